@@ -69,7 +69,7 @@ def main():
     for here, there in differ[:20]:
         print(f"C: {here}   Python: {there}")
     if differ or len(c) != len(python):
-        sys.exit("tools/python/declare.py has not understood a header")
+        sys.exit("tools/python/declare.py does not support a header")
     enums = sum(isinstance(v, type) and issubclass(v, enum.IntEnum) and v is not enum.IntEnum
                 for v in vars(declared).values())
     print(f"{len(structs)} structs, {len(constants)} constants, {len(declared.INIT)} initial values, "

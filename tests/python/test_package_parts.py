@@ -167,7 +167,7 @@ class Parts(Case):
         self.assertEqual(double.mesh().vertices.dtype, np.float64)
         text = "v 691234.567 5334567.891 0\nv 691235.567 5334567.891 0\nv 691234.567 5334568.902 1\nf 1 2 3\n"
         pathlib.Path("utm.obj").write_text(text + "l 1 2\n")
-        with self.assertWarnsRegex(UserWarning, "^utm.obj: ignored in reading: points, lines"):
+        with self.assertWarnsRegex(UserWarning, "^utm.obj: not read: points, lines"):
             utm = ebpo.convert("utm.obj", "utm.ebpo.h5")
         self.assertEqual(sorted(utm.mesh().vertices.tolist()),
                          sorted([float(x) for x in line.split()[1:]] for line in text.splitlines()[:3]))

@@ -2,9 +2,9 @@
 """Translates the public headers to ctypes: declare.py INCLUDE_FOLDER [OUTPUT]
 
 Writes the module ebpo/_declared.py: each struct, enumeration, constant, function and initial value
-(EBPO_..._INIT) of lib/include/ebpo/*.h, so that nothing of them is written twice. It understands the
-C that these headers are written in, and stops at what it does not. tests/python/test_declared.py
-compares sizes, offsets and initial values with those of the C compiler.
+(EBPO_..._INIT) of lib/include/ebpo/*.h. So no declaration is written by hand. The program supports only the
+C constructs of these headers, and stops at others. tests/python/test_declared.py compares sizes, offsets and
+initial values with those of the C compiler.
 """
 import pathlib
 import re
@@ -34,7 +34,7 @@ class Unknown(Exception):
 
 
 def text_of(header, seen):
-    """Return a header after the headers that it includes, each once, without comments."""
+    """Return the text of a header, without comments, after the headers that it includes. Each header occurs once."""
     if header in seen:
         return ""
     seen.add(header)
@@ -46,7 +46,7 @@ def text_of(header, seen):
 
 
 def value_of(text, known):
-    """An expression or initializer of C: a number, or a list of such."""
+    """Return the value of a C expression or initializer: a number, or a list of values."""
     python = re.sub(r"\b(?:UINT64_C|INT64_C)\((\w+)\)", r"\1", text)
     python = re.sub(r"\b(0[xX][0-9a-fA-F]+|\d+)[uUlL]+\b", r"\1", python)
     python = python.replace("~0u", "0xffffffff").replace("__builtin_inf()", "INFINITY")
@@ -56,7 +56,7 @@ def value_of(text, known):
     python = python.replace("{", "[").replace("}", "]")
     names = dict(known, **LITERALS, INFINITY=float("inf"), sizeof=lambda name: f"sizeof({name})")
     try:
-        return eval(python, {"__builtins__": {}}, names)  # of our own headers
+        return eval(python, {"__builtins__": {}}, names)  # the text is from the project's headers
     except Exception as error:
         raise Unknown(f"{text.strip()}: {error}") from None
 
@@ -195,7 +195,7 @@ class Headers:
             if name.endswith("_INIT"):
                 struct = name[:-len("_INIT")].lower()
                 if struct not in self.types:
-                    raise Unknown(f"{name} is of no struct {struct}")
+                    raise Unknown(f"{name}: there is no struct {struct}")
                 self.known[name] = value_of(text, self.known)
                 self.lines.append(f"INIT[{struct}] = {written(self.known[name])}")
 
@@ -209,7 +209,7 @@ def main():
         headers = [include / "ebpo" / "ebpo.h", *sorted((include / "ebpo").glob("*.h"))]
         text = Headers("".join(text_of(header, seen) for header in headers)).declared()
     except Unknown as error:
-        sys.exit(f"declare.py: not understood: {error}")
+        sys.exit(f"declare.py: unsupported C: {error}")
     if len(sys.argv) == 3:
         pathlib.Path(sys.argv[2]).write_text(text, encoding="utf-8")
     else:

@@ -1,17 +1,17 @@
-"""Builds the wheel of the package for Python: a backend of PEP 517 for pip and build.
+"""Builds the wheel of the Python package: a backend of PEP 517 for pip and build.
 
     pip wheel tools/python --no-deps -w dist
     pip wheel tools/python --no-deps -w dist --config-settings setup-args=-Dhttp=enabled
-    python3 tools/python/backend/ebpo_wheel.py BUILD_FOLDER DIST    # packs what has been built
+    python3 tools/python/backend/ebpo_wheel.py BUILD_FOLDER DIST    # packs an existing build
 
 It needs meson, ninja, a C compiler, binutils and patchelf, and downloads nothing. The library is built without
-libhdf5, libcurl, assimp and qhull. Libraries that it still needs (zstd, zlib, GMP, nettle, jansson) go
-into the wheel beside it under names of their own, so that no other package's copy is taken for them;
-so do their licences. There is no code for a version of Python in it: one wheel is for all of them. Its
-tag says which glibc it needs. Equal inputs give equal bytes.
+libhdf5, libcurl, assimp and qhull. The libraries that it still needs (zstd, zlib, GMP, nettle, jansson) and
+their licences go into the wheel. These libraries get unique names, so that no other package's copy is used
+instead. The wheel contains no code for one version of Python, so one wheel serves all versions. Its tag
+states the required version of glibc. Equal inputs give equal bytes.
 
-It is not meson-python that builds it, because that installs all of a project: the command, the headers
-and the manuals as well, up to its version 0.12 without a choice.
+meson-python is not used, because it installs the whole project: also the command, the headers and the
+manuals. Up to its version 0.12 it has no option for this.
 """
 import base64
 import hashlib
@@ -30,7 +30,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 SETUP = ["--buildtype=release", "-Dtests=disabled", "-Dhttp=disabled", "-Dassimp=disabled", "-Dqhull=disabled",
          "-Drender=disabled", "-Dcaptions=disabled", "-Dpython_dir=none",
          "-Dhdf5=disabled"]
-# What every Linux with glibc has (PEP 600).
+# Libraries of every Linux with glibc (PEP 600).
 SYSTEM = re.compile(r"^(ld-linux|libc|libm|libpthread|libdl|librt|libgcc_s|libstdc\+\+)[-.]")
 DATE = (1980, 1, 1, 0, 0, 0)
 
@@ -38,7 +38,7 @@ DATE = (1980, 1, 1, 0, 0, 0)
 def run(*command):
     done = subprocess.run([str(word) for word in command], stdout=subprocess.PIPE, text=True)
     if done.returncode:
-        sys.stderr.write(done.stdout)  # of ninja the compiler's messages
+        sys.stderr.write(done.stdout)  # ninja prints the compiler's messages here
         sys.exit(f"ebpo_wheel.py: {' '.join(map(str, command))} failed; its messages are above")
     return done.stdout
 
@@ -60,14 +60,14 @@ def build(folder, setup_args):
 
 
 def needed(library, system):
-    """Libraries that a library names and the system need not have, with their paths."""
+    """Return the libraries that a library needs and the system may lack, with their paths."""
     where = dict(re.findall(r"^\s*(\S+) => (/\S+)", run("ldd", library), flags=re.M))
     names = [name for name in run("patchelf", "--print-needed", library).split() if not system.match(name)]
     return {name: pathlib.Path(where[name]) for name in names}
 
 
 def bundle(library, folder, system):
-    """Copy a library and all that it needs to a folder, and makes them find each other there."""
+    """Copy a library and all libraries that it needs to a folder, and make them find each other there."""
     names, waiting = {}, [(copied(library, folder / "libebpo.so.0"), needed(library, system))]
     while waiting:
         file, needs = waiting.pop()
@@ -92,7 +92,7 @@ def copied(path, copy):
 
 
 def licences(names):
-    """Of libraries that are in the wheel, as Debian keeps them; (name, text)."""
+    """Yield (name, text) of the licence of each library in the wheel, from Debian's copyright files."""
     for name in names:
         printed = subprocess.run(["dpkg-query", "-S", f"*/{name}"], capture_output=True, text=True).stdout
         package = printed.partition(":")[0].strip()
@@ -102,15 +102,15 @@ def licences(names):
 
 
 def glibc(file):
-    """Versions of glibc that a library's symbols are of, as its table of needed versions has them."""
+    """Return the versions of glibc that a library needs, from its table of needed versions."""
     printed = run("env", "LC_ALL=C", "readelf", "--wide", "--version-info", file).partition("Version needs section")[2]
     names = re.findall(r"Name: GLIBC_(\S+)", printed)
-    relative = [(2, 36)] if "ABI_DT_RELR" in names else []  # packed relocations, which that one reads first
+    relative = [(2, 36)] if "ABI_DT_RELR" in names else []  # packed relocations need glibc 2.36
     return relative + [tuple(map(int, name.split(".")[:2])) for name in names if name[0].isdigit()]
 
 
 def tag(files):
-    """py3-none-PLATFORM, by the glibc that the libraries ask for; not below that of manylinux2014."""
+    """Return py3-none-PLATFORM for the glibc that the libraries need, at least that of manylinux2014."""
     machine = sysconfig.get_platform().rpartition("-")[2].replace("-", "_")
     if platform.libc_ver()[0] != "glibc":
         return f"py3-none-linux_{machine}"
@@ -121,7 +121,7 @@ def tag(files):
 METADATA = """Metadata-Version: 2.1
 Name: ebpo
 Version: {version}
-Summary: EBP-Octree in HDF5: exact questions to triangle meshes of any size
+Summary: EBP-Octree in HDF5: exact queries on triangle meshes of any size
 License: MIT
 Requires-Python: >=3.9
 Requires-Dist: numpy
@@ -142,7 +142,7 @@ def metadata():
 
 
 def write(path, entries):
-    """A zip of (name, bytes, executable), and its RECORD."""
+    """Write a zip of entries (name, bytes, executable), and its RECORD."""
     record = []
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
         def add(name, data, executable=False):
@@ -160,7 +160,7 @@ def write(path, entries):
 
 
 def pack(folder, dist, system=SYSTEM):
-    """A wheel of what is in a build folder, without libraries that `system` matches."""
+    """Pack a build folder into a wheel, without libraries whose names match `system`."""
     folder, dist = pathlib.Path(folder), pathlib.Path(dist)
     dist.mkdir(parents=True, exist_ok=True)
     about = f"ebpo-{version()}.dist-info"
@@ -180,7 +180,7 @@ def pack(folder, dist, system=SYSTEM):
     return path.name
 
 
-# ---- what pip calls ----
+# ---- functions that pip calls ----
 
 
 def setup_args(config_settings):
@@ -203,7 +203,7 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
 
 
 def build_sdist(sdist_directory, config_settings=None):
-    raise SystemExit("ebpo_wheel.py: the package is built from the whole project; `meson dist` packs that")
+    raise SystemExit("ebpo_wheel.py: a source distribution is the whole project; make it with `meson dist`")
 
 
 def main():

@@ -1,4 +1,4 @@
-"""EBP-Octree in HDF5: .ebpo.h5 files, and exact queries of them, with numpy arrays.
+"""EBP-Octree in HDF5: .ebpo.h5 files and exact queries on them, with numpy arrays.
 
 >>> import ebpo
 >>> m = ebpo.open("cube.ebpo.h5")
@@ -28,10 +28,11 @@ __version__: str = _lib.ebpo_version().decode()
 
 
 def library() -> str:
-    """Return the path or name of the shared library that is used.
+    """Return the path or name of the shared library in use.
 
-    It is that of the variable EBPO_LIBRARY, else the one inside the package, else the one of the build
-    folder that the package lies in, else that of the `ebpo` in PATH, else the system's.
+    The first of these is used: the value of the variable EBPO_LIBRARY, the library inside the package, the
+    library in the installation prefix or build folder of the package, the library of the `ebpo` in PATH, the
+    system's library.
     """
     return str(_lib.path)
 

@@ -1,4 +1,4 @@
-"""trimesh and PyVista, where they are installed: nothing is imported before it is needed."""
+"""Adapters for trimesh and PyVista. They are imported when they are needed."""
 from __future__ import annotations
 
 from typing import Any
@@ -9,7 +9,7 @@ from .model import Model
 
 
 def to_trimesh(model: Model, **options: Any) -> Any:
-    """Return the mesh as a trimesh.Trimesh; options are those of trimesh. Not processed by default."""
+    """Return the mesh as a trimesh.Trimesh; options are those of trimesh. Unprocessed by default."""
     import trimesh
     mesh = model.mesh(order="source" if "maps" in model.info.parts else "file")
     return trimesh.Trimesh(vertices=np.array(mesh.vertices), faces=np.array(mesh.faces, dtype=np.int64),
@@ -17,13 +17,13 @@ def to_trimesh(model: Model, **options: Any) -> Any:
 
 
 def from_trimesh(mesh: Any, output: Any, **options: Any) -> Model:
-    """Convert a trimesh.Trimesh, or what else has vertices and faces, as `convert` does."""
+    """Convert a trimesh.Trimesh, or another object with vertices and faces, as `convert` does."""
     from .build import convert
     return convert((mesh.vertices, mesh.faces), output, **options)
 
 
 def to_pyvista(model: Model, level: int | None = None) -> Any:
-    """Return the mesh, or a level's envelopes with octcode, type and volume of cells, as a pyvista.PolyData."""
+    """Return the mesh as a pyvista.PolyData, or a level's envelopes with octcode, type and volume of cells."""
     import pyvista
     if level is None:
         mesh = model.mesh(order="source" if "maps" in model.info.parts else "file")
@@ -36,7 +36,7 @@ def to_pyvista(model: Model, level: int | None = None) -> Any:
 
 
 def faces_of_vtk(faces: np.ndarray) -> np.ndarray:
-    """Rows of 3 and three numbers, in one line."""
+    """Return VTK's flat array of faces: for each face a 3 and its three indices."""
     out = np.empty((len(faces), 4), np.int64)
     out[:, 0], out[:, 1:] = 3, faces
     return out.ravel()
@@ -47,8 +47,10 @@ class TrimeshLike:
 
     contains, ray.intersects_any, intersects_first, intersects_id, intersects_location, contains_points;
     nearest.on_surface, signed_distance; bounds, extents, area, volume, center_mass, is_watertight,
-    vertices, faces. Points on faces are contained. Numbers of faces are those of `faces`, which is in
-    the source's order if the file has maps.
+    vertices, faces.
+
+    Points on faces are contained. Face indices are those of `faces`, which is in the source's order if the
+    file has maps.
 
     >>> mesh = cube.as_trimesh()
     >>> mesh.contains([[.5, .5, .5], [2, 0, 0]])
@@ -67,11 +69,11 @@ class TrimeshLike:
         self.nearest = TrimeshNearest(model)
 
     def contains(self, points: Any) -> np.ndarray:
-        """(n,) bool."""
+        """Return True for points inside: (n,) bool."""
         return self.model.inside(points)
 
     def signed_distance(self, points: Any) -> np.ndarray:
-        """(n,) float64, positive inside, as trimesh has it."""
+        """Return distances: (n,) float64, positive inside as in trimesh."""
         return self.nearest.signed_distance(points)
 
     def _read(self) -> Any:
@@ -96,44 +98,44 @@ class TrimeshLike:
 
 
 class TrimeshNearest:
-    """As trimesh.proximity.ProximityQuery."""
+    """The queries of trimesh.proximity.ProximityQuery."""
 
     def __init__(self, model: Model) -> None:
         self._model = model
 
     def on_surface(self, points: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(n, 3) nearest points, (n,) distances, not negative, (n,) faces."""
+        """Return the nearest points (n, 3), distances (n,), which are not negative, and faces (n,)."""
         distance, point, _, face = self._model.distance(points, signed=False)
         return point, distance, face
 
     def signed_distance(self, points: Any) -> np.ndarray:
-        """(n,) float64, positive inside."""
+        """Return distances: (n,) float64, positive inside."""
         return -self._model.distance(points).distance + 0.0
 
 
 class TrimeshRays:
-    """As trimesh.ray: directions are of any length."""
+    """The queries of trimesh.ray. Directions have any length."""
 
     def __init__(self, model: Model) -> None:
         self._model = model
 
     def intersects_any(self, ray_origins: Any, ray_directions: Any) -> np.ndarray:
-        """(n,) bool."""
+        """Return True for rays that hit a face: (n,) bool."""
         return self._model.ray_any(ray_origins, ray_directions)
 
     def intersects_first(self, ray_origins: Any, ray_directions: Any) -> np.ndarray:
-        """(n,) int64 faces, -1: none."""
+        """Return the first face of each ray: (n,) int64, -1: none."""
         return self._model.ray(ray_origins, ray_directions).face
 
     def intersects_id(self, ray_origins: Any, ray_directions: Any, return_locations: bool = False,
                       multiple_hits: bool = True) -> tuple:
-        """Faces, rays and, if asked for, (k, 3) points of hits."""
+        """Return the faces (k,) and rays (k,) of hits and, with return_locations, the points (k, 3)."""
         locations, rays, faces = self.intersects_location(ray_origins, ray_directions, multiple_hits)
         return (faces, rays, locations) if return_locations else (faces, rays)
 
     def intersects_location(self, ray_origins: Any, ray_directions: Any, multiple_hits: bool = True
                             ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(k, 3) points, (k,) rays, (k,) faces."""
+        """Return the points (k, 3), rays (k,) and faces (k,) of hits."""
         if multiple_hits:
             hits = self._model.ray_all(ray_origins, ray_directions)
             t, rays, faces = hits.t, hits.ray, hits.face
@@ -142,9 +144,9 @@ class TrimeshRays:
             rays = np.flatnonzero(first.face >= 0)
             t, faces = first.t[rays], first.face[rays]
         o = np.asarray(ray_origins, dtype=np.float64)[rays]
-        with np.errstate(invalid="ignore"):  # a t beyond doubles gives no point: nan
+        with np.errstate(invalid="ignore"):  # an infinite t gives the point nan
             return o + t[:, None] * np.asarray(ray_directions, dtype=np.float64)[rays], rays, faces
 
     def contains_points(self, points: Any) -> np.ndarray:
-        """(n,) bool."""
+        """Return True for points inside: (n,) bool."""
         return self._model.inside(points)

@@ -1,4 +1,4 @@
-"""Decides how much of a model is held without a budget: parts, until the whole model is cheaper."""
+"""Decides without a budget how much of a model is in memory: subtrees, until the whole model is cheaper."""
 from __future__ import annotations
 
 import contextlib
@@ -10,21 +10,25 @@ from . import _declared as c
 from ._library import Handle, call, lib, made
 from .errors import LimitError
 
-SMALL = 16 << 20  # a model that is loaded at once: some milliseconds
-# The mean of so many loads is believed; estimated loads must exceed all subtrees so many times.
+SMALL = 16 << 20  # a whole model of at most this size is loaded at once, in some milliseconds
+# BELIEVED: loads before their mean time is used. CERTAIN: factor by which estimated loads must
+# exceed the number of subtrees.
 BELIEVED, CERTAIN = 8, 4
 FIRST = 16  # queries before the first decision
 
 
 class Automatic:
-    """Decides as the command does without --memory (tools/cli/commands/query_holding.c): at most half of the free memory.
+    """Makes the decisions of the command without --memory (tools/cli/commands/query_holding.c).
 
-    options: of the model; they are changed. waiting: it is held in parts, and all of it would fit.
+    At most half of the free memory is used.
+
+    options: the model's options, which are changed here.
+    waiting: subtrees are loaded, and the whole model would fit into memory.
     """
 
     def __init__(self, file: Handle, options: Any) -> None:
         self.file, self.options, self.waiting = file, options, False
-        self.lock = threading.Lock()  # of the counts
+        self.lock = threading.Lock()  # protects the counts
         self.queries, self.seconds, self.subtrees, self.next = 0, 0.0, 0, FIRST
         wished = options.memory or options.cut_level >= 0 or options.prefetch
         info = c.ebpo_info.from_address(lib.ebpo_file_info(file))
@@ -38,7 +42,7 @@ class Automatic:
 
     def _decide(self, info: Any) -> None:
         plan = self._plan()
-        if plan.budget:  # the library has decided for a file elsewhere
+        if plan.budget:  # the library has chosen a budget for a file elsewhere
             return
         options = self.options
         options.memory = limit = max(lib.ebpo_free_memory() // 2, plan.least)
@@ -46,16 +50,16 @@ class Automatic:
         if plan.resident and plan.whole <= SMALL:
             return
         options.cut_level = info.subtree_level or -1
-        if options.cut_level < 0:  # as if not all of it fitted
+        if options.cut_level < 0:  # plan as if the whole model did not fit
             options.memory = plan.whole - 1 if plan.resident else limit
-            with contextlib.suppress(LimitError):  # the whole model is as small as the least budget
+            with contextlib.suppress(LimitError):  # the whole model may need no more than the least budget
                 options.cut_level = self._plan().cut_level
             options.memory = limit
         self.subtrees = self._plan().subtrees
         self.waiting = bool(plan.resident and self.subtrees)
 
     def piece(self) -> int:
-        """Return how many queries at most come before the next decision."""
+        """Return the greatest number of queries before the next decision."""
         return max(FIRST, self.queries) if self.waiting else 1 << 62
 
     def add(self, queries: int, seconds: float) -> None:
@@ -64,9 +68,12 @@ class Automatic:
             self.seconds += seconds
 
     def pays(self, model: Handle, total: int, parts_share: float) -> bool:
-        """Return whether the whole model has become cheaper: parts have cost as much, or certainly will.
+        """Return True when loading the whole model is cheaper.
 
-        total: queries that are known to come; parts_share: of the time of queries, the cost of parts.
+        That is so when subtrees have cost as much as the whole model, or certainly will.
+
+        total: number of queries that are known to follow.
+        parts_share: share of the queries' time that loading subtrees costs.
         """
         if self.queries < self.next:
             return False
@@ -83,7 +90,7 @@ class Automatic:
                                                  expected >= CERTAIN * self.subtrees)
 
     def whole(self) -> Any:
-        """Return the options of a model that is all in memory."""
+        """Return the options of a model that is completely in memory."""
         options = c.ebpo_model_options.from_buffer_copy(self.options)
         options.cut_level = -1
         return options

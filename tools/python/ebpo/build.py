@@ -27,23 +27,24 @@ RULES = {rule.name.lower(): int(rule) for rule in c.Rule}
 def convert(mesh: Any, output: Any, *, parts: Any = None, rule: str = "nonzero", codec: str = "zstd",
             codec_level: int = 0, memory: int | str | None = None, temp_dir: Any = None,
             threads: int | None = None, progress: Callable | None = None, **options: Any) -> Model:
-    """Convert a mesh to an .ebpo.h5 file, which is replaced atomically, and opens it.
+    """Convert a mesh to an .ebpo.h5 file, which is replaced atomically, and open it.
 
-    mesh: the path of a PLY, OBJ, STL or OFF, or (vertices, faces): (v, 3) of float32, which stay such, or
-        anything that float64 takes, and (f, 3) integers.
-    parts: as `ebpo convert --parts`: "mesh,maps,attributes,envelopes,leaf-planes,colours", the parts to store,
-        or parts with minus signs, "-maps,-colours", to omit; or a list of such names. None: all but leaf-planes.
-    rule: "nonzero", "evenodd" or "positive": winding numbers that are inside.
+    mesh: the path of a PLY, OBJ, STL or OFF, or (vertices, faces). vertices: (v, 3); float32 is stored as
+        float32, other types as float64. faces: (f, 3) integers.
+    parts: as `ebpo convert --parts`: the parts to store, such as
+        "mesh,maps,attributes,envelopes,leaf-planes,colours", or parts to omit with minus signs, such as
+        "-maps,-colours"; or a list of such names. None: all except leaf-planes.
+    rule: "nonzero", "evenodd" or "positive": the winding numbers that are inside.
     codec: "zstd", "deflate" or "none".
-    memory: bytes that the process may take; the rest goes to temporary files in temp_dir. None: half
-        of the machine's.
+    memory: budget in bytes for the process; the rest is stored in temporary files in temp_dir. None: half
+        of the machine's memory.
     options: weld, orient, fill_holes, flip, drop_duplicates, weld_distance: repair the mesh; max_level, leaf_faces,
         epsilon, require_solid, seed, unit, crs, date as in ebpo_build_options, ebpo/build.h. Defaults are
-        those of the command `ebpo convert`, and so are the bytes of the file.
+        those of the command `ebpo convert`; the files are then equal byte for byte.
 
-    Warns of data that was lost while reading, such as digits that a PLY's floats do not keep.
+    Warns of data that is lost while reading, such as digits that a PLY's floats do not keep.
 
-    Raises NotSolidError with require_solid, UnsupportedError where the library is one without libhdf5,
+    Raises NotSolidError with require_solid, UnsupportedError when the library was built without libhdf5,
     FormatError, IOFailure.
 
     >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
@@ -55,12 +56,12 @@ def convert(mesh: Any, output: Any, *, parts: Any = None, rule: str = "nonzero",
     if unknown:
         raise TypeError(f"convert() has no option {', '.join(sorted(unknown))}")
     if options.get("date") and not lib.ebpo_is_date(options["date"]):
-        raise ValueError(f"date: {options['date']!r} is not one as in ISO 8601 and in the calendar, such as 2026-11-26")
+        raise ValueError(f"date: {options['date']!r} is not a valid date in ISO 8601, such as 2026-11-26")
     for what, given, known in (("rule", rule, RULES), ("codec", codec, CODECS)):
         if given not in known:
-            raise ValueError(f"{what}: {', '.join(map(repr, known))}, not {given!r}")
+            raise ValueError(f"{what}: expected one of {', '.join(map(repr, known))}, not {given!r}")
     stored = parts_of(parts)
-    call("ebpo_register_filters")  # a library without libhdf5 says now, not after hours, that it cannot write
+    call("ebpo_register_filters")  # fails before the work when the library has no libhdf5
     call("ebpo_check_output", path(output, "output"))
     space = made(c.ebpo_workspace_options, memory=size_in_bytes(memory),
                  temp_dir=None if temp_dir is None else path(temp_dir, "temp_dir"))
@@ -82,19 +83,19 @@ def convert(mesh: Any, output: Any, *, parts: Any = None, rule: str = "nonzero",
 
 
 def parts_of(parts: Any) -> int:
-    """Return the bits of parts that are named as for `ebpo convert --parts`. ValueError: no such list."""
+    """Return the bits of parts, which have the names of `ebpo convert --parts`. Raises ValueError for another list."""
     if parts is None:
         return DEFAULT_PARTS
     given = parts.split(",") if isinstance(parts, str) else list(parts)
     omits = {name.startswith("-") for name in given}
     names = {name[1:] if name.startswith("-") else name for name in given}
-    names = {"envelopes" if name == "planes" else name for name in names}  # as in Info.parts
+    names = {"envelopes" if name == "planes" else name for name in names}  # the name in Info.parts
     if len(omits) != 1 or not names <= set(PARTS):
-        raise ValueError(f"parts: a list of {', '.join(PARTS)}, or of these with a minus sign before each, "
-                         f"not {','.join(given)!r}")
+        raise ValueError(f"parts: expected a list of {', '.join(PARTS)}, or of these names with a minus sign "
+                         f"before each, not {','.join(given)!r}")
     if omits == {True}:
         names = {name for name, bit in PARTS.items() if bit & DEFAULT_PARTS} - names
-        for name, needed in NEEDS.items():  # in this order
+        for name, needed in NEEDS.items():  # the order of NEEDS matters
             names -= {name} if needed not in names else set()
     for name in names & set(NEEDS):
         if NEEDS[name] not in names:
@@ -103,21 +104,21 @@ def parts_of(parts: Any) -> int:
 
 
 def read_mesh(mesh: Any, workspace: Handle, attributes: bool, common: dict) -> Struct:
-    """An ebpo_mesh of a file, or of arrays."""
+    """Return an ebpo_mesh of a file, or of arrays."""
     if isinstance(mesh, (str, bytes, os.PathLike)):
         options = made(c.ebpo_mesh_read_options, attributes=attributes, workspace=workspace.pointer, **common)
         read = Struct(c.ebpo_mesh, "ebpo_mesh_free", workspace)
         call("ebpo_mesh_read", path(mesh, "mesh"), ctypes.byref(options), read)
         ignored = lib.ebpo_mesh_ignored(read)
         if ignored:
-            warnings.warn(f"{os.fsdecode(mesh)}: ignored in reading: {ignored.decode()}", stacklevel=3)
+            warnings.warn(f"{os.fsdecode(mesh)}: not read: {ignored.decode()}", stacklevel=3)
         return read
     vertices, faces = map(np.asarray, mesh)
     if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
         raise ValueError(f"vertices are (v, 3) and faces (f, 3), not {vertices.shape} and {faces.shape}")
     faces = integers(faces, np.uint32, "faces")
     if faces.size and faces.max() >= len(vertices):
-        raise ValueError("a face names a vertex that is not there")
+        raise ValueError("a face names a vertex that does not exist")
     single = vertices.dtype == np.float32
     read = Struct(c.ebpo_mesh, "ebpo_mesh_free", workspace, vertex_count=len(vertices), face_count=len(faces))
     xyz = of_malloc(vertices if single else doubles(vertices, "vertices"))
@@ -128,7 +129,7 @@ def read_mesh(mesh: Any, workspace: Handle, attributes: bool, common: dict) -> S
 
 
 def of_malloc(values: np.ndarray) -> int:
-    """Return a copy that free() frees."""
+    """Return the address of a copy that free() frees."""
     values = np.ascontiguousarray(values)
     malloc = ctypes.CDLL(None).malloc
     malloc.restype, malloc.argtypes = ctypes.c_void_p, [ctypes.c_size_t]

@@ -1,7 +1,7 @@
-"""Exceptions. Each failure of the library is one of these classes, with its message.
+"""Exceptions. Each failure of the library is one of these classes, with the library's message.
 
-The message says what, where and what next. The classes are also those of Python that fit, so that
-`except OSError` catches what the system or a server said no to.
+The message states what is wrong, where, and what to do. The classes derive from the corresponding classes
+of Python, so `except OSError` catches failures of the system or of a server.
 """
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ class Error(Exception):
     """A failure of the library.
 
     status: the name of the C status, such as "EBPO_E_FORMAT".
-    file, object: the file at fault, and the path inside it, or "".
-    offset: the byte at fault, or None.
+    file: the file with the fault, or "".
+    object: the path inside the file, or "".
+    offset: the offset of the fault in bytes, or None.
     """
 
     status: str = ""
@@ -56,7 +57,7 @@ class NotSolidError(Error, ValueError):
 
 
 class LimitError(Error, ValueError):
-    """A count or size is beyond a limit, or the budget is too small; the message names enough."""
+    """A count or size exceeds a limit, or the budget is too small. The message states a sufficient budget."""
 
 
 class Cancelled(Error):
@@ -64,7 +65,7 @@ class Cancelled(Error):
 
 
 class AbsentError(Error, LookupError):
-    """The file was written without a part that is needed."""
+    """The file was written without a part that the query needs."""
 
 
 class NoMemory(Error, MemoryError):

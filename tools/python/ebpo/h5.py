@@ -1,25 +1,25 @@
-"""Lets programs with h5py read .ebpo.h5 files, with or without the rest of this package.
+"""Lets programs read .ebpo.h5 files with h5py, with or without the rest of this package.
 
-The files are HDF5, and format-spec/README.md says what is in them. Arrays of files that were written
-with `--codec deflate` or `none` are read by any h5py. The default codec is zstd, HDF5's filter 32015,
-which takes a plugin; one of these is enough:
+The files are HDF5 files; format-spec/README.md describes their contents. Every h5py reads the arrays of files
+that were written with `--codec deflate` or `none`. The default codec is zstd, HDF5's filter 32015, which
+needs a plugin. One of these is sufficient:
 
-    import hdf5plugin                   # of the package index: registers zstd, and others, on import
+    import hdf5plugin                   # from PyPI: registers zstd and other filters on import
     import h5py
 
-    HDF5_PLUGIN_PATH=/usr/local/lib/hdf5/plugin python3 ...     # the project's own, from its installation
+    HDF5_PLUGIN_PATH=/usr/local/lib/hdf5/plugin python3 ...     # the plugin that this project installs
 
     import ebpo.h5
-    ebpo.h5.enable()                    # whichever of the two is there
+    ebpo.h5.enable()                    # uses whichever of the two exists
 
-`ebpo --version --verbose` names the folder of the project's plugin. `h5py` then reads as from any file:
+`ebpo --version --verbose` prints the folder of the project's plugin. Then `h5py` reads as usual:
 
     with h5py.File("bunny.ebpo.h5") as file:
         file.attrs["box_origin"], file["/levels/01/plane_counts"][:]
 
-Arrays with a coding (vertices, faces, lists of faces) are read as numbers that format-spec/README.md,
-section 7, says how to decode; `ebpo.Model` does that. samples/read_level.py reads a level with h5py alone,
-and format-spec/read_ebpo.py all of a file: it is a second reader, made from the specification.
+Arrays with a coding (vertices, faces, lists of faces) are read as codes. Section 7 of format-spec/README.md
+describes how to decode them; `ebpo.Model` decodes them. samples/read_level.py reads a level with h5py alone.
+format-spec/read_ebpo.py reads the whole file: it is a second reader, written from the specification.
 """
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ ZSTD = 32015
 
 
 def plugin_folder() -> str | None:
-    """Return the folder of the project's zstd plugin, as the `ebpo` in PATH prints it, or None."""
+    """Return the folder of the project's zstd plugin, which the `ebpo` in PATH prints, or None."""
     try:
         printed = subprocess.run(["ebpo", "--version", "--verbose"], capture_output=True, text=True)
     except OSError:
@@ -41,13 +41,15 @@ def plugin_folder() -> str | None:
 
 
 def enable() -> str:
-    """Enable zstd for h5py in this process. Returns the name of the plugin. ImportError: no plugin found.
+    """Enable zstd for h5py in this process. Returns the name of the plugin.
 
-    Before the first file is opened: HDF5 remembers that it has found no plugin.
+    Call it before the first file is opened: HDF5 does not search again for a plugin that it did not find.
+
+    Raises ImportError when no plugin is found.
     """
     import h5py
     if h5py.h5z.filter_avail(ZSTD):
-        return "HDF5 has it"
+        return "built into HDF5"
     try:
         import hdf5plugin  # noqa: F401
         return "hdf5plugin"
@@ -59,4 +61,4 @@ def enable() -> str:
         if h5py.h5z.filter_avail(ZSTD):
             return folder
     raise ImportError("h5py has no filter for zstd: install hdf5plugin, or set HDF5_PLUGIN_PATH to the folder "
-                      "that `ebpo --version --verbose` names")
+                      "that `ebpo --version --verbose` prints")

@@ -1,4 +1,4 @@
-"""Haptics: force, distance, and a proxy path that passes through no face."""
+"""Haptics: force, distance, and a proxy whose path passes through no face."""
 from __future__ import annotations
 
 import ctypes
@@ -14,7 +14,7 @@ _STOPPED = c.EBPO_HAPTIC_STOPPED
 
 
 class HapticResult(NamedTuple):
-    """The result of a haptic step of a ball or a tool; see ebpo/haptic.h. face: -1 if none is near."""
+    """Result of a haptic step of a ball or a tool; see ebpo/haptic.h. face: -1: no face is near."""
 
     proxy: np.ndarray
     force: np.ndarray
@@ -27,12 +27,15 @@ class HapticResult(NamedTuple):
 
     @property
     def stopped(self) -> bool:
-        """No more faces will be loaded: `Haptic.check` raises why."""
+        """True: loading of faces has failed; `Haptic.check` raises the error."""
         return bool(self.flags & _STOPPED)
 
 
 class ProbeResult(NamedTuple):
-    """The result of a haptic step of a probe: the distance (NaN if only its bounds are known), from lo to hi."""
+    """Result of a haptic step of a probe.
+
+    distance: NaN if only its bounds are known. lo, hi: certain bounds of the distance.
+    """
 
     distance: float
     lo: float
@@ -44,7 +47,7 @@ class ProbeResult(NamedTuple):
 
     @property
     def stopped(self) -> bool:
-        """No more faces will be loaded: `Haptic.check` raises why."""
+        """True: loading of faces has failed; `Haptic.check` raises the error."""
         return bool(self.flags & _STOPPED)
 
 
@@ -60,11 +63,13 @@ def _number(face: int) -> int:
 
 
 class Haptic:
-    """A hand at `place`: a ball of `radius`, or with `points` (n, 3) a tool, or with `probe` a point that
-    nothing stops. Other options are those of ebpo_haptic_options. One thread at a time.
+    """A haptic object at the position `place`. One thread at a time.
 
-    Loading goes on beside it; where `flags` has EBPO_HAPTIC_WAITING (2), the hand is ahead of that; where
-    a tick is `stopped`, no more will come.
+    The object is a ball of `radius`; with `points` (n, 3) a tool; with `probe` a probe, which faces do not
+    stop. Other options are members of ebpo_haptic_options.
+
+    A separate thread loads faces. While a result has EBPO_HAPTIC_WAITING (2) in `flags`, the proxy waits
+    for faces. If a result is `stopped`, no further faces will be loaded.
 
     >>> haptic = Haptic(cube, [.5, .5, 2], radius=.1, stiffness=100, damping=0)
     >>> for step in range(200):
@@ -87,21 +92,21 @@ class Haptic:
                                    free="ebpo_haptic_free", keep=(model.model,))
 
     def step(self, device: Any) -> HapticResult:
-        """Compute a haptic step of a ball."""
+        """Compute a haptic step of a ball with the device at a position (3,)."""
         r = c.ebpo_haptic_ball_result()
         lib.ebpo_haptic_step_ball(self._handle, _vector(device, 3), ctypes.byref(r))
         return HapticResult(np.array(r.proxy), np.array(r.force), np.zeros(3), np.array([0, 0, 0, 1.0]),
                             np.array(r.normal), r.depth, _number(r.face), r.flags)
 
     def step_tool(self, place: Any, quaternion: Any) -> HapticResult:
-        """Compute a haptic step of a tool; quaternions are x, y, z, w."""
+        """Compute a haptic step of a tool at a pose. quaternion: x, y, z, w."""
         r = c.ebpo_haptic_tool_result()
         lib.ebpo_haptic_step_tool(self._handle, _vector(place, 3), _vector(quaternion, 4), ctypes.byref(r))
         return HapticResult(np.array(r.proxy), np.array(r.force), np.array(r.torque), np.array(r.turn),
                             np.array(r.normal), r.depth, _number(r.face), r.flags)
 
     def step_probe(self, place: Any) -> ProbeResult:
-        """Compute a haptic step of a probe."""
+        """Compute a haptic step of a probe at a position (3,)."""
         r = c.ebpo_haptic_probe_result()
         lib.ebpo_haptic_step_probe(self._handle, _vector(place, 3), ctypes.byref(r))
         return ProbeResult(r.distance, r.lo, r.hi, np.array(r.normal), _number(r.face), r.where, r.flags)

@@ -15,14 +15,14 @@ CODES = {kind: code for code, kind in BY_STATUS.items()}
 IO, CANCELLED = -3, -9
 ENTRY: dict = {name: kind for name, kind in c.ebpo_catalogue_options._fields_}
 
-_files: dict[int, Handle] = {}  # that the library has open, by their addresses
-_options: list[dict] = []  # of catalogues; an opener's number is a place here, from 1 on
+_files: dict[int, Handle] = {}  # files that the library has open, by their addresses
+_options: list[dict] = []  # options of catalogues; the number of an opener is its index here plus 1
 _numbers: dict[str, int] = {}
-_raised: dict[str, BaseException] = {}  # what is no failure of the library, by its message
+_raised: dict[str, BaseException] = {}  # exceptions that are not library errors, by their messages
 
 
 def opener(options: dict) -> int:
-    """The number by which catalogues with these options of URLs know how files are opened."""
+    """Return the number that tells `_open_file` to use these options for URLs."""
     key = repr(sorted(options.items()))
     if key not in _numbers:
         _options.append(options)
@@ -31,7 +31,7 @@ def opener(options: dict) -> int:
 
 
 def opened_by(name: str, options: dict) -> Handle:
-    """An ebpo_file. Options are those of URLs; long work waits for servers that are away for some minutes."""
+    """Return an open ebpo_file. options: options for URLs; by default a server may be unavailable for some minutes."""
     http: dict = {}
     if "://" in name:
         http = dict(options)
@@ -42,7 +42,7 @@ def opened_by(name: str, options: dict) -> Handle:
 
 
 def _open_file(number: int, path: bytes, out: int, error: int) -> int:
-    """For the library, in any thread."""
+    """Open a file for the library. The library calls it in any thread."""
     try:
         file = opened_by(os.fsdecode(path), _options[number - 1])
         _files[file.pointer.value] = file
@@ -68,14 +68,14 @@ OPEN_FILE, CLOSE_FILE = ENTRY["open_file"](_open_file), ENTRY["close_file"](_clo
 
 
 def raised_by(error: Error) -> BaseException:
-    """What was raised in a function that opened a file, of the failure that came of it."""
+    """Return the exception that caused an error in `_open_file`, or the error itself."""
     return _raised.pop(str(error), error)
 
 
 class OpenModels:
-    """Models of catalogues that stay open, the least recently asked goes first. Any number of threads.
+    """Open models of catalogues. The least recently used model is closed first. Any number of threads.
 
-    memory: bytes for all of them together.
+    memory: budget in bytes for all models together.
     """
 
     def __init__(self, memory: int | str | None = None) -> None:
@@ -93,24 +93,27 @@ class OpenModels:
         lib.ebpo_catalogue_models_set_memory(self.models, self._memory)
 
     def stats(self) -> dict[str, int]:
-        """Since the process began: opened, closed: models; bytes_read, reads, loads, hits, evicted: as in
-        `Model.stats`, of all of them; now: open, memory (bytes)."""
+        """Return statistics of all models.
+
+        Since the process started: opened, closed (models), bytes_read, reads, loads, hits, evicted (as in
+        `Model.stats`). Current values: open (models), memory (bytes).
+        """
         counts, sums = made(c.ebpo_catalogue_models_stats), made(c.ebpo_model_stats)
         lib.ebpo_catalogue_models_get_stats(self.models, ctypes.byref(counts), ctypes.byref(sums))
         stats = {name: getattr(sums, name) for name in ("bytes_read", "reads", "loads", "hits", "evicted", "memory")}
         return dict(stats, opened=counts.opened, closed=counts.closed, open=counts.open)
 
     def clear(self) -> None:
-        """Close models that are not in use."""
+        """Close the models that are not in use."""
         lib.ebpo_catalogue_models_close_idle(self.models)
 
 
 _process_models = OpenModels()
-_process_models.models._end.detach()  # it ends with the process; threads may still be asking
+_process_models.models._end.detach()  # never freed: threads may still run queries when the process ends
 
 
 def process_models(memory: int | str | None = None) -> OpenModels:
-    """That of this process. A budget that is given holds from now on."""
+    """Return the open models of this process. memory: their budget from now on; None: unchanged."""
     if memory is not None:
         _process_models.memory = memory
     return _process_models

@@ -1,4 +1,4 @@
-"""Points in files, read by stretches, and files that appear whole or not at all."""
+"""Reads ranges of points from files, and writes files that are replaced atomically."""
 from __future__ import annotations
 
 import contextlib
@@ -18,9 +18,9 @@ HDF5 = (".h5", ".hdf5", ".hdf", ".nc")
 
 @contextlib.contextmanager
 def published(path: Any, *, new: bool = False) -> Iterator[Any]:
-    """A file to write into, which takes the place of `path` when all has been written to the disk.
+    """Yield a file for writing; it replaces `path` after all its bytes are on the disk.
 
-    new: FileExistsError where `path` is there by then (file systems without hard links cannot say so).
+    new: raise FileExistsError when `path` exists by then. File systems without hard links cannot detect it.
     """
     path = pathlib.Path(path)
     temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex[:12]}")
@@ -37,7 +37,7 @@ def published(path: Any, *, new: bool = False) -> Iterator[Any]:
 
 
 def links(there: pathlib.Path, path: pathlib.Path) -> bool:
-    """Give a file another name. False: the file system has no hard links."""
+    """Make a hard link. Returns False when the file system has no hard links."""
     try:
         os.link(there, path)
     except FileExistsError:
@@ -48,9 +48,11 @@ def links(there: pathlib.Path, path: pathlib.Path) -> bool:
 
 
 class PointFile(NamedTuple):
-    """Points in a file of some format, which is read wherever a stretch is wanted.
+    """Points in a file. Ranges of rows are read when they are needed.
 
-    dataset: of HDF5. count: points. stamp: size and time of the file when it was looked at.
+    dataset: the HDF5 dataset.
+    count: the number of points.
+    stamp: size and modification time of the file when it was examined.
     """
 
     path: str
@@ -61,9 +63,9 @@ class PointFile(NamedTuple):
 
     @classmethod
     def at(cls, path: Any, dataset: str | None = None, columns: int = 3) -> PointFile:
-        """Looks at a .npy, an HDF5 dataset, or raw doubles of this machine's byte order.
+        """Examine a .npy, an HDF5 dataset, or raw doubles in this machine's byte order.
 
-        FormatError: it has not so many columns, or holds no numbers.
+        Raises FormatError when the file has another number of columns, or contains no numbers.
         """
         dtype = np.dtype(np.float64)
         path = os.path.abspath(os.fspath(path))
@@ -71,16 +73,16 @@ class PointFile(NamedTuple):
             with opened_hdf5(path) as file:
                 dataset = dataset or only_dataset(file, path, columns)
                 if dataset not in file or not hasattr(file[dataset], "shape"):
-                    raise FormatError(f"{path}: there is no dataset {dataset}", "EBPO_E_FORMAT", path)
+                    raise FormatError(f"{path}: dataset {dataset} not found", "EBPO_E_FORMAT", path)
                 shape, dtype = file[dataset].shape, file[dataset].dtype
                 if holds_codes(file[dataset]):
-                    raise FormatError(f"{path}: {dataset} holds {CODES}", "EBPO_E_FORMAT", path)
+                    raise FormatError(f"{path}: {dataset} contains {CODES}", "EBPO_E_FORMAT", path)
         elif path.endswith(".npy"):
             shape, dtype = shape_of_npy(path)
         else:
             size = os.path.getsize(path)
             if size % (8 * columns):
-                raise FormatError(f"{path}: {size} bytes are no rows of {columns} doubles", "EBPO_E_FORMAT", path)
+                raise FormatError(f"{path}: {size} bytes are not rows of {columns} doubles", "EBPO_E_FORMAT", path)
             shape = (size // (8 * columns), columns)
         if len(shape or ()) != 2 or shape[1] != columns:
             raise FormatError(f"{path}: points have the shape (n, {columns}), not {shape}", "EBPO_E_FORMAT", path)
@@ -89,9 +91,9 @@ class PointFile(NamedTuple):
         return cls(path, dataset or "", int(shape[0]), columns, stamp_of(path))
 
     def read(self, begin: int, end: int) -> np.ndarray:
-        """Rows as doubles. IOFailure: the file is not the one that was looked at."""
+        """Read rows as doubles. Raises IOFailure when the file has changed since it was examined."""
         if stamp_of(self.path) != self.stamp:
-            raise IOFailure(f"{self.path} has changed since it was asked about; ask anew", "EBPO_E_IO", self.path)
+            raise IOFailure(f"{self.path} has changed since the query; query again", "EBPO_E_IO", self.path)
         if self.dataset:
             with opened_hdf5(self.path) as file:
                 return doubles(file[self.dataset][begin:end], self.path)
@@ -102,16 +104,16 @@ class PointFile(NamedTuple):
 
 
 def load_npy(path: str) -> np.ndarray:
-    """A .npy as a memory map. FormatError: it is none of numbers, or has not as many as its shape says."""
+    """Open a .npy as a memory map. Raises FormatError when it is not a complete array of numbers."""
     try:
         with np.errstate(over="ignore"):
             values = np.load(path, mmap_mode="r", allow_pickle=False)
     except OSError:
         raise
-    except Exception as error:  # numpy has many, for shapes that are negative or overflow as well
-        raise FormatError(f"{path}: not a whole .npy of numbers: {error}", "EBPO_E_FORMAT", path) from None
+    except Exception as error:  # numpy raises several types, for example for negative or overflowing shapes
+        raise FormatError(f"{path}: not a complete .npy of numbers: {error}", "EBPO_E_FORMAT", path) from None
     if not isinstance(values, np.ndarray):
-        raise FormatError(f"{path}: not a .npy, but an archive of some", "EBPO_E_FORMAT", path)
+        raise FormatError(f"{path}: not a .npy, but an archive of several arrays", "EBPO_E_FORMAT", path)
     return values
 
 
@@ -128,14 +130,14 @@ def h5py_of(path: str) -> Any:
     try:
         import h5py
     except ImportError:
-        raise ImportError(f"{path}: HDF5 takes h5py, which is not installed") from None
+        raise ImportError(f"{path}: reading HDF5 needs h5py, which is not installed") from None
     return h5py
 
 
 def opened_hdf5(path: str) -> Any:
-    """An HDF5 file to read. Reading needs no lock: where the file system has none, it is opened without.
+    """Open an HDF5 file for reading. Opens it without a lock when the file system has no locks.
 
-    IOFailure: another program has it open for writing.
+    Raises IOFailure when another program has the file open for writing.
     """
     import errno
     h5py = h5py_of(path)

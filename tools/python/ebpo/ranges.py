@@ -1,4 +1,4 @@
-"""Ranges of a source far away: joined, asked for in parallel and ahead of the reader, within bounded memory."""
+"""Ranges of a remote source: joined, requested in parallel and ahead of the reader, within bounded memory."""
 from __future__ import annotations
 
 import bisect
@@ -7,17 +7,20 @@ import os
 import threading
 from typing import Any, Iterator
 
-HEAD = 1 << 17  # bytes that are read at once when a source is opened
-MEMORY = 48 << 20  # bytes of what was read ahead and what was read last
-CONNECTIONS = 16  # ranges that are asked for at a time
-GAP, GAP_OF_MANY, MANY = 1 << 14, 1 << 15, 256  # between ranges: fetching it costs less than another request
-MAX = 4 << 20  # of a request
-STALE = 64  # announcements: what has not been read by then hardly will be
+HEAD = 1 << 17  # first bytes of a source, which are read when it is opened
+MEMORY = 48 << 20  # bytes for pieces that are prefetched or were read last
+CONNECTIONS = 16  # requests at a time
+GAP, GAP_OF_MANY, MANY = 1 << 14, 1 << 15, 256  # bytes between ranges that cost less than another request
+MAX = 4 << 20  # bytes of one request
+STALE = 64  # prefetch calls after which a piece that was not read is not expected to be read
 NOTED, COMING, THERE, FAILED = range(4)
 
 
 class Piece:
-    """A range that is fetched by one request. wanted: bytes announced and not read yet; users: readers."""
+    """A range of bytes that one request fetches.
+
+    wanted: bytes with a prefetch hint that are not read yet. users: number of readers.
+    """
 
     __slots__ = ("begin", "end", "state", "wanted", "plan", "used", "users", "data", "error")
 
@@ -33,27 +36,28 @@ class Piece:
 
 
 class Ranges:
-    """Read an object with `size` and `read_range(offset, size)`, which several threads call at once.
+    """A reader of an object with `size` and `read_range(offset, size)`, which several threads call at once.
 
-    As the library reads URLs (lib/io/http_cache.c): announced ranges are joined over small gaps, cut into
-    requests of at most MOST bytes, and fetched ahead of the reader as long as they fit into `memory`.
+    It works like the library's reader of URLs (lib/io/http_cache.c). Ranges of prefetch hints are joined
+    over small gaps, cut into requests of at most MAX bytes, and fetched ahead of the reader as long as they
+    fit into `memory`.
 
-    connections: so many requests at a time.
+    connections: number of requests at a time.
     """
 
     def __init__(self, source: Any, size: int, *, memory: int = MEMORY, connections: int = CONNECTIONS) -> None:
         self.source, self.size, self.memory, self.connections = source, size, memory, connections
         head = getattr(source, "head", None)
         self.head = read_whole(source, 0, min(HEAD, size)) if head is None else head
-        self.changed = threading.Condition()  # holds the lock of what follows
-        self.begins: list[int] = []  # of pieces, ascending, without overlaps
+        self.changed = threading.Condition()  # its lock protects the following members
+        self.begins: list[int] = []  # offsets of pieces, ascending; pieces do not overlap
         self.pieces: dict[int, Piece] = {}
         self.queue: collections.deque[Piece] = collections.deque()
-        self.unrequested: set[int] = set()  # begins of pieces that were announced and not asked for
+        self.unrequested: set[int] = set()  # offsets of pieces with a prefetch hint and without a request
         self.held = self.plan = self.clock = self.running = 0
         self.process = os.getpid()
 
-    # ---- pieces; the lock is held ----
+    # ---- pieces; the caller holds the lock ----
 
     def _over(self, begin: int, end: int) -> Iterator[Piece]:
         """Yield the pieces that overlap a range, in order."""
@@ -63,7 +67,7 @@ class Ranges:
                 yield self.pieces[start]
 
     def _cover(self, begin: int, end: int) -> None:
-        """Add pieces for those bytes of a range that have none."""
+        """Add pieces for the bytes of a range that are in no piece."""
         begin = max(begin, len(self.head))
         for piece in [*self._over(begin, end), None]:
             stop = piece.begin if piece else end
@@ -82,13 +86,13 @@ class Ranges:
         self.begins.pop(bisect.bisect_left(self.begins, piece.begin))
 
     def _drop(self, piece: Piece) -> None:
-        """Forget the bytes of a piece, or its failure."""
+        """Forget the bytes of a piece, or its error."""
         if piece.state in (COMING, THERE):
             self.held -= piece.size
         piece.state, piece.data, piece.error = NOTED, None, None
 
     def _reserve_space(self, size: int) -> None:
-        """Forget what was read longest ago, then what was announced long ago, until `size` more bytes fit."""
+        """Forget pieces until `size` more bytes fit: those read longest ago, then those with old hints."""
         if self.held + size <= self.memory:
             return
         idle = [piece for piece in self.pieces.values() if piece.state == THERE and not piece.users and
@@ -99,7 +103,7 @@ class Ranges:
             self._remove(piece)
 
     def _check_process(self) -> None:
-        """Forgets, in a process that was forked, what the threads of the other process have under way."""
+        """After a fork, forget the requests of the other process's threads."""
         if self.process != os.getpid():
             self.process, self.running = os.getpid(), 0
             self.queue.clear()
@@ -116,11 +120,11 @@ class Ranges:
             self.running += 1
             try:
                 threading.Thread(target=self._work, daemon=True).start()
-            except RuntimeError:  # the system gives no more threads: readers fetch for themselves
+            except RuntimeError:  # no further thread could be started: readers fetch their own pieces
                 self.running -= 1
 
     def _ahead(self, begin: int) -> None:
-        """Request announced pieces from an offset on, as far as they fit."""
+        """Request pieces with a prefetch hint, from an offset on, as long as they fit."""
         for start in sorted(start for start in self.unrequested if start >= begin):
             piece = self.pieces[start]
             self._reserve_space(piece.size)
@@ -131,7 +135,7 @@ class Ranges:
     # ---- other threads ----
 
     def _work(self) -> None:
-        """Fetch pieces until none waits."""
+        """Fetch pieces until the queue is empty."""
         while True:
             with self.changed:
                 if not self.queue:
@@ -148,14 +152,14 @@ class Ranges:
                     piece.state, piece.data = THERE, data
                 else:
                     self._drop(piece)
-                    if piece.users:  # they raise it; without readers it is requested again when it is read
+                    if piece.users:  # the readers raise the error; without readers the piece is requested again later
                         piece.state, piece.error = FAILED, error
                 self.changed.notify_all()
 
-    # ---- what the library calls ----
+    # ---- methods that the library calls ----
 
     def prefetch(self, ranges: list) -> None:
-        """Announces (offset, size), each of which will be read about once. It does not wait."""
+        """Accept prefetch hints (offset, size). Each range will be read about once. Does not wait."""
         ranges = sorted((offset, offset + size) for offset, size in ranges if size)
         if not ranges:
             return
@@ -174,14 +178,14 @@ class Ranges:
             for begin, end in ranges:
                 for piece in self._over(begin, end):
                     piece.plan = self.plan
-                    if piece.begin in anew:  # of others it has been counted
+                    if piece.begin in anew:  # earlier hints have counted the other pieces
                         piece.wanted += min(end, piece.end) - max(begin, piece.begin)
                         if piece.state == NOTED:
                             self.unrequested.add(piece.begin)
             self._ahead(0)
 
     def read_range(self, offset: int, size: int) -> bytes:
-        """Return bytes; their pieces are requested at the same time."""
+        """Return a range of bytes. Its pieces are requested at the same time."""
         end = offset + size
         parts = [self.head[offset:end]] if offset < len(self.head) else []
         if end <= len(self.head):
@@ -204,7 +208,7 @@ class Ranges:
         return b"".join(parts)
 
     def _await(self, piece: Piece, pieces: list) -> None:
-        """Request a piece and those behind it, and waits for it. Raises what went wrong."""
+        """Request a piece and the following pieces, and wait for it. Raises the error of the request."""
         while piece.state != THERE:
             if piece.state == FAILED:
                 raise piece.error  # type: ignore[misc]
@@ -213,7 +217,7 @@ class Ranges:
                     self._reserve_space(other.size)
                     if other is piece or self.held + other.size <= self.memory:
                         self._start(other, True)
-            if piece in self.queue:  # before those that only are announced
+            if piece in self.queue:  # before pieces that have only a prefetch hint
                 self.queue.remove(piece)
                 self.queue.appendleft(piece)
             if self.running:
@@ -238,14 +242,14 @@ class Ranges:
         self._reserve_space(0)
 
     def close(self) -> None:
-        """Stop fetching; requests under way end by themselves."""
+        """Stop fetching. Requests that were sent end by themselves."""
         with self.changed:
             self.queue.clear()
 
 
 def read_whole(source: Any, offset: int, size: int) -> Any:
-    """Read a range of a source. OSError: it returned another number of bytes."""
+    """Read a range of a source. Raises OSError when it returns another number of bytes."""
     data = memoryview(source.read_range(offset, size)).cast("B")
     if len(data) != size:
-        raise OSError(f"{len(data)} bytes came instead of {size} at byte {offset}")
+        raise OSError(f"expected {size} bytes at byte {offset}, got {len(data)}")
     return data

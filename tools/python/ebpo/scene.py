@@ -83,22 +83,22 @@ class Scene:
             call("ebpo_scene_pairs", self._handle, *self._times(begin, end), taking, None)
         return found.array
 
-    def clashes(self, time: float = 0.0, *, count: bool = False, places: bool = False, relate: bool = False,
+    def clashes(self, time: float = 0.0, *, count: bool = False, locations: bool = False, relate: bool = False,
              depth: float = 0.0, threads: int | None = None, progress: Callable | None = None) -> np.ndarray:
         """Return pairs of instances that intersect at a time, or are closer than their clearance.
 
         count: count all pairs of intersecting faces, and intersection lines.
-        places: compute a common point and its box.
+        locations: compute a common point and its box.
         relate: compute the relation of solids.
         depth: compute penetration depths with this tolerance, in the world's unit; implies `relate`. 0: none.
 
         Returns a structured array with the members of ebpo_scene_clash in ebpo/scene.h: a, b, kind (a
-        ClashKind), relation (a Relation), face_a, face_b, distance, place ...
+        ClashKind), relation (a Relation), face_a, face_b, distance, location ...
         """
         found = Gathered(c.ebpo_scene_clashes_fn, CLASH)
         with self._lock, Reporter(progress) as reported, found as taking:
             options = made(c.ebpo_scene_clash_options, progress=reported, threads=threads or 0, count=count,
-                           places=places, relate=relate, depth=depth)
+                           locations=locations, relate=relate, depth=depth)
             call("ebpo_scene_find_clashes", self._handle, time, ctypes.byref(options), taking, None, None)
         return found.array
 

@@ -23,7 +23,7 @@ IO, CANCELLED = -3, -9
 
 
 class Seekable:
-    """A file object with seek and read, one thread at a time."""
+    """A file object with seek and read. One thread reads at a time."""
 
     def __init__(self, file: Any) -> None:
         self.file, self.lock = file, threading.Lock()
@@ -35,7 +35,7 @@ class Seekable:
         with self.lock:
             self.file.seek(offset)
             data = self.file.read(size)
-            while data and len(data) < size:  # raw files give what they have
+            while data and len(data) < size:  # a raw file may return fewer bytes than requested
                 more = self.file.read(size - len(data))
                 if not more:
                     break
@@ -50,7 +50,7 @@ class Stored:
         try:
             import fsspec
         except ImportError:
-            raise ImportError(f"{url}: this kind of address takes fsspec, which is not installed") from None
+            raise ImportError(f"{url}: this kind of URL needs fsspec, which is not installed") from None
         self.fs, self.path = fsspec.core.url_to_fs(url, **(storage_options or {}))
         self.size = self.fs.size(self.path)
 
@@ -59,7 +59,7 @@ class Stored:
 
 
 class Uncached:
-    """A file object of fsspec, read around its own cache, which reads ahead: several ranges at a time."""
+    """A file object of fsspec, read without its cache, which reads ahead. Several ranges are read at a time."""
 
     def __init__(self, file: Any) -> None:
         self.file, self.size = file, file.size
@@ -73,9 +73,9 @@ class Uncached:
 
 
 class Source:
-    """An object with `size` and `read_range` as the library wants it.
+    """An object with `size` and `read_range`, as an ebpo_source of the library.
 
-    far: a Ranges, which is announced what will be read; of others the bytes are read where they are.
+    Only a Ranges receives prefetch hints.
     """
 
     def __init__(self, ranges: Any) -> None:
@@ -106,9 +106,9 @@ class Source:
         try:
             self.ranges.prefetch(np.frombuffer(ctypes.string_at(ranges, count * RANGE.itemsize), RANGE).tolist())
         except KeyboardInterrupt:
-            self.interrupted = True  # reading says so
+            self.interrupted = True  # the next read raises KeyboardInterrupt
         except Exception:
-            pass  # nothing depends on it
+            pass  # hints are optional
 
     def close(self, _user: int) -> None:
         if isinstance(self.ranges, Ranges):
@@ -116,12 +116,12 @@ class Source:
 
 
 def shown(name: str) -> bytes:
-    """Return a text for messages, without NULs."""
+    """Return a text for messages as UTF-8 without NULs."""
     return name.encode("utf-8", "replace").replace(b"\0", b"?")
 
 
 def http_options(options: dict) -> tuple[Any, list]:
-    """Options of URLs as the library takes them, and what must live as long."""
+    """Return the options of URLs as a struct, and the objects that must stay alive with it."""
     given, keep, own = {}, [], {}
     for name, value in options.items():
         if name == "headers":
@@ -143,7 +143,11 @@ def by_name(name: Any, max_expansion: int, keep: tuple = (), **members: Any) -> 
 
 @functools.lru_cache(1)
 def has_http() -> bool:
-    """Return whether the library has HTTP. Without, it refuses every name (UnsupportedError); with, only this one."""
+    """Return True if the library has HTTP.
+
+    A library without HTTP refuses every URL (UnsupportedError). A library with HTTP refuses only the invalid
+    URL that is used here (ArgumentError).
+    """
     try:
         call("ebpo_source_of_url", "no URL", None, ctypes.byref(made(c.ebpo_source)))
     except UnsupportedError:
@@ -156,7 +160,7 @@ def has_http() -> bool:
 def by_url(url: str, http: dict, max_expansion: int) -> Handle:
     struct, keep = http_options(http)
     own = {"headers", "time_limit", "retries", "whole_limit", "unversioned", "connections"}
-    if has_http() or set(http) - own:  # other options it takes, or refuses without HTTP
+    if has_http() or set(http) - own:  # the library supports other options, or refuses them without HTTP
         return by_name(url, max_expansion, http=struct)
     del keep
     connections = within(struct.connections if "connections" in http else CONNECTIONS, 1, 32, "connections")
@@ -171,19 +175,19 @@ def by_ranges(ranges: Any, name: str, max_expansion: int = 0) -> Handle:
 
 
 def opened(source: Any, http: dict, storage_options: dict | None, max_expansion: int = 0) -> Handle:
-    """An ebpo_file of whatever `ebpo.open` takes."""
+    """Return an open ebpo_file of any source that `ebpo.open` supports."""
     if isinstance(source, (str, os.PathLike)):
         name = os.fspath(source)
         if isinstance(name, str) and name.startswith(("http://", "https://")) and storage_options is None:
             return by_url(name, http, max_expansion)
         if http:
-            raise TypeError(f"{name} is no URL: there is nothing to do for {', '.join(http)}")
+            raise TypeError(f"{name} is not a URL; remove the options {', '.join(http)}")
         if isinstance(name, str) and "://" in name:
             stored = Stored(name, storage_options)
             return by_ranges(far(stored, stored.size, name), name, max_expansion)
         return by_name(path(name), max_expansion)
     if http or storage_options is not None:
-        raise TypeError("options of URLs are for URLs")
+        raise TypeError("options for URLs need a URL")
     name = str(getattr(source, "name", "") or type(source).__name__)
     if hasattr(source, "read_range") and hasattr(source, "size"):
         return by_ranges(far(source, source.size() if callable(source.size) else source.size, name), name,
@@ -202,7 +206,7 @@ def opened(source: Any, http: dict, storage_options: dict | None, max_expansion:
 
 
 def far(source: Any, size: Any, name: str, **options: Any) -> Ranges:
-    """Read the first bytes of a source elsewhere, and returns its ranges. IOFailure: they cannot be read."""
+    """Return a Ranges of a source elsewhere. Reads its first bytes; raises IOFailure when that fails."""
     try:
         return Ranges(source, size_in_bytes(size), **options)
     except (Error, TypeError):
@@ -212,7 +216,7 @@ def far(source: Any, size: Any, name: str, **options: Any) -> Ranges:
 
 
 def of_file(file: Any, name: str) -> Any:
-    """Return what reads a file object: itself if it is on this machine, else its ranges."""
+    """Return a reader of a file object: a Seekable on this machine, else a Ranges."""
     if Uncached.fits(file):
         return far(Uncached(file), file.size, name)
     seekable = Seekable(file)
@@ -230,7 +234,7 @@ def is_of_system(file: Any) -> bool:
 
 
 class Bytes:
-    """Ranges of bytes in memory."""
+    """Bytes in memory, with `size` and `read_range`."""
 
     def __init__(self, data: np.ndarray) -> None:
         self.data, self.size = data, data.nbytes
@@ -240,7 +244,7 @@ class Bytes:
 
 
 def _mmap() -> type:
-    """Has seek and read, but is bytes as well."""
+    """Return the type of memory maps, which have seek and read but are used as bytes."""
     import mmap
     return mmap.mmap
 

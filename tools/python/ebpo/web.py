@@ -1,4 +1,7 @@
-"""Reads URLs with Python's HTTP when the library has none. Each range has a time limit; all ranges are of one version."""
+"""Reads URLs with Python's HTTP when the library has no HTTP.
+
+Each range has a time limit. All ranges come from one version of the file.
+"""
 from __future__ import annotations
 
 import collections
@@ -25,11 +28,11 @@ from ._library import size_in_bytes
 from .errors import IOFailure, UnsupportedError
 from .ranges import HEAD
 
-SILENT = 20.0  # seconds without a byte, or for a connection; then the request is sent again
+SILENT = 20.0  # seconds without a byte or a connection, after which the request is sent again
 
 
 class Timed(io.RawIOBase):
-    """Read a socket until a time of time.monotonic. After it: TimeoutError."""
+    """A raw socket reader with a deadline `end` in time.monotonic. Reading later raises TimeoutError."""
 
     def __init__(self, raw: Any, sock: Any, end: float) -> None:
         self.raw, self.sock, self.end = raw, sock, end
@@ -40,7 +43,7 @@ class Timed(io.RawIOBase):
     def readinto(self, buffer: Any) -> int | None:
         left = self.end - time.monotonic()
         if left <= 0:
-            raise TimeoutError("the answer did not end in time")
+            raise TimeoutError("the response was not complete in time")
         self.sock.settimeout(min(SILENT, left))
         return self.raw.readinto(buffer)
 
@@ -50,9 +53,10 @@ class Timed(io.RawIOBase):
 
 
 class Response(http.client.HTTPResponse):
-    """An answer of which every byte comes before `end`: status, headers, body and trailers.
+    """A response whose bytes must all arrive before `end`: status, headers, body and trailers.
 
-    connection: what it comes by; when it has been read to its end, `idle` gets it for the next request.
+    connection: the connection of the response. After the whole body is read, it is appended to `idle` for
+        the next request.
     """
 
     connection: Any = None
@@ -73,9 +77,9 @@ class Response(http.client.HTTPResponse):
 
 
 class Request(urllib.request.Request):
-    """A request that ends, with all redirects, before `end` of time.monotonic.
+    """A request that, with all its redirects, ends before `end` in time.monotonic.
 
-    idle: for each kind of connection and host those that are open and not in use.
+    idle: for each kind of connection and host, the open connections that are not in use.
     """
 
     end = 0.0
@@ -83,14 +87,14 @@ class Request(urllib.request.Request):
 
 
 def opened(handler: Any, kind: Any, request: Any, **options: Any) -> Any:
-    """Send a request, by a connection that an earlier one has left, and returns its answer, read up to its body."""
+    """Send a request, on an idle connection if there is one. Return the response; its body is not read."""
     def connection(*host: Any, **given: Any) -> Any:
         made = kind(*host, **given, **options)
         made.response_class = functools.partial(Response, end=request.end)
         return made
 
     request.timeout = max(0.001, min(SILENT, request.end - time.monotonic()))
-    if request.host != urllib.parse.urlsplit(request.full_url).netloc:  # by a proxy
+    if request.host != urllib.parse.urlsplit(request.full_url).netloc:  # through a proxy
         return handler.do_open(connection, request)
     idle = request.idle.setdefault((kind, request.host), collections.deque())
     while True:
@@ -107,7 +111,7 @@ def opened(handler: Any, kind: Any, request: Any, **options: Any) -> Any:
         except (OSError, http.client.HTTPException) as error:
             used.close()
             if again and not isinstance(error, TimeoutError):
-                continue  # the server has closed it meanwhile
+                continue  # the server has closed the idle connection
             if isinstance(error, OSError) and not isinstance(error, http.client.HTTPException):
                 raise urllib.error.URLError(error) from error
             raise
@@ -137,17 +141,20 @@ class Https(urllib.request.HTTPSHandler):
 
 
 class Redirects(urllib.request.HTTPRedirectHandler):
-    """As the library follows them: five, http and https alone, never from https to http; the caller's
-    headers, which may be secret, stay with the server that they were given for."""
+    """Follows redirects by the rules of the library.
+
+    At most five; only http and https; never from https to http. Headers of the caller, which may be secret,
+    are sent only to the original server.
+    """
 
     max_redirections = 5
 
     def redirect_request(self, request: Any, response: Any, code: int, message: str, headers: Any, url: str) -> Any:
-        response.close()  # its body may have no end
+        response.close()  # the body may be endless
         new: Any = super().redirect_request(request, response, code, message, headers, url)
         before, after = urllib.parse.urlsplit(request.full_url), urllib.parse.urlsplit(url)
         if after.scheme not in ("http", "https") or (before.scheme, after.scheme) == ("https", "http"):
-            raise IOFailure(f"the server redirects from {before.scheme} to {after.scheme}, which is not followed",
+            raise IOFailure(f"a redirect from {before.scheme} to {after.scheme} is not followed",
                             "EBPO_E_IO")
         if new is not None:
             new.end, new.idle = request.end, request.idle
@@ -158,13 +165,16 @@ class Redirects(urllib.request.HTTPRedirectHandler):
 
 @functools.lru_cache(1)
 def opener() -> Any:
-    """What sends requests; the system's certificates are read when it is first used."""
+    """Return the object that sends requests. Its first use reads the system's certificates."""
     return urllib.request.build_opener(Redirects, Http, Https)
 
 
 class Patience:
-    """How long a request is sent again: with pauses that double, by chance shorter, so that many clients do
-    not come back together; or as long as the server says (Retry-After)."""
+    """Decides when a failed request is sent again, and when to give up.
+
+    The pause doubles after each failure. A random factor shortens it, so that many clients do not return at
+    the same time. A longer pause that the server requests (Retry-After) is used instead.
+    """
 
     FIRST, LONGEST, AGAIN = 0.2, 20.0, (408, 429, 500, 502, 503, 504)
 
@@ -172,10 +182,10 @@ class Patience:
         self.began, self.seconds, self.retries, self.what, self.failures = time.monotonic(), seconds, retries, what, 0
 
     def wait(self, error: Exception) -> None:
-        """Wait before the next attempt. Raises IOFailure when the attempt would be too late or is useless."""
+        """Wait before the next attempt. Raises IOFailure when another attempt is useless or not allowed."""
         code, reason = getattr(error, "code", None), getattr(error, "reason", error)
         if code is not None and code not in self.AGAIN:
-            raise self.failure(f"the server answered with status {code}") from error
+            raise self.failure(f"the server returned status {code}") from error
         if isinstance(reason, ssl.SSLCertVerificationError):
             raise self.failure(f"the server's certificate is not trusted: {reason.verify_message}") from error
         pause = min(self.LONGEST, self.FIRST * 2**min(self.failures, 16)) * random.uniform(0.5, 1)
@@ -184,7 +194,7 @@ class Patience:
         gone = time.monotonic() - self.began
         if gone + pause > self.seconds or (self.retries is not None and self.failures > self.retries):
             said = f"status {code}" if code is not None else str(reason)[:200]
-            raise self.failure(f"no answer after {self.failures} requests in {gone:.1f} s, the last one: "
+            raise self.failure(f"no response after {self.failures} requests in {gone:.1f} s; the last failure: "
                                f"{said}; {self.seconds:g} s (time_limit) and "
                                f"{'any number of' if self.retries is None else self.retries} retries are allowed"
                                ) from error
@@ -195,7 +205,7 @@ class Patience:
 
     @staticmethod
     def retry_after(error: Exception) -> float:
-        """Return the delay that a server requests, in seconds, from a number or a date; 0: none."""
+        """Return the delay in seconds that a server requests as a number or a date. Returns 0 without a request."""
         text = (getattr(error, "headers", None) or {}).get("Retry-After") or ""
         if text.strip().isdecimal():
             return float(text)
@@ -213,57 +223,64 @@ def close_all(idle: dict) -> None:
 
 
 class Web:
-    """A URL by Python's own HTTP. Answers are of one version of the file. Any number of threads.
+    """A URL that is read with Python's HTTP, from one version of the file. Any number of threads.
 
-    time_limit: seconds for a range with all requests that it takes; retries: how many may fail, None: any number.
+    time_limit: seconds for a range, with all its requests.
+    retries: number of requests that may fail; None: any number.
     whole_limit, unversioned: as in ebpo_http_options.
 
-    size: of the file. head: its first bytes; of a server without ranges or versions all of them.
+    size: the size of the file.
+    head: the first bytes of the file; the whole file when the server supports no ranges or versions.
     """
 
     def __init__(self, url: str, headers: dict | None = None, time_limit: float = 120.0, retries: int | None = 5,
                  whole_limit: int | str = 64 << 20, unversioned: bool = False) -> None:
         self.url, self.headers, self.shown = url, dict(headers or {}), url.partition("?")[0]
         if re.search(r"[^\x21-\x7e]", url):
-            raise refused(self.shown, "a URL has printable ASCII characters alone; write others as %XX")
+            raise refused(self.shown, "a URL may contain only printable ASCII characters; write others as %XX")
         for name, text in self.headers.items():
             if not re.fullmatch(r"[!-9;-~]+", name) or re.search(r"[^\t\x20-\x7e\x80-\xff]", text):
-                raise refused(self.shown, "a header to send is not 'Name: value' on one line")
+                raise refused(self.shown, "a header must be 'Name: value' on one line")
         self.time_limit, self.retries = real(time_limit, "time_limit"), retries
         if not 0 < self.time_limit <= 1e6:
-            raise refused(self.shown, "a time-out is not above 0 and at most 1000000 seconds")
+            raise refused(self.shown, "a time-out must be above 0 and at most 1000000 seconds")
         if retries is not None:
             self.retries = integer_as(ctypes.c_uint)(retries, "retries")
         self.whole_limit, self.unversioned = size_in_bytes(whole_limit), unversioned
         self.version: Any = None
         self.size = self.requests = self.received = 0
         self.head = b""
-        self.lock = threading.Lock()  # of the counts
+        self.lock = threading.Lock()  # protects the counts
         self.idle: dict = {}
         self.process = os.getpid()
         weakref.finalize(self, close_all, self.idle)
         self.head = self.first()
 
     def first(self) -> bytes:
-        """Read the first bytes, the size and the version; from a server without ranges or versions the whole file."""
+        """Read the first bytes, the size and the version.
+
+        Read the whole file when the server supports no ranges or versions.
+        """
         data = self.get(0, HEAD)
         if len(data) < self.size and self.version[0] is None and not self.unversioned:
             if self.size > self.whole_limit:
                 raise UnsupportedError(f"{self.shown}: the server sends neither ETag nor Last-Modified, and "
-                                       f"{self.size} bytes are more than would be read at once; download the file, or "
+                                       f"{self.size} bytes exceed whole_limit; download the file, or "
                                        "allow unversioned files (unversioned=True)", "EBPO_E_UNSUPPORTED", self.shown)
             data = self.get(0, self.size, at_once=True)
         return data
 
     def read_range(self, offset: int, size: int) -> bytes:
-        """Return bytes. IOFailure: the server does not send them in time."""
+        """Return a range of bytes. Raises IOFailure when they do not arrive in time."""
         if offset + size <= len(self.head):
             return self.head[offset:offset + size]
         return self.get(offset, size)
 
     def get(self, offset: int, size: int, at_once: bool = False) -> bytes:
-        """Request a range, or the whole file from a server without ranges. A server may send it in parts,
-        unless it must come at once."""
+        """Request a range, or the whole file from a server that supports no ranges.
+
+        at_once: the server must send the range in one response; otherwise it may send it in parts.
+        """
         patience, data = Patience(self.time_limit, self.retries, self.shown), bytearray()
         while True:
             try:
@@ -273,7 +290,7 @@ class Web:
                 if len(data) >= size:
                     return bytes(data)
                 if at_once:
-                    raise patience.failure("the server sends parts of the file, and no version of it; download the file")
+                    raise patience.failure("the server sends parts of the file without a version; download the file")
             except (urllib.error.URLError, TimeoutError, ConnectionError, ssl.SSLError, http.client.HTTPException) as error:
                 if isinstance(error, urllib.error.HTTPError):
                     error.close()
@@ -281,14 +298,14 @@ class Web:
             except (ValueError, OSError) as error:
                 if isinstance(error, IOFailure):
                     raise
-                raise patience.failure(f"the answer cannot be read: {error}") from error
+                raise patience.failure(f"invalid response: {error}") from error
             if at_once:
                 data.clear()
 
     def send(self, begin: int, end: int, patience: Patience, data: bytearray) -> None:
-        """Send one request, and appends the received bytes to `data`, also before a failure."""
+        """Send one request. Append the received bytes to `data`, even when the request then fails."""
         request = Request(self.url, headers={**self.headers, "Range": f"bytes={begin}-{end - 1}"})
-        if self.process != os.getpid():  # a process that was forked: the connections are those of the other one
+        if self.process != os.getpid():  # after a fork the connections belong to the other process
             self.process, self.idle = os.getpid(), {}
         request.end, request.idle = patience.began + self.time_limit, self.idle
         with self.lock:
@@ -297,7 +314,7 @@ class Web:
         try:
             with opener().open(request) as response:
                 if (response.headers["Content-Encoding"] or "identity").lower() != "identity":
-                    raise patience.failure("the server sends the file in another encoding; download it")
+                    raise patience.failure("the server sends the file compressed (Content-Encoding); download it")
                 if response.status == 200 and self.version is None and begin == 0:
                     self.take_whole(response, patience, data)
                 else:
@@ -307,12 +324,12 @@ class Web:
                 self.received += len(data) - before
 
     def range_of(self, response: Any, begin: int, end: int, patience: Patience) -> int:
-        """Return how many bytes of the range the server sends: all, or fewer. IOFailure: another range or version."""
+        """Return how many bytes of the range the server sends. Raises IOFailure for another range or version."""
         if response.status != 206:
-            raise patience.failure(f"the server does not answer ranges (status {response.status})")
+            raise patience.failure(f"the server does not support ranges (status {response.status})")
         stated = re.fullmatch(r"bytes (\d{1,18})-(\d{1,18})/(\d{1,18})", (response.headers["Content-Range"] or "").strip())
         if not stated:
-            raise patience.failure("the server does not say which range it sent")
+            raise patience.failure("the server does not state which range it sent")
         first, last, size = map(int, stated.groups())
         etag = response.headers["ETag"] and re.sub(r"^\s*W/", "", response.headers["ETag"])
         version = etag or response.headers["Last-Modified"], size
@@ -320,13 +337,13 @@ class Web:
             raise patience.failure("the file on the server has changed since it was opened; open it again")
         length = response.headers["Content-Length"]
         if first != begin or not begin <= last < min(end, size) or (length and length.strip() != str(last + 1 - begin)):
-            raise patience.failure("the server sent another range than was asked for")
+            raise patience.failure("the server sent another range than requested")
         self.version, self.size = version, size
         return last + 1 - begin
 
     @staticmethod
     def take(response: Any, size: int, patience: Patience, data: bytearray) -> None:
-        """Append a body of so many bytes. ConnectionError: it is shorter; IOFailure: longer."""
+        """Append a body of `size` bytes. Raises ConnectionError for a shorter body, IOFailure for a longer one."""
         whole = len(data) + size
         while len(data) < whole + 1:
             some = response.read1(min(1 << 16, whole + 1 - len(data)))
@@ -334,25 +351,25 @@ class Web:
                 break
             data += some
         if len(data) > whole:
-            raise patience.failure("the server sent more bytes than it said")
+            raise patience.failure("the server sent more bytes than its Content-Range states")
         if len(data) < whole:
             raise ConnectionError(f"the connection ended after {len(data) - whole + size} bytes")
 
     def take_whole(self, response: Any, patience: Patience, data: bytearray) -> None:
-        """Append the body of an answer of status 200, which must have an end that is certain."""
+        """Append the body of a response with status 200. Its length must be known, or it must be chunked."""
         try:
             self.take_all(response, patience, data)
         except BaseException:
-            data.clear()  # what follows might be of another version
+            data.clear()  # the next response may be of another version
             raise
 
     def take_all(self, response: Any, patience: Patience, data: bytearray) -> None:
         size, content = response.length, response.headers["Content-Type"] or ""
         if content.startswith("text/"):
-            raise patience.failure(f"the server sends {content[:60]} in place of the file; check the URL, and whether it "
-                                   "takes a login")
+            raise patience.failure(f"the server sends {content[:60]} instead of the file; check the URL, and whether it "
+                                   "requires a login")
         if size is None and not response.chunked:
-            raise patience.failure("the server does not answer ranges, and does not say how long the file is")
+            raise patience.failure("the server neither supports ranges nor states the length of the file")
         if (size or 0) <= self.whole_limit:
             while len(data) <= self.whole_limit:
                 some = response.read1(1 << 16)
@@ -360,7 +377,7 @@ class Web:
                     break
                 data += some
         if max(size or 0, len(data)) > self.whole_limit:
-            raise UnsupportedError(f"{self.shown}: the server does not answer ranges, and the file has more than "
+            raise UnsupportedError(f"{self.shown}: the server does not support ranges, and the file has more than "
                                    f"{self.whole_limit} bytes; download it", "EBPO_E_UNSUPPORTED", self.shown)
         if size is not None and len(data) != size:
             raise ConnectionError(f"the connection ended after {len(data)} of {size} bytes")
