@@ -105,7 +105,7 @@ static void learn_distance(ebpo_bounder *b, const double xi[3], double distance)
     if (certain <= b->lo || !is_in_envelope(b, at))
         return;
     b->lo = certain;
-    ebpo_cell_frame_point(&b->frame, at, b->place);
+    ebpo_cell_frame_point(&b->frame, at, b->location);
     b->target = fmax(b->target, b->ratio * b->lo);
 }
 
@@ -218,7 +218,7 @@ ebpo_status ebpo_bound_envelope(ebpo_bounder *b, ebpo_cell cell, const ebpo_boun
         ebpo_bound_raise(b, b->fragments[i].upper);
     *out = (ebpo_reach_bound){ b->lo > 0 ? ldexp(b->lo, b->frame.exponent) : 0,
                                ebpo_cell_frame_model_length(&b->frame, b->hi),
-                               { b->place[0], b->place[1], b->place[2] },
+                               { b->location[0], b->location[1], b->location[2] },
                                b->queries };
     return status;
 }
@@ -230,7 +230,7 @@ static void merge_bounds(ebpo_reach_bound *known, const ebpo_reach_bound *found)
     if (found->lo <= known->lo)
         return;
     known->lo = found->lo;
-    memcpy(known->place, found->place, sizeof known->place);
+    memcpy(known->location, found->location, sizeof known->location);
 }
 
 ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound_goal *goal,

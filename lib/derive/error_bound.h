@@ -17,8 +17,8 @@ typedef struct ebpo_bound_goal {
 } ebpo_bound_goal;
 
 typedef struct ebpo_reach_bound {
-    double lo, hi;   /* in the model's unit */
-    double place[3]; /* a point of the envelope at lo; not set when lo is 0 */
+    double lo, hi;      /* in the model's unit */
+    double location[3]; /* a point of the envelope at lo; not set when lo is 0 */
     uint64_t queries;
 } ebpo_reach_bound;
 

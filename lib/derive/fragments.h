@@ -95,7 +95,7 @@ typedef struct ebpo_bounder {
     uint64_t face_capacity, face_count;
     /* The current node: */
     ebpo_cell_frame frame;
-    double target, quit, ratio, lo, hi, place[3];
+    double target, quit, ratio, lo, hi, location[3];
     double inner[3]; /* about the envelope's middle, in cell coordinates */
     uint64_t queries;
     ebpo_error *error;

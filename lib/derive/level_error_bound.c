@@ -378,7 +378,7 @@ static void gather_survey(const survey *s, uint64_t first, uint64_t last, ebpo_e
         const ebpo_reach_bound *b = &s->nodes[s->order[i]].bound;
         if (b->lo > out->lo) {
             out->lo = b->lo;
-            memcpy(out->place, b->place, sizeof out->place);
+            memcpy(out->location, b->location, sizeof out->location);
         }
     }
 }

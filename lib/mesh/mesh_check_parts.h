@@ -23,7 +23,7 @@ typedef struct ebpo_units {
  * edge, a vertex, or the index of a face. For a repeated face, `b` is the first face with its
  * vertices. */
 typedef struct ebpo_found {
-    uint32_t kind, place; /* as in ebpo_finding */
+    uint32_t kind, location; /* as in ebpo_finding */
     uint32_t a, b;
 } ebpo_found;
 
@@ -76,19 +76,19 @@ static inline void ebpo_finding_add(ebpo_finding *finding, uint64_t place)
     int kept =
         finding->count < EBPO_FINDING_LOCATIONS ? (int)finding->count : EBPO_FINDING_LOCATIONS;
     finding->count++;
-    if (kept == EBPO_FINDING_LOCATIONS && finding->place[kept - 1] <= place)
+    if (kept == EBPO_FINDING_LOCATIONS && finding->locations[kept - 1] <= place)
         return;
     int i = kept < EBPO_FINDING_LOCATIONS ? kept : kept - 1;
-    for (; i > 0 && finding->place[i - 1] > place; i--)
-        finding->place[i] = finding->place[i - 1];
-    finding->place[i] = place;
+    for (; i > 0 && finding->locations[i - 1] > place; i--)
+        finding->locations[i] = finding->locations[i - 1];
+    finding->locations[i] = place;
 }
 
 static inline void ebpo_finding_merge(ebpo_finding *finding, const ebpo_finding *other)
 {
     uint64_t kept = other->count < EBPO_FINDING_LOCATIONS ? other->count : EBPO_FINDING_LOCATIONS;
     for (uint64_t i = 0; i < kept; i++)
-        ebpo_finding_add(finding, other->place[i]);
+        ebpo_finding_add(finding, other->locations[i]);
     finding->count += other->count - kept;
 }
 

@@ -28,7 +28,7 @@ typedef struct places_picture {
     ebpo_publish target;
 } places_picture;
 
-#define PLACES_PICTURE_INIT           \
+#define PICTURE_INIT                  \
     {                                 \
         NULL, NULL, EBPO_PUBLISH_INIT \
     }
@@ -74,7 +74,7 @@ static bool is_vertex(uint32_t kind) { return kind >= EBPO_FOUND_BOWTIE_VERTEX; 
 
 /* ---- reporting ---- */
 
-typedef struct places {
+typedef struct finding_search {
     const ebpo_mesh *mesh;
     ebpo_findings_options options;
     ebpo_findings_fn take;
@@ -85,7 +85,7 @@ typedef struct places {
     uint64_t *faces; /* faces around the current place */
     uint64_t face_count, face_capacity;
     places_picture picture;
-} places;
+} finding_search;
 
 /* A place with its sort key: its kind, then the index in the report. */
 typedef struct keyed {
@@ -110,7 +110,7 @@ static ebpo_status make_keyed(void *context, uint64_t begin, uint64_t end, void 
     keyed *out = records;
     (void)error;
     for (uint64_t i = begin; i < end; i++, out++) {
-        *out = (keyed){ .key = (uint64_t)s->from[i].kind << 32 | s->from[i].place,
+        *out = (keyed){ .key = (uint64_t)s->from[i].kind << 32 | s->from[i].location,
                         .found = s->from[i] };
         if (ebpo_found_is_edge(s->from[i].kind))
             out->ends = ebpo_mesh_source_vertex(s->mesh, s->from[i].a) << 32 |
@@ -134,7 +134,7 @@ static void take_keyed(void *context, uint64_t place, const void *records, uint6
 }
 
 /* Concatenates the lists of the workers. */
-static ebpo_status join_lists(const places *p, const ebpo_found_list *lists, unsigned count,
+static ebpo_status join_lists(const finding_search *p, const ebpo_found_list *lists, unsigned count,
                               ebpo_found_list *out, ebpo_error *error)
 {
     ebpo_workspace *workspace = p->mesh->workspace;
@@ -156,8 +156,8 @@ static ebpo_status join_lists(const places *p, const ebpo_found_list *lists, uns
 }
 
 /* Gathers one sorted list, which does not depend on the threads. */
-static ebpo_status gather_places(places *p, const ebpo_found_list *lists, unsigned count,
-                                 ebpo_error *error)
+static ebpo_status gather_findings(finding_search *p, const ebpo_found_list *lists, unsigned count,
+                                   ebpo_error *error)
 {
     ebpo_workspace *workspace = p->mesh->workspace;
     ebpo_found_list joined = { NULL, 0, 0, false };
@@ -171,7 +171,7 @@ static ebpo_status gather_places(places *p, const ebpo_found_list *lists, unsign
     const ebpo_sort sort = { .workspace = workspace,
                              .threads = ebpo_thread_count(p->options.threads),
                              .progress = &p->options.progress,
-                             .stage = "sorting places",
+                             .stage = "sorting findings",
                              .count = joined.count,
                              .record = sizeof(keyed),
                              .shift = KEY_SHIFT,
@@ -198,7 +198,7 @@ static int compare_numbers(const void *x, const void *y)
 
 /* Collects the faces that have all `count` corners, as indices in the current mesh. Searches the
  * faces at the corner that has the fewest, because another corner may be the hub of a large fan. */
-static bool gather_faces(places *p, const uint32_t *corner, int count)
+static bool gather_faces(finding_search *p, const uint32_t *corner, int count)
 {
     uint32_t about = corner[0];
     for (int i = 1; i < count; i++)
@@ -220,7 +220,7 @@ static bool gather_faces(places *p, const uint32_t *corner, int count)
 }
 
 /* Collects the faces of a finding, as indices in the current mesh. */
-static bool faces_of(places *p, const ebpo_found *f)
+static bool faces_of(finding_search *p, const ebpo_found *f)
 {
     if (ebpo_found_is_edge(f->kind))
         return gather_faces(p, (const uint32_t[2]){ f->a, f->b }, 2);
@@ -236,7 +236,7 @@ static bool faces_of(places *p, const ebpo_found *f)
 }
 
 /* Returns the vertices in the current mesh: two of an edge, one of a vertex, three of a face. */
-static int vertices_of(const places *p, const ebpo_found *f, uint32_t out[3])
+static int vertices_of(const finding_search *p, const ebpo_found *f, uint32_t out[3])
 {
     if (!ebpo_found_is_edge(f->kind) && !is_vertex(f->kind)) {
         memcpy(out, p->mesh->faces + 3 * (uint64_t)f->a, 3 * sizeof *out);
@@ -247,30 +247,30 @@ static int vertices_of(const places *p, const ebpo_found *f, uint32_t out[3])
     return ebpo_found_is_edge(f->kind) ? 2 : 1;
 }
 
-static ebpo_mesh_finding make_finding(places *p, const ebpo_found *f)
+static ebpo_mesh_finding make_finding(finding_search *p, const ebpo_found *f)
 {
     uint32_t v[3];
     int count = vertices_of(p, f, v);
-    ebpo_mesh_finding place = { .kind = (int32_t)f->kind, .component = p->component[v[0]] };
+    ebpo_mesh_finding finding = { .kind = (int32_t)f->kind, .component = p->component[v[0]] };
     for (int i = 0; i < count; i++) {
         double x[3];
         ebpo_mesh_position(p->mesh, v[i], x);
         for (int k = 0; k < 3; k++)
-            place.point[k] += x[k] / count;
+            finding.point[k] += x[k] / count;
     }
     for (int i = 0; i < 2; i++)
-        place.vertex[i] = ebpo_mesh_source_vertex(p->mesh, v[count == 1 ? 0 : i]);
+        finding.vertex[i] = ebpo_mesh_source_vertex(p->mesh, v[count == 1 ? 0 : i]);
     for (uint64_t i = 0; i < p->face_count; i++)
         p->faces[i] = ebpo_mesh_source_face(p->mesh, p->faces[i]);
     qsort(p->faces, p->face_count, sizeof *p->faces, compare_numbers);
-    place.faces = p->face_count ? p->faces : NULL;
-    place.face_count = p->face_count;
-    return place;
+    finding.faces = p->face_count ? p->faces : NULL;
+    finding.face_count = p->face_count;
+    return finding;
 }
 
 enum { BETWEEN_STEPS = 1 << 12 };
 
-static ebpo_status report_all(places *p, ebpo_error *error)
+static ebpo_status report_all(finding_search *p, ebpo_error *error)
 {
     ebpo_workspace *workspace = p->mesh->workspace;
     EBPO_FOR_ITEMS(workspace, i, 0, p->all.count) {
@@ -280,10 +280,10 @@ static ebpo_status report_all(places *p, ebpo_error *error)
         if (p->options.ply)
             note_in_picture(&p->picture, f, p->faces, p->face_count);
         if (i % BETWEEN_STEPS == 0 &&
-            !ebpo_progress_step(&p->options.progress, "places", i, p->all.count, error))
+            !ebpo_progress_step(&p->options.progress, "findings", i, p->all.count, error))
             return EBPO_E_CANCELLED;
-        ebpo_mesh_finding place = make_finding(p, f);
-        if (p->take && !p->take(p->user, &place)) {
+        ebpo_mesh_finding finding = make_finding(p, f);
+        if (p->take && !p->take(p->user, &finding)) {
             p->take = NULL;
             if (!p->options.ply)
                 break;
@@ -294,7 +294,7 @@ static ebpo_status report_all(places *p, ebpo_error *error)
 
 /* ---- entry point ---- */
 
-static ebpo_status note_all(places *p, ebpo_mesh_report *report, ebpo_error *error)
+static ebpo_status note_all(finding_search *p, ebpo_mesh_report *report, ebpo_error *error)
 {
     unsigned threads = ebpo_thread_count(p->options.threads);
     ebpo_found_list *lists = ebpo_alloc_zero(threads, sizeof *lists);
@@ -307,14 +307,14 @@ static ebpo_status note_all(places *p, ebpo_mesh_report *report, ebpo_error *err
                          .found = lists };
     ebpo_status status = ebpo_check_run(&check, error);
     if (status == EBPO_OK)
-        status = gather_places(p, lists, threads, error);
+        status = gather_findings(p, lists, threads, error);
     for (unsigned t = 0; t < threads; t++)
         ebpo_array_free(p->mesh->workspace, lists[t].item);
     free(lists);
     return status;
 }
 
-static ebpo_status find_places(places *p, ebpo_mesh_report *report, ebpo_error *error)
+static ebpo_status find_all(finding_search *p, ebpo_mesh_report *report, ebpo_error *error)
 {
     ebpo_status status = note_all(p, report, error);
     if (status == EBPO_OK)
@@ -336,15 +336,15 @@ ebpo_status ebpo_mesh_findings(const ebpo_mesh *mesh, const ebpo_findings_option
                                ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    places p = { .mesh = mesh,
-                 .options = EBPO_FINDINGS_OPTIONS_INIT,
-                 .take = take,
-                 .user = user,
-                 .picture = PLACES_PICTURE_INIT };
+    finding_search p = { .mesh = mesh,
+                         .options = EBPO_FINDINGS_OPTIONS_INIT,
+                         .take = take,
+                         .user = user,
+                         .picture = PICTURE_INIT };
     ebpo_mesh_report found = { .edges = 0 };
     ebpo_status status = EBPO_TAKE(ebpo_findings_options, &p.options, options, error);
     if (status == EBPO_OK)
-        status = find_places(&p, &found, error);
+        status = find_all(&p, &found, error);
     ebpo_array_free(mesh->workspace, p.all.item);
     ebpo_array_free(mesh->workspace, p.component);
     ebpo_array_free(mesh->workspace, p.faces);

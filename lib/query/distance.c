@@ -398,7 +398,7 @@ static ebpo_status check_mode(const ebpo_distance_options *o, ebpo_error *error)
     if (o->mode == EBPO_DISTANCE_ENVELOPE && o->deadline_ns)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "the envelope mode of distance supports no deadline; give a level "
-                         "instead");
+                         "(--max-level) instead");
     return EBPO_OK;
 }
 

@@ -52,7 +52,7 @@ ebpo_status ebpo_check_mesh(const ebpo_model *model, ebpo_error *error)
         return EBPO_OK;
     return ebpo_fail_file(error, EBPO_E_ABSENT, model->file->in.shown,
                           "the file was written without its mesh, which exact results need; query "
-                          "with a level, or use "
+                          "with a level (--max-level), or use "
                           "a file that has it (`ebpo subset`, `ebpo fetch` or `ebpo convert` with "
                           "--profile collision "
                           "or full)");

@@ -245,14 +245,14 @@ ebpo_status ebpo_fail_pruned(const ebpo_model *model, ebpo_cell cell, ebpo_error
     char cut[200];
     ebpo_box box = ebpo_model_box(model);
     describe_cut(model->info, cut, sizeof cut);
-    return ebpo_fail(error, EBPO_E_ABSENT,
-                     "%.120s: the query needs nodes omitted below level %d at %.6g %.6g %.6g "
-                     "(%s); query with a level, or make a larger part of the original with `ebpo "
-                     "subset` or `ebpo fetch`",
-                     model->file->in.shown, cell.level,
-                     ebpo_cell_face(&box, 0, cell.level, cell.at[0]),
-                     ebpo_cell_face(&box, 1, cell.level, cell.at[1]),
-                     ebpo_cell_face(&box, 2, cell.level, cell.at[2]), cut);
+    return ebpo_fail(
+        error, EBPO_E_ABSENT,
+        "%.120s: the query needs nodes omitted below level %d at %.6g %.6g %.6g "
+        "(%s); query with a level (--max-level), or make a larger part of the original "
+        "with `ebpo subset` or `ebpo fetch`",
+        model->file->in.shown, cell.level, ebpo_cell_face(&box, 0, cell.level, cell.at[0]),
+        ebpo_cell_face(&box, 1, cell.level, cell.at[1]),
+        ebpo_cell_face(&box, 2, cell.level, cell.at[2]), cut);
 }
 
 typedef struct checking {

@@ -143,7 +143,7 @@ static const char introduction[] =
     "\n"
     "Made by `ninja -C build tests/bench/degenerate_table && build/tests/bench/degenerate_table >\n"
     "docs/measured/degenerate.md`. Each case is one line of `tests/support/degenerate_cases.c` "
-    "(test suite `stiff`).\n"
+    "(test suite `degenerate`).\n"
     "\n"
     "A case is stable when it converts, `ebpo verify` finds 0 violations and 0 query results "
     "are wrong, or when it\n"

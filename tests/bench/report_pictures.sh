@@ -1,5 +1,5 @@
 #!/bin/sh
-# Remakes docs/pictures/report-dragon.png and report-stiff.png: the pages of `ebpo report` for a
+# Remakes docs/pictures/report-dragon.png and report-degenerate.png: the pages of `ebpo report` for a
 # dragon and for a shell whose wall is thinner than any cell.
 #
 #     tests/bench/report_pictures.sh BUILD_DIR MODELS_DIR [FOLDER]
@@ -49,7 +49,7 @@ page() { # NAME PICTURE
 }
 
 "$build/tools/ebpo" report --select $methods --targets -o "$folder/dragon" "$models/dragon100k.ply"
-"$build/tools/ebpo" report --select $methods --points 2000 --view 30,35 -o "$folder/stiff" \
+"$build/tools/ebpo" report --select $methods --points 2000 --view 30,35 -o "$folder/degenerate" \
     "$folder/thin_shell.ply"
 page dragon report-dragon.png
-page stiff report-stiff.png
+page degenerate report-degenerate.png

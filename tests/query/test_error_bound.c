@@ -50,7 +50,7 @@ static void check_level(query_model *m, int level)
                   m->variant, level, d.lo, d.hi);
     ck_assert(d.lo >= 0 && d.lo <= d.hi);
     if (d.lo > 0) {
-        double there = reference_distance(&m->mesh, m->info.solid, d.place);
+        double there = reference_distance(&m->mesh, m->info.solid, d.location);
         ck_assert_msg(fabs(there - d.lo) <= slack,
                       "%s, %s, level %d: the farthest point is %.17g away, not %.17g", m->name,
                       m->variant, level, there, d.lo);

@@ -407,7 +407,7 @@ TEST_SUITE(haptic_models)
     watch_gmp();
     tcase_set_timeout(models, 7200);
     tcase_add_loop_test(models, test_haptic_on_real_models, 0, 2 * NAMES);
-    TCase *degenerate = tcase_create("stiff");
+    TCase *degenerate = tcase_create("degenerate");
     tcase_set_timeout(degenerate, 7200);
     tcase_add_loop_test(degenerate, test_haptic_on_degenerate_models, 0, 2 * degenerate_case_count);
     suite_add_tcase(suite, models);

@@ -200,8 +200,8 @@ END_TEST
 
 TEST_SUITE(query_degenerate)
 {
-    Suite *suite = suite_create("query_stiff");
-    TCase *tests = tcase_create("stiff");
+    Suite *suite = suite_create("query_degenerate");
+    TCase *tests = tcase_create("degenerate");
     tcase_set_timeout(tests, 600);
     tcase_add_loop_test(tests, test_faces_larger_than_subtree_are_exact, 0, 12);
     tcase_add_loop_test(tests, test_convex_leaf_planes_with_short_edges, 0, 60);

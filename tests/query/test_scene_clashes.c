@@ -184,10 +184,10 @@ static double distance_to(const alone *p, int m, const double at[3])
 static void check_place(const alone *p, const ebpo_scene_clash *m, const seen *s)
 {
     for (int i = 0; i < 2; i++)
-        ck_assert_double_le(fabs(distance_to(p, i, m->place) - m->distance / 2), 1e-9);
+        ck_assert_double_le(fabs(distance_to(p, i, m->location) - m->distance / 2), 1e-9);
     for (int k = 0; k < 3; k++) {
-        ck_assert_double_eq(m->place_min[k], fmin(m->place[k], s->low[k]));
-        ck_assert_double_eq(m->place_max[k], fmax(m->place[k], s->high[k]));
+        ck_assert_double_eq(m->location_min[k], fmin(m->location[k], s->low[k]));
+        ck_assert_double_eq(m->location_max[k], fmax(m->location[k], s->high[k]));
     }
 }
 
@@ -257,7 +257,7 @@ START_TEST(test_scene_reports_match_pair_queries)
 {
     uint64_t rounds = query_scaled(20) + 4, kinds[8] = { 0 };
     ebpo_scene_clash_options how = EBPO_SCENE_CLASH_OPTIONS_INIT;
-    how.count = how.places = how.relate = true;
+    how.count = how.locations = how.relate = true;
     how.depth = within;
     for (uint64_t n = 0; n < rounds; n++) {
         ebpo_scene *scene = some_scene(n);
@@ -287,7 +287,7 @@ START_TEST(test_scene_reports_only_requested_values)
     ebpo_scene_clash_options all = EBPO_SCENE_CLASH_OPTIONS_INIT,
                              few = EBPO_SCENE_CLASH_OPTIONS_INIT;
     all.count = true;
-    few.places = true;
+    few.locations = true;
     for (uint64_t n = 0; n < rounds; n++) {
         ebpo_scene *scene = some_scene(n);
         intersected m, l;
@@ -300,7 +300,7 @@ START_TEST(test_scene_reports_only_requested_values)
             };
             alone p;
             ck_assert_int_eq(m.list[i].kind, l.list[i].kind);
-            ck_assert(isnan(m.list[i].place[0]) && m.list[i].relation == EBPO_RELATION_OPEN);
+            ck_assert(isnan(m.list[i].location[0]) && m.list[i].relation == EBPO_RELATION_OPEN);
             ck_assert(m.list[i].depth[0].hi == INFINITY && l.list[i].contacts == 0);
             make_alone(scene, l.list[i].a, l.list[i].b, &p);
             check_place(&p, &l.list[i], &nothing);

@@ -28,8 +28,8 @@ __attribute__((format(printf, 2, 3))) static void fault(degenerate_result *r, co
 
 static query_variant variant_of(const degenerate_case *c)
 {
-    query_variant v = { "stiff", c->leaf ? c->leaf : 16, c->levels ? c->levels - 1 : -1, c->rule,
-                        0 };
+    query_variant v = { "degenerate", c->leaf ? c->leaf : 16, c->levels ? c->levels - 1 : -1,
+                        c->rule, 0 };
     return v;
 }
 

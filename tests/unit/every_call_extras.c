@@ -554,7 +554,7 @@ static ebpo_status intersect_in_scene(ebpo_scene *scene, ebpo_error *error)
     uint64_t clashes = 0, tested = 0;
     ebpo_scene_clash_options how = EBPO_SCENE_CLASH_OPTIONS_INIT;
     how.threads = 1;
-    how.count = how.places = how.relate = true;
+    how.count = how.locations = how.relate = true;
     how.depth = 0.1;
     ebpo_status status =
         ebpo_scene_find_clashes(scene, 1, &how, count_clashes, &clashes, &tested, error);

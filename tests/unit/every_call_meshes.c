@@ -106,7 +106,7 @@ static bool take_place(void *user, const ebpo_mesh_finding *place)
     return ebpo_finding_name(place->kind) != NULL;
 }
 
-static ebpo_status call_places(every_call_env *e)
+static ebpo_status call_findings(every_call_env *e)
 {
     ebpo_mesh mesh;
     ebpo_findings_options options = EBPO_FINDINGS_OPTIONS_INIT;
@@ -352,7 +352,7 @@ const every_call every_call_meshes[] = {
     { "write_ply", call_write_ply },
     { "colours", call_colours },
     { "check", call_check },
-    { "places", call_places },
+    { "findings", call_findings },
     { "arrange", call_arrange },
     { "weld", call_weld },
     { "weld_within", call_weld_within },

@@ -26,7 +26,7 @@ static ebpo_mesh random_mesh(uint64_t *state)
 }
 
 typedef struct reported {
-    ebpo_mesh_finding place;
+    ebpo_mesh_finding found_one;
     uint64_t faces[MAX_FACES];
 } reported;
 
@@ -35,15 +35,15 @@ typedef struct all {
     uint64_t count, enough;
 } all;
 
-static bool keep(void *user, const ebpo_mesh_finding *place)
+static bool keep(void *user, const ebpo_mesh_finding *found_one)
 {
     all *a = user;
     reported *t = &a->item[a->count++];
     memset(t, 0, sizeof *t);
-    t->place = *place;
-    for (uint64_t i = 0; i < place->face_count; i++)
-        t->faces[i] = place->faces[i];
-    t->place.faces = NULL;
+    t->found_one = *found_one;
+    for (uint64_t i = 0; i < found_one->face_count; i++)
+        t->faces[i] = found_one->faces[i];
+    t->found_one.faces = NULL;
     return a->count != a->enough;
 }
 
@@ -134,7 +134,7 @@ static uint64_t first_like(const ebpo_mesh *m, uint64_t face)
  * occurrence; the face of an index. */
 static void judge_faces(const ebpo_mesh *m, const reported *t)
 {
-    const ebpo_mesh_finding *p = &t->place;
+    const ebpo_mesh_finding *p = &t->found_one;
     uint64_t wanted = 0;
     bool one = p->kind == EBPO_FOUND_INDEX_REPEATED_FACE || p->kind == EBPO_FOUND_ZERO_AREA_FACE;
     if (one)
@@ -159,7 +159,7 @@ static void judge_faces(const ebpo_mesh *m, const reported *t)
 
 static void judge_point(const ebpo_mesh *m, const reported *t)
 {
-    const ebpo_mesh_finding *p = &t->place;
+    const ebpo_mesh_finding *p = &t->found_one;
     uint64_t v[3] = { p->vertex[0], p->vertex[1], 0 };
     int count = p->kind <= EBPO_FOUND_UNBALANCED_EDGE ? 2 : p->vertex[0] == p->vertex[1] ? 1 : 3;
     if (p->kind >= EBPO_FOUND_REPEATED_FACE && p->kind <= EBPO_FOUND_ZERO_AREA_FACE) {
@@ -190,7 +190,8 @@ static void judge(const ebpo_mesh *m, const all *a, const ebpo_mesh_report *r)
 {
     uint64_t count[EBPO_FINDING_KINDS] = { 0 };
     for (uint64_t i = 0; i < a->count; i++) {
-        const ebpo_mesh_finding *p = &a->item[i].place, *q = i ? &a->item[i - 1].place : NULL;
+        const ebpo_mesh_finding *p = &a->item[i].found_one,
+                                *q = i ? &a->item[i - 1].found_one : NULL;
         count[p->kind]++;
         ck_assert(!q || p->kind >= q->kind);
         /* each item is reported once */
@@ -229,9 +230,9 @@ START_TEST(test_finding_locations_are_reported_once)
 }
 END_TEST
 
-static bool count_places(void *user, const ebpo_mesh_finding *place)
+static bool count_findings(void *user, const ebpo_mesh_finding *found_one)
 {
-    (void)place;
+    (void)found_one;
     ++*(uint64_t *)user;
     return true;
 }
@@ -249,7 +250,7 @@ START_TEST(test_locations_of_many_repeated_faces)
         ebpo_test_append_vertex(&mesh, v == 1, v == 2, 0);
     for (int f = 0; f < MANY; f++)
         ebpo_test_append_face(&mesh, 0, 1, 2);
-    ck_assert(ebpo_mesh_findings(&mesh, NULL, count_places, &count, NULL, &error) == EBPO_OK);
+    ck_assert(ebpo_mesh_findings(&mesh, NULL, count_findings, &count, NULL, &error) == EBPO_OK);
     ck_assert_uint_eq(count, MANY - 1 + 9); /* of edges 6, of vertices 3 */
     ebpo_mesh_free(&mesh);
 }
@@ -291,7 +292,7 @@ END_TEST
 
 TEST_SUITE(findings)
 {
-    Suite *suite = suite_create("places");
+    Suite *suite = suite_create("findings");
     TCase *tests = tcase_create("all");
     tcase_set_timeout(tests, 30);
     tcase_add_test(tests, test_finding_locations_are_reported_once);

@@ -135,10 +135,10 @@ START_TEST(test_repeated_faces_in_any_rotation)
 {
     ebpo_mesh_report r = check_named("repeated_faces");
     ck_assert_uint_eq(r.repeated_faces.count, 2);
-    ck_assert_uint_eq(r.repeated_faces.place[0], 12);
-    ck_assert_uint_eq(r.repeated_faces.place[1], 13);
+    ck_assert_uint_eq(r.repeated_faces.locations[0], 12);
+    ck_assert_uint_eq(r.repeated_faces.locations[1], 13);
     ck_assert_uint_eq(r.nonmanifold_edges.count, 3);
-    ck_assert_uint_eq(r.nonmanifold_edges.place[0], 0);
+    ck_assert_uint_eq(r.nonmanifold_edges.locations[0], 0);
 }
 END_TEST
 
@@ -156,11 +156,11 @@ START_TEST(test_zero_area_faces_are_found_exactly)
 {
     ebpo_mesh_report r = check_named("zero_area_face");
     ck_assert_uint_eq(r.zero_area_faces.count, 1);
-    ck_assert_uint_eq(r.zero_area_faces.place[0], 5);
+    ck_assert_uint_eq(r.zero_area_faces.locations[0], 5);
     r = check_named("index_repeated_face");
     ck_assert_uint_eq(r.zero_area_faces.count, 1);
     ck_assert_uint_eq(r.index_repeated_faces.count, 1);
-    ck_assert_uint_eq(r.index_repeated_faces.place[0], 4);
+    ck_assert_uint_eq(r.index_repeated_faces.locations[0], 4);
     r = check_named("thin_wall");
     ck_assert_uint_eq(r.zero_area_faces.count, 0);
     /* Collinear to 1 part in 2^52, but not exactly. */
@@ -201,9 +201,9 @@ START_TEST(test_finding_indices_are_first_ascending)
     ebpo_mesh_report r = check(&mesh);
     ck_assert_uint_eq(r.misoriented_edges.count, 18);
     for (int i = 1; i < EBPO_FINDING_LOCATIONS; i++)
-        ck_assert(r.misoriented_edges.place[i - 1] <= r.misoriented_edges.place[i]);
+        ck_assert(r.misoriented_edges.locations[i - 1] <= r.misoriented_edges.locations[i]);
     /* face 9 is reversed; 8 shares an edge with it */
-    ck_assert_uint_eq(r.misoriented_edges.place[0], 8);
+    ck_assert_uint_eq(r.misoriented_edges.locations[0], 8);
     ebpo_mesh_free(&mesh);
 }
 END_TEST
@@ -214,7 +214,7 @@ START_TEST(test_unreferenced_vertices_do_not_extend_box)
     ebpo_test_append_vertex(&mesh, 100, 0, 0);
     ebpo_mesh_report r = check(&mesh);
     ck_assert_uint_eq(r.unreferenced_vertices.count, 1);
-    ck_assert_uint_eq(r.unreferenced_vertices.place[0], 4);
+    ck_assert_uint_eq(r.unreferenced_vertices.locations[0], 4);
     ck_assert_double_eq(r.max[0], 1);
     ck_assert(r.manifold && r.genus == 0);
     ebpo_mesh_free(&mesh);

@@ -174,7 +174,7 @@ START_TEST(test_mesh_check_matches_reference)
         ck_assert_uint_eq(r.repeated_positions.count, t.positions);
         ck_assert_uint_eq(r.components, t.components);
         if (t.boundary)
-            ck_assert_uint_eq(r.boundary_edges.place[0], t.first_boundary);
+            ck_assert_uint_eq(r.boundary_edges.locations[0], t.first_boundary);
         ebpo_mesh_free(&mesh);
     }
 }

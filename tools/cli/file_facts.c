@@ -22,9 +22,9 @@ const char *facts_inside_out(const ebpo_info *info)
     if (!info->solid || !(info->report.volume < 0 || is_less_than_nothing(&info->report)))
         return NULL;
     return info->rule == EBPO_RULE_POSITIVE
-               ? "turned inside out: normals look inwards, and points within have winding number "
+               ? "turned inside out: normals point inwards, and points within have winding number "
                  "-1, which by this file's rule is outside; convert again with --orient"
-               : "turned inside out: normals look inwards, and points within have winding number "
+               : "turned inside out: normals point inwards, and points within have winding number "
                  "-1, which is inside by this file's rule but not by the rule positive; convert "
                  "again with --orient";
 }

@@ -17,7 +17,7 @@ static const struct doubt_text {
     { EBPO_DOUBT_MOSTLY_FILLED, "mostly_filled", "filling holes added as much area as was given" },
     { EBPO_DOUBT_NO_VOLUME, "no_volume", "it has hardly any volume" },
     { EBPO_DOUBT_INSIDE_OUT, "inside_out",
-      "it is turned inside out: normals look inwards, so a point within has winding number -1, "
+      "it is turned inside out: normals point inwards, so a point within has winding number -1, "
       "which is inside by the rules nonzero and evenodd but outside by positive; --orient turns "
       "it" },
 };
@@ -100,7 +100,7 @@ static void warn_of_inside_out(FILE *out, const char *command, const char *path,
 {
     fprintf(out,
             "ebpo %s: %s: warning: %llu of %llu closed components %s turned inside out: normals "
-            "look inwards, and winding numbers there are less by 1 and not greater, which the "
+            "point inwards, and winding numbers there are less by 1 and not greater, which the "
             "rule positive takes for outside; --orient turns them\n",
             command, path, (unsigned long long)s->inside_out, (unsigned long long)s->closed,
             s->inside_out == 1 ? "is" : "are");
@@ -108,13 +108,13 @@ static void warn_of_inside_out(FILE *out, const char *command, const char *path,
 
 static void warn_of_nested(FILE *out, const char *command, const char *path, const ebpo_shells *s)
 {
-    fprintf(
-        out,
-        "ebpo %s: %s: warning: %llu of %llu closed components %s within another and %s outwards "
-        "like it: winding numbers there are greater by 1, so the rules nonzero and positive "
-        "leave no cavity, and evenodd does; --orient turns them into cavities\n",
-        command, path, (unsigned long long)s->nested, (unsigned long long)s->closed,
-        s->nested == 1 ? "is" : "are", s->nested == 1 ? "looks" : "look");
+    fprintf(out,
+            "ebpo %s: %s: warning: %llu of %llu closed components %s within another and oriented "
+            "outwards "
+            "like it: winding numbers there are greater by 1, so the rules nonzero and positive "
+            "leave no cavity, and evenodd does; --orient turns them into cavities\n",
+            command, path, (unsigned long long)s->nested, (unsigned long long)s->closed,
+            s->nested == 1 ? "is" : "are");
 }
 
 /* Warns of faces that share positions, but not vertices, with an earlier face and its
@@ -129,7 +129,7 @@ static void warn_of_repeated_positions(FILE *out, const char *command, const cha
             "drops such\n",
             command, path,
             words_plural(text, sizeof text, p->repeated_same, "face is", "faces are"),
-            (unsigned long long)p->repeated.place[0], p->repeated.count > 1 ? ", ..." : "");
+            (unsigned long long)p->repeated.locations[0], p->repeated.count > 1 ? ", ..." : "");
 }
 
 /* Returns the result of dropping repeated faces alone, if this was tried. */
@@ -150,7 +150,7 @@ static void warn_of_repeated(FILE *out, const char *command, const char *path, c
     char text[80], steps[64], left[FINDINGS_VOLUME];
     fprintf(out, "ebpo %s: %s: warning: %s of the same three vertices as an earlier one (face %llu",
             command, path, words_plural(text, sizeof text, f->count, "face is", "faces are"),
-            (unsigned long long)f->place[0]);
+            (unsigned long long)f->locations[0]);
     fputs(f->count > 1 ? ", ...): " : "): ", out);
     if (!t) {
         fprintf(out, "--drop-duplicates drops such%s\n",
@@ -177,7 +177,7 @@ static void warn_of_opened(FILE *out, const char *command, const char *path,
     fprintf(
         out,
         "ebpo %s: %s: WARNING: it was a solid before repeated faces were dropped, %llu of which "
-        "looked the other way than the one that stays; omit --drop-duplicates\n",
+        "had the opposite orientation of the kept face; omit --drop-duplicates\n",
         command, path, (unsigned long long)r->dropped_opposite);
 }
 

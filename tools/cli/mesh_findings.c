@@ -12,7 +12,7 @@
 /* Findings in the order of printing. */
 static const struct finding_text {
     size_t offset;
-    const char *key, *one, *many, *place;
+    const char *key, *one, *many, *element;
 } findings[] = {
     { offsetof(ebpo_mesh_report, boundary_edges), "boundary_edges",
       "boundary edge (used by one face only)", "boundary edges (used by one face only)", "face" },
@@ -58,13 +58,13 @@ static int places_of(const ebpo_finding *f)
     return f->count < EBPO_FINDING_LOCATIONS ? (int)f->count : EBPO_FINDING_LOCATIONS;
 }
 
-static void print_places(FILE *out, const ebpo_finding *f, const char *place)
+static void print_locations(FILE *out, const ebpo_finding *f, const char *element)
 {
     int shown = places_of(f);
-    const char *many = place[0] == 'v' ? "vertices" : "faces";
-    fprintf(out, ": %s", shown == 1 ? place : many);
+    const char *many = element[0] == 'v' ? "vertices" : "faces";
+    fprintf(out, ": %s", shown == 1 ? element : many);
     for (int i = 0; i < shown; i++)
-        fprintf(out, "%s %llu", i ? "," : "", (unsigned long long)f->place[i]);
+        fprintf(out, "%s %llu", i ? "," : "", (unsigned long long)f->locations[i]);
     fprintf(out, "%s\n", f->count > (uint64_t)shown ? ", ..." : "");
 }
 
@@ -78,7 +78,7 @@ static void print_findings(FILE *out, const ebpo_mesh_report *report)
         any = true;
         fprintf(out, "  %llu %s", (unsigned long long)f->count,
                 f->count == 1 ? findings[i].one : findings[i].many);
-        print_places(out, f, findings[i].place);
+        print_locations(out, f, findings[i].element);
     }
     if (!any)
         fputs("  no problems found in vertices, edges and single faces\n", out);
@@ -234,7 +234,7 @@ void findings_print_repair(FILE *out, const ebpo_repair_record *r)
                 words_plural(text, sizeof text, r->dropped_faces, "repeated face",
                              "repeated faces"));
         if (r->dropped_opposite)
-            fprintf(out, ", %llu of which looked the other way",
+            fprintf(out, ", %llu of which had the opposite orientation",
                     (unsigned long long)r->dropped_opposite);
         fputc('\n', out);
     }
@@ -269,7 +269,7 @@ static void json_finding(json *j, const char *key, const ebpo_finding *f)
     json_uint(j, "count", f->count);
     json_array(j, "locations");
     for (int i = 0; i < places_of(f); i++)
-        json_uint(j, NULL, f->place[i]);
+        json_uint(j, NULL, f->locations[i]);
     json_end(j);
     json_end(j);
 }

@@ -7,6 +7,9 @@
 
 #include "cli/numbers.h"
 
+/* Number of words of a table, without the final NULL. */
+#define WORD_COUNT(words) (sizeof(words) / sizeof *(words)-1)
+
 const char *const rule_words[] = { "nonzero", "evenodd", "positive", NULL };
 const char *selection_words[EBPO_SELECTION_COUNT + 1];
 const char *const normals_words[] = { "spherical", "angle", NULL };
@@ -92,11 +95,14 @@ const char *words_node_type(ebpo_node_type type)
     return words[type];
 }
 
-const char *words_rule(ebpo_rule rule) { return (unsigned)rule < 3 ? rule_words[rule] : "unknown"; }
+const char *words_rule(ebpo_rule rule)
+{
+    return (unsigned)rule < WORD_COUNT(rule_words) ? rule_words[rule] : "unknown";
+}
 
 const char *words_codec(ebpo_codec codec)
 {
-    return (unsigned)codec < 3 ? codec_words[codec] : "unknown";
+    return (unsigned)codec < WORD_COUNT(codec_words) ? codec_words[codec] : "unknown";
 }
 
 bool words_end_with(const char *text, const char *end)

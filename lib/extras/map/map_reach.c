@@ -90,12 +90,12 @@ static ebpo_status reach_keep(search *s, triangles *list, const triangle *t, ebp
     return EBPO_OK;
 }
 
-static void reach_learn(search *s, double away, const double place[3])
+static void reach_learn(search *s, double away, const double location[3])
 {
     if (away <= s->reach.lo)
         return;
     s->reach.lo = away;
-    memcpy(s->reach.place, place, sizeof s->reach.place);
+    memcpy(s->reach.location, location, sizeof s->reach.location);
 }
 
 /* --- a round --- */

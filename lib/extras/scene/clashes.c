@@ -2,10 +2,10 @@
  * describes each contact.
  *
  * Pairs come from the broad phase (scene_pairs.c), and are evaluated on all cores. For each pair
- * whose faces intersect, the result has the faces, the place, the number and the depth of contacts.
- * For other pairs it has, as far as the options request, the relation of the solids and whether the
- * clearance is kept. Parts omitted from a subset must not matter: if they may, the query fails with
- * EBPO_E_ABSENT instead of guessing.
+ * whose faces intersect, the result has the faces, the location, the number and the depth of
+ * contacts. For other pairs it has, as far as the options request, the relation of the solids and
+ * whether the clearance is kept. Parts omitted from a subset must not matter: if they may, the
+ * query fails with EBPO_E_ABSENT instead of guessing.
  *
  * Source: docs/guide/scenes.md. */
 #include "core/strict_fp.h"
@@ -39,23 +39,23 @@ static void scene_forget_facts(ebpo_scene_clash *m)
     m->face_a = m->face_b = EBPO_NO_FACE;
     m->relation = EBPO_RELATION_OPEN;
     for (int k = 0; k < 3; k++)
-        m->place[k] = m->place_min[k] = m->place_max[k] = NAN;
+        m->location[k] = m->location_min[k] = m->location_max[k] = NAN;
     m->depth[0] = m->depth[1] = unknown;
 }
 
-/* Widens the box of places. If one of two values is NAN, the result is the other one. */
+/* Widens the box of locations. If one of two values is NAN, the result is the other one. */
 static void clash_facts_widen(ebpo_scene_clash *m, const double p[3])
 {
     for (int k = 0; k < 3; k++) {
-        m->place_min[k] = fmin(m->place_min[k], p[k]);
-        m->place_max[k] = fmax(m->place_max[k], p[k]);
+        m->location_min[k] = fmin(m->location_min[k], p[k]);
+        m->location_max[k] = fmax(m->location_max[k], p[k]);
     }
 }
 
-static void set_place(ebpo_scene_clash *m, const double place[3])
+static void set_location(ebpo_scene_clash *m, const double location[3])
 {
-    memcpy(m->place, place, sizeof m->place);
-    clash_facts_widen(m, place);
+    memcpy(m->location, location, sizeof m->location);
+    clash_facts_widen(m, location);
 }
 
 /* --- all pairs --- */
@@ -64,7 +64,7 @@ static void set_place(ebpo_scene_clash *m, const double place[3])
  * pair if the options need no more. */
 typedef struct tally {
     ebpo_scene_clash *m;
-    ebpo_pair_faces *faces; /* for finding places; NULL: not requested */
+    ebpo_pair_faces *faces; /* for finding locations; NULL: not requested */
     ebpo_face_pair first;
     bool enough;
     ebpo_error *error; /* error of `status` */
@@ -124,7 +124,7 @@ static ebpo_status report_lines(const scene_two *two, ebpo_scene_clash *m, ebpo_
     return ebpo_collide_polylines(two->collider, two->options, count_lines, &m->contacts, error);
 }
 
-/* --- places --- */
+/* --- locations --- */
 
 /* Returns a point of both faces: an end of their common segment, or a point of their nearest
  * features. */
@@ -149,18 +149,18 @@ static ebpo_status common_point(ebpo_pair_faces *of, const ebpo_face_pair *pair,
     return EBPO_OK;
 }
 
-/* Finds a place of contact. The distance query of intersecting models begins with their first
+/* Finds a location of contact. The distance query of intersecting models begins with their first
  * contact and returns a point of it; this needs no table of all faces. */
-static ebpo_status place_of_first(const scene_two *two, ebpo_scene_clash *m, ebpo_error *error)
+static ebpo_status locate_first(const scene_two *two, ebpo_scene_clash *m, ebpo_error *error)
 {
     ebpo_clearance found;
     ebpo_status status = ebpo_collide_distance(two->collider, two->options, NULL, &found, error);
     if (status == EBPO_OK)
-        set_place(m, found.point_a);
+        set_location(m, found.point_a);
     return status;
 }
 
-/* Sets faces, distance and place of the nearest pair. */
+/* Sets faces, distance and location of the nearest pair. */
 static void scene_report_nearest(const scene_two *two, const ebpo_clearance *nearest,
                                  ebpo_scene_clash *m)
 {
@@ -170,18 +170,18 @@ static void scene_report_nearest(const scene_two *two, const ebpo_clearance *nea
     m->face_b = nearest->pair.face_b;
     for (int k = 0; k < 3; k++)
         middle[k] = nearest->point_a[k] / 2 + nearest->point_b[k] / 2;
-    if (two->how->places)
-        set_place(m, middle);
+    if (two->how->locations)
+        set_location(m, middle);
 }
 
 /* --- intersecting faces --- */
 
-/* Counts pairs of faces. `faces`: NULL, or for finding places. */
+/* Counts pairs of faces. `faces`: NULL, or for finding locations. */
 static ebpo_status count_all(const scene_two *two, ebpo_pair_faces *faces,
                              const ebpo_face_pair *first, ebpo_scene_clash *m, ebpo_error *error)
 {
     tally t = { m, faces, *first, false, error, EBPO_OK };
-    double place[3];
+    double location[3];
     ebpo_status status = ebpo_collide_all(two->collider, two->options, count_faces, &t, error);
     if (status == EBPO_OK)
         status = t.status;
@@ -190,14 +190,14 @@ static ebpo_status count_all(const scene_two *two, ebpo_pair_faces *faces,
     m->face_a = t.first.face_a;
     m->face_b = t.first.face_b;
     if (faces)
-        status = common_point(faces, &t.first, place, error);
+        status = common_point(faces, &t.first, location, error);
     if (faces && status == EBPO_OK)
-        set_place(m, place);
+        set_location(m, location);
     return status == EBPO_OK && m->crossing ? report_lines(two, m, error) : status;
 }
 
-static ebpo_status count_places(const scene_two *two, const ebpo_face_pair *first,
-                                ebpo_scene_clash *m, ebpo_error *error)
+static ebpo_status count_with_location(const scene_two *two, const ebpo_face_pair *first,
+                                       ebpo_scene_clash *m, ebpo_error *error)
 {
     ebpo_collision current_query;
     ebpo_pair_faces faces = { .current_query = &current_query };
@@ -219,17 +219,17 @@ static ebpo_status find_kind(const scene_two *two, const ebpo_face_pair *first, 
                        : ebpo_collide_all(two->collider, two->options, count_faces, &t, error);
 }
 
-/* Sets faces, numbers of pairs, contacts and place. `first`: result of ebpo_collide_first. */
+/* Sets faces, numbers of pairs, contacts and location. `first`: result of ebpo_collide_first. */
 static ebpo_status scene_report_contacts(const scene_two *two, const ebpo_face_pair *first,
                                          ebpo_scene_clash *m, ebpo_error *error)
 {
     m->face_a = first->face_a;
     m->face_b = first->face_b;
     if (two->how->count)
-        return two->how->places ? count_places(two, first, m, error)
-                                : count_all(two, NULL, first, m, error);
+        return two->how->locations ? count_with_location(two, first, m, error)
+                                   : count_all(two, NULL, first, m, error);
     ebpo_status status = find_kind(two, first, m, error);
-    return status == EBPO_OK && two->how->places ? place_of_first(two, m, error) : status;
+    return status == EBPO_OK && two->how->locations ? locate_first(two, m, error) : status;
 }
 
 /* Returns true if a point of one model is inside the other. Otherwise the depth is 0, and a search

@@ -1,8 +1,8 @@
 /* Records results of a scene at several times in an HDF5 file, for other programs.
  *
  * The file has the names of instances and models, a row for each time, and a row for each pair
- * found, with the pair's kind, place and depth. Tables grow by rows while times are added. The file
- * is published when it is finished; after a failure there is no file. */
+ * found, with the pair's kind, location and depth. Tables grow by rows while times are added. The
+ * file is published when it is finished; after a failure there is no file. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -34,8 +34,8 @@ enum {
     CONTACTS,
     CLEARANCE,
     DISTANCE,
-    PLACE,
-    PLACE_BOX,
+    LOCATION,
+    LOCATION_BOX,
     DEPTH,
     TABLES
 };
@@ -69,9 +69,10 @@ static const struct {
     [CONTACTS] = { "/clashes/contacts", EBPO_H5_I64, 0, "lines of contact; -1: not known" },
     [CLEARANCE] = { "/clashes/clearance", EBPO_H5_F64, 0, "required, the scene's unit" },
     [DISTANCE] = { "/clashes/distance", EBPO_H5_F64, 0, "of faces, the scene's unit" },
-    [PLACE] = { "/clashes/location", EBPO_H5_F64, 3, "x, y, z in the world; nan: not requested" },
-    [PLACE_BOX] = { "/clashes/location_box", EBPO_H5_F64, 6,
-                    "of contacts in the world: least x, y, z, greatest x, y, z" },
+    [LOCATION] = { "/clashes/location", EBPO_H5_F64, 3,
+                   "x, y, z in the world; nan: not requested" },
+    [LOCATION_BOX] = { "/clashes/location_box", EBPO_H5_F64, 6,
+                       "of contacts in the world: least x, y, z, greatest x, y, z" },
     [DEPTH] = { "/clashes/depth", EBPO_H5_F64, 4, "of a in b from, to; of b in a from, to" },
 };
 
@@ -250,7 +251,8 @@ enum { ROWS = 256 };
 typedef struct rows {
     int64_t frame[ROWS], instances[ROWS][2], faces[ROWS][2], pairs[ROWS][3], contacts[ROWS];
     uint8_t kind[ROWS], relation[ROWS];
-    double clearance[ROWS], distance[ROWS], place[ROWS][3], place_box[ROWS][6], depth[ROWS][4];
+    double clearance[ROWS], distance[ROWS], location[ROWS][3], location_box[ROWS][6],
+        depth[ROWS][4];
 } rows;
 
 /* Returns the number of an object, or -1 if it is missing. */
@@ -271,9 +273,9 @@ static void fill_row(rows *out, uint64_t i, const ebpo_scene_clash *m, int64_t f
     out->contacts[i] = record_number(m->contacts);
     out->clearance[i] = m->clearance;
     out->distance[i] = m->distance;
-    memcpy(out->place[i], m->place, sizeof m->place);
-    memcpy(out->place_box[i], m->place_min, sizeof m->place_min);
-    memcpy(out->place_box[i] + 3, m->place_max, sizeof m->place_max);
+    memcpy(out->location[i], m->location, sizeof m->location);
+    memcpy(out->location_box[i], m->location_min, sizeof m->location_min);
+    memcpy(out->location_box[i] + 3, m->location_max, sizeof m->location_max);
     for (int k = 0; k < 2; k++) {
         out->depth[i][2 * k] = m->depth[k].lo;
         out->depth[i][2 * k + 1] = m->depth[k].hi;
@@ -282,9 +284,9 @@ static void fill_row(rows *out, uint64_t i, const ebpo_scene_clash *m, int64_t f
 
 static ebpo_status put_rows(ebpo_scene_report *r, const rows *d, uint64_t count, ebpo_error *error)
 {
-    const void *const data[] = { d->frame,    d->instances, d->kind,      d->relation,
-                                 d->faces,    d->pairs,     d->contacts,  d->clearance,
-                                 d->distance, d->place,     d->place_box, d->depth };
+    const void *const data[] = { d->frame,    d->instances, d->kind,         d->relation,
+                                 d->faces,    d->pairs,     d->contacts,     d->clearance,
+                                 d->distance, d->location,  d->location_box, d->depth };
     ebpo_status status = EBPO_OK;
     for (int i = FRAME; i < TABLES && status == EBPO_OK; i++)
         status = ebpo_h5_append(&r->out, &r->table[i], data[i - FRAME], count, error);

@@ -59,7 +59,7 @@ typedef struct ebpo_error_bound {
     double lo, hi;
 
     /* Point of an envelope, about lo away from the model; zeros if lo is 0. */
-    double place[3];
+    double location[3];
 
     /*
      * Mean and root mean square distance of the level's surface from the model, weighted by area.

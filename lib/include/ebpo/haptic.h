@@ -121,8 +121,8 @@ typedef struct ebpo_haptic_options {
  *
  * model   must outlive the object. Contexts may use the model at the same time. Its budget limits
  *         loading (ebpo_model_options.memory)
- * place   position: three finite doubles. Ball and tool: outside the solid, with no face within the
- *         radius and 1.5 skins (tool: of any point). Probe: anywhere
+ * position   three finite doubles. Ball and tool: outside the solid, with no face within the radius
+ *            and 1.5 skins (tool: of any point). Probe: anywhere
  *
  * EBPO_E_ARGUMENT: an option or the position is not valid. EBPO_E_UNSUPPORTED: coordinates are
  * beyond 2^200. EBPO_E_ABSENT: the file has no mesh, or is a subset without the surroundings of the
@@ -132,7 +132,7 @@ typedef struct ebpo_haptic_options {
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_haptic_new(ebpo_model *model,
                                                    const ebpo_haptic_options *options,
-                                                   const double place[3], ebpo_haptic **out,
+                                                   const double position[3], ebpo_haptic **out,
                                                    ebpo_error *error);
 
 /*
@@ -290,7 +290,7 @@ typedef struct ebpo_haptic_probe_result {
 
 /*
  * Computes one haptic step of a probe, which has no collisions: bounds of the distance from the
- * position `place` to the model, from data in memory. The bounds combine
+ * `position` to the model, from data in memory. The bounds combine
  *   - the near faces, and the sides of these faces on which the probe is, which are tracked by
  *   exact arithmetic: within `search_radius` of a face the result is exact except for rounding;
  *   - the first levels of the octree, at most 2^17 nodes: leaves and gray nodes, and black nodes;
@@ -300,7 +300,7 @@ typedef struct ebpo_haptic_probe_result {
  *
  * Threads: one per object.
  */
-EBPO_API void ebpo_haptic_step_probe(ebpo_haptic *haptic, const double place[3],
+EBPO_API void ebpo_haptic_step_probe(ebpo_haptic *haptic, const double position[3],
                                      ebpo_haptic_probe_result *out);
 
 /* Result of a haptic step of a tool. */
@@ -339,11 +339,11 @@ typedef struct ebpo_haptic_tool_result {
 } ebpo_haptic_tool_result;
 
 /*
- * Computes one haptic step of a tool with the device at position `place`, rotated by the quaternion
- * `turn` (x, y, z, w, of any length). No point of the tool passes through a face, or comes closer
- * than half a skin to a face; this is decided by exact arithmetic, as for a ball. Between its
- * points a tool has no collisions, so the spacing of points must be finer than the features to
- * feel.
+ * Computes one haptic step of a tool with the device at `position`, rotated by the
+ * quaternion `turn` (x, y, z, w, of any length). No point of the tool passes through a face, or
+ * comes closer than half a skin to a face; this is decided by exact arithmetic, as for a ball.
+ * Between its points a tool has no collisions, so the spacing of points must be finer than the
+ * features to feel.
  *
  * A rotation counts as its angle times the arm of the tool, the root mean square distance of the
  * points from the tool's position. Among all motions that the contacts allow, the proxy takes the
@@ -361,7 +361,7 @@ typedef struct ebpo_haptic_tool_result {
  *
  * Threads: one per object.
  */
-EBPO_API void ebpo_haptic_step_tool(ebpo_haptic *haptic, const double place[3],
+EBPO_API void ebpo_haptic_step_tool(ebpo_haptic *haptic, const double position[3],
                                     const double turn[4], ebpo_haptic_tool_result *out);
 
 /*
@@ -372,7 +372,7 @@ EBPO_API void ebpo_haptic_step_tool(ebpo_haptic *haptic, const double place[3],
  *
  * Threads: one per object.
  */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_haptic_reset(ebpo_haptic *haptic, const double place[3],
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_haptic_reset(ebpo_haptic *haptic, const double position[3],
                                                      ebpo_error *error);
 
 /*

@@ -186,7 +186,7 @@ typedef struct ebpo_map_range {
     double lo, hi;
 
     /* Point on a face of the mesh, at distance lo from the model. */
-    double place[3];
+    double location[3];
 
     uint64_t queries;
 } ebpo_map_range;

@@ -235,7 +235,7 @@ typedef struct ebpo_finding {
     uint64_t count;
 
     /* First min(count, EBPO_FINDING_LOCATIONS) indices, ascending. */
-    uint64_t place[EBPO_FINDING_LOCATIONS];
+    uint64_t locations[EBPO_FINDING_LOCATIONS];
 } ebpo_finding;
 
 /*

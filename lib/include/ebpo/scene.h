@@ -494,13 +494,14 @@ typedef struct ebpo_scene_clash {
     uint64_t contacts;
 
     /*
-     * With ebpo_scene_clash_options.places: a common point of the two faces, or the middle of their
-     * nearest points. In the world's coordinates, approximated in doubles. NAN: not requested.
+     * With ebpo_scene_clash_options.locations: a common point of the two faces, or the middle of
+     * their nearest points. In the world's coordinates, approximated in doubles. NAN: not
+     * requested.
      */
-    double place[3];
+    double location[3];
 
-    /* Box of `place` and, with ebpo_scene_clash_options.count, of all contact segments. */
-    double place_min[3], place_max[3];
+    /* Box of `location` and, with ebpo_scene_clash_options.count, of all contact segments. */
+    double location_min[3], location_max[3];
 
     /*
      * Depth of a in b, and of b in a (ebpo_collide_depth), with the tolerance
@@ -523,8 +524,8 @@ typedef struct ebpo_scene_clash_options {
     /* Counts all pairs of intersecting faces, and the intersection lines. */
     bool count;
 
-    /* Computes `place`, `place_min` and `place_max` of ebpo_scene_clash. */
-    bool places;
+    /* Computes `location`, `location_min` and `location_max` of ebpo_scene_clash. */
+    bool locations;
 
     /*
      * Computes the relation of solids (ebpo_collide_relation) for all tested pairs. Takes about 60

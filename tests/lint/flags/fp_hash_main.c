@@ -1,5 +1,6 @@
-/* Prints a line for each small stiff case: hash of the content, hash of the answers, name. Built
- * once for each set of compiler flags, with the library's numeric sources built the same way. */
+/* Prints a line for each small degenerate case: hash of the content, hash of the results, name.
+ * Built once for each set of compiler flags, with the library's numeric sources built the same way.
+ */
 #include <fenv.h>
 #include <inttypes.h>
 #include <stdio.h>

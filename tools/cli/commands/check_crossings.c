@@ -6,17 +6,17 @@
 
 enum { PLACES = 10 };
 
-typedef struct places {
+typedef struct crossing_list {
     json *j; /* NULL: words */
     progress_line *line;
     ebpo_crossing first[PLACES];
     int count;
-} places;
+} crossing_list;
 
 static const char *const kinds[] = { "APART", "TOUCHING", "CROSSING", "COPLANAR" };
 static const char *const verbs[] = { "", "touch", "cross", "overlap" };
 
-static void place_json(json *j, const ebpo_crossing *c)
+static void crossing_json(json *j, const ebpo_crossing *c)
 {
     json_object(j, NULL);
     json_text(j, "kind", kinds[c->kind]);
@@ -30,11 +30,11 @@ static void place_json(json *j, const ebpo_crossing *c)
 
 static bool take_crossing(void *user, const ebpo_crossing *crossings, uint64_t count)
 {
-    places *p = user;
+    crossing_list *p = user;
     progress_wipe(p->line);
     for (uint64_t i = 0; i < count; i++)
         if (p->j)
-            place_json(p->j, &crossings[i]);
+            crossing_json(p->j, &crossings[i]);
         else if (p->count < PLACES)
             p->first[p->count++] = crossings[i];
     return true;
@@ -46,7 +46,7 @@ static uint64_t pairs_of(const ebpo_crossings_summary *s)
            s->pairs[EBPO_PAIR_COPLANAR];
 }
 
-static void print_words(const places *p, const ebpo_crossings_summary *s)
+static void print_words(const crossing_list *p, const ebpo_crossings_summary *s)
 {
     char pairs[64], faces[64];
     uint64_t all = pairs_of(s);
@@ -91,7 +91,7 @@ ebpo_status check_crossings(ebpo_mesh *mesh, const ebpo_mesh_report *report,
                             const ebpo_crossings_options *options, json *j, bool quiet,
                             progress_line *line, ebpo_error *error)
 {
-    places p = { .j = j, .line = line };
+    crossing_list p = { .j = j, .line = line };
     ebpo_crossings_summary sum = EBPO_CROSSINGS_SUMMARY_INIT;
     if (j) {
         json_object(j, "crossings");

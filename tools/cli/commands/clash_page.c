@@ -334,8 +334,8 @@ static void put_row(FILE *f, const ebpo_scene *scene, const clash *c, uint64_t n
             clash_kind_word(m->kind), clash_kind_word(m->kind), meanings[m->kind]);
     put_measure(f, m);
     fputs("<td class=n>", f);
-    if (isfinite(m->place[0]))
-        fprintf(f, "x %.6g<br>y %.6g<br>z %.6g", m->place[0], m->place[1], m->place[2]);
+    if (isfinite(m->location[0]))
+        fprintf(f, "x %.6g<br>y %.6g<br>z %.6g", m->location[0], m->location[1], m->location[2]);
     if (frames > 1)
         fprintf(f, "<td class=n>from %.6g<br>to %.6g<br>worst %.6g", c->first, c->last, c->time);
     fputc('\n', f);

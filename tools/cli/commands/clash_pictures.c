@@ -67,7 +67,7 @@ static ebpo_status find_region(const ebpo_scene *scene, const clash *c, double m
 {
     const ebpo_scene_clash *m = &c->worst;
     double min[2][3], max[2][3];
-    bool placed = isfinite(m->place[0]);
+    bool placed = isfinite(m->location[0]);
     for (int i = 0; i < 2; i++) {
         ebpo_status status = ebpo_scene_instance_box(scene, i ? m->b : m->a, c->time, c->time,
                                                      min[i], max[i], error);
@@ -76,12 +76,13 @@ static ebpo_status find_region(const ebpo_scene *scene, const clash *c, double m
     }
     int small = longest_side(min[1], max[1]) < longest_side(min[0], max[0]);
     double size = longest_side(min[small], max[small]),
-           contact = longest_side(m->place_min, m->place_max);
+           contact = longest_side(m->location_min, m->location_max);
     bool zoom = placed && m->crossing && contact > 0 && 8 * contact < size;
-    const double *low = zoom ? m->place_min : min[small], *high = zoom ? m->place_max : max[small];
+    const double *low = zoom ? m->location_min : min[small],
+                 *high = zoom ? m->location_max : max[small];
     if (placed) {
-        widen_box(min[small], max[small], m->place_min);
-        widen_box(min[small], max[small], m->place_max);
+        widen_box(min[small], max[small], m->location_min);
+        widen_box(min[small], max[small], m->location_max);
     }
     for (int k = 0; k < 3; k++)
         middle[k] = low[k] / 2 + high[k] / 2;

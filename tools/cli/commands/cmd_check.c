@@ -31,16 +31,16 @@ typedef struct reporting {
 } reporting;
 
 /* Returns false when `to` is neither "all" nor the name of a PLY file. */
-static bool check_places_good(const char *to)
+static bool check_findings_good(const char *to)
 {
     size_t length = strlen(to);
     return strcmp(to, "all") == 0 || (length > 4 && strcasecmp(to + length - 4, ".ply") == 0);
 }
 
 /* Returns the PLY that `to` names; NULL: "all". */
-static const char *check_places_ply(const char *to) { return strcmp(to, "all") == 0 ? NULL : to; }
+static const char *check_findings_ply(const char *to) { return strcmp(to, "all") == 0 ? NULL : to; }
 
-static void place_json(json *j, const ebpo_mesh_finding *p)
+static void finding_json(json *j, const ebpo_mesh_finding *p)
 {
     json_object(j, NULL);
     json_text(j, "kind", ebpo_finding_name(p->kind));
@@ -62,7 +62,7 @@ static void place_json(json *j, const ebpo_mesh_finding *p)
 
 enum { FACES_SHOWN = 8 };
 
-static void place_words(const ebpo_mesh_finding *p)
+static void finding_words(const ebpo_mesh_finding *p)
 {
     printf("    at %.9g %.9g %.9g", p->point[0], p->point[1], p->point[2]);
     if (p->component != EBPO_NO_COMPONENT)
@@ -81,7 +81,7 @@ static void place_words(const ebpo_mesh_finding *p)
     puts(p->face_count > FACES_SHOWN ? " ..." : "");
 }
 
-static bool take_place(void *user, const ebpo_mesh_finding *p)
+static bool take_finding(void *user, const ebpo_mesh_finding *p)
 {
     reporting *t = user;
     bool first = t->count[p->kind]++ == 0;
@@ -89,11 +89,11 @@ static bool take_place(void *user, const ebpo_mesh_finding *p)
         return true;
     progress_wipe(t->line);
     if (t->j) {
-        place_json(t->j, p);
+        finding_json(t->j, p);
     } else {
         if (first)
             printf("  %s:\n", findings_many(ebpo_finding_name(p->kind)));
-        place_words(p);
+        finding_words(p);
     }
     return true;
 }
@@ -112,19 +112,19 @@ static void print_legend(const char *path, const uint64_t count[EBPO_FINDING_KIN
 
 /* Prints all positions, or writes the picture and prints its legend. `j`: into its open object
  * instead; NULL: words, unless `quiet`. */
-static ebpo_status check_places(const ebpo_mesh *mesh, const char *to, unsigned threads,
-                                ebpo_progress progress, json *j, bool quiet, progress_line *line,
-                                ebpo_error *error)
+static ebpo_status check_findings(const ebpo_mesh *mesh, const char *to, unsigned threads,
+                                  ebpo_progress progress, json *j, bool quiet, progress_line *line,
+                                  ebpo_error *error)
 {
     ebpo_findings_options how = EBPO_FINDINGS_OPTIONS_INIT;
     reporting t = { .j = j, .line = line };
     how.threads = threads;
     how.progress = progress;
-    how.ply = check_places_ply(to);
+    how.ply = check_findings_ply(to);
     t.words = !quiet && !how.ply;
     if (j)
         json_array(j, "locations");
-    ebpo_status status = ebpo_mesh_findings(mesh, &how, take_place, &t, NULL, error);
+    ebpo_status status = ebpo_mesh_findings(mesh, &how, take_finding, &t, NULL, error);
     progress_wipe(line);
     if (j)
         json_end(j);
@@ -138,7 +138,7 @@ static ebpo_status check_places(const ebpo_mesh *mesh, const char *to, unsigned 
 typedef struct values {
     repairing repair_record;
     bool require_solid, crossings, json, quiet;
-    const char *out, *places;
+    const char *out, *findings;
     int64_t threads;
     memory_values memory;
 } values;
@@ -203,9 +203,9 @@ static ebpo_status report_findings(const values *v, mesh_input *p, const char *p
     command_flush("check");
     mesh_input_warn("check", path, p);
     advice_warn(stderr, "check", path, p);
-    if (v->places) /* before crossings, which consume the mesh */
-        status = check_places(&p->mesh, v->places, (unsigned)v->threads, progress,
-                              v->json ? &j : NULL, v->quiet, line, error);
+    if (v->findings) /* before crossings, which consume the mesh */
+        status = check_findings(&p->mesh, v->findings, (unsigned)v->threads, progress,
+                                v->json ? &j : NULL, v->quiet, line, error);
     else if (v->json)
         json_null(&j, "locations"); /* not requested */
     if (v->json && !(status == EBPO_OK && v->crossings))
@@ -249,9 +249,9 @@ static int run_check(void *given, const char **operand)
                                       "(-Dextras=disabled); build it with -Dextras=enabled");
     if (v->out && !v->crossings)
         return command_usage("check", "--output needs --crossings; give both");
-    if (v->places && !check_places_good(v->places))
+    if (v->findings && !check_findings_good(v->findings))
         return command_usage("check", "--findings takes 'all', or a file whose name ends in .ply");
-    const char *picture = v->places ? check_places_ply(v->places) : NULL;
+    const char *picture = v->findings ? check_findings_ply(v->findings) : NULL;
     if (picture && command_overwrites("check", operand[0], picture))
         return EXIT_USAGE;
     if (picture && v->out && command_overwrites("check", v->out, picture))

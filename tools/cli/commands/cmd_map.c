@@ -624,7 +624,7 @@ static void json_stats(const map_job *j, json *out)
         json_object(out, "hausdorff");
         json_real(out, "lo", j->reach.lo);
         json_real(out, "hi", j->reach.hi);
-        json_reals(out, "location", j->reach.place, 3);
+        json_reals(out, "location", j->reach.location, 3);
         json_uint(out, "queries", j->reach.queries);
         json_end(out);
     }

@@ -155,7 +155,7 @@ static void json_error_bound(json *j, const ebpo_error_bound *d)
     json_object(j, "error_bound");
     json_real(j, "lo", d->lo);
     json_real(j, "hi", d->hi);
-    json_reals(j, "location", d->place, 3);
+    json_reals(j, "location", d->location, 3);
     json_real(j, "mean", d->mean);
     json_real(j, "rms", d->rms);
     json_uint(j, "samples", d->samples);

@@ -81,7 +81,7 @@ static int unknown_command(const char *name)
 {
     const char *now = renamed_command(name);
     if (now) {
-        fprintf(stderr, "ebpo: the command '%s' is now '%s'\n", name, now);
+        fprintf(stderr, "ebpo: the command '%s' is now '%s'; try 'ebpo help %s'\n", name, now, now);
         return EXIT_USAGE;
     }
     for (int g = 0; g < GROUPS; g++)

@@ -67,10 +67,10 @@ static void scene_row_json(json *j, const scene_values *v, const ebpo_scene *sce
         counts_json(j, m);
     json_real(j, "clearance", m->clearance);
     json_real(j, "distance", m->distance);
-    if (v->places) {
-        json_reals(j, "location", m->place, 3);
-        json_reals(j, "location_min", m->place_min, 3);
-        json_reals(j, "location_max", m->place_max, 3);
+    if (v->locations) {
+        json_reals(j, "location", m->location, 3);
+        json_reals(j, "location_min", m->location_min, 3);
+        json_reals(j, "location_max", m->location_max, 3);
     }
     if (v->depth > 0) {
         depth_json(j, "depth_of_a", &m->depth[0]);
@@ -85,7 +85,7 @@ static void scene_head_csv(const scene_values *v)
 {
     printf("time,a,b,kind,distance,face_a,face_b%s%s%s%s\n",
            v->count ? ",touching,coplanar,crossing,contacts" : "",
-           v->solids || v->depth > 0 ? ",relation" : "", v->places ? ",x,y,z" : "",
+           v->solids || v->depth > 0 ? ",relation" : "", v->locations ? ",x,y,z" : "",
            v->depth > 0 ? ",a_in_b_lo,a_in_b_hi,b_in_a_lo,b_in_a_hi" : "");
 }
 
@@ -136,8 +136,8 @@ static void scene_row_csv(const scene_values *v, const ebpo_scene *scene, double
         csv_count(counts[i]);
     if (v->solids || v->depth > 0)
         printf(",%s", relation_word(m->relation));
-    for (int k = 0; k < 3 && v->places; k++)
-        csv_real(m->place[k]);
+    for (int k = 0; k < 3 && v->locations; k++)
+        csv_real(m->location[k]);
     for (int i = 0; i < 2 && v->depth > 0; i++) {
         csv_real(m->depth[i].hi < INFINITY ? m->depth[i].lo : NAN);
         csv_real(m->depth[i].hi);
@@ -170,8 +170,8 @@ static void scene_row_words(const scene_values *v, const ebpo_scene *scene, doub
         depth_words("a", &m->depth[0]);
         depth_words("b", &m->depth[1]);
     }
-    if (v->places && isfinite(m->place[0]))
-        printf("\tat %.9g %.9g %.9g", m->place[0], m->place[1], m->place[2]);
+    if (v->locations && isfinite(m->location[0]))
+        printf("\tat %.9g %.9g %.9g", m->location[0], m->location[1], m->location[2]);
     putchar('\n');
 }
 
@@ -386,7 +386,7 @@ ebpo_status scene_report(const scene_values *v, const char *path, ebpo_scene *sc
     r.page = v->out && words_end_with(v->out, ".html");
     r.prints = !v->out || v->csv || v->json;
     r.how.count = v->count || r.page;
-    r.how.places = v->places || r.page;
+    r.how.locations = v->locations || r.page;
     r.how.relate = v->solids || v->depth > 0 || r.page;
     r.how.depth = v->depth;
     r.how.threads = (unsigned)v->threads;

@@ -11,7 +11,7 @@ typedef struct scene_values {
     int purpose; /* an ebpo_scene_purpose */
     int64_t threads;
     int64_t max_expansion; /* as in ebpo_open_options */
-    bool outside, remote, json, csv, count, places, solids, least, quiet;
+    bool outside, remote, json, csv, count, locations, solids, least, quiet;
 } scene_values;
 
 #define SCENE_VALUES_INIT                                                             \
