@@ -7,7 +7,7 @@ library's numeric sources, built with other flags each, print the same hashes.
 GOLDEN holds what all builds on all machines must print. After a change that is meant to change the
 contents of files (a selection of planes, an order) redo it with `--update`:
 
-    tests/lint/flags/fp_flags.py tests/lint/flags/fp_golden.txt --update build/tests/lint/flags/fp_hash_usual
+    tests/lint/flags/fp_flags.py tests/lint/flags/fp_golden.txt --update build/tests/lint/flags/fp_hash_default
 """
 import os
 import pathlib
