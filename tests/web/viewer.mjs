@@ -677,7 +677,7 @@ async function embedsSeveral(page, address) {
   assert.deepEqual([files.length, instances.map((i) => [i.name, i.model])], [1, [['left', 'red'], ['red', 'red']]]);
   const answer = await many.evaluate((e) => e.ask([4.5, 0.5, 3], 'red'));
   assert.deepEqual([answer.where, answer.distance, answer.nearest, answer.instance], ['out', 2, [4.5, 0.5, 1], 'red']);
-  assert.match(await many.evaluate((e) => e.ask([0, 0, 0], 'none').catch((error) => error.message)), /"none" is no instance/);
+  assert.match(await many.evaluate((e) => e.ask([0, 0, 0], 'none').catch((error) => error.message)), /"none" is not an instance/);
   // A click on the right one, seen from the front: its middle is 2 of the 5 (whose diagonal is as long as 2 in the picture) right of the picture's middle.
   const { x, y, width, height } = await many.boundingBox(), right = 2 * 2 / Math.hypot(5, 1, 1) / (2.5 - 1 / Math.hypot(5, 1, 1)) * height / 2 / Math.tan(19 * Math.PI / 180);
   await page.mouse.click(x + width / 2 + right, y + height / 2);

@@ -1,6 +1,6 @@
-// Strokes in the picture: balls around their points, that colour what of the surface lies in them. By the depths that are seen, so as fine as the picture,
-// whatever level is drawn. Where the ball meets faces that do not hang together with the point (format-spec/paint.md, section 4), only what is seen of
-// those that do is coloured: they are drawn themselves, where they are what the depths show.
+// Draws strokes over the picture. Each point of a stroke is a ball that colours the visible surface inside it. The surface is computed from the depths of
+// the picture, so that the resolution of the paint does not depend on the drawn level. When a ball also intersects faces that are not connected with the
+// point (format-spec/paint.md, section 4), only the visible parts of the connected faces are coloured: these faces are drawn and compared with the depths.
 const VERTEX = `
   attribute vec3 corner, centre, facing;
   attribute vec4 tint; // red, green, blue, radius
@@ -43,7 +43,7 @@ const REACH_FRAGMENT = `
   uniform sampler2D depths;
   uniform vec2 size;
   uniform mat4 back;
-  uniform float near; // so many pixels may lie between a face and what is drawn for it
+  uniform float near; // greatest distance in pixels between a face and the surface that is drawn for it
   varying vec3 at, face;
   varying vec4 what;
   void main() {
@@ -60,12 +60,12 @@ const CUBE = Float32Array.from([0, 1, 2, 3, 4, 5, 6, 7].flatMap((i) => [0, 1, 2]
 const SIDES = [0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4, 2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5];
 const BLENDING = { custom: 5, none: 0, add: 100, zero: 200, one: 201, withoutAlpha: 205 }; // three.js' constants
 const FRONT = 0, BACK = 1, DOUBLE = 2;
-const NEAR_PIXELS = 2; // of real faces; of envelopes as many as cells have, about
+const NEAR_PIXELS = 2; // for real faces; for envelopes the value is near the size of cells
 
 export class Decals {
   constructor(kit) {
     this.kit = kit;
-    this.near = () => 0; // how many pixels what is drawn may be from the faces, now
+    this.near = () => 0; // returns the current distance limit between faces and the drawn surface, in pixels
     this.layers = []; // { opacity, runs: [{ meshes, erases, alpha }] }
     this.uniforms = { depths: { value: null }, size: { value: null }, back: { value: new kit.Matrix4() }, near: { value: NEAR_PIXELS } };
     const blend = (source) => ({ blending: BLENDING.custom, blendEquation: BLENDING.add, blendSrc: source, blendDst: BLENDING.withoutAlpha, blendSrcAlpha: source,
@@ -101,8 +101,9 @@ export class Decals {
   }
 
   /**
-   * What is drawn from now on: [{ opacity (0 to 1), strokes: [{ erases, colour, radius, points: [{ centre, normal, faces, share }] }] }], lowest first; scene
-   * coordinates, `share` of the radius; `faces`: nine numbers each, what is coloured in place of all that is in the ball. `solid`: backs of faces are never seen.
+   * Sets the layers to draw, lowest first: [{ opacity (0 to 1), strokes: [{ erases, colour, radius, points: [{ centre, normal, faces, share }] }] }], in scene
+   * coordinates. `share`: of the stroke's radius. `faces`: nine numbers each; if present, only these faces are coloured instead of everything inside the ball.
+   * `solid`: true when backs of faces are never visible.
    */
   set(layers, solid = true) {
     this.reachPaints.side = this.reachErases.side = solid ? FRONT : DOUBLE;
@@ -110,7 +111,7 @@ export class Decals {
     this.layers = layers.map(({ opacity, strokes }) => ({ opacity, runs: this.#runs(strokes) })).filter((layer) => layer.runs.length);
   }
 
-  // Strokes that follow each other and are opaque are drawn at once; one that is not is drawn by itself, as it covers but once.
+  // Groups strokes: consecutive opaque strokes are drawn together. A translucent stroke is drawn separately, because its overlapping balls must cover only once.
   #runs(strokes) {
     const runs = [];
     for (const stroke of strokes) {
@@ -123,7 +124,7 @@ export class Decals {
     return runs.filter((run) => run.alpha > 0).map((run) => ({ ...run, strokes: undefined, meshes: [this.#balls(run), this.#reach(run)].filter(Boolean) }));
   }
 
-  // The faces of points whose balls meet others, too: undefined if there is none.
+  // Returns a mesh of the faces of points that have `faces`, or undefined when there are none.
   #reach({ strokes, erases }) {
     const { kit } = this, all = strokes.flatMap(({ colour, radius, points }) => points.filter((p) => p.faces?.length).map((p) => ({ ...p, tint: [...colour.slice(0,
       3).map((c) => c / 255), radius * p.share] })));
@@ -146,7 +147,7 @@ export class Decals {
     return mesh;
   }
 
-  // The balls of all other points.
+  // Returns a mesh of the balls of all other points.
   #balls({ strokes: all, erases }) {
     const strokes = all.map((s) => ({ ...s, points: s.points.filter((p) => !p.faces) }));
     const { kit } = this, count = strokes.reduce((sum, s) => sum + s.points.length, 0), centre = new Float32Array(3 * count), facing = new Float32Array(3 * count), tint = new Float32Array(4 * count);
@@ -169,7 +170,7 @@ export class Decals {
     return mesh;
   }
 
-  /** Draws all layers into a texture: sRGB, times alpha. */
+  /** Draws all layers into a texture: sRGB, premultiplied by alpha. */
   render(renderer, camera, depths, size) {
     const { kit } = this, target = () => new kit.WebGLRenderTarget(size.x, size.y, { depthBuffer: false });
     this.sum ??= target();

@@ -1,11 +1,11 @@
-// The paint and notes of one model, with undo. States are immutable; each change makes a new state, so that undo is cheap.
+// The paint and notes of one model, with undo. States are immutable: each change creates a new state, so that undo is cheap.
 import { MOST, cleanText } from './paint_file.js';
 
 const STEPS_MOST = 200;
-/** Of the diagonal of the root cell: so far a point may be from its face. */
+/** Greatest distance of a point from its face, in diagonals of the root cell. */
 export const OFF = 2 ** -20;
 
-/** The digest that a paint file for a model has, and whose face numbers: format-spec/paint.md, section 2. */
+/** Returns the digest that a paint file for a model must have, and the kind of its face numbers: format-spec/paint.md, section 2. */
 export function identityOf(info) {
   const maps = info.parts.has('maps');
   return { model: maps && info.subset_of ? info.subset_of : info.content_sha256, faceNumbers: maps ? 'source' : 'file' };
@@ -20,14 +20,14 @@ export function misfit(doc, info) {
   const slack = OFF * Math.hypot(...info.box_size);
   const far = (p) => p.some((x, k) => !(x >= info.box_origin[k] - slack && x <= info.box_origin[k] + info.box_size[k] + slack)), all = [...doc.notes, ...doc.strokes.flatMap((s) => s.points)];
   if (whole && all.some((p) => p.face >= most || far(p.place)))
-    return 'the paint has points that the model cannot have: it was changed; get a fresh copy';
+    return 'the paint has points that the model cannot have: the paint file was changed; get a fresh copy';
   return undefined;
 }
 
 export const today = () => new Date().toISOString().replace(/\.\d+Z$/, 'Z');
 
 export class PaintDocument {
-  /** `changed()` is called after each step. */
+  /** Calls `changed()` after each step. */
   constructor(info, name, changed) {
     Object.assign(this, { ...identityOf(info), modelName: cleanText(name ?? '', 255), unit: info.unit ?? '', changed });
     this.state = { layers: [], notes: [], strokes: [] };
@@ -36,7 +36,7 @@ export class PaintDocument {
     this.saved = this.state;
   }
 
-  /** Takes a file's content (readPaint) in place of what is there. */
+  /** Replaces the document by the content of a file (readPaint), without undo. */
   take({ layers, notes, strokes }) {
     this.state = { layers, notes, strokes };
     this.saved = this.state;
@@ -45,7 +45,7 @@ export class PaintDocument {
     this.changed();
   }
 
-  /** For writePaint(). */
+  /** The argument of writePaint(). */
   get file() {
     const { model, modelName, unit, faceNumbers } = this;
     return { model, modelName, unit, faceNumbers, ...this.state };
@@ -55,11 +55,11 @@ export class PaintDocument {
     return this.saved === this.state;
   }
 
-  /** The next state: members of it. Refused beyond what a file can have. */
+  /** Makes a new state with these members. Throws when a paint file cannot hold the new state. */
   step(members) {
     const next = { ...this.state, ...members }, points = next.strokes.reduce((sum, s) => sum + s.points.length, 0);
     if (next.layers.length > MOST.layers || next.notes.length > MOST.notes || next.strokes.length > MOST.strokes || points > MOST.points)
-      throw new Error('this is more than a paint file can hold; save it, and begin another');
+      throw new Error('a paint file cannot hold more; save this one, and begin another');
     this.past.push(this.state);
     if (this.past.length > STEPS_MOST)
       this.past.shift();
@@ -99,10 +99,10 @@ export class PaintDocument {
     this.step({ layers: this.state.layers.filter((_, i) => i !== number), notes: keep(this.state.notes), strokes: keep(this.state.strokes) });
   }
 
-  /** A stroke or a note of a layer that is not there would make a file that nobody reads. */
+  /** Throws when a layer does not exist. A file with a stroke or note in a missing layer would be invalid. */
   #mustHave(layer) {
     if (!(layer < this.state.layers.length))
-      throw new Error('the layer is not there any more; choose another one, and paint again');
+      throw new Error('the layer was removed; choose another layer, and paint again');
   }
 
   addStroke(stroke) {

@@ -1,4 +1,4 @@
-// Paint files as objects, both ways: format-spec/paint.md. What is read has been checked by all that the page says without the model.
+// Reads and writes paint files (format-spec/paint.md) as objects. Reading checks all rules of the format that do not need the model.
 //   { model, modelName, unit, faceNumbers, layers: [{ title, author, date, description, colour, opacity, visible }],
 //     notes: [{ title, author, date, body, layer, face, weights, place }],
 //     strokes: [{ layer, erases, colour: [r, g, b, a], radius, time, points: [{ face, weights, place, size, pressure, time }] }] }
@@ -18,7 +18,7 @@ const number4 = (i) => String(i).padStart(4, '0');
 
 const bitsOf = (values) => new BigUint64Array(Float64Array.from(values).buffer);
 
-/** The file's bytes. */
+/** Returns the bytes of a paint file. */
 export function writePaint(doc) {
   const h5 = new H5Writer(), points = doc.strokes.flatMap((s) => s.points), links = [];
   const group = (name, items, attributesOf) => items.length && links.push([name, h5.group([], items.map((item, i) => [number4(i), h5.group(attributesOf(item))]))]);
@@ -39,11 +39,11 @@ export function writePaint(doc) {
     ['layer_count', u64(doc.layers.length)], ['note_count', u64(doc.notes.length)], ['stroke_count', u64(strokes.length)], ['point_count', u64(points.length)]], links));
 }
 
-/** A text as the file may have it: without control characters, at most so many bytes; lines end with U+2028. */
+/** Returns a text that the file can hold: without control characters, with at most `most` bytes. Line ends become U+2028. */
 export function cleanText(value, most) {
   // eslint-disable-next-line no-control-regex
   const out = value.replace(/\r?\n/g, '\u2028').replace(/[\u0000-\u001f\u007f-\u009f]/g, ' ').replace(/[\ud800-\udbff](?![\udc00-\udfff])|(?<![\ud800-\udbff])[\udc00-\udfff]/g, ' ').trim();
-  return out.slice(0, new TextEncoder().encodeInto(out, new Uint8Array(most)).read); // whole characters
+  return out.slice(0, new TextEncoder().encodeInto(out, new Uint8Array(most)).read); // cuts at a character
 }
 
 // --- reading ---
@@ -61,7 +61,7 @@ class PaintReader {
     return { links: o.links, facts: new Facts(o.attributes, path) };
   }
 
-  // One chunk of whole rows, with a checksum.
+  // Reads an array: one chunk of complete rows, with a checksum.
   array(path, address, rows, columns, Type) {
     const o = address === undefined ? undefined : this.hdf5.object(address, path), size = Type.BYTES_PER_ELEMENT, shape = columns ? [rows, columns] : [rows];
     const same = (a, b) => a?.length === b.length && a.every((x, i) => x === b[i]);
@@ -82,23 +82,23 @@ const must = (condition, where, what) => {
     throw formatError(where, what);
 };
 const reals = (bits) => new Float64Array(bits.buffer, bits.byteOffset, bits.length);
-const places = (list, where) => must(list.every((x) => Math.abs(x) <= FAR), where, 'a place is not finite, or too far away'); // NaN is not
+const places = (list, where) => must(list.every((x) => Math.abs(x) <= FAR), where, 'a position is not finite, or is too far away'); // also refuses NaN
 
-/** From a file's bytes (Uint8Array); throws an EbpoError that says what is wrong. */
+/** Reads a paint file from its bytes (Uint8Array). Throws an EbpoError for invalid files. */
 export function readPaint(bytes) {
   if (bytes.length > MOST.bytes)
-    throw new EbpoError('FORMAT', 'the file is larger than this page reads; use the command ebpo paint');
+    throw new EbpoError('FORMAT', 'the file is too large for this page; use the command ebpo paint');
   const reader = new PaintReader(bytes.byteOffset % 8 ? bytes.slice() : bytes), { links, facts } = reader.group('/', reader.hdf5.root);
   if (!facts.has('format') || facts.text('format') !== FORMAT)
     throw formatError('', 'an HDF5 file, but not a paint file', 'open one that ends with .paint.h5');
   if (facts.int('format_version_major', -(2 ** 40), 2 ** 40) !== 1)
-    throw new EbpoError('VERSION', 'the paint file has a newer version than this page knows; use a newer one');
+    throw new EbpoError('VERSION', 'the version of the paint file is newer than this page; use a newer viewer');
   facts.int('format_version_minor');
   facts.text('generator', 63);
   const doc = { model: facts.text('model_sha256', 64), modelName: facts.has('model_name') ? facts.text('model_name', 255) : '', unit: facts.has('unit') ? facts.text('unit', 31) : '',
     faceNumbers: facts.text('face_numbers', 63) };
-  must(/^[0-9a-f]{64}$/.test(doc.model), '/', 'attribute model_sha256: it is not 64 digits');
-  must(['source', 'file'].includes(doc.faceNumbers), '/', 'attribute face_numbers: it is neither source nor file');
+  must(/^[0-9a-f]{64}$/.test(doc.model), '/', 'attribute model_sha256: not 64 hexadecimal digits');
+  must(['source', 'file'].includes(doc.faceNumbers), '/', 'attribute face_numbers: neither source nor file');
   const [layers, notes, strokes, points] = ['layer', 'note', 'stroke', 'point'].map((name) => facts.count(`${name}_count`, MOST[`${name}s`]));
   must(4 * (layers + notes + strokes + points) <= bytes.length, '/', 'the counts are more than the file can hold');
   let room = bytes.length;
@@ -107,7 +107,7 @@ export function readPaint(bytes) {
     return Array.from({ length: count }, (_, i) => {
       const path = `/${name}/${number4(i)}`, item = of(reader.group(path, group.links.get(number4(i))).facts, path);
       room -= Object.values(item).reduce((sum, v) => sum + (typeof v === 'string' ? v.length : 0), 0);
-      must(room >= 0, path, 'there is more text than the file has bytes: groups share it');
+      must(room >= 0, path, 'the texts are longer than the file: groups share it');
       return item;
     });
   };
@@ -127,7 +127,7 @@ export function readPaint(bytes) {
 }
 
 function readNote(f, path, layers) {
-  must(layers > 0, path, 'a note belongs to a layer, and there is none');
+  must(layers > 0, path, 'a note refers to a missing layer');
   const note = { title: f.text('title', 255), author: f.text('author', 255), date: f.text('date', 31), body: f.text('body', 32767), layer: f.count('layer', layers - 1),
     face: f.count('face', 2 ** 32 - 2), weights: f.reals('weights', 2), place: f.reals('place', 3) };
   must(note.weights.every((w) => Number.isInteger(w) && w >= 0) && note.weights[0] + note.weights[1] <= ONE_WEIGHT, path, 'attribute weights: out of range');
@@ -139,12 +139,12 @@ function readStrokes(reader, links, count, layers, pointCount) {
   const array = (name, columns, Type) => reader.array(`/strokes/${name}`, links.get(name), count, columns, Type);
   const layer = array('layer', 0, Uint32Array), kind = array('kind', 0, Uint32Array), colour = array('colour', 4, Uint8Array), radius = reals(array('radius', 0, BigUint64Array));
   const time = array('time', 0, BigUint64Array), points = array('points', 0, Uint32Array);
-  must(layer.every((l) => l < layers), '/strokes/layer', 'a stroke is in no layer');
-  must(kind.every((k) => k <= 1), '/strokes/kind', 'a stroke neither paints nor erases');
+  must(layer.every((l) => l < layers), '/strokes/layer', 'a stroke refers to a missing layer');
+  must(kind.every((k) => k <= 1), '/strokes/kind', 'a stroke with an unknown kind');
   must(kind.every((k, i) => k === 0 || colour.subarray(4 * i, 4 * i + 4).every((c) => c === 0)), '/strokes/colour', 'an erasing stroke has a colour');
   must(radius.every((r) => r >= 1 / FAR && r <= FAR), '/strokes/radius', 'a radius is out of range');
   must(time.every((t) => t <= 2n ** 53n), '/strokes/time', 'a time is out of range');
-  must(points.every((p) => p > 0) && points.reduce((sum, p) => sum + p, 0) === pointCount, '/strokes/points', 'the numbers of points contradict the head');
+  must(points.every((p) => p > 0) && points.reduce((sum, p) => sum + p, 0) === pointCount, '/strokes/points', 'the numbers of points contradict the number in the header');
   return Array.from(layer, (l, i) => ({ layer: l, erases: kind[i] === 1, colour: [...colour.subarray(4 * i, 4 * i + 4)], radius: radius[i], time: Number(time[i]), points: points[i] }));
 }
 
@@ -152,9 +152,9 @@ function readPoints(reader, links, count) {
   const array = (name, columns, Type) => reader.array(`/points/${name}`, links.get(name), count, columns, Type);
   const face = array('face', 0, Uint32Array), weights = array('weights', 2, Uint32Array), place = reals(array('place', 3, BigUint64Array)), size = array('size', 0, Uint16Array);
   const pressure = array('pressure', 0, Uint16Array), time = array('time', 0, Uint32Array);
-  must(face.every((f) => f < 2 ** 32 - 1), '/points/face', 'a face has no number');
+  must(face.every((f) => f < 2 ** 32 - 1), '/points/face', 'a point refers to no face');
   for (let i = 0; i < count; i++)
-    must(weights[2 * i] + weights[2 * i + 1] <= ONE_WEIGHT, '/points/weights', 'weights are more than the whole');
+    must(weights[2 * i] + weights[2 * i + 1] <= ONE_WEIGHT, '/points/weights', 'the sum of the weights is greater than 1');
   places(place, '/points/place');
   must(size.every((s) => s >= 1 && s <= ONE_SIZE), '/points/size', 'a size is out of range');
   return Array.from(face, (f, i) => ({ face: f, weights: [weights[2 * i], weights[2 * i + 1]], place: [...place.subarray(3 * i, 3 * i + 3)], size: size[i], pressure: pressure[i], time: time[i] }));

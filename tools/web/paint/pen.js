@@ -24,7 +24,7 @@ const NARROW = 2e-4, WIDE = 0.1;    // radii of the pen, in halves of the box's 
 const FULL_SIZE = 32768, AT_ONCE = 200;
 
 export function addPen({ scene, worker, query }, pipeline) {
-  const decals = pipeline.layers = new Decals(kit), docs = new Map(), reaches = new WeakMap(); // by a model's digest; by a point of a document: { normal, faces }
+  const decals = pipeline.layers = new Decals(kit), docs = new Map(), reaches = new WeakMap(); // documents by a model's digest; { normal, faces } by a point of a document
   let doc, layer = 0, stroke, pending = 0, unsettled = 0, details, asked = 0;
   const colour = () => [1, 3, 5].map((i) => parseInt($('penColour').value.slice(i, i + 2), 16));
   const radius = () => NARROW * (WIDE / NARROW) ** ($('penSize').value / 100) / state.scene.scale;
@@ -34,7 +34,7 @@ export function addPen({ scene, worker, query }, pipeline) {
     return placesOf(worker, points);
   };
 
-  // Queries of the document for the rest of the page.
+  // Returns the document with functions for other modules of the page.
   const drawing = () => Object.assign(doc, { placesOf: askPlaces, layerForNew() {
     if (!doc.state.layers.length)
       doc.addLayer({});
@@ -63,7 +63,7 @@ export function addPen({ scene, worker, query }, pipeline) {
     tell('drawing');
   }
 
-  // Strokes whose places are on their way come first: what is undone is the last one that is seen, and no layer goes before its stroke is there.
+  // Waits until the positions of all strokes have arrived, then makes a change. Undo then reverts the last visible stroke, and no layer is removed before its stroke.
   async function inTurn(change) {
     const mine = doc;
     while (unsettled)
@@ -99,8 +99,8 @@ export function addPen({ scene, worker, query }, pipeline) {
   // --- strokes ---
 
   const tools = {
-    penOn: { hint: 'Drag on the model to paint; beside it, or with two fingers, to turn. Pressure widens.' },
-    eraserOn: { hint: 'Drag over what shall go from the chosen layer.' },
+    penOn: { hint: 'Drag on the model to paint; beside it, or with two fingers, to turn. Pressure widens the stroke.' },
+    eraserOn: { hint: 'Drag over the paint to erase from the chosen layer.' },
   };
   for (const [id, tool] of Object.entries(tools)) {
     tool.click = () => {};
@@ -116,7 +116,7 @@ export function addPen({ scene, worker, query }, pipeline) {
   const active = () => Object.keys(tools).find((id) => taken() === tools[id]);
 
   function down(e) {
-    if (stroke && e.pointerType === 'touch') { // a second finger: the model is to be turned
+    if (stroke && e.pointerType === 'touch') { // a second finger begins to turn the model
       stroke = undefined;
       draw();
       return;
@@ -127,9 +127,9 @@ export function addPen({ scene, worker, query }, pipeline) {
       complain('the file has no faces to paint on; convert the model with its mesh');
       return;
     }
-    e.stopImmediatePropagation(); // the camera stays
+    e.stopImmediatePropagation(); // the camera does not move
     $('canvas').setPointerCapture(e.pointerId);
-    const erases = active() === 'eraserOn' || e.buttons === 32; // a stylus' other end
+    const erases = active() === 'eraserOn' || e.buttons === 32; // the eraser end of a stylus
     if (!doc.state.layers.length)
       doc.addLayer({ author: localStorage.getItem('ebpo:author') ?? '', colour: (colour().reduce((sum, c) => sum * 256 + c, 0) * 256 + 255) });
     stroke = new Stroke({ layer, erases, colour: [...colour(), 255], radius: radius() },
@@ -179,14 +179,14 @@ export function addPen({ scene, worker, query }, pipeline) {
   // --- files ---
 
   async function saveFile() {
-    while (pending) // strokes whose places are on their way
+    while (pending) // waits for the positions of strokes
       await new Promise((done) => setTimeout(done, 20));
     save(`${modelName()}.paint.h5`, writePaint(doc.file), 'application/x-hdf5');
     doc.saved = doc.state;
   }
 
   async function openBytes(name, bytes) {
-    if (!doc.isSaved && !confirm('What is painted and noted here is not saved. Open the other file in its place?'))
+    if (!doc.isSaved && !confirm('The paint and notes on this page are not saved. Replace them with the other file?'))
       return;
     const mine = ++asked;
     pending++;
@@ -204,7 +204,7 @@ export function addPen({ scene, worker, query }, pipeline) {
     pending--;
   }
 
-  // What the points of strokes cover, by the worker: on the faces that they name. Returns a message if a point is not where it says to be. The work ends when `goes()` says no.
+  // Lets the worker compute the faces that points of strokes cover. Returns a message when a point is not on its face. Stops when `goes()` returns false.
   async function findReach(strokes, goes, told = () => {}) {
     const points = strokes.flatMap((s) => s.points.map((p) => ({ p, radius: s.radius * p.size / FULL_SIZE })));
     for (let i = 0; i < points.length && goes(); i += AT_ONCE) {
@@ -212,7 +212,7 @@ export function addPen({ scene, worker, query }, pipeline) {
       if (!goes())
         return undefined;
       if (found.some((f) => f.here === 'no'))
-        return 'the paint has points that do not lie on the model, on the faces that they name: it was changed; get a fresh copy';
+        return 'the paint has points that are not on their faces of the model: the paint file was changed; get a fresh copy';
       found.forEach(({ normal, faces }, k) => reaches.set(some[k].p, { normal, faces: inPicture(faces) }));
       told();
     }
@@ -233,7 +233,7 @@ export function addPen({ scene, worker, query }, pipeline) {
 
   function fresh() {
     asked++;
-    const key = state.info && identityOf(state.info).model; // what was painted before another model was opened is still there
+    const key = state.info && identityOf(state.info).model; // the paint of models that were opened earlier is kept
     doc = docs.get(key) ?? new PaintDocument(state.info ?? { parts: new Set() }, `${modelName()}.ebpo.h5`, changed);
     if (key)
       docs.set(key, doc);
@@ -251,9 +251,9 @@ export function addPen({ scene, worker, query }, pipeline) {
     try {
       const answer = await fetch(new URL(wanted, location.href));
       if (!answer.ok)
-        throw new Error(`the server answers ${answer.status}; check the address`);
+        throw new Error(`the server returned ${answer.status}; check the address`);
       const bytes = new Uint8Array(await answer.arrayBuffer());
-      if (opening === state.opening) // another model may have been opened meanwhile
+      if (opening === state.opening) // unless another model was opened meanwhile
         await openBytes(wanted, bytes);
     } catch (error) {
       if (opening === state.opening)
@@ -290,7 +290,7 @@ export function addPen({ scene, worker, query }, pipeline) {
     };
     const canvas = $('canvas'), early = { capture: true };
     for (const [name, listener] of [['pointerdown', down], ['pointermove', move], ['pointerup', up], ['pointercancel', up]])
-      canvas.parentElement.addEventListener(name, listener, early); // before the camera hears of it
+      canvas.parentElement.addEventListener(name, listener, early); // before the camera receives the event
     on('key', (e) => ({ b: 'penOn', r: 'eraserOn' })[e.key.toLowerCase()] && $({ b: 'penOn', r: 'eraserOn' }[e.key.toLowerCase()]).click());
     addEventListener('keydown', (e) => {
       if ((e.ctrlKey || e.metaKey) && e.key.toLowerCase() === 'z' && state.info && !e.target.matches('input[type=text], textarea')) {

@@ -6,7 +6,7 @@ import { lookup3 } from '../reader/hdf5.js';
 const NONE = 2n ** 64n - 1n;
 const utf8 = new TextEncoder();
 
-// A growing array of bytes.
+// An array of bytes that grows.
 class Bytes {
   constructor() {
     this.array = new Uint8Array(1 << 12);
@@ -40,7 +40,7 @@ const double = () => block().u8(0x11, 0x20, 0x3f, 0).u32(8).u16(0, 64).u8(52, 11
 const string = (size) => block().u8(0x13, 0x11).u16(0).u32(size).all;
 const space = (...dims) => (dims.length ? block().u8(2, dims.length, 0, 1).u64(...dims).all : block().u8(2, 0, 0, 0).all);
 
-/** Values of attributes: { type, space, data }. */
+/** These functions return values of attributes: { type, space, data }. */
 export const text = (value) => {
   const bytes = utf8.encode(value), data = bytes.length ? bytes : Uint8Array.of(0);
   return { type: string(data.length), space: space(), data };
@@ -66,7 +66,7 @@ function link(name, address) {
 export class H5Writer {
   constructor() {
     this.out = block();
-    this.out.room(48); // the superblock, when all is known
+    this.out.room(48); // space for the superblock, which end() writes
   }
 
   #header(messages) {
@@ -76,22 +76,22 @@ export class H5Writer {
     return at;
   }
 
-  /** `values`: a Uint8Array, Uint16Array, Uint32Array or BigUint64Array; `columns` 0 for one dimension. Returns its address. */
+  /** Writes an array. `values`: a Uint8Array, Uint16Array, Uint32Array or BigUint64Array; `columns`: 0 for one dimension. Returns the array's address. */
   array(values, columns = 0) {
     const size = values.BYTES_PER_ELEMENT, rows = values.length / (columns || 1), shape = columns ? [rows, columns] : [rows];
-    const data = new Uint8Array(values.buffer, values.byteOffset, values.byteLength), chunk = this.out.length; // this machine is little-endian, as all that run WebGL are
+    const data = new Uint8Array(values.buffer, values.byteOffset, values.byteLength), chunk = this.out.length; // assumes little-endian memory, as on all platforms with WebGL
     this.out.bytes(data).u32(fletcher32(data));
     const layout = block().u8(4, 2, 2, shape.length + 1, 8).u64(...shape, size).u8(1).u64(data.length + 4).u32(0).u64(chunk).all;
     return this.#header([message(1, space(...shape)), message(3, integer(size), 1), message(5, Uint8Array.of(3, 7), 1), message(8, layout), message(11, block().u8(2, 1).u16(3, 0, 0).all, 1)]);
   }
 
-  /** `attributes`: [name, value] each; `links`: [name, address] each. Returns its address. */
+  /** Writes a group. `attributes`: [name, value] each; `links`: [name, address] each. Returns the group's address. */
   group(attributes, links = []) {
     return this.#header([message(2, block().u8(0, 0).u64(NONE, NONE).all), message(10, Uint8Array.of(0, 0)), ...links.map(([name, at]) => link(name, at)),
       ...attributes.map(([name, value]) => attribute(name, value))]);
   }
 
-  /** The file, whose root is the group at this address. */
+  /** Returns the file's bytes. `root`: the address of the root group. */
   end(root) {
     const head = block().u8(0x89, 0x48, 0x44, 0x46, 0x0d, 0x0a, 0x1a, 0x0a, 3, 8, 8, 0).u64(0, NONE, this.out.length, root);
     this.out.array.set(head.u32(lookup3(head.all, 0, head.length)).all);

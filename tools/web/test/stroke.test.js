@@ -44,8 +44,8 @@ test('each step can be undone and done again; layers take what is theirs along',
   assert.equal(doc.state, full);
   doc.redo();
   assert.equal(doc.state.layers.length, 1);
-  assert.throws(() => doc.addStroke({ layer: 1, points: [point] }), /layer is not there/);
-  assert.throws(() => doc.addNote({ layer: 1, ...point }), /layer is not there/);
+  assert.throws(() => doc.addStroke({ layer: 1, points: [point] }), /layer was removed/);
+  assert.throws(() => doc.addNote({ layer: 1, ...point }), /layer was removed/);
   for (let i = 0; i < 10; i++)
     doc.undo();
   assert.deepEqual([doc.state.layers.length, doc.isSaved], [0, true]);

@@ -2,7 +2,7 @@
 import { AT_HOME, unitQuaternion, matrixOf } from './poses.js';
 import { MOST, isFar, readScene } from './scene_file.js';
 
-const MODELS_MOST = 100; // an address may come from anybody
+const MODELS_MOST = 100; // limits untrusted addresses
 
 const nameOf = (url) => {
   const last = new URL(url).pathname.split('/').at(-1);
@@ -13,25 +13,25 @@ const nameOf = (url) => {
   }
 };
 
-/** X,Y,Z[,QX,QY,QZ,QW[,SCALE]] as a pose; an empty text is where the file's own coordinates are. */
+/** Parses a pose: X,Y,Z[,QX,QY,QZ,QW[,SCALE]]. An empty text is the identity. */
 export function poseFrom(text) {
   if (!text)
     return AT_HOME;
   const list = text.split(',').map((word) => (word.trim() ? Number(word) : NaN)), turn = unitQuaternion(list.length > 3 ? list.slice(3, 7) : [0, 0, 0, 1]), scale = list[7] ?? 1;
   if (!list.every(Number.isFinite) || ![3, 7, 8].includes(list.length) || !turn || !(scale > 0))
-    throw new Error(`pose=${text}: a pose is X,Y,Z or X,Y,Z,QX,QY,QZ,QW or that and a scale; correct the address`);
+    throw new Error(`pose=${text}: expected X,Y,Z or X,Y,Z,QX,QY,QZ,QW or X,Y,Z,QX,QY,QZ,QW,SCALE; correct the address`);
   return { rotation: matrixOf(turn), scale, translation: list.slice(0, 3) };
 }
 
-// Of files that are fetched; nothing else is an address here.
+// Returns the URL of a file to fetch. Throws for other texts and protocols.
 function addressOf(text, base) {
   const url = URL.canParse(text, base) ? new URL(text, base) : undefined;
   if (!['http:', 'https:', 'blob:'].includes(url?.protocol))
-    throw new Error(`${text}: this is no address of a file; give one that begins with https://`);
+    throw new Error(`${text}: not an address of a file; give an address that begins with https://`);
   return url;
 }
 
-// Names differ, also of files that are called alike.
+// Makes names unique by appending numbers.
 function differ(names) {
   const taken = new Set();
   return names.map((name) => {
@@ -43,12 +43,15 @@ function differ(names) {
   });
 }
 
-/** For Assembly.open(): { title, models, instances, up, ... } of files (File objects). */
+/** Returns the argument of Assembly.open(), { title, models, instances, up, ... }, for File objects. */
 export function ofFiles(files) {
   return { ...ofParts(files.map((src) => ({ src }))), title: `${files.length} files`, local: true };
 }
 
-/** What an address' query asks for, likewise; undefined if it is no matter of several models. Throws an Error that says what is wrong. `base`: the page's address. */
+/**
+ * Returns the argument of Assembly.open() for the query of an address, or undefined when the query names neither models nor a scene. Throws an Error for invalid
+ * queries and scenes. `base`: the page's address.
+ */
 export async function wanted(query, base, get = fetch) {
   const up = query.get('up') === 'z' ? 2 : query.get('up') === 'y' ? 1 : undefined;
   if (query.has('scene'))
@@ -63,15 +66,15 @@ export async function wanted(query, base, get = fetch) {
 }
 
 /**
- * Of parts, likewise: [{ src (an address, a File or a Blob), name, pose (of poseFrom()), colour (#RRGGBB), hidden }], all but the first of which may be missing. Parts of one file and
- * colour are instances of one model.
+ * Returns the argument of Assembly.open() for parts: [{ src (an address, a File or a Blob), name, pose (from poseFrom()), colour (#RRGGBB), hidden }]. All members
+ * except `src` are optional. Parts with the same file and colour are instances of one model.
  */
 export function ofParts(parts, base) {
   const models = [], fileOf = ({ src }) => (typeof src === 'string' || src instanceof URL ? addressOf(src, base).href : src);
   const own = parts.map((part) => {
     const file = fileOf(part), { colour } = part;
     if (colour !== undefined && !/^#[0-9a-f]{6}$/i.test(colour))
-      throw new Error(`colour ${colour}: a colour is #RRGGBB; correct it`);
+      throw new Error(`colour ${colour}: expected #RRGGBB; correct the colour`);
     const known = models.findIndex((m) => m.file === file && m.colour === colour);
     return known < 0 ? models.push({ file, colour }) - 1 : known;
   });
@@ -81,11 +84,11 @@ export function ofParts(parts, base) {
   return { title: labels.join(', '), models, instances: parts.map(({ pose, hidden = false }, i) => ({ name: names[i], model: own[i], pose: pose ?? AT_HOME, hidden })) };
 }
 
-// A scene and its files of poses together may be so long: `rest` is what may still come.
+// Fetches a text. `rest.bytes`: the number of bytes that the scene and its files of poses may still have together.
 async function textAt(url, get, rest) {
   const answer = await get(url);
   if (!answer.ok)
-    throw new Error(`${url.pathname}: the server answers ${answer.status}; check the address`);
+    throw new Error(`${url.pathname}: the server returned ${answer.status}; check the address`);
   const parts = [];
   for (const reader = answer.body.getReader(); ;) {
     const { done, value } = await reader.read();
@@ -94,7 +97,7 @@ async function textAt(url, get, rest) {
     parts.push(value);
     if ((rest.bytes -= value.length) < 0) {
       await reader.cancel();
-      throw new Error(`${url.pathname}: with it the scene is larger than 64 MiB; show a part of it`);
+      throw new Error(`${url.pathname}: the scene with this file is larger than 64 MiB; show a part of the scene`);
     }
   }
 }

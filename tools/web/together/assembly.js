@@ -1,4 +1,4 @@
-// Several models in one picture, some of them in many places: each file is read once, drawn once for all instances of it, and refined for those that are largest.
+// Several models in one picture, each with one or more instances. A file is read once for all its instances and refined for the instances that are largest in the picture.
 import { cutOf } from '../address.js';
 import { Client, Crew } from '../client.js';
 import { kit } from '../scene.js';
@@ -8,20 +8,23 @@ import { sharesOf, weightOf } from './budget.js';
 import { boundsOf } from './bounds.js';
 import { placed, poseAt, unplaced } from './poses.js';
 
-const VIEWS_MOST = 8;                    // of a model at the same time: its instances that are largest in the picture
+const VIEWS_MOST = 8;                    // most views for which a model is refined: those of its largest instances
 const SEEN_PIXELS = 0.5;                 // smaller instances are not drawn
-const WHOLE_FILES = 4, FEW_BYTES = 1 << 17, MANY_BYTES = 1 << 20; // of first requests, with more files and with fewer
-const CACHE_BYTES = 64 << 20, CACHE_LEAST = 4 << 20;              // of decoded chunks, of all files and of one
-const OPENING_MOST = 16;                 // files at the same time; a browser asks a server for few at once, and the others would wait until they are given up
+const WHOLE_FILES = 4, FEW_BYTES = 1 << 17, MANY_BYTES = 1 << 20; // bytes of first requests: FEW_BYTES with more than WHOLE_FILES files
+const CACHE_BYTES = 64 << 20, CACHE_LEAST = 4 << 20;              // decoded chunks: limit for all files together, and least limit of a file
+const OPENING_MOST = 16;                 // files that are opened at the same time; a browser sends few requests to a server at once, and waiting requests would time out
 
-// Far apart in hue, neither dark nor pale: beside each other on both themes.
+// Colours with different hues that are visible in both themes.
 export const COLOURS = ['#8fb3d9', '#e0a96d', '#8cc084', '#c792c9', '#d98c8c', '#6dbfb8', '#c9bd6a', '#a6a3dc', '#b9bfca', '#d9a0b8'];
 
-// All meshes of a model share one array of places, which the renderer frees when one that it has drawn says that it is over.
+// All meshes of a model share one array of matrices. The renderer frees the array when a drawn mesh is disposed.
 const freeMatrices = ({ tiles }) => tiles.byKey.forEach(({ mesh }) => mesh.dispose());
 
 export class Assembly {
-  /** `crew`: a Crew, if not one of its own; `news(model)` is called when something of a model changed, `failed(model, error)`, `changed()` when the picture is another. */
+  /**
+   * `crew`: a shared Crew; by default a new one. Calls `news(model)` when a state of a model changed, `failed(model, error)` on errors, and `changed()` when the
+   * picture must be drawn again.
+   */
   constructor({ crew = new Crew(), news = () => {}, failed = () => {}, changed = () => {} } = {}) {
     Object.assign(this, { crew, news, failed, changed });
     this.group = new kit.Group();
@@ -33,8 +36,8 @@ export class Assembly {
   }
 
   /**
-   * Opens all files. `models`: [{ name, file (an address or a File), digest, colour }]; `instances`: as readScene() gives them; `up`: 1 or 2, the axis that is drawn upwards.
-   * Resolves when all heads are there or have failed: to whether there is anything to be seen.
+   * Opens all files. `models`: [{ name, file (an address or a File), digest, colour }]; `instances`: as from readScene(); `up`: 1 or 2, the axis that is drawn
+   * upwards. Resolves when all headers have been read or have failed; to true when at least one instance can be shown.
    */
   async open({ models, instances, up = 1, from = 0, to = 0 }) {
     Object.assign(this, { up, from, to, time: from });
@@ -59,7 +62,7 @@ export class Assembly {
       const mesh = new kit.InstancedMesh(geometry, material, 0);
       mesh.instanceMatrix = model.matrices;
       mesh.count = model.shown.length;
-      mesh.frustumCulled = false; // instances that are out of sight are left out one by one
+      mesh.frustumCulled = false; // update() omits each instance that is out of sight
       mesh.ebpoModel = model;
       return mesh;
     });
@@ -69,7 +72,7 @@ export class Assembly {
   }
 
   async #openAll(models) {
-    const rest = models.values(); // which all take from
+    const rest = models.values(); // the concurrent loops below share this iterator
     await Promise.all(Array.from({ length: OPENING_MOST }, async () => {
       for (const model of rest)
         await this.#openModel(model);
@@ -80,10 +83,10 @@ export class Assembly {
     try {
       const { info, size } = await model.client.open(model.file, this.options);
       if (model.digest && model.digest !== info.content_sha256)
-        throw new Error('it is another one than the scene names (its digest differs); get the file that belongs to the scene');
+        throw new Error('not the file of the scene (its digest differs); get the file that belongs to the scene');
       Object.assign(model, { info, size });
     } catch (error) {
-      if (!this.models.includes(model)) // all was ended meanwhile
+      if (!this.models.includes(model)) // end() was called meanwhile
         return;
       model.error = error;
       model.client.close();
@@ -110,7 +113,7 @@ export class Assembly {
     this.news(model);
   }
 
-  /** What failed is asked for again: files that could not be opened, too. */
+  /** Repeats all failed requests, and opens failed files again. */
   async retry() {
     const failed = this.models.filter((m) => m.error);
     failed.forEach((m) => (m.error = undefined));
@@ -142,14 +145,14 @@ export class Assembly {
     this.changed();
   }
 
-  /** Puts an instance elsewhere. The box of all stays what it was. */
+  /** Changes the pose of an instance. The box of all instances is not updated. */
   setPose(instance, pose) {
     instance.pose = pose;
     this.#place(instance);
     this.changed();
   }
 
-  // From the coordinates of a model's scene (cut.js: its box centred, its half diagonal 1) to those of the picture.
+  // Computes the matrix of an instance: from the coordinates of the model's scene (cut.js: box centred, half diagonal 1) to the coordinates of the picture.
   #place(instance) {
     const { client, info } = this.models[instance.model], { scene } = this;
     if (!info || !scene)
@@ -162,7 +165,10 @@ export class Assembly {
     instance.radius = s;
   }
 
-  /** To be called when the camera, the time or what is visible has changed. `want`: { pixels, triangles, mesh }; `height` of the picture in pixels of the page. */
+  /**
+   * Selects the visible instances and requests their detail. Call it when the camera, the time or the visibility of an instance has changed. `want`: { pixels,
+   * triangles, mesh }; `height`: height of the picture in pixels of the page.
+   */
   update(camera, height, want) {
     camera.updateMatrixWorld();
     const m = camera.matrixWorldInverse.elements, frustum = new kit.Frustum().setFromProjectionMatrix(new kit.Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse));
@@ -194,7 +200,7 @@ export class Assembly {
     model.look.uniforms.chosen.value = shown.indexOf(this.chosen);
     model.tiles.byKey.forEach(({ mesh }) => {
       mesh.count = shown.length;
-      mesh.boundingSphere = null; // three.js keeps one for rays
+      mesh.boundingSphere = null; // three.js caches a sphere for ray casting
     });
   }
 
@@ -215,7 +221,7 @@ export class Assembly {
     });
   }
 
-  /** Whether all that is in sight is as fine as it gets. */
+  /** Returns true when all visible instances have their final detail. */
   get idle() {
     return this.asked === true && this.models.every((model) => model.error || !model.shown.length || model.idle);
   }
@@ -246,7 +252,7 @@ export class Assembly {
     this.models.forEach(({ look }) => (look.uniforms.own.value = own));
   }
 
-  /** As an address has them: NAME:RRGGBB of models, with a bar between. */
+  /** Sets the colours of models from the text of an address: NAME:RRGGBB, separated by bars. */
   setColours(text) {
     for (const pair of (text ?? '').split('|')) {
       const [, name, hex] = /^(.*):([0-9a-f]{6})$/i.exec(pair) ?? [], model = this.models.find((m) => m.name === name);
@@ -255,9 +261,12 @@ export class Assembly {
     }
   }
 
-  /** Shows what lies within shares of the box's sides, [x, y, z, x, y, z] of the world; everything without them. Gives corners of the picture's coordinates, if something is left out. */
+  /**
+   * Shows only the section box, given as shares [x, y, z, x, y, z] of the box's sides in world coordinates; without `box`, everything. Returns the corners in the
+   * picture's coordinates, or undefined when everything is shown.
+   */
   setBox(box) {
-    // An axis of the picture that is turned over counts from the world's other end.
+    // With z upwards, the picture's z axis is the world's -y axis.
     const turned = box && this.up === 2 ? [box[0], box[2], 1 - box[4], box[3], box[5], 1 - box[1]] : box;
     this.cut = cutOf(upright(this.box.size, this.up).map(Math.abs), this.scene.scale, undefined, turned);
     this.models.forEach((model) => this.#paint(model));
@@ -268,16 +277,16 @@ export class Assembly {
     this.models.forEach(({ tiles }) => tiles.setWalls(walls));
   }
 
-  // --- who is where ---
+  // --- instances ---
 
-  /** For a Raycaster of three.js; a hit's instance is instanceOf(hit). */
+  /** The visible meshes, for a Raycaster of three.js. instanceOf(hit) returns the instance of a hit. */
   get meshes() {
     return this.models.flatMap(({ tiles, shown }) => (shown.length ? tiles.meshes : []));
   }
 
   instanceOf = ({ object, instanceId }) => object.ebpoModel?.shown[instanceId];
 
-  /** Coordinates of the world as those of an instance's model, and back. */
+  /** Converts a point from world coordinates to those of an instance's model; inWorld() converts back. */
   inModel = (instance, point) => unplaced(instance.now, point);
   inWorld = (instance, point) => placed(instance.now, point);
 

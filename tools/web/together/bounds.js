@@ -1,9 +1,9 @@
-// Computes the approximate box of all instances at all times of their routes, for the camera. No DOM, no WebGL.
+// Computes the approximate box of all instances at all times of their routes, for the camera. Uses neither DOM nor WebGL.
 import { placed, poseAt } from './poses.js';
 
-const BETWEEN = 32;         // times besides the keys of a route
-const TIMES_MOST = 1000;    // of an instance
-const POSES_MOST = 200_000; // of all instances together, so that a large scene begins soon
+const BETWEEN = 32;         // number of times in addition to the keys of a route
+const TIMES_MOST = 1000;    // most times of an instance
+const POSES_MOST = 200_000; // most poses of all instances together, so that large scenes appear early
 
 const evenly = (list, most) => (list.length <= most ? list : Array.from({ length: most }, (_, i) => list[Math.round(i * (list.length - 1) / (most - 1))]));
 
@@ -13,8 +13,8 @@ function timesOf({ keys }, { from, to }, share) {
 }
 
 /**
- * Of [{ instance: { pose, route }, origin, size }], the boxes in their models' coordinates, from one time to another: { origin, size }; undefined if there are none. Throws an Error
- * where numbers do not suffice.
+ * Returns the box { origin, size } of all instances between two times, or undefined without instances. `all`: [{ instance: { pose, route }, origin, size }], with
+ * boxes in the models' coordinates. Throws an Error when the box is too large or too small for double precision.
  */
 export function boundsOf(all, { from, to }) {
   const moving = all.filter(({ instance }) => instance.route).length, share = Math.max(2, Math.min(TIMES_MOST, Math.floor(POSES_MOST / Math.max(1, moving)))), times = new Map();
@@ -27,7 +27,7 @@ export function boundsOf(all, { from, to }) {
       const pose = poseAt(instance, time);
       for (let c = 0; c < 8; c++)
         placed(pose, origin.map((o, k) => o + (c >> k & 1) * size[k])).forEach((x, k) => {
-          low[k] = Math.min(low[k], x); // which a NaN stays in
+          low[k] = Math.min(low[k], x); // NaN stays NaN, and is refused below
           high[k] = Math.max(high[k], x);
         });
     }

@@ -1,17 +1,17 @@
-// One budget of triangles for several models, by how much of the picture they may fill. No DOM, no WebGL.
-const PIXELS_MOST = 1000; // half a picture: nearer is not more
-const LEAST = 500;        // triangles of a model that is out of sight, or small
+// Distributes a budget of triangles among several models by their size in the picture. Uses neither DOM nor WebGL.
+const PIXELS_MOST = 1000; // limit of the size: about half a picture
+const LEAST = 500;        // least number of triangles of a model, also when it is out of sight
 
-/** How large a model is in a view (lookOf() of shade.js): the square of half its box' diagonal in pixels; 0 out of sight. */
+/** Returns the weight of a model in a view (lookOf() of shade.js): the square of half its box's diagonal in pixels, or 0 when the model is out of sight. */
 export function weightOf({ eye, planes, pixels }) {
-  if (planes.some((p) => p[3] < -1)) // in its own coordinates the model is within 1 of the origin
+  if (planes.some((p) => p[3] < -1)) // in the coordinates of the view, the model is within a distance of 1 from the origin
     return 0;
   return Math.min(PIXELS_MOST, pixels / Math.max(1, Math.hypot(...eye))) ** 2;
 }
 
 /**
- * Triangles for each copy of some models: [{ weight (of all its copies together), copies (that are seen), faces (of the model: more are of no use) }]. Shares go by weight; what one
- * model cannot use the others get.
+ * Returns the number of triangles for each copy of each model. `models`: [{ weight (sum over its copies), copies (number of visible copies), faces (most triangles
+ * that the model can use) }]. Shares are proportional to weights. Triangles that a model cannot use are distributed among the other models.
  */
 export function sharesOf(total, models) {
   const out = models.map(() => LEAST);

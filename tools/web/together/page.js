@@ -16,12 +16,12 @@ const TRIANGLES_MOST = 2_000_000, PIXELS = 12, LATER_MS = 300, NAMES_MOST = 300;
 const HTML = `<div class="row" id="timeRow" hidden><button id="timePlay" class="small" aria-pressed="false">Play</button><input type="range" id="time" min="0" max="1000" value="0"
   aria-label="Time"><output id="timeText"></output></div>
   <div id="cameras" class="buttons"></div><ul id="models" class="list"></ul><div id="sceneLayers" class="toggles"></div>`;
-const CHOSEN = `<p class="hint" id="chosenHint">Click a model to choose it and to ask about the point.</p><div id="chosen" hidden>
+const CHOSEN = `<p class="hint" id="chosenHint">Click a model to select it and to query the point.</p><div id="chosen" hidden>
   <div class="answer"><strong id="chosenName"></strong><span id="chosenModel"></span></div><dl id="chosenFacts" class="facts"></dl>
   <div class="answer"><strong id="chosenWhere"></strong><span id="chosenNote"></span></div>
   <div class="buttons"><button id="chosenLook" class="small">Look at it</button><a id="chosenOpen" class="small">Open it alone</a></div></div>`;
 
-/** `page`: { scene, layout } of app.js; `asked`: what wanted() or ofFiles() of asked.js give. Shows it. */
+/** Shows several models. `page`: { scene, layout } of app.js; `asked`: the result of wanted() or ofFiles() of asked.js. */
 export async function begin(page, asked) {
   const { scene } = page;
   await styled();
@@ -61,17 +61,17 @@ class Together {
     this.#takeAddress();
     this.#soon();
     tell('opened');
-    assembly.models.filter((m) => m.error).forEach((m) => this.#failed(m, m.error)); // now with a way to try again
+    assembly.models.filter((m) => m.error).forEach((m) => this.#failed(m, m.error)); // shows errors again, now with a button to retry
   }
 
-  // What the rest of the page knows of it.
+  // Sets the state that other modules of the page read.
   #opened() {
     const { asked, assembly: { box, models, scene } } = this, unit = asked.unit ?? models.find((m) => m.info?.unit)?.info.unit;
     state.scene = scene;
     state.info = { box_origin: box.origin, box_size: box.size, unit, parts: new Set(), levels: [], level_count: 0 };
   }
 
-  // Nothing can be shown: the first page is there again, for other files.
+  // Returns to the first page, because no model can be shown.
   #leave() {
     this.assembly.end();
     this.scene.others = state.together = undefined;
@@ -91,7 +91,7 @@ class Together {
     showError({ message: `${model.name}: ${error.message}` }, error.code === 'NETWORK' && state.info ? again : undefined);
   }
 
-  /** Asks again for what has not come. */
+  /** Repeats pending requests. */
   retry() {
     this.assembly.models.forEach((model) => model.client.retry());
     this.moved();
@@ -227,9 +227,9 @@ class Together {
     $('timeText').textContent = `${time.toFixed(2)} s`;
   }
 
-  // --- what is clicked ---
+  // --- the selected instance ---
 
-  /** By app.js, with the picture's point in the world. */
+  /** Handles a click. app.js calls it with the clicked point in world coordinates. */
   clicked(point) {
     const instance = this.scene.picked && this.assembly.instanceOf(this.scene.picked);
     this.#choose(instance, instance && this.assembly.inModel(instance, point));
@@ -282,13 +282,13 @@ class Together {
       this.assembly.inWorld(this.assembly.chosen, this.point).map((x) => Number(x.toPrecision(6))).join(', ');
   }
 
-  // The point and its nearest one move with their instance.
+  // Shows the query point and its nearest point, which move with their instance.
   #marks() {
     const { assembly, point, near } = this, at = (p) => p && toScene(assembly.inWorld(assembly.chosen, p));
     this.scene.showProbe(assembly.chosen && at(point), assembly.chosen && at(near));
   }
 
-  // For distances: on the nearest face of what is clicked.
+  // Returns the position on the nearest face of the clicked instance, for measuring distances.
   async #placeOf(point) {
     const { picked, pickedCut } = this.scene, instance = picked && this.assembly.instanceOf(picked), model = instance && this.assembly.models[instance.model];
     if (!instance || pickedCut || !model.info.parts.has('mesh'))
@@ -313,7 +313,7 @@ class Together {
     this.changed();
   }
 
-  /** The camera has moved, or what is shown is another. */
+  /** Call it when the camera has moved or the visible models have changed. */
   moved() {
     this.#soon();
     this.changed();
@@ -364,7 +364,7 @@ class Together {
     state.measured = pointsOf(query.get('measure'));
   }
 
-  /** The address of what is shown now. */
+  /** Returns the address of the current view. */
   address() {
     const { assembly, scene } = this, view = cameraText(scene.place), diagonal = Math.hypot(...assembly.box.size);
     const hidden = [...assembly.models.filter((m) => !m.visible).map((m) => m.name), ...this.hiddenLayers];
@@ -374,7 +374,7 @@ class Together {
   }
 
   changed() {
-    if (!state.info || this.asked.local || this.playing) // browsers refuse an address that changes all the time
+    if (!state.info || this.asked.local || this.playing) // browsers reject changes of the address that are too frequent
       return;
     this.later ??= setTimeout(() => {
       this.later = undefined;

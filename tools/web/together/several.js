@@ -1,4 +1,4 @@
-// What the element <ebpo-viewer> shows when it has several models in it, or a scene.
+// Several models or a scene in the element <ebpo-viewer>.
 import { Assembly } from './assembly.js';
 import { Crew } from '../client.js';
 import { fromPicture, toPicture } from '../state.js';
@@ -7,20 +7,20 @@ export class Several {
   #frame;
   #wasIdle = true;
 
-  /** `scene` shows it; `worker`: the address of worker.js; `want()`: { pixels, triangles }; `heard(type, news)` gets idle, line, failed. */
+  /** `scene`: draws the models; `worker`: the address of worker.js; `want()`: returns { pixels, triangles }; `heard(type, news)` receives idle, line and failed. */
   constructor(scene, { worker, want, heard }) {
     Object.assign(this, { scene, want, heard, ended: false });
     this.assembly = new Assembly({ crew: new Crew({ worker }), changed: () => this.moved(), news: () => this.#news(),
       failed: (model, { code = 'FORMAT', message }) => heard('failed', { error: { code, message: `${model.name}: ${message}` }, model: model.name }) });
   }
 
-  /** `asked`: what wanted() or ofParts() of asked.js give. Resolves to facts of all when their heads are there. */
+  /** Opens models. `asked`: the result of wanted() or ofParts() of asked.js. Resolves to `facts` when all headers have been read. */
   async open(asked) {
     const { assembly, scene } = this, there = await assembly.open(asked);
     if (this.ended)
       throw new DOMException('other models were opened', 'AbortError');
     if (!there)
-      throw new Error(`${asked.title}: none of it could be opened; see what was said of each`);
+      throw new Error(`${asked.title}: no model could be opened; see the errors of the models`);
     scene.scene.add(assembly.group);
     scene.others = assembly;
     this.moved();
@@ -33,7 +33,7 @@ export class Several {
       instances: instances.map(({ name, model, layer }) => ({ name, model: models[model].name, layer })) };
   }
 
-  /** The camera has moved, or what is shown is another. */
+  /** Call it when the camera has moved or the visible models have changed. */
   moved() {
     this.#frame ??= requestAnimationFrame(() => {
       this.#frame = undefined;
@@ -55,7 +55,7 @@ export class Several {
     this.#wasIdle = idle;
   }
 
-  /** An instance by its number: where it is, and whether. */
+  /** Sets the pose and the visibility of an instance, by its index. */
   place(number, pose, hidden) {
     const instance = this.assembly.instances[number];
     if (instance)
@@ -67,24 +67,24 @@ export class Several {
     this.assembly.setTime(Math.max(from, Math.min(to, time)));
   }
 
-  /** By names of instances, layers or models, with a bar between. */
+  /** Hides instances, layers or models by their names, separated by bars. */
   hide(text) {
     const names = new Set((text ?? '').split('|')), { models, instances } = this.assembly;
     instances.forEach((i) => (i.visible = !i.hidden && ![i.name, i.layer, models[i.model].name].some((name) => names.has(name))));
     this.moved();
   }
 
-  /** What was picked at last, at a point of the picture: { instance (its name), point (of the scene) }; undefined if nothing was. */
+  /** Returns the last picked instance's name and a point of the picture in scene coordinates, { instance, point }; undefined when no instance was picked. */
   pickedAt(point) {
     const { scene: { picked }, assembly } = this, instance = picked && assembly.instanceOf(picked);
     return instance && { instance: instance.name, point: fromPicture(point, assembly.scene) };
   }
 
-  /** About a point of the scene, of one instance: { point, instance, model, where, distance, nearest, lo, hi, exact }, all in the scene's coordinates. */
+  /** Queries a point for one instance. Resolves to { point, instance, model, where, distance, nearest, lo, hi, exact }, in the scene's coordinates. */
   async ask(point, name) {
     const { assembly } = this, instance = assembly.instances.find((i) => i.name === name), model = instance && assembly.models[instance.model];
     if (!model?.info)
-      throw new Error(`"${name}" is no instance that is shown; name one of info.instances`);
+      throw new Error(`"${name}" is not an instance that is shown; name one of info.instances`);
     const { where, distance, nearest, lo, hi, exact } = await model.client.probe(assembly.inModel(instance, point)), { scale } = instance.now, far = (d) => (d === undefined ? undefined : d * scale);
     return { point, instance: name, model: model.name, where, distance: far(distance), nearest: nearest && assembly.inWorld(instance, nearest), lo: far(lo), hi: far(hi), exact };
   }

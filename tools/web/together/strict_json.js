@@ -1,11 +1,11 @@
-// Checks JSON of scene files more strictly than JSON.parse(): rejects duplicate members and too deep nesting. No DOM.
+// Parses JSON of scene files more strictly than JSON.parse(): rejects duplicate members and too deep nesting. Uses no DOM.
 const LEVELS_MOST = 32;
-const PIECES = /"(?:[^"\\]|\\.)*"|[{}[\],]/g; // colons, numbers and words do not matter
+const PIECES = /"(?:[^"\\]|\\.)*"|[{}[\],]/g; // other tokens are skipped
 
-/** The value of a text that JSON.parse() takes; throws an Error that says what is wrong. */
+/** Returns the value of a JSON text. Throws an Error for invalid JSON, duplicate members and too deep nesting. */
 export function parseStrict(text) {
-  const value = JSON.parse(text), open = []; // of each bracket around: the names of its object's members so far, or undefined in an array
-  let first = false; // whether a text here is a member's name
+  const value = JSON.parse(text), open = []; // for each open bracket: the names of the object's members so far, or undefined for an array
+  let first = false; // true when the next string is a member's name
   for (const [piece] of text.matchAll(PIECES)) {
     if (piece === '{' || piece === '[') {
       open.push(piece === '{' ? new Set() : undefined);

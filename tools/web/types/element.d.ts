@@ -1,20 +1,20 @@
-// Types of "ebpo-viewer": the element <ebpo-viewer>, which importing this module defines.
+// Types of "ebpo-viewer". Importing this module defines the element <ebpo-viewer>.
 
-/** What is known of a point. Distances are in the file's unit. */
+/** Result of a point query. Distances are in the file's unit. */
 export interface PointAnswer {
   point: [number, number, number];
-  /** undefined for surfaces, which have no inside */
+  /** Undefined for surfaces, which have no inside. */
   where?: 'in' | 'out' | 'on' | 'maybe';
-  /** to the nearest face, if `exact` */
+  /** Distance to the nearest face, if `exact`. */
   distance?: number;
   nearest?: [number, number, number];
-  /** the distance is certain to lie between these */
+  /** Certain bounds of the distance. */
   lo: number;
   hi: number;
   exact: boolean;
 }
 
-/** The root attributes of a file, by the names of the format's specification, and what is made of them. */
+/** The root attributes of a file, by the names of the format's specification. `solid` and `parts` are derived from the attributes. */
 export interface EbpoInfo {
   face_count: number;
   vertex_count: number;
@@ -28,57 +28,57 @@ export interface EbpoInfo {
   [attribute: string]: unknown;
 }
 
-/** One of several models: an <ebpo-part>, or of load(). */
+/** One of several models: an <ebpo-part>, or an item of the list for load(). */
 export interface EbpoPart {
-  /** in an <ebpo-part> an address */
+  /** In an <ebpo-part>, always an address. */
   src: string | URL | Blob;
-  /** X,Y,Z or X,Y,Z,QX,QY,QZ,QW or that and a scale */
+  /** X,Y,Z or X,Y,Z,QX,QY,QZ,QW or X,Y,Z,QX,QY,QZ,QW,SCALE. */
   pose?: string;
-  /** the file's, if it is left out */
+  /** The file's name by default. */
   name?: string;
-  /** #RRGGBB */
+  /** #RRGGBB. */
   colour?: string;
   hidden?: boolean;
 }
 
-/** Of several models, or a scene. */
+/** Facts of several models or a scene. */
 export interface EbpoSceneInfo {
-  /** of all that can be shown, at all times, in the scene's coordinates */
+  /** Box of all instances at all times, in the scene's coordinates. */
   box_origin: [number, number, number];
   box_size: [number, number, number];
-  /** seconds; equal where nothing moves */
+  /** Times in seconds; equal when nothing moves. */
   from: number;
   to: number;
-  /** with what is known of each, or why it could not be opened */
+  /** With the facts of each file, or the error message of a file that could not be opened. */
   models: { name: string; info?: EbpoInfo; error?: string }[];
   instances: { name: string; model: string; layer?: string }[];
 }
 
-/** Of one instance; `point` and `nearest` in the scene's coordinates. */
+/** Result of a point query for one instance; `point` and `nearest` are in the scene's coordinates. */
 export interface ScenePointAnswer extends PointAnswer {
   instance: string;
   model: string;
 }
 
 export interface EbpoViewerEventMap extends Omit<HTMLElementEventMap, 'error' | 'progress' | 'load'> {
-  /** The head is there. */
+  /** The file's header has been read. */
   load: CustomEvent<EbpoInfo | EbpoSceneInfo>;
   progress: CustomEvent<{ got: number; want: number; quiet: number }>;
-  /** Nothing more comes for this view. */
+  /** All data for this view has been loaded. */
   idle: CustomEvent<{ traffic: { requests: number; bytes: number } }>;
-  /** `model`: its name, where it is one of several. */
+  /** `model`: the model's name, when several are shown. */
   error: CustomEvent<{ code: string; message: string; model?: string }>;
-  /** The user has moved the camera. */
+  /** The camera has moved. */
   view: CustomEvent<{ view: string }>;
   point: CustomEvent<PointAnswer | ScenePointAnswer>;
 }
 
 /**
- * Attributes: src, view, level, detail, clip, box, point, colour, theme, walls, alt; in place of src, <ebpo-part>s in it or scene, up, remote; of several models time, hide, colours.
- * Those of a view are as in the viewer's address.
+ * Attributes for one model: src, view, level, detail, clip, box, point, colour, theme, walls, alt. For several models, <ebpo-part> children, or scene, up and remote
+ * replace src; further attributes are time, hide and colours. Attributes of the view have the form of the viewer's address.
  */
 export declare class EbpoViewerElement extends HTMLElement {
-  /** Where worker.js is, if it does not lie beside the module. To be set before the first element is there. */
+  /** The address of worker.js, if it is not beside the module. Set it before the first element exists. */
   static worker: string | URL | undefined;
   readonly info: EbpoInfo | EbpoSceneInfo | undefined;
   readonly parts: EbpoPart[];

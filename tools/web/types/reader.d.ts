@@ -1,4 +1,4 @@
-// Types of "ebpo-viewer/reader" (and of "ebpo-reader", which is the same): docs/guide/embedding.md says how they work together.
+// Types of "ebpo-viewer/reader" and of "ebpo-reader", which is the same code. docs/guide/embedding.md describes their use.
 import type { EbpoInfo } from './element.js';
 
 export declare const WHITE: 0, BLACK: 1, LEAF: 2, GRAY: 3;
@@ -10,7 +10,7 @@ export declare class EbpoError extends Error {
   readonly code: 'FORMAT' | 'VERSION' | 'NETWORK' | 'ABSENT' | 'ARGUMENT';
 }
 
-/** Where bytes come from: one of these classes, or your own object with these members. */
+/** A source of bytes: one of these classes, or another object with these members. */
 export interface Source {
   name: string;
   size: number;
@@ -20,11 +20,11 @@ export interface Source {
   read(offset: number, length: number): Promise<Uint8Array>;
 }
 export interface UrlOptions {
-  /** bytes of the first request */
+  /** Bytes of the first request. */
   ahead?: number;
-  /** ms without a byte, after which is asked again */
+  /** Longest time without a byte, in milliseconds; then the request is repeated. */
   timeout?: number;
-  /** go on asking when the line is dead */
+  /** Keeps repeating requests while the connection is lost, instead of failing. */
   patient?: boolean;
   fetch?: typeof fetch;
 }
@@ -61,7 +61,7 @@ export type Openable = string | URL | Blob | ArrayBuffer | Uint8Array | Source;
 export declare function sourceOf(what: Openable, options?: UrlOptions): Source;
 
 export interface OpenOptions extends UrlOptions {
-  /** a decoder as loadZstd() gives it, or a promise of it */
+  /** A decoder from loadZstd(), or a promise of a decoder. */
   zstd?: unknown;
   headBytes?: number;
   cacheBytes?: number;
@@ -69,7 +69,7 @@ export interface OpenOptions extends UrlOptions {
 export declare function openEbpo(what: Openable, options?: OpenOptions): Promise<EbpoFile>;
 export declare function loadZstd(ZSTDDecoder?: unknown): Promise<unknown>;
 
-/** A level's arrays; those that the file does not have are undefined. */
+/** A level's arrays. Arrays that the file does not have are undefined. */
 export interface Level {
   level: number;
   groups: number;
@@ -80,7 +80,7 @@ export interface Level {
   leafNew?: ArrayLike<number>;
   [array: string]: unknown;
 }
-/** Nine numbers a face. */
+/** Nine numbers for each face. */
 export type Faces = Float64Array & { numbers: Uint32Array; colours?: Uint8Array };
 
 export declare class EbpoFile {
@@ -97,7 +97,7 @@ export declare class EbpoFile {
   facesByNumber(numbers: ArrayLike<number>): Promise<Float64Array & { colours?: Uint8Array }>;
   leafFaces(leaves: Node[]): Promise<Faces[]>;
   maps(): Promise<{ vertexSource: Uint32Array; faceSource: Uint32Array }>;
-  /** The source's numbers of some faces. */
+  /** Returns the indices of faces in the source mesh. */
   sourceFaces(numbers: ArrayLike<number>): Promise<Uint32Array>;
   checkOrder(levels: Level[]): void;
   verifyContent(): Promise<void>;
@@ -126,7 +126,7 @@ export declare class Tree {
   readonly root: Node | undefined;
   readonly depth: number;
   add(level: Level): void;
-  /** For questions: shares the levels, has no planes below them. */
+  /** Returns a tree for queries that shares the loaded levels and has no planes below them. */
   lean(): Tree;
   children(node: Node): Node[] | undefined;
   isPruned(node: Node): boolean;

@@ -3,11 +3,11 @@ import type { Box3, Camera, Group, Material, MeshStandardMaterial, MeshStandardM
 import type { EbpoInfo } from './element.js';
 
 export interface EbpoModelOptions {
-  /** where worker.js is, if it does not lie beside the module */
+  /** The address of worker.js, if it is not beside the module. */
   worker?: string | URL;
-  /** 'standard' (lit by the scene), 'viewer' (as the viewer's page draws), or one of standardMaterial() */
+  /** 'standard' (lit by the scene), 'viewer' (shaded as on the viewer's page), or a result of standardMaterial(). */
   material?: 'standard' | 'viewer' | Material;
-  /** of an EbpoGroup: its make() gives it */
+  /** Shared workers; EbpoGroup.make() sets this option. */
   crew?: unknown;
   detail?: number;
   level?: number;
@@ -17,7 +17,7 @@ export interface EbpoModelOptions {
 
 export interface EbpoModelEventMap extends Object3DEventMap {
   load: { info: EbpoInfo };
-  /** The picture is another: draw a frame. */
+  /** The model has changed; draw a frame. */
   change: { stats: { nodes: number; triangles: number; meshTriangles: number } };
   progress: { got: number; want: number; quiet: number };
   idle: { traffic: { requests: number; bytes: number } };
@@ -29,20 +29,20 @@ export declare class EbpoModel extends Object3D<EbpoModelEventMap> {
   readonly info: EbpoInfo | undefined;
   readonly content: Group;
   readonly material: Material;
-  /** nodes are refined until their cells are so many pixels of the page; 0: as far as the file goes */
+  /** Nodes are refined until their cells have this size in pixels of the page; 0: down to the deepest level. */
   detail: number;
-  /** the deepest level drawn */
+  /** The deepest drawn level. */
   level: number;
-  /** whether leaves show the real faces */
+  /** True when leaves show the real faces. */
   mesh: boolean;
-  /** about the most that are drawn */
+  /** Approximate limit of drawn triangles. */
   triangles: number;
-  /** what is shown, in this object's coordinates, which are the file's */
+  /** The visible box, in this object's coordinates, which are those of the file. */
   clip: Box3 | undefined;
-  /** the root cell; only when loaded */
+  /** The root cell; available after load(). */
   readonly box: Box3;
   load(what: string | URL | Blob): Promise<EbpoInfo>;
-  /** to be called before each frame; a number is the picture's height in pixels of the page */
+  /** Call it before each frame. A number as `renderer` is the picture's height in pixels of the page. */
   update(camera: Camera, renderer: WebGLRenderer | number): void;
   probe(point: Vector3): Promise<{ where?: 'in' | 'out' | 'on' | 'maybe'; distance?: number; nearest?: Vector3; lo: number; hi: number; exact: boolean }>;
   dispose(): void;
@@ -51,14 +51,14 @@ export declare class EbpoModel extends Object3D<EbpoModelEventMap> {
 /** Several models that share workers and a budget of triangles. */
 export declare class EbpoGroup extends Group {
   constructor(options?: { triangles?: number; worker?: string | URL; workers?: number });
-  /** of all models together, about */
+  /** Approximate limit for all models together. */
   triangles: number;
   readonly models: EbpoModel[];
   make(options?: EbpoModelOptions): EbpoModel;
-  /** in place of the models' own update() */
+  /** Call it instead of the models' update(). */
   update(camera: Camera, renderer: WebGLRenderer | number): void;
   dispose(): void;
 }
 
-/** A material that knows what the attributes of the model's meshes mean. */
+/** Returns a material that evaluates the attributes of the model's meshes. */
 export declare function standardMaterial(parameters?: MeshStandardMaterialParameters): MeshStandardMaterial;
