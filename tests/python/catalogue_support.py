@@ -1,6 +1,6 @@
-"""Support for tests of catalogues: results of the command, and parts cut by the sample.
+"""Support for tests of catalogues: results of the command, and parts that the sample cuts.
 
-Run as package_support says, with the sources' folder behind it.
+Run as described in package_support, with the source folder as an additional argument.
 """
 import contextlib
 import importlib.util
@@ -21,10 +21,10 @@ RAW = {"inside": np.dtype([("where", "<i4"), ("winding", "<i4")]),
 
 
 def by_command(command, catalogue, rows, *options):
-    """What the command answers of a catalogue that was saved."""
-    catalogue.save("asked.json")
-    np.ascontiguousarray(rows, float).tofile("asked.raw")
-    done = subprocess.run([COMMAND, command, "--raw", *options, "asked.json", "asked.raw"], capture_output=True)
+    """Save a catalogue, and return the command's results for it."""
+    catalogue.save("queried.json")
+    np.ascontiguousarray(rows, float).tofile("queried.raw")
+    done = subprocess.run([COMMAND, command, "--raw", *options, "queried.json", "queried.raw"], capture_output=True)
     assert done.returncode == 0, done.stderr
     return np.frombuffer(done.stdout, RAW[command])
 
@@ -35,7 +35,7 @@ def same(results, expected):
 
 
 def cut_by_sample(whole, folder, *level):
-    """The sample as a module, its catalogue, and what it printed."""
+    """Run the sample cut_along_octcodes. Return it as a module, its catalogue, and its output."""
     spec = importlib.util.spec_from_file_location("cut_along_octcodes", CUT)
     cut = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(cut)
@@ -47,7 +47,10 @@ def cut_by_sample(whole, folder, *level):
 
 
 def caps_of(catalogue, corners):
-    """Corners of the caps of all parts: of what a part has beyond the whole's faces, whose corners are given."""
+    """Return the corners of the caps of all parts, which are the faces that the whole model lacks.
+
+    corners: (f, 3, 3), the corners of the whole model's faces.
+    """
     caps = []
     for entry in catalogue.entries:
         vertices, faces = ebpo.open(entry.path).mesh(order="source")
@@ -61,6 +64,6 @@ def caps_of(catalogue, corners):
 
 
 def on_triangles(corners):
-    """On corners, edges and inner parts, at places that doubles have exactly if corners are floats."""
+    """Return points at corners, on edges and inside faces. They are exact doubles if the corners are floats."""
     return np.concatenate([corners[:, 0], (corners[:, 0] + corners[:, 1]) / 2,
                            (2 * corners[:, 0] + corners[:, 1] + corners[:, 2]) / 4])

@@ -1,6 +1,6 @@
 """Support for tests of the package: a folder with models, and results of the command.
 
-Run as  NAME.py EBPO EBPO_INPUTS EBPO_GENERATE  with PYTHONPATH at the package.
+Run as  NAME.py EBPO EBPO_INPUTS EBPO_GENERATE  with PYTHONPATH naming the package's folder.
 """
 import atexit
 import ctypes
@@ -27,7 +27,7 @@ MADE = {}
 
 
 def model(name, **options):
-    """A model of one of the inputs, opened anew; the command converts it once."""
+    """Open a new model of one of the inputs. The command converts each input once."""
     if name not in MADE:
         subprocess.run([COMMAND, "convert", "-q", f"{name}.ply", f"{name}.ebpo.h5"], check=True)
         MADE[name] = f"{name}.ebpo.h5"
@@ -35,7 +35,7 @@ def model(name, **options):
 
 
 def command_results(command, name, queries, *options):
-    """What the command answers to rows of numbers: an array of its own, from its --npy."""
+    """Return the command's results for rows of numbers, as the array that --npy writes."""
     np.save("queries.npy", np.ascontiguousarray(queries, dtype=np.float64))
     done = subprocess.run([COMMAND, command, "--npy", *options, f"{name}.ebpo.h5", "queries.npy"],
                           check=True, capture_output=True)
@@ -46,12 +46,12 @@ def points(count, seed=1, reach=1.2):
     return np.random.default_rng(seed).uniform(-reach, reach, (count, 3))
 
 
-EXTRAS = hasattr(ctypes.CDLL(ebpo.library()), "ebpo_collider_new")  # else the library is the core alone
+EXTRAS = hasattr(ctypes.CDLL(ebpo.library()), "ebpo_collider_new")  # False: the library is only the core
 
 
 class Case(unittest.TestCase):
     def _callTestMethod(self, method):
-        """Tests of what a library without extras lacks are skipped."""
+        """Skip a test that needs functions which a library without extras lacks."""
         try:
             super()._callTestMethod(method)
         except ebpo.UnsupportedError as error:
@@ -60,7 +60,7 @@ class Case(unittest.TestCase):
             self.skipTest(str(error))
 
     def same(self, one, other):
-        """Tuples of arrays, bit for bit; nan is nan."""
+        """Assert that two tuples of arrays are equal bit for bit; nan equals nan."""
         for a, b in zip(one, other):
             np.testing.assert_array_equal(a, b)
 

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Compares ctypes declarations with the compiler: test_declared.py INCLUDE_FOLDER PACKAGE_FOLDER CC...
 
-What tools/python/declare.py has made of the public headers, against a C program that includes them:
-sizes, offsets of members, constants, and each member of each initial value.
+tools/python/declare.py makes the declarations from the public headers. A C program that includes the headers
+prints sizes, offsets of members, constants, and each member of each initial value.
 """
 import ctypes
 import enum
@@ -22,7 +22,7 @@ constants = [name for name, value in vars(declared).items() if name.startswith("
 
 
 def printed_by_c():
-    """Lines of a C program about all of it."""
+    """Return the output of the C program."""
     lines = [f"#include <ebpo/{header.name}>" for header in sorted((pathlib.Path(include) / "ebpo").glob("*.h"))]
     lines += ["#include <stdio.h>",
               "static void print_bytes(const char *name, const void *data, size_t size) {",
@@ -73,7 +73,7 @@ def main():
     enums = sum(isinstance(v, type) and issubclass(v, enum.IntEnum) and v is not enum.IntEnum
                 for v in vars(declared).values())
     print(f"{len(structs)} structs, {len(constants)} constants, {len(declared.INIT)} initial values, "
-          f"{enums} enumerations, {len(declared.FUNCTIONS)} functions are those of C")
+          f"{enums} enumerations, {len(declared.FUNCTIONS)} functions are equal in C and Python")
 
 
 main()

@@ -19,7 +19,7 @@ P = points(6000, seed=5, reach=3)
 
 
 def spheres(count=27):
-    """Copies of the scan, each moved; some overlap."""
+    """Make copies of the scan at different positions; some overlap."""
     names = [f"moved/{i:02d}.ebpo.h5" for i in range(count)]
     if not os.path.isdir("moved"):
         os.mkdir("moved")
@@ -50,7 +50,7 @@ class Many(Case):
 
     def test_results_of_the_command(self):
         rays = np.concatenate([P[:3000], P[3000:] - P[:3000]], axis=1)
-        rays[:500, 3:] = 1e-320, 0, 0  # hits are farther away than a t can tell: it is inf
+        rays[:500, 3:] = 1e-320, 0, 0  # t is inf: the hits are at a t above every double
         expected = self.catalogue.locate(P), self.catalogue.distance(P), self.catalogue.ray(rays[:, :3], rays[:, 3:])
         self.assertTrue((np.isinf(expected[2]["t"]) & (expected[2]["face"] >= 0)).any())
         for options in ([], ["--memory", "8M", "--threads", "4"], ["--memory", "0", "--threads", "1"]):
@@ -73,10 +73,10 @@ class Many(Case):
         near = self.catalogue.distance(P, max_distance=.3)
         np.testing.assert_array_equal(near["face"] == -1, every.min(axis=0) > .3)
         twice = Catalogue.of(self.names[:1] * 3).distance(P[:500])
-        self.assertEqual(set(twice["model"]), {0}, "of equal ones the first")
+        self.assertEqual(set(twice["model"]), {0}, "the first of equal ones")
         entry = self.catalogue.entries[0]
         wider = Catalogue([entry, entry._replace(low=(-9, -9, -9), high=(9, 9, 9))]).distance(P[:500])
-        self.assertEqual(set(wider["model"]), {0}, "also where another one is asked before it")
+        self.assertEqual(set(wider["model"]), {0}, "also when another model is queried before")
 
     def test_rays(self):
         d = points(len(P), seed=6)
@@ -88,7 +88,7 @@ class Many(Case):
         self.assertTrue(0 < np.isfinite(found["t"]).mean() < 1)
 
     def test_rays_beyond_doubles(self):
-        """Hits at a t that is greater than every double have a face and t = inf, and are in order."""
+        """Hits at a t that is greater than every double have a face and t = inf, and are sorted."""
         def box(z):
             x, y, k = np.array(np.meshgrid([0, 1], [0, 1], [z, z + 1], indexing="ij"), float).reshape(3, 8)
             faces = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6],
@@ -99,7 +99,7 @@ class Many(Case):
         boxes = Catalogue.of([box(9), box(3), box(6)])
         for z, direction, t, row in ((-1e308, 1e-308, np.inf, 0), (-1, 1e-320, np.inf, 1), (20, -1e-320, np.inf, 0),
                                      (-1, 1e-300, 4 / 1e-300, 1), (-1, 5e-324, np.inf, 1)):
-            o, d = [.5, .25, z], [0, 0, direction]  # from 1e308 away all are at the same double: the first
+            o, d = [.5, .25, z], [0, 0, direction]  # seen from 1e308 all boxes are at the same double: the first is used
             found = boxes.ray(o, d)
             self.assertEqual((found["t"], found["model"]), (t, row))
             self.assertGreaterEqual(found["face"], 0)
@@ -182,14 +182,14 @@ class Holdings(Case):
         before = process_models().stats()
         for _ in range(2):
             for entry in catalogue.entries:
-                catalogue.inside(np.array(entry.low) / 2 + np.array(entry.high) / 2, memory="8M")  # eight shares
+                catalogue.inside(np.array(entry.low) / 2 + np.array(entry.high) / 2, memory="8M")  # an eighth of the budget for each of eight threads
                 self.assertLessEqual(process_models().stats()["memory"], 8_000_000)
         stats = process_models().stats()
         self.assertEqual(stats["opened"], stats["closed"] + stats["open"])
         self.assertGreater(stats["closed"] - before["closed"], 2)
         self.assertGreater(stats["bytes_read"], before["bytes_read"])
         catalogue.inside(np.array(entry.low) / 2 + np.array(entry.high) / 2)
-        self.assertEqual(process_models().stats()["opened"], stats["opened"], "it was held")
+        self.assertEqual(process_models().stats()["opened"], stats["opened"], "the model stayed open")
         process_models().clear()
         self.assertEqual(process_models().stats()["open"], 0)
 
@@ -212,14 +212,14 @@ class Holdings(Case):
                 catalogue.inside(P, memory=1000)
         self.assertEqual(process_models().stats()["open"], 0)
 
-    def test_what_opening_raises(self):
-        """A failure of what opens files comes out of the question as it is."""
+    def test_exceptions_of_opening(self):
+        """An exception of the function that opens files is raised by the query unchanged."""
         catalogue = Catalogue.of(spheres()[:2], storage_options={"no": "file system"})
         catalogue.entries = [entry._replace(path="nowhere://x/y") for entry in catalogue.entries]
-        with self.assertRaises((ValueError, ImportError)):  # of fsspec, or as that is not installed
+        with self.assertRaises((ValueError, ImportError)):  # raised by fsspec, or because it is not installed
             catalogue.inside(P)
         os.remove(spheres()[1])
-        self.addCleanup(shutil.rmtree, "moved")  # is made anew
+        self.addCleanup(shutil.rmtree, "moved")  # the next test creates it again
         for entry in Catalogue.of(spheres()[:1]).entries:
             with self.assertRaises(ebpo.IOFailure):
                 Catalogue([entry._replace(path=os.path.abspath("moved/01.ebpo.h5"))]).inside(P)
@@ -235,12 +235,12 @@ class Interrupts(Case):
             catalogue.distance(p)
         self.assertLess(time.monotonic() - began, 10)
         timer.join()
-        # no thread is left that would write into arrays that are freed
+        # No thread remains that could write into arrays that are freed.
         self.assertEqual(len(os.listdir("/proc/self/task")), before)
 
 
-class Hostile(Case):
-    """A catalogue is from others: what it says wrongly is noticed, not answered from."""
+class Untrusted(Case):
+    """Catalogues are untrusted input: false data in them is detected."""
 
     def setUp(self):
         model("cube")
@@ -248,12 +248,12 @@ class Hostile(Case):
         self.stated = json.loads(pathlib.Path("stated.json").read_bytes())
 
     def query(self, stated):
-        pathlib.Path("hostile.json").write_text(stated if isinstance(stated, str) else json.dumps(stated))
-        catalogue = Catalogue.open("hostile.json")
+        pathlib.Path("untrusted.json").write_text(stated if isinstance(stated, str) else json.dumps(stated))
+        catalogue = Catalogue.open("untrusted.json")
         catalogue.inside([[.5, .5, .5]])
         return catalogue.distance([[.5, .5, .5]])
 
-    def test_what_is_refused(self):
+    def test_refused_catalogues(self):
         row = self.stated["models"][0]
         np.save("few.npy", np.arange(3))
         np.save("halves.npy", np.arange(12) + .5)
@@ -284,7 +284,7 @@ class Hostile(Case):
 
 class Sizes(Case):
     def test_models_of_any_size(self):
-        """Squares of lengths are 0, or beyond doubles."""
+        """Squares of lengths underflow to 0 or overflow."""
         vertices, faces = model("cube").mesh(order="source")
         for size in (3e-162, 1e155, 1e300):
             names, p = [f"sized{i}.ebpo.h5" for i in range(9)], points(200, seed=3, reach=3) * size
@@ -297,7 +297,7 @@ class Sizes(Case):
 
 
 class Parts(Case):
-    """A model cut into eight files answers as the whole does, on its faces and on caps as well."""
+    """A model cut into eight files returns the results of the whole, also on its faces and on caps."""
 
     @classmethod
     def setUpClass(cls):
@@ -319,8 +319,8 @@ class Parts(Case):
         with self.assertRaisesRegex(ebpo.FormatError, "few.npy: expected a number for each face: 3 numbers of"):
             Catalogue(entries, parts=True).distance(P[:99])
 
-    def test_cells_of_which_a_half_is_empty(self):
-        ring = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])  # a rod: all along x, nothing between its sides
+    def test_half_empty_cells(self):
+        ring = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])  # a rod along x, with no vertices between its ends
         vertices = np.array([[x, y, z] for x in range(21) for y, z in ring], float)
         sides = [[[a, b, b + 4], [a, b + 4, a + 4]] for x in range(20) for k in range(4)
                  for a, b in [(4 * x + k, 4 * x + (k + 1) % 4)]]
@@ -332,7 +332,7 @@ class Parts(Case):
         np.testing.assert_array_equal(parts.distance(p)["distance"], whole.distance(p).distance)
 
     def test_folders_of_arrays(self):
-        """They stay on the disk; faces may have numbers of any kind, and more than one stretch."""
+        """Memory-mapped arrays are supported. Face indices may have any integer type and be in several ranges."""
         vertices, faces = self.whole.mesh(order="source")
         os.makedirs("arrays", exist_ok=True)
         np.save("arrays/vertices.npy", vertices.astype(np.float64))
@@ -364,7 +364,7 @@ class Parts(Case):
         self.assertEqual(set(balance.values()), {0})
 
     def points(self):
-        """At random; and on faces and caps, at places that doubles have exactly."""
+        """Return random points, and points on faces and caps whose coordinates are exact doubles."""
         yield points(5000, seed=8)
         for k in (self.corners[::3], self.caps):
             yield on_triangles(k)
@@ -380,16 +380,16 @@ class Parts(Case):
             np.testing.assert_array_equal(self.catalogue.inside(p), self.whole.inside(p))
             same(by_command("inside", self.catalogue, p), results)
             self.points_on_caps = (on_parts & (expected.where != Where.ON)).sum()
-        self.assertGreater(self.points_on_caps, least, "points on caps, which are no faces of the whole")
+        self.assertGreater(self.points_on_caps, least, "points on caps, which are not faces of the whole")
 
-    def test_distance_and_rays_do_not_see_caps(self):
+    def test_distance_and_rays_ignore_caps(self):
         for p in self.points():
             results, expected = self.catalogue.distance(p), self.whole.distance(p)
             same(by_command("distance", self.catalogue, p), results)
             np.testing.assert_array_equal(results["distance"], expected.distance)
             np.testing.assert_allclose(results["point"], expected.point, rtol=0, atol=1e-14)
             only = results["face"] == expected.face
-            corners = self.corners[results["face"][~only]]  # another one as near: they share the point
+            corners = self.corners[results["face"][~only]]  # another face is as near: both contain the nearest point
             shared = np.abs(self.corners[expected.face[~only]][:, :, None] - corners[:, None]).max(axis=3) == 0
             self.assertTrue(shared.any(axis=(1, 2)).all())
         o, d = 2 * points(4000, seed=2), points(4000, seed=3)
@@ -398,7 +398,7 @@ class Parts(Case):
             np.testing.assert_array_equal(results[name], getattr(expected, name))
         np.testing.assert_array_equal(command_results("inside", "scan", o)["where"], self.catalogue.locate(o)["where"])
 
-    def test_what_is_not_closed_is_refused(self):
+    def test_open_meshes_are_refused(self):
         faces = np.arange(9).reshape(3, 3)
         with self.assertRaises(SystemExit):
             list(self.cut.cycles(self.cut.open_edges(faces)[:-1]))
@@ -424,7 +424,7 @@ class Parts(Case):
             border = {(a, b) for a, b in edges if (b, a) not in edges}
             self.assertEqual(border, set(zip(chain.tolist(), np.roll(chain, -1).tolist())))
             self.assertLess(np.unique(cap, return_counts=True)[1].max(), 2 * np.log2(count) + 2)
-        eight = np.array([[0, 1, 2], [0, 3, 4]])  # two chains with one vertex
+        eight = np.array([[0, 1, 2], [0, 3, 4]])  # two chains that share one vertex
         found = sorted(sorted(chain.tolist()) for chain in self.cut.cycles(self.cut.open_edges(eight)))
         self.assertEqual(found, [[0, 1, 2], [0, 3, 4]])
 

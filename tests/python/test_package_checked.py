@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Checks that every integer, text and array reaches C unchanged, or is rejected.
 
-All declared functions and all members of structs are tried one after the other, as the headers have them; then
-the package itself, function by function.
+Tests all declared functions and all members of structs, in the order of the headers. Then tests the package's
+functions.
 """
 import ctypes
 import os
@@ -28,7 +28,7 @@ def range_of(kind):
 
 
 def cases_of(kind):
-    """A value that fits, and (value, exception) of such as do not; nothing for addresses and structs."""
+    """Return a valid value, and (value, exception) of invalid values. None and [] for addresses and structs."""
     if kind in _checked.INTEGERS:
         low, high = range_of(kind)
         bad = [(low - 1, ValueError), (high + 1, ValueError), (2**64 + 1, ValueError), (np.uint64(2**64 - 1), ValueError)
@@ -56,7 +56,7 @@ def shown(value):
 
 
 def known(kind):
-    """True for types that are checked, or that hold what no user gives."""
+    """Return True for types that are checked, or whose values no user sets."""
     return bool(_checked.converter(kind)) or kind is ctypes.c_void_p or \
         issubclass(kind, (ctypes._CFuncPtr, _checked.Structure))
 
@@ -118,7 +118,7 @@ class Package(Case):
         self.assertTrue(str(caught.exception))
 
     def test_paths(self):
-        """No file is made or replaced under a name that ends at a NUL."""
+        """No file is made or replaced under a name that is cut at a NUL."""
         m = model("cube")
         paint = ebpo.Paint(m)
         pathlib.Path("precious.txt").write_text("precious")
@@ -129,7 +129,7 @@ class Package(Case):
                                     (lambda name: ebpo.convert(mesh, name),),
                                     (lambda name: ebpo.convert(name, "out.ebpo.h5"),),
                                     (lambda name: ebpo.convert(mesh, "out.ebpo.h5", temp_dir=name),)):
-                if not (function is ebpo.open and isinstance(name, bytes)):  # these are a file's own bytes
+                if not (function is ebpo.open and isinstance(name, bytes)):  # bytes are the contents of a file here
                     self.refused(ValueError, function, name, *rest)
         self.assertEqual((sorted(os.listdir()), pathlib.Path("precious.txt").read_text()), (before, "precious"))
         for text in (NUL, LONE):
@@ -185,7 +185,7 @@ class Package(Case):
         self.assertEqual(m.subtree(np.uint64(1)).node_count, m.subtree(True).node_count)
 
     def test_callbacks_raise(self):
-        """What goes wrong while an answer is taken comes out of the call, which gives no half of it."""
+        """An exception in a callback that receives results is raised by the call, which returns no partial result."""
         m = model("cube")
         paint = ebpo.Paint(m)
         layer = paint.add_layer(title="x")

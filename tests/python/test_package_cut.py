@@ -14,7 +14,7 @@ from catalogue_support import by_command, caps_of, cut_by_sample, on_triangles, 
 from ebpo.catalogue import Where
 
 MODEL = os.path.join(sys.argv[5], "bunny_closed.ply")
-AT_MOST = 20_000  # of each kind of points
+AT_MOST = 20_000  # points of each kind
 
 
 class RealParts(Case):
@@ -54,13 +54,13 @@ class RealParts(Case):
             np.testing.assert_array_equal(results["distance"], expected.distance, kind)
             np.testing.assert_allclose(results["point"], expected.point, rtol=0, atol=1e-14 * self.length)
             same(by_command("distance", self.catalogue, p, "--memory", "16M"), results)
-            other = results["face"] != expected.face  # one as near, with a common corner
+            other = results["face"] != expected.face  # another face at the same distance, with a common corner
             a, b = self.corners[results["face"][other]], self.corners[expected.face[other]]
             shared = (a[:, :, None] == b[:, None]).all(axis=3).any(axis=(1, 2))
             self.assertTrue(shared.all(), kind)
 
     def test_rays(self):
-        """At corners, edges and inner parts of faces: several are met at one t."""
+        """Rays to corners, edges and the interior of faces: several faces are hit at one t."""
         for kind, o in self.points.items():
             d = np.random.default_rng(12).permutation(self.points["faces"])[:len(o)] - o[:AT_MOST]
             o, d = o[d.any(axis=1)], d[d.any(axis=1)]

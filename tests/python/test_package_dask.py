@@ -50,9 +50,9 @@ def setUpModule():
 
 
 class Results(Case):
-    """With schedulers in this process."""
+    """Schedulers in this process."""
 
-    def test_the_models_own(self):
+    def test_results_of_the_model(self):
         m = model("scan")
         for scheduler, chunk in (("sync", 7000), ("threads", 999), ("threads", 1 << 18)):
             options = {"chunk": chunk}
@@ -97,7 +97,7 @@ class Results(Case):
                 ed.points(path, dataset)
 
     def test_hdf5_without_locks(self):
-        """A file system that has no locks, as some of networks; and a file that another program writes."""
+        """A file system without locks, such as some network file systems, and a file that another program writes."""
         h5py = h5py_or_none()
         if not h5py:
             self.skipTest("no h5py")
@@ -194,7 +194,7 @@ class Files(Case):
         with self.assertRaises(FileExistsError):
             ed.to_file(inside, "inside.npy")
         self.assertEqual([str(p) for p in pathlib.Path(".").glob("*.parts")], [])
-        self.assertEqual([str(p) for p in pathlib.Path(".").glob(".*")], [], "no temporary files stay")
+        self.assertEqual([str(p) for p in pathlib.Path(".").glob(".*")], [], "no temporary files remain")
 
     def test_few_chunks_are_mapped_at_a_time(self):
         opened, load, limit = [], np.load, [0]
@@ -212,8 +212,8 @@ class Files(Case):
         np.testing.assert_array_equal(load("many.npy"), model("scan").inside(P[:1000]))
         self.assertTrue(1 <= limit[0] <= 3, limit)
 
-    def test_two_that_begin_one_folder(self):
-        """The question of the one that comes later is compared with the other's, and does not replace it."""
+    def test_two_processes_begin_one_folder(self):
+        """The query of the second process is compared with that of the first, and does not replace it."""
         from ebpo.point_files import published
         inside, other = (ed.inside("scan.ebpo.h5", P[:n], chunk=100) for n in (300, 200))
         folder = pathlib.Path("begun.npy.parts")
@@ -229,7 +229,7 @@ class Files(Case):
         self.assertEqual((folder / "query.json").read_bytes(), before)
         self.assertEqual(len([*folder.iterdir()]), 1)
 
-    def test_what_is_no_chunk_is_not_joined(self):
+    def test_invalid_chunks_are_not_joined(self):
         inside = ed.inside("scan.ebpo.h5", P[:300], chunk=100)
         self.addCleanup(shutil.rmtree, "joined.npy.parts", ignore_errors=True)
         folder = pathlib.Path("joined.npy.parts")
@@ -245,7 +245,7 @@ class Files(Case):
         ed.to_file(inside, "joined.npy")
         np.testing.assert_array_equal(np.load("joined.npy"), model("scan").inside(P[:300]))
 
-    def test_points_that_are_none(self):
+    def test_invalid_points(self):
         np.save("complex.npy", np.zeros((3, 3), complex))
         np.save("text.npy", np.full((3, 3), "1"))
         pathlib.Path("cut.npy").write_bytes(pathlib.Path("text.npy").read_bytes()[:140])
@@ -257,8 +257,8 @@ class Files(Case):
                 ed.inside("scan.ebpo.h5", P, chunk=chunk)
         self.assertEqual(ed.inside("scan.ebpo.h5", P[:5], chunk=1).numblocks, (5,))
 
-    def test_a_killed_client_goes_on(self):
-        """It is killed after some chunks; what is there then is not asked again."""
+    def test_killed_client_continues(self):
+        """The client is killed after some chunks. The next one does not compute these chunks again."""
         script = (f"import sys, time; sys.argv[1:] = []\nimport ebpo.dask as ed, ebpo.catalogue as cat\n"
                   f"slow = cat.Catalogue.inside\n"
                   f"def inside(*a, **k):\n    time.sleep(.2)\n    return slow(*a, **k)\n"
@@ -288,15 +288,15 @@ class Files(Case):
         np.testing.assert_array_equal(np.load("killed.npy"), model("scan").inside(P))
 
 
-class Away(http.server.BaseHTTPRequestHandler):
-    """Ranges of a file, by a server that is away until `until`; None: for two seconds from the next request."""
+class Unavailable(http.server.BaseHTTPRequestHandler):
+    """A server of ranges of a file that returns status 503 until `until`; None: for two seconds from the next request."""
     until, refused, protocol_version = 0.0, 0, "HTTP/1.1"
 
     def do_GET(self):
-        if Away.until is None:
-            Away.until = time.monotonic() + 2
-        if time.monotonic() < Away.until:
-            Away.refused += 1
+        if Unavailable.until is None:
+            Unavailable.until = time.monotonic() + 2
+        if time.monotonic() < Unavailable.until:
+            Unavailable.refused += 1
             self.send_response(503)
             self.send_header("Content-Length", "0")
             self.end_headers()
@@ -316,7 +316,7 @@ class Away(http.server.BaseHTTPRequestHandler):
 
 
 def take_time():
-    """In a worker: its answers come slowly, so that it is in the middle when it dies."""
+    """Slow the queries of a worker down, so that it is killed during its work."""
     quick = Catalogue.distance
 
     def slow(*arguments, **options):
@@ -331,7 +331,7 @@ class Cluster(Case):
 
     @classmethod
     def setUpClass(cls):
-        main = sys.modules["__main__"]  # workers are not to run this file
+        main = sys.modules["__main__"]  # workers must not run this file
         cls.addClassCleanup(setattr, main, "__file__", main.__file__)
         main.__file__ = None
         dask.config.set({"distributed.worker.use-file-locking": False, "temporary-directory": os.getcwd()})
@@ -373,15 +373,15 @@ class Cluster(Case):
         self.assertEqual(sum(c["opened"] for c in after.values()), sum(max(1, c["opened"]) for c in before.values()))
 
     def test_a_server_is_away(self):
-        server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Away)
+        server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Unavailable)
         threading.Thread(target=server.serve_forever, daemon=True).start()
         self.addCleanup(server.server_close)
         self.addCleanup(server.shutdown)
         catalogue = Catalogue.of([f"http://127.0.0.1:{server.server_port}/scan.ebpo.h5"])
-        Away.until = None  # from now on might be over before a busy machine asks
+        Unavailable.until = None  # a fixed time could be over before a busy machine sends the first request
         results = ed.inside(catalogue, P, chunk=5000).compute()
         np.testing.assert_array_equal(results, model("scan").inside(P))
-        self.assertGreater(Away.refused, 0)
+        self.assertGreater(Unavailable.refused, 0)
 
     def test_to_file(self):
         ed.to_file(ed.inside(os.path.abspath("scan.ebpo.h5"), INPUT, chunk=1500), "of_cluster.npy")

@@ -42,8 +42,8 @@ class Painting(Case):
         with self.assertRaises(ebpo.FormatError):
             ebpo.Paint.open(b"no such file" * 50)
 
-    def test_two_that_change_one_file(self):
-        """Two that were opened and saved: the second is refused. In turns, all changes are there."""
+    def test_two_changes_of_one_file(self):
+        """Of two paints that are opened and saved at the same time, the second is refused. Changes in turn are kept."""
         m, paint = self.painted()
         paint.save("two.paint.h5")
         one, other = ebpo.Paint.open("two.paint.h5"), ebpo.Paint.open("two.paint.h5")

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Parts of files as arrays, several models, files that are made, other packages; docstrings and guide."""
+"""Tests parts of files as arrays, several models, conversion, other packages; docstrings and guide."""
 import ast
 import doctest
 import gc
@@ -21,8 +21,8 @@ MODULES = sorted(path.stem for path in PACKAGE.glob("*.py") if path.stem not in 
 
 
 class Parts(Case):
-    def test_volumes_are_of_what_the_rule_puts_inside(self):
-        """A box in a box, whose winding number is 2; and two boxes on each other."""
+    def test_volumes_follow_the_rule(self):
+        """A box in a box, where the winding number is 2, and two boxes that coincide."""
         def measured(boxes, rule):
             vertices = [[(low, high)[i >> k & 1] for k in range(3)] for low, high in boxes for i in range(8)]
             sides = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
@@ -180,7 +180,7 @@ class Parts(Case):
             ebpo.convert("open_box.ply", "never.ebpo.h5", require_solid=True)
         with self.assertRaises(TypeError):
             ebpo.convert("scan.ply", "never.ebpo.h5", nonsense=1)
-        with self.assertRaises(TypeError):  # of the theses' selections, which there are none of here
+        with self.assertRaises(TypeError):  # selections are not supported here
             ebpo.convert("scan.ply", "never.ebpo.h5", percent=5)
         for wrong in ({"rule": "none"}, {"codec": "none at all"}, {"parts": "mess"}, {"parts": ["-maps", "-mess"]},
                       {"parts": "-maps,mesh"}, {"parts": "maps,envelopes"}, {"parts": "mesh,colours"}, {"parts": ""}):
@@ -250,7 +250,7 @@ class Parts(Case):
             ebpo.open_scene("bad.scene.json")
 
     def test_other_packages(self):
-        """Those that are not installed are played by what takes the same arguments."""
+        """Packages that are not installed are replaced by objects that accept the same arguments."""
         m, taken = model("scan"), {}
 
         class Trimesh:
@@ -320,7 +320,7 @@ class Text(Case):
             ran += tried
         self.assertGreater(ran, 40 if EXTRAS else 20)
 
-    def test_all_is_described(self):
+    def test_everything_has_a_docstring(self):
         for name in ebpo.__all__:
             thing = getattr(ebpo, name)
             self.assertTrue(thing.__doc__, name)
@@ -330,12 +330,12 @@ class Text(Case):
                     self.assertIn("return", value.__annotations__, f"{name}.{key}")
 
     def test_python_3_9(self):
-        """Nothing that Python 3.9 cannot read."""
+        """The sources have only the syntax of Python 3.9."""
         for path in PACKAGE.glob("*.py"):
             ast.parse(path.read_text(), str(path), feature_version=(3, 9))
 
     def test_the_guide(self):
-        """Its code is Python, and what it names is there."""
+        """The guide's examples are valid Python, and every name in it exists."""
         text = GUIDE.read_text()
         code = "\n".join(re.findall(r"```python\n(.*?)```", text, re.S))
         ast.parse(code)

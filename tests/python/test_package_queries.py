@@ -13,7 +13,7 @@ P = points(20_000)
 
 
 class Queries(Case):
-    def test_inside_is_the_commands(self):
+    def test_inside_equals_the_command(self):
         m = model("scan")
         expected = command_results("inside", "scan", P)
         located = m.locate(P)
@@ -23,7 +23,7 @@ class Queries(Case):
         np.testing.assert_array_equal(m.winding(P), expected["winding"])
         self.assertTrue(0 < m.inside(P).mean() < 1)
 
-    def test_distance_is_the_commands(self):
+    def test_distance_equals_the_command(self):
         d = model("scan").distance(P[:4000])
         expected = command_results("distance", "scan", P[:4000])
         np.testing.assert_array_equal(d.distance, expected["distance"])
@@ -31,7 +31,7 @@ class Queries(Case):
         np.testing.assert_array_equal(d.normal, expected["normal"])
         np.testing.assert_array_equal(d.face, expected["face"].astype(np.int64))
 
-    def test_rays_are_the_commands(self):
+    def test_rays_equal_the_command(self):
         m, direction = model("scan"), points(4000, seed=2)
         origin = 3 * points(4000, seed=3)
         expected = command_results("ray", "scan", np.hstack([origin, direction]))
@@ -48,7 +48,7 @@ class Queries(Case):
         self.assertFalse(m.ray_any(origin, direction, t_max=hits.t * .999).any())
 
     def test_arrays_of_all_kinds(self):
-        """What is not contiguous doubles is converted block by block, to the same answers."""
+        """Arrays that are not contiguous doubles are converted block by block, with the same results."""
         m, single = model("scan"), P.astype(np.float32)
         wide = np.zeros((len(P), 5), np.float32)
         wide[:, 1:4] = single
@@ -95,10 +95,10 @@ class Queries(Case):
                 np.testing.assert_array_equal(got, m.inside(P))
 
     def test_the_lock_of_python_is_free(self):
-        """ctypes lets go of it around calls of a CDLL, and holds it around those of a PyDLL."""
+        """ctypes releases the lock around calls of a CDLL, and holds it around calls of a PyDLL."""
         self.assertTrue(isinstance(lib, ctypes.CDLL) and not isinstance(lib, ctypes.PyDLL))
 
-    def test_what_is_limited_holds_what_is_exact(self):
+    def test_limited_results_contain_exact_results(self):
         m = model("scan")
         exact = m.locate(P)
         for limited in (m.locate(P, level=2), m.locate(P[:2000], deadline=1e-9)):
@@ -165,7 +165,7 @@ class Queries(Case):
             m.distance(P, progress=lambda stage, done, total: done < 5000)
         with self.assertRaises(ZeroDivisionError):
             m.distance(P, progress=lambda *_: 1 / 0)
-        with self.assertRaises(ZeroDivisionError):  # through the library
+        with self.assertRaises(ZeroDivisionError):  # raised through the library
             m.level(2, progress=lambda *_: 1 / 0)
         np.testing.assert_array_equal(m.inside(P), model("scan").inside(P))
 

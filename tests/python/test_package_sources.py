@@ -33,16 +33,16 @@ class Ranges:
 
 
 class Server(http.server.BaseHTTPRequestHandler):
-    """Ranges of one file; what `fail` holds comes before."""
+    """A server of ranges of one file. It first returns the status codes in `fail`."""
     data, etag, fail, protocol_version = b"", '"1"', [], "HTTP/1.1"
-    keys: list = []  # of requests for the file: the header X-Key
-    silent = False  # about ranges
-    later = ""  # Retry-After
-    cut = 0  # answers that end before their time
-    cap = 1 << 30  # bytes of an answer
-    plain = False  # no ranges
-    count, max_at_once, now = 0, 0, 0  # requests
-    pause = .005  # seconds that each takes
+    keys: list = []  # the header X-Key of each request for the file
+    silent = False  # omits the header Content-Range
+    later = ""  # value of Retry-After
+    cut = 0  # number of responses that end too early
+    cap = 1 << 30  # most bytes of a response
+    plain = False  # True: does not support ranges
+    count, max_at_once, now = 0, 0, 0  # requests: all, most at a time, current
+    pause = .005  # seconds for each request
     lock = threading.Lock()
     connections, kind = 0, "application/octet-stream"
 
@@ -197,7 +197,7 @@ class Sources(Case):
         url = f"{self.serve(data)}/scan.ebpo.h5?key=secret"
         self.same(ebpo.open(url, headers={"X-Key": "1"}, retries=2).locate(P), ebpo.open(data).locate(P))
 
-        # where the library has no HTTP, Python's is taken
+        # Python's HTTP is used when the library has none.
         Server.fail = [503, 500]
         web = sources.Web(url)
         self.assertEqual((web.size, web.read_range(100, web.size - 200)), (len(data), data[100:-100]))
@@ -211,7 +211,7 @@ class Sources(Case):
             sources.Web(url)
 
     def test_patience(self):
-        """Servers that are away for a while are waited for, as long as they say and as is allowed."""
+        """Requests to an unavailable server are repeated, after the delay that it requests, within the limits."""
         url = f"{self.serve()}/scan.ebpo.h5?key=secret"
         self.addCleanup(setattr, Server, "later", "")
         self.addCleanup(Server.fail.clear)
@@ -221,7 +221,7 @@ class Sources(Case):
         Server.fail[:] = [503] * 5
         self.assertEqual(sources.Web(url).size, len(self.data))
         Server.cut = 2
-        self.assertEqual(sources.Web(url).size, len(self.data), "short bodies are asked for again")
+        self.assertEqual(sources.Web(url).size, len(self.data), "short bodies are requested again")
         Server.fail[:] = [503] * 5
         with self.assertRaisesRegex(OSError, "no response after 4 requests.*503.* 3 retries") as caught:
             sources.Web(url, retries=3)
@@ -236,7 +236,7 @@ class Sources(Case):
         begin = time.monotonic()
         sources.Web(url)
         self.assertGreaterEqual(time.monotonic() - begin, 1)
-        for _ in range(20):  # doubling, and never together
+        for _ in range(20):  # pauses double, and differ between clients
             patience = Patience(1e9, None, "it")
             patience.FIRST, patience.failures = 0.001, 3
             begin = time.monotonic()
@@ -248,21 +248,21 @@ class Sources(Case):
 
 
     def changed(self, **server):
-        """The server is so for this test."""
+        """Set members of Server for this test."""
         for name, value in server.items():
             self.addCleanup(setattr, Server, name, getattr(Server, name))
             setattr(Server, name, value)
 
     def by_web(self, url, **http):
-        """A model by Python's own HTTP, as where the library has none."""
+        """Open a model with Python's own HTTP, as when the library has none."""
         self.assertTrue(sources.has_http())
         with unittest.mock.patch.object(sources, "has_http", return_value=False):
             return ebpo.open(url, **http)
 
     def test_web_reads_parts(self):
-        """Only what a question needs is read, joined and several ranges at a time, as by the library."""
+        """Only the bytes that a query needs are read, joined and several ranges at a time, as in the library."""
         url = f"{self.serve(large())}/large.ebpo.h5"
-        self.changed(count=0, max_at_once=0, pause=.1)  # long enough for a busy machine to send several
+        self.changed(count=0, max_at_once=0, pause=.1)  # long enough for a busy machine to send several requests
         library = ebpo.open(url)
         expected = library.distance(P), library.inside(P[0])
         counts = []
@@ -284,7 +284,7 @@ class Sources(Case):
         for at in range(200_000, 201_000, 100):
             self.assertEqual(web.read_range(at, 1000), large()[at:at + 1000])
         self.assertEqual(Server.connections, 1)
-        time.sleep(.6)  # the server closes it
+        time.sleep(.6)  # the server closes idle connections
         self.assertEqual(web.read_range(200_000, 1000), large()[200_000:201_000])
         Server.cut = 1
         self.assertEqual(web.read_range(200_000, 1000), large()[200_000:201_000])
@@ -322,7 +322,7 @@ class Sources(Case):
                 sources.Web(url, headers=bad)
 
     def test_time_limit(self):
-        """Every answer without an end is an IOFailure after `time_limit`, and no other exception."""
+        """Every endless response raises IOFailure after `time_limit`, and no other exception."""
         good = b"HTTP/1.1 206 OK\r\nContent-Range: bytes 0-9/10\r\n"
         cases = {"trickle": (good + b"Content-Length: 10\r\n\r\n", b"0", .5),
                  "trailers": (good + b"Transfer-Encoding: chunked\r\n\r\na\r\n0123456789\r\n0\r\n", b"X: y\r\n", 0),
@@ -354,7 +354,7 @@ class Sources(Case):
             try:
                 web = sources.Web(f"http://127.0.0.1:{listening.getsockname()[1]}/x", time_limit=1.0, retries=3,
                                   unversioned=True)
-                self.assertEqual((name, web.size), ("a longer body", 10))  # its end is known
+                self.assertEqual((name, web.size), ("a longer body", 10))  # Content-Length states its end
             except ebpo.IOFailure:
                 pass
             took[name] = time.monotonic() - began
@@ -369,7 +369,7 @@ class Sources(Case):
         self.assertLess(max(took.values()), 10, took)
 
     def test_npy_shapes(self):
-        """A .npy whose shape is negative, huge or overflows is refused, as points and as numbers of faces."""
+        """A .npy whose shape is negative, huge or overflows is refused, as points and as face indices."""
         from ebpo.catalogue import Catalogue
         from ebpo.open_models import process_models
         from ebpo.point_files import PointFile
@@ -400,7 +400,7 @@ class Sources(Case):
             PointFile.at("x.npy").read(0, 2)
 
     def test_ranges_ahead(self):
-        """Announced ranges are joined, fetched several at a time, and held within the memory."""
+        """Ranges of prefetch hints are joined, fetched several at a time, and kept within the memory."""
         data = np.random.default_rng(1).bytes(3 << 20)
         requested, gate = [], threading.Event()
 
@@ -421,12 +421,12 @@ class Sources(Case):
         self.assertEqual(sorted(requested[1:]), [(1 << 18, 3000), (300_000, 2000), (1 << 20, 5000)], "three at a time, joined")
         gate.set()
         self.assertEqual(far.read_range(300_500, 100), data[300_500:300_600])
-        self.assertEqual(len(requested), 4, "what has come is not asked for again")
+        self.assertEqual(len(requested), 4, "received bytes are not requested again")
         far.prefetch([(begin, 100_000) for begin in range(1 << 18, 2 << 20, 120_000)])
         for begin in range(1 << 18, 2 << 20, 120_000):
             self.assertEqual(far.read_range(begin, 100_000), data[begin:begin + 100_000])
             self.assertLessEqual(far.held, (1 << 20) + 100_000)
-        self.assertEqual(far.read_range(0, len(data)), data, "more than the memory, while it is read")
+        self.assertEqual(far.read_range(0, len(data)), data, "more than the memory while it is read")
         self.assertLessEqual(far.held, 1 << 20)
         threads = [threading.Thread(target=lambda: [self.assertEqual(far.read_range(b, 999), data[b:b + 999])
                                                     for b in range(1000, 3 << 20, 7777)]) for _ in range(4)]
@@ -436,7 +436,7 @@ class Sources(Case):
             thread.join()
 
     def test_ranges_without_threads(self):
-        """Where the system gives no thread, and in a process that was forked, a reader fetches by itself."""
+        """A reader fetches by itself when no thread can be started, and after a fork."""
         data = np.random.default_rng(1).bytes(1 << 20)
         for start in (RuntimeError, threading.Thread.start):
             far = Far(Ranges(data), len(data), memory=1 << 18)
@@ -465,14 +465,14 @@ class Sources(Case):
         far.prefetch([(1 << 18, 1000)])
         while fail:
             time.sleep(.01)
-        self.assertEqual(far.read_range(1 << 18, 1000), bytes(1000), "nobody waited for the one that failed")
+        self.assertEqual(far.read_range(1 << 18, 1000), bytes(1000), "no reader waited for the failed piece")
         fail.append(2)
         with self.assertRaises(KeyError):
             far.read_range(1 << 19, 1000)
         self.assertEqual(far.read_range(1 << 19, 1000), bytes(1000))
 
     def test_fsspec_files(self):
-        """File objects of fsspec are read around their cache, which reads ahead; others that are far by ranges."""
+        """File objects of fsspec are read without their cache, which reads ahead; other remote ones by ranges."""
         try:
             from fsspec.spec import AbstractBufferedFile
         except ImportError:
@@ -502,7 +502,7 @@ class Sources(Case):
             self.assertLess(sum(read), len(data) // 4)
 
     def test_local_files_are_held_in_parts(self):
-        """As in the command: one point loads no more than it needs, many all of the model; answers are equal."""
+        """One point loads only the subtrees that it needs; many load the whole model. Results are equal."""
         pathlib.Path("large.ebpo.h5").write_bytes(large())
         q, whole = points(20_000, 2), ebpo.open("large.ebpo.h5", memory="4G")
         m = ebpo.open("large.ebpo.h5")
@@ -510,7 +510,7 @@ class Sources(Case):
         self.assertEqual(m.stats["resident"], False, "one point")
         self.assertLess(m.stats["memory_peak"], whole.stats["memory"] / 2)
         self.same(m.distance(q)[:3], whole.distance(q)[:3])
-        self.assertTrue(m.stats["resident"], "so many that they need all of it")
+        self.assertTrue(m.stats["resident"], "enough points to need the whole model")
         q = q[:2000]
         for query in (lambda m: m.ray(q, q + .1), lambda m: m.ray_all(q, q + .1), lambda m: m.locate(q),
                     lambda m: m.faces_in_box([0, 0, 0], [.2, .2, 1])):
@@ -520,10 +520,10 @@ class Sources(Case):
                 np.testing.assert_array_equal(a, b)
         m = ebpo.open("large.ebpo.h5")
         ebpo.Collider(m, m)
-        self.assertTrue(m.stats["resident"], "what holds the model for long has all of it")
+        self.assertTrue(m.stats["resident"], "an object that keeps the model loads it whole")
 
     def test_parts_are_freed_before_all_is_loaded(self):
-        """The whole model and the parts that other threads ask are never in memory together."""
+        """The whole model and the subtrees that other threads query are never in memory together."""
         pathlib.Path("large.ebpo.h5").write_bytes(large())
         for hold, waits in ((lambda m: m._context(1, 1, "box"), True), (lambda m: m._context(), False)):
             m, alive = ebpo.open("large.ebpo.h5"), []
@@ -544,15 +544,15 @@ class Sources(Case):
             self.assertFalse(other.is_alive())
             self.assertEqual((alive, m.stats["resident"]), ([[False, False]], True) if waits else ([], False))
         m = ebpo.open("large.ebpo.h5")
-        with m._context():  # as where a progress function asks the model that it reports of
+        with m._context():  # as when a progress function queries the model that it reports on
             m.distance(points(20_000, 2))
             self.assertFalse(m.stats["resident"])
         m.distance(points(20_000, 2), threads=4)
-        self.assertTrue(m.stats["resident"], "at a later question")
+        self.assertTrue(m.stats["resident"], "at a later query")
 
 
 def large():
-    """Bytes of a model of more than 2 MiB, made once."""
+    """Return the bytes of a model of more than 2 MiB, which is made once."""
     if not MADE:
         subprocess.run([GENERATE, "--base", "sphere", "--faces", "300000", "large.ply"], check=True, capture_output=True)
         subprocess.run([COMMAND, "convert", "-q", "large.ply", "large.ebpo.h5"], check=True)

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Tests the wheel in an environment with numpy only: test_wheel.py SOURCE_ROOT BUILD EBPO EBPO_INPUTS
 
-It is packed from the library of this build. Of what that library needs, only what the reading library of
-the real wheel needs goes in; the rest is the system's here. Exit code 77: pip, patchelf or binutils is missing.
+The wheel is packed from the library of this build. It contains only the libraries that the real wheel's library
+needs; the other libraries are the system's. Exit code 77: pip, patchelf or binutils is missing.
 """
 import base64
 import csv
@@ -24,7 +24,7 @@ import ebpo_wheel  # noqa: E402
 
 OTHERS = re.compile(r"^(?!lib(zstd|z|gmp|nettle|jansson)\.so)")
 
-# What manylinux lets a wheel take from the system, of what C and C++ need.
+# Libraries of the system that manylinux allows, for C and C++.
 ALLOWED = {"libc.so.6", "libm.so.6", "libpthread.so.0", "libdl.so.2", "librt.so.1", "libgcc_s.so.1", "libstdc++.so.6",
            "ld-linux-x86-64.so.2", "ld-linux-aarch64.so.1"}
 
@@ -42,7 +42,7 @@ mapped = open("/proc/self/maps").read()
 scenes = hasattr(ctypes.CDLL(ebpo.library()), "ebpo_scene_new")
 for name in ["zstd", "z", "gmp", "nettle"] + ["jansson"] * scenes:
     assert f"{here}/lib{name}-" in mapped, name
-print("asked")
+print("queried")
 """
 
 
@@ -54,12 +54,12 @@ def run(*words, **options):
 
 
 def check_record(path):
-    """Every file is listed with its digest and size, as pip wants it."""
+    """Check that RECORD lists every file with its digest and size, as pip requires."""
     with zipfile.ZipFile(path) as archive:
         names = archive.namelist()
         record = next(name for name in names if name.endswith("/RECORD"))
         rows = list(csv.reader(io.StringIO(archive.read(record).decode())))
-        assert [row[0] for row in rows] == names, "RECORD names what is there"
+        assert [row[0] for row in rows] == names, "RECORD lists the files of the wheel"
         for name, digest, size in rows:
             data = archive.read(name)
             expected = "sha256=" + base64.urlsafe_b64encode(hashlib.sha256(data).digest()).rstrip(b"=").decode()
@@ -70,7 +70,7 @@ def check_record(path):
 
 
 def check_platform(path, omitted):
-    """The tag names the newest glibc that a library in the wheel asks for; all else they need is in it."""
+    """Check that the tag names the newest required glibc, and that the wheel contains all other libraries."""
     with tempfile.TemporaryDirectory() as folder, zipfile.ZipFile(path) as archive:
         libraries = [name for name in archive.namelist() if ".so" in name]
         names = {os.path.basename(name) for name in libraries}
@@ -80,7 +80,7 @@ def check_platform(path, omitted):
             needed = set(re.findall(r"^ +NEEDED +(\S+)", printed, re.M))
             others = needed - names - ALLOWED
             assert not [other for other in others if not omitted.match(other)], (name, others)
-            assert re.findall(r"^ +R(?:UN)?PATH +(\S+)", printed, re.M) == ["$ORIGIN"], (name, "looks elsewhere")
+            assert re.findall(r"^ +R(?:UN)?PATH +(\S+)", printed, re.M) == ["$ORIGIN"], (name, "searches other folders")
             for version in re.findall(r"^ +0x\w+ 0x\w+ \d+ GLIBC_(\d+\.\d+)", printed, re.M):
                 newest = max(newest, tuple(map(int, version.split("."))))
             if " GLIBC_ABI_DT_RELR" in printed:
@@ -111,7 +111,7 @@ def main():
         nothing = {name: value for name, value in os.environ.items() if not name.startswith(("EBPO", "PYTHON", "LD_"))}
         print(run(python, "-c", ASK, env=dict(nothing, PATH="/usr/bin:/bin")), end="")
         run(sys.executable, "-m", "pip", "--python", python, "uninstall", "-y", "ebpo")
-        assert not list(pathlib.Path(name).glob("clean/lib/python*/site-packages/ebpo*")), "uninstall leaves nothing"
+        assert not list(pathlib.Path(name).glob("clean/lib/python*/site-packages/ebpo*")), "uninstall removes all files"
     return 0
 
 

@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""Counts functions and files of lib, tools and tests, and names those beyond the limits.
+"""Counts functions and files of lib, tools and tests, and lists those beyond the limits.
 
     tools/dev/layout_counts.py [--json] [FOLDER...]
 
-Public headers (folders named include) are not counted as files. Short .c files need a reason.
-Lines of a function: from its name to its closing brace, comments within included. Functions are
-found by ctags (universal-ctags) where it is installed, else by the form that .clang-format gives
-them: a brace in the first column opens one and closes it. Exit code 1: something is beyond.
+Public headers (in folders named include) are not counted as files. A short .c file needs a reason.
+The lines of a function are those from its name to its closing brace, with comments. ctags
+(universal-ctags) finds the functions if it is installed. Otherwise they are found by the layout of
+.clang-format: a brace in the first column opens and closes a function.
+Exit code 1: a function or file is beyond a limit.
 """
 import argparse
 import json
@@ -22,7 +23,7 @@ LONGEST_FUNCTION, LONGEST_FILE, SHORTEST_FILE = 60, 900, 60
 
 
 def by_ctags(paths):
-    """(path, name, first line, lines) of each function."""
+    """Yield (path, name, first line, lines) of each function, from ctags."""
     command = ["ctags", "--languages=C,C++", "--langmap=C:.c.h.inc,C++:.cpp.hpp", "--kinds-C=f",
                "--kinds-C++=f", "--fields=+ne", "--output-format=json", "-f", "-", "-L", "-"]
     out = subprocess.run(command, input="\n".join(map(str, paths)), capture_output=True, text=True,
@@ -34,7 +35,7 @@ def by_ctags(paths):
 
 
 def by_form(paths):
-    """The same without ctags."""
+    """Yield the same from the layout of the source, without ctags."""
     for path in paths:
         head = begin = None
         for number, line in enumerate((ROOT / path).read_text().splitlines(), 1):
