@@ -236,7 +236,7 @@ int ebpo_component_times(const ebpo_solid_shells *shells, uint32_t component, eb
     if (shells->shell_of[component] == EBPO_NO_INDEX)
         return 1;
     const ebpo_shell *one = &shells->nesting.shells[shells->shell_of[component]];
-    int sign = ebpo_shell_looks_inwards(&shells->nesting, one) ? -1 : 1;
+    int sign = ebpo_shell_faces_inwards(&shells->nesting, one) ? -1 : 1;
     return sign *
            (ebpo_rule_inside(rule, one->around + sign) - ebpo_rule_inside(rule, one->around));
 }
@@ -245,7 +245,7 @@ int ebpo_component_times(const ebpo_solid_shells *shells, uint32_t component, eb
 
 static void count_one(const ebpo_nesting *n, const ebpo_shell *one, ebpo_shells *made)
 {
-    bool inwards = ebpo_shell_looks_inwards(n, one), cavity = ebpo_shell_is_cavity(one);
+    bool inwards = ebpo_shell_faces_inwards(n, one), cavity = ebpo_shell_is_cavity(one);
     made->inside_out += inwards && !cavity;
     made->cavities += inwards && cavity;
     made->nested += !inwards && cavity;

@@ -1,8 +1,8 @@
 /* Reads whole parts of a file into memory: a level, the mesh, the maps to source indices, the mesh
  * in the source's order, and the whole tree. Levels and meshes are checked during reading, so that
- * callers may use every index in them. Threads decode chunks directly into the result, which may be
- * in a workspace on disk. The last part recomputes a file's checksums and compares them with the
- * stated ones. */
+ * every index in the result is valid. Threads decode chunks directly into the result, which may be
+ * in a workspace on disk. The last functions of this file recompute a file's checksums and compare
+ * them with the stated ones. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -19,8 +19,8 @@
 #include "format/write_plan.h"
 #include "hdf5_read/coding.h"
 
-/* Converts the skips in leaf_first to first faces; each leaf's new faces end before those of the
- * next one. */
+/* Converts the skips in leaf_first to first faces. A skip is the number of faces between the new
+ * faces of the previous leaf and those of this leaf. */
 static ebpo_status add_up_skips(const ebpo_file *file, int number, ebpo_level *level,
                                 ebpo_error *error)
 {
@@ -79,7 +79,8 @@ static ebpo_status decode_refs(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-/* Checks an index, except columns about parts that are omitted. */
+/* Compares an index array of the file with the sums `right`. Does nothing if the array is absent or
+ * needs one of the parts `without`. */
 static ebpo_status check_index(const ebpo_file *file, ebpo_array_id id, const ebpo_level *level,
                                int number, uint64_t without, const uint64_t *right,
                                ebpo_error *error)
@@ -101,7 +102,7 @@ static ebpo_status check_index(const ebpo_file *file, ebpo_array_id id, const eb
     return status;
 }
 
-/* Checks counts of references and converts skips. */
+/* Checks that the counts of references add up, and converts the skips. */
 static ebpo_status finish_lists(const ebpo_file *file, int number, ebpo_level *level,
                                 ebpo_error *error)
 {
@@ -117,7 +118,8 @@ static ebpo_status finish_lists(const ebpo_file *file, int number, ebpo_level *l
     return add_up_skips(file, number, level, error);
 }
 
-/* Decodes references; leaf_index states where each block of leaves begins. */
+/* Decodes references. The sums of leaf_index locate the references of each EBPO_INDEX_ROWS leaves,
+ * so several threads can decode them. */
 static ebpo_status finish_leaves(const ebpo_file *file, int number, ebpo_level *level,
                                  const ebpo_read_options *options, ebpo_error *error)
 {
@@ -125,8 +127,8 @@ static ebpo_status finish_leaves(const ebpo_file *file, int number, ebpo_level *
     ebpo_status status =
         index ? EBPO_OK : ebpo_fail_memory(error, level->leaf_count / EBPO_INDEX_ROWS * 24);
     if (status == EBPO_OK)
-        status =
-            check_index(file, EBPO_A_LEAF_INDEX, level, number, options->without, index, error);
+        status = check_index(file, EBPO_A_LEAF_INDEX, level, number, options->omitted_parts, index,
+                             error);
     if (status == EBPO_OK && level->leaf_refs) {
         refs_job j = { file, number, level, index };
         uint64_t blocks = (level->leaf_count - 1) / EBPO_INDEX_ROWS + 1;
@@ -157,7 +159,7 @@ static ebpo_status read_arrays(const ebpo_file *file, int number, ebpo_level *le
                                const ebpo_read_options *options, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    uint32_t needs = ebpo_schema_has(&file->info) & ~(uint32_t)options->without;
+    uint32_t needs = ebpo_schema_has(&file->info) & ~(uint32_t)options->omitted_parts;
     for (int id = 0; id < EBPO_LEVEL_ARRAYS && status == EBPO_OK; id++) {
         void *array;
         if (!ebpo_schema_is_held(id) || !(ebpo_schema[id].needs & needs))
@@ -192,17 +194,17 @@ ebpo_status ebpo_file_read_level(const ebpo_file *file, int level, const ebpo_re
                               info->level_count - 1);
     *out = ebpo_level_of_summary(info, level);
     out->workspace = read.workspace;
-    read.without &= info->parts;
-    expect_arrays(file, level, (uint32_t)read.without);
+    read.omitted_parts &= info->parts;
+    expect_arrays(file, level, (uint32_t)read.omitted_parts);
     status = read_arrays(file, level, out, &read, error);
     if (status == EBPO_OK && out->leaf_count)
         status = finish_leaves(file, level, out, &read, error);
     if (status == EBPO_OK)
-        status = check_indexes(file, level, out, read.without, error);
+        status = check_indexes(file, level, out, read.omitted_parts, error);
     if (status == EBPO_OK) {
         ebpo_check check = ebpo_reader_check(file, out->workspace);
         ebpo_info seen = *info;
-        seen.parts &= ~(uint32_t)read.without;
+        seen.parts &= ~(uint32_t)read.omitted_parts;
         status = ebpo_check_level(&check, &seen, level, out, error);
     }
     if (status != EBPO_OK)
@@ -235,7 +237,7 @@ typedef struct mesh_job {
     const ebpo_file *file;
     ebpo_mesh *mesh;
     uint64_t *faces_index; /* NULL: a single chunk */
-    uint64_t seen;         /* for the last chunk */
+    uint64_t seen;
 } mesh_job;
 
 static ebpo_status take_vertices(void *context, const ebpo_array_in *array, uint64_t chunk,
@@ -447,7 +449,7 @@ ebpo_status ebpo_file_read_tree(const ebpo_file *file, const ebpo_read_options *
     ebpo_status status = EBPO_TAKE(ebpo_read_options, &read, options, error);
     if (status != EBPO_OK)
         return status;
-    if (read.without)
+    if (read.omitted_parts)
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, file->in.shown,
                               "a tree is always read as a whole; set `without` of the read "
                               "options to 0, or read levels");
@@ -461,13 +463,13 @@ ebpo_status ebpo_file_read_tree(const ebpo_file *file, const ebpo_read_options *
     return status;
 }
 
-/* Computes the rank of each item by source index (distinct, below limit). The caller frees *place.
- * Uses a bit for each possible index, as a head may state far more of them than the file has items:
- * pages without items stay empty. */
+/* Computes the rank of each item when items are sorted by source index. The indices are distinct
+ * and below `limit`. The caller frees *place. A header may state a limit far above the number of
+ * items, so the function uses one bit per possible index; memory pages without items stay empty. */
 static ebpo_status sort_by_source(ebpo_workspace *workspace, const uint32_t *source, uint64_t count,
                                   uint64_t limit, uint32_t **place, ebpo_error *error)
 {
-    enum { WORDS = 8 /* between two counts */ };
+    enum { WORDS = 8 /* words of 64 bits for each entry of `before` */ };
     uint64_t words = (limit <= UINT32_MAX ? limit : UINT64_C(1) << 32) / 64 + 1;
     uint64_t *bits = ebpo_alloc_zero(words, sizeof *bits);
     uint32_t *before = ebpo_alloc(words / WORDS + 1, sizeof *before),
@@ -531,7 +533,7 @@ static ebpo_status reorder_faces(ebpo_mesh *mesh, const uint32_t *vertex_place,
     return EBPO_OK;
 }
 
-/* rows[place[i]] = i */
+/* Moves row i of the attributes of an element to row place[i]. */
 static ebpo_status reorder_attributes(ebpo_mesh *mesh, const char *element, const uint32_t *place,
                                       uint64_t count, ebpo_error *error)
 {
@@ -591,7 +593,7 @@ ebpo_status ebpo_file_read_source_mesh(const ebpo_file *file, const ebpo_read_op
     if (status == EBPO_OK && maps)
         status = to_source_order(file, out, &read, error);
     if (status == EBPO_OK && (!maps || file->info.repair_record.welded_vertices))
-        ebpo_attributes_drop_others(out->attributes); /* vertex indices are those of the source */
+        ebpo_attributes_drop_others(out->attributes); /* they refer to vertices by source indices */
     if (source_order)
         *source_order = status == EBPO_OK && maps;
     if (status != EBPO_OK)
@@ -599,9 +601,9 @@ ebpo_status ebpo_file_read_source_mesh(const ebpo_file *file, const ebpo_read_op
     return status;
 }
 
-/* --- recomputing checksums --- */
+/* --- recomputing checksums: a thread takes a whole array, as its chunks must come in order --- */
 
-/* Threads take whole arrays, which are independent; chunks within an array must come in order. */
+/* Digest of one array. */
 typedef struct taking {
     const ebpo_info *info;
     ebpo_array_digest digest;
@@ -667,7 +669,7 @@ ebpo_status ebpo_file_check_content(const ebpo_file *file, const ebpo_read_optio
         return status;
     content_job j = { .file = file, .alone = read };
     j.alone.threads = 1;
-    /* remote: in file order; otherwise the largest first */
+    /* arrays of a remote file in file order; otherwise the largest arrays first */
     bool far = ebpo_input_expects(&file->in);
     for (int id = EBPO_ARRAYS - 1; id >= EBPO_LEVEL_ARRAYS; id--)
         if (file->root_array[id].present && ebpo_content_has(&file->info, (ebpo_array_id)id))

@@ -422,7 +422,7 @@ ebpo_status ebpo_stream_next_level(ebpo_stream *s, ebpo_stream_level *out, bool 
     ebpo_level *level = &s->kept[next];
     uint64_t parents = next ? s->kept[next - 1].gray_count : 1;
     ebpo_read_options read = ebpo_read_threads(s->options.threads);
-    read.without = EBPO_PART_MESH;
+    read.omitted_parts = EBPO_PART_MESH;
     ebpo_status status = ebpo_file_read_level(s->file, next, &read, level, error);
     if (status != EBPO_OK)
         return status;

@@ -569,7 +569,7 @@ ebpo_status ebpo_mesh_turn_shells(ebpo_mesh *mesh, uint32_t *closed, ebpo_repair
         return EBPO_OK;
     ebpo_status status = ebpo_nesting_find(&n, mesh, closed, 0, NULL, error);
     for (uint64_t i = 0; i < n.count && status == EBPO_OK; i++)
-        if (ebpo_shell_looks_inwards(&n, &n.shells[i]) != ebpo_shell_is_cavity(&n.shells[i]))
+        if (ebpo_shell_faces_inwards(&n, &n.shells[i]) != ebpo_shell_is_cavity(&n.shells[i]))
             turned += turn_shell(n.components, n.shells[i].component);
     ebpo_nesting_free(&n, mesh);
     if (record)

@@ -29,7 +29,7 @@ typedef struct ebpo_nesting {
     unsigned threads;
 } ebpo_nesting;
 
-static inline bool ebpo_shell_looks_inwards(const ebpo_nesting *n, const ebpo_shell *one)
+static inline bool ebpo_shell_faces_inwards(const ebpo_nesting *n, const ebpo_shell *one)
 {
     return n->components->list[one->component].volume < 0;
 }

@@ -25,7 +25,7 @@ ns = bench["ns"]
 check("quantiles ascend", 0 <= ns["p50"] <= ns["p99"] <= ns["p999"] <= ns["max"]
       and 0 < ns["mean"] <= ns["max"])
 check("as many points as counted", len(points) == wide * bench["count"])
-check("as many answers as points", sum(bench["answers"].values()) == bench["count"])
+check("as many results as points", sum(bench["results"].values()) == bench["count"])
 check("opening comes before the first answer",
       0 < bench["cold_open_seconds"] <= bench["cold_first_result_seconds"])
 check("bytes were read", 0 < bench["cold_bytes_read"]

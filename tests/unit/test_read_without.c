@@ -28,7 +28,7 @@ static ebpo_level read_level(const ebpo_file *file, int number, uint64_t without
     ebpo_read_options options = EBPO_READ_OPTIONS_INIT;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_level level;
-    options.without = without;
+    options.omitted_parts = without;
     ck_assert_msg(ebpo_file_read_level(file, number, &options, &level, &error) == EBPO_OK,
                   "level %d without %x: %s", number, (unsigned)without, error.message);
     return level;
@@ -61,7 +61,7 @@ static void trees_are_whole(const ebpo_file *file)
     ebpo_read_options options = EBPO_READ_OPTIONS_INIT;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_tree tree;
-    options.without = EBPO_PART_MESH;
+    options.omitted_parts = EBPO_PART_MESH;
     ck_assert(ebpo_file_read_tree(file, &options, &tree, &error) == EBPO_E_ARGUMENT);
     ck_assert(strstr(error.message, "without") != NULL);
     ck_assert(ebpo_file_repack(file, scratch("new.ebpo.h5"), &options, NULL, &error) ==

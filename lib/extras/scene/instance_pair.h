@@ -103,18 +103,18 @@ typedef struct ebpo_scene_evaluations {
 
 /* Begins evaluations. `tolerance`: that of the result; an evaluation uses a quarter of it, or the
  * limit of rounding. Free the collider, also on failure. */
-EBPO_MUST_USE ebpo_status ebpo_scene_evaluations_begin(ebpo_scene_evaluations *looks,
+EBPO_MUST_USE ebpo_status ebpo_scene_evaluations_begin(ebpo_scene_evaluations *evaluations,
                                                        const ebpo_scene *scene,
                                                        const ebpo_scene_pair *pair,
                                                        double tolerance, ebpo_error *error);
 
 /* Bounds the motion of the pair, as pair_motion does. */
-EBPO_MUST_USE ebpo_status ebpo_scene_evaluations_motion(const ebpo_scene_evaluations *looks,
+EBPO_MUST_USE ebpo_status ebpo_scene_evaluations_motion(const ebpo_scene_evaluations *evaluations,
                                                         double from, double to, double *out,
                                                         ebpo_error *error);
 
 /* Bounds the distance of the pair's faces at a time, including omitted faces. */
-EBPO_MUST_USE ebpo_status ebpo_scene_evaluate(ebpo_scene_evaluations *looks, double time,
+EBPO_MUST_USE ebpo_status ebpo_scene_evaluate(ebpo_scene_evaluations *evaluations, double time,
                                               double *lo, double *hi, ebpo_error *error);
 
 /* Returns true if `hi` is at most the tolerance above `lo`, in real numbers. */

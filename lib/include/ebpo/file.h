@@ -758,7 +758,7 @@ typedef struct ebpo_read_options {
      * NULL; their counts are set. For whole trees (ebpo_file_read_tree, ebpo_file_repack) it must
      * be 0, else EBPO_E_ARGUMENT.
      */
-    uint64_t without;
+    uint64_t omitted_parts;
 
     /*
      * 1: ebpo_file_read_mesh and ebpo_file_read_source_mesh also read attributes if the file has
@@ -885,7 +885,7 @@ EBPO_API void ebpo_attribute_values_free(ebpo_attribute_values *values);
 /*
  * Reads the whole file. Freed by ebpo_tree_free.
  *
- * EBPO_E_ARGUMENT: `without` is not 0.
+ * EBPO_E_ARGUMENT: `omitted_parts` is not 0.
  *
  * Threads: any.
  */

@@ -34,7 +34,7 @@ typedef enum ebpo_doubt {
      */
     EBPO_DOUBT_NO_VOLUME = 1 << 4,
 
-    /* The volume is negative: faces look inwards. */
+    /* The volume is negative: faces point inwards. */
     EBPO_DOUBT_INSIDE_OUT = 1 << 5
 } ebpo_doubt;
 

@@ -305,7 +305,7 @@ static void print_results(const values *v, const char *path, uint64_t count, con
 static void json_results(json *j, const values *v, const results *r)
 {
     int count = result_kinds(v);
-    json_object(j, "answers");
+    json_object(j, "results");
     for (int i = 0; i < count; i++)
         json_uint(j, v->query == BENCH_INSIDE ? inside_names[i] : other_names[i], r->answered[i]);
     json_end(j);

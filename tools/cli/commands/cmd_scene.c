@@ -223,7 +223,7 @@ typedef struct listing {
     const scene_values *v;
     const ebpo_scene *scene;
     json j;
-    uint64_t reached, open, looks, ways;
+    uint64_t reached, open, evaluations, approaches;
 } listing;
 
 static const char *name_of(const listing *l, uint64_t instance)
@@ -264,15 +264,15 @@ static void print_way(const listing *l, const ebpo_scene_approach_result *w)
     printf("%s\n", words_real(w->hi, hi));
 }
 
-static bool print_ways(void *user, const ebpo_scene_approach_result *ways, uint64_t count)
+static bool print_ways(void *user, const ebpo_scene_approach_result *approaches, uint64_t count)
 {
     listing *l = user;
-    l->ways += count;
+    l->approaches += count;
     for (uint64_t i = 0; i < count; i++) {
-        const ebpo_scene_approach_result *w = &ways[i];
+        const ebpo_scene_approach_result *w = &approaches[i];
         l->reached += w->reached > 0;
         l->open += w->reached < 0;
-        l->looks += w->evaluations;
+        l->evaluations += w->evaluations;
         if (l->v->json)
             way_json(l, w);
         else
@@ -313,13 +313,13 @@ static void print_least(const listing *l, const ebpo_scene_least *w, bool open)
 static bool print_leasts(void *user, const ebpo_scene_least *list, uint64_t count)
 {
     listing *l = user;
-    l->ways += count;
+    l->approaches += count;
     for (uint64_t i = 0; i < count; i++) {
         const ebpo_scene_least *w = &list[i];
         l->reached += w->lo <= w->clearance;
         bool open = is_open(l, w);
         l->open += open;
-        l->looks += w->evaluations;
+        l->evaluations += w->evaluations;
         if (l->v->json)
             least_json(l, w);
         else
@@ -354,9 +354,9 @@ static ebpo_status scene_approach(const scene_values *v, const char *path, ebpo_
         json_finish(&l.j);
     else if (!v->quiet)
         fprintf(stderr, "%s: %llu come near, %llu open; %llu evaluations; %.3g s\n",
-                words_plural((char[40]){ 0 }, 40, l.ways, "pair", "pairs"),
+                words_plural((char[40]){ 0 }, 40, l.approaches, "pair", "pairs"),
                 (unsigned long long)l.reached, (unsigned long long)l.open,
-                (unsigned long long)l.looks, progress_now() - begun);
+                (unsigned long long)l.evaluations, progress_now() - begun);
     return status;
 }
 

@@ -191,7 +191,7 @@ static int inspect_inputs(const query_shard *s, const query_job *job, char **fac
 static char *note_text(const char *facts, const struct stat *results)
 {
     char *text = NULL;
-    return asprintf(&text, "%sanswers: %" PRIu64 " bytes, of %" PRId64 ".%09ld\n", facts,
+    return asprintf(&text, "%sresults: %" PRIu64 " bytes, of %" PRId64 ".%09ld\n", facts,
                     (uint64_t)results->st_size, (int64_t)results->st_mtim.tv_sec,
                     (long)results->st_mtim.tv_nsec) < 0
                ? NULL

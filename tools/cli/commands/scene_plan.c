@@ -138,7 +138,7 @@ static void packed_json(pack *p, const ebpo_scene_packed *m)
     json_uint(&p->j, "source_bytes", m->source_bytes);
     json_uint(&p->j, "bytes_read", m->bytes_read);
     json_real(&p->j, "max_error", m->max_error);
-    json_bool(&p->j, "answers", m->complete);
+    json_bool(&p->j, "complete", m->complete);
     json_text(&p->j, "content_sha256", digest);
     json_text(&p->j, "subset_of", source);
     json_end(&p->j);

@@ -52,7 +52,7 @@ class ProbeResult(NamedTuple):
 
 
 def _vector(values: Any, count: int) -> Any:
-    got = doubles(values, "place")
+    got = doubles(values, "position")
     if got.shape != (count,):
         raise ValueError(f"expected {count} numbers, got an array of shape {got.shape}")
     return (ctypes.c_double * count)(*got)
@@ -63,7 +63,7 @@ def _number(face: int) -> int:
 
 
 class Haptic:
-    """A haptic object at the position `place`. One thread at a time.
+    """A haptic object at `position`. One thread at a time.
 
     The object is a ball of `radius`; with `points` (n, 3) a tool; with `probe` a probe, which faces do not
     stop. Other options are members of ebpo_haptic_options.
@@ -79,7 +79,7 @@ class Haptic:
     (True, False)
     """
 
-    def __init__(self, model: Any, place: Any, *, points: Any = None, probe: bool = False, **options: Any) -> None:
+    def __init__(self, model: Any, position: Any, *, points: Any = None, probe: bool = False, **options: Any) -> None:
         wanted = of_members(c.ebpo_haptic_options, options, points=None, point_count=0, kind=0)
         if points is not None:
             rows = doubles(points, "points")
@@ -88,7 +88,7 @@ class Haptic:
             wanted.points, wanted.point_count, wanted.kind = rows.ctypes.data, len(rows), 2
         elif probe:
             wanted.kind = 1
-        self._handle = Handle.made("ebpo_haptic_new", model.model, ctypes.byref(wanted), _vector(place, 3),
+        self._handle = Handle.made("ebpo_haptic_new", model.model, ctypes.byref(wanted), _vector(position, 3),
                                    free="ebpo_haptic_free", keep=(model.model,))
 
     def step(self, device: Any) -> HapticResult:
@@ -98,22 +98,22 @@ class Haptic:
         return HapticResult(np.array(r.proxy), np.array(r.force), np.zeros(3), np.array([0, 0, 0, 1.0]),
                             np.array(r.normal), r.depth, _number(r.face), r.flags)
 
-    def step_tool(self, place: Any, quaternion: Any) -> HapticResult:
+    def step_tool(self, position: Any, quaternion: Any) -> HapticResult:
         """Compute a haptic step of a tool at a pose. quaternion: x, y, z, w."""
         r = c.ebpo_haptic_tool_result()
-        lib.ebpo_haptic_step_tool(self._handle, _vector(place, 3), _vector(quaternion, 4), ctypes.byref(r))
+        lib.ebpo_haptic_step_tool(self._handle, _vector(position, 3), _vector(quaternion, 4), ctypes.byref(r))
         return HapticResult(np.array(r.proxy), np.array(r.force), np.array(r.torque), np.array(r.turn),
                             np.array(r.normal), r.depth, _number(r.face), r.flags)
 
-    def step_probe(self, place: Any) -> ProbeResult:
+    def step_probe(self, position: Any) -> ProbeResult:
         """Compute a haptic step of a probe at a position (3,)."""
         r = c.ebpo_haptic_probe_result()
-        lib.ebpo_haptic_step_probe(self._handle, _vector(place, 3), ctypes.byref(r))
+        lib.ebpo_haptic_step_probe(self._handle, _vector(position, 3), ctypes.byref(r))
         return ProbeResult(r.distance, r.lo, r.hi, np.array(r.normal), _number(r.face), r.where, r.flags)
 
-    def reset(self, place: Any) -> None:
+    def reset(self, position: Any) -> None:
         """Move the device and the proxy to another position, without contact."""
-        call("ebpo_haptic_reset", self._handle, _vector(place, 3))
+        call("ebpo_haptic_reset", self._handle, _vector(position, 3))
 
     def check(self) -> None:
         """Raise the error that stopped loading of faces, if any."""

@@ -613,8 +613,8 @@ class Model:
         rays = self._rays(origins, directions, t_max)
         parts, begins = [], [np.zeros(1, np.int64)]
 
-        def keep(begin: int, end: int, hits: Any, places: Any) -> None:
-            first = copied(places._obj.value, (end - begin + 1,), np.int64)
+        def keep(begin: int, end: int, hits: Any, offsets: Any) -> None:
+            first = copied(offsets._obj.value, (end - begin + 1,), np.int64)
             parts.append(copied(hits._obj.value, (int(first[-1]),), HIT))
             begins.append(first[1:] + begins[-1][-1])
 

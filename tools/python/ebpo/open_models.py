@@ -98,9 +98,9 @@ class OpenModels:
         Since the process started: opened, closed (models), bytes_read, reads, loads, hits, evicted (as in
         `Model.stats`). Current values: open (models), memory (bytes).
         """
-        counts, sums = made(c.ebpo_catalogue_models_stats), made(c.ebpo_model_stats)
-        lib.ebpo_catalogue_models_get_stats(self.models, ctypes.byref(counts), ctypes.byref(sums))
-        stats = {name: getattr(sums, name) for name in ("bytes_read", "reads", "loads", "hits", "evicted", "memory")}
+        counts, totals = made(c.ebpo_catalogue_models_stats), made(c.ebpo_model_stats)
+        lib.ebpo_catalogue_models_get_stats(self.models, ctypes.byref(counts), ctypes.byref(totals))
+        stats = {name: getattr(totals, name) for name in ("bytes_read", "reads", "loads", "hits", "evicted", "memory")}
         return dict(stats, opened=counts.opened, closed=counts.closed, open=counts.open)
 
     def clear(self) -> None:

@@ -208,12 +208,12 @@ class Paint:
         rows = doubles(input, "input")
         if rows.ndim != 2 or rows.shape[1] not in (4, 5):
             raise ValueError(f"input has the shape (n, 4) or (n, 5), not {rows.shape}")
-        way = np.zeros((len(rows), 5))
-        way[:, :rows.shape[1]] = rows
+        stroke = np.zeros((len(rows), 5))
+        stroke[:, :rows.shape[1]] = rows
         drawn = made(c.ebpo_paint_drawn)
         with Reporter(progress) as reported, model._context() as context:
             given = of_members(c.ebpo_paint_pen, pen, progress=reported)
-            call("ebpo_paint_draw", self._handle, context, way.ctypes.data, len(way), ctypes.byref(given),
+            call("ebpo_paint_draw", self._handle, context, stroke.ctypes.data, len(stroke), ctypes.byref(given),
                  ctypes.byref(drawn))
         return facts(drawn)
 

@@ -206,25 +206,25 @@ class Attributes(Mapping):
 
     def __init__(self, file: Handle, threads: int) -> None:
         self._file, self._threads = file, threads
-        self._places: dict[str, tuple[int, int]] = {}
+        self._columns: dict[str, tuple[int, int]] = {}
         number, facts = 0, made(c.ebpo_attribute_facts)
         while lib.ebpo_file_attribute(file, number, ctypes.byref(facts)):
             for column, name in enumerate(text(facts.names).split(" ")):
-                self._places.setdefault(f"{text(facts.element)}:{name}", (number, column))
+                self._columns.setdefault(f"{text(facts.element)}:{name}", (number, column))
             number += 1
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._places)
+        return iter(self._columns)
 
     def __len__(self) -> int:
-        return len(self._places)
+        return len(self._columns)
 
     def _find(self, name: str) -> tuple[int, int]:
-        found = [key for key in self._places if key == name or key.partition(":")[2] == name]
+        found = [key for key in self._columns if key == name or key.partition(":")[2] == name]
         if not found:
             raise KeyError(name)
         found.sort(key=lambda key: (not key.startswith("vertex:"), not key.startswith("face:")))
-        return self._places[name if name in self._places else found[0]]
+        return self._columns[name if name in self._columns else found[0]]
 
     def facts(self, name: str) -> dict[str, Any]:
         """Return element, names, type, row count and range of the array with an attribute. Reads no values."""

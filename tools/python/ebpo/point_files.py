@@ -155,12 +155,12 @@ def opened_hdf5(path: str) -> Any:
 def only_dataset(file: Any, path: str, columns: int) -> str:
     found: list[str] = []
 
-    def look(name: str, item: Any) -> None:
+    def visit(name: str, item: Any) -> None:
         if len(getattr(item, "shape", None) or ()) == 2 and item.shape[1] == columns \
                 and item.dtype.kind in "fiu" and not holds_codes(item):
             found.append(name)
 
-    file.visititems(look)
+    file.visititems(visit)
     if len(found) != 1:
         some = "; name one (dataset=): " + ", ".join(found[:4]) + ", ..." * (len(found) > 4) if found else ""
         raise FormatError(f"{path}: {len(found)} datasets have {columns} columns of numbers{some}", "EBPO_E_FORMAT",
