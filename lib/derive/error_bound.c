@@ -1,8 +1,8 @@
 /* Bounds the distance by which an envelope extends beyond the model. ebpo_bound_envelope is a
- * branch and bound over the pieces of fragments.c: each piece has an upper bound from the distance
- * of its centre and from its nearest face, and the largest distance found is the lower bound. The
- * second part decides for the nodes of a level if their envelopes are within max_error, on several
- * threads, and keeps its results for other limits. */
+ * branch and bound over the pieces of fragments.c: the upper bound of each piece is computed from
+ * the distance of its centre and from its nearest face, and the largest distance found is the lower
+ * bound. The second part decides for the nodes of a level if their envelopes are within max_error,
+ * on several threads, and keeps its results for other limits. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -75,9 +75,9 @@ static bool is_in_envelope(const ebpo_bounder *b, const double xi[3])
     return true;
 }
 
-/* Pieces extend a little beyond the envelope, and where it is sharp all of a piece may be outside.
- * So a point outside is pulled towards the middle until it is inside: its distance changes by at
- * most the length of the pull. */
+/* Moves a point outside the envelope towards the envelope's middle until it is inside. Pieces
+ * extend a little beyond the envelope, and where the envelope is sharp, all of a piece may be
+ * outside. The move changes the point's distance by at most the length of the move. */
 static void pull_in(const ebpo_bounder *b, const double xi[3], double out[3])
 {
     double share = 0;
@@ -130,7 +130,8 @@ static ebpo_status measure_fragment(ebpo_bounder *b, const ebpo_fragment *fragme
         fmin(fmin(fragment->upper, corner), fmax(0, l->distance + l->reach)) + 4 * b->frame.grain;
     if (l->upper <= b->target || (l->distance < 0 && corner <= -l->distance))
         return EBPO_OK;
-    /* The corner most likely to have the largest distance, moved off the rounded surface. */
+    /* Also query the corner most likely to have the largest distance, moved off the rounded
+     * surface. */
     double xi[3], d;
     for (int k = 0; k < 3; k++)
         xi[k] = fmin(fmax(fragment->p.vertex[farthest][k] +
@@ -265,15 +266,17 @@ ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound
     }
 }
 
-/* a node that needs more is refined: its children's envelopes are smaller and closer */
+/* maximum number of queries for a node; a node that needs more is refined, as its children's
+ * envelopes are smaller and closer */
 enum { QUERIES = 4096 };
 
-/* The least max_error that was found to be enough, the largest one that was not, and a certain
- * lower bound. A search for a larger max_error sends no more queries and accepts no more
- * (error_bound.h), so these predict its result. An upper bound from another search would not, as
- * this one might use up its queries just above it. */
+/* Results of earlier searches for a node, which predict results for other limits: a search for a
+ * larger max_error never needs more queries (error_bound.h). The upper bound of an earlier search
+ * predicts nothing, as a search for that limit might use up its queries before it gets there. */
 typedef struct memory {
-    double enough, failed, lo;
+    double enough; /* least max_error that was enough */
+    double failed; /* largest max_error that was not enough */
+    double lo;     /* a certain lower bound of the distance */
 } memory;
 
 struct ebpo_tolerance {
@@ -410,7 +413,8 @@ ebpo_status ebpo_tolerance_max(ebpo_tolerance *n, double *out, ebpo_error *error
     if (own.type == EBPO_LEAF || !n->planes)
         n->bounders[0].halves.count = 0;
     ebpo_status status = ebpo_bound_closely(&n->bounders[0], root, &goal, &found, error);
-    /* A separate search may need slightly more; with the root cell's diagonal none is needed. */
+    /* The search of judge_node may need a slightly larger limit. With the root cell's diagonal as
+     * the limit, it succeeds without queries. */
     ebpo_tolerance_node node = { root, true, false };
     double most = found.hi > 0 ? found.hi : DBL_MIN;
     *out = most;

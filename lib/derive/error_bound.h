@@ -26,25 +26,28 @@ EBPO_MUST_USE ebpo_status ebpo_bounder_make(ebpo_bounder *out, const ebpo_lod_mo
                                             ebpo_model *model, ebpo_error *error);
 void ebpo_bounder_free(ebpo_bounder *b);
 
-/* Bounds max d(x) over the envelope of `cell` and b->halves, including the envelope's inside. d is
- * the distance to the closed solid and to the faces, 0 inside. The search is a branch and bound
- * over convex pieces. d changes by no more than x moves (the signed distance has this property
- * within the solid, too). The distance to a single face is convex, so its largest value over a
- * piece is at a corner. Pieces follow the model's tree down to leaves; within these, they are cut
- * along the faces' planes, until each is inside or outside. The order and the cuts depend on the
+/* Bounds the maximum of d(x) over all points x of an envelope: the part of `cell` within b->halves.
+ * d is the distance to the closed solid and to the faces, 0 inside the solid.
+ *
+ * The search is a branch and bound over convex pieces of the envelope. When x moves, d changes by
+ * at most the length of the move (the signed distance has this property within the solid, too). The
+ * distance to a single face is convex, so its largest value over a piece is at a corner of the
+ * piece. Pieces follow the model's tree down to leaves. Within leaves, pieces are cut along the
+ * faces' planes, until each piece is inside or outside. The order and the cuts depend on the
  * envelope alone, so a larger `enough` never needs more queries. */
 EBPO_MUST_USE ebpo_status ebpo_bound_envelope(ebpo_bounder *b, ebpo_cell cell,
                                               const ebpo_bound_goal *goal, ebpo_reach_bound *out,
                                               ebpo_error *error);
 
-/* Bounds the distance for a `ratio`, from the known bounds in *out (0, INFINITY and 0 queries if
- * nothing is known). Each step uses half the upper bound, so that far places are found before close
- * ones are examined. When the queries are used up, the certain bounds are returned. */
+/* Improves the bounds in *out until their ratio is goal->ratio. On entry, *out has the known bounds
+ * (0, INFINITY and 0 queries if nothing is known). Each step searches with half the upper bound as
+ * `enough`, so that far places are found before close ones are examined. When the queries are used
+ * up, *out has the bounds that are certain by then. */
 EBPO_MUST_USE ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell,
                                              const ebpo_bound_goal *goal, ebpo_reach_bound *out,
                                              ebpo_error *error);
 
-/* --- which envelopes are close enough to the model; results are kept for other limits --- */
+/* --- decides which envelopes are close enough to the model; keeps results for other limits --- */
 
 typedef struct ebpo_tolerance ebpo_tolerance;
 
@@ -60,16 +63,17 @@ typedef struct ebpo_tolerance_node {
 EBPO_MUST_USE ebpo_status ebpo_tolerance_open(ebpo_tolerance **out, const ebpo_file *file,
                                               bool planes, unsigned threads, ebpo_progress progress,
                                               ebpo_error *error);
-void ebpo_tolerance_close(ebpo_tolerance *need);
+void ebpo_tolerance_close(ebpo_tolerance *tolerance);
 
-/* Sets node[i].enough if its envelope certainly extends at most max_error beyond the model. Then
- * `enough` is also set for every larger max_error. Results do not depend on earlier queries or on
- * threads.
- */
-EBPO_MUST_USE ebpo_status ebpo_tolerance_judge(ebpo_tolerance *need, ebpo_tolerance_node *nodes,
-                                               uint64_t count, double max_error, ebpo_error *error);
+/* Sets nodes[i].enough if the node's envelope certainly extends at most max_error beyond the model.
+ * If it is set for a max_error, it is also set for every larger max_error. Results do not depend on
+ * earlier calls or on threads. */
+EBPO_MUST_USE ebpo_status ebpo_tolerance_judge(ebpo_tolerance *tolerance,
+                                               ebpo_tolerance_node *nodes, uint64_t count,
+                                               double max_error, ebpo_error *error);
 
 /* Computes a max_error for which the root's envelope is close enough. */
-EBPO_MUST_USE ebpo_status ebpo_tolerance_max(ebpo_tolerance *need, double *out, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_tolerance_max(ebpo_tolerance *tolerance, double *out,
+                                             ebpo_error *error);
 
 #endif

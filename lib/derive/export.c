@@ -20,7 +20,7 @@
 #define WRITE_BY_ASSIMP NULL
 #endif
 
-/* In the order of ebpo_export_format. */
+/* Indexed by ebpo_export_format. */
 static const ebpo_export_row formats[] = {
     [EBPO_EXPORT_XDMF] = { .name = "xdmf",
                            .second_ending = ".h5",

@@ -40,8 +40,8 @@ typedef struct cursor {
 
 static cursor *cursor_of(struct aiFile *file) { return (cursor *)(void *)file->UserData; }
 
-/* Keeps the failure: assimp ignores the result of this callback. */
-static void note_failure(scene_file *target)
+/* Records a failure, as assimp ignores the results of these callbacks. */
+static void keep_failure(scene_file *target)
 {
     target->why = target->failed ? target->why : errno;
     target->failed = true;
@@ -52,7 +52,7 @@ static size_t write_bytes(struct aiFile *file, const char *from, size_t size, si
     cursor *c = cursor_of(file);
     size_t done = fwrite(from, size, count, c->stream);
     if (done != count && size)
-        note_failure(c->target);
+        keep_failure(c->target);
     return done;
 }
 
@@ -62,7 +62,7 @@ static size_t read_bytes(struct aiFile *file, char *to, size_t size, size_t coun
     return 0;
 }
 
-static size_t report_stream(struct aiFile *file)
+static size_t stream_position(struct aiFile *file)
 {
     off_t at = ftello(cursor_of(file)->stream);
     return at > 0 ? (size_t)at : 0;
@@ -77,9 +77,9 @@ static enum aiReturn seek_stream(struct aiFile *file, size_t offset, enum aiOrig
 
 static size_t file_size(struct aiFile *file)
 {
-    size_t at = report_stream(file), end;
+    size_t at = stream_position(file), end;
     (void)seek_stream(file, 0, aiOrigin_END);
-    end = report_stream(file);
+    end = stream_position(file);
     (void)seek_stream(file, at, aiOrigin_SET);
     return end;
 }
@@ -87,7 +87,7 @@ static size_t file_size(struct aiFile *file)
 static void flush_stream(struct aiFile *file)
 {
     if (fflush(cursor_of(file)->stream) != 0)
-        note_failure(cursor_of(file)->target);
+        keep_failure(cursor_of(file)->target);
 }
 
 static struct aiFile *open_file(struct aiFileIO *io, const char *name, const char *mode)
@@ -110,7 +110,7 @@ static struct aiFile *open_file(struct aiFileIO *io, const char *name, const cha
     }
     target->stream = stream;
     *c = (cursor){ target, stream };
-    *file = (struct aiFile){ read_bytes,  write_bytes,  report_stream,        file_size,
+    *file = (struct aiFile){ read_bytes,  write_bytes,  stream_position,      file_size,
                              seek_stream, flush_stream, (aiUserData)(void *)c };
     return file;
 }
@@ -128,8 +128,8 @@ static void scene_file_begin(scene_file *file, const char *path)
     *file = (scene_file){ .path = path, .publish = EBPO_PUBLISH_INIT };
 }
 
-/* Offers the file to assimp by the last part of its name; no other name exists for it. `io` points
- * into `file`. */
+/* Gives assimp access to the file under the last part of its path, and to no other file. `io`
+ * points to `file`. */
 static void scene_file_offer(scene_file *file, struct aiFileIO *io)
 {
     *io = (struct aiFileIO){ open_file, close_file, (aiUserData)(void *)file };
@@ -162,7 +162,7 @@ enum { PARTS_MAX = EBPO_LEVELS_MAX + 1 };
 /* assimp has one error text for the whole process. */
 static pthread_mutex_t assimp_mutex = PTHREAD_MUTEX_INITIALIZER;
 
-/* All that assimp borrows. It copies before it changes anything. */
+/* All data that assimp borrows. assimp copies data before changing them. */
 typedef struct scene {
     struct aiScene root;
     struct aiNode top, node[PARTS_MAX], *children[PARTS_MAX];
@@ -212,7 +212,7 @@ static ebpo_status add_colours(struct aiMesh *to, const ebpo_block *block, ebpo_
     return EBPO_OK;
 }
 
-/* Moves the triangles from the block. */
+/* Moves the triangles from the block to the scene. */
 static ebpo_status add_faces(struct aiMesh *to, ebpo_mesh *from, ebpo_error *error)
 {
     to->mNumFaces = (unsigned)from->face_count;

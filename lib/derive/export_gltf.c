@@ -30,7 +30,7 @@ enum {
 };
 
 typedef struct part {
-    ebpo_block block; /* its positions are in xyz only */
+    ebpo_block block; /* block.mesh has no positions, which are in xyz */
     float *xyz, low[3], high[3];
 } part;
 
@@ -43,8 +43,8 @@ typedef struct model {
 
 /* --- content --- */
 
-/* Far from zero a float32 has few digits left: then vertices are relative to the middle of the box,
- * which becomes the nodes' translation. */
+/* Far from zero, a float32 has few digits left. There, vertices are stored relative to the middle
+ * of the box, which becomes the nodes' translation. */
 static void choose_origin(model *m, const ebpo_info *info)
 {
     double size = 0, far = 0;
@@ -82,7 +82,7 @@ static uint64_t view_bytes(const part *p, int view)
                                    : 0;
 }
 
-/* Returns the number of a part's first accessor and first view. */
+/* Returns the index of a part's first accessor, which is also the index of its first view. */
 static int first_view(const model *m, int number)
 {
     int n = 0;
@@ -277,7 +277,7 @@ static void write_words(FILE *f, const void *words, uint64_t count)
     }
 }
 
-/* COLOR_0 is linear, and a mesh's colours are sRGB; 16 bits keep all of these distinct. */
+/* COLOR_0 is linear, but a mesh's colours are sRGB. With 16 bits, all 256 values stay distinct. */
 static void write_colours(FILE *f, const uint8_t *rgba, uint64_t count)
 {
     uint16_t linear[256];

@@ -1,7 +1,7 @@
 /* Functions that all export formats share. They read a block from the file: one level with its
- * nodes, or the mesh with its source's numbers; and colours. They make its columns for each node or
- * polygon, float32 coordinates for formats that need them, and the entries in the report. Limits of
- * formats are checked before anything is read where the counts are known. */
+ * nodes, or the mesh with its source's numbers, and the colours. They make the block's columns,
+ * float32 coordinates for formats that need them, and the entries in the report. Where the counts
+ * are known, limits of formats are checked before anything is read. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -24,7 +24,7 @@ const ebpo_column ebpo_columns[EBPO_COLUMNS] = {
     { "winding", EBPO_H5_I32 },     /* black: in the cell; leaf: at its lowest corner; else 0 */
     { "volume", EBPO_H5_F64 },      /* of the envelope; mesh 0 */
     { "source_face", EBPO_H5_I64 }, /* number in the source mesh; envelopes, or without maps: -1 */
-    { "lod", EBPO_H5_I32 },         /* its level of detail; mesh -1 */
+    { "lod", EBPO_H5_I32 },         /* level of detail of the block; mesh -1 */
 };
 
 int ebpo_block_count(const ebpo_export_options *o)
@@ -199,7 +199,7 @@ ebpo_status ebpo_mesh_floats(float **out, const ebpo_mesh *mesh, const double or
             free(xyz);
             *out = NULL;
             return ebpo_fail(error, EBPO_E_LIMIT,
-                             "a coordinate of %g is beyond what a float32 holds; export XDMF or "
+                             "a coordinate of %g exceeds the range of float32; export XDMF or "
                              "VTKHDF, or scale the model",
                              at);
         }
@@ -241,7 +241,7 @@ ebpo_status ebpo_export_check_glb(const char *path, uint64_t text, uint64_t bin,
     return ebpo_fail_file(
         error, EBPO_E_LIMIT, path,
         "would have %" PRIu64
-        " bytes or more, and a GLB file has less than 4 GiB; take gltf, or coarser levels",
+        " bytes or more, but a GLB file has less than 4 GiB; use gltf, or coarser levels",
         total);
 }
 

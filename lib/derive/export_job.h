@@ -1,5 +1,5 @@
-/* Declares what all export formats share: blocks (a level's envelopes, or the mesh; and colours),
- * the job of a writer, and the writers. */
+/* Declarations shared by all export formats: blocks (the envelopes of a level, or the mesh, with
+ * colours), the job of a writer, and the writers. */
 #ifndef EBPO_DERIVE_EXPORT_JOB_H
 #define EBPO_DERIVE_EXPORT_JOB_H
 
@@ -22,15 +22,17 @@ typedef struct ebpo_block {
 int ebpo_block_count(const ebpo_export_options *options);
 int ebpo_block_level(const ebpo_export_options *options, int i);
 
-/* Order of the mesh (`level` -1): the order of the file with the numbers of the source, or the
- * order of the source if the maps are present. */
-typedef enum ebpo_block_order { EBPO_FILE_ORDER, EBPO_SOURCE_ORDER } ebpo_block_order;
+/* Order of the mesh in its block (`level` -1). */
+typedef enum ebpo_block_order {
+    EBPO_FILE_ORDER,  /* order of the file; the block has the maps to the source, if present */
+    EBPO_SOURCE_ORDER /* order of the source, if the file has maps; the block has no maps */
+} ebpo_block_order;
 
 /* Frees a block, also after a failure. */
 void ebpo_block_free(ebpo_block *block);
 
-/* A column of numbers: one for each node; or one for each polygon, the number of its node; in the
- * mesh one for each triangle. */
+/* A column of values: one for each node of a level, or one for each polygon (the value of its
+ * node). In the mesh, one for each triangle. */
 typedef struct ebpo_column {
     const char *name;
     ebpo_h5_number number;
@@ -54,10 +56,10 @@ static inline uint32_t ebpo_polygon_corner(const uint32_t *triangle, unsigned i)
     return i < 2 ? triangle[i] : triangle[3 * (i - 2) + 2];
 }
 
-/* Returns the values, to be freed by the caller; NULL without memory. */
+/* Returns the values of a column, to be freed by the caller; NULL when out of memory. */
 void *ebpo_column_make(const ebpo_block *block, int column, bool polygons);
-/* Returns the numbers of the mesh's vertices in its source; levels: -1 each. I64, to be freed by
- * the caller; NULL without memory. */
+/* Returns the source's number of each vertex of the mesh as int64_t; -1 each for a level or without
+ * maps. To be freed by the caller; NULL when out of memory. */
 void *ebpo_column_of_vertices(const ebpo_block *block);
 
 /* --- jobs and formats --- */
@@ -68,8 +70,8 @@ typedef struct ebpo_export_job ebpo_export_job;
 typedef struct ebpo_export_row {
     const char *name;          /* also the default ending of its files */
     const char *second_ending; /* ending of a second file; NULL: the format has one file */
-    bool replaces_ending;      /* it replaces the ending of the first file's name; else it is
-                                * appended */
+    /* true: second_ending replaces the ending of the first file's name; false: it is appended */
+    bool replaces_ending;
     bool holds_vertex_colours, holds_face_colours;
     bool takes_colours; /* ebpo_export_options.vertex_colours */
     bool one_block;     /* a file holds a single level, or the mesh */
@@ -94,17 +96,17 @@ EBPO_MUST_USE ebpo_status ebpo_export_read_block(const ebpo_export_job *job, int
                                                  ebpo_error *error);
 
 /* These functions fail with EBPO_E_LIMIT for counts that a format cannot represent. GLB has sizes
- * of 32 bits; `text` and `bin` are the bytes of text and of numbers. For OBJ and STL, assimp
- * numbers corners in 32 bits. */
+ * of 32 bits; `text` and `bin` are the numbers of bytes of the JSON text and of the binary data.
+ * For OBJ and STL, assimp numbers corners in 32 bits. */
 enum { EBPO_GLB_HEADS = 28 };
 EBPO_MUST_USE ebpo_status ebpo_export_check_glb(const char *path, uint64_t text, uint64_t bin,
                                                 ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_export_check_scene(const char *path, uint64_t vertices,
                                                   uint64_t faces, ebpo_error *error);
 
-/* Returns vertices less the origin, [vertex_count][3] to be freed by the caller, NULL on failure
- * (EBPO_E_MEMORY; EBPO_E_LIMIT: a coordinate out of range for float32). *largest_change is raised
- * to the largest change of a coordinate. */
+/* Sets *out to the vertices minus the origin, as floats [vertex_count][3] to be freed by the
+ * caller; NULL on failure (EBPO_E_MEMORY; EBPO_E_LIMIT: a coordinate out of range for float32).
+ * Raises *largest_change to the largest rounding error of a coordinate. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_floats(float **out, const ebpo_mesh *mesh,
                                            const double origin[3], double *largest_change,
                                            ebpo_error *error);

@@ -22,7 +22,7 @@ enum {
     CELL_COUNT,
     CORNER_COUNT,
     SOURCE_VERTEX,
-    VERTEX_COLOURS, /* these two are made when a block has colours */
+    VERTEX_COLOURS, /* the two tables of colours are made when the first block has colours */
     FACE_COLOURS,
     FIRST_COLUMN,
     TABLES = FIRST_COLUMN + EBPO_COLUMNS
@@ -138,7 +138,7 @@ static ebpo_status append_cells(writer *w, const ebpo_block *block, uint64_t cel
     return status;
 }
 
-/* Appends white up to this number of rows, for blocks without colours. */
+/* Appends white rows, for blocks without colours, until the table has `rows` rows. */
 static ebpo_status pad_colours(writer *w, int table, uint64_t rows, ebpo_error *error)
 {
     uint8_t white[4 * 1024];
@@ -151,7 +151,8 @@ static ebpo_status pad_colours(writer *w, int table, uint64_t rows, ebpo_error *
     return status;
 }
 
-/* `all`: rows with this block. The table begins with the first block that has colours. */
+/* Appends a block's colours. `all`: number of rows including this block. The table is made for the
+ * first block that has colours. */
 static ebpo_status append_rgba(writer *w, int table, const uint8_t *rgba, uint64_t rows,
                                uint64_t all, ebpo_error *error)
 {

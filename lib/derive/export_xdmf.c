@@ -29,7 +29,8 @@ static void print_escaped(FILE *f, const char *s)
     }
 }
 
-/* Writes the array and names it in the text; NULL means that memory was short. */
+/* Writes the array to the HDF5 file and refers to it in the text; NULL means that memory was short.
+ */
 static ebpo_status put_array(writer *w, const ebpo_block *block, const char *name,
                              ebpo_h5_number number, uint32_t cols, const void *values,
                              uint64_t rows, ebpo_error *error)

@@ -3,8 +3,8 @@
  * near the cell's longest side, so that nothing overflows or underflows. Every cut keeps slightly
  * too much on both sides, so that the tolerances of ebpo_polytope_clip lose nothing. Pieces follow
  * the model's tree down to leaves and are then cut along the planes of faces, or halved, until each
- * is inside, outside, or small. The file also reads the trees: the one whose envelopes are
- * measured, and the whole model's, which determines the solid. */
+ * is inside, outside, or small. This file also reads the trees: the tree whose envelopes are
+ * measured, and the tree of the whole model, which determines the solid. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -94,7 +94,8 @@ double ebpo_cell_frame_distance(const ebpo_cell_frame *f, const double xi[3],
     return bounds.hi + f->grain;
 }
 
-/* Converts a triangle of the model to cell coordinates; returns a bound on their error. */
+/* Converts a triangle of the model to cell coordinates; returns a bound of the rounding error of a
+ * coordinate. */
 static double cell_frame_triangle(const ebpo_cell_frame *f, const double triangle[3][3],
                                   double out[3][3])
 {
@@ -124,14 +125,14 @@ void ebpo_extent_of(const ebpo_polytope *p, ebpo_extent *out)
 }
 
 /* Computes the part with x[axis] <= at (side 0) or >= at (side 1), plus a thin part of the other
- * side. Returns false if there is none, or it is thin. */
+ * side. Returns false if this part is empty or thin. */
 static bool cut_axis(const ebpo_polytope *p, int axis, int side, double at, ebpo_polytope *out)
 {
     double n[3] = { 0, 0, 0 };
     ebpo_extent e;
     ebpo_extent_of(p, &e);
-    /* Clipping fails where next to nothing would remain, and a box around a thin part extends far
-     * beyond it. So thin parts go with the thick ones. */
+    /* Clipping fails where almost nothing would remain, and a box around a thin part extends far
+     * beyond it. So a thin part stays with the thick part. */
     bool high_is_thin = e.max[axis] - at <= EBPO_CUT_THIN,
          low_is_thin = !high_is_thin && at - e.min[axis] <= EBPO_CUT_THIN;
     if (side ? high_is_thin : low_is_thin)
@@ -139,7 +140,7 @@ static bool cut_axis(const ebpo_polytope *p, int axis, int side, double at, ebpo
     ebpo_polytope_copy(out, p);
     n[axis] = side ? -1 : 1;
     if (!high_is_thin && !low_is_thin)
-        /* where it still fails, too much is kept */
+        /* where clipping still fails, the part stays too large */
         (void)ebpo_polytope_clip(out, n, (side ? -at : at) + EBPO_CUT_SLACK, CUT_TAG);
     return true;
 }
@@ -158,7 +159,7 @@ ebpo_status ebpo_tree_read_whole(ebpo_lod_model *out, const ebpo_file *file, uns
     if (!(info->parts & EBPO_PART_MESH))
         return ebpo_fail_file(error, EBPO_E_ABSENT, file->in.shown,
                               "error bounds are measured against the mesh, which the file does "
-                              "not have; use a file with it (`ebpo convert`)");
+                              "not have; use a file with its mesh (`ebpo convert`)");
     if (info->pruned)
         return ebpo_fail_file(error, EBPO_E_ABSENT, file->in.shown,
                               "is a subset, and error bounds are measured against the whole "
@@ -212,10 +213,10 @@ ebpo_status ebpo_tree_derive(const ebpo_lod_model *tree, const ebpo_node *leaf,
     return status;
 }
 
-/* most faces to cut along; with more, halving reduces them */
+/* maximum number of faces to cut along; a piece with more faces is halved */
 enum { CUT_FACES = 64 };
-/* a plane cuts a piece that extends this far to both sides; in cells, above what ebpo_polytope_clip
- * refuses */
+/* a plane cuts only a piece that extends this far, in cells, to both sides of the plane; this is
+ * more than the width that ebpo_polytope_clip refuses */
 static const double side_least = 2e-7;
 
 /* --- the stack --- */
@@ -251,8 +252,8 @@ static ebpo_status push_polytope(ebpo_bounder *b, ebpo_fragment_kind kind,
     return status;
 }
 
-/* Gives the piece those of `count` triangles that may intersect it; they may be at the beginning of
- * the stack of faces. */
+/* Gives a piece the faces that may intersect it. Copies these to the top of the stack of faces from
+ * `count` faces that begin at `first` in the same stack. */
 static ebpo_status give_faces(ebpo_bounder *b, ebpo_fragment *fragment, uint64_t first,
                               uint64_t count)
 {
@@ -264,11 +265,11 @@ static ebpo_status give_faces(ebpo_bounder *b, ebpo_fragment *fragment, uint64_t
     for (uint64_t i = first; i < first + count; i++) {
         double t[3][3],
             error = cell_frame_triangle(&b->frame, (const double(*)[3])b->faces[i], t) + 1e-9;
-        bool meets = true;
+        bool overlaps = true;
         for (int k = 0; k < 3; k++)
-            meets = meets && fmin(fmin(t[0][k], t[1][k]), t[2][k]) <= e.max[k] + error &&
-                    fmax(fmax(t[0][k], t[1][k]), t[2][k]) >= e.min[k] - error;
-        if (meets)
+            overlaps = overlaps && fmin(fmin(t[0][k], t[1][k]), t[2][k]) <= e.max[k] + error &&
+                       fmax(fmax(t[0][k], t[1][k]), t[2][k]) >= e.min[k] - error;
+        if (overlaps)
             memcpy(b->faces[b->face_count++], b->faces[i], sizeof *b->faces);
     }
     fragment->face_count = b->face_count - fragment->face_first;
@@ -293,7 +294,8 @@ ebpo_status ebpo_fragment_leaf_faces(ebpo_bounder *b, ebpo_fragment *fragment,
 
 /* --- cutting --- */
 
-/* Finds the cell faces of a cell `levels` below the node's, in cell coordinates. */
+/* Computes the bounds of a cell `levels` below the envelope's node, in the coordinates of that
+ * node's cell. */
 static void find_cell_faces(const ebpo_bounder *b, ebpo_cell cell, int levels, double low[3],
                             double high[3])
 {
@@ -305,10 +307,10 @@ static void find_cell_faces(const ebpo_bounder *b, ebpo_cell cell, int levels, d
     }
 }
 
-/* A piece extends up to EBPO_CUT_THIN, or the slack of a cut, beyond its cell, where a neighbour's
- * thin part went with it. That is measured in the node's cells: far below, it is not small compared
- * with the piece's cell. Bounds of the cell hold for the points beyond it, too, when their distance
- * to it is added. */
+/* Returns how far a piece extends beyond its cell: up to EBPO_CUT_THIN where a neighbour's thin
+ * part stayed with it, or the slack of a cut. Both are in units of the node's cell, so far below
+ * the node they are not small compared with the piece's cell. A bound for the cell plus this
+ * distance is a bound for the piece. */
 static double find_beyond(const ebpo_bounder *b, const ebpo_polytope *p, ebpo_cell cell, int levels)
 {
     double low[3], high[3], origin[3] = { 0, 0, 0 }, apart[3];
@@ -320,8 +322,9 @@ static double find_beyond(const ebpo_bounder *b, const ebpo_polytope *p, ebpo_ce
     return ebpo_cell_frame_apart(&b->frame, apart, origin);
 }
 
-/* Inside, except for thin parts of the neighbours: more than the slack, by which neighbours
- * overlap. */
+/* Bounds a piece in a black cell. The piece is inside the solid, except for thin parts of
+ * neighbouring cells that stayed with it. Parts within the slack are ignored, as the pieces of
+ * neighbours overlap by it. */
 static void bound_black(ebpo_bounder *b, const ebpo_polytope *p, ebpo_cell cell, int levels)
 {
     double low[3], high[3];
@@ -409,8 +412,8 @@ static bool find_plane(const ebpo_bounder *b, uint64_t face, double n[3], double
     double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]), edge = 0;
     for (int k = 0; k < 3; k++)
         edge += fabs(u[k]) + fabs(v[k]);
-    /* An error of a corner tilts the plane by about error * edge / length, over distances of a cell
-     * or an edge. */
+    /* An error of a corner tilts the plane by about error * edge / length. The tilt acts over the
+     * length of a cell or of an edge. */
     if (!(length > 0) || !(error * edge / length * (1 + edge) < 1e-9))
         return false;
     for (int k = 0; k < 3; k++)
@@ -419,7 +422,8 @@ static bool find_plane(const ebpo_bounder *b, uint64_t face, double n[3], double
     return true;
 }
 
-/* Pushes both halves along a plane, |n| = 1; not `done` when clipping fails. */
+/* Cuts a piece along a plane, |n| = 1, and pushes both parts. Sets *done to false when clipping
+ * fails. */
 static ebpo_status cut_along(ebpo_bounder *b, const ebpo_fragment *fragment,
                              ebpo_fragment_kind kind, const double n[3], double d, bool *done)
 {
@@ -436,8 +440,9 @@ static ebpo_status cut_along(ebpo_bounder *b, const ebpo_fragment *fragment,
     return status;
 }
 
-/* Over a face, its plane's distance is the face's: pieces of about its size are cut along the prism
- * above it, so that flat places need no small ones. */
+/* Cuts a piece of about the size of its nearest face along the sides of the prism above that face.
+ * Over the face, the distance to the face's plane is the distance to the face, so flat places need
+ * no small pieces. */
 static ebpo_status cut_prism(ebpo_bounder *b, const ebpo_fragment *fragment,
                              const ebpo_fragment_measure *l)
 {
@@ -481,10 +486,11 @@ static ebpo_status cut_prism(ebpo_bounder *b, const ebpo_fragment *fragment,
     return status != EBPO_OK || done ? status : cut_longest(b, fragment, EBPO_FRAGMENT_OUTSIDE);
 }
 
-/* No face passes through the piece, but some may through its outermost part: a segment from the
- * centre to a point behind one ends this far behind it. The same holds for the leaf's cell faces,
- * where the piece extends beyond them by more than cuts overlap: faces there are in the neighbour's
- * list, not in this one. */
+/* Returns a bound of the distance for a piece whose centre is inside the solid. Faces may cut only
+ * the outermost part of the piece. A segment from the centre to a point behind such a face ends at
+ * most this far behind the face. The same is true for the cell faces of the leaf, where the piece
+ * extends beyond them by more than the overlap of cuts: faces there are in the list of the
+ * neighbour, not of this leaf. */
 static double behind_faces(const ebpo_bounder *b, const ebpo_fragment *fragment,
                            const ebpo_fragment_measure *l)
 {
@@ -497,8 +503,8 @@ static double behind_faces(const ebpo_bounder *b, const ebpo_fragment *fragment,
             double other = side ? all.max[k] - high[k] : low[k] - all.min[k],
                    own = side ? high[k] - l->centre[k] : l->centre[k] - low[k];
             if (other > EBPO_CUT_SLACK && !(own > 0))
-                return INFINITY; /* the centre is beyond the cell face: only its own distance is
-                                  * known */
+                /* the centre is beyond the cell face: only the distance of the centre is known */
+                return INFINITY;
             if (other > EBPO_CUT_SLACK)
                 share = fmax(share, (other + 2e-9) / (other + 2e-9 + own));
         }
@@ -524,7 +530,7 @@ static bool is_flat(const ebpo_bounder *b)
     return fmin(fmin(b->frame.side[0], b->frame.side[1]), b->frame.side[2]) < 1e10 * b->frame.grain;
 }
 
-/* Cuts a piece within a leaf, with an inside and an outside. */
+/* Cuts a piece within a leaf of a solid, whose points are inside or outside. */
 static ebpo_status cut_leaf(ebpo_bounder *b, const ebpo_fragment *fragment,
                             const ebpo_fragment_measure *l)
 {
@@ -546,7 +552,7 @@ static ebpo_status cut_leaf(ebpo_bounder *b, const ebpo_fragment *fragment,
     }
     if (status != EBPO_OK || done)
         return status;
-    if (!known && is_flat(b)) /* sides cannot be distinguished: treat it as a surface */
+    if (!known && is_flat(b)) /* sides cannot be distinguished: the model is treated as a surface */
         return cut_prism(b, fragment, l);
     if (!known)
         return cut_longest(b, fragment, EBPO_FRAGMENT_LEAF);

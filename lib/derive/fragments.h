@@ -1,5 +1,5 @@
-/* Defines a node's cell in the model, with lengths in units of a power of two near the cell's
- * longest side. */
+/* Declarations of fragments.c: a node's cell with its unit of length, pieces of an envelope, the
+ * trees of a file, and the state of a search for an error bound. */
 #ifndef EBPO_DERIVE_FRAGMENTS_H
 #define EBPO_DERIVE_FRAGMENTS_H
 
@@ -10,42 +10,46 @@
 #include "geometry/polytope.h"
 #include "levels/lod.h"
 
+/* A node's cell in the model. The frame's unit of length is a power of two near the cell's longest
+ * side. */
 typedef struct ebpo_cell_frame {
     ebpo_cell cell;
     int exponent;                    /* the unit is 2^exponent in the model's unit */
     double factor[2];                /* 2^-exponent in two factors, as one may overflow */
     double low[3], high[3], size[3]; /* box of the cell, in the model's unit */
-    double side[3];                  /* sides of the cell, in our unit */
-    /* bound of the rounding of points and distances, in our unit */
+    double side[3];                  /* sides of the cell, in the frame's unit */
+    /* bound of the rounding error of points and distances, in the frame's unit */
     double grain;
 } ebpo_cell_frame;
 
 void ebpo_cell_frame_make(ebpo_cell_frame *out, const ebpo_box *box, ebpo_cell cell);
 
-/* Converts cell coordinates to the model's: rounded by less than the grain. */
+/* Converts cell coordinates to the model's coordinates, with a rounding error below the grain. */
 void ebpo_cell_frame_point(const ebpo_cell_frame *f, const double xi[3], double out[3]);
 
-/* Convert a length of the model to our unit, and back (rounded up). INFINITY stays. */
+/* Convert a length of the model to the frame's unit, and back (rounded up). INFINITY is not
+ * changed. */
 double ebpo_cell_frame_length(const ebpo_cell_frame *f, double length);
 double ebpo_cell_frame_model_length(const ebpo_cell_frame *f, double length);
 
-/* Returns an upper bound of the distance of two points given in cell coordinates, in our unit. */
+/* Returns an upper bound of the distance of two points. Points are in cell coordinates, the
+ * distance is in the frame's unit. */
 double ebpo_cell_frame_apart(const ebpo_cell_frame *f, const double a[3], const double b[3]);
 
-/* Returns an upper bound of the distance of every point of the cell, or of one `levels` below, to a
- * face that is known to touch it or nearly so (format-spec, section 5). */
+/* A face that touches a cell, perhaps up to a rounding error (format-spec, section 5), is at most
+ * this far from every point of the cell. The cell is `levels` below the frame's cell. */
 double ebpo_cell_frame_diagonal(const ebpo_cell_frame *f, int levels);
 
-/* Returns an upper bound of the distance of a point (cell coordinates) to a triangle of the model,
- * in our unit. */
+/* Returns an upper bound of the distance of a point (in cell coordinates) to a triangle of the
+ * model, in the frame's unit. */
 double ebpo_cell_frame_distance(const ebpo_cell_frame *f, const double xi[3],
                                 const double triangle[3][3]);
 
-/* Pieces of an envelope: convex polytopes in the cell coordinates of the node, which together cover
- * it. Every cut keeps a little too much on both sides. */
+/* Pieces of an envelope are convex polytopes in the cell coordinates of the node. Together they
+ * cover the envelope. Every cut keeps a little too much on both sides. */
 
-/* Amount kept: more than the clipping's tolerance, for normals of Euclidean length 1/sqrt(3) and
- * up. */
+/* The amount that is kept too much: more than the tolerance of clipping, for normals of Euclidean
+ * length 1/sqrt(3) and up. */
 #define EBPO_CUT_SLACK 4e-10
 
 typedef struct ebpo_extent {
@@ -54,8 +58,8 @@ typedef struct ebpo_extent {
 
 void ebpo_extent_of(const ebpo_polytope *p, ebpo_extent *out);
 
-/* A part of at most this width goes with the other side; less than a quarter of the smallest piece
- * that is cut. */
+/* A part of at most this width stays with the part on the other side. The width is less than a
+ * quarter of the smallest piece that is cut. */
 #define EBPO_CUT_THIN 1.2e-7 /* ebpo_polytope_clip refuses 1e-7 */
 
 /* Two trees determine a bound: the tree whose envelopes are bounded, and the tree of the whole
@@ -69,12 +73,14 @@ EBPO_MUST_USE ebpo_status ebpo_tree_read_whole(ebpo_lod_model *out, const ebpo_f
 /* Finds the node of `cell`; returns false if there is none. */
 bool ebpo_tree_find(const ebpo_lod_model *tree, ebpo_cell cell, ebpo_node *out);
 
-/* Does the same, and returns the half-spaces of the node's ancestors in the cell's coordinates;
- * with `own`, also the half-spaces that the file stores for the node. */
+/* Finds the node like ebpo_tree_find, and returns the half-spaces of the node's ancestors in the
+ * coordinates of `cell`. With `own`, also returns the half-spaces that the file stores for the
+ * node. */
 bool ebpo_tree_bounds(const ebpo_lod_model *tree, ebpo_cell cell, bool own, ebpo_node *out,
                       ebpo_half_spaces *halves);
 
-/* Adds the half-spaces that ebpo_lod_level derives for a leaf of a file without stored ones. */
+/* Adds the half-spaces that ebpo_lod_level derives for a leaf of a file without stored leaf planes.
+ */
 EBPO_MUST_USE ebpo_status ebpo_tree_derive(const ebpo_lod_model *tree, const ebpo_node *leaf,
                                            ebpo_leaf_scratch *scratch, ebpo_half_spaces *halves,
                                            ebpo_error *error);
@@ -93,10 +99,14 @@ typedef struct ebpo_bounder {
     /* faces of pieces within leaves, in the model's unit: also a stack */
     double (*faces)[3][3];
     uint64_t face_capacity, face_count;
-    /* The current node: */
+    /* The search for the current node, with lengths in the frame's unit: */
     ebpo_cell_frame frame;
-    double target, quit, ratio, lo, hi, location[3];
-    double inner[3]; /* about the envelope's middle, in cell coordinates */
+    double target;      /* pieces with an upper bound of at most this are not examined further */
+    double quit;        /* the search stops once `lo` is larger */
+    double ratio;       /* `target` is at least `ratio` times `lo` */
+    double lo, hi;      /* bounds found so far */
+    double location[3]; /* point of the envelope at `lo`, in the model's coordinates */
+    double inner[3];    /* a point near the envelope's middle, in cell coordinates */
     uint64_t queries;
     ebpo_error *error;
 } ebpo_bounder;
@@ -116,9 +126,9 @@ typedef enum ebpo_fragment_kind {
 struct ebpo_fragment {
     ebpo_fragment_kind kind;
     double upper;
-    ebpo_node node; /* GRAY, LEAF */
-    int levels;     /* GRAY, LEAF: of the cell below the node's */
-    /* GRAY, LEAF: bound of the distance of the piece's points from that cell */
+    ebpo_node node; /* GRAY, LEAF: the node of the model's tree whose cell has the piece */
+    int levels;     /* GRAY, LEAF: the number of levels of `node` below the node of the envelope */
+    /* GRAY, LEAF: bound of the distance of the piece's points from the cell of `node` */
     double beyond;
     uint64_t face_first, face_count; /* LEAF */
     ebpo_polytope p;
@@ -129,10 +139,11 @@ typedef struct ebpo_fragment_measure {
     double centre[3], reach; /* all of the piece is within `reach` of the centre */
     double distance;         /* distance of the centre; negative inside */
     double upper;
-    double face[3][3]; /* the nearest one, in the model's unit */
+    double face[3][3]; /* the face nearest to the centre, in the model's unit */
 } ebpo_fragment_measure;
 
-/* The new piece is valid until the next call. Its polytope is not set. */
+/* Pushes a piece with the bounds of its parent. *out is valid until the next call; its polytope is
+ * not set. */
 EBPO_MUST_USE ebpo_status ebpo_fragment_push(ebpo_bounder *b, ebpo_fragment_kind kind,
                                              const ebpo_fragment *parent, ebpo_fragment **out);
 
@@ -140,7 +151,8 @@ EBPO_MUST_USE ebpo_status ebpo_fragment_push(ebpo_bounder *b, ebpo_fragment_kind
 EBPO_MUST_USE ebpo_status ebpo_fragment_leaf_faces(ebpo_bounder *b, ebpo_fragment *fragment,
                                                    const ebpo_node *leaf);
 
-/* Pushes the parts of a piece, which is no longer on the stack, or decides them. */
+/* Cuts a piece, which the caller has popped from the stack. Pushes its parts, or raises the bound
+ * by them if no further cut is needed. */
 EBPO_MUST_USE ebpo_status ebpo_fragment_cut(ebpo_bounder *b, const ebpo_fragment *fragment,
                                             const ebpo_fragment_measure *l);
 

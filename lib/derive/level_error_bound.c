@@ -1,9 +1,9 @@
 /* Measures the error of a level: bounds of the largest distance by which its envelopes extend
  * beyond the model, and the mean distance, from samples. A level's bounds are those of its nodes. A
- * short search for each node gives bounds that dismiss most of them; the others are searched in the
- * order of their upper bounds. Samples are points on the level's polygons, distributed by area, one
- * in each of equal parts of the area; a sample counts if a point slightly outside its polygon is in
- * no other envelope. */
+ * short search for each node gives bounds that dismiss most nodes; the other nodes are searched in
+ * the order of their upper bounds. Samples are points on the level's polygons. The area is divided
+ * into equal parts, with one sample in each. A sample counts if a point slightly outside its
+ * polygon is in no other envelope. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -38,7 +38,7 @@ typedef struct sampling {
     unsigned threads;
 } sampling;
 
-/* Returns the number of the stream at `place`. */
+/* Returns the random number at index `place` of the stream for `seed`, from 0 to 1. */
 static double random_unit(uint64_t seed, uint64_t place)
 {
     uint64_t number = seed * UINT64_C(0xd1342543de82ef95) + place + 1;
@@ -65,7 +65,7 @@ static double triangle_area(const sampling *s, uint64_t triangle)
 }
 
 /* Distributes one sample to each of `samples` equal parts of the area. */
-static void share_out(sampling *s)
+static void distribute_samples(sampling *s)
 {
     double total = 0, below = 0;
     uint64_t t = 0;
@@ -94,7 +94,7 @@ static uint64_t node_of_triangle(const sampling *s, uint64_t triangle)
     return low;
 }
 
-/* Returns the node with the octcode, or node_count. Nodes ascend. */
+/* Returns the node with the octcode, or node_count. Nodes are sorted by octcode. */
 static uint64_t find_node(const sampling *s, uint64_t octcode)
 {
     uint64_t low = 0, high = s->nodes.node_count;
@@ -161,7 +161,7 @@ static bool in_another(const sampling *s, uint64_t own, const double p[3])
     return false;
 }
 
-/* --- --- */
+/* --- samples --- */
 
 static ebpo_status measure_sample(sampling *s, uint64_t i, ebpo_context *context, ebpo_error *error)
 {
@@ -250,7 +250,7 @@ static ebpo_status error_bound_sample(ebpo_model *model, const ebpo_file *file, 
     if (status == EBPO_OK)
         status = reserve_space(&s, model, error);
     if (status == EBPO_OK && s.mesh.face_count) {
-        share_out(&s);
+        distribute_samples(&s);
         status = ebpo_parallel_for(s.threads, NULL, options->samples, 64, sample_some, &s,
                                    &options->progress, "sampling the level's surface", error);
         if (status == EBPO_OK)
@@ -269,7 +269,8 @@ static ebpo_status error_bound_sample(ebpo_model *model, const ebpo_file *file, 
 
 /* --- bounds --- */
 
-/* for each node: the rest is then in flat places, close to the model */
+/* QUERIES_MAX limits the queries for each node; only flat places close to the model are undecided
+ * then */
 enum { BLOCK_MAX = 512, QUERIES_MAX = 1 << 16 };
 
 typedef struct level_node {
@@ -391,8 +392,8 @@ static uint64_t count_queries(const survey *s)
     return sum;
 }
 
-/* A block is decided together, for any number of threads: the results of one block are known to the
- * next. */
+/* Searches the nodes block by block. All nodes of a block have the same goal, which depends only on
+ * the results of earlier blocks, so results do not depend on the number of threads. */
 static ebpo_status search_nodes(survey *s, const ebpo_error_bound_options *o, ebpo_error_bound *out)
 {
     uint64_t done = 0, block = 4, queries_done = count_queries(s);
@@ -425,7 +426,7 @@ static ebpo_status search_nodes(survey *s, const ebpo_error_bound_options *o, eb
     return status;
 }
 
-/* Applies the certain bound of a coarser level to its descendants. */
+/* Applies the certain bound of a coarser level to all nodes. */
 static void bound_by_coarser(survey *s, double at_most)
 {
     for (uint64_t i = 0; i < s->count && at_most > 0; i++) {
@@ -452,7 +453,7 @@ static ebpo_status bound_level(survey *s, const ebpo_error_bound_options *o, ebp
     free(s->order);
     s->order = NULL;
     s->count = 0;
-    s->first = 0; /* the end of the search in a finer level */
+    s->first = 0; /* may still be set by the search in a finer level */
     ebpo_status status = list_nodes(s, &tree, &root);
     if (status == EBPO_OK && !(s->order = ebpo_alloc(s->count, sizeof *s->order)))
         status = ebpo_fail_memory(s->error, s->count * sizeof *s->order);
@@ -476,10 +477,11 @@ static ebpo_status bound_level(survey *s, const ebpo_error_bound_options *o, ebp
     return status;
 }
 
-/* Envelopes nest, so no level has a larger error than the one before. Its search has other pieces
- * to cut and may be more precise. */
-static ebpo_status query_coarser(survey *s, const ebpo_error_bound_options *o,
-                                 ebpo_error_bound *out)
+/* Improves the upper bound by the bounds of coarser levels. Envelopes nest, so no level has a
+ * larger error than the coarser level before it. The search in the coarser level cuts other pieces
+ * and may be more precise. */
+static ebpo_status use_coarser_levels(survey *s, const ebpo_error_bound_options *o,
+                                      ebpo_error_bound *out)
 {
     ebpo_status status = EBPO_OK;
     while (s->spent && s->level > 0 && !(o->at_most > 0) && status == EBPO_OK) {
@@ -493,7 +495,7 @@ static ebpo_status query_coarser(survey *s, const ebpo_error_bound_options *o,
     return status;
 }
 
-/* --- --- */
+/* --- the call --- */
 
 static ebpo_status make_bounders(survey *s, ebpo_model *model)
 {
@@ -505,9 +507,9 @@ static ebpo_status make_bounders(survey *s, ebpo_model *model)
     return status;
 }
 
-/* Returns the difference that shows that the file is no subset of the model's, or NULL. Digests
- * cannot show it, as subsets of subsets name only the first file, or none when all nodes were kept.
- */
+/* Compares the file with the model's file. If the file cannot be a subset, returns the properties
+ * that differ, else NULL. Digests alone cannot decide this: a subset of a subset names only the
+ * first file, and a subset with all nodes names none. */
 static const char *find_difference(const ebpo_info *info, const ebpo_info *model)
 {
     if (memcmp(info->box_origin, model->box_origin, sizeof info->box_origin) != 0 ||
@@ -590,7 +592,7 @@ ebpo_status ebpo_level_error_bound(ebpo_model *model, const ebpo_file *file, int
     if (status == EBPO_OK)
         status = bound_level(&s, o, &found);
     if (status == EBPO_OK)
-        status = query_coarser(&s, o, &found);
+        status = use_coarser_levels(&s, o, &found);
     for (unsigned i = 0; s.bounders && i < s.threads; i++)
         ebpo_bounder_free(&s.bounders[i]);
     free(s.bounders);

@@ -1,8 +1,8 @@
 /* Computes the limit of convex envelopes: the volume of the convex hull of the solid in each cell
  * of a level. The extreme points of a hull are mesh vertices in the cell, corners where faces cut
- * the cell faces, and those corners of the cell that are inside. qhull computes the volumes; a
- * build without it reports EBPO_E_ABSENT. Volumes are kept for each node and added in that order.
- */
+ * the cell faces, and the corners of the cell that are inside. qhull computes the volumes; a build
+ * without qhull reports EBPO_E_ABSENT. Volumes are stored for each node and added in the order of
+ * the nodes, so that the number of threads does not change the sum. */
 #include "core/strict_fp.h"
 
 #include <ebpo/limit.h>
@@ -82,8 +82,8 @@ static double volume_by(hull *h, double *points, int count, char *command, bool 
     return volume > 0 ? volume : 0;
 }
 
-/* Returns the volume of the hull of `count` points [count][3], of the order of 1; 0 when they are
- * in a plane within rounding. */
+/* Returns the volume of the hull of points [count][3], whose coordinates are of the order of 1.
+ * Returns 0 when all points are in a plane, up to rounding. */
 static double hull_volume(hull *h, double *points, uint64_t count)
 {
     static char merged[] = "qhull Qt Pp", joggled[] = "qhull QJ Pp";
@@ -91,8 +91,8 @@ static double hull_volume(hull *h, double *points, uint64_t count)
     if (count < 4 || count > INT_MAX / 3)
         return 0;
     double volume = volume_by(h, points, (int)count, merged, &failed);
-    /* Thin hulls whose facets merge completely: with points moved by some 1e-11 they have a volume;
-     * flat ones then have almost none. */
+    /* qhull fails for thin hulls when all of their facets merge. When the points are moved by about
+     * 1e-11, thin hulls have a volume, and flat ones almost none. */
     return failed ? volume_by(h, points, (int)count, joggled, &failed) : volume;
 }
 
@@ -224,10 +224,10 @@ static bool take_faces(const job *j, scratch *s)
     return true;
 }
 
-/* --- its corners --- */
+/* --- a node's points --- */
 
-/* Returns the winding number at a node's lowest corner: for a gray node, that of the node in that
- * corner. */
+/* Returns the winding number at a node's lowest corner. For a gray node, this is the winding number
+ * of the descendant in that corner. */
 static int32_t lowest_winding(const job *j, ebpo_node node)
 {
     while (node.type == EBPO_GRAY)
@@ -357,7 +357,7 @@ ebpo_status ebpo_limit_level(const ebpo_file *file, int level, const ebpo_limit_
         status = ebpo_parallel_for(threads, NULL, j.node_count, 1, measure_hulls, &j,
                                    &requested.progress, "convex hulls", error);
     for (uint64_t i = 0; i < j.node_count && status == EBPO_OK; i++) {
-        /* not 0 times infinity */
+        /* avoids 0 times infinity */
         double volume = j.volume[i] > 0 ? j.volume[i] * cell_volume(&j, j.nodes[i].cell.level) : 0;
         found.volume += volume;
         found.gray_volume += j.nodes[i].type == EBPO_GRAY ? volume : 0;

@@ -1,11 +1,13 @@
 /* Makes subsets: a smaller file that contains selected levels, parts, a box, or the envelopes that
- * are close enough to the model. This file counts the bytes that a subset needs of its file, from
- * heads and tables alone. It resolves the options and cuts the tree, whose levels, faces and
- * volumes the other subset files cut. It searches for the smallest max_error whose file fits a
- * target size, and publishes the result. The size falls as max_error grows; coarse files are tried
- * first, as they are small and quick to make, and all trials share the bounds of envelopes. Trials
- * are written beside the output, and the best that fits is published, so that the published file is
- * the one that was measured. */
+ * are close enough to the model. This file
+ * - counts the bytes that a subset needs of its file, from headers and tables alone;
+ * - resolves the options and makes the subset's tree, with subset_levels.c and subset_faces.c;
+ * - searches for the smallest max_error whose file fits a target size;
+ * - publishes the result.
+ *
+ * The size falls as max_error grows. Coarse files are tried first, as they are small and quick to
+ * make, and all trials share the bounds of envelopes. Trials are written beside the output. The
+ * best trial that fits is published, so that the published file is the one that was measured. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -31,8 +33,9 @@ typedef struct counting {
     const ebpo_file *file;
     const ebpo_subset_options *options;
     ebpo_box box;
-    ebpo_chunks *top;   /* chunks that are read to find subtrees */
-    ebpo_chunks *below; /* a cache with nothing of the subtrees: everything counts */
+    ebpo_chunks *top; /* chunks that are read to find subtrees */
+    /* a cache without chunks of the subtrees, so that all of their chunks are counted */
+    ebpo_chunks *below;
     ebpo_hints expected;
     uint32_t needs;
     int last_level;
@@ -138,8 +141,8 @@ uint32_t ebpo_profile_parts(ebpo_profile profile)
            EBPO_PART_ATTRIBUTES | EBPO_PART_COLOURS;
 }
 
-/* Intersects the box with the root cell and with the box of an earlier subset, outside which the
- * file has nothing. */
+/* Checks that the box intersects the root cell and the box of an earlier subset, outside which the
+ * file has nothing. Sets the kept box. */
 static ebpo_status resolve_box(ebpo_cutting *c)
 {
     const ebpo_subset_options *o = c->options;
@@ -208,8 +211,8 @@ static ebpo_status resolve_options(ebpo_cutting *c)
     return resolve_box(c);
 }
 
-/* Gives prefetch hints for whole arrays, which are read without a box: a remote source then fetches
- * them in few requests. */
+/* Gives prefetch hints for whole arrays, which are read if there is no box. A remote source then
+ * fetches the arrays in few requests. */
 static void hint_cut(const ebpo_cutting *c)
 {
     ebpo_hints e = EBPO_HINTS_INIT(c->file);
@@ -289,7 +292,7 @@ ebpo_status ebpo_subset_tree(ebpo_tree *out, const ebpo_file *file,
     return status;
 }
 
-/* Returns options to write the subset: all parts of its tree. */
+/* Returns the options for writing the subset with all parts of its tree. */
 static ebpo_write_options subset_write_options(const ebpo_subset_options *options)
 {
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
@@ -304,22 +307,24 @@ static ebpo_write_options subset_write_options(const ebpo_subset_options *option
 
 /* --- subsets for a target size --- */
 
-/* below that share of the coarsest only the whole file is tried */
-static const double precision = 1.01, finest = 0x1p-40;
+/* the search ends when the two limits of max_error differ by this factor */
+static const double precision = 1.01;
+/* below this share of the coarsest max_error, only the whole file is tried */
+static const double finest = 0x1p-40;
 
 typedef struct fitting {
     const ebpo_file *file;
     ebpo_subset_options *options;
-    ebpo_publish trial, best; /* best: the finest that fits so far */
+    ebpo_publish trial, best; /* best: the finest trial that fits so far */
     ebpo_tolerance *need;
     double fits, too_large;          /* max_error */
-    uint64_t fit_bytes, large_bytes; /* and the sizes with these */
+    uint64_t fit_bytes, large_bytes; /* the sizes with these max_errors */
     ebpo_error *error;
 } fitting;
 
-/* Writes a trial file for a max_error and returns its size in *bytes. It becomes the best if it
- * fits, as each is finer than those that fitted before; *pruned: max_error has made a difference.
- */
+/* Writes a trial file for a max_error and returns its size in *bytes. A trial that fits becomes the
+ * best, as it is finer than the trials that fitted before. *pruned is set if max_error made a
+ * difference. */
 static ebpo_status try_error(fitting *f, double max_error, uint64_t *bytes, bool *pruned)
 {
     ebpo_tree tree;
@@ -347,8 +352,8 @@ static ebpo_status try_error(fitting *f, double max_error, uint64_t *bytes, bool
     return EBPO_OK;
 }
 
-/* Tries files from the coarsest on, until one is too large or nothing is pruned any more (*pruned
- * false). `too_large` stays 0 when none is. */
+/* Tries files from the coarsest on, until a file is too large or nothing is pruned any more
+ * (*pruned is false). `too_large` stays 0 when no file is too large. */
 static ebpo_status bracket_size(fitting *f, bool *pruned)
 {
     uint64_t bytes = 0;
@@ -375,9 +380,9 @@ static ebpo_status bracket_size(fitting *f, bool *pruned)
     return status;
 }
 
-/* Sizes change almost linearly from one end to the other, which are a factor of 2 apart. The guess
- * is halfway between the linear one and the middle, so that neither end stays for long. No
- * functions of libm, as the result is stored. */
+/* Sizes change almost linearly between the two ends, which are at most a factor of 2 apart. The
+ * guess is halfway between the linear guess and the middle, so that neither end stays for long.
+ * Functions of libm are not used, as their results differ and max_error is stored in the file. */
 static double next_guess(const fitting *f)
 {
     double share = .5;
@@ -415,7 +420,7 @@ static ebpo_status find_error(fitting *f)
     return status;
 }
 
-/* Tries the profiles of which the file has all parts, from the largest on. */
+/* Tries the profiles without pruning (max_error 0), from the largest on. */
 static ebpo_status choose_parts(fitting *f, bool *found)
 {
     static const ebpo_profile order[] = { EBPO_PROFILE_FULL, EBPO_PROFILE_COLLISION,

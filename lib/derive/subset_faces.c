@@ -1,8 +1,8 @@
 /* Cuts the faces, vertices, maps and attributes of a subset. Depth first through the remaining
- * leaves, faces and vertices get new numbers in the order of the specification. Arrays from old
- * numbers to new ones are as long as the source's mesh. Pages that are never written take no
- * memory, and faces that are close in space have close numbers. Source: format-spec/README.md,
- * section 5. */
+ * leaves, faces and vertices get new numbers in the order of the specification. Arrays that map old
+ * numbers to new ones are as long as the source's mesh. They take little memory for a small subset:
+ * pages that are never written take none, and faces that are close in space have close numbers.
+ * Source: format-spec/README.md, section 5. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -20,7 +20,7 @@ typedef struct numbering {
     uint32_t *number; /* [faces of the source] new number + 1; 0: none yet */
     uint32_t *old;    /* [count] old number of each new face */
     uint64_t count, capacity;
-    /* references */
+    /* for each level: index of the next group and leaf; references read and written so far */
     uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX], read[EBPO_LEVELS_MAX],
         written[EBPO_LEVELS_MAX];
     bool no_memory;
@@ -42,8 +42,9 @@ static int compare_numbers(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* References to faces whose first leaf is gone become new, in the order of their old numbers,
- * before the leaf's own. The others stay, in place. */
+/* Numbers the faces of a leaf. References to faces whose first leaf was removed become new faces of
+ * this leaf, in the order of their old numbers, before the leaf's own new faces. The other
+ * references stay references, renumbered in place. */
 static ebpo_status number_leaf(numbering *n, int level)
 {
     ebpo_level *l = &n->c->out->level[level];
@@ -116,7 +117,7 @@ static ebpo_status number_vertices(ebpo_cutting *c, vertices *v)
         mesh->faces[i] = v->number[vertex] - 1;
     }
     for (uint64_t i = 0; i < c->from->vertex_count && good && !c->out->info.pruned;
-         i++) /* vertices that no face uses belong to the whole */
+         i++) /* a file from which nothing was pruned keeps vertices that no face uses */
         if (v->number[i] == 0) {
             good = ebpo_grow(&v->old, &v->capacity, v->count + 1, sizeof *v->old);
             if (good)
@@ -125,8 +126,8 @@ static ebpo_status number_vertices(ebpo_cutting *c, vertices *v)
     return good ? EBPO_OK : ebpo_fail_memory(c->error, c->from->vertex_count * sizeof *v->number);
 }
 
-/* In a subset, attributes of other elements are omitted: they may refer to removed elements.
- * Textures stay. If nothing was pruned, everything is unchanged. */
+/* In a subset, attributes of elements other than vertices and faces are omitted, as they may refer
+ * to removed elements. Textures stay. If nothing was pruned, everything is unchanged. */
 static ebpo_status begin_attributes(ebpo_cutting *c)
 {
     ebpo_read_options read = ebpo_read_threads(c->options->threads);
@@ -200,7 +201,7 @@ static ebpo_status take_faces(ebpo_cutting *c, const numbering *n)
     return status == EBPO_OK ? take_vertices(c) : status;
 }
 
-/* Empty face lists are no part. */
+/* Removes the mesh with its maps and attributes, when no leaf lists a face. */
 static void drop_lists(ebpo_cutting *c)
 {
     c->parts &= ~(uint32_t)(EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES);

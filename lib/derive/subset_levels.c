@@ -1,9 +1,9 @@
 /* Cuts the levels of a subset: the nodes that remain, and their volumes. Levels are cut from the
  * root downwards; the level above determines the needed groups, so only these are read. Nodes with
- * omitted descendants become pruned nodes. All arrays of the table of arrays are copied node by
- * node for the remaining nodes; face numbers remain those of the source until subset_faces.c
- * renumbers them. With max_error, the envelopes of a level are evaluated together. Volumes are
- * computed as ebpo_lod_level cuts envelopes: leaves by stored planes or not at all. */
+ * omitted descendants become pruned nodes. All arrays of ebpo_schema are copied node by node for
+ * the remaining nodes; face numbers remain those of the source until subset_faces.c renumbers them.
+ * With max_error, the envelopes of a level are evaluated together. Volumes are those of envelopes
+ * that are cut as in ebpo_lod_level; leaves are cut by stored planes only. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -27,7 +27,7 @@ typedef struct kept_column {
     const uint8_t *from;
     uint8_t *to;
     uint8_t size;
-    int8_t standard; /* default for new nodes */
+    int8_t default_value; /* for new nodes */
 } kept_column;
 
 /* Counts of items for each node: u8, or u32. */
@@ -80,7 +80,7 @@ static void note_column(kept_nodes *kept, int id, int type)
         (kept_column){ .from = ebpo_level_array(kept->from, id),
                        .to = ebpo_level_array(kept->to, id),
                        .size = ebpo_schema[id].held_size,
-                       .standard = ebpo_schema[id].standard };
+                       .default_value = ebpo_schema[id].standard };
 }
 
 /* Returns the index of the counts of a list; adds them at first use. */
@@ -109,8 +109,8 @@ static void note_list(kept_nodes *kept, int id, const ebpo_list_spec *list)
 }
 
 /* Makes the arrays of `to` for any of `needs`, with space for all of `from` and for `more` nodes of
- * each type (and, since `more` gray nodes were leaves, for their planes). Returns false without
- * memory. */
+ * each type. New gray nodes were leaves, so there is also space for the planes of leaves. Returns
+ * false when out of memory. */
 static bool kept_begin(kept_nodes *kept, const ebpo_level *from, ebpo_level *to, uint32_t needs,
                        const uint64_t more[4])
 {
@@ -144,11 +144,11 @@ static void copy_row(const kept_column *c, uint64_t from, uint64_t to)
 
 static void put_default(const kept_column *c, uint64_t to)
 {
-    int64_t value = c->standard;
+    int64_t value = c->default_value;
     switch (c->size) {
-    case 1: memcpy(c->to + to, &(int8_t){ c->standard }, 1); break;
-    case 2: memcpy(c->to + 2 * to, &(int16_t){ c->standard }, 2); break;
-    case 4: memcpy(c->to + 4 * to, &(int32_t){ c->standard }, 4); break;
+    case 1: memcpy(c->to + to, &(int8_t){ c->default_value }, 1); break;
+    case 2: memcpy(c->to + 2 * to, &(int16_t){ c->default_value }, 2); break;
+    case 4: memcpy(c->to + 4 * to, &(int32_t){ c->default_value }, 4); break;
     default: memcpy(c->to + 8 * to, &value, 8);
     }
 }
@@ -162,7 +162,7 @@ static uint64_t kept_items(const kept_counts *c, uint64_t rank)
     return count;
 }
 
-/* Returns the index of a node that joins the level. */
+/* Adds a node to the level's count; returns the index of the node among those of its type. */
 static uint64_t grow_level(ebpo_level *level, ebpo_node_type type)
 {
     uint64_t place = ebpo_level_count(level, per_of(type));
@@ -256,9 +256,9 @@ static bool may_go_on(const ebpo_cutting *c, int level)
 
 /* --- runs of needed groups --- */
 
-/* Gives prefetch hints in a file with subtrees: where the parents are their roots, for all nodes
- * below and for lists of faces. The lists determine the faces. */
-static void expect_subtrees(const descent *d)
+/* Gives prefetch hints in a file with subtrees, when the parents are the roots of subtrees. The
+ * hints cover all nodes below and the lists of faces, which are needed to find the faces. */
+static void hint_subtrees(const descent *d)
 {
     const ebpo_cutting *c = d->c;
     ebpo_hints e = EBPO_HINTS_INIT(c->file);
@@ -280,7 +280,7 @@ static ebpo_status pick_level(descent *d)
     uint64_t count = 0;
     if (d->c->from->subtree_level && d->level == d->c->from->subtree_level + 1 &&
         ebpo_input_expects(&d->c->file->in))
-        expect_subtrees(d);
+        hint_subtrees(d);
     ebpo_run *runs = ebpo_alloc(d->parent_count, sizeof *runs);
     if (!runs)
         return ebpo_fail_memory(d->c->error, d->parent_count * sizeof *runs);
@@ -295,8 +295,8 @@ static ebpo_status pick_level(descent *d)
     }
     ebpo_status status =
         ebpo_pick_level(d->c->chunks, d->level, runs, count, d->c->parts, &d->from, d->c->error);
-    /* The groups need the ranks of the picked gray nodes in the source: they are found one after
-     * the other through the runs. */
+    /* A gray node's group of children has the node's rank in the source, which follows from the
+     * runs. */
     uint64_t next = 0;
     if (status == EBPO_OK) {
         d->child = ebpo_alloc(d->from.gray_count + d->from.leaf_count, sizeof *d->child);
@@ -304,8 +304,9 @@ static ebpo_status pick_level(descent *d)
             status = ebpo_fail_memory(d->c->error,
                                       (d->from.gray_count + d->from.leaf_count) * sizeof *d->child);
     }
-    /* Stored at the end of the array, which leaves that become pruned fill from the front: they
-     * never collide, as each gray node takes at most one entry. */
+    /* The groups are stored at the end of d->child, while the array is filled from the front by
+     * gray nodes and by leaves that become pruned nodes. The two never collide, as each node takes
+     * at most one entry. */
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
         for (uint64_t k = 0; k < runs[i].count[EBPO_GRAY]; k++)
             d->child[d->from.leaf_count + next++].group = runs[i].rank[EBPO_GRAY] + k;
@@ -334,8 +335,8 @@ static void add_child(descent *d, ebpo_cell cell, uint64_t group)
     d->goes_on = d->goes_on || group != NOTHING;
 }
 
-/* Returns true if the envelope is close enough to the model: called once for each gray node and
- * leaf, in their order. */
+/* Returns true if the envelope is close enough to the model. To be called once for each gray node
+ * and leaf, in their order. */
 static bool is_enough(descent *d) { return d->judged && d->judged[d->next_judged++].enough; }
 
 static void take_gray(descent *d, ebpo_cell cell)
@@ -372,8 +373,8 @@ static void add_colour(descent *d)
             d->level ? t[-1].gray_colours[d->group] : EBPO_COLOUR_OF_NOTHING;
 }
 
-/* Outside the box a leaf becomes a pruned node; its planes bound the cell's content as well as a
- * gray node's do. If its parent's planes are good enough, it needs none. */
+/* Takes a leaf. Outside the box, the leaf becomes a pruned node with the leaf's planes. If its
+ * parent's planes are close enough to the model, it becomes a pruned node without planes. */
 static ebpo_node_type take_leaf(descent *d, ebpo_cell cell)
 {
     bool enough = is_enough(d);
@@ -447,7 +448,7 @@ static ebpo_status judge_level(descent *d)
                                 d->c->error);
 }
 
-/* Cuts a level; the parents are complete after this. */
+/* Cuts a level; its gray nodes are the parents of the next level. */
 static ebpo_status cut_level(descent *d)
 {
     ebpo_status status = pick_level(d);

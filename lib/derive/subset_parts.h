@@ -13,7 +13,7 @@ typedef struct ebpo_cutting {
     const ebpo_info *from;
     const ebpo_subset_options *options;
     ebpo_chunks *chunks;
-    ebpo_tolerance *need; /* if max_error is given */
+    ebpo_tolerance *need; /* decides which envelopes are close enough; NULL without max_error */
     ebpo_box box;         /* the root cell */
     int last_level;       /* deepest level that may be kept */
     uint32_t parts;       /* parts that are kept and are in the file */
@@ -35,7 +35,7 @@ void ebpo_cut_volumes(ebpo_cutting *c);
 EBPO_MUST_USE ebpo_status ebpo_subset_tree(ebpo_tree *out, const ebpo_file *file,
                                            const ebpo_subset_options *options, ebpo_error *error);
 
-/* --- the bytes that a subset needs of its file, from heads and tables, without cutting it --- */
+/* --- counting the bytes that a subset needs of its file, from headers and tables alone --- */
 
 typedef struct ebpo_subset_reads {
     uint64_t subtrees;    /* subtrees that intersect the box; 0 if the file has none */

@@ -226,7 +226,7 @@ ebpo_status ebpo_partial_add(ebpo_partial *g, const ebpo_info *info, uint64_t pa
     if (grays > info->level[level].gray_count - g->grays[level])
         return ebpo_fail(
             error, EBPO_E_FORMAT,
-            "level %d: its index gives more gray nodes than the head states; run ebpo verify",
+            "level %d: its index gives more gray nodes than the header states; run ebpo verify",
             level);
     ebpo_status status = reserve_space(g, read->code_count, error);
     if (status != EBPO_OK)

@@ -245,7 +245,7 @@ START_TEST(test_lod_normals_refuse_other_level)
     l.mesh.face_count--;
     ck_assert_int_eq(ebpo_lod_normals(l.info, &l.mesh, &l.nodes, l.normals, &error),
                      EBPO_E_ARGUMENT);
-    ck_assert_ptr_nonnull(strstr(error.message, "pass both of one level"));
+    ck_assert_ptr_nonnull(strstr(error.message, "pass nodes and mesh of one level"));
     l.mesh.face_count++;
     double *corners = l.mesh.xyz64;
     l.mesh.xyz64 = NULL;
