@@ -332,7 +332,7 @@ class Parts(Case):
         np.testing.assert_array_equal(parts.distance(p)["distance"], whole.distance(p).distance)
 
     def test_folders_of_arrays(self):
-        """Memory-mapped arrays are supported. Face indices may have any integer type and be in several ranges."""
+        """Arrays stay on the disk and are read in several ranges. Face indices may have any integer type."""
         vertices, faces = self.whole.mesh(order="source")
         os.makedirs("arrays", exist_ok=True)
         np.save("arrays/vertices.npy", vertices.astype(np.float64))

@@ -289,7 +289,7 @@ class Files(Case):
 
 
 class Unavailable(http.server.BaseHTTPRequestHandler):
-    """A server of ranges of a file that returns status 503 until `until`; None: for two seconds from the next request."""
+    """Serves ranges of a file; returns status 503 until `until`. None: for two seconds from the next request."""
     until, refused, protocol_version = 0.0, 0, "HTTP/1.1"
 
     def do_GET(self):

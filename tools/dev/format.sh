@@ -1,6 +1,6 @@
 #!/bin/sh
-# Gives all C and C++ the form of .clang-format; with --check it only says what has another form.
-# Versions of clang-format break lines differently: any but Debian 12's is refused (77, skipped).
+# Formats all C and C++ by .clang-format; with --check it only reports files with another format.
+# Versions of clang-format break lines differently, so only that of Debian 12 is accepted (else exit code 77, skipped).
 set -eu
 cd "$(dirname "$0")/../.."
 version=14
@@ -17,7 +17,7 @@ if [ -z "$program" ]; then
     exit 77
 fi
 sources=$(git ls-files '*.c' '*.h' '*.cpp' '*.hpp' '*.inc' 2>/dev/null || true)
-[ -n "$sources" ] || { echo "skipped: this is no git repository" >&2; exit 77; }
+[ -n "$sources" ] || { echo "skipped: this is not a git repository" >&2; exit 77; }
 how=-i
 [ "${1:-}" = --check ] && how="--dry-run -Werror --ferror-limit=3"
 # shellcheck disable=SC2086

@@ -1,18 +1,18 @@
 #!/bin/sh
-# Builds the Debian packages of what is committed, in a clean root: build_deb.sh [-l] [-r] OUT [SUITE]
-#   -l      lintian looks at them, too, and its errors and warnings are a failure
-#   -r      builds a second time where all is otherwise that may be, and compares every .deb
+# Builds the Debian packages of the current commit in a clean root: build_deb.sh [-l] [-r] OUT [SUITE]
+#   -l      checks the packages with lintian; its errors and warnings are failures
+#   -r      builds again in a different environment, and compares every .deb
 #   OUT     folder for the packages and the source package
-#   SUITE   of Debian, bookworm unless named
-# As root, with debootstrap. The root is made in $TMPDIR, of the mirror $EBPO_DEBIAN_MIRROR, and goes away
-# afterwards; with $EBPO_DEB_ROOT=FOLDER it is kept there, for the next time. $EBPO_DEB_ARCH: another
-# architecture whose programs run here, as i386 on amd64.
+#   SUITE   suite of Debian; default: bookworm
+# Run as root, with debootstrap. The clean root is made in $TMPDIR from the mirror $EBPO_DEBIAN_MIRROR, and removed
+# at the end. With EBPO_DEB_ROOT=FOLDER it is kept in FOLDER and used again. EBPO_DEB_ARCH selects another
+# architecture whose programs run on this machine, such as i386 on amd64.
 set -eu
 usage() { echo "usage: build_deb.sh [-l] [-r] OUT [SUITE]" >&2 && exit 2; }
-look=no twice=no
+lint=no twice=no
 while getopts lr option; do
     case $option in
-    l) look=yes ;;
+    l) lint=yes ;;
     r) twice=yes ;;
     *) usage ;;
     esac
@@ -22,8 +22,8 @@ shift $((OPTIND - 1))
 mkdir -p "$1"
 out=$(cd "$1" && pwd) suite=${2:-bookworm}
 source=$(cd "$(dirname "$0")/../.." && pwd)
-mirror=${EBPO_DEBIAN_MIRROR:-} # empty: the one that debootstrap knows
-[ "$(id -u)" = 0 ] || { echo "build_deb.sh: making a root of Debian's needs root (or sudo)" >&2 && exit 1; }
+mirror=${EBPO_DEBIAN_MIRROR:-} # empty: the default of debootstrap
+[ "$(id -u)" = 0 ] || { echo "build_deb.sh: making a Debian root needs root (or sudo)" >&2 && exit 1; }
 command -v debootstrap >/dev/null ||
     { echo "build_deb.sh: debootstrap is missing: apt install debootstrap" >&2 && exit 1; }
 
@@ -48,7 +48,7 @@ install() { within apt-get install -y -qq -o Dpkg::Use-Pty=0 --no-install-recomm
 
 version=$(sed -n "s/^  version: '\(.*\)',$/\1/p" "$source/meson.build")
 name=ebpo-octree-$version
-# The source package: a tarball of what is committed, and debian/ beside meson.build.
+# Makes the source package: a tarball of the commit, and debian/ beside meson.build.
 unpack() { # folder in the root
     rm -rf "${root:?}$1" && mkdir -p "$root$1"
     git -C "$source" -c tar.umask=022 archive --format=tar --prefix="$name/" HEAD |
@@ -69,12 +69,12 @@ install build-essential fakeroot
 within sh -c "cd /build/ebpo/$name && apt-get build-dep -y -qq -o Dpkg::Use-Pty=0 --no-install-recommends ./" >/dev/null
 build /build/ebpo
 find "$root/build/ebpo" -maxdepth 1 -type f -exec cp -p {} "$out/" \;
-if [ $look = yes ]; then
+if [ $lint = yes ]; then
     install lintian
     within sh -c "cd /build/ebpo && lintian --allow-root --fail-on error,warning -i -I --pedantic ./*.changes"
 fi
 if [ $twice = yes ]; then
-    # Another path, user, host, umask, year, zone, language (its i has a capital of its own) and number of jobs.
+    # Another path, user, host, umask, year, time zone, language (Turkish has a special capital i) and number of jobs.
     install faketime locales
     within localedef -i tr_TR -f UTF-8 tr_TR.UTF-8
     (umask 027 && unpack /build/else/where)
@@ -87,9 +87,9 @@ if [ $twice = yes ]; then
     sums "$root/build/ebpo" >"$root/build/first"
     sums "$root/build/else/where" >"$root/build/second"
     diff "$root/build/first" "$root/build/second" || {
-        echo "build_deb.sh: built twice, the packages differ; with EBPO_DEB_ROOT kept, diffoscope compares" \
-            "those in build/ebpo and build/else/where there" >&2 && exit 1
+        echo "build_deb.sh: the packages of the two builds differ; with EBPO_DEB_ROOT set, compare them with" \
+            "diffoscope in build/ebpo and build/else/where there" >&2 && exit 1
     }
-    echo "build_deb.sh: built twice, all $(wc -l <"$root/build/first") packages are equal"
+    echo "build_deb.sh: both builds have the same $(wc -l <"$root/build/first") packages"
 fi
 sums "$out"

@@ -1,5 +1,6 @@
 #!/bin/sh
-# Run by conda build, which sets PREFIX, SP_DIR and CPU_COUNT. Conda has no Chart.js, so reports have data and no page.
+# conda build runs this script and sets PREFIX, SP_DIR and CPU_COUNT. Conda has no Chart.js, so reports consist of
+# data without a page.
 set -eu
 # shellcheck disable=SC2086
 meson setup conda-build $(for part in assimp http render captions qhull; do echo "-D$part=enabled"; done) \

@@ -1,4 +1,4 @@
-# Of a tarball of `meson dist`, as there is no address of releases yet:
+# Releases have no URL yet, so this formula builds a tarball of `meson dist`:
 #   HOMEBREW_EBPO_TARBALL=/path/ebpo-octree-0.1.0.tar.xz brew install --formula ./ebpo.rb
 class Ebpo < Formula
   desc "Octree of convex envelopes of triangle meshes, in one HDF5 file"
@@ -26,7 +26,7 @@ class Ebpo < Formula
 
   def install
     parts = %w[assimp http render captions qhull].map { |part| "-D#{part}=enabled" }
-    # Homebrew has no Chart.js, so reports have data and no page.
+    # Homebrew has no Chart.js, so reports consist of data without a page.
     system "meson", "setup", "build", *std_meson_args, *parts, "-Dtests=disabled", "-Dchart_js=none"
     system "ninja", "-C", "build", "install", "-v"
   end
