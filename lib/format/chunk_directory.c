@@ -1,10 +1,11 @@
 /* Manages the chunk directory: the offset, the stored size and the checksum of every chunk of an
  * open file. Offsets are read from the file's list of all chunks (/subtrees/places), or from HDF5's
- * index of each array. They are read only when needed, as they may be long or remote, and once,
- * under the file's lock. The checksums (/chunk_sums) detect an intact chunk that belongs to
- * another position or another version of the file. Each list is a single chunk, however long, so
- * both have a separate encoder and decoder. The sum of stored sizes is checked against the size of
- * the file before chunks are decoded. Source: format-spec/README.md, sections 9 and 20. */
+ * index of each array. The list and the indexes may be long or remote. They are therefore read only
+ * when needed, and only once, under the file's lock. The checksums (/chunk_sums) detect an intact
+ * chunk that belongs to another position or another version of the file. Each of the two lists is a
+ * single chunk, however long, so they have a separate encoder and decoder. The sum of stored sizes
+ * is checked against the size of the file before chunks are decoded. Source: format-spec/README.md,
+ * sections 9 and 20. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -50,11 +51,12 @@ static ebpo_array_id place_array(uint32_t number, int *level)
     return EBPO_ARRAYS;
 }
 
-/* The list is in memory three times, encoded and decoded. */
+/* Maximum number of values in a list. Three copies of a list are in memory while it is encoded or
+ * decoded. */
 static const uint64_t LONGEST = PTRDIFF_MAX / 8 / 3;
 
-/* Returns true if the pipeline shuffles the elements. The shuffle is done here, as the coder's
- * scratch memory is too small for a long list. */
+/* Returns true if the pipeline shuffles the elements. This file shuffles lists itself, as the
+ * coder's scratch memory is too small for a long list. */
 static bool is_shuffled(ebpo_pipeline pipeline)
 {
     return ebpo_pipeline_facts_of(pipeline)->compresses;
@@ -69,21 +71,21 @@ ebpo_status ebpo_long_chunk_encode(const uint64_t *values, uint64_t count, ebpo_
         return ebpo_fail_memory(error, count * 8);
     size_t size = (size_t)count * 8;
     ebpo_chunk_coder *coder = ebpo_alloc_zero(1, sizeof *coder);
-    uint8_t *raw = ebpo_alloc(size, 1), *turned = ebpo_alloc(size, 1);
+    uint8_t *raw = ebpo_alloc(size, 1), *shuffled = ebpo_alloc(size, 1);
     *stored = ebpo_alloc(ebpo_chunk_bound(size), 1);
-    ebpo_status status = coder && raw && turned && *stored ? EBPO_OK : EBPO_E_MEMORY;
+    ebpo_status status = coder && raw && shuffled && *stored ? EBPO_OK : EBPO_E_MEMORY;
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
         ebpo_store64(raw + 8 * i, values[i]);
     if (status == EBPO_OK && is_shuffled(pipeline))
-        ebpo_shuffle(raw, size, 8, turned);
+        ebpo_shuffle(raw, size, 8, shuffled);
     if (status == EBPO_OK)
         status = ebpo_chunk_encode(coder, pipeline, codec_level, 1,
-                                   is_shuffled(pipeline) ? turned : raw, size, *stored, bytes);
+                                   is_shuffled(pipeline) ? shuffled : raw, size, *stored, bytes);
     if (coder)
         ebpo_chunk_coder_clear(coder);
     free(coder);
     free(raw);
-    free(turned);
+    free(shuffled);
     if (status == EBPO_OK)
         return EBPO_OK;
     free(*stored);
@@ -100,20 +102,20 @@ ebpo_status ebpo_long_chunk_decode(const uint8_t *stored, size_t stored_bytes,
         return ebpo_fail_memory(error, count * 8);
     size_t size = (size_t)count * 8;
     ebpo_chunk_coder *coder = ebpo_alloc_zero(1, sizeof *coder);
-    uint8_t *raw = ebpo_alloc(size, 1), *turned = ebpo_alloc(size, 1);
+    uint8_t *raw = ebpo_alloc(size, 1), *shuffled = ebpo_alloc(size, 1);
     *values = ebpo_alloc(count, sizeof **values);
-    ebpo_status status = coder && raw && turned && *values ? EBPO_OK : EBPO_E_MEMORY;
+    ebpo_status status = coder && raw && shuffled && *values ? EBPO_OK : EBPO_E_MEMORY;
     if (status == EBPO_OK)
         status = ebpo_chunk_decode(coder, pipeline, 1, stored, stored_bytes, raw, size, why);
     if (status == EBPO_OK && is_shuffled(pipeline))
-        ebpo_unshuffle(raw, size, 8, turned);
+        ebpo_unshuffle(raw, size, 8, shuffled);
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
-        (*values)[i] = ebpo_load64((is_shuffled(pipeline) ? turned : raw) + 8 * i);
+        (*values)[i] = ebpo_load64((is_shuffled(pipeline) ? shuffled : raw) + 8 * i);
     if (coder)
         ebpo_chunk_coder_clear(coder);
     free(coder);
     free(raw);
-    free(turned);
+    free(shuffled);
     if (status == EBPO_OK)
         return EBPO_OK;
     free(*values);
@@ -121,7 +123,8 @@ ebpo_status ebpo_long_chunk_decode(const uint8_t *stored, size_t stored_bytes,
     return status == EBPO_E_MEMORY ? ebpo_fail_memory(error, size * 3) : status;
 }
 
-/* Returns EBPO_E_FORMAT: the list's data about `path` are wrong. */
+/* Reports an error in a list and returns EBPO_E_FORMAT. The message is `what` followed by `path`.
+ */
 static ebpo_status long_chunk_fail(const ebpo_file *file, ebpo_array_id list, const char *what,
                                    const char *path, ebpo_error *error)
 {
@@ -165,8 +168,6 @@ static uint64_t level_bytes(const ebpo_file *file, int level, bool located)
     return bytes;
 }
 
-/* Returns the bytes of a level. While another thread may be locating the chunks, only sizes known
- * from opening count. */
 uint64_t ebpo_reader_level_bytes(const ebpo_file *file, int level)
 {
     return level_bytes(file, level, atomic_load(&file->located));
@@ -226,8 +227,8 @@ ebpo_status ebpo_stored_check_expansion(const ebpo_file *file, uint64_t most, eb
         bytes / 1e6, bytes / space, (unsigned long long)most, bytes / space + 1);
 }
 
-/* Finds the rows of one array from *row on, and moves *row past them. Rows of unknown arrays may
- * precede them. */
+/* Finds the rows of one array from *row on, and moves *row past them. Skips rows of unknown arrays
+ * that precede them. */
 static ebpo_status find_rows(const ebpo_file *file, ebpo_array_in *a, const uint64_t *list,
                              uint64_t rows, uint64_t *row, ebpo_error *error)
 {
@@ -293,9 +294,7 @@ ebpo_status ebpo_chunk_checksums_read(const ebpo_file *file, ebpo_error *error)
     return status;
 }
 
-/* --- offsets --- */
-
-/* --- by HDF5's index --- */
+/* --- chunk offsets from HDF5's indexes --- */
 
 static ebpo_status locate_array(ebpo_file *file, ebpo_head *head, ebpo_array_in *a,
                                 ebpo_error *error)
@@ -336,9 +335,9 @@ static ebpo_status locate_by_index(ebpo_file *file, ebpo_error *error)
     return status == EBPO_OK ? ebpo_stored_check(file, error) : status;
 }
 
-/* --- by the list of all chunks (format-spec/README.md, section 9) --- */
+/* --- chunk offsets from the list of all chunks (format-spec/README.md, section 9) --- */
 
-/* Chunks of each array read so far. */
+/* Number of chunks of each array in the rows read so far. */
 typedef struct listing {
     ebpo_file *file;
     uint64_t seen[EBPO_LEVELS_MAX][EBPO_LEVEL_ARRAYS], seen_root[EBPO_ARRAYS];
@@ -384,7 +383,7 @@ static ebpo_status list_chunk(listing *l, uint32_t number, ebpo_chunk_location c
     return EBPO_OK;
 }
 
-/* Allocates the tables of chunks, after checking that the file can hold them. */
+/* Allocates an array's table of chunks. First checks that the list has enough rows for it. */
 static ebpo_status begin_array(ebpo_file *file, ebpo_array_in *a, uint64_t *chunks,
                                ebpo_error *error)
 {
@@ -431,7 +430,7 @@ static ebpo_status list_chunks(ebpo_file *file, const uint64_t *places, uint64_t
     return status;
 }
 
-/* Discards a list that was read in part. */
+/* Discards the chunk offsets of a list that was only partly valid. */
 static void forget_places(ebpo_file *file)
 {
     for (int i = 0; i < ebpo_all_arrays(file); i++) {
@@ -456,7 +455,7 @@ static ebpo_status locate_by_list(ebpo_file *file, ebpo_error *error)
     return status == EBPO_OK ? ebpo_stored_check(file, error) : status;
 }
 
-/* --- either way --- */
+/* --- chunk offsets from either source --- */
 
 static ebpo_status locate_all(ebpo_file *file, ebpo_error *error)
 {
@@ -486,11 +485,12 @@ ebpo_status ebpo_file_locate(const ebpo_file *file, ebpo_stored_sizes *out, ebpo
 
 ebpo_status ebpo_reader_locate(const ebpo_file *file, const ebpo_array_in *array, ebpo_error *error)
 {
-    /* The header of the array has the offset of a single chunk, known since opening. */
+    /* The offset of a single chunk is in the array's header, which is read when a file is opened.
+     */
     return ebpo_shape_chunks(&array->shape) == 1 ? EBPO_OK : ebpo_file_locate(file, NULL, error);
 }
 
-/* --- data of each array in the head --- */
+/* --- information about each array --- */
 
 static const ebpo_array_in *find_present_array(const ebpo_file *file, unsigned n)
 {
@@ -507,7 +507,7 @@ static const ebpo_array_in *find_present_array(const ebpo_file *file, unsigned n
     return NULL;
 }
 
-/* Returns an array's stored size. Another thread may be locating the chunks of arrays with several
+/* The size of an array with several chunks is unknown while another thread may be locating its
  * chunks. */
 uint64_t ebpo_reader_stored_bytes(const ebpo_file *file, const ebpo_array_in *array)
 {

@@ -10,7 +10,7 @@
 #include "format/schema.h"
 #include "hdf5_read/chunk.h"
 
-/* All arrays that a file can have, under one index, in the order of their numbers in the format
+/* A common index for all arrays that a file can have, in the order of their numbers in the format
  * (ebpo_place_number). */
 enum {
     EBPO_ARRAYS_OF_LEVELS = EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS,
@@ -23,7 +23,7 @@ static inline int ebpo_all_arrays(const ebpo_file *file)
     return EBPO_ARRAYS_OF_FORMAT + file->attributes.arrays;
 }
 
-/* Returns array i, present or not. */
+/* Returns the array with index i, which may be absent. */
 static inline ebpo_array_in *ebpo_array_number(ebpo_file *file, int i)
 {
     return i < EBPO_ARRAYS_OF_LEVELS
@@ -35,15 +35,15 @@ static inline ebpo_array_in *ebpo_array_number(ebpo_file *file, int i)
 
 /* --- the list of all chunks, /subtrees/places: format-spec/README.md, section 9, "Places" --- */
 
-/* Marks a gap. */
+/* Array number of a list row that describes bytes between chunks. */
 #define EBPO_PLACE_GAP UINT32_MAX
 
-/* Returns the number of an array in the list. */
+/* Returns the number that the list uses for an array. */
 uint32_t ebpo_place_number(ebpo_array_id id, int level);
 /* Returns EBPO_ARRAYS for an unknown array. */
 ebpo_array_id ebpo_place_array(uint32_t number, int *level); /* attributes have any number */
 
-/* Encodes a row of the list. */
+/* Encode a row of the list (array number and stored bytes of a chunk), and decode it. */
 static inline uint64_t ebpo_place(uint32_t number, uint64_t bytes)
 {
     return (uint64_t)number << 32 | (uint32_t)bytes;
@@ -53,7 +53,7 @@ static inline uint32_t ebpo_place_bytes_of(uint64_t place) { return (uint32_t)pl
 
 /* --- lists of u64 in a single chunk, however long --- */
 
-/* Encodes a list. `bytes`: size of the encoded list, which the caller frees. `codec_level`: as in
+/* Encodes a list into *stored, which the caller frees. *bytes is its size. `codec_level`: as in
  * ebpo_write_options. */
 EBPO_MUST_USE ebpo_status ebpo_long_chunk_encode(const uint64_t *values, uint64_t count,
                                                  ebpo_pipeline pipeline, int codec_level,
@@ -67,7 +67,7 @@ EBPO_MUST_USE ebpo_status ebpo_long_chunk_decode(const uint8_t *stored, size_t s
                                                  uint64_t **values, const char **why,
                                                  ebpo_error *error);
 
-/* Reads such an array: array->shape.rows values, which the caller frees. */
+/* Reads an array that is such a list: array->shape.rows values, which the caller frees. */
 EBPO_MUST_USE ebpo_status ebpo_long_chunk_read(const ebpo_file *file, const ebpo_array_in *array,
                                                uint64_t **values, ebpo_error *error);
 
@@ -76,14 +76,16 @@ EBPO_MUST_USE ebpo_status ebpo_long_chunk_read(const ebpo_file *file, const ebpo
 /* Returns EBPO_E_FORMAT if the arrays with known chunks take more bytes than the file has. */
 EBPO_MUST_USE ebpo_status ebpo_stored_check(const ebpo_file *file, ebpo_error *error);
 
-/* Returns EBPO_E_LIMIT if their decoded size exceeds both `most` times the file size and
- * EBPO_EXPANSION_FREE. `most`: as in ebpo_open_options. */
+/* Returns EBPO_E_LIMIT if the decoded size of all arrays exceeds both `most` times the file size
+ * and EBPO_EXPANSION_FREE. `most`: as max_expansion in ebpo_open_options. */
 EBPO_MUST_USE ebpo_status ebpo_stored_check_expansion(const ebpo_file *file, uint64_t most,
                                                       ebpo_error *error);
 
-/* --- checksums: one list with the last bytes of every chunk of a file. A chunk's own checksum does
- * not identify the chunk: without the list, a chunk of another position or file version would be
- * accepted. format-spec/README.md, section 20 --- */
+/* --- checksums --- */
+
+/* The list /chunk_sums contains the last four bytes of every chunk of a file. The checksum inside a
+ * chunk does not identify the chunk. Without the list, a chunk of another position or file version
+ * would be accepted. format-spec/README.md, section 20. */
 
 /* Returns the list entry of a chunk: its last four bytes, which are its checksum in every pipeline
  * that has one. `bytes`: stored size, at least four. */
@@ -92,11 +94,11 @@ static inline uint32_t ebpo_chunk_sum(const uint8_t *stored, size_t bytes)
     return ebpo_load32(stored + bytes - 4);
 }
 
-/* Reads the list, once, if the file has a valid one. Required before ebpo_chunk_fits. Any thread.
- */
+/* Reads the list of chunk checksums, once, if the file has a valid list. Required before
+ * ebpo_chunk_fits. Any thread may call this function. */
 EBPO_MUST_USE ebpo_status ebpo_chunk_checksums_read(const ebpo_file *file, ebpo_error *error);
 
-/* Returns true if the bytes belong to this chunk of this array, or if the file has no list. */
+/* Returns true if the bytes have the chunk's checksum in the list, or if the file has no list. */
 static inline bool ebpo_chunk_fits(const ebpo_file *file, const ebpo_array_in *array,
                                    uint64_t chunk, const uint8_t *stored, size_t bytes)
 {

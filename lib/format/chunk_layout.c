@@ -1,10 +1,10 @@
 /* Computes the layout of a file's chunks, for the writer: the number of rows in the chunks of each
  * array, the order of chunks, and the chunks that each subtree needs. Levels near the root are
- * stored whole. Deep levels are stored subtree by subtree, so that one subtree is one range of
- * bytes, except for the chunks of faces and vertices that it shares with subtrees before it. These
- * shared chunks are listed in /subtrees/outer, and the sums before each subtree in
- * /subtrees/counts. All computations use integers, because the bytes of a file depend on them.
- * Source: format-spec/README.md, section 9. */
+ * stored whole. Deep levels are stored subtree by subtree. One subtree is one range of bytes,
+ * except for the chunks of faces and vertices that it shares with earlier subtrees. /subtrees/outer
+ * lists these shared chunks. /subtrees/counts contains the numbers of items of each subtree. All
+ * computations use integers, because the bytes of a file depend on them. Source:
+ * format-spec/README.md, section 9. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -19,40 +19,42 @@
 #include "geometry/level_nodes.h"
 #include "hdf5_read/chunk.h"
 
-/* --- shared chunks: those that a subtree shares with earlier subtrees, computed in order --- */
+/* --- chunks of the mesh that a subtree shares with earlier subtrees --- */
 
-/* A subtree's owned items: faces [face, face_end), vertices from `vertex` on. */
-typedef struct outer_range {
+/* A subtree's owned items: faces [face, face_end), and vertices from `vertex` on. */
+typedef struct owned_range {
     uint64_t face, face_end, vertex;
-} outer_range;
+} owned_range;
 
+/* Lists of the shared chunks of one subtree after the other. A block is a chunk of /mesh/faces or
+ * /mesh/vertices. */
 typedef struct shared_blocks {
-    /* [blocks of the mesh] last round in which a block was listed */
-    uint32_t *face_round, *vertex_round;
-    uint32_t round;
-    uint32_t *face_block, *vertex_block; /* [blocks of the mesh] listed blocks */
-    uint64_t face_blocks, vertex_blocks;
+    uint32_t *face_round, *vertex_round; /* [blocks] last round in which a block was listed */
+    uint32_t round;                      /* number of the current subtree, from 1 */
+    uint32_t *face_block, *vertex_block; /* [blocks] blocks listed in this round */
+    uint64_t face_blocks, vertex_blocks; /* their numbers */
 } shared_blocks;
 
 enum {
-    FIRST_LEVELS = 5,    /* stored together, independent of subtrees */
-    LEAVES_OF_DEEP = 64, /* a deep level has a leaf for this many faces */
-    CHUNK_FACES = 16384, /* number of faces that corresponds to a chunk of a lower level */
-    CHUNK_LEAST = 256,   /* in bytes */
+    FIRST_LEVELS = 5,    /* levels 0 to 5 are stored whole, at any level of the subtrees' roots */
+    LEAVES_OF_DEEP = 64, /* deep: at least one leaf for each 64 faces of the mesh */
+    CHUNK_FACES = 16384, /* a chunk of a level corresponds to about this number of faces */
+    CHUNK_LEAST = 256,   /* bytes of a chunk of a level */
     CHUNK_MAX = 32768,
-    MAP_ROWS = 2048,
+    MAP_ROWS = 2048, /* rows of a chunk of these arrays */
     FACES_INDEX_ROWS = 512,
     SHARED_ROWS = 4096,
     ATTRIBUTE_ROWS = 2048
 };
 
-/* Return level limits for files with subtrees: levels up to the first are stored whole, levels from
- * the second on are deep. */
+/* Returns the last level that is stored whole in a file with subtrees. */
 static int last_whole_level(const ebpo_info *info)
 {
     return info->subtree_level > FIRST_LEVELS ? info->subtree_level : FIRST_LEVELS;
 }
 
+/* Returns the first deep level. The levels between these two have chunks sorted by subtree, level
+ * by level; the chunks of all deep levels are sorted together. */
 static int first_deep_level(const ebpo_info *info)
 {
     int level = last_whole_level(info) + 1;
@@ -62,10 +64,10 @@ static int first_deep_level(const ebpo_info *info)
     return level;
 }
 
-/* Returns the power of two nearest, by ratio, to the number of rows for CHUNK_FACES faces: the
- * first that is not less than that number divided by the root of 2. Uses integers, as bytes depend
- * on it: there are at most 2^40 rows, and both sides of the comparison are below 2^64 before
- * squaring. */
+/* Returns the power of two with the smallest ratio to the number of rows for CHUNK_FACES faces: the
+ * first power that is not less than that number divided by the root of 2. Compares squares of
+ * integers, because the bytes of a file depend on the result. There are at most 2^40 rows, and both
+ * sides are below 2^64 before squaring. */
 static uint64_t rows_for_faces(const ebpo_info *info, uint64_t rows)
 {
     uint64_t wanted = rows * CHUNK_FACES, found = 1;
@@ -170,7 +172,7 @@ static void list_block(uint32_t *rounds, uint32_t round, uint64_t block, uint32_
     blocks[(*count)++] = (uint32_t)block;
 }
 
-static void use_face(shared_blocks *b, const ebpo_mesh *mesh, const outer_range *own, uint64_t face)
+static void use_face(shared_blocks *b, const ebpo_mesh *mesh, const owned_range *own, uint64_t face)
 {
     for (int k = 0; k < 3; k++) {
         uint32_t vertex = mesh->faces[3 * face + (uint64_t)k];
@@ -180,9 +182,9 @@ static void use_face(shared_blocks *b, const ebpo_mesh *mesh, const outer_range 
     }
 }
 
-/* Adds the faces that the subtree's leaves refer to, including owned ones, and all its owned faces.
- */
-static void shared_blocks_refer(shared_blocks *b, const ebpo_mesh *mesh, const outer_range *own,
+/* Lists the blocks of the shared faces among these references of the subtree's leaves, and the
+ * blocks of their shared vertices. */
+static void shared_blocks_refer(shared_blocks *b, const ebpo_mesh *mesh, const owned_range *own,
                                 const uint32_t *refs, uint64_t count)
 {
     for (uint64_t i = 0; i < count; i++)
@@ -193,7 +195,8 @@ static void shared_blocks_refer(shared_blocks *b, const ebpo_mesh *mesh, const o
         }
 }
 
-static void shared_blocks_use(shared_blocks *b, const ebpo_mesh *mesh, const outer_range *own)
+/* Lists the blocks of the shared vertices of all owned faces. */
+static void shared_blocks_use(shared_blocks *b, const ebpo_mesh *mesh, const owned_range *own)
 {
     for (uint64_t face = own->face; face < own->face_end; face++)
         use_face(b, mesh, own, face);
@@ -216,9 +219,10 @@ static uint64_t take_blocks(uint32_t *blocks, uint64_t count, uint64_t from, uin
     return taken;
 }
 
-/* Writes distances to `out`, faces first, and adds their counts to the sums before the subtree.
- * Clears the lists. */
-static void shared_blocks_take(shared_blocks *b, const outer_range *own, uint32_t *out,
+/* Writes the listed blocks to `out`, blocks of faces first: each as the distance from the block of
+ * the subtree's first owned face or vertex. Adds the numbers of blocks to the sums `before` the
+ * subtree, which gives the sums `after` it. Clears the lists. */
+static void shared_blocks_take(shared_blocks *b, const owned_range *own, uint32_t *out,
                                const uint64_t *before, uint64_t *after)
 {
     uint64_t faces = take_blocks(b->face_block, b->face_blocks, own->face / EBPO_FACE_BLOCK, out);
@@ -230,8 +234,10 @@ static void shared_blocks_take(shared_blocks *b, const outer_range *own, uint32_
     b->round++;
 }
 
+/* Default number of faces in a subtree, and of faces of a mesh that has subtrees by default. */
 enum { DEFAULT_FACES = 1024, LEAST_FACES = 131072 };
-/* A subtree's rows in all arrays take tens of kilobytes. */
+/* Pages of the workspace are released after this number of subtrees. A subtree's rows in all arrays
+ * take tens of kilobytes. */
 enum { SUBTREES_A_TIME = 128 };
 
 int ebpo_subtree_level_for(const ebpo_info *info, uint64_t subtree_faces)
@@ -239,7 +245,7 @@ int ebpo_subtree_level_for(const ebpo_info *info, uint64_t subtree_faces)
     uint64_t faces = subtree_faces ? subtree_faces : DEFAULT_FACES;
     if (subtree_faces == EBPO_NO_SUBTREES || (!subtree_faces && info->face_count < LEAST_FACES))
         return 0;
-    /* at least these if requested */
+    /* level 1 if the caller requested subtrees and no level has enough faces per subtree */
     int found = subtree_faces && info->level_count > 2;
     for (int level = 1; level <= info->level_count - 2; level++) {
         uint64_t grays = info->level[level].gray_count;
@@ -280,7 +286,7 @@ static uint64_t first_group(const counting *c, uint64_t subtree, int level)
                                                : level_sum(c, subtree, level - 1, EBPO_S_GRAY);
 }
 
-/* Counts the items of the subtree's leaves of one level, from rank `leaf` to `end`. */
+/* Counts the items of a subtree's leaves of one level, which have the ranks [leaf, end). */
 static void count_leaves(const counting *c, const ebpo_level *level, uint64_t leaf, uint64_t end,
                          uint64_t *sum)
 {
@@ -294,7 +300,7 @@ static void count_leaves(const counting *c, const ebpo_level *level, uint64_t le
     sum[EBPO_S_ENDS] = level->leaf_first[end - 1] + level->leaf_new[end - 1];
 }
 
-/* Computes the columns of one level from those of the level before. */
+/* Computes the columns of one level from those of the previous level. */
 static void count_level(const counting *c, int number)
 {
     const ebpo_level *level = &c->tree->level[number];
@@ -314,7 +320,8 @@ static void count_level(const counting *c, int number)
     }
 }
 
-/* Finds the subtree's new faces, [*first, *end): those of its leaves have no gaps. */
+/* Finds the subtree's owned faces, [*first, *end). The new faces of its leaves form one range
+ * without gaps. */
 static void owned_faces(const counting *c, uint64_t subtree, uint64_t *first, uint64_t *end)
 {
     *first = UINT64_MAX;
@@ -337,7 +344,7 @@ static void count_faces(const counting *c)
     for (uint64_t i = 0; i < c->checksums->subtrees; i++) {
         uint64_t *from = row_of(c, i), *to = row_of(c, i + 1);
         owned_faces(c, i, &first, &end);
-        first = end < at || first == UINT64_MAX ? at : first; /* no leaves */
+        first = end < at || first == UINT64_MAX ? at : first; /* the subtree has no leaves */
         end = end < first ? first : end;
         to[EBPO_S_FACES_BEFORE] = from[EBPO_S_FACES_BEFORE] + first - at;
         to[EBPO_S_FACES] = from[EBPO_S_FACES] + end - first;
@@ -345,9 +352,9 @@ static void count_faces(const counting *c)
     }
 }
 
-/* Counts first uses of vertices by faces [*face, end); *seen is the number of vertices used before.
- */
-static void see_vertices(const ebpo_mesh *mesh, uint64_t *face, uint64_t end, uint64_t *seen)
+/* Adds the number of vertices that faces [*face, end) use first to *seen, the number of vertices
+ * that earlier faces use. */
+static void count_first_uses(const ebpo_mesh *mesh, uint64_t *face, uint64_t end, uint64_t *seen)
 {
     EBPO_FOR_ITEMS(mesh->workspace, i, *face * 3, end * 3)
         *seen += mesh->faces[i] == *seen;
@@ -359,10 +366,11 @@ static void count_vertices(const counting *c)
     uint64_t face = 0, seen = 0;
     for (uint64_t i = 0; i < c->checksums->subtrees; i++) {
         uint64_t *from = row_of(c, i), *to = row_of(c, i + 1), begin = seen;
-        see_vertices(&c->tree->mesh, &face, to[EBPO_S_FACES_BEFORE] + from[EBPO_S_FACES], &seen);
+        count_first_uses(&c->tree->mesh, &face, to[EBPO_S_FACES_BEFORE] + from[EBPO_S_FACES],
+                         &seen);
         to[EBPO_S_VERTICES_BEFORE] = from[EBPO_S_VERTICES_BEFORE] + seen - begin;
         begin = seen;
-        see_vertices(&c->tree->mesh, &face, to[EBPO_S_FACES_BEFORE] + to[EBPO_S_FACES], &seen);
+        count_first_uses(&c->tree->mesh, &face, to[EBPO_S_FACES_BEFORE] + to[EBPO_S_FACES], &seen);
         to[EBPO_S_VERTICES] = from[EBPO_S_VERTICES] + seen - begin;
     }
 }
@@ -373,7 +381,7 @@ static ebpo_status list_shared(const counting *c, ebpo_error *error)
     ebpo_status status = shared_blocks_make(&blocks, c->info, error);
     EBPO_FOR_ITEMS_EVERY(c->tree->mesh.workspace, SUBTREES_A_TIME, i, 0, c->checksums->subtrees) {
         uint64_t *from = row_of(c, i), *to = row_of(c, i + 1);
-        outer_range own = {
+        owned_range own = {
             .face = to[EBPO_S_FACES_BEFORE] + from[EBPO_S_FACES],
             .face_end = to[EBPO_S_FACES_BEFORE] + to[EBPO_S_FACES],
             .vertex = to[EBPO_S_VERTICES_BEFORE] + from[EBPO_S_VERTICES],
@@ -403,8 +411,8 @@ static ebpo_status list_shared(const counting *c, ebpo_error *error)
     return status;
 }
 
-/* Splits sums into differences and a sum for each chunk. Returns false if a count exceeds its type.
- */
+/* Computes /subtrees/counts, which are differences of the sums, and the sums before each chunk of
+ * counts. Returns false if a count exceeds its type. */
 static bool split_sums(const counting *c)
 {
     ebpo_subtree_checksums *s = c->checksums;
@@ -449,9 +457,9 @@ ebpo_status ebpo_subtree_checksums_make(ebpo_subtree_checksums *out, const ebpo_
     return status;
 }
 
-/* --- subtree of a row --- */
+/* --- the order of chunks --- */
 
-/* Returns the rows of the array before subtree i. */
+/* Returns the number of rows of an array before subtree i. */
 static uint64_t rows_before(const counting *c, ebpo_array_id id, int level, uint64_t i)
 {
     const uint64_t *row = row_of(c, i), *next = i < c->checksums->subtrees ? row_of(c, i + 1) : row;
@@ -471,8 +479,8 @@ static uint64_t rows_before(const counting *c, ebpo_array_id id, int level, uint
     }
 }
 
-/* Returns the subtree of a row: in arrays of levels below the roots, the mesh, the maps. Rows
- * before the first subtree belong to it. */
+/* Returns the subtree of a row of an array of the mesh, of the maps, or of a level below the
+ * subtrees' roots. Rows before the first subtree count as its rows. */
 static uint64_t subtree_of_row(const ebpo_subtree_checksums *checksums, const ebpo_info *info,
                                ebpo_array_id id, int level, uint64_t row)
 {
@@ -510,13 +518,13 @@ static int by_subtree(const void *a, const void *b)
                                 : (x->chunk > y->chunk) - (x->chunk < y->chunk);
 }
 
-/* Selection of the next arrays. */
+/* Selection of the arrays that come next in the file. */
 typedef struct choice {
-    int first_level, last_level; /* for the arrays of levels */
+    int first_level, last_level; /* for arrays of levels */
     enum { WHOLE, TOP_INDEXES, NODES, LISTS, MESH, MAPS, TABLE, OF_MESH, REST } kind;
 } choice;
 
-/* Returns true for arrays that describe faces; others describe nodes. */
+/* Returns true for arrays of a level that describe face lists; the others describe nodes. */
 static bool is_of_faces(ebpo_array_id id)
 {
     return id == EBPO_A_LEAF_SKIP || id == EBPO_A_LEAF_NEW || id == EBPO_A_LEAF_REF_COUNT ||

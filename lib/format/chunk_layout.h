@@ -10,22 +10,23 @@
 #include "hdf5_write/h5.h"
 #include "mesh/attributes.h"
 
+/* The tables of subtrees: counts and their prefix sums (no checksums). */
 typedef struct ebpo_subtree_checksums {
     uint64_t subtrees;
     uint32_t cols;
-    uint64_t *before; /* [subtrees + 1][cols] sums of the columns of /subtrees/counts */
-    uint32_t *counts; /* [subtrees][cols] */
-    uint64_t *index;  /* [chunks of counts][cols] */
-    uint32_t *outer;  /* [shared_count] */
+    uint64_t *before; /* [subtrees + 1][cols] sums of the columns before each subtree */
+    uint32_t *counts; /* [subtrees][cols] /subtrees/counts */
+    uint64_t *index;  /* [chunks of counts][cols] sums before each chunk of counts */
+    uint32_t *outer;  /* [shared_count] /subtrees/outer */
     uint64_t shared_count, shared_capacity;
 } ebpo_subtree_checksums;
 
-/* Returns the level of the subtrees' roots for a desired number of faces in a subtree; 0 if no
- * subtrees are needed. */
+/* Returns the level of the subtrees' roots for a requested number of faces in a subtree, or 0 if
+ * the file is written without subtrees. `subtree_faces`: as in ebpo_write_options. */
 int ebpo_subtree_level_for(const ebpo_info *info, uint64_t subtree_faces);
 
-/* Computes the counts of the subtrees and their sums. `info` is the information that the file will
- * state; its subtree_level is not 0. The caller has checked the tree. */
+/* Computes the counts of the subtrees and the sums of these counts. `info`: as in the file to
+ * write; its subtree_level is not 0. The caller has checked the tree. */
 EBPO_MUST_USE ebpo_status ebpo_subtree_checksums_make(ebpo_subtree_checksums *out,
                                                       const ebpo_tree *tree, const ebpo_info *info,
                                                       ebpo_error *error);
@@ -48,7 +49,7 @@ typedef struct ebpo_array_out {
     ebpo_array_id rows_of;
 } ebpo_array_out;
 
-/* Head of an attribute array. */
+/* Properties of an attribute array that its HDF5 attributes state. */
 typedef struct ebpo_attribute_plan {
     bool columns, items_columns, has_range;
     double range[2];
@@ -69,15 +70,15 @@ typedef struct ebpo_plan {
 
 /* --- rows of chunks --- */
 
-/* Returns the number of rows in each chunk of an array: all rows, or a power of two. `rows` is the
- * number of rows of the array. */
+/* Returns the number of rows in each chunk of an array: all rows, or a power of two. `rows`: all
+ * rows of the array. */
 uint32_t ebpo_rows_of_chunk(const ebpo_info *info, ebpo_array_id id, int level, uint64_t rows,
                             uint32_t cols, uint32_t element_size);
 
-/* Returns the number of rows in each chunk for a file that another program has rewritten, as
- * described at ebpo_h5_chunk_rows_fn. Codes restart at chunks, so the original number must be found
- * if that program changed it. Arrays whose chunk size is not fixed keep their chunk size if the
- * format allows it. */
+/* Returns the original number of rows in each chunk for a file that another program has rewritten.
+ * See ebpo_h5_chunk_rows_fn. The values cannot be decoded with another number, as codes restart at
+ * each chunk. If `kept` is true, arrays whose chunk size the format does not fix keep their current
+ * chunk size, if the format allows it. */
 uint32_t ebpo_rows_of_foreign_chunk(const char *path, const ebpo_shape *stored, bool subtrees,
                                     bool kept);
 
@@ -92,7 +93,7 @@ typedef struct ebpo_ordered_chunk {
 typedef struct ebpo_chunk_order {
     ebpo_ordered_chunk *chunk; /* [count]; all except /subtrees/places */
     uint64_t count;
-    uint64_t top; /* number of chunks needed to look up a subtree */
+    uint64_t top; /* number of chunks at the beginning that are needed to look up a subtree */
 } ebpo_chunk_order;
 
 EBPO_MUST_USE ebpo_status ebpo_chunk_order_make(ebpo_chunk_order *out, const ebpo_plan *plan,

@@ -1,8 +1,7 @@
-/* Reads ranges of rows of a file's arrays through a cache of decoded chunks under a budget. Each
- * chunk is decoded and checked once, when it is loaded, so using it again only requires finding it.
- * Any number of threads share the cache. A counted cache belongs to one thread, reads and
- * prefetches only what its user requests, and refuses loads beyond a limit of bytes read
- * (EBPO_E_LIMIT). */
+/* Reads ranges of rows of a file's arrays through a cache of decoded chunks under a budget. A chunk
+ * is decoded and checked when it is loaded; later uses only find it in the cache. Any number of
+ * threads share the cache. A counted cache belongs to one thread. It reads and prefetches only
+ * requested chunks, and refuses loads beyond a limit of bytes read (EBPO_E_LIMIT). */
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
@@ -16,8 +15,10 @@
 #include "format/read_attributes.h"
 #include "hdf5_read/coding.h"
 
+/* Bits of a key for the number of the chunk; number of adjacent chunks that are fetched together.
+ */
 enum { CHUNK_BITS = 48, AROUND = 4 };
-/* Limits for prefetch hints: a maximum, and a share of the remaining limit. */
+/* Limits of prefetched bytes of a counted cache: a maximum, and shares of the remaining limit. */
 enum { AHEAD_MAX = 4 << 20, AHEAD_SHARE = 4, BATCH_SHARE = 16 };
 
 static uint64_t key_of(const ebpo_array_in *array, uint64_t chunk)
@@ -80,15 +81,15 @@ static ebpo_status decode_vertices(const ebpo_chunks *c, uint64_t rows, const ui
 {
     bool finite = true;
     if (c->file->info.double_coordinates) {
-        const double *numbers = xyz;
+        const double *values = xyz;
         ebpo_points64_decode(raw, rows, xyz);
         for (uint64_t i = 0; i < 3 * rows; i++)
-            finite &= isfinite(numbers[i]) != 0;
+            finite &= isfinite(values[i]) != 0;
     } else {
-        const float *numbers = xyz;
+        const float *values = xyz;
         ebpo_points32_decode(raw, rows, xyz);
         for (uint64_t i = 0; i < 3 * rows; i++)
-            finite &= isfinite(numbers[i]) != 0;
+            finite &= isfinite(values[i]) != 0;
     }
     return finite ? EBPO_OK
                   : ebpo_chunks_fail(c, -1, EBPO_A_VERTICES, "a coordinate is not a finite number",
@@ -111,8 +112,7 @@ static ebpo_status decode_map(const ebpo_chunks *c, ebpo_array_id id, uint64_t r
                : ebpo_chunks_fail(c, -1, id, "a source index is out of range or used twice", error);
 }
 
-/* Decodes and checks a chunk, once for each load, so that using it again only requires finding it.
- */
+/* Decodes a chunk and checks its values. */
 static ebpo_status decode_item(const ebpo_chunks *c, const ebpo_array_in *array, uint64_t chunk,
                                const uint8_t *raw, void *item, ebpo_error *error)
 {
@@ -127,8 +127,8 @@ static ebpo_status decode_item(const ebpo_chunks *c, const ebpo_array_in *array,
     }
 }
 
-static void expect_missing(ebpo_chunks *c, ebpo_hints *e, const ebpo_array_in *array,
-                           uint64_t begin, uint64_t end)
+static void hint_missing(ebpo_chunks *c, ebpo_hints *e, const ebpo_array_in *array, uint64_t begin,
+                         uint64_t end)
 {
     for (uint64_t i = begin; i < end; i++)
         if (!ebpo_cache_has(c->cache, key_of(array, i)))
@@ -146,26 +146,26 @@ void ebpo_chunks_hint(ebpo_chunks *c, ebpo_hints *e, ebpo_array_id id, int level
     if (c->counted)
         return;
     uint64_t left = array->shape.rows - row, last = row + (rows < left ? rows : left) - 1;
-    expect_missing(c, e, array, row / array->shape.chunk_rows, last / array->shape.chunk_rows + 1);
+    hint_missing(c, e, array, row / array->shape.chunk_rows, last / array->shape.chunk_rows + 1);
 }
 
-/* Prefetches adjacent chunks: a request for a few chunks takes about as long as for one, and they
- * are likely to be next. */
-static void expect_around(ebpo_chunks *c, const ebpo_array_in *array, uint64_t chunk)
+/* Sends prefetch hints for adjacent chunks, which are likely to be read next. A request for a few
+ * chunks takes about as long as a request for one. */
+static void hint_around(ebpo_chunks *c, const ebpo_array_in *array, uint64_t chunk)
 {
     uint64_t begin = chunk / AROUND * AROUND, count = ebpo_shape_chunks(&array->shape);
     ebpo_hints e = EBPO_HINTS_INIT(c->file);
     /* in files with subtrees, adjacent chunks belong to other arrays */
     if (!ebpo_input_expects(&c->file->in) || c->file->info.subtree_level)
         return;
-    expect_missing(c, &e, array, begin, count - begin < AROUND ? count : begin + AROUND);
+    hint_missing(c, &e, array, begin, count - begin < AROUND ? count : begin + AROUND);
     ebpo_hint_all(&e);
 }
 
 /* --- counting --- */
 
-/* Returns the bytes that must be read for a chunk, including the chunk offsets if they have not
- * been read. */
+/* Returns the number of bytes that must be read for a chunk, including the chunk offsets if they
+ * are not known yet. */
 static uint64_t cost_of(const ebpo_chunks *c, const ebpo_array_in *array, uint64_t chunk)
 {
     if (ebpo_shape_chunks(&array->shape) == 1 || atomic_load(&c->file->located))
@@ -195,7 +195,9 @@ static ebpo_status refuse_load(ebpo_chunks *c, const ebpo_array_in *array, ebpo_
                         c->limit);
 }
 
-/* Checks the limit before a chunk is read; prefetched chunks were already counted. */
+/* Checks the limit before a chunk is read. Prefetched chunks were counted when they were
+ * prefetched.
+ */
 static ebpo_status admit_load(ebpo_chunks *c, const ebpo_array_in *array, uint64_t key,
                               ebpo_error *error)
 {
@@ -219,9 +221,10 @@ static bool is_ahead(const ebpo_chunks *c, uint64_t key)
 
 static uint64_t smaller_of(uint64_t a, uint64_t b) { return a < b ? a : b; }
 
-/* Returns a share of the remaining limit, minus prefetched bytes not yet read. These may wait long,
- * as a view may turn elsewhere first; the share then shrinks with each batch, so that batches do
- * not degenerate to single chunks. */
+/* Returns a share of the remaining limit, minus the prefetched bytes that are not yet read. Those
+ * bytes may remain unread for long, for example when a view turns away. The result is therefore at
+ * least a smaller share of the remaining limit, so that batches do not degenerate to single chunks.
+ */
 uint64_t ebpo_chunks_capacity(const ebpo_chunks *c)
 {
     uint64_t taken = atomic_load(&c->file->in.bytes),
@@ -231,9 +234,9 @@ uint64_t ebpo_chunks_capacity(const ebpo_chunks *c)
     return share > c->ahead_bytes + batch ? share - c->ahead_bytes : batch;
 }
 
-/* Sends prefetch hints for chunks of counted arrays, within the limit; they count as read from then
- * on. The first `now` are needed at once. The others are prefetched only while the prefetched and
- * unread bytes stay small, also relative to the remaining limit (ebpo_chunks_capacity). */
+/* Sends prefetch hints for chunks of a counted cache, within its limit. Their bytes count as read
+ * from then on. The first `now` chunks are needed at once. The others are prefetched only while the
+ * prefetched and unread bytes are few (ebpo_chunks_capacity). */
 static void chunks_hint(ebpo_chunks *c, const uint64_t *keys, unsigned now, unsigned count)
 {
     ebpo_hints e = EBPO_HINTS_INIT(c->file);
@@ -319,9 +322,9 @@ bool ebpo_chunks_missing(ebpo_chunks *c, ebpo_array_id id, int level, uint64_t r
 
 void ebpo_chunks_collect(ebpo_chunks *c, ebpo_chunk_keys *keys) { c->collecting = keys; }
 
-/* Returns true for rows of the table and chunks that lead to the subtrees: further chunks depend on
- * their content. */
-static bool reports_more(const ebpo_chunks *c, uint64_t key)
+/* Returns true for chunks of the table of subtrees, and of the types down to the subtrees' roots.
+ * Their content determines which further chunks are needed. */
+static bool locates_more(const ebpo_chunks *c, uint64_t key)
 {
     const ebpo_array_in *a = array_of(c, key);
     return a->id >= EBPO_A_SUBTREE_INDEX ||
@@ -336,7 +339,7 @@ ebpo_status ebpo_chunks_fetch(ebpo_chunks *c, const ebpo_chunk_keys *keys, unsig
     chunks_hint(c, keys->key, now, keys->count);
     for (unsigned i = 0; i < keys->count && status == EBPO_OK; i++) {
         void *item;
-        if (i >= now && !(reports_more(c, keys->key[i]) && is_ahead(c, keys->key[i])))
+        if (i >= now && !(locates_more(c, keys->key[i]) && is_ahead(c, keys->key[i])))
             continue;
         status = ebpo_cache_get(c->cache, keys->key[i], &item, NULL, error);
         if (status == EBPO_OK)
@@ -345,8 +348,8 @@ ebpo_status ebpo_chunks_fetch(ebpo_chunks *c, const ebpo_chunk_keys *keys, unsig
     return status;
 }
 
-/* Reads the counts of vertices seen before each chunk of faces; for counted chunks, only when the
- * first one is read. */
+/* Reads the number of vertices that the faces before each chunk of faces use. In a counted cache,
+ * this is done when the first chunk of faces is read. */
 static ebpo_status read_seen(ebpo_chunks *c, ebpo_error *error)
 {
     const ebpo_array_in *index = ebpo_reader_array(c->file, EBPO_A_FACES_INDEX, 0);
@@ -388,7 +391,7 @@ static ebpo_status load_chunk(void *user, uint64_t key, uint64_t most, void **it
     ebpo_status status =
         made ? EBPO_OK : ebpo_fail_memory(error, rows * row_bytes + sizeof *reader);
     if (!c->counted)
-        expect_around(c, array, chunk_of(key));
+        hint_around(c, array, chunk_of(key));
     if (status == EBPO_OK)
         status =
             ebpo_reader_chunk(c->file, array, chunk_of(key), &reader->reader, reader->raw, error);
@@ -410,7 +413,7 @@ static void release_chunk(void *user, void *item)
     free(item);
 }
 
-/* Creates a cache. pool: NULL, or the shared budget. */
+/* Creates a cache. `pool`: shared budget, or NULL for the separate `budget`. */
 static ebpo_status make_chunks(ebpo_chunks **out, const ebpo_file *file, uint64_t budget,
                                ebpo_cache_pool *pool, bool counted, ebpo_error *error)
 {
@@ -481,7 +484,8 @@ ebpo_status ebpo_held_chunk_load(ebpo_chunks *chunks, ebpo_held_chunk *view, uin
 {
     uint64_t chunk = row / view->array->shape.chunk_rows;
     void *item;
-    ebpo_held_chunk_release(chunks, view); /* first, as a tight budget may need the space */
+    ebpo_held_chunk_release(chunks,
+                            view); /* before loading, as a small budget may need its space */
     uint64_t key = key_of(view->array, chunk);
     if (chunks->collecting && !ebpo_cache_has(chunks->cache, key)) {
         add_key(chunks->collecting, key, cost_of(chunks, view->array, chunk));
@@ -533,10 +537,10 @@ ebpo_status ebpo_chunks_integers(ebpo_chunks *chunks, ebpo_array_id id, int leve
     if (status != EBPO_OK)
         return status;
     const ebpo_array_in *array = ebpo_reader_array(chunks->file, id, level);
-    ebpo_hints expected = EBPO_HINTS_INIT(chunks->file);
+    ebpo_hints hints = EBPO_HINTS_INIT(chunks->file);
     if (!chunks->counted)
-        ebpo_chunks_hint(chunks, &expected, id, level, row, rows);
-    ebpo_hint_all(&expected);
+        ebpo_chunks_hint(chunks, &hints, id, level, row, rows);
+    ebpo_hint_all(&hints);
     ebpo_held_chunk view = { .array = array };
     uint64_t cols = array->shape.cols ? array->shape.cols : 1;
     uint8_t *out = values;
@@ -560,7 +564,7 @@ ebpo_status ebpo_chunks_take(ebpo_chunks *chunks, ebpo_array_id id, int level, u
                              uint64_t rows, size_t size, void *values_out, ebpo_error *error)
 {
     void *values = NULL;
-    /* before making space */
+    /* checked before memory is allocated */
     ebpo_status status = rows ? check_rows(chunks, id, level, row, rows, size, error) : EBPO_OK;
     if (status == EBPO_OK && rows) {
         const ebpo_array_in *array = ebpo_reader_array(chunks->file, id, level);

@@ -15,9 +15,9 @@ EBPO_MUST_USE ebpo_status ebpo_chunks_make(ebpo_chunks **out, const ebpo_file *f
 /* Creates a cache under a shared budget. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_make_in(ebpo_chunks **out, const ebpo_file *file,
                                               ebpo_cache_pool *pool, ebpo_error *error);
-/* Creates a counted cache for one thread at a time. Only requested data are read or prefetched, and
- * no read may exceed the limit of bytes read from the file (ebpo_chunks_limit; initially none).
- * A read beyond the limit returns EBPO_E_LIMIT, and ebpo_chunks_refused returns true. */
+/* Creates a counted cache for one thread at a time. It reads and prefetches only requested data.
+ * ebpo_chunks_limit sets the maximum number of bytes read from the file; initially there is none. A
+ * read beyond the limit returns EBPO_E_LIMIT, and ebpo_chunks_refused then returns true. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_make_counted(ebpo_chunks **out, const ebpo_file *file,
                                                    uint64_t budget, ebpo_error *error);
 void ebpo_chunks_limit(ebpo_chunks *chunks, uint64_t bytes);
@@ -36,7 +36,8 @@ EBPO_MUST_USE ebpo_status ebpo_chunks_integers(ebpo_chunks *chunks, ebpo_array_i
 struct ebpo_chunks {
     const ebpo_file *file;
     ebpo_cache *cache;
-    /* [chunks of /mesh/faces] vertices seen before each chunk; NULL: a single chunk, or no mesh */
+    /* [chunks of /mesh/faces] number of vertices that the faces before each chunk use;
+     * NULL: a single chunk, or no mesh */
     uint64_t *seen;
     pthread_mutex_t lock;        /* for `rows` */
     struct ebpo_kept_rows *rows; /* recently used rows of the table of subtrees, or NULL */
@@ -73,18 +74,20 @@ EBPO_MUST_USE static inline ebpo_status ebpo_held_chunk_move(ebpo_chunks *chunks
                                                  : ebpo_held_chunk_load(chunks, view, row, error);
 }
 
-/* Does the same as ebpo_chunks_integers, in new memory; NULL for no rows. */
+/* Does the same as ebpo_chunks_integers, into new memory that the caller frees. `values_out` is the
+ * address of the pointer; the pointer is NULL for 0 rows. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_take(ebpo_chunks *chunks, ebpo_array_id id, int level,
                                            uint64_t row, uint64_t rows, size_t size,
                                            void *values_out, ebpo_error *error);
 
-/* Collects the chunks of existing rows in [row, row + rows) that are not in memory. Does nothing
- * for counted chunks, except while collecting; they have separate functions below. */
-void ebpo_chunks_hint(ebpo_chunks *chunks, ebpo_hints *expected, ebpo_array_id id, int level,
+/* Adds the chunks of existing rows in [row, row + rows) that are not in memory to `hints`. In a
+ * counted cache, it only adds them to the keys of ebpo_chunks_collect, if any; use the functions
+ * below. */
+void ebpo_chunks_hint(ebpo_chunks *chunks, ebpo_hints *hints, ebpo_array_id id, int level,
                       uint64_t row, uint64_t rows);
 
 /* Set of chunk keys. Chunks that do not fit are omitted, and later read without a prefetch hint.
- * Initialise with ebpo_chunk_keys_begin: unused parts are never cleared. */
+ * Initialise a set with ebpo_chunk_keys_begin, which clears only the parts that it uses. */
 enum { EBPO_CHUNK_KEYS = 8192 };
 typedef struct ebpo_chunk_keys {
     unsigned count, mask; /* mask + 1 slots */
@@ -94,21 +97,20 @@ typedef struct ebpo_chunk_keys {
 } ebpo_chunk_keys;
 void ebpo_chunk_keys_begin(ebpo_chunk_keys *keys);
 
-/* Adds the chunks of existing rows in [row, row + rows) that are not in memory; returns true if
- * there are any. */
+/* Adds the chunks of existing rows in [row, row + rows) that are not in memory to `keys`. Returns
+ * true if there are any. */
 bool ebpo_chunks_missing(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row,
                          uint64_t rows, ebpo_chunk_keys *keys);
 
-/* Returns the number of bytes that may be prefetched now for later use. */
+/* Returns the number of bytes that a counted cache may prefetch now for later use. */
 uint64_t ebpo_chunks_capacity(const ebpo_chunks *chunks);
 
 /* Returns true if all of these counted chunks are prefetched and not yet read. */
 bool ebpo_chunks_hinted(const ebpo_chunks *chunks, const ebpo_chunk_keys *keys);
-/* Starts collecting the counted chunks that an operation needs. Until the call with NULL nothing is
- * read: chunks that are not in memory are added to `keys`, and reading them returns EBPO_E_LIMIT.
- */
+/* Starts collecting the counted chunks that an operation needs. Until the call with NULL, nothing
+ * is read: a chunk that is not in memory is added to `keys`, and its read returns EBPO_E_LIMIT. */
 void ebpo_chunks_collect(ebpo_chunks *chunks, ebpo_chunk_keys *keys);
-/* Sends prefetch hints for counted chunks and reads the first `now` of them. */
+/* Sends prefetch hints for counted chunks and reads the first `now` chunks of `keys`. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_fetch(ebpo_chunks *chunks, const ebpo_chunk_keys *keys,
                                             unsigned now, ebpo_error *error);
 

@@ -1,8 +1,9 @@
-/* Computes the content checksum: over all arrays of a file, sorted by path, the SHA-256 of the
- * array as stored before shuffle and compression. It does not depend on the codec, chunks or HDF5.
- * Where a coding depends on the chunks (vertex indices in faces), rows are recoded as in a file
- * without subtrees. The part `attributes` has a separate checksum of its values, so the content
- * checksum is the same with and without it. Source: format-spec/README.md, section 8. */
+/* Computes the content checksum from the path and the SHA-256 of each array, sorted by path. The
+ * SHA-256 is that of the array's bytes before shuffle and compression, so the checksum does not
+ * depend on the codec, the chunks or HDF5. Codes that restart at each chunk (vertices, maps) are
+ * recoded as in a file without subtrees. The part `attributes` has a separate checksum of its
+ * values, so the content checksum is the same with and without attributes. Source:
+ * format-spec/README.md, section 8. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,7 +16,7 @@
 #include "format/schema.h"
 #include "hdf5_read/coding.h"
 
-/* Chunks of faces in a file without subtrees. */
+/* Faces of a chunk in a file without subtrees; number of chunks with subtrees that contain them. */
 enum { PLAIN_FACE_ROWS = 4096, SKIPPED = PLAIN_FACE_ROWS / EBPO_FACE_BLOCK };
 
 bool ebpo_content_has(const ebpo_info *info, ebpo_array_id id)
@@ -38,7 +39,7 @@ static uint64_t load_integer(const uint8_t *at, unsigned size)
     return size == 4 ? ebpo_load32(at) : ebpo_load64(at);
 }
 
-/* Converts a zigzag code to a difference and back, modulo 2 to the number of bits of `size`. */
+/* Convert a zigzag code to a difference and back, modulo 2^(8 * size). */
 static uint64_t decode_zigzag(uint64_t code) { return (code >> 1) ^ (0 - (code & 1)); }
 
 static uint64_t encode_zigzag(uint64_t value, unsigned size)
@@ -47,8 +48,8 @@ static uint64_t encode_zigzag(uint64_t value, unsigned size)
                      : value << 1 ^ (0 - (value >> 63));
 }
 
-/* Recodes rows so that the first one continues from the chunk before; keeps the last row's values.
- */
+/* Writes the chunk's first row to `joined`, recoded as a difference from the last row of the
+ * previous chunk if `goes_on` is true. Stores the values of the chunk's last row. */
 static void join_deltas(ebpo_array_digest *digest, const ebpo_shape *shape, bool goes_on,
                         uint64_t rows, const uint8_t *bytes, uint8_t *joined)
 {
@@ -133,7 +134,7 @@ void ebpo_content_free(ebpo_content *content)
     memset(content, 0, sizeof *content);
 }
 
-/* --- the part `attributes`: its values, independent of their storage --- */
+/* --- the checksum of the part `attributes`: over values, independent of their storage --- */
 
 enum { PIECE = 1 << 16 };
 

@@ -1,6 +1,7 @@
-/* Computes the content checksum: over all arrays of a file, sorted by path: path, a zero byte,
- * SHA-256 of the array as stored before shuffle and compression. It does not depend on codec,
- * chunks or HDF5, and a few lines of Python compute it. */
+/* Computes the content checksum of a file: the SHA-256 of one entry per array, sorted by path. An
+ * entry is the path, a zero byte, and the SHA-256 of the array as stored before shuffle and
+ * compression. The checksum does not depend on the codec, the chunks or HDF5. A few lines of Python
+ * compute it. */
 #ifndef EBPO_FORMAT_CONTENT_CHECKSUM_H
 #define EBPO_FORMAT_CONTENT_CHECKSUM_H
 
@@ -16,23 +17,24 @@ typedef struct ebpo_content_entry {
     uint8_t digest[32];
 } ebpo_content_entry;
 
-/* Returns true if a checksum includes the array. Tables of subtrees are excluded, as the layout
- * does not count. */
+/* Returns true if a checksum includes the array. The tables of subtrees are excluded, as the
+ * checksum does not depend on the layout. */
 bool ebpo_content_has(const ebpo_info *info, ebpo_array_id id);
 
-/* The checksum that includes an array: the content checksum is the same with and without colours.
- */
+/* The two checksums. Colours have a separate one, so the content checksum is the same with and
+ * without colours. */
 enum { EBPO_DIGEST_CONTENT, EBPO_DIGEST_COLOURS, EBPO_DIGESTS };
 static inline int ebpo_content_of(ebpo_array_id id)
 {
     return id == EBPO_A_GRAY_COLOURS ? EBPO_DIGEST_COLOURS : EBPO_DIGEST_CONTENT;
 }
 
-/* Digest of one array, chunk by chunk. Chunks with fewer rows than without subtrees are joined to
- * larger ones: codes that restart with them are recoded. */
+/* Digest of one array, computed chunk by chunk. In a file with subtrees, chunks have fewer rows
+ * than in a file without. They are joined to the larger chunks, and codes that restart with each
+ * chunk are recoded. */
 typedef struct ebpo_array_digest {
     ebpo_sha256 state;
-    uint64_t last[3]; /* running sums of the components at the end of the chunk before */
+    uint64_t last[3]; /* running sums of the components at the end of the previous chunk */
 } ebpo_array_digest;
 
 void ebpo_array_digest_begin(ebpo_array_digest *digest);
@@ -42,7 +44,7 @@ void ebpo_array_digest_add(ebpo_array_digest *digest, const ebpo_info *info, ebp
                            const uint8_t *bytes);
 void ebpo_array_digest_end(ebpo_array_digest *digest, uint8_t out[32]);
 
-/* Initialise with zeros. Arrays may come in any order. */
+/* The entries of the arrays. Initialise with zeros. Arrays may be added in any order. */
 typedef struct ebpo_content {
     bool short_of_memory;
     ebpo_content_entry *entries;

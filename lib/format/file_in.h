@@ -20,7 +20,7 @@ typedef struct ebpo_chunk_reader {
     size_t capacity;
 } ebpo_chunk_reader;
 
-/* State of one thread. */
+/* Chunk reader and buffer of one thread. */
 typedef struct ebpo_idle_reader ebpo_idle_reader;
 struct ebpo_idle_reader {
     ebpo_idle_reader *next;
@@ -28,8 +28,8 @@ struct ebpo_idle_reader {
     uint8_t raw[EBPO_CHUNK_BYTES_MAX];
 };
 
-/* Idle chunk readers for reuse, as creating a decoder takes longer than decoding a chunk. A few
- * stay with the file and count toward no budget. */
+/* Idle chunk readers for reuse, as creating a decoder takes longer than decoding a chunk. The file
+ * keeps a few of them, which count toward no budget. */
 typedef struct ebpo_idle_readers {
     pthread_mutex_t lock; /* protects the following fields */
     ebpo_idle_reader *first;
@@ -42,13 +42,13 @@ typedef struct ebpo_array_in {
     int level;
     char path[EBPO_PATH_BYTES];
     ebpo_shape shape; /* of the result of ebpo_reader_chunk */
-    bool gates;       /* derives the stored shape: ebpo_stored_shape */
+    bool gates;       /* stored as gates, so the stored shape differs: ebpo_stored_shape */
     uint64_t stored_bytes;
     /* [ebpo_shape_chunks(&shape)] location of each chunk; NULL when the array is absent. Valid
      * after ebpo_reader_locate, or always for a single chunk */
     ebpo_chunk_location *chunks;
-    uint64_t first_sum; /* index of its first chunk in the list of chunk checksums */
-    const char *coding; /* for attributes; other arrays have theirs in ebpo_schema */
+    uint64_t first_sum; /* index of the array's first chunk in the list of chunk checksums */
+    const char *coding; /* for attributes; ebpo_schema has the codings of other arrays */
 } ebpo_array_in;
 
 /* Returns the maximum size of a stored chunk. */
@@ -58,7 +58,7 @@ static inline size_t ebpo_reader_chunk_bound(const ebpo_array_in *array)
     return ebpo_chunk_bound(stored.chunk_rows * ebpo_shape_row_bytes(&stored));
 }
 
-/* Head of an attribute array. */
+/* Properties of an attribute array that its HDF5 attributes state. */
 typedef struct ebpo_attribute_in {
     ebpo_attribute head; /* no values */
     bool different;      /* lists have different lengths */
@@ -84,15 +84,16 @@ struct ebpo_file {
     atomic_bool located; /* the chunks of all arrays are located */
     bool has_places;     /* the file has a list of chunk offsets */
     bool has_checksums;  /* the file has a list of chunk checksums: chunk_directory.h */
-    atomic_bool summed;  /* the list has been read */
-    uint32_t *checksums;
+    atomic_bool summed;  /* the list of chunk checksums has been read */
+    uint32_t *checksums; /* NULL until then */
     ebpo_idle_readers idle;
 };
 
 /* Opens a file that this process has written, without a limit on its decoded size. */
 EBPO_MUST_USE ebpo_status ebpo_open_own(const char *path, ebpo_file **out, ebpo_error *error);
 
-/* Locates the chunks of an array that is present. Reads remote files once. Any thread. */
+/* Locates the chunks of an array that is present. The first call locates the chunks of all arrays;
+ * later calls do not read the file. Any thread may call this function. */
 EBPO_MUST_USE ebpo_status ebpo_reader_locate(const ebpo_file *file, const ebpo_array_in *array,
                                              ebpo_error *error);
 
@@ -110,14 +111,14 @@ static inline ebpo_check ebpo_reader_check(const ebpo_file *file, ebpo_workspace
     return (ebpo_check){ file->in.shown, EBPO_E_FORMAT, workspace };
 }
 
-/* Returns the mutable state of a file that is being read: counters, chunk offsets, idle readers.
- * Atomic, or protected by its locks. */
+/* Returns a file as mutable, for the state that reading changes: counters, chunk offsets, idle
+ * readers. These members are atomic or protected by the file's locks. */
 static inline ebpo_file *ebpo_reader_own(const ebpo_file *file)
 {
     return (ebpo_file *)(uintptr_t)file;
 }
 
-/* Returns the allowed rows of the file's chunks. */
+/* Returns which numbers of rows are allowed in the chunks of an array. */
 static inline ebpo_head_rows ebpo_reader_rows_of_chunk(const ebpo_file *file, ebpo_array_id id)
 {
     return ebpo_schema_is_list(id)    ? EBPO_HEAD_ROWS_ALL
@@ -128,7 +129,8 @@ static inline ebpo_head_rows ebpo_reader_rows_of_chunk(const ebpo_file *file, eb
 /* Returns the stored size of an array; 0 while another thread may be locating its chunks. */
 uint64_t ebpo_reader_stored_bytes(const ebpo_file *file, const ebpo_array_in *array);
 
-/* Returns the bytes of a level in the file, once it has been read. */
+/* Returns the stored bytes of a level. While another thread may be locating the chunks, it counts
+ * only sizes that are known since opening. */
 uint64_t ebpo_reader_level_bytes(const ebpo_file *file, int level);
 
 #endif

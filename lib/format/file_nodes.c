@@ -1,8 +1,8 @@
-/* Reads single nodes of a file through a cache of chunks: the children of a gray node, the planes
- * and the winding number of a node; and groups of eight siblings with all of these, for streams
- * that do not follow the file's order. Each function reads only the chunks that contain the node
- * and checks the values against the head and the index. For remote files, a missing group and the
- * following ones are fetched together. */
+/* Reads single nodes of a file through a cache of chunks: the children of a gray node, and the
+ * planes and the winding number of a node. Also reads groups of eight siblings with their planes
+ * and winding numbers, for streams that do not follow the file's order. Each function reads only
+ * the chunks that contain the node, and checks the values against the header and the index arrays.
+ * For remote files, several groups are fetched together. */
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
@@ -51,7 +51,7 @@ ebpo_status ebpo_chunks_children(ebpo_chunks *chunks, const ebpo_node *gray, uin
     ebpo_status status = check_type(chunks, gray, EBPO_GRAY, "children", error);
     if (status == EBPO_OK &&
         gray->cell.level + 1 ==
-            chunks->file->info.level_count) { /* pruned: checked with the head */
+            chunks->file->info.level_count) { /* a pruned node: ebpo_facts_check excludes others */
         *types = 0;
         memset(ranks, 0, 4 * sizeof *ranks);
         return EBPO_OK;
@@ -67,11 +67,11 @@ ebpo_status ebpo_chunks_children(ebpo_chunks *chunks, const ebpo_node *gray, uin
     return ebpo_ranks_check(chunks, gray->cell.level + 1, ranks, counts, error);
 }
 
-/* Location of a node's planes: those that a gray node adds, or those stored for a leaf. */
+/* The arrays with a node's planes: planes that a gray node adds, or stored planes of a leaf. */
 typedef struct plane_list {
     ebpo_array_id counts, codes;
     uint32_t part;
-    uint64_t all; /* total of the level */
+    uint64_t all; /* number of planes in the level */
 } plane_list;
 
 static plane_list planes_of(const ebpo_chunks *chunks, const ebpo_node *node)
@@ -155,8 +155,6 @@ ebpo_status ebpo_chunks_winding(ebpo_chunks *chunks, const ebpo_node *node, int3
     return status;
 }
 
-/* octants 1 to 7 do not exist */
-
 ebpo_status ebpo_chunks_root(ebpo_chunks *chunks, ebpo_node *root, ebpo_error *error)
 {
     uint16_t types = 0;
@@ -215,7 +213,7 @@ static ebpo_status read_types(ebpo_chunks *chunks, int level, uint64_t group, eb
     ebpo_groups_count(&out->types, 1, counts);
     if (level == 0)
         counts[EBPO_WHITE] =
-            ebpo_group_type(out->types, 0) == EBPO_WHITE; /* octants 1 to 7 do not exist */
+            ebpo_group_type(out->types, 0) == EBPO_WHITE; /* level 0 has no octants 1 to 7 */
     return ebpo_ranks_check(chunks, level, out->rank, counts, error);
 }
 
@@ -285,7 +283,8 @@ static ebpo_status read_leaf_planes(ebpo_chunks *chunks, int level, uint64_t cou
                       EBPO_LEAF, error);
 }
 
-/* Sorts codes into node order; initially, codes of gray nodes precede those of leaves. */
+/* Sorts the plane codes into node order. Before, the codes of gray nodes precede those of leaves.
+ */
 static void sort_codes(ebpo_group *group, unsigned gray_codes)
 {
     uint32_t sorted[EBPO_GROUP_CODES];
@@ -353,9 +352,10 @@ ebpo_status ebpo_group_read(ebpo_chunks *chunks, int level, uint64_t group, unsi
                : status;
 }
 
-/* --- chunks needed for reading --- */
+/* --- chunks of a group that are not in memory --- */
 
-/* Adds the chunks of an item's index row, and of the counts and the items themselves. */
+/* Adds the missing chunks of an item's index row, and of the counts from this row to the last of
+ * `items` items. Returns true if there are any. */
 static bool missing_counted(ebpo_chunks *chunks, ebpo_array_id index, ebpo_array_id counts,
                             int level, uint64_t item, uint64_t items, ebpo_chunk_keys *keys)
 {
@@ -388,7 +388,8 @@ static uint64_t chunks_of(const ebpo_array_in *array)
     return array->present ? ebpo_shape_chunks(&array->shape) : 0;
 }
 
-/* Adds the single-chunk arrays of a level, which every group needs. Returns their bytes. */
+/* Adds the missing single-chunk arrays of a level, which every group needs. Returns their stored
+ * bytes. */
 static uint64_t add_small(ebpo_chunks *chunks, int level, unsigned wanted, ebpo_chunk_keys *keys)
 {
     static const struct {
@@ -415,8 +416,8 @@ static uint64_t add_small(ebpo_chunks *chunks, int level, unsigned wanted, ebpo_
     return bytes;
 }
 
-/* Adds the next chunks that reading the group would wait for; returns false when there are none.
- * Reads only memory; errors are left to the actual read. */
+/* Adds the missing chunks that the group needs next; returns false when there are none. Reads only
+ * chunks in memory. Ignores errors, which the later read reports. */
 static bool group_is_missing(ebpo_chunks *chunks, const ebpo_group_number *number, unsigned wanted,
                              ebpo_chunk_keys *keys)
 {
@@ -464,8 +465,8 @@ ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_number *group
                              unsigned wanted, ebpo_error *error)
 {
     enum {
-        STAGES = 4 /* start of its subtree, types, counts, planes */,
-        FIRST_BYTES = 32 << 10 /* of the first levels, which are always needed */
+        STAGES = 4 /* rows of the table of subtrees, types, counts, planes */,
+        FIRST_BYTES = 32 << 10 /* with level 0, so much of the next levels is fetched */
     };
     ebpo_status status = EBPO_OK;
     for (int stage = 0; stage < STAGES && status == EBPO_OK; stage++) {

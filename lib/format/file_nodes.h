@@ -10,8 +10,8 @@ EBPO_MUST_USE ebpo_status ebpo_chunks_check_node(const ebpo_chunks *chunks, cons
                                                  ebpo_error *error);
 
 /* Reads the children of a gray node: the group's types, and the rank of the group's first node of
- * each type (indexed by ebpo_node_type) in the next level. For a pruned node the types are 0, and
- * the file's info has `pruned`. */
+ * each type (indexed by ebpo_node_type) in the next level. The types of a pruned node are 0, which
+ * only occurs in files with info.pruned. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_children(ebpo_chunks *chunks, const ebpo_node *gray,
                                                uint16_t *types, uint64_t ranks[4],
                                                ebpo_error *error);
@@ -27,7 +27,8 @@ EBPO_MUST_USE ebpo_status ebpo_chunks_planes(ebpo_chunks *chunks, const ebpo_nod
 EBPO_MUST_USE ebpo_status ebpo_chunks_winding(ebpo_chunks *chunks, const ebpo_node *node,
                                               int32_t *winding, ebpo_error *error);
 
-/* Reads the root, for cursors (geometry/cursor.h); the holder is an ebpo_chunks. */
+/* Reads the root. With ebpo_chunks_source, it serves cursors (geometry/cursor.h) whose holder is an
+ * ebpo_chunks. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_root(ebpo_chunks *chunks, ebpo_node *root, ebpo_error *error);
 
 extern const ebpo_node_source ebpo_chunks_source;
@@ -36,12 +37,12 @@ extern const ebpo_node_source ebpo_chunks_source;
 
 enum { EBPO_GROUP_CODES = 8 * 255, EBPO_GROUP_BLOCK = EBPO_INDEX_ROWS };
 
-/* Requested data in addition to the types; data that the file lacks are omitted. */
+/* Data that a caller requests in addition to the types. Data that the file lacks are omitted. */
 enum { EBPO_GROUP_PLANES = 1, EBPO_GROUP_WINDINGS = 2 };
 
 typedef struct ebpo_group {
     uint16_t types;
-    uint64_t rank[4]; /* of the group's first node of each type in its level */
+    uint64_t rank[4]; /* rank in the level of the group's first node of each type */
     /* by octant: planes added by gray nodes, stored planes of leaves */
     uint8_t plane_count[8];
     uint32_t codes[EBPO_GROUP_CODES]; /* in node order; valid codes */
@@ -49,10 +50,11 @@ typedef struct ebpo_group {
     int32_t winding[8]; /* by octant; 0 for gray nodes and in surfaces */
 } ebpo_group;
 
-/* Reads group number `group` of a level: the children of the gray node with that rank in the level
- * before. Level 0 has group 0, with octant 0 only. `chunks` are counted (ebpo_chunks_make_counted).
- * EBPO_E_LIMIT: the limit stopped the reading; chunks read so far stay in memory for another
- * attempt. Values are checked like those of ebpo_chunks_children and ebpo_chunks_planes. */
+/* Reads group number `group` of a level: the children of the gray node with that rank in the
+ * previous level. Level 0 has group 0, with octant 0 only. `chunks` must be counted
+ * (ebpo_chunks_make_counted). Returns EBPO_E_LIMIT when the limit of bytes is reached; chunks read
+ * so far stay in memory for the next attempt. Values are checked as in ebpo_chunks_children and
+ * ebpo_chunks_planes. */
 EBPO_MUST_USE ebpo_status ebpo_group_read(ebpo_chunks *chunks, int level, uint64_t group,
                                           unsigned wanted, ebpo_group *out, ebpo_error *error);
 
@@ -62,13 +64,13 @@ typedef struct ebpo_group_number {
     uint64_t group;
 } ebpo_group_number;
 
-/* Returns true if the file is remote (its source uses prefetch hints) and the group is not
+/* Returns true if the file's source uses prefetch hints (remote files) and the group is not
  * completely in memory. */
 bool ebpo_group_is_far(ebpo_chunks *chunks, const ebpo_group_number *group, unsigned wanted);
 
-/* Fetches the missing chunks of the first group of a remote file and, with them, prefetches those
- * of the other groups, as far as they are known. One group is sufficient for each block of
- * EBPO_GROUP_BLOCK adjacent groups. Returns EBPO_E_LIMIT like ebpo_group_read. */
+/* Fetches the missing chunks of the first group from a remote file. Prefetches the missing chunks
+ * of the other groups at the same time, as far as they are known. For EBPO_GROUP_BLOCK adjacent
+ * groups, one group in `groups` is sufficient. Returns EBPO_E_LIMIT like ebpo_group_read. */
 EBPO_MUST_USE ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_number *groups,
                                            unsigned count, unsigned wanted, ebpo_error *error);
 

@@ -1,9 +1,9 @@
-/* Writes and reads the attributes of a file's root and of its levels: ebpo_info except for values
- * that the reader measures. The tables in the first part have one row for each attribute; writing
- * and reading loop over these rows, so that both agree on names and types. A reader rejects a newer
- * version and unknown required parts before it reads anything else. Before memory is sized by the
- * attributes, check_ functions test their consistency: ranges, and sums over the levels. Source:
- * format-spec/README.md, section 3. */
+/* Writes and reads the HDF5 attributes of a file's root and of its levels. They contain ebpo_info,
+ * except for values that the reader measures. The tables in the first part have one row for each
+ * attribute. Writing and reading loop over these rows, and so agree on names and types. A reader
+ * rejects a newer version and unknown required parts before it reads anything else. The check_
+ * functions test ranges, and sums over the levels, before memory is allocated by these values.
+ * Source: format-spec/README.md, section 3. */
 #include <inttypes.h>
 #include <math.h>
 #include <stddef.h>
@@ -20,7 +20,7 @@
 
 #define FORMAT_NAME "EBP-Octree in HDF5"
 
-/* Conversion of a field of ebpo_info to an attribute. */
+/* Conversion of a member of ebpo_info to an attribute. */
 typedef enum fact_kind {
     FACT_TEXT,    /* char[size], required */
     FACT_NOTE,    /* char[size], omitted when empty */
@@ -29,7 +29,7 @@ typedef enum fact_kind {
     FACT_INTEGER, /* int64_t as i64 */
     FACT_COUNT32, /* uint32_t as u64 */
     FACT_COUNT,   /* uint64_t as u64 */
-    FACT_HINT,    /* the same, optional */
+    FACT_HINT,    /* uint64_t as u64, may be absent */
     FACT_YES_NO,  /* bool as u64 0 or 1 */
     FACT_REAL,    /* double */
     FACT_REAL3,   /* double[3] */
@@ -46,15 +46,15 @@ typedef struct fact {
 #define FACT_AT(field) offsetof(ebpo_info, field), sizeof(((ebpo_info *)0)->field), NULL
 
 enum { WELD_FACTS = 3 };
-/* A reader may ignore an unknown optional part; without a required part its results would be wrong.
- */
+/* A word in the lists of parts. A reader may ignore an unknown optional part. A reader that ignores
+ * a required part would return wrong results. */
 typedef struct part_word {
     const char *word;
-    unsigned part; /* an ebpo_part, or one of: */
+    unsigned part; /* an ebpo_part, a WORD_ constant, or 0: in every file */
     bool required;
 } part_word;
 
-/* info.pruned, subtree_level and gates: words in the list of parts that cannot be omitted. */
+/* Bits of required parts that are no ebpo_part: info.pruned, info.subtree_level, info.gates. */
 enum { WORD_PRUNED = 1 << 30, WORD_SUBTREES = 1 << 29, WORD_GATES = 1 << 28 };
 
 static const char *const KINDS[] = { "surface", "solid", NULL }; /* indexed by info.solid */
@@ -152,7 +152,8 @@ static const part_word part_words[] = {
 };
 static const int part_word_count = sizeof part_words / sizeof part_words[0];
 
-/* Non-default selection of planes; readers do not need these attributes. */
+/* Attributes of files with a selection of planes that is not the default. Readers do not need them.
+ */
 static const char *const normals_words[] = { "spherical", "angle", NULL };
 static const fact selection_facts[] = {
     { "selection_percent", FACT_REAL, FACT_AT(percent) },
@@ -165,19 +166,19 @@ static const int selection_fact_count = sizeof selection_facts / sizeof selectio
 static const fact dropped_faces_fact = { "mend_dropped_faces", FACT_COUNT,
                                          FACT_AT(repair_record.dropped_faces) };
 
-/* For files whose vertices were welded within a distance. */
+/* Attributes of files whose vertices were welded within a distance. */
 static const fact weld_facts[WELD_FACTS] = {
     { "mend_weld_distance", FACT_REAL, FACT_AT(repair_record.weld_distance) },
     { "mend_weld_moved", FACT_REAL, FACT_AT(repair_record.weld_moved) },
     { "mend_collapsed_faces", FACT_COUNT, FACT_AT(repair_record.collapsed_faces) },
 };
 
-/* For files with subtrees, or with colours. */
+/* Attributes of files with subtrees (the first and the last), or with colours. */
 static const fact subtree_level_fact = { "subtree_level", FACT_NUMBER, FACT_AT(subtree_level) },
                   colours_fact = { "colours_sha256", FACT_DIGEST, FACT_AT(colours_sha256) },
                   top_bytes_fact = { "top_bytes", FACT_HINT, FACT_AT(top_bytes) };
 
-/* --- selections of planes: names and settings; the functions are in construct/selections.c --- */
+/* --- names and settings of selections of planes; construct/selections.c has the functions --- */
 
 static const ebpo_selection_traits selection_traits[] = {
     [EBPO_SELECT_INHERIT] = { .name = "inherit" },
@@ -396,7 +397,7 @@ static ebpo_status put_subtrees(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_in
     return status == EBPO_OK ? put_fact(out, root, &top_bytes_fact, info, error) : status;
 }
 
-/* Writes the attributes of subsets; other files are unchanged. */
+/* Writes the attributes that only subsets have. */
 static ebpo_status put_subset(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *info,
                               ebpo_error *error)
 {
@@ -582,7 +583,7 @@ static ebpo_status get_fact(ebpo_head *in, ebpo_head_object id, const char *obje
     case FACT_INTEGER: status = ebpo_head_get_int(in, id, object, f->name, field, error); break;
     case FACT_HINT:
         if (ebpo_head_get_count(in, id, object, f->name, field, NULL) != EBPO_OK)
-            *(uint64_t *)field = 0; /* absent, or another program's type: no hint */
+            *(uint64_t *)field = 0; /* absent, or rewritten by another program with another type */
         return EBPO_OK;
     case FACT_COUNT: status = ebpo_head_get_count(in, id, object, f->name, field, error); break;
     case FACT_REAL: status = ebpo_head_get_real(in, id, object, f->name, field, 0, error); break;
@@ -622,7 +623,7 @@ static ebpo_status get_version(ebpo_head *in, ebpo_head_object root, ebpo_info *
             error, EBPO_E_VERSION, in->shown,
             "format version %d.%d, and this library reads version %d; use a newer one",
             info->version_major, info->version_minor, EBPO_FORMAT_MAJOR);
-    char words[32] = ""; /* informative, but draft files have the same version numbers */
+    char words[32] = ""; /* only this text distinguishes draft files */
     if (status == EBPO_OK)
         status = ebpo_head_get_text(in, root, "/", "format_version", words, sizeof words, error);
     if (status == EBPO_E_ABSENT)
@@ -634,7 +635,7 @@ static ebpo_status get_version(ebpo_head *in, ebpo_head_object root, ebpo_info *
     return status;
 }
 
-/* Reads a part, which may be in either list; a known part counts as present. */
+/* Marks a known part as present in *seen. A part may be in either of the two lists. */
 static ebpo_status take_part(ebpo_head *in, const char *word, bool required, unsigned *seen,
                              ebpo_error *error)
 {
@@ -667,7 +668,7 @@ static ebpo_status get_parts(ebpo_head *in, ebpo_head_object root, ebpo_info *in
             return ebpo_fail_at(error, EBPO_E_FORMAT, in->shown, "/", -1,
                                 "attribute %s is missing; get a fresh copy of the file", name);
         if (status == EBPO_OK && !*words)
-            rest = NULL; /* no words */
+            rest = NULL; /* the list is empty */
         while (status == EBPO_OK && rest) {
             char *word = rest, *space = strchr(rest, ' ');
             rest = space ? space + 1 : NULL;
@@ -683,7 +684,7 @@ static ebpo_status get_parts(ebpo_head *in, ebpo_head_object root, ebpo_info *in
         if (seen >> i & 1)
             info->parts |= part_words[i].part;
     info->pruned = info->parts & WORD_PRUNED;
-    info->subtree_level = info->parts & WORD_SUBTREES ? 1 : 0; /* until get_subtrees */
+    info->subtree_level = info->parts & WORD_SUBTREES ? 1 : 0; /* get_subtrees reads the level */
     info->gates = info->parts & WORD_GATES;
     info->parts &= ~(uint32_t)(WORD_PRUNED | WORD_SUBTREES | WORD_GATES);
     return seen & 1 ? EBPO_OK : wrong_value(in, "/", "required_parts", error);
@@ -728,8 +729,8 @@ static ebpo_status get_subset(ebpo_head *in, ebpo_head_object root, ebpo_info *i
     return status == EBPO_E_ABSENT ? EBPO_OK : status;
 }
 
-/* Reads the index of the attribute's word in `words`, or -1 for a word of a newer library. Without
- * the attribute *out is unchanged. */
+/* Reads an attribute that is a word. Sets *out to the value for which word_of returns this word, or
+ * to -1 for a word of a newer library. Leaves *out unchanged if the attribute is absent. */
 static ebpo_status get_known(ebpo_head *in, ebpo_head_object root, const char *name,
                              const char *(*word_of)(int value), int *out, ebpo_error *error)
 {
@@ -763,7 +764,7 @@ static ebpo_status get_selection(ebpo_head *in, ebpo_head_object root, ebpo_info
     return status;
 }
 
-/* Reads the count of dropped faces. Dropping was requested if any were dropped. */
+/* Reads the number of dropped faces. If it is not 0, dropping was requested. */
 static ebpo_status get_dropped(ebpo_head *in, ebpo_head_object root, ebpo_info *info,
                                ebpo_error *error)
 {
@@ -776,7 +777,8 @@ static ebpo_status get_dropped(ebpo_head *in, ebpo_head_object root, ebpo_info *
     return status;
 }
 
-/* Reads the record of welding within a distance, which is rare; ebpo_facts_check checks it. */
+/* Reads the record of welding within a distance, which few files have. ebpo_facts_check checks it.
+ */
 static ebpo_status get_weld(ebpo_head *in, ebpo_head_object root, ebpo_info *info,
                             ebpo_error *error)
 {

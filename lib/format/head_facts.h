@@ -1,5 +1,5 @@
-/* Attributes of the root and of the level groups: ebpo_info except for values that the reader
- * measures. */
+/* Writes and reads the HDF5 attributes of the root and of the level groups. They contain ebpo_info,
+ * except for values that the reader measures. */
 #ifndef EBPO_FORMAT_HEAD_FACTS_H
 #define EBPO_FORMAT_HEAD_FACTS_H
 
@@ -10,8 +10,8 @@
 #include "hdf5_read/head.h"
 #include "hdf5_write/h5.h"
 
-/* Writes the root's attributes, with current checksums and chunk_index_* (write them again later).
- */
+/* Writes the root's attributes with the checksums and chunk_index_* of `info`. The functions below
+ * overwrite these once their values are known. */
 EBPO_MUST_USE ebpo_status ebpo_facts_put(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *info,
                                          ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_facts_put_digest(ebpo_h5_out *out, ebpo_h5_id root,
@@ -34,13 +34,13 @@ EBPO_MUST_USE ebpo_status ebpo_facts_get_level(ebpo_head *in, ebpo_head_object g
                                                const char *path, ebpo_level_summary *level,
                                                ebpo_error *error);
 
-/* Reads one digest of any object. */
+/* Reads one digest from an attribute of any object. */
 EBPO_MUST_USE ebpo_status ebpo_facts_get_digest(ebpo_head *in, ebpo_head_object id,
                                                 const char *object, const char *name,
                                                 uint8_t digest[32], ebpo_error *error);
 
-/* Checks the facts for consistency: ranges, and sums over the levels. For files (EBPO_E_FORMAT) and
- * for callers' trees (EBPO_E_ARGUMENT). */
+/* Checks ranges, and sums over the levels. `as`: status of an error, EBPO_E_FORMAT for files and
+ * EBPO_E_ARGUMENT for callers' trees. */
 EBPO_MUST_USE ebpo_status ebpo_facts_check(const ebpo_info *info, const char *shown, ebpo_status as,
                                            ebpo_error *error);
 

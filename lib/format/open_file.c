@@ -1,8 +1,8 @@
-/* Opens a file: reads the head, and checks that every array is present in the shape that the counts
- * in the head require. Nothing is sized by a count before head_facts.c has checked it, and the
- * decoded size is limited relative to the file size. The second part opens files that other
- * programs have rewritten with another HDF5 layout: libhdf5 copies these, in a separate process
- * with limits of memory, time and bytes written, and the copy is opened like any other file.
+/* Opens a file: reads the header, and checks that every array is present in the shape that the
+ * counts in the header require. No memory is allocated by a count before head_facts.c has checked
+ * it. The decoded size is limited relative to the file size. The second part opens files that other
+ * programs have rewritten with another HDF5 layout. libhdf5 copies such a file in a separate
+ * process with limits of memory, time and bytes written. The copy is opened like any other file.
  * Source: format-spec/README.md, sections 2 and 3; docs/develop/threats.md. */
 #include <errno.h>
 #include <fcntl.h>
@@ -27,8 +27,8 @@
 #include "io/file_source.h"
 #include "mesh/import.h"
 
-/* Returns true if the coding's word is known: numbers would be read wrong otherwise. Files of 1.0
- * and the first files of 1.1 also have `delta` at leaf_skip. */
+/* Returns true if the array may have this coding. Values of another coding would be decoded
+ * wrongly. Files of version 1.0 and the first files of 1.1 also have `delta` at leaf_skip. */
 static bool coding_known(const ebpo_array_spec *spec, const char *word, bool gates)
 {
     if (gates)
@@ -37,7 +37,8 @@ static bool coding_known(const ebpo_array_spec *spec, const char *word, bool gat
            (spec == &ebpo_schema[EBPO_A_LEAF_SKIP] && strcmp(word, "delta") == 0);
 }
 
-/* Checks the type. Sets the shape of the values, and `gates`. */
+/* Returns true if the array's type and columns are those of the schema. Sets a->shape to the shape
+ * of the values, and a->gates. */
 static bool type_fits(const ebpo_info *info, ebpo_array_in *a, bool gates)
 {
     const ebpo_array_spec *spec = &ebpo_schema[a->id];
@@ -65,7 +66,7 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, ebpo_array_id id
     ebpo_schema_path(id, level, a->path);
     if (rows == 0 || (spec->if_needed && ebpo_head_find_kind(head, a->path) == EBPO_HEAD_ABSENT))
         return EBPO_OK;
-    /* offsets of several chunks are in the index or in a list */
+    /* offsets of several chunks are read later from the index of remote files, or from the list */
     uint64_t most = ebpo_input_is_far(&file->in) || file->has_places ? 1 : UINT64_MAX;
     char coding[EBPO_HEAD_CODING_BYTES];
     ebpo_status status =
@@ -146,7 +147,8 @@ static ebpo_status check_pipelines(const ebpo_file *file, ebpo_error *error)
     return status;
 }
 
-/* Opens a list about all chunks. It is valid unless another program has rewritten the file. */
+/* Opens a list of all chunks. *holds is false if another program has rewritten the file, as the
+ * list is then not valid. */
 static ebpo_status open_list(ebpo_file *file, ebpo_head *head, ebpo_array_id list, bool *holds,
                              ebpo_error *error)
 {
@@ -199,9 +201,9 @@ static ebpo_status open_arrays(ebpo_file *file, ebpo_head *head, ebpo_error *err
     return status == EBPO_OK ? ebpo_stored_check(file, error) : status;
 }
 
-/* Ignores an invalid location of the chunk index, as in files that other programs have rewritten.
- */
-static void judge_index(ebpo_info *info, uint64_t size)
+/* Discards the location of the chunk index if it is impossible, as in files that other programs
+ * have rewritten. */
+static void discard_bad_index(ebpo_info *info, uint64_t size)
 {
     enum { INDEX_BYTES_MAX = 64 << 20 };
     if (info->chunk_index_offset > size ||
@@ -216,7 +218,7 @@ static ebpo_status read_head(ebpo_file *file, ebpo_head *head, ebpo_error *error
     ebpo_status status = ebpo_head_open_group(head, "/", &root, error);
     if (status == EBPO_OK)
         status = ebpo_facts_get(head, root, &file->info, error);
-    judge_index(&file->info, file->in.source.size);
+    discard_bad_index(&file->info, file->in.source.size);
     ebpo_head_hint_index(head, (ebpo_range){ file->info.chunk_index_offset,
                                              file->info.chunk_index_bytes });
     if (status == EBPO_OK &&
@@ -231,8 +233,8 @@ static ebpo_status read_head(ebpo_file *file, ebpo_head *head, ebpo_error *error
     return status == EBPO_OK ? open_arrays(file, head, error) : status;
 }
 
-/* Compares the content checksum of files without chunk checksums, as `h5repack -f NONE` writes
- * them, before any data are returned: nothing else detects a changed chunk. */
+/* Compares the content checksum of a file without chunk checksums, such as `h5repack -f NONE`
+ * writes. This is done before any data are returned, as nothing else detects a changed chunk. */
 static ebpo_status check_bare(const ebpo_file *file, ebpo_error *error)
 {
     return file->level_array[0][EBPO_A_TYPES].shape.pipeline == EBPO_PIPELINE_BARE
@@ -240,8 +242,8 @@ static ebpo_status check_bare(const ebpo_file *file, ebpo_error *error)
                : EBPO_OK;
 }
 
-/* Returns true if the head's error names the file type: the file begins like HDF5 or another known
- * type. */
+/* Returns true if the error that occurred already names the type of the file, which begins like
+ * HDF5 or another known type. */
 static bool head_names_kind(const uint8_t *begin, uint64_t size)
 {
     return (size && begin[0] == 0x89) || ebpo_foreign_bytes(begin, size);
@@ -254,13 +256,14 @@ static const ebpo_import_format *mesh_format(const uint8_t *begin, uint64_t size
     const ebpo_import_format *format = ebpo_import_recognise(begin, size, "");
     if (format && format->mark_comes_first)
         return format;
-    if (ebpo_stl_states_size(begin, size, whole_size)) /* begins with any bytes */
+    if (ebpo_stl_states_size(begin, size, whole_size)) /* binary STL may begin with any bytes */
         return &ebpo_import_stl;
     return head_names_kind(begin, size) ? NULL : format;
 }
 
-/* Returns a description of a frequently confused file type, recognised by its first bytes, and
- * advice; NULL if it is unknown or the head's error describes it. */
+/* Returns a description of a file type that users often confuse with this format, with advice. The
+ * first bytes identify the type. Returns NULL if the type is unknown or the error already names it.
+ */
 static const char *other_kind(const uint8_t *begin, uint64_t size)
 {
     return size == 0                      ? "an empty file; get a fresh copy of it"
@@ -270,6 +273,7 @@ static const char *other_kind(const uint8_t *begin, uint64_t size)
                : NULL;
 }
 
+/* Replaces the error if the file has another known type. */
 static ebpo_status name_kind(ebpo_file *file, ebpo_status status, ebpo_error *error)
 {
     enum { BEGIN = 4096 };
@@ -288,7 +292,7 @@ static ebpo_status name_kind(ebpo_file *file, ebpo_status status, ebpo_error *er
                 : status;
 }
 
-/* Opens a source and takes ownership in any case. */
+/* Opens a source and takes ownership of it, also on failure. */
 static ebpo_status open_source(ebpo_file **out, const ebpo_source *source, const char *name,
                                uint64_t max_expansion, ebpo_error *error)
 {
@@ -328,8 +332,8 @@ static ebpo_status open_bytes(const ebpo_source *source, const char *name, uint6
 {
     ebpo_source own = EBPO_SOURCE_INIT;
     ebpo_status status = EBPO_TAKE(ebpo_source, &own, source, error);
-    if (status == EBPO_E_UNSUPPORTED && source->close) /* of a newer caller: only the known part is
-                                                        * used */
+    if (status == EBPO_E_UNSUPPORTED && source->close) /* the struct of a newer caller: only known
+                                                        * members are used */
         source->close(source->user);
     if (status != EBPO_OK)
         return status;
@@ -445,7 +449,7 @@ ebpo_status ebpo_register_filters(ebpo_error *error) { return ebpo_h5_register(e
 
 enum { PIECE = 4 << 20, BYTES_A_SECOND = 4 << 20 };
 
-/* A named temporary file for libhdf5, unlinked once it is open. */
+/* A named temporary file, which libhdf5 opens by its name. The name is removed once it is open. */
 typedef struct temporary {
     int fd;
     char name[PATH_MAX];
@@ -465,7 +469,7 @@ static void remove_temporary(temporary *t)
 {
     if (t->fd < 0)
         return;
-    unlink(t->name); /* unless already done */
+    unlink(t->name); /* fails if ebpo_h5_clean_copy has removed the name */
     close(t->fd);
 }
 
@@ -485,7 +489,7 @@ static ebpo_status write_piece(int fd, const char *shown, uint64_t at, const uin
     return EBPO_OK;
 }
 
-/* Downloads a complete URL into an unnamed file. */
+/* Downloads a complete file to the descriptor `to`. */
 static ebpo_status fetch_url(const char *url, const ebpo_http_options *http, const char *shown,
                              int to, ebpo_error *error)
 {
@@ -510,7 +514,8 @@ static ebpo_status fetch_url(const char *url, const ebpo_http_options *http, con
     return status;
 }
 
-/* Finds the name under which libhdf5 opens the file, and its size. */
+/* Finds the name under which libhdf5 opens the file, and the file's size. Downloads a remote file
+ * first. */
 static ebpo_status find_from(const char *path, const ebpo_http_options *http, const char *shown,
                              temporary *fetched, const char **from, uint64_t *bytes,
                              ebpo_error *error)
@@ -529,7 +534,7 @@ static ebpo_status find_from(const char *path, const ebpo_http_options *http, co
     return status;
 }
 
-/* Opens the copy by its descriptor, which the caller keeps, and checks that it matches the head. */
+/* Opens the copy by its descriptor, which the caller keeps, and checks its content checksum. */
 static ebpo_status open_copy(int to, const char *shown, const ebpo_compat_options *o,
                              ebpo_file **out, ebpo_error *error)
 {
@@ -593,8 +598,7 @@ static ebpo_status open_foreign(const char *path, const ebpo_compat_options *o, 
                                     ebpo_rows_of_foreign_chunk, &limits, &omitted, error);
     if (status == EBPO_OK && open_copy(copy.fd, shown, o, out, &why) != EBPO_OK)
         status = ebpo_fail_with(error, *omitted.message && copy_lacks(copy.fd, shown, why.object)
-                                           ? &omitted /* the copy omitted an existing object; this
-                                                       * error says why */
+                                           ? &omitted /* states why the copy lacks the object */
                                            : &why);
     remove_temporary(&copy);
     remove_temporary(&fetched);

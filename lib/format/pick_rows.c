@@ -1,8 +1,8 @@
-/* Reads selected rows of a file's arrays. A run is a range of sibling groups of one level. Reading
- * runs returns all arrays of the level for these nodes, including lists that counts divide, and
- * checks the values like schema.c checks levels. Rows of the mesh's arrays and of attributes are
- * read in any order, chunk by chunk. Prefetch hints for all chunks are sent first, and each chunk
- * is fetched once. Source: format-spec/README.md, sections 4 and 5. */
+/* Reads selected rows of a file's arrays. A run is a range of sibling groups of one level. For
+ * runs, all arrays of the level are read for the nodes in these groups, including lists of planes
+ * and references. Their values are checked as schema.c checks levels. Rows of the mesh's arrays and
+ * of attributes are read in any order, chunk by chunk. Prefetch hints for all chunks are sent
+ * first, and each chunk is fetched once. Source: format-spec/README.md, sections 4 and 5. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -16,7 +16,7 @@
 #include "geometry/level_nodes.h"
 #include "geometry/polytope.h"
 
-/* A run's range in a list that counts divide: rows [first, first + count) of the file. */
+/* A run's range in a list of planes or references: rows [first, first + count) in the file. */
 typedef struct span {
     uint64_t first, count;
     uint64_t end; /* for references: end of the new faces of the leaf before the run */
@@ -29,7 +29,7 @@ typedef struct reading {
     uint64_t run_count;
     uint32_t needs;
     ebpo_quota *space;
-    span *span; /* for each run, in the current list */
+    span *span; /* [run_count] ranges in the current list */
     ebpo_level *out;
     ebpo_error *error;
 } reading;
@@ -47,7 +47,7 @@ static bool is_wanted_array(const reading *r, int id)
 
 /* --- prefetch hints --- */
 
-/* Returns the index array with sums for this array, if any. */
+/* Returns the index array with sums of this array, or -1. */
 static int index_of(int id)
 {
     switch (id) {
@@ -60,8 +60,9 @@ static int index_of(int id)
     }
 }
 
-/* Collects chunks. Arrays with sums are read from the preceding index row on. */
-static void expect_column(const reading *r, ebpo_hints *e, int id, int type)
+/* Collects the chunks of an array with a row for each node of a type. An array with an index array
+ * is read from the preceding index row on. */
+static void hint_column(const reading *r, ebpo_hints *e, int id, int type)
 {
     int index = ebpo_subtree_table_has(r->chunks->file, r->level) ? -1 : index_of(id);
     for (uint64_t i = 0; i < r->run_count; i++) {
@@ -75,7 +76,7 @@ static void expect_column(const reading *r, ebpo_hints *e, int id, int type)
     }
 }
 
-void ebpo_runs_hint(ebpo_chunks *chunks, ebpo_hints *expected, int level, const ebpo_run *runs,
+void ebpo_runs_hint(ebpo_chunks *chunks, ebpo_hints *hints, int level, const ebpo_run *runs,
                     uint64_t run_count, uint32_t needs)
 {
     reading r = {
@@ -84,11 +85,11 @@ void ebpo_runs_hint(ebpo_chunks *chunks, ebpo_hints *expected, int level, const 
     for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++) {
         int type = ebpo_schema_node_type(ebpo_schema[id].per);
         if (type >= 0 && is_wanted_array(&r, id))
-            expect_column(&r, expected, id, type);
+            hint_column(&r, hints, id, type);
     }
 }
 
-/* --- an array with a row for each node of a type --- */
+/* --- arrays with a row for each node of a type --- */
 
 static void *make_array(const reading *r, int id, uint64_t count, ebpo_status *status)
 {
@@ -118,7 +119,7 @@ static ebpo_status read_column(const reading *r, int id, int type)
     return status;
 }
 
-/* --- lists that counts divide --- */
+/* --- lists of planes and references --- */
 
 static uint64_t sum_counts(const reading *r, int id, uint64_t begin, uint64_t nodes)
 {
@@ -130,7 +131,7 @@ static uint64_t sum_counts(const reading *r, int id, uint64_t begin, uint64_t no
     return sum;
 }
 
-/* Finds the start of the list of the nodes from `rank` on. */
+/* Finds the start of the list items of the node with this rank. */
 static ebpo_status find_span(const reading *r, ebpo_per per, uint64_t rank, span *s)
 {
     switch (per) {
@@ -170,7 +171,7 @@ static ebpo_status find_spans(const reading *r, int id, const ebpo_list_spec *li
     return status;
 }
 
-static void expect_spans(const reading *r, int id)
+static void hint_spans(const reading *r, int id)
 {
     ebpo_hints e = EBPO_HINTS_INIT(r->chunks->file);
     for (uint64_t i = 0; i < r->run_count; i++)
@@ -186,7 +187,7 @@ static ebpo_status read_list(const reading *r, int id, const ebpo_list_spec *lis
     uint64_t total = ebpo_level_rows(r->out, id);
     if (status != EBPO_OK || total == 0)
         return status;
-    expect_spans(r, id);
+    hint_spans(r, id);
     uint8_t *to = make_array(r, id, total, &status);
     for (uint64_t i = 0; i < r->run_count && status == EBPO_OK; i++)
         if (r->span[i].count) {
@@ -232,7 +233,8 @@ static ebpo_status check_windings(const reading *r, ebpo_array_id id, bool insid
     return EBPO_OK;
 }
 
-/* Converts skips to first faces. */
+/* Converts the skips in leaf_first to first faces, for leaves [begin, begin + leaves). `end`: end
+ * of the new faces of the leaf before them. */
 static ebpo_status add_up_skips(const reading *r, uint64_t begin, uint64_t leaves, uint64_t end)
 {
     ebpo_level *out = r->out;
@@ -248,7 +250,7 @@ static ebpo_status add_up_skips(const reading *r, uint64_t begin, uint64_t leave
     return EBPO_OK;
 }
 
-/* Decodes face indices; the spans are those of the references. */
+/* Decodes the face indices of leaves. Requires the spans of the references. */
 static ebpo_status decode_faces(const reading *r)
 {
     ebpo_level *out = r->out;
@@ -320,7 +322,7 @@ typedef struct picking {
     ebpo_error *error;
 } picking;
 
-static void expect_types(const picking *p)
+static void hint_types(const picking *p)
 {
     ebpo_hints e = EBPO_HINTS_INIT(p->chunks->file);
     for (uint64_t i = 0; i < p->run_count; i++) {
@@ -345,7 +347,7 @@ static ebpo_status pick_types(const picking *p)
     p->out->types = ebpo_alloc(p->out->group_count, sizeof *p->out->types);
     if (!p->out->types)
         return ebpo_fail_memory(p->error, p->out->group_count * sizeof *p->out->types);
-    expect_types(p);
+    hint_types(p);
     for (uint64_t i = 0; i < p->run_count && status == EBPO_OK; at += p->run[i++].groups) {
         ebpo_run *r = &p->run[i];
         uint16_t *types = p->out->types + at;
@@ -379,12 +381,10 @@ ebpo_status ebpo_pick_level(ebpo_chunks *chunks, int level, ebpo_run *runs, uint
     return status;
 }
 
-/* --- rows of the mesh's arrays, in any order --- */
+/* --- prefetch hints for rows of the mesh's arrays --- */
 
-/* --- prefetch hints --- */
-
-/* Returns flags of the chunks that contain these rows, or NULL if unknown. The caller frees them.
- */
+/* Returns a flag for each chunk: true if it contains one of these rows. Returns NULL when out of
+ * memory. The caller frees the flags. */
 static bool *chunks_of(const ebpo_array_in *array, const uint32_t *rows, uint64_t count)
 {
     bool *has = ebpo_alloc_zero(ebpo_shape_chunks(&array->shape), sizeof *has);
@@ -394,8 +394,8 @@ static bool *chunks_of(const ebpo_array_in *array, const uint32_t *rows, uint64_
     return has;
 }
 
-static void expect_vertices(ebpo_chunks *chunks, ebpo_hints *e, uint64_t row, uint64_t rows,
-                            uint32_t parts)
+static void hint_vertices(ebpo_chunks *chunks, ebpo_hints *e, uint64_t row, uint64_t rows,
+                          uint32_t parts)
 {
     ebpo_chunks_hint(chunks, e, EBPO_A_VERTICES, 0, row, rows);
     if (parts & EBPO_PART_MAPS)
@@ -418,7 +418,7 @@ void ebpo_faces_hint(ebpo_chunks *chunks, const uint32_t *faces, uint64_t count,
         if (parts & EBPO_PART_MAPS)
             ebpo_chunks_hint(chunks, &e, EBPO_A_FACE_SOURCE, 0, i * rows, rows);
         if (first < end)
-            expect_vertices(chunks, &e, first, end - first, parts);
+            hint_vertices(chunks, &e, first, end - first, parts);
     }
     ebpo_hint_all(&e);
     free(has);
@@ -433,18 +433,19 @@ void ebpo_vertices_hint(ebpo_chunks *chunks, const uint32_t *vertices, uint64_t 
     bool *has = ebpo_input_expects(&chunks->file->in) ? chunks_of(array, vertices, count) : NULL;
     for (uint64_t i = 0; has && i < ebpo_shape_chunks(&array->shape); i++)
         if (has[i])
-            expect_vertices(chunks, &e, i * rows, rows, parts);
+            hint_vertices(chunks, &e, i * rows, rows, parts);
     ebpo_hint_all(&e);
     free(has);
 }
 
-/* --- reading --- */
+/* --- reading rows in any order --- */
 
 typedef struct gathering {
     ebpo_chunks *chunks;
     const ebpo_array_in *array;
-    const uint32_t *rows, *order; /* order: indices into `rows`, sorted by chunk */
-    const uint64_t *begin;        /* [chunks + 1] ranges in `order` */
+    const uint32_t *rows;
+    const uint32_t *order; /* indices into `rows`, sorted by chunk */
+    const uint64_t *begin; /* [chunks + 1] begin of each chunk's range in `order` */
     size_t row_bytes;
     uint8_t *out;
 } gathering;
@@ -469,7 +470,7 @@ static ebpo_status gather_chunks(void *context, uint64_t begin, uint64_t end, un
     return status;
 }
 
-/* Sorts by chunk with a counting sort. */
+/* Sorts the requested rows by chunk with a counting sort. */
 static ebpo_status sort_rows(const gathering *g, uint64_t count, uint64_t *begin, uint32_t *order,
                              uint64_t chunks, ebpo_error *error)
 {
@@ -531,7 +532,7 @@ ebpo_status ebpo_pick_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t
                      error);
 }
 
-/* Reads rows of an attribute array (/attributes): values, ends or items. */
+/* Reads rows of the array `number` of /attributes: values, ends of lists, or items of lists. */
 static ebpo_status pick_attribute_rows(ebpo_chunks *chunks, int number, const uint32_t *rows,
                                        uint64_t count, unsigned threads, void *out,
                                        ebpo_error *error)
@@ -564,8 +565,8 @@ static ebpo_status pick_columns(const attribute_picking *p, uint64_t n, ebpo_att
                      : ebpo_fail_memory(p->error, p->count * bytes);
 }
 
-/* Computes the indices of the items of all lists: a list begins at the end of the preceding one in
- * the file. */
+/* Computes the file indices of the items of all selected lists. A list begins at `before`, the end
+ * of the preceding list in the file. Replaces a->ends by the ends in the selection. */
 static ebpo_status number_items(const attribute_picking *p, ebpo_attribute *a,
                                 const uint64_t *before, uint32_t **items)
 {
@@ -591,7 +592,7 @@ static ebpo_status number_items(const attribute_picking *p, ebpo_attribute *a,
     return EBPO_OK;
 }
 
-/* Reads the ends of the rows before the selected ones. */
+/* Reads the ends of the lists before the selected lists. */
 static ebpo_status pick_before(const attribute_picking *p, uint64_t n, uint64_t *before)
 {
     uint32_t *rows = ebpo_alloc(p->count, sizeof *rows);

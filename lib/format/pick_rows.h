@@ -8,46 +8,47 @@
 #include "format/chunks.h"
 #include "mesh/attributes.h"
 
-/* Groups [group, group + groups) of a level; level 0 has group 0. Its nodes of type k are [rank[k],
- * rank[k] + count[k]). */
+/* Groups [group, group + groups) of a level; level 0 has group 0. The run's nodes of type k have
+ * the ranks [rank[k], rank[k] + count[k]). */
 typedef struct ebpo_run {
     uint64_t group, groups;
     uint64_t rank[4], count[4];
 } ebpo_run;
 
 /* Collects the first chunks that ebpo_runs_read needs, for remote sources. */
-void ebpo_runs_hint(ebpo_chunks *chunks, ebpo_hints *expected, int level, const ebpo_run *runs,
+void ebpo_runs_hint(ebpo_chunks *chunks, ebpo_hints *hints, int level, const ebpo_run *runs,
                     uint64_t run_count, uint32_t needs);
 
-/* Reads the concatenated arrays of the nodes of ascending runs, and their counts, into `out`, which
- * already has the types. Includes arrays needed by any of `needs`; face indices are those of the
- * file. Memory is first reserved from `space` (NULL: no limit). */
+/* Reads the arrays of the nodes of ascending runs into `out`, concatenated, and sets the counts.
+ * `out` already has the types. Reads the arrays that any of `needs` requires. Face indices are
+ * those of the file. Memory is first reserved from `space` (NULL: no limit). */
 EBPO_MUST_USE ebpo_status ebpo_runs_read(ebpo_chunks *chunks, int level, const ebpo_run *runs,
                                          uint64_t run_count, uint32_t needs, ebpo_quota *space,
                                          ebpo_level *out, ebpo_error *error);
 
-/* Reads all nodes of ascending runs that do not overlap, as one level: group_count is the sum over
- * the runs, whose ranks and counts are filled in. Includes every array needed by one of `parts`
- * (face lists with the file's indices, also leaf_first) or always present. Volumes are 0. The
- * caller frees it with ebpo_level_free. */
+/* Reads all nodes of ascending runs that do not overlap, as one level. Fills in the ranks and
+ * counts of the runs. The level's group_count is the sum over the runs, and its volumes are 0. The
+ * level has the arrays that are always present and those of `parts`. Its face lists, and
+ * leaf_first, contain the file's indices. The caller frees it with ebpo_level_free. */
 EBPO_MUST_USE ebpo_status ebpo_pick_level(ebpo_chunks *chunks, int level, ebpo_run *runs,
                                           uint64_t run_count, uint32_t parts, ebpo_level *out,
                                           ebpo_error *error);
 
-/* Reads rows of a decoded array without level (faces: three corners; vertices: three floats or
- * doubles; maps: a number), in any order. EBPO_E_FORMAT for a row that does not exist. */
+/* Reads rows, in any order, of an array of the mesh or the maps. A row is three corners for faces,
+ * three floats or doubles for vertices, an index for maps. Returns EBPO_E_FORMAT for a row that
+ * does not exist. */
 EBPO_MUST_USE ebpo_status ebpo_pick_rows(ebpo_chunks *chunks, ebpo_array_id id,
                                          const uint32_t *rows, uint64_t count, unsigned threads,
                                          void *out, ebpo_error *error);
 
-/* Reads rows of all attributes of an element into `to`, which has the file's arrays without values
- * and no workspace. */
+/* Reads rows of all attributes of an element (such as "vertex" or "face") into `to`. `to` has the
+ * file's attribute arrays without values, and no workspace. */
 EBPO_MUST_USE ebpo_status ebpo_pick_attributes(ebpo_chunks *chunks, ebpo_attributes *to,
                                                const char *element, const uint32_t *rows,
                                                uint64_t count, unsigned threads, ebpo_error *error);
 
-/* Sends prefetch hints for selecting these faces (parts: mesh, maps), and for the vertices first
- * used in their chunks, which are most vertices of the faces. */
+/* Sends prefetch hints for reading these faces, in the mesh and the maps as `parts` requires.
+ * Includes the vertices first used in the faces' chunks, which are most vertices of the faces. */
 void ebpo_faces_hint(ebpo_chunks *chunks, const uint32_t *faces, uint64_t count, uint32_t parts);
 /* Does the same for vertices. */
 void ebpo_vertices_hint(ebpo_chunks *chunks, const uint32_t *vertices, uint64_t count,

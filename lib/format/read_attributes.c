@@ -1,7 +1,7 @@
-/* Reads attributes of vertices, faces and other elements. Opening a file finds the arrays of
- * /attributes and checks their heads (names, types, ranges, lists of different lengths). Values are
- * read later, as whole arrays, and compared with the checksum of the part. Source:
- * format-spec/README.md, "Attributes". */
+/* Reads attributes of vertices, faces and other elements. When a file is opened, the arrays of
+ * /attributes are located, and their HDF5 attributes are checked (names, types, ranges, lists of
+ * different lengths). Values are read later, as whole arrays, and compared with the checksum of the
+ * part. Source: format-spec/README.md, "Attributes". */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -25,7 +25,7 @@ static ebpo_status attribute_head_wrong(const ebpo_file *file, const char *path,
                         "%s; get a fresh copy of the file", what);
 }
 
-/* Adds a message when a required attribute is absent. */
+/* Reports an error if the status of reading a required HDF5 attribute is EBPO_E_ABSENT. */
 static ebpo_status required_value(const ebpo_file *file, const char *path, ebpo_status status,
                                   const char *name, ebpo_error *error)
 {
@@ -122,7 +122,7 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, int number, ebpo
                : EBPO_OK;
 }
 
-/* Checks the shape of an array against its head. */
+/* Checks the shape of an array against its HDF5 attributes. Returns the error's text or NULL. */
 static const char *check_shape(const ebpo_file *file, const ebpo_array_in *array,
                                const ebpo_attribute_in *of)
 {
@@ -159,7 +159,8 @@ static const char *check_element(const ebpo_file *file, uint64_t n)
     return NULL;
 }
 
-/* Checks the texts of textures, which are small, as they are read to inspect the file. */
+/* Checks the sizes of the arrays of textures. Their texts must be small, as they are read when a
+ * user inspects the file. */
 static const char *check_textures(const ebpo_attribute_in *of, const ebpo_array_in *items)
 {
     bool texts = strcmp(of->head.names, ebpo_texture_array_name(EBPO_TEXTURE_BYTES)) != 0;
@@ -296,7 +297,7 @@ const char *ebpo_attribute_type_text(uint64_t type)
                                           : NULL;
 }
 
-/* --- reading whole arrays, and their checksum --- */
+/* --- reading whole arrays, and checking the part's checksum --- */
 
 static bool floats_in(const ebpo_file *file, const ebpo_array_in *array)
 {
@@ -334,7 +335,7 @@ static ebpo_status take_attribute_rows(void *context, const ebpo_array_in *array
     return EBPO_OK;
 }
 
-/* Reads into new memory; NULL if the array is absent. */
+/* Reads array `number` of /attributes into new memory. *values is NULL if the array is absent. */
 static ebpo_status read_array(const ebpo_file *file, int number, const ebpo_read_options *read,
                               uint8_t **values, ebpo_error *error)
 {
@@ -487,7 +488,7 @@ static ebpo_status read_public(const ebpo_file *file, unsigned n, const ebpo_rea
     memset(out, 0, sizeof *out);
     if (status == EBPO_OK && n >= file->attributes.count)
         status = ebpo_fail_file(error, EBPO_E_ABSENT, file->in.shown,
-                                "the file has no array of attributes number %u", n);
+                                "the file has no attribute array number %u", n);
     if (status != EBPO_OK)
         return status;
     ebpo_attribute a = file->attributes.head[n].head;
@@ -518,8 +519,7 @@ ebpo_status ebpo_file_attribute_ends(const ebpo_file *file, unsigned n,
     return read_public(file, n, options, true, out, error);
 }
 
-/* Reads the whole part, although one array at a time would suffice: it is small compared to the
- * mesh. */
+/* Reads the whole part into memory, as it is small compared to the mesh. */
 ebpo_status ebpo_attributes_check(const ebpo_file *file, const ebpo_read_options *read,
                                   ebpo_error *error)
 {

@@ -171,7 +171,7 @@ static ebpo_status read_arrays(const ebpo_file *file, int number, ebpo_level *le
     return status == EBPO_OK ? finish_lists(file, number, level, error) : status;
 }
 
-static void expect_arrays(const ebpo_file *file, int level, uint32_t without)
+static void hint_arrays(const ebpo_file *file, int level, uint32_t without)
 {
     ebpo_hints e = EBPO_HINTS_INIT(file);
     ebpo_hint_level(&e, level, without);
@@ -195,7 +195,7 @@ ebpo_status ebpo_file_read_level(const ebpo_file *file, int level, const ebpo_re
     *out = ebpo_level_of_summary(info, level);
     out->workspace = read.workspace;
     read.omitted_parts &= info->parts;
-    expect_arrays(file, level, (uint32_t)read.omitted_parts);
+    hint_arrays(file, level, (uint32_t)read.omitted_parts);
     status = read_arrays(file, level, out, &read, error);
     if (status == EBPO_OK && out->leaf_count)
         status = finish_leaves(file, level, out, &read, error);
@@ -335,11 +335,11 @@ static ebpo_status take_options(const ebpo_file *file, const ebpo_read_options *
 /* Sends prefetch hints for the root's arrays that these needs require, and for the attributes. */
 static void hint_root(const ebpo_file *file, uint32_t needs, bool attributes)
 {
-    ebpo_hints expected = EBPO_HINTS_INIT(file);
-    ebpo_hint_root(&expected, needs);
+    ebpo_hints hints = EBPO_HINTS_INIT(file);
+    ebpo_hint_root(&hints, needs);
     if (attributes)
-        ebpo_hint_attributes(&expected);
-    ebpo_hint_all(&expected);
+        ebpo_hint_attributes(&hints);
+    ebpo_hint_all(&hints);
 }
 
 ebpo_status ebpo_file_read_mesh(const ebpo_file *file, const ebpo_read_options *options,

@@ -1,8 +1,8 @@
 /* Reads chunks of an open file: fetches the stored bytes, compares their checksum, decompresses and
- * unshuffles them. Several threads read independent chunks at once, each with its own decoding
- * state. Idle states stay with the file, because creating a decoder takes longer than decoding a
- * chunk. Before reading, callers collect the chunks (ebpo_hints) and send prefetch hints, so
- * that a remote source fetches them in few requests. A failed hint never fails a read. */
+ * unshuffles them. Several threads read independent chunks at once, each with a separate chunk
+ * reader. The file keeps idle chunk readers, because creating a decoder takes longer than decoding
+ * a chunk. Before reading, callers collect the chunks (ebpo_hints) and send prefetch hints, so that
+ * a remote source fetches the chunks in few requests. A failed hint never fails a read. */
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,7 +17,8 @@
 #include "hdf5_read/coding.h"
 #include "hdf5_read/face_gates.h"
 
-/* Maximum number of idle readers, and of bytes in each buffer for stored chunks. */
+/* Maximum number of idle readers, and maximum bytes of an idle reader's buffer for stored chunks.
+ */
 enum { IDLE_MAX = 4, STORED_MAX = 1 << 18 };
 
 void ebpo_idle_readers_make(ebpo_idle_readers *readers)
@@ -42,7 +43,7 @@ void ebpo_idle_readers_free(ebpo_idle_readers *readers)
     pthread_mutex_destroy(&readers->lock);
 }
 
-/* Creates a reader; its large members need no zeros. */
+/* Creates a reader. Its large members are not initialised. */
 static ebpo_idle_reader *new_reader(void)
 {
     ebpo_idle_reader *r = ebpo_alloc(1, sizeof *r);
@@ -95,7 +96,7 @@ static void add_range(ebpo_hints *e, uint64_t offset, uint64_t size)
     if (last && last->offset + last->size == offset)
         last->size += size;
     else if (ebpo_grow(&e->range, &e->capacity, e->count + 1,
-                       sizeof *e->range)) /* otherwise it is read without a prefetch hint */
+                       sizeof *e->range)) /* without memory, the range has no prefetch hint */
         e->range[e->count++] = (ebpo_range){ offset, size };
 }
 
@@ -107,10 +108,9 @@ bool ebpo_hints_wanted(const ebpo_hints *e)
 
 void ebpo_hint_chunks(ebpo_hints *e, const ebpo_array_in *array, uint64_t begin, uint64_t end)
 {
-    /* The actual read reports failures. */
     if (!ebpo_hints_wanted(e) || !array->present || e->failed)
         return;
-    /* once only, as each attempt takes all retries */
+    /* not repeated after a failure, as each attempt makes all retries; the later read reports it */
     e->failed = ebpo_reader_locate(e->file, array, NULL) != EBPO_OK;
     if (e->failed)
         return;
@@ -133,7 +133,7 @@ void ebpo_hint_level(ebpo_hints *e, int level, uint32_t without)
 
 void ebpo_hint_root(ebpo_hints *e, uint32_t needs)
 {
-    /* the list of chunk checksums is read together with the first data */
+    /* excludes the list of chunk checksums, which is read together with the first data */
     for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_A_CHUNK_CHECKSUMS; id++)
         if (ebpo_schema[id].needs & needs)
             ebpo_hint_array(e, &e->file->root_array[id]);
@@ -168,7 +168,7 @@ static void join_ranges(ebpo_hints *e, uint64_t between)
     e->count = kept;
 }
 
-/* Sends hints to the operating system; each range takes a system call. */
+/* Sends hints to the operating system. Joins close ranges, as each range takes a system call. */
 static void hint_system(ebpo_hints *e)
 {
     enum { BETWEEN = 16 << 10 };
@@ -187,7 +187,7 @@ uint64_t ebpo_hints_bytes(ebpo_hints *e)
     return sum;
 }
 
-/* Returns true if the list of chunk checksums is still to be read, which precedes all other data.
+/* Returns true if the list of chunk checksums has not been read. It is read before all other data.
  */
 static bool wants_checksums(const ebpo_file *file)
 {
@@ -212,7 +212,7 @@ void ebpo_hint_all(ebpo_hints *e)
     *e = (ebpo_hints)EBPO_HINTS_INIT(e->file);
 }
 
-/* Returns false if the stated size is implausible for the first levels. */
+/* Returns false if the stated size top_bytes is implausibly large. */
 static bool is_top(const ebpo_info *info)
 {
     enum { SHARE = 16, ANYWAY = 1 << 20 };
@@ -262,8 +262,8 @@ void ebpo_hint_tree(const ebpo_file *file)
 }
 
 enum {
-    RUN_BYTES = 1 << 20, /* of one read, at most */
-    RUN_CHUNKS = 64      /* for a thread at a time */
+    RUN_BYTES = 1 << 20, /* maximum number of bytes of one read */
+    RUN_CHUNKS = 64      /* maximum number of chunks that a thread takes at a time */
 };
 
 typedef struct job {
@@ -272,11 +272,11 @@ typedef struct job {
     ebpo_rows_fn take;
     void *context;
     ebpo_workspace *workspace;
-    ebpo_idle_reader **reader; /* for each worker, created when first needed */
+    ebpo_idle_reader **reader; /* [threads] created when first needed */
 } job;
 
-/* Reads bytes [address, address + bytes) of the file to reader->stored, which has space for at
- * least `capacity`. */
+/* Reads bytes [address, address + bytes) of the file to reader->stored. Enlarges the buffer to
+ * `capacity` bytes if it is smaller. */
 static ebpo_status fetch_stored(const ebpo_file *file, ebpo_chunk_reader *reader, uint64_t address,
                                 size_t bytes, size_t capacity, ebpo_error *error)
 {
@@ -317,8 +317,8 @@ static ebpo_status unpack_stored(const ebpo_file *file, const ebpo_array_in *arr
     return status == EBPO_OK ? EBPO_OK : chunk_damaged(file, array, chunk, why, error);
 }
 
-/* Converts gates to high-water codes, with padding. Single bytes are not shuffled, so the coder's
- * buffer for that is free. */
+/* Decodes a chunk of gates to high-water codes, with padding. Uses the coder's buffer for
+ * shuffling, which is free because gates are single bytes and not shuffled. */
 static ebpo_status unpack_gates(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
                                 ebpo_chunk_coder *coder, const uint8_t *stored, uint8_t *codes,
                                 ebpo_error *error)
@@ -375,8 +375,9 @@ ebpo_status ebpo_reader_gates(const ebpo_file *file, uint64_t chunk, ebpo_chunk_
                : status;
 }
 
-/* Returns the end of the run of chunks from `begin` on (at most `end`) that are contiguous in the
- * file, up to RUN_BYTES: one read fetches them all. */
+/* Returns the end of a run of chunks that one read fetches. The chunks [begin, result) are
+ * contiguous in the file, end at or before chunk `end`, and take at most RUN_BYTES unless there is
+ * only one. */
 static uint64_t find_run(const ebpo_array_in *array, uint64_t begin, uint64_t end, size_t *bytes)
 {
     const ebpo_chunk_location *c = array->chunks;
@@ -446,7 +447,7 @@ ebpo_status ebpo_reader_rows(const ebpo_file *file, const ebpo_array_in *array,
     j.reader = ebpo_alloc_zero(threads, sizeof *j.reader);
     if (!j.reader)
         return ebpo_fail_memory(error, threads * sizeof *j.reader);
-    /* a few turns for each thread, with the longest possible runs */
+    /* each thread takes chunks about four times, so that runs are long */
     uint64_t grain = chunks / (threads * 4) + 1;
     if (grain > RUN_CHUNKS)
         grain = RUN_CHUNKS;
@@ -475,7 +476,7 @@ static ebpo_status take_integers(void *context, const ebpo_array_in *array, uint
     return EBPO_OK;
 }
 
-/* Reads integers into `values`, `size` bytes each. */
+/* Reads the integers of an array into `values`, `size` bytes each. */
 static ebpo_status reader_integers(const ebpo_file *file, const ebpo_array_in *array,
                                    const ebpo_read_options *options, void *values, size_t size,
                                    ebpo_error *error)

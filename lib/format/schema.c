@@ -1,8 +1,8 @@
-/* Defines the arrays of a file as a table in memory, and the constraints on them. array_table.inc
- * lists all arrays and counts. This file derives tables from it: paths, shapes, codings and needs
- * for the writer, the reader and subsets, so that each array is named once. The second part checks
- * the arrays of a tree from a file (EBPO_E_FORMAT) or from a caller who writes it
- * (EBPO_E_ARGUMENT); each check names the level, the array and the constraint. Source:
+/* Defines the arrays of a file as a table in memory, and the constraints on these arrays.
+ * array_table.inc lists each array and each count once. This file derives tables of paths, shapes,
+ * codings and needs from the list, for the writer, the reader and subsets. The second part checks
+ * the arrays of a tree from a file (EBPO_E_FORMAT), or from a caller who writes the tree
+ * (EBPO_E_ARGUMENT). Each error names the level, the array and the constraint. Source:
  * format-spec/README.md, "Arrays" and "Constraints". */
 #include <inttypes.h>
 #include <math.h>
@@ -101,13 +101,14 @@ static const count_spec level_counts[EBPO_COUNTS] = {
 #include "format/array_table.inc"
 };
 
-/* Checks that rows and fields agree. */
+/* Checks that the type in each row of array_table.inc is that of the member of ebpo_level. */
 #define LEVEL_ARRAY(ID, name, field, type, ...)                                 \
     _Static_assert(_Generic(((ebpo_level *)0)->field, type * : 1, default : 0), \
                    "ebpo_level." #field ": another type than in its row of array_table.inc");
 #include "format/array_table.inc"
 
-/* Values are narrowed from 32 bits, or have one size; leaf_skip holds differences. */
+/* Checks the sizes in the file. Either values are narrowed from 32 bits, or they have one size.
+ * leaf_skip is an exception, as it contains differences. */
 #define LEVEL_ARRAY(ID, name, field, type, stored, ...)                               \
     _Static_assert((stored) & ((stored)-1)                                            \
                        ? sizeof(type) == 4                                            \
@@ -115,7 +116,8 @@ static const count_spec level_counts[EBPO_COUNTS] = {
                    #name ": its sizes in the file do not go with its type in memory");
 #include "format/array_table.inc"
 
-/* The contents of ebpo_level: the pointers and counts of the rows, and the fields listed here. */
+/* All members of ebpo_level: the pointers and counts of array_table.inc, and the members listed
+ * here. Compared with ebpo_level by size. */
 struct all_of_level {
 #define LEVEL_ARRAY(ID, name, field, type, ...) type *field;
 #define LEVEL_COUNT(ID, attribute, field, ...)  uint64_t field;
@@ -157,6 +159,7 @@ static uint64_t face_chunks(const ebpo_info *info)
     return faces > rows ? (faces - 1) / rows + 1 : 0;
 }
 
+/* Returns the number of subtrees. */
 static uint64_t subtree_rows(const ebpo_info *info)
 {
     return info->level[info->subtree_level].gray_count;
@@ -362,7 +365,7 @@ static ebpo_status check_types(const ebpo_check *check, const ebpo_info *info, i
     return EBPO_OK;
 }
 
-/* Checks that all required arrays are present and no others. */
+/* Checks that all required arrays are present, and that a surface has no winding numbers. */
 static ebpo_status check_presence(const ebpo_check *check, const ebpo_info *info, int level,
                                   const ebpo_level *arrays, ebpo_error *error)
 {
@@ -491,9 +494,10 @@ ebpo_status ebpo_check_level(const ebpo_check *check, const ebpo_info *info, int
 typedef struct walk {
     const ebpo_check *check;
     const ebpo_tree *tree;
-    /* next item of each level: depth-first order visits them in octcode order */
+    /* next item of each level: in depth-first order, the items of a level have ascending octcodes
+     */
     uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX];
-    uint64_t seen;
+    uint64_t seen; /* number of new faces of the leaves before */
 } walk;
 
 static ebpo_status walk_group(walk *w, int level, ebpo_error *error)
@@ -530,7 +534,7 @@ ebpo_status ebpo_check_order(const ebpo_check *check, const ebpo_tree *tree, ebp
 ebpo_status ebpo_check_map(const ebpo_check *check, const char *array, const uint32_t *map,
                            uint64_t count, uint64_t limit, ebpo_error *error)
 {
-    limit = limit <= UINT32_MAX ? limit : UINT64_C(1) << 32; /* all indices of 32 bits */
+    limit = limit <= UINT32_MAX ? limit : UINT64_C(1) << 32; /* a map has indices of 32 bits */
     uint64_t *seen = ebpo_alloc_zero(limit / 64 + 1, sizeof *seen);
     if (!seen)
         return ebpo_fail_memory(error, limit / 8);

@@ -9,7 +9,7 @@
 
 #include "hdf5_read/chunk.h"
 
-/* In file order. Up to EBPO_LEVEL_ARRAYS once for each level. */
+/* Arrays in file order. Arrays before EBPO_LEVEL_ARRAYS exist once for each level. */
 typedef enum ebpo_array_id {
 #define LEVEL_ARRAY(ID, ...) EBPO_A_##ID,
 #define LEVEL_INDEX(ID, ...) EBPO_A_##ID,
@@ -20,18 +20,19 @@ typedef enum ebpo_array_id {
 #define TABLE_ARRAY(ID, ...) EBPO_A_##ID,
 #define SUM_ARRAY(ID, ...)   EBPO_A_##ID,
 #include "format/array_table.inc"
-    /* all arrays of /attributes, in any number; `level` is then the number of the array there */
+    /* stands for every array of /attributes; `level` is then the array's number there */
     EBPO_A_ATTRIBUTE,
     EBPO_ARRAYS
 } ebpo_array_id;
 
-/* The item that has one row. The first ones are counted in the attributes of a level. */
+/* Kind of item that has one row in an array. The attributes of a level's group contain the numbers
+ * of items before EBPO_COUNTS. */
 typedef enum ebpo_per {
 #define LEVEL_COUNT(ID, ...) EBPO_PER_##ID,
 #include "format/array_table.inc"
     EBPO_COUNTS,
     EBPO_PER_GROUP = EBPO_COUNTS,
-    EBPO_PER_GROUP_BLOCK, /* block of EBPO_INDEX_ROWS groups, and so on */
+    EBPO_PER_GROUP_BLOCK, /* EBPO_INDEX_ROWS groups; the next two: gray nodes, leaves */
     EBPO_PER_GRAY_BLOCK,
     EBPO_PER_LEAF_BLOCK,
     EBPO_PER_VERTEX,
@@ -43,7 +44,8 @@ typedef enum ebpo_per {
     EBPO_PER_CHUNK
 } ebpo_per;
 
-/* Conditions for the presence of an array, as bits: parts, and defined winding numbers. */
+/* Conditions for the presence of an array, as bits. The last three are no parts: the file has
+ * subtrees, the model is a solid, none. */
 enum {
     EBPO_NEEDS_PLANES = EBPO_PART_PLANES,
     EBPO_NEEDS_MESH = EBPO_PART_MESH,
@@ -68,17 +70,19 @@ enum {
     EBPO_COLS_OF_SUBTREES = 255 /* see ebpo_schema_cols */
 };
 
-/* Columns of /subtrees/counts: items of a subtree, and items between it and the one before
- * (`BEFORE`: of leaves down to the roots' level). */
+/* Columns of /subtrees/counts: numbers of items of a subtree. Columns with BEFORE count the items
+ * between the previous subtree and this one. These items belong to leaves above or at the level of
+ * the subtrees' roots. */
 enum {
     EBPO_S_FACES_BEFORE, /* new faces */
     EBPO_S_FACES,
     EBPO_S_VERTICES_BEFORE, /* first used by these faces */
     EBPO_S_VERTICES,
-    EBPO_S_SHARED_FACES, /* rows of /subtrees/outer for blocks of faces */
-    EBPO_S_SHARED_VERTICES,
-    EBPO_SUBTREE_LEVELS /* then for each level below the roots: */
+    EBPO_S_SHARED_FACES,    /* rows of /subtrees/outer for chunks of faces */
+    EBPO_S_SHARED_VERTICES, /* rows of /subtrees/outer for chunks of vertices */
+    EBPO_SUBTREE_LEVELS     /* first of the columns of levels */
 };
+/* Columns of each level below the subtrees' roots. */
 enum {
     EBPO_S_GRAY,
     EBPO_S_LEAF,
@@ -86,21 +90,21 @@ enum {
     EBPO_S_PLANES,
     EBPO_S_LEAF_PLANES,
     EBPO_S_REFS,
-    EBPO_S_ENDS, /* increase of the end of the level's new faces */
+    EBPO_S_ENDS, /* increase of the end of the new faces (one past the last) in the level */
     EBPO_SUBTREE_LEVEL_COLS
 };
 
-/* Returns a column. `level`: below the roots; `what`: one of the last constants. */
+/* Returns the column of a level below the subtrees' roots. `what`: EBPO_S_GRAY to EBPO_S_ENDS. */
 static inline unsigned ebpo_subtree_column(const ebpo_info *info, int level, unsigned what)
 {
     return EBPO_SUBTREE_LEVELS +
            EBPO_SUBTREE_LEVEL_COLS * (unsigned)(level - info->subtree_level - 1) + what;
 }
 
-/* Returns the rows of a chunk of /subtrees/counts; the array may have fewer. */
+/* Returns the number of rows in a chunk of /subtrees/counts. The array may have fewer rows. */
 uint32_t ebpo_subtree_rows(const ebpo_info *info);
 
-/* Length of arrays that only the array itself states. */
+/* Number of rows of an array whose length is not derived from the header's counts. */
 #define EBPO_ROWS_STATED UINT64_MAX
 
 /* The index arrays of a level, in the order of the items that they count. */
@@ -113,59 +117,60 @@ typedef struct ebpo_array_spec {
     uint8_t cols;   /* 0: one dimension */
     uint8_t sizes;  /* sum of the allowed element sizes: 1 + 2 + 4 + 8 */
     bool is_signed;
-    bool if_needed; /* may be absent although its rows exist: all values are then the default */
-    int8_t standard;
-    uint8_t since;      /* minor version of the format */
-    uint8_t held_size;  /* of an element in ebpo_level; 0: not stored there */
+    bool if_needed;     /* may be absent although its rows exist: all values are then the default */
+    int8_t standard;    /* default value */
+    uint8_t since;      /* first minor version of the format with this array */
+    uint8_t held_size;  /* size of an element in ebpo_level; 0: ebpo_level lacks the array */
     uint16_t held;      /* offset of the pointer in ebpo_level */
-    uint16_t bytes;     /* arrays of the root: offset of their kind in ebpo_stored_sizes */
-    const char *coding; /* attribute */
-    const char *about;  /* attribute */
+    uint16_t bytes;     /* arrays of the root: offset of their size in ebpo_stored_sizes */
+    const char *coding; /* value of the array's attribute `coding` */
+    const char *about;  /* value of the array's attribute `about` */
 } ebpo_array_spec;
 
 extern const ebpo_array_spec ebpo_schema[EBPO_ARRAYS];
 
-/* Returns the stored shape of an array with values of shape `given`: the same, or that of gates. */
 #define EBPO_GATES_CODING "gates"
+/* Returns the shape in the file of an array with values of shape `given`. It differs from `given`
+ * only for gates. */
 ebpo_shape ebpo_stored_shape(const ebpo_shape *given, bool gates);
 
 /* Writes the absolute path of an array; `level` matters for level arrays only. */
 void ebpo_schema_path(ebpo_array_id id, int level, char path[EBPO_PATH_BYTES]);
 
-/* Returns the columns of an array; 0: one dimension. */
+/* Returns the number of columns of an array; 0: one dimension. */
 uint32_t ebpo_schema_cols(const ebpo_info *info, ebpo_array_id id);
 
-/* Returns the rows that the head's counts and parts require, or EBPO_ROWS_STATED; 0: the array is
- * not in the file. */
+/* Returns the number of rows that the header's counts and parts require, or EBPO_ROWS_STATED.
+ * Returns 0 if the array is not in the file. */
 uint64_t ebpo_schema_rows(const ebpo_info *info, ebpo_array_id id, int level);
 
-/* Returns the rows of an index array over `count` items: one for each EBPO_INDEX_ROWS, but none if
- * one would suffice (it is all zeros). */
+/* Returns the number of rows of an index array over `count` items: one for each EBPO_INDEX_ROWS
+ * items. Returns 0 instead of 1, as a single row contains only zeros. */
 uint64_t ebpo_schema_index_rows(uint64_t count);
 
-/* Returns the number of groups of eight in a level, from the head's counts. */
+/* Returns the number of groups of eight in a level, from the header's counts. */
 static inline uint64_t ebpo_schema_groups(const ebpo_info *info, int level)
 {
     return level == 0 ? 1 : info->level[level - 1].gray_count;
 }
 
-/* Returns the needs that a file or tree fulfils. */
+/* Returns the conditions (EBPO_NEEDS_...) that a file or tree fulfils. */
 static inline uint32_t ebpo_schema_has(const ebpo_info *info)
 {
     return info->parts | (info->solid ? EBPO_NEEDS_SOLID : 0) |
            (info->subtree_level ? EBPO_NEEDS_SUBTREES : 0) | EBPO_NEEDS_ALWAYS;
 }
 
-/* Lists that counts divide: planes, leaf planes and references have a count for each node of one
- * type. */
+/* A list of planes, leaf planes or references. Another array contains the number of list items of
+ * each node of one type. */
 typedef struct ebpo_list_spec {
-    ebpo_array_id counts;
-    ebpo_per of;
+    ebpo_array_id counts; /* the array of these numbers */
+    ebpo_per of;          /* the type of node */
 } ebpo_list_spec;
 /* Returns NULL for arrays that are not lists. */
 const ebpo_list_spec *ebpo_schema_list(ebpo_per per);
 
-/* Returns the type of the nodes with one row each, or -1. */
+/* Returns the type of node (ebpo_node_type) that `per` stands for, or -1. */
 int ebpo_schema_node_type(ebpo_per per);
 
 /* --- a level in memory --- */
@@ -176,7 +181,8 @@ static inline bool ebpo_schema_is_index(int id)
            ebpo_schema[id].per <= EBPO_PER_LEAF_BLOCK;
 }
 
-/* Returns true for a list about all chunks, which has a single chunk and is not in any list. */
+/* Returns true for the two lists of all chunks (offsets and checksums). Each list is a single
+ * chunk, which neither list contains. */
 static inline bool ebpo_schema_is_list(ebpo_array_id id)
 {
     return id == EBPO_A_PLACES || id == EBPO_A_CHUNK_CHECKSUMS;
@@ -208,12 +214,13 @@ static inline uint64_t ebpo_level_rows(const ebpo_level *level, int id)
 /* Returns true if all values are the default, which an absent array means as well. */
 bool ebpo_level_is_default(const ebpo_level *level, int id);
 
-/* Frees the arrays that only these `needs` require. Keeps counts. */
+/* Frees the arrays that only these `needs` require. The level's counts do not change. */
 void ebpo_level_drop(ebpo_level *level, uint32_t needs);
 
-/* Return the counts and volumes of a level as stated in the head, restricted to `parts`; and a
- * level with the head's counts and no arrays. */
+/* Returns the counts and volumes of a level, as a file's header states them. Counts of parts that
+ * are not in `parts` are 0. */
 ebpo_level_summary ebpo_level_summarise(const ebpo_level *level, uint32_t parts);
+/* Returns a level with the header's counts and no arrays. */
 ebpo_level ebpo_level_of_summary(const ebpo_info *info, int level);
 
 /* Constraints on a tree from a file or from a caller who writes one: format-spec/README.md,
@@ -226,16 +233,17 @@ typedef struct ebpo_check {
     ebpo_workspace *workspace; /* contains the arrays, or NULL */
 } ebpo_check;
 
-/* Reports a wrong array of a level: "shown: /levels/03/planes: what; next". */
+/* Reports a wrong array of a level, for example "shown: /levels/03/planes: what; advice". `level`:
+ * -1 for an array of the root. */
 ebpo_status ebpo_check_fail(const ebpo_check *check, int level, const char *array, const char *what,
                             ebpo_error *error);
 
-/* Checks a level's arrays against the head's counts and each other. */
+/* Checks a level's arrays against the header's counts and against each other. */
 EBPO_MUST_USE ebpo_status ebpo_check_level(const ebpo_check *check, const ebpo_info *info,
                                            int level, const ebpo_level *arrays, ebpo_error *error);
 
-/* Checks that leaves in depth-first order have the new faces 0 .. face_count - 1, in order. For
- * trees with face lists. */
+/* Checks a tree with face lists: the new faces of its leaves, in depth-first order, must be
+ * 0 .. face_count - 1 in ascending order. */
 EBPO_MUST_USE ebpo_status ebpo_check_order(const ebpo_check *check, const ebpo_tree *tree,
                                            ebpo_error *error);
 
@@ -248,12 +256,12 @@ EBPO_MUST_USE ebpo_status ebpo_check_map(const ebpo_check *check, const char *ar
 EBPO_MUST_USE ebpo_status ebpo_check_finite(const ebpo_check *check, const ebpo_mesh *mesh,
                                             ebpo_error *error);
 
-/* The arrays of /attributes in a file: a header, then for each attribute array its values and, for
- * lists of different lengths, their items. format-spec/README.md, "Attributes". */
-
-/* Convert between attribute arrays, their numbers and paths. */
+/* Numbers of the arrays in /attributes: 0 is the header. Attribute array n has an array of values
+ * and, for lists of different lengths, an array of their items. format-spec/README.md,
+ * "Attributes". */
 static inline int ebpo_values_number(uint64_t n) { return 1 + 2 * (int)n; }
 static inline int ebpo_items_number(uint64_t n) { return 2 + 2 * (int)n; }
+/* Writes the absolute path of an array in /attributes. */
 void ebpo_attribute_path(int number, char path[EBPO_PATH_BYTES]);
 
 extern const char ebpo_coding_plain[], ebpo_coding_columns[];

@@ -1,8 +1,8 @@
-/* Reads slices: whole subtrees as one piece, or the whole tree. A subtree is a contiguous range of
- * the nodes of every level. A slice contains these ranges, the faces that its leaves list, and
- * their vertices, with local indices: first faces that are new in leaves before the subtree, in
- * ascending order, then its owned faces. A hash table (ebpo_compact) maps scattered indices to
- * dense ones. A caller may limit the memory (ebpo_quota), which is reserved before each array is
+/* Reads slices: a complete subtree or the whole tree. A subtree is a contiguous range of nodes in
+ * every level. A slice contains these ranges, the faces that its leaves list, and the vertices of
+ * these faces. Faces have local indices: first the shared faces, in ascending order of their file
+ * indices, then the owned faces. A hash table (ebpo_compact) maps scattered indices to dense ones.
+ * A caller may limit the memory (ebpo_quota); the bytes of each array are reserved before it is
  * allocated. Source: format-spec/README.md, sections 4 and 5. */
 #include <stdlib.h>
 #include <string.h>
@@ -54,7 +54,7 @@ ebpo_status ebpo_compact_make(ebpo_compact *out, uint64_t capacity, ebpo_error *
     return EBPO_OK;
 }
 
-/* Returns the slot that holds or would hold a number. */
+/* Returns the slot that contains a number, or the free slot for it. */
 static uint64_t slot_of(const ebpo_compact *c, uint32_t number)
 {
     uint64_t at;
@@ -72,7 +72,8 @@ static void compact_add(ebpo_compact *compact, uint32_t number)
     compact->sorted[compact->count++] = number;
 }
 
-/* Sorts by radix, byte by byte from the lowest; skips bytes in which all numbers agree. */
+/* Sorts with a radix sort, from the lowest byte to the highest. Skips bytes that are equal in all
+ * numbers. `other`: temporary memory of the same size. */
 static void sort_numbers(uint32_t *numbers, uint32_t *other, uint64_t count)
 {
     uint64_t begin[4][256] = { { 0 } };
@@ -99,7 +100,7 @@ static void sort_numbers(uint32_t *numbers, uint32_t *other, uint64_t count)
         memcpy(numbers, from, count * sizeof *numbers);
 }
 
-/* Sorts after the last addition. */
+/* Sorts the numbers. Called after the last compact_add. */
 static ebpo_status compact_sort(ebpo_compact *compact, ebpo_error *error)
 {
     if (compact->count == 0)
@@ -114,7 +115,7 @@ static ebpo_status compact_sort(ebpo_compact *compact, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Returns the rank of a number that was added. */
+/* Returns the position, in sorted order, of a number that was added. */
 static uint32_t compact_find(const ebpo_compact *compact, uint32_t number)
 {
     return compact->slot[slot_of(compact, number)].place;
@@ -122,11 +123,11 @@ static uint32_t compact_find(const ebpo_compact *compact, uint32_t number)
 
 /* --- faces --- */
 
-static void expect_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t *single,
-                        uint64_t singles, uint64_t first, uint64_t rows)
+static void hint_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t *single,
+                      uint64_t singles, uint64_t first, uint64_t rows)
 {
     ebpo_hints e = EBPO_HINTS_INIT(chunks->file);
-    /* rows before `next` are included */
+    /* rows before `next` are already collected */
     uint64_t chunk_rows = ebpo_reader_array(chunks->file, id, 0)->shape.chunk_rows, next = 0;
     if (!ebpo_input_expects(&chunks->file->in))
         return;
@@ -141,8 +142,8 @@ static void expect_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t *s
     ebpo_hint_all(&e);
 }
 
-/* Reads rows of a decoded array: those of `single` (ascending), then [first, first + rows). Chunks
- * stay pinned while their rows are read. */
+/* Reads decoded rows of an array: first the rows `single`, in ascending order, then the rows
+ * [first, first + rows). A chunk stays pinned while its rows are read. */
 static ebpo_status gather_rows(ebpo_chunks *chunks, ebpo_array_id id, size_t row_bytes,
                                const uint32_t *single, uint64_t singles, uint64_t first,
                                uint64_t rows, void *out, ebpo_error *error)
@@ -150,7 +151,7 @@ static ebpo_status gather_rows(ebpo_chunks *chunks, ebpo_array_id id, size_t row
     ebpo_held_chunk view = { .array = ebpo_reader_array(chunks->file, id, 0) };
     ebpo_status status = EBPO_OK;
     uint8_t *to = out;
-    expect_rows(chunks, id, single, singles, first, rows);
+    hint_rows(chunks, id, single, singles, first, rows);
     for (uint64_t i = 0;
          i < singles && (status = ebpo_held_chunk_move(chunks, &view, single[i], error)) == EBPO_OK;
          i++, to += row_bytes)
@@ -167,7 +168,7 @@ static ebpo_status gather_rows(ebpo_chunks *chunks, ebpo_array_id id, size_t row
     return status;
 }
 
-/* --- references --- */
+/* --- local indices of faces --- */
 
 static ebpo_status collect_shared(ebpo_slice *slice, ebpo_compact *outer, ebpo_quota *space,
                                   ebpo_error *error)
@@ -190,7 +191,7 @@ static ebpo_status collect_shared(ebpo_slice *slice, ebpo_compact *outer, ebpo_q
 
 static void localise_faces(ebpo_slice *slice, const ebpo_compact *outer)
 {
-    /* the shared faces are among those before the first owned one */
+    /* owned faces decrease by the number of earlier faces that are not shared */
     uint64_t less = slice->first_face - outer->count;
     for (int i = 0; i < slice->level_count; i++) {
         ebpo_level *level = &slice->level[i];
@@ -204,7 +205,7 @@ static void localise_faces(ebpo_slice *slice, const ebpo_compact *outer)
     }
 }
 
-/* Numbers the faces. The slice keeps the list of shared faces. */
+/* Gives the faces local indices, and moves the list of shared faces to the slice. */
 static ebpo_status number_faces(ebpo_slice *slice, ebpo_quota *space, ebpo_error *error)
 {
     ebpo_compact outer = { .slot = NULL };
@@ -223,13 +224,13 @@ static ebpo_status number_faces(ebpo_slice *slice, ebpo_quota *space, ebpo_error
 
 /* --- vertices --- */
 
-/* Finds the vertices that are new in the slice's owned faces. As vertices are numbered by first
- * use, they are a range, [*begin, *end), and all other vertices of the slice precede it. */
+/* Finds the vertices that the slice's owned faces use first. Vertices are numbered by first use, so
+ * these vertices are a range [*begin, *end), and all other vertices of the slice precede it. */
 static ebpo_status new_vertices(ebpo_slice *slice, ebpo_chunks *chunks, uint64_t *begin,
                                 uint64_t *end, ebpo_error *error)
 {
     ebpo_held_chunk view = { .array = ebpo_reader_array(chunks->file, EBPO_A_FACES, 0) };
-    *begin = *end = UINT32_MAX; /* no owned faces: all vertices are older */
+    *begin = *end = UINT32_MAX; /* without owned faces, all vertices precede the range */
     if (slice->face_count == 0)
         return EBPO_OK;
     ebpo_status status = ebpo_held_chunk_move(chunks, &view, slice->first_face, error);
@@ -238,7 +239,9 @@ static ebpo_status new_vertices(ebpo_slice *slice, ebpo_chunks *chunks, uint64_t
     const uint32_t *corners = (const uint32_t *)(const void *)view.rows,
                    *own = slice->mesh.faces + 3 * (uint64_t)slice->shared_count;
     uint64_t seen = chunks->seen ? chunks->seen[view.begin / view.array->shape.chunk_rows] : 0;
-    uint32_t before = 0, within = 0; /* one past the largest; vertex indices are below 2^32 - 2 */
+    /* one past the largest vertex of the faces before the owned faces, and of the owned faces;
+     * vertex indices are below 2^32 - 2 */
+    uint32_t before = 0, within = 0;
     for (uint64_t i = 0; i < 3 * (slice->first_face - view.begin); i++)
         before = corners[i] + 1 > before ? corners[i] + 1 : before;
     for (uint64_t i = 0; i < 3 * slice->face_count; i++)
@@ -265,7 +268,8 @@ static ebpo_status collect_older(const ebpo_mesh *mesh, uint64_t begin, ebpo_quo
     return status == EBPO_OK ? compact_sort(older, error) : status;
 }
 
-/* Renumbers vertices: older ones first, then the new ones, in file order. */
+/* Gives the vertices local indices, in file order: first the older vertices, then those that owned
+ * faces use first. */
 static void renumber_vertices(ebpo_mesh *mesh, uint64_t begin, const ebpo_compact *older)
 {
     uint32_t less = (uint32_t)(begin - older->count);
@@ -316,8 +320,9 @@ static ebpo_status take_source(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_erro
                        slice->face_source, error);
 }
 
-/* Completes a slice from levels with file indices, first_face and face_count. Converts the levels
- * to local indices; with `maps`, adds source indices. `space`: see ebpo_slice_read_within. */
+/* Completes a slice that has levels with file indices, first_face and face_count. Reads faces and
+ * vertices, and converts the levels to local indices. With `maps`, also reads source indices.
+ * `space`: see ebpo_slice_read_within. */
 static ebpo_status slice_take_faces(ebpo_slice *slice, ebpo_chunks *chunks, bool maps,
                                     ebpo_quota *space, ebpo_error *error)
 {
@@ -373,11 +378,11 @@ static ebpo_status root_range(const ebpo_chunks *chunks, const ebpo_node *root, 
     return ebpo_chunks_check_node(chunks, root, error);
 }
 
-/* Selected nodes of a subtree, and their data (EBPO_NEEDS_...). */
+/* Selected levels of a subtree, and the data to read. */
 typedef struct extent {
-    uint32_t needs;
+    uint32_t needs;    /* EBPO_NEEDS_... */
     int end;           /* one past the deepest level */
-    bool faces;        /* faces listed by the leaves will also be read */
+    bool faces;        /* the faces that the leaves list will also be read */
     ebpo_quota *space; /* NULL: no limit */
 } extent;
 
@@ -391,14 +396,13 @@ static extent extent_of(const ebpo_chunks *chunks, const ebpo_node *root, uint32
                      NULL };
 }
 
-/* Returns true if the range has a next level; the gray nodes of the file's last level are pruned.
- */
+/* Returns true if the next level of the extent has nodes below this range. */
 static bool goes_on(const extent *e, const range *r)
 {
     return r->run.count[EBPO_GRAY] && r->level + 1 < e->end;
 }
 
-/* Computes the range of the next level. */
+/* Moves the range to the next level. `types`: receives the types of its groups, or NULL. */
 static ebpo_status next_range(ebpo_chunks *chunks, range *r, uint16_t **types, ebpo_error *error)
 {
     uint64_t group = r->run.rank[EBPO_GRAY], groups = r->run.count[EBPO_GRAY];
@@ -415,9 +419,9 @@ static ebpo_status next_range(ebpo_chunks *chunks, range *r, uint16_t **types, e
                              : status;
 }
 
-/* Sends prefetch hints for the first reads of a level's nodes, and for the types of the next level;
- * for remote files only. */
-static void expect_nodes(ebpo_chunks *chunks, const extent *x, const range *r)
+/* Sends prefetch hints for the nodes of a level, and for the types of the next level. For remote
+ * files only. */
+static void hint_nodes(ebpo_chunks *chunks, const extent *x, const range *r)
 {
     ebpo_hints e = EBPO_HINTS_INIT(chunks->file);
     uint64_t gray = r->run.rank[EBPO_GRAY], index = gray / EBPO_INDEX_ROWS,
@@ -433,9 +437,9 @@ static void expect_nodes(ebpo_chunks *chunks, const extent *x, const range *r)
     ebpo_hint_all(&e);
 }
 
-/* Sends prefetch hints from the level of the subtrees' roots on, where all lower chunks are known.
- */
-static void expect_below(ebpo_chunks *chunks, const extent *x, const range *r)
+/* Sends prefetch hints for all levels below the subtrees' roots. Does nothing unless the range is
+ * in the level of these roots, where the table states all lower chunks. */
+static void hint_subtrees(ebpo_chunks *chunks, const extent *x, const range *r)
 {
     uint64_t first = r->run.rank[EBPO_GRAY], count = r->run.count[EBPO_GRAY];
     ebpo_hints e = EBPO_HINTS_INIT(chunks->file);
@@ -452,8 +456,8 @@ static void expect_below(ebpo_chunks *chunks, const extent *x, const range *r)
 static ebpo_status read_nodes(ebpo_chunks *chunks, const extent *x, const range *r, ebpo_level *out,
                               ebpo_error *error)
 {
-    expect_below(chunks, x, r);
-    expect_nodes(chunks, x, r);
+    hint_subtrees(chunks, x, r);
+    hint_nodes(chunks, x, r);
     return ebpo_runs_read(chunks, r->level, &r->run, 1, x->needs, x->space, out, error);
 }
 
@@ -490,8 +494,8 @@ typedef struct walk {
     bool begun;
 } walk;
 
-/* Checks that leaves in depth-first order have the subtree's owned faces as their new ones, without
- * gaps. The first leaf determines their start. */
+/* Checks that the new faces of the leaves, in depth-first order, are one range without gaps. This
+ * range is the owned faces; the first leaf determines its begin. */
 static ebpo_status walk_group(walk *w, int level, ebpo_error *error)
 {
     const ebpo_level *arrays = &w->slice->level[level];
@@ -521,12 +525,12 @@ static ebpo_status walk_group(walk *w, int level, ebpo_error *error)
 static bool is_subtree(const ebpo_chunks *chunks, const extent *x, const ebpo_node *root)
 {
     const ebpo_info *info = &chunks->file->info;
-    /* for a subset of the levels the table does not state the faces */
+    /* the table does not state the faces of a part of the levels */
     return info->subtree_level && root->cell.level == info->subtree_level &&
            root->type == EBPO_GRAY && x->end == info->level_count;
 }
 
-/* Checks that the leaves' faces are those stated in the table for the subtree. */
+/* Checks that the owned faces are those that the table states for the subtree. */
 static ebpo_status check_owned_faces(const ebpo_slice *slice, ebpo_chunks *chunks, const extent *x,
                                      ebpo_error *error)
 {
@@ -641,13 +645,13 @@ static ebpo_status measure_nodes(ebpo_chunks *chunks, const extent *x, const ran
     return status;
 }
 
-/* Reads the sizes of a subtree, except its root, from the table. */
+/* Adds the sizes of a subtree, except its root, from the table. */
 static ebpo_status measure_subtree(ebpo_chunks *chunks, const extent *x, uint64_t subtree,
                                    ebpo_slice_size *out, ebpo_error *error)
 {
     const ebpo_info *info = &chunks->file->info;
     ebpo_subtree_row row;
-    /* also prefetches the table rows that reading needs */
+    /* the later read needs the same rows of the table */
     ebpo_subtree_table_hint_run(chunks, subtree, 1);
     ebpo_status status = ebpo_subtree_table_row(chunks, subtree, &row, error);
     for (int level = info->subtree_level + 1; level < x->end && status == EBPO_OK; level++) {
@@ -699,7 +703,7 @@ ebpo_status ebpo_slice_measure(ebpo_chunks *chunks, const ebpo_node *root, ebpo_
 
 /* --- the whole tree --- */
 
-/* Removes arrays that a slice does not have. */
+/* Removes data that slices do not contain. */
 static void drop_arrays(ebpo_level *level)
 {
     ebpo_level_drop(level, EBPO_NEEDS_LEAF_PLANES);

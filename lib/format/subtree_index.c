@@ -1,10 +1,11 @@
-/* Locates subtrees and nodes in every array. The first part reads the file's table of subtrees: for
- * each subtree the sums of all counts before it, from sums stored for some rows and counts in
- * between; recently used rows are cached. The second part computes ranks: the planes, faces and
- * nodes of each type before a node. Levels below the roots of subtrees begin at the subtree's row;
- * other levels have an index row for every 4,096 items, from which counting continues. Results are
- * checked against the counts in the head. The last part sends prefetch hints for subtrees. Source:
- * format-spec/README.md, sections 4 and 9. */
+/* Locates subtrees and nodes in every array. The first part reads the file's table of subtrees. For
+ * each subtree, it computes the sums of all counts before the subtree: from the sums that the file
+ * stores for some rows, and the counts of the rows in between. It caches recently used rows. The
+ * second part computes ranks: the planes, faces and nodes of each type before a node. It counts
+ * from the subtree's row in levels below the subtrees' roots, and in other levels from an index
+ * row, which exists for every 4,096 items. Results are checked against the counts in the header.
+ * The last part sends prefetch hints for subtrees. Source: format-spec/README.md, sections 4 and 9.
+ */
 #include <stdlib.h>
 #include <string.h>
 
@@ -21,7 +22,8 @@ static ebpo_status table_fails(const ebpo_chunks *chunks, ebpo_array_id id, cons
     return ebpo_chunks_fail(chunks, -1, id, what, error);
 }
 
-/* Returns the maximum sum of a column; *exact is true if it must be reached. */
+/* Returns the maximum of the sum of a column over all subtrees. *exact is true if the sum must be
+ * equal to it. */
 static uint64_t column_total(const ebpo_file *file, unsigned column, bool *exact)
 {
     const ebpo_info *info = &file->info;
@@ -48,23 +50,24 @@ static uint64_t column_total(const ebpo_file *file, unsigned column, bool *exact
     }
 }
 
-/* Reads the sums before a chunk of rows; after the last chunk, the head's counts. */
-static ebpo_status checksums_before(ebpo_chunks *chunks, uint64_t chunk, uint32_t cols,
-                                    uint64_t *checksums, ebpo_error *error)
+/* Reads the sums before a chunk of rows. For the number after the last chunk, returns the totals
+ * from the header. */
+static ebpo_status sums_before(ebpo_chunks *chunks, uint64_t chunk, uint32_t cols, uint64_t *sums,
+                               ebpo_error *error)
 {
     const ebpo_array_in *index = ebpo_reader_array(chunks->file, EBPO_A_SUBTREE_INDEX, 0);
     bool exact;
     ebpo_status status = EBPO_OK;
     if (chunk == index->shape.rows) {
         for (uint32_t k = 0; k < cols; k++)
-            checksums[k] = column_total(chunks->file, k, &exact);
+            sums[k] = column_total(chunks->file, k, &exact);
         return EBPO_OK;
     }
     ebpo_held_chunk view = { .array = index };
     status = ebpo_held_chunk_move(chunks, &view, chunk, error);
     for (uint32_t k = 0; k < cols && status == EBPO_OK; k++) {
-        checksums[k] = ebpo_load64(view.rows + ((chunk - view.begin) * cols + k) * 8);
-        if (checksums[k] > column_total(chunks->file, k, &exact) || (chunk == 0 && checksums[k]))
+        sums[k] = ebpo_load64(view.rows + ((chunk - view.begin) * cols + k) * 8);
+        if (sums[k] > column_total(chunks->file, k, &exact) || (chunk == 0 && sums[k]))
             status = table_fails(chunks, EBPO_A_SUBTREE_INDEX,
                                  "the sums contradict the counts in the head", error);
     }
@@ -72,6 +75,7 @@ static ebpo_status checksums_before(ebpo_chunks *chunks, uint64_t chunk, uint32_
     return status;
 }
 
+/* A chunk of rows of the table. */
 typedef struct subtree_counts {
     ebpo_held_chunk view;
     uint32_t cols;
@@ -83,39 +87,39 @@ static uint32_t count_at(const subtree_counts *c, uint64_t subtree, uint32_t col
     return ebpo_load32(c->view.rows + ((subtree - c->view.begin) * c->cols + column) * 4);
 }
 
-static void add_row(const subtree_counts *c, uint64_t subtree, uint64_t *checksums)
+static void add_row(const subtree_counts *c, uint64_t subtree, uint64_t *sums)
 {
     for (uint32_t k = 0; k < c->cols; k++)
-        checksums[k] += count_at(c, subtree, k);
+        sums[k] += count_at(c, subtree, k);
 }
 
-/* Opens the chunk of rows that contains a subtree, and checks that it adds up to the sums after it.
- */
+/* Opens the chunk of rows that contains a subtree. Checks that the sums before the chunk plus its
+ * counts are the sums after the chunk. */
 static ebpo_status open_counts(ebpo_chunks *chunks, uint64_t subtree, subtree_counts *c,
                                ebpo_error *error)
 {
     const ebpo_array_in *array = ebpo_reader_array(chunks->file, EBPO_A_SUBTREE_COUNTS, 0);
-    uint64_t rows = array->shape.chunk_rows, chunk = subtree / rows, checksums[EBPO_SUBTREE_COLS];
+    uint64_t rows = array->shape.chunk_rows, chunk = subtree / rows, sums[EBPO_SUBTREE_COLS];
     c->view = (ebpo_held_chunk){ .array = array };
     c->cols = array->shape.cols;
-    ebpo_status status = checksums_before(chunks, chunk, c->cols, c->begin, error);
+    ebpo_status status = sums_before(chunks, chunk, c->cols, c->begin, error);
     if (status == EBPO_OK)
-        status = checksums_before(chunks, chunk + 1, c->cols, c->end, error);
+        status = sums_before(chunks, chunk + 1, c->cols, c->end, error);
     if (status == EBPO_OK)
         status = ebpo_held_chunk_move(chunks, &c->view, subtree, error);
     if (status != EBPO_OK)
         return status;
-    memcpy(checksums, c->begin, sizeof checksums);
+    memcpy(sums, c->begin, sizeof sums);
     for (uint64_t i = c->view.begin; i < c->view.end; i++)
-        add_row(c, i, checksums);
+        add_row(c, i, sums);
     bool last = c->view.end == array->shape.rows, exact;
-    if (last && checksums[EBPO_S_SHARED_FACES] + checksums[EBPO_S_SHARED_VERTICES] !=
-                    c->end[EBPO_S_SHARED_FACES]) /* they share its rows */
+    if (last && sums[EBPO_S_SHARED_FACES] + sums[EBPO_S_SHARED_VERTICES] !=
+                    c->end[EBPO_S_SHARED_FACES]) /* both columns count rows of this array */
         status = table_fails(chunks, EBPO_A_SUBTREE_SHARED,
                              "its rows do not match the table's counts", error);
     for (uint32_t k = 0; k < c->cols && status == EBPO_OK; k++) {
         (void)column_total(chunks->file, k, &exact);
-        if (last && !exact ? checksums[k] > c->end[k] : checksums[k] != c->end[k])
+        if (last && !exact ? sums[k] > c->end[k] : sums[k] != c->end[k])
             status = table_fails(chunks, EBPO_A_SUBTREE_COUNTS,
                                  "the rows do not add up to the sums in the index", error);
     }
@@ -136,7 +140,7 @@ static void take_row(const subtree_counts *c, uint64_t subtree, ebpo_subtree_row
     out->vertex = out->after[EBPO_S_VERTICES_BEFORE] + out->before[EBPO_S_VERTICES];
 }
 
-/* Checks a row. Faces and vertices of other leaves count as well. */
+/* Checks a row against the header: its sums of faces and vertices, and its numbers of nodes. */
 static ebpo_status check_row(const ebpo_chunks *chunks, const ebpo_subtree_row *row,
                              ebpo_error *error)
 {
@@ -148,10 +152,10 @@ static ebpo_status check_row(const ebpo_chunks *chunks, const ebpo_subtree_row *
                            "a subtree's faces are beyond the last face", error);
     for (int level = info->subtree_level + 1; level < info->level_count; level++)
         for (int end = 0; end < 2; end++) {
-            const uint64_t *checksums = end ? row->after : row->before;
+            const uint64_t *sums = end ? row->after : row->before;
             unsigned column = ebpo_subtree_column(info, level, 0);
-            if (checksums[column + EBPO_S_GRAY] + checksums[column + EBPO_S_LEAF] +
-                    checksums[column + EBPO_S_BLACK] >
+            if (sums[column + EBPO_S_GRAY] + sums[column + EBPO_S_LEAF] +
+                    sums[column + EBPO_S_BLACK] >
                 8 * ebpo_subtree_groups(info, row, level, end))
                 return table_fails(chunks, EBPO_A_SUBTREE_COUNTS,
                                    "a subtree has more nodes than its groups hold", error);
@@ -162,16 +166,17 @@ static ebpo_status check_row(const ebpo_chunks *chunks, const ebpo_subtree_row *
 uint64_t ebpo_subtree_groups(const ebpo_info *info, const ebpo_subtree_row *row, int level,
                              bool after)
 {
-    const uint64_t *checksums = after ? row->after : row->before;
+    const uint64_t *sums = after ? row->after : row->before;
     return level == info->subtree_level + 1
                ? row->subtree + after
-               : checksums[ebpo_subtree_column(info, level - 1, EBPO_S_GRAY)];
+               : sums[ebpo_subtree_column(info, level - 1, EBPO_S_GRAY)];
 }
 
-/* --- cache of rows: one subtree is requested repeatedly while it is read, and summing a chunk of
- * rows takes longer than the rest of a request --- */
+/* --- cache of rows --- */
 
-enum { KEPT = 4 /* threads that read at once, typically two */, BY_NUMBER = EBPO_SUBTREE_COLS };
+/* Size of the cache. One subtree is requested repeatedly while it is read, and adding up a chunk of
+ * rows takes most of the time of a request. Typically two threads read at once. */
+enum { KEPT = 4, BY_NUMBER = EBPO_SUBTREE_COLS /* no column: compare the subtree's number */ };
 
 struct ebpo_kept_rows {
     ebpo_subtree_row row[KEPT];
@@ -184,7 +189,8 @@ static bool row_holds(const ebpo_subtree_row *row, unsigned column, uint64_t ite
                                : row->before[column] <= item && item < row->after[column];
 }
 
-/* Finds a cached row of a subtree, or (by a column) of the subtree that contains an item. */
+/* Finds a cached row: of subtree `item` if column is BY_NUMBER, otherwise of the subtree that
+ * contains item `item` of the column. */
 static bool find_kept(ebpo_chunks *chunks, unsigned column, uint64_t item, ebpo_subtree_row *out)
 {
     bool found = false;
@@ -197,7 +203,7 @@ static bool find_kept(ebpo_chunks *chunks, unsigned column, uint64_t item, ebpo_
     return found;
 }
 
-/* Checks a row, and caches it; not for counted chunks, where each read counts. */
+/* Checks a row, and caches it. Counted caches do not use this cache, so that each read counts. */
 static ebpo_status keep_row(ebpo_chunks *chunks, const ebpo_subtree_row *row, ebpo_error *error)
 {
     ebpo_status status = check_row(chunks, row, error);
@@ -235,12 +241,12 @@ static ebpo_status find_chunk(ebpo_chunks *chunks, unsigned column, uint64_t ite
                               ebpo_error *error)
 {
     const ebpo_array_in *index = ebpo_reader_array(chunks->file, EBPO_A_SUBTREE_INDEX, 0);
-    uint64_t low = 0, high = index->shape.rows - 1, checksums[EBPO_SUBTREE_COLS];
+    uint64_t low = 0, high = index->shape.rows - 1, sums[EBPO_SUBTREE_COLS];
     ebpo_status status = EBPO_OK;
     while (low < high && status == EBPO_OK) {
         uint64_t middle = low + (high - low + 1) / 2;
-        status = checksums_before(chunks, middle, index->shape.cols, checksums, error);
-        if (status == EBPO_OK && checksums[column] <= item)
+        status = sums_before(chunks, middle, index->shape.cols, sums, error);
+        if (status == EBPO_OK && sums[column] <= item)
             low = middle;
         else
             high = middle - 1;
@@ -272,7 +278,8 @@ ebpo_status ebpo_subtree_table_find(ebpo_chunks *chunks, unsigned column, uint64
     return keep_row(chunks, out, error);
 }
 
-/* Groups of the first level below the roots correspond to subtrees. */
+/* Returns true for groups of the first level below the subtrees' roots. There, group i belongs to
+ * subtree i. */
 static bool is_direct(const ebpo_info *info, int level, ebpo_per per)
 {
     return per == EBPO_PER_GROUP && level == info->subtree_level + 1;
@@ -311,16 +318,16 @@ bool ebpo_subtree_table_missing(ebpo_chunks *chunks, int level, ebpo_per per, ui
     return false;
 }
 
-/* Collects a chunk of the table, and the corresponding rows of `outer`. */
-static void expect_rows_at(ebpo_chunks *chunks, ebpo_hints *e, uint64_t chunk)
+/* Collects a chunk of the table, and the rows of /subtrees/outer of its subtrees. */
+static void hint_table_chunk(ebpo_chunks *chunks, ebpo_hints *e, uint64_t chunk)
 {
     const ebpo_shape *shape = &ebpo_reader_array(chunks->file, EBPO_A_SUBTREE_COUNTS, 0)->shape;
-    uint64_t checksums[EBPO_SUBTREE_COLS], outer[2];
+    uint64_t sums[EBPO_SUBTREE_COLS], outer[2];
     for (int k = 0; k < 2; k++) {
         if (!ebpo_input_expects(&chunks->file->in) ||
-            checksums_before(chunks, chunk + (uint64_t)k, shape->cols, checksums, NULL) != EBPO_OK)
-            return; /* the actual read reports errors */
-        outer[k] = checksums[EBPO_S_SHARED_FACES] + checksums[EBPO_S_SHARED_VERTICES];
+            sums_before(chunks, chunk + (uint64_t)k, shape->cols, sums, NULL) != EBPO_OK)
+            return; /* the later read reports errors */
+        outer[k] = sums[EBPO_S_SHARED_FACES] + sums[EBPO_S_SHARED_VERTICES];
     }
     ebpo_chunks_hint(chunks, e, EBPO_A_SUBTREE_COUNTS, 0, chunk * shape->chunk_rows, 1);
     if (outer[1] > outer[0])
@@ -333,7 +340,7 @@ void ebpo_subtree_table_hint_run(ebpo_chunks *chunks, uint64_t first, uint64_t c
              all = ebpo_reader_array(chunks->file, EBPO_A_SUBTREE_COUNTS, 0)->shape.rows;
     ebpo_hints e = EBPO_HINTS_INIT(chunks->file);
     for (uint64_t at = first / rows * rows; at < first + count && at < all; at += rows)
-        expect_rows_at(chunks, &e, at / rows);
+        hint_table_chunk(chunks, &e, at / rows);
     ebpo_hint_all(&e);
 }
 
@@ -343,7 +350,7 @@ void ebpo_subtree_table_hint(ebpo_chunks *chunks, const uint64_t *subtrees, uint
     ebpo_hints e = EBPO_HINTS_INIT(chunks->file);
     for (uint64_t i = 0; i < count; i++)
         if (i == 0 || subtrees[i] / rows != subtrees[i - 1] / rows)
-            expect_rows_at(chunks, &e, subtrees[i] / rows);
+            hint_table_chunk(chunks, &e, subtrees[i] / rows);
     ebpo_hint_all(&e);
 }
 
@@ -367,7 +374,7 @@ ebpo_status ebpo_ranks_count_file(ebpo_chunks *chunks, int level, uint64_t group
     return status;
 }
 
-/* Sums numbers of up to 32 bits, which cannot overflow; checks larger ones. */
+/* Adds values to *sum. Returns false on overflow, which is only possible for values of 64 bits. */
 static bool sum_rows(const uint8_t *rows, unsigned element_size, uint64_t count, uint64_t *sum)
 {
     uint64_t total = 0, all = 0;
@@ -414,7 +421,7 @@ ebpo_status ebpo_chunks_sum(ebpo_chunks *chunks, ebpo_array_id id, int level, ui
     return status;
 }
 
-/* Reads the row of an index array for an item; row 0 is all zeros, whatever the file contains. */
+/* Reads the row of an index array for an item. Row 0 is all zeros and is not read from the file. */
 static ebpo_status index_row(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t item,
                              unsigned cols, uint64_t *row, ebpo_error *error)
 {
@@ -424,7 +431,7 @@ static ebpo_status index_row(ebpo_chunks *chunks, ebpo_array_id id, int level, u
                                                          1, row, sizeof *row, error);
 }
 
-/* Finds the subtree that contains an item of a level, if the table covers it. */
+/* Finds the subtree that contains an item of a level. The table must cover this level. */
 static ebpo_status find_subtree(ebpo_chunks *chunks, int level, unsigned what, uint64_t item,
                                 ebpo_subtree_row *row, ebpo_error *error)
 {
@@ -438,7 +445,7 @@ static uint64_t level_sum(const ebpo_chunks *chunks, const ebpo_subtree_row *row
     return row->before[ebpo_subtree_column(&chunks->file->info, level, what)];
 }
 
-/* Returns the row's count for the subtree. */
+/* Returns the number of items of the row's subtree. */
 static uint64_t level_has(const ebpo_chunks *chunks, const ebpo_subtree_row *row, int level,
                           unsigned what)
 {
@@ -448,9 +455,9 @@ static uint64_t level_has(const ebpo_chunks *chunks, const ebpo_subtree_row *row
 
 static const char *const contradicts = "the index contradicts the counts in the head";
 
-/* Reports a row that assigns nodes to the wrong subtree; sums alone do not detect this, so nodes
- * are counted. */
-static ebpo_status row_lies(const ebpo_chunks *chunks, ebpo_error *error)
+/* Reports a row that assigns nodes to the wrong subtree. The check_ functions below detect such a
+ * row by counting nodes, as the sums do not show it. */
+static ebpo_status row_contradicts(const ebpo_chunks *chunks, ebpo_error *error)
 {
     return ebpo_chunks_fail(chunks, -1, EBPO_A_SUBTREE_COUNTS,
                             "a row contradicts the nodes of its subtree", error);
@@ -469,10 +476,11 @@ static ebpo_status check_types(ebpo_chunks *chunks, int level, const ebpo_subtre
                    counts[EBPO_LEAF] == level_has(chunks, row, level, EBPO_S_LEAF) &&
                    counts[EBPO_BLACK] == level_has(chunks, row, level, EBPO_S_BLACK)
                ? EBPO_OK
-               : row_lies(chunks, error);
+               : row_contradicts(chunks, error);
 }
 
-/* Checks a list: `id` has the counts of the nodes that `nodes` counts. */
+/* Checks the length of a subtree's list, column `what`, against the counts in array `id`. `nodes`:
+ * the column of the nodes that have these counts. */
 static ebpo_status check_list(ebpo_chunks *chunks, int level, const ebpo_subtree_row *row,
                               ebpo_array_id id, unsigned nodes, unsigned what, ebpo_error *error)
 {
@@ -481,11 +489,11 @@ static ebpo_status check_list(ebpo_chunks *chunks, int level, const ebpo_subtree
                                          level_has(chunks, row, level, nodes), &sum, error);
     return status != EBPO_OK || sum == level_has(chunks, row, level, what)
                ? status
-               : row_lies(chunks, error);
+               : row_contradicts(chunks, error);
 }
 
-/* Checks the end of the leaves' faces, and that the faces of the leaves are within the range of the
- * subtree's faces. */
+/* Checks column EBPO_S_ENDS, and that the new faces of the subtree's leaves are within the range of
+ * the subtree's owned faces. */
 static ebpo_status check_ends(ebpo_chunks *chunks, int level, const ebpo_subtree_row *row,
                               ebpo_error *error)
 {
@@ -494,7 +502,7 @@ static ebpo_status check_ends(ebpo_chunks *chunks, int level, const ebpo_subtree
              growth = level_has(chunks, row, level, EBPO_S_ENDS),
              begin = level_sum(chunks, row, level, EBPO_S_ENDS), gap = 0, skip = 0, fresh = 0;
     if (leaves == 0)
-        return growth ? row_lies(chunks, error) : EBPO_OK;
+        return growth ? row_contradicts(chunks, error) : EBPO_OK;
     ebpo_status status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_SKIP, level, first, 1, &gap, error);
     if (status == EBPO_OK)
         status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_SKIP, level, first, leaves, &skip, error);
@@ -505,7 +513,7 @@ static ebpo_status check_ends(ebpo_chunks *chunks, int level, const ebpo_subtree
     uint64_t has = row->after[EBPO_S_FACES] - row->before[EBPO_S_FACES];
     return skip + fresh == growth && begin + gap >= row->face && begin + growth <= row->face + has
                ? EBPO_OK
-               : row_lies(chunks, error);
+               : row_contradicts(chunks, error);
 }
 
 ebpo_status ebpo_ranks_check(const ebpo_chunks *chunks, int level, const uint64_t ranks[4],
@@ -521,8 +529,8 @@ ebpo_status ebpo_ranks_check(const ebpo_chunks *chunks, int level, const uint64_
     return EBPO_OK;
 }
 
-/* Computes the ranks at which a subtree's groups of a level begin, and the first of these groups.
- */
+/* Finds the subtree that contains a group. Computes its first group of the level, *from, and the
+ * ranks at which its nodes begin. */
 static ebpo_status ranks_of_subtree(ebpo_chunks *chunks, int level, uint64_t group,
                                     uint64_t ranks[4], uint64_t *from, ebpo_error *error)
 {
@@ -588,8 +596,8 @@ ebpo_status ebpo_ranks_planes(ebpo_chunks *chunks, int level, uint64_t gray, uin
     return status;
 }
 
-/* Reads the row of leaf_index, or of the table, for leaf `*from`. `faces`: the sums of faces,
- * otherwise of planes. */
+/* Reads the row of leaf_index, or of the table, that precedes a leaf. With the table, *from is the
+ * leaf at which the row begins. `faces`: checks the sums of faces, otherwise of planes. */
 static ebpo_status leaf_row(ebpo_chunks *chunks, int level, uint64_t leaf, bool faces,
                             uint64_t row[3], uint64_t *from, ebpo_error *error)
 {
@@ -655,29 +663,28 @@ ebpo_status ebpo_ranks_leaf_planes(ebpo_chunks *chunks, int level, uint64_t leaf
     return status;
 }
 
-typedef struct reporting {
+typedef struct hinting {
     ebpo_chunks *chunks;
-    ebpo_hints *expected;
+    ebpo_hints *hints;
     const ebpo_subtree_row *first, *last;
     uint32_t needs;
     int last_level;
-} reporting;
+} hinting;
 
-static void expect_rows(const reporting *t, ebpo_array_id id, int level, uint64_t begin,
-                        uint64_t end)
+static void hint_rows(const hinting *t, ebpo_array_id id, int level, uint64_t begin, uint64_t end)
 {
     if (end > begin)
-        ebpo_chunks_hint(t->chunks, t->expected, id, level, begin, end - begin);
+        ebpo_chunks_hint(t->chunks, t->hints, id, level, begin, end - begin);
 }
 
-/* Returns the level's sums of a column before or after the subtrees. */
-static uint64_t subtree_sum(const reporting *t, int level, unsigned what, bool after)
+/* Returns the sum of a column of a level before or after the subtrees. */
+static uint64_t subtree_sum(const hinting *t, int level, unsigned what, bool after)
 {
     unsigned column = ebpo_subtree_column(&t->chunks->file->info, level, what);
     return after ? t->last->after[column] : t->first->before[column];
 }
 
-static uint64_t sum_of(const reporting *t, ebpo_per per, int level, bool after)
+static uint64_t sum_of(const hinting *t, ebpo_per per, int level, bool after)
 {
     const ebpo_info *info = &t->chunks->file->info;
     uint64_t groups = ebpo_subtree_groups(info, after ? t->last : t->first, level, after);
@@ -697,43 +704,44 @@ static uint64_t sum_of(const reporting *t, ebpo_per per, int level, bool after)
     }
 }
 
-static void report_nodes(const reporting *t)
+static void hint_nodes(const hinting *t)
 {
     const ebpo_info *info = &t->chunks->file->info;
     for (int level = info->subtree_level + 1; level < info->level_count && level <= t->last_level;
          level++)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
             if (ebpo_schema[id].needs & t->needs)
-                expect_rows(t, (ebpo_array_id)id, level,
-                            sum_of(t, ebpo_schema[id].per, level, false),
-                            sum_of(t, ebpo_schema[id].per, level, true));
+                hint_rows(t, (ebpo_array_id)id, level, sum_of(t, ebpo_schema[id].per, level, false),
+                          sum_of(t, ebpo_schema[id].per, level, true));
 }
 
-/* Collects a chunk of faces or vertices, `distance` blocks before `from`. */
-static void report_block(const reporting *t, ebpo_array_id id, uint64_t from, uint64_t block_rows,
-                         uint32_t distance)
+/* Collects the chunk of faces or vertices that is `distance` chunks before the chunk of row `from`.
+ */
+static void hint_chunk(const hinting *t, ebpo_array_id id, uint64_t from, uint64_t block_rows,
+                       uint32_t distance)
 {
     uint64_t block = from / block_rows;
     if (distance > block)
         return;
-    expect_rows(t, id, 0, (block - distance) * block_rows, (block - distance) * block_rows + 1);
+    hint_rows(t, id, 0, (block - distance) * block_rows, (block - distance) * block_rows + 1);
     if (id == EBPO_A_FACES && t->needs & EBPO_NEEDS_MAPS)
-        expect_rows(t, EBPO_A_FACE_SOURCE, 0, (block - distance) * block_rows,
-                    (block - distance) * block_rows + block_rows);
+        hint_rows(t, EBPO_A_FACE_SOURCE, 0, (block - distance) * block_rows,
+                  (block - distance) * block_rows + block_rows);
 }
 
-static void report_owned_faces(const reporting *t)
+static void hint_owned_faces(const hinting *t)
 {
     uint64_t faces = t->last->after[EBPO_S_FACES_BEFORE] + t->last->after[EBPO_S_FACES],
              vertices = t->last->after[EBPO_S_VERTICES_BEFORE] + t->last->after[EBPO_S_VERTICES];
-    expect_rows(t, EBPO_A_FACES, 0, t->first->face, faces);
-    expect_rows(t, EBPO_A_VERTICES, 0, t->first->vertex, vertices);
+    hint_rows(t, EBPO_A_FACES, 0, t->first->face, faces);
+    hint_rows(t, EBPO_A_VERTICES, 0, t->first->vertex, vertices);
     if (t->needs & EBPO_NEEDS_MAPS)
-        expect_rows(t, EBPO_A_FACE_SOURCE, 0, t->first->face, faces);
+        hint_rows(t, EBPO_A_FACE_SOURCE, 0, t->first->face, faces);
 }
 
-/* Collects chunks from rows of `outer`. They are hints, with unchecked values and count. */
-static void report_shared(const reporting *t, const ebpo_subtree_row *row)
+/* Collects the shared chunks in the subtree's rows of /subtrees/outer. The values are not checked,
+ * as they are only used for hints. */
+static void hint_shared(const hinting *t, const ebpo_subtree_row *row)
 {
     enum { OUTER_MAX = 1 << 16 };
     uint64_t first = row->before[EBPO_S_SHARED_FACES] + row->before[EBPO_S_SHARED_VERTICES],
@@ -748,33 +756,32 @@ static void report_shared(const reporting *t, const ebpo_subtree_row *row)
                          NULL) != EBPO_OK)
         return;
     for (uint64_t i = 0; i < count; i++)
-        report_block(t, i < faces ? EBPO_A_FACES : EBPO_A_VERTICES,
-                     i < faces ? row->face : row->vertex,
-                     i < faces ? EBPO_FACE_BLOCK : EBPO_VERTEX_BLOCK, outer[i]);
+        hint_chunk(t, i < faces ? EBPO_A_FACES : EBPO_A_VERTICES,
+                   i < faces ? row->face : row->vertex,
+                   i < faces ? EBPO_FACE_BLOCK : EBPO_VERTEX_BLOCK, outer[i]);
     free(outer);
 }
 
-void ebpo_subtrees_hint(ebpo_chunks *chunks, ebpo_hints *expected, uint64_t first, uint64_t count,
+void ebpo_subtrees_hint(ebpo_chunks *chunks, ebpo_hints *hints, uint64_t first, uint64_t count,
                         uint32_t needs, int last_level, bool faces)
 {
     const ebpo_info *info = &chunks->file->info;
-    bool mesh = faces && info->parts & EBPO_PART_MESH, alone = count == 1; /* one row is then
-                                                                            * sufficient */
+    bool mesh = faces && info->parts & EBPO_PART_MESH, alone = count == 1;
     ebpo_subtree_row *row = ebpo_alloc(3, sizeof *row);
-    reporting t = { chunks,  expected,
-                    &row[0], alone ? &row[0] : &row[1],
-                    needs,   faces ? EBPO_LEVELS_MAX : last_level };
-    if (row && count && ebpo_hints_wanted(expected) &&
+    hinting t = { chunks,  hints,
+                  &row[0], alone ? &row[0] : &row[1],
+                  needs,   faces ? EBPO_LEVELS_MAX : last_level };
+    if (row && count && ebpo_hints_wanted(hints) &&
         ebpo_subtree_table_row(chunks, first, &row[0], NULL) == EBPO_OK &&
         (alone || ebpo_subtree_table_row(chunks, first + count - 1, &row[1], NULL) == EBPO_OK)) {
-        report_nodes(&t);
+        hint_nodes(&t);
         if (mesh)
-            report_owned_faces(&t);
+            hint_owned_faces(&t);
         if (mesh && alone)
-            report_shared(&t, &row[0]);
+            hint_shared(&t, &row[0]);
         for (uint64_t i = 0; i < count && mesh && !alone; i++)
             if (ebpo_subtree_table_row(chunks, first + i, &row[2], NULL) == EBPO_OK)
-                report_shared(&t, &row[2]);
+                hint_shared(&t, &row[2]);
     }
     free(row);
 }

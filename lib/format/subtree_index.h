@@ -1,5 +1,6 @@
-/* Locates subtrees, groups, planes and faces in every array. Results are consistent with the counts
- * in the head. Any thread. format-spec/README.md, sections 4 and 9. */
+/* Locates the rows of subtrees, groups, planes and faces in every array. Results are consistent
+ * with the counts in the header. Any thread may call these functions. format-spec/README.md,
+ * sections 4 and 9. */
 #ifndef EBPO_FORMAT_SUBTREE_INDEX_H
 #define EBPO_FORMAT_SUBTREE_INDEX_H
 
@@ -7,11 +8,12 @@
 
 enum { EBPO_SUBTREE_COLS = EBPO_SUBTREE_LEVELS + EBPO_SUBTREE_LEVEL_COLS * EBPO_LEVELS_MAX };
 
+/* Position of a subtree in the file's arrays, from the table /subtrees/counts. */
 typedef struct ebpo_subtree_row {
     uint64_t subtree;
-    uint64_t before[EBPO_SUBTREE_COLS]; /* sums of the columns before it */
-    uint64_t after[EBPO_SUBTREE_COLS];  /* sums including it */
-    uint64_t face, vertex;              /* its first owned face and vertex */
+    uint64_t before[EBPO_SUBTREE_COLS]; /* sums of the columns over the preceding subtrees */
+    uint64_t after[EBPO_SUBTREE_COLS];  /* the same, including this subtree */
+    uint64_t face, vertex;              /* first owned face and vertex of the subtree */
 } ebpo_subtree_row;
 
 /* Returns true if the table covers a level's nodes: those below the subtrees' roots. */
@@ -23,33 +25,37 @@ static inline bool ebpo_subtree_table_has(const ebpo_file *file, int level)
 /* Reads a subtree's row; the index must be less than the number of subtrees. */
 EBPO_MUST_USE ebpo_status ebpo_subtree_table_row(ebpo_chunks *chunks, uint64_t subtree,
                                                  ebpo_subtree_row *out, ebpo_error *error);
-/* Finds the last subtree that begins at or before an item that column `column` counts. */
+/* Finds the last subtree that begins at or before item number `item` of those that column `column`
+ * counts. */
 EBPO_MUST_USE ebpo_status ebpo_subtree_table_find(ebpo_chunks *chunks, unsigned column,
                                                   uint64_t item, ebpo_subtree_row *out,
                                                   ebpo_error *error);
 
-/* Returns the groups of a level before or after the row's subtree. */
+/* Returns the number of groups of a level before the row's subtree, or with `after` the number
+ * including the subtree. */
 uint64_t ebpo_subtree_groups(const ebpo_info *info, const ebpo_subtree_row *row, int level,
                              bool after);
 
-/* Adds the missing chunks of the table that are needed to find an item of a level (groups, gray
- * nodes or leaves, by EBPO_PER_...). Returns true if there are any; otherwise *first is the start
- * of its subtree. Returns true for errors as well, which the actual read reports. */
+/* Adds to `keys` the chunks of the table that are not in memory and are needed to find an item of a
+ * level. `per` is the kind of item: EBPO_PER_GROUP, EBPO_PER_GRAY or EBPO_PER_LEAF. Returns true if
+ * there are such chunks; otherwise *first is the first such item of the item's subtree. Also
+ * returns true on errors, which the later read reports. */
 bool ebpo_subtree_table_missing(ebpo_chunks *chunks, int level, ebpo_per per, uint64_t item,
                                 ebpo_chunk_keys *keys, uint64_t *first);
 
-/* Sends prefetch hints for reading rows of the table, for subtrees in any order. */
+/* Send prefetch hints for rows of the table: for subtrees in any order, or for
+ * [first, first + count). */
 void ebpo_subtree_table_hint(ebpo_chunks *chunks, const uint64_t *subtrees, uint64_t count);
 void ebpo_subtree_table_hint_run(ebpo_chunks *chunks, uint64_t first, uint64_t count);
 
-/* --- ranks: counted from the preceding row of an index --- */
+/* --- ranks, counted from the preceding row of an index array or of the table --- */
 
 /* Sums rows of an unsigned array; EBPO_E_FORMAT when the sum exceeds 2^62. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_sum(ebpo_chunks *chunks, ebpo_array_id id, int level,
                                           uint64_t row, uint64_t rows, uint64_t *sum,
                                           ebpo_error *error);
 
-/* Does the same as ebpo_groups_count for groups [group, group + groups) of the file. */
+/* Counts the nodes of each type in groups [group, group + groups), like ebpo_groups_count. */
 EBPO_MUST_USE ebpo_status ebpo_ranks_count_file(ebpo_chunks *chunks, int level, uint64_t group,
                                                 uint64_t groups, uint64_t counts[4],
                                                 ebpo_error *error);
@@ -60,26 +66,26 @@ EBPO_MUST_USE ebpo_status ebpo_ranks_before(ebpo_chunks *chunks, int level, uint
 EBPO_MUST_USE ebpo_status ebpo_ranks_check(const ebpo_chunks *chunks, int level,
                                            const uint64_t ranks[4], const uint64_t counts[4],
                                            ebpo_error *error);
-/* Counts the planes of the gray nodes before one. */
+/* Counts the planes of the gray nodes before gray node `gray`. */
 EBPO_MUST_USE ebpo_status ebpo_ranks_planes(ebpo_chunks *chunks, int level, uint64_t gray,
                                             uint64_t *planes, ebpo_error *error);
-/* Finds the end of the new faces of the leaf before one, and counts the references of the leaves
- * before it. */
+/* Finds the end of the new faces (one past the last) of the leaf before `leaf`, and counts the
+ * references of all leaves before `leaf`. */
 EBPO_MUST_USE ebpo_status ebpo_ranks_leaf(ebpo_chunks *chunks, int level, uint64_t leaf,
                                           uint64_t *end, uint64_t *refs, ebpo_error *error);
 
-/* Counts the leaf planes of the leaves before one. */
+/* Counts the stored planes of the leaves before `leaf`. */
 EBPO_MUST_USE ebpo_status ebpo_ranks_leaf_planes(ebpo_chunks *chunks, int level, uint64_t leaf,
                                                  uint64_t *planes, ebpo_error *error);
 
 /* --- prefetch hints --- */
 
-/* Sends prefetch hints for all missing chunks of the subtrees [first, first + count): nodes below
- * their roots, in arrays for `needs`; with EBPO_NEEDS_MESH the faces that their leaves list, with
- * EBPO_NEEDS_MAPS the source indices of these faces. Without `faces`, only nodes down to
- * `last_level`. Reads the table's rows. Chunks without hints are read normally. For remote files
- * only. */
-void ebpo_subtrees_hint(ebpo_chunks *chunks, ebpo_hints *expected, uint64_t first, uint64_t count,
+/* Collects the chunks of the subtrees [first, first + count) that are not in memory, for remote
+ * files only. Includes nodes below the subtrees' roots, in the arrays that `needs` requires. With
+ * EBPO_NEEDS_MESH, includes the faces that the leaves list, and with EBPO_NEEDS_MAPS the source
+ * indices of these faces. Without `faces`, includes only nodes down to `last_level`. Reads the
+ * table's rows. Chunks without hints are read normally. */
+void ebpo_subtrees_hint(ebpo_chunks *chunks, ebpo_hints *hints, uint64_t first, uint64_t count,
                         uint32_t needs, int last_level, bool faces);
 
 #endif

@@ -1,9 +1,9 @@
 /* Writes a file: ebpo_tree_write. The headers come first (groups, array headers, attributes, and
- * HDF5's indexes of chunks); a trial in memory determines their size. Then chunks are encoded and
- * compressed by several threads, in windows of some chunks, and appended in the order of
- * chunk_layout.c: first those of the top levels, which looking up a subtree needs, then all others.
- * The lists of chunk offsets and chunk checksums are the last chunks. Content checksums are
- * computed meanwhile. ebpo_file_repack reads a file and writes it again with other options. Source:
+ * HDF5's indexes of chunks). The same file is first written in memory to determine their size. Then
+ * several threads encode and compress chunks, some at a time. The chunks are appended in the order
+ * of chunk_layout.c: first the chunks with which a reader locates a subtree, then all others. The
+ * lists of chunk checksums and chunk offsets are the last chunks. Content checksums are computed
+ * meanwhile. ebpo_file_repack reads a file and writes it again with other options. Source:
  * format-spec/README.md, sections 2, 9 and 20. */
 #include <stdio.h>
 #include <stdlib.h>
@@ -29,29 +29,29 @@
 
 /* --- headers --- */
 
-/* In file order. */
+/* The lists of all chunks, in file order. */
 typedef enum header_list { LIST_CHECKSUMS, LIST_PLACES, LISTS } header_list;
 
 typedef struct file_headers {
-    ebpo_plan *plan; /* its arrays receive handles */
+    ebpo_plan *plan; /* opening sets the handles of its arrays */
     ebpo_h5_out out;
     ebpo_h5_id root;
-    /* lists about all chunks, the last chunks of the file; not written if they have no rows */
+    /* lists of all chunks; a list without rows is not written */
     ebpo_array_out list[LISTS];
     uint64_t chunks; /* number of chunks of the plan's arrays */
     int codec_level;
     uint64_t head_bytes;  /* size of the headers */
-    uint64_t index_bytes; /* for arrays of several chunks; 0 if there are none */
+    uint64_t index_bytes; /* size of HDF5's indexes; 0 if no array has several chunks */
 } file_headers;
 
-/* The file's first chunk (of the root's type), written with the headers. */
+/* The file's first chunk, which contains the root's type. It is written with the headers. */
 typedef struct first_chunk {
     const void *data;
     size_t bytes;
 } first_chunk;
 
-/* HDF5 may enlarge a header within its metadata block by a tenth of the remaining space; this
- * reserves that space where no other header follows. */
+/* HDF5 may enlarge a header within its metadata block by a tenth of the remaining space. This many
+ * bytes are reserved if no other header follows in the block. */
 enum { ALONE_BYTES = 4096 };
 
 static bool has_index(const ebpo_plan *plan)
@@ -74,8 +74,8 @@ static void plan_list(file_headers *h, header_list list, ebpo_array_id id, uint6
                                  .pipeline = h->plan->array[0].shape.pipeline };
 }
 
-/* Prepares the headers. The caller keeps the plan. End with headers_close, and ebpo_h5_finish or
- * ebpo_h5_discard. */
+/* Initialises the headers. The caller keeps the plan, and ends with headers_close and then
+ * ebpo_h5_finish or ebpo_h5_discard. */
 static void headers_plan(file_headers *h, ebpo_plan *plan, uint64_t chunks,
                          const ebpo_write_options *options)
 {
@@ -110,7 +110,8 @@ static ebpo_status make_level_groups(file_headers *h, ebpo_error *error)
     return status;
 }
 
-/* Creates a group of the root, if needed, with space for all arrays that it may have. */
+/* Creates a group of the root with space for all arrays that the group may have. Does nothing if
+ * the file does not fulfil `need`. */
 static ebpo_status make_root_group(file_headers *h, const char *path, uint32_t need,
                                    ebpo_error *error)
 {
@@ -125,9 +126,9 @@ static ebpo_status make_root_group(file_headers *h, const char *path, uint32_t n
     return status;
 }
 
-/* Writes a list's offset and the file's size, by which readers check that it is still valid. */
-static ebpo_status headers_put_holds(file_headers *h, header_list list, uint64_t file_bytes,
-                                     uint64_t offset, ebpo_error *error)
+/* Writes a list's offset and the file's size. Readers use the list only if both are still true. */
+static ebpo_status headers_put_validity(file_headers *h, header_list list, uint64_t file_bytes,
+                                        uint64_t offset, ebpo_error *error)
 {
     ebpo_h5_id id = h->list[list].handle;
     ebpo_status status = ebpo_h5_put_count(&h->out, id, "file_bytes", file_bytes, error);
@@ -152,9 +153,9 @@ static ebpo_status make_array(file_headers *h, ebpo_array_out *a, const first_ch
     return status;
 }
 
-/* Writes everything except the chunks, and the first chunk. That chunk comes before attributes
- * enlarge the first header, so that HDF5 fills the metadata block at the end of the file and cannot
- * enlarge it. */
+/* Writes all headers and the first chunk. The first chunk is written before attributes enlarge the
+ * header of the first array. HDF5 then cannot enlarge the metadata block at the end of the file and
+ * must fill it. */
 static ebpo_status lay_out(file_headers *h, const char *path, const char *shown,
                            uint64_t head_bytes, first_chunk first, ebpo_error *error)
 {
@@ -186,7 +187,7 @@ static ebpo_status lay_out(file_headers *h, const char *path, const char *shown,
             continue;
         status = make_array(h, &h->list[l], NULL, error);
         if (status == EBPO_OK)
-            status = headers_put_holds(h, l, 0, 0, error);
+            status = headers_put_validity(h, l, 0, 0, error);
     }
     return status;
 }
@@ -206,14 +207,16 @@ static void headers_close(file_headers *h)
     h->root = -1;
 }
 
-/* Lays out the file after headers_measure, and leaves it open. `shown`: name for messages. */
+/* Writes the headers to the file after headers_measure, and leaves the file open. `shown`: name for
+ * messages. */
 static ebpo_status headers_lay_out(file_headers *h, const char *path, const char *shown,
                                    first_chunk first, ebpo_error *error)
 {
     return lay_out(h, path, shown, h->head_bytes, first, error);
 }
 
-/* Measures headers and indexes with the same file in memory, with chunks of one byte. */
+/* Measures headers and HDF5's indexes by writing the same file in memory, with chunks of one byte.
+ */
 static ebpo_status headers_measure(file_headers *h, const char *shown, ebpo_error *error)
 {
     ebpo_plan *plan = h->plan;
@@ -231,15 +234,18 @@ static ebpo_status headers_measure(file_headers *h, const char *shown, ebpo_erro
     if (status == EBPO_OK)
         status = ebpo_h5_head_used(&h->out, capacity, &all, error);
     ebpo_h5_discard(&h->out);
-    h->head_bytes = (headers + 8 + 7) / 8 * 8; /* the last checksum may end in zero bytes */
+    /* 8 more bytes, as the last checksum of the headers may end in zero bytes, which are not
+     * counted as used */
+    h->head_bytes = (headers + 8 + 7) / 8 * 8;
     if (plan->count == 1)
         h->head_bytes += ALONE_BYTES;
-    /* not from the sizes, which are too small where a checksum ends in zero bytes */
+    /* the same for the last checksum of the indexes */
     h->index_bytes = has_index(plan) ? (all - headers + 8 + 7) / 8 * 8 : 0;
     return status;
 }
 
-/* Reserves index_bytes as a separate piece when the first array of several chunks needs it. */
+/* Opens the file again, so that HDF5 allocates its indexes as one block of index_bytes. It does
+ * this when the first chunk of an array with several chunks is written. */
 static ebpo_status headers_begin_index(file_headers *h, ebpo_error *error)
 {
     headers_close(h);
@@ -257,7 +263,7 @@ static ebpo_status headers_begin_index(file_headers *h, ebpo_error *error)
 
 /* --- chunks --- */
 
-/* Chunks in memory at a time: 8 MiB raw and the same encoded. */
+/* Number of chunks in memory at a time: 8 MiB before compression, and as much after it. */
 enum { WINDOW = 128 };
 
 typedef struct slot {
@@ -274,17 +280,18 @@ typedef struct writer {
     unsigned threads;
     file_headers head;
     slot slots[WINDOW];
-    unsigned used;            /* number of slots */
-    ebpo_chunk_coder *coders; /* one for each thread */
+    unsigned used;            /* number of slots in use */
+    ebpo_chunk_coder *coders; /* [threads] */
     ebpo_chunk_order order;
     ebpo_array_digest *digest; /* [arrays of the plan] */
     ebpo_content content[EBPO_DIGESTS];
     uint64_t chunk_bytes, chunks_done;
-    uint64_t *sum;       /* [chunks], if checksums are written: for the plan's arrays in order */
-    uint64_t *first_sum; /* [arrays of the plan] */
-    uint64_t *place;     /* [rows of the list of chunk offsets] */
-    uint64_t place_count, top_bytes;
-    uint64_t index_at; /* start of the index; 0: none, or not yet */
+    uint64_t *sum;       /* [chunks] rows of the list of chunk checksums, if it is written */
+    uint64_t *first_sum; /* [arrays of the plan] index in `sum` of the array's first chunk */
+    uint64_t *place;     /* rows of the list of chunk offsets */
+    uint64_t place_count;
+    uint64_t top_bytes; /* end of the chunks with which a reader locates a subtree */
+    uint64_t index_at;  /* offset of HDF5's indexes; 0: none, or not yet written */
 } writer;
 
 static ebpo_status fill_slot(void *context, uint64_t begin, uint64_t end, unsigned worker,
@@ -328,7 +335,7 @@ static void digest_slots(writer *w)
     }
 }
 
-/* Compresses faces as gates. The padding of the last chunk is not a face. */
+/* Compresses faces as gates. The last chunk's padding is zeros, not gates. */
 static ebpo_status compress_gates(slot *s, ebpo_chunk_coder *coder, int level)
 {
     ebpo_shape stored = ebpo_stored_shape(&s->array->shape, true);
@@ -349,7 +356,7 @@ static ebpo_status compress_chunk(slot *s, ebpo_chunk_coder *coder, int level)
                                                s->raw, s->raw_bytes, s->stored, &s->stored_bytes);
 }
 
-/* Digests the whole window for item 0, and compresses one slot for each other item. */
+/* Item 0 adds the whole window to the digests. Item i > 0 compresses slot i - 1. */
 static ebpo_status compress_slot(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                  ebpo_error *error)
 {
@@ -386,7 +393,7 @@ static void note_place(writer *w, uint32_t number, uint64_t bytes)
     w->place[w->place_count++] = ebpo_place(number, bytes);
 }
 
-/* Records each chunk, in file order, before it is written. */
+/* Adds a chunk to the lists and to the sizes. Called in file order, before the chunk is written. */
 static void place_chunk(writer *w, const slot *s)
 {
     if (w->index_at == 0 && ebpo_shape_chunks(&s->array->shape) > 1) {
@@ -411,7 +418,7 @@ static ebpo_status flush_window(writer *w, ebpo_error *error)
         const slot *s = &w->slots[i];
         place_chunk(w, s);
         if (w->chunks_done++ == 0)
-            continue; /* written with the headers */
+            continue; /* the first chunk was written with the headers */
         status = ebpo_h5_put_chunk(&w->head.out, s->array->path, s->array->handle, &s->array->shape,
                                    s->chunk, s->stored, s->stored_bytes, error);
     }
@@ -452,8 +459,8 @@ static ebpo_status write_list(writer *w, header_list list, const uint64_t *value
     return status;
 }
 
-/* Writes the last chunks of the file. If libhdf5 has placed other data in between, the lists are
- * marked as invalid. */
+/* Writes the lists, which are the last chunks of the file. If libhdf5 has placed other data between
+ * the chunks, the lists are wrong and are marked as invalid. */
 static ebpo_status write_lists(writer *w, ebpo_error *error)
 {
     size_t bytes[LISTS];
@@ -470,7 +477,7 @@ static ebpo_status write_lists(writer *w, ebpo_error *error)
     bool holds = status == EBPO_OK && size == offset + bytes[LIST_CHECKSUMS] + bytes[LIST_PLACES];
     for (header_list l = 0; l < LISTS && status == EBPO_OK; l++) {
         if (w->head.list[l].shape.rows)
-            status = headers_put_holds(&w->head, l, holds ? size : 0, holds ? offset : 0, error);
+            status = headers_put_validity(&w->head, l, holds ? size : 0, holds ? offset : 0, error);
         offset += bytes[l];
     }
     return status;
@@ -495,15 +502,15 @@ static ebpo_status make_window(writer *w, ebpo_error *error)
         w->slots[i].raw = block + i * slot_bytes;
         w->slots[i].stored = w->slots[i].raw + EBPO_CHUNK_BYTES_MAX;
     }
-    uint64_t checksums = 0;
+    uint64_t before = 0;
     for (unsigned i = 0; i < w->plan.count; i++) {
-        w->first_sum[i] = checksums;
-        checksums += ebpo_shape_chunks(&w->plan.array[i].shape);
+        w->first_sum[i] = before;
+        before += ebpo_shape_chunks(&w->plan.array[i].shape);
     }
     return EBPO_OK;
 }
 
-/* Encodes the root's types in advance. */
+/* Encodes the first chunk in advance. */
 static ebpo_status encode_first(writer *w, uint8_t *stored, size_t *bytes, ebpo_error *error)
 {
     slot *s = &w->slots[0];
@@ -532,7 +539,7 @@ static ebpo_status put_digests(writer *w, ebpo_error *error)
 
 static ebpo_status write_file(writer *w, const char *path, const char *shown, ebpo_error *error)
 {
-    uint8_t first[256]; /* the chunk has two bytes */
+    uint8_t first[256]; /* ample for the encoded chunk, which has two bytes */
     size_t first_bytes = 0;
     ebpo_status status = encode_first(w, first, &first_bytes, error);
     if (status == EBPO_OK)
@@ -554,7 +561,8 @@ static ebpo_status write_file(writer *w, const char *path, const char *shown, eb
         status = ebpo_facts_put_top(&w->head.out, w->head.root, w->top_bytes, error);
     headers_close(&w->head);
     if (status == EBPO_OK)
-        /* another libhdf5 may place metadata differently: tests rely on it, readers do not */
+        /* another libhdf5 may place metadata differently: tests would fail, but readers accept it
+         */
         status = ebpo_h5_finish(&w->head.out, error);
     return status;
 }
@@ -573,7 +581,8 @@ static ebpo_status check_options(const ebpo_write_options *options, const char *
     return EBPO_OK;
 }
 
-/* Publishes the file under its name; without `publish` writes directly to `path`. */
+/* Writes a file and publishes it under its name. If `publish` is NULL, writes directly to `path`.
+ */
 static ebpo_status write_tree(const ebpo_tree *tree, const char *path, const char *shown,
                               ebpo_publish *publish, const ebpo_write_options *options,
                               ebpo_error *error)
@@ -638,7 +647,7 @@ ebpo_status ebpo_tree_write_into(const ebpo_tree *tree, const char *path, const 
 
 /* --- repacking --- */
 
-/* Compares the file on disk with the content of the file that was read. */
+/* Checks the content of the written file, and that it is the content of the file that was read. */
 static ebpo_status check_written(const ebpo_file *from, const ebpo_publish *out,
                                  const ebpo_read_options *read, ebpo_error *error)
 {
@@ -674,7 +683,7 @@ ebpo_status ebpo_file_repack(const ebpo_file *file, const char *path, const ebpo
     ebpo_status status = EBPO_TAKE(ebpo_write_options, &wanted, write, error);
     wanted.parts = ~0u;
     if (status == EBPO_OK)
-        status = ebpo_publish_begin(&out, path, error); /* before operations that may take long */
+        status = ebpo_publish_begin(&out, path, error); /* first, as the others may take long */
     if (status == EBPO_OK) {
         ebpo_publish_expect_input(&out, &file->in);
         status = ebpo_file_read_tree(file, read, &tree, error);

@@ -4,9 +4,9 @@
 
 #include <ebpo/file.h>
 
-/* Writes like ebpo_tree_write directly into `path`, an existing file of the caller that is
- * overwritten: the same bytes, not synced, and incomplete on failure. `shown`: name for messages.
- */
+/* Writes the same bytes as ebpo_tree_write, but directly into `path`, an existing file that is
+ * overwritten. Does not sync the file. On failure the file is incomplete. `shown`: name for
+ * messages. */
 EBPO_MUST_USE ebpo_status ebpo_tree_write_into(const ebpo_tree *tree, const char *path,
                                                const char *shown, const ebpo_write_options *options,
                                                ebpo_error *error);

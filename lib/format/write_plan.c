@@ -1,8 +1,8 @@
-/* Plans a file to write: the list of its arrays with shapes and codings, and the function that
- * encodes rows of an array to bytes. The plan refers to the caller's checked tree, and owns only
- * derived arrays: prefix sums that let a reader start in the middle of a level (arrays of an absent
- * part count as zeros), sums before subtrees, and codings of attributes. Encoding depends only on
- * the plan and the rows, so threads encode chunks independently. */
+/* Plans a file to write: lists its arrays with shapes and codings, and encodes rows of an array to
+ * bytes. The plan refers to the caller's checked tree. It owns only derived arrays: index arrays,
+ * counts and sums of subtrees, and codings of attributes. In index arrays, counts of an absent part
+ * are zeros. Encoding depends only on the plan and the rows, so threads encode chunks
+ * independently. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -73,9 +73,7 @@ uint64_t *ebpo_index_leaves(const ebpo_level *level)
     return index;
 }
 
-/* --- attributes: checks, codings and heads --- */
-
-/* --- checking --- */
+/* --- attributes: checks --- */
 
 static const char *check_rows(const ebpo_info *info, const ebpo_attributes *all, uint64_t i)
 {
@@ -104,7 +102,7 @@ static const char *check_names(const ebpo_attribute *a)
     return NULL;
 }
 
-/* --- codings: chosen by the size of a few chunks --- */
+/* --- attributes: codings, chosen by the compressed size of a few samples --- */
 
 enum { SAMPLES = 8, SAMPLE_BYTES = 16384 };
 
@@ -148,7 +146,7 @@ static void choose_codings(ebpo_attribute_plan *to, const ebpo_attribute *a,
         a->ends && count && columns_are_less(coder, a->values, bytes, floats, count, 1);
 }
 
-/* Checks attributes to write (EBPO_E_ARGUMENT), and determines their heads. */
+/* Checks attributes to write (EBPO_E_ARGUMENT). Determines their codings, ranges and checksum. */
 static ebpo_status attributes_plan(ebpo_plan *plan, const char *shown, ebpo_error *error)
 {
     const ebpo_attributes *all = plan->attributes;
@@ -180,9 +178,9 @@ static ebpo_status attributes_plan(ebpo_plan *plan, const char *shown, ebpo_erro
     return ebpo_attributes_digest(all, plan->attributes_sha256, error);
 }
 
-/* --- arrays --- */
+/* --- attributes: arrays --- */
 
-/* Adds attribute arrays to the plan, which has space for attributes_planned of them. */
+/* Returns the maximum number of arrays in /attributes. */
 static uint64_t attributes_planned(const ebpo_plan *plan)
 {
     return plan->attributes ? 1 + 2 * plan->attributes->count : 0;
@@ -257,7 +255,7 @@ static void attributes_encode(const ebpo_plan *plan, const ebpo_array_out *array
         ebpo_integers_encode(values, array->value_size, rows * cols, array->value_size, file);
 }
 
-/* --- heads --- */
+/* --- attributes: HDF5 attributes --- */
 
 ebpo_status ebpo_attributes_put_group(ebpo_h5_out *out, const ebpo_plan *plan, ebpo_error *error)
 {
@@ -327,7 +325,7 @@ static void encode_skips(const ebpo_level *level, const ebpo_shape *shape, uint6
     }
 }
 
-/* Returns the last index row whose references begin at or before `ref`. */
+/* Returns the last row of leaf_index whose leaves' references begin at or before `ref`. */
 static uint64_t block_of(const uint64_t *leaf_index, uint64_t leaves, uint64_t ref)
 {
     uint64_t low = 0, high = (leaves - 1) / EBPO_INDEX_ROWS;
@@ -348,7 +346,7 @@ static void encode_refs(const ebpo_level *level, const uint64_t *leaf_index, uin
     uint64_t leaf = block * EBPO_INDEX_ROWS, before = leaf_index[block * 3 + 1], end = row + rows;
     for (; before < end; before += level->leaf_ref_count[leaf++]) {
         uint64_t count = level->leaf_ref_count[leaf];
-        /* ascending; stored from the last to the first */
+        /* `refs` are ascending, and are stored from the last to the first */
         const uint32_t *refs = level->leaf_refs + before;
         for (uint64_t k = row > before ? row - before : 0; k < count && before + k < end; k++) {
             uint64_t above = k ? refs[count - k] : level->leaf_first[leaf];
@@ -377,7 +375,7 @@ void ebpo_plan_encode(const ebpo_plan *plan, const ebpo_array_out *array, uint64
         break;
     case EBPO_A_FACES:
         seen = plan->faces_index[row / array->shape.chunk_rows];
-        /* checked by index_faces */
+        /* cannot fail, as index_faces has checked the faces */
         (void)ebpo_corners_encode(tree->mesh.faces + 3 * row, rows, &seen, file);
         break;
     case EBPO_A_VERTEX_SOURCE: ebpo_numbers_encode(tree->vertex_source + row, rows, file); break;
@@ -431,16 +429,18 @@ static bool texts_ok(const ebpo_info *info)
     return true;
 }
 
-/* Returns true if faces are stored as gates: not without compression, as the gates contain many
- * zero bytes. */
+/* Returns true if faces are stored as gates. By default they are if
+ * the tree has gates (info.gates), but not in an uncompressed file, as gates contain many zero
+ * bytes. */
 static bool gates_wanted(const ebpo_info *info, bool had, ebpo_face_coding coding)
 {
-    bool standard = had && info->codec != EBPO_CODEC_NONE;
+    bool by_default = had && info->codec != EBPO_CODEC_NONE;
     return info->parts & EBPO_PART_MESH &&
-           (coding == EBPO_FACES_DEFAULT ? standard : coding == EBPO_FACES_GATES);
+           (coding == EBPO_FACES_DEFAULT ? by_default : coding == EBPO_FACES_GATES);
 }
 
-/* Computes the facts of the file: requested and available parts, counts of written items. */
+/* Computes plan->info: the parts that are requested and available, and the counts of written items.
+ */
 static ebpo_status resolve_facts(ebpo_plan *plan, const ebpo_write_options *options,
                                  const ebpo_check *check, ebpo_error *error)
 {
@@ -514,7 +514,7 @@ static ebpo_status index_levels(ebpo_plan *plan, ebpo_error *error)
 {
     for (int i = 0; i < plan->info.level_count; i++) {
         const ebpo_level *level = &plan->tree->level[i];
-        ebpo_level stored = *level; /* without omitted parts */
+        ebpo_level stored = *level; /* lacks the arrays of omitted parts */
         if (!(plan->info.parts & EBPO_PART_MESH))
             stored.leaf_first = NULL;
         if (!(plan->info.parts & EBPO_PART_LEAF_PLANES))
@@ -551,7 +551,7 @@ static ebpo_status index_faces(ebpo_plan *plan, const ebpo_check *check, ebpo_er
     return EBPO_OK;
 }
 
-/* Returns the least of 1, 2, 4 bytes that holds all values. */
+/* Returns the smallest size of an element, 1, 2 or 4 bytes, that is sufficient for all values. */
 static uint8_t narrow_unsigned(const ebpo_level *level, const uint32_t *values, uint64_t count)
 {
     uint32_t all = 0;
@@ -570,8 +570,8 @@ static uint8_t narrow_signed(const ebpo_level *level, const int32_t *values, uin
     return low >= INT8_MIN && high <= INT8_MAX ? 1 : low >= INT16_MIN && high <= INT16_MAX ? 2 : 4;
 }
 
-/* Returns the bytes of an element in the file. If there is a choice, values have 32 bits
- * (schema.c). */
+/* Returns the size of an element in the file. Values of arrays with several allowed sizes have 32
+ * bits in memory (schema.c). */
 static uint8_t stored_size(const ebpo_plan *plan, const ebpo_array_out *a, const void *values)
 {
     const ebpo_array_spec *spec = &ebpo_schema[a->id];
@@ -585,7 +585,7 @@ static uint8_t stored_size(const ebpo_plan *plan, const ebpo_array_out *a, const
                            : narrow_unsigned(level, values, count);
 }
 
-/* Finds the values and their width. */
+/* Sets the array's values and the size of an element in memory and in the file. */
 static void find_values(const ebpo_plan *plan, ebpo_array_out *a)
 {
     const ebpo_array_spec *spec = &ebpo_schema[a->id];

@@ -13,20 +13,20 @@ EBPO_MUST_USE ebpo_status ebpo_plan_make(ebpo_plan *plan, const ebpo_tree *tree,
                                          ebpo_error *error);
 void ebpo_plan_free(ebpo_plan *plan);
 
-/* Encodes rows [row, row + rows) of an array, as stored before compression. row is a multiple of
- * the chunk's rows; rows is at most that number. */
+/* Encodes rows [row, row + rows) of an array, as stored before compression. `row` is a multiple of
+ * the rows of a chunk; `rows` is at most that number. */
 void ebpo_plan_encode(const ebpo_plan *plan, const ebpo_array_out *array, uint64_t row,
                       uint64_t rows, uint8_t *file);
 
-/* These functions return prefix sums, with which a reader can start in the middle of a level.
- * Readers compare them with the sums in the file. There is one row for each EBPO_INDEX_ROWS items,
- * and at least one row. NULL when out of memory. */
+/* Return the rows of an index array: sums of counts before each EBPO_INDEX_ROWS-th item. With them
+ * a reader can start in the middle of a level. Readers compare them with the sums in the file.
+ * There is at least one row. Return NULL when out of memory. */
 uint64_t *ebpo_index_types(const ebpo_level *level, bool root);
 uint64_t *ebpo_index_gray(const ebpo_level *level);
 uint64_t *ebpo_index_leaves(const ebpo_level *level);
 
-/* These functions write the HDF5 attributes of the group /attributes, and the HDF5 attributes of
- * the arrays in the group, except `about`. */
+/* Write the HDF5 attributes of the group /attributes, and of the arrays in this group except
+ * `about`. */
 EBPO_MUST_USE ebpo_status ebpo_attributes_put_group(ebpo_h5_out *out, const ebpo_plan *plan,
                                                     ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_attributes_put_array(ebpo_h5_out *out, const ebpo_plan *plan,
