@@ -84,10 +84,10 @@ def check_file(name, mesh, path, options, volume):
     info = json.loads(run("info", "--json", out).stdout)
     expect(name, f"the file's volume {info['report']['volume']} is not {volume}", close(integral(info["report"]), volume))
     points = "".join(" ".join(repr(float(x)) for x in p) + "\n" for p in mesh.inside + mesh.outside)
-    answers = [line.split()[0] for line in run("inside", out, "-", text=points).stdout.splitlines()]
+    results = [line.split()[0] for line in run("inside", out, "-", text=points).stdout.splitlines()]
     wanted = ["IN"] * len(mesh.inside) + ["OUT"] * len(mesh.outside)
-    expect(name, f"after {options} points are {answers}, not {wanted}",
-           len(answers) == len(wanted) and all(a.upper().startswith(w) for a, w in zip(answers, wanted)))
+    expect(name, f"after {options} points are {results}, not {wanted}",
+           len(results) == len(wanted) and all(a.upper().startswith(w) for a, w in zip(results, wanted)))
 
 
 def check_mesh(name, folder):

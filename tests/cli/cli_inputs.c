@@ -144,16 +144,16 @@ static ebpo_mesh box(double low, double high, uint32_t n)
  * three, one that is inside out. Faces stand in any order. No two have a vertex in one place. */
 static ebpo_mesh several_parts(void)
 {
-    ebpo_mesh mesh = box(1, 3, 2), beside = box(5, 6, 1), sheet = ebpo_test_sheet(6, 5),
+    ebpo_mesh mesh = box(1, 3, 2), neighbour = box(5, 6, 1), sheet = ebpo_test_sheet(6, 5),
               inside_out = box(7, 8, 1);
     ebpo_test_reverse(&mesh);
-    move(&beside, 0, -1.25, -1.25);
+    move(&neighbour, 0, -1.25, -1.25);
     move(&sheet, -1, -1, 1.75);
     ebpo_test_reverse(&inside_out);
     add(&mesh, box(0, 4, 3));
     add(&mesh, box(1.5, 2.5, 1));
     add(&mesh, box(3.5, 5, 2));
-    add(&mesh, beside);
+    add(&mesh, neighbour);
     add(&mesh, sheet);
     add(&mesh, inside_out);
     ebpo_test_shuffle(&mesh, 2);

@@ -42,15 +42,15 @@ assert sorted(owner) == sorted(faces_of(whole)) == list(range(len(owner)))
 
 of_parts = {}
 for a, b in itertools.combinations(parts, 2):
-    met = pairs_of(run("collide", "-q", "--all", parts[a], parts[b]))
-    assert all({owner[f], owner[g]} == {a, b} for f, g, _ in met)
-    if met:
-        of_parts[a, b] = met
+    contacts = pairs_of(run("collide", "-q", "--all", parts[a], parts[b]))
+    assert all({owner[f], owner[g]} == {a, b} for f, g, _ in contacts)
+    if contacts:
+        of_parts[a, b] = contacts
 of_whole = {p for p in pairs_of(run("collide", "-q", "--self", whole)) if owner[p[0]] != owner[p[1]]}
 assert set().union(*of_parts.values()) == of_whole, (of_parts, of_whole)
 
 report = run("scene", "report", "-q", "--count", f"{folder}/components.scene.json").splitlines()
-told = {tuple(line.split("\t")[2:4]): int(line.split("\t")[4].split()[0]) for line in report}
-assert told == {pair: len(met) for pair, met in of_parts.items()}, (told, of_parts)
+reported = {tuple(line.split("\t")[2:4]): int(line.split("\t")[4].split()[0]) for line in report}
+assert reported == {pair: len(contacts) for pair, contacts in of_parts.items()}, (reported, of_parts)
 print(len(parts), "components,", len(owner), "faces,", len(of_parts), "pairs meet,",
       len(of_whole), "pairs of faces")

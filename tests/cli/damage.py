@@ -9,15 +9,15 @@ import h5py
 def largest(file, name):
     found = []
 
-    def look(path, item):
+    def inspect(path, item):
         if isinstance(item, h5py.Dataset) and item.id.get_storage_size():
             found.append((item.id.get_storage_size(), path))
 
     item = file[name]
     if isinstance(item, h5py.Dataset):
-        look(name, item)
+        inspect(name, item)
     else:
-        item.visititems(lambda path, below: look(name + "/" + path, below))
+        item.visititems(lambda path, below: inspect(name + "/" + path, below))
     return max(found)[1]
 
 

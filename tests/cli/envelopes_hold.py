@@ -160,10 +160,10 @@ def check_mesh(points, cells, data, source):
 
 
 def main():
-    path, about, told, source = sys.argv[1:]
+    path, about, reported, source = sys.argv[1:]
     with open(about, encoding="utf-8") as f:
         info = json.load(f)
-    with open(told, encoding="utf-8") as f:
+    with open(reported, encoding="utf-8") as f:
         nodes = {n["octcode"]: (n["type"], n["winding"]) for level in json.load(f)["levels"]
                  for n in level["nodes"]}
     blocks = (xdmf_blocks if path.endswith(".xdmf") else vtkhdf_blocks)(path)

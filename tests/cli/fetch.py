@@ -106,10 +106,10 @@ def parts(tool, folder, path, url):
                    f"{Handler.sent} of {len(Handler.data)}")
         os.remove(out)
     Handler.reset()
-    told = json.loads(run(tool, "fetch", "--json", "--levels", "0-2", url, out).stdout)
-    expect("json", told["fetched_bytes"] == Handler.sent
-           and told["fetched_requests"] == Handler.requests and told["subset"]["last_level"] == 2,
-           told.get("fetched_bytes"))
+    reported = json.loads(run(tool, "fetch", "--json", "--levels", "0-2", url, out).stdout)
+    expect("json", reported["fetched_bytes"] == Handler.sent
+           and reported["fetched_requests"] == Handler.requests and reported["subset"]["last_level"] == 2,
+           reported.get("fetched_bytes"))
     os.remove(out)
 
 
@@ -260,8 +260,8 @@ def attributes(tool, plain, url):
                     expect(f"attributes, {layout}, {name}", *comes_back(tool, folder, ply, out, compare))
                 else:
                     expect(f"attributes, {layout}, {name}: verify", run(tool, "verify", "-q", out).returncode == 0)
-            told = json.loads(run(tool, "info", "--json", path).stdout)
-            stored = told["bytes"]["attributes"]
+            reported = json.loads(run(tool, "info", "--json", path).stdout)
+            stored = reported["bytes"]["attributes"]
             expect(f"attributes, {layout}: what is left out is not fetched",
                    stored > 10000 and sent["bare"] <= sent["all"] - stored // 2, (sent, stored))
             expect(f"attributes, {layout}: straight from the server", *comes_back(tool, folder, ply, url,

@@ -153,14 +153,14 @@ class Quiet(http.server.SimpleHTTPRequestHandler):
 
     def do_GET(self):
         """What is below /slow comes after a while, by ranges."""
-        asked = re.fullmatch(r"bytes=(\d+)-(\d+)", self.headers.get("Range", ""))
-        if not self.path.startswith("/slow/") or not asked:
+        requested = re.fullmatch(r"bytes=(\d+)-(\d+)", self.headers.get("Range", ""))
+        if not self.path.startswith("/slow/") or not requested:
             super().do_GET()
             return
         time.sleep(0.15)
         with open(self.translate_path(self.path[5:]), "rb") as file:
             data = file.read()
-        first, last = int(asked[1]), min(int(asked[2]), len(data) - 1)
+        first, last = int(requested[1]), min(int(requested[2]), len(data) - 1)
         self.send_response(206)
         self.send_header("Content-Range", f"bytes {first}-{last}/{len(data)}")
         self.send_header("Content-Length", str(last + 1 - first))
@@ -176,8 +176,8 @@ def serve(folder):
 
 
 def commands_with_json(tool):
-    told = subprocess.run([tool, "help"], check=True, capture_output=True, text=True).stdout
-    for command in re.findall(r"^  ([a-z]+) ", told, re.MULTILINE):
+    reported = subprocess.run([tool, "help"], check=True, capture_output=True, text=True).stdout
+    for command in re.findall(r"^  ([a-z]+) ", reported, re.MULTILINE):
         if command != "help" and "  --json" in subprocess.run(
                 [tool, command, "--help"], check=True, capture_output=True, text=True).stdout:
             yield command

@@ -56,9 +56,9 @@ def main():
     wrong += glob.glob(HIDDEN)
     if os.path.getsize(OUT) != 8 * (rows - rows // 2):
         wrong.append(f"{os.path.getsize(OUT)} bytes of answers")
-    told = subprocess.run(again, check=True, capture_output=True, text=True).stderr
-    if "nothing to do" not in told:
-        wrong.append(told)
+    reported = subprocess.run(again, check=True, capture_output=True, text=True).stderr
+    if "nothing to do" not in reported:
+        wrong.append(reported)
     for name in ("zeros.raw", OUT, OUT + ".shard"):
         os.remove(name)
     print("\n".join(wrong) or "fine")

@@ -6,11 +6,11 @@ import sys
 
 with open(sys.argv[1], encoding="utf-8") as f:
     levels = json.load(f)["levels"]
-told = json.load(sys.stdin)["levels"]
-assert 1 <= len(levels) <= len(told)
-last = told[-1]["envelope_volume"]
+reported = json.load(sys.stdin)["levels"]
+assert 1 <= len(levels) <= len(reported)
+last = reported[-1]["envelope_volume"]
 parents, ms = None, 0
-for level, info in zip(levels, told):
+for level, info in zip(levels, reported):
     for key in ("gray", "leaf", "white", "black", "planes", "cumulative_bytes"):
         assert level[key] == info[key], (key, level[key], info[key])
     assert math.isclose(level["volume"], info["envelope_volume"], rel_tol=1e-12)

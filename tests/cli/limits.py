@@ -115,10 +115,10 @@ def limits_of_others_stay():
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_DATA, (soft, resource.RLIM_INFINITY)))
     process.stdin.write("0 0 0\n")
     process.stdin.flush()
-    answer = process.stdout.readline()
+    result = process.stdout.readline()
     limit = resource.prlimit(process.pid, resource.RLIMIT_DATA)[0]
     process.communicate()
-    check(answer and limit == soft, f"a limit of {soft} bytes is kept: {limit}, {answer!r}")
+    check(result and limit == soft, f"a limit of {soft} bytes is kept: {limit}, {result!r}")
 
 
 def little_data():
@@ -146,11 +146,11 @@ UNDRAWN = {"nothing": "", "drawing": "out of memory for a picture's captions",
 def captions_are_never_left_out():
     """A picture without the captions that were asked for is an error, and not a picture."""
     words = ["render", "--size", "64x64", "--levels", "0,1", "b.ebpo.h5", "captions.png"]
-    for lacks, told in UNDRAWN.items() if CAIRO else ():
+    for lacks, reported in UNDRAWN.items() if CAIRO else ():
         code, _, said, _ = run(*words, LD_LIBRARY_PATH=os.path.dirname(CAIRO), EBPO_TEST_CAIRO=lacks)
-        check(code == (1 if told else 0) and told in said, f"lacks {lacks}: {code}, {said.strip()}")
-        check(os.path.exists("captions.png") == (not told), f"lacks {lacks}: no output")
-        if not told:
+        check(code == (1 if reported else 0) and reported in said, f"lacks {lacks}: {code}, {said.strip()}")
+        check(os.path.exists("captions.png") == (not reported), f"lacks {lacks}: no output")
+        if not reported:
             os.remove("captions.png")
     os.mkdir("damaged")
     with open("damaged/libcairo.so.2", "w", encoding="ascii") as f:
@@ -166,20 +166,20 @@ def models_are_held_in_parts():
     """The same answers, from parts; where the least is more than half, that is said."""
     plan = json.loads(run("info", "--json", "--memory", "0", "b.ebpo.h5")[1])["memory"]
     whole, least = plan["whole"], plan["least"]
-    asked = {"map": ["map", "--grid", "9,9,9", "-o", "OUT.nrrd", "b.ebpo.h5"],
+    requested = {"map": ["map", "--grid", "9,9,9", "-o", "OUT.nrrd", "b.ebpo.h5"],
              "collide": ["collide", "--all", "--pose-b", "1 0 0 0 0.01 0 0", "b.ebpo.h5", "b.ebpo.h5"],
              "haptic": ["haptic", "--seconds", "0.1", "b.ebpo.h5"]}
-    for command, words in asked.items():
+    for command, words in requested.items():
         right = None
         for free, noted in ((1 << 40, False), (whole + least, False), (least + least // 2, True)):
             out = f"{command}{free}.nrrd"
-            code, told, said, _ = run(*(out if w == "OUT.nrrd" else w for w in words), free=free)
+            code, reported, said, _ = run(*(out if w == "OUT.nrrd" else w for w in words), free=free)
             check(code == 0, f"{command} with {free} bytes free works ({said.strip()})")
             check(("note: needs at least" in said) == noted,
                   f"{command} with {free} bytes free: what is held is said ({said.strip()})")
-            answer = slurp(out) if command == "map" else sorted(told.splitlines())
-            right = right or answer
-            check(command == "haptic" or answer == right, f"{command} answers the same from parts")
+            result = slurp(out) if command == "map" else sorted(reported.splitlines())
+            right = right or result
+            check(command == "haptic" or result == right, f"{command} answers the same from parts")
 
 
 def verify_keeps_its_budget():
@@ -203,8 +203,8 @@ def shortened_while_read():
         time.sleep(0.006 * i)
         os.truncate("s.ply", 2000)
         said = process.communicate()[1].decode()
-        told = "while it was read" in said or "cut short" in said or "the file ends" in said
-        check(process.returncode == 0 or (process.returncode == 1 and told),
+        reported = "while it was read" in said or "cut short" in said or "the file ends" in said
+        check(process.returncode == 0 or (process.returncode == 1 and reported),
               f"check of a mesh that is shortened ({process.returncode}: {said.strip()})")
 
 
@@ -233,8 +233,8 @@ def pipes_are_refused():
         except subprocess.TimeoutExpired:
             check(False, f"{words} waits")
             continue
-        told = "is a pipe or device" in done.stderr or "not a regular file" in done.stderr
-        check(done.returncode == 1 and told, f"{words}: {done.returncode}, {done.stderr.strip()}")
+        reported = "is a pipe or device" in done.stderr or "not a regular file" in done.stderr
+        check(done.returncode == 1 and reported, f"{words}: {done.returncode}, {done.stderr.strip()}")
 
 
 def hdf5_without_locks():

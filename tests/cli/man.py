@@ -37,9 +37,9 @@ def numbers(text):
 def lost_defaults(command):
     """Defaults of --help that the manual does not have."""
     for option in command.options():
-        told = re.search(r"default:? (\d[\d.]*\d|\d)\b", option.help)
-        if told and option.man and told[1] not in numbers("\n".join(option.man)):
-            yield f"--{option.name}: the default {told[1]} is not in the manual"
+        reported = re.search(r"default:? (\d[\d.]*\d|\d)\b", option.help)
+        if reported and option.man and reported[1] not in numbers("\n".join(option.man)):
+            yield f"--{option.name}: the default {reported[1]} is not in the manual"
 
 
 def other_words(tool, command):
@@ -69,9 +69,9 @@ def bash_offers(tool, script, commands):
         yield f"ebpo: bash offers {completed(script, '')}"
     for command in commands:
         offered = completed(script, command.name, "--")
-        told = options_in_help(help_of(tool, command.name, "--help"))
-        told |= {o.name for o in command.options() if o.page}
-        if sorted(offered) != sorted("--" + name for name in told):
+        reported = options_in_help(help_of(tool, command.name, "--help"))
+        reported |= {o.name for o in command.options() if o.page}
+        if sorted(offered) != sorted("--" + name for name in reported):
             yield f"{command.name}: bash offers {offered}"
         for option in command.options():
             if option.words:
@@ -82,20 +82,20 @@ def bash_offers(tool, script, commands):
 
 def check_remote(tool, page):
     """`ebpo help remote` and ebpo-remote(7) have the same options."""
-    told = help_of(tool, "help", "remote")
-    if not told or options_in_help(told) != set(items_in_page(page)):
-        yield f"remote: options of help and manual: {options_in_help(told) ^ set(items_in_page(page))}"
-    yield from (f"wider than 80 columns: {line}" for line in told.splitlines()[1:] if len(line) > 80)
+    reported = help_of(tool, "help", "remote")
+    if not reported or options_in_help(reported) != set(items_in_page(page)):
+        yield f"remote: options of help and manual: {options_in_help(reported) ^ set(items_in_page(page))}"
+    yield from (f"wider than 80 columns: {line}" for line in reported.splitlines()[1:] if len(line) > 80)
 
 
 def check_command(tool, command, page):
-    told = help_of(tool, command.name, "--help")
+    reported = help_of(tool, command.name, "--help")
     items = items_in_page(page)
-    if options_in_help(told) != set(items) or "help" not in items:
-        yield f"options of --help and of the manual: {sorted(options_in_help(told) ^ set(items))}"
-    yield from (f"wider than 80 columns: {line}" for line in told.splitlines()[1:]
+    if options_in_help(reported) != set(items) or "help" not in items:
+        yield f"options of --help and of the manual: {sorted(options_in_help(reported) ^ set(items))}"
+    yield from (f"wider than 80 columns: {line}" for line in reported.splitlines()[1:]
                 if len(line) > 80)
-    if help_of(tool, "help", command.name) != told:
+    if help_of(tool, "help", command.name) != reported:
         yield "'ebpo help' and '--help' differ"
     if f".Nd {command.summary}\n" not in page:
         yield "the summary is not the manual's"

@@ -60,9 +60,9 @@ def main():
             print(*map(repr, p))
         return
     with open(sys.argv[3], encoding="ascii") as f:
-        asked = [float(line.split()[0]) for line in f]
-    wrong = [(x, y) for x, y in zip(asked, b[3]) if x != y]
-    print("fine" if not wrong and len(asked) == len(b[3]) else wrong[:3])
+        requested = [float(line.split()[0]) for line in f]
+    wrong = [(x, y) for x, y in zip(requested, b[3]) if x != y]
+    print("fine" if not wrong and len(requested) == len(b[3]) else wrong[:3])
 
 
 if __name__ == "__main__":

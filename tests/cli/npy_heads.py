@@ -45,18 +45,18 @@ REFUSED = {
     "has no valid NumPy header": array("{'descr': '<f8'}\n")}
 
 
-def ask(data):
+def run_query(data):
     done = subprocess.run(["ebpo", "inside", sys.argv[1]], input=data, capture_output=True)
     return done.returncode, done.stdout.decode(), done.stderr.decode()
 
 
 def main():
-    wrong = [(name, got) for name, data in FINE.items() if (got := ask(data)) != (0, READ, "")]
-    one = ask(array(head(shape="(3,)"), "<3d", points=POINTS[:1]))
+    wrong = [(name, got) for name, data in FINE.items() if (got := run_query(data)) != (0, READ, "")]
+    one = run_query(array(head(shape="(3,)"), "<3d", points=POINTS[:1]))
     if one != (0, "IN 1\n", ""):
         wrong.append(("one point", one))
     for message, data in REFUSED.items():
-        code, out, err = ask(data)
+        code, out, err = run_query(data)
         if code != 1 or out or not err.startswith("ebpo inside: standard input: " + message):
             wrong.append((message, code, out, err))
     print(wrong or "fine")

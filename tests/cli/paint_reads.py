@@ -33,9 +33,9 @@ def vectors():
     folder, wrong = SPEC / "vectors" / "paint", []
     for path in sorted(folder.glob("passed/*.paint.h5")):
         done = subprocess.run(["ebpo", "paint", "--json", "--points", path], capture_output=True, text=True)
-        told = without_counts(json.loads(done.stdout or "{}"))
+        reported = without_counts(json.loads(done.stdout or "{}"))
         expected = json.loads(path.with_name(path.name.replace(".paint.h5", ".json")).read_text())
-        if {k: told.get(k) for k in expected} != expected:
+        if {k: reported.get(k) for k in expected} != expected:
             wrong.append(f"{path.name} is told differently {done.stderr}")
     for path in sorted(folder.glob("failed/*.paint.h5")):
         done = subprocess.run(["ebpo", "paint", path], capture_output=True, text=True)
@@ -108,7 +108,7 @@ def areas(paint_path, model, n=24):
     import numpy as np
     import read_paint
     done = subprocess.run(["ebpo", "paint", "--json", "--area", paint_path, model], capture_output=True, check=True)
-    told = json.loads(done.stdout)["areas"]
+    reported = json.loads(done.stdout)["areas"]
     paint, vertices, faces, _ = read_both(paint_path, model)
     by_corner = {}
     for i, face in enumerate(faces):
@@ -128,7 +128,7 @@ def areas(paint_path, model, n=24):
             for layer, balls in layers.items():
                 last = max((i for i, p, square in balls if read_paint.within(p, square, q)), default=None)
                 sums[layer] += part if last is not None and paint["strokes"][last]["kind"] == "paints" else 0
-    for layer, (found, one) in enumerate(zip(sums, told["layers"])):
+    for layer, (found, one) in enumerate(zip(sums, reported["layers"])):
         if abs(found - one["area"]) > 2e-3 * found or not one["lo"] <= one["area"] <= one["hi"] < 1.02 * one["lo"]:
             wrong.append(f"layer {layer}: {found}, told {one}")
     return wrong

@@ -70,7 +70,7 @@ def least_memory(ebpo, model):
     return int(said.split("give at least")[1].split()[0])
 
 
-def answers_of(command, path):
+def results_of(command, path):
     """Exit code, answers and messages; 'hung' after a time."""
     with open(path) as rows:
         try:
@@ -83,7 +83,7 @@ def answers_of(command, path):
 def compare(ebpo, model, query, path, threads):
     """What is wrong with the answers to the rows of `path`, a line each."""
     command = [ebpo, query[0], model, *query[1:]]
-    right = answers_of(command + ["--threads", "1", "--memory", "1G"], path)
+    right = results_of(command + ["--threads", "1", "--memory", "1G"], path)
     if right[0] != 0 or right[2]:
         yield f"{' '.join(command)}: {right[0]}, {right[2].decode()}"
     for memory in MEMORY[model]:
@@ -91,7 +91,7 @@ def compare(ebpo, model, query, path, threads):
             memory = str(int(memory * least_memory(ebpo, model)))
         for n in threads if memory == "" else (8,):
             how = ["--threads", str(n)] + (["--memory", memory] if memory else [])
-            found = answers_of(command + how, path)
+            found = results_of(command + how, path)
             if found != right:
                 yield (f"{' '.join(command + how)} <{path}: {found[0]}, {len(found[1])} bytes of answers, "
                        f"expected {len(right[1])}; {found[2].decode()[-2000:]}")

@@ -40,19 +40,19 @@ def value(text):
 
 # --- the three files say the same ---
 
-def from_json(told):
+def from_json(reported):
     """(method, level, parameter, quantity) -> value, as the lines of the CSV."""
     found = {}
-    of = {q["name"]: q for q in told["quantities"]}
-    for m in told["methods"]:
+    of = {q["name"]: q for q in reported["quantities"]}
+    for m in reported["methods"]:
         places = [("", "", m)] + [(str(l["level"]), "", l)
                                   for l in m["levels"]] + [("", f"{d['microseconds']}us", d)
                                                            for d in m["deadlines"]]
         places += [("", "=".join([k, repr_c(n[k])]), n) for n in m["needs"]
                    for k in ("max_error", "target_bytes") if k in n]
         places += [("", f"memory/{b['part']}", b) for b in m["budgets"]]
-        for level, parameter, figures in places:
-            found.update({(m["name"], level, parameter, k): v for k, v in figures.items()
+        for level, parameter, statistics in places:
+            found.update({(m["name"], level, parameter, k): v for k, v in statistics.items()
                           if k in of})
     return found, of
 
@@ -61,8 +61,8 @@ def repr_c(v):
     return "%.17g" % v
 
 
-def agree(rows, told):
-    found, of = from_json(told)
+def agree(rows, reported):
+    found, of = from_json(reported)
     lines = {(r["method"], r["level"], r["parameter"], r["quantity"]): r for r in rows}
     assert len(lines) == len(rows) and lines.keys() == found.keys(), lines.keys() ^ found.keys()
     for key, line in lines.items():
@@ -95,7 +95,7 @@ class Well(html.parser.HTMLParser):
             self.texts[self.name] = self.texts.get(self.name, "") + data
 
 
-def page_holds(folder, told, pictures):
+def page_holds(folder, reported, pictures):
     """The page has the report's data, so many pictures of levels, and no address; none without
     Chart.js."""
     path = folder / "report.html"
@@ -107,7 +107,7 @@ def page_holds(folder, told, pictures):
     parser.feed(page)
     parser.close()
     assert parser.open == [], parser.open
-    assert json.loads(parser.texts["report"]) == told
+    assert json.loads(parser.texts["report"]) == reported
     drawn = json.loads(parser.texts["drawn"])
     expected = pictures if "png" in FEATURES else 0
     assert (sum(map(len, drawn["levels"])) == expected
@@ -121,8 +121,8 @@ def page_holds(folder, told, pictures):
 
 # --- against other commands ---
 
-def against_info(told, folder):
-    for m in told["methods"]:
+def against_info(reported, folder):
+    for m in reported["methods"]:
         info = json.loads(run("info", "--json", folder / f"{m['name']}.ebpo.h5"))
         derived = [l["derived_volume"]
                    for l in json.loads(run("measure", "--json", "--derived",
@@ -136,7 +136,7 @@ def against_info(told, folder):
                          ("leaf",) * 2, ("planes",) * 2, ("leaf_planes",) * 2):
                 assert mine[a] == theirs[b], (m["name"], a, mine[a], theirs[b])
             assert mine["envelope_volume"] == volume <= theirs["envelope_volume"] * (1 + 1e-9)
-            if told["model"]["kind"] == "solid" and solid > 0:
+            if reported["model"]["kind"] == "solid" and solid > 0:
                 assert math.isclose(mine["excess"], 100 * (volume - solid) / solid, rel_tol=1e-9,
                                     abs_tol=1e-9)
             assert (mine["read_bytes"] >= mine["cumulative_bytes"] - info["bytes"]["head"]
@@ -161,20 +161,20 @@ def quantile(values, share):
     return sorted(values)[max(math.ceil(share * len(values)), 1) - 1]
 
 
-def questions(told, folder):
-    numbers = uniform_points(told["model"])
+def queries(reported, folder):
+    numbers = uniform_points(reported["model"])
     text = "".join(f"{x!r} {y!r} {z!r}\n" for x, y, z in zip(numbers[::3], numbers[1::3],
                                                              numbers[2::3])).encode()
-    for m in told["methods"]:
+    for m in reported["methods"]:
         file = folder / f"{m['name']}.ebpo.h5"
         for l in m["levels"]:
-            if told["model"]["kind"] == "solid":
-                answers = run("inside", "--max-level", l["level"], file, data=text).decode()
+            if reported["model"]["kind"] == "solid":
+                results = run("inside", "--max-level", l["level"], file, data=text).decode()
                 assert l["maybe_uniform"] == sum(line.startswith("MAYBE")
-                                                 for line in answers.splitlines()) / POINTS
+                                                 for line in results.splitlines()) / POINTS
                 assert 0 <= l["maybe_near"] <= 1
-            told_widths = run("distance", "--json", "--max-level", l["level"], file, data=text).decode()
-            widths = [a["hi"] - a["lo"] for a in map(json.loads, told_widths.splitlines())]
+            reported_widths = run("distance", "--json", "--max-level", l["level"], file, data=text).decode()
+            widths = [a["hi"] - a["lo"] for a in map(json.loads, reported_widths.splitlines())]
             assert (l["width_median"] == quantile(widths, 0.5)
                     and l["width_p99"] == quantile(widths, 0.99))
             assert math.isclose(l["width_mean"], sum(widths) / POINTS, rel_tol=1e-12)
@@ -183,18 +183,18 @@ def questions(told, folder):
                     and due["deadline_took_median"] <= due["deadline_took_p99"] <= due["deadline_took_max"])
 
 
-def shapes(told, folder):
+def shapes(reported, folder):
     """What the deviation certifies holds for the vertices of the envelopes, by exact distances; the
     limit is one."""
-    for m in told["methods"]:
+    for m in reported["methods"]:
         file = folder / f"{m['name']}.ebpo.h5"
         farthest = math.inf
         for l in m["levels"]:
             run("extract", "-q", file, folder / "level.ply", "--level", l["level"])
-            answers = run("distance", "--json", file, folder / "level.ply")
+            results = run("distance", "--json", file, folder / "level.ply")
             reach = max([0, *(json.loads(line)["distance"]
-                              for line in answers.decode().splitlines())])
-            slack = 1e-6 * told["model"]["diagonal"]
+                              for line in results.decode().splitlines())])
+            slack = 1e-6 * reported["model"]["diagonal"]
             assert (reach <= l["hausdorff_hi"] + slack), (m["name"], l["level"], reach,
                                                           l["hausdorff_hi"])
             assert l["hausdorff_hi"] <= farthest, "farther than the level before"
@@ -209,10 +209,10 @@ def shapes(told, folder):
         (folder / "level.ply").unlink()
 
 
-def lines_and_budgets(told):
+def lines_and_budgets(reported):
     """A server sends no less than the levels, nor more than the file; trips are at least the first.
     With less memory, less stays and more is loaded."""
-    for m in told["methods"]:
+    for m in reported["methods"]:
         trips = [l["line_trips"] for l in m["levels"]]
         sent = [l["line_bytes"] for l in m["levels"]]
         assert trips[0] >= 1 and sorted(trips) == trips and sorted(sent) == sent, (trips, sent)
@@ -240,15 +240,15 @@ def settings(inputs):
          ["inherit", "offset-10%", "offset-40%"], "percent", [None, 10, 40]),
         (("--select", "kmedoids", "--k-root", "8,1%"), ["kmedoids-K8", "kmedoids-K1%"], "k_root",
          [8, None])):
-        rows, told = report(folder, *options, *arguments)
-        agree(rows, told)
-        assert [m["name"] for m in told["methods"]] == names
-        assert all(m["build_seconds"] > 0 for m in told["methods"])
+        rows, reported = report(folder, *options, *arguments)
+        agree(rows, reported)
+        assert [m["name"] for m in reported["methods"]] == names
+        assert all(m["build_seconds"] > 0 for m in reported["methods"])
         assert all((folder / f"{name}.ebpo.h5").exists() for name in names)
-        for m, v in zip(told["methods"], values):
+        for m, v in zip(reported["methods"], values):
             assert v is None or m[key] == v, (m["name"], m.get(key))
-    share = told["methods"][1]["k_root"]
-    assert abs(share - told["model"]["faces"] / 100) < 1e-9, share
+    share = reported["methods"][1]["k_root"]
+    assert abs(share - reported["model"]["faces"] / 100) < 1e-9, share
 
 
 def beyond_doubles(inputs):
@@ -259,9 +259,9 @@ def beyond_doubles(inputs):
     for scale in (1, 2.0**997, 2.0**-830):
         mesh = folder_of(inputs, "scaled.ply")
         mesh.write_bytes(scaled(text, scale))
-        _, told = report(folder_of(inputs, "scaled"), "--no-pictures", "--max-level", "2", mesh)
+        _, reported = report(folder_of(inputs, "scaled"), "--no-pictures", "--max-level", "2", mesh)
         tables.append([[l[k] for k in ("excess", "levels_excess", "limit_excess",
-                                       "excess_to_limit")] for l in told["methods"][0]["levels"]])
+                                       "excess_to_limit")] for l in reported["methods"][0]["levels"]])
     for table in tables[1:]:
         for row, expected in zip(table, tables[0], strict=True):
             for a, b in zip(row, expected):
@@ -290,8 +290,8 @@ def scaled(ply, factor):
     return (made + "".join(" ".join(map(str, f)) + "\n" for f in faces)).encode()
 
 
-def needs(told):
-    for m in told["methods"]:
+def needs(reported):
+    for m in reported["methods"]:
         for n in m["needs"]:
             if "target_bytes" in n:
                 assert n["need_bytes"] <= n["target_bytes"], n
@@ -306,21 +306,21 @@ def folder_of(inputs, name):
     return pathlib.Path(inputs) / name
 
 
-def usual(inputs):
+def default(inputs):
     folder = folder_of(inputs, "r")
     arguments = ("--select", "inherit,kmedoids,offset,random", "--keep", "--no-pictures", "--targets",
                  "--max-level", "3", folder_of(inputs, "torus.ply"))
-    rows, told = report(folder, *arguments)
-    of = agree(rows, told)
-    page_holds(folder, told, 0)
-    against_info(told, folder)
-    questions(told, folder)
-    shapes(told, folder)
-    needs(told)
-    lines_and_budgets(told)
-    assert ([m["name"] for m in told["methods"]] == ["inherit", "kmedoids", "offset", "random"]
-            and all(m["build_seconds"] > 0 for m in told["methods"]))
-    thesis_is_at_least(told)
+    rows, reported = report(folder, *arguments)
+    of = agree(rows, reported)
+    page_holds(folder, reported, 0)
+    against_info(reported, folder)
+    queries(reported, folder)
+    shapes(reported, folder)
+    needs(reported)
+    lines_and_budgets(reported)
+    assert ([m["name"] for m in reported["methods"]] == ["inherit", "kmedoids", "offset", "random"]
+            and all(m["build_seconds"] > 0 for m in reported["methods"]))
+    thesis_is_at_least(reported)
     again, _ = report(folder_of(inputs, "again"), *arguments, "--threads", "1")
     steady = [[r for r in all_rows if not of[r["quantity"]]["timed"]] for all_rows in (rows, again)]
     assert (steady[0] == steady[1] and len(steady[0]) > 100), [x for x in zip(*steady)
@@ -331,12 +331,12 @@ def usual(inputs):
                                                      if r["quantity"] == "maybe_uniform"]
 
 
-def thesis_is_at_least(told):
+def thesis_is_at_least(reported):
     """Every leaf, plane, face and vertex comes once, and is paid for."""
-    for m in told["methods"]:
+    for m in reported["methods"]:
         total = m["levels"][-1]["thesis_cumulative_bytes"]
-        least = sum(l["leaf"]
-                    for l in m["levels"]) + 8 * m["all_planes"] + 12 * (told["model"]["faces"] + told["model"]["vertices"])
+        mesh_size = reported["model"]["faces"] + reported["model"]["vertices"]
+        least = sum(l["leaf"] for l in m["levels"]) + 8 * m["all_planes"] + 12 * mesh_size
         assert least <= total, (least, total)
         assert math.isclose(sum(l["thesis_bytes"] for l in m["levels"]), total)
 
@@ -346,51 +346,51 @@ def files(inputs):
     run("convert", "-q", "--max-level", "2", folder_of(inputs, "sphere.ply"), a)
     run("convert", "-q", "--max-level", "3", "--profile", "full",
         folder_of(inputs, "sphere.ply"), b)
-    rows, told = report(folder_of(inputs, "files"), "--name", "short", "--name", "<long> & 'odd'",
+    rows, reported = report(folder_of(inputs, "files"), "--name", "short", "--name", "<long> & 'odd'",
                         a, b)
-    agree(rows, told)
-    page_holds(folder_of(inputs, "files"), told, 7)
-    assert ([len(m["levels"]) for m in told["methods"]] == [3, 4]
-            and told["methods"][0]["build_seconds"] is None)
-    for l in told["methods"][0]["levels"]:
+    agree(rows, reported)
+    page_holds(folder_of(inputs, "files"), reported, 7)
+    assert ([len(m["levels"]) for m in reported["methods"]] == [3, 4]
+            and reported["methods"][0]["build_seconds"] is None)
+    for l in reported["methods"][0]["levels"]:
         assert l["levels_volume"] >= l["envelope_volume"] * (1 - 1e-9)
     _, whole = report(folder_of(inputs, "all"), "--targets", "--no-pictures", b)
-    rows, told = report(folder_of(inputs, "some"), "--targets", "--levels", "1-2", b)
-    assert [l["level"] for l in told["methods"][0]["levels"]] == [1, 2]
-    page_holds(folder_of(inputs, "some"), told, 2)
+    rows, reported = report(folder_of(inputs, "some"), "--targets", "--levels", "1-2", b)
+    assert [l["level"] for l in reported["methods"][0]["levels"]] == [1, 2]
+    page_holds(folder_of(inputs, "some"), reported, 2)
     # What the whole file reaches is that of its last level, measured or not.
-    ratios = [[n["need_ratio"] for n in j["methods"][0]["needs"]] for j in (whole, told)]
+    ratios = [[n["need_ratio"] for n in j["methods"][0]["needs"]] for j in (whole, reported)]
     last = whole["methods"][0]["levels"][-1]["hausdorff_hi"]
     assert (ratios[0] == ratios[1] and any(n.get("max_error", last) < last
-                                           for n in told["methods"][0]["needs"])), (ratios, last)
+                                           for n in reported["methods"][0]["needs"])), (ratios, last)
 
 
 def surface(inputs):
     folder = folder_of(inputs, "surface")
-    rows, told = report(folder, "--keep", "--no-pictures", "--max-level", "2",
+    rows, reported = report(folder, "--keep", "--no-pictures", "--max-level", "2",
                         folder_of(inputs, "open_box.ply"))
-    agree(rows, told)
-    page_holds(folder, told, 0)
-    against_info(told, folder)
-    questions(told, folder)
-    for l in told["methods"][0]["levels"]:
+    agree(rows, reported)
+    page_holds(folder, reported, 0)
+    against_info(reported, folder)
+    queries(reported, folder)
+    for l in reported["methods"][0]["levels"]:
         assert (l["excess"] is None and l["maybe_uniform"] is None and l["inside_ns"] is None
                 and l["width_median"] > 0 and l["hausdorff_hi"] >= 0)
-    assert "exact_inside_ns" in told["methods"][0] and told["methods"][0]["exact_inside_ns"] is None
+    assert "exact_inside_ns" in reported["methods"][0] and reported["methods"][0]["exact_inside_ns"] is None
 
 
 def single_leaf(inputs):
     folder = folder_of(inputs, "leaf")
-    rows, told = report(folder, "--keep", "--max-level", "0", folder_of(inputs, "tetrahedron.ply"))
-    agree(rows, told)
-    page_holds(folder, told, 1)
-    against_info(told, folder)
-    level, = told["methods"][0]["levels"]
+    rows, reported = report(folder, "--keep", "--max-level", "0", folder_of(inputs, "tetrahedron.ply"))
+    agree(rows, reported)
+    page_holds(folder, reported, 1)
+    against_info(reported, folder)
+    level, = reported["methods"][0]["levels"]
     assert (level["gray"], level["leaf"]) == (0, 1)
     # 4 faces and 4 vertices once; each plane has a normal of its own
     assert (level["leaf_planes"] > 0
             and level["thesis_bytes"] == 1 + 12 * 4 + 12 * 4 + 20 * level["leaf_planes"])
-    assert abs(level["excess"]) < 10 and level["hausdorff_lo"] < 0.1 * told["model"]["diagonal"]
+    assert abs(level["excess"]) < 10 and level["hausdorff_lo"] < 0.1 * reported["model"]["diagonal"]
 
 
 def no_volume(inputs):
@@ -399,21 +399,21 @@ def no_volume(inputs):
                     "y\nproperty float z\nelement face 2\n"
                     "property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 "
                     "1 2\n3 0 2 1\n", encoding="ascii")
-    rows, told = report(folder_of(inputs, "flat"), "--max-level", "1", flat)
-    agree(rows, told)
-    page_holds(folder_of(inputs, "flat"), told, 1)
-    assert (told["model"]["volume"] == 0 and all(l["excess"] is None
-                                                 for l in told["methods"][0]["levels"]))
+    rows, reported = report(folder_of(inputs, "flat"), "--max-level", "1", flat)
+    agree(rows, reported)
+    page_holds(folder_of(inputs, "flat"), reported, 1)
+    assert (reported["model"]["volume"] == 0 and all(l["excess"] is None
+                                                 for l in reported["methods"][0]["levels"]))
 
 
 def without_mesh(inputs):
     file = folder_of(inputs, "bare.ebpo.h5")
     run("convert", "-q", "--max-level", "2", "--parts", "-mesh", folder_of(inputs, "torus.ply"),
         file)
-    rows, told = report(folder_of(inputs, "bare"), file)
-    agree(rows, told)
-    page_holds(folder_of(inputs, "bare"), told, 3)
-    method, = told["methods"]
+    rows, reported = report(folder_of(inputs, "bare"), file)
+    agree(rows, reported)
+    page_holds(folder_of(inputs, "bare"), reported, 3)
+    method, = reported["methods"]
     assert method["exact_distance_ns"] is None and method["notes"]
     for l in method["levels"]:
         assert (l["hausdorff_hi"] is None and l["limit_volume"] is None and l["maybe_near"] is None
@@ -424,7 +424,7 @@ def without_mesh(inputs):
 def main():
     with tempfile.TemporaryDirectory() as inputs:
         subprocess.run([INPUTS, inputs], check=True)
-        for case in (usual, settings, beyond_doubles, files, surface, single_leaf, no_volume, without_mesh):
+        for case in (default, settings, beyond_doubles, files, surface, single_leaf, no_volume, without_mesh):
             case(inputs)
             print(f"{case.__name__}: fine")
 

@@ -18,7 +18,7 @@ dice = random.Random(7)
 wrong = []
 
 
-def ask(command, options, data, pieces=None):
+def run_query(command, options, data, pieces=None):
     process = subprocess.Popen(["ebpo", command, *options, MODEL], stdin=subprocess.PIPE,
                                stdout=subprocess.PIPE)
 
@@ -94,26 +94,26 @@ def check(command, options=()):
     rows = list(rows_for(command))
     raw = struct.pack(f"<{len(rows) * len(rows[0])}d", *(x for row in rows for x in row))
     text = "".join(as_text(rows)).encode()
-    expected = ask(command, PLAIN + options + ["--raw"], raw)
+    expected = run_query(command, PLAIN + options + ["--raw"], raw)
     for how in [], ["--threads", "5"], ["--threads", "3", "--cut-level", "1"], ["--cut-level", "2"]:
-        compare(f"{command} {options} {how} raw", expected, ask(command, how + options + ["--raw"], raw))
+        compare(f"{command} {options} {how} raw", expected, run_query(command, how + options + ["--raw"], raw))
     compare(f"{command} {options} in pieces", expected,
-            ask(command, ["--raw"] + options, raw, [1, 23, 24, 1000, 65536]))
+            run_query(command, ["--raw"] + options, raw, [1, 23, 24, 1000, 65536]))
     for kind in "<f8", ">f8":
         compare(f"{command} {options} npy {kind}", expected,
-                ask(command, ["--raw"] + options, as_npy(rows, kind)))
-    lines = ask(command, PLAIN + options, text)
-    compare(f"{command} {options} text", lines, ask(command, ["--threads", "4"] + options, text))
+                run_query(command, ["--raw"] + options, as_npy(rows, kind)))
+    lines = run_query(command, PLAIN + options, text)
+    compare(f"{command} {options} text", lines, run_query(command, ["--threads", "4"] + options, text))
     compare(f"{command} {options} text in pieces", lines,
-            ask(command, options, text, [3, 40, 4096, 100000]))
-    compare(f"{command} {options} npy, text", lines, ask(command, options, as_npy(rows, "<f8")))
-    answers = ask(command, ["--header", "--csv"] + options, header_and_rows(command, rows))
-    named, _, rest = answers.partition(b"\n")
+            run_query(command, options, text, [3, 40, 4096, 100000]))
+    compare(f"{command} {options} npy, text", lines, run_query(command, options, as_npy(rows, "<f8")))
+    results = run_query(command, ["--header", "--csv"] + options, header_and_rows(command, rows))
+    named, _, rest = results.partition(b"\n")
     if not named[:1].isalpha() or b"," not in named and options != ["--any"]:
         wrong.append(f"{command} {options}: no header: {named!r}")
     if command != "ray" or "--any" in options:
         compare(f"{command} {options} csv", lines, rest.replace(b",", b" "))
-    return expected, lines, ask(command, ["--json"] + options, text)
+    return expected, lines, run_query(command, ["--json"] + options, text)
 
 
 def bits(x):

@@ -58,8 +58,8 @@ def by_zsh(line):
     return shown
 
 
-wrong, asked = 0, 0
-for shell, ask in ("fish", by_fish), ("zsh", by_zsh):
+wrong, requested = 0, 0
+for shell, complete in ("fish", by_fish), ("zsh", by_zsh):
     if not shutil.which(shell):
         print(f"{shell} is not installed")
         continue
@@ -67,9 +67,9 @@ for shell, ask in ("fish", by_fish), ("zsh", by_zsh):
         print("skipped: zsh, as there is no pseudo-terminal")
         continue
     for line, words in ASKED.items():
-        found, asked = ask(line), asked + 1
+        found, requested = complete(line), requested + 1
         missing = [word for word in words if word not in found]
         if missing:
             print(f"{shell}: after {line!r} there is no {', '.join(missing)}:\n{found}")
             wrong += 1
-sys.exit(77 if not asked else wrong > 0)
+sys.exit(77 if not requested else wrong > 0)

@@ -62,7 +62,7 @@ def column(name, code, out, error, command, ran):
         yield "text"
     if fails and error not in ("", "*"):
         yield "errors"
-    if re.search(r"/dev/full|[|] head|whole_lines|asks_and_waits", command) or re.search(
+    if re.search(r"/dev/full|[|] head|whole_lines|queries_and_waits", command) or re.search(
             rf"[|] *(?:timeout \d+ )?ebpo {ran}\b|ebpo {ran} [^|;&]* - |ebpo {ran} [^|;&]* -$|"
             rf"ebpo {ran} [^|;&]*<", command):
         yield "pipes"

@@ -5,7 +5,7 @@ import sys
 
 with open(sys.argv[1], encoding="utf-8") as a, open(sys.argv[2], encoding="utf-8") as b:
     levels, view = json.load(a), json.load(b)
-told = {node["octcode"]: node for level in levels["levels"] for node in level["nodes"]}
+reported = {node["octcode"]: node for level in levels["levels"] for node in level["nodes"]}
 come, siblings = {}, []
 for node in view["nodes"]:
     code = node["octcode"]
@@ -15,8 +15,8 @@ for node in view["nodes"]:
             and node["complete"] == (len(siblings) == (8 if code > 1 else 1))), siblings
     if node["complete"]:
         siblings = []
-    come[code] = {key: node[key] for key in told[code]}
-assert come == told, "other nodes"
+    come[code] = {key: node[key] for key in reported[code]}
+assert come == reported, "other nodes"
 last = view["last"]
 kinds = {kind: sum(1 for n in come.values() if n["type"] == kind)
          for kind in ("leaf", "white", "black")}

@@ -15,7 +15,7 @@ import threading
 PIECES = 200
 
 
-def ask(stream):
+def run_query(stream):
     try:
         for i in itertools.count():
             stream.write(f"{i % 977 / 100} {i % 13 / 7} "
@@ -24,14 +24,14 @@ def ask(stream):
         pass
 
 
-answers, theirs = os.pipe2(os.O_DIRECT)
+results, theirs = os.pipe2(os.O_DIRECT)
 process = subprocess.Popen(["ebpo", *sys.argv[1:]], stdin=subprocess.PIPE, stdout=theirs)
 os.close(theirs)
-asker = threading.Thread(target=ask, args=[process.stdin], daemon=True)
-asker.start()
+writer = threading.Thread(target=run_query, args=[process.stdin], daemon=True)
+writer.start()
 broken = 0
 for number in itertools.count():
-    piece = os.read(answers, 1 << 16)
+    piece = os.read(results, 1 << 16)
     if not piece:
         break
     broken += not piece.endswith(b"\n")
