@@ -52,7 +52,7 @@ const keyOf = ({ array, chunk }) => array.number * 2 ** 32 + chunk;
 
 function withoutGates(bytes, array, chunk) {
   const codes = decodeGates(bytes, Math.min(array.chunkRows, array.rows - chunk * array.chunkRows));
-  return codes ? { bytes: new Uint8Array(codes.buffer) } : { fault: 'its streams do not encode faces' };
+  return codes ? { bytes: new Uint8Array(codes.buffer) } : { fault: 'the chunk\'s streams do not encode faces' };
 }
 
 export class ChunkCache {
@@ -142,7 +142,7 @@ export class ChunkCache {
 
   #compare(sums, array, chunk, end) {
     if (sums && sums.get(array)[chunk] !== end)
-      throw formatError(`${array.path}: chunk ${chunk}`, 'the chunk is damaged: it is not the one that was written there');
+      throw formatError(`${array.path}: chunk ${chunk}`, 'the chunk is damaged: it is not the chunk that was written there');
   }
 
   /** Compares the chunks that were returned early with the checksums. After a mismatch no further chunks are returned. */
@@ -193,7 +193,7 @@ export class ChunkCache {
       : behind.push({ i, from: Math.max(r.at, coming), to: r.at + r.bytes })));
     for (const run of joined(behind)) {
       run.data = this.#turn(() => this.source.read(run.from, run.to - run.from));
-      run.data.catch(() => {}); // the promises of its pieces report the error
+      run.data.catch(() => {}); // the promises of the run's pieces report the error
       for (const { i, from, to } of run.ranges)
         out[i] = this.#piece(run, ranges[i].at, from, to);
     }
@@ -216,7 +216,7 @@ export class ChunkCache {
 
   async #turn(work) {
     if (this.busy >= REQUESTS)
-      await new Promise((done) => this.queue.push(done)); // takes the slot of the request that ended
+      await new Promise((done) => this.queue.push(done)); // waits until another request ends, and takes its slot
     else
       this.busy++;
     try {

@@ -1,6 +1,6 @@
 // Decodes chunks as HDF5 stores them: shuffle, zstd or deflate, fletcher32. Compares every checksum and every length.
 
-export const CHUNK_BYTES_MAX = 65536; // before compression
+export const CHUNK_BYTES_MAX = 65536; // size limit before compression
 export const FILTER = { deflate: 1, shuffle: 2, fletcher32: 3, zstd: 32015 };
 
 /** Returns 'zstd', 'deflate', 'checksum' or 'bare' for an array's filters, or undefined when the format does not allow the filters. Single bytes may be shuffled too. */
@@ -80,7 +80,7 @@ function modesFault(block) {
 export function zstdFrameFault(data, size) {
   const view = new DataView(data.buffer, data.byteOffset, data.byteLength);
   if (data.length < 6 || view.getUint32(0, true) !== 0xfd2fb528)
-    return 'it is not a zstd frame';
+    return 'not a zstd frame';
   const descriptor = data[4], single = descriptor >> 5 & 1, contentCode = descriptor >> 6;
   const contentBytes = contentCode === 0 ? single : 1 << contentCode;
   let at = 5 + (single ? 0 : 1) + [0, 1, 2, 4][descriptor & 3];
@@ -98,7 +98,7 @@ export function zstdFrameFault(data, size) {
   at += contentBytes;
   for (let last = 0; !last;) {
     if (at + 3 > data.length)
-      return 'the zstd frame is cut short';
+      return 'the zstd frame is truncated';
     const header = data[at] | data[at + 1] << 8 | data[at + 2] << 16;
     last = header & 1;
     const kind = header >> 1 & 3, size = kind === 1 ? 1 : header >> 3;
@@ -140,7 +140,7 @@ async function inflate(data, most) {
 let wasm;
 
 /** Loads the default zstd decoder: the wasm of npm's zstddec. Its import needs Node.js, a bundler or an import map. */
-async function usualZstd() {
+async function defaultZstd() {
   wasm ??= import('zstddec').then(({ ZSTDDecoder }) => loadZstd(ZSTDDecoder));
   return wasm;
 }
@@ -168,7 +168,7 @@ export async function decodeChunk(stored, pipeline, elementSize, size, zstd) {
     const fault = zstdFrameFault(data, size);
     if (fault)
       return { fault };
-    data = (zstd ?? await usualZstd()).decode(data, size);
+    data = (zstd ?? await defaultZstd()).decode(data, size);
     if (data.length !== size) // the decoder returns no bytes on errors
       return { fault: 'the zstd frame does not decode, or its checksum does not match' };
   } else if (pipeline === 'deflate') {

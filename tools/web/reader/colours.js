@@ -14,20 +14,23 @@ export function describeColumns(path, text, isList) {
   if (isList || !['vertex', 'face'].includes(element))
     return undefined;
   if (!TYPES[type])
-    throw formatError(path, 'attribute type: it has a value that the format does not allow');
+    throw formatError(path, 'attribute type: the format does not allow this value');
   if (names.length > COLUMNS_MOST || !['plain', 'columns'].includes(coding))
-    throw formatError(path, "the array's columns or its coding are none that the format has");
+    throw formatError(path, "the format does not allow the array's number of columns or its coding");
   return { path, element, names, type, coding, elementSize: TYPES[type][0].BYTES_PER_ELEMENT };
 }
 
 /** Returns the paths of the group's arrays from the group's count. */
 export function columnPaths(count) {
   if (count > ARRAYS_MOST)
-    throw formatError('/attributes', 'it has more arrays than the format allows');
+    throw formatError('/attributes', 'the group has more arrays than the format allows');
   return Array.from({ length: count }, (_, n) => `/attributes/${String(n).padStart(3, '0')}`);
 }
 
-/** Finds colours among described arrays. Returns { element, channels: three of { path, column } }, or undefined without colours. Prefers vertex colours, unless all vertices have the same gray. */
+/**
+ * Finds colours among described arrays. Returns { element, channels: three of { path, column } }, or undefined without colours. Prefers vertex colours, unless all
+ * vertices have the same gray.
+ */
 export function chooseColours(described) {
   const of = (element) => {
     for (const names of CHANNELS) {
@@ -52,7 +55,7 @@ export function decodeColours(bytes, array, rows) {
     undo(whole, elementSize, type.startsWith('float'), rows);
   for (let i = 0; i < out.length; i++) {
     const to = coding === 'columns' ? i % rows * width + Math.floor(i / rows) : i;
-    out[to] = Math.min(255, Math.max(0, values[i] / full * 255)) + 0.5; // NaN: 0
+    out[to] = Math.min(255, Math.max(0, values[i] / full * 255)) + 0.5; // NaN becomes 0
   }
   return out;
 }

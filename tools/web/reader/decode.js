@@ -25,7 +25,7 @@ export function countTypes(types, level) {
 function checkTypes(info, level) {
   const counts = countTypes(level.types, level.level), s = level.summary;
   if (counts[WHITE] !== s.white || counts[BLACK] !== s.black || counts[LEAF] !== s.leaf || counts[GRAY] !== s.gray)
-    throw formatError(levelPath(level.level, 'types'), 'the types do not add up to the counts in the head');
+    throw formatError(levelPath(level.level, 'types'), 'the types do not add up to the counts in the header');
   if (level.level && level.types.reduce((sum, t) => sum + (t === 0), 0) !== info.levels[level.level - 1].pruned)
     throw formatError(levelPath(level.level, 'types'), info.parts.has('pruned') ? 'there is not exactly one empty group for each pruned node of the level above'
       : 'a group is 0: all children of a gray node are white');
@@ -56,7 +56,7 @@ export function checkColours(level, colours) {
     throw formatError(levelPath(level, 'gray_colours'), 'a colour is above 2^24 - 1');
 }
 
-/** Decodes a level's tree, planes and colours, and checks them against the counts in the head. */
+/** Decodes a level's tree, planes and colours, and compares them with the counts in the header. */
 export function checkLevel(info, level) {
   checkTypes(info, level);
   checkPlanes(level, 'plane_counts', level.planeCounts, 'planes', level.planes, level.summary.planes);
@@ -65,7 +65,7 @@ export function checkLevel(info, level) {
   checkColours(level.level, level.grayColours);
 }
 
-/** Checks types_index and gray_index against the sums that they store. */
+/** Compares types_index and gray_index with the sums that they must contain. */
 export function checkIndexes(level, index) {
   const wrong = (name) => formatError(levelPath(level.level, name), 'the index contradicts the arrays that it indexes');
   if (index.types) {
@@ -109,7 +109,7 @@ export function decodeLeaves(info, level, { skip, fresh, refCount, refs, index }
     news += fresh[leaf];
     planes += level.leafPlaneCounts?.[leaf] ?? 0;
     let above = first[leaf];
-    for (let k = 0; k < refCount[leaf]; k++) { // descending gaps, ascending numbers
+    for (let k = 0; k < refCount[leaf]; k++) { // stored as descending differences; the result is ascending
       above -= refs[at + k] + 1;
       if (above < 0)
         throw fail('leaf_refs', "a reference is not to a face before the leaf's own");
@@ -260,7 +260,7 @@ export function decodeMap(bytes, array, limit) {
   return out;
 }
 
-/** Decodes one chunk of a map. Does not detect numbers that occur in other chunks too. */
+/** Decodes one chunk of a map. Does not detect indices that also occur in other chunks. */
 export function decodeMapChunk(bytes, array, limit) {
   const codes = new Uint32Array(bytes.buffer, bytes.byteOffset, bytes.length / 4), out = new Uint32Array(codes.length);
   sumMap(codes, array, limit, (i, sum) => {

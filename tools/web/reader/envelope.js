@@ -6,8 +6,8 @@ const TOLERANCE = 1e-10; // in cell units
 const VERTICES = 192, FACES = 96, CORNERS = 576;
 
 /**
- * In cell coordinates, 0 .. 1 on each axis. `x`: three numbers a vertex; polygon f has the vertices corner[first[f]] .. corner[first[f + 1] - 1],
- * counter-clockwise seen from outside, and wall[f] is 1 when the polygon is on a face of the cell.
+ * A polytope in cell coordinates, 0 to 1 on each axis. `x`: three numbers for each vertex. Polygon f has the vertices corner[first[f]] to
+ * corner[first[f + 1] - 1], counter-clockwise as seen from outside. wall[f] is 1 when polygon f is on a cell face.
  * @typedef {{ vertices: number, faces: number, x: Float64Array, first: Uint16Array, corner: Uint8Array, wall: Uint8Array }} Polytope
  */
 const room = () => ({ vertices: 0, faces: 0, x: new Float64Array(3 * VERTICES), first: new Uint16Array(FACES + 1), corner: new Uint8Array(CORNERS), wall: new Uint8Array(FACES) });
@@ -21,7 +21,7 @@ function copy(to, from) {
   to.wall.set(from.wall.subarray(0, from.faces));
 }
 
-/** Returns the whole cell. In the number of a vertex, bit 0 is x, bit 1 is y, bit 2 is z. */
+/** The whole cell. In the index of a vertex, bit 0 is x, bit 1 is y, bit 2 is z. */
 const CUBE = {
   vertices: 8, faces: 6,
   x: Float64Array.of(0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0, 0, 0, 1, 1, 0, 1, 0, 1, 1, 1, 1, 1),
@@ -152,8 +152,8 @@ function closeCap(wall) {
 }
 
 /**
- * Keeps n . x <= d of `at`. Returns false when almost nothing would remain, memory is too small, or rounding broke the loops. The polytope is
- * then unchanged: too large, never too small.
+ * Clips `at` to n . x <= d. Returns false when almost nothing would remain, memory is too small, or rounding broke the loops. The polytope is
+ * then unchanged: it may be too large, but is never too small.
  */
 function clip(nx, ny, nz, d, wall) {
   let most = -Infinity, least = Infinity;

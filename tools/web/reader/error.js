@@ -1,8 +1,8 @@
-// Errors of the reader. The message is one sentence: what is wrong, where, and what to do next. Programs use `code`.
+// Errors of the reader. The message is one sentence: where, what is wrong, and what to do next. Programs use `code`.
 
 export class EbpoError extends Error {
   /**
-   * @param {'FORMAT'|'VERSION'|'NETWORK'|'ABSENT'|'ARGUMENT'} code  as the C library's status of the same name
+   * @param {'FORMAT'|'VERSION'|'NETWORK'|'ABSENT'|'ARGUMENT'} code  the C library's status with the same name
    * @param {string} message
    */
   constructor(code, message, options) {
@@ -19,5 +19,5 @@ export function formatError(where, what, next = 'get a fresh copy of the file') 
 
 /** Makes the error of an array that another program has rewritten: not damaged, but not in the layout that the format requires. */
 export function foreignError(where, what) {
-  return new EbpoError('UNSUPPORTED', `${where}: ${what}; write the file anew with 'ebpo repack --compat'`);
+  return new EbpoError('UNSUPPORTED', `${where}: ${what}; rewrite the file with 'ebpo repack --compat'`);
 }

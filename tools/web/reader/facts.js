@@ -1,4 +1,4 @@
-// Reads a file's head: root attributes, levels, and the table of arrays. format-spec/README.md, sections 3 and 4.
+// Reads a file's header: root attributes, levels, and the table of arrays. format-spec/README.md, sections 3 and 4.
 import { CHUNK_BYTES_MAX } from './chunk.js';
 import { EbpoError, formatError } from './error.js';
 import { text } from './hdf5.js';
@@ -15,7 +15,7 @@ const COUNTS = ['source_size', 'vertex_count', 'face_count', 'source_vertex_coun
   'mesh_nonmanifold_edges', 'mesh_misoriented_edges', 'mesh_unbalanced_edges', 'mesh_bowtie_vertices', 'mesh_zero_area_faces',
   'mesh_index_repeated_faces', 'mesh_repeated_faces', 'mesh_unreferenced_vertices', 'mesh_repeated_positions', 'mesh_edges', 'mesh_components',
   'mesh_boundary_loops'];
-const HINTS = ['chunk_index_offset', 'chunk_index_bytes', 'top_bytes']; // may be absent or wrong
+const HINTS = ['chunk_index_offset', 'chunk_index_bytes', 'top_bytes']; // these attributes may be absent or wrong
 const NUMBERS = ['grid_level', 'max_level', 'level_count'];
 const REALS = ['epsilon', 'mesh_area', 'mesh_volume', 'mesh_mean_edge'];
 const TRIPLES = ['box_origin', 'box_size', 'mesh_min', 'mesh_max'];
@@ -104,7 +104,7 @@ function readParts(facts) {
         throw facts.fail(name, 'it has a value that the format does not allow');
       if (!KNOWN_PARTS.includes(word)) {
         if (required)
-          throw new EbpoError('VERSION', `the file needs part "${word}", which this reader does not know; use a newer one`);
+          throw new EbpoError('VERSION', `the file needs the part "${word}", which this reader does not know; use a newer reader`);
       } else if (seen.has(word)) {
         throw formatError('', `part "${word}" is listed twice`);
       }
@@ -122,16 +122,16 @@ export function readFacts(attributes) {
   let format;
   try {
     format = facts.text('format');
-  } catch { /* said below */ }
+  } catch { /* reported below */ }
   if (format !== 'EBP-Octree in HDF5')
-    throw formatError('', 'an HDF5 file, but not an EBP-Octree (its root attribute format is not "EBP-Octree in HDF5")',
-      /^EBP-Octree paint/.test(format) ? 'this is paint for a model: open the model, then this file by Open in its section Paint' : 'make one with `ebpo convert`');
+    throw formatError('', 'an HDF5 file, but not an EBP-Octree file (its root attribute format is not "EBP-Octree in HDF5")',
+      /^EBP-Octree paint/.test(format) ? 'this is a paint file for a model: open the model, and then this file by Open in the section Paint' : 'make one with `ebpo convert`');
   out.format_version_major = facts.int('format_version_major');
   out.format_version_minor = facts.int('format_version_minor');
   if (out.format_version_major !== 1)
-    throw new EbpoError('VERSION', `format version ${out.format_version_major}.${out.format_version_minor}, and this reader reads version 1; use a newer one`);
-  if (facts.has('format_version') && facts.text('format_version') === '1.0-draft') // for people, but files of the draft have the same numbers
-    throw new EbpoError('VERSION', 'was written by a draft of the format, which is no longer supported; convert the model again');
+    throw new EbpoError('VERSION', `format version ${out.format_version_major}.${out.format_version_minor}, but this reader reads version 1; use a newer reader`);
+  if (facts.has('format_version') && facts.text('format_version') === '1.0-draft') // files of the draft have the same version numbers; only this text differs
+    throw new EbpoError('VERSION', 'the file was written by a draft of the format, which is no longer supported; convert the model again');
   out.parts = readParts(facts);
   out.generator = facts.text('generator');
   for (const name of TEXTS)
@@ -229,7 +229,7 @@ function checkLevelCounts(info, level) {
   if ([s.gray, s.leaf, s.white, s.black].some((n) => n > NODES_MAX))
     return 'a level has too many nodes';
   if (s.gray + s.leaf + s.white + s.black !== nodes)
-    return 'a level does not have eight nodes for each gray one above';
+    return 'a level does not have eight nodes for each gray node above';
   const last = level === info.level_count - 1, subset = has('pruned');
   if (last ? s.gray && !subset : s.gray === 0)
     return 'the gray nodes do not end at the deepest level';
@@ -240,7 +240,7 @@ function checkLevelCounts(info, level) {
   if (s.planes > (has('planes') ? 255 * s.gray : 0) || s.leaf_planes > (has('leaf-planes') ? 255 * s.leaf : 0))
     return 'a level has more planes than its nodes can have';
   if (!has('mesh') && (s.faces_new || s.faces_referenced))
-    return 'a level counts faces, and there is no mesh';
+    return 'a level counts faces, but there is no mesh';
   if (s.leaf === 0 && (s.faces_new || s.faces_referenced))
     return 'a level has faces but no leaf';
   if (s.black && !info.solid)
@@ -250,7 +250,7 @@ function checkLevelCounts(info, level) {
   return undefined;
 }
 
-/** Checks that the facts are consistent before any memory is sized by them. */
+/** Checks that the facts are consistent, before they determine the size of memory. */
 export function checkFacts(info) {
   const mesh = (what) => formatError('/', what);
   if (info.parts.has('gates') && !info.parts.has('mesh'))
@@ -291,7 +291,7 @@ export function chunkRows(rows, cols, elementSize) {
 
 const indexRows = (count) => (count > INDEX_ROWS ? Math.ceil(count / INDEX_ROWS) : 0);
 
-// name: [columns (0: one dimension), element sizes, signed, rows, may be absent though it has rows]
+// name: [columns (0: one dimension), element sizes, signed, rows, may be absent although it has rows]
 const has = (info, part, rows) => (info.parts.has(part) ? rows : 0);
 const LEVEL_ARRAYS = {
   types: [0, [2], false, (info, s, groups) => groups],
@@ -312,7 +312,7 @@ const LEVEL_ARRAYS = {
   gray_colours: [0, [4], false, (info, s) => has(info, 'colours', s.gray)],
 };
 export const LEVEL_ARRAY_COUNT = Object.keys(LEVEL_ARRAYS).length;
-const CODINGS = { // others: plain
+const CODINGS = { // the coding of other arrays is plain
   leaf_skip: ['skips', 'delta'], leaf_refs: ['gap'], '/mesh/vertices': ['delta'], '/mesh/faces': ['high-water'], '/maps/vertex_source': ['delta'],
   '/maps/face_source': ['delta'],
 };
@@ -349,7 +349,7 @@ export const PLACES = '/subtrees/places', CHUNK_SUMS = '/chunk_sums';
 /** Returns true for lists about all chunks. Such a list is itself a single chunk, and no list contains it. */
 export const isList = (path) => path === PLACES || path === CHUNK_SUMS;
 
-// With the part subtrees. rows: undefined when the array itself stores the number.
+// The arrays of files with the part subtrees. rows: undefined when only the array's shape has the number of rows.
 const subtreeArrays = (info) => (info.subtree_level === undefined ? [] : [
   { path: '/subtrees/counts', cols: subtreeCols(info), sizes: [4], rows: info.levels[info.subtree_level].gray },
   { path: '/subtrees/index', cols: subtreeCols(info), sizes: [8], rows: undefined },

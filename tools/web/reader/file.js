@@ -19,9 +19,11 @@ const folder = (level) => `/levels/${String(level).padStart(2, '0')}/`;
 
 /**
  * Opens a file: a URL (text or URL), a File or Blob, an ArrayBuffer, a Uint8Array (also a Node.js Buffer), or a source (source.js).
- * Options: those of UrlSource, of which `ahead` is 1 MiB unless said: small files come whole with the first answer, and of large ones what is needed
- * next; `zstd`, a decoder as loadZstd() gives it, or a promise of it; `headBytes`, what is waited for of the first answer (128 KiB); `cacheBytes`, how
- * much of decoded chunks is kept (64 MiB).
+ * Options: those of UrlSource, and
+ *   `ahead`       bytes of the first request, 1 MiB by default; its response contains small files completely, and the upper levels of large files
+ *   `zstd`        a decoder from loadZstd(), or a promise of a decoder
+ *   `headBytes`   number of bytes of the first response to wait for, 128 KiB by default
+ *   `cacheBytes`  size limit of the cache of decoded chunks, 64 MiB by default
  * @returns {Promise<EbpoFile>}
  */
 export async function openEbpo(what, options = {}) {
@@ -48,7 +50,7 @@ export class EbpoFile {
     this.source = source;
     this.options = options;
     this.info = undefined;   // facts.js: attributes by name, `levels`, `parts`, `solid`
-    this.colours = undefined; // colours.js: where the mesh's colours are
+    this.colours = undefined; // colours.js: the arrays of the mesh's colours
     this.arrays = new Map(); // path: { path, rows, cols, elementSize, signed, chunkRows, chunkCount, pipeline, chunks, bytes }; chunks and bytes are undefined until located
   }
 
@@ -57,7 +59,7 @@ export class EbpoFile {
     return { requests: this.source.requests, bytes: this.source.bytes };
   }
 
-  // --- the head ---
+  // --- the header ---
 
   async openHead(bytes) {
     const { source } = this;
@@ -78,7 +80,7 @@ export class EbpoFile {
 
   async #moreHead(size) {
     if (size > HEAD_BYTES_MOST)
-      throw formatError('', 'its head is larger than any file needs');
+      throw formatError('', 'its header is larger than any valid file needs');
     const more = await this.source.read(this.head.length, size - this.head.length), all = new Uint8Array(size);
     all.set(this.head);
     all.set(more, this.head.length);
@@ -111,7 +113,7 @@ export class EbpoFile {
         continue;
       arrays.set(wanted.path, describe(hdf5, wanted, links.has(name), links.get(name), info));
     }
-    if (info.parts.has('attributes') && arrays.get('/levels/00/types').pipeline !== 'bare') // else their checksum would have to be compared
+    if (info.parts.has('attributes') && arrays.get('/levels/00/types').pipeline !== 'bare') // without chunk checksums, the attributes' checksum would have to be compared
       this.colours = this.#findColours(hdf5, group('/attributes', root.links.get('attributes')), info, arrays);
     for (const array of arrays.values())
       if (array.pipeline !== arrays.get('/levels/00/types').pipeline)
@@ -124,11 +126,11 @@ export class EbpoFile {
     this.hdf5 = hdf5;
     this.#placeArrays((array) => !array.indexed); // the header of an array with a single chunk has the chunk offset
     if (arrays.has(PLACES))
-      return; // has a list of all chunks
+      return; // the file has a list of all chunks
     try {
       this.#placeArrays((array) => array.indexed);
     } catch (error) {
-      if (!(error instanceof NeedBytes)) // else the index has not come with the head
+      if (!(error instanceof NeedBytes)) // otherwise the index is not part of the loaded header
         throw error;
     }
   }
@@ -160,7 +162,7 @@ export class EbpoFile {
 
   #checkRoom() {
     if ([...this.arrays.values()].reduce((sum, a) => sum + (a.bytes ?? 0), 0) > this.source.size)
-      throw formatError('', "the arrays' chunks take more room than the file has");
+      throw formatError('', "the arrays' chunks are larger than the file");
   }
 
   /** Returns true when all chunk offsets are known. Arrays of several chunks have an index; files with subtrees have a directory of all chunks. */
@@ -212,7 +214,7 @@ export class EbpoFile {
         const from = Math.min(piece?.at ?? error.at, error.at), to = Math.max(piece?.end ?? error.end, error.end);
         piece = { at: from, end: Math.min(this.source.size, from + 2 * (to - from) + 128 * 1024) };
         if (piece.end - piece.at > INDEX_BYTES_MOST)
-          throw named(this.source, formatError('', 'its chunk indexes are spread over more of the file than can be read at once'));
+          throw named(this.source, formatError('', 'its chunk indexes are too far apart to be read at once'));
       }
     }
   }
@@ -221,7 +223,7 @@ export class EbpoFile {
   bytesToLevel(level) {
     const arrays = [...this.arrays.values()].filter((a) => a.level <= level), places = (a) => a.chunks?.map((c) => c.at + c.bytes) ?? [NaN];
     if (!this.info.parts.has('subtrees'))
-      return arrays.reduce((end, a) => places(a).reduce((most, at) => Math.max(most, at), end), 0); // NaN stays
+      return arrays.reduce((end, a) => places(a).reduce((most, at) => Math.max(most, at), end), 0); // NaN stays NaN
     const begin = Math.min(...arrays.map((a) => a.chunks?.[0].at ?? Infinity));
     return arrays.reduce((sum, a) => sum + (a.bytes ?? NaN), begin);
   }
@@ -238,7 +240,7 @@ export class EbpoFile {
   }
 
   // Adds the file's name to errors.
-  async #told(work) {
+  async #named(work) {
     try {
       return await work();
     } catch (error) {
@@ -304,11 +306,11 @@ export class EbpoFile {
   // --- parts of levels ---
 
   /**
-   * Reads nodes of parts of levels in one batch, as segments for Tree.addPart(). `wanted` is [{ level, part }] from Tree.partOf(). With `planes` reads the
-   * data for drawing, else the data for exact queries: winding numbers of leaves.
+   * Reads nodes of parts of levels in one batch, as segments for Tree.addPart(). `wanted` is [{ level, part }] from Tree.partOf(). With `planes`, reads the
+   * data for drawing; otherwise the data for exact queries, which include the winding numbers of leaves.
    */
   async nodeParts(wanted, { planes = true } = {}) {
-    return this.#told(async () => {
+    return this.#named(async () => {
       await this.locate();
       return this.parts.segments(await this.parts.nodes(wanted), planes);
     });
@@ -316,7 +318,7 @@ export class EbpoFile {
 
   /** Returns the number of bytes that nodeParts() would fetch. */
   async costOfParts(wanted, { planes = true } = {}) {
-    return this.#told(async () => {
+    return this.#named(async () => {
       await this.locate();
       const described = await this.parts.nodes(wanted);
       return this.store.cache.cost(this.store.chunksOf(described.flatMap((d) => this.parts.nodeRanges(d, planes))));
@@ -328,7 +330,7 @@ export class EbpoFile {
    * [{ level, part, segment }], without planes; lists, faces and vertices are kept for leafFaces().
    */
   async subtrees(numbers) {
-    return this.#told(async () => {
+    return this.#named(async () => {
       await this.locate();
       const { info, parts, store } = this, below = Array.from({ length: info.level_count - 1 - info.subtree_level }, (_, i) => info.subtree_level + 1 + i);
       const rows = [...(await parts.subtrees.rows(numbers)).values()], wanted = rows.flatMap((row) => below.filter((l) => row.level(l).groups).map((level) => ({ level, part: row.subtree })));
@@ -343,13 +345,13 @@ export class EbpoFile {
 
   #needMesh() {
     if (!this.info.parts.has('mesh'))
-      throw new EbpoError('ABSENT', `${this.source.name}: the file was written without its mesh; convert it again with it`);
+      throw new EbpoError('ABSENT', `${this.source.name}: the file has no mesh; convert the model again with its mesh`);
   }
 
   /** Reads the whole mesh: { vertices: Float32Array or Float64Array, faces: Uint32Array }, three numbers each. */
   async mesh() {
     this.#needMesh();
-    return this.#told(async () => {
+    return this.#named(async () => {
       const vertices = this.arrays.get('/mesh/vertices'), faces = this.arrays.get('/mesh/faces');
       await this.#findChunks([vertices.path, faces.path, '/mesh/faces_index']);
       const index = await this.store.facesIndex();
@@ -367,7 +369,7 @@ export class EbpoFile {
   /** Reads faces by their face numbers. Returns their corners: Float64Array, nine numbers each. Fetches the chunks of faces, then those of vertices. */
   async facesByNumber(numbers) {
     this.#needMesh();
-    return this.#told(async () => {
+    return this.#named(async () => {
       await this.#findChunks(['/mesh/faces', '/mesh/vertices', '/mesh/faces_index']);
       const corners = new Uint32Array(numbers.length * 3), out = new Float64Array(numbers.length * 9);
       await this.store.triples('/mesh/faces', numbers, corners);
@@ -378,7 +380,7 @@ export class EbpoFile {
     });
   }
 
-  // Reads red, green, blue of each corner, nine bytes a face.
+  // Reads red, green and blue of each corner: nine bytes for each face.
   async #coloursOf(numbers, corners) {
     if (!this.colours)
       return undefined;
@@ -397,26 +399,27 @@ export class EbpoFile {
   }
 
   /**
-   * Reads only the face lists of leaves 4096 * block .. of a level: { first, fresh, refCount, refBegin, refs }, arrays indexed by
-   * the leaf's position in the block. A leaf's faces are first .. first + fresh - 1 and refs[refBegin] .. refs[refBegin + refCount - 1].
+   * Reads only the face lists of at most 4,096 leaves of a level, from leaf 4096 * block on: { first, fresh, refCount, refBegin, refs }, arrays indexed by
+   * the leaf's position in the block. A leaf's faces are first to first + fresh - 1, and refs[refBegin] to refs[refBegin + refCount - 1].
    */
   async leafBlock(level, block) {
     this.#needMesh();
     if (!(block >= 0 && block * INDEX_ROWS < this.info.levels[level]?.leaf))
       throw new EbpoError('ARGUMENT', `${this.source.name}: level ${level} has no leaf ${block * INDEX_ROWS}`);
-    return this.#told(async () => {
+    return this.#named(async () => {
       await this.locate();
       return (await this.parts.decodeLists([await this.parts.block(level, block)]))[0];
     });
   }
 
   /**
-   * Reads the faces of leaves (nodes of tree.js): [Float64Array], nine numbers a face; `.numbers` of each array has the face indices. The lists, faces
-   * and vertices of a subtree are fetched in one batch. `.colours`, where the file has any: red, green, blue of each corner, 0 to 255.
+   * Reads the faces of leaves (nodes of tree.js): one Float64Array for each leaf, with nine numbers for each face. The member `numbers` of each array has the
+   * face indices, and `colours`, if the file has colours, red, green and blue of each corner, 0 to 255. The lists, faces and vertices of a subtree are fetched
+   * in one batch.
    */
   async leafFaces(leaves) {
     this.#needMesh();
-    return this.#told(async () => {
+    return this.#named(async () => {
       await this.locate();
       const { parts, store } = this, wanted = new Map(), keyOf = (leaf) => leaf.level * 2 ** 40 + parts.partOfLeaf(leaf);
       for (const leaf of leaves)
@@ -456,15 +459,15 @@ export class EbpoFile {
   async sourceFaces(numbers) {
     if (!this.info.parts.has('maps'))
       throw new EbpoError('ABSENT', `${this.source.name}: the file was written without its maps to the source's numbers; convert it again with them`);
-    return this.#told(async () => {
+    return this.#named(async () => {
       await this.#findChunks(['/maps/face_source']);
       return this.store.column('/maps/face_source', 0, numbers, Uint32Array);
     });
   }
 
-  // --- everything ---
+  // --- checks of the whole file ---
 
-  /** Checks that the leaves of all levels (read with `faces`) have every face as a new one once, in depth-first order. */
+  /** Checks that the leaves of all levels (read with `faces`) list every face as new exactly once, in depth-first order. */
   checkOrder(levels) {
     try {
       checkOrder(this.info, levels);
@@ -473,7 +476,7 @@ export class EbpoFile {
     }
   }
 
-  /** Compares content_sha256 and colours_sha256 (format-spec, section 8). Reads the whole file. In a page: only over https and from localhost. */
+  /** Compares content_sha256 and colours_sha256 (format-spec, section 8). Reads the whole file. Pages can use it only over https and from localhost. */
   async verifyContent() {
     const of = (path) => (path.endsWith('/gray_colours') ? 'colours_sha256' : 'content_sha256');
     const paths = [...this.arrays.keys()].filter((p) => !isList(p) && !/^\/(subtrees|attributes)\//.test(p)).sort();
@@ -495,7 +498,7 @@ export class EbpoFile {
     return [...await digest(all)].map((b) => b.toString(16).padStart(2, '0')).join('');
   }
 
-  // Returns the hashed content of an array: the content of a file without subtrees, which have smaller chunks.
+  // Returns the bytes of an array for the digest: the array as stored in a file without subtrees. Files with subtrees have smaller chunks.
   #digested(path, bytes) {
     const array = this.arrays.get(path), rows = chunkRows(array.rows, array.cols, array.elementSize);
     if (!this.info.parts.has('subtrees'))
@@ -544,20 +547,20 @@ function describe(hdf5, wanted, linked, address, info) {
   if (o.space.rank < 1 || o.space.rank > 2 || !o.space.fixed || o.space.dims.includes(0))
     throw formatError(path, 'the array does not have one or two fixed dimensions');
   if (o.external || o.layout.elsewhere)
-    throw formatError(path, "the array's values are in other files or arrays, which are never looked for");
+    throw formatError(path, "the array's values are in other files or arrays, which are not read");
   if (!o.layout.chunked)
     throw foreignError(path, 'the array is not stored in chunks');
   if (o.layout.grows)
-    throw foreignError(path, "the array's chunks have an index for arrays that grow");
+    throw foreignError(path, "the array's chunks have an index for extensible arrays");
   const elementSize = o.type.size, rows = wanted.rows ?? o.space.dims[0], [fit] = o.layout.chunk, chunk = [fit, ...o.space.dims.slice(1)];
   if (o.layout.elementSize !== elementSize || chunk.length !== o.layout.chunk.length || chunk.some((n, i) => n !== o.layout.chunk[i]) ||
       !chunkRowsFit(info, path, o.space.dims[0], o.space.dims[1] ?? 0, elementSize, fit))
     throw foreignError(path, "the array's chunks do not have the size that the format requires");
   const pipeline = pipelineOf(o.filters, elementSize);
   if (!pipeline)
-    throw foreignError(path, "the array's filters are none of the format's");
+    throw foreignError(path, "the format does not allow the array's filters");
   if (o.space.dims[0] !== rows)
-    throw formatError(path, "the array's length contradicts the counts in the head");
+    throw formatError(path, "the array's length contradicts the counts in the header");
   if ((o.space.dims[1] ?? 0) !== (gates ? GATES_COLS : cols) || !(gates ? [1] : wanted.sizes).includes(elementSize) || o.type.signed !== wanted.signed)
     throw formatError(path, 'the array has the wrong type or the wrong number of columns');
   if (path === '/mesh/vertices' && elementSize !== (info.coordinate_type === 'float64' ? 8 : 4))

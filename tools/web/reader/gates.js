@@ -1,10 +1,10 @@
-// Decodes faces across edges (coding `gates`, format-spec/README.md, section 7): converts a chunk's streams to high-water codes.
+// Decodes the coding `gates` of faces (format-spec/README.md, section 7), which codes faces across open edges: converts a chunk's streams to high-water codes.
 
 export const GATES_COLS = 13;
 const OPEN_MOST = 64, NEAR = 32, LOW_END = 224, LONG = 240;
-const NEW = 0, AT_SECOND = 1, AT_FIRST = 2, BY_NUMBER = 3, AT_OPEN = 4; // values of `third`: the corner beyond the edge
+const NEW = 0, AT_SECOND = 1, AT_FIRST = 2, BY_NUMBER = 3, AT_OPEN = 4; // values of `third`: the way in which the corner opposite the edge is coded
 
-/** Pairs of vertices, newest last. Vertices are counted from the first one that is new in the chunk, modulo 2^32: codes say no more. */
+/** A list of open edges (pairs of vertices), newest last. Vertices are numbered relative to the chunk's first new vertex, modulo 2^32, because codes are relative. */
 class OpenEdges {
   constructor() {
     this.a = [];
@@ -119,7 +119,7 @@ function withoutStreams(bytes, rows) {
   return out;
 }
 
-/** Returns the codes of `rows` faces, or undefined when the bytes are invalid. Numbers above `seen` become codes above it, which decodeFaces rejects. */
+/** Returns the high-water codes of `rows` faces, or undefined when the bytes are invalid. Numbers above `seen` become codes above `seen`, which decodeFaces() rejects. */
 export function decodeGates(bytes, rows) {
   if (bytes[0] === 1)
     return withoutStreams(bytes, rows);

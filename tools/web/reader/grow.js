@@ -1,9 +1,9 @@
-// Loads the nodes below some nodes of a tree in one batch: whole levels when most of a level is needed, else parts of levels.
+// Loads the nodes below some nodes of a tree in one batch: whole levels when a large share of a level is needed, otherwise parts of levels.
 import { INDEX_ROWS } from './facts.js';
 
-const BATCH_BYTES = 256 * 1024;                // of parts; pictures are drawn between batches
-const WHOLE_SHARE = 0.3;                       // the share of a level's parts from which on the whole level is loaded
-const WHOLE_BYTES_MOST = 64 * 1024 * 1024;     // of whole levels, decoded, about
+const BATCH_BYTES = 256 * 1024;                // default size limit of a batch of parts; pictures are drawn between batches
+const WHOLE_SHARE = 0.3;                       // a level is loaded completely when a greater share of its parts is needed
+const WHOLE_BYTES_MOST = 64 * 1024 * 1024;     // approximate limit of completely loaded levels, decoded
 
 /** Returns the levels that are always read whole: the levels above subtrees, or small levels in other files. */
 export function isSmall(info, level) {
@@ -18,7 +18,7 @@ function fits(tree, level) {
 async function addWhole(file, tree, numbers) {
   const missing = numbers.filter((level) => !tree.levels[level]).sort((a, b) => a - b);
   for (let i = 0, from = 0; i < missing.length; i++)
-    if (missing[i + 1] !== missing[i] + 1) { // neighbouring levels together
+    if (missing[i + 1] !== missing[i] + 1) { // reads consecutive levels together
       (await file.levels(missing[from], missing[i])).forEach((level) => tree.add(level));
       from = i + 1;
     }
@@ -26,7 +26,7 @@ async function addWhole(file, tree, numbers) {
 
 /**
  * Loads nodes for drawing. wants: [{ node, levels }], most important first: nodes whose children are not loaded, and the number of levels to load below them.
- * `bytes`: fetch about so much at most. Returns the number of parts and levels that were loaded.
+ * `bytes`: approximate limit of fetched bytes. Returns the number of loaded parts and levels.
  */
 export async function growForView(file, tree, wants, { bytes = BATCH_BYTES } = {}) {
   const { info } = tree, whole = new Set(), parts = new Map(), count = [];

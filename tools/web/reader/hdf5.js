@@ -1,5 +1,5 @@
 // Reads the subset of HDF5's file format that EBP-Octree files use: superblock 3, version 2 object headers with all links and
-// attributes in them, arrays of fixed size in chunks with the single-chunk or the fixed-array index. Other features are rejected with their name.
+// attributes in them, arrays of fixed size in chunks with the single-chunk or the fixed-array index. Other features are rejected with an error that names the feature.
 // Every block's checksum is compared, and every count and address is checked before it is used.
 // Source: The HDF Group, "HDF5 File Format Specification Version 3.0".
 import { EbpoError, formatError } from './error.js';
@@ -74,7 +74,7 @@ class Cursor {
 
   take(count) {
     if (count > this.end - this.at)
-      throw formatError(this.where, 'its description is cut short');
+      throw formatError(this.where, 'its description is truncated');
     this.at += count;
     return this.at - count;
   }
@@ -121,7 +121,7 @@ export class Hdf5 {
 
   #need(at, length, where) {
     if (at + length > this.size)
-      throw formatError(where, 'it lies beyond the end of the file');
+      throw formatError(where, 'it is beyond the end of the file');
     if (at + length <= this.head.length)
       return { bytes: this.head, at };
     const { piece } = this;
@@ -136,7 +136,7 @@ export class Hdf5 {
   }
 
   #superblock() {
-    const foreign = () => new EbpoError('FORMAT', 'not a whole HDF5 file; was it cut off in copying, or is it something else?');
+    const foreign = () => new EbpoError('FORMAT', 'not a whole HDF5 file; check whether it was truncated by copying, or is another kind of file');
     if (this.size < 48)
       throw foreign();
     this.#need(0, 48, '');
@@ -144,12 +144,12 @@ export class Hdf5 {
       throw foreign();
     const c = new Cursor(this.head, 8, 48, '');
     if (c.u8() !== 3)
-      throw formatError('', 'the HDF5 file has another layout than EBP-Octree files have (superblock version)', 'convert it again with ebpo');
+      throw formatError('', 'the superblock version differs from that of EBP-Octree files', 'convert it again with ebpo');
     const sizes = [c.u8(), c.u8()];
     c.u8(); // consistency flags: a writer has or had the file open
     const [base, extension, end, root] = [c.address(), c.address(), c.address(), c.address()];
     this.#checksum(0, 44, '');
-    c.must(sizes[0] === 8 && sizes[1] === 8 && base === 0 && extension === undefined, 'the HDF5 file has another layout than EBP-Octree files have');
+    c.must(sizes[0] === 8 && sizes[1] === 8 && base === 0 && extension === undefined, 'the HDF5 layout differs from that of EBP-Octree files');
     if (end === undefined || end > this.size || root === undefined)
       throw foreign();
     return root;
@@ -216,7 +216,7 @@ export class Hdf5 {
         case PIPELINE: parts.filters = pipeline(cursor); break;
         case LAYOUT: parts.layout = layout(cursor); break;
         case EXTERNAL: parts.external = true; break;
-        default: break; // times, comments, reference counts: they do not affect the data
+        default: break; // times, comments and reference counts do not affect the data
       }
     }
     if (group)
@@ -269,13 +269,13 @@ export class Hdf5 {
       if (mask)
         throw formatError(chunk, 'the chunk was stored without its filters');
       if (bytes > most)
-        throw formatError(chunk, 'the chunk is larger than it can be');
+        throw formatError(chunk, 'the chunk is larger than the format allows');
       if (at + bytes > this.size)
-        throw formatError(chunk, 'the chunk lies beyond the end of the file');
+        throw formatError(chunk, 'the chunk is beyond the end of the file');
       total += bytes;
     });
     if (total > this.size)
-      throw formatError(where, "the array's chunks do not fit the file");
+      throw formatError(where, "the array's chunks are larger than the file");
     return found;
   }
 
@@ -330,7 +330,7 @@ function dataspace(c) {
   return { rank, dims, fixed: most.every((m, i) => m === dims[i]) && dims.every((d) => d !== undefined) };
 }
 
-/** { class: 'integer', size, signed, little } or { class: 'float' ... } or { class: 'text', size } or { class: 'other' }. */
+/** Reads a type: { class: 'integer', size, signed, little }, { class: 'float' ... }, { class: 'text', size } or { class: 'other' }. */
 function datatype(c) {
   const kind = c.u8(), bits = c.uint(3), size = c.u32();
   if ((kind & 15) === 0) {
@@ -352,7 +352,7 @@ function pipeline(c) {
   const filters = [];
   for (let n = c.u8(); n > 0; n--) {
     const id = c.u16(), nameLength = id >= 256 ? c.u16() : 0;
-    c.u16(); // optional or not: they are all needed
+    c.u16(); // flags; all filters are required, also optional ones
     const count = c.u16(), values = [];
     c.take(nameLength);
     for (let i = 0; i < count; i++)

@@ -1,5 +1,5 @@
 // Reads parts of levels. In files with subtrees, a part has the nodes and face lists of one subtree in one level. In other files, and above the
-// subtrees, a part has 4,096 groups or leaves, one entry of the index arrays. All chunks of a batch of parts are requested at once.
+// subtrees, a part has 4,096 groups or leaves, which is one entry of the index arrays. All chunks of a batch of parts are requested at once.
 import { LEAF, GRAY, WHITE, BLACK, checkColours, checkWindings, countTypes, decodeLeafBlock } from './decode.js';
 import { formatError } from './error.js';
 import { INDEX_ROWS } from './facts.js';
@@ -35,7 +35,7 @@ export class Parts {
     return numbers.length ? this.subtrees.rows(numbers) : new Map();
   }
 
-  // `planes`: rows from .. to - 1 of planes are those of the gray nodes from `row` on, or fewer
+  // In the result, `planes` is { row, from, to }: rows `from` to `to` - 1 of the planes belong to gray nodes from `row` on.
   #ofSubtree(row, level) {
     const d = row.level(level), has = (name) => this.store.arrays.has(folder(level) + name);
     return { ...d, exact: true, planes: has('plane_counts') ? { row: d.first[GRAY], ...d.planes } : undefined,
@@ -49,7 +49,7 @@ export class Parts {
     const first = row(block), next = last ? all : row(block + 1), count = [...next].map((n, t) => n - first[t]);
     if (count.some((n, t) => n < 0 || next[t] > all[t]))
       throw formatError(at + 'types_index', 'the index contradicts the arrays that it indexes');
-    const span = (index, name, cols, col, total, type) => { // between the index's rows around the nodes of a type
+    const span = (index, name, cols, col, total, type) => { // returns the rows between the index's entries around the nodes of a type
       const from = Math.floor(first[type] / INDEX_ROWS), to = Math.ceil(next[type] / INDEX_ROWS);
       const value = (i) => (i * INDEX_ROWS >= all[type] ? total : index ? index[cols * i + col] : 0);
       if (value(from) > value(to) || value(to) > total)
@@ -61,7 +61,10 @@ export class Parts {
       leafPlanes: store.arrays.has(at + 'leaf_plane_counts') ? span(leaf, 'leaf_index', 3, 2, s.leaf_planes, LEAF) : undefined };
   }
 
-  /** Returns the rows of arrays that hold a part's nodes: [{ path, from, to }]. With `planes` for drawing (with colours), else for exact queries (with winding numbers of leaves). */
+  /**
+   * Returns the rows of arrays with a part's nodes: [{ path, from, to }]. With `planes`, the data for drawing, with colours; otherwise the data for exact queries,
+   * with winding numbers of leaves.
+   */
   nodeRanges(d, planes) {
     const at = folder(d.level), of = (name, type) => ({ path: at + name, from: d.first[type], to: d.first[type] + d.count[type] });
     const out = [{ path: at + 'types', from: d.group, to: d.group + d.groups }, of('black_winding', BLACK), of('white_winding', WHITE)];
@@ -85,7 +88,7 @@ export class Parts {
   #segment(d, [types, blackWinding, whiteWinding, ...rest], planes) {
     const [leafWinding, grayColours] = planes ? [undefined, rest.shift()] : [rest.shift()], at = folder(d.level), found = countTypes(types, d.level);
     if (found.some((n, t) => n !== d.count[t]))
-      throw formatError(at + 'types', d.exact ? 'the types do not add up to what /subtrees/counts says' : 'the types do not add up to what types_index says');
+      throw formatError(at + 'types', d.exact ? 'the types do not add up to the counts in /subtrees/counts' : 'the types do not add up to the counts in types_index');
     checkWindings(this.info, d.level, blackWinding, whiteWinding);
     checkColours(d.level, grayColours);
     const gray = planes && d.planes ? this.#planes(d, GRAY, d.planes, at + 'plane_counts', ...rest.splice(0, 2)) : {};
@@ -125,7 +128,7 @@ export class Parts {
     }));
   }
 
-  /** Describes the face lists of leaves 4096 * block .. of any level. */
+  /** Describes the face lists of at most 4,096 leaves of a level, from leaf 4096 * block on. */
   async block(level, block) {
     const s = this.info.levels[level], first = block * INDEX_ROWS, index = await this.store.whole(folder(level) + 'leaf_index'), next = 3 * block + 3;
     const refs = { from: index ? index[3 * block + 1] : 0, to: index && next < index.length ? index[next + 1] : s.faces_referenced };
@@ -141,7 +144,7 @@ export class Parts {
     return [...['leaf_skip', 'leaf_new', 'leaf_ref_count'].map((name) => ({ path: at + name, from: d.first, to: d.first + d.count })), { path: at + 'leaf_refs', ...d.refs }];
   }
 
-  /** { first, fresh, refCount, refBegin, refs } of described parts: decode.js, decodeLeafBlock(). */
+  /** Reads the face lists of described parts: { first, fresh, refCount, refBegin, refs }, by decodeLeafBlock() of decode.js. */
   async decodeLists(described) {
     const kept = described.map((d) => this.store.cache.recall(d.key)), missing = described.filter((_, i) => !kept[i]), fresh = new Map();
     const wanted = missing.map((d) => this.listRanges(d)), values = await this.store.rows(wanted.flat());
@@ -157,9 +160,9 @@ export class Parts {
     const lists = decodeLeafBlock(this.info, d.level, { start: d.end.from, skip, fresh, refCount, refs: refs ?? new Uint32Array(0) }), n = d.count;
     const end = n ? lists.first[n - 1] + lists.fresh[n - 1] : d.end.from;
     if (d.end.to !== undefined && end !== d.end.to)
-      throw formatError(folder(d.level) + 'leaf_skip', 'the new faces do not end where the table says');
+      throw formatError(folder(d.level) + 'leaf_skip', 'the new faces do not end at the end that the table of subtrees has');
     if (n && (lists.first[0] < d.faces.from || end > d.faces.to))
-      throw formatError(folder(d.level) + 'leaf_skip', "a leaf's new faces lie outside of its subtree's");
+      throw formatError(folder(d.level) + 'leaf_skip', "a leaf's new faces are outside the range of its subtree");
     return Object.assign(lists, { begin: d.first, byteLength: 8 * lists.refs.length + 20 * n });
   }
 }

@@ -9,7 +9,7 @@ export function placeNumber(path, level, order) {
 }
 
 const ROOT_NUMBERS = { '/mesh/vertices': 4096, '/mesh/faces': 4097, '/mesh/faces_index': 4098, '/maps/vertex_source': 4099, '/maps/face_source': 4100,
-  '/subtrees/index': 4112, '/subtrees/counts': 4113, '/subtrees/outer': 4114, '/subtrees/places': 4115, '/chunk_sums': 4116 }; // the chunk directory and the checksums do not list themselves
+  '/subtrees/index': 4112, '/subtrees/counts': 4113, '/subtrees/outer': 4114, '/subtrees/places': 4115, '/chunk_sums': 4116 }; // the chunk directory does not list itself, nor do the chunk checksums
 
 const WHERE = PLACES;
 
@@ -18,7 +18,7 @@ function isArray(number) {
   return number < 64 * LEVELS_MAX ? number % 64 < LEVEL_ARRAY_COUNT : number < ROOT_NUMBERS[WHERE] && Object.values(ROOT_NUMBERS).includes(number);
 }
 
-/** Returns true when a list about all chunks is still valid. Other programs that rewrite the file keep the old list. */
+/** Returns true when a list of all chunks is valid. A program that rewrites the file may keep an old list, which is then invalid. */
 export function placesHold(places, size) {
   const { attributes } = places.object, stated = (name) => {
     const a = attributes.get(name);
@@ -28,7 +28,7 @@ export function placesHold(places, size) {
   return stated('file_bytes') === size && places.chunks !== undefined && stated('offset') === places.chunks[0].at;
 }
 
-// The offset of the directory: the header of an array with a single chunk has it.
+// Returns the offset of the first chunk in the directory, from the header of a level-0 array, which has a single chunk.
 function begin(rows, byNumber) {
   let before = 0;
   for (let i = 0; i < rows.length; i += 2) {
@@ -37,10 +37,10 @@ function begin(rows, byNumber) {
       return chunks[0].at - before;
     before += rows[i];
   }
-  throw formatError(WHERE, 'the chunks of level 0 are not in it');
+  throw formatError(WHERE, 'the chunks of level 0 are missing');
 }
 
-/** `rows`: for each chunk, bytes and number; `arrays`: all but places. -> Map(array, [{ at, bytes }]). */
+/** Decodes the chunk directory. `rows`: for each chunk, its size in bytes and the number of its array; `arrays`: all arrays except the lists. Returns Map(array, [{ at, bytes }]). */
 export function readPlaces(rows, arrays, size) {
   const byNumber = new Map(), out = new Map();
   for (const array of arrays) {
@@ -55,20 +55,20 @@ export function readPlaces(rows, arrays, size) {
     if (array) {
       const chunks = out.get(array);
       if (chunks.length === array.chunkCount)
-        throw formatError(WHERE, `${array.path} has more chunks here than it has`);
+        throw formatError(WHERE, `the list has more chunks of ${array.path} than the array`);
       if (bytes === 0 || bytes > array.chunkMost)
-        throw formatError(WHERE, `a chunk of ${array.path} has a size that it cannot have`);
+        throw formatError(WHERE, `a chunk of ${array.path} has an invalid size`);
       chunks.push({ at, bytes });
     }
     if (!array && isArray(rows[i + 1]))
-      throw formatError(WHERE, 'it has a chunk of an array that the file does not have');
+      throw formatError(WHERE, 'the list has a chunk of an array that the file does not have');
     at += bytes;
   }
   for (const [array, chunks] of out) {
     if (chunks.length !== array.chunkCount)
-      throw formatError(WHERE, `${array.path} has fewer chunks here than it has`);
+      throw formatError(WHERE, `the list has fewer chunks of ${array.path} than the array`);
     if (array.chunks && (array.chunks[0].at !== chunks[0].at || array.chunks[0].bytes !== chunks[0].bytes)) // the header of an array with a single chunk has the offset
-      throw formatError(WHERE, `${array.path} lies elsewhere`);
+      throw formatError(WHERE, `the first chunk of ${array.path} is at another offset or has another size`);
   }
   return out;
 }

@@ -1,13 +1,13 @@
-// Exact predicates over doubles: a floating-point filter decides nearly all cases, integers of any size decide the rest. The predicates and the
-// infinitely small shift are those of the library; lib/geometry/triangle_predicates.c explains them.
-// Source of the filters: Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates", 1997; of the shift:
-// Edelsbrunner and Muecke, "Simulation of Simplicity", 1990.
+// Exact predicates over doubles. A floating-point filter decides nearly all cases; integers of any size decide the rest. The predicates and the
+// infinitely small shift are those of the library; see lib/geometry/triangle_predicates.c.
+// Source of the filters: Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates", 1997.
+// Source of the shift: Edelsbrunner and Muecke, "Simulation of Simplicity", 1990.
 
 const view = new DataView(new ArrayBuffer(8));
-const BOUND_2D = 3.4e-16, BOUND_3D = 7.9e-16; // above (3 + 16 u) u and (7 + 56 u) u, u = 2^-53
-const SMALL = 1e-250;                         // below this the filters' products may have lost bits to underflow
+const BOUND_2D = 3.4e-16, BOUND_3D = 7.9e-16; // greater than (3 + 16 u) u and (7 + 56 u) u, where u = 2^-53
+const SMALL = 1e-250;                         // smaller products may have lost bits to underflow
 
-// Converts all numbers to integers times one common power of two.
+// Scales all numbers by a common power of two to integers.
 function integers(numbers) {
   let least = Infinity;
   const parts = numbers.map((x) => {
@@ -66,8 +66,8 @@ function shiftedSide3d(a, b, c, p) {
 }
 
 /**
- * Returns the change of the winding number along the segment from `from` in direction +axis to coordinate `to`, both ends shifted by infinitely small
- * (d0, d1, d2): +1 when it enters through the face a, b, c, -1 when it leaves, 0 when it does not cross it.
+ * Returns the change of the winding number at the face a, b, c along the segment from `from` in direction +axis to coordinate `to`: +1 when the segment enters
+ * through the face, -1 when it leaves, and 0 when it does not cross the face. Both ends are shifted by infinitely small (d0, d1, d2).
  */
 export function axisCrossing(from, to, axis, a, b, c) {
   if (!(from[axis] < to))

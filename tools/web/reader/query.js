@@ -6,8 +6,8 @@ import { EbpoError } from './error.js';
 import { axisCrossing, onTriangle } from './predicates.js';
 
 const MORE = 1 + 1e-12, LESS = 1 - 1e-12; // factors for lengths: the rounding error is about 1e-15
-const TOGETHER = 8, TOGETHER_MOST = 64;   // number of leaves whose faces are requested together: initial and maximum
-const NEAR = 1 / 256;                     // a gray node or leaf has surface within so much of its cell: format-spec, section 5
+const TOGETHER = 8, TOGETHER_MOST = 64;   // initial and greatest number of leaves whose faces are requested together
+const NEAR = 1 / 256;                     // a gray node or leaf has surface within its cell enlarged by this share: format-spec, section 5
 
 /** Returns true when p is certainly outside one of the node's own half-spaces. Computes in doubles with a margin: values are up to 2^22, errors below 1e-8. */
 function beyondPlanes(tree, node, p) {
@@ -29,7 +29,7 @@ function inRoot(tree, p) {
 
 /**
  * Classifies a point by the loaded levels, down to `deepest`: { where: 'in' | 'out' | 'maybe', node, winding }. 'in' and 'out' are certain. `node`
- * is the leaf or gray node at which the descent ended. The faces of a leaf can decide the result (insideLeaf). Solids only.
+ * is the leaf or gray node at which the descent ended. For a leaf, insideLeaf() decides the result. For solids only.
  */
 export function inside(tree, p, deepest = tree.depth) {
   const rule = tree.info.winding_rule;
@@ -107,7 +107,10 @@ export function distanceInterval(tree, p, deepest = tree.depth) {
   return { lo: Math.min(lo, hi), hi };
 }
 
-/** Returns the point of a triangle (nine numbers from `at` on) that is nearest to p: [distance, x, y, z]. Computes in doubles. Source: Ericson, "Real-Time Collision Detection", 5.1.5. */
+/**
+ * Returns the point of a triangle (nine numbers from `at` on) that is nearest to p: [distance, x, y, z]. Computes in doubles.
+ * Source: Ericson, "Real-Time Collision Detection", 5.1.5.
+ */
 export function nearestOnTriangle(p, f, at) {
   const sub = (i, j) => [f[at + i] - f[at + j], f[at + i + 1] - f[at + j + 1], f[at + i + 2] - f[at + j + 2]];
   const dot = (u, v) => u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
@@ -141,11 +144,12 @@ export function nearestOnTriangle(p, f, at) {
 }
 
 /**
- * Finds the nearest face: { distance, point, face, corners, leaves }: its index and nine coordinates. `facesOf(leaves)` gives (a promise of) the faces of each leaf, and `deeper(nodes)` brings the
- * children of these nodes into the tree, all at once. Cells are searched nearest first, so that few leaves are visited.
+ * Finds the nearest face. Returns { distance, point, face (its index), corners (nine coordinates), leaves (number of visited leaves) }. `facesOf(leaves)` returns
+ * the faces of each leaf, or a promise of them. `deeper(nodes)` loads the children of these nodes together. Cells are searched nearest first, so that few
+ * leaves are visited.
  */
 export async function nearestFace(tree, p, facesOf, deeper) {
-  let best = [Infinity], face, bound = Infinity, looked = 0, together = TOGETHER, ahead = 1;
+  let best = [Infinity], face, bound = Infinity, visited = 0, together = TOGETHER, ahead = 1;
   const queue = [];
   const add = (node) => {
     queue.push([cellNear(tree, node, p), node]);
@@ -155,28 +159,28 @@ export async function nearestFace(tree, p, facesOf, deeper) {
   const missing = (node) => node.type === GRAY && !tree.children(node) && !tree.isPruned(node);
   add(tree.root);
   while (queue.length) {
-    queue.sort((a, b) => b[0] - a[0]); // few entries: a heap is not faster
+    queue.sort((a, b) => b[0] - a[0]); // the queue is short, so that a heap would not be faster
     const [near, node] = queue.at(-1), leaves = [];
     if (!wanted(near))
       break;
     while (queue.at(-1)?.[1].type === LEAF && wanted(queue.at(-1)[0]) && leaves.length < together)
       leaves.push(queue.pop()[1]);
     if (!leaves.length) {
-      if (missing(node)) { // with those that are likely to be wanted then; when that was too few, twice as many
+      if (missing(node)) { // also loads nodes that are probably needed next, and doubles their number each time
         const next = queue.filter(([d, n]) => wanted(d) && missing(n)).reverse(), close = near + tree.size(node, 0) / 16;
         await deeper(next.filter(([d], i) => i < ahead || d <= close).map(([, n]) => n));
         ahead *= 2;
       }
       const children = tree.children(node);
       if (!children)
-        throw new EbpoError('ABSENT', 'the file is a subset: the nearest face may be among those that were left out; take a larger part of the original');
+        throw new EbpoError('ABSENT', 'the file is a subset: the nearest face may be among the omitted faces; use a larger subset of the original file');
       queue.splice(queue.findLastIndex((entry) => entry[1] === node), 1);
       for (const child of children)
         if (child.type === GRAY || child.type === LEAF)
           add(child);
       continue;
     }
-    looked += leaves.length;
+    visited += leaves.length;
     together = Math.min(2 * together, TOGETHER_MOST);
     for (const faces of await facesOf(leaves))
       for (let at = 0; at < faces.length; at += 9) {
@@ -187,5 +191,5 @@ export async function nearestFace(tree, p, facesOf, deeper) {
         }
       }
   }
-  return { distance: best[0], point: best.slice(1), face: face?.number, corners: face?.corners, leaves: looked };
+  return { distance: best[0], point: best.slice(1), face: face?.number, corners: face?.corners, leaves: visited };
 }

@@ -1,7 +1,7 @@
-// A range of nodes of one level: types, planes and winding numbers. Ranks are counted from every 16th group.
-const STEP = 16; // 8 * 16 fits a byte
+// A range of nodes of one level: types, planes and winding numbers. Ranks are stored for every 16th group and counted from there.
+const STEP = 16; // counts of at most 8 * 16 nodes fit in a byte
 
-// For each byte of four types: the numbers of white, black, leaf and gray nodes, a byte each.
+// For each byte with four types: the numbers of white, black, leaf and gray nodes, in one byte each.
 const COUNTS = Uint32Array.from({ length: 256 }, (_, types) => [0, 2, 4, 6].reduce((sum, bit) => sum + 2 ** (8 * (types >> bit & 3)), 0));
 
 function begins(counts) {
@@ -25,8 +25,8 @@ const NONE = new Uint32Array(0);
 
 export class Segment {
   /**
-   * Groups from `group` on, with the arrays of format-spec, section 4, from there on. `first`: ranks of the first white, black, leaf, gray node.
-   * Planes and colours are undefined where they were not read.
+   * Creates a segment whose first group is `group`. The arrays are ranges of the arrays in format-spec, section 4. `first`: ranks of the first white, black, leaf
+   * and gray node. Arrays that were not read are undefined.
    */
   constructor({ level, group = 0, first = [0, 0, 0, 0], types, planeCounts, planes, leafPlaneCounts, leafPlanes, leafWinding, blackWinding, whiteWinding, grayColours }) {
     Object.assign(this, { level, group, first, types, planeCounts, planes, leafPlaneCounts, leafPlanes, grayColours });

@@ -1,4 +1,4 @@
-// Sources of bytes. A source has `name`, `size` (bytes; known after `open()`), `requests` and `bytes` (counted traffic), and
+// Sources of bytes. A source has `name`, `size` (in bytes; known after `open()`), `requests` and `bytes` (counted traffic), and
 //   open(bytes)           -> Promise<Uint8Array>  the first `bytes` bytes of the file, or all of it when it is shorter
 //   read(offset, length)  -> Promise<Uint8Array>  exactly `length` bytes, or an EbpoError
 // Ranges are checked by the caller against `size`.
@@ -24,7 +24,7 @@ export class BytesSource {
   }
 }
 
-/** A Blob, so also a File from an <input> or a drop. */
+/** A Blob or a File, such as from an <input> or a drop. */
 export class BlobSource {
   constructor(blob, name = blob.name ?? 'file') {
     this.blob = blob;
@@ -42,7 +42,7 @@ export class BlobSource {
     try {
       data = new Uint8Array(await this.blob.slice(offset, offset + length).arrayBuffer());
     } catch (cause) {
-      throw new EbpoError('NETWORK', `${this.name}: the browser could not read the file (${cause.message}); was it changed or moved? Open it again`, { cause });
+      throw new EbpoError('NETWORK', `${this.name}: the browser could not read the file (${cause.message}); if it was changed or moved, open it again`, { cause });
     }
     if (data.length !== length)
       throw new EbpoError('NETWORK', `${this.name}: the file got shorter while it was read; open it again`);
@@ -60,10 +60,10 @@ const RETRY_STATUS = new Set([429, 500, 502, 503, 504]);
 
 // Responses that a retry cannot fix: their meaning, and what to do next.
 const REFUSED = {
-  401: ['the server wants to know who asks', 'sign in there, or ask for an address that needs no password'],
-  403: ['the server does not let this page have it', 'ask its owner for access, or for a fresh address where it was signed: such run out'],
+  401: ['the server requires a login', 'log in to the server, or use an address that needs no password'],
+  403: ['the server does not let this page read the file', 'ask its owner for access, or for a new address if the address was signed and has expired'],
   404: ['there is no such file', 'check the address'],
-  410: ['there is no such file any more', 'check the address'],
+  410: ['the file was removed from the server', 'check the address'],
 };
 
 /** Receives bytes from .. to - 1 over one or more requests. Received bytes are never requested again. */
@@ -96,15 +96,22 @@ class Transfer {
 }
 
 /**
- * A file on any static web server, by range requests. The server must answer 206 with Content-Range; one that answers 200 is read once as a
- * whole when the file is not larger than `wholeLimit`. The ETag of the first answer (else Last-Modified) is pinned: a file that changes while
- * it is read is an error, if the server sends one of them (and exposes it to pages of other origins). Failed requests are repeated a few times, with pauses that grow and vary.
+ * A file on a static web server, read by range requests. The server must return status 206 with Content-Range. From a server that returns 200, the file is
+ * read once and completely, if it is not larger than `wholeLimit`.
  *
- * The browser's cache may be used: the first request revalidates the cached response, and later responses must have the same ETag.
+ * All responses must have the ETag of the first response, or its Last-Modified when it has no ETag: a file that changes while it is read is an error. This
+ * check needs a server that sends one of these headers, and exposes it to pages of other origins.
  *
- * Options: `wholeLimit` (bytes, 64 MiB), `timeout` (ms without a byte, 30000), `fetch` (another implementation), `headers` (for credentials),
- * `ahead` (bytes that the first request asks for at least: what is read of them comes from that answer, as it arrives), `patient` (an open file whose
- * line is dead waits for `retry()` rather than fail).
+ * Failed requests are repeated a few times, with growing, randomly varied pauses. The browser's cache may be used: the first request revalidates the cached
+ * response.
+ *
+ * Options:
+ *   `wholeLimit`  greatest size of a file that is read completely, 64 MiB by default
+ *   `timeout`     longest time without a byte, 30000 ms by default
+ *   `fetch`       another implementation of fetch()
+ *   `headers`     headers of the requests, for credentials
+ *   `ahead`       least size of the first request; its bytes can be read as they arrive
+ *   `patient`     when the connection is lost, an open file waits for `retry()` instead of failing
  */
 export class UrlSource {
   constructor(url, options = {}) {
@@ -120,12 +127,12 @@ export class UrlSource {
     this.size = undefined;
     this.tag = undefined;     // the first ETag or date of the file
     this.whole = undefined;   // all bytes, from a server without ranges
-    this.first = undefined;   // the first answer, which is read from while it comes
-    this.running = new Map(); // transfers under way, and how to end their request
-    this.trouble = undefined; // why a patient source waits
+    this.first = undefined;   // the transfer of the first response; its bytes can be read as they arrive
+    this.running = new Map(); // running transfers, with the AbortController of their current request
+    this.trouble = undefined; // the error because of which a patient source waits
     this.retried = 0;
     this.closed = false;
-    this.byCache = 0;         // requests under way that go by the browser's cache
+    this.byCache = 0;         // number of running requests that use the browser's cache
   }
 
   async open(bytes) {
@@ -150,29 +157,29 @@ export class UrlSource {
     return have === offset ? rest.data : joined([first.data.subarray(offset, have), rest.data]);
   }
 
-  /** How many of the file's first bytes are there or on their way with the first answer: to read them takes no request. */
+  /** The number of the file's first bytes that the first response has or will have. Reading them needs no further request. */
   get coming() {
     return this.whole ? this.whole.length : this.first ? (this.running.has(this.first) ? Math.min(this.first.to, this.size ?? 0) : this.first.end) : 0;
   }
 
-  /** How many of the file's first bytes have come. */
+  /** The number of the file's first bytes that have arrived. */
   get come() {
     return this.whole ? this.whole.length : this.first?.got ?? 0;
   }
 
-  /** What is waited for: { from, to, got, quiet }, `quiet` the ms since a byte of it came. */
+  /** Returns the unfinished transfers: [{ from, to, got, quiet }]. `quiet`: milliseconds since the last byte. */
   underway() {
     return [...this.running.keys()].filter((t) => t.end < t.to).map((t) => ({ from: t.from, to: t.to, got: t.got, quiet: performance.now() - t.at }));
   }
 
-  /** Asks again at once for everything that is waited for. */
+  /** Repeats all unfinished requests immediately. */
   retry() {
     this.retried++;
     this.again?.();
     this.running.forEach((abort) => abort?.abort());
   }
 
-  /** Ends everything under way; nothing can be read any more. */
+  /** Ends all transfers. The source cannot be read afterwards. */
   close() {
     this.closed = true;
     this.retry();
@@ -219,7 +226,7 @@ export class UrlSource {
     return Promise.race([this.woken, new Promise((done) => setTimeout(done, ms))]);
   }
 
-  // A dead line: nothing is given up, and nothing that has come is lost.
+  // Waits while the connection is lost. Keeps the transfer and its received bytes.
   async #wait(error) {
     this.trouble = error;
     await this.#pause(PATIENCE_MS);
@@ -227,8 +234,8 @@ export class UrlSource {
     return -1;
   }
 
-  // What is gone on with is not for the cache: Chromium would ask for it twice. And it lets requests of one address that go by its cache wait for each
-  // other: one at a time does, so that batches stay side by side.
+  // Returns the cache mode of a request. Continued transfers do not use the cache, because Chromium would request their bytes twice. Only one request at a time
+  // uses the cache, because Chromium runs cached requests of one address one after the other.
   #cacheMode(transfer, first) {
     return first ? 'no-cache' : this.tag === null || transfer.asked || this.byCache ? 'no-store' : 'default';
   }
@@ -250,16 +257,16 @@ export class UrlSource {
     this.byCache += cache === 'no-store' ? 0 : 1;
     this.running.set(transfer, abort);
     try {
-      // Browsers drop Accept-Encoding, and send identity with ranges.
+      // Browsers ignore this Accept-Encoding, and send identity with range requests.
       const response = await this.fetch(this.url, {
         cache, signal: abort.signal, headers: { ...this.headers, 'Range': `bytes=${offset}-${transfer.to - 1}`, 'Accept-Encoding': 'identity' },
       });
       if (RETRY_STATUS.has(response.status))
-        throw transient(`the server answers ${response.status}`, 'try again later');
+        throw transient(`the server returned ${response.status}`, 'try again later');
       this.#refused(response, first);
       if (response.headers.get('content-encoding') && response.headers.get('content-encoding') !== 'identity')
-        throw this.#fail('the server compresses the file on the way, which makes ranges meaningless', 'switch that off for .h5 files');
-      if (cache === 'default' && versionOf(response) !== this.tag) { // perhaps the cache's answer is old, and the server's is not
+        throw this.#fail('the server compresses the file during transfer, so that ranges do not work', 'disable compression for .h5 files on the server');
+      if (cache === 'default' && versionOf(response) !== this.tag) { // the response may be an old one from the cache
         abort.abort();
         return await this.#once(transfer, first, 'no-store');
       }
@@ -278,23 +285,23 @@ export class UrlSource {
       if (cause instanceof EbpoError)
         throw cause;
       if (late)
-        throw transient(`no byte came for ${this.timeout / 1000} s`, 'try again later', cause);
+        throw transient(`no data for ${this.timeout / 1000} s`, 'try again later', cause);
       throw transient(`the request failed (${cause.message})`, 'check the address, the network, and that the server allows this page\'s origin (CORS)', cause);
     } finally {
       clearTimeout(timer);
-      abort.abort(); // ends what is left of a body that nobody wants
+      abort.abort(); // aborts the rest of the body, if any
       this.byCache -= cache === 'no-store' ? 0 : 1;
     }
   }
 
   #refused({ status, statusText, headers }, first) {
     if (/^text\/html\b/i.test(headers.get('content-type') ?? '') && status < 300)
-      throw this.#fail('the server returned text/html, not a model', 'check the address, and whether it wants a login');
+      throw this.#fail('the server returned text/html, not a model', 'check the address, and whether it needs a login');
     if (status === 206 || status === 200)
       return;
-    const said = `the server answers ${status} ${statusText}`.trimEnd();
+    const said = `the server returned ${status} ${statusText}`.trimEnd();
     if (status === 416)
-      throw first ? this.#fail(`${said}: the file is empty`, 'put it there again') : this.#fail(`${said}: the file got shorter on the server since it was opened`, 'open it again');
+      throw first ? this.#fail(`${said}: the file is empty`, 'upload it again') : this.#fail(`${said}: the file on the server is shorter than when it was opened`, 'open it again');
     const [what, next] = REFUSED[status] ?? [undefined, 'check the address'];
     throw this.#fail(what ? `${said}: ${what}` : said, next);
   }
@@ -310,20 +317,20 @@ export class UrlSource {
   #partial(response, offset, length, first) {
     const range = /^bytes (\d+)-(\d+)\/(\d+)$/.exec(response.headers.get('content-range') ?? '');
     if (!range)
-      throw this.#fail('the answer has no Content-Range that this page may see', 'let the server send it, and from another origin add it to Access-Control-Expose-Headers');
+      throw this.#fail('the response has no Content-Range that this page can read', 'configure the server to send Content-Range and, for pages of other origins, to list it in Access-Control-Expose-Headers');
     const [from, to, size] = range.slice(1).map(Number);
     if (!first && size !== this.size)
       throw this.#fail('the file was changed on the server since it was opened', 'open it again');
     if (from !== offset || to !== Math.min(offset + length, size) - 1 || !Number.isSafeInteger(size))
-      throw this.#fail(`the server sent bytes ${from} to ${to} where ${offset} to ${offset + length - 1} were asked for`, 'use a server that serves ranges');
+      throw this.#fail(`the server sent bytes ${from} to ${to} where ${offset} to ${offset + length - 1} were requested`, 'use a server that serves ranges');
     this.size = size;
     return to - from + 1;
   }
 
-  // The answer of a server without ranges.
+  // Takes the response of a server without ranges.
   async #takeWhole(response, first, alive) {
     if (!first)
-      throw this.#fail('the server stopped answering ranges', 'open it again');
+      throw this.#fail('the server stopped serving ranges', 'open it again');
     const stated = response.headers.get('content-length'), want = stated === null ? undefined : Number(stated), parts = [];
     if (want > this.wholeLimit)
       throw this.#noRanges(`${stated} bytes`);
@@ -339,7 +346,7 @@ export class UrlSource {
     return this.#fail(`the server does not serve ranges, and the file has ${size}`, 'use a server that answers 206, or download the file and open it from disk');
   }
 
-  // The body, counted while it comes: never more than was promised.
+  // Reads and counts the body. Throws when it is longer than stated.
   async #drain(response, want, alive, take) {
     const most = want ?? this.wholeLimit;
     let total = 0;
@@ -351,13 +358,13 @@ export class UrlSource {
       total += value.length;
       this.bytes += value.length;
       if (total > most)
-        throw want === undefined ? this.#noRanges(`more than ${most} bytes`) : this.#fail('the server sent more bytes than it said', 'use another server');
+        throw want === undefined ? this.#noRanges(`more than ${most} bytes`) : this.#fail('the server sent more bytes than it stated', 'use another server');
       take(value);
     }
   }
 }
 
-// Servers and proxies add and drop the mark of weak tags.
+// Returns the ETag without the mark of weak tags, which servers and proxies add and remove; or Last-Modified.
 const versionOf = (response) => response.headers.get('etag')?.replace(/^W\//, '') ?? response.headers.get('last-modified');
 
 function joined(parts) {
@@ -368,7 +375,7 @@ function joined(parts) {
   return all;
 }
 
-/** A source for whatever was given: URL or its text, Blob or File, ArrayBuffer or bytes, or a source already. */
+/** Returns a source for a URL or its text, a Blob or File, an ArrayBuffer or bytes; returns a source unchanged. */
 export function sourceOf(what, options) {
   if (typeof what === 'string' || what instanceof URL)
     return new UrlSource(what, options);
@@ -378,5 +385,5 @@ export function sourceOf(what, options) {
     return new BytesSource(what, options?.name);
   if (typeof what?.open === 'function' && typeof what?.read === 'function')
     return what;
-  throw new EbpoError('ARGUMENT', 'this cannot be read; give a URL, a File, an ArrayBuffer or a Uint8Array');
+  throw new EbpoError('ARGUMENT', 'expected a URL, a File, an ArrayBuffer or a Uint8Array; pass one of these');
 }

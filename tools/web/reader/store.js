@@ -1,4 +1,4 @@
-// Reads arrays of an open file by rows: finds their chunks and returns their values.
+// Reads rows of arrays of an open file: finds their chunks and returns their values.
 import { ChunkCache } from './cache.js';
 import { decodeColours } from './colours.js';
 import { decodeFaces, decodeMapChunk, decodeVertices } from './decode.js';
@@ -8,7 +8,7 @@ import { placesHold } from './places.js';
 import { readSums } from './sums.js';
 
 export class Store {
-  /** `arrays`: by path, as file.js describes them; all that is asked for must have its chunks. */
+  /** `arrays`: descriptions by path (file.js). The chunks of requested arrays must be known. */
   constructor(info, arrays, source, head, options) {
     this.info = info;
     this.arrays = arrays;
@@ -16,13 +16,15 @@ export class Store {
     this.cache = new ChunkCache(source, head, { ...options, sums: () => this.sums(), late: () => this.#sumsAreLate(), values: (array, chunk, bytes) => this.#values(array, chunk, bytes) });
   }
 
-  /** How the chunks must end; undefined where the file does not say, or what it says is of before another program rewrote it. Read once. */
+  /**
+   * Resolves to the chunk checksums; to undefined when the file has no list of them, or when another program rewrote the file without its list. The list is read once.
+   */
   sums() {
     const list = this.arrays.get(CHUNK_SUMS);
     if (!list || !placesHold(list, this.cache.source.size))
       return Promise.resolve(undefined);
     this.ends ??= this.#readSums(list);
-    this.ends.catch(() => (this.ends = undefined)); // the next one tries again
+    this.ends.catch(() => (this.ends = undefined)); // the next call tries again
     return this.ends;
   }
 
@@ -34,7 +36,7 @@ export class Store {
     return sums;
   }
 
-  // When the source reports its progress, the first levels are returned as soon as they arrive, even if the list never arrives.
+  // Returns true while the list has not arrived. Chunks are then returned without a comparison, so that the first levels do not wait for the list.
   #sumsAreLate() {
     const [{ at, bytes }] = this.arrays.get(CHUNK_SUMS)?.chunks ?? [{ at: 0, bytes: 0 }], { head, source } = this.cache;
     return !this.summed && source.come !== undefined && at + bytes > Math.max(head.length, source.come);
@@ -50,7 +52,7 @@ export class Store {
     return array.path === '/mesh/vertices' ? decodeVertices(bytes, array, chunk) : typed(array, bytes);
   }
 
-  /** Returns the chunks of rows from .. to - 1 of arrays: wanted is [{ path, from, to }] -> [{ array, chunk }], each once. Nothing of absent arrays. */
+  /** Returns the chunks with rows `from` to `to` - 1 of arrays, each once: [{ array, chunk }]. `wanted`: [{ path, from, to }]. Absent arrays have no chunks. */
   chunksOf(wanted) {
     const out = [], seen = new Set();
     for (const { path, from, to } of wanted) {
@@ -65,7 +67,7 @@ export class Store {
     return out;
   }
 
-  /** Reads rows from .. to - 1 of arrays of one column: [a new typed array]; undefined for absent arrays. */
+  /** Reads rows `from` to `to` - 1 of arrays with one column. Returns a new typed array for each, or undefined for absent arrays. */
   async rows(wanted) {
     const chunks = this.chunksOf(wanted), values = await this.cache.get(chunks), byArray = new Map();
     chunks.forEach(({ array, chunk }, i) => {
@@ -89,7 +91,7 @@ export class Store {
     });
   }
 
-  /** Three numbers of each of some rows, into `out`. */
+  /** Reads rows of three numbers into `out`. */
   async triples(path, rows, out) {
     const array = this.arrays.get(path), shift = array.chunkRows, numbers = new Map();
     for (const row of rows) {
@@ -107,7 +109,7 @@ export class Store {
     }
   }
 
-  /** One column's value of each of some rows; as bytes, if they are colours (colours.js). */
+  /** Reads the values of one column in rows. Values of colours are bytes (colours.js). */
   async column(path, column, rows, Type = Uint8Array) {
     const array = this.arrays.get(path), width = Math.max(array.cols, 1), chunks = new Map(), out = new Type(rows.length);
     for (const row of rows)
@@ -121,7 +123,7 @@ export class Store {
     return out;
   }
 
-  /** Whole arrays as stored before filters, not kept; absent ones are undefined. -> Map(path, bytes) */
+  /** Reads whole arrays, as stored before filters, without caching them. Returns Map(path, bytes); absent arrays are undefined. */
   async raw(paths) {
     const arrays = paths.map((path) => this.arrays.get(path)).filter(Boolean), wanted = arrays.flatMap(everyChunk), out = new Map();
     for (const array of arrays)
@@ -133,7 +135,7 @@ export class Store {
     return out;
   }
 
-  /** Returns a small array of 64-bit numbers, read once; undefined if absent. */
+  /** Resolves to a small array of 64-bit numbers, or undefined if absent. The array is read once. */
   whole(path) {
     if (!this.small.has(path))
       this.small.set(path, this.raw([path]).then((raw) => this.integers(raw, path, Float64Array), (error) => {
@@ -147,7 +149,7 @@ export class Store {
     return await this.whole('/mesh/faces_index') ?? Float64Array.of(0);
   }
 
-  /** An array's integers from raw(), widened to Type (Float64Array holds those of 64 bits). */
+  /** Converts an array's integers from raw() to Type. Integers of 64 bits become a Float64Array. */
   integers(raw, path, Type) {
     const bytes = raw.get(path);
     if (!bytes)

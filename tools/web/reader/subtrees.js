@@ -2,11 +2,11 @@
 import { formatError } from './error.js';
 import { FIXED_ROWS, subtreeCols } from './facts.js';
 
-const FACES = 1, VERTICES = 3, OUTER = 4, BELOW = 6, LEVEL_COLS = 7; // columns; 0 and 2 are what lies before the subtree
+const FACES = 1, VERTICES = 3, OUTER = 4, BELOW = 6, LEVEL_COLS = 7; // columns; columns 0 and 2 count new faces and vertices before the subtree
 const GRAY = 0, LEAF = 1, BLACK = 2, PLANES = 3, LEAF_PLANES = 4, REFS = 5, END = 6;
 const INDEX = '/subtrees/index', COUNTS = '/subtrees/counts';
 
-/** The most that each column can come to, by the head; `exact`: it does at the end. */
+/** Returns [greatest sum, exact] of each column, by the counts in the header; exact: the total must equal this sum. */
 function limits(info, outer) {
   const C = info.subtree_level, faces = (levels) => levels.reduce((sum, l) => sum + l.faces_new, 0);
   const mesh = info.parts.has('mesh'), vertices = mesh ? info.vertex_count : 0;
@@ -24,7 +24,7 @@ export class Subtrees {
     this.counts = store.arrays.get(COUNTS);
     this.outer = store.arrays.get('/subtrees/outer');
     this.limits = limits(store.info, this.outer?.rows ?? 0);
-    this.checked = new Set(); // chunks of counts that add up
+    this.checked = new Set(); // chunks of counts whose sums were checked
   }
 
   #index() {
@@ -38,17 +38,17 @@ export class Subtrees {
   #checkIndex(index) {
     for (let i = 0; i < index.length; i++) {
       if (i < this.cols && index[i] !== 0)
-        throw formatError(INDEX, 'its first row is not 0');
+        throw formatError(INDEX, 'the first row of the index is not 0');
       if (index[i] > this.limits[i % this.cols][0])
-        throw formatError(INDEX, "a sum is more than the head's counts allow");
+        throw formatError(INDEX, "a sum is greater than the header's counts allow");
     }
     return index;
   }
 
-  // A chunk of counts leads from its row of the index to the next, the last one to the head's counts.
+  // Checks a chunk of counts: its row of the index plus its counts must be the next row of the index, or for the last chunk the counts in the header.
   #checkChunk(chunk, counts, index) {
     const { cols } = this, last = chunk + 1 === this.counts.chunkCount, n = Math.min(this.counts.chunkRows, this.counts.rows - chunk * this.counts.chunkRows);
-    const fail = () => formatError(COUNTS, last ? "the counts do not add up to the head's" : 'the counts do not add up to the next row of the index');
+    const fail = () => formatError(COUNTS, last ? "the counts do not add up to the header's" : 'the counts do not add up to the next row of the index');
     const sum = index.slice(chunk * cols, (chunk + 1) * cols);
     for (let i = 0; i < n * cols; i++)
       sum[i % cols] += counts[i];
@@ -62,11 +62,11 @@ export class Subtrees {
     this.checked.add(chunk);
   }
 
-  /** Rows of the table: a Map from the subtrees' numbers to SubtreeRow. */
+  /** Reads rows of the table. Resolves to a Map from the subtrees' numbers to SubtreeRow. */
   async rows(numbers) {
     const { cols, counts } = this, wanted = [...new Set(numbers.map((i) => Math.floor(i / counts.chunkRows)))];
     const asked = this.store.cache.get(wanted.map((chunk) => ({ array: counts, chunk }))), mesh = this.info.parts.has('mesh');
-    const [index, values] = await Promise.all([this.#index(), asked, mesh && this.store.facesIndex()]); // the last lies beside the index; faces would wait for it
+    const [index, values] = await Promise.all([this.#index(), asked, mesh && this.store.facesIndex()]); // facesIndex() is stored beside the index and will be needed for faces
     const chunks = new Map(wanted.map((chunk, i) => [chunk, values[i]])), out = new Map();
     for (const [chunk, rows] of chunks)
       if (!this.checked.has(chunk))
@@ -87,12 +87,12 @@ export class Subtrees {
     return out;
   }
 
-  /** Chunks of faces and vertices of some subtrees, as far as the table knows them: [{ array, chunk }]. */
+  /** Returns the chunks of faces and vertices of subtrees that the table names: [{ array, chunk }]. */
   async blocks(rows) {
     const ranges = rows.map((r) => ({ path: '/subtrees/outer', from: r.outer, to: r.outer + r.outerFaces + r.outerVertices })), { store } = this;
     const outer = await store.rows(ranges), out = new Map();
     const add = (path, first, count, distances) => {
-      const array = store.arrays.get(path), rows = FIXED_ROWS[path], block = Math.floor(first / rows); // the array may be shorter than a block
+      const array = store.arrays.get(path), rows = FIXED_ROWS[path], block = Math.floor(first / rows); // `block` may be beyond the end of a short array
       const put = (chunk) => chunk >= 0 && chunk < array.chunkCount && out.set(array.number * 2 ** 32 + chunk, { array, chunk });
       for (let chunk = block; count && chunk * rows < first + count; chunk++)
         put(chunk);
@@ -133,14 +133,14 @@ class SubtreeRow {
     return level === C ? [this.subtree, 1] : [this.before[at], this.counts[at]];
   }
 
-  /** Of a level below subtree_level; `first` and `count` by type: white, black, leaf, gray. */
+  /** Returns the row's data of a level below subtree_level. `first` and `count` are by type: white, black, leaf, gray. */
   level(level) {
     const at = BELOW + LEVEL_COLS * (level - this.info.subtree_level - 1), [group, groups] = this.#gray(level - 1);
     const by = (of, n) => [n * 8 - of[at + BLACK] - of[at + LEAF] - of[at + GRAY], of[at + BLACK], of[at + LEAF], of[at + GRAY]];
     const span = (column) => ({ from: this.before[at + column], to: this.before[at + column] + this.counts[at + column] });
     const first = by(this.before, group), count = by(this.counts, groups);
     if (first[0] < 0 || count[0] < 0)
-      throw formatError(COUNTS, 'a level of a subtree has more nodes than its gray nodes above have children');
+      throw formatError(COUNTS, 'a level of a subtree has more nodes than the gray nodes above have children');
     return { level, group, groups, first, count, planes: span(PLANES), leafPlanes: span(LEAF_PLANES), refs: span(REFS), end: span(END) };
   }
 }

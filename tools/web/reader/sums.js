@@ -3,20 +3,20 @@ import { formatError } from './error.js';
 
 const WHERE = '/chunk_sums';
 
-/** `rows`: for each chunk, its sum and its array's number; `arrays`: those of the file. -> Map(array, Uint32Array of sums). */
+/** Decodes the chunk checksums. `rows`: for each chunk, its checksum and its array's number; `arrays`: the file's arrays. Returns Map(array, Uint32Array of checksums). */
 export function readSums(rows, arrays) {
   const numbers = new Map(), out = new Map();
   for (let begin = 0, end; begin < rows.length; begin = end) {
     const number = rows[begin + 1];
     for (end = begin; end < rows.length && rows[end + 1] === number; end += 2);
     if (end < rows.length && rows[end + 1] < number)
-      throw formatError(WHERE, "the list is not in the order of arrays' numbers");
+      throw formatError(WHERE, "the list is not ordered by the numbers of arrays");
     numbers.set(number, rows.subarray(begin, end).filter((_, i) => i % 2 === 0));
   }
   for (const array of arrays) {
     const sums = numbers.get(array.number) ?? new Uint32Array(0);
     if (sums.length !== array.chunkCount)
-      throw formatError(WHERE, `it has more or fewer chunks of ${array.path} than that has`);
+      throw formatError(WHERE, `the list has more or fewer chunks of ${array.path} than the array`);
     out.set(array, sums);
   }
   return out;

@@ -4,9 +4,9 @@ import { cube, envelope } from './envelope.js';
 import { INDEX_ROWS } from './facts.js';
 import { Segment } from './segment.js';
 
-const PARTS_BYTES = 48 * 1024 * 1024; // of segments that are kept besides those of nodes in use
+const PARTS_BYTES = 48 * 1024 * 1024; // limit of cached segments, in addition to those of existing nodes
 
-/** One node. `at`: its cell's place in its level; `rank`: among the nodes of its type in its level; `octant`: among its siblings. */
+/** A node. `at`: its cell's position in the grid of its level; `rank`: number among the nodes of its type in its level; `octant`: index among its siblings. */
 export class Node {
   constructor(parent, octant, type, rank, segment, subtree) {
     this.parent = parent;
@@ -15,8 +15,8 @@ export class Node {
     this.at = parent ? [2 * parent.at[0] + (octant & 1), 2 * parent.at[1] + (octant >> 1 & 1), 2 * parent.at[2] + (octant >> 2)] : [0, 0, 0];
     this.type = type;
     this.rank = rank;
-    this.segment = segment; // where it is described
-    this.subtree = subtree; // which it is below the root of, in files that have subtrees
+    this.segment = segment; // the segment with the node's data
+    this.subtree = subtree; // number of the subtree that contains the node, in files with subtrees
     this.children = undefined;
     this.polytope = undefined;
   }
@@ -25,10 +25,10 @@ export class Node {
 export class Tree {
   constructor(info) {
     this.info = info;
-    this.levels = []; // whole ones, as segments
-    this.parts = new Map(); // other segments by level and part, oldest first
+    this.levels = []; // completely loaded levels, as segments
+    this.parts = new Map(); // segments of parts, by level and part, oldest first
     this.partBytes = 0;
-    this.partDepth = -1; // deepest level of which a part was ever at hand
+    this.partDepth = -1; // deepest level with a part that was loaded at some time
     this.root = undefined;
   }
 
@@ -37,14 +37,14 @@ export class Tree {
     return Math.max(this.levels.length - 1, this.partDepth);
   }
 
-  /** A whole level, as file.levels() gives it. */
+  /** Adds a whole level from file.levels(). */
   add(level) {
     this.levels[level.level] = level instanceof Segment ? level : new Segment(level);
     if (level.level === 0)
       this.root = new Node(undefined, 0, level.types[0] & 3, 0, this.levels[0]);
   }
 
-  /** A part of a level (parts.js). */
+  /** Adds a part of a level (parts.js). */
   addPart(part, segment) {
     const key = segment.level * 2 ** 40 + part;
     if (this.parts.has(key))
@@ -64,7 +64,7 @@ export class Tree {
     return this.parts.has(level * 2 ** 40 + part);
   }
 
-  /** A tree that shares the whole levels, also those that come later: for questions, which read no planes of parts. */
+  /** Returns a tree for queries, which read parts without planes. It shares the whole levels, also those that are added later. */
   lean() {
     const tree = new Tree(this.info);
     tree.levels = this.levels;
@@ -84,13 +84,13 @@ export class Tree {
       return whole;
     const key = (node.level + 1) * 2 ** 40 + this.partOf(node), part = this.parts.get(key);
     if (part) {
-      this.parts.delete(key); // to the young end
+      this.parts.delete(key); // moves the part to the newest end
       this.parts.set(key, part);
     }
     return part;
   }
 
-  /** Whether a gray node has no children in the file, as in a subset; undefined while that is not known, its part of the next level not being at hand. */
+  /** Returns true when a gray node is pruned; undefined while the part of the next level for its children is not loaded. */
   isPruned(node) {
     if (node.type !== GRAY || !this.info.parts.has('pruned'))
       return false;
@@ -117,12 +117,12 @@ export class Tree {
     return node.children;
   }
 
-  /** The node's own plane codes. */
+  /** Returns the node's plane codes, without those of its ancestors. */
   planes(node) {
     return node.type === GRAY ? node.segment.grayPlanes(node.rank) : node.type === LEAF ? node.segment.leafPlanesOf(node.rank) : [];
   }
 
-  /** Red + 256 green + 65,536 blue: a gray node's, else its parent's; undefined where none is. */
+  /** Returns the colour of a gray node, or of another node's parent, as red + 256 green + 65,536 blue; undefined without a colour. */
   colour(node) {
     const gray = node.type === GRAY ? node : node.parent;
     return gray?.segment.colour(gray.rank);
@@ -133,15 +133,15 @@ export class Tree {
   }
 
   /**
-   * The envelope, in cell coordinates: the cell cut by the node's planes and by those of all its ancestors. So a leaf without stored planes has
-   * its parent's envelope in its own cell. Kept with the node.
+   * Returns the envelope in cell coordinates: the cell cut by the planes of the node and of all its ancestors. A leaf without stored planes has its parent's
+   * envelope, cut by its cell. The node stores the result.
    */
   polytope(node) {
     node.polytope ??= node.type === BLACK ? cube() : envelope(node.parent && this.polytope(node.parent), node.octant, this.planes(node));
     return node.polytope;
   }
 
-  /** Returns the exact coordinate of a face of the node's cell: side 0 or 1. */
+  /** Returns the exact coordinate of a cell face on an axis; `side`: 0 for the lower face, 1 for the upper face. */
   wall(node, axis, side) {
     const { box_origin: origin, box_size: size } = this.info;
     return origin[axis] + (node.at[axis] + side) * (size[axis] / 2 ** node.level);

@@ -89,9 +89,9 @@ test('levels that have come are given before the list of sums; a wrong one among
     if (data === summed)
       assert.equal((await file.levels(3, 3)).length, 1);
     else
-      await assert.rejects(file.levels(3, 3), /levels\/02\/types: chunk 0: the chunk is damaged: it is not the one/);
+      await assert.rejects(file.levels(3, 3), /levels\/02\/types: chunk 0: the chunk is damaged: it is not the chunk/);
   }
-  await assert.rejects((await openEbpo(wrong)).levels(2, 2), /it is not the one/); // all is there: nothing is given
+  await assert.rejects((await openEbpo(wrong)).levels(2, 2), /it is not the chunk/); // all is there: nothing is given
 });
 
 // The list of a file with arrays of several chunks, as pairs of bytes and number.
@@ -109,10 +109,10 @@ test('places: a chunk too many, too few, too large, beyond the end, elsewhere', 
   wrong((rows) => (rows[3] = rows[1]), /\/subtrees\/places: .*more chunks/);
   wrong((rows, last) => (rows[last + 1] = 70000), /\/subtrees\/places: .*fewer chunks/);
   wrong((rows, last) => (rows[last] = 2 ** 32 - 1), /\/subtrees\/places: a chunk reaches beyond the end/);
-  wrong((rows) => (rows[6] += 1), /\/subtrees\/places: .*lies elsewhere/);
-  wrong((rows) => (rows[6] = 0), /\/subtrees\/places: .*size that it cannot have/);
-  wrong((rows) => (rows[6] = 100000), /\/subtrees\/places: .*(size that it cannot have|beyond the end)/);
-  wrong((rows) => rows.fill(70000), /\/subtrees\/places: the chunks of level 0 are not in it/);
+  wrong((rows) => (rows[6] += 1), /\/subtrees\/places: .*at another offset/);
+  wrong((rows) => (rows[6] = 0), /\/subtrees\/places: .*invalid size/);
+  wrong((rows) => (rows[6] = 100000), /\/subtrees\/places: .*(invalid size|beyond the end)/);
+  wrong((rows) => rows.fill(70000), /\/subtrees\/places: the chunks of level 0 are missing/);
   await many.locate();
   for (const [array, chunks] of placed(() => {}))
     assert.deepEqual(chunks, array.chunks.map(({ at, bytes }) => ({ at, bytes })), array.path);
@@ -163,7 +163,7 @@ test('counts of which one subtree has what another should', async () => {
     }
 });
 
-test('an index that does not begin with 0', () => refused(changed('/subtrees/index', (data) => data.writeUInt32LE(1, 8)), /\/subtrees\/index: its first row is not 0/));
+test('an index that does not begin with 0', () => refused(changed('/subtrees/index', (data) => data.writeUInt32LE(1, 8)), /\/subtrees\/index: the first row of the index is not 0/));
 
 test('500 changes of the tables at random: an error, or the same', async () => {
   const right = await readBySubtree(original);

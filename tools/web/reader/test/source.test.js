@@ -78,9 +78,9 @@ test('a large file without ranges or length is not read to the end', () => fails
   whole(answer);
   delete answer.headers['Content-Length'];
 }, 'NETWORK', /does not serve ranges/, { wholeLimit: 1000 }));
-test('ranges that stop', () => fails((answer, n) => (n > 1 ? whole(answer) : undefined), 'NETWORK', /stopped answering ranges/));
+test('ranges that stop', () => fails((answer, n) => (n > 1 ? whole(answer) : undefined), 'NETWORK', /stopped serving ranges/));
 
-test('another range than was asked for', () => fails((answer) => (answer.headers['Content-Range'] = `bytes 1-${part}/${bytes.length}`), 'NETWORK', /where 0 to \d+ were asked for/));
+test('another range than was asked for', () => fails((answer) => (answer.headers['Content-Range'] = `bytes 1-${part}/${bytes.length}`), 'NETWORK', /where 0 to \d+ were requested/));
 test('no Content-Range', () => fails((answer) => delete answer.headers['Content-Range'], 'NETWORK', /no Content-Range/));
 test('a file that changes under way', () => fails((answer, n) => (n > 1 ? (answer.headers.ETag = '"2"') : undefined), 'NETWORK', /was changed on the server/));
 test('a file that grows under way', () => fails((answer, n) => {
@@ -94,7 +94,7 @@ test('short bodies', () => fails((answer) => {
 test('bodies that are too long', () => fails((answer) => {
   answer.body = Buffer.concat([answer.body, answer.body]);
   delete answer.headers['Content-Length'];
-}, 'NETWORK', /more bytes than it said/));
+}, 'NETWORK', /more bytes than it stated/));
 test('compression on the way', () => fails((answer) => (answer.headers['Content-Encoding'] = 'gzip'), 'NETWORK', /compresses the file|request failed/));
 test('not there', () => fails((answer) => (answer.status = 404), 'NETWORK', /404/));
 test('a page in place of the file', () => fails((answer) => {
@@ -117,12 +117,12 @@ test('connections that break now and then', () => serve((answer, n, response) =>
     response.destroy();
   return n % 2 === 0;
 }, (url) => readAll(url)));
-test('a server that stalls', () => fails(() => false, 'NETWORK', /no byte came/, { timeout: 100 }));
+test('a server that stalls', () => fails(() => false, 'NETWORK', /no data for/, { timeout: 100 }));
 test('a server that stalls in the middle of a body', () => fails((answer, n, response) => {
   response.writeHead(206, answer.headers);
   response.write(answer.body.subarray(0, 100));
   return false;
-}, 'NETWORK', /no byte came/, { timeout: 100 }));
+}, 'NETWORK', /no data for/, { timeout: 100 }));
 test('bytes that were changed on the way are noticed', () => fails((answer, n) => {
   if (n === 1)
     answer.body = Buffer.from(answer.body).fill(0, 3000, 3010);
@@ -133,10 +133,10 @@ test('nobody there', async () => {
 });
 
 test('what a status means is said', async () => {
-  for (const [status, said] of [[401, /401.*who asks/], [403, /403.*does not let this page.*access/], [404, /404.*no such file.*address/], [410, /410.*any more/],
+  for (const [status, said] of [[401, /401.*requires a login/], [403, /403.*does not let this page.*access/], [404, /404.*no such file.*address/], [410, /410.*removed/],
     [416, /416.*is empty/], [418, /418/]])
     await fails((answer) => (answer.status = status), 'NETWORK', said);
-  await fails((answer, n) => (n > 1 ? (answer.status = 416) : undefined), 'NETWORK', /416.*got shorter.*open it again/);
+  await fails((answer, n) => (n > 1 ? (answer.status = 416) : undefined), 'NETWORK', /416.*is shorter.*open it again/);
 });
 
 let finish;
