@@ -42,7 +42,8 @@ typedef struct ebpo_build_node {
 } ebpo_build_node;
 
 typedef struct ebpo_build_detail {
-    int32_t delta[8]; /* winding numbers of the corners minus that of corner 0 */
+    /* corner differences: winding numbers of the corners minus that of corner 0 */
+    int32_t delta[8];
     /* range in `entries`: list of the leaf, or lists of all leaves below the gray node */
     uint64_t entry_begin, entry_end;
     /* gray: faces that are not entirely inside the cell, in `crossing` */
@@ -50,7 +51,7 @@ typedef struct ebpo_build_detail {
     uint32_t first, new_count; /* leaf: final number of its first new face */
 } ebpo_build_detail;
 
-/* A subtree: its nodes, depth first. nodes[0] is its root. */
+/* A piece, or the top of the tree. Its nodes are stored depth first; nodes[0] is the root. */
 typedef struct ebpo_branch {
     ebpo_cell cell;
     /* faces that touch the cell, ascending; NULL for the top, whose entries are face numbers */

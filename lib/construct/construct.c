@@ -187,7 +187,7 @@ static ebpo_status builder_begin(ebpo_builder *b, ebpo_mesh *mesh, const ebpo_me
     if (!b->solid && options->require_solid)
         return ebpo_fail(
             error, EBPO_E_NOT_SOLID,
-            "%s does not balance (%llu edges are not used as often one way as the other), so it "
+            "%s does not balance (%llu edges are not used equally often in both directions), so it "
             "does not bound a solid; run 'ebpo check' to see the repairs that make one, or omit "
             "--require-solid for a surface model",
             mesh->source_name[0] ? mesh->source_name : "the mesh",

@@ -63,8 +63,8 @@ EBPO_MUST_USE ebpo_status ebpo_build_gray_colours(const ebpo_builder *b, ebpo_tr
 
 /* Computes the winding numbers of all pieces, before the pieces are partitioned. */
 ebpo_status ebpo_build_corner_windings(ebpo_builder *b, ebpo_error *error);
-/* Computes the winding number at corner 0 of each child minus that of the parent, from the
- * children's corner differences. */
+/* For each child, computes the winding number at the child's corner 0 minus the winding number at
+ * the parent's corner 0, from the children's corner differences. */
 void ebpo_child_windings(const ebpo_builder *b, const ebpo_branch *s, uint32_t child,
                          int32_t offset[8]);
 /* Computes the corner differences of a cell from the piece's faces that touch the cell. The faces

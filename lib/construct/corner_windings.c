@@ -1,13 +1,14 @@
 /* Computes winding numbers at the corners of cells. These numbers decide which corners, and which
  * cells without faces, are inside.
  *
- * In one cell, a corner's number follows from another's by the signed crossings of faces along the
- * cell's edges; all corners are shifted by the same infinitely small amount, so a face through a
- * corner is no special case (ebpo_axis_crossing). For the tree, each node keeps its corners'
- * differences from its corner 0. The differences of a gray node are computed from those of its
- * children, added along the children's edges. The root's lowest corner is outside the model: its
- * winding number is 0. This replaces the special cases of BP 2008, 3.4.1.1. Where two paths to a
- * corner disagree, the mesh does not balance, and the model is a surface. */
+ * In one cell, a corner's number follows from another corner's number by the signed crossings of
+ * faces along the cell's edges. All corners are shifted by the same infinitely small amount, so a
+ * face through a corner is no special case (ebpo_axis_crossing). Each node of the tree keeps the
+ * differences of its corners' numbers from the number of its corner 0. The differences of a gray
+ * node are computed from those of its children, added along the children's edges. The root's lowest
+ * corner is outside the model: its winding number is 0. This replaces the special cases of BP 2008,
+ * 3.4.1.1. Where two paths to a corner disagree, the mesh does not balance, and the model is a
+ * surface. */
 #include "core/strict_fp.h"
 
 #include <string.h>
@@ -48,9 +49,9 @@ static bool child_offsets(const int32_t *child_delta[8], int32_t offset[8])
             if (!(i >> axis & 1))
                 continue;
             int before = i & ~(1 << axis);
-            int32_t way = offset[before] + child_delta[before][1 << axis];
-            agree = agree && (!known || way == offset[i]);
-            offset[i] = way;
+            int32_t winding = offset[before] + child_delta[before][1 << axis];
+            agree = agree && (!known || winding == offset[i]);
+            offset[i] = winding;
             known = true;
         }
     }
@@ -129,9 +130,9 @@ unsigned ebpo_inside_corners(const ebpo_builder *b, int32_t winding, const int32
 /* --- the corners of one cell --- */
 
 /* Returns a mask of the cell faces that a face may touch: bit 2 k for the lower and bit 2 k + 1 for
- * the upper cell face along axis k. A face strictly on one side of a cell face crosses none of its
- * edges, nor does a face strictly on one side of the cell; the infinitely small shift changes
- * nothing. */
+ * the upper cell face along axis k. A face strictly on one side of a cell face crosses none of that
+ * cell face's edges. A face strictly on one side of the cell crosses no edge at all. The infinitely
+ * small shift of the corners does not change this. */
 static unsigned cell_faces_reached(const double cell_face[3][2], const ebpo_triangle *f)
 {
     unsigned reached = 0;

@@ -146,7 +146,7 @@ struct ebpo_envelope_scratch {
     ebpo_supports supports;
     ebpo_candidate candidates[EBPO_PLANES_CANDIDATES];
     int count;
-    /* normals of candidates and of dropped ones */
+    /* normals of candidates and of dropped directions */
     uint32_t tried[2 * EBPO_PLANES_CANDIDATES];
     int tried_count;
     uint32_t normals[TABLE];          /* 1 + normal, by hash */
@@ -169,10 +169,11 @@ void ebpo_scratch_free(ebpo_envelope_scratch *scratch)
     free(scratch);
 }
 
-/* Returns the support from which on a plane can remove neither epsilon nor a needle: a cap of
- * height h of a body of width H and volume V has at most V (1 - (1 - h/H)^3) <= 3 V h / H. */
-static double hopeless_below(const ebpo_polytope *envelope, double volume, const int32_t n[3],
-                             double epsilon)
+/* Returns the largest useful support of a plane: with this support or more, the plane can remove
+ * neither epsilon nor a needle. The reason: a cap of height h of a body of width H and volume V has
+ * at most V (1 - (1 - h/H)^3) <= 3 V h / H. */
+static double largest_useful_support(const ebpo_polytope *envelope, double volume,
+                                     const int32_t n[3], double epsilon)
 {
     double most = -1e300, least = 1e300;
     for (int i = 0; i < envelope->vertex_count; i++) {
@@ -192,7 +193,7 @@ static void try_normal(ebpo_envelope_scratch *s, uint32_t normal, const ebpo_pol
 {
     int32_t n[3], d;
     ebpo_plane_code_decode(normal, n, &d);
-    double enough = hopeless_below(envelope, volume, n, epsilon);
+    double enough = largest_useful_support(envelope, volume, n, epsilon);
     double support = ebpo_supports_find_from(&s->supports, n, enough, (const double(*)[3])s->core,
                                              s->core_count, where);
     if (support < enough && s->count < EBPO_PLANES_CANDIDATES)
@@ -225,10 +226,10 @@ static void add_core(ebpo_envelope_scratch *s, const double where[3])
 static void try_all_around(ebpo_envelope_scratch *s)
 {
     for (int i = 0; i < 27; i++) {
-        double way[3] = { i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1 }, where[3];
+        double direction[3] = { i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1 }, where[3];
         uint32_t normal;
         int32_t n[3], d;
-        if (!ebpo_plane_code_normal(way, &normal) || !ebpo_plane_code_decode(normal, n, &d))
+        if (!ebpo_plane_code_normal(direction, &normal) || !ebpo_plane_code_decode(normal, n, &d))
             continue;
         if (ebpo_supports_find_from(&s->supports, n, 1e300, (const double(*)[3])s->core,
                                     s->core_count, where) > -1e300)

@@ -1,12 +1,13 @@
 /* Computes a small convex hull. Only the directions of its facets are used, so that a rounding
  * error may enlarge an envelope but never breaks containment.
  *
- * The hull grows point by point: each point beyond the hull replaces the facets that it sees (a
- * beneath-beyond algorithm in doubles). Points that are extreme along the axes and diagonals come
- * first, so that most other points are inside the hull when they are tested. Facets are kept as
- * planes by coordinate, for the kernel that tests a point against all of them (sweep.h). Limits:
- * EBPO_HULL_POINTS points, EBPO_HULL_FACETS facets; further points and facets are omitted. Ties are
- * ordered by indices of points, so that all machines return the same facets in the same order. */
+ * The hull grows point by point: each point beyond the hull replaces the facets that the point is
+ * above (a beneath-beyond algorithm in doubles). Points that are extreme along the axes and
+ * diagonals come first, so that most other points are inside the hull when they are tested. Facets
+ * are kept as planes by coordinate, for the kernel that tests a point against all of them
+ * (sweep.h). Limits: EBPO_HULL_POINTS points, EBPO_HULL_FACETS facets; further points and facets
+ * are omitted. Ties are ordered by indices of points, so that all machines return the same facets
+ * in the same order. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -21,13 +22,13 @@ static const double flat = 1e-9; /* a point nearer to a plane than this counts a
 
 _Static_assert((int)EBPO_HULL_FACETS <= (int)EBPO_SWEEP_PLANES, "sweeps have space for the facets");
 
-enum { SPACE = EBPO_HULL_FACETS, WAYS = 14, VISIBLE = 192 };
+enum { SPACE = EBPO_HULL_FACETS, EXTREMES = 14, VISIBLE = 192 };
 
 /* Planes by coordinate: each point is tested against all of them. */
 typedef struct hull {
     const ebpo_sweep *sweep;
     const double (*p)[3];
-    /* padding to a multiple of four: planes that no point sees */
+    /* padding to a multiple of four: planes that no point is above */
     double nx[SPACE + 4], ny[SPACE + 4], nz[SPACE + 4], d[SPACE + 4];
     double length[SPACE], beyond;
     uint16_t corner[SPACE][3];
@@ -86,16 +87,16 @@ static void set_count(hull *h, int count)
 
 /* --- the first four facets --- */
 
-/* Finds the most extreme points along the axes and the diagonals, both ways. */
-static void find_extremes(const double (*p)[3], int count, int at[WAYS])
+/* Finds the most extreme points along the axes and the diagonals, in both directions. */
+static void find_extremes(const double (*p)[3], int count, int at[EXTREMES])
 {
-    double best[WAYS];
-    for (int w = 0; w < WAYS; w++)
+    double best[EXTREMES];
+    for (int w = 0; w < EXTREMES; w++)
         best[w] = -INFINITY, at[w] = 0;
     for (int i = 0; i < count; i++) {
         double x = p[i][0], y = p[i][1], z = p[i][2],
-               v[WAYS / 2] = { x, y, z, x + y + z, x + y - z, x - y + z, x - y - z };
-        for (int w = 0; w < WAYS / 2; w++) {
+               v[EXTREMES / 2] = { x, y, z, x + y + z, x + y - z, x - y + z, x - y - z };
+        for (int w = 0; w < EXTREMES / 2; w++) {
             if (v[w] > best[2 * w])
                 best[2 * w] = v[w], at[2 * w] = i;
             if (-v[w] > best[2 * w + 1])
@@ -113,19 +114,19 @@ static double distance_squared(const double a[3], const double b[3])
 
 static double height_above(const double n[3], const double from[3], const double p[3])
 {
-    double way[3];
-    ebpo_vec3_subtract(p, from, way);
-    return ebpo_vec3_dot(n, way);
+    double difference[3];
+    ebpo_vec3_subtract(p, from, difference);
+    return ebpo_vec3_dot(n, difference);
 }
 
 /* Finds four points far from each other; returns false when no four span a volume. */
-static bool first_four(const double (*p)[3], int count, const int ways[WAYS], int corner[4])
+static bool first_four(const double (*p)[3], int count, const int extremes[EXTREMES], int corner[4])
 {
     double best = -1, n[3];
     for (int w = 0; w < 6; w += 2)
-        if (distance_squared(p[ways[w]], p[ways[w + 1]]) > best)
-            best = distance_squared(p[ways[w]], p[ways[w + 1]]), corner[0] = ways[w + 1],
-            corner[1] = ways[w];
+        if (distance_squared(p[extremes[w]], p[extremes[w + 1]]) > best)
+            best = distance_squared(p[extremes[w]], p[extremes[w + 1]]),
+            corner[0] = extremes[w + 1], corner[1] = extremes[w];
     best = 0;
     corner[2] = corner[3] = 0;
     for (int i = 0; i < count; i++) {
@@ -231,10 +232,10 @@ static bool add_point(hull *h, int point)
     return true;
 }
 
-static void grow_hull(hull *h, int count, const int ways[WAYS])
+static void grow_hull(hull *h, int count, const int extremes[EXTREMES])
 {
-    for (int w = 0; w < WAYS; w++)
-        if (!add_point(h, ways[w]))
+    for (int w = 0; w < EXTREMES; w++)
+        if (!add_point(h, extremes[w]))
             return;
     for (int i = 0; i < count; i++)
         if (!add_point(h, i))
@@ -245,7 +246,7 @@ int ebpo_hull_facets(const double (*points)[3], int count, double tolerance,
                      ebpo_hull_facet *facets, int capacity)
 {
     hull h;
-    int corner[4] = { 0 }, ways[WAYS];
+    int corner[4] = { 0 }, extremes[EXTREMES];
     h.sweep = ebpo_sweep_best();
     h.p = points;
     h.count = 0;
@@ -253,10 +254,10 @@ int ebpo_hull_facets(const double (*points)[3], int count, double tolerance,
     h.beyond = tolerance;
     if (count < 4 || capacity < 4 || count > EBPO_HULL_POINTS)
         return 0;
-    find_extremes(points, count, ways);
-    if (!first_four(points, count, ways, corner) || !first_facets(&h, corner))
+    find_extremes(points, count, extremes);
+    if (!first_four(points, count, extremes, corner) || !first_facets(&h, corner))
         return 0;
-    grow_hull(&h, count, ways);
+    grow_hull(&h, count, extremes);
     for (int i = 0; i < h.count; i++)
         facets[i] = (ebpo_hull_facet){ .corner = { h.corner[i][0], h.corner[i][1], h.corner[i][2] },
                                        .n = { h.nx[i], h.ny[i], h.nz[i] },

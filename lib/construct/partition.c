@@ -31,8 +31,8 @@ enum { RELEASE_FACES = 1 << 13 };
 static const uint64_t leaves_per_face = 64, leaves_always = 1 << 22, entries_per_face = 512,
                       entries_always = 1 << 26;
 
-/* Set of faces found below a node. A slot is used if its round is the current round, so the set is
- * emptied without clearing it. */
+/* Set of faces found below a node. A slot is used if its round is the current round, so a new round
+ * empties the set without clearing the slots. */
 typedef struct face_set {
     struct {
         uint32_t face, round;
@@ -220,7 +220,8 @@ static ebpo_status collapse_if_few(grower *g, uint32_t index, ebpo_cell cell, ui
     return status;
 }
 
-/* Grows a node. Its list is stack[at] to stack[at + count - 1]; the stack is free from `top` on. */
+/* Makes the subtree of a node. The node's list is stack[at] to stack[at + count - 1]; the stack is
+ * free from `top` on. */
 static ebpo_status grow_node(grower *g, uint32_t index, ebpo_cell cell, uint64_t at, uint64_t count,
                              uint64_t top)
 {
@@ -457,12 +458,12 @@ typedef struct cutting {
     ebpo_builder *b;
     uint64_t piece;   /* a node with at most this many faces becomes a piece */
     uint8_t *listed;  /* bit f: a piece lists face f */
-    uint64_t entries; /* entries of the pieces' lists */
+    uint64_t entries; /* number of entries in the lists of all pieces so far */
     ebpo_error *error;
 } cutting;
 
-/* Takes over `list`. A piece has at least one leaf, and its leaves list all of its faces: so the
- * limits of leaves are checked here, before the piece is made. */
+/* Adds a piece; takes over `list`. A piece has at least one leaf, and its leaves list all of its
+ * faces, so the limits of leaves are checked here, before the piece is made. */
 static ebpo_status add_piece(cutting *c, ebpo_build_node *node, ebpo_cell cell, uint32_t *list,
                              uint64_t count)
 {
@@ -484,7 +485,7 @@ static ebpo_status add_piece(cutting *c, ebpo_build_node *node, ebpo_cell cell, 
     return EBPO_OK;
 }
 
-/* Takes over `list`. */
+/* Grows a node of the top; takes over `list`. */
 static ebpo_status grow_top(cutting *c, uint32_t index, ebpo_cell cell, uint32_t *list,
                             uint64_t count)
 {

@@ -25,10 +25,10 @@ void ebpo_piece_levels_free(ebpo_piece_level *out);
 
 /* --- planes chosen from the leaves up, and the data that nodes pass to their parents --- */
 
-/* A plane that a node's parent may choose: its normal, and n . xi of its face. */
+/* A plane that a node's parent may choose. */
 typedef struct ebpo_offer {
     uint32_t normal;
-    double origin;
+    double origin; /* n . xi at the centroid of the plane's face */
 } ebpo_offer;
 
 /* Data that a node passes to its parent, in the coordinates of the node's cell: its planes and the
@@ -66,14 +66,15 @@ bool ebpo_handover_gather(ebpo_handover *given, const ebpo_handover *child, unsi
 /* Moves a piece's results to the store; they are read once, when the levels are joined. Does
  * nothing without a workspace. */
 ebpo_status ebpo_build_pack(ebpo_builder *b, ebpo_piece_level *out, ebpo_error *error);
-/* Reserves memory in the store, aligned for 8 bytes, until the store is freed; NULL: see
- * ebpo_workspace_fail. Needs a workspace. */
+/* Reserves memory in the store, aligned to 8 bytes. It is valid until the store is freed. Returns
+ * NULL on failure, which ebpo_workspace_fail reports. Needs a workspace. */
 void *ebpo_store_reserve(ebpo_builder *b, uint64_t bytes);
 void ebpo_store_free(struct ebpo_store *store);
 
 /* --- the nodes of a piece --- */
 
-/* Adds an empty detail, or eight empty nodes. Returns false when out of memory. */
+/* ebpo_branch_detail adds an empty detail, ebpo_branch_children eight empty nodes. They return
+ * false when out of memory. */
 bool ebpo_branch_detail(const ebpo_builder *b, ebpo_branch *s, uint32_t *index);
 bool ebpo_branch_children(const ebpo_builder *b, ebpo_branch *s, uint32_t *first);
 /* Returns EBPO_E_LIMIT when 32 bits cannot number more nodes of the piece. */

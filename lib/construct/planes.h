@@ -1,6 +1,6 @@
-/* Chooses the planes of an envelope: candidates and selections (selections.c), a leaf's planes
- * (leaf_planes.c), faces against cells (triangle_cell.c), the small hull (hull_directions.c), and
- * winding numbers at a cell's corners (corner_windings.c). */
+/* Functions that choose the planes of an envelope: selections from candidates (selections.c), a
+ * leaf's planes (leaf_planes.c), tests of faces against cells (triangle_cell.c), a small convex
+ * hull (hull_directions.c), and winding numbers at a cell's corners (corner_windings.c). */
 #ifndef EBPO_CONSTRUCT_PLANES_H
 #define EBPO_CONSTRUCT_PLANES_H
 
@@ -68,10 +68,10 @@ ebpo_select_fn ebpo_selection_function(ebpo_selection selection);
 int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes);
 
 /* Returns how many of `count` candidates a selection of the theses chooses: `percent` of the
- * candidates, rounded up (EBP 2017, equation 5). With k_root > 0, it is K of BP (2008, 3.5.1):
- * k_root / 2^level, halved until K is below `count`; as in BP, all candidates if k_root / 2^level
- * is below 1. At most EBPO_PLANES_STORED: more planes cannot be stored, and clusters for more
- * planes would not be the best clusters for the stored planes. */
+ * candidates, rounded up (EBP 2017, equation 5). With k_root > 0, the number is K of BP (2008,
+ * 3.5.1): k_root / 2^level, halved until K is below `count`. As in BP, all candidates are chosen if
+ * k_root / 2^level is below 1. The number is at most EBPO_PLANES_STORED: more planes cannot be
+ * stored, and clusters for more planes would not be the best clusters for the stored planes. */
 int ebpo_selection_wanted(int count, int level, double percent, double k_root);
 
 /* Selects every candidate that may remove 0.03 % of the cell or more, deepest cut first, then

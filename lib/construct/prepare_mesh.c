@@ -31,7 +31,7 @@ typedef struct preparation {
 
 /* Accepts coordinates that are too large for an exact grid, as checking is still possible. Building
  * reports this error again. */
-static ebpo_status unless_too_large(ebpo_status status, const ebpo_error *local, ebpo_error *error)
+static ebpo_status accept_too_large(ebpo_status status, const ebpo_error *local, ebpo_error *error)
 {
     if (status == EBPO_OK || status == EBPO_E_LIMIT)
         return EBPO_OK;
@@ -58,7 +58,7 @@ static ebpo_status arrange_and_repair(const preparation *p, bool weld, ebpo_erro
     const ebpo_prepare_options *o = p->options;
     ebpo_error local = EBPO_ERROR_INIT;
     ebpo_status status = ebpo_arrange_to_repair(p->mesh, o->threads, &o->progress, &local);
-    status = unless_too_large(status, &local, error);
+    status = accept_too_large(status, &local, error);
     if (status == EBPO_OK)
         status = ebpo_mesh_check(p->mesh, o->threads, o->progress, &p->out->before, error);
     return status == EBPO_OK ? repair_as_requested(p, weld, error) : status;
@@ -80,7 +80,7 @@ static ebpo_status prepare_in_order(const preparation *p, ebpo_error *error)
     if (status == EBPO_OK) {
         ebpo_error local = EBPO_ERROR_INIT;
         status = ebpo_arrange(p->mesh, -1, o->threads, &o->progress, &local);
-        status = unless_too_large(status, &local, error);
+        status = accept_too_large(status, &local, error);
     }
     if (status == EBPO_OK)
         status = ebpo_mesh_check(p->mesh, o->threads, o->progress, &p->out->report, error);
@@ -128,8 +128,8 @@ typedef struct trying {
 
 /* --- doubts about a result --- */
 
-/* Returns true if much of the surface was filled. Filling a loop of n edges adds n - 2 faces with n
- * - 3 new edges. */
+/* Returns true if much of the surface was filled. When a loop of n edges is filled, n - 2 faces and
+ * n - 3 edges are added. */
 static bool mostly_open(const ebpo_mesh_report *report, const ebpo_repair_record *record)
 {
     uint64_t boundary = record->added_faces + 2 * record->filled_holes;

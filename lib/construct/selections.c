@@ -34,10 +34,10 @@ typedef struct ranked {
 
 /* Candidates that may still be chosen: a heap by removed volume, and a list by the extent of the
  * envelope beyond the plane. */
-typedef struct contest {
+typedef struct ranking {
     ranked by_gain[EBPO_PLANES_CANDIDATES], by_reach[EBPO_PLANES_CANDIDATES];
     int gains, reaches;
-} contest;
+} ranking;
 
 /* Makes the plane of a candidate, for ebpo_polytope_clip. Returns false when no plane code has an
  * offset that keeps the candidate's support. */
@@ -71,7 +71,7 @@ static void envelope_extent(const ebpo_polytope *p, const double n[3], double *l
 
 static void rank_candidates(const ebpo_polytope *envelope, double volume,
                             const ebpo_candidate *candidates, int count, double epsilon,
-                            double reach, contest *c)
+                            double reach, ranking *c)
 {
     c->gains = c->reaches = 0;
     for (int i = 0; i < count && i < EBPO_PLANES_CANDIDATES; i++) {
@@ -124,7 +124,7 @@ static void drop_first(ranked *heap, int *count)
 
 /* Cuts off needles, which have hardly any volume, the longest first. Skips a plane if clipping by
  * it fails. */
-static int cut_needles(ebpo_polytope *envelope, contest *c, double reach, int most, int taken,
+static int cut_needles(ebpo_polytope *envelope, ranking *c, double reach, int most, int taken,
                        uint32_t *codes)
 {
     while (taken < most && c->reaches > 0) {
@@ -155,7 +155,7 @@ static int cut_needles(ebpo_polytope *envelope, contest *c, double reach, int mo
 
 int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes)
 {
-    contest c;
+    ranking c;
     double epsilon = choice->epsilon, volume = ebpo_polytope_volume(envelope);
     int taken = 0, most = choice->most;
     rank_candidates(envelope, volume, choice->candidates, choice->count, epsilon, choice->reach,
@@ -182,14 +182,14 @@ int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_choice *choice, uint3
 }
 
 /* A derived plane that removes less than this share of the cell is not worth the time of a clip. */
-static const double hardly_anything = 3e-4;
+static const double least_gain = 3e-4;
 
 int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, int most,
                     uint32_t *codes)
 {
-    contest c;
+    ranking c;
     int taken = 0;
-    rank_candidates(envelope, ebpo_polytope_volume(envelope), candidates, count, hardly_anything,
+    rank_candidates(envelope, ebpo_polytope_volume(envelope), candidates, count, least_gain,
                     ebpo_needle, &c);
     make_heap(c.by_gain, c.gains);
     for (; c.gains > 0 && taken < most; drop_first(c.by_gain, &c.gains))

@@ -129,8 +129,8 @@ static ebpo_status find_exposed(void *context, uint64_t begin, uint64_t end, uns
     return compare_faces(c, begin, end, &c->s->nesting.tree, visit_shells);
 }
 
-static ebpo_status find_clash(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                              ebpo_error *error)
+static ebpo_status find_contacts(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                 ebpo_error *error)
 {
     comparing *c = context;
     (void)worker, (void)error;
@@ -169,8 +169,8 @@ static ebpo_status compare_shells(comparing *c, ebpo_error *error)
     if (status == EBPO_OK && c->apart)
         status = build_face_tree(c, error);
     if (status == EBPO_OK && c->apart && c->faces.count)
-        status =
-            ebpo_parallel_for(n->threads, workspace, count, GRAIN, find_clash, c, NULL, "", error);
+        status = ebpo_parallel_for(n->threads, workspace, count, GRAIN, find_contacts, c, NULL, "",
+                                   error);
     return status;
 }
 

@@ -271,7 +271,8 @@ static bool gather_points(ebpo_supports *s, const ebpo_builder *b, const ebpo_br
         return false;
     s->begin = few ? 0 : begin;
     s->end = few ? 0 : end;
-    /* Corners come first: they are far out, so searches for hopeless directions stop early. */
+    /* Corners come first: they are far out, so searches along directions without gain stop early.
+     */
     unsigned corners = ebpo_inside_corners(b, winding, detail->delta);
     for (int i = 0; i < 8; i++)
         if (corners >> i & 1 &&

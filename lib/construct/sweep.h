@@ -19,19 +19,19 @@ typedef struct ebpo_sweep_planes {
     int fours;
 } ebpo_sweep_planes;
 
-/* Points in fours, by coordinate: x, y, z, and an addition to n . x. The padding of the last four
- * is a copy of a point. */
+/* Points in fours, by coordinate: x, y, z, and a value that is added to n . x. The padding of the
+ * last four is a copy of a point. */
 typedef struct ebpo_sweep_points {
     const double (*point)[4][4]; /* [fours] */
-    /* for each stretch: least and greatest coordinates, greatest addition */
+    /* for each stretch: least and greatest coordinates, greatest added value */
     const double (*box)[7];
     uint64_t fours;
 } ebpo_sweep_points;
 
 typedef struct ebpo_sweep {
-    /* Finds planes that p is above by more than `above`, if it is beyond any by more than `beyond`
-     * (else none): writes the indices of the first `capacity` planes and returns the number of all
-     * planes found. */
+    /* Finds all planes that p is above by more than `above`, but none if p is above no plane by
+     * more than `beyond`. Writes the indices of the first `capacity` planes and returns the number
+     * of all planes found. */
     int (*seen)(const ebpo_sweep_planes *planes, const double p[3], double beyond, double above,
                 uint16_t *list, int capacity);
     /* Raises *best to the greatest value among the points; ends when *best has reached `enough`.

@@ -273,11 +273,11 @@ enum { QUERIES = 4096 };
 /* Results of earlier searches for a node, which predict results for other limits: a search for a
  * larger max_error never needs more queries (error_bound.h). The upper bound of an earlier search
  * predicts nothing, as a search for that limit might use up its queries before it gets there. */
-typedef struct memory {
+typedef struct earlier_results {
     double enough; /* least max_error that was enough */
     double failed; /* largest max_error that was not enough */
     double lo;     /* a certain lower bound of the distance */
-} memory;
+} earlier_results;
 
 struct ebpo_tolerance {
     ebpo_model *model;
@@ -285,17 +285,17 @@ struct ebpo_tolerance {
     bool planes;
     unsigned threads;
     ebpo_progress progress;
-    memory *gray[EBPO_LEVELS_MAX], *leaf[EBPO_LEVELS_MAX];
+    earlier_results *gray[EBPO_LEVELS_MAX], *leaf[EBPO_LEVELS_MAX];
     ebpo_bounder *bounders;     /* [threads] */
     ebpo_tolerance_node *nodes; /* nodes of the current call */
     double max_error;
 };
 
-static memory *new_memory(uint64_t count)
+static earlier_results *new_results(uint64_t count)
 {
-    memory *out = ebpo_alloc(count, sizeof *out);
+    earlier_results *out = ebpo_alloc(count, sizeof *out);
     for (uint64_t i = 0; out && i < count; i++)
-        out[i] = (memory){ INFINITY, -1, 0 };
+        out[i] = (earlier_results){ INFINITY, -1, 0 };
     return out;
 }
 
@@ -319,12 +319,12 @@ ebpo_status ebpo_tolerance_open(ebpo_tolerance **out, const ebpo_file *file, boo
     for (unsigned i = 0; i < n->threads && status == EBPO_OK; i++)
         status = ebpo_bounder_make(&n->bounders[i], &n->tree, n->model, error);
     for (int i = 0; i <= n->tree.target && status == EBPO_OK; i++) {
-        n->gray[i] = new_memory(n->tree.level[i].gray_count);
-        n->leaf[i] = new_memory(n->tree.level[i].leaf_count);
+        n->gray[i] = new_results(n->tree.level[i].gray_count);
+        n->leaf[i] = new_results(n->tree.level[i].leaf_count);
         if (!n->gray[i] || !n->leaf[i])
             status = ebpo_fail_memory(error,
                                       (n->tree.level[i].gray_count + n->tree.level[i].leaf_count) *
-                                          sizeof(memory));
+                                          sizeof(earlier_results));
     }
     if (status != EBPO_OK) {
         ebpo_tolerance_close(n);
@@ -363,8 +363,8 @@ static ebpo_status judge_node(ebpo_tolerance *n, ebpo_bounder *b, ebpo_tolerance
         return ebpo_fail(error, EBPO_E_FORMAT,
                          "level %d: a node is missing in the tree; run ebpo verify",
                          node->cell.level);
-    memory *m = own.type == EBPO_GRAY ? &n->gray[node->cell.level][own.rank]
-                                      : &n->leaf[node->cell.level][own.rank];
+    earlier_results *m = own.type == EBPO_GRAY ? &n->gray[node->cell.level][own.rank]
+                                               : &n->leaf[node->cell.level][own.rank];
     node->enough = n->max_error >= m->enough;
     if (node->enough || n->max_error <= m->failed || n->max_error < m->lo)
         return EBPO_OK;

@@ -11,9 +11,9 @@
 typedef struct ebpo_bound_goal {
     double enough;   /* stop at an upper bound of at most this; 0: never */
     double too_much; /* stop once the distance is certainly larger; INFINITY: never */
-    /* stop at an upper bound of at most `ratio` times the lower one, > 1; 0: never */
+    /* > 1: stop when the upper bound is at most `ratio` times the lower bound; 0: never */
     double ratio;
-    uint64_t queries; /* stop after about this many distances */
+    uint64_t queries; /* stop after about this many distance queries */
 } ebpo_bound_goal;
 
 typedef struct ebpo_reach_bound {

@@ -1,7 +1,8 @@
 /* Writes glTF 2.0, as one file (GLB) or as a text with a .bin file beside it. Coordinates are
- * float32 relative to the middle of the root cell, which is the translation of the nodes. assimp is
- * not used here: its exporter joins vertices that are less than 1e-5 apart, at any size of the
- * model. Source: Khronos, "glTF 2.0 Specification", sections 3 and 4. */
+ * float32. If the model is far from zero, they are relative to the middle of the root cell, which
+ * is the translation of the nodes. assimp is not used here: its exporter joins vertices that are
+ * less than 1e-5 apart, at any size of the model. Source: Khronos, "glTF 2.0 Specification",
+ * sections 3 and 4. */
 #include "core/strict_fp.h"
 
 #include <float.h>

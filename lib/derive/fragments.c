@@ -254,7 +254,7 @@ static ebpo_status push_polytope(ebpo_bounder *b, ebpo_fragment_kind kind,
 
 /* Gives a piece the faces that may intersect it. Copies these to the top of the stack of faces from
  * `count` faces that begin at `first` in the same stack. */
-static ebpo_status give_faces(ebpo_bounder *b, ebpo_fragment *fragment, uint64_t first,
+static ebpo_status copy_faces(ebpo_bounder *b, ebpo_fragment *fragment, uint64_t first,
                               uint64_t count)
 {
     ebpo_extent e;
@@ -308,9 +308,9 @@ static void find_cell_faces(const ebpo_bounder *b, ebpo_cell cell, int levels, d
 }
 
 /* Returns how far a piece extends beyond its cell: up to EBPO_CUT_THIN where a neighbour's thin
- * part stayed with it, or the slack of a cut. Both are in units of the node's cell, so far below
- * the node they are not small compared with the piece's cell. A bound for the cell plus this
- * distance is a bound for the piece. */
+ * part stayed with it, or the slack of a cut. Both are lengths in the cell coordinates of the
+ * envelope's node, so far below this node they are not small compared with the piece's cell. A
+ * bound for the cell plus this distance is a bound for the piece. */
 static double find_beyond(const ebpo_bounder *b, const ebpo_polytope *p, ebpo_cell cell, int levels)
 {
     double low[3], high[3], origin[3] = { 0, 0, 0 }, apart[3];
@@ -392,7 +392,7 @@ static ebpo_status cut_longest(ebpo_bounder *b, const ebpo_fragment *fragment,
             continue;
         status = push_polytope(b, kind, fragment, &part, &next);
         if (status == EBPO_OK && kind == EBPO_FRAGMENT_LEAF)
-            status = give_faces(b, next, fragment->face_first, fragment->face_count);
+            status = copy_faces(b, next, fragment->face_first, fragment->face_count);
     }
     return status;
 }
@@ -435,7 +435,7 @@ static ebpo_status cut_along(ebpo_bounder *b, const ebpo_fragment *fragment,
         ebpo_fragment *next = NULL;
         status = push_polytope(b, kind, fragment, &side[i], &next);
         if (status == EBPO_OK && kind == EBPO_FRAGMENT_LEAF)
-            status = give_faces(b, next, fragment->face_first, fragment->face_count);
+            status = copy_faces(b, next, fragment->face_first, fragment->face_count);
     }
     return status;
 }

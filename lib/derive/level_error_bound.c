@@ -1,9 +1,9 @@
 /* Measures the error of a level: bounds of the largest distance by which its envelopes extend
- * beyond the model, and the mean distance, from samples. A level's bounds are those of its nodes. A
- * short search for each node gives bounds that dismiss most nodes; the other nodes are searched in
- * the order of their upper bounds. Samples are points on the level's polygons. The area is divided
- * into equal parts, with one sample in each. A sample counts if a point slightly outside its
- * polygon is in no other envelope. */
+ * beyond the model, and the mean distance, from samples. A level's bounds are the largest bounds of
+ * its nodes. A short search for each node gives bounds that dismiss most nodes; the other nodes are
+ * searched in the order of their upper bounds. Samples are points on the level's polygons. The area
+ * is divided into equal parts, with one sample in each. A sample counts if a point slightly outside
+ * its polygon is in no other envelope. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -372,7 +372,7 @@ static ebpo_status sort_nodes(survey *s)
     return EBPO_OK;
 }
 
-/* Gathers the results of nodes first .. last - 1 in the order. */
+/* Updates *out by the results of the nodes with indices first .. last - 1 in s->order. */
 static void gather_survey(const survey *s, uint64_t first, uint64_t last, ebpo_error_bound *out)
 {
     for (uint64_t i = first; i < last; i++) {

@@ -30,13 +30,13 @@
 #include <libqhull_r/qhull_ra.h>
 #endif
 
-/* --- the volume of a convex hull, by qhull where the library has it --- */
+/* --- the volume of a convex hull, computed by qhull if the build has it --- */
 
 #if EBPO_HAVE_QHULL
 
 /* One for each thread. */
 typedef struct hull {
-    FILE *silence; /* receives qhull's long explanations of flat sets */
+    FILE *null_file; /* receives qhull's long explanations of flat sets */
     qhT qhull;
 } hull;
 
@@ -45,8 +45,8 @@ static ebpo_status hull_new(hull **out, ebpo_error *error)
     hull *h = *out = ebpo_alloc_zero(1, sizeof *h);
     if (!h)
         return ebpo_fail_memory(error, sizeof *h);
-    h->silence = fopen("/dev/null", "w");
-    if (h->silence)
+    h->null_file = fopen("/dev/null", "w");
+    if (h->null_file)
         return EBPO_OK;
     free(h);
     *out = NULL;
@@ -55,8 +55,8 @@ static ebpo_status hull_new(hull **out, ebpo_error *error)
 
 static void hull_free(hull *h)
 {
-    if (h && h->silence)
-        fclose(h->silence);
+    if (h && h->null_file)
+        fclose(h->null_file);
     free(h);
 }
 
@@ -65,8 +65,8 @@ static double volume_by(hull *h, double *points, int count, char *command, bool 
     qhT *qh = &h->qhull;
     volatile double volume = 0; /* set between setjmp and a jump */
     volatile bool wrong = true;
-    qh_zero(qh, h->silence);
-    if (qh_new_qhull(qh, 3, count, points, False, command, NULL, h->silence) == 0) {
+    qh_zero(qh, h->null_file);
+    if (qh_new_qhull(qh, 3, count, points, False, command, NULL, h->null_file) == 0) {
         if (setjmp(qh->errexit) == 0) { /* qhull's errors jump here */
             qh->NOerrexit = False;
             qh_getarea(qh, qh->facet_list);

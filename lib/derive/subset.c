@@ -50,7 +50,7 @@ static void count_subtree(counting *c, uint64_t number)
                        c->needs & EBPO_NEEDS_MESH);
 }
 
-/* Descends gray nodes that intersect the box, down to the subtrees' roots. */
+/* Counts the subtrees below a gray node whose roots' cells intersect the box. */
 static ebpo_status descend_to_subtrees(counting *c, const ebpo_node *gray)
 {
     const ebpo_subset_options *o = c->options;
@@ -238,8 +238,8 @@ static void name_mesh(ebpo_tree *out)
     out->mesh.source_size = out->info.source_size;
 }
 
-/* Makes the tree of the subset. `need`: bounds of this file's envelopes, with the kept planes; or
- * NULL. */
+/* Makes the tree of the subset. `need` decides which envelopes of the file, with the kept planes,
+ * are close enough; it may be NULL. */
 static ebpo_status subset_tree_within(ebpo_tree *out, const ebpo_file *file,
                                       const ebpo_subset_options *options, ebpo_tolerance *need,
                                       ebpo_error *error)
@@ -317,8 +317,9 @@ typedef struct fitting {
     ebpo_subset_options *options;
     ebpo_publish trial, best; /* best: the finest trial that fits so far */
     ebpo_tolerance *need;
-    double fits, too_large;          /* max_error */
-    uint64_t fit_bytes, large_bytes; /* the sizes with these max_errors */
+    double fits;                     /* least max_error with a file that fits */
+    double too_large;                /* largest max_error with a file that is too large; 0: none */
+    uint64_t fit_bytes, large_bytes; /* sizes of these two files */
     ebpo_error *error;
 } fitting;
 
@@ -475,8 +476,8 @@ static ebpo_status subset_fit(const ebpo_file *file, const char *path, ebpo_subs
 
 uint64_t ebpo_subset_memory(uint64_t face_count, uint32_t leaf_faces)
 {
-    /* bytes per face, measured: the mesh and its bounds, and leaves, which take more when they are
-     * smaller */
+    /* measured bytes per face of the mesh and its bounds, and of leaves, which take more when they
+     * are smaller */
     enum { OF_MESH = 130, OF_LEAVES = 1800, OF_LEAVES_MAX = 430, ANYHOW = 16 << 20 };
     double leaves = OF_LEAVES / (double)leaf_faces;
     return (uint64_t)((double)face_count *

@@ -30,14 +30,14 @@ typedef struct kept_column {
     int8_t default_value; /* for new nodes */
 } kept_column;
 
-/* Counts of items for each node: u8, or u32. */
+/* Counts of items for each node, as u8 or u32. */
 typedef struct kept_counts {
     ebpo_per per;
     const uint8_t *counts;
     uint8_t size;
 } kept_counts;
 
-/* An array of counted items; several may share their counts. */
+/* An array of counted items; several arrays may share their counts. */
 typedef struct kept_list {
     unsigned counts; /* index of the counts of the type */
     const uint8_t *from;
@@ -180,7 +180,7 @@ static void copy_items(const kept_nodes *kept, const kept_list *list, const kept
 }
 
 /* Omits the next node of a type. */
-static void kept_pass(kept_nodes *kept, ebpo_node_type type)
+static void kept_skip(kept_nodes *kept, ebpo_node_type type)
 {
     uint64_t rank = kept->next[type]++;
     for (unsigned i = 0; i < kept->of_type[type].counts; i++) {
@@ -207,7 +207,7 @@ static void kept_take(kept_nodes *kept, ebpo_node_type type)
         ebpo_level_set_count(kept->to, c->per,
                              ebpo_level_count(kept->to, c->per) + kept_items(c, rank));
     }
-    kept_pass(kept, type);
+    kept_skip(kept, type);
 }
 
 /* Adds a node that is not in `from`: default values, empty lists. */
@@ -224,7 +224,8 @@ static const uint64_t NOTHING = UINT64_MAX;
 
 /* A gray node of the result. */
 typedef struct gray {
-    uint64_t group; /* group of its children, in the source; NOTHING: they are omitted */
+    /* group of the node's children in the source; NOTHING: the children are omitted */
+    uint64_t group;
     ebpo_cell cell;
 } gray;
 
@@ -234,8 +235,9 @@ typedef struct descent {
     ebpo_level from, *to;
     kept_nodes kept; /* copies nodes from one to the other */
     gray *parent, *child;
-    ebpo_tolerance_node *judged; /* gray nodes and leaves in order, with max_error; else NULL */
-    uint64_t next_judged;
+    ebpo_tolerance_node
+        *tolerance_nodes; /* gray nodes and leaves in order, with max_error; else NULL */
+    uint64_t next_tolerance_node;
     uint64_t parent_count, child_count;
     uint64_t group;  /* current group of the result: the number of its parent among gray nodes */
     uint64_t filled; /* groups of the result that are not empty */
@@ -337,7 +339,10 @@ static void add_child(descent *d, ebpo_cell cell, uint64_t group)
 
 /* Returns true if the envelope is close enough to the model. To be called once for each gray node
  * and leaf, in their order. */
-static bool is_enough(descent *d) { return d->judged && d->judged[d->next_judged++].enough; }
+static bool is_enough(descent *d)
+{
+    return d->tolerance_nodes && d->tolerance_nodes[d->next_tolerance_node++].enough;
+}
 
 static void take_gray(descent *d, ebpo_cell cell)
 {
@@ -386,7 +391,7 @@ static ebpo_node_type take_leaf(descent *d, ebpo_cell cell)
     if (!enough)
         add_leaf_planes(d);
     add_colour(d);
-    kept_pass(&d->kept, EBPO_LEAF);
+    kept_skip(&d->kept, EBPO_LEAF);
     add_child(d, cell, NOTHING);
     return EBPO_GRAY;
 }
@@ -424,12 +429,13 @@ static void take_group(descent *d, uint64_t number, uint16_t types)
 static ebpo_status judge_level(descent *d)
 {
     uint64_t next = 0, count = 0;
-    d->next_judged = 0;
+    d->next_tolerance_node = 0;
     if (!d->c->need)
         return EBPO_OK;
-    if (!(d->judged = ebpo_alloc_zero(d->from.gray_count + d->from.leaf_count, sizeof *d->judged)))
-        return ebpo_fail_memory(d->c->error,
-                                (d->from.gray_count + d->from.leaf_count) * sizeof *d->judged);
+    if (!(d->tolerance_nodes =
+              ebpo_alloc_zero(d->from.gray_count + d->from.leaf_count, sizeof *d->tolerance_nodes)))
+        return ebpo_fail_memory(d->c->error, (d->from.gray_count + d->from.leaf_count) *
+                                                 sizeof *d->tolerance_nodes);
     for (uint64_t i = 0; i < d->parent_count; i++) {
         if (d->parent[i].group == NOTHING)
             continue;
@@ -438,13 +444,13 @@ static ebpo_status judge_level(descent *d)
             ebpo_node_type type = ebpo_group_type(types, octant);
             if (type != EBPO_GRAY && type != EBPO_LEAF)
                 continue;
-            ebpo_tolerance_node *node = &d->judged[count++];
+            ebpo_tolerance_node *node = &d->tolerance_nodes[count++];
             node->cell = child_cell(d, i, octant);
             node->required = intersects_box(d->c, node->cell) &&
                              (type == EBPO_LEAF || may_go_on(d->c, d->level));
         }
     }
-    return ebpo_tolerance_judge(d->c->need, d->judged, count, d->c->options->max_error,
+    return ebpo_tolerance_judge(d->c->need, d->tolerance_nodes, count, d->c->options->max_error,
                                 d->c->error);
 }
 
@@ -467,8 +473,8 @@ static ebpo_status cut_level(descent *d)
         d->filled += d->to->types[i] != 0;
     }
     ebpo_level_free(&d->from);
-    free(d->judged);
-    d->judged = NULL;
+    free(d->tolerance_nodes);
+    d->tolerance_nodes = NULL;
     free(d->parent);
     d->parent = d->child;
     d->parent_count = d->child_count;
@@ -496,7 +502,8 @@ ebpo_status ebpo_cut_levels(ebpo_cutting *c)
         d.goes_on = false;
         status = cut_level(&d);
         if (status == EBPO_OK && d.level && d.filled == 0) {
-            ebpo_level_free(d.to); /* in a subset of a subset: no node of this level is in both */
+            /* for a subset of a subset: no node of this level is in both subsets */
+            ebpo_level_free(d.to);
             break;
         }
         if (d.level)

@@ -21,11 +21,11 @@ typedef struct ebpo_cutting {
     ebpo_error *error;
 } ebpo_cutting;
 
-/* In subset_levels.c. Cuts the levels that remain, with face numbers of the source. */
+/* Cuts the levels of the subset (subset_levels.c). Face numbers are those of the source. */
 EBPO_MUST_USE ebpo_status ebpo_cut_levels(ebpo_cutting *c);
 
-/* In subset_faces.c. Renumbers the faces that the remaining leaves list, with their vertices and
- * maps. Without any faces, these parts are removed. */
+/* Renumbers the faces that the remaining leaves list, with their vertices and maps
+ * (subset_faces.c). If no faces remain, these parts are removed. */
 EBPO_MUST_USE ebpo_status ebpo_cut_faces(ebpo_cutting *c);
 
 /* Computes the volumes of the envelopes of the nodes that remain. */

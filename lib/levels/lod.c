@@ -427,10 +427,10 @@ typedef struct job {
     int split;       /* level at which the first walk creates seeds */
     seed *seeds;
     uint64_t seed_count;
-    ebpo_polyhedra (
-        *pieces)[EBPO_LEVELS_MAX]; /* [1 + seed_count]: for the top, then for each seed */
-    ebpo_leaf_scratch *scratch;    /* [threads] */
-    path_halves *halves;           /* [threads] */
+    /* [1 + seed_count]: for the top, then for each seed */
+    ebpo_polyhedra (*pieces)[EBPO_LEVELS_MAX];
+    ebpo_leaf_scratch *scratch; /* [threads] */
+    path_halves *halves;        /* [threads] */
 } job;
 
 typedef struct walker {

@@ -1,5 +1,5 @@
-/* Computes polygons of a level (lod.c): polyhedra as triangles, the model that a walk reads, and
- * the planes of leaves. */
+/* Parts of the computation of a level's polygons (lod.c): polyhedra as triangles, the model that a
+ * walk reads, and the planes of leaves. */
 #ifndef EBPO_LEVELS_LOD_H
 #define EBPO_LEVELS_LOD_H
 

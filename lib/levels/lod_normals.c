@@ -25,8 +25,8 @@
 enum { SIDES = 6, ON_PLANE = SIDES, DEEPEST = EBPO_LEVELS_MAX - 1 };
 
 static const uint32_t none = UINT32_MAX;
-static const double least_turned =
-    -0.3; /* cosine of the largest angle between a plane and a side */
+/* cosine of the largest angle between a plane and a side */
+static const double least_turned = -0.3;
 
 typedef struct polygon {
     double area[3]; /* normal with a length of twice its area */

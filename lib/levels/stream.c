@@ -31,13 +31,15 @@
 
 /* --- from cell to model coordinates --- */
 
-/* With t the cell's shortest side and N = t n / size, the half-space is: N . (p - corner) <= t d /
- * 4096. For any normal a, any factor f > 0, and p in the cell: a . p = a . corner + f N . (p -
- * corner) + (a - f N) . (p - corner) <= a . corner + f t d / 4096 + sum |a - f N| size. Here f is
- * the computed 1 / |N| and a is the computed f N, so that |a - f N| <= 4 u |a| with u = DBL_EPSILON
- * / 2. The other roundings of this function sum to less than 8 u times sum |a| (|corner| + size),
- * and evaluating a . p adds another 4 u of that. 32 u covers all of them; underflow is covered by
- * the remaining margin. */
+/* With t the cell's shortest side and N = t n / size, the half-space is
+ *     N . (p - corner) <= t d / 4096.
+ * For any normal a, any factor f > 0, and p in the cell:
+ *     a . p = a . corner + f N . (p - corner) + (a - f N) . (p - corner)
+ *          <= a . corner + f t d / 4096 + sum |a - f N| size.
+ * Here f is the computed 1 / |N| and a is the computed f N, so that |a - f N| <= 4 u |a|, where u
+ * is DBL_EPSILON / 2. The other rounding errors of this function sum to less than 8 u S, where S is
+ * sum |a| (|corner| + size). The evaluation of a . p adds another 4 u S. The offset is raised by
+ * 32 u S, which covers all of these errors; the remaining margin covers underflow. */
 void ebpo_plane_to_world(const ebpo_box *box, ebpo_cell cell, const int32_t n[3], int32_t d,
                          double out[4])
 {
@@ -62,8 +64,8 @@ void ebpo_plane_to_world(const ebpo_box *box, ebpo_cell cell, const int32_t n[3]
              (16 * DBL_EPSILON * reach + 4 * DBL_MIN * bulk + 64 * DBL_TRUE_MIN);
 }
 
-/* Converts the vertices of a polytope, rounded. Those on cell faces get the faces' exact
- * coordinates, so that neighbours agree to the last bit. */
+/* Converts the vertices of a polytope. Coordinates are rounded, but vertices on cell faces get the
+ * exact coordinates of the cell faces, so that neighbours agree to the last bit. */
 static void polytope_to_world(const ebpo_polytope *p, const ebpo_box *box, ebpo_cell cell,
                               double (*out)[3])
 {
@@ -148,7 +150,7 @@ static void level_walk_begin(level_walk *walk, const ebpo_level *level, int targ
 }
 
 /* Visits the next node of the level at `depth`; the caller ensures that there is one. */
-static level_walk_node *pass_node(level_walk *w, int depth)
+static level_walk_node *visit_next_node(level_walk *w, int depth)
 {
     const ebpo_level *level = &w->level[depth];
     unsigned octant = w->at[depth].octant++;
@@ -188,7 +190,7 @@ static bool level_walk_next(level_walk *w, level_walk_node *out)
             w->at[depth].octant = 8;
             continue;
         }
-        const level_walk_node *node = pass_node(w, depth);
+        const level_walk_node *node = visit_next_node(w, depth);
         if (depth == w->target) {
             *out = *node;
             return true;
@@ -278,7 +280,7 @@ void ebpo_stream_free(ebpo_stream *s)
 
 /* --- reading a level --- */
 
-static void drop_passed(ebpo_level *level, bool planes)
+static void drop_unneeded_arrays(ebpo_level *level, bool planes)
 {
     ebpo_level_drop(level, ~(uint32_t)(EBPO_NEEDS_ALWAYS | EBPO_NEEDS_COLOURS |
                                        (planes ? EBPO_NEEDS_PLANES : 0)));
@@ -440,7 +442,7 @@ ebpo_status ebpo_stream_next_level(ebpo_stream *s, ebpo_stream_level *out, bool 
         return status;
     }
     if (next)
-        drop_passed(&s->kept[next - 1], s->options.polygons);
+        drop_unneeded_arrays(&s->kept[next - 1], s->options.polygons);
     s->level = next;
     s->terminal_volume += v.terminal_volume;
     s->bytes += ebpo_reader_level_bytes(s->file, next) +

@@ -22,8 +22,8 @@ typedef struct ebpo_viewpoint {
     double eye[3];   /* in the model's unit */
     double unit;     /* size of the unit of length, in the model's unit */
     double focal;    /* pixels of length 1 at distance 1 */
-    /* normals of the frustum's planes, all through the eye, and of the plane through the eye
-     * parallel to the picture */
+    /* normals of the four side planes of the frustum, and of the plane parallel to the picture; all
+     * five planes pass through the eye */
     double inward[5][3];
     double diagonal2[EBPO_LEVELS_MAX]; /* squared diagonal of the cells of each level */
 } ebpo_viewpoint;
@@ -134,7 +134,7 @@ typedef struct ebpo_frontier {
 } ebpo_frontier;
 
 void ebpo_frontier_free(ebpo_frontier *frontier);
-/* Reserves space, so that this number of pushes cannot fail. */
+/* Reserves space, so that the next `more` pushes cannot fail. */
 EBPO_MUST_USE ebpo_status ebpo_frontier_reserve(ebpo_frontier *frontier, uint64_t more,
                                                 ebpo_error *error);
 void ebpo_frontier_push(ebpo_frontier *frontier, ebpo_waiting node);

@@ -2,9 +2,9 @@
  * until the view's limits are reached.
  *
  * Each step takes the top of the frontier (view_cut.h), reads the group of its children, with the
- * faces of leaves if they are requested, and returns the siblings. After the last one they replace
- * their parent in the cut. When the observer changes, the frontier is sorted again; delivered nodes
- * stay.
+ * faces of leaves if they are requested, and returns the siblings. After the last sibling, the
+ * siblings replace their parent in the cut. When the observer changes, the frontier is sorted
+ * again; delivered nodes stay.
  *
  * For remote files, the chunks that a group needs are requested together, with the chunks of the
  * groups that follow, as far as the reader's memory allows. */
@@ -199,7 +199,7 @@ typedef struct fetching {
     const view_depth *depth;
 } fetching;
 
-/* Returns the children of a node that waits for refinement. */
+/* Returns the group of children of a node of the frontier. */
 static view_group children_of(const ebpo_waiting *w)
 {
     return (view_group){ { ebpo_octcode_level(w->octcode) + 1, w->below }, w->octcode };
