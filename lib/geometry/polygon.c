@@ -411,13 +411,13 @@ static bool is_along(const double b[2], const double a[2], const double q[2])
 static void note_edges_along(const outline *o, tested_ear *e, uint32_t i)
 {
     const uint32_t *c = e->corner;
-    const uint32_t beside[2] = { o->next[i], o->previous[i] };
+    const uint32_t neighbours[2] = { o->next[i], o->previous[i] };
     for (int k = 0; k < 2; k++) {
-        const double *q = o->at[beside[k]];
+        const double *q = o->at[neighbours[k]];
         e->along_a |=
-            turn_of_corners(o, c[1], c[0], beside[k]) == 0 && is_along(e->at[1], e->at[0], q);
+            turn_of_corners(o, c[1], c[0], neighbours[k]) == 0 && is_along(e->at[1], e->at[0], q);
         e->along_c |=
-            turn_of_corners(o, c[1], c[2], beside[k]) == 0 && is_along(e->at[1], e->at[2], q);
+            turn_of_corners(o, c[1], c[2], neighbours[k]) == 0 && is_along(e->at[1], e->at[2], q);
     }
 }
 

@@ -12,7 +12,7 @@ typedef struct ebpo_segment {
 } ebpo_segment;
 
 typedef struct ebpo_ray_intersection {
-    bool meets; /* the closed triangle and the ray have a common point with 0 <= t <= t_max */
+    bool intersects; /* the closed triangle and the ray have a common point with 0 <= t <= t_max */
     /* 1: the ray passes through the triangle's interior against the normal (enters); -1: with the
      * normal (leaves); 0: it intersects an edge or corner, is within the plane, or the triangle has
      * no area */

@@ -278,7 +278,7 @@ static bool intersect_within_plane(const ebpo_segment *ray, const double triangl
         least = sign > 0 ? fmin(least, t) : least;
     }
     *out = (ebpo_ray_intersection){ after_begin && before_end, 0, 0, INFINITY };
-    if (out->meets)
+    if (out->intersects)
         out->t = before_begin ? 0 : least;
     return true;
 }

@@ -20,22 +20,22 @@
 
 /* The projected corners of a face or segment, in order. With two corners it is a segment, and both
  * sides of its edge are outer sides. */
-typedef struct figure {
+typedef struct projection {
     double corner[3][2];
     int corners;
-} figure;
+} projection;
 
-static figure seen_along(int axis, const double (*corner)[3], int corners)
+static projection seen_along(int axis, const double (*corner)[3], int corners)
 {
     const int to[2] = { axis == 2 ? 0 : axis + 1, axis == 0 ? 2 : axis - 1 };
-    figure f = { .corners = corners };
+    projection f = { .corners = corners };
     for (int i = 0; i < corners; i++)
         for (int k = 0; k < 2; k++)
             f.corner[i][k] = corner[i][to[k]];
     return f;
 }
 
-static int turn_of(const figure *f)
+static int turn_of(const projection *f)
 {
     return ebpo_orient2d(f->corner[0], f->corner[1], f->corner[2]);
 }
@@ -44,7 +44,7 @@ static int turn_of(const figure *f)
 static int axis_of(const double corner[3][3])
 {
     for (int k = 0; k < 3; k++) {
-        figure f = seen_along(k, corner, 3);
+        projection f = seen_along(k, corner, 3);
         if (turn_of(&f) != 0)
             return k;
     }
@@ -53,7 +53,7 @@ static int axis_of(const double corner[3][3])
 
 /* Returns how an edge separates its figure from the other one: 2: the other one is strictly beyond
  * the edge; 1: beyond it or on it; 0: not separated. */
-static int parted_by(const double from[2], const double to[2], int outer, const figure *other)
+static int parted_by(const double from[2], const double to[2], int outer, const projection *other)
 {
     int parted = 2;
     for (int i = 0; i < other->corners; i++) {
@@ -65,7 +65,7 @@ static int parted_by(const double from[2], const double to[2], int outer, const 
     return parted;
 }
 
-static int parted_by_edges(const figure *f, const figure *other)
+static int parted_by_edges(const projection *f, const projection *other)
 {
     int most = 0, edges = f->corners == 3 ? 3 : 2, inner = f->corners == 3 ? turn_of(f) : 1;
     for (int i = 0; i < edges; i++) {
@@ -77,7 +77,7 @@ static int parted_by_edges(const figure *f, const figure *other)
 
 /* Returns 2 if the figures have no common point, 1 if they have no common inner point, otherwise 0.
  */
-static int figures_parted(const figure *f, const figure *g)
+static int projections_separated(const projection *f, const projection *g)
 {
     int by_f = parted_by_edges(f, g), by_g = parted_by_edges(g, f);
     return by_f > by_g ? by_f : by_g;
@@ -120,8 +120,8 @@ static bool segments_cross(const ends *s, const ends *t)
     int axis = axis_of((const double(*)[3])corner);
     if (axis < 0)
         return false;
-    figure f = seen_along(axis, (const double(*)[3])s->at, 2),
-           g = seen_along(axis, (const double(*)[3])t->at, 2);
+    projection f = seen_along(axis, (const double(*)[3])s->at, 2),
+               g = seen_along(axis, (const double(*)[3])t->at, 2);
     int side[2][2];
     for (int i = 0; i < 2; i++) {
         side[0][i] = ebpo_orient2d(f.corner[0], f.corner[1], g.corner[i]);
@@ -147,8 +147,8 @@ static bool segment_intersects_triangle(const ends *s, const double t[3][3], int
     if (side[0] * side[1] > 0)
         return false;
     if (side[0] == 0 && side[1] == 0 && !s->point) {
-        figure f = seen_along(axis, t, 3), g = seen_along(axis, (const double(*)[3])s->at, 2);
-        return figures_parted(&f, &g) != 2;
+        projection f = seen_along(axis, t, 3), g = seen_along(axis, (const double(*)[3])s->at, 2);
+        return projections_separated(&f, &g) != 2;
     }
     for (int i = 0; i < 2; i++)
         if (side[i] == 0)
@@ -166,8 +166,8 @@ static ebpo_pair_kind classify_flat(const double a[3][3], const double b[3][3])
     if (axis_a >= 0 && axis_b >= 0) {
         static const ebpo_pair_kind kinds[] = { EBPO_PAIR_COPLANAR, EBPO_PAIR_TOUCHING,
                                                 EBPO_PAIR_APART };
-        figure f = seen_along(axis_a, a, 3), g = seen_along(axis_a, b, 3);
-        return kinds[figures_parted(&f, &g)];
+        projection f = seen_along(axis_a, a, 3), g = seen_along(axis_a, b, 3);
+        return kinds[projections_separated(&f, &g)];
     }
     ends s = ends_of(axis_a < 0 ? a : b);
     bool intersect;

@@ -67,8 +67,8 @@ static inline double ebpo_vec3_scaled_length(const double v[3])
 
 static inline double ebpo_vec3_scaled_distance(const double a[3], const double b[3])
 {
-    const double way[3] = { b[0] - a[0], b[1] - a[1], b[2] - a[2] };
-    return ebpo_vec3_scaled_length(way);
+    const double difference[3] = { b[0] - a[0], b[1] - a[1], b[2] - a[2] };
+    return ebpo_vec3_scaled_length(difference);
 }
 
 #endif

@@ -268,7 +268,7 @@ int ebpo_open_below(const char *folder, const char *name)
     return fd;
 }
 
-enum { LOOK = 512 };
+enum { CHECKED_BYTES = 512 };
 
 static const struct {
     const char *bytes;
@@ -346,7 +346,7 @@ const char *ebpo_foreign_bytes(const uint8_t *data, uint64_t size)
 
 bool ebpo_bytes_are_text(const uint8_t *data, uint64_t size)
 {
-    for (uint64_t i = 0; i < size && i < LOOK; i++)
+    for (uint64_t i = 0; i < size && i < CHECKED_BYTES; i++)
         if (data[i] == 0x7f || (data[i] < ' ' && !(data[i] >= '\t' && data[i] <= '\r')))
             return false;
     return size > 0;

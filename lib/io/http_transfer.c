@@ -117,9 +117,9 @@ typedef struct ebpo_slot {
     bool is_pinned;
     ebpo_http_response response;
     ebpo_redirect redirect;
-    bool judged, stopped, stalled; /* stopped, stalled: ended by this code, not by libcurl */
-    bool sent;                     /* connected, and the request was sent */
-    double moved;                  /* time of the last bytes */
+    bool has_verdict, stopped, stalled; /* stopped, stalled: ended by this code, not by libcurl */
+    bool sent;                          /* connected, and the request was sent */
+    double moved;                       /* time of the last bytes */
     ebpo_verdict verdict;
     ebpo_status status;
     char why[EBPO_WHY_BYTES];
@@ -190,7 +190,7 @@ static size_t take_header(char *line, size_t size, size_t count, void *user)
         curl_easy_setopt(s->easy, CURLOPT_HTTPHEADER, s->owner->bare_headers);
     if (s->response.header_bytes <= EBPO_HTTP_HEADERS_MAX)
         return size * count;
-    s->judged = true;
+    s->has_verdict = true;
     s->stopped = true;
     s->verdict = EBPO_HTTP_REFUSED;
     s->status = EBPO_E_IO;
@@ -204,9 +204,9 @@ static void judge_slot(ebpo_slot *s)
     ebpo_http_request http_request = { s->begin, s->end, s->is_pinned ? &s->pinned : NULL,
                                        s->owner->options->whole_limit,
                                        s->owner->options->unversioned };
-    if (!s->judged)
+    if (!s->has_verdict)
         s->verdict = ebpo_http_response_judge(&s->response, &http_request, &s->status, s->why);
-    s->judged = true;
+    s->has_verdict = true;
 }
 
 static size_t refuse_body(ebpo_slot *s, ebpo_status status, const char *why)
@@ -317,7 +317,7 @@ static bool set_up_slot(ebpo_slot *s)
 }
 
 enum {
-    LOOK_MS = 100, /* between checks of `stop` and for stalls */
+    CHECK_MS = 100, /* between checks of `stop` and for stalls */
     IDLE_MS = 60000
 };
 static const double PAUSE_FIRST = 0.2, PAUSE_MAX = 8, PAUSE_BY_SERVER_MAX = 60; /* seconds */
@@ -491,7 +491,7 @@ static double pause_after(ebpo_transfers *t, const ebpo_slot *s, bool *by_server
         pause *= 2;
     pause = (pause < PAUSE_MAX ? pause : PAUSE_MAX) *
             (0.5 + 0.5 * ebpo_random_unit(ebpo_random_next(&t->random)));
-    if (s->judged && s->verdict == EBPO_HTTP_LATER)
+    if (s->has_verdict && s->verdict == EBPO_HTTP_LATER)
         curl_easy_getinfo(s->easy, CURLINFO_RETRY_AFTER, &retry_after);
     *by_server = (double)retry_after > pause;
     return *by_server ? (double)retry_after : pause;
@@ -505,7 +505,7 @@ static void begin_attempt(ebpo_transfers *t, ebpo_slot *s, ebpo_request *r, doub
     s->is_pinned = t->is_pinned || begun;
     s->pinned = begun ? r->version : t->pinned;
     s->response = (ebpo_http_response){ .code = 0 };
-    s->judged = s->stopped = s->stalled = s->sent = false;
+    s->has_verdict = s->stopped = s->stalled = s->sent = false;
     s->status = EBPO_E_IO;
     s->why[0] = s->trouble[0] = 0;
     s->begin = r->offset + (r->whole ? 0 : r->got);
@@ -584,7 +584,7 @@ static const char *error_text(const ebpo_slot *s, CURLcode code)
 static void describe_error(const ebpo_slot *s, CURLcode code, char *out, size_t capacity)
 {
     const char *trouble = error_text(s, code);
-    if (s->judged && s->verdict == EBPO_HTTP_LATER)
+    if (s->has_verdict && s->verdict == EBPO_HTTP_LATER)
         snprintf(out, capacity, "%s", s->why);
     else if (s->stalled)
         snprintf(out, capacity, "the server sent nothing for %g s",
@@ -609,7 +609,7 @@ static void try_again(ebpo_transfers *t, ebpo_slot *s, CURLcode code, double now
 {
     ebpo_request *r = s->request;
     char what[CURL_ERROR_SIZE], why[CURL_ERROR_SIZE + 160];
-    if (code == CURLE_OK && s->judged && s->verdict == EBPO_HTTP_PART && s->taken &&
+    if (code == CURLE_OK && s->has_verdict && s->verdict == EBPO_HTTP_PART && s->taken &&
         s->taken == s->response.last - s->response.begin + 1 && may_join(t, r) &&
         now < r->deadline) {
         r->due = now; /* the server sends smaller parts than requested: not a failure */
@@ -661,14 +661,14 @@ static void end_attempt(ebpo_transfers *t, ebpo_slot *s, CURLcode code)
     t->stats.bytes += s->received;
     t->stats.connections += (uint64_t)(connections > 0 ? connections : 0);
     t->stats.requests += (uint64_t)(redirects > 0 ? redirects : 0);
-    bool usable =
-        s->judged && !s->stopped && (s->verdict == EBPO_HTTP_PART || s->verdict == EBPO_HTTP_WHOLE);
-    if (s->judged && s->verdict == EBPO_HTTP_REFUSED)
+    bool usable = s->has_verdict && !s->stopped &&
+                  (s->verdict == EBPO_HTTP_PART || s->verdict == EBPO_HTTP_WHOLE);
+    if (s->has_verdict && s->verdict == EBPO_HTTP_REFUSED)
         finish_request(t, r, s->status, s->why);
     else if (usable && keep_arrived(s, code))
         finish_request(t, r, EBPO_OK, NULL);
     else if (code == CURLE_OK || s->stalled || is_temporary(code) ||
-             (s->judged && s->verdict == EBPO_HTTP_LATER))
+             (s->has_verdict && s->verdict == EBPO_HTTP_LATER))
         try_again(t, s, code, now);
     else
         finish_request(t, r, EBPO_E_IO, error_text(s, code));
@@ -795,7 +795,7 @@ static void *drive_transfers(void *transfers)
             continue;
         bool busy = running || wait * 1000 < IDLE_MS;
         int ms = (int)(wait * 1000) + 1;
-        curl_multi_poll(t->multi, NULL, 0, busy && ms > LOOK_MS ? LOOK_MS : ms, NULL);
+        curl_multi_poll(t->multi, NULL, 0, busy && ms > CHECK_MS ? CHECK_MS : ms, NULL);
         check_stop(t);
     }
 }

@@ -308,8 +308,8 @@ bool ebpo_edge_faces_turn(ebpo_edge_faces *e, const ebpo_mesh *mesh, uint32_t v,
         if (i == 0)
             first_sign = sign, first_axis = axis;
         int side = ebpo_orient3d(of.v, of.w, e->face[0].at, f->at);
-        bool beside = ebpo_normal_sign(first_axis, of.v, of.w, f->at) == first_sign;
-        f->quarter = side > 0 ? 1 : side < 0 ? 3 : beside ? 0 : 2;
+        bool same_side = ebpo_normal_sign(first_axis, of.v, of.w, f->at) == first_sign;
+        f->quarter = side > 0 ? 1 : side < 0 ? 3 : same_side ? 0 : 2;
         f->reversed = sign < 0;
         f->source = ebpo_mesh_source_face(mesh, f->face);
     }

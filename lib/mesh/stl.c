@@ -322,7 +322,7 @@ static ebpo_status keep_stl_colours(ebpo_mesh *mesh, const uint8_t *data, uint64
     return status == EBPO_OK && s.words ? add_words(mesh, &s, error) : status;
 }
 
-enum { STL_HEAD = 84, RELEASE = 1 << 22, LOOK_AHEAD = 1 << 16 };
+enum { STL_HEAD = 84, RELEASE = 1 << 22, CHECKED_BYTES = 1 << 16 };
 
 static bool is_blank(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
 
@@ -553,15 +553,15 @@ static ebpo_status make_faces(ebpo_import_build *b)
 
 static bool is_text(const uint8_t *data, uint64_t size)
 {
-    uint64_t look = size < LOOK_AHEAD ? size : LOOK_AHEAD;
-    const uint8_t *at = data, *end = data + look;
+    uint64_t checked = size < CHECKED_BYTES ? size : CHECKED_BYTES;
+    const uint8_t *at = data, *end = data + checked;
     if (!begins_solid(data, size) || memchr(data, 0, size < STL_HEAD ? size : STL_HEAD) ||
         fits_binary(data, size))
         return false;
     for (; at + 5 <= end; at++)
         if (strncasecmp((const char *)at, "facet", 5) == 0)
             return true;
-    return memchr(data, 0, look) == NULL;
+    return memchr(data, 0, checked) == NULL;
 }
 
 /* Builds the mesh. A file named .stl is text if it begins with the word solid and contains the word

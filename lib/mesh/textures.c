@@ -613,7 +613,7 @@ static char *path_of(const char *name)
 }
 
 /* Opens a file that the source names. */
-static found open_beside(const char *source, const char *name, ebpo_whole_file *out)
+static found open_next_to_source(const char *source, const char *name, ebpo_whole_file *out)
 {
     size_t length = (size_t)(ebpo_path_name(source) - source);
     char *path = path_of(name), *folder = strndup(length ? source : ".", length ? length : 1);
@@ -636,7 +636,7 @@ static found open_beside(const char *source, const char *name, ebpo_whole_file *
 static bool read_library(finding *f, const char *name)
 {
     ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
-    found how = f->tried++ < LIBRARIES ? open_beside(f->path, name, &file) : ABSENT;
+    found how = f->tried++ < LIBRARIES ? open_next_to_source(f->path, name, &file) : ABSENT;
     f->no_memory |= how == NO_MEMORY;
     bool good = how == FOUND && file.size <= LIBRARY_BYTES - f->library_bytes;
     if (good)
@@ -717,7 +717,7 @@ static ebpo_status add_image(finding *f, ebpo_attributes *to, const ebpo_texture
         [EBPO_TEXTURE_NAME] = { named->name, strlen(named->name) },
         [EBPO_TEXTURE_USE] = { named->use, named->use_bytes },
     };
-    found how = open_beside(f->path, named->name, &file);
+    found how = open_next_to_source(f->path, named->name, &file);
     f->absent += how == ABSENT;
     f->outside += how == OUTSIDE;
     if (how == NO_MEMORY)

@@ -63,7 +63,7 @@ typedef struct sizes {
     uint64_t only_read;                 /* memory that is needed only while reading, not for a slice
                                          * in memory */
     uint64_t nodes, list, planes, rows, slots;
-    uint64_t beside;
+    uint64_t reserve;
 } sizes;
 
 static uint64_t grid_bytes(uint64_t groups)
@@ -93,7 +93,7 @@ static sizes sizes_of(const counts *c, const ebpo_info *info)
         .planes = c->keeps_planes ? 4 * (c->groups + 1 + c->planes) : 0,
         .rows = c->below && info->solid ? c->leaves * sizeof(ebpo_kind_row) : 0,
         .slots = 4 * c->faces,
-        .beside = c->below ? 1 << 14 : 3 << 16,
+        .reserve = c->below ? 1 << 14 : 3 << 16,
     };
 }
 
@@ -192,7 +192,7 @@ static uint64_t peak_bytes(const sizes *t, const found *f)
              read = t->levels + t->mesh + t->outer + t->maps + t->only_read;
     uint64_t made =
         t->levels + kept + greater_of(greater_of(early, extents), late + t->slots) + layout;
-    return greater_of(greater_of(read, made), t->levels + kept + after) + t->beside;
+    return greater_of(greater_of(read, made), t->levels + kept + after) + t->reserve;
 }
 
 /* --- estimates --- */

@@ -39,7 +39,7 @@ uint64_t ebpo_skeleton_budget(const ebpo_model_options *o, uint64_t budget)
     return o->loading == EBPO_LOAD_CACHE && budget > least ? (budget - least) / 4 : 0;
 }
 
-uint64_t ebpo_beside_subtrees(const ebpo_model_options *o, uint64_t budget)
+uint64_t ebpo_bytes_besides_subtrees(const ebpo_model_options *o, uint64_t budget)
 {
     return ebpo_chunk_budget(budget) + ebpo_skeleton_budget(o, budget);
 }
@@ -182,12 +182,12 @@ static int cut_for(const ebpo_info *info, const ebpo_model_options *o, uint64_t 
         uint64_t grays = info->level[level].gray_count;
         uint64_t top = ebpo_top_estimate(info, level);
         if (top > budget / 4 ||
-            top + ebpo_beside_subtrees(o, budget) + EBPO_SUBTREES_LEAST > budget)
+            top + ebpo_bytes_besides_subtrees(o, budget) + EBPO_SUBTREES_LEAST > budget)
             return -1;
         if (grays == 0 || ebpo_accel_mean_bytes(&size, info, grays) * subtrees <= budget / 2)
             return level;
     }
-    return budget < ebpo_beside_subtrees(o, budget) + 2 * EBPO_SUBTREES_LEAST
+    return budget < ebpo_bytes_besides_subtrees(o, budget) + 2 * EBPO_SUBTREES_LEAST
                ? -1
                : info->level_count - 1;
 }
@@ -234,7 +234,7 @@ static int prefer_subtrees(const ebpo_info *info, const ebpo_model_options *o, i
     int level = info->subtree_level;
     uint64_t top = ebpo_top_estimate(info, level), budget = o->memory;
     return level > cut && top <= budget / 4 &&
-                   top + ebpo_beside_subtrees(o, budget) + EBPO_SUBTREES_LEAST <= budget
+                   top + ebpo_bytes_besides_subtrees(o, budget) + EBPO_SUBTREES_LEAST <= budget
                ? level
                : cut;
 }

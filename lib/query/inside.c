@@ -622,8 +622,8 @@ static const ebpo_accel *held_around(const inside_query *a, uint32_t *entry)
 
 /* Returns true when the context holds all data that p needs: then envelopes save nothing, and only
  * the faces of a leaf take time. */
-static bool result_at_hand(inside_query *a, ebpo_inside_result *out, ebpo_status *status,
-                           ebpo_error *error)
+static bool result_in_memory(inside_query *a, ebpo_inside_result *out, ebpo_status *status,
+                             ebpo_error *error)
 {
     const ebpo_model *m = a->context->model;
     uint32_t entry;
@@ -695,7 +695,7 @@ static ebpo_status inside_walk(ebpo_context *context, const double p[3],
     ebpo_status status;
     bool plain = options->envelopes != EBPO_ENVELOPES_USE && options->level < 0;
     if (plain && (m->whole || m->options.loading != EBPO_LOAD_NODES) &&
-        result_at_hand(&a, out, &status, error))
+        result_in_memory(&a, out, &status, error))
         return status;
     return !m->whole && m->options.loading == EBPO_LOAD_NODES ? walk_nodes(&a, out, error)
                                                               : walk_down(&a, out, error);

@@ -101,15 +101,15 @@ static bool gather_faces(const ebpo_accel *s, const ebpo_accel_leaf *leaf, ebpo_
 }
 
 /* Counts crossings of the leaf's faces with a segment along an axis. Skips blocks whose box has any
- * bit of `beside`: the lower side of such a box is above the lower side of the cell, where the
+ * bit of `excluded`: the lower side of such a box is above the lower side of the cell, where the
  * segment is. */
 static int32_t leaf_crossings(const ebpo_accel *s, const ebpo_accel_leaf *leaf,
-                              const double from[3], double to, int axis, uint64_t beside)
+                              const double from[3], double to, int axis, uint64_t excluded)
 {
     int32_t sum = 0;
     for (const ebpo_listed_block *at = s->list + leaf->list;; at++) {
         uint64_t listed = ebpo_listed(at);
-        for (unsigned lanes = listed & beside ? 0 : ebpo_listed_lanes(listed); lanes;
+        for (unsigned lanes = listed & excluded ? 0 : ebpo_listed_lanes(listed); lanes;
              lanes &= lanes - 1) {
             double t[3][3];
             ebpo_accel_triangle(

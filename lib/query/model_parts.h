@@ -137,7 +137,7 @@ enum { EBPO_CHUNKS_LEAST = 2 << 20 };
  * top and subtrees. */
 uint64_t ebpo_chunk_budget(uint64_t budget);
 uint64_t ebpo_skeleton_budget(const ebpo_model_options *options, uint64_t budget);
-uint64_t ebpo_beside_subtrees(const ebpo_model_options *options, uint64_t budget);
+uint64_t ebpo_bytes_besides_subtrees(const ebpo_model_options *options, uint64_t budget);
 
 /* --- the plan for a model's budget, from the counts in the file header --- */
 

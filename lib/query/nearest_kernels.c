@@ -293,7 +293,7 @@ EBPO_EIGHT uint32_t near_begin(ebpo_near_search *g, bool wide)
 }
 
 /* Pushes all children of a node but one. */
-EBPO_EIGHT uint32_t near_beside(ebpo_near_search *g, uint32_t node, uint32_t child)
+EBPO_EIGHT uint32_t near_other_children(ebpo_near_search *g, uint32_t node, uint32_t child)
 {
     float lower2[8];
     unsigned lanes = near_children(g, node, lower2);
@@ -332,7 +332,7 @@ EBPO_EIGHT void near_walk_in(ebpo_near_search *g, bool wide)
     while (near_walk_down(g, top, wide) && node != g->s->top) {
         uint32_t child = node;
         node = g->s->bound[node].parent;
-        top = near_beside(g, node, child);
+        top = near_other_children(g, node, child);
     }
 }
 

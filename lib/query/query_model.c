@@ -224,7 +224,7 @@ ebpo_status ebpo_model_has_capacity(const ebpo_model *m, const ebpo_node *leaf, 
     if (status != EBPO_OK || !m->options.memory)
         return status;
     ebpo_accel_estimate(&size, m->info, &keep, &peak);
-    uint64_t taken = m->top->bytes + ebpo_beside_subtrees(&m->options, m->options.memory);
+    uint64_t taken = m->top->bytes + ebpo_bytes_besides_subtrees(&m->options, m->options.memory);
     if (taken + peak <= m->options.memory)
         return EBPO_OK;
     return ebpo_fail(error, EBPO_E_LIMIT,
@@ -251,7 +251,7 @@ static ebpo_status open_whole(ebpo_model *m, ebpo_error *error)
 static ebpo_status make_own(ebpo_model *m, const ebpo_cache_source *source, ebpo_error *error)
 {
     uint64_t budget = m->options.memory, chunks = budget ? ebpo_chunk_budget(budget) : 0;
-    uint64_t taken = m->top->bytes + ebpo_beside_subtrees(&m->options, budget);
+    uint64_t taken = m->top->bytes + ebpo_bytes_besides_subtrees(&m->options, budget);
     if (budget && taken + EBPO_SUBTREES_LEAST > budget)
         return ebpo_fail(error, EBPO_E_LIMIT,
                          "levels 0 to %d and a cache take more than the budget of %" PRIu64
@@ -482,7 +482,7 @@ static ebpo_status too_little(const ebpo_model *m, uint32_t below, ebpo_error *e
         EBPO_OK)
         return EBPO_E_LIMIT;
     least = m->top->bytes + peak;
-    while (m->top->bytes + ebpo_beside_subtrees(&m->options, least) + peak > least)
+    while (m->top->bytes + ebpo_bytes_besides_subtrees(&m->options, least) + peak > least)
         least += least / 8 + 1;
     return ebpo_fail(error, EBPO_E_LIMIT,
                      "the memory budget of %" PRIu64

@@ -234,7 +234,7 @@ static bool casting_intersects(const casting *c, int facing, ebpo_ray_found *m)
         ebpo_ray_interior(&c->ray, triangle, facing, &m->intersection);
     else
         ebpo_ray_triangle(&c->ray, triangle, &m->intersection);
-    return m->intersection.meets &&
+    return m->intersection.intersects &&
            (c->sides == EBPO_RAY_BOTH ||
             m->intersection.facing == (c->sides == EBPO_RAY_FRONT ? 1 : -1));
 }

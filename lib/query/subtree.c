@@ -353,8 +353,8 @@ static void subtree_free_scratch(subtree_scratch *scratch)
 
 /* Returns the planes of the node at this level on the path to `octcode`. If the level is in the
  * subtree, `node` is the number of that node, and is set to the number of the next one. */
-static const uint32_t *planes_on_way(const ebpo_subtree *s, uint64_t octcode, int level,
-                                     uint64_t *node, uint32_t *count)
+static const uint32_t *planes_on_path(const ebpo_subtree *s, uint64_t octcode, int level,
+                                      uint64_t *node, uint32_t *count)
 {
     int last = ebpo_octcode_level(octcode), root = s->root.cell.level;
     *count = 0;
@@ -379,7 +379,7 @@ static void add_inherited(ebpo_subtree *s, uint64_t octcode, ebpo_subtree_node *
     uint64_t node = 0;
     for (int level = 0; level < cell.level; level++) {
         uint32_t count;
-        const uint32_t *codes = planes_on_way(s, octcode, level, &node, &count);
+        const uint32_t *codes = planes_on_path(s, octcode, level, &node, &count);
         for (uint32_t i = 0; i < count; i++) {
             int32_t n[3], d;
             if (ebpo_plane_code_decode(codes[i], n, &d))
@@ -403,7 +403,7 @@ static const ebpo_polytope *stored_envelope(ebpo_subtree *s, uint64_t octcode, e
     for (int level = 0; level <= last; level++) {
         ebpo_octcode own = octcode >> 3 * (last - level);
         uint32_t count;
-        const uint32_t *codes = planes_on_way(s, octcode, level, &node, &count);
+        const uint32_t *codes = planes_on_path(s, octcode, level, &node, &count);
         envelope = ebpo_envelope_held(stack, own);
         if (!envelope)
             envelope = ebpo_envelope_put(stack, own, codes, count);

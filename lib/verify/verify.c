@@ -35,14 +35,14 @@ typedef struct totals {
     ebpo_wide of[4]; /* sums of weights times colours, and of weights; all three times */
 } totals;
 
-typedef struct judging {
+typedef struct node_check {
     ebpo_tally *tally;
     const ebpo_reference_tree *view;
     ebpo_colours colours;
     bool by_face;
     double longest; /* side of the root cell */
     uint64_t leaves;
-} judging;
+} node_check;
 
 static void add_corner(uint64_t weight, const uint8_t *rgba, totals *sum)
 {
@@ -51,7 +51,7 @@ static void add_corner(uint64_t weight, const uint8_t *rgba, totals *sum)
     sum->of[3] = ebpo_wide_plus(sum->of[3], (ebpo_wide){ 0, weight });
 }
 
-static void add_listed(const judging *j, uint64_t face, totals *sum)
+static void add_listed(const node_check *j, uint64_t face, totals *sum)
 {
     const ebpo_mesh *mesh = &j->view->tree->mesh;
     double at[3][3], edge[2][3], across[3];
@@ -77,7 +77,7 @@ static void add_listed(const judging *j, uint64_t face, totals *sum)
                    sum);
 }
 
-static void add_list(judging *j, const ebpo_reference_node *leaf, totals *sum)
+static void add_list(node_check *j, const ebpo_reference_node *leaf, totals *sum)
 {
     const ebpo_level *level = &j->view->tree->level[leaf->cell.level];
     uint32_t count;
@@ -98,7 +98,7 @@ static bool is_nearest(const totals *sum, int channel, uint32_t byte)
            ebpo_wide_less(above, ebpo_wide_times(one, 2 * (uint64_t)byte + 2));
 }
 
-static void check_node(const judging *j, const ebpo_reference_node *node, const totals *sum)
+static void check_node(const node_check *j, const ebpo_reference_node *node, const totals *sum)
 {
     uint32_t colour = j->view->tree->level[node->cell.level].gray_colours[node->rank];
     bool right = true;
@@ -111,7 +111,7 @@ static void check_node(const judging *j, const ebpo_reference_node *node, const 
                              "its colour %06" PRIx32 " is not the mean of the faces below", colour);
 }
 
-static void judge_node(judging *j, const ebpo_reference_node *node, totals *above)
+static void judge_node(node_check *j, const ebpo_reference_node *node, totals *above)
 {
     totals sum = { { { 0, 0 } } };
     if (node->type == EBPO_LEAF)
@@ -126,7 +126,7 @@ static void judge_node(judging *j, const ebpo_reference_node *node, totals *abov
         above->of[i] = ebpo_wide_plus(above->of[i], sum.of[i]);
 }
 
-static bool vertices_differ(const judging *j)
+static bool vertices_differ(const node_check *j)
 {
     const uint8_t *rgba = j->colours.vertex;
     for (uint64_t i = 1; rgba && i < j->view->tree->mesh.vertex_count; i++)
@@ -141,7 +141,7 @@ static ebpo_status check_colours(ebpo_tally *tally, const ebpo_reference_tree *v
                                  ebpo_error *error)
 {
     const ebpo_tree *tree = view->tree;
-    judging j = { .tally = tally, .view = view };
+    node_check j = { .tally = tally, .view = view };
     if (!(tree->info.parts & EBPO_PART_COLOURS) || !view->has_mesh || tree->info.pruned)
         return EBPO_OK;
     ebpo_status status = ebpo_mesh_colours(&tree->mesh, &j.colours, error);

@@ -104,11 +104,11 @@ static const char *last_line_end(const char *text, size_t bytes)
 /* Takes all complete lines; the last line may lack its line end. */
 static void take_lines(points *p, points_block *b)
 {
-    size_t whole = 0, looked = 0;
+    size_t whole = 0, scanned = 0;
     for (;;) {
-        const char *last = last_line_end(b->bytes + looked, b->count - looked);
+        const char *last = last_line_end(b->bytes + scanned, b->count - scanned);
         whole = last ? (size_t)(last - b->bytes) + 1 : whole;
-        looked = b->count;
+        scanned = b->count;
         if (p->ended || b->count == POINTS_LINE ||
             (whole && (b->count >= POINTS_TEXT || !points_more_is_there(p))))
             break;

@@ -300,13 +300,13 @@ static ebpo_status add_sides(squares *s, ebpo_octcode code, ebpo_boolean_side si
                              ebpo_error *error)
 {
     const ebpo_boolean_cells *c = s->cells;
-    ebpo_cell cell = ebpo_cell_of_octcode(code), beside;
+    ebpo_cell cell = ebpo_cell_of_octcode(code), neighbour;
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < 6 && status == EBPO_OK; i++) {
         int step[3] = { 0, 0, 0 };
         step[i / 2] = i % 2 ? 1 : -1;
-        bool within = ebpo_cell_neighbour(cell, step, &beside);
-        ebpo_octcode other = within ? ebpo_octcode_of_cell(beside) : 0;
+        bool within = ebpo_cell_neighbour(cell, step, &neighbour);
+        ebpo_octcode other = within ? ebpo_octcode_of_cell(neighbour) : 0;
         bool in = within && is_in(c, other);
         bool wanted = side == EBPO_BOOLEAN_INNER ? in : !in && !(within && is_mixed(c, other));
         if (wanted)

@@ -185,8 +185,8 @@ static ebpo_status visit_pieces(piece_visit *l, ebpo_face_cuts *pieces, ebpo_err
     return status == EBPO_E_CANCELLED ? EBPO_OK : status;
 }
 
-ebpo_status ebpo_look_around_face(ebpo_two_models *two, int m, uint64_t face, ebpo_around_fn visit,
-                                  void *user, ebpo_error *error)
+ebpo_status ebpo_visit_around_face(ebpo_two_models *two, int m, uint64_t face, ebpo_around_fn visit,
+                                   void *user, ebpo_error *error)
 {
     double t[3][3];
     bool has_area;

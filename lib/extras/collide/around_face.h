@@ -47,9 +47,9 @@ EBPO_MUST_USE ebpo_status ebpo_two_models_face(const ebpo_two_models *two, int m
 
 /* Visits every piece of a face of model m; `face` is its number in the file. A face without area
  * has no pieces. */
-EBPO_MUST_USE ebpo_status ebpo_look_around_face(ebpo_two_models *two, int m, uint64_t face,
-                                                ebpo_around_fn visit, void *user,
-                                                ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_visit_around_face(ebpo_two_models *two, int m, uint64_t face,
+                                                 ebpo_around_fn visit, void *user,
+                                                 ebpo_error *error);
 
 /* Finds if a face of model m has a point that is in both models, as closed sets. */
 EBPO_MUST_USE ebpo_status ebpo_face_has_common_point(ebpo_two_models *two, int m, uint64_t face,

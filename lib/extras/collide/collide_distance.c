@@ -44,7 +44,7 @@ typedef struct nearest_pair {
     /* Output: lo <= distance <= hi, equal if the result is exact. */
     double lo, hi;
     bool found;
-    bool meets;      /* the faces of `best` intersect; a pair that is first may exist */
+    bool intersects; /* the faces of `best` intersect; a pair that is first may exist */
     int is_at_least; /* 1: yes, 0: no, -1: no comparison wanted, or undecided */
     ebpo_face_two best;
     bool ended; /* the search ended early: everything not visited is at least this far apart */
@@ -143,7 +143,7 @@ static bool consider_faces(nearest_pair *n, const ebpo_face_two *f)
     if (!(f->bounds.lo > 0) &&
         ebpo_triangle_pair(CORNERS(f, 0), CORNERS(f, 1)) != EBPO_PAIR_APART) {
         n->best = *f;
-        n->found = n->meets = true;
+        n->found = n->intersects = true;
         return false;
     }
     if (!isnan(n->at_least))
@@ -191,10 +191,10 @@ static bool judge_waiting(ebpo_gap_search *g)
 {
     nearest_pair *n = g->user;
     bool more = true;
-    unsigned judged = 0, i = 0;
+    unsigned evaluated = 0, i = 0;
     for (; i < g->waits && more; i++)
         if (!(g->waiting[i].low > g->limit))
-            more = take_faces(g, n, g->waiting[i].slot) && (++judged % 16 || go_on(g));
+            more = take_faces(g, n, g->waiting[i].slot) && (++evaluated % 16 || go_on(g));
     if (!more)
         n->lo = fmin(n->lo, least_waiting(g, i));
     g->waits = 0;
@@ -232,7 +232,7 @@ static void end_open(nearest_pair *n)
 static void nearest_pair_end(nearest_pair *n)
 {
     bool has_threshold = !isnan(n->at_least);
-    if (n->meets) {
+    if (n->intersects) {
         n->lo = n->hi = 0;
         n->is_at_least = has_threshold ? n->at_least <= 0 : -1;
     } else if (has_threshold) {
@@ -262,7 +262,7 @@ static void nearest_pair_leave(nearest_pair *n, double left)
 static void nearest_pair_begin(nearest_pair *n)
 {
     n->lo = n->left = INFINITY;
-    n->found = n->meets = n->ended = false;
+    n->found = n->intersects = n->ended = false;
     n->status = EBPO_OK;
     n->is_at_least = -1;
 }
@@ -281,7 +281,7 @@ static void nearest_pair_start(nearest_pair *n, const ebpo_posing posing[2],
 static void nearest_pair_found(nearest_pair *n, const ebpo_gap_search *g, const uint32_t slot[2])
 {
     inspect_slots(g, slot, &n->best);
-    n->found = n->meets = true;
+    n->found = n->intersects = true;
 }
 
 /* Returns the distance beyond which pairs do not matter any more. */
@@ -295,7 +295,7 @@ static double nearest_pair_limit(const nearest_pair *n)
 /* Returns true if further pairs cannot change the result. */
 static bool nearest_pair_is_done(const nearest_pair *n)
 {
-    return n->meets || n->is_at_least >= 0 || n->ended || n->status != EBPO_OK;
+    return n->intersects || n->is_at_least >= 0 || n->ended || n->status != EBPO_OK;
 }
 
 /* Limits the search by what is already known. */
@@ -314,7 +314,7 @@ static void begin_search(const nearest_pair *n, ebpo_gap_search *g)
  * `before`. */
 static void judge_rest(ebpo_gap_search *g, nearest_pair *n, float before)
 {
-    if (nearest_pair_is_done(n) || !judge_waiting(g) || n->meets || !isnan(n->at_least))
+    if (nearest_pair_is_done(n) || !judge_waiting(g) || n->intersects || !isnan(n->at_least))
         return;
     if (n->tolerance > 0 && g->best < before)
         take_faces(g, n, g->best_slot);
@@ -356,15 +356,15 @@ static ebpo_status distance_of_accels(const ebpo_collision *q, const ebpo_accel 
 {
     ebpo_collider *c = q->collider;
     ebpo_posing posing[2] = { q->posing[0].posing, q->posing[1].posing };
-    int32_t meet = 0;
+    int32_t intersects = 0;
     if (accel[0]->bound_count == 0 || accel[1]->bound_count == 0)
         return EBPO_OK;
     ebpo_gap_begin(c->gap, accel, posing, q->reach);
     ebpo_status status =
-        may_intersect ? ebpo_collision_first(q, accel, stage, &meet, error) : EBPO_OK;
+        may_intersect ? ebpo_collision_first(q, accel, stage, &intersects, error) : EBPO_OK;
     if (status != EBPO_OK)
         return status;
-    if (meet == 1) {
+    if (intersects == 1) {
         nearest_pair_found(n, c->gap, c->walk.found_slot);
         return EBPO_OK;
     }
@@ -487,7 +487,7 @@ static void report_pair(const ebpo_collision *q, const nearest_pair *n, ebpo_cle
     double point[2][3];
     for (int i = 0; i < 6; i++)
         point[i / 3][i % 3] = f->bounds.point[i / 3][i % 3];
-    if (n->meets) {
+    if (n->intersects) {
         kind =
             ebpo_triangle_pair((const double(*)[3])f->corner[0], (const double(*)[3])f->corner[1]);
         clash_point(f, kind, point);

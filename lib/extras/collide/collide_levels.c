@@ -22,7 +22,7 @@ typedef struct level_search {
     /* output */
     double lo, hi;       /* bounds of the distance of faces */
     uint64_t open_pairs; /* pairs whose faces may intersect */
-    bool meets;          /* the solids or faces certainly have a common point */
+    bool intersects;     /* the solids or faces certainly have a common point */
     bool may_intersect;  /* an undecided pair may have a common point */
 } level_search;
 
@@ -124,7 +124,7 @@ static ebpo_status add_node_pair(level_search *g, const ebpo_posed_node node[2],
     content has[2] = { content_of(g, 0, &node[0]), content_of(g, 1, &node[1]) };
     ebpo_node_gap pair = { { node[0], node[1] }, 0 };
     bool faces = has[0] == FACES && has[1] == FACES;
-    if (has[0] == NOTHING || has[1] == NOTHING || (!faces && g->meets))
+    if (has[0] == NOTHING || has[1] == NOTHING || (!faces && g->intersects))
         return EBPO_OK;
     ebpo_status status = ebpo_node_gap_of(&g->nodes, node, &pair.gap, error);
     pair.gap = fmax(pair.gap, gap); /* the gap of their parents is a bound, too */
@@ -133,7 +133,7 @@ static ebpo_status add_node_pair(level_search *g, const ebpo_posed_node node[2],
     if (faces)
         g->hi = fmin(g->hi, ebpo_node_far_bound(&g->nodes, node));
     else if (certainly_intersect(g, node, has))
-        g->meets = true;
+        g->intersects = true;
     return ebpo_node_gaps_push(&g->nodes, &pair, error);
 }
 
@@ -193,7 +193,7 @@ static ebpo_status search_levels(level_search *g, ebpo_error *error)
         ebpo_node_gap pair = ebpo_node_gaps_pop(&g->nodes);
         bool faces = has_faces(g, &pair);
         g->current_query->collider->node_pairs++;
-        if ((!faces && g->meets) || pair.gap > g->lo)
+        if ((!faces && g->intersects) || pair.gap > g->lo)
             continue;
         if (ebpo_collision_is_late(g->current_query) || is_full(g)) {
             close_pair(g, &pair);
@@ -239,7 +239,7 @@ static void fill_result(const ebpo_collision *q, const level_search *g, ebpo_lev
                          : lo == 0 || isinf(g->hi) ? EBPO_VALUE_BOUND
                                                    : EBPO_VALUE_INTERVAL;
     out->distance = (ebpo_certain){ lo, g->hi, value_kind, 0 };
-    out->common = g->meets ? 1 : g->may_intersect ? -1 : 0;
+    out->common = g->intersects ? 1 : g->may_intersect ? -1 : 0;
     out->contact = g->open_pairs ? -1 : 0;
     out->open_pairs = g->open_pairs;
     out->level_a = last_level(q->model[q->turned], q->options.level);

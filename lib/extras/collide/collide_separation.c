@@ -53,7 +53,7 @@ typedef struct separation_search {
                         * moves extents */
     double sure;       /* `last` is certainly not earlier */
     separation_pair *pairs; /* a heap, the greatest first */
-    uint64_t count, capacity, looked;
+    uint64_t count, capacity, evaluations;
 } separation_search;
 
 /* Extents along the axes of a convex set, or of a set that it contains. */
@@ -167,7 +167,7 @@ static void inspect_faces(separation_search *s, const double a[3][3], const doub
 {
     double most = ebpo_sweep_max(a, b, s->direction, INFINITY);
     ebpo_sweep_time t;
-    s->looked++;
+    s->evaluations++;
     if (most < s->sure)
         return;
     ebpo_sweep_time_init(&t);
@@ -283,7 +283,7 @@ static ebpo_status separation_search_run(separation_search *s, const ebpo_accel 
     while (status == EBPO_OK && s->count > 0 && s->pairs[0].most >= s->sure) {
         if (ebpo_collision_is_late(s->current_query))
             break;
-        if (s->looked % 64 == 0 &&
+        if (s->evaluations % 64 == 0 &&
             !ebpo_progress_step(progress, "separation distance", 0, 0, error)) {
             status = EBPO_E_CANCELLED;
             break;

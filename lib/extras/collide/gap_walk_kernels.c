@@ -500,7 +500,7 @@ EBPO_EIGHT bool let_wait(ebpo_gap_search *g, f8 low, unsigned used, const uint32
                          const near_lanes *near, unsigned at)
 {
     float lows[8];
-    bool meets = false;
+    bool intersects = false;
     used &= f8_bits(f8_at_most(low, f8_all(g->limit)));
     if (!used)
         return false;
@@ -511,9 +511,9 @@ EBPO_EIGHT bool let_wait(ebpo_gap_search *g, f8 low, unsigned used, const uint32
         c->low = lows[i];
         for (int s = 0; s < 2; s++)
             c->slot[s] = block[s] * 8 + (uint32_t)near->lane[s][at + i];
-        meets = meets || !(lows[i] > 0);
+        intersects = intersects || !(lows[i] > 0);
     }
-    return meets;
+    return intersects;
 }
 
 /* Returns false when enough is known. */
@@ -531,7 +531,7 @@ static bool block_pair(ebpo_gap_search *g, const uint32_t block[2])
     near_lanes near;
     near_by_boxes(g, a, b, shift, error + 0x1p-22f * size, &near);
     g->block_pairs++;
-    bool meets = false;
+    bool intersects = false;
     if (near.count && !ebpo_gap_wait_capacity(g))
         return false;
     for (unsigned at = 0; at < near.count; at += 8) {
@@ -542,9 +542,9 @@ static bool block_pair(ebpo_gap_search *g, const uint32_t block[2])
         place8 direction;
         bounds_of_pairs8(&p, &q, size, error, &low, &high, &direction);
         take_nearer(g, high, &direction, used, block, &near, at);
-        meets |= let_wait(g, low, used, block, &near, at);
+        intersects |= let_wait(g, low, used, block, &near, at);
     }
-    return !meets || g->judge(g);
+    return !intersects || g->judge(g);
 }
 
 /* --- the walk --- */

@@ -145,8 +145,8 @@ EBPO_EIGHT ebpo_pair_masks on_line8(const face8 *a, const face8 *b, const sides8
     f8 lower = vector8_dot(vector8_cross(q, y), v), upper = vector8_dot(vector8_cross(r, w), y);
     f8 minus = f8_sub(f8_all(0), bound);
     f8 apart = f8_or(f8_less(bound, lower), f8_less(bound, upper)),
-       meet = f8_and(f8_less(lower, minus), f8_less(upper, minus));
-    return (ebpo_pair_masks){ (uint8_t)f8_bits(apart), (uint8_t)f8_bits(meet) };
+       intersects = f8_and(f8_less(lower, minus), f8_less(upper, minus));
+    return (ebpo_pair_masks){ (uint8_t)f8_bits(apart), (uint8_t)f8_bits(intersects) };
 }
 
 /* --- bounds --- */

@@ -221,7 +221,7 @@ static bool inspect_pair_one(relating *r, int m, uint64_t face)
     if ((is_mixed(r) && r->two.solid[m]) || has_bit(r->seen[m], face))
         return true;
     set_bit(r->seen[m], face);
-    r->status = ebpo_look_around_face(&r->two, m, face, note_piece, &f, r->error);
+    r->status = ebpo_visit_around_face(&r->two, m, face, note_piece, &f, r->error);
     if (r->status == EBPO_OK && ++r->inspected % 64 == 0 &&
         !ebpo_progress_step(&r->current_query->options.progress, stage, 0, 0, r->error))
         r->status = EBPO_E_CANCELLED;
@@ -397,7 +397,7 @@ static bool is_sound(relating *r, int m, uint64_t face)
     facing f = { r, m };
     r->examined = r->doubtful = false;
     if (r->status == EBPO_OK)
-        r->status = ebpo_look_around_face(&r->two, m, face, note_sound, &f, r->error);
+        r->status = ebpo_visit_around_face(&r->two, m, face, note_sound, &f, r->error);
     return r->status == EBPO_OK && r->examined && !r->doubtful;
 }
 

@@ -177,7 +177,7 @@ static void wait_for(ebpo_ball_walk *w, uint64_t node)
 
 void ebpo_ball_set_out(ebpo_ball_walk *w)
 {
-    w->stage = EBPO_BALL_LOOKS;
+    w->stage = EBPO_BALL_SEARCHES;
     w->part = 1;
     w->intersected.count = 0;
     w->cut = false;
@@ -306,7 +306,7 @@ static ebpo_ball_end ball_walk_check(ebpo_ball_walk *w, ebpo_ball_work *work)
 
 ebpo_ball_end ebpo_ball_go_on(ebpo_ball_walk *w, ebpo_ball_work *work)
 {
-    if (w->stage == EBPO_BALL_LOOKS) {
+    if (w->stage == EBPO_BALL_SEARCHES) {
         if (!find_contact(w, work))
             return EBPO_BALL_LATER;
         begin_check(w);

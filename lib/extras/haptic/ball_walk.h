@@ -35,8 +35,8 @@ typedef struct ebpo_ball_work {
 
 typedef enum ebpo_ball_stage {
     EBPO_BALL_STANDS,
-    EBPO_BALL_LOOKS, /* search for the first contact */
-    EBPO_BALL_CHECKS /* check that the centre crosses nothing */
+    EBPO_BALL_SEARCHES, /* search for the first contact */
+    EBPO_BALL_CHECKS    /* check that the centre crosses nothing */
 } ebpo_ball_stage;
 
 typedef struct ebpo_ball_walk {
@@ -49,7 +49,7 @@ typedef struct ebpo_ball_walk {
     bool cut;                               /* the path ends before the contact, because the work
                                              * was used up */
     double to[3];                           /* end of the piece, known after the search */
-    ebpo_near_queue queue;                  /* used at EBPO_BALL_LOOKS */
+    ebpo_near_queue queue;                  /* used at EBPO_BALL_SEARCHES */
     uint64_t stack[64]; /* used at EBPO_BALL_CHECKS; each level leaves one node */
     int depth;
 } ebpo_ball_walk;

@@ -108,16 +108,16 @@ void ebpo_haptic_step_ball(ebpo_haptic *t, const double device[3], ebpo_haptic_b
 {
     EBPO_DEFAULT_FP;
     double at[3], from[3], moved[3], along_at[3];
-    bool astray = false;
+    bool bad_input = false;
     ebpo_ball_work work = { 0 };
     if (t->options.kind != EBPO_HAPTIC_BALL) {
         *out = (ebpo_haptic_ball_result){ .face = EBPO_NO_FACE, .flags = EBPO_HAPTIC_WRONG_KIND };
         return;
     }
     for (int i = 0; i < 3; i++)
-        astray |= !(fabs(device[i]) <= 0x1p200);
-    ebpo_vec3_copy(astray ? t->device : device, at);
-    *out = (ebpo_haptic_ball_result){ .flags = astray ? EBPO_HAPTIC_BAD_INPUT : 0 };
+        bad_input |= !(fabs(device[i]) <= 0x1p200);
+    ebpo_vec3_copy(bad_input ? t->device : device, at);
+    *out = (ebpo_haptic_ball_result){ .flags = bad_input ? EBPO_HAPTIC_BAD_INPUT : 0 };
     ebpo_vec3_subtract(at, t->device, moved);
     ebpo_passive_moved(&t->passive, t->force, moved, 3);
     ebpo_vec3_copy(t->proxy, from);

@@ -129,7 +129,7 @@ void ebpo_haptic_step_probe(ebpo_haptic *t, const double place[3], ebpo_haptic_p
 {
     EBPO_DEFAULT_FP;
     double at[3];
-    bool astray = false;
+    bool bad_input = false;
     bounds b = { 0, INFINITY };
     *out = (ebpo_haptic_probe_result){ .face = EBPO_NO_FACE, .where = EBPO_MAYBE };
     if (t->options.kind != EBPO_HAPTIC_PROBE) {
@@ -137,9 +137,9 @@ void ebpo_haptic_step_probe(ebpo_haptic *t, const double place[3], ebpo_haptic_p
         return;
     }
     for (int i = 0; i < 3; i++)
-        astray |= !(fabs(place[i]) <= 0x1p200);
-    ebpo_vec3_copy(astray ? t->device : place, at);
-    out->flags = (astray ? EBPO_HAPTIC_BAD_INPUT : 0) | ebpo_haptic_stopped(t);
+        bad_input |= !(fabs(place[i]) <= 0x1p200);
+    ebpo_vec3_copy(bad_input ? t->device : place, at);
+    out->flags = (bad_input ? EBPO_HAPTIC_BAD_INPUT : 0) | ebpo_haptic_stopped(t);
     ebpo_vec3_copy(at, t->proxy);
     ebpo_vec3_copy(at, t->device);
     (void)ebpo_haptic_take_box(t);

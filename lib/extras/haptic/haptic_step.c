@@ -50,7 +50,7 @@ typedef struct around {
     ebpo_near_queue queue;
     double search_radius; /* all faces that are closer to the ball than this have been found */
     double nearest;       /* distance from the centre to the nearest face */
-    uint32_t looked;
+    uint32_t visited_faces;
     uint32_t count; /* number of entries of t->found */
     ebpo_haptic_ball_result *out;
 } around;
@@ -77,7 +77,7 @@ static void add_face(around *a, uint64_t f)
     ebpo_face_near near;
     ebpo_face_nearest(a->t->proxy, face, &near);
     double gap = near.distance - a->t->options.radius;
-    a->looked++;
+    a->visited_faces++;
     if (!(gap < a->t->options.search_radius))
         return;
     a->t->found[a->count] = (uint32_t)f;
@@ -109,7 +109,8 @@ static void wait_for(around *a, uint64_t node)
 static void find_faces(around *a)
 {
     for (uint32_t visits = 0; a->queue.count > 0; visits++) {
-        if (visits >= EBPO_HAPTIC_VISITS || a->looked + EBPO_FACE_BOX_LEAF > EBPO_HAPTIC_FACES) {
+        if (visits >= EBPO_HAPTIC_VISITS ||
+            a->visited_faces + EBPO_FACE_BOX_LEAF > EBPO_HAPTIC_FACES) {
             a->out->flags |= EBPO_HAPTIC_PARTIAL;
             a->search_radius = fmin(a->search_radius, a->queue.item[0].key - a->t->options.radius);
             return;
@@ -168,7 +169,7 @@ void ebpo_haptic_find_nearest(ebpo_haptic *t, ebpo_haptic_ball_result *out)
         wait_for(&a, 1);
         find_faces(&a);
     }
-    out->work += a.looked;
+    out->work += a.visited_faces;
     report_normal(&a, out->normal);
     out->depth = -fmin(t->options.search_radius, a.nearest - t->options.radius);
 }

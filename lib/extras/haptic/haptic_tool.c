@@ -280,7 +280,7 @@ static bool begin_tool_motion(ebpo_haptic *t, const double wanted[EBPO_SCREW], u
     ebpo_rigid end;
     ebpo_rigid_go(&tool->proxy, tool->motion, 1, tool->arm, &end);
     ebpo_rigid_matrix(&end, tool->to_matrix);
-    tool->stage = EBPO_TOOL_LOOKS;
+    tool->stage = EBPO_TOOL_SEARCHES;
     tool->at = tool->close_count = tool->pool_count = 0;
     tool->part = 1;
     return true;
@@ -300,13 +300,13 @@ static uint32_t continue_tool_motion(ebpo_haptic *t, uint64_t *work, bool *arriv
     tool_piece p = piece_of(t, work);
     ebpo_tool *tool = t->tool;
     *arrived = false;
-    for (; tool->stage == EBPO_TOOL_LOOKS && tool->at < tool->cluster_count; tool->at++) {
+    for (; tool->stage == EBPO_TOOL_SEARCHES && tool->at < tool->cluster_count; tool->at++) {
         if (*work > EBPO_TOOL_WORK)
             return EBPO_HAPTIC_INCOMPLETE;
         if (!inspect_cluster(&p, (uint32_t)tool->at))
             return give_up(&p);
     }
-    if (tool->stage == EBPO_TOOL_LOOKS)
+    if (tool->stage == EBPO_TOOL_SEARCHES)
         begin_check(tool);
     for (; tool->at < tool->close_count; tool->at++) {
         if (*work > EBPO_TOOL_WORK)
@@ -435,8 +435,8 @@ void ebpo_haptic_step_tool(ebpo_haptic *t, const double place[3], const double t
         out->flags = EBPO_HAPTIC_WRONG_KIND;
         return;
     }
-    bool astray = !ebpo_rigid_read(place, turn, &device);
-    if (astray)
+    bool bad_input = !ebpo_rigid_read(place, turn, &device);
+    if (bad_input)
         device = tool->device;
     ebpo_rigid_between(&tool->device, &device, tool->arm, moved);
     ebpo_passive_moved(&t->passive, tool->force, moved, EBPO_SCREW);
@@ -456,7 +456,7 @@ void ebpo_haptic_step_tool(ebpo_haptic *t, const double place[3], const double t
     ebpo_vec3_copy(tool->proxy.place, out->proxy);
     for (int k = 0; k < 4; k++)
         out->turn[k] = tool->proxy.turn[k];
-    out->flags = flags | (astray ? EBPO_HAPTIC_BAD_INPUT : 0) | ebpo_haptic_stopped(t);
+    out->flags = flags | (bad_input ? EBPO_HAPTIC_BAD_INPUT : 0) | ebpo_haptic_stopped(t);
     if ((flags & EBPO_HAPTIC_WAITING) && tool->stage == EBPO_TOOL_STANDS)
         ebpo_haptic_try_other(t);
     ebpo_haptic_count(t, out->flags, out->work);

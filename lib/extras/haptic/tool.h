@@ -113,7 +113,7 @@ typedef struct ebpo_tool_close {
 
 typedef enum ebpo_tool_stage {
     EBPO_TOOL_STANDS,
-    EBPO_TOOL_LOOKS,
+    EBPO_TOOL_SEARCHES,
     EBPO_TOOL_CHECKS
 } ebpo_tool_stage;
 

@@ -94,10 +94,10 @@ static ebpo_status paint_two(ebpo_scene *scene, const clash *c, unsigned threads
                              ebpo_error *error)
 {
     const ebpo_scene_clash *m = &c->worst;
-    bool meet = m->touching + m->coplanar + m->crossing > 0;
+    bool intersects = m->touching + m->coplanar + m->crossing > 0;
     uint8_t *red[2] = { NULL, NULL };
     ebpo_status status =
-        meet ? painted_find_red(scene, m->a, m->b, c->time, threads, red, error) : EBPO_OK;
+        intersects ? painted_find_red(scene, m->a, m->b, c->time, threads, red, error) : EBPO_OK;
     for (int i = 0; i < 2 && status == EBPO_OK; i++) {
         bool outer = m->kind == EBPO_CLASH_ENCLOSED &&
                      m->relation == (i ? EBPO_A_INSIDE_B : EBPO_B_INSIDE_A);
@@ -253,7 +253,7 @@ static ebpo_status draw_tile(clash_strip *s, const painted_mesh *p, double time,
     s->done++;
     ebpo_status status =
         draw_model(&s->picture, x, y, HEIGHT - caption, &view, p, s->threads, error);
-    snprintf(text, sizeof text, "time %.4g: %llu meet", time, (unsigned long long)count);
+    snprintf(text, sizeof text, "time %.4g: %llu clash", time, (unsigned long long)count);
     if (status == EBPO_OK && caption)
         status =
             picture_caption(&s->picture, x, y + HEIGHT - caption, WIDTH, caption, ink, text, error);

@@ -42,7 +42,7 @@ typedef struct results {
     bench_metrics metrics;
     ebpo_model_stats model, model_end; /* after the first pass, and at the end */
     traffic traffic;                   /* traffic of the warm session */
-    uint64_t answered[4];              /* inside: by ebpo_where; else NOTHING, FOUND or INTERVAL */
+    uint64_t counts[4];                /* inside: by ebpo_where; else NOTHING, FOUND or INTERVAL */
 } results;
 
 /* The words of --mode depend on the query. */
@@ -207,13 +207,13 @@ static void count_results(const bench_job *job, results *r)
     const ebpo_ray_hit *hit = job->result_values;
     for (uint64_t i = 0; i < job->count; i++)
         if (job->query == BENCH_INSIDE)
-            r->answered[inside[i].where & 3]++;
+            r->counts[inside[i].where & 3]++;
         else if (job->query == BENCH_DISTANCE)
-            r->answered[isnan(distance[i].distance)   ? INTERVAL
-                        : isinf(distance[i].distance) ? NOTHING
-                                                      : FOUND]++;
+            r->counts[isnan(distance[i].distance)   ? INTERVAL
+                      : isinf(distance[i].distance) ? NOTHING
+                                                    : FOUND]++;
         else
-            r->answered[hit[i].face != EBPO_NO_FACE ? FOUND : NOTHING]++;
+            r->counts[hit[i].face != EBPO_NO_FACE ? FOUND : NOTHING]++;
 }
 
 static int save_results(const bench_job *job, const char *path)
@@ -264,7 +264,7 @@ static void print_results_of(const values *v, const results *r)
         printf(" %11s", v->query == BENCH_INSIDE ? inside_names[i] : other_names[i]);
     printf("\n%-12s", "");
     for (int i = 0; i < count; i++)
-        printf(" %11" PRIu64, r->answered[i]);
+        printf(" %11" PRIu64, r->counts[i]);
     putchar('\n');
 }
 
@@ -307,7 +307,7 @@ static void json_results(json *j, const values *v, const results *r)
     int count = result_kinds(v);
     json_object(j, "results");
     for (int i = 0; i < count; i++)
-        json_uint(j, v->query == BENCH_INSIDE ? inside_names[i] : other_names[i], r->answered[i]);
+        json_uint(j, v->query == BENCH_INSIDE ? inside_names[i] : other_names[i], r->counts[i]);
     json_end(j);
 }
 

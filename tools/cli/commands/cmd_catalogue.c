@@ -186,7 +186,7 @@ static char *real_folder(const char *path)
 
 /* Returns the relative path from folder `a` to files in `b`: "", "x/" or "../x/"; or NULL. Both
  * must be resolved. */
-static char *way_between(const char *a, const char *b)
+static char *relative_path(const char *a, const char *b)
 {
     size_t same = 0, at = 0;
     for (;; at++) { /* common folders */
@@ -200,24 +200,24 @@ static char *way_between(const char *a, const char *b)
     for (const char *s = a + same; *s; s++)
         ups += *s == '/' && s[1];
     const char *rest = b + same + (b[same] == '/');
-    char *way = malloc(3 * ups + strlen(rest) + 2), *end = way;
-    for (size_t i = 0; way && i < ups; i++)
+    char *path = malloc(3 * ups + strlen(rest) + 2), *end = path;
+    for (size_t i = 0; path && i < ups; i++)
         end = stpcpy(end, "../");
-    if (way) {
+    if (path) {
         end = stpcpy(end, rest);
         strcpy(end, *rest ? "/" : "");
     }
-    return way;
+    return path;
 }
 
 /* Finds the prefix of paths in the catalogue. Returns the exit code. */
-static int find_way(catalogue *c)
+static int find_relative_path(catalogue *c)
 {
     char *a = real_folder(c->out), *b = a ? realpath(c->folder, NULL) : NULL;
     bool reached = b || errno == ENOMEM;
     if (!reached)
         fprintf(stderr, "ebpo catalogue: %s: %s\n", a ? c->folder : c->out, strerror(errno));
-    c->from = b ? way_between(a, b) : NULL;
+    c->from = b ? relative_path(a, b) : NULL;
     int code = c->from ? EXIT_FINE : reached ? command_no_memory("catalogue") : EXIT_FAILED;
     free(a);
     free(b);
@@ -339,7 +339,7 @@ static int make_catalogue(catalogue *c)
         return c->files.no_memory ? command_no_memory("catalogue") : EXIT_FAILED;
     if (ebpo_check_output(c->out, &error) != EBPO_OK)
         return command_failed("catalogue", &error);
-    int code = find_way(c);
+    int code = find_relative_path(c);
     if (code != EXIT_FINE || overwrites_model(c, &code))
         return code;
     if (!inspect_all(c))

@@ -138,12 +138,12 @@ static uint64_t thread_clock(void)
     return (uint64_t)t.tv_sec * UINT64_C(1000000000) + (uint64_t)t.tv_nsec;
 }
 
-static void move_ball(ebpo_haptic *haptic, const haptic_pose *hand, haptic_result *a)
+static void move_ball(ebpo_haptic *haptic, const haptic_pose *pose, haptic_result *a)
 {
     ebpo_haptic_ball_result r;
-    ebpo_haptic_step_ball(haptic, hand->place, &r);
+    ebpo_haptic_step_ball(haptic, pose->place, &r);
     memcpy(a->proxy.place, r.proxy, sizeof r.proxy);
-    memcpy(a->proxy.turn, hand->turn, sizeof hand->turn);
+    memcpy(a->proxy.turn, pose->turn, sizeof pose->turn);
     memcpy(a->force, r.force, sizeof r.force);
     memcpy(a->normal, r.normal, sizeof r.normal);
     a->depth = r.depth;
@@ -151,10 +151,10 @@ static void move_ball(ebpo_haptic *haptic, const haptic_pose *hand, haptic_resul
     a->flags = r.flags;
 }
 
-static void turn_tool(ebpo_haptic *haptic, const haptic_pose *hand, haptic_result *a)
+static void turn_tool(ebpo_haptic *haptic, const haptic_pose *pose, haptic_result *a)
 {
     ebpo_haptic_tool_result r;
-    ebpo_haptic_step_tool(haptic, hand->place, hand->turn, &r);
+    ebpo_haptic_step_tool(haptic, pose->place, pose->turn, &r);
     memcpy(a->proxy.place, r.proxy, sizeof r.proxy);
     memcpy(a->proxy.turn, r.turn, sizeof r.turn);
     memcpy(a->force, r.force, sizeof r.force);
@@ -165,11 +165,11 @@ static void turn_tool(ebpo_haptic *haptic, const haptic_pose *hand, haptic_resul
     a->flags = r.flags;
 }
 
-static void sense_distance(const haptic_play *p, const haptic_pose *hand, haptic_result *a)
+static void sense_distance(const haptic_play *p, const haptic_pose *pose, haptic_result *a)
 {
     ebpo_haptic_probe_result r;
-    ebpo_haptic_step_probe(p->haptic, hand->place, &r);
-    a->proxy = *hand;
+    ebpo_haptic_step_probe(p->haptic, pose->place, &r);
+    a->proxy = *pose;
     memcpy(a->normal, r.normal, sizeof r.normal);
     a->depth = r.distance;
     a->lo = r.lo;
@@ -184,17 +184,17 @@ static void sense_distance(const haptic_play *p, const haptic_pose *hand, haptic
 static bool play_step(const haptic_play *p, uint64_t i, haptic_times *out)
 {
     haptic_result result = { .depth = 0 };
-    haptic_pose hand;
+    haptic_pose pose;
     if (!p->haptic)
         return true;
-    if (!p->device->read(p->device->self, i, &hand))
+    if (!p->device->read(p->device->self, i, &pose))
         return false;
     if (p->record)
-        p->record[i] = hand;
+        p->record[i] = pose;
     switch (p->kind) {
-    case EBPO_HAPTIC_BALL: move_ball(p->haptic, &hand, &result); break;
-    case EBPO_HAPTIC_PROBE: sense_distance(p, &hand, &result); break;
-    case EBPO_HAPTIC_TOOL: turn_tool(p->haptic, &hand, &result); break;
+    case EBPO_HAPTIC_BALL: move_ball(p->haptic, &pose, &result); break;
+    case EBPO_HAPTIC_PROBE: sense_distance(p, &pose, &result); break;
+    case EBPO_HAPTIC_TOOL: turn_tool(p->haptic, &pose, &result); break;
     }
     p->device->write(p->device->self, &result);
     out->between_mean += result.hi - result.lo; /* a sum, until the end */

@@ -116,10 +116,11 @@ static void print_volume(const ebpo_info *info, const ebpo_mass *mass)
         return;
     printf("  integral  of the winding number: %s%s%s\n",
            table_scaled(cell, 16, mass->scaled_integral, 3 * mass->exponent), unit,
-           known ? ""
-                 : "; centroid and inertia are those of the winding number as a density:\n"
-                   "            components meet, repeat or cross themselves, or the mesh is no "
-                   "2-manifold");
+           known
+               ? ""
+               : "; centroid and inertia are those of the winding number as a density:\n"
+                 "            components intersect, repeat or cross themselves, or the mesh is no "
+                 "2-manifold");
 }
 
 static void print_mass(const char *path, const ebpo_info *info, const ebpo_mass *mass,

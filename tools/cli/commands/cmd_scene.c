@@ -238,7 +238,7 @@ static const char *word_of(const ebpo_scene_approach_result *w)
     return w->reached > 0 ? "reached" : w->reached == 0 ? "apart" : "open";
 }
 
-static void way_json(listing *l, const ebpo_scene_approach_result *w)
+static void approach_json(listing *l, const ebpo_scene_approach_result *w)
 {
     json *j = &l->j;
     json_object(j, NULL);
@@ -254,7 +254,7 @@ static void way_json(listing *l, const ebpo_scene_approach_result *w)
 }
 
 /* Prints all digits of bounds. */
-static void print_way(const listing *l, const ebpo_scene_approach_result *w)
+static void print_approach(const listing *l, const ebpo_scene_approach_result *w)
 {
     char time[32], lo[32], hi[32];
     printf("%s\t%s\t%s\t%s\t", words_real(w->time, time), word_of(w), name_of(l, w->a),
@@ -264,7 +264,8 @@ static void print_way(const listing *l, const ebpo_scene_approach_result *w)
     printf("%s\n", words_real(w->hi, hi));
 }
 
-static bool print_ways(void *user, const ebpo_scene_approach_result *approaches, uint64_t count)
+static bool print_approaches(void *user, const ebpo_scene_approach_result *approaches,
+                             uint64_t count)
 {
     listing *l = user;
     l->approaches += count;
@@ -274,9 +275,9 @@ static bool print_ways(void *user, const ebpo_scene_approach_result *approaches,
         l->open += w->reached < 0;
         l->evaluations += w->evaluations;
         if (l->v->json)
-            way_json(l, w);
+            approach_json(l, w);
         else
-            print_way(l, w);
+            print_approach(l, w);
     }
     return true;
 }
@@ -346,7 +347,7 @@ static ebpo_status scene_approach(const scene_values *v, const char *path, ebpo_
     }
     ebpo_status status =
         v->least ? ebpo_scene_least_distances(scene, v->from, v->to, &how, print_leasts, &l, error)
-                 : ebpo_scene_approach(scene, v->from, v->to, &how, print_ways, &l, error);
+                 : ebpo_scene_approach(scene, v->from, v->to, &how, print_approaches, &l, error);
     progress_wipe(&line);
     if (status != EBPO_OK)
         return status;

@@ -31,14 +31,14 @@ static ebpo_status measure_radii(own *o, ebpo_context *context, ebpo_error *erro
     for (int h = 0; h < HIGH; h++)
         for (int a = 0; a < ROUND; a++) {
             double angle = 2 * pi * a / ROUND, height = 0.9 * ((double)h / (HIGH - 1) - 0.5);
-            double from[3], way[3];
+            double from[3], direction[3];
             ebpo_ray_hit hit;
             bool is_hit;
             place_at(o, angle, height, 0.8, from);
-            place_at(o, angle, height, 0, way);
+            place_at(o, angle, height, 0, direction);
             for (int k = 0; k < 3; k++)
-                way[k] -= from[k];
-            ebpo_status status = ebpo_ray_first(context, from, way, 1, &hit, &is_hit, error);
+                direction[k] -= from[k];
+            ebpo_status status = ebpo_ray_first(context, from, direction, 1, &hit, &is_hit, error);
             if (status != EBPO_OK)
                 return status;
             o->hit[h][a] = is_hit ? 0.8 * (1 - hit.t) : 0.1;
