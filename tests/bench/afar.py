@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""What a distance from far away takes: tests/bench/afar.py EBPO MODELS... [--count N] [--seed S]
+"""Measures distance queries from far away: tests/bench/afar.py EBPO MODELS... [--count N] [--seed S]
 
-MODELS are .ebpo.h5 files, which are held in memory as wholes. N points are asked for each row, one
-after the other by one thread, each without starting from the answer before, by `ebpo bench`: around
-the model, at one size of its box from the middle; and far away, at 16 to 1e300 sizes, in random
-directions, and along axes and diagonals, where sides may face the point.
+MODELS are .ebpo.h5 files, which are kept completely in memory. Each row has N points. One thread queries them one
+after the other with `ebpo bench`; no query starts from the previous result. The rows: around the model, at one
+size of its box from the center; far away, at 16 to 1e300 sizes in random directions; and far away along axes and
+diagonals, where a side of the model may face the point.
 """
 import argparse
 import itertools

@@ -45,7 +45,7 @@ def library(ebpo, model, query, raw):
 
 
 def ask_large(ebpo, model, folder, turns):
-    """Queries one point after the other, each in a new process."""
+    """Query one point after the other, each in a new process."""
     raw, out = f"{folder}/large.raw", f"{folder}/out"
     subprocess.run([ebpo, "bench", "--count", "20", "--save-points", raw, model],
                    stdout=subprocess.DEVNULL, check=True)
@@ -73,7 +73,7 @@ def main():
     parser.add_argument("--count", type=int, default=1000000)
     parser.add_argument("--turns", type=int, default=9)
     parser.add_argument("--before", help="an older ebpo, for comparison")
-    parser.add_argument("--large", help="a large model; queries one point of it")
+    parser.add_argument("--large", help="a large model, in which one point is queried")
     a = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         raw, text, one = (str(pathlib.Path(folder, n)) for n in ("p.raw", "p.txt", "one.txt"))

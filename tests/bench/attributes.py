@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Remakes docs/measured/attributes.md: compares every PLY of a folder with its copy from a file, a subset and HTTP, and
-measures the size of attributes.
+"""Remakes docs/measured/attributes.md.
+
+Compares every PLY of a folder with its copies from a file, a subset and HTTP, and measures the size of attributes.
 
     tests/bench/attributes.py EBPO MODELS_DIR... > docs/measured/attributes.md
 
-EBPO: the tool; MODELS_DIR: folders of PLY files. tests/cli/same_ply.py compares; it has a separate PLY reader. Exit code
-1: something differs.
+EBPO: the tool; MODELS_DIR: folders of PLY files. tests/cli/same_ply.py compares the files; it has a separate PLY
+reader. Exit code 1: a file differs.
 """
 import functools
 import http.server
@@ -27,7 +28,7 @@ wrong = []
 
 
 class Ranges(http.server.SimpleHTTPRequestHandler):
-    """Files of a folder by byte ranges; `sent`: bytes of bodies."""
+    """Serves byte ranges of the files in a folder. `sent`: bytes of response bodies."""
     protocol_version = "HTTP/1.1"
     sent = 0
 
@@ -69,7 +70,7 @@ def verdict(name, what, compare, source, other):
 
 
 def half(info):
-    """A box that cuts the model: half of it along each axis."""
+    """Return a box that contains half of the model along each axis."""
     low, size = info["box_origin"], info["box_size"]
     return ",".join(repr(v) for v in (*low, *(a + b / 2 for a, b in zip(low, size))))
 

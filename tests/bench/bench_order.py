@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """bench_order.py FILE.ebpo.h5 [--memory 8M] [--points 200000]
 
-What it is worth that ebpo.dask asks points in Morton order: subtrees loaded, bytes read and seconds for
-points at random in the root cell, as they come and by a catalogue of the one model. With PYTHONPATH at the
-package, as docs/guide/python.md says.
+Measures the benefit of Morton order, in which ebpo.dask queries points. Prints subtrees loaded, bytes read and seconds
+for random points in the root cell: in random order, and through a catalogue of the one model, which sorts them. Needs
+PYTHONPATH as in docs/guide/python.md.
 """
 import argparse
 import time
@@ -31,8 +31,8 @@ begin = time.monotonic()
 winding = catalogue.winding(points)
 ordered = time.monotonic() - begin
 if (winding != expected).any():
-    raise SystemExit("the answers differ")
+    raise SystemExit("the results differ")
 before, after = model.stats, process_models().stats()
 for name in ("loads", "bytes_read"):
-    print(f"{name}: {before[name]} as they come, {after[name]} in order: {before[name] / max(1, after[name]):.1f} times")
-print(f"time: as they come {loose / ordered:.1f} times as long")
+    print(f"{name}: {before[name]} unsorted, {after[name]} sorted: {before[name] / max(1, after[name]):.1f} times")
+print(f"time: unsorted takes {loose / ordered:.1f} times as long")

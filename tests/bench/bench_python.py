@@ -1,15 +1,17 @@
 #!/usr/bin/env python3
-"""What Python costs, and what other packages of Python answer: bench_python.py MODEL.ebpo.h5
+"""Measures the overhead of Python, and other Python packages: bench_python.py MODEL.ebpo.h5
 
     PYTHONPATH=build/tools/python tests/bench/bench_python.py bunny.ebpo.h5 [--points 1000000] [--threads N]
                                                                [--rounds 9]
 
-First: Model.inside, and the same points by ebpo_inside_many on as many threads, each with a context
-and a share of the points, into an array that is there already. Both in turns, in one process; the
-ratio is the median of the rounds. Then Open3D's RaycastingScene and trimesh, where they are
-installed: times as a ratio to Model's in the same round, and how many of their answers differ from
-the exact ones, for points in the box of the model and for those within a millionth of its size of its
-faces: inside, distances that are off by more than a millionth of that size, rays that meet something.
+First measures Model.inside, and ebpo_inside_many for the same points on as many threads. Each of these threads has a
+context and a share of the points, and writes to an existing array. The two run in turns in one process; the ratio is
+the median of the rounds.
+
+Then measures Open3D's RaycastingScene and trimesh, if they are installed: the ratio of their times to those of Model in
+the same round, and the number of their results that differ from the exact ones. The points are in the model's box, or
+within a millionth of its size of a face. Compared are inside, distances (a difference above a millionth of that size),
+and whether a ray hits a face.
 """
 import argparse
 import statistics
@@ -32,7 +34,7 @@ def seconds(function, *arguments):
 
 
 class Plain:
-    """ebpo_inside_many on threads, as a program in C has it."""
+    """ebpo_inside_many on threads, as in a C program."""
 
     def __init__(self, model, points, threads):
         self.points, self.out = points, np.zeros(len(points), np.dtype(c.ebpo_inside_result))
@@ -61,7 +63,7 @@ def cost(model, points, threads, rounds):
         times = {}
         for name, function in order[::1 if number % 2 else -1]:
             times[name], answer = seconds(function)
-        if number:  # the first one warms up
+        if number:  # the first round only warms up
             ratios.append(times["python"] / times["c"])
     assert np.array_equal(model.inside(points), plain.out["where"] != c.EBPO_OUT)
     print(f"Model.inside / ebpo_inside_many, {len(points)} points, {threads} threads: {statistics.median(ratios):.2f} "
@@ -97,7 +99,7 @@ def along(points):
 
 
 def wrong(question, answer, exact, size):
-    """Whether points are inside and rays meet anything has one answer; a distance may be rounded."""
+    """Return which results are wrong: another truth value, or a distance with more than a rounding error."""
     if question == "inside":
         return answer != exact
     if question == "ray":
@@ -110,12 +112,12 @@ def compare(model, sets, rounds):
     size = np.linalg.norm(np.ptp(mesh.vertices, axis=0))
     ours = {"inside": model.inside, "distance": lambda points: model.distance(points, signed=False).distance,
             "ray": lambda points: model.ray(points, along(points)).t}
-    print("| package | question | points | time / Model's | wrong answers |\n|---|---|---|---|---|")
+    print("| package | query | points | time / Model's | wrong results |\n|---|---|---|---|---|")
     for name, make in (("Open3D", open3d), ("trimesh", trimesh)):
         try:
             theirs = make(mesh)
         except ImportError as error:
-            print(f"| {name} | | | | not here: {error} |")
+            print(f"| {name} | | | | not available: {error} |")
             continue
         for question, where, points in ((q, w, p) for q in ours for w, p in sets.items()):
             ratios = []

@@ -1,13 +1,12 @@
 #!/usr/bin/env python3
-"""Compares pictures of coarse levels with those of the model, for docs/measured/coarse-looks.md.
+"""Compares pictures of coarse levels with pictures of the model, for docs/measured/coarse-looks.md.
 
     /usr/bin/python3 tests/bench/coarse_looks.py BUILD_DIR FILE.ebpo.h5 [--levels 3-7]
     [--directions 5]
 
-Draws the model and its levels from up to 20 directions and prints the SSIM and the difference of the
-pictures, for each way of shading: polygon normals; cell faces with the normals of the planes around
-them; normals that a file could store; and pictures taken around the model (BP-Octree thesis, 4.4).
-No result depends on the machine.
+Draws the model and its levels from up to 20 directions. Prints the SSIM and the difference of the pictures for each
+method of shading: polygon normals; cell faces with the normals of the planes around them; normals that a file could
+store; and pictures taken around the model (BP-Octree thesis, 4.4). No result depends on the machine.
 
 Needs numpy, and ninja -C BUILD_DIR tests/bench/looks_samples tests/bench/jpeg_pictures.
 """
@@ -19,12 +18,12 @@ import zlib
 
 import numpy
 
-PIXELS = 320       # the side of a picture; two samples across each
-LARGE, SMALL = 384, 192  # of one that is stored
+PIXELS = 320       # width and height of a picture; each pixel has 2 x 2 samples
+LARGE, SMALL = 384, 192  # width and height of stored pictures
 NONE = 0xffffffff
 BACKGROUND = numpy.array([.80, .82, .85])
 PLAIN = numpy.array([.66, .54, .40])
-SURE = .25, .6     # the viewer's: lengths of a field between which it begins to count
+SURE = .25, .6     # from the viewer: lengths of a field between which its weight rises from 0 to 1
 BUDGETS = [50, 100, 200, 500, 1000, 2000, 5000]  # KB
 
 
@@ -35,7 +34,7 @@ def unit(v):
 
 
 def cameras(directions):
-    """Right, up, back of each."""
+    """Return the axes right, up and back of each camera."""
     out = []
     for back in directions:
         up = numpy.array([0, 1., 0]) if abs(back[1]) < .99 else numpy.array([0, 0, -1.])
@@ -45,7 +44,7 @@ def cameras(directions):
 
 
 def dodecahedron():
-    """Its 20 corners, turned so that none is where a picture is taken."""
+    """Return the 20 corners of a dodecahedron, turned away from the directions of stored pictures."""
     g = (1 + 5 ** .5) / 2
     corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
     for a in (-1 / g, 1 / g):
@@ -56,7 +55,7 @@ def dodecahedron():
 
 
 def octahedron(halvings):
-    """Corners of an octahedron whose edges were halved so often: 6, 18, 66, 258."""
+    """Return the corners of an octahedron after `halvings` subdivisions of its edges: 6, 18, 66, 258."""
     n = 2 ** halvings
     return unit(numpy.array(sorted(
         {(a * i, b * j, (n - a - b) * k) for a in range(n + 1) for b in range(n + 1 - a)
@@ -75,7 +74,7 @@ def srgb(v):
 
 
 def lit(n, colour):
-    """Linear light of normals in the camera's axes."""
+    """Return the linear light of normals, which are in the camera's axes."""
     key, fill, half = ((n @ numpy.array(v)).clip(0)[:, None] for v in (
         (-.46, .62, .635), (.86, .10, .50), (-.254, .343, .904)))
     warm, cool = numpy.array([1, .97, .92]), numpy.array([.9, .95, 1])
@@ -99,7 +98,7 @@ def covered(hit):
     return halved(hit[..., None].astype(float))[..., 0] > 0
 
 
-# --- likeness: SSIM (Wang and others 2004), a Gaussian of 11 pixels, sigma 1.5 ---
+# --- similarity: SSIM (Wang and others 2004), a Gaussian of 11 pixels, sigma 1.5 ---
 
 def blurred(a):
     w = numpy.exp(-numpy.arange(-5, 6) ** 2 / 4.5)
@@ -113,7 +112,7 @@ def blurred(a):
 
 
 class Reference:
-    """A picture that others are compared with: three channels of 0 to 255, and where it counts."""
+    """A reference picture for comparisons: three channels of 0 to 255, and the mask of its object."""
 
     def __init__(self, image, inside):
         self.channels, self.inside = srgb(image), inside
@@ -121,8 +120,9 @@ class Reference:
         self.squares = [blurred(self.channels[..., k] ** 2) for k in range(3)]
 
     def likeness(self, image, inside):
-        """Mean SSIM of the channels, and the root of the mean square of differences, where one of
-        the two shows something."""
+        """Return the mean SSIM of the channels, and the root mean square difference, where one of the two pictures
+        shows the object.
+        """
         where = self.inside | inside
         part = tuple(slice(max(0, at.min() - 5), at.max() + 6) for at in numpy.nonzero(where))
         where, other, mine = where[part], srgb(image[part]), self.channels[part]
@@ -137,8 +137,11 @@ class Reference:
 
 
 def check_likeness():
-    """Known values: 1 of the same, (2ab + c1) / (a a + b b + c1) of even pictures, and of a picture
-    and its negative around the same mean nearly -1."""
+    """Check known values of the SSIM.
+
+    Equal pictures have 1; constant pictures have (2ab + c1) / (a a + b b + c1); a picture and its negative around the same
+    mean have nearly -1.
+    """
     random = numpy.random.default_rng(1).random((64, 64, 3)) * .2 + .1
     all_of_it = numpy.ones((64, 64), bool)
     assert abs(Reference(random, all_of_it).likeness(random, all_of_it)[0] - 1) < 1e-12
@@ -151,7 +154,7 @@ def check_likeness():
     assert Reference(one, all_of_it).likeness(two, all_of_it)[0] < -.9
 
 
-# --- what is drawn ---
+# --- samples ---
 
 class Shown:
     """The output of looks_samples."""
@@ -181,12 +184,12 @@ class Shown:
         out.unlink()
 
     def area(self, some=slice(None)):
-        """Cross products of triangles' sides."""
+        """Return the cross products of the triangles' sides."""
         a, b, c = (self.xyz[self.faces[some, k]].astype("f8") for k in range(3))
         return numpy.cross(b - a, c - a)
 
     def at(self, view):
-        """Where something is seen, of what, and shares of its corners."""
+        """Return the mask of the object in a view, the triangle of each sample, and its barycentric coordinates."""
         samples = self.samples[view]
         hit = samples["id"] != NONE
         share = samples["share"][hit].astype("f8")
@@ -215,13 +218,13 @@ class Model:
                            for hit, light, _ in self.shots(self.views, 2 * PIXELS)]
 
     def shots(self, views, samples):
-        """Of the full model: where it is seen, light, normals."""
+        """Return mask, light and normals of the full model, for each view."""
         shown = Shown(self.bench, self.path, "mesh", views, self.scale, samples, self.scratch)
         out = []
         for i, view in enumerate(views):
             hit, which, share = shown.at(i)
             n = unit(self.normal[which]) @ view.T
-            n *= numpy.where(n[:, 2:] < 0, -1, 1)  # backs of surfaces
+            n *= numpy.where(n[:, 2:] < 0, -1, 1)  # back sides of surfaces
             out.append((hit, lit(n, shown.colour(which, share)), n @ view))
         return out
 
@@ -230,7 +233,7 @@ class Model:
         return (cells[:, 0] * n + cells[:, 1]) * n + cells[:, 2]
 
     def of_cells(self, level):
-        """Cells with something in them: keys, sums of normals, and of their lengths."""
+        """Return the cells with faces: keys, sums of normals, and sums of the normals' lengths."""
         if level not in self.cells:
             if level < self.deepest:
                 keys, sums = self.of_cells(level + 1)
@@ -247,7 +250,7 @@ class Model:
 
 
 def octahedral(n):
-    """As two bytes, and what these mean."""
+    """Return normals as two bytes each, and the normals that these bytes encode."""
     n = n / numpy.maximum(numpy.abs(n).sum(1, keepdims=True), 1e-30)
 
     def fold(v, where):
@@ -259,7 +262,7 @@ def octahedral(n):
 
 
 class Level:
-    """A level's envelopes with normals of several kinds."""
+    """A level's envelopes with several kinds of normals."""
 
     def __init__(self, model, path, level):
         self.model, self.level = model, level
@@ -283,7 +286,7 @@ class Level:
         self.corner = self.corner.reshape(-1, 8)
 
     def walls(self):
-        """Which triangles lie on walls that are not the root cell's."""
+        """Return which triangles are on cell faces that are not on the root cell's faces."""
         node, out = self.shown.face_node, numpy.zeros(len(self.area), bool)
         for axis in range(3):
             at, last = self.cell[node, axis], (1 << self.depth[node]) - 1
@@ -294,15 +297,17 @@ class Level:
         return out
 
     def own(self):
-        """Of each node what its planes add up to, as in the viewer: a vector, and its length
-        without cancelling."""
+        """Return the sum of each node's planes, as in the viewer: a vector, and its length without cancellation."""
         some = ~self.wall
         return numpy.stack([numpy.bincount(self.shown.face_node[some], w[some], len(self.cell))
                             for w in (*self.area.T, numpy.linalg.norm(self.area, axis=1))], 1)
 
     def stored(self, leaves=False):
-        """The same of the surface below: a direction of two bytes, its length in 16 steps. Leaves
-        have their parent's, or their own. And the bytes that zlib makes of the level's."""
+        """Return the same for the surface in each node, as a file could store it, and the bytes that zlib makes of it.
+
+        Directions have two bytes, lengths 16 steps.
+        leaves: leaves have their own normals; otherwise those of their parents.
+        """
         out = numpy.zeros((len(self.cell), 4))
         code = []
         up = 0 if leaves else 1
@@ -323,7 +328,7 @@ class Level:
         return out, len(zlib.compress(code[:, 0].tobytes() + code[:, 1].tobytes(), 6))
 
     def field(self, of_nodes):
-        """At vertices, between means at cells' corners."""
+        """Return the field at vertices, interpolated between means at the cells' corners."""
         s, sums = self.shown, numpy.zeros((self.corner.max() + 1, 4))
         for c in range(8):
             for k in range(4):
@@ -349,7 +354,7 @@ class Level:
 # --- pictures around the model ---
 
 class Taken:
-    """Pictures from the directions that some numbers of them need, light and normals."""
+    """Pictures from the directions that a number of pictures needs, with light and normals."""
 
     def __init__(self, model, halvings):
         self.directions = {h: octahedron(h) for h in halvings}
@@ -384,7 +389,7 @@ class Pictures:
                               capture_output=True, check=True)
         decoded = numpy.frombuffer(done.stdout, "u1").reshape(len(images), pixels, pixels, 3)
         self.image = dict(zip(needed, decoded.astype("f8")))
-        self.one = int(done.stderr) / len(needed)  # bytes, the mean of those that are needed
+        self.one = int(done.stderr) / len(needed)  # bytes, the mean of the needed pictures
         self.bytes = self.one * len(self.directions)
         self.scale = model.scale
 
@@ -393,7 +398,7 @@ class Pictures:
 
     @staticmethod
     def grown(image, seen):
-        """What is seen also around it, where coarser envelopes look for it."""
+        """Extend the object in a picture beyond its border, because coarser envelopes are larger than the object."""
         image, seen = image.copy(), seen.copy()
         for _ in range(16):
             total, count = numpy.zeros_like(image), numpy.zeros(seen.shape)
@@ -407,7 +412,7 @@ class Pictures:
         return image
 
     def on(self, back, places):
-        """What the nearest one shows at places, and the direction it was taken from."""
+        """Return the values of the nearest picture at positions, and the direction from which it was taken."""
         i = self.nearest(back)
         camera, image = self.cameras[i], self.image[i]
         at = (places - self.scale[0]) @ camera.T * (self.pixels / 2 / self.scale[1])
@@ -427,7 +432,7 @@ def towards(n, view):
 
 
 def compare_nodes(model, level, of_nodes):
-    """Mean SSIM, mean difference, lit by node normals."""
+    """Return mean SSIM and mean difference when node normals give the light."""
     field, values = level.field(of_nodes), []
     for i, view in enumerate(model.views):
         hit, which, share = level.shown.at(i)
@@ -438,7 +443,7 @@ def compare_nodes(model, level, of_nodes):
 
 
 def compare(model, level, pictures, stored):
-    """Of each way of drawing: bytes beside the level's, mean SSIM, mean difference."""
+    """Return for each method of shading: bytes in addition to the level's, mean SSIM, mean difference."""
     s, found = level.shown, {}
     field, (of_nodes, node_bytes) = level.field(level.own()), stored
     node_field = level.field(of_nodes)
@@ -479,7 +484,7 @@ def run(*arguments):
 
 
 def budget_table(rows):
-    """The best of each way within each budget."""
+    """Print the best result of each method within each budget."""
     ways = {}
     for name, level, size, likeness in rows:
         ways.setdefault(name, []).append((size, likeness, level))

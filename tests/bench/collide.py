@@ -22,7 +22,7 @@ import tempfile
 
 from query_page import handwritten, reflow
 
-# Question, FCL's name for it, kinds of poses.
+# Query, FCL's name for it, kinds of poses.
 ROWS = [
     ("first contact", "first", "first", ("slight", "deep", "slight-turned", "deep-turned")),
     ("none", "first", "first", ("none",)),
@@ -37,7 +37,7 @@ def run(command):
 
 
 def ask(program, model, poses, question, rounds, pairs=None):
-    """What it took to be made, and (kind, microseconds, value) for each pose."""
+    """Return the cost of construction, and (kind, microseconds, value) for each pose."""
     lines = run([program, model, poses, question, rounds] + ([pairs] if pairs else [])).splitlines()
     made = lines[0].split()
     answers = [(kind, float(us), float(value)) for kind, us, value in map(str.split, lines[1:])]
@@ -55,7 +55,7 @@ def read_pairs(path):
 
 
 def compare_pairs(ours, theirs):
-    """Pairs in all, those only we have, those only they have."""
+    """Return the number of all pairs, of pairs that only we report, and of pairs that only they report."""
     out = [0, 0, 0]
     for a, b in zip(read_pairs(ours), read_pairs(theirs)):
         out[0] += len(a)
@@ -91,7 +91,7 @@ def measure(build, ply, tree, args, folder):
 
 
 def study(name, count, got, pairs):
-    """Returns the values of one model that the page has."""
+    """Return the values of one model for the page."""
     cells = {(title, kind): (mean(got["ours", ours][1], kind), mean(got["theirs", theirs][1], kind))
              for title, ours, theirs, kinds in ROWS for kind in kinds}
     deep = [(us, n) for k, us, n in got["ours", "all"][1] if k.startswith("deep") and n]
@@ -109,7 +109,7 @@ def speeds(models, *titles):
 
 
 def missed(models):
-    """Returns the goals that a model misses, one line a model."""
+    """Return the missed goals of all models, one line for each model."""
     out = []
     for m in models:
         slow = [f"{' '.join(dict.fromkeys((title, kind)))} {b / a:.1f}" for (title, kind), (a, b) in m["cells"].items()
@@ -160,7 +160,7 @@ def head(models, made):
 
 
 def cross(build, a, b, size, memory, question, steps):
-    """What opening took, and (microseconds, pairs, loads, bytes) for each step."""
+    """Return the cost of opening, and (microseconds, pairs, loads, bytes) for each step."""
     lines = run([build / "tests/bench/peers/crossing_ebpo", a, b, steps, question, size,
                  memory]).splitlines()
     made = lines[0].split()
@@ -205,11 +205,11 @@ def main():
     parser.add_argument("build", type=pathlib.Path)
     parser.add_argument("out", type=pathlib.Path)
     parser.add_argument("models", nargs="+", metavar="PLY=EBPO")
-    parser.add_argument("--poses", type=int, default=4, help="of each kind, straight and turned")
+    parser.add_argument("--poses", type=int, default=4, help="poses of each kind, straight and turned")
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--fcl-rounds", type=int, default=2)
     parser.add_argument("--crossing", action="append", default=[], metavar="A=B=SIZE=BYTES")
-    parser.add_argument("--steps", type=int, default=40, help="of each crossing")
+    parser.add_argument("--steps", type=int, default=40, help="steps of each crossing")
     args = parser.parse_args()
     names = " ".join("=".join(pathlib.Path(p).name for p in m.split("=")) for m in args.models)
     made = [f"    tests/bench/collide.py BUILD collide.md {names} --poses {args.poses} "

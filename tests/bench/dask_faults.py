@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """dask_faults.py EBPO MODEL [--rows N] [--seconds S] [--folder F]: fault injection for ebpo.dask.
 
-Classifies N uniform points (10^7) as inside or outside MODEL, by two worker processes of one thread each,
-into a .npy: once undisturbed, and then, when a tenth of the chunks has been written (`away`: at the start),
-with a fault:
+Two worker processes with one thread each classify N uniform points (10^7) as inside or outside MODEL, into a .npy.
+They do it once without a fault, and once with each fault, which begins when a tenth of the chunks is written (`away`:
+at the start):
 
     away      the server of MODEL responds 503 to every request for S seconds (60)
     stopped   a worker gets SIGSTOP, and SIGCONT after S seconds
@@ -12,7 +12,7 @@ with a fault:
 
 For `away` the workers read the model by HTTP without a cache. Prints a line for each fault: seconds, seconds
 of the fault, chunks that were ready at its start, and refused requests. Exit code 1: the results differ from
-those of `ebpo inside`. Needs dask.distributed, and PYTHONPATH at the package.
+those of `ebpo inside`. Needs dask.distributed, and PYTHONPATH naming the package's folder.
 """
 import argparse
 import http.server
@@ -38,7 +38,7 @@ BLOCK = 1 << 20
 
 
 class Server(http.server.ThreadingHTTPServer):
-    """Ranges of a file; 503 until `until`."""
+    """Serves ranges of a file; returns 503 until `until`."""
     daemon_threads, until, refused, answered, data = True, 0.0, 0, 0, b""
 
 
@@ -72,7 +72,7 @@ def make_points(path, rows, box):
 
 
 class Trouble:
-    """What happens to the workers and the server; each is given what it is done to, and the seconds."""
+    """The faults. Each method gets the workers or the server, and the seconds."""
 
     @staticmethod
     def calm(_server, _pids, _seconds, _done):
@@ -103,7 +103,7 @@ class Trouble:
 
 
 def run(name, args, server, model, points, expected):
-    """One of them, from a cluster of its own. Whether the answers are equal."""
+    """Run one fault on a new cluster. Return True when the results are equal."""
     out = args.folder / f"{name}.npy"
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None,
                                   memory_limit=None) as cluster, distributed.Client(cluster) as client:
@@ -138,10 +138,10 @@ def run(name, args, server, model, points, expected):
     told = np.load(out)
     equal = told["where"].tobytes() == expected[:, 0].astype("i1").tobytes() and (
         told["winding"].tobytes() == expected[:, 1].tobytes())
-    print(f"{name:8} {seconds:6.1f} s, trouble for {trouble:5.1f} s from chunk {ready} of {of}; "
-          f"{server.refused - refused} requests refused; {'equal' if equal else 'OTHER ANSWERS'}", flush=True)
+    print(f"{name:8} {seconds:6.1f} s, fault for {trouble:5.1f} s from chunk {ready} of {of}; "
+          f"{server.refused - refused} requests refused; {'equal' if equal else 'DIFFERENT RESULTS'}", flush=True)
     if name == "away" and server.refused == refused:
-        print("away: nothing was asked of the server meanwhile")
+        print("away: no request reached the server during the fault")
         return False
     return equal
 

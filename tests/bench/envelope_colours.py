@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
-"""envelope_colours.py FILE.ebpo.h5 ...: what colours of envelopes cost in a file that has them: stored
-bytes of each level's types and planes, and of its colours. Needs h5py."""
+"""envelope_colours.py FILE.ebpo.h5 ...: measures the size of the colours of envelopes.
+
+Prints for each level the stored bytes of types and planes, and of colours. Needs h5py.
+"""
 import sys
 
 import h5py

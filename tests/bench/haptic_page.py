@@ -22,13 +22,13 @@ def load():
 
 
 def steal():
-    """Returns the clock ticks that the host gave to other machines, and all."""
+    """Return the clock ticks that the host gave to other machines, and all clock ticks."""
     numbers = [int(n) for n in open("/proc/stat", encoding="ascii").readline().split()[1:]]
     return numbers[7], sum(numbers)
 
 
 def tool_of(path, radius):
-    """10,000 points on a ball."""
+    """Write 10,000 points on a sphere, as a tool."""
     with open(path, "w", encoding="ascii") as out:
         for i in range(10000):
             z, a = 1 - (2 * i + 1) / 10000, 2.399963229728653 * i
@@ -51,8 +51,10 @@ def play(ebpo, model, words):
 
 
 def sums_beside(folder, seconds):
-    """Starts a loop that does the same arithmetic in each step without the library: its times show the
-    delays of the machine."""
+    """Start a loop with the same arithmetic in each step, without the library.
+
+    Its times show the delays of the machine.
+    """
     program = folder + "/tick_alone"
     subprocess.run(["cc", "-O2", os.path.join(os.path.dirname(os.path.abspath(__file__)), "tick_alone.c"),
                     "-o", program, "-lm"], check=True)

@@ -1,6 +1,7 @@
-"""Remakes docs/pictures/touch.png: haptic_picture.py EBPO BUNNY.ply PICTURE, with the package ebpo in
-PYTHONPATH. A hand (orange, hidden within) goes along behind the bunny's flank; its proxy (red) stays on
-the side from which it came.
+"""Remakes docs/pictures/touch.png: haptic_picture.py EBPO BUNNY.ply PICTURE
+
+PYTHONPATH must name the folder of the package ebpo. The device (orange, hidden inside) moves behind the surface of the
+bunny's flank; its proxy (red) stays outside.
 """
 import math
 import subprocess
@@ -13,7 +14,7 @@ import numpy as np
 
 
 def tube(way, radius, colour):
-    """Vertices, faces and colours of a tube of six sides along points."""
+    """Return vertices, faces and colours of a tube of six sides along points."""
     way = np.asarray(way)
     along = np.gradient(way, axis=0)
     along /= np.maximum(np.linalg.norm(along, axis=1), 1e-30)[:, None]
@@ -49,14 +50,14 @@ def main(program, ply, picture):
     knots = np.array([[-0.2, -0.02, 0.9], [-0.15, -0.02, 0.2], [0.3, -0.02, 0.15], [0.35, -0.02, 0.9]])
     haptic = ebpo.Haptic(model, middle + size * knots[0], radius=0.004 * size[0])
     devices, proxies = [], []
-    for i in range(3000):  # in, along behind the surface in waves, out again
+    for i in range(3000):  # into the solid, along behind the surface in waves, out again
         leg, part = divmod(3 * i / 3000, 1)
         at = knots[int(leg)] * (1 - part) + knots[int(leg) + 1] * part
         at[1] += 0.12 * math.sin(6 * math.pi * part) if leg == 1 else 0
         at = middle + size * at
         for _ in range(200):
             result = haptic.step(at)
-            if not result.flags & 6:  # waits, short
+            if not result.flags & 6:  # neither EBPO_HAPTIC_WAITING nor EBPO_HAPTIC_INCOMPLETE
                 break
             time.sleep(0.001)
         devices.append(at)

@@ -1,6 +1,6 @@
 """Makes a model for `ebpo check`: N small octahedra in a cylinder of about M faces, which is 20 radii long.
 
-    many_shells.py N M OUT.ply [lean]        lean: tilts the cylinder to the axes
+    many_shells.py N M OUT.ply [lean]        lean: tilts the cylinder against the axes
 """
 import sys
 

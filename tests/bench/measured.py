@@ -1,5 +1,4 @@
-"""Commands measured from outside: time, memory, bytes read and written, as the kernel accounts for
-them."""
+"""Runs commands and measures time, memory, and bytes read and written, from the kernel's accounting."""
 import json
 import os
 import pathlib
@@ -15,8 +14,10 @@ class Failed(RuntimeError):
 
 
 def drop_from_memory(path):
-    """Asks the system to forget a file, so that the next read goes to the disk. Returns the share
-    in percent that is still cached, or None when the share is unknown."""
+    """Ask the system to drop a file from the page cache, so that the next read goes to the disk.
+
+    Returns the share in percent that is still cached, or None when the share is unknown.
+    """
     with open(path, "rb") as f:
         os.fsync(f.fileno())
         os.posix_fadvise(f.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)
@@ -27,12 +28,14 @@ def drop_from_memory(path):
 
 
 def io_of(pid):
-    """Of a process that has ended but is not yet waited for, its threads included: bytes from and
-    to storage (pages of mapped files too), and bytes by read and write calls."""
+    """Return the I/O of a process with its threads, which has ended but is not waited for.
+
+    The values are bytes from and to storage (with pages of mapped files), and bytes of read and write calls.
+    """
     try:
         lines = dict(line.split(": ")
                      for line in pathlib.Path(f"/proc/{pid}/io").read_text().splitlines())
-    except OSError:  # not for us to read
+    except OSError:  # no permission to read
         return {}
     return {"storage_read": int(lines["read_bytes"]),
             "storage_written": int(lines["write_bytes"]) - int(lines["cancelled_write_bytes"]),
@@ -41,10 +44,11 @@ def io_of(pid):
 
 
 def run(*command, accept=(0,)):
-    """Seconds (wall, processor), peak memory (ru_maxrss, mapped pages of files included), input and
-    output of one command, and what it printed.
+    """Run a command. Return seconds (wall-clock, processor), peak memory, I/O and output.
 
-    What other programs have left to write is written first."""
+    Peak memory is ru_maxrss, which includes mapped pages of files. Before the start, data that other programs have written
+    is flushed to the disk.
+    """
     command = [str(c) for c in command]
     os.sync()
     with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as err:
@@ -67,14 +71,14 @@ def run(*command, accept=(0,)):
 
 
 def run_json(*command, accept=(0,)):
-    """The same, with what the command printed as `report`."""
+    """Run a command as `run`, with its JSON output as `report`."""
     figures = run(*command, accept=accept)
     figures["report"] = json.loads(figures.pop("printed"))
     return figures
 
 
 def machine():
-    """Processor, cores, memory and storage in words, without names of this machine."""
+    """Return processor, cores, memory and system as a text, without the machine's name."""
     model = next((line.split(":", 1)[1].strip() for line in open("/proc/cpuinfo")
                   if line.startswith("model name")), "unknown processor")
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")

@@ -1,12 +1,11 @@
 #!/usr/bin/env python3
-"""How long ebpo_open takes with two builds of the library, locally and by URL.
+"""Measures ebpo_open with two builds of the library, locally and by URL.
 
     tests/bench/opening.py BEFORE/lib/libebpo.so AFTER/lib/libebpo.so MODEL.ebpo.h5... [--rounds 5] [--count 100]
 
-In turns, before, after, after, before, each time in a process of its own, a file is opened and closed
-COUNT times (by URL a tenth of that; the server runs in this process), and the median is taken; the table
-has the least of these medians, and the median of the rounds' ratios. Requests and bytes are those of one
-opening. Files are in the system's memory.
+A round runs before, after, after, before, each in a new process. A process opens and closes a file COUNT times (by
+URL a tenth of that; this process runs the server) and takes the median. The table has the least of these medians, and
+the median of the rounds' ratios. Requests and bytes are those of one opening. The files are in the page cache.
 """
 import argparse
 import ctypes
@@ -22,7 +21,7 @@ import ranges_server  # noqa: E402
 
 
 def child(library, name, count):
-    """Prints the median of the nanoseconds of so many openings."""
+    """Print the median time in nanoseconds of `count` openings."""
     ebpo, file, times = ctypes.CDLL(library), ctypes.c_void_p(), []
     ebpo.ebpo_close.argtypes = [ctypes.c_void_p]
     for _ in range(count):
@@ -40,7 +39,7 @@ def timed(library, name, count):
 
 
 def in_turns(libraries, name, count, rounds):
-    """The least median of both in microseconds, and the median ratio."""
+    """Return the least medians of both libraries in microseconds, and the median ratio."""
     found, ratios = ([], []), []
     for _ in range(rounds):
         turn = ([], [])
@@ -53,7 +52,7 @@ def in_turns(libraries, name, count, rounds):
 
 
 class Counted:
-    """What one opening asks of the server."""
+    """Counts the requests and bytes of one opening."""
 
     def __init__(self, data):
         self.requests = self.bytes = 0

@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
-"""painted.py MODEL.ply OUT.ply: a binary PLY of floats with nothing but positions and faces, with
-colours of its vertices: waves, dark bands across y, and noise as scans have it. Equal input gives
-equal bytes with one version of numpy."""
+"""painted.py MODEL.ply OUT.ply: adds colours to the vertices of a binary PLY of floats.
+
+The PLY must have only positions and faces. The colours are waves, dark bands across y, and noise as in scans. Equal
+input gives equal bytes with one version of numpy.
+"""
 import sys
 
 import numpy as np

@@ -1,18 +1,18 @@
 #!/usr/bin/env python3
-"""Two builds beside each other: is one slower, and do they make and answer the same?
+"""Compares two builds: their times, their files and their results.
 
     tests/bench/paired.py BEFORE AFTER MODELS... [--rounds 7] [--json FILE]
     tests/bench/paired.py BEFORE AFTER MODELS... --same
 
-BEFORE and AFTER are `ebpo` programs, MODELS are meshes or folders of them. Each command runs in
-turns, before, after, after, before, so that what the machine does besides meets both; a round gives
-one ratio after/before, and the table shows their median for each model and the geometric mean for
-each command. Seconds are those of the processors (user and system), with --wall those of the clock;
-they are of the child alone, so nothing else of this script counts.
+BEFORE and AFTER are `ebpo` programs; MODELS are meshes or folders of meshes. A round runs each command in the order
+before, after, after, before, so that other load of the machine affects both builds. A round gives one ratio
+after/before. The table has the median ratio for each model, and the geometric mean for each command. Times are
+processor times (user and system) of the command, with --wall wall-clock times.
 
---same times nothing: it converts each model with both, compares the files byte by byte, and what
-`inside`, `distance` and `ray` answer to the same points. Exit code 1: a difference, or with
---limit R a geometric mean above R.
+--same measures no times. It converts each model with both builds and compares the files byte by byte, and the results
+of `inside`, `distance` and `ray` for the same points.
+
+Exit code 1: a difference, or with --limit R a geometric mean above R.
 """
 import argparse
 import filecmp
@@ -29,7 +29,7 @@ import time
 
 COMMANDS = ("convert", "verify", "inside", "distance")
 SUFFIXES = (".ply", ".obj", ".stl", ".off")
-CONVERT_EXIT_CODES = (0, 1)  # 1: both must refuse the model
+CONVERT_EXIT_CODES = (0, 1)  # with code 1, both must refuse the model
 
 
 def models_of(arguments):
@@ -41,7 +41,7 @@ def models_of(arguments):
 
 
 def seconds(arguments, wall):
-    """What a command takes; its output goes nowhere."""
+    """Run a command without output. Return its seconds."""
     with open(os.devnull, "r+b") as nowhere:
         began = time.perf_counter()
         child = subprocess.Popen(arguments, stdin=nowhere, stdout=nowhere, stderr=nowhere)
@@ -59,7 +59,7 @@ def facts_of(ebpo, file):
 
 
 def write_questions(folder, facts, count):
-    """Points in and around the model, and rays from some to others: always the same."""
+    """Write points in and around the model, and rays between pairs of points. They are the same in each run."""
     dice, low, size = random.Random(1), facts["box_origin"], facts["box_size"]
 
     def point():
@@ -82,14 +82,14 @@ def convert(ebpo, model, out):
     return done.returncode, done.stderr
 
 
-# --- the same ---
+# --- comparison of files and results ---
 
 def same(pair, model, folder, count):
-    """What differs between the two for one model."""
+    """Return the differences between the two builds for one model."""
     files = [folder / "before.ebpo.h5", folder / "after.ebpo.h5"]
     codes = [convert(e, model, f)[0] for e, f in zip(pair, files)]
     if codes[0] != codes[1] or codes[0] not in CONVERT_EXIT_CODES:
-        return [f"convert ends with {codes[0]} and {codes[1]}"]
+        return [f"exit codes of convert: {codes[0]} and {codes[1]}"]
     if codes[0] != 0:
         return []
     problems = [] if filecmp.cmp(*files, shallow=False) else ["the files differ"]
@@ -98,9 +98,9 @@ def same(pair, model, folder, count):
         said = [subprocess.run([e, command, files[0], asked], capture_output=True, check=False)
                 for e in pair]
         if said[0].returncode != said[1].returncode:
-            problems.append(f"{command} ends with {[s.returncode for s in said]}")
+            problems.append(f"exit codes of {command}: {[s.returncode for s in said]}")
         elif said[0].stdout != said[1].stdout:
-            problems.append(f"{command} answers otherwise")
+            problems.append(f"{command}: different results")
     return problems
 
 
@@ -109,7 +109,7 @@ def compare_all(options, models):
     for model in models:
         with tempfile.TemporaryDirectory() as folder:
             problems = same(options.pair, model, pathlib.Path(folder), options.count)
-        print(f"{model.name}: {'; '.join(problems) or 'the same bytes and answers'}", flush=True)
+        print(f"{model.name}: {'; '.join(problems) or 'equal bytes and results'}", flush=True)
         wrong += len(problems)
     return 1 if wrong else 0
 
@@ -117,11 +117,11 @@ def compare_all(options, models):
 # --- times ---
 
 def time_model(options, model, folder):
-    """{command: [(before, after) of each round]} of one model."""
+    """Return {command: [(before, after) of each round]} of one model."""
     file, out = folder / "model.ebpo.h5", folder / "out.ebpo.h5"
     code, said = convert(options.pair[0], model, file)
     if code != 0:
-        print(f"{model.name}: left out: {said.decode(errors='replace').strip()}", file=sys.stderr)
+        print(f"{model.name}: omitted: {said.decode(errors='replace').strip()}", file=sys.stderr)
         return {}
     facts = facts_of(options.pair[0], file)
     points, _ = write_questions(folder, facts, options.count)
@@ -130,14 +130,14 @@ def time_model(options, model, folder):
     times = {}
     for command in options.commands:
         if command == "inside" and facts["kind"] != "solid":
-            continue  # a surface has no inside
+            continue  # a surface has no interior
         rounds = []
         for turn in range(options.rounds + 1):
             taken = [[], []]
             for which in (0, 1, 1, 0):
                 taken[which].append(seconds([options.pair[which], command, *arguments[command]],
                                             options.wall))
-            if turn:  # the first one warms up
+            if turn:  # the first turn only warms up
                 rounds.append(tuple(map(sum, taken)))
         times[command] = rounds
     return times
@@ -148,7 +148,7 @@ def ratio(rounds):
 
 
 def spread(rounds):
-    """From the smallest to the largest ratio."""
+    """Return the smallest and the largest ratio as a text."""
     ratios = [after / before for before, after in rounds]
     return f"{min(ratios):.2f} to {max(ratios):.2f}"
 
@@ -193,12 +193,12 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("pair", nargs=2, metavar="EBPO")
     parser.add_argument("models", nargs="+")
-    parser.add_argument("--same", action="store_true", help="compare bytes and answers, no times")
+    parser.add_argument("--same", action="store_true", help="compare bytes and results; measure no times")
     parser.add_argument("--rounds", type=int, default=7)
-    parser.add_argument("--count", type=int, default=20000, help="points that are asked about")
+    parser.add_argument("--count", type=int, default=20000, help="number of query points")
     parser.add_argument("--commands", nargs="+", choices=COMMANDS, default=COMMANDS)
-    parser.add_argument("--wall", action="store_true", help="time by the clock on the wall")
-    parser.add_argument("--limit", type=float, help="fail when a geometric mean is above it")
+    parser.add_argument("--wall", action="store_true", help="measure wall-clock time")
+    parser.add_argument("--limit", type=float, help="fail when a geometric mean is above this limit")
     parser.add_argument("--json", metavar="FILE")
     options = parser.parse_args()
     options.pair = [os.path.abspath(p) for p in options.pair]

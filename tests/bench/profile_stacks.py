@@ -1,10 +1,9 @@
-"""Adds up the stacks of `perf script -F tid,ip,sym,dso`, from standard input;
-tests/bench/profile.sh runs it.
+"""Sums the stacks of `perf script -F tid,ip,sym,dso` from standard input. tests/bench/profile.sh runs it.
 
     profile_stacks.py BUILD_DIR CONVERT.json
 
-A stage is what the program gives to its threads (the function that ebpo_parallel_for calls), or, of
-what runs on one thread only, the library function that the command called and the one below that.
+A stage is the function that ebpo_parallel_for calls in threads. In code that runs on one thread only, a stage is the
+library function that the command called, with the function that this one called.
 """
 import bisect
 import collections
@@ -21,8 +20,10 @@ OUTSIDE = "outside of the library"
 
 
 class Symbols:
-    """Functions of our own binaries: name and source file by address. Names alone will not do: many
-    files have a function called `work`."""
+    """Functions of this project's binaries: name and source file by address.
+
+    Names alone are ambiguous: many files have a function called `work`.
+    """
     def __init__(self, path):
         found = {}
         for line in subprocess.run(["nm", "-l", "--defined-only", path], check=True,
@@ -41,7 +42,7 @@ class Symbols:
 
 
 def stacks():
-    """Lists of (function, file), the innermost first."""
+    """Yield stacks as lists of (function, file), the innermost function first."""
     own = {name: Symbols(f"{BUILD}/{path}") for name, path in [("libebpo.so", "lib/libebpo.so"),
                                                                ("ebpo", "tools/ebpo")]}
     stack = []
@@ -64,7 +65,7 @@ def is_threads(frame):
 
 
 def stage_of(stack):
-    """The stage, and what of the stack belongs to it."""
+    """Return the stage of a stack, and the part of the stack that belongs to the stage."""
     for i in range(1, len(stack)):
         if is_threads(stack[i]) and not is_threads(stack[i - 1]):
             return f"{stack[i - 1][0]} ({stack[i - 1][1]}), threads", stack[:i]
@@ -98,17 +99,17 @@ def main():
         sys.exit("profile_stacks.py: no samples")
     with open(CONVERTED) as f:
         facts = json.load(f)
-    print(f"# Where building spends its time\n\n{facts['source']['name']}, {facts['faces']:,} "
+    print(f"# Time of the build by function\n\n{facts['source']['name']}, {facts['faces']:,} "
           f"faces, {facts['seconds']:.1f} s; {total:,} samples of processor time, of all threads. "
-          f"Percent of these.")
+          f"Values are percent of the samples.")
     table("By stage", stages, total, ["stage"], 20)
     for stage in [name for name, _ in stages.most_common(4) if name != OUTSIDE]:
-        table(f"Within {stage}: with all that they call", within[stage], total,
+        table(f"Within {stage}: inclusive", within[stage], total,
               ["function", "file"], TOP_OF_STAGE)
-    table("By source file: its own", by_file, total, ["file"], TOP)
-    table("By function: its own", by_function, total, ["function", "file"], TOP)
-    table("By function: with all that it calls", inclusive, total, ["function", "file"], TOP)
-    print("\n## Seconds of the clock, as convert tells them\n\n| s | stage |\n|---|---|")
+    table("By source file: exclusive", by_file, total, ["file"], TOP)
+    table("By function: exclusive", by_function, total, ["function", "file"], TOP)
+    table("By function: inclusive", inclusive, total, ["function", "file"], TOP)
+    print("\n## Wall-clock seconds, from convert\n\n| s | stage |\n|---|---|")
     for s in sorted(facts["stages"], key=lambda s: -s["seconds"])[:12]:
         print(f"| {s['seconds']:.2f} | {s['stage']} |")
 

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""What one query from Python reads and holds, by source: python_sources.py MODEL.ebpo.h5
+"""Measures reads and memory of one Python query, by kind of source: python_sources.py MODEL.ebpo.h5
 
     PYTHONPATH=build/tools/python tests/bench/python_sources.py scan.ebpo.h5 [--latency 0.05] [--point X Y Z]
 
-A web server of this process counts requests and bytes of bodies: `inside` and `distance` of one point by URL
-with the library's HTTP (libcurl), with Python's own, and by fsspec, as a URL and as a file object, where fsspec
-and aiohttp are installed. Opening is counted apart. Then the memory of a process that opens the file by its path,
-with one point and without. Each row opens the file anew.
+A web server in this process counts requests and bytes of bodies for `inside` and `distance` of one point. The sources
+are a URL with the library's HTTP (libcurl), a URL with Python's HTTP, and fsspec, as a URL and as a file object, if
+fsspec and aiohttp are installed. Opening is counted separately. Then the script measures the memory of a process that
+opens the file by its path, with one point and without. Each row opens the file again.
 """
 import argparse
 import http.server
@@ -74,7 +74,7 @@ def fsspec_url(url):
 
 
 def counted(function):
-    """What a function returns; requests, bytes and seconds that it took."""
+    """Call a function. Return its result, and the requests, bytes and seconds of the call."""
     before, began = list(Server.counts), time.perf_counter()
     try:
         answer = function()
@@ -92,14 +92,14 @@ def row(name, open_it, query):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("model", type=pathlib.Path)
-    parser.add_argument("--latency", type=float, default=0.05, help="seconds before each answer")
+    parser.add_argument("--latency", type=float, default=0.05, help="seconds before each response")
     parser.add_argument("--point", type=float, nargs=3, default=[0.3, 0.4, 0.5])
     options = parser.parse_args()
     Server.path_of_file, Server.latency = options.model.absolute(), options.latency
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Server)
     threading.Thread(target=server.serve_forever, daemon=True).start()
     url, has_http = f"http://127.0.0.1:{server.server_port}/model", sources.has_http
-    print(f"{options.model.stat().st_size:,} bytes, {options.latency:g} s before each answer\n")
+    print(f"{options.model.stat().st_size:,} bytes, {options.latency:g} s before each response\n")
     print("| one point, by | requests to open | bytes | requests of the query | bytes | s |\n|---|---:|---:|---:|---:|---:|")
     for what, query in (("inside", lambda m: m.inside(options.point)), ("distance", lambda m: m.distance(options.point))):
         for name, open_it in (("URL, libcurl", lambda: ebpo.open(url)), ("URL, without libcurl", lambda: ebpo.open(url)),
@@ -108,7 +108,7 @@ def main():
             try:
                 row(f"{what}, {name}", open_it, query)
             except (ImportError, UnsupportedError) as error:
-                print(f"| {what}, {name} | not here: {error} | | | | |")
+                print(f"| {what}, {name} | not available: {error} | | | | |")
     print("\n| process, path | peak of memory, KiB |\n|---|---:|")
     for name, point in (("opened", []), ("opened, one point", map(str, options.point))):
         done = subprocess.run([sys.executable, "-c", PEAK, options.model, *point], check=True, capture_output=True)

@@ -1,17 +1,16 @@
 #!/usr/bin/env python3
-"""Remakes docs/measured/queries.md: query times on real models, compared with Embree, CGAL and the
-results of the two theses; and the goals.
+"""Remakes docs/measured/queries.md: query times on real models, compared with Embree, CGAL and the results of the two
+theses; and the goals.
 
     tests/bench/query.py BUILD_DIR MODEL.ply... [--grow BASE.ply:FACES]... [--count N]
     -o docs/measured/queries.md
 
-BUILD_DIR: a release build configured with -Dpeers=enabled (tools/install-deps.sh --bench installs
-what that needs). Each model is converted once; --work keeps models and queries. The programs hold a
-model and take turns, one thread each, on one core. The results are medians of --rounds turns (half
-of that above two million faces) of processor time. Meanwhile another core judges results by rational
-arithmetic and counts cache misses (valgrind). The largest model is then queried under a budget. The
-sections `leaves` (kinds of leaves) and `misses` are not printed by default. The handwritten end of
-an existing page is kept.
+BUILD_DIR: a release build configured with -Dpeers=enabled (tools/install-deps.sh --bench installs the required
+packages). Each model is converted once; --work keeps models and queries. Each program keeps a model in memory. The
+programs take turns, one thread each, on one core. The results are medians of the processor times of --rounds turns
+(half as many above two million faces). Meanwhile another core judges results by rational arithmetic and counts cache
+misses (valgrind). The largest model is then queried under a budget. The sections `leaves` (kinds of leaves) and
+`misses` are not printed by default. The handwritten end of an existing page is kept.
 """
 import argparse
 import concurrent.futures
@@ -29,26 +28,26 @@ import query_thesis
 
 SECTIONS = ["rays", "distance", "inside", "memory", "budget", "modes", "distance-modes", "opening",
             "answers"]
-MORE = ["leaves", "misses"]  # only where --sections names them
+MORE = ["leaves", "misses"]  # sections that are printed only if --sections names them
 RAYS = ["uniform", "camera", "segments", "degenerate"]
 QUESTIONS = {"ray": "first hit", "ray-any": "any hit", "ray-all": "all hits"}
-CUT = 4 # level, of the second way of opening
-SHARE = {("distance", "uniform"): 20} # of --count
+CUT = 4 # the cut level, for the second method of opening
+SHARE = {("distance", "uniform"): 20} # divisors of --count
 BUDGET = 256 << 20
 TAILS = [("ray", "uniform"), ("distance", "uniform"), ("distance", "path"), ("inside", "path")]
 
 
-# ---- asking in turns ----
+# ---- queries in turns ----
 
 def cells_of(model, query):
-    """(points, query) in which a structure is asked."""
+    """Return the pairs (points, query) for a structure."""
     if query == "rays":
         return [(points, q) for points in RAYS for q in QUESTIONS]
     return [(points, query) for points in ("uniform", "path")]
 
 
 def ways_of(peer, points, query):
-    """How a program is asked: a word for the page, and its options."""
+    """Return the variants in which a program is queried: a word for the page, and options."""
     if peer == "cgal":
         return {"cgal": []} if query != "ray" or points == "uniform" else {}
     if query in ("ray-any", "ray-all") and peer == "cgal":
@@ -63,8 +62,10 @@ def ways_of(peer, points, query):
 
 
 def in_turns(ways):
-    """After each way of ours another program, so that none finds what it needs in the processor's
-    caches because it was just asked the same."""
+    """Return the variants in an order with another program after each of ours.
+
+    So no variant profits from processor caches that the same queries have just filled.
+    """
     others = [w for w in ways if w[0] != "ebpo"]
     turns = []
     for i, ours in enumerate(w for w in ways if w[0] == "ebpo"):
@@ -73,7 +74,7 @@ def in_turns(ways):
 
 
 def ask_cell(bench, model, servers, points, query):
-    """Reports of all programs and ways on the same questions, in turns; answers that differ."""
+    """Run the same queries with all programs and variants, in turns. Return reports, and counts of different results."""
     rays = query.startswith("ray")
     count = max(1, bench.options.count // SHARE.get((query, points), 1))
     raw = model.questions(points, count, rays)
@@ -87,7 +88,7 @@ def ask_cell(bench, model, servers, points, query):
             words = ways[peer, way]
             save = ["--answers", told[peer]] if turn == 0 and way == peer else []
             report = servers[peer].ask(query, raw, *words, *end, *save)
-            if turn > 0: # the first turn warms
+            if turn > 0: # the first turn only warms up
                 reports[way].append(report)
     wrong = {p: differences(query, told["ebpo"], told[p], 1e-6 * model.diagonal,
                             lengths_of(raw) if rays else None)
@@ -101,8 +102,7 @@ def ask_cell(bench, model, servers, points, query):
 
 
 def ask_model(bench, model, wanted):
-    """{(points, query): what ask_cell returns}, structure by structure: a peer has a tree for
-    each."""
+    """Return {(points, query): result of ask_cell}, structure by structure, because a peer has one tree for each."""
     results = {}
     for structure in wanted:
         servers = {}
@@ -118,7 +118,7 @@ def ask_model(bench, model, wanted):
 
 
 def building(peer, model):
-    """Large models are made on all cores where that is not what is measured."""
+    """Return the options for construction. Large models use all cores when construction is not measured."""
     return ["--threads", 0] if peer != "cgal" and model.faces > 2000000 else []
 
 
@@ -186,8 +186,9 @@ def section_tails(page, results):
 # ---- memory and loading ----
 
 def measure_memory(bench, model):
-    """Processor seconds on one thread, and wall seconds on all cores, of loading everything and of
-    Embree's build, in turns; bytes."""
+    """Measure loading of a whole model and Embree's build, in turns: CPU seconds on one thread, wall-clock seconds on all
+    cores, and bytes.
+    """
     reports = {(p, t): [] for p in ("ebpo", "embree") for t in (1, 0)}
     for _ in range(bench.rounds(model)):
         for (peer, threads), runs in reports.items():
@@ -225,9 +226,9 @@ def section_memory(page, memory):
 # ---- under a budget ----
 
 def measure_budget(bench, model):
-    """Each on a model that has just been opened; the file is in the system's memory."""
+    """Measure queries under a budget, each on a newly opened model. The file is in the page cache."""
     rows = []
-    with open(model.file, "rb") as f: # so that it is
+    with open(model.file, "rb") as f: # reads the file into the page cache
         while f.read(1 << 24):
             pass
     for query, points, count in [("distance", "uniform", bench.options.count // 50),
@@ -336,19 +337,19 @@ def parse():
     parser.add_argument("build", metavar="BUILD_DIR")
     parser.add_argument("models", metavar="MODEL.ply", nargs="+")
     parser.add_argument("--grow", metavar="BASE.ply:FACES", action="append", default=[],
-                        help="also a model of at least so many faces: BASE, its faces cut into four")
+                        help="also a model of at least this many faces: the faces of BASE are divided into four repeatedly")
     parser.add_argument("--count", type=int, default=100000,
-                        help="questions of each kind (distance far from the surface: a twentieth; "
+                        help="queries of each kind (distance far from the surface: a twentieth; "
                              "default 100,000)")
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--core", type=int, default=os.cpu_count() - 1,
-                        help="the core on which is measured")
+                        help="the core of the measured programs")
     parser.add_argument("--side-core", type=int, default=0,
-                        help="the core on which answers are judged and misses counted meanwhile")
+                        help="the core that judges results and counts misses meanwhile")
     parser.add_argument("--judged", type=int, default=2000,
-                        help="answers to each question that are judged by rational arithmetic")
+                        help="number of results of each query that rational arithmetic judges")
     parser.add_argument("--work",
-                        help="where models and questions are kept (default BUILD_DIR/bench-query)")
+                        help="folder for models and queries (default BUILD_DIR/bench-query)")
     parser.add_argument("--sections", default=",".join(SECTIONS),
                         help="comma list of " + ", ".join(SECTIONS + MORE))
     parser.add_argument("-v", "--verbose", action="store_true", help="print the commands")
@@ -357,7 +358,7 @@ def parse():
 
 
 class Made:
-    """What has been measured so far; the page is whole after each step."""
+    """The measurements so far. The page is complete after each step."""
 
     def __init__(self, bench):
         self.bench = bench
@@ -399,7 +400,7 @@ POINTS = {
 
 
 def beside(bench, small, middling, wanted, found):
-    """What the clock does not matter for."""
+    """Run the parts that do not depend on time."""
     if "answers" in wanted:
         found["answers"] = query_checks.judge_answers(bench, small)
     if "misses" in wanted:
@@ -407,7 +408,7 @@ def beside(bench, small, middling, wanted, found):
 
 
 def ask_models(bench, models, made, wanted):
-    """In turns on one core, while another one is at what needs no clock."""
+    """Query the models in turns on one core, while another core runs the parts that do not depend on time."""
     below = [m for m in models if m.faces < 2000000]
     structures = [s for s in ("rays", "distance", "inside") if s in wanted]
     with concurrent.futures.ThreadPoolExecutor(1) as side:
@@ -427,7 +428,7 @@ def main():
     wanted = options.sections.split(",")
     unknown = set(wanted) - set(SECTIONS + MORE)
     if unknown:
-        sys.exit(f"query.py: no section is called {', '.join(sorted(unknown))}; there are "
+        sys.exit(f"query.py: unknown sections: {', '.join(sorted(unknown))}; the sections are "
                  f"{', '.join(SECTIONS + MORE)}")
     bench = Bench(options)
     models = sorted((Model(bench, ply) for ply in

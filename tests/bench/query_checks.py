@@ -1,5 +1,7 @@
-"""Checks of tests/bench/query.py that do not depend on time: results judged by rational arithmetic,
-and cache misses counted by valgrind."""
+"""Checks of tests/bench/query.py that do not depend on time.
+
+They judge results by rational arithmetic, and count cache misses with valgrind.
+"""
 import json
 import re
 import subprocess
@@ -15,7 +17,7 @@ MISSES = {("ray", "uniform"): 20000, ("distance", "uniform"): 2000, ("distance",
           ("inside", "path"): 20000}
 
 
-# ---- answers ----
+# ---- results ----
 
 def judge(bench, model, query, raw, which):
     peers = [p for p in bench.peers(model) if p != "cgal" or query not in ("ray-any", "ray-all")]
@@ -66,7 +68,7 @@ def wrong(verdict):
 # ---- cache misses ----
 
 def cachegrind(bench, peer, model, query, raw, count):
-    """Instructions, data misses of the first and of the last level, of a whole run."""
+    """Return instructions, and data misses of the first and the last level, of a whole run."""
     source = model.file if peer == "ebpo" else model.ply
     words = bench.command("valgrind", "--tool=cachegrind", *CACHES, "--cachegrind-out-file=/dev/null",
                           bench.program(peer), source, query, raw, "--count", count,

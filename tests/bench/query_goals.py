@@ -1,9 +1,9 @@
-"""The head of docs/measured/queries.md: the result in short, and the goals."""
+"""The beginning of docs/measured/queries.md: the result in short, and the goals."""
 import query_thesis
 from query_page import Page, figure, quotient
 
 SIZES = ["70 K", "1 M", "5.5 M", "25.6 M"]
-# fcpw's time, of Embree's point query, as measured elsewhere where both could be had.
+# Time of fcpw divided by that of Embree's point query, measured on a machine that had both.
 FCPW = {"path": [0.72, 0.48, 0.49, 0.49], "uniform": [0.63, 0.47, 0.47, 0.47]}
 NEAREST = {"path": [0.85, 0.7, 0.6, 0.6], "uniform": [0.7, 0.35, 0.35, 0.35]}
 INSIDE = [0.4, 0.25, 0.12, 0.12]

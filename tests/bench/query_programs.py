@@ -1,5 +1,7 @@
-"""The programs that tests/bench/query.py asks: this library's and the peers', each holding its model
-while it is asked again and again; and the models with their questions."""
+"""The programs that tests/bench/query.py queries, and the models with their queries.
+
+The programs are this library's and the peers'. Each keeps its model in memory between queries.
+"""
 import array
 import json
 import math
@@ -11,7 +13,7 @@ import subprocess
 import sys
 
 PEERS = ["ebpo", "embree", "cgal"]
-CGAL_MOST = 2000000  # faces, of what CGAL is asked about
+CGAL_MOST = 2000000  # the most faces for queries of CGAL
 NAMES = {"ebpo": "ours", "embree": "Embree", "cgal": "CGAL"}
 
 
@@ -28,7 +30,7 @@ class Bench:
         return self.options.rounds if model.faces < 2000000 else max(1, self.options.rounds // 2)
 
     def command(self, *words, core=None):
-        """`core` None: the one that is measured on; False: any."""
+        """Run a command. core: None: the measured core; False: any core."""
         core = self.options.core if core is None else core
         words = [str(w) for w in words]
         words = words if core is False else ["taskset", "-c", str(core)] + words
@@ -45,7 +47,7 @@ class Bench:
         return done.stdout
 
     def ours(self, model, query, *arguments, points="uniform", core=None):
-        """`points`: a word, or a file of them."""
+        """Run a query with `ebpo bench`. points: a word, or a file of points."""
         kind = ["--raw"] if pathlib.Path(points).suffix == ".raw" else ["--seed", 1]
         return json.loads(self.run(self.ebpo, "bench", model.file, "--query", query, "--points",
                                    points, *kind, "--json", *arguments, core=core))
@@ -59,8 +61,10 @@ class Bench:
 
 
 class Server:
-    """A program that holds a model. None for an answer that it cannot give (CGAL wants closed
-    manifolds)."""
+    """A program that keeps a model in memory.
+
+    Its result is None when the program does not support the query (CGAL needs closed manifolds).
+    """
 
     def __init__(self, bench, peer, model, *arguments, core=None):
         self.bench, self.peer, self.model = bench, peer, model
@@ -103,8 +107,10 @@ class Model:
         self.diagonal = math.hypot(*self.info["box_size"])
 
     def questions(self, points, count, rays=False):
-        """A file of so many; made once, by asking next to nothing: rays without length, inside by
-        the first levels."""
+        """Return a file of `count` queries, which is made once.
+
+        A cheap query makes it: rays without length, or inside with the first levels.
+        """
         raw = self.bench.work / f"{self.name}.{points}{'.rays' if rays else ''}.{count}.raw"
         if not raw.exists():
             self.bench.ours(self, *(["ray-any", "--tmax", 0] if rays else ["inside", "--max-level", 1]),
@@ -120,7 +126,7 @@ class Model:
 
 
 def grown(bench, what):
-    """BASE.ply:M: `ebpo-generate` cuts the base's faces into four until there are at least M."""
+    """Return BASE.ply:M: `ebpo-generate` divides the base's faces into four until there are at least M."""
     base, faces = what.rsplit(":", 1)
     target = bench.work / f"{pathlib.Path(base).stem}_{faces}.ply"
     if not target.exists():
@@ -130,34 +136,36 @@ def grown(bench, what):
 
 
 def middle(reports, name="mean_cpu_ns"):
-    """Median; None when a program could not answer."""
+    """Return the median, or None when a program has no result."""
     values = [r[name] for r in reports if r]
     return statistics.median(values) if values else None
 
 
-# ---- answers ----
+# ---- results ----
 
 def inside_of(path):
     return pathlib.Path(path).read_bytes()
 
 
 def hits_of(path):
-    """Distances or ray parameters, and faces, of 16 bytes each."""
+    """Return distances or ray parameters, and faces, of 16 bytes each."""
     data = pathlib.Path(path).read_bytes()
     values, faces = array.array("d", data)[0::2], array.array("q", data)[1::2]
     return values, faces
 
 
 def lengths_of(path):
-    """Of the rays' directions."""
+    """Return the lengths of the rays' directions."""
     data = array.array("d", pathlib.Path(path).read_bytes())
     return [math.hypot(*data[i + 3:i + 6]) for i in range(0, len(data), 6)]
 
 
 def differences(query, ours, theirs, tolerance, lengths=None):
-    """How many answers differ. inside: of points that are not on the surface. ray-any: one has a
-    hit. ray-all: their number. distance, ray: by more than `tolerance`, or one has none; `lengths`:
-    of what the parameters of rays count."""
+    """Return the number of different results.
+
+    inside: points on the surface are ignored. ray-any: hit or no hit. ray-all: number of hits.
+    distance, ray: a difference above `tolerance`, or only one has a result. `lengths`: factors of ray parameters.
+    """
     if query == "inside":
         return sum(a != b for a, b in zip(inside_of(ours), inside_of(theirs)) if a != 2)
     (a, a_faces), (b, b_faces) = hits_of(ours), hits_of(theirs)

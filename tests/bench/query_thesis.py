@@ -1,20 +1,21 @@
-"""The modes of the EBP thesis on a large model, with the memory of the thesis, and its results."""
+"""The modes of the EBP thesis on a large model, with the memory and the results of the thesis."""
 from query_page import figure, us
 
-# The thesis' program held 11 to 13 MB up to the cut level, and a few subtrees.
+# The program of the thesis kept 11 to 13 MB up to the cut level, and a few subtrees.
 CUT, MEMORY = 7, 16 << 20
 COUNTS = {"uniform": 100, "path": 20000}
-SHOWN_LEVELS = {1, 6, 11}  # of those measured, the levels on the page
-# Of what takes a second fewer; envelopes that have been cut are kept: enough to have cut them.
+SHOWN_LEVELS = {1, 6, 11}  # the measured levels that the page shows
+# Numbers of queries of modes that take a second for few queries. Cut envelopes are cached, so there
+# are enough queries to have cut all of them.
 OTHERS = {"recursive": {"uniform": 4, "path": 1000},
           "envelope": {"uniform": 20000, "path": 20000}}
 
-# EBP 2017, table 25: microseconds for a test, mean of three models of 26 to 28 million faces,
+# EBP 2017, table 25: microseconds for a test, mean of three models of 26 to 28 million faces, for
 # random points and a continuous path.
 EBP_MODES = {"cache": (1769.11, 256.33), "nodes": (1153.04, 340.56), "subtree": (1264.36, 324.76),
              "cache-plain": (1985.27, 289.64), "nodes-plain": (2389.29, 369.21),
              "subtree-plain": (2607.71, 347.91)}
-# EBP 2017, table 26: the same down to level 1, 2, ..., for cache, nodes and subtree; levels to 5
+# EBP 2017, table 26: the same down to level 1, 2, ..., for cache, nodes and subtree. Levels up to 5
 # were in memory.
 EBP_LEVELS = [(2.87, 4.45, 3.01, 4.42, 2.87, 4.42), (3.79, 6.07, 3.80, 6.14, 3.81, 6.05),
               (4.20, 6.93, 4.22, 6.92, 4.24, 6.91),
@@ -25,8 +26,8 @@ EBP_LEVELS = [(2.87, 4.45, 3.01, 4.42, 2.87, 4.42), (3.79, 6.07, 3.80, 6.14, 3.8
               (2121.11, 218.97, 366.25, 347.58, 471.53, 243.81),
               (2122.89, 219.86, 372.98, 372.35, 580.54, 249.05),
               (2467.64, 227.36, 466.90, 423.54, 810.08, 334.14)]
-# EBP 2017, table 28: nearest point; envelopes down to level 1, 2, ... (table 27's numbers of the
-# levels; table 28 counts from 0).
+# EBP 2017, table 28: nearest point; envelopes down to level 1, 2, ... (levels as in table 27; table
+# 28 counts from 0).
 EBP_DISTANCE = {"recursive": (680.03, 7.612), "leaves": (694.994, 9.269)}
 EBP_DISTANCE_LEVELS = [(87.911, 73.668), (25.624, 23.895), (7.595, 9.783), (10.469, 8.252),
                        (9.446, 5.524), (9.293, 4.807),
@@ -35,7 +36,7 @@ EBP_DISTANCE_LEVELS = [(87.911, 73.668), (25.624, 23.895), (7.595, 9.783), (10.4
 
 
 def ask(bench, model, query, *arguments):
-    """Mean nanoseconds, and subtrees loaded, of uniform points and of a path."""
+    """Return mean nanoseconds and loaded subtrees, for uniform points and for a path."""
     out = {}
     counts = next((OTHERS[word] for word in arguments if word in OTHERS), COUNTS)
     for points, count in counts.items():
@@ -85,7 +86,7 @@ def thesis_distance(name):
 
 
 def cells(tables):
-    """(what, our us, the thesis' us) of every cell that the thesis has."""
+    """Yield (name, our us, us of the thesis) of every cell with a value in the thesis."""
     for mode, ours in tables.get("modes", {}).items():
         for i, points in enumerate(COUNTS):
             yield f"{mode} {points}", ours[points][0] / 1000, EBP_MODES[mode][i]

@@ -1,16 +1,15 @@
 #!/usr/bin/env python3
-"""Remakes docs/measured/remote.md: requests, bytes, round trips and times of queries by URL, compared
-with HDF5's ros3 driver and h5wasm.
+"""Remakes docs/measured/remote.md: requests, bytes, round trips and times of queries by URL, compared with HDF5's ros3
+driver and h5wasm.
 
     tests/bench/remote.py BUILD_DIR LARGE.ebpo.h5 SMALL.ebpo.h5
         --before BUILD_DIR LARGE.ebpo.h5 SMALL.ebpo.h5 --ply SMALL.ply -o docs/measured/remote.md
         [--json FILE [--only PATTERN]]
 
-BUILD_DIR: a release build inside its checkout, whose viewer is measured, too. --before measures an
-older build and its files as well, and the new build with the old files; only --json keeps these.
-nginx serves the files; its log has the requests. A proxy before it adds latency (and a rate for the
-viewer). --only repeats the measurements in --json whose name matches. The handwritten end of an
-existing page is kept.
+BUILD_DIR: a release build inside its checkout, whose viewer is measured, too. --before also measures an older build
+with its files, and the new build with the old files; only --json stores these results. nginx serves the files; its log
+has the requests. A proxy in front of nginx adds latency, and limits the rate for the viewer. --only repeats the
+measurements in --json whose name matches. The handwritten end of an existing page is kept.
 Needs nginx, chromium, python3-h5py, npm (h5wasm is installed below BUILD_DIR) and
 `sh tools/install-deps.sh --tests`.
 """
@@ -40,7 +39,7 @@ LATENCIES = [0, 50, 200]
 
 
 class Measurements:
-    """By name, "SIDE/ROW"; each is written down as soon as it is there."""
+    """Measurements by name, "SIDE/ROW". Each is written to the disk when it is complete."""
     def __init__(self, options):
         self.path = options.json and pathlib.Path(options.json)
         self.only = re.compile(options.only) if options.only is not None else None
@@ -65,7 +64,7 @@ class Measurements:
 # --- the viewer ---
 
 def view(side, large, work):
-    """Its page as its own samples/serve.sh serves it, over a slow line."""
+    """Measure the viewer's page over a slow line. The side's own samples/serve.sh serves it."""
     folder, log, port = work / "shown", work / "shown.log", free_port()
     folder.mkdir(exist_ok=True)
     shown = folder / side.link("large")
@@ -94,7 +93,7 @@ def view(side, large, work):
 # --- building ---
 
 def build_in_turns(sides, ply, work):
-    """[CPU seconds of (before, after) of each round], in the order before, after, after, before."""
+    """Return [CPU seconds of (before, after) of each round], in the order before, after, after, before."""
     out, rounds = work / "built.ebpo.h5", []
     for _ in range(ROUNDS):
         taken = [0, 0]
@@ -105,7 +104,7 @@ def build_in_turns(sides, ply, work):
     return rounds
 
 
-# --- all of it ---
+# --- all measurements ---
 
 def measure_sides(take, sides, server, line, work):
     large = asked.Places(sides[0], "large", 100, work)

@@ -1,15 +1,14 @@
 #!/usr/bin/env python3
-"""Remakes docs/measured/scale.md: generated models of growing size, built, verified, decoded, opened
-and queried within a memory budget, compared with Embree and CGAL.
+"""Remakes docs/measured/scale.md: generated models of growing size, built, verified, decoded, opened and queried within a
+memory budget, compared with Embree and CGAL.
 
     tests/bench/scale.py BUILD_DIR [--sizes 0.1,1,8,28] [--memory 1GiB] [--rounds N] -o
     docs/measured/scale.md [--json FILE]
 
-BUILD_DIR: a release build configured with -Dtests=enabled -Dpeers=enabled (tools/install-deps.sh
---tests --bench installs what that needs). Models are made by ebpo-generate and kept in --work (28
-million faces: 1 GB with all that is made of it, and as much for temporary files meanwhile). Run it
-on a machine that does nothing else; the results are medians of the rounds, in which the programs
-take turns. The handwritten end of an existing page is kept.
+BUILD_DIR: a release build configured with -Dtests=enabled -Dpeers=enabled (tools/install-deps.sh --tests --bench
+installs the required packages). ebpo-generate makes the models, which are kept in --work. 28 million faces need 1 GB
+with all derived files, and as much for temporary files. Run it on an idle machine. The results are medians of the
+rounds, in which the programs take turns. The handwritten end of an existing page is kept.
 """
 import argparse
 import json
@@ -26,7 +25,7 @@ from query_page import Page, figure, handwritten, ratio, reflow
 
 BUDGET_OF_QUESTIONS = 256 * MIB
 OPENINGS = 5
-LARGE = 2000000  # faces from which on a third of the rounds is run
+LARGE = 2000000  # models with at least this many faces have a third of the rounds
 GOALS = {"build_seconds": 150, "growth": 1.3, "first_levels": 1e6, "ratio_full": 0.60,
          "ratio_without_maps": 0.50, "decode": 300e6, "verify_times_build": 2,
          "first_answer": 0.050, "p999": 1e6}
@@ -47,7 +46,7 @@ class Scale:
         return self.options.rounds if faces < LARGE else max(1, self.options.rounds // 3)
 
     def run(self, *command, cold=None, asks_json=True, accept=(0,)):
-        """None, and a line in the page, where the command fails."""
+        """Run a command. When it fails, return None and add a line to the page."""
         if self.options.verbose:
             print("+", shlex.join(map(str, command)), file=sys.stderr)
         self.load.append(os.getloadavg()[0])
@@ -76,12 +75,12 @@ def generate(scale, millions):
         made = scale.run(scale.build / "samples" / "ebpo-generate", *command[1:-1], target,
                          asks_json=False)
         if not made:
-            sys.exit("scale.py: no model, no figures")
+            sys.exit("scale.py: no model, no results")
     return target, command, made
 
 
 def build_all(scale, ply, file, faces):
-    """Ours and the peers in turns, the PLY forgotten by the system before each."""
+    """Build with ours and the peers in turns, with a cold PLY each time."""
     runs = {"ebpo": [], "embree": [], "cgal": []}
     for _ in range(scale.rounds(faces)):
         runs["ebpo"].append(scale.run(scale.ebpo, "convert", "--json", "-q", "--memory",
@@ -93,7 +92,7 @@ def build_all(scale, ply, file, faces):
 
 
 def sizes_of(scale, file, bare, first):
-    """Files with and without maps, and of the first levels; each as it is on the disk."""
+    """Return the sizes on the disk: files with and without maps, and the first levels."""
     info = scale.run(scale.ebpo, "info", "--json", file)["report"]
     scale.run(scale.ebpo, "subset", "-q", "--parts", "-maps", file, bare, asks_json=False)
     scale.run(scale.ebpo, "subset", "-q", "--levels", "0-5", file, first, asks_json=False)
@@ -112,8 +111,10 @@ def ask(scale, file, query, count, *arguments, seed=1):
 
 
 def questions_of(scale, file):
-    """Opening with one question, near the surface so that something must be loaded for it, each
-    time elsewhere; a path as fast as answers come, and at a haptic device's rate."""
+    """Measure opening with one query, and a path, at full speed and at a haptic device's rate.
+
+    The one query is near the surface, so it must load data, and at another position each time.
+    """
     o = scale.options
     return {query: {"open": [ask(scale, file, query, 1, seed=seed)
                              for seed in range(1, OPENINGS + 1)], "path": ask(scale, file, query, o.count, "--prefetch"),
@@ -143,10 +144,10 @@ def study(scale, millions):
     return result
 
 
-# ---- figures ----
+# ---- statistics ----
 
 def middle(runs, *keys):
-    """Median over the runs of a figure within them; None without runs."""
+    """Return the median over the runs of a value; None without runs."""
     values = []
     for value in runs:
         for key in keys:
@@ -173,8 +174,11 @@ def built(result):
 
 
 def growth(results):
-    """Seconds a face of each model of a million faces or more: largest model by smallest, and the
-    worst of all pairs (a larger model by a smaller one)."""
+    """Return ratios of the seconds per face, for models of at least a million faces.
+
+    The first ratio is that of the largest model to the smallest; the second is the worst of all pairs of a larger and a
+    smaller model.
+    """
     costs = [built(r) / faces_of(r) for r in results if faces_of(r) >= 0.9e6]
     if len(costs) < 2:
         return None, None
@@ -241,7 +245,7 @@ def with_longest(seconds):
 
 
 def warm_answer(report):
-    """Seconds: there is one question."""
+    """Return the seconds of the only query."""
     return report["open_seconds"] + report["ns"]["max"] * 1e-9
 
 
@@ -280,13 +284,13 @@ def section_questions(page, results, options):
 
 
 def bytes_of(size):
-    """Of a size as `ebpo convert --memory` takes it."""
+    """Return the bytes of a size in the syntax of `ebpo convert --memory`."""
     number, power, binary = re.fullmatch("([0-9.]+)([KMGTkmgt]?)(i?)B?", size).groups()
     return int(float(number) * (1024 if binary else 1000)**" KMGT".index(power.upper() or " "))
 
 
 def section_goals(page, scale, results):
-    """The largest model beside what was aimed at."""
+    """Print the values of the largest model beside the goals."""
     r = results[-1]
     s, questions = r["sizes"], r["queries"]
     first = [run["report"] for query in questions.values() for run in query["open"] if run]
@@ -380,18 +384,18 @@ def parse():
     parser.add_argument("--sizes", default="0.1,1,8,28",
                         help="millions of faces (default 0.1,1,8,28)")
     parser.add_argument("--base", default="torus", choices=["torus", "sphere"],
-                        help="what ebpo-generate begins with; a sphere has 20 times a power of "
+                        help="the base of ebpo-generate; a sphere has 20 times a power of "
                              "four faces (default torus)")
     parser.add_argument("--memory", default="1GiB", help="budget of convert and verify (1GiB)")
     parser.add_argument("--rounds", type=int, default=3,
-                        help="of models below two million faces; larger ones: a third (default 3)")
+                        help="rounds for models below two million faces; larger ones have a third (default 3)")
     parser.add_argument("--count", type=int, default=1000000,
-                        help="questions along a path (default 1,000,000)")
+                        help="queries along a path (default 1,000,000)")
     parser.add_argument("--rate-count", type=int, default=20000,
-                        help="of them, at 1,000 a second (default 20,000)")
+                        help="queries of these at 1,000 per second (default 20,000)")
     parser.add_argument("--work", metavar="DIR",
-                        help="where models and temporary files are (default BUILD_DIR/bench-scale)")
-    parser.add_argument("--json", metavar="FILE", help="all figures of all runs")
+                        help="folder for models and temporary files (default BUILD_DIR/bench-scale)")
+    parser.add_argument("--json", metavar="FILE", help="file for all values of all runs")
     parser.add_argument("-v", "--verbose", action="store_true", help="print the commands")
     parser.add_argument("-o", "--output", required=True)
     return parser.parse_args()
@@ -402,7 +406,7 @@ def main():
     scale, results = Scale(options), []
     for millions in sorted(float(s) for s in options.sizes.split(",")):
         results.append(study(scale, millions))
-        write(scale, results)  # the page is whole after each
+        write(scale, results)  # the page is complete after each model
         if options.json:
             pathlib.Path(options.json).write_text(json.dumps({"machine": measured.machine(),
                                                               "load": scale.load,

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """shards.py EBPO MODEL [--rows N] [--folder F] [--rounds N] [--memory SIZE]: compares one process with two.
 
-Makes N uniform points in the model's box as raw doubles (24 bytes each; F/uniform-N.raw is kept), and
-classifies them as inside or outside: by one process, then by two at the same time with half of them each,
-of one thread each, in turns. Prints a line of JSON: points per second, the parallel efficiency (time of
-one / (2 * time of two), with and without opening the model), and the bytes that each process reads in all
-calls (rchar of /proc) and from the disk. Compares the results byte for byte. Needs numpy.
+Makes N uniform points in the model's box as raw doubles (24 bytes each; F/uniform-N.raw is kept) and classifies them
+as inside or outside. One process does it for all points, then two processes at the same time for half of them each, in
+turns. Each process has one thread. Prints a line of JSON: points per second; the parallel efficiency (time of one /
+(2 * time of two), with and without opening the model); and the bytes that each process reads in all calls (rchar of
+/proc) and from the disk. Compares the results byte for byte. Needs numpy.
 """
 import argparse
 import json
@@ -33,13 +33,13 @@ def make_points(path, rows, low, high):
 
 
 def io_of(pid):
-    """What it has read: read after it has ended and before it is forgotten."""
+    """Return the bytes that a process has read. It has ended but is not waited for."""
     with open(f"/proc/{pid}/io", encoding="ascii") as file:
         return {key: int(value) for key, value in (line.split(":") for line in file)}
 
 
 def run(command, shards, out):
-    """Seconds, and for each process what it read and how long the model took to open."""
+    """Return the seconds and, for each process, the bytes read and the seconds of opening the model."""
     begun, processes, told = time.monotonic(), [], []
     for i in range(shards):
         processes.append(subprocess.Popen(command + ["--shard", f"{i}/{shards}", "-o", f"{out}.{i}"],
@@ -91,7 +91,7 @@ def main():
             asking[shards].append(took - max(t["open_seconds"] for t in told))
             print(json.dumps({"processes": shards, "seconds": took, "each": told}), flush=True)
     if not same(f"{out}.1.0", [f"{out}.2.0", f"{out}.2.1"]):
-        sys.exit("the answers of two processes are not those of one")
+        sys.exit("the results of two processes differ from those of one")
     one, two = statistics.median(seconds[1]), statistics.median(seconds[2])
     print(json.dumps({"rows": o.rows, "points_a_second_one": o.rows / one,
                       "points_a_second_two": o.rows / two, "efficiency": one / (2 * two),

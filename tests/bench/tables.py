@@ -3,8 +3,8 @@
 
     tests/bench/tables.py EBPO MODELS_DIR [LARGE.ply] > docs/measured/tables.md
 
-EBPO: the tool; MODELS_DIR: a folder of PLY files with the names used below; LARGE.ply: a generated
-model of several million faces. Sizes are the same on every machine; seconds are not.
+EBPO: the tool. MODELS_DIR: a folder of PLY files with the names used below. LARGE.ply: a generated model of several
+million faces. Sizes are the same on every machine; seconds are not.
 """
 import contextlib
 import io

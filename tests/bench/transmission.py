@@ -21,7 +21,7 @@ import numpy
 from query_page import reflow
 
 GOALS = [10, 3, 1]  # percent of excess
-# Melero 2008, tables 4.4 and 4.6 ("Transm. at Level") and the volumes of figure 4.17 by level,
+# Melero 2008, tables 4.4 and 4.6 ("Transm. at Level") and the volumes of figure 4.17 by level, in
 # percent.
 THESIS = {
     "bunny_closed": ("bunny, 71,040 faces", [13035, 31384, 73558, 232372, 1006872, 3248614, 879022,
@@ -40,7 +40,7 @@ def run(*arguments, data=None):
 
 
 def polyhedra(group):
-    """Vertices of each node's envelope, as arrays."""
+    """Return the vertices of each node's envelope, as arrays."""
     stream, points, at, found = group["cells"][...].tolist(), group["points"][...], 0, []
     while at < len(stream):
         count, at, corners = stream[at + 1], at + 2, set()
@@ -60,7 +60,7 @@ def cell_of(octcode, info):
 
 
 def touched(tool, file, boxes):
-    """For each box whether a face meets it: exact."""
+    """Return for each box whether a face intersects it, exactly."""
     answers, at, found = run(tool, "box", "--raw", file,
                              data=numpy.array(boxes, "<f8").tobytes()), 0, []
     for _ in boxes:
@@ -71,16 +71,18 @@ def touched(tool, file, boxes):
 
 
 def farthest(tool, file, group, info, size):
-    """How far the level's envelopes reach from the solid, in percent of `size`: what is certain,
-    and what their vertices show."""
+    """Return the greatest distance of the level's envelopes from the solid, in percent of `size`.
+
+    Returns an upper bound, and the greatest distance of a vertex.
+    """
     nodes = [(code, shape) for code, kind, shape in zip(group["octcode"][...].tolist(),
                                                         group["type"][...],
                                                         polyhedra(group)) if kind != BLACK]
     cells = [cell_of(code, info) for code, _ in nodes]
     certain = 0.0
     for (_, shape), (_, diagonal), meets in zip(nodes, cells, touched(tool, file, [box for box, _ in cells])):
-        # A face that meets the cell has a point in the envelope, which is convex; else one comes as
-        # near as 1/256 of the cell's size.
+        # When a face intersects the cell, the convex envelope contains one of its points. Otherwise
+        # a face is within 1/256 of the cell's size.
         difference = shape[:, None, :] - shape[None, :, :]
         certain = max(certain, numpy.sqrt((difference**2).sum(2).max()) if meets
                       else diagonal * (1 + 1 / 256))
@@ -92,7 +94,7 @@ def farthest(tool, file, group, info, size):
 
 def study(tool, model, folder, leaf_planes):
     file = folder / (model.stem + ".ebpo.h5")
-    # the same tree, as a reader without the mesh has it
+    # the same tree for a reader without the mesh
     bare = folder / (model.stem + ".bare.ebpo.h5")
     extra = ["--profile", "full"] if leaf_planes else []
     run(tool, "convert", "-q", *extra, model, file)

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Compares this tool with the tool of format 1.0: reads files of 1.0 with both, and files of 1.1 with both.
+"""Compares this tool with the tool of format 1.0: both read files of 1.0, and files of 1.1.
 
     tests/bench/versions.py OLD EBPO OLD_VECTORS MODELS_DIR
 
 OLD: the tool of format 1.0, from the last commit that writes it: `git worktree add old ef94608 && cd old && meson setup
 build && ninja -C build tools/ebpo`. OLD_VECTORS: its format-spec/vectors. EBPO: this tool. MODELS_DIR: a folder of PLY
-files with the names used below, and `wild`. Prints two tables. Exit code 1: this tool does not read a file of 1.0 as the
-old tool does, or the old tool does not refuse a file of 1.1 that it cannot read.
+files with the names used below, and `wild`. Prints two tables. Exit code 1: the two tools read a file of 1.0
+differently, or the old tool accepts a file of 1.1 that it cannot read.
 """
 import pathlib
 import subprocess

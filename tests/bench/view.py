@@ -1,11 +1,10 @@
 #!/usr/bin/env python3
 """Prints the tables of docs/measured/view.md: tests/bench/view.py EBPO FILE.ebpo.h5 [MILLISECONDS]
 
-For three views of a model (all of it, an eighth of the angle, ten times as far) it prints the bytes
-of the file until no visible node is larger than a number of pixels, compared with whole levels; the
-size of the largest visible node after a number of bytes, by order; and the requests and waiting times
-with a server on this machine that waits MILLISECONDS (default 50) before each response. Bytes, nodes
-and pixels do not depend on the machine.
+The three views of a model are the whole model, an eighth of the angle, and ten times the distance. For each view the
+script prints the bytes of the file until no visible node is larger than a number of pixels, compared with whole levels;
+the size of the largest visible node after a number of bytes, by order; and the requests and waiting times with a local
+server that waits MILLISECONDS (default 50) before each response. Bytes, nodes and pixels do not depend on the machine.
 """
 import http.server
 import json

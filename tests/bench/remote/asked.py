@@ -1,4 +1,4 @@
-"""The queries by URL: rows that are measured for each side."""
+"""The queries by URL: the rows that are measured for each side."""
 import json
 import math
 import random
@@ -7,15 +7,15 @@ import subprocess
 import time
 
 BUDGET = "256M"
-NEAR = 1e-4     # of the diagonal
+NEAR = 1e-4     # diagonals
 VIEW_FROM = 0.03
-KEPT = 588e3    # bytes of the box that is fetched
+KEPT = 588e3    # bytes that `fetch --box` keeps
 CONNECTIONS = 32  # maximum of the command, used to count dependent round trips
 TRIES = 3
 
 
 class Side:
-    """A build in its checkout, with a large and a small file of the same two models."""
+    """A build in its checkout, with its files of the large and the small model."""
     def __init__(self, name, build, large, small):
         self.name, self.build, self.files = name, build, {"large": large, "small": small}
         self.ebpo, self.root = build / "tools/ebpo", build.parent
@@ -28,7 +28,7 @@ class Side:
         return f"{self.name.replace(' ', '_')}_{which}.ebpo.h5"
 
 
-# --- where ---
+# --- positions ---
 
 def unit(dice):
     z, turn = 2 * dice.random() - 1, 2 * math.pi * dice.random()
@@ -41,8 +41,10 @@ def numbers(*values):
 
 
 class Places:
-    """Random places on a model: where random lines through the ball around it enter the surface,
-    evenly by area as far as it is seen from outside. Always the same for one model."""
+    """Random positions on a model: where random lines through the ball around the model enter the surface.
+
+    They are uniform by area on the part that is visible from outside, and always the same for one model.
+    """
     def __init__(self, side, which, count, work):
         self.work, self.side, self.file = work, side, side.files[which]
         info = json.loads(side.run("info", "--json", self.file))
@@ -60,10 +62,10 @@ class Places:
         self.found = [([o + hit["t"] * x for o, x in zip(origin, d)], d)
                       for (origin, d), hit in zip(rays, hits) if hit][:count]
         if len(self.found) < count:
-            raise RuntimeError(f"{self.file}: only {len(self.found)} places of {count}")
+            raise RuntimeError(f"{self.file}: only {len(self.found)} positions of {count}")
 
     def near(self, name, begin, count):
-        """A file of points at most NEAR diagonals from the surface."""
+        """Write a file of points at most NEAR diagonals from the surface."""
         path = self.work / name
         lines = []
         for i in range(begin, begin + count):
@@ -74,7 +76,7 @@ class Places:
         return path
 
     def crowd(self, name, count):
-        """A file of points around all places, up to 100 times as far as the near ones."""
+        """Write a file of points around all positions, up to 100 times as far from the surface as the near points."""
         path, dice = self.work / name, random.Random(2)
         path.write_text("".join(
             numbers(*(p + 10**-(2 + 2 * dice.random()) * self.diagonal * x
@@ -83,12 +85,12 @@ class Places:
         return path
 
     def view(self, i):
-        """Eye and what is looked at, from outside."""
+        """Return an eye outside of the model, and the point at which it looks."""
         at, d = self.found[i]
         return [p - VIEW_FROM * self.diagonal * x for p, x in zip(at, d)], at
 
     def box(self, i):
-        """The cube around a place of which `ebpo subset` keeps about KEPT bytes."""
+        """Return the cube around a position of which `ebpo subset` keeps about KEPT bytes."""
         low, high, out = 0, 0.1 * self.diagonal, self.work / "box.ebpo.h5"
         for _ in range(14):
             half = (low + high) / 2
@@ -104,14 +106,14 @@ class Places:
 # --- rows ---
 
 class Row:
-    """Commands that are asked one by one: `command` as the page shows it, `asks` what fills it."""
+    """Commands that run one by one. command: their text on the page; asks: the arguments of each."""
     def __init__(self, name, what, command, asks, which="large", waves=True):
         self.name, self.what, self.command = name, what, command
         self.asks, self.which, self.waves = asks, which, waves
 
 
 def rows(large, small, work, singles, views):
-    """All rows of questions by URL."""
+    """Return all rows of queries by URL."""
     each = [large.near(f"near_{i}.txt", i, 1) for i in range(singles)]
     hundred, fifty = large.near("near_100.txt", 0, 100), small.near("near_50.txt", 0, 50)
     box, kept = large.box(0)
@@ -143,7 +145,7 @@ def rows(large, small, work, singles, views):
 
 
 def ask(server, line, side, row, work, connections=None):
-    """One after the other, each a new process: {requests, bytes, seconds or waves: [of each]}."""
+    """Run the commands one after the other, each in a new process. Return {requests, bytes, seconds or waves: [of each]}."""
     out, found = work / "out.ebpo.h5", {"requests": [], "bytes": [], "seconds": [], "waves": []}
     name = side.link(row.which)
     for command in row.asks:
@@ -163,7 +165,7 @@ def ask(server, line, side, row, work, connections=None):
         found["bytes"].append(size)
         found["waves"].append(line.waves(connections or 1000))
         if not said and row.name != "box":
-            raise RuntimeError(f"{side.name}, {row.name}: nothing was answered")
+            raise RuntimeError(f"{side.name}, {row.name}: no result")
     return found
 
 
@@ -172,16 +174,16 @@ def measure(server, line, side, row, work):
     found = ask(server, line, side, row, work)
     found["round_trips"] = found.pop("waves")
     if row.waves:
-        # a machine with much to do only ever adds to them
+        # other load of the machine only increases the number
         tries = [ask(server, line, side, row, work, CONNECTIONS)["waves"] for _ in range(TRIES)]
         found["waves"] = [min(each) for each in zip(*tries)]
     return found
 
 
-# --- on this machine ---
+# --- local files ---
 
 def local(side, file, seeds, count):
-    """A first answer from a file that the system has forgotten; a path at once; uniform points."""
+    """Measure a first result from a cold file, a path at full speed, and uniform points."""
     def bench(*options):
         return json.loads(side.run("bench", "--json", "--memory", BUDGET, *options, file))
     found = {}
@@ -195,7 +197,7 @@ def local(side, file, seeds, count):
 
 
 def same_answers(side, line, which, points):
-    """Whether what is said by URL is what is said of the file."""
+    """Return True when the results by URL equal those from the file."""
     url = f"http://127.0.0.1:{line.port}/{side.link(which)}"
     return all(side.run(command, "--memory", BUDGET, url, points)
                == side.run(command, "--memory", BUDGET, side.files[which], points)

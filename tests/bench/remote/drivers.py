@@ -1,4 +1,4 @@
-"""Levels and whole files read by the command, by the viewer's reader, and by HDF5's own ways."""
+"""Readers of levels and whole files: the command, the viewer's reader, and HDF5's own readers."""
 import json
 import os
 import pathlib
@@ -20,7 +20,7 @@ class Readers:
         self.point.write_text("0 0 0\n")
 
     def ours(self, url, to):
-        """The library, by the command that reads the same."""
+        """Read with the library, through the command that reads the same data."""
         if to == "whole":
             command = [self.tool, "fetch", "-q", url, self.point.with_name("whole.ebpo.h5")]
         else:
@@ -52,8 +52,10 @@ class Readers:
 
 
 def requests_of(server, readers, models):
-    """[file, its bytes, reader, requests and bytes of levels 0 to 4, of 0 to 5, of all]; all of
-    large files by the command only."""
+    """Return [file, its bytes, reader, requests and bytes of levels 0 to 4, of 0 to 5, of all].
+
+    Only the command reads all of large files.
+    """
     found = []
     for name, size in models.items():
         for reader, read in readers.all().items():
@@ -70,7 +72,7 @@ def requests_of(server, readers, models):
 
 
 def latency_of(server, readers, name, latencies, rounds):
-    """[round trip in ms, reader, ms until level 0, and until level 5, are decoded]"""
+    """Return [round trip in ms, reader, ms until level 0 is decoded, ms until level 5 is decoded]."""
     found = []
     for latency in latencies:
         port = Line(server.port, latency / 1e3).port if latency else server.port

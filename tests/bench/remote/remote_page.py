@@ -1,5 +1,7 @@
-"""Prints docs/measured/remote.md from the measurements. The page has those of the new build; --json keeps
-the others."""
+"""Prints docs/measured/remote.md from the measurements.
+
+The page has the measurements of the new build; --json keeps the others.
+"""
 import statistics
 
 import asked
@@ -7,11 +9,11 @@ import measured
 from query_page import Page, figure
 
 BEFORE, MIXED, AFTER = "before", "old file", "after"
-NAMES = {"waves": "round trips"}  # on the page
+NAMES = {"waves": "round trips"}  # names on the page
 
 
 def middle(values):
-    """Median, and the largest where there are several."""
+    """Return the median and, for several values, the maximum."""
     if not values:
         return "-"
     return figure(statistics.median(values)) + (f" / {figure(max(values))}"
@@ -31,7 +33,7 @@ class Found:
         return row and row.get(what)
 
     def rows(self):
-        """Names of the queries by URL, in order, with text and command."""
+        """Return the names of the queries by URL, in order, with text and command."""
         seen = {}
         for name, row in self.found.items():
             if isinstance(row, dict) and "command" in row:
@@ -39,7 +41,7 @@ class Found:
         return seen
 
     def beyond(self, side, what):
-        """Levels 6 to 8: the difference of levels 0 to 8 and levels 0 to 5."""
+        """Return levels 6 to 8: the difference of levels 0 to 8 and levels 0 to 5."""
         both = [self.values(side, name, what) for name in ("levels 8", "levels 5")]
         return both[0] and both[1] and [both[0][0] - both[1][0]]
 

@@ -1,5 +1,4 @@
-"""One reading by HDF5's own ros3 driver: ros3.py URL TO|whole -> JSON. Needs HDF5_PLUGIN_PATH for
-zstd."""
+"""Reads once with HDF5's own ros3 driver: ros3.py URL TO|whole -> JSON. Needs HDF5_PLUGIN_PATH for zstd."""
 import json
 import sys
 import time

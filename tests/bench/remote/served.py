@@ -1,5 +1,4 @@
-"""nginx with its log, and a slow line before a port that notes when requests were sent and
-answered."""
+"""nginx with its log, and a slow line that records when requests were sent and responses were complete."""
 import asyncio
 import contextlib
 import os
@@ -9,7 +8,7 @@ import subprocess
 import threading
 import time
 
-BUSY = 0.02  # seconds within which a client that has much to do uses a connection that became free
+BUSY = 0.02  # seconds within which a busy client uses a connection again
 
 
 def free_port():
@@ -24,11 +23,11 @@ def wait_for(port):
             if s.connect_ex(("127.0.0.1", port)) == 0:
                 return
         time.sleep(0.1)
-    raise RuntimeError(f"nothing answers on port {port}")
+    raise RuntimeError(f"no server on port {port}")
 
 
 class Server:
-    """nginx on a folder of links; lines of its log are (status, bytes of the body, method, uri)."""
+    """nginx on a folder of links. Lines of its log are (status, bytes of the body, method, uri)."""
     def __init__(self, work, rules, links):
         self.port, self.log = free_port(), work / "access.log"
         shutil.rmtree(work / "www", ignore_errors=True)
@@ -54,8 +53,8 @@ http {{
         wait_for(self.port)
 
     def traffic(self, name):
-        """Requests and bytes for a file since the last call."""
-        time.sleep(0.3)  # nginx writes a line when an answer is out
+        """Return requests and bytes for a file since the last call."""
+        time.sleep(0.3)  # nginx writes a line after the response is sent
         lines = [line.split(" ", 3) for line in self.log.read_text().splitlines()]
         self.log.write_text("")
         lines = [line for line in lines if line[3].endswith(name)]
@@ -67,12 +66,15 @@ http {{
 
 
 class Line:
-    """Forwards a port to another with a round trip of `seconds` on top, and for each new connection
-    one more (the handshake); answers share `rate` bytes a second."""
+    """Forwards a port to another port, with a latency.
+
+    Each round trip takes `seconds` longer, and each new connection one more round trip (the handshake). All responses
+    together have a rate of `rate` bytes per second.
+    """
     def __init__(self, to, seconds, rate=None):
         self.to, self.half, self.rate, self.port = to, seconds / 2, rate, free_port()
-        self.free_at = 0   # when the line has carried what it has taken
-        self.requests = []  # [sent, answered in whole, connection] as the client sees it
+        self.free_at = 0   # time when the line has transferred all bytes that it has accepted
+        self.requests = []  # [sent, response complete, connection] at the client's times
         self.loop = asyncio.new_event_loop()
         ready = threading.Event()
         threading.Thread(target=self.run, args=(ready,), daemon=True).start()
@@ -86,7 +88,7 @@ class Line:
         self.loop.run_forever()
 
     async def connection(self, reader, writer):
-        """A client connects because it has a request, which it sends after the handshake."""
+        """Accept a connection. The client connects for a request, and sends it after the handshake."""
         call = [self.loop.time(), None, writer]
         self.requests.append(call)
 
@@ -105,17 +107,17 @@ class Line:
                              return_exceptions=True)
 
     async def carried(self, size, rate):
-        """When so many bytes have gone into the line, after all that other connections gave it."""
+        """Wait until the line has transferred `size` bytes, after the bytes of other connections."""
         if rate:
             self.free_at = max(self.free_at, self.loop.time()) + size / rate
             await asyncio.sleep(self.free_at - self.loop.time())
 
     async def forward(self, reader, writer, rate, taken, given):
-        """What has been carried at t arrives at t + half, however much follows."""
+        """Forward bytes. Bytes that are transferred at t arrive at t + half the latency, whatever follows."""
         queue = asyncio.Queue()
 
         async def take():
-            with contextlib.suppress(ConnectionError):  # a client that ends takes no leave
+            with contextlib.suppress(ConnectionError):  # a client may close the connection at any time
                 while data := await reader.read(1 << (12 if rate else 16)):
                     taken()
                     await self.carried(len(data), rate)
@@ -135,9 +137,11 @@ class Line:
         await asyncio.gather(take(), give())
 
     def waves(self, connections):
-        """Batches of the requests since the last call. One begins a wave if it was sent after an
-        answer of the wave had come in whole, unless all `connections` were busy until then, and
-        some still are: it had only waited for one of them."""
+        """Return the round trips since the last call: batches of requests that depend on each other.
+
+        A request begins a new batch if it was sent after a response of the batch was complete. The exception is a request that
+        only waited for a connection: all `connections` were busy until then, and some still are.
+        """
         calls, self.requests = sorted((c for c in self.requests if c[1]), key=lambda c: c[:2]), []
         count, first_answer = 0, 0
         for i, (sent, answered, _) in enumerate(calls):
