@@ -35,8 +35,8 @@ typedef struct block_start {
 
 typedef struct colouring {
     ebpo_tree *tree;
-    double size; /* largest side of the box */
-    bool by_face;
+    double size;  /* largest side of the box */
+    bool by_face; /* the columns are colours of faces, not of vertices */
     ebpo_colour_column column[EBPO_COLOUR_CHANNELS];
     const ebpo_level *level; /* level whose groups are added up */
     const block_start *start;

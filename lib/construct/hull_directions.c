@@ -30,7 +30,8 @@ typedef struct hull {
     const double (*p)[3];
     /* padding to a multiple of four: planes that no point is above */
     double nx[SPACE + 4], ny[SPACE + 4], nz[SPACE + 4], d[SPACE + 4];
-    double length[SPACE], beyond;
+    double length[SPACE]; /* twice the area of each facet */
+    double beyond;        /* a point that is no farther from the hull is omitted */
     uint16_t corner[SPACE][3];
     int count, capacity;
 } hull;

@@ -309,7 +309,7 @@ typedef struct top_split {
     uint16_t *mask; /* bits 0 to 7: octants; bit 8: the face crosses the cell's faces */
     /* for each block and bit: the number of faces, later the position in the list */
     uint64_t (*begin)[9];
-    uint32_t *to[9];
+    uint32_t *to[9]; /* for each bit: the list that gets the faces */
 } top_split;
 
 /* Returns a mask of the octants that the face touches. An exact test decides where several octants

@@ -280,7 +280,8 @@ typedef struct clustering {
     bool *chosen;          /* [count] */
     int *nearest;          /* [count] index in `medoid` */
     float *first, *second; /* [count] distance of the nearest medoid and of the next */
-    double *lost, *gain;   /* [wanted] */
+    double *lost;          /* [wanted] change of the cost when the medoid is removed */
+    double *gain;          /* [wanted] change of the cost when a candidate replaces the medoid */
 } clustering;
 
 /* Returns the angle of (x, y) from the x axis, -pi .. pi, to about 1e-15, by operations that round

@@ -30,10 +30,10 @@ typedef struct comparing {
     /* [faces] 1: the face's box intersects the box of another shell, which does not contain the box
      * of the face's own shell */
     uint8_t *exposed;
-    uint8_t *reached;    /* [shells] 1: a face of another shell intersects this shell's box */
-    ebpo_box_tree faces; /* faces of reached shells; value: the shell */
-    uint64_t steps, most;
-    bool apart; /* result so far */
+    uint8_t *reached;     /* [shells] 1: a face of another shell intersects this shell's box */
+    ebpo_box_tree faces;  /* faces of reached shells; value: the shell */
+    uint64_t steps, most; /* steps of all walks so far; their limit */
+    bool apart;           /* result so far */
 } comparing;
 
 /* The walk for one face, which is compared with shells or with other faces. */

@@ -1,8 +1,8 @@
 /* Bounds the distance by which an envelope extends beyond the model. ebpo_bound_envelope is a
- * branch and bound over the pieces of fragments.c: the upper bound of each piece is computed from
- * the distance of its centre and from its nearest face, and the largest distance found is the lower
- * bound. The second part decides for the nodes of a level if their envelopes are within max_error,
- * on several threads, and keeps its results for other limits. */
+ * branch and bound over the fragments of fragments.c: the upper bound of each fragment is computed
+ * from the distance of its centre and from its nearest face, and the largest distance found is the
+ * lower bound. The second part decides for the nodes of a level if their envelopes are within
+ * max_error, on several threads, and keeps its results for other limits. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -35,7 +35,7 @@ void ebpo_bounder_free(ebpo_bounder *b)
     memset(b, 0, sizeof *b);
 }
 
-/* --- measures of a piece --- */
+/* --- measures of a fragment --- */
 
 static void find_centre(const ebpo_bounder *b, const ebpo_polytope *p, ebpo_fragment_measure *l)
 {
@@ -75,8 +75,8 @@ static bool is_in_envelope(const ebpo_bounder *b, const double xi[3])
     return true;
 }
 
-/* Moves a point outside the envelope towards the envelope's middle until it is inside. Pieces
- * extend a little beyond the envelope, and where the envelope is sharp, all of a piece may be
+/* Moves a point outside the envelope towards the envelope's middle until it is inside. Fragments
+ * extend a little beyond the envelope, and where the envelope is sharp, all of a fragment may be
  * outside. The move changes the point's distance by at most the length of the move. */
 static void pull_in(const ebpo_bounder *b, const double xi[3], double out[3])
 {

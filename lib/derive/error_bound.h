@@ -16,6 +16,7 @@ typedef struct ebpo_bound_goal {
     uint64_t queries; /* stop after about this many distance queries */
 } ebpo_bound_goal;
 
+/* The result of a search: bounds of the distance. */
 typedef struct ebpo_reach_bound {
     double lo, hi;      /* in the model's unit */
     double location[3]; /* a point of the envelope at lo; not set when lo is 0 */
@@ -29,12 +30,12 @@ void ebpo_bounder_free(ebpo_bounder *b);
 /* Bounds the maximum of d(x) over all points x of an envelope: the part of `cell` within b->halves.
  * d is the distance to the closed solid and to the faces, 0 inside the solid.
  *
- * The search is a branch and bound over convex pieces of the envelope. When x moves, d changes by
- * at most the length of the move (the signed distance has this property within the solid, too). The
- * distance to a single face is convex, so its largest value over a piece is at a corner of the
- * piece. Pieces follow the model's tree down to leaves. Within leaves, pieces are cut along the
- * faces' planes, until each piece is inside or outside. The order and the cuts depend on the
- * envelope alone, so a larger `enough` never needs more queries. */
+ * The search is a branch and bound over convex fragments of the envelope. When x moves, d changes
+ * by at most the length of the move (the signed distance has this property within the solid, too).
+ * The distance to a single face is convex, so its largest value over a fragment is at a corner of
+ * the fragment. Fragments follow the model's tree down to leaves. Within leaves, fragments are cut
+ * along the faces' planes, until each fragment is inside or outside. The order and the cuts depend
+ * on the envelope alone, so a larger `enough` never needs more queries. */
 EBPO_MUST_USE ebpo_status ebpo_bound_envelope(ebpo_bounder *b, ebpo_cell cell,
                                               const ebpo_bound_goal *goal, ebpo_reach_bound *out,
                                               ebpo_error *error);

@@ -1,10 +1,10 @@
-/* Pieces of an envelope, for bounds of its distance to the model: convex polytopes in the cell
+/* Fragments of an envelope, for bounds of its distance to the model: convex polytopes in the cell
  * coordinates of a node, which together cover the envelope. Lengths are in units of a power of two
  * near the cell's longest side, so that nothing overflows or underflows. Every cut keeps slightly
- * too much on both sides, so that the tolerances of ebpo_polytope_clip lose nothing. Pieces follow
- * the model's tree down to leaves and are then cut along the planes of faces, or halved, until each
- * is inside, outside, or small. This file also reads the trees: the tree whose envelopes are
- * measured, and the tree of the whole model, which determines the solid. */
+ * too much on both sides, so that the tolerances of ebpo_polytope_clip lose nothing. Fragments
+ * follow the model's tree down to leaves and are then cut along the planes of faces, or halved,
+ * until each is inside, outside, or small. This file also reads the trees: the tree whose envelopes
+ * are measured, and the tree of the whole model, which determines the solid. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -213,9 +213,9 @@ ebpo_status ebpo_tree_derive(const ebpo_lod_model *tree, const ebpo_node *leaf,
     return status;
 }
 
-/* maximum number of faces to cut along; a piece with more faces is halved */
+/* maximum number of faces to cut along; a fragment with more faces is halved */
 enum { CUT_FACES = 64 };
-/* a plane cuts only a piece that extends this far, in cells, to both sides of the plane; this is
+/* a plane cuts only a fragment that extends this far, in cells, to both sides of the plane; this is
  * more than the width that ebpo_polytope_clip refuses */
 static const double side_least = 2e-7;
 
@@ -252,8 +252,8 @@ static ebpo_status push_polytope(ebpo_bounder *b, ebpo_fragment_kind kind,
     return status;
 }
 
-/* Gives a piece the faces that may intersect it. Copies these to the top of the stack of faces from
- * `count` faces that begin at `first` in the same stack. */
+/* Gives a fragment the faces that may intersect it. Copies these to the top of the stack of faces
+ * from `count` faces that begin at `first` in the same stack. */
 static ebpo_status copy_faces(ebpo_bounder *b, ebpo_fragment *fragment, uint64_t first,
                               uint64_t count)
 {
@@ -307,10 +307,10 @@ static void find_cell_faces(const ebpo_bounder *b, ebpo_cell cell, int levels, d
     }
 }
 
-/* Returns how far a piece extends beyond its cell: up to EBPO_CUT_THIN where a neighbour's thin
+/* Returns how far a fragment extends beyond its cell: up to EBPO_CUT_THIN where a neighbour's thin
  * part stayed with it, or the slack of a cut. Both are lengths in the cell coordinates of the
- * envelope's node, so far below this node they are not small compared with the piece's cell. A
- * bound for the cell plus this distance is a bound for the piece. */
+ * envelope's node, so far below this node they are not small compared with the fragment's cell. A
+ * bound for the cell plus this distance is a bound for the fragment. */
 static double find_beyond(const ebpo_bounder *b, const ebpo_polytope *p, ebpo_cell cell, int levels)
 {
     double low[3], high[3], origin[3] = { 0, 0, 0 }, apart[3];
@@ -322,8 +322,8 @@ static double find_beyond(const ebpo_bounder *b, const ebpo_polytope *p, ebpo_ce
     return ebpo_cell_frame_apart(&b->frame, apart, origin);
 }
 
-/* Bounds a piece in a black cell. The piece is inside the solid, except for thin parts of
- * neighbouring cells that stayed with it. Parts within the slack are ignored, as the pieces of
+/* Bounds a fragment in a black cell. The fragment is inside the solid, except for thin parts of
+ * neighbouring cells that stayed with it. Parts within the slack are ignored, as the fragments of
  * neighbours overlap by it. */
 static void bound_black(ebpo_bounder *b, const ebpo_polytope *p, ebpo_cell cell, int levels)
 {
@@ -422,7 +422,7 @@ static bool find_plane(const ebpo_bounder *b, uint64_t face, double n[3], double
     return true;
 }
 
-/* Cuts a piece along a plane, |n| = 1, and pushes both parts. Sets *done to false when clipping
+/* Cuts a fragment along a plane, |n| = 1, and pushes both parts. Sets *done to false when clipping
  * fails. */
 static ebpo_status cut_along(ebpo_bounder *b, const ebpo_fragment *fragment,
                              ebpo_fragment_kind kind, const double n[3], double d, bool *done)
@@ -440,9 +440,9 @@ static ebpo_status cut_along(ebpo_bounder *b, const ebpo_fragment *fragment,
     return status;
 }
 
-/* Cuts a piece of about the size of its nearest face along the sides of the prism above that face.
- * Over the face, the distance to the face's plane is the distance to the face, so flat places need
- * no small pieces. */
+/* Cuts a fragment of about the size of its nearest face along the sides of the prism above that
+ * face. Over the face, the distance to the face's plane is the distance to the face, so flat places
+ * need no small fragments. */
 static ebpo_status cut_prism(ebpo_bounder *b, const ebpo_fragment *fragment,
                              const ebpo_fragment_measure *l)
 {
@@ -486,10 +486,10 @@ static ebpo_status cut_prism(ebpo_bounder *b, const ebpo_fragment *fragment,
     return status != EBPO_OK || done ? status : cut_longest(b, fragment, EBPO_FRAGMENT_OUTSIDE);
 }
 
-/* Returns a bound of the distance for a piece whose centre is inside the solid. Faces may cut only
- * the outermost part of the piece. A segment from the centre to a point behind such a face ends at
- * most this far behind the face. The same is true for the cell faces of the leaf, where the piece
- * extends beyond them by more than the overlap of cuts: faces there are in the list of the
+/* Returns a bound of the distance for a fragment whose centre is inside the solid. Faces may cut
+ * only the outermost part of the fragment. A segment from the centre to a point behind such a face
+ * ends at most this far behind the face. The same is true for the cell faces of the leaf, where the
+ * fragment extends beyond them by more than the overlap of cuts: faces there are in the list of the
  * neighbour, not of this leaf. */
 static double behind_faces(const ebpo_bounder *b, const ebpo_fragment *fragment,
                            const ebpo_fragment_measure *l)
@@ -530,7 +530,7 @@ static bool is_flat(const ebpo_bounder *b)
     return fmin(fmin(b->frame.side[0], b->frame.side[1]), b->frame.side[2]) < 1e10 * b->frame.grain;
 }
 
-/* Cuts a piece within a leaf of a solid, whose points are inside or outside. */
+/* Cuts a fragment within a leaf of a solid, whose points are inside or outside. */
 static ebpo_status cut_leaf(ebpo_bounder *b, const ebpo_fragment *fragment,
                             const ebpo_fragment_measure *l)
 {

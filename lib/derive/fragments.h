@@ -1,4 +1,4 @@
-/* Declarations of fragments.c: a node's cell with its unit of length, pieces of an envelope, the
+/* Declarations of fragments.c: a node's cell with its unit of length, fragments of an envelope, the
  * trees of a file, and the state of a search for an error bound. */
 #ifndef EBPO_DERIVE_FRAGMENTS_H
 #define EBPO_DERIVE_FRAGMENTS_H
@@ -45,7 +45,7 @@ double ebpo_cell_frame_diagonal(const ebpo_cell_frame *f, int levels);
 double ebpo_cell_frame_distance(const ebpo_cell_frame *f, const double xi[3],
                                 const double triangle[3][3]);
 
-/* Pieces of an envelope are convex polytopes in the cell coordinates of the node. Together they
+/* Fragments of an envelope are convex polytopes in the cell coordinates of the node. Together they
  * cover the envelope. Every cut keeps a little too much on both sides. */
 
 /* The amount that is kept too much: more than the tolerance of clipping, for normals of Euclidean
@@ -59,7 +59,7 @@ typedef struct ebpo_extent {
 void ebpo_extent_of(const ebpo_polytope *p, ebpo_extent *out);
 
 /* A part of at most this width stays with the part on the other side. The width is less than a
- * quarter of the smallest piece that is cut. */
+ * quarter of the smallest fragment that is cut. */
 #define EBPO_CUT_THIN 1.2e-7 /* ebpo_polytope_clip refuses 1e-7 */
 
 /* Two trees determine a bound: the tree whose envelopes are bounded, and the tree of the whole
@@ -96,12 +96,12 @@ typedef struct ebpo_bounder {
     ebpo_half_spaces halves;  /* half-spaces of the envelope */
     ebpo_fragment *fragments; /* a stack */
     uint64_t fragment_capacity, fragment_count;
-    /* faces of pieces within leaves, in the model's unit: also a stack */
+    /* faces of fragments within leaves, in the model's unit: also a stack */
     double (*faces)[3][3];
     uint64_t face_capacity, face_count;
     /* The search for the current node, with lengths in the frame's unit: */
     ebpo_cell_frame frame;
-    double target;      /* pieces with an upper bound of at most this are not examined further */
+    double target;      /* fragments with an upper bound of at most this are not examined further */
     double quit;        /* the search stops once `lo` is larger */
     double ratio;       /* `target` is at least `ratio` times `lo` */
     double lo, hi;      /* bounds found so far */
@@ -111,13 +111,14 @@ typedef struct ebpo_bounder {
     ebpo_error *error;
 } ebpo_bounder;
 
-/* --- the pieces that error_bound.c searches: a stack, and how a piece is cut --- */
+/* --- the fragments that error_bound.c searches: a stack, and how a fragment is cut --- */
 
-#define EBPO_FRAGMENT_LEAST 1e-6 /* pieces are not cut below this, in sides of the cell */
+#define EBPO_FRAGMENT_LEAST 1e-6 /* fragments are not cut below this, in sides of the cell */
 
 typedef enum ebpo_fragment_kind {
     EBPO_FRAGMENT_GRAY, /* the part in a gray node's cell */
-    EBPO_FRAGMENT_LEAF, /* within a leaf's cell: its faces that may intersect the piece are known */
+    /* within a leaf's cell: its faces that may intersect the fragment are known */
+    EBPO_FRAGMENT_LEAF,
     /* in a white cell, or cut off from all faces, or in a surface's envelope, which has no inside
      */
     EBPO_FRAGMENT_OUTSIDE
@@ -126,37 +127,37 @@ typedef enum ebpo_fragment_kind {
 struct ebpo_fragment {
     ebpo_fragment_kind kind;
     double upper;
-    ebpo_node node; /* GRAY, LEAF: the node of the model's tree whose cell has the piece */
+    ebpo_node node; /* GRAY, LEAF: the node of the model's tree whose cell has the fragment */
     int levels;     /* GRAY, LEAF: the number of levels of `node` below the node of the envelope */
-    /* GRAY, LEAF: bound of the distance of the piece's points from the cell of `node` */
+    /* GRAY, LEAF: bound of the distance of the fragment's points from the cell of `node` */
     double beyond;
     uint64_t face_first, face_count; /* LEAF */
     ebpo_polytope p;
 };
 
-/* Measures of a piece. */
+/* Measures of a fragment. */
 typedef struct ebpo_fragment_measure {
-    double centre[3], reach; /* all of the piece is within `reach` of the centre */
+    double centre[3], reach; /* all of the fragment is within `reach` of the centre */
     double distance;         /* distance of the centre; negative inside */
     double upper;
     double face[3][3]; /* the face nearest to the centre, in the model's unit */
 } ebpo_fragment_measure;
 
-/* Pushes a piece with the bounds of its parent. *out is valid until the next call; its polytope is
- * not set. */
+/* Pushes a fragment with the bounds of its parent. *out is valid until the next call; its polytope
+ * is not set. */
 EBPO_MUST_USE ebpo_status ebpo_fragment_push(ebpo_bounder *b, ebpo_fragment_kind kind,
                                              const ebpo_fragment *parent, ebpo_fragment **out);
 
-/* Gives a new piece all faces of its leaf. */
+/* Gives a new fragment all faces of its leaf. */
 EBPO_MUST_USE ebpo_status ebpo_fragment_leaf_faces(ebpo_bounder *b, ebpo_fragment *fragment,
                                                    const ebpo_node *leaf);
 
-/* Cuts a piece, which the caller has popped from the stack. Pushes its parts, or raises the bound
- * by them if no further cut is needed. */
+/* Cuts a fragment, which the caller has popped from the stack. Pushes its parts, or raises the
+ * bound by them if no further cut is needed. */
 EBPO_MUST_USE ebpo_status ebpo_fragment_cut(ebpo_bounder *b, const ebpo_fragment *fragment,
                                             const ebpo_fragment_measure *l);
 
-/* Raises the bound to `upper`, the bound of some piece. */
+/* Raises the bound to `upper`, the bound of some fragment. */
 static inline void ebpo_bound_raise(ebpo_bounder *b, double upper)
 {
     b->hi = b->hi < upper ? upper : b->hi;

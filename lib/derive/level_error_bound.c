@@ -478,8 +478,8 @@ static ebpo_status bound_level(survey *s, const ebpo_error_bound_options *o, ebp
 }
 
 /* Improves the upper bound by the bounds of coarser levels. Envelopes nest, so no level has a
- * larger error than the coarser level before it. The search in the coarser level cuts other pieces
- * and may be more precise. */
+ * larger error than the coarser level before it. The search in the coarser level cuts other
+ * fragments and may be more precise. */
 static ebpo_status use_coarser_levels(survey *s, const ebpo_error_bound_options *o,
                                       ebpo_error_bound *out)
 {
