@@ -281,7 +281,8 @@ typedef struct clustering {
     int *nearest;          /* [count] index in `medoid` */
     float *first, *second; /* [count] distance of the nearest medoid and of the next */
     double *lost;          /* [wanted] change of the cost when the medoid is removed */
-    double *gain;          /* [wanted] change of the cost when a candidate replaces the medoid */
+    /* [wanted] part of the change that depends on the medoid, when a candidate replaces it */
+    double *gain;
 } clustering;
 
 /* Returns the angle of (x, y) from the x axis, -pi .. pi, to about 1e-15, by operations that round
