@@ -1,6 +1,6 @@
-// The pages of `ebpo report` in a headless Chromium: report_page.mjs EBPO CLI_INPUTS SOURCE_ROOT
-// Each draws without a complaint and asks for nothing; each figure of its tables and plots is that of report.json.
-// Ends with 77 (skipped) where Chromium or the viewer's packages are missing; tools/install-deps.sh --tests installs them.
+// Tests the pages of `ebpo report` in a headless Chromium: report_page.mjs EBPO CLI_INPUTS SOURCE_ROOT
+// Each page must show without errors, warnings or further requests. Values in tables and plots must agree with report.json.
+// Exits with 77 (skipped) when Chromium or the viewer's packages are missing; tools/install-deps.sh --tests installs them.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
@@ -18,7 +18,7 @@ const { chromium: playwright } = await import(pathToFileURL(join(packages, 'play
 
 const work = mkdtempSync(join(tmpdir(), 'ebpo-report-')), input = (name) => join(work, name);
 const run = (program, args) => execFileSync(program, args, { encoding: 'utf8', stdio: ['ignore', 'pipe', 'inherit'] });
-// A triangle and its back: a solid without volume.
+// A triangle with both orientations: a solid without volume.
 const FLAT = `ply
 format ascii 1.0
 element vertex 3
@@ -36,15 +36,15 @@ end_header
 `;
 const ODD = "<long> & 'odd'";
 
-// --- what figures should look like ---
+// --- formats of values ---
 
 const UNITS = { '': 1, '%': 1, '×': 1, B: 1, kB: 1e3, MB: 1e6, s: 1, ms: 1e-3, 'µs': 1e-6, ns: 1e-9 };
 
-// The number in a text such as "12.3 kB", null for a dash.
+// Returns the value of a text such as "12.3 kB", or null for a dash.
 function valueOf(text) {
   if (text === '–')
     return null;
-  const [, digits, unit] = /^([0-9.,e+-]+)\*? ?(\S*)$/.exec(text) ?? assert.fail(`'${text}' is no figure`);
+  const [, digits, unit] = /^([0-9.,e+-]+)\*? ?(\S*)$/.exec(text) ?? assert.fail(`'${text}' is not a value`);
   assert.ok(unit in UNITS, text);
   return Number(digits.replaceAll(',', '')) * UNITS[unit];
 }
@@ -71,7 +71,7 @@ const LINES = [[0.1, 1.25e6], [0.02, 1.25e7]];
 const onLine = ([trip, rate]) => (l) => (l?.line_trips == null ? null : l.line_trips * trip + l.line_bytes / rate);
 const LINE = [figure('line_bytes'), figure('line_trips'), ...LINES.map(onLine)];
 
-// The levels whose excess stands beside the build's time: the first, one in the middle, the last.
+// Returns all levels, and the levels in the table of build times: the first, one in the middle, and the last.
 function levelsOf(told) {
   const deepest = Math.max(...told.methods.map((m) => m.levels.at(-1).level));
   const numbers = Array.from({ length: deepest - told.levels.first + 1 }, (_, i) => told.levels.first + i);
@@ -113,7 +113,7 @@ function rowsAgree(table, rows, columns, what) {
   });
 }
 
-// Rows hold one thing for each method; each method has the same columns.
+// Returns columns for rows that have one item for each method. All methods have the same columns.
 const perMethod = (told, columns) => told.methods.flatMap((_, i) => columns.map((c) => (row) => c(row[i])));
 
 function tablesAgree(told, { tables, ofMethods }) {
@@ -174,15 +174,15 @@ const plotAxes = (told) => {
   };
 };
 
-// Points with a place on the axes: levels from 0, all else from above 0.
+// Returns the points that are within the axes: levels from 0 on, other values greater than 0.
 function pointsOf(rows, x, y) {
   const fits = (v, of) => v !== null && (of === level ? v >= 0 : v > 0);
   return rows.map((r) => [x(r), y(r)]).filter(([a, b]) => fits(a, x) && fits(b, y));
 }
 
-// Lines of each method, dotted ones after the others.
+// Returns the expected lines: those of each method, then the dotted lines of each method.
 function expectedLines(told, name, [x, ...ys]) {
-  if (name.endsWith('build')) { // a line for each selection
+  if (name.endsWith('build')) { // one line for each selection
     const families = [...new Set(told.methods.map((m) => m.selection))], [y] = ys;
     const members = (s) => told.methods.filter((m) => m.selection === s);
     return families.map((s) => [s, pointsOf(members(s), x, y)]).filter(([, points]) => points.length);
@@ -201,7 +201,7 @@ function plotsAgree(told, plots, count) {
       assert.equal(lines[i].points.length, points.length, `${name}, ${method}`);
       lines[i].points.forEach((p, k) => p.forEach((v, axis) => assert.ok(Math.abs(v / points[k][axis] - 1) < 1e-9 || v === points[k][axis], name)));
     });
-    assert.ok(!expected.length || inside, `${name}: points stand outside of ${JSON.stringify(limits)}`);
+    assert.ok(!expected.length || inside, `${name}: points are outside ${JSON.stringify(limits)}`);
     drawn += expected.length > 0;
   }
   assert.equal(drawn, Object.keys(plots).length);
@@ -210,7 +210,7 @@ function plotsAgree(told, plots, count) {
 
 // --- the pages ---
 
-// Runs in the page.
+// Returns the contents of the page. Runs in the page.
 function look() {
   const texts = (table) => [...table.querySelectorAll('tbody tr')].map((tr) => [...tr.querySelectorAll('td')].map((td) => td.textContent));
   const placed = [...document.querySelectorAll('[data-table]')].map((d) => [d.dataset.table, texts(d.querySelector('table'))]);
@@ -251,12 +251,12 @@ function everywhere(told, seen, pictures) {
   assert.equal(seen.title, told.model.name);
   assert.equal(seen.unexplained, 0, 'dashes without a reason');
   assert.ok(seen.wide <= 0, `wider than the window by ${seen.wide}`);
-  assert.ok(!/\b(NaN|undefined|null|Infinity)\b|\[object/.test(seen.text), 'a figure that is none');
+  assert.ok(!/\b(NaN|undefined|null|Infinity)\b|\[object/.test(seen.text), 'an invalid value in the text');
   assert.ok(seen.pictures.every(Boolean) && seen.pictures.length === pictures, `${seen.pictures.length} pictures, not ${pictures}`);
   assert.equal(seen.shownPlots, Object.keys(seen.plots).length);
   for (const [name, { ink, ticks }] of Object.entries(seen.plots)) {
     assert.ok(ink > 20, `${name} is empty`);
-    assert.ok(ticks[0] >= 1 && ticks[1] >= 2, `${name}: ${ticks} numbers at its axes`);
+    assert.ok(ticks[0] >= 1 && ticks[1] >= 2, `${name}: ${ticks} labels at the axes`);
   }
 }
 
@@ -270,7 +270,7 @@ async function check(browser, name, { plots, pictures }, ...args) {
   tablesAgree(told, seen);
   plotsAgree(told, seen.plots, plots);
   everywhere(told, await show(browser, folder, { width: 390, height: 800 }, 'dark'), shown);
-  console.log(`${name}: fine`);
+  console.log(`${name}: OK`);
   return seen;
 }
 

@@ -1,5 +1,5 @@
-// The viewer in a headless Chromium, files served by nginx: viewer.mjs EBPO GENERATE SOURCE_ROOT
-// Ends with 77 (skipped) where Chromium, nginx or the viewer's packages are not installed; tools/install-deps.sh --tests installs them.
+// Tests the viewer in a headless Chromium, with files served by nginx: viewer.mjs EBPO GENERATE SOURCE_ROOT
+// Exits with 77 (skipped) when Chromium, nginx or the viewer's packages are not installed; tools/install-deps.sh --tests installs them.
 import assert from 'node:assert/strict';
 import { execFileSync, spawn } from 'node:child_process';
 import { copyFileSync, existsSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, statSync, symlinkSync, utimesSync, writeFileSync } from 'node:fs';
@@ -90,7 +90,7 @@ async function settled(page) {
   return stateOf(page);
 }
 
-// --- what the library says ---
+// --- results of the library ---
 
 const levels = () => JSON.parse(run(ebpo, ['levels', '--json', model])).levels;
 function triangles(level, ...options) {
@@ -99,7 +99,7 @@ function triangles(level, ...options) {
 }
 const sum = (list, what) => list.reduce((total, item) => total + what(item), 0);
 
-// Requests for the model since the last call, from nginx's own log: [bytes].
+// Returns the sizes in bytes of the requests for the model since the last call, from nginx's log.
 let logged = 0;
 function requests(name = 'ring') {
   const lines = readFileSync(log, 'utf8').split('\n').filter((line) => line.includes(`/models/${name}.ebpo.h5`)), fresh = lines.slice(logged);
@@ -111,7 +111,7 @@ function requests(name = 'ring') {
   });
 }
 
-// Where the model's vertices fall on the page: [left, top, right, bottom].
+// Returns the bounds of the model's vertices on the page: [left, top, right, bottom].
 async function silhouette(page) {
   const { vertices } = await (await openEbpo(readFileSync(model))).mesh();
   const { matrix, center, scale } = await page.evaluate(() => {
@@ -131,7 +131,8 @@ async function silhouette(page) {
   return box;
 }
 
-// The screenshot, without the panels: where it differs from one without the model, and the mean colour there. The page decodes the PNG.
+// Compares screenshots with and without the model, both without panels. Returns the bounds of the differing pixels, their share of the page, their mean colour and
+// the number of their colours. The page decodes the PNG.
 async function look(page, hidden = '#panel, #bar, #tools, #progress, #compass, #scale { visibility: hidden; }') {
   const hide = await page.addStyleTag({ content: hidden });
   const shot = async () => (await page.screenshot()).toString('base64');
@@ -188,8 +189,8 @@ async function levelFive(page) {
   const planes = triangles(5, '--no-cell-faces'), all = triangles(5);
   assert.equal(state.stats.triangles - state.stats.wallTriangles, planes);
   const { wallTriangles } = state.stats, walls = all - 12 * black - planes;
-  assert.ok(wallTriangles > 0 && wallTriangles < 0.4 * walls, `walls that nobody sees are not drawn: ${wallTriangles} of ${walls}`);
-  await page.keyboard.press('x'); // a section shows all of them, and black cells
+  assert.ok(wallTriangles > 0 && wallTriangles < 0.4 * walls, `hidden cell faces must not be drawn: ${wallTriangles} of ${walls}`);
+  await page.keyboard.press('x'); // a section shows all cell faces and black cells
   assert.equal((await settled(page)).stats.triangles, all);
   for (let i = 0; i < 3; i++)
     await page.keyboard.press('x');
@@ -244,7 +245,7 @@ async function point(page) {
   assert.match(await page.textContent('#where'), /Inside|Outside/);
 }
 
-// A box of red faces: red while the switch is on; a file without colours has no switch.
+// Opens a box with red faces. The picture is red while the switch is on; a file without colours has no switch.
 async function modelColours(browser, address, plainPage) {
   const page = await show(browser, `${address}?file=models/red.ebpo.h5&detail=0`), colour = async () => (await look(page)).colour;
   await settled(page);
@@ -262,7 +263,7 @@ async function click(page) {
   await page.keyboard.press('Escape');
   await page.mouse.click(x0 + (x1 - x0) * 0.5, y1 - (y1 - y0) * 0.12);
   await page.waitForFunction(() => window.ebpoViewer.state.probe?.exact, undefined, { timeout: 30000 });
-  assert.ok((await stateOf(page)).probe.distance < 1e-5, 'a point picked on the real faces lies on them');
+  assert.ok((await stateOf(page)).probe.distance < 1e-5, 'a point picked on the real faces must be on the faces');
 }
 
 async function fromDisk(page) {
@@ -296,7 +297,7 @@ async function samples(browser, address) {
   await page.close();
 }
 
-// The page's code is held back until the model has come and the worker has it: neither waits for the code.
+// Delays the page's code until the worker has the model. Neither the request nor the worker waits for the code.
 async function modelFirst(browser, address) {
   const context = await browser.newContext({ viewport: SIZE, reducedMotion: 'reduce' });
   const come = new Promise((done) => context.on('requestfinished', (r) => r.url().endsWith('ring.ebpo.h5') && done()));
@@ -310,7 +311,7 @@ async function modelFirst(browser, address) {
   await context.close();
 }
 
-// A file below 1 MiB: one request; nothing at the second visit, unless the file is another by then.
+// A file below 1 MiB takes one request. The second visit fetches no bytes, unless the file has changed.
 async function oneRequest(browser, address) {
   const name = 'small', file = join(models, `${name}.ebpo.h5`), context = await browser.newContext({ viewport: SIZE, reducedMotion: 'reduce' }), ways = [];
   const visit = async (wanted) => {
@@ -321,7 +322,7 @@ async function oneRequest(browser, address) {
     await page.close();
   };
   logged = 0;
-  utimesSync(file, 1e9, 1e9); // old, so that a cache may think it fresh
+  utimesSync(file, 1e9, 1e9); // an old date, for which a cache may assume that the file is fresh
   await visit('40,140');
   await visit('40,140');
   run(ebpo, ['convert', '-q', join(work, 'other.ply'), file]);
@@ -333,8 +334,8 @@ async function oneRequest(browser, address) {
   requests();
 }
 
-// A line that can be bad: { address, line }; `line.mode` says what becomes of questions for the model: 'good', 'stall' after `line.most` bytes of the body,
-// 'dead', or a status. line.sent: what was delivered of it, [from, to].
+// Starts a proxy with fault injection: { address, line }. `line.mode` selects the handling of requests for the model: 'good', 'stall' after `line.most` bytes of
+// the body, 'dead', or a status. `line.sent`: the delivered ranges [from, to].
 async function badLine(address) {
   const line = { mode: 'good', most: 0, sent: [], held: new Set() }, { port } = new URL(address);
   const server = createHttp((question, answer) => {
@@ -366,7 +367,7 @@ async function badLine(address) {
   return { address: `http://localhost:${server.address().port}/`, line };
 }
 
-// `gaps`: bytes that came along because they lay between others that were wanted, and were wanted later.
+// Checks that no byte was delivered twice. `gaps`: number of bytes allowed twice, from gaps between wanted ranges that were wanted later.
 function checkOnce(sent, gaps = 0) {
   const sorted = [...sent].sort((a, b) => a[0] - b[0] || a[1] - b[1]);
   let twice = 0, end = 0;
@@ -377,7 +378,7 @@ function checkOnce(sent, gaps = 0) {
   assert.ok(twice <= gaps, `nothing is fetched twice: ${JSON.stringify(sorted)}`);
 }
 
-// Before and in the middle of the first answer nothing comes: it is said, and Retry goes on with the rest.
+// The first response stalls before its first byte and later in its body. The page reports the stall, and Retry fetches the rest.
 async function stalls(browser, { address, line }) {
   const quiet = complaints.length;
   for (const most of [0, 200_000]) {
@@ -386,7 +387,7 @@ async function stalls(browser, { address, line }) {
     await page.waitForSelector('#stall:not([hidden])', { timeout: 15000 });
     assert.match(await page.textContent('#stallWhat'), /No data for \d+ s/);
     assert.match(await page.textContent('#stallNext'), most ? /Waiting for .*, \d+ kB of \d+ kB\./ : /Waiting for the first levels, 1\.05 MB of 1\.05 MB\./);
-    assert.equal(await page.isVisible('#opening'), most === 0); // with so much there is a picture already
+    assert.equal(await page.isVisible('#opening'), most === 0); // with more bytes a picture is already visible
     assert.equal(await page.textContent('#openingName'), 'ring.ebpo.h5');
     const percent = Number(await page.getAttribute('#progress', 'aria-valuenow'));
     assert.ok(most ? percent > 20 && percent < 60 : percent === 0, `progress ${percent}`);
@@ -401,7 +402,7 @@ async function stalls(browser, { address, line }) {
   complaints.length = quiet;
 }
 
-// The line dies when the file is open: nothing is lost, and with the line all of it comes.
+// The connection is lost after the file was opened. No received data is lost, and everything is loaded when the connection is back.
 async function dies(browser, { address, line }) {
   const quiet = complaints.length;
   Object.assign(line, { mode: 'good', sent: [] });
@@ -420,7 +421,7 @@ async function dies(browser, { address, line }) {
   complaints.length = quiet;
 }
 
-// What a status means is said, and there is a way to try again.
+// The page explains HTTP statuses and offers Retry.
 async function statuses(browser, { address, line }) {
   const quiet = complaints.length;
   for (const [status, what, next] of [[403, /403.*does not let this page/, /access/], [404, /404.*no such file/, /address/], [416, /416.*is empty/, /again/], [503, /503/, /later/]]) {
@@ -438,7 +439,8 @@ async function statuses(browser, { address, line }) {
   complaints.length = quiet;
 }
 
-// What an address says is shown; what is looked at stands in it, without steps of the history; another file is a step, and back goes back.
+// The page shows the view of its address. Changes of the view update the address without adding steps to the history. Opening another file adds a step, and Back
+// returns to the previous file.
 async function shares(browser, address) {
   const view = '120,30,2.2,0.1,0,-0.05', page = await show(browser,
     `${address}?file=models/ring.ebpo.h5&level=3&view=${view}&clip=-y0.4&box=0,0,0.125,1,1,1&colour=type&point=0.5,0.25,0&measure=1,0,0,0,1,0`);
@@ -474,7 +476,7 @@ async function shares(browser, address) {
   await page.close();
 }
 
-// Distances and sections are those of the faces.
+// Distances and sections agree with the faces.
 async function measures(browser, address) {
   const page = await show(browser, `${address}?file=models/ring.ebpo.h5&clip=z0.5`);
   await settled(page);
@@ -487,7 +489,7 @@ async function measures(browser, address) {
   assert.equal(Number(await page.textContent('#sectionArea')), Number(measureOf(segments).area.toPrecision(6)));
   const [download] = await Promise.all([page.waitForEvent('download'), page.click('#sectionCsv')]), lines = readFileSync(await download.path(), 'utf8').trim().split('\n');
   assert.equal(lines[0], 'line,x,y,z');
-  assert.equal(lines.length - 1, segments.length / 4 + 2); // two closed lines
+  assert.equal(lines.length - 1, segments.length / 4 + 2); // two closed polylines
   await page.keyboard.press('x'); // no plane
   await page.keyboard.press('d');
   const [x0, y0, x1, y1] = await silhouette(page);
@@ -501,7 +503,7 @@ async function measures(browser, address) {
   await page.close();
 }
 
-// How many pixels of the model's picture are red.
+// Returns the number of red pixels in the model's picture.
 const red = (page) => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => {
   const canvas = document.querySelector('#canvas'), context = new OffscreenCanvas(canvas.width, canvas.height).getContext('2d');
   context.drawImage(canvas, 0, 0);
@@ -509,14 +511,14 @@ const red = (page) => page.evaluate(() => new Promise((done) => requestAnimation
   done(data.reduce((sum, r, i) => sum + (i % 4 === 0 && r > data[i + 1] + 40 ? 1 : 0), 0));
 }))));
 
-// What was painted in a browser, as the command sees it: listed, measured, baked into colours of vertices, and these shown.
+// Reads paint from the browser with the command ebpo paint: lists and measures it, bakes it into vertex colours, and shows these colours.
 async function readsPaint(browser, address, path) {
   const baked = join(work, 'baked.ply'), told = JSON.parse(run(ebpo, ['paint', '--json', '--area', path, model]));
   assert.deepEqual([told.stroke_count, told.layers.length, told.notes[0].title], [1, 1, 'A loss']);
   const { lo, area, hi } = told.areas.all;
   assert.ok(lo > 0 && lo <= area && area <= hi);
   run(ebpo, ['paint', path, model, '--bake', baked]);
-  const converted = join(work, 'baked.ebpo.h5'); // not on the server, which has what was there when it began
+  const converted = join(work, 'baked.ebpo.h5'); // not in the served folder, because the server serves only files that existed at its start
   run(ebpo, ['convert', '-q', baked, converted]);
   const page = await show(browser, address);
   await page.setInputFiles('#file', converted);
@@ -547,7 +549,7 @@ async function paints(browser, address) {
   });
   await page.keyboard.press('b');
   await pull([0.38, 0.87], [0.62, 0.87]);
-  await page.keyboard.press('Control+z'); // its places are perhaps not there yet: it is undone all the same, and not its layer
+  await page.keyboard.press('Control+z'); // undoes the stroke, not its layer, even when the stroke's positions have not arrived
   await page.waitForSelector('#penRedo:not([disabled])');
   assert.deepEqual(await page.evaluate(() => [window.ebpoViewer.paint.file.layers.length, window.ebpoViewer.paint.file.strokes.length]), [1, 0]);
   await drag([0.38, 0.87], [0.62, 0.87]);
@@ -564,7 +566,7 @@ async function paints(browser, address) {
   await page.waitForSelector('#noteForm:not([hidden])');
   await page.fill('#noteTitle', 'A loss');
   await page.focus('#noteBody');
-  await page.keyboard.type('two\nlines'); // not taken for keys of the page
+  await page.keyboard.type('two\nlines'); // the page must not interpret these as its keys
   await page.click('#noteForm button');
   const [download] = await Promise.all([page.waitForEvent('download'), page.click('#paintSave')]), path = join(models, download.suggestedFilename());
   assert.equal(download.suggestedFilename(), 'ring.paint.h5');
@@ -595,7 +597,7 @@ async function paints(browser, address) {
   await other.close({ runBeforeUnload: false });
 }
 
-// The package in a page of somebody else's, of another origin: the element, and the object in a scene of its own.
+// Uses the package in a page of another origin: the element, and the three.js object in a separate scene.
 async function embeds(browser, address) {
   const folder = join(work, 'project'), own = join(folder, 'node_modules/ebpo-viewer'), { build } = await load('node_modules/esbuild/lib/main.js');
   run('node', [join(viewer, 'package.mjs'), own]);
@@ -667,25 +669,25 @@ async function embeds(browser, address) {
   await page.close();
 }
 
-// The element with parts in it: asked, clicked, moved; then a scene, and one model again.
+// Tests the element with parts: queries, clicks and poses; then a scene, and one model again.
 async function embedsSeveral(page, address) {
   const many = page.locator('#many'), heard = (name, count = 1) => page.waitForFunction(([event, n]) => window.of.many?.filter(([one]) => one === event).length >= n, [name, count],
     { timeout: 60000 });
   await heard('idle');
   const { box_size: size, instances, models: files } = await many.evaluate((e) => e.info);
-  assert.ok(size.every((x, k) => Math.abs(x - [5, 1, 1][k]) < 0.01), `${size}`); // cells are a little larger than what is in them
+  assert.ok(size.every((x, k) => Math.abs(x - [5, 1, 1][k]) < 0.01), `${size}`); // cells are slightly larger than the models
   assert.deepEqual([files.length, instances.map((i) => [i.name, i.model])], [1, [['left', 'red'], ['red', 'red']]]);
   const answer = await many.evaluate((e) => e.ask([4.5, 0.5, 3], 'red'));
   assert.deepEqual([answer.where, answer.distance, answer.nearest, answer.instance], ['out', 2, [4.5, 0.5, 1], 'red']);
   assert.match(await many.evaluate((e) => e.ask([0, 0, 0], 'none').catch((error) => error.message)), /"none" is not an instance/);
-  // A click on the right one, seen from the front: its middle is 2 of the 5 (whose diagonal is as long as 2 in the picture) right of the picture's middle.
+  // Clicks the right cube from the front. Its centre is 2 units to the right of the centre of the box, which is 5 units wide; the box's diagonal is 2 in the picture.
   const { x, y, width, height } = await many.boundingBox(), right = 2 * 2 / Math.hypot(5, 1, 1) / (2.5 - 1 / Math.hypot(5, 1, 1)) * height / 2 / Math.tan(19 * Math.PI / 180);
   await page.mouse.click(x + width / 2 + right, y + height / 2);
   await page.waitForFunction(() => window.of.many.some(([name, { instance, exact }]) => name === 'point' && exact && instance === 'red'));
-  await many.evaluate((e) => e.lastElementChild.setAttribute('pose', '8,0,0')); // moves without being opened again
+  await many.evaluate((e) => e.lastElementChild.setAttribute('pose', '8,0,0')); // changes the pose without opening the file again
   await page.waitForFunction(() => document.querySelector('#many').ask([8.5, 0.5, 3], 'red').then((a) => a.nearest[0] === 8.5));
   assert.equal(await page.evaluate(() => window.of.many.filter(([name]) => name === 'load').length), 1);
-  await many.evaluate((e) => e.append(Object.assign(document.createElement('ebpo-part'), { innerHTML: '' }), e.firstElementChild.cloneNode())); // one without src, one more
+  await many.evaluate((e) => e.append(Object.assign(document.createElement('ebpo-part'), { innerHTML: '' }), e.firstElementChild.cloneNode())); // adds a part without src and another part with src
   await heard('load', 2);
   assert.deepEqual(await many.evaluate((e) => e.info.instances.map((i) => i.name)), ['left', 'red', 'left (2)']);
   await many.evaluate((e) => {
@@ -696,7 +698,7 @@ async function embedsSeveral(page, address) {
   await many.evaluate((e) => e.setAttribute('remote', ''));
   await heard('load', 3);
   assert.deepEqual(await many.evaluate(async (e) => [e.info.to, e.info.models.map((m) => m.name), (await e.ask([0.5, 0.5, 5], 'b')).distance]), [2, ['red'], 2]);
-  await many.evaluate((e) => e.firstElementChild.setAttribute('pose', '0,0,90')); // of a part, where a scene is shown
+  await many.evaluate((e) => e.firstElementChild.setAttribute('pose', '0,0,90')); // changes a part while a scene is shown
   assert.deepEqual(await many.evaluate(async (e) => (await e.ask([0.5, 0.5, 2], 'a')).nearest), [0.5, 0.5, 1]);
   await many.evaluate((e) => {
     e.removeAttribute('scene');
@@ -709,13 +711,13 @@ async function embedsSeveral(page, address) {
   await many.evaluate((e) => e.remove());
 }
 
-// Saved views go into a file, and come out of it in another browser; those of another model do not.
+// Saved views are written to a file and read by another browser. Views of another model are refused.
 async function viewsAsFiles(browser, address) {
   const page = await show(browser, `${address}?file=models/red.ebpo.h5`), file = join(work, 'views.json');
   await settled(page);
   await page.waitForFunction(() => window.ebpoViewer.state.idle && document.getElementById('viewSave'));
   page.on('dialog', (dialog) => dialog.accept('From above'));
-  const clickIn = (id) => page.evaluate((name) => document.getElementById(name).click(), id); // in a section that is folded
+  const clickIn = (id) => page.evaluate((name) => document.getElementById(name).click(), id); // clicks an element in a folded section
   await page.evaluate(() => (window.ebpoViewer.scene.place = { eye: [0, 2, 0.1], target: [0, 0, 0] }));
   await clickIn('viewSave');
   await page.waitForFunction(() => document.querySelectorAll('#views li').length === 1);
@@ -738,13 +740,13 @@ async function viewsAsFiles(browser, address) {
   await page.close();
 }
 
-// Paint on one of two plates with a crack between them, whose ball meets the other: the picture has it where ebpo paint has it.
+// Paints one of two plates with a crack between them. The point's ball intersects the other plate, but the picture must show paint only where ebpo paint does.
 async function paintsByReach(browser, address) {
   const page = await show(browser, `${address}?file=models/plates.ebpo.h5&paint=models/plates.paint.h5&view=0,0,1.6`);
   await settled(page);
   await page.waitForFunction(() => window.ebpoViewer.paint?.file.strokes.length === 1 && window.ebpoViewer.paint.pending === 0);
   await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
-  // Red pixels of the canvas where x is below and above the crack, and the crack's column.
+  // Counts the red pixels left and right of the crack.
   const [left, right] = await page.evaluate(() => {
     const { scene, place } = window.ebpoViewer, canvas = document.getElementById('canvas'), gl = canvas.getContext('webgl2'), w = gl.drawingBufferWidth, h = gl.drawingBufferHeight;
     const pixels = new Uint8Array(4 * w * h), crack = scene.project([0, 0.5, 0.05].map((x, k) => (x - place.center[k]) * place.scale))[0] * w / canvas.clientWidth, sides = [0, 0];
@@ -759,7 +761,7 @@ async function paintsByReach(browser, address) {
   await page.close();
 }
 
-// A step of two cubes: its inner edge is darker with ambient occlusion, what has nothing over it is not.
+// Two cubes form a step. Ambient occlusion darkens the inner edge, and does not darken points with nothing above them.
 async function occludes(browser, address) {
   const page = await show(browser, `${address}?model=models/red.ebpo.h5&model=models/red.ebpo.h5&pose=0,0,0&pose=1,-0.5,0&view=50,40,2.5`);
   await settled(page);
@@ -779,7 +781,7 @@ async function occludes(browser, address) {
   await page.close();
 }
 
-// Two models and a scene: what is drawn where, what a click means, distances across models, what is hidden, the time, the address.
+// Shows two models and then a scene. Tests the drawn triangles, clicks, distances between models, hidden models, the time and the address.
 async function together(browser, address) {
   const query = '?model=models/ring.ebpo.h5&model=models/red.ebpo.h5&pose=0,0,0&pose=2,0,0', at = (x, y) => ({ position: { x, y } });
   const page = await show(browser, `${address}${query}`);
@@ -787,7 +789,7 @@ async function together(browser, address) {
   const seen = () => page.evaluate(() => window.ebpoViewer.together.assembly.stats), all = await seen(), faces = (await openEbpo(readFileSync(model))).info.face_count;
   assert.equal(all.meshTriangles, all.triangles);
   assert.equal(all.triangles, faces + 12);
-  // Where points of the world are on the page.
+  // Returns the position on the page of a point in world coordinates.
   const spot = (p) => page.evaluate((point) => {
     const { scene, together: { assembly } } = window.ebpoViewer, s = assembly.scene;
     return scene.project(point.map((x, k) => (x - s.center[k]) * s.scale));
@@ -796,7 +798,7 @@ async function together(browser, address) {
   await page.waitForFunction(() => document.getElementById('chosenWhere').textContent !== '');
   assert.equal(await page.textContent('#chosenName'), 'red');
   assert.match(await page.textContent('#chosenNote'), /to the nearest face; at 2\.5, 0\.5, 1$/);
-  // From a corner region of the cube to another of its places: 0.6 apart, in the world.
+  // Measures between two points of the cube with a distance of 0.6 in world coordinates.
   await page.keyboard.press('d');
   for (const x of [2.2, 2.8])
     await page.mouse.click(...await spot([x, 0.5, 1]));
@@ -806,7 +808,7 @@ async function together(browser, address) {
   const red = await look(page);
   await page.locator('#models input[type=checkbox]').nth(1).uncheck();
   await settled(page);
-  assert.ok((await look(page)).share < red.share, 'what is hidden is not seen');
+  assert.ok((await look(page)).share < red.share, 'a hidden model must not be visible');
   await page.waitForFunction(() => location.search.includes('hide=red') && location.search.includes('measure='));
   await page.goto(page.url());
   await settled(page);
@@ -821,7 +823,7 @@ async function together(browser, address) {
     stats.requests]; }), [1, 3, 36, 1]);
   await scene.locator('#time').fill('500');
   await scene.waitForFunction(() => location.search.includes('time=2.000'));
-  const left = await scene.evaluate(() => { // what ends leaves nothing on the graphics card, and no worker
+  const left = await scene.evaluate(() => { // after end(), neither geometry nor workers remain
     const { scene: { renderer: { info: { memory } } }, together: { assembly } } = window.ebpoViewer, tiles = assembly.meshes.length, before = memory.geometries;
     assembly.end();
     return [tiles > 0, before - memory.geometries - tiles, assembly.crew.workers.length, assembly.group.parent];
@@ -834,7 +836,7 @@ async function together(browser, address) {
   await wrong.close();
 }
 
-// From disk a page has no worker: it says so.
+// A page opened from disk explains that it must be served.
 async function fromFolder(browser) {
   const page = await browser.newPage();
   await page.goto(pathToFileURL(join(viewer, 'index.html')).href);
@@ -842,7 +844,7 @@ async function fromFolder(browser) {
   await page.close();
 }
 
-// The page as it is written, without a bundle.
+// Tests the page from its sources, without a bundle.
 async function fromSources(browser) {
   const page = await show(browser, `${await serve('--sources')}?file=models/ring.ebpo.h5&level=4`), state = await settled(page);
   assert.equal(state.depth, 4);
@@ -850,7 +852,7 @@ async function fromSources(browser) {
   await page.close();
 }
 
-// serve.sh says which command to run, and neither installs nor writes anything.
+// When something is missing, serve.sh prints the command to run. It neither installs nor writes files.
 async function servesOrSays() {
   const empty = join(work, 'empty'), script = join(root, 'samples/serve.sh'), says = (env, ...options) => {
     try {
@@ -858,7 +860,7 @@ async function servesOrSays() {
     } catch ({ status, stderr }) {
       return `${status} ${stderr}`;
     }
-    return 'it served';
+    return 'no error';
   };
   mkdirSync(empty);
   assert.match(says(process.env, '--folder', empty), /^1 serve\.sh: .*no \.ebpo\.h5 file is there;.*--folder.*quickstart\.sh[^\n]*\n$/);
@@ -886,39 +888,39 @@ async function main() {
     });
     console.log(`ok ${name}`);
   };
-  await step('levels 0 to 4 come in at most two requests and 150 kB', () => levelFour(page));
-  await step('level 5 has the nodes and triangles of the library\'s, and is seen where the model is', () => levelFive(page));
-  await step('colours tell levels and types', () => colours(page));
-  await step('leaves show the real faces, in their place', () => mesh(page));
+  await step('levels 0 to 4 need at most two requests and 150 kB', () => levelFour(page));
+  await step('level 5 has the same nodes and triangles as in the library, at the model\'s position', () => levelFive(page));
+  await step('colours show levels and types', () => colours(page));
+  await step('leaves show the real faces at their positions', () => mesh(page));
   await step('the clipping plane cuts', () => clipping(page));
-  await step('a point gets the library\'s answers', () => point(page));
-  await step('a click asks about the point that is seen', () => click(page));
-  await step('faces have the model\'s colours, and there is a switch', () => modelColours(browser, address, page));
+  await step('point queries agree with the library', () => point(page));
+  await step('a click queries the visible point', () => click(page));
+  await step('faces have the model\'s colours, with a switch', () => modelColours(browser, address, page));
   requests();
   await step('a file from disk is shown without a server', () => fromDisk(page));
   await page.close();
-  await step('errors say what, and what next', () => errors(browser, address));
-  await step('the model is asked for before the page\'s code is there', () => modelFirst(browser, address));
-  await step('a small file comes in one request, and is not fetched again unless it has changed', () => oneRequest(browser, address));
-  await step('an address says what is shown, and back goes back', () => shares(browser, address));
-  await step('distances and sections are those of the faces', () => measures(browser, address));
-  await step('what is painted is kept, and shown again', () => paints(browser, address));
-  await step('saved views go from browser to browser as files', () => viewsAsFiles(browser, address));
-  await step('paint is seen on what hangs together with it', () => paintsByReach(browser, address));
+  await step('errors state the problem and the next step', () => errors(browser, address));
+  await step('the model is requested before the page\'s code is loaded', () => modelFirst(browser, address));
+  await step('a small file needs one request, and is fetched again only after a change', () => oneRequest(browser, address));
+  await step('the address describes the view, and Back works', () => shares(browser, address));
+  await step('distances and sections agree with the faces', () => measures(browser, address));
+  await step('paint is saved and shown again', () => paints(browser, address));
+  await step('saved views are exchanged as files', () => viewsAsFiles(browser, address));
+  await step('paint is visible only on connected faces', () => paintsByReach(browser, address));
   await step('several models and scenes are shown together', () => together(browser, address));
-  await step('ambient occlusion darkens what has something over it', () => occludes(browser, address));
+  await step('ambient occlusion darkens inner edges', () => occludes(browser, address));
   const quiet = complaints.length;
   await step('the element and the three.js object work in a page of another origin', () => embeds(browser, address));
   complaints.length = quiet; // the browser logs the 404
-  await step('from disk the page says that it must be served', () => fromFolder(browser));
+  await step('a page from disk explains that it must be served', () => fromFolder(browser));
   const bad = await badLine(address);
-  await step('a stall is told, and Retry goes on with what has not come', () => stalls(browser, bad));
-  await step('a dead line loses nothing', () => dies(browser, bad));
-  await step('a status says what it means, and can be tried again', () => statuses(browser, bad));
-  await step('the page works as it is written, too', () => fromSources(browser));
-  await step('serve.sh says what is missing', () => servesOrSays());
+  await step('a stall is reported, and Retry fetches the rest', () => stalls(browser, bad));
+  await step('a lost connection loses no data', () => dies(browser, bad));
+  await step('HTTP statuses are explained, with Retry', () => statuses(browser, bad));
+  await step('the page works without a bundle', () => fromSources(browser));
+  await step('serve.sh reports missing programs and files', () => servesOrSays());
   await step('a sample is opened from the list', () => samples(browser, address));
-  assert.deepEqual(complaints, [], 'the page complained');
+  assert.deepEqual(complaints, [], 'errors or warnings of the page');
 }
 
 let code = 0;

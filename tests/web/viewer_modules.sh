@@ -1,5 +1,5 @@
 #!/bin/sh
-# The viewer's modules under node: viewer_modules.sh NODE VIEWER EBPO GENERATE INPUTS
+# Runs the tests of the viewer's modules under node: viewer_modules.sh NODE VIEWER EBPO GENERATE INPUTS
 set -eu
 EBPO_TOOL=$(realpath "$3") generate=$(realpath "$4") inputs=$(realpath "$5")
 cd "$2"

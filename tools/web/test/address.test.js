@@ -1,11 +1,11 @@
-// What stands in addresses: what is written is read again as the same, nonsense is nothing, and texts stay short.
+// Tests addresses: values are read as they were written, invalid texts are ignored, and texts are short.
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import { boxOf, boxText, cameraOf, cameraText, clipOf, clipText, cutOf, pointsOf, pointsText, withQuery } from '../address.js';
 
 const near = (a, b, most) => a.forEach((x, i) => assert.ok(Math.abs(x - b[i]) <= most, `${a} is not ${b}`));
 
-test('a camera comes back to within a thousandth of its distance, in at most 50 characters', () => {
+test('a camera is restored to a thousandth of its distance, from at most 50 characters', () => {
   for (const [eye, target] of [[[1.2, 0.9, 2.5], [0, 0, 0]], [[-0.3, -0.2, 0.1], [0.31234, -0.2345, 0.1]], [[0.500001, 0.25, 0.1251], [0.5, 0.25, 0.125]], [[0, 2, 0], [0, 0, 0]]]) {
     const text = cameraText({ eye, target }), back = cameraOf(text), distance = Math.hypot(...eye.map((x, k) => x - target[k]));
     assert.ok(text.length <= 50, text);
@@ -18,7 +18,7 @@ test('a camera comes back to within a thousandth of its distance, in at most 50 
     assert.equal(cameraOf(text), undefined, text);
 });
 
-test('planes, boxes and points come back; what is none is nothing', () => {
+test('planes, boxes and points are restored; invalid texts are ignored', () => {
   for (const text of ['x0.25', '-z0.5', 'y1', '-x0'])
     assert.equal(clipText(clipOf(text)), text);
   for (const text of [undefined, '', 'w0.5', 'x', 'x1.5', 'x-1', 'xx0.5'])
@@ -34,7 +34,7 @@ test('planes, boxes and points come back; what is none is nothing', () => {
   assert.equal(pointsText([[12345.678, 0, -1]], 20000), '12345.68,0,-1');
 });
 
-test('a plane and a box leave what both leave; what they do not touch is not cut', () => {
+test('a plane and a box keep their intersection; axes without a limit are not cut', () => {
   const size = [2, 4, 6];
   assert.equal(cutOf(size, 1, undefined, undefined), undefined);
   assert.equal(cutOf(size, 1, undefined, [0, 0, 0, 1, 1, 1]), undefined);
@@ -45,7 +45,7 @@ test('a plane and a box leave what both leave; what they do not touch is not cut
   near([both.low[0], both.high[0], both.high[2]], [-0.25, 0, 0], 1e-12);
 });
 
-test('an address keeps what it is not told of, and its commas', () => {
+test('an address keeps its other parameters and its commas', () => {
   const href = withQuery('https://example.org/v/?samples=a.json&view=1,2,3', [['view', '4,5,6'], ['file', 'models/a b.ebpo.h5'], ['clip', undefined]]);
   assert.equal(href, 'https://example.org/v/?samples=a.json&view=4,5,6&file=models/a+b.ebpo.h5');
 });

@@ -1,4 +1,4 @@
-// Sections and places on faces, against plain geometry and against the library.
+// Compares sections and positions on faces with simple geometry and with the library.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { readFileSync } from 'node:fs';
@@ -6,15 +6,15 @@ import test from 'node:test';
 import { cutFaces, measureOf, placesOf, sectionOf, weightsOf } from '../answers.js';
 import { Tree, openEbpo } from '../reader/index.js';
 
-// A box as twelve faces, counter-clockwise from outside.
+// Returns a box as twelve faces, counter-clockwise as seen from outside.
 function box(low, high) {
   const corner = (i) => [0, 1, 2].map((k) => (i >> k & 1 ? high : low)[k]), quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
   return Float64Array.from(quads.flatMap(([a, b, c, d]) => [a, b, c, a, c, d].flatMap(corner)));
 }
 
-test('a box is cut into a rectangle on each axis, also through its corners, and a hole counts less', () => {
+test('the section of a box is a rectangle on each axis, also through corners, and a hole reduces the area', () => {
   for (let axis = 0; axis < 3; axis++)
-    for (const at of [0.3, 1, -0.5]) { // 1 is the upper side, whose corners count as above
+    for (const at of [0.3, 1, -0.5]) { // at 1 is the upper side, whose corners count as above the plane
       const out = [], size = [2, 3, 5], low = [-1, -2, -4], shift = low[axis] + (at === 1 ? size[axis] : at === -0.5 ? 1e-9 : size[axis] * at);
       cutFaces(box(low, low.map((x, k) => x + size[k])), axis, shift, out);
       const { area, length } = measureOf(out), [a, b] = [size[(axis + 1) % 3], size[(axis + 2) % 3]];
@@ -22,12 +22,12 @@ test('a box is cut into a rectangle on each axis, also through its corners, and 
     }
   const out = [], hole = box([0.25, 0.25, 0.25], [0.75, 0.75, 0.75]);
   cutFaces(box([0, 0, 0], [1, 1, 1]), 2, 0.5, out);
-  for (let f = 0; f < hole.length; f += 9) // turned inside out
+  for (let f = 0; f < hole.length; f += 9) // reverses the orientation
     cutFaces(Float64Array.from([...hole.subarray(f, f + 3), ...hole.subarray(f + 6, f + 9), ...hole.subarray(f + 3, f + 6)]), 2, 0.5, out);
   assert.ok(Math.abs(measureOf(out).area - 0.75) < 1e-15);
 });
 
-test('weights give the point back', () => {
+test('weights reproduce the point', () => {
   const corners = Float64Array.of(1, 0, 0, 4, 1, 0, 0, 3, 2), at = (w) => [0, 1,
     2].map((k) => corners[k] * (1 - (w[0] + w[1]) / 2 ** 30) + corners[3 + k] * w[0] / 2 ** 30 + corners[6 + k] * w[1] / 2 ** 30);
   for (const [s, t] of [[0, 0], [1, 0], [0, 1], [0.25, 0.5], [0.3, 0.7]]) {
@@ -35,12 +35,12 @@ test('weights give the point back', () => {
     assert.ok(w[0] + w[1] <= 2 ** 30 && w.every((x) => Number.isInteger(x) && x >= 0));
     at(w).forEach((x, k) => assert.ok(Math.abs(x - p[k]) < 1e-8));
   }
-  assert.deepEqual(weightsOf([0.5, 0, 0], Float64Array.of(0, 0, 0, 1, 0, 0, 2, 0, 0)), [0, 2 ** 28]); // no area
+  assert.deepEqual(weightsOf([0.5, 0, 0], Float64Array.of(0, 0, 0, 1, 0, 0, 2, 0, 0)), [0, 2 ** 28]); // a triangle without area
   assert.deepEqual(weightsOf([1, 1, 1], new Float64Array(9).fill(1)), [0, 0]);
 });
 
 const paths = (process.env.EBPO_FILES ?? '').split(' ').filter((path) => /\/ring(_subtrees|_blocks|_without_mesh|_box)?\.ebpo\.h5$/.test(path)), tool = process.env.EBPO_TOOL;
-test('sections of files are those of all their faces; places are on the source\'s faces', { skip: paths.length && tool ? false : 'EBPO_TOOL and EBPO_FILES are not set' }, async () => {
+test('sections of files agree with those of all faces; positions are on the source\'s faces', { skip: paths.length && tool ? false : 'EBPO_TOOL and EBPO_FILES are not set' }, async () => {
   for (const path of paths) {
     const file = await openEbpo(readFileSync(path), { name: path }), { info } = file, tree = new Tree(info), said = [];
     tree.add((await file.levels(0, 0))[0]);

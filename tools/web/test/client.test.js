@@ -1,4 +1,4 @@
-// Tests the page's side of workers: routing of answers, errors for requests without an answer, and failing workers.
+// Tests client.js: routing of responses, errors for requests without a response, and failing workers.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
@@ -40,7 +40,7 @@ test('files are shared among workers, and a worker ends with its last file', () 
   assert.equal(crew.workers.length, 0);
 });
 
-test('a worker that fails is told to all its files, and later ones get another', async () => {
+test('a failing worker is reported to all its files, and later files get another worker', async () => {
   workers.length = 0;
   const crew = new Crew({ most: 1 }), told = [], one = client(crew, (type) => told.push(type)), opening = one.open('a.ebpo.h5');
   const two = client(crew, (type) => told.push(type));
@@ -56,7 +56,7 @@ test('a worker that fails is told to all its files, and later ones get another',
   await there;
 });
 
-test('who asks gets an answer or an error: nobody waits forever', async () => {
+test('each query gets a result or an error', async () => {
   workers.length = 0;
   const crew = new Crew({ most: 1 }), it = client(crew), open = async () => {
     const there = it.open('a.ebpo.h5');

@@ -1,4 +1,4 @@
-// The choice of nodes: complete, without overlap, the same whether made in one pass or in many.
+// Tests the choice of nodes: it is complete, without overlap, and does not depend on the number of passes.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import test from 'node:test';
@@ -17,7 +17,7 @@ async function load(levels) {
   return { file, tree, cut: new Cut(tree) };
 }
 
-// Passes until nothing is left to do; the tiles as the page has them.
+// Runs passes until nothing changes. Returns the tiles of the page.
 function settle(cut, want, tiles = new Map()) {
   let result, passes = 0;
   do {
@@ -31,7 +31,7 @@ function settle(cut, want, tiles = new Map()) {
 
 const sum = (tiles, what) => [...tiles.values()].reduce((total, tile) => total + what(tile), 0);
 
-test('everything, level by level: as many nodes as the file says', async () => {
+test('each level has as many nodes as the file states', async () => {
   const { file, tree } = await load();
   for (let level = 0; level <= tree.depth; level++) {
     const { stats } = settle(new Cut(tree), { ...all, level }), wanted = file.info.levels.map((l, i) => (i < level ? l.leaf : i === level ? l.leaf + l.gray : 0));
@@ -39,7 +39,7 @@ test('everything, level by level: as many nodes as the file says', async () => {
   }
 });
 
-test('the tiles at the end do not depend on the way there', async () => {
+test('the final tiles do not depend on earlier views', async () => {
   const { cut, tree } = await load(), tiles = new Map(), geometry = (t) => [...t.values()].map((tile) => [...tile.position].sort().join()).sort();
   for (const pixels of [200, 60, 300, 20])
     settle(cut, { ...all, pixels }, tiles);
@@ -48,14 +48,14 @@ test('the tiles at the end do not depend on the way there', async () => {
   assert.deepEqual(geometry(tiles), geometry(once));
 });
 
-test('a view that has not changed makes nothing again', async () => {
+test('an unchanged view builds no tile', async () => {
   const { cut } = await load();
   settle(cut, all);
   const again = cut.update(view, all);
   assert.deepEqual([again.set, again.removed, again.more], [[], [], false]);
 });
 
-test('triangles: plane polygons first, all indices name vertices, walls counted', async () => {
+test('triangles: plane polygons first, valid indices, cell faces counted', async () => {
   const { cut } = await load(), { tiles, stats } = settle(cut, { ...all, lines: true, cells: true });
   for (const t of tiles.values()) {
     assert.equal(t.index.length, 3 * t.triangles);
@@ -66,7 +66,7 @@ test('triangles: plane polygons first, all indices name vertices, walls counted'
   assert.equal(sum(tiles, (t) => t.cells.length / 72), stats.nodes);
 });
 
-test('levels that are not there are asked for, and drawn when they come', async () => {
+test('missing levels are requested, and drawn when they arrive', async () => {
   const { file, tree, cut } = await load(2);
   assert.ok(settle(cut, all).deeper);
   (await file.levels(2, file.info.level_count - 1)).forEach((level) => tree.add(level));
@@ -75,33 +75,33 @@ test('levels that are not there are asked for, and drawn when they come', async 
   assert.equal(end.stats.nodes, settle(new Cut(tree), all).stats.nodes);
 });
 
-test('with a budget there are fewer triangles, and the cut stays complete', async () => {
+test('a budget reduces triangles and keeps the cut complete', async () => {
   const { tree, cut } = await load();
   const { stats, tiles } = settle(cut, { ...all, triangles: 400 });
   assert.ok(stats.triangles < sum(settle(new Cut(tree), all).tiles, (t) => t.triangles));
   assert.ok(stats.nodes > 0 && tiles.size > 0);
 });
 
-test('black nodes are drawn when asked for', async () => {
+test('black nodes are drawn on request', async () => {
   const { file, cut } = await load(), black = file.info.levels.reduce((n, l) => n + l.black, 0);
   const without = settle(cut, all).stats.nodes;
   assert.ok(black > 0);
   assert.equal(settle(cut, { ...all, black: true }).stats.nodes, without + black);
 });
 
-test('leaves show their real faces once these are there', async () => {
+test('leaves show their real faces when these have arrived', async () => {
   const { file, cut } = await load(), want = { ...all, mesh: true };
   const { leaves } = settle(cut, want), lists = await file.leafFaces(leaves);
   assert.equal(leaves.length, file.info.levels.reduce((n, l) => n + l.leaf, 0));
   leaves.forEach((leaf, i) => cut.addMesh(leaf, lists[i]));
   const { stats, leaves: missing } = settle(cut, want);
   assert.equal(missing.length, 0);
-  assert.equal(stats.meshTriangles, file.info.face_count); // each once, though leaves list it again
+  assert.equal(stats.meshTriangles, file.info.face_count); // each face once, although several leaves may list it
   assert.ok(file.info.levels.some((l) => l.faces_referenced > 0));
   assert.equal(new Set(lists.flatMap((l) => [...l.numbers])).size, file.info.face_count);
 });
 
-test('the tree has the nodes that the file counts, and each has its place', async () => {
+test('the tree has as many nodes as the file states, each at its position', async () => {
   const { file, tree } = await load(), count = file.info.levels.map(() => ({ gray: 0, leaf: 0, black: 0 }));
   const walk = (node) => {
     const name = { [GRAY]: 'gray', [LEAF]: 'leaf', [BLACK]: 'black' }[node.type];
@@ -113,7 +113,7 @@ test('the tree has the nodes that the file counts, and each has its place', asyn
   file.info.levels.forEach((l, i) => assert.deepEqual(count[i], { gray: l.gray, leaf: l.leaf, black: l.black }));
 });
 
-// --- walls ---
+// --- cell faces ---
 
 const inside = (p, u, v) => {
   let sign = 0;
@@ -126,7 +126,7 @@ const inside = (p, u, v) => {
   return true;
 };
 
-test('a convex polygon without another: every point is in one piece or hidden', () => {
+test('subtracting a convex polygon: every point is in one piece or hidden', () => {
   const square = [0, 0, 1, 0, 1, 1, 0, 1];
   const cases = [[0.2, 0.2, 0.7, 0.3, 0.5, 0.9], [-1, -1, 2, -1, 2, 0.5, -1, 0.5], [0.5, 0.9, 0.7, 0.3, 0.2, 0.2], [2, 2, 3, 2, 3, 3], [-1, -1, 2, -1, 2, 2, -1, 2]];
   for (const q of cases) {
@@ -138,13 +138,13 @@ test('a convex polygon without another: every point is in one piece or hidden', 
   }
 });
 
-// A point of a drawn envelope's wall is seen unless it lies in a black cell's wall or in that of an envelope drawn on the other side.
-test('walls: what is hidden is hidden by a neighbour, and by nothing else', async () => {
+// A point on a cell face of a drawn envelope is visible unless a black cell or a drawn envelope on the other side covers it.
+test('cell faces are hidden exactly where a neighbour covers them', async () => {
   const { tree, cut } = await load();
   settle(cut, { ...all, level: 3 });
   const drawn = new Set(cut.nodes), walls = new Walls(tree, (n) => drawn.has(n), (n) => tree.polytope(n)), found = { seen: 0, hidden: 0 };
   const polygon = (p, f, axis) => Array.from({ length: p.first[f + 1] - p.first[f] }, (_, i) => [(axis + 1) % 3, (axis + 2) % 3].map((k) => p.x[3 * p.corner[p.first[f] + i] + k])).flat();
-  const twin = (node, axis, side, u, v) => { // from the root down, by a point on the other side
+  const twin = (node, axis, side, u, v) => { // reference implementation: descends from the root to a point on the other side
     const x = node.at.map((n) => n / 2 ** node.level);
     x[axis] = (node.at[axis] + side) / 2 ** node.level;
     x[(axis + 1) % 3] += u / 2 ** node.level;
@@ -189,7 +189,7 @@ test('walls: what is hidden is hidden by a neighbour, and by nothing else', asyn
 const CUBE = [[0, 1, 3], [0, 3, 2], [4, 7, 5], [4, 6, 7], [0, 5, 1], [0, 4, 5], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 7, 3], [1, 5, 7]];
 const cornersOf = (v) => [v & 1, v >> 1 & 1, v >> 2];
 
-test('normals: edges of a cube stay, a bent sheet is smooth, and by angles', () => {
+test('normals: edges of a cube are sharp, a bent sheet is smooth, weights are angles', () => {
   const store = new MeshStore(), leaf = { id: 1 }, n = [0, 0, 0];
   store.add(leaf, CUBE.flat().flatMap(cornersOf), CUBE.map((_, i) => i));
   assert.equal(store.vertices, 8);
@@ -199,7 +199,7 @@ test('normals: edges of a cube stay, a bent sheet is smooth, and by angles', () 
     for (let k = 0; k < 3; k++)
       assert.ok(Math.abs(n[k] / size - store.normal[3 * own + k]) < 1e-6);
   }
-  const sheet = new MeshStore(), z = 0.1; // two triangles and one across the fold: angles of 45 + 45 on one side weigh as 90 on the other
+  const sheet = new MeshStore(), z = 0.1; // two triangles and one beyond the fold: angles of 45 + 45 degrees on one side weigh as much as 90 degrees on the other
   sheet.add({ id: 2 }, [0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 0, 0, 1, 1, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0, -1, 0, z], [1, 2, 3]);
   sheet.cornerNormal(0, n);
   const lean = Math.hypot(z, 1), wanted = [z / lean * Math.PI / 2, 0, Math.PI / 2 + Math.PI / 2 / lean];
@@ -207,7 +207,7 @@ test('normals: edges of a cube stay, a bent sheet is smooth, and by angles', () 
     assert.ok(Math.abs(Math.abs(n[k]) - Math.abs(wanted[k])) < 1e-5, `${n} ${wanted}`);
 });
 
-test('a face that several leaves list is drawn by one of them, by another when that is gone, and told when its normals change', () => {
+test('one of the leaves that list a face draws it, another one when this leaf is gone, and changed normals are reported', () => {
   const store = new MeshStore(), a = { id: 7 }, b = { id: 3 }, corners = CUBE.flat().flatMap(cornersOf);
   store.add(a, corners.slice(0, 27), [0, 1, 2]);
   const before = a.stamp;

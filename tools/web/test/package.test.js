@@ -1,4 +1,4 @@
-// The npm package, as somebody else's project would have it: packed, unpacked, bundled for browsers without a word about Node.js; and the reader in it, under node.
+// Tests the npm package as another project uses it: packs, unpacks and bundles it for browsers without warnings about Node.js, and runs its reader under node.
 import assert from 'node:assert/strict';
 import { execFileSync, spawnSync } from 'node:child_process';
 import { existsSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, symlinkSync, writeFileSync } from 'node:fs';
@@ -10,7 +10,7 @@ import { pathToFileURL } from 'node:url';
 const here = join(import.meta.dirname ?? new URL('.', import.meta.url).pathname, '..');
 const esbuild = existsSync(join(here, 'node_modules/esbuild')) && spawnSync('npm', ['--version']).status === 0 ? await import('esbuild') : undefined;
 
-test('the package is packed, bundled for browsers, and has the types of what it exports', { skip: esbuild ? false : 'esbuild or npm is not installed' }, async (t) => {
+test('the package is packed, bundled for browsers, and has types for its exports', { skip: esbuild ? false : 'esbuild or npm is not installed' }, async (t) => {
   const work = mkdtempSync(join(tmpdir(), 'ebpo-package-')), project = join(work, 'project'), own = join(project, 'node_modules/ebpo-viewer');
   t.after(() => rmSync(work, { recursive: true, force: true }));
   execFileSync(process.execPath, [join(here, 'package.mjs'), join(work, 'package')]);
@@ -30,7 +30,7 @@ test('the package is packed, bundled for browsers, and has the types of what it 
   assert.equal(text.match(/\bWebGLRenderer = class\b|class WebGLRenderer\b/g)?.length ?? 0, 1, 'three.js is there once');
   assert.doesNotMatch(readFileSync(join(own, 'worker.js'), 'utf8'), /(from|import\()\s*["'](node:|three|zstddec|\.\/node_modules)/);
 
-  // Types: each exported name is declared, and what is declared as a value is exported.
+  // Each exported name has a declared type, and each declared value is exported.
   for (const part of ['element', 'three', 'reader']) {
     const { metafile } = await esbuild.build({ entryPoints: [join(own, `${part}.js`)], metafile: true, bundle: true, external: ['three', 'three/*'], format: 'esm', write: false, outdir: work });
     const [{ exports: exported }] = Object.values(metafile.outputs);

@@ -1,4 +1,4 @@
-// Paint files: what is written is read again, by this reader, and as HDF5 by h5dump and h5py; what breaks a rule is refused.
+// Tests paint files: written files are read by this reader and, as HDF5, by h5dump and h5py; invalid files are refused.
 import assert from 'node:assert/strict';
 import { execFileSync, spawnSync } from 'node:child_process';
 import { existsSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
@@ -21,12 +21,12 @@ function sample(strokes = 3, points = 5) {
       points: Array.from({ length: points }, (__, i) => point(100 * s + i)) })) };
 }
 
-test('a paint file comes back as it was', () => {
+test('a paint file is read as it was written', () => {
   for (const doc of [sample(), { ...sample(0), notes: [], layers: [] }, { ...sample(0) }, sample(1, 1), sample(1000, 30), { ...sample(), modelName: '', unit: '' }])
     assert.deepEqual(readPaint(writePaint(doc)), doc);
 });
 
-test('other programs read it: h5dump and h5py', (t) => {
+test('h5dump and h5py read a paint file', (t) => {
   const work = mkdtempSync(join(tmpdir(), 'ebpo-paint-')), path = join(work, 'a.paint.h5');
   t.after(() => rmSync(work, { recursive: true, force: true }));
   writeFileSync(path, writePaint(sample()));
@@ -52,7 +52,7 @@ print(json.dumps([f.attrs["format"].decode(), f.attrs["model_name"].decode(), in
     doc.strokes.map((s) => s.radius), doc.strokes.map((s) => s.colour), doc.strokes.map((s) => s.time), [1, 2, -0.5], '', ['layers', 'notes', 'points', 'strokes']]);
 });
 
-test('what breaks a rule is refused', () => {
+test('invalid paint files are refused', () => {
   const broken = (change) => {
     const doc = structuredClone(sample());
     change(doc);
@@ -67,7 +67,7 @@ test('what breaks a rule is refused', () => {
   assert.throws(() => readPaint(new TextEncoder().encode('nothing of the kind, but long enough to be looked at ...')), /not a whole HDF5 file/);
 });
 
-test('groups that share their texts are not read again and again', () => {
+test('groups that share their texts are refused', () => {
   const h5 = new H5Writer(), layer = h5.group([...['title', 'author', 'date'].map((name) => [name, text('')]), ['description', text('d'.repeat(4000))],
     ...['colour', 'opacity', 'visible'].map((name) => [name, u64(1)])]), layers = (n) => h5.group([], Array.from({ length: n }, (_, i) => [String(i).padStart(4, '0'), layer]));
   const file = (n) => {
@@ -79,7 +79,7 @@ test('groups that share their texts are not read again and again', () => {
   assert.throws(() => readPaint(file(MOST.layers)), /groups share it/);
 });
 
-test('no damaged byte gives another drawing', () => {
+test('a damaged byte never gives another drawing', () => {
   const bytes = writePaint(sample()), whole = JSON.stringify(readPaint(bytes));
   for (let i = 0; i < bytes.length; i += 1 + i % 7) {
     const damaged = bytes.slice();
@@ -94,16 +94,16 @@ test('no damaged byte gives another drawing', () => {
     assert.throws(() => readPaint(bytes.slice(0, cut)), { name: 'EbpoError' });
 });
 
-test('the checksum of blocks is lookup3\'s, and texts are made fit', () => {
+test('the checksum of blocks is lookup3, and texts are cleaned', () => {
   assert.equal(lookup3(new TextEncoder().encode('Four score and seven years ago'), 0, 30), 0x17770551); // the published example
   assert.equal(cleanText('a\r\nb\u0007', 9), 'a\u2028b');
   assert.equal(cleanText('ääää', 5), 'ää');
   assert.equal(cleanText('a😀😀', 8), 'a😀');
 });
 
-// The vectors of format-spec/paint.md: every one that must be read gives what its text says, every one that must be refused is.
+// The vectors of format-spec/paint.md: valid files agree with their texts, and invalid files are refused.
 const vectors = process.env.EBPO_PAINT_VECTORS ?? join(import.meta.dirname ?? new URL('.', import.meta.url).pathname, '../../../format-spec/vectors/paint');
-test('vectors of paint files', { skip: existsSync(vectors) ? false : 'there are no vectors' }, () => {
+test('vectors of paint files', { skip: existsSync(vectors) ? false : 'the vectors are missing' }, () => {
   const files = (folder) => readdirSync(join(vectors, folder)).filter((name) => name.endsWith('.paint.h5'));
   const read = (folder, name) => readPaint(new Uint8Array(readFileSync(join(vectors, folder, name))));
   const wrong = files('failed').filter((name) => {

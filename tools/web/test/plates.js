@@ -1,6 +1,7 @@
 import { writeFileSync } from 'node:fs';
 
-// Two flat boxes side by side with a crack of 0.02 between them, their tops in one plane: as PLY. A ball on one reaches the other; paint does not.
+// Writes a PLY file with two flat boxes side by side, with a crack of 0.02 between them and with their tops in one plane. The ball of a point on one box intersects
+// the other box, but paint must not.
 export function plates(path) {
   const n = 12, vertices = [], faces = [];
   for (const x0 of [-1.01, 0.01]) {

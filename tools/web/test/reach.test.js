@@ -1,4 +1,5 @@
-// What a point of paint covers, against a plain twin, and against what ebpo paint bakes: on plates with a crack between them, where the ball says too much.
+// Compares the faces that a point of paint covers with a reference implementation and with the result of ebpo paint. The model is two plates with a crack between
+// them, where the ball intersects faces that are not covered.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
@@ -10,13 +11,13 @@ import { readPaint } from '../paint/paint_file.js';
 import { hangTogether, reachOf } from '../reach.js';
 import { plates } from './plates.js';
 
-// A crooked generator of numbers, the same each time.
+// A generator of reproducible pseudorandom numbers.
 function chance(seed) {
   let state = seed;
   return () => (state = (state * 48271) % 2147483647) / 2147483647;
 }
 
-// Slow and plain: faces are joined if they share a corner in the ball, or an edge whose nearest place, looked for in small steps and at its ends, is.
+// Reference implementation: joins faces that share a corner inside the ball, or an edge with a point inside the ball. Tests edges in small steps and at their ends.
 function plainly(faces, own, centre, radius) {
   const corners = (f) => [0, 3, 6].map((c) => [...f.subarray(c, c + 3)]), near = (q) => Math.hypot(...q.map((x, k) => x - centre[k])) <= radius, same = (a, b) => a.every((x, k) => x === b[k]);
   const reached = (a, b) => Array.from({ length: 2001 }, (_, i) => i / 2000).some((t) => near(a.map((x, k) => x + t * (b[k] - x))));
@@ -34,7 +35,7 @@ function plainly(faces, own, centre, radius) {
   return [...reach].sort((a, b) => a - b);
 }
 
-test('faces hang together as a plain twin says', () => {
+test('connected faces agree with the reference implementation', () => {
   const next = chance(7);
   for (let round = 0; round < 60; round++) {
     const points = Array.from({ length: 14 }, () => [next(), next(), next() * 0.4]), pick = () => points[Math.floor(next() * points.length)];
@@ -43,7 +44,7 @@ test('faces hang together as a plain twin says', () => {
   }
 });
 
-test('the reach is what ebpo paint colours', { skip: process.env.EBPO_TOOL ? false : 'EBPO_TOOL is not set' }, async (t) => {
+test('covered faces agree with ebpo paint', { skip: process.env.EBPO_TOOL ? false : 'EBPO_TOOL is not set' }, async (t) => {
   const folder = mkdtempSync(join(tmpdir(), 'ebpo-reach-')), at = (name) => join(folder, name), ebpo = (...args) => execFileSync(process.env.EBPO_TOOL, args, { encoding: 'utf8' });
   t.after(() => rmSync(folder, { recursive: true, force: true }));
   plates(at('plates.ply'));
@@ -79,7 +80,7 @@ test('the reach is what ebpo paint colours', { skip: process.env.EBPO_TOOL ? fal
         mine.add([...found.faces.subarray(c, c + 3)].join());
     assert.deepEqual([...mine].sort(), [...red].sort(), `at ${place} with ${radius}`);
   }
-  // On the face that is named, although another one is as near: on an edge; and not on one that is elsewhere.
+  // A point on an edge is on its named face, although another face is as near. A point is not on a distant face.
   const all = await file.facesByNumber(Uint32Array.from({ length: file.info.face_count }, (_, i) => i)),
     numbers = await file.sourceFaces(Uint32Array.from({ length: file.info.face_count }, (_, i) => i));
   const place = [0, 1, 2].map((k) => (all[k] + all[3 + k]) / 2), holders = [...numbers].filter((_, f) => [0, 3, 6].filter((c) => [0, 3].some((d) => [0, 1,
@@ -89,7 +90,7 @@ test('the reach is what ebpo paint colours', { skip: process.env.EBPO_TOOL ? fal
   assert.deepEqual([one.here, other.here, wrong.here, (await reachOf(file, tree, [{ face: holders[0], place: [5, 5, 5], radius: 0 }]))[0].here], ['yes', 'yes', 'no', 'no']);
 });
 
-test('a ball as large as the model does not have all of it fetched', async () => {
+test('a ball as large as the model does not fetch the whole model', async () => {
   let looked = 0;
   const node = { type: 3 }, endless = { root: node, wall: (_, k, upper) => upper, children: () => (looked++, Array(8).fill(node)), isPruned: () => false };
   const file = { info: { box_size: [1, 1, 1], parts: new Set() }, leafFaces: () => assert.fail('faces are fetched') };

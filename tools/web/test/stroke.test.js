@@ -1,14 +1,14 @@
-// Strokes and documents: points are close enough to each other, pressure widens, what is beside the model is left out, and each step can be undone.
+// Tests strokes and documents: points are closely spaced, pressure widens strokes, points beside the model are omitted, and each step can be undone.
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import { PaintDocument, misfit } from '../paint/document.js';
 import { Stroke } from '../paint/stroke.js';
 
-const PIXEL = 0.01; // of the model's unit; the model is the part of the page with x below 300
+const PIXEL = 0.01; // size of a pixel in the model's unit; the model is visible where x is below 300
 const way = { pick: (x, y) => (x < 300 ? [x * PIXEL, y * PIXEL, 0] : undefined), pixels: () => 1 / PIXEL };
 const made = (members) => new Stroke({ layer: 0, erases: false, colour: [1, 2, 3, 255], radius: 0.1, ...members }, way);
 
-test('points are closer than half of the radius, however far apart the pen was seen', () => {
+test('points are closer than half of the radius, also for distant positions of the pen', () => {
   const stroke = made();
   for (const x of [10, 11, 13, 60, 200])
     stroke.to(x, 50, 0.5, false);
@@ -17,7 +17,7 @@ test('points are closer than half of the radius, however far apart the pen was s
   assert.ok(stroke.points.length < 60 && stroke.points.every((p) => p.size === 32768));
 });
 
-test('a stylus\' pressure widens, and what lies beside the model is left out', () => {
+test('pressure of a stylus widens strokes, and points beside the model are omitted', () => {
   const stroke = made();
   stroke.to(250, 50, 0.1, true);
   stroke.to(280, 50, 0.4, true);
@@ -26,11 +26,11 @@ test('a stylus\' pressure widens, and what lies beside the model is left out', (
   assert.ok(sizes.every((s, i) => s >= 1 && s <= 32768 && (i === 0 || s >= sizes[i - 1])) && sizes.at(-1) > 1.5 * sizes[0], String(sizes));
   assert.ok(stroke.points.every((p) => p.place[0] < 3));
   const places = stroke.points.map((p, i) => ({ face: i, weights: [0, 0], place: p.place, normal: [0, 0, 1], distance: i === 1 ? 1 : 0 })), settled = stroke.settled(places);
-  assert.deepEqual(settled.points.map((p) => p.face), places.map((p) => p.face).filter((f) => f !== 1)); // that one is far from all faces
+  assert.deepEqual(settled.points.map((p) => p.face), places.map((p) => p.face).filter((f) => f !== 1)); // this point is far from all faces
 });
 
 const INFO = { parts: new Set(['mesh', 'maps']), content_sha256: 'a'.repeat(64), source_face_count: 10, mend_added_faces: 2, face_count: 12, box_origin: [0, 0, 0], box_size: [1, 1, 1] };
-test('each step can be undone and done again; layers take what is theirs along', () => {
+test('each step can be undone and redone; a removed layer removes its strokes and notes', () => {
   const doc = new PaintDocument(INFO, 'a.ebpo.h5', () => {}), point = { face: 1, weights: [0, 0], place: [0.5, 0.5, 0.5], size: 1, pressure: 0, time: 0 };
   doc.addLayer({});
   doc.addLayer({ title: 'Other' });
@@ -60,7 +60,7 @@ test('paint of another model, or on faces that the model cannot have, is refused
   assert.match(with_({ strokes: strokes(12, [0, 0, 0]) }), /cannot have/);
   assert.match(with_({ strokes: strokes(0, [0, 0, 1.5]) }), /cannot have/);
   assert.match(with_({ strokes: strokes(0, [0, 0, 1 + 2e-6]) }), /cannot have/);
-  assert.equal(with_({ strokes: strokes(0, [-(2 ** -60), 0.5, 1 + 2 ** -52]) }), undefined); // places are rounded
+  assert.equal(with_({ strokes: strokes(0, [-(2 ** -60), 0.5, 1 + 2 ** -52]) }), undefined); // rounded positions are accepted
   const subset = { ...INFO, content_sha256: 'c'.repeat(64), subset_of: INFO.content_sha256 };
-  assert.equal(misfit({ ...doc, strokes: strokes(99, [5, 5, 5]) }, subset), undefined); // elsewhere in the whole
+  assert.equal(misfit({ ...doc, strokes: strokes(99, [5, 5, 5]) }, subset), undefined); // may be in another part of the whole model
 });

@@ -1,4 +1,4 @@
-// Several models: what scenes and addresses say, where instances are, who gets how many triangles; workers for many files are tried in the browser's test.
+// Tests several models: reading of scenes and addresses, poses of instances and budgets of triangles. tests/web/viewer.mjs tests workers with many files.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { copyFileSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
@@ -26,7 +26,7 @@ const SCENE = {
 const CSV = 'time;qx;qy;qz;qw;x;y;z\r\n0;0;0;0;1;0;0;0\r\n\r\n3;0;0;1;1;7;8;9\r\n';
 const read = (scene, csv = CSV) => readScene(JSON.stringify(scene), async (path) => (assert.equal(path, 'steps.csv'), csv));
 
-test('a scene says who is where at which time', async () => {
+test('instances of a scene have their poses at each time', async () => {
   const scene = await read(SCENE), [north, arm, stepper, slider] = scene.instances;
   assert.deepEqual([scene.title, scene.unit, scene.from, scene.to, scene.models.length, arm.model, arm.layer], ['Two', 'm', 0, 5, 2, 1, 'robot']);
   near(placed(poseAt(north, 1), [1, 2, 3]), [-1, -6, 3]);
@@ -39,13 +39,13 @@ test('a scene says who is where at which time', async () => {
   near(cameraAt(scene.cameras[0], 5).eye, [8, 13, 2]);
 });
 
-test('a turn is even on the shorter arc', () => {
+test('rotations have constant speed along the shorter arc', () => {
   const turn = (angle) => [0, Math.sin(angle / 2), 0, Math.cos(angle / 2)], keys = [0, 1].map((time) => ({ time, turn: time ? turn(2).map((x) => -x) : turn(0), scale: 1, translation: [0, 0, 0] }));
   for (const u of [0.1, 0.37, 0.5, 0.9])
     near(poseAt({ pose: poseFrom(''), route: { keys } }, u).rotation, matrixOf(turn(2 * u)), 1e-8);
 });
 
-test('poses go both ways, and one after the other', () => {
+test('poses can be inverted and composed', () => {
   for (const q of [[0, 0, 0, 1], [1, 2, 3, 4], [-4, 1, 0, 0.1], [0, 5, 0, 0], [0, 0, 1, -1e-9]]) {
     const pose = poseOf({ quaternion: q, scale: 2.5, translation: [1, -2, 3] }, 'pose'), p = [0.3, 7, -5], again = quaternionOf(pose.rotation), unit = unitQuaternion(q);
     near(unplaced(pose, placed(pose, p)), p);
@@ -57,14 +57,14 @@ test('poses go both ways, and one after the other', () => {
 const REFUSED = {
   'another version': [(s) => (s.ebpo_scene = '2.0'), /ebpo_scene/], 'an unknown member': [(s) => (s.colour = 1), /"colour"/], 'no such model': [(s) => (s.instances[1].model = 'leg'),
     /instances\[1\]\.model: "leg"/],
-  'a way out': [(s) => (s.models.wall.file = '../wall.ebpo.h5'), /models\.wall\.file.*leads out/], 'a way from the root': [(s) => (s.models.wall.file = '/etc/x'), /leads out/],
+  'a path out of the folder': [(s) => (s.models.wall.file = '../wall.ebpo.h5'), /models\.wall\.file.*leads out/], 'an absolute path': [(s) => (s.models.wall.file = '/etc/x'), /leads out/],
   'another scheme': [(s) => (s.models.wall.file = 'data:x'), /leads out/], 'a server without a digest': [(s) => (s.models.wall.file = 'https://example.org/x.ebpo.h5'), /content_sha256/],
   'a mirror': [(s) => (s.instances[0].pose.rotation = [-1, 0, 0, 0, 1, 0, 0, 0, 1]), /mirror/], 'no rotation': [(s) => (s.instances[0].pose.rotation = [1, 0, 0, 0, 2, 0, 0, 0, 1]), /not a rotation/],
-  'no quaternion': [(s) => (s.routes.reach.keys[1].pose.quaternion = [0, 0, 0, 0]), /is 0/], 'times that fall': [(s) => (s.routes.reach.keys[1].time = 0), /ascend/],
+  'no quaternion': [(s) => (s.routes.reach.keys[1].pose.quaternion = [0, 0, 0, 0]), /is 0/], 'descending times': [(s) => (s.routes.reach.keys[1].time = 0), /ascend/],
     'fixed and moving': [(s) => (s.instances[1].fixed = true), /fixed/],
-  'two of a name': [(s) => (s.instances[1].name = 'north'), /twice/], 'a scale of 0': [(s) => (s.instances[1].pose.scale = 0), /scale/],
+  'a duplicate name': [(s) => (s.instances[1].name = 'north'), /twice/], 'a scale of 0': [(s) => (s.instances[1].pose.scale = 0), /scale/],
     'a text for a number': [(s) => (s.instances[1].pose.scale = '1'), /scale/],
-  'no pose but null': [(s) => (s.instances[1].pose = null), /pose: is not an object/], 'a rotation that is false': [(s) => (s.instances[1].pose.rotation = false), /9 numbers/],
+  'null as a pose': [(s) => (s.instances[1].pose = null), /pose: is not an object/], 'false as a rotation': [(s) => (s.instances[1].pose.rotation = false), /9 numbers/],
   'null for models': [(s) => (s.models = null), /models: is not an object/], 'poses of another server': [(s) => (s.routes.steps.csv = 'https://elsewhere.example/steps.csv'), /files of poses/],
   'too many instances': [(s) => (s.instances = Array.from({ length: 100_001 }, () => null)), /more than 100000 instances/],
 };
@@ -75,7 +75,7 @@ for (const [what, [spoil, says]] of Object.entries(REFUSED))
     await assert.rejects(read(scene), says);
   });
 
-test('members twice, however they are written, and brackets without end are refused', async () => {
+test('duplicate members, also with escapes, and too deep nesting are refused', async () => {
   const text = JSON.stringify(SCENE), twice = text.replace('"title":"Two"', '"title":"Two","t\\u0069tle":"Three"');
   assert.notEqual(text, twice);
   await assert.rejects(readScene(twice), /"t\\u0069tle" is there twice/);
@@ -85,7 +85,7 @@ test('members twice, however they are written, and brackets without end are refu
     assert.deepEqual(parseStrict(good), JSON.parse(good));
 });
 
-test('many routes and instances do not take forever, and numbers that do not suffice are told', async () => {
+test('many routes and instances take little time, and boxes beyond double precision are reported', async () => {
   const keys = Array.from({ length: 5000 }, (_, time) => ({ time, pose: { translation: [time, 0, 0] } })), scene = { ...SCENE, cameras: [], ignore: [], routes: { long: { keys } },
     instances: Array.from({ length: 20_000 }, (_, i) => ({ name: `${i}`, model: 'arm', route: 'long' })) };
   const { instances, from, to } = await read(scene), boxes = instances.map((instance) => ({ instance, origin: [0, 0, 0], size: [1, 1, 1] }));
@@ -105,7 +105,7 @@ test('a key is found among many', () => {
   }
 });
 
-test('a file of poses that is wrong is refused with its line', async () => {
+test('an invalid file of poses is refused with the line number', async () => {
   await assert.rejects(read(SCENE, 'time,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1,0,a,0,0,0,0,1\n'), /steps\.csv: line 3/);
   await assert.rejects(read(SCENE, 'time,x,y,z\n'), /line 1/);
 });
@@ -134,7 +134,7 @@ test('addresses name models and poses', async () => {
   assert.ok(sent < 70, `${sent} MiB were read`);
 });
 
-test('who fills more of the picture gets more triangles, and what one cannot use the others get', () => {
+test('larger models get more triangles, and unused triangles go to other models', () => {
   assert.deepEqual(sharesOf(1e6, [{ weight: 1, copies: 1, faces: 1e9 }, { weight: 3, copies: 1, faces: 1e9 }]), [250000, 750000]);
   assert.deepEqual(sharesOf(1e6, [{ weight: 3, copies: 1, faces: 100000 }, { weight: 1, copies: 3, faces: 1e9 }, { weight: 0, copies: 0, faces: 1e9 }]), [100000, 300000, 500]);
   const total = [[5, 2, 1000], [1, 10, 7000], [2, 1, 1e6]].map(([weight, copies, faces]) => ({ weight, copies, faces }));
@@ -144,8 +144,8 @@ test('who fills more of the picture gets more triangles, and what one cannot use
   assert.equal(weightOf({ ...view, planes: [[1, 0, 0, -1.5]] }), 0);
 });
 
-// The library as judge: where it has instances at some time.
-test('instances are where ebpo scene has them', { skip: process.env.EBPO_TOOL ? false : 'EBPO_TOOL is not set' }, async (t) => {
+// Compares the poses of instances with those of the library.
+test('poses of instances agree with ebpo scene', { skip: process.env.EBPO_TOOL ? false : 'EBPO_TOOL is not set' }, async (t) => {
   const folder = mkdtempSync(join(tmpdir(), 'ebpo-scene-')), model = process.env.EBPO_FILES.split(' ').find((name) => name.endsWith('/ring.ebpo.h5')), scene = structuredClone(SCENE);
   t.after(() => rmSync(folder, { recursive: true, force: true }));
   copyFileSync(model, join(folder, 'ring.ebpo.h5'));

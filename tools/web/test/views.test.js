@@ -1,11 +1,11 @@
-// Saved views as files: both ways, and what is refused.
+// Tests files of saved views: writing, reading, and refusing invalid files.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { mergedViews, readViews, viewOf, writeViews } from '../views.js';
 
 const DIGEST = 'a'.repeat(64), VIEW = { name: 'Front', query: '?view=0,0,2&clip=x0.5' };
 
-test('views come back from a file as they were', () => {
+test('views are read from a file as they were written', () => {
   const [clip] = mergedViews([], [{ ...VIEW, query: '?file=secret.ebpo.h5&view=0,0,2&clip=x0.5&paint=x' }]);
   assert.deepEqual([...new URLSearchParams(clip.query)], [['view', '0,0,2'], ['clip', 'x0.5']], 'of the file and its paint a view says nothing');
   const again = mergedViews([], readViews(writeViews([clip], DIGEST, 'statue'), DIGEST));
@@ -14,7 +14,7 @@ test('views come back from a file as they were', () => {
   assert.equal(viewOf('https://example.org/v/?file=a'), '?');
 });
 
-test('what is no list of views is refused, and what is no view is left out', () => {
+test('invalid files are refused, and invalid views are omitted', () => {
   for (const text of ['', '{', '[]', '{"ebpo_views":"2.0","views":[]}', '{"ebpo_views":"1.0","views":5}', 'x'.repeat(1 << 23)])
     assert.throws(() => readViews(text, DIGEST), /not a file of saved views/);
   assert.throws(() => readViews(writeViews([VIEW], 'b'.repeat(64), 'statue'), DIGEST), /belong to "statue"/);

@@ -1,4 +1,4 @@
-// The worker, with the page's side of it played here: several files in one, questions that come as soon as a file's head is there, and files that go.
+// Tests the worker with messages as the page sends them: several files, queries that arrive as soon as a file's header has been read, and closed files.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
@@ -13,7 +13,7 @@ globalThis.setInterval = usual;
 
 const file = new Blob([readFileSync(fileURLToPath(new URL('../../../format-spec/vectors/passed/16_many_subtrees.ebpo.h5', import.meta.url)))]);
 const tell = (data) => self.onmessage({ data });
-/** The first message that fits. */
+/** Resolves to the first message that fits. */
 const heard = (fits) => new Promise((done) => listeners.push(function listener(message) {
   if (!fits(message))
     return;
@@ -21,11 +21,11 @@ const heard = (fits) => new Promise((done) => listeners.push(function listener(m
   done(message);
 }));
 
-test('questions that come with the head are answered, each about its file', async () => {
+test('queries that arrive with the header are evaluated, each for its file', async () => {
   const point = [100, 100, 100], answers = [1, 2].map((number) => heard((m) => m.file === number && m.type === 'probed' && m.done));
   const places = heard((m) => m.file === 2 && m.type === 'places');
   for (const number of [1, 2]) {
-    listeners.push((m) => { // at once, while the worker still waits for the first levels
+    listeners.push((m) => { // immediately, while the worker still waits for the first levels
       if (m.file === number && m.type === 'opened')
         tell({ file: number, type: 'probe', opening: 5, point });
       if (m.file === 2 && number === 2 && m.type === 'opened')
@@ -40,7 +40,7 @@ test('questions that come with the head are answered, each about its file', asyn
   assert.ok(Math.abs(place.distance - one.distance) <= 1e-12 * one.distance);
 });
 
-test('what fails of a question is told to who asked, and a file that is gone says no more', async () => {
+test('a failed query is reported to its sender, and a closed file sends no more messages', async () => {
   const wrong = heard((m) => m.file === 1 && m.type === 'places');
   tell({ file: 1, type: 'places', opening: 5, id: 10, points: [undefined] });
   const { id, error } = await wrong;
@@ -50,7 +50,7 @@ test('what fails of a question is told to who asked, and a file that is gone say
   listeners.push((m) => m.file === 2 && late.push(m));
   const going = tell({ file: 2, type: 'places', opening: 5, id: 11, points: [[0, 0, 0], [1e5, 0, 0], [0, 1e5, 0]] });
   for (let i = 0; i < 5; i++)
-    await undefined; // it has begun
+    await undefined; // the query has begun
   tell({ file: 2, type: 'end' });
   await going;
   assert.deepEqual(late, []);

@@ -1,4 +1,4 @@
-// The same answers and the same polygons as the library's. Needs EBPO_TOOL (the ebpo program) and EBPO_FILES (files, with spaces between).
+// Compares query results and polygons with those of the library. Needs EBPO_TOOL (the ebpo program) and EBPO_FILES (files, separated by spaces).
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
@@ -17,7 +17,7 @@ async function load(path) {
   return { file, tree };
 }
 
-// Of a level's nodes and of the leaves and black nodes above: triangles, and how many of them are not on walls.
+// Counts the triangles of a level's nodes and of leaves and black nodes above: all triangles, and those that are not on cell faces.
 function countTriangles(tree, level) {
   const count = { all: 0, inner: 0 };
   const walk = (node) => {
@@ -35,7 +35,7 @@ function countTriangles(tree, level) {
   return count;
 }
 
-// Points in and around the model, the same in every run; every third on corners of cells.
+// Returns reproducible points in and around the model. Every third point is a corner of a cell.
 function points(info, n) {
   let state = 7;
   const random = () => (state = (state * 48271) % 2147483647) / 2147483647;
@@ -45,10 +45,10 @@ function points(info, n) {
 
 for (const path of files) {
   const name = basename(path);
-  test(`${name}: as many triangles as the library cuts, level by level`, { skip }, async () => {
+  test(`${name}: each level has as many triangles as in the library`, { skip }, async () => {
     const { file, tree } = await load(path);
     if (file.info.parts.has('mesh') && !file.info.parts.has('leaf-planes'))
-      return; // the library derives planes from the leaves' faces there
+      return; // here the library derives planes from the faces of leaves
     const folder = mkdtempSync(join(tmpdir(), 'ebpo-')), triangles = (...options) => {
       run(['extract', '-q', ...options, path, join(folder, 'out.ply')]);
       return Number(/element face (\d+)/.exec(readFileSync(join(folder, 'out.ply'), 'latin1').slice(0, 2000))[1]);
@@ -58,7 +58,7 @@ for (const path of files) {
     rmSync(folder, { recursive: true });
   });
 
-  test(`${name}: the same inside and distance, and intervals that hold them`, { skip }, async () => {
+  test(`${name}: inside and distance agree with the library, and intervals contain the distance`, { skip }, async () => {
     const { file, tree } = await load(path);
     if (!file.info.parts.has('mesh'))
       return;
@@ -86,7 +86,7 @@ for (const path of files) {
     }
   });
 
-  test(`${name}: points on the surface are on it, and midpoints of edges exactly where the library says`, { skip }, async () => {
+  test(`${name}: points on the surface are classified as on, and midpoints of edges as in the library`, { skip }, async () => {
     const { file, tree } = await load(path);
     if (!file.info.solid || !file.info.parts.has('mesh'))
       return;
@@ -104,4 +104,4 @@ for (const path of files) {
     }
   });
 }
-test('files to compare with are given', { skip }, () => {});
+test('files for the comparison are given', { skip }, () => {});

@@ -1,9 +1,9 @@
-// A whole file as read_ebpo.py prints it. As a program: node as_json.js FILE
+// Converts a whole file to the JSON that read_ebpo.py prints. As a program: node as_json.js FILE
 import { createHash } from 'node:crypto';
 import { readFileSync } from 'node:fs';
 import { openEbpo } from '../index.js';
 
-// As read_ebpo.py prints arrays: as a list, or the SHA-256 of the little-endian values when there are more than 1,000.
+// Returns an array in the form of read_ebpo.py: a list, or for more than 1,000 values the SHA-256 of the little-endian values.
 function listed(values, Type) {
   if (values === undefined)
     return null;
@@ -30,7 +30,7 @@ function asJson(info, levels, mesh, maps) {
   };
 }
 
-/** Reads and checks everything. The answer is that of read_ebpo.py. */
+/** Reads and checks the whole file. Returns the same value as read_ebpo.py. */
 export async function readAll(bytes, name) {
   const file = await openEbpo(bytes, { name });
   const levels = await file.levels(0, file.info.level_count - 1, { faces: true });

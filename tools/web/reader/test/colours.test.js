@@ -1,5 +1,5 @@
-// Colours of faces as they come with leaves, against what they were made from: of vertices and of faces, of several types, with and without subtrees.
-// Needs EBPO_TOOL, the command.
+// Compares the colours that leafFaces() returns with the source's colours: of vertices and of faces, with several types, with and without subtrees.
+// Needs EBPO_TOOL, the ebpo program.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
@@ -11,11 +11,11 @@ import { GRAY, LEAF, Tree, openEbpo } from '../index.js';
 const tool = process.env.EBPO_TOOL, SIDE = 24;
 const FULL = { uchar: 255, ushort: 65535, float: 1, double: 1 };
 
-// What is right: of a point, 0 to 255 each, so that neighbours differ and no plain order of rows could say the same.
+// Returns the expected colour of a point, three numbers from 0 to 255. Neighbouring points have different colours, so that wrong orders of rows are detected.
 const colourAt = ([x, y, z]) => [x * 10 % 256, (y * 7 + x * x) % 256, z * 41 % 256].map(Math.round);
 const height = (x, y) => (x * 5 + y * y * 3) % 7;
 
-// A hilly sheet of two triangles for each square.
+// A curved sheet with two triangles for each square.
 function sheet(element, type, prefix) {
   const points = [], faces = [], number = (c) => c.map((v) => v / 255 * FULL[type]).join(' ');
   for (let y = 0; y < SIDE; y++)
@@ -71,12 +71,12 @@ for (const [how, options] of Object.entries(LAYOUTS))
       assert.ok(seen >= file.info.face_count);
     });
 
-test('without colours there are none', { skip: !tool }, async () => {
+test('a file without colours returns no colours', { skip: !tool }, async () => {
   const file = await converted(sheet('vertex', 'uchar', 'pale_'), []), faces = await file.leafFaces(await leavesOf(file));
   assert.equal(file.colours, undefined);
   assert.ok(faces.every((f) => f.colours === undefined));
 });
 
-test('colours are left out of content_sha256', { skip: !tool }, async () => {
+test('content_sha256 omits colours', { skip: !tool }, async () => {
   await (await converted(sheet('vertex', 'uchar', ''), ['--subtree-faces', '100'])).verifyContent();
 });

@@ -1,4 +1,4 @@
-// Counts and places beyond 2^31, 2^32 and 2^53, without the data.
+// Tests counts and offsets beyond 2^31, 2^32 and 2^53, without the data.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { createServer } from 'node:http';
@@ -9,10 +9,10 @@ import { openEbpo } from '../index.js';
 
 const FAR = 2 ** 33, vector = readFileSync(new URL('../../../../format-spec/vectors/passed/01_one_leaf_unfiltered.ebpo.h5', import.meta.url));
 
-test('vertices and source numbers near 2^32 stay what they are', () => {
+test('vertex and source indices near 2^32 are decoded correctly', () => {
   const codes = new Uint32Array([0, 2 ** 32 - 4, 1]), array = { rows: 2, chunkRows: 1, chunkCount: 2 };
   assert.deepEqual([...decodeFaces(new Uint8Array(codes.buffer), array, 1, [0, 2 ** 32 - 3], 2 ** 32 - 2)], [2 ** 32 - 3, 2, 2 ** 32 - 3]);
-  const zigzag = new Uint32Array([1, 2 ** 32 - 2]); // -1 and + 2^31 - 1, wrapping
+  const zigzag = new Uint32Array([1, 2 ** 32 - 2]); // -1 and 2^31 - 1, modulo 2^32
   const map = { path: 'map', rows: 2, chunkRows: 2 };
   assert.deepEqual([...decodeMap(new Uint8Array(zigzag.buffer), map, 2 ** 32)], [2 ** 32 - 1, 2 ** 31 - 2]);
 });
@@ -23,7 +23,7 @@ test('references count down from faces beyond 2^31', () => {
   assert.deepEqual([...block.refs], [2 ** 32 - 11, 2 ** 31 - 12]);
 });
 
-// A server of a file that says it has so many bytes (in its superblock too), of which all but the first are never asked for.
+// Starts a server for a file whose stated size, also in its superblock, is `size`. The reader requests only the first bytes.
 async function serve(size, use) {
   const bytes = Buffer.from(vector);
   bytes.writeBigUInt64LE(BigInt(size), 28);
@@ -44,7 +44,7 @@ async function serve(size, use) {
   }
 }
 
-test('files of more than 2^32 bytes are opened, of more than 2^53 refused', async () => {
+test('files of more than 2^32 bytes are opened, and of more than 2^53 bytes are refused', async () => {
   await serve(FAR, async (url) => {
     const file = await openEbpo(url, { headBytes: 131072, timeout: 2000 });
     assert.equal(file.source.size, FAR);

@@ -1,4 +1,4 @@
-// Tables of subtrees and lists of places that lie: an error that names the object, or the right answer, and never anything else.
+// Tests wrong tables of subtrees and wrong chunk directories. The reader must either throw an error that names the object or return correct data.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import test from 'node:test';
@@ -12,7 +12,7 @@ const good = await openEbpo(original);
 await good.locate();
 const { info } = good, below = info.level_count - 1 - info.subtree_level;
 
-// A copy in which a chunk was changed, with the checksum that it then has.
+// Returns a copy with a changed chunk and the matching checksum.
 function changed(path, change, chunk = 0) {
   const bytes = Buffer.from(original), { at, bytes: length } = good.arrays.get(path).chunks[chunk], data = bytes.subarray(at, at + length - 4);
   change(data);
@@ -20,7 +20,7 @@ function changed(path, change, chunk = 0) {
   return bytes;
 }
 
-// Everything that is read by subtree.
+// Reads all data that is read by subtree.
 async function readBySubtree(bytes) {
   const file = await openEbpo(bytes, { name: 'a' }), numbers = Array.from({ length: info.levels[info.subtree_level].gray }, (_, i) => i);
   await file.locate();
@@ -40,11 +40,11 @@ async function refused(bytes, said, read = readBySubtree) {
   });
 }
 
-// --- how chunks end ---
+// --- chunk checksums ---
 
 const summed = readFileSync(new URL('../../../../format-spec/vectors/passed/55_chunk_sums_of_subtrees.ebpo.h5', import.meta.url));
 
-// The beginning of a file is there; what lies behind `limit` comes when `gate` opens.
+// A source whose bytes before `limit` arrive immediately, and the others when `gate` resolves.
 class SlowSource {
   constructor(data, limit, gate) {
     Object.assign(this, { data, limit, gate, name: 'slow', size: data.length, requests: 0, bytes: 0 });
@@ -69,7 +69,7 @@ class SlowSource {
   }
 }
 
-// With another end in the list for the types of level 2 than they have.
+// A file whose list has a wrong checksum for the types of level 2.
 function withWrongEnd(data, { at, bytes: length }) {
   const bytes = Buffer.from(data), rows = bytes.subarray(at, at + length - 4);
   for (let row = 0; row < rows.length; row += 8)
@@ -78,7 +78,7 @@ function withWrongEnd(data, { at, bytes: length }) {
   return bytes;
 }
 
-test('levels that have come are given before the list of sums; a wrong one among them is told when that has come', async () => {
+test('levels are returned before the chunk checksums arrive; a wrong level is reported when they have arrived', async () => {
   const list = (await openEbpo(summed)).arrays.get('/chunk_sums').chunks[0], wrong = withWrongEnd(summed, list);
   for (const data of [summed, wrong]) {
     let open;
@@ -91,10 +91,10 @@ test('levels that have come are given before the list of sums; a wrong one among
     else
       await assert.rejects(file.levels(3, 3), /levels\/02\/types: chunk 0: the chunk is damaged: it is not the chunk/);
   }
-  await assert.rejects((await openEbpo(wrong)).levels(2, 2), /it is not the chunk/); // all is there: nothing is given
+  await assert.rejects((await openEbpo(wrong)).levels(2, 2), /it is not the chunk/); // everything has arrived, so that no level is returned
 });
 
-// The list of a file with arrays of several chunks, as pairs of bytes and number.
+// The chunk directory of a file that has arrays with several chunks, as pairs of size and number.
 const many = await openEbpo(readFileSync(new URL('../../../../format-spec/vectors/passed/16_many_subtrees.ebpo.h5', import.meta.url)));
 const list = many.arrays.get('/subtrees/places'), arrays = [...many.arrays.values()].filter((a) => a !== list), [stored] = await Promise.all(many.store.cache.decoded([{ array: list, chunk: 0 }]));
 const placed = (change) => {
@@ -103,7 +103,7 @@ const placed = (change) => {
   return readPlaces(rows, arrays, many.source.size);
 };
 
-test('places: a chunk too many, too few, too large, beyond the end, elsewhere', async () => {
+test('chunk directory: a chunk too many, too few, too large, beyond the end, at a wrong offset', async () => {
   assert.deepEqual([...placed(() => {}).values()].map((chunks) => chunks.length), arrays.map((a) => a.chunkCount));
   const wrong = (change, said) => assert.throws(() => placed(change), (error) => error instanceof EbpoError && error.code === 'FORMAT' && said.test(error.message));
   wrong((rows) => (rows[3] = rows[1]), /\/subtrees\/places: .*more chunks/);
@@ -118,7 +118,7 @@ test('places: a chunk too many, too few, too large, beyond the end, elsewhere', 
     assert.deepEqual(chunks, array.chunks.map(({ at, bytes }) => ({ at, bytes })), array.path);
 });
 
-test('places that say that they are stale are not used', async () => {
+test('outdated chunk directories are not used', async () => {
   const bytes = many.source.data;
   async function placesOf(change) {
     const file = await openEbpo(bytes), { attributes } = file.arrays.get('/subtrees/places').object;
@@ -144,14 +144,14 @@ test('counts that do not add up, in each column', async () => {
   for (let column = 0; column < cols; column++)
     for (const by of [1, 2 ** 31]) {
       const bytes = changed('/subtrees/counts', (data) => data.writeUInt32LE((data.readUInt32LE(4 * column) + by) >>> 0, 4 * column));
-      if (![0, 2].includes(column) && !(column >= 6 && column % 7 === 5)) // what lies before, and ends, have no sum in the head
+      if (![0, 2].includes(column) && !(column >= 6 && column % 7 === 5)) // the header has no sums for the columns that count what is before a subtree, and for ends
         await refused(bytes, /\/subtrees\/counts: /);
       else
         await readBySubtree(bytes).then((found) => assert.ok(found), (error) => assert.ok(error instanceof EbpoError, error.stack));
     }
 });
 
-test('counts of which one subtree has what another should', async () => {
+test('counts that are moved from one subtree to another', async () => {
   const cols = 6 + 7 * below, move = (column, from, to) => changed('/subtrees/counts', (data) => [[from, -1], [to, 1]].forEach(([row, by]) => {
     const at = 4 * (row * cols + column), value = data.readUInt32LE(at);
     data.writeUInt32LE((value + by) >>> 0, at);
@@ -159,13 +159,13 @@ test('counts of which one subtree has what another should', async () => {
   for (const column of [6, 7, 8, 9, 11, 13])
     for (const [from, to] of [[0, 1], [1, 0]]) {
       const bytes = move(column, from, to);
-      await readBySubtree(bytes).then((found) => assert.fail(`column ${column} is believed: ${found.length}`), (error) => assert.ok(error instanceof EbpoError, error.stack));
+      await readBySubtree(bytes).then((found) => assert.fail(`column ${column} was accepted: ${found.length}`), (error) => assert.ok(error instanceof EbpoError, error.stack));
     }
 });
 
 test('an index that does not begin with 0', () => refused(changed('/subtrees/index', (data) => data.writeUInt32LE(1, 8)), /\/subtrees\/index: the first row of the index is not 0/));
 
-test('500 changes of the tables at random: an error, or the same', async () => {
+test('500 random changes of the tables: an error or the same result', async () => {
   const right = await readBySubtree(original);
   let state = 3, errors = 0;
   const random = (n) => Math.floor((state = (state * 48271) % 2147483647) / 2147483647 * n);
@@ -182,11 +182,11 @@ test('500 changes of the tables at random: an error, or the same', async () => {
   assert.ok(errors > 400, String(errors));
 });
 
-test('a list whose own place is not known does not hold', () => {
+test('a chunk directory without a known offset is invalid', () => {
   const places = good.arrays.get('/subtrees/places');
   assert.equal(placesHold(places, original.length), true);
   assert.equal(placesHold(places, original.length + 1), false);
   assert.equal(placesHold({ ...places, chunks: undefined }, original.length), false);
 });
 
-test('the whole file is read alike', async () => assert.ok((await readAll(original, 'a')).levels.length));
+test('the whole file can be read', async () => assert.ok((await readAll(original, 'a')).levels.length));

@@ -1,5 +1,5 @@
-// Parts of levels and subtrees against whole levels: the same nodes, planes, lists, faces and answers, in few requests and waves, within the budget.
-// Vectors; with EBPO_FILES (files, with spaces between) these, too.
+// Compares parts of levels and subtrees with whole levels: nodes, planes, lists, faces and query results must be equal. Limits requests, round trips and memory.
+// Uses the vectors and the files in EBPO_FILES (separated by spaces).
 import assert from 'node:assert/strict';
 import { readFileSync, readdirSync } from 'node:fs';
 import { basename } from 'node:path';
@@ -11,7 +11,7 @@ const passed = new URL('../../../../format-spec/vectors/passed/', import.meta.ur
 const files = [...readdirSync(passed).filter((n) => n.endsWith('.h5')).map((n) => passed + n), ...(process.env.EBPO_FILES ?? '').split(' ').filter(Boolean)];
 const withSubtrees = (path) => readFileSync(path).includes('subtree_level');
 
-// The tree as plain loops over whole levels find it: every node with its children, nothing counted but one by one.
+// Reference implementation: builds the tree by loops over whole levels and counts nodes one by one.
 function plainTree(levels) {
   const nodes = levels.map(() => [[], [], [], []]);
   levels.forEach((level) => {
@@ -39,7 +39,7 @@ function plainTree(levels) {
   return nodes[0].flat()[0];
 }
 
-// A tree of level 0 and of what `grow(tree, nodes)` brings below nodes that have no children yet.
+// Returns a tree with level 0 and the nodes that `grow(tree, nodes)` loads below nodes without children.
 async function grown(file, grow) {
   const tree = new Tree(file.info);
   tree.add((await file.levels(0, 0))[0]);
@@ -78,7 +78,7 @@ function leavesOf(tree, node = tree.root, out = []) {
   return out;
 }
 
-// Points near faces, on corners of cells and elsewhere, the same in every run.
+// Returns reproducible points: near faces, on corners of cells, and others.
 async function points(file, n) {
   const { box_origin: origin, box_size: size } = file.info, { vertices, faces } = await file.mesh();
   let state = 5;
@@ -117,7 +117,7 @@ for (const path of files) {
     }
   });
 
-  test(`${name}: leaves have the faces of whole levels, also with next to no memory`, async () => {
+  test(`${name}: leaves have the faces of whole levels, also with very little memory`, async () => {
     const all = await openEbpo(bytes);
     if (!all.info.parts.has('mesh'))
       return;
@@ -139,7 +139,7 @@ for (const path of files) {
     assert.ok(info.face_count > 0);
   });
 
-  test(`${name}: the nearest face and inside, as all faces say`, async () => {
+  test(`${name}: nearest face and inside agree with a search of all faces`, async () => {
     const file = await openEbpo(bytes);
     if (!file.info.parts.has('mesh') || file.info.parts.has('pruned'))
       return;
@@ -160,13 +160,13 @@ for (const path of files) {
   });
 }
 
-// The plain node at a node's place.
+// Returns the node of the reference tree at a node's position.
 function find(tree, node, plain) {
   return node.parent ? find(tree, node.parent, plain).children[node.octant] : plain;
 }
 
 for (const path of files.filter(withSubtrees))
-  test(`${basename(path)}: a subtree is one batch, known after one look-up`, async () => {
+  test(`${basename(path)}: a subtree is read in one batch after one look-up`, async () => {
     const bytes = readFileSync(path), source = new SlowSource(bytes), file = await openEbpo(source, { headBytes: 16384 }), { info } = file;
     const tree = new Tree(info);
     (await file.levels(0, info.subtree_level)).forEach((level) => tree.add(level));
@@ -174,13 +174,13 @@ for (const path of files.filter(withSubtrees))
     await file.parts.subtrees.rows([0]); // the index, and a chunk of counts
     const roots = info.levels[info.subtree_level].gray, { cache } = file.store;
     for (let i = 0; i < roots; i += Math.ceil(roots / 12)) {
-      await file.parts.subtrees.rows([i]); // the look-up
+      await file.parts.subtrees.rows([i]); // the look-up of the table
       cache.kept.clear();
       cache.bytes = 0;
-      await file.parts.subtrees.rows([i]); // is kept, but for the counts
+      await file.parts.subtrees.rows([i]); // cached, except for the counts
       source.count();
       const found = await file.subtrees([i]), { waves, requests } = source.count(), lean = tree.lean();
-      const turns = 1 + Math.ceil((requests - 1) / 6); // blocks of elsewhere; everything else, six at a time
+      const turns = 1 + Math.ceil((requests - 1) / 6); // one round trip for shared blocks; the other requests run six at a time
       assert.ok(waves <= turns && requests <= 10, `${waves} waves, ${requests} requests for subtree ${i}`);
       found.forEach(({ part, segment }) => lean.addPart(part, segment));
       const root = nodeOf(lean, lean.root, i, info.subtree_level), leaves = leavesOf(lean, root);

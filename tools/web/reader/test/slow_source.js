@@ -1,10 +1,10 @@
-// A file as it comes over a line with delay: counts requests, bytes and waves. A wave is what is asked for without waiting for one another.
+// A source with a latency: counts requests, bytes and round trips (`waves`). Requests that do not wait for each other are one round trip.
 import { openSync, readSync, fstatSync } from 'node:fs';
 
 const pause = (ms) => new Promise((done) => setTimeout(done, ms));
 
 export class SlowSource {
-  /** `what`: bytes, or a path. `ahead`: the first answer goes on coming up to there. `bandwidth` in bytes per ms. */
+  /** `what`: bytes, or a path. `ahead`: least size of the first response. `bandwidth`: in bytes per ms. */
   constructor(what, { latency = 2, ahead = 0, bandwidth = Infinity, name = 'slow' } = {}) {
     Object.assign(this, { latency, ahead, bandwidth, name });
     if (typeof what === 'string') {
@@ -20,9 +20,9 @@ export class SlowSource {
       this.take = (offset, length) => Uint8Array.from(what.subarray(offset, offset + length));
     }
     this.coming = 0;
-    this.asked = []; // [offset, length, wave]
-    this.done = 0;   // waves of which an answer has come
-    this.free = 0;   // when the line is
+    this.asked = []; // [offset, length, round trip]
+    this.done = 0;   // number of round trips with a response
+    this.free = 0;   // time at which the connection is free
     this.requests = this.bytes = this.waves = 0;
   }
 
@@ -48,11 +48,11 @@ export class SlowSource {
 
   async read(offset, length) {
     if (offset < 0 || offset + length > this.size)
-      throw new Error(`bytes ${offset} to ${offset + length} of ${this.size} were asked for`);
+      throw new Error(`bytes ${offset} to ${offset + length} of ${this.size} were requested`);
     return offset + length <= this.coming ? this.take(offset, length) : this.#request(offset, length);
   }
 
-  /** Since the last call: { requests, bytes, waves }. */
+  /** Returns { requests, bytes, waves } since the last call. */
   count() {
     const { requests, bytes, done } = this.last ?? { requests: 0, bytes: 0, done: 0 }, out = { requests: this.requests - requests, bytes: this.bytes - bytes, waves: this.done - done };
     this.last = { requests: this.requests, bytes: this.bytes, done: this.done };

@@ -1,4 +1,4 @@
-// URLs on servers good and bad: what is read is right, or there is a clear error in time.
+// Tests URLs on correct and misbehaving servers: the reader returns correct bytes, or a clear error within its time limit.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { createServer } from 'node:http';
@@ -6,9 +6,9 @@ import test from 'node:test';
 import { EbpoError, UrlSource, openEbpo } from '../index.js';
 
 const bytes = readFileSync(new URL('../../../../format-spec/vectors/passed/06_four_levels_leaf_planes.ebpo.h5', import.meta.url));
-const part = bytes.length >> 1; // a head that is read in pieces
+const part = bytes.length >> 1; // a header that is read in pieces
 
-// A server that answers ranges as it should, but for what `odd` does. Returns what `use` makes of its address.
+// Starts a server for ranges whose responses `odd` may change. Returns the result of `use(address)`.
 async function serve(odd, use) {
   const asked = [];
   const server = createServer((request, response) => {
@@ -55,7 +55,7 @@ test('a good server: the right bytes, in few requests', () => serve(undefined, a
   assert.equal(file.traffic.bytes, asked.reduce((sum, [from, to]) => sum + to - from + 1, 0));
   assert.ok(asked.length <= 20, String(asked.length));
 }));
-test('a small file comes whole with the head', () => serve(undefined, async (url, asked) => {
+test('the first response contains a small file completely', () => serve(undefined, async (url, asked) => {
   await readAll(url, { headBytes: 1 << 20 });
   assert.deepEqual(asked, [[0, bytes.length - 1]]);
 }));
@@ -69,7 +69,7 @@ test('a server without ranges: a small file is read once', () => serve(whole, as
   await readAll(url);
   assert.equal(asked.length, 1);
 }));
-test('a server without ranges, without a length either', () => serve((answer) => {
+test('a server without ranges and without a length', () => serve((answer) => {
   whole(answer);
   delete answer.headers['Content-Length'];
 }, (url) => readAll(url)));
@@ -78,12 +78,12 @@ test('a large file without ranges or length is not read to the end', () => fails
   whole(answer);
   delete answer.headers['Content-Length'];
 }, 'NETWORK', /does not serve ranges/, { wholeLimit: 1000 }));
-test('ranges that stop', () => fails((answer, n) => (n > 1 ? whole(answer) : undefined), 'NETWORK', /stopped serving ranges/));
+test('a server that stops serving ranges', () => fails((answer, n) => (n > 1 ? whole(answer) : undefined), 'NETWORK', /stopped serving ranges/));
 
-test('another range than was asked for', () => fails((answer) => (answer.headers['Content-Range'] = `bytes 1-${part}/${bytes.length}`), 'NETWORK', /where 0 to \d+ were requested/));
+test('a wrong range', () => fails((answer) => (answer.headers['Content-Range'] = `bytes 1-${part}/${bytes.length}`), 'NETWORK', /where 0 to \d+ were requested/));
 test('no Content-Range', () => fails((answer) => delete answer.headers['Content-Range'], 'NETWORK', /no Content-Range/));
-test('a file that changes under way', () => fails((answer, n) => (n > 1 ? (answer.headers.ETag = '"2"') : undefined), 'NETWORK', /was changed on the server/));
-test('a file that grows under way', () => fails((answer, n) => {
+test('a file that changes while it is read', () => fails((answer, n) => (n > 1 ? (answer.headers.ETag = '"2"') : undefined), 'NETWORK', /was changed on the server/));
+test('a file that grows while it is read', () => fails((answer, n) => {
   if (n > 1)
     answer.headers['Content-Range'] = answer.headers['Content-Range'].replace(/\d+$/, bytes.length + 1);
 }, 'NETWORK', /was changed on the server/));
@@ -95,24 +95,24 @@ test('bodies that are too long', () => fails((answer) => {
   answer.body = Buffer.concat([answer.body, answer.body]);
   delete answer.headers['Content-Length'];
 }, 'NETWORK', /more bytes than it stated/));
-test('compression on the way', () => fails((answer) => (answer.headers['Content-Encoding'] = 'gzip'), 'NETWORK', /compresses the file|request failed/));
-test('not there', () => fails((answer) => (answer.status = 404), 'NETWORK', /404/));
-test('a page in place of the file', () => fails((answer) => {
+test('compression during transfer', () => fails((answer) => (answer.headers['Content-Encoding'] = 'gzip'), 'NETWORK', /compresses the file|request failed/));
+test('a missing file', () => fails((answer) => (answer.status = 404), 'NETWORK', /404/));
+test('a page instead of the file', () => fails((answer) => {
   whole(answer);
   answer.body = Buffer.from('<!doctype html><title>Not found</title> and so on, and so on');
   delete answer.headers['Content-Length'];
 }, 'FORMAT', /not a whole HDF5 file/));
-test('a page of a login, with its type', () => fails((answer) => {
+test('a login page with its content type', () => fails((answer) => {
   whole(answer);
   answer.body = Buffer.from('<!doctype html><title>Sign in</title>');
   answer.headers = { 'Content-Type': 'text/html; charset=utf-8' };
 }, 'NETWORK', /returned text\/html, not a model/));
-test('a tag that is weak now and then', () => serve((answer, n) => {
+test('a tag that is sometimes weak', () => serve((answer, n) => {
   answer.headers.ETag = n % 2 ? 'W/"1"' : '"1"';
 }, (url) => readAll(url)));
-test('always busy', () => fails((answer) => (answer.status = 503), 'NETWORK', /503/));
-test('busy now and then', () => serve((answer, n) => (n % 2 ? (answer.status = 503) : undefined), (url) => readAll(url)));
-test('connections that break now and then', () => serve((answer, n, response) => {
+test('a server that is always busy', () => fails((answer) => (answer.status = 503), 'NETWORK', /503/));
+test('a server that is sometimes busy', () => serve((answer, n) => (n % 2 ? (answer.status = 503) : undefined), (url) => readAll(url)));
+test('connections that sometimes break', () => serve((answer, n, response) => {
   if (n % 2)
     response.destroy();
   return n % 2 === 0;
@@ -123,16 +123,16 @@ test('a server that stalls in the middle of a body', () => fails((answer, n, res
   response.write(answer.body.subarray(0, 100));
   return false;
 }, 'NETWORK', /no data for/, { timeout: 100 }));
-test('bytes that were changed on the way are noticed', () => fails((answer, n) => {
+test('bytes changed during transfer are detected', () => fails((answer, n) => {
   if (n === 1)
     answer.body = Buffer.from(answer.body).fill(0, 3000, 3010);
 }, 'FORMAT', /checksum differs/));
-test('nobody there', async () => {
+test('no server', async () => {
   const url = await serve(undefined, (address) => address);
   await assert.rejects(readAll(url), (error) => error instanceof EbpoError && error.code === 'NETWORK' && /request failed/.test(error.message));
 });
 
-test('what a status means is said', async () => {
+test('HTTP statuses are explained', async () => {
   for (const [status, said] of [[401, /401.*requires a login/], [403, /403.*does not let this page.*access/], [404, /404.*no such file.*address/], [410, /410.*removed/],
     [416, /416.*is empty/], [418, /418/]])
     await fails((answer) => (answer.status = status), 'NETWORK', said);
@@ -140,7 +140,7 @@ test('what a status means is said', async () => {
 });
 
 let finish;
-test('the first answer is read from while it comes, and brings a small file whole', () => serve((answer, n, response) => {
+test('bytes of the first response are readable as they arrive, up to a whole small file', () => serve((answer, n, response) => {
   response.writeHead(206, answer.headers);
   response.write(answer.body.subarray(0, part));
   finish = () => response.end(answer.body.subarray(part));
@@ -157,7 +157,7 @@ test('the first answer is read from while it comes, and brings a small file whol
   assert.deepEqual(source.underway(), []);
 }));
 
-test('behind the first answer ranges are asked for, across its end only what it has not', () => serve(undefined, async (url, asked) => {
+test('requests beyond the first response fetch only missing bytes', () => serve(undefined, async (url, asked) => {
   const source = new UrlSource(url, { ahead: part });
   await source.open(100);
   assert.deepEqual(Buffer.from(await source.read(part - 4, 20)), bytes.subarray(part - 4, part + 16));
@@ -165,7 +165,7 @@ test('behind the first answer ranges are asked for, across its end only what it 
   assert.deepEqual(asked, [[0, part - 1], [part, part + 15], [part + 30, part + 49]]);
 }));
 
-// Each answer breaks off after 300 bytes until `broken` is 0.
+// Each response ends after 300 bytes until `broken` is 0.
 const breaking = (broken) => (answer, n, response) => {
   if (--broken < 0)
     return true;
@@ -173,14 +173,14 @@ const breaking = (broken) => (answer, n, response) => {
   response.write(answer.body.subarray(0, 300), () => setTimeout(() => response.destroy(), 20));
   return false;
 };
-test('a broken answer goes on where it ended', () => serve(breaking(2), async (url, asked) => {
+test('a broken response is continued at its end', () => serve(breaking(2), async (url, asked) => {
   const source = new UrlSource(url);
   assert.deepEqual(Buffer.from(await source.open(part)), bytes.subarray(0, part));
   assert.deepEqual(asked, [[0, part - 1], [300, part - 1], [600, part - 1]]);
 }));
 
 let dead = true;
-test('a patient source waits on a dead line, says why, and goes on when told', () => serve((answer, n, response) => {
+test('a patient source waits while the connection is lost, states the reason, and continues on retry', () => serve((answer, n, response) => {
   if (n > 1 && dead)
     response.destroy();
   return n === 1 || !dead;
@@ -200,7 +200,7 @@ test('a patient source waits on a dead line, says why, and goes on when told', (
   assert.equal(asked.filter(([from]) => from === 0).length, 1);
 }));
 
-test('told to try again, a stalled request is asked again, for its rest only; a closed source ends', () => serve((answer, n, response) => {
+test('retry repeats a stalled request for its rest only; a closed source ends', () => serve((answer, n, response) => {
   response.writeHead(206, answer.headers);
   response.write(answer.body.subarray(0, 100));
   return false;
@@ -218,7 +218,7 @@ test('told to try again, a stalled request is asked again, for its rest only; a 
   await reading;
 }));
 
-test('the cache may answer; an answer of another version is asked for again behind its back', async () => {
+test('the cache may respond; a response of another version is fetched again without the cache', async () => {
   const modes = [], answer = (from, to, tag) => new Response(bytes.subarray(from, to + 1), { status: 206, headers: { 'Content-Range': `bytes ${from}-${to}/${bytes.length}`, 'ETag': tag } });
   const fetch = async (url, { cache, headers }) => {
     const [from, to] = headers.Range.match(/\d+/g).map(Number);
@@ -234,14 +234,14 @@ test('the cache may answer; an answer of another version is asked for again behi
   await assert.rejects(source.read(300, 50), /was changed on the server/);
 });
 
-test('files and bytes are read alike', async () => {
+test('files and bytes are read', async () => {
   await readAll(new Blob([bytes]));
   await readAll(bytes);
   await readAll(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length));
   await assert.rejects(openEbpo(7), { code: 'ARGUMENT' });
 });
 
-// The index of chunks, which stands behind the first levels: fetched when it is needed, in one go; what the head says of its place is not relied on.
+// The chunk index is stored after the first levels. It is fetched in one request when it is needed. A wrong position in the header is tolerated.
 const indexed = readFileSync(new URL('../../../../format-spec/vectors/passed/11_two_chunks_of_faces.ebpo.h5', import.meta.url));
 async function openIndexed(change) {
   const whole = await openEbpo(indexed), { chunk_index_offset: at, chunk_index_bytes: size } = whole.info, asked = [];
@@ -258,18 +258,18 @@ async function openIndexed(change) {
   assert.equal(file.located, true);
   return { asked, at, size };
 }
-test('the index of chunks comes in one request', async () => {
+test('the chunk index needs one request', async () => {
   const { asked, at, size } = await openIndexed();
   assert.equal(asked.filter(([from, n]) => from < at + size && from + n > at).length, 1);
   assert.deepEqual(asked.find(([from]) => from === at), [at, size]);
 });
 for (const [what, offset, bytes] of [['nowhere', 0, 0], ['somewhere else', 100, 500], ['beyond the end', 1 << 30, 100], ['too short', undefined, 8]])
-  test(`the index of chunks, said to be ${what}`, () => openIndexed((info) => {
+  test(`the chunk index, stated to be ${what}`, () => openIndexed((info) => {
     info.chunk_index_offset = offset ?? info.chunk_index_offset;
     info.chunk_index_bytes = bytes;
   }));
 
-test('of requests side by side one goes by the cache, which would make them wait for each other', () => serve(undefined, async (url) => {
+test('only one of several concurrent requests uses the cache, which would serialize them', () => serve(undefined, async (url) => {
   const modes = [], file = await openEbpo(url, { headBytes: part, fetch: (address, init) => {
     modes.push(init.cache);
     return fetch(address, init);
@@ -280,7 +280,7 @@ test('of requests side by side one goes by the cache, which would make them wait
   await read(3);
   assert.deepEqual(modes, ['default', 'no-store', 'no-store', 'default']);
 }));
-test('what the first answer brings is not asked for again, and is known to come', () => serve(undefined, async (url, asked) => {
+test('bytes of the first response are not requested again, and are counted as coming', () => serve(undefined, async (url, asked) => {
   const ahead = bytes.length - 100, file = await openEbpo(url, { headBytes: part, ahead });
   assert.equal(file.source.coming, ahead);
   assert.deepEqual(Buffer.from(await file.source.read(part, ahead - part)), bytes.subarray(part, ahead));

@@ -1,4 +1,4 @@
-// The format's vectors: passed ones must be read as their .json says, failed ones must be refused.
+// Tests the format's vectors: files in passed must be read as in their .json files, and files in failed must be refused.
 import assert from 'node:assert/strict';
 import { readFileSync, readdirSync } from 'node:fs';
 import { join } from 'node:path';
@@ -9,7 +9,7 @@ import { readAll } from './as_json.js';
 const vectors = new URL('../../../../format-spec/vectors/', import.meta.url).pathname;
 const load = (folder, name) => readFileSync(join(vectors, folder, name));
 
-// All that is read of a file, attributes included, as one text.
+// Returns all data of a file, with attributes, as one text.
 const everything = async (bytes) => {
   const { info } = await openEbpo(bytes);
   return JSON.stringify([await readAll(bytes, 'damaged'), { ...info, parts: [...info.parts] }]);
@@ -18,7 +18,7 @@ const everything = async (bytes) => {
 const narrow = (value) => (typeof value === 'number' ? Math.fround(value) : Array.isArray(value) ? value.map(narrow) : value);
 
 for (const name of readdirSync(join(vectors, 'passed')).filter((n) => n.endsWith('.h5')))
-  test(`${name} is read as its json says`, async () => {
+  test(`${name} agrees with its .json file`, async () => {
     const wanted = JSON.parse(load('passed', name.replace('.ebpo.h5', '.json'))), found = await readAll(load('passed', name), name);
     if (found.coordinate_type === 'float32')
       for (const side of [wanted, found])
@@ -26,7 +26,7 @@ for (const name of readdirSync(join(vectors, 'passed')).filter((n) => n.endsWith
     assert.deepEqual(found, wanted);
   });
 
-// Attributes are not given, and so not looked at (section 18).
+// The reader does not return attributes, and therefore does not check them (section 18).
 for (const name of readdirSync(join(vectors, 'failed')).filter((n) => n.endsWith('.h5') && !n.startsWith('attributes_')))
   test(`${name} is refused`, async () => {
     const [status, said] = load('failed', name.replace('.ebpo.h5', '.txt')).toString().split('\n');
@@ -40,7 +40,7 @@ for (const name of readdirSync(join(vectors, 'failed')).filter((n) => n.endsWith
     });
   });
 
-test('1,500 damaged files give an error or the same content, never anything else', async () => {
+test('1,500 damaged files give an error or the same content', async () => {
   const names = readdirSync(join(vectors, 'passed')).filter((n) => n.endsWith('.h5')), right = new Map();
   for (const name of names)
     right.set(name, await everything(load('passed', name)));
@@ -56,5 +56,5 @@ test('1,500 damaged files give an error or the same content, never anything else
     });
     assert.ok(found === undefined || found === right.get(name), `${name}, damaged copy ${i}, is read as something else`);
   }
-  assert.ok(refused > 1000, String(refused)); // what is unused in a head may be damaged
+  assert.ok(refused > 1000, String(refused)); // damage in unused bytes of a header is not detected
 });
