@@ -80,7 +80,7 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, ebpo_array_id id
                                "the array's coding is not valid for this array", error);
     if (a->shape.rows != rows && rows != EBPO_ROWS_STATED)
         return ebpo_check_fail(&check, -1, a->path,
-                               "the array's length contradicts the counts in the head", error);
+                               "the array's length contradicts the counts in the header", error);
     if (!type_fits(&file->info, a, gates))
         return ebpo_check_fail(&check, -1, a->path,
                                "the array has the wrong type or the wrong number of columns",

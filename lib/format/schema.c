@@ -361,7 +361,7 @@ static ebpo_status check_types(const ebpo_check *check, const ebpo_info *info, i
     if (counts[EBPO_WHITE] != s->white_count || counts[EBPO_BLACK] != s->black_count ||
         counts[EBPO_LEAF] != s->leaf_count || counts[EBPO_GRAY] != s->gray_count)
         return ebpo_check_fail(check, level, "types",
-                               "the types do not add up to the counts in the head", error);
+                               "the types do not add up to the counts in the header", error);
     return EBPO_OK;
 }
 
@@ -464,7 +464,7 @@ static ebpo_status check_leaves(const ebpo_check *check, const ebpo_info *info, 
     }
     if (news != s->new_count || refs != s->ref_count)
         return ebpo_check_fail(check, level, "leaf_new",
-                               "the leaves' counts do not add up to those in the head", error);
+                               "the leaves' counts do not add up to those in the header", error);
     return EBPO_OK;
 }
 

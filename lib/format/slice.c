@@ -613,7 +613,7 @@ static ebpo_status measure_faces(ebpo_chunks *chunks, const range *r, ebpo_slice
         status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_NEW, r->level, first, count, &fresh, error);
     if (status == EBPO_OK && (refs > s->ref_count || fresh > s->new_count))
         status = ebpo_chunks_fail(chunks, r->level, EBPO_A_LEAF_NEW,
-                                  "the leaves' counts do not add up to those in the head", error);
+                                  "the leaves' counts do not add up to those in the header", error);
     out->refs += refs;
     out->new_faces += fresh;
     return status;

@@ -69,7 +69,7 @@ static ebpo_status sums_before(ebpo_chunks *chunks, uint64_t chunk, uint32_t col
         sums[k] = ebpo_load64(view.rows + ((chunk - view.begin) * cols + k) * 8);
         if (sums[k] > column_total(chunks->file, k, &exact) || (chunk == 0 && sums[k]))
             status = table_fails(chunks, EBPO_A_SUBTREE_INDEX,
-                                 "the sums contradict the counts in the head", error);
+                                 "the sums contradict the counts in the header", error);
     }
     ebpo_held_chunk_release(chunks, &view);
     return status;
@@ -453,7 +453,7 @@ static uint64_t level_has(const ebpo_chunks *chunks, const ebpo_subtree_row *row
            level_sum(chunks, row, level, what);
 }
 
-static const char *const contradicts = "the index contradicts the counts in the head";
+static const char *const contradicts = "the index contradicts the counts in the header";
 
 /* Reports a row that assigns nodes to the wrong subtree. The check_ functions below detect such a
  * row by counting nodes, as the sums do not show it. */
@@ -524,7 +524,7 @@ ebpo_status ebpo_ranks_check(const ebpo_chunks *chunks, int level, const uint64_
     for (int k = 0; k < 4; k++)
         if (ranks[k] > all[k] || counts[k] > all[k] - ranks[k])
             return ebpo_chunks_fail(chunks, level, EBPO_A_TYPES,
-                                    "the types contradict the counts in the head or the index",
+                                    "the types contradict the counts in the header or the index",
                                     error);
     return EBPO_OK;
 }

@@ -468,9 +468,9 @@ static ebpo_status resolve_facts(ebpo_plan *plan, const ebpo_write_options *opti
         bool one = !tree->mesh.xyz32 != !tree->mesh.xyz64;
         if (!one || !tree->mesh.faces || tree->mesh.vertex_count != info->vertex_count ||
             tree->mesh.face_count != info->face_count)
-            return ebpo_check_fail(check, -1, "/mesh",
-                                   "the mesh is missing or its counts differ from the facts",
-                                   error);
+            return ebpo_check_fail(
+                check, -1, "/mesh",
+                "the mesh is missing or its counts differ from those in the tree's info", error);
         info->double_coordinates = tree->mesh.xyz64 != NULL;
     }
     if (info->parts & EBPO_PART_MAPS && (!tree->vertex_source || !tree->face_source))

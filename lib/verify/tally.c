@@ -1,8 +1,8 @@
 /* Counts checks and violations of the verifier, and keeps the first violation of each kind.
  *
- * Each thread counts in a separate tally; tallies are merged. "First" is by position in the file:
- * level, octcode, face, plane, then by the text. So the report does not depend on which thread
- * finds a violation, or on the order of merging. */
+ * Each thread counts in a separate tally; tallies are merged. The first violation is the first by
+ * octcode, then by face, by plane and by text. So the report does not depend on which thread finds
+ * a violation, or on the order of merging. */
 #include "verify/tally.h"
 
 #include <inttypes.h>
@@ -22,7 +22,8 @@ static int compare_places(const ebpo_verify_place *a, const ebpo_verify_place *b
     return order != 0 ? order : compare_u64(a->plane, b->plane);
 }
 
-/* Prints "level 5, octcode 0o1234567, face 17, plane 2: ", as far as the place has these. */
+/* Prints "level 5, octcode 0o1234567, face 17, plane 2: " without the items that the place lacks.
+ * Returns the length. */
 static int print_place(char *out, size_t size, const ebpo_verify_place *place)
 {
     int length = 0;
@@ -45,7 +46,8 @@ static int print_place(char *out, size_t size, const ebpo_verify_place *place)
     return length;
 }
 
-/* Findings at one place are ordered by their text, so that merging does not depend on order. */
+/* Counts a violation, and keeps its text if it is the first. Violations at one place are ordered by
+ * their text, so that the result does not depend on the order of merging. */
 static void record_violation(ebpo_tally *tally, ebpo_verify_kind kind,
                              const ebpo_verify_place *place, const char *text)
 {
@@ -70,7 +72,7 @@ void ebpo_tally_violation(ebpo_tally *tally, ebpo_verify_kind kind, const ebpo_v
                           const char *format, ...)
 {
     if (tally->violations[kind] && compare_places(place, &tally->place[kind]) > 0) {
-        /* damaged files have millions of these: print only a text that is kept */
+        /* a damaged file may have millions of violations, so only a text to keep is printed */
         tally->violations[kind]++;
         return;
     }

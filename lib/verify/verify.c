@@ -1,15 +1,20 @@
-/* Verifies a file: runs all checks in order and makes the report. This folder checks the others: it
- * uses nothing of construct, of the writer or of query, and has separate vector functions. Cells,
- * half-spaces and clipping are computed in another way than in the builder; only the exact
- * predicates are shared (tests/lint/test_layers.py checks the folders).
+/* Verifies a file: runs all checks in order, and makes the report. The folder `verify` checks the
+ * results of other folders. It therefore uses no code of construct, of the writer or of query, and
+ * has separate vector functions. It computes cells, half-spaces and clipping with other methods
+ * than the builder; only the exact predicates are shared (tests/lint/test_layers.py checks the
+ * folders).
  *
- * The order: chunk directory and chunk checksums (verify_chunks.c), the content's checksum, the
- * consistency of the arrays; only then structure, nesting, colours, the walk (containment, lists,
- * labels), subtrees, and chunks of faces; last the source mesh and unused bytes. Damage that
- * reading reports is a violation, not an error of the call.
+ * The order of the checks:
+ * 1. chunk directory and chunk checksums (verify_chunks.c)
+ * 2. content checksum
+ * 3. consistency of the arrays; the checks in line 4 require it
+ * 4. structure, nesting, colours, the walk (containment, lists, labels), subtrees, chunks of faces
+ * 5. source mesh
+ * 6. unused bytes
+ * Damage that is found while reading is a violation, not an error of the call.
  *
- * Colours of gray nodes are checked here, from the root down. No byte is computed: two products
- * decide if it is the nearest to the mean. */
+ * Colours of gray nodes are checked in this file, from the root down. The mean colour is not
+ * rounded to a byte. Instead, two products decide if the stored byte is the nearest to the mean. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -31,17 +36,18 @@
 
 enum { NODES_A_TIME = 128 };
 
+/* Sums over the corners of faces. */
 typedef struct totals {
-    ebpo_wide of[4]; /* sums of weights times colours, and of weights; all three times */
+    ebpo_wide of[4]; /* weight times red, green and blue; weight */
 } totals;
 
 typedef struct node_check {
     ebpo_tally *tally;
     const ebpo_reference_tree *view;
     ebpo_colours colours;
-    bool by_face;
-    double longest; /* side of the root cell */
-    uint64_t leaves;
+    bool by_face;    /* use colours of faces, otherwise of vertices */
+    double longest;  /* longest side of the root cell */
+    uint64_t leaves; /* number of visited leaves */
 } node_check;
 
 static void add_corner(uint64_t weight, const uint8_t *rgba, totals *sum)
@@ -68,7 +74,7 @@ static void add_listed(const node_check *j, uint64_t face, totals *sum)
     }
     double squares = across[0] * across[0] + across[1] * across[1];
     double area = ldexp(sqrt(squares + across[2] * across[2]), 32);
-    /* faces beyond the root cell are reported elsewhere */
+    /* a larger face is beyond the root cell, which check_vertices reports */
     uint64_t weight = area < 0x1p40 ? (uint64_t)area + 1 : 1;
     for (uint64_t i = 0; i < 3; i++)
         add_corner(weight,
@@ -111,14 +117,14 @@ static void check_node(const node_check *j, const ebpo_reference_node *node, con
                              "its colour %06" PRIx32 " is not the mean of the faces below", colour);
 }
 
-static void judge_node(node_check *j, const ebpo_reference_node *node, totals *above)
+static void check_subtree_colours(node_check *j, const ebpo_reference_node *node, totals *above)
 {
     totals sum = { { { 0, 0 } } };
     if (node->type == EBPO_LEAF)
         add_list(j, node, &sum);
     for (unsigned octant = 0; octant < 8 && node->type == EBPO_GRAY; octant++) {
         ebpo_reference_node child = ebpo_reference_child(j->view, node, octant);
-        judge_node(j, &child, &sum);
+        check_subtree_colours(j, &child, &sum);
     }
     if (node->type == EBPO_GRAY)
         check_node(j, node, &sum);
@@ -135,8 +141,8 @@ static bool vertices_differ(const node_check *j)
     return false;
 }
 
-/* Checks the colours of a tree whose shape was checked. Does nothing if it has no mesh, its mesh
- * has no colours, or it is a subset. Fails with EBPO_E_MEMORY. */
+/* Checks the colours of a tree that has passed ebpo_check_shape. Does nothing if the tree is a
+ * subset or has no mesh, or if the mesh has no colours. Fails with EBPO_E_MEMORY. */
 static ebpo_status check_colours(ebpo_tally *tally, const ebpo_reference_tree *view,
                                  ebpo_error *error)
 {
@@ -152,14 +158,14 @@ static ebpo_status check_colours(ebpo_tally *tally, const ebpo_reference_tree *v
         j.longest = fmax(j.longest, view->box.size[k]);
     totals all = { { { 0, 0 } } };
     ebpo_reference_node root = ebpo_reference_root(view);
-    judge_node(&j, &root, &all);
+    check_subtree_colours(&j, &root, &all);
     ebpo_colours_free(&j.colours);
     return EBPO_OK;
 }
 
 /* --- the checks in order --- */
 
-/* `file`: the file of the tree, or NULL. */
+/* Runs all checks of a tree. `file`: the file of the tree, or NULL. */
 static ebpo_status verify_tree_of(ebpo_tally *tally, const ebpo_file *file, const ebpo_tree *tree,
                                   const ebpo_verify_options *options, ebpo_error *error)
 {
@@ -188,7 +194,7 @@ ebpo_status ebpo_verify_tree(ebpo_tally *tally, const ebpo_tree *tree,
     return verify_tree_of(tally, NULL, tree, options, error);
 }
 
-/* Returns true for a failure that is due to the file, not to this machine or call. */
+/* Returns true for a failure that the file causes, not this machine or the call. */
 static bool is_finding(ebpo_status status)
 {
     return status == EBPO_E_FORMAT || status == EBPO_E_VERSION || status == EBPO_E_LIMIT;
@@ -280,7 +286,7 @@ ebpo_status ebpo_verify(const ebpo_file *file, const ebpo_verify_options *option
     }
     ebpo_tally tally = { 0 };
     status = ebpo_check_places(&tally, file, options, error);
-    /* if chunks are not at the listed offsets, checksums add no information */
+    /* checksums are not meaningful if chunks are not at the listed offsets */
     if (status == EBPO_OK && tally.violations[EBPO_VERIFY_STRUCTURE] == 0)
         status = ebpo_check_checksums(&tally, file, error);
     if (status == EBPO_OK)

@@ -1,11 +1,13 @@
 /* Verifies how the file stores its chunks (format-spec/README.md, sections 7 and 20).
  *
- * - Chunks of faces with the coding `gates` are decoded by a second reader, which follows the
- *   specification line by line without regard to speed, and compared with the library's result.
- * - The directory of all chunks is compared with HDF5's own index.
- * - Unused bytes of the file are counted. They change no result, but a change of them must be
- *   detectable.
- * - Chunk checksums are compared with the chunks, which are read without the reader's check. */
+ * - Chunks of faces with the coding `gates` are decoded by a reference implementation, which
+ * follows the specification line by line and is not optimised. The corners are compared with the
+ * library's result.
+ * - The list of chunk offsets is compared with HDF5's indexes.
+ * - Unused bytes of the file are counted. They do not affect results, but a change of these bytes
+ *   must be detectable.
+ * - Chunk checksums are compared with the last bytes of the chunks, which are read without the
+ *   library's check. */
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
@@ -20,7 +22,7 @@
 #include "hdf5_read/head.h"
 #include "verify/verify_parts.h"
 
-/* --- a second reader of the coding gates --- */
+/* --- reference implementation of a reader of the coding `gates` --- */
 
 enum { OPEN_MAX = 64, NEAR = 32 };
 
@@ -79,7 +81,8 @@ static bool read_vertex(gates_reader *t, uint64_t *vertex)
     return true;
 }
 
-/* Returns the index of the newest open edge with that end, or count if there is none. */
+/* Returns the index of the newest open edge that begins (`first`) or ends at the vertex, or
+ * t->count if there is none. */
 static size_t newest_edge(const gates_reader *t, bool first, uint64_t vertex)
 {
     for (size_t i = t->count; i > 0; i--)
@@ -159,18 +162,18 @@ bool ebpo_plain_gates_read(const uint8_t *in, uint32_t rows, uint64_t *seen, uin
     t.seen = *seen;
     for (uint32_t i = 0; i < rows; i++) {
         uint64_t face[3];
-        bool fine = true;
+        bool ok = true;
         if (in[i]) {
-            fine = read_across(&t, in[i], *third++, face);
+            ok = read_across(&t, in[i], *third++, face);
         } else {
-            for (int k = 0; k < 3 && fine; k++)
-                fine = read_vertex(&t, &face[k]);
-            for (int k = 0; k < 3 && fine; k++)
+            for (int k = 0; k < 3 && ok; k++)
+                ok = read_vertex(&t, &face[k]);
+            for (int k = 0; k < 3 && ok; k++)
                 open_edge(&t, face[(k + 1) % 3], face[k]);
         }
-        for (int k = 0; k < 3 && fine; k++)
+        for (int k = 0; k < 3 && ok; k++)
             faces[3 * i + (uint32_t)k] = (uint32_t)face[k];
-        if (!fine)
+        if (!ok)
             return false;
     }
     for (; t.more < t.end; t.more++)
@@ -180,7 +183,7 @@ bool ebpo_plain_gates_read(const uint8_t *in, uint32_t rows, uint64_t *seen, uin
     return true;
 }
 
-/* --- comparison of gates with the reader --- */
+/* --- comparison of the corners with those of the library --- */
 
 enum { CORNERS_MAX = EBPO_CHUNK_BYTES_MAX / 4 };
 
@@ -226,16 +229,17 @@ ebpo_status ebpo_check_gates(ebpo_tally *tally, const ebpo_file *file, const ebp
     return status;
 }
 
-/* --- the chunk directory --- */
+/* --- the list of chunk offsets --- */
 
 #define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
 
-/* An array as HDF5 reports it, and the number of its chunks listed so far. */
+/* An array and its chunks in HDF5's index. */
 typedef struct indexed {
     const ebpo_array_in *array;
-    uint32_t number;
+    uint32_t number; /* the array's number in the list */
     ebpo_chunk_location *chunks;
-    uint64_t count, listed;
+    uint64_t count;  /* number of chunks in HDF5's index */
+    uint64_t listed; /* number of chunks in the list so far */
 } indexed;
 
 enum { LIMIT = EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS };
@@ -247,10 +251,12 @@ typedef struct places_comparison {
     indexed array[LIMIT];
     unsigned arrays;
     uint64_t *list, rows;
-    uint64_t top; /* end of the bytes that a subtree look-up reads */
+    uint64_t top; /* end of the bytes with which a reader locates a subtree */
 } places_comparison;
 
-/* Numbers arrays as the specification does: 64 a level; then the mesh, the maps, the table. */
+/* Reads HDF5's index of an array that is present. `number`: the array's number in the
+ * specification, which has 64 numbers for each level, then those of the mesh, the maps and the
+ * table. */
 static ebpo_status index_array(places_comparison *c, const ebpo_array_in *array, uint32_t number,
                                ebpo_error *error)
 {
@@ -327,7 +333,7 @@ static void compare_row(places_comparison *c, uint64_t row, uint64_t at, uint32_
     if (!of) {
         CHECK(number >= 4096,
               "/subtrees/places, row %" PRIu64 ": number %" PRIu32
-              " is of an array that is not in the file",
+              " is that of an array that is not in the file",
               row, number);
         return;
     }
@@ -359,7 +365,7 @@ static void compare_directory(places_comparison *c)
               c->array[i].listed, c->array[i].count, c->array[i].array->path);
     uint64_t top = c->file->info.top_bytes;
     CHECK(top == 0 || (top >= c->top && top <= c->file->info.file_bytes),
-          "top_bytes states %" PRIu64 ", but a subtree look-up reads up to %" PRIu64, top, c->top);
+          "top_bytes states %" PRIu64 ", but locating a subtree reads up to %" PRIu64, top, c->top);
 }
 
 ebpo_status ebpo_check_places(ebpo_tally *tally, const ebpo_file *file,
@@ -464,7 +470,7 @@ static int by_offset(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Counts the bytes of a gap that are not zero. The gap may be nearly all of a large file. */
+/* Counts the bytes of a gap that are not zero. The gap may be large, so it is read in pieces. */
 static ebpo_status inspect_gap(const survey *s, ebpo_range gap, uint64_t *filled, ebpo_error *error)
 {
     enum { PIECE = 1 << 14 };
@@ -523,7 +529,7 @@ ebpo_status ebpo_count_spare(const ebpo_file *file, const ebpo_progress *progres
     if (status == EBPO_OK)
         status = inspect_gaps(&s, spare, filled, &own);
     free(s.range);
-    /* damage is reported by the checks that read the data */
+    /* the checks that read the data report damage */
     return status == EBPO_OK || status == EBPO_E_FORMAT ? EBPO_OK : ebpo_fail_with(error, &own);
 }
 
@@ -538,7 +544,7 @@ typedef struct checksum_comparison {
     uint64_t rows;
 } checksum_comparison;
 
-/* Returns an array's number as the specification defines it. */
+/* Returns an array's number in the specification, or UNKNOWN. */
 static uint32_t number_of(const ebpo_array_in *a)
 {
     switch (a->id) {
@@ -568,8 +574,8 @@ static ebpo_status compare_sum(checksum_comparison *c, const ebpo_array_in *a, u
                                          at.address + at.bytes - SUM_BYTES, SUM_BYTES, end, error);
     if (status == EBPO_OK)
         CHECK(ebpo_load32(end) == (uint32_t)c->list[row],
-              "%s, chunk %" PRIu64 ": /chunk_sums, row %" PRIu64 ", says %08" PRIx32
-              ", but it ends with %08" PRIx32,
+              "%s, chunk %" PRIu64 ": /chunk_sums, row %" PRIu64 ", contains %08" PRIx32
+              ", but the chunk ends with %08" PRIx32,
               a->path, chunk, row, (uint32_t)c->list[row], ebpo_load32(end));
     return status;
 }
@@ -609,7 +615,7 @@ ebpo_status ebpo_check_checksums(ebpo_tally *tally, const ebpo_file *file, ebpo_
     const ebpo_array_in *a = &file->root_array[EBPO_A_CHUNK_CHECKSUMS];
     ebpo_error own = EBPO_ERROR_INIT;
     uint64_t *list = NULL;
-    /* in a remote file each chunk would take a request: the reader's check must be enough there */
+    /* In a remote file each chunk would take a request. There, only the library's check is made. */
     if (!file->has_checksums || ebpo_input_expects(&ebpo_reader_own(file)->in))
         return EBPO_OK;
     ebpo_status status = ebpo_file_locate(file, NULL, &own);

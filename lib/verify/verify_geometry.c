@@ -1,10 +1,13 @@
-/* Decides if a face touches a cell, if a face's part in a cell respects the node's planes, and how
- * often a ray crosses a face. Floating point with error bounds decides most cases; the rest uses
- * rationals (GMP), so every result is exact. Only the exact predicates are shared with the builder.
+/* Decides three questions exactly: if a face touches a cell, if the part of a face in a cell
+ * satisfies the node's planes, and how a ray crosses a face. Floating point with error bounds
+ * decides most cases; the others use rationals (GMP). Only the exact predicates are shared with the
+ * builder.
  *
- * The parts, each with its method: clipping in rationals (Sutherland and Hodgman, "Reentrant
- * polygon clipping", 1974), separating axes (Gottschalk, Lin and Manocha, "OBBTree", 1996), winding
- * numbers by rays, containment by weak duality. */
+ * The methods, in the order of this file:
+ * - clipping in rationals (Sutherland and Hodgman, "Reentrant polygon clipping", 1974)
+ * - separating axes (Gottschalk, Lin and Manocha, "OBBTree", 1996)
+ * - winding numbers by rays
+ * - containment by weak duality */
 #include "core/strict_fp.h"
 
 #include <gmp.h>
@@ -14,7 +17,7 @@
 #include "mesh/mesh_parts.h"
 #include "verify/verify_geometry.h"
 
-enum { CORNERS = 9 }; /* three, and at most one more for each cell face */
+enum { CORNERS = 9 }; /* of a clipped face: three, and at most one more for each cell face */
 
 typedef struct polygon {
     int count;
@@ -55,13 +58,15 @@ static void set_triangle(polygon *g, const double low[3], const double high[3],
     mpq_clears(first, size, NULL);
 }
 
-/* Returns true if a corner is on the inner side of a cell face: at least 0, or at most 1. */
+/* Returns true if a coordinate is on the inner side of a cell face. cell_face 0: at least 0;
+ * cell_face 1: at most 1. */
 static bool exact_within(const mpq_t x, int cell_face)
 {
     return cell_face == 0 ? mpq_sgn(x) >= 0 : mpq_cmp_ui(x, 1, 1) <= 0;
 }
 
-/* Appends the point where a-b crosses the cell face; exactly one of the two is within. */
+/* Appends the point at which the segment from a to b crosses the cell face. Exactly one of a and b
+ * is on the inner side. */
 static void append_crossing(polygon *out, mpq_t a[3], mpq_t b[3], int axis, int cell_face)
 {
     mpq_t t, part;
@@ -97,7 +102,7 @@ static void exact_clip(polygon *out, polygon *in, int axis, int cell_face)
     }
 }
 
-/* Stores the intersection in *g. */
+/* Stores the intersection of face and box in *g. */
 static void clip_to_box(polygon *g, const double low[3], const double high[3],
                         const ebpo_corners *face)
 {
@@ -148,18 +153,18 @@ bool ebpo_exact_half_space(const double low[3], const double high[3], const ebpo
     return holds;
 }
 
-/* Separating axes (Gottschalk, Lin and Manocha, "OBBTree", 1996): the box's normals, the face's
- * normal, and the products of their edges. These suffice for a box and a triangle, also one without
- * area. */
+/* Separating axes (Gottschalk, Lin and Manocha, "OBBTree", 1996): the normals of the box, the
+ * normal of the face, and the cross products of an edge of the box with an edge of the face. These
+ * axes are sufficient for a box and a triangle, which may have no area. */
 
 static const double eps = 0x1p-53;
-static const double slack = 0x1p-900; /* covers underflow */
+static const double slack = 0x1p-900; /* error bound of underflow */
 
 /* Corners of a face in cell coordinates. The error of each coordinate is at most 4 * 2^-53 of its
  * absolute value (plus 2^-1000). */
 typedef struct local_face {
     double at[3][3];
-    double reach[3];    /* largest absolute coordinate on each axis, at least 1 */
+    double largest[3];  /* largest absolute coordinate on each axis, at least 1 */
     unsigned contained; /* bit i: corner i is in the closed cell; exact */
 } local_face;
 
@@ -180,19 +185,19 @@ static void local_make(local_face *out, const ebpo_frame *frame, const ebpo_corn
 {
     out->contained = 0;
     for (int k = 0; k < 3; k++)
-        out->reach[k] = 1;
+        out->largest[k] = 1;
     for (int i = 0; i < 3; i++) {
         for (int k = 0; k < 3; k++) {
             double x = (face->at[i][k] - frame->low[k]) * frame->inverse[k];
             out->at[i][k] = x;
-            out->reach[k] = fabs(x) > out->reach[k] ? fabs(x) : out->reach[k];
+            out->largest[k] = fabs(x) > out->largest[k] ? fabs(x) : out->largest[k];
         }
         out->contained |= (unsigned)ebpo_corner_in_cell(frame, face->at[i]) << i;
     }
 }
 
-/* Compares the intervals [a, b] of the face and [low, high] of the box on an axis; the error of
- * each end is at most `error`. NaN compares false: unsure. */
+/* Compares the intervals [a, b] of the face and [low, high] of the box on an axis. The error of
+ * each end is at most `error`. Returns UNSURE for NaN. */
 static verdict compare_intervals(double a, double b, double low, double high, double error)
 {
     if (a > high + error || b < low - error)
@@ -202,27 +207,27 @@ static verdict compare_intervals(double a, double b, double low, double high, do
     return UNSURE;
 }
 
-/* Returns (b - a) * inverse, 0 only when a and b are equal; NaN (so never sure) where it is too
- * small to compute with. */
+/* Returns (b - a) * inverse. The result is 0 only when a and b are equal. Returns NaN, which makes
+ * the comparison UNSURE, if the value is too small for exact bounds. */
 static double scaled_difference(double a, double b, double inverse)
 {
     double x = (b - a) * inverse;
     return a != b && fabs(x) < 0x1p-400 ? NAN : x;
 }
 
-/* Compares on the axis edge x (unit vector k), edge from corner i to j, l being the third corner.
- */
+/* Compares the intervals on the cross product of an edge of the face and the unit vector k. The
+ * edge begins at corner i; l is the corner opposite to the edge. */
 static verdict edge_axis(const local_face *p, const double edge[3], int i, int l, int k)
 {
     int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
     double eu = edge[u], ev = edge[v];
     if (eu == 0 && ev == 0)
-        return INTERSECT; /* the edge runs along k: no axis */
+        return INTERSECT; /* the edge is parallel to k, so the cross product is no axis */
     double a = ev * p->at[i][u] - eu * p->at[i][v];
     double b = ev * p->at[l][u] - eu * p->at[l][v];
     double low = (ev < 0 ? ev : 0) - (eu > 0 ? eu : 0),
            high = (ev > 0 ? ev : 0) - (eu < 0 ? eu : 0);
-    double error = 32 * eps * (fabs(ev) * p->reach[u] + fabs(eu) * p->reach[v]) + slack;
+    double error = 32 * eps * (fabs(ev) * p->largest[u] + fabs(eu) * p->largest[v]) + slack;
     return compare_intervals(a < b ? a : b, a < b ? b : a, low, high, error);
 }
 
@@ -236,12 +241,13 @@ static verdict normal_axis(const local_face *p, double edge[3][3])
         value += n * p->at[0][k];
         low += n < 0 ? n : 0;
         high += n > 0 ? n : 0;
-        error += 32 * eps * (fabs(left) + fabs(right)) * p->reach[k];
+        error += 32 * eps * (fabs(left) + fabs(right)) * p->largest[k];
     }
     return compare_intervals(value, value, low, high, error);
 }
 
-/* Compares on the axes other than the box's normals, which the caller decided exactly. */
+/* Compares the intervals on all axes except the normals of the box, which the caller has compared
+ * exactly. */
 static verdict separating_axes(const ebpo_frame *frame, const ebpo_corners *face)
 {
     local_face p;
@@ -278,10 +284,10 @@ bool ebpo_face_touches(const ebpo_frame *frame, const ebpo_corners *face, ebpo_t
     return ebpo_exact_touches(frame->low, frame->high, face);
 }
 
-/* Seen along the axis, a face winds around the ray once or not at all: the edges that cross a
- * half-line beside the point are counted. The half-line is along the axis of the larger shift. So
- * the smaller shift decides on which side the ends of an edge are, and the larger one all remaining
- * ties. */
+/* Winding numbers by rays. In a projection along the axis, a face winds around the ray once or not
+ * at all. To decide this, the edges that cross a half-line from the point are counted. The
+ * half-line is along the axis of the larger shift. The smaller shift therefore decides on which
+ * side of the half-line an end of an edge is, and the larger shift decides all remaining ties. */
 
 void ebpo_face_corners(const ebpo_mesh *mesh, uint64_t face, ebpo_corners *out)
 {
@@ -295,7 +301,8 @@ static int orient_in(int u, int v, const double a[3], const double b[3], const d
                          (double[2]){ c[u], c[v] });
 }
 
-/* Returns the turns of the face around p seen in the plane (u, v), counter-clockwise positive. */
+/* Returns how often the face, projected to the plane (u, v), winds around p: 1 counter-clockwise,
+ * -1 clockwise, 0 not at all. */
 static int turns_around(const double p[3], int u, int v, const ebpo_corners *face)
 {
     int sum = 0;
@@ -313,8 +320,8 @@ static int turns_around(const double p[3], int u, int v, const ebpo_corners *fac
     return sum;
 }
 
-/* Returns the side of the face's plane of the shifted p: a tie is decided by the first nonzero
- * component of the normal. */
+/* Returns the side of the face's plane on which the shifted p is. If p is in the plane, the first
+ * nonzero component of the normal decides. */
 static int shifted_side(const double p[3], const ebpo_corners *face)
 {
     const double *a = face->at[0], *b = face->at[1], *c = face->at[2];
@@ -342,17 +349,21 @@ int ebpo_ray_hit(const double p[3], int axis, const ebpo_corners *face)
         return 0;
     int turn = turns_around(p, u, v, face);
     if (axis == 1)
-        turn = -turn; /* (x, z) is left-handed seen along y */
+        turn = -turn; /* the projection (x, z) along y is left-handed */
     if (turn == 0 || (a > x && b > x && c > x))
         return turn;
     return shifted_side(p, face) == -turn ? turn : 0;
 }
 
-/* The extent in direction n of a face's part in its cell is a linear program. By weak duality, for
- * any vector m, n . x <= max over the face's corners of (n - m) . v  +  max over the unit cube of m
- * . x. Some m makes it an equality: 0, or one that levels n on an edge of the face by one cell
- * face, or on the face by two. So rounded m still give certain bounds, and nothing has to be
- * clipped. Undecided cases are clipped in rationals. */
+/* Containment. The greatest n . x over the part of a face in its cell is the value of a linear
+ * program. By weak duality, every vector m gives an upper bound:
+ *
+ *     n . x <= (max of (n - m) . v over the face's corners v) + (max of m . y over the unit cube)
+ *
+ * The bound is attained for one of these m: 0; m along one axis such that n - m is perpendicular to
+ * an edge of the face; m along two axes such that n - m is normal to the face. A rounded m gives a
+ * valid bound as well, so the face need not be clipped. Undecided cases are clipped in rationals.
+ */
 
 void ebpo_node_planes_of(ebpo_node_planes *out, const ebpo_reference_tree *view,
                          const ebpo_reference_node *node)
@@ -384,19 +395,19 @@ static double highest_corner(const local_face *face, const double n[3])
     return fmax(a, fmax(b, c));
 }
 
-/* Checks the bound above for one m, rounding included. */
+/* Returns true if the upper bound for m, including rounding errors, is at most `bound`. */
 static bool is_certified(const local_face *face, const double n[3], const double m[3], double bound)
 {
     double rest[3], cube = 0, size = 0;
     for (int k = 0; k < 3; k++) {
         rest[k] = n[k] - m[k];
         cube += m[k] > 0 ? m[k] : 0;
-        size += (fabs(n[k]) + fabs(m[k])) * face->reach[k];
+        size += (fabs(n[k]) + fabs(m[k])) * face->largest[k];
     }
     return highest_corner(face, rest) + cube + 16 * eps * size <= bound;
 }
 
-/* Tries m along one axis, so that n - m is level along an edge. */
+/* Tries m along one axis such that n - m is perpendicular to an edge of the face. */
 static bool certified_by_cell_face(const local_face *face, const double n[3], double bound)
 {
     for (int i = 0; i < 3; i++) {
@@ -413,7 +424,7 @@ static bool certified_by_cell_face(const local_face *face, const double n[3], do
     return false;
 }
 
-/* Tries m along two axes, so that n - m is normal to the face. */
+/* Tries m along two axes such that n - m is normal to the face. */
 static bool certified_by_two_cell_faces(const local_face *face, const double n[3], double bound)
 {
     double p[3], q[3], normal[3];
@@ -433,8 +444,7 @@ static bool certified_by_two_cell_faces(const local_face *face, const double n[3
     return false;
 }
 
-/* Returns true if a corner of the face is in the cell and surely beyond the plane: no rationals are
- * needed. */
+/* Returns true if a corner of the face is in the cell and certainly beyond the plane. */
 static bool corner_beyond(const local_face *face, const double n[3], double bound, double error)
 {
     for (int i = 0; i < 3; i++)
@@ -443,12 +453,14 @@ static bool corner_beyond(const local_face *face, const double n[3], double boun
     return false;
 }
 
+/* Returns true if plane i cuts off no point of the face in the cell. */
 static bool face_keeps(ebpo_tally *tally, const ebpo_node_planes *planes, int i,
                        const ebpo_frame *frame, const ebpo_corners *face, const local_face *local)
 {
     const double *n = planes->n[i];
     double bound = planes->bound[i],
-           error = 16 * eps * 511 * fmax(local->reach[0], fmax(local->reach[1], local->reach[2]));
+           error =
+               16 * eps * 511 * fmax(local->largest[0], fmax(local->largest[1], local->largest[2]));
     if (highest_corner(local, n) <= bound - error)
         return true;
     if (corner_beyond(local, n, bound, error))

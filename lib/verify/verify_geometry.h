@@ -1,5 +1,5 @@
 /* Exact tests of faces against cells and planes, and winding numbers by rays (verify_geometry.c).
- * Pure; any thread. */
+ * Any thread may call these functions. */
 #ifndef EBPO_VERIFY_VERIFY_GEOMETRY_H
 #define EBPO_VERIFY_VERIFY_GEOMETRY_H
 
@@ -12,9 +12,9 @@
 #include "verify/tally.h"
 #include "verify/verify_tree.h"
 
-/* --- rationals: slow, exact --- */
+/* --- tests in rationals: exact and slow --- */
 
-/* A face: corners in the model's coordinates, exact. */
+/* A face: its corners in the model's coordinates, exact. */
 typedef struct ebpo_corners {
     double at[3][3];
 } ebpo_corners;
@@ -22,14 +22,14 @@ typedef struct ebpo_corners {
 /* Returns true when the closed face intersects the closed box [low, high]. */
 bool ebpo_exact_touches(const double low[3], const double high[3], const ebpo_corners *face);
 
-/* Returns true when every point of the face in the closed box satisfies 4096 * (n . xi) <= d, xi =
- * (point - low) / (high - low). */
+/* Returns true when every point of the face in the closed box satisfies 4096 * (n . xi) <= d, where
+ * xi = (point - low) / (high - low). */
 bool ebpo_exact_half_space(const double low[3], const double high[3], const ebpo_corners *face,
                            const int32_t n[3], int32_t d);
 
-/* --- floating point with error bounds, rationals when in doubt --- */
+/* --- tests in floating point with error bounds; undecided cases use rationals --- */
 
-/* A cell: the coordinates of its faces (exact) and the reciprocals of its sizes (rounded). */
+/* A cell: the coordinates of its cell faces (exact), and the reciprocals of its sizes (rounded). */
 typedef struct ebpo_frame {
     double low[3], high[3], inverse[3];
 } ebpo_frame;
@@ -42,16 +42,16 @@ static inline bool ebpo_corner_in_cell(const ebpo_frame *frame, const double p[3
            p[1] <= frame->high[1] && p[2] >= frame->low[2] && p[2] <= frame->high[2];
 }
 
-/* Returns, exactly, true if the closed triangle and the closed cell have a common point. Counts the
- * tests in rationals. */
+/* Returns true if the closed triangle and the closed cell have a common point. The result is exact.
+ * Counts tests in rationals in the tally. */
 bool ebpo_face_touches(const ebpo_frame *frame, const ebpo_corners *face, ebpo_tally *tally);
 
-/* Winding numbers by rays, from orientation signs only.
+/* --- winding numbers by rays, from orientation signs only ---
  *
  * A point is shifted by (d0, d1, d2), infinitely small and positive, d0 >> d1 >> d2, as the format
- * defines for the corners of cells. The ray has direction +axis; far out the winding number is 0.
- * So a point's winding number is the sum over the faces that its ray crosses: +1 when the ray
- * leaves through the face (along its normal), -1 when it enters. */
+ * defines for the corners of cells. The ray has direction +axis. Far from the model the winding
+ * number is 0. So a point's winding number is a sum over the faces that its ray crosses: +1 if the
+ * ray crosses the face along its normal, -1 if it crosses against the normal. */
 
 /* Returns the face's exact contribution to the winding number of p: -1, 0 or 1. */
 int ebpo_ray_hit(const double p[3], int axis, const ebpo_corners *face);
@@ -59,12 +59,12 @@ int ebpo_ray_hit(const double p[3], int axis, const ebpo_corners *face);
 /* Returns the corners of a face of a mesh. */
 void ebpo_face_corners(const ebpo_mesh *mesh, uint64_t face, ebpo_corners *out);
 
-/* --- containment: the node's planes cut off no point of a face in the cell, and no inside corner
- * --- */
+/* --- containment: a node's planes must not cut off a point of a face in the cell, or a corner of
+ * the cell that is in the solid --- */
 
 enum { EBPO_NODE_PLANES_MAX = 255 }; /* counts are bytes */
 
-/* A node's own planes, decoded. Invalid codes are omitted (they are violations elsewhere). */
+/* The planes stored for a node, decoded. Invalid codes are omitted; check_nesting reports them. */
 typedef struct ebpo_node_planes {
     int count;
     double n[EBPO_NODE_PLANES_MAX][3], bound[EBPO_NODE_PLANES_MAX]; /* n . xi <= bound; exact */
@@ -75,12 +75,13 @@ typedef struct ebpo_node_planes {
 void ebpo_node_planes_of(ebpo_node_planes *out, const ebpo_reference_tree *view,
                          const ebpo_reference_node *node);
 
-/* Checks a face that touches the cell. */
+/* Checks a face that touches the cell against all planes. `number`: the face's index. */
 void ebpo_check_face_contained(ebpo_tally *tally, const ebpo_node_planes *planes,
                                const ebpo_reference_node *node, const ebpo_frame *frame,
                                const ebpo_corners *face, uint64_t number);
 
-/* Checks cell corners, bit i for corner i (bit 0 x, bit 1 y, bit 2 z). */
+/* Checks corners of the cell against all planes. `corners`: bit i is set for corner i. Bits 0, 1
+ * and 2 of a corner's number are set for the upper end in x, y and z. */
 void ebpo_check_corners_contained(ebpo_tally *tally, const ebpo_node_planes *planes,
                                   const ebpo_reference_node *node, unsigned corners);
 

@@ -1,14 +1,14 @@
-/* Verifies labels: the winding numbers of cells. Two proofs:
+/* Verifies labels, which are the winding numbers of cells, in two independent ways:
  *
- * - By links, for all cells: equal points must have equal winding numbers in all cells.
- *   A cell without faces has one winding number for all its corners. A leaf stores the winding
- *   number of its lowest corner; the numbers of the other corners follow from signed crossings
- *   along the cell's edges. The 64 corners of a gray node's children are 27 points. The root's
- * corners are outside. This links every cell to the root, so all winding numbers are right when all
- * links hold and the lists are complete (verify_lists.c).
- * - By rays through the whole mesh, for all cells or an even sample, without the links. The
- *   points are sorted into columns along x, and each face visits the points that it is in front of.
- *   Thus faces are visited once, in their order, and only the points are in memory. */
+ * - By links, for all cells. A point must have the same winding number in all cells of which it is
+ * a corner. A cell without faces has one winding number for all its corners. A leaf stores the
+ *   winding number of its lowest corner; those of the other corners follow from signed crossings
+ *   along the cell's edges. The 64 corners of a gray node's children are 27 points. The corners of
+ *   the root have the winding number 0. These links connect every cell to the root. All winding
+ *   numbers are right if all links hold and the lists are complete (verify_lists.c).
+ * - By rays through the whole mesh, for all cells or an even sample. The points are sorted into
+ *   columns along x. Each face is tested against the points in its columns. Faces are therefore
+ * read once, in their order, and only the points are in memory. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -27,7 +27,7 @@
 
 enum { SIDE_MAX = 2048, FACE_GRAIN = 1 << 14 };
 
-/* A grid of columns seen along x: cell (y, z). */
+/* A grid of columns along x, side by side in y and z. */
 typedef struct columns {
     const ebpo_mesh *mesh;
     double low[2], scale[2];
@@ -57,7 +57,8 @@ static columns grid_for(const ebpo_mesh *mesh, const ebpo_box *box, uint64_t cou
     return c;
 }
 
-/* Monotone, so that a point in a face's range of coordinates is in its range of columns. */
+/* Returns the column of a coordinate, y if i is 0 or z if i is 1. The function is monotone, so a
+ * point within a face's range of coordinates is also within its range of columns. */
 static uint64_t column_of(const columns *c, int i, double x)
 {
     double at = (x - c->low[i]) * c->scale[i] * (double)c->side;
@@ -89,7 +90,7 @@ static column_range columns_of_face(const columns *c, const ebpo_corners *face)
     return range;
 }
 
-/* Sorts the points by column; points of a column keep their order, which does not matter. */
+/* Sorts the points by column. */
 static ebpo_status sort_points(columns *c, ebpo_ray_points *points, ebpo_error *error)
 {
     uint64_t cells = c->side * c->side;
@@ -108,7 +109,7 @@ static ebpo_status sort_points(columns *c, ebpo_ray_points *points, ebpo_error *
     }
     EBPO_FOR_ITEMS_SCATTERED(points->workspace, i, 0, points->count)
         sorted[c->first[column_of_point(c, &points->point[i])]++] = points->point[i];
-    /* each was advanced to the beginning of the next one */
+    /* each `first` has been advanced to the start of the next column */
     memmove(c->first + 1, c->first, cells * sizeof *c->first);
     c->first[0] = 0;
     ebpo_array_free(points->workspace, points->point);
@@ -117,7 +118,8 @@ static ebpo_status sort_points(columns *c, ebpo_ray_points *points, ebpo_error *
     return EBPO_OK;
 }
 
-/* Several threads may update one point. */
+/* Adds a face's contributions to the winding numbers of points [begin, end). Several threads may
+ * update one point. */
 static void count_hits(const columns *c, const ebpo_corners *face, uint64_t begin, uint64_t end)
 {
     for (uint64_t i = begin; i < end; i++) {
@@ -133,12 +135,12 @@ static ebpo_status follow_faces(void *context, uint64_t begin, uint64_t end, uns
     const columns *c = context;
     (void)worker;
     (void)error;
-    uint64_t rows = 0; /* jumps between rows */
+    uint64_t rows = 0; /* number of visited rows of columns, each elsewhere in memory */
     for (uint64_t f = begin; f < end; f++) {
         ebpo_corners face;
         ebpo_face_corners(c->mesh, f, &face);
         column_range r = columns_of_face(c, &face);
-        /* the columns of a row are adjacent */
+        /* the columns with the same z are adjacent */
         for (uint64_t z = r.from[1]; z <= r.to[1]; z++) {
             count_hits(c, &face, c->first[z * c->side + r.from[0]],
                        c->first[z * c->side + r.to[0] + 1]);
@@ -163,12 +165,12 @@ ebpo_status ebpo_rays_follow(ebpo_ray_points *points, const ebpo_mesh *mesh, con
     return status;
 }
 
-/* Estimates how many points all faces would visit if `count` points were spread evenly over the
- * box. */
+/* Estimates the number of tests of a face against a point if `count` points were spread evenly over
+ * the box. */
 static double rays_work(const ebpo_mesh *mesh, const ebpo_box *box, uint64_t count)
 {
     columns c = grid_for(mesh, box, count);
-    uint64_t covered = 0; /* number of columns, over all faces */
+    uint64_t covered = 0; /* sum over all faces of the number of their columns */
     EBPO_FOR_ITEMS(mesh->workspace, f, 0, mesh->face_count) {
         ebpo_corners face;
         ebpo_face_corners(mesh, f, &face);
@@ -178,10 +180,10 @@ static double rays_work(const ebpo_mesh *mesh, const ebpo_box *box, uint64_t cou
     return (double)covered * (double)count / (double)(c.side * c.side);
 }
 
-/* --- which cells are checked by rays --- */
+/* --- selection of the cells to check by rays --- */
 
 enum { SAMPLES_LEAST = 4096, SAMPLES_MANY = 1 << 20, CELLS_ALL = 1 << 22 };
-/* Most points that all faces visit: some seconds. */
+/* Maximum number of tests of a face against a point by default, which take some seconds. */
 static const double ray_work_affordable = 4e8;
 
 static uint64_t default_samples(const ebpo_reference_tree *view, uint64_t cells)
@@ -221,14 +223,15 @@ void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_reference_tree *view
         }
 }
 
-/* Returns true for `take` of the `cells` ranks, evenly spread. */
+/* Returns true if the node's rank is one of the `take` selected ranks, which are evenly spread over
+ * the `cells` ranks of its level and type. */
 static bool is_planned(const ebpo_label_plan *plan, const ebpo_reference_node *node)
 {
     uint64_t cells = plan->cells[node->cell.level][node->type],
              take = plan->take[node->cell.level][node->type];
     if (take >= cells)
         return true;
-    /* (rank + 1) * take / cells is another integer than rank * take / cells */
+    /* true if (rank + 1) * take / cells and rank * take / cells, rounded down, are different */
     return ebpo_wide_modulo(ebpo_wide_product(node->rank, take), cells) >= cells - take;
 }
 
@@ -240,13 +243,15 @@ static void corner_position(const ebpo_frame *frame, unsigned corner, double out
         out[k] = corner >> k & 1 ? frame->high[k] : frame->low[k];
 }
 
-/* Changes of the winding number due to one face along seven cell edges: a tree that reaches all
- * corners from corner 0. */
+/* Seven edges of a cell that connect all corners to corner 0: the corners at the ends, and the
+ * axis.
+ */
 static const struct {
     unsigned char from, to, axis;
 } edge_tree[7] = { { 0, 1, 0 }, { 0, 2, 1 }, { 0, 4, 2 }, { 2, 3, 0 },
                    { 4, 5, 0 }, { 4, 6, 1 }, { 6, 7, 0 } };
 
+/* Adds the changes of the winding number along the seven edges that one face causes. */
 static void add_crossings(int64_t change[7], const ebpo_frame *frame, const ebpo_corners *face)
 {
     for (int e = 0; e < 7; e++) {
@@ -319,7 +324,7 @@ void ebpo_check_rays(ebpo_tally *tally, const ebpo_ray_points *points)
     }
 }
 
-/* Returns the number, 0 .. 26, of the point at a child's corner. */
+/* Returns the number of the point, 0 .. 26, at a corner of a child. */
 static int shared_point(unsigned octant, unsigned corner)
 {
     int point = 0, step = 1;

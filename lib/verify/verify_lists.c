@@ -1,10 +1,13 @@
 /* Verifies the face lists of leaves against the faces that touch them.
  *
- * A leaf must list every face that touches its closed cell; a white or black cell has none. A
- * listed face that does not touch the leaf must touch the cell widened by 1/256, because the
- * builder's test includes faces in doubt; such entries are only counted. For gray nodes that should
- * be leaves, the different faces below are counted up to the limit. When memory is short the count
- * proves nothing, and the node passes. */
+ * A leaf must list every face that touches its closed cell. No face may touch a white or black
+ * cell. The builder also lists faces for which its test is not certain. A listed face that does not
+ * touch the leaf is therefore no violation if it touches the cell widened by 1/256; such faces are
+ * only counted.
+ *
+ * A gray node is only allowed if a leaf in its place would list too many faces. To check this, the
+ * different faces in the lists below the node are counted up to the limit. If there is not enough
+ * memory to count them, the node passes. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -14,18 +17,19 @@
 #include "verify/verify_geometry.h"
 #include "verify/verify_parts.h"
 
-static void report_unlisted(ebpo_tally *tally, const ebpo_reference_node *node, uint32_t face,
-                            const char *text)
+static void report_face(ebpo_tally *tally, const ebpo_reference_node *node, uint32_t face,
+                        const char *text)
 {
     ebpo_tally_violation(tally, EBPO_VERIFY_LISTS,
                          &(ebpo_verify_place){ node->code, face, EBPO_NO_PLANE }, "%s", text);
 }
 
-/* The list in ascending order: references, then the new range (the file's shape was checked). */
+/* The face list of a leaf, ascending: the references, then the range of new faces. The tree has
+ * passed ebpo_check_shape. */
 typedef struct face_list {
     const uint32_t *refs;
     uint32_t ref_count, new_count;
-    uint64_t first;
+    uint64_t first; /* first new face */
 } face_list;
 
 static face_list list_of(const ebpo_reference_tree *view, const ebpo_reference_node *leaf)
@@ -37,7 +41,7 @@ static face_list list_of(const ebpo_reference_tree *view, const ebpo_reference_n
     return list;
 }
 
-/* Faces that touch a node are ascending, like those of its parent. */
+/* Returns true if `faces`, which are ascending, contain the face. */
 static bool is_among(const uint32_t *faces, uint64_t count, uint32_t face)
 {
     uint64_t low = 0, high = count;
@@ -51,8 +55,8 @@ static bool is_among(const uint32_t *faces, uint64_t count, uint32_t face)
     return low < count && faces[low] == face;
 }
 
-/* Checks that a listed face that does not touch the leaf touches it widened by 1/256: level-limited
- * distances depend on that. */
+/* Checks that a listed face touches the leaf's cell widened by 1/256. Level-limited distances
+ * depend on this. */
 static void check_near(ebpo_tally *tally, const ebpo_reference_tree *view,
                        const ebpo_reference_node *leaf, uint32_t face)
 {
@@ -66,7 +70,7 @@ static void check_near(ebpo_tally *tally, const ebpo_reference_tree *view,
     }
     ebpo_face_corners(&view->tree->mesh, face, &corners);
     if (!ebpo_face_touches(&frame, &corners, tally))
-        report_unlisted(tally, leaf, face, "the leaf lists a face that is not near it");
+        report_face(tally, leaf, face, "the leaf lists a face that is not near it");
 }
 
 static void check_spare(ebpo_tally *tally, const ebpo_reference_tree *view,
@@ -95,15 +99,14 @@ static void check_leaf(ebpo_tally *tally, const ebpo_reference_tree *view,
                       (face >= list.first && face - list.first < list.new_count);
         found += listed;
         if (!listed)
-            report_unlisted(tally, leaf, face, "the face touches the leaf, which does not list it");
+            report_face(tally, leaf, face, "the face touches the leaf, which does not list it");
     }
     EBPO_FOR_ITEMS(view->workspace, i, 1, list.ref_count)
         if (list.refs[i] <= list.refs[i - 1])
-            report_unlisted(tally, leaf, list.refs[i],
-                            "the list names the face twice or not in order");
+            report_face(tally, leaf, list.refs[i], "the list names the face twice or not in order");
     if (list.ref_count && list.refs[list.ref_count - 1] >= list.first)
-        report_unlisted(tally, leaf, list.refs[list.ref_count - 1],
-                        "the list refers to a face that is not below its first new face");
+        report_face(tally, leaf, list.refs[list.ref_count - 1],
+                    "the list refers to a face that is not below its first new face");
     tally->checks[EBPO_VERIFY_LISTS] += count + list.ref_count + list.new_count;
     uint64_t spare = (uint64_t)list.ref_count + list.new_count - found;
     tally->spare_entries += spare;
@@ -121,20 +124,20 @@ void ebpo_check_terminal_lists(ebpo_tally *tally, const ebpo_reference_tree *vie
     }
     tally->checks[EBPO_VERIFY_LISTS] += count ? count : 1;
     EBPO_FOR_ITEMS(view->workspace, i, 0, count)
-        report_unlisted(tally, node, faces[i],
-                        node->type == EBPO_WHITE ? "the face touches a white cell"
-                                                 : "the face touches a black cell");
+        report_face(tally, node, faces[i],
+                    node->type == EBPO_WHITE ? "the face touches a white cell"
+                                             : "the face touches a black cell");
 }
 
 enum { LIMIT_OF_LISTS = 1 << 16 };
 
-/* Different faces listed below a node, while there are at most `limit`. Holds twice that many in a
- * list or, where that would be large, a bit for each face of the mesh. */
+/* Different faces listed below a node, up to `limit`. They are kept in a list of up to twice as
+ * many faces or, if the limit is large, as a bit for each face of the mesh. */
 typedef struct gathering {
     uint32_t *faces;
-    uint8_t *seen; /* NULL if `faces` is used */
+    uint8_t *seen; /* bits; NULL if `faces` is used */
     uint64_t count, capacity, limit;
-    bool more; /* more than the limit */
+    bool more; /* there are more different faces than the limit */
     bool short_of_memory;
 } gathering;
 
@@ -156,7 +159,7 @@ static void keep_different(gathering *g)
     g->more |= kept > g->limit;
 }
 
-static void see_face(gathering *g, uint64_t face)
+static void mark_face(gathering *g, uint64_t face)
 {
     uint8_t bit = (uint8_t)(1u << (face & 7));
     g->count += !(g->seen[face >> 3] & bit);
@@ -164,15 +167,16 @@ static void see_face(gathering *g, uint64_t face)
     g->more |= g->count > g->limit;
 }
 
-static void see_list(gathering *g, const face_list *list)
+static void mark_list(gathering *g, const face_list *list)
 {
     for (uint32_t i = 0; i < list->ref_count; i++)
-        see_face(g, list->refs[i]);
+        mark_face(g, list->refs[i]);
     for (uint32_t i = 0; i < list->new_count; i++)
-        see_face(g, list->first + i);
+        mark_face(g, list->first + i);
 }
 
-/* A list contains no face twice, so a list longer than the limit decides. */
+/* Adds a leaf's list. A list contains no face twice, so a list longer than the limit is sufficient
+ * to set `more`. */
 static void gather_list(gathering *g, const face_list *list)
 {
     uint64_t more = (uint64_t)list->ref_count + list->new_count;
@@ -181,7 +185,7 @@ static void gather_list(gathering *g, const face_list *list)
         return;
     }
     if (g->seen) {
-        see_list(g, list);
+        mark_list(g, list);
         return;
     }
     if (g->count + more > 2 * g->limit + 64)
@@ -227,6 +231,6 @@ bool ebpo_lists_more_faces(const ebpo_reference_tree *view, const ebpo_reference
         keep_different(&g);
     free(g.faces);
     ebpo_array_free(view->workspace, g.seen);
-    /* a lack of memory proves nothing about the file */
+    /* a lack of memory is no violation of the file */
     return g.more || g.short_of_memory;
 }

@@ -1,10 +1,11 @@
 /* Compares the mesh in a file with its source mesh.
  *
- * The recorded repairs are repeated on a copy of the source, which must then equal the file's mesh
- * bit for bit. In the source's order vertices and faces are compared one by one, otherwise as
- * multisets. For a subset, or a component's file, faces and vertices are compared by their numbers
- * in the source. Attributes must be the source's, in its order, except for omitted elements. If an
- * earlier version rounded the coordinates, that is the only violation. */
+ * The recorded repairs are repeated on a copy of the source. The copy must then be equal to the
+ * file's mesh bit for bit. If the file's mesh is in the source's order, vertices and faces are
+ * compared one by one, otherwise as multisets. For a subset, or the file of one component, faces
+ * and vertices are compared by their source indices. Attributes must be those of the source, in the
+ * same order, except for omitted elements. If an earlier version rounded the coordinates, only this
+ * is reported. */
 #include "verify/verify_parts.h"
 
 #include <inttypes.h>
@@ -63,8 +64,8 @@ static ebpo_status copy_mesh(ebpo_mesh *out, const ebpo_mesh *mesh, ebpo_workspa
     return status;
 }
 
-/* Returns the repair steps of the record. Faces that were flipped without a request for consistency
- * were all flipped. */
+/* Returns the repair steps of the record. If faces were flipped without the step orient, all faces
+ * were flipped. */
 static unsigned steps_of(const ebpo_repair_record *to_repeat)
 {
     return (to_repeat->weld ? EBPO_REPAIR_WELD : 0) | (to_repeat->orient ? EBPO_REPAIR_ORIENT : 0) |
@@ -73,8 +74,8 @@ static unsigned steps_of(const ebpo_repair_record *to_repeat)
            (to_repeat->fill_holes ? EBPO_REPAIR_FILL : 0);
 }
 
-/* Repeats the recorded repairs on a copy of the source. Earlier versions flipped fewer faces: if
- * the record has another number of flipped faces, repeats the repairs as these versions did. */
+/* Repeats the recorded repairs on a copy of the source. If the number of flipped faces is not the
+ * recorded one, repeats the repairs as earlier versions did, which flipped fewer faces. */
 static ebpo_status repair_again(ebpo_mesh *mesh, const ebpo_mesh *source,
                                 const ebpo_repair_record *to_repeat, ebpo_repair_record *did,
                                 ebpo_workspace *workspace, ebpo_error *error)
@@ -133,21 +134,23 @@ static void compare_in_order(ebpo_tally *tally, const ebpo_mesh *a, const ebpo_m
                                  "the face (by its source number) has other corners in the file");
 }
 
+/* Returns true if element, names and types are equal. */
 static bool same_head(const ebpo_attribute *a, const ebpo_attribute *b)
 {
     return strcmp(a->element, b->element) == 0 && strcmp(a->names, b->names) == 0 &&
            a->type == b->type && a->list == b->list;
 }
 
-/* Returns true for a missing image: its digest and bytes state nothing. */
+/* Returns true if the image of a texture is missing in the source or in the file, so that its rows
+ * cannot be compared. */
 static bool image_unknown(const ebpo_attribute *source, uint64_t at, const ebpo_attribute *stored,
                           uint64_t i)
 {
     return !ebpo_texture_list(source, at).count || !ebpo_texture_list(stored, i).count;
 }
 
-/* Compares row i of the file's array with row `number[i]` of the source, or i without numbers;
- * numbers from `rows` on are of faces that repairs have added. */
+/* Compares row i of the file's array with row number[i] of the source, or with row i if `number` is
+ * NULL. Skips faces that repairs have added, which have numbers from source->rows on. */
 static void compare_rows(ebpo_tally *tally, const ebpo_attribute *source,
                          const ebpo_attribute *stored, const uint32_t *number,
                          ebpo_workspace *workspace)
@@ -164,7 +167,8 @@ static void compare_rows(ebpo_tally *tally, const ebpo_attribute *source,
           differ, stored->names, stored->element);
 }
 
-/* Elements other than vertices and faces are complete in each part. */
+/* Returns the source indices of an array's rows, or NULL if they are 0, 1, 2, .... The latter is
+ * true for elements other than vertices and faces, which each part contains completely. */
 static const uint32_t *source_numbers(const ebpo_attribute *array, const ebpo_maps *maps)
 {
     if (maps && ebpo_attribute_is_of(array, "vertex"))
@@ -172,8 +176,8 @@ static const uint32_t *source_numbers(const ebpo_attribute *array, const ebpo_ma
     return maps && ebpo_attribute_is_of(array, "face") ? maps->face_source : NULL;
 }
 
-/* Checks that the file's arrays are the source's, in their order, except for arrays of omitted
- * elements. */
+/* Checks that the file's attribute arrays are those of the source, in the same order, except for
+ * arrays of omitted elements. `maps`: source indices, or NULL for the source's order. */
 static void compare_attributes(ebpo_tally *tally, const ebpo_mesh *source, const ebpo_mesh *stored,
                                const ebpo_maps *maps)
 {
@@ -210,7 +214,7 @@ static int compare_faces(const void *a, const void *b, void *mesh)
     return face_order(mesh, *(const uint32_t *)a, mesh, *(const uint32_t *)b);
 }
 
-/* Returns 0 .. count - 1, sorted; NULL without memory. */
+/* Returns the indices 0 .. count - 1, sorted by `compare`. Returns NULL when out of memory. */
 static uint32_t *sorted_order(const ebpo_mesh *mesh, uint64_t count,
                               int (*compare)(const void *, const void *, void *))
 {
@@ -243,8 +247,8 @@ static ebpo_status compare_as_sets(ebpo_tally *tally, const ebpo_mesh *a, const 
     return EBPO_OK;
 }
 
-/* Lists for each number in the source the face that has it now, or EBPO_NO_INDEX; NULL in *out: the
- * same numbers. */
+/* Computes for each face index of the source the current index of the face, or EBPO_NO_INDEX. *out
+ * is NULL if the indices are the same. *numbers: number of face indices of the source. */
 static ebpo_status list_places(const ebpo_mesh *whole, uint32_t **out, uint64_t *numbers,
                                ebpo_error *error)
 {
@@ -274,8 +278,8 @@ static bool same_corners(const ebpo_mesh *whole, const uint32_t *places, uint64_
     return true;
 }
 
-/* Compares the mesh of a subset, or one with dropped faces: each face and vertex by its number in
- * the source. */
+/* Compares the mesh of a subset, of one component, or with dropped faces: each face and vertex by
+ * its source index. */
 static ebpo_status compare_some(ebpo_tally *tally, const ebpo_file *file, const ebpo_mesh *whole,
                                 const ebpo_read_options *read, ebpo_error *error)
 {
@@ -323,38 +327,38 @@ static bool check_digest(ebpo_tally *tally, const ebpo_info *info, const ebpo_me
                  "the source file's digest or size is not the recorded one");
 }
 
-/* Returns true if an earlier version has made the file: it rounded the coordinates of OBJ, OFF and
- * text STL to floats, although the text has more digits. */
+/* Returns true if an earlier version has written the file with rounded coordinates. It rounded the
+ * coordinates of OBJ, OFF and text STL to floats, although the text has more digits. */
 static bool was_rounded(const ebpo_info *info, const ebpo_mesh *source)
 {
     return source->xyz64 && !info->double_coordinates && source->source_format[0] &&
            strncmp(source->source_format, "ply", 3) != 0;
 }
 
-static ebpo_status compare_meshes(ebpo_tally *tally, const ebpo_mesh *was_repaired,
+static ebpo_status compare_meshes(ebpo_tally *tally, const ebpo_mesh *repaired,
                                   const ebpo_mesh *stored, bool ordered, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    bool comparable = CHECK(!was_repaired->xyz32 == !stored->xyz32,
+    bool comparable = CHECK(!repaired->xyz32 == !stored->xyz32,
                             "the source and the file have different kinds of coordinates") &&
-                      CHECK(was_repaired->vertex_count == stored->vertex_count &&
-                                was_repaired->face_count == stored->face_count,
+                      CHECK(repaired->vertex_count == stored->vertex_count &&
+                                repaired->face_count == stored->face_count,
                             "the repaired source has %" PRIu64 " vertices and %" PRIu64
                             " faces, the file %" PRIu64 " and %" PRIu64,
-                            was_repaired->vertex_count, was_repaired->face_count,
-                            stored->vertex_count, stored->face_count);
+                            repaired->vertex_count, repaired->face_count, stored->vertex_count,
+                            stored->face_count);
     if (comparable && ordered)
-        compare_in_order(tally, was_repaired, stored);
+        compare_in_order(tally, repaired, stored);
     if (comparable && ordered)
-        compare_attributes(tally, was_repaired, stored, NULL);
+        compare_attributes(tally, repaired, stored, NULL);
     if (comparable && !ordered)
-        status = compare_as_sets(tally, was_repaired, stored, false, error);
+        status = compare_as_sets(tally, repaired, stored, false, error);
     if (comparable && !ordered && status == EBPO_OK)
-        status = compare_as_sets(tally, was_repaired, stored, true, error);
+        status = compare_as_sets(tally, repaired, stored, true, error);
     return status;
 }
 
-/* Returns true for the file of a component, which records that the source has more faces. */
+/* Returns true for the file of one component, which records that the source has more faces. */
 static bool is_part(const ebpo_info *info)
 {
     return info->source_face_count + info->repair_record.added_faces -
@@ -368,7 +372,8 @@ ebpo_status ebpo_check_source(ebpo_tally *tally, const ebpo_file *file, const eb
 {
     const ebpo_info *info = ebpo_file_info(file);
     if (check_digest(tally, info, source) && was_rounded(info, source)) {
-        /* vertices may have become equal, and polygons may have been cut in other ways */
+        /* no further comparison, as rounding may have made vertices equal and may have changed how
+         * polygons are cut into triangles */
         CHECK(false, "coordinates were rounded to single precision by an earlier version; convert "
                      "again");
         return EBPO_OK;
@@ -379,25 +384,25 @@ ebpo_status ebpo_check_source(ebpo_tally *tally, const ebpo_file *file, const eb
           " and %" PRIu64,
           source->vertex_count, source->face_count, info->source_vertex_count,
           info->source_face_count);
-    ebpo_mesh was_repaired = { 0 };
+    ebpo_mesh repaired = { 0 };
     const ebpo_repair_record *to_repeat = &info->repair_record;
-    bool as_it_is = steps_of(to_repeat) == 0;
+    bool unchanged = steps_of(to_repeat) == 0;
     ebpo_repair_record did = { .weld = info->repair_record.weld,
                                .orient = info->repair_record.orient,
                                .fill_holes = info->repair_record.fill_holes };
     ebpo_status status =
-        as_it_is ? EBPO_OK
-                 : repair_again(&was_repaired, source, to_repeat, &did, read->workspace, error);
-    if (status == EBPO_E_ARGUMENT) { /* due to the record, not the caller */
+        unchanged ? EBPO_OK
+                  : repair_again(&repaired, source, to_repeat, &did, read->workspace, error);
+    if (status == EBPO_E_ARGUMENT) { /* the cause is the record, not the caller */
         CHECK(false, "welding within %g is recorded, but the source cannot be welded within it",
               to_repeat->weld_distance);
-        ebpo_mesh_free(&was_repaired);
+        ebpo_mesh_free(&repaired);
         return EBPO_OK;
     }
-    const ebpo_mesh *made = as_it_is ? source : &was_repaired;
+    const ebpo_mesh *made = unchanged ? source : &repaired;
     if (status == EBPO_OK)
         check_record(tally, &info->repair_record, &did);
-    bool mapped = info->parts & EBPO_PART_MAPS; /* else the faces are unknown */
+    bool mapped = info->parts & EBPO_PART_MAPS; /* without maps, source indices are unknown */
     bool by_number = is_part(info) || (info->repair_record.dropped_faces && mapped);
     if (status == EBPO_OK && stored && info->repair_record.dropped_faces && !is_part(info))
         CHECK(made->vertex_count == stored->vertex_count && made->face_count == stored->face_count,
@@ -409,7 +414,7 @@ ebpo_status ebpo_check_source(ebpo_tally *tally, const ebpo_file *file, const eb
     else if (status == EBPO_OK && mapped)
         status = compare_some(tally, file, made, read, error);
     else if (status == EBPO_OK && stored)
-        CHECK(mapped, "the file has a part of the source, and no maps that identify it");
-    ebpo_mesh_free(&was_repaired);
+        CHECK(mapped, "the file has a part of the source, but no maps that identify this part");
+    ebpo_mesh_free(&repaired);
     return status;
 }

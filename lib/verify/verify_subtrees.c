@@ -1,9 +1,11 @@
-/* Verifies the table of subtrees (format-spec/README.md, section 9) by recounting it: one visit of
- * the whole tree, leaf by leaf in the order of the faces.
+/* Verifies the table of subtrees (format-spec/README.md, section 9). One visit of the whole tree,
+ * leaf by leaf in the order of the faces, counts all items again.
  *
- * Every column of every row is recomputed: ranks, faces, vertices, and the blocks of shared faces
- * and vertices that are stored with other subtrees, where exactly the needed ones must be listed.
- * Writer and reader proceed level by level; only the reading of arrays is shared with them. */
+ * Every column of every row is recomputed: numbers of nodes, faces and vertices, and the shared
+ * chunks (here: blocks) of faces and vertices, which must be exactly the listed ones. The writer
+ * and the reader of the library proceed level by level; only the reading of arrays is shared with
+ * them.
+ */
 #include "verify/verify_parts.h"
 
 #include <inttypes.h>
@@ -17,7 +19,8 @@
 
 #define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
 
-/* Columns, as the specification numbers them. */
+/* Columns with their numbers in the specification. FIRST_LEVEL begins the columns of the levels;
+ * GRAY to END are relative to the first column of a level. */
 enum {
     FACES_BETWEEN,
     FACES,
@@ -42,11 +45,11 @@ static const char *const names[] = { "faces before", "faces",           "vertice
 static const char *const level_names[] = { "gray nodes",  "leaves",     "black nodes",   "planes",
                                            "leaf planes", "references", "the faces' end" };
 
-/* Numbers in order of appearance. */
+/* A list of numbers. */
 typedef struct numbers {
     uint32_t *at;
     uint64_t count, capacity;
-    uint64_t different; /* count at the last sort */
+    uint64_t different; /* count after the last sort_once, when all numbers were different */
 } numbers;
 
 typedef struct recount {
@@ -57,11 +60,13 @@ typedef struct recount {
     const uint32_t *counts, *outer;
     const uint64_t *index;
     uint64_t subtrees, shared_rows;
-    /* counts so far */
-    uint64_t subtree, faces, vertices, outer_done, end[EBPO_LEVELS_MAX];
+    /* numbers of items so far */
+    uint64_t subtree, faces, vertices;
+    uint64_t outer_done;           /* compared rows of /subtrees/outer */
+    uint64_t end[EBPO_LEVELS_MAX]; /* end of the new faces, by level */
     uint64_t sum[MAX_COLS], row[MAX_COLS];
-    bool within; /* within a subtree */
-    numbers shared_faces;
+    bool within;          /* the visit is within a subtree */
+    numbers shared_faces; /* references of the leaves of the current subtree */
     bool no_memory;
 } recount;
 
@@ -93,7 +98,7 @@ static void sort_once(numbers *list)
     list->count = kept;
 }
 
-/* Adds numbers that recur often, without keeping each occurrence. */
+/* Adds a number that may recur often. Removes duplicates from time to time. */
 static bool add_block(numbers *list, uint32_t block)
 {
     if (list->count >= 2 * list->different + 4096) {
@@ -111,9 +116,9 @@ static const char *column_name(const recount *c, unsigned column, int *level)
     return level_names[(column - FIRST_LEVEL) % OF_A_LEVEL];
 }
 
-/* --- comparing a complete subtree with its row --- */
+/* --- comparing a subtree with its row --- */
 
-/* Compares the distances that must be listed with the stored ones. */
+/* Compares the needed blocks with the distances in the next rows of /subtrees/outer. */
 static void compare_shared(recount *c, const char *what, uint64_t from, const numbers *needed,
                            unsigned column)
 {
@@ -191,8 +196,8 @@ static void check_row(recount *c)
 
 /* --- visiting the tree --- */
 
-/* Counts faces that are new in a leaf, and vertices that are new in these faces. */
-static void see_faces(recount *c, uint64_t count)
+/* Counts the next `count` faces, which are new in a leaf, and the vertices that they use first. */
+static void count_faces(recount *c, uint64_t count)
 {
     const ebpo_mesh *mesh = &c->view->tree->mesh;
     uint64_t seen = c->vertices;
@@ -204,7 +209,7 @@ static void see_faces(recount *c, uint64_t count)
     c->vertices = seen;
 }
 
-static void see_leaf(recount *c, const ebpo_reference_node *leaf, uint64_t *row)
+static void count_leaf(recount *c, const ebpo_reference_node *leaf, uint64_t *row)
 {
     const ebpo_level *level = &c->view->tree->level[leaf->cell.level];
     uint32_t planes, references;
@@ -225,53 +230,53 @@ static void see_leaf(recount *c, const ebpo_reference_node *leaf, uint64_t *row)
         row[END] += end - c->end[leaf->cell.level];
         c->end[leaf->cell.level] = end;
     }
-    /* the leaves' faces are consecutive, which is checked elsewhere */
+    /* ebpo_check_structure checks that the leaves' new faces are consecutive */
     if (c->faces + level->leaf_new[leaf->rank] <= c->view->tree->mesh.face_count)
-        see_faces(c, level->leaf_new[leaf->rank]);
+        count_faces(c, level->leaf_new[leaf->rank]);
 }
 
-static void see_node(recount *c, const ebpo_reference_node *node);
+static void visit_node(recount *c, const ebpo_reference_node *node);
 
-static void see_children(recount *c, const ebpo_reference_node *node)
+static void visit_children(recount *c, const ebpo_reference_node *node)
 {
     if (!ebpo_reference_is_pruned(c->view, node))
         for (unsigned octant = 0; octant < 8; octant++) {
             ebpo_reference_node child = ebpo_reference_child(c->view, node, octant);
-            see_node(c, &child);
+            visit_node(c, &child);
         }
 }
 
-static void see_node(recount *c, const ebpo_reference_node *node)
+static void visit_node(recount *c, const ebpo_reference_node *node)
 {
     uint64_t *row =
         c->within ? c->row + FIRST_LEVEL + OF_A_LEVEL * (unsigned)(node->cell.level - c->level - 1)
                   : NULL;
     uint32_t planes;
     if (node->type == EBPO_LEAF)
-        see_leaf(c, node, row);
+        count_leaf(c, node, row);
     else if (node->type == EBPO_BLACK && c->within)
         row[BLACK]++;
     else if (node->type == EBPO_GRAY && c->within) {
         (void)ebpo_reference_planes(c->view, node, &planes);
         row[GRAY]++;
         row[PLANES] += planes;
-        see_children(c, node);
+        visit_children(c, node);
     } else if (node->type == EBPO_GRAY && node->cell.level == c->level) {
         c->within = true;
-        see_children(c, node);
+        visit_children(c, node);
         c->within = false;
         check_row(c);
         if (++c->subtree % SUBTREES_A_TIME == 0)
             ebpo_release_pages(c->view->workspace);
     } else if (node->type == EBPO_GRAY)
-        see_children(c, node);
+        visit_children(c, node);
 }
 
 static ebpo_status recount_table(recount *c, ebpo_error *error)
 {
     ebpo_tally *tally = c->tally;
     ebpo_reference_node root = ebpo_reference_root(c->view);
-    see_node(c, &root);
+    visit_node(c, &root);
     CHECK(c->outer_done == c->shared_rows,
           "/subtrees/outer has %" PRIu64 " rows, but %" PRIu64 " blocks are needed", c->shared_rows,
           c->outer_done);

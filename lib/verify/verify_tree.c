@@ -1,15 +1,16 @@
-/* A tree in memory as the verifier sees it, and the checks that need no face: nesting and
+/* Finds the nodes of a tree in memory, and runs the checks that need no single face: nesting and
  * structure.
  *
- * - Nodes are found by rank: counts before each group of siblings give the positions of a node's
- *   children, planes, lists and winding number.
- * - Structure: the arrays fit together (ebpo_check_shape; nothing else is checked before), and the
- *   format allows the tree: summaries, leaf sizes, the order of faces, the root box,
- *   balanced edges of a solid.
- * - Nesting: the planes of a node and of all its ancestors bound the node's envelope, so the
- *   envelope is within the parent's envelope by definition, if a plane means the same in every
- *   cell's coordinates. This condition is checked in integers on points of sampled cells: each
- * plane is transformed down to the cell, and the point up to the plane. */
+ * - Nodes are found by rank. The numbers of items before each group of siblings give the positions
+ *   of a node's children, planes, lists and winding number.
+ * - Structure: the arrays are consistent (ebpo_check_shape, which runs before all other checks),
+ * and the format allows the tree: summaries, leaf sizes, the order of faces, the root box, balanced
+ *   edges of a solid.
+ * - Nesting: the planes of a node and of all its ancestors bound the node's envelope. The envelope
+ *   is therefore within the envelope of the parent if a plane is the same in the coordinates of
+ *   every cell. This condition is checked in integers, for points of sampled cells. Each point is
+ *   compared with each plane twice: the plane is transformed down to the cell of the point, and the
+ *   point is transformed up to the cell of the plane. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -26,7 +27,7 @@
 
 /* --- finding nodes --- */
 
-/* Adds a group's contents to the running counts. */
+/* Adds the numbers of items of a group to *sum. */
 static void add_group(ebpo_reference_group *sum, const ebpo_reference_tree *view,
                       const ebpo_level *level, uint64_t group, unsigned octants)
 {
@@ -81,7 +82,7 @@ void ebpo_reference_free(ebpo_reference_tree *view)
     *view = (ebpo_reference_tree){ 0 };
 }
 
-/* Fills in type and rank. */
+/* Returns a node, with type and rank, from its position. */
 static ebpo_reference_node node_in_group(const ebpo_reference_tree *view, ebpo_octcode code,
                                          ebpo_cell cell, uint64_t group, unsigned octant)
 {
@@ -132,7 +133,7 @@ static uint64_t group_of_gray(const ebpo_reference_tree *view, int level, uint64
     return low;
 }
 
-/* Returns the node at a position of a level; climbs to the root to find its cell. */
+/* Returns the node at a position of a level. Finds its ancestors to determine its cell. */
 static ebpo_reference_node reference_at(const ebpo_reference_tree *view, int level, uint64_t group,
                                         unsigned octant)
 {
@@ -223,12 +224,12 @@ static void check_codes(ebpo_tally *tally, const ebpo_reference_tree *view, int 
                                          &(ebpo_verify_place){
                                              reference_at(view, l, group, octant).code,
                                              EBPO_NO_FACE, i },
-                                         "the code %08x is no plane", (unsigned)codes[i]);
+                                         "invalid plane code %08x", (unsigned)codes[i]);
             }
         }
 }
 
-/* A chain of nodes from the root down. */
+/* A node and its ancestors, from the root down. */
 typedef struct chain {
     int depth;
     ebpo_reference_node node[EBPO_LEVELS_MAX];
@@ -243,8 +244,8 @@ static void chain_to(chain *out, const ebpo_reference_tree *view, const ebpo_ref
                                             (unsigned)(end->code >> 3 * (out->depth - l) & 7));
 }
 
-/* Compares the point (in 2^-16 of the cell `at`) with a plane of the cell `above`, in the
- * coordinates of `above`. */
+/* Returns true if a point is on the inner side of a plane of the cell `above`. The point is in
+ * units of 2^-16 of the cell `at`, and is transformed to the coordinates of `above`. */
 static bool keeps_above(const ebpo_cell *above, const ebpo_cell *at, const int64_t point[3],
                         const int32_t n[3], int64_t d)
 {
@@ -259,7 +260,8 @@ static bool keeps_above(const ebpo_cell *above, const ebpo_cell *at, const int64
                                     ebpo_wide_signed_product(d, INT64_C(1) << (POINT_BITS + down)));
 }
 
-/* Makes the same comparison with the plane transformed down level by level as readers do. */
+/* Does the same in the coordinates of the lower cell. The plane is transformed down level by level,
+ * as readers do. */
 static bool keeps_below(const chain *c, int from, int to, const int64_t point[3],
                         const int32_t n[3], int64_t d)
 {
@@ -297,7 +299,8 @@ static void check_point(ebpo_tally *tally, const ebpo_reference_tree *view, cons
     }
 }
 
-/* Checks that cell faces are cell faces or the middle of the parent, as doubles too. */
+/* Checks that each cell face, as a double, is a cell face of the parent or its middle plane, and
+ * that the difference of opposite cell faces is the size of the cell. */
 static void check_cell_faces(ebpo_tally *tally, const ebpo_reference_tree *view,
                              const ebpo_reference_node *node)
 {
@@ -328,7 +331,7 @@ static uint64_t next_random(uint64_t *state)
     return *state;
 }
 
-/* Checks random points of the cell, and its corners. */
+/* Checks random points of a cell, and the cell's corners. */
 static void check_nesting_at(ebpo_tally *tally, const ebpo_reference_tree *view,
                              const ebpo_reference_node *node)
 {
@@ -370,7 +373,7 @@ void ebpo_check_nesting(ebpo_tally *tally, const ebpo_reference_tree *view)
 
 #define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
 
-/* --- structure: the arrays fit together --- */
+/* --- structure: the arrays are consistent --- */
 
 static bool head_shape(ebpo_tally *tally, const ebpo_info *info)
 {
@@ -411,7 +414,7 @@ static bool types_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
                  "level %d, the last one, has gray nodes", l);
 }
 
-/* Checks per-node counts and the array that they divide. */
+/* Checks that `counts`, one for each node, add up to the length of a list. */
 static bool counted_shape(ebpo_tally *tally, const ebpo_level *level, int l, const char *what,
                           uint64_t nodes, const uint8_t *counts, uint64_t total,
                           const uint32_t *items)
@@ -464,8 +467,8 @@ static bool lists_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
         fresh += level->leaf_new[leaf];
     }
     if (!CHECK(refs == level->ref_count && fresh == level->new_count,
-               "level %d: lists hold %" PRIu64 " new faces and %" PRIu64
-               " references, counts say %" PRIu64 " and %" PRIu64,
+               "level %d: the lists have %" PRIu64 " new faces and %" PRIu64
+               " references, but the counts state %" PRIu64 " and %" PRIu64,
                l, fresh, refs, level->new_count, level->ref_count))
         return false;
     refs = 0;
@@ -487,7 +490,7 @@ static bool mesh_shape(ebpo_tally *tally, const ebpo_tree *tree)
     const ebpo_mesh *mesh = &tree->mesh;
     if (!CHECK(mesh->vertex_count == tree->info.vertex_count &&
                    mesh->face_count == tree->info.face_count,
-               "the mesh has %" PRIu64 " vertices and %" PRIu64 " faces, the head says %" PRIu64
+               "the mesh has %" PRIu64 " vertices and %" PRIu64 " faces, the header states %" PRIu64
                " and %" PRIu64,
                mesh->vertex_count, mesh->face_count, tree->info.vertex_count,
                tree->info.face_count) ||
@@ -495,7 +498,7 @@ static bool mesh_shape(ebpo_tally *tally, const ebpo_tree *tree)
                    mesh->face_count < UINT32_MAX,
                "the mesh has no vertices or no faces") ||
         !CHECK(!!mesh->xyz64 == tree->info.double_coordinates,
-               "the head and the mesh have different kinds of coordinates"))
+               "the header and the mesh have different kinds of coordinates"))
         return false;
     uint64_t outside = 0, infinite = 0;
     EBPO_FOR_ITEMS(mesh->workspace, i, 0, 3 * mesh->face_count)
@@ -505,10 +508,10 @@ static bool mesh_shape(ebpo_tally *tally, const ebpo_tree *tree)
         ebpo_mesh_position(mesh, i, p);
         infinite += !isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2]);
     }
-    bool corners_fine =
+    bool corners_ok =
         CHECK(outside == 0, "%" PRIu64 " corners of faces name vertices that do not exist",
               outside);
-    return CHECK(infinite == 0, "%" PRIu64 " vertices are not finite", infinite) && corners_fine;
+    return CHECK(infinite == 0, "%" PRIu64 " vertices are not finite", infinite) && corners_ok;
 }
 
 static bool colours_shape(ebpo_tally *tally, const ebpo_level *level, int l)
@@ -519,7 +522,7 @@ static bool colours_shape(ebpo_tally *tally, const ebpo_level *level, int l)
     return CHECK(all < 1 << 24, "level %d: a colour is above 2^24 - 1", l);
 }
 
-/* Checks the arrays that the checks above do not name. Counted only when it fails. */
+/* Checks that the other required arrays are present. Counts a check only when it fails. */
 static bool arrays_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
 {
     const ebpo_level *level = &tree->level[l];
@@ -559,9 +562,9 @@ bool ebpo_check_shape(ebpo_tally *tally, const ebpo_tree *tree)
 
 /* --- structure: the tree --- */
 
-/* A volume is at most that of its cells, plus slack for the rounding of sums. Volumes for
- * coordinates beyond about 1e102 or below 1e-102 exceed the range of double: the format leaves
- * those unspecified. */
+/* Returns true if a volume is at most that of `cells` cells, plus a tolerance for the rounding of
+ * sums. Also returns true for coordinates beyond about 1e102 or below 1e-102. Their volumes exceed
+ * the range of double, and the format does not specify them. */
 static bool volume_possible(double volume, uint64_t cells, int l, const ebpo_info *info)
 {
     double cell =
@@ -578,14 +581,14 @@ static void check_summary(ebpo_tally *tally, const ebpo_tree *tree, int l)
     CHECK(stored->gray_count == level->gray_count && stored->leaf_count == level->leaf_count &&
               stored->white_count == level->white_count &&
               stored->black_count == level->black_count,
-          "level %d: the head's counts of nodes differ from the level's", l);
+          "level %d: the header's counts of nodes differ from the level's", l);
     CHECK(stored->plane_count == level->plane_count &&
               stored->leaf_plane_count == level->leaf_plane_count,
-          "level %d: the head's counts of planes differ from the level's", l);
+          "level %d: the header's counts of planes differ from the level's", l);
     CHECK(stored->new_count == level->new_count && stored->ref_count == level->ref_count,
-          "level %d: the head's counts of faces differ from the level's", l);
+          "level %d: the header's counts of faces differ from the level's", l);
     CHECK(stored->gray_volume == level->gray_volume && stored->leaf_volume == level->leaf_volume,
-          "level %d: the head's volumes differ from the level's", l);
+          "level %d: the header's volumes differ from the level's", l);
     CHECK(volume_possible(level->gray_volume, level->gray_count, l, &tree->info) &&
               volume_possible(level->leaf_volume, level->leaf_count, l, &tree->info),
           "level %d: envelopes of volume %g and %g do not fit their cells", l, level->gray_volume,
@@ -595,9 +598,9 @@ static void check_summary(ebpo_tally *tally, const ebpo_tree *tree, int l)
 typedef struct descent {
     ebpo_tally *tally;
     const ebpo_reference_tree *view;
-    uint64_t next_face; /* first face that no leaf has listed yet */
-    uint64_t grays;
-    uint64_t pruned[EBPO_LEVELS_MAX];
+    uint64_t next_face;               /* first face that no visited leaf has listed */
+    uint64_t grays;                   /* number of visited gray nodes */
+    uint64_t pruned[EBPO_LEVELS_MAX]; /* number of pruned nodes, by level */
 } descent;
 
 static void record_check(descent *d, const ebpo_reference_node *node, bool holds, const char *text)
@@ -640,21 +643,22 @@ static void check_node(descent *d, const ebpo_reference_node *node)
 
 static void check_gray(descent *d, const ebpo_reference_node *node)
 {
-    if (ebpo_reference_is_pruned(d->view, node)) { /* may have been a leaf */
+    if (ebpo_reference_is_pruned(d->view, node)) { /* a leaf may have become pruned */
         d->pruned[node->cell.level]++;
         return;
     }
     record_check(d, node, node->cell.level < d->view->tree->info.max_level,
                  "a node at the maximum level is gray");
-    bool touched = false;
+    bool has_faces = false;
     if (d->grays++ % EBPO_ITEMS_IN_ORDER == 0)
         ebpo_release_pages(d->view->workspace);
     for (unsigned octant = 0; octant < 8; octant++) {
         ebpo_reference_node child = ebpo_reference_child(d->view, node, octant);
-        touched |= child.type >= EBPO_LEAF;
+        has_faces |= child.type >= EBPO_LEAF;
         check_node(d, &child);
     }
-    record_check(d, node, touched, "the node is gray, but none of its children is gray or a leaf");
+    record_check(d, node, has_faces,
+                 "the node is gray, but none of its children is gray or a leaf");
 }
 
 static void check_vertices(ebpo_tally *tally, const ebpo_reference_tree *view)
@@ -676,8 +680,9 @@ static void check_vertices(ebpo_tally *tally, const ebpo_reference_tree *view)
           outside, first / 3);
 }
 
-/* Returns true if a sum of signed random values, one for each undirected edge, is zero: it is when
- * directions cancel, and otherwise only in one case in 2^64. */
+/* Returns true if every edge is used equally often in both directions. Adds a random value for each
+ * use of an undirected edge, with a sign for its direction. The sum is 0 if all directions cancel,
+ * and otherwise with a probability of only 2^-64. */
 static bool edges_balance(const ebpo_mesh *mesh)
 {
     uint64_t sum = 0;
@@ -701,7 +706,7 @@ void ebpo_check_structure(ebpo_tally *tally, const ebpo_reference_tree *view)
     check_node(&d, &root);
     for (int l = 0; l < tree->info.level_count; l++)
         CHECK(d.pruned[l] == tree->info.level[l].pruned_count,
-              "level %d: %" PRIu64 " nodes are pruned, the head says %" PRIu64, l, d.pruned[l],
+              "level %d: %" PRIu64 " nodes are pruned, the header states %" PRIu64, l, d.pruned[l],
               tree->info.level[l].pruned_count);
     if (!view->has_mesh)
         return;
@@ -710,5 +715,5 @@ void ebpo_check_structure(ebpo_tally *tally, const ebpo_reference_tree *view)
     check_vertices(tally, view);
     if (tree->info.solid && !tree->info.pruned) /* a part of a mesh may be unbalanced */
         CHECK(edges_balance(&tree->mesh),
-              "the file says solid, but the directions of the mesh's edges do not cancel");
+              "the file states a solid, but the directions of the mesh's edges do not cancel");
 }

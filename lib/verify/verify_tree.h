@@ -1,5 +1,5 @@
-/* A tree in memory as the verifier sees it (verify_tree.c): children by rank, and the checks of
- * nesting and structure. */
+/* Finds the nodes of a tree in memory by a separate implementation for the verifier, and checks
+ * nesting and structure (verify_tree.c). */
 #ifndef EBPO_VERIFY_VERIFY_TREE_H
 #define EBPO_VERIFY_VERIFY_TREE_H
 
@@ -10,21 +10,22 @@
 
 /* --- finding nodes --- */
 
-/* Counts before a group of siblings in its level. */
+/* Numbers of items before a group of siblings in its level. */
 typedef struct ebpo_reference_group {
-    uint64_t of_type[4]; /* nodes of each type, by ebpo_node_type */
+    uint64_t of_type[4]; /* nodes of each ebpo_node_type */
     uint64_t planes, refs, leaf_planes;
 } ebpo_reference_group;
 
+/* View of a tree, in which nodes are found by rank. */
 typedef struct ebpo_reference_tree {
-    const ebpo_tree *tree; /* borrowed */
+    const ebpo_tree *tree; /* the caller's */
     ebpo_box box;
     bool has_mesh, has_planes, has_leaf_planes;
     ebpo_reference_group *groups[EBPO_LEVELS_MAX]; /* [group_count] for each level */
-    ebpo_workspace *workspace;                     /* quota of the groups */
+    ebpo_workspace *workspace;                     /* contains `groups`, or NULL */
 } ebpo_reference_tree;
 
-/* A node. `rank` counts the nodes of its type before it in its level. */
+/* A node. */
 typedef struct ebpo_reference_node {
     ebpo_octcode code;
     ebpo_cell cell;
@@ -34,8 +35,8 @@ typedef struct ebpo_reference_node {
     uint64_t rank;
 } ebpo_reference_node;
 
-/* Makes the view. The level arrays of the tree must have passed ebpo_check_shape. `workspace` is
- * the quota of the view, or NULL. The view is cleared on failure. */
+/* Creates a view. The tree must have passed ebpo_check_shape, and must outlive the view. Memory is
+ * from `workspace`, or from the heap if it is NULL. On failure the view is cleared. */
 EBPO_MUST_USE ebpo_status ebpo_reference_make(ebpo_reference_tree *out, const ebpo_tree *tree,
                                               ebpo_workspace *workspace, ebpo_error *error);
 void ebpo_reference_free(ebpo_reference_tree *view);
@@ -47,21 +48,21 @@ static inline ebpo_node_type ebpo_reference_type(const ebpo_level *level, uint64
 }
 
 ebpo_reference_node ebpo_reference_root(const ebpo_reference_tree *view);
-/* Returns true for a gray node whose children are not in the file: subsets only. */
+/* Returns true for a gray node whose children are not in the file. Only subsets have such nodes. */
 bool ebpo_reference_is_pruned(const ebpo_reference_tree *view, const ebpo_reference_node *node);
 /* Returns a child of a gray node that is not pruned. */
 ebpo_reference_node ebpo_reference_child(const ebpo_reference_tree *view,
                                          const ebpo_reference_node *node, unsigned octant);
 
-/* Returns codes of the node's own planes (gray: the level's planes; leaf: stored leaf planes); NULL
- * and 0 when there are none. */
+/* Returns the codes of the planes stored for a node: those that a gray node adds, or the leaf
+ * planes of a leaf. Returns NULL, and *count is 0, when there are none. */
 const uint32_t *ebpo_reference_planes(const ebpo_reference_tree *view,
                                       const ebpo_reference_node *node, uint32_t *count);
-/* Returns the back-references of a leaf. */
+/* Returns the references of a leaf to faces that earlier leaves list first. */
 const uint32_t *ebpo_reference_refs(const ebpo_reference_tree *view,
                                     const ebpo_reference_node *leaf, uint32_t *count);
-/* Returns the stored winding number of the lowest corner of a leaf, or of all of a white or black
- * cell. */
+/* Returns the winding number that is stored for a leaf (at its lowest corner) or a white or black
+ * node (in the whole cell). */
 int64_t ebpo_reference_winding(const ebpo_reference_tree *view, const ebpo_reference_node *node);
 
 static inline bool ebpo_reference_inside(const ebpo_reference_tree *view, int64_t winding)
@@ -73,19 +74,20 @@ static inline bool ebpo_reference_inside(const ebpo_reference_tree *view, int64_
     }
 }
 
-/* --- nesting: plane codes decode, and coordinates agree from level to level --- */
+/* --- nesting --- */
 
-/* Checks nesting: a plane must mean the same in every cell's coordinates (verify_tree.c). */
+/* Checks that plane codes are valid, and that a plane is the same in the coordinates of its cell
+ * and of every cell below (verify_tree.c). */
 void ebpo_check_nesting(ebpo_tally *tally, const ebpo_reference_tree *view);
 
-/* --- structure: the arrays fit together, and the format allows the tree --- */
+/* --- structure: the arrays are consistent, and the format allows the tree --- */
 
-/* Checks everything that the other checks need to stay within arrays. Returns false after a
- * violation: then nothing else can be checked. */
+/* Checks that the arrays are consistent, so that other checks stay within them. Returns false after
+ * a violation; the caller must then run no other checks. */
 bool ebpo_check_shape(ebpo_tally *tally, const ebpo_tree *tree);
 
-/* Checks the rest: summaries, leaf sizes, order of faces, root box around the vertices, balanced
- * edges of a solid. */
+/* Checks the level summaries, the sizes of leaves, the order of faces, that the root box contains
+ * the vertices, and that the edges of a solid are balanced. */
 void ebpo_check_structure(ebpo_tally *tally, const ebpo_reference_tree *view);
 
 #endif

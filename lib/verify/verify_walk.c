@@ -1,11 +1,11 @@
-/* Walks down the tree with the faces that touch each node, and checks containment, lists and labels
- * there.
+/* Visits the nodes of the tree from the root down, with the faces that touch each node, and checks
+ * containment, lists and labels of each node.
  *
- * Nodes with many faces come first, one after the other, with their faces distributed to all
- * threads. One thread walks each of the smaller subtrees below, depth first. Every face is tested
- * exactly against every cell that it comes near. Points whose winding number is checked by rays are
- * collected on the way and traced through the mesh at the end. The tally does not depend on the
- * number of threads. */
+ * Nodes with many faces are visited first, one after the other, with their faces distributed to all
+ * threads. Each smaller subtree below them is visited by one thread, depth first. Every face is
+ * tested exactly against every cell that its bounding box intersects. The points for the check by
+ * rays are collected during the visit, and their winding numbers are computed at the end. The tally
+ * does not depend on the number of threads. */
 #include "core/strict_fp.h"
 
 #include "verify/verify_parts.h"
@@ -22,11 +22,10 @@
 
 enum { FACE_GRAIN = 4096, SUBTREE_FACES = 1024, SUBTREE_FACES_MAX = 1 << 18, SUBTREES_WANTED = 64 };
 
-/* A stack of face numbers: a node's faces, then its child's, and so on down; and for each face the
- * children that it touches. */
+/* A stack of face indices: the faces of a node, then those of its child, and so on down. */
 typedef struct face_stack {
     uint32_t *faces;
-    uint8_t *octants;
+    uint8_t *octants; /* for each face, the children that it touches, as bits */
     uint64_t capacity;
 } face_stack;
 
@@ -35,15 +34,15 @@ typedef struct worker {
     face_stack stack;
     ebpo_node_planes planes;
     ebpo_ray_points points;
-    uint64_t visited; /* faces */
+    uint64_t visited; /* number of faces since the last release of pages */
 } worker;
 
-/* A node of the upper part. `children` 0: the root of a subtree for one thread. */
+/* A node of the upper part of the tree. */
 typedef struct upper_node {
     ebpo_reference_node node;
     uint32_t *faces;
     uint64_t face_count;
-    uint64_t children; /* the first of eight, in the same array */
+    uint64_t children; /* index in `upper` of the first of eight; 0: root of a subtree */
     ebpo_node_windings corners;
 } upper_node;
 
@@ -56,18 +55,18 @@ typedef struct walk {
     worker *workers;
     upper_node *upper;
     uint64_t upper_count, upper_capacity;
-    uint64_t *subtrees; /* indices in `upper` */
+    uint64_t *subtrees; /* [subtree_count] indices in `upper` of the subtrees' roots */
     uint64_t subtree_count;
-    uint64_t subtree_limit;
-    /* The node whose faces are distributed. */
+    uint64_t subtree_limit; /* maximum number of faces of a subtree's root */
+    /* the node whose faces are distributed to all threads */
     const upper_node *shared;
     uint8_t *shared_octants;
 } walk;
 
-/* A gray node's cell and its children's. */
+/* The cells of a gray node and of its children. */
 typedef struct family {
     ebpo_frame self, child[8];
-    double middle[3];
+    double middle[3]; /* coordinates of the middle planes */
 } family;
 
 static void family_make(family *out, const ebpo_box *box, const ebpo_reference_node *node)
@@ -84,8 +83,8 @@ static void family_make(family *out, const ebpo_box *box, const ebpo_reference_n
         }
 }
 
-/* Returns the octants, bounded by the half-spaces at the middle planes, that the face's bounding
- * box intersects. */
+/* Returns the octants that the face's bounding box intersects. An octant is here the intersection
+ * of three half-spaces at the middle planes. */
 static unsigned near_octants(const family *f, const ebpo_corners *face)
 {
     static const uint8_t upper[3] = { 0xaa, 0xcc, 0xf0 };
@@ -100,18 +99,18 @@ static unsigned near_octants(const family *f, const ebpo_corners *face)
     return octants & 255;
 }
 
-static unsigned visited_octants(const family *f, const ebpo_corners *face, ebpo_tally *tally)
+static unsigned touched_octants(const family *f, const ebpo_corners *face, ebpo_tally *tally)
 {
     unsigned near = near_octants(f, face), touched = 0;
     if ((near & (near - 1)) == 0)
-        return near; /* the face touches the node, so it touches the only octant */
+        return near; /* the face touches the node, so it touches the only possible child */
     for (unsigned octant = 0; octant < 8; octant++)
         if (near >> octant & 1)
             touched |= (unsigned)ebpo_face_touches(&f->child[octant], face, tally) << octant;
     return touched;
 }
 
-/* Work for each face at a gray node. */
+/* Checks containment of the faces at a gray node, and finds the children that each face touches. */
 static void visit_faces(const walk *w, worker *self, const ebpo_reference_node *node,
                         const family *f, const uint32_t *faces, uint8_t *octants, uint64_t count)
 {
@@ -120,16 +119,17 @@ static void visit_faces(const walk *w, worker *self, const ebpo_reference_node *
         ebpo_face_corners(&w->view->tree->mesh, faces[i], &face);
         if (self->planes.count)
             ebpo_check_face_contained(&self->tally, &self->planes, node, &f->self, &face, faces[i]);
-        octants[i] = (uint8_t)visited_octants(f, &face, &self->tally);
+        octants[i] = (uint8_t)touched_octants(f, &face, &self->tally);
     }
-    /* Pages are read in for visited faces, plus a few for each node. */
+    /* pages of the workspace are used for each visited face, and a few for each node */
     if ((self->visited += count + 64) >= 1 << 15) {
         self->visited = 0;
         ebpo_release_pages(w->options->workspace);
     }
 }
 
-/* Checks that a gray node has too many faces for a leaf. */
+/* Checks that a gray node has too many faces for a leaf. `touching`: number of faces that touch it.
+ */
 static void check_worth(const walk *w, ebpo_tally *tally, const ebpo_reference_node *node,
                         uint64_t touching)
 {
@@ -145,7 +145,7 @@ static void check_worth(const walk *w, ebpo_tally *tally, const ebpo_reference_n
             "the node is gray, but its leaves list no more faces than one leaf may");
 }
 
-/* Completes a gray node after its children. */
+/* Checks the corners of a gray node, after its children have been visited. */
 static void finish_gray(const walk *w, worker *self, const ebpo_reference_node *node,
                         const ebpo_node_windings children[8], ebpo_node_windings *corners)
 {
@@ -164,14 +164,14 @@ static bool is_terminal(const walk *w, const ebpo_reference_node *node)
     return node->type != EBPO_GRAY || ebpo_reference_is_pruned(w->view, node);
 }
 
-/* The faces may be all of the mesh. */
+/* Runs all checks of a leaf, white, black or pruned node. */
 static ebpo_status walk_terminal(const walk *w, worker *self, const ebpo_reference_node *node,
                                  const uint32_t *faces, uint64_t count, ebpo_node_windings *corners,
                                  ebpo_error *error)
 {
     const ebpo_reference_tree *view = w->view;
     ebpo_frame frame = ebpo_frame_make(&view->box, node->cell);
-    if (view->has_mesh && node->type != EBPO_GRAY) /* pruned */
+    if (view->has_mesh && node->type != EBPO_GRAY) /* a gray node is pruned here */
         ebpo_check_terminal_lists(&self->tally, view, node, faces, count);
     ebpo_node_planes_of(&self->planes, view, node);
     EBPO_FOR_ITEMS_SCATTERED(w->options->workspace, i, 0, self->planes.count ? count : 0) {
@@ -209,7 +209,7 @@ static bool stack_reserve(face_stack *s, uint64_t need)
     return true;
 }
 
-/* The node's faces are [first, first + count) on the stack. */
+/* Visits a node and all nodes below it. Its faces are [first, first + count) on the stack. */
 static ebpo_status walk_down(const walk *w, worker *self, const ebpo_reference_node *node,
                              uint64_t first, uint64_t count, ebpo_node_windings *corners,
                              ebpo_error *error)
@@ -217,7 +217,7 @@ static ebpo_status walk_down(const walk *w, worker *self, const ebpo_reference_n
     face_stack *s = &self->stack;
     if (is_terminal(w, node))
         return walk_terminal(w, self, node, count ? s->faces + first : NULL, count, corners, error);
-    if (!stack_reserve(s, first + 2 * count + 1)) /* never NULL */
+    if (!stack_reserve(s, first + 2 * count + 1)) /* at least 1, so that the stack is not NULL */
         return ebpo_fail_memory(error, (first + 2 * count) * 5);
     family f;
     family_make(&f, &w->view->box, node);
@@ -254,7 +254,7 @@ static ebpo_status shared_task(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-/* Appends a child with its part of the parent's faces. */
+/* Appends a child with those faces of the parent that touch it. */
 static ebpo_status add_child(walk *w, uint64_t parent, unsigned octant, ebpo_error *error)
 {
     const upper_node *from = &w->upper[parent];
@@ -274,7 +274,7 @@ static ebpo_status add_child(walk *w, uint64_t parent, unsigned octant, ebpo_err
     return EBPO_OK;
 }
 
-/* Opens the upper node `at`: all threads visit its faces, and its children are appended. */
+/* Visits the upper node `at` with all threads, and appends its children. */
 static ebpo_status open_node(walk *w, uint64_t at, ebpo_error *error)
 {
     if (!ebpo_grow(&w->upper, &w->upper_capacity, w->upper_count + 8, sizeof *w->upper))
@@ -316,7 +316,8 @@ static ebpo_status add_root(walk *w, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Walks breadth-first, from the root down to nodes with few faces. */
+/* Visits the upper nodes, breadth first, from the root down to nodes with few faces. Collects the
+ * roots of the subtrees. */
 static ebpo_status walk_upper(walk *w, ebpo_error *error)
 {
     ebpo_status status = add_root(w, error);
@@ -334,7 +335,7 @@ static ebpo_status walk_upper(walk *w, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* A leaf may have more faces than a stack should hold: they stay in place. */
+/* Visits a subtree. The faces of a leaf are not copied to the stack, as they may be too many. */
 static ebpo_status walk_subtree(const walk *w, worker *self, upper_node *n, ebpo_error *error)
 {
     if (is_terminal(w, &n->node))
@@ -362,7 +363,8 @@ static ebpo_status subtree_task(void *context, uint64_t begin, uint64_t end, uns
     return EBPO_OK;
 }
 
-/* Children come after their parents, so in reverse order they are done first. */
+/* Completes the upper nodes in reverse order, so that children are completed before their parents.
+ */
 static void finish_upper(walk *w)
 {
     for (uint64_t at = w->upper_count; at-- > 0;) {
@@ -384,12 +386,13 @@ static ebpo_status walk_prepare(walk *w, ebpo_error *error)
     if (!w->workers)
         return ebpo_fail_memory(error, w->threads * sizeof *w->workers);
     uint64_t faces = w->view->has_mesh ? w->view->tree->mesh.face_count : 0;
-    /* each thread holds the faces on its path: 15 B for each of a subtree */
+    /* each thread stores the faces on its path, about 15 bytes for each face of the subtree's root
+     */
     uint64_t share = faces / SUBTREES_WANTED;
     w->subtree_limit = share < SUBTREE_FACES       ? SUBTREE_FACES
                        : share > SUBTREE_FACES_MAX ? SUBTREE_FACES_MAX
                                                    : share;
-    /* rays need all faces */
+    /* rays need all faces, which a subset lacks */
     w->rays = faces > 0 && w->view->tree->info.solid && !w->view->tree->info.pruned;
     for (unsigned i = 0; i < w->threads; i++)
         w->workers[i].points.workspace = w->options->workspace;
@@ -398,7 +401,7 @@ static ebpo_status walk_prepare(walk *w, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Moves all workers' points to the first one. */
+/* Moves the points of all threads to one list, and checks their winding numbers by rays. */
 static ebpo_status follow_rays(walk *w, ebpo_error *error)
 {
     ebpo_ray_points *all = &w->workers[0].points;

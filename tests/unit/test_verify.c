@@ -416,7 +416,7 @@ START_TEST(test_verify_detects_contradicting_header)
     expect_caught(EBPO_VERIFY_STRUCTURE, "do not fit their cells");
     build("sphere", 8, EBPO_RULE_NONZERO);
     tree.info.face_count++;
-    expect_caught(EBPO_VERIFY_STRUCTURE, "the head says");
+    expect_caught(EBPO_VERIFY_STRUCTURE, "the header states");
 }
 END_TEST
 

@@ -334,7 +334,7 @@ static void replace_marks(int level, hid_t type, hsize_t rows)
 
 START_TEST(test_new_array_length_and_type)
 {
-    static const char *const wrong[] = { "the array's length contradicts the counts in the head",
+    static const char *const wrong[] = { "the array's length contradicts the counts in the header",
                                          "the array has the wrong type" };
     ebpo_file *file;
     ebpo_close(write_and_open(EBPO_CODEC_NONE));
