@@ -83,7 +83,8 @@ def goals_table(results, memory, budget, tables, found):
     page.text("## Goals", "",
               "The table begins with missed goals. A goal is an upper limit. Four values in a "
               "cell are for the models of "
-              f"{', '.join(SIZES)} faces. The estimate for fcpw, a nearest-point library, is the "
+              f"{', '.join(SIZES)} faces; *1 of 4*: one of them meets the goal. The estimate for "
+              "fcpw, a nearest-point library, is the "
               "time of Embree's point query "
               f"times {', '.join(map(str, FCPW['path']))} (path) or "
               f"{', '.join(map(str, FCPW['uniform']))} (uniform).")
