@@ -5,8 +5,8 @@ from query_page import figure, us
 CUT, MEMORY = 7, 16 << 20
 COUNTS = {"uniform": 100, "path": 20000}
 SHOWN_LEVELS = {1, 6, 11}  # the measured levels that the page shows
-# Numbers of queries of modes that take a second for few queries. Cut envelopes are cached, so there
-# are enough queries to have cut all of them.
+# Counts of queries for modes in which a query takes up to a second. Cut envelopes are cached; the
+# counts are large enough for all envelopes to be cut.
 OTHERS = {"recursive": {"uniform": 4, "path": 1000},
           "envelope": {"uniform": 20000, "path": 20000}}
 

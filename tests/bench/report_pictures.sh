@@ -1,10 +1,10 @@
 #!/bin/sh
-# Remakes docs/pictures/report-dragon.png and report-degenerate.png: the pages of `ebpo report` for a
-# dragon and for a shell whose wall is thinner than any cell.
+# Remakes docs/pictures/report-dragon.png and report-degenerate.png: pages of `ebpo report` for a
+# dragon, and for a shell that is thinner than any cell.
 #
 #     tests/bench/report_pictures.sh BUILD_DIR MODELS_DIR [FOLDER]
 #
-# MODELS_DIR holds dragon100k.ply; the reports stay in FOLDER (default: report-pictures in
+# MODELS_DIR contains dragon100k.ply. The reports remain in FOLDER (default: report-pictures in
 # BUILD_DIR). Needs chromium and python3.
 set -eu
 build=$1 models=$2 folder=${3:-$1/report-pictures}
@@ -12,7 +12,7 @@ root=$(cd "$(dirname "$0")/../.." && pwd)
 methods=inherit,kmedoids,offset,random
 mkdir -p "$folder" "$root/docs/pictures"
 
-# Two tori, one in the other, 1/2000 of the larger radius apart: a wall of that thickness.
+# Two tori, one in the other. The shell between them has a thickness of 1/2000 of the larger radius.
 python3 - "$folder/thin_shell.ply" <<'PYTHON'
 import math
 import sys

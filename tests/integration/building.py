@@ -1,15 +1,14 @@
 #!/usr/bin/env python3
-"""building.py TOOL GENERATE FAULTS [few]
+"""Tests memory, temporary files and output of `ebpo convert`: building.py TOOL GENERATE FAULTS [few]
 
-What `ebpo convert` promises of memory, temporary files and bytes, on a model that does not fit into
-its budget:
+The model does not fit into its budget. The tests check:
   - the bytes are the same for any number of threads and any budget;
-  - the process never has more resident than --memory allows;
-  - interrupted at any stage, also by SIGKILL, it leaves nothing in --temp-dir, and nothing beside
-  OUT unless killed;
+  - the resident memory of the process never exceeds --memory;
+  - a process that is interrupted at any stage, also by SIGKILL, leaves nothing in --temp-dir, and nothing
+    beside OUT unless it is killed;
   - a full disk is an error that names the folder, and leaves nothing.
-FAULTS is preloaded to make a disk full without being root. few: a smaller model that does not fit
-either, and fewer budgets, numbers of threads and moments of interruption.
+FAULTS is preloaded to simulate a full disk without root. few: uses a smaller model that does not fit either,
+and fewer budgets, numbers of threads and times of interruption.
 """
 import contextlib
 import math
@@ -33,9 +32,9 @@ from run import has_terminal
 TOOL, GENERATE, FAULTS = (os.path.abspath(a) for a in sys.argv[1:4])
 MIB = 1 << 20
 FEW = "few" in sys.argv[4:]
-FACES, FEWER_FACES = 1_600_000 if FEW else 3_000_000, 1_200_000  # none fits into 128 MiB
-SMALL = 128 * MIB  # the least that is allowed
-# Coarse envelopes: what is looked at here does not depend on how many planes they have.
+FACES, FEWER_FACES = 1_600_000 if FEW else 3_000_000, 1_200_000  # no model fits into 128 MiB
+SMALL = 128 * MIB  # the least budget
+# Coarse envelopes: the number of planes does not matter here.
 QUICK = ["--max-level", "6", "--epsilon", "1", "--leaf-faces", "64"]
 failures = []
 
@@ -47,7 +46,7 @@ def check(good, what):
 
 
 class Place:
-    """A folder for the output and one for temporary files, both empty."""
+    """An empty folder for the output, and one for temporary files."""
 
     def __init__(self, root, name):
         self.out_dir, self.temp_dir = os.path.join(root, name,
@@ -73,7 +72,7 @@ def write_ply(path, vertices, faces):
 
 
 def write_fan(path, faces):
-    """Two cones over one circle: half of the faces at each apex."""
+    """Write two cones over one circle, with half of the faces at each apex."""
     n = faces // 2
     ring = [(math.cos(2 * math.pi * i / n), math.sin(2 * math.pi * i / n), 0.001 * (i % 7))
             for i in range(n)]
@@ -82,14 +81,14 @@ def write_fan(path, faces):
 
 
 def write_box(path):
-    """Twelve large faces."""
+    """Write a box of twelve large faces."""
     corners = [(i & 1, 1.03 * (i >> 1 & 1), 0.97 * (i >> 2 & 1)) for i in range(8)]
     squares = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
     write_ply(path, corners, [t for a, b, c, d in squares for t in ((a, b, c), (a, c, d))])
 
 
 def usual_signals():
-    # nohup and background jobs hand down that these are ignored
+    # nohup and background jobs pass on that these signals are ignored
     for number in signal.SIGINT, signal.SIGTERM, signal.SIGHUP:
         signal.signal(number, signal.SIG_DFL)
 
@@ -103,7 +102,7 @@ def limits(file_bytes=None):
 
 
 def uses_files(pid, folder):
-    """Whether arrays of the process lie in files of this folder."""
+    """Return True when the process has mapped files of this folder."""
     with contextlib.suppress(OSError):
         with open(f"/proc/{pid}/maps", encoding="utf-8", errors="replace") as maps:
             return any(folder in line for line in maps)
@@ -111,7 +110,7 @@ def uses_files(pid, folder):
 
 
 def run(command, folder, environment=None, file_bytes=None):
-    """Exit code, what was said, peak of resident bytes, whether files were used."""
+    """Run a command. Return exit code, messages, peak of resident bytes, and whether files were used."""
     with tempfile.TemporaryFile() as said:
         process = subprocess.Popen(command, stdout=said, stderr=said, stdin=subprocess.DEVNULL,
                                    preexec_fn=limits(file_bytes),
@@ -158,8 +157,8 @@ def same_bytes_and_bounded_memory(root, model):
             check(filed, f"{name}: uses temporary files")
             check(peak <= budget, f"{name}: {peak / MIB:.0f} MiB resident at most")
             check(free_peak > budget,
-                  f"{name}: without a budget {free_peak / MIB:.0f} MiB, so the budget is put to "
-                  f"the test")
+                  f"{name}: without a budget {free_peak / MIB:.0f} MiB, so the budget is "
+                  f"tested")
     os.unlink(place.out)
     code, said, peak, filed = run(place.command(model, "-q", "--memory", "128MiB", "--threads",
                                                 "16"), place.temp_dir)
@@ -170,7 +169,7 @@ def same_bytes_and_bounded_memory(root, model):
 
 
 def proving_and_extracting(place, model):
-    """What was built in little memory is proved and given back in as little."""
+    """Verify and extract a file with the memory with which it was built."""
     back = os.path.join(place.out_dir, "back.ply")
     little = ["--temp-dir", place.temp_dir, "--memory"]
     for what, command in (("verify --against", ["verify", place.out, "--against", model]),
@@ -181,8 +180,8 @@ def proving_and_extracting(place, model):
         check(code == 0 and peak <= SMALL,
               f"{what} --memory 128MiB: {peak / MIB:.0f} MiB resident at most ({said.strip()})")
         check(free_peak > SMALL,
-              f"{what}: without a budget {free_peak / MIB:.0f} MiB, so the budget is put to the "
-              f"test")
+              f"{what}: without a budget {free_peak / MIB:.0f} MiB, so the budget is "
+              f"tested")
     code, _, peak, _ = run([TOOL, "extract", "--mesh", "-q", *little, "128MiB", place.out, back],
                            place.temp_dir)
     check(code == 0 and peak <= SMALL,
@@ -191,19 +190,21 @@ def proving_and_extracting(place, model):
 
 
 def same_bytes_as_usual(root, model):
-    """With envelopes as fine as they are by default."""
+    """Compare bytes with default envelopes."""
     place, seen = Place(root, "usual"), []
     for memory, threads in (("16G", 1), ("128MiB", 3)):
         code, said, _, _ = run(place.command(model, "-q", "--memory", memory, "--threads",
                                              str(threads), options=[]), place.temp_dir)
         seen.append(slurp(place.out) if code == 0 else said)
     check(isinstance(seen[0], bytes) and seen[0] == seen[1],
-          "usual envelopes: the bytes are the same for 16G, 1 thread and 128MiB, 3 threads")
+          "default envelopes: the bytes are the same for 16G, 1 thread and 128MiB, 3 threads")
 
 
 def run_until(command, stage, number):
-    """Runs on a terminal, sends the signal once the stage is shown; how it ended and whether the
-    stage was seen."""
+    """Run a command on a terminal, and send a signal when the stage is shown.
+
+    Return how the command ended, and whether the stage was seen.
+    """
     pid, terminal = pty.fork()
     if pid == 0:
         usual_signals()
@@ -226,7 +227,7 @@ def run_until(command, stage, number):
 
 
 def one_cell(root, model):
-    """Cells that may not be cut are worked on in memory: half of the budget must do."""
+    """Test a cell that may not be divided: it is processed in memory and must fit into half of the budget."""
     place = Place(root, "one cell")
     code, said, _, _ = run(place.command(model, "-q", "--memory", "128MiB",
                                          options=["--max-level", "0"]), place.temp_dir)
@@ -236,7 +237,7 @@ def one_cell(root, model):
 
 
 def unlike_scans(root):
-    """Models whose pieces are large for their faces, or have many faces in one cell."""
+    """Test models whose pieces are large for their number of faces, or have many faces in one cell."""
     place, model = Place(root, "unlike scans"), os.path.join(root, "unlike.ply")
     write_box(model)
     for threads in "1", "3":
@@ -274,7 +275,7 @@ def interrupted(root, model):
         place = Place(root, f"{stage} {number}")
         code, seen = run_until(place.command(model, "--memory", "128MiB"), stage, number)
         name = f"{signal.Signals(number).name} while {stage}"
-        check(seen and code == -number, f"{name}: ends by it ({code})")
+        check(seen and code == -number, f"{name}: ends by the signal ({code})")
         check(not os.listdir(place.temp_dir),
               f"{name}: leaves nothing in --temp-dir ({place.left()})")
         if number != signal.SIGKILL:
@@ -283,8 +284,10 @@ def interrupted(root, model):
 
 
 def files_with_names(root, model):
-    """Where files cannot be made without names, they have one for a moment only, and a signal in
-    that moment finds it."""
+    """Interrupt while a temporary file has a name.
+
+    If the system cannot make files without names, a file has a name for a short time.
+    """
     strange = {"LD_PRELOAD": FAULTS, "EBPO_TEST_NAMED": "1"}
     place = Place(root, "named")
     code, said, _, filed = run(place.command(model, "-q", "--memory", "128MiB"), place.temp_dir,
@@ -321,7 +324,7 @@ def full_disk(root, model):
                 and "another folder" in said and said.count("\n") == 1)
         check(good, f"disk full at file {n}: {said.strip()} ({code})")
         check(not place.left(), f"disk full at file {n}: leaves nothing ({place.left()})")
-    check(failed > 3, f"disk full: looked at {failed} moments")
+    check(failed > 3, f"disk full: tested {failed} sizes")
     place = Place(root, "limit")
     code, said, _, _ = run(place.command(model, "-q", "--memory", "128MiB"), place.temp_dir,
                            file_bytes=256 << 10)
@@ -330,7 +333,7 @@ def full_disk(root, model):
 
 
 def really_full(root, model):
-    """A file system of 20 MB of one's own, where the system lets us have one."""
+    """Use a file system of 20 MB, if the system permits mounting it."""
     place = Place(root, "really full")
     mount = ('mount -t tmpfs -o size=20M none "$1" 2>/dev/null || exit 77; temp=$1; shift; "$@"; '
              'code=$?; ls -A "$temp"; exit $code')
@@ -344,7 +347,7 @@ def really_full(root, model):
                       and said.count("\n") == 1 and not place.left(),
                       f"a file system of 20 MB: {said.strip()} ({code}, {place.left()})")
                 return
-    print("skipped a file system of 20 MB: neither root nor user namespaces may mount one here")
+    print("skipped a file system of 20 MB: root or a user namespace is needed to mount it")
 
 
 def generate(model, faces):

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Tests files that change while they are open: changing.py TOOL GENERATE FEATURES
 
-Questions are asked one by one; in between the file is replaced, shortened, grown, damaged, or
-written over by another model, on disk and on a server. Then commands read a file that another
-program replaces, or writes over, all the time, and programs of two kinds write one output. Whatever
-is answered is the answer of the file that was opened, or of one of the two; else there is an error
-with a message. EBPO_TEST_SCALE is the share of the trials.
+First, queries are made one by one. Between them the file is replaced, shortened, extended, damaged, or
+overwritten with another model, on disk and on a server. Then commands read a file that another program
+replaces or overwrites all the time. Finally, two programs write one output. Each result must be that of the
+file that was opened, or of one of the two files; otherwise there must be an error with a message.
+EBPO_TEST_SCALE is the share of the trials.
 """
 import os
 import random
@@ -19,7 +19,7 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 import ranges_server
 
 POINTS = 60
-TURNS = 60  # of each command beside a writer
+TURNS = 60  # runs of each command while the file is written
 failures, counts = [], {}
 
 
@@ -46,7 +46,7 @@ def count(what, outcome):
     counts[what][outcome] += 1
 
 
-# --- one by one ---
+# --- single queries ---
 
 def replaced(path, other):
     shutil.copy(other, path + ".new")
@@ -95,7 +95,7 @@ def flipped(path, other):
     write(path, bytes(content))
 
 
-# What happens to the file: whether all answers have to come all the same.
+# The changes of the file. True: all queries must succeed nevertheless.
 WAYS = {replaced: True, removed: True, grown: True, written_over: False,
         written_over_in_part: False, shortened: False, emptied: False, zeroed: False,
         flipped: False}
@@ -105,13 +105,13 @@ def questions(command, draw):
     width = {"inside": 3, "distance": 3, "ray": 6, "box": 6}[command]
     for _ in range(POINTS):
         row = [draw.uniform(-1.5, 1.5) for _ in range(width)]
-        if command == "box": # small ones
+        if command == "box": # small boxes
             row = row[:3] + [x + 0.2 for x in row[:3]]
         yield " ".join(map(repr, row)) + "\n"
 
 
 def ask(command, path, asked, change):
-    """What was answered, the exit code, and what was said; `change` is called after two."""
+    """Query a file. Return the results, the exit code and the messages. `change` is called after two queries."""
     how = ["--mode", "nodes"] if command == "inside" else []
     process = subprocess.Popen([TOOL, command, *how, "--cut-level", "1", "--memory", "3200KiB",
                                 "--threads", "1", path], stdin=subprocess.PIPE, text=True,
@@ -134,9 +134,9 @@ def ask(command, path, asked, change):
 
 def judge(what, right, outcome, must_go_on):
     answers, code, said = outcome
-    good = check(answers == right[:len(answers)], f"{what}: wrong answers, {code}, {said}")
+    good = check(answers == right[:len(answers)], f"{what}: wrong results, {code}, {said}")
     if code == 0:
-        good = check(len(answers) == len(right), f"{what}: {len(answers)} answers, and success")
+        good = check(len(answers) == len(right), f"{what}: {len(answers)} results, and success")
     else:
         good = check(code == 1 and said and not must_go_on, f"{what}: {code}: {said!r}") and good
     count(what.split(":")[0], "wrong" if not good else "all answers" if code == 0 else "error")
@@ -158,7 +158,7 @@ def on_disk(root, a, b):
 
 
 def on_a_server(a, b):
-    """The other version comes with another ETag, or with the same one."""
+    """Change a file on a server, with another ETag or with the same one."""
     draw = random.Random(3)
     for command in ("inside", "distance", "ray"):
         asked = list(questions(command, draw))
@@ -175,7 +175,7 @@ def on_a_server(a, b):
             server.shutdown()
 
 
-# --- beside a writer ---
+# --- while another program writes ---
 
 COMMANDS = {"inside": "inside {} points.txt", "verify": "verify -q {}",
             "extract": "extract -q --mesh {} OUT.ply", "subset": "subset -q --levels 0-3 {} OUT.h5",
@@ -228,7 +228,7 @@ def beside(root, a, b, change, name, must_go_on):
 
 
 def two_writers(root, a, b):
-    """Of one output; whoever is last, it is whole."""
+    """Write one output with two programs at a time. The output must be complete, whichever is the last."""
     for _ in range(TURNS if SCALE >= 1 else 3):
         both = [subprocess.Popen([TOOL, *text.format(which).split()], cwd=root,
                                  stderr=subprocess.PIPE)
@@ -256,8 +256,8 @@ def main():
         on_disk(root, a, b)
         if "http" in features:
             on_a_server(a, b)
-        beside(root, a, b, replaced, "beside one who replaces", True)
-        beside(root, a, b, written_over, "beside one who writes over", False)
+        beside(root, a, b, replaced, "while a program replaces", True)
+        beside(root, a, b, written_over, "while a program overwrites", False)
         two_writers(root, a, b)
     for what, outcomes in counts.items():
         print(f"{what}: " + ", ".join(f"{n} {o}" for o, n in sorted(outcomes.items())))

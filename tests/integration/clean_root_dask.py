@@ -1,4 +1,4 @@
-"""clean_root_dask.py MODEL FOLDER SCHEDULER: the points of clean_root_ask.py once more, on Dask."""
+"""clean_root_dask.py MODEL FOLDER SCHEDULER: queries the points of clean_root_query.py again, on Dask."""
 import os
 import sys
 
@@ -19,7 +19,7 @@ def main(path, folder, scheduler):
     results = np.load(os.path.join(folder, "dask.npy"))
     assert (results == np.load(os.path.join(folder, "inside.npy"))).all()
     os.remove(os.path.join(folder, "dask.npy"))
-    print(len(results), "answers of two workers, as of one process")
+    print(len(results), "results of two workers equal those of one process")
 
 
 main(*sys.argv[1:])

@@ -1,7 +1,8 @@
-"""Commands and what they write, for trials in which calls fail (faults.py) or programs are killed
-(killed.py). In a command NAME.ply and the like are inputs that make_inputs makes, URL is one of
-model.ebpo.h5, and what begins with OUT is written. An output that ends with a slash is a folder,
-which appears whole. Before, outputs are what put_old makes them.
+"""Commands and their outputs, for tests in which calls fail (faults.py) or programs are killed (killed.py).
+
+In a command, NAME.ply and similar names are inputs that make_inputs makes. URL is the URL of model.ebpo.h5. Names
+that begin with OUT are outputs. An output that ends with a slash is a folder, which is replaced atomically. put_old
+makes the outputs that exist before a run.
 """
 import dataclasses
 import os
@@ -67,12 +68,12 @@ TEXTS = {"points.txt": POINTS, "rays.txt": RAYS, "boxes.txt": BOXES, "hand.txt":
 class Command:
     text: str
     outputs: tuple = ()
-    need: str = ""  # what the build must have
-    times_printed: bool = False  # what is printed differs from run to run
-    times_written: bool = False  # so do outputs, of which the size then counts
-    fresh: bool = False  # outputs may not be there before; so are folders
-    replaces: bool = False  # but this folder, a report
-    seconds: bool = False  # takes seconds: a twentieth of the calls are made to fail
+    need: str = ""  # a feature that the build must have
+    times_printed: bool = False  # the printed text differs from run to run
+    times_written: bool = False  # outputs differ from run to run; only their sizes are compared
+    fresh: bool = False  # outputs must not exist before, nor their folders
+    replaces: bool = False  # exception: this folder, a report, may exist
+    seconds: bool = False  # the command takes seconds: only a twentieth of the calls fails
 
 
 COMMANDS = {
@@ -160,7 +161,7 @@ def write(folder, name, content):
 
 
 def read(path):
-    """Of a folder the files in it, by name; None: there is nothing."""
+    """Return the contents of a file, or of a folder's files by name. None: it does not exist."""
     try:
         if os.path.isdir(path):
             return {os.path.relpath(os.path.join(folder, name), path):
@@ -173,7 +174,7 @@ def read(path):
 
 
 def old(command, name):
-    """What an output is before."""
+    """Return the contents of an output before the run."""
     if command.replaces:
         return {"report.json": OLD}
     return None if command.fresh or name.endswith("/") else OLD
@@ -192,18 +193,18 @@ def put_old(command, folder):
 
 
 def is_new(command, name, content, right):
-    """Whether an output is whole and right: `right` is that of a run that nothing befell."""
+    """Return True when an output is complete and correct. right: its contents after a run without faults."""
     if not command.times_written or content is None:
         return content == right
     if name.endswith("/"):
         return (content.keys() == right.keys() and OLD not in content.values() and
                 all(c.rstrip()[-1:] == right[n].rstrip()[-1:] for n, c in content.items()
                     if not n.endswith(".csv")))
-    return content != OLD and abs(len(content) - len(right)) <= 64 # seconds have digits
+    return content != OLD and abs(len(content) - len(right)) <= 64 # the digits of seconds differ
 
 
 def damaged(tool, folder, content):
-    """A file with a chunk that repairing can make anew: one whose frame is damaged."""
+    """Write damaged.ebpo.h5, with a damaged frame in a chunk that `recover` can compute again."""
     at = content.find(b"\x28\xb5\x2f\xfd")
     while at >= 0:
         changed = bytearray(content)
@@ -220,7 +221,7 @@ def damaged(tool, folder, content):
 
 
 def make_inputs(tool, generate, folder, faces, leaf_faces="32"):
-    """The content of model.ebpo.h5."""
+    """Make the inputs. Return the contents of model.ebpo.h5."""
     def path(name):
         return os.path.join(folder, name)
 

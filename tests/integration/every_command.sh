@@ -1,12 +1,12 @@
 #!/bin/sh
-# every_command.sh EBPO VECTORS MODELS: each command that reads over all conformance files, and a few
-# real models converted in several ways. For builds with sanitizers, as of clang:
+# every_command.sh EBPO VECTORS MODELS: runs each reading command on all conformance files, and on a
+# few real models that are converted with several options. For builds with sanitizers, for example with clang:
 #
 #   CC=clang CXX=clang++ meson setup BUILD -Db_sanitize=undefined -Db_lundef=false \
 #       --buildtype=debugoptimized -Dc_args=-fno-sanitize-recover=all
 #
-# Prints how many runs there were, and those with an exit code that no command has, or with a word of a
-# sanitizer; exit code 1 where there is one. Not part of the tests: it takes minutes.
+# Prints the number of runs, and the runs with an invalid exit code or a message of a sanitizer; then
+# its exit code is 1. It takes minutes, so it is not part of the tests.
 ebpo=$(realpath "$1") vectors=$(realpath "$2") models=$(realpath "$3")
 folder=$(mktemp -d) && cd "$folder" || exit 2
 trap 'rm -rf "$folder"' EXIT

@@ -3,13 +3,15 @@
 
 faults.py TOOL GENERATE FAULTS FEATURES [--foreign] [--table] [--every=N] [CASE...]
 
-For each command and each kind of call the n-th fails, once and from then on (tests/support/faults.h).
-Then the program has to end by itself, what it wrote is whole and right or as it was before, no
-other file is left, and the message says what was wrong. CASE: names of commands.py, all of them
-else. EBPO_TEST_SCALE from 1 on: all calls, or, with --every, N apart; less: of each command that
-share of the kinds, one call of each. --foreign: allocations by libhdf5 and other libraries instead
-of our own, counted apart. --table prints counts in Markdown. FAULTS may name more that is
-preloaded, after a colon: liblsan.so.0, which finds memory that is not freed on exit.
+For each command and each kind of call, the n-th call fails once, or from then on (tests/support/faults.h).
+Then the program must end by itself; its outputs must be complete and correct, or unchanged; no other file may
+remain; and the message must state the error.
+
+CASE: names of commands.py; default: all. EBPO_TEST_SCALE of at least 1: all calls fail in turn, or, with
+--every, every N-th. Less than 1: this share of the kinds of each command, and one call of each kind.
+--foreign: allocations by libhdf5 and other libraries fail instead of the project's own; they are counted
+separately. --table prints counts in Markdown. FAULTS may name further preloaded libraries after a colon, such
+as liblsan.so.0, which finds memory that is not freed at exit.
 """
 import collections
 import concurrent.futures
@@ -28,7 +30,7 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 import ranges_server
 from commands import COMMANDS, is_new, make_inputs, old, put_old, read
 
-# The error of each kind. Interrupted and short calls are no failures: the command continues.
+# The errors of each kind. Interrupted and short calls are not failures: the command continues.
 KINDS = {"malloc": ["ENOMEM"], "read": ["EIO", "EINTR"], "short-read": [""],
          "write": ["EIO", "ENOSPC", "EINTR"], "short-write": [""], "fsync": ["EIO"],
          "rename": ["EIO"], "truncate": ["EIO"], "close": ["EIO"], "mmap": ["ENOMEM"],
@@ -39,7 +41,7 @@ LEAK = 23  # LeakSanitizer's exit code
 
 
 class Place:
-    """A folder with the inputs, the outputs as they were before, and one for temporary files."""
+    """A folder with the inputs and the previous outputs, and a folder for temporary files."""
 
     def __init__(self, inputs, root, case, url):
         self.root, self.outputs = root, COMMANDS[case].outputs
@@ -59,7 +61,7 @@ class Place:
         return read(os.path.join(self.root, name))
 
     def run(self, fault, foreign=False):
-        """Exit code, output, what was said, calls of the kind, and how many of them failed."""
+        """Run the command. Return exit code, output, messages, number of calls of the kind, and of failed calls."""
         counts = os.path.join(self.root, "counts")
         environment = dict(os.environ, LC_ALL="C.UTF-8", TMPDIR=self.temporary, LD_PRELOAD=FAULTS,
                            EBPO_TEST_FAULT=fault, EBPO_TEST_FAULT_COUNT=counts,
@@ -78,7 +80,7 @@ class Place:
 
 
 class Case:
-    """A command, and what it does when nothing fails."""
+    """A command, and its results without faults."""
 
     def __init__(self, name, inputs, root, url):
         self.name, self.inputs, self.root, self.url = name, inputs, root, url
@@ -102,32 +104,32 @@ class Case:
         return is_new(self.command, name, content, self.right[name])
 
     def judge(self, place, kind, error, outcome):
-        """What is wrong, or an empty text."""
+        """Return what is wrong, or an empty text."""
         code, printed, said, _, failed = outcome
         wrong = [name for name in place.outputs if not self.is_right(name, place.content(name))]
         if code == 0:
             if wrong or (printed != self.printed and not self.command.times_printed):
-                return f"success, with wrong {wrong or 'answers'}"
+                return f"success, with wrong {wrong or 'results'}"
             return "" if place.files() == self.files else f"success, left {place.files()}"
         if code != 1:
             return f"ended by {code}: {said[-300:]}"
         if error in HARMLESS:
-            return f"not gone on: {said}"
+            return f"did not continue: {said}"
         if not re.search(SAID.get(error) or os.strerror(getattr(errno, error)), said):
             return f"said: {said}"
         if place.outputs and not wrong and place.files() == self.files:
-            return "" # something failed later: the sync of the folder, looking at what was written
-        if "of the two files only" in said: # neither forwards nor back
+            return "" # a later call failed: syncing the folder, or examining the output
+        if "of the two files only" in said: # one of two outputs is written and cannot be undone
             return ""
         changed = [name for name in place.outputs if place.content(name) != old(self.command, name)]
         left = place.files() - self.before
-        if self.name == "fetch": # from which the next one resumes
+        if self.name == "fetch": # the next fetch resumes from these files
             left = {name for name in left if not name.startswith("OUT.part/")}
         return f"changed {changed}, left {sorted(left)}: {said}" if changed or left else ""
 
 
 def places(calls, case, kind):
-    """Which calls are tried."""
+    """Return the numbers of the calls that will fail."""
     draw = random.Random(f"{case.name} {kind}")
     if SCALE < 1:
         return [draw.randint(1, calls)] if calls and draw.random() < max(SCALE, 0.2) else []
@@ -151,7 +153,7 @@ def attempts(case, foreign):
         for n in places(case.calls(kind, foreign), case, kind):
             for error in errors if SCALE >= 1 else errors[n % len(errors):][:1]:
                 for onward in (False, True) if SCALE >= 1 else (n % 2 == 1,):
-                    if not (onward and error == "EINTR"): # which would never end
+                    if not (onward and error == "EINTR"): # it would never end
                         yield (case, kind, error, n, onward, foreign)
 
 
@@ -199,8 +201,8 @@ def main():
         print(f"{name}: {kind} {n}{'+' if onward else ''} {error}: {wrong}")
     if "--table" in options:
         print_table(results)
-    print(f"{len(results)} faults, of which {sum(r[6][4] > 0 for r in results)} came about; "
-          f"{len(bad)} answered wrongly, {len(crashed)} of them by not ending by themselves")
+    print(f"{len(results)} faults, {sum(r[6][4] > 0 for r in results)} of them occurred; "
+          f"{len(bad)} with wrong results, {len(crashed)} of these did not end by themselves")
     return 1 if bad and not foreign else 0
 
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""What ebpo-generate writes is a closed manifold without self-intersections, for every base, and
-the same at every run.
+"""Checks that ebpo-generate writes closed manifolds without self-intersections, for every base, and the same in
+each run.
 
     generator.py EBPO GENERATE CROSSING_FACES
 """
@@ -11,7 +11,7 @@ import sys
 import tempfile
 
 EBPO, GENERATE, CROSSING_FACES = sys.argv[1:4]
-# The last one's base is the file that the first one made.
+# The base of the last model is the file of the first one.
 MODELS = [["--base", "torus", "--faces", "5000"], ["--base", "torus", "--faces", "200000"],
           ["--base", "torus", "--faces", "50000", "--relief", "0.2", "--roughness", "0.5", "--seed",
            "9"],
@@ -28,7 +28,7 @@ def main():
             for target in path, again:
                 subprocess.run([GENERATE, *options, target], check=True, capture_output=True)
             assert (filecmp.cmp(path, again,
-                                shallow=False)), f"{options}: another run gave other bytes"
+                                shallow=False)), f"{options}: another run writes other bytes"
             judged = subprocess.run([CROSSING_FACES, path], capture_output=True, text=True)
             assert judged.returncode == 0, judged.stdout
             report = json.loads(subprocess.run([EBPO, "check", "--json", path], check=True,
@@ -37,7 +37,7 @@ def main():
         lone = subprocess.run([GENERATE, "--base", "sphere", "--faces", "1", "--seed", "2", again],
                               capture_output=True, text=True)
         assert lone.returncode == 0 and not filecmp.cmp(path, again, shallow=False)
-    print(f"{len(MODELS)} models are as promised")
+    print(f"{len(MODELS)} models are correct")
 
 
 main()

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""The same input gives the same bytes: for any number of threads, run after run, and for every
-compiler and its options.
+"""Checks that the same input gives the same bytes, for any number of threads, in every run, and with every compiler
+and its options.
 
     golden.py EBPO GENERATE EXPECTED [--update]
 
-EXPECTED holds a content digest for each input; the other builds of the same sources must reach it
-too. Real models are tested where $EBPO_MODELS names their folder.
+EXPECTED contains a content digest for each input; other builds of the same sources must reach it too. Real models
+are tested if $EBPO_MODELS names their folder.
 """
 import filecmp
 import json

@@ -39,7 +39,7 @@ def sender():
 
 
 def answer(s, to, packet, sequence):
-    """The answer to that place; earlier ones are passed over. What a full queue has dropped is sent again."""
+    """Return the reply for a position. Skip earlier replies; send packets again that a full queue has dropped."""
     tries = 20
     s.sendto(packet, to)
     while True:
@@ -78,13 +78,13 @@ def main(ebpo):
         subprocess.run([ebpo, "convert", "-q", ply, model], check=True)
         p, to = begin(ebpo, model, "--seconds", "20", "--rate", "500")
         device, other = sender(), sender()
-        for packet in NONE:  # before there is a device
+        for packet in NONE:  # before a device is connected
             other.sendto(packet, to)
         first = answer(device, to, place(10), 10)
         assert first[11:14] == (0.4, 0.5, 3.0), first
         for packet in NONE + [place(1 << 63), place(2 ** 64 - 1, kind=3)]:
             other.sendto(packet, to)
-        for packet in NONE + [place(10, at=(9, 9, 9)), place(3, kind=3)]:  # the device's own, wrong or old
+        for packet in NONE + [place(10, at=(9, 9, 9)), place(3, kind=3)]:  # packets of the device itself that are wrong or old
             device.sendto(packet, to)
         second = answer(device, to, place(11, at=(0.4, 0.5, 2.5), turn=(0, 0, 0.6, 0.8)), 11)
         assert second[11:14] == (0.4, 0.5, 2.5), second
@@ -97,7 +97,7 @@ def main(ebpo):
         out, err = p.communicate(timeout=60)
         assert p.returncode == 0, (p.returncode, err)
 
-        p, to = begin(ebpo, model, "--seconds", "2")  # no device connects, or only untrusted senders
+        p, to = begin(ebpo, model, "--seconds", "2")  # no device sends packets, or only untrusted senders
         other.sendto(b"hello", to)
         out, err = p.communicate(timeout=60)
         assert p.returncode == 1 and "no device has sent its position in 2 seconds (1 invalid packets" in err, err

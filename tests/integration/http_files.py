@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Checks that commands give the same results on URLs as on files: http_files.py SERVER TOOL GENERATE [POINTS]
 
-Makes a model, serves it with SERVER (kit/faulty_server.py), well and badly, and compares what the
-commands print, byte by byte. POINTS (default 2000) are asked about; 100000 is the full number.
+Makes a model, serves it with SERVER (tests/support/faulty_server.py) with and without faults, and compares the output
+of the commands byte by byte. POINTS is the number of query points (default 2000; the full test uses 100000).
 """
 import json
 import os
@@ -25,7 +25,7 @@ def expect(what, good, shown=""):
 
 
 def equal(tool, what, path, url, *arguments):
-    """The same output for a path and for a URL, whose name may stand in it."""
+    """Check that the output for a path and for a URL is the same, except for the name."""
     near, far = run(tool, arguments[0], path, *arguments[1:]), run(tool, arguments[0], url,
                                                                    *arguments[1:])
     expect(what, near.returncode == 0 and far.returncode == 0
@@ -44,7 +44,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "m.ebpo.h5")
         ply, asked, rays = (os.path.join(folder, name) for name in ("m.ply", "points", "rays"))
-        # what comes in many pieces must stay so
+        # the file must still consist of many pieces
         scale = min(1, max(0.3, float(os.environ.get("EBPO_TEST_SCALE", "1"))))
         subprocess.run([generate, "--base", "torus", "--faces", str(int(150000 * scale)), ply],
                        check=True, capture_output=True)
@@ -67,8 +67,8 @@ def main():
 
 def check(tool, folder, path, ply, asked, rays, site):
     good = f"{site}/good/m.ebpo.h5"
-    # Everything that is exact, with all in memory and with subtrees on demand, from servers with
-    # troubles that pass.
+    # All exact queries, with the whole model in memory and with subtrees on demand, from servers
+    # with temporary faults.
     for url in (good, f"{site}/short-3/a", f"{site}/random-5-10/b", f"{site}/code_later-503-1-3/c",
                 f"{site}/whole/d"):
         name = url.split("/")[3]
@@ -103,7 +103,7 @@ def check(tool, folder, path, ply, asked, rays, site):
                                     "20001").stdout)["nodes"] for source in (path, good))
         expect(f"view {order}", near == far and len(near) > 19990)
         t = traffic(tool, "view", good, *seen, "--bytes", "300K")
-        expect(f"view {order} keeps to its budget",
+        expect(f"view {order} keeps its budget",
                t["bytes_read"] <= 300 << 10 and t["bytes"] <= (300 << 10) + (64 << 10), t)
 
     # Requests and bytes.
@@ -112,21 +112,21 @@ def check(tool, folder, path, ply, asked, rays, site):
     expect("levels 0 to 4 take two requests and 150 kB",
            t["requests"] <= 2 and t["bytes"] <= 150000, t)
     t = traffic(tool, "levels", good)
-    expect("no byte comes twice", t["bytes"] <= size, t)
+    expect("no byte is sent twice", t["bytes"] <= size, t)
     t = traffic(tool, "bench", good, "--count", "10")
     expect("a whole file in few requests", t["bytes"] <= size
            and t["requests"] <= 3 + size // (1 << 20), t)
-    expect("local files tell reads and bytes",
+    expect("statistics of local files have reads and bytes",
            set(traffic(tool, "info", path)) == {"reads", "bytes_read"})
 
-    # The folder.
+    # The cache folder.
     cache = os.path.join(folder, "cache")
     first = traffic(tool, "measure", good, "--http-cache", cache)
     again = traffic(tool, "measure", good, "--http-cache", cache)
-    expect("the folder saves requests", first["requests"] > 1 and again["requests"] == 1
+    expect("the cache folder saves requests", first["requests"] > 1 and again["requests"] == 1
            and again["cache_bytes"] > 0, (first, again))
 
-    # Errors: one line, code 1 or 2, no hang.
+    # Errors print one line with exit code 1 or 2, and end in time.
     for url, code, words, more in ((f"{site}/code-404/x", 1, "404", ()),
                                    (f"{site}/code-503/x", 1, "503", ("--http-retries", "1")),
                                    (f"{site}/html/x", 1, "returned text/html, not a model", ()),

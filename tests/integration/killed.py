@@ -1,12 +1,11 @@
 #!/usr/bin/env python3
-"""Tests programs that are killed at any moment: killed.py TOOL GENERATE FEATURES [--kills=N] [NAME...]
+"""Tests programs that are killed at any time: killed.py TOOL GENERATE FEATURES [--kills=N] [NAME...]
 
-Every command of commands.py that writes is killed (SIGKILL) after times that are drawn between none
-and somewhat more than a run takes. Afterwards each output is the old one or the new one, whole;
-beside it is at most one temporary file, and a lock file, or a folder in the making, which the next run
-removes (and what fetch resumes from). 200 kills for each command, or N; where
-EBPO_TEST_SCALE is less than 1, two for each third one. Then two writers of one output, and two readers of one cache
-folder.
+Every writing command of commands.py is killed (SIGKILL) after random times, from zero to somewhat more than the
+duration of a run. Then each output must be the old one or the new one, complete. Beside it there may be at most one
+temporary file, and a lock file, or an incomplete folder. The next run removes them (fetch resumes from them). Each
+command is killed 200 times, or N times; if EBPO_TEST_SCALE is less than 1, every third command twice. Then two
+programs write one output, and two programs use one cache folder.
 """
 import collections
 import glob
@@ -28,7 +27,7 @@ from commands import COMMANDS, OLD, is_new, make_inputs, old, put_old, read
 KILLS = 200
 LEFT = re.compile(r"\.OUT(\.[a-z0-9]+)*\.(\d+-\d+\.tmp|lock)|OUT\.part(/.*)?|"
                   r"(OUT|\.OUT\.new)\.part-[0-9a-f]{8}-\d+-\w+(\.old)?")
-NAMED = re.compile(r"\.ebpo-crossings\.\d+-\d+\.tmp") # until libhdf5 has opened it
+NAMED = re.compile(r"\.ebpo-crossings\.\d+-\d+\.tmp") # until libhdf5 has opened the file
 failures = []
 
 
@@ -56,7 +55,7 @@ def make_place(inputs, root):
 
 
 def state(name, out, content, right):
-    """old, new, or neither."""
+    """Return "old", "new" or "neither" for an output."""
     command = COMMANDS[name]
     if content == old(command, out):
         return "old"
@@ -69,7 +68,7 @@ def beside(root, inputs, outputs):
 
 
 def look_beside(name, root, inputs):
-    """Whether something is left."""
+    """Return whether files remain beside the output."""
     others = beside(root, inputs, COMMANDS[name].outputs)
     check(all(LEFT.fullmatch(o) for o in others) and
           len([o for o in others if o.endswith(".tmp")]) <= len(COMMANDS[name].outputs),
@@ -80,7 +79,7 @@ def look_beside(name, root, inputs):
 
 
 def kill_once(name, command, root, wait):
-    """Whether it had ended by itself."""
+    """Kill one run. Return True when it had ended before."""
     put_old(COMMANDS[name], root)
     process = run(command, root)
     time.sleep(wait)
@@ -90,18 +89,20 @@ def kill_once(name, command, root, wait):
 
 
 def is_replaced_report(path):
-    """What was in a report's place, between the exchange and its removal: no later run takes it for
-    its own."""
+    """Return True for the previous contents of a report's folder, between the exchange and the removal.
+
+    No later run mistakes this folder for one of its own.
+    """
     return os.path.isdir(path) and read(path).get("report.json") == OLD
 
 
 def kill_often(name, url, inputs, root, draw, kills):
-    """Kills in one folder, so that what remains meets the next run."""
+    """Kill runs in one folder, so that each run starts with the remains of the previous ones."""
     command, outputs = arguments(COMMANDS[name].text, url), COMMANDS[name].outputs
     make_place(inputs, root)
     put_old(COMMANDS[name], root)
     began = time.monotonic()
-    check(run(command, root).wait(timeout=300) == 0, f"{name}: a run that nobody kills")
+    check(run(command, root).wait(timeout=300) == 0, f"{name}: a run without a kill")
     length = time.monotonic() - began
     right = {out: read(os.path.join(root, out)) for out in outputs}
     counts, done, left, mixed = collections.Counter(), 0, 0, 0
@@ -109,7 +110,7 @@ def kill_often(name, url, inputs, root, draw, kills):
         wait = draw.uniform(0, 1.1 * length)
         ended = kill_once(name, command, root, wait)
         done += ended
-        # other work on the machine makes runs longer and shorter
+        # the load of the machine changes the duration of runs
         length *= 0.95 if ended and wait < length else 1.1 if not ended and wait > 0.9 * length else 1
         states = [state(name, out, read(os.path.join(root, out)), right[out]) for out in outputs]
         check("neither" not in states, f"{name}: {outputs} are {states}")
@@ -126,14 +127,14 @@ def kill_often(name, url, inputs, root, draw, kills):
     others = {other for other in beside(root, inputs, outputs)
               if not is_replaced_report(os.path.join(root, other))}
     others |= set(os.listdir(os.path.join(root, "temporary")))
-    check(not others, f"{name}: the run after leaves {others}")
+    check(not others, f"{name}: the run after that leaves {others}")
     print(f"| {name} | {counts['old']} | {counts['new']} | {counts['neither']} | {mixed} | {done} |"
           f" {left} |", flush=True)
     shutil.rmtree(root)
 
 
 def two_writers(inputs, root):
-    """One output, written by two programs at a time: it is of one or the other."""
+    """Write one output with two programs at a time. It must be that of one of them."""
     make_place(inputs, root)
     for _ in range(20 if SCALE >= 1 else 2):
         both = [run(arguments(f"subset -q --levels 0-{n} model.ebpo.h5 OUT", ""), root)
@@ -143,11 +144,11 @@ def two_writers(inputs, root):
             check(process.returncode == 0, f"two writers: {said}")
         good = subprocess.run([TOOL, "verify", "-q", "OUT"], cwd=root, capture_output=True)
         check(good.returncode == 0, f"two writers: {good.stderr}")
-        check(not [n for n in os.listdir(root) if n.endswith(".tmp")], "two writers: files left")
+        check(not [n for n in os.listdir(root) if n.endswith(".tmp")], "two writers: temporary files remain")
 
 
 def stop_at_folder(command, root):
-    """A program that stands still while a folder of its own is in the making, and that folder."""
+    """Return a stopped program with an incomplete folder, and this folder."""
     for _ in range(50):
         process, made = run(command, root), []
         while not made and process.poll() is None:
@@ -162,26 +163,26 @@ def stop_at_folder(command, root):
 
 
 def folders_in_use(inputs, root):
-    """A folder in the making goes once its program is not there any more, and no other goes."""
+    """Check that an incomplete folder is removed after its program has ended, and no other folder."""
     make_place(inputs, root)
     command = arguments(COMMANDS["convert components"].text, "")
     process, folder = stop_at_folder(command, root)
-    check(run(command, root).wait(timeout=300) == 0, "folders: beside one that is stopped")
-    check(os.listdir(folder), "folders: one that is in use is removed")
+    check(run(command, root).wait(timeout=300) == 0, "folders: while another program is stopped")
+    check(os.listdir(folder), "folders: a folder in use is removed")
     like = [folder + "0", os.path.join(root, "OUT.part-abcdef")]
-    for other in like: # no program has made a folder of that inode under that name
+    for other in like: # folders with these names were not made by a program: their inodes differ
         shutil.copytree(folder, other)
     process.kill()
     process.communicate(timeout=300)
     shutil.rmtree(os.path.join(root, "OUT"))
     check(run(command, root).wait(timeout=300) == 0, "folders: after the kill")
-    check(not os.path.exists(folder), "folders: that of a killed program stays")
+    check(not os.path.exists(folder), "folders: the folder of a killed program remains")
     check(all(os.listdir(other) for other in like if os.path.exists(other)) and
-          all(map(os.path.exists, like)), "folders: somebody's own are removed")
+          all(map(os.path.exists, like)), "folders: the user's own folders are removed")
 
 
 def two_readers(inputs, root, url):
-    """One cache folder, used by two programs at a time, one of which is killed now and then."""
+    """Use one cache folder with two programs at a time; one of them is killed repeatedly."""
     make_place(inputs, root)
     points = os.path.join(root, "points.txt")
     with open(points, "w", encoding="ascii") as f:
@@ -212,7 +213,7 @@ def main():
     with tempfile.TemporaryDirectory(dir=os.environ.get("TMPDIR", "/var/tmp")) as root:
         inputs = os.path.join(root, "inputs")
         url = ranges_server.serve(make_inputs(TOOL, GENERATE, inputs, 5000))
-        print("| command | old | new | neither | of two one | had ended | something left |\n"
+        print("| command | old | new | neither | one of two new | ended before | files remain |\n"
               "|---|---:|---:|---:|---:|---:|---:|")
         for name in names:
             kill_often(name, url, inputs, os.path.join(root, "killed"), draw, kills)

@@ -1,12 +1,11 @@
 #!/usr/bin/env python3
-"""Tests real models end to end: converts each, verifies it against the source, extracts the mesh and
-compares it bit for bit.
+"""Tests real models end to end: converts each model, verifies it against the source, extracts the mesh and compares it
+bit for bit.
 
     models.py EBPO FOLDER [MOST_BYTES]
 
-FOLDER holds PLY files and wild/ with unusual dialects. This script lists the solids, from the
-folder's index. Other files must become a surface with a warning, or a solid by repair.
-Files above MOST_BYTES are omitted.
+FOLDER contains PLY files, and wild/ with unusual dialects. This script lists the solids, from the folder's index. Other
+files must become a surface with a warning, or a solid by repair. Files above MOST_BYTES are omitted.
 """
 import json
 import pathlib
@@ -20,7 +19,8 @@ SOLIDS = {"bunny_closed", "armadillo", "dragon100k", "lucy100k", "igea", "xyzrgb
           "skull", "fertility", "cheese_g133", "thingi73416",
           "thingi99865", "twin7081_left", "twin7081_right", "selfint_A", "cad_adis16480"}
 SURFACES = {"bunny", "dragon_vrip", "blade", "motorbike", "conrod", "office_chair"}
-# Three edges where the two directions do not cancel, says the index; it must not pass for a solid.
+# According to the index, three edges have directions that do not cancel. The model must not be
+# accepted as a solid.
 SURFACES |= {"buildings"}
 MENDED = {"bunny": ["--fill-holes"], "blade": ["--fill-holes"], "dragon_vrip": ["--fill-holes"]}
 TRUNCATED = "pond_truncated_points.ply"
@@ -33,7 +33,7 @@ def run(*arguments):
 
 
 def parse(path):
-    """Vertices and faces as bytes: of plain files (three coordinates, triangles) only."""
+    """Return vertices and faces as bytes. Only for plain files (three coordinates, triangles)."""
     data = path.read_bytes()
     body = data.index(b"end_header\n") + len(b"end_header\n")
     header = data[:body].decode().split("\n")
@@ -66,7 +66,7 @@ def check(path, folder, kind, options=()):
     expect(run(EBPO, "extract", "-q", "--mesh", str(target), str(back)).returncode == 0,
            f"{name}: extract")
     if not options and path.parent == FOLDER:
-        expect(parse(back) == parse(path), f"{name}: the mesh that comes back differs")
+        expect(parse(back) == parse(path), f"{name}: the extracted mesh differs")
     if kind == "surface":
         refused = run(EBPO, "convert", "-q", "--require-solid", *options, str(path), str(target))
         expect(refused.returncode == 3, f"{name}: --require-solid ends with {refused.returncode}")
@@ -87,7 +87,7 @@ def main():
             done = run(EBPO, "check", str(path))
             if path.name == TRUNCATED:
                 expect(done.returncode == 1 and "byte" in done.stderr,
-                       f"{path.name}: not refused with its place: {done.stderr}")
+                       f"{path.name}: not refused with a position: {done.stderr}")
             else:
                 expect(done.returncode == 0, f"{path.name}: {done.stderr}")
     print("\n".join(problems) or f"{count} checks of real models")

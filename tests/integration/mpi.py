@@ -1,6 +1,9 @@
 #!/usr/bin/env python3
-"""mpi.py EBPO GENERATE MPIRUN MPI_INSIDE: the sample with MPI answers as the command, on 1, 2 and 4
-processes, byte for byte; an error ends all of them with its message, and leaves no answers."""
+"""Tests the sample with MPI: mpi.py EBPO GENERATE MPIRUN MPI_INSIDE
+
+It must give the results of the command on 1, 2 and 4 processes, byte for byte. An error must end all processes with
+its message, and leave no results.
+"""
 import os
 import random
 import struct
@@ -8,7 +11,7 @@ import subprocess
 import sys
 import tempfile
 
-ROWS = 600_001  # more than two processes take at a time
+ROWS = 600_001  # more rows than two processes handle at a time
 
 
 def main():
@@ -37,7 +40,7 @@ def main():
             os.remove("a.raw")
         with open("cut.raw", "wb") as file:
             file.write(some[:30])
-        with open("nan.raw", "wb") as file:  # found when answers are written already
+        with open("nan.raw", "wb") as file:  # found after some results are written
             file.write(some * (ROWS // 5000) + struct.pack("<3d", 0, 0, float("nan")))
         for arguments, message in ((("no.ebpo.h5", "p.raw", "a.raw"), "no.ebpo.h5: "),
                                    (("m.ebpo.h5", "cut.raw", "a.raw"), "does not contain rows of three doubles"),

@@ -1,7 +1,7 @@
 #!/bin/sh
 # paraview.sh EBPO CLI_INPUTS SOURCE_ROOT: checks that ParaView opens the files of ebpo export,
-# counts the same cells as ebpo, and draws them. Skips (77) without pvpython, or without a display and xvfb-run;
-# tools/install-deps.sh --paraview installs all of it.
+# counts the same cells as ebpo, and draws them. Skips (77) without pvpython, or without a display and xvfb-run.
+# tools/install-deps.sh --paraview installs the required packages.
 set -eu
 tests=$(cd "$(dirname "$0")" && pwd)
 ebpo=$(realpath "$1") inputs=$(realpath "$2") root=$3

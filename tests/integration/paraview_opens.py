@@ -1,5 +1,8 @@
-"""paraview_opens.py FOLDER [PICTURE]: run by pvpython. The files in FOLDER are what the JSON beside
-each says, as ParaView reads them; or the picture shows something."""
+"""paraview_opens.py FOLDER [PICTURE]: pvpython runs this script.
+
+Checks that ParaView reads the files in FOLDER as the JSON beside each describes them, or that the picture shows an
+object.
+"""
 import json
 import math
 import os
@@ -85,7 +88,7 @@ def check_picture(name):
     reader.Update()
     image = reader.GetOutput()
     width, height = image.GetDimensions()[:2]
-    for left in (0, width // 2):  # something large, of many shades, in each half
+    for left in (0, width // 2):  # each half shows a large object with many shades
         seen = [tuple(image.GetScalarComponentAsFloat(x, y, 0, k) for k in range(3))
                 for x in range(left, left + width // 2, 4) for y in range(0, height, 4)]
         shown = [c for c in seen if c != (255, 255, 255)]

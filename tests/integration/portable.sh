@@ -1,20 +1,20 @@
 #!/bin/sh
-# portable.sh [--all] [ARCH...]: the library and the command on machines that this one is not.
+# portable.sh [--all] [ARCH...]: tests the library and the command for other kinds of machines.
 #
-#   amd64   this one, whose bytes the others are compared with; always first
+#   amd64   the reference, whose bytes the others must equal; always first
 #   s390x   big-endian, 64 bits            armhf   32 bits, ARM
 #   i386    32 bits, x86 with SSE2         arm64   ARM, 64 bits
 #
-# On Debian 12 with root, debootstrap and python3-h5py; by hand, as each takes half an hour. Each
-# gets a root folder of its own below $EBPO_PORTABLE (/var/tmp/ebpo-portable, 1.5 GB each), with a
-# cross compiler, Debian's libraries for it and qemu-user: this system is left as it is. What is
-# built is asked for: vectors, golden hashes, dialects of PLY, reading of heads, a model converted
-# and verified, and its bytes. EBPO_JOBS and EBPO_TEST_SCALE are passed on. --all: every program of
-# tests/unit and tests/query, too.
+# Run it by hand on Debian 12, as root, with debootstrap and python3-h5py; each machine takes half an
+# hour. Each machine has a separate root folder below $EBPO_PORTABLE (/var/tmp/ebpo-portable, 1.5 GB
+# each), with a cross compiler, Debian's libraries and qemu-user. This system is not changed. The
+# tests are vectors, golden hashes, dialects of PLY, reading of headers, conversion and verification
+# of a model, and its bytes. EBPO_JOBS and EBPO_TEST_SCALE are passed on. --all also runs every
+# program of tests/unit and tests/query.
 set -eu
 source=$(cd "$(dirname "$0")/../.." && pwd)
 roots=${EBPO_PORTABLE:-/var/tmp/ebpo-portable}
-mirror=${EBPO_DEBIAN_MIRROR:-} # empty: the one that debootstrap knows
+mirror=${EBPO_DEBIAN_MIRROR:-} # empty: the default of debootstrap
 tests=chosen
 [ "${1:-}" != --all ] || { tests=all && shift; }
 [ $# -gt 0 ] || set -- s390x i386 armhf arm64
@@ -35,7 +35,7 @@ python=/usr/bin/python3
     exit 2
 }
 
-# In mounts of its own, which end with it.
+# Runs a command in a root folder. A child process has the mounts, which end with it.
 inside() { # root, command...
     root=$1
     shift
@@ -88,7 +88,7 @@ failed=
 case " $* " in *" amd64 "*) ;; *) set -- amd64 "$@" ;; esac
 for arch in "$@"; do
     make_root "$arch" >"$roots/$arch.packages" 2>&1 || {
-        echo "portable.sh: no root for $arch; why is in $roots/$arch.packages" >&2
+        echo "portable.sh: no root folder for $arch; see $roots/$arch.packages" >&2
         failed="$failed $arch"
         continue
     }
@@ -98,7 +98,7 @@ for arch in "$@"; do
         failed="$failed $arch"
     ! [ -e "$roots/$arch/made/sums" ] || cmp "$roots/amd64/made/sums" "$roots/$arch/made/sums" ||
         failed="$failed $arch:bytes"
-    # In 37 and 38 a list is false on purpose; libhdf5 turns a number out of range otherwise there.
+    # Files 37 and 38 have invalid lists; on s390x libhdf5 converts their out-of-range values differently.
     differs=
     [ "$arch" != s390x ] || differs="--differs 37 38"
     # shellcheck disable=SC2086
@@ -106,4 +106,4 @@ for arch in "$@"; do
         "$roots/$arch/made/vectors/passed" $differs || failed="$failed $arch:chunks"
 done
 [ -z "$failed" ] || { echo "portable.sh: failed:$failed" >&2; exit 1; }
-echo "portable.sh: all is well on $*"
+echo "portable.sh: OK on $*"

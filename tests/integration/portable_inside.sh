@@ -1,11 +1,11 @@
 #!/bin/sh
-# portable_inside.sh ARCH chosen|all: what portable.sh runs within a root folder that has all that
-# is needed. Builds /ebpo for ARCH in /build, and asks it; bytes that must be the same on all
-# machines go to /made/sums.
+# portable_inside.sh ARCH chosen|all: portable.sh runs this script in a complete root folder.
+# Builds /ebpo for ARCH in /build and tests it. Writes checksums of bytes that must be the same on
+# all machines to /made/sums.
 set -eu
 arch=$1 tests=$2 failed=
 export EBPO_VECTORS=/ebpo/format-spec/vectors EBPO_TEST_SCALE="${EBPO_TEST_SCALE:-0.02}"
-export CK_TIMEOUT_MULTIPLIER=20 # qemu takes its time
+export CK_TIMEOUT_MULTIPLIER=20 # qemu is slow
 qemu='' cross=''
 case $arch in
 s390x) triplet=s390x-linux-gnu qemu=qemu-s390x-static family=s390x endian=big ;;
@@ -33,7 +33,7 @@ cpu = '$family'
 endian = '$endian'
 END
 }
-# Programs of the other machine under names that scripts can call.
+# Makes scripts that run the other machine's programs with qemu.
 wrap() { # program...
     for program in "$@"; do
         printf '#!/bin/sh\nexec %s "%s" "$@"\n' "$qemu" "$program" >"/made/bin/${program##*/}"
@@ -44,7 +44,7 @@ check() { # name, command...
     name=$1
     shift
     if "$@" >"/made/$name.log" 2>&1; then
-        echo "fine    $name"
+        echo "OK      $name"
     else
         echo "FAILED  $name (/made/$name.log in the root)"
         tail -5 "/made/$name.log" | sed 's/^/        /'
@@ -86,14 +86,14 @@ check hashes python3 /ebpo/tests/lint/flags/fp_flags.py /ebpo/tests/lint/flags/f
     bin/fp_hash_usual
 [ "$tests" = all ] || for unit in $units; do check "$unit" bin/test_unit "$unit"; done
 if [ "$tests" = all ]; then
-    suites() { "$1" 2>&1 | sed -n 's/.*SUITE is one of//p'; } # as its usage lists them
+    suites() { "$1" 2>&1 | sed -n 's/.*SUITE is one of//p'; } # from its usage text
     for unit in $(suites bin/test_unit); do check "$unit" bin/test_unit "$unit"; done
     for query in $(suites bin/test_query); do check "$query" bin/test_query "$query"; done
 fi
 check golden python3 /ebpo/tests/integration/golden.py bin/ebpo bin/ebpo-generate \
     /ebpo/tests/integration/golden.json
 
-# The same mesh on all machines, converted and brought back.
+# Converts the same mesh on all machines, and extracts it.
 for selection in greedy leaf-planes; do
     bin/ebpo-generate --base torus --faces 30000 --seed 7 torus.ply
     case $selection in
@@ -106,7 +106,7 @@ done
 check extract bin/ebpo extract --mesh greedy.ebpo.h5 back.ply
 check same-mesh cmp torus.ply back.ply
 bin/predicates_hash_small >predicates.txt
-# Not of the .ebpo.h5: zstd has other bytes on machines of 32 bits and on big-endian ones.
+# Not the .ebpo.h5: zstd writes other bytes on 32-bit and on big-endian machines.
 sha256sum predicates.txt torus.ply back.ply >sums
 cat sums
 [ -z "$failed" ] || exit 1

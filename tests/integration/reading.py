@@ -14,7 +14,8 @@ TOOL, LIBRARY, INPUTS, VECTORS = map(os.path.abspath, sys.argv[1:5])
 FEATURES = sys.argv[5].split(",")
 CANNOT = "was built without libhdf5"
 READING = dict(os.environ, LC_ALL="C.UTF-8", LD_LIBRARY_PATH=os.path.dirname(LIBRARY))
-# The build finds its own by itself; Meson may put the other one's folder before it.
+# The build finds its own library without LD_LIBRARY_PATH; Meson may put the other library's folder
+# first.
 USUAL = {k: v for k, v in READING.items() if k != "LD_LIBRARY_PATH"}
 failures = []
 
@@ -32,7 +33,7 @@ def run(environment, *words, given=None):
 
 
 def same(*words, given=None):
-    """The same exit code and the same words of both."""
+    """Check that both libraries give the same exit code and output."""
     reading, usual = run(READING, *words, given=given), run(USUAL, *words, given=given)
     check(reading == usual, f"{' '.join(words)}: as with libhdf5 ({reading[0]}, {usual[0]}; "
           f"{reading[2].strip()[:200]})")
@@ -47,7 +48,7 @@ def slurp(path):
 def is_without():
     loaded = subprocess.run([TOOL], env=dict(READING, LD_TRACE_LOADED_OBJECTS="1"), check=True,
                             capture_output=True, text=True).stdout
-    check(os.path.dirname(LIBRARY) in loaded, "the library is the one under test")
+    check(os.path.dirname(LIBRARY) in loaded, "the tested library is loaded")
     check("hdf5" not in loaded.replace(os.path.dirname(LIBRARY), ""), "libhdf5 is not loaded")
 
 
@@ -66,7 +67,7 @@ def vectors():
 
 
 def writing(model):
-    """Each command that would write HDF5, and what it would write."""
+    """Yield each command that would write HDF5, and its output."""
     for words in (["convert", "sphere.ply", "OUT"], ["subset", "--levels", "0-1", model, "OUT"],
                   ["repack", model, "OUT"], ["recover", "-o", "OUT", model],
                   ["export", "--levels", "0", "--format", "xdmf", model, "OUT.xdmf"],
@@ -75,7 +76,7 @@ def writing(model):
         out = next((w.replace("OUT", "out") for w in words if "OUT" in w), None)
         code, _, said = run(READING, *(w.replace("OUT", "out") for w in words))
         told = CANNOT in said or words[0] == "info"
-        check(code == 1 and told, f"{words[0]} says that it cannot ({code}: {said.strip()[:200]})")
+        check(code == 1 and told, f"{words[0]} reports that it is unsupported ({code}: {said.strip()[:200]})")
         check(not out or not any(n.startswith(out) for n in os.listdir(".")), f"{words[0]}: no output")
 
 

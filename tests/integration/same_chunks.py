@@ -24,7 +24,7 @@ room = ctypes.create_string_buffer(MOST)
 def undone(stored):
     size = library.ZSTD_decompress(room, MOST, stored, len(stored))
     if library.ZSTD_isError(ctypes.c_size_t(size)):
-        raise ValueError("a chunk is not a frame of zstd")
+        raise ValueError("a chunk is not a zstd frame")
     return ctypes.string_at(room, size)
 
 
@@ -34,7 +34,7 @@ def attributes(thing):
 
 
 def chunks(dataset):
-    """Of a dataset: what it is, then a pair for each chunk."""
+    """Yield the description of a dataset, then a pair for each chunk."""
     plist = dataset.id.get_create_plist()
     filters = [plist.get_filter(i)[0] for i in range(plist.get_nfilters())]
     yield dataset.name, (dataset.dtype.str, dataset.shape, dataset.chunks, filters)
@@ -61,7 +61,7 @@ def content(path):
 
 
 def difference(path, other):
-    """The first thing that is not the same, or nothing; and how much was compared."""
+    """Return the first difference or nothing, and the number of compared items."""
     one, two = content(path), content(other)
     for key in sorted(one.keys() | two.keys()):
         if one.get(key) != two.get(key):
@@ -81,7 +81,7 @@ def main():
             problems.append(f"{path.name}: {where or 'has the same content'}")
     files = len(list(folder.glob("*.ebpo.h5")))
     print("\n".join(problems) or f"{files} files, {compared} attributes, arrays and chunks, {same}"
-          f" files in the same bytes; with other content, as expected: {len(differs)}")
+                                 f" files with equal bytes; different contents as expected: {len(differs)}")
     return 1 if problems or files < 32 else 0
 
 

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Whatever `convert`, `subset`, `repack`, `recover` and `fetch` write is opened, and is fine: each option that
+"""Checks that every file that `convert`, `subset`, `repack`, `recover` and `fetch` write is valid, with each option that
 changes a file.
 
-written.py EBPO SERVER [PLY ...] [--few] [--generate EBPO-GENERATE]: SERVER is tests/support/faulty_server.py, or
-- for no fetching. Each file has to be opened by `ebpo info` without --compat, and to be found fine by `ebpo
-verify`. What a command refuses to make is counted and named. --few: every seventh way, other ones for each
-model. --generate: also of a small model that this program makes.
+written.py EBPO SERVER [PLY ...] [--few] [--generate EBPO-GENERATE]
+
+SERVER is tests/support/faulty_server.py, or - to omit fetch. Each file must be opened by `ebpo info` without --compat
+and verified by `ebpo verify`. Refused combinations are counted and printed. --few: tests every seventh combination,
+others for each model. --generate: also tests a small model that this program makes.
 """
 import argparse
 import collections
@@ -75,7 +76,7 @@ CONVERT = """
 --unit mm --crs EPSG:25832 --date 2026-03-01
 """
 
-# {box}: the half of the model's box from its lower corner on
+# {box}: half of the model's box, from its lower corner
 SUBSET = """
 --levels 0-0
 --levels 0-2
@@ -114,7 +115,7 @@ class Tried:
         self.number = 0
 
     def ways(self, text):
-        """Lists of options; of the long lists, by turns, a few."""
+        """Return lists of options; of the long lists only some, others for each model."""
         for way in text.strip().split("\n"):
             self.number += 1
             if not self.few or self.number % 7 == 0:
@@ -124,7 +125,7 @@ class Tried:
         return subprocess.run((self.ebpo,) + words, capture_output=True, text=True, check=False)
 
     def made(self, command, way, source, target):
-        """Whether there is a file now; it is looked at."""
+        """Run a command and check its output. Return True when there is an output."""
         names = ("-o", target, source) if command == "recover" else (source, target)
         done = self.run(command, *way.split(), *names)
         what = f"{command} {way} {source}"
@@ -150,7 +151,7 @@ def lower_half(facts):
 
 
 def copies(tried, path, server):
-    """What subset, recover and fetch make of a file of all parts."""
+    """Check the outputs of subset, recover and fetch for a file with all parts."""
     box = lower_half(json.loads(tried.run("info", "--json", path).stdout))
     for way in tried.ways(SUBSET):
         if tried.made("subset", way.replace("{box}", box), path, "s.ebpo.h5"):

@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""A web server that misbehaves as its addresses say.
+"""A web server that misbehaves as its URLs request.
 
 faulty_server.py FILE            serves FILE on 127.0.0.1, prints the port on a line, and ends when
-its standard input does http://127.0.0.1:PORT/FAULT/...  FAULT is one of the functions below without
-"fault_", numbers after dashes are its arguments
+                                 its standard input ends
+http://127.0.0.1:PORT/FAULT/...  FAULT is one of the functions below without "fault_"; numbers after
+                                 dashes are its arguments
 
-Each address counts its requests by itself, so a test takes an address of its own: what follows
-FAULT/ is not looked at.
+The server counts requests separately for each URL, so each test uses a URL of its own. The text
+after FAULT/ has no other effect.
 """
 import collections
 import email.utils
@@ -22,7 +23,7 @@ import time
 
 MODIFIED = email.utils.formatdate(1700000000, usegmt=True)
 LATER = email.utils.formatdate(1700000100, usegmt=True)
-NAP = 30  # seconds: longer than any test waits
+NAP = 30  # seconds, longer than any test waits
 
 
 class Handler(http.server.BaseHTTPRequestHandler):
@@ -36,7 +37,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
     def log_message(self, *arguments):
         pass
 
-    # --- what answers are made of ---
+    # --- parts of responses ---
 
     def head(self, code, headers):
         self.send_response_only(code)
@@ -56,8 +57,11 @@ class Handler(http.server.BaseHTTPRequestHandler):
         return (begin, last) if begin <= last else None
 
     def part(self, data=None, version=None, extra=(), shift=0, cut=0, code=206):
-        """The range that was asked for. `shift`: of what Content-Range says; `cut`: bytes that are
-        missing at the end."""
+        """Send the requested range.
+
+        shift: offset of the range in Content-Range.
+        cut: bytes that are missing at the end.
+        """
         data = self.data if data is None else data
         asked = self.asked(data)
         if asked is None:
@@ -101,14 +105,14 @@ class Handler(http.server.BaseHTTPRequestHandler):
         self.wfile.write(text)
 
     def first(self, times, fault):
-        """The fault for the first requests of this address, then the range."""
+        """Send the fault for the first requests of this URL, then the range."""
         if self.number <= times:
             fault()
         else:
             self.part()
 
     def first_good(self, times, fault):
-        """The range for the first requests of this address, then the fault."""
+        """Send the range for the first requests of this URL, then the fault."""
         (self.part if self.number <= times else fault)()
 
     def redirect(self, target):
@@ -135,7 +139,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
         self.chunks(200, [], self.data)
 
     def fault_whole_open(self):
-        """HTTP/1.0: nobody knows where this ends."""
+        """Use HTTP/1.0 without a length, so that the end of the body is unknown."""
         self.head(200, [("Connection", "close")])
         self.wfile.write(self.data[:len(self.data) // 2])
         self.drop()
@@ -151,13 +155,13 @@ class Handler(http.server.BaseHTTPRequestHandler):
             self.whole()
 
     def fault_small_parts(self):
-        """Never more than 32 KiB at a time, properly said."""
+        """Send at most 32 KiB at a time, with the correct Content-Range."""
         begin, last = self.asked(self.data)
         self.headers.replace_header("Range", f"bytes={begin}-{min(last, begin + 32767)}")
         self.part()
 
     def fault_whole_then_parts(self, times=1):
-        """As by turns from two servers behind one address: everything, broken off, then ranges."""
+        """Send the whole file, but cut off, then ranges, like two different servers behind one URL."""
         def fault():
             self.head(200, [("Content-Length", len(self.data))] + self.version())
             self.wfile.write(self.data[:1000])
@@ -165,7 +169,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
         self.first(times, fault)
 
     def fault_bare_replaced(self):
-        """Sends no version, and replaces the file while it is read."""
+        """Send no version, and replace the file while it is read."""
         if self.number <= 2:
             self.part(version=[], cut=0 if self.number == 1 else len(self.data) // 2)
         else:
@@ -200,7 +204,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
         self.first(times, self.drop)
 
     def fault_lying_length(self, times=99):
-        """Content-Length and body agree, but are less than the range."""
+        """Send a body that agrees with Content-Length but is shorter than the range."""
         def fault():
             begin, last = self.asked(self.data)
             body = self.data[begin:last + 1][:500]
@@ -210,7 +214,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
         self.first(times, fault)
 
     def fault_less(self):
-        """Answers with a shorter range than was asked for, and says so: that is allowed."""
+        """Send a shorter range than requested, with the correct Content-Range; this is allowed."""
         begin, last = self.asked(self.data)
         last = min(last, begin + 70000)
         self.head(206, [("Content-Range", f"bytes {begin}-{last}/{len(self.data)}"),
@@ -286,7 +290,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
         self.first(times, fault)
 
     def fault_drip(self):
-        """A few bytes at a time, for ever."""
+        """Send a few bytes at a time, without an end."""
         begin, last = self.asked(self.data)
         self.head(206, [("Content-Range", f"bytes {begin}-{last}/{len(self.data)}"),
                         ("Content-Length", last + 1 - begin)] + self.version())
@@ -325,7 +329,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
         self.redirect("/good/elsewhere")
 
     def fault_redirect_wrong(self):
-        """To a place that ignores ranges properly said, and says another one."""
+        """Redirect to a URL that returns another range than requested."""
         self.redirect("/wrong_range/elsewhere")
 
     def fault_redirect_long(self, bytes):
@@ -341,8 +345,12 @@ class Handler(http.server.BaseHTTPRequestHandler):
         return int(self.server.server_address[1])
 
     def fault_away(self, where=0):
-        """To this machine by another name; to another port; to this server, and from there away;
-        away, and from there back; to this server alone, by a whole address and by a part of one."""
+        """Redirect by the value of `where`.
+
+        0: to this server by another host name; 1: to another port; 2: to this server, which then redirects
+        to another host name; 3: to another host name, which redirects back; 4, 5: to this server only, by
+        an absolute and by a relative URL.
+        """
         rest = "/".join(self.path.split("/")[2:])
         self.redirect([f"http://localhost:{self.here()}/other/{rest}",
                        f"http://127.0.0.1:{Handler.other_port}/other/{rest}",
@@ -356,7 +364,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
         self.redirect(f"http://127.0.0.1:{self.here()}/other/{rest}")
 
     def fault_other(self):
-        """Fails when the request contains a secret."""
+        """Fail when the request contains a secret."""
         if self.headers.get("X-Key") or self.headers.get("Authorization"):
             self.fail(403)
         else:
@@ -396,11 +404,11 @@ class Handler(http.server.BaseHTTPRequestHandler):
             self.part(data=self.data[:1000])
 
     def fault_change_bare(self, good=1):
-        """Sends neither ETag nor Last-Modified: only the bytes show a change."""
+        """Send neither ETag nor Last-Modified: only the bytes show a change."""
         self.part(data=self.data if self.number <= good else self.data[::-1], version=[])
 
     def fault_change_between(self):
-        """Every answer is short, and from the second on of another version."""
+        """Send short responses; from the second on they are of another version."""
         if self.number == 1:
             self.part(cut=1000)
         else:

@@ -1,4 +1,4 @@
-"""A web server that gives ranges of one file, and does nothing else: serve(data) gives its URL."""
+"""A web server that serves ranges of one file: serve(data) returns its URL."""
 import http.server
 import re
 import threading
@@ -23,12 +23,12 @@ class Handler(http.server.BaseHTTPRequestHandler):
         try:
             self.end_headers()
             self.wfile.write(data[begin:end])
-        except ConnectionError: # a client that was killed
+        except ConnectionError: # the client was killed
             pass
 
 
 def start(data):
-    """A server whose members `data` and `etag` may be changed."""
+    """Return a running server. Its members `data` and `etag` may be changed."""
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
     server.daemon_threads = True
     server.data, server.etag = data, '"1"'

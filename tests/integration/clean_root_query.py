@@ -1,4 +1,4 @@
-"""clean_root_ask.py MODEL FOLDER: a million points and rays about a model; answers as .npy files."""
+"""clean_root_query.py MODEL FOLDER: queries a million points and rays, and writes the results as .npy files."""
 import os
 import sys
 import time
