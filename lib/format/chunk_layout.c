@@ -255,24 +255,24 @@ int ebpo_subtree_level_for(const ebpo_info *info, uint64_t subtree_faces)
     return found;
 }
 
-void ebpo_subtree_checksums_free(ebpo_subtree_checksums *checksums)
+void ebpo_subtree_checksums_free(ebpo_subtree_checksums *sums)
 {
-    free(checksums->before);
-    free(checksums->counts);
-    free(checksums->index);
-    free(checksums->outer);
-    memset(checksums, 0, sizeof *checksums);
+    free(sums->before);
+    free(sums->counts);
+    free(sums->index);
+    free(sums->outer);
+    memset(sums, 0, sizeof *sums);
 }
 
 typedef struct counting {
-    ebpo_subtree_checksums *checksums;
+    ebpo_subtree_checksums *sums;
     const ebpo_tree *tree;
     const ebpo_info *info;
 } counting;
 
 static uint64_t *row_of(const counting *c, uint64_t subtree)
 {
-    return c->checksums->before + subtree * c->checksums->cols;
+    return c->sums->before + subtree * c->sums->cols;
 }
 
 static uint64_t level_sum(const counting *c, uint64_t subtree, int level, unsigned what)
@@ -305,7 +305,7 @@ static void count_level(const counting *c, int number)
 {
     const ebpo_level *level = &c->tree->level[number];
     unsigned column = ebpo_subtree_column(c->info, number, 0);
-    EBPO_FOR_ITEMS_EVERY(level->workspace, SUBTREES_A_TIME, i, 0, c->checksums->subtrees) {
+    EBPO_FOR_ITEMS_EVERY(level->workspace, SUBTREES_A_TIME, i, 0, c->sums->subtrees) {
         const uint64_t *from = row_of(c, i) + column;
         uint64_t *sum = row_of(c, i + 1) + column, group = first_group(c, i, number), types[4];
         memcpy(sum, from, EBPO_SUBTREE_LEVEL_COLS * sizeof *sum);
@@ -341,7 +341,7 @@ static void owned_faces(const counting *c, uint64_t subtree, uint64_t *first, ui
 static void count_faces(const counting *c)
 {
     uint64_t at = 0, first, end;
-    for (uint64_t i = 0; i < c->checksums->subtrees; i++) {
+    for (uint64_t i = 0; i < c->sums->subtrees; i++) {
         uint64_t *from = row_of(c, i), *to = row_of(c, i + 1);
         owned_faces(c, i, &first, &end);
         first = end < at || first == UINT64_MAX ? at : first; /* the subtree has no leaves */
@@ -364,7 +364,7 @@ static void count_first_uses(const ebpo_mesh *mesh, uint64_t *face, uint64_t end
 static void count_vertices(const counting *c)
 {
     uint64_t face = 0, seen = 0;
-    for (uint64_t i = 0; i < c->checksums->subtrees; i++) {
+    for (uint64_t i = 0; i < c->sums->subtrees; i++) {
         uint64_t *from = row_of(c, i), *to = row_of(c, i + 1), begin = seen;
         count_first_uses(&c->tree->mesh, &face, to[EBPO_S_FACES_BEFORE] + from[EBPO_S_FACES],
                          &seen);
@@ -379,7 +379,7 @@ static ebpo_status list_shared(const counting *c, ebpo_error *error)
 {
     shared_blocks blocks;
     ebpo_status status = shared_blocks_make(&blocks, c->info, error);
-    EBPO_FOR_ITEMS_EVERY(c->tree->mesh.workspace, SUBTREES_A_TIME, i, 0, c->checksums->subtrees) {
+    EBPO_FOR_ITEMS_EVERY(c->tree->mesh.workspace, SUBTREES_A_TIME, i, 0, c->sums->subtrees) {
         uint64_t *from = row_of(c, i), *to = row_of(c, i + 1);
         owned_range own = {
             .face = to[EBPO_S_FACES_BEFORE] + from[EBPO_S_FACES],
@@ -396,16 +396,14 @@ static ebpo_status list_shared(const counting *c, ebpo_error *error)
                                     c->tree->level[l].leaf_refs + first, end - first);
         }
         shared_blocks_use(&blocks, &c->tree->mesh, &own);
-        if (!ebpo_grow(&c->checksums->outer, &c->checksums->shared_capacity,
-                       c->checksums->shared_count + blocks.face_blocks + blocks.vertex_blocks +
+        if (!ebpo_grow(&c->sums->outer, &c->sums->shared_capacity,
+                       c->sums->shared_count + blocks.face_blocks + blocks.vertex_blocks +
                            1, /* never NULL */
-                       sizeof *c->checksums->outer))
-            status =
-                ebpo_fail_memory(error, c->checksums->shared_count * sizeof *c->checksums->outer);
+                       sizeof *c->sums->outer))
+            status = ebpo_fail_memory(error, c->sums->shared_count * sizeof *c->sums->outer);
         else
-            shared_blocks_take(&blocks, &own, c->checksums->outer + c->checksums->shared_count,
-                               from, to);
-        c->checksums->shared_count = to[EBPO_S_SHARED_FACES] + to[EBPO_S_SHARED_VERTICES];
+            shared_blocks_take(&blocks, &own, c->sums->outer + c->sums->shared_count, from, to);
+        c->sums->shared_count = to[EBPO_S_SHARED_FACES] + to[EBPO_S_SHARED_VERTICES];
     }
     shared_blocks_free(&blocks);
     return status;
@@ -415,7 +413,7 @@ static ebpo_status list_shared(const counting *c, ebpo_error *error)
  * counts. Returns false if a count exceeds its type. */
 static bool split_sums(const counting *c)
 {
-    ebpo_subtree_checksums *s = c->checksums;
+    ebpo_subtree_checksums *s = c->sums;
     uint32_t rows = ebpo_subtree_rows(c->info);
     bool fits = true;
     for (uint64_t i = 0; i < s->subtrees; i++) {
@@ -462,7 +460,7 @@ ebpo_status ebpo_subtree_checksums_make(ebpo_subtree_checksums *out, const ebpo_
 /* Returns the number of rows of an array before subtree i. */
 static uint64_t rows_before(const counting *c, ebpo_array_id id, int level, uint64_t i)
 {
-    const uint64_t *row = row_of(c, i), *next = i < c->checksums->subtrees ? row_of(c, i + 1) : row;
+    const uint64_t *row = row_of(c, i), *next = i < c->sums->subtrees ? row_of(c, i + 1) : row;
     switch (ebpo_schema[id].per) {
     case EBPO_PER_GROUP: return first_group(c, i, level);
     case EBPO_PER_GRAY: return level_sum(c, i, level, EBPO_S_GRAY);
@@ -481,11 +479,11 @@ static uint64_t rows_before(const counting *c, ebpo_array_id id, int level, uint
 
 /* Returns the subtree of a row of an array of the mesh, of the maps, or of a level below the
  * subtrees' roots. Rows before the first subtree count as its rows. */
-static uint64_t subtree_of_row(const ebpo_subtree_checksums *checksums, const ebpo_info *info,
+static uint64_t subtree_of_row(const ebpo_subtree_checksums *sums, const ebpo_info *info,
                                ebpo_array_id id, int level, uint64_t row)
 {
-    counting c = { (ebpo_subtree_checksums *)checksums, NULL, info };
-    uint64_t low = 0, high = checksums->subtrees - 1;
+    counting c = { (ebpo_subtree_checksums *)sums, NULL, info };
+    uint64_t low = 0, high = sums->subtrees - 1;
     while (low < high) {
         uint64_t middle = low + (high - low + 1) / 2;
         if (rows_before(&c, id, level, middle) <= row)

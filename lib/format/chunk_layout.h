@@ -30,7 +30,7 @@ int ebpo_subtree_level_for(const ebpo_info *info, uint64_t subtree_faces);
 EBPO_MUST_USE ebpo_status ebpo_subtree_checksums_make(ebpo_subtree_checksums *out,
                                                       const ebpo_tree *tree, const ebpo_info *info,
                                                       ebpo_error *error);
-void ebpo_subtree_checksums_free(ebpo_subtree_checksums *checksums);
+void ebpo_subtree_checksums_free(ebpo_subtree_checksums *sums);
 
 /* --- arrays to write --- */
 
