@@ -106,14 +106,14 @@ static void time_rays(const char *name, aim a, uint64_t *state)
         hits = both = ties = 0;
         for (int n = 0; n < COUNT; n++) {
             ebpo_ray_triangle(&rays[n], (const double(*)[3])triangles[n], &intersected[0][n]);
-            hits += intersected[0][n].meets;
+            hits += intersected[0][n].intersects;
         }
         best = fmin(best, (now() - begin) / COUNT);
         for (int n = 0; n < COUNT; n++)
             ebpo_ray_triangle(&rays[n], (const double(*)[3])others[n], &intersected[1][n]);
         begin = now();
         for (int n = 0; n < COUNT; n++) {
-            if (!intersected[0][n].meets || !intersected[1][n].meets)
+            if (!intersected[0][n].intersects || !intersected[1][n].intersects)
                 continue;
             both++;
             ties += ebpo_ray_compare(&rays[n], (const double(*)[3])triangles[n], &intersected[0][n],

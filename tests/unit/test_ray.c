@@ -408,9 +408,9 @@ static void check_ray(const ebpo_segment *ray, const double triangle[3][3], int 
     ebpo_ray_intersection m;
     int facing, side = reference_ray(ray, triangle, &r, &facing);
     ebpo_ray_triangle(ray, triangle, &m);
-    ck_assert_msg(m.meets == r.any, "kind %d, case %ld: meets %d, reference %d", kind, count->cases,
-                  m.meets, r.any);
-    if (m.meets) {
+    ck_assert_msg(m.intersects == r.any, "kind %d, case %ld: intersects %d, reference %d", kind,
+                  count->cases, m.intersects, r.any);
+    if (m.intersects) {
         ck_assert_msg(m.side == side, "kind %d, case %ld: side %d, reference %d", kind,
                       count->cases, m.side, side);
         ck_assert_msg(m.facing == facing, "kind %d, case %ld: facing %d, reference %d", kind,
@@ -431,7 +431,7 @@ static void check_limits(ebpo_segment *ray, const double triangle[3][3], int kin
 {
     ebpo_ray_intersection m;
     ebpo_ray_triangle(ray, triangle, &m);
-    if (!m.meets || m.t == INFINITY)
+    if (!m.intersects || m.t == INFINITY)
         return;
     double t = m.t;
     for (int step = -1; step <= 1; step++) {
@@ -563,10 +563,10 @@ START_TEST(test_ray_triangle_known_cases)
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         ebpo_ray_intersection m;
         ebpo_ray_triangle(&cases[i].ray, cases[i].triangle, &m);
-        ck_assert_msg(m.meets == cases[i].expected.meets && m.side == cases[i].expected.side &&
-                          m.facing == cases[i].expected.facing,
+        ck_assert_msg(m.intersects == cases[i].expected.intersects &&
+                          m.side == cases[i].expected.side && m.facing == cases[i].expected.facing,
                       "case %zu", i);
-        ck_assert_msg(!m.meets || m.t == cases[i].expected.t, "case %zu: t %g", i, m.t);
+        ck_assert_msg(!m.intersects || m.t == cases[i].expected.t, "case %zu: t %g", i, m.t);
     }
 }
 END_TEST

@@ -72,8 +72,8 @@ static uint64_t hash_rays(uint64_t hash, const double *p)
             ray.direction[0] = 1;
         ebpo_ray_triangle(&ray, triangle, &m);
         ebpo_ray_triangle(&ray, other, &n);
-        hash = mix_double(mix(hash, m.meets ? m.side : 7), m.t);
-        if (m.meets && n.meets)
+        hash = mix_double(mix(hash, m.intersects ? m.side : 7), m.t);
+        if (m.intersects && n.intersects)
             hash = mix(hash, ebpo_ray_compare(&ray, triangle, &m, other, &n));
     }
     const double low[3] = { p[9], fmin(p[10], p[1]), p[11] },

@@ -59,11 +59,12 @@ static bool overwrites_input(const query_shard *s, const char *path)
     return true;
 }
 
-bool query_shard_fits(query_shard *s, const query_job *job, const char *model, const char *points)
+bool query_shard_fits(query_shard *s, const query_job *job, const char *model,
+                      const char *points_path)
 {
     const query_values *v = job->values;
     *s = (query_shard){
-        .command = job->command, .v = v, .model = model, .points = points, .kept = -1
+        .command = job->command, .v = v, .model = model, .points = points_path, .kept = -1
     };
     if (v->shard && !read_shard(s, v->shard))
         return false;
@@ -71,7 +72,7 @@ bool query_shard_fits(query_shard *s, const query_job *job, const char *model, c
         command_usage(s->command, "--shard writes to a file; name it with -o");
     else if (v->force && !v->shard)
         command_usage(s->command, "--force has no effect without --shard; omit it");
-    else if (v->shard && (!points || strcmp(points, "-") == 0))
+    else if (v->shard && (!points_path || strcmp(points_path, "-") == 0))
         command_usage(s->command, "--shard takes its part of a file, not of standard input");
     else if (v->shard && v->npy)
         command_usage(s->command, "--npy has no effect with --shard; outputs of --raw can be "

@@ -18,7 +18,8 @@ typedef struct query_shard {
 
 /* Checks options of outputs and shards; reads I/N. Returns false after an error, reported on stderr
  * (exit with EXIT_USAGE). Call query_shard_free in any case. */
-bool query_shard_fits(query_shard *s, const query_job *job, const char *model, const char *points);
+bool query_shard_fits(query_shard *s, const query_job *job, const char *model,
+                      const char *points_path);
 /* Examines the inputs. Returns true when the results exist, which was reported, or *code is not
  * EXIT_FINE. */
 bool query_shard_done(query_shard *s, const query_job *job, int *code);
