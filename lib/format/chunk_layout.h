@@ -93,7 +93,7 @@ typedef struct ebpo_ordered_chunk {
 typedef struct ebpo_chunk_order {
     ebpo_ordered_chunk *chunk; /* [count]; all except /subtrees/places */
     uint64_t count;
-    uint64_t top; /* number of chunks at the beginning that are needed to look up a subtree */
+    uint64_t top; /* number of chunks at the beginning that are needed to locate a subtree */
 } ebpo_chunk_order;
 
 EBPO_MUST_USE ebpo_status ebpo_chunk_order_make(ebpo_chunk_order *out, const ebpo_plan *plan,

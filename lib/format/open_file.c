@@ -147,15 +147,15 @@ static ebpo_status check_pipelines(const ebpo_file *file, ebpo_error *error)
     return status;
 }
 
-/* Opens a list of all chunks. *holds is false if another program has rewritten the file, as the
+/* Opens a list of all chunks. *valid is false if another program has rewritten the file, as the
  * list is then not valid. */
-static ebpo_status open_list(ebpo_file *file, ebpo_head *head, ebpo_array_id list, bool *holds,
+static ebpo_status open_list(ebpo_file *file, ebpo_head *head, ebpo_array_id list, bool *valid,
                              ebpo_error *error)
 {
     const ebpo_array_in *a = &file->root_array[list];
     ebpo_head_object id;
     uint64_t bytes = 0, offset = 0;
-    *holds = false;
+    *valid = false;
     ebpo_status status = open_array(file, head, list, 0, error);
     if (status != EBPO_OK || !a->present)
         return status;
@@ -164,7 +164,7 @@ static ebpo_status open_list(ebpo_file *file, ebpo_head *head, ebpo_array_id lis
         return status;
     bool stated = ebpo_head_get_count(head, id, a->path, "file_bytes", &bytes, NULL) == EBPO_OK &&
                   ebpo_head_get_count(head, id, a->path, "offset", &offset, NULL) == EBPO_OK;
-    *holds =
+    *valid =
         stated && bytes == file->info.file_bytes && a->chunks && offset == a->chunks[0].address;
     return EBPO_OK;
 }

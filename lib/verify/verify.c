@@ -57,7 +57,7 @@ static void add_corner(uint64_t weight, const uint8_t *rgba, totals *sum)
     sum->of[3] = ebpo_wide_plus(sum->of[3], (ebpo_wide){ 0, weight });
 }
 
-static void add_listed(const node_check *j, uint64_t face, totals *sum)
+static void add_face(const node_check *j, uint64_t face, totals *sum)
 {
     const ebpo_mesh *mesh = &j->view->tree->mesh;
     double at[3][3], edge[2][3], across[3];
@@ -83,15 +83,15 @@ static void add_listed(const node_check *j, uint64_t face, totals *sum)
                    sum);
 }
 
-static void add_list(node_check *j, const ebpo_reference_node *leaf, totals *sum)
+static void add_leaf(node_check *j, const ebpo_reference_node *leaf, totals *sum)
 {
     const ebpo_level *level = &j->view->tree->level[leaf->cell.level];
     uint32_t count;
     const uint32_t *refs = ebpo_reference_refs(j->view, leaf, &count);
     for (uint32_t i = 0; i < count; i++)
-        add_listed(j, refs[i], sum);
+        add_face(j, refs[i], sum);
     for (uint64_t i = 0; i < level->leaf_new[leaf->rank]; i++)
-        add_listed(j, level->leaf_first[leaf->rank] + i, sum);
+        add_face(j, level->leaf_first[leaf->rank] + i, sum);
     if (++j->leaves % NODES_A_TIME == 0)
         ebpo_release_pages(j->view->workspace);
 }
@@ -121,7 +121,7 @@ static void check_subtree_colours(node_check *j, const ebpo_reference_node *node
 {
     totals sum = { { { 0, 0 } } };
     if (node->type == EBPO_LEAF)
-        add_list(j, node, &sum);
+        add_leaf(j, node, &sum);
     for (unsigned octant = 0; octant < 8 && node->type == EBPO_GRAY; octant++) {
         ebpo_reference_node child = ebpo_reference_child(j->view, node, octant);
         check_subtree_colours(j, &child, &sum);

@@ -1,4 +1,4 @@
-/* Decides three questions exactly: if a face touches a cell, if the part of a face in a cell
+/* Determines exactly if a face touches a cell, if the part of a face in a cell
  * satisfies the node's planes, and how a ray crosses a face. Floating point with error bounds
  * decides most cases; the others use rationals (GMP). Only the exact predicates are shared with the
  * builder.

@@ -46,12 +46,13 @@ static inline bool ebpo_corner_in_cell(const ebpo_frame *frame, const double p[3
  * Counts tests in rationals in the tally. */
 bool ebpo_face_touches(const ebpo_frame *frame, const ebpo_corners *face, ebpo_tally *tally);
 
-/* --- winding numbers by rays, from orientation signs only ---
- *
- * A point is shifted by (d0, d1, d2), infinitely small and positive, d0 >> d1 >> d2, as the format
+/* --- winding numbers by rays --- */
+
+/* A point is shifted by (d0, d1, d2), infinitely small and positive, d0 >> d1 >> d2, as the format
  * defines for the corners of cells. The ray has direction +axis. Far from the model the winding
  * number is 0. So a point's winding number is a sum over the faces that its ray crosses: +1 if the
- * ray crosses the face along its normal, -1 if it crosses against the normal. */
+ * ray crosses the face along its normal, -1 if it crosses against the normal. Only orientation
+ * signs are used. */
 
 /* Returns the face's exact contribution to the winding number of p: -1, 0 or 1. */
 int ebpo_ray_hit(const double p[3], int axis, const ebpo_corners *face);
@@ -59,12 +60,16 @@ int ebpo_ray_hit(const double p[3], int axis, const ebpo_corners *face);
 /* Returns the corners of a face of a mesh. */
 void ebpo_face_corners(const ebpo_mesh *mesh, uint64_t face, ebpo_corners *out);
 
-/* --- containment: a node's planes must not cut off a point of a face in the cell, or a corner of
- * the cell that is in the solid --- */
+/* --- containment --- */
+
+/* A node's planes must not cut off a point of a face in the cell, or a corner of the cell that is
+ * in the solid. */
 
 enum { EBPO_NODE_PLANES_MAX = 255 }; /* counts are bytes */
 
-/* The planes stored for a node, decoded. Invalid codes are omitted; check_nesting reports them. */
+/* The planes stored for a node, decoded. Invalid codes are omitted; ebpo_check_nesting reports
+ * them.
+ */
 typedef struct ebpo_node_planes {
     int count;
     double n[EBPO_NODE_PLANES_MAX][3], bound[EBPO_NODE_PLANES_MAX]; /* n . xi <= bound; exact */

@@ -5,7 +5,7 @@
  *   winding number of its lowest corner; those of the other corners follow from signed crossings
  *   along the cell's edges. The 64 corners of a gray node's children are 27 points. The corners of
  *   the root have the winding number 0. These links connect every cell to the root. All winding
- *   numbers are right if all links hold and the lists are complete (verify_lists.c).
+ *   numbers are right if no link is violated and the lists are complete (verify_lists.c).
  * - By rays through the whole mesh, for all cells or an even sample. The points are sorted into
  *   columns along x. Each face is tested against the points in its columns. Faces are therefore
  * read once, in their order, and only the points are in memory. */

@@ -167,8 +167,8 @@ static void compare_rows(ebpo_tally *tally, const ebpo_attribute *source,
           differ, stored->names, stored->element);
 }
 
-/* Returns the source indices of an array's rows, or NULL if they are 0, 1, 2, .... The latter is
- * true for elements other than vertices and faces, which each part contains completely. */
+/* Returns the source indices of an array's rows, or NULL if row i is row i of the
+ * source. This is true for elements other than vertices and faces: each part contains all rows. */
 static const uint32_t *source_numbers(const ebpo_attribute *array, const ebpo_maps *maps)
 {
     if (maps && ebpo_attribute_is_of(array, "vertex"))

@@ -299,7 +299,7 @@ static void check_point(ebpo_tally *tally, const ebpo_reference_tree *view, cons
     }
 }
 
-/* Checks that each cell face, as a double, is a cell face of the parent or its middle plane, and
+/* Checks that each cell face, as a double, is a cell face of the parent or its middle plane. Checks
  * that the difference of opposite cell faces is the size of the cell. */
 static void check_cell_faces(ebpo_tally *tally, const ebpo_reference_tree *view,
                              const ebpo_reference_node *node)
