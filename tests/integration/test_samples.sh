@@ -151,7 +151,7 @@ planes=$("$ebpo" info --json "$work/a.ebpo.h5" |
 [ "$(grep -c '^1[0-7] ' "$work/out")" = "$planes" ] ||
     fail "read_level.py prints each plane of level 1 ($planes)"
 
-# Without the plugin, the message in one line tells what to do.
+# Without the plugin, a one-line message states what to do.
 HDF5_PLUGIN_PATH=/nowhere /usr/bin/python3 "$samples/read_level.py" "$work/a.ebpo.h5" 1 \
     >"$work/out" 2>&1 && exit 0 # HDF5 finds another plugin
 [ "$(wc -l <"$work/out")" = 1 ] && grep -q '^read_level.py: .*HDF5_PLUGIN_PATH' "$work/out" ||

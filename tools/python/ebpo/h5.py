@@ -12,7 +12,7 @@ needs a plugin. One of these is sufficient:
     import ebpo.h5
     ebpo.h5.enable()                    # uses whichever of the two exists
 
-`ebpo --version --verbose` prints the folder of the project's plugin. Then `h5py` reads as usual:
+`ebpo --version --verbose` prints the folder of the project's plugin. Then `h5py` reads the file:
 
     with h5py.File("bunny.ebpo.h5") as file:
         file.attrs["box_origin"], file["/levels/01/plane_counts"][:]

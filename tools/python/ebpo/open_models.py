@@ -22,7 +22,7 @@ _raised: dict[str, BaseException] = {}  # exceptions that are not library errors
 
 
 def opener(options: dict) -> int:
-    """Return the number that tells `_open_file` to use these options for URLs."""
+    """Return the number by which `_open_file` finds these options for URLs."""
     key = repr(sorted(options.items()))
     if key not in _numbers:
         _options.append(options)
