@@ -32,7 +32,7 @@ typedef struct shared_blocks {
     uint32_t *face_round, *vertex_round; /* [blocks] last round in which a block was listed */
     uint32_t round;                      /* number of the current subtree, from 1 */
     uint32_t *face_block, *vertex_block; /* [blocks] blocks listed in this round */
-    uint64_t face_blocks, vertex_blocks; /* their numbers */
+    uint64_t face_blocks, vertex_blocks; /* numbers of listed blocks */
 } shared_blocks;
 
 enum {
@@ -234,7 +234,8 @@ static void shared_blocks_take(shared_blocks *b, const owned_range *own, uint32_
     b->round++;
 }
 
-/* Default number of faces in a subtree, and of faces of a mesh that has subtrees by default. */
+/* Default number of faces in a subtree; minimum number of faces of a mesh for subtrees by default.
+ */
 enum { DEFAULT_FACES = 1024, LEAST_FACES = 131072 };
 /* Pages of the workspace are released after this number of subtrees. A subtree's rows in all arrays
  * take tens of kilobytes. */

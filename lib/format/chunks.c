@@ -173,7 +173,7 @@ static uint64_t cost_of(const ebpo_chunks *c, const ebpo_array_in *array, uint64
     const ebpo_info *info = &c->file->info;
     uint64_t prefetched = c->file->in.source.prefetched,
              index_end = info->chunk_index_offset + info->chunk_index_bytes;
-    /* libhdf5 reads the headers again */
+    /* locating the chunks reads the headers again */
     uint64_t again = prefetched < info->head_bytes ? info->chunk_index_offset : 0;
     uint64_t index = index_end <= prefetched                 ? 0
                      : info->chunk_index_offset < prefetched ? index_end - prefetched

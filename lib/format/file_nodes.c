@@ -283,7 +283,7 @@ static ebpo_status read_leaf_planes(ebpo_chunks *chunks, int level, uint64_t cou
                       EBPO_LEAF, error);
 }
 
-/* Sorts the plane codes into node order. Before, the codes of gray nodes precede those of leaves.
+/* Sorts the plane codes into node order. In the input, codes of gray nodes precede those of leaves.
  */
 static void sort_codes(ebpo_group *group, unsigned gray_codes)
 {
@@ -466,7 +466,7 @@ ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_number *group
 {
     enum {
         STAGES = 4 /* rows of the table of subtrees, types, counts, planes */,
-        FIRST_BYTES = 32 << 10 /* with level 0, so much of the next levels is fetched */
+        FIRST_BYTES = 32 << 10 /* bytes of the next levels that are fetched with level 0 */
     };
     ebpo_status status = EBPO_OK;
     for (int stage = 0; stage < STAGES && status == EBPO_OK; stage++) {

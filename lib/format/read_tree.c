@@ -463,7 +463,7 @@ ebpo_status ebpo_file_read_tree(const ebpo_file *file, const ebpo_read_options *
     return status;
 }
 
-/* Computes the rank of each item when items are sorted by source index. The indices are distinct
+/* Computes the position of each item in the order of source indices. The indices are distinct
  * and below `limit`. The caller frees *place. A header may state a limit far above the number of
  * items, so the function uses one bit per possible index; memory pages without items stay empty. */
 static ebpo_status sort_by_source(ebpo_workspace *workspace, const uint32_t *source, uint64_t count,

@@ -44,8 +44,8 @@ typedef enum ebpo_per {
     EBPO_PER_CHUNK
 } ebpo_per;
 
-/* Conditions for the presence of an array, as bits. The last three are no parts: the file has
- * subtrees, the model is a solid, none. */
+/* Conditions for the presence of an array, as bits. The last three bits are not parts of the file:
+ * the file has subtrees; the model is a solid; no condition. */
 enum {
     EBPO_NEEDS_PLANES = EBPO_PART_PLANES,
     EBPO_NEEDS_MESH = EBPO_PART_MESH,
@@ -71,8 +71,8 @@ enum {
 };
 
 /* Columns of /subtrees/counts: numbers of items of a subtree. Columns with BEFORE count the items
- * between the previous subtree and this one. These items belong to leaves above or at the level of
- * the subtrees' roots. */
+ * between the previous subtree and this one. These items belong to leaves that are at or above the
+ * level of the subtrees' roots. */
 enum {
     EBPO_S_FACES_BEFORE, /* new faces */
     EBPO_S_FACES,
@@ -252,7 +252,7 @@ EBPO_MUST_USE ebpo_status ebpo_check_map(const ebpo_check *check, const char *ar
                                          const uint32_t *map, uint64_t count, uint64_t limit,
                                          ebpo_error *error);
 
-/* Checks that vertices are finite and that faces refer to existing vertices, in first-use order. */
+/* Checks that all coordinates of vertices are finite. */
 EBPO_MUST_USE ebpo_status ebpo_check_finite(const ebpo_check *check, const ebpo_mesh *mesh,
                                             ebpo_error *error);
 

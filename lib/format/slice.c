@@ -191,7 +191,7 @@ static ebpo_status collect_shared(ebpo_slice *slice, ebpo_compact *outer, ebpo_q
 
 static void localise_faces(ebpo_slice *slice, const ebpo_compact *outer)
 {
-    /* owned faces decrease by the number of earlier faces that are not shared */
+    /* the index of an owned face decreases by the number of earlier faces that are not shared */
     uint64_t less = slice->first_face - outer->count;
     for (int i = 0; i < slice->level_count; i++) {
         ebpo_level *level = &slice->level[i];
@@ -495,7 +495,7 @@ typedef struct walk {
 } walk;
 
 /* Checks that the new faces of the leaves, in depth-first order, are one range without gaps. This
- * range is the owned faces; the first leaf determines its begin. */
+ * range is the owned faces; the first leaf determines its start. */
 static ebpo_status walk_group(walk *w, int level, ebpo_error *error)
 {
     const ebpo_level *arrays = &w->slice->level[level];

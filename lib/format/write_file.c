@@ -126,7 +126,8 @@ static ebpo_status make_root_group(file_headers *h, const char *path, uint32_t n
     return status;
 }
 
-/* Writes a list's offset and the file's size. Readers use the list only if both are still true. */
+/* Writes a list's offset and the file's size. Readers use the list only if both values still match.
+ */
 static ebpo_status headers_put_validity(file_headers *h, header_list list, uint64_t file_bytes,
                                         uint64_t offset, ebpo_error *error)
 {
@@ -244,8 +245,8 @@ static ebpo_status headers_measure(file_headers *h, const char *shown, ebpo_erro
     return status;
 }
 
-/* Opens the file again, so that HDF5 allocates its indexes as one block of index_bytes. It does
- * this when the first chunk of an array with several chunks is written. */
+/* Opens the file again, so that HDF5 allocates its indexes as one block of index_bytes. HDF5
+ * allocates them when the first chunk of an array with several chunks is written. */
 static ebpo_status headers_begin_index(file_headers *h, ebpo_error *error)
 {
     headers_close(h);
@@ -263,7 +264,8 @@ static ebpo_status headers_begin_index(file_headers *h, ebpo_error *error)
 
 /* --- chunks --- */
 
-/* Number of chunks in memory at a time: 8 MiB before compression, and as much after it. */
+/* Number of chunks in memory at a time (a window): 8 MiB before compression, and as much after it.
+ */
 enum { WINDOW = 128 };
 
 typedef struct slot {

@@ -209,8 +209,8 @@ void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_reference_tree *view
     }
     if (samples == 0)
         samples = default_samples(view, all);
-    /* Half of the samples are distributed to the classes evenly, so that small levels are included;
-     * half by size. */
+    /* A class is the cells of one level and type. Half of the samples are distributed evenly to the
+     * classes, so that small levels are included, and half in proportion to the number of cells. */
     for (int l = 0; l < view->tree->info.level_count; l++)
         for (int type = 0; type <= EBPO_GRAY; type++) {
             uint64_t cells = plan->cells[l][type];
