@@ -49,14 +49,14 @@ def open_edges(faces, others=NO_EDGES):
 
 def cycles(edges):
     """Closed chains of vertices, each of which a chain has once, of rows (low, high, times)."""
-    ways = {}
+    edges_from = {}
     for low, high, times in edges.tolist():
         begin, end = (low, high) if times > 0 else (high, low)
-        ways.setdefault(begin, []).extend([end] * abs(times))
-    for begin in list(ways):
+        edges_from.setdefault(begin, []).extend([end] * abs(times))
+    for begin in list(edges_from):
         path, place = [begin], {begin: 0}
-        while ways.get(path[-1]):
-            at = ways[path[-1]].pop()
+        while edges_from.get(path[-1]):
+            at = edges_from[path[-1]].pop()
             if at not in place:
                 place[at] = len(path)
                 path.append(at)

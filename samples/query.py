@@ -30,14 +30,14 @@ def parse(line, number):
     return x, y, z
 
 
-def answer(model, points):
+def print_results(model, points):
     words = [place.name for place in ebpo.Where]
     where = ["surface"] * len(points)
     if model.info.solid:
         where = [words[place] for place in model.locate(points).where]
     nearest = model.distance(points)
-    for word, *told in zip(where, nearest.distance.tolist(), nearest.face.tolist(), nearest.point.tolist()):
-        print(f"{word}, {told[0]!r} from face {told[1]} at", *map(repr, told[2]))
+    for word, *values in zip(where, nearest.distance.tolist(), nearest.face.tolist(), nearest.point.tolist()):
+        print(f"{word}, {values[0]!r} from face {values[1]} at", *map(repr, values[2]))
 
 
 def main():
@@ -54,7 +54,7 @@ def main():
                 break
             if point is not None:
                 points.append(point)
-        answer(model, np.array(points).reshape(-1, 3))
+        print_results(model, np.array(points).reshape(-1, 3))
     except (ebpo.Error, OSError) as error:
         sys.exit(f"query.py: {error}")
     if wrong:

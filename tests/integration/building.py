@@ -87,7 +87,7 @@ def write_box(path):
     write_ply(path, corners, [t for a, b, c, d in squares for t in ((a, b, c), (a, c, d))])
 
 
-def usual_signals():
+def default_signals():
     # nohup and background jobs pass on that these signals are ignored
     for number in signal.SIGINT, signal.SIGTERM, signal.SIGHUP:
         signal.signal(number, signal.SIG_DFL)
@@ -95,7 +95,7 @@ def usual_signals():
 
 def limits(file_bytes=None):
     def apply():
-        usual_signals()
+        default_signals()
         if file_bytes:
             resource.setrlimit(resource.RLIMIT_FSIZE, (file_bytes, file_bytes))
     return apply
@@ -189,7 +189,7 @@ def proving_and_extracting(place, model):
     check(slurp(back) == slurp(model), "extract --mesh --memory 128MiB: the model, bit for bit")
 
 
-def same_bytes_as_usual(root, model):
+def same_bytes_as_default(root, model):
     """Compare bytes with default envelopes."""
     place, seen = Place(root, "usual"), []
     for memory, threads in (("16G", 1), ("128MiB", 3)):
@@ -207,7 +207,7 @@ def run_until(command, stage, number):
     """
     pid, terminal = pty.fork()
     if pid == 0:
-        usual_signals()
+        default_signals()
         os.execv(command[0], command)
     text, seen = b"", False
     while True:
@@ -362,7 +362,7 @@ def main():
         same_bytes_and_bounded_memory(root, model)
         generate(model, FEWER_FACES)
         if not FEW:
-            same_bytes_as_usual(root, model)
+            same_bytes_as_default(root, model)
             unlike_scans(root)
         one_cell(root, model)
         interrupted(root, model)

@@ -101,7 +101,7 @@ WAYS = {replaced: True, removed: True, grown: True, written_over: False,
         flipped: False}
 
 
-def questions(command, draw):
+def queries(command, draw):
     width = {"inside": 3, "distance": 3, "ray": 6, "box": 6}[command]
     for _ in range(POINTS):
         row = [draw.uniform(-1.5, 1.5) for _ in range(width)]
@@ -110,33 +110,33 @@ def questions(command, draw):
         yield " ".join(map(repr, row)) + "\n"
 
 
-def ask(command, path, asked, change):
+def run_queries(command, path, sent, change):
     """Query a file. Return the results, the exit code and the messages. `change` is called after two queries."""
     how = ["--mode", "nodes"] if command == "inside" else []
     process = subprocess.Popen([TOOL, command, *how, "--cut-level", "1", "--memory", "3200KiB",
                                 "--threads", "1", path], stdin=subprocess.PIPE, text=True,
                                stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    answers = []
-    for n, question in enumerate(asked):
+    results = []
+    for n, query in enumerate(sent):
         if n == 2:
             change()
         try:
-            process.stdin.write(question)
+            process.stdin.write(query)
             process.stdin.flush()
         except BrokenPipeError:
             break
-        answers.append(process.stdout.readline())
-        if not answers[-1]:
+        results.append(process.stdout.readline())
+        if not results[-1]:
             break
     rest, said = process.communicate(timeout=300)
-    return [a for a in answers if a] + rest.splitlines(True), process.returncode, said
+    return [a for a in results if a] + rest.splitlines(True), process.returncode, said
 
 
 def judge(what, right, outcome, must_go_on):
-    answers, code, said = outcome
-    good = check(answers == right[:len(answers)], f"{what}: wrong results, {code}, {said}")
+    results, code, said = outcome
+    good = check(results == right[:len(results)], f"{what}: wrong results, {code}, {said}")
     if code == 0:
-        good = check(len(answers) == len(right), f"{what}: {len(answers)} results, and success")
+        good = check(len(results) == len(right), f"{what}: {len(results)} results, and success")
     else:
         good = check(code == 1 and said and not must_go_on, f"{what}: {code}: {said!r}") and good
     count(what.split(":")[0], "wrong" if not good else "all answers" if code == 0 else "error")
@@ -145,31 +145,31 @@ def judge(what, right, outcome, must_go_on):
 def on_disk(root, a, b):
     draw = random.Random(2)
     for command in ("inside", "distance", "ray", "box"):
-        asked = list(questions(command, draw))
-        right = ask(command, a, asked, lambda: None)
+        sent = list(queries(command, draw))
+        right = run_queries(command, a, sent, lambda: None)
         check(right[1] == 0 and len(right[0]) == POINTS, f"{command}: {right}")
-        for way in WAYS:
+        for change_file in WAYS:
             if SCALE < 1 and draw.random() > SCALE / 2:
                 continue
             path = os.path.join(root, "open.ebpo.h5")
             shutil.copy(a, path)
-            outcome = ask(command, path, asked, lambda w=way, p=path: w(p, b))
-            judge(f"{way.__name__}: {command}", right[0], outcome, WAYS[way])
+            outcome = run_queries(command, path, sent, lambda w=change_file, p=path: w(p, b))
+            judge(f"{change_file.__name__}: {command}", right[0], outcome, WAYS[change_file])
 
 
 def on_a_server(a, b):
     """Change a file on a server, with another ETag or with the same one."""
     draw = random.Random(3)
     for command in ("inside", "distance", "ray"):
-        asked = list(questions(command, draw))
-        right = ask(command, a, asked, lambda: None)
+        sent = list(queries(command, draw))
+        right = run_queries(command, a, sent, lambda: None)
         for tagged in (True, False):
             server = ranges_server.start(read(a))
 
             def change(server=server, tagged=tagged):
                 server.data, server.etag = read(b), '"2"' if tagged else server.etag
 
-            outcome = ask(command, ranges_server.url_of(server), asked, change)
+            outcome = run_queries(command, ranges_server.url_of(server), sent, change)
             judge(f"server, {'another' if tagged else 'the same'} ETag: {command}", right[0],
                   outcome, False)
             server.shutdown()
@@ -193,7 +193,7 @@ def result(root, command, path):
     return done.returncode, [done.stdout, *written], done.stderr
 
 
-def beside(root, a, b, change, name, must_go_on):
+def serve_both(root, a, b, change, name, must_go_on):
     path = os.path.join(root, "model.ebpo.h5")
     shutil.copy(a, path)
     stop = threading.Event()
@@ -252,12 +252,12 @@ def main():
             subprocess.run([TOOL, "convert", "-q", "--subtree-faces", "64", path + ".ply", path],
                            check=True)
         with open(os.path.join(root, "points.txt"), "w", encoding="ascii") as f:
-            f.writelines(questions("inside", random.Random(1)))
+            f.writelines(queries("inside", random.Random(1)))
         on_disk(root, a, b)
         if "http" in features:
             on_a_server(a, b)
-        beside(root, a, b, replaced, "while a program replaces", True)
-        beside(root, a, b, written_over, "while a program overwrites", False)
+        serve_both(root, a, b, replaced, "while a program replaces", True)
+        serve_both(root, a, b, written_over, "while a program overwrites", False)
         two_writers(root, a, b)
     for what, outcomes in counts.items():
         print(f"{what}: " + ", ".join(f"{n} {o}" for o, n in sorted(outcomes.items())))

@@ -29,8 +29,8 @@ def main():
                 subprocess.run([GENERATE, *options, target], check=True, capture_output=True)
             assert (filecmp.cmp(path, again,
                                 shallow=False)), f"{options}: another run writes other bytes"
-            judged = subprocess.run([CROSSING_FACES, path], capture_output=True, text=True)
-            assert judged.returncode == 0, judged.stdout
+            checked = subprocess.run([CROSSING_FACES, path], capture_output=True, text=True)
+            assert checked.returncode == 0, checked.stdout
             report = json.loads(subprocess.run([EBPO, "check", "--json", path], check=True,
                                                capture_output=True, text=True).stdout)
             assert report["report"]["manifold"], f"{options}: not a manifold"

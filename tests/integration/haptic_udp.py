@@ -38,7 +38,7 @@ def sender():
     return s
 
 
-def answer(s, to, packet, sequence):
+def receive(s, to, packet, sequence):
     """Return the reply for a position. Skip earlier replies; send packets again that a full queue has dropped."""
     tries = 20
     s.sendto(packet, to)
@@ -80,13 +80,13 @@ def main(ebpo):
         device, other = sender(), sender()
         for packet in NONE:  # before a device is connected
             other.sendto(packet, to)
-        first = answer(device, to, place(10), 10)
+        first = receive(device, to, place(10), 10)
         assert first[11:14] == (0.4, 0.5, 3.0), first
         for packet in NONE + [place(1 << 63), place(2 ** 64 - 1, kind=3)]:
             other.sendto(packet, to)
         for packet in NONE + [place(10, at=(9, 9, 9)), place(3, kind=3)]:  # packets of the device itself that are wrong or old
             device.sendto(packet, to)
-        second = answer(device, to, place(11, at=(0.4, 0.5, 2.5), turn=(0, 0, 0.6, 0.8)), 11)
+        second = receive(device, to, place(11, at=(0.4, 0.5, 2.5), turn=(0, 0, 0.6, 0.8)), 11)
         assert second[11:14] == (0.4, 0.5, 2.5), second
         other.settimeout(0.1)
         try:

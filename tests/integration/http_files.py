@@ -43,20 +43,20 @@ def main():
     points = sys.argv[4] if len(sys.argv) > 4 else "2000"
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "m.ebpo.h5")
-        ply, asked, rays = (os.path.join(folder, name) for name in ("m.ply", "points", "rays"))
+        ply, points_file, rays = (os.path.join(folder, name) for name in ("m.ply", "points", "rays"))
         # the file must still consist of many pieces
         scale = min(1, max(0.3, float(os.environ.get("EBPO_TEST_SCALE", "1"))))
         subprocess.run([generate, "--base", "torus", "--faces", str(int(150000 * scale)), ply],
                        check=True, capture_output=True)
         subprocess.run([tool, "convert", "-q", ply, path], check=True)
-        subprocess.run([tool, "bench", "--count", points, "--save-points", asked, path], check=True,
+        subprocess.run([tool, "bench", "--count", points, "--save-points", points_file, path], check=True,
                        capture_output=True)
         subprocess.run([tool, "bench", "--query", "ray", "--count", "500", "--save-points", rays,
                         path], check=True, capture_output=True)
         server = subprocess.Popen([sys.executable, faulty_server, path],
                                   stdin=subprocess.PIPE, stdout=subprocess.PIPE)
         try:
-            check(tool, folder, path, ply, asked, rays,
+            check(tool, folder, path, ply, points_file, rays,
                   f"http://127.0.0.1:{int(server.stdout.readline())}")
         finally:
             server.stdin.close()
@@ -65,7 +65,7 @@ def main():
     return 1 if failures else 0
 
 
-def check(tool, folder, path, ply, asked, rays, site):
+def check(tool, folder, path, ply, points_file, rays, site):
     good = f"{site}/good/m.ebpo.h5"
     # All exact queries, with the whole model in memory and with subtrees on demand, from servers
     # with temporary faults.
@@ -73,12 +73,12 @@ def check(tool, folder, path, ply, asked, rays, site):
                 f"{site}/whole/d"):
         name = url.split("/")[3]
         more = ("--http-retries", "20") if "random" in name else ()
-        equal(tool, f"inside {name}", path, url, "inside", asked, "--raw", *more)
-        equal(tool, f"distance {name}", path, url, "distance", asked, "--raw", *more)
+        equal(tool, f"inside {name}", path, url, "inside", points_file, "--raw", *more)
+        equal(tool, f"distance {name}", path, url, "distance", points_file, "--raw", *more)
     for mode in ("--memory=12MiB", "--cut-level=3"):
-        equal(tool, f"inside {mode}", path, good, "inside", asked, "--raw", mode)
-        equal(tool, f"distance {mode}", path, good, "distance", asked, "--raw", mode)
-    equal(tool, "inside nodes", path, good, "inside", asked, "--raw", "--cut-level", "4", "--mode",
+        equal(tool, f"inside {mode}", path, good, "inside", points_file, "--raw", mode)
+        equal(tool, f"distance {mode}", path, good, "distance", points_file, "--raw", mode)
+    equal(tool, "inside nodes", path, good, "inside", points_file, "--raw", "--cut-level", "4", "--mode",
           "nodes")
     equal(tool, "rays", path, good, "ray", rays, "--raw")
     equal(tool, "measure", path, good, "measure")

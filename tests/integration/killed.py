@@ -62,14 +62,14 @@ def state(name, out, content, right):
     return "new" if is_new(command, out, content, right) else "neither"
 
 
-def beside(root, inputs, outputs):
+def other_files(root, inputs, outputs):
     return (set(os.listdir(root)) - set(os.listdir(inputs)) - {"temporary"} -
             {out.partition("/")[0] for out in outputs})
 
 
-def look_beside(name, root, inputs):
+def check_other_files(name, root, inputs):
     """Return whether files remain beside the output."""
-    others = beside(root, inputs, COMMANDS[name].outputs)
+    others = other_files(root, inputs, COMMANDS[name].outputs)
     check(all(LEFT.fullmatch(o) for o in others) and
           len([o for o in others if o.endswith(".tmp")]) <= len(COMMANDS[name].outputs),
           f"{name}: left {others}")
@@ -116,7 +116,7 @@ def kill_often(name, url, inputs, root, draw, kills):
         check("neither" not in states, f"{name}: {outputs} are {states}")
         counts.update(states[:1])
         mixed += len(set(states)) > 1
-        left += look_beside(name, root, inputs)
+        left += check_other_files(name, root, inputs)
     put_old(COMMANDS[name], root)
     process = run(command, root)
     said = process.communicate(timeout=300)[1]
@@ -124,7 +124,7 @@ def kill_often(name, url, inputs, root, draw, kills):
     for out in outputs:
         check(state(name, out, read(os.path.join(root, out)), right[out]) == "new",
               f"{name}: the run after: {out}")
-    others = {other for other in beside(root, inputs, outputs)
+    others = {other for other in other_files(root, inputs, outputs)
               if not is_replaced_report(os.path.join(root, other))}
     others |= set(os.listdir(os.path.join(root, "temporary")))
     check(not others, f"{name}: the run after that leaves {others}")
@@ -197,9 +197,9 @@ def two_readers(inputs, root, url):
             time.sleep(0.01 * turn)
             both[0].kill()
         for n, process in enumerate(both):
-            answers, said = process.communicate(timeout=300)
+            results, said = process.communicate(timeout=300)
             if not (turn % 2 and n == 0):
-                check(process.returncode == 0 and answers == right,
+                check(process.returncode == 0 and results == right,
                       f"two readers: {process.returncode} {said}")
 
 

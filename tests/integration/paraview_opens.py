@@ -17,7 +17,7 @@ POLYHEDRON, POLYGON, TRIANGLE = 42, 7, 5
 OF_NODES = {"octcode", "level", "type", "winding", "volume"}
 
 
-def told(name):
+def reported(name):
     with open(os.path.join(folder, name + ".json"), encoding="utf-8") as f:
         return json.load(f)["blocks"]
 
@@ -37,7 +37,7 @@ def cell_types(grid):
 
 def check_xdmf():
     data = fetched(Xdmf3ReaderT(FileName=[os.path.join(folder, "model.xdmf")]))
-    blocks = told("xdmf")
+    blocks = reported("xdmf")
     assert data.GetNumberOfBlocks() == len(blocks) >= 3
     for i, wanted in enumerate(blocks):
         grid, name = data.GetBlock(i), data.GetMetaData(i).Get(data.NAME())
@@ -64,7 +64,7 @@ def check_xdmf():
 
 def check_vtkhdf():
     grid = fetched(VTKHDFReader(FileName=[os.path.join(folder, "model.vtkhdf")]))
-    blocks = told("vtkhdf")
+    blocks = reported("vtkhdf")
     values = arrays(grid.GetCellData())
     assert (grid.GetNumberOfPoints() == sum(b["vertices"] for b in blocks)
             and grid.GetNumberOfCells() == sum(b["polygons"] for b in blocks))
@@ -77,7 +77,7 @@ def check_vtkhdf():
 
 def check_glb():
     data = fetched(OpenDataFile(os.path.join(folder, "model.glb")))
-    wanted, = told("glb")
+    wanted, = reported("glb")
     assert (data.GetNumberOfCells() == wanted["triangles"]
             and data.GetNumberOfPoints() == wanted["vertices"])
 

@@ -34,10 +34,10 @@ def run(environment, *words, given=None):
 
 def same(*words, given=None):
     """Check that both libraries give the same exit code and output."""
-    reading, usual = run(READING, *words, given=given), run(USUAL, *words, given=given)
-    check(reading == usual, f"{' '.join(words)}: as with libhdf5 ({reading[0]}, {usual[0]}; "
+    reading, default = run(READING, *words, given=given), run(USUAL, *words, given=given)
+    check(reading == default, f"{' '.join(words)}: as with libhdf5 ({reading[0]}, {default[0]}; "
           f"{reading[2].strip()[:200]})")
-    return usual
+    return default
 
 
 def slurp(path):
@@ -53,7 +53,7 @@ def is_without():
 
 
 def vectors():
-    asked = "".join(f"{x} {y} {z}\n" for x in (-0.5, 0.1, 2) for y in (0, 0.7) for z in (0.2, 1.1))
+    points = "".join(f"{x} {y} {z}\n" for x in (-0.5, 0.1, 2) for y in (0, 0.7) for z in (0.2, 1.1))
     for kind in "passed", "failed":
         folder = os.path.join(VECTORS, kind)
         for name in sorted(os.listdir(folder)):
@@ -63,7 +63,7 @@ def vectors():
                 check(code == (0 if kind == "passed" else 1) and CANNOT not in said,
                       f"{kind}: {name} ({code})")
                 if kind == "passed":
-                    same("distance", path, given=asked)
+                    same("distance", path, given=points)
 
 
 def writing(model):
@@ -75,8 +75,8 @@ def writing(model):
                   ["info", "--compat", "quads.ply"]):
         out = next((w.replace("OUT", "out") for w in words if "OUT" in w), None)
         code, _, said = run(READING, *(w.replace("OUT", "out") for w in words))
-        told = CANNOT in said or words[0] == "info"
-        check(code == 1 and told, f"{words[0]} reports that it is unsupported ({code}: {said.strip()[:200]})")
+        is_reported = CANNOT in said or words[0] == "info"
+        check(code == 1 and is_reported, f"{words[0]} reports that it is unsupported ({code}: {said.strip()[:200]})")
         check(not out or not any(n.startswith(out) for n in os.listdir(".")), f"{words[0]}: no output")
 
 

@@ -114,35 +114,35 @@ class Tried:
         self.counts, self.wrong, self.refused = collections.Counter(), [], collections.Counter()
         self.number = 0
 
-    def ways(self, text):
+    def option_sets(self, text):
         """Return lists of options; of the long lists only some, others for each model."""
-        for way in text.strip().split("\n"):
+        for options in text.strip().split("\n"):
             self.number += 1
             if not self.few or self.number % 7 == 0:
-                yield way
+                yield options
 
     def run(self, *words):
         return subprocess.run((self.ebpo,) + words, capture_output=True, text=True, check=False)
 
-    def made(self, command, way, source, target):
+    def made(self, command, options, source, target):
         """Run a command and check its output. Return True when there is an output."""
         names = ("-o", target, source) if command == "recover" else (source, target)
-        done = self.run(command, *way.split(), *names)
-        what = f"{command} {way} {source}"
+        done = self.run(command, *options.split(), *names)
+        what = f"{command} {options} {source}"
         if done.returncode != 0:
-            self.refused[f"{command} {way}"] += 1
+            self.refused[f"{command} {options}"] += 1
             if done.returncode != 1 or not done.stderr or os.path.exists(target):
                 self.wrong.append(f"{what}: ends with {done.returncode}: {done.stderr}")
             return False
         self.counts[command] += 1
-        self.look(what, target)
+        self.inspect(what, target)
         return True
 
-    def look(self, what, target):
+    def inspect(self, what, target):
         for command in ("info", "verify"):
-            looked = self.run(command, "-q" if command == "verify" else "--json", target)
-            if looked.returncode != 0:
-                self.wrong.append(f"{what}: {command} ends with {looked.returncode}: {looked.stderr}")
+            inspected = self.run(command, "-q" if command == "verify" else "--json", target)
+            if inspected.returncode != 0:
+                self.wrong.append(f"{what}: {command} ends with {inspected.returncode}: {inspected.stderr}")
 
 
 def lower_half(facts):
@@ -153,8 +153,8 @@ def lower_half(facts):
 def copies(tried, path, server):
     """Check the outputs of subset, recover and fetch for a file with all parts."""
     box = lower_half(json.loads(tried.run("info", "--json", path).stdout))
-    for way in tried.ways(SUBSET):
-        if tried.made("subset", way.replace("{box}", box), path, "s.ebpo.h5"):
+    for options in tried.option_sets(SUBSET):
+        if tried.made("subset", options.replace("{box}", box), path, "s.ebpo.h5"):
             if tried.made("repack", "--codec none --subtree-faces 64", "s.ebpo.h5", "t.ebpo.h5"):
                 os.unlink("t.ebpo.h5")
             os.unlink("s.ebpo.h5")
@@ -171,10 +171,10 @@ def copies(tried, path, server):
 def model(tried, path, server):
     tried.made("convert", "", path, "usual.ebpo.h5")
     tried.made("convert", "--subtree-faces 64 --profile full", path, "parts.ebpo.h5")
-    for way in tried.ways(CONVERT):
-        if not tried.made("convert", way, path, "c.ebpo.h5"):
+    for options in tried.option_sets(CONVERT):
+        if not tried.made("convert", options, path, "c.ebpo.h5"):
             continue
-        for again in tried.ways(REPACK):
+        for again in tried.option_sets(REPACK):
             if tried.made("repack", again, "c.ebpo.h5", "p.ebpo.h5"):
                 os.unlink("p.ebpo.h5")
         os.unlink("c.ebpo.h5")
@@ -206,8 +206,8 @@ def main():
         tried.wrong.append(f"left behind: {left}")
     for line in tried.wrong:
         print(line)
-    for way, count in tried.refused.items():
-        print(f"not made, {count} times: {way}")
+    for options, count in tried.refused.items():
+        print(f"not made, {count} times: {options}")
     print(", ".join(f"{count} by {command}" for command, count in tried.counts.items()) +
           f"; {len(tried.wrong)} wrong")
     return 1 if tried.wrong or not tried.counts["subset"] else 0

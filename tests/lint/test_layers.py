@@ -133,12 +133,12 @@ class Tree:
         return []
 
     def check_circles(self):
-        told = set()
+        reported = set()
         for start in sorted(self.uses):
             circle = self.shortest_circle(start)
-            if not circle or frozenset(circle) in told:
+            if not circle or frozenset(circle) in reported:
                 continue
-            told.add(frozenset(circle))
+            reported.add(frozenset(circle))
             steps = [f"    {a} uses {b}: {', '.join(sorted(self.uses[a][b]))}"
                      for a, b in zip(circle, circle[1:] + circle[:1])]
             self.problems.append("\n".join([f"{self.root.name}: a circle of {len(circle)} files"] + steps))

@@ -125,9 +125,9 @@ def check_versions(control, conda, brew):
 
 
 def check_libraries(control, conda, brew):
-    asked = re.findall(r"dependency\('([\w-]+)'(?:, version: '>=([\d.]+)')?", meson_build)
+    dependencies = re.findall(r"dependency\('([\w-]+)'(?:, version: '>=([\d.]+)')?", meson_build)
     build_depends = control.split("Build-Depends:")[1].split("\n\n")[0]
-    for name, least in asked:
+    for name, least in dependencies:
         if name not in LIBRARIES:
             problems.append(f"meson.build: {name} has no names in test_packages.py")
             continue
@@ -141,7 +141,7 @@ def check_libraries(control, conda, brew):
                 problems.append(f"{where}: lacks {package}, as meson.build asks for {name}")
             elif package and least and "brew" not in where and found["least"] != least:
                 problems.append(f"{where}: {package} is not >= {least}, as meson.build asks for")
-    return len(asked)
+    return len(dependencies)
 
 
 texts = [(packaging / name).read_text() for name in ("debian/control", "conda/meta.yaml", "homebrew/ebpo.rb")]

@@ -24,12 +24,12 @@ for name in names:
     if name != "inherit" and f"`{name}`" not in spec:
         missing.append(f"format-spec/README.md, section 3, selection: `{name}` is missing")
     for command, text in texts.items():
-        words, told, manual = (set(re.findall(r"\w+", part)) for part in (
+        words, in_help, manual = (set(re.findall(r"\w+", part)) for part in (
             re.search(r"^  (?:word|set) (.*)", text, re.MULTILINE).group(1),
             re.search(r"^  help (.*(?:\n    .*)*)", text, re.MULTILINE).group(1),
             " ".join(re.findall(r"^\.Cm (\w+)", text, re.MULTILINE))))
         missing += [f"tools/cli/options/{command}.options, select: {name} is missing in {place}"
-                    for place, found in (("its words", words), ("its help", told),
+                    for place, found in (("its words", words), ("its help", in_help),
                                          ("the manual", manual)) if name not in found]
 print("\n".join(missing) or f"{len(names)} selections are documented")
 sys.exit(1 if missing or len(names) < 4 else 0)
