@@ -1,14 +1,13 @@
-// One model passes through another, step by step, as in the EBP thesis' scenarios (5.6, 5.7).
+// Moves one model through another, step by step, as in the EBP thesis' scenarios (5.6, 5.7).
 //
-//     crossing_ebpo A.ebpo.h5 B.ebpo.h5 STEPS QUESTION SIZE [MEMORY]
-//         QUESTION: first, all. SIZE: B's diagonal for one of A's; 0: as it is.
-//         MEMORY: bytes of each model's budget; 0: all of it.
+//     crossing_ebpo A.ebpo.h5 B.ebpo.h5 STEPS QUERY SIZE [MEMORY]
+//         QUERY: first, all. SIZE: B's diagonal divided by A's; 0: the original size.
+//         MEMORY: budget of each model in bytes; 0: no limit.
 //
-// B begins beside A along x, boxes touching, and ends on the other side; its middle passes A's by
-// 1 % of A's diagonal above and aside, as a model that comes upon itself exactly is another
-// question. Each step is asked once, on one thread; prints what opening took and then, for each
-// step, microseconds of the processor, the number of pairs, and subtrees and bytes that were
-// loaded.
+// B begins beside A along x with touching boxes, and ends on the other side. B's center has an
+// offset of 1 % of A's diagonal along y and z, because exactly coinciding models are a special
+// case. Each step is queried once, on one thread. Prints the time of opening. Then prints for each
+// step the processor time in microseconds, the number of pairs, and the loaded subtrees and bytes.
 #include <ebpo/ebpo.h>
 #include <ebpo/collide.h>
 

@@ -1,7 +1,7 @@
-// Two copies of one model at poses: what programs that ask for contacts and distances share.
+// Common parts of the programs that query contacts and distances of two copies of a model.
 //
-// A line of a file of poses: a kind, nine numbers of the rotation by rows, three of the
-// translation; the second copy has the pose, the first stays where it is.
+// A line of a file of poses has a kind, nine numbers of the rotation by rows, and three of the
+// translation. The second copy has this pose; the first copy is not moved.
 #ifndef EBPO_BENCH_PAIRS_HPP
 #define EBPO_BENCH_PAIRS_HPP
 
@@ -32,7 +32,7 @@ inline std::vector<pose> read_poses(const char *path)
     return out;
 }
 
-// Microseconds of the processor for so many times.
+// Returns the processor time of `times` calls in microseconds.
 template <class Work> double time_of(int times, Work work)
 {
     timespec a, b;
@@ -43,8 +43,8 @@ template <class Work> double time_of(int times, Work work)
     return 1e6 * (double)(b.tv_sec - a.tv_sec) + 1e-3 * (double)(b.tv_nsec - a.tv_nsec);
 }
 
-// The least of so many times, in microseconds. All is asked before, so that all is in memory. What
-// takes little is asked several times in a row, as looking at the clock takes a while too.
+// Returns the minimum time of one call in microseconds. A first call loads all data. Short calls
+// are measured several at a time, because reading the clock takes time.
 template <class Work> double least_time(int rounds, Work work)
 {
     time_of(1, work);
@@ -57,7 +57,7 @@ template <class Work> double least_time(int rounds, Work work)
 
 using face_pairs = std::vector<std::pair<uint64_t, uint64_t>>;
 
-// Little-endian, sorted, behind their number.
+// Writes the number of pairs, and the sorted pairs, little-endian.
 inline void write_pairs(FILE *stream, face_pairs pairs)
 {
     std::sort(pairs.begin(), pairs.end());
@@ -66,19 +66,19 @@ inline void write_pairs(FILE *stream, face_pairs pairs)
     fwrite(pairs.data(), sizeof pairs[0], count, stream);
 }
 
-// POSES QUESTION ROUNDS [PAIRS]: prints for each pose its kind, microseconds and a value; `which`
-// answers with the value and, of "all", fills the pairs.
-template <class Ask> int run_poses(char **argument, Ask ask)
+// Runs POSES QUERY ROUNDS [PAIRS]: prints the kind, microseconds and a value for each pose.
+// run_query returns the value; for "all" it also fills the pairs.
+template <class Query> int run_poses(char **argument, Query run_query)
 {
     std::vector<pose> poses = read_poses(argument[0]);
-    std::string question = argument[1];
+    std::string query = argument[1];
     int rounds = atoi(argument[2]);
     FILE *stream = argument[3] ? fopen(argument[3], "wb") : nullptr;
     for (const pose &p : poses) {
         face_pairs pairs;
         double value = 0, us = least_time(rounds, [&] {
                               pairs.clear();
-                              value = ask(p, question, pairs);
+                              value = run_query(p, query, pairs);
                           });
         printf("%s %.3f %.17g\n", p.kind.c_str(), us, value);
         if (stream)

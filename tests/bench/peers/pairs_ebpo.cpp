@@ -1,11 +1,12 @@
-// Contacts and distances by this library, on one thread; and the poses that all programs get.
+// Queries contacts and distances with this library on one thread, and makes the poses for all
+// programs.
 //
-//     pairs_ebpo MODEL.ebpo.h5 POSES QUESTION ROUNDS [PAIRS]
-//         QUESTION: first, all, distance (exact), within (a tolerance of 1e-12 of the diagonal)
+//     pairs_ebpo MODEL.ebpo.h5 POSES QUERY ROUNDS [PAIRS]
+//         QUERY: first, all, distance (exact), within (a tolerance of 1e-12 of the diagonal)
 //     pairs_ebpo MODEL.ebpo.h5 make N
-//         prints N poses of each kind: slight and deep (in by 1 and 20 % of the diagonal, in a
-//         random direction, from where the models touch), these turned about, none (out by 2 %),
-//         apart (at a distance of 1 %)
+//         prints N poses of each kind. The first four have a penetration in a random direction
+//         from the touching pose: slight (1 % of the diagonal), deep (20 %), and the same rotated.
+//         none: 2 % outside of the touching pose. apart: at a distance of 1 %.
 #include <ebpo/ebpo.h>
 #include <ebpo/collide.h>
 
@@ -93,7 +94,8 @@ static double run_query(two &t, const bench::pose &p, const std::string &current
 
 // --- poses ---
 
-// Moves the second copy along `way`, from beyond the first one's ball, until it is so far away.
+// Moves the second copy along `way`, from outside of the first one's ball, until its distance is
+// `distance`. Returns the position along `way`.
 static double approach(two &t, bench::pose &p, const double way[3], const double start[3],
                        double distance)
 {
@@ -150,7 +152,7 @@ static void make_poses(two &t, int count)
             x = normal(random);
             length += x * x;
         }
-        for (int k = 0; k < 3; k++) { // middle on middle
+        for (int k = 0; k < 3; k++) { // start with common centers
             way[k] /= std::sqrt(length);
             start[k] = 0;
             for (int j = 0; j < 3; j++)

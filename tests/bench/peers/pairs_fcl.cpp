@@ -1,6 +1,6 @@
-// Contacts and distances by FCL: trees of OBBRSS in doubles, as its examples use it.
+// Queries contacts and distances with FCL: trees of OBBRSS in doubles, as in its examples.
 //
-//     pairs_fcl MODEL.ply POSES QUESTION ROUNDS [PAIRS]     QUESTION: first, all, distance
+//     pairs_fcl MODEL.ply POSES QUERY ROUNDS [PAIRS]     QUERY: first, all, distance
 #include <fcl/fcl.h>
 #include <malloc.h>
 

@@ -1,13 +1,17 @@
-// What the peers' programs have in common: command line, PLY, points, clocks, one line of JSON.
+// Common parts of the peers' programs: command line, PLY, points, clocks, one line of JSON.
 //
-// A peer has a class for each structure that it asks: inside, distance, rays (any may be void),
-// with `static constexpr int doubles` (of one point: 3; of one ray: 6), `answer_type`, and
-//     void load(const char *path); void build();
-//     void begin(const job &); answer_type answer(const double *point);
-//     void answer_all(const double *points, uint64_t count, answer_type *);
-//     uint64_t bytes(); // of memory, beside the mesh as it was read; 0: not known
-//     void tell(); // prints more members of a JSON object
-// Of these `usual` has the last three.
+// A peer has a class for each structure: inside, distance, rays (any of them may be void). A class
+// has `static constexpr int doubles` (of one point: 3; of one ray: 6), `result_type`, and
+//
+//     void load(const char *path);
+//     void build();
+//     void begin(const job &);
+//     result_type result(const double *point);
+//     void result_all(const double *points, uint64_t count, result_type *);
+//     uint64_t bytes(); // memory in addition to the mesh; 0: unknown
+//     void report();    // prints more members of a JSON object
+//
+// `standard` has defaults for the last three.
 #ifndef EBPO_BENCH_PEER_HPP
 #define EBPO_BENCH_PEER_HPP
 
@@ -34,20 +38,20 @@
 namespace bench
 {
 
-// Little-endian machines only, as the peers themselves.
+// The peers' programs run only on little-endian machines.
 static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
               "the peers' programs read little-endian numbers as they are");
 
-// Questions of one kind: QUERY POINTS.raw, then options.
+// Queries of one kind: QUERY POINTS.raw, then options.
 struct job {
     std::string query, points, answers;
     uint64_t count = UINT64_MAX;
-    double tmax = INFINITY; // where rays end
-    bool warm = false;      // distance: search no farther than the last answer allows
-    bool clocked = false;   // each question by the clock
+    double tmax = INFINITY; // the end of rays
+    bool warm = false;      // distance: limit the search by the previous result
+    bool clocked = false;   // measure each query separately
     bool batch = false;     // all in one call
-    bool base = false;      // without what only newer processors have
-    bool plain = false;     // distance: without sign
+    bool base = false;      // use only the base kernels (SSE2)
+    bool plain = false;     // distance: unsigned
 };
 
 struct settings {
@@ -56,16 +60,16 @@ struct settings {
     bool cold = false;
 };
 
-// Nothing will be asked: the quality that Embree has by default, as a build that is done often.
+// No queries follow: Embree then builds with its default quality, as for frequent builds.
 inline bool only_building = false;
 
-// For building; where the peer can use more than one. 0: all cores.
+// Threads for building, if the peer supports several. 0: all cores.
 inline unsigned threads = 1;
 
-// Of ours: bytes that the model may take. 0: as many as it needs.
+// The memory budget of our model in bytes. 0: no limit.
 inline uint64_t memory = 0;
 
-// What is written to --answers: for inside one byte, 1 inside and 0 outside; for the others 16
+// A result in the file of --answers: for inside one byte, 1 inside and 0 outside; else these 16
 // bytes.
 struct hit {
     double value; // distance, the ray's parameter, or for ray-all the number of hits
@@ -113,8 +117,8 @@ inline size_t ply_size(const std::string &type)
     throw std::runtime_error("PLY type \"" + type + "\" is not known");
 }
 
-// The vertices' properties may be anything scalar; faces have one list, of 32-bit numbers with
-// counts of one byte.
+// Vertices may have any scalar properties; faces have one list of 32-bit indices with counts of one
+// byte.
 inline ply_head read_ply_head(FILE *stream)
 {
     ply_head head;
@@ -184,7 +188,7 @@ inline void read_faces(file &in, const ply_head &head, std::vector<uint32_t> &co
     }
     for (uint32_t corner : corners)
         if (corner >= head.vertices)
-            throw std::runtime_error("a face names a vertex that is not there");
+            throw std::runtime_error("a face names a vertex that does not exist");
 }
 
 template <class Real> mesh<Real> read_ply(const char *path)
@@ -197,7 +201,7 @@ template <class Real> mesh<Real> read_ply(const char *path)
     return out;
 }
 
-// Asks the system to forget what it holds of a file, so that the next read goes to the disk.
+// Drops a file from the page cache, so that the next read goes to the disk.
 inline void drop_from_memory(const std::string &path)
 {
     int descriptor = open(path.c_str(), O_RDONLY);
@@ -207,7 +211,7 @@ inline void drop_from_memory(const std::string &path)
     close(descriptor);
 }
 
-// ---- clocks and figures ----
+// ---- clocks and statistics ----
 
 inline uint64_t nanoseconds(clockid_t clock = CLOCK_MONOTONIC)
 {
@@ -216,7 +220,7 @@ inline uint64_t nanoseconds(clockid_t clock = CLOCK_MONOTONIC)
     return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
 }
 
-// Median of what two readings in a row differ by.
+// Returns the median difference of two consecutive readings of the clock.
 inline uint64_t clock_cost()
 {
     std::vector<uint64_t> costs(10001);
@@ -239,7 +243,7 @@ inline double peak_megabytes()
     return kilobytes / 1024;
 }
 
-// Of ascending times: the least that is not exceeded by `share` of them.
+// Returns the quantile `share` of ascending times.
 inline uint64_t quantile(const std::vector<uint64_t> &sorted, double share)
 {
     size_t rank = (size_t)(share * (double)sorted.size());
@@ -259,11 +263,11 @@ inline std::vector<double> read_points(const std::string &path, uint64_t count, 
     return points;
 }
 
-template <class Answer>
-void write_answers(const std::string &path, const std::vector<Answer> &answers)
+template <class Result>
+void write_results(const std::string &path, const std::vector<Result> &results)
 {
     file out(path, "wb");
-    if (fwrite(answers.data(), sizeof(Answer), answers.size(), out.stream) != answers.size())
+    if (fwrite(results.data(), sizeof(Result), results.size(), out.stream) != results.size())
         throw std::runtime_error(path + ": cannot be written");
 }
 
@@ -295,24 +299,24 @@ template <class Peer> void print_build(const build_times &took, uint64_t bytes)
            peak_megabytes());
 }
 
-struct usual {
+struct standard {
     uint64_t bytes() const { return 0; }
-    void tell() const {}
-    template <class Answer> void answer_all(const double *, uint64_t, Answer *)
+    void report() const {}
+    template <class Result> void result_all(const double *, uint64_t, Result *)
     {
-        throw std::runtime_error("this peer answers questions one by one");
+        throw std::runtime_error("this peer runs queries one by one");
     }
 };
 
-// Ascending times, without the clock's own.
-template <class Peer, class Answer>
-std::vector<uint64_t> answer_clocked(Peer &peer, const double *points, std::vector<Answer> &answers)
+// Returns ascending times of queries, minus the cost of reading the clock.
+template <class Peer, class Result>
+std::vector<uint64_t> run_clocked(Peer &peer, const double *points, std::vector<Result> &results)
 {
-    std::vector<uint64_t> times(answers.size());
+    std::vector<uint64_t> times(results.size());
     uint64_t cost = clock_cost();
     for (uint64_t i = 0; i < times.size(); i++) {
         uint64_t before = nanoseconds();
-        answers[i] = peer.answer(&points[i * Peer::doubles]);
+        results[i] = peer.result(&points[i * Peer::doubles]);
         uint64_t took = nanoseconds() - before;
         times[i] = took > cost ? took - cost : 0;
     }
@@ -328,31 +332,31 @@ inline void print_clocked(const std::vector<uint64_t> &times)
            quantile(times, 0.5), quantile(times, 0.99), quantile(times, 0.999), times.back());
 }
 
-// Prints members of a JSON object.
-template <class Peer> void ask(Peer &peer, const job &j)
+// Runs a job, and prints members of a JSON object.
+template <class Peer> void run_job(Peer &peer, const job &j)
 {
     std::vector<double> points = read_points(j.points, j.count, Peer::doubles);
     uint64_t count = points.size() / Peer::doubles;
-    std::vector<typename Peer::answer_type> answers(count);
+    std::vector<typename Peer::result_type> results(count);
     std::vector<uint64_t> times;
     peer.begin(j);
     uint64_t wall = nanoseconds(), cpu = nanoseconds(CLOCK_THREAD_CPUTIME_ID);
     if (j.clocked)
-        times = answer_clocked(peer, points.data(), answers);
+        times = run_clocked(peer, points.data(), results);
     else if (j.batch)
-        peer.answer_all(points.data(), count, answers.data());
+        peer.result_all(points.data(), count, results.data());
     else
         for (uint64_t i = 0; i < count; i++)
-            answers[i] = peer.answer(&points[i * Peer::doubles]);
+            results[i] = peer.result(&points[i * Peer::doubles]);
     cpu = nanoseconds(CLOCK_THREAD_CPUTIME_ID) - cpu;
     wall = nanoseconds() - wall;
     printf(", \"query\": \"%s\", \"count\": %" PRIu64 ", \"mean_ns\": %.1f, \"mean_cpu_ns\": %.1f",
            j.query.c_str(), count, (double)wall / (double)count, (double)cpu / (double)count);
-    peer.tell();
+    peer.report();
     if (!times.empty())
         print_clocked(times);
     if (!j.answers.empty())
-        write_answers(j.answers, answers);
+        write_results(j.answers, results);
 }
 
 template <class Peer> void run(const settings &s)
@@ -361,12 +365,12 @@ template <class Peer> void run(const settings &s)
     Peer peer;
     build_times took = timed_build(peer, s);
     peer.begin(s.one);
-    volatile auto first = peer.answer(point.data());
+    volatile auto first = peer.result(point.data());
     (void)first;
-    uint64_t answered = nanoseconds();
+    uint64_t ended = nanoseconds();
     print_build<Peer>(took, peer.bytes());
-    printf(", \"first_answer_s\": %.6f", (double)(answered - took.start) * 1e-9);
-    ask(peer, s.one);
+    printf(", \"first_answer_s\": %.6f", (double)(ended - took.start) * 1e-9);
+    run_job(peer, s.one);
     printf("}\n");
 }
 
@@ -387,7 +391,7 @@ inline bool is_query(const std::string &word)
     return false;
 }
 
-// An option of a job; `value` is the next word, or "".
+// Parses an option of a job. `value` is the next word, or "".
 inline bool parse_job(const std::string &word, const std::string &value, job &j, bool &took)
 {
     bool *flags[] = { &j.warm, &j.clocked, &j.batch, &j.base, &j.plain };
@@ -434,8 +438,8 @@ inline std::vector<std::string> split(const std::string &line)
     return { std::istream_iterator<std::string>(in), {} };
 }
 
-// Jobs as lines of the standard input, until it ends; a line of JSON for each. What they ask is
-// built when it is first asked, and kept until something else is asked.
+// Runs jobs from lines of the standard input until it ends, and prints a line of JSON for each. A
+// structure is built for its first job, and kept until a job needs another structure.
 template <class Inside, class Distance, class Rays> class server
 {
   public:
@@ -467,7 +471,7 @@ template <class Inside, class Distance, class Rays> class server
             took = timed_build(*peer, base);
         }
         print_build<Peer>(took, peer->bytes());
-        ask(*peer, j);
+        run_job(*peer, j);
         printf("}\n");
     }
 
@@ -519,15 +523,16 @@ template <class Inside, class Distance, class Rays> int main(int argc, char **ar
             "       %s MODEL serve [--threads N] [--memory BYTES]\n"
             "POINTS.raw: little-endian doubles, x y z for each point; rays: origin and direction.\n"
             "--tmax T  rays end at origin + T direction\n"
-            "--warm  distance: search no farther than the last answer allows\n"
-            "--batch, --base, --unsigned  ours: all in one call; without what only newer "
-            "processors have; distance without sign\n"
-            "--clocked  each question by the clock\n"
-            "--memory  ours: what the model may take\n"
+            "--warm  distance: limit the search by the previous result\n"
+            "--batch, --base, --unsigned  ours: all in one call; only base kernels (SSE2); "
+            "unsigned distance\n"
+            "--clocked  measure each query separately\n"
+            "--memory  ours: memory budget of the model\n"
             "--cold  ask the system to drop MODEL from its cache first\n"
-            "build    only load and build what rays need; --threads 0: on all cores, where the "
-            "peer can\n"
-            "serve    what the first line has after MODEL, from lines of the standard input\n",
+            "build    only load, and build the structure for rays; --threads 0: on all cores, if "
+            "the peer supports it\n"
+            "serve    run jobs from lines of the standard input: the arguments of the first line "
+            "after MODEL\n",
             argv[0], argv[0], argv[0]);
     return 2;
 }

@@ -44,7 +44,7 @@ class inside : public bench::standard
                 return surface_mesh::Vertex_index(mesh.corners[3 * i + corner]);
             };
             if (surface.add_face(vertex(0), vertex(1), vertex(2)) == surface_mesh::null_face())
-                throw std::runtime_error("CGAL's Surface_mesh wants a mesh that is a manifold");
+                throw std::runtime_error("CGAL's Surface_mesh needs a manifold mesh");
         }
         if (!CGAL::is_closed(surface))
             throw std::runtime_error("the mesh is not closed");
@@ -57,7 +57,7 @@ class inside : public bench::standard
         side = std::make_unique<CGAL::Side_of_triangle_mesh<surface_mesh, kernel>>(tree);
     }
 
-    // On the surface counts as inside.
+    // Points on the surface count as inside.
     uint8_t result(const double *p)
     {
         return (*side)(point_3(p[0], p[1], p[2])) != CGAL::ON_UNBOUNDED_SIDE;
@@ -71,8 +71,7 @@ class inside : public bench::standard
     std::unique_ptr<CGAL::Side_of_triangle_mesh<surface_mesh, kernel>> side;
 };
 
-// ---- distance and rays: over the triangles themselves, which is faster than through a mesh's
-// connectivity ----
+// ---- distance and rays: on a list of triangles, which is faster than on a connected mesh ----
 
 using triangle_list = std::vector<kernel::Triangle_3>;
 using triangle_primitive = CGAL::AABB_triangle_primitive<kernel, triangle_list::const_iterator>;
@@ -137,7 +136,7 @@ class first_hit : public bench::standard
     void begin(const bench::job &job)
     {
         if (job.query != "ray")
-            throw std::runtime_error("this peer does not answer " + job.query);
+            throw std::runtime_error("this peer does not support " + job.query);
     }
     void load(const char *path) { triangles = read_triangles(path); }
 

@@ -1,5 +1,5 @@
-// The library itself, asked as the peers are: by the same loops, under the same clock; everything
-// in memory, made on `--threads` threads.
+// This library, queried like the peers: with the same loops and clocks. The whole model is in
+// memory, loaded by `--threads` threads.
 #include <ebpo/ebpo.h>
 
 #include "peer.hpp"
@@ -8,7 +8,7 @@
 namespace
 {
 
-// Aborts what is under way when the library does not succeed.
+// Throws an exception when a call of the library fails.
 class outcome
 {
   public:
@@ -46,7 +46,7 @@ class model : public bench::standard
     }
     void build() {}
     uint64_t bytes() const { return stats().memory; }
-    // Since the last `begin`.
+    // Prints statistics since the last `begin`.
     void report() const
     {
         ebpo_model_stats now = stats();

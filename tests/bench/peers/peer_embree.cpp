@@ -61,7 +61,7 @@ class scene
         return true;
     }
 
-    std::atomic<uint64_t> bytes{ 0 }; // of Embree, beside the mesh
+    std::atomic<uint64_t> bytes{ 0 }; // Embree's memory, without the mesh
     RTCDevice device;
     RTCScene handle;
     bench::mesh<float> triangles;
@@ -70,7 +70,7 @@ class scene
 // ---- inside ----
 
 struct counting_context {
-    RTCIntersectContext base; // first: Embree passes its address on
+    RTCIntersectContext base; // the first member: Embree passes its address
     unsigned hits;
 };
 
@@ -87,8 +87,8 @@ class inside : public bench::standard
     static constexpr int doubles = 3;
     using result_type = uint8_t;
 
-    // Splits in space would put a face into two leaves, and its hit would count twice: no build of
-    // high quality.
+    // No build of high quality: spatial splits would put a face into two leaves, and its hit would
+    // count twice.
     inside() : tree(RTC_SCENE_FLAG_ROBUST, RTC_BUILD_QUALITY_MEDIUM)
     {
         if (!rtcGetDeviceProperty(tree.device, RTC_DEVICE_PROPERTY_FILTER_FUNCTION_SUPPORTED))
@@ -191,8 +191,8 @@ class distance : public bench::standard
     static constexpr int doubles = 3;
     using result_type = bench::hit;
 
-    // Compact: measured faster (5 to 25 %) and half the memory; a build of high quality takes three
-    // times as long and gains nothing here.
+    // A compact scene is 5 to 25 % faster and needs half the memory. A build of high quality takes
+    // three times as long and is not faster here.
     distance() : tree(RTC_SCENE_FLAG_COMPACT, RTC_BUILD_QUALITY_MEDIUM) {}
     void load(const char *path) { tree.load(path); }
     void build() { tree.build(nullptr); }
@@ -208,7 +208,7 @@ class distance : public bench::standard
         RTCPointQuery query = {};
         query.x = (float)point[0], query.y = (float)point[1], query.z = (float)point[2];
         query.radius = INFINITY;
-        if (warm) { // the last nearest point is at most so far away; with space for rounding
+        if (warm) { // an upper bound of the distance, with a margin for rounding
             vec step = vec{ query.x, query.y, query.z } - last_point;
             query.radius = (last_distance + std::sqrt(dot(step, step))) * 1.00001f + 1e-30f;
             last_point = { query.x, query.y, query.z };
@@ -242,7 +242,7 @@ RTCRay ray_of(const double *from, double tmax)
 }
 
 struct gathering_context {
-    RTCIntersectContext base; // first: Embree passes its address on
+    RTCIntersectContext base; // the first member: Embree passes its address
     struct intersected {
         float t;
         uint32_t face;
@@ -258,7 +258,7 @@ void gather_and_go_on(const RTCFilterFunctionNArguments *arguments)
     arguments->valid[0] = 0;
 }
 
-// High quality is what Embree's authors advise where a scene is built once.
+// Embree's authors recommend high quality for scenes that are built once.
 class rays : public bench::standard
 {
   public:
@@ -302,7 +302,8 @@ class rays : public bench::standard
         return ray.tfar < 0 ? bench::hit{ 0, 0 } : bench::hit{ INFINITY, -1 };
     }
 
-    // In their order. Splits in space put a face into several leaves: each is reported once.
+    // Returns all hits in order. Spatial splits put a face into several leaves; each face is
+    // reported once.
     bench::hit all(const double *from)
     {
         gathering_context context;
