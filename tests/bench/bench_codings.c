@@ -17,14 +17,14 @@
 
 enum { SPACE = 1 << 20, STREAMS_MAX = 32, TURNS = 3, DICTIONARY = 16384 };
 
-/* Contents of a chunk before zstd: runs of similar bytes. */
+/* Contents of a chunk before zstd: streams of similar bytes. */
 typedef struct streams {
     const uint8_t *bytes[STREAMS_MAX];
     size_t size[STREAMS_MAX];
     int count;
 } streams;
 
-/* Use of zstd. `blocks`: one for each stream. */
+/* How zstd is used. `blocks`: one block for each stream. */
 typedef struct effort {
     int level, match_least;
     bool blocks;
@@ -35,7 +35,7 @@ typedef struct effort {
 static const effort one_block = { 3, 0, false, NULL, 0 }, today = { 7, 6, true, NULL, 0 };
 
 static ebpo_tree tree;
-static uint32_t faces_rows, vertices_rows, list_rows; /* of chunks */
+static uint32_t faces_rows, vertices_rows, list_rows; /* rows of a chunk */
 static ZSTD_CCtx *writer;
 static ZSTD_DCtx *reader;
 static uint8_t stored[SPACE], space[SPACE];
@@ -131,7 +131,8 @@ static size_t bit_planes(const uint32_t *values, size_t count)
     return frame(&s, &today);
 }
 
-/* Writes the number of bits and the two bits after the first in a byte, and packs the others. */
+/* Writes the number of bits and the two bits after the first one into a byte for each value, and
+ * packs the other bits. */
 static size_t bit_counts(const uint32_t *values, size_t count)
 {
     size_t bits = 0;
@@ -150,7 +151,7 @@ static size_t bit_counts(const uint32_t *values, size_t count)
     return frame(&s, &today);
 }
 
-/* Compresses columns of codes by zstd: in the current way, as rows of columns, and with a
+/* Compresses columns of codes by zstd: with the current coding, with separate columns, and with a
  * dictionary. */
 static void standard(const char *array, const uint32_t *codes, uint64_t rows, int columns,
                      uint32_t chunk)
@@ -172,7 +173,7 @@ static void standard(const char *array, const uint32_t *codes, uint64_t rows, in
     report(array, "one block, level 3", sum[0], 0);
     report(array, "**today**: a block for each plane of bytes", sum[1], 0);
     if (columns > 1)
-        report(array, "the same, columns apart", sum[2], 0);
+        report(array, "columns separate", sum[2], 0);
     size_t trained =
         ZDICT_trainFromBuffer(dictionary, DICTIONARY, sample, sizes, (unsigned)samples);
     effort with = { 7, 6, true, dictionary, trained };
@@ -192,7 +193,7 @@ static uint32_t ordered(float value)
     return ebpo_float_order32(bits);
 }
 
-/* ---- vertices for the prediction of a vertex ---- */
+/* ---- vertices, from which a vertex is predicted ---- */
 
 /* For each vertex, in the first face with it: the two other vertices of that face, and the corner
  * across these in an earlier face; ~0: there is none, or it is in an earlier chunk. */
@@ -307,7 +308,7 @@ static double gates_back(size_t bytes, uint32_t rows, uint64_t seen, const uint3
         bool fine =
             ebpo_gates_decode(space, rows, codes) && ebpo_corners_decode(codes, rows, &then, back);
         double took = now() - begin;
-        check(fine && memcmp(back, expected, 12 * (size_t)rows) == 0, "faces came back otherwise");
+        check(fine && memcmp(back, expected, 12 * (size_t)rows) == 0, "the decoded faces differ");
         best = took < best ? took : best;
     }
     return best;
@@ -407,7 +408,7 @@ static void lists(void)
     }
     report("leaf_refs", "one block, level 3", sum[0], 0);
     report("leaf_refs", "**today**: a block for each plane of bytes", sum[1], 0);
-    report("leaf_refs", "the first of each leaf apart", sum[2], 0);
+    report("leaf_refs", "the first of each leaf separate", sum[2], 0);
 }
 
 static void map(const char *name, const uint32_t *numbers, uint64_t rows)

@@ -1,8 +1,8 @@
-/* Measures how fast a file is decoded: bench_decode FILE.ebpo.h5 [--threads N] [--rounds R]. Reads
- * all of it, including checks, as any reader does: the levels, the mesh, the maps, each freed
- * before the next. The file is in the page cache (a first round is not counted). One line of JSON:
- * medians of R rounds (default 3), and the decoded bytes: those of the arrays returned to a reader
- * (file.h: ebpo_level, ebpo_mesh, maps). */
+/* Measures decoding of a file: bench_decode FILE.ebpo.h5 [--threads N] [--rounds R]. Reads the
+ * whole file with all checks: the levels, the mesh, the maps. Each part is freed before the next. A
+ * first round, which is not counted, loads the file into the page cache. Prints one line of JSON:
+ * medians of R rounds (default 3), and the decoded bytes, which are the bytes of the arrays that a
+ * reader gets (file.h: ebpo_level, ebpo_mesh, maps). */
 #include <inttypes.h>
 #include <stdbool.h>
 #include <stdio.h>

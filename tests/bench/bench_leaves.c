@@ -1,7 +1,7 @@
-/* Measures the gain by kinds of leaves: bench_leaves FILE.ebpo.h5 [--points N] [--json]. For
- * uniform points of the model's box that are in leaves, by the kind of the leaf: nanoseconds per
- * point, with the planes of the kind and with the same leaf treated as a general one. Both are the
- * best of seven passes, in turn, in one run. */
+/* Measures the gain by kinds of leaves: bench_leaves FILE.ebpo.h5 [--points N] [--json]. Queries
+ * uniform points of the model's box that are in leaves. Prints for each kind of leaf the
+ * nanoseconds per point: with the planes of the kind, and with the same leaf treated as a general
+ * leaf. Both values are the best of seven passes, which alternate in one run. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -40,7 +40,7 @@ static void fail(const ebpo_error *error)
     exit(EXIT_FAILURE);
 }
 
-/* Prepares all leaves as after many queries. */
+/* Prepares all leaves below a node, as many queries do. */
 static void know_below(const ebpo_accel *s, const ebpo_node *node)
 {
     for (int i = 0;
@@ -107,7 +107,7 @@ static void measure(ebpo_context *c, bucket *b)
             s->leaf[k].kind = kinds[k];
         for (uint64_t k = 0; k < b->count; k++)
             if (with[k].where != without[k].where || with[k].winding != without[k].winding) {
-                fprintf(stderr, "bench_leaves: answers differ\n");
+                fprintf(stderr, "bench_leaves: results differ\n");
                 exit(EXIT_FAILURE);
             }
     }

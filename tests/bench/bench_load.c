@@ -1,7 +1,7 @@
-/* Measures the cost of loading, stage by stage: bench_load FILE.ebpo.h5 [--memory BYTES] [--count
- * N] [--planes] [--whole]. Without --whole N subtrees below the cut level, one after another from
- * the middle of the file on, as queries under a budget load them; with it the whole model, N times,
- * on one thread. CPU time of this thread. */
+/* Measures the cost of loading by stage: bench_load FILE.ebpo.h5 [--memory BYTES] [--count N]
+ * [--planes] [--whole]. Without --whole it loads N subtrees below the cut level, one after another
+ * from the middle of the file, as queries under a budget do. With --whole it loads the whole model
+ * N times, on one thread. Prints the CPU time of this thread. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -103,7 +103,8 @@ int main(int argc, char **argv)
         options.memory = memory;
         check(ebpo_model_new(file, &options, &m, &error), &error);
         if (!m->top) {
-            fprintf(stderr, "bench_load: the model fits into the memory; --whole, or less of it\n");
+            fprintf(stderr, "bench_load: the model fits into the memory; use --whole or a "
+                            "smaller --memory\n");
             return EXIT_FAILURE;
         }
         load_below(&t, m, count, planes);

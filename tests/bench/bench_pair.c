@@ -1,5 +1,5 @@
-/* Measures nanoseconds for each pair of faces: the filter of eight, the exact test, contacts,
- * distances; by kind of input; and for pairs of blocks. Not a test: prints a table. */
+/* Measures nanoseconds for each pair of faces, by kind of input: the filter of eight, the exact
+ * test, contacts, distances. Also measures pairs of blocks. Prints a table; it is not a test. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -204,8 +204,8 @@ static void report_blocks(uint64_t *state)
         for (unsigned k = 0; k < found.count; k++)
             certain += (found.pair[k] & EBPO_CERTAINLY_CROSSING) != 0;
     }
-    printf("\nns for each pair of blocks: turn one %.1f, place one %.1f, filter all 64 pairs: "
-           "base %.1f, best %.1f\n(%.2f crossing for certain, %.3f open)\n",
+    printf("\nns for each pair of blocks: rotate one %.1f, pose one %.1f, filter all 64 pairs: "
+           "base %.1f, best %.1f\n(%.2f certainly crossing, %.3f open)\n",
            ns_per_pair(turn_block, BLOCKS, ROUNDS), ns_per_pair(place_block, BLOCKS, ROUNDS),
            ns_per_pair(pair_blocks_base, BLOCKS, ROUNDS),
            ns_per_pair(pair_blocks_best, BLOCKS, ROUNDS), (double)certain / BLOCKS,

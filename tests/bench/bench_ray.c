@@ -1,5 +1,5 @@
-/* Measures processor time for one ray or box against one triangle, the best of many rounds:
- * bench_ray. */
+/* Measures the processor time of one ray or box against one triangle: bench_ray. Prints the best of
+ * many rounds. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -24,19 +24,19 @@ static double now(void)
 typedef enum aim {
     AT_RANDOM,
     AT_THE_MIDDLE,
-    AT_A_CORNER, /* as close as the rounding of the direction allows */
+    AT_A_CORNER, /* as exactly as the rounding of the direction permits */
     AT_A_CORNER_EXACTLY,
     AT_AN_EDGE_EXACTLY,
     FROM_A_CORNER,
     FROM_AN_EDGE,
-    FROM_THE_FACE, /* within rounding */
-    TO_THE_FACE,   /* ends there, within rounding */
+    FROM_THE_FACE, /* from the face, within rounding */
+    TO_THE_FACE,   /* ends at the face, within rounding */
     TO_A_CORNER,
-    ALONG_AN_AXIS, /* through a corner */
+    ALONG_AN_AXIS, /* along an axis through a corner */
     WITHIN_THE_PLANE
 } aim;
 
-/* Points with few bits, so that differences are exact. */
+/* Returns a coordinate with few bits, so that differences are exact. */
 static double coarse(uint64_t *state)
 {
     return (double)(float)(0x1p-20 * (double)reference_integer(state, -(1 << 20), 1 << 20));
@@ -93,8 +93,8 @@ static void prepare(aim a, uint64_t *state)
     }
 }
 
-/* Measures one ray against a triangle; and the order of the hits of two neighbours, when it hits
- * both. */
+/* Measures one ray against a triangle. Also measures the comparison of the hits of two neighbours,
+ * for rays that hit both. */
 static void time_rays(const char *name, aim a, uint64_t *state)
 {
     static ebpo_ray_intersection intersected[2][COUNT];
@@ -121,7 +121,7 @@ static void time_rays(const char *name, aim a, uint64_t *state)
         }
         best_order = fmin(best_order, (now() - begin) / (double)(both ? both : 1));
     }
-    printf("%-22s %8.1f ns  %5.1f %% meet; %8.1f ns to compare %4ld pairs, %4ld ties\n", name, best,
+    printf("%-22s %8.1f ns  %5.1f %% hit; %8.1f ns to compare %4ld pairs, %4ld ties\n", name, best,
            100.0 * (double)hits / COUNT, both ? best_order : 0.0, both, ties);
 }
 
@@ -138,7 +138,7 @@ static void time_boxes(uint64_t *state)
                                                  box_max[n]);
         best = fmin(best, (now() - begin) / COUNT);
     }
-    printf("%-22s %8.1f ns  %5.1f %% meet\n", "box", best, 100.0 * (double)hits / COUNT);
+    printf("%-22s %8.1f ns  %5.1f %% hit\n", "box", best, 100.0 * (double)hits / COUNT);
 }
 
 int main(void)

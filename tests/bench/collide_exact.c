@@ -1,11 +1,12 @@
 /* Compares pairs of faces and distances of two models with brute force in rational arithmetic
- * (tests/support/models_reference.h), which takes seconds a pose from 30,000 faces on.
+ * (tests/support/models_reference.h). This takes seconds per pose from 30,000 faces on.
  *
  *     collide_exact POSES A.ply|A.obj|... [...]
  *
- * Each model with itself and with the next one, at poses of sixteen kinds in turn: identical,
- * quarter turns, halves, boxes in contact, 1e-9 apart, slight and deep penetration, one within the
- * other, apart. Prints a row of a table for each two models; fails if anything differs. */
+ * Tests each model with itself and with the next one, at poses of sixteen kinds in turn. These
+ * include identical models, quarter turns, halves, touching boxes, a gap of 1e-9, slight and deep
+ * penetration, one model within the other, and separate models. Prints a table row for each two
+ * models; fails if a result differs. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>

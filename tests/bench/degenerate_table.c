@@ -34,7 +34,7 @@ static double median(double *x, int count)
     return x[count / 2];
 }
 
-/* A torus of about as many faces. */
+/* Returns a torus of about this many faces. */
 static degenerate_case tame_like(uint64_t faces)
 {
     uint32_t m = 3;
@@ -79,7 +79,7 @@ static double distance_seconds(const degenerate_case *c)
     return median(seconds, run);
 }
 
-/* The two take turns. */
+/* Returns the ratio of the build times; the two builds alternate. */
 static double build_ratio(const degenerate_case *c, const degenerate_case *tame)
 {
     double ours[RUNS], theirs[RUNS];

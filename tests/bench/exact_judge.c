@@ -1,17 +1,21 @@
 /* Measures the accuracy of results: makes queries that are hard to decide, and compares results
- * with rational arithmetic (tests/support/oracle.h, brute force), for models that are not large.
+ * with rational arithmetic (tests/support/oracle.h, brute force). For models that are not large.
  *
  *     exact_judge ask FILE.ebpo.h5 points|rays COUNT OUT.raw
  *     exact_judge judge FILE.ebpo.h5 QUERY POINTS.raw TMAX TOLERANCE ANSWERS...
  *
- * Points are in turn on a vertex, on an edge and on a face, as exactly as doubles allow, in the
- * plane of a face, above a vertex, next to one, between two, and in a plane of the octree. Rays go
- * to a vertex, to the middle of an edge, from a vertex, along an axis through a vertex, along an
- * edge, in the plane of a face, from the middle of an edge, from vertex to vertex. Results: as
- * peer.hpp writes them. Prints JSON for each file of results: `decisions`: inside or not (excluding
- * points on the surface, unless it reports which these are), hit or none, number of hits; `values`:
- * distances or positions that differ by more than TOLERANCE, in the unit of the model; `bits`:
- * values that are not correctly rounded, the first face or the sign. */
+ * Points are in turn on a vertex, on an edge and on a face (as exactly as doubles permit), in the
+ * plane of a face, above a vertex, next to a vertex, between two vertices, and in a plane of the
+ * octree.
+ *
+ * Rays go to a vertex, to the middle of an edge, from a vertex, along an axis through a vertex,
+ * along an edge, in the plane of a face, from the middle of an edge, and from vertex to vertex.
+ *
+ * The files of results have the layout of peer.hpp. Prints JSON for each of them.
+ * `decisions`: wrong inside results (without points on the surface, unless the program reports
+ * these), hits, and numbers of hits.
+ * `values`: distances or positions with an error above TOLERANCE, in the unit of the model.
+ * `bits`: values that are not correctly rounded, or a wrong first face or sign. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -61,7 +65,7 @@ static void read_subject(subject *s, const char *path)
     s->has_maps = ebpo_file_read_maps(file, NULL, &s->maps, &error) == EBPO_OK;
     s->solid = ebpo_file_info(file)->solid;
     if (s->solid && ebpo_file_info(file)->rule != EBPO_RULE_NONZERO)
-        fail("only the rule nonzero is judged");
+        fail("only the rule nonzero is supported");
     s->box = ebpo_root_box(ebpo_file_info(file));
     s->truth = oracle_make(&s->mesh);
     ebpo_close(file);
@@ -163,7 +167,7 @@ static void run_query(const subject *s, bool rays, uint64_t count, const char *p
         fwrite(row, sizeof *row, rays ? 6 : 3, f);
     }
     if (!f || fclose(f) != 0)
-        fail("the questions cannot be written");
+        fail("the queries cannot be written");
 }
 
 /* --- reference --- */
@@ -187,7 +191,7 @@ static int64_t reported_face(const subject *s, uint32_t face)
     return s->has_maps ? s->maps.face_source[face] : face;
 }
 
-/* inside: the value is an ebpo_where. */
+/* Returns the exact result. inside: the value is an ebpo_where. */
 static result truth_of(const subject *s, query what, const double *q, double tmax)
 {
     oracle_nearest near;
@@ -242,7 +246,7 @@ static void judge(const subject *s, query what, const double *points, uint64_t c
     for (int k = 0; k < files; k++) {
         results[k] = read_file(paths[k], &bytes);
         if (bytes != count * each)
-            fail("not as many answers as questions");
+            fail("the numbers of results and queries differ");
     }
     for (uint64_t i = 0; i < count; i++) {
         const double *q = points + i * (what >= RAY ? 6 : 3);

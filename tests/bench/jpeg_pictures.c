@@ -1,8 +1,8 @@
-/* Measures the size of pictures as JPEG, and returns the decoded pictures.
+/* Compresses pictures as JPEG, and writes the decoded pictures to standard output.
  *
  *     jpeg_pictures WIDTH HEIGHT QUALITY COUNT < RGB > RGB
  *
- * Prints the bytes of all, with optimized Huffman tables, on standard error. */
+ * Prints the compressed bytes of all pictures, with optimized Huffman tables, on standard error. */
 #include <stdio.h>
 #include <stdlib.h>
 

@@ -1,13 +1,14 @@
 /* Computes samples for the pictures of coarse_looks.py: the triangle of each sample, and the
- * position on it.
+ * position on the triangle.
  *
  *     looks_samples FILE LEVEL|mesh SAMPLES OUT < CAMERAS
  *     looks_samples FILE --planes-to LEVEL OUT.ebpo.h5
  *
- * Cameras are orthographic: their number, then for each right, up and back, the middle, and half
- * the side of the picture, 13 numbers. OUT, in native byte order: eight counts, the box, positions,
- * triangles, colours, nodes, corners of polygons, normals of polygons (ebpo_lod_normals), samples.
- * The second form copies a file without the planes below a level. */
+ * Cameras are orthographic. The input is their number, then 13 numbers for each camera: right, up,
+ * back, center, and half the side of the picture. OUT, in native byte order, contains eight counts,
+ * the box, positions, triangles, colours, nodes, corners of polygons, normals of polygons
+ * (ebpo_lod_normals), and samples. The second form copies a file without the planes below a level.
+ */
 #include <ebpo/ebpo.h>
 #include <math.h>
 #include <stdio.h>
@@ -18,8 +19,8 @@ enum { NUMBERS = 13 };
 
 typedef struct sample {
     float depth;
-    uint32_t triangle; /* UINT32_MAX: none */
-    float share[2];    /* weights of its second and third corner */
+    uint32_t triangle; /* UINT32_MAX: no triangle */
+    float share[2];    /* weights of the triangle's second and third corner */
 } sample;
 
 typedef struct shown {
@@ -60,7 +61,7 @@ static void project(const shown *s, const double camera[NUMBERS], int side, doub
     }
 }
 
-/* Computes the range of pixels whose middles may be between. */
+/* Computes the range of pixels whose centers may be between a and b. */
 static void range(double a, double b, double c, int side, int out[2])
 {
     out[0] = (int)ceil(fmax(0, fmin(a, fmin(b, c)) - 0.5));
@@ -85,8 +86,8 @@ static void fill(sample *to, int side, uint32_t triangle, const double *a, const
         }
 }
 
-/* Backs of envelopes are never visible; rows run down, so that fronts have the other orientation.
- */
+/* The back sides of envelopes are never visible. Rows run downwards, so front faces are clockwise
+ * in the picture. */
 static void draw(const shown *s, const double *at, int side, sample *to)
 {
     for (int i = 0; i < side * side; i++)
@@ -154,7 +155,7 @@ static ebpo_status draw_all(const ebpo_file *file, char **argv, ebpo_error *erro
     if (status != EBPO_OK)
         return status;
     if (!out || side < 1 || scanf("%d", &cameras) != 1)
-        fail("no cameras, or nowhere to write");
+        fail("no cameras, or the output cannot be written");
     write_shown(&s, ebpo_file_info(file), side, cameras, out);
     double *at = space(s.mesh.vertex_count * 24);
     sample *samples = space((size_t)side * (size_t)side * sizeof *samples);
@@ -162,7 +163,7 @@ static ebpo_status draw_all(const ebpo_file *file, char **argv, ebpo_error *erro
         double camera[NUMBERS];
         for (int k = 0; k < NUMBERS; k++)
             if (scanf("%lf", &camera[k]) != 1)
-                fail("a camera has 13 numbers");
+                fail("each camera needs 13 numbers");
         project(&s, camera, side, at);
         draw(&s, at, side, samples);
         fwrite(samples, sizeof *samples, (size_t)side * (size_t)side, out);

@@ -1,5 +1,5 @@
-/* Measures the memory of a whole model by kind: memory_kinds FILE.ebpo.h5. Prints bytes by kind as
- * JSON, before any query. */
+/* Prints the memory of a whole model by kind as JSON, before any query: memory_kinds FILE.ebpo.h5
+ */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>

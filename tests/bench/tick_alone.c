@@ -1,8 +1,7 @@
-/* Measures the delays of the machine: a loop at 1 kHz does the same 20 us of arithmetic in each
+/* Measures the delays of the machine. A loop at 1 kHz does the same 20 us of arithmetic in each
  * step, without the library, with SCHED_FIFO and locked memory as in `ebpo haptic`.
  *
- *     gcc -O2 tests/bench/tick_alone.c -o tick_alone -lm && ./tick_alone SECONDS
- */
+ *     gcc -O2 tests/bench/tick_alone.c -o tick_alone -lm && ./tick_alone SECONDS */
 #define _GNU_SOURCE
 #include <sched.h>
 #include <stdio.h>

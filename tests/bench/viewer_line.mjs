@@ -1,8 +1,8 @@
-// The viewer in a headless Chromium over a slow line: viewer_line.mjs [OPTION VALUE ...] MODEL.ebpo.h5 ...
-// For each model, a table row: how long until the first picture (median of the rounds) and until the picture has settled, requests and bytes of the model
-// by then, triangles, and what a second visit still fetches. All connections share the line, in turns, as they would.
-// --kbits 5000   --ms 100 (round trip)   --rounds 9   --pictures FOLDER (of the settled page)   --query TEXT (more of the address)   --sources (not bundled)
-// --viewer ROOT (another checkout)   --near 0.03 (a row more: a click's distance, then the camera so many of the box's diagonals from the point clicked)
+// Measures the viewer in a headless Chromium over a slow line: viewer_line.mjs [OPTION VALUE ...] MODEL.ebpo.h5 ...
+// Prints a table row for each model: time to the first picture (median of the rounds) and to the settled picture, requests and bytes of the model until
+// then, triangles, and the bytes that a second visit fetches. All connections share the line in turns.
+// --kbits 5000   --ms 100 (round trip)   --rounds 9   --pictures FOLDER (of the settled page)   --query TEXT (appended to the URL)   --sources (not bundled)
+// --viewer ROOT (another checkout)   --near 0.03 (another row: the time of a click's distance; then the camera is at this many box diagonals from the point)
 import { spawn } from 'node:child_process';
 import { existsSync, mkdtempSync, readFileSync, rmSync, symlinkSync } from 'node:fs';
 import { connect, createServer } from 'node:net';
@@ -24,9 +24,9 @@ for (let i = 2; i < process.argv.length; i++) {
 const root = resolve(options.viewer), viewer = join(root, 'tools/web'), work = mkdtempSync(join(tmpdir(), 'ebpo-bench-')), log = join(work, 'access.log');
 const { chromium } = await import(pathToFileURL(join(viewer, 'node_modules/playwright-core/index.mjs')));
 
-const PIECE = 4096, QUEUE = 65536; // what a turn sends, and what the line holds of a connection
+const PIECE = 4096, QUEUE = 65536; // bytes of a turn, and bytes that the line stores for a connection
 
-// A line between a port of its own and `to`: every connection and every byte comes late, and bytes come at the line's rate, connections in turns.
+// Starts a line from a new port to `to`. It delays every connection and every byte, and limits the rate of bytes. Connections take turns.
 function line(to) {
   const waiting = []; // connections with something to send: { queue, send }
   let busy = false;
@@ -99,7 +99,7 @@ async function serve() {
 }
 
 let logged = 0;
-// Since the last call: what of the model and of the page was sent.
+// Returns what was sent of the model and of the page since the last call.
 function traffic() {
   const lines = readFileSync(log, 'utf8').split('\n').filter(Boolean), sums = { requests: 0, bytes: 0, page: 0 };
   for (const text of lines.slice(logged)) {
@@ -111,7 +111,7 @@ function traffic() {
   return sums;
 }
 
-// In the page: when a picture was there, and when nothing more came.
+// Runs in the page: records the times of the first picture and of the last change.
 const WATCH = `{
   const look = () => {
     if (!(window.ebpoViewer?.state.stats?.triangles > 0))
@@ -128,11 +128,11 @@ async function visit(page, address) {
   const first = await page.evaluate(() => window.firstPicture);
   await settle(page);
   const { settled, state } = await page.evaluate(() => ({ settled: performance.now(), state: window.ebpoViewer.state }));
-  await page.waitForTimeout(200); // nginx writes its log when an answer is out
+  await page.waitForTimeout(200); // nginx writes its log after a response is sent
   return { first, settled: settled - 1000, stats: state.stats, ...traffic() };
 }
 
-// A click in the middle until its distance is exact, then a close-up of that point until it has settled.
+// Clicks in the middle and waits for the exact distance; then moves close to that point and waits until the page has settled.
 async function closeUp(page) {
   const { width, height } = page.viewportSize(), began = Date.now();
   await page.mouse.click(width / 2 - 155, height / 2);

@@ -1,5 +1,5 @@
-/* Writes attributes as JSON: the content of the vectors' .attributes.json. Values are written as
- * the integers of their bits. */
+/* Writes attributes as JSON: the content of the vectors' .attributes.json. Each value is written as
+ * an integer with the same bits. */
 #ifndef ATTRIBUTES_JSON_H
 #define ATTRIBUTES_JSON_H
 

@@ -10,7 +10,7 @@ int main(int argc, char **argv)
     (void)argc;
     test_arguments = argv + 1;
     SRunner *runner = srunner_create(test_suite());
-    scratch_enter(); /* here, not in a child process, so that the folder to remove is known */
+    scratch_enter(); /* in the parent process, which knows the folder to remove */
     srunner_run_all(runner, CK_ENV);
     int failed = srunner_ntests_failed(runner);
     srunner_free(runner);

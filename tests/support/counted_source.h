@@ -8,7 +8,7 @@ typedef struct counted_source {
     uint8_t *data, *touched;
     uint64_t size, requested; /* bytes of the file; bytes requested */
     uint64_t batches;         /* prefetch hints */
-    uint64_t alone;           /* reads of bytes not requested before */
+    uint64_t alone;           /* reads of bytes that were not requested before */
     uint64_t failed;          /* reads during the failure */
     bool failing;
 } counted_source;

@@ -140,7 +140,7 @@ static bool segment_intersects(const float *p, const float *q, const triangle t)
     if (above * below > 0)
         return false;
     int some = 0;
-    for (int i = 0; i < 3; i++) { /* the segment's line passes all edges on one side */
+    for (int i = 0; i < 3; i++) { /* the segment's line is outside of all edges on one side */
         int side = orient3(p, q, t[i], t[(i + 1) % 3]);
         if (side * some < 0)
             return false;
@@ -245,7 +245,7 @@ static grid make_grid(const face_model *m)
     return g;
 }
 
-/* Writes the entries of a face, if `to` is not NULL; returns their number. */
+/* Writes the grid entries of a face to `to`, if it is not NULL; returns their number. */
 static uint64_t enter(const face_model *m, const grid *g, uint64_t f, entry *to)
 {
     float low[3], high[3];

@@ -46,9 +46,9 @@ extern const int degenerate_case_count;
 typedef struct degenerate_result {
     uint64_t faces;
     int levels;
-    ebpo_status status; /* of converting */
+    ebpo_status status; /* status of converting */
     char message[480];
-    uint64_t checks, violations; /* of verify */
+    uint64_t checks, violations; /* statistics of verify */
     uint64_t queries, wrong;     /* results */
     bool has_volume;             /* the exact volume is a normal double: the following values are
                                   * meaningful */

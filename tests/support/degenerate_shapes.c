@@ -326,14 +326,14 @@ ebpo_mesh degenerate_staircase(const degenerate_case *c)
     for (uint32_t x = 0; x < n; x++) {
         uint32_t a = x == 0 ? 1 : 3 * x, low = 3 * x + 1, high = 3 * x + 2, b = 3 * x + 3,
                  top = 3 * x + 4;
-        for (uint32_t y = 0; y < 2; y++) { /* in the first column a is low */
+        for (uint32_t y = 0; y < 2; y++) { /* in the first column, a is the lower end */
             uint32_t s = y * back, polygon[5] = { top + s, high + s, low + s, a + s, b + s };
             if (x == 0)
                 polygon[3] = b + s;
             for (uint32_t i = 1; i + 1 < (x == 0 ? 4u : 5u); i++)
                 face(&m, polygon[0], polygon[y ? i + 1 : i], polygon[y ? i : i + 1]);
         }
-        face(&m, a, a + back, b + back); /* below */
+        face(&m, a, a + back, b + back); /* the bottom */
         face(&m, a, b + back, b);
         face(&m, high, top, top + back); /* the step */
         face(&m, high, top + back, high + back);
@@ -403,7 +403,8 @@ ebpo_mesh degenerate_needles(const degenerate_case *c)
     uint64_t state = 17;
     for (uint32_t i = 0; i < (uint32_t)c->a[0]; i++) {
         ebpo_mesh needle = ebpo_test_tetrahedron(c->a[1]);
-        double *tip = needle.xyz64 + 9; /* in the half-space that keeps the orientation */
+        double *tip = needle.xyz64 + 9; /* keeps the tip in the half-space that preserves the
+                                         * orientation */
         for (int k = 0; k < 3; k++)
             tip[k] = k == 2 ? 0.125 + ebpo_test_random_unit(&state)
                             : 2 * ebpo_test_random_unit(&state) - 1;

@@ -1,4 +1,4 @@
-/* Preloaded: see faults.h. */
+/* Preloaded library; see faults.h. */
 #undef _FILE_OFFSET_BITS /* defines both names of each call */
 #ifndef _GNU_SOURCE
 #define _GNU_SOURCE
@@ -122,7 +122,7 @@ static uint64_t own_counts[2];
 static _Atomic uint64_t *counts = (_Atomic uint64_t *)own_counts; /* calls, failed */
 static __thread bool busy;
 
-/* Returns the module for which the C library makes the call. */
+/* Returns the module on whose behalf the C library makes the call. */
 static module_kind behind(void)
 {
     enum { DEPTH = 64 };
@@ -179,7 +179,7 @@ uint64_t faults_end(void)
 void faults_pause(void) { paused = true; }
 void faults_resume(void) { paused = false; }
 
-/* Child processes continue the counts. */
+/* Shares the counts with child processes. */
 static void share_counts(void)
 {
     REAL(mmap64);

@@ -1,13 +1,14 @@
-/* System calls that fail on demand. Implemented in the preloaded faults.c; without it these
- * functions are NULL. The environment of a program controls it:
- *   EBPO_TEST_FAULT=KIND:N:ERRNO    the N-th call of a kind fails with that error
- *   EBPO_TEST_FAULT=KIND:N+:ERRNO   and all later calls
- *   EBPO_TEST_FAULT_COUNT=FILE      two 64-bit numbers: calls so far, and failed calls
+/* System calls that fail on demand. The preloaded faults.c implements these functions; without it
+ * they are NULL. The environment of a program controls the failures:
+ *   EBPO_TEST_FAULT=KIND:N:ERRNO    the N-th call of a kind fails with this error
+ *   EBPO_TEST_FAULT=KIND:N+:ERRNO   the N-th and all later calls fail
+ *   EBPO_TEST_FAULT_COUNT=FILE      file of two 64-bit numbers: calls so far, failed calls
  *   EBPO_TEST_FAULT_FOREIGN=1       counts calls of other libraries instead of this project's
  *   EBPO_TEST_NAMED=1               file systems do not support unnamed files (O_TMPFILE)
  *   EBPO_TEST_PAUSE=1               a temporary file is unlinked only after a second
  *
- * Counts only calls from main on that this project makes, or the C library on its behalf. */
+ * Calls count from the start of main. Only calls of this project count, or of the C library on its
+ * behalf. */
 #ifndef EBPO_TESTS_FAULTS_H
 #define EBPO_TESTS_FAULTS_H
 
@@ -17,7 +18,7 @@
 /* In the order of their names in faults.c. */
 enum {
     FAULT_MALLOC = 1 << 0,
-    FAULT_READ = 1 << 1, /* read and pread, also of streams */
+    FAULT_READ = 1 << 1, /* read and pread, also by streams */
     FAULT_SHORT_READ = 1 << 2,
     FAULT_WRITE = 1 << 3,
     FAULT_SHORT_WRITE = 1 << 4,

@@ -1,4 +1,4 @@
-/* Calls the library in the requested environment, and hashes the results. */
+/* Calls the library in a floating-point environment, and hashes the results. */
 #include "fp_hash.h"
 #include "core/endian.h"
 #include "scratch.h"
@@ -239,7 +239,7 @@ static void hash_ray(hashing *h, const degenerate_case *c, ebpo_context *context
         number(h, faces[i]);
 }
 
-/* Hashes error bounds of levels, and a subset by need. */
+/* Hashes error bounds of levels, and a subset selected by an error bound. */
 static void hash_reach(hashing *h, const degenerate_case *c, query_model *m)
 {
     ebpo_error error = EBPO_ERROR_INIT;

@@ -7,15 +7,15 @@
 /* Floating-point environment in which the library is called; the test's own arithmetic uses the
  * default one. */
 typedef struct fp_setting {
-    int rounding;          /* of <fenv.h> */
+    int rounding;          /* a rounding mode of <fenv.h> */
     unsigned control_bits; /* x86: additional bits of the SSE control register */
 } fp_setting;
 
 typedef struct fp_hashes {
-    ebpo_status status; /* of converting */
+    ebpo_status status; /* status of converting */
     uint64_t content;   /* the report, metadata and arrays of the file */
     uint64_t results;   /* levels, measures, verification, queries of all kinds */
-    bool kept;          /* each call preserved the environment */
+    bool kept;          /* every call preserved the environment */
 } fp_hashes;
 
 void fp_hash_case(const degenerate_case *c, const fp_setting *setting, uint64_t queries,

@@ -1,5 +1,5 @@
-/* Preloaded: simulates a machine by environment variables: EBPO_TEST_FREE, bytes of free memory;
- * EBPO_TEST_LOCK, the error number with which locking a file fails. */
+/* Preloaded library that simulates a machine. Environment variables: EBPO_TEST_FREE, bytes of free
+ * memory; EBPO_TEST_LOCK, the error number with which locking a file fails. */
 #include <errno.h>
 #include <stdint.h>
 #include <stdlib.h>

@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-/* Does not use ck_assert, as programs without Check call this, too. */
+/* Does not use ck_assert, because programs without Check also call this function. */
 void model_must(ebpo_status status, const char *what, const ebpo_error *error)
 {
     if (status == EBPO_OK)

@@ -43,7 +43,7 @@ enum { CORNERS_MAX = 64 };
 typedef struct work {
     zector corner[2][3], edge[2][3], normal[2], n, w, x, y;
     mpz_t nn, s, t, den;
-    /* found: points[i] / weight[i] */
+    /* the found points: points[i] / weight[i] */
     zector points[CORNERS_MAX];
     mpz_t weight[CORNERS_MAX];
     int count, unit;

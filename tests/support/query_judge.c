@@ -189,7 +189,7 @@ uint64_t query_wrong_inside(const query_model *m, const double *points, const qu
         if (got[i].where == t->where && got[i].winding == t->winding && got[i].doubt == 0)
             continue;
         if (show(m, points + 3 * i, &wrong))
-            fprintf(stderr, "inside says %d, winding %d, doubt %a; it is %d, winding %d\n",
+            fprintf(stderr, "inside returns %d, winding %d, doubt %a; expected %d, winding %d\n",
                     got[i].where, got[i].winding, got[i].doubt, t->where, t->winding);
     }
     return wrong;
@@ -248,8 +248,9 @@ uint64_t query_wrong_distance(const query_model *m, const double *points, const 
         const query_truth *t = truth + i;
         const double *n = m->normal[t->file_face];
         fprintf(stderr,
-                "wrong %s: distance %a in [%a, %a], face %llu, point (%a, %a, %a), normal (%a, %a, "
-                "%a); it is %a, where %d, face %llu (%u at this distance), normal (%a, %a, %a)\n",
+                "wrong %s: distance %a in [%a, %a], face %llu, point (%a, %a, %a), normal (%a, "
+                "%a, %a); expected %a, where %d, face %llu (%u at this distance), normal (%a, "
+                "%a, %a)\n",
                 fault, got[i].distance, got[i].lo, got[i].hi, (unsigned long long)got[i].face,
                 got[i].point[0], got[i].point[1], got[i].point[2], got[i].normal[0],
                 got[i].normal[1], got[i].normal[2], t->distance, t->where,
@@ -267,14 +268,14 @@ uint64_t query_wrong_limited_inside(const query_model *m, const double *points,
         const query_truth *t = truth + i;
         bool maybe =
             got[i].where == EBPO_MAYBE && got[i].winding == 0 && got[i].doubt >= t->distance;
-        /* an envelope gives no more information */
+        /* envelopes return winding number 0 for points outside */
         bool winding =
             got[i].winding == t->winding || (t->where == EBPO_OUT && got[i].winding == 0);
         bool certain = got[i].where == t->where && winding && got[i].doubt == 0;
         if (!maybe && !certain && show(m, points + 3 * i, &wrong))
             fprintf(stderr,
-                    "limited inside says %d, winding %d, doubt %a; it is %d, winding %d, at "
-                    "distance %a\n",
+                    "limited inside returns %d, winding %d, doubt %a; expected %d, winding %d, "
+                    "at distance %a\n",
                     got[i].where, got[i].winding, got[i].doubt, t->where, t->winding, t->distance);
     }
     return wrong;
@@ -300,7 +301,8 @@ uint64_t query_wrong_limited_distance(const query_model *m, const double *points
         if (!limited_distance_fits(truth + i, got + i) && show(m, points + 3 * i, &wrong))
             fprintf(
                 stderr,
-                "limited distance says %a in [%a, %a], face %llu; it is %a, where %d, face %llu\n",
+                "limited distance returns %a in [%a, %a], face %llu; expected %a, where %d, face "
+                "%llu\n",
                 got[i].distance, got[i].lo, got[i].hi, (unsigned long long)got[i].face,
                 truth[i].distance, truth[i].where, (unsigned long long)truth[i].face);
     return wrong;
@@ -332,15 +334,14 @@ static bool hits_fit(const query_model *m, const query_ray *r, const oracle_hit 
     for (uint32_t i = 0; i < n && i < count; i++)
         if (!hit_fits(m, &expected[i], &got[i])) {
             show_ray(m, r);
-            fprintf(stderr,
-                    "hit %u says t %a, face %llu, side %d; it is t %a, face %llu, side %d\n", i,
-                    got[i].t, (unsigned long long)got[i].face, got[i].side, expected[i].t,
+            fprintf(stderr, "hit %u: t %a, face %llu, side %d; expected t %a, face %llu, side %d\n",
+                    i, got[i].t, (unsigned long long)got[i].face, got[i].side, expected[i].t,
                     (unsigned long long)query_reported(m, expected[i].face), expected[i].side);
             return false;
         }
     if (count != n) {
         show_ray(m, r);
-        fprintf(stderr, "%llu hits; there are %u\n", (unsigned long long)count, n);
+        fprintf(stderr, "%llu hits; expected %u\n", (unsigned long long)count, n);
     }
     return count == n;
 }

@@ -69,8 +69,8 @@ typedef struct query_model {
 void query_model_make(query_model *m, const char *name, ebpo_mesh mesh,
                       const query_variant *variant);
 void query_model_free(query_model *m);
-/* Does the same for programs without Check, or that test the failure: returns the library's status.
- * On failure nothing is left. */
+/* Does the same for programs without Check, and for tests of the failure. Returns the library's
+ * status. On failure no files or memory remain. */
 ebpo_status query_model_try(query_model *m, const char *name, ebpo_mesh mesh,
                             const query_variant *variant, ebpo_error *error);
 /* Only checks and builds, with one thread; the mesh is consumed. */
@@ -80,7 +80,7 @@ ebpo_status query_build(ebpo_tree *tree, ebpo_mesh *mesh, const query_variant *v
 /* Correct results for a point. */
 typedef struct query_truth {
     double distance; /* correctly rounded, not signed */
-    int32_t winding; /* 0 when on */
+    int32_t winding; /* 0 on a face */
     int32_t where;   /* IN, OUT or ON; a surface: OUT or ON */
     uint64_t face;   /* source index of the nearest face that is first in the file */
     uint32_t file_face, ties;

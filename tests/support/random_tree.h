@@ -1,5 +1,5 @@
-/* Trees that are valid as files (counts, orders, ranges) but describe no shape, for tests of the
- * container. */
+/* Trees whose counts, orders and ranges are valid in files but that describe no shape, for tests of
+ * the container. */
 #ifndef RANDOM_TREE_H
 #define RANDOM_TREE_H
 

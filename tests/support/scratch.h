@@ -7,7 +7,8 @@ enum { SCRATCH_LENGTH = 96 };
 
 /* Makes a folder; ends the program on failure. */
 void scratch_make(char folder[SCRATCH_LENGTH]);
-/* Removes a folder with its contents, independent of permissions. An empty name is no folder. */
+/* Removes a folder with its contents, whatever their permissions are. Does nothing if the name is
+ * empty. */
 void scratch_remove(const char *folder);
 
 /* Fixtures that empty the program's folder before and after a test. check_main.c removes it at the

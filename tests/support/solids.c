@@ -86,12 +86,12 @@ double ebpo_test_random_unit(uint64_t *state)
 
 void ebpo_test_circle(uint32_t i, uint32_t n, double *cosine, double *sine)
 {
-    /* the turn is between eighth / 8 and that + 1/8; odd ones use the end */
+    /* the turn is between eighth / 8 and that + 1/8; odd eighths are measured from their end */
     uint64_t eighth = 8 * (uint64_t)(i % n) / n, odd = eighth % 2;
     double part = odd ? (double)((eighth + 1) * n - 8 * (uint64_t)(i % n))
                       : (double)(8 * (uint64_t)(i % n) - eighth * n);
     double x = part / n * (PI / 4), x2 = x * x, c = 0, s = 0;
-    for (int k = 20; k > 0; k -= 2) { /* Taylor, from the far end */
+    for (int k = 20; k > 0; k -= 2) { /* Taylor series, from the smallest term */
         c = (1 + c) * (-x2 / (k * (k - 1)));
         s = (1 + s) * (-x2 / (k * (k + 1)));
     }
@@ -110,7 +110,7 @@ void ebpo_test_point(const ebpo_mesh *m, uint64_t v, double out[3])
         out[k] = m->xyz32 ? (double)m->xyz32[3 * v + (unsigned)k] : m->xyz64[3 * v + (unsigned)k];
 }
 
-/* Allocates exactly the used size: the growth above depends only on the count. */
+/* Allocates exactly the used size, because the arrays grow by their counts alone. */
 static void regrow(ebpo_mesh *m, uint64_t vertices, uint64_t faces)
 {
     uint64_t v = 1, f = 1;

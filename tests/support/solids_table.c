@@ -103,7 +103,7 @@ static ebpo_mesh make_touching_at_face(void)
     return m;
 }
 
-/* Makes the same two cubes with shared vertices: the side between the cubes occurs twice, in both
+/* Makes two cubes with shared vertices. The side between the cubes occurs twice, in both
  * orientations. */
 static ebpo_mesh make_coincident_opposite_faces(void)
 {
@@ -151,7 +151,7 @@ static ebpo_mesh make_giant_and_dust(void)
 static ebpo_mesh make_open_box(void)
 {
     ebpo_mesh m = cube_at(0, 0, 0, 1, 1);
-    m.face_count -= 2; /* one side */
+    m.face_count -= 2; /* removes one side */
     return m;
 }
 

@@ -130,7 +130,7 @@ static void try_all(hull *h)
     }
 }
 
-/* Returns true when some points are beyond the known maximum, along the direction. */
+/* Returns true when some points may be beyond the known maximum along the direction. */
 static bool may_be_later(hull *h)
 {
     for (int i = 0; i < 9; i++) {

@@ -1,6 +1,6 @@
-/* Writes a tree as JSON: the content of the vectors' .json files, which every reader must get from
- * a file. The arrays are those of ebpo_tree; coordinates have enough digits to restore every bit.
- */
+/* Writes a tree as JSON: the content of the vectors' .json files, which every reader must reproduce
+ * from a file. The arrays are those of ebpo_tree. Coordinates have enough digits to restore every
+ * bit. */
 #ifndef TREE_JSON_H
 #define TREE_JSON_H
 

@@ -92,7 +92,7 @@ uint64_t *octcodes_of_level(const ebpo_file *file, int level, uint64_t *count)
 {
     const ebpo_info *info = ebpo_file_info(file);
     uint64_t *gray = malloc(sizeof *gray), *wanted = NULL, grays = 1, wanteds = 0;
-    gray[0] = 0; /* stands for the parent of the root, whose octcode is 1 */
+    gray[0] = 0; /* octcode of the root's parent; the root's octcode is 1 */
     for (int i = 0; i <= level; i++) {
         ebpo_level l;
         ebpo_error error = EBPO_ERROR_INIT;

@@ -1,5 +1,5 @@
-/* Reads a whole vector file and gives the result as two lines: status, message. The folder is
- * omitted. */
+/* Reads a whole vector file, and returns the result as two lines: status, message. The message
+ * omits the folder. */
 #ifndef VECTOR_READ_H
 #define VECTOR_READ_H
 #include "read_by.h"

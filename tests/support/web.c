@@ -48,7 +48,7 @@ bool web_start(const char *script, const void *data, size_t size)
 
 void web_stop(void)
 {
-    if (server <= 0 || getpid() != owner) /* child processes of Check run this, too */
+    if (server <= 0 || getpid() != owner) /* child processes of Check also run this function */
         return;
     close(server_input);
     waitpid(server, NULL, 0);

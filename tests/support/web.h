@@ -1,10 +1,10 @@
-/* A faulty web server for a test program: tests/support/faulty_server.py, started once, ended with
- * the program in all cases. */
+/* A misbehaving web server for a test program: tests/support/faulty_server.py. It is started once,
+ * and always ends with the program. */
 #ifndef EBPO_TESTS_WEB_H
 #define EBPO_TESTS_WEB_H
 
 /* Serves these bytes as a file; returns false if Python is not available. The server ends when this
- * process ends, as the system then closes a pipe from which the server reads. */
+ * process ends, because the system then closes the pipe from which the server reads. */
 #include <stdbool.h>
 #include <stddef.h>
 

@@ -1,4 +1,4 @@
-// One reading in a headless Chromium: browser.mjs VIEWER SITE READER URL TO|whole -> JSON. Page and worker come from SITE, the model from URL.
+// Runs one reader in a headless Chromium: browser.mjs VIEWER SITE READER URL TO|whole -> JSON. Page and worker come from SITE, the model from URL.
 import { join } from 'node:path';
 import { pathToFileURL } from 'node:url';
 

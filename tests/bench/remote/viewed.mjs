@@ -1,5 +1,5 @@
-// The viewer over a slow line, in a headless Chromium: viewed.mjs VIEWER ADDRESS LOG MODEL EYE AT [PICTURE] -> JSON. Each on a page that was just opened: the first picture and what
-// comes until nothing more is asked for; a click until its exact distance is there; a close-up until it is settled. Seconds as the page's user has them, requests and bytes from LOG.
+// Measures the viewer over a slow line, in a headless Chromium: viewed.mjs VIEWER ADDRESS LOG MODEL EYE AT [PICTURE] -> JSON. Each measurement uses a newly opened page:
+// the first picture, and the time to the last request; a click until its exact distance; a close-up until it has settled. Seconds are measured in the page, requests and bytes from LOG.
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { pathToFileURL } from 'node:url';
@@ -10,7 +10,7 @@ const gl = ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swifts
 const browser = await chromium.launch({ executablePath: '/usr/bin/chromium', args: process.getuid() === 0 ? ['--no-sandbox', ...gl] : gl });
 const pause = (ms) => new Promise((done) => setTimeout(done, ms));
 
-// Of all that was answered since the last call: requests and bytes, of the model and of the page.
+// Returns requests and bytes of the model and of the page since the last call.
 let read = 0;
 async function traffic() {
   await pause(300);
@@ -24,7 +24,7 @@ async function traffic() {
   return sum;
 }
 
-// When nothing more was asked for, and stayed so for two seconds: finer detail may be asked for after the first.
+// Waits until no request was sent for two seconds, because requests for finer detail follow the first ones.
 async function settledAt(page) {
   for (let since, now; ; await pause(50)) {
     const { idle, error } = await page.evaluate(() => window.ebpoViewer?.state ?? {});
@@ -37,7 +37,7 @@ async function settledAt(page) {
   }
 }
 
-// The page with nothing cached, up to its first picture.
+// Opens the page with an empty cache, and waits for its first picture.
 async function open() {
   const context = await browser.newContext({ viewport: { width: 1280, height: 800 }, reducedMotion: 'reduce' }), page = await context.newPage();
   await page.goto(address, { waitUntil: 'commit' });
@@ -54,7 +54,7 @@ async function first() {
   return { page, first: picked, settled };
 }
 
-// Where the model is hit nearest to the middle of the canvas.
+// Returns the position nearest to the middle of the canvas where the model is visible.
 const middle = (page) => page.evaluate(() => {
   const { scene } = window.ebpoViewer, box = document.getElementById('canvas').getBoundingClientRect();
   for (let r = 0; r < 300; r += 10)
@@ -86,7 +86,7 @@ async function closeUp(page) {
     scene.controls.update();
     scene.redraw();
   }, [eye, at].map((p) => p.split(',').map(Number)));
-  await pause(500); // the worker hears of a new camera a little later
+  await pause(500); // the worker receives a new camera with a delay
   const seconds = (await settledAt(page) - begin) / 1000, stats = await page.evaluate(() => window.ebpoViewer.state.stats);
   if (picture)
     await page.screenshot({ path: `${picture}-close.png` });

@@ -1,4 +1,4 @@
-// Reads levels of a file by URL, by one of two readers: { reader, url, to } -> { first, last, ms, values }. Levels are read in full: every array of theirs.
+// Reads levels of a file by URL, with one of two readers: { reader, url, to } -> { first, last, ms, values }. Reads all arrays of the levels.
 self.onmessage = async ({ data }) => {
   try {
     self.postMessage(await ({ ours, h5wasm }[data.reader])(data));

@@ -1,5 +1,5 @@
-/* Replaces libcairo.so.2, and draws nothing. The environment selects the call that runs out of
- * memory: EBPO_TEST_CAIRO=drawing or surface; without the variable no call does. */
+/* Replaces libcairo.so.2, and draws nothing. The environment variable EBPO_TEST_CAIRO=drawing or
+ * surface selects the call that runs out of memory. Without the variable no call fails. */
 #include <cairo.h>
 #include <stdbool.h>
 #include <stdlib.h>
