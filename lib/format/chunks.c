@@ -191,8 +191,7 @@ static ebpo_status refuse_load(ebpo_chunks *c, const ebpo_array_in *array, ebpo_
 {
     c->refused = true;
     return ebpo_fail_at(error, EBPO_E_LIMIT, c->file->in.shown, array->path, -1,
-                        "further reading would take more than the %" PRIu64 " bytes allowed",
-                        c->limit);
+                        "reading more would exceed the limit of %" PRIu64 " bytes", c->limit);
 }
 
 /* Checks the limit before a chunk is read. Prefetched chunks were counted when they were

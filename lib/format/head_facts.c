@@ -260,10 +260,10 @@ static const char *check_level_counts(const ebpo_info *info, int level)
         s->black_count > NODES_MAX)
         return "a level has too many nodes";
     if (s->gray_count + s->leaf_count + s->white_count + s->black_count != nodes)
-        return "a level does not have eight nodes for each gray one above";
+        return "a level does not have eight nodes for each gray node above";
     bool last = level == info->level_count - 1;
     if (last ? s->gray_count && !info->pruned : s->gray_count == 0)
-        return "the gray nodes do not end at the deepest level";
+        return "a level has no gray nodes, or the deepest level has gray nodes";
     if (info->pruned ? s->pruned_count > s->gray_count || (s->pruned_count == s->gray_count) < last
                      : s->pruned_count != 0)
         return "a level's pruned nodes exceed its gray nodes, or differ from them at the deepest "
@@ -271,12 +271,13 @@ static const char *check_level_counts(const ebpo_info *info, int level)
     if (!last && info->pruned &&
         (s->pruned_count == s->gray_count ||
          info->level[level + 1].white_count / 8 < s->pruned_count))
-        return "a level has only the empty groups of pruned nodes, or not all of them";
+        return "all gray nodes of a level are pruned, or the next level lacks empty groups of "
+               "pruned nodes";
     if (s->plane_count > (info->parts & EBPO_PART_PLANES ? 255 * s->gray_count : 0) ||
         s->leaf_plane_count > (info->parts & EBPO_PART_LEAF_PLANES ? 255 * s->leaf_count : 0))
         return "a level has more planes than its nodes can have";
     if (!(info->parts & EBPO_PART_MESH) && (s->new_count || s->ref_count))
-        return "a level counts faces, and there is no mesh";
+        return "a level counts faces, but there is no mesh";
     if (s->leaf_count == 0 && (s->new_count || s->ref_count))
         return "a level has faces but no leaf";
     if (s->black_count && !info->solid)
@@ -621,7 +622,7 @@ static ebpo_status get_version(ebpo_head *in, ebpo_head_object root, ebpo_info *
     if (status == EBPO_OK && info->version_major != EBPO_FORMAT_MAJOR)
         status = ebpo_fail_file(
             error, EBPO_E_VERSION, in->shown,
-            "format version %d.%d, and this library reads version %d; use a newer one",
+            "format version %d.%d, but this library reads version %d; use a newer library",
             info->version_major, info->version_minor, EBPO_FORMAT_MAJOR);
     char words[32] = ""; /* only this text distinguishes draft files */
     if (status == EBPO_OK)
@@ -653,7 +654,7 @@ static ebpo_status take_part(ebpo_head *in, const char *word, bool required, uns
         return EBPO_OK;
     return ebpo_fail_file(
         error, EBPO_E_VERSION, in->shown,
-        "the file needs part \"%s\", which this library does not know; use a newer one", word);
+        "the file needs part \"%s\", which this library does not know; use a newer library", word);
 }
 
 static ebpo_status get_parts(ebpo_head *in, ebpo_head_object root, ebpo_info *info,

@@ -269,7 +269,7 @@ static const char *other_kind(const uint8_t *begin, uint64_t size)
     return size == 0                      ? "an empty file; get a fresh copy of it"
            : head_names_kind(begin, size) ? NULL
            : begin[0] == '{'
-               ? "JSON; a scene is for 'ebpo scene', and some commands take a catalogue"
+               ? "JSON; use 'ebpo scene' for a scene, or a command that reads a catalogue"
                : NULL;
 }
 
@@ -342,7 +342,7 @@ static ebpo_status open_bytes(const ebpo_source *source, const char *name, uint6
     if (own.close)
         own.close(own.user);
     return ebpo_fail_file(error, EBPO_E_ARGUMENT, name ? name : "source",
-                          "a source without a read function; set one");
+                          "the source has no read function; set one");
 }
 
 ebpo_status ebpo_open_with(const char *path, const ebpo_open_options *options, ebpo_file **out,
@@ -396,7 +396,7 @@ ebpo_status ebpo_open_memory(const void *data, uint64_t size, const char *name, 
     *out = NULL;
     if (!data && size)
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, name ? name : "memory",
-                              "no bytes; give the file's bytes with their count");
+                              "no bytes; pass the file's bytes and their number");
     ebpo_source source = ebpo_source_of_memory(data, size);
     return open_source(out, &source, name ? name : "memory", 0, error);
 }
@@ -461,8 +461,9 @@ static ebpo_status make_temporary(temporary *t, const char *shown, ebpo_error *e
     snprintf(t->name, sizeof t->name, "%s/.ebpo-compat-XXXXXX",
              folder && *folder ? folder : "/tmp");
     t->fd = mkostemp(t->name, O_CLOEXEC);
-    return t->fd >= 0 ? EBPO_OK
-                      : ebpo_fail_errno(error, shown, "its copy could not be made in TMPDIR");
+    return t->fd >= 0
+               ? EBPO_OK
+               : ebpo_fail_errno(error, shown, "a temporary copy could not be created in TMPDIR");
 }
 
 static void remove_temporary(temporary *t)
@@ -481,7 +482,8 @@ static ebpo_status write_piece(int fd, const char *shown, uint64_t at, const uin
         if (done < 0 && errno == EINTR)
             continue;
         if (done <= 0)
-            return ebpo_fail_errno(error, shown, "its copy in TMPDIR could not be written");
+            return ebpo_fail_errno(error, shown,
+                                   "the temporary copy in TMPDIR could not be written");
         data += done;
         at += (uint64_t)done;
         bytes -= (uint64_t)done;

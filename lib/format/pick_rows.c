@@ -265,7 +265,7 @@ static ebpo_status decode_faces(const reading *r)
         if (out->leaf_ref_count[i] &&
             !ebpo_refs_decode(out->leaf_refs + at, out->leaf_ref_count[i], out->leaf_first[i]))
             status = runs_wrong(r, EBPO_A_LEAF_REFS,
-                                "a reference is not to a face before the leaf's own");
+                                "a reference is not to a face before the leaf's new faces");
     return status;
 }
 

@@ -74,7 +74,8 @@ static ebpo_status decode_refs(void *context, uint64_t begin, uint64_t end, unsi
                               j->level->leaf_first[leaf])) {
             ebpo_check check = ebpo_reader_check(j->file, j->level->workspace);
             return ebpo_check_fail(&check, j->number, "leaf_refs",
-                                   "a reference is not to a face before the leaf's own", error);
+                                   "a reference is not to a face before the leaf's new faces",
+                                   error);
         }
     return EBPO_OK;
 }
@@ -406,7 +407,7 @@ ebpo_status ebpo_file_read_maps(const ebpo_file *file, const ebpo_read_options *
     memset(out, 0, sizeof *out);
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
     ebpo_status status =
-        take_options(file, options, EBPO_PART_MAPS, "maps to the source's numbers", &read, error);
+        take_options(file, options, EBPO_PART_MAPS, "maps to source indices", &read, error);
     if (status != EBPO_OK)
         return status;
     hint_root(file, EBPO_NEEDS_MAPS, false);

@@ -113,7 +113,7 @@ static const count_spec level_counts[EBPO_COUNTS] = {
     _Static_assert((stored) & ((stored)-1)                                            \
                        ? sizeof(type) == 4                                            \
                        : sizeof(type) == (stored) || EBPO_A_##ID == EBPO_A_LEAF_SKIP, \
-                   #name ": its sizes in the file do not go with its type in memory");
+                   #name ": its sizes in the file do not match its type in memory");
 #include "format/array_table.inc"
 
 /* All members of ebpo_level: the pointers and counts of array_table.inc, and the members listed
@@ -432,9 +432,10 @@ static ebpo_status check_refs(const ebpo_check *check, int level, const uint32_t
 {
     for (uint64_t k = 0; k < count; k++)
         if (refs[k] >= first || (k && refs[k] <= refs[k - 1]))
-            return ebpo_check_fail(
-                check, level, "leaf_refs",
-                "a leaf refers to faces out of order, or to one that is not before its own", error);
+            return ebpo_check_fail(check, level, "leaf_refs",
+                                   "a leaf's references are not ascending, or one is not to a face "
+                                   "before its new faces",
+                                   error);
     return EBPO_OK;
 }
 

@@ -579,8 +579,9 @@ ebpo_status ebpo_slice_read_within(ebpo_slice *out, ebpo_chunks *chunks, const e
     extent x = extent_of(chunks, root, needs | ALWAYS, EBPO_SLICE_ALL);
     memset(out, 0, sizeof *out);
     if (!(chunks->file->info.parts & EBPO_PART_MESH))
-        return ebpo_fail_file(error, EBPO_E_ABSENT, chunks->file->in.shown,
-                              "the file was written without its mesh; build it again with it");
+        return ebpo_fail_file(
+            error, EBPO_E_ABSENT, chunks->file->in.shown,
+            "the file was written without its mesh; build it again with the mesh");
     walk w = { .chunks = chunks, .slice = out };
     x.faces = true;
     x.space = space;
@@ -716,8 +717,9 @@ ebpo_status ebpo_slice_read_all(ebpo_slice *out, const ebpo_file *file, unsigned
 {
     memset(out, 0, sizeof *out);
     if (!(file->info.parts & EBPO_PART_MESH))
-        return ebpo_fail_file(error, EBPO_E_ABSENT, file->in.shown,
-                              "the file was written without its mesh; build it again with it");
+        return ebpo_fail_file(
+            error, EBPO_E_ABSENT, file->in.shown,
+            "the file was written without its mesh; build it again with the mesh");
     ebpo_tree tree;
     ebpo_read_options read = ebpo_read_threads(threads);
     ebpo_status status = ebpo_file_read_tree(file, &read, &tree, error);

@@ -81,12 +81,12 @@ static const char *check_rows(const ebpo_info *info, const ebpo_attributes *all,
     bool vertex = ebpo_attribute_is_of(a, "vertex"), face = ebpo_attribute_is_of(a, "face");
     if (a->rows == 0 ||
         ((vertex || face) && a->rows != (vertex ? info->vertex_count : info->face_count)))
-        return "an array of attributes and the mesh differ in the number of rows";
+        return "an attribute array and the mesh have different numbers of rows";
     for (uint64_t k = 0; k < i; k++)
         if (strcmp(all->array[k].element, a->element) == 0 && all->array[k].rows != a->rows)
-            return "two arrays of attributes of one element have different numbers of rows";
+            return "two attribute arrays of one element have different numbers of rows";
     if (!a->ends && !a->values)
-        return "an array of attributes has no values";
+        return "an attribute array has no values";
     return NULL;
 }
 
@@ -98,7 +98,7 @@ static const char *check_names(const ebpo_attribute *a)
     if (!a->element[0] || strchr(a->element, ' ') || !a->names[0] || !ebpo_text_ok(a->element) ||
         !ebpo_text_ok(a->names) || a->columns < 1 || a->columns > EBPO_ATTRIBUTE_COLUMNS ||
         words != (a->list == EBPO_ATTRIBUTE_NO_LIST ? a->columns : 1))
-        return "an array of attributes does not have a name for each column";
+        return "an attribute array does not have a name for each column";
     return NULL;
 }
 

@@ -319,7 +319,7 @@ void ebpo_check_rays(ebpo_tally *tally, const ebpo_ray_points *points)
             ebpo_tally_violation(tally, EBPO_VERIFY_LABELS,
                                  &(ebpo_verify_place){ p->octcode, EBPO_NO_FACE, EBPO_NO_PLANE },
                                  "winding number %" PRId64
-                                 " is stored, a ray through the mesh finds %" PRId64,
+                                 " is stored, but a ray through the mesh finds %" PRId64,
                                  p->stored, p->found);
     }
 }
@@ -351,7 +351,7 @@ void ebpo_check_links(ebpo_tally *tally, const ebpo_reference_node *node,
                                             EBPO_NO_PLANE };
                 ebpo_tally_violation(tally, EBPO_VERIFY_LABELS, &place,
                                      "winding number %" PRId64
-                                     " at corner %u, a neighbour gives %" PRId64
+                                     " at corner %u, but a neighbour has %" PRId64
                                      " for the same point",
                                      here, corner, value[point]);
             }

@@ -98,21 +98,21 @@ static void check_record(ebpo_tally *tally, const ebpo_repair_record *stored,
                          const ebpo_repair_record *did)
 {
     CHECK(stored->welded_vertices == did->welded_vertices,
-          "%" PRIu64 " welded vertices are recorded, repeating the repair welds %" PRIu64,
+          "%" PRIu64 " welded vertices are recorded, but repeating the repair welds %" PRIu64,
           stored->welded_vertices, did->welded_vertices);
     CHECK(stored->weld_moved == did->weld_moved && stored->collapsed_faces == did->collapsed_faces,
-          "welding by up to %g is recorded, repeating the repair moves vertices by up to %g",
+          "welding by up to %g is recorded, but repeating the repair moves vertices by up to %g",
           stored->weld_moved, did->weld_moved);
     CHECK(stored->dropped_faces == did->dropped_faces,
-          "%" PRIu64 " dropped faces are recorded, repeating the repair drops %" PRIu64,
+          "%" PRIu64 " dropped faces are recorded, but repeating the repair drops %" PRIu64,
           stored->dropped_faces, did->dropped_faces);
     CHECK(stored->flipped_faces == did->flipped_faces &&
               stored->unorientable_components == did->unorientable_components,
-          "%" PRIu64 " flipped faces are recorded, repeating the repair flips %" PRIu64,
+          "%" PRIu64 " flipped faces are recorded, but repeating the repair flips %" PRIu64,
           stored->flipped_faces, did->flipped_faces);
     CHECK(stored->filled_holes == did->filled_holes && stored->added_faces == did->added_faces &&
               stored->unfilled_holes == did->unfilled_holes,
-          "%" PRIu64 " faces filling holes are recorded, repeating the repair adds %" PRIu64,
+          "%" PRIu64 " faces filling holes are recorded, but repeating the repair adds %" PRIu64,
           stored->added_faces, did->added_faces);
 }
 
@@ -131,7 +131,7 @@ static void compare_in_order(ebpo_tally *tally, const ebpo_mesh *a, const ebpo_m
         if (memcmp(a->faces + 3 * i, b->faces + 3 * i, 3 * sizeof *a->faces) != 0)
             ebpo_tally_violation(tally, EBPO_VERIFY_SOURCE,
                                  &(ebpo_verify_place){ 0, i, EBPO_NO_PLANE },
-                                 "the face (by its source number) has other corners in the file");
+                                 "the face (by its source index) has other corners in the file");
 }
 
 /* Returns true if element, names and types are equal. */
@@ -243,7 +243,8 @@ static ebpo_status compare_as_sets(ebpo_tally *tally, const ebpo_mesh *a, const 
     if (short_of_memory)
         return ebpo_workspace_fail(a->workspace, count * sizeof *left, error);
     tally->checks[EBPO_VERIFY_SOURCE] += count - 1;
-    CHECK(differ == 0, "as sets, the %s of source and file differ", faces ? "faces" : "vertices");
+    CHECK(differ == 0, "compared as sets, the %s of source and file differ",
+          faces ? "faces" : "vertices");
     return EBPO_OK;
 }
 
@@ -309,7 +310,7 @@ static ebpo_status compare_some(ebpo_tally *tally, const ebpo_file *file, const 
                 ebpo_tally_violation(
                     tally, EBPO_VERIFY_SOURCE,
                     &(ebpo_verify_place){ 0, maps.face_source[i], EBPO_NO_PLANE },
-                    "the face (by its source number) has other corners in the file");
+                    "the face (by its source index) has other corners in the file");
         compare_attributes(tally, whole, &part, &maps);
     }
     ebpo_array_free(whole->workspace, places);

@@ -458,8 +458,8 @@ static bool lists_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
     if (!CHECK((level->leaf_first && level->leaf_new && level->leaf_ref_count) ||
                    level->leaf_count == 0,
                "level %d: face lists of leaves are missing", l) ||
-        !CHECK(level->leaf_refs || level->ref_count == 0, "level %d: back-references are missing",
-               l))
+        !CHECK(level->leaf_refs || level->ref_count == 0,
+               "level %d: references of leaves are missing", l))
         return false;
     uint64_t refs = 0, fresh = 0;
     EBPO_FOR_ITEMS(level->workspace, leaf, 0, level->leaf_count) {

@@ -1,4 +1,5 @@
-/* The list of chunk ends: it matches the file, and only the correct chunks are accepted. */
+/* Tests the list of chunk checksums: it matches the file, and only the correct chunks are
+ * accepted. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -28,8 +29,8 @@ static bytes slurp(const char *path)
     return b;
 }
 
-/* Writes a torus. All have the same topology, so files of one codec without compression have chunks
- * of the same sizes. `wide`: the size of the torus. */
+/* Writes a torus. All tori have the same topology, so that uncompressed files have chunks of the
+ * same sizes. `wide`: size of the torus. */
 static bytes write_torus(const char *name, double wide, ebpo_codec codec, uint64_t subtree_faces,
                          ebpo_chunk_checksums checksums)
 {
@@ -111,7 +112,7 @@ static bool is_noticed(const bytes *b, int n, uint64_t chunk)
     ebpo_error error = EBPO_ERROR_INIT;
     char expected[64];
     options.threads = 1;
-    snprintf(expected, sizeof expected, "chunk %llu is damaged: it is not the one",
+    snprintf(expected, sizeof expected, "chunk %llu is damaged: its checksum is not the one",
              (unsigned long long)chunk);
     ebpo_file *file = open_bytes(b);
     ebpo_status status = ebpo_reader_rows(file, array_of(file, n), &options, pass, NULL, &error);
@@ -119,8 +120,8 @@ static bool is_noticed(const bytes *b, int n, uint64_t chunk)
     return status == EBPO_E_FORMAT && strstr(error.message, expected);
 }
 
-/* Puts each chunk of one file into the other: the chunks have the same length, and valid checksums.
- */
+/* Copies each chunk of one file to the other file. The chunks have the same length and valid
+ * checksums. */
 START_TEST(test_chunks_of_other_version_are_refused)
 {
     uint64_t subtrees = _i ? 8 : EBPO_NO_SUBTREES, found = 0;
