@@ -1,5 +1,5 @@
-/* Meshes for the command-line tests, good and bad, written into a folder: cli_inputs FOLDER, or
- * cli_inputs --large FILE for one that takes a while to convert. */
+/* Writes valid and invalid meshes for the command-line tests into a folder: cli_inputs FOLDER.
+ * With --large FILE, writes a mesh whose conversion takes some time. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -93,7 +93,7 @@ static const struct {
                      "vt 0 0\nvt 0.5 0\nvt 0 0.5\nusemtl red paint\ns 1\n"
                      "f 1/1/1 3/2/1 2/3/1\nf 1/1/2 2/2/2 4/3/2\nusemtl blue\n"
                      "f 1/1/3 4/3/3 3/2/3\nf 2/1/4 3/2/4 4/3/4\n" },
-    /* what the one before is as a PLY */
+    /* the previous model as a PLY file */
     { "painted.ply",
       "ply\nformat ascii 1.0\ncomment material 0 DefaultMaterial\n"
       "comment material 1 red paint\ncomment material 2 blue\nelement vertex 4\n"
@@ -139,9 +139,10 @@ static ebpo_mesh box(double low, double high, uint32_t n)
     return ebpo_test_box((double[3]){ low, low, low }, (double[3]){ high, high, high }, n);
 }
 
-/* Seven components, of which six are left: a cavity before the box that it is in, another box in
- * the cavity, one that crosses the first, one with a side on that one's, a sheet through the first
- * three, one that is inside out. Faces stand in any order. No two have a vertex in one place. */
+/* Makes seven components, of which six remain: a cavity before its box in the file; another box in
+ * the cavity; a box that crosses the first box; a box that shares a side with the crossing box; a
+ * sheet through the first three; and a box that is inside out. Faces are in any order. No two
+ * components have a vertex at one position. */
 static ebpo_mesh several_parts(void)
 {
     ebpo_mesh mesh = box(1, 3, 2), neighbour = box(5, 6, 1), sheet = ebpo_test_sheet(6, 5),
@@ -180,7 +181,7 @@ int main(int argc, char **argv)
     ebpo_mesh split = ebpo_test_make("cube");
     ebpo_test_split_vertices(&split);
     write_mesh(&split, in_folder(argv[1], "split_cube.ply"));
-    ebpo_mesh shells = box(0, 4, 2), inner = box(1, 3, 2); /* both outwards */
+    ebpo_mesh shells = box(0, 4, 2), inner = box(1, 3, 2); /* both boxes are oriented outwards */
     add(&shells, inner);
     write_mesh(&shells, in_folder(argv[1], "box_in_box.ply"));
     ebpo_mesh one_turned = box(0, 4, 2);

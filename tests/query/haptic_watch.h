@@ -1,4 +1,4 @@
-/* Calls that a haptic step must not make, counted by haptic_watch.c. */
+/* Counts calls that a haptic step must not make (haptic_watch.c). */
 #ifndef EBPO_TESTS_HAPTIC_WATCH_H
 #define EBPO_TESTS_HAPTIC_WATCH_H
 

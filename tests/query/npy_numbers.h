@@ -1,4 +1,4 @@
-/* Writes a .npy of integers, which a catalogue names for the faces of a part. */
+/* Writes a .npy file of integers: the face numbers of a part, for catalogues. */
 #ifndef EBPO_TESTS_NPY_NUMBERS_H
 #define EBPO_TESTS_NPY_NUMBERS_H
 

@@ -186,7 +186,7 @@ static ebpo_status query_box(const mix_session *a, uint64_t number, uint64_t *ha
     box_of(a, number, min, max);
     ebpo_status status = ebpo_faces_in_box(a->context, min, max, &faces, &count, error);
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
-        sum += add_number(basis, faces[i]); /* in any order */
+        sum += add_number(basis, faces[i]); /* the order of the faces is not fixed */
     *hash = add_number(add_number(*hash, count), sum);
     return status;
 }
@@ -294,7 +294,7 @@ static ebpo_status query_subtree(const mix_session *a, uint64_t number, uint64_t
     uint64_t octcode = ebpo_octcode_at(ebpo_file_info(a->file), point, 3);
     options.or_leaf_above = true;
     ebpo_status status = ebpo_subtree_open(a->file, octcode, &options, &subtree, error);
-    if (status == EBPO_E_ARGUMENT) { /* empty */
+    if (status == EBPO_E_ARGUMENT) { /* there is no such subtree */
         *hash = add_number(*hash, octcode);
         return EBPO_OK;
     }
@@ -370,8 +370,7 @@ static ebpo_status query_haptic(const mix_session *a, uint64_t number, uint64_t 
     }
     status = ebpo_haptic_check(touch, error);
     ebpo_haptic_free(touch);
-    return good ? status
-                : EBPO_E_FORMAT; /* a status that no query here returns for another reason */
+    return good ? status : EBPO_E_FORMAT; /* no query here returns this status for another reason */
 }
 #endif
 

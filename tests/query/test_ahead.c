@@ -33,8 +33,8 @@ static double distance_and_sign(ebpo_model *model, const double p[3])
     ebpo_inside_result inside;
     ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
     ASSERT_OK(ebpo_context_new(model, &context, error));
-    /* the cell that contains p is needed at any distance of its envelope, as envelopes do not
-     * decide under these rules */
+    /* these rules need the cell that contains p at any distance from its envelope, because
+     * envelopes do not decide then */
     options.unsigned_distance = model->info->rule != EBPO_RULE_NONZERO;
     ASSERT_OK(ebpo_distance(context, p, &options, &distance, error));
     if (!options.unsigned_distance)
@@ -43,7 +43,8 @@ static double distance_and_sign(ebpo_model *model, const double p[3])
     return fabs(distance.distance);
 }
 
-/* Runs a query about a point `away` from p, when only the subtrees listed for p are loaded. */
+/* Runs a query for a point at p + away when only the subtrees listed for p are loaded. Returns
+ * true when the query loads no other subtree. */
 static bool loads_nothing_more(ebpo_model *model, const double p[3], const double away[3])
 {
     double way = sqrt(away[0] * away[0] + away[1] * away[1] + away[2] * away[2]) * (1 + 0x1p-40),
@@ -51,7 +52,7 @@ static bool loads_nothing_more(ebpo_model *model, const double p[3], const doubl
     uint64_t keys[EBPO_CACHE_AHEAD];
     unsigned count = ebpo_subtrees_near(model, p, distance_and_sign(model, p) + 2 * way, keys);
     if (count == EBPO_CACHE_AHEAD)
-        return false; /* there may be more subtrees than listed */
+        return false; /* more subtrees are needed than the list can hold */
     ebpo_cache_stats before, after;
     ebpo_cache_clear(model->cache);
     load(model, keys, count);

@@ -166,8 +166,8 @@ static bool nothing_else_near(operand *o, const double p[3], double distance)
     return none;
 }
 
-/* Returns the kinds of the points very close to p, which is on operands, as bits; 0: other faces
- * are close as well. */
+/* Returns the kinds of the points very close to p as bits. The point p is on at least one operand.
+ * Returns 0 when other faces are close to p. */
 static unsigned kinds_near(const formula *f, operand *o, const double p[3],
                            const int32_t where[OPERANDS], uint64_t *state)
 {
@@ -259,8 +259,7 @@ static void run_query(operand *o, const formula *f, uint64_t count, uint64_t see
     free(points);
 }
 
-/* reported: counts of results in the order of ebpo_where (OUT, IN, certain ON), then of other ON.
- */
+/* reported: counts of results: OUT, IN, certain ON (in the order of ebpo_where), then other ON. */
 static void query_all(const char *const solids[OPERANDS], const ebpo_pose poses[OPERANDS],
                       uint64_t reported[4])
 {
@@ -293,7 +292,7 @@ START_TEST(test_boolean_of_boxes_sharing_sides)
     ebpo_pose poses[OPERANDS] = { shifted(0, 0, 0), quarter_turn(1, 0, 0), shifted(1, 0, 0.5) };
     uint64_t reported[4];
     query_all(solids, poses, reported);
-    ck_assert(reported[EBPO_ON] && reported[3]); /* on sides; on edges */
+    ck_assert(reported[EBPO_ON] && reported[3]); /* points on sides, and points on edges */
 }
 END_TEST
 
@@ -307,8 +306,8 @@ START_TEST(test_boolean_of_equal_and_nearly_equal)
 }
 END_TEST
 
-/* Rounding moves faces by 2^-26 of their size: the position in the model is uncertain for many
- * points. */
+/* Rounding moves faces by 2^-26 of their size, so that the position in the model is uncertain for
+ * many points. */
 START_TEST(test_boolean_far_from_origin)
 {
     static const char *const solids[OPERANDS] = { "sphere", "tetrahedron", "touching_shells" };

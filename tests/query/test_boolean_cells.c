@@ -37,7 +37,7 @@ static query_model make_sphere(void)
     return m;
 }
 
-/* A op B. */
+/* Makes the Boolean A op B. */
 static ebpo_boolean *make_pair(ebpo_model *a, ebpo_pose pose_a, ebpo_model *b, ebpo_pose pose_b,
                                int operation, unsigned threads)
 {
@@ -127,7 +127,7 @@ START_TEST(test_cell_volumes_of_cubes)
 }
 END_TEST
 
-/* Two unit balls at a distance of 1 share a lens with a volume of 5/12 pi; for meshes of 5,120
+/* Two unit balls at a distance of 1 share a lens with a volume of 5/12 pi. For meshes of 5,120
  * faces, the volume is smaller by less than a hundredth. */
 START_TEST(test_cell_volumes_of_spheres)
 {
@@ -244,7 +244,7 @@ START_TEST(test_cells_ignore_order_and_threads)
 }
 END_TEST
 
-/* A model whose subtrees are loaded on demand. */
+/* Loads the subtrees of a model on demand. */
 START_TEST(test_cells_same_with_loading_on_demand)
 {
     query_model sphere = make_sphere();
@@ -274,10 +274,10 @@ END_TEST
 
 /* --- distances --- */
 
-/* The result for two boxes in a row: up to two boxes that do not touch. */
+/* The result for two boxes in a row: at most two boxes, which do not touch. */
 typedef struct row_of_boxes {
     int operation, count;
-    double low[2], high[2]; /* in x; 0 to 1 in y and z */
+    double low[2], high[2]; /* bounds on x; the boxes extend from 0 to 1 on y and z */
 } row_of_boxes;
 
 static double to_boundary(const row_of_boxes *row, const double p[3])

@@ -36,7 +36,7 @@ static ebpo_boolean *make_boolean(const ebpo_boolean_operand *operands, uint32_t
     return boolean;
 }
 
-/* A op B. */
+/* Measures A op B. */
 static ebpo_exact_volume measure_pair(ebpo_model *a, ebpo_pose pose_a, ebpo_model *b,
                                       ebpo_pose pose_b, int operation, unsigned threads)
 {
@@ -61,13 +61,13 @@ static void check_exact(const ebpo_exact_volume *v, double truth)
 
 /* --- boxes on a grid --- */
 
-/* Faces look inward if sign is -1. */
+/* A box; its faces are oriented inwards when the sign is -1. */
 typedef struct box {
     int low[3], high[3], operand, sign;
 } box;
 
 typedef struct scene {
-    box of[BOXES]; /* in world coordinates */
+    box of[BOXES]; /* boxes in world coordinates */
     int count;
     ebpo_boolean_node node[NODES];
     ebpo_rule rule[OPERANDS];
@@ -137,7 +137,7 @@ static ebpo_pose random_pose(uint64_t *state)
     ebpo_pose pose = EBPO_POSE_INIT;
     int first = (int)below(state, 3);
     memset(pose.rotation, 0, sizeof pose.rotation);
-    for (int i = 0; i < 3; i++) /* a cyclic exchange of axes, and a half turn about one */
+    for (int i = 0; i < 3; i++) /* a cyclic exchange of axes, and a half turn about one axis */
         pose.rotation[i][(i + first) % 3] = 1;
     int kept = (int)below(state, 4);
     for (int i = 0; i < 3 && kept < 3; i++)
@@ -155,7 +155,7 @@ static ebpo_pose random_pose(uint64_t *state)
     return pose;
 }
 
-/* Converts to model coordinates; exact for these poses. */
+/* Converts world to model coordinates. The conversion is exact for these poses. */
 static void to_model(const ebpo_pose *pose, const int w[3], double x[3])
 {
     for (int k = 0; k < 3; k++) {
@@ -254,7 +254,7 @@ static unsigned used_operands(const scene *s)
     return operands;
 }
 
-/* Returns true when surfaces of used operands (two or one) intersect. */
+/* Returns true when the surfaces of used operands intersect. `two`: both operands are used. */
 static bool some_intersect(const scene *s, bool two)
 {
     unsigned used = used_operands(s);
@@ -538,7 +538,8 @@ START_TEST(test_volume_with_subnormal_coordinates)
 }
 END_TEST
 
-/* Nearly in contact, then in contact: one unit in the last place decides. */
+/* The boxes are nearly in contact, and then in contact. The difference is one unit in the last
+ * place. */
 START_TEST(test_volume_contact_is_not_exact)
 {
     const double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 };
@@ -587,7 +588,7 @@ START_TEST(test_volume_of_equal_operands)
 }
 END_TEST
 
-/* (A & A) - B with B in A: both operands are in around B. */
+/* Tests (A & A) - B with B in A. Around B, points are in both operands A. */
 START_TEST(test_volume_of_equal_operands_inside_third)
 {
     query_model ball = make_ball(1), small = make_ball(0.3);
@@ -694,7 +695,7 @@ START_TEST(test_volume_self_intersection_is_not_exact)
     ck_assert_int_eq(v.doubt, EBPO_VOLUME_FACES_INTERSECT);
     ck_assert(v.operand[0] == 0 && v.operand[1] == 0 && v.file_face[0] != v.file_face[1]);
     v = measure_pair(m.model, at, m.model, away, EBPO_BOOLEAN_INTERSECTION, 1);
-    check_exact(&v, 0); /* boxes are apart */
+    check_exact(&v, 0); /* the boxes are apart */
     query_model_free(&m);
 }
 END_TEST

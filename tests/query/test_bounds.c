@@ -1,6 +1,6 @@
-/* Checks the hierarchy over blocks of faces in rational arithmetic: the stored bounds contain the
- * faces below each child, with the margin of docs/develop/bounds.md and hardly more; and the
- * kernels for any processor return the same results as the kernels for this one. */
+/* Checks the hierarchy over blocks of faces in rational arithmetic. The stored bounds contain the
+ * faces below each child, with the margin of docs/develop/bounds.md and hardly more. The kernels
+ * for any processor return the same results as the kernels for this processor. */
 #include <gmp.h>
 #include <inttypes.h>
 #include <math.h>
@@ -16,7 +16,8 @@
 
 typedef struct exact {
     mpq_t x[3], middle[3], along, square, bound, part;
-    double least, most, aside2; /* bounds of the faces of a child along its axis, and off it */
+    /* bounds of a child's faces: along its axis, and the squared distance from the axis */
+    double least, most, aside2;
     uint64_t wrong;
 } exact;
 
@@ -158,7 +159,7 @@ static void check_below(exact *e, const ebpo_accel *s, uint32_t n, int lane, uin
     }
 }
 
-/* The square of no axis is greater than 1: the proof for bounding cylinders depends on it. */
+/* No axis has a squared length greater than 1, as the proof for bounding cylinders requires. */
 static bool axis_is_short(const ebpo_bound_slab *slab, int lane)
 {
     int64_t square = 0;
@@ -280,7 +281,7 @@ START_TEST(test_bounds_kernels_agree)
         query_make_ray(&m, &state, r.origin, r.direction, &r.t_max);
         m.model->kernels = ebpo_query_kernels_base();
         query_all(&m, &r, &one);
-        ck_assert(query_one_ray(&m, m.context, &r)); /* against rational arithmetic */
+        ck_assert(query_one_ray(&m, m.context, &r)); /* compares with rational arithmetic */
         m.model->kernels = standard;
         query_all(&m, &r, &other);
         ck_assert_msg(same_results(&one, &other), "%s: ray %" PRIu64, m.name, i);

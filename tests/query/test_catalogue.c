@@ -1,5 +1,5 @@
-/* Catalogues: combined results against separate results of each model; parts with caps against the
- * undivided model; budgets that hold few of the models; and callbacks. */
+/* Tests catalogues: combined results against separate results of each model; parts with caps
+ * against the undivided model; budgets that hold only some of the models; and callbacks. */
 #include <math.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -25,8 +25,8 @@ static ebpo_mesh box_mesh(double x, double y, double z, double size)
     return ebpo_test_box(low, high, 16);
 }
 
-/* Makes mesh i. Some meshes overlap, some are in contact, one occurs twice; all have about as many
- * faces. */
+/* Makes mesh i. Some meshes overlap, some are in contact, and one occurs twice. All have a similar
+ * number of faces. */
 static ebpo_mesh mesh_of(int i)
 {
     const double centre[3] = { 0.25 * i, 0.25 * (i % 3), 0.125 * (i % 5) };
@@ -156,7 +156,7 @@ static void judge_rays(const ebpo_ray_hit *got, const uint64_t *intersected)
             }
         }
         if (isinf(best.t) && best.face != EBPO_NO_FACE)
-            continue; /* several distances may be beyond doubles */
+            continue; /* several distances may exceed the range of doubles */
         ck_assert_double_eq(got[r].t, best.t);
         ck_assert_uint_eq(got[r].face, best.face);
         ck_assert_int_eq(got[r].side, best.side);
@@ -198,7 +198,7 @@ START_TEST(test_catalogue_queries_many_models)
 }
 END_TEST
 
-/* Memory for querying eight models at a time; not all of them stay in memory. */
+/* Returns the memory for querying eight models at a time. Not all of them stay in memory. */
 static uint64_t little_memory(void)
 {
     uint64_t most = 0;
@@ -349,7 +349,7 @@ START_TEST(test_catalogue_parts_match_whole_model)
     ASSERT_OK(
         ebpo_catalogue_ray(h.a.catalogue, h.a.models, &through, 1, NULL, &hit, number, error));
     ck_assert(hit.t == 1 && hit.face / 1000 == 1 && number[0] == 0 && hit.side == 1);
-    through.origin[0] = 0.5; /* no cap intersects it */
+    through.origin[0] = 0.5; /* no cap intersects this ray */
     ASSERT_OK(
         ebpo_catalogue_ray(h.a.catalogue, h.a.models, &through, 1, NULL, &hit, number, error));
     ck_assert(hit.t == 1.5 && hit.face / 1000 == 2 && number[0] == 1 && hit.side == -1);
@@ -382,7 +382,7 @@ END_TEST
 
 typedef struct opener {
     atomic_int opened, closed;
-    int fails; /* index of the failing opening; 0: none */
+    int fails; /* number of the call that fails to open a model; 0: none */
 } opener;
 
 static ebpo_status open_counted(void *user, const char *path, ebpo_file **out, ebpo_error *error)

@@ -1,5 +1,5 @@
-/* Catalogue files: written files can be read; errors in a file or an entry are detected; the tree
- * of boxes finds the same models as a test of all boxes. */
+/* Tests catalogue files: written files can be read; errors in a file or an entry are detected; the
+ * tree of boxes finds the same models as a test of all boxes. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -181,7 +181,7 @@ START_TEST(test_catalogue_wrong_metadata_is_detected)
                       "%s: %d, %s", hostile[i].to, (int)status, reported.message);
         reported = (ebpo_error)EBPO_ERROR_INIT;
     }
-    /* another digest, of the right form */
+    /* a wrong digest in a valid form */
     char *digest = strstr(text, "sha256\": \"") + 10;
     *digest = *digest == '0' ? '1' : '0';
     ck_assert_int_eq(query_changed(text, "\"version\": 1", "\"version\": 1", &reported),

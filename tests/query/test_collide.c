@@ -375,7 +375,7 @@ static const char *const names[] = {
     "cube_twice",     "nested_windings", "sphere_float", "giant_and_dust",  "far_away_float",
     "zero_area_face", "thin_hollow",     "cone_slivers"
 };
-/* Larger products are tried at fewer poses. */
+/* Larger products of face counts are tested at fewer poses. */
 enum { FEW_PAIRS = 300000 };
 enum { NAMES = sizeof names / sizeof *names };
 
@@ -409,7 +409,7 @@ START_TEST(test_collide_pairs_match_brute_force)
 }
 END_TEST
 
-/* At one pose each face intersects its neighbours: enough pairs for every thread. */
+/* At one pose each face intersects its neighbours. This gives enough pairs for every thread. */
 START_TEST(test_collide_pairs_same_for_any_threads)
 {
     query_model m;

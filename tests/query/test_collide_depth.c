@@ -1,5 +1,5 @@
-/* Penetration depth of models: against dense points on faces, by distances to every face and
- * winding numbers as sums of solid angles; and against known depths of boxes. */
+/* Tests the penetration depth of models against dense points on faces, by distances to every face
+ * and by winding numbers as sums of solid angles; and against known depths of boxes. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -15,7 +15,8 @@ static const char *const names[] = { "cube", "torus", "sphere", "nested_windings
 enum { NAMES = sizeof names / sizeof *names };
 /* Samples per edge of a face. */
 enum { STEPS = 4 };
-/* Product of the numbers of faces; larger pairs of models are tested at a few kinds of poses. */
+/* Greatest product of the numbers of faces. Larger pairs of models are tested only at a few kinds
+ * of poses. */
 enum { MAX_PAIRS = 100000 };
 
 typedef struct two_models {
@@ -164,7 +165,8 @@ START_TEST(test_depth_bounds_match_points)
 }
 END_TEST
 
-/* The whole surface of the inner box is equally deep; a fine tolerance costs hardly more. */
+/* All points of the inner box's surface are equally deep. A finer tolerance hardly increases the
+ * cost. */
 START_TEST(test_depth_of_boxes_matches_formula)
 {
     two_models t;

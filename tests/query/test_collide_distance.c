@@ -16,7 +16,8 @@ static const char *const names[] = { "cube",           "torus",      "touching_s
                                      "sheet",          "cube_twice", "zero_area_face",
                                      "far_away_float", "blob",       "nested_windings" };
 enum { NAMES = sizeof names / sizeof *names };
-/* Product of the numbers of faces; the reference implementation takes seconds for more. */
+/* Greatest product of the numbers of faces. The reference implementation takes seconds for larger
+ * products. */
 enum { MAX_PAIRS = 100000 };
 
 typedef struct two_models {
@@ -201,7 +202,7 @@ static double box_gap(const double a[3][3], const double b[3][3])
     return sqrt(square);
 }
 
-/* Computes the least bounds over all pairs of faces: the distance is in *lo .. *hi. */
+/* Computes the least bounds over all pairs of faces. The distance is in *lo .. *hi. */
 static void distance_of_all(const reference_faces *a, const reference_faces *b, double *lo,
                             double *hi)
 {
@@ -229,7 +230,7 @@ static void approach(two_models *t, const ebpo_pose *a, ebpo_pose *b, double lef
     }
 }
 
-/* Rotated models use bounds that small models at axis-aligned poses hardly need. */
+/* Rotated models use bounds that small models at axis-aligned poses hardly use. */
 START_TEST(test_collide_distance_in_deep_hierarchies)
 {
     two_models t;
@@ -258,7 +259,7 @@ START_TEST(test_collide_distance_in_deep_hierarchies)
 }
 END_TEST
 
-/* A translation that rounds nothing changes nothing. */
+/* A common translation without rounding does not change the result. */
 START_TEST(test_collide_distance_common_translation)
 {
     two_models t;

@@ -1,5 +1,6 @@
-/* Contact segments against the exact contact of each crossing pair; lines of contact: each segment
- * once, joined end to end, closed where both models are closed. */
+/* Tests contact segments against the exact contact of each crossing pair, and lines of contact:
+ * each segment occurs once, segments are joined end to end, and lines are closed when both models
+ * are closed. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,10 +12,10 @@
 #include "query_support.h"
 
 typedef struct gathered {
-    ebpo_face_pair *pair; /* crossing ones */
+    ebpo_face_pair *pair; /* crossing pairs */
     ebpo_contact_segment *segment;
     uint64_t pairs, segments;
-    /* counts of lines: */
+    /* counts of lines and of their parts */
     uint64_t lines, open, parts;
     double length;
     const struct gathered *all; /* the owner of the segments */
@@ -161,7 +162,7 @@ static ebpo_collide_options swapped(const ebpo_collide_options *how)
     return out;
 }
 
-/* Compares with the lines of swapped models: each line runs the other way. */
+/* Compares with the lines of swapped models, which run in the opposite direction. */
 static void check_swap(const query_model *a, const query_model *b, const ebpo_collide_options *how,
                        const gathered *g)
 {
@@ -194,7 +195,7 @@ static query_model model_of(const char *name, int variant)
     return m;
 }
 
-/* Two boxes, each with one corner in the other: the line has the six edges of their common box. */
+/* Each of two boxes has one corner in the other. The line has six edges of the common box. */
 START_TEST(test_intersection_lines_of_two_cubes)
 {
     query_model m = model_of("cube", 0);
@@ -211,7 +212,7 @@ START_TEST(test_intersection_lines_of_two_cubes)
 }
 END_TEST
 
-/* Boundaries of two manifold solids in general position: only closed lines. */
+/* Two manifold solids in general position have only closed lines. */
 START_TEST(test_intersection_lines_of_solids_are_closed)
 {
     static const char *const names[] = { "torus", "sphere_float", "cube" };
@@ -222,7 +223,7 @@ START_TEST(test_intersection_lines_of_solids_are_closed)
     how.pose_b.rotation[0][0] = how.pose_b.rotation[1][1] = 0.6;
     how.pose_b.rotation[0][1] = -0.8;
     how.pose_b.rotation[1][0] = 0.8;
-    /* a face of B on one of A, nearly */
+    /* a face of B approximately on a face of A */
     posed_face(&a, &how.pose_a, a.mesh.face_count / 3, corner[0]);
     posed_face(&b, &how.pose_b, b.mesh.face_count / 2, corner[1]);
     for (int k = 0; k < 3; k++) {

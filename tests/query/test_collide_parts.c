@@ -1,5 +1,6 @@
-/* Partly loaded models give the results of whole models: distances, contacts, lines and files, at
- * several cuts, with both in parts, one in parts, swapped, and under a shared budget. */
+/* Partly loaded models give the results of whole models: distances, contacts, lines and files. The
+ * tests use several cut levels, both models or one model in parts, swapped models, and a shared
+ * budget. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -333,7 +334,7 @@ static void check_separation(const two_models *t, const ebpo_pose pose[2], uint6
 
 /* --- depths --- */
 
-/* Computes the depths. Surfaces have no depth: then all bytes are 0. */
+/* Computes the depths. Surfaces have no depth: then all bytes of the result are 0. */
 static void depths(ebpo_collider *c, const two_models *t, const ebpo_pose pose[2], bool back,
                    uint64_t deadline, ebpo_certain out[2])
 {

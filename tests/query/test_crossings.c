@@ -1,5 +1,5 @@
-/* Intersecting faces of one mesh, except neighbours: against an independent reference of the tests;
- * under budgets, with threads, with and without shared vertices. */
+/* Tests intersecting faces of one mesh, except neighbours, against an independent reference
+ * implementation: under budgets, with threads, with and without shared vertices. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -46,7 +46,7 @@ static ebpo_mesh copy_of(const ebpo_mesh *mesh)
     return out;
 }
 
-/* Finds all pairs. memory 0: without a workspace */
+/* Finds all pairs. memory: 0 for no workspace. */
 static found look(const ebpo_mesh *mesh, unsigned threads, uint64_t memory)
 {
     found out = { .sum = EBPO_CROSSINGS_SUMMARY_INIT };
@@ -205,7 +205,7 @@ START_TEST(test_crossings_of_nested_spheres)
 }
 END_TEST
 
-/* A face that occurs twice, reversed; and a fold. */
+/* Tests a face that occurs twice in opposite orientations, and a fold. */
 START_TEST(test_crossings_of_coincident_faces)
 {
     ebpo_mesh mesh = make_soup(2, 1, 3);
@@ -214,7 +214,7 @@ START_TEST(test_crossings_of_coincident_faces)
     memcpy(mesh.faces, faces, sizeof faces);
     mesh.face_count = 4;
     found f = look(&mesh, 1, 0);
-    /* 0 and 1 are one face; 3 overlaps both of these, and 2 overlaps them partly */
+    /* faces 0 and 1 coincide; face 3 overlaps both of them, and face 2 overlaps them partly */
     ck_assert_uint_eq(f.count, 4);
     ck_assert_uint_eq(f.sum.pairs[EBPO_PAIR_COPLANAR], 4);
     ck_assert_uint_eq(f.sum.faces, 4);

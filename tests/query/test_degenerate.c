@@ -1,5 +1,5 @@
-/* Each degenerate or ill-conditioned case keeps its limits: degenerate_cases.c. `test_degenerate
- * TEXT` runs the cases whose name contains the text. */
+/* Checks that each degenerate or ill-conditioned case of degenerate_cases.c keeps its limits.
+ * `test_degenerate TEXT` runs the cases whose name contains the text. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,8 +7,8 @@
 #include "check_main.h"
 #include "degenerate.h"
 
-/* Returns the number of queries; few for large meshes, as the oracle tests every face for every
- * query. */
+/* Returns the number of queries. It is small for large meshes, because the oracle tests every face
+ * for every query. */
 static uint64_t queries_for(const degenerate_case *c)
 {
     ebpo_mesh mesh = c->make(c);

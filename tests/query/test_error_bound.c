@@ -66,7 +66,8 @@ START_TEST(test_error_bounds_enclose_and_converge)
 {
     static const char *const names[] = { "torus",     "sphere", "blob",      "cone",
                                          "staircase", "sheet",  "tetrahedra" };
-    for (int i = 0; i < 7; i += query_scaled(40) < 4 ? 3 : 1) /* sanitizers: three of them */
+    /* with sanitizers, only three cases */
+    for (int i = 0; i < 7; i += query_scaled(40) < 4 ? 3 : 1)
         for (int v = 0; v < 3; v += query_scaled(4) < 4 ? 2 : 1) {
             const query_variant *variants[] = { &stored, &derived, &cells };
             query_model m;
@@ -121,7 +122,7 @@ END_TEST
 
 static uint32_t rings(void)
 {
-    return query_scaled(4) < 4 ? 16 : 60; /* other compilers and sanitizers: a small one */
+    return query_scaled(4) < 4 ? 16 : 60; /* a small model for other compilers and sanitizers */
 }
 
 START_TEST(test_error_bound_same_for_any_threads)
@@ -157,7 +158,8 @@ START_TEST(test_error_bound_with_query_limit)
 }
 END_TEST
 
-/* A shell thinner than any cell: every outer point is close to the inside, and bounds stay wide. */
+/* Makes a shell that is thinner than any cell. Every outer point is close to the inside, so that
+ * bounds stay wide. */
 static ebpo_mesh shell(void)
 {
     ebpo_mesh mesh = ebpo_test_torus(3, 1, 24, 12), inner = ebpo_test_torus(3, 1 - 1e-9, 24, 12);
@@ -207,7 +209,7 @@ START_TEST(test_error_bound_scales_with_model)
     query_model_make(&unit, "torus", ebpo_test_torus(3, 1, 24, 12), &stored);
     for (int i = 0; i < 6; i++) {
         if (ebpo_test_scale() < 1 && i % 5)
-            continue; /* only the minimum and the maximum */
+            continue; /* tests only the minimum and the maximum */
         query_model m;
         double matrix[3][3] = { { scale[i], 0, 0 }, { 0, scale[i], 0 }, { 0, 0, scale[i] } },
                nowhere[3] = { 0, 0, 0 };

@@ -154,8 +154,8 @@ END_TEST
 
 /* --- turns --- */
 
-/* Faces within the box of a model, whose extent determines the allowed error, and a line through a
- * corner, close to an edge, or anywhere. */
+/* Makes faces within the box of a model, whose extent determines the allowed error, and a line
+ * through a corner, close to an edge, or at a random position. */
 static void make_line(block *b, ebpo_axis_segment *g, uint64_t *state)
 {
     double p[3], reach = 0, low[3], high[3], size = 0;
@@ -179,8 +179,8 @@ static void make_line(block *b, ebpo_axis_segment *g, uint64_t *state)
     g->to = high[g->axis];
 }
 
-/* Returns the exact turns at a face's corners as bits: 1 some left, 2 some right, 4 some neither.
- */
+/* Returns the exact turns at a face's corners as bits: 1 when some turn left, 2 when some turn
+ * right, 4 when some do neither. */
 static unsigned exact_turns(const block *b, const ebpo_axis_segment *g, unsigned lane)
 {
     int u = g->axis == 2 ? 0 : g->axis + 1, v = g->axis == 0 ? 2 : g->axis - 1;
@@ -223,7 +223,9 @@ START_TEST(test_filter_orientations_are_correct)
         check_turns(&b, &g, &face_filters_base, &certain);
         check_turns(&b, &g, &face_filters_avx2, &certain);
     }
-    ck_assert_uint_gt(certain, count); /* of 16 each: a filter that decides nothing is useless */
+    /* of 16 decisions in each round, more than one must be certain on average, because a filter
+     * that decides nothing is useless */
+    ck_assert_uint_gt(certain, count);
 }
 END_TEST
 

@@ -27,7 +27,7 @@ typedef struct judged {
     ebpo_haptic *haptic;
     ebpo_haptic_options options;
     double skin, proxy[3], device[3], force[3];
-    double energy, step; /* energy; the longest step */
+    double energy, step; /* energy gained; length of the longest step */
     bool placed;
 } judged;
 
@@ -58,7 +58,7 @@ static void judge_piece(judged *j, const double from[3], const double to[3])
                   j->options.radius, j->skin);
 }
 
-/* Checks all pieces, which form one path from the previous proxy position. */
+/* Checks all pieces of the proxy's path, which begins at the previous proxy position. */
 static void judge_way(judged *j, const double to[3])
 {
     double way[EBPO_HAPTIC_PATH_MAX][3];
@@ -116,7 +116,7 @@ static void judge_step(judged *j, const double device[3], bool closely)
     }
 }
 
-/* Chooses a position; returns false when it is not outside and far enough from faces. */
+/* Chooses a position. Returns false when the position is not outside and far enough from faces. */
 static bool begin(judged *j, uint64_t *state)
 {
     const ebpo_info *info = ebpo_file_info(j->m->file);
@@ -143,7 +143,7 @@ static bool begin(judged *j, uint64_t *state)
     return status == EBPO_OK;
 }
 
-/* Moves to random positions, slowly or at once; also through the solid. */
+/* Moves the device to random positions, slowly or in one step, also through the solid. */
 static void wave(judged *j, uint64_t step_count, uint64_t *state)
 {
     const ebpo_info *info = ebpo_file_info(j->m->file);
@@ -159,7 +159,7 @@ static void wave(judged *j, uint64_t step_count, uint64_t *state)
                 device[k] = from[k] + (goal[k] - from[k]) * (double)s / (double)steps;
             judge_step(j, device, i % 8 == 0);
             if (i % 4 == 0)
-                pause_a_little(); /* as a device does: boxes are loaded meanwhile */
+                pause_a_little(); /* pauses as a device does; boxes are loaded meanwhile */
         }
     }
 }
@@ -225,7 +225,7 @@ static void cube_end(cube_device *c)
     query_model_free(&c->m);
 }
 
-/* Moves there in steps, and stays until nothing is pending. */
+/* Moves to a position in steps, and waits until nothing is pending. */
 static void cube_move(cube_device *c, double x, double y, double z, int steps)
 {
     ebpo_haptic_stats stats = EBPO_HAPTIC_STATS_INIT;
@@ -268,12 +268,12 @@ START_TEST(test_haptic_cube_force_matches_planes)
     check_vector(c.r.proxy, 0.3, 0.4, 1.2, 1e-6);
     check_vector(c.r.force, 0, 0, 0, 0);
     ck_assert_double_le(fabs(c.r.depth + (0.2 - radius)), 1e-9);
-    cube_move(&c, 0.35, 0.4, 0.9, 30); /* into the top */
+    cube_move(&c, 0.35, 0.4, 0.9, 30); /* into the top of the cube */
     ck_assert_uint_eq(c.r.flags, EBPO_HAPTIC_CONTACT);
     check_vector(c.r.proxy, 0.35, 0.4, 1 + radius, 3e-6);
     check_vector(c.r.force, 0, 0, 100 * (0.1 + radius), 3e-4);
     ck_assert_double_le(fabs(c.r.depth - (0.1 + radius)), 3e-6);
-    cube_move(&c, 0.7, 0.6, 0.8, 50); /* along it: edges within the plane do not matter */
+    cube_move(&c, 0.7, 0.6, 0.8, 50); /* along the top; edges within the plane have no effect */
     check_vector(c.r.proxy, 0.7, 0.6, 1 + radius, 3e-6);
     cube_move(&c, 0.7, 0.6, -3, 1); /* the device leaves at the bottom, the proxy is still on top */
     check_vector(c.r.proxy, 0.7, 0.6, 1 + radius, 3e-6);
@@ -296,8 +296,8 @@ static double off_box(const double at[3], const double low[3], const double high
     return sqrt(sum);
 }
 
-/* A ball slides on one box towards another. Its path is clipped to its surroundings: the rounding
- * error of the whole path, which is long, does not apply to contact with a face. */
+/* A ball slides on one box towards another. Its path is clipped to its surroundings, so that the
+ * rounding error of the whole long path does not affect the contact with a face. */
 START_TEST(test_haptic_distant_device_keeps_ball)
 {
     static const double floor_low[3] = { 0, 0, 0 }, floor_high[3] = { 1, 1, 1 };
@@ -317,7 +317,7 @@ START_TEST(test_haptic_distant_device_keeps_ball)
         options.radius = 0.2;
         options.skin = 1e-6;
         ASSERT_OK(ebpo_haptic_new(m.model, &options, start, &haptic, error));
-        /* until it is between the boxes, and some further steps */
+        /* until the ball is between the boxes, and some further steps */
         for (int i = 0, there = 0; there < 100; i++) {
             ck_assert_msg(i < 20000, "the ball stays at %g, flags %u", r.proxy[0], r.flags);
             step_seconds(haptic, devices[h], &r);
@@ -339,12 +339,12 @@ START_TEST(test_haptic_friction_follows_coulomb)
     cube_device c;
     cube_begin(&c, 0, 0.5);
     cube_move(&c, 0.3, 0.4, 1.1, 10);
-    cube_move(&c, 0.3, 0.4, 0.9, 20); /* straight down: depth 0.1 */
+    cube_move(&c, 0.3, 0.4, 0.9, 20); /* straight down to a depth of 0.1 */
     double x = c.r.proxy[0];
-    cube_move(&c, 0.34, 0.4, 0.9, 10); /* 0.04 < 0.5 * 0.1 */
+    cube_move(&c, 0.34, 0.4, 0.9, 10); /* sticks, because 0.04 < 0.5 * 0.1 */
     check_vector(c.r.proxy, x, 0.4, 1, 3e-6);
     check_vector(c.r.force, 100 * (x - 0.34), 0, 10, 1e-3);
-    cube_move(&c, 0.6, 0.4, 0.9, 100); /* pulled along, 0.05 behind */
+    cube_move(&c, 0.6, 0.4, 0.9, 100); /* friction pulls the proxy along, 0.05 behind the device */
     check_vector(c.r.proxy, 0.55, 0.4, 1, 1e-4);
     cube_end(&c);
 }
@@ -412,9 +412,10 @@ START_TEST(test_haptic_invalid_options_are_refused)
 }
 END_TEST
 
-/* For any damping, and although rounding rotates the path from device to proxy, far from 0 and with
- * friction: no force towards a face that the spring pushes away from. Whether a face or its edge is
- * nearer is known only to the square root of the rounding error, 1e-7. */
+/* Damping of any size causes no force towards a face that the spring pushes away from. This holds
+ * far from 0, with friction, and although rounding rotates the path from device to proxy. When a
+ * face and its edge are almost equally near, the decision has an error of the square root of the
+ * rounding error, 1e-7. */
 START_TEST(test_haptic_damping_never_pulls)
 {
     static const double offsets[] = { 0, 1e7, 1e13 }, factors[] = { 1, 1e3, 1e6 };
@@ -454,8 +455,8 @@ START_TEST(test_haptic_damping_never_pulls)
 }
 END_TEST
 
-/* More faces around one position than a box can hold: this is reported, and the proxy stays
- * outside. */
+/* When there are more faces around a position than a box can hold, this is reported, and the proxy
+ * stays outside. */
 START_TEST(test_haptic_too_many_faces_are_refused)
 {
     query_model m;
@@ -490,8 +491,8 @@ static uint32_t step_of(ebpo_haptic *haptic, uint64_t kind, const double at[3], 
                                        : tool.flags;
 }
 
-/* Far away there is no error; around the target there are more faces than a box can hold. Each step
- * there reports the error, and loaded faces still constrain the proxy. */
+/* There is no error far away. Around the target there are more faces than a box can hold. Each
+ * step there reports the error, and loaded faces still constrain the proxy. */
 START_TEST(test_haptic_step_reports_stopped_loading)
 {
     static const double zero[3] = { 0, 0, 0 }, points[2][3] = { { 0.6, 0, 0 }, { -0.6, 0, 0 } };
@@ -531,9 +532,9 @@ START_TEST(test_haptic_step_reports_stopped_loading)
 }
 END_TEST
 
-/* The last loaded box may be the previous one, when a step has put it aside; when the proxy is
- * placed there again, no other box is loaded for it. In use this needs a slow loader, so the test
- * creates the state directly. */
+/* A step may have put the last loaded box aside as the previous box. When the proxy is placed
+ * there again, no other box is loaded. In practice this needs a slow loader, so the test creates
+ * the state directly. */
 START_TEST(test_haptic_place_uses_previous_box)
 {
     cube_device c;
@@ -602,7 +603,7 @@ TEST_SUITE(haptic_ball)
     tcase_add_test(device, test_haptic_ball_leaves_dense_faces);
     tcase_add_loop_test(device, test_haptic_step_reports_stopped_loading, 0, 3);
     suite_add_tcase(suite, device);
-    TCase *placed = tcase_create("placed"); /* without the fix it would wait for ever */
+    TCase *placed = tcase_create("placed"); /* before the fix this test waited for ever */
     tcase_set_timeout(placed, 60);
     tcase_add_test(placed, test_haptic_place_uses_previous_box);
     suite_add_tcase(suite, placed);

@@ -1,8 +1,8 @@
-/* A ball that is large compared with the faces: thousands are around it, and in a cavity of nearly
- * its size all of them nearly touch it. It must stop at contact and not before, compared with a
- * reference implementation that measures the distance from every face. It must come to rest when no
- * path leads nearer to the device, and visit no more faces in a haptic step than a ball in the open
- * may. */
+/* Tests a ball that is large compared with the faces. Thousands of faces are around the ball; in a
+ * cavity of nearly the ball's size, nearly all of them are in contact with the ball. The ball must
+ * stop at contact and not before, compared with a reference implementation that measures the
+ * distance from every face. It must come to rest when no path leads nearer to the device, and
+ * visit no more faces in a haptic step than a ball in open space may. */
 #include <stdlib.h>
 #include <ebpo/haptic.h>
 #include <math.h>
@@ -40,7 +40,8 @@ static double from_edge(const double p[3], const double a[3], const double b[3])
     return product(d, d);
 }
 
-/* Returns the squared distance; the plane counts where p is above the inside of all three edges. */
+/* Returns the squared distance from a face. The plane counts when the projection of p is inside
+ * all three edges. */
 static double from_face(const double p[3], double t[3][3])
 {
     double e[3], f[3], n[3], d[3], least = INFINITY;
@@ -85,7 +86,7 @@ typedef struct ball {
     ebpo_haptic_options options;
     ebpo_haptic_ball_result r;
     double diagonal;
-    uint32_t step_count; /* taken by the last move, except waiting steps */
+    uint32_t step_count; /* number of steps of the last move, without waiting steps */
 } ball;
 
 static void ball_begin(ball *b, const char *name, ebpo_mesh mesh, double radius,
@@ -187,8 +188,8 @@ static void judge_rest(const ball *b, const double device[3], uint64_t *state)
 
 /* --- cases --- */
 
-/* The expected results are those of a box, although it has 19,200 faces. More than a thousand of
- * them are in the range of the ball at the edge. */
+/* The expected results are those of a box, although the box has 19,200 faces. When the ball is at
+ * the edge, more than a thousand of them are in its range. */
 START_TEST(test_haptic_large_ball_rests_on_box)
 {
     static const double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 };
@@ -196,7 +197,8 @@ START_TEST(test_haptic_large_ball_rests_on_box)
     ball b;
     ball_begin(&b, "box", ebpo_test_box(low, high, 40), 0.4, above);
     double skin = b.options.skin;
-    for (int i = 1; i <= 40; i++) { /* down: in contact from 1.4 on, and not before */
+    /* moves down; the ball is in contact from 1.4 on, and not before */
+    for (int i = 1; i <= 40; i++) {
         const double device[3] = { 0.5, 0.5, 2 - 0.0251 * i };
         ball_move(&b, device, 20);
         ck_assert_int_eq((b.r.flags & EBPO_HAPTIC_CONTACT) != 0, device[2] < 1.4);
@@ -205,7 +207,8 @@ START_TEST(test_haptic_large_ball_rests_on_box)
         if (b.r.flags & EBPO_HAPTIC_CONTACT)
             ck_assert_double_ge(b.r.normal[2], 0.999);
     }
-    for (int i = 1; i <= 60; i++) { /* along, over the edge, and down beside it */
+    /* moves along the top, over the edge, and down beside the box */
+    for (int i = 1; i <= 60; i++) {
         const double device[3] = { 0.5 + 0.02 * i, 0.5, 0.996 };
         ball_move(&b, device, 40);
         double over = fmax(b.r.proxy[0] - 1, 0);
@@ -218,8 +221,8 @@ START_TEST(test_haptic_large_ball_rests_on_box)
 }
 END_TEST
 
-/* The inner sphere is oriented so that its hollow is outside of the solid; some 1,280 or 20,480
- * faces are nearly as far from the middle as the radius of the ball. */
+/* The inner sphere is oriented so that its interior is outside of the solid. The distance of some
+ * 1,280 or 20,480 faces from the middle is nearly the radius of the ball. */
 START_TEST(test_haptic_ball_fills_cavity)
 {
     static const double low[3] = { -2, -2, -2 }, high[3] = { 2, 2, 2 }, zero[3] = { 0, 0, 0 };
@@ -263,8 +266,8 @@ static void middle_of(const ball *b, double out[3])
 static const double of_diagonal[] = { 0.02, 0.1, 0.25, 0.8 };
 enum { SIZES = sizeof of_diagonal / sizeof *of_diagonal };
 
-/* Approaches in steps: the first contact is where the reference implementation reports it. Then
- * moves along the surface. */
+/* Approaches in steps. The first contact is at the position that the reference implementation
+ * reports. Then the ball moves along the surface. */
 static void haptic_model(const char *name, ebpo_mesh mesh, double part, uint64_t seed)
 {
     uint64_t state = seed;

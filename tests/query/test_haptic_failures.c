@@ -1,5 +1,6 @@
-/* A partly loaded model whose source fails permanently while a haptic device moves: each kind of
- * device reports in its steps that loading has stopped, and returns the reason on request. */
+/* Tests a partly loaded model whose source fails permanently while a haptic device moves. Each
+ * kind of device reports in its steps that loading has stopped, and returns the reason on request.
+ */
 #include <ebpo/haptic.h>
 #include <pthread.h>
 #include <stdatomic.h>
@@ -14,8 +15,8 @@
 typedef struct line {
     uint8_t *data;
     uint64_t size;
-    pthread_t device;          /* the thread of haptic steps; the loader reads in its own thread */
-    atomic_bool waiting, down; /* the loader waits; all reads fail */
+    pthread_t device;          /* thread of the haptic steps; the loader reads in another thread */
+    atomic_bool waiting, down; /* the loader must wait; all reads must fail */
     atomic_int refused;
 } line;
 
@@ -23,8 +24,8 @@ static ebpo_status read_line(void *user, uint64_t offset, uint64_t size, void *d
                              ebpo_error *error)
 {
     line *l = user;
-    /* Otherwise the loader may have read everything that the device needs before the source fails.
-     */
+    /* Waits, because otherwise the loader may read everything that the device needs before the
+     * source fails. */
     while (atomic_load(&l->waiting) && !pthread_equal(pthread_self(), l->device))
         nanosleep(&(struct timespec){ .tv_nsec = 300000 }, NULL);
     if (atomic_load(&l->down)) {
@@ -101,7 +102,7 @@ START_TEST(test_haptic_step_reports_source_failure)
     }
     ck_assert_int_eq(ebpo_haptic_check(haptic, &why), EBPO_E_IO);
     ck_assert_ptr_nonnull(strstr(why.message, "the line is down"));
-    atomic_store(&l.down, false); /* no retry */
+    atomic_store(&l.down, false); /* must not cause a retry */
     ck_assert_uint_ne(step_of(haptic, kind, far) & EBPO_HAPTIC_STOPPED, 0);
     ebpo_haptic_free(haptic);
     ebpo_model_free(model);

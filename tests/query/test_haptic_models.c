@@ -108,7 +108,8 @@ static void grid_free(grid *g)
     free(g->seen);
 }
 
-/* Returns a reference with the faces that may be within `wide` of the box; NULL: there are none. */
+/* Returns a reference implementation with the faces that may be within `wide` of the box; NULL
+ * when there are none. */
 static oracle *judge_around(grid *g, const double p[3], const double q[3], double wide)
 {
     double low[3], high[3], l[3], h[3];
@@ -229,7 +230,7 @@ static void judge_way(device *h, double way[][7], uint32_t count)
     }
 }
 
-/* The rotation is about one axis throughout, so that its angle is known. */
+/* Checks the energy. All rotations are about one axis, so that the angle is known. */
 static void judge_energy(device *h, const double to[7], double turn)
 {
     double square = 0;
@@ -394,7 +395,7 @@ START_TEST(test_haptic_on_degenerate_models)
         return;
     }
     if (query_model_try(&m, c->name, mesh, &query_variants[0], &error) != EBPO_OK)
-        return; /* test_degenerate checks that */
+        return; /* test_degenerate checks these cases */
     play(&m, _i % 2, query_scaled(2000), 80 + (uint64_t)_i);
     query_model_free(&m);
 }

@@ -1,5 +1,5 @@
-/* A probe without constraints: its bounds contain the exact signed distance for any jump and any
- * part in memory; and a haptic step calls nothing that could delay it. */
+/* Tests a probe without constraints. Its bounds contain the exact signed distance for any jump and
+ * any part in memory, and a haptic step makes no call that could delay it. */
 #include <stdlib.h>
 #include <ebpo/haptic.h>
 #include <math.h>
@@ -139,8 +139,8 @@ START_TEST(test_haptic_probe_bounds_exact_distance)
 }
 END_TEST
 
-/* Far away a distance is known to less than the size of the model. Such a bound says nothing about
- * a position near the model, and bounds there are wider by the rounding of lengths. */
+/* Far away, a distance is known with an error of less than the size of the model. Such a bound
+ * gives no information about positions near the model. Rounding of lengths widens bounds there. */
 START_TEST(test_haptic_probe_bounds_after_long_jump)
 {
     static const double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 };

@@ -165,7 +165,7 @@ static ebpo_status begin(judged *j, query_model *m, const double place[3], ebpo_
     return ebpo_haptic_new(m->model, &j->options, place, &j->haptic, error);
 }
 
-/* Begins with a tool of points in a ball; returns false when the position is unsuitable. */
+/* Begins with a tool whose points are in a ball. Returns false when the position is unsuitable. */
 static bool begin_wild(judged *j, query_model *m, uint64_t *state)
 {
     const ebpo_info *info = ebpo_file_info(m->file);
@@ -290,8 +290,8 @@ static void random_contact(uint64_t *state, ebpo_tool_contact *c)
     ebpo_vec3_cross(lever, c->grip, c->grip + 3);
 }
 
-/* A contact that pulls, so that its point sticks to the face, would restrain more than needed. The
- * remaining error of few sweeps is less than 0.02 here. */
+/* A contact must not pull, because its point would then stick to the face and restrain the motion
+ * more than needed. The remaining error of a few sweeps is less than 0.02 here. */
 START_TEST(test_haptic_tool_contacts_never_pull)
 {
     ebpo_tool_contacts all;
@@ -384,7 +384,7 @@ START_TEST(test_haptic_plate_rests_on_cube)
     ck_assert_double_le(fabs(r.depth - 0.1), 3e-4);
     ck_assert_uint_gt(r.contacts, 3);
     ck_assert_double_ge(r.normal[2], 0.999);
-    go(&j, (const double[3]){ 0.55, 0.45, 0.9 }, 20, &r); /* along it */
+    go(&j, (const double[3]){ 0.55, 0.45, 0.9 }, 20, &r); /* along the top */
     check_vector(r.proxy, 0.55, 0.45, 1 + 1e-4, 2e-4);
     go(&j, (const double[3]){ 0.55, 0.45, -2 }, 1,
        &r); /* the device leaves at the bottom, the tool is still on top */
@@ -393,7 +393,7 @@ START_TEST(test_haptic_plate_rests_on_cube)
 }
 END_TEST
 
-/* The device tilts the plate on the cube: it stays flat, and exerts a torque. */
+/* The device tilts the plate on the cube. The plate stays flat and exerts a torque. */
 START_TEST(test_haptic_tilted_plate_restores_device)
 {
     query_model m;
@@ -424,16 +424,17 @@ START_TEST(test_haptic_friction_holds_plate)
     cube_begin(&j, &m, 0.5);
     go(&j, (const double[3]){ 0.5, 0.5, 0.9 }, 40, &r);
     double x = r.proxy[0];
-    go(&j, (const double[3]){ 0.54, 0.5, 0.9 }, 10, &r); /* 0.04 < 0.5 * 0.1 */
+    go(&j, (const double[3]){ 0.54, 0.5, 0.9 }, 10, &r); /* sticks, because 0.04 < 0.5 * 0.1 */
     ck_assert_double_le(fabs(r.proxy[0] - x), 1e-3);
     ck_assert_double_le(fabs(r.force[0] + 4), 0.15);
-    go(&j, (const double[3]){ 0.7, 0.5, 0.9 }, 80, &r); /* pulled along, 0.05 behind */
+    /* friction pulls the tool along, 0.05 behind the device */
+    go(&j, (const double[3]){ 0.7, 0.5, 0.9 }, 80, &r);
     ck_assert_double_le(fabs(r.proxy[0] - 0.65), 3e-3);
     cube_end(&j, &m);
 }
 END_TEST
 
-/* 10,000 points, a third of them in contact with the cube: steps take no longer. */
+/* Uses 10,000 points, a third of them in contact with the cube. Steps do not take longer. */
 START_TEST(test_haptic_step_time_with_many_points)
 {
     static const double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 };

@@ -50,8 +50,9 @@ typedef struct bytes {
 
 static bytes content[MODELS];
 static __thread unsigned own_number; /* 0: a thread of the library */
-static __thread unsigned fail_in;    /* the read after so many fails; 0: none */
-static _Atomic uint64_t background;  /* reads in threads of the library */
+/* the number of the read that fails, counted from now; 0: none */
+static __thread unsigned fail_in;
+static _Atomic uint64_t background; /* reads in threads of the library */
 static _Atomic bool background_fails;
 
 static ebpo_status fail_as(const char *who, unsigned number, ebpo_error *error)
@@ -196,8 +197,8 @@ static void report(worker *w, int kind, uint64_t number, const char *what)
                 names[w->which], what);
 }
 
-/* Returns true for an expected failure: of a read by the worker, or of a read by a library thread
- * for the worker. */
+/* Returns true when a failure is expected: of a read by the worker, or of a read by a library
+ * thread for the worker. */
 static bool is_own(const worker *w, int kind, bool wanted, const ebpo_error *error)
 {
     char own[64];
@@ -207,8 +208,8 @@ static bool is_own(const worker *w, int kind, bool wanted, const ebpo_error *err
     return mix_has_workers(kind) && strstr(error->message, "refused by background");
 }
 
-/* The first query of each thread has injected faults, so that there are some for any number of
- * queries: not everything is in memory yet. */
+/* Runs a query. The first query of each thread has injected faults, so that faults occur for any
+ * number of queries: at that time not everything is in memory. */
 static void query_one(worker *w, bool first)
 {
     int kind = (int)draw(w, MIX_KINDS);
@@ -262,7 +263,7 @@ static void *work(void *user)
     return NULL;
 }
 
-/* Memory of 64 contexts with a subtree each, and as much again for loading. */
+/* Returns the memory of 64 contexts with a subtree each, and the same amount for loading. */
 static uint64_t budget_for(const shared *s)
 {
     ebpo_error error = EBPO_ERROR_INIT;

@@ -1,4 +1,4 @@
-/* Subsets by need: they meet the requested error or size. */
+/* Tests subsets by need: they keep the requested error or size. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -175,7 +175,7 @@ static void keeps_its_word(query_model *m, uint32_t parts)
 START_TEST(test_subset_keeps_error_limit)
 {
     for (int i = query_scaled(4) < 4 ? 3 : 0; i < 5;
-         i++) { /* other compilers and sanitizers: the small ones */
+         i++) { /* other compilers and sanitizers test only the small models */
         query_model m;
         ebpo_mesh mesh = i == 0   ? ebpo_test_torus(3, 1, 48, 24)
                          : i == 1 ? ebpo_test_sphere((double[3]){ 1, 2, 3 }, 2, 3)
@@ -243,7 +243,7 @@ START_TEST(test_subset_size_limit_minimizes_error)
         result_free(&finer);
         e.max_error = r.info->kept_error / 1.02;
         result_make(&finer, &m, "finer", &e);
-        /* Sizes of nearly the same content vary slightly, because of compression. */
+        /* Sizes vary slightly for nearly the same content, because of compression. */
         ck_assert_msg(finer.info->file_bytes > o.target_bytes * 99 / 100,
                       "a smaller error would have fitted: %llu of %llu bytes",
                       (unsigned long long)finer.info->file_bytes,
@@ -289,7 +289,7 @@ START_TEST(test_subset_never_exceeds_size_limit)
             snprintf(path, sizeof path, "%s/fit.ebpo.h5", m.folder);
             ebpo_status status = ebpo_subset(m.file, path, &o, &error);
             if (status == EBPO_E_ARGUMENT && !last)
-                continue; /* below the least size */
+                continue; /* a limit below the least size */
             fine(status, &error);
             unlink(path);
             result r, same;
@@ -410,7 +410,8 @@ START_TEST(test_subset_impossible_limits_are_refused)
     o.last_level = 2;
     snprintf(again.path, sizeof again.path, "%s/again.ebpo.h5", m.folder);
     ebpo_error error = EBPO_ERROR_INIT;
-    fine(ebpo_subset(r.file, again.path, &o, &error), &error); /* a subset of it keeps the value */
+    /* a subset of the subset keeps the value */
+    fine(ebpo_subset(r.file, again.path, &o, &error), &error);
     fine(ebpo_open(again.path, &again.file, &error), &error);
     ck_assert(ebpo_file_info(again.file)->kept_error == 0.1);
     result_free(&again);

@@ -160,7 +160,7 @@ START_TEST(test_oracle_omitted_faces_are_never_nearest)
                     at++;
                 }
             }
-            ck_assert_uint_eq(at, count); /* ascending */
+            ck_assert_uint_eq(at, count); /* the order is ascending */
             free(faces);
         }
         oracle_free(o);
@@ -283,7 +283,7 @@ START_TEST(test_oracle_ray_hits_sum_to_winding)
                 ck_assert_double_ge(hits[h].t, last);
                 last = hits[h].t;
                 sum += hits[h].side;
-                if (sum == 0) /* ends are part of the ray */
+                if (sum == 0) /* the ends are part of the ray */
                     ck_assert_double_gt(hits[h].t, 0);
             }
             ck_assert_int_eq(sum, 0);
@@ -294,7 +294,7 @@ START_TEST(test_oracle_ray_hits_sum_to_winding)
 }
 END_TEST
 
-/* The cube 0 .. 4 with two faces a side. */
+/* Uses a cube from 0 to 4 with two faces on each side. */
 START_TEST(test_oracle_rays_along_edges_and_vertices)
 {
     static const struct {
@@ -303,15 +303,16 @@ START_TEST(test_oracle_rays_along_edges_and_vertices)
         double first, last;
         int side; /* side of the first hit */
     } rows[] = {
-        { { -1, 1, 2 }, { 1, 0, 0 }, INFINITY, 2, 1, 5, 1 }, /* crosses two faces */
-        { { -1, 1, 2 }, { 1, 0, 0 }, 1, 1, 1, 1, 1 },        /* up to the side */
+        { { -1, 1, 2 }, { 1, 0, 0 }, INFINITY, 2, 1, 5, 1 }, /* the ray crosses two faces */
+        { { -1, 1, 2 }, { 1, 0, 0 }, 1, 1, 1, 1, 1 },        /* the ray ends at the side */
         { { -1, 1, 2 }, { 1, 0, 0 }, 0.999, 0, 0, 0, 0 },
-        /* from inside; t counts lengths of the direction */
+        /* the ray begins inside; t is in lengths of the direction */
         { { 1, 3, 2 }, { 0.5, 0, 0 }, INFINITY, 1, 6, 6, -1 },
-        /* within the side y = 0: its two faces, and the edges of the two ends */
+        /* the ray is in the side y = 0 and hits its two faces, and the faces at the edges of both
+         * ends */
         { { -1, 0, 1 }, { 1, 0, 0 }, INFINITY, 4, 1, 5, 0 },
         { { 5, 5, 5 }, { 1, 1, 1 }, INFINITY, 0, 0, 0, 0 },
-        /* a point: the vertex has 6 faces or fewer */
+        /* the ray is a point at a vertex, which has at most 6 faces */
         { { 0, 0, 0 }, { 0, 0, 1e-300 }, 0, 6, 0, 0, 0 },
     };
     ebpo_mesh mesh = box_mesh(0, 4, 1);
@@ -335,7 +336,7 @@ START_TEST(test_oracle_rays_along_edges_and_vertices)
 }
 END_TEST
 
-/* The point of a hit is at distance 0 when it is a double. */
+/* The distance of a hit point is 0 when the point is representable by doubles. */
 START_TEST(test_oracle_hit_points_are_on_faces)
 {
     uint64_t state = 6;

@@ -1,5 +1,5 @@
-/* Queries to small models of every kind, with a million difficult points, against the oracle.
- * EBPO_TEST_SCALE scales the number of points. */
+/* Queries small models of every kind with a million difficult points, and compares with the
+ * oracle. EBPO_TEST_SCALE scales the number of points. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,7 +7,7 @@
 #include "check_main.h"
 #include "query_support.h"
 
-/* Returns the number of points; few where brute force is slow: with many faces, and with
+/* Returns the number of points. It is small when brute force is slow: with many faces, and with
  * coordinates of two thousand bits. */
 static uint64_t points_for(const char *name, uint64_t faces)
 {

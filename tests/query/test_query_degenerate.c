@@ -1,5 +1,5 @@
-/* Queries with numbers of very different size: faces far larger than a subtree, edges far shorter
- * than a cell. */
+/* Tests queries with lengths of very different size: faces far larger than a subtree, edges far
+ * shorter than a cell. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -21,7 +21,7 @@ static void add(ebpo_mesh *m, ebpo_mesh other)
 enum { TIES = 60, STEPS = 40 };
 static const double radius = 0x1p-14;
 
-/* The unit normal of the large face, and its middle. */
+/* Computes the unit normal of the large face, and its middle. */
 static void large_face(const ebpo_mesh *m, double normal[3], double middle[3])
 {
     const double *a = m->xyz64 + 3 * 1, *b = m->xyz64 + 3 * 2, *c = m->xyz64 + 3 * 3;
@@ -177,7 +177,8 @@ END_TEST
 START_TEST(test_nearest_tiny_face_with_underflow)
 {
     const double m = 0x1p-77 * (1 + _i * 0.025), origin[3] = { 0, 0, 0 };
-    const double xyz[9][3] = { { -1, -1, -1 },    { 1, -1, 1 },       { 1, -1, -1 }, /* the size */
+    /* the size of the model */
+    const double xyz[9][3] = { { -1, -1, -1 },    { 1, -1, 1 },       { 1, -1, -1 },
                                { m, m, m },       { 1.02 * m, m, m }, { m, 1.02 * m, m },
                                { 1.3 * m, 0, 0 }, { 1.32 * m, 0, 0 }, { 1.3 * m, 0.01 * m, 0 } };
     ebpo_mesh mesh = { .vertex_count = 9,

@@ -1,5 +1,6 @@
-/* Points far from a model, in all directions and up to the range of doubles, against brute force in
- * rational arithmetic: the same exact results, however the model is held. */
+/* Queries points far from a model, in all directions and up to the range of doubles, and compares
+ * with brute force in rational arithmetic. Results are the same exact values for all loading
+ * modes. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,8 +8,8 @@
 #include "check_main.h"
 #include "query_support.h"
 
-/* Curved models; flat sides of many faces towards far points; repeated faces; models of the
- * smallest and of the greatest doubles. */
+/* The models: curved models; flat sides with many faces, seen from far points; repeated faces; and
+ * the smallest and greatest doubles as coordinates. */
 static const struct {
     const char *name;
     int variant;
@@ -68,11 +69,11 @@ static void far_point(const query_model *m, uint64_t *state, double p[3])
         memcpy(to, m->normal[face], sizeof to);
         ebpo_test_point(&m->mesh, m->mesh.faces[3 * face], p);
         break;
-    case 3: /* along a diagonal of the space or of a side */
+    case 3: /* along a diagonal of the box or of a side */
         for (int k = 0; k < 3; k++)
             to[k] = (double)(ebpo_test_random(state) % 3) - 1;
         break;
-    case 4: /* coordinates of all sizes */
+    case 4: /* random coordinates of all sizes */
         for (int k = 0; k < 3; k++)
             to[k] = either(state) * magnitude(m, state) / away;
         break;
@@ -137,7 +138,7 @@ START_TEST(test_distant_points_ignore_load_mode)
         ASSERT_OK(ebpo_model_new(a.m.file, &how, &model, error));
         ASSERT_OK(ebpo_context_new(model, &context, error));
         run_query(&a, context, "in parts");
-        run_query(&a, context, "in parts, once more"); /* with the kept data of subtrees */
+        run_query(&a, context, "in parts, once more"); /* uses cached data of subtrees */
         ebpo_context_free(context);
         ebpo_model_free(model);
     }

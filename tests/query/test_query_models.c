@@ -1,4 +1,5 @@
-/* Real models in the folder EBPO_MODELS: difficult points against brute force. */
+/* Queries real models in the folder EBPO_MODELS at difficult points, and compares with brute
+ * force. */
 #include <stdio.h>
 #include <stdlib.h>
 

@@ -1,5 +1,5 @@
-/* Queries in all modes: results are the same for all loading modes, budgets, orders and threads;
- * with limits they are certain. */
+/* Tests queries in all modes. Results are the same for all loading modes, budgets, orders and
+ * threads. With limits they are certain. */
 #include <inttypes.h>
 #include <math.h>
 #include <pthread.h>
@@ -147,7 +147,7 @@ START_TEST(test_results_same_for_any_budget)
     ck_assert(!query_within(&a, 1, &resident));
     for (uint64_t budget = 4096; !resident; budget += budget / 2) {
         bool fitted = query_within(&a, budget, &resident);
-        ck_assert(fitted || !fits); /* more memory is never worse */
+        ck_assert(fitted || !fits); /* a model that fits a budget also fits a greater one */
         fits = fitted;
         ck_assert_uint_lt(budget, UINT64_C(1) << 32);
     }
@@ -188,7 +188,7 @@ START_TEST(test_results_ignore_warm_start_and_sign)
         options.unsigned_distance = form & 2;
         query_exactly(&a, a.m.context, NULL, &options);
     }
-    /* along a path, where the previous result is close */
+    /* points along a path, where the previous result is close to the next one */
     for (uint64_t i = 1; i < a.count; i++)
         for (uint64_t k = 0; k < 3; k++)
             a.points[3 * i + k] =
@@ -323,8 +323,9 @@ START_TEST(test_deadline_limited_results_are_certain)
             ASSERT_OK(ebpo_context_new(model, &context, error));
             query_limited(&a, context, EBPO_ENVELOPES_AUTO, &options);
             for (uint64_t i = 0; i < a.count;
-                 i++) /* even after the shortest time, a bound is known, as some face is in the root
-                         cell; distances beyond the largest double are not known */
+                 /* a bound is known even after the shortest time, because some face is in the root
+                  * cell; distances beyond the largest double are not known */
+                 i++)
                 ck_assert(isfinite(a.distance[i].hi) || isinf(a.truth[i].distance) ||
                           fabs(a.points[3 * i]) + fabs(a.points[3 * i + 1]) +
                                   fabs(a.points[3 * i + 2]) >
@@ -353,7 +354,7 @@ START_TEST(test_thesis_mode_bounds_hold)
                           "mode %d, point (%a, %a, %a): [%a, %a], it is %a", mode, a.points[3 * i],
                           a.points[3 * i + 1], a.points[3 * i + 2], got->lo, got->hi, d);
             if (mode != EBPO_DISTANCE_ENVELOPE &&
-                isfinite(got->distance)) { /* this is the distance of some face */
+                isfinite(got->distance)) { /* the distance must be that of some face */
                 ck_assert_double_ge(fabs(got->distance), d);
                 ck_assert(got->face != EBPO_NO_FACE);
             }
@@ -363,7 +364,7 @@ START_TEST(test_thesis_mode_bounds_hold)
 }
 END_TEST
 
-/* A context keeps envelopes for its next queries; a new one has none. */
+/* A context caches envelopes for its next queries. A new context has none. */
 START_TEST(test_cached_envelopes_match_fresh_ones)
 {
     if (!ebpo_test_wanted(_i + 11))
@@ -390,7 +391,7 @@ START_TEST(test_cached_envelopes_match_fresh_ones)
 }
 END_TEST
 
-/* The data of a leaf or a node depends on the file, not on neighbours in memory. */
+/* The data of a leaf or a node depends only on the file, not on other nodes in memory. */
 START_TEST(test_thesis_modes_ignore_loaded_data)
 {
     if (!ebpo_test_wanted(_i + 10))
@@ -479,7 +480,8 @@ typedef struct thread_job {
     uint64_t different;
 } thread_job;
 
-/* Each thread starts at another point; results must equal those of one thread, bit for bit. */
+/* Each thread begins with a different point. Results must equal those of one thread, bit for bit.
+ */
 static void *query_in_thread(void *user)
 {
     thread_job *job = user;
@@ -529,8 +531,8 @@ static void query_in_threads(fixture *a, const ebpo_model_options *how)
     in_threads(a, how, query_in_thread, &stats);
 }
 
-/* With ThreadSanitizer (meson setup build-tsan -Db_sanitize=thread; CK_RUN_CASE=threads
- * build-tsan/tests/query/test_query_modes) these look for races. */
+/* These tests detect data races with ThreadSanitizer: meson setup build-tsan -Db_sanitize=thread;
+ * CK_RUN_CASE=threads build-tsan/tests/query/test_query_modes */
 START_TEST(test_four_threads_match_single_thread)
 {
     if (!ebpo_test_wanted(_i + 12))
@@ -551,7 +553,7 @@ START_TEST(test_four_threads_match_single_thread)
 }
 END_TEST
 
-/* The smallest budgets for four contexts, where subtrees are loaded and evicted all the time. */
+/* Uses the smallest budgets for four contexts. Subtrees are loaded and evicted all the time. */
 START_TEST(test_four_threads_share_small_budget)
 {
     if (!ebpo_test_wanted(_i + 13))
@@ -581,8 +583,8 @@ START_TEST(test_four_threads_share_small_budget)
 }
 END_TEST
 
-/* The cell faces of a leaf are computed by its first query, its planes by the 128th, during other
- * queries. */
+/* The first query of a leaf computes its cell faces, and the 128th its planes, while other queries
+ * run. */
 enum { REPEATED_POINTS = 12, OFTEN = 200 };
 
 static void *query_often(void *user)
@@ -601,7 +603,7 @@ static void *query_often(void *user)
     return NULL;
 }
 
-/* Points close to faces, on either side: so that they are in leaves. */
+/* Makes points close to faces, on either side, so that they are in leaves. */
 static void begin_in_leaves(fixture *a, int number)
 {
     query_model_make(&a->m, cases[number].name, query_solid_by_name(cases[number].name),

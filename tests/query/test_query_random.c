@@ -1,6 +1,6 @@
-/* Queries to small random solids against brute force: boxes and tetrahedra in contact, nested,
- * overlapping and repeated. A failure prints the seed of the solid; EBPO_TEST_SEED=<seed> tests
- * only that solid, EBPO_TEST_SCALE scales the number of solids. */
+/* Queries small random solids and compares with brute force: boxes and tetrahedra in contact,
+ * nested, overlapping and repeated. A failure prints the seed of the solid. EBPO_TEST_SEED=<seed>
+ * tests only that solid; EBPO_TEST_SCALE scales the number of solids. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -156,8 +156,8 @@ static bool aim(const query_model *m, const double p[3], uint64_t *state, ebpo_r
            (out->direction[0] != 0 || out->direction[1] != 0 || out->direction[2] != 0);
 }
 
-/* A ray from inside a convex solid hits no front, and hits the back if it hits anything; a ray from
- * outside hits the front first, and a back behind it or at the same point. */
+/* Checks the rays of a convex solid. A ray from inside hits no front, and may hit the back. A ray
+ * from outside hits the front first, and a back behind it or at the same point. */
 static bool convex_keeps_its_word(ebpo_context *context, const ebpo_ray *ray, bool from_inside)
 {
     static const ebpo_ray_sides sides[3] = { EBPO_RAY_BOTH, EBPO_RAY_FRONT, EBPO_RAY_BACK };
@@ -170,7 +170,7 @@ static bool convex_keeps_its_word(ebpo_context *context, const ebpo_ray *ray, bo
     if (from_inside)
         return hit[0].face != EBPO_NO_FACE && hit[1].face == EBPO_NO_FACE &&
                same_hit(&hit[2], &hit[0]);
-    /* a ray within a face may hit that face: then t is equal up to rounding */
+    /* a ray within a face may hit this face; then t is equal up to rounding */
     return hit[0].face == EBPO_NO_FACE ||
            (fabs(hit[0].t - hit[1].t) <= 4 * DBL_EPSILON * hit[0].t &&
             hit[2].face != EBPO_NO_FACE && hit[2].t >= hit[1].t);
@@ -198,8 +198,8 @@ START_TEST(test_rays_detect_inside_of_convex_solids)
 }
 END_TEST
 
-/* No ray leaves a solid without a hit; a ray that hits no edge enters as often as it leaves, except
- * for its beginning. */
+/* No ray leaves a solid without a hit. A ray that hits no edge enters as often as it leaves, if
+ * its beginning is taken into account. */
 START_TEST(test_rays_detect_inside_of_solids)
 {
     query_model m;

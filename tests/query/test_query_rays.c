@@ -12,7 +12,7 @@
 static void some_ray(query_model *m, uint64_t *state, query_ray *r)
 {
     query_make_ray(m, state, r->origin, r->direction, &r->t_max);
-    if (ebpo_test_random(state) % 8 == 0) { /* any length */
+    if (ebpo_test_random(state) % 8 == 0) { /* the direction may have any length */
         int shift = (int)(ebpo_test_random(state) % 600) - 300;
         bool any = false;
         for (int k = 0; k < 3; k++) {
@@ -198,7 +198,7 @@ END_TEST
 
 /* --- triangles --- */
 
-enum { CUTS = 4 }; /* modes of holding a model */
+enum { CUTS = 4 }; /* number of loading modes */
 
 typedef struct gathered {
     const query_model *m;
@@ -296,8 +296,8 @@ START_TEST(test_box_query_returns_each_triangle_once)
 }
 END_TEST
 
-/* A tetrahedron above an edge of eight cells, upwards in x and y: its slanting face is so close to
- * the edge that the cell below also lists it, as a new face. */
+/* Adds a tetrahedron above an edge of eight cells, upwards in x and y. Its slanting face is so
+ * close to the edge that the cell below also lists this face, as a new face. */
 static void add_passing(ebpo_mesh *mesh, const double at[3], double a)
 {
     static const uint32_t face[4][3] = { { 0, 2, 1 }, { 0, 1, 3 }, { 0, 3, 2 }, { 1, 2, 3 } };
@@ -367,8 +367,8 @@ static void take_all(const query_model *m, ebpo_context *context)
     }
 }
 
-/* All triangles are more than the budget holds at once. The callback can end the query. The file is
- * large enough for separate subtrees, of which a remote file requests many at a time. */
+/* All triangles together exceed the budget. The callback can end the query. The file is large
+ * enough for separate subtrees, of which a remote file requests many at a time. */
 START_TEST(test_triangles_of_whole_model_keep_budget)
 {
     query_model m;

@@ -1,4 +1,4 @@
-/* Attributes at points on faces, against long doubles and exact conditions. */
+/* Tests attributes at points on faces against long doubles and exact conditions. */
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -101,7 +101,7 @@ static void random_point(uint64_t *state, double point[3])
 static void expect_values(const double values[3], uint64_t face, const double point[3], bool maps)
 {
     ck_assert_double_eq_tol(values[0], linear(point), 1e-13);
-    ck_assert_double_eq(values[1], (double)0.1f); /* all three are the same */
+    ck_assert_double_eq(values[1], (double)0.1f); /* all three values are equal */
     if (maps)
         ck_assert_double_eq(values[2], (double)face);
 }
@@ -219,9 +219,11 @@ START_TEST(test_sample_of_slivers_at_any_scale)
         convert(scratch("h.ply"), scratch("h.ebpo.h5"), 0);
         fixture a = run_query(scratch("h.ebpo.h5"), "q");
         ck_assert_double_eq(at(&a, 0, s / 4, s / 2, 0), 0.25 * 1 + 0.5 * 4 + 0.25 * 2);
-        ck_assert_double_eq(at(&a, 0, s / 2, 0, 0), 1.5);  /* vertex 2 has weight 0 */
-        ck_assert_double_eq(at(&a, 0, -s, s / 2, 0), 2.5); /* beside it: nearest by weights */
-        ck_assert_double_eq(at(&a, 4, s / 4, 0, 0), 1.25); /* without area: along 0 1 */
+        ck_assert_double_eq(at(&a, 0, s / 2, 0, 0), 1.5); /* vertex 2 has weight 0 */
+        /* beside the face: values of the nearest point */
+        ck_assert_double_eq(at(&a, 0, -s, s / 2, 0), 2.5);
+        /* a face without area: values along the edge from 0 to 1 */
+        ck_assert_double_eq(at(&a, 4, s / 4, 0, 0), 1.25);
         ck_assert_double_eq(at(&a, 4, s / 2, s, s), 1.5);
         ck_assert_double_eq(at(&a, 5, s, 0, 0), 2);
         answered(&a);

@@ -1,4 +1,4 @@
-/* The nearest faces in order: against all faces, ordered by exact arithmetic; for any radius,
+/* Tests the nearest faces in order against all faces, ordered by exact arithmetic: for any radius,
  * number, loading mode and budget. */
 #include <ebpo/subset.h>
 #include <math.h>
@@ -100,7 +100,7 @@ static void check(const current_query *q)
     free(truth);
 }
 
-/* The first face is the nearest one, to the last bit of its point. */
+/* Checks that the first face is the nearest one; its point is equal bit by bit. */
 static void compare_first(const current_query *q)
 {
     ebpo_distance_options o = EBPO_DISTANCE_OPTIONS_INIT;
@@ -135,7 +135,7 @@ static void check_point(const query_model *m, ebpo_context *context, const doubl
     const uint64_t most[] = { 0, 1, 7, count, count + (uint64_t)10 };
     current_query q = { m, context, p, INFINITY, 0, UINT64_MAX };
     compare_first(&q);
-    /* one query for large models: far away everything needs slow exact arithmetic */
+    /* only one query for large models, because far away everything needs slow exact arithmetic */
     for (uint64_t i = 0; i < (m->mesh.face_count > 500 ? 1 : 3); i++) {
         uint64_t kind = ebpo_test_random(state) % 4;
         q.radius = kind < 2 ? radii[ebpo_test_random(state) % 5] : INFINITY;
@@ -184,7 +184,7 @@ START_TEST(test_within_stream_ignores_load_mode)
     query_model_make(&m, cases[_i].name, query_solid_by_name(cases[_i].name),
                      &query_variants[cases[_i].variant]);
     for (int loading = 0; loading < 3; loading++)
-        /* modes that keep nothing load much for a list of all faces */
+        /* modes without a cache load much data for a list of all faces */
         for (int cut = 0; cut < (loading ? 2 : 4) && cut < m.info.level_count; cut++) {
             ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
             ebpo_model *model;
@@ -224,7 +224,7 @@ START_TEST(test_within_minimum_budget_is_kept)
 }
 END_TEST
 
-/* Returns the loads of a query with a model that keeps one subtree, or all. */
+/* Returns the number of loads of a query, with a model that keeps one subtree or all subtrees. */
 static uint64_t loads_for(const query_model *m, ebpo_loading loading, double radius, uint64_t most)
 {
     ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
@@ -263,7 +263,7 @@ END_TEST
 
 /* --- subsets --- */
 
-/* Checks that faces are correct in any case, and complete when no omitted part matters. */
+/* Checks that faces are correct, and complete when no omitted part is near. */
 static bool query_part(const current_query *q)
 {
     uint32_t count;

@@ -1,6 +1,6 @@
-/* Relations of two models, against a reference implementation that fills the cells of a grid:
- * solids of boxes and surfaces of rectangles on that grid, at quarter turns and half steps; and
- * against points of solids of all kinds, in rational arithmetic. */
+/* Tests relations of two models. A reference implementation fills the cells of a grid: solids of
+ * boxes and surfaces of rectangles on this grid, at quarter turns and half steps. Solids of all
+ * kinds are tested by points, in rational arithmetic. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -26,8 +26,8 @@ typedef struct grid_model {
     bool solid;
 } grid_model;
 
-/* Returns the index of a vertex. Faces of parts share vertices, as parts would otherwise not be
- * closed. */
+/* Returns the index of a vertex. Faces of a part share vertices, because the part would otherwise
+ * not be closed. */
 static uint32_t vertex(ebpo_mesh *m, const double x[3])
 {
     for (uint64_t i = 0; i < m->vertex_count; i++) {
@@ -39,7 +39,7 @@ static uint32_t vertex(ebpo_mesh *m, const double x[3])
     return ebpo_test_append_vertex(m, x[0], x[1], x[2]);
 }
 
-/* Adds a rectangle: two faces at one of its diagonals, or four faces around its middle. */
+/* Adds a rectangle: two faces on either side of a diagonal, or four faces around its middle. */
 static void add_rectangle(ebpo_mesh *m, const double corner[4][3], bool reversed, unsigned how)
 {
     uint32_t v[5], n = 4;
@@ -92,7 +92,8 @@ static ebpo_mesh mesh_of(const grid_model *g, uint64_t seed)
 
 /* --- poses that keep the grid --- */
 
-/* World coordinates in half steps: x of the model's axis[k] times twice the scale, rotated. */
+/* World coordinates in half steps: coordinate axis[k] of the model times twice the scale, rotated.
+ */
 typedef struct grid_pose {
     int axis[3], sign[3], twice_scale, shift[3];
 } grid_pose;
@@ -114,7 +115,8 @@ static grid_pose still(void) { return (grid_pose){ { 0, 1, 2 }, { 1, 1, 1 }, 2, 
 static grid_pose random_pose(uint64_t *state, bool scaled)
 {
     grid_pose g = still();
-    for (uint64_t turns = ebpo_test_random(state) % 3; turns > 0; turns--) { /* a quarter each */
+    /* each by a quarter turn */
+    for (uint64_t turns = ebpo_test_random(state) % 3; turns > 0; turns--) {
         int k = (int)(ebpo_test_random(state) % 3), l = (k + 1) % 3;
         int axis = g.axis[k], sign = g.sign[k];
         g.axis[k] = g.axis[l];
@@ -144,7 +146,7 @@ static part posed_part(const part *p, const grid_pose *g)
 /* --- the reference implementation: cells of the world --- */
 
 typedef struct cells {
-    int8_t *winding; /* [z][y][x], of solids */
+    int8_t *winding; /* [z][y][x], winding numbers of solids */
     part part[BOXES];
     int parts;
     bool solid;

@@ -1,5 +1,5 @@
-/* Reports of a scene against separate queries of two models: every pair of instances, near or not.
- */
+/* Compares reports of a scene with separate queries of two models, for every pair of instances,
+ * near or not. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -26,7 +26,7 @@ static void write_model(const char *name, ebpo_mesh mesh)
     model_write(&tree, scratch(name), NULL);
 }
 
-/* Two faces of a surface. */
+/* Makes a surface of two faces. */
 static ebpo_mesh sheet(void)
 {
     ebpo_mesh mesh = { 0 };
@@ -155,7 +155,7 @@ static int32_t kind_of(const alone *p, const seen *s, int32_t relation, double d
 
 /* --- results --- */
 
-/* Returns the distance to the faces of a model, by trying all. */
+/* Returns the distance to the faces of a model by a search of all faces. */
 static double distance_to(const alone *p, int m, const double at[3])
 {
     static const double reach[3] = { 2, 2, 2 };
@@ -279,8 +279,8 @@ START_TEST(test_scene_reports_match_pair_queries)
 }
 END_TEST
 
-/* Without counting, kinds and positions are equally correct, and nothing is returned that was not
- * requested. */
+/* Kinds and positions are also correct without counting, and values that were not requested are
+ * not returned. */
 START_TEST(test_scene_reports_only_requested_values)
 {
     uint64_t rounds = query_scaled(20) + 4;

@@ -1,4 +1,4 @@
-/* Animated scenes against queries at many times; packed scenes against their originals. */
+/* Compares animated scenes with queries at many times, and packed scenes with their originals. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -48,7 +48,8 @@ static void put_pose(FILE *f, uint64_t *state, double far)
     fprintf(f, ", \"scale\": %.9g}", 0.75 + some(state, 0.25));
 }
 
-/* Two routes, one with possible jumps; fixed plates, and instances that move between them. */
+/* Makes a scene with two routes, one of which may have jumps; fixed plates; and instances that
+ * move between the plates. */
 static ebpo_scene *some_scene(uint64_t seed)
 {
     uint64_t state = 977 * seed + 5;
@@ -160,8 +161,8 @@ START_TEST(test_packed_scene_gives_same_results)
 }
 END_TEST
 
-/* A scene is packed for one time only: another time gives the same result as the original scene, or
- * an error. */
+/* A scene is packed for one time only. Another time gives the same result as the original scene,
+ * or an error. */
 START_TEST(test_packed_scene_refuses_omitted_time)
 {
     uint64_t refused = 0, rounds = query_scaled(60) + 3;

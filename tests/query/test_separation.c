@@ -1,6 +1,6 @@
-/* Separation distance along a direction: pairs of faces and whole models against a reference
- * implementation in integers (tests/support/sweep_reference.h), and against contacts of the moved
- * models. */
+/* Tests the separation distance along a direction. Pairs of faces and whole models are compared
+ * with a reference implementation in integers (tests/support/sweep_reference.h), and with contacts
+ * of the moved models. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,8 +16,8 @@
 
 /* --- two faces --- */
 
-/* Small integers: many faces are parallel to the direction, in one plane, or meet at an edge or a
- * corner. */
+/* Uses small integers, so that many faces are parallel to the direction, are in one plane, or have
+ * a common edge or corner. */
 static void on_grid(double *x, int n, uint64_t *state, unsigned size)
 {
     for (int i = 0; i < n; i++)
@@ -68,7 +68,7 @@ static two_faces make_faces(uint64_t i, uint64_t *state)
     } while (f.d[0] == 0 && f.d[1] == 0 && f.d[2] == 0);
     if (i % 5 == 0)
         flatten(&f, i / 5);
-    if (i % 7 == 0) /* all coordinates of one kind, very small or large */
+    if (i % 7 == 0) /* sometimes all coordinates are very small or very large */
         for (int k = 0; k < 9; k++) {
             f.a[k / 3][k % 3] = ldexp(f.a[k / 3][k % 3], (int)(i % 5) * 200 - 400);
             f.b[k / 3][k % 3] = ldexp(f.b[k / 3][k % 3], (int)(i % 5) * 200 - 400);
@@ -165,7 +165,8 @@ static void check_time(mpq_t exact, double t, const char *what)
     mpq_clears(low, high, NULL);
 }
 
-/* Tests all pairs: *t is the last contact at 0 or later; returns false when there is none. */
+/* Tests all pairs. *t is the time of the last contact at 0 or later; returns false when there is
+ * none. */
 static bool brute_force(const reference_faces *a, const reference_faces *b, const double d[3],
                         mpq_t t)
 {
@@ -193,7 +194,7 @@ static bool parts_at(const reference_faces *a, uint64_t i, const reference_faces
     mpq_t own;
     mpq_init(own);
     mpq_set_d(own, 0x1p-20);
-    mpq_sub(own, t, own); /* so that most pairs are excluded at once */
+    mpq_sub(own, t, own); /* excludes most pairs early */
     bool parts = sweep_reference((const double(*)[3])a->corner[i], (const double(*)[3])b->corner[j],
                                  d, true, own) &&
                  mpq_cmp(own, t) == 0;
@@ -201,8 +202,8 @@ static bool parts_at(const reference_faces *a, uint64_t i, const reference_faces
     return parts;
 }
 
-/* Checks the reported pair. Among pairs that separate at the same time, it is the first by the
- * faces of a or of b, as the order of the models depends on digests. */
+/* Checks the reported pair. Among pairs that separate at the same time, it is the first pair by
+ * the faces of a or by the faces of b. The order of the models depends on digests. */
 static void check_pair(const reference_faces *a, const reference_faces *b, const double d[3],
                        mpq_t t, const ebpo_face_pair *pair, const char *what)
 {
@@ -290,8 +291,8 @@ static int32_t meets(ebpo_collider *c, const ebpo_pose *a, const ebpo_pose *b)
     return found;
 }
 
-/* On a grid little is rounded. Models moved by t are in contact; models moved farther are never in
- * contact again. */
+/* On a grid, little is rounded. Models moved by t are in contact. Models moved farther are never
+ * in contact again. */
 START_TEST(test_separation_of_grid_solids)
 {
     query_model m[2];
@@ -310,7 +311,7 @@ START_TEST(test_separation_of_grid_solids)
         for (int k = 0; k < 3; k++)
             b.translation[k] = (double)(ebpo_test_random(&state) % 3) / 2;
         ebpo_separation w = run_query(c, &a, &b, d, 0);
-        /* models with slanted faces may separate at a t that is no double */
+        /* models with slanted faces may separate at a t that doubles do not represent */
         for (int step = w.t.lo * 64 == floor(w.t.lo * 64) ? 0 : 1; step < 12; step++) {
             ebpo_pose moved = a;
             double t = w.t.lo + step / 4.0;
@@ -326,7 +327,8 @@ START_TEST(test_separation_of_grid_solids)
 }
 END_TEST
 
-/* Boxes: the distance is the overlap along the axis; a solid within another is moved out of it. */
+/* For boxes the distance is the overlap along the axis. A solid within another one is moved out of
+ * it. */
 START_TEST(test_separation_of_boxes_is_axis_overlap)
 {
     query_model m;
@@ -341,11 +343,11 @@ START_TEST(test_separation_of_boxes_is_axis_overlap)
     b.translation[1] = size / 8;
     ck_assert_double_eq(run_query(c, &a, &b, x, 0).t.lo, size * 5 / 4);
     ck_assert_double_eq(run_query(c, &a, &b, up, 0).t.lo, size * 2);
-    b.translation[1] = 2 * size; /* beside it: never */
+    b.translation[1] = 2 * size; /* beside the box: never in contact */
     ck_assert(run_query(c, &a, &b, x, 0).pair.face_a == EBPO_NO_FACE);
     ck_assert_double_eq(run_query(c, &a, &b, x, 0).t.hi, 0);
     b.translation[1] = 0;
-    b.translation[0] = -4 * size; /* behind it: already separated */
+    b.translation[0] = -4 * size; /* behind the box: already separated */
     ck_assert(run_query(c, &a, &b, x, 0).pair.face_a == EBPO_NO_FACE);
     ebpo_collider_free(c);
     query_model_free(&m);

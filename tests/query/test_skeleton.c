@@ -1,5 +1,5 @@
-/* Skeletons, which are kept for subtrees that are not in memory: their bounds hold exactly for
- * every face, they take the given memory, and they save loading without changing a result. */
+/* Tests skeletons, which are kept for subtrees that are not in memory. Their bounds hold exactly
+ * for every face, they take the stated memory, and they save loading without changing a result. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -57,7 +57,7 @@ static uint64_t count_nearer(const ebpo_accel *s, const slots *all, const double
     return nearer;
 }
 
-/* Checks bounds with a limit: distances beyond the limit may be infinite. */
+/* Checks bounds with a limit. Distances beyond the limit may be reported as infinite. */
 static void check_limit(const ebpo_skeleton *k, const double p[3], ebpo_skeleton_bounds all)
 {
     double limit[] = { all.own * (1 - 0x1p-30), all.own, all.outer, all.own / 2 + all.outer / 2 };
@@ -79,7 +79,7 @@ static bool take(void *user, uint64_t bytes)
     return true;
 }
 
-/* Checks bounds for several amounts of memory: more nodes improve the bounds. */
+/* Checks bounds for several amounts of memory. More nodes improve the bounds. */
 static void check_bounds(const ebpo_accel *s, const double *points, uint64_t count)
 {
     uint64_t space = 3 * (ebpo_skeleton_bytes(8) - ebpo_skeleton_bytes(0));
@@ -216,8 +216,8 @@ static uint64_t subtrees_searched(fixture *s)
     return after.distance_subtrees - before.distance_subtrees;
 }
 
-/* Skeletons of no subtree, of some, of nearly all, or of those that fit a small budget; with or
- * without the levels below the cut. */
+/* Uses skeletons of no subtree, of some, of nearly all, or of as many as fit a small budget; with
+ * or without the levels below the cut. */
 START_TEST(test_results_do_not_depend_on_skeletons)
 {
     fixture s;
@@ -262,7 +262,7 @@ START_TEST(test_skeleton_avoids_subtree_searches)
     s.model->skeletons = NULL;
     uint64_t without = subtrees_searched(&s);
     s.model->skeletons = all;
-    ck_assert_uint_ge(with, s.count); /* one each */
+    ck_assert_uint_ge(with, s.count); /* at least one for each point */
     ck_assert_msg(with * 3 < without * 2, "%d, %d without", (int)with, (int)without);
     end(&s);
 }
@@ -298,8 +298,8 @@ START_TEST(test_levels_below_cut_bound_unvisited)
 }
 END_TEST
 
-/* Levels below the cut are read when queries visit many new subtrees, and not when they visit few.
- */
+/* Levels below the cut are read when queries visit many new subtrees, and not when queries visit
+ * few. */
 START_TEST(test_levels_below_cut_load_on_demand)
 {
     fixture s;

@@ -1,6 +1,7 @@
-/* Queries need little stack: threads of a program that links the library may have 64 KiB each. Each
- * kind of query runs on a stack whose unused part is counted afterwards, with the model in memory
- * and in parts that are loaded meanwhile. Not run with sanitizers, which need more stack. */
+/* Checks that queries need little stack, because threads of a program that links the library may
+ * have stacks of 64 KiB. Each kind of query runs on a stack whose unused part is counted
+ * afterwards, with the model in memory and in parts that are loaded meanwhile. Sanitizers need
+ * more stack, so the test does not run with them. */
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,7 +15,7 @@
 #include "scratch.h"
 #include "solids.h"
 
-/* Limit stated in ebpo/base.h, without the part used by the C library. */
+/* The limit of ebpo/base.h, reduced by the stack of the C library. */
 enum {
     STACK = 1 << 20,
     PROMISED = 64 << 10,
@@ -89,7 +90,8 @@ static size_t stack_of(void *(*body)(void *), void *user)
     return STACK - unused;
 }
 
-/* Haptic devices have their own thread; views are queried rarely. */
+/* Returns false for haptic devices, which have a separate thread, and for views, which are queried
+ * rarely. */
 static bool is_query(int kind)
 {
     static const char *const others[] = { "stream", "view", "subtree", "level", "touch" };
@@ -138,7 +140,7 @@ START_TEST(test_query_stack_size)
 }
 END_TEST
 
-/* Checks, builds, writes, reads and verifies on the calling thread. */
+/* Checks a mesh, and builds, writes, reads and verifies a file, on the calling thread. */
 static void *build(void *user)
 {
     ebpo_error error = EBPO_ERROR_INIT;

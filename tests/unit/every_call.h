@@ -6,12 +6,12 @@
 #include <ebpo/ebpo.h>
 
 typedef struct every_call_env {
-    ebpo_workspace *workspace; /* NULL: memory of malloc */
-    ebpo_file *file;           /* open before and after the call: a failed call leaves it usable */
+    ebpo_workspace *workspace; /* NULL: arrays are allocated by malloc */
+    ebpo_file *file;           /* an open file, which a failed call leaves usable */
     ebpo_error *error;
 } every_call_env;
 
-/* A call leaves nothing behind, whether it succeeds or fails. */
+/* A named call. It leaves nothing behind, whether it succeeds or fails. */
 typedef struct every_call {
     const char *name;
     ebpo_status (*call)(every_call_env *e);
@@ -47,7 +47,7 @@ ebpo_status every_call_two_models(ebpo_model *model, bool whole, ebpo_error *err
 /* Returns a URL of the model; NULL: no server. */
 const char *every_call_url(void);
 
-/* Lets all allocations succeed until every_call_resume. Used for allocations of the tests
+/* Makes all allocations succeed until every_call_resume(). Used for allocations of the tests
  * themselves. */
 void every_call_pause(void);
 void every_call_resume(void);

@@ -1,4 +1,4 @@
-/* Calls that query a model, or return its levels. */
+/* Calls that query a model or return its levels. */
 #include <math.h>
 #include <stdlib.h>
 #include <unistd.h>

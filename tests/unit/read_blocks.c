@@ -1,5 +1,5 @@
-/* lib/query/face_block.h compiled for any processor, or for processors with AVX2: READ_BLOCK names
- * the function. */
+/* Compiles lib/query/face_block.h for any processor, or for processors with AVX2. READ_BLOCK is
+ * the name of the function. */
 #include "query/face_block.h"
 #include "read_blocks.h"
 

@@ -1,4 +1,5 @@
-/* Reads a block as kernels do: [axis][corner][lane]; returns a bit for each lane with a face. */
+/* Reads a block as kernels do, into [axis][corner][lane]. Returns a bit for each lane with a face.
+ */
 #ifndef EBPO_TESTS_READ_BLOCKS_H
 #define EBPO_TESTS_READ_BLOCKS_H
 

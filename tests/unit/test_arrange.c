@@ -60,11 +60,11 @@ static uint64_t key_of_kind(int kind, uint64_t i, uint64_t *state)
 {
     uint64_t r = ebpo_test_random(state);
     switch (kind) {
-    case 0: return r & ((UINT64_C(1) << 63) - 1); /* uniform */
+    case 0: return r & ((UINT64_C(1) << 63) - 1); /* uniformly distributed */
     case 1: return 12345;                         /* all equal */
-    case 2: return r % 7 << 50;                   /* few, far from each other */
+    case 2: return r % 7 << 50;                   /* few different values, far from each other */
     case 3: return (UINT64_C(1) << 60) + r % 100; /* all in one bin */
-    default: return i;                            /* in order, all in the first bin */
+    default: return i;                            /* ascending, all in the first bin */
     }
 }
 

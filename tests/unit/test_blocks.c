@@ -1,5 +1,5 @@
-/* Blocks contain the faces of their mesh, bit for bit, read one by one and by kernels on any
- * processor. An accel takes no more memory than stated before. */
+/* Blocks contain the faces of their mesh, bit by bit, read one by one and by the kernels for each
+ * processor. An accel takes no more memory than estimated. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,10 +16,10 @@
 
 typedef struct reading {
     const ebpo_accel *s;
-    const ebpo_mesh *mesh; /* in file order, or local */
+    const ebpo_mesh *mesh; /* in file order, or with local indices */
     bool in_file_order;
-    uint8_t *seen;    /* [local face] */
-    unsigned largest; /* vertices of any block */
+    uint8_t *seen;    /* flag by local face */
+    unsigned largest; /* number of vertices of the largest block */
 } reading;
 
 static double coordinate(const ebpo_mesh *mesh, uint64_t face, int corner, int axis)
@@ -159,7 +159,7 @@ static ebpo_slice one_leaf(const ebpo_mesh *mesh)
     return slice;
 }
 
-/* From few vertices for many faces to as many as there are corners. */
+/* Pool sizes from few vertices for many faces to one vertex for each corner. */
 static const uint32_t pools[] = { 4, 6, 8, 9, 12, 17, 24, 1000 };
 enum { POOLS = sizeof pools / sizeof pools[0] };
 
@@ -225,8 +225,8 @@ static void check_slabs(const ebpo_accel *s)
     }
 }
 
-/* For files of other programs: the leaf is 1 wide, its faces are up to 10^25 away, and single
- * precision holds squares up to 10^38. */
+/* Covers files of other programs: the leaf is 1 wide, its faces are up to 10^25 away, and squares
+ * in single precision may be at most 10^38. */
 START_TEST(test_cylinders_contain_faces_with_overflow)
 {
     static const double far[] = { 1, 1e15, 1e25 };

@@ -1,5 +1,5 @@
-/* The builder: trees keep the guarantees for readers, on solids of every kind. test_verify checks
- * envelopes and labels. */
+/* Tests the builder: trees keep the guarantees for readers, for solids of every kind. test_verify
+ * checks envelopes and labels. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -172,8 +172,8 @@ END_TEST
 
 START_TEST(test_maximum_level_follows_equation_3)
 {
-    /* A cube of side 1 cut into n x n squares: edges 1/n and the diagonals; L / 2^i falls below
-     * their mean. */
+    /* The sides of a cube of side 1 are cut into n x n squares with edges of 1/n and diagonals. At
+     * some level L / 2^i is less than their mean. */
     double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 };
     for (uint32_t n = 1; n <= 32; n *= 2) {
         ebpo_mesh mesh = ebpo_test_box(low, high, n);

@@ -1,5 +1,5 @@
-/* The cache against a reference implementation, and with threads: the source counts loading and
- * existing items, and the budget holds at all times. */
+/* Tests the cache against a reference implementation, and with threads. The source counts loads
+ * and existing items. The budget holds at all times. */
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
@@ -13,15 +13,16 @@
 
 enum { KEYS = 256 };
 
-/* An instrumented source: item `key` takes size[key], its loading peak[key]. */
+/* An instrumented source. Item `key` takes size[key] bytes, and its loading peak[key] bytes. */
 typedef struct source {
     pthread_mutex_t lock;
     pthread_cond_t moved;
     uint64_t budget, bytes, size[KEYS], peak[KEYS];
     int live[KEYS], loading[KEYS], loads[KEYS];
-    bool failing[KEYS], gated[KEYS]; /* a gated load waits until the gate opens */
-    int order[4 * KEYS], ordered;    /* loads in order of their start */
-    int faults;                      /* number of violations */
+    /* flags by key: loading fails; loading waits until the gate opens */
+    bool failing[KEYS], gated[KEYS];
+    int order[4 * KEYS], ordered; /* loads in order of their start */
+    int faults;                   /* number of violations */
     bool jitter;
 } source;
 
@@ -235,7 +236,7 @@ static void reference_unpin(reference *t, int key)
     if (--t->pins[key])
         return;
     t->pinned -= src->size[key];
-    reference_remove(t, reference_at(t, key)); /* the end of use is the last use */
+    reference_remove(t, reference_at(t, key)); /* an item counts as used when its use ends */
     reference_append(t, key);
 }
 
@@ -640,14 +641,14 @@ START_TEST(test_get_waits_for_memory_of_load)
     pthread_join(a.thread, NULL);
     pthread_join(b.thread, NULL);
     ck_assert_int_eq(a.status, EBPO_OK);
-    /* refused if the request came while item 1 was in use */
+    /* the load is refused when item 1 was in use at the time of the request */
     ck_assert(b.status == EBPO_OK || b.status == EBPO_E_LIMIT);
     finish();
 }
 END_TEST
 
-/* Runs small loads one after the other; on several threads they never leave space for a large load
- * by chance. */
+/* Runs small loads one after the other. On several threads together they never leave enough memory
+ * for a large load. */
 static void *run_small(void *context)
 {
     atomic_bool *stop = context;
@@ -666,8 +667,8 @@ START_TEST(test_large_load_is_not_starved)
     atomic_bool stop = false;
     begin_with(400, 100, 100);
     src->jitter = true;
-    /* a small item in use leaves no space: the large load is refused; beside small loads it waits
-     */
+    /* A small item in use leaves no space, so that the large load is refused. While only small
+     * loads run, the large load waits. */
     src->size[200] = src->peak[200] = 290;
     for (int i = 0; i < 3; i++)
         pthread_create(&small[i], NULL, run_small, &stop);
@@ -675,7 +676,7 @@ START_TEST(test_large_load_is_not_starved)
     for (int i = 0; i < 20000 && done < 20; i++) {
         void *it;
         if (ebpo_cache_get(cache, 200, &it, NULL, NULL) != EBPO_OK) {
-            usleep(100); /* a thread that lost its turn while it uses an item gets a new one */
+            usleep(100); /* a thread that lost its turn while it used an item gets a new turn */
             continue;
         }
         ebpo_cache_unpin(cache, 200);
@@ -752,7 +753,7 @@ START_TEST(test_get_waits_for_prefetch)
     ebpo_cache_prefetch(cache, &key, 1);
     await_loading(1);
     start(&g, 1);
-    usleep(200000); /* on a busy machine it takes some time until the other thread waits */
+    usleep(200000); /* on a busy machine, it takes some time until the other thread waits */
     set_gate(1, false);
     pthread_join(g.thread, NULL);
     ck_assert_int_eq(g.status, EBPO_OK);

@@ -174,7 +174,7 @@ START_TEST(test_box_valid_refuses_hostile_boxes)
 }
 END_TEST
 
-/* For any bits in a file: a valid box has exact cell faces. */
+/* A valid box has exact cell faces, for any bits in a file. */
 START_TEST(test_box_valid_requires_exact_cell_faces)
 {
     uint64_t state = 6;

@@ -1,5 +1,5 @@
-/* Files that other programs change while they are read: the result is an error that reports the
- * change, or the data of one version. */
+/* Tests files that other programs change while they are read. The result is an error that reports
+ * the change, or the data of one version. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

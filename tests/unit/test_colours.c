@@ -1,4 +1,5 @@
-/* Colours in the attributes of a mesh: of every type, by their names, of vertices and of faces. */
+/* Tests colours in the attributes of a mesh: of every type, by their names, of vertices and of
+ * faces. */
 #include <stdio.h>
 #include <string.h>
 
@@ -52,7 +53,7 @@ START_TEST(test_colours_convert_to_bytes)
         { RGB("int", "") "|-5 9 300", { 0, 9, 255, 255 } },
         { RGB("uchar", "diffuse_") "|1 2 3", { 1, 2, 3, 255 } },
         { RGB("uchar", "diffuse_") RGB("uchar", "") "|1 2 3 4 5 6", { 4, 5, 6, 255 } },
-        /* neither neighbours nor of one type */
+        /* the columns are neither adjacent nor of one type */
         { "property float blue\nproperty float quality\nproperty uchar red\n"
           "property ushort green\n|1 0.25 3 65535",
           { 3, 255, 255, 255 } },

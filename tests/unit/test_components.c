@@ -38,9 +38,9 @@ static ebpo_mesh nested(uint64_t *state)
         add_box(&m, x, 0.5 + (double)(ebpo_test_random(state) % 12),
                 ebpo_test_random(state) % 2 == 0);
     }
-    add_box(&m, 100, 4, true);  /* in no other box */
-    add_box(&m, 80, 40, false); /* in contact with the first one along a side */
-    add_box(&m, 44, 3, true);   /* the face between the two passes through its middle */
+    add_box(&m, 100, 4, true);  /* a box in no other box */
+    add_box(&m, 80, 40, false); /* shares a side with the first box */
+    add_box(&m, 44, 3, true);   /* the common face of the two boxes passes through its middle */
     return m;
 }
 
@@ -141,7 +141,8 @@ static int winding(const ebpo_mesh *m, const reference *t, uint32_t c, const dou
         double p[3][3];
         for (uint64_t k = 0; k < 3; k++)
             ebpo_mesh_position(m, m->faces[3 * f + k], p[k]);
-        if (t->of[f] == c) /* another method than in the library; the same shift of the point */
+        /* uses another method than the library, with the same shift of the point */
+        if (t->of[f] == c)
             sum += ebpo_axis_crossing(at, 1e6, 2, p[0], p[1], p[2]);
     }
     return sum;
@@ -322,7 +323,7 @@ START_TEST(test_component_file_keeps_source_indices)
 }
 END_TEST
 
-/* Source indices belong to the whole mesh: faces added by repairs would have none. */
+/* Source indices refer to the whole mesh. Faces added by repairs would have no source index. */
 START_TEST(test_component_repair_is_refused)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -333,7 +334,7 @@ START_TEST(test_component_repair_is_refused)
     ck_assert(ebpo_components_new(&m, 1, silent, &c, &error) == EBPO_OK);
     ck_assert_uint_eq(ebpo_components_count(c), 1 + other.face_count);
     ck_assert(ebpo_components_mesh(c, 0, &part, &error) == EBPO_OK);
-    ck_assert(ebpo_mesh_weld(&part, NULL, &error) == EBPO_OK); /* nothing to do */
+    ck_assert(ebpo_mesh_weld(&part, NULL, &error) == EBPO_OK); /* nothing to weld */
     ck_assert(ebpo_mesh_fill_holes(&part, NULL, &error) == EBPO_E_ARGUMENT);
     ebpo_mesh_free(&part);
     ebpo_components_free(c);

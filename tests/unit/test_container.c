@@ -1,5 +1,5 @@
-/* The container: trees are read back bit for bit, equal trees give equal files, and damage is
- * detected. */
+/* Tests the container: trees are read as they were written, bit by bit; equal trees give equal
+ * files; and damage is detected. */
 #include <fcntl.h>
 #include <hdf5.h>
 #include <sys/stat.h>
@@ -342,7 +342,7 @@ START_TEST(test_source_order_inverts_maps)
     ebpo_mesh mesh;
     bool ordered;
     random_tree_make(&tree, &shapes[_i]);
-    /* as after welding: every second index is missing */
+    /* every second index is missing, as after welding */
     tree.info.source_vertex_count = tree.mesh.vertex_count * 2;
     for (uint64_t i = 0; i < tree.mesh.vertex_count; i++)
         tree.vertex_source[i] *= 2;
@@ -413,7 +413,7 @@ START_TEST(test_truncated_files_are_refused)
 }
 END_TEST
 
-/* zstd frames have a few unused bits; reads_well has compared the content, so an accepted flip
+/* zstd frames have a few unused bits. reads_well() compares the content, so an accepted flip
  * changed nothing. */
 START_TEST(test_bit_flips_after_header_are_detected)
 {
@@ -543,7 +543,7 @@ START_TEST(test_index_contradicting_arrays_is_refused)
 }
 END_TEST
 
-/* Stops after something was written. */
+/* Stops after some data was written. */
 static bool stop_soon(void *user, const char *stage, uint64_t done, uint64_t total)
 {
     (void)user;
@@ -693,8 +693,8 @@ START_TEST(test_unused_frame_bits_are_refused)
 }
 END_TEST
 
-/* 4,096 numbers of ten random bits are 5,120 bytes; with one code table for all planes they would
- * be some 5,700 at the default. */
+/* 4,096 numbers of ten random bits are 5,120 bytes. With one code table for all planes they would
+ * take about 5,700 bytes at the default level. */
 START_TEST(test_byte_planes_are_compressed_separately)
 {
     static ebpo_chunk_coder coder;
@@ -724,7 +724,8 @@ END_TEST
 /* For empty data nothing is allocated or sorted, which sanitizers check. */
 START_TEST(test_checksum_of_empty_content)
 {
-    static const uint8_t of_nothing[4] = { 0xe3, 0xb0, 0xc4, 0x42 }; /* SHA-256 begins with it */
+    /* the SHA-256 begins with these bytes */
+    static const uint8_t of_nothing[4] = { 0xe3, 0xb0, 0xc4, 0x42 };
     ebpo_content content = { 0 };
     ebpo_hints expected = EBPO_HINTS_INIT(NULL);
     uint8_t digest[32];

@@ -1,5 +1,5 @@
-/* Crossings of faces by axis-parallel segments: against a reference implementation that shifts the
- * segment, and on closed meshes. */
+/* Tests crossings of faces by axis-parallel segments against a reference implementation that
+ * shifts the segment, and on closed meshes. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -336,7 +336,7 @@ START_TEST(test_winding_of_tetrahedra_ignores_path)
 }
 END_TEST
 
-/* For a point well inside, the sum of solid angles is one turn; this determines the sign. */
+/* For a point far inside, the sum of solid angles is a full sphere. This determines the sign. */
 START_TEST(test_winding_inside_tetrahedron_is_one)
 {
     static soup mesh;

@@ -1,4 +1,4 @@
-/* Cursors visit the same nodes in every representation, the nodes that a plain traversal of the
+/* Cursors visit the same nodes in every representation: the nodes that a simple traversal of the
  * levels lists. */
 #include <math.h>
 #include <stdio.h>
@@ -124,7 +124,7 @@ typedef struct whole {
     reference reference;
 } whole;
 
-/* `shape` false: the faces form no surface, so that subtrees cannot be made. */
+/* `shape`: false when the faces form no surface, so that subtrees cannot be made. */
 static void whole_open(whole *w, const char *name, int cut_level, bool shape)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -354,7 +354,7 @@ static void compare_envelopes(whole *w, holder which, uint64_t seed, uint64_t ju
         if (n->type == EBPO_BLACK) {
             ck_assert_double_eq(ebpo_polytope_volume(a), 1);
         } else if (w->model &&
-                   n->type != EBPO_WHITE) { /* the envelope of a shape, which never becomes empty */
+                   n->type != EBPO_WHITE) { /* only for shapes, whose envelopes are never empty */
             ebpo_half_spaces_cut(&expected, 0, &cut);
             ck_assert_double_eq_tol(ebpo_polytope_volume(a), ebpo_polytope_volume(&cut), 1e-6);
         }

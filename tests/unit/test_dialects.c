@@ -1,5 +1,6 @@
-/* Small files as other programs write them: the tables state which files are read, with which
- * warning, and which are refused, with which message. docs/guide/formats.md describes the same. */
+/* Tests small files as other programs write them. The tables state which files are read, with
+ * which warning, and which files are refused, with which message. docs/guide/formats.md describes
+ * the same rules. */
 #include <stdio.h>
 #include <string.h>
 
@@ -12,7 +13,7 @@ typedef struct dialect {
     const char *name, *text;
     size_t bytes;
     uint64_t vertices, faces; /* 0: the file is refused */
-    const char *words;        /* text of the error, or of the warning; NULL: there is no warning */
+    const char *words;        /* text of the error or the warning; NULL: no warning */
 } dialect;
 
 #define FILE_OF(text) text, sizeof(text) - 1
@@ -38,7 +39,7 @@ typedef struct dialect {
     FACET("0 0 0", "1 0 0", "0 0 1") \
     FACET("0 0 0", "0 0 1", "0 1 0") FACET("1 0 0", "0 1 0", "0 0 1")
 
-/* Binary STL: four facets of a tetrahedron, and the data behind each. */
+/* Binary STL: four facets of a tetrahedron, each followed by two bytes. */
 #define HEAD69         "a head of 80 bytes, which are of any kind                            "
 #define HEAD75         HEAD69 "      "
 #define HEAD80         HEAD75 "     "
@@ -374,7 +375,7 @@ START_TEST(test_ply_dialects_are_read_or_refused)
 }
 END_TEST
 
-/* Files with each byte changed, and cut at each length, give an error or a complete mesh. */
+/* Files with one changed byte, and truncated files, give an error or a complete mesh. */
 START_TEST(test_damaged_ply_dialects)
 {
     const dialect *d = &dialects[_i];

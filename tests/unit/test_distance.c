@@ -1,6 +1,6 @@
-/* The distance of point and triangle against its definition in rational arithmetic (mpq): the
- * minimum of the distance from the plane, if the point projects inside, and of the distances from
- * the three edges. */
+/* Tests the distance of a point and a triangle against its definition in rational arithmetic
+ * (mpq): the minimum of the distance from the plane, if the projection of the point is inside, and
+ * of the distances from the three edges. */
 #include <float.h>
 #include <gmp.h>
 #include <math.h>
@@ -310,8 +310,8 @@ START_TEST(test_unit_normals_of_slivers)
 END_TEST
 
 #if defined(__x86_64__)
-/* Precondition ensured by callers: no product of four differences of coordinates exceeds doubles.
- */
+/* Returns true when no product of four differences of coordinates exceeds the range of doubles.
+ * Callers ensure this precondition. */
 static bool in_range(const double *x, int n)
 {
     for (int i = 0; i < n; i++)

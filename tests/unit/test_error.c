@@ -1,4 +1,4 @@
-/* Members of an error besides its message. */
+/* Tests the members of an error besides its message. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -47,7 +47,7 @@ START_TEST(test_error_of_ply_has_byte_offset)
 }
 END_TEST
 
-/* Flips bits of the arrays, as libhdf5 checks the header. */
+/* Flips bits of the arrays only, because libhdf5 checks the header. */
 START_TEST(test_error_of_damaged_array)
 {
     static const query_variant standard = { "default", 4, 4, EBPO_RULE_NONZERO, 0 };

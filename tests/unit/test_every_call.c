@@ -1,7 +1,9 @@
-/* Every public function, with and without a small workspace, and with each allocation and each file
- * system call failing once: a call returns a status, holds nothing afterwards, leaves no file
- * behind and succeeds when it is repeated. For AddressSanitizer and LeakSanitizer, which see each
- * call separately: Check forks. test_every_call [FAULTY_SERVER], with faults.so preloaded */
+/* Calls every public function, with and without a small workspace, and with each allocation and
+ * each file system call failing once. A call must return a status, hold no resource afterwards,
+ * leave no file behind, and succeed when it is repeated. Check forks for each call, so that
+ * AddressSanitizer and LeakSanitizer see the calls separately.
+ *
+ *     test_every_call [FAULTY_SERVER], with faults.so preloaded */
 #include <errno.h>
 #include <dirent.h>
 #include <stdio.h>
@@ -97,7 +99,7 @@ static void write_obj(void)
     fine(ebpo_write_file(scratch(EVERY_CALL_OBJ), text, sizeof text - 1, &error));
 }
 
-/* An HDF5 file with rows of coordinates. */
+/* Writes an HDF5 file with rows of coordinates. */
 static void write_rows(void)
 {
     ebpo_file *file;
@@ -234,11 +236,12 @@ END_TEST
 
 enum {
     MEMORY = FAULT_MALLOC | FAULT_MMAP | FAULT_THREAD,
-    IN_PART = FAULT_SHORT_READ | FAULT_SHORT_WRITE /* not failures: the call continues */
+    /* faults that are not failures; the call continues */
+    IN_PART = FAULT_SHORT_READ | FAULT_SHORT_WRITE
 };
 
-/* Lets the n-th system call of these kinds fail, or all from the n-th on. Returns true when there
- * are more calls to fail. */
+/* Makes the n-th system call of these kinds fail, or all calls from the n-th on. Returns true when
+ * there are more calls that could fail. */
 static bool call_with_failure(const every_call *c, every_call_env *e, unsigned kinds, uint64_t n,
                               bool onward)
 {

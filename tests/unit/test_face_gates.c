@@ -1,4 +1,4 @@
-/* The coding of faces across edges against the simple reader of the verifier. */
+/* Compares the coding `gates` of faces with the simple reader of the verifier. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -17,7 +17,7 @@ enum { ROWS = 4096, BYTES = ROWS * EBPO_GATES_COLS };
 
 static uint64_t pick(uint64_t *state, uint64_t below) { return ebpo_random_next(state) % below; }
 
-/* Makes a face of a grid, strip after strip and row after row, as in scans. */
+/* Makes a face of a grid. Faces are ordered by strips and rows, as in scans. */
 static void grid_face(uint64_t i, uint32_t width, uint32_t *face)
 {
     uint32_t square = (uint32_t)(i / 2), x = square % width, y = square / width,
@@ -109,7 +109,8 @@ START_TEST(test_face_encoding_round_trip)
 }
 END_TEST
 
-/* Changed bytes give the result of the reference implementation, or are refused by both readers. */
+/* Changed bytes either give the result of the reference implementation, or are refused by both
+ * readers. */
 START_TEST(test_changed_face_bytes_match_reference)
 {
     uint64_t state = (uint64_t)_i + 100, taken = 0, refused = 0;
@@ -150,7 +151,7 @@ START_TEST(test_noise_face_bytes_match_reference)
 }
 END_TEST
 
-/* A grid takes two bytes a face and hardly any index; other faces are stored as codes. */
+/* A grid takes two bytes for each face and hardly any index. Other faces are stored as codes. */
 START_TEST(test_face_stream_lengths)
 {
     uint64_t state = 3;

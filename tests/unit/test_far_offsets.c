@@ -1,5 +1,5 @@
-/* Bytes, rows and elements beyond 2^32, without the data: sparse files and mappings, which take
- * memory only for visited parts. */
+/* Tests bytes, rows and elements beyond 2^32, without the data: with sparse files, and with
+ * mappings that take memory only for visited parts. */
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -90,7 +90,8 @@ START_TEST(test_ply_elements_beyond_4_gib)
     ck_assert_uint_eq(count, 4);
     ck_assert_double_eq(points[11], 1);
     free(points);
-    /* With one byte less, or an invalid corner, the message has the offset, which is above 2^32. */
+    /* When one byte is missing, or a corner is invalid, the message has the offset, which is above
+     * 2^32. */
     ck_assert_int_eq(ebpo_ply_parse_memory(&mesh, data, size - 1, "far.ply", NULL, 0, NULL, &error),
                      EBPO_E_FORMAT);
     data[size - 1] = 1;
@@ -181,8 +182,8 @@ START_TEST(test_whole_files_beyond_4_gib)
     ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
     ebpo_error error = EBPO_ERROR_INIT;
     int fd = open(path, O_CREAT | O_RDWR | O_TRUNC, 0600);
-    if (pwrite(fd, "end", 3, (off_t)(FAR + 77)) == 3) { /* else the file system does not support
-                                                         * such files */
+    /* otherwise the file system does not support such files */
+    if (pwrite(fd, "end", 3, (off_t)(FAR + 77)) == 3) {
         ck_assert_msg(ebpo_whole_file_open(&file, path, &error) == EBPO_OK, "%s", error.message);
         ck_assert_uint_eq(file.size, FAR + 80);
         ck_assert_int_eq(ebpo_whole_file_read(&file, FAR + 77, end, 3, path, &error), EBPO_OK);
@@ -381,8 +382,9 @@ START_TEST(test_container_in_memory_beyond_8_gib)
 {
     static const char *const names[] = { "01_one_leaf_unfiltered", "06_four_levels_leaf_planes" };
     for (size_t i = 0; i < 2 * sizeof names / sizeof *names;
-         i++) { /* then all again as a remote file: chunk offsets are read later, with prefetch
-                 * hints */
+         /* repeats everything as a remote file, whose chunk offsets are read later, with prefetch
+          * hints */
+         i++) {
         bool away = i >= sizeof names / sizeof *names;
         shifted s = vector_of(names[i % (sizeof names / sizeof *names)]);
         ebpo_error error = EBPO_ERROR_INIT;
@@ -449,13 +451,13 @@ START_TEST(test_container_uses_8_byte_addresses)
     shifted s = vector_of("03_one_leaf");
     ck_assert_mem_eq(s.bytes + 1, "HDF", 3);
     ck_assert_uint_eq(s.bytes[9], 8);  /* superblock version 2 and 3: size of offsets */
-    ck_assert_uint_eq(s.bytes[10], 8); /* and of lengths */
+    ck_assert_uint_eq(s.bytes[10], 8); /* size of lengths */
     free(s.bytes);
 }
 END_TEST
 
-/* The writer encodes a leaf whose references begin at row 2^32 + 65536, which a row of the index
- * before them states. */
+/* The writer encodes a leaf whose references begin at row 2^32 + 65536. The preceding row of the
+ * index states this row. */
 START_TEST(test_references_beyond_32_bits)
 {
     enum { ROWS = 16384, LEAVES = EBPO_INDEX_ROWS + 1 };
@@ -486,7 +488,7 @@ START_TEST(test_references_beyond_32_bits)
     uint32_t *rows = malloc(4 * ROWS);
     ebpo_plan_encode(&plan, &array, before, ROWS, (uint8_t *)rows);
     for (uint32_t i = 0; i < ROWS; i++)
-        rows[i] = ebpo_load32(rows + i); /* a file is little-endian */
+        rows[i] = ebpo_load32(rows + i); /* files are little-endian */
     ck_assert(ebpo_refs_decode(rows, ROWS, first[LEAVES - 1]));
     for (uint32_t i = 0; i < ROWS; i++)
         ck_assert_uint_eq(rows[i], 3 * i);

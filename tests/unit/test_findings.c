@@ -237,8 +237,8 @@ static bool count_findings(void *user, const ebpo_mesh_finding *found_one)
     return true;
 }
 
-/* One face that is repeated very often takes as little time for each occurrence as a few
- * repetitions do. */
+/* For one face with very many repetitions, the time for each repetition is as small as for few
+ * repetitions. */
 START_TEST(test_locations_of_many_repeated_faces)
 {
     enum { MANY = 40000 };
@@ -251,7 +251,7 @@ START_TEST(test_locations_of_many_repeated_faces)
     for (int f = 0; f < MANY; f++)
         ebpo_test_append_face(&mesh, 0, 1, 2);
     ck_assert(ebpo_mesh_findings(&mesh, NULL, count_findings, &count, NULL, &error) == EBPO_OK);
-    ck_assert_uint_eq(count, MANY - 1 + 9); /* of edges 6, of vertices 3 */
+    ck_assert_uint_eq(count, MANY - 1 + 9); /* 6 findings of edges and 3 of vertices */
     ebpo_mesh_free(&mesh);
 }
 END_TEST

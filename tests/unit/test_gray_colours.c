@@ -16,7 +16,7 @@
 #include "solids.h"
 #include "verify/verify_parts.h"
 
-/* Fills random bytes; `columns`: "red green blue" and the like. */
+/* Fills an attribute with random bytes. `columns`: names such as "red green blue". */
 static void paint(ebpo_mesh *mesh, const char *element, uint64_t rows, uint64_t seed, bool flat)
 {
     ebpo_attribute like = { .type = EBPO_ATTRIBUTE_UINT8,
@@ -208,7 +208,7 @@ START_TEST(test_gray_colours_in_levels_and_streams)
 }
 END_TEST
 
-/* Subsets keep the rows; a leaf of the original file has the colour of its parent. */
+/* Subsets keep the rows. A leaf of the original file has the colour of its parent. */
 START_TEST(test_gray_colours_in_subsets)
 {
     ebpo_tree tree, part;

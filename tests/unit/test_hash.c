@@ -1,4 +1,4 @@
-/* The hash table and the random numbers shared by all modules. */
+/* Tests the hash table and the random numbers that all modules share. */
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
@@ -86,7 +86,8 @@ START_TEST(test_hash_slots_are_power_of_two)
 }
 END_TEST
 
-/* The first numbers of SplitMix64 from 0, from the program of its authors. */
+/* The expected values are the first numbers of SplitMix64 for the state 0, from the program of its
+ * authors. */
 START_TEST(test_random_matches_splitmix64)
 {
     uint64_t state = 0;

@@ -1,5 +1,5 @@
-/* Headers of files, read without libhdf5, against the data of libhdf5 for the same files, object by
- * object; damaged, truncated and other layouts are refused. */
+/* Compares headers of files, read without libhdf5, with the data of libhdf5 for the same files,
+ * object by object. Damaged, truncated and other layouts are refused. */
 #include <dirent.h>
 #include <hdf5.h>
 #include <stdlib.h>
@@ -267,11 +267,11 @@ static void flip_bits(subject *s)
 static void cut_off(subject *s)
 {
     for (size_t size = 0; size < s->size; size += size < 64 ? 1 : s->size / 50 + 1) {
-        uint8_t *bytes = malloc(size ? size : 1); /* of exactly its size */
+        uint8_t *bytes = malloc(size ? size : 1); /* a block of exactly this size */
         ebpo_error error = EBPO_ERROR_INIT;
         memcpy(bytes, s->data, size);
         ebpo_status status = open_bytes(s, bytes, size, &error);
-        /* vector 38 has bytes behind the end of the HDF5 file */
+        /* vector 38 has bytes after the end of the HDF5 file */
         ck_assert(status == EBPO_E_FORMAT || strstr(s->path, "behind_the_end"));
         close_bytes(s, status);
         free(bytes);

@@ -1,6 +1,8 @@
-/* Files on correct and misbehaving web servers: the correct bytes or a clear error, and never a
- * hang (each test has a time limit). test_http FAULTY_SERVER. EBPO_TEST_SCALE scales the number of
- * random fault schedules. */
+/* Reads files on correct and misbehaving web servers. The result is the correct bytes or a clear
+ * error, and never a hang: each test has a time limit. EBPO_TEST_SCALE scales the number of random
+ * fault schedules.
+ *
+ *     test_http FAULTY_SERVER */
 #include <dirent.h>
 #include <fcntl.h>
 #include <pthread.h>
@@ -101,7 +103,7 @@ static ebpo_status visit(const char *fault, const ebpo_http_options *options,
 
 static const struct {
     const char *fault;
-    unsigned retries; /* at least */
+    unsigned retries; /* least number of retries */
 } readable[] = {
     { "good", 0 },
     { "modified", 0 },
@@ -516,8 +518,8 @@ START_TEST(test_http_credentials_are_never_shown)
 }
 END_TEST
 
-/* Headers go to no other server. They are not sent either when another server redirects back, as
- * that server chose the target. */
+/* Headers are sent to no other server. When another server redirects back, they are not sent
+ * either, because that server chose the target. */
 START_TEST(test_http_headers_stay_with_their_server)
 {
     static const char *const headers[] = { "X-Key: 7", NULL };
@@ -811,9 +813,9 @@ START_TEST(test_http_ranges_beyond_4_gib)
         { "Content-Range: bytes 8589934592-8589934691/900000000000", UINT64_C(8589934691),
           EBPO_HTTP_PART },
         { "Content-Range: bytes 4294967296-4294967395/900000000000", 0,
-          EBPO_HTTP_REFUSED }, /* 2^32 less */
+          EBPO_HTTP_REFUSED }, /* less by 2^32 */
         { "Content-Range: bytes 8589934592-12884901887/900000000000", 0,
-          EBPO_HTTP_REFUSED }, /* 2^32 more than requested */
+          EBPO_HTTP_REFUSED }, /* more than requested by 2^32 */
         { "Content-Range: bytes 8589934592-8589934691/2349901312", 0, EBPO_HTTP_REFUSED },
         { "Content-Range: bytes 8589934592-8589934691/18446744073709551616", 0, EBPO_HTTP_REFUSED },
     };

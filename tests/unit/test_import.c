@@ -182,8 +182,8 @@ static char *long_strip(unsigned squares, const char *digits)
     return text;
 }
 
-/* Arrays that exceed the budget go to files, and the mesh is the same: with floats, and with
- * doubles, which the file needs at its last vertex. */
+/* Arrays that exceed the budget are stored in files, and the mesh is the same: with floats, and
+ * with doubles, which the file needs only at its last vertex. */
 START_TEST(test_import_result_ignores_memory_budget)
 {
     ebpo_mesh mesh, within;
@@ -213,8 +213,8 @@ START_TEST(test_import_result_ignores_memory_budget)
 }
 END_TEST
 
-/* Decimals become the nearest floats. For these decimals, other readers return neighbouring floats.
- */
+/* Decimal numbers become the nearest floats. For these numbers, other readers return neighbouring
+ * floats. */
 START_TEST(test_import_numbers_are_rounded_correctly)
 {
     static const char obj[] = "v 2.96501994e-01 5.3e-31 16777216.0000000000\n"
@@ -234,8 +234,8 @@ END_TEST
 #define UTM_C              "691246.912 5334567.892 519.25"
 #define UTM_D              "1.1 -0.000 1e39"
 
-/* One coordinate that floats cannot represent turns all of them into the nearest doubles, and
- * vertices with equal doubles are merged. B and C are one float. */
+/* When floats cannot represent a coordinate, all coordinates become the nearest doubles, and
+ * vertices with equal doubles are merged. B and C are equal as floats. */
 START_TEST(test_import_doubles_when_floats_lose_digits)
 {
     static const struct {
@@ -264,7 +264,7 @@ START_TEST(test_import_doubles_when_floats_lose_digits)
 }
 END_TEST
 
-/* Coordinates divided by a weight have no text: floats are used where they are exact. */
+/* Coordinates divided by a weight have no decimal text. Floats are used when they are exact. */
 START_TEST(test_import_floats_for_exact_quotients)
 {
     static const char exact[] = "v 0 0 0 1\nv 2 0 0 2.0\nv 0 0.1 0 1\nf 1 2 3\n",

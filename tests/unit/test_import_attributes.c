@@ -1,4 +1,5 @@
-/* Data of OBJ, STL and OFF files besides positions and corners, as attributes of the mesh. */
+/* Tests data of OBJ, STL and OFF files besides positions and corners, which become attributes of
+ * the mesh. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -30,7 +31,7 @@ static void import_text(const ebpo_import_format *format, const char *text)
     import(format, text, strlen(text));
 }
 
-/* Finds the array of these names; its rows are those of the element. */
+/* Finds the array with these names, whose rows belong to the element. */
 static const ebpo_attribute *find(const char *element, const char *names)
 {
     for (uint64_t i = 0; mesh.attributes && i < mesh.attributes->count; i++) {

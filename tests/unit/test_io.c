@@ -1,4 +1,4 @@
-/* Files: complete reading, and atomic outputs. */
+/* Tests files: complete reading and atomic output. */
 #include <dirent.h>
 #include <signal.h>
 #include <stdio.h>
@@ -258,7 +258,8 @@ START_TEST(test_lock_keeps_unrelated_file)
 }
 END_TEST
 
-/* Increases the number in the file by one; many processes run this, and no increase is lost. */
+/* Increases the number in the file by one. Many processes run this function, and no increase is
+ * lost. */
 static int count_up(void)
 {
     for (int i = 0; i < 25; i++) {
@@ -328,8 +329,8 @@ static int write_pair(const char *second_path)
     return ebpo_publish_commit_pair(&first, &second, NULL) != EBPO_OK;
 }
 
-/* When two programs write the same two files at once, one waits: no file of one stays beside a file
- * of the other. */
+/* When two programs write the same two files at once, one of them waits. A file of one program
+ * never stays beside a file of the other. */
 START_TEST(test_output_pairs_are_published_in_turn)
 {
     ebpo_file_lock lock;
@@ -375,7 +376,7 @@ START_TEST(test_output_keeps_mode_and_attributes)
     check_content(target, "new");
     ck_assert(stat(target, &st) == 0 && (st.st_mode & 07777) == 0604);
 #ifndef EBPO_HAVE_XATTR
-    has = false; /* nor do all systems; then the attributes are lost */
+    has = false; /* not all systems support them; then the attributes are lost */
 #endif
     ck_assert(!has || (getxattr(target, "user.ebpo", value, sizeof value) == 4 &&
                        memcmp(value, "kept", 4) == 0));

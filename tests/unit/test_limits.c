@@ -1,5 +1,5 @@
-/* Faked counts near and beyond 32 bits: correct arithmetic when they are allowed, else EBPO_E_LIMIT
- * before any access. */
+/* Tests faked counts near and beyond 32 bits: the arithmetic is correct for allowed counts, and
+ * other counts give EBPO_E_LIMIT before any access. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -162,7 +162,8 @@ START_TEST(test_header_level_counts_use_64_bits)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_info *info = head_of(TWO32 - 2, TWO32 - 2);
-    /* Beyond 2^33 leaves and 2^35 references below 2^31 gray nodes: valid counts beyond 32 bits. */
+    /* More than 2^33 leaves and 2^35 references below 2^31 gray nodes: valid counts beyond 32
+     * bits. */
     info->max_level = info->grid_level = 20;
     info->level_count = 13;
     info->level[0] = (ebpo_level_summary){ .gray_count = 1 };
@@ -247,7 +248,7 @@ START_TEST(test_huge_source_counts_take_no_memory)
     bool ordered;
     random_tree_make(&tree, &options);
     tree.info.source_vertex_count = tree.info.source_face_count = TWO32 - 2;
-    tree.vertex_source[tree.info.vertex_count - 1] = UINT32_MAX - 2; /* the last of them */
+    tree.vertex_source[tree.info.vertex_count - 1] = UINT32_MAX - 2; /* the greatest source index */
     ck_assert_msg(ebpo_tree_write(&tree, path, NULL, &error) == EBPO_OK, "%s", error.message);
     ck_assert_msg(ebpo_open(path, &file, &error) == EBPO_OK, "%s", error.message);
     getrusage(RUSAGE_SELF, &before);
@@ -255,7 +256,7 @@ START_TEST(test_huge_source_counts_take_no_memory)
                   "%s", error.message);
     getrusage(RUSAGE_SELF, &after);
     ck_assert(ordered);
-    /* KiB; a number for each vertex and face would take 16 GiB; sanitizers also need memory */
+    /* in KiB; a number for each vertex and face would take 16 GiB; sanitizers also need memory */
     ck_assert_int_lt(after.ru_maxrss - before.ru_maxrss, 1 << 20);
     uint64_t last = mesh.vertex_count - 1;
     size_t size = tree.mesh.xyz32 ? 3 * sizeof(float) : 3 * sizeof(double);
@@ -399,7 +400,7 @@ START_TEST(test_view_groups_beyond_32_bits)
     ebpo_error error = EBPO_ERROR_INIT;
     uint64_t places[EBPO_FRONTIER_BLOCKS];
     ck_assert_int_eq(ebpo_frontier_reserve(&frontier, NODES, &error), EBPO_OK);
-    for (uint64_t i = 0; i < NODES; i++) /* the same blocks in 32 bits */
+    for (uint64_t i = 0; i < NODES; i++) /* in 32 bits the number of blocks would be the same */
         ebpo_frontier_push(&frontier, (ebpo_waiting){ .key = i,
                                                       .octcode = UINT64_C(1) << 48,
                                                       .below = i << 38,

@@ -1,4 +1,4 @@
-/* Levels as polygons. */
+/* Tests levels as polygons. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -70,8 +70,8 @@ static double largest_volume(const ebpo_info *info)
     return info->box_size[0] * info->box_size[1] * info->box_size[2];
 }
 
-/* The file states volumes of leaves by stored planes or as inherited; derived planes cut off more.
- */
+/* The volumes of leaves in the file are computed by stored or inherited planes. Derived planes cut
+ * off more. */
 START_TEST(test_lod_volumes_match_stored_volumes)
 {
     if (!ebpo_test_wanted(_i))
@@ -177,7 +177,7 @@ START_TEST(test_lod_same_for_any_threads)
 }
 END_TEST
 
-/* Returns true when all three corners are in one face x, y or z = constant of a cell of `level`. */
+/* Returns true when all three corners are in one cell face of `level`. */
 static bool on_cell_face(const ebpo_info *info, const ebpo_mesh *mesh, uint64_t face, int level)
 {
     for (int k = 0; k < 3; k++) {
@@ -291,7 +291,7 @@ START_TEST(test_lod_cancel_leaves_nothing)
     ebpo_mesh mesh;
     ebpo_status status =
         ebpo_lod_level(file, ebpo_file_info(file)->level_count - 1, &options, &mesh, NULL, NULL);
-    /* Finishing before the first report is OK, too. */
+    /* The call may also finish before the first report. */
     ck_assert(status == EBPO_E_CANCELLED || status == EBPO_OK);
     ck_assert(status == EBPO_OK || mesh.xyz64 == NULL);
     ebpo_mesh_free(&mesh);

@@ -1,5 +1,5 @@
-/* Normals for the lighting of polygons of a level. They are compared with the definition, computed
- * node by node without tables, and with the known normals of spheres. */
+/* Tests normals for the lighting of polygons of a level. They are compared with the definition,
+ * computed node by node without tables, and with the known normals of spheres. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -48,7 +48,7 @@ static void find_polygons(level *l)
             for (unsigned c = 0; c < l->nodes.corners[polygon]; c++) {
                 const double *a = corner_of(l, polygon, c),
                              *b = corner_of(l, polygon, (c + 1) % l->nodes.corners[polygon]);
-                for (int j = 0; j < 3; j++) /* Newell */
+                for (int j = 0; j < 3; j++) /* Newell's method */
                     l->area[polygon][j] +=
                         (a[(j + 1) % 3] - b[(j + 1) % 3]) * (a[(j + 2) % 3] + b[(j + 2) % 3]);
             }
@@ -114,7 +114,8 @@ static void in_box(const level *l, const double at[3], double out[3])
         out[k] = (at[k] - l->info->box_origin[k]) / l->info->box_size[k];
 }
 
-/* Returns 2 * axis, + 1 for the upper side; 6: on a plane, or a side of the root cell. */
+/* Returns 2 * axis, or 2 * axis + 1 for the upper side; 6 for polygons on a plane or a side of the
+ * root cell. */
 static int side_of(const level *l, uint64_t polygon)
 {
     double low[3], side, at[3];
@@ -200,7 +201,9 @@ START_TEST(test_lod_normals_match_definition)
         double n[3],
             scale = fmax(fmax(l.info->box_size[0], l.info->box_size[1]), l.info->box_size[2]);
         if ((sides[i] < 6 && i % 3) || length_of(l.area[i]) < 1e-7 * scale * scale)
-            continue; /* the definition is slow; the normal of a sliver is only rounding */
+            /* omits polygons because the definition is slow, and slivers, whose normals are only
+             * rounding errors */
+            continue;
         expect(&l, sides, i, n);
         for (int k = 0; k < 3; k++)
             ck_assert_msg(fabs((double)l.normals[3 * i + (uint64_t)k] - n[k]) < 1e-4,

@@ -1,4 +1,4 @@
-/* Maps of distance: against closed forms, single queries, plain sums and dense samples. */
+/* Tests maps of distance against closed forms, single queries, simple sums and dense samples. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -189,7 +189,8 @@ START_TEST(test_map_invalid_input_is_refused)
     ck_assert_int_eq(ebpo_map_lattice(o.model, &l, NULL, keep, &k, &error), EBPO_E_ARGUMENT);
     l = (ebpo_lattice){ { 0, 0, 0 }, { { 0 } }, { UINT64_MAX, UINT64_MAX, 2 } };
     ck_assert_int_eq(ebpo_map_lattice(o.model, &l, NULL, keep, &k, &error), EBPO_E_ARGUMENT);
-    /* not at right angles: only NRRD supports it; the failed attempt leaves no file */
+    /* the axes are not at right angles, which only NRRD supports; the failed attempt leaves no
+     * file */
     l = (ebpo_lattice){ { 0, 0, 0 }, { { 1, 0, 0 }, { 1, 1, 0 }, { 0, 0, 1 } }, { 2, 2, 2 } };
     int before = scratch_entries();
     ck_assert_int_eq(ebpo_map_write(o.model, &l, scratch("f"), EBPO_MAP_VTKHDF, NULL, &stats,
@@ -234,7 +235,8 @@ static void check_stats(const double *values, int count, double scale)
     ck_assert_double_eq_tol(s.standard_deviation / scale,
                             (double)sqrtl(square / count - sum / count * (sum / count)), 1e-14);
     for (int i = 0; i < EBPO_MAP_PERCENTILES; i++) {
-        int below = 0; /* the least value that this percentage does not exceed */
+        /* checks the percentile: the least value that this percentage does not exceed */
+        int below = 0;
         while ((below + 1) * 100 < ebpo_map_percent(i) * count)
             below++;
         ck_assert(s.percentile[i] == sorted[below]);
@@ -256,7 +258,7 @@ START_TEST(test_map_statistics_match_reference)
         check_stats(values, 1, scales[k]);
     }
     for (int i = 0; i < COUNT; i++)
-        values[i] = 1e308; /* whose sum exceeds doubles */
+        values[i] = 1e308; /* the sum exceeds the range of doubles */
     check_stats(values, COUNT, 1e308);
 }
 END_TEST
@@ -331,7 +333,8 @@ START_TEST(test_map_error_bounds_hold_between_vertices)
                    &error);
         ck_assert(sampled <= many.hi && many.hi >= one.hi && many.lo <= one.lo);
         double widest = many.hi;
-        options.queries = 300; /* these are used where the bounds are widest; no more are made */
+        /* the queries are used where the bounds are widest, and not more than these are made */
+        options.queries = 300;
         model_must(ebpo_map_find_range(o.model, &m, away, &options, &many, &error), "reach",
                    &error);
         ck_assert(sampled <= many.hi && many.hi < widest && many.queries <= 303);

@@ -1,5 +1,5 @@
-/* Area, volume, centroid and inertia, against closed forms and integrals of the mesh in rational
- * numbers. */
+/* Tests area, volume, centroid and inertia against closed forms and against integrals of the mesh
+ * in rational numbers. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -36,10 +36,10 @@ static ebpo_mesh copy_of(const ebpo_mesh *mesh)
     return copy;
 }
 
-/* The rule of files that are made. */
+/* The winding rule of the files that the tests write. */
 static ebpo_rule file_rule;
 
-/* Makes a file of the mesh, which the caller keeps. */
+/* Makes a file of the mesh. The mesh remains owned by the caller. */
 static ebpo_file *file_of(const ebpo_mesh *mesh, uint32_t parts)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -185,9 +185,9 @@ static void add_area(exact_moments *m, mpq_t p[3][3])
     mpf_clear(root);
 }
 
-/* Adds the tetrahedron of the origin and a face: over its affine parameters the integral of x y is
- * det / 120 times the sum of a_x b_y over all pairs of corners, equal ones twice; computed as such
- * a sum. */
+/* Adds the tetrahedron of the origin and a face. Over its affine parameters, the integral of x y
+ * is det / 120 times the sum of a_x b_y over all pairs of corners, where equal pairs count twice.
+ * The function computes this sum. */
 static void add_tetrahedron(exact_moments *m, mpq_t p[3][3])
 {
     mpq_t n[3], det, term, share;
@@ -352,7 +352,7 @@ START_TEST(test_mass_matches_exact_integrals)
         if (mesh.face_count && mesh.face_count <= 6000) {
             ebpo_mass m = mass_of(&mesh), expected = reference_of(&mesh);
             assert_near(m.integral, expected.volume, fabs(expected.volume), "integral");
-            if (isnan(m.volume)) /* the rest uses the winding number as a density */
+            if (isnan(m.volume)) /* the following values use the winding number as a density */
                 m.volume = m.integral;
             if (same(m.volume, m.integral) && m.volume != 0)
                 assert_masses_near(&m, &expected, 1);
@@ -378,8 +378,8 @@ START_TEST(test_mass_of_distant_spheres)
 }
 END_TEST
 
-/* A thin plate across the space that it hardly fills: volumes cancel almost completely when
- * measured from far away. */
+/* Uses a thin plate that is slanted to the axes. Volumes measured from far away cancel almost
+ * completely. */
 START_TEST(test_mass_of_thin_plates)
 {
     const double low[3] = { 0, 0, 0 }, high[3] = { 1000, 1000, 0x1p-30 };

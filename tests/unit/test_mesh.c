@@ -43,7 +43,7 @@ static ebpo_repair_record repair_record(ebpo_mesh *mesh,
     return record;
 }
 
-/* Padding in the struct is zeroed by the check, so bytes can be compared. */
+/* The check sets the padding of the struct to zero, so that bytes can be compared. */
 static bool same_report(const ebpo_mesh_report *a, const ebpo_mesh_report *b)
 {
     return memcmp(a, b, sizeof *a) == 0;
@@ -90,7 +90,7 @@ START_TEST(test_mesh_cube_is_measured_exactly)
     ck_assert_double_eq(r.area, 384);
     ck_assert_double_eq(r.min[0], -4);
     ck_assert_double_eq(r.max[2], 4);
-    /* each square: two sides and a diagonal */
+    /* each square contributes two sides and a diagonal */
     ck_assert_double_eq_tol(r.mean_edge, (2 + sqrt(2)) / 3, 1e-15);
 }
 END_TEST
@@ -196,13 +196,14 @@ END_TEST
 START_TEST(test_finding_indices_are_first_ascending)
 {
     ebpo_mesh mesh = ebpo_test_tetrahedra(9);
-    for (int i = 0; i < 6; i++) /* from the top, so that the order is not correct by chance */
+    /* from the last one on, so that the order is not correct by chance */
+    for (int i = 0; i < 6; i++)
         ebpo_test_turn_face(&mesh, (uint64_t)(34 - 5 * i));
     ebpo_mesh_report r = check(&mesh);
     ck_assert_uint_eq(r.misoriented_edges.count, 18);
     for (int i = 1; i < EBPO_FINDING_LOCATIONS; i++)
         ck_assert(r.misoriented_edges.locations[i - 1] <= r.misoriented_edges.locations[i]);
-    /* face 9 is reversed; 8 shares an edge with it */
+    /* face 9 is reversed, and face 8 shares an edge with face 9 */
     ck_assert_uint_eq(r.misoriented_edges.locations[0], 8);
     ebpo_mesh_free(&mesh);
 }
@@ -287,7 +288,7 @@ START_TEST(test_weld_joins_zero_and_minus_zero)
     ebpo_test_append_vertex(&mesh, -0.0, 0, 0);
     ebpo_test_append_vertex(&mesh, 5, 5, 5);
     ebpo_test_append_vertex(&mesh, 1, -0.0, 0);
-    mesh.faces[0] = 4; /* was 0 */
+    mesh.faces[0] = 4; /* the corner was 0 */
     ebpo_test_append_face(&mesh, 1, 6, 2);
     ebpo_repair_record record = repair_record(&mesh, ebpo_mesh_weld);
     ck_assert_uint_eq(record.welded_vertices, 2);
@@ -344,8 +345,8 @@ START_TEST(test_orient_flips_inverted_component)
 }
 END_TEST
 
-/* Tests boxes in boxes, with two side by side in the second, in any order and each reversed or not,
- * and a box that extends through the outermost, so that it is in no box. */
+/* Tests nested boxes in any order, each reversed or not. The second box contains two boxes side by
+ * side. A further box extends through the outermost box, so that no box contains it. */
 START_TEST(test_orient_outer_shells_and_cavities)
 {
     static const double low[6][3] = { { 0, 0, 0 }, { 1, 1, 1 }, { 2, 2, 2 },
@@ -530,8 +531,8 @@ typedef struct model {
     const char *name;
     uint64_t boundary, nonmanifold, misoriented, bowties, shells, zero_area, repeated, unused,
         positions;
-    int64_t genus; /* -1: not a closed 2-manifold */
-    double volume; /* NAN: not balanced */
+    int64_t genus; /* -1: the mesh is not a closed 2-manifold */
+    double volume; /* NAN: the mesh is not balanced */
 } model;
 
 static const model models[] = {

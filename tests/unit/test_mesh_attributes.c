@@ -1,5 +1,5 @@
-/* Data of a PLY besides positions and corners: read in each encoding, kept by building, writing and
- * reading, split and merged with the mesh, and written unchanged. */
+/* Tests data of a PLY file besides positions and corners: it is read in each encoding; kept by
+ * building, writing and reading; split and merged with the mesh; and written unchanged. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -28,9 +28,10 @@ enum { MAX_PROPERTIES = 12 };
 
 typedef struct random_property {
     char name[24];
-    int type, count; /* count: -1: not a list; else the type of the list's length */
-    bool equal;      /* lists of one length */
-    char axis;       /* x, y, z or v for corners; 0: none of these */
+    /* count: -1 for a property that is not a list, otherwise the type of the list's length */
+    int type, count;
+    bool equal; /* all lists have the same length */
+    char axis;  /* x, y or z; v for corners; 0 for other properties */
 } random_property;
 
 typedef struct random_element {
@@ -344,7 +345,7 @@ START_TEST(test_attributes_ply_round_trip)
         fine(ebpo_mesh_write_ply(&source, scratch("again.ply"), &error));
         fine(ebpo_mesh_read(scratch("again.ply"), &how, &again, &error));
         same(source.attributes, again.attributes);
-        /* types have several names: the values, and so the bytes, are the same */
+        /* types have several names, but the values and therefore the bytes are the same */
         same_files(scratch("made.ply"), scratch("again.ply"));
         ebpo_mesh_free(&source);
         ebpo_mesh_free(&again);
@@ -488,7 +489,7 @@ START_TEST(test_attributes_of_triangles_follow_polygon)
         "0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n"
         "7 4 0 1 2 3 2 8 9\n1 2 0 1 1 4\n-2 3 0 1 4 0\n300 5 0 1 2 3 4 1 5\n");
     const ebpo_attribute *label = &mesh.attributes->array[0], *words = &mesh.attributes->array[1];
-    ck_assert_uint_eq(mesh.face_count, 6); /* two corners are no face */
+    ck_assert_uint_eq(mesh.face_count, 6); /* an item with two corners is not a face */
     ck_assert(memcmp(label->values, (int16_t[]){ 7, 7, -2, 300, 300, 300 }, 12) == 0);
     ck_assert(memcmp(words->ends, (uint64_t[]){ 2, 4, 4, 5, 6, 7 }, 48) == 0);
     ck_assert(memcmp(words->values, (uint8_t[]){ 8, 9, 8, 9, 5, 5, 5 }, 7) == 0);
@@ -533,7 +534,7 @@ START_TEST(test_attributes_of_strips_are_empty)
 }
 END_TEST
 
-/* An element of faces without rows states its properties; the triangles belong to strips. */
+/* A face element without rows states its properties. The triangles belong to strips. */
 START_TEST(test_attributes_ply_writes_every_property)
 {
     ebpo_mesh back,
@@ -589,7 +590,8 @@ START_TEST(test_attributes_of_elements_with_equal_name)
 }
 END_TEST
 
-/* Lists colours of vertices with one byte each, also by other names, and other values. */
+/* Lists colours of vertices with one byte for each component, also with other names, and other
+ * values. */
 START_TEST(test_attributes_are_listed_by_file)
 {
     ebpo_mesh mesh = parse_text(

@@ -1,5 +1,5 @@
-/* The mesh check against a reference implementation, on small random meshes: every kind of defect,
- * many at once. */
+/* Compares the mesh check with a reference implementation, on small random meshes with many
+ * defects of every kind. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -30,7 +30,7 @@ static ebpo_mesh random_mesh(uint64_t *state)
 /* ---- the reference implementation: tables over all pairs ---- */
 
 typedef struct reference {
-    uint64_t uses[MAX_VERTICES][MAX_VERTICES]; /* directed */
+    uint64_t uses[MAX_VERTICES][MAX_VERTICES]; /* number of uses of each directed edge */
     uint64_t edges, boundary, nonmanifold, misoriented, unbalanced, bowties, repeated,
         index_repeated, zero_area;
     uint64_t unreferenced, positions, components;
@@ -72,8 +72,8 @@ static bool share_twofold_edge(const reference *t, const uint32_t *f, const uint
     return false;
 }
 
-/* Spreads labels until nothing changes; returns how many labels remain among the faces with label >
- * 0. */
+/* Spreads labels until nothing changes. Returns the number of labels of faces with a label greater
+ * than 0. */
 static uint64_t spread(const reference *t, const ebpo_mesh *m, uint64_t *label, uint32_t v,
                        bool fans)
 {
@@ -112,7 +112,7 @@ static void reference_fans(reference *t, const ebpo_mesh *m)
 static bool flat(const ebpo_mesh *m, const uint32_t *f)
 {
     const double *a = m->xyz64 + 3 * f[0], *b = m->xyz64 + 3 * f[1], *c = m->xyz64 + 3 * f[2];
-    /* small whole numbers in z = 0 */
+    /* coordinates are small integers in the plane z = 0 */
     return (b[0] - a[0]) * (c[1] - a[1]) == (b[1] - a[1]) * (c[0] - a[0]);
 }
 

@@ -1,5 +1,5 @@
-/* Repairs of arranged meshes, in little memory and on all cores, against repairs in source order.
- */
+/* Compares repairs of arranged meshes, in little memory and on all cores, with repairs in source
+ * order. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -131,7 +131,8 @@ static void repair_both(ebpo_mesh plain, int steps, ebpo_workspace *workspace)
     ebpo_mesh_free(&plain);
 }
 
-/* Few positions, some with both zeros: every kind of defect occurs many times. */
+/* Makes a mesh with few positions, some with positive and negative zeros, so that every kind of
+ * defect occurs many times. */
 static ebpo_mesh random_mesh(uint64_t *state)
 {
     static const double line[] = { -0.0, 0, 1, 2, 5 };
@@ -294,7 +295,7 @@ START_TEST(test_weld_of_arranged_mesh_matches)
 }
 END_TEST
 
-/* Compares ebpo_mesh_prepare with the single calls in the documented order. Frees `plain`. */
+/* Compares ebpo_mesh_prepare with the separate calls in the documented order. Frees `plain`. */
 static void prepare_and_compare(ebpo_mesh plain, const ebpo_prepare_options *options)
 {
     ebpo_mesh m = copy_of(&plain);

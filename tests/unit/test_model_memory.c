@@ -1,4 +1,5 @@
-/* Memory of whole models and subtrees, counted at every allocation, against the estimates. */
+/* Compares the memory of whole models and subtrees, counted at every allocation, with the
+ * estimates. */
 #include <malloc.h>
 #include <stdatomic.h>
 #include <stdlib.h>
@@ -58,8 +59,8 @@ void __wrap_free(void *block)
 /* --- models --- */
 
 typedef struct taken {
-    uint64_t keep, whole; /* estimated */
-    uint64_t kept, peak;  /* counted */
+    uint64_t keep, whole; /* estimated bytes */
+    uint64_t kept, peak;  /* counted bytes */
     bool resident;
 } taken;
 
@@ -177,7 +178,7 @@ END_TEST
 
 /* --- subtrees --- */
 
-/* Rounding by the allocator, array by array. */
+/* Limit of rounding by the allocator, summed over arrays. */
 enum { ROUNDING = 1 << 14 };
 
 typedef struct reading {
@@ -287,7 +288,7 @@ START_TEST(test_subtree_memory_estimate_is_close)
 }
 END_TEST
 
-/* Memory outside the budget: decoding of chunks, a context, tables of the caches. */
+/* Limit of memory outside the budget: decoding of chunks, a context, tables of the caches. */
 enum { BESIDE = 768 << 10 };
 
 /* Returns the number of results. */
@@ -326,7 +327,7 @@ static int check_results(const query_model *m, uint64_t memory)
     return results;
 }
 
-/* The triangles are large: each is in many subtrees, and many cross borders of subtrees. */
+/* Uses large triangles. Each is in many subtrees, and many cross borders of subtrees. */
 START_TEST(test_budget_holds_for_unusual_subtrees)
 {
     static const query_variant fine = { "fine", 16, 6, EBPO_RULE_NONZERO, 0 };

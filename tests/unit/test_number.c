@@ -1,4 +1,5 @@
-/* Decimal text to float and double against the C library, which rounds correctly. */
+/* Compares conversions of decimal text to float and double with the C library, which rounds
+ * correctly. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -117,14 +118,15 @@ START_TEST(test_decimal_digits_survive_printing)
             *at++ = (char)('0' + next(&state) % 10);
         *at = 0;
         check_kept(s, c);
-        float f = strtof(s, NULL); /* as programs print floats: with enough digits, and with too
-                                    * many */
+        /* with enough digits, as programs print floats, and with too many */
+        float f = strtof(s, NULL);
         for (int k = 5; k < 40; k += 1 + (int)(next(&state) % 5)) {
             snprintf(s, sizeof s, "%.*f", k, (double)f);
             check_kept(s, c);
         }
     }
-    /* floats of this size are multiples of a quarter: two texts, one float, ties to even */
+    /* floats of this size are multiples of a quarter, so that two texts give one float; ties go to
+     * even */
     check_kept("2097152.2", c);
     check_kept("2097152.3", c);
     freelocale(c);

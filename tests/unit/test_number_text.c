@@ -1,6 +1,6 @@
-/* Numbers in the text of the tool against the C library: read equally, and printed so that they
- * read back as the same double, in the layout of %.17g, with no more digits than printf would need.
- */
+/* Compares numbers in the text of the tool with the C library. They are read equally, and are
+ * printed so that reading returns the same double, in the layout of %.17g, with no more digits
+ * than printf needs. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -122,7 +122,7 @@ START_TEST(test_integers_print_like_c_library)
 }
 END_TEST
 
-/* Checks against strtod: the same number with the same end. */
+/* Compares with strtod: the number and the end of the text must be equal. */
 static void check_read(const char *text)
 {
     char *stop;

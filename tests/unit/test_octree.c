@@ -1,4 +1,4 @@
-/* Types in group words, cells and their neighbours, against reference implementations. */
+/* Tests types in group words, and cells and their neighbours, against reference implementations. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -46,7 +46,7 @@ START_TEST(test_group_type_counts_match_plain_count)
     uint16_t *types = malloc((groups + 1) * sizeof *types);
     ck_assert_ptr_nonnull(types);
     for (uint64_t i = 0; i < groups; i++) {
-        /* sometimes all of one type: then the sums of bytes are largest */
+        /* sometimes all nodes have one type, which gives the largest sums of bytes */
         types[i] =
             _i % 5 < 4 ? (uint16_t)(0x5555 * (_i % 5)) : (uint16_t)random_below(&state, 65536);
         for (unsigned octant = 0; octant < 8; octant++)

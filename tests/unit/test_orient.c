@@ -1,5 +1,5 @@
-/* Orientation of cubes that share edges, vertices and faces, against winding numbers in every cell.
- */
+/* Tests the orientation of cubes that share edges, vertices and faces against winding numbers in
+ * every cell. */
 #include <string.h>
 
 #include <ebpo/ebpo.h>
@@ -108,7 +108,8 @@ static void check_cells(const bool filled[CELLS], uint32_t of_eight)
     ebpo_mesh_free(&m);
 }
 
-/* Two cubes that share an edge, a vertex, a face, and the maximum around an edge. */
+/* Tests two cubes that share an edge, a vertex or a face, and the greatest number of cubes around
+ * an edge. */
 START_TEST(test_orient_neighbours_point_outwards)
 {
     static const int with_first[][3] = {
@@ -137,7 +138,7 @@ START_TEST(test_orient_random_cells_point_outwards)
 }
 END_TEST
 
-/* Each cube is oriented, although such cubes have no volume together. */
+/* Each cube is oriented, although the volumes of such cubes cancel. */
 START_TEST(test_orient_shells_sharing_vertex_or_edge)
 {
     for (int other = 4; other <= 13; other += 9) {

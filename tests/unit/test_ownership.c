@@ -1,5 +1,5 @@
-/* Ownership: arrays in a workspace beside other arrays of one file, and an open file shared by
- * threads. For AddressSanitizer, LeakSanitizer and ThreadSanitizer. */
+/* Tests ownership: arrays in a workspace beside other arrays of one file, and an open file shared
+ * by threads. Intended for AddressSanitizer, LeakSanitizer and ThreadSanitizer. */
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -200,7 +200,7 @@ static memory load(void)
     return m;
 }
 
-/* A remote file whose chunks are located while other threads read. */
+/* Locates the chunks of a remote file while other threads read. */
 START_TEST(test_threads_share_remote_file)
 {
     enum { THREADS = 6 };

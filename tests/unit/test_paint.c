@@ -1,6 +1,6 @@
-/* Paint: contents of files, range of a ball, areas against closed forms, strokes from the path of a
- * device. tests/cli/paint.tests compares the colouring of vertices with a reference implementation
- * in Python. */
+/* Tests paint: contents of files, range of a ball, areas against closed forms, and strokes from
+ * the path of a device. tests/cli/paint.tests compares the colouring of vertices with a reference
+ * implementation in Python. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -171,7 +171,7 @@ START_TEST(test_paint_file_round_trip)
     model_must(ebpo_paint_open(scratch("p.paint.h5"), &read, &error), "reading", &error);
     same_paint(o.paint, read);
     same_paint(read, o.paint);
-    /* saved again to the file that it was read from */
+    /* saves the paint again to the file that it was read from */
     model_must(ebpo_paint_save(read, scratch("p.paint.h5"), &error), "saving", &error);
     ebpo_paint_free(read);
     model_must(ebpo_paint_open(scratch("p.paint.h5"), &read, &error), "reading", &error);
@@ -206,7 +206,7 @@ START_TEST(test_paint_second_save_is_refused)
     ebpo_paint *one = opened_paint(), *other = opened_paint();
     ck_assert(ebpo_paint_add_layer(one, NULL, NULL, NULL) == EBPO_OK);
     model_must(ebpo_paint_save(one, scratch("p.paint.h5"), &error), "saving", &error);
-    /* the handle that made the file is also refused, as it has not read the file again */
+    /* the handle that created the file is also refused, because it has not read the file again */
     ck_assert(ebpo_paint_save(other, scratch("p.paint.h5"), &error) == EBPO_E_IO);
     ck_assert(strstr(error.message, "another program has changed it") != NULL);
     ck_assert(ebpo_paint_save(o.paint, scratch("p.paint.h5"), NULL) == EBPO_E_IO);
@@ -249,7 +249,7 @@ START_TEST(test_paint_file_is_locked_for_changes)
     const char *path = scratch("p.paint.h5");
     ck_assert(ebpo_paint_open_to_change(path, NULL, 0, NULL, &one, &error) == EBPO_E_IO);
     ck_assert(ebpo_paint_open_to_change(path, NULL, NAN, NULL, &one, NULL) == EBPO_E_ARGUMENT);
-    /* for a new paint, too, others wait */
+    /* other programs also wait for a new paint */
     model_must(ebpo_paint_open_to_change(path, o.file, 0, NULL, &one, &error), "new", &error);
     ck_assert(ebpo_paint_open_to_change(path, o.file, 0.05, NULL, &other, &error) == EBPO_E_IO);
     ck_assert(strstr(error.message, "another program has been changing it") && !other);
@@ -260,7 +260,7 @@ START_TEST(test_paint_file_is_locked_for_changes)
     ck_assert(ebpo_paint_open_to_change(path, o.file, 0.05, NULL, &other, &error) == EBPO_E_IO);
     ck_assert(ebpo_paint_add_layer(one, NULL, NULL, NULL) == EBPO_OK);
     model_must(ebpo_paint_save(one, path, &error), "saving", &error);
-    /* saved: the next one gets the lock, and reads the saved file */
+    /* after saving, the next program gets the lock and reads the saved file */
     model_must(ebpo_paint_open_to_change(path, o.file, 0, NULL, &other, &error), "next", &error);
     ck_assert(layers_of(other) == 1 && ebpo_paint_add_layer(other, NULL, NULL, NULL) == EBPO_OK);
     ebpo_paint_free(other); /* without saving */
@@ -280,7 +280,7 @@ START_TEST(test_new_paint_keeps_file_made_meanwhile)
     ebpo_paint *p = NULL;
     model_must(ebpo_paint_open_to_change(scratch("p.paint.h5"), o.file, 0, NULL, &p, &error), "new",
                &error);
-    /* by a program that ignores locks */
+    /* written by a program that ignores locks */
     ck_assert(ebpo_write_file(scratch("p.paint.h5"), "x", 1, NULL) == EBPO_OK);
     ck_assert(ebpo_paint_save(p, scratch("p.paint.h5"), &error) == EBPO_E_IO);
     ebpo_paint_free(p);
@@ -294,7 +294,7 @@ START_TEST(test_new_paint_writes_file_on_save)
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_paint *p = NULL;
     int slots = 0;
-    while (ebpo_unfinished_reserve() >= 0) /* no output can be begun */
+    while (ebpo_unfinished_reserve() >= 0) /* no further output can be started */
         slots++;
     ebpo_status status =
         ebpo_paint_open_to_change(scratch("p.paint.h5"), o.file, 0, NULL, &p, &error);
@@ -326,7 +326,7 @@ START_TEST(test_paint_points_are_checked_against_model)
     ck_assert(strstr(error.message, "stroke 12 of the paint is not on face") != NULL);
     ck_assert(ebpo_paint_remove_stroke(o.paint, 12, NULL) == EBPO_OK);
     n.at = q;
-    n.at.face = 1 << 20; /* which does not exist */
+    n.at.face = 1 << 20; /* a face that does not exist */
     ck_assert(ebpo_paint_add_note(o.paint, &n, NULL) == EBPO_OK);
     ck_assert(ebpo_paint_check_points(o.paint, o.context, NULL, &error) == EBPO_E_FORMAT);
     ck_assert(strstr(error.message, "note 3 of the paint is not on face 1048576") != NULL);
@@ -388,7 +388,8 @@ START_TEST(test_paint_invalid_input_is_refused)
     ck_assert(ebpo_paint_add_layer(o.paint, &layer, NULL, NULL) == EBPO_E_ARGUMENT);
     s.radius = 1;
     s.points = &q;
-    ck_assert(ebpo_paint_add_stroke(o.paint, &s, NULL) == EBPO_E_ARGUMENT); /* no point */
+    /* a stroke without points */
+    ck_assert(ebpo_paint_add_stroke(o.paint, &s, NULL) == EBPO_E_ARGUMENT);
     s.point_count = 1;
     ck_assert(ebpo_paint_add_stroke(o.paint, &s, NULL) == EBPO_OK);
     s.radius = NAN;
@@ -475,7 +476,7 @@ START_TEST(test_paint_spares_back_of_thin_plate)
 }
 END_TEST
 
-/* Two faces of one large square, and a ball that touches none of its other edges. */
+/* Tests two faces of one large square, and a ball that touches none of the square's other edges. */
 START_TEST(test_paint_joins_faces_across_long_edges)
 {
     opened o = open_model(ebpo_test_sheet(8, 1), -1);
@@ -497,8 +498,8 @@ static double lens(double r, double d)
     return 2 * r * r * acos(d / (2 * r)) - d / 2 * sqrt(4 * r * r - d * d);
 }
 
-/* On a square of side 8 there are a disc, a second disc that overlaps it, a disc that erases a part
- * of both, and a disc in a layer above. */
+/* A square of side 8 has a disc, a second disc that overlaps the first one, a disc that erases a
+ * part of both, and a disc in a layer above. */
 START_TEST(test_paint_areas_match_discs)
 {
     for (int cut = -1; cut <= 1; cut += 2) {
@@ -509,7 +510,7 @@ START_TEST(test_paint_areas_match_discs)
         add_dab(&o, 0, 0xff0000ff, 0.9, 2, 2, 0);
         add_dab(&o, 1, 0xff0000ff, 0.9, 6, 6, 0);
         add_dab(&o, 0, 0x00ff00ff, 0.9, 3, 2, 0);
-        add_dab(&o, 0, 0, 0.9, 4.2, 2, 0); /* erases only the second one */
+        add_dab(&o, 0, 0, 0.9, 4.2, 2, 0); /* erases only the second disc */
         add_dab(&o, 1, 0x00ff00ff, 0.9, 2.5, 2, 0);
         ebpo_paint_areas a = measured(&o, 256, 1), b = measured(&o, 256, 3);
         double second = disc - lens(0.9, 1.2), first = disc - lens(0.9, 1);
@@ -551,7 +552,7 @@ START_TEST(test_paint_smallest_balls_terminate)
 }
 END_TEST
 
-/* A complete sphere, and a cap of it: the area of a cap within a chord r is pi r^2. */
+/* Tests a complete sphere and a cap of the sphere. The area of a cap within a chord r is pi r^2. */
 START_TEST(test_paint_areas_follow_surface)
 {
     opened o = open_model(ebpo_test_sphere((double[3]){ 1, 2, 3 }, 2, 4), -1);
@@ -623,7 +624,7 @@ START_TEST(test_paint_pressure_adds_points)
                      again = laid_by(&o, &pen, 1, 0.5);
     pen.seed = 2;
     laid_by(&o, &pen, 1, 0.5);
-    /* the device moves up at one position, where the pen is lifted */
+    /* the device moves up at one position, which lifts the pen */
     ck_assert(soft.strokes == 2 && hard.strokes == 2 && soft.lifted == hard.lifted);
     ck_assert(soft.steps == hard.steps && soft.lifted > 0 && hard.strayed == 0);
     ck_assert(soft.points == 2 * soft.steps && hard.points == 20 * hard.steps);

@@ -1,5 +1,5 @@
-/* Pairs of faces against brute force in rational arithmetic: kinds, the filter of eight, contacts.
- */
+/* Tests pairs of faces against brute force in rational arithmetic: kinds, the filter for eight
+ * faces, contacts. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -88,15 +88,19 @@ START_TEST(test_pair_kinds_match_documentation)
     } cases[] = {
         { { { 0, 0, 1 }, { 4, 0, 1 }, { 0, 4, 1 } }, EBPO_PAIR_APART },
         { { { 1, 1, -1 }, { 1, 1, 1 }, { 9, 9, 1 } }, EBPO_PAIR_CROSSING },
-        { { { 1, 1, 0 }, { 2, 1, 0 }, { 1, 2, 5 } }, EBPO_PAIR_TOUCHING },  /* an edge within */
-        { { { 1, 1, 0 }, { 1, 1, 2 }, { 2, 1, 5 } }, EBPO_PAIR_TOUCHING },  /* a corner within */
-        { { { 4, 0, 0 }, { 0, 4, 0 }, { 4, 4, 0 } }, EBPO_PAIR_TOUCHING },  /* an edge, one plane */
-        { { { 1, 1, 0 }, { 2, 1, 0 }, { 1, 2, 0 } }, EBPO_PAIR_COPLANAR },  /* within */
-        { { { 0, 0, 0 }, { 4, 0, 0 }, { 0, 4, 0 } }, EBPO_PAIR_COPLANAR },  /* itself */
-        { { { 1, 1, -1 }, { 1, 1, 1 }, { 1, 1, 0 } }, EBPO_PAIR_TOUCHING }, /* no area, through */
-        { { { 1, 1, 0 }, { 1, 1, 0 }, { 1, 1, 0 } }, EBPO_PAIR_TOUCHING },  /* a point */
+        { { { 1, 1, 0 }, { 2, 1, 0 }, { 1, 2, 5 } }, EBPO_PAIR_TOUCHING }, /* an edge within A */
+        { { { 1, 1, 0 }, { 1, 1, 2 }, { 2, 1, 5 } }, EBPO_PAIR_TOUCHING }, /* a corner within A */
+        /* a common edge in one plane */
+        { { { 4, 0, 0 }, { 0, 4, 0 }, { 4, 4, 0 } }, EBPO_PAIR_TOUCHING },
+        { { { 1, 1, 0 }, { 2, 1, 0 }, { 1, 2, 0 } }, EBPO_PAIR_COPLANAR }, /* a face within A */
+        { { { 0, 0, 0 }, { 4, 0, 0 }, { 0, 4, 0 } }, EBPO_PAIR_COPLANAR }, /* the face itself */
+        /* a face without area that crosses A */
+        { { { 1, 1, -1 }, { 1, 1, 1 }, { 1, 1, 0 } }, EBPO_PAIR_TOUCHING },
+        /* a face that is a point */
+        { { { 1, 1, 0 }, { 1, 1, 0 }, { 1, 1, 0 } }, EBPO_PAIR_TOUCHING },
         { { { 3, 3, 0 }, { 3, 3, 0 }, { 3, 3, 0 } }, EBPO_PAIR_APART },
-        { { { 0, -1, -1 }, { 0, -1, 1 }, { 0, 1, 0 } }, EBPO_PAIR_TOUCHING }, /* at the corner */
+        /* contact at the corner */
+        { { { 0, -1, -1 }, { 0, -1, 1 }, { 0, 1, 0 } }, EBPO_PAIR_TOUCHING },
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         ck_assert_int_eq(ebpo_triangle_pair(face, cases[i].other), cases[i].kind);
@@ -184,7 +188,7 @@ START_TEST(test_pair_filter_matches_exact_result)
         check_masks(&g, masks, &open[i & 3]);
         check_builds(&g, masks);
     }
-    if (_i == 0) /* the filter is meant for ordinary faces */
+    if (_i == 0) /* only ordinary faces must be decided by the filter */
         ck_assert_int_le(open[0] + open[1], count / 2 * 8 / 100 + 4);
 }
 END_TEST

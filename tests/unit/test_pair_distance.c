@@ -1,4 +1,5 @@
-/* Distances of faces against the minimum over all pairs of features, in rational arithmetic. */
+/* Tests distances of faces against the minimum over all pairs of features, in rational arithmetic.
+ */
 #include <math.h>
 #include <string.h>
 

@@ -1,5 +1,5 @@
-/* Faces against cells, corner windings and selections, against reference implementations that
- * sample or enumerate. */
+/* Tests faces and cells, windings of corners, and selections against reference implementations
+ * that sample or enumerate. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -14,8 +14,8 @@ static const double shapes[][6] = { { 0, 0, 0, 1, 1, 1 },
                                     { 1e7, -1e7, 3, 4, 8, 16 },
                                     { 1e-30, 0, 0, 1e-30, 1e-30, 1e-30 } };
 
-/* Corners on a coarse grid around the box, so that exact contact with cell faces, edges and corners
- * is common. */
+/* Makes a face with corners on a coarse grid around the box, so that exact contact with cell
+ * faces, edges and corners is common. */
 static ebpo_triangle random_face(const ebpo_box *box, uint64_t *seed, bool on_grid)
 {
     ebpo_triangle t;
@@ -30,7 +30,7 @@ static ebpo_triangle random_face(const ebpo_box *box, uint64_t *seed, bool on_gr
 
 static void point_of(const ebpo_triangle *t, uint64_t *seed, double out[3])
 {
-    /* Weights in 64ths: corners and edge points are common. */
+    /* Weights are multiples of 1/64, so that corners and edge points are common. */
     int a = (int)(ebpo_test_random(seed) % 65),
         b = (int)(ebpo_test_random(seed) % (uint64_t)(65 - a));
     for (int k = 0; k < 3; k++)

@@ -1,4 +1,4 @@
-/* Reading and writing PLY: dialects, messages, damaged files. */
+/* Tests reading and writing of PLY: dialects, messages, damaged files. */
 #include <fcntl.h>
 #include <inttypes.h>
 #include <stdarg.h>
@@ -121,7 +121,7 @@ static void cube_edges(bytes *b, enum encoding e)
     }
 }
 
-/* A cube of six quads with other properties, lists and elements around. */
+/* Makes a cube of six quads, with other properties, lists and elements around. */
 static void make_cube(bytes *b, enum encoding e, bool faces_first, int width, const char *line_end)
 {
     const char *real_name = width == 4 ? "float32" : "float64";
@@ -462,7 +462,7 @@ START_TEST(test_ply_truncation_is_refused)
         b.size = n;
         ebpo_status status = parse(&mesh, &b, &error);
         if (status ==
-            EBPO_OK) /* ascii: nothing but blanks and digits of the last value may be missing */
+            EBPO_OK) /* in ascii, only blanks and digits of the last value may be missing */
             ck_assert(_i % 3 == ASCII && n + 2 + (_i == 3 ? 2 : 0) >= whole);
         else
             ck_assert(status == EBPO_E_FORMAT && error.message[0] && !mesh.faces);
@@ -558,7 +558,7 @@ END_TEST
 
 /* --- rows on all cores --- */
 
-/* Change in one row of many. */
+/* The kind of fault in one row of many. */
 enum error_bound {
     TRIANGLES,
     QUAD,
@@ -582,7 +582,7 @@ static uint8_t *put_raw(uint8_t *to, enum encoding e, uint64_t raw, int width)
     return to;
 }
 
-/* `second_list`: faces have another, empty list, which makes the reader process single rows. */
+/* `second_list`: faces have another, empty list, so that the reader processes single rows. */
 static uint8_t *make_many(size_t *size, enum encoding e, enum error_bound what, uint64_t at,
                           bool second_list)
 {
@@ -666,7 +666,7 @@ START_TEST(test_ply_parallel_rows_match_serial)
             ck_assert(memcmp(m.faces, reference.faces, (size_t)m.face_count * 12) == 0);
         } else {
             ck_assert(what >= BAD_INDEX);
-            if (what != LONG_LIST) /* whose items are the bytes that follow */
+            if (what != LONG_LIST) /* the items of the list are the following bytes */
                 expect_message(&error, &reference_error);
         }
         ebpo_mesh_free(&m);

@@ -1,5 +1,5 @@
-/* Polygons are cut into triangles that cover them: same area, all in the orientation of the
- * polygon. */
+/* Polygons are cut into triangles that cover the polygon: with the same area, and all with the
+ * orientation of the polygon. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -196,7 +196,8 @@ static void add_area(const int64_t *a, const int64_t *b, const int64_t *c, int64
 }
 
 /* Checks that the vector areas add up to the area of the outline, exactly. For a planar outline no
- * triangle is reversed: then each of its points is covered once. Returns how many have no area. */
+ * triangle is reversed, so that each of its points is covered once. Returns the number of
+ * triangles without area. */
 static uint32_t check_exactly(bool planar)
 {
     int64_t outline[3] = { 0 }, sum[3] = { 0 };
@@ -226,9 +227,8 @@ static void insert_corner(uint32_t before, const int64_t p[2])
     memcpy(w.at[before], p, 2 * sizeof *p);
 }
 
-/* Makes an outline with coincident edges and corners: half squares of a grid, joined along the
- * edges of a tree. The half squares cover the outline. The diagonal of a square runs from low to
- * high. */
+/* Makes an outline with coincident edges and corners. It covers half squares of a grid, which are
+ * joined along the edges of a tree. The diagonal of a square runs from low to high. */
 static void grow_glued(uint32_t side, uint32_t corners)
 {
     static bool used[400 * 400 * 2];
@@ -245,11 +245,13 @@ static void grow_glued(uint32_t side, uint32_t corners)
         const int64_t *a = w.at[i], *b = w.at[j];
         int64_t dx = b[0] - a[0], dy = b[1] - a[1], apex[2], cell[2];
         bool upper;
-        if (dx && dy) { /* to the right of the diagonal, when it goes up, is the lower half */
+        if (dx && dy) { /* the lower half is to the right of a diagonal that goes up */
             upper = dx < 0;
             cell[0] = dx < 0 ? b[0] : a[0], cell[1] = dy < 0 ? b[1] : a[1];
             apex[0] = cell[0] + !upper, apex[1] = cell[1] + upper;
-        } else if (dx) { /* to the right, below: an upper half; to the left: above, a lower one */
+            /* an upper half is below an edge that goes to the right; a lower half is above an edge
+             * that goes to the left */
+        } else if (dx) {
             upper = dx > 0;
             cell[0] = dx > 0 ? a[0] : b[0], cell[1] = a[1] - upper;
             apex[0] = cell[0] + !upper, apex[1] = cell[1] + !upper;
@@ -324,7 +326,7 @@ START_TEST(test_polygon_spikes_are_covered)
 }
 END_TEST
 
-/* In a plate with slits of no width every triangle has an area. */
+/* In a plate with slits without width, every triangle has an area. */
 START_TEST(test_polygon_slits_need_no_empty_triangle)
 {
     static const int64_t slit[][2] = { { 0, 0 }, { 10, 0 }, { 10, 10 }, { 5, 10 },

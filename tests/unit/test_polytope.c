@@ -1,5 +1,5 @@
-/* Polytopes and plane codes: volumes add up, codes decode to the encoded values, and never to less
- * than the support. */
+/* Tests polytopes and plane codes: volumes add up; codes decode to the encoded values, and never
+ * to less than the support. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -57,7 +57,8 @@ START_TEST(test_polytope_removed_volume_matches_clipping)
         for (int cut = 0; cut < 24; cut++) {
             double n[3], before = ebpo_polytope_volume(&p);
             random_direction(&seed, n);
-            /* Near the middle first, then closer to the faces, so that some volume remains. */
+            /* The first planes are near the middle, the later ones closer to the faces, so that
+             * some volume remains. */
             double d = 0.5 * (n[0] + n[1] + n[2]) + 0.2 + 0.5 * ebpo_test_random_unit(&seed);
             double removed = ebpo_polytope_removed(&p, n, d, 0, 0);
             ebpo_clip result = ebpo_polytope_clip(&p, n, d, cut);
@@ -143,7 +144,7 @@ END_TEST
 
 START_TEST(test_plane_code_decodes_or_is_refused)
 {
-    /* odd, to meet all columns of the map */
+    /* odd, so that all columns of the map are tested */
     uint32_t step = (uint32_t)(16 / ebpo_test_scaled(16)) | 1;
     for (uint32_t normal = 0; normal < 1 << 20; normal += step) {
         int32_t n[3], d;

@@ -1,4 +1,5 @@
-/* Posed coordinates: their definition, refused poses, and their error against exact motions. */
+/* Tests posed coordinates: their definition, refused poses, and their error against exact motions.
+ */
 #include <math.h>
 #include <string.h>
 
@@ -201,7 +202,8 @@ static void random_pose(ebpo_pose *pose, double far, uint64_t *state)
         ldexp(1.5 + 0.4 * reference_uniform(state), (int)reference_integer(state, -20, 20));
 }
 
-/* Vertices within about `size`, `far` from the model's origin. */
+/* Makes vertices within approximately `size` of a point at the distance `far` from the model's
+ * origin. */
 static void random_block(double wide[72], float block[72], double far, double size, int vertices,
                          uint64_t *state)
 {

@@ -1,5 +1,5 @@
-/* Exact predicates against rational reference implementations, on inputs where rounding would
- * decide. */
+/* Tests exact predicates against rational reference implementations, for inputs where rounding
+ * would decide. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -56,8 +56,8 @@ START_TEST(test_expansion_stage_decides_common_inputs)
 }
 END_TEST
 
-/* Millions of calls without a reference: swapping two points changes the sign, rotating three keeps
- * it. */
+/* Tests millions of calls without a reference implementation. Swapping two points changes the
+ * sign; rotating three points keeps it. */
 START_TEST(test_orientation_sign_changes_with_swap)
 {
     uint64_t state = (uint64_t)_i + 77;
@@ -110,8 +110,8 @@ START_TEST(test_zero_area_finds_collinear_points)
 }
 END_TEST
 
-/* Cancelling sums: later products repeat earlier ones with opposite sign, some changed by an ulp.
- */
+/* Makes sums that cancel. Later products repeat earlier ones with the opposite sign, some of them
+ * changed by one ulp. */
 static int cancelling_factors(double *f, int kind, uint64_t *state)
 {
     double p[12];

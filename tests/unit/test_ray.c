@@ -1,6 +1,6 @@
-/* Rays and boxes against triangles, compared with reference implementations in rational numbers
- * that share no method with the library: a ray is clipped by linear conditions on t, a triangle is
- * clipped as a polygon by the half-spaces of the box. */
+/* Tests rays and boxes against triangles, compared with reference implementations in rational
+ * numbers that share no method with the library. The reference clips a ray by linear conditions on
+ * t, and a triangle as a polygon by the half-spaces of the box. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -37,7 +37,7 @@ static void set3(rational3 *a, const double x[3])
         mpq_set_d(a->x[k], x[k]);
 }
 
-/* out = a - b, initialised here */
+/* out = a - b; initialises out */
 static void difference3(rational3 *out, const rational3 *a, const rational3 *b)
 {
     init3(out);
@@ -173,7 +173,8 @@ static void keep_area(interval *r, const rational3 p[3], const rational3 *normal
         }
 }
 
-/* The corners are on one line: uses the segment between the two that are farthest apart. */
+/* Keeps the part of the ray on a face whose corners are on one line: uses the segment between the
+ * two corners that are farthest apart. */
 static void keep_segment(interval *r, const rational3 p[3], const rational3 *origin,
                          const rational3 *direction)
 {
@@ -213,8 +214,8 @@ static void keep_segment(interval *r, const rational3 p[3], const rational3 *ori
     mpq_clears(length, longest, NULL);
 }
 
-/* r->low: the first common point; returns the side, and the side of origin of the line. r is
- * initialised here. */
+/* Computes the first common point, r->low. Returns the side of the face, and the side of the
+ * origin relative to the line. Initialises r. */
 static int reference_ray(const ebpo_segment *ray, const double triangle[3][3], interval *r,
                          int *facing)
 {
@@ -255,7 +256,7 @@ static int reference_ray(const ebpo_segment *ray, const double triangle[3][3], i
 
 static void interval_clear(interval *r) { mpq_clears(r->low, r->high, NULL); }
 
-/* Half the sum of two doubles. */
+/* Sets out to half the sum of two doubles. */
 static void set_middle(mpq_t out, double a, double b)
 {
     mpq_t other;
@@ -673,8 +674,8 @@ static void box_case(int kind, double triangle[3][3], double min[3], double max[
                    : kind == 1 ? small(state, 20)
                                : centre[k] - 2 * half * reference_uniform(state);
         double b = kind == 0 ? small(state, 3) : kind == 1 ? a + 16 : a + half;
-        /* Makes a box with a corner on the triangle, or one step off; also flat boxes and points.
-         */
+        /* Makes a box with a corner on the triangle, or one floating-point step off the triangle;
+         * also flat boxes and points. */
         if (kind == 2 || kind == 5) {
             a = nudged(centre[k], state);
             b = a + half;

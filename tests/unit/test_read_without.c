@@ -1,4 +1,5 @@
-/* Levels read without some of their parts: the other parts equal those of the complete level. */
+/* When levels are read without some of their parts, the other parts equal those of the complete
+ * level. */
 #include <string.h>
 
 #include "check_main.h"
@@ -9,7 +10,7 @@
 
 enum { PARTS = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES };
 
-/* Large enough that the lists of planes and of leaves have index arrays. */
+/* Makes files that are large enough for index arrays of planes and leaves. */
 static two_layouts make_files(void)
 {
     two_layouts l;
@@ -75,7 +76,7 @@ START_TEST(test_reading_with_omitted_parts)
     trees_are_whole(l.with);
     for (uint64_t without = 1; without <= PARTS + 1; without++)
         for (int level = 0; level < l.with->info.level_count; level++) {
-            /* undefined bits are ignored */
+            /* the reader ignores undefined bits */
             compare(l.with, level, without > PARTS ? UINT64_MAX : without);
             compare(l.without, level, without > PARTS ? UINT64_MAX : without);
         }

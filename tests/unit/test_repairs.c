@@ -1,4 +1,4 @@
-/* Repairs tried, against all sequences of steps on copies of the mesh. */
+/* Compares tried repairs with all sequences of steps on copies of the mesh. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -75,7 +75,7 @@ static void expect_best(const ebpo_mesh *mesh)
 {
     ebpo_repairs r = tried(mesh);
     int best = fewest(mesh);
-    if (best == 0) /* nothing to repair, and the result of dropping is reported */
+    if (best == 0) /* nothing needs repair, and the result of dropping faces is reported */
         ck_assert(r.chosen < 0 && r.count == (check(mesh).repeated_faces.count > 0));
     else if (best < 0)
         ck_assert_int_eq(r.chosen, -1);

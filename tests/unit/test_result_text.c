@@ -1,5 +1,5 @@
-/* Result text (tools/cli/result_text.h): text that is written early, lost or repeated, in any
- * order, gives the bytes of each row once. */
+/* Tests result text (tools/cli/result_text.h): text that is written early, lost or repeated, in
+ * any order, gives the bytes of each row once. */
 #include <string.h>
 
 #include "check_main.h"
@@ -36,7 +36,7 @@ static void spill(result_text *t, void *user)
 
 static unsigned items_of(uint64_t row) { return (unsigned)(row * 7919 % 59); }
 
-/* Prints the first items of a row; all items and its end, when there are so many. */
+/* Prints the first items of a row. When the row has no more items, also prints its end. */
 static void print_row(result_text *t, uint64_t row, unsigned items)
 {
     for (unsigned i = 0; i < items_of(row) && i < items; i++) {
@@ -84,7 +84,7 @@ START_TEST(test_failed_rows_are_printed_once)
             unsigned items = (unsigned)(ebpo_test_random_unit(&state) * items_of(row));
             print_row(&t, row, fails ? items : UINT32_MAX);
             failed = fails && !t.rows ? row : failed;
-            if (t.full) /* waits for the turn of the block */
+            if (t.full) /* the row must wait for the turn of its block */
                 turn = true;
             if (!t.rows)
                 result_text_retry(&t);

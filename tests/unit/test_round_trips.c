@@ -21,7 +21,7 @@ typedef struct result {
     uint64_t waves;
 } result;
 
-/* Runs one cold query for the distance, or for the class of the point. */
+/* Runs one cold query: the distance of a point, or its class. */
 static result run_query(const ebpo_file *file, const counted_source *far, const double p[3],
                         bool inside)
 {
@@ -110,8 +110,8 @@ END_TEST
 
 /* --- parts of the file --- */
 
-/* After the header there is a round trip for each of these: the top levels, rows of the table,
- * nodes with lists, faces with their vertices. */
+/* After the header, one round trip is needed for each of these: the top levels, rows of the table,
+ * nodes with lists, and faces with their vertices. */
 START_TEST(test_remote_box_query_round_trips)
 {
     enum { WAVES = 4 };
@@ -165,7 +165,7 @@ static ebpo_view_options look(ebpo_observer *observer, ebpo_priority order)
     return view;
 }
 
-/* In any order: all subtrees that a view will visit are requested together. */
+/* For each order, all subtrees that a view will visit are requested together. */
 START_TEST(test_remote_view_round_trips)
 {
     if (!ebpo_test_wanted(_i))
@@ -200,8 +200,8 @@ static const char *by_number(const ebpo_file *file)
     return path;
 }
 
-/* The final depth is not known in advance: prefetch hints cover nodes whose turn is near, neither
- * the deepest levels, for which there is no memory, nor single nodes. */
+/* The final depth is not known in advance. Prefetch hints cover nodes whose turn is near. They
+ * cover neither the deepest levels, for which there is no memory, nor single nodes. */
 START_TEST(test_remote_limited_view_round_trips)
 {
     static const struct {

@@ -1,4 +1,4 @@
-/* Scenes: valid and invalid files, poses in time, boxes and pairs against reference
+/* Tests scenes: valid and invalid files, poses in time, boxes and pairs against reference
  * implementations. */
 #include "core/strict_fp.h"
 
@@ -200,7 +200,7 @@ START_TEST(test_scene_csv_routes)
         { "time,x,y,z,qx,qy,qz,qw\n1,2,3,4,0,0,0,1\n\n2;2;3;5;0;0;0;-1\r\n", NULL },
         { "\xef\xbb\xbftime,x,y,z,qx,qy,qz,qw\n1,2,3,4,0,0,0,1\n2,2,3,5,0,0,0,-1\n", NULL },
         { "\xff\xfet\0i\0", "two bytes a character (UTF-16)" },
-        { "\xef\xbb\xbf", "there are no poses" }, /* and nothing behind it */
+        { "\xef\xbb\xbf", "there are no poses" }, /* only a byte order mark */
         { "scale, qw ,qz,qy,qx,z,y,x,time\n 1 , 1,0,0,0,4,3,2,1\n1,1,0,0,0,5,3,2,2", NULL },
         { "time,x,y,z\n", "line 1: the first line must name" },
         { "time,x,y,z,qx,qy,qz,qw,qw\n", "line 1: each column must be one of" },
@@ -387,9 +387,8 @@ START_TEST(test_scene_motion_bounds_hold)
 }
 END_TEST
 
-/* bounds are tight for a quarter turn at arm's length and for a straight path */
-/* An arm that turns by a right angle, its tip on the x axis halfway, and translates by its length:
- * squares of these lengths are no doubles. */
+/* An arm turns by a right angle, with its tip on the x axis halfway, and translates by its length.
+ * The squares of these lengths overflow or underflow. */
 START_TEST(test_scene_motion_bounds_of_any_size)
 {
     static const int exponents[] = { -560, 0, 530 };
@@ -417,6 +416,7 @@ START_TEST(test_scene_motion_bounds_of_any_size)
 }
 END_TEST
 
+/* Bounds are tight for a quarter turn of a point at a distance of 1, and for a straight path. */
 START_TEST(test_scene_motion_bounds_are_tight)
 {
     ebpo_scene *s =
@@ -490,7 +490,7 @@ static void all_pairs(const ebpo_scene *s, double from, double to, found *f)
         }
 }
 
-/* Tests few and many lines of rules, for instances with few and many groups: the lines are
+/* Tests few and many lines of rules, for instances with few and many groups. The lines are
  * evaluated in order. */
 START_TEST(test_scene_rules_match_reference)
 {

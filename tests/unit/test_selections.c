@@ -1,6 +1,6 @@
-/* Selections: selections of the theses against reference implementations; the hull for candidate
- * directions; files of every selection keep the guarantees; and the lower limit of all envelopes.
- */
+/* Tests selections: those of the theses against reference implementations; the hull for candidate
+ * directions; files of every selection, which keep the guarantees; and the lower limit of all
+ * envelopes. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -190,9 +190,9 @@ START_TEST(test_plane_counts_match_theses)
     ck_assert_int_eq(ebpo_selection_wanted(1000, 0, 40, 250), 250);
     ck_assert_int_eq(ebpo_selection_wanted(1000, 2, 40, 694), 173);
     ck_assert_int_eq(ebpo_selection_wanted(100, 1, 40, 694), 86);   /* 347, 173.5, 86.75 */
-    ck_assert_int_eq(ebpo_selection_wanted(100, 10, 40, 694), 100); /* K below 1: all of them */
+    ck_assert_int_eq(ebpo_selection_wanted(100, 10, 40, 694), 100); /* K below 1 selects all */
     ck_assert_int_eq(ebpo_selection_wanted(1, 0, 40, 694), 1);
-    /* never more than a file stores: chosen planes are kept */
+    /* the number never exceeds the maximum of the format */
     ck_assert_int_eq(ebpo_selection_wanted(1000, 0, 40, 694), EBPO_PLANES_STORED);
     ck_assert_int_eq(ebpo_selection_wanted(1000, 0, 40, 0), EBPO_PLANES_STORED);
     ck_assert_int_eq(ebpo_selection_wanted(1000, 30, 40, 694), EBPO_PLANES_STORED);
@@ -254,7 +254,7 @@ START_TEST(test_hull_of_nearly_flat_points)
         int space = 4 + round % 77;
         memset(&facets[space], 0x5a, sizeof *facets);
         for (int i = 0; i < 40;
-             i++) { /* on a cylinder, a grid, a plane: inputs with unstable signs */
+             i++) { /* points on a cylinder, a grid or a plane: inputs with unstable signs */
             double a = 0.1 * (double)(ebpo_test_random(&seed) % 63);
             p[i][0] = round % 3 ? cos(a) : ebpo_test_random_unit(&seed),
             p[i][1] = round % 3 ? sin(a) : ebpo_test_random_unit(&seed),
@@ -272,12 +272,12 @@ START_TEST(test_hull_of_flat_points_and_grid)
     static ebpo_hull_facet facets[EBPO_HULL_FACETS];
     static double p[EBPO_HULL_POINTS][3];
     ck_assert_int_eq(ebpo_hull_facets((const double(*)[3])p, 3, 1e-9, facets, EBPO_HULL_FACETS), 0);
-    /* all at one point */
+    /* all points are equal */
     ck_assert_int_eq(ebpo_hull_facets((const double(*)[3])p, 100, 1e-9, facets, EBPO_HULL_FACETS),
                      0);
     for (int i = 0; i < 100; i++)
         p[i][0] = i % 10, p[i][1] = i / 10;
-    /* in a plane */
+    /* all points are in a plane */
     ck_assert_int_eq(ebpo_hull_facets((const double(*)[3])p, 100, 1e-9, facets, EBPO_HULL_FACETS),
                      0);
     for (int i = 0; i < 512; i++)
@@ -342,7 +342,7 @@ START_TEST(test_selections_make_valid_files)
     if (omitted(_i))
         return;
     for (int s = _i % 2; s < 2 * EBPO_SELECTION_COUNT;
-         s += 2) { /* each solid with every second selection, which halves the time */
+         s += 2) { /* each solid is tested with every second selection, which halves the time */
         ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
         ebpo_error error = EBPO_ERROR_INIT;
         ebpo_verify_report report = EBPO_VERIFY_REPORT_INIT;
@@ -458,8 +458,8 @@ static double root_excess(const ebpo_build_options *options)
     return volume / solid - 1;
 }
 
-/* Clusters of normals are not nested, so a greater number of planes may increase the excess, at
- * most by this share. */
+/* Greatest share by which a greater number of planes may increase the excess, because clusters of
+ * normals are not nested. */
 static const double step_may_lose = 0.02;
 
 static void falls(ebpo_build_options *o, double *option, const double *value, int count)
@@ -574,7 +574,8 @@ START_TEST(test_envelope_sizes_are_close_to_limit)
                           "%s, level %d: %g below the limit %g", solid->name, level, volume,
                           limit.volume);
             ck_assert_double_le(volume, before * (1 + 1e-9) + 1e-12 * root);
-            if (s == 0 && level <= 3) /* rounding of offsets to 4096ths of a cell costs some */
+            /* rounding of offsets to 1/4096 of a cell increases the volume */
+            if (s == 0 && level <= 3)
                 ck_assert_msg(volume - limit.volume <= 0.03 * root,
                               "%s, level %d: %g where %g is possible", solid->name, level, volume,
                               limit.volume);

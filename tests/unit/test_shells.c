@@ -1,5 +1,5 @@
-/* Nesting of closed components, found by trees, against a reference implementation that compares
- * all pairs. */
+/* Compares the nesting of closed components, found by trees, with a reference implementation that
+ * compares all pairs. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -25,7 +25,7 @@ static void position(const ebpo_mesh *m, uint64_t corner, double out[3])
     ebpo_mesh_position(m, m->faces[corner], out);
 }
 
-/* Orders points by coordinate d, and points with this coordinate equal by the others. */
+/* Orders points by coordinate d, and points with equal coordinate d by the other coordinates. */
 static bool before(const double a[3], const double b[3], int d)
 {
     int axis = d / 2;
@@ -100,7 +100,7 @@ static ebpo_shells reference(const ebpo_mesh *m, const parts *p)
     return s;
 }
 
-/* Rotates about x, so that long faces are across the axes; by thirds, as rounded. */
+/* Rotates about x by thirds, with rounding, so that long faces are slanted to the axes. */
 static void lean(ebpo_mesh *m)
 {
     for (uint64_t v = 0; v < m->vertex_count; v++) {
@@ -129,8 +129,8 @@ static double whole(uint64_t *state, uint64_t most)
     return (double)(ebpo_test_random(state) % most);
 }
 
-/* Boxes at integer coordinates, so that they share faces and are in contact; tetrahedra, tori with
- * holes. */
+/* Makes boxes at integer coordinates, which share faces and are in contact; tetrahedra; and tori.
+ */
 static ebpo_mesh many(uint64_t *state, parts *p)
 {
     ebpo_mesh m = { 0 };
@@ -177,8 +177,7 @@ START_TEST(test_shell_nesting_matches_reference)
 }
 END_TEST
 
-/* Makes so many nested components that each contains many, and each also contains a separate small
- * one. */
+/* Makes a long chain of nested components. Each component also contains a separate small one. */
 START_TEST(test_shell_chain_depth)
 {
     enum { CHAIN = 150 };

@@ -1,4 +1,5 @@
-/* Structs that begin with their size: callers of other versions, and callers who did not set it. */
+/* Tests structs that begin with their size, for callers of other versions and callers that did not
+ * set the size. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -64,7 +65,8 @@ START_TEST(test_options_of_other_versions)
     ebpo_workspace_stats stats = EBPO_WORKSPACE_STATS_INIT;
     later.now.memory = 256 << 20;
     later.now.temp_dir = "/no/such/folder";
-    later.now.struct_size = offsetof(ebpo_workspace_options, temp_dir); /* an earlier one */
+    /* the size of an earlier version */
+    later.now.struct_size = offsetof(ebpo_workspace_options, temp_dir);
     ebpo_workspace *workspace = made_with(&later, EBPO_OK);
     ck_assert_int_eq(ebpo_workspace_get_stats(workspace, &stats), EBPO_OK);
     ck_assert_uint_eq(stats.memory, 256 << 20);
@@ -108,8 +110,8 @@ START_TEST(test_output_structs_are_filled_by_size)
 }
 END_TEST
 
-/* Expects that a public call with an uninitialized struct is refused, with a message that names the
- * struct, and makes nothing. */
+/* Expects that a public call refuses an uninitialized struct with a message that names the struct,
+ * and creates nothing. */
 #define REFUSED(type, call)                                                                   \
     do {                                                                                      \
         ebpo_error error_ = EBPO_ERROR_INIT, *error = &error_;                                \
@@ -118,7 +120,7 @@ END_TEST
                       error_.message);                                                        \
     } while (0)
 
-/* Returns zeros of any type. */
+/* Returns a zeroed block for any type. */
 static void *zeros(void)
 {
     static uint64_t block[4096];

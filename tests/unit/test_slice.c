@@ -1,4 +1,4 @@
-/* Parts of a file against the whole file: ranges, nodes, subtrees in one piece. */
+/* Compares parts of a file with the whole file: ranges, nodes, subtrees in one piece. */
 #include <dirent.h>
 #include <pthread.h>
 #include <stdint.h>
@@ -280,7 +280,7 @@ static void check_node(const whole *w, const ebpo_node *node)
     }
 }
 
-/* Checks every node; the subtrees of each `step`th of them. */
+/* Checks every node, and the subtree of every `step`th node. */
 static void check_all(const whole *w, uint64_t step)
 {
     uint64_t turn = 0;
@@ -330,8 +330,8 @@ START_TEST(test_slices_of_solids_match_file)
 }
 END_TEST
 
-/* More than 4,096 groups, gray nodes and leaves in a level, so that index arrays exist and give the
- * beginning; dozens of chunks. */
+/* Uses more than 4,096 groups, gray nodes and leaves in a level, so that parts begin at rows of
+ * the index arrays; and dozens of chunks. */
 START_TEST(test_slices_by_index_with_little_memory)
 {
     random_tree_options options = { 5, 7, 13, 2, true, _i == 1, true, _i == 1 };
@@ -531,7 +531,7 @@ static void check_bounds(const ebpo_slice *s)
         ck_assert_uint_lt(s->mesh.faces[i], s->mesh.vertex_count);
 }
 
-/* Reads some of everything; returns true when there was no error. */
+/* Reads parts of all data. Returns true when there was no error. */
 static bool try_all(const ebpo_file *file, ebpo_chunks *chunks, uint64_t *state)
 {
     const ebpo_info *info = ebpo_file_info(file);
@@ -817,7 +817,8 @@ TEST_SUITE(slice)
     tcase_add_test(cases, test_slice_of_invalid_vectors_fails);
     tcase_add_test(cases, test_slices_of_real_model_are_complete);
     suite_add_tcase(suite, cases);
-    cases = tcase_create("threads"); /* separate: CK_RUN_CASE=threads under a thread sanitizer */
+    /* a separate case, for CK_RUN_CASE=threads with a thread sanitizer */
+    cases = tcase_create("threads");
     tcase_set_timeout(cases, 300);
     tcase_add_checked_fixture(cases, make_folder, scratch_leave);
     tcase_add_test(cases, test_slice_threads_share_cache);

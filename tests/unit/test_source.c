@@ -1,5 +1,5 @@
-/* Files from memory, from paths and from a source of the caller: the same trees, few reads, and
- * correct reports of failed reads. */
+/* Reads files from memory, from paths and from a source of the caller: the trees are the same,
+ * reads are few, and failed reads are reported correctly. */
 #include <limits.h>
 #include <hdf5.h>
 #include <pthread.h>
@@ -137,8 +137,8 @@ static ebpo_status open_probe(ebpo_file **file, probe *p, ebpo_error *error)
     return ebpo_open_source(&source, "afar", file, error);
 }
 
-/* Writes the same content by libhdf5, with distributed metadata. By default there are chunks in
- * B-trees and no checksums; `kept`: with the layout of this format. */
+/* Writes the same content by libhdf5, with distributed metadata. By default, chunks are in B-trees
+ * and have no checksums; with `kept`, the file has the layout of this format. */
 static void rewrite(bool kept)
 {
     static const char *const groups[] = { "levels", "mesh", "maps", "subtrees" };
@@ -280,7 +280,7 @@ START_TEST(test_open_and_array_read_counts)
     later = after.bytes_read;
     later_reads = after.reads;
     reads = stats.reads;
-    /* of the table of subtrees only the list of chunk offsets was needed */
+    /* only the list of chunk offsets of the part `subtrees` was needed */
     ebpo_stored_sizes sizes = EBPO_STORED_SIZES_INIT;
     ck_assert_int_eq(ebpo_file_locate(file, &sizes, NULL), EBPO_OK);
     ck_assert_uint_eq(later - bytes, size - info->head_bytes - info->chunk_index_bytes -
@@ -425,7 +425,8 @@ START_TEST(test_files_without_checksums_are_refused)
     ck_assert_msg(ebpo_open_compat(rewritten, NULL, &file, &error) == EBPO_OK, "%s", error.message);
     expect_tree(file, 2);
     ebpo_close(file);
-    ck_assert_int_eq(ebpo_open_compat(path, NULL, &file, &error), EBPO_OK); /* as all other files */
+    /* opens this file like all other files */
+    ck_assert_int_eq(ebpo_open_compat(path, NULL, &file, &error), EBPO_OK);
     ebpo_close(file);
 }
 END_TEST
@@ -508,11 +509,11 @@ START_TEST(test_open_file_keeps_no_hdf5_objects)
     make_file(&small, EBPO_CODEC_ZSTD);
     ck_assert_int_eq(ebpo_open(path, &file, NULL), EBPO_OK);
     ck_assert_int_eq(H5Fget_obj_count(H5F_OBJ_ALL, H5F_OBJ_ALL), 0);
-    ck_assert_int_eq(H5close(), 0); /* the library is not needed any more */
+    ck_assert_int_eq(H5close(), 0); /* libhdf5 is no longer needed */
     expect_tree(file, 2);
     ebpo_close(file);
     ck_assert_msg(ebpo_open(path, &file, &error) == EBPO_OK, "%s",
-                  error.message); /* and it is initialised again */
+                  error.message); /* libhdf5 is initialised again */
     ebpo_close(file);
 }
 END_TEST

@@ -1,5 +1,5 @@
-/* Levels in order: the same nodes as in the tree read at once, planes that contain the half-spaces
- * of their codes (proved with rationals), closed polygons, volumes. */
+/* Reads levels in order: the nodes are those of the tree read at once; planes contain the
+ * half-spaces of their codes (proved with rationals); polygons are closed; and volumes agree. */
 #include <gmp.h>
 #include <math.h>
 #include <stdio.h>
@@ -261,7 +261,7 @@ START_TEST(test_stream_reads_only_requested_level)
         while (next_node(stream, &node))
             ;
         after = ebpo_test_file_stats(file).bytes_read;
-        /* the list of chunk checksums comes with the first chunk */
+        /* the list of chunk checksums is read with the first chunk */
         ck_assert_uint_le(after - before, stored.level_bytes[i] + (i ? 0 : stored.sum_bytes));
     }
     ebpo_stream_free(stream);
@@ -357,7 +357,7 @@ static void expect_volumes(ebpo_file *file, bool stored_leaves)
                 continue;
             }
             expect_closed(&node);
-            double away = 1e-9; /* vertices far from the origin are rounded more */
+            double away = 1e-9; /* vertices far from the origin have greater rounding errors */
             for (int k = 0; k < 3; k++)
                 away += 1e-14 * fabs(node.max[k]) / (node.max[k] - node.min[k]);
             ck_assert_double_eq_tol(polygon_volume(&node) / cell, node.volume / cell, away);
@@ -526,7 +526,8 @@ END_TEST
 
 /* --- the solid is within --- */
 
-/* Vertices that no face uses come last and need not be within anything. */
+/* Returns the number of used vertices. Vertices that no face uses come last and need not be inside
+ * an envelope. */
 static uint64_t used_vertices(const ebpo_mesh *mesh)
 {
     uint64_t used = 0;
@@ -594,7 +595,7 @@ static int by_octcode(const void *a, const void *b)
     return (p->octcode > q->octcode) - (p->octcode < q->octcode);
 }
 
-/* Sorts the vertices by their cell of `level`; the lower faces of a cell belong to the cell. */
+/* Sorts the vertices by their cell of `level`. A cell contains its lower faces. */
 static void place(placed *list, const ebpo_mesh *mesh, uint64_t count, const ebpo_box *box,
                   int level)
 {

@@ -182,8 +182,8 @@ static void query_rays(tally *t, query_model *m, part *p, int way, uint64_t seed
         if (answered(t,
                      ebpo_ray_first(p->context[way], origin, direction, t_max, &near, &too, &error),
                      &error))
-            /* among faces with equal t the first in the file is returned, which may be another face
-             * in the subset */
+            /* among faces with equal t, the first face in the file is returned, which may be
+             * another face in the subset */
             ck_assert(hit == too && (!hit || far.t == near.t));
         fine(ebpo_ray_all(m->context, origin, direction, t_max, &all, &count, &error), &error);
         if (answered(t,
@@ -212,7 +212,8 @@ static void query_box(tally *t, query_model *m, part *p, int way, const double m
     if (!answered(t, status, &error))
         return;
     ck_assert_uint_eq(count, found);
-    if (p->info->parts & EBPO_PART_MAPS && count) { /* orders are those of the files */
+    /* the order of the results is that of the files */
+    if (p->info->parts & EBPO_PART_MAPS && count) {
         uint64_t *a = malloc(count * sizeof *a), *b = malloc(count * sizeof *b);
         memcpy(a, all, count * sizeof *a);
         memcpy(b, some, count * sizeof *b);
@@ -256,7 +257,7 @@ static void random_box(query_model *m, uint64_t *state, ebpo_subset_options *o)
         double a = ebpo_test_random_unit(state), b = a + ebpo_test_random_unit(state) * 0.5;
         o->min[k] = m->info.box_origin[k] + a * m->info.box_size[k];
         o->max[k] = m->info.box_origin[k] + b * m->info.box_size[k];
-        if (ebpo_test_random(state) % 4 == 0) { /* a cell face */
+        if (ebpo_test_random(state) % 4 == 0) { /* on a cell face */
             double step = m->info.box_size[k] / 4;
             o->min[k] = m->info.box_origin[k] + step * (double)(ebpo_test_random(state) % 4);
             o->max[k] = ebpo_test_random(state) % 2 ? o->min[k] : o->min[k] + step;
@@ -487,8 +488,8 @@ START_TEST(test_subset_of_replaced_file_is_refused)
         ebpo_file *file;
         fine(ebpo_file_repack(m.file, path, NULL, NULL, &error), &error);
         fine(ebpo_open(i == 3 ? link : path, &file, &error), &error);
-        fine(ebpo_file_repack(file, path, NULL, NULL, &error), &error); /* from here on it is
-                                                                         * outdated */
+        /* from here on, the open file is outdated */
+        fine(ebpo_file_repack(file, path, NULL, NULL, &error), &error);
         ebpo_status status = i == 1   ? ebpo_subset(file, path, &o, &error)
                              : i == 2 ? ebpo_subset(file, path, &fit, &error)
                                       : ebpo_file_repack(file, path, NULL, NULL, &error);
@@ -544,7 +545,7 @@ START_TEST(test_subset_measure_is_refused)
 }
 END_TEST
 
-/* Changes bytes of the header one by one, which checksums of HDF5 mostly detect; then tests the
+/* Changes bytes of the header one by one; checksums of HDF5 detect most changes. Then tests the
  * library with a file of wrong counts. */
 START_TEST(test_damaged_subsets_are_harmless)
 {
@@ -581,8 +582,8 @@ START_TEST(test_damaged_subsets_are_harmless)
 }
 END_TEST
 
-/* Changes numbers in one chunk of an unfiltered file, and its checksum: the contents must be
- * checked separately. */
+/* Changes numbers in one chunk of an unfiltered file and its checksum, so that only checks of the
+ * contents detect them. */
 static void lie(ebpo_file *file, uint8_t *bytes, uint64_t *state)
 {
     static uint8_t raw[EBPO_CHUNK_BYTES_MAX], stored[2 * EBPO_CHUNK_BYTES_MAX];

@@ -1,4 +1,4 @@
-/* Subtrees as plain arrays, against a reference implementation that reads the whole file and
+/* Compares subtrees as plain arrays with a reference implementation that reads the whole file and
  * selects nodes. */
 #include <limits.h>
 #include <math.h>
@@ -62,8 +62,9 @@ static ebpo_file *write_solid(ebpo_mesh mesh, uint32_t parts, uint32_t leaf_face
 /* --- the reference implementation: every node of the file, level after level --- */
 
 typedef struct reference_node {
-    uint64_t octcode, rank[4], refs; /* such nodes before it in the level, and their references */
-    uint64_t plane;                  /* own planes: their beginning in the level */
+    /* numbers of such nodes before the node in its level, and number of their references */
+    uint64_t octcode, rank[4], refs;
+    uint64_t plane; /* index of the node's first plane in the level */
     ebpo_node_type type;
 } reference_node;
 
@@ -135,7 +136,7 @@ typedef struct pair {
     ebpo_subtree_faces faces;
     uint64_t octcode;
     int level;
-    uint8_t *listed; /* by index in the file; 2: new in this subtree */
+    uint8_t *listed; /* flag by index in the file; 2: new in this subtree */
 } pair;
 
 static int32_t winding_of(const ebpo_level *l, const reference_node *n)
@@ -203,7 +204,7 @@ static void compare_level(pair *p, int i, bool has_faces)
     ck_assert(number == p->nodes.level_first[i + 1]);
 }
 
-/* Checks that children are where the next level has their octcodes, or nowhere. */
+/* Checks that children are at the position of their octcodes in the next level, or are missing. */
 static void compare_children(const pair *p)
 {
     uint64_t linked = 1;
@@ -324,7 +325,7 @@ static void check_refused(const ebpo_file *file, uint64_t octcode, ebpo_status s
     ck_assert_msg(strstr(error.message, word), "%s", error.message);
 }
 
-/* Checks every `step`th gray node and leaf; all others are refused. */
+/* Checks every `step`th gray node and leaf. All other nodes are refused. */
 static void check_all(const ebpo_file *file, uint64_t step)
 {
     reference t;
@@ -472,7 +473,7 @@ START_TEST(test_subtree_nodes_match_streams)
             ebpo_subtree *subtree = open_around(file, node.octcode, _i,
                                                 EBPO_PART_PLANES | EBPO_PART_LEAF_PLANES, &number);
             if (!subtree)
-                continue; /* white and black ones */
+                continue; /* white and black nodes */
             ck_assert_int_eq(ebpo_subtree_get_node(subtree, number, true, &own, &error), EBPO_OK);
             same_node(&own.node, &node);
             compared++;
@@ -527,7 +528,7 @@ static uint64_t planes_above(const ebpo_subtree_nodes *nodes, uint64_t number)
     return planes;
 }
 
-/* The inherited planes, its own planes and its cell bound the corners of an envelope. */
+/* The inherited planes, the node's planes and its cell bound the corners of an envelope. */
 START_TEST(test_subtree_inherited_planes_bound_envelope)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -698,7 +699,7 @@ START_TEST(test_subtree_octcodes_of_points)
 }
 END_TEST
 
-/* The maximum number of levels means all. */
+/* The maximum number of levels requests all levels. */
 START_TEST(test_subtree_level_count_is_clamped)
 {
     ebpo_file *file = write_solid(ebpo_test_torus(2, 0.7, 30, 20), DEFAULT, 6, EBPO_CODEC_ZSTD);
@@ -746,7 +747,7 @@ START_TEST(test_subtree_without_faces_gives_reason)
 }
 END_TEST
 
-/* Returns the limit that the error message names; 0: `memory` is enough. */
+/* Returns the limit that the error message names, or 0 when `memory` is enough. */
 static uint64_t named_limit(const ebpo_file *file, uint64_t octcode, uint64_t memory)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -830,7 +831,7 @@ static bool try_changed(const uint8_t *data, uint64_t size, uint64_t octcode)
     return status == EBPO_OK;
 }
 
-/* Files without checksums, so that changed data is read. */
+/* Uses files without checksums, so that changed data is read. */
 START_TEST(test_subtree_changed_bytes_stay_in_bounds)
 {
     FILE *f;

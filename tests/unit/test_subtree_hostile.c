@@ -1,5 +1,5 @@
-/* Wrong tables of subtrees: every number is changed, in files with valid checksums. Results must
- * equal those of a file without a table, or be refused; prefetch hints are within the file. */
+/* Tests wrong tables of subtrees: every number is changed, in files with valid checksums. Results
+ * must equal those of a file without a table, or be refused. Prefetch hints are within the file. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -20,7 +20,7 @@ static const double points[POINTS][3] = { { 2.7, 0.1, 0.2 },
 typedef struct truth {
     two_layouts files;
     changeable c;
-    uint64_t *octcode, *sum, count, roots; /* roots: of subtrees, which come first */
+    uint64_t *octcode, *sum, count, roots; /* roots: number of subtree roots, which come first */
     double distance[POINTS];
     bool inside[POINTS];
 } truth;
@@ -66,7 +66,7 @@ static ebpo_file *open_bytes(far_bytes *b, bool far)
 
 /* --- queries --- */
 
-/* Returns false when something is refused, which is OK. */
+/* Returns false when a call is refused, which is allowed. */
 static bool run_query(const ebpo_file *file, double distance[POINTS], bool inside[POINTS])
 {
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
@@ -131,7 +131,7 @@ static void truth_free(truth *t)
     free(t->sum);
 }
 
-/* Checks subtrees around one and some others: each is unchanged, or refused. */
+/* Checks the subtrees around one subtree, and some others. Each is unchanged or refused. */
 static void check_results(const truth *t, uint64_t around, bool far, uint64_t *refused)
 {
     far_bytes b = { t->c.data, t->c.size };

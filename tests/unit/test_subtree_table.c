@@ -1,5 +1,5 @@
-/* The table of subtrees against plain counting, the order of chunks against the specification, and
- * the same model in both layouts. */
+/* Compares the table of subtrees with simple counting, the order of chunks with the specification,
+ * and the same model in both layouts. */
 #include <hdf5.h>
 #include <stdlib.h>
 #include <string.h>
@@ -28,7 +28,7 @@ typedef struct plain_table {
     int level;
     unsigned cols;
     uint64_t subtrees;
-    uint64_t (*sum)[EBPO_SUBTREE_COLS]; /* [subtrees + 1] sums before each subtree */
+    uint64_t (*sum)[EBPO_SUBTREE_COLS]; /* [subtrees + 1], the sums before each subtree */
 } plain_table;
 
 /* Returns the subtree of each group of a level; the gray nodes of the level give the next one. */
@@ -274,8 +274,8 @@ static uint64_t list_chunks(const ebpo_file *file, placed *out)
     return count;
 }
 
-/* Returns the position in the list of the specification: the step, and within it the level or
- * nothing. */
+/* Returns the position in the list of the specification: the step, and the level within the step,
+ * if any. */
 static unsigned step_of(const ebpo_info *info, const placed *p)
 {
     int whole = info->subtree_level > 5 ? info->subtree_level : 5, deep = whole + 1;
@@ -389,8 +389,8 @@ END_TEST
 
 /* --- remote files --- */
 
-/* With a failed connection each attempt waits: among many points the first failure ends the
- * prefetching for the others, and the query reports it. */
+/* With a failed connection, each attempt waits. The first failure among many points ends the
+ * prefetching for the other points, and the query reports it. */
 START_TEST(test_failed_connection_ends_batch)
 {
     enum { POINTS = 200 };

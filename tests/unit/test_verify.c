@@ -1,5 +1,5 @@
-/* The verifier on correct trees, and on trees with one error each: each error is detected in the
- * correct kind of check. */
+/* Tests the verifier with correct trees, and with trees that have one error each. Each error is
+ * detected by the correct kind of check. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,7 +11,7 @@
 #include "solids.h"
 #include "verify/verify_parts.h"
 
-static ebpo_tree tree; /* tree of the running test */
+static ebpo_tree tree; /* the tree of the current test */
 static ebpo_tally tally;
 
 static void build_mesh(ebpo_mesh *mesh, uint32_t leaf_faces, ebpo_rule rule,
@@ -181,7 +181,7 @@ static void add_plane(int l, uint32_t code)
 
 START_TEST(test_verify_detects_plane_cutting_corner)
 {
-    /* The middle of the box is inside and far from faces; it is corner 7 of the lowest cell of
+    /* The middle of the box is inside and far from faces. It is corner 7 of the lowest cell of
      * level 1. The normal is (170, 170, 171). */
     build("box_subdivided", 8, EBPO_RULE_NONZERO);
     ck_assert_int_eq(type_of(1, 0, 0), EBPO_GRAY);
@@ -373,7 +373,8 @@ START_TEST(test_verify_detects_moved_vertex)
     build("sphere", 8, EBPO_RULE_NONZERO);
     move_vertex(7, 0.5);
     expect_caught(EBPO_VERIFY_LISTS, "face");
-    build("sphere", 1000000, EBPO_RULE_NONZERO); /* one leaf: only its planes are affected */
+    /* the tree has one leaf, so that only its planes are affected */
+    build("sphere", 1000000, EBPO_RULE_NONZERO);
     shrink(&tree.level[0].leaf_planes[0], 2);
     expect_caught(EBPO_VERIFY_CONTAINMENT, "level 0");
     build("sphere", 8, EBPO_RULE_NONZERO);
@@ -495,7 +496,7 @@ START_TEST(test_verify_real_models)
         snprintf(path, sizeof path, "%s/%s.ply", folder, names[i]);
         ebpo_mesh mesh;
         if (ebpo_mesh_read(path, NULL, &mesh, NULL) != EBPO_OK)
-            continue; /* the folder may contain only some of them */
+            continue; /* the folder may contain only some of the models */
         build_mesh(&mesh, 16, EBPO_RULE_NONZERO, (ebpo_repair_record){ 0 });
         expect_fine(names[i]);
         ebpo_tree_free(&tree);

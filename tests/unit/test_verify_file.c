@@ -1,5 +1,5 @@
-/* The verifier on files: with and without their parts, against their source and against another
- * one, intact and damaged. */
+/* Tests the verifier with files: with and without optional parts, against their source and against
+ * another mesh, intact and damaged. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -29,7 +29,8 @@ static void leave(void)
     scratch_leave();
 }
 
-/* A mesh with repeated vertices, a hole and reversed faces: every repair changes something. */
+/* Makes a mesh with repeated vertices, a hole and reversed faces, so that every repair changes
+ * something. */
 static ebpo_mesh worn_mesh(void)
 {
     ebpo_mesh mesh = ebpo_test_make("sphere");
@@ -159,7 +160,7 @@ START_TEST(test_verify_detects_other_source)
 }
 END_TEST
 
-/* A file whose coordinates an earlier version rounded, which is no damage. */
+/* Tests a file whose coordinates an earlier version rounded. This is not damage. */
 START_TEST(test_verify_names_coordinates_of_old_version)
 {
     ebpo_mesh source = ebpo_test_make("box_subdivided"), rounded = ebpo_test_make("box_subdivided");
@@ -174,15 +175,16 @@ START_TEST(test_verify_names_coordinates_of_old_version)
     ck_assert(report.source.violations == 1 && report.violations == 1);
     ck_assert_str_eq(report.source.first, "coordinates were rounded to single precision by an "
                                           "earlier version; convert again");
-    strcpy(source.source_format, "ply-ascii"); /* these kept the text of their header */
+    strcpy(source.source_format, "ply-ascii"); /* this version stored the text of the header */
     ck_assert(verify_against(&source));
     ck_assert(strstr(report.source.first, "different kinds of coordinates") != NULL);
     ebpo_mesh_free(&source);
 }
 END_TEST
 
-/* Flips bits of the arrays (not of the header, as libhdf5 leaks memory when that is damaged). The
- * result is a finding, or the byte is unused; there is never a crash or a failed call. */
+/* Flips bits of the arrays. Bits of the header are not flipped, because libhdf5 leaks memory when
+ * the header is damaged. The result is a finding, or the byte is unused; there is never a crash or
+ * a failed call. */
 START_TEST(test_verify_reports_damage_as_findings)
 {
     write_file(ebpo_test_make("sphere"), false, ~0u);
@@ -229,7 +231,7 @@ START_TEST(test_verify_validation_and_cancel)
     ebpo_verify_options options = EBPO_VERIFY_OPTIONS_INIT;
     options.progress.report = stop_at_once;
     ebpo_status status = ebpo_verify(file, &options, &report, &error);
-    /* a small file is done before the first report */
+    /* a small file is finished before the first report */
     ck_assert(status == EBPO_OK || status == EBPO_E_CANCELLED);
     ck_assert(ebpo_verify(file, NULL, &report, &error) == EBPO_OK);
     ck_assert_uint_eq(report.violations, 0);
@@ -243,7 +245,7 @@ static bool stop_at_unused(void *user, const char *stage, uint64_t done, uint64_
     return strcmp(stage, "checking unused bytes") != 0;
 }
 
-/* Unused bytes as in sparse files, which take no space. */
+/* Tests unused bytes in a sparse file, which take no space. */
 START_TEST(test_verify_unused_bytes_and_cancel)
 {
     enum { UNUSED = 1 << 20 };

@@ -1,5 +1,5 @@
-/* The geometry of the verifier: floating-point results against rationals, rays against the
- * crossings of the library, the certificates against clipping. */
+/* Tests the geometry of the verifier: floating-point results against rationals, rays against the
+ * crossings of the library, and the certificates against clipping. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -23,8 +23,8 @@ static ebpo_cell some_cell(uint64_t *state)
     return cell;
 }
 
-/* Coordinates near the cell; often exactly on its faces, corners and middle, so that every kind of
- * contact occurs. */
+/* Returns a coordinate near the cell, often exactly on its faces, corners and middle, so that
+ * every kind of contact occurs. */
 static double some_coordinate(const ebpo_frame *frame, int k, uint64_t *state)
 {
     double size = frame->high[k] - frame->low[k];
@@ -71,7 +71,7 @@ START_TEST(test_single_point_contact_is_contact)
     const ebpo_box unit = { { 0, 0, 0 }, { 1, 1, 1 }, 20 };
     ebpo_frame frame = ebpo_frame_make(&unit, (ebpo_cell){ 0, { 0, 0, 0 } });
     ebpo_tally tally = { 0 };
-    /* An edge through the upper corner of the cell, the rest outside. */
+    /* An edge passes through the upper corner of the cell; the rest of the face is outside. */
     ebpo_corners face = { { { 0.5, 1.5, 1 }, { 1.5, 0.5, 1 }, { 1.5, 1.5, 1.75 } } };
     ck_assert(ebpo_face_touches(&frame, &face, &tally));
     face.at[0][0] += 0x1p-50;
@@ -142,7 +142,8 @@ static void check_rays(const char *name)
         double a[3], b[3];
         ebpo_test_point(&mesh, v, a);
         ebpo_test_point(&mesh, w, b);
-        for (int k = 0; k < 3; k++) /* on vertices, in line with them, half-way between them */
+        /* on vertices, on lines through vertices, and half-way between them */
+        for (int k = 0; k < 3; k++)
             p[k] = ebpo_test_random(&state) % 3 == 0 ? (a[k] + b[k]) / 2
                    : ebpo_test_random(&state) % 2    ? a[k]
                                                      : b[k];

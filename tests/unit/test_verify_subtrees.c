@@ -1,4 +1,5 @@
-/* The verifier on the part `subtrees`: every number is changed, and the change is reported. */
+/* Tests the verifier with the part `subtrees`: every number is changed, and the change is
+ * reported. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -68,7 +69,7 @@ static void expect_named(changeable *c, ebpo_array_id id, uint64_t item, uint64_
     changeable_put(c, id, item, before);
 }
 
-/* Changes every number of an array; in large arrays, some of each column. */
+/* Changes every number of an array, or in large arrays some numbers of each column. */
 static void change_array(changeable *c, ebpo_array_id id, uint64_t step)
 {
     uint64_t count = changeable_count(c, id);
@@ -130,7 +131,7 @@ START_TEST(test_verify_chunk_checksums)
 }
 END_TEST
 
-/* Two rows of the list with equal sizes are exchanged. */
+/* Exchanges two rows of the list with equal sizes. */
 START_TEST(test_verify_detects_swapped_chunks)
 {
     changeable c;

@@ -1,4 +1,4 @@
-/* Nodes in the order of an observer: against the ordinary stream, and against reference
+/* Tests nodes in the order of an observer against the ordinary stream, and against reference
  * implementations of every key. */
 #include <math.h>
 #include <stdio.h>
@@ -59,7 +59,7 @@ typedef struct record {
 } record;
 
 typedef struct records {
-    record *at; /* ascending octcodes */
+    record *at; /* records with ascending octcodes */
     uint64_t count;
 } records;
 
@@ -160,8 +160,8 @@ static double plain_dot(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Returns how far the cell extends into the half-space of the view in which it is least: negative
- * means invisible. The result is relative to the distances. */
+/* Returns the least extent of the cell into a half-space of the view. A negative value means that
+ * the cell is invisible. The result is relative to the distances. */
 static double plain_reach(const ebpo_observer *o, const record *r)
 {
     double right[3], up[3], least = INFINITY, length = sqrt(plain_dot(o->direction, o->direction));
@@ -259,7 +259,7 @@ typedef struct viewer {
     const records *all;
     const ebpo_observer *observer;
     ebpo_view_options options;
-    uint8_t *come, *in_cut, *seen; /* [count] */
+    uint8_t *come, *in_cut, *seen; /* [count], flags of nodes */
     uint64_t group[8], siblings, count, refined;
     uint64_t *order; /* [refined] octcodes in the order in which they were replaced */
 } viewer;
@@ -293,7 +293,8 @@ static bool wanted(const viewer *v, uint64_t i)
            (o->unseen == EBPO_UNSEEN_LAST || v->seen[i]);
 }
 
-/* The minimum must come first; keys that are equal up to rounding may come in any order. */
+/* Returns the reference key. The node with the minimum must come first; keys that are equal up to
+ * rounding may come in any order. */
 static double plain_key(const viewer *v, uint64_t i)
 {
     const record *r = &v->all->at[i];
@@ -365,7 +366,7 @@ typedef struct cutter {
     const viewer *v;
     uint8_t *intersected;
     uint64_t count, types[4];
-    double share; /* share of the root cell; exact */
+    double share; /* exact share of the root cell */
     const double *ray;
     double last_in;
     uint64_t stop;
@@ -407,8 +408,8 @@ static void expect_cut(const viewer *v, ebpo_view_stream *stream, uint64_t *rand
     for (uint64_t i = 0; i < v->all->count; i++)
         kept += v->in_cut[i];
     ck_assert_uint_eq(c.count, kept);
-    /* different cells that cover as much as the root, none within another as all are in the cut of
-     * the viewer: */
+    /* the cells are different, cover as much as the root, and do not contain each other, as all
+     * are in the cut of the viewer */
     ck_assert(c.share == (v->count ? 1 : 0));
     ebpo_view_stream_get_stats(stream, &stats);
     uint64_t waiting = 0;
@@ -427,7 +428,7 @@ static void expect_cut(const viewer *v, ebpo_view_stream *stream, uint64_t *rand
     ck_assert_uint_eq(stats.waiting, waiting);
     ck_assert(v->observer ? stats.pixels == pixels || fabs(stats.pixels - pixels) < 1e-9 * pixels
                           : isnan(stats.pixels));
-    if (c.count > 2) { /* early stop is allowed */
+    if (c.count > 2) { /* the stream may end early */
         cutter some = { .v = v, .intersected = calloc(v->all->count, 1), .stop = c.count / 2 };
         ebpo_view_stream_cut(stream, visit, &some);
         ck_assert_uint_eq(some.count, c.count / 2);
@@ -500,8 +501,8 @@ static bool add_share(void *user, const ebpo_view_node *n)
     return true;
 }
 
-/* Nothing is known below a pruned node. The node stays in the cut, as nothing else covers its cell.
- */
+/* The file has no data below a pruned node. The node stays in the cut, because nothing else covers
+ * its cell. */
 START_TEST(test_view_cut_keeps_pruned_subset_nodes)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -574,7 +575,8 @@ START_TEST(test_view_front_to_back_follows_rays)
             if (!ray_intersects(observer.eye, direction, &all.at[find(&all, v.order[a])], &in[0],
                                 &out[0]))
                 continue;
-            for (uint64_t b = a + 1; b < v.refined; b++) /* later, so not before a */
+            /* b is refined later, so b must not be before a */
+            for (uint64_t b = a + 1; b < v.refined; b++)
                 if (ray_intersects(observer.eye, direction, &all.at[find(&all, v.order[b])], &in[1],
                                    &out[1])) {
                     ck_assert_msg(out[1] > in[0] + 1e-9 * (1 + in[0]),
@@ -652,7 +654,7 @@ START_TEST(test_view_moving_observer_changes_order)
     ck_assert_uint_eq(v.count, all.count);
     viewer_free(&v);
     ebpo_view_stream_free(stream);
-    /* Within a group: its siblings come first, and nothing is lost. */
+    /* A change within a group: the siblings come first, and no node is lost. */
     stream = new_view(file, &options);
     uint64_t count = 0, parent = 0;
     bool within = false;
@@ -702,7 +704,7 @@ START_TEST(test_view_byte_budget_truncates_sequence)
         file = counted_open(&c, path, far);
         bytes = ebpo_test_file_stats(file).bytes_read;
         options.bytes = bytes / 2;
-        uint64_t opening = bytes; /* which is not limited by the budget */
+        uint64_t opening = bytes; /* the budget does not limit the bytes of opening */
         stream = new_view(file, &options);
         for (count = 0;;) {
             uint64_t some_count, *some = sequence(stream, &some_count, &end);
@@ -766,7 +768,7 @@ START_TEST(test_view_budgets_do_not_change_sequence)
         ebpo_close(file);
     }
     ck_assert_uint_ge(bytes[1], bytes[0]);
-    ck_assert_uint_lt(bytes[2], bytes[0] / 2); /* no planes, no winding numbers */
+    ck_assert_uint_lt(bytes[2], bytes[0] / 2); /* neither planes nor winding numbers */
     free(all);
 }
 END_TEST
@@ -822,7 +824,7 @@ START_TEST(test_view_invalid_options_are_refused)
         bad[i] = good;
     bad[0].eye[1] = NAN, bad[1].direction[0] = INFINITY, bad[2].fov = 180, bad[3].fov = 0,
     bad[4].width = 0, bad[5].height = 0;
-    bad[6].direction[1] = -3; /* along up */
+    bad[6].direction[1] = -3; /* the direction is parallel to up */
     bad[7].direction[0] = 1, bad[7].up[1] = 0;
     bad[8].up[2] = NAN;
     for (int i = 0; i < 9; i++) {

@@ -1,4 +1,4 @@
-/* Faces that come with the leaves of a view, against the lists of the leaves in the whole file. */
+/* Compares the faces in the leaves of a view with the lists of the leaves in the whole file. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -35,8 +35,8 @@ static void write_solid(ebpo_mesh mesh, uint32_t parts, uint64_t subtree_faces)
     write_tree(&tree, subtree_faces);
 }
 
-/* Writes model i: for even i a solid with floats, for odd i a tree of random nodes; from 2 on with
- * subtrees. */
+/* Writes model i: a solid with floats for even i, and a tree of random nodes for odd i; with
+ * subtrees for i >= 2. */
 static void write_model(int i)
 {
     uint64_t subtree_faces = i < 2 ? EBPO_NO_SUBTREES : 100;
@@ -166,7 +166,7 @@ START_TEST(test_view_faces_are_new_once)
         ck_assert_int_eq(take_all(stream, whole, &t), EBPO_VIEW_DONE);
         ck_assert_uint_eq(t.fresh, t.mesh.face_count);
         ck_assert_uint_gt(t.repeated, 0);
-        if (far) /* hardly any read is for a single item */
+        if (far) /* few reads are for a single item */
             ck_assert_msg(c.alone < 16 && c.batches > 0, "%llu reads, %llu batches",
                           (unsigned long long)c.alone, (unsigned long long)c.batches);
         ebpo_view_stream_free(stream);

@@ -1,4 +1,4 @@
-/* Welding within a distance, against comparison of all pairs in integers. */
+/* Compares welding within a distance with a comparison of all pairs in integers. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -131,7 +131,8 @@ static void compare(const soup *s, const expected *e, ebpo_mesh *m, double dista
             ck_assert(p[1] == (double)(to[1] - s->offset) / 8);
             ck_assert(p[2] == (double)to[2] / 8);
         }
-        /* vertices at one position are already merged: those faces have not lost an area */
+        /* vertices at one position were merged before, so that those faces have not lost their
+         * area */
         bool before = compare_points(&s->vertex[was[0]], &s->vertex[was[1]]) == 0 ||
                       compare_points(&s->vertex[was[1]], &s->vertex[was[2]]) == 0 ||
                       compare_points(&s->vertex[was[2]], &s->vertex[was[0]]) == 0;

@@ -1,4 +1,4 @@
-/* Integers of 128 bits, against GMP. */
+/* Compares integers of 128 bits with GMP. */
 #include <gmp.h>
 
 #include "core/hash.h"

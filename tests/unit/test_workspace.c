@@ -1,4 +1,4 @@
-/* Arrays in memory or in files, and the resident memory. */
+/* Tests arrays in memory or in files, and the resident memory. */
 #include <dirent.h>
 #include <signal.h>
 #include <stdio.h>
@@ -49,7 +49,7 @@ START_TEST(test_workspace_spills_to_unnamed_files)
     memset(filed, 7, 5 * MIB);
     ebpo_array_free(w, held);
     ebpo_array_free(w, small);
-    ebpo_workspace_free(w); /* blocks outlive the workspace */
+    ebpo_workspace_free(w); /* blocks remain valid after the workspace is freed */
     ck_assert(filed[0] == 7 && filed[5 * MIB - 1] == 7);
     ebpo_array_free(w, filed);
 }
@@ -81,7 +81,7 @@ START_TEST(test_workspace_releases_file_pages)
     return; /* whose own memory is resident, too */
 #endif
     uint64_t before = resident(), budget = before + (32 << 20), most = 0;
-    /* a quarter is reserved for changes between two checks */
+    /* a quarter of the budget is reserved for changes between two checks */
     ebpo_workspace *w = make(budget / 3 * 4);
     enum { BYTES = 256 << 20 };
     unsigned char *a = ebpo_array_alloc(w, BYTES, 1);
@@ -108,7 +108,7 @@ enum { PAGE = 4096, PAGES = 1 << 15, LINE = 64 };
 
 typedef struct touching {
     unsigned char *array;
-    uint64_t most; /* bytes resident meanwhile */
+    uint64_t most; /* greatest number of resident bytes */
 } touching;
 
 static void touch(touching *t, uint64_t byte)
@@ -135,7 +135,7 @@ static void haptic_all(int way, ebpo_workspace *w, touching *t)
     if (way == 1)
         EBPO_FOR_ITEMS_SCATTERED(w, page, 0, PAGES) {
             touch(t, page * PAGE);
-            continue; /* which also releases pages */
+            continue; /* this way also releases pages */
         }
     if (way == 2)
         EBPO_FOR_PIECES(w, page, PAGES, 256)
@@ -209,7 +209,7 @@ START_TEST(test_workspace_write_failure_names_folder)
 }
 END_TEST
 
-/* Otherwise pages are controlled by the system. */
+/* Without madvise, the system controls the pages. */
 #ifdef EBPO_HAVE_MADVISE
 enum { LETS_GO = 1 };
 #else
