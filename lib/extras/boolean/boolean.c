@@ -257,8 +257,8 @@ static void add_opinion(opinion *o, uint32_t i, ebpo_rule rule, const ebpo_posed
 {
     uint64_t above = ebpo_rule_inside(rule, sides->above),
              below = ebpo_rule_inside(rule, sides->below);
-    if (sides->flat && above == below) { /* the point is not on the operand's boundary, even if
-                                          * faces are there */
+    if (sides->flat && above == below) { /* the point is not on the operand's boundary, although a
+                                          * face contains the point */
         o->known |= UINT64_C(1) << i;
         o->above |= above << i;
         o->below |= above << i;

@@ -1,10 +1,10 @@
-/* The cells of the result of a boolean expression: cells of an octree of the world that are
- * entirely inside (in-cells), and undecided cells of the finest level (mixed).
+/* Finds the cells of the result of a boolean expression: cells of an octree of the world that are
+ * entirely inside (in-cells), and undecided cells of the finest level (mixed cells).
  *
- * Level by level the children of all mixed cells are classified on all processor cores; those that
- * are mixed continue to the next level. Cells are kept in the order of octcodes, so the result does
- * not depend on the number of threads. The cells' volumes bound the volume of the result. The
- * surface between the chosen cells and the other ones is a mesh of squares. */
+ * The search goes level by level. The children of all mixed cells are classified on all processor
+ * cores, and mixed children continue to the next level. Cells are kept in the order of octcodes, so
+ * the result does not depend on the number of threads. The cells' volumes bound the volume of the
+ * result. The surface between the selected cells and the other cells is a mesh of squares. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>

@@ -1,10 +1,10 @@
 /* Computes the distance of a point to the boundary of the result of a boolean expression.
  *
- * The boundary is a part of the operands' faces, so no point of it is nearer than the nearest face.
- * If the result changes just behind that face, the face's distance is the result. If not, a search
- * over cells of the world, the nearest first, bounds the distance to the other side: decided cells
- * end the search, mixed cells are divided down to the tolerance or up to the maximum number of
- * cells. */
+ * The boundary is a part of the operands' faces, so no point of the boundary is nearer than the
+ * nearest face. If the result changes just behind that face, the face's distance is the result.
+ * Otherwise a search over cells of the world, the nearest first, bounds the distance to the other
+ * side. Decided cells end the search. Mixed cells are divided, until the tolerance or the maximum
+ * number of cells is reached. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -201,7 +201,8 @@ static ebpo_status inspect_operand(const measuring *m, uint32_t operand, double 
     *lo = 0;
     ebpo_unpose(s, m->w, p, &doubt);
     if (!(fabs(p[0]) < 0x1p1000 && fabs(p[1]) < 0x1p1000 && fabs(p[2]) < 0x1p1000))
-        return EBPO_OK; /* the point is so far away that its position in the model is no double */
+        return EBPO_OK; /* the point is so far away that its position in the model is not a double
+                         */
     o.unsigned_distance = true;
     ebpo_status status =
         ebpo_distance(ebpo_boolean_context(m->b, 0, operand), p, &o, &nearest, error);

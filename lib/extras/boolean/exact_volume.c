@@ -1,12 +1,12 @@
 /* Computes the exact volume of the result of a boolean expression, if no face of an operand
  * intersects a face of another operand.
  *
- * Each patch of connected faces is then in or out of every other operand as a whole. So the whole
- * patch bounds the result, from inside or from outside, or no face of it does. The signed volumes
+ * Then each patch of connected faces is entirely in or out of every other operand. So a whole patch
+ * bounds the result, from inside or from outside, or none of its faces does. The signed volumes
  * below the bounding faces add up to the volume. They are summed without rounding: in a long
- * accumulator if products of coordinates are exact in doubles, otherwise in integers (GMP); the sum
- * is rounded once. If faces intersect, the result has the pair, and the reason why there is no
- * exact volume. Proof: docs/develop/booleans.md, "Exact volumes". */
+ * accumulator if products of coordinates are exact in doubles, otherwise in integers (GMP). The sum
+ * is rounded once. If faces intersect, the result names a pair of them as the reason why there is
+ * no exact volume. Proof: docs/develop/booleans.md, "Exact volumes". */
 #include "core/strict_fp.h"
 
 #include <gmp.h>
@@ -163,8 +163,8 @@ typedef struct measuring {
     ebpo_exact_volume *out;
     uint64_t first;                           /* first operands of each group of equal ones, a bit
                                                * for each */
-    uint64_t same[EBPO_BOOLEAN_OPERANDS_MAX]; /* for each of these, the operands that are equal to
-                                               * it */
+    uint64_t same[EBPO_BOOLEAN_OPERANDS_MAX]; /* for each of these: the operands that are equal to
+                                               * it, a bit for each */
     volume_sum *sum;                          /* [threads] */
 } measuring;
 
@@ -286,11 +286,11 @@ typedef struct operand {
     measuring *m;
     uint32_t number;
     const ebpo_posed_solid *solid;
-    uint32_t *slots, *patch; /* for each face, by its number in the file: its slot, and the first
-                              * face of its patch */
+    uint32_t *slots, *patch; /* indexed by the face's number in the file: the face's slot, and the
+                              * first face of its patch */
     uint32_t *head;          /* first faces of the patches */
     uint64_t heads;
-    int8_t *times; /* for each patch, by its first face: how often its faces count: -1, 0 or 1 */
+    int8_t *times; /* indexed by a patch's first face: the factor of its faces: -1, 0 or 1 */
 } operand;
 
 static void pose_face(const operand *o, uint64_t face, double t[3][3])

@@ -1,9 +1,9 @@
-/* Cells of an octree of the world; decides if the result of a boolean expression is the same in a
+/* Cells of an octree of the world. Decides if the result of a boolean expression is the same in a
  * whole cell.
  *
- * For each operand the ball around the cell is transformed into the model's coordinates. The
+ * For each operand, the ball around the cell is transformed into the model's coordinates. The
  * model's box, then the white and black nodes of its tree, then the nearest face decide if the cell
- * is inside, outside, or may contain a face. A cell keeps the states of the operands, so that its
+ * is inside, outside, or may contain a face. A cell keeps the states of the operands, so its
  * children need not query them again. The size of the root is a power of two, so corners and
  * centres are exact. */
 #include "core/strict_fp.h"
@@ -17,8 +17,8 @@
 
 enum {
     SEEN_FACES = 4, /* in addition to EBPO_MAY_IN and EBPO_MAY_OUT: there may be faces */
-    NODES_MAX = 64  /* maximum number of nodes that are visited to find a black and a white one,
-                     * once faces may be in the ball */
+    NODES_MAX = 64  /* maximum number of nodes that are visited to find a black node and a white
+                     * one, after a node that may have faces */
 };
 
 typedef struct ball {

@@ -32,7 +32,7 @@ typedef struct gathering {
     uint64_t most; /* maximum number of pairs */
     _Atomic uint64_t found;
     _Atomic bool full; /* there are more than `most` pairs */
-    ebpo_found_pair *intersected;
+    ebpo_found_pair *found_pairs;
     uint64_t found_count, found_capacity;
 } gathering;
 
@@ -146,7 +146,7 @@ ebpo_status ebpo_collide_first(ebpo_collider *c, const ebpo_collide_options *opt
     status = ebpo_collision_first(&q, accel, "first contact", found, error);
     if (status == EBPO_OK && *found == 1)
         *out =
-            ebpo_collision_pair(&q, q.model[0]->whole, q.model[1]->whole, &c->walk.intersected[0]);
+            ebpo_collision_pair(&q, q.model[0]->whole, q.model[1]->whole, &c->walk.found_pairs[0]);
     return status;
 }
 
@@ -248,23 +248,23 @@ static ebpo_status put_together(gathering *g, const ebpo_accel_pair *pair, ebpo_
     uint64_t count = 0;
     for (unsigned i = 0; i < g->threads; i++)
         count += g->walk[i].found_count;
-    if (!ebpo_grow(&g->intersected, &g->found_capacity, 2 * count, sizeof *g->intersected))
-        return ebpo_fail_memory(error, 2 * count * sizeof *g->intersected);
+    if (!ebpo_grow(&g->found_pairs, &g->found_capacity, 2 * count, sizeof *g->found_pairs))
+        return ebpo_fail_memory(error, 2 * count * sizeof *g->found_pairs);
     g->found_count = 0;
     for (unsigned i = 0; i < g->threads; i++) {
         const ebpo_pair_walk *w = &g->walk[i];
         if (w->found_count)
-            memcpy(g->intersected + g->found_count, w->intersected,
-                   w->found_count * sizeof *w->intersected);
+            memcpy(g->found_pairs + g->found_count, w->found_pairs,
+                   w->found_count * sizeof *w->found_pairs);
         g->found_count += w->found_count;
     }
     if (count)
-        sort_found_pairs(g->intersected, g->intersected + count, count, pair->accel[0]->face_count,
+        sort_found_pairs(g->found_pairs, g->found_pairs + count, count, pair->accel[0]->face_count,
                          pair->accel[1]->face_count);
     return EBPO_OK;
 }
 
-/* Gathers pairs of faces `begin` to `end` of the pair's first accel. Fills `intersected`, sorted;
+/* Gathers pairs of faces `begin` to `end` of the pair's first accel. Fills `found_pairs`, sorted;
  * or sets `full` if there are too many. */
 static ebpo_status gather_pairs(gathering *g, const ebpo_accel_pair *pair, uint32_t begin,
                                 uint32_t end, ebpo_error *error)
@@ -302,7 +302,7 @@ static void gathering_free(gathering *g)
 {
     give_walks_back(g);
     free(g->part);
-    free(g->intersected);
+    free(g->found_pairs);
 }
 
 /* --- all pairs --- */
@@ -318,14 +318,14 @@ typedef struct giving {
 
 enum { GIVEN_AT_ONCE = 1024 };
 
-static void give_pairs(giving *v, const ebpo_found_pair *intersected, uint64_t count)
+static void give_pairs(giving *v, const ebpo_found_pair *found_pairs, uint64_t count)
 {
     ebpo_face_pair out[GIVEN_AT_ONCE];
     for (uint64_t at = 0; at < count && !v->enough; at += GIVEN_AT_ONCE) {
         uint64_t n = count - at < GIVEN_AT_ONCE ? count - at : GIVEN_AT_ONCE;
         for (uint64_t i = 0; i < n; i++)
             out[i] = ebpo_collision_pair(v->current_query, v->pair->accel[0], v->pair->accel[1],
-                                         &intersected[at + i]);
+                                         &found_pairs[at + i]);
         v->enough = !v->take(v->user, out, n);
     }
 }
@@ -347,7 +347,7 @@ static ebpo_status in_runs(giving *v, gathering *g, ebpo_error *error)
             run = run / 2;
             continue;
         }
-        give_pairs(v, g->intersected, g->found_count);
+        give_pairs(v, g->found_pairs, g->found_count);
         begin = end;
         run = run < faces / 2 ? 2 * run : faces;
     }

@@ -171,14 +171,14 @@ uint64_t ebpo_collision_bytes_read(const ebpo_collision *q)
 }
 
 ebpo_face_pair ebpo_collision_pair(const ebpo_collision *q, const ebpo_accel *first,
-                                   const ebpo_accel *second, const ebpo_found_pair *intersected)
+                                   const ebpo_accel *second, const ebpo_found_pair *pair)
 {
-    uint64_t file[2] = { ebpo_accel_file_face(first, intersected->a),
-                         ebpo_accel_file_face(second, intersected->b) },
-             source[2] = { ebpo_accel_source_face(first, intersected->a),
-                           ebpo_accel_source_face(second, intersected->b) };
+    uint64_t file[2] = { ebpo_accel_file_face(first, pair->a),
+                         ebpo_accel_file_face(second, pair->b) },
+             source[2] = { ebpo_accel_source_face(first, pair->a),
+                           ebpo_accel_source_face(second, pair->b) };
     int a = q->turned, b = !q->turned;
-    return (ebpo_face_pair){ source[a], source[b], file[a], file[b], intersected->kind, 0 };
+    return (ebpo_face_pair){ source[a], source[b], file[a], file[b], pair->kind, 0 };
 }
 
 /* Chooses the kernels of a walk. */

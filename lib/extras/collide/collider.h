@@ -49,7 +49,7 @@ EBPO_MUST_USE ebpo_status ebpo_collision_begin(ebpo_collision *out, ebpo_collide
 bool ebpo_collision_is_late(const ebpo_collision *collision);
 
 /* Finds the first contact of two accels of the query's models. The collider's walk then has it in
- * intersected[0] and found_slot. *found is set as by ebpo_collide_first. */
+ * found_pairs[0] and found_slot. *found is set as by ebpo_collide_first. */
 EBPO_MUST_USE ebpo_status ebpo_collision_first(const ebpo_collision *collision,
                                                const ebpo_accel *const accel[2], const char *stage,
                                                int32_t *found, ebpo_error *error);
@@ -69,7 +69,7 @@ void ebpo_collider_count(ebpo_collider *collider, ebpo_pair_walk *walk);
 
 /* Converts local numbers of two accels to the pair that the caller receives. */
 ebpo_face_pair ebpo_collision_pair(const ebpo_collision *collision, const ebpo_accel *first,
-                                   const ebpo_accel *second, const ebpo_found_pair *intersected);
+                                   const ebpo_accel *second, const ebpo_found_pair *pair);
 
 /* As ebpo_collide_self; both poses of the options are equal. */
 EBPO_MUST_USE ebpo_status ebpo_collide_self_posed(ebpo_collider *collider,

@@ -23,9 +23,9 @@
 void ebpo_pair_walk_free(ebpo_pair_walk *w)
 {
     free(w->stack);
-    free(w->intersected);
+    free(w->found_pairs);
     w->stack = NULL;
-    w->intersected = NULL;
+    w->found_pairs = NULL;
     w->capacity = w->found_capacity = 0;
 }
 
@@ -114,23 +114,22 @@ bool ebpo_pair_walk_decide(ebpo_pair_walk *w, uint32_t block_a, uint32_t block_b
     const ebpo_accel *const *s = w->pair->accel;
     uint32_t face_a = ebpo_accel_meshlet(s[0], block_a)->face,
              face_b = ebpo_accel_meshlet(s[1], block_b)->face;
-    if (!ebpo_grow(&w->intersected, &w->found_capacity, w->found_count + pairs->count,
-                   sizeof *w->intersected))
+    if (!ebpo_grow(&w->found_pairs, &w->found_capacity, w->found_count + pairs->count,
+                   sizeof *w->found_pairs))
         return false;
     for (unsigned i = 0; i < pairs->count; i++) {
         uint32_t lane_a = pairs->pair[i] & 7, lane_b = pairs->pair[i] >> 3 & 7;
-        ebpo_found_pair intersected = { face_a + lane_a, face_b + lane_b, EBPO_PAIR_CROSSING };
-        if (intersected.a < w->begin || intersected.a >= w->end ||
-            (w->self && intersected.a >= intersected.b))
+        ebpo_found_pair found = { face_a + lane_a, face_b + lane_b, EBPO_PAIR_CROSSING };
+        if (found.a < w->begin || found.a >= w->end || (w->self && found.a >= found.b))
             continue;
         if (w->neighbours || !(pairs->pair[i] & EBPO_CERTAINLY_CROSSING))
-            intersected.kind = (int32_t)exact_kind(w, block_a * EBPO_BLOCK + lane_a,
-                                                   block_b * EBPO_BLOCK + lane_b);
-        if (intersected.kind == EBPO_PAIR_APART)
+            found.kind = (int32_t)exact_kind(w, block_a * EBPO_BLOCK + lane_a,
+                                             block_b * EBPO_BLOCK + lane_b);
+        if (found.kind == EBPO_PAIR_APART)
             continue;
         w->found_slot[0] = block_a * EBPO_BLOCK + lane_a;
         w->found_slot[1] = block_b * EBPO_BLOCK + lane_b;
-        w->intersected[w->found_count++] = intersected;
+        w->found_pairs[w->found_count++] = found;
         if (w->first)
             break;
     }

@@ -66,7 +66,7 @@ struct ebpo_pair_walk {
     ebpo_node_pair *stack;
     uint64_t top, capacity;
     uint64_t group; /* for the first contact: start of the last group of the stack */
-    ebpo_found_pair *intersected;
+    ebpo_found_pair *found_pairs;
     uint64_t found_count, found_capacity;
     uint32_t found_slot[2];                  /* slots of the last pair found */
     uint64_t node_pairs, block_pairs, exact; /* visited pairs; pairs of faces decided by the exact

@@ -297,8 +297,8 @@ static ebpo_status store_pairs(subtree_walk *w, const ebpo_accel *const accel[2]
     if (!ebpo_grow(&w->stored, &w->capacity, found->found_count, sizeof *w->stored))
         return ebpo_fail_memory(error, found->found_count * sizeof *w->stored);
     for (uint64_t i = 0; i < found->found_count; i++) {
-        uint32_t local[2] = { found->intersected[i].a, found->intersected[i].b };
-        stored_pair t = { .kind = found->intersected[i].kind };
+        uint32_t local[2] = { found->found_pairs[i].a, found->found_pairs[i].b };
+        stored_pair t = { .kind = found->found_pairs[i].kind };
         for (int side = 0; side < 2; side++) {
             t.file[side] = (uint32_t)ebpo_accel_file_face(accel[side], local[side]);
             t.source[side] = (uint32_t)ebpo_accel_source_face(accel[side], local[side]);

@@ -1,18 +1,18 @@
 /* Follows a ball along a straight piece of its path to the first face in contact, and checks that
- * its centre crosses no face.
+ * the ball's centre crosses no face.
  *
- * Nodes of the tree over the faces are visited in the order of possible contact, until the next
- * node can only be in contact later than a known face. The distance from a box or a face is convex
- * along a line, so Newton's steps towards the ball's radius never go too far. Of the nodes already
- * in contact the closest come first.
+ * Nodes of the tree over the faces are visited in the order of possible contact. The search ends
+ * when the next node can only be in contact later than a known face. The distance from a box or a
+ * face is convex along a line, so Newton's steps towards the ball's radius never go too far. Of the
+ * nodes that are already in contact, the closest are visited first.
  *
- * The work is bounded for each haptic step. After an early end, the ball goes as far as the next
- * node allows. If the known contacts hold the ball in place, it stays; otherwise the next step
+ * The work of a haptic step is bounded. After an early end, the ball goes as far as the next node
+ * allows. If the known contacts hold the ball in place, the ball stays; otherwise the next step
  * continues.
  *
  * The planes of the contacts leave a cone of free directions. The point of the cone that is nearest
- * to the wanted path is the wanted point itself, or on a plane or on the line of two planes;
- * otherwise it is the apex. All of these are tried, since there are few planes. */
+ * to the wanted path is the wanted point itself, or on a plane, or on the line of two planes, or
+ * the apex. All of these are tried, since there are few planes. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -107,9 +107,10 @@ enum {
 };
 
 static const double worth =
-    1.0 / 32; /* shortest part of a path at which ending early is worthwhile */
+    1.0 / 32; /* the shortest part of a path for which an early end is worthwhile */
 
-/* Returns the number of nodes that can wait: at most as many parts of the tree as it has leaves. */
+/* Returns the greatest number of waiting nodes: waiting nodes are disjoint parts of the tree, so
+ * there are at most as many as leaves. */
 static uint64_t capacity_for(uint64_t faces) { return ebpo_face_box_leaves(faces) + 1; }
 
 uint64_t ebpo_ball_walk_bytes(uint64_t faces)
@@ -179,7 +180,7 @@ void ebpo_ball_set_out(ebpo_ball_walk *w)
 {
     w->stage = EBPO_BALL_SEARCHES;
     w->part = 1;
-    w->intersected.count = 0;
+    w->contacts.count = 0;
     w->cut = false;
     w->queue.count = 0;
     if (w->box && w->box->count > 0)
@@ -193,20 +194,19 @@ static void inspect_leaf(ebpo_ball_walk *w, uint64_t leaf, ebpo_ball_work *work)
     uint64_t f = leaf * EBPO_FACE_BOX_LEAF, end = f + EBPO_FACE_BOX_LEAF;
     for (; f < end && f < w->box->count; f++) {
         double away[3];
-        double intersected =
-            ebpo_ball_intersects(&motion, (const double(*)[3])w->box->corner[f], away);
+        double part = ebpo_ball_intersects(&motion, (const double(*)[3])w->box->corner[f], away);
         work->faces++;
-        if (intersected > w->part)
+        if (part > w->part)
             continue;
-        if (intersected < w->part)
-            w->intersected.count = 0;
-        w->part = intersected;
-        ebpo_held_planes_add(&w->intersected, away);
+        if (part < w->part)
+            w->contacts.count = 0;
+        w->part = part;
+        ebpo_held_planes_add(&w->contacts, away);
     }
 }
 
-/* Ends the path before the first waiting node; all nodes not visited are farther along the path.
- * Returns false if hardly any path remains. */
+/* Ends the path before the first waiting node; all nodes that are not visited are farther along the
+ * path. Returns false if hardly any path remains. */
 static bool end_before_waiting(ebpo_ball_walk *w)
 {
     if (w->part <= 0)
@@ -214,7 +214,7 @@ static bool end_before_waiting(ebpo_ball_walk *w)
     if (!(w->queue.item[0].key >= worth))
         return false;
     w->part = w->queue.item[0].key;
-    w->intersected.count = 0;
+    w->contacts.count = 0;
     w->cut = true;
     return true;
 }
@@ -224,7 +224,7 @@ static bool find_contact(ebpo_ball_walk *w, ebpo_ball_work *work)
     uint32_t held = work->faces; /* number of faces visited before the contact */
     while (w->queue.count > 0 && w->queue.item[0].key < w->part) {
         if (w->part <= 0 &&
-            (w->intersected.count == EBPO_PLANES_LIMIT || work->faces >= held + HELD_FACES))
+            (w->contacts.count == EBPO_PLANES_LIMIT || work->faces >= held + HELD_FACES))
             break;
         if (work->faces + EBPO_FACE_BOX_LEAF + KEPT_FACES > EBPO_BALL_FACES ||
             work->nodes + 2 + KEPT_NODES > EBPO_BALL_NODES) {
@@ -255,8 +255,8 @@ static void begin_check(ebpo_ball_walk *w)
         w->stack[w->depth++] = 1;
 }
 
-/* Returns true if the segment may intersect `e`. `e` is widened by more than the rounding of the
- * segment's entry and exit, and by less than the ball's distance from faces. */
+/* Returns true if the segment may intersect `e`. The margin of `e` is more than the rounding of the
+ * segment's entry and exit, and less than the ball's distance from faces. */
 static bool may_cross(const ebpo_ball_walk *w, const ebpo_extent *e)
 {
     double enters = 0, leaves = 1, wider = 16 * w->band;

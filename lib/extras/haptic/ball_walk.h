@@ -1,5 +1,6 @@
 /* Follows a straight piece of a ball's path: finds its first contact with a face, and checks that
- * its centre crosses none. The work is done in shares and continues where it ended. */
+ * the ball's centre crosses no face. The work is divided into shares of haptic steps; each share
+ * continues the previous one. */
 #ifndef EBPO_HAPTIC_BALL_WALK_H
 #define EBPO_HAPTIC_BALL_WALK_H
 
@@ -45,12 +46,12 @@ typedef struct ebpo_ball_walk {
     double from[3], motion[3];
     double reach, band, slack, least_slack; /* as in ebpo_ball_motion */
     double part;                            /* part of the path until the first contact */
-    ebpo_held_planes intersected;           /* normals of the contacts there */
-    bool cut;                               /* the path ends before the contact, because the work
-                                             * was used up */
+    ebpo_held_planes contacts;              /* normals of the contacts there */
+    bool cut;                               /* the path ends before the contact, because the limit
+                                             * of work was reached */
     double to[3];                           /* end of the piece, known after the search */
     ebpo_near_queue queue;                  /* used at EBPO_BALL_SEARCHES */
-    uint64_t stack[64]; /* used at EBPO_BALL_CHECKS; each level leaves one node */
+    uint64_t stack[64]; /* used at EBPO_BALL_CHECKS; at most one node of each level waits */
     int depth;
 } ebpo_ball_walk;
 

@@ -5,9 +5,10 @@
  * the file, which follows a space-filling curve, so the tree needs no sorting. Functions that steps
  * call allocate no memory; their callers limit their work.
  *
- * Distances are in doubles, correct to a few ulps. The side of a point is exact: its winding number
- * changes at each face whose interior a straight path crosses. Where the path crosses an edge, or
- * begins in a face's plane, it takes a detour through another point; almost every point works. */
+ * Distances are in doubles, correct to a few ulps. The side of a point is exact: a straight path
+ * from a known point changes the winding number at each face whose interior it crosses. If the path
+ * crosses an edge, or begins in a face's plane, a detour through another point is used; almost
+ * every point works. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -48,9 +49,11 @@ ebpo_status ebpo_face_box_new(ebpo_face_box *out, uint64_t capacity, ebpo_error 
     }
     memset(out->corner, 0xff, capacity * sizeof *out->corner);
     memset(out->face, 0xff, capacity * sizeof *out->face);
-    memset(out->node, 0xff, nodes * sizeof *out->node); /* NAN: the node intersects nothing */
+    memset(out->node, 0xff, nodes * sizeof *out->node); /* NAN: an empty node, which intersects
+                                                         * nothing */
     for (int i = 0; i < 3; i++)
-        out->centres.min[i] = out->centres.max[i] = NAN; /* NAN: the box contains nothing */
+        out->centres.min[i] = out->centres.max[i] = NAN; /* NAN: an empty box, which contains
+                                                          * nothing */
     return EBPO_OK;
 }
 
@@ -149,7 +152,7 @@ static bool face_intersects(const double face[3][3], const ebpo_extent *around)
 bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uint32_t *found,
                         uint32_t most, uint32_t *visits, uint32_t *count)
 {
-    uint64_t stack[64]; /* each level leaves one node */
+    uint64_t stack[64]; /* at most one node of each level waits */
     int depth = 0;
     *count = 0;
     stack[depth++] = 1;
@@ -208,7 +211,7 @@ static double find_square(const ebpo_face_box *box, const ebpo_extent *around, u
     struct {
         uint64_t node;
         double lower;
-    } stack[64]; /* each level leaves one node */
+    } stack[64]; /* at most one node of each level waits */
     int depth = 0;
     double least = INFINITY;
     if (box->count == 0)
@@ -246,9 +249,9 @@ double ebpo_face_box_clearance(const ebpo_face_box *box, const ebpo_extent *arou
 
 /* --- the nearest point of a face --- */
 
-/* The distance from a face, a convex set, is convex along a line. Where it decreases, its tangents
- * are below it, so Newton's steps towards a distance never go too far. So they find when a ball
- * touches a face, at any of the face's features. */
+/* Computes when a ball is in contact with a face, at any of the face's features. The distance from
+ * a face, a convex set, is convex along a line. Where the distance decreases, its tangents are
+ * below it. So Newton's steps towards a distance never go too far. */
 
 typedef struct nearest {
     double square, offset[3]; /* vector from the nearest point to p */
@@ -392,8 +395,8 @@ static bool intersects_in_plane(const double p[3], const double q[3], const doub
     return true;
 }
 
-/* Compares along each axis along which the face is not seen as a line; a face without area is
- * always seen as one. */
+/* Compares along each axis along which the face is not seen as a line. A face without area is seen
+ * as a line along every axis. */
 static bool intersects_flat(const double p[3], const double q[3], const double face[3][3])
 {
     for (int axis = 0; axis < 3; axis++) {

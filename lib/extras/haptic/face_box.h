@@ -72,8 +72,8 @@ void ebpo_face_nearest(const double p[3], const double face[3][3], ebpo_face_nea
 typedef struct ebpo_ball_motion {
     const double *from, *motion; /* [3] */
     double reach, band; /* the ball's radius; contact begins at a distance of reach + band */
-    /* If the ball comes nearer to a face by less than this over the whole path, that is no
-     * approach. least_slack is used where the ball is already closer than its radius. */
+    /* An approach to a face by less than this over the whole path is ignored. least_slack applies
+     * where the ball is already closer than its radius. */
     double slack, least_slack;
 } ebpo_ball_motion;
 
@@ -119,9 +119,9 @@ typedef struct ebpo_side {
 } ebpo_side;
 
 /* Moves the side to `place`, as far as bounded work allows: in a few pieces of path, with at most
- * `most` faces for each, into found[most]. Returns true if `place` is reached. Otherwise the side
- * stops at a point where the winding number is known, or has left the box (then `known` is false).
- */
+ * `most` faces each (their indices are in found[most]). Returns true if `place` is reached.
+ * Otherwise the side stops at a point with a known winding number, or has left the box (then
+ * `known` is false). */
 bool ebpo_side_go(ebpo_side *side, const ebpo_face_box *box, const double place[3], uint32_t *found,
                   uint32_t most, uint32_t visits, uint64_t *work);
 

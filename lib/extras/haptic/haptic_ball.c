@@ -74,10 +74,10 @@ static void find_depth(const ebpo_haptic *t, const double device[3], uint32_t fl
 
 /* Removes the part of the force that pulls towards faces, without increasing the force. The vector
  * from device to proxy is not exactly along the faces' normals: the proxy's remaining path,
- * rounding far from 0, and friction tilt it. So damping across the vector may pull towards faces,
- * and very high damping pulls with full force. The first contact may be the edge of a face that is
- * a tiny distance beside the ball, so the nearest face counts, too. If the spring itself pulls to a
- * face, that face is another one of a narrow corner. */
+ * rounding far from 0, and friction tilt this vector. So damping across the vector may pull towards
+ * faces, and very high damping pulls with full force. The first contact may be the edge of a face
+ * that is a tiny distance beside the ball, so the nearest face counts, too. If the spring itself
+ * pulls to a face, this face is the other face of a narrow corner. */
 static void keep_from_faces(const ebpo_haptic *t, bool near, const double depth[3], double force[3])
 {
     ebpo_held_planes off = { .count = 0 };
@@ -191,7 +191,7 @@ static ebpo_status check_options(const ebpo_haptic_options *o, ebpo_error *error
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "a haptic step must take more than 0 seconds, and 2^200 at most");
     if (o->kind > EBPO_HAPTIC_TOOL)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "unknown kind of haptic device");
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "unknown kind of haptic object");
     if (o->kind != EBPO_HAPTIC_BALL && o->radius != 0)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "only balls have a radius");
     if ((o->kind == EBPO_HAPTIC_TOOL) != (o->points != NULL && o->point_count > 0) ||
@@ -305,8 +305,8 @@ static ebpo_status check_place(ebpo_haptic *t, const double place[3], ebpo_error
 }
 
 /* Returns true if a box contains the proxy. The previous box counts, too: it may be the last one
- * loaded, which a haptic step discarded because the box was made for another position; then the
- * loader makes no other box for this position. */
+ * loaded. A haptic step discards a box that was made for another position; then the loader makes no
+ * other box for this position. */
 static bool has_box(ebpo_haptic *t)
 {
     if (ebpo_extent_holds(&t->box[t->at].centres, t->proxy) || ebpo_haptic_take_box(t))

@@ -67,9 +67,9 @@ const ebpo_known_place *ebpo_haptic_known(ebpo_haptic *t)
 
 /* --- boxes --- */
 
-/* Seconds of prediction for a box (ahead), and seconds over which the speed is measured (measured).
- * As a part of half a box's side: greatest distance of the proxy from the middle of a new box
- * (aside), and motion of the middle that requires another box (enough). */
+/* ahead: seconds of prediction for a box. measured: seconds over which the speed is measured. As
+ * shares of half a box's side: aside, the greatest distance of the proxy from the middle of a new
+ * box; enough, the motion of the middle that requires another box. */
 static const double ahead = 0.05, measured = 0.02, aside = 0.6, enough = 0.25;
 
 static void wait_a_little(void)
@@ -78,8 +78,8 @@ static void wait_a_little(void)
     nanosleep(&half_a_millisecond, NULL);
 }
 
-/* Predicts the position of the device. Its speed is averaged over several haptic steps: between two
- * checks the device has often made one step or none. */
+/* Predicts the position of the device. Its speed is averaged over several haptic steps, because
+ * between two checks the device has often made one step or none. */
 static void loader_foresee(ebpo_haptic *t, double out[3])
 {
     uint64_t now = ebpo_clock();
@@ -152,7 +152,7 @@ static ebpo_status loader_load(ebpo_haptic *t, const double goal[3], ebpo_error 
                 (unsigned long long)t->options.faces);
     }
     t->last = centres;
-    bool few = box->count < box->capacity / 4; /* read first: after the exchange, the haptic step
+    bool few = box->count < box->capacity / 4; /* read here: after the exchange, the haptic step
                                                 * owns the box */
     hand_over(t, began);
     if (few)
@@ -190,7 +190,7 @@ static void *loader_run(void *user)
 ebpo_status ebpo_haptic_loader_start(ebpo_haptic *t, ebpo_error *error)
 {
     for (int i = 0; i < 3; i++) {
-        t->last.min[i] = t->last.max[i] = NAN; /* NAN: far from every position */
+        t->last.min[i] = t->last.max[i] = NAN; /* NAN: no position is near */
         t->last_query[i] = NAN;
         t->device_before[i] = atomic_load(&t->device_reported[i]);
     }

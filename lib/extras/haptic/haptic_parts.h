@@ -15,7 +15,7 @@ enum {
     /* Number of boxes: the current one of the step, its previous one, the middle one, the one being
      * loaded. */
     EBPO_HAPTIC_BOXES = 4,
-    EBPO_HAPTIC_FRESH = 8, /* flag beside a box's number: the haptic step has not seen the box */
+    EBPO_HAPTIC_FRESH = 8, /* flag in addition to a box's number: no haptic step has seen the box */
 
     /* Maximum number of faces and nodes that are examined for the normal, and for the side of a
      * probe. */
@@ -48,12 +48,12 @@ struct ebpo_haptic {
     unsigned at, seen; /* numbers of the current and the previous box */
     double proxy[3], device[3], force[3];
     bool touching;
-    ebpo_ball_walk walk;     /* the current piece of path */
+    ebpo_ball_walk walk;     /* the current piece of the path */
     ebpo_held_planes along;  /* contacts of the ball when its centre is at along_at */
     double along_at[3];      /* position of the centre for these contacts */
     ebpo_held_planes planes; /* planes that hold the proxy after the last complete piece */
-    uint32_t cut;            /* flags to return when the end of the piece is reached */
-    bool felt;               /* a complete piece leads to the device's position */
+    uint32_t cut;            /* flags that are returned at the end of the piece */
+    bool felt;               /* the whole path to the device's position is done */
     double path[EBPO_HAPTIC_PATH_MAX][3];
     uint32_t path_count;
     double stride; /* maximum length of a piece of a tool's path */
@@ -71,9 +71,9 @@ struct ebpo_haptic {
     /* --- exchanged between the threads --- */
     ebpo_face_box box[EBPO_HAPTIC_BOXES];
     atomic_uint between; /* number of the middle box, possibly with EBPO_HAPTIC_FRESH */
-    _Atomic double proxy_reported[3]; /* Each component is atomic: the loader may read a mixture of
-                                       * two positions. The step checks that a box that was made for
-                                       * a mixture contains the proxy. */
+    _Atomic double proxy_reported[3]; /* The position of the proxy. Each component is atomic, so the
+                                       * loader may read a mixture of two positions. Therefore the
+                                       * step checks that a new box contains the proxy. */
     _Atomic double device_reported[3];
     ebpo_known_place known[3];
     atomic_uint known_between;  /* as `between`, for known[] */

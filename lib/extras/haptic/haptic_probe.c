@@ -2,9 +2,9 @@
  *
  * Bounds come from three sources, all certain: the faces of the current box, the exact result for a
  * recent position of the probe, and the first levels of the octree. The step returns the
- * intersection of their intervals. The side is the winding number, which exact arithmetic changes
- * at each face that the probe crosses; the side is EBPO_MAYBE where a step is too short to find it.
- */
+ * intersection of these intervals. The side is the winding number, which exact arithmetic changes
+ * at each face that the probe crosses. The side is EBPO_MAYBE if the work limit of the step is too
+ * small to find it. */
 #include "core/strict_fp.h"
 
 #include <math.h>

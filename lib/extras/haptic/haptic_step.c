@@ -1,12 +1,12 @@
 /* The path of the proxy in a haptic step: straight until the ball is in contact, then along the
  * contacts, repeated a few times.
  *
- * Each straight piece is decided twice: distances find where the ball stops, and exact arithmetic
- * checks that the centre has crossed no face. A piece takes several steps if very many faces are
- * around the ball.
+ * Each straight piece is decided in two passes: distances find where the ball stops, and exact
+ * arithmetic checks that the centre has crossed no face. A piece takes several steps if very many
+ * faces are around the ball.
  *
- * Also here: the exchange of a box that the loading thread has made, and the nearest face with a
- * normal that changes continuously. */
+ * This file also exchanges boxes with the loading thread, and finds the nearest face with a normal
+ * that changes continuously. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -105,7 +105,7 @@ static void wait_for(around *a, uint64_t node)
 }
 
 /* Finds the faces around the ball, the nearest first. When there are too many, the farthest are
- * omitted, and the normal uses only faces that are closer than all omitted ones. */
+ * omitted, and the normal uses only faces that are closer than every omitted face. */
 static void find_faces(around *a)
 {
     for (uint32_t visits = 0; a->queue.count > 0; visits++) {
@@ -272,8 +272,8 @@ static bool set_out(step *s)
     t->cut = 0;
     if (!keep_known(s))
         return false;
-    /* Slacks for the whole path, scaled to this part: for a distant device they would otherwise be
-     * those of long pieces. */
+    /* Slacks are those of the whole path, scaled to this part. Otherwise the slacks for a distant
+     * device would be those of a long piece. */
     double share = sqrt(ebpo_vec3_dot(s->motion, s->motion)) / whole;
     const ebpo_face_box *box = &t->box[t->at];
     ebpo_vec3_copy(t->proxy, w->from);
@@ -305,10 +305,10 @@ static void add_planes(ebpo_haptic *t)
     const ebpo_ball_walk *w = &t->walk;
     if (w->part > 0)
         t->along.count = 0;
-    else if (t->along.count + w->intersected.count > EBPO_PLANES_LIMIT)
+    else if (t->along.count + w->contacts.count > EBPO_PLANES_LIMIT)
         reserve_space(&t->along, w->motion);
-    for (int i = 0; i < w->intersected.count; i++)
-        ebpo_held_planes_add(&t->along, w->intersected.normal[i]);
+    for (int i = 0; i < w->contacts.count; i++)
+        ebpo_held_planes_add(&t->along, w->contacts.normal[i]);
     ebpo_vec3_copy(t->proxy, t->along_at);
 }
 
@@ -331,7 +331,7 @@ static bool step_settle(step *s)
     return touches;
 }
 
-/* Returns flags: until more is known, the previous contacts hold the proxy. */
+/* Returns flags of the previous contacts, which hold the proxy until more is known. */
 static uint32_t still_held(const step *s)
 {
     const ebpo_haptic *t = s->t;

@@ -2,11 +2,11 @@
  * contacts allow, the tool makes the one nearest to the device's motion (Ortega, Redon, Coquillart
  * 2007).
  *
- * A piece of the path is decided in two passes. First each point that may hit a face is followed
+ * A piece of the path is decided in two passes. First, each point that may hit a face is followed
  * along the path, up to where the first point comes too close to a face. Then all these points are
  * examined at their new positions: exact arithmetic checks that they have crossed no face, and
- * distances check that they are not too close. Only then the tool moves there. Both passes may take
- * several steps, if many points are close. */
+ * distances check that they are not too close. Only then does the tool move there. Both passes may
+ * take several steps, if many points are close. */
 #include "core/strict_fp.h"
 
 #include "core/fp_env.h"
@@ -102,9 +102,9 @@ static bool add_close(const tool_piece *p, uint32_t point)
     const ebpo_ball_motion w = { from, motion, blocks * p->skin, p->t->band, 0, 0 };
     for (uint32_t i = 0; i < count; i++) {
         double away[3];
-        double intersected = ebpo_ball_intersects(
+        double part = ebpo_ball_intersects(
             &w, (const double(*)[3])p->box->corner[tool->pool[tool->pool_count + i]], away);
-        tool->part = fmin(tool->part, intersected);
+        tool->part = fmin(tool->part, part);
     }
     tool->close[tool->close_count++] =
         (ebpo_tool_close){ point, (uint32_t)tool->pool_count, count };
@@ -119,7 +119,7 @@ static bool inspect_points(const tool_piece *p, uint32_t number)
     ebpo_tool_cluster *c = &tool->cluster[number];
     double need = search * p->skin;
     double all = INFINITY;
-    c->free = 0; /* 0 remains if the path is given up */
+    c->free = 0; /* remains 0 if the path is given up */
     for (uint32_t i = c->first; i < c->first + c->count; i++) {
         double motion = tool_step_far(p, lever_of(tool->point[i])) * (1 + 0x1p-40);
         if (tool->free[i] - c->gone - motion <= 0) {

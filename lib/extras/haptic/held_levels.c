@@ -1,10 +1,10 @@
 /* Keeps the first levels of an octree in memory for probes: bounds of the distance to the surface,
  * and the winding numbers of cells without faces.
  *
- * There are at most 2^17 nodes, of 6 levels or fewer below the root. A node has its box, its
- * children, a flag for faces in or near its cell, and without faces its winding number. Bounds are
- * certain: they include the rounding of the model's coordinates. A query visits at most as many
- * nodes as its caller allows; when that is too few, its bounds are wider. */
+ * There are at most 2^17 nodes, of at most 6 levels below the root. A node has its box, its
+ * children, a flag for faces in or near its cell, and its winding number if there are no faces.
+ * Bounds are certain: they include the rounding of the model's coordinates. A query visits at most
+ * as many nodes as its caller allows; with fewer nodes its bounds are wider. */
 #include "core/strict_fp.h"
 
 #include "extras/haptic/held_levels.h"
@@ -113,7 +113,7 @@ static void add_children(const ebpo_held_levels *levels, const double p[3], uint
 void ebpo_held_levels_bound(const ebpo_held_levels *levels, const double p[3], int visits,
                             double *lo, double *hi)
 {
-    waiting stack[8 * (DEEPEST + 1)]; /* each level leaves at most seven */
+    waiting stack[8 * (DEEPEST + 1)]; /* each level adds at most seven waiting nodes */
     int depth = 0;
     double lower = INFINITY, upper = INFINITY;
     if (levels->node[0].has_faces)

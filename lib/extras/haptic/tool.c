@@ -3,9 +3,9 @@
  * Points are split at the middle of their longest side into clusters of few points. A rotation is
  * measured as a length: its angle times the tool's arm.
  *
- * Contacts constrain the path of a tool: the path is the nearest one to the wanted path that brings
- * no point closer to a face than allowed. Hildreth's method solves that for the contacts that
- * matter, which are added one at a time, the most violated first.
+ * Contacts constrain the motion of a tool. The tool makes the motion nearest to the wanted one that
+ * brings no point closer to a face than allowed. Hildreth's method finds this motion for the
+ * contacts that matter, which are added one at a time, the most violated first.
  *
  * Forces are passive: they are reduced where the device would receive more energy than it gave. */
 #include "core/strict_fp.h"
@@ -34,10 +34,10 @@ void ebpo_passive_moved(ebpo_passive *p, const double *force, const double *move
 /* Limits the force F so that the energy given in total, `given`, never exceeds A = stiffness s^2,
  * where s is the longest motion of the device in one haptic step. Let g = -given. A step of length
  * s' gives at most F s', and F s' - g must not exceed stiffness max(s, s')^2. This holds for all s'
- * in two cases. First, if F^2 <= 4 stiffness g. Second, if F <= 2 stiffness s and F s - g <= A, as
- * from s on the right side then grows faster than the left one. A spring that was pressed steadily
- * to the depth d has F = stiffness d and g at least stiffness d^2 / 2: then one of the two cases
- * holds, and the force is not reduced. */
+ * in two cases. First, if F^2 <= 4 stiffness g. Second, if F <= 2 stiffness s and F s - g <= A,
+ * because for s' >= s the right side then grows faster than the left side. A spring that was
+ * pressed steadily to the depth d has F = stiffness d and g of at least stiffness d^2 / 2. Then one
+ * of the two cases holds, and the force is not reduced. */
 static double max_force(const ebpo_passive *p)
 {
     double k = p->stiffness, g = -p->energy, s = p->longest_step;
@@ -328,8 +328,8 @@ static void tool_new_fill(ebpo_tool *t, const double (*points)[3], placed *p)
     for (uint64_t i = 0; i < EBPO_TOOL_POOL; i++)
         t->pool[i] = 0;                     /* write each page here, so that no haptic step is the
                                              * first to use it */
-    t->arm = square > 0 ? sqrt(square) : 1; /* otherwise the only point is in the middle: rotation
-                                             * has no effect */
+    t->arm = square > 0 ? sqrt(square) : 1; /* otherwise the only point is in the middle, and
+                                             * rotation has no effect */
 }
 
 uint64_t ebpo_tool_bytes(const ebpo_tool *t)

@@ -1,6 +1,6 @@
 /* A tool: points that move together, its contacts, rigid motions, and passive forces. For each
- * point a distance without faces is known; the point is examined only after it has moved farther
- * than that. */
+ * point a distance is known within which there is no face. The point is examined only after it has
+ * moved farther than this distance. */
 #ifndef EBPO_HAPTIC_TOOL_H
 #define EBPO_HAPTIC_TOOL_H
 
@@ -83,8 +83,8 @@ typedef struct ebpo_tool_contacts {
 void ebpo_tool_contact_add(ebpo_tool_contacts *all, const ebpo_tool_contact *contact);
 
 /* Computes `out` with grip . out >= -space for all contacts, with an error of at most `close`, as
- * far as bounded work allows. Without `release` no contact has to move away. Returns the number of
- * contacts that hold. */
+ * far as bounded work allows. Without `release`, no contact requires a motion away from its face.
+ * Returns the number of contacts that hold the tool. */
 int ebpo_tool_hold(const ebpo_tool_contacts *all, const double want[EBPO_SCREW], double close,
                    bool release, double out[EBPO_SCREW]);
 

@@ -1,9 +1,9 @@
 /* Computes distances of given points and of the points of a lattice.
  *
  * A lattice is evaluated in groups of layers. Each group is evaluated in bricks, whose points are
- * close to each other, so that subtrees are loaded few times and the processor's caches hold their
- * data. Each thread has a separate query context, made when it is first used. Results do not depend
- * on the number of threads.
+ * close to each other. So subtrees are loaded few times, and the processor's caches keep the data.
+ * Each thread has a separate query context, which is made when it is first used. Results do not
+ * depend on the number of threads.
  *
  * Source: docs/guide/maps.md. */
 #include "core/strict_fp.h"
@@ -40,7 +40,7 @@ ebpo_status ebpo_map_queries_make(ebpo_map_queries *out, ebpo_model *model,
     distance.unsigned_distance = options->unsigned_distance;
     *out = (ebpo_map_queries){ .model = model, .distance = distance };
     out->threads = ebpo_thread_count(options->threads);
-    /* fails for an unusable model before anything is made */
+    /* a context of an unusable model fails here, before anything else is made */
     ebpo_status status = ebpo_context_new(model, &out->context[0], error);
     return status == EBPO_OK ? ebpo_distance_many(out->context[0], NULL, 0, &distance, NULL, error)
                              : status;

@@ -63,7 +63,8 @@ static void palette_diverging(double share, uint8_t rgb[3])
     of_oklab(light, chroma * cosine[outside], chroma * sine[outside], rgb);
 }
 
-/* Goes from red over green to blue; each of the two ranges is a third of the circle of hues. */
+/* Computes a colour from red over green to blue; red to green and green to blue are each a third of
+ * the circle of hues. */
 static void palette_thesis(double share, uint8_t rgb[3])
 {
     double far = fabs(share), turn = 4 * far; /* red, yellow, green, cyan, blue */

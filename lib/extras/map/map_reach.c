@@ -3,8 +3,9 @@
  *
  * Branch and bound over triangles, which are divided into four. When a point moves, its distance
  * changes by at most the length of the motion. So the distance of each point of a triangle is at
- * most that of a corner plus the longest way from that corner. Each round divides the triangles
- * with the greatest bounds together, so the result does not depend on threads. */
+ * most the distance of a corner plus the greatest length from that corner. In each round the
+ * triangles with the greatest bounds are divided together, so the result does not depend on
+ * threads. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -18,8 +19,8 @@
 #include "core/parallel.h"
 #include "extras/map/map_lattice.h"
 
-/* Number of faces evaluated together; maximum number of triangles of a round. For further triangles
- * the bounds are used unchanged. */
+/* Number of faces evaluated together, and maximum number of triangles of a round. Beyond that
+ * number, triangles are not divided and keep their bounds. */
 enum { FACES_AT_A_TIME = 1 << 17, TRIANGLES_MAX = 1 << 20 };
 
 typedef struct triangle {
@@ -75,7 +76,7 @@ static bool needs_division(const search *s, double upper)
     return upper > s->reach.lo * (1 + s->o.tolerance) && upper > s->reach.hi;
 }
 
-/* Keeps a triangle for the next round, or uses its bound unchanged. */
+/* Keeps a triangle for the next round. If there are too many, its bound is final. */
 static ebpo_status reach_keep(search *s, triangles *list, const triangle *t, ebpo_error *error)
 {
     if (!needs_division(s, t->upper))
@@ -198,8 +199,8 @@ static void corner_of(const ebpo_mesh *m, uint32_t vertex, double out[3])
 static ebpo_status inspect_faces(search *s, uint64_t begin, uint64_t end, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    double share = (double)end / (double)s->mesh->face_count; /* faces that are done, including
-                                                               * these */
+    double share = (double)end / (double)s->mesh->face_count; /* share of the faces that are done
+                                                               * after this piece */
     s->allowed =
         end == s->mesh->face_count ? s->o.queries : (uint64_t)((double)s->o.queries * share);
     s->now.count = 0;

@@ -192,7 +192,7 @@ static void put_vector(FILE *to, const double v[3])
 }
 
 /* Begins an NRRD file. Each format has functions for the header, for the layers in order, and for
- * the end, which returns late failures; `discard` is called after a failure. */
+ * the end, which returns late failures. `discard` is called after a failure. */
 static ebpo_status map_nrrd_begin(map_file *f, ebpo_error *error)
 {
     const ebpo_lattice *l = f->lattice;

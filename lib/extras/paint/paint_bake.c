@@ -1,9 +1,9 @@
 /* Turns paint into colours of a mesh's vertices, and finds the faces that a stroke covers.
  *
- * The strokes of a layer are applied in order to the vertices in the reaches of their points
- * (paint_reach.h); then the layers are blended in order over the colours of vertices. Colours are
- * stored in the mesh's existing columns, in their types; other meshes get columns for them. A
- * stroke covers the faces of its points' reaches.
+ * A stroke covers the faces and vertices in the reaches of its points (paint_reach.h). The strokes
+ * of a layer are applied in order. Then the layers are blended in order over the original colours
+ * of the vertices. Colours are stored in the mesh's existing columns, in the columns' types; a mesh
+ * without colours gets new columns.
  *
  * Source: format-spec/paint.md, section 5. */
 #include "core/strict_fp.h"
@@ -92,25 +92,25 @@ static int by_file_face(const void *a, const void *b)
     return (x->file_face > y->file_face) - (x->file_face < y->file_face);
 }
 
-static ebpo_status add_point(ebpo_found_faces *intersected, ebpo_reach *reach, ebpo_error *error)
+static ebpo_status add_point(ebpo_found_faces *found_faces, ebpo_reach *reach, ebpo_error *error)
 {
     for (uint64_t i = 0; i < reach->count; i++) {
         const ebpo_reach_face *f = &reach->face[i];
         uint32_t number;
-        ebpo_status status = ebpo_found_faces_add(intersected, f, &number, error);
+        ebpo_status status = ebpo_found_faces_add(found_faces, f, &number, error);
         if (status != EBPO_OK)
             return status;
         for (int k = 0; k < 3; k++)
-            intersected->face[number].covered[k] |= f->within[k];
+            found_faces->face[number].covered[k] |= f->within[k];
     }
     return EBPO_OK;
 }
 
-static void cover_give(const ebpo_found_faces *intersected, ebpo_paint_face_fn take, void *user)
+static void cover_give(const ebpo_found_faces *found_faces, ebpo_paint_face_fn take, void *user)
 {
-    qsort(intersected->face, intersected->count, sizeof *intersected->face, by_file_face);
-    for (uint64_t i = 0; i < intersected->count; i++) {
-        const ebpo_found_face *f = &intersected->face[i];
+    qsort(found_faces->face, found_faces->count, sizeof *found_faces->face, by_file_face);
+    for (uint64_t i = 0; i < found_faces->count; i++) {
+        const ebpo_found_face *f = &found_faces->face[i];
         ebpo_paint_face out = { .face = f->face, .file_face = f->file_face };
         memcpy(out.corner, f->corner, sizeof out.corner);
         for (int k = 0; k < 3; k++)
@@ -125,7 +125,7 @@ ebpo_status ebpo_paint_cover(const ebpo_paint *p, ebpo_context *context, uint64_
                              ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_found_faces intersected = { 0 };
+    ebpo_found_faces found_faces = { 0 };
     ebpo_reach reach;
     uint64_t absent = 0;
     ebpo_status status = ebpo_paint_check_context(p, context, error);
@@ -139,15 +139,15 @@ ebpo_status ebpo_paint_cover(const ebpo_paint *p, ebpo_context *context, uint64_
         bool here;
         status = ebpo_paint_reach(&reach, p, stroke, i, &here, error);
         if (status == EBPO_OK && here)
-            status = add_point(&intersected, &reach, error);
+            status = add_point(&found_faces, &reach, error);
         absent += status == EBPO_OK && !here;
     }
     ebpo_reach_end(&reach);
     if (status == EBPO_OK && elsewhere)
         *elsewhere = absent;
     if (status == EBPO_OK)
-        cover_give(&intersected, take, user);
-    ebpo_found_faces_free(&intersected);
+        cover_give(&found_faces, take, user);
+    ebpo_found_faces_free(&found_faces);
     return status;
 }
 
@@ -162,9 +162,9 @@ static ebpo_status check_point(ebpo_reach *reach, const ebpo_paint_point *q, con
                ? status
                : ebpo_fail_file(
                      error, EBPO_E_FORMAT, reach->context->model->file->in.shown,
-                     "%s %llu of the paint is not on face %lu, which it names: the paint does "
-                     "not fit the model; give the one that it was made on, or remove that %s "
-                     "without naming a model",
+                     "%s %llu of the paint is not on its face %lu: the paint does not fit the "
+                     "model; give the model that it was made on, or remove that %s without "
+                     "naming a model",
                      what, (unsigned long long)number, (unsigned long)q->face, what);
 }
 
@@ -226,8 +226,8 @@ static int by_value(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Reads the source numbers of the mesh's faces, if they have gaps or go beyond the mesh's number of
- * faces. The mesh is in the source's order. */
+/* Reads the source numbers of the mesh's faces, if the numbers have gaps or exceed the mesh's
+ * number of faces. The mesh is in the source's order. */
 static ebpo_status read_numbers(bake *b, ebpo_error *error)
 {
     const ebpo_file *file = b->context->model->file;

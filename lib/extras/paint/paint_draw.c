@@ -1,9 +1,9 @@
-/* Makes strokes from the path of a pen: points at even steps along the path; with more pressure
+/* Makes strokes from the path of a pen: points at even steps along the path. With more pressure
  * there are more points at each step.
  *
- * Every point is on a face of the model, and is stored as the face and three integer weights of its
- * corners. The scatter of points is pseudorandom with a seed, so that a path makes the same stroke
- * on every machine. */
+ * Every point is on a face of the model. It is stored as the face and two integer weights of the
+ * face's corners. The scatter of points is pseudorandom with a seed, so a path makes the same
+ * stroke on every machine. */
 #include "core/strict_fp.h"
 
 #include <ebpo/paint.h>
@@ -50,16 +50,16 @@ static bool in_range(double v, double least, double most) { return v >= least &&
 static const char *pen_wrong(const ebpo_paint_pen *pen)
 {
     if (!in_range(pen->radius, 1 / EBPO_PAINT_MAX, EBPO_PAINT_MAX))
-        return "a pen's radius is 2^-200 to 2^200";
+        return "a pen's radius must be 2^-200 to 2^200";
     if (!in_range(pen->spread, 0, EBPO_PAINT_MAX))
-        return "a pen's spread is 0 to 2^200";
+        return "a pen's spread must be 0 to 2^200";
     if (pen->density < 1 || pen->density > DENSITY_MAX || (pen->spread == 0 && pen->density != 1))
-        return "a pen's density is 1 to 10,000, and 1 without spread";
+        return "a pen's density must be 1 to 10,000, and 1 if the spread is 0";
     if (!in_range(pen->size_least, 0x1p-15, 1) || !in_range(pen->size_full, 0x1p-15, 1))
-        return "a pen's sizes are 2^-15 to 1";
+        return "a pen's sizes must be 2^-15 to 1";
     if (pen->step != 0 && !in_range(pen->step, 1 / EBPO_PAINT_MAX, DBL_MAX))
-        return "a pen's step is 0, or 2^-200 and more";
-    return pen->within >= 0 ? NULL : "a pen's distance from the surface is at least 0";
+        return "a pen's step must be 0, or at least 2^-200";
+    return pen->within >= 0 ? NULL : "a pen's distance from the surface must be at least 0";
 }
 
 static const char *device_wrong(const ebpo_paint_input *h)
@@ -68,8 +68,8 @@ static const char *device_wrong(const ebpo_paint_input *h)
         if (!(fabs(h->place[k]) <= EBPO_PAINT_MAX))
             return "a position of the pen is not finite, or beyond 2^200";
     if (!in_range(h->pressure, 0, 1))
-        return "the pen's pressure is 0 to 1";
-    return in_range(h->time, 0, UINT32_MAX) ? NULL : "the pen's time is 0 to 2^32 - 1";
+        return "the pen's pressure must be 0 to 1";
+    return in_range(h->time, 0, UINT32_MAX) ? NULL : "the pen's time must be 0 to 2^32 - 1";
 }
 
 static ebpo_status draw_check(const drawing *l, const ebpo_paint *p, const ebpo_paint_input *input,
@@ -172,7 +172,7 @@ static ebpo_status add_point(drawing *l, const ebpo_distance_result *at, const d
     double share = l->pen.size_least + input->pressure * (l->pen.size_full - l->pen.size_least);
     if (l->point_count == l->space)
         return ebpo_fail(error, EBPO_E_LIMIT,
-                         "the stroke would exceed the %d points that a paint may have; take "
+                         "the stroke would exceed the %d points that a paint may have; use "
                          "longer steps or fewer points",
                          EBPO_PAINT_POINTS);
     if (!ebpo_grow(&l->point, &l->point_capacity, l->point_count + 1, sizeof *l->point))
@@ -315,7 +315,7 @@ static ebpo_status draw_go(drawing *l, const ebpo_paint_input *input, uint64_t c
         if (!(length / step <= EBPO_PAINT_POINTS))
             return ebpo_fail(
                 error, EBPO_E_LIMIT,
-                "two positions of the pen are more than %d steps apart; take longer ones",
+                "two positions of the pen are more than %d steps apart; use longer steps",
                 EBPO_PAINT_POINTS);
         for (uint64_t k = 1; at <= length && status == EBPO_OK; k++) {
             ebpo_paint_input pen;

@@ -117,7 +117,7 @@ ebpo_status ebpo_paint_remove_stroke(ebpo_paint *p, uint64_t number, ebpo_error 
     if (number >= p->stroke_count)
         return ebpo_fail(
             error, EBPO_E_ARGUMENT,
-            "there is no stroke %llu: strokes are counted from 0, and the paint has %llu",
+            "there is no stroke %llu: strokes are numbered from 0, and the paint has %llu",
             (unsigned long long)number, (unsigned long long)p->stroke_count);
     ebpo_stroke_held gone = p->stroke[number];
     uint64_t end = gone.first + gone.count;
@@ -166,8 +166,8 @@ bool ebpo_paint_texts_begin(char *text[EBPO_PAINT_TEXTS])
     return copy_texts(none, text);
 }
 
-/* Checks texts before anything is changed, and copies them. The date `known` is accepted without a
- * check, because texts of other programs are kept. */
+/* Checks texts before anything is changed, and copies them. A date equal to `known` is accepted
+ * without a check, so that texts of other programs are kept. */
 static ebpo_status take_texts(const char *const from[EBPO_PAINT_TEXTS],
                               const ebpo_paint_text_kind *kinds, const char *of, const char *known,
                               char *to[EBPO_PAINT_TEXTS], ebpo_error *error)
@@ -199,7 +199,7 @@ static ebpo_status take_texts(const char *const from[EBPO_PAINT_TEXTS],
 static ebpo_status no_layer(const ebpo_paint *p, uint64_t number, ebpo_error *error)
 {
     return ebpo_fail(error, EBPO_E_ARGUMENT,
-                     "there is no layer %llu: layers are counted from 0, and the paint has %llu",
+                     "there is no layer %llu: layers are numbered from 0, and the paint has %llu",
                      (unsigned long long)number, (unsigned long long)p->layer_count);
 }
 
@@ -362,7 +362,8 @@ ebpo_status ebpo_paint_remove_note(ebpo_paint *p, uint64_t number, ebpo_error *e
 {
     if (number >= p->note_count)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "there is no note %llu: notes are counted from 0, and the paint has %llu",
+                         "there is no note %llu: notes are numbered from 0, and the paint has "
+                         "%llu",
                          (unsigned long long)number, (unsigned long long)p->note_count);
     free_texts(p->note[number].text);
     p->note_count--;

@@ -3,10 +3,10 @@
  * Faces are halved at their longest edge until the stroke of a part is certain, or the part is
  * small. In each layer the last stroke decides: if one of its balls contains the part, the part
  * belongs to this stroke. If a ball only intersects the part, the uncovered rest may belong to
- * earlier strokes; so lower and upper bounds are summed.
+ * earlier strokes. So lower and upper bounds are summed.
  *
- * Faces are distributed to a fixed number of pieces of work, whose sums are added in order: results
- * do not depend on the number of threads.
+ * Faces are distributed to a fixed number of pieces of work. The sums of the pieces are added in
+ * order, so results do not depend on the number of threads.
  *
  * Source: format-spec/paint.md, section 6. */
 #include "core/strict_fp.h"
@@ -112,7 +112,8 @@ static bool area_cut_intersects(const area_ball *ball, const triangle *t)
 
 /* Copies the balls of a layer at [from, end) that may contain a part of the triangle to `to`. Stops
  * after the first stroke with a ball that contains the whole triangle; of this stroke only that
- * ball is copied. Returns the number of balls; *sure: the layer is decided. */
+ * ball is copied. Returns the number of copied balls. *sure: the layer is decided, because no ball
+ * intersects the triangle, or the last stroke covers all of it. */
 static uint64_t sift_layer(area_cut *c, const triangle *t, uint64_t from, uint64_t end, uint64_t to,
                            bool *sure)
 {
@@ -134,7 +135,8 @@ static uint64_t sift_layer(area_cut *c, const triangle *t, uint64_t from, uint64
     return kept;
 }
 
-/* Calls sift_layer for all layers at [from, from + count), and copies their balls behind these. */
+/* Calls sift_layer for all layers at [from, from + count). The copied balls follow the given ones
+ * on the stack. */
 static uint64_t area_cut_sift(area_cut *c, const triangle *t, uint64_t from, uint64_t count,
                               bool *sure)
 {
@@ -275,8 +277,8 @@ static bool find_middle(const double a[3], const double b[3], double middle[3])
     return memcmp(middle, a, 3 * sizeof *a) != 0 && memcmp(middle, b, 3 * sizeof *b) != 0;
 }
 
-/* Divides a triangle. Its balls are at [from, from + count); the stack behind them is used for the
- * parts. */
+/* Divides a triangle, whose balls are at [from, from + count). The stack behind them is used for
+ * the balls of the parts. */
 static bool area_cut_cut(area_cut *c, const triangle *t, uint64_t from, uint64_t count, int depth)
 {
     bool sure;
@@ -326,10 +328,10 @@ typedef struct hit {
 typedef struct measure {
     const ebpo_paint *p;
     const ebpo_paint_options *options;
-    ebpo_found_faces intersected;
+    ebpo_found_faces found_faces;
     hit *hit;
     uint64_t hit_count, hit_capacity, elsewhere;
-    uint64_t *first; /* [intersected.count + 1] first hit of each face */
+    uint64_t *first; /* [found_faces.count + 1] first hit of each face */
     area_keys keys;
     ebpo_paint_colour_area *colour; /* [keys.colours] */
     uint64_t pieces;
@@ -346,7 +348,7 @@ static ebpo_status add_point(measure *m, ebpo_reach *reach, uint32_t stroke, uin
     for (uint64_t i = 0; i < reach->count; i++) {
         hit *h = &m->hit[m->hit_count];
         ebpo_status status =
-            ebpo_found_faces_add(&m->intersected, &reach->face[i], &h->face, error);
+            ebpo_found_faces_add(&m->found_faces, &reach->face[i], &h->face, error);
         if (status != EBPO_OK)
             return status;
         h->layer = m->p->stroke[stroke].layer;
@@ -395,9 +397,9 @@ static int by_face(const void *a, const void *b)
 
 static ebpo_status sort_hits(measure *m, ebpo_error *error)
 {
-    m->first = ebpo_alloc_zero(m->intersected.count + 1, sizeof *m->first);
+    m->first = ebpo_alloc_zero(m->found_faces.count + 1, sizeof *m->first);
     if (!m->first)
-        return ebpo_fail_memory(error, m->intersected.count * sizeof *m->first);
+        return ebpo_fail_memory(error, m->found_faces.count * sizeof *m->first);
     if (m->hit_count)
         qsort(m->hit, m->hit_count, sizeof *m->hit, by_face);
     for (uint64_t i = 0; i < m->hit_count; i++)
@@ -461,7 +463,7 @@ static bool measure_face(measure *m, area_cut *cut, uint64_t face)
                                     h->layer,
                                     h->stroke };
     }
-    return area_cut_face(cut, (const double(*)[3])m->intersected.face[face].corner, count);
+    return area_cut_face(cut, (const double(*)[3])m->found_faces.face[face].corner, count);
 }
 
 static ebpo_status measure_pieces(void *context, uint64_t begin, uint64_t end, unsigned worker,
@@ -469,7 +471,7 @@ static ebpo_status measure_pieces(void *context, uint64_t begin, uint64_t end, u
 {
     measure *m = context;
     area_cut cut;
-    uint64_t faces = m->intersected.count, keys = area_key_count(&m->keys);
+    uint64_t faces = m->found_faces.count, keys = area_key_count(&m->keys);
     (void)worker;
     bool fine = area_cut_begin(&cut, &m->keys, m->options->fineness);
     for (uint64_t piece = begin; piece < end && fine; piece++) {
@@ -521,7 +523,7 @@ static ebpo_status measure_give(measure *m, ebpo_paint_areas *out, ebpo_error *e
     own.all = layers[m->p->layer_count];
     own.strokes = copy_areas(strokes, m->p->stroke_count);
     own.layers = copy_areas(layers, m->p->layer_count);
-    own.faces = m->intersected.count;
+    own.faces = m->found_faces.count;
     own.elsewhere = m->elsewhere;
     if (!own.strokes || !own.layers) {
         ebpo_paint_areas_free(&own);
@@ -573,7 +575,7 @@ ebpo_status ebpo_paint_measure(const ebpo_paint *p, ebpo_context *context,
         status = measure_all(&m, error);
     if (status == EBPO_OK)
         status = measure_give(&m, out, error);
-    ebpo_found_faces_free(&m.intersected);
+    ebpo_found_faces_free(&m.found_faces);
     free(m.hit);
     free(m.first);
     free(m.keys.colour);

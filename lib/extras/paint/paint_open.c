@@ -1,11 +1,11 @@
 /* Reads paint files, and has the table of their arrays.
  *
- * A paint file is untrusted input, read by the strict reader of HDF5 headers (lib/hdf5_read)
+ * A paint file is untrusted input. The strict reader of HDF5 headers (lib/hdf5_read) reads it
  * without libhdf5. Every count is compared with its limit and with the file's size before memory is
- * allocated; every number is checked for its range, and texts for UTF-8 without control characters.
+ * allocated. Every number is checked for its range, and texts for UTF-8 without control characters.
  *
- * The table of arrays states for each column its path, its element type, and the member of a stroke
- * or a point that it holds; paint_save.c writes by the same table.
+ * The table states for each array its path, its element type, and the member of a stroke or a point
+ * that it contains. paint_save.c writes files by the same table.
  *
  * Source: format-spec/paint.md. */
 #include "core/strict_fp.h"
@@ -216,7 +216,9 @@ static ebpo_status read_texts(reader *r, ebpo_head_object group, const char *pat
             return status;
         r->text_bytes += strlen(r->text);
         if (r->text_bytes > r->input.source.size)
-            return open_wrong(r, path, "the texts have more bytes than the file: groups share them",
+            return open_wrong(r, path,
+                              "the texts have more bytes than the file: groups share "
+                              "objects",
                               error);
         char *copy = strdup(r->text);
         if (!copy)
@@ -285,7 +287,8 @@ static ebpo_status read_note(reader *r, uint64_t number, ebpo_error *error)
     if (status == EBPO_OK)
         status = get_count(r, group, path, "layer", EBPO_PAINT_LAYERS, &n->layer, error);
     if (status == EBPO_OK && n->layer >= r->p->layer_count)
-        return open_wrong(r, path, "attribute layer names a layer that does not exist", error);
+        return open_wrong(r, path, "attribute layer is the number of a layer that does not exist",
+                          error);
     return status == EBPO_OK ? read_note_place(r, group, path, n, error) : status;
 }
 
@@ -337,8 +340,7 @@ static ebpo_status find_column(reader *r, const ebpo_paint_column *c, uint64_t r
     free(chunks);
     if (!same)
         return open_wrong(r, c->path,
-                          "the array does not have the type, shape and filter that the format "
-                          "fixes",
+                          "the array does not have the type, shape and filter of the format",
                           error);
     return place->bytes == rows * ebpo_shape_row_bytes(&expected) + 4
                ? EBPO_OK
@@ -381,8 +383,7 @@ static ebpo_status check_strokes(reader *r, ebpo_error *error)
     }
     if (sum != p->point_count)
         return open_wrong(r, "/strokes/points",
-                          "the points of all strokes are not as many as "
-                          "there are points",
+                          "the sum of the strokes' point counts differs from the number of points",
                           error);
     for (uint64_t i = 0; i < p->point_count; i++) {
         const char *what = ebpo_paint_point_wrong(&p->point[i]);
@@ -440,7 +441,7 @@ static ebpo_status read_all(reader *r, ebpo_error *error)
     return status == EBPO_OK ? read_strokes(r, strokes, points, error) : status;
 }
 
-/* Records the file and version that are read. */
+/* Stores which file, and which version of it, was read. */
 static ebpo_status keep_version(const reader *r, ebpo_error *error)
 {
     ebpo_paint_file *f = r->p->file;
@@ -448,7 +449,7 @@ static ebpo_status keep_version(const reader *r, ebpo_error *error)
     char *path = fd >= 0 ? realpath(r->input.shown, NULL) : NULL;
     if (fd >= 0 && !path && errno == ENOMEM)
         return ebpo_fail_memory(error, strlen(r->input.shown));
-    if (!path) /* no memory, or the file has no name any more */
+    if (!path) /* no memory, or the file has been removed */
         return EBPO_OK;
     f->path = path;
     f->fd = fcntl(fd, F_DUPFD_CLOEXEC, 3);
@@ -501,8 +502,8 @@ ebpo_status ebpo_paint_open(const char *path, ebpo_paint **out, ebpo_error *erro
     return open_path(path, out, error);
 }
 
-/* Makes the paint of a file that does not exist. The path is recorded, so that saving fails if
- * another program has made a file there meanwhile. */
+/* Makes the paint of a file that does not exist. Stores the path, so that saving fails if another
+ * program has made a file there meanwhile. */
 static ebpo_status make_at(const char *path, const ebpo_file *model, ebpo_paint **out,
                            ebpo_error *error)
 {

@@ -51,13 +51,13 @@ typedef struct ebpo_stroke_held {
     uint8_t rgba[4];
 } ebpo_stroke_held;
 
-/* The file that a paint belongs to, and the version of the file from which the paint was read, or
+/* The file to which a paint belongs, and its version: the version from which the paint was read, or
  * as which it was saved. Saving changes this struct, but not the paint. */
 typedef struct ebpo_paint_file {
     pthread_mutex_t mutex; /* protects the other members during saving */
     char *path;            /* absolute path; NULL: no file yet */
-    int fd;                /* keeps the version open, so that no later file gets the same inode; -1:
-                            * no file */
+    int fd;                /* keeps the file open, so that no later file gets the same inode; -1: no
+                            * file */
     ebpo_file_version version;
     ebpo_file_lock lock; /* held while the paint is open for changes */
 } ebpo_paint_file;

@@ -1,11 +1,11 @@
 /* The reach of a point: the faces that are connected with the point's own face within the point's
  * ball.
  *
- * Faces in the ball's box are joined at common corners (equal positions) that are within the ball,
- * and at common edges that cross it; the set that contains the point's face is the reach. So paint
- * does not pass through a part of a model that is thinner than the ball.
+ * Faces in the ball's box are joined into sets: at common corners (equal positions) within the
+ * ball, and at common edges that cross the ball. The set that contains the point's face is the
+ * reach. So paint does not pass through a part of a model that is thinner than the ball.
  *
- * Points of a stroke are evaluated in batches on all cores; a reach is kept until it is requested.
+ * Points of a stroke are evaluated in batches on all cores. A reach is kept until it is requested.
  * Results do not depend on the number of threads.
  *
  * Source: format-spec/paint.md, section 4. */
@@ -79,7 +79,7 @@ static ebpo_status reach_gather(ebpo_reach *r, const ebpo_reach_ball *ball, ebpo
     ebpo_status status = ebpo_triangles_in_box(r->context, min, max, reach_take, r, error);
     if (status == EBPO_OK && r->too_many)
         status = ebpo_fail(error, EBPO_E_LIMIT,
-                           "the ball of a point intersects more than %d faces; take a smaller "
+                           "the ball of a point intersects more than %d faces; use a smaller "
                            "radius",
                            FACES_MAX);
     if (status == EBPO_OK && r->short_of_memory)
@@ -271,7 +271,7 @@ static ebpo_status find_face(ebpo_reach *r, const ebpo_reach_ball *ball, bool *h
     ebpo_error cause = EBPO_ERROR_INIT;
     *here = *on = false;
     ebpo_status status = reach_gather(r, ball, &cause);
-    if (status == EBPO_E_ABSENT && subset) /* in the omitted part, connectivity is not known */
+    if (status == EBPO_E_ABSENT && subset) /* connectivity in the omitted part is unknown */
         return EBPO_OK;
     if (status != EBPO_OK)
         return ebpo_fail_with(error, &cause);
@@ -315,56 +315,56 @@ ebpo_status ebpo_reach_find(ebpo_reach *r, const ebpo_reach_ball *ball, bool *he
     return EBPO_OK;
 }
 
-static uint64_t found_faces_find(const ebpo_found_faces *intersected, uint64_t file_face)
+static uint64_t found_faces_find(const ebpo_found_faces *found_faces, uint64_t file_face)
 {
     uint64_t at;
-    EBPO_HASH_FIND(at, ebpo_hash_number(file_face), intersected->slots - 1,
-                   intersected->slot[at] == 0 ||
-                       intersected->face[intersected->slot[at] - 1].file_face == file_face);
+    EBPO_HASH_FIND(at, ebpo_hash_number(file_face), found_faces->slots - 1,
+                   found_faces->slot[at] == 0 ||
+                       found_faces->face[found_faces->slot[at] - 1].file_face == file_face);
     return at;
 }
 
 /* Doubles the slots, and inserts all faces again. */
-static bool grow_slots(ebpo_found_faces *intersected)
+static bool grow_slots(ebpo_found_faces *found_faces)
 {
-    uint64_t slots = ebpo_hash_slots(4 * (intersected->count + 1));
+    uint64_t slots = ebpo_hash_slots(4 * (found_faces->count + 1));
     uint32_t *slot = ebpo_alloc_zero(slots, sizeof *slot);
     if (!slot)
         return false;
-    free(intersected->slot);
-    intersected->slot = slot;
-    intersected->slots = slots;
-    for (uint64_t i = 0; i < intersected->count; i++)
-        slot[found_faces_find(intersected, intersected->face[i].file_face)] = (uint32_t)i + 1;
+    free(found_faces->slot);
+    found_faces->slot = slot;
+    found_faces->slots = slots;
+    for (uint64_t i = 0; i < found_faces->count; i++)
+        slot[found_faces_find(found_faces, found_faces->face[i].file_face)] = (uint32_t)i + 1;
     return true;
 }
 
-ebpo_status ebpo_found_faces_add(ebpo_found_faces *intersected, const ebpo_reach_face *face,
+ebpo_status ebpo_found_faces_add(ebpo_found_faces *found_faces, const ebpo_reach_face *face,
                                  uint32_t *number, ebpo_error *error)
 {
-    if (2 * (intersected->count + 1) > intersected->slots && !grow_slots(intersected))
-        return ebpo_fail_memory(error, 4 * intersected->count * sizeof *intersected->slot);
-    uint64_t at = found_faces_find(intersected, face->file_face);
-    if (intersected->slot[at] == 0) {
-        if (intersected->count == UINT32_MAX - 1)
+    if (2 * (found_faces->count + 1) > found_faces->slots && !grow_slots(found_faces))
+        return ebpo_fail_memory(error, 4 * found_faces->count * sizeof *found_faces->slot);
+    uint64_t at = found_faces_find(found_faces, face->file_face);
+    if (found_faces->slot[at] == 0) {
+        if (found_faces->count == UINT32_MAX - 1)
             return ebpo_fail(error, EBPO_E_LIMIT, "strokes reach more than 2^32 - 2 faces");
-        if (!ebpo_grow(&intersected->face, &intersected->capacity, intersected->count + 1,
-                       sizeof *intersected->face))
-            return ebpo_fail_memory(error, intersected->count * sizeof *intersected->face);
-        ebpo_found_face *f = &intersected->face[intersected->count++];
+        if (!ebpo_grow(&found_faces->face, &found_faces->capacity, found_faces->count + 1,
+                       sizeof *found_faces->face))
+            return ebpo_fail_memory(error, found_faces->count * sizeof *found_faces->face);
+        ebpo_found_face *f = &found_faces->face[found_faces->count++];
         *f = (ebpo_found_face){ .face = face->face, .file_face = face->file_face };
         memcpy(f->corner, face->corner, sizeof f->corner);
-        intersected->slot[at] = (uint32_t)intersected->count;
+        found_faces->slot[at] = (uint32_t)found_faces->count;
     }
-    *number = intersected->slot[at] - 1;
+    *number = found_faces->slot[at] - 1;
     return EBPO_OK;
 }
 
-void ebpo_found_faces_free(ebpo_found_faces *intersected)
+void ebpo_found_faces_free(ebpo_found_faces *found_faces)
 {
-    free(intersected->face);
-    free(intersected->slot);
-    *intersected = (ebpo_found_faces){ 0 };
+    free(found_faces->face);
+    free(found_faces->slot);
+    *found_faces = (ebpo_found_faces){ 0 };
 }
 
 /* --- many points --- */
@@ -372,8 +372,8 @@ void ebpo_found_faces_free(ebpo_found_faces *intersected)
 /* Number of points that are evaluated together, unless they already reach too many faces. */
 enum { TOGETHER = 1024, FACES_TOGETHER = 1 << 20, GRAIN = 8 };
 
-/* Part of the budget that each thread needs: with less, threads load items that others have just
- * dropped. */
+/* Part of the budget that each thread needs. With less, a thread would load data that another
+ * thread has just dropped. */
 enum { THREAD_CAPACITY = 1 << 20 };
 
 typedef struct found {
@@ -425,7 +425,7 @@ static ebpo_status find_some(void *context, uint64_t begin, uint64_t end, unsign
         f->done = status == EBPO_OK;
     }
     ebpo_context_let_go(
-        reach->context); /* a thread that waits must not hold memory that others need */
+        reach->context); /* a waiting thread must not hold memory that others need */
     return status;
 }
 

@@ -37,8 +37,8 @@ typedef struct ebpo_reach {
     uint64_t position_count, position_capacity, edge_count, edge_capacity;
     uint32_t *slot; /* hash table of positions, later of edges; an entry is 0 (free) or the index
                      * plus 1 */
-    uint32_t *root; /* sets of faces, positions and edges: each entry is the number of another
-                     * member of its set */
+    uint32_t *root; /* sets of faces, positions and edges: each entry is the index of another member
+                     * of its set, or of itself */
     uint64_t slots, slot_capacity, root_capacity;
     bool short_of_memory, too_many;
 } ebpo_reach;
@@ -86,10 +86,10 @@ typedef struct ebpo_found_faces {
 } ebpo_found_faces;
 
 /* Finds or adds a face, and sets its index. Fails with EBPO_E_LIMIT, EBPO_E_MEMORY. */
-EBPO_MUST_USE ebpo_status ebpo_found_faces_add(ebpo_found_faces *intersected,
+EBPO_MUST_USE ebpo_status ebpo_found_faces_add(ebpo_found_faces *found_faces,
                                                const ebpo_reach_face *face, uint32_t *number,
                                                ebpo_error *error);
-void ebpo_found_faces_free(ebpo_found_faces *intersected);
+void ebpo_found_faces_free(ebpo_found_faces *found_faces);
 
 /* --- the reach of a stroke's point --- */
 
@@ -128,8 +128,8 @@ typedef struct ebpo_reached {
 
 typedef struct ebpo_reacher ebpo_reacher;
 
-/* Makes a reacher. It uses the context, and makes others of the same model. `threads` 0: all cores,
- * or fewer if the model's budget is small. After a failure *out is NULL. */
+/* Makes a reacher. It uses the context, and makes further contexts of the same model. `threads` 0:
+ * all cores, or fewer if the model's budget is small. After a failure *out is NULL. */
 EBPO_MUST_USE ebpo_status ebpo_reacher_new(const ebpo_paint *p, ebpo_context *context,
                                            unsigned threads, ebpo_reacher **out, ebpo_error *error);
 void ebpo_reacher_free(ebpo_reacher *r);

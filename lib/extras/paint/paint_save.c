@@ -1,8 +1,8 @@
 /* Writes paint files by the table of paint_open.c.
  *
- * A file is written under a temporary name and published when it is complete. The file that a paint
- * belongs to is replaced only if it is still the version from which the paint was read or as which
- * it was last saved, so that a change by another program is not lost.
+ * A file is written under a temporary name and published when it is complete. The file of a paint
+ * is replaced only if its version is still the one that was read or last saved. So a change by
+ * another program is not lost.
  *
  * Source: format-spec/paint.md. */
 #include "core/strict_fp.h"
@@ -167,7 +167,7 @@ static uint64_t head_bytes(const ebpo_paint *p)
     return sum;
 }
 
-/* Records, after saving, that the file at `path` is the paint's current version. */
+/* Stores, after saving, that the file at `path` is the paint's current version. */
 static void take_version(ebpo_paint_file *f, char *path, int fd)
 {
     if (f->fd >= 0)
