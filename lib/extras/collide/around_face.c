@@ -1,6 +1,6 @@
-/* Finds what is on either side of a posed face of two models. The face is cut into pieces along the
- * faces of both models that intersect it (face_pieces.h). At a point of each piece, the winding
- * numbers of both models give the sides of the piece that are in each model.
+/* Finds which models are on either side of a posed face of two models. The face is cut into pieces
+ * along the faces of both models that intersect it (face_pieces.h). At a point of each piece, the
+ * winding numbers of both models show which sides of the piece are in each model.
  *
  * All decisions are exact: points are fractions, and posed coordinates are the doubles that
  * geometry/pose.h defines. Only the faces near a point are looked up in the models' hierarchies, so
@@ -78,7 +78,8 @@ typedef struct cutting {
     ebpo_face_cuts *pieces;
     double low[3], high[3]; /* box of the face */
     int model;              /* model whose faces are visited */
-    uint64_t own;           /* number of the cut face, which does not cut itself; or EBPO_NO_FACE */
+    uint64_t own;           /* index of the cut face, which does not cut itself; EBPO_NO_FACE: the
+                             * face is of the other model */
 } cutting;
 
 static bool near_box(const cutting *c, const double t[3][3])
@@ -105,7 +106,7 @@ static bool cut_by(void *user, const ebpo_triangles *triangles)
     return true;
 }
 
-/* Cuts face t of model m by all other faces. */
+/* Cuts a face of model m, whose posed corners are `t`, by all faces that intersect it. */
 static ebpo_status cut_face(ebpo_two_models *two, ebpo_face_cuts *pieces, int m, uint64_t face,
                             const double t[3][3], ebpo_error *error)
 {
@@ -177,8 +178,8 @@ static ebpo_status visit_around_piece(void *user, const ebpo_piece *piece, ebpo_
     return status;
 }
 
-/* Visits the pieces. visit_around_piece returns EBPO_E_CANCELLED when the visitor has found enough;
- * that is no failure. */
+/* Visits the pieces. When the visitor needs no more, visit_around_piece returns EBPO_E_CANCELLED,
+ * which is not a failure. */
 static ebpo_status visit_pieces(piece_visit *l, ebpo_face_cuts *pieces, ebpo_error *error)
 {
     ebpo_status status = ebpo_face_pieces_visit(pieces, visit_around_piece, l, error);
@@ -199,7 +200,7 @@ ebpo_status ebpo_visit_around_face(ebpo_two_models *two, int m, uint64_t face, e
     return status == EBPO_OK ? visit_pieces(&l, &two->pieces, error) : status;
 }
 
-/* --- points of the closed models --- */
+/* --- points of the models as closed sets --- */
 
 /* Faces of a model near a point. */
 typedef struct faces_at {
@@ -235,7 +236,7 @@ static ebpo_status find_faces(ebpo_two_models *two, int m, const mpq_t x[3], fac
 typedef struct face_query {
     ebpo_two_models *two;
     int m;
-    bool in; /* near the point, the model is on a side of some piece */
+    bool in; /* near the point, the model is on at least one side of a piece */
     bool on; /* a face with an area contains the point */
 } face_query;
 

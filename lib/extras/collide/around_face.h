@@ -1,5 +1,5 @@
-/* Finds what is on either side of the pieces of a posed face, for two models, exactly. One thread.
- */
+/* Finds which models are on either side of the pieces of a posed face, for two models, exactly. One
+ * thread. */
 #ifndef EBPO_COLLIDE_AROUND_FACE_H
 #define EBPO_COLLIDE_AROUND_FACE_H
 
@@ -28,17 +28,17 @@ void ebpo_two_models_let_go(ebpo_two_models *two);
 uint64_t ebpo_two_models_loads(const ebpo_two_models *two);
 void ebpo_two_models_end(ebpo_two_models *two);
 
-/* Sides of a face: in front, where its normal points to, and behind. */
+/* Sides of a face: in front, to which its normal points, and behind. */
 enum { EBPO_SIDE_FRONT = 1, EBPO_SIDE_BACK = 2, EBPO_SIDE_BOTH = 3 };
 
 /* A piece of a face. */
 typedef struct ebpo_around {
-    /* For each model: bits of the sides of the piece on which the model is. For a surface: both
-     * sides if the surface contains the piece, else 0. */
+    /* For each model: bits of the sides of the piece on which there is the model's interior. For a
+     * surface: both sides if the surface contains the piece, else 0. */
     unsigned in[2];
 } ebpo_around;
 
-/* Returns false to stop the visits; the call that visits then succeeds. */
+/* Returns false to stop the visits; the function that visits then succeeds. */
 typedef bool (*ebpo_around_fn)(void *user, const ebpo_around *around);
 
 /* Returns a face of model m at its pose. *has_area is false if the corners are on one line. */
@@ -51,7 +51,7 @@ EBPO_MUST_USE ebpo_status ebpo_visit_around_face(ebpo_two_models *two, int m, ui
                                                  ebpo_around_fn visit, void *user,
                                                  ebpo_error *error);
 
-/* Finds if a face of model m has a point that is in both models, as closed sets. */
+/* Finds if a face of model m has a point that belongs to both models, as closed sets. */
 EBPO_MUST_USE ebpo_status ebpo_face_has_common_point(ebpo_two_models *two, int m, uint64_t face,
                                                      bool *has, ebpo_error *error);
 

@@ -2,7 +2,7 @@
  * a point of the surface inside the solid to the boundary of the solid.
  *
  * A branch-and-bound search visits the cells of the surface's octree, then faces and parts of
- * faces. Each of these is enclosed in a ball; the distance at the ball's centre bounds the depth of
+ * faces. Each of them is enclosed in a ball; the distance at the ball's centre bounds the depth of
  * its points. A heap gives the part that may be deepest. The search ends when no part can be deeper
  * than the best point plus the tolerance, or at the deadline; lo and hi then bound the depth. The
  * steps do not depend on what is in memory. Bounds: docs/develop/collision.md, "Depth". One thread.
@@ -49,14 +49,15 @@ typedef struct depth_search {
     /* Output: lo <= depth <= hi. */
     double lo, hi;
     /* Initially 0: */
-    double left, lost; /* greatest `most` of the dropped parts; bound of how far rounding moves
-                        * points */
+    double left, lost; /* left: greatest `most` of the dropped parts; lost: bound of how far
+                        * rounding moves points */
     depth_part *part;  /* a heap, the greatest first */
     uint64_t count, capacity, evaluations;
 } depth_search;
 
 /* A ball that contains a part of the surface: all points of the part are within `radius` of the
- * centre. One of the points is certainly within `far`; INFINITY if that is not known. */
+ * centre. At least one of the points is certainly within `far`; INFINITY if no such bound is known.
+ */
 typedef struct depth_ball {
     double radius, far;
     /* Output: true if the part still matters, and a bound of its depth. */
@@ -93,7 +94,7 @@ static ebpo_status depth_at(depth_search *s, const double w[3], double *lo, doub
 
 /* Bounds the depth of a triangle by one face: the face that was nearest to the last query point. No
  * point of the triangle inside the solid is deeper than its distance from that face. The distance
- * is convex, so its values at the corners bound it. */
+ * is convex, so its greatest value at the corners is a bound. */
 static double max_at_corners(const depth_search *s, const double corner[3][3])
 {
     double most = 0, p[3], doubt;
@@ -127,7 +128,7 @@ static bool is_search_late(const depth_search *s)
     return s->late != UINT64_MAX && ebpo_clock() >= s->late;
 }
 
-/* Returns true if the part is not to be divided. A doubt that only rounding causes is no reason to
+/* Returns true if the part need not be divided. A doubt that only rounding causes is no reason to
  * divide: parts of faces that lie on other faces would be divided forever. */
 static bool is_enough(depth_search *s, double most, double rounding)
 {
@@ -158,8 +159,8 @@ static ebpo_status query_ball(depth_search *s, const double middle[3], depth_bal
     return EBPO_OK;
 }
 
-/* Adds a part to the heap if it may matter. All its points are within `radius` of the centre, which
- * is one of them. */
+/* Adds a part to the heap if the part may matter. All its points are within `radius` of the centre,
+ * which is one of the points. */
 static ebpo_status offer_part(depth_search *s, depth_part *part, const double centre[3],
                               double radius, ebpo_error *error)
 {
@@ -222,8 +223,7 @@ static ebpo_status halve_triangle(depth_search *s, const depth_part *p, int k, e
 }
 
 /* Divides the triangle into four at the middles of its edges. A long triangle is halved instead:
- * its quarters would lie side by side, and their number would grow without limit near another face.
- */
+ * its quarters would be long, too, and their number would grow without limit near another face. */
 static ebpo_status divide_triangle(depth_search *s, const depth_part *p, ebpo_error *error)
 {
     double middle[3][3], length[3];
@@ -258,9 +258,9 @@ static ebpo_status divide_next(depth_search *s, ebpo_error *error)
 
 /* --- cells of the octree --- */
 
-/* Cells are visited level by level, and in each level in file order, so that a subtree is loaded
- * about once for each level that matters. Neither the cells nor the final interval depend on what
- * is in memory. */
+/* Cells are visited level by level, and in each level in file order. So a subtree is loaded about
+ * once for each level that matters. Neither the cells nor the final interval depend on what is in
+ * memory. */
 
 /* A cell whose content may be deep enough. */
 typedef struct open_cell {
@@ -278,7 +278,7 @@ typedef struct going_down {
     ebpo_posed_subtrees at; /* the pose of the surface */
     open_cell *open, *next; /* cells of the current level, and of the level below it */
     uint64_t open_count, open_capacity, next_count, next_capacity;
-    listed_face *face; /* faces of leaves, waiting to be offered */
+    listed_face *face; /* faces of leaves that wait for offer_faces */
     uint64_t face_count, face_capacity;
 } going_down;
 

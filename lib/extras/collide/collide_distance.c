@@ -3,10 +3,10 @@
  * The kernels of gap_walk_kernels.c walk through pairs of nodes in floats and drop pairs that are
  * certainly farther apart than the limit. The remaining pairs wait and are decided here: in doubles
  * with error bounds (ebpo_triangles_distance_bounds), and exactly where the bounds overlap. Of
- * pairs at the same distance the first in file order is returned, so the result is the same with
- * every processor and number of threads.
+ * several pairs at the same distance, the first in file order is returned, so the result is the
+ * same with every processor and number of threads.
  *
- * Models in parts are searched in pairs of subtrees, the smallest gap of envelopes first; a subtree
+ * Models in parts are searched in pairs of subtrees, the smallest gap of envelopes first. A subtree
  * is loaded only if its envelope is nearer than the best pair so far. A collider keeps its last
  * pair, from which the next search begins. Bounds: docs/develop/collision.md. */
 #include "core/strict_fp.h"
@@ -44,10 +44,12 @@ typedef struct nearest_pair {
     /* Output: lo <= distance <= hi, equal if the result is exact. */
     double lo, hi;
     bool found;
-    bool intersects; /* the faces of `best` intersect; a pair that is first may exist */
+    bool intersects; /* the faces of `best` intersect; another intersecting pair may precede it in
+                      * file order */
     int is_at_least; /* 1: yes, 0: no, -1: no comparison wanted, or undecided */
     ebpo_face_two best;
-    bool ended; /* the search ended early: everything not visited is at least this far apart */
+    bool ended; /* the search ended early: all pairs that were not visited are at least this far
+                 * apart */
     double left;
     ebpo_error *error; /* error of `status` during the search */
     ebpo_status status;
@@ -467,8 +469,7 @@ static ebpo_status check_options(const ebpo_clearance_options *o, ebpo_error *er
     return EBPO_OK;
 }
 
-/* Computes a common point of two faces: an end of the common segment, or a point of the nearest
- * features. */
+/* Computes a common point of two faces, or their nearest points. */
 static void clash_point(const ebpo_face_two *f, ebpo_pair_kind kind, double point[2][3])
 {
     ebpo_contact_end end[2];

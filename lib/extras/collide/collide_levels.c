@@ -1,11 +1,11 @@
-/* Bounds the distance of two models at poses from the levels of their octrees, without their faces,
- * and finds if both solids certainly have a common point.
+/* Bounds the distance of two models at poses from the levels of their octrees, without their faces.
+ * Also finds if both solids certainly have a common point.
  *
- * Pairs of nodes come in the order of the gaps between their envelopes, the smallest first
+ * Pairs of nodes are visited in the order of the gaps between their envelopes, the smallest first
  * (subtree_search.h). A gap is a lower bound of the distance. Two nodes with faces give an upper
- * bound. A black cell belongs to its solid as a whole. So both solids have a common point if a
- * black cell contains a whole cell with faces of the other model, or a point of a black cell of the
- * other model. One thread. */
+ * bound. A black cell belongs entirely to its solid. So both solids have a common point in two
+ * cases: a black cell contains a whole cell with faces of the other model, or it contains a point
+ * of a black cell of the other model. One thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -28,8 +28,8 @@ typedef struct level_search {
 
 static const char stage[] = "pairs of nodes";
 
-/* Margin inside a black cell, next to its cell faces, that is not used: as a share of the cell's
- * side. */
+/* Margin inside a black cell along its cell faces that is not used, as a share of the cell's side.
+ */
 static const double cell_face_share = 0x1p-14;
 
 /* --- nodes --- */
@@ -85,9 +85,9 @@ static void widen_cell(double corner[8][3], double share)
             corner[c][i] = middle[i] + (corner[c][i] - middle[i]) * (1 + share);
 }
 
-/* Returns true if `solid`, a black node's cell, certainly has a common point with the content of
- * the other node: `solid` contains the whole region in which the other node has a face, or
- * (`black`: the other node is black, too) one of some points of the other cell. */
+/* Returns true if `solid`, the cell of a black node, certainly has a common point with the content
+ * of the other node. That is so if `solid` contains the whole region in which the other node has a
+ * face, or (`black`: the other node is black, too) one of several points of the other cell. */
 static bool shares_point(const level_search *g, double solid[8][3], double other[8][3], bool black)
 {
     int within = 0;
@@ -184,8 +184,8 @@ static bool is_full(const level_search *g)
            g->current_query->collider->options.memory;
 }
 
-/* Visits pairs in the order of their gaps. The search ends after the first pair that is not
- * divided, and after the pairs that may intersect. */
+/* Visits pairs in the order of their gaps. Skips pairs with a gap above `lo`, which is the least
+ * gap of the pairs that are not divided, and pairs without faces once a common point is certain. */
 static ebpo_status search_levels(level_search *g, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;

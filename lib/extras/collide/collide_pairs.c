@@ -2,10 +2,10 @@
  * order.
  *
  * All pairs: the walk through both hierarchies (pair_walk_kernels.c) is expanded to enough pairs of
- * nodes, which threads share. Their results are sorted by the numbers of the first face, then of
- * the second, so the order does not depend on the number of threads. When the collider's memory is
- * too small for all pairs, runs of the first model's faces are searched one after the other. Models
- * in parts are searched by subtree_walk.h. */
+ * nodes, which are distributed to threads. The results are sorted by the numbers of the first face,
+ * then of the second, so the order does not depend on the number of threads. When the collider's
+ * memory is too small for all pairs, runs of the first model's faces are searched one after the
+ * other. Models in parts are searched by subtree_walk.h. */
 #include "core/strict_fp.h"
 
 #include <stdatomic.h>
@@ -209,8 +209,8 @@ static ebpo_status run_parts(void *user, uint64_t begin, uint64_t end, unsigned 
     return EBPO_OK;
 }
 
-/* Takes the collider's walks if they are not in use: they are when the callback that receives pairs
- * sends another query. */
+/* Takes the collider's walks if they are free. They are in use when the callback that receives
+ * pairs makes another query. */
 static bool take_walks(gathering *g)
 {
     ebpo_collider *c = g->current_query->collider;

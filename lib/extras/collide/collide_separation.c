@@ -45,13 +45,13 @@ typedef struct separation_search {
      * not count. */
     ebpo_sweep_time last;
     ebpo_face_pair pair; /* faces of the caller's A and B */
-    double hi;           /* dropped pairs are certainly not later; negative: none was dropped */
+    double hi;           /* upper bound of the times of dropped pairs; negative: none was dropped */
     /* Initially 0: */
     separation_side side[2];
     double axis[3][3]; /* three perpendicular axes; the first is the direction */
-    double step, lost; /* component of the direction along the first axis; bound of how far rounding
-                        * moves extents */
-    double sure;       /* `last` is certainly not earlier */
+    double step, lost; /* step: component of the direction along the first axis; lost: bound of how
+                        * far rounding moves extents */
+    double sure;       /* `last` is certainly not earlier than this */
     separation_pair *pairs; /* a heap, the greatest first */
     uint64_t count, capacity, evaluations;
 } separation_search;
@@ -215,7 +215,7 @@ static double size_of(const separation_extent *e)
     return e->high[0] - e->low[0] + (e->high[1] - e->low[1]) + (e->high[2] - e->low[2]);
 }
 
-/* Adds pairs: each child of one node with `other`, a child of the other model's node. */
+/* Adds pairs of each child of one node with `other`, a child of the other model's node. */
 static ebpo_status offer_children(separation_search *s, int which, uint32_t node, uint32_t other,
                                   ebpo_error *error)
 {
@@ -301,13 +301,13 @@ static ebpo_status separation_search_run(separation_search *s, const ebpo_accel 
 
 /* --- pairs of subtrees --- */
 
-/* State of a search in pairs of subtrees. A subtree lists the faces in its cell. If moved faces
- * have a last common point, the point is in such a cell of each model. So both subtrees' envelopes
- * contain the point and do not separate before. */
+/* State of a search in pairs of subtrees. A subtree lists the faces that have a point in its cell.
+ * If moved faces have a last common point, the point is in such a cell of each model. So both
+ * subtrees' envelopes contain the point and do not separate earlier. */
 
 typedef struct searching {
     ebpo_subtree_search
-        subtrees; /* its `gap` is minus the time until which envelopes may intersect */
+        subtrees; /* `gap` of a pair: minus the time until which the envelopes may intersect */
     separation_search *search;
 } searching;
 

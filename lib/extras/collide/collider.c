@@ -1,9 +1,11 @@
-/* A collider: two models, options, and data that queries keep for the next ones. All queries begin
- * with ebpo_collision_begin. It checks the options and puts the models in an order that does not
- * change when the caller swaps them, so results do not depend on the caller's order.
+/* A collider: two models, options, and data that queries keep for the next ones.
+ *
+ * All queries begin with ebpo_collision_begin. It checks the options and puts the models in an
+ * order that does not change when the caller swaps them, so results do not depend on the caller's
+ * order.
  *
  * A collider belongs to one thread at a time. Colliders of models that are subsets are refused,
- * except where the caller knows what is omitted (ebpo_collider_of_parts). */
+ * except where the caller knows which parts are omitted (ebpo_collider_of_parts). */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -19,13 +21,13 @@
 #include "extras/collide/posed_solid.h"
 #include "query/query_model.h"
 
-/* Refuses a subset: its omitted faces might intersect as well. */
+/* Refuses a subset, because its omitted faces might also intersect. */
 static ebpo_status check_complete(const ebpo_model *model, ebpo_error *error)
 {
     if (!model->info->pruned)
         return EBPO_OK;
     return ebpo_fail_file(error, EBPO_E_ABSENT, model->file->in.shown,
-                          "is a part of another file, and omitted faces might intersect too; "
+                          "is a part of another file, and omitted faces might also intersect; "
                           "query the whole file, or put both into a scene, which knows the "
                           "relevant faces (`ebpo scene`)");
 }
@@ -105,8 +107,8 @@ ebpo_status ebpo_collider_get_stats(const ebpo_collider *c, ebpo_collider_stats 
 
 /* --- queries --- */
 
-/* Returns true if the caller's A comes second. Orders by files, then by poses, compared as bits:
- * the order has no meaning. */
+/* Returns true if the caller's A comes second. Orders by files, then by the bits of poses; the
+ * order has no meaning. */
 static bool comes_second(const ebpo_collider *c, const ebpo_collide_options *o)
 {
     int by_file = memcmp(c->model[0]->info->content_sha256, c->model[1]->info->content_sha256,
@@ -157,7 +159,7 @@ bool ebpo_collision_is_late(const ebpo_collision *q)
     return q->late != UINT64_MAX && ebpo_clock() >= q->late;
 }
 
-/* A file that both models use counts once. */
+/* Counts a file that both models use once. */
 uint64_t ebpo_collision_bytes_read(const ebpo_collision *q)
 {
     uint64_t bytes = 0;

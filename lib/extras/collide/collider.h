@@ -48,8 +48,8 @@ EBPO_MUST_USE ebpo_status ebpo_collision_begin(ebpo_collision *out, ebpo_collide
 
 bool ebpo_collision_is_late(const ebpo_collision *collision);
 
-/* Finds the first contact of two accels of the query's models. The collider's walk then has it in
- * found_pairs[0] and found_slot. *found is set as by ebpo_collide_first. */
+/* Finds the first contact of two accels of the query's models. Stores it in found_pairs[0] and
+ * found_slot of the collider's walk. *found is set as by ebpo_collide_first. */
 EBPO_MUST_USE ebpo_status ebpo_collision_first(const ebpo_collision *collision,
                                                const ebpo_accel *const accel[2], const char *stage,
                                                int32_t *found, ebpo_error *error);

@@ -1,10 +1,11 @@
 /* Computes where two crossing faces intersect: the ends of the common segment.
  *
- * Exact signs (geometry/predicates.h) decide which edges pierce the other face, so the result has
- * the right combinatorics. The point where an edge pierces a plane is computed in double-double
- * arithmetic; where numbers are too large or too small for its bounds, exactly with GMP and rounded
- * once. Neither the order of the faces nor that of their corners changes a bit of the points.
- * Bounds: docs/develop/collision.md, "Contact of a crossing pair". Pure functions, any thread. */
+ * Exact signs (geometry/predicates.h) decide which edges pierce the other face, so the ends are on
+ * the right edges. The point where an edge pierces a plane is computed in double-double arithmetic.
+ * Where numbers are too large or too small for its error bounds, the point is computed exactly with
+ * GMP and rounded once. Neither the order of the faces nor that of their corners changes a bit of
+ * the points. Bounds: docs/develop/collision.md, "Contact of a crossing pair". Pure functions, any
+ * thread. */
 #include "core/strict_fp.h"
 
 #include "extras/collide/face_pairs.h"
@@ -16,8 +17,8 @@
 #include "geometry/integer_vectors.h"
 #include "geometry/triangle_pair.h"
 
-/* An edge that goes from below a plane to above it; edge and plane are in the order of coordinates.
- */
+/* An edge that goes from below a plane to above it. The ends of the edge and the corners of the
+ * plane are sorted by coordinates. */
 typedef struct piercing {
     const double *end[2], *plane[3];
 } piercing;
@@ -207,8 +208,8 @@ static const edge *choose_edge(const edge *a, const edge *b)
     return (order != 0 ? order : ebpo_corner_order(p.end[1], q.end[1])) <= 0 ? a : b;
 }
 
-/* Sets an end of the segment. The end is where A's edge pierces B (order < 0), where B's edge
- * pierces A (order > 0), or both (0). */
+/* Sets an end of the segment: where A's edge pierces B (order < 0), where B's edge pierces A (order
+ * > 0), or where both happens (0). */
 static void set_end(const edge *a, const edge *b, int order, ebpo_contact_end *out)
 {
     end_of(order < 0 ? a : order > 0 ? b : choose_edge(a, b), out->point);

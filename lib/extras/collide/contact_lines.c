@@ -1,10 +1,10 @@
 /* Joins the segments of all crossing pairs to lines of contact, where segments end at the same
  * features of the same faces.
  *
- * Each end has a key: the edge or corner of the face that contains it, and the face of the other
- * model. Ends with equal keys are the same point. Corners with equal coordinates have equal numbers
- * (face_patches.h). A line continues where exactly one segment ends and one begins; elsewhere it
- * ends. */
+ * Each end has a key: the edge or corner of the face that contains the end, and the face of the
+ * other model. Ends with equal keys are the same point. Corners with equal coordinates have equal
+ * numbers (face_patches.h). A line continues where exactly one segment ends and exactly one begins;
+ * at all other points it ends. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -19,8 +19,8 @@
 
 #define NONE UINT32_MAX
 
-/* Key of an end: for each model the feature that contains it. Two corners, the lesser first: an
- * edge; a corner and NONE; NONE and a face. */
+/* Key of an end: the feature of each model that contains the end. An edge is two corners, the
+ * lesser first. A corner is a corner and NONE. A face is NONE and the face. */
 typedef struct end_key {
     uint32_t on[2][2];
     uint32_t end; /* twice the segment's number, plus 1 for its second end */
@@ -71,8 +71,8 @@ static void unit_normal(const double t[3][3], double out[3])
         out[k] /= length;
 }
 
-/* Sets the feature that `on` gives, of a face of the caller's model m, with the face's corners as
- * in the file. Returns false without memory. */
+/* Sets the feature `on` of a face of the caller's model m; `t` has the face's corners as in the
+ * file. Returns false without memory. */
 static bool set_feature(lines *l, int m, uint64_t face, const double t[3][3], unsigned on,
                         uint32_t out[2])
 {

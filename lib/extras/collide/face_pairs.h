@@ -12,9 +12,9 @@
 #include "core/cpu.h"
 #include "geometry/distance.h"
 
-/* An end of the common segment. Corners are exact. Otherwise each coordinate differs from the exact
- * one by at most the sum of two errors: 0.51 units in its last place, and 2^-60 times the greatest
- * |coordinate| on that axis of the edge that pierces the other face. */
+/* An end of the common segment. Corners are exact. Otherwise the error of each coordinate is at
+ * most the sum of two parts: 0.51 units in the coordinate's last place, and 2^-60 times the
+ * greatest |coordinate| on that axis of the edge that pierces the other face. */
 typedef struct ebpo_contact_end {
     double point[3];
     ebpo_feature on_a, on_b; /* for each face, the feature of lowest dimension that contains the
@@ -29,9 +29,9 @@ void ebpo_triangle_contact(const double a[3][3], const double b[3][3], ebpo_cont
 /* --- distance: docs/develop/collision.md, "Distance of two faces" --- */
 
 /* Certainly lo <= distance <= hi. For ordinary disjoint faces the bounds differ from the distance
- * by at most 2^-42 of the faces' sizes and the distance; for intersecting faces hi may be far too
- * great. point: points of A and of B at a distance of at most hi, the nearest ones except for
- * rounding. Overflow and underflow give wide bounds, never wrong ones. */
+ * by at most 2^-42 of the sum of the faces' sizes and the distance. For intersecting faces hi may
+ * be far too great. `point`: points of A and of B at a distance of at most hi, the nearest points
+ * except for rounding. Overflow and underflow give wide bounds, never wrong ones. */
 typedef struct ebpo_pair_distance_bounds {
     double lo, hi;
     double point[2][3];
@@ -105,9 +105,9 @@ typedef struct ebpo_block_pairs {
 } ebpo_block_pairs;
 
 /* Eight faces are [9][8] floats: x, y, z of corner 0, of corner 1, of corner 2. Coordinates are
- * relative to an origin, the same one for both faces of a pair. Each float is within `error` (0 or
- * more) of the exact value and at most 2^36 in size. Lanes without a face may have any values;
- * their bits have no meaning. */
+ * relative to an origin, which is the same for both faces of a pair. Each float is within `error`
+ * (0 or more) of the exact value, and at most 2^36 in size. Lanes without a face may have any
+ * values; their bits have no meaning. */
 typedef struct ebpo_pair_kernels {
     /* Compares one face, [9], with each of the eight faces of b. */
     ebpo_pair_masks (*one)(const float *a, const float *b, float error);

@@ -1,10 +1,11 @@
-/* Finds patches of faces: the connected components of a mesh. Faces are connected by corners with
- * equal coordinates, or by edges that two faces share. Faces are joined with a disjoint-set forest
- * whose roots are the first faces of their patches. A hash table numbers corners: equal coordinates
- * have equal numbers (0 and -0 are equal).
+/* Finds patches of faces: the connected components of a mesh.
+ *
+ * Faces are connected by corners with equal coordinates, or by edges that two faces share. They are
+ * joined in a disjoint-set forest whose roots are the first faces of the patches. A hash table
+ * numbers corners: equal coordinates have equal numbers (0 and -0 are equal).
  *
  * A patch whose faces intersect no face of the other model lies entirely on one side of that model.
- * The relation of two models and exact volumes of results rely on this. */
+ * The relation of two models and the exact volumes of results rely on this. */
 #include "core/strict_fp.h"
 
 #include <stdint.h>

@@ -21,16 +21,16 @@ bool ebpo_corner_id(ebpo_corner_ids *ids, const double x[3], uint32_t *id);
 void ebpo_corner_ids_free(ebpo_corner_ids *ids);
 
 /* Finds the patches of a subtree's owned faces, connected by corners with equal coordinates.
- * (*out)[i], for the owned face with the number first_face + i in the file, is the first face of
- * its patch. Omitted faces (`omitted` has a bit for each face of the file) connect no others; each
- * is alone. The caller frees the result. */
+ * (*out)[i] is the first face of the patch of the owned face whose index in the file is first_face
+ * + i. Omitted faces (`omitted` has a bit for each face of the file) connect no other faces, and
+ * each of them is a patch. The caller frees the result. */
 EBPO_MUST_USE ebpo_status ebpo_face_patches(const ebpo_accel *subtree, const uint32_t *slots,
                                             const uint64_t *omitted, uint32_t **out,
                                             ebpo_error *error);
 
 /* Finds the patches of a whole model at a pose, connected by edges (equal posed corners) that
- * exactly two faces with an area share. (*out)[i], for the face with the number i in the file, is
- * the first face of its patch. A face without area is alone. The caller frees the result. */
+ * exactly two faces with an area share. (*out)[i] is the first face of the patch of the face whose
+ * index in the file is i. A face without area is a separate patch. The caller frees the result. */
 EBPO_MUST_USE ebpo_status ebpo_edge_patches(const ebpo_accel *whole, const uint32_t *slots,
                                             const ebpo_posing *posing, uint32_t **out,
                                             ebpo_error *error);

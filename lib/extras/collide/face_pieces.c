@@ -1,11 +1,11 @@
-/* Finds the pieces of a face that other faces cut: an exact point of each piece.
+/* Finds the pieces of a face that other faces cut, and an exact point of each piece.
  *
  * The face is seen along the axis on which its normal has the largest component; p and q are the
  * two other coordinates, GMP fractions. Other faces cut it in segments, the cuts. Values of p at
- * which a cut begins, ends or crosses another one are events. Between neighbouring events (a strip)
- * the cuts have one order in q, so the strip is divided into parts without a cut inside. Parts of
- * neighbouring strips that share an open interval belong to one piece. Faces in the same plane
- * count by their winding. See docs/develop/collision.md, "Relation of two models". One thread. */
+ * which a cut begins, ends or crosses another cut are events. Between neighbouring events (a strip)
+ * the cuts have one order in q, so they divide the strip into parts. Parts of neighbouring strips
+ * that share an open interval belong to one piece. Faces in the same plane count by their winding.
+ * See docs/develop/collision.md, "Relation of two models". One thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -30,7 +30,7 @@ static bool capacity_for_cut(ebpo_face_cuts *f)
     return true;
 }
 
-/* Adds a value of p, or a point (p, q). Without memory, records that in `f`. */
+/* Adds a value of p, or a point (p, q). Sets a flag in `f` if memory is short. */
 static void add_event(ebpo_face_cuts *f, const mpq_t p)
 {
     if (!ebpo_grow(&f->event, &f->event_capacity, f->events + 1, sizeof *f->event)) {
@@ -179,7 +179,7 @@ static int side_in_view(const ebpo_face_cuts *f, int i, const double x[3])
                                    (double[]){ x[f->u], x[f->v] });
 }
 
-/* Returns true if all of t is beyond an edge of the face or on the edge. */
+/* Returns true if all corners of t are beyond an edge of the face, or on the edge. */
 static bool beyond_an_edge(const ebpo_face_cuts *f, const double t[3][3])
 {
     for (int i = 0; i < 3; i++)
@@ -463,7 +463,7 @@ static uint64_t cuts_of_strip(ebpo_face_cuts *f, const mpq_t p[3])
             low = low < 0 ? (int)i : low;
             high = (int)i;
         }
-    /* an edge of the face may follow an equal cut: nothing is between them */
+    /* an edge of the face may follow an equal cut; there is no part between them */
     for (uint64_t i = (uint64_t)(low < 0 ? 0 : low); low >= 0 && i <= (uint64_t)high; i++) {
         f->order[kept++] = f->order[i];
         at_p(&f->cut[f->order[kept - 1]], p[LEFT], *value_at(f, f->order[kept - 1], LEFT));

@@ -54,12 +54,12 @@ typedef struct ebpo_face_cuts {
     uint64_t ends[2], ends_made[2], end_capacity[2];
 } ebpo_face_cuts;
 
-/* Begins a face with an area. */
+/* Begins a new face, which must have an area. */
 void ebpo_face_cuts_begin(ebpo_face_cuts *f, const double corner[3][3], bool all_cuts);
 /* Adds another face, of model 0 or 1. */
 void ebpo_face_cuts_add(ebpo_face_cuts *f, const double other[3][3], int model);
-/* Sets a target; needs all cuts. Returns false if x is not on the face. Otherwise each piece that
- * is visited later has at_target set or not. */
+/* Sets a target; needs all_cuts. Returns false if x is not on the face. Otherwise at_target is set
+ * for each piece that is visited later. */
 bool ebpo_face_cuts_target(ebpo_face_cuts *f, const mpq_t x[3]);
 void ebpo_face_cuts_free(ebpo_face_cuts *f);
 
@@ -68,9 +68,9 @@ void ebpo_face_cuts_free(ebpo_face_cuts *f);
 /* A point of a piece, and what is around it. */
 typedef struct ebpo_piece {
     const mpq_t *x; /* [3] the point */
-    /* For each model: other faces of it that are in the face's plane at the point. `covered`: there
-     * are any. `jump`: their contribution to the winding number behind the face less the one in
-     * front (the normal points to the front). */
+    /* The model's other faces that are in the face's plane at the point. `covered`: there is at
+     * least one. `jump`: their contribution to the winding number behind the face, minus their
+     * contribution in front (the normal points to the front). */
     bool covered[2];
     int32_t jump[2];
     bool at_target; /* the target is in the piece or on its border */
@@ -78,11 +78,11 @@ typedef struct ebpo_piece {
 
 typedef ebpo_status (*ebpo_piece_fn)(void *user, const ebpo_piece *piece, ebpo_error *error);
 
-/* Calls `visit` for a point of each piece; some pieces are visited at several points (with all
- * cuts, any piece may be). Fails with EBPO_E_MEMORY and the errors of `visit`. */
+/* Calls `visit` for a point of each piece; some pieces are visited at several points (with
+ * all_cuts, any piece may be). Fails with EBPO_E_MEMORY and the errors of `visit`. */
 EBPO_MUST_USE ebpo_status ebpo_face_pieces_visit(ebpo_face_cuts *f, ebpo_piece_fn visit, void *user,
                                                  ebpo_error *error);
-/* With all cuts: visits the points of the closed face that are corners, ends of cuts or
+/* Needs all_cuts. Visits the points of the closed face that are corners, ends of cuts or
  * intersections of two cuts; some of them repeatedly. Afterwards `f` must not be used until the
  * next begin. */
 typedef ebpo_status (*ebpo_vertex_fn)(void *user, const mpq_t x[3], ebpo_error *error);

@@ -1,11 +1,11 @@
 /* Walks through pairs of nodes of two hierarchies for the distance of two models, eight children at
- * a time, in floats. It is compiled for several instruction sets with the same results.
+ * a time, in floats. This file is compiled for several instruction sets with the same results.
  *
  * The distance of two nodes has three lower bounds: the gaps of their boxes, of their bounding
- * cylinders, and along the direction of the best pair. Until a limit is known the walk is
- * depth-first; then a heap gives the smallest bound first. Pairs of blocks give pairs of faces with
- * the bounds that a nearest pair of points proves. No dropped pair is nearer than the limit;
- * collide_distance.c decides the remaining ones. Bounds: docs/develop/collision.md, "Bounds of
+ * cylinders, and along the direction of the best pair. The walk is depth-first until a limit is
+ * known; then a heap gives the smallest bound first. Pairs of blocks give pairs of faces, with
+ * bounds that follow from a nearest pair of points. No dropped pair is nearer than the limit;
+ * collide_distance.c decides the remaining pairs. Bounds: docs/develop/collision.md, "Bounds of
  * pairs of nodes" and "Distance of two faces". */
 #include "core/strict_fp.h"
 
@@ -173,8 +173,8 @@ EBPO_EIGHT void node_boxes(ebpo_gap_node *out, const ebpo_bound *b, const ebpo_t
     }
 }
 
-/* Decodes bounding cylinders. A cylinder without an axis is decoded as extremely thick, so it gives
- * no bound. */
+/* Decodes bounding cylinders. A cylinder without an axis is decoded as extremely thick, so that it
+ * gives no bound. */
 EBPO_EIGHT void node_slabs(ebpo_gap_node *out, const ebpo_bound_slab *b, const ebpo_turned_frame *f,
                            float slack)
 {
@@ -345,8 +345,8 @@ static void sift_down(ebpo_gap_search *g, uint64_t at, ebpo_gap_visit v)
     g->stack[at] = v;
 }
 
-/* Makes the heap: from now on the least key comes first. So no pair is visited whose bound is
- * beyond the final distance. */
+/* Makes the heap: from now on the least key comes first. So no visited pair has a bound beyond the
+ * final distance. */
 static void make_heap(ebpo_gap_search *g)
 {
     uint64_t kept = 0;
@@ -608,7 +608,7 @@ static void walk_gaps(ebpo_gap_search *g)
         fetch_next(g);
         if (far_along(g, &v) || visit_pair(g, &v))
             continue;
-        g->stack[g->count++] = v; /* the pair has been visited only in part, or not at all */
+        g->stack[g->count++] = v; /* the pair was visited only in part, or not at all */
         g->ended = true;
         return;
     }

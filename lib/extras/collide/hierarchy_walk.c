@@ -1,6 +1,6 @@
 /* States of the two walks through the hierarchies of two models, and functions that the kernels of
- * these walks call: pair_walk_kernels.c searches for faces that intersect, gap_walk_kernels.c for
- * the nearest ones. Each state has a stack of pairs of nodes and keeps the last nodes and blocks
+ * these walks call. pair_walk_kernels.c searches for faces that intersect, gap_walk_kernels.c for
+ * the nearest ones. Each state has a stack of pairs of nodes, and keeps the last nodes and blocks
  * that it has transformed. One thread each.
  *
  * Pairs of faces that the float filter cannot decide are decided here exactly. When both models are

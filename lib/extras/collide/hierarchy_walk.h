@@ -32,7 +32,7 @@ typedef struct ebpo_turned_node {
     float half[8], radius[8], extent[8]; /* extent: the sum of the half sides */
     double origin[3];                    /* the node's origin in the first model's frame, for nodes
                                           * of both models */
-    float size;                          /* longest side of all boxes */
+    float size;                          /* length of the longest side of all boxes */
     uint32_t node;                       /* EBPO_NO_CHILD: the entry is empty */
     uint8_t lanes;
     bool slabs; /* at least one child has a cylinder */
@@ -69,8 +69,8 @@ struct ebpo_pair_walk {
     ebpo_found_pair *found_pairs;
     uint64_t found_count, found_capacity;
     uint32_t found_slot[2];                  /* slots of the last pair found */
-    uint64_t node_pairs, block_pairs, exact; /* visited pairs; pairs of faces decided by the exact
-                                              * test */
+    uint64_t node_pairs, block_pairs, exact; /* node_pairs, block_pairs: visited pairs; exact: pairs
+                                              * of faces decided by the exact test */
     ebpo_turned_node turned[2][EBPO_TURNED_NODES];
     ebpo_posed_faces posed[2][EBPO_POSED_FACES];
 };
@@ -128,10 +128,10 @@ struct ebpo_gap_search {
     float tolerance; /* an improvement smaller than this does not matter */
     float best; /* upper bound of the distance of the faces best_slot; INFINITY: no pair is known */
     uint32_t best_slot[2];
-    float direction[3]; /* a direction in the world, from A to B, along which the models may be far
-                           apart */
-    float along[2][3], along_shift; /* the same direction in both frames, in each one towards the
-                                     * other model */
+    float direction[3]; /* a direction in the world, from A to B, along which the gap of the models
+                         * may be large */
+    float along[2][3], along_shift; /* along: the same direction in both frames, towards the other
+                                     * model */
     uint32_t direction_number;
 
     void *user;
@@ -174,9 +174,9 @@ bool ebpo_gap_capacity(ebpo_gap_search *g);
 /* Makes space for a block's pairs among the waiting ones. Returns false if judge returned false. */
 bool ebpo_gap_wait_capacity(ebpo_gap_search *g);
 
-/* Walks through all pairs, beginning with the tops. Afterwards, the waiting pairs may be nearest.
- * After an early end, the stack has the pairs that were not visited. Compiled twice, with the same
- * results. */
+/* Walks through all pairs, beginning with the tops. Afterwards, the nearest pair may be among the
+ * waiting pairs. After an early end, the stack has the pairs that were not visited. Compiled twice,
+ * with the same results. */
 typedef struct ebpo_gap_kernels {
     void (*walk)(ebpo_gap_search *g);
 } ebpo_gap_kernels;

@@ -1,9 +1,9 @@
-/* Finds faces of one mesh that intersect other than as neighbours.
+/* Finds faces of one mesh that intersect and are not just neighbours.
  *
  * The mesh is written to a temporary file, which is opened as a model with a memory budget, so the
  * mesh may be larger than memory. The search needs only the faces, so the model is built as a
  * surface without planes, which takes a fraction of the time. The crossings are those of the model
- * with itself (ebpo_collide_self_posed); the mesh in memory gives their positions. An optional PLY
+ * with itself (ebpo_collide_self_posed). The mesh in memory gives their positions. An optional PLY
  * file shows the faces in red. */
 #include "core/strict_fp.h"
 
@@ -50,15 +50,15 @@ static ebpo_status build_model(crossings *c, ebpo_mesh *mesh, const ebpo_mesh_re
     return ebpo_build(mesh, &surface, NULL, &how, &c->tree, error);
 }
 
-/* Frees the levels: after writing, the search needs only the file, and the mesh for positions. */
+/* Frees the levels. After writing, the search needs only the file, and the mesh for positions. */
 static void drop_levels(ebpo_tree *tree)
 {
     for (int i = 0; i < tree->info.level_count; i++)
         ebpo_level_free(&tree->level[i]);
 }
 
-/* Writes the temporary file and opens it. libhdf5 needs a name, so the file has a name until it is
- * open. */
+/* Writes the temporary file and opens it. The file has a name until it is open, because libhdf5
+ * needs a name. */
 static ebpo_status store_model(crossings *c, const char *folder, ebpo_error *error)
 {
     ebpo_write_options how = EBPO_WRITE_OPTIONS_INIT;

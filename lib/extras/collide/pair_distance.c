@@ -4,9 +4,9 @@
  * points is an upper bound. The planes through them, perpendicular to the line between them, give a
  * lower bound. All coordinates are relative to A's first corner, so the position of the faces does
  * not matter. Where bounds do not decide, the squared distance is computed as a fraction of
- * integers: the least value over corners and faces, and over edges whose inner points are nearest.
- * See docs/develop/collision.md, "Distance of two faces". Pure functions, any thread; the results
- * are the same with every compiler and its flags. */
+ * integers. It is the least value over corners with faces, and over edges whose inner points are
+ * nearest. See docs/develop/collision.md, "Distance of two faces". Pure functions, any thread; the
+ * results are the same with every compiler and its flags. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -157,9 +157,10 @@ static bool is_on(int corner, int feature)
            (feature >= 3 && (corner == feature - 3 || corner == (feature - 2) % 3));
 }
 
-/* Returns true if the features of the points are certainly nearest. Then, along n, A's other
- * corners are strictly behind A's point and B's other corners are ahead of B's point, by more than
- * the error of n and of the points: docs/develop/collision.md, "Which features are nearest". */
+/* Returns true if the features of the points are certainly nearest. This holds if, along n, A's
+ * other corners are strictly behind A's point and B's other corners are ahead of B's point, by more
+ * than the error of n and of the points: docs/develop/collision.md, "Which features are nearest".
+ */
 static bool features_certain(const search *s, const double n[3])
 {
     const double enough = 0x1p-24;
@@ -194,8 +195,8 @@ static bool same_feature(const double a[3][3], int on_a, const double b[3][3], i
     return true;
 }
 
-/* Returns true if each face lies in a plane perpendicular to the same axis and one face is above
- * the other: their distance is that of the two planes. */
+/* Returns true if both faces are perpendicular to the same axis and one is above the other. Their
+ * distance is then that of the two planes. */
 static bool level_faces(const double a[3][3], const double b[3][3], double level[2])
 {
     for (int k = 0; k < 3; k++) {

@@ -1,5 +1,5 @@
 /* Filters pairs of faces, eight at a time in floats: finds pairs that are certainly apart and pairs
- * that certainly cross. It is compiled for several instruction sets with the same results.
+ * that certainly cross. This file is compiled for several instruction sets with the same results.
  *
  * Boxes are compared first, then the sides of both planes, then the intervals on the common line of
  * the planes, each with a proved error bound. All other pairs are undecided; the caller decides
@@ -82,8 +82,8 @@ typedef struct sides8 {
     unsigned same, certain;
 } sides8;
 
-/* Finds the sides of a plane. d: corners of the other face less the plane's first corner; bound:
- * error of determinants. */
+/* Finds the sides of corners on a plane. d: corners of the other face minus the plane's first
+ * corner; bound: error of determinants. */
 EBPO_EIGHT sides8 sides_of8(vector8 e1, vector8 e2, const vector8 d[3], f8 bound)
 {
     vector8 n = vector8_cross(e1, e2);
@@ -103,8 +103,8 @@ EBPO_EIGHT sides8 sides_of8(vector8 e1, vector8 e2, const vector8 d[3], f8 bound
 
 /* --- the common line --- */
 
-/* Masks for a face: which corner is alone on its side of the other plane (corner 2 if neither 0 nor
- * 1), and if that corner is above the plane. */
+/* Masks for a face. They show which corner is alone on its side of the other plane (corner 2 if
+ * neither 0 nor 1), and if that corner is above the plane. */
 typedef struct alone8 {
     f8 is0, is1, above;
 } alone8;
@@ -120,7 +120,7 @@ EBPO_EIGHT alone8 alone_of8(const f8 above[3])
     return out;
 }
 
-/* Returns the corner that follows the corner that is alone, by `first` positions. */
+/* Returns the corner that is `first` positions after the corner that is alone. */
 EBPO_EIGHT vector8 turned_corner8(const face8 *f, const alone8 *alone, int first)
 {
     const vector8 *c = f->corner;

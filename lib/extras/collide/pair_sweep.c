@@ -1,7 +1,7 @@
-/* Computes, for two triangles of which one moves along a direction, the last time at which they
- * have a common point.
+/* Computes the last time at which two triangles have a common point, when one of them moves along a
+ * direction.
  *
- * Seen along the direction both faces are convex polygons with heights. The difference of heights
+ * Seen along the direction, both faces are convex polygons with heights. The difference of heights
  * is concave where the polygons overlap, so it is greatest over a corner of one polygon or where
  * edges cross. The exact time is a fraction of integers (GMP). A bound in doubles comes from
  * separating axes: normals, and cross products of edges with each other and with the direction. See
@@ -91,8 +91,8 @@ static void triple_product(sweep *s, mpz_t out, const ebpo_vectorz *x, const ebp
     ebpo_vectorz_dot(out, x, &s->m);
 }
 
-/* Takes top / bottom as a time of contact. `other`: the time was computed from the face that does
- * not move, so its sign is reversed. */
+/* Takes top / bottom as a time of contact. `other`: the computation used the face that does not
+ * move, so the sign of the time is reversed. */
 static void take_time(sweep *s, bool other)
 {
     if (mpz_sgn(s->bottom) < 0) {
@@ -148,7 +148,8 @@ static bool is_over(sweep *s, const ebpo_vectorz *corner, int of)
     return signs[0] == 0 || signs[2] == 0;
 }
 
-/* Compares the other face's corners with face `of`, which is not parallel to the direction. */
+/* Takes the times of the other face's corners over face `of`, which is not parallel to the
+ * direction. */
 static void corners_and_face(sweep *s, int of)
 {
     (void)find_normal(s, !of);
@@ -255,7 +256,7 @@ void ebpo_sweep_last(const double a[3][3], const double b[3][3], const double di
 
 /* --- bounds --- */
 
-/* Interval of times, which each separating direction n restricts in turn: n . d t is between the
+/* Interval of times. Each separating direction n restricts it in turn: n . d t is between the
  * differences of the extents. */
 typedef struct bounding {
     double x[3][3], y[3][3], reach; /* corners relative to the first corner */

@@ -1,11 +1,11 @@
 /* Walks through two hierarchies to the pairs of faces that intersect, eight children at a time, in
- * floats. It is compiled for several instruction sets with the same results.
+ * floats. This file is compiled for several instruction sets with the same results.
  *
  * Boxes and bounding cylinders of one model's nodes are transformed into the other model's frame
- * and compared along the axes of both. Bounds are rounded outwards, so no pair is lost. The larger
- * of two nodes is divided first. Two blocks go to the filter of pairs (pair_filter_kernels.c);
- * ebpo_pair_walk_decide decides the pairs that the filter leaves undecided. See
- * docs/develop/collision.md, "Going down two hierarchies". */
+ * and compared along the axes of both frames. Bounds are rounded outwards, so no pair is lost. The
+ * larger of two nodes is divided first. Two blocks go to the filter of pairs
+ * (pair_filter_kernels.c); ebpo_pair_walk_decide decides the pairs that the filter leaves
+ * undecided. See docs/develop/collision.md, "Going down two hierarchies". */
 #include "core/strict_fp.h"
 
 #include "core/simd.h"
@@ -184,7 +184,8 @@ EBPO_EIGHT f8 slab_gaps(const two_nodes *t, int j)
     return f8_max(gap, f8_sub(f8_max(by_slab, by_box), q_half));
 }
 
-/* Returns a bit for each child of P that may intersect child j of Q. NaN keeps a child. */
+/* Returns a bit for each child of P that may intersect child j of Q. A child with NaN counts as
+ * intersecting. */
 EBPO_EIGHT unsigned near_children_of(const two_nodes *t, int j, bool first, float key[8])
 {
     f8 gap = box_gaps(t, j);
@@ -204,8 +205,8 @@ EBPO_EIGHT unsigned near_children_of(const two_nodes *t, int j, bool first, floa
 /* --- pairs of nodes --- */
 
 /* For the first contact, the pairs into which one pair of nodes was divided are a group at the top
- * of the stack. The group's deepest overlap is found only when needed, as most groups are left
- * early. Below each group is a mark with the start of the previous group. */
+ * of the stack. The deepest overlap of a group is searched only when it is needed, because most
+ * groups are left early. Below each group is a mark with the start of the previous group. */
 EBPO_EIGHT void open_group(ebpo_pair_walk *w)
 {
     w->stack[w->top++] = (ebpo_node_pair){ 0, (uint32_t)w->group, 0 };
@@ -238,8 +239,8 @@ EBPO_EIGHT void push_pair(ebpo_pair_walk *w, uint32_t a, uint32_t b, float key)
     w->stack[w->top++] = (ebpo_node_pair){ a, b, key };
 }
 
-/* Pairs the children of A's node with those children of B's node that are in `of_b`. Collects a bit
- * for each pair first: the processor predicts one loop over these bits better than a loop for each
+/* Pairs the children of A's node with those children of B's node that are in `of_b`. First collects
+ * a bit for each pair: the processor predicts one loop over these bits better than a loop for each
  * child. */
 EBPO_EIGHT void both_down(ebpo_pair_walk *w, const ebpo_turned_node *p, const ebpo_turned_node *q,
                           unsigned of_b, bool first)

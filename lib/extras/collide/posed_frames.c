@@ -3,9 +3,9 @@
  *
  * A unit, a power of two, brings posed coordinates into the range of floats. Blocks are rotated in
  * floats and placed relative to their first vertex, whose posed coordinates are doubles. Matrices
- * between frames come with the sizes of their entries, from which the kernels bound their errors.
- * Where two frames are too different for floats, no pair is dropped. See docs/develop/collision.md,
- * "From blocks to the filter". Pure functions, any thread. */
+ * between frames come with the absolute values of their entries, from which the kernels bound their
+ * errors. Where two frames are too different for floats, no pair is dropped. See
+ * docs/develop/collision.md, "From blocks to the filter". Pure functions, any thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -135,7 +135,7 @@ static void inspect_all(ebpo_accel_pair *out)
 }
 
 /* Returns true if the boxes of both models are certainly apart. Compares along the axes of the
- * first model's frame; spheres would not be better. */
+ * first model's frame; a comparison of spheres would not be better. */
 static bool turned_boxes_apart(const ebpo_accel_pair *p)
 {
     double first = p->accel[0]->reach * (double)p->unit[0],
@@ -205,7 +205,7 @@ static double greatest_coordinate(const double x[3])
     return fmax(fabs(x[0]), fmax(fabs(x[1]), fabs(x[2])));
 }
 
-/* Computes the position of frame `from` in frame `to`; offset: centre of `from` less centre of
+/* Computes the position of frame `from` in frame `to`. offset: centre of `from` minus centre of
  * `to`, in the world. */
 static void turn_into(ebpo_turned_frame *out, double from[3][3], double to[3][3],
                       const double offset[3])

@@ -39,7 +39,8 @@ typedef struct ebpo_posed_block {
     float reach; /* greatest |x| */
 } ebpo_posed_block;
 
-/* Returns the reach of vertices whose 1-norms, relative to the first one, are at most `most`. */
+/* Returns the greatest |x| of rotated vertices whose 1-norms, relative to the first vertex, are at
+ * most `most`. */
 static inline float ebpo_posed_block_extent(const ebpo_block_posing *p, float most)
 {
     return p->size * most * (1 + 0x1p-20f);
@@ -96,7 +97,7 @@ typedef struct ebpo_accel_pair {
      * values of the entries, rounded up. */
     float into[2][3][3], size[2][3][3];
     float doubt;         /* error of posing and of these values, in the unit */
-    float slab_share;    /* share of the nodes' sizes by which bounds of cylinders are reduced */
+    float slab_share;    /* bounds of cylinders are reduced by this share of the nodes' sizes */
     float sine_capacity; /* margin that is added to the squared sine of the angle between two
                           * cylinders' axes */
     bool slabs;          /* cylinders may be used */

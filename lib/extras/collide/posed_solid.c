@@ -2,8 +2,8 @@
  *
  * The point is transformed into the model's coordinates with an error bound. If no face is near,
  * the result is the winding number there. Otherwise the faces near the point are posed, and they
- * decide: axis-parallel segments lead from a point farther away, whose winding number is known, to
- * the query point, and their crossings with faces are counted exactly. A point with fractions as
+ * decide. Axis-parallel segments lead from a point farther away, whose winding number is known, to
+ * the query point; their crossings with faces are counted exactly. A point with fractions as
  * coordinates is reached from the nearest double in three such segments.
  *
  * Solids are not changed: any thread may use them, each with a separate context. Proofs:
@@ -170,8 +170,8 @@ typedef struct side_segment {
     const double *w;
     int axis;              /* axis of the segment */
     double low[3], to;     /* the segment goes from `low` to coordinate `to` */
-    int32_t crossed, jump; /* winding number at the end less the one at the beginning; above the
-                            * point less below it */
+    int32_t crossed, jump; /* crossed: winding number at the end minus that at the beginning; jump:
+                            * winding number above the point minus that below */
     ebpo_posed_sides *out;
 } side_segment;
 
@@ -192,7 +192,7 @@ static bool in_plane(const double plane[3][3], const double t[3][3])
            ebpo_orient3d(plane[0], plane[1], plane[2], t[2]) == 0;
 }
 
-/* Takes a face that contains w. */
+/* Handles a face that contains w. */
 static void take_on(side_segment *l, const double t[3][3])
 {
     int axis = side_axis(t);
@@ -315,8 +315,8 @@ typedef struct path {
     const mpq_t *x;
     double w[3];
     mpz_t denominator, number[4]; /* number: temporary values */
-    ebpo_vectorz at[4];           /* the point w, then one coordinate after the other is replaced by
-                                   * that of x */
+    ebpo_vectorz at[4];           /* at[0] is w; at[1] to at[3] replace one coordinate after the
+                                   * other by that of x */
     ebpo_vectorz corner[3];
     int32_t crossed;
 } path;

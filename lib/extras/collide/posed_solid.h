@@ -63,10 +63,10 @@ typedef struct ebpo_posed_sides {
     bool on;            /* a posed face with an area contains the point */
     bool flat;          /* all such faces are in one plane */
     double plane[3][3]; /* if on: corners of one of them */
-    /* Winding numbers close to the point: `above` on the side that is greater in x (or, if the
-     * plane is parallel to the x axis, in y, or else in z), `below` on the other side. Equal unless
-     * `on`. If `on` and not `flat`, only `above` is valid: the winding number at some point near
-     * this one. */
+    /* Winding numbers close to the point: `above` on the side that is greater in x (in y if the
+     * plane is parallel to the x axis, in z if it is also parallel to the y axis), `below` on the
+     * other side. They are equal unless `on`. If `on` and not `flat`, only `above` is valid: the
+     * winding number at some point near this one. */
     int32_t above, below;
 } ebpo_posed_sides;
 

@@ -1,10 +1,10 @@
 /* Subtrees of a model at a pose, with convex envelopes of their faces, and gaps between envelopes.
  * A model in parts has the subtrees that are loaded on demand; a whole model is a single subtree.
  *
- * An envelope is made from the cell's polytope: it is cut by the planes in memory of the node and
- * of its last ancestors, then posed. A hash table keeps envelopes by octcode. Gaps are lower bounds
- * of the distance of two convex sets, found by the iteration of Gilbert (1966): every direction
- * gives a bound, so the iteration may stop at any time. */
+ * An envelope begins as the cell's polytope. The planes in memory of the node and of its last
+ * ancestors cut it; then it is posed. A hash table keeps envelopes by octcode. Gaps are lower
+ * bounds of the distance of two convex sets, found by the iteration of Gilbert (1966): every
+ * direction gives a bound, so the iteration may stop at any time. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -48,10 +48,10 @@ static const double *farthest_point(const ebpo_convex *c, const double n[3], dou
 /* Maximum number of directions that are tried; sets nearly in contact would take more. */
 enum { DIRECTIONS = 32 };
 
-/* `v` is a difference of a point of B and a point of A, and near the origin. Each step moves v
- * towards the difference that is least along v, to the nearest point of the line between them
- * (Gilbert 1966). Any v gives a lower bound of the distance: along v, all differences are at least
- * as far as the least one. */
+/* `v` is a difference of a point of B and a point of A, and near the origin. Each step finds the
+ * difference that is least along v. Then v moves on the line towards that difference, to the point
+ * nearest to the origin (Gilbert 1966). Any v gives a lower bound of the distance: along v, no
+ * difference is less than the least one. */
 double ebpo_convex_gap(const ebpo_convex *a, const ebpo_convex *b, double enough)
 {
     double v[3], w[3], from[3], best = 0;
@@ -241,8 +241,8 @@ static void cut_envelope(const ebpo_posed_subtrees *s, ebpo_cell cell, ebpo_poly
         node = ebpo_posed_child(s, &node, octant);
         if (matters) {
             ebpo_polytope_copy(&above, out);
-            (void)ebpo_polytope_child(&above, octant, out); /* otherwise the result is a box around
-                                                             * the content */
+            (void)ebpo_polytope_child(&above, octant, out); /* otherwise `out` is a box around the
+                                                             * content */
         }
     }
 }

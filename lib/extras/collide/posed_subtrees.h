@@ -13,8 +13,8 @@ typedef struct ebpo_convex {
 } ebpo_convex;
 
 /* Returns a lower bound of the distance, with an error of 2^-48 of the greatest coordinate; 0 if no
- * bound was found. The bound is near the distance, but may be less; the search ends at a bound
- * beyond `enough`. The result is the same on every processor. */
+ * bound was found. The bound is usually close to the distance. The search ends at a bound beyond
+ * `enough`. The result is the same on every processor. */
 double ebpo_convex_gap(const ebpo_convex *a, const ebpo_convex *b, double enough);
 
 /* Returns an upper bound of the distance of any two points, rounded up. */
@@ -49,8 +49,8 @@ void ebpo_posed_subtrees_free(ebpo_posed_subtrees *s);
 EBPO_MUST_USE ebpo_status ebpo_posed_envelope(ebpo_posed_subtrees *s, ebpo_cell cell,
                                               ebpo_convex *out, ebpo_error *error);
 
-/* Return the root of the tree, and the root of a subtree that is loaded on demand; a whole model is
- * its only subtree. */
+/* The first function returns the root of the tree. The second returns the root of a subtree that is
+ * loaded on demand; a whole model is its only subtree. */
 ebpo_posed_node ebpo_posed_root(const ebpo_posed_subtrees *s);
 ebpo_posed_node ebpo_posed_subtree_root(const ebpo_posed_subtrees *s);
 /* Returns a child of a gray node. */

@@ -2,12 +2,14 @@
  * other, or equal.
  *
  * The boundaries of two models divide space into parts. The relation depends on which kinds of part
- * exist: in both models, in the first alone, in the second alone. Each part is bounded by pieces of
- * faces, so it is found around these pieces (around_face.h). A crossing pair nearly always decides.
- * If not, all faces that intersect the other model are examined, then one face of each patch that
- * does not: such a patch is on one side as a whole. A patch is skipped if a face on its side would
- * not change the result; its subtree is not loaded if the side is known. If the deadline passes,
- * the relation is open. See docs/develop/collision.md, "Relation of two models". One thread. */
+ * exist: in both models, in the first only, in the second only. Each part is bounded by pieces of
+ * faces, so the parts are found around these pieces (around_face.h).
+ *
+ * A crossing pair nearly always decides. Otherwise all faces that intersect the other model are
+ * examined, then one face of each patch without contact, because such a patch is entirely on one
+ * side. A patch is skipped if a face on its side would not change the result; if the side is known,
+ * the patch's subtree is not loaded. If the deadline passes, the relation is open. See
+ * docs/develop/collision.md, "Relation of two models". One thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -36,8 +38,9 @@ typedef struct separate_patches {
     ebpo_two_models *two;
     int m;
     uint64_t subtrees;
-    /* The owned faces of the last examined subtree, by numbers in the file; for each face the first
-     * face of its patch (face_patches.h), less `first`. */
+    /* The owned faces of the last examined subtree: index of the first in the file, and their
+     * number. `patch` has for each face the first face of its patch (face_patches.h), minus
+     * `first`. */
     uint64_t first, count;
     uint32_t *patch;
 } separate_patches;
@@ -114,9 +117,9 @@ static ebpo_status side_of_ball(const separate_patches *u, const double middle[3
     return status;
 }
 
-/* Finds the side of all faces of a subtree that intersect no face of the other model. The cell, and
- * so the ball around the cell, contains a point of each owned face. If no face of the other model
- * is near the ball, the ball is on one side, and so is each of these faces. */
+/* Finds the side of all faces of a subtree that intersect no face of the other model. The cell
+ * contains a point of each owned face, and so does the ball around the cell. If no face of the
+ * other model is near the ball, the ball is on one side, and so is each of these faces. */
 static ebpo_status separate_patches_side(const separate_patches *u, uint64_t number, int *in,
                                          ebpo_error *error)
 {
@@ -148,12 +151,12 @@ typedef struct relating {
     ebpo_pair_faces places;
     ebpo_two_models two;
     ebpo_relation_result *out;
-    uint64_t *intersected[2], *seen[2]; /* bits for each face: it intersects the other model; it has
-                                         * been examined */
-    bool both, only[2];   /* there are inner points of both models; inner points of one model that
-                           * are not in the other */
+    uint64_t *intersected[2], *seen[2]; /* intersected: a bit for each face that intersects the
+                                         * other model; seen: for each examined face */
+    bool both, only[2];   /* both: there are inner points of both models; only: there are inner
+                           * points of this model that are not in the other */
     bool examined;        /* a face with an area has been examined */
-    bool touch, doubtful; /* a common point exists; undecided pairs exist */
+    bool touch, doubtful; /* touch: a common point exists; doubtful: undecided pairs exist */
     unsigned last[2];     /* `in` of the last examined piece */
     uint64_t inspected;
     bool open;
@@ -213,7 +216,7 @@ static bool note_piece(void *user, const ebpo_around *a)
     return !is_decided(r);
 }
 
-/* Examines a face once. Returns false when enough is known, or after a failure (`status`). Of a
+/* Examines a face once. Returns false when enough is known, or after a failure (`status`). For a
  * solid and a surface, the surface's faces decide. */
 static bool inspect_pair_one(relating *r, int m, uint64_t face)
 {
@@ -390,8 +393,8 @@ static bool note_sound(void *user, const ebpo_around *a)
     return !f->r->doubtful;
 }
 
-/* Returns true if every piece of the face belongs to the face's model; then every point of a
- * contact does. */
+/* Returns true if every piece of the face belongs to the face's model. Then every point of a
+ * contact also belongs to the model. */
 static bool is_sound(relating *r, int m, uint64_t face)
 {
     facing f = { r, m };
@@ -445,7 +448,7 @@ static bool is_same(const ebpo_collision *q)
            memcmp(&q->options.pose_a, &q->options.pose_b, sizeof q->options.pose_a) == 0;
 }
 
-/* Finds if identical models have a point. */
+/* Finds if two identical models have any point. */
 static void find_any(relating *r)
 {
     uint64_t count = face_count(r, 0);
@@ -548,7 +551,8 @@ static ebpo_status find_relation(relating *r, ebpo_error *error)
     return r->status;
 }
 
-/* Counts the loads and the bytes read, in nested queries and here. */
+/* Adds the loads and the bytes read, by nested queries and by this one, to the collider's counts.
+ */
 static void count_loads(const relating *r, uint64_t bytes_before, uint64_t read_before)
 {
     ebpo_collider *c = r->current_query->collider;

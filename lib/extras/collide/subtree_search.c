@@ -1,10 +1,10 @@
 /* Visits pairs of nodes of two posed trees, the smallest gap first, down to subtrees that are
  * loaded on demand. The gap of two envelopes bounds the distance of the nodes' contents.
  *
- * Depth, levels, distances and separation distances along a direction use this search; each has its
- * own measure of the best result and decides when to stop. The larger of two nodes is divided
- * first. Several pairs of nodes of a whole model and a model in parts may need the same subtree: it
- * is visited once. One thread. */
+ * Queries of depth, levels, distances and separation distances use this search. Each query compares
+ * results in its own way and decides when to stop. The larger of two nodes is divided first.
+ * Several pairs of nodes of a whole model and a model in parts may need the same subtree: it is
+ * visited once. One thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>

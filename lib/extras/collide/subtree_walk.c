@@ -1,11 +1,11 @@
 /* Finds all pairs of intersecting faces of models that are loaded in parts, with the same result as
  * for whole models.
  *
- * Two faces with a common point are listed by the subtrees whose cells contain that point, so it
- * suffices to search pairs of subtrees whose envelopes may touch. These pairs are found before a
+ * Two faces with a common point are listed by the subtrees whose cells contain that point. So only
+ * pairs of subtrees whose envelopes may touch need to be searched. These pairs are found before a
  * subtree is loaded, and sorted so that a loaded subtree is soon reused. Several threads search
  * pairs of subtrees. A face that several subtrees list is found more than once. So pairs of faces
- * wait, are sorted and made unique; they are returned in order, each one as soon as no earlier pair
+ * wait, are sorted and made unique. They are returned in order, each one as soon as no earlier pair
  * can come.
  *
  * When more pairs wait than the collider's memory holds, the pairs of the first model's later faces
@@ -29,7 +29,7 @@
 typedef struct subtree_pair {
     uint32_t a, b;
     uint32_t rank_a, rank_b; /* ranks in the order of the files' faces */
-    double apart;            /* distance of their middles, divided by the sum of their sizes */
+    double apart;            /* distance of their middles divided by the sum of their sizes */
 } subtree_pair;
 
 typedef struct subtree_pairs {
@@ -53,7 +53,7 @@ typedef struct subtree_walk {
     stored_pair *stored; /* pairs of faces of the last pair of subtrees, unordered; no face with
                           * itself */
     uint64_t count, capacity;
-    uint64_t first_end; /* all faces that the first subtree lists have lesser numbers */
+    uint64_t first_end; /* all faces that the first subtree lists have indices below this */
     bool late;          /* the deadline passed before all pairs were found */
 } subtree_walk;
 
@@ -192,12 +192,13 @@ static ebpo_status count_seconds(subtree_pairs *p, uint64_t most, ebpo_error *er
     return EBPO_OK;
 }
 
-/* Finds the pairs of subtrees that may have intersecting faces. Two such faces have a common point,
- * which is in a cell of each model that lists the face: so the subtrees of one of these pairs list
- * them. The pairs are sorted by the position of the first subtree, and for each first subtree back
- * or forth by the position of the second, so that loaded subtrees are reused soon. `self`: both are
- * one model at one pose; each pair comes once, with the first subtree's position not behind the
- * second's. The caller frees the pairs (`pair`), also after a failure. */
+/* Finds the pairs of subtrees that may have intersecting faces. Two intersecting faces have a
+ * common point, which is in a cell of each model whose subtree lists the face. So one of the pairs
+ * lists both faces. The pairs are sorted by the position of the first subtree. For each first
+ * subtree they are sorted by the position of the second, alternately forwards and backwards, so
+ * that loaded subtrees are reused soon. `self`: both are one model at one pose; each pair comes
+ * once, with the first subtree's position not behind the second's. The caller frees the pairs
+ * (`pair`), also after a failure. */
 static ebpo_status find_subtree_pairs(subtree_pairs *out, ebpo_posed_subtrees *a,
                                       ebpo_posed_subtrees *b, double reach, bool self,
                                       ebpo_error *error)
@@ -371,8 +372,8 @@ typedef struct gathering_parts {
     bool self;
     ebpo_posed_subtrees subtrees[2];
     subtree_pairs pairs;
-    uint64_t *end; /* for each subtree of the first model: the numbers of its faces are below this
-                    * one; 0: not known yet */
+    uint64_t *end; /* for each subtree of the first model: an upper limit of its faces' indices; 0:
+                    * unknown */
     subtree_walk *walk; /* one for each thread */
     unsigned threads;
     uint64_t read_before;
@@ -476,8 +477,8 @@ static ebpo_status run_pairs(void *user, uint64_t begin, uint64_t end, unsigned 
     return EBPO_OK;
 }
 
-/* Runs all threads. Each holds several subtrees; where the budget is too small for all threads, one
- * thread continues. */
+/* Runs all threads. Each thread holds several subtrees; if the budget is too small for all threads,
+ * one thread continues. */
 static ebpo_status run_all(gathering_parts *g, ebpo_error *error)
 {
     const ebpo_progress *progress = &g->current_query->options.progress;
