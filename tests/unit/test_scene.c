@@ -47,7 +47,7 @@ static const struct {
     { HEAD "\"title\": 1}", "line 3: title: is not a text" },
     { HEAD "\"title\": \"a\", \"title\": \"b\"}", "line 3: is not JSON: duplicate" },
     { HEAD "\"instances\": [\n{\"model\": \"m\"}]}", "line 4: instances[0]: has no member name" },
-    { HEAD "\"instances\": [" ONE ",\n" ONE "]}", "line 4: instances[1]: there is another 'a'" },
+    { HEAD "\"instances\": [" ONE ",\n" ONE "]}", "line 4: instances[1]: the name 'a' exists already" },
     { HEAD "\"instances\": [\n{\"name\": \"a\", \"model\": \"n\"}]}",
       "line 4: instances[0].model: is not one of this scene" },
     { HEAD "\"instances\": [{\"name\": \"a\", \"model\": \"m\",\n\"pose\": {\n\"scale\": \"1\"}}]}",

@@ -2,12 +2,12 @@
  * clearance, and the least distance of a pair over an interval of time.
  *
  * Both searches evaluate the distance at some times, and use one bound: the distance of two
- * instances changes by at most their motion. The first search goes from one evaluation to the next,
- * so that in between the motion is shorter than the gap to the clearance and no contact is missed.
- * The second search keeps parts of the interval in a heap by the least distance that each part
- * allows, and halves the first part until the result is within the tolerance. Jumps of routes are
- * ends of parts. A result is a pair of certain bounds; a search that needs too many evaluations
- * returns its current bounds.
+ * instances changes by at most their motion. The first search goes from one evaluation to the next.
+ * The motion in between is shorter than the gap to the clearance, so no contact is missed. The
+ * second search keeps parts of the interval in a heap by the least distance that each part allows.
+ * It halves the first part until the result is within the tolerance. Jumps of routes are ends of
+ * parts. A result is a pair of certain bounds. A search that needs too many evaluations returns its
+ * current bounds.
  *
  * Source: docs/guide/scenes.md. */
 #include "core/strict_fp.h"
@@ -28,7 +28,7 @@ typedef struct travel {
 } travel;
 
 /* Returns the time of the next evaluation: until then the motion is shorter than `gap`. Returns
- * w->time if there is no such time. */
+ * w->time if no later time is possible. */
 static ebpo_status next_evaluation(const travel *t, const ebpo_scene_evaluations *evaluations,
                                    const ebpo_scene_approach_result *w, double gap, double *next,
                                    ebpo_error *error)
@@ -52,8 +52,8 @@ static ebpo_status next_evaluation(const travel *t, const ebpo_scene_evaluations
     return status;
 }
 
-/* Moves past a jump. *next stays unchanged if there is no jump: then rounding alone may exceed the
- * gap, however short the time. */
+/* Moves past a jump. *next stays unchanged if there is no jump; then the bound of rounding exceeds
+ * the gap even for the shortest time. */
 static ebpo_status approach_jump(const ebpo_scene_evaluations *evaluations,
                                  const ebpo_scene_approach_result *w, double *next,
                                  ebpo_error *error)
@@ -154,10 +154,10 @@ typedef struct least_search {
     uint64_t max_evaluations;
 } least_search;
 
-/* A part of the interval of time, without a jump within. */
+/* A part of the interval of time; no route jumps inside it. */
 typedef struct part {
     double from, to;
-    double at_from, at_to; /* lower bounds of the distance at the ends */
+    double at_from, at_to; /* lower bounds of the distance at both ends */
     double motion;         /* bound of the motion of both instances */
     double least;          /* lower bound of the distance in the part */
 } part;
@@ -165,7 +165,8 @@ typedef struct part {
 typedef struct part_search {
     ebpo_scene_evaluations evaluations;
     ebpo_scene_least *out;
-    double limit; /* least bound by omitted faces so far: the result cannot be better */
+    double limit; /* least bound by omitted faces so far; the lower bound of the result cannot
+                   * exceed it */
     EBPO_SCENE_LIST(part, parts); /* a heap: the part with the least `least` first */
 } part_search;
 
@@ -201,8 +202,8 @@ static ebpo_status least_distance_evaluate(part_search *s, double time, double *
     return status;
 }
 
-/* Adds a part. Between its ends the distance may be less than at the ends: by half of the motion
- * that remains. */
+/* Adds a part. Between its ends the distance may be less than at the ends, by up to half of the
+ * rest of the motion. */
 static ebpo_status add_part(part_search *s, part p, ebpo_error *error)
 {
     ebpo_status status =
@@ -258,7 +259,7 @@ static ebpo_status begin_parts(part_search *s, double from, double to, ebpo_erro
 /* Returns true if the bound of the first part is good enough, or cannot be improved. */
 static bool is_done(const part_search *s, const part *p, double middle, const least_search *how)
 {
-    double hi = s->out->hi, open = hi - s->limit; /* open below 0: no omitted face matters */
+    double hi = s->out->hi, open = hi - s->limit; /* below 0: no omitted face matters */
     return ebpo_scene_is_within(hi, p->least, how->tolerance) || s->limit - p->least <= open / 8 ||
            s->out->evaluations >= how->max_evaluations || p->motion <= how->tolerance / 8 ||
            !(middle > p->from && middle < p->to);

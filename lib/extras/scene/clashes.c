@@ -3,9 +3,9 @@
  *
  * Pairs come from the broad phase (scene_pairs.c), and are evaluated on all cores. For each pair
  * whose faces intersect, the result has the faces, the location, the number and the depth of
- * contacts. For other pairs it has, as far as the options request, the relation of the solids and
- * whether the clearance is kept. Parts omitted from a subset must not matter: if they may, the
- * query fails with EBPO_E_ABSENT instead of guessing.
+ * contacts. For other pairs the result has, as far as the options request it, the relation of the
+ * solids and whether the clearance is kept. If parts that are omitted from a subset may matter, the
+ * query fails with EBPO_E_ABSENT.
  *
  * Source: docs/guide/scenes.md. */
 #include "core/strict_fp.h"
@@ -43,7 +43,8 @@ static void scene_forget_facts(ebpo_scene_clash *m)
     m->depth[0] = m->depth[1] = unknown;
 }
 
-/* Widens the box of locations. If one of two values is NAN, the result is the other one. */
+/* Widens the box of locations by a point. If one of two values is NAN, the result is the other one.
+ */
 static void clash_facts_widen(ebpo_scene_clash *m, const double p[3])
 {
     for (int k = 0; k < 3; k++) {
@@ -232,8 +233,8 @@ static ebpo_status scene_report_contacts(const scene_two *two, const ebpo_face_p
     return status == EBPO_OK && two->how->locations ? locate_first(two, m, error) : status;
 }
 
-/* Returns true if a point of one model is inside the other. Otherwise the depth is 0, and a search
- * would take long to find that for faces that are on each other. */
+/* Returns true if a point of one model is inside the other. Otherwise the depth is 0, and is not
+ * searched: for faces that are on each other the search would take long. */
 static bool is_any_inner(int32_t relation)
 {
     return relation == EBPO_INTERSECTING || relation == EBPO_A_INSIDE_B ||
@@ -272,8 +273,8 @@ static ebpo_clash_kind kind_of(const ebpo_scene_clash *m)
                          : EBPO_CLASH_NONE;
 }
 
-/* Checks the clearance, which takes less time than the distance; if the clearance is not kept,
- * finds the distance. */
+/* Checks the clearance, which takes less time than computing the distance. Computes the distance
+ * only if the clearance is not kept. */
 static ebpo_status query_clearance(const scene_two *two, ebpo_scene_clash *m, ebpo_error *error)
 {
     ebpo_clearance_options how = EBPO_CLEARANCE_OPTIONS_INIT;
@@ -399,7 +400,9 @@ ebpo_status ebpo_scene_find_clashes(ebpo_scene *scene, double time,
     uint64_t count = 0;
     ebpo_status status = EBPO_TAKE(ebpo_scene_clash_options, &a.how, options, error);
     if (status == EBPO_OK && !(a.how.depth >= 0 && a.how.depth < INFINITY))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "depths within %g: not a valid length",
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "depths within %g: the tolerance is not a valid "
+                         "length",
                          a.how.depth);
     a.how.relate |= a.how.depth > 0;
     ebpo_scene_search search = {

@@ -1,12 +1,12 @@
-/* Two instances of a scene at a time: one in the other's coordinates, their relative motion, their
- * distance, and the relevant parts that their files omit.
+/* Two instances of a scene at a time: the position of one in the other's coordinates, their
+ * relative motion, their distance, and the relevant parts that their files omit.
  *
  * Boxes and lengths are rounded outwards, so that every bound is certain in spite of rounding. A
- * file that is a subset has only the faces of its kept box: the omitted part is bounded by up to
- * six boxes around that box. Two instances that follow one route have no relative motion except by
+ * file that is a subset has only the faces of its kept box: up to six boxes around the kept box
+ * bound the omitted part. Two instances that follow one route have no relative motion except by
  * rounding and scale.
  *
- * ebpo_scene_find_in_pairs evaluates a list of pairs on all cores, each pair with a separate
+ * ebpo_scene_find_in_pairs evaluates a list of pairs on all cores. Each pair has a separate
  * collider, so that results do not depend on the number of threads. */
 #include "core/strict_fp.h"
 
@@ -81,7 +81,8 @@ ebpo_status ebpo_scene_seen_from(const ebpo_scene *scene, uint64_t of, uint64_t 
         sizes += fabs(from.translation[i]);
         reach += fmax(fabs(m->min[i]), fabs(m->max[i]));
     }
-    /* the transposed matrix is the inverse up to the error bound, for points of the model's box */
+    /* the transposed matrix is the inverse except for an error, which is bounded for points of the
+     * model's box */
     double off = (sizes + reach * scale) * slack / scale + 3 * from.error_bound * reach;
     out->rounding = off;
     for (int k = 0; k < 3; k++) {
@@ -126,7 +127,7 @@ static bool held_box(const ebpo_scene *scene, uint64_t instance, ebpo_scene_spac
     return true;
 }
 
-/* Returns the distance of `other` from the part of the box `all` that is outside `held`. That part
+/* Returns the distance of `other` from the part of the box `all` that is outside `held`. This part
  * consists of up to six boxes on the sides of `held`. */
 static double gap_around(const ebpo_scene_space *all, const ebpo_scene_space *held,
                          const ebpo_scene_space *other)
@@ -182,10 +183,10 @@ ebpo_status ebpo_scene_lacks(const ebpo_scene *scene, const ebpo_scene_pair *pai
     const ebpo_scene_model_entry *m = omitted_model_of(scene, lacking);
     return ebpo_fail(
         error, EBPO_E_ABSENT,
-        "instances '%.80s' and '%.80s' at time %.9g: the file of model '%.80s' is a part of "
-        "another or has no mesh, and the omitted part may matter; query a scene with more of it%s",
+        "instances '%.80s' and '%.80s' at time %.9g: the file of model '%.80s' is a subset or "
+        "has no mesh, and the omitted part may matter; query a scene with more of the model%s",
         scene->instances[pair->a].as.name, scene->instances[pair->b].as.name, time, m->name,
-        solids ? ", such as ebpo scene pack --solids makes" : "");
+        solids ? ", such as a scene from ebpo scene pack --solids" : "");
 }
 
 static const ebpo_scene_route *route_of(const ebpo_scene *scene, uint64_t instance)
@@ -195,7 +196,7 @@ static const ebpo_scene_route *route_of(const ebpo_scene *scene, uint64_t instan
 }
 
 /* Returns true if both instances follow one route, or two routes with the same keys. Then their
- * relation changes only by rounding, and in size where the route's scale changes. */
+ * relative position changes only by rounding, and in size where the route's scale changes. */
 static bool pair_rides(const ebpo_scene *scene, const ebpo_scene_pair *pair)
 {
     const ebpo_scene_route *a = route_of(scene, pair->a), *b = route_of(scene, pair->b);
@@ -205,8 +206,8 @@ static bool pair_rides(const ebpo_scene *scene, const ebpo_scene_pair *pair)
                       memcmp(a->keys, b->keys, a->count * sizeof *a->keys) == 0);
 }
 
-/* Returns how much rounding changes the distance of the pair on its routes, in order of magnitude;
- * 0: neither instance moves. */
+/* Returns the order of magnitude of the change of the pair's distance by rounding on its routes; 0:
+ * neither instance moves. */
 static double pair_rounding(const ebpo_scene *scene, const ebpo_scene_pair *pair)
 {
     double sum = 0;
@@ -222,8 +223,8 @@ static double pair_rounding(const ebpo_scene *scene, const ebpo_scene_pair *pair
 }
 
 /* Bounds the motion of a pair on one route. The pose of the route is the same for both instances,
- * to the last bit. So if two of their points are at most `reach` apart at the beginning of the
- * route, their distance later is scale times that. */
+ * to the last bit. So if two of their points are at most `reach` apart in the coordinates of the
+ * route, their distance at a time is at most the scale times `reach`. */
 static double pair_motion_ride(const ebpo_scene *scene, const ebpo_scene_pair *pair, double from,
                                double to)
 {
@@ -378,7 +379,7 @@ ebpo_status ebpo_scene_pose_pair(const ebpo_scene *scene, const ebpo_scene_pair 
     return status == EBPO_OK ? ebpo_scene_pose(scene, pair->b, time, &out->pose_b, error) : status;
 }
 
-/* Bounds the distance; without a collider there are no faces that could be near. */
+/* Bounds the distance. Without a collider, no faces in the files can be near. */
 static ebpo_status query_distance(ebpo_scene_evaluations *l, double time, double *lo, double *hi,
                                   ebpo_error *error)
 {
@@ -412,7 +413,7 @@ ebpo_status ebpo_scene_evaluations_begin(ebpo_scene_evaluations *l, const ebpo_s
                                          ebpo_error *error)
 {
     *l = (ebpo_scene_evaluations){ .scene = scene, .pair = pair, .tolerance = tolerance / 4 };
-    /* a smaller tolerance would take long, for digits that change with the next pose */
+    /* a smaller tolerance would take long, and the additional digits change with every pose */
     l->tolerance = fmax(l->tolerance, pair_rounding(scene, pair) / 16);
     l->rides = pair_rides(scene, pair);
     return ebpo_scene_collider(scene, pair, 1, &l->collider, error);

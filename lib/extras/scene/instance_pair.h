@@ -27,25 +27,25 @@ EBPO_MUST_USE ebpo_status ebpo_scene_seen_from(const ebpo_scene *scene, uint64_t
 /* Returns the distance of two boxes, rounded down. */
 double ebpo_scene_space_gap(const ebpo_scene_space *a, const ebpo_scene_space *b);
 
-/* Bounds the distance of omitted faces of a pair at a time: no two faces of which one is omitted
- * from its model's file are nearer than *gap; INFINITY: nothing is omitted. *lacking: an instance
- * whose file omits faces. */
+/* Bounds the distance of omitted faces of a pair at a time. If one of two faces is omitted from its
+ * model's file, the faces are not nearer than *gap; INFINITY: nothing is omitted. *lacking: an
+ * instance whose file omits faces. */
 EBPO_MUST_USE ebpo_status ebpo_scene_omitted(const ebpo_scene *scene, const ebpo_scene_pair *pair,
                                              double time, double *gap, uint64_t *lacking,
                                              ebpo_error *error);
 
-/* Returns EBPO_E_ABSENT: the omitted part of this instance's file may be nearer than the query
- * allows; or around the other one, where solids are requested. */
+/* Returns EBPO_E_ABSENT with a message: an omitted part of this instance's file may be nearer than
+ * the query allows; or, with `solids`, may be around the other instance. */
 ebpo_status ebpo_scene_lacks(const ebpo_scene *scene, const ebpo_scene_pair *pair, uint64_t lacking,
                              double time, bool solids, ebpo_error *error);
 
 /* Relative motion of two instances. */
 
-/* Returns the next time at which a route of theirs has a key; `to` if that comes first. */
+/* Returns the next time at which a route of the pair has a key; `to` if that comes first. */
 double ebpo_scene_pair_next(const ebpo_scene *scene, const ebpo_scene_pair *pair, double from,
                             double to);
 
-/* Pairs of instances that are evaluated in sequence, by any thread. */
+/* Pairs of instances, each evaluated by any thread. */
 
 typedef struct ebpo_scene_pairs_list {
     ebpo_scene_pair *pairs; /* from malloc */
@@ -55,7 +55,7 @@ typedef struct ebpo_scene_pairs_list {
 /* Lists the pairs of ebpo_scene_pairs. On failure there is nothing to free. */
 EBPO_MUST_USE ebpo_status ebpo_scene_keep_pairs(const ebpo_scene *scene, double from, double to,
                                                 ebpo_scene_pairs_list *out, ebpo_error *error);
-/* Finds a result for one pair; how: data of the search. */
+/* Finds a result for one pair. how: data of the search. */
 typedef ebpo_status (*ebpo_scene_find_fn)(const void *how, const ebpo_scene_pair *pair,
                                           void *result, ebpo_error *error);
 
@@ -64,14 +64,14 @@ typedef struct ebpo_scene_search {
     ebpo_scene_find_fn find;
     const void *how;
     size_t result_size;
-    uint64_t grain; /* pairs of a piece of work */
+    uint64_t grain; /* number of pairs in a piece of work */
     unsigned threads;
     const ebpo_progress *progress;
     const char *stage;
 } ebpo_scene_search;
 
-/* Lists the pairs, makes their models, and finds the result of each on all cores. Free *results, in
- * the order of pairs, also on failure; *count is 0 without a list. */
+/* Lists the pairs, makes their models, and finds the result of each pair on all cores. *results has
+ * the order of the pairs; free it, also on failure. *count is 0 without a list. */
 EBPO_MUST_USE ebpo_status ebpo_scene_find_in_pairs(ebpo_scene *scene, double from, double to,
                                                    const ebpo_scene_search *search, void **results,
                                                    uint64_t *count, ebpo_error *error);
@@ -79,12 +79,12 @@ EBPO_MUST_USE ebpo_status ebpo_scene_find_in_pairs(ebpo_scene *scene, double fro
 /* Makes models in sequence; queries then share them. */
 EBPO_MUST_USE ebpo_status ebpo_scene_make_models(ebpo_scene *scene, const ebpo_scene_pair *pairs,
                                                  uint64_t count, ebpo_error *error);
-/* Makes a collider for one of these pairs. NULL: a file has no mesh; then ebpo_scene_omitted
- * counts all of it. */
+/* Makes a collider for one of these pairs. NULL: a file has no mesh; then ebpo_scene_omitted treats
+ * the whole file as omitted. */
 EBPO_MUST_USE ebpo_status ebpo_scene_collider(const ebpo_scene *scene, const ebpo_scene_pair *pair,
                                               unsigned threads, ebpo_collider **out,
                                               ebpo_error *error);
-/* Sets the poses of both at a time. */
+/* Sets the poses of both instances at a time. */
 EBPO_MUST_USE ebpo_status ebpo_scene_pose_pair(const ebpo_scene *scene, const ebpo_scene_pair *pair,
                                                double time, ebpo_collide_options *out,
                                                ebpo_error *error);
@@ -101,8 +101,8 @@ typedef struct ebpo_scene_evaluations {
     uint64_t lacking;        /* instance whose file omits faces, from the same call */
 } ebpo_scene_evaluations;
 
-/* Begins evaluations. `tolerance`: that of the result; an evaluation uses a quarter of it, or the
- * limit of rounding. Free the collider, also on failure. */
+/* Begins evaluations. `tolerance`: tolerance of the result; an evaluation uses a quarter of it, or
+ * the limit of rounding. Free the collider, also on failure. */
 EBPO_MUST_USE ebpo_status ebpo_scene_evaluations_begin(ebpo_scene_evaluations *evaluations,
                                                        const ebpo_scene *scene,
                                                        const ebpo_scene_pair *pair,

@@ -1,12 +1,12 @@
-/* Reads members of a scene file. Every error names the line, the path of the value and what was
- * expected.
+/* Reads members of a scene file. Every error names the line, the path of the value and the expected
+ * value.
  *
  * A scene file is untrusted input. Before jansson parses the text, one pass compares the number and
- * the depth of its values with the limits, so that parsing takes bounded memory. jansson keeps no
+ * the depth of its values with the limits, so that parsing takes bounded memory. jansson stores no
  * positions: after an error, a second pass over the text follows the path of the member to find its
  * line.
  *
- * A reader keeps the path of the current value: ebpo_json_enter and ebpo_json_leave must bracket
+ * A reader stores the path of the current value: ebpo_json_enter and ebpo_json_leave must bracket
  * the evaluation of each value. Unknown members are errors, except private ones, whose names begin
  * with "x-".
  *

@@ -1,4 +1,4 @@
-/* Reads members of a scene file; errors name the line, the path and what was expected. */
+/* Reads members of a scene file. Errors name the line, the path and the expected value. */
 #ifndef EBPO_SCENE_JSON_READER_H
 #define EBPO_SCENE_JSON_READER_H
 
@@ -30,8 +30,8 @@ ebpo_status ebpo_json_judge(ebpo_json_reader *r, ebpo_status status, const ebpo_
 EBPO_MUST_USE ebpo_status ebpo_json_members(ebpo_json_reader *r, const json_t *value,
                                             const char *const *known);
 
-/* Reads a member. If it is missing, *out stays unchanged; EBPO_E_FORMAT if it is missing and
- * needed. */
+/* Reads a member. If the member is missing, *out stays unchanged; EBPO_E_FORMAT if it is also
+ * `needed`. */
 EBPO_MUST_USE ebpo_status ebpo_json_get_text(ebpo_json_reader *r, const json_t *object,
                                              const char *key, bool needed, const char **out);
 EBPO_MUST_USE ebpo_status ebpo_json_get_flag(ebpo_json_reader *r, const json_t *object,
@@ -42,7 +42,7 @@ EBPO_MUST_USE ebpo_status ebpo_json_get_reals(ebpo_json_reader *r, const json_t 
                                               const char *key, bool needed, double *out,
                                               size_t count);
 
-/* Called for each member (or item) of the member `key`, if that exists; the member (or item) has
+/* Called for each member (or item) of the member `key`, if `key` exists. The member (or item) has
  * been entered. `name` is NULL in arrays. */
 typedef ebpo_status (*ebpo_json_each_fn)(ebpo_json_reader *r, const char *name,
                                          const json_t *value);

@@ -4,8 +4,8 @@
  * sums, products, quotients and square roots are used, so that a pose has the same bits on every
  * machine.
  *
- * Bounds hold between two times without a key between them: the length of the motion, how far it
- * leaves the straight line, and the part that rounding alone causes. They are rounded upwards. */
+ * Bounds hold between two times without a key between them: the length of the motion, its distance
+ * from the straight line, and the part that rounding alone causes. They are rounded upwards. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -100,7 +100,7 @@ static void turn_between(const double from[4], const double to[4], double u, dou
         for (int k = 0; k < 4; k++)
             middle[k] = a[k] + b[k];
         ebpo_quaternion_normalise(middle); /* both are at most a right angle apart, so their sum is
-                                            * far from 0 */
+                                            * not near 0 */
         bool later = u >= 0.5;
         memcpy(later ? a : b, middle, sizeof middle);
         u = later ? 2 * u - 1 : 2 * u;

@@ -1,9 +1,9 @@
 /* Reads a scene from its file: models, instances, layers, groups, cameras, rules and routes, and
  * the CSV files of poses that routes name.
  *
- * A scene file is untrusted input: each member is checked for its type and range, names must be
+ * A scene file is untrusted input. Each member is checked for its type and range, names must be
  * unique, and other files may be named only as the options allow (scene_make.c). The first line of
- * a file of poses names its columns time, x, y, z, qx, qy, qz, qw and scale in any order; the bytes
+ * a file of poses names its columns time, x, y, z, qx, qy, qz, qw and scale in any order. The bytes
  * of all such files are limited. Numbers are read in the C locale.
  *
  * Source: format-spec/scene.md. */
@@ -29,7 +29,7 @@ static const char *const columns[COLUMNS] = {
 typedef struct lines {
     const char *at, *end, *name;
     uint64_t line;
-    int field[COLUMNS]; /* number of the field of each column; -1: missing */
+    int field[COLUMNS]; /* index of each column's field; -1: missing */
     int fields;
     locale_t c_locale;
 } lines;

@@ -5,8 +5,8 @@
  * selectors, which rules use. A selector is a set. Every instance belongs to the set of all, to its
  * own set, to that of its layer and to those of its groups.
  *
- * A scene that is untrusted input may name only files below its own folder, unless the options
- * allow others; symbolic links that lead out of the folder are rejected. */
+ * A scene that is untrusted input may name only files in its own folder or below, unless the
+ * options allow others. Symbolic links that lead out of the folder are rejected. */
 #include "core/strict_fp.h"
 
 #include <errno.h>
@@ -76,7 +76,7 @@ static ebpo_status put_name(ebpo_scene *scene, const char *kind, const char *nam
     char key[KIND_MAX + NAME_MAX + 2];
     names_join(key, sizeof key, kind, name);
     if (json_object_get(scene->names, key))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "there is another '%.80s'", name);
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "the name '%.80s' exists already", name);
     if (json_object_set_new(scene->names, key, json_integer((json_int_t)number)) != 0)
         return ebpo_fail_memory(error, sizeof key);
     return EBPO_OK;
@@ -154,7 +154,7 @@ static ebpo_status check_real(const char *folder, const char *real, const char *
     if (is_below(folder, real))
         return EBPO_OK;
     return ebpo_fail_file(error, EBPO_E_FORMAT, path,
-                          "is by a link the file %.160s, outside the scene's folder %.160s, "
+                          "is a link to the file %.160s, outside the scene's folder %.160s, "
                           "which must be allowed (ebpo scene --allow-outside)",
                           real, folder);
 }

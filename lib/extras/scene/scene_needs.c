@@ -5,8 +5,8 @@
  * They are computed over steps of time so short that no instance moves far. They are rounded
  * outwards, so that queries in a subset of this box return the same results as in the whole file.
  *
- * A view needs the levels whose cells are larger than a pixel: a node's envelope and its content
- * are both in its cell, so a camera cannot distinguish finer levels. */
+ * A view needs the levels whose cells are larger than a pixel. A node's envelope and its content
+ * are both in its cell, so finer levels make no visible difference. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -89,7 +89,7 @@ static ebpo_status near_box(const nearing *n, double from, double to, double mot
         status = ebpo_scene_seen_from(n->scene, n->of, n->other, to, &later, n->needs->error);
     if (status != EBPO_OK)
         return status;
-    /* more than the effect of rounding between these times, also where nothing else is added */
+    /* more than the effect of rounding between these times, even if all other terms are 0 */
     double grow = (n->clearance + n->margin + motion) / fmin(at.unit, later.unit) * (1 + 0x1p-40) +
                   2 * fmax(at.rounding, later.rounding);
     *any = true;
@@ -140,8 +140,8 @@ static ebpo_status come_near(const nearing *n, double from, double to, int halvi
     return status == EBPO_OK ? come_near(n, middle, to, halvings - 1) : status;
 }
 
-/* Goes from key to key of both routes; the time of a key begins the next part, because routes may
- * jump there. */
+/* Goes from key to key of both routes. Each key begins a new part, because routes may jump there.
+ */
 static ebpo_status come_near_along(const nearing *n)
 {
     const ebpo_scene_pair pair = { n->of, n->other, 0 };
@@ -176,7 +176,7 @@ static double default_margin(const ebpo_scene_needs *needs, const ebpo_scene_pai
     return (fmin(a, b) > 0 ? fmin(a, b) : fmax(a, b)) / 32;
 }
 
-/* Adds all faces of a model to the need, because any of them may be around the other instance. */
+/* Adds all faces of a model to the need, because the solid may contain the other instance. */
 static void add_whole(ebpo_scene_needs *needs, const ebpo_scene_pair *pair)
 {
     for (int i = 0; i < 2; i++) {
@@ -226,7 +226,7 @@ ebpo_status ebpo_scene_add_near(ebpo_scene_needs *needs)
     return status;
 }
 
-/* Initialises the needs of files; two models of one file have one box. */
+/* Initialises the needs of files; two models of one file share one need. */
 static void begin_files(ebpo_scene_needs *needs)
 {
     for (uint64_t i = 0; i < needs->scene->models_count; i++) {

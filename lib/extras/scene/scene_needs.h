@@ -27,7 +27,7 @@ EBPO_MUST_USE ebpo_status ebpo_scene_begin_needs(ebpo_scene_needs *needs);
 /* Adds the parts of models that other instances of pairs come near. */
 EBPO_MUST_USE ebpo_status ebpo_scene_add_near(ebpo_scene_needs *needs);
 
-/* Completes the needs; of files without additions only the root is needed. */
+/* Completes the needs. Of files to which nothing was added only the root is needed. */
 void ebpo_scene_end_needs(ebpo_scene_needs *needs);
 
 /* Returns the need of a file as options for a subset. */

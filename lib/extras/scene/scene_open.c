@@ -1,9 +1,9 @@
 /* Opens scene files, and loads the models that they name.
  *
- * Models of the same path share one open file. Where a scene file states a digest, the
- * content_sha256 of the model's file must be equal to it. Loading sets the box of each model, which
- * bounds of motion use; until then the models of a scene have no boxes. A model for queries is made
- * when it is first needed. */
+ * Models of the same path share one open file. If a scene file states a digest, the content_sha256
+ * of the model's file must be equal to it. Loading sets the box of each model, which bounds of
+ * motion use; until then the models of a scene have no boxes. A model for queries is made when it
+ * is first needed. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -175,8 +175,8 @@ static ebpo_status check_digest(const ebpo_scene_model_entry *m, const ebpo_info
         return EBPO_OK;
     char shown[256];
     return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_url_redact(m->path, shown, sizeof shown),
-                          "is not the file that the scene means by model '%.80s': its "
-                          "content_sha256 is different",
+                          "is not the file of model '%.80s': its content_sha256 differs from "
+                          "that in the scene",
                           m->name);
 }
 

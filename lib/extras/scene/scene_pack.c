@@ -1,5 +1,5 @@
 /* Plans and packs a scene: finds the bytes of its models' files that are needed, and writes a
- * folder that has only those.
+ * folder that has only these bytes.
  *
  * Packing writes a subset of each file (scene_needs.c), copies the files of poses, and writes a
  * scene file like the original with other paths and digests. The folder is written beside its
@@ -27,7 +27,7 @@
 #include "format/file_in.h"
 #include "io/file_source.h"
 
-/* Names in the folder: of the scene file, of the number of a file in scene->files, of a route's
+/* Names in the folder: the scene file; a model's file, by its index in scene->files; a route's
  * poses. */
 #define SCENE_PACKED "packed.scene.json"
 
@@ -43,7 +43,7 @@ static ebpo_status scene_plan_check(ebpo_scene_needs *needs, const ebpo_plan_opt
     if (needs->how.purpose < EBPO_SCENE_FOR_COLLIDE || needs->how.purpose > EBPO_SCENE_FOR_SOLIDS)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "unknown purpose %d", (int)needs->how.purpose);
     if (!(needs->how.margin >= 0 && needs->how.margin < INFINITY))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "the margin %g is below 0 or not a length",
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "the margin %g is below 0 or not a valid length",
                          needs->how.margin);
     if (!(isfinite(needs->from) && isfinite(needs->to) && needs->from <= needs->to))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "%g to %g is not an interval of time", needs->from,
@@ -316,8 +316,8 @@ static uint64_t sum_of_files(const packing *p)
     return sum;
 }
 
-/* Reduces a plan that is too large: the need of each file by the same share, except of files of
- * which nothing is needed. */
+/* Reduces a plan that is too large. The need of each file is reduced by the same share, except for
+ * files of which nothing is needed. */
 static ebpo_status pack_shrink(packing *p)
 {
     uint64_t fixed = 0, sum = sum_of_files(p), target = p->how.target_bytes;

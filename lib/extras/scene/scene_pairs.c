@@ -1,11 +1,12 @@
 /* The broad phase of a scene: finds the pairs of instances that may come near each other in an
  * interval of time.
  *
- * Rules select the pairs and their clearances. Of several rules for a pair the greatest clearance
- * applies; a rule that ignores the pair overrides all others.
+ * Rules select the pairs and their clearances. If several rules apply to a pair, the greatest
+ * clearance counts; a rule that ignores the pair overrides all others.
  *
- * The box of an instance contains it at all times of the interval. Between keys the box is made in
- * steps of little rotation, each widened by how far the motion leaves the straight line.
+ * The box of an instance contains the instance at all times of the interval. Between keys the box
+ * is made in steps of little rotation; each step is widened by the distance of the motion from a
+ * straight line.
  *
  * Sweep and prune sorts boxes along the axis with the least expected overlap. Pairs are returned in
  * the order of their instances. If a test is in doubt, the pair is returned. */
@@ -47,8 +48,8 @@ static void sort_sets(ebpo_scene_instance_entry *i)
     i->set_count = kept;
 }
 
-/* Keeps one rule for each pair of sets: it ignores pairs if any rule does, else it has the greatest
- * clearance. */
+/* Keeps one rule for each pair of sets. It ignores pairs if one of the rules does; otherwise it has
+ * the greatest clearance. */
 void ebpo_scene_sort_rules(ebpo_scene *scene)
 {
     uint64_t kept = 0;
@@ -69,8 +70,8 @@ void ebpo_scene_sort_rules(ebpo_scene *scene)
         sort_sets(&scene->instances[i]);
 }
 
-/* Returns the clearance of the rule of two sets; below 0: pairs are ignored; 0 also if there is no
- * rule. */
+/* Returns the clearance of the rule of two sets; below 0: pairs are ignored. Returns 0 if there is
+ * no rule. */
 static double rule_of(const ebpo_scene *scene, uint64_t a, uint64_t b)
 {
     ebpo_scene_rule_entry wanted = { a < b ? a : b, a < b ? b : a, 0 };
@@ -358,8 +359,8 @@ static ebpo_status make_boxes(sweep *s, double from, double to, ebpo_error *erro
     return status;
 }
 
-/* Returns the axis with the least expected overlap. It is estimated from the sizes of boxes
- * relative to the size of the box around all. */
+/* Returns the axis with the least expected overlap. The overlap is estimated from the sizes of
+ * boxes relative to the size of the box around all boxes. */
 static int best_axis(const sweep *s)
 {
     int best = 0;
@@ -380,8 +381,8 @@ static int best_axis(const sweep *s)
     return best;
 }
 
-/* Exchanges axes in each box, so that the axis of comparison is the first one while boxes are
- * sorted and swept. */
+/* Exchanges axes in each box, so that the chosen axis is the first one while boxes are sorted and
+ * swept. */
 static void turn_axis(sweep *s, int axis)
 {
     for (uint64_t i = 0; i < s->count; i++) {
@@ -403,7 +404,7 @@ static int compare_boxes(const void *a, const void *b)
 }
 
 /* Returns true if two boxes are at most `by` apart on each axis. The rounding of differences is
- * added, so the result may be true in doubt. */
+ * added, so the result is true in doubt. */
 static bool near_each_other(const box *x, const box *y, double by)
 {
     for (int k = 0; k < 3; k++) {
@@ -425,8 +426,8 @@ static ebpo_status take_pair(sweep *s, const box *x, const box *y, ebpo_error *e
     if (s->pairs_count == max_pairs)
         return ebpo_fail(error, EBPO_E_LIMIT,
                          "more than %" PRIu64 " pairs of instances come near each other: place "
-                         "fewer at one position, have pairs ignored, or use "
-                         "a shorter time",
+                         "fewer instances at one position, let rules ignore "
+                         "pairs, or use a shorter time",
                          max_pairs);
     if (!ebpo_grow(&s->pairs, &s->pairs_capacity, s->pairs_count + 1, sizeof pair))
         return ebpo_fail_memory(error, (s->pairs_count + 1) * sizeof pair);

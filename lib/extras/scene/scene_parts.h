@@ -130,22 +130,23 @@ void ebpo_scene_turn_of_matrix(const double m[3][3], double turn[4]);
 void ebpo_scene_route_at(const ebpo_scene_route *route, double time, ebpo_pose *out);
 /* Computes the pose that applies `inner` first, then `outer`. */
 void ebpo_scene_compose(const ebpo_pose *outer, const ebpo_pose *inner, ebpo_pose *out);
-/* Returns the end of the first part of from .. to in which the route's motion is smooth; this part
+/* Returns the end of the first part of from .. to in which the route's motion is smooth. This part
  * begins at `from`. */
 double ebpo_scene_route_next(const ebpo_scene_route *route, double from, double to);
 
 /* Returns an upper bound of the length of a vector, however small or large. */
 double ebpo_scene_length_above(const double vector[3]);
 
-/* Reach of points that follow a route: a bound of their distance from the route's origin, and the
- * size of the coordinates from which the bound is computed, which determines its rounding. */
+/* Reach of points that follow a route. The first member bounds their distance from the route's
+ * origin. The second is the size of the coordinates from which this bound is computed; it
+ * determines the rounding. */
 typedef struct ebpo_scene_reach {
     double length, size;
 } ebpo_scene_reach;
 
 /* Motion of points within `reach` of the route's origin, between two times without a key between
  * them. length: bound of their distance from their first position. sag: bound of their distance
- * from the point that moves at constant speed on the straight line from their first to their last
+ * from a point that moves at constant speed on the straight line from their first to their last
  * position. */
 typedef struct ebpo_scene_step {
     double length, sag;
@@ -153,8 +154,8 @@ typedef struct ebpo_scene_step {
 ebpo_scene_step ebpo_scene_route_step(const ebpo_scene_route *route, double from, double to,
                                       ebpo_scene_reach reach);
 
-/* Returns, for points anywhere on the route, the part of their motion that does not shrink with the
- * interval of time. */
+/* Returns the part of the motion of points on the route that does not shrink with the interval of
+ * time, which rounding causes. */
 double ebpo_scene_route_rounding(const ebpo_scene_route *route, ebpo_scene_reach reach);
 
 /* Bounds the change of the distance of two instances on one route between `from` and `to`,
