@@ -1,12 +1,15 @@
 """Makes small degenerate meshes, one kind of defect each, with their expected results.
 
-awkward.py FOLDER [NAME...]: writes these, or all, as ASCII PLY with doubles; NAME.obj and NAME.stl
-as those.
+awkward.py FOLDER [NAME...]: writes the named meshes, or all, as ASCII PLY with doubles. NAME.obj and
+NAME.stl select these formats.
 
-MESHES[name]() gives an `Awkward`: vertices, faces; `volume` is that of the solid that was meant,
-None when there is none to be had without guessing; `inside` and `outside` are points of which that
-is known for such a solid (rule nonzero); `fine` says that the mesh is that solid as it stands;
-`refused`: it is no mesh of triangles."""
+MESHES[name]() returns an `Awkward` with these members:
+    vertices, faces
+    volume            volume of the intended solid; None when it cannot be determined without guessing
+    inside, outside   points with a known class for the intended solid (rule nonzero)
+    fine              True when the mesh is the intended solid without repairs
+    refused           True when the mesh is not a triangle mesh
+"""
 import math
 import pathlib
 import random
@@ -68,7 +71,7 @@ def sphere(n=12, radius=1.0, at=(0, 0, 0)):
 
 
 def tube(n=16, rows=4, radius=1.0, length=2.0):
-    """A cylinder without its ends."""
+    """Makes a cylinder without its ends."""
     v = [(radius * math.cos(2 * math.pi * j / n), radius * math.sin(2 * math.pi * j / n), length * i / rows)
          for i in range(rows + 1) for j in range(n)]
     at = lambda i, j: i * n + j % n
@@ -101,7 +104,7 @@ def moebius(n=12):
 
 
 def volume_of(mesh):
-    """A sixth of the sum of determinants about the first vertex."""
+    """Returns the volume: a sixth of the sum of determinants about the first vertex."""
     v, f = mesh
     o, total = v[0], 0.0
     for a, b, c in f:
@@ -111,7 +114,7 @@ def volume_of(mesh):
     return total / 6
 
 
-# ---- what is done to them ----
+# ---- changes of parts ----
 
 def turned(mesh, which=lambda i: True):
     return mesh[0], [(f[0], f[2], f[1]) if which(i) else f for i, f in enumerate(mesh[1])]
@@ -172,7 +175,7 @@ def known(name, mesh, volume=None, inside=(), outside=(), **more_facts):
 
 
 def cube(name, mesh, fine=False):
-    """One that was meant to be the unit cube."""
+    """Makes a mesh whose intended solid is the unit cube."""
     known(name, mesh, 1.0, [MIDDLE], [FAR], fine=fine)
 
 
@@ -215,14 +218,14 @@ def joined_faces(a, b):
 
 
 def split_edge():
-    """A T-junction: one face of the edge 0-1 is cut at its middle, the other is not."""
+    """Makes a T-junction: one face at the edge 0-1 is cut at the middle of the edge, the other is not."""
     v, f = box()
     f = [g for g in f if g != (0, 1, 5)]
     return v + [(0.5, 0, 0)], f + [(0, 8, 5), (8, 1, 5)]
 
 
 def split_side():
-    """The bottom's diagonal cut finely on one side alone: T-junctions along it."""
+    """Cuts the diagonal of the bottom finely on one side only, which gives T-junctions along the diagonal."""
     v, f = box()
     f = [g for g in f if g != (0, 2, 3)]
     v = v + [(0.25, 0.25, 0), (0.5, 0.5, 0), (0.75, 0.75, 0)]
@@ -343,7 +346,7 @@ known("gap_of_1e-7", lambda: joined(*[(lambda v, f: ([tuple(x + 1e-7 * i for x i
 
 
 def tube_capped(n):
-    """Flat as a coin, its faces long and thin."""
+    """Makes a flat disc with long, thin faces."""
     v, f = tube(n, 1, 1.0, 0.1)
     v = v + [(0, 0, 0), (0, 0, 0.1)]
     return v, f + [(2 * n, (j + 1) % n, j) for j in range(n)] + [(2 * n + 1, n + j, n + (j + 1) % n) for j in range(n)]

@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
-"""awkward_reported.py EBPO [SHARE]: checks that findings about degenerate meshes are correct and that the advice works.
+"""awkward_reported.py EBPO [SHARE]: checks that findings about degenerate meshes are correct and that the
+advice works.
 
-Of each mesh of awkward.py: `check` does not crash; a mesh that is called fine is; advice that is
-obeyed leaves the solid that was promised, with the volume and the points inside that the solid that
-was meant has; a converted file verifies against its source. SHARE takes every n-th."""
+For each mesh of awkward.py, `check` does not crash, and a mesh reported as correct is correct. Following
+the advice gives the promised solid, with the volume and the inside points of the intended solid. A
+converted file verifies against its source. SHARE n selects every n-th mesh.
+"""
 import json
 import math
 import os
@@ -26,7 +28,7 @@ def run(*words, text=None):
 
 
 def integral(report):
-    """Of the winding number; the volume, where that is known, but for its sign."""
+    """Returns the integral of the winding number: the volume, if it is known, except for its sign."""
     volume = report["volume"]
     if volume is not None and not math.isclose(volume, abs(report["winding_integral"])):
         sys.exit(f"volume {volume}, integral of the winding number {report['winding_integral']}")
@@ -43,7 +45,7 @@ def expect(name, what, good):
 
 
 def check_edges(name, mesh, report):
-    """Edges, counted anew."""
+    """Compares the edges with a separate count."""
     uses = {}
     for f in mesh.faces:
         for i in range(3):
@@ -131,7 +133,7 @@ def check_mesh(name, folder):
     check_file(name, mesh, path, ["--drop-duplicates", "--weld"], None)
 
 
-# Meshes that only a guess could repair: the command reports that they are no plausible solid.
+# Only a guess could repair these meshes. The command reports that they are not a plausible solid.
 GIVEN_UP = set()
 
 with tempfile.TemporaryDirectory() as folder:

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""ebpo bench --json on standard input agrees with itself and with the points that were saved:
-bench_adds_up.py POINTS.raw [INFO.json]
+"""bench_adds_up.py POINTS.raw [INFO.json]: checks that the output of ebpo bench --json on standard input is
+consistent and agrees with the saved points.
 
-With INFO.json (ebpo info --json) the points are a path: steps of at most a tenth of the mean edge
-and what the swing adds, within the box and its margin.
+With INFO.json (ebpo info --json) the points are a path: steps are at most a tenth of the mean edge plus
+the swing, and points are within the box and its margin.
 """
 import array
 import json

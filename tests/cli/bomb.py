@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""Makes a small file that claims very many faces, like an attack on memory: bomb.py IN OUT FACES
+"""Makes a small file that claims very many faces, as an attack on memory would: bomb.py IN OUT FACES
 
-IN has one leaf, zstd and no maps' worth keeping. All blocks of its faces become the same few bytes."""
+IN has one leaf and zstd; its maps are lost. All blocks of faces become the same few bytes.
+"""
 import ctypes
 import shutil
 import sys
@@ -19,7 +20,7 @@ zstd.ZSTD_CCtx_setParameter(context, 201, 1)  # ZSTD_c_checksumFlag
 
 
 def packed(values):
-    """As the pipeline has it: bytes by their significance, then zstd with a checksum."""
+    """Encodes like the filter pipeline: bytes are grouped by their significance, then compressed by zstd with a checksum."""
     shuffled = np.ascontiguousarray(values.view(np.uint8).reshape(values.size, -1).T).tobytes()
     room = ctypes.create_string_buffer(len(shuffled) + 1000)
     size = zstd.ZSTD_compress2(context, room, ctypes.c_size_t(len(room)), shuffled,
@@ -28,7 +29,7 @@ def packed(values):
 
 
 def anew(file, path, dtype, rows, columns, block, coding):
-    """The array with other rows, but the attributes that it had."""
+    """Replaces the rows of an array and keeps its attributes."""
     rank = 1 if path.startswith("levels") else 2
     kept = [(k, v, file[path].attrs.get_id(k).dtype) for k, v in file[path].attrs.items()] if path in file \
         else [("coding", np.bytes_(coding), f"S{len(coding)}")]
@@ -50,7 +51,7 @@ shutil.copy(source, out)
 with h5py.File(out, "r+", libver="latest") as file:
     blocks = -(-faces // BLOCK)
     faces = blocks * BLOCK
-    later = np.tile(np.array([4, 3, 2], "u4"), (BLOCK, 1))  # code k: the vertex k before the newest
+    later = np.tile(np.array([4, 3, 2], "u4"), (BLOCK, 1))  # code k: the k-th vertex before the newest
     first = later.copy()
     first[0], first[1] = [0, 0, 0], [0, 2, 3]
     array = anew(file, "mesh/faces", "<u4", faces, 3, BLOCK, "")

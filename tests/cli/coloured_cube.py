@@ -1,6 +1,8 @@
-"""coloured_cube.py faces|vertices TYPE [PREFIX] >OUT.ply: a cube with colours of this type of a
-PLY. Of faces: two triangles each, red to the front, green above, blue at the other sides. Of
-vertices: red below and blue above, purple between them."""
+"""coloured_cube.py faces|vertices TYPE [PREFIX] >OUT.ply: writes a cube whose colours have this PLY type.
+
+Colours of faces: two triangles each; the front is red, the top green, other sides are blue. Colours of
+vertices: red below, blue above, purple between.
+"""
 import sys
 
 of, kind = sys.argv[1:3]

@@ -1,7 +1,10 @@
-"""colours_agree.py paint SOURCE.ply PAINTED.ply: a binary PLY with colours of vertices and faces.
-colours_agree.py OUT SOURCE.ply: what ebpo export wrote of the painted mesh has them: XDMF and
-VTKHDF bytes for vertices and faces (read with h5py), glTF linear u16 and OBJ fractions of 1 for
-vertices; levels have colours of vertices. Vertices are found again by their positions, the first two formats' by source numbers."""
+"""colours_agree.py paint SOURCE.ply PAINTED.ply: writes a binary PLY with colours of vertices and faces.
+colours_agree.py OUT SOURCE.ply: checks the colours in the output of ebpo export for the painted mesh.
+
+XDMF and VTKHDF have bytes for vertices and faces (read with h5py), glTF has linear u16 and OBJ fractions
+of 1 for vertices. Levels have colours of vertices. XDMF and VTKHDF vertices are found by source indices,
+the others by their positions.
+"""
 import json
 import os
 import struct
@@ -72,7 +75,7 @@ def check_obj(path, points):
 
 
 def check_numbers(numbers, rows, wanted, others):
-    """Rows of the mesh stand behind those of levels: in colours of envelopes, their polygons white."""
+    """Checks colours of rows. Rows of the mesh follow those of levels, whose polygons are white."""
     assert rows.shape == (others + len(numbers), 4) and rows.dtype == "uint8", rows.shape
     assert (rows[:others, 3] == 255).all()
     assert not others or (rows[:others] == 255).all() == (wanted is face)

@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
-"""components_agree.py TOOL WHOLE.ebpo.h5 FOLDER: what `ebpo convert --split-components` has written
-to FOLDER is the whole: each face once, by its number there; and what meets in the scene is what
-`ebpo collide --self` finds in the whole between components (of which no two may have a vertex in one
-place: it takes their faces for neighbours). Prints how many of each."""
+"""components_agree.py TOOL WHOLE.ebpo.h5 FOLDER: checks the output of `ebpo convert --split-components`.
+
+Each face of the whole is in one component, with its number in the whole. Intersections in the scene equal
+those that `ebpo collide --self` finds between components in the whole. No two components may have a vertex
+at one position, because `collide --self` takes their faces for neighbours. Prints the counts.
+"""
 import itertools
 import json
 import subprocess
@@ -22,7 +24,7 @@ def faces_of(path):
 
 
 def pairs_of(lines):
-    """(the lower face, the higher one, what they are to each other)."""
+    """Returns (lower face, higher face, relation of the two)."""
     return {(*sorted(map(int, line.split()[:2])), line.split()[2]) for line in lines.splitlines()
             if line != "none"}
 

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""damage.py FILE NAME ...: turns some bits in the middle of the largest dataset below each name (a
-group or dataset of the file), where it is stored. Prints the dataset."""
+"""damage.py FILE NAME ...: flips some bits in the middle of the stored bytes of the largest dataset below
+each name (a group or dataset of the file). Prints the dataset.
+"""
 import sys
 
 import h5py

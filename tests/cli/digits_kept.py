@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """Checks in rational arithmetic that no digit of text is lost.
 
-digits_kept.py: writes numbers of all forms into OBJ, OFF and text STL files, of which `ebpo check`
-prints the kind and the value of a coordinate. They are floats if the nearest float, rounded to the
-text's last digit (ties to even), gives the text; else the nearest doubles. Then larger files are
-converted, and what `ebpo extract` gives back is compared with the text."""
+Writes numbers in all notations into OBJ, OFF and text STL files. `ebpo check` prints the kind and the
+value of a coordinate. Coordinates must be floats if the nearest float, rounded to the text's last digit
+(ties to even), gives the text; otherwise the nearest doubles. Then larger files are converted, and the
+output of `ebpo extract` is compared with the text.
+"""
 import json
 import random
 import struct
@@ -19,9 +20,9 @@ def float_of(bits):
 
 
 def nearest_float(value):
-    """The float nearest to a rational number, ties to even; infinite beyond the range."""
+    """Returns the float nearest to a rational number, ties to even; infinite beyond the range."""
     size, low, high = abs(value), 0, 0x7f7fffff
-    while low < high:  # the greatest float that is no greater
+    while low < high:  # finds the greatest float that is not greater
         middle = (low + high + 1) // 2
         low, high = (middle, high) if Fraction(float_of(middle)) <= size else (low, middle - 1)
     below = Fraction(float_of(low))
@@ -32,7 +33,7 @@ def nearest_float(value):
 
 
 def expected(text):
-    """The coordinate, and whether it is a float."""
+    """Returns the expected coordinate, and True when it is a float."""
     digits = Decimal(text)
     value, unit = Fraction(digits), Fraction(10) ** digits.as_tuple().exponent
     narrow = nearest_float(value)
@@ -43,7 +44,7 @@ def expected(text):
 def random_text(r):
     kind = r.randrange(8)
     sign = r.choice(["", "", "-", "+"])
-    if kind == 0:  # of so many digits, with a point somewhere
+    if kind == 0:  # a random number of digits, with a point at a random position
         digits = "".join(r.choice("0123456789") for _ in range(r.randint(1, 24)))
         at = r.randint(0, len(digits))
         return sign + digits[:at] + "." + digits[at:]
@@ -58,17 +59,17 @@ def random_text(r):
         return f"{sign}{narrow:.{r.randint(0, 30)}f}"
     if kind == 4:
         return f"{sign}{narrow:.{r.randint(0, 25)}e}"
-    if kind == 5:  # near the middle of two floats
+    if kind == 5:  # near the middle between two floats
         above = float_of(struct.unpack("<I", struct.pack("<f", narrow))[0] + 1)
         return sign + f"{(Decimal(narrow) + Decimal(above)) / 2:f}"[:40]
-    if kind == 6:  # quarters, of which two texts are one float
+    if kind == 6:  # quarters, for which two texts give one float
         return f"{sign}{r.randrange(2097152, 4194304)}.{r.randrange(10)}"
     edges = ["0.5", "691234.567", "5334567.891", ".000", "1e-45", "1.0e-44", "1.2e-45", "1e39", "3.4028235e38"]
     return "0" * r.randint(0, 3) + r.choice(edges)
 
 
 def write(path, vertices):
-    """A triangle for every three vertices, which are texts of coordinates."""
+    """Writes a triangle for every three vertices, whose coordinates are texts."""
     rows = [" ".join(v) for v in vertices]
     faces = range(0, len(rows), 3)
     with open(path, "w", encoding="ascii") as f:
@@ -94,7 +95,7 @@ def ebpo(*words):
 
 
 def check_one(path, text):
-    """A file with one number whose digits decide."""
+    """Checks a file with one decisive number."""
     write(path, [(text, "0", "0"), ("0", "1", "0"), ("0", "0", "1")])
     mesh = json.loads(ebpo("check", "--json", path), parse_int=float)
     value, narrow = expected(text)

@@ -1,9 +1,10 @@
-"""envelopes_hold.py OUT.xdmf|OUT.vtkhdf INFO.json NODES.json SOURCE.ply: what ebpo export wrote,
-read with h5py, is what ebpo info and ebpo levels --nodes tell.
+"""envelopes_hold.py OUT.xdmf|OUT.vtkhdf INFO.json NODES.json SOURCE.ply: compares the output of ebpo export,
+read with h5py, with that of ebpo info and ebpo levels --nodes.
 
-Every envelope is a closed polyhedron in its node's cell, with the volume that stands beside it; the
-nodes of a level cover each place once, and their volumes add up to the level's.
-The mesh is the source's, by the source's numbers."""
+Every envelope is a closed polyhedron in its node's cell, with its stated volume. The nodes of a level cover
+each position once, and their volumes add up to that of the level. The mesh is the source's, in the order of
+the source's numbers.
+"""
 import json
 import math
 import os
@@ -20,7 +21,7 @@ TYPE_NAMES = ["white", "black", "leaf", "gray"]
 
 
 def xdmf_blocks(path):
-    """name -> points, cells (polyhedra as lists of polygons, or triangles), data by name."""
+    """Returns name -> points, cells (polyhedra as lists of polygons, or triangles), data by name."""
     top = xml.etree.ElementTree.parse(path).getroot().find("Domain/Grid")
     assert top.get("GridType") == "Collection" and top.get("CollectionType") == "Spatial"
     used = set()
@@ -57,7 +58,7 @@ def xdmf_blocks(path):
 
 
 def vtkhdf_blocks(path):
-    """The same from the partitions; polygons of one node become one cell."""
+    """Returns the same value from the partitions. Polygons of one node become one cell."""
     blocks = {}
     with h5py.File(path, "r") as f:
         top = f["VTKHDF"]
@@ -98,7 +99,7 @@ def cell_of(octcode, info):
 
 
 def check_polyhedron(points, polygons):
-    """Closed: each directed edge once, and once the other way. Gives the volume."""
+    """Checks that the polyhedron is closed: each edge occurs once in each direction. Returns the volume."""
     edges = set()
     volume = 0.0
     middle = points[polygons[0][0]]
@@ -144,7 +145,7 @@ def check_level(number, points, cells, data, info, nodes):
     stated, derived = levels[number]["envelope_volume"], any(l["leaf"] and not l["leaf_planes"]
                                                              for l in levels[: number + 1])
     total = math.fsum(data["volume"])
-    # derived planes cut off more than the file counts
+    # derived planes cut off more than the volumes in the file
     assert math.isclose(total, stated, rel_tol=1e-9) or (derived and 0 < total < stated)
 
 

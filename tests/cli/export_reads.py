@@ -1,12 +1,13 @@
-"""Small readers of the formats that ebpo export writes, and of our own PLY: for tests, sharing
-nothing with the writers."""
+"""Small readers of the formats that ebpo export writes, and of PLY: for tests. They share no code with the
+writers.
+"""
 import json
 import os
 import struct
 
 
 def ply(path):
-    """Points and triangles of a binary PLY."""
+    """Returns the points and triangles of a binary PLY."""
     with open(path, "rb") as f:
         data = f.read()
     at = data.index(b"end_header\n") + 11
@@ -22,7 +23,7 @@ def ply(path):
 
 
 def gltf(path):
-    """[(name, translation, points, triangles)] of a .gltf or .glb file."""
+    """Returns [(name, translation, points, triangles)] of a .gltf or .glb file."""
     with open(path, "rb") as f:
         data = f.read()
     if data[:4] == b"glTF":
@@ -65,7 +66,7 @@ def gltf(path):
 
 
 def obj(path):
-    """[(name, [0, 0, 0], points, triangles)], one for each object or group."""
+    """Returns [(name, [0, 0, 0], points, triangles)] of an OBJ file, one for each object or group."""
     points, found = [], []
     with open(path, encoding="ascii") as f:
         for line in f:
@@ -81,7 +82,7 @@ def obj(path):
 
 
 def stl(path):
-    """[("", [0, 0, 0], points, triangles)] of a binary STL."""
+    """Returns [("", [0, 0, 0], points, triangles)] of a binary STL."""
     with open(path, "rb") as f:
         data = f.read()
     count, = struct.unpack_from("<I", data, 80)

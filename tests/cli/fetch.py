@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""ebpo fetch: parts of a file, interruptions, and files that change: fetch.py TOOL GENERATE"""
+"""fetch.py TOOL GENERATE: tests ebpo fetch with parts of a file, interruptions, and files that change."""
 import http.server
 import json
 import os
@@ -24,11 +24,11 @@ def expect(what, good, shown=""):
 
 
 class Handler(http.server.BaseHTTPRequestHandler):
-    """One file by ranges. `left`: requests that are answered before all others get 404; `nap`:
-    seconds before each answer."""
+    """Serves one file by ranges. `left`: number of requests that are served before all others get 404;
+    `nap`: seconds before each response."""
     protocol_version = "HTTP/1.1"
     data, etag, left, nap, sent, requests = b"", '"1"', 10 ** 9, 0, 0, 0
-    damage = False  # of a bit of the second answer
+    damage = False  # True: a bit of the second response is changed
     lock = threading.Lock()
 
     def log_message(self, *arguments):
@@ -54,7 +54,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
         try:
             self.end_headers()
             self.wfile.write(body)
-        except ConnectionError: # a client that was interrupted
+        except ConnectionError: # an interrupted client
             return
         with self.lock:
             site.sent += len(body)
@@ -79,7 +79,7 @@ def blocks(part):
     for name in os.listdir(part) if os.path.isdir(part) else []:
         try:
             total += os.path.getsize(os.path.join(part, name)) - 56
-        except FileNotFoundError:  # a temporary name, gone meanwhile
+        except FileNotFoundError:  # a temporary name that was removed meanwhile
             pass
     return total
 
@@ -114,8 +114,7 @@ def parts(tool, folder, path, url):
 
 
 def refusals(tool, folder, path, url):
-    """What could not be put in its place is said before anything is fetched; what came damaged is
-    not kept."""
+    """Outputs that cannot be written are reported before anything is fetched. Damaged data is not kept."""
     out = os.path.join(folder, "o.ebpo.h5")
     part = out + ".part"
     Handler.reset()
@@ -160,7 +159,7 @@ def resume(tool, folder, path, url):
     expect("the folder goes", not os.path.exists(part))
     print(f"whole {whole} bytes; interrupted after {first}, {held} kept; then {Handler.sent}")
     os.remove(out)
-    # A block that was damaged on the disk is fetched again.
+    # A block that was damaged on disk is fetched again.
     Handler.reset(left=3)
     run(tool, "fetch", "-q", "--http-connections", "1", url, out)
     victim = os.path.join(part, sorted(os.listdir(part))[0])
@@ -211,7 +210,7 @@ def interrupt(tool, folder, path, url):
 
 
 def colour(plain, path):
-    """The binary mesh once more, with colours, a label for each face, lists, and an element of its own."""
+    """Writes the binary mesh again, with colours, a label for each face, lists, and a further element."""
     mesh = same_ply.Ply(plain)
     (kinds, vertices), (_, faces) = mesh.element("vertex"), mesh.element("face")
     scalar = {"f": "float", "d": "double"}[kinds[0][0][0]]
@@ -230,7 +229,7 @@ def colour(plain, path):
 
 
 def comes_back(tool, folder, ply, near, compare):
-    """Whether what a file gives back is what the source says."""
+    """Returns True when the mesh extracted from a file equals the source."""
     back = os.path.join(folder, "back.ply")
     done = run(tool, "extract", "-q", "--mesh", near, back)
     try:
@@ -241,7 +240,7 @@ def comes_back(tool, folder, ply, near, compare):
 
 
 def attributes(tool, plain, url):
-    """Colours and the like come with what is fetched, and only then."""
+    """Attributes are fetched with the requested parts, and only then."""
     with tempfile.TemporaryDirectory() as folder:
         ply, path, out = (os.path.join(folder, name) for name in ("c.ply", "c.ebpo.h5", "o.ebpo.h5"))
         colour(plain, ply)
@@ -280,7 +279,7 @@ def main():
         subprocess.run([tool, "convert", "-q", "--leaf-faces", "40", ply, other], check=True)
         Handler.data = content(path)
         server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-        server.handle_error = lambda *arguments: None  # clients that were interrupted
+        server.handle_error = lambda *arguments: None  # interrupted clients
         threading.Thread(target=server.serve_forever, daemon=True).start()
         url = f"http://127.0.0.1:{server.server_address[1]}/m.ebpo.h5"
         parts(tool, folder, path, url)

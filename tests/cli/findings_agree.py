@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""The picture of `ebpo check --json --findings X.ply` beside its JSON: findings_agree.py REPORT.json X.ply
+"""findings_agree.py REPORT.json X.ply: compares the picture of `ebpo check --json --findings X.ply` with its JSON.
 
-Reads the binary PLY by itself. Every place's face has the colour of one of its kinds, the first of the
-legend; the middles of edges lie where the picture has their vertices; nothing else has a colour."""
+Reads the binary PLY with separate code. The face of every finding has the colour of one of its kinds, the
+first in the legend. Vertices of the picture are at the middles of edges. No other face has a colour.
+"""
 import json
 import struct
 import sys

@@ -1,5 +1,6 @@
-"""info_adds_up.py FILE <JSON of ebpo info: bytes, volumes and counts are consistent with each other
-and with the file."""
+"""info_adds_up.py FILE <JSON of ebpo info: checks that bytes, volumes and counts are consistent with each
+other and with the file.
+"""
 import json
 import math
 import os
@@ -21,7 +22,7 @@ below = 0
 for i, level in enumerate(levels):
     below += level["leaf_volume"] + level["black"] * cell / 8**i
     assert math.isclose(level["envelope_volume"], below + level["gray_volume"], rel_tol=1e-12)
-    # the head alone does not say more of several components, or of a mesh that is no 2-manifold
+    # the header alone does not state more for several components, or for a mesh that is not a 2-manifold
     known = info["report"]["components"] == 1 and info["report"]["manifold"]
     assert level["percent_of_solid" if known else "percent_of_integral"] >= 99.999999
     nodes = level["gray"] + level["leaf"] + level["white"] + level["black"]

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""interrupt.py SIGNAL OUT COMMAND...: sends SIGNAL once a temporary file for OUT is there; prints
-how the command ended and what it left."""
+"""interrupt.py SIGNAL OUT COMMAND...: sends SIGNAL when a temporary file for OUT exists. Prints the exit
+status of the command and the remaining files.
+"""
 import os
 import signal
 import subprocess

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """json_outputs.py TOOL INPUTS FEATURES SCHEMAS: checks the JSON of every command against its schema.
 
-json.tests names commands and their schemas. Each is run over real files; what it prints is
-validated, and a member that the schema does not know is a failure. Every command that has --json
-must be there, and so must every schema. $URL is a web server in the folder; lines "feature?schema"
-are left out where FEATURES (words with commas between) does not have it.
+json.tests lists commands and their schemas. Each command runs over real files, and its output is validated.
+A member that the schema does not have is a failure. Every command with --json and every schema must be in
+the list. $URL is a web server in the folder. Lines "feature?schema" are omitted when FEATURES (words
+separated by commas) does not contain the feature.
 """
 import functools
 import http.server
@@ -36,7 +36,7 @@ def is_type(value, name):
 
 
 class Schemas:
-    """The part of JSON Schema that ours use; another keyword is an error."""
+    """The part of JSON Schema that the schemas use; another keyword is an error."""
 
     def __init__(self, folder):
         self.files = {}
@@ -54,7 +54,7 @@ class Schemas:
         return schema, file
 
     def wrong(self, value, schema, at, where="$"):
-        """What does not fit, one text each."""
+        """Returns the violations, one text for each."""
         if set(schema) - KNOWN:
             yield f"{at}: unknown keywords {sorted(set(schema) - KNOWN)}"
         if "$ref" in schema:
@@ -98,7 +98,7 @@ class Schemas:
 
 
 def unique(pairs):
-    """An object whose members have names of their own."""
+    """Builds an object; refuses duplicate names of members."""
     if len({name for name, _ in pairs}) != len(pairs):
         raise ValueError(f"a member is there twice: {[name for name, _ in pairs]}")
     return dict(pairs)
@@ -115,7 +115,7 @@ def documents(form, done):
 
 
 def lines_of(path):
-    """(number, feature, schema, command) of each line."""
+    """Yields (number, feature, schema, command) of each line."""
     for number, line in run_tests.lines_of(path):
         if line:
             name, _, command = line.partition(" | ")
@@ -129,7 +129,7 @@ def run(command, folder, environment):
 
 
 def check(schemas, name, form, done):
-    """What is wrong with what was printed."""
+    """Returns the problems of the printed output."""
     try:
         values = documents(form, done)
     except ValueError as error:
@@ -146,13 +146,13 @@ def check(schemas, name, form, done):
 
 
 class Quiet(http.server.SimpleHTTPRequestHandler):
-    """Files of a folder, without a word."""
+    """Serves the files of a folder, without a log."""
 
     def log_message(self, *_):
         pass
 
     def do_GET(self):
-        """What is below /slow comes after a while, by ranges."""
+        """Serves files; those below /slow are delayed, and served by ranges."""
         requested = re.fullmatch(r"bytes=(\d+)-(\d+)", self.headers.get("Range", ""))
         if not self.path.startswith("/slow/") or not requested:
             super().do_GET()
@@ -184,7 +184,7 @@ def commands_with_json(tool):
 
 
 def self_test(schemas):
-    """The validator sees what is wrong."""
+    """Checks that the validator detects errors."""
     schema = {"type": "object", "required": ["a"], "additionalProperties": False,
               "properties": {"a": {"type": "integer", "minimum": 0}, "b": {"items": {"enum": [1]}}}}
     for good in ({"a": 1}, {"a": 0, "b": [1, 1]}):

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""killed_shard.py MODEL: a shard that is killed while it answers leaves no answers, and the same
-command makes them afterwards; of SIGTERM nothing stays at all. Nor of one whose points change meanwhile.
+"""killed_shard.py MODEL: a shard that is killed while it runs leaves no results, and the same command writes
+them afterwards. After SIGTERM no files remain, nor after a shard whose points changed while it ran.
 
-Points are zeros, in a file without blocks on the disk; more of them when the shard was done too early.
+Points are zeros, in a file without blocks on disk; there are more of them when the shard finished too early.
 """
 import glob
 import os
@@ -15,7 +15,7 @@ OUT, HIDDEN = "killed.out", ".killed.out.*.tmp"
 
 
 def begun(model, points):
-    """The process, in whose hidden file there are answers; None: it was done before."""
+    """Returns the process when its hidden file has results; None when the process finished before."""
     running = subprocess.Popen(["ebpo", "inside", "--raw", "--threads", "1", "--shard", "1/2", "-o", OUT,
                                 model, points])
     while running.poll() is None:

@@ -1,5 +1,6 @@
-"""levels_add_up.py LEVELS.json <JSON of ebpo info: checks that ebpo levels and ebpo info print the
-same values, and that the nodes fill the levels."""
+"""levels_add_up.py LEVELS.json <JSON of ebpo info: checks that ebpo levels and ebpo info print the same
+values, and that the nodes fill the levels.
+"""
 import json
 import math
 import sys

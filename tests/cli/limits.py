@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """limits.py TOOL INPUTS LITTLE FEATURES [CAIRO]: checks the limits of memory and threads of commands.
 
-Each keeps to its limit of memory, given or not, or ends with an error and without output; a mesh that
-is shortened while it is read is an error. LITTLE is preloaded where a machine has little memory left, or
-no locks of files. CAIRO is found instead of libcairo.
+Each command keeps its limit of memory, given or not, or ends with an error and without output. A mesh that
+is shortened while it is read is an error. LITTLE is a library that is preloaded to simulate little memory or
+missing file locks. CAIRO is used instead of libcairo.
 """
 import errno
 import fcntl
@@ -31,12 +31,12 @@ def check(good, what):
 
 
 def small_stacks():
-    """Stacks of threads come on top of a limit: this test should not need a model larger than all."""
+    """Sets small stacks. Stacks of threads are added to a limit; without this, the test would need a large model."""
     resource.setrlimit(resource.RLIMIT_STACK, (160 << 10, 160 << 10))
 
 
 def run(*words, free=None, given="", before=None, **more):
-    """Exit code, both outputs, peak of resident bytes. What is more is set in the environment."""
+    """Returns the exit code, both outputs and the peak of resident bytes. Further arguments are environment variables."""
     environment = dict(os.environ, LC_ALL="C.UTF-8", **more)
     if free is not None:
         environment.update(LD_PRELOAD=LITTLE, EBPO_TEST_FREE=str(free))
@@ -59,7 +59,7 @@ def slurp(path):
 
 
 def write_ball(path, rows):
-    """A closed sphere with 4 rows^2 faces, roughly."""
+    """Writes a closed sphere with approximately 4 rows^2 faces."""
     columns, points, faces = 2 * rows, ["0 0 -1"], []
     for i in range(1, rows):
         for k in range(columns):
@@ -82,7 +82,7 @@ def write_ball(path, rows):
         f.writelines("3 %d %d %d\n" % face for face in faces)
 
 
-# Commands that hold what their work takes, and their outputs.
+# Commands that keep their limits, and their outputs.
 HOLDING = [(["measure", "b.ebpo.h5"], None), (["export", "--mesh", "b.ebpo.h5", "o.glb"], "o.glb")]
 if "png" in FEATURES:
     HOLDING.append((["render", "--size", "640x480", "b.ebpo.h5", "o.png"], "o.png"))
@@ -106,7 +106,7 @@ def holding_is_limited():
 
 
 def limits_of_others_stay():
-    """A soft limit that is less than what is free, asked for when a question has been answered."""
+    """A soft limit below the free memory is kept; it is read after the first result."""
     soft = 512 << 20
     process = subprocess.Popen(
         [TOOL, "distance", "--threads", "1", "b.ebpo.h5"], text=True, stdin=subprocess.PIPE,
@@ -122,7 +122,7 @@ def limits_of_others_stay():
 
 
 def little_data():
-    """A limit of the caller's that the process could widen, but must not."""
+    """The process must not raise a limit of the caller, although it could."""
     resource.setrlimit(resource.RLIMIT_DATA, (100 << 20, resource.RLIM_INFINITY))
 
 
@@ -138,13 +138,13 @@ def what_the_caller_allows():
     check(not os.path.exists("large.png"), "no output is left")
 
 
-# What libcairo's memory does not suffice for: EBPO_TEST_CAIRO of CAIRO.
+# The operation for which libcairo runs out of memory: EBPO_TEST_CAIRO of CAIRO.
 UNDRAWN = {"nothing": "", "drawing": "out of memory for a picture's captions",
            "surface": "out of memory for a picture's captions"}
 
 
 def captions_are_never_left_out():
-    """A picture without the captions that were asked for is an error, and not a picture."""
+    """When requested captions cannot be drawn, the result is an error, and no picture is written."""
     words = ["render", "--size", "64x64", "--levels", "0,1", "b.ebpo.h5", "captions.png"]
     for lacks, reported in UNDRAWN.items() if CAIRO else ():
         code, _, said, _ = run(*words, LD_LIBRARY_PATH=os.path.dirname(CAIRO), EBPO_TEST_CAIRO=lacks)
@@ -163,7 +163,7 @@ def captions_are_never_left_out():
 
 
 def models_are_held_in_parts():
-    """The same answers, from parts; where the least is more than half, that is said."""
+    """Results are the same with the model in parts. When the least memory is more than half of the free memory, this is reported."""
     plan = json.loads(run("info", "--json", "--memory", "0", "b.ebpo.h5")[1])["memory"]
     whole, least = plan["whole"], plan["least"]
     requested = {"map": ["map", "--grid", "9,9,9", "-o", "OUT.nrrd", "b.ebpo.h5"],
@@ -183,7 +183,7 @@ def models_are_held_in_parts():
 
 
 def verify_keeps_its_budget():
-    """Eight million faces in one leaf; they took 173 MB once."""
+    """Verifies eight million faces in one leaf, which once took 173 MB."""
     run("convert", "-q", "quads.ply", "one.ebpo.h5")
     subprocess.run([sys.executable, os.path.join(HERE, "bomb.py"), "one.ebpo.h5", "bomb.ebpo.h5",
                     "8000000"], check=True, stdout=subprocess.DEVNULL)
@@ -194,7 +194,7 @@ def verify_keeps_its_budget():
 
 
 def shortened_while_read():
-    """Whenever that is, it is an error that says so, or comes too late."""
+    """Shortening a file at any time is an error that names the reason, or is too late to matter."""
     whole = slurp("b.ply")
     for i in range(6):
         with open("s.ply", "wb") as f:
@@ -217,7 +217,7 @@ PIPES = ["scene info pipe", "scene boxes names.json", "verify --against pipe b.e
 
 
 def pipes_are_refused():
-    """At once, wherever a file is expected: nobody writes to this one."""
+    """Refuses a pipe immediately, for every file argument. Nobody writes to this pipe."""
     os.mkfifo("pipe")
     with open("names.json", "w", encoding="ascii") as f:
         f.write('{"ebpo_scene": "1.0", "models": {"m": {"file": "pipe"}}, '
@@ -238,7 +238,7 @@ def pipes_are_refused():
 
 
 def hdf5_without_locks():
-    """Reading needs no lock; a lock that another program holds is named."""
+    """Reading needs no lock. A lock held by another program is named."""
     subprocess.run([sys.executable, "-c", "import h5py; f = h5py.File('rows.h5', 'w'); f['p'] = [[.5, .5, .5]]; "
                     "f['of/rays'] = [[5, .5, .5, -1, 0, 0]]"], check=True)
     for number in (errno.EROFS, errno.ENOLCK, errno.EOPNOTSUPP, 524, errno.ENOSYS):
@@ -254,7 +254,7 @@ def hdf5_without_locks():
 
 
 def changed_while_open():
-    """An .ebpo.h5 file that is replaced goes on being the old one; shortened, it is an error."""
+    """A replaced .ebpo.h5 file is still read as the old file; a shortened one is an error."""
     for how in "replaced", "shortened":
         run("repack", "-q", "--subtree-faces", "64", "b.ebpo.h5", "open.ebpo.h5")
         process = subprocess.Popen([TOOL, "inside", "--cut-level", "2", "open.ebpo.h5"],

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """man.py TOOL PAGES COMMANDS: checks that the pages made by tools/cli/options match the tool.
 
-COMMANDS is tools/cli/options, PAGES where the build has put what is made of it. The options of --help,
-of the manual and of bash's completion are the same; so are the words that options take and those
-that are completed; defaults that --help names are in the manual; --help fits on 80 columns; mandoc
-finds no error, and shells that are there none in their completions.
+COMMANDS is tools/cli/options; PAGES is the folder in which the build puts its output. --help, the manual and
+the completion of bash have the same options, and options take the keywords that are completed. The manual has
+the defaults that --help names. --help fits 80 columns. mandoc finds no error in the manual, and installed
+shells find none in their completions.
 """
 import os
 import re
@@ -24,7 +24,7 @@ def options_in_help(text):
 
 
 def items_in_page(text):
-    """The mdoc of each option."""
+    """Returns the mdoc text of each option."""
     parts = re.split(r"^\.It ((?:Fl \w .*, )?Fl -[a-z-]+.*)$", text, flags=re.MULTILINE)
     return {re.search(r"Fl -([a-z-]+)", head)[1]: body for head, body in zip(parts[1::2],
                                                                               parts[2::2])}
@@ -35,7 +35,7 @@ def numbers(text):
 
 
 def lost_defaults(command):
-    """Defaults of --help that the manual does not have."""
+    """Returns the defaults in --help that the manual does not have."""
     for option in command.options():
         reported = re.search(r"default:? (\d[\d.]*\d|\d)\b", option.help)
         if reported and option.man and reported[1] not in numbers("\n".join(option.man)):
@@ -43,7 +43,7 @@ def lost_defaults(command):
 
 
 def other_words(tool, command):
-    """Options whose words the tool does not have so."""
+    """Returns the options whose keywords differ from those of the tool."""
     for option in command.options():
         if not option.words:
             continue
@@ -55,7 +55,7 @@ def other_words(tool, command):
 
 
 def completed(script, *words):
-    """What bash offers for the last of the words."""
+    """Returns the completions that bash offers for the last word."""
     program = ('. "$1"; shift; COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); _ebpo; '
                'printf "%s\\n" "${COMPREPLY[@]}"')
     done = subprocess.run(["bash", "-c", program, "bash", script, "ebpo", *words], check=True,
@@ -104,7 +104,7 @@ def check_command(tool, command, page):
 
 
 def lint(program, arguments, files):
-    """What a program finds, if it is there."""
+    """Returns the findings of a checker, if it is installed."""
     if shutil.which(program):
         for file in files:
             done = subprocess.run([program, *arguments, file], capture_output=True, text=True)

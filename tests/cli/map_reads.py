@@ -2,8 +2,8 @@
 """Reads the output of `ebpo map` with h5py and with separate code.
 
 map_reads.py IMAGE.vtkhdf VOLUME.nrrd         prints the points, x y z, in the files' order
-map_reads.py IMAGE.vtkhdf VOLUME.nrrd ASKED   "fine" if both hold the distances in ASKED, the first
-                                              number of each line
+map_reads.py IMAGE.vtkhdf VOLUME.nrrd ASKED   prints "fine" if both files contain the distances in ASKED,
+                                              the first number of each line
 """
 import struct
 import sys

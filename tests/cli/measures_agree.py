@@ -1,5 +1,6 @@
-"""measures_agree.py INFO <JSON of ebpo measure: it fits what the file's head says (ebpo info
---json)."""
+"""measures_agree.py INFO <JSON of ebpo measure: checks that the output agrees with the file's header (ebpo
+info --json).
+"""
 import json
 import math
 import sys

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""npy_heads.py CUBE.ebpo.h5: heads of NumPy arrays as programs write them. What is common is read;
-what is not is refused by name. Needs ebpo in PATH, no NumPy."""
+"""npy_heads.py CUBE.ebpo.h5: tests headers of NumPy arrays as programs write them. Common headers are read;
+others are refused by name. Needs ebpo in PATH, but not NumPy.
+"""
 import struct
 import subprocess
 import sys

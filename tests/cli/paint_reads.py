@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""What `ebpo paint` reads and bakes, against the second reader (format-spec/read_paint.py):
+"""Compares the results of `ebpo paint` with the second reader (format-spec/read_paint.py):
 
-paint_reads.py vectors           all of format-spec/vectors/paint, read and refused
-paint_reads.py areas PAINT MODEL    each layer's area against points strewn over faces
-paint_reads.py moved PAINT OUT   writes a paint with a point of stroke 1 beside its face, and right checksums
-paint_reads.py waits PAINT       a change waits for another program's lock
-paint_reads.py baked PAINT MODEL PLY [GLB]    MODEL: without filters of one's own (convert --codec deflate)
+paint_reads.py vectors             reads or refuses all files of format-spec/vectors/paint
+paint_reads.py areas PAINT MODEL   compares each layer's area with points strewn over faces
+paint_reads.py moved PAINT OUT     writes a paint with a point of stroke 1 beside its face, and correct checksums
+paint_reads.py waits PAINT         checks that a change waits for another program's lock
+paint_reads.py baked PAINT MODEL PLY [GLB]    MODEL: without custom filters (convert --codec deflate)
 
-Baked colours are compared bit for bit with those that the reader finds by going from face to face, and
-all else of the PLY with `ebpo extract --mesh`.
+Baked colours are compared bit by bit with those that the reader finds by moving from face to face. All other
+data of the PLY is compared with `ebpo extract --mesh`.
 """
 import json
 import pathlib
@@ -45,7 +45,7 @@ def vectors():
 
 
 def ply(path):
-    """Vertices as a structured array, and the bytes behind them."""
+    """Returns the vertices as a structured array, and the bytes after them."""
     import numpy as np
     head, body = pathlib.Path(path).read_bytes().split(b"end_header\n", 1)
     types = {"float": "<f4", "double": "<f8", "uchar": "u1", "ushort": "<u2", "short": "<i2", "char": "i1", "int": "<i4", "uint": "<u4"}
@@ -77,7 +77,7 @@ def linear(c):
 
 
 def read_both(paint_path, model):
-    """The paint, whose points get the rows of their faces, and the model's vertices, faces, numbers of vertices."""
+    """Returns the paint, with the rows of its points' faces, and the model's vertices, faces, vertex numbers."""
     import h5py
     import numpy as np
     import read_ebpo
@@ -96,7 +96,7 @@ def read_both(paint_path, model):
 
 
 def middles(corners, n):
-    """The middles of the n^2 equal parts of a triangle."""
+    """Returns the middles of the n^2 equal parts of a triangle."""
     a, b, c = corners
     for i in range(n):
         for k in range(2 * (n - i) - 1):

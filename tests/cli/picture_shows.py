@@ -1,6 +1,7 @@
-"""picture_shows.py FILE.png WIDTH HEIGHT [COLOUR..]: a PNG of that size with a light border and
-something darker inside; or with something of each colour: red, green, blue, purple; of -COLOUR
-nothing. Filters 0 to 4 of 8-bit RGB."""
+"""picture_shows.py FILE.png WIDTH HEIGHT [COLOUR..]: checks that a PNG has this size, a light border and darker
+pixels inside. With colours, the PNG must have pixels of each colour: red, green, blue, purple; -COLOUR means
+no such pixels. Supports filters 0 to 4 of 8-bit RGB.
+"""
 import struct
 import sys
 import zlib

@@ -1,5 +1,6 @@
-"""ply_moves.py IN.ply OUT.ply SCALE X Y Z: a binary PLY scaled, then moved, as text with all digits
-of its doubles."""
+"""ply_moves.py IN.ply OUT.ply SCALE X Y Z: scales a binary PLY, then moves it. Writes text with all digits of
+the doubles.
+"""
 import sys
 
 import export_reads

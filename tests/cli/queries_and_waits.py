@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Asks `ebpo inside MODEL` one point after the other through a pipe and waits for each answer
-before the next: queries_and_waits.py MODEL"""
+"""queries_and_waits.py MODEL: queries `ebpo inside MODEL` with one point after the other through a pipe, and
+waits for each result before the next point.
+"""
 import subprocess
 import sys
 
@@ -11,6 +12,6 @@ with subprocess.Popen(["ebpo", "inside", sys.argv[1]], stdin=subprocess.PIPE,
         ebpo.stdin.flush()
         if ebpo.stdout.readline() != result + "\n":
             sys.exit(f"{point}: not {result}")
-    ebpo.stdin.write("0.25 0.5 0.75")  # the last line may lack its end
+    ebpo.stdin.write("0.25 0.5 0.75")  # the last line may lack its line end
     ebpo.stdin.close()
     print("fine" if ebpo.stdout.read() == "IN 1\n" and ebpo.wait() == 0 else "not fine")

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""query_threads.py EBPO EBPO-GENERATE [few]: every query gives the same bytes on 1 to 8 threads, with all of
-the model in memory, with parts of it, and where the command decides; nothing waits for ever. The answers to a
-block, or to a row, are longer than what is kept of them. `few`: on 8 threads."""
+"""query_threads.py EBPO EBPO-GENERATE [few]: checks that every query gives the same bytes on 1 to 8 threads, with
+the whole model in memory, with parts of it, and with the default. No command waits for ever. The results for a
+block or a row are longer than the buffers. `few`: only 8 threads.
+"""
 import os
 import random
 import subprocess
@@ -9,14 +10,14 @@ import sys
 import tempfile
 
 FINE, COARSE, CATALOGUE = "fine.ebpo.h5", "models/coarse.ebpo.h5", "models/catalogue.json"
-# The first: the command begins with parts of FINE and may bring in all of it on its way. Numbers: so many times
-# the least that is possible for the model.
+# First entry: the command begins with parts of FINE and may load the whole model later. Numbers: multiples of
+# the least memory for the model.
 MEMORY = {FINE: ["", "1G"], COARSE: [1.02, 1.5], CATALOGUE: ["", 2.1]}
 HUNG = 240
 
 
 def rows_of(count, width, seed):
-    """Points near the torus, with a direction (6 numbers) or as boxes."""
+    """Returns points near the torus, with a direction (6 numbers) or as boxes."""
     r = random.Random(seed)
     for _ in range(count):
         p = [r.uniform(-1.4, 1.4), r.uniform(-1.4, 1.4), r.uniform(-0.4, 0.4)]
@@ -34,7 +35,7 @@ def make_inputs(ebpo, generate):
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
 
     run(generate, "--base", "torus", "--faces", "10000", "torus.ply")
-    # so many nodes that the command does not bring in all of it at once
+    # so many nodes that the command does not load the whole model at once
     run(ebpo, "convert", "-q", "--leaf-faces", "1", "--max-level", "8", "--parts", "-envelopes", "torus.ply", FINE)
     os.mkdir("models")
     run(ebpo, "convert", "-q", "torus.ply", COARSE)
@@ -45,8 +46,8 @@ def make_inputs(ebpo, generate):
     write("few.txt", rows_of(3000, 3, 2))
     write("rays.txt", rows_of(6000, 7, 3))
     write("boxes.txt", rows_of(4000, 6, 4))
-    write("rows.txt", rows_of(6, 3, 5))  # all faces of each, more than 1 MB of text
-    write("one_place.txt", ([0.1, 0.2, 0.3] for _ in range(10000)))  # long answers of one size
+    write("rows.txt", rows_of(6, 3, 5))  # all faces for each row, more than 1 MB of text
+    write("one_place.txt", ([0.1, 0.2, 0.3] for _ in range(10000)))  # long results of equal size
 
 
 LISTS = [
@@ -64,14 +65,14 @@ QUERIES = [
 
 
 def least_memory(ebpo, model):
-    """Bytes that the command says the model needs."""
+    """Returns the bytes that the model needs according to the command."""
     command = [ebpo, "inside", "--memory", "1", model, "points.txt"]
     said = subprocess.run(command, capture_output=True, text=True).stderr
     return int(said.split("give at least")[1].split()[0])
 
 
 def results_of(command, path):
-    """Exit code, answers and messages; 'hung' after a time."""
+    """Returns the exit code, results and messages; 'hung' after a time limit."""
     with open(path) as rows:
         try:
             done = subprocess.run(command, stdin=rows, capture_output=True, timeout=HUNG)
@@ -81,7 +82,7 @@ def results_of(command, path):
 
 
 def compare(ebpo, model, query, path, threads):
-    """What is wrong with the answers to the rows of `path`, a line each."""
+    """Returns the problems of the results for the rows of `path`, one line for each."""
     command = [ebpo, query[0], model, *query[1:]]
     right = results_of(command + ["--threads", "1", "--memory", "1G"], path)
     if right[0] != 0 or right[2]:

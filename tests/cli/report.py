@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""report.py TOOL INPUTS FEATURES: the figures of `ebpo report`, against other commands, against
-figures made here, and against
-each other. The page holds the same data and nothing from elsewhere; what it draws of it:
-tests/web/report_page.mjs."""
+"""report.py TOOL INPUTS FEATURES: compares the values of `ebpo report` with other commands, with values computed
+here, and with each other. The page contains the same data and loads nothing. tests/web/report_page.mjs tests
+what the page draws.
+"""
 import csv
 import html.parser
 import json
@@ -38,10 +38,10 @@ def value(text):
     return None if text == "" or not math.isfinite(float(text)) else float(text)
 
 
-# --- the three files say the same ---
+# --- the three files agree ---
 
 def from_json(reported):
-    """(method, level, parameter, quantity) -> value, as the lines of the CSV."""
+    """Returns (method, level, parameter, quantity) -> value, like the lines of the CSV."""
     found = {}
     of = {q["name"]: q for q in reported["quantities"]}
     for m in reported["methods"]:
@@ -72,7 +72,7 @@ def agree(rows, reported):
 
 
 class Well(html.parser.HTMLParser):
-    """Tags close in order, nothing comes from elsewhere; collects scripts and style by their id."""
+    """Checks that tags are closed in order and that the page loads nothing; collects scripts and style by their id."""
 
     def __init__(self):
         super().__init__()
@@ -96,8 +96,8 @@ class Well(html.parser.HTMLParser):
 
 
 def page_holds(folder, reported, pictures):
-    """The page has the report's data, so many pictures of levels, and no address; none without
-    Chart.js."""
+    """The page has the report's data, the given number of pictures of levels, and no address. Without
+    Chart.js there is no page."""
     path = folder / "report.html"
     assert path.exists() == ("page" in FEATURES)
     if not path.exists():
@@ -184,8 +184,8 @@ def queries(reported, folder):
 
 
 def shapes(reported, folder):
-    """What the deviation certifies holds for the vertices of the envelopes, by exact distances; the
-    limit is one."""
+    """Certified error bounds hold for the vertices of the envelopes, by exact distances. The limit is a
+    lower bound."""
     for m in reported["methods"]:
         file = folder / f"{m['name']}.ebpo.h5"
         farthest = math.inf
@@ -210,8 +210,8 @@ def shapes(reported, folder):
 
 
 def lines_and_budgets(reported):
-    """A server sends no less than the levels, nor more than the file; trips are at least the first.
-    With less memory, less stays and more is loaded."""
+    """A server sends at least the levels, and at most the file. Round trips are at least those of the first
+    level. With less memory, less data stays in memory and more is loaded."""
     for m in reported["methods"]:
         trips = [l["line_trips"] for l in m["levels"]]
         sent = [l["line_bytes"] for l in m["levels"]]
@@ -232,7 +232,7 @@ def lines_and_budgets(reported):
 
 
 def settings(inputs):
-    """Several numbers of planes in one run: a method of each, named after it; kept, and replaced."""
+    """Several numbers of planes in one run give one method each, named after the number. Outputs are kept, and replaced."""
     folder = folder_of(inputs, "settings")
     arguments = ("--keep", "--no-pictures", "--max-level", "1", folder_of(inputs, "torus.ply"))
     for options, names, key, values in (
@@ -252,8 +252,8 @@ def settings(inputs):
 
 
 def beyond_doubles(inputs):
-    """Excess is free of scale: what it is at 1 it is at 1e300 and 1e-250, where no volume is a
-    double. Powers of two, so that the cells are the same."""
+    """Excess does not depend on scale: it is the same at 1, 1e300 and 1e-250, where volumes exceed the range
+    of doubles. Scales are powers of two, so that the cells are the same."""
     tables = []
     text = folder_of(inputs, "torus.ply").read_bytes()
     for scale in (1, 2.0**997, 2.0**-830):
@@ -270,7 +270,7 @@ def beyond_doubles(inputs):
 
 
 def scaled(ply, factor):
-    """A PLY with coordinates times a factor, as ASCII doubles."""
+    """Writes a PLY with scaled coordinates, as ASCII doubles."""
     head, body = ply.split(b"end_header\n", 1)
     assert b"binary_little_endian" in head or b"ascii" in head, head
     count = int(re.search(rb"element vertex (\d+)", head).group(1))
@@ -332,7 +332,7 @@ def default(inputs):
 
 
 def thesis_is_at_least(reported):
-    """Every leaf, plane, face and vertex comes once, and is paid for."""
+    """Every leaf, plane, face and vertex is sent once, and its cost is counted."""
     for m in reported["methods"]:
         total = m["levels"][-1]["thesis_cumulative_bytes"]
         mesh_size = reported["model"]["faces"] + reported["model"]["vertices"]
@@ -358,7 +358,7 @@ def files(inputs):
     rows, reported = report(folder_of(inputs, "some"), "--targets", "--levels", "1-2", b)
     assert [l["level"] for l in reported["methods"][0]["levels"]] == [1, 2]
     page_holds(folder_of(inputs, "some"), reported, 2)
-    # What the whole file reaches is that of its last level, measured or not.
+    # The error bound of the whole file is that of its last level, measured or not.
     ratios = [[n["need_ratio"] for n in j["methods"][0]["needs"]] for j in (whole, reported)]
     last = whole["methods"][0]["levels"][-1]["hausdorff_hi"]
     assert (ratios[0] == ratios[1] and any(n.get("max_error", last) < last
@@ -387,7 +387,7 @@ def single_leaf(inputs):
     against_info(reported, folder)
     level, = reported["methods"][0]["levels"]
     assert (level["gray"], level["leaf"]) == (0, 1)
-    # 4 faces and 4 vertices once; each plane has a normal of its own
+    # 4 faces and 4 vertices once; each plane has a separate normal
     assert (level["leaf_planes"] > 0
             and level["thesis_bytes"] == 1 + 12 * 4 + 12 * 4 + 20 * level["leaf_planes"])
     assert abs(level["excess"]) < 10 and level["hausdorff_lo"] < 0.1 * reported["model"]["diagonal"]

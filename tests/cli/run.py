@@ -3,20 +3,21 @@
 
 run.py TOOL INPUTS FEATURES FILE.tests
 
-Each line of FILE.tests, with the lines after it that begin with blanks, is
+Each line of FILE.tests, together with following lines that begin with blanks, is
 
     exit code | standard output | standard error | command
 
-and is run by sh in a folder of its own for each file, in which the input meshes lie and in which
-later lines see what earlier ones wrote. Outputs are regular expressions (searched, "." matches
-newlines); an empty one means that there must be no output,
-* means anything, @NAME that the output equals the file NAME beside this script. "png:0" runs the
-line only when FEATURES (words with commas between) has png, "no-png:2" only when it has not. Without
-"extras" among them, lines with commands of the extras are left out. Lines that need a terminal are
-skipped, and counted, where no pseudo-terminal can be had. Lines that begin with # are comments.
+sh runs the command in a separate folder for each file. The folder contains the input meshes, and later lines
+use the output of earlier ones. Outputs are regular expressions (searched, "." matches newlines). An empty
+expression means no output, * means any output, and @NAME means the contents of the file NAME beside this
+script.
 
-python3 within a line is the interpreter that runs this script: where a machine has several, that
-one was chosen for its modules, and another first in PATH may lack them.
+"png:0" runs the line only when FEATURES (words separated by commas) contains png, "no-png:2" only when it does
+not. Without the feature "extras", lines with commands of the extras are skipped. Lines that need a terminal are
+skipped and counted when the system has no pseudo-terminal. Lines that begin with # are comments.
+
+python3 within a line is the interpreter that runs this script. The build chose this interpreter for its
+modules; the first one in PATH may lack them.
 """
 import functools
 import os
@@ -35,7 +36,7 @@ NEEDS_TERMINAL = re.compile(r"\bscript -|shows_progress\.py")
 
 @functools.cache
 def has_terminal():
-    """Whether the system has pseudo-terminals; containers without /dev/pts have none."""
+    """Returns True when the system has pseudo-terminals; containers without /dev/pts have none."""
     try:
         for end in pty.openpty():
             os.close(end)
@@ -60,7 +61,7 @@ def output_fits(expected, actual):
 
 
 def wanted(field, command, features):
-    """The exit code of a line, or None if the line is for another build."""
+    """Returns the expected exit code of a line, or None if the line is for another build."""
     condition, _, code = field.rpartition(":")
     if lacks_terminal(command):
         return None
@@ -72,7 +73,7 @@ def wanted(field, command, features):
 
 
 def run_line(line, folder, environment, features):
-    """None if fine or skipped, else what is wrong."""
+    """Returns None if the line passed or was skipped, otherwise the problem."""
     fields = [f.strip() for f in line.split(" | ", 3)]
     if len(fields) != 4:
         return "is not: code | output | error | command"
@@ -95,7 +96,7 @@ def run_line(line, folder, environment, features):
 
 
 def lines_of(path):
-    """(number, test) of each test in a file; a line that begins with blanks continues the last."""
+    """Yields (number, test) of each test in a file; a line that begins with blanks continues the previous one."""
     number, test = 0, ""
     with open(path, encoding="utf-8") as data:
         for at, line in enumerate(data, 1):
@@ -111,7 +112,7 @@ def lines_of(path):
 
 
 def python_in(folder):
-    """Writes a command python3 that is this interpreter into a folder."""
+    """Writes a command python3 into a folder, which runs this interpreter."""
     command = os.path.join(folder, "python3")
     with open(command, "w", encoding="utf-8") as f:
         f.write(f'#!/bin/sh\nexec "{sys.executable}" "$@"\n')

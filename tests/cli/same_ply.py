@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""same_ply.py SOURCE BACK [--subset]: whether a PLY that was written again says what its source says: the same
-elements, properties in the same order and of the same types, comments, and all values bit for bit and in the same
-order, also those of lists. Polygons and strips of the source are triangles in the other: each triangle has the corners
-and the values of its polygon. --subset: the other one has some of the vertices and faces, and no other elements."""
+"""same_ply.py SOURCE BACK [--subset]: compares a rewritten PLY with its source. Elements, properties in the same order
+and with the same types, comments, and all values, also of lists, must be equal bit by bit and in the same order. A
+polygon or strip of the source may be triangles in BACK: each triangle has the corners and values of its polygon.
+--subset: BACK has some of the vertices and faces, and no other elements.
+"""
 import array
 import struct
 import sys
@@ -13,7 +14,7 @@ TYPES = {"char": "b", "int8": "b", "uchar": "B", "uint8": "B", "short": "h", "in
 
 
 class Ply:
-    """notes: comments and obj_info; elements: [(name, [(kind, name)], rows)], a row being a tuple of bytes."""
+    """A PLY file. notes: comments and obj_info; elements: [(name, [(kind, name)], rows)], where a row is a tuple of bytes."""
 
     def __init__(self, path):
         data = open(path, "rb").read()
@@ -99,7 +100,7 @@ def check(condition, text):
 
 
 def faces_of(ply):
-    """[(corners of the polygon, the other values)]"""
+    """Returns [(corners of the polygon, other values)]."""
     out = []
     for name, properties, rows in ply.elements:
         for row in rows if name in ("face", "tristrips") else []:
@@ -141,7 +142,7 @@ def compare(source, back):
 
 
 def compare_subset(source, back):
-    """Rows are in ascending order of the source: each is looked for behind the one before."""
+    """Compares a subset. Rows are in the order of the source, so that each is searched after the previous one."""
     check(source.notes == back.notes, "the comments differ")
     properties, rows = source.element("vertex")
     check(properties == back.element("vertex")[0], "the vertices have other properties")

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Whatever the threads, the memory, the form of the questions and how they arrive: the answers are
-those of one thread with everything in memory, bit for bit and in order: same_results.py MODEL"""
+"""same_results.py MODEL: results do not depend on threads, memory, or the form and timing of queries. They
+equal those of one thread with everything in memory, bit by bit and in order.
+"""
 import json
 import os
 import random
@@ -55,7 +56,7 @@ def as_number(x):
 
 
 def as_text(rows):
-    """Lines as people write them, all of the same numbers."""
+    """Returns lines in several notations of the same numbers."""
     for row in rows:
         if dice.random() < 0.02:
             yield dice.choice(["", "# a comment", "   ", "\t# 1 2 3"]) + dice.choice(["\n", "\r\n"])
@@ -70,7 +71,7 @@ def compare(what, expected, got):
 
 
 def header_and_rows(command, rows):
-    """Columns in another order, with some that nobody asked for."""
+    """Returns columns in another order, with additional ones."""
     names = NAMES[command].split()
     order = names + ["note", "id"]
     dice.shuffle(order)

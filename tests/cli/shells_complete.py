@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """Checks the completions with zsh and fish: shells_complete.py FOLDER
 
-Each shell that is installed is asked what follows some beginnings of a line. bash is asked by
-whole_lines of cli_man. Exit code 77: neither is installed."""
+Each installed shell must complete some beginnings of a line. man.py tests bash. Exit code 77: neither shell
+is installed.
+"""
 import pathlib
 import pty
 import os
@@ -17,7 +18,7 @@ sys.dont_write_bytecode = True
 from run import has_terminal
 
 folder = pathlib.Path(sys.argv[1]).resolve()
-ASKED = {  # what is typed: what has to be offered
+ASKED = {  # typed text: completions that must be offered
     "ebpo rep": ["repack", "report"],
     "ebpo convert --codec ": ["deflate", "none", "zstd"],
     "ebpo check --fin": ["--findings"],
@@ -31,7 +32,7 @@ def by_fish(line):
 
 
 def by_zsh(line):
-    """On a terminal, as zsh completes nowhere else: all that it shows until all is there that is asked for."""
+    """Returns the output of zsh on a terminal, where alone it completes, until all expected words have appeared."""
     with tempfile.TemporaryDirectory() as home:
         child, terminal = pty.fork()
         if child == 0:

@@ -39,7 +39,7 @@ This page lists the files of `tests/cli` that test each command. `python3 tests/
 
 
 def tests():
-    """(file, expected code, output, error, command line) of each line."""
+    """Yields (file, expected code, output, error, command line) of each line."""
     for name in sorted(os.listdir(HERE)):
         if not name.endswith(".tests"):
             continue

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Runs a command with standard error on a terminal, and looks for its line of progress:
+"""Runs a command with standard error on a terminal, and checks its progress line:
 shows_progress.py [STAGE ...] -- ebpo NAME ARGUMENTS
 
-Each STAGE must have been on the line, which begins with the command's name and is wiped at the end.
+Each STAGE must have been on the line. The line begins with the command's name and is cleared at the end.
 """
 import os
 import pty
@@ -14,7 +14,7 @@ WIPE = "\r\x1b[K"
 
 
 def on_terminal(command):
-    """The exit code, and what came to the terminal."""
+    """Returns the exit code and the output on the terminal."""
     mine, its = pty.openpty()
     with subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=its,
                           env=dict(os.environ, TERM="vt100")) as running:

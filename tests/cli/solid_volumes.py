@@ -1,7 +1,7 @@
-"""Volumes that commands print against the volume of the set that the rule defines: boxes at whole
-coordinates, counted in a voxel grid; nested, repeated, overlapping, touching and turned ones.
-
-  solid_volumes.py EBPO [ROUNDS]"""
+"""solid_volumes.py EBPO [ROUNDS]: compares volumes that commands print with the volume of the set that the
+winding rule defines. The models are boxes at integer coordinates, counted in a voxel grid: nested, repeated,
+overlapping, touching and reversed boxes.
+"""
 import itertools
 import json
 import math
@@ -30,7 +30,7 @@ def write_ply(name, boxes):
 
 
 def windings(boxes):
-    """The winding number of each voxel."""
+    """Returns the winding number of each voxel."""
     w = dict.fromkeys(itertools.product(range(SIZE), repeat=3), 0)
     for low, high, sign in boxes:
         for voxel in itertools.product(*(range(a, b) for a, b in zip(low, high))):
@@ -39,7 +39,7 @@ def windings(boxes):
 
 
 def are_apart(boxes):
-    """No two boxes have a common point of their surfaces."""
+    """Returns True when no two boxes have a common point of their surfaces."""
     def within(a, b):
         return all(b[0][k] < a[0][k] and a[1][k] < b[1][k] for k in range(3))
     def away(a, b):

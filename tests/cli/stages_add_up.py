@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""What `ebpo convert --json` says of its stages, read from standard input: whether it adds up; then
-the rows with the thesis' stages."""
+"""Checks that the stages of `ebpo convert --json`, read from standard input, add up. Then prints the rows with
+the stages of the thesis.
+"""
 import json
 import sys
 

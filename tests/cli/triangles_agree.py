@@ -1,6 +1,7 @@
-"""triangles_agree.py OUT NAME=MODEL.ply...: a glTF, OBJ or STL file holds these triangles, in their
-order, each coordinate the float32 nearest to that of the PLY (less the node's
-translation), and no vertex of one has become another's."""
+"""triangles_agree.py OUT NAME=MODEL.ply...: checks that a glTF, OBJ or STL file has the triangles of the PLY files,
+in their order. Each coordinate is the float32 nearest to that of the PLY (minus the node's translation), and
+different vertices stay different.
+"""
 import struct
 import sys
 

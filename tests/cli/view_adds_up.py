@@ -1,5 +1,6 @@
-"""view_adds_up.py LEVELS.json VIEW.json: an exhausted view has the nodes that the levels have,
-planes and winding numbers too, each parent before its children."""
+"""view_adds_up.py LEVELS.json VIEW.json: checks that an exhausted view has the nodes of the levels, with planes
+and winding numbers, and each parent before its children.
+"""
 import json
 import sys
 

@@ -1,6 +1,7 @@
-"""volumes_agree.py JSON <output of ebpo extract --level 0, 1, ...: checks that the volumes are those
-of ebpo info. They are smaller where planes derived from faces cut the leaves; the file does not
-count these planes."""
+"""volumes_agree.py JSON <output of ebpo extract --level 0, 1, ...: checks that the volumes are those of ebpo
+info. Volumes are smaller when planes derived from faces cut the leaves, because the file does not count these
+planes.
+"""
 import json
 import math
 import re

@@ -1,9 +1,8 @@
 #!/usr/bin/env python3
-"""Answers leave `ebpo COMMAND MODEL` as whole lines, also when it is interrupted: whole_lines.py
-COMMAND MODEL
+"""whole_lines.py COMMAND MODEL: `ebpo COMMAND MODEL` writes results as whole lines, also when it is interrupted.
 
-Standard output is a pipe that keeps what was written apart (O_DIRECT): each piece must end with a
-line. Then SIGTERM, of which the program dies.
+Standard output is a pipe that keeps separate writes apart (O_DIRECT). Each write must end with a line. Then
+SIGTERM ends the program.
 """
 import itertools
 import os

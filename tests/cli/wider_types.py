@@ -1,6 +1,6 @@
-"""wider_types.py FILE: stores one array of an .ebpo.h5 file without filters and without subtrees in a
-wider type than it needs, as another program might, and states the content checksum that this
-gives."""
+"""wider_types.py FILE: stores one array of an .ebpo.h5 file, without filters and without subtrees, in a wider
+type than it needs, as another program might, and updates the content checksum.
+"""
 import hashlib
 import sys
 
