@@ -154,7 +154,7 @@ static ebpo_status check_real(const char *folder, const char *real, const char *
     if (is_below(folder, real))
         return EBPO_OK;
     return ebpo_fail_file(error, EBPO_E_FORMAT, path,
-                          "is a link to the file %.160s, outside the scene's folder %.160s, "
+                          "leads by a link to the file %.160s, outside the scene's folder %.160s, "
                           "which must be allowed (ebpo scene --allow-outside)",
                           real, folder);
 }
