@@ -1,7 +1,7 @@
 #!/bin/sh
-# clash_report.sh FOLDER [PARTS]: a plant of many parts and a tool that flies through; what clashes,
-# as a page for people, a strip of pictures, a table and an HDF5 file. Needs ebpo in PATH, with
-# libpng.
+# clash_report.sh FOLDER [PARTS]: makes a plant of many parts and a tool that flies through, and
+# reports their clashes as an HTML page, a strip of pictures, a table and an HDF5 file. Needs ebpo in
+# PATH, built with libpng.
 #
 #     sh samples/clash_report.sh /tmp/clashes 300
 set -eu

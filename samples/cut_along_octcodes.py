@@ -1,21 +1,23 @@
 #!/usr/bin/env python3
-"""Cuts a closed mesh along the cells of an octree level into parts that are asked as the whole is.
+"""Cuts a closed mesh along the cells of an octree level into parts. Queries of the parts give the results of
+the whole mesh.
 
     PYTHONPATH=/usr/local/lib/ebpo/python samples/cut_along_octcodes.py WHOLE FOLDER [LEVEL]
 
-WHOLE: an .ebpo.h5 file, or a folder with vertices.npy (v, 3) of float32 or float64 and faces.npy (f, 3) of
-integers, which may be larger than memory and have more than 2^32 faces. FOLDER gets for each cell with faces
-(LEVEL 1: 8 of them, 2: 64; 1 if not given) files named by its octcode, and catalogue.json:
+WHOLE is an .ebpo.h5 file, or a folder with vertices.npy (v, 3) of float32 or float64 and faces.npy (f, 3) of
+integers. The arrays may be larger than memory and have more than 2^32 faces. LEVEL 1 (the default) has 8
+cells, level 2 has 64. The script writes catalogue.json and, for each cell with faces, files named by the
+octcode O of the cell to FOLDER:
 
-    O.closed.ebpo.h5      its faces and caps: a closed mesh, for winding numbers
-    O.surface.ebpo.h5     its faces alone, for distances and rays
-    O.numbers.npy         their numbers in the whole
+    O.closed.ebpo.h5      the cell's faces and caps: a closed mesh, for winding numbers
+    O.surface.ebpo.h5     the cell's faces alone, for distances and rays
+    O.numbers.npy         the numbers of these faces in the whole mesh
 
-Each cell is cut in two by its middle planes, first of x, then of y and z. A face is of the side that the mean
-of its corners is on; none is divided. Where the sides hang together, there is a chain of edges in each: it is
-filled by caps, triangles of vertices that are there, which one side gets as they are and the other one turned
-around. What both add to a winding number is 0 together, whatever the caps' shape.
-docs/guide/clusters.md says what stays exact.
+Each cell is cut by its middle planes, first across x, then across y and z. A face belongs to the side of the
+mean of its corners; no face is divided. The open edges between the two sides form chains. Caps fill the
+chains: triangles between vertices of the chain. One side gets the caps, the other side gets the reversed
+caps. The two contributions to a winding number cancel for any shape of the caps. docs/guide/clusters.md
+describes which results stay exact.
 """
 import pathlib
 import sys
@@ -26,13 +28,13 @@ import numpy as np
 import ebpo
 from ebpo.catalogue import Catalogue, Entry
 
-STRETCH = 1 << 20  # faces that are in memory at a time
-CAP = -1  # instead of a face's number
+STRETCH = 1 << 20  # number of faces in memory at a time
+CAP = -1  # number of faces of caps
 NO_EDGES = np.empty((0, 3), np.int64)
 
 
 def open_edges(faces, others=NO_EDGES):
-    """Rows (low, high, times) of the edges whose directions do not cancel, with those of before."""
+    """Returns rows (low, high, times) of the edges whose directions do not cancel. `others`: rows of earlier faces."""
     directed = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     low, high = directed.min(axis=1), directed.max(axis=1)
     times = np.where(directed[:, 0] < directed[:, 1], 1, -1)
@@ -48,7 +50,7 @@ def open_edges(faces, others=NO_EDGES):
 
 
 def cycles(edges):
-    """Closed chains of vertices, each of which a chain has once, of rows (low, high, times)."""
+    """Yields closed chains of vertices for rows (low, high, times). A chain contains each of its vertices once."""
     edges_from = {}
     for low, high, times in edges.tolist():
         begin, end = (low, high) if times > 0 else (high, low)
@@ -70,8 +72,8 @@ def cycles(edges):
 
 
 def filled(chain):
-    """Triangles (k - 2, 3) whose edges are the chain's, but for those that cancel. Every second vertex is
-    cut off, again and again: no vertex gets many."""
+    """Returns triangles (k - 2, 3) whose edges are those of the chain, except for edges that cancel. Every
+    second vertex is cut off repeatedly, so that no vertex has many triangles."""
     made = []
     while len(chain) > 2:
         made.append(np.stack([np.roll(chain, -i)[0:len(chain) - 1:2] for i in range(3)], axis=1))
@@ -80,7 +82,7 @@ def filled(chain):
 
 
 class Pieces:
-    """Faces and their numbers in two files that grow at the end."""
+    """Faces and their numbers in two files, to which data is appended."""
 
     def __init__(self, folder):
         self.folder, self.count = pathlib.Path(tempfile.mkdtemp(dir=folder)), 0
@@ -111,7 +113,7 @@ class Pieces:
 
 
 def halve(pieces, vertices, axis, middle, folder):
-    """Two Pieces: the faces below the middle and those above, with caps."""
+    """Returns two Pieces: the faces below the middle and those above, with caps."""
     sides, edges = (Pieces(folder), Pieces(folder)), NO_EDGES
     for faces, numbers in pieces.stretches():
         corners = np.asarray(vertices[faces.ravel(), axis], np.float64).reshape(-1, 3)
@@ -119,7 +121,7 @@ def halve(pieces, vertices, axis, middle, folder):
         edges = open_edges(faces[~above], edges)
         for side, these in zip(sides, (~above, above)):
             side.add(faces[these], numbers[these])
-    for chain in cycles(edges * [1, 1, -1]):  # caps go the other way
+    for chain in cycles(edges * [1, 1, -1]):  # caps have the opposite direction
         cap = filled(chain)
         sides[0].add(cap, np.full(len(cap), CAP))
         sides[1].add(cap[:, ::-1], np.full(len(cap), CAP))
@@ -132,7 +134,7 @@ def write(mesh, vertices, path):
 
 
 def write_part(pieces, vertices, code, folder):
-    """The files of a cell; its Entry."""
+    """Writes the files of a cell. Returns its Entry."""
     faces, numbers = pieces.whole()
     real = numbers != CAP
     paths = [folder / f"{code:o}.{end}" for end in ("closed.ebpo.h5", "surface.ebpo.h5", "numbers.npy")]
@@ -143,7 +145,7 @@ def write_part(pieces, vertices, code, folder):
     corners = vertices[np.unique(faces)].astype(np.float64)
     entry = Entry(str(paths[0]), closed.content_sha256, True, tuple(corners.min(axis=0).tolist()),
                   tuple(corners.max(axis=0).tolist()), surface=None)
-    if not real.any():  # caps alone: nothing that can be seen
+    if not real.any():  # only caps: the cell has no surface
         return entry
     surface = write(faces[real], vertices, paths[1])
     np.save(paths[2], numbers[real])
@@ -151,14 +153,14 @@ def write_part(pieces, vertices, code, folder):
 
 
 def cut(pieces, vertices, box, code, levels, folder, scratch):
-    """Entries of all cells of the level with faces, in the order of octcodes. `pieces` goes."""
+    """Returns the Entries of all cells of the level with faces, in the order of octcodes. Removes `pieces`."""
     if pieces.count == 0 or levels == 0:
         entries = [write_part(pieces, vertices, code, folder)] if pieces.count else []
         pieces.drop()
         return entries
     middle = (box[0] + box[1]) / 2
     octants = [pieces]
-    for axis in (2, 1, 0):  # of the octant's number, x is the lowest bit
+    for axis in (2, 1, 0):  # x is the lowest bit of the octant's number
         halves = []
         for piece in octants:
             halves += halve(piece, vertices, axis, middle[axis], scratch)
@@ -173,7 +175,7 @@ def cut(pieces, vertices, box, code, levels, folder, scratch):
 
 
 def read_whole(name):
-    """Vertices, faces (both perhaps on the disk), the root cell, and the rule of what is inside."""
+    """Returns vertices and faces (which may be mapped files), the root cell, and the winding rule."""
     if pathlib.Path(name).is_dir():
         vertices, faces = (np.load(pathlib.Path(name) / f"{what}.npy", mmap_mode="r") for what in ("vertices", "faces"))
         low, high = np.full(3, np.inf), np.full(3, -np.inf)

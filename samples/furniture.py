@@ -13,7 +13,7 @@ import itertools
 import pathlib
 import sys
 
-# A piece: boxes, each with two opposite corners. The boxes of one piece do not intersect: each is a body.
+# A piece is a list of boxes, each given by two opposite corners. Boxes of one piece do not intersect, so that each is a separate body.
 PIECES = {
     "table/top": [((0, 0, 0.7), (1.6, 0.8, 0.74))],
     "table/legs": [((x, y, 0), (x + 0.05, y + 0.05, 0.69)) for x in (0.1, 1.45) for y in (0.1, 0.65)],
@@ -25,7 +25,7 @@ SIDES = ((0, 4, 6, 2), (1, 3, 7, 5), (0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (
 
 
 def corners(low, high):
-    """Corner i has the greater x, y, z where bit 0, 1, 2 of i is set."""
+    """Returns the corners of a box. Corner i has the greater x, y or z when bit 0, 1 or 2 of i is set."""
     return [tuple((low, high)[bits[2 - k]][k] for k in range(3))
             for bits in itertools.product((0, 1), repeat=3)]
 

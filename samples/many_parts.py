@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""many_parts.py FOLDER [PARTS]: a scene of many parts, PARTS of them (10,000 if not given), and a
-tool that flies through. Needs ebpo in PATH. Equal arguments give equal scenes.
+"""many_parts.py FOLDER [PARTS]: writes a scene of PARTS parts (default: 10,000) and a tool that flies
+through them. Needs ebpo in PATH. Equal arguments give equal scenes.
 
     python3 samples/many_parts.py /tmp/plant
     ebpo scene info /tmp/plant/plant.scene.json
     ebpo scene report --from 0 --to 10 --step 1 /tmp/plant/plant.scene.json
 
-The parts are pipes along the three axes and blocks on a grid, each moved a little by chance, so that
-some meet their neighbours."""
+The parts are pipes along the three axes and blocks, on a grid. Each part has a small random offset, so
+that some parts intersect their neighbours."""
 import json
 import math
 import os
@@ -32,7 +32,7 @@ def block(x, y, z):
 
 
 def pipe(radius, length, sides=48, rings=24):
-    """Along x, closed at both ends."""
+    """Returns a pipe along x that is closed at both ends."""
     vertices = [(length * (r / rings - 0.5), radius * math.cos(2 * math.pi * s / sides),
                  radius * math.sin(2 * math.pi * s / sides))
                 for r in range(rings + 1) for s in range(sides)]
@@ -47,7 +47,7 @@ def pipe(radius, length, sides=48, rings=24):
 
 
 def chance(state=1):
-    """-1 .. 1, the same on every machine."""
+    """Yields pseudorandom numbers from -1 to 1, the same on every machine."""
     while True:
         state = (state * 6364136223846793005 + 1442695040888963407) % 2**64
         yield (state >> 11) / 2**52 - 1
@@ -97,7 +97,7 @@ def main():
         try:
             subprocess.run(["ebpo", "convert", "--quiet", mesh, out], check=True)
         except FileNotFoundError:
-            sys.exit("many_parts.py: ebpo is not in PATH; it is in tools/ of the folder that was built in")
+            sys.exit("many_parts.py: ebpo is not in PATH; it is in tools/ of the build folder")
         except subprocess.CalledProcessError:
             sys.exit(1)
     with open(os.path.join(folder, "plant.scene.json"), "w", encoding="utf-8") as f:

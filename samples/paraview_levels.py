@@ -1,10 +1,10 @@
-"""Draws in ParaView the output of `ebpo export FILE OUT.xdmf --levels A-B --mesh` wrote:
+"""Draws the output of `ebpo export FILE OUT.xdmf --levels A-B --mesh` with ParaView:
 
     xvfb-run -a pvpython samples/paraview_levels.py OUT.xdmf PICTURE.png [COARSE [FINE]]
 
-Left, half of the envelopes of level COARSE (default: 3) and half of the mesh that they contain;
-right, the envelopes of level FINE (default: the last). Colours tell the envelopes'
-volume, on a logarithmic scale."""
+The left picture shows half of the envelopes of level COARSE (default: 3) and half of the mesh that they
+contain. The right picture shows the envelopes of level FINE (default: the last). Colours show the volumes
+of the envelopes on a logarithmic scale."""
 import os
 import sys
 
@@ -48,7 +48,7 @@ def show_mesh(source, view):
 
 
 def half_of(source, middle, right):
-    """Whole cells of one side: nothing is cut."""
+    """Returns the whole cells of one side; no cell is cut."""
     half = Clip(Input=source, ClipType="Plane", Crinkleclip=1, Invert=0 if right else 1)
     half.ClipType.Origin, half.ClipType.Normal = [middle, 0, 0], [1, 0, 0]
     return half
@@ -74,7 +74,7 @@ def look_at(view):
 
 
 def main():
-    # beside a bare name this reader does not find the HDF5 file
+    # the reader needs an absolute path to find the HDF5 file
     path, picture = os.path.abspath(sys.argv[1]), sys.argv[2]
     reader = Xdmf3ReaderT(FileName=[path])
     reader.UpdatePipeline()

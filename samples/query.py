@@ -3,8 +3,8 @@
 
     PYTHONPATH=/usr/local/lib/ebpo/python samples/query.py MODEL.ebpo.h5 <points.txt
 
-Reads lines "x y z", with blanks or commas between, and answers all of them at once: arrays go in and
-come out. docs/guide/python.md says where the package is.
+Reads lines "x y z" with coordinates separated by blanks or commas. Queries all points with one call for
+each kind of result, as arrays. docs/guide/python.md describes the location of the package.
 """
 import re
 import sys
@@ -14,12 +14,12 @@ import numpy as np
 try:
     import ebpo
 except ImportError as error:
-    sys.exit(f"query.py: {error}; PYTHONPATH names the folder of the package: after an installation "
-             "PREFIX/lib/ebpo/python, in a build folder tools/python")
+    sys.exit(f"query.py: {error}; set PYTHONPATH to the folder of the package: PREFIX/lib/ebpo/python of an "
+             "installation, or tools/python of a build folder")
 
 
 def parse(line, number):
-    """A point, or None for an empty line."""
+    """Returns a point, or None for an empty line."""
     line = line.split("#")[0].strip()
     if not line:
         return None
@@ -50,7 +50,7 @@ def main():
             try:
                 point = parse(line, number)
             except ValueError as error:
-                wrong = error  # after what comes before it
+                wrong = error  # reported after the results of earlier points
                 break
             if point is not None:
                 points.append(point)

@@ -1,17 +1,18 @@
 #!/bin/sh
-# The main job on a real model: installs what is needed, builds, installs, converts the closed bunny
-# of Debian's glmark2-data, inspects, verifies and draws it. Results in samples/out.
+# Runs the main steps with a real model: installs dependencies, builds and installs the program;
+# converts the closed bunny of Debian's glmark2-data; inspects, verifies and draws the file. Writes to
+# samples/out.
 set -eu
 cd "$(dirname "$0")/.."
 sh tools/install-deps.sh --demo
-# The plugin goes where HDF5's own tools look for it.
+# Installs the plugin where the tools of HDF5 search for it.
 meson setup build-quick -Dplugin_dir=system -Dtests=disabled $([ -d build-quick ] && echo --reconfigure)
 ninja -C build-quick
 sudo=
 [ "$(id -u)" = 0 ] || sudo=sudo
 $sudo ninja -C build-quick install >/dev/null
 $sudo ldconfig
-PATH=/usr/local/bin:$PATH # not everyone's has it
+PATH=/usr/local/bin:$PATH # not all systems have this folder in PATH
 mkdir -p samples/out
 out=samples/out/bunny.ebpo.h5
 set -x
@@ -22,4 +23,4 @@ ebpo render $out samples/out/bunny.png --levels 0,1,2,3,4,6 --size 1200x840
 h5dump -A 0 -d /levels/01/plane_counts $out
 set +x
 echo "Results: $out, samples/out/bunny.png"
-echo "Where 'ebpo' or 'man ebpo' is not found: export PATH=/usr/local/bin:\$PATH MANPATH=/usr/local/share/man:"
+echo "If 'ebpo' or 'man ebpo' is not found: export PATH=/usr/local/bin:\$PATH MANPATH=/usr/local/share/man:"

@@ -4,8 +4,8 @@ node adds to its parent's envelope.
 
     samples/read_level.py FILE.ebpo.h5 [LEVEL]
 
-Each half-space keeps the points p with  n . (p - corner) / size <= d  (division axis by axis): nine
-numbers a line after the octcode.
+Each half-space contains the points p with  n . (p - corner) / size <= d, where the division is by axis.
+Lines have the octcode and the numbers n (3), d and corner (3).
 """
 import sys
 
@@ -14,8 +14,8 @@ import numpy as np
 
 
 def octcodes(file, level):
-    """Octcodes of all nodes of a level and their types, level by level from the root: the i-th gray
-    node has the i-th eight children."""
+    """Returns the octcodes of all nodes of a level and their types. Descends level by level from the root:
+    the i-th gray node has the i-th group of eight children."""
     codes = np.array([1], dtype=np.uint64)
     for at in range(level + 1):
         groups = file[f"/levels/{at:02d}/types"][:]
@@ -28,7 +28,7 @@ def octcodes(file, level):
 
 
 def cells(codes, level, origin, size):
-    """Lowest corner and size of each cell."""
+    """Returns the lowest corner of each cell, and the size of the cells."""
     at = np.zeros((len(codes), 3))
     for step in range(level):
         octant = (codes >> np.uint64(3 * (level - 1 - step))).astype(np.int64) & 7
@@ -37,8 +37,8 @@ def cells(codes, level, origin, size):
 
 
 def half_spaces(codes):
-    """Normals (integers of 1-norm 511) and offsets of plane codes, in cell coordinates: n . xi <=
-    d."""
+    """Returns the normals (integers with 1-norm 511) and offsets of plane codes, in cell coordinates:
+    n . xi <= d."""
     codes = codes.astype(np.int64)
     u, v, q = (codes & 1023) - 511, (codes >> 10 & 1023) - 511, codes >> 20
     w = 511 - abs(u) - abs(v)
@@ -77,5 +77,5 @@ try:
 except BrokenPipeError:
     sys.exit(0)
 except OSError as error:
-    sys.exit(f"read_level.py: {error}; where HDF5 has no plugin for zstd, set HDF5_PLUGIN_PATH to the "
-             "folder that `ebpo --version --verbose` names, or convert with --codec deflate")
+    sys.exit(f"read_level.py: {error}; if HDF5 has no plugin for zstd, set HDF5_PLUGIN_PATH to the "
+             "folder that `ebpo --version --verbose` prints, or convert with --codec deflate")

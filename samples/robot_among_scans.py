@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""robot_among_scans.py FOLDER [FACES]: a robot with two arms among scans of FACES faces each (320,000
-if not given) that ebpo-generate makes. Needs ebpo and ebpo-generate in PATH; the latter is not installed, but lies
-in samples/ of the folder that was built in. Equal arguments give equal scenes.
+"""robot_among_scans.py FOLDER [FACES]: writes a scene with a robot among scans of FACES faces each (default:
+320,000), which ebpo-generate makes. Needs ebpo and ebpo-generate in PATH; ebpo-generate is not installed, but
+is in samples/ of the build folder. Equal arguments give equal scenes.
 
     python3 samples/robot_among_scans.py /tmp/robot
     ebpo scene report --csv --from 0 --to 12 --step 0.5 /tmp/robot/robot.scene.json
@@ -9,8 +9,8 @@ in samples/ of the folder that was built in. Equal arguments give equal scenes.
     ebpo scene plan /tmp/robot/robot.scene.json
     ebpo scene pack -o /tmp/robot/packed /tmp/robot/robot.scene.json
 
-The base drives past rough boulders and through a rough ring, the upper arm turns, and the hand, a
-part of the arm that turns with it, has a clearance of 2 cm."""
+The base drives past rough boulders and through a rough ring. The arm turns, and the hand turns with the arm.
+The hand has a clearance of 2 cm."""
 import json
 import math
 import os
@@ -24,13 +24,13 @@ SCANS = {"boulder": ["--base", "sphere", "--relief", "0.2"],
 
 
 def turn(angle, axis):
-    """A quaternion."""
+    """Returns the quaternion of a rotation about an axis."""
     half = angle / 2
     return [c * math.sin(half) for c in axis] + [math.cos(half)]
 
 
 def drive(time):
-    """Where the base is, its heading the y axis."""
+    """Returns the position of the base at a time; it moves along the y axis."""
     return [0.1 * math.sin(time / 2), -6 + time, 0]
 
 
@@ -76,7 +76,7 @@ def run(*command, **how):
         subprocess.run(command, check=True, **how)
     except FileNotFoundError:
         sys.exit(f"robot_among_scans.py: {command[0]} is not in PATH; ebpo-generate is in samples/ and "
-                 "ebpo in tools/ of the folder that was built in (build-quick, build)")
+                 "ebpo in tools/ of the build folder (build-quick, build)")
     except subprocess.CalledProcessError:
         sys.exit(1)
 

@@ -1,11 +1,10 @@
 #!/bin/sh
-# The viewer and models on this machine: serves them by nginx and prints the address. Ends with
-# Ctrl-C.
+# Serves the viewer and models on this machine with nginx, and prints the address. Ctrl-C ends it.
 #   serve.sh [--port N] [--folder DIR] [--log FILE] [--sources]
-# DIR holds .ebpo.h5 files (samples/out, which samples/quickstart.sh fills), .paint.h5 files for
-# &paint=models/NAME.paint.h5, and scenes (.scene.json) with their models, poses and folders. The
-# page is bundled anew each time; --sources serves it as it is written. Installs nothing and writes nothing outside
-# a temporary folder; what is missing is said.
+# DIR contains .ebpo.h5 files, .paint.h5 files for &paint=models/NAME.paint.h5, and scenes (.scene.json)
+# with their models, poses and folders. The default is samples/out, which samples/quickstart.sh fills.
+# The page is bundled each time; --sources serves it without a bundle. The script installs nothing and
+# writes only to a temporary folder. It reports missing programs and files.
 set -eu
 here=$(cd "$(dirname "$0")/.." && pwd)
 viewer=$here/tools/web port=8080 folder=$here/samples/out log='' bundle=yes
@@ -32,7 +31,7 @@ command -v nginx >/dev/null || missing nginx
 command -v node >/dev/null || missing node
 [ -d "$viewer/node_modules/three" ] || missing "tools/web/node_modules"
 if ! ls "$folder"/*.ebpo.h5 >/dev/null 2>&1; then
-    echo "serve.sh: $folder: no .ebpo.h5 file is there; name a folder with --folder, or run" \
+    echo "serve.sh: $folder: no .ebpo.h5 file is there; choose a folder with --folder, or run" \
         "sh $here/samples/quickstart.sh for a sample" >&2
     exit 1
 fi
@@ -43,7 +42,7 @@ trap 'rm -rf "$work"' EXIT
 trap 'exit 0' INT TERM
 mkdir -p "$work/www/models" "$work/tmp"
 if [ $bundle = yes ] && [ ! -d "$viewer/node_modules/esbuild" ]; then
-    echo "serve.sh: esbuild is missing, so the page is served as it is written and loads slower;" \
+    echo "serve.sh: esbuild is missing, so the page is served without a bundle and loads slower;" \
         "npm ci in tools/web installs it" >&2
     bundle=no
 fi
@@ -61,7 +60,7 @@ find -L "$work/www/models" -maxdepth 1 \( -name '*.ebpo.h5' -o -name '*.scene.js
     exit 1
 }
 
-# An nginx of one's own: no root, no system folders. The page is sent compressed, models never.
+# A separate nginx without root and system folders. The page is sent compressed, models are not.
 user=
 [ "$(id -u)" = 0 ] && user="user root;"
 cat >"$work/nginx.conf" <<END
@@ -86,6 +85,6 @@ nginx -e stderr -p "$work" -c "$work/nginx.conf" &
 server=$!
 trap 'kill $server 2>/dev/null; wait $server 2>/dev/null; exit 0' INT TERM
 wait $server || {
-    echo "serve.sh: nginx does not serve, as it says above; --port names another port" >&2
+    echo "serve.sh: nginx does not serve (see its message above); choose another port with --port" >&2
     exit 1
 }

@@ -61,7 +61,7 @@ static bool parse_height(const char *name, const char *text, double most, double
     return true;
 }
 
-/* Returns 0: go on, 1: stop with success, 2: wrong usage. */
+/* Returns 0 to continue, 1 to stop with success, 2 for wrong usage. */
 static int parse(int argc, char **argv, settings *s)
 {
     static const struct option options[] = { { "base", required_argument, NULL, 'b' },
