@@ -112,7 +112,7 @@ def open(source: Any, *, memory: int | str | None = None, cut_level: int | None 
         queries need; it loads the whole model when that becomes cheaper. The command does the same.
         None, a source of more than 2 MiB elsewhere (a URL, an object with ranges, a file object that the
         system does not read): 256 MiB.
-    cut_level: the levels above it stay in memory. None: the budget determines it.
+    cut_level: levels 0 to cut_level stay in memory. None: the budget determines it.
     prefetch: a background thread loads the subtrees around the last queries.
     threads: number of threads for queries and for reading. None: all cores.
     storage_options: options of fsspec for the URL.
