@@ -47,10 +47,12 @@ static double distance_and_sign(ebpo_model *model, const double p[3])
  * true when the query loads no other subtree. */
 static bool loads_nothing_more(ebpo_model *model, const double p[3], const double away[3])
 {
-    double way = sqrt(away[0] * away[0] + away[1] * away[1] + away[2] * away[2]) * (1 + 0x1p-40),
+    double distance_moved =
+               sqrt(away[0] * away[0] + away[1] * away[1] + away[2] * away[2]) * (1 + 0x1p-40),
            q[3] = { p[0] + away[0], p[1] + away[1], p[2] + away[2] };
     uint64_t keys[EBPO_CACHE_AHEAD];
-    unsigned count = ebpo_subtrees_near(model, p, distance_and_sign(model, p) + 2 * way, keys);
+    unsigned count =
+        ebpo_subtrees_near(model, p, distance_and_sign(model, p) + 2 * distance_moved, keys);
     if (count == EBPO_CACHE_AHEAD)
         return false; /* more subtrees are needed than the list can hold */
     ebpo_cache_stats before, after;

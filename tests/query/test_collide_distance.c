@@ -52,8 +52,7 @@ static void check_pair(const reference_faces *f, const ebpo_clearance *got, cons
            !(intersected[i].a == got->pair.file_face_a &&
              intersected[i].b == got->pair.file_face_b && intersected[i].kind == got->pair.kind))
         i++;
-    ck_assert_msg(count == 0 || i < count, "%s: the reported pair does not intersect in this way",
-                  what);
+    ck_assert_msg(count == 0 || i < count, "%s: the reported pair has another kind", what);
     ck_assert_msg((got->distance.hi == 0) == (count > 0), "%s: %g", what, got->distance.hi);
     free(intersected);
     if (count)

@@ -136,7 +136,7 @@ static void check_distance(const two_models *t, const ebpo_pose pose[2], const e
     options.pose_a = pose[0];
     options.pose_b = pose[1];
     ASSERT_OK(ebpo_collide_all(t->whole, &options, find, &l, error));
-    ck_assert_msg(l.found, "%s: the reported pair does not intersect in this way", what);
+    ck_assert_msg(l.found, "%s: the reported pair has another kind", what);
 }
 
 static void check_distances(const two_models *t, const ebpo_pose pose[2], const char *what)
@@ -302,7 +302,7 @@ static ebpo_separation separation(ebpo_collider *c, const ebpo_pose pose[2], con
     return out;
 }
 
-static ebpo_separation turned_way(ebpo_separation w)
+static ebpo_separation swapped_separation(ebpo_separation w)
 {
     const ebpo_face_pair p = w.pair;
     w.pair = (ebpo_face_pair){ p.face_b, p.face_a, p.file_face_b, p.file_face_a, p.kind, 0 };
@@ -323,7 +323,7 @@ static void check_separation(const two_models *t, const ebpo_pose pose[2], uint6
     ebpo_separation want = separation(t->whole, pose, d, 0),
                     both = separation(t->parts, pose, d, 0), one = separation(t->one, pose, d, 0),
                     late = separation(t->parts, pose, d, 1),
-                    swapped = turned_way(separation(t->swapped, back, against, 0));
+                    swapped = swapped_separation(separation(t->swapped, back, against, 0));
     ck_assert_int_eq(want.t.kind, EBPO_VALUE_EXACT);
     ck_assert_msg(memcmp(&want, &both, sizeof want) == 0 && memcmp(&want, &one, sizeof want) == 0 &&
                       memcmp(&want, &swapped, sizeof want) == 0,

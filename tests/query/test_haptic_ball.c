@@ -38,7 +38,7 @@ static bool has_area(judged *j, uint32_t face)
     return n[0] != 0 || n[1] != 0 || n[2] != 0;
 }
 
-static void judge_piece(judged *j, const double from[3], const double to[3])
+static void check_piece(judged *j, const double from[3], const double to[3])
 {
     const oracle_hit *hits;
     uint32_t count;
@@ -59,7 +59,7 @@ static void judge_piece(judged *j, const double from[3], const double to[3])
 }
 
 /* Checks all pieces of the proxy's path, which begins at the previous proxy position. */
-static void judge_way(judged *j, const double to[3])
+static void check_path(judged *j, const double to[3])
 {
     double way[EBPO_HAPTIC_PATH_MAX][3];
     uint32_t count = ebpo_haptic_ball_path(j->haptic, way);
@@ -67,7 +67,7 @@ static void judge_way(judged *j, const double to[3])
     ck_assert_mem_eq(way[0], j->proxy, sizeof way[0]);
     ck_assert_mem_eq(way[count - 1], to, sizeof way[0]);
     for (uint32_t i = 1; i < count; i++)
-        judge_piece(j, way[i - 1], way[i]);
+        check_piece(j, way[i - 1], way[i]);
 }
 
 static double apart(const double a[3], const double b[3])
@@ -104,7 +104,7 @@ static void judge_step(judged *j, const double device[3], bool closely)
     ck_assert_msg(j->energy <= j->options.stiffness * j->step * j->step,
                   "%s: contact gave energy %g, the longest step is %g", j->m->name, j->energy,
                   j->step);
-    judge_way(j, r.proxy);
+    check_path(j, r.proxy);
     if (closely)
         judge_face(j, &r);
     if (!(r.flags & (EBPO_HAPTIC_CONTACT | EBPO_HAPTIC_WAITING | EBPO_HAPTIC_INCOMPLETE)))
@@ -144,7 +144,7 @@ static bool begin(judged *j, uint64_t *state)
 }
 
 /* Moves the device to random positions, slowly or in one step, also through the solid. */
-static void wave(judged *j, uint64_t step_count, uint64_t *state)
+static void move_randomly(judged *j, uint64_t step_count, uint64_t *state)
 {
     const ebpo_info *info = ebpo_file_info(j->m->file);
     double goal[3], device[3];
@@ -182,7 +182,7 @@ START_TEST(test_haptic_proxy_never_penetrates)
         if (!begin(&j, &state))
             continue;
         begun++;
-        wave(&j, step_count, &state);
+        move_randomly(&j, step_count, &state);
         ebpo_haptic_stats stats = EBPO_HAPTIC_STATS_INIT;
         ck_assert_int_eq(ebpo_haptic_get_stats(j.haptic, &stats), EBPO_OK);
         ck_assert_uint_eq(stats.step_count, step_count);
@@ -446,8 +446,8 @@ START_TEST(test_haptic_damping_never_pulls)
             continue;
         double length = hypot(hypot(r.force[0], r.force[1]), r.force[2]);
         touched += length > 0;
-        ck_assert_msg(r.force[2] >= -1e-7 * length, "towards the face by %g of itself",
-                      -r.force[2] / length);
+        ck_assert_msg(r.force[2] >= -1e-7 * length,
+                      "a share of %g of the force is towards the face", -r.force[2] / length);
     }
     ck_assert_uint_gt(touched, 300);
     ebpo_haptic_free(haptic);

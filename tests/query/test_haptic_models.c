@@ -163,14 +163,14 @@ static void judge_step(const char *name, oracle *o, const double p[3], const dou
     const oracle_hit *hits;
     oracle_nearest near;
     uint32_t count;
-    const double way[3] = { q[0] - p[0], q[1] - p[1], q[2] - p[2] };
+    const double motion[3] = { q[0] - p[0], q[1] - p[1], q[2] - p[2] };
     if (!o)
         return;
     oracle_find_nearest(o, q, &near);
     ck_assert_msg(near.distance >= least, "%s: %g from a face", name, near.distance);
-    if (way[0] == 0 && way[1] == 0 && way[2] == 0)
+    if (motion[0] == 0 && motion[1] == 0 && motion[2] == 0)
         return;
-    oracle_ray(o, p, way, 1, &hits, &count);
+    oracle_ray(o, p, motion, 1, &hits, &count);
     for (uint32_t i = 0; i < count; i++) {
         double n[3];
         oracle_normal(o, hits[i].face, n);
@@ -203,25 +203,25 @@ static void turned_by(const double q[4], const double p[3], double out[3])
         out[i] = p[i] + 2 * v[i];
 }
 
-static void judge_way(device *h, double way[][7], uint32_t count)
+static void check_path(device *h, double motion[][7], uint32_t count)
 {
     double margin = h->options.radius + h->options.skin, wide = 0;
     if (h->options.point_count)
         for (int p = 0; p < POINTS; p++)
             wide = fmax(wide, hypot(hypot(h->point[p][0], h->point[p][1]), h->point[p][2]));
     for (uint32_t i = 1; i < count; i++) {
-        if (memcmp(way[i - 1], way[i], sizeof way[i]) == 0)
+        if (memcmp(motion[i - 1], motion[i], sizeof motion[i]) == 0)
             continue;
-        oracle *o = judge_around(&h->grid, way[i - 1], way[i], margin + wide);
+        oracle *o = judge_around(&h->grid, motion[i - 1], motion[i], margin + wide);
         if (!h->options.point_count)
-            judge_step(h->m->name, o, way[i - 1], way[i], margin - h->options.skin / 2);
+            judge_step(h->m->name, o, motion[i - 1], motion[i], margin - h->options.skin / 2);
         for (int p = 0; h->options.point_count && p < POINTS; p++) {
             double a[3], b[3];
-            turned_by(way[i - 1] + 3, h->point[p], a);
-            turned_by(way[i] + 3, h->point[p], b);
+            turned_by(motion[i - 1] + 3, h->point[p], a);
+            turned_by(motion[i] + 3, h->point[p], b);
             for (int k = 0; k < 3; k++) {
-                a[k] += way[i - 1][k];
-                b[k] += way[i][k];
+                a[k] += motion[i - 1][k];
+                b[k] += motion[i][k];
             }
             judge_step(h->m->name, o, a, b, h->options.skin / 2);
         }
@@ -247,7 +247,7 @@ static void judge_energy(device *h, const double to[7], double turn)
 
 static void step_seconds(device *h, const double to[7], double turn)
 {
-    double way[EBPO_HAPTIC_PATH_MAX][7] = { { 0 } }, places[EBPO_HAPTIC_PATH_MAX][3];
+    double motion[EBPO_HAPTIC_PATH_MAX][7] = { { 0 } }, places[EBPO_HAPTIC_PATH_MAX][3];
     uint32_t flags, count;
     judge_energy(h, to, turn);
     if (h->options.point_count) {
@@ -258,7 +258,7 @@ static void step_seconds(device *h, const double to[7], double turn)
         memcpy(h->force, r.force, sizeof r.force);
         memcpy(h->force + 3, r.torque, sizeof r.torque);
         flags = r.flags;
-        count = ebpo_haptic_tool_path(h->haptic, way);
+        count = ebpo_haptic_tool_path(h->haptic, motion);
     } else {
         ebpo_haptic_ball_result r;
         in_step = true;
@@ -268,14 +268,14 @@ static void step_seconds(device *h, const double to[7], double turn)
         flags = r.flags;
         count = ebpo_haptic_ball_path(h->haptic, places);
         for (uint32_t i = 0; i < count; i++)
-            memcpy(way[i], places[i], sizeof places[i]);
+            memcpy(motion[i], places[i], sizeof places[i]);
     }
     h->contacts += (flags & EBPO_HAPTIC_CONTACT) != 0;
     memcpy(h->at, to, sizeof h->at);
-    judge_way(h, way, count);
+    check_path(h, motion, count);
 }
 
-static void wave(device *h, uint64_t step_count, uint64_t *state)
+static void move_randomly(device *h, uint64_t step_count, uint64_t *state)
 {
     const ebpo_info *info = ebpo_file_info(h->m->file);
     double angle = 0;
@@ -348,7 +348,7 @@ static uint64_t play(const query_model *m, bool tool, uint64_t step_count, uint6
         if (!begin(&h, m, tool, &state))
             continue;
         grid_make(&h.grid, &m->mesh);
-        wave(&h, step_count, &state);
+        move_randomly(&h, step_count, &state);
         contacts = h.contacts;
         ASSERT_OK(ebpo_haptic_check(h.haptic, error));
         ebpo_haptic_free(h.haptic);

@@ -89,7 +89,7 @@ static void roam(probe *p, uint64_t step_count, uint64_t *state)
         int patience = 20000;
         for (ebpo_haptic_probe_result r = sense(p, at); !(r.flags & EBPO_HAPTIC_ACCURATE);
              r = sense(p, at)) {
-            ck_assert_msg(patience-- > 0, "%s: nothing becomes known", p->m->name);
+            ck_assert_msg(patience-- > 0, "%s: the bounds do not become accurate", p->m->name);
             pause_a_little();
         }
     }
@@ -162,7 +162,7 @@ START_TEST(test_haptic_probe_bounds_after_long_jump)
             pause_a_little();
             ebpo_haptic_step_probe(p.haptic, at, &r);
         }
-        ck_assert_msg((r.flags & EBPO_HAPTIC_ACCURATE) != 0, "nothing becomes known");
+        ck_assert_msg((r.flags & EBPO_HAPTIC_ACCURATE) != 0, "the bounds do not become accurate");
         ck_assert_double_ge(r.hi - r.lo, far * 0x1p-52);
         sense(&p, near);
     }
@@ -190,7 +190,7 @@ START_TEST(test_haptic_probe_on_cube_faces)
             pause_a_little();
             r = sense(&p, at);
         }
-        ck_assert_msg((r.flags & EBPO_HAPTIC_ACCURATE) != 0, "nothing becomes known");
+        ck_assert_msg((r.flags & EBPO_HAPTIC_ACCURATE) != 0, "the bounds do not become accurate");
     }
     ck_assert_uint_eq(forbidden, 0);
     ebpo_haptic_free(p.haptic);

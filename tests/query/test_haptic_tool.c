@@ -87,7 +87,7 @@ static void judge_point(judged *j, const double from[3], const double to[3])
                       hits[i].face);
 }
 
-static void judge_way(judged *j, const ebpo_haptic_tool_result *r)
+static void check_path(judged *j, const ebpo_haptic_tool_result *r)
 {
     double way[EBPO_HAPTIC_PATH_MAX][7];
     uint32_t count = ebpo_haptic_tool_path(j->haptic, way);
@@ -131,7 +131,7 @@ static ebpo_haptic_tool_result judge_step(judged *j, const pose *device, bool cl
     ebpo_haptic_step_tool(j->haptic, device->place, device->turn, &r);
     in_step = false;
     if (closely)
-        judge_way(j, &r);
+        check_path(j, &r);
     if (!(r.flags & EBPO_HAPTIC_CONTACT))
         ck_assert(length(r.force) == 0 && length(r.torque) == 0 && r.depth == 0);
     ck_assert_uint_le(r.work, 12000);
@@ -198,7 +198,7 @@ static void choose(const query_model *m, uint64_t *state, pose *out)
         out->turn[k] = ebpo_test_random_unit(state) - 0.5;
 }
 
-static void wave(judged *j, uint64_t step_count, uint64_t *state, uint64_t *contacts)
+static void move_randomly(judged *j, uint64_t step_count, uint64_t *state, uint64_t *contacts)
 {
     for (uint64_t i = 0; i < step_count;) {
         uint64_t steps = ebpo_test_random(state) % 3 ? 1 + ebpo_test_random(state) % 60 : 1;
@@ -236,7 +236,7 @@ START_TEST(test_haptic_tool_never_penetrates)
         if (!begin_wild(&j, &m, &state))
             continue;
         begun++;
-        wave(&j, query_scaled(400), &state, &contacts);
+        move_randomly(&j, query_scaled(400), &state, &contacts);
         ASSERT_OK(ebpo_haptic_check(j.haptic, error));
         ebpo_haptic_free(j.haptic);
     }
@@ -252,8 +252,8 @@ enum { PUSHING = 6 };
 
 /* Computes the motion allowed by contacts that is nearest to the wanted one: a thousand iterations
  * of Hildreth's method over all contacts. */
-static void hold_plainly(const ebpo_tool_contacts *all, const double want[EBPO_SCREW],
-                         double out[EBPO_SCREW])
+static void hold_reference(const ebpo_tool_contacts *all, const double want[EBPO_SCREW],
+                           double out[EBPO_SCREW])
 {
     double force[PUSHING] = { 0 };
     memcpy(out, want, EBPO_SCREW * sizeof *out);
@@ -307,9 +307,9 @@ START_TEST(test_haptic_tool_contacts_never_pull)
         for (int k = 0; k < EBPO_SCREW; k++)
             want[k] = 2 * ebpo_test_random_unit(&state) - 1;
         (void)ebpo_tool_hold(&all, want, 1e-6, true, way);
-        hold_plainly(&all, want, plain);
+        hold_reference(&all, want, plain);
         ck_assert_msg(apart_by(way, want) <= apart_by(plain, want) + 0.05,
-                      "turn %d: %g is held back, not %g", turn, apart_by(way, want),
+                      "turn %d: %g is restrained, expected %g", turn, apart_by(way, want),
                       apart_by(plain, want));
     }
 }

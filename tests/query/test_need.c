@@ -127,7 +127,7 @@ static uint64_t missing(ebpo_file *coarse, ebpo_file *fine_file, uint64_t *nodes
 }
 
 /* Checks that subsets keep the requested errors; leaves cannot be refined. */
-static void keeps_its_word(query_model *m, uint32_t parts)
+static void check_requested_errors(query_model *m, uint32_t parts)
 {
     ebpo_subset_options o = EBPO_SUBSET_OPTIONS_INIT;
     double leaves, coarsest = reach(m, m->file, 0);
@@ -189,11 +189,11 @@ START_TEST(test_subset_keeps_error_limit)
                          : i == 3 ? "cone"
                                   : "sheet",
                          mesh, &stored);
-        keeps_its_word(&m, ~0u);
+        check_requested_errors(&m, ~0u);
         if (i < 2)
-            keeps_its_word(&m, EBPO_PART_PLANES | EBPO_PART_LEAF_PLANES);
+            check_requested_errors(&m, EBPO_PART_PLANES | EBPO_PART_LEAF_PLANES);
         if (i == 0)
-            keeps_its_word(&m, EBPO_PART_MESH);
+            check_requested_errors(&m, EBPO_PART_MESH);
         query_model_free(&m);
     }
 }
@@ -245,7 +245,7 @@ START_TEST(test_subset_size_limit_minimizes_error)
         result_make(&finer, &m, "finer", &e);
         /* Sizes vary slightly for nearly the same content, because of compression. */
         ck_assert_msg(finer.info->file_bytes > o.target_bytes * 99 / 100,
-                      "a smaller error would have fitted: %llu of %llu bytes",
+                      "a smaller error would fit: %llu of %llu bytes",
                       (unsigned long long)finer.info->file_bytes,
                       (unsigned long long)o.target_bytes);
         result_free(&finer);

@@ -382,7 +382,7 @@ START_TEST(test_cached_envelopes_match_fresh_ones)
         ASSERT_OK(ebpo_distance(fresh, a.points + 3 * i, &options, &cut, error));
         ck_assert_msg(memcmp(&kept.distance, &cut.distance, sizeof kept.distance) == 0 &&
                           memcmp(kept.normal, cut.normal, sizeof kept.normal) == 0,
-                      "level %d, point (%a, %a, %a): %a, and newly cut %a", options.level,
+                      "level %d, point (%a, %a, %a): %a, computed anew %a", options.level,
                       a.points[3 * i], a.points[3 * i + 1], a.points[3 * i + 2], kept.distance,
                       cut.distance);
         ebpo_context_free(fresh);

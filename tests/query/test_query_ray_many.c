@@ -158,7 +158,7 @@ static bool aim(const query_model *m, const double p[3], uint64_t *state, ebpo_r
 
 /* Checks the rays of a convex solid. A ray from inside hits no front, and may hit the back. A ray
  * from outside hits the front first, and a back behind it or at the same point. */
-static bool convex_keeps_its_word(ebpo_context *context, const ebpo_ray *ray, bool from_inside)
+static bool is_valid_for_convex(ebpo_context *context, const ebpo_ray *ray, bool from_inside)
 {
     static const ebpo_ray_sides sides[3] = { EBPO_RAY_BOTH, EBPO_RAY_FRONT, EBPO_RAY_BACK };
     ebpo_ray_hit hit[3];
@@ -190,7 +190,7 @@ START_TEST(test_rays_detect_inside_of_convex_solids)
         ASSERT_OK(ebpo_inside(m.context, points + 3 * i, NULL, &where, error));
         if (!aim(&m, points + 3 * i, &state, &ray) || where.where == EBPO_ON)
             continue;
-        wrong += !convex_keeps_its_word(m.context, &ray, where.where == EBPO_IN);
+        wrong += !is_valid_for_convex(m.context, &ray, where.where == EBPO_IN);
     }
     ck_assert_uint_eq(wrong, 0);
     free(points);

@@ -198,7 +198,7 @@ END_TEST
 
 /* --- triangles --- */
 
-enum { CUTS = 4 }; /* number of loading modes */
+enum { MODES = 4 }; /* number of loading modes */
 
 typedef struct gathered {
     const query_model *m;
@@ -254,13 +254,13 @@ static bool query_triangles(query_model *m, ebpo_context *context, bool resident
     return same;
 }
 
-static void hold(query_model *m, int way, ebpo_model **model, ebpo_context **context)
+static void open_mode(query_model *m, int mode, ebpo_model **model, ebpo_context **context)
 {
-    static const ebpo_loading loading[CUTS] = { EBPO_LOAD_CACHE, EBPO_LOAD_CACHE, EBPO_LOAD_SUBTREE,
-                                                EBPO_LOAD_NODES };
+    static const ebpo_loading loading[MODES] = { EBPO_LOAD_CACHE, EBPO_LOAD_CACHE,
+                                                 EBPO_LOAD_SUBTREE, EBPO_LOAD_NODES };
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
-    options.cut_level = way ? way : -1;
-    options.loading = loading[way];
+    options.cut_level = mode ? mode : -1;
+    options.loading = loading[mode];
     ASSERT_OK(ebpo_model_new(m->file, &options, model, error));
     ASSERT_OK(ebpo_context_new(*model, context, error));
 }
@@ -268,14 +268,14 @@ static void hold(query_model *m, int way, ebpo_model **model, ebpo_context **con
 START_TEST(test_box_query_returns_each_triangle_once)
 {
     query_model m;
-    ebpo_model *model[CUTS];
-    ebpo_context *context[CUTS];
+    ebpo_model *model[MODES];
+    ebpo_context *context[MODES];
     uint64_t count = query_scaled(100), wrong = 0;
     double(*p)[3] = query_capacity(2 * count, sizeof *p);
     query_model_make(&m, query_solid_name(_i), query_solid_make(_i),
                      &query_variants[(_i + 2) % query_variant_count]);
-    for (int way = 0; way < CUTS; way++)
-        hold(&m, way, &model[way], &context[way]);
+    for (int mode = 0; mode < MODES; mode++)
+        open_mode(&m, mode, &model[mode], &context[mode]);
     query_make_points(&m, 2 * count, (uint64_t)_i + 78, p[0]);
     for (uint64_t i = 0; i < count; i++) {
         double low[3], high[3];
@@ -283,13 +283,13 @@ START_TEST(test_box_query_returns_each_triangle_once)
             low[k] = fmin(p[2 * i][k], p[2 * i + 1][k]);
             high[k] = fmax(p[2 * i][k], p[2 * i + 1][k]);
         }
-        for (int way = 0; way < CUTS; way++)
-            wrong += !query_triangles(&m, context[way], way == 0, low, high);
+        for (int mode = 0; mode < MODES; mode++)
+            wrong += !query_triangles(&m, context[mode], mode == 0, low, high);
     }
     ck_assert_uint_eq(wrong, 0);
-    for (int way = 0; way < CUTS; way++) {
-        ebpo_context_free(context[way]);
-        ebpo_model_free(model[way]);
+    for (int mode = 0; mode < MODES; mode++) {
+        ebpo_context_free(context[mode]);
+        ebpo_model_free(model[mode]);
     }
     free(p);
     query_model_free(&m);
@@ -337,11 +337,11 @@ START_TEST(test_triangle_beside_cell_is_returned_once)
     query_model_make(&frame, "frame", passing_by(NULL), &variant);
     query_model_make(&m, "passing", passing_by(ebpo_file_info(frame.file)), &variant);
     query_model_free(&frame);
-    for (int way = 0; way < CUTS; way++) {
+    for (int mode = 0; mode < MODES; mode++) {
         ebpo_model *model;
         ebpo_context *context;
-        hold(&m, way, &model, &context);
-        ck_assert_msg(query_triangles(&m, context, way == 0, low, high), "way %d", way);
+        open_mode(&m, mode, &model, &context);
+        ck_assert_msg(query_triangles(&m, context, mode == 0, low, high), "mode %d", mode);
         ebpo_context_free(context);
         ebpo_model_free(model);
     }
@@ -362,7 +362,7 @@ static void take_all(const query_model *m, ebpo_context *context)
         qsort(g.face, g.count, sizeof *g.face, compare_numbers);
         for (uint64_t i = 1; i < g.count; i++)
             if (g.face[i] == g.face[i - 1])
-                ck_abort_msg("face %u came twice", g.face[i]);
+                ck_abort_msg("face %u was returned twice", g.face[i]);
         free(g.face);
     }
 }

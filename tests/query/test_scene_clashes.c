@@ -275,7 +275,7 @@ START_TEST(test_scene_reports_match_pair_queries)
     }
     for (int i = EBPO_CLASH_NEAR; i <= EBPO_CLASH_ENCLOSED; i++)
         ck_assert_msg(kinds[i] > 0 || i == EBPO_CLASH_TOUCHING || i == EBPO_CLASH_CROSSING,
-                      "none of kind %d", i);
+                      "no pair of kind %d", i);
 }
 END_TEST
 

@@ -195,7 +195,7 @@ typedef struct ways {
     uint64_t count;
 } ways;
 
-static bool keep_ways(void *user, const ebpo_scene_approach_result *list, uint64_t count)
+static bool keep_approaches(void *user, const ebpo_scene_approach_result *list, uint64_t count)
 {
     ways *w = user;
     memcpy(w->list, list, count * sizeof *list);
@@ -223,7 +223,7 @@ static double distance_at(ebpo_scene *scene, uint64_t a, uint64_t b, double time
     return found.distance.hi;
 }
 
-static void check_way(ebpo_scene *whole, const ebpo_scene_approach_result *w)
+static void check_approach(ebpo_scene *whole, const ebpo_scene_approach_result *w)
 {
     double at = distance_at(whole, w->a, w->b, w->time);
     ck_assert_int_ge(w->reached, 0);
@@ -247,12 +247,12 @@ START_TEST(test_approach_finds_every_pair)
         ways list[2] = { { .count = 0 }, { .count = 0 } };
         ebpo_scene *whole = some_scene(n), *part = packed_scene(whole, 0, LAST, 0);
         how.tolerance = tolerance;
-        ASSERT_OK(ebpo_scene_approach(whole, 0, LAST, &how, keep_ways, &list[0], error));
-        ASSERT_OK(ebpo_scene_approach(part, 0, LAST, &how, keep_ways, &list[1], error));
+        ASSERT_OK(ebpo_scene_approach(whole, 0, LAST, &how, keep_approaches, &list[0], error));
+        ASSERT_OK(ebpo_scene_approach(part, 0, LAST, &how, keep_approaches, &list[1], error));
         ck_assert_uint_eq(list[0].count, list[1].count);
         for (uint64_t i = 0; i < 2 * list[0].count; i++) {
             const ebpo_scene_approach_result *w = &list[i % 2].list[i / 2];
-            check_way(whole, w);
+            check_approach(whole, w);
             reached += w->reached == 1 && w->time > 0;
             apart += w->reached == 0;
         }
@@ -335,7 +335,7 @@ static void query_by(uint64_t seed, unsigned threads, all_results *out)
     how.max_evaluations = 100;
     memset(out, 0, sizeof *out);
     ASSERT_OK(intersect_by(scene, 0.5, threads, &out->intersected, error));
-    ASSERT_OK(ebpo_scene_approach(scene, 0, LAST, &how, keep_ways, &out->ways, error));
+    ASSERT_OK(ebpo_scene_approach(scene, 0, LAST, &how, keep_approaches, &out->ways, error));
     ASSERT_OK(ebpo_scene_least_distances(scene, 0, LAST, &how, keep_leasts, &out->leasts, error));
     ebpo_scene_free(scene);
 }

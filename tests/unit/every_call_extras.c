@@ -471,7 +471,7 @@ static bool count_clashes(void *user, const ebpo_scene_clash *clashes, uint64_t 
     return true;
 }
 
-static bool count_ways(void *user, const ebpo_scene_approach_result *ways, uint64_t count)
+static bool count_approaches(void *user, const ebpo_scene_approach_result *ways, uint64_t count)
 {
     *(uint64_t *)user += count + (ways[0].reached != 1);
     return true;
@@ -565,7 +565,7 @@ static ebpo_status intersect_in_scene(ebpo_scene *scene, ebpo_error *error)
     along.threads = 1;
     along.tolerance = 0.01;
     if (status == EBPO_OK)
-        status = ebpo_scene_approach(scene, 0, 1, &along, count_ways, &ways, error);
+        status = ebpo_scene_approach(scene, 0, 1, &along, count_approaches, &ways, error);
     if (status == EBPO_OK)
         status = ebpo_scene_least_distances(scene, 0, 1, &along, count_leasts, &ways, error);
     return status == EBPO_OK && (clashes != 1 || tested != 1 || ways != 2) ? EBPO_E_ARGUMENT

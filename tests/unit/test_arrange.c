@@ -115,7 +115,7 @@ static ebpo_mesh some_mesh(int i)
 
 /* Returns true when the vertex is in the cell, compared bit by bit. The upper faces of a cell
  * belong to the next cells. */
-static bool lies_in(const ebpo_box *box, const ebpo_mesh *m, uint64_t v, ebpo_cell cell)
+static bool is_in_cell(const ebpo_box *box, const ebpo_mesh *m, uint64_t v, ebpo_cell cell)
 {
     double p[3];
     uint32_t last = (uint32_t)((UINT64_C(1) << cell.level) - 1);
@@ -159,7 +159,7 @@ static void expect_arranged(const ebpo_mesh *m, const ebpo_mesh *source)
     for (uint64_t v = 0; v < a->referenced; v++) {
         ck_assert(v == 0 || a->key[v] >= a->key[v - 1]);
         ck_assert(ebpo_octcode_level(a->key[v]) == a->box.grid_level &&
-                  lies_in(&a->box, m, v, ebpo_cell_of_octcode(a->key[v])));
+                  is_in_cell(&a->box, m, v, ebpo_cell_of_octcode(a->key[v])));
     }
     free(seen);
     free(named);

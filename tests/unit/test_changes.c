@@ -65,13 +65,13 @@ static void write_mesh(const char *name, double height, bool ply)
 typedef enum change { SHORTENED, EMPTIED, LONGER, REWRITTEN, REPLACED, CHANGES } change;
 
 /* Changes by another program at the `when`-th step of reading. */
-typedef struct meddler {
+typedef struct scheduled_change {
     change what;
     int when, step;
     bool ply, done;
-} meddler;
+} scheduled_change;
 
-static void meddle(meddler *m)
+static void change_file(scheduled_change *m)
 {
     struct stat st;
     m->done = true;
@@ -90,16 +90,16 @@ static void meddle(meddler *m)
 
 static bool report(void *user, const char *stage, uint64_t done, uint64_t total)
 {
-    meddler *m = user;
+    scheduled_change *m = user;
     (void)stage;
     (void)done;
     (void)total;
     if (m->step++ == m->when)
-        meddle(m);
+        change_file(m);
     return true;
 }
 
-static ebpo_status read_meddled(meddler *m, ebpo_mesh *mesh, ebpo_error *error)
+static ebpo_status read_changed(scheduled_change *m, ebpo_mesh *mesh, ebpo_error *error)
 {
     ebpo_mesh_read_options options = EBPO_MESH_READ_OPTIONS_INIT;
     write_mesh(path, 1, m->ply);
@@ -116,7 +116,7 @@ static void expect_old(const ebpo_mesh *mesh)
         ck_assert(mesh->xyz32 ? mesh->xyz32[3 * i + 1] == 1 : mesh->xyz64[3 * i + 1] == 1);
 }
 
-static void expect_reported(const meddler *m, ebpo_status status, const char *message)
+static void expect_reported(const scheduled_change *m, ebpo_status status, const char *message)
 {
     bool reported = strstr(message, "while it was read") != NULL;
     ck_assert_msg(status == EBPO_E_IO && reported, "change %d at step %d: %s", m->what, m->when,
@@ -128,10 +128,10 @@ START_TEST(test_mesh_changed_while_reading_is_reported)
     for (int ply = 0; ply < 2; ply++)
         for (change what = 0; what < CHANGES; what++)
             for (int when = 0; when < 4; when++) {
-                meddler m = { .what = what, .when = when, .ply = ply };
+                scheduled_change m = { .what = what, .when = when, .ply = ply };
                 ebpo_mesh mesh;
                 ebpo_error error = EBPO_ERROR_INIT;
-                ebpo_status status = read_meddled(&m, &mesh, &error);
+                ebpo_status status = read_changed(&m, &mesh, &error);
                 if (status != EBPO_OK)
                     expect_reported(&m, status, error.message);
                 else

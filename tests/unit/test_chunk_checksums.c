@@ -106,7 +106,7 @@ static ebpo_status pass(void *context, const ebpo_array_in *array, uint64_t chun
 }
 
 /* Returns true when reading array n of these bytes reports that chunk `chunk` is wrong. */
-static bool is_noticed(const bytes *b, int n, uint64_t chunk)
+static bool is_detected(const bytes *b, int n, uint64_t chunk)
 {
     ebpo_read_options options = EBPO_READ_OPTIONS_INIT;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -141,7 +141,7 @@ START_TEST(test_chunks_of_other_version_are_refused)
                 continue;
             memcpy(kept, at, size);
             memcpy(at, other.at + theirs->chunks[k].address, size);
-            ck_assert_msg(is_noticed(&b, n, k), "%s, chunk %d", a->path, (int)k);
+            ck_assert_msg(is_detected(&b, n, k), "%s, chunk %d", a->path, (int)k);
             memcpy(at, kept, size);
             found++;
         }

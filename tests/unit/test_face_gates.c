@@ -70,7 +70,7 @@ static bool decode(uint32_t rows, uint64_t before, uint32_t *faces)
            ebpo_corners_decode(codes_back, rows, &before, faces);
 }
 
-static bool read_plainly(uint32_t rows, uint64_t before)
+static bool read_reference(uint32_t rows, uint64_t before)
 {
     return ebpo_plain_gates_read(chunk, rows, &before, faces_reference);
 }
@@ -103,7 +103,7 @@ START_TEST(test_face_encoding_round_trip)
         ck_assert(decode(rows, before, faces_back));
         ck_assert_int_eq(memcmp(codes_back, codes_made, 12 * (size_t)rows), 0);
         ck_assert_int_eq(memcmp(faces_back, faces_made, 12 * (size_t)rows), 0);
-        ck_assert(read_plainly(rows, before));
+        ck_assert(read_reference(rows, before));
         ck_assert_int_eq(memcmp(faces_reference, faces_made, 12 * (size_t)rows), 0);
     }
 }
@@ -124,7 +124,7 @@ START_TEST(test_changed_face_bytes_match_reference)
             chunk[pick(&state, pick(&state, 8) ? used : 13 * rows)] =
                 (uint8_t)pick(&state, pick(&state, 2) ? 16 : 256);
         bool fine = decode(rows, before, faces_back);
-        ck_assert(fine == read_plainly(rows, before));
+        ck_assert(fine == read_reference(rows, before));
         taken += fine;
         refused += !fine;
         if (fine)
@@ -144,7 +144,7 @@ START_TEST(test_noise_face_bytes_match_reference)
             chunk[i] = (uint8_t)(i > 4 * (size_t)rows && turn % 2 ? 0 : pick(&state, most));
         chunk[0] = (uint8_t)(turn % 5 == 4);
         bool fine = decode(rows, 1000000, faces_back);
-        ck_assert(fine == read_plainly(rows, 1000000));
+        ck_assert(fine == read_reference(rows, 1000000));
         if (fine)
             ck_assert_int_eq(memcmp(faces_reference, faces_back, 12 * (size_t)rows), 0);
     }

@@ -64,8 +64,8 @@ static void check_written(double v)
 {
     char plain[NUMBER_CAPACITY];
     const char *text = written(v);
-    ck_assert_msg(same(strtod(text, NULL), v), "%a is written %s", v, text);
-    ck_assert_msg(digits_in(text) <= digits_needed(v), "%a is written %s", v, text);
+    ck_assert_msg(same(strtod(text, NULL), v), "%a is printed as %s", v, text);
+    ck_assert_msg(digits_in(text) <= digits_needed(v), "%a is printed as %s", v, text);
     snprintf(plain, sizeof plain, "%.17g", v);
     ck_assert_msg(!strchr(text, 'e') == !strchr(plain, 'e') &&
                       !strchr(text, '-') == !strchr(plain, '-') &&

@@ -97,7 +97,7 @@ START_TEST(test_cells_and_octcodes_stay_consistent)
 END_TEST
 
 /* Returns true when two cells touch, in a root cell of size 1, where these doubles are exact. */
-static bool plainly_touch(ebpo_cell a, ebpo_cell b)
+static bool reference_touch(ebpo_cell a, ebpo_cell b)
 {
     for (int k = 0; k < 3; k++) {
         double a_side = ldexp(1, -a.level), b_side = ldexp(1, -b.level), a_low = a.at[k] * a_side,
@@ -128,7 +128,7 @@ START_TEST(test_neighbours_match_exhaustive_search)
         }
         for (uint32_t m = 0; m < last * last * last; m++) {
             ebpo_cell other = { level, { m % last, m / last % last, m / last / last } };
-            expected += plainly_touch(cell, other);
+            expected += reference_touch(cell, other);
         }
         ck_assert_uint_eq(found, expected);
     }
@@ -142,8 +142,8 @@ START_TEST(test_cells_of_any_level_touch)
     for (int i = 0; i < 20000; i++) {
         ebpo_cell a = random_cell(&state, (int)random_below(&state, 6)),
                   b = random_cell(&state, (int)random_below(&state, 6));
-        ck_assert_int_eq(ebpo_cells_touch(a, b), plainly_touch(a, b));
-        touching += plainly_touch(a, b);
+        ck_assert_int_eq(ebpo_cells_touch(a, b), reference_touch(a, b));
+        touching += reference_touch(a, b);
     }
     ck_assert(touching > 1000 && touching < 19000);
     ebpo_cell deep = { EBPO_MAX_LEVEL, { (1u << EBPO_MAX_LEVEL) - 1, 0, 0 } };

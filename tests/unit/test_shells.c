@@ -101,7 +101,7 @@ static ebpo_shells reference(const ebpo_mesh *m, const parts *p)
 }
 
 /* Rotates about x by thirds, with rounding, so that long faces are slanted to the axes. */
-static void lean(ebpo_mesh *m)
+static void slant(ebpo_mesh *m)
 {
     for (uint64_t v = 0; v < m->vertex_count; v++) {
         double y = m->xyz64[3 * v + 1], z = m->xyz64[3 * v + 2];
@@ -150,7 +150,7 @@ static ebpo_mesh many(uint64_t *state, parts *p)
         add(&m, p, &part, ebpo_test_random(state) % 2);
     }
     if (ebpo_test_random(state) % 2)
-        lean(&m);
+        slant(&m);
     return m;
 }
 

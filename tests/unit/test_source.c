@@ -57,7 +57,7 @@ static void expect_tree(ebpo_file *file, unsigned threads)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     char *text = read_text(file, threads);
-    ck_assert_msg(strcmp(text, expected) == 0, "another tree came back");
+    ck_assert_msg(strcmp(text, expected) == 0, "the tree differs");
     ck_assert_msg(ebpo_file_check_content(file, READ_BY(threads), &error) == EBPO_OK, "%s",
                   error.message);
     free(text);
@@ -117,7 +117,7 @@ static ebpo_status probe_read(void *user, uint64_t offset, uint64_t bytes, void 
     if (p->reads++ == p->fail_at) {
         if (!p->silent) {
             error->status = p->status;
-            snprintf(error->message, sizeof error->message, "the line is dead");
+            snprintf(error->message, sizeof error->message, "the connection is lost");
         }
         return p->status;
     }
@@ -315,7 +315,7 @@ START_TEST(test_chunk_index_found_at_any_offset)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     make_file(&large, EBPO_CODEC_ZSTD);
-    for (int lie = 0; lie < 6; lie++) {
+    for (int falsified = 0; falsified < 6; falsified++) {
         probe p = { .fail_at = UINT_MAX };
         ebpo_file *file;
         ebpo_source source = { .struct_size = sizeof(ebpo_source),
@@ -329,7 +329,7 @@ START_TEST(test_chunk_index_found_at_any_offset)
                       error.message);
         ebpo_info *info = &file->info;
         ck_assert(info->chunk_index_bytes > 0 && !atomic_load(&file->located) && p.reads == 1);
-        switch (lie) {
+        switch (falsified) {
         case 1: info->chunk_index_offset = info->chunk_index_bytes = 0; break;
         case 2: info->chunk_index_offset -= 1000; break;
         case 3: info->chunk_index_bytes /= 2; break;
@@ -338,7 +338,8 @@ START_TEST(test_chunk_index_found_at_any_offset)
         }
         unsigned before = p.reads;
         ck_assert_msg(ebpo_file_locate(file, NULL, &error) == EBPO_OK, "%s", error.message);
-        ck_assert_uint_le(p.reads - before, lie ? 20 : 2); /* the header again, and the index */
+        ck_assert_uint_le(p.reads - before,
+                          falsified ? 20 : 2); /* the header again, and the index */
         expect_tree(file, 1);
         ebpo_close(file);
     }
@@ -370,7 +371,8 @@ static unsigned fail_everywhere(ebpo_status status, bool silent)
             return k;
         }
         ck_assert_msg(got == status, "read %u: %s, %s", k, ebpo_status_name(got), error.message);
-        ck_assert_ptr_nonnull(strstr(error.message, silent ? "afar: bytes " : "the line is dead"));
+        ck_assert_ptr_nonnull(
+            strstr(error.message, silent ? "afar: bytes " : "the connection is lost"));
     }
 }
 
@@ -602,7 +604,7 @@ START_TEST(test_threads_read_one_file)
         ck_assert_int_eq(pthread_create(&thread[i], NULL, read_in_thread, file), 0);
     for (int i = 0; i < 4; i++) {
         ck_assert_int_eq(pthread_join(thread[i], &text), 0);
-        ck_assert_msg(strcmp(text, expected) == 0, "another tree came back");
+        ck_assert_msg(strcmp(text, expected) == 0, "the tree differs");
         free(text);
     }
     ebpo_close(file);

@@ -144,7 +144,7 @@ static void query_limited(query_model *m, part *p, int way, const double point[3
             fine(ebpo_inside(p->context[way], point, &inside_options, &some, &error), &error);
             fine(ebpo_inside(m->context, point, &inside_options, &whole, &error), &error);
             ck_assert_msg(some.where == EBPO_MAYBE || some.where == truth->where,
-                          "level %d: %d, and it is %d", o.level, some.where, truth->where);
+                          "level %d: class %d, expected %d", o.level, some.where, truth->where);
             ck_assert(some.where != EBPO_MAYBE || truth->distance <= some.doubt);
             if (same)
                 ck_assert(some.where == whole.where && some.doubt == whole.doubt);
@@ -162,7 +162,7 @@ static void query_limited(query_model *m, part *p, int way, const double point[3
         ck_assert_msg(status == EBPO_OK || (status == EBPO_E_ABSENT && !same), "%s", error.message);
         if (status == EBPO_OK && cut->parts & EBPO_PART_PLANES)
             ck_assert_msg(near.distance == far.distance,
-                          "level %d: an envelope is %.17g away, the whole says %.17g", o.level,
+                          "level %d: an envelope is %.17g away, in the whole file %.17g", o.level,
                           near.distance, far.distance);
         o.mode = EBPO_DISTANCE_EXACT;
     }
@@ -207,8 +207,7 @@ static void query_box(tally *t, query_model *m, part *p, int way, const double m
     uint64_t count, found;
     fine(ebpo_faces_in_box(m->context, min, max, &all, &count, &error), &error);
     ebpo_status status = ebpo_faces_in_box(p->context[way], min, max, &some, &found, &error);
-    ck_assert_msg(!must || status == EBPO_OK, "the box that was kept is refused: %s",
-                  error.message);
+    ck_assert_msg(!must || status == EBPO_OK, "the kept box is refused: %s", error.message);
     if (!answered(t, status, &error))
         return;
     ck_assert_uint_eq(count, found);
@@ -537,7 +536,7 @@ START_TEST(test_subset_measure_is_refused)
     part p;
     part_open(&p, m.file, path, &o);
     ck_assert_msg(p.info->pruned && p.info->boxed && p.info->face_count < m.info.face_count,
-                  "nothing was left out");
+                  "nothing was omitted");
     ebpo_mass mass = EBPO_MASS_INIT;
     ck_assert_int_eq(ebpo_measure(p.file, 1, &mass, &error), EBPO_E_ABSENT);
     part_close(&p);

@@ -83,21 +83,21 @@ static void set_type(int l, uint64_t group, unsigned octant, int type)
 }
 
 /* A level with a node of this type, its index, and its rank. */
-typedef struct spot {
+typedef struct position {
     int level;
     uint64_t group, rank;
     unsigned octant;
-} spot;
+} position;
 
-static spot find_from(int first_level, int type)
+static position find_from(int first_level, int type)
 {
     for (int l = first_level; l < tree.info.level_count; l++)
         for (uint64_t group = 0; group < tree.level[l].group_count; group++)
             for (unsigned octant = 0; octant < (l ? 8u : 1u); octant++)
                 if (type_of(l, group, octant) == type)
-                    return (spot){ l, group, 0, octant };
+                    return (position){ l, group, 0, octant };
     ck_abort_msg("no node of type %d", type);
-    return (spot){ 0 };
+    return (position){ 0 };
 }
 
 static void recount(int l)
@@ -207,12 +207,12 @@ END_TEST
 START_TEST(test_verify_detects_swapped_black_and_white)
 {
     build("sphere", 8, EBPO_RULE_NONZERO);
-    spot white = find_from(1, EBPO_WHITE);
+    position white = find_from(1, EBPO_WHITE);
     set_type(white.level, white.group, white.octant, EBPO_BLACK);
     recount(white.level);
     expect_caught(EBPO_VERIFY_LABELS, "octcode 0o1");
     build("sphere", 8, EBPO_RULE_NONZERO);
-    spot black = find_from(1, EBPO_BLACK);
+    position black = find_from(1, EBPO_BLACK);
     set_type(black.level, black.group, black.octant, EBPO_WHITE);
     recount(black.level);
     expect_caught(EBPO_VERIFY_LABELS, "octcode 0o1");
@@ -222,11 +222,11 @@ END_TEST
 START_TEST(test_verify_detects_wrong_winding_numbers)
 {
     build("sphere", 8, EBPO_RULE_NONZERO);
-    spot leaf = find_from(0, EBPO_LEAF);
+    position leaf = find_from(0, EBPO_LEAF);
     tree.level[leaf.level].leaf_winding[0] += 1;
     expect_caught(EBPO_VERIFY_LABELS, "winding number");
     build("sphere", 8, EBPO_RULE_NONZERO);
-    spot black = find_from(0, EBPO_BLACK);
+    position black = find_from(0, EBPO_BLACK);
     ebpo_level *level = &tree.level[black.level];
     ck_assert(level->black_winding == NULL);
     level->black_winding = malloc(level->black_count * sizeof(int32_t));
@@ -234,7 +234,7 @@ START_TEST(test_verify_detects_wrong_winding_numbers)
         level->black_winding[i] = i == 0 ? 2 : 1;
     expect_caught(EBPO_VERIFY_LABELS, "winding number");
     build("sphere", 8, EBPO_RULE_NONZERO);
-    spot white = find_from(0, EBPO_WHITE);
+    position white = find_from(0, EBPO_WHITE);
     level = &tree.level[white.level];
     level->white_winding = calloc(level->white_count, sizeof(int32_t));
     level->white_winding[0] = INT32_MIN;
@@ -321,7 +321,7 @@ START_TEST(test_verify_detects_unsorted_references)
             expect_caught(EBPO_VERIFY_STRUCTURE, "are not ascending");
             return;
         }
-    spot leaf = find_from(0, EBPO_LEAF);
+    position leaf = find_from(0, EBPO_LEAF);
     tree.level[leaf.level].leaf_refs[0] = UINT32_MAX;
     expect_caught(EBPO_VERIFY_STRUCTURE, "are not ascending");
 }
@@ -442,7 +442,7 @@ START_TEST(test_verify_detects_surface_with_inside)
     tree.info.solid = false;
     expect_caught(EBPO_VERIFY_STRUCTURE, "a surface has no winding numbers");
     build("sheet", 2, EBPO_RULE_NONZERO);
-    spot white = find_from(1, EBPO_WHITE);
+    position white = find_from(1, EBPO_WHITE);
     set_type(white.level, white.group, white.octant, EBPO_BLACK);
     recount(white.level);
     expect_caught(EBPO_VERIFY_STRUCTURE, "a surface has no inside");
@@ -461,11 +461,11 @@ START_TEST(test_verify_detects_inconsistent_arrays)
     tree.mesh.faces[4] = UINT32_MAX;
     expect_caught(EBPO_VERIFY_STRUCTURE, "vertices that do not exist");
     build("sphere", 8, EBPO_RULE_NONZERO);
-    spot leaf = find_from(0, EBPO_LEAF);
+    position leaf = find_from(0, EBPO_LEAF);
     tree.level[leaf.level].leaf_first[0] = UINT64_MAX - 1;
     expect_caught(EBPO_VERIFY_STRUCTURE, "its list exceeds the faces");
     build("sphere", 8, EBPO_RULE_NONZERO);
-    spot gray = find_from(1, EBPO_GRAY);
+    position gray = find_from(1, EBPO_GRAY);
     set_type(gray.level, gray.group, gray.octant, EBPO_WHITE);
     expect_caught(EBPO_VERIFY_STRUCTURE, "do not add up");
 }

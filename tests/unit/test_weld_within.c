@@ -83,7 +83,7 @@ typedef struct expected {
     int64_t moved;
 } expected;
 
-static void weld_plainly(const soup *s, int64_t distance, expected *e)
+static void weld_reference(const soup *s, int64_t distance, expected *e)
 {
     point sorted[LIMIT];
     e->count = 0;
@@ -154,7 +154,7 @@ START_TEST(test_weld_within_matches_all_pairs)
         int64_t distance = 1 + below(5);
         bool far = below(2), single = below(2);
         make_soup(&s, side, far ? (single ? 1 << 20 : INT64_C(1) << 45) : 0);
-        weld_plainly(&s, distance, &e);
+        weld_reference(&s, distance, &e);
         ebpo_mesh m = mesh_of(&s, single), arranged = mesh_of(&s, single);
         ebpo_error error = EBPO_ERROR_INIT;
         compare(&s, &e, &m, (double)distance / 8);
