@@ -44,7 +44,7 @@ def library(ebpo, model, query, raw):
     return of([begin()]), of([begin(), begin()]) / 2
 
 
-def ask_large(ebpo, model, folder, turns):
+def query_large(ebpo, model, folder, turns):
     """Query one point after the other, each in a new process."""
     raw, out = f"{folder}/large.raw", f"{folder}/out"
     subprocess.run([ebpo, "bench", "--count", "20", "--save-points", raw, model],
@@ -90,7 +90,7 @@ def main():
                 for program in filter(None, (a.ebpo, a.before)):
                     plain = [program, query, "--memory", "64GiB", a.model]
                     for name, command in (
-                            ("one question", [*plain, one]),
+                            ("one query", [*plain, one]),
                             ("raw, 1 thread", [*plain, raw, "--raw", "--threads", "1"]),
                             ("raw, 2 threads", [*plain, raw, "--raw", "--threads", "2"]),
                             ("text, 1 thread", [*plain, text, "--threads", "1"]),
@@ -103,9 +103,9 @@ def main():
               "CPU / library on one thread | wall-clock / library on as many |\n"
               "|---|---|---|---|---|---|---|")
         for key, values in found.items():
-            if len(key) == 2 or key[2] == "one question":
+            if len(key) == 2 or key[2] == "one query":
                 continue
-            opened = found[key[0], key[1], "one question"]
+            opened = found[key[0], key[1], "one query"]
             alone = [min(v[i] for v in found[key[0], "library"]) for i in (0, 1)]
             cpu, wall = ((min(v[i] for v in values) - min(v[i] for v in opened)) / a.count * 1e9
                          for i in (0, 1))
@@ -116,7 +116,7 @@ def main():
             one, two = (min(v[i] for v in found[query, "library"]) for i in (0, 1))
             print(f"\n{query}, the library alone: {one:.0f} ns per point on one thread, {two:.0f} on two")
         if a.large:
-            ask_large(a.ebpo, a.large, folder, a.turns)
+            query_large(a.ebpo, a.large, folder, a.turns)
 
 
 main()

@@ -29,8 +29,8 @@ from ebpo.queries import cores
 
 def seconds(function, *arguments):
     began = time.perf_counter()
-    answer = function(*arguments)
-    return time.perf_counter() - began, answer
+    result = function(*arguments)
+    return time.perf_counter() - began, result
 
 
 class Plain:
@@ -62,7 +62,7 @@ def cost(model, points, threads, rounds):
         order = [("c", plain), ("python", lambda: model.inside(points, threads=threads))]
         times = {}
         for name, function in order[::1 if number % 2 else -1]:
-            times[name], answer = seconds(function)
+            times[name], result = seconds(function)
         if number:  # the first round only warms up
             ratios.append(times["python"] / times["c"])
     assert np.array_equal(model.inside(points), plain.out["where"] != c.EBPO_OUT)
@@ -98,13 +98,13 @@ def along(points):
     return np.tile([1., .5, .25], (len(points), 1))
 
 
-def wrong(question, answer, exact, size):
+def wrong(query, result, exact, size):
     """Return which results are wrong: another truth value, or a distance with more than a rounding error."""
-    if question == "inside":
-        return answer != exact
-    if question == "ray":
-        return np.isinf(answer) != np.isinf(exact)
-    return abs(answer - exact) > 1e-6 * size
+    if query == "inside":
+        return result != exact
+    if query == "ray":
+        return np.isinf(result) != np.isinf(exact)
+    return abs(result - exact) > 1e-6 * size
 
 
 def compare(model, sets, rounds):
@@ -119,14 +119,14 @@ def compare(model, sets, rounds):
         except ImportError as error:
             print(f"| {name} | | | | not available: {error} |")
             continue
-        for question, where, points in ((q, w, p) for q in ours for w, p in sets.items()):
+        for query, where, points in ((q, w, p) for q in ours for w, p in sets.items()):
             ratios = []
             for _ in range(rounds):
-                took, exact = seconds(ours[question], points)
-                their, answer = seconds(theirs[question], points)
+                took, exact = seconds(ours[query], points)
+                their, result = seconds(theirs[query], points)
                 ratios.append(their / took)
-            count = int(wrong(question, answer, exact, size).sum())
-            print(f"| {name} | {question} | {len(points)} {where} | {statistics.median(ratios):.2f} | {count} |")
+            count = int(wrong(query, result, exact, size).sum())
+            print(f"| {name} | {query} | {len(points)} {where} | {statistics.median(ratios):.2f} | {count} |")
 
 
 def main():

@@ -36,9 +36,9 @@ def run(command):
     return subprocess.run(list(map(str, command)), check=True, capture_output=True, text=True).stdout
 
 
-def ask(program, model, poses, question, rounds, pairs=None):
+def run_query(program, model, poses, query, rounds, pairs=None):
     """Return the cost of construction, and (kind, microseconds, value) for each pose."""
-    lines = run([program, model, poses, question, rounds] + ([pairs] if pairs else [])).splitlines()
+    lines = run([program, model, poses, query, rounds] + ([pairs] if pairs else [])).splitlines()
     made = lines[0].split()
     answers = [(kind, float(us), float(value)) for kind, us, value in map(str.split, lines[1:])]
     return (float(made[1]), int(made[2])), answers
@@ -82,10 +82,10 @@ def measure(build, ply, tree, args, folder):
     poses.write_text(run([programs / "pairs_ebpo", tree, "make", args.poses]))
     got = {}
     for ours, theirs in sorted({(row[1], row[2]) for row in ROWS}):
-        got["ours", ours] = ask(programs / "pairs_ebpo", tree, poses, ours, args.rounds,
+        got["ours", ours] = run_query(programs / "pairs_ebpo", tree, poses, ours, args.rounds,
                                 folder / f"ours.{ours}")
         if ("theirs", theirs) not in got:
-            got["theirs", theirs] = ask(programs / "pairs_fcl", ply, poses, theirs, args.fcl_rounds,
+            got["theirs", theirs] = run_query(programs / "pairs_fcl", ply, poses, theirs, args.fcl_rounds,
                                         folder / f"theirs.{theirs}")
     return got, compare_pairs(folder / "ours.all", folder / "theirs.all")
 
@@ -159,9 +159,9 @@ def head(models, made):
     return lines + [""]
 
 
-def cross(build, a, b, size, memory, question, steps):
+def run_crossing(build, a, b, size, memory, query, steps):
     """Return the cost of opening, and (microseconds, pairs, loads, bytes) for each step."""
-    lines = run([build / "tests/bench/peers/crossing_ebpo", a, b, steps, question, size,
+    lines = run([build / "tests/bench/peers/crossing_ebpo", a, b, steps, query, size,
                  memory]).splitlines()
     made = lines[0].split()
     return ((float(made[1]), int(made[2])),
@@ -188,8 +188,8 @@ def mean_worst(steps):
 
 def crossing_row(build, crossing, args):
     a, b, size, memory = crossing.split("=")
-    _, first = cross(build, a, b, size, memory, "first", args.steps)
-    _, every = cross(build, a, b, size, memory, "all", args.steps)
+    _, first = run_crossing(build, a, b, size, memory, "first", args.steps)
+    _, every = run_crossing(build, a, b, size, memory, "all", args.steps)
     pairs, us = sum(step[1] for step in every), sum(step[0] for step in every)
     names = " through ".join(pathlib.Path(p).name.split(".")[0] for p in (b, a))
     return (f"| {names}" + (f", {size} of its size" if float(size) not in (0, 1) else "") +

@@ -135,9 +135,9 @@ def run(name, args, server, model, points, expected):
     if failed:
         print(f"{name}: {failed[0]}")
         return False
-    told = np.load(out)
-    equal = told["where"].tobytes() == expected[:, 0].astype("i1").tobytes() and (
-        told["winding"].tobytes() == expected[:, 1].tobytes())
+    found = np.load(out)
+    equal = found["where"].tobytes() == expected[:, 0].astype("i1").tobytes() and (
+        found["winding"].tobytes() == expected[:, 1].tobytes())
     print(f"{name:8} {seconds:6.1f} s, fault for {trouble:5.1f} s from chunk {ready} of {of}; "
           f"{server.refused - refused} requests refused; {'equal' if equal else 'DIFFERENT RESULTS'}", flush=True)
     if name == "away" and server.refused == refused:

@@ -24,7 +24,7 @@ WAYS = {"inherit": [], "kmedoids": ["--select", "kmedoids"],
         "kmedoids, angle": ["--select", "kmedoids", "--normals", "angle"],
         "offset": ["--select", "offset"], "random": ["--select", "random"],
         "BP, K = 1 %": ["--select", "kmedoids", "--k-root", "1%"]}
-VERDICT, SIZES, TOLD = {}, {}, []
+VERDICT, SIZES, GOAL_ROWS = {}, {}, []
 
 
 def run(*command):
@@ -43,14 +43,14 @@ def table(name, folder):
         run("convert", "-q", *options, "--leaf-faces", 0, "--profile", "full",
             models / f"{name}.ply", path)
         assert "no violation" in run("verify", path), name
-        told = json.loads(run("measure", "--json", *(["--hulls"] if limits is None else []), path))
+        facts = json.loads(run("measure", "--json", *(["--hulls"] if limits is None else []), path))
         info = json.loads(run("info", "--json", path))
         if limits is None:
-            limits = [(x["limit_volume"], x["excess_to_limit"]) for x in told["levels"]]
+            limits = [(x["limit_volume"], x["excess_to_limit"]) for x in facts["levels"]]
             levels = range(len(limits))
             head = (row("", *(f"L{i}" for i in levels), "planes in gray nodes", "file bytes")
                     + row(*["---"] * (len(limits) + 3)))
-        volume, excess = told["volume"], [x["envelope_volume"] for x in told["levels"]]
+        volume, excess = facts["volume"], [x["envelope_volume"] for x in facts["levels"]]
         if way == "inherit":
             VERDICT[name] = [(v - volume) / (l - volume) if l > volume * (1 + 1e-9) else 1
                              for v, (l, _) in zip(excess, limits)]
@@ -62,7 +62,7 @@ def table(name, folder):
     ratios += row("limit, % of solid", *(f"{100 * l / volume:.2f}" for l, _ in limits), "", "")
     worst = {"levels 0 to 3": (max(VERDICT[name][:4]), 1.2),
              "levels 4 to 6": (max(VERDICT[name][4:7] or [0]), 1.5)}
-    TOLD.append(row(name,
+    GOAL_ROWS.append(row(name,
                     *(f"{value:.3f} ({'met' if value <= target else 'missed'}, {target})"
                       for value, target in worst.values()),
                     f"{SIZES[name]['inherit'] / SIZES[name]['kmedoids']:.2f} "
@@ -111,9 +111,9 @@ share = [sizes["inherit"] / sizes["kmedoids"] for sizes in SIZES.values()]
 result = (f"- The excess volume (envelopes minus solid) of the default is at most {upper:.3f} times that of the smallest\n"
           f"  possible convex envelopes at levels 0 to 3, and at most {lower:.3f} times at levels 4 to 6.\n"
           f"- The default needs {min(share):.2f} to {max(share):.2f} times the level bytes of k-medoids at 40 %.\n"
-          f"- {'All goals are met' if 'missed' not in ''.join(TOLD) else 'Goals are missed'}.")
+          f"- {'All goals are met' if 'missed' not in ''.join(GOAL_ROWS) else 'Goals are missed'}.")
 goals = row("", "levels 0 to 3", "levels 4 to 6", "bytes") + row(*["---"] * 4) + "".join(
-    sorted(TOLD, key=lambda line: "missed" not in line))
+    sorted(GOAL_ROWS, key=lambda line: "missed" not in line))
 document = HEAD.replace("{RESULT}", result).replace("{GOALS}", goals) + tables
 document = reflow(document)
 if out:

@@ -58,7 +58,7 @@ def facts_of(ebpo, file):
     return json.loads(done.stdout)
 
 
-def write_questions(folder, facts, count):
+def write_queries(folder, facts, count):
     """Write points in and around the model, and rays between pairs of points. They are the same in each run."""
     dice, low, size = random.Random(1), facts["box_origin"], facts["box_size"]
 
@@ -93,9 +93,9 @@ def same(pair, model, folder, count):
     if codes[0] != 0:
         return []
     problems = [] if filecmp.cmp(*files, shallow=False) else ["the files differ"]
-    points, rays = write_questions(folder, facts_of(pair[0], files[0]), count)
-    for command, asked in (("inside", points), ("distance", points), ("ray", rays)):
-        said = [subprocess.run([e, command, files[0], asked], capture_output=True, check=False)
+    points, rays = write_queries(folder, facts_of(pair[0], files[0]), count)
+    for command, rows in (("inside", points), ("distance", points), ("ray", rays)):
+        said = [subprocess.run([e, command, files[0], rows], capture_output=True, check=False)
                 for e in pair]
         if said[0].returncode != said[1].returncode:
             problems.append(f"exit codes of {command}: {[s.returncode for s in said]}")
@@ -124,7 +124,7 @@ def time_model(options, model, folder):
         print(f"{model.name}: omitted: {said.decode(errors='replace').strip()}", file=sys.stderr)
         return {}
     facts = facts_of(options.pair[0], file)
-    points, _ = write_questions(folder, facts, options.count)
+    points, _ = write_queries(folder, facts, options.count)
     arguments = {"convert": ["-q", model, out], "verify": [file], "inside": [file, points],
                  "distance": [file, points]}
     times = {}

@@ -30,7 +30,7 @@ SECTIONS = ["rays", "distance", "inside", "memory", "budget", "modes", "distance
             "answers"]
 MORE = ["leaves", "misses"]  # sections that are printed only if --sections names them
 RAYS = ["uniform", "camera", "segments", "degenerate"]
-QUESTIONS = {"ray": "first hit", "ray-any": "any hit", "ray-all": "all hits"}
+RAY_QUERIES = {"ray": "first hit", "ray-any": "any hit", "ray-all": "all hits"}
 CUT = 4 # the cut level, for the second method of opening
 SHARE = {("distance", "uniform"): 20} # divisors of --count
 BUDGET = 256 << 20
@@ -42,7 +42,7 @@ TAILS = [("ray", "uniform"), ("distance", "uniform"), ("distance", "path"), ("in
 def cells_of(model, query):
     """Return the pairs (points, query) for a structure."""
     if query == "rays":
-        return [(points, q) for points in RAYS for q in QUESTIONS]
+        return [(points, q) for points in RAYS for q in RAY_QUERIES]
     return [(points, query) for points in ("uniform", "path")]
 
 
@@ -73,24 +73,24 @@ def in_turns(ways):
     return turns + others[len(turns) // 2:]
 
 
-def ask_cell(bench, model, servers, points, query):
+def query_cell(bench, model, servers, points, query):
     """Run the same queries with all programs and variants, in turns. Return reports, and counts of different results."""
     rays = query.startswith("ray")
     count = max(1, bench.options.count // SHARE.get((query, points), 1))
-    raw = model.questions(points, count, rays)
+    raw = model.queries_of(points, count, rays)
     end = ["--tmax", 1] if points == "segments" else []
-    told = {p: bench.work / f"answers.{p}" for p in servers}
+    saved = {p: bench.work / f"answers.{p}" for p in servers}
     ways = {(p, way): words for p in servers for way, words in ways_of(p, points, query).items()
             if p != "cgal" or query in ("ray", "inside", "distance")}
     reports = {way: [] for _, way in ways}
     for turn in range(bench.rounds(model) + 1):
         for peer, way in in_turns(ways):
             words = ways[peer, way]
-            save = ["--answers", told[peer]] if turn == 0 and way == peer else []
+            save = ["--answers", saved[peer]] if turn == 0 and way == peer else []
             report = servers[peer].ask(query, raw, *words, *end, *save)
             if turn > 0: # the first turn only warms up
                 reports[way].append(report)
-    wrong = {p: differences(query, told["ebpo"], told[p], 1e-6 * model.diagonal,
+    wrong = {p: differences(query, saved["ebpo"], saved[p], 1e-6 * model.diagonal,
                             lengths_of(raw) if rays else None)
              for p in servers if p != "ebpo" and reports.get(p) and None not in reports[p]}
     tails = {}
@@ -101,8 +101,8 @@ def ask_cell(bench, model, servers, points, query):
             "tails": tails, "count": count}
 
 
-def ask_model(bench, model, wanted):
-    """Return {(points, query): result of ask_cell}, structure by structure, because a peer has one tree for each."""
+def query_one_model(bench, model, wanted):
+    """Return {(points, query): result of query_cell}, structure by structure, because a peer has one tree for each."""
     results = {}
     for structure in wanted:
         servers = {}
@@ -110,7 +110,7 @@ def ask_model(bench, model, wanted):
             for peer in bench.peers(model):
                 servers[peer] = Server(bench, peer, model, *building(peer, model)).__enter__()
             for points, query in cells_of(model, structure):
-                results[points, query] = ask_cell(bench, model, servers, points, query)
+                results[points, query] = query_cell(bench, model, servers, points, query)
         finally:
             for server in servers.values():
                 server.__exit__()
@@ -235,7 +235,7 @@ def measure_budget(bench, model):
                                  ("distance", "path", bench.options.count),
                                  ("inside", "uniform", bench.options.count),
                                  ("inside", "path", bench.options.count)]:
-        raw = model.questions(points, max(1, count))
+        raw = model.queries_of(points, max(1, count))
         with Server(bench, "ebpo", model, "--memory", BUDGET, "--threads", 0, core=False) as s:
             rows.append((query, points, s.ask(query, raw, "--clocked",
                                               *(["--warm"] if query == "distance" else []))))
@@ -267,7 +267,7 @@ def section_opening(bench, page, models):
     rows = []
     for query in ["inside", "distance"]:
         for model in models:
-            raw = model.questions("uniform", 100)
+            raw = model.queries_of("uniform", 100)
             runs = {who: [] for who in ["ebpo", "cut"] + bench.peers(model)[1:]}
             for _ in range(bench.rounds(model)):
                 runs["ebpo"].append(bench.ours(model, query, "--count", 100))
@@ -402,19 +402,19 @@ POINTS = {
 def beside(bench, small, middling, wanted, found):
     """Run the parts that do not depend on time."""
     if "answers" in wanted:
-        found["answers"] = query_checks.judge_answers(bench, small)
+        found["answers"] = query_checks.judge_results(bench, small)
     if "misses" in wanted:
         found["misses"] = query_checks.count_misses(bench, [small, middling])
 
 
-def ask_models(bench, models, made, wanted):
+def query_models(bench, models, made, wanted):
     """Query the models in turns on one core, while another core runs the parts that do not depend on time."""
     below = [m for m in models if m.faces < 2000000]
     structures = [s for s in ("rays", "distance", "inside") if s in wanted]
     with concurrent.futures.ThreadPoolExecutor(1) as side:
         done = side.submit(beside, bench, models[0], below[-1], wanted, made.found)
         for model in models:
-            made.results[model] = ask_model(bench, model, structures)
+            made.results[model] = query_one_model(bench, model, structures)
             made.publish(models[-1])
         if "opening" in wanted:
             section_opening(bench, made.more, below)
@@ -435,7 +435,7 @@ def main():
                      list(options.models) + [grown(bench, what) for what in options.grow]),
                     key=lambda m: m.faces)
     made = Made(bench)
-    ask_models(bench, models, made, wanted)
+    query_models(bench, models, made, wanted)
     if "memory" in wanted:
         made.memory = {m: measure_memory(bench, m) for m in models}
         made.publish(models[-1])

@@ -32,17 +32,17 @@ def judge(bench, model, query, raw, which):
             "peers": dict(zip(peers, found["answers"]))}
 
 
-def judge_answers(bench, model):
+def judge_results(bench, model):
     count, rows = bench.options.judged, []
     for query in QUERIES:
         rays = query.startswith("ray")
         for points in ("uniform", "camera" if rays else "path"):
-            rows.append(judge(bench, model, query, model.questions(points, count, rays), points))
+            rows.append(judge(bench, model, query, model.queries_of(points, count, rays), points))
         rows.append(judge(bench, model, query, model.hard(rays, count), "hard"))
     return model, rows
 
 
-def write_answers(page, model, rows):
+def write_results(page, model, rows):
     shown = [r for r in rows if r["which"] == "hard" or any(map(wrong, r["peers"].values()))]
     page.text("## Correctness", "",
               f"{model.name}, compared with rational arithmetic over all faces "
@@ -85,7 +85,7 @@ def count_misses(bench, models):
     rows = []
     for model in models:
         for (query, points), count in MISSES.items():
-            raw = model.questions(points, count, query == "ray")
+            raw = model.queries_of(points, count, query == "ray")
             for peer in ("ebpo", "embree"):
                 few = cachegrind(bench, peer, model, query, raw, 1)
                 all_of = cachegrind(bench, peer, model, query, raw, count)
@@ -104,6 +104,6 @@ def write_misses(page, rows):
 
 def write(page, found):
     if found["answers"]:
-        write_answers(page, *found["answers"])
+        write_results(page, *found["answers"])
     if found["misses"]:
         write_misses(page, found["misses"])

@@ -106,7 +106,7 @@ class Model:
         self.faces = self.info["faces"]
         self.diagonal = math.hypot(*self.info["box_size"])
 
-    def questions(self, points, count, rays=False):
+    def queries_of(self, points, count, rays=False):
         """Return a file of `count` queries, which is made once.
 
         A cheap query makes it: rays without length, or inside with the first levels.

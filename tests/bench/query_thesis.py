@@ -35,12 +35,12 @@ EBP_DISTANCE_LEVELS = [(87.911, 73.668), (25.624, 23.895), (7.595, 9.783), (10.4
                        (4781.919, 43.845), (4678.370, 45.809)]
 
 
-def ask(bench, model, query, *arguments):
+def run_query(bench, model, query, *arguments):
     """Return mean nanoseconds and loaded subtrees, for uniform points and for a path."""
     out = {}
     counts = next((OTHERS[word] for word in arguments if word in OTHERS), COUNTS)
     for points, count in counts.items():
-        raw = model.questions(points, bench.options.count)
+        raw = model.queries_of(points, bench.options.count)
         report = bench.ours(model, query, "--count", count, "--memory", MEMORY,
                             "--cut-level", CUT, *arguments, points=raw)
         out[points] = (report["ns"]["mean"], report["model"]["loads"],
@@ -49,11 +49,11 @@ def ask(bench, model, query, *arguments):
 
 
 def modes(bench, model):
-    return {mode: ask(bench, model, "inside", "--mode", mode) for mode in EBP_MODES}
+    return {mode: run_query(bench, model, "inside", "--mode", mode) for mode in EBP_MODES}
 
 
 def levels(bench, model):
-    return {(level, mode): ask(bench, model, "inside", "--mode", mode, "--max-level", level)
+    return {(level, mode): run_query(bench, model, "inside", "--mode", mode, "--max-level", level)
             for level in range(1, deepest(model, EBP_LEVELS) + 1)
             for mode in ("cache", "nodes", "subtree")}
 
@@ -62,7 +62,7 @@ def distances(bench, model):
     kinds = {f"`{mode}`": ["--mode", mode] for mode in ("exact", "recursive", "leaves")}
     kinds |= {f"`envelope`, level {n}": ["--mode", "envelope", "--max-level", n]
               for n in range(1, deepest(model, EBP_DISTANCE_LEVELS) + 1)}
-    return {name: ask(bench, model, "distance", *words) for name, words in kinds.items()}
+    return {name: run_query(bench, model, "distance", *words) for name, words in kinds.items()}
 
 
 def deepest(model, rows):

@@ -26,7 +26,7 @@ import sys
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(1, str(HERE / "remote"))
 # pylint: disable=wrong-import-position
-import asked
+import url_queries
 import drivers
 import measured
 import remote_page
@@ -107,20 +107,20 @@ def build_in_turns(sides, ply, work):
 # --- all measurements ---
 
 def measure_sides(take, sides, server, line, work):
-    large = asked.Places(sides[0], "large", 100, work)
-    small = asked.Places(sides[0], "small", 50, work)
-    for name, row in asked.rows(large, small, work, SINGLES, VIEWS).items():
+    large = url_queries.Places(sides[0], "large", 100, work)
+    small = url_queries.Places(sides[0], "small", 50, work)
+    for name, row in url_queries.rows(large, small, work, SINGLES, VIEWS).items():
         for side in sides:
             take(f"{side.name}/{name}",
                  lambda s=side, r=row: {"what": r.what, "command": r.command,
-                                        **asked.measure(server, line, s, r, work)})
+                                        **url_queries.measure(server, line, s, r, work)})
     crowd = large.crowd("crowd.txt", EQUAL)
     near = Line(server.port, 0)
-    take(f"{sides[-1].name}/same", lambda: asked.same_answers(sides[-1], near, "large", crowd))
+    take(f"{sides[-1].name}/same", lambda: url_queries.same_results(sides[-1], near, "large", crowd))
     for side in sides:
         take(f"{side.name}/size", lambda s=side: {which: f.stat().st_size
                                                   for which, f in s.files.items()})
-        take(f"{side.name}/local", lambda s=side: asked.local(s, s.files["large"], OPENINGS, PATH))
+        take(f"{side.name}/local", lambda s=side: url_queries.local(s, s.files["large"], OPENINGS, PATH))
         take(f"{side.name}/viewer", lambda s=side: view(s, large, work))
 
 
@@ -173,11 +173,11 @@ def parse():
 
 def sides_of(options):
     new = options.build.resolve()
-    sides = [asked.Side(remote_page.AFTER, new, *options.files)]
+    sides = [url_queries.Side(remote_page.AFTER, new, *options.files)]
     if options.before:
         old, *files = options.before
-        sides[:0] = [asked.Side(remote_page.BEFORE, old.resolve(), *files),
-                     asked.Side(remote_page.MIXED, new, *files)]
+        sides[:0] = [url_queries.Side(remote_page.BEFORE, old.resolve(), *files),
+                     url_queries.Side(remote_page.MIXED, new, *files)]
     return sides
 
 

@@ -23,12 +23,12 @@ import measured
 from measured import MIB, Failed
 from query_page import Page, figure, handwritten, ratio, reflow
 
-BUDGET_OF_QUESTIONS = 256 * MIB
+QUERY_BUDGET = 256 * MIB
 OPENINGS = 5
 LARGE = 2000000  # models with at least this many faces have a third of the rounds
 GOALS = {"build_seconds": 150, "growth": 1.3, "first_levels": 1e6, "ratio_full": 0.60,
          "ratio_without_maps": 0.50, "decode": 300e6, "verify_times_build": 2,
-         "first_answer": 0.050, "p999": 1e6}
+         "first_result": 0.050, "p999": 1e6}
 
 
 class Scale:
@@ -45,14 +45,14 @@ class Scale:
     def rounds(self, faces):
         return self.options.rounds if faces < LARGE else max(1, self.options.rounds // 3)
 
-    def run(self, *command, cold=None, asks_json=True, accept=(0,)):
+    def run(self, *command, cold=None, needs_json=True, accept=(0,)):
         """Run a command. When it fails, return None and add a line to the page."""
         if self.options.verbose:
             print("+", shlex.join(map(str, command)), file=sys.stderr)
         self.load.append(os.getloadavg()[0])
         held = measured.drop_from_memory(cold) if cold else None
         try:
-            figures = (measured.run_json if asks_json else measured.run)(*command, accept=accept)
+            figures = (measured.run_json if needs_json else measured.run)(*command, accept=accept)
             return {**figures, "held_before": held}
         except (Failed, OSError, ValueError) as error:
             print(f"scale.py: {error}", file=sys.stderr)
@@ -73,7 +73,7 @@ def generate(scale, millions):
     made = None
     if not target.exists():
         made = scale.run(scale.build / "samples" / "ebpo-generate", *command[1:-1], target,
-                         asks_json=False)
+                         needs_json=False)
         if not made:
             sys.exit("scale.py: no model, no results")
     return target, command, made
@@ -94,8 +94,8 @@ def build_all(scale, ply, file, faces):
 def sizes_of(scale, file, bare, first):
     """Return the sizes on the disk: files with and without maps, and the first levels."""
     info = scale.run(scale.ebpo, "info", "--json", file)["report"]
-    scale.run(scale.ebpo, "subset", "-q", "--parts", "-maps", file, bare, asks_json=False)
-    scale.run(scale.ebpo, "subset", "-q", "--levels", "0-5", file, first, asks_json=False)
+    scale.run(scale.ebpo, "subset", "-q", "--parts", "-maps", file, bare, needs_json=False)
+    scale.run(scale.ebpo, "subset", "-q", "--levels", "0-5", file, first, needs_json=False)
     last = info["levels"][min(5, len(info["levels"]) - 1)]
     return {"info": info, "file": file.stat().st_size,
             "without_maps": bare.stat().st_size if bare.exists() else None,
@@ -105,20 +105,20 @@ def sizes_of(scale, file, bare, first):
             "first_levels_file": first.stat().st_size if first.exists() else None}
 
 
-def ask(scale, file, query, count, *arguments, seed=1):
-    return scale.run(scale.ebpo, "bench", file, "--memory", BUDGET_OF_QUESTIONS, "--query", query,
+def run_query(scale, file, query, count, *arguments, seed=1):
+    return scale.run(scale.ebpo, "bench", file, "--memory", QUERY_BUDGET, "--query", query,
                      "--points", "path", "--count", count, "--seed", seed, "--json", *arguments)
 
 
-def questions_of(scale, file):
+def measure_queries(scale, file):
     """Measure opening with one query, and a path, at full speed and at a haptic device's rate.
 
     The one query is near the surface, so it must load data, and at another position each time.
     """
     o = scale.options
-    return {query: {"open": [ask(scale, file, query, 1, seed=seed)
-                             for seed in range(1, OPENINGS + 1)], "path": ask(scale, file, query, o.count, "--prefetch"),
-                    "rate": ask(scale, file, query, o.rate_count, "--prefetch", "--rate",
+    return {query: {"open": [run_query(scale, file, query, 1, seed=seed)
+                             for seed in range(1, OPENINGS + 1)], "path": run_query(scale, file, query, o.count, "--prefetch"),
+                    "rate": run_query(scale, file, query, o.rate_count, "--prefetch", "--rate",
                                 1000)} for query in ("inside", "distance")}
 
 
@@ -138,7 +138,7 @@ def study(scale, millions):
     verified = [scale.run(scale.ebpo, "verify", "--json", *scale.verify_options, file, cold=file,
                           accept=(0, 1)) for _ in range(scale.rounds(faces))]  # 1: violations, which are reported
     result["verify"] = [v for v in verified if v]
-    result["queries"] = questions_of(scale, file)
+    result["queries"] = measure_queries(scale, file)
     for path in others:
         path.unlink(missing_ok=True)
     return result
@@ -244,7 +244,7 @@ def with_longest(seconds):
             else "-")
 
 
-def warm_answer(report):
+def warm_seconds(report):
     """Return the seconds of the only query."""
     return report["open_seconds"] + report["ns"]["max"] * 1e-9
 
@@ -252,14 +252,14 @@ def warm_answer(report):
 def opening_row(r, query):
     runs = r["queries"][query]["open"]
     reports = [run["report"] for run in runs if run]
-    return [f"{r['millions']:g} M", query, with_longest([warm_answer(f) for f in reports]),
+    return [f"{r['millions']:g} M", query, with_longest([warm_seconds(f) for f in reports]),
             with_longest([f["cold_first_result_seconds"] for f in reports])]
 
 
 def section_questions(page, results, options):
     page.text("## Opening and queries", "",
-              f"The budget is {BUDGET_OF_QUESTIONS // MIB} MiB (`ebpo bench --memory "
-              f"{BUDGET_OF_QUESTIONS}`), all cores. The table has the ms from opening to the "
+              f"The budget is {QUERY_BUDGET // MIB} MiB (`ebpo bench --memory "
+              f"{QUERY_BUDGET}`), all cores. The table has the ms from opening to the "
               f"first exact result near the surface, as median and maximum of {OPENINGS} points; "
               "*warm*, *cold*: the file is or is not in the page cache.")
     page.table(["model", "query", "warm", "cold"],
@@ -292,9 +292,9 @@ def bytes_of(size):
 def section_goals(page, scale, results):
     """Print the values of the largest model beside the goals."""
     r = results[-1]
-    s, questions = r["sizes"], r["queries"]
-    first = [run["report"] for query in questions.values() for run in query["open"] if run]
-    tails = {kind: max((query[kind]["report"]["ns"]["p999"] for query in questions.values()
+    s, by_query = r["sizes"], r["queries"]
+    first = [run["report"] for query in by_query.values() for run in query["open"] if run]
+    tails = {kind: max((query[kind]["report"]["ns"]["p999"] for query in by_query.values()
                         if query[kind]), default=None) for kind in ("path", "rate")}
     budget = bytes_of(scale.options.memory)
     _, worst = growth(results)
@@ -316,11 +316,11 @@ def section_goals(page, scale, results):
                "most"),
               ("violations", r["verify"][0]["report"]["violations"] if r["verify"] else None, 0,
                "most"),
-              ("first result warm, ms", max((warm_answer(f) for f in first), default=None),
-               GOALS["first_answer"], "most"),
+              ("first result warm, ms", max((warm_seconds(f) for f in first), default=None),
+               GOALS["first_result"], "most"),
               ("first result cold, ms",
                max((f["cold_first_result_seconds"] for f in first), default=None),
-               GOALS["first_answer"], "most"),
+               GOALS["first_result"], "most"),
               ("p99.9 of a path without pauses, us", tails["path"], GOALS["p999"], "most"),
               ("p99.9 of a path at 1,000 Hz, us", tails["rate"], GOALS["p999"], "most")]
     rows = []
@@ -333,7 +333,7 @@ def section_goals(page, scale, results):
     page.text("# Scale", "",
               f"- A model of {r['millions']:g} million faces is built in {figure(built(r))} s and "
               f"{figure(checks[1][1])} MiB; the file has {s['file'] / faces_of(r):.3f} B per face.",
-              f"- With a budget of {BUDGET_OF_QUESTIONS // MIB} MiB its first exact result comes "
+              f"- With a budget of {QUERY_BUDGET // MIB} MiB its first exact result comes "
               "at "
               f"most {figure(1e3 * checks[11][1])} ms after opening the cold file." if checks[11][1]
               else "- The first result of a cold file is not measured.",

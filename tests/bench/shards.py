@@ -40,7 +40,7 @@ def io_of(pid):
 
 def run(command, shards, out):
     """Return the seconds and, for each process, the bytes read and the seconds of opening the model."""
-    begun, processes, told = time.monotonic(), [], []
+    begun, processes, each = time.monotonic(), [], []
     for i in range(shards):
         processes.append(subprocess.Popen(command + ["--shard", f"{i}/{shards}", "-o", f"{out}.{i}"],
                                           stderr=subprocess.PIPE, text=True))
@@ -50,10 +50,10 @@ def run(command, shards, out):
         stats = process.stderr.read()
         if process.wait() != 0:
             sys.exit(f"{command}: {process.returncode}")
-        told.append({"rchar": read["rchar"], "disk": read["read_bytes"],
+        each.append({"rchar": read["rchar"], "disk": read["read_bytes"],
                      **{key: float(re.search(rf"\b{key} ([0-9.]+)", stats)[1])
                         for key in ("bytes_read", "loads", "open_seconds")}})
-    return time.monotonic() - begun, told
+    return time.monotonic() - begun, each
 
 
 def same(one, parts):
@@ -86,10 +86,10 @@ def main():
     seconds, asking, out = {1: [], 2: []}, {1: [], 2: []}, os.path.join(o.folder, "answers")
     for _ in range(o.rounds):
         for shards in (1, 2):
-            took, told = run(command, shards, f"{out}.{shards}")
+            took, each = run(command, shards, f"{out}.{shards}")
             seconds[shards].append(took)
-            asking[shards].append(took - max(t["open_seconds"] for t in told))
-            print(json.dumps({"processes": shards, "seconds": took, "each": told}), flush=True)
+            asking[shards].append(took - max(t["open_seconds"] for t in each))
+            print(json.dumps({"processes": shards, "seconds": took, "each": each}), flush=True)
     if not same(f"{out}.1.0", [f"{out}.2.0", f"{out}.2.1"]):
         sys.exit("the results of two processes differ from those of one")
     one, two = statistics.median(seconds[1]), statistics.median(seconds[2])

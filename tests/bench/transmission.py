@@ -61,10 +61,10 @@ def cell_of(octcode, info):
 
 def touched(tool, file, boxes):
     """Return for each box whether a face intersects it, exactly."""
-    answers, at, found = run(tool, "box", "--raw", file,
+    results, at, found = run(tool, "box", "--raw", file,
                              data=numpy.array(boxes, "<f8").tobytes()), 0, []
     for _ in boxes:
-        count, = struct.unpack_from("<Q", answers, at)
+        count, = struct.unpack_from("<Q", results, at)
         found.append(count > 0)
         at += 8 + 8 * count
     return found
@@ -80,16 +80,16 @@ def farthest(tool, file, group, info, size):
                                                         polyhedra(group)) if kind != BLACK]
     cells = [cell_of(code, info) for code, _ in nodes]
     certain = 0.0
-    for (_, shape), (_, diagonal), meets in zip(nodes, cells, touched(tool, file, [box for box, _ in cells])):
+    for (_, shape), (_, diagonal), intersects in zip(nodes, cells, touched(tool, file, [box for box, _ in cells])):
         # When a face intersects the cell, the convex envelope contains one of its points. Otherwise
         # a face is within 1/256 of the cell's size.
         difference = shape[:, None, :] - shape[None, :, :]
-        certain = max(certain, numpy.sqrt((difference**2).sum(2).max()) if meets
+        certain = max(certain, numpy.sqrt((difference**2).sum(2).max()) if intersects
                       else diagonal * (1 + 1 / 256))
     corners = numpy.concatenate([shape for _, shape in nodes]).astype("<f8")
-    answers = numpy.frombuffer(run(tool, "distance", "--raw", file, data=corners.tobytes()),
+    results = numpy.frombuffer(run(tool, "distance", "--raw", file, data=corners.tobytes()),
                                "<f8").reshape(-1, 8)
-    return 100 * certain / size, 100 * max(answers[:, 0].max(), 0) / size
+    return 100 * certain / size, 100 * max(results[:, 0].max(), 0) / size
 
 
 def study(tool, model, folder, leaf_planes):

@@ -43,7 +43,7 @@ def expect(good, what):
     return "yes" if good else "**no**"
 
 
-def answers(tool, file, points, folder):
+def results_of(tool, file, points, folder):
     """Returns the raw query results and the mesh that a tool reads from a file."""
     back = folder / "back.ply"
     solid = run(tool, "inside", "--raw", file, points, text=False)
@@ -61,7 +61,7 @@ def old_files(folder):
             run(OLD, "convert", "-q", "--codec", codec, MODELS / f"{name}.ply", file)
             run(OLD, "bench", "--count", 1000, "--save-points", points, file)
             opens = run(NEW, "info", file).returncode == 0
-            same = answers(OLD, file, points, folder) == answers(NEW, file, points, folder)
+            same = results_of(OLD, file, points, folder) == results_of(NEW, file, points, folder)
             row(name, codec, expect(opens, name), expect(run(NEW, "verify", "-q", file).returncode == 0, name),
                 expect(same, name))
     passed, failed = sorted(VECTORS.glob("passed/*.h5")), sorted(VECTORS.glob("failed/*.h5"))
@@ -86,7 +86,7 @@ def new_files(folder):
             run(NEW, "bench", "--count", 1000, "--save-points", points, whole)
             done = run(OLD, "info", whole)
             opens, verified = done.returncode == 0, run(OLD, "verify", "-q", whole).returncode == 0
-            same = opens and answers(OLD, whole, points, folder)[:2] == answers(NEW, whole, points, folder)[:2]
+            same = opens and results_of(OLD, whole, points, folder)[:2] == results_of(NEW, whole, points, folder)[:2]
             refused = 'needs part "subtrees"' in done.stderr or 'needs part "gates"' in done.stderr
             expect(verified and same if opens else refused and not verified, f"{name} {options}")
             row(name.removeprefix("wild/"), " ".join(options) or "default", "yes" if opens else "no",

@@ -40,10 +40,10 @@ class Readers:
     def browser(self, reader, url, to):
         done = subprocess.run(["node", HERE / "browser.mjs", ROOT / "tools/web", self.site,
                                reader, url, str(to)], check=True, capture_output=True, text=True)
-        answer = json.loads(done.stdout)
-        if "failed" in answer:
-            raise RuntimeError(f"{reader}: {answer['failed']}")
-        return answer
+        result = json.loads(done.stdout)
+        if "failed" in result:
+            raise RuntimeError(f"{reader}: {result['failed']}")
+        return result
 
     def all(self):
         return {"ebpo (C)": self.ours, "HDF5 ros3": self.ros3,

@@ -4,7 +4,7 @@ The page has the measurements of the new build; --json keeps the others.
 """
 import statistics
 
-import asked
+import url_queries
 import measured
 from query_page import Page, figure
 
@@ -130,11 +130,11 @@ def query_table(page, found):
     page.text("## Queries by URL", "",
               "The round trip is 100 ms, also for each new connection. nginx's log has the requests "
               "and bytes (of bodies). *Round trips* are chains of dependent requests, counted with "
-              f"`--http-connections {asked.CONNECTIONS}`: the minimum of {asked.TRIES} tries. All "
+              f"`--http-connections {url_queries.CONNECTIONS}`: the minimum of {url_queries.TRIES} tries. All "
               "else is measured with the default connections.", "",
-              f"*Near* points are at most {asked.NEAR:g} diagonals from the surface, at positions where "
+              f"*Near* points are at most {url_queries.NEAR:g} diagonals from the surface, at positions where "
               f"random lines enter the model. The commands are `ebpo distance` and `ebpo inside "
-              f"--memory {asked.BUDGET} URL POINTS`, `ebpo fetch -q --box`, `ebpo levels --max-level` and `ebpo "
+              f"--memory {url_queries.BUDGET} URL POINTS`, `ebpo fetch -q --box`, `ebpo levels --max-level` and `ebpo "
               "view --seen-only --pixels 16`.")
     page.table(["query", "round trips", "requests", "bytes", "s"],
                [[row["what"],
@@ -145,7 +145,7 @@ def query_table(page, found):
     if same is not None:
         page.text("For 10,000 points around the same positions, the results by URL and from the "
                   f"file on disk are {'equal' if same else 'NOT equal'} (`ebpo inside` and `ebpo "
-                  f"distance`, `--memory {asked.BUDGET}`).")
+                  f"distance`, `--memory {url_queries.BUDGET}`).")
 
 
 def viewer_table(page, found):
@@ -154,7 +154,7 @@ def viewer_table(page, found):
               "serves page and model (`node tests/bench/remote/viewed.mjs`). Each page is newly "
               "opened with an empty cache. *first*: time to the first picture; *settled*: time to "
               "the last request; *click*: from a settled page to the exact distance; *close*: from "
-              f"a settled page to a settled view from {asked.VIEW_FROM} diagonals away.")
+              f"a settled page to a settled view from {url_queries.VIEW_FROM} diagonals away.")
     page.table(["step", "s", "model: requests", "bytes", "page: requests", "bytes"],
                [[step, *map(figure, (part["seconds"], *part["model"], *part["page"]))]
                 for step, part in (found.row(AFTER, "viewer") or {}).items()])
@@ -162,7 +162,7 @@ def viewer_table(page, found):
 
 def local_table(page, found):
     page.text("## Local file", "",
-              f"The table has results of `ebpo bench --memory {asked.BUDGET} --query QUERY`: the first "
+              f"The table has results of `ebpo bench --memory {url_queries.BUDGET} --query QUERY`: the first "
               "result from a cold file (`--points path --count 1 --seed 1..5`), a path (`--points path "
               "--count 200000 --prefetch`), and uniform points (`--points uniform --count 1000`).")
     table = []

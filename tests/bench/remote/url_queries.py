@@ -144,7 +144,7 @@ def rows(large, small, work, singles, views):
     return {row.name: row for row in table}
 
 
-def ask(server, line, side, row, work, connections=None):
+def run_row(server, line, side, row, work, connections=None):
     """Run the commands one after the other, each in a new process. Return {requests, bytes, seconds or waves: [of each]}."""
     out, found = work / "out.ebpo.h5", {"requests": [], "bytes": [], "seconds": [], "waves": []}
     name = side.link(row.which)
@@ -171,11 +171,11 @@ def ask(server, line, side, row, work, connections=None):
 
 def measure(server, line, side, row, work):
     """Measures a row with the default connections, and its dependent round trips with 32."""
-    found = ask(server, line, side, row, work)
+    found = run_row(server, line, side, row, work)
     found["round_trips"] = found.pop("waves")
     if row.waves:
         # other load of the machine only increases the number
-        tries = [ask(server, line, side, row, work, CONNECTIONS)["waves"] for _ in range(TRIES)]
+        tries = [run_row(server, line, side, row, work, CONNECTIONS)["waves"] for _ in range(TRIES)]
         found["waves"] = [min(each) for each in zip(*tries)]
     return found
 
@@ -196,7 +196,7 @@ def local(side, file, seeds, count):
     return found
 
 
-def same_answers(side, line, which, points):
+def same_results(side, line, which, points):
     """Return True when the results by URL equal those from the file."""
     url = f"http://127.0.0.1:{line.port}/{side.link(which)}"
     return all(side.run(command, "--memory", BUDGET, url, points)
