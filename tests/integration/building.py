@@ -191,7 +191,7 @@ def proving_and_extracting(place, model):
 
 def same_bytes_as_default(root, model):
     """Compare bytes with default envelopes."""
-    place, seen = Place(root, "usual"), []
+    place, seen = Place(root, "default"), []
     for memory, threads in (("16G", 1), ("128MiB", 3)):
         code, said, _, _ = run(place.command(model, "-q", "--memory", memory, "--threads",
                                              str(threads), options=[]), place.temp_dir)

@@ -139,7 +139,7 @@ def judge(what, right, outcome, must_go_on):
         good = check(len(results) == len(right), f"{what}: {len(results)} results, and success")
     else:
         good = check(code == 1 and said and not must_go_on, f"{what}: {code}: {said!r}") and good
-    count(what.split(":")[0], "wrong" if not good else "all answers" if code == 0 else "error")
+    count(what.split(":")[0], "wrong" if not good else "all results" if code == 0 else "error")
 
 
 def on_disk(root, a, b):

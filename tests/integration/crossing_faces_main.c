@@ -1,6 +1,6 @@
-/* crossing_faces MODEL.ply...: is each model a closed 2-manifold of which no two faces meet but
- * where they share a corner or an edge? One line for each, and code 1 unless all are. For models as
- * ebpo-generate writes them. */
+/* crossing_faces MODEL.ply...: checks that each model is a closed 2-manifold whose faces have no
+ * common points except shared corners and edges. Prints a line for each model; exit code 1: a check
+ * fails. Reads only PLY files of ebpo-generate. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -59,7 +59,7 @@ static bool check(const char *path)
     uint64_t first[2] = { 0, 0 }, clashes = 0;
     bool ok = read_model(path, &m);
     if (!ok) {
-        printf("%s: no PLY as ebpo-generate writes it\n", path);
+        printf("%s: not a PLY file of ebpo-generate\n", path);
     } else {
         face_model faces = { (const float(*)[3])m.xyz, (const uint32_t(*)[3])m.corners, m.vertices,
                              m.faces };
@@ -69,7 +69,7 @@ static bool check(const char *path)
                manifold ? "a closed manifold" : "not a closed manifold", flat);
         if (flat == 0) {
             clashes = crossing_faces(&faces, first);
-            printf(", %" PRIu64 " pairs meet", clashes);
+            printf(", %" PRIu64 " pairs intersect", clashes);
         }
         if (clashes)
             printf(", the first %" PRIu64 " and %" PRIu64, first[0], first[1]);

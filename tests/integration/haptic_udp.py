@@ -46,7 +46,7 @@ def receive(s, to, packet, sequence):
         try:
             got = FEEL.unpack(s.recv(4096))
         except socket.timeout:
-            assert tries > 0, "no answer"
+            assert tries > 0, "no reply"
             tries -= 1
             s.sendto(packet, to)
             continue

@@ -101,4 +101,4 @@ else:
     check_xdmf()
     check_vtkhdf()
     check_glb()
-print("fine")
+print("OK")

@@ -16,7 +16,7 @@ CANNOT = "was built without libhdf5"
 READING = dict(os.environ, LC_ALL="C.UTF-8", LD_LIBRARY_PATH=os.path.dirname(LIBRARY))
 # The build finds its own library without LD_LIBRARY_PATH; Meson may put the other library's folder
 # first.
-USUAL = {k: v for k, v in READING.items() if k != "LD_LIBRARY_PATH"}
+DEFAULT = {k: v for k, v in READING.items() if k != "LD_LIBRARY_PATH"}
 failures = []
 
 
@@ -34,7 +34,7 @@ def run(environment, *words, given=None):
 
 def same(*words, given=None):
     """Check that both libraries give the same exit code and output."""
-    reading, default = run(READING, *words, given=given), run(USUAL, *words, given=given)
+    reading, default = run(READING, *words, given=given), run(DEFAULT, *words, given=given)
     check(reading == default, f"{' '.join(words)}: as with libhdf5 ({reading[0]}, {default[0]}; "
           f"{reading[2].strip()[:200]})")
     return default
@@ -87,11 +87,11 @@ def other_outputs(model):
     if "png" in FEATURES:
         outputs.append(["render", "-q", "--size", "64x64", model, "OUT.png"])
     for words in outputs:
-        for name, environment in ("reading", READING), ("usual", USUAL):
+        for name, environment in ("reading", READING), ("default", DEFAULT):
             code, _, said = run(environment, *(w.replace("OUT", name) for w in words))
             check(code == 0, f"{words[0]} works with the {name} library ({said.strip()})")
         end = words[-1].replace("OUT", "")
-        check(slurp("reading" + end) == slurp("usual" + end), f"{words[0]}: the same bytes")
+        check(slurp("reading" + end) == slurp("default" + end), f"{words[0]}: the same bytes")
 
 
 def main():
@@ -100,7 +100,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
         subprocess.run([INPUTS, "."], check=True)
-        check(run(USUAL, "convert", "-q", "torus.ply", "t.ebpo.h5")[0] == 0, "a model")
+        check(run(DEFAULT, "convert", "-q", "torus.ply", "t.ebpo.h5")[0] == 0, "a model")
         other_outputs("t.ebpo.h5")
         writing("t.ebpo.h5")
         os.chdir("/")

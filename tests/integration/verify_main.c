@@ -1,5 +1,5 @@
-/* verify_main FILE...: every file keeps what it promises. Needs the reading library alone, so that
- * it shows a system for which the command cannot be linked (docs/develop/portability.md). */
+/* verify_main FILE...: verifies every file. Needs only the reading library, so it also runs on
+ * systems for which the command cannot be linked (docs/develop/portability.md). */
 #include <ebpo/ebpo.h>
 #include <stdio.h>
 

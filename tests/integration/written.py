@@ -169,7 +169,7 @@ def copies(tried, path, server):
 
 
 def model(tried, path, server):
-    tried.made("convert", "", path, "usual.ebpo.h5")
+    tried.made("convert", "", path, "default.ebpo.h5")
     tried.made("convert", "--subtree-faces 64 --profile full", path, "parts.ebpo.h5")
     for options in tried.option_sets(CONVERT):
         if not tried.made("convert", options, path, "c.ebpo.h5"):
@@ -178,7 +178,7 @@ def model(tried, path, server):
             if tried.made("repack", again, "c.ebpo.h5", "p.ebpo.h5"):
                 os.unlink("p.ebpo.h5")
         os.unlink("c.ebpo.h5")
-    for name in ("usual.ebpo.h5", "parts.ebpo.h5"):
+    for name in ("default.ebpo.h5", "parts.ebpo.h5"):
         copies(tried, name, server)
         os.unlink(name)
 

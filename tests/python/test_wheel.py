@@ -28,7 +28,7 @@ OTHERS = re.compile(r"^(?!lib(zstd|z|gmp|nettle|jansson)\.so)")
 ALLOWED = {"libc.so.6", "libm.so.6", "libpthread.so.0", "libdl.so.2", "librt.so.1", "libgcc_s.so.1", "libstdc++.so.6",
            "ld-linux-x86-64.so.2", "ld-linux-aarch64.so.1"}
 
-ASK = """
+QUERY = """
 import ctypes, os, sys
 import numpy as np, ebpo
 here = os.path.dirname(ebpo.__file__)
@@ -109,7 +109,7 @@ def main():
         run(inputs, ".")
         run(command, "convert", "-q", "sphere.ply", "sphere.ebpo.h5")
         nothing = {name: value for name, value in os.environ.items() if not name.startswith(("EBPO", "PYTHON", "LD_"))}
-        print(run(python, "-c", ASK, env=dict(nothing, PATH="/usr/bin:/bin")), end="")
+        print(run(python, "-c", QUERY, env=dict(nothing, PATH="/usr/bin:/bin")), end="")
         run(sys.executable, "-m", "pip", "--python", python, "uninstall", "-y", "ebpo")
         assert not list(pathlib.Path(name).glob("clean/lib/python*/site-packages/ebpo*")), "uninstall removes all files"
     return 0

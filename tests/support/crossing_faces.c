@@ -150,7 +150,7 @@ static bool segment_intersects(const float *p, const float *q, const triangle t)
 }
 
 /* Returns true when faces f and g have a common point besides shared corners and edges. */
-static bool meet(const face_model *m, uint64_t f, uint64_t g)
+static bool have_common_point(const face_model *m, uint64_t f, uint64_t g)
 {
     triangle a, b;
     int shared = 0, at_a[3], at_b[3];
@@ -301,7 +301,7 @@ uint64_t crossing_faces(const face_model *m, uint64_t first[2])
     for (uint64_t i = 0; i < count; i++)
         for (uint64_t j = i + 1; j < count && entries[j].cell == entries[i].cell; j++)
             if (near(m, &g, entries[i].cell, entries[i].face, entries[j].face) &&
-                meet(m, entries[i].face, entries[j].face) && !found++) {
+                have_common_point(m, entries[i].face, entries[j].face) && !found++) {
                 first[0] = entries[i].face;
                 first[1] = entries[j].face;
             }

@@ -49,7 +49,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
         return ([("ETag", etag)] if etag else []) + ([("Last-Modified", modified)] if modified
                                                      else [])
 
-    def asked(self, data):
+    def requested_range(self, data):
         found = re.fullmatch(r"bytes=(\d+)-(\d+)", self.headers.get("Range", ""))
         if not found:
             return None
@@ -63,11 +63,11 @@ class Handler(http.server.BaseHTTPRequestHandler):
         cut: bytes that are missing at the end.
         """
         data = self.data if data is None else data
-        asked = self.asked(data)
-        if asked is None:
+        requested = self.requested_range(data)
+        if requested is None:
             self.head(416, [("Content-Range", f"bytes */{len(data)}"), ("Content-Length", 0)])
             return
-        begin, last = asked
+        begin, last = requested
         body = data[begin:last + 1]
         self.head(code, [("Content-Range", f"bytes {begin + shift}-{last + shift}/{len(data)}"),
                          ("Content-Length", len(body))]
@@ -156,7 +156,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
 
     def fault_small_parts(self):
         """Send at most 32 KiB at a time, with the correct Content-Range."""
-        begin, last = self.asked(self.data)
+        begin, last = self.requested_range(self.data)
         self.headers.replace_header("Range", f"bytes={begin}-{min(last, begin + 32767)}")
         self.part()
 
@@ -206,7 +206,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
     def fault_lying_length(self, times=99):
         """Send a body that agrees with Content-Length but is shorter than the range."""
         def fault():
-            begin, last = self.asked(self.data)
+            begin, last = self.requested_range(self.data)
             body = self.data[begin:last + 1][:500]
             self.head(206, [("Content-Range", f"bytes {begin}-{last}/{len(self.data)}"),
                             ("Content-Length", len(body))] + self.version())
@@ -215,14 +215,14 @@ class Handler(http.server.BaseHTTPRequestHandler):
 
     def fault_less(self):
         """Send a shorter range than requested, with the correct Content-Range; this is allowed."""
-        begin, last = self.asked(self.data)
+        begin, last = self.requested_range(self.data)
         last = min(last, begin + 70000)
         self.head(206, [("Content-Range", f"bytes {begin}-{last}/{len(self.data)}"),
                         ("Content-Length", last - begin + 1)] + self.version())
         self.wfile.write(self.data[begin:last + 1])
 
     def fault_wrong_range(self):
-        self.part(shift=1 if self.asked(self.data)[1] + 1 < len(self.data) else -1)
+        self.part(shift=1 if self.requested_range(self.data)[1] + 1 < len(self.data) else -1)
 
     def fault_wrong_range_later(self, good=1):
         self.part(shift=0 if self.number <= good else -1)
@@ -233,28 +233,28 @@ class Handler(http.server.BaseHTTPRequestHandler):
         self.wfile.write(body)
 
     def fault_no_range(self):
-        begin, last = self.asked(self.data)
+        begin, last = self.requested_range(self.data)
         self.head(206, [("Content-Length", last + 1 - begin)])
         self.wfile.write(self.data[begin:last + 1])
 
     def fault_star(self):
-        begin, last = self.asked(self.data)
+        begin, last = self.requested_range(self.data)
         self.head(206, [("Content-Range", f"bytes {begin}-{last}/*"),
                         ("Content-Length", last + 1 - begin)])
         self.wfile.write(self.data[begin:last + 1])
 
     def fault_two_ranges(self):
-        begin, last = self.asked(self.data)
+        begin, last = self.requested_range(self.data)
         self.part(extra=[("Content-Range", f"bytes {begin}-{last}/{len(self.data) + 1}")])
 
     def fault_wide(self):
-        begin = self.asked(self.data)[0]
+        begin = self.requested_range(self.data)[0]
         self.head(206, [("Content-Range", f"bytes {begin}-{len(self.data) - 1}/{len(self.data)}"),
                         ("Content-Length", len(self.data) - begin)])
         self.wfile.write(self.data[begin:])
 
     def fault_longer(self):
-        begin, last = self.asked(self.data)
+        begin, last = self.requested_range(self.data)
         self.chunks(206, [("Content-Range", f"bytes {begin}-{last}/{len(self.data)}")],
                     self.data[begin:last + 1] + b"more")
 
@@ -265,7 +265,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
         self.wfile.write(body)
 
     def fault_gzip(self):
-        begin, last = self.asked(self.data)
+        begin, last = self.requested_range(self.data)
         body = gzip.compress(self.data[begin:last + 1])
         self.head(206, [("Content-Range", f"bytes {begin}-{last}/{len(self.data)}"),
                         ("Content-Encoding", "gzip"), ("Content-Length", len(body))]
@@ -282,7 +282,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
 
     def fault_stall_body(self, times=1):
         def fault():
-            begin, last = self.asked(self.data)
+            begin, last = self.requested_range(self.data)
             self.head(206, [("Content-Range", f"bytes {begin}-{last}/{len(self.data)}"),
                             ("Content-Length", last + 1 - begin)] + self.version())
             self.wfile.write(self.data[begin:begin + 1000])
@@ -291,7 +291,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
 
     def fault_drip(self):
         """Send a few bytes at a time, without an end."""
-        begin, last = self.asked(self.data)
+        begin, last = self.requested_range(self.data)
         self.head(206, [("Content-Range", f"bytes {begin}-{last}/{len(self.data)}"),
                         ("Content-Length", last + 1 - begin)] + self.version())
         for at in range(begin, last + 1, 200):
@@ -415,7 +415,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
             self.part(data=self.data[::-1], version=self.version(etag='"v2"'))
 
     def fault_chunked(self):
-        begin, last = self.asked(self.data)
+        begin, last = self.requested_range(self.data)
         self.chunks(206, [("Content-Range", f"bytes {begin}-{last}/{len(self.data)}")],
                     self.data[begin:last + 1])
 
