@@ -6,7 +6,7 @@ import { probeAt, probeShown, probeWith } from './probe.js';
 import { listSamples } from './samples.js';
 import { Scene } from './scene.js';
 import { LEVEL_COLOURS, MESH_COLOUR, TYPE_COLOURS } from './shade.js';
-import { address, atHome, changed, said, shareOf, went, whereTo } from './share.js';
+import { address, changed, fileOfEntry, pushStep, setHomeView, setPicture, viewParameters } from './share.js';
 import { $, count, on, state, tell, toModel } from './state.js';
 
 const MORE_MS = 5000; // the tools are loaded so long after the first picture, or earlier when all data has arrived
@@ -18,7 +18,7 @@ let coming; // a promise of more.js, once it has been requested
 const boot = window.ebpoBoot, { worker } = boot; // boot.js may already have requested a file
 const scene = new Scene($('canvas'), boot, { changed: cameraMoved, drawn: frameDrawn });
 probeWith(scene, worker);
-shareOf(scene);
+setPicture(scene);
 
 // --- opening ---
 
@@ -28,7 +28,7 @@ function open(what, name, begun) {
   Object.assign(state, { info: undefined, depth: -1, idle: false, timeline: [], stats: undefined, probe: undefined, box: undefined, measured: undefined, error: undefined,
     shownAfter: undefined, auto: AUTO.first, frames: [] });
   scene.clear();
-  const { camera, level } = said(new URLSearchParams(location.search));
+  const { camera, level } = viewParameters(new URLSearchParams(location.search));
   Object.assign(state, { levelAsked: level });
   home(camera);
   tell('closed');
@@ -52,14 +52,14 @@ function openUrl(text, { begun = false, step = true } = {}) {
     return;
   }
   if (step)
-    went(text);
+    pushStep(text);
   $('url').value = text;
   open(url.href, boot.nameOf(url.href), begun);
 }
 
 function openFile(file, { step = true } = {}) {
   if (step)
-    went(file);
+    pushStep(file);
   open(file, file.name);
 }
 
@@ -91,7 +91,7 @@ function close({ step = true } = {}) {
     return;
   }
   if (step)
-    went();
+    pushStep();
   state.opening++;
   Object.assign(state, { info: undefined, depth: -1, idle: false });
   tell('closed');
@@ -111,7 +111,7 @@ function close({ step = true } = {}) {
 // Moves the camera to the view of an address, or to the default view.
 function home(camera) {
   scene.home();
-  atHome();
+  setHomeView();
   if (camera)
     scene.place = camera;
 }
@@ -139,7 +139,7 @@ const handlers = {
     $('level').max = stops;
     makeLevels(chooseLevel);
     layout();
-    shownAs(said(new URLSearchParams(location.search)));
+    showView(viewParameters(new URLSearchParams(location.search)));
     tell('opened');
   },
   loaded(m) {
@@ -290,7 +290,7 @@ function cutChanged() {
 }
 
 // Applies all parameters of a view in an address.
-function shownAs({ camera, level, clip, box, point, measured, colouring, walls, detail: pixels }) {
+function showView({ camera, level, clip, box, point, measured, colouring, walls, detail: pixels }) {
   home(camera);
   $('level').value = level ?? $('level').max;
   $('detail').value = pixels;
@@ -452,13 +452,13 @@ addEventListener('popstate', (e) => {
     location.reload();
     return;
   }
-  const query = new URLSearchParams(location.search), what = whereTo(query, e.state);
+  const query = new URLSearchParams(location.search), what = fileOfEntry(query, e.state);
   if (what === undefined)
     close({ step: false });
   else if (typeof what !== 'string')
     openFile(what, { step: false });
   else if (state.info && typeof state.what === 'string' && new URL(what, location.href).href === state.what)
-    shownAs(said(query));
+    showView(viewParameters(query));
   else
     openUrl(what, { step: false });
 });
@@ -468,7 +468,7 @@ on('complaint', (message) => showError({ message }));
 // --- tools that are loaded later: measuring, notes, the pen, sharing ---
 
 function more() {
-  coming ??= import('./more.js').then((m) => m.begin({ scene, worker, ask, cutChanged, changed, address, shownAs: (query) => shownAs(said(query)), layout, query: boot.query }),
+  coming ??= import('./more.js').then((m) => m.begin({ scene, worker, ask, cutChanged, changed, address, shownAs: (query) => showView(viewParameters(query)), layout, query: boot.query }),
     (error) => showError({ message: `The page's tools could not be loaded (${error.message}); reload the page` }));
   return coming;
 }
@@ -487,7 +487,7 @@ if (query.has('scene') || query.has('model'))
 else if (query.has('file'))
   openUrl(query.get('file'), { begun: boot.opening === 1, step: false });
 boot.over();
-boot.said.splice(0).forEach((data) => worker.onmessage({ data }));
+boot.messages.splice(0).forEach((data) => worker.onmessage({ data }));
 
 /** The current state, for tests and debugging. */
 window.ebpoViewer = {

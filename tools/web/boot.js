@@ -8,7 +8,7 @@
   const PATIENCE_MS = 1500;       // longest time for which app.js waits for HEAD_BYTES
   const FIELD_OF_VIEW = 38;       // vertical, in degrees
 
-  const query = new URLSearchParams(location.search), said = [];
+  const query = new URLSearchParams(location.search), messages = [];
   const number = (name) => (/^\d+$/.test(query.get(name) ?? '') ? Number(query.get(name)) : undefined);
   document.documentElement.dataset.theme = query.get('theme') ?? (matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark');
   if (location.protocol === 'file:') { // browsers load neither modules nor workers for pages opened from disk
@@ -16,8 +16,8 @@
     return;
   }
   const worker = new Worker('worker.js', { type: 'module' });
-  worker.onmessage = ({ data }) => said.push(data);
-  const boot = window.ebpoBoot = { worker, said, query, level: number('level'), detail: number('detail'), fieldOfView: FIELD_OF_VIEW, opening: 0, over() {},
+  worker.onmessage = ({ data }) => messages.push(data);
+  const boot = window.ebpoBoot = { worker, messages, query, level: number('level'), detail: number('detail'), fieldOfView: FIELD_OF_VIEW, opening: 0, over() {},
     contextOptions: { antialias: true, powerPreference: 'high-performance', preserveDrawingBuffer: true } };
   // A name may contain a literal %.
   boot.nameOf = (url) => {

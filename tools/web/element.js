@@ -108,7 +108,7 @@ export class EbpoViewerElement extends HTMLElement {
     else if (name === 'colours')
       this.#several?.assembly.setColours(text);
     else if (name === 'view')
-      this.#look();
+      this.#setView();
     else if (name === 'clip' || name === 'box')
       this.#cut();
     else if (name === 'point' && this.info && !this.#several && pointsOf(text)?.length === 1)
@@ -116,26 +116,26 @@ export class EbpoViewerElement extends HTMLElement {
     else if (name === 'point' && !text)
       scene.showProbe();
     else if (name === 'colour')
-      this.#both((it) => it.setColouring(['level', 'type'].includes(text) ? text : 'plain'));
+      this.#applyToScenes((it) => it.setColouring(['level', 'type'].includes(text) ? text : 'plain'));
     else if (name === 'walls')
-      this.#both((it) => it.setWalls(text !== '0'));
+      this.#applyToScenes((it) => it.setWalls(text !== '0'));
     else if (name === 'theme')
-      this.#dress(text ?? (matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark'));
-    this.#want();
+      this.#setTheme(text ?? (matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark'));
+    this.#sendView();
   }
 
-  #both(change) {
+  #applyToScenes(change) {
     change(this.#scene);
     if (this.#several)
       change(this.#several.assembly);
   }
 
-  #dress(theme) {
+  #setTheme(theme) {
     this.#part('#stage').className = theme === 'light' ? 'light' : '';
-    this.#both((it) => it.setTheme(theme !== 'light'));
+    this.#applyToScenes((it) => it.setTheme(theme !== 'light'));
   }
 
-  #look() {
+  #setView() {
     const camera = cameraOf(this.getAttribute('view'));
     if (camera)
       this.#scene.place = camera;
@@ -156,7 +156,7 @@ export class EbpoViewerElement extends HTMLElement {
     return /^\d+$/.test(this.getAttribute(name) ?? '') ? Number(this.getAttribute(name)) : undefined;
   }
 
-  #want() {
+  #sendView() {
     const level = this.#number('level') ?? 99, pixels = this.#number('detail') ?? PIXELS, { info } = this;
     this.#several?.moved();
     if (this.#several || !this.#client)
@@ -168,34 +168,34 @@ export class EbpoViewerElement extends HTMLElement {
   #moved() {
     if (!this.#client && !this.#several)
       return;
-    this.#want();
+    this.#sendView();
     clearTimeout(this.#timer);
-    this.#timer = setTimeout(() => this.#tell('view', { view: this.view }), LATER_MS);
+    this.#timer = setTimeout(() => this.#dispatch('view', { view: this.view }), LATER_MS);
   }
 
-  #tell(name, detail) {
+  #dispatch(name, detail) {
     this.dispatchEvent(new CustomEvent(name, { detail }));
   }
 
-  #hear(type, news) {
+  #handle(type, news) {
     if (type === 'tiles') {
       this.#scene.setTiles(news.set, news.removed);
     } else if (type === 'line') {
       const { got, want, quiet } = news, bar = this.#part('#bar');
       bar.hidden = !(want > 0);
       bar.style.width = want > 0 ? `${100 * got / want}%` : '';
-      this.#say(news.trouble ?? (want > 0 && quiet > 3000 ? `No data for ${Math.floor(quiet / 1000)} s` : ''));
-      this.#tell('progress', { got, want, quiet });
+      this.#showMessage(news.trouble ?? (want > 0 && quiet > 3000 ? `No data for ${Math.floor(quiet / 1000)} s` : ''));
+      this.#dispatch('progress', { got, want, quiet });
     } else if (type === 'idle') {
       this.#part('#bar').hidden = true;
-      this.#tell('idle', { traffic: news.traffic });
+      this.#dispatch('idle', { traffic: news.traffic });
     } else if (type === 'failed') {
-      this.#say(news.error.message);
-      this.#tell('error', { code: news.error.code, message: news.error.message, ...(news.model && { model: news.model }) });
+      this.#showMessage(news.error.message);
+      this.#dispatch('error', { code: news.error.code, message: news.error.message, ...(news.model && { model: news.model }) });
     }
   }
 
-  #say(text) {
+  #showMessage(text) {
     if (this.#part('#say').textContent !== text)
       this.#part('#say').textContent = text;
   }
@@ -207,7 +207,7 @@ export class EbpoViewerElement extends HTMLElement {
     this.#several = undefined;
     this.#scene.clear();
     this.#scene.setCut();
-    this.#say('');
+    this.#showMessage('');
   }
 
   // --- opening the attributes and parts ---
@@ -237,22 +237,22 @@ export class EbpoViewerElement extends HTMLElement {
       parts.forEach(({ pose, hidden }, i) => this.#several?.place(i, poseFrom(pose), hidden));
       this.#apply('hide');
     } catch (error) {
-      this.#hear('failed', { error: { code: 'ARGUMENT', message: error.message } });
+      this.#handle('failed', { error: { code: 'ARGUMENT', message: error.message } });
     }
   }
 
   async #openSeveral(asking) {
     this.#close();
-    const several = this.#several = new Several(this.#scene, { worker: EbpoViewerElement.worker, heard: (type, news) => this.#hear(type, news),
+    const several = this.#several = new Several(this.#scene, { worker: EbpoViewerElement.worker, heard: (type, news) => this.#handle(type, news),
       want: () => ({ pixels: this.#number('detail') ?? PIXELS, triangles: TRIANGLES_MOST }) });
     try {
       const facts = await several.open(await asking());
       ['time', 'hide', 'colours', 'colour', 'walls', 'theme', 'view', 'box'].forEach((name) => this.#apply(name));
-      this.#tell('load', facts);
+      this.#dispatch('load', facts);
       return facts;
     } catch (error) {
       if (error.name !== 'AbortError')
-        this.#hear('failed', { error: { code: error.code ?? 'ARGUMENT', message: error.message } });
+        this.#handle('failed', { error: { code: error.code ?? 'ARGUMENT', message: error.message } });
       throw error;
     }
   }
@@ -294,12 +294,12 @@ export class EbpoViewerElement extends HTMLElement {
     if (Array.isArray(what))
       return this.#openSeveral(async () => ofParts(what.map((part) => ({ ...part, pose: poseFrom(part.pose) })), document.baseURI));
     this.#close();
-    this.#client ??= new Client({ worker: EbpoViewerElement.worker, heard: (type, news) => this.#hear(type, news) });
+    this.#client ??= new Client({ worker: EbpoViewerElement.worker, heard: (type, news) => this.#handle(type, news) });
     const { info } = await this.#client.open(what);
-    this.#look();
+    this.#setView();
     this.#cut();
-    this.#want();
-    this.#tell('load', info);
+    this.#sendView();
+    this.#dispatch('load', info);
     const points = pointsOf(this.getAttribute('point'));
     if (points?.length === 1)
       this.ask(points[0]).catch(() => {});
@@ -322,7 +322,7 @@ export class EbpoViewerElement extends HTMLElement {
     this.#scene.showProbe(inScene(point));
     const answer = several ? await several.ask(point, instance) : await this.#askOne(point), { where, nearest } = answer;
     this.#scene.showProbe(inScene(point), nearest && inScene(nearest), where === 'in' ? '#4cc38a' : where === 'out' ? '#ff6b6b' : '#ffb020');
-    this.#tell('point', answer);
+    this.#dispatch('point', answer);
     return answer;
   }
 

@@ -62,7 +62,7 @@ function segmentWithin(centre, square, p, q) {
 }
 
 /** Returns the indices of the faces that are connected with the face `own` inside a ball, ascending. `faces`: nine numbers each. */
-export function hangTogether(faces, own, centre, radius) {
+export function connectedFaces(faces, own, centre, radius) {
   const square = radius * radius, places = new Map(), root = faces.map((_, i) => i), edges = new Map();
   const setOf = (i) => {
     while (root[i] !== i)
@@ -104,7 +104,7 @@ export async function reachOf(file, tree, points) {
       out.push({ here: subset && own < 0 ? 'elsewhere' : 'no' });
       continue;
     }
-    const reach = crowded || !(radius > 0) ? undefined : hangTogether(around.corners, own, place, radius), inBall = reach && around.corners.filter((f) => nearestOnTriangle(place, f, 0)[0] <= radius);
+    const reach = crowded || !(radius > 0) ? undefined : connectedFaces(around.corners, own, place, radius), inBall = reach && around.corners.filter((f) => nearestOnTriangle(place, f, 0)[0] <= radius);
     const alone = reach && inBall.length > reach.filter((i) => nearestOnTriangle(place, around.corners[i], 0)[0] <= radius).length;
     out.push({ here: 'yes', normal: normalOf(around.corners[own]), faces: alone ? Float64Array.from(reach.flatMap((i) => [...around.corners[i]])) : undefined });
   }

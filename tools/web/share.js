@@ -8,17 +8,17 @@ const OF_A_VIEW = ['view', 'level', 'clip', 'box', 'point', 'measure', 'colour',
 const files = []; // files from disk, by their number in the history's entries
 let timer, home, picture;
 
-export function shareOf(scene) {
+export function setPicture(scene) {
   picture = scene;
 }
 
 /** Takes the current camera as the default, which the address omits. */
-export function atHome() {
+export function setHomeView() {
   home = cameraText(picture.place);
 }
 
 /** Adds a step to the history: another file, by its address or as a File, or no file. */
-export function went(what) {
+export function pushStep(what) {
   clearTimeout(timer);
   timer = undefined;
   const href = withQuery(location.href, [...OF_A_VIEW.map((name) => [name]), ['paint'], ['file', typeof what === 'string' ? what : undefined]]);
@@ -28,13 +28,13 @@ export function went(what) {
 }
 
 /** Returns the file of an entry of the history: an address, a File or undefined. */
-export const whereTo = (query, entry) => (entry?.local !== undefined ? files[entry.local] : query.get('file') ?? undefined);
+export const fileOfEntry = (query, entry) => (entry?.local !== undefined ? files[entry.local] : query.get('file') ?? undefined);
 
 /**
  * Returns the parameters of an address about the open file: { camera, level, clip, box, point, measured, colouring, walls, detail }. Missing parameters are undefined,
  * except for the last three, which have defaults.
  */
-export function said(query) {
+export function viewParameters(query) {
   const one = (name) => pointsOf(query.get(name))?.[0], level = query.get('level');
   return { camera: cameraOf(query.get('view')), level: /^\d+$/.test(level ?? '') ? Number(level) : undefined, clip: clipOf(query.get('clip')), box: boxOf(query.get('box')),
     point: one('point'), measured: pointsOf(query.get('measure')), colouring: query.get('colour') ?? 'plain', walls: query.get('walls') !== '0', detail: query.get('detail') ?? 'auto' };

@@ -15,10 +15,10 @@ export const length = (x, digits = 5, power = 1) => `${Number(x.toPrecision(digi
 
 // --- coordinates ---
 
-// The picture's y axis points upwards; `up` is 2 when the model's z axis does. upright() converts to the picture's axes, laid() back.
+// The picture's y axis points upwards; `up` is 2 when the model's z axis does. upright() converts to the picture's axes, fromUpright() back.
 export const upright = ([x, y, z], up) => (up === 2 ? [x, z, -y] : [x, y, z]);
-export const laid = ([x, y, z], up) => (up === 2 ? [x, -z, y] : [x, y, z]);
-export const fromPicture = (p, { center, scale, up }) => laid(p, up).map((x, k) => x / scale + center[k]);
+export const fromUpright = ([x, y, z], up) => (up === 2 ? [x, -z, y] : [x, y, z]);
+export const fromPicture = (p, { center, scale, up }) => fromUpright(p, up).map((x, k) => x / scale + center[k]);
 export const toPicture = (p, { center, scale, up }) => upright(p.map((x, k) => (x - center[k]) * scale), up);
 export const toModel = (p) => fromPicture(p, state.scene);
 export const toScene = (p) => toPicture(p, state.scene);

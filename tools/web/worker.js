@@ -211,7 +211,7 @@ async function answer(data, slot, mine) {
 }
 
 // Reports progress to the page, and reports once when all requests have ended.
-function tellLine(slot) {
+function reportProgress(slot) {
   const { current } = slot, underway = current?.source?.underway?.() ?? [];
   if (!underway.length && slot.silent)
     return;
@@ -221,7 +221,7 @@ function tellLine(slot) {
   post(slot, { type: 'line', opening: current?.number, got: sum((t) => t.got), want: sum((t) => t.to - t.from), quiet: underway.length ? Math.min(...underway.map((t) => t.quiet)) : 0,
     what, trouble: source?.trouble?.message });
 }
-setInterval(() => slots.forEach(tellLine), LINE_MS);
+setInterval(() => slots.forEach(reportProgress), LINE_MS);
 const retry = ({ current }) => current?.source?.retry?.();
 self.addEventListener('online', () => slots.forEach(retry));
 
@@ -230,7 +230,7 @@ function end(slot) {
   slot.current = undefined;
 }
 
-async function heed(data, slot) {
+async function handle(data, slot) {
   const { current } = slot, ready = current?.tree?.root;
   if (data.type === 'first') {
     takeFirst(data);
@@ -262,7 +262,7 @@ async function heed(data, slot) {
 self.onmessage = async ({ data }) => {
   const slot = slotOf(data.file);
   try {
-    await heed(data, slot);
+    await handle(data, slot);
   } catch (error) {
     post(slot, { type: 'failed', opening: data.opening ?? slot.current?.number, error: describe(error) });
   }

@@ -8,7 +8,7 @@ import { join } from 'node:path';
 import { test } from 'node:test';
 import { Tree, openEbpo } from '../reader/index.js';
 import { readPaint } from '../paint/paint_file.js';
-import { hangTogether, reachOf } from '../reach.js';
+import { connectedFaces, reachOf } from '../reach.js';
 import { plates } from './plates.js';
 
 // A generator of reproducible pseudorandom numbers.
@@ -40,7 +40,7 @@ test('connected faces agree with the reference implementation', () => {
   for (let round = 0; round < 60; round++) {
     const points = Array.from({ length: 14 }, () => [next(), next(), next() * 0.4]), pick = () => points[Math.floor(next() * points.length)];
     const faces = Array.from({ length: 12 }, () => Float64Array.from([...pick(), ...pick(), ...pick()])), centre = [next(), next(), 0.2], radius = 0.1 + 0.3 * next();
-    assert.deepEqual(hangTogether(faces, 0, centre, radius), plainly(faces, 0, centre, radius), `round ${round}`);
+    assert.deepEqual(connectedFaces(faces, 0, centre, radius), plainly(faces, 0, centre, radius), `round ${round}`);
   }
 });
 

@@ -246,7 +246,7 @@ class Together {
     this.moved();
     if (!instance)
       return;
-    this.#tellChosen(instance, model);
+    this.#showChosen(instance, model);
     if (!point || !model.info)
       return;
     try {
@@ -254,7 +254,7 @@ class Together {
       if (asks !== this.asks)
         return;
       this.near = answer.nearest;
-      this.#tellAnswer(model, answer, instance.now.scale);
+      this.#showResult(model, answer, instance.now.scale);
       this.#marks();
     } catch (error) {
       if (error.name !== 'AbortError')
@@ -262,7 +262,7 @@ class Together {
     }
   }
 
-  #tellChosen(instance, { name, info, size, error, file }) {
+  #showChosen(instance, { name, info, size, error, file }) {
     $('chosenName').textContent = instance.name;
     $('chosenModel').textContent = instance.name === name ? '' : name;
     const rows = info ? [['Faces', count(info.face_count)], ['Kind', info.solid ? 'solid' : 'surface'], ['Levels', `0–${info.level_count - 1}`], ['File', bytes(size)],
@@ -275,7 +275,7 @@ class Together {
       $('chosenOpen').href = withQuery(new URL(location.pathname, location.href).href, [['file', file]]);
   }
 
-  #tellAnswer({ info }, { where, distance, lo, hi, exact }, scale) {
+  #showResult({ info }, { where, distance, lo, hi, exact }, scale) {
     const words = { in: 'Inside', out: 'Outside', on: 'On the surface', maybe: 'Undecided' };
     $('chosenWhere').textContent = info.solid ? words[where] ?? '' : 'A surface';
     $('chosenNote').textContent = `${exact ? `${length(distance * scale, 6)} to the nearest face` : `${length(lo * scale, 3)} – ${length(hi * scale, 3)} to the surface`}; at ` +

@@ -179,9 +179,9 @@ for (const path of files.filter(withSubtrees))
       cache.bytes = 0;
       await file.parts.subtrees.rows([i]); // cached, except for the counts
       source.count();
-      const found = await file.subtrees([i]), { waves, requests } = source.count(), lean = tree.lean();
+      const found = await file.subtrees([i]), { roundTrips, requests } = source.count(), lean = tree.lean();
       const turns = 1 + Math.ceil((requests - 1) / 6); // one round trip for shared blocks; the other requests run six at a time
-      assert.ok(waves <= turns && requests <= 10, `${waves} waves, ${requests} requests for subtree ${i}`);
+      assert.ok(roundTrips <= turns && requests <= 10, `${roundTrips} round trips, ${requests} requests for subtree ${i}`);
       found.forEach(({ part, segment }) => lean.addPart(part, segment));
       const root = nodeOf(lean, lean.root, i, info.subtree_level), leaves = leavesOf(lean, root);
       if (info.parts.has('mesh') && leaves.length)

@@ -1,4 +1,4 @@
-// A source with a latency: counts requests, bytes and round trips (`waves`). Requests that do not wait for each other are one round trip.
+// A source with a latency: counts requests, bytes and round trips. Requests that do not wait for each other are one round trip.
 import { openSync, readSync, fstatSync } from 'node:fs';
 
 const pause = (ms) => new Promise((done) => setTimeout(done, ms));
@@ -23,19 +23,19 @@ export class SlowSource {
     this.asked = []; // [offset, length, round trip]
     this.done = 0;   // number of round trips with a response
     this.free = 0;   // time at which the connection is free
-    this.requests = this.bytes = this.waves = 0;
+    this.requests = this.bytes = this.roundTrips = 0;
   }
 
   async #request(offset, length) {
-    const wave = this.done + 1;
+    const trip = this.done + 1;
     this.requests++;
     this.bytes += length;
-    this.asked.push([offset, length, wave]);
-    this.waves = Math.max(this.waves, wave);
+    this.asked.push([offset, length, trip]);
+    this.roundTrips = Math.max(this.roundTrips, trip);
     const now = performance.now();
     this.free = Math.max(this.free, now + this.latency) + length / this.bandwidth;
     await pause(this.free - now);
-    this.done = Math.max(this.done, wave);
+    this.done = Math.max(this.done, trip);
     return this.take(offset, length);
   }
 
@@ -52,9 +52,9 @@ export class SlowSource {
     return offset + length <= this.coming ? this.take(offset, length) : this.#request(offset, length);
   }
 
-  /** Returns { requests, bytes, waves } since the last call. */
+  /** Returns { requests, bytes, roundTrips } since the last call. */
   count() {
-    const { requests, bytes, done } = this.last ?? { requests: 0, bytes: 0, done: 0 }, out = { requests: this.requests - requests, bytes: this.bytes - bytes, waves: this.done - done };
+    const { requests, bytes, done } = this.last ?? { requests: 0, bytes: 0, done: 0 }, out = { requests: this.requests - requests, bytes: this.bytes - bytes, roundTrips: this.done - done };
     this.last = { requests: this.requests, bytes: this.bytes, done: this.done };
     return out;
   }
