@@ -26,7 +26,7 @@ check("quantiles ascend", 0 <= ns["p50"] <= ns["p99"] <= ns["p999"] <= ns["max"]
       and 0 < ns["mean"] <= ns["max"])
 check("as many points as counted", len(points) == wide * bench["count"])
 check("as many results as points", sum(bench["results"].values()) == bench["count"])
-check("opening comes before the first answer",
+check("opening precedes the first result",
       0 < bench["cold_open_seconds"] <= bench["cold_first_result_seconds"])
 check("bytes were read", 0 < bench["cold_bytes_read"]
       and 0 < bench["bytes_read"] == bench["model"]["bytes_read"])
@@ -40,7 +40,7 @@ if len(sys.argv) > 2:
     rows = [points[i:i + 3] for i in range(0, len(points), 3)]
     step = mesh["mean_edge"] / 10 + 0.02 * diagonal * 0.1
     check("steps are short", all(math.dist(a, b) <= step for a, b in zip(rows, rows[1:])))
-    check("the path goes somewhere", max(math.dist(rows[0], r) for r in rows) > 0.1 * diagonal)
+    check("the path moves", max(math.dist(rows[0], r) for r in rows) > 0.1 * diagonal)
     check("points are near the box",
           all(l - 0.011 * diagonal <= c <= h + 0.011 * diagonal for r in rows
               for l, c, h in zip(low, r, high)))

@@ -94,7 +94,7 @@ def parts(tool, folder, path, url):
         expect(f"fetch {options}", done.returncode == 0 and content(out) == content(near),
                done.stderr)
         expect(f"{options}: verify", run(tool, "verify", "-q", out).returncode == 0)
-        expect(f"{options}: nothing is left",
+        expect(f"{options}: nothing remains",
                sorted(os.listdir(folder)) == sorted(["m.ply", "m.ebpo.h5", "other.ebpo.h5",
                                                      "o.ebpo.h5",
                                                      "near.ebpo.h5"]), os.listdir(folder))
@@ -129,7 +129,7 @@ def refusals(tool, folder, path, url):
     Handler.reset()
     Handler.damage = True
     done = run(tool, "fetch", url, out)
-    expect("a transfer that was damaged", done.returncode == 1 and "start again" in done.stderr
+    expect("a damaged transfer", done.returncode == 1 and "start again" in done.stderr
            and not os.path.exists(part) and not os.path.exists(out), done.stderr)
     done = run(tool, "fetch", url, out)
     expect("and the next one", done.returncode == 0 and content(out) == content(path), done.stderr)
@@ -146,17 +146,17 @@ def resume(tool, folder, path, url):
     Handler.reset(left=3)
     done = run(tool, "fetch", "--http-connections", "1", url, out)
     held, first = blocks(part), Handler.sent
-    expect("an interruption keeps what came",
+    expect("an interruption keeps received blocks",
            done.returncode == 1 and not os.path.exists(out) and held > len(Handler.data) / 8
            and held >= first - 131072 and "kept in " + part in done.stderr,
            (held, first, done.stderr))
     Handler.reset()
     done = run(tool, "fetch", url, out)
-    expect("and goes on from there", done.returncode == 0 and content(out) == content(path)
+    expect("the next run continues from there", done.returncode == 0 and content(out) == content(path)
            and "resuming with" in done.stderr, done.stderr)
-    expect("without fetching it again", Handler.sent <= whole - held + 2 * 131072,
-           f"{Handler.sent} of {whole}, {held} had come")
-    expect("the folder goes", not os.path.exists(part))
+    expect("without fetching the blocks again", Handler.sent <= whole - held + 2 * 131072,
+           f"{Handler.sent} of {whole}, {held} were received")
+    expect("the folder is removed", not os.path.exists(part))
     print(f"whole {whole} bytes; interrupted after {first}, {held} kept; then {Handler.sent}")
     os.remove(out)
     # A block that was damaged on disk is fetched again.
@@ -180,10 +180,10 @@ def change(tool, folder, path, url):
     Handler.data, Handler.etag = content(other), '"2"'
     Handler.reset()
     done = run(tool, "fetch", url, out)
-    expect("a file that has changed begins anew",
+    expect("a changed file is fetched from the beginning",
            done.returncode == 0 and content(out) == content(other)
            and "has changed on the server" in done.stderr, done.stderr)
-    expect("and its folder goes", not os.path.exists(out + ".part"))
+    expect("its folder is removed", not os.path.exists(out + ".part"))
     Handler.data, Handler.etag = content(path), '"1"'
     os.remove(out)
 
@@ -204,7 +204,7 @@ def interrupt(tool, folder, path, url):
            and not os.path.exists(out), (child.returncode, held))
     Handler.reset()
     done = run(tool, "fetch", "-q", url, out)
-    expect("and the next run ends well", done.returncode == 0 and content(out) == content(path),
+    expect("the next run succeeds", done.returncode == 0 and content(out) == content(path),
            done.stderr)
     os.remove(out)
 
@@ -261,9 +261,9 @@ def attributes(tool, plain, url):
                     expect(f"attributes, {layout}, {name}: verify", run(tool, "verify", "-q", out).returncode == 0)
             reported = json.loads(run(tool, "info", "--json", path).stdout)
             stored = reported["bytes"]["attributes"]
-            expect(f"attributes, {layout}: what is left out is not fetched",
+            expect(f"attributes, {layout}: omitted attributes are not fetched",
                    stored > 10000 and sent["bare"] <= sent["all"] - stored // 2, (sent, stored))
-            expect(f"attributes, {layout}: straight from the server", *comes_back(tool, folder, ply, url,
+            expect(f"attributes, {layout}: directly from the server", *comes_back(tool, folder, ply, url,
                                                                                  same_ply.compare))
 
 

@@ -23,7 +23,7 @@ def main():
     seen = process.poll() is None
     process.send_signal(number)
     code = process.wait(timeout=60)
-    print(f"{'interrupted' if seen else 'came too late'}, ended by {-code}, left {leftovers(out)}")
+    print(f"{'interrupted' if seen else 'finished before the signal'}, ended by {-code}, left {leftovers(out)}")
 
 
 main()

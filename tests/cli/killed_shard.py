@@ -40,7 +40,7 @@ def end_by(act, code, model, rows):
             os.remove(OUT + ".shard")
         rows *= 2
         if rows > 1 << 28:
-            sys.exit("is never under way")
+            sys.exit("never runs long enough")
 
 
 def main():

@@ -40,17 +40,17 @@ def run(*words, free=None, given="", before=None, **more):
     environment = dict(os.environ, LC_ALL="C.UTF-8", **more)
     if free is not None:
         environment.update(LD_PRELOAD=LITTLE, EBPO_TEST_FREE=str(free))
-    with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as said, \
+    with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as messages, \
             tempfile.TemporaryFile("w+") as stdin:
         stdin.write(given)
         stdin.seek(0)
-        process = subprocess.Popen([TOOL, *words], stdin=stdin, stdout=out, stderr=said,
+        process = subprocess.Popen([TOOL, *words], stdin=stdin, stdout=out, stderr=messages,
                                    env=environment, preexec_fn=before)
         _, status, usage = os.wait4(process.pid, 0)
         process.returncode = os.waitstatus_to_exitcode(status)
         out.seek(0)
-        said.seek(0)
-        return process.returncode, out.read(), said.read(), usage.ru_maxrss * 1024
+        messages.seek(0)
+        return process.returncode, out.read(), messages.read(), usage.ru_maxrss * 1024
 
 
 def slurp(path):
@@ -91,21 +91,21 @@ if "png" in FEATURES:
 def holding_is_limited():
     for words, out in HOLDING:
         command = words[0]
-        code, _, said, _ = run(command, "--memory", "1K", *words[1:], before=small_stacks)
-        check(code == 1 and "1.00 kB is what --memory allows" in said,
-              f"{command} --memory 1K is refused ({code}: {said.strip()})")
+        code, _, messages, _ = run(command, "--memory", "1K", *words[1:], before=small_stacks)
+        check(code == 1 and "1.00 kB is what --memory allows" in messages,
+              f"{command} --memory 1K is refused ({code}: {messages.strip()})")
         check(not out or not os.path.exists(out), f"{command} leaves no output")
-        code, _, said, _ = run(*words, free=1000, before=small_stacks)
-        check(code == 1 and "1.00 kB was free at the start" in said,
-              f"{command} with 1000 bytes free is refused ({code}: {said.strip()})")
+        code, _, messages, _ = run(*words, free=1000, before=small_stacks)
+        check(code == 1 and "1.00 kB was free at the start" in messages,
+              f"{command} with 1000 bytes free is refused ({code}: {messages.strip()})")
         for limit in ([], ["--memory", "1G"], ["--memory", "0"]):
-            code, _, said, _ = run(command, *limit, *words[1:])
-            check(code == 0, f"{command} {' '.join(limit)} works ({code}: {said.strip()})")
-        code, _, said, _ = run(command, "--memory", "much", *words[1:])
-        check(code == 2 and "--memory: 'much' is not a size" in said, f"{command} --memory much")
+            code, _, messages, _ = run(command, *limit, *words[1:])
+            check(code == 0, f"{command} {' '.join(limit)} works ({code}: {messages.strip()})")
+        code, _, messages, _ = run(command, "--memory", "much", *words[1:])
+        check(code == 2 and "--memory: 'much' is not a size" in messages, f"{command} --memory much")
 
 
-def limits_of_others_stay():
+def soft_limits_are_kept():
     """A soft limit below the free memory is kept; it is read after the first result."""
     soft = 512 << 20
     process = subprocess.Popen(
@@ -126,16 +126,16 @@ def little_data():
     resource.setrlimit(resource.RLIMIT_DATA, (100 << 20, resource.RLIM_INFINITY))
 
 
-def what_the_caller_allows():
+def caller_limits_are_kept():
     """A limit of the process is never exceeded."""
     if "png" not in FEATURES:
         return
     large = ["render", "-q", "--size", "4000x4000", "b.ebpo.h5", "large.png"]
     for limit in ([], ["--memory", "1G"], ["--memory", "0"]):
-        code, _, said, _ = run(*large, *limit, before=little_data)
-        check(code == 1 and "not enough memory" in said,
-              f"what the caller allows holds with {limit} ({code}: {said.strip()})")
-    check(not os.path.exists("large.png"), "no output is left")
+        code, _, messages, _ = run(*large, *limit, before=little_data)
+        check(code == 1 and "not enough memory" in messages,
+              f"the limit of the caller is kept with {limit} ({code}: {messages.strip()})")
+    check(not os.path.exists("large.png"), "no output remains")
 
 
 # The operation for which libcairo runs out of memory: EBPO_TEST_CAIRO of CAIRO.
@@ -143,12 +143,12 @@ UNDRAWN = {"nothing": "", "drawing": "out of memory for a picture's captions",
            "surface": "out of memory for a picture's captions"}
 
 
-def captions_are_never_left_out():
+def captions_are_never_omitted():
     """When requested captions cannot be drawn, the result is an error, and no picture is written."""
     words = ["render", "--size", "64x64", "--levels", "0,1", "b.ebpo.h5", "captions.png"]
     for lacks, reported in UNDRAWN.items() if CAIRO else ():
-        code, _, said, _ = run(*words, LD_LIBRARY_PATH=os.path.dirname(CAIRO), EBPO_TEST_CAIRO=lacks)
-        check(code == (1 if reported else 0) and reported in said, f"lacks {lacks}: {code}, {said.strip()}")
+        code, _, messages, _ = run(*words, LD_LIBRARY_PATH=os.path.dirname(CAIRO), EBPO_TEST_CAIRO=lacks)
+        check(code == (1 if reported else 0) and reported in messages, f"lacks {lacks}: {code}, {messages.strip()}")
         check(os.path.exists("captions.png") == (not reported), f"lacks {lacks}: no output")
         if not reported:
             os.remove("captions.png")
@@ -156,9 +156,9 @@ def captions_are_never_left_out():
     with open("damaged/libcairo.so.2", "w", encoding="ascii") as f:
         f.write("no library")
     if CAIRO:
-        code, _, said, _ = run(*words, LD_LIBRARY_PATH=os.path.abspath("damaged"))
-        check(code == 1 and "libcairo, which draws captions, cannot be loaded" in said,
-              f"a damaged libcairo: {code}, {said.strip()}")
+        code, _, messages, _ = run(*words, LD_LIBRARY_PATH=os.path.abspath("damaged"))
+        check(code == 1 and "libcairo, which draws captions, cannot be loaded" in messages,
+              f"a damaged libcairo: {code}, {messages.strip()}")
         check(not os.path.exists("captions.png"), "a damaged libcairo: no output")
 
 
@@ -173,13 +173,13 @@ def models_are_held_in_parts():
         right = None
         for free, noted in ((1 << 40, False), (whole + least, False), (least + least // 2, True)):
             out = f"{command}{free}.nrrd"
-            code, reported, said, _ = run(*(out if w == "OUT.nrrd" else w for w in words), free=free)
-            check(code == 0, f"{command} with {free} bytes free works ({said.strip()})")
-            check(("note: needs at least" in said) == noted,
-                  f"{command} with {free} bytes free: what is held is said ({said.strip()})")
+            code, reported, messages, _ = run(*(out if w == "OUT.nrrd" else w for w in words), free=free)
+            check(code == 0, f"{command} with {free} bytes free works ({messages.strip()})")
+            check(("note: needs at least" in messages) == noted,
+                  f"{command} with {free} bytes free: the needed memory is reported ({messages.strip()})")
             result = slurp(out) if command == "map" else sorted(reported.splitlines())
             right = right or result
-            check(command == "haptic" or result == right, f"{command} answers the same from parts")
+            check(command == "haptic" or result == right, f"{command} has the same results in parts")
 
 
 def verify_keeps_its_budget():
@@ -187,10 +187,10 @@ def verify_keeps_its_budget():
     run("convert", "-q", "quads.ply", "one.ebpo.h5")
     subprocess.run([sys.executable, os.path.join(HERE, "bomb.py"), "one.ebpo.h5", "bomb.ebpo.h5",
                     "8000000"], check=True, stdout=subprocess.DEVNULL)
-    code, _, said, peak = run("verify", "--memory", "128M", "--max-expansion", "1000",
+    code, _, messages, peak = run("verify", "--memory", "128M", "--max-expansion", "1000",
                               "bomb.ebpo.h5")
-    check(code == 1 and "content" in said, f"verify of many faces in one leaf ({said.strip()})")
-    check(peak <= 128e6, f"it keeps to 128 MB: {peak / 1e6:.0f} MB")
+    check(code == 1 and "content" in messages, f"verify of many faces in one leaf ({messages.strip()})")
+    check(peak <= 128e6, f"uses at most 128 MB: {peak / 1e6:.0f} MB")
 
 
 def shortened_while_read():
@@ -202,10 +202,10 @@ def shortened_while_read():
         process = subprocess.Popen([TOOL, "check", "-q", "s.ply"], stderr=subprocess.PIPE)
         time.sleep(0.006 * i)
         os.truncate("s.ply", 2000)
-        said = process.communicate()[1].decode()
-        reported = "while it was read" in said or "cut short" in said or "the file ends" in said
+        messages = process.communicate()[1].decode()
+        reported = "while it was read" in messages or "cut short" in messages or "the file ends" in messages
         check(process.returncode == 0 or (process.returncode == 1 and reported),
-              f"check of a mesh that is shortened ({process.returncode}: {said.strip()})")
+              f"check of a mesh that is shortened ({process.returncode}: {messages.strip()})")
 
 
 PIPES = ["scene info pipe", "scene boxes names.json", "verify --against pipe b.ebpo.h5",
@@ -243,14 +243,14 @@ def hdf5_without_locks():
                     "f['of/rays'] = [[5, .5, .5, -1, 0, 0]]"], check=True)
     for number in (errno.EROFS, errno.ENOLCK, errno.EOPNOTSUPP, 524, errno.ENOSYS):
         for words in (("inside", "cube.ebpo.h5", "rows.h5:/p"), ("ray", "cube.ebpo.h5", "rows.h5:/of/rays")):
-            code, out, said, _ = run(*words, LD_PRELOAD=LITTLE, EBPO_TEST_LOCK=str(number))
-            check(code == 0 and out and not said, f"{words[0]} where locks fail with {number}: {said}")
-        code, _, said, _ = run("inside", "cube.ebpo.h5", "rows.h5", LD_PRELOAD=LITTLE, EBPO_TEST_LOCK=str(number))
-        check(code == 1 and "rows.h5:/p" in said, f"datasets are named where locks fail with {number}: {said}")
+            code, out, messages, _ = run(*words, LD_PRELOAD=LITTLE, EBPO_TEST_LOCK=str(number))
+            check(code == 0 and out and not messages, f"{words[0]} where locks fail with {number}: {messages}")
+        code, _, messages, _ = run("inside", "cube.ebpo.h5", "rows.h5", LD_PRELOAD=LITTLE, EBPO_TEST_LOCK=str(number))
+        check(code == 1 and "rows.h5:/p" in messages, f"datasets are named where locks fail with {number}: {messages}")
     with open("rows.h5", "rb") as writer:
         fcntl.flock(writer, fcntl.LOCK_EX)
-        code, out, said, _ = run("inside", "cube.ebpo.h5", "rows.h5:/p")
-        check(code == 1 and not out and "rows.h5: is open for writing in another program" in said, f"locked: {said}")
+        code, out, messages, _ = run("inside", "cube.ebpo.h5", "rows.h5:/p")
+        check(code == 1 and not out and "rows.h5: is open for writing in another program" in messages, f"locked: {messages}")
 
 
 def changed_while_open():
@@ -268,13 +268,13 @@ def changed_while_open():
             os.replace("new.ebpo.h5", "open.ebpo.h5")
         else:
             os.truncate("open.ebpo.h5", 9000)
-        rest, said = process.communicate("".join(f"{s * 0.6} {t * 0.6} 0.52\n" for s in (-1, 1)
+        rest, messages = process.communicate("".join(f"{s * 0.6} {t * 0.6} 0.52\n" for s in (-1, 1)
                                                  for t in (-1, 1)))
-        check(first.startswith("IN"), f"{how}: the first answer ({first.strip()}{said})")
+        check(first.startswith("IN"), f"{how}: the first result ({first.strip()}{messages})")
         if how == "replaced":
-            check(process.returncode == 0 and rest.count("IN") == 4, f"replaced: {rest} {said}")
+            check(process.returncode == 0 and rest.count("IN") == 4, f"replaced: {rest} {messages}")
         else:
-            check(process.returncode == 1 and "became shorter" in said, f"shortened: {rest} {said}")
+            check(process.returncode == 1 and "became shorter" in messages, f"shortened: {rest} {messages}")
 
 
 def main():
@@ -285,9 +285,9 @@ def main():
         run("convert", "-q", "b.ply", "b.ebpo.h5")
         run("convert", "-q", "quads.ply", "cube.ebpo.h5")
         holding_is_limited()
-        limits_of_others_stay()
-        what_the_caller_allows()
-        captions_are_never_left_out()
+        soft_limits_are_kept()
+        caller_limits_are_kept()
+        captions_are_never_omitted()
         if "extras" in FEATURES:
             models_are_held_in_parts()
         if "h5py" in FEATURES:

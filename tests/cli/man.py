@@ -47,11 +47,11 @@ def other_words(tool, command):
     for option in command.options():
         if not option.words:
             continue
-        said = subprocess.run([tool, command.name, f"--{option.name}", "?"], capture_output=True,
+        messages = subprocess.run([tool, command.name, f"--{option.name}", "?"], capture_output=True,
                               text=True).stderr
-        known = re.search(r"is not one of: ([^;\n]*)", said)
+        known = re.search(r"is not one of: ([^;\n]*)", messages)
         if not known or known[1].split(", ") != option.words:
-            yield f"--{option.name}: {option.words} in its table; {said.strip()}"
+            yield f"--{option.name}: {option.words} in its table; {messages.strip()}"
 
 
 def completed(script, *words):

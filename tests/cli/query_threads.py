@@ -67,8 +67,8 @@ QUERIES = [
 def least_memory(ebpo, model):
     """Returns the bytes that the model needs according to the command."""
     command = [ebpo, "inside", "--memory", "1", model, "points.txt"]
-    said = subprocess.run(command, capture_output=True, text=True).stderr
-    return int(said.split("give at least")[1].split()[0])
+    messages = subprocess.run(command, capture_output=True, text=True).stderr
+    return int(messages.split("give at least")[1].split()[0])
 
 
 def results_of(command, path):
@@ -94,7 +94,7 @@ def compare(ebpo, model, query, path, threads):
             how = ["--threads", str(n)] + (["--memory", memory] if memory else [])
             found = results_of(command + how, path)
             if found != right:
-                yield (f"{' '.join(command + how)} <{path}: {found[0]}, {len(found[1])} bytes of answers, "
+                yield (f"{' '.join(command + how)} <{path}: {found[0]}, {len(found[1])} bytes of results, "
                        f"expected {len(right[1])}; {found[2].decode()[-2000:]}")
 
 

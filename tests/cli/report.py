@@ -115,7 +115,7 @@ def page_holds(folder, reported, pictures):
     assert all(uri.startswith("data:image/png;base64,") for levels in drawn["levels"]
                for uri in levels.values())
     own = page.replace(parser.texts["chart"], "").replace(parser.texts["drawn"], "")
-    assert "<long>" not in own, "a name is read as a tag"
+    assert "<long>" not in own, "a name is interpreted as a tag"
     assert not re.search(r"url\(|@import|https?://|\{\{", own)
 
 

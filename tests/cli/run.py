@@ -138,7 +138,7 @@ def main():
                 print(f"{tests}:{number}: {line}\n{wrong}")
     print(f"{tests}: {lines} lines, {bad} failed, {without - silent} of other builds")
     if silent:
-        print(f"skipped: {silent} lines, as there is no pseudo-terminal")
+        print(f"skipped: {silent} lines, because there is no pseudo-terminal")
     return 1 if bad or not lines else 0
 
 

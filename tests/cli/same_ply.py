@@ -150,7 +150,7 @@ def compare_subset(source, back):
     for i, row in enumerate(back.element("vertex")[1]):
         while at < len(rows) and rows[at] != row:
             at += 1
-        check(at < len(rows), f"vertex {i} is none of the source, or in another order")
+        check(at < len(rows), f"vertex {i} is not in the source, or is in another order")
         at += 1
     strips = source.element("face") is None
     check(strips or source.element("face")[0] == back.element("face")[0], "the faces have other properties")

@@ -129,7 +129,7 @@ for i, (line, found) in enumerate(zip(lines.decode().splitlines(), map(json.load
         wrong.append(f"distance {i}: {line} and {found} are not {struct.unpack('<7d', exact)}")
         break
 if not len(expected) // 64 == len(lines.splitlines()) == len(objects.splitlines()) == COUNT:
-    wrong.append("distance: not as many answers as questions")
+    wrong.append("distance: the number of results differs from that of queries")
 check("distance", ["--within", "0.05"])
 check("distance", ["--nearest", "3"])
 check("distance", ["--max-level", "2"])

@@ -65,7 +65,7 @@ for shell, complete in ("fish", by_fish), ("zsh", by_zsh):
         print(f"{shell} is not installed")
         continue
     if shell == "zsh" and not has_terminal():
-        print("skipped: zsh, as there is no pseudo-terminal")
+        print("skipped: zsh, because there is no pseudo-terminal")
         continue
     for line, words in ASKED.items():
         found, requested = complete(line), requested + 1

@@ -38,7 +38,7 @@ def main():
         if not any(stage in line for line in lines):
             sys.exit(f"{command[1]}: no line with {stage!r}: {seen!r}")
     if code or not seen[seen.rindex(WIPE + command[1]) + 4:].count(WIPE):
-        sys.exit(f"exit code {code}, or the line was not wiped: {seen!r}")
+        sys.exit(f"exit code {code}, or the line was not cleared: {seen!r}")
 
 
 main()

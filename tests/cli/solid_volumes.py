@@ -62,9 +62,9 @@ def check(where, printed, volume, integral, known):
     if printed["volume_lo"] > volume + 1e-9 or (printed["volume_hi"] or math.inf) < volume - 1e-9:
         sys.exit(f"{where}: printed {printed['volume_lo']} to {printed['volume_hi']}, the set has {volume}")
     if not near(printed["winding_integral"], integral):
-        sys.exit(f"{where}: printed integral {printed['winding_integral']}, it is {integral}")
+        sys.exit(f"{where}: printed integral {printed['winding_integral']}, expected {integral}")
     if known and printed["volume"] is None:
-        sys.exit(f"{where}: volume not known, though shells are apart: it is {volume}")
+        sys.exit(f"{where}: the volume is reported as unknown, although shells are apart; expected {volume}")
 
 
 def judge(boxes, rule, name):
@@ -119,9 +119,9 @@ def judge_twice_around():
                            ("measure", run("measure", "--json", "around.ebpo.h5"))):
         check(f"{where} of a cube that runs around itself twice", printed, 1, 2, False)
         if printed["volume"] is not None:
-            sys.exit(f"{where} of a cube that runs around itself twice: the volume cannot be known")
+            sys.exit(f"{where} of a cube that runs around itself twice: a volume was printed")
     if made["components"] != 1 or not made["manifold"]:
-        sys.exit("the cube that runs around itself twice is no 2-manifold of one component")
+        sys.exit("the cube that runs around itself twice is not a 2-manifold with one component")
 
 
 def box(low, high, sign=1):

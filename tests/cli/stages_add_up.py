@@ -15,7 +15,7 @@ def main():
     facts = json.load(sys.stdin)
     stages, thesis = facts["stages"], facts["thesis_stages"]
     assert stages and all(s["seconds"] >= 0 and s["stage"] for s in stages), stages
-    assert len({s["stage"] for s in stages}) == len(stages), "a stage is told twice"
+    assert len({s["stage"] for s in stages}) == len(stages), "a stage is reported twice"
     assert {s["name"] for s in stages} <= set(ROWS), [s["name"] for s in stages]
     assert sum(s["seconds"] for s in stages) <= facts["seconds"], "stages take longer than all"
     assert ([t["name"] for t in thesis] == NAMES
