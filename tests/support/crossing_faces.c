@@ -140,7 +140,8 @@ static bool segment_intersects(const float *p, const float *q, const triangle t)
     if (above * below > 0)
         return false;
     int some = 0;
-    for (int i = 0; i < 3; i++) { /* the segment's line is outside of all edges on one side */
+    for (int i = 0; i < 3;
+         i++) { /* the line intersects the triangle if it passes all edges on one side */
         int side = orient3(p, q, t[i], t[(i + 1) % 3]);
         if (side * some < 0)
             return false;

@@ -237,13 +237,13 @@ void ebpo_boolean_free(ebpo_boolean *b)
 
 /* States of the operands at a point. If the point is on the boundary of an operand, the operand has
  * two sides. */
-typedef struct opinion {
+typedef struct operand_states {
     uint64_t known;        /* operands that are in the same state on both sides, a bit for each */
     uint64_t above, below; /* operands that are in on each side */
     bool flat;             /* all faces through the point are in one plane */
     bool on;
     double plane[3][3];
-} opinion;
+} operand_states;
 
 static bool same_plane(const double a[3][3], const double b[3][3])
 {
@@ -253,7 +253,7 @@ static bool same_plane(const double a[3][3], const double b[3][3])
     return true;
 }
 
-static void add_opinion(opinion *o, uint32_t i, ebpo_rule rule, const ebpo_posed_sides *sides)
+static void add_states(operand_states *o, uint32_t i, ebpo_rule rule, const ebpo_posed_sides *sides)
 {
     uint64_t above = ebpo_rule_inside(rule, sides->above),
              below = ebpo_rule_inside(rule, sides->below);
@@ -274,7 +274,7 @@ static void add_opinion(opinion *o, uint32_t i, ebpo_rule rule, const ebpo_posed
     o->on = true;
 }
 
-static void conclude_result(const ebpo_boolean *b, const opinion *o, unsigned may,
+static void conclude_result(const ebpo_boolean *b, const operand_states *o, unsigned may,
                             ebpo_boolean_result *out)
 {
     if (may == EBPO_MAY_BOTH && o->flat) {
@@ -289,7 +289,7 @@ static void conclude_result(const ebpo_boolean *b, const opinion *o, unsigned ma
 ebpo_status ebpo_boolean_query(const ebpo_boolean *b, unsigned worker, const double w[3],
                                ebpo_boolean_result *out, ebpo_error *error)
 {
-    opinion o = { .flat = true };
+    operand_states o = { .flat = true };
     unsigned may = EBPO_MAY_BOTH;
     for (uint32_t i = 0; i < b->count && may == EBPO_MAY_BOTH; i++) {
         ebpo_posed_sides sides;
@@ -297,7 +297,7 @@ ebpo_status ebpo_boolean_query(const ebpo_boolean *b, unsigned worker, const dou
         if (ebpo_posed_solid_sides(&b->solid[i], ebpo_boolean_context(b, worker, i), w, &sides,
                                    &cause) != EBPO_OK)
             return ebpo_fail_operand(b->solid[i].model, i, &cause, error);
-        add_opinion(&o, i, b->solid[i].model->info->rule, &sides);
+        add_states(&o, i, b->solid[i].model->info->rule, &sides);
         may = ebpo_expression_value(&b->expression, o.known, o.above);
     }
     conclude_result(b, &o, may, out);

@@ -193,7 +193,7 @@ static bool in_plane(const double plane[3][3], const double t[3][3])
 }
 
 /* Handles a face that contains w. */
-static void take_on(side_segment *l, const double t[3][3])
+static void take_face_at_point(side_segment *l, const double t[3][3])
 {
     int axis = side_axis(t);
     if (axis < 0)
@@ -217,7 +217,7 @@ static bool take_near_triangles(void *user, const ebpo_triangles *triangles)
             ebpo_posing_apply(&l->solid->posing, triangles->corners[i][c], t[c]);
         l->crossed += ebpo_axis_crossing(l->low, l->to, l->axis, t[0], t[1], t[2]);
         if (ebpo_point_on_triangle(l->w, t[0], t[1], t[2]))
-            take_on(l, (const double(*)[3])t);
+            take_face_at_point(l, (const double(*)[3])t);
     }
     return true;
 }

@@ -385,7 +385,7 @@ static void inspect_patches(relating *r, int m)
 
 /* --- common points of models without common inner points --- */
 
-static bool note_sound(void *user, const ebpo_around *a)
+static bool note_doubtful_piece(void *user, const ebpo_around *a)
 {
     const facing *f = user;
     f->r->examined = true;
@@ -400,7 +400,7 @@ static bool is_sound(relating *r, int m, uint64_t face)
     facing f = { r, m };
     r->examined = r->doubtful = false;
     if (r->status == EBPO_OK)
-        r->status = ebpo_visit_around_face(&r->two, m, face, note_sound, &f, r->error);
+        r->status = ebpo_visit_around_face(&r->two, m, face, note_doubtful_piece, &f, r->error);
     return r->status == EBPO_OK && r->examined && !r->doubtful;
 }
 

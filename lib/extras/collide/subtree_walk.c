@@ -158,7 +158,7 @@ static int by_places(const void *x, const void *y)
     return (p->rank_b > q->rank_b) - (p->rank_b < q->rank_b);
 }
 
-static void turn_round(subtree_pair *pair, uint64_t count)
+static void reverse_pairs(subtree_pair *pair, uint64_t count)
 {
     for (uint64_t i = 0; i < count / 2; i++) {
         subtree_pair other = pair[i];
@@ -175,7 +175,7 @@ static void sort_back_and_forth(subtree_pairs *p)
         for (end = begin + 1; end < p->count && p->pair[end].a == p->pair[begin].a;)
             end++;
         if (p->subtrees[0]++ % 2)
-            turn_round(p->pair + begin, end - begin);
+            reverse_pairs(p->pair + begin, end - begin);
     }
 }
 

@@ -509,7 +509,8 @@ static crossing cross_faces(ebpo_side *side, const ebpo_face_box *box, const dou
 }
 
 /* Chooses a point for a detour near the middle of the path, a different one each time. */
-static void go_round(ebpo_side *side, const double to[3], const ebpo_extent *within, double via[3])
+static void choose_detour(ebpo_side *side, const double to[3], const ebpo_extent *within,
+                          double via[3])
 {
     double length = 0;
     for (int i = 0; i < 3; i++)
@@ -541,7 +542,7 @@ bool ebpo_side_go(ebpo_side *side, const ebpo_face_box *box, const double place[
             for (int i = 0; i < 3; i++)
                 to[i] = side->at[i] + 0.25 * (to[i] - side->at[i]);
             break;
-        case BADLY: go_round(side, to, &box->centres, to); break;
+        case BADLY: choose_detour(side, to, &box->centres, to); break;
         }
     }
     return false;

@@ -35,12 +35,12 @@ uint32_t ebpo_haptic_stopped(const ebpo_haptic *t)
     return atomic_load_explicit(&t->stopped, memory_order_acquire) ? EBPO_HAPTIC_STOPPED : 0;
 }
 
-static bool move_stands(const ebpo_haptic *t) { return t->walk.stage == EBPO_BALL_STANDS; }
+static bool has_no_piece(const ebpo_haptic *t) { return t->walk.stage == EBPO_BALL_STANDS; }
 
 /* Applies Coulomb friction. Without friction the proxy has slid from `from`; with friction it
  * follows only as far as the tangential part of the spring exceeds the friction. */
-static uint32_t move_rub(ebpo_haptic *t, const double from[3], const double device[3],
-                         ebpo_ball_work *work)
+static uint32_t apply_friction(ebpo_haptic *t, const double from[3], const double device[3],
+                               ebpo_ball_work *work)
 {
     double slid[3], depth[3], goal[3];
     ebpo_vec3_subtract(t->proxy, from, slid);
@@ -124,10 +124,11 @@ void ebpo_haptic_step_ball(ebpo_haptic *t, const double device[3], ebpo_haptic_b
     ebpo_vec3_copy(t->along_at, along_at);
     ebpo_held_planes along = t->along;
     uint32_t flags = ebpo_haptic_go(t, at, &work);
-    if (t->touching && (flags & EBPO_HAPTIC_CONTACT) && t->options.friction > 0 && move_stands(t)) {
+    if (t->touching && (flags & EBPO_HAPTIC_CONTACT) && t->options.friction > 0 &&
+        has_no_piece(t)) {
         t->along = along;
         ebpo_vec3_copy(along_at, t->along_at);
-        flags |= move_rub(t, from, at, &work);
+        flags |= apply_friction(t, from, at, &work);
     }
     out->work = work.faces;
     out->flags |= flags | ebpo_haptic_stopped(t);
@@ -144,7 +145,7 @@ void ebpo_haptic_step_ball(ebpo_haptic *t, const double device[3], ebpo_haptic_b
     ebpo_vec3_copy(t->proxy, out->proxy);
     ebpo_vec3_copy(out->force, t->force);
     ebpo_vec3_copy(at, t->device);
-    if ((flags & EBPO_HAPTIC_WAITING) && move_stands(t))
+    if ((flags & EBPO_HAPTIC_WAITING) && has_no_piece(t))
         ebpo_haptic_try_other(t);
     ebpo_haptic_count(t, out->flags, out->work);
     ebpo_haptic_report(t, at);
@@ -209,7 +210,7 @@ static ebpo_status check_options(const ebpo_haptic_options *o, ebpo_error *error
 
 /* Computes values that depend on the model: its box, and the least distance of the ball from faces.
  */
-static ebpo_status new_measure(ebpo_haptic *t, ebpo_error *error)
+static ebpo_status measure_model(ebpo_haptic *t, ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(t->model->file);
     double most = 0;
@@ -395,7 +396,7 @@ ebpo_status ebpo_haptic_new(ebpo_model *model, const ebpo_haptic_options *option
         status = ebpo_tool_new(own.points, own.point_count, &t->tool, error);
     t->options.points = NULL; /* the caller's memory */
     if (status == EBPO_OK)
-        status = new_measure(t, error);
+        status = measure_model(t, error);
     if (status == EBPO_OK)
         status = make_parts(t, error);
     if (status == EBPO_OK)

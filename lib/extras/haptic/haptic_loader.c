@@ -37,7 +37,7 @@ static ebpo_status known_query(ebpo_haptic *t, ebpo_known_place *out, ebpo_error
 
 /* Queries the distance and the side at the probe's position, in the loading thread. *moved: true if
  * the position has changed. */
-static ebpo_status learn_place(ebpo_haptic *t, bool *moved, ebpo_error *error)
+static ebpo_status query_position(ebpo_haptic *t, bool *moved, ebpo_error *error)
 {
     ebpo_known_place *known = &t->known[t->own_known];
     for (int i = 0; i < 3; i++)
@@ -80,7 +80,7 @@ static void wait_a_little(void)
 
 /* Predicts the position of the device. Its speed is averaged over several haptic steps, because
  * between two checks the device has often made one step or none. */
-static void loader_foresee(ebpo_haptic *t, double out[3])
+static void predict_device(ebpo_haptic *t, double out[3])
 {
     uint64_t now = ebpo_clock();
     double seconds = 1e-9 * (double)(now - t->when_before);
@@ -130,7 +130,7 @@ static void hand_over(ebpo_haptic *t, uint64_t began)
         atomic_store(&t->load_ns_max, ns);
 }
 
-static ebpo_status loader_load(ebpo_haptic *t, const double goal[3], ebpo_error *error)
+static ebpo_status load_boxes(ebpo_haptic *t, const double goal[3], ebpo_error *error)
 {
     uint64_t began = ebpo_clock();
     ebpo_face_box *box = &t->box[t->own];
@@ -168,13 +168,13 @@ static void *loader_run(void *user)
     while (status == EBPO_OK && !atomic_load(&t->stop)) {
         double goal[3];
         ebpo_extent centres;
-        loader_foresee(t, goal);
+        predict_device(t, goal);
         place_box(t, goal, &centres);
         bool moved = false;
         if (far_from_last(t, &centres))
-            status = loader_load(t, goal, &error);
+            status = load_boxes(t, goal, &error);
         else if (t->options.kind == EBPO_HAPTIC_PROBE)
-            status = learn_place(t, &moved, &error);
+            status = query_position(t, &moved, &error);
         if (status == EBPO_OK && !moved)
             wait_a_little();
     }

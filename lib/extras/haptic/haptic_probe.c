@@ -21,7 +21,7 @@ typedef struct bounds {
     double lo, hi;
 } bounds;
 
-static void sense_narrow(bounds *b, double lo, double hi)
+static void narrow_bounds(bounds *b, double lo, double hi)
 {
     b->lo = fmax(b->lo, lo);
     b->hi = fmin(b->hi, hi);
@@ -35,8 +35,8 @@ static double rounding_of(const ebpo_haptic *t, double length)
 
 /* Bounds the distance by the faces of the current box. Returns true if the nearest face is known.
  */
-static bool sense_faces(ebpo_haptic *t, const double place[3], ebpo_haptic_probe_result *out,
-                        bounds *b)
+static bool bound_by_faces(ebpo_haptic *t, const double place[3], ebpo_haptic_probe_result *out,
+                           bounds *b)
 {
     ebpo_haptic_ball_result near = { 0 };
     ebpo_haptic_find_nearest(t, &near);
@@ -54,13 +54,14 @@ static bool sense_faces(ebpo_haptic *t, const double place[3], ebpo_haptic_probe
         distance = sqrt(ebpo_vec3_dot(motion, motion));
     }
     double nearer = fmin(distance, search_radius);
-    sense_narrow(b, all ? nearer - rounding_of(t, nearer) : 0, distance + rounding_of(t, distance));
+    narrow_bounds(b, all ? nearer - rounding_of(t, nearer) : 0,
+                  distance + rounding_of(t, distance));
     return all && near.face != EBPO_NO_FACE;
 }
 
 /* Bounds the distance by a recent result and the path since then. */
-static bool sense_known(ebpo_haptic *t, const double place[3], ebpo_haptic_probe_result *out,
-                        bounds *b)
+static bool bound_by_known(ebpo_haptic *t, const double place[3], ebpo_haptic_probe_result *out,
+                           bounds *b)
 {
     const ebpo_known_place *known = ebpo_haptic_known(t);
     double motion[3];
@@ -69,7 +70,7 @@ static bool sense_known(ebpo_haptic *t, const double place[3], ebpo_haptic_probe
     ebpo_vec3_subtract(place, known->place, motion);
     double far = sqrt(ebpo_vec3_dot(motion, motion)),
            rounding = rounding_of(t, far + known->distance);
-    sense_narrow(b, known->distance - far - rounding, known->distance + far + rounding);
+    narrow_bounds(b, known->distance - far - rounding, known->distance + far + rounding);
     if (out->normal[0] == 0 && out->normal[1] == 0 && out->normal[2] == 0)
         ebpo_vec3_copy(known->normal, out->normal);
     return far == 0;
@@ -93,7 +94,8 @@ static bool find_side(ebpo_haptic *t, const double place[3], ebpo_haptic_probe_r
     return false;
 }
 
-static int32_t sense_where(ebpo_haptic *t, const double place[3], ebpo_haptic_probe_result *out)
+static int32_t classify_position(ebpo_haptic *t, const double place[3],
+                                 ebpo_haptic_probe_result *out)
 {
     int32_t winding;
     const ebpo_face_box *box = &t->box[t->at];
@@ -112,7 +114,7 @@ static int32_t sense_where(ebpo_haptic *t, const double place[3], ebpo_haptic_pr
     return ebpo_rule_inside(t->model->info->rule, t->side.winding) ? EBPO_IN : EBPO_OUT;
 }
 
-static void sense_report(ebpo_haptic_probe_result *out, const bounds *b, bool close)
+static void fill_bounds(ebpo_haptic_probe_result *out, const bounds *b, bool close)
 {
     double lo = fmax(0, fmin(b->lo, b->hi)), hi = b->hi;
     bool in = out->where == EBPO_IN, maybe = out->where == EBPO_MAYBE;
@@ -143,13 +145,13 @@ void ebpo_haptic_step_probe(ebpo_haptic *t, const double place[3], ebpo_haptic_p
     ebpo_vec3_copy(at, t->proxy);
     ebpo_vec3_copy(at, t->device);
     (void)ebpo_haptic_take_box(t);
-    bool close = sense_faces(t, at, out, &b);
-    close |= sense_known(t, at, out, &b);
+    bool close = bound_by_faces(t, at, out, &b);
+    close |= bound_by_known(t, at, out, &b);
     double lo, hi;
     ebpo_held_levels_bound(&t->levels, at, VISITS, &lo, &hi);
-    sense_narrow(&b, lo, hi);
-    out->where = sense_where(t, at, out);
-    sense_report(out, &b, close);
+    narrow_bounds(&b, lo, hi);
+    out->where = classify_position(t, at, out);
+    fill_bounds(out, &b, close);
     ebpo_haptic_count(t, out->flags | (out->flags & EBPO_HAPTIC_ACCURATE ? 0 : EBPO_HAPTIC_WAITING),
                       out->work);
     ebpo_haptic_report(t, at);

@@ -184,7 +184,7 @@ typedef struct step {
     ebpo_ball_work *work;
 } step;
 
-static void step_swept(const double p[3], const double motion[3], double wider, ebpo_extent *out)
+static void box_of_path(const double p[3], const double motion[3], double wider, ebpo_extent *out)
 {
     for (int i = 0; i < 3; i++) {
         out->min[i] = fmin(p[i], p[i] + motion[i]) - wider;
@@ -192,7 +192,7 @@ static void step_swept(const double p[3], const double motion[3], double wider, 
     }
 }
 
-static bool step_apart(const ebpo_extent *a, const ebpo_extent *b)
+static bool are_apart(const ebpo_extent *a, const ebpo_extent *b)
 {
     for (int i = 0; i < 3; i++)
         if (a->min[i] > b->max[i] || a->max[i] < b->min[i])
@@ -200,7 +200,7 @@ static bool step_apart(const ebpo_extent *a, const ebpo_extent *b)
     return false;
 }
 
-static void step_shorten(double motion[3], double part)
+static void shorten_motion(double motion[3], double part)
 {
     for (int i = 0; i < 3; i++)
         motion[i] *= part;
@@ -225,20 +225,20 @@ double ebpo_haptic_known_part(const ebpo_haptic *t, const double motion[3], doub
 {
     const ebpo_extent *centres = &t->box[t->at].centres;
     ebpo_extent all;
-    step_swept(t->proxy, motion, reach, &all);
-    if (step_apart(&all, &t->root))
+    box_of_path(t->proxy, motion, reach, &all);
+    if (are_apart(&all, &t->root))
         return 1;
     return ebpo_extent_holds(centres, t->proxy) ? part_inside(t->proxy, motion, centres) : 0;
 }
 
 /* Cuts the path to the part where all faces around it are known. Returns false if there is none. */
-static bool keep_known(step *s)
+static bool cut_to_known_part(step *s)
 {
     ebpo_haptic *t = s->t;
     double part = ebpo_haptic_known_part(t, s->motion, t->reach + t->band);
     if (part < 1) {
         t->cut = EBPO_HAPTIC_WAITING;
-        step_shorten(s->motion, part);
+        shorten_motion(s->motion, part);
     }
     if (part <= 0 && !ebpo_extent_holds(&t->box[t->at].centres, t->proxy)) {
         s->flags |= EBPO_HAPTIC_WAITING;
@@ -247,13 +247,13 @@ static bool keep_known(step *s)
     return true;
 }
 
-static bool step_differ(const double a[3], const double b[3])
+static bool vectors_differ(const double a[3], const double b[3])
 {
     return a[0] != b[0] || a[1] != b[1] || a[2] != b[2];
 }
 
 /* Begins the next piece. Returns false if the proxy stays. */
-static bool set_out(step *s)
+static bool begin_piece(step *s)
 {
     ebpo_haptic *t = s->t;
     ebpo_ball_walk *w = &t->walk;
@@ -263,14 +263,14 @@ static bool set_out(step *s)
         t->along.count = 0;
     ebpo_vec3_subtract(s->goal, t->proxy, want);
     s->slack = ebpo_hold_back(&t->along, want, s->motion);
-    if (step_differ(s->motion, want))
+    if (vectors_differ(s->motion, want))
         s->flags |= EBPO_HAPTIC_CONTACT;
     s->least_slack = 0x1p-44 * sqrt(ebpo_vec3_dot(want, want));
     double whole = sqrt(ebpo_vec3_dot(s->motion, s->motion));
     if (whole <= 0x1p-12 * t->options.skin)
         return false;
     t->cut = 0;
-    if (!keep_known(s))
+    if (!cut_to_known_part(s))
         return false;
     /* Slacks are those of the whole path, scaled to this part. Otherwise the slacks for a distant
      * device would be those of a long piece. */
@@ -279,7 +279,7 @@ static bool set_out(step *s)
     ebpo_vec3_copy(t->proxy, w->from);
     ebpo_vec3_copy(s->motion, w->motion);
     w->box = ebpo_extent_holds(&box->centres, t->proxy) ? box : NULL; /* NULL is possible: see
-                                                                       * keep_known */
+                                                                       * cut_to_known_part */
     w->reach = t->reach;
     w->band = t->band;
     w->slack = s->slack * share;
@@ -314,7 +314,7 @@ static void add_planes(ebpo_haptic *t)
 
 /* Ends the piece. The ball then slides along the contacts there; after a motion, only along those.
  * Returns false if the ball has no contact and stops for this haptic step. */
-static bool step_settle(step *s)
+static bool end_piece(step *s)
 {
     ebpo_haptic *t = s->t;
     const ebpo_ball_walk *w = &t->walk;
@@ -332,7 +332,7 @@ static bool step_settle(step *s)
 }
 
 /* Returns flags of the previous contacts, which hold the proxy until more is known. */
-static uint32_t still_held(const step *s)
+static uint32_t held_flags(const step *s)
 {
     const ebpo_haptic *t = s->t;
     double want[3], motion[3];
@@ -340,7 +340,7 @@ static uint32_t still_held(const step *s)
         return 0;
     ebpo_vec3_subtract(s->goal, t->proxy, want);
     (void)ebpo_hold_back(&t->planes, want, motion);
-    return step_differ(motion, want) ? EBPO_HAPTIC_CONTACT : 0;
+    return vectors_differ(motion, want) ? EBPO_HAPTIC_CONTACT : 0;
 }
 
 static uint32_t go_by_pieces(step *s)
@@ -348,14 +348,14 @@ static uint32_t go_by_pieces(step *s)
     ebpo_haptic *t = s->t;
     bool resumed = t->walk.stage != EBPO_BALL_STANDS;
     for (int piece = 0; piece < EBPO_HAPTIC_PIECES; piece++) {
-        if (t->walk.stage == EBPO_BALL_STANDS && !set_out(s))
+        if (t->walk.stage == EBPO_BALL_STANDS && !begin_piece(s))
             return s->flags;
         ebpo_ball_end end = ebpo_ball_go_on(&t->walk, s->work);
         if (end == EBPO_BALL_LATER)
-            return s->flags | EBPO_HAPTIC_INCOMPLETE | still_held(s);
+            return s->flags | EBPO_HAPTIC_INCOMPLETE | held_flags(s);
         if (end == EBPO_BALL_THROUGH)
             return s->flags | EBPO_HAPTIC_INCOMPLETE;
-        if (!step_settle(s)) {
+        if (!end_piece(s)) {
             if (!resumed)
                 return s->flags;
             s->flags = 0; /* flags of the path to the last device position */

@@ -18,7 +18,7 @@ enum { CLUSTER_VISITS = 64, POINT_VISITS = 48, FACE_VISITS = 256, FACE_COST = 6 
 
 /* Distances in units of the skin. Faces are examined within `search`. A point closer than `blocks`
  * ends the path. At the path's end, no point may be closer than `least`. Rotation adds less than
- * `bend` to straight paths (see tool_step_limit). */
+ * `bend` to straight paths (see limit_angle). */
 static const double search = 2.5, blocks = 0.75, least = 0.5, bend = 0.125;
 
 typedef struct tool_piece {
@@ -42,7 +42,7 @@ static tool_piece piece_of(ebpo_haptic *t, uint64_t *work)
                          work };
 }
 
-static void tool_step_around(const double p[3], const double q[3], double wide, ebpo_extent *out)
+static void box_of_segment(const double p[3], const double q[3], double wide, ebpo_extent *out)
 {
     for (int i = 0; i < 3; i++) {
         out->min[i] = fmin(p[i], q[i]) - wide;
@@ -52,7 +52,7 @@ static void tool_step_around(const double p[3], const double q[3], double wide, 
 
 /* Returns a distance from `e` within which no face is. Sources: the faces of the box, the boundary
  * of the loaded region, and the model's box. */
-static double tool_step_clearance(const tool_piece *p, const ebpo_extent *e, uint32_t visits)
+static double free_distance(const tool_piece *p, const ebpo_extent *e, uint32_t visits)
 {
     double out = 0, inside = INFINITY;
     for (int i = 0; i < 3; i++)
@@ -66,7 +66,7 @@ static double tool_step_clearance(const tool_piece *p, const ebpo_extent *e, uin
 }
 
 /* Bounds the motion of a point, given its lever arm about the centre of rotation. */
-static double tool_step_far(const tool_piece *p, double lever)
+static double max_point_motion(const tool_piece *p, double lever)
 {
     return sqrt(ebpo_vec3_dot(p->tool->motion, p->tool->motion)) + lever * p->turned;
 }
@@ -75,7 +75,7 @@ static double lever_of(const double p[3]) { return sqrt(ebpo_vec3_dot(p, p)); }
 
 static double max_motion(const tool_piece *p, const ebpo_tool_cluster *c)
 {
-    return tool_step_far(p, lever_of(c->middle) + c->radius) * (1 + 0x1p-40);
+    return max_point_motion(p, lever_of(c->middle) + c->radius) * (1 + 0x1p-40);
 }
 
 /* Adds a close point with its faces. Returns false if the pool is full, or too many faces are
@@ -91,7 +91,7 @@ static bool add_close(const tool_piece *p, uint32_t point)
     for (int i = 0; i < 3; i++)
         to[i] = tool->proxy.place[i] + tool->motion[i] + motion[i];
     ebpo_vec3_subtract(to, from, motion);
-    tool_step_around(from, to, search * p->skin, &e);
+    box_of_segment(from, to, search * p->skin, &e);
     if (tool->pool_count + EBPO_TOOL_NEAR > EBPO_TOOL_POOL)
         return false;
     bool all = ebpo_face_box_find(p->box, &e, tool->pool + tool->pool_count, EBPO_TOOL_NEAR,
@@ -121,13 +121,13 @@ static bool inspect_points(const tool_piece *p, uint32_t number)
     double all = INFINITY;
     c->free = 0; /* remains 0 if the path is given up */
     for (uint32_t i = c->first; i < c->first + c->count; i++) {
-        double motion = tool_step_far(p, lever_of(tool->point[i])) * (1 + 0x1p-40);
+        double motion = max_point_motion(p, lever_of(tool->point[i])) * (1 + 0x1p-40);
         if (tool->free[i] - c->gone - motion <= 0) {
             double at[3];
             ebpo_extent e;
             ebpo_tool_at(&tool->proxy, (const double(*)[3])tool->from_matrix, tool->point[i], at);
-            tool_step_around(at, at, 0, &e);
-            tool->free[i] = c->gone + tool_step_clearance(p, &e, POINT_VISITS) - need;
+            box_of_segment(at, at, 0, &e);
+            tool->free[i] = c->gone + free_distance(p, &e, POINT_VISITS) - need;
         }
         if (tool->free[i] - c->gone - motion <= 0 && !add_close(p, i))
             return false;
@@ -148,8 +148,8 @@ static bool inspect_cluster(const tool_piece *p, uint32_t number)
     double at[3], from_all;
     ebpo_extent e;
     ebpo_tool_at(&tool->proxy, (const double(*)[3])tool->from_matrix, c->middle, at);
-    tool_step_around(at, at, c->radius, &e);
-    from_all = tool_step_clearance(p, &e, CLUSTER_VISITS) - search * p->skin;
+    box_of_segment(at, at, c->radius, &e);
+    from_all = free_distance(p, &e, CLUSTER_VISITS) - search * p->skin;
     if (from_all - motion <= 0)
         return inspect_points(p, number);
     c->free = c->gone + from_all;
@@ -227,7 +227,7 @@ static void begin_check(ebpo_tool *tool)
 }
 
 /* Moves the tool to the end of the piece and reduces the free distance of each point. */
-static void tool_step_arrive(const tool_piece *p)
+static void end_piece(const tool_piece *p)
 {
     ebpo_tool *tool = p->tool;
     for (uint64_t i = 0; i < tool->cluster_count; i++)
@@ -240,7 +240,7 @@ static void tool_step_arrive(const tool_piece *p)
 
 /* Limits the angle: the path of a point differs from a straight one by at most lever * angle^2 / 8.
  */
-static void tool_step_limit(ebpo_haptic *t, double motion[EBPO_SCREW], uint32_t *flags)
+static void limit_angle(ebpo_haptic *t, double motion[EBPO_SCREW], uint32_t *flags)
 {
     ebpo_tool *tool = t->tool;
     double most = fmin(0.25, sqrt(8 * bend * t->options.skin / tool->radius));
@@ -265,7 +265,7 @@ static bool begin_tool_motion(ebpo_haptic *t, const double wanted[EBPO_SCREW], u
     for (int k = 0; k < EBPO_SCREW; k++)
         tool->motion[k] = wanted[k];
     tool->flags = 0;
-    tool_step_limit(t, tool->motion, &tool->flags);
+    limit_angle(t, tool->motion, &tool->flags);
     double part = ebpo_haptic_known_part(t, tool->motion, tool->radius + search * t->options.skin);
     if (part < 1) {
         tool->flags |= EBPO_HAPTIC_WAITING;
@@ -314,7 +314,7 @@ static uint32_t continue_tool_motion(ebpo_haptic *t, uint64_t *work, bool *arriv
         if (!check_close(&p, &tool->close[tool->at]))
             return give_up(&p);
     }
-    tool_step_arrive(&p);
+    end_piece(&p);
     *arrived = true;
     if (t->stride < t->diagonal && tool->pool_count < EBPO_TOOL_POOL / 4)
         t->stride *= 2;
@@ -323,11 +323,12 @@ static uint32_t continue_tool_motion(ebpo_haptic *t, uint64_t *work, bool *arriv
 
 /* --- the step --- */
 
-static double turn_closeness(const ebpo_haptic *t) { return 0x1p-6 * t->options.skin; }
+static double contact_tolerance(const ebpo_haptic *t) { return 0x1p-6 * t->options.skin; }
 
 /* Applies Coulomb friction: shortens the path along the contacts by the friction times the part
  * that the contacts hold back. */
-static void turn_rub(const ebpo_haptic *t, const double want[EBPO_SCREW], double motion[EBPO_SCREW])
+static void apply_friction(const ebpo_haptic *t, const double want[EBPO_SCREW],
+                           double motion[EBPO_SCREW])
 {
     double held[EBPO_SCREW];
     for (int k = 0; k < EBPO_SCREW; k++)
@@ -340,20 +341,20 @@ static void turn_rub(const ebpo_haptic *t, const double want[EBPO_SCREW], double
 }
 
 /* Begins the next piece. Returns false if the tool stays. */
-static bool set_out(ebpo_haptic *t, const ebpo_rigid *device, uint32_t *flags)
+static bool begin_path(ebpo_haptic *t, const ebpo_rigid *device, uint32_t *flags)
 {
     ebpo_tool *tool = t->tool;
     double want[EBPO_SCREW], motion[EBPO_SCREW];
     ebpo_rigid_between(&tool->proxy, device, tool->arm, want);
-    int holding = ebpo_tool_hold(&tool->contacts, want, turn_closeness(t), true, motion);
+    int holding = ebpo_tool_hold(&tool->contacts, want, contact_tolerance(t), true, motion);
     if (holding > 0 && t->touching && t->options.friction > 0)
-        turn_rub(t, want, motion);
-    if (ebpo_screw_length(motion) <= turn_closeness(t) / 2)
+        apply_friction(t, want, motion);
+    if (ebpo_screw_length(motion) <= contact_tolerance(t) / 2)
         return false;
     return begin_tool_motion(t, motion, flags);
 }
 
-static uint32_t turn_go(ebpo_haptic *t, const ebpo_rigid *device, uint64_t *work)
+static uint32_t move_proxy(ebpo_haptic *t, const ebpo_rigid *device, uint64_t *work)
 {
     ebpo_tool *tool = t->tool;
     uint32_t flags = 0;
@@ -366,7 +367,7 @@ static uint32_t turn_go(ebpo_haptic *t, const ebpo_rigid *device, uint64_t *work
                 return flags | EBPO_HAPTIC_INCOMPLETE;
             (void)ebpo_haptic_take_box(t);
             *work += 4 * (uint64_t)tool->contacts.count; /* work of the contacts */
-            if (!set_out(t, device, &flags))
+            if (!begin_path(t, device, &flags))
                 return flags;
         }
         flags |= continue_tool_motion(t, work, &arrived);
@@ -387,7 +388,7 @@ static int find_depth(const ebpo_haptic *t, const ebpo_rigid *device, uint32_t f
     const ebpo_tool *tool = t->tool;
     double want[EBPO_SCREW], motion[EBPO_SCREW];
     ebpo_rigid_between(&tool->proxy, device, tool->arm, want);
-    int holding = ebpo_tool_hold(&tool->contacts, want, turn_closeness(t), false, motion);
+    int holding = ebpo_tool_hold(&tool->contacts, want, contact_tolerance(t), false, motion);
     bool part = flags & (EBPO_HAPTIC_WAITING | EBPO_HAPTIC_INCOMPLETE) || t->options.friction == 0;
     for (int k = 0; k < EBPO_SCREW; k++)
         out[k] = (part ? motion[k] : 0) - want[k];
@@ -410,8 +411,8 @@ static void report_contact(const ebpo_haptic *t, ebpo_haptic_tool_result *out)
     ebpo_vec3_copy(nearest->normal, out->normal);
 }
 
-static void turn_push(ebpo_haptic *t, const double depth[EBPO_SCREW],
-                      const double moved[EBPO_SCREW], ebpo_haptic_tool_result *out)
+static void compute_force(ebpo_haptic *t, const double depth[EBPO_SCREW],
+                          const double moved[EBPO_SCREW], ebpo_haptic_tool_result *out)
 {
     ebpo_tool *tool = t->tool;
     double *force = tool->force;
@@ -440,14 +441,14 @@ void ebpo_haptic_step_tool(ebpo_haptic *t, const double place[3], const double t
         device = tool->device;
     ebpo_rigid_between(&tool->device, &device, tool->arm, moved);
     ebpo_passive_moved(&t->passive, tool->force, moved, EBPO_SCREW);
-    uint32_t flags = turn_go(t, &device, &out->work);
+    uint32_t flags = move_proxy(t, &device, &out->work);
     int holding = find_depth(t, &device, flags, depth);
     t->touching = holding > 0;
     for (int k = 0; k < EBPO_SCREW; k++)
         tool->force[k] = 0;
     if (t->touching) {
         flags |= EBPO_HAPTIC_CONTACT;
-        turn_push(t, depth, moved, out);
+        compute_force(t, depth, moved, out);
         out->depth = ebpo_screw_length(depth);
     }
     report_contact(t, out);

@@ -135,21 +135,21 @@ void ebpo_rigid_matrix(const ebpo_rigid *r, double out[3][3])
 
 enum { ACTIVE = 12, SWEEPS = 20 };
 
-static void tool_hold_swap(ebpo_tool_contacts *all, int i, int j)
+static void swap_contacts(ebpo_tool_contacts *all, int i, int j)
 {
     ebpo_tool_contact c = all->at[i];
     all->at[i] = all->at[j];
     all->at[j] = c;
 }
 
-static void tool_hold_sink(ebpo_tool_contacts *all)
+static void sink_contact(ebpo_tool_contacts *all)
 {
     for (int i = 0, child; (child = 2 * i + 1) < all->count; i = child) {
         if (child + 1 < all->count && all->at[child + 1].gap > all->at[child].gap)
             child++;
         if (all->at[child].gap <= all->at[i].gap)
             return;
-        tool_hold_swap(all, i, child);
+        swap_contacts(all, i, child);
     }
 }
 
@@ -159,13 +159,13 @@ void ebpo_tool_contact_add(ebpo_tool_contacts *all, const ebpo_tool_contact *con
         if (contact->gap >= all->at[0].gap)
             return;
         all->at[0] = *contact;
-        tool_hold_sink(all);
+        sink_contact(all);
         return;
     }
     int i = all->count++;
     all->at[i] = *contact;
     for (; i > 0 && all->at[(i - 1) / 2].gap < all->at[i].gap; i = (i - 1) / 2)
-        tool_hold_swap(all, i, (i - 1) / 2);
+        swap_contacts(all, i, (i - 1) / 2);
 }
 
 typedef struct held {
@@ -175,8 +175,8 @@ typedef struct held {
     bool release;
 } held;
 
-static double tool_hold_lacks(const held *h, const ebpo_tool_contact *c,
-                              const double motion[EBPO_SCREW])
+static double violation_of(const held *h, const ebpo_tool_contact *c,
+                           const double motion[EBPO_SCREW])
 {
     double space = h->release ? c->space : fmax(c->space, 0);
     return -space - ebpo_screw_dot(c->grip, motion);
@@ -188,7 +188,7 @@ static void tool_hold_sweep(held *h, double close, double motion[EBPO_SCREW])
         double most = 0;
         for (int i = 0; i < h->count; i++) {
             const ebpo_tool_contact *c = &h->all->at[h->active[i]];
-            double by = fmax(tool_hold_lacks(h, c, motion) / h->square[i], -h->force[i]);
+            double by = fmax(violation_of(h, c, motion) / h->square[i], -h->force[i]);
             h->force[i] += by;
             for (int k = 0; k < EBPO_SCREW; k++)
                 motion[k] += by * c->grip[k];
@@ -204,7 +204,7 @@ static int max_offended(const held *h, double close, const double motion[EBPO_SC
     int found = -1;
     double most = close;
     for (int i = 0; i < h->all->count; i++) {
-        double lack = tool_hold_lacks(h, &h->all->at[i], motion);
+        double lack = violation_of(h, &h->all->at[i], motion);
         if (lack > most) {
             most = lack;
             found = i;

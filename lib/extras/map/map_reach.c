@@ -49,7 +49,7 @@ typedef struct search {
     uint64_t middle_capacity, away_capacity;
 } search;
 
-static double reach_apart(const double a[3], const double b[3])
+static double distance_above(const double a[3], const double b[3])
 {
     double d[3] = { a[0] - b[0], a[1] - b[1], a[2] - b[2] };
     double most = fmax(fabs(d[0]), fmax(fabs(d[1]), fabs(d[2])));
@@ -65,7 +65,7 @@ static void reach_bound(const search *s, triangle *t)
     double edge[3];
     t->upper = INFINITY;
     for (int k = 0; k < 3; k++)
-        edge[k] = reach_apart(t->corner[k], t->corner[(k + 1) % 3]);
+        edge[k] = distance_above(t->corner[k], t->corner[(k + 1) % 3]);
     for (int k = 0; k < 3; k++)
         t->upper = fmin(t->upper, t->away[k] + fmax(edge[k], edge[(k + 2) % 3]));
     t->upper += s->slack;
@@ -77,7 +77,7 @@ static bool needs_division(const search *s, double upper)
 }
 
 /* Keeps a triangle for the next round. If there are too many, its bound is final. */
-static ebpo_status reach_keep(search *s, triangles *list, const triangle *t, ebpo_error *error)
+static ebpo_status keep_triangle(search *s, triangles *list, const triangle *t, ebpo_error *error)
 {
     if (!needs_division(s, t->upper))
         return EBPO_OK;
@@ -91,7 +91,7 @@ static ebpo_status reach_keep(search *s, triangles *list, const triangle *t, ebp
     return EBPO_OK;
 }
 
-static void reach_learn(search *s, double away, const double location[3])
+static void raise_lower_bound(search *s, double away, const double location[3])
 {
     if (away <= s->reach.lo)
         return;
@@ -132,7 +132,7 @@ static void child_of(const search *s, uint64_t i, int which, triangle *out)
 
 /* Moves triangles with bounds of at least half of the greatest one to the front: dividing other
  * triangles does not help yet. */
-static void reach_choose(search *s)
+static void choose_triangles(search *s)
 {
     double most = 0;
     uint64_t left = s->allowed > s->reach.queries ? s->allowed - s->reach.queries : 0;
@@ -153,17 +153,17 @@ static ebpo_status reach_cut(search *s, ebpo_error *error)
     s->reach.queries += 3 * s->cut;
     for (uint64_t i = 0; i < s->cut; i++)
         for (int k = 0; k < 3; k++)
-            reach_learn(s, s->middle_away[i][k] - s->slack, s->middle[i][k]);
+            raise_lower_bound(s, s->middle_away[i][k] - s->slack, s->middle[i][k]);
     s->next.count = 0;
     for (uint64_t i = 0; i < s->cut && status == EBPO_OK; i++)
         for (int which = 0; which < 4 && status == EBPO_OK; which++) {
             triangle t;
             child_of(s, i, which, &t);
             reach_bound(s, &t);
-            status = reach_keep(s, &s->next, &t, error);
+            status = keep_triangle(s, &s->next, &t, error);
         }
     for (uint64_t i = s->cut; i < s->now.count && status == EBPO_OK; i++)
-        status = reach_keep(s, &s->next, &s->now.item[i], error);
+        status = keep_triangle(s, &s->next, &s->now.item[i], error);
     triangles old = s->now;
     s->now = s->next;
     s->next = old;
@@ -175,7 +175,7 @@ static ebpo_status reach_refine(search *s, ebpo_error *error)
     ebpo_status status = EBPO_OK;
     ebpo_progress none = { NULL, NULL };
     while (status == EBPO_OK && s->now.count) {
-        reach_choose(s);
+        choose_triangles(s);
         if (!ebpo_grow(&s->middle, &s->middle_capacity, s->cut, sizeof *s->middle) ||
             !ebpo_grow(&s->middle_away, &s->away_capacity, s->cut, sizeof *s->middle_away))
             return ebpo_fail_memory(error, s->cut * sizeof *s->middle);
@@ -212,7 +212,7 @@ static ebpo_status inspect_faces(search *s, uint64_t begin, uint64_t end, ebpo_e
             t.away[k] = fabs(s->distances[v]);
         }
         reach_bound(s, &t);
-        status = reach_keep(s, &s->now, &t, error);
+        status = keep_triangle(s, &s->now, &t, error);
     }
     return status == EBPO_OK ? reach_refine(s, error) : status;
 }
@@ -251,7 +251,7 @@ static ebpo_status reach_begin(search *s, ebpo_error *error)
                                  f);
             corner_of(m, v, p);
             most = fmax(most, fmax(fabs(p[0]), fmax(fabs(p[1]), fabs(p[2]))));
-            reach_learn(s, fabs(s->distances[v]), p);
+            raise_lower_bound(s, fabs(s->distances[v]), p);
         }
     s->slack = most * 0x1p-49 + 0x1p-1060;
     return EBPO_OK;

@@ -302,8 +302,8 @@ static double length_between(const ebpo_paint_input *a, const ebpo_paint_input *
 }
 
 /* Follows the path. Steps are at multiples of their length from the first position on. */
-static ebpo_status draw_go(drawing *l, const ebpo_paint_input *input, uint64_t count,
-                           ebpo_error *error)
+static ebpo_status follow_path(drawing *l, const ebpo_paint_input *input, uint64_t count,
+                               ebpo_error *error)
 {
     double step = l->pen.step != 0 ? l->pen.step : fmax(l->pen.radius, l->pen.spread) / 2,
            ahead = step; /* distance from the current position to the next step */
@@ -330,7 +330,7 @@ static ebpo_status draw_go(drawing *l, const ebpo_paint_input *input, uint64_t c
 }
 
 /* Adds all strokes, or none. */
-static ebpo_status draw_keep(drawing *l, ebpo_paint *p, ebpo_error *error)
+static ebpo_status keep_strokes(drawing *l, ebpo_paint *p, ebpo_error *error)
 {
     uint64_t before = p->stroke_count;
     ebpo_status status = EBPO_OK;
@@ -374,9 +374,9 @@ ebpo_status ebpo_paint_draw(ebpo_paint *p, ebpo_context *context, const ebpo_pai
     l.random = l.pen.seed;
     l.space = EBPO_PAINT_POINTS - p->point_count;
     ebpo_reach_begin(&l.reach, context);
-    status = draw_go(&l, input, count, error);
+    status = follow_path(&l, input, count, error);
     if (status == EBPO_OK)
-        status = draw_keep(&l, p, error);
+        status = keep_strokes(&l, p, error);
     if (status == EBPO_OK && drawn)
         EBPO_GIVE(ebpo_paint_drawn, drawn, &l.drawn);
     ebpo_reach_end(&l.reach);

@@ -137,8 +137,8 @@ static uint64_t sift_layer(area_cut *c, const triangle *t, uint64_t from, uint64
 
 /* Calls sift_layer for all layers at [from, from + count). The copied balls follow the given ones
  * on the stack. */
-static uint64_t area_cut_sift(area_cut *c, const triangle *t, uint64_t from, uint64_t count,
-                              bool *sure)
+static uint64_t sift_layers(area_cut *c, const triangle *t, uint64_t from, uint64_t count,
+                            bool *sure)
 {
     uint64_t kept = 0;
     *sure = true;
@@ -279,13 +279,14 @@ static bool find_middle(const double a[3], const double b[3], double middle[3])
 
 /* Divides a triangle, whose balls are at [from, from + count). The stack behind them is used for
  * the balls of the parts. */
-static bool area_cut_cut(area_cut *c, const triangle *t, uint64_t from, uint64_t count, int depth)
+static bool divide_triangle(area_cut *c, const triangle *t, uint64_t from, uint64_t count,
+                            int depth)
 {
     bool sure;
     int edge = 0;
     if (!ebpo_grow(&c->ball, &c->ball_capacity, from + 2 * count, sizeof *c->ball))
         return false;
-    uint64_t kept = area_cut_sift(c, t, from, count, &sure), at = from + count;
+    uint64_t kept = sift_layers(c, t, from, count, &sure), at = from + count;
     if (kept == 0)
         return true;
     double longest = longest_edge(t, &edge), middle[3];
@@ -298,11 +299,11 @@ static bool area_cut_cut(area_cut *c, const triangle *t, uint64_t from, uint64_t
     triangle half = *t;
     half.area = t->area / 2;
     memcpy(half.p[edge], middle, sizeof middle);
-    if (!area_cut_cut(c, &half, at, kept, depth + 1))
+    if (!divide_triangle(c, &half, at, kept, depth + 1))
         return false;
     memcpy(half.p[edge], a, sizeof middle);
     memcpy(half.p[(edge + 1) % 3], middle, sizeof middle);
-    return area_cut_cut(c, &half, at, kept, depth + 1);
+    return divide_triangle(c, &half, at, kept, depth + 1);
 }
 
 /* Adds a face. Its `count` balls are at cut->ball, ordered by layer, in each layer the last stroke
@@ -312,7 +313,7 @@ static bool area_cut_face(area_cut *c, const double corner[3][3], uint64_t count
     triangle t;
     memcpy(t.p, corner, sizeof t.p);
     t.area = area_of(corner);
-    return t.area > 0 ? area_cut_cut(c, &t, 0, count, 0) : true;
+    return t.area > 0 ? divide_triangle(c, &t, 0, count, 0) : true;
 }
 
 /* --- the model --- */

@@ -147,7 +147,7 @@ static ebpo_status get_count(reader *r, ebpo_head_object object, const char *pat
 }
 
 /* Checks first that the file is a paint file. */
-static ebpo_status open_judge(reader *r, ebpo_head_object root, ebpo_error *error)
+static ebpo_status check_paint_file(reader *r, ebpo_head_object root, ebpo_error *error)
 {
     char format[64];
     int64_t major = 0, minor = 0;
@@ -425,7 +425,7 @@ static ebpo_status read_all(reader *r, ebpo_error *error)
     uint64_t layers = 0, notes = 0, strokes = 0, points = 0;
     ebpo_status status = ebpo_head_open_group(&r->head, "/", &root, error);
     if (status == EBPO_OK)
-        status = open_judge(r, root, error);
+        status = check_paint_file(r, root, error);
     if (status == EBPO_OK)
         status = read_names(r, root, error);
     if (status == EBPO_OK)
@@ -504,8 +504,8 @@ ebpo_status ebpo_paint_open(const char *path, ebpo_paint **out, ebpo_error *erro
 
 /* Makes the paint of a file that does not exist. Stores the path, so that saving fails if another
  * program has made a file there meanwhile. */
-static ebpo_status make_at(const char *path, const ebpo_file *model, ebpo_paint **out,
-                           ebpo_error *error)
+static ebpo_status make_new_paint(const char *path, const ebpo_file *model, ebpo_paint **out,
+                                  ebpo_error *error)
 {
     char *target;
     ebpo_status status = ebpo_target_path(path, &target, error);
@@ -530,7 +530,7 @@ ebpo_status ebpo_paint_open_to_change(const char *path, const ebpo_file *model, 
     ebpo_status status = ebpo_file_lock_take(&lock, path, wait, progress, error);
     if (status == EBPO_OK)
         status = model && access(path, F_OK) != 0 && errno == ENOENT
-                     ? make_at(path, model, out, error)
+                     ? make_new_paint(path, model, out, error)
                      : open_path(path, out, error);
     if (status == EBPO_OK)
         (*out)->file->lock = lock;

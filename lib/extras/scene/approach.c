@@ -54,9 +54,9 @@ static ebpo_status next_evaluation(const travel *t, const ebpo_scene_evaluations
 
 /* Moves past a jump. *next stays unchanged if there is no jump; then the bound of rounding exceeds
  * the gap even for the shortest time. */
-static ebpo_status approach_jump(const ebpo_scene_evaluations *evaluations,
-                                 const ebpo_scene_approach_result *w, double *next,
-                                 ebpo_error *error)
+static ebpo_status move_past_jump(const ebpo_scene_evaluations *evaluations,
+                                  const ebpo_scene_approach_result *w, double *next,
+                                  ebpo_error *error)
 {
     double length, at = nextafter(w->time, INFINITY);
     ebpo_status status = ebpo_scene_evaluations_motion(evaluations, w->time, at, &length, error);
@@ -81,7 +81,7 @@ static ebpo_status approach_evaluate(const travel *t, ebpo_scene_evaluations *ev
                             error);
 }
 
-static ebpo_status approach_go(const travel *t, ebpo_scene_evaluations *evaluations,
+static ebpo_status follow_pair(const travel *t, ebpo_scene_evaluations *evaluations,
                                ebpo_scene_approach_result *w, ebpo_error *error)
 {
     for (;;) {
@@ -94,7 +94,7 @@ static ebpo_status approach_go(const travel *t, ebpo_scene_evaluations *evaluati
             return EBPO_OK;
         status = next_evaluation(t, evaluations, w, w->lo - w->clearance, &next, error);
         if (status == EBPO_OK && !(next > w->time))
-            status = approach_jump(evaluations, w, &next, error);
+            status = move_past_jump(evaluations, w, &next, error);
         if (status != EBPO_OK)
             return status;
         if (w->evaluations >= t->how.max_evaluations || !(next > w->time)) {
@@ -117,7 +117,7 @@ static ebpo_status find_approach(const void *how, const ebpo_scene_pair *pair, v
     ebpo_status status =
         ebpo_scene_evaluations_begin(&evaluations, t->scene, pair, t->how.tolerance, error);
     if (status == EBPO_OK)
-        status = approach_go(t, &evaluations, approach, error);
+        status = follow_pair(t, &evaluations, approach, error);
     ebpo_collider_free(evaluations.collider);
     return status;
 }

@@ -33,7 +33,7 @@ typedef struct scene_two {
 } scene_two;
 
 /* Marks all results as unknown. */
-static void scene_forget_facts(ebpo_scene_clash *m)
+static void clear_results(ebpo_scene_clash *m)
 {
     static const ebpo_certain unknown = { 0, INFINITY, EBPO_VALUE_BOUND, 0 };
     m->face_a = m->face_b = EBPO_NO_FACE;
@@ -45,7 +45,7 @@ static void scene_forget_facts(ebpo_scene_clash *m)
 
 /* Widens the box of locations by a point. If one of two values is NAN, the result is the other one.
  */
-static void clash_facts_widen(ebpo_scene_clash *m, const double p[3])
+static void widen_location_box(ebpo_scene_clash *m, const double p[3])
 {
     for (int k = 0; k < 3; k++) {
         m->location_min[k] = fmin(m->location_min[k], p[k]);
@@ -56,7 +56,7 @@ static void clash_facts_widen(ebpo_scene_clash *m, const double p[3])
 static void set_location(ebpo_scene_clash *m, const double location[3])
 {
     memcpy(m->location, location, sizeof m->location);
-    clash_facts_widen(m, location);
+    widen_location_box(m, location);
 }
 
 /* --- all pairs --- */
@@ -85,8 +85,8 @@ static bool note_segment(tally *t, const ebpo_face_pair *pair)
     if (t->status != EBPO_OK)
         return false;
     ebpo_contact_of(&faces, pair, &s);
-    clash_facts_widen(t->m, s.point[0]);
-    clash_facts_widen(t->m, s.point[1]);
+    widen_location_box(t->m, s.point[0]);
+    widen_location_box(t->m, s.point[1]);
     return true;
 }
 
@@ -363,7 +363,7 @@ static ebpo_status query_pair(const void *how, const ebpo_scene_pair *pair, void
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     ebpo_collider *collider = NULL;
     *m = (ebpo_scene_clash){ .a = pair->a, .b = pair->b, .clearance = pair->clearance };
-    scene_forget_facts(m);
+    clear_results(m);
     ebpo_status status = ebpo_scene_pose_pair(a->scene, pair, a->time, &options, error);
     if (status == EBPO_OK)
         status = check_omitted(a, pair, error);

@@ -197,7 +197,7 @@ static const ebpo_scene_route *route_of(const ebpo_scene *scene, uint64_t instan
 
 /* Returns true if both instances follow one route, or two routes with the same keys. Then their
  * relative position changes only by rounding, and in size where the route's scale changes. */
-static bool pair_rides(const ebpo_scene *scene, const ebpo_scene_pair *pair)
+static bool follows_one_route(const ebpo_scene *scene, const ebpo_scene_pair *pair)
 {
     const ebpo_scene_route *a = route_of(scene, pair->a), *b = route_of(scene, pair->b);
     if (!a || !b)
@@ -225,8 +225,8 @@ static double pair_rounding(const ebpo_scene *scene, const ebpo_scene_pair *pair
 /* Bounds the motion of a pair on one route. The pose of the route is the same for both instances,
  * to the last bit. So if two of their points are at most `reach` apart in the coordinates of the
  * route, their distance at a time is at most the scale times `reach`. */
-static double pair_motion_ride(const ebpo_scene *scene, const ebpo_scene_pair *pair, double from,
-                               double to)
+static double motion_on_one_route(const ebpo_scene *scene, const ebpo_scene_pair *pair, double from,
+                                  double to)
 {
     ebpo_scene_reach a = ebpo_scene_reach_of(scene, &scene->instances[pair->a]);
     ebpo_scene_reach b = ebpo_scene_reach_of(scene, &scene->instances[pair->b]);
@@ -235,7 +235,7 @@ static double pair_motion_ride(const ebpo_scene *scene, const ebpo_scene_pair *p
 }
 
 /* Sets *out to a bound of the change of the pair's distance between two times; INFINITY over a
- * jump. rides: result of pair_rides. */
+ * jump. rides: result of follows_one_route. */
 static ebpo_status pair_motion(const ebpo_scene *scene, const ebpo_scene_pair *pair, bool rides,
                                double from, double to, double *out, ebpo_error *error)
 {
@@ -247,7 +247,7 @@ static ebpo_status pair_motion(const ebpo_scene *scene, const ebpo_scene_pair *p
         return status;
     *out = (a + b) * (1 + 0x1p-50);
     if (rides && from < to)
-        *out = fmin(*out, pair_motion_ride(scene, pair, from, to));
+        *out = fmin(*out, motion_on_one_route(scene, pair, from, to));
     return EBPO_OK;
 }
 
@@ -415,7 +415,7 @@ ebpo_status ebpo_scene_evaluations_begin(ebpo_scene_evaluations *l, const ebpo_s
     *l = (ebpo_scene_evaluations){ .scene = scene, .pair = pair, .tolerance = tolerance / 4 };
     /* a smaller tolerance would take long, and the additional digits change with every pose */
     l->tolerance = fmax(l->tolerance, pair_rounding(scene, pair) / 16);
-    l->rides = pair_rides(scene, pair);
+    l->rides = follows_one_route(scene, pair);
     return ebpo_scene_collider(scene, pair, 1, &l->collider, error);
 }
 

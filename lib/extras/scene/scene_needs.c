@@ -142,7 +142,7 @@ static ebpo_status come_near(const nearing *n, double from, double to, int halvi
 
 /* Goes from key to key of both routes. Each key begins a new part, because routes may jump there.
  */
-static ebpo_status come_near_along(const nearing *n)
+static ebpo_status add_near_parts(const nearing *n)
 {
     const ebpo_scene_pair pair = { n->of, n->other, 0 };
     double to = n->needs->to;
@@ -205,7 +205,7 @@ static ebpo_status add_pair(ebpo_scene_needs *needs, const ebpo_scene_pair *pair
                       .margin = margin };
         n.need = need_of(needs, n.of);
         n.need->users++;
-        status = come_near_along(&n);
+        status = add_near_parts(&n);
     }
     return status;
 }
