@@ -27,7 +27,7 @@ done
 echo "== contents"
 h5ls -r "$file"
 
-echo "== level $level, first values: types of eight siblings in two bits each, number of planes of each gray node, plane codes"
+echo "== level $level, first values: types of eight siblings, planes of each gray node, plane codes"
 for name in types plane_counts planes; do
     h5ls "$file/levels/$level" | grep -q "^$name " &&
         h5dump -d "/levels/$level/$name" -A 0 -s 0 -c 1 "$file" | sed -n 's/^ *(0): /'"$name"': /p'

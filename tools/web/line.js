@@ -38,7 +38,8 @@ export function showLine({ got, want, quiet, what, trouble }) {
   $('stall').hidden = !stalls;
   if (stalls) {
     $('stallWhat').textContent = trouble ? `Connection lost: ${trouble}` : `No data for ${Math.floor(quiet / 1000)} s`;
-    $('stallNext').textContent = `Waiting for ${what}, ${bytes(want - got)} of ${bytes(want)}. ${trouble ? 'The page repeats the request from time to time; received data is kept.' : 'Received data is kept.'}`;
+    const kept = trouble ? 'The page repeats the request from time to time; received data is kept.' : 'Received data is kept.';
+    $('stallNext').textContent = `Waiting for ${what}, ${bytes(want - got)} of ${bytes(want)}. ${kept}`;
   }
 }
 

@@ -104,7 +104,8 @@ export async function reachOf(file, tree, points) {
       out.push({ here: subset && own < 0 ? 'elsewhere' : 'no' });
       continue;
     }
-    const reach = crowded || !(radius > 0) ? undefined : connectedFaces(around.corners, own, place, radius), inBall = reach && around.corners.filter((f) => nearestOnTriangle(place, f, 0)[0] <= radius);
+    const reach = crowded || !(radius > 0) ? undefined : connectedFaces(around.corners, own, place, radius);
+    const inBall = reach && around.corners.filter((f) => nearestOnTriangle(place, f, 0)[0] <= radius);
     const alone = reach && inBall.length > reach.filter((i) => nearestOnTriangle(place, around.corners[i], 0)[0] <= radius).length;
     out.push({ here: 'yes', normal: normalOf(around.corners[own]), faces: alone ? Float64Array.from(reach.flatMap((i) => [...around.corners[i]])) : undefined });
   }

@@ -317,7 +317,7 @@ export class UrlSource {
   #partial(response, offset, length, first) {
     const range = /^bytes (\d+)-(\d+)\/(\d+)$/.exec(response.headers.get('content-range') ?? '');
     if (!range)
-      throw this.#fail('the response has no Content-Range that this page can read', 'configure the server to send Content-Range and, for pages of other origins, to list it in Access-Control-Expose-Headers');
+      throw this.#fail('the response has no Content-Range that this page can read', 'let the server send it, and for other origins list it in Access-Control-Expose-Headers');
     const [from, to, size] = range.slice(1).map(Number);
     if (!first && size !== this.size)
       throw this.#fail('the file was changed on the server since it was opened', 'open it again');

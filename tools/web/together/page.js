@@ -108,7 +108,7 @@ class Together {
       $(id).hidden = id === 'panel' && innerWidth <= 760;
     markOn(scene);
     section('Models', HTML, { open: true });
-    section('Chosen', CHOSEN, { open: true });
+    section('Selected instance', CHOSEN, { open: true });
     addSectionBox({ cutChanged: () => this.#cut() });
     addDistances({ scene, placeOf: (point) => this.#placeOf(point), changed: () => this.changed() });
     addShading(scene, scene.pipeline = new Pipeline(kit));
@@ -136,7 +136,7 @@ class Together {
       const li = make('li', ''), eye = make('input', '', { type: 'checkbox', checked: model.visible, ariaLabel: `Show ${model.name}` }), colour = make('input', '', { type: 'color',
         value: model.colour, ariaLabel: `Colour of ${model.name}` });
       const name = make('button', model.name, { className: 'link', disabled: !model.info });
-      const facts = model.info ? [`${count(model.info.face_count)} faces`, model.instances.length > 1 && `${count(model.instances.length)} times`, model.size && bytes(model.size)]
+      const facts = model.info ? [`${count(model.info.face_count)} faces`, model.instances.length > 1 && `${count(model.instances.length)} instances`, model.size && bytes(model.size)]
         : [model.error ? 'could not be opened' : 'no instance'];
       eye.onchange = () => this.#show(model, eye.checked);
       colour.oninput = () => {
