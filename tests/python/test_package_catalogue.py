@@ -182,7 +182,8 @@ class Holdings(Case):
         before = process_models().stats()
         for _ in range(2):
             for entry in catalogue.entries:
-                catalogue.inside(np.array(entry.low) / 2 + np.array(entry.high) / 2, memory="8M")  # an eighth of the budget for each of eight threads
+                # An eighth of the budget for each of eight threads.
+                catalogue.inside(np.array(entry.low) / 2 + np.array(entry.high) / 2, memory="8M")
                 self.assertLessEqual(process_models().stats()["memory"], 8_000_000)
         stats = process_models().stats()
         self.assertEqual(stats["opened"], stats["closed"] + stats["open"])

@@ -312,8 +312,9 @@ static void add_planes(ebpo_haptic *t)
     ebpo_vec3_copy(t->proxy, t->along_at);
 }
 
-/* Ends the piece. The ball then slides along the contacts there; after a motion, only along those.
- * Returns false if the ball has no contact and stops for this haptic step. */
+/* Ends the piece. The ball then slides along the contacts at the end of the piece, and along
+ * earlier contacts only if the ball has not moved. Returns false if the ball has no contact and
+ * stops for this haptic step. */
 static bool end_piece(step *s)
 {
     ebpo_haptic *t = s->t;
