@@ -278,12 +278,12 @@ async function fromDisk(page) {
 
 async function errors(browser, address) {
   const quiet = complaints.length;
-  for (const [query, said] of [['file=models/damaged.ebpo.h5&detail=0', /damaged\.ebpo\.h5.*(damaged|checksum)/],
+  for (const [query, expected] of [['file=models/damaged.ebpo.h5&detail=0', /damaged\.ebpo\.h5.*(damaged|checksum)/],
     ['file=models/none.ebpo.h5', /404/],
     ['file=icon.svg', /not a whole HDF5 file|does not serve ranges/]]) {
     const page = await show(browser, `${address}?${query}`);
     await page.waitForSelector('#error:not([hidden])', { timeout: 60000 });
-    assert.match(await page.textContent('#errorWhat'), said);
+    assert.match(await page.textContent('#errorWhat'), expected);
     assert.ok((await page.textContent('#errorNext')).length > 5);
     await page.close();
   }

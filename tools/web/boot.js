@@ -53,16 +53,16 @@
   post({ range: `bytes=0-${boot.ahead - 1}` });
   // Updates the card that is shown before the first picture, until app.js does so.
   let got = 0, last = performance.now();
-  const name = boot.nameOf(boot.url), say = () => {
+  const name = boot.nameOf(boot.url), showProgress = () => {
     const text = document.getElementById('openingText'), quiet = Math.floor((performance.now() - last) / 1000);
     if (!text)
       return;
     document.getElementById('openingName').textContent = name;
     text.textContent = quiet > 2 ? `Nothing has come for ${quiet} s; waiting for ${got >= HEAD_BYTES ? "the page's code" : 'the model'}` : got ? `${Math.round(got / 1000)} kB` : 'Requested';
   };
-  const telling = setInterval(say, 200);
+  const timer = setInterval(showProgress, 200);
   document.documentElement.classList.add('opening');
-  boot.over = () => clearInterval(telling);
+  boot.over = () => clearInterval(timer);
   (async () => {
     const response = await fetch(boot.url, { cache: 'no-cache', signal: abort.signal, headers: { Range: `bytes=0-${boot.ahead - 1}` } });
     post({ head: { status: response.status, statusText: response.statusText, headers: [...response.headers] } });

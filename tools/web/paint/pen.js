@@ -205,7 +205,7 @@ export function addPen({ scene, worker, query }, pipeline) {
   }
 
   // Lets the worker compute the faces that points of strokes cover. Returns a message when a point is not on its face. Stops when `goes()` returns false.
-  async function findReach(strokes, goes, told = () => {}) {
+  async function findReach(strokes, goes, progress = () => {}) {
     const points = strokes.flatMap((s) => s.points.map((p) => ({ p, radius: s.radius * p.size / FULL_SIZE })));
     for (let i = 0; i < points.length && goes(); i += AT_ONCE) {
       const some = points.slice(i, i + AT_ONCE), found = await reachOf(worker, some.map(({ p: { face, place }, radius }) => ({ face, place, radius })));
@@ -214,7 +214,7 @@ export function addPen({ scene, worker, query }, pipeline) {
       if (found.some((f) => f.here === 'no'))
         return 'the paint has points that are not on their faces of the model: the paint file was changed; get a fresh copy';
       found.forEach(({ normal, faces }, k) => reaches.set(some[k].p, { normal, faces: inPicture(faces) }));
-      told();
+      progress();
     }
     return undefined;
   }

@@ -299,11 +299,11 @@ export class UrlSource {
       throw this.#fail('the server returned text/html, not a model', 'check the address, and whether it needs a login');
     if (status === 206 || status === 200)
       return;
-    const said = `the server returned ${status} ${statusText}`.trimEnd();
+    const outcome = `the server returned ${status} ${statusText}`.trimEnd();
     if (status === 416)
-      throw first ? this.#fail(`${said}: the file is empty`, 'upload it again') : this.#fail(`${said}: the file on the server is shorter than when it was opened`, 'open it again');
+      throw first ? this.#fail(`${outcome}: the file is empty`, 'upload it again') : this.#fail(`${outcome}: the file on the server is shorter than when it was opened`, 'open it again');
     const [what, next] = REFUSED[status] ?? [undefined, 'check the address'];
-    throw this.#fail(what ? `${said}: ${what}` : said, next);
+    throw this.#fail(what ? `${outcome}: ${what}` : outcome, next);
   }
 
   #pin(response, first) {

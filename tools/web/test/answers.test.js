@@ -42,11 +42,11 @@ test('weights reproduce the point', () => {
 const paths = (process.env.EBPO_FILES ?? '').split(' ').filter((path) => /\/ring(_subtrees|_blocks|_without_mesh|_box)?\.ebpo\.h5$/.test(path)), tool = process.env.EBPO_TOOL;
 test('sections of files agree with those of all faces; positions are on the source\'s faces', { skip: paths.length && tool ? false : 'EBPO_TOOL and EBPO_FILES are not set' }, async () => {
   for (const path of paths) {
-    const file = await openEbpo(readFileSync(path), { name: path }), { info } = file, tree = new Tree(info), said = [];
+    const file = await openEbpo(readFileSync(path), { name: path }), { info } = file, tree = new Tree(info), reports = [];
     tree.add((await file.levels(0, 0))[0]);
     const axis = 1, at = info.box_origin[1] + 0.4375 * info.box_size[1];
-    await sectionOf(file, tree.lean(), axis, at, (news) => said.push(news), () => false);
-    const last = said.at(-1);
+    await sectionOf(file, tree.lean(), axis, at, (news) => reports.push(news), () => false);
+    const last = reports.at(-1);
     if (!info.parts.has('mesh')) {
       assert.match(last.fault, /no faces/);
       continue;

@@ -42,11 +42,11 @@ test('files are shared among workers, and a worker ends with its last file', () 
 
 test('a failing worker is reported to all its files, and later files get another worker', async () => {
   workers.length = 0;
-  const crew = new Crew({ most: 1 }), told = [], one = client(crew, (type) => told.push(type)), opening = one.open('a.ebpo.h5');
-  const two = client(crew, (type) => told.push(type));
+  const crew = new Crew({ most: 1 }), received = [], one = client(crew, (type) => received.push(type)), opening = one.open('a.ebpo.h5');
+  const two = client(crew, (type) => received.push(type));
   workers[0].onerror({ message: 'gone' });
   await assert.rejects(opening, /the worker failed \(gone\)/);
-  assert.deepEqual([told, workers[0].over], [['failed', 'failed'], true]);
+  assert.deepEqual([received, workers[0].over], [['failed', 'failed'], true]);
   const three = client(crew), there = three.open('b.ebpo.h5');
   assert.equal(workers.length, 2);
   one.end();

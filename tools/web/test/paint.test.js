@@ -31,9 +31,9 @@ test('h5dump and h5py read a paint file', (t) => {
   t.after(() => rmSync(work, { recursive: true, force: true }));
   writeFileSync(path, writePaint(sample()));
   if (spawnSync('h5dump', ['--version']).status === 0) {
-    const said = execFileSync('h5dump', [path], { encoding: 'utf8' });
-    assert.match(said, /DATASET "weights"[^]*H5T_STD_U32LE[^]*\( 15, 2 \)/);
-    assert.match(said, /\(0\): "EBP-Octree paint 1"/);
+    const dump = execFileSync('h5dump', [path], { encoding: 'utf8' });
+    assert.match(dump, /DATASET "weights"[^]*H5T_STD_U32LE[^]*\( 15, 2 \)/);
+    assert.match(dump, /\(0\): "EBP-Octree paint 1"/);
   } else {
     t.diagnostic('h5dump is not installed');
   }
@@ -58,12 +58,12 @@ test('invalid paint files are refused', () => {
     change(doc);
     return writePaint(doc);
   };
-  for (const [change, said] of [[(d) => (d.strokes[0].layer = 2), /layer/], [(d) => (d.strokes[1].radius = Infinity), /radius/], [(d) => (d.strokes[1].radius = 0), /radius/],
+  for (const [change, expected] of [[(d) => (d.strokes[0].layer = 2), /layer/], [(d) => (d.strokes[1].radius = Infinity), /radius/], [(d) => (d.strokes[1].radius = 0), /radius/],
     [(d) => (d.strokes[0].points[0].size = 0), /size/], [(d) => (d.strokes[0].points[0].weights = [2 ** 30, 1]), /weights/], [(d) => (d.strokes[0].points[0].place = [0, NaN, 0]), /place/],
     [(d) => (d.strokes[0].points[0].face = 2 ** 32 - 1), /face/], [(d) => (d.strokes[0].points = []), /points/], [(d) => (d.model = 'x'), /model_sha256/], [(d) => (d.faceNumbers = 'mine'),
       /face_numbers/],
     [(d) => (d.notes[0].layer = 2), /layer/], [(d) => (d.notes[0].weights = [0.5, 0]), /weights/], [(d) => (d.layers[0].opacity = 256), /opacity/], [(d) => (d.layers[0].title = 'a\nb'), /title/]])
-    assert.throws(() => readPaint(broken(change)), (e) => e.code === 'FORMAT' && said.test(e.message), String(said));
+    assert.throws(() => readPaint(broken(change)), (e) => e.code === 'FORMAT' && expected.test(e.message), String(expected));
   assert.throws(() => readPaint(new TextEncoder().encode('nothing of the kind, but long enough to be looked at ...')), /not a whole HDF5 file/);
 });
 
@@ -117,12 +117,12 @@ test('vectors of paint files', { skip: existsSync(vectors) ? false : 'the vector
   });
   assert.deepEqual(wrong, []);
   for (const name of files('passed')) {
-    const doc = read('passed', name), said = JSON.parse(readFileSync(join(vectors, 'passed', name.replace('.paint.h5', '.json')), 'utf8'));
+    const doc = read('passed', name), expected = JSON.parse(readFileSync(join(vectors, 'passed', name.replace('.paint.h5', '.json')), 'utf8'));
     const hex = (list) => `#${list.map((x) => x.toString(16).padStart(2, '0')).join('')}`, bytesOf = (c) => [24, 16, 8, 0].map((shift) => c >>> shift & 255);
     const layers = doc.layers.map((l) => ({ ...l, colour: hex(bytesOf(l.colour)) }));
     const strokes = doc.strokes.map(({ erases, colour, ...rest }) => ({ ...rest, kind: erases ? 'erases' : 'paints', colour: hex(colour) }));
-    assert.deepEqual([doc.model, doc.modelName, doc.unit, doc.faceNumbers], [said.model_sha256, said.model_name, said.unit, said.face_numbers], name);
-    assert.deepEqual({ layers, notes: doc.notes, strokes }, { layers: said.layers, notes: said.notes, strokes: said.strokes }, name);
+    assert.deepEqual([doc.model, doc.modelName, doc.unit, doc.faceNumbers], [expected.model_sha256, expected.model_name, expected.unit, expected.face_numbers], name);
+    assert.deepEqual({ layers, notes: doc.notes, strokes }, { layers: expected.layers, notes: expected.notes, strokes: expected.strokes }, name);
     assert.deepEqual(readPaint(writePaint(doc)), doc);
   }
   assert.ok(files('passed').length > 0 && files('failed').length > 0);

@@ -18,7 +18,7 @@ function chance(seed) {
 }
 
 // Reference implementation: joins faces that share a corner inside the ball, or an edge with a point inside the ball. Tests edges in small steps and at their ends.
-function plainly(faces, own, centre, radius) {
+function referenceFaces(faces, own, centre, radius) {
   const corners = (f) => [0, 3, 6].map((c) => [...f.subarray(c, c + 3)]), near = (q) => Math.hypot(...q.map((x, k) => x - centre[k])) <= radius, same = (a, b) => a.every((x, k) => x === b[k]);
   const reached = (a, b) => Array.from({ length: 2001 }, (_, i) => i / 2000).some((t) => near(a.map((x, k) => x + t * (b[k] - x))));
   const joined = (f, g) => {
@@ -40,7 +40,7 @@ test('connected faces agree with the reference implementation', () => {
   for (let round = 0; round < 60; round++) {
     const points = Array.from({ length: 14 }, () => [next(), next(), next() * 0.4]), pick = () => points[Math.floor(next() * points.length)];
     const faces = Array.from({ length: 12 }, () => Float64Array.from([...pick(), ...pick(), ...pick()])), centre = [next(), next(), 0.2], radius = 0.1 + 0.3 * next();
-    assert.deepEqual(connectedFaces(faces, 0, centre, radius), plainly(faces, 0, centre, radius), `round ${round}`);
+    assert.deepEqual(connectedFaces(faces, 0, centre, radius), referenceFaces(faces, 0, centre, radius), `round ${round}`);
   }
 });
 

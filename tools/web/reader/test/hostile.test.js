@@ -31,11 +31,11 @@ async function readBySubtree(bytes) {
   return JSON.stringify([found.map(({ segment }) => [...segment.types]), drawn.map((s) => [...s.planes ?? []]), faces.map((f) => [...f, ...f.numbers])]);
 }
 
-async function refused(bytes, said, read = readBySubtree) {
+async function refused(bytes, expected, read = readBySubtree) {
   await assert.rejects(read(bytes), (error) => {
     assert.ok(error instanceof EbpoError, error.stack);
     assert.equal(error.code, 'FORMAT');
-    assert.match(error.message, said);
+    assert.match(error.message, expected);
     return true;
   });
 }
@@ -105,7 +105,7 @@ const placed = (change) => {
 
 test('chunk directory: a chunk too many, too few, too large, beyond the end, at a wrong offset', async () => {
   assert.deepEqual([...placed(() => {}).values()].map((chunks) => chunks.length), arrays.map((a) => a.chunkCount));
-  const wrong = (change, said) => assert.throws(() => placed(change), (error) => error instanceof EbpoError && error.code === 'FORMAT' && said.test(error.message));
+  const wrong = (change, expected) => assert.throws(() => placed(change), (error) => error instanceof EbpoError && error.code === 'FORMAT' && expected.test(error.message));
   wrong((rows) => (rows[3] = rows[1]), /\/subtrees\/places: .*more chunks/);
   wrong((rows, last) => (rows[last + 1] = 70000), /\/subtrees\/places: .*fewer chunks/);
   wrong((rows, last) => (rows[last] = 2 ** 32 - 1), /\/subtrees\/places: a chunk reaches beyond the end/);

@@ -37,12 +37,12 @@ async function readAll(url, options) {
   return file;
 }
 
-async function fails(odd, code, said, options) {
+async function fails(odd, code, expected, options) {
   await serve(odd, async (url) => {
     await assert.rejects(readAll(url, options), (error) => {
       assert.ok(error instanceof EbpoError, error.stack);
       assert.equal(error.code, code);
-      assert.match(error.message, said);
+      assert.match(error.message, expected);
       assert.ok(error.message.startsWith(url + ': '), error.message);
       return true;
     });
@@ -133,9 +133,9 @@ test('no server', async () => {
 });
 
 test('HTTP statuses are explained', async () => {
-  for (const [status, said] of [[401, /401.*requires a login/], [403, /403.*does not let this page.*access/], [404, /404.*no such file.*address/], [410, /410.*removed/],
+  for (const [status, expected] of [[401, /401.*requires a login/], [403, /403.*does not let this page.*access/], [404, /404.*no such file.*address/], [410, /410.*removed/],
     [416, /416.*is empty/], [418, /418/]])
-    await fails((answer) => (answer.status = status), 'NETWORK', said);
+    await fails((answer) => (answer.status = status), 'NETWORK', expected);
   await fails((answer, n) => (n > 1 ? (answer.status = 416) : undefined), 'NETWORK', /416.*is shorter.*open it again/);
 });
 

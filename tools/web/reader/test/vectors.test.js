@@ -29,13 +29,13 @@ for (const name of readdirSync(join(vectors, 'passed')).filter((n) => n.endsWith
 // The reader does not return attributes, and therefore does not check them (section 18).
 for (const name of readdirSync(join(vectors, 'failed')).filter((n) => n.endsWith('.h5') && !n.startsWith('attributes_')))
   test(`${name} is refused`, async () => {
-    const [status, said] = load('failed', name.replace('.ebpo.h5', '.txt')).toString().split('\n');
+    const [status, expected] = load('failed', name.replace('.ebpo.h5', '.txt')).toString().split('\n');
     await assert.rejects(readAll(load('failed', name), name), (error) => {
       assert.ok(error instanceof EbpoError, error.stack);
       assert.equal('EBPO_E_' + error.code, status);
       assert.ok(error.message.startsWith(name + ': ') && error.message.includes('; '), error.message);
       if (process.env.EBPO_SHOW)
-        console.log(`C:  ${said}\nJS: ${error.message}\n`);
+        console.log(`C:  ${expected}\nJS: ${error.message}\n`);
       return true;
     });
   });
