@@ -110,7 +110,7 @@ static bool is_detected(const bytes *b, int n, uint64_t chunk)
 {
     ebpo_read_options options = EBPO_READ_OPTIONS_INIT;
     ebpo_error error = EBPO_ERROR_INIT;
-    char expected[64];
+    char expected[80];
     options.threads = 1;
     snprintf(expected, sizeof expected, "chunk %llu is damaged: its checksum is not the one",
              (unsigned long long)chunk);
