@@ -182,7 +182,7 @@ class Holdings(Case):
         before = process_models().stats()
         for _ in range(2):
             for entry in catalogue.entries:
-                # An eighth of the budget for each of eight threads.
+                # Each open model has an eighth of the budget.
                 catalogue.inside(np.array(entry.low) / 2 + np.array(entry.high) / 2, memory="8M")
                 self.assertLessEqual(process_models().stats()["memory"], 8_000_000)
         stats = process_models().stats()
