@@ -87,7 +87,7 @@ def query_cell(bench, model, servers, points, query):
         for peer, way in in_turns(ways):
             words = ways[peer, way]
             save = ["--answers", saved[peer]] if turn == 0 and way == peer else []
-            report = servers[peer].ask(query, raw, *words, *end, *save)
+            report = servers[peer].run_query(query, raw, *words, *end, *save)
             if turn > 0: # the first turn only warms up
                 reports[way].append(report)
     wrong = {p: differences(query, saved["ebpo"], saved[p], 1e-6 * model.diagonal,
@@ -95,7 +95,7 @@ def query_cell(bench, model, servers, points, query):
              for p in servers if p != "ebpo" and reports.get(p) and None not in reports[p]}
     tails = {}
     if (query, points) in TAILS:
-        tails = {way: servers[peer].ask(query, raw, *words, "--clocked")
+        tails = {way: servers[peer].run_query(query, raw, *words, "--clocked")
                  for (peer, way), words in ways.items() if way in ("ebpo", "embree", "cgal")}
     return {"ns": {way: middle(runs) for way, runs in reports.items()}, "wrong": wrong,
             "tails": tails, "count": count}
@@ -237,7 +237,7 @@ def measure_budget(bench, model):
                                  ("inside", "path", bench.options.count)]:
         raw = model.queries_of(points, max(1, count))
         with Server(bench, "ebpo", model, "--memory", BUDGET, "--threads", 0, core=False) as s:
-            rows.append((query, points, s.ask(query, raw, "--clocked",
+            rows.append((query, points, s.run_query(query, raw, "--clocked",
                                               *(["--warm"] if query == "distance" else []))))
     return rows
 

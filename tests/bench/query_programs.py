@@ -83,7 +83,7 @@ class Server:
         self.process.stdin.close()
         self.process.wait()
 
-    def ask(self, query, points, *words):
+    def run_query(self, query, points, *words):
         try:
             print(query, points, *words, file=self.process.stdin, flush=True)
             line = self.process.stdout.readline()
