@@ -83,10 +83,10 @@ def measure(build, ply, tree, args, folder):
     got = {}
     for ours, theirs in sorted({(row[1], row[2]) for row in ROWS}):
         got["ours", ours] = run_query(programs / "pairs_ebpo", tree, poses, ours, args.rounds,
-                                folder / f"ours.{ours}")
+                                      folder / f"ours.{ours}")
         if ("theirs", theirs) not in got:
             got["theirs", theirs] = run_query(programs / "pairs_fcl", ply, poses, theirs, args.fcl_rounds,
-                                        folder / f"theirs.{theirs}")
+                                              folder / f"theirs.{theirs}")
     return got, compare_pairs(folder / "ours.all", folder / "theirs.all")
 
 

@@ -238,7 +238,7 @@ def measure_budget(bench, model):
         raw = model.queries_of(points, max(1, count))
         with Server(bench, "ebpo", model, "--memory", BUDGET, "--threads", 0, core=False) as s:
             rows.append((query, points, s.run_query(query, raw, "--clocked",
-                                              *(["--warm"] if query == "distance" else []))))
+                                                      *(["--warm"] if query == "distance" else []))))
     return rows
 
 

@@ -116,10 +116,10 @@ def measure_queries(scale, file):
     The one query is near the surface, so it must load data, and at another position each time.
     """
     o = scale.options
-    return {query: {"open": [run_query(scale, file, query, 1, seed=seed)
-                             for seed in range(1, OPENINGS + 1)], "path": run_query(scale, file, query, o.count, "--prefetch"),
-                    "rate": run_query(scale, file, query, o.rate_count, "--prefetch", "--rate",
-                                1000)} for query in ("inside", "distance")}
+    return {query: {"open": [run_query(scale, file, query, 1, seed=seed) for seed in range(1, OPENINGS + 1)],
+                    "path": run_query(scale, file, query, o.count, "--prefetch"),
+                    "rate": run_query(scale, file, query, o.rate_count, "--prefetch", "--rate", 1000)}
+            for query in ("inside", "distance")}
 
 
 def study(scale, millions):
