@@ -75,7 +75,7 @@ void ebpo_catalogue_numbers_close(ebpo_catalogue_numbers *f);
 EBPO_MUST_USE ebpo_status ebpo_catalogue_numbers_get(const ebpo_catalogue_numbers *f,
                                                      uint64_t *face, ebpo_error *error);
 
-/* --- each model once, by one thread: catalogue_ask.c --- */
+/* --- each model once, by one thread: catalogue_query.c --- */
 
 typedef struct ebpo_catalogue_batch {
     const ebpo_catalogue *c;
@@ -122,7 +122,7 @@ EBPO_MUST_USE ebpo_status ebpo_catalogue_query_all(const ebpo_catalogue_batch *a
 /* Returns EBPO_E_ABSENT if the catalogue contains caps only. */
 EBPO_MUST_USE ebpo_status ebpo_catalogue_need_surface(const ebpo_catalogue *c, ebpo_error *error);
 
-/* --- many rows, by any number of threads: catalogue_ask.c --- */
+/* --- many rows, by any number of threads: catalogue_query.c --- */
 
 /* Processes a stretch of rows in one thread. A row is a point, or an ebpo_ray as numbers. */
 typedef ebpo_status (*ebpo_catalogue_stretch)(const ebpo_catalogue_batch *a, const double *rows,

@@ -1,7 +1,7 @@
 /* Rewrites files in another program's layout in this format's layout, by libhdf5 in a separate
- * process (apart.c). Chunks whose filters and rows fit are copied as stored; from other layouts,
- * filters and byte orders, libhdf5 decodes the values. Arrays that do not fit the format are
- * omitted, and the first one is reported. Depth and number of objects are bounded, because hard
+ * process (separate_process.c). Chunks whose filters and rows fit are copied as stored; from other
+ * layouts, filters and byte orders, libhdf5 decodes the values. Arrays that do not fit the format
+ * are omitted, and the first one is reported. Depth and number of objects are bounded, because hard
  * links may form cycles. */
 #include <inttypes.h>
 #include <stdio.h>

@@ -40,8 +40,8 @@ def run_query(program, model, poses, query, rounds, pairs=None):
     """Return the cost of construction, and (kind, microseconds, value) for each pose."""
     lines = run([program, model, poses, query, rounds] + ([pairs] if pairs else [])).splitlines()
     made = lines[0].split()
-    answers = [(kind, float(us), float(value)) for kind, us, value in map(str.split, lines[1:])]
-    return (float(made[1]), int(made[2])), answers
+    results = [(kind, float(us), float(value)) for kind, us, value in map(str.split, lines[1:])]
+    return (float(made[1]), int(made[2])), results
 
 
 def read_pairs(path):
@@ -64,8 +64,8 @@ def compare_pairs(ours, theirs):
     return out
 
 
-def mean(answers, kind):
-    return statistics.mean(us for k, us, _ in answers if k == kind)
+def mean(results, kind):
+    return statistics.mean(us for k, us, _ in results if k == kind)
 
 
 def faces(ply):

@@ -47,8 +47,8 @@ class Ranges(http.server.BaseHTTPRequestHandler):
 
     def do_GET(self):
         away = time.monotonic() < self.server.until
-        asked = re.match(r"bytes=(\d+)-(\d+)", self.headers["Range"] or "bytes=0-0")
-        first, last = int(asked[1]), min(int(asked[2]), len(self.server.data) - 1)
+        requested = re.match(r"bytes=(\d+)-(\d+)", self.headers["Range"] or "bytes=0-0")
+        first, last = int(requested[1]), min(int(requested[2]), len(self.server.data) - 1)
         part = b"" if away else self.server.data[first:last + 1]
         self.server.refused += away
         self.server.answered += not away

@@ -1,8 +1,8 @@
 /* Measures the accuracy of results: makes queries that are hard to decide, and compares results
  * with rational arithmetic (tests/support/oracle.h, brute force). For models that are not large.
  *
- *     exact_judge ask FILE.ebpo.h5 points|rays COUNT OUT.raw
- *     exact_judge judge FILE.ebpo.h5 QUERY POINTS.raw TMAX TOLERANCE ANSWERS...
+ *     exact_judge make FILE.ebpo.h5 points|rays COUNT OUT.raw
+ *     exact_judge judge FILE.ebpo.h5 QUERY POINTS.raw TMAX TOLERANCE RESULTS...
  *
  * Points are in turn on a vertex, on an edge and on a face (as exactly as doubles permit), in the
  * plane of a face, above a vertex, next to a vertex, between two vertices, and in a plane of the
@@ -258,7 +258,7 @@ static void judge(const subject *s, query what, const double *points, uint64_t c
             judge_one(what, &truth, &reported, unit, &verdicts[k]);
         }
     }
-    printf("{\"count\": %" PRIu64 ", \"on\": %" PRIu64 ", \"answers\": [", count, on);
+    printf("{\"count\": %" PRIu64 ", \"on\": %" PRIu64 ", \"results\": [", count, on);
     for (int k = 0; k < files; k++) {
         printf("%s{\"decisions\": %" PRIu64 ", \"values\": %" PRIu64 ", \"bits\": %" PRIu64 "}",
                k ? ", " : "", verdicts[k].decisions, verdicts[k].values, verdicts[k].bits);
@@ -277,18 +277,18 @@ static query query_of(const char *word)
 
 int main(int argc, char **argv)
 {
-    bool asks = argc == 6 && strcmp(argv[1], "ask") == 0, judges = argc >= 8 && argc <= 23 &&
-                                                                   strcmp(argv[1], "judge") == 0 &&
-                                                                   query_of(argv[3]) != QUERIES;
+    bool makes = argc == 6 && strcmp(argv[1], "make") == 0,
+         judges = argc >= 8 && argc <= 23 && strcmp(argv[1], "judge") == 0 &&
+                  query_of(argv[3]) != QUERIES;
     subject s = { .has_maps = false };
-    if (!asks && !judges) {
-        fprintf(stderr, "usage: exact_judge ask FILE.ebpo.h5 points|rays COUNT OUT.raw\n"
+    if (!makes && !judges) {
+        fprintf(stderr, "usage: exact_judge make FILE.ebpo.h5 points|rays COUNT OUT.raw\n"
                         "       exact_judge judge FILE.ebpo.h5 QUERY POINTS.raw TMAX TOLERANCE "
-                        "ANSWERS...\n");
+                        "RESULTS...\n");
         return 2;
     }
     read_subject(&s, argv[2]);
-    if (asks)
+    if (makes)
         run_query(&s, strcmp(argv[3], "rays") == 0, strtoull(argv[4], NULL, 10), argv[5]);
     else {
         query what = query_of(argv[3]);

@@ -55,8 +55,8 @@ def sums_beside(folder, seconds):
 
     Its times show the delays of the machine.
     """
-    program = folder + "/tick_alone"
-    subprocess.run(["cc", "-O2", os.path.join(os.path.dirname(os.path.abspath(__file__)), "tick_alone.c"),
+    program = folder + "/machine_delays"
+    subprocess.run(["cc", "-O2", os.path.join(os.path.dirname(os.path.abspath(__file__)), "machine_delays.c"),
                     "-o", program, "-lm"], check=True)
     return program, subprocess.Popen([program, str(int(seconds))], text=True, stdout=subprocess.PIPE)
 
@@ -89,7 +89,7 @@ def main(ebpo, model, seconds="600"):
 - With {info["faces"]:,} faces and a budget of 256 MiB, a step of the ball at 1 kHz takes {us(first["p50"])} us (median) and
   {us(first["p99_9"])} us (p99.9).
 - {first["over_ms"]} of {first["steps"]:,} steps take more than 1 ms; the longest takes {us(first["max"])} us.
-- A loop of the same arithmetic without the library shows the delays of the machine (`tests/bench/tick_alone.c`):
+- A loop of the same arithmetic without the library shows the delays of the machine (`tests/bench/machine_delays.c`):
   {sums}
 
 ## Goals

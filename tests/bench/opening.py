@@ -87,12 +87,12 @@ def main():
     for model in given.models:
         before, after, ratio = in_turns(given.libraries, str(model), given.count, given.rounds)
         server = Counted(model.read_bytes())
-        asked = [server.once(library) for library in given.libraries]
+        requests = [server.once(library) for library in given.libraries]
         far = in_turns(given.libraries, server.url, max(given.count // 10, 1), given.rounds)
         server.undo()
         print(f"| {model.name} | {model.stat().st_size / 1e6:.1f} | {before:.0f} | {after:.0f} | {ratio:.2f} "
-              f"| {far[0]:.0f} | {far[1]:.0f} | {far[2]:.2f} | {asked[0][0]}, {asked[1][0]} "
-              f"| {asked[0][1]:,}, {asked[1][1]:,} |", flush=True)
+              f"| {far[0]:.0f} | {far[1]:.0f} | {far[2]:.2f} | {requests[0][0]}, {requests[1][0]} "
+              f"| {requests[0][1]:,}, {requests[1][1]:,} |", flush=True)
 
 
 if sys.argv[1:2] == ["--child"]:

@@ -40,10 +40,10 @@ class Server(http.server.BaseHTTPRequestHandler):
     def do_GET(self):
         time.sleep(Server.latency)
         size = Server.path_of_file.stat().st_size
-        asked = re.fullmatch(r"bytes=(\d+)-(\d*)", self.headers["Range"] or "")
-        first, last = (int(asked[1]), min(int(asked[2] or size), size - 1)) if asked else (0, size - 1)
-        self.send_response(206 if asked else 200)
-        if asked:
+        requested = re.fullmatch(r"bytes=(\d+)-(\d*)", self.headers["Range"] or "")
+        first, last = (int(requested[1]), min(int(requested[2] or size), size - 1)) if requested else (0, size - 1)
+        self.send_response(206 if requested else 200)
+        if requested:
             self.send_header("Content-Range", f"bytes {first}-{last}/{size}")
         self.send_header("Content-Length", str(last + 1 - first))
         self.send_header("Accept-Ranges", "bytes")
@@ -77,16 +77,16 @@ def counted(function):
     """Call a function. Return its result, and the requests, bytes and seconds of the call."""
     before, began = list(Server.counts), time.perf_counter()
     try:
-        answer = function()
+        result = function()
     except (BrokenPipeError, ConnectionError) as error:
-        answer = error
-    return answer, [after - b for after, b in zip(Server.counts, before)] + [time.perf_counter() - began]
+        result = error
+    return result, [after - b for after, b in zip(Server.counts, before)] + [time.perf_counter() - began]
 
 
 def row(name, open_it, query):
     model, opening = counted(open_it)
-    _, asking = counted(lambda: query(model))
-    print(f"| {name} | {opening[0]} | {opening[1]:,} | {asking[0]} | {asking[1]:,} | {asking[2]:.2f} |", flush=True)
+    _, querying = counted(lambda: query(model))
+    print(f"| {name} | {opening[0]} | {opening[1]:,} | {querying[0]} | {querying[1]:,} | {querying[2]:.2f} |", flush=True)
 
 
 def main():

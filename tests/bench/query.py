@@ -27,7 +27,7 @@ import query_checks
 import query_thesis
 
 SECTIONS = ["rays", "distance", "inside", "memory", "budget", "modes", "distance-modes", "opening",
-            "answers"]
+            "results"]
 MORE = ["leaves", "misses"]  # sections that are printed only if --sections names them
 RAYS = ["uniform", "camera", "segments", "degenerate"]
 RAY_QUERIES = {"ray": "first hit", "ray-any": "any hit", "ray-all": "all hits"}
@@ -79,14 +79,14 @@ def query_cell(bench, model, servers, points, query):
     count = max(1, bench.options.count // SHARE.get((query, points), 1))
     raw = model.queries_of(points, count, rays)
     end = ["--tmax", 1] if points == "segments" else []
-    saved = {p: bench.work / f"answers.{p}" for p in servers}
+    saved = {p: bench.work / f"results.{p}" for p in servers}
     ways = {(p, way): words for p in servers for way, words in ways_of(p, points, query).items()
             if p != "cgal" or query in ("ray", "inside", "distance")}
     reports = {way: [] for _, way in ways}
     for turn in range(bench.rounds(model) + 1):
         for peer, way in in_turns(ways):
             words = ways[peer, way]
-            save = ["--answers", saved[peer]] if turn == 0 and way == peer else []
+            save = ["--results", saved[peer]] if turn == 0 and way == peer else []
             report = servers[peer].run_query(query, raw, *words, *end, *save)
             if turn > 0: # the first turn only warms up
                 reports[way].append(report)
@@ -276,7 +276,7 @@ def section_opening(bench, page, models):
                     runs[peer].append(query_checks.loads(bench.run(
                         bench.program(peer), model.ply, query, raw, "--cold", "--count", 1)))
             first = {who: middle(r, "cold_first_result_seconds" if who in ("ebpo", "cut")
-                                 else "first_answer_s") for who, r in runs.items()}
+                                 else "first_result_s") for who, r in runs.items()}
             rows.append([model.name, query]
                         + [figure(size / 2**20) for size in
                            (model.ply.stat().st_size, model.file.stat().st_size,
@@ -301,7 +301,7 @@ def section_leaves(bench, page, models):
         leaves = sum(kind["leaves"] for kind in kinds)
         rows.append([model.name, f"{model.faces:,}", f"{leaves:,}"]
                     + [figure(100 * n / max(1, leaves))
-                       for n in [kind["leaves"] for kind in kinds] + [last["one_wall"]]])
+                       for n in [kind["leaves"] for kind in kinds] + [last["one_cell_face"]]])
         for kind in kinds[1:]:
             if kind["points"]:
                 gains.append([model.name, kind["kind"], f"{kind['points']:,}",
@@ -364,7 +364,7 @@ class Made:
         self.bench = bench
         self.results, self.memory, self.tables = {}, {}, {}
         self.budget, self.more = [], Page()
-        self.found = {"answers": None, "misses": None}
+        self.found = {"results": None, "misses": None}
 
     def publish(self, largest):
         page, wanted = Page(), self.bench.options.sections.split(",")
@@ -401,8 +401,8 @@ POINTS = {
 
 def beside(bench, small, middling, wanted, found):
     """Run the parts that do not depend on time."""
-    if "answers" in wanted:
-        found["answers"] = query_checks.judge_results(bench, small)
+    if "results" in wanted:
+        found["results"] = query_checks.judge_results(bench, small)
     if "misses" in wanted:
         found["misses"] = query_checks.count_misses(bench, [small, middling])
 

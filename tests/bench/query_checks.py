@@ -25,11 +25,11 @@ def judge(bench, model, query, raw, which):
     for peer in peers:
         source = model.file if peer == "ebpo" else model.ply
         files.append(bench.work / f"judged.{peer}")
-        bench.run(bench.program(peer), source, query, raw, "--answers", files[-1], core=core)
+        bench.run(bench.program(peer), source, query, raw, "--results", files[-1], core=core)
     found = loads(bench.run(bench.build / "tests" / "bench" / "exact_judge", "judge", model.file,
                             query, raw, "inf", 1e-6 * model.diagonal, *files, core=core))
     return {"query": query, "which": which, "count": found["count"], "on": found["on"],
-            "peers": dict(zip(peers, found["answers"]))}
+            "peers": dict(zip(peers, found["results"]))}
 
 
 def judge_results(bench, model):
@@ -103,7 +103,7 @@ def write_misses(page, rows):
 
 
 def write(page, found):
-    if found["answers"]:
-        write_results(page, *found["answers"])
+    if found["results"]:
+        write_results(page, *found["results"])
     if found["misses"]:
         write_misses(page, found["misses"])

@@ -75,11 +75,11 @@ def goals_table(results, memory, budget, tables, found):
         slower = [what for what, ours, theirs in thesis if ours > theirs]
         goals.rows.append(["modes of the EBP thesis: table cells slower than the thesis", 0,
                            f"{len(slower)} of {len(thesis)}", "missed" if slower else "met"])
-    if found["answers"]:
-        bad = sum(r["peers"]["ebpo"]["bits"] for r in found["answers"][1])
-        asked = sum(r["count"] for r in found["answers"][1])
+    if found["results"]:
+        bad = sum(r["peers"]["ebpo"]["bits"] for r in found["results"][1])
+        judged = sum(r["count"] for r in found["results"][1])
         goals.rows.append(["results that rational arithmetic contradicts", 0,
-                           f"{bad} of {asked:,}", "missed" if bad else "met"])
+                           f"{bad} of {judged:,}", "missed" if bad else "met"])
     page.text("## Goals", "",
               "The table begins with missed goals. A goal is an upper limit. Four values in a "
               "cell are for the models of "
@@ -112,10 +112,10 @@ def summary(results, memory, budget, found):
         lines.append(f"- With the model in memory, a ray query takes {span(rays)} times as long as "
                      f"Embree's in single precision, a nearest-point query {span(near)} times, a "
                      f"point-in-solid query {span(inside)} times.")
-    if found["answers"]:
-        bad = sum(r["peers"]["ebpo"]["bits"] for r in found["answers"][1])
-        asked = sum(r["count"] for r in found["answers"][1])
-        lines.append(f"- Results are exact: rational arithmetic contradicts {bad} of {asked:,} "
+    if found["results"]:
+        bad = sum(r["peers"]["ebpo"]["bits"] for r in found["results"][1])
+        judged = sum(r["count"] for r in found["results"][1])
+        lines.append(f"- Results are exact: rational arithmetic contradicts {bad} of {judged:,} "
                      "results.")
     means = [f"{figure(r['clocked_mean_ns'] / 1000)} us ({query})"
              for query, points, r in budget if r and points == "path"]

@@ -120,7 +120,7 @@ class Model:
 
     def hard(self, rays, count):
         raw = self.bench.work / f"{self.name}.hard{'.rays' if rays else ''}.{count}.raw"
-        self.bench.run(self.bench.build / "tests" / "bench" / "exact_judge", "ask", self.file,
+        self.bench.run(self.bench.build / "tests" / "bench" / "exact_judge", "make", self.file,
                        "rays" if rays else "points", count, raw, core=False)
         return raw
 

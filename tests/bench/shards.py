@@ -83,12 +83,12 @@ def main():
     make_points(points, o.rows, low, high)
     command = [o.ebpo, "inside", "--raw", "--stats", "--force", "--threads", "1", "--memory", o.memory,
                o.model, points]
-    seconds, asking, out = {1: [], 2: []}, {1: [], 2: []}, os.path.join(o.folder, "answers")
+    seconds, querying, out = {1: [], 2: []}, {1: [], 2: []}, os.path.join(o.folder, "results")
     for _ in range(o.rounds):
         for shards in (1, 2):
             took, each = run(command, shards, f"{out}.{shards}")
             seconds[shards].append(took)
-            asking[shards].append(took - max(t["open_seconds"] for t in each))
+            querying[shards].append(took - max(t["open_seconds"] for t in each))
             print(json.dumps({"processes": shards, "seconds": took, "each": each}), flush=True)
     if not same(f"{out}.1.0", [f"{out}.2.0", f"{out}.2.1"]):
         sys.exit("the results of two processes differ from those of one")
@@ -96,7 +96,7 @@ def main():
     print(json.dumps({"rows": o.rows, "points_a_second_one": o.rows / one,
                       "points_a_second_two": o.rows / two, "efficiency": one / (2 * two),
                       "efficiency_without_opening":
-                          statistics.median(asking[1]) / (2 * statistics.median(asking[2]))}))
+                          statistics.median(querying[1]) / (2 * statistics.median(querying[2]))}))
 
 
 if __name__ == "__main__":

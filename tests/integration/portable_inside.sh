@@ -64,7 +64,7 @@ fi
     exit 1
 }
 units="dialects ply head container predicates face_gates chunk_sums source import number slice wide
-    far_offsets"
+    large_offsets"
 programs="tools/ebpo samples/ebpo-generate tests/vectors/make_vectors tests/vectors/test_vectors \
     tests/lint/flags/fp_hash_usual tests/lint/flags/predicates_hash_small tests/unit/test_unit \
     tests/query/test_query"

@@ -19,7 +19,7 @@ if (!chromium || !nginx || !existsSync(join(viewer, 'node_modules/playwright-cor
 const load = (path) => import(pathToFileURL(join(viewer, path)));
 const { chromium: playwright } = await load('node_modules/playwright-core/index.mjs');
 const { openEbpo } = await load('reader/index.js');
-const { cutFaces, measureOf } = await load('answers.js'), { plates } = await load('test/plates.js'), { readPaint } = await load('paint/paint_file.js');
+const { cutFaces, measureOf } = await load('queries.js'), { plates } = await load('test/plates.js'), { readPaint } = await load('paint/paint_file.js');
 
 const work = mkdtempSync(join(tmpdir(), 'ebpo-viewer-')), models = join(work, 'models'), log = join(work, 'access.log'), model = join(models, 'ring.ebpo.h5');
 const run = (program, args, input, env) => execFileSync(program, args, { encoding: 'utf8', input, env, stdio: ['pipe', 'pipe', 'pipe'], maxBuffer: 1 << 26 });

@@ -1,6 +1,6 @@
 // Controls the page: requests, the picture, and messages to and from the worker.
 import { cutOf } from './address.js';
-import { frameMs, frameTook, makeLevels, showLevel, showLevels, showStats } from './figures.js';
+import { frameMs, frameTook, makeLevels, showLevel, showLevels, showStats } from './statistics.js';
 import { busy, bytes, showError, showLine, showOpening } from './line.js';
 import { probeAt, probeShown, probeWith } from './probe.js';
 import { listSamples } from './samples.js';

@@ -46,7 +46,7 @@
   if (!boot.url || !/^https?:/.test(boot.url))
     return;
 
-  // Makes the worker's first request. handover.js gives the response to the worker as if the worker had sent the request.
+  // Makes the worker's first request. first_response.js gives the response to the worker as if the worker had sent the request.
   const post = (part, transfer = []) => worker.postMessage({ type: 'first', url: boot.url, ...part }, transfer), abort = new AbortController();
   boot.forget = () => abort.abort();
   boot.opening = 1;

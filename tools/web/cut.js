@@ -7,7 +7,7 @@ import { Hidden } from './hidden.js';
 import { MeshStore } from './mesh.js';
 import { BLACK, GRAY, LEAF, WHITE } from './reader/index.js';
 import { TileMaker, planeVector } from './tile.js';
-import { Walls } from './walls.js';
+import { Walls } from './cell_faces.js';
 
 const TILE_NODES = 300;        // most nodes of a tile: large tiles need fewer draw calls, small tiles are rebuilt faster
 const NODES_A_PASS = 2400;     // most new nodes of a pass, so that a picture appears early and improves; the first passes create even fewer

@@ -4,7 +4,7 @@ import { boxOf, cameraOf, cameraText, clipOf, cutOf, pointsOf } from './address.
 import { Client } from './client.js';
 import { Scene } from './scene.js';
 import { fromPicture, toPicture } from './state.js';
-import { ofParts, poseFrom, wanted } from './together/asked.js';
+import { ofParts, poseFrom, wanted } from './together/addresses.js';
 import { Several } from './together/several.js';
 
 const OPENS = ['src', 'scene', 'remote', 'up'], PART = 'ebpo-part';

@@ -30,7 +30,7 @@ export class TileMaker {
 
   /**
    * Returns { key, position, tag, normal, index, inner, lines, cells, triangles, meshTriangles, wallTriangles }. The triangles of planes and faces are first in
-   * `index`. `walls`: from walls.js; if undefined, all cell faces are drawn completely.
+   * `index`. `walls`: from cell_faces.js; if undefined, all cell faces are drawn completely.
    */
   make(key, nodes, want, walls) {
     this.vertices = this.inners = this.outers = this.lines = 0;

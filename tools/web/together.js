@@ -1,3 +1,3 @@
 // Module that the page loads to show several models or a scene.
-export { ofFiles, wanted } from './together/asked.js';
+export { ofFiles, wanted } from './together/addresses.js';
 export { begin } from './together/page.js';

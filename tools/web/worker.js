@@ -2,10 +2,10 @@
 // The page sends 'open', 'close', 'end', 'view', 'probe', 'places', 'reach' and 'section'. It receives 'opened', 'located', 'tiles', 'loaded',
 // 'probed', 'places', 'section', 'idle' and 'failed'. Several files may be open: the member `file` of each message, 0 by default, names the file.
 import { ZSTDDecoder } from './node_modules/zstddec/dist/zstddec.mjs'; // workers have no import maps
-import { placesOf, sectionOf } from './answers.js';
+import { placesOf, sectionOf } from './queries.js';
 import { reachOf } from './reach.js';
 import { Cut } from './cut.js';
-import { fetchAfter, takeFirst } from './handover.js';
+import { fetchAfter, takeFirst } from './first_response.js';
 import { GRAY, Tree, UrlSource, distanceInterval, growForQuestion, growForView, inside, insideLeaf, loadZstd, nearestFace, openEbpo, sourceOf } from './reader/index.js';
 
 const LINE_MS = 250;                      // interval between reports of progress to the page

@@ -44,7 +44,7 @@ static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
 
 // Queries of one kind: QUERY POINTS.raw, then options.
 struct job {
-    std::string query, points, answers;
+    std::string query, points, results;
     uint64_t count = UINT64_MAX;
     double tmax = INFINITY; // the end of rays
     bool warm = false;      // distance: limit the search by the previous result
@@ -69,7 +69,7 @@ inline unsigned threads = 1;
 // The memory budget of our model in bytes. 0: no limit.
 inline uint64_t memory = 0;
 
-// A result in the file of --answers: for inside one byte, 1 inside and 0 outside; else these 16
+// A result in the file of --results: for inside one byte, 1 inside and 0 outside; else these 16
 // bytes.
 struct hit {
     double value; // distance, the ray's parameter, or for ray-all the number of hits
@@ -355,8 +355,8 @@ template <class Peer> void run_job(Peer &peer, const job &j)
     peer.report();
     if (!times.empty())
         print_clocked(times);
-    if (!j.answers.empty())
-        write_results(j.answers, results);
+    if (!j.results.empty())
+        write_results(j.results, results);
 }
 
 template <class Peer> void run(const settings &s)
@@ -369,7 +369,7 @@ template <class Peer> void run(const settings &s)
     (void)first;
     uint64_t ended = nanoseconds();
     print_build<Peer>(took, peer.bytes());
-    printf(", \"first_answer_s\": %.6f", (double)(ended - took.start) * 1e-9);
+    printf(", \"first_result_s\": %.6f", (double)(ended - took.start) * 1e-9);
     run_job(peer, s.one);
     printf("}\n");
 }
@@ -404,8 +404,8 @@ inline bool parse_job(const std::string &word, const std::string &value, job &j,
         return (j.count = strtoull(value.c_str(), nullptr, 10)) > 0;
     if (word == "--tmax" && took)
         j.tmax = strtod(value.c_str(), nullptr);
-    else if (word == "--answers" && took)
-        j.answers = value;
+    else if (word == "--results" && took)
+        j.results = value;
     else
         return false;
     return true;
@@ -518,7 +518,7 @@ template <class Inside, class Distance, class Rays> int main(int argc, char **ar
     }
     fprintf(stderr,
             "usage: %s MODEL inside|distance|ray|ray-any|ray-all POINTS.raw [--count N] [--warm] "
-            "[--unsigned] [--base] [--batch] [--clocked] [--tmax T] [--answers FILE] [--cold]\n"
+            "[--unsigned] [--base] [--batch] [--clocked] [--tmax T] [--results FILE] [--cold]\n"
             "       %s MODEL build [--threads N] [--cold]\n"
             "       %s MODEL serve [--threads N] [--memory BYTES]\n"
             "POINTS.raw: little-endian doubles, x y z for each point; rays: origin and direction.\n"

@@ -7,11 +7,11 @@ const { chromium } = await import(pathToFileURL(join(viewer, 'node_modules/playw
 const browser = await chromium.launch({ executablePath: '/usr/bin/chromium', args: process.getuid() === 0 ? ['--no-sandbox'] : [] });
 const page = await browser.newPage();
 await page.goto(`${site}/bench.html`);
-const answer = await page.evaluate(([reader, url, to]) => new Promise((done) => {
+const result = await page.evaluate(([reader, url, to]) => new Promise((done) => {
   const worker = new Worker('/worker.js', { type: 'module' });
   worker.onmessage = ({ data }) => done(data);
   worker.onerror = (e) => done({ failed: e.message });
   worker.postMessage({ reader, url, to: Number(to), whole: to === 'whole' });
 }), [reader, url, to]);
-console.log(JSON.stringify(answer));
+console.log(JSON.stringify(result));
 await browser.close();

@@ -143,11 +143,11 @@ class Line:
         only waited for a connection: all `connections` were busy until then, and some still are.
         """
         calls, self.requests = sorted((c for c in self.requests if c[1]), key=lambda c: c[:2]), []
-        count, first_answer = 0, 0
-        for i, (sent, answered, _) in enumerate(calls):
+        count, first_response = 0, 0
+        for i, (sent, responded, _) in enumerate(calls):
             busy = len({id(call[2]) for call in calls[:i] if call[1] > sent - BUSY})
             waited = busy >= connections and any(call[1] > sent for call in calls[:i])
-            if i == 0 or (sent > first_answer and not waited):
-                count, first_answer = count + 1, answered
-            first_answer = min(first_answer, answered)
+            if i == 0 or (sent > first_response and not waited):
+                count, first_response = count + 1, responded
+            first_response = min(first_response, responded)
         return count

@@ -55,10 +55,10 @@ class Places:
             d, a, r = unit(dice), unit(dice), self.diagonal / 2
             side_step = [x - y * sum(p * q for p, q in zip(a, d)) for x, y in zip(a, d)]
             rays.append(([c - 2 * r * x + r * s for c, x, s in zip(self.centre, d, side_step)], d))
-        asked = work / f"rays_{which}.txt"
-        asked.write_text("".join(numbers(*o, *d) + "\n" for o, d in rays))
+        queries = work / f"rays_{which}.txt"
+        queries.write_text("".join(numbers(*o, *d) + "\n" for o, d in rays))
         hits = map(json.loads, side.run("ray", "--json", "--memory", "2G", self.file,
-                                        asked).splitlines())
+                                        queries).splitlines())
         self.found = [([o + hit["t"] * x for o, x in zip(origin, d)], d)
                       for (origin, d), hit in zip(rays, hits) if hit][:count]
         if len(self.found) < count:
@@ -106,10 +106,10 @@ class Places:
 # --- rows ---
 
 class Row:
-    """Commands that run one by one. command: their text on the page; asks: the arguments of each."""
-    def __init__(self, name, what, command, asks, which="large", waves=True):
+    """Commands that run one by one. command: their text on the page; arguments: the arguments of each."""
+    def __init__(self, name, what, command, arguments, which="large", waves=True):
         self.name, self.what, self.command = name, what, command
-        self.asks, self.which, self.waves = asks, which, waves
+        self.arguments, self.which, self.waves = arguments, which, waves
 
 
 def rows(large, small, work, singles, views):
@@ -148,7 +148,7 @@ def run_row(server, line, side, row, work, connections=None):
     """Run the commands one after the other, each in a new process. Return {requests, bytes, seconds or waves: [of each]}."""
     out, found = work / "out.ebpo.h5", {"requests": [], "bytes": [], "seconds": [], "waves": []}
     name = side.link(row.which)
-    for command in row.asks:
+    for command in row.arguments:
         words = {"URL": f"http://127.0.0.1:{line.port}/{name}", "OUT": out}
         command = [str(words.get(word, word)) for word in command]
         if connections:

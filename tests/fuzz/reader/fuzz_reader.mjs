@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-// The JavaScript reader on damaged files: errors of its own, or the same answers.
+// The JavaScript reader on damaged files: its own errors, or the same results.
 //
 //     node fuzz_reader.mjs [-n MUTATIONS] [-s SEED] FILE...     mutates; checksums are made good again half of the time
-//     node fuzz_reader.mjs -d [-e EVERY] [-o OTHER] FILE...     damages as tests/fuzz/damage.c does; wrong answers are counted
+//     node fuzz_reader.mjs -d [-e EVERY] [-o OTHER] FILE...     damages as tests/fuzz/damage.c does; wrong results are counted
 //
 // Run where zstddec is found: in tools/web after npm ci, or with NODE_PATH's like.
 import { readFileSync, writeFileSync } from 'node:fs';
 import { basename } from 'node:path';
 import { parseArgs } from 'node:util';
-import { askAll, kinds } from './ask_all.mjs';
+import { queryAll, kinds } from './query_all.mjs';
 import { changeHead, changeNumbers, changeBytes } from './mutate.mjs';
 
 const { values: option, positionals: files } = parseArgs({
@@ -42,9 +42,9 @@ async function fuzz(path) {
     let bytes = Buffer.from(good);
     for (let times = i < 0 ? 0 : 1 + pick(3); times > 0; times--)
       bytes = await [changeBytes, changeHead, changeNumbers, changeNumbers][pick(4)](bytes, pick);
-    const answers = await askAll(bytes).catch((error) => crashed(name, `mutation ${i}, seed ${option.s}`, bytes, error));
+    const results = await queryAll(bytes).catch((error) => crashed(name, `mutation ${i}, seed ${option.s}`, bytes, error));
     counts.runs++;
-    counts.opened += answers.open === undefined ? 1 : 0;
+    counts.opened += results.open === undefined ? 1 : 0;
   }
   console.log(`${name}: ${counts.runs} inputs, ${counts.opened} opened, no crash`);
 }
@@ -54,11 +54,11 @@ async function fuzz(path) {
 const ways = ['flips', 'zeros', 'ones', 'cuts', 'swaps', 'of another'];
 
 async function damage(path) {
-  const good = readFileSync(path), name = basename(path), right = await askAll(good), step = Number(option.e), wrongs = [];
+  const good = readFileSync(path), name = basename(path), right = await queryAll(good), step = Number(option.e), wrongs = [];
   const counts = Object.fromEntries(ways.map((way) => [way, { tried: 0, refused: 0, noticed: 0, harmless: 0, wrong: 0 }]));
   const summed = right.chunks.some((c) => c.path === '/chunk_sums');
   const judge = async (way, at, bytes) => {
-    const found = await askAll(Buffer.from(bytes)).catch((error) => crashed(name, `${way}, byte ${at}`, bytes, error)), count = counts[way];
+    const found = await queryAll(Buffer.from(bytes)).catch((error) => crashed(name, `${way}, byte ${at}`, bytes, error)), count = counts[way];
     count.tried++;
     if (found.open)
       return void count.refused++;
@@ -88,7 +88,7 @@ async function damage(path) {
         good.copy(bytes);
       }
   if (option.o) {
-    const other = readFileSync(option.o), theirs = (await askAll(other)).chunks;
+    const other = readFileSync(option.o), theirs = (await queryAll(other)).chunks;
     for (const x of chunks)
       for (const y of theirs)
         if (x.path === y.path && x.chunk === y.chunk && x.bytes === y.bytes && !good.subarray(x.at, x.at + x.bytes).equals(other.subarray(y.at, y.at + y.bytes))) {

@@ -46,8 +46,8 @@ bool haptic_path_open(haptic_device *out, const char *path);
 bool haptic_udp_named(const char *name);
 bool haptic_udp_open(haptic_device *out, const char *name);
 
-/* haptic_path_own.c: opens a built-in device that moves around the model, into its surface and out
- * again. */
+/* haptic_path_builtin.c: opens a built-in device that moves around the model, into its surface and
+ * out again. */
 ebpo_status haptic_own_open(haptic_device *out, ebpo_model *model, const ebpo_info *info,
                             double rate, double clear, ebpo_error *error);
 

@@ -3,7 +3,7 @@
 import { decodeChunk } from './chunk.js';
 import { formatError } from './error.js';
 import { decodeGates } from './gates.js';
-import { chunkEnd } from './sums.js';
+import { chunkEnd } from './chunk_checksums.js';
 
 const GAP_BYTES = 16 * 1024;            // gaps of at most this size are read rather than split into two requests
 const REQUEST_BYTES = 4 * 1024 * 1024;  // most bytes of a request
@@ -58,7 +58,7 @@ function withoutGates(bytes, array, chunk) {
 export class ChunkCache {
   /**
    * `head`: the file's first bytes, which are not fetched again. `values(array, chunk, bytes)`: returns the cached value of a chunk (an object with byteLength), or a promise of it.
-   * `sums()`: a promise of the expected chunk checksums (sums.js), or of undefined; not used for lists of chunks. `late()`: true while the checksums are still loading;
+   * `sums()`: a promise of the expected chunk checksums (chunk_checksums.js), or of undefined; not used for lists of chunks. `late()`: true while the checksums are still loading;
    * chunks that arrived earlier are then returned first.
    */
   constructor(source, head, { zstd, values, sums, late, budget = CACHE_BYTES }) {

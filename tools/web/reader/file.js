@@ -7,7 +7,7 @@ import { GATES_COLS } from './gates.js';
 import { Hdf5, NeedBytes } from './hdf5.js';
 import { checkIndexes, checkLevel, checkOrder, decodeFaces, decodeLeaves, decodeMap, decodeVertices, recode } from './decode.js';
 import { Parts } from './parts.js';
-import { placeNumber, placesHold, readPlaces } from './places.js';
+import { placeNumber, placesHold, readPlaces } from './chunk_directory.js';
 import { sourceOf } from './source.js';
 import { Store, everyChunk } from './store.js';
 

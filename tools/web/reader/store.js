@@ -4,8 +4,8 @@ import { decodeColours } from './colours.js';
 import { decodeFaces, decodeMapChunk, decodeVertices } from './decode.js';
 import { formatError } from './error.js';
 import { CHUNK_SUMS } from './facts.js';
-import { placesHold } from './places.js';
-import { readSums } from './sums.js';
+import { placesHold } from './chunk_directory.js';
+import { readSums } from './chunk_checksums.js';
 
 export class Store {
   /** `arrays`: descriptions by path (file.js). The chunks of requested arrays must be known. */

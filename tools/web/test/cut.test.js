@@ -4,7 +4,7 @@ import { readFileSync } from 'node:fs';
 import test from 'node:test';
 import { Cut } from '../cut.js';
 import { MeshStore } from '../mesh.js';
-import { Walls, sidesOf, subtract } from '../walls.js';
+import { Walls, sidesOf, subtract } from '../cell_faces.js';
 import { BLACK, GRAY, LEAF, Tree, openEbpo } from '../reader/index.js';
 
 const bytes = readFileSync(new URL('../../../format-spec/vectors/passed/06_four_levels_leaf_planes.ebpo.h5', import.meta.url));

@@ -10,7 +10,7 @@ import { sharesOf, weightOf } from '../together/budget.js';
 import { boundsOf } from '../together/bounds.js';
 import { parseStrict } from '../together/strict_json.js';
 import { after, matrixOf, placed, poseAt, quaternionOf, routeAt, unitQuaternion, unplaced } from '../together/poses.js';
-import { poseFrom, wanted } from '../together/asked.js';
+import { poseFrom, wanted } from '../together/addresses.js';
 import { cameraAt, poseOf, readScene } from '../together/scene_file.js';
 
 const near = (a, b, off = 1e-12) => a.forEach((x, k) => assert.ok(Math.abs(x - b[k]) <= off * (1 + Math.abs(b[k])), `${a} and ${b}`));

@@ -21,7 +21,7 @@ const CHOSEN = `<p class="hint" id="chosenHint">Click a model to select it and t
   <div class="answer"><strong id="chosenWhere"></strong><span id="chosenNote"></span></div>
   <div class="buttons"><button id="chosenLook" class="small">Look at it</button><a id="chosenOpen" class="small">Open it alone</a></div></div>`;
 
-/** Shows several models. `page`: { scene, layout } of app.js; `asked`: the result of wanted() or ofFiles() of asked.js. */
+/** Shows several models. `page`: { scene, layout } of app.js; `asked`: the result of wanted() or ofFiles() of addresses.js. */
 export async function begin(page, asked) {
   const { scene } = page;
   await styled();

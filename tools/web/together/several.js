@@ -14,7 +14,7 @@ export class Several {
       failed: (model, { code = 'FORMAT', message }) => heard('failed', { error: { code, message: `${model.name}: ${message}` }, model: model.name }) });
   }
 
-  /** Opens models. `asked`: the result of wanted() or ofParts() of asked.js. Resolves to `facts` when all headers have been read. */
+  /** Opens models. `asked`: the result of wanted() or ofParts() of addresses.js. Resolves to `facts` when all headers have been read. */
   async open(asked) {
     const { assembly, scene } = this, there = await assembly.open(asked);
     if (this.ended)

@@ -4,7 +4,7 @@ import { readFileSync } from 'node:fs';
 import test from 'node:test';
 import { fletcher32 } from '../chunk.js';
 import { EbpoError, openEbpo } from '../index.js';
-import { placesHold, readPlaces } from '../places.js';
+import { placesHold, readPlaces } from '../chunk_directory.js';
 import { readAll } from './as_json.js';
 
 const original = readFileSync(new URL('../../../../format-spec/vectors/passed/15_subtrees_unfiltered.ebpo.h5', import.meta.url));

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Measures distance queries from far away: tests/bench/afar.py EBPO MODELS... [--count N] [--seed S]
+"""Measures distance queries from far away: tests/bench/distant_points.py EBPO MODELS... [--count N] [--seed S]
 
 MODELS are .ebpo.h5 files, which are kept completely in memory. Each row has N points. One thread queries them one
 after the other with `ebpo bench`; no query starts from the previous result. The rows: around the model, at one

@@ -62,7 +62,7 @@ const ask = {
 export const kinds = Object.keys(ask);
 
 /** { open: error } or { [kind]: { said, error } }, and where the chunks are. */
-export async function askAll(bytes) {
+export async function queryAll(bytes) {
   let file;
   try {
     file = await openEbpo(bytes, { name: 'damaged' });

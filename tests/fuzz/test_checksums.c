@@ -2,7 +2,7 @@
  * Checks that checksums are compared: a build with -Dfuzzing=true, which does not compare them,
  * must not be used by mistake, and fails here.
  *
- *     test_sums FILE...    each of a pipeline with checksums */
+ *     test_checksums FILE...    each of a pipeline with checksums */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

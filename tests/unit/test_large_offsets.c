@@ -592,10 +592,10 @@ static void enter(void)
     path = scratch("far");
 }
 
-TEST_SUITE(far_offsets)
+TEST_SUITE(large_offsets)
 {
-    Suite *suite = suite_create("far offsets");
-    TCase *tests = tcase_create("far offsets");
+    Suite *suite = suite_create("large offsets");
+    TCase *tests = tcase_create("large offsets");
     tcase_set_timeout(tests, 120);
     tcase_add_checked_fixture(tests, enter, scratch_leave);
     tcase_add_test(tests, test_ply_elements_beyond_4_gib);

@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""Compares pictures of coarse levels with pictures of the model, for docs/measured/coarse-looks.md.
+"""Compares pictures of coarse levels with pictures of the model, for docs/measured/coarse-levels.md.
 
-    /usr/bin/python3 tests/bench/coarse_looks.py BUILD_DIR FILE.ebpo.h5 [--levels 3-7]
+    /usr/bin/python3 tests/bench/coarse_levels.py BUILD_DIR FILE.ebpo.h5 [--levels 3-7]
     [--directions 5]
 
 Draws the model and its levels from up to 20 directions. Prints the SSIM and the difference of the pictures for each
 method of shading: polygon normals; cell faces with the normals of the planes around them; normals that a file could
 store; and pictures taken around the model (BP-Octree thesis, 4.4). No result depends on the machine.
 
-Needs numpy, and ninja -C BUILD_DIR tests/bench/looks_samples tests/bench/jpeg_pictures.
+Needs numpy, and ninja -C BUILD_DIR tests/bench/level_samples tests/bench/jpeg_pictures.
 """
 import argparse
 import pathlib
@@ -157,13 +157,13 @@ def check_likeness():
 # --- samples ---
 
 class Shown:
-    """The output of looks_samples."""
+    """The output of level_samples."""
 
     def __init__(self, bench, path, level, views, scale, samples, scratch):
         text = f"{len(views)}\n" + "\n".join(
             " ".join(repr(float(x)) for x in (*view.ravel(), *scale[0], scale[1])) for view in views)
         out = scratch / "samples.bin"
-        subprocess.run([bench / "looks_samples", path, str(level), str(samples), out], input=text,
+        subprocess.run([bench / "level_samples", path, str(level), str(samples), out], input=text,
                        text=True, check=True)
         with open(out, "rb") as f:
             head = [int(x) for x in numpy.fromfile(f, "u8", 8)]
@@ -278,14 +278,14 @@ class Level:
         self.low = model.origin + self.cell * self.step
         self.area = s.area()
         self.flat = unit(self.area)
-        self.wall = self.walls()
+        self.on_cell_face = self.cell_faces()
         corners = numpy.array([[c & 1, c >> 1 & 1, c >> 2] for c in range(8)])
         at = (self.cell[:, None] + corners) << (12 - self.depth)[:, None, None]
         _, self.corner = numpy.unique((at[..., 0] << 42) + (at[..., 1] << 21) + at[..., 2],
                                       return_inverse=True)
         self.corner = self.corner.reshape(-1, 8)
 
-    def walls(self):
+    def cell_faces(self):
         """Return which triangles are on cell faces that are not on the root cell's faces."""
         node, out = self.shown.face_node, numpy.zeros(len(self.area), bool)
         for axis in range(3):
@@ -298,7 +298,7 @@ class Level:
 
     def own(self):
         """Return the sum of each node's planes, as in the viewer: a vector, and its length without cancellation."""
-        some = ~self.wall
+        some = ~self.on_cell_face
         return numpy.stack([numpy.bincount(self.shown.face_node[some], w[some], len(self.cell))
                             for w in (*self.area.T, numpy.linalg.norm(self.area, axis=1))], 1)
 
@@ -449,7 +449,7 @@ def compare(model, level, pictures, stored):
     node_field = level.field(of_nodes)
     for i, view in enumerate(model.views):
         hit, which, share = s.at(i)
-        colour, flat, wall = s.colour(which, share), level.flat[which], level.wall[which][:, None]
+        colour, flat, on_cell_face = s.colour(which, share), level.flat[which], level.on_cell_face[which][:, None]
         places = s.between(s.xyz, which, share)
         by_nodes, by_field = (level.from_field(f, which, share) for f in (node_field, field))
 
@@ -459,10 +459,10 @@ def compare(model, level, pictures, stored):
         for name, extra, n in (
                 ("polygon normals", 0, flat), ("cell faces lit", 0, s.lent[which]),
                 ("cell faces lit, planes half", 0,
-                 numpy.where(wall, s.lent[which], unit(flat + by_field))),
+                 numpy.where(on_cell_face, s.lent[which], unit(flat + by_field))),
                 ("field", 0, by_field),
                 ("node normals", node_bytes, by_nodes),
-                ("cell faces by node normals", node_bytes, numpy.where(wall, by_nodes, flat))):
+                ("cell faces by node normals", node_bytes, numpy.where(on_cell_face, by_nodes, flat))):
             note(name, extra, lit(towards(n, view), colour))
         for p in pictures:
             shown, taken = p.on(view[2], places)
@@ -527,7 +527,7 @@ def main():
             level = Level(model, path, deepest)
             found = compare(model, level, pictures, level.stored())
             cut = scratch / "cut.ebpo.h5"
-            run(bench / "looks_samples", path, "--planes-to", deepest - 1, cut)
+            run(bench / "level_samples", path, "--planes-to", deepest - 1, cut)
             level = Level(model, cut, deepest)
             stored = level.stored(leaves=True)
             found["planes of the level above, normals of all nodes"] = (

@@ -1,8 +1,8 @@
-/* Computes samples for the pictures of coarse_looks.py: the triangle of each sample, and the
+/* Computes samples for the pictures of coarse_levels.py: the triangle of each sample, and the
  * position on the triangle.
  *
- *     looks_samples FILE LEVEL|mesh SAMPLES OUT < CAMERAS
- *     looks_samples FILE --planes-to LEVEL OUT.ebpo.h5
+ *     level_samples FILE LEVEL|mesh SAMPLES OUT < CAMERAS
+ *     level_samples FILE --planes-to LEVEL OUT.ebpo.h5
  *
  * Cameras are orthographic. The input is their number, then 13 numbers for each camera: right, up,
  * back, center, and half the side of the picture. OUT, in native byte order, contains eight counts,
@@ -33,7 +33,7 @@ typedef struct shown {
 
 static void fail(const char *what)
 {
-    fprintf(stderr, "looks_samples: %s\n", what);
+    fprintf(stderr, "level_samples: %s\n", what);
     exit(1);
 }
 

@@ -1,7 +1,7 @@
 /* Measures the delays of the machine. A loop at 1 kHz does the same 20 us of arithmetic in each
  * step, without the library, with SCHED_FIFO and locked memory as in `ebpo haptic`.
  *
- *     gcc -O2 tests/bench/tick_alone.c -o tick_alone -lm && ./tick_alone SECONDS */
+ *     gcc -O2 tests/bench/machine_delays.c -o machine_delays -lm && ./machine_delays SECONDS */
 #define _GNU_SOURCE
 #include <sched.h>
 #include <stdio.h>
@@ -31,7 +31,7 @@ int main(int argc, char **argv)
     struct timespec due;
     if (!took || count == 0 || sched_setscheduler(0, SCHED_FIFO, &first) != 0 ||
         mlockall(MCL_CURRENT) != 0)
-        return perror("tick_alone"), 1;
+        return perror("machine_delays"), 1;
     clock_gettime(CLOCK_MONOTONIC, &due);
     for (size_t i = 0; i < count; i++) {
         due.tv_nsec += 1000000;

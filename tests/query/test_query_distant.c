@@ -185,9 +185,9 @@ START_TEST(test_distant_point_levels_and_deadlines)
 }
 END_TEST
 
-TEST_SUITE(query_far)
+TEST_SUITE(query_distant)
 {
-    Suite *suite = suite_create("query_far");
+    Suite *suite = suite_create("query_distant");
     TCase *tests = tcase_create("far");
     tcase_set_timeout(tests, 600);
     tcase_add_loop_test(tests, test_distant_points_ignore_load_mode, 0, CASES);

@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { readFileSync } from 'node:fs';
 import test from 'node:test';
-import { cutFaces, measureOf, placesOf, sectionOf, weightsOf } from '../answers.js';
+import { cutFaces, measureOf, placesOf, sectionOf, weightsOf } from '../queries.js';
 import { Tree, openEbpo } from '../reader/index.js';
 
 // Returns a box as twelve faces, counter-clockwise as seen from outside.

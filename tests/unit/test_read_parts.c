@@ -84,9 +84,9 @@ START_TEST(test_reading_with_omitted_parts)
 }
 END_TEST
 
-TEST_SUITE(read_without)
+TEST_SUITE(read_parts)
 {
-    Suite *s = suite_create("read_without");
+    Suite *s = suite_create("read_parts");
     TCase *tc = tcase_create("levels");
     tcase_set_timeout(tc, 600);
     tcase_add_checked_fixture(tc, scratch_enter, scratch_leave);

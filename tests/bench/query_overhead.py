@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Measures the overhead of `ebpo inside` and `ebpo distance` over the library, for many queries.
 
-    tests/bench/asking.py EBPO MODEL.ebpo.h5 [--count N] [--turns T] [--before EBPO]
+    tests/bench/query_overhead.py EBPO MODEL.ebpo.h5 [--count N] [--turns T] [--before EBPO]
                           [--large LARGE.ebpo.h5]
 
 Points are uniform in the model's box (`ebpo bench --save-points`). In turns it runs the library alone
