@@ -127,13 +127,15 @@ def building(peer, model):
 def section_rays(page, results):
     page.text("## Rays", "",
               "*uniform*: from points in the box, in uniform directions. *camera*: from one eye "
-              "through the pixels of a picture. *segments*: uniform, 1/20 of the diagonal long. "
+              "through the pixels of a picture. *segments*: as uniform, with a length of 1/20 of the "
+              "box diagonal. "
               "*degenerate*: to a vertex, to the middle of an edge, from a vertex, along an axis "
               "through a vertex. The table has the times and their ratio to Embree (robust "
               "scene, high quality, single precision). *Embree differs, first*: number of first "
               "hits that differ by more than 1e-6 of the box diagonal or that only one program "
-              "finds. *all*: number of rays with another number of hits. A degenerate ray hits all "
-              "faces around its vertex; single precision rarely finds all of them.")
+              "finds. *all*: number of rays for which the programs find different numbers of hits. A "
+              "degenerate ray hits all faces around its vertex; single precision rarely finds all "
+              "of them.")
     rows = []
     for model, cells in results.items():
         for points in RAYS:
@@ -212,7 +214,8 @@ def section_memory(page, memory):
               "a mesh in memory. *CPU s*: processor seconds on one thread; *all cores*: wall-clock "
               "seconds. Embree's memory includes its single-precision mesh, which point queries "
               "need.")
-    page.table(["model", "faces", "ours, B per face", "Embree tree", "with mesh", "ours / Embree",
+    page.table(["model", "faces", "ours, B per face", "Embree tree, B per face",
+                "Embree tree and mesh, B per face", "ours / Embree with mesh",
                 "ours, CPU s", "Embree, CPU s", "ours / Embree", "ours, all cores, s",
                 "Embree, all cores, s", "ours / Embree"],
                [[model.name, f"{model.faces:,}", figure(m["bytes"]), figure(m["embree bytes"]),
@@ -246,8 +249,8 @@ def section_budget(page, model, rows):
     page.text("## Memory budget", "",
               f"{model.name}, {model.faces:,} faces, budget {BUDGET >> 20} MiB. Each row begins "
               "with a model that has just been opened: only its upper levels are in memory, and "
-              "the file is in the page cache. *visited*, *loaded*, *KiB read* are per query. "
-              "Times are wall-clock times; background threads may use all cores.")
+              "the file is in the page cache. *visited* and *loaded*: subtrees per query. *KiB read*: "
+              "per query. Times are wall-clock times in us; background threads may use all cores.")
     page.table(["query", "points", "queries", "visited", "loaded", "KiB read", "mean", "p50",
                 "p99", "p99.9", "max", "peak MiB"],
                [[query, points, f"{r['count']:,}", figure((r["hits"] + r["loads"]) / r["count"]),
@@ -450,12 +453,13 @@ def write(options, bench, page, goals, short):
     head, made = Page(), Page()
     head.text("# Query times", "", *short)
     made.text("## Measurement", "",
-              f"Made by `{command_line(options)}` on {processor()}. One thread on one core; "
-              f"medians of {options.rounds} turns (half as many above two million faces) of "
-              "processor time in us per query, unless a section says otherwise. *batch*: one "
-              f"call for all points. Load average {statistics.median(bench.load):.1f} (median), "
+              f"Made by `{command_line(options)}` on {processor()}. Each query "
+              "runs on one thread of one core. A time is the processor time per query in us: the "
+              f"median of {options.rounds} rounds, or of half as many for models of more than two "
+              "million faces. Sections with other rules state them. *batch*: one call for all "
+              f"points. Load average {statistics.median(bench.load):.1f} (median), "
               f"{max(bench.load):.1f} (maximum). Compare values within a row only. The results of "
-              "the theses come from other machines.")
+              "the thesis come from another machine.")
     text = "\n".join(head.lines + goals.lines + made.lines + page.lines).rstrip("\n") + "\n"
     pathlib.Path(options.output).write_text(reflow(text + handwritten(options.output)))
 

@@ -105,28 +105,38 @@ def write(page, model, tables):
     if not tables:
         return
     page.text("## Modes of the EBP thesis", "",
-              f"{model.name}, {model.faces:,} faces, {MEMORY >> 20} MiB, levels 0 to {CUT} in "
-              f"memory (`ebpo bench --memory {MEMORY} --cut-level {CUT}`). {COUNTS['uniform']:,} "
-              f"uniform points and {COUNTS['path']:,} points of a path (*recursive*: "
-              f"{OTHERS['recursive']['uniform']} and {OTHERS['recursive']['path']:,}; *envelope*: "
-              f"{OTHERS['envelope']['uniform']:,} and {OTHERS['envelope']['path']:,}). Times are "
-              "wall-clock times from a newly opened model and a cold file. The columns *EBP* are "
-              "tables 25, 26 and 28 of EBP 2017: means of three models of 26 to 28 million faces.")
+              "EBP 2017 is a thesis on this data structure "
+              "([format specification](../../format-spec/README.md)). Its query modes are "
+              "reimplemented for comparison. The columns *EBP* are from tables 25, 26 and 28 of the "
+              "thesis: means of three models of 26 to 28 million faces. Our model is "
+              f"{model.name}, {model.faces:,} faces, with {MEMORY >> 20} MiB of memory and levels 0 "
+              f"to {CUT} in memory (`ebpo bench --memory {MEMORY} --cut-level {CUT}`). There are "
+              f"{COUNTS['uniform']:,} uniform points and {COUNTS['path']:,} points of a path. Times "
+              "are wall-clock times from a newly opened model and a cold file.")
     if "modes" in tables:
-        page.text("The first table is for point in solid. *plain*: without envelopes.")
+        page.text("The first table is for point in solid. `cache`: a cache of subtrees. `nodes`: reads "
+                  "only the nodes on the path to the leaf, without a cache. `subtree`: one subtree "
+                  "at a time, without a cache. `-plain`: the same without envelopes.")
         page.table(["mode", "uniform", "path", "peak MB", "EBP, random", "EBP, path"],
                    [[f"`{mode}`", us(o["uniform"][0]), us(o["path"][0]),
                      figure(max(o[p][2] for p in COUNTS) / 2**20)]
                     + [figure(t) for t in EBP_MODES[mode]] for mode, o in tables["modes"].items()])
     if "distances" in tables:
-        page.text("The second table is for distances. *exact* returns the minimum; the other "
-                  "modes do not guarantee it. *recursive* is not comparable: for a point in a "
-                  "white node ours visits every leaf below the parent. For random points these "
-                  "leaves have millions of faces.")
+        page.text("The second table is for distances. `exact` returns the minimum; the other modes do "
+                  "not guarantee it. `recursive`: distance to the faces below the deepest gray "
+                  "node around the point. `leaves`: distance to the faces of the leaf around the "
+                  "point. `envelope`: distance to the envelope of the deepest gray node around the "
+                  "point, down to a level. The numbers of uniform points and path points differ "
+                  f"for `recursive` ({OTHERS['recursive']['uniform']} and "
+                  f"{OTHERS['recursive']['path']:,}) and `envelope` "
+                  f"({OTHERS['envelope']['uniform']:,} and {OTHERS['envelope']['path']:,}). "
+                  "`recursive` is not comparable: for a point in a white node, our program visits "
+                  "every leaf below the parent. For random points these leaves have millions of "
+                  "faces.")
         page.table(["mode", "uniform", "path", "EBP, random", "EBP, path"],
                    [[name, us(o["uniform"][0]), us(o["path"][0])]
                     + [figure(t) for t in thesis_distance(name) or ("-", "-")]
                     for name, o in tables["distances"].items()
                     if not name.startswith("`envelope`") or int(name.split()[-1]) in SHOWN_LEVELS])
     slower = [what for what, ours, theirs in cells(tables) if ours > theirs]
-    page.text("Slower than the thesis, at all levels: " + (", ".join(slower) or "none") + ".")
+    page.text("Slower than in the thesis, of all modes and levels: " + (", ".join(slower) or "none") + ".")
