@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * Reads and writes .ebpo.h5 files. format-spec/ describes the format byte by byte.
  *
- *   Contents   ebpo_tree (a whole model in memory), ebpo_level, ebpo_info
+ *   Contents   ebpo_tree (a whole model in memory), ebpo_level, ebpo_info, ebpo_plane_decode
  *   Writing    ebpo_tree_write
  *   Sources    ebpo_source (bytes from any storage)
  *   Opening    ebpo_open, ebpo_open_with, ebpo_open_memory, ebpo_open_source, ebpo_close
@@ -30,8 +30,8 @@ extern "C" {
 /* Type of a node: two bits in `types` of ebpo_level. The cell of a node includes its boundary. */
 typedef enum ebpo_node_type {
     /*
-     * No face intersects the cell. The cell is outside the solid (of a surface, there is no
-     * inside).
+     * No face intersects the cell. The cell is outside the solid. In a file of a surface, all cells
+     * without faces have this type.
      */
     EBPO_WHITE = 0,
 
@@ -70,16 +70,22 @@ typedef enum ebpo_codec {
 
 /* Coding of the vertex indices of faces (format-spec/README.md, section 7). */
 typedef enum ebpo_face_coding {
-    /* When copying a file: its coding, except for EBPO_CODEC_NONE. Else EBPO_FACES_HIGH_WATER. */
+    /*
+     * EBPO_FACES_GATES if the tree is from a file with this coding and the new file's codec is not
+     * EBPO_CODEC_NONE. In all other cases EBPO_FACES_HIGH_WATER.
+     */
     EBPO_FACES_DEFAULT = 0,
 
     /*
-     * Relative to edges of preceding faces. Whole files are 7 to 11 % smaller; decoding takes
-     * longer (docs/develop/codings.md). Since format 1.1.
+     * Coding `gates`: each face is relative to an edge of a preceding face. Whole files are 7 to
+     * 11 % smaller; decoding takes longer (docs/develop/codings.md). Since format 1.1.
      */
     EBPO_FACES_GATES = 1,
 
-    /* As indices, as in format 1.0. */
+    /*
+     * Coding `high-water`: vertex indices, relative to the number of vertices used so far. The
+     * only coding of format 1.0.
+     */
     EBPO_FACES_HIGH_WATER = 2
 } ebpo_face_coding;
 
@@ -106,8 +112,8 @@ typedef struct ebpo_level {
     uint64_t plane_count;
 
     /*
-     * [leaf_count] winding number at the leaf's lowest corner, shifted (format-spec/README.md);
-     * solids only
+     * [leaf_count] winding number at the leaf's lowest corner, after the corner was shifted by
+     * infinitely small positive numbers (format-spec/README.md, section 5); solids only
      */
     int32_t *leaf_winding;
 
@@ -155,8 +161,9 @@ typedef struct ebpo_level {
     double gray_volume;
 
     /*
-     * Volume of the envelopes of this level's leaves, cut by the stored planes of the leaves, else
-     * only by the planes of their ancestors. Planes that readers derive from faces cut off more.
+     * Volume of the envelopes of this level's leaves. They are cut by the stored planes of the
+     * leaves, or only by the planes of their ancestors if no planes of leaves are stored. Planes
+     * that readers derive from faces cut off more.
      */
     double leaf_volume;
 
@@ -198,8 +205,11 @@ typedef struct ebpo_level_summary {
     uint64_t gray_count, leaf_count, white_count, black_count;
     uint64_t plane_count, leaf_plane_count;
 
-    /* Number of faces that leaves list first, and number of repeated references to faces. */
-    uint64_t new_count, ref_count;
+    /* Sum of leaf_new: each face counts in the first leaf that it intersects. */
+    uint64_t new_count;
+
+    /* Number of references from other leaves to these faces. */
+    uint64_t ref_count;
 
     double gray_volume, leaf_volume;
 
@@ -248,7 +258,10 @@ typedef struct ebpo_info {
     /* ebpo_selection (build.h) that selected the planes. */
     int selection;
 
-    /* For the selections of the theses: one of the two is set; else both are 0. */
+    /*
+     * As in ebpo_build_options (build.h). One of the two is set if `selection` is one of the
+     * selections of the theses; else both are 0.
+     */
     double percent, k_root;
 
     /* ebpo_normal_distance, for EBPO_SELECT_KMEDOIDS. */
@@ -259,7 +272,7 @@ typedef struct ebpo_info {
 
     ebpo_repair_record repair_record;
 
-    /* Counts and measures; locations are not stored. */
+    /* Counts and measures of defects. The locations of defects are not stored. */
     ebpo_mesh_report report;
 
     /* ebpo_part bits */
@@ -269,8 +282,8 @@ typedef struct ebpo_info {
     uint8_t content_sha256[32];
 
     /*
-     * Location of the chunk directory of large arrays, which is behind the first levels. Used only
-     * for prefetching. 0: none, or not recorded.
+     * Location of HDF5's chunk indexes, which are behind the first levels in the file. Only arrays
+     * with several chunks have a chunk index. Used for prefetching. 0: none, or not recorded.
      */
     uint64_t chunk_index_offset, chunk_index_bytes;
 
@@ -300,8 +313,8 @@ typedef struct ebpo_info {
     double kept_box[6];
 
     /*
-     * Upper limit for the error bound of the envelopes of nodes that were pruned for it; 0: not
-     * requested.
+     * Requested error bound: nodes whose envelopes have at most this error bound were pruned. 0:
+     * not requested.
      */
     double kept_error;
 
@@ -313,7 +326,9 @@ typedef struct ebpo_info {
     /* Size of the file, and number of bytes before the first level. Set when reading. */
     uint64_t file_bytes, head_bytes;
 
-    /* First level whose reading needs the chunk directory. level_count: none. Set when reading. */
+    /*
+     * First level whose reading needs HDF5's chunk indexes. level_count: none. Set when reading.
+     */
     int index_level;
 
     /* Checksum of the colours, with EBPO_PART_COLOURS. */
@@ -337,11 +352,12 @@ typedef struct ebpo_tree {
     uint32_t *vertex_source;
 
     /*
-     * [face_count] source index, or NULL; source_face_count or more: face that filling holes added
+     * [face_count] source index, or NULL. An index of source_face_count or more: the face was added
+     * when holes were filled.
      */
     uint32_t *face_source;
 
-    /* Owns both arrays; NULL: allocated with malloc. */
+    /* Owns vertex_source and face_source. NULL: they were allocated with malloc. */
     ebpo_workspace *workspace;
 } ebpo_tree;
 
@@ -355,9 +371,9 @@ EBPO_API void ebpo_tree_free(ebpo_tree *tree);
 /* ---- writing ---- */
 
 /*
- * Chunk checksums: a list that repeats the checksum at the end of each chunk
- * (format-spec/README.md, section 20). With this list, readers detect a chunk that was exchanged
- * with another chunk or with another version of the chunk.
+ * Chunk checksums. Each chunk ends with a checksum; this list has a copy of the checksums of all
+ * chunks (format-spec/README.md, section 20). With the list, readers detect a chunk that was
+ * replaced by another chunk or by another version of the chunk.
  */
 typedef enum ebpo_chunk_checksums {
     EBPO_CHECKSUMS_DEFAULT = 0, /* written */
@@ -370,8 +386,8 @@ typedef struct ebpo_write_options {
     ebpo_codec codec;
 
     /*
-     * 0: the default. For deflate: 6. For zstd: 3 for small chunks; 7 for chunks from 4 KiB on,
-     * without matches of less than six bytes.
+     * 0: the default. For deflate: 6. For zstd: 3 for chunks of less than 4 KiB; 7 for larger
+     * chunks, with a minimum match length of six bytes.
      */
     int codec_level;
 
@@ -383,11 +399,13 @@ typedef struct ebpo_write_options {
     ebpo_progress progress;
 
     /*
-     * Minimum mean number of faces per gray node of the level of subtrees (format-spec/README.md,
-     * section 9). The data of a subtree is contiguous, so that one read loads it. The deepest level
-     * with at least this mean is used, or level 1 if no level has it. 0: 1,024, but no subtrees for
-     * fewer than 131,072 faces. EBPO_NO_SUBTREES: no subtrees, as in format 1.0. Trees of fewer
-     * than three levels have no subtrees.
+     * Selects the level whose gray nodes are the roots of subtrees (format-spec/README.md, section
+     * 9): the deepest level with at least this mean number of faces per gray node, or level 1 if
+     * there is none. The data of a subtree is contiguous, so that one read loads it.
+     *
+     * 0: 1,024; the file has no subtrees if no level has this mean, or if the mesh has fewer than
+     * 131,072 faces. EBPO_NO_SUBTREES: no subtrees, as in format 1.0. Trees of fewer than three
+     * levels have no subtrees.
      */
     uint64_t subtree_faces;
 
@@ -455,8 +473,9 @@ typedef struct ebpo_source {
 
     /*
      * With `prefetch`: number of bytes at the beginning of the file that are already available. If
-     * this is not the whole file, opening reads only these bytes. Chunk offsets of arrays of
-     * several chunks are then read when needed, or by ebpo_file_locate.
+     * this number is more than 0 and less than `size`, opening reads only these bytes; the chunk
+     * offsets of arrays with several chunks are then read when needed, or by ebpo_file_locate.
+     * Otherwise opening reads whatever it needs.
      */
     uint64_t prefetched;
 } ebpo_source;
@@ -482,7 +501,7 @@ typedef struct ebpo_file ebpo_file;
  * Chunks have checksums, and the list of chunk checksums (ebpo_chunk_checksums) also detects
  * exchanged chunks. For files without this list, ebpo_file_check_content detects exchanged chunks.
  * If chunks have no checksums, as in copies by other programs, opening reads the whole file and
- * compares content_sha256; changes after opening are not detected.
+ * compares content_sha256. Changes after opening are not detected.
  *
  * EBPO_E_IO. EBPO_E_FORMAT: not an .ebpo.h5 file, or damaged. EBPO_E_VERSION: the file has another
  * major version, or a part that this library does not know. EBPO_E_UNSUPPORTED: another program,
@@ -494,8 +513,8 @@ typedef struct ebpo_file ebpo_file;
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_open(const char *path, ebpo_file **out, ebpo_error *error);
 
 /*
- * Limits for the total size of the decoded arrays: EBPO_EXPANSION_MAX times the file size.
- * EBPO_EXPANSION_FREE bytes are always allowed.
+ * Limit for the total size of the decoded arrays: EBPO_EXPANSION_MAX times the file size, or
+ * EBPO_EXPANSION_FREE bytes if this is more.
  */
 #define EBPO_EXPANSION_MAX  256
 #define EBPO_EXPANSION_FREE (UINT64_C(64) << 20)
@@ -508,8 +527,8 @@ typedef struct ebpo_open_options {
     uint64_t max_expansion;
 
     /*
-     * Opens this source instead of the path, which is then only for messages. The source is closed
-     * as by ebpo_open_source.
+     * Opens this source instead of the path. The path is then only for messages. The source is
+     * closed at the same times as with ebpo_open_source.
      */
     const ebpo_source *source;
 
@@ -528,19 +547,22 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_with(const char *path,
                                                   const ebpo_open_options *options, ebpo_file **out,
                                                   ebpo_error *error);
 
-/* Options for ebpo_open_compat; 0 and NULL select defaults. */
+/*
+ * Options for ebpo_open_compat, which may run libhdf5 in a forked process; 0 and NULL select
+ * defaults.
+ */
 typedef struct ebpo_compat_options {
     size_t struct_size;
 
     /*
-     * Memory limit of the separate process in bytes, in addition to the memory of this process. 0:
-     * 1 GiB.
+     * Number of bytes that the forked process may allocate, in addition to the memory that it
+     * inherits from the caller's process. 0: 1 GiB.
      */
     uint64_t memory_bytes;
 
     /*
-     * Limit of the processor time of the separate process, in seconds. 0: 60, plus one for each 4
-     * MiB of the file.
+     * Limit of the processor time of the forked process, in seconds. 0: 60 seconds, plus one
+     * second for each 4 MiB of the file.
      */
     unsigned seconds;
 
@@ -558,8 +580,8 @@ typedef struct ebpo_compat_options {
 
 /*
  * Opens a file as ebpo_open does. A file that ebpo_open rejects with EBPO_E_UNSUPPORTED is
- * converted with libhdf5 in a separate process, without plugins and with limits on memory, time and
- * output. The separate process copies the chunks to an unnamed file in TMPDIR, which is about as
+ * converted with libhdf5 in a forked process, without plugins and with limits on memory, time and
+ * output. The forked process copies the chunks to an unnamed file in TMPDIR. The copy is about as
  * large as the original. Chunks are encoded again if their filters, size or byte order differ from
  * the format. A file at a URL is first fetched completely to TMPDIR.
  *
@@ -572,8 +594,8 @@ typedef struct ebpo_compat_options {
  * content does not match its checksum. EBPO_E_IO: the process or the temporary file could not be
  * made. EBPO_E_UNSUPPORTED: the library was built without libhdf5.
  *
- * Threads: any. The call forks the process. A SIGCHLD handler that waits for all children causes
- * EBPO_E_FORMAT.
+ * Threads: any. If the caller has a SIGCHLD handler that waits for all children, the call can
+ * return EBPO_E_FORMAT.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_compat(const char *path,
                                                     const ebpo_compat_options *options,
@@ -635,7 +657,7 @@ typedef struct ebpo_file_stats {
  */
 EBPO_API ebpo_status ebpo_file_get_stats(const ebpo_file *file, ebpo_file_stats *out);
 
-/* Description of an array of a file. Its texts are static. */
+/* Description of an array of a file. `coding` and `about` point to static texts. */
 typedef struct ebpo_array_facts {
     size_t struct_size;
     char path[48];
@@ -810,8 +832,9 @@ typedef struct ebpo_maps {
 } ebpo_maps;
 
 /*
- * Reads the maps, and checks that each is a permutation of 0 .. count - 1. After welding, the
- * indices of vertices must be distinct and below source_vertex_count.
+ * Reads the maps. Checks that the indices of each map are distinct and in range: source indices of
+ * vertices are below source_vertex_count. Source indices of faces are below source_face_count plus
+ * the number of faces that were added when holes were filled.
  *
  * EBPO_E_ABSENT: the file has no maps.
  *
@@ -837,7 +860,8 @@ typedef struct ebpo_attribute_values {
     void *values;
 
     /*
-     * [rows] for lists of different lengths: number of items in all rows up to this one; else NULL
+     * [rows] for lists of different lengths: number of items in this row and all rows before it;
+     * else NULL
      */
     uint64_t *ends;
 
@@ -908,7 +932,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_source_mesh(const ebpo_file *f
 
 /*
  * Computes the content checksum from all arrays, and compares it with content_sha256 of the file.
- * Reads the whole file. Memory: a few chunks per thread, and the embedded images.
+ * Reads the whole file. Memory: a few chunks per thread, and the texture images in the file.
  *
  * EBPO_E_FORMAT: the checksums differ. EBPO_E_IO.
  *
@@ -920,9 +944,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_check_content(const ebpo_file *file
 
 /*
  * Writes the whole content of a file to a new file with the layout of `write` (codec, subtrees;
- * `parts` is ignored). `path` is replaced atomically and may be the path of `file`. Before it is
- * replaced, the new file is read again: its content_sha256 must be that of `file`, which also
- * checks `file`. The whole model is in memory, limited by the workspace of `read`.
+ * `parts` is ignored). `path` is replaced atomically and may be the path of `file`. Before the
+ * replacement the new file is read again. It must have the content_sha256 of `file`, so the content
+ * of `file` is checked too. The whole model is in memory, limited by the workspace of `read`.
  *
  * EBPO_E_FORMAT: the content of `file` differs from its checksum. EBPO_E_UNSUPPORTED: the content
  * is correct, but this library would write the arrays in another way (for example, another program
