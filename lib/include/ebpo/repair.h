@@ -2,7 +2,7 @@
  * Finds the repairs that make a mesh a solid.
  *
  *   ebpo_mesh_try_repairs    tries sequences of repairs and chooses the shortest successful one
- *   ebpo_mesh_count_shells   counts closed shells, also inverted ones
+ *   ebpo_mesh_count_shells   counts shells (closed sets of faces) by orientation and nesting
  *   ebpo_mesh_doubts         reasons why a solid is probably not the intended one
  */
 #ifndef EBPO_REPAIR_H
@@ -16,7 +16,7 @@ extern "C" {
 
 /* Reasons why a mesh is not a solid, or probably not the intended one. Bits. */
 typedef enum ebpo_doubt {
-    /* Its edges are not balanced. */
+    /* The mesh has unbalanced edges (ebpo_mesh_report): it is not closed. */
     EBPO_DOUBT_OPEN = 1 << 0,
 
     /* Holes were filled although vertices of equal position had not been merged. */
@@ -29,8 +29,9 @@ typedef enum ebpo_doubt {
     EBPO_DOUBT_MOSTLY_FILLED = 1 << 3,
 
     /*
-     * The volume is that of a sheet: at most the cube of 1/100 of the square root of the area. If
-     * coordinates are so large or small that a double cannot hold the volume: the thickness is 0.
+     * The mesh is a sheet: |volume| <= (0.01 * sqrt(area))^3, or the mesh's box has size 0 on an
+     * axis. If a double cannot hold the volume, because coordinates are very large or very small,
+     * only the box is tested.
      */
     EBPO_DOUBT_NO_VOLUME = 1 << 4,
 
@@ -72,8 +73,8 @@ typedef struct ebpo_repairs {
     ebpo_repair_try tries[EBPO_REPAIR_TRIES];
 
     /*
-     * Index of the try without doubts, which is then the last try. -1: no try is without doubts, or
-     * the mesh had none before.
+     * Index of the try without doubts, which is the last try. -1: every try has doubts, or the mesh
+     * had no doubts without repairs.
      */
     int64_t chosen;
 } ebpo_repairs;
@@ -82,8 +83,9 @@ typedef struct ebpo_repairs {
 
 /*
  * Tries ebpo_mesh_weld, ebpo_mesh_drop_duplicates, ebpo_mesh_orient and ebpo_mesh_fill_holes, in
- * this order, on a copy of the mesh without its attributes, in its workspace. Sequences that cannot
- * help are skipped. If no repair is needed, only dropping repeated faces is tried.
+ * this order, on a copy of the mesh without attributes. The copy is allocated in the workspace of
+ * the mesh. Sequences that cannot help are skipped. If no repair is needed, only dropping repeated
+ * faces is tried.
  *
  * report   of the current mesh (ebpo_mesh_check, ebpo_mesh_prepare)
  *
@@ -97,30 +99,30 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_try_repairs(const ebpo_mesh *mesh,
                                                          ebpo_repairs *out, ebpo_error *error);
 
 /*
- * Number of shells by kind, and properties of their components. Shells are defined at
- * ebpo_mesh_orient; they may share vertices or edges.
+ * Number of shells by kind. Shells are defined at ebpo_mesh_orient; they may share vertices or
+ * edges. A component is here a shell, or a set of other faces that are connected by vertices.
  */
 typedef struct ebpo_shells {
     size_t struct_size;
 
-    /* Number of shells with a volume other than 0. */
+    /* Number of shells. Shells of volume 0 are not counted. */
     uint64_t closed;
 
-    /* Closed shells that are oriented inwards, inside an even number of other shells. */
+    /* Number of these that are oriented inwards, inside an even number of other shells. */
     uint64_t inside_out;
 
-    /* Closed shells that are oriented inwards, inside an odd number of other shells. */
+    /* Number of these that are oriented inwards, inside an odd number of other shells. */
     uint64_t cavities;
 
     /*
-     * Closed shells that are oriented outwards, inside an odd number of other shells: a solid
-     * inside another.
+     * Number of these that are oriented outwards, inside an odd number of other shells: solids
+     * inside other solids.
      */
     uint64_t nested;
 
     /*
-     * 1: every component is closed, and no faces of two components have a common point;
-     * intersections within one component are not tested. 0: otherwise, or the search was stopped
+     * 1: every component is closed, and no faces of two components have a common point.
+     * Intersections within one component are not tested. 0: otherwise, or the search was stopped
      * (ebpo_mesh_count_shells).
      */
     int32_t apart;
@@ -128,9 +130,10 @@ typedef struct ebpo_shells {
     uint32_t reserved;
 
     /*
-     * Indexed by ebpo_rule, for components that are apart: volume of the solid minus the integral
-     * of the winding number, in the cube of the source's unit. 0 if each component outside all
-     * solids is oriented outwards, and each component in a solid inwards.
+     * Indexed by ebpo_rule, if `apart` is 1: volume of the solid that the rule gives, minus the
+     * signed volume of the mesh (the integral of the winding number), in the cube of the source's
+     * unit. The difference is 0 if each component outside all solids is oriented outwards and each
+     * component inside a solid is oriented inwards.
      */
     double beyond[3];
 } ebpo_shells;
@@ -138,9 +141,9 @@ typedef struct ebpo_shells {
 #define EBPO_SHELLS_INIT EBPO_SIZED(ebpo_shells)
 
 /*
- * Counts the shells and tests if they are apart. It takes a few passes over the faces, and a search
- * in trees of components and of faces near other components. The search stops after 64 boxes for
- * each face (plus 2^22); `apart` is then 0.
+ * Counts the shells, and tests if faces of different components have a common point. Takes a few
+ * passes over the faces and a search in trees of boxes. The search stops after 64 * face_count +
+ * 2^22 compared boxes; `apart` is then 0.
  *
  * Errors are those of ebpo_components_new. On failure `out` is cleared.
  *

@@ -38,8 +38,8 @@ typedef struct ebpo_stream_options {
  * leaf of a file without EBPO_PART_LEAF_PLANES has no planes: its envelope is the part of its
  * parent's envelope in the leaf's cell.
  *
- * Polygons are rounded, and negligible cuts are omitted: drawn envelopes are too large rather than
- * too small.
+ * The polygons of an envelope are rounded, and negligible cuts are omitted. They enclose a slightly
+ * larger volume than the envelope rather than a smaller one.
  */
 typedef struct ebpo_stream_node {
     /* A leading 1, then three bits for each level. */
@@ -50,7 +50,7 @@ typedef struct ebpo_stream_node {
     /* Exact bounds of the cell. */
     double min[3], max[3];
 
-    /* Winding number. White and black: in the cell. Leaf: at the lowest corner. Gray: 0. */
+    /* Winding number. White and black: in the cell. Leaf: leaf_winding (file.h). Gray: 0. */
     int32_t winding;
 
     /*
@@ -85,12 +85,12 @@ typedef struct ebpo_stream_node {
     const uint32_t *corners;
 
     /*
-     * Colour: red + 256 green + 65,536 blue, sRGB. A gray node has its own colour, others that of
+     * Colour: red + 256 green + 65,536 blue, sRGB. Other nodes than gray ones have the colour of
      * their parent. 0x808080 if `coloured` is 0.
      */
     uint32_t colour;
 
-    /* 1: the file has a colour for this node. Views (view.h) do not read colours. */
+    /* 1: the file has a colour for this node. 0 in views (view.h), which do not read colours. */
     uint32_t coloured;
 } ebpo_stream_node;
 
@@ -108,11 +108,12 @@ typedef struct ebpo_stream_level {
      * all leaves so far, and all black cells so far. With `polygons` it is the sum of the nodes'
      * volumes, otherwise the value stored in the file.
      *
-     * Leaves are cut by stored planes if the file has them, else only by the planes of their
-     * ancestors. Planes derived from the faces would cut off more (ebpo_lod_level).
+     * The envelopes of leaves are cut by the stored planes of the leaves, or only by the planes of
+     * their ancestors if no planes of leaves are stored. Planes derived from the faces would cut
+     * off more (ebpo_lod_level).
      *
-     * In a subset, it is the volume of the kept nodes. Nodes omitted by a box count only at their
-     * own level.
+     * In a subset, only nodes in the file count. A pruned node counts at its own level, and not at
+     * deeper levels.
      */
     double volume;
 } ebpo_stream_level;
@@ -120,8 +121,8 @@ typedef struct ebpo_stream_level {
 typedef struct ebpo_stream ebpo_stream;
 
 /*
- * Makes a stream of an open file, which must stay open. Reads nothing yet. Of earlier levels, only
- * the node types stay in memory, and with `polygons` the planes.
+ * Makes a stream of an open file, which must stay open. Reads nothing yet. The stream keeps the
+ * node types of the levels that it has read, and with `polygons` also their planes.
  *
  * Threads: any.
  */
