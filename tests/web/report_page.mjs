@@ -72,36 +72,36 @@ const onLine = ([trip, rate]) => (l) => (l?.line_trips == null ? null : l.line_t
 const LINE = [figure('line_bytes'), figure('line_trips'), ...LINES.map(onLine)];
 
 // Returns all levels, and the levels in the table of build times: the first, one in the middle, and the last.
-function levelsOf(told) {
-  const deepest = Math.max(...told.methods.map((m) => m.levels.at(-1).level));
-  const numbers = Array.from({ length: deepest - told.levels.first + 1 }, (_, i) => told.levels.first + i);
+function levelsOf(report) {
+  const deepest = Math.max(...report.methods.map((m) => m.levels.at(-1).level));
+  const numbers = Array.from({ length: deepest - report.levels.first + 1 }, (_, i) => report.levels.first + i);
   return { numbers, some: [...new Set([numbers[0], numbers[Math.floor(numbers.length / 2)], numbers.at(-1)])] };
 }
 
 const excessAt = (n) => (m) => m.levels.find((l) => l.level === n)?.excess ?? null;
 
-function buildColumns(told) {
+function buildColumns(report) {
   const sum = (m) => (m.levels.some((l) => l.excess === null) ? null : m.levels.reduce((s, l) => s + 100 + l.excess, 0));
   const all = (m) => m.levels.at(-1).cumulative_bytes;
-  return [figure('build_seconds'), figure('all_planes'), all, ...levelsOf(told).some.map(excessAt), sum];
+  return [figure('build_seconds'), figure('all_planes'), all, ...levelsOf(report).some.map(excessAt), sum];
 }
 
-function lengths(told, ...names) {
-  return names.map((n) => (told.model.diagonal > 0 ? figure(n, 100 / told.model.diagonal) : () => null));
+function lengths(report, ...names) {
+  return names.map((n) => (report.model.diagonal > 0 ? figure(n, 100 / report.model.diagonal) : () => null));
 }
 
-function shapeColumns(told, method) {
+function shapeColumns(report, method) {
   const volume = ['envelope_volume', 'excess', 'levels_excess', 'limit_excess', 'excess_to_limit'];
   return [
     ...['bytes', 'cumulative_bytes', 'gray', 'leaf', 'planes', 'leaf_planes'].map((n) => figure(n)),
     ...volume.filter((n) => n !== 'levels_excess' || !method.leaf_planes_stored).map((n) => figure(n)),
-    ...lengths(told, 'hausdorff_lo', 'hausdorff_hi', 'distance_mean', 'distance_rms'),
+    ...lengths(report, 'hausdorff_lo', 'hausdorff_hi', 'distance_mean', 'distance_rms'),
   ];
 }
 
-const answerColumns = (told) => [
+const queryColumns = (report) => [
   figure('maybe_uniform', 100), figure('maybe_near', 100), figure('inside_ns', 1e-9),
-  ...lengths(told, 'width_mean', 'width_median', 'width_p99'), figure('distance_ns', 1e-9),
+  ...lengths(report, 'width_mean', 'width_median', 'width_p99'), figure('distance_ns', 1e-9),
   figure('have_seconds'), figure('read_bytes'), figure('reads'), figure('level_memory_bytes'),
 ];
 
@@ -114,60 +114,60 @@ function rowsAgree(table, rows, columns, what) {
 }
 
 // Returns columns for rows that have one item for each method. All methods have the same columns.
-const perMethod = (told, columns) => told.methods.flatMap((_, i) => columns.map((c) => (row) => c(row[i])));
+const perMethod = (report, columns) => report.methods.flatMap((_, i) => columns.map((c) => (row) => c(row[i])));
 
-function tablesAgree(told, { tables, ofMethods }) {
-  const { methods } = told, { numbers } = levelsOf(told);
+function tablesAgree(report, { tables, ofMethods }) {
+  const { methods } = report, { numbers } = levelsOf(report);
   const levelRows = numbers.map((n) => methods.map((m) => m.levels.find((l) => l.level === n)));
   const dueRows = methods[0].deadlines.map((_, i) => methods.map((m) => m.deadlines[i]));
-  const [width] = lengths(told, 'deadline_width_p99');
+  const [width] = lengths(report, 'deadline_width_p99');
   const due = [figure('deadline_exact', 100), width, figure('deadline_took_p99', 1e-9), figure('deadline_late', 100)];
   rowsAgree(tables.glance, methods, GLANCE, 'glance');
-  rowsAgree(tables.limit, levelRows, [null, ...perMethod(told, LIMIT)], 'limit');
-  rowsAgree(tables.deadlines, dueRows, perMethod(told, due), 'deadlines');
-  rowsAgree(tables.build, methods.filter((m) => m.build_seconds !== null), buildColumns(told), 'build');
-  rowsAgree(tables.lines, levelRows, perMethod(told, LINE), 'lines');
-  const [known] = lengths(told, 'budget_width_median'), loads = figure('budget_loads'), read = figure('budget_read_bytes');
+  rowsAgree(tables.limit, levelRows, [null, ...perMethod(report, LIMIT)], 'limit');
+  rowsAgree(tables.deadlines, dueRows, perMethod(report, due), 'deadlines');
+  rowsAgree(tables.build, methods.filter((m) => m.build_seconds !== null), buildColumns(report), 'build');
+  rowsAgree(tables.lines, levelRows, perMethod(report, LINE), 'lines');
+  const [known] = lengths(report, 'budget_width_median'), loads = figure('budget_loads'), read = figure('budget_read_bytes');
   const budget = [figure('budget_bytes'), figure('budget_level'), known, figure('budget_distance_ns', 1e-9), loads, read];
-  rowsAgree(tables.budgets, methods[0].budgets.map((_, i) => methods.map((m) => m.budgets[i])), perMethod(told, budget), 'budgets');
-  rowsAgree(tables.transmission, levelRows, perMethod(told, SENT), 'transmission');
+  rowsAgree(tables.budgets, methods[0].budgets.map((_, i) => methods.map((m) => m.budgets[i])), perMethod(report, budget), 'budgets');
+  rowsAgree(tables.transmission, levelRows, perMethod(report, SENT), 'transmission');
   if (methods.length === 1) {
-    const need = [figure('need_bytes'), ...lengths(told, 'need_hausdorff_lo', 'need_hausdorff_hi'), figure('need_ratio')];
+    const need = [figure('need_bytes'), ...lengths(report, 'need_hausdorff_lo', 'need_hausdorff_hi'), figure('need_ratio')];
     rowsAgree(tables.needs, methods[0].needs, need, 'needs');
   }
   assert.equal(ofMethods.length, 2 * methods.length);
   methods.forEach((m, i) => {
-    rowsAgree(ofMethods[2 * i], m.levels, shapeColumns(told, m), `${m.name}, shapes`);
-    rowsAgree(ofMethods[2 * i + 1], m.levels, answerColumns(told), `${m.name}, answers`);
+    rowsAgree(ofMethods[2 * i], m.levels, shapeColumns(report, m), `${m.name}, shapes`);
+    rowsAgree(ofMethods[2 * i + 1], m.levels, queryColumns(report), `${m.name}, queries`);
   });
 }
 
 // --- plots ---
 
-const far = (told, name) => lengths(told, name)[0];
+const far = (report, name) => lengths(report, name)[0];
 const level = figure('level'), soFar = figure('cumulative_bytes'), have = figure('have_seconds');
-const plotAxes = (told) => {
-  const solid = told.methods.some((m) => m.levels.some((l) => l.excess !== null));
+const plotAxes = (report) => {
+  const solid = report.methods.some((m) => m.levels.some((l) => l.excess !== null));
   const known = figure(solid ? 'excess' : 'envelope_volume'), alone = figure(solid ? 'levels_excess' : 'levels_volume');
   const deadline = figure('microseconds', 1e-6);
   return {
     'volume-by-level': [level, known], 'ratio-by-level': [level, figure('excess_to_limit')],
-    'volume-by-bytes': [soFar, alone], 'farthest-by-bytes': [soFar, far(told, 'hausdorff_hi')],
-    'mean-by-bytes': [soFar, far(told, 'distance_mean')], 'maybe-by-bytes': [soFar, figure('maybe_near', 100)],
-    'volume-by-time': [have, alone], 'farthest-by-time': [have, far(told, 'hausdorff_hi')],
+    'volume-by-bytes': [soFar, alone], 'farthest-by-bytes': [soFar, far(report, 'hausdorff_hi')],
+    'mean-by-bytes': [soFar, far(report, 'distance_mean')], 'maybe-by-bytes': [soFar, figure('maybe_near', 100)],
+    'volume-by-time': [have, alone], 'farthest-by-time': [have, far(report, 'hausdorff_hi')],
     'maybe-by-time': [figure('inside_ns', 1e-9), figure('maybe_uniform', 100)],
-    'width-by-time': [figure('distance_ns', 1e-9), far(told, 'width_median')],
+    'width-by-time': [figure('distance_ns', 1e-9), far(report, 'width_median')],
     ...Object.fromEntries(['slow', 'fast'].flatMap((name, i) => [
       [`volume-by-${name}-line`, [onLine(LINES[i]), alone]],
-      [`farthest-by-${name}-line`, [onLine(LINES[i]), far(told, 'hausdorff_hi')]],
+      [`farthest-by-${name}-line`, [onLine(LINES[i]), far(report, 'hausdorff_hi')]],
     ])),
-    ...Object.fromEntries(['first', 'middle'].map((name, i) => [`${name}-by-build`, [figure('build_seconds'), excessAt(levelsOf(told).some[i] ?? levelsOf(told).some[0])]])),
+    ...Object.fromEntries(['first', 'middle'].map((name, i) => [`${name}-by-build`, [figure('build_seconds'), excessAt(levelsOf(report).some[i] ?? levelsOf(report).some[0])]])),
     'volume-by-memory': [figure('level_memory_bytes'), alone],
-    'width-by-memory': [figure('level_memory_bytes'), far(told, 'width_median')],
+    'width-by-memory': [figure('level_memory_bytes'), far(report, 'width_median')],
     'distance-by-budget': [figure('budget_bytes'), figure('budget_distance_ns', 1e-9)],
-    'width-by-deadline': [deadline, far(told, 'deadline_width_p99')],
+    'width-by-deadline': [deadline, far(report, 'deadline_width_p99')],
     'taken-by-deadline': [deadline, figure('deadline_took_p99', 1e-9), figure('deadline_took_median', 1e-9)],
-    ...(told.methods.some((m) => m.levels.some((l) => l.thesis_bytes !== null)) && {
+    ...(report.methods.some((m) => m.levels.some((l) => l.thesis_bytes !== null)) && {
       'sent-so-far': [level, soFar, figure('thesis_cumulative_bytes')],
       'sent-by-level': [level, figure('bytes'), figure('thesis_bytes')],
     }),
@@ -181,20 +181,20 @@ function pointsOf(rows, x, y) {
 }
 
 // Returns the expected lines: those of each method, then the dotted lines of each method.
-function expectedLines(told, name, [x, ...ys]) {
+function expectedLines(report, name, [x, ...ys]) {
   if (name.endsWith('build')) { // one line for each selection
-    const families = [...new Set(told.methods.map((m) => m.selection))], [y] = ys;
-    const members = (s) => told.methods.filter((m) => m.selection === s);
+    const families = [...new Set(report.methods.map((m) => m.selection))], [y] = ys;
+    const members = (s) => report.methods.filter((m) => m.selection === s);
     return families.map((s) => [s, pointsOf(members(s), x, y)]).filter(([, points]) => points.length);
   }
   const rows = (m) => (name.endsWith('deadline') ? m.deadlines : name.endsWith('budget') ? m.budgets : m.levels);
-  return ys.flatMap((y) => told.methods.map((m) => [m.name, pointsOf(rows(m), x, y)])).filter(([, points]) => points.length);
+  return ys.flatMap((y) => report.methods.map((m) => [m.name, pointsOf(rows(m), x, y)])).filter(([, points]) => points.length);
 }
 
-function plotsAgree(told, plots, count) {
+function plotsAgree(report, plots, count) {
   let drawn = 0;
-  for (const [name, axes] of Object.entries(plotAxes(told))) {
-    const expected = expectedLines(told, name, axes), { lines, limits, inside } = plots[name] ?? { lines: [] };
+  for (const [name, axes] of Object.entries(plotAxes(report))) {
+    const expected = expectedLines(report, name, axes), { lines, limits, inside } = plots[name] ?? { lines: [] };
     assert.equal(lines.filter((l) => !l.reference).length, expected.length, name);
     expected.forEach(([method, points], i) => {
       assert.equal(lines[i].name, method, name);
@@ -233,22 +233,22 @@ function look() {
 }
 
 async function show(browser, folder, viewport, colorScheme) {
-  const page = await browser.newPage({ viewport, colorScheme }), complaints = [], asked = [];
+  const page = await browser.newPage({ viewport, colorScheme }), complaints = [], requested = [];
   page.on('pageerror', (e) => complaints.push(e.message));
   page.on('console', (m) => complaints.push(m.text()));
-  page.on('request', (r) => r.url().startsWith('data:') || asked.push(r.url()));
+  page.on('request', (r) => r.url().startsWith('data:') || requested.push(r.url()));
   const address = pathToFileURL(join(folder, 'report.html')).href;
   await page.goto(address);
   const seen = await page.evaluate(look);
   await page.close();
   assert.deepEqual(complaints, []);
-  assert.deepEqual(asked, [address]);
+  assert.deepEqual(requested, [address]);
   return seen;
 }
 
-function everywhere(told, seen, pictures) {
+function everywhere(report, seen, pictures) {
   assert.equal(seen.done, 'all');
-  assert.equal(seen.title, told.model.name);
+  assert.equal(seen.title, report.model.name);
   assert.equal(seen.unexplained, 0, 'dashes without a reason');
   assert.ok(seen.wide <= 0, `wider than the window by ${seen.wide}`);
   assert.ok(!/\b(NaN|undefined|null|Infinity)\b|\[object/.test(seen.text), 'an invalid value in the text');
@@ -263,13 +263,13 @@ function everywhere(told, seen, pictures) {
 async function check(browser, name, { plots, pictures }, ...args) {
   const folder = join(work, name);
   run(ebpo, ['report', '-q', '--points', '50', '-o', folder, ...args]);
-  const told = JSON.parse(readFileSync(join(folder, 'report.json'), 'utf8'));
-  const shown = told.without_pictures ? 0 : pictures;
+  const report = JSON.parse(readFileSync(join(folder, 'report.json'), 'utf8'));
+  const shown = report.without_pictures ? 0 : pictures;
   const seen = await show(browser, folder, { width: 1280, height: 900 }, 'light');
-  everywhere(told, seen, shown);
-  tablesAgree(told, seen);
-  plotsAgree(told, seen.plots, plots);
-  everywhere(told, await show(browser, folder, { width: 390, height: 800 }, 'dark'), shown);
+  everywhere(report, seen, shown);
+  tablesAgree(report, seen);
+  plotsAgree(report, seen.plots, plots);
+  everywhere(report, await show(browser, folder, { width: 390, height: 800 }, 'dark'), shown);
   console.log(`${name}: OK`);
   return seen;
 }

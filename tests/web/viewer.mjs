@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { execFileSync, spawn } from 'node:child_process';
 import { copyFileSync, existsSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, statSync, symlinkSync, utimesSync, writeFileSync } from 'node:fs';
-import { createServer as createHttp, request as ask } from 'node:http';
+import { createServer as createHttp, request as send } from 'node:http';
 import { createServer } from 'node:net';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
@@ -187,9 +187,9 @@ async function levelFive(page) {
   assert.ok(requests().length <= 2);
   assert.equal(state.stats.nodes, table[5].gray + sum(table, (l) => l.leaf));
   const planes = triangles(5, '--no-cell-faces'), all = triangles(5);
-  assert.equal(state.stats.triangles - state.stats.wallTriangles, planes);
-  const { wallTriangles } = state.stats, walls = all - 12 * black - planes;
-  assert.ok(wallTriangles > 0 && wallTriangles < 0.4 * walls, `hidden cell faces must not be drawn: ${wallTriangles} of ${walls}`);
+  assert.equal(state.stats.triangles - state.stats.cellFaceTriangles, planes);
+  const { cellFaceTriangles } = state.stats, cellFaces = all - 12 * black - planes;
+  assert.ok(cellFaceTriangles > 0 && cellFaceTriangles < 0.4 * cellFaces, `hidden cell faces must not be drawn: ${cellFaceTriangles} of ${cellFaces}`);
   await page.keyboard.press('x'); // a section shows all cell faces and black cells
   assert.equal((await settled(page)).stats.triangles, all);
   for (let i = 0; i < 3; i++)
@@ -338,27 +338,27 @@ async function oneRequest(browser, address) {
 // the body, 'dead', or a status. `line.sent`: the delivered ranges [from, to].
 async function badLine(address) {
   const line = { mode: 'good', most: 0, sent: [], held: new Set() }, { port } = new URL(address);
-  const server = createHttp((question, answer) => {
-    const isModel = question.url.startsWith('/models/'), mode = isModel ? line.mode : 'good';
+  const server = createHttp((request, response) => {
+    const isModel = request.url.startsWith('/models/'), mode = isModel ? line.mode : 'good';
     if (mode === 'dead') {
-      question.socket.destroy();
+      request.socket.destroy();
     } else if (typeof mode === 'number') {
-      answer.writeHead(mode);
-      answer.end();
+      response.writeHead(mode);
+      response.end();
     } else {
-      ask({ port, path: question.url, headers: question.headers }, (far) => {
+      send({ port, path: request.url, headers: request.headers }, (far) => {
         const begin = Number(/\d+/.exec(far.headers['content-range'] ?? '0')), most = mode === 'stall' ? line.most : Infinity, sent = [begin, begin];
         if (mode === 'stall' && most === 0)
           return;
         if (isModel)
           line.sent.push(sent);
-        answer.writeHead(far.statusCode, far.headers);
+        response.writeHead(far.statusCode, far.headers);
         far.on('data', (data) => {
           const part = data.subarray(0, Math.max(0, most - (sent[1] - begin)));
           sent[1] += part.length;
-          answer.write(part);
+          response.write(part);
         });
-        far.on('end', () => most === Infinity && answer.end());
+        far.on('end', () => most === Infinity && response.end());
       }).end();
     }
   });
@@ -513,9 +513,9 @@ const red = (page) => page.evaluate(() => new Promise((done) => requestAnimation
 
 // Reads paint from the browser with the command ebpo paint: lists and measures it, bakes it into vertex colours, and shows these colours.
 async function readsPaint(browser, address, path) {
-  const baked = join(work, 'baked.ply'), told = JSON.parse(run(ebpo, ['paint', '--json', '--area', path, model]));
-  assert.deepEqual([told.stroke_count, told.layers.length, told.notes[0].title], [1, 1, 'A loss']);
-  const { lo, area, hi } = told.areas.all;
+  const baked = join(work, 'baked.ply'), report = JSON.parse(run(ebpo, ['paint', '--json', '--area', path, model]));
+  assert.deepEqual([report.stroke_count, report.layers.length, report.notes[0].title], [1, 1, 'A loss']);
+  const { lo, area, hi } = report.areas.all;
   assert.ok(lo > 0 && lo <= area && area <= hi);
   run(ebpo, ['paint', path, model, '--bake', baked]);
   const converted = join(work, 'baked.ebpo.h5'); // not in the served folder, because the server serves only files that existed at its start
@@ -633,11 +633,11 @@ async function embeds(browser, address) {
   const { info } = await openEbpo(readFileSync(join(models, 'red.ebpo.h5')));
   const scene = { ebpo_scene: '1.0', models: { red: { file: `${address}models/red.ebpo.h5`, content_sha256: info.content_sha256 } }, routes: { up: { keys: [{ time: 0, pose: {} },
     { time: 2, pose: { translation: [0, 0, 4] } }] } }, instances: [{ name: 'a', model: 'red' }, { name: 'b', model: 'red', route: 'up' }] };
-  const server = createHttp((question, answer) => {
+  const server = createHttp((request, response) => {
     const file = { '/': ['text/html', html], '/main.js': ['text/javascript', main.text], '/pair.scene.json': ['application/json', JSON.stringify(scene)],
-      '/worker.js': ['text/javascript', readFileSync(join(own, 'worker.js'))] }[question.url] ?? ['image/x-icon', ''];
-    answer.writeHead(200, { 'content-type': file[0] });
-    answer.end(file[1]);
+      '/worker.js': ['text/javascript', readFileSync(join(own, 'worker.js'))] }[request.url] ?? ['image/x-icon', ''];
+    response.writeHead(200, { 'content-type': file[0] });
+    response.end(file[1]);
   });
   await new Promise((done) => server.listen(0, '127.0.0.1', done));
   cleanup.push(() => server.closeAllConnections() ?? server.close());
@@ -660,8 +660,8 @@ async function embeds(browser, address) {
   await element.evaluate((e) => e.shadowRoot.querySelector('canvas').focus());
   await page.keyboard.press('ArrowLeft');
   await page.waitForFunction(() => window.heard.some(([name, detail]) => name === 'view' && detail.view === '2.5,20,2.5'));
-  const answer = await element.evaluate((e) => e.ask(e.info.box_origin));
-  assert.equal(answer.where, 'out');
+  const response = await element.evaluate((e) => e.query(e.info.box_origin));
+  assert.equal(response.where, 'out');
   await element.evaluate((e) => (e.src = e.src.replace('ring', 'none')));
   await page.waitForFunction(() => window.heard.some(([name, detail]) => name === 'error' && /404/.test(detail.message)));
   await element.evaluate((e) => e.remove());
@@ -677,15 +677,15 @@ async function embedsSeveral(page, address) {
   const { box_size: size, instances, models: files } = await many.evaluate((e) => e.info);
   assert.ok(size.every((x, k) => Math.abs(x - [5, 1, 1][k]) < 0.01), `${size}`); // cells are slightly larger than the models
   assert.deepEqual([files.length, instances.map((i) => [i.name, i.model])], [1, [['left', 'red'], ['red', 'red']]]);
-  const answer = await many.evaluate((e) => e.ask([4.5, 0.5, 3], 'red'));
-  assert.deepEqual([answer.where, answer.distance, answer.nearest, answer.instance], ['out', 2, [4.5, 0.5, 1], 'red']);
-  assert.match(await many.evaluate((e) => e.ask([0, 0, 0], 'none').catch((error) => error.message)), /"none" is not an instance/);
+  const response = await many.evaluate((e) => e.query([4.5, 0.5, 3], 'red'));
+  assert.deepEqual([response.where, response.distance, response.nearest, response.instance], ['out', 2, [4.5, 0.5, 1], 'red']);
+  assert.match(await many.evaluate((e) => e.query([0, 0, 0], 'none').catch((error) => error.message)), /"none" is not an instance/);
   // Clicks the right cube from the front. Its centre is 2 units to the right of the centre of the box, which is 5 units wide; the box's diagonal is 2 in the picture.
   const { x, y, width, height } = await many.boundingBox(), right = 2 * 2 / Math.hypot(5, 1, 1) / (2.5 - 1 / Math.hypot(5, 1, 1)) * height / 2 / Math.tan(19 * Math.PI / 180);
   await page.mouse.click(x + width / 2 + right, y + height / 2);
   await page.waitForFunction(() => window.of.many.some(([name, { instance, exact }]) => name === 'point' && exact && instance === 'red'));
   await many.evaluate((e) => e.lastElementChild.setAttribute('pose', '8,0,0')); // changes the pose without opening the file again
-  await page.waitForFunction(() => document.querySelector('#many').ask([8.5, 0.5, 3], 'red').then((a) => a.nearest[0] === 8.5));
+  await page.waitForFunction(() => document.querySelector('#many').query([8.5, 0.5, 3], 'red').then((a) => a.nearest[0] === 8.5));
   assert.equal(await page.evaluate(() => window.of.many.filter(([name]) => name === 'load').length), 1);
   await many.evaluate((e) => e.append(Object.assign(document.createElement('ebpo-part'), { innerHTML: '' }), e.firstElementChild.cloneNode())); // adds a part without src and another part with src
   await heard('load', 2);
@@ -697,9 +697,9 @@ async function embedsSeveral(page, address) {
   await page.waitForFunction(() => window.of.many.some(([name, { message }]) => name === 'error' && /on another server/.test(message)));
   await many.evaluate((e) => e.setAttribute('remote', ''));
   await heard('load', 3);
-  assert.deepEqual(await many.evaluate(async (e) => [e.info.to, e.info.models.map((m) => m.name), (await e.ask([0.5, 0.5, 5], 'b')).distance]), [2, ['red'], 2]);
+  assert.deepEqual(await many.evaluate(async (e) => [e.info.to, e.info.models.map((m) => m.name), (await e.query([0.5, 0.5, 5], 'b')).distance]), [2, ['red'], 2]);
   await many.evaluate((e) => e.firstElementChild.setAttribute('pose', '0,0,90')); // changes a part while a scene is shown
-  assert.deepEqual(await many.evaluate(async (e) => (await e.ask([0.5, 0.5, 2], 'a')).nearest), [0.5, 0.5, 1]);
+  assert.deepEqual(await many.evaluate(async (e) => (await e.query([0.5, 0.5, 2], 'a')).nearest), [0.5, 0.5, 1]);
   await many.evaluate((e) => {
     e.removeAttribute('scene');
     e.replaceChildren();

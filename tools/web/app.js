@@ -7,7 +7,7 @@ import { listSamples } from './samples.js';
 import { Scene } from './scene.js';
 import { LEVEL_COLOURS, MESH_COLOUR, TYPE_COLOURS } from './shade.js';
 import { address, changed, fileOfEntry, pushStep, setHomeView, setPicture, viewParameters } from './share.js';
-import { $, count, on, state, tell, toModel } from './state.js';
+import { $, count, emit, on, state, toModel } from './state.js';
 
 const MORE_MS = 5000; // the tools are loaded so long after the first picture, or earlier when all data has arrived
 const TRIANGLES_MOST = 2_000_000; // approximate limit
@@ -31,7 +31,7 @@ function open(what, name, begun) {
   const { camera, level } = viewParameters(new URLSearchParams(location.search));
   Object.assign(state, { levelAsked: level });
   home(camera);
-  tell('closed');
+  emit('closed');
   showError();
   busy(true);
   showOpening(name);
@@ -39,7 +39,7 @@ function open(what, name, begun) {
   Object.assign(state, { shownName: name, what });
   if (!begun)
     worker.postMessage({ type: 'open', opening: state.opening, what, ahead: boot.ahead });
-  ask();
+  requestCut();
 }
 
 // `step`: true to add a step to the browser's history; false when the step exists already, or when the page opens with this file.
@@ -64,14 +64,14 @@ function openFile(file, { step = true } = {}) {
 }
 
 // Shows several models or a scene. The page stays in this mode until it is closed.
-async function openTogether(asked) {
+async function openTogether(requested) {
   if (state.info || coming || state.together) { // the panel and tools of one model exist already
     showError({ message: 'this page already showed other models; reload the page, and then open these files together' });
     return;
   }
   try {
     const together = await import('./together.js');
-    await together.begin({ scene, layout }, await asked(together));
+    await together.begin({ scene, layout }, await requested(together));
   } catch (error) {
     showOpening();
     showError(error);
@@ -94,7 +94,7 @@ function close({ step = true } = {}) {
     pushStep();
   state.opening++;
   Object.assign(state, { info: undefined, depth: -1, idle: false });
-  tell('closed');
+  emit('closed');
   worker.postMessage({ type: 'close', opening: state.opening });
   scene.clear();
   busy(false);
@@ -140,12 +140,12 @@ const handlers = {
     makeLevels(chooseLevel);
     layout();
     showView(viewParameters(new URLSearchParams(location.search)));
-    tell('opened');
+    emit('opened');
   },
   loaded(m) {
     Object.assign(state, { depth: m.depth, timeline: m.timeline, traffic: m.traffic });
     showLevels();
-    showStats(scene.walls);
+    showStats(scene.cellFaces);
   },
   tiles(m) {
     scene.setTiles(m.set, m.removed);
@@ -157,14 +157,14 @@ const handlers = {
     }
     Object.assign(state, { stats: m.stats, traffic: m.traffic });
     showLevels();
-    showStats(scene.walls);
+    showStats(scene.cellFaces);
   },
   probed(m) {
     state.traffic = m.traffic;
     state.probe = m;
     probeShown();
-    showStats(scene.walls);
-    tell('probed');
+    showStats(scene.cellFaces);
+    emit('probed');
   },
   idle(m) {
     Object.assign(state, { traffic: m.traffic, settled: m.want, idle: m.want === state.want });
@@ -173,7 +173,7 @@ const handlers = {
       refineMore();
       more();
     }
-    showStats(scene.walls);
+    showStats(scene.cellFaces);
   },
   line(m) {
     state.line = m;
@@ -192,7 +192,7 @@ worker.onmessage = ({ data }) => {
   if (data.type === 'forget')
     boot.forget();
   else if (data.opening === state.opening)
-    (handlers[data.type] ?? ((news) => tell(data.type, news)))(data);
+    (handlers[data.type] ?? ((news) => emit(data.type, news)))(data);
 };
 worker.onerror = (e) => showError({ message: `The page's worker failed (${e.message ?? 'it could not be loaded'}); run npm ci in tools/web, and reload` });
 
@@ -206,7 +206,7 @@ function retry() {
     return;
   }
   worker.postMessage({ type: 'retry' });
-  ask();
+  requestCut();
 }
 
 function cameraMoved() {
@@ -214,16 +214,16 @@ function cameraMoved() {
     state.together.moved();
     return;
   }
-  timer ??= setTimeout(ask, 90);
+  timer ??= setTimeout(requestCut, 90);
   changed();
 }
 
 function frameDrawn(ms, info) {
   frameTook(ms, info.calls);
-  tell('frame');
+  emit('frame');
 }
 
-function ask() {
+function requestCut() {
   clearTimeout(timer);
   timer = undefined;
   const mesh = state.info?.parts.has('mesh') && Number($('level').value) === state.info.level_count;
@@ -244,13 +244,13 @@ function refineMore() {
   if ($('detail').value !== 'auto' || state.auto !== AUTO.first || !state.frames.length || (frameMs() > AUTO.fastMs && frameMs() < AUTO.slowMs))
     return;
   state.auto = frameMs() <= AUTO.fastMs ? AUTO.fast : AUTO.slow;
-  ask();
+  requestCut();
 }
 
 function levelChanged() {
   showLevel();
   changed();
-  ask();
+  requestCut();
 }
 
 function chooseLevel(level) {
@@ -284,13 +284,13 @@ function cutChanged() {
   const cut = cutOf(state.info.box_size, state.scene.scale, clip, state.box);
   scene.setCut(cut?.low, cut?.high);
   if ((was === undefined) !== (cut === undefined))
-    ask();
+    requestCut();
   changed();
-  tell('cut');
+  emit('cut');
 }
 
 // Applies all parameters of a view in an address.
-function showView({ camera, level, clip, box, point, measured, colouring, walls, detail: pixels }) {
+function showView({ camera, level, clip, box, point, measured, colouring, cellFaces, detail: pixels }) {
   home(camera);
   $('level').value = level ?? $('level').max;
   $('detail').value = pixels;
@@ -303,8 +303,8 @@ function showView({ camera, level, clip, box, point, measured, colouring, walls,
   check('colouring', colouring);
   cutChanged();
   colouringChanged();
-  $('walls').checked = walls;
-  scene.setWalls(walls);
+  $('cellFaces').checked = cellFaces;
+  scene.setCellFaces(cellFaces);
   levelChanged();
   if (point || state.probe)
     probeAt(point);
@@ -315,7 +315,7 @@ function showView({ camera, level, clip, box, point, measured, colouring, walls,
 function setTheme(theme) {
   document.documentElement.dataset.theme = theme;
   scene.setTheme(theme === 'dark');
-  tell('theme');
+  emit('theme');
 }
 
 function layout() {
@@ -336,17 +336,17 @@ $('stallRetry').onclick = () => (state.together ? state.together.retry() : worke
 $('errorClose').onclick = () => showError();
 $('level').oninput = levelChanged;
 $('detail').onchange = () => {
-  ask();
+  requestCut();
   changed();
 };
-$('walls').onchange = () => {
-  scene.setWalls($('walls').checked);
-  showStats(scene.walls);
+$('cellFaces').onchange = () => {
+  scene.setCellFaces($('cellFaces').checked);
+  showStats(scene.cellFaces);
   changed();
 };
 $('own').onchange = () => scene.setOwnColours($('own').checked);
-$('wire').onchange = ask;
-$('cells').onchange = ask;
+$('wire').onchange = requestCut;
+$('cells').onchange = requestCut;
 $('colouring').onchange = colouringChanged;
 $('clipAxis').onchange = cutChanged;
 $('clipAt').oninput = cutChanged;
@@ -405,12 +405,12 @@ const slide = (id, step, then) => () => {
   then();
 };
 const KEYS = {
-  arrowleft: slide('level', -1, levelChanged), arrowright: slide('level', 1, levelChanged), g: click('walls'), w: click('wire'), c: click('cells'), m: click('own'),
+  arrowleft: slide('level', -1, levelChanged), arrowright: slide('level', 1, levelChanged), g: click('cellFaces'), w: click('wire'), c: click('cells'), m: click('own'),
   k: () => choose('colouring', 1), x: () => choose('clip', 1), '[': slide('clipAt', -15, cutChanged), ']': slide('clipAt', 15, cutChanged), '/': click('clipFlip'),
   f: click('toolHome'), t: click('toolTheme'), p: click('toolPanel'), '?': click('toolHelp'), o: close,
   ',': slide('level', -1, levelChanged), '.': slide('level', 1, levelChanged),
   escape: () => {
-    tell('escape');
+    emit('escape');
     probeAt();
     showError();
   },
@@ -430,12 +430,12 @@ addEventListener('keydown', (e) => {
     return;
   const steer = e.target === $('canvas') ? STEER[key] : undefined;
   if (state.together && key === 'escape') {
-    tell('escape');
+    emit('escape');
     showError();
     return;
   }
   if (!steer && (!KEYS[key] || (state.together && !TOGETHER_KEYS.includes(key)))) {
-    tell('key', e);
+    emit('key', e);
     return;
   }
   e.preventDefault();
@@ -468,7 +468,7 @@ on('complaint', (message) => showError({ message }));
 // --- tools that are loaded later: measuring, notes, the pen, sharing ---
 
 function more() {
-  coming ??= import('./more.js').then((m) => m.begin({ scene, worker, ask, cutChanged, changed, address, shownAs: (query) => showView(viewParameters(query)), layout, query: boot.query }),
+  coming ??= import('./more.js').then((m) => m.begin({ scene, worker, requestCut, cutChanged, changed, address, shownAs: (query) => showView(viewParameters(query)), layout, query: boot.query }),
     (error) => showError({ message: `The page's tools could not be loaded (${error.message}); reload the page` }));
   return coming;
 }
@@ -494,7 +494,7 @@ window.ebpoViewer = {
   get state() {
     return { idle: state.idle, depth: state.depth, stats: state.stats, traffic: state.traffic, timeline: state.timeline, shownAfter: state.shownAfter, probe: state.probe,
       error: state.error, line: state.line,
-      levels: state.info?.levels.length, walls: scene.walls, calls: state.calls, box: state.box, measured: state.measured };
+      levels: state.info?.levels.length, cellFaces: scene.cellFaces, calls: state.calls, box: state.box, measured: state.measured };
   },
   get place() {
     return state.scene;

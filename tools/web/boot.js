@@ -80,8 +80,8 @@
   })().catch((error) => post({ failed: error.message })).finally(begin);
 
   // Estimates the view of the camera; the page sends the exact view when it is loaded.
-  const asked = (query.get('view') ?? '').split(',').filter(Boolean).map(Number);
-  const [azimuth = 26.3, height = 18.65, distance = 0.98 / Math.sin(FIELD_OF_VIEW * Math.PI / 360), ...at] = asked.every(Number.isFinite) ? asked : [];
+  const requested = (query.get('view') ?? '').split(',').filter(Boolean).map(Number);
+  const [azimuth = 26.3, height = 18.65, distance = 0.98 / Math.sin(FIELD_OF_VIEW * Math.PI / 360), ...at] = requested.every(Number.isFinite) ? requested : [];
   const a = azimuth * Math.PI / 180, h = height * Math.PI / 180, away = [Math.sin(a) * Math.cos(h), Math.sin(h), Math.cos(a) * Math.cos(h)];
   worker.postMessage({ type: 'open', opening: 1, what: boot.url, ahead: boot.ahead });
   worker.postMessage({ type: 'view', view: { eye: away.map((x, k) => (at[k] ?? 0) + x * distance), planes: [], pixels: innerHeight / (2 * Math.tan(FIELD_OF_VIEW * Math.PI / 360)) },

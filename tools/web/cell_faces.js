@@ -60,7 +60,7 @@ export function subtract(pieces, q) {
 /** Returns, for each polygon, 2 axis + side of the cell face that contains the polygon, or -1. Stores the result in the polytope. */
 export function sidesOf(p) {
   p.sides ??= Int8Array.from({ length: p.faces }, (_, f) => {
-    for (let s = 0; p.wall[f] && s < 6; s++) {
+    for (let s = 0; p.onCellFace[f] && s < 6; s++) {
       let on = true;
       for (let i = p.first[f]; i < p.first[f + 1]; i++)
         on &&= Math.abs(p.x[3 * p.corner[i] + (s >> 1)] - (s & 1)) < ON;
@@ -82,7 +82,7 @@ function inCell(node, of, p, f, axis) {
   return out;
 }
 
-export class Walls {
+export class CellFaces {
   /** `drawn(node)`: returns true when a node is in the cut; `envelope(node)`: returns its polytope, or undefined when its real faces are drawn. */
   constructor(tree, drawn, envelope) {
     Object.assign(this, { tree, drawn, envelope });

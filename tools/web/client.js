@@ -69,7 +69,7 @@ export class Client {
    */
   constructor({ worker, crew = new Crew({ worker, most: 1 }), heard }) {
     this.heard = heard;
-    this.opening = this.want = this.asks = 0;
+    this.opening = this.want = this.queries = 0;
     this.waiting = new Map(); // pending queries for positions, by their numbers
     this.worker = crew.join({ heard: (data) => this.#hear(data), failed: (error) => this.#failed(error) });
   }
@@ -85,10 +85,10 @@ export class Client {
       this.opened = undefined;
     } else if (data.type === 'probed') {
       if (data.done)
-        this.asked?.done(data);
-    } else if (data.type === 'places') {
-      const asked = this.waiting.get(data.id);
-      data.error ? asked?.fail(problemOf(data.error)) : asked?.done(data.places);
+        this.requested?.done(data);
+    } else if (data.type === 'positions') {
+      const requested = this.waiting.get(data.id);
+      data.error ? requested?.fail(problemOf(data.error)) : requested?.done(data.positions);
       this.waiting.delete(data.id);
     } else if (data.type === 'failed') {
       this.#failed(data.error, data.late);
@@ -107,8 +107,8 @@ export class Client {
 
   // Rejects pending requests, which will get no response.
   #forget(problem) {
-    const all = [this.opened, this.asked, ...this.waiting.values()];
-    this.opened = this.asked = undefined;
+    const all = [this.opened, this.requested, ...this.waiting.values()];
+    this.opened = this.requested = undefined;
     this.waiting.clear();
     all.forEach((one) => one?.fail(problem));
   }
@@ -156,16 +156,16 @@ export class Client {
 
   /** Queries a point of the model: { where, distance, nearest, lo, hi, exact, depth, ... }. A newer query cancels an older one, which rejects with AbortError. */
   probe(point) {
-    this.asked?.fail(new DOMException('a newer query cancelled this one', 'AbortError'));
-    const promise = new Promise((done, fail) => (this.asked = { done, fail }));
+    this.requested?.fail(new DOMException('a newer query cancelled this one', 'AbortError'));
+    const promise = new Promise((done, fail) => (this.requested = { done, fail }));
     this.worker.post({ type: 'probe', opening: this.opening, point });
     return promise;
   }
 
   /** Returns the nearest positions on the faces for points of the model: [{ face, weights, place, normal, distance }]. */
-  places(points) {
-    const id = ++this.asks, promise = new Promise((done, fail) => this.waiting.set(id, { done, fail }));
-    this.worker.post({ type: 'places', opening: this.opening, id, points });
+  positions(points) {
+    const id = ++this.queries, promise = new Promise((done, fail) => this.waiting.set(id, { done, fail }));
+    this.worker.post({ type: 'positions', opening: this.opening, id, points });
     return promise;
   }
 

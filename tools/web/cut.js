@@ -7,7 +7,7 @@ import { Hidden } from './hidden.js';
 import { MeshStore } from './mesh.js';
 import { BLACK, GRAY, LEAF, WHITE } from './reader/index.js';
 import { TileMaker, planeVector } from './tile.js';
-import { Walls } from './cell_faces.js';
+import { CellFaces } from './cell_faces.js';
 
 const TILE_NODES = 300;        // most nodes of a tile: large tiles need fewer draw calls, small tiles are rebuilt faster
 const NODES_A_PASS = 2400;     // most new nodes of a pass, so that a picture appears early and improves; the first passes create even fewer
@@ -69,7 +69,7 @@ export class Cut {
     this.tree = tree;
     this.small = small;
     this.scene = sceneOf(tree.info);
-    this.tiles = new Map(); // key: { signature, pass, nodes, triangles, meshTriangles, wallTriangles }
+    this.tiles = new Map(); // key: { signature, pass, nodes, triangles, meshTriangles, cellFaceTriangles }
     this.nodes = [];        // nodes of the last cut
     this.mesh = new MeshStore();
     this.field = new Field();
@@ -81,7 +81,7 @@ export class Cut {
     this.low = tree.info.box_size.map((s) => -s / 2 * this.scene.scale);
     const colour = tree.info.parts.has('colours') ? (node) => tree.colour(node) : undefined;
     this.maker = new TileMaker({ place: (node) => this.#place(node), polytope: (node) => tree.polytope(node), colour, field: this.field, mesh: this.mesh });
-    this.walls = new Walls(tree, (node) => node.drawn === this.pass, (node) => (node.useMesh ? undefined : tree.polytope(node)));
+    this.cellFaces = new CellFaces(tree, (node) => node.drawn === this.pass, (node) => (node.useMesh ? undefined : tree.polytope(node)));
   }
 
   #place(node) {
@@ -139,14 +139,14 @@ export class Cut {
     this.pass++;
     const chosen = this.#choose(view, want), tiles = this.#tilesOf(chosen.nodes);
     this.#enter(chosen.nodes);
-    const flags = (want.lines ? 1 : 0) + (want.cells ? 2 : 0) + (want.black ? 4 : 0), set = [], removed = [], walls = want.black ? undefined : this.walls; // a section shows every cell face
+    const flags = (want.lines ? 1 : 0) + (want.cells ? 2 : 0) + (want.black ? 4 : 0), set = [], removed = [], cellFaces = want.black ? undefined : this.cellFaces; // a section shows every cell face
     for (const [root, nodes] of tiles) {
       const key = root.id ??= ++this.ids, signature = signatureOf(nodes, flags), old = this.tiles.get(key);
       if (old?.signature === signature && (want.black || nodes.every((node) => this.field.changedAt(node) <= old.pass)))
         continue;
-      const tile = this.maker.make(key, nodes, want, walls);
+      const tile = this.maker.make(key, nodes, want, cellFaces);
       set.push(tile);
-      this.tiles.set(key, { signature, pass: this.pass, nodes: nodes.length, triangles: tile.triangles, meshTriangles: tile.meshTriangles, wallTriangles: tile.wallTriangles });
+      this.tiles.set(key, { signature, pass: this.pass, nodes: nodes.length, triangles: tile.triangles, meshTriangles: tile.meshTriangles, cellFaceTriangles: tile.cellFaceTriangles });
     }
     const now = new Set([...tiles.keys()].map((root) => root.id));
     for (const key of this.tiles.keys())
@@ -204,12 +204,12 @@ export class Cut {
   }
 
   #stats() {
-    const s = { nodes: 0, triangles: 0, meshTriangles: 0, wallTriangles: 0, tiles: this.tiles.size };
+    const s = { nodes: 0, triangles: 0, meshTriangles: 0, cellFaceTriangles: 0, tiles: this.tiles.size };
     for (const t of this.tiles.values()) {
       s.nodes += t.nodes;
       s.triangles += t.triangles;
       s.meshTriangles += t.meshTriangles;
-      s.wallTriangles += t.wallTriangles;
+      s.cellFaceTriangles += t.cellFaceTriangles;
     }
     return s;
   }

@@ -26,7 +26,7 @@ const STEER = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDo
 const filesOf = (parts) => JSON.stringify(parts.map(({ src, colour, name }) => [src, colour, name]));
 
 export class EbpoViewerElement extends HTMLElement {
-  static observedAttributes = [...OPENS, 'view', 'level', 'detail', 'clip', 'box', 'point', 'colour', 'theme', 'walls', 'time', 'hide', 'colours'];
+  static observedAttributes = [...OPENS, 'view', 'level', 'detail', 'clip', 'box', 'point', 'colour', 'theme', 'cell-faces', 'time', 'hide', 'colours'];
   /** The address of worker.js, if worker.js is not beside this file. Set it before the first element exists. */
   static worker = undefined;
 
@@ -87,7 +87,7 @@ export class EbpoViewerElement extends HTMLElement {
       const at = down && Math.hypot(e.clientX - down[0], e.clientY - down[1]) <= 4 && this.info ? this.#scene.pick(e.clientX, e.clientY) : undefined;
       const { point, instance } = (at && (this.#several ? this.#several.pickedAt(at) : { point: fromPicture(at, this.#client.scene) })) ?? {};
       if (point)
-        this.ask(point, instance).catch(() => {});
+        this.query(point, instance).catch(() => {});
     });
     canvas.addEventListener('keydown', (e) => {
       if (!STEER[e.key] || e.ctrlKey || e.metaKey || e.altKey)
@@ -112,13 +112,13 @@ export class EbpoViewerElement extends HTMLElement {
     else if (name === 'clip' || name === 'box')
       this.#cut();
     else if (name === 'point' && this.info && !this.#several && pointsOf(text)?.length === 1)
-      this.ask(pointsOf(text)[0]).catch(() => {});
+      this.query(pointsOf(text)[0]).catch(() => {});
     else if (name === 'point' && !text)
       scene.showProbe();
     else if (name === 'colour')
       this.#applyToScenes((it) => it.setColouring(['level', 'type'].includes(text) ? text : 'plain'));
-    else if (name === 'walls')
-      this.#applyToScenes((it) => it.setWalls(text !== '0'));
+    else if (name === 'cell-faces')
+      this.#applyToScenes((it) => it.setCellFaces(text !== '0'));
     else if (name === 'theme')
       this.#setTheme(text ?? (matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark'));
     this.#sendView();
@@ -241,13 +241,13 @@ export class EbpoViewerElement extends HTMLElement {
     }
   }
 
-  async #openSeveral(asking) {
+  async #openSeveral(parse) {
     this.#close();
     const several = this.#several = new Several(this.#scene, { worker: EbpoViewerElement.worker, heard: (type, news) => this.#handle(type, news),
       want: () => ({ pixels: this.#number('detail') ?? PIXELS, triangles: TRIANGLES_MOST }) });
     try {
-      const facts = await several.open(await asking());
-      ['time', 'hide', 'colours', 'colour', 'walls', 'theme', 'view', 'box'].forEach((name) => this.#apply(name));
+      const facts = await several.open(await parse());
+      ['time', 'hide', 'colours', 'colour', 'cell-faces', 'theme', 'view', 'box'].forEach((name) => this.#apply(name));
       this.#dispatch('load', facts);
       return facts;
     } catch (error) {
@@ -302,7 +302,7 @@ export class EbpoViewerElement extends HTMLElement {
     this.#dispatch('load', info);
     const points = pointsOf(this.getAttribute('point'));
     if (points?.length === 1)
-      this.ask(points[0]).catch(() => {});
+      this.query(points[0]).catch(() => {});
     return info;
   }
 
@@ -315,18 +315,18 @@ export class EbpoViewerElement extends HTMLElement {
    * Queries a point and marks it. Resolves to { point, where, distance, nearest, lo, hi, exact }, which the event `point` also has. With several models, the point
    * is in the scene's coordinates, and `instance` is the name of the queried instance.
    */
-  async ask(point, instance) {
+  async query(point, instance) {
     if (!this.info)
       throw new Error('no model is open; wait for the event load');
     const several = this.#several, inScene = several?.inPicture ?? ((p) => toPicture(p, this.#client.scene));
     this.#scene.showProbe(inScene(point));
-    const answer = several ? await several.ask(point, instance) : await this.#askOne(point), { where, nearest } = answer;
+    const result = several ? await several.query(point, instance) : await this.#queryOne(point), { where, nearest } = result;
     this.#scene.showProbe(inScene(point), nearest && inScene(nearest), where === 'in' ? '#4cc38a' : where === 'out' ? '#ff6b6b' : '#ffb020');
-    this.#dispatch('point', answer);
-    return answer;
+    this.#dispatch('point', result);
+    return result;
   }
 
-  async #askOne(point) {
+  async #queryOne(point) {
     const { where, distance, nearest, lo, hi, exact } = await this.#client.probe(point);
     return { point, where, distance, nearest, lo, hi, exact };
   }

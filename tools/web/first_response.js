@@ -6,8 +6,8 @@ export function takeFirst({ url, range, head, bytes, end, failed }) {
   if (range) {
     first = { url, range, taken: false };
     first.body = new ReadableStream({ start: (controller) => (first.controller = controller) });
-    first.answer = new Promise((done, fail) => Object.assign(first, { done, fail }));
-    first.answer.catch(() => {}); // the receiver reports the error
+    first.response = new Promise((done, fail) => Object.assign(first, { done, fail }));
+    first.response.catch(() => {}); // the receiver reports the error
   } else if (first.ended) {
     return; // the request was aborted or is complete
   } else if (head) {
@@ -28,7 +28,7 @@ export function takeFirst({ url, range, head, bytes, end, failed }) {
 export const fetchAfter = (forget) => (url, init) => {
   if (!first || first.taken || url !== first.url || init.headers.Range !== first.range)
     return fetch(url, init);
-  const { answer } = first;
+  const { response } = first;
   first.taken = true;
   init.signal.addEventListener('abort', () => {
     if (first.ended)
@@ -36,5 +36,5 @@ export const fetchAfter = (forget) => (url, init) => {
     takeFirst({ failed: 'the request was aborted' });
     forget();
   });
-  return answer;
+  return response;
 };

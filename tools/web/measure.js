@@ -1,10 +1,10 @@
 // Measures distances between points and the section's area and outline, and clips the model to a box.
-import { complain, make, mark, modelName, placesOf, save, section, svg, take, taken } from './parts.js';
+import { complain, make, mark, modelName, positionsOf, save, section, svg, take, taken } from './parts.js';
 import { $, length, on, state, toScene } from './state.js';
 
 const SECTIONS = `
   <div class="row"><button id="sectionOn" class="small">Area and outline of the section</button></div>
-  <div id="sectionAnswer" hidden><div class="answer"><strong id="sectionArea"></strong><span id="sectionNote"></span></div><canvas id="sectionPicture" width="528" height="360"></canvas>
+  <div id="sectionResult" hidden><div class="result"><strong id="sectionArea"></strong><span id="sectionNote"></span></div><canvas id="sectionPicture" width="528" height="360"></canvas>
     <div class="row"><button id="sectionSvg" class="small">Save as SVG</button><button id="sectionCsv" class="small">Save as CSV</button></div></div>`;
 
 const between = (a, b) => Math.hypot(...a.map((x, k) => x - b[k]));
@@ -22,10 +22,10 @@ export function addDistances(page) {
 
 export function addMeasuring(page) {
   const { worker, scene } = page, details = section('Measure', DISTANCES + SECTIONS);
-  const placeOf = async (point) => (state.info.parts.has('mesh') && !scene.pickedCut ? (await placesOf(worker, [point]))[0].place : point);
+  const placeOf = async (point) => (state.info.parts.has('mesh') && !scene.pickedCut ? (await positionsOf(worker, [point]))[0].place : point);
   distances({ ...page, placeOf }, details);
   sections(page);
-  on('theme', () => $('sectionAnswer').hidden || drawOutline());
+  on('theme', () => $('sectionResult').hidden || drawOutline());
 }
 
 // --- distances ---
@@ -91,7 +91,7 @@ function distances({ placeOf, changed }, details) {
 let outline; // { axis, at, segments, area, length, faces, partial }
 
 function sections({ worker }) {
-  const ask = () => {
+  const requestSection = () => {
     const { axis, at } = state.clip;
     if (axis === undefined) {
       complain('no clipping plane is active; choose an axis of the clipping plane first');
@@ -103,11 +103,11 @@ function sections({ worker }) {
   };
   const forget = () => {
     outline = undefined;
-    $('sectionAnswer').hidden = true;
+    $('sectionResult').hidden = true;
     $('sectionOn').disabled = false;
     $('sectionOn').textContent = 'Area and outline of the section';
   };
-  $('sectionOn').onclick = ask;
+  $('sectionOn').onclick = requestSection;
   on('closed', forget);
   on('cut', () => outline && (outline.axis !== state.clip.axis || Math.abs(outline.share - state.clip.at) > 1e-9) && forget());
   on('section', (news) => {
@@ -128,7 +128,7 @@ function sections({ worker }) {
 
 function showOutline() {
   const { area, length: long, faces, partial, axis, at } = outline;
-  $('sectionAnswer').hidden = false;
+  $('sectionResult').hidden = false;
   $('sectionArea').textContent = area === undefined ? length(long, 6) : length(area, 6, 2);
   $('sectionNote').textContent = `${area === undefined ? 'outline; a surface has no area inside' : `area; outline ${length(long,
     6)}`}; ${faces} faces at ${'xyz'[axis]} = ${length(at, 6)}${partial ? '; part of it is not in this subset' : ''}`;

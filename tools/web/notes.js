@@ -93,7 +93,7 @@ export function addNotes({ scene, changed, shownAs }, drawing) {
     },
     click: async (point) => {
       try {
-        const [place] = await drawing().placesOf([point]);
+        const [place] = await drawing().positionsOf([point]);
         take();
         edit({ place });
       } catch (error) {

@@ -1,5 +1,5 @@
 // Components of the page's tools: folding sections of the panel, marks over the picture, opening and saving files.
-import { $, on, state, tell } from './state.js';
+import { $, emit, on, state } from './state.js';
 
 /** Adds a folding section to the panel, before the statistics. `html` must be trusted; texts of users are set only as text content. */
 export function section(title, html, { open = false } = {}) {
@@ -99,20 +99,20 @@ export const modelName = () => (state.shownName ?? 'model').replace(/(\.ebpo)?\.
 // --- queries to the worker ---
 
 const waiting = new Map();
-let asks = 0;
+let queries = 0;
 /** Resolves to the nearest positions on the faces for points of the model: [{ face, weights, place, normal, distance }]. */
-export const placesOf = (worker, points) => ask(worker, 'places', points);
+export const positionsOf = (worker, points) => query(worker, 'positions', points);
 
 /** Resolves to the faces that points of paint cover: the result of reachOf() of reach.js. */
-export const reachOf = (worker, points) => ask(worker, 'reach', points);
+export const reachOf = (worker, points) => query(worker, 'reach', points);
 
-function ask(worker, type, points) {
-  const id = ++asks;
+function query(worker, type, points) {
+  const id = ++queries;
   worker.postMessage({ type, opening: state.opening, id, points });
   return new Promise((done, fail) => waiting.set(id, { done, fail, opening: state.opening }));
 }
-on('places', ({ id, places, error }) => {
-  error ? waiting.get(id)?.fail(new Error(error.message)) : waiting.get(id)?.done(places);
+on('positions', ({ id, positions, error }) => {
+  error ? waiting.get(id)?.fail(new Error(error.message)) : waiting.get(id)?.done(positions);
   waiting.delete(id);
 });
 on('closed', () => {
@@ -120,4 +120,4 @@ on('closed', () => {
   waiting.clear();
 });
 
-export const complain = (message) => tell('complaint', message);
+export const complain = (message) => emit('complaint', message);

@@ -1,5 +1,5 @@
 // The queried point: its coordinates, result and marker.
-import { $, length, state, tell, toScene } from './state.js';
+import { $, emit, length, state, toScene } from './state.js';
 
 let picture, queries;
 
@@ -15,7 +15,7 @@ export function probeAt(point) {
   if (point)
     queries.postMessage({ type: 'probe', opening: state.opening, point });
   probeShown();
-  tell('point');
+  emit('point');
 }
 
 export function probeShown() {

@@ -1,5 +1,5 @@
 // Evaluates longer queries of the page in the worker: positions on faces for painting and measuring, and sections of the real faces.
-import { GRAY, LEAF, growForQuestion, nearestFace } from './reader/index.js';
+import { GRAY, LEAF, growForQuery, nearestFace } from './reader/index.js';
 
 const ONE_WEIGHT = 2 ** 30;     // format-spec/paint.md
 const LEAVES_AT_ONCE = 1024, NODES_AT_ONCE = 256;
@@ -23,10 +23,10 @@ const unit = (x) => Math.round(Math.min(1, Math.max(0, x)) * ONE_WEIGHT);
  * Returns the nearest positions on the faces: [{ face, weights, place, normal, distance }]. `face` is the number that paint files use. Computes in double
  * precision. The file must have the part `mesh`.
  */
-export async function placesOf(file, tree, points) {
+export async function positionsOf(file, tree, points) {
   const found = [];
   for (const p of points)
-    found.push(await nearestFace(tree, p, (leaves) => file.leafFaces(leaves), (nodes) => growForQuestion(file, tree, nodes)));
+    found.push(await nearestFace(tree, p, (leaves) => file.leafFaces(leaves), (nodes) => growForQuery(file, tree, nodes)));
   const own = found.map((f) => f.face), numbers = file.info.parts.has('maps') ? await file.sourceFaces(own) : own;
   return found.map(({ point, corners, distance }, i) => {
     const n = cross(sub(corners.subarray(3, 6), corners.subarray(0, 3)), sub(corners.subarray(6, 9), corners.subarray(0, 3))), size = Math.hypot(...n);
@@ -73,25 +73,25 @@ export function measureOf(segments) {
 }
 
 /**
- * Computes the section of the real faces by a plane across an axis, in the model's coordinates. Calls `tell` repeatedly with the progress { looked, of }, and at
+ * Computes the section of the real faces by a plane across an axis, in the model's coordinates. Calls `emit` repeatedly with the progress { looked, of }, and at
  * the end with { segments, area, length, faces, partial } or { fault }. `area` is present only for solids. `partial`: the file is a subset and lacks part of
  * the section.
  */
-export async function sectionOf(file, tree, axis, at, tell, ended) {
+export async function sectionOf(file, tree, axis, at, emit, ended) {
   const { info } = file;
   if (!info.parts.has('mesh')) {
-    tell({ fault: 'the file has no faces; convert it with its mesh' });
+    emit({ fault: 'the file has no faces; convert it with its mesh' });
     return;
   }
   const leaves = [];
   let partial = false;
   for (let nodes = [tree.root]; nodes.length && !ended();) {
-    const here = nodes.filter((node) => (node.type === GRAY || node.type === LEAF) && tree.wall(node, axis, 0) <= at && tree.wall(node, axis, 1) >= at);
+    const here = nodes.filter((node) => (node.type === GRAY || node.type === LEAF) && tree.cellFace(node, axis, 0) <= at && tree.cellFace(node, axis, 1) >= at);
     leaves.push(...here.filter((node) => node.type === LEAF));
     const gray = here.filter((node) => node.type === GRAY && !tree.isPruned(node)), missing = gray.filter((node) => !tree.children(node));
     partial ||= gray.length < here.filter((node) => node.type === GRAY).length;
     for (let i = 0; i < missing.length && !ended(); i += NODES_AT_ONCE) { // children are created at once, because the cache may drop these chunks when the next ones arrive
-      await growForQuestion(file, tree, missing.slice(i, i + NODES_AT_ONCE));
+      await growForQuery(file, tree, missing.slice(i, i + NODES_AT_ONCE));
       missing.slice(i, i + NODES_AT_ONCE).forEach((node) => tree.children(node));
     }
     partial ||= gray.some((node) => !tree.children(node) && tree.isPruned(node));
@@ -104,13 +104,13 @@ export async function sectionOf(file, tree, axis, at, tell, ended) {
       cutFaces(fresh.length === faces.numbers.length ? faces : Float64Array.from(fresh.flatMap((k) => [...faces.subarray(9 * k, 9 * k + 9)])), axis, at, segments);
     }
     if (seen.size > FACES_MOST) {
-      tell({ fault: `the section intersects more than ${FACES_MOST / 1e6} million faces; cut a part of the model out with ebpo subset` });
+      emit({ fault: `the section intersects more than ${FACES_MOST / 1e6} million faces; cut a part of the model out with ebpo subset` });
       return;
     }
-    tell({ looked: Math.min(leaves.length, i + LEAVES_AT_ONCE), of: leaves.length });
+    emit({ looked: Math.min(leaves.length, i + LEAVES_AT_ONCE), of: leaves.length });
   }
   if (!ended()) {
     const { area, length } = segments.length ? measureOf(segments) : { area: 0, length: 0 };
-    tell({ segments: Float64Array.from(segments), area: info.solid ? area : undefined, length, faces: segments.length / 4, partial });
+    emit({ segments: Float64Array.from(segments), area: info.solid ? area : undefined, length, faces: segments.length / 4, partial });
   }
 }

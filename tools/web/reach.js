@@ -1,5 +1,5 @@
 // Computes in the worker which faces a point of paint covers (format-spec/paint.md, section 4): the faces that are connected with the point's face inside the ball.
-import { GRAY, LEAF, cellNear, growForQuestion, nearestOnTriangle } from './reader/index.js';
+import { GRAY, LEAF, cellNear, growForQuery, nearestOnTriangle } from './reader/index.js';
 
 const FACES_MOST = 100_000;   // around a point; with more faces the whole ball is coloured
 const LEAVES_MOST = 20_000, LEAVES_AT_ONCE = 1024; // a ball may be as large as the model; the limit avoids fetching the whole model
@@ -16,7 +16,7 @@ async function leavesAround(file, tree, point, distance) {
     if (missing.some((node) => tree.isPruned(node)))
       return 'elsewhere';
     if (missing.length)
-      await growForQuestion(file, tree, missing);
+      await growForQuery(file, tree, missing);
     if (gray.some((node) => !tree.children(node)))
       return 'elsewhere';
     nodes = gray.flatMap((node) => tree.children(node)).filter(meets);

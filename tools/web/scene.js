@@ -172,12 +172,12 @@ export class Scene {
     this.redraw();
   }
 
-  get walls() {
-    return this.tiles.walls;
+  get cellFaces() {
+    return this.tiles.cellFaces;
   }
 
-  setWalls(walls) {
-    this.tiles.setWalls(walls);
+  setCellFaces(cellFaces) {
+    this.tiles.setCellFaces(cellFaces);
     this.redraw();
   }
 
@@ -232,7 +232,7 @@ export class Scene {
   /** Frees the memory of the graphics card. */
   end() {
     this.observer.disconnect();
-    cancelAnimationFrame(this.asked);
+    cancelAnimationFrame(this.requested);
     this.clear();
     this.controls.dispose();
     this.renderer.dispose();
@@ -240,12 +240,12 @@ export class Scene {
   }
 
   redraw() {
-    if (!this.asked)
-      this.asked = requestAnimationFrame(() => this.#draw());
+    if (!this.requested)
+      this.requested = requestAnimationFrame(() => this.#draw());
   }
 
   #draw() {
-    this.asked = undefined;
+    this.requested = undefined;
     this.controls.update(); // damping requests the next frame
     const distance = this.camera.position.length();
     this.camera.near = Math.max(0.0005, (distance - 1.05) * 0.5);
@@ -278,7 +278,7 @@ function pickAlong(ray, meshes, cut) {
   const { origin, direction } = ray.ray, o = origin.toArray(), d = direction.toArray();
   let enter = 0, leave = Infinity;
   for (let k = 0; cut && k < 3; k++) {
-    const [a, b] = [cut.low[k], cut.high[k]].map((wall) => (wall - o[k]) / (d[k] || 1e-30)).sort((x, y) => x - y);
+    const [a, b] = [cut.low[k], cut.high[k]].map((bound) => (bound - o[k]) / (d[k] || 1e-30)).sort((x, y) => x - y);
     enter = Math.max(enter, a);
     leave = Math.min(leave, b);
   }

@@ -152,7 +152,7 @@ export class Tiles {
   constructor(parent, { faces, wire, cells }, make = (geometry, material) => new THREE.Mesh(geometry, material)) {
     Object.assign(this, { parent, faces, wire, cells, make });
     this.byKey = new Map();
-    this.walls = true;
+    this.cellFaces = true;
   }
 
   /** Applies all changes of one pass together, so that no gap becomes visible. */
@@ -212,12 +212,12 @@ export class Tiles {
   }
 
   #range(tile) {
-    tile.mesh.geometry.setDrawRange(0, this.walls ? tile.all : tile.inner);
-    tile.mesh.visible = (this.walls ? tile.all : tile.inner) > 0;
+    tile.mesh.geometry.setDrawRange(0, this.cellFaces ? tile.all : tile.inner);
+    tile.mesh.visible = (this.cellFaces ? tile.all : tile.inner) > 0;
   }
 
-  setWalls(walls) {
-    this.walls = walls;
+  setCellFaces(cellFaces) {
+    this.cellFaces = cellFaces;
     this.byKey.forEach((tile) => this.#range(tile));
   }
 

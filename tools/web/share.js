@@ -3,7 +3,7 @@ import { boxOf, boxText, cameraOf, cameraText, clipOf, clipText, pointsOf, point
 import { $, state } from './state.js';
 
 const LATER_MS = 300; // browsers reject changes of the address that are too frequent
-const OF_A_VIEW = ['view', 'level', 'clip', 'box', 'point', 'measure', 'colour', 'walls', 'detail'];
+const OF_A_VIEW = ['view', 'level', 'clip', 'box', 'point', 'measure', 'colour', 'cell-faces', 'detail'];
 
 const files = []; // files from disk, by their number in the history's entries
 let timer, home, picture;
@@ -31,13 +31,13 @@ export function pushStep(what) {
 export const fileOfEntry = (query, entry) => (entry?.local !== undefined ? files[entry.local] : query.get('file') ?? undefined);
 
 /**
- * Returns the parameters of an address about the open file: { camera, level, clip, box, point, measured, colouring, walls, detail }. Missing parameters are undefined,
+ * Returns the parameters of an address about the open file: { camera, level, clip, box, point, measured, colouring, cellFaces, detail }. Missing parameters are undefined,
  * except for the last three, which have defaults.
  */
 export function viewParameters(query) {
   const one = (name) => pointsOf(query.get(name))?.[0], level = query.get('level');
   return { camera: cameraOf(query.get('view')), level: /^\d+$/.test(level ?? '') ? Number(level) : undefined, clip: clipOf(query.get('clip')), box: boxOf(query.get('box')),
-    point: one('point'), measured: pointsOf(query.get('measure')), colouring: query.get('colour') ?? 'plain', walls: query.get('walls') !== '0', detail: query.get('detail') ?? 'auto' };
+    point: one('point'), measured: pointsOf(query.get('measure')), colouring: query.get('colour') ?? 'plain', cellFaces: query.get('cell-faces') !== '0', detail: query.get('detail') ?? 'auto' };
 }
 
 /** Returns the address of the current view. */
@@ -46,7 +46,7 @@ export function address() {
   const points = (list) => (list?.length ? pointsText(list, diagonal) : undefined), unless = (value, defaultValue) => (value === defaultValue ? undefined : value);
   return withQuery(location.href, [['view', unless(view, home)], ['level', unless($('level').value, $('level').max)], ['clip', clipText(state.clip)], ['box', boxText(state.box)],
     ['point', points(state.probe && [state.probe.point])], ['measure', points(state.measured)], ['colour', unless(chosen('colouring'), 'plain')],
-    ['walls', $('walls').checked ? undefined : '0'], ['detail', unless($('detail').value, 'auto')]]);
+    ['cell-faces', $('cellFaces').checked ? undefined : '0'], ['detail', unless($('detail').value, 'auto')]]);
 }
 
 /** Schedules an update of the address after a change. */

@@ -23,7 +23,7 @@ export function addSharing({ address }) {
     setTimeout(() => (b.textContent = 'Copy'), 1500);
   }));
   button.onclick = () => {
-    const link = address(), query = new URL(link).searchParams, attributes = ['view', 'level', 'detail', 'clip', 'box', 'point', 'colour', 'walls'].filter((name) => query.has(name));
+    const link = address(), query = new URL(link).searchParams, attributes = ['view', 'level', 'detail', 'clip', 'box', 'point', 'colour', 'cell-faces'].filter((name) => query.has(name));
     const local = typeof state.what !== 'string';
     $('shareHint').textContent = local ? 'This file is on this computer. To share the view, put the file on a server and give its address in ?file=.' : '';
     $('shareLink').value = link;

@@ -29,6 +29,6 @@ const listeners = new Map();
 export function on(name, listener) {
   listeners.set(name, [...(listeners.get(name) ?? []), listener]);
 }
-export function tell(name, news) {
+export function emit(name, news) {
   listeners.get(name)?.forEach((listener) => listener(news));
 }

@@ -67,8 +67,8 @@ export function frameTook(ms, calls) {
 
 export const frameMs = () => state.frames.reduce((a, b) => a + b, 0) / Math.max(state.frames.length, 1);
 
-/** `walls`: true when cell faces are drawn. */
-export function showStats(walls) {
+/** `cellFaces`: true when cell faces are drawn. */
+export function showStats(cellFaces) {
   if (!state.info)
     return;
   const s = state.stats, t = state.traffic;
@@ -78,7 +78,7 @@ export function showStats(walls) {
   $('sLevels').textContent = state.depth < 0 ? '' : `0–${state.depth} of 0–${state.info.level_count - 1}`;
   if (s) {
     $('sNodes').textContent = count(s.nodes);
-    $('sTriangles').textContent = count(s.triangles - (walls ? 0 : s.wallTriangles));
+    $('sTriangles').textContent = count(s.triangles - (cellFaces ? 0 : s.cellFaceTriangles));
     $('sMesh').textContent = state.info.parts.has('mesh') ? count(s.meshTriangles) : 'not in the file';
   }
 }

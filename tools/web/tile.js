@@ -29,10 +29,10 @@ export class TileMaker {
   }
 
   /**
-   * Returns { key, position, tag, normal, index, inner, lines, cells, triangles, meshTriangles, wallTriangles }. The triangles of planes and faces are first in
-   * `index`. `walls`: from cell_faces.js; if undefined, all cell faces are drawn completely.
+   * Returns { key, position, tag, normal, index, inner, lines, cells, triangles, meshTriangles, cellFaceTriangles }. The triangles of planes and faces are first in
+   * `index`. `cellFaces`: from cell_faces.js; if undefined, all cell faces are drawn completely.
    */
-  make(key, nodes, want, walls) {
+  make(key, nodes, want, cellFaces) {
     this.vertices = this.inners = this.outers = this.lines = 0;
     this.wanted = want.lines;
     const coloured = this.colour || (this.mesh.coloured && nodes.some((node) => node.useMesh));
@@ -41,7 +41,7 @@ export class TileMaker {
       if (node.useMesh)
         meshTriangles += this.#addFaces(node);
       else
-        this.#addPolytope(node, walls);
+        this.#addPolytope(node, cellFaces);
     for (const node of nodes)
       if (node.useMesh)
         this.#forget(node);
@@ -51,7 +51,7 @@ export class TileMaker {
     return { key, position: this.position.slice(0, 3 * this.vertices), tag: this.tag.slice(0, 4 * this.vertices), normal: this.normal.slice(0, 2 * this.vertices),
       hue: coloured ? this.hue.slice(0, 4 * this.vertices) : undefined, index, inner: this.inners / 3,
       lines: want.lines ? this.line.slice(0, this.lines) : undefined, cells: want.cells ? this.#cells(nodes) : undefined,
-      triangles: index.length / 3, meshTriangles, wallTriangles: this.outers / 3 };
+      triangles: index.length / 3, meshTriangles, cellFaceTriangles: this.outers / 3 };
   }
 
   // Adds a vertex with the normal this.n. The length of the normal is its weight.
@@ -82,8 +82,8 @@ export class TileMaker {
     this.line[this.lines++] = b;
   }
 
-  #triangle(wall, a, b, c) {
-    const name = wall ? 'outer' : 'inner', count = wall ? 'outers' : 'inners', to = this[name] = grown(this[name], this[count] + 3);
+  #triangle(onCellFace, a, b, c) {
+    const name = onCellFace ? 'outer' : 'inner', count = onCellFace ? 'outers' : 'inners', to = this[name] = grown(this[name], this[count] + 3);
     to[this[count]++] = a;
     to[this[count]++] = b;
     to[this[count]++] = c;
@@ -91,12 +91,12 @@ export class TileMaker {
 
   // --- envelopes ---
 
-  #addPolytope(node, walls) {
+  #addPolytope(node, cellFaces) {
     const p = this.polytope(node), { low, size } = this.place(node), numbers = this.numbers ??= new Int32Array(256), seen = this.seen ??= [];
     this.field.enter(node);
     numbers.fill(-1, 0, p.vertices);
     for (let f = 0; f < p.faces; f++)
-      seen[f] = p.wall[f] && walls ? walls.seen(node, p, f) : undefined;
+      seen[f] = p.onCellFace[f] && cellFaces ? cellFaces.seen(node, p, f) : undefined;
     const colour = this.colour && this.colour(node);
     const make = (x, y, z) => {
       this.field.at(x, y, z, this.n);
@@ -108,10 +108,10 @@ export class TileMaker {
     const own = (v) => (numbers[v] < 0 ? numbers[v] = make(p.x[3 * v], p.x[3 * v + 1], p.x[3 * v + 2]) : numbers[v]);
     for (let f = 0; f < p.faces; f++)
       if (!seen[f])
-        this.#polygon(p.wall[f], p.first[f + 1] - p.first[f], (i) => own(p.corner[p.first[f] + i]));
+        this.#polygon(p.onCellFace[f], p.first[f + 1] - p.first[f], (i) => own(p.corner[p.first[f] + i]));
       else
         for (const piece of seen[f]) {
-          const axis = walls.sideOf(p, f) >> 1, at = walls.sideOf(p, f) & 1, corners = [];
+          const axis = cellFaces.sideOf(p, f) >> 1, at = cellFaces.sideOf(p, f) & 1, corners = [];
           for (let i = 0; i < piece.length; i += 2) {
             const x = [at, at, at];
             x[(axis + 1) % 3] = piece[i];
@@ -122,13 +122,13 @@ export class TileMaker {
         }
   }
 
-  #polygon(wall, corners, number) {
+  #polygon(onCellFace, corners, number) {
     const first = number(0);
     for (let i = 1; i + 1 < corners; i++)
-      this.#triangle(wall, first, number(i), number(i + 1));
+      this.#triangle(onCellFace, first, number(i), number(i + 1));
     for (let i = 0; this.wanted && i < corners; i++) {
       const a = number(i), b = number((i + 1) % corners);
-      if (a < b || wall)
+      if (a < b || onCellFace)
         this.#addLine(a, b);
     }
   }
@@ -210,7 +210,7 @@ export class TileMaker {
 export function planeVector(p, size) {
   const sum = [0, 0, 0, 0], n = [0, 0, 0], at = (v, k) => p.x[3 * v + k] * size[k];
   for (let f = 0; f < p.faces; f++) {
-    if (p.wall[f])
+    if (p.onCellFace[f])
       continue;
     const a = p.corner[p.first[f]];
     n[0] = n[1] = n[2] = 0;

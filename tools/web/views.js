@@ -1,6 +1,6 @@
 // Reads and writes files of saved views: JSON { ebpo_views: '1.0', model_sha256, model_name, views: [{ name, query }] }. `query` is the part of the page's address
 // that describes the view. Uses no DOM.
-const OF_A_VIEW = ['view', 'level', 'clip', 'box', 'point', 'measure', 'colour', 'walls', 'detail'];
+const OF_A_VIEW = ['view', 'level', 'clip', 'box', 'point', 'measure', 'colour', 'cell-faces', 'detail'];
 const VIEWS_MOST = 1000, NAME_MOST = 100, QUERY_MOST = 20_000, BYTES_MOST = 1 << 22;
 
 /** Returns the query of an address with only the parameters of the view. */

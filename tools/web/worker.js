@@ -1,12 +1,12 @@
 // Reads files, chooses nodes and builds tiles outside the page's thread.
-// The page sends 'open', 'close', 'end', 'view', 'probe', 'places', 'reach' and 'section'. It receives 'opened', 'located', 'tiles', 'loaded',
-// 'probed', 'places', 'section', 'idle' and 'failed'. Several files may be open: the member `file` of each message, 0 by default, names the file.
+// The page sends 'open', 'close', 'end', 'view', 'probe', 'positions', 'reach' and 'section'. It receives 'opened', 'located', 'tiles', 'loaded',
+// 'probed', 'positions', 'section', 'idle' and 'failed'. Several files may be open: the member `file` of each message, 0 by default, names the file.
 import { ZSTDDecoder } from './node_modules/zstddec/dist/zstddec.mjs'; // workers have no import maps
-import { placesOf, sectionOf } from './queries.js';
+import { positionsOf, sectionOf } from './queries.js';
 import { reachOf } from './reach.js';
 import { Cut } from './cut.js';
 import { fetchAfter, takeFirst } from './first_response.js';
-import { GRAY, Tree, UrlSource, distanceInterval, growForQuestion, growForView, inside, insideLeaf, loadZstd, nearestFace, openEbpo, sourceOf } from './reader/index.js';
+import { GRAY, Tree, UrlSource, distanceInterval, growForQuery, growForView, inside, insideLeaf, loadZstd, nearestFace, openEbpo, sourceOf } from './reader/index.js';
 
 const LINE_MS = 250;                      // interval between reports of progress to the page
 const TIMEOUT_MS = 20000;                 // longest time without a byte
@@ -160,12 +160,12 @@ class OpenFile {
   /** Classifies a point: first by the loaded levels, then exactly by the faces of the relevant leaves. */
   async probe(point) {
     const number = ++this.probes, { tree, file } = this, solid = tree.info.solid;
-    const answer = (more) => this.ended || number !== this.probes || post(this.slot, { type: 'probed', opening: this.number, point, solid, traffic: file.traffic, ...more });
+    const reply = (more) => this.ended || number !== this.probes || post(this.slot, { type: 'probed', opening: this.number, point, solid, traffic: file.traffic, ...more });
     const coarse = { depth: tree.depth, where: solid ? inside(tree, point).where : undefined, ...distanceInterval(tree, point) };
-    answer({ ...coarse, exact: false, done: !file.info.parts.has('mesh') });
+    reply({ ...coarse, exact: false, done: !file.info.parts.has('mesh') });
     if (!file.info.parts.has('mesh'))
       return;
-    const lean = tree.lean(), deeper = (nodes) => growForQuestion(file, lean, nodes);
+    const lean = tree.lean(), deeper = (nodes) => growForQuery(file, lean, nodes);
     let where;
     if (solid) {
       let found = inside(lean, point);
@@ -174,7 +174,7 @@ class OpenFile {
         found = inside(lean, point);
       }
       if (found.where === 'maybe' && lean.isPruned(found.node)) { // the file is a subset without data here
-        answer({ ...coarse, exact: false, done: true });
+        reply({ ...coarse, exact: false, done: true });
         return;
       }
       where = found.where === 'maybe' ? insideLeaf(lean, found.node, point, (await file.leafFaces([found.node]))[0]).where : found.where;
@@ -185,29 +185,29 @@ class OpenFile {
     } catch (error) {
       if (error.code !== 'ABSENT')
         throw error;
-      answer({ ...coarse, where: where ?? coarse.where, exact: false, done: true });
+      reply({ ...coarse, where: where ?? coarse.where, exact: false, done: true });
       return;
     }
-    answer({ ...coarse, where, distance: near.distance, nearest: near.point, exact: true, done: true });
+    reply({ ...coarse, where, distance: near.distance, nearest: near.point, exact: true, done: true });
   }
 }
 
 // Evaluates longer queries one after the other. A newer section query cancels an older one.
-async function answer(data, slot, mine) {
+async function runQuery(data, slot, mine) {
   if (data.type === 'section') {
     const number = ++slot.sections, over = () => mine.ended || number !== slot.sections;
-    const tell = (news) => over() || post(slot, { type: 'section', opening: mine.number, axis: data.axis, at: data.at, traffic: mine.file.traffic, ...news });
-    await sectionOf(mine.file, mine.tree.lean(), data.axis, data.at, tell, over);
+    const emit = (news) => over() || post(slot, { type: 'section', opening: mine.number, axis: data.axis, at: data.at, traffic: mine.file.traffic, ...news });
+    await sectionOf(mine.file, mine.tree.lean(), data.axis, data.at, emit, over);
     return;
   }
-  const tell = (news) => mine.ended || post(slot, { type: 'places', opening: mine.number, id: data.id, ...news });
+  const emit = (news) => mine.ended || post(slot, { type: 'positions', opening: mine.number, id: data.id, ...news });
   try {
-    tell({ places: await (data.type === 'reach' ? reachOf : placesOf)(mine.file, mine.asked ??= mine.tree.lean(), data.points) });
+    emit({ positions: await (data.type === 'reach' ? reachOf : positionsOf)(mine.file, mine.queryTree ??= mine.tree.lean(), data.points) });
   } catch (error) {
-    tell({ error: describe(error) });
+    emit({ error: describe(error) });
   }
-  if ((mine.places = (mine.places ?? 0) + data.points.length) > PLACES_A_TREE)
-    mine.asked = mine.places = undefined; // frees the nodes that these queries loaded
+  if ((mine.queried = (mine.queried ?? 0) + data.points.length) > PLACES_A_TREE)
+    mine.queryTree = mine.queried = undefined; // frees the nodes that these queries loaded
 }
 
 // Reports progress to the page, and reports once when all requests have ended.
@@ -251,11 +251,11 @@ async function handle(data, slot) {
     Object.assign(slot, { view: data.view, want: data.want });
     if (ready)
       await current.pump();
-  } else if (['probe', 'places', 'reach', 'section'].includes(data.type) && data.opening === current?.number) {
+  } else if (['probe', 'positions', 'reach', 'section'].includes(data.type) && data.opening === current?.number) {
     await current.rooted; // queries may arrive before the first levels are loaded
     if (current.ended)
       return;
-    await (data.type === 'probe' ? current.probe(data.point) : answer(data, slot, current));
+    await (data.type === 'probe' ? current.probe(data.point) : runQuery(data, slot, current));
   }
 }
 

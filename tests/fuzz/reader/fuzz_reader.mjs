@@ -8,7 +8,7 @@
 import { readFileSync, writeFileSync } from 'node:fs';
 import { basename } from 'node:path';
 import { parseArgs } from 'node:util';
-import { queryAll, kinds } from './query_all.mjs';
+import { kinds, queryAll } from './query_all.mjs';
 import { changeHead, changeNumbers, changeBytes } from './mutate.mjs';
 
 const { values: option, positionals: files } = parseArgs({
@@ -64,8 +64,8 @@ async function damage(path) {
       return void count.refused++;
     const differ = kinds.filter((kind) => found[kind].said !== right[kind].said), wrong = differ.filter((kind) => !found[kind].error);
     count[wrong.length ? 'wrong' : differ.length ? 'noticed' : 'harmless']++;
-    const told = !summed && !found.verified && (way === 'swaps' || way === 'of another'); // of whole chunks only the checksum of the content can tell
-    if (wrong.length && !told && wrongs.push(at) <= 20)
+    const reported = !summed && !found.verified && (way === 'swaps' || way === 'of another'); // of whole chunks only the checksum of the content can detect the damage
+    if (wrong.length && !reported && wrongs.push(at) <= 20)
       console.log(`${name}: ${way}, byte ${at}: ${wrong.join(', ')}: wrong, and nothing is said`);
   };
   const bytes = Buffer.from(good);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Everything that can be asked of a file, each kind as a text of its answers or the reader's own error. Other errors are thrown.
+// Everything that can be queried in a file, each kind as a text of its results, or the reader's own error. Other errors are thrown.
 import { createHash } from 'node:crypto';
 import { EbpoError, Tree, distanceInterval, envelope, inside, insideLeaf, nearestFace, openEbpo } from '../../../tools/web/reader/index.js';
 
@@ -21,7 +21,7 @@ async function treeOf(file) {
   return tree;
 }
 
-const ask = {
+const evaluate = {
   facts: async (file) => Object.entries(file.info).filter(([name]) => !/^(chunk_index|top_bytes)/.test(name)),
   levels: async (file) => (await file.levels(0, file.info.level_count - 1, { faces: file.info.parts.has('mesh') })).map((l) => ({ ...l })),
   mesh: async (file) => (file.info.parts.has('mesh') ? file.mesh() : null),
@@ -59,7 +59,7 @@ const ask = {
     return all.map(({ level, part, segment }) => [level, part, [...segment.types]]);
   },
 };
-export const kinds = Object.keys(ask);
+export const kinds = Object.keys(evaluate);
 
 /** { open: error } or { [kind]: { said, error } }, and where the chunks are. */
 export async function queryAll(bytes) {
@@ -75,7 +75,7 @@ export async function queryAll(bytes) {
   const out = { chunks: [...file.arrays.values()].flatMap(({ path, chunks }) => chunks.map(({ at, bytes: size }, chunk) => ({ path, chunk, at, bytes: size }))) };
   for (const kind of kinds)
     try {
-      out[kind] = { said: digest(await ask[kind](file)), error: false };
+      out[kind] = { said: digest(await evaluate[kind](file)), error: false };
     } catch (error) {
       if (!(error instanceof EbpoError))
         throw error;

@@ -1,7 +1,7 @@
 // The pen: paints and erases with mouse, finger or stylus; layers; undo; save and open.
-import { complain, make, modelName, placesOf, reachOf, save, section, take, taken } from '../parts.js';
+import { complain, make, modelName, positionsOf, reachOf, save, section, take, taken } from '../parts.js';
 import { kit } from '../scene.js';
-import { $, length, on, state, tell, toModel, toScene } from '../state.js';
+import { $, emit, length, on, state, toModel, toScene } from '../state.js';
 import { Decals } from './decals.js';
 import { PaintDocument, identityOf, misfit } from './document.js';
 import { MOST, cleanText, readPaint, writePaint } from './paint_file.js';
@@ -25,17 +25,17 @@ const FULL_SIZE = 32768, AT_ONCE = 200;
 
 export function addPen({ scene, worker, query }, pipeline) {
   const decals = pipeline.layers = new Decals(kit), docs = new Map(), reaches = new WeakMap(); // documents by a model's digest; { normal, faces } by a point of a document
-  let doc, layer = 0, stroke, pending = 0, unsettled = 0, details, asked = 0;
+  let doc, layer = 0, stroke, pending = 0, unsettled = 0, details, requested = 0;
   const colour = () => [1, 3, 5].map((i) => parseInt($('penColour').value.slice(i, i + 2), 16));
   const radius = () => NARROW * (WIDE / NARROW) ** ($('penSize').value / 100) / state.scene.scale;
-  const askPlaces = (points) => {
+  const positionsOfPoints = (points) => {
     if (!state.info.parts.has('mesh'))
       throw new Error('the file has no faces to paint on; convert the model with its mesh');
-    return placesOf(worker, points);
+    return positionsOf(worker, points);
   };
 
   // Returns the document with functions for other modules of the page.
-  const drawing = () => Object.assign(doc, { placesOf: askPlaces, layerForNew() {
+  const drawing = () => Object.assign(doc, { positionsOf: positionsOfPoints, layerForNew() {
     if (!doc.state.layers.length)
       doc.addLayer({});
     return layer;
@@ -60,7 +60,7 @@ export function addPen({ scene, worker, query }, pipeline) {
     $('penRedo').disabled = !doc.future.length;
     showLayers();
     draw();
-    tell('drawing');
+    emit('drawing');
   }
 
   // Waits until the positions of all strokes have arrived, then makes a change. Undo then reverts the last visible stroke, and no layer is removed before its stroke.
@@ -163,7 +163,7 @@ export function addPen({ scene, worker, query }, pipeline) {
     pending++;
     unsettled++;
     try {
-      const settled = done.settled(await askPlaces(done.points.map((p) => p.place)));
+      const settled = done.settled(await positionsOfPoints(done.points.map((p) => p.place)));
       if (opening === state.opening && settled.points.length) {
         await findReach([settled], () => opening === state.opening);
         doc.addStroke(settled);
@@ -188,7 +188,7 @@ export function addPen({ scene, worker, query }, pipeline) {
   async function openBytes(name, bytes) {
     if (!doc.isSaved && !confirm('The paint and notes on this page are not saved. Replace them with the other file?'))
       return;
-    const mine = ++asked;
+    const mine = ++requested;
     pending++;
     try {
       const file = readPaint(bytes), why = misfit(file, state.info);
@@ -196,9 +196,9 @@ export function addPen({ scene, worker, query }, pipeline) {
         throw new Error(why);
       doc.take(file);
       details.open = true;
-      await checkPlaces(file, () => mine === asked && doc.state.strokes === file.strokes);
+      await checkPlaces(file, () => mine === requested && doc.state.strokes === file.strokes);
     } catch (error) {
-      if (mine === asked)
+      if (mine === requested)
         complain(`${name}: ${error.message}`);
     }
     pending--;
@@ -232,7 +232,7 @@ export function addPen({ scene, worker, query }, pipeline) {
   }
 
   function fresh() {
-    asked++;
+    requested++;
     const key = state.info && identityOf(state.info).model; // the paint of models that were opened earlier is kept
     doc = docs.get(key) ?? new PaintDocument(state.info ?? { parts: new Set() }, `${modelName()}.ebpo.h5`, changed);
     if (key)
@@ -249,10 +249,10 @@ export function addPen({ scene, worker, query }, pipeline) {
     if (!wanted || !state.info || doc.past.length || doc.state.strokes.length)
       return;
     try {
-      const answer = await fetch(new URL(wanted, location.href));
-      if (!answer.ok)
-        throw new Error(`the server returned ${answer.status}; check the address`);
-      const bytes = new Uint8Array(await answer.arrayBuffer());
+      const response = await fetch(new URL(wanted, location.href));
+      if (!response.ok)
+        throw new Error(`the server returned ${response.status}; check the address`);
+      const bytes = new Uint8Array(await response.arrayBuffer());
       if (opening === state.opening) // unless another model was opened meanwhile
         await openBytes(wanted, bytes);
     } catch (error) {

@@ -4,7 +4,7 @@ import { formatError } from './error.js';
 const WHERE = '/chunk_sums';
 
 /** Decodes the chunk checksums. `rows`: for each chunk, its checksum and its array's number; `arrays`: the file's arrays. Returns Map(array, Uint32Array of checksums). */
-export function readSums(rows, arrays) {
+export function readChecksums(rows, arrays) {
   const numbers = new Map(), out = new Map();
   for (let begin = 0, end; begin < rows.length; begin = end) {
     const number = rows[begin + 1];

@@ -3,7 +3,7 @@ import { formatError } from './error.js';
 import { LEVELS_MAX, LEVEL_ARRAY_COUNT, PLACES } from './facts.js';
 
 /** Returns the number of an array in the directory. `order`: the array's index in its level. */
-export function placeNumber(path, level, order) {
+export function arrayNumber(path, level, order) {
   const [, attribute] = /^\/attributes\/(\d{3})$/.exec(path) ?? [];
   return attribute ? 8192 + 2 * Number(attribute) : level === undefined ? ROOT_NUMBERS[path] : 64 * level + order;
 }
@@ -19,13 +19,13 @@ function isArray(number) {
 }
 
 /** Returns true when a list of all chunks is valid. A program that rewrites the file may keep an old list, which is then invalid. */
-export function placesHold(places, size) {
-  const { attributes } = places.object, stated = (name) => {
+export function isListValid(list, size) {
+  const { attributes } = list.object, stated = (name) => {
     const a = attributes.get(name);
     return a?.type?.class === 'integer' && a.type.size === 8 && !a.type.signed && a.type.little && a.data.length >= 8
       ? Number(new DataView(a.data.buffer, a.data.byteOffset, 8).getBigUint64(0, true)) : undefined;
   };
-  return stated('file_bytes') === size && places.chunks !== undefined && stated('offset') === places.chunks[0].at;
+  return stated('file_bytes') === size && list.chunks !== undefined && stated('offset') === list.chunks[0].at;
 }
 
 // Returns the offset of the first chunk in the directory, from the header of a level-0 array, which has a single chunk.
@@ -41,7 +41,7 @@ function begin(rows, byNumber) {
 }
 
 /** Decodes the chunk directory. `rows`: for each chunk, its size in bytes and the number of its array; `arrays`: all arrays except the lists. Returns Map(array, [{ at, bytes }]). */
-export function readPlaces(rows, arrays, size) {
+export function readDirectory(rows, arrays, size) {
   const byNumber = new Map(), out = new Map();
   for (const array of arrays) {
     byNumber.set(array.number, array);

@@ -7,10 +7,10 @@ const VERTICES = 192, FACES = 96, CORNERS = 576;
 
 /**
  * A polytope in cell coordinates, 0 to 1 on each axis. `x`: three numbers for each vertex. Polygon f has the vertices corner[first[f]] to
- * corner[first[f + 1] - 1], counter-clockwise as seen from outside. wall[f] is 1 when polygon f is on a cell face.
- * @typedef {{ vertices: number, faces: number, x: Float64Array, first: Uint16Array, corner: Uint8Array, wall: Uint8Array }} Polytope
+ * corner[first[f + 1] - 1], counter-clockwise as seen from outside. onCellFace[f] is 1 when polygon f is on a cell face.
+ * @typedef {{ vertices: number, faces: number, x: Float64Array, first: Uint16Array, corner: Uint8Array, onCellFace: Uint8Array }} Polytope
  */
-const room = () => ({ vertices: 0, faces: 0, x: new Float64Array(3 * VERTICES), first: new Uint16Array(FACES + 1), corner: new Uint8Array(CORNERS), wall: new Uint8Array(FACES) });
+const room = () => ({ vertices: 0, faces: 0, x: new Float64Array(3 * VERTICES), first: new Uint16Array(FACES + 1), corner: new Uint8Array(CORNERS), onCellFace: new Uint8Array(FACES) });
 
 function copy(to, from) {
   to.vertices = from.vertices;
@@ -18,7 +18,7 @@ function copy(to, from) {
   to.x.set(from.x.subarray(0, 3 * from.vertices));
   to.first.set(from.first.subarray(0, from.faces + 1));
   to.corner.set(from.corner.subarray(0, from.first[from.faces]));
-  to.wall.set(from.wall.subarray(0, from.faces));
+  to.onCellFace.set(from.onCellFace.subarray(0, from.faces));
 }
 
 /** The whole cell. In the index of a vertex, bit 0 is x, bit 1 is y, bit 2 is z. */
@@ -27,7 +27,7 @@ const CUBE = {
   x: Float64Array.of(0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0, 0, 0, 1, 1, 0, 1, 0, 1, 1, 1, 1, 1),
   first: Uint16Array.of(0, 4, 8, 12, 16, 20, 24),
   corner: Uint8Array.of(0, 4, 6, 2, 1, 3, 7, 5, 0, 1, 5, 4, 2, 6, 7, 3, 0, 2, 3, 1, 4, 5, 7, 6),
-  wall: new Uint8Array(6).fill(1),
+  onCellFace: new Uint8Array(6).fill(1),
 };
 export const cube = () => CUBE;
 
@@ -84,7 +84,7 @@ function addCorner(start, v) {
     spare.corner[corners++] = v;
 }
 
-function closeFace(start, wall) {
+function closeFace(start, onCellFace) {
   while (corners > start + 1 && spare.corner[corners - 1] === spare.corner[start])
     corners--;
   if (corners - start < 3 || spare.faces === FACES) {
@@ -92,7 +92,7 @@ function closeFace(start, wall) {
     corners = start;
     return;
   }
-  spare.wall[spare.faces] = wall;
+  spare.onCellFace[spare.faces] = onCellFace;
   spare.first[spare.faces++] = start;
   spare.first[spare.faces] = corners;
 }
@@ -111,7 +111,7 @@ function clipFace(f) {
     if (aOut !== bOut)
       addCorner(start, aOut ? crossing(b, a) : crossing(a, b));
   }
-  closeFace(start, at.wall[f]);
+  closeFace(start, at.onCellFace[f]);
   for (let i = start; i < corners; i++) {
     const a = spare.corner[i], b = spare.corner[i + 1 < corners ? i + 1 : start];
     if (on[a] && on[b]) {
@@ -122,7 +122,7 @@ function clipFace(f) {
 }
 
 // Rim edges used in both directions are between two kept polygons. The other rim edges, reversed, bound the cap.
-function closeCap(wall) {
+function closeCap(onCellFace) {
   let open = 0, begin = -1;
   next.fill(-1, 0, spare.vertices);
   for (let i = 0; i < rims; i++) {
@@ -147,7 +147,7 @@ function closeCap(wall) {
   } while (v !== -1 && v !== begin && steps <= open);
   if (v !== begin || steps !== open)
     return false;
-  closeFace(start, wall);
+  closeFace(start, onCellFace);
   return true;
 }
 
@@ -155,7 +155,7 @@ function closeCap(wall) {
  * Clips `at` to n . x <= d. Returns false when almost nothing would remain, memory is too small, or rounding broke the loops. The polytope is
  * then unchanged: it may be too large, but is never too small.
  */
-function clip(nx, ny, nz, d, wall) {
+function clip(nx, ny, nz, d, onCellFace) {
   let most = -Infinity, least = Infinity;
   for (let i = 0; i < at.vertices; i++) {
     const e = dist[i] = nx * at.x[3 * i] + ny * at.x[3 * i + 1] + nz * at.x[3 * i + 2] - d;
@@ -173,7 +173,7 @@ function clip(nx, ny, nz, d, wall) {
       number[i] = addVertex(at.x[3 * i], at.x[3 * i + 1], at.x[3 * i + 2], dist[i] >= -TOLERANCE ? 1 : 0);
   for (let f = 0; f < at.faces && !full; f++)
     clipFace(f);
-  if (full || !closeCap(wall) || full || spare.faces < 4)
+  if (full || !closeCap(onCellFace) || full || spare.faces < 4)
     return false;
   [at, spare] = [spare, at];
   return true;
@@ -202,7 +202,7 @@ export function envelope(parent, octant, codes) {
     clip(n[0] * (1 / 511), n[1] * (1 / 511), n[2] * (1 / 511), d * (1 / (511 * 4096)), 0);
   }
   return { vertices: at.vertices, faces: at.faces, x: at.x.slice(0, 3 * at.vertices), first: at.first.slice(0, at.faces + 1),
-    corner: at.corner.slice(0, at.first[at.faces]), wall: at.wall.slice(0, at.faces) };
+    corner: at.corner.slice(0, at.first[at.faces]), onCellFace: at.onCellFace.slice(0, at.faces) };
 }
 
 /** Returns the volume in units of the cell's volume. */

@@ -7,7 +7,7 @@ import { GATES_COLS } from './gates.js';
 import { Hdf5, NeedBytes } from './hdf5.js';
 import { checkIndexes, checkLevel, checkOrder, decodeFaces, decodeLeaves, decodeMap, decodeVertices, recode } from './decode.js';
 import { Parts } from './parts.js';
-import { placeNumber, placesHold, readPlaces } from './chunk_directory.js';
+import { arrayNumber, isListValid, readDirectory } from './chunk_directory.js';
 import { sourceOf } from './source.js';
 import { Store, everyChunk } from './store.js';
 
@@ -174,18 +174,18 @@ export class EbpoFile {
   async locate() {
     if (this.located)
       return;
-    this.locating ??= this.#readPlaces().then((found) => found || this.#readIndex()).finally(() => (this.locating = undefined));
+    this.locating ??= this.#readDirectory().then((found) => found || this.#readIndex()).finally(() => (this.locating = undefined));
     await this.locating;
   }
 
-  async #readPlaces() {
+  async #readDirectory() {
     const places = this.arrays.get(PLACES);
-    if (!places || !placesHold(places, this.source.size))
+    if (!places || !isListValid(places, this.source.size))
       return false;
     try {
       const [bytes] = await Promise.all(this.store.cache.decoded([{ array: places, chunk: 0 }]));
       const others = [...this.arrays.values()].filter((a) => !a.list);
-      for (const [array, chunks] of readPlaces(new Uint32Array(bytes.buffer, bytes.byteOffset, bytes.length / 4), others, this.source.size))
+      for (const [array, chunks] of readDirectory(new Uint32Array(bytes.buffer, bytes.byteOffset, bytes.length / 4), others, this.source.size))
         if (!array.chunks)
           place(array, chunks);
       this.#checkRoom();
@@ -569,7 +569,7 @@ function describe(hdf5, wanted, linked, address, info) {
   const storedRow = elementSize * Math.max(gates ? GATES_COLS : cols, 1), whole = fit * storedRow;
   if (whole > (isList(path) ? Math.min(LIST_BYTES_MOST, 2 * hdf5.size) : CHUNK_BYTES_MAX))
     throw formatError(path, "the array's chunks do not have the size that the format requires");
-  return { path, number: placeNumber(path, wanted.level, wanted.order), level: wanted.level, name: wanted.name, rows, cols,
+  return { path, number: arrayNumber(path, wanted.level, wanted.order), level: wanted.level, name: wanted.name, rows, cols,
     elementSize: gates ? 4 : elementSize, signed: o.type.signed, chunkRows: fit, chunkCount: Math.ceil(rows / fit), chunkMost: chunkBound(whole), gates,
     stored: { elementSize, rowBytes: storedRow }, rowBytes: gates ? 4 * cols : storedRow, pipeline,
     list: isList(path), object: o, indexed: o.layout.index !== 1, chunks: undefined, bytes: undefined };

@@ -60,7 +60,7 @@ async function affordable(file, parts, bytes) {
 }
 
 /** Loads nodes for exact queries, without planes; in files with subtrees also loads the faces. `tree` is a tree without planes. */
-export async function growForQuestion(file, tree, nodes) {
+export async function growForQuery(file, tree, nodes) {
   const { info } = tree, C = info.subtree_level, whole = [], parts = new Map(), subtrees = new Set();
   for (const node of nodes)
     if (C !== undefined && node.level >= C)

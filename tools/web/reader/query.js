@@ -14,7 +14,7 @@ function beyondPlanes(tree, node, p) {
   const codes = tree.planes(node);
   if (!codes.length)
     return false;
-  const xi = [0, 1, 2].map((k) => (p[k] - tree.wall(node, k, 0)) / tree.size(node, k));
+  const xi = [0, 1, 2].map((k) => (p[k] - tree.cellFace(node, k, 0)) / tree.size(node, k));
   for (const code of codes) {
     const { n, d } = decodePlane(code);
     if (4096 * (n[0] * xi[0] + n[1] * xi[1] + n[2] * xi[2]) > d + 1e-6)
@@ -24,7 +24,7 @@ function beyondPlanes(tree, node, p) {
 }
 
 function inRoot(tree, p) {
-  return [0, 1, 2].every((k) => p[k] >= tree.wall(tree.root, k, 0) && p[k] <= tree.wall(tree.root, k, 1));
+  return [0, 1, 2].every((k) => p[k] >= tree.cellFace(tree.root, k, 0) && p[k] <= tree.cellFace(tree.root, k, 1));
 }
 
 /**
@@ -45,7 +45,7 @@ export function inside(tree, p, deepest = tree.depth) {
     const children = node.level < deepest ? tree.children(node) : undefined;
     if (!children)
       return { where: 'maybe', node };
-    node = children[[0, 1, 2].reduce((o, k) => o | (p[k] >= tree.wall(node, k, 0) + tree.size(node, k) / 2) << k, 0)];
+    node = children[[0, 1, 2].reduce((o, k) => o | (p[k] >= tree.cellFace(node, k, 0) + tree.size(node, k) / 2) << k, 0)];
   }
 }
 
@@ -55,7 +55,7 @@ export function inside(tree, p, deepest = tree.depth) {
  */
 export function insideLeaf(tree, leaf, p, faces) {
   const corner = (i, k) => faces.subarray(9 * i + 3 * k, 9 * i + 3 * k + 3);
-  const at = [0, 1, 2].map((k) => tree.wall(leaf, k, 0));
+  const at = [0, 1, 2].map((k) => tree.cellFace(leaf, k, 0));
   let winding = tree.winding(leaf);
   for (let i = 0; i < faces.length / 9; i++)
     if (onTriangle(p, corner(i, 0), corner(i, 1), corner(i, 2)))
@@ -72,7 +72,7 @@ export function insideLeaf(tree, leaf, p, faces) {
 export function cellNear(tree, node, p) {
   let sum = 0;
   for (let k = 0; k < 3; k++) {
-    const d = Math.max(tree.wall(node, k, 0) - p[k], p[k] - tree.wall(node, k, 1), 0);
+    const d = Math.max(tree.cellFace(node, k, 0) - p[k], p[k] - tree.cellFace(node, k, 1), 0);
     sum += d * d;
   }
   return Math.sqrt(sum) * LESS;
@@ -82,7 +82,7 @@ export function cellNear(tree, node, p) {
 function cellFar(tree, node, p) {
   let sum = 0, size = 0;
   for (let k = 0; k < 3; k++) {
-    const d = Math.max(Math.abs(p[k] - tree.wall(node, k, 0)), Math.abs(p[k] - tree.wall(node, k, 1)));
+    const d = Math.max(Math.abs(p[k] - tree.cellFace(node, k, 0)), Math.abs(p[k] - tree.cellFace(node, k, 1)));
     sum += d * d;
     size += tree.size(node, k) ** 2;
   }

@@ -237,7 +237,7 @@ export class UrlSource {
   // Returns the cache mode of a request. Continued transfers do not use the cache, because Chromium would request their bytes twice. Only one request at a time
   // uses the cache, because Chromium runs cached requests of one address one after the other.
   #cacheMode(transfer, first) {
-    return first ? 'no-cache' : this.tag === null || transfer.asked || this.byCache ? 'no-store' : 'default';
+    return first ? 'no-cache' : this.tag === null || transfer.requested || this.byCache ? 'no-store' : 'default';
   }
 
   async #once(transfer, first, cache = this.#cacheMode(transfer, first)) {
@@ -253,7 +253,7 @@ export class UrlSource {
     alive();
     const transient = (what, next, cause) => Object.assign(this.#fail(what, next, cause), { again: true });
     this.requests++;
-    transfer.asked = true;
+    transfer.requested = true;
     this.byCache += cache === 'no-store' ? 0 : 1;
     this.running.set(transfer, abort);
     try {
@@ -343,7 +343,7 @@ export class UrlSource {
   }
 
   #noRanges(size) {
-    return this.#fail(`the server does not serve ranges, and the file has ${size}`, 'use a server that answers 206, or download the file and open it from disk');
+    return this.#fail(`the server does not serve ranges, and the file has ${size}`, 'use a server that returns status 206, or download the file and open it from disk');
   }
 
   // Reads and counts the body. Throws when it is longer than stated.

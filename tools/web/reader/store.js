@@ -4,8 +4,8 @@ import { decodeColours } from './colours.js';
 import { decodeFaces, decodeMapChunk, decodeVertices } from './decode.js';
 import { formatError } from './error.js';
 import { CHUNK_SUMS } from './facts.js';
-import { placesHold } from './chunk_directory.js';
-import { readSums } from './chunk_checksums.js';
+import { isListValid } from './chunk_directory.js';
+import { readChecksums } from './chunk_checksums.js';
 
 export class Store {
   /** `arrays`: descriptions by path (file.js). The chunks of requested arrays must be known. */
@@ -21,16 +21,16 @@ export class Store {
    */
   sums() {
     const list = this.arrays.get(CHUNK_SUMS);
-    if (!list || !placesHold(list, this.cache.source.size))
+    if (!list || !isListValid(list, this.cache.source.size))
       return Promise.resolve(undefined);
-    this.ends ??= this.#readSums(list);
+    this.ends ??= this.#readChecksums(list);
     this.ends.catch(() => (this.ends = undefined)); // the next call tries again
     return this.ends;
   }
 
-  async #readSums(list) {
+  async #readChecksums(list) {
     const [bytes] = await Promise.all(this.cache.decoded([{ array: list, chunk: 0 }]));
-    const sums = readSums(new Uint32Array(bytes.buffer, bytes.byteOffset, bytes.length / 4), [...this.arrays.values()].filter((a) => !a.list));
+    const sums = readChecksums(new Uint32Array(bytes.buffer, bytes.byteOffset, bytes.length / 4), [...this.arrays.values()].filter((a) => !a.list));
     this.summed = true;
     this.cache.judgeEarly(sums);
     return sums;

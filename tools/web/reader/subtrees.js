@@ -65,8 +65,8 @@ export class Subtrees {
   /** Reads rows of the table. Resolves to a Map from the subtrees' numbers to SubtreeRow. */
   async rows(numbers) {
     const { cols, counts } = this, wanted = [...new Set(numbers.map((i) => Math.floor(i / counts.chunkRows)))];
-    const asked = this.store.cache.get(wanted.map((chunk) => ({ array: counts, chunk }))), mesh = this.info.parts.has('mesh');
-    const [index, values] = await Promise.all([this.#index(), asked, mesh && this.store.facesIndex()]); // facesIndex() is stored beside the index and will be needed for faces
+    const requested = this.store.cache.get(wanted.map((chunk) => ({ array: counts, chunk }))), mesh = this.info.parts.has('mesh');
+    const [index, values] = await Promise.all([this.#index(), requested, mesh && this.store.facesIndex()]); // facesIndex() is stored beside the index and will be needed for faces
     const chunks = new Map(wanted.map((chunk, i) => [chunk, values[i]])), out = new Map();
     for (const [chunk, rows] of chunks)
       if (!this.checked.has(chunk))

@@ -142,7 +142,7 @@ export class Tree {
   }
 
   /** Returns the exact coordinate of a cell face on an axis; `side`: 0 for the lower face, 1 for the upper face. */
-  wall(node, axis, side) {
+  cellFace(node, axis, side) {
     const { box_origin: origin, box_size: size } = this.info;
     return origin[axis] + (node.at[axis] + side) * (size[axis] / 2 ** node.level);
   }

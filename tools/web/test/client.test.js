@@ -20,7 +20,7 @@ globalThis.Worker = class {
 const { Client, Crew } = await import('../client.js');
 
 const client = (crew, heard = () => {}) => new Client({ crew, heard });
-const answer = (worker, file, opening, news) => worker.onmessage({ data: { file, opening, ...news } });
+const response = (worker, file, opening, news) => worker.onmessage({ data: { file, opening, ...news } });
 const OPENED = { type: 'opened', info: {}, scene: {}, size: 1 };
 
 test('files are shared among workers, and a worker ends with its last file', () => {
@@ -52,7 +52,7 @@ test('a failing worker is reported to all its files, and later files get another
   one.end();
   two.end();
   assert.equal(crew.workers.length, 1, 'the new one stays');
-  answer(workers[1], 2, 1, OPENED);
+  response(workers[1], 2, 1, OPENED);
   await there;
 });
 
@@ -60,20 +60,20 @@ test('each query gets a result or an error', async () => {
   workers.length = 0;
   const crew = new Crew({ most: 1 }), it = client(crew), open = async () => {
     const there = it.open('a.ebpo.h5');
-    answer(workers[0], 0, it.opening, OPENED);
+    response(workers[0], 0, it.opening, OPENED);
     await there;
-    return [it.probe([0, 0, 0]), it.places([[0, 0, 0]])];
+    return [it.probe([0, 0, 0]), it.positions([[0, 0, 0]])];
   };
-  let asked = await open();
-  answer(workers[0], 0, it.opening, { type: 'failed', late: true, error: { message: 'of the picture' } });
-  answer(workers[0], 0, it.opening, { type: 'places', id: it.asks, error: { code: 'NETWORK', message: 'no line' } });
-  answer(workers[0], 0, it.opening, { type: 'probed', done: true, where: 'in' });
-  assert.equal((await asked[0]).where, 'in');
-  await assert.rejects(asked[1], { code: 'NETWORK', message: 'no line' });
+  let requested = await open();
+  response(workers[0], 0, it.opening, { type: 'failed', late: true, error: { message: 'of the picture' } });
+  response(workers[0], 0, it.opening, { type: 'positions', id: it.queries, error: { code: 'NETWORK', message: 'no line' } });
+  response(workers[0], 0, it.opening, { type: 'probed', done: true, where: 'in' });
+  assert.equal((await requested[0]).where, 'in');
+  await assert.rejects(requested[1], { code: 'NETWORK', message: 'no line' });
   for (const over of [() => it.open('b.ebpo.h5').catch(() => {}), () => it.close(), () => it.end()]) {
-    asked = await open();
+    requested = await open();
     over();
-    for (const one of asked)
+    for (const one of requested)
       await assert.rejects(one, { name: 'AbortError' });
   }
 });

@@ -4,7 +4,7 @@ import { readFileSync } from 'node:fs';
 import test from 'node:test';
 import { Cut } from '../cut.js';
 import { MeshStore } from '../mesh.js';
-import { Walls, sidesOf, subtract } from '../cell_faces.js';
+import { CellFaces, sidesOf, subtract } from '../cell_faces.js';
 import { BLACK, GRAY, LEAF, Tree, openEbpo } from '../reader/index.js';
 
 const bytes = readFileSync(new URL('../../../format-spec/vectors/passed/06_four_levels_leaf_planes.ebpo.h5', import.meta.url));
@@ -59,7 +59,7 @@ test('triangles: plane polygons first, valid indices, cell faces counted', async
   const { cut } = await load(), { tiles, stats } = settle(cut, { ...all, lines: true, cells: true });
   for (const t of tiles.values()) {
     assert.equal(t.index.length, 3 * t.triangles);
-    assert.equal(t.inner, t.triangles - t.wallTriangles);
+    assert.equal(t.inner, t.triangles - t.cellFaceTriangles);
     assert.ok(t.index.every((i) => i < t.position.length / 3) && t.lines.every((i) => i < t.position.length / 3));
     assert.ok(t.position.every((x) => Math.abs(x) <= 1) && t.cells.every((x) => Math.abs(x) <= 1));
   }
@@ -142,7 +142,7 @@ test('subtracting a convex polygon: every point is in one piece or hidden', () =
 test('cell faces are hidden exactly where a neighbour covers them', async () => {
   const { tree, cut } = await load();
   settle(cut, { ...all, level: 3 });
-  const drawn = new Set(cut.nodes), walls = new Walls(tree, (n) => drawn.has(n), (n) => tree.polytope(n)), found = { seen: 0, hidden: 0 };
+  const drawn = new Set(cut.nodes), cellFaces = new CellFaces(tree, (n) => drawn.has(n), (n) => tree.polytope(n)), found = { seen: 0, hidden: 0 };
   const polygon = (p, f, axis) => Array.from({ length: p.first[f + 1] - p.first[f] }, (_, i) => [(axis + 1) % 3, (axis + 2) % 3].map((k) => p.x[3 * p.corner[p.first[f] + i] + k])).flat();
   const twin = (node, axis, side, u, v) => { // reference implementation: descends from the root to a point on the other side
     const x = node.at.map((n) => n / 2 ** node.level);
@@ -165,10 +165,10 @@ test('cell faces are hidden exactly where a neighbour covers them', async () => 
   for (const node of drawn) {
     const p = tree.polytope(node), sides = sidesOf(p);
     for (let f = 0; f < p.faces; f++) {
-      assert.equal(sides[f] >= 0, p.wall[f] === 1);
+      assert.equal(sides[f] >= 0, p.onCellFace[f] === 1);
       if (sides[f] < 0)
         continue;
-      const axis = sides[f] >> 1, own = polygon(p, f, axis), pieces = walls.seen(node, p, f) ?? [own];
+      const axis = sides[f] >> 1, own = polygon(p, f, axis), pieces = cellFaces.seen(node, p, f) ?? [own];
       for (let i = 0; i < 49; i++) {
         const u = (i % 7 + 0.5137) / 7, v = (Math.floor(i / 7) + 0.4871) / 7;
         if (!inside(own, u, v))

@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { readFileSync } from 'node:fs';
 import test from 'node:test';
-import { cutFaces, measureOf, placesOf, sectionOf, weightsOf } from '../queries.js';
+import { cutFaces, measureOf, positionsOf, sectionOf, weightsOf } from '../queries.js';
 import { Tree, openEbpo } from '../reader/index.js';
 
 // Returns a box as twelve faces, counter-clockwise as seen from outside.
@@ -60,12 +60,12 @@ test('sections of files agree with those of all faces; positions are on the sour
     assert.equal(last.faces, plain.length / 4);
     assert.ok(Math.abs(last.length - wanted.length) <= 1e-9 * wanted.length && Math.abs(last.area - wanted.area) <= 1e-9 * wanted.area, `${last.area} ${wanted.area}`);
 
-    const points = [[0.1, 0.2, 0.3], [0.9, 0.9, 0.1], [0.5, 0.5, 0.5]].map((s) => s.map((x, k) => info.box_origin[k] + x * info.box_size[k])), places = await placesOf(file, tree.lean(), points);
-    const { faceSource } = await file.maps(), answers = points.map((p) => JSON.parse(execFileSync(tool, ['distance', '--json', '--unsigned', path], { input: `${p.join(' ')}\n`, encoding: 'utf8' })));
+    const points = [[0.1, 0.2, 0.3], [0.9, 0.9, 0.1], [0.5, 0.5, 0.5]].map((s) => s.map((x, k) => info.box_origin[k] + x * info.box_size[k])), places = await positionsOf(file, tree.lean(), points);
+    const { faceSource } = await file.maps(), results = points.map((p) => JSON.parse(execFileSync(tool, ['distance', '--json', '--unsigned', path], { input: `${p.join(' ')}\n`, encoding: 'utf8' })));
     places.forEach(({ face, weights, place, distance }, i) => {
       const own = faceSource.indexOf(face), p = [0, 1, 2].map((k) => [2 ** 30 - weights[0] - weights[1], ...weights].reduce((sum, w, c) => sum + w / 2 ** 30 * all[9 * own + 3 * c + k], 0));
       assert.ok(own >= 0 && p.every((x, k) => Math.abs(x - place[k]) < 1e-6 * info.box_size[k]), `${path}: face ${face}`);
-      assert.ok(Math.abs(distance - answers[i].distance) < 1e-12);
+      assert.ok(Math.abs(distance - results[i].distance) < 1e-12);
     });
   }
 });

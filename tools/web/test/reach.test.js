@@ -92,7 +92,7 @@ test('covered faces agree with ebpo paint', { skip: process.env.EBPO_TOOL ? fals
 
 test('a ball as large as the model does not fetch the whole model', async () => {
   let looked = 0;
-  const node = { type: 3 }, endless = { root: node, wall: (_, k, upper) => upper, children: () => (looked++, Array(8).fill(node)), isPruned: () => false };
+  const node = { type: 3 }, endless = { root: node, cellFace: (_, k, upper) => upper, children: () => (looked++, Array(8).fill(node)), isPruned: () => false };
   const file = { info: { box_size: [1, 1, 1], parts: new Set() }, leafFaces: () => assert.fail('faces are fetched') };
   assert.deepEqual(await reachOf(file, endless, [{ face: 0, place: [0.5, 0.5, 0.5], radius: 1e300 }]), [{ here: 'no' }]);
   assert.ok(looked < 100_000, `${looked} nodes`);

@@ -111,11 +111,11 @@ test('an invalid file of poses is refused with the line number', async () => {
 });
 
 test('addresses name models and poses', async () => {
-  const asked = await wanted(new URLSearchParams('model=a/x.ebpo.h5&model=b/x.ebpo.h5&pose=1,2,3&pose=0,0,0,0,0,2,0,4&model=a/x.ebpo.h5&up=z'), 'https://example.org/v/');
-  assert.deepEqual(asked.models.map((m) => [m.name, m.file]), [['x', 'https://example.org/v/a/x.ebpo.h5'], ['x (2)', 'https://example.org/v/b/x.ebpo.h5']]);
-  assert.deepEqual(asked.instances.map((i) => [i.name, i.model]), [['x', 0], ['x (2)', 1], ['x (3)', 0]]);
-  assert.deepEqual([asked.up, asked.instances[0].pose.translation, asked.instances[1].pose.scale], [2, [1, 2, 3], 4]);
-  near(asked.instances[1].pose.rotation, [-1, 0, 0, 0, -1, 0, 0, 0, 1]);
+  const requested = await wanted(new URLSearchParams('model=a/x.ebpo.h5&model=b/x.ebpo.h5&pose=1,2,3&pose=0,0,0,0,0,2,0,4&model=a/x.ebpo.h5&up=z'), 'https://example.org/v/');
+  assert.deepEqual(requested.models.map((m) => [m.name, m.file]), [['x', 'https://example.org/v/a/x.ebpo.h5'], ['x (2)', 'https://example.org/v/b/x.ebpo.h5']]);
+  assert.deepEqual(requested.instances.map((i) => [i.name, i.model]), [['x', 0], ['x (2)', 1], ['x (3)', 0]]);
+  assert.deepEqual([requested.up, requested.instances[0].pose.translation, requested.instances[1].pose.scale], [2, [1, 2, 3], 4]);
+  near(requested.instances[1].pose.rotation, [-1, 0, 0, 0, -1, 0, 0, 0, 1]);
   assert.equal(await wanted(new URLSearchParams('file=x'), 'https://example.org/'), undefined);
   await assert.rejects(async () => wanted(new URLSearchParams('model=x&pose=1,2'), 'https://example.org/'), /pose=1,2/);
   for (const bad of ['model=javascript:alert(1)', 'model=http://[', 'scene=data:,x', 'scene=file:///s.json', new URLSearchParams(Array.from({ length: 101 }, () => ['model', 'x']))])

@@ -12,7 +12,7 @@ await import('../worker.js');
 globalThis.setInterval = usual;
 
 const file = new Blob([readFileSync(fileURLToPath(new URL('../../../format-spec/vectors/passed/16_many_subtrees.ebpo.h5', import.meta.url)))]);
-const tell = (data) => self.onmessage({ data });
+const emit = (data) => self.onmessage({ data });
 /** Resolves to the first message that fits. */
 const heard = (fits) => new Promise((done) => listeners.push(function listener(message) {
   if (!fits(message))
@@ -22,18 +22,18 @@ const heard = (fits) => new Promise((done) => listeners.push(function listener(m
 }));
 
 test('queries that arrive with the header are evaluated, each for its file', async () => {
-  const point = [100, 100, 100], answers = [1, 2].map((number) => heard((m) => m.file === number && m.type === 'probed' && m.done));
-  const places = heard((m) => m.file === 2 && m.type === 'places');
+  const point = [100, 100, 100], replies = [1, 2].map((number) => heard((m) => m.file === number && m.type === 'probed' && m.done));
+  const positions = heard((m) => m.file === 2 && m.type === 'positions');
   for (const number of [1, 2]) {
     listeners.push((m) => { // immediately, while the worker still waits for the first levels
       if (m.file === number && m.type === 'opened')
-        tell({ file: number, type: 'probe', opening: 5, point });
+        emit({ file: number, type: 'probe', opening: 5, point });
       if (m.file === 2 && number === 2 && m.type === 'opened')
-        tell({ file: 2, type: 'places', opening: 5, id: 9, points: [point] });
+        emit({ file: 2, type: 'positions', opening: 5, id: 9, points: [point] });
     });
-    tell({ file: number, type: 'open', opening: 5, what: file, ahead: 1 << 16 });
+    emit({ file: number, type: 'open', opening: 5, what: file, ahead: 1 << 16 });
   }
-  const [one, two] = await Promise.all(answers), { id, places: [place] } = await places;
+  const [one, two] = await Promise.all(replies), { id, positions: [place] } = await positions;
   listeners.length = 0;
   assert.deepEqual([one.opening, two.opening, one.where, id], [5, 5, 'out', 9]);
   assert.equal(one.distance, two.distance);
@@ -41,17 +41,17 @@ test('queries that arrive with the header are evaluated, each for its file', asy
 });
 
 test('a failed query is reported to its sender, and a closed file sends no more messages', async () => {
-  const wrong = heard((m) => m.file === 1 && m.type === 'places');
-  tell({ file: 1, type: 'places', opening: 5, id: 10, points: [undefined] });
+  const wrong = heard((m) => m.file === 1 && m.type === 'positions');
+  emit({ file: 1, type: 'positions', opening: 5, id: 10, points: [undefined] });
   const { id, error } = await wrong;
   assert.equal(id, 10);
   assert.ok(error.message);
   const late = [];
   listeners.push((m) => m.file === 2 && late.push(m));
-  const going = tell({ file: 2, type: 'places', opening: 5, id: 11, points: [[0, 0, 0], [1e5, 0, 0], [0, 1e5, 0]] });
+  const going = emit({ file: 2, type: 'positions', opening: 5, id: 11, points: [[0, 0, 0], [1e5, 0, 0], [0, 1e5, 0]] });
   for (let i = 0; i < 5; i++)
     await undefined; // the query has begun
-  tell({ file: 2, type: 'end' });
+  emit({ file: 2, type: 'end' });
   await going;
   assert.deepEqual(late, []);
 });

@@ -86,11 +86,11 @@ export function ofParts(parts, base) {
 
 // Fetches a text. `rest.bytes`: the number of bytes that the scene and its files of poses may still have together.
 async function textAt(url, get, rest) {
-  const answer = await get(url);
-  if (!answer.ok)
-    throw new Error(`${url.pathname}: the server returned ${answer.status}; check the address`);
+  const response = await get(url);
+  if (!response.ok)
+    throw new Error(`${url.pathname}: the server returned ${response.status}; check the address`);
   const parts = [];
-  for (const reader = answer.body.getReader(); ;) {
+  for (const reader = response.body.getReader(); ;) {
     const { done, value } = await reader.read();
     if (done)
       return new Blob(parts).text();

@@ -185,7 +185,7 @@ export class Assembly {
       });
       this.#fill(model);
     }
-    this.#ask(camera, height, want);
+    this.#request(camera, height, want);
   }
 
   #fill(model) {
@@ -204,8 +204,8 @@ export class Assembly {
     });
   }
 
-  #ask(camera, height, { pixels, triangles, mesh }) {
-    this.asked = true;
+  #request(camera, height, { pixels, triangles, mesh }) {
+    this.requested = true;
     const seen = this.models.filter((model) => model.info && model.shown.length);
     for (const model of seen) {
       const largest = model.shown.length > VIEWS_MOST ? [...model.shown].sort((a, b) => b.pixels - a.pixels).slice(0, VIEWS_MOST) : model.shown;
@@ -223,7 +223,7 @@ export class Assembly {
 
   /** Returns true when all visible instances have their final detail. */
   get idle() {
-    return this.asked === true && this.models.every((model) => model.error || !model.shown.length || model.idle);
+    return this.requested === true && this.models.every((model) => model.error || !model.shown.length || model.idle);
   }
 
   // --- how it looks ---
@@ -273,8 +273,8 @@ export class Assembly {
     return this.cut;
   }
 
-  setWalls(walls) {
-    this.models.forEach(({ tiles }) => tiles.setWalls(walls));
+  setCellFaces(cellFaces) {
+    this.models.forEach(({ tiles }) => tiles.setCellFaces(cellFaces));
   }
 
   // --- instances ---

@@ -9,7 +9,7 @@ import { Pipeline } from '../pipeline.js';
 import { kit } from '../scene.js';
 import { addSectionBox } from '../section_box.js';
 import { addShading, styled } from '../shading.js';
-import { $, count, length, on, state, tell, toScene } from '../state.js';
+import { $, count, emit, length, on, state, toScene } from '../state.js';
 import { cameraAt } from './scene_file.js';
 
 const TRIANGLES_MOST = 2_000_000, PIXELS = 12, LATER_MS = 300, NAMES_MOST = 300;
@@ -17,20 +17,20 @@ const HTML = `<div class="row" id="timeRow" hidden><button id="timePlay" class="
   aria-label="Time"><output id="timeText"></output></div>
   <div id="cameras" class="buttons"></div><ul id="models" class="list"></ul><div id="sceneLayers" class="toggles"></div>`;
 const CHOSEN = `<p class="hint" id="chosenHint">Click a model to select it and to query the point.</p><div id="chosen" hidden>
-  <div class="answer"><strong id="chosenName"></strong><span id="chosenModel"></span></div><dl id="chosenFacts" class="facts"></dl>
-  <div class="answer"><strong id="chosenWhere"></strong><span id="chosenNote"></span></div>
+  <div class="result"><strong id="chosenName"></strong><span id="chosenModel"></span></div><dl id="chosenFacts" class="facts"></dl>
+  <div class="result"><strong id="chosenWhere"></strong><span id="chosenNote"></span></div>
   <div class="buttons"><button id="chosenLook" class="small">Look at it</button><a id="chosenOpen" class="small">Open it alone</a></div></div>`;
 
-/** Shows several models. `page`: { scene, layout } of app.js; `asked`: the result of wanted() or ofFiles() of addresses.js. */
-export async function begin(page, asked) {
+/** Shows several models. `page`: { scene, layout } of app.js; `requested`: the result of wanted() or ofFiles() of addresses.js. */
+export async function begin(page, requested) {
   const { scene } = page;
   await styled();
-  return new Together(page, asked, scene).open();
+  return new Together(page, requested, scene).open();
 }
 
 class Together {
-  constructor(page, asked, scene) {
-    Object.assign(this, { page, asked, scene, hidden: new Set(), hiddenLayers: new Set() });
+  constructor(page, requested, scene) {
+    Object.assign(this, { page, requested, scene, hidden: new Set(), hiddenLayers: new Set() });
     this.query = new URLSearchParams(location.search);
     this.assembly = new Assembly({ changed: () => this.#soon(), news: () => this.#news(), failed: (model, error) => this.#failed(model, error) });
     this.assembly.setTheme(document.documentElement.dataset.theme !== 'light');
@@ -38,17 +38,17 @@ class Together {
   }
 
   async open() {
-    const { asked, assembly, scene } = this;
+    const { requested, assembly, scene } = this;
     document.documentElement.classList.add('together');
     $('start').hidden = true;
     document.documentElement.classList.add('opening');
-    $('openingName').textContent = asked.title;
-    $('openingText').textContent = `${count(asked.models.length)} models`;
+    $('openingName').textContent = requested.title;
+    $('openingText').textContent = `${count(requested.models.length)} models`;
     scene.scene.add(assembly.group);
     scene.others = assembly;
     let there = false;
     try {
-      there = await assembly.open(asked);
+      there = await assembly.open(requested);
     } finally {
       document.documentElement.classList.remove('opening');
       if (!there)
@@ -60,13 +60,13 @@ class Together {
     this.#build();
     this.#takeAddress();
     this.#soon();
-    tell('opened');
+    emit('opened');
     assembly.models.filter((m) => m.error).forEach((m) => this.#failed(m, m.error)); // shows errors again, now with a button to retry
   }
 
   // Sets the state that other modules of the page read.
   #opened() {
-    const { asked, assembly: { box, models, scene } } = this, unit = asked.unit ?? models.find((m) => m.info?.unit)?.info.unit;
+    const { requested, assembly: { box, models, scene } } = this, unit = requested.unit ?? models.find((m) => m.info?.unit)?.info.unit;
     state.scene = scene;
     state.info = { box_origin: box.origin, box_size: box.size, unit, parts: new Set(), levels: [], level_count: 0 };
   }
@@ -100,9 +100,9 @@ class Together {
   // --- panel ---
 
   #build() {
-    const { asked, assembly, scene, page } = this, faces = assembly.instances.reduce((sum, i) => sum + (assembly.models[i.model].info?.face_count ?? 0), 0);
-    document.title = `${asked.title} – EBP-Octree viewer`;
-    $('name').textContent = asked.title;
+    const { requested, assembly, scene, page } = this, faces = assembly.instances.reduce((sum, i) => sum + (assembly.models[i.model].info?.face_count ?? 0), 0);
+    document.title = `${requested.title} – EBP-Octree viewer`;
+    $('name').textContent = requested.title;
     $('facts').textContent = `${count(assembly.models.length)} models · ${count(assembly.instances.length)} instances · ${count(faces)} faces`;
     for (const id of ['panel', 'bar', 'tools'])
       $(id).hidden = id === 'panel' && innerWidth <= 760;
@@ -119,7 +119,7 @@ class Together {
     this.#times();
     $('ownRow').hidden = false;
     $('own').onchange = () => (assembly.setOwnColours($('own').checked), scene.redraw());
-    $('walls').onchange = () => (assembly.setWalls($('walls').checked), scene.redraw());
+    $('cellFaces').onchange = () => (assembly.setCellFaces($('cellFaces').checked), scene.redraw());
     $('colouring').onchange = () => (assembly.setColouring(document.querySelector('input[name=colouring]:checked').value), scene.redraw());
     $('detail').onchange = () => this.moved();
     $('chosenLook').onclick = () => this.#lookAt(assembly.chosen);
@@ -157,7 +157,7 @@ class Together {
   }
 
   #layers() {
-    const { layers = [] } = this.asked;
+    const { layers = [] } = this.requested;
     $('sceneLayers').replaceChildren(...layers.slice(0, NAMES_MOST).map((layer) => {
       const label = make('label', '', { className: 'switch' }), box = make('input', '', { type: 'checkbox', checked: !this.hiddenLayers.has(layer) });
       box.onchange = () => {
@@ -176,7 +176,7 @@ class Together {
   }
 
   #cameras() {
-    const { cameras = [] } = this.asked;
+    const { cameras = [] } = this.requested;
     $('cameras').replaceChildren(...cameras.slice(0, NAMES_MOST).map((camera) => {
       const go = make('button', camera.name, { className: 'small' });
       go.onclick = () => {
@@ -236,7 +236,7 @@ class Together {
   }
 
   async #choose(instance, point) {
-    const { assembly } = this, asks = this.asks = (this.asks ?? 0) + 1, model = instance && assembly.models[instance.model];
+    const { assembly } = this, queries = this.queries = (this.queries ?? 0) + 1, model = instance && assembly.models[instance.model];
     assembly.chosen = instance;
     this.point = point;
     this.near = undefined;
@@ -250,11 +250,11 @@ class Together {
     if (!point || !model.info)
       return;
     try {
-      const answer = await model.client.probe(point);
-      if (asks !== this.asks)
+      const response = await model.client.probe(point);
+      if (queries !== this.queries)
         return;
-      this.near = answer.nearest;
-      this.#showResult(model, answer, instance.now.scale);
+      this.near = response.nearest;
+      this.#showResult(model, response, instance.now.scale);
       this.#marks();
     } catch (error) {
       if (error.name !== 'AbortError')
@@ -293,7 +293,7 @@ class Together {
     const { picked, pickedCut } = this.scene, instance = picked && this.assembly.instanceOf(picked), model = instance && this.assembly.models[instance.model];
     if (!instance || pickedCut || !model.info.parts.has('mesh'))
       return point;
-    const [{ place }] = await model.client.places([this.assembly.inModel(instance, point)]);
+    const [{ place }] = await model.client.positions([this.assembly.inModel(instance, point)]);
     return this.assembly.inWorld(instance, place);
   }
 
@@ -349,7 +349,7 @@ class Together {
     this.scene.place = view ?? home;
     for (const name of names('hide')) {
       assembly.models.filter((m) => m.name === name).forEach((m) => (m.visible = false));
-      if (this.asked.layers?.includes(name))
+      if (this.requested.layers?.includes(name))
         this.hiddenLayers.add(name);
     }
     assembly.setColours(query.get('colours'));
@@ -374,7 +374,7 @@ class Together {
   }
 
   changed() {
-    if (!state.info || this.asked.local || this.playing) // browsers reject changes of the address that are too frequent
+    if (!state.info || this.requested.local || this.playing) // browsers reject changes of the address that are too frequent
       return;
     this.later ??= setTimeout(() => {
       this.later = undefined;

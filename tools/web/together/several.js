@@ -14,13 +14,13 @@ export class Several {
       failed: (model, { code = 'FORMAT', message }) => heard('failed', { error: { code, message: `${model.name}: ${message}` }, model: model.name }) });
   }
 
-  /** Opens models. `asked`: the result of wanted() or ofParts() of addresses.js. Resolves to `facts` when all headers have been read. */
-  async open(asked) {
-    const { assembly, scene } = this, there = await assembly.open(asked);
+  /** Opens models. `requested`: the result of wanted() or ofParts() of addresses.js. Resolves to `facts` when all headers have been read. */
+  async open(requested) {
+    const { assembly, scene } = this, there = await assembly.open(requested);
     if (this.ended)
       throw new DOMException('other models were opened', 'AbortError');
     if (!there)
-      throw new Error(`${asked.title}: no model could be opened; see the errors of the models`);
+      throw new Error(`${requested.title}: no model could be opened; see the errors of the models`);
     scene.scene.add(assembly.group);
     scene.others = assembly;
     this.moved();
@@ -81,7 +81,7 @@ export class Several {
   }
 
   /** Queries a point for one instance. Resolves to { point, instance, model, where, distance, nearest, lo, hi, exact }, in the scene's coordinates. */
-  async ask(point, name) {
+  async query(point, name) {
     const { assembly } = this, instance = assembly.instances.find((i) => i.name === name), model = instance && assembly.models[instance.model];
     if (!model?.info)
       throw new Error(`"${name}" is not an instance that is shown; name one of info.instances`);

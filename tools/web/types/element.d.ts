@@ -1,7 +1,7 @@
 // Types of "ebpo-viewer". Importing this module defines the element <ebpo-viewer>.
 
 /** Result of a point query. Distances are in the file's unit. */
-export interface PointAnswer {
+export interface PointResult {
   point: [number, number, number];
   /** Undefined for surfaces, which have no inside. */
   where?: 'in' | 'out' | 'on' | 'maybe';
@@ -55,7 +55,7 @@ export interface EbpoSceneInfo {
 }
 
 /** Result of a point query for one instance; `point` and `nearest` are in the scene's coordinates. */
-export interface ScenePointAnswer extends PointAnswer {
+export interface ScenePointResult extends PointResult {
   instance: string;
   model: string;
 }
@@ -70,11 +70,11 @@ export interface EbpoViewerEventMap extends Omit<HTMLElementEventMap, 'error' | 
   error: CustomEvent<{ code: string; message: string; model?: string }>;
   /** The camera has moved. */
   view: CustomEvent<{ view: string }>;
-  point: CustomEvent<PointAnswer | ScenePointAnswer>;
+  point: CustomEvent<PointResult | ScenePointResult>;
 }
 
 /**
- * Attributes for one model: src, view, level, detail, clip, box, point, colour, theme, walls, alt. For several models, <ebpo-part> children, or scene, up and remote
+ * Attributes for one model: src, view, level, detail, clip, box, point, colour, theme, cell-faces, alt. For several models, <ebpo-part> children, or scene, up and remote
  * replace src; further attributes are time, hide and colours. Attributes of the view have the form of the viewer's address.
  */
 export declare class EbpoViewerElement extends HTMLElement {
@@ -87,8 +87,8 @@ export declare class EbpoViewerElement extends HTMLElement {
   load(what: string | URL | Blob): Promise<EbpoInfo>;
   load(parts: EbpoPart[]): Promise<EbpoSceneInfo>;
   home(): void;
-  ask(point: [number, number, number]): Promise<PointAnswer>;
-  ask(point: [number, number, number], instance: string): Promise<ScenePointAnswer>;
+  query(point: [number, number, number]): Promise<PointResult>;
+  query(point: [number, number, number], instance: string): Promise<ScenePointResult>;
   addEventListener<K extends keyof EbpoViewerEventMap>(type: K, listener: (this: EbpoViewerElement, event: EbpoViewerEventMap[K]) => void, options?: boolean | AddEventListenerOptions): void;
   addEventListener(type: string, listener: EventListenerOrEventListenerObject, options?: boolean | AddEventListenerOptions): void;
 }

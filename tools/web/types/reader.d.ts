@@ -118,7 +118,7 @@ export interface Polytope {
   x: Float64Array;
   first: ArrayLike<number>;
   corner: ArrayLike<number>;
-  wall: ArrayLike<number>;
+  onCellFace: ArrayLike<number>;
 }
 export declare class Tree {
   constructor(info: EbpoInfo);
@@ -133,10 +133,10 @@ export declare class Tree {
   planes(node: Node): ArrayLike<number>;
   winding(node: Node): number;
   polytope(node: Node): Polytope;
-  wall(node: Node, axis: number, side: 0 | 1): number;
+  cellFace(node: Node, axis: number, side: 0 | 1): number;
   size(node: Node, axis: number): number;
 }
-export declare function growForQuestion(file: EbpoFile, tree: Tree, nodes: Node[]): Promise<unknown>;
+export declare function growForQuery(file: EbpoFile, tree: Tree, nodes: Node[]): Promise<unknown>;
 export declare function growForView(file: EbpoFile, tree: Tree, wants: { node: Node; levels: number }[], options?: { bytes?: number }): Promise<number>;
 
 export declare function isInside(rule: string, winding: number): boolean;

@@ -24,10 +24,10 @@ function countTriangles(tree, level) {
     if (node.type === GRAY && node.level < level && !tree.isPruned(node))
       tree.children(node).forEach(walk);
     else if (node.type === GRAY || node.type === LEAF || node.type === BLACK) {
-      const { faces, first, wall } = tree.polytope(node);
+      const { faces, first, onCellFace } = tree.polytope(node);
       for (let f = 0; f < faces; f++) {
         count.all += first[f + 1] - first[f] - 2;
-        count.inner += wall[f] ? 0 : first[f + 1] - first[f] - 2;
+        count.inner += onCellFace[f] ? 0 : first[f + 1] - first[f] - 2;
       }
     }
   };
@@ -62,11 +62,11 @@ for (const path of files) {
     const { file, tree } = await load(path);
     if (!file.info.parts.has('mesh'))
       return;
-    const asked = points(file.info, 300), input = asked.map((p) => p.join(' ')).join('\n');
+    const requested = points(file.info, 300), input = requested.map((p) => p.join(' ')).join('\n');
     const lines = (text) => text.trim().split('\n').map((line) => JSON.parse(line));
     const distances = lines(run(['distance', '--json', '--unsigned', path], input)).map((d) => d.distance);
     const wheres = file.info.solid ? lines(run(['inside', '--json', path], input)) : undefined;
-    for (const [i, p] of asked.entries()) {
+    for (const [i, p] of requested.entries()) {
       for (let level = 0; level <= tree.depth; level++) {
         const { lo, hi } = distanceInterval(tree, p, level);
         assert.ok(lo <= distances[i] && distances[i] <= hi, `${p}: ${lo} ${distances[i]} ${hi}`);
@@ -90,13 +90,13 @@ for (const path of files) {
     const { file, tree } = await load(path);
     if (!file.info.solid || !file.info.parts.has('mesh'))
       return;
-    const { vertices, faces } = await file.mesh(), asked = [];
+    const { vertices, faces } = await file.mesh(), requested = [];
     for (let f = 0; f < file.info.face_count; f += Math.ceil(file.info.face_count / 100)) {
       const corner = (k) => [0, 1, 2].map((i) => vertices[3 * faces[3 * f + k] + i]);
-      asked.push(corner(0), corner(1).map((x, i) => (x + corner(2)[i]) / 2), corner(0).map((x, i) => (x + corner(1)[i] + corner(2)[i]) / 3));
+      requested.push(corner(0), corner(1).map((x, i) => (x + corner(2)[i]) / 2), corner(0).map((x, i) => (x + corner(1)[i] + corner(2)[i]) / 3));
     }
-    const wheres = run(['inside', '--json', path], asked.map((p) => p.join(' ')).join('\n')).trim().split('\n').map((line) => JSON.parse(line));
-    for (const [i, p] of asked.entries()) {
+    const wheres = run(['inside', '--json', path], requested.map((p) => p.join(' ')).join('\n')).trim().split('\n').map((line) => JSON.parse(line));
+    for (const [i, p] of requested.entries()) {
       let found = inside(tree, p);
       if (found.where === 'maybe')
         found = insideLeaf(tree, found.node, p, (await file.leafFaces([found.node]))[0]);

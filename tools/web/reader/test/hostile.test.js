@@ -4,7 +4,7 @@ import { readFileSync } from 'node:fs';
 import test from 'node:test';
 import { fletcher32 } from '../chunk.js';
 import { EbpoError, openEbpo } from '../index.js';
-import { placesHold, readPlaces } from '../chunk_directory.js';
+import { isListValid, readDirectory } from '../chunk_directory.js';
 import { readAll } from './as_json.js';
 
 const original = readFileSync(new URL('../../../../format-spec/vectors/passed/15_subtrees_unfiltered.ebpo.h5', import.meta.url));
@@ -100,7 +100,7 @@ const list = many.arrays.get('/subtrees/places'), arrays = [...many.arrays.value
 const placed = (change) => {
   const rows = new Uint32Array(stored.slice().buffer);
   change(rows, rows.length - 2);
-  return readPlaces(rows, arrays, many.source.size);
+  return readDirectory(rows, arrays, many.source.size);
 };
 
 test('chunk directory: a chunk too many, too few, too large, beyond the end, at a wrong offset', async () => {
@@ -120,7 +120,7 @@ test('chunk directory: a chunk too many, too few, too large, beyond the end, at 
 
 test('outdated chunk directories are not used', async () => {
   const bytes = many.source.data;
-  async function placesOf(change) {
+  async function positionsOf(change) {
     const file = await openEbpo(bytes), { attributes } = file.arrays.get('/subtrees/places').object;
     change(attributes);
     let reads = 0;
@@ -129,11 +129,11 @@ test('outdated chunk directories are not used', async () => {
     await file.locate();
     return { where: [...file.arrays.values()].map((x) => x.chunks.map((c) => c.at)), reads };
   }
-  const { where: right, reads: once } = await placesOf(() => {});
+  const { where: right, reads: once } = await positionsOf(() => {});
   assert.equal(once, 1);
   for (const name of ['file_bytes', 'offset'])
     for (const change of [(a) => a.set(name, { ...a.get(name), data: Uint8Array.from(a.get(name).data, (byte, i) => byte ^ (i === 0)) }), (a) => a.delete(name)]) {
-      const { where, reads } = await placesOf(change);
+      const { where, reads } = await positionsOf(change);
       assert.equal(reads, 0);
       assert.deepEqual(where, right);
     }
@@ -184,9 +184,9 @@ test('500 random changes of the tables: an error or the same result', async () =
 
 test('a chunk directory without a known offset is invalid', () => {
   const places = good.arrays.get('/subtrees/places');
-  assert.equal(placesHold(places, original.length), true);
-  assert.equal(placesHold(places, original.length + 1), false);
-  assert.equal(placesHold({ ...places, chunks: undefined }, original.length), false);
+  assert.equal(isListValid(places, original.length), true);
+  assert.equal(isListValid(places, original.length + 1), false);
+  assert.equal(isListValid({ ...places, chunks: undefined }, original.length), false);
 });
 
 test('the whole file can be read', async () => assert.ok((await readAll(original, 'a')).levels.length));

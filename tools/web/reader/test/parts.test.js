@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { readFileSync, readdirSync } from 'node:fs';
 import { basename } from 'node:path';
 import test from 'node:test';
-import { GRAY, LEAF, Tree, growForQuestion, growForView, inside, insideLeaf, nearestFace, nearestOnTriangle, openEbpo } from '../index.js';
+import { GRAY, LEAF, Tree, growForQuery, growForView, inside, insideLeaf, nearestFace, nearestOnTriangle, openEbpo } from '../index.js';
 import { SlowSource } from './slow_source.js';
 
 const passed = new URL('../../../../format-spec/vectors/passed/', import.meta.url).pathname;
@@ -91,8 +91,8 @@ async function points(file, n) {
   });
 }
 
-async function ask(file, whole, p) {
-  const lean = whole.lean(), deeper = (nodes) => growForQuestion(file, lean, nodes);
+async function query(file, whole, p) {
+  const lean = whole.lean(), deeper = (nodes) => growForQuery(file, lean, nodes);
   const near = await nearestFace(lean, p, (leaves) => file.leafFaces(leaves), deeper);
   if (!file.info.solid)
     return { near };
@@ -110,7 +110,7 @@ for (const path of files) {
     const file = await openEbpo(bytes), levels = await file.levels(0, file.info.level_count - 1, { faces: true }), plain = plainTree(levels);
     const ways = [[(tree, nodes) => partsBelow(file, tree, nodes), true], [(tree, nodes) => growForView(file, tree, nodes.map((node) => ({ node, levels: 3 }))), true],
       [(tree, nodes) => growForView(file, tree, nodes.slice(0, 5).map((node) => ({ node, levels: 1 })), { bytes: 1 }), true],
-      [(tree, nodes) => growForQuestion(file, tree, nodes), false]];
+      [(tree, nodes) => growForQuery(file, tree, nodes), false]];
     for (const [grow, planes] of ways) {
       const tree = await grown(file, grow);
       compare(tree, tree.root, plain, planes);
@@ -123,7 +123,7 @@ for (const path of files) {
       return;
     const plain = plainTree(await all.levels(0, all.info.level_count - 1, { faces: true })), mesh = await all.mesh(), { info } = all;
     for (const cacheBytes of [1 << 26, 5000]) {
-      const file = await openEbpo(bytes, { cacheBytes }), tree = await grown(file, (t, nodes) => growForQuestion(file, t, nodes)), leaves = leavesOf(tree);
+      const file = await openEbpo(bytes, { cacheBytes }), tree = await grown(file, (t, nodes) => growForQuery(file, t, nodes)), leaves = leavesOf(tree);
       const step = Math.ceil(leaves.length / 8);
       for (let i = 0; i < leaves.length; i += step) {
         const some = leaves.slice(i, i + Math.min(step, 100)), faces = await file.leafFaces(some);
@@ -149,7 +149,7 @@ for (const path of files) {
     const full = new Tree(file.info), all = await openEbpo(bytes);
     (await all.levels(0, all.info.level_count - 1)).forEach((level) => full.add(level));
     for (const p of await points(file, Math.max(6, Math.min(40, Math.floor(5e5 / file.info.face_count))))) {
-      const { near, where } = await ask(file, whole, p), old = await ask(all, full, p);
+      const { near, where } = await query(file, whole, p), old = await query(all, full, p);
       let best = Infinity;
       for (let at = 0; at < corners.length; at += 9)
         best = Math.min(best, nearestOnTriangle(p, corners, at)[0]);
@@ -186,7 +186,7 @@ for (const path of files.filter(withSubtrees))
       const root = nodeOf(lean, lean.root, i, info.subtree_level), leaves = leavesOf(lean, root);
       if (info.parts.has('mesh') && leaves.length)
         await file.leafFaces(leaves);
-      assert.deepEqual(source.asked.slice(source.requests - source.count().requests), [], 'its faces were asked for after it');
+      assert.deepEqual(source.requested.slice(source.requests - source.count().requests), [], 'its faces were requested after it');
     }
   });
 

@@ -20,7 +20,7 @@ export class SlowSource {
       this.take = (offset, length) => Uint8Array.from(what.subarray(offset, offset + length));
     }
     this.coming = 0;
-    this.asked = []; // [offset, length, round trip]
+    this.requested = []; // [offset, length, round trip]
     this.done = 0;   // number of round trips with a response
     this.free = 0;   // time at which the connection is free
     this.requests = this.bytes = this.roundTrips = 0;
@@ -30,7 +30,7 @@ export class SlowSource {
     const trip = this.done + 1;
     this.requests++;
     this.bytes += length;
-    this.asked.push([offset, length, trip]);
+    this.requested.push([offset, length, trip]);
     this.roundTrips = Math.max(this.roundTrips, trip);
     const now = performance.now();
     this.free = Math.max(this.free, now + this.latency) + length / this.bandwidth;

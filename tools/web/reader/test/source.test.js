@@ -10,19 +10,19 @@ const part = bytes.length >> 1; // a header that is read in pieces
 
 // Starts a server for ranges whose responses `odd` may change. Returns the result of `use(address)`.
 async function serve(odd, use) {
-  const asked = [];
+  const requested = [];
   const server = createServer((request, response) => {
     const range = /^bytes=(\d+)-(\d+)$/.exec(request.headers.range ?? ''), from = Number(range[1]), to = Math.min(Number(range[2]), bytes.length - 1);
-    asked.push([from, to]);
-    const answer = { status: 206, headers: { 'Content-Range': `bytes ${from}-${to}/${bytes.length}`, 'Content-Length': to - from + 1, 'ETag': '"1"' }, body: bytes.subarray(from, to + 1) };
-    if (odd?.(answer, asked.length, response) === false)
+    requested.push([from, to]);
+    const reply = { status: 206, headers: { 'Content-Range': `bytes ${from}-${to}/${bytes.length}`, 'Content-Length': to - from + 1, 'ETag': '"1"' }, body: bytes.subarray(from, to + 1) };
+    if (odd?.(reply, requested.length, response) === false)
       return;
-    response.writeHead(answer.status, answer.headers);
-    response.end(answer.body);
+    response.writeHead(reply.status, reply.headers);
+    response.end(reply.body);
   });
   await new Promise((done) => server.listen(0, '127.0.0.1', done));
   try {
-    return await use(`http://127.0.0.1:${server.address().port}/a.ebpo.h5`, asked);
+    return await use(`http://127.0.0.1:${server.address().port}/a.ebpo.h5`, requested);
   } finally {
     server.closeAllConnections?.();
     server.close();
@@ -49,83 +49,83 @@ async function fails(odd, code, expected, options) {
   });
 }
 
-test('a good server: the right bytes, in few requests', () => serve(undefined, async (url, asked) => {
+test('a good server: the right bytes, in few requests', () => serve(undefined, async (url, requested) => {
   const file = await readAll(url);
-  assert.equal(file.traffic.requests, asked.length);
-  assert.equal(file.traffic.bytes, asked.reduce((sum, [from, to]) => sum + to - from + 1, 0));
-  assert.ok(asked.length <= 20, String(asked.length));
+  assert.equal(file.traffic.requests, requested.length);
+  assert.equal(file.traffic.bytes, requested.reduce((sum, [from, to]) => sum + to - from + 1, 0));
+  assert.ok(requested.length <= 20, String(requested.length));
 }));
-test('the first response contains a small file completely', () => serve(undefined, async (url, asked) => {
+test('the first response contains a small file completely', () => serve(undefined, async (url, requested) => {
   await readAll(url, { headBytes: 1 << 20 });
-  assert.deepEqual(asked, [[0, bytes.length - 1]]);
+  assert.deepEqual(requested, [[0, bytes.length - 1]]);
 }));
 
-const whole = (answer) => {
-  answer.status = 200;
-  answer.body = bytes;
-  answer.headers = { 'Content-Length': bytes.length, 'ETag': '"1"' };
+const whole = (reply) => {
+  reply.status = 200;
+  reply.body = bytes;
+  reply.headers = { 'Content-Length': bytes.length, 'ETag': '"1"' };
 };
-test('a server without ranges: a small file is read once', () => serve(whole, async (url, asked) => {
+test('a server without ranges: a small file is read once', () => serve(whole, async (url, requested) => {
   await readAll(url);
-  assert.equal(asked.length, 1);
+  assert.equal(requested.length, 1);
 }));
-test('a server without ranges and without a length', () => serve((answer) => {
-  whole(answer);
-  delete answer.headers['Content-Length'];
+test('a server without ranges and without a length', () => serve((reply) => {
+  whole(reply);
+  delete reply.headers['Content-Length'];
 }, (url) => readAll(url)));
 test('a server without ranges: a large file is refused', () => fails(whole, 'NETWORK', /does not serve ranges/, { wholeLimit: 1000 }));
-test('a large file without ranges or length is not read to the end', () => fails((answer) => {
-  whole(answer);
-  delete answer.headers['Content-Length'];
+test('a large file without ranges or length is not read to the end', () => fails((reply) => {
+  whole(reply);
+  delete reply.headers['Content-Length'];
 }, 'NETWORK', /does not serve ranges/, { wholeLimit: 1000 }));
-test('a server that stops serving ranges', () => fails((answer, n) => (n > 1 ? whole(answer) : undefined), 'NETWORK', /stopped serving ranges/));
+test('a server that stops serving ranges', () => fails((reply, n) => (n > 1 ? whole(reply) : undefined), 'NETWORK', /stopped serving ranges/));
 
-test('a wrong range', () => fails((answer) => (answer.headers['Content-Range'] = `bytes 1-${part}/${bytes.length}`), 'NETWORK', /where 0 to \d+ were requested/));
-test('no Content-Range', () => fails((answer) => delete answer.headers['Content-Range'], 'NETWORK', /no Content-Range/));
-test('a file that changes while it is read', () => fails((answer, n) => (n > 1 ? (answer.headers.ETag = '"2"') : undefined), 'NETWORK', /was changed on the server/));
-test('a file that grows while it is read', () => fails((answer, n) => {
+test('a wrong range', () => fails((reply) => (reply.headers['Content-Range'] = `bytes 1-${part}/${bytes.length}`), 'NETWORK', /where 0 to \d+ were requested/));
+test('no Content-Range', () => fails((reply) => delete reply.headers['Content-Range'], 'NETWORK', /no Content-Range/));
+test('a file that changes while it is read', () => fails((reply, n) => (n > 1 ? (reply.headers.ETag = '"2"') : undefined), 'NETWORK', /was changed on the server/));
+test('a file that grows while it is read', () => fails((reply, n) => {
   if (n > 1)
-    answer.headers['Content-Range'] = answer.headers['Content-Range'].replace(/\d+$/, bytes.length + 1);
+    reply.headers['Content-Range'] = reply.headers['Content-Range'].replace(/\d+$/, bytes.length + 1);
 }, 'NETWORK', /was changed on the server/));
-test('short bodies', () => fails((answer) => {
-  answer.body = answer.body.subarray(0, 10);
-  delete answer.headers['Content-Length'];
+test('short bodies', () => fails((reply) => {
+  reply.body = reply.body.subarray(0, 10);
+  delete reply.headers['Content-Length'];
 }, 'NETWORK', /sent 10 bytes of/));
-test('bodies that are too long', () => fails((answer) => {
-  answer.body = Buffer.concat([answer.body, answer.body]);
-  delete answer.headers['Content-Length'];
+test('bodies that are too long', () => fails((reply) => {
+  reply.body = Buffer.concat([reply.body, reply.body]);
+  delete reply.headers['Content-Length'];
 }, 'NETWORK', /more bytes than it stated/));
-test('compression during transfer', () => fails((answer) => (answer.headers['Content-Encoding'] = 'gzip'), 'NETWORK', /compresses the file|request failed/));
-test('a missing file', () => fails((answer) => (answer.status = 404), 'NETWORK', /404/));
-test('a page instead of the file', () => fails((answer) => {
-  whole(answer);
-  answer.body = Buffer.from('<!doctype html><title>Not found</title> and so on, and so on');
-  delete answer.headers['Content-Length'];
+test('compression during transfer', () => fails((reply) => (reply.headers['Content-Encoding'] = 'gzip'), 'NETWORK', /compresses the file|request failed/));
+test('a missing file', () => fails((reply) => (reply.status = 404), 'NETWORK', /404/));
+test('a page instead of the file', () => fails((reply) => {
+  whole(reply);
+  reply.body = Buffer.from('<!doctype html><title>Not found</title> and so on, and so on');
+  delete reply.headers['Content-Length'];
 }, 'FORMAT', /not a whole HDF5 file/));
-test('a login page with its content type', () => fails((answer) => {
-  whole(answer);
-  answer.body = Buffer.from('<!doctype html><title>Sign in</title>');
-  answer.headers = { 'Content-Type': 'text/html; charset=utf-8' };
+test('a login page with its content type', () => fails((reply) => {
+  whole(reply);
+  reply.body = Buffer.from('<!doctype html><title>Sign in</title>');
+  reply.headers = { 'Content-Type': 'text/html; charset=utf-8' };
 }, 'NETWORK', /returned text\/html, not a model/));
-test('a tag that is sometimes weak', () => serve((answer, n) => {
-  answer.headers.ETag = n % 2 ? 'W/"1"' : '"1"';
+test('a tag that is sometimes weak', () => serve((reply, n) => {
+  reply.headers.ETag = n % 2 ? 'W/"1"' : '"1"';
 }, (url) => readAll(url)));
-test('a server that is always busy', () => fails((answer) => (answer.status = 503), 'NETWORK', /503/));
-test('a server that is sometimes busy', () => serve((answer, n) => (n % 2 ? (answer.status = 503) : undefined), (url) => readAll(url)));
-test('connections that sometimes break', () => serve((answer, n, response) => {
+test('a server that is always busy', () => fails((reply) => (reply.status = 503), 'NETWORK', /503/));
+test('a server that is sometimes busy', () => serve((reply, n) => (n % 2 ? (reply.status = 503) : undefined), (url) => readAll(url)));
+test('connections that sometimes break', () => serve((reply, n, response) => {
   if (n % 2)
     response.destroy();
   return n % 2 === 0;
 }, (url) => readAll(url)));
 test('a server that stalls', () => fails(() => false, 'NETWORK', /no data for/, { timeout: 100 }));
-test('a server that stalls in the middle of a body', () => fails((answer, n, response) => {
-  response.writeHead(206, answer.headers);
-  response.write(answer.body.subarray(0, 100));
+test('a server that stalls in the middle of a body', () => fails((reply, n, response) => {
+  response.writeHead(206, reply.headers);
+  response.write(reply.body.subarray(0, 100));
   return false;
 }, 'NETWORK', /no data for/, { timeout: 100 }));
-test('bytes changed during transfer are detected', () => fails((answer, n) => {
+test('bytes changed during transfer are detected', () => fails((reply, n) => {
   if (n === 1)
-    answer.body = Buffer.from(answer.body).fill(0, 3000, 3010);
+    reply.body = Buffer.from(reply.body).fill(0, 3000, 3010);
 }, 'FORMAT', /checksum differs/));
 test('no server', async () => {
   const url = await serve(undefined, (address) => address);
@@ -135,17 +135,17 @@ test('no server', async () => {
 test('HTTP statuses are explained', async () => {
   for (const [status, expected] of [[401, /401.*requires a login/], [403, /403.*does not let this page.*access/], [404, /404.*no such file.*address/], [410, /410.*removed/],
     [416, /416.*is empty/], [418, /418/]])
-    await fails((answer) => (answer.status = status), 'NETWORK', expected);
-  await fails((answer, n) => (n > 1 ? (answer.status = 416) : undefined), 'NETWORK', /416.*is shorter.*open it again/);
+    await fails((reply) => (reply.status = status), 'NETWORK', expected);
+  await fails((reply, n) => (n > 1 ? (reply.status = 416) : undefined), 'NETWORK', /416.*is shorter.*open it again/);
 });
 
 let finish;
-test('bytes of the first response are readable as they arrive, up to a whole small file', () => serve((answer, n, response) => {
-  response.writeHead(206, answer.headers);
-  response.write(answer.body.subarray(0, part));
-  finish = () => response.end(answer.body.subarray(part));
+test('bytes of the first response are readable as they arrive, up to a whole small file', () => serve((reply, n, response) => {
+  response.writeHead(206, reply.headers);
+  response.write(reply.body.subarray(0, part));
+  finish = () => response.end(reply.body.subarray(part));
   return false;
-}, async (url, asked) => {
+}, async (url, requested) => {
   const source = new UrlSource(url, { ahead: 1 << 20 });
   assert.equal((await source.open(part)).length, part);
   const [begin, across] = [await source.read(3, 7), source.read(part - 5, 10)];
@@ -153,38 +153,38 @@ test('bytes of the first response are readable as they arrive, up to a whole sma
   assert.deepEqual(source.underway().map(({ from, to, got }) => [from, to, got]), [[0, bytes.length, part]]);
   finish();
   assert.deepEqual(Buffer.from(await across), bytes.subarray(part - 5, part + 5));
-  assert.deepEqual(asked, [[0, bytes.length - 1]]);
+  assert.deepEqual(requested, [[0, bytes.length - 1]]);
   assert.deepEqual(source.underway(), []);
 }));
 
-test('requests beyond the first response fetch only missing bytes', () => serve(undefined, async (url, asked) => {
+test('requests beyond the first response fetch only missing bytes', () => serve(undefined, async (url, requested) => {
   const source = new UrlSource(url, { ahead: part });
   await source.open(100);
   assert.deepEqual(Buffer.from(await source.read(part - 4, 20)), bytes.subarray(part - 4, part + 16));
   assert.deepEqual(Buffer.from(await source.read(part + 30, 20)), bytes.subarray(part + 30, part + 50));
-  assert.deepEqual(asked, [[0, part - 1], [part, part + 15], [part + 30, part + 49]]);
+  assert.deepEqual(requested, [[0, part - 1], [part, part + 15], [part + 30, part + 49]]);
 }));
 
 // Each response ends after 300 bytes until `broken` is 0.
-const breaking = (broken) => (answer, n, response) => {
+const breaking = (broken) => (reply, n, response) => {
   if (--broken < 0)
     return true;
-  response.writeHead(206, answer.headers);
-  response.write(answer.body.subarray(0, 300), () => setTimeout(() => response.destroy(), 20));
+  response.writeHead(206, reply.headers);
+  response.write(reply.body.subarray(0, 300), () => setTimeout(() => response.destroy(), 20));
   return false;
 };
-test('a broken response is continued at its end', () => serve(breaking(2), async (url, asked) => {
+test('a broken response is continued at its end', () => serve(breaking(2), async (url, requested) => {
   const source = new UrlSource(url);
   assert.deepEqual(Buffer.from(await source.open(part)), bytes.subarray(0, part));
-  assert.deepEqual(asked, [[0, part - 1], [300, part - 1], [600, part - 1]]);
+  assert.deepEqual(requested, [[0, part - 1], [300, part - 1], [600, part - 1]]);
 }));
 
 let dead = true;
-test('a patient source waits while the connection is lost, states the reason, and continues on retry', () => serve((answer, n, response) => {
+test('a patient source waits while the connection is lost, states the reason, and continues on retry', () => serve((reply, n, response) => {
   if (n > 1 && dead)
     response.destroy();
   return n === 1 || !dead;
-}, async (url, asked) => {
+}, async (url, requested) => {
   const source = new UrlSource(url, { patient: true });
   await source.open(100);
   const reading = Promise.all([source.read(200, 50), source.read(400, 50)]);
@@ -197,14 +197,14 @@ test('a patient source waits while the connection is lost, states the reason, an
   const [a, b] = await reading;
   assert.deepEqual([Buffer.from(a), Buffer.from(b)], [bytes.subarray(200, 250), bytes.subarray(400, 450)]);
   assert.equal(source.trouble, undefined);
-  assert.equal(asked.filter(([from]) => from === 0).length, 1);
+  assert.equal(requested.filter(([from]) => from === 0).length, 1);
 }));
 
-test('retry repeats a stalled request for its rest only; a closed source ends', () => serve((answer, n, response) => {
-  response.writeHead(206, answer.headers);
-  response.write(answer.body.subarray(0, 100));
+test('retry repeats a stalled request for its rest only; a closed source ends', () => serve((reply, n, response) => {
+  response.writeHead(206, reply.headers);
+  response.write(reply.body.subarray(0, 100));
   return false;
-}, async (url, asked) => {
+}, async (url, requested) => {
   const source = new UrlSource(url, { patient: true }), opened = source.open(300);
   for (const wanted of [100, 200, 300]) {
     while ((source.underway()[0]?.got ?? 300) < wanted)
@@ -212,18 +212,18 @@ test('retry repeats a stalled request for its rest only; a closed source ends', 
     source.retry();
   }
   assert.deepEqual(Buffer.from(await opened), bytes.subarray(0, 300));
-  assert.deepEqual(asked, [[0, 299], [100, 299], [200, 299]]);
+  assert.deepEqual(requested, [[0, 299], [100, 299], [200, 299]]);
   const reading = assert.rejects(source.read(500, 300), { code: 'NETWORK' });
   source.close();
   await reading;
 }));
 
 test('the cache may respond; a response of another version is fetched again without the cache', async () => {
-  const modes = [], answer = (from, to, tag) => new Response(bytes.subarray(from, to + 1), { status: 206, headers: { 'Content-Range': `bytes ${from}-${to}/${bytes.length}`, 'ETag': tag } });
+  const modes = [], reply = (from, to, tag) => new Response(bytes.subarray(from, to + 1), { status: 206, headers: { 'Content-Range': `bytes ${from}-${to}/${bytes.length}`, 'ETag': tag } });
   const fetch = async (url, { cache, headers }) => {
     const [from, to] = headers.Range.match(/\d+/g).map(Number);
     modes.push(cache);
-    return answer(from, to, modes.length === 2 || stale ? '"old"' : '"new"');
+    return reply(from, to, modes.length === 2 || stale ? '"old"' : '"new"');
   };
   let stale = false;
   const source = new UrlSource('https://example.org/a', { fetch });
@@ -244,9 +244,9 @@ test('files and bytes are read', async () => {
 // The chunk index is stored after the first levels. It is fetched in one request when it is needed. A wrong position in the header is tolerated.
 const indexed = readFileSync(new URL('../../../../format-spec/vectors/passed/11_two_chunks_of_faces.ebpo.h5', import.meta.url));
 async function openIndexed(change) {
-  const whole = await openEbpo(indexed), { chunk_index_offset: at, chunk_index_bytes: size } = whole.info, asked = [];
+  const whole = await openEbpo(indexed), { chunk_index_offset: at, chunk_index_bytes: size } = whole.info, requested = [];
   const source = { name: 'a', size: indexed.length, requests: 0, bytes: 0, open: async (n) => indexed.subarray(0, n), read: async (from, n) => {
-    asked.push([from, n]);
+    requested.push([from, n]);
     return indexed.subarray(from, from + n);
   } };
   assert.ok(at > 0 && size > 0 && whole.located);
@@ -256,12 +256,12 @@ async function openIndexed(change) {
   await file.levels(0, file.info.level_count - 1);
   assert.deepEqual((await file.mesh()).faces, (await whole.mesh()).faces);
   assert.equal(file.located, true);
-  return { asked, at, size };
+  return { requested, at, size };
 }
 test('the chunk index needs one request', async () => {
-  const { asked, at, size } = await openIndexed();
-  assert.equal(asked.filter(([from, n]) => from < at + size && from + n > at).length, 1);
-  assert.deepEqual(asked.find(([from]) => from === at), [at, size]);
+  const { requested, at, size } = await openIndexed();
+  assert.equal(requested.filter(([from, n]) => from < at + size && from + n > at).length, 1);
+  assert.deepEqual(requested.find(([from]) => from === at), [at, size]);
 });
 for (const [what, offset, bytes] of [['nowhere', 0, 0], ['somewhere else', 100, 500], ['beyond the end', 1 << 30, 100], ['too short', undefined, 8]])
   test(`the chunk index, stated to be ${what}`, () => openIndexed((info) => {
@@ -280,9 +280,9 @@ test('only one of several concurrent requests uses the cache, which would serial
   await read(3);
   assert.deepEqual(modes, ['default', 'no-store', 'no-store', 'default']);
 }));
-test('bytes of the first response are not requested again, and are counted as coming', () => serve(undefined, async (url, asked) => {
+test('bytes of the first response are not requested again, and are counted as coming', () => serve(undefined, async (url, requested) => {
   const ahead = bytes.length - 100, file = await openEbpo(url, { headBytes: part, ahead });
   assert.equal(file.source.coming, ahead);
   assert.deepEqual(Buffer.from(await file.source.read(part, ahead - part)), bytes.subarray(part, ahead));
-  assert.deepEqual(asked, [[0, ahead - 1]]);
+  assert.deepEqual(requested, [[0, ahead - 1]]);
 }));
