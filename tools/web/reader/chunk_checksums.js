@@ -10,7 +10,7 @@ export function readChecksums(rows, arrays) {
     const number = rows[begin + 1];
     for (end = begin; end < rows.length && rows[end + 1] === number; end += 2);
     if (end < rows.length && rows[end + 1] < number)
-      throw formatError(WHERE, "the list is not ordered by the numbers of arrays");
+      throw formatError(WHERE, "the list is not in the order of arrays' numbers");
     numbers.set(number, rows.subarray(begin, end).filter((_, i) => i % 2 === 0));
   }
   for (const array of arrays) {

@@ -112,7 +112,7 @@ export function decodeLeaves(info, level, { skip, fresh, refCount, refs, index }
     for (let k = 0; k < refCount[leaf]; k++) { // stored as descending differences; the result is ascending
       above -= refs[at + k] + 1;
       if (above < 0)
-        throw fail('leaf_refs', "a reference is not to a face before the leaf's own");
+        throw fail('leaf_refs', "a reference is not to a face before the leaf's new faces");
       refs[at + k] = above;
     }
     refs?.subarray(at, at + refCount[leaf]).reverse();
@@ -139,7 +139,7 @@ export function decodeLeafBlock(info, level, { start, skip, fresh, refCount, ref
     for (let k = 0; k < refCount[i]; k++, at++)
       out[at] = above -= refs[at] + 1;
     if (above < 0)
-      throw formatError(levelPath(level, 'leaf_refs'), "a reference is not to a face before the leaf's own");
+      throw formatError(levelPath(level, 'leaf_refs'), "a reference is not to a face before the leaf's new faces");
   }
   if (at !== refs.length)
     throw formatError(levelPath(level, 'leaf_ref_count'), 'the counts do not add up to the number of references');

@@ -29,6 +29,10 @@ export class Facts {
     this.where = where;
   }
 
+  notAllowed(name) {
+    return formatError(this.where, `attribute ${name} has a value that the format does not allow`);
+  }
+
   fail(name, what) {
     return formatError(this.where, `attribute ${name}: ${what}`);
   }
@@ -50,11 +54,11 @@ export class Facts {
   }
 
   text(name, most = 4096) {
-    const view = this.#get(name, 1, (t) => t.class === 'text' && t.size >= 1 && t.size <= 65536, 'a fixed-length UTF-8 text of a sensible length');
+    const view = this.#get(name, 1, (t) => t.class === 'text' && t.size >= 1 && t.size <= 65536, 'a fixed-length UTF-8 text of an allowed length');
     const bytes = new Uint8Array(view.buffer, view.byteOffset, view.byteLength), end = bytes.indexOf(0);
     const value = text(end < 0 ? bytes : bytes.subarray(0, end));
     if (value === undefined || (end < 0 ? bytes.length : end) > most)
-      throw this.fail(name, 'it is not a fixed-length UTF-8 text of a sensible length');
+      throw this.fail(name, 'it is not a fixed-length UTF-8 text of an allowed length');
     return value;
   }
 
@@ -62,7 +66,7 @@ export class Facts {
     const view = this.#get(name, 1, (t) => t.class === 'integer' && t.size === 8 && !t.signed && t.little, 'a u64');
     const value = view.getBigUint64(0, true);
     if (value > BigInt(most))
-      throw this.fail(name, 'it has a value that the format does not allow');
+      throw this.notAllowed(name);
     return Number(value);
   }
 
@@ -79,7 +83,7 @@ export class Facts {
     const view = this.#get(name, 1, (t) => t.class === 'integer' && t.size === 8 && t.signed && t.little, 'an i64');
     const value = view.getBigInt64(0, true);
     if (value < BigInt(least) || value > BigInt(most))
-      throw this.fail(name, 'it has a value that the format does not allow');
+      throw this.notAllowed(name);
     return Number(value);
   }
 
@@ -91,7 +95,7 @@ export class Facts {
   word(name) {
     const value = this.text(name);
     if (!WORDS[name].includes(value))
-      throw this.fail(name, 'it has a value that the format does not allow');
+      throw this.notAllowed(name);
     return value;
   }
 }
@@ -101,7 +105,7 @@ function readParts(facts) {
   for (const [name, required] of [['required_parts', true], ['optional_parts', false]])
     for (const word of facts.text(name) === '' ? [] : facts.text(name).split(' ')) {
       if (word === '')
-        throw facts.fail(name, 'it has a value that the format does not allow');
+        throw facts.notAllowed(name);
       if (!KNOWN_PARTS.includes(word)) {
         if (required)
           throw new EbpoError('VERSION', `the file needs the part "${word}", which this reader does not know; use a newer reader`);
@@ -112,7 +116,7 @@ function readParts(facts) {
         seen.add(word);
     }
   if (!seen.has('levels'))
-    throw facts.fail('required_parts', 'it has a value that the format does not allow');
+    throw facts.notAllowed('required_parts');
   return seen;
 }
 
@@ -124,7 +128,7 @@ export function readFacts(attributes) {
     format = facts.text('format');
   } catch { /* reported below */ }
   if (format !== 'EBP-Octree in HDF5')
-    throw formatError('', 'an HDF5 file, but not an EBP-Octree file (its root attribute format is not "EBP-Octree in HDF5")',
+    throw formatError('', 'an HDF5 file, but not an EBP-Octree (its root attribute format is not "EBP-Octree in HDF5")',
       /^EBP-Octree paint/.test(format) ? 'this is a paint file for a model: open the model, and then this file by Open in the section Paint' : 'make one with `ebpo convert`');
   out.format_version_major = facts.int('format_version_major');
   out.format_version_minor = facts.int('format_version_minor');
@@ -148,9 +152,9 @@ export function readFacts(attributes) {
     [out.mend_weld_moved] = facts.reals('mend_weld_moved', 1);
     out.mend_collapsed_faces = facts.count('mend_collapsed_faces');
     if (!(Number.isFinite(out.mend_weld_distance) && out.mend_weld_distance > 0 && out.mend_weld))
-      throw facts.fail('mend_weld_distance', 'it has a value that the format does not allow');
+      throw facts.notAllowed('mend_weld_distance');
     if (!(Number.isFinite(out.mend_weld_moved) && out.mend_weld_moved >= 0))
-      throw facts.fail('mend_weld_moved', 'it has a value that the format does not allow');
+      throw facts.notAllowed('mend_weld_moved');
   }
   for (const name of HINTS)
     out[name] = facts.hint(name);
@@ -164,7 +168,7 @@ export function readFacts(attributes) {
   for (const name of [...DIGESTS, ...(out.parts.has('colours') ? ['colours_sha256'] : [])]) {
     out[name] = facts.text(name);
     if (!/^[0-9a-f]{64}$/.test(out[name]))
-      throw facts.fail(name, 'it has a value that the format does not allow');
+      throw facts.notAllowed(name);
   }
   if (out.level_count < 1 || out.level_count > LEVELS_MAX)
     throw formatError('/', `level_count is not 1 to ${LEVELS_MAX}`);
@@ -173,14 +177,14 @@ export function readFacts(attributes) {
   if (out.parts.has('pruned')) {
     out.subset_of = facts.text('subset_of');
     if (!/^[0-9a-f]{64}$/.test(out.subset_of))
-      throw facts.fail('subset_of', 'it has a value that the format does not allow');
+      throw facts.notAllowed('subset_of');
     out.subset_levels = facts.has('subset_levels') ? facts.int('subset_levels', 1, LEVELS_MAX) : undefined;
     out.subset_error = facts.has('subset_error') ? facts.reals('subset_error', 1)[0] : undefined;
     if (out.subset_error !== undefined && !(Number.isFinite(out.subset_error) && out.subset_error > 0))
-      throw facts.fail('subset_error', 'it has a value that the format does not allow');
+      throw facts.notAllowed('subset_error');
     out.subset_box = facts.has('subset_box') ? facts.reals('subset_box', 6) : undefined;
     if (out.subset_box && ![0, 1, 2].every((k) => Number.isFinite(out.subset_box[k]) && Number.isFinite(out.subset_box[3 + k]) && out.subset_box[k] <= out.subset_box[3 + k]))
-      throw facts.fail('subset_box', 'it has a value that the format does not allow');
+      throw facts.notAllowed('subset_box');
   }
   return out;
 }
@@ -232,7 +236,7 @@ function checkLevelCounts(info, level) {
     return 'a level does not have eight nodes for each gray node above';
   const last = level === info.level_count - 1, subset = has('pruned');
   if (last ? s.gray && !subset : s.gray === 0)
-    return 'the gray nodes do not end at the deepest level';
+    return 'a level has no gray nodes, or the deepest level has gray nodes';
   if (subset ? s.pruned > s.gray || (last && s.pruned !== s.gray) : s.pruned !== 0)
     return "a level's pruned nodes exceed its gray nodes, or differ from them at the deepest level";
   if (!last && subset && (s.pruned === s.gray || info.levels[level + 1].white < 8 * s.pruned))

@@ -162,7 +162,7 @@ export class EbpoFile {
 
   #checkRoom() {
     if ([...this.arrays.values()].reduce((sum, a) => sum + (a.bytes ?? 0), 0) > this.source.size)
-      throw formatError('', "the arrays' chunks are larger than the file");
+      throw formatError('', "the arrays' chunks take more space than the file has");
   }
 
   /** Returns true when all chunk offsets are known. Arrays of several chunks have an index; files with subtrees have a directory of all chunks. */
@@ -546,8 +546,10 @@ function describe(hdf5, wanted, linked, address, info) {
     throw foreignError(path, 'the array does not have fixed dimensions');
   if (o.space.rank < 1 || o.space.rank > 2 || !o.space.fixed || o.space.dims.includes(0))
     throw formatError(path, 'the array does not have one or two fixed dimensions');
-  if (o.external || o.layout.elsewhere)
-    throw formatError(path, "the array's values are in other files or arrays, which are not read");
+  if (o.external)
+    throw formatError(path, "the array's values are in another file (external storage), which is never read");
+  if (o.layout.elsewhere)
+    throw formatError(path, 'the array is virtual: its values are in other arrays, which are never read');
   if (!o.layout.chunked)
     throw foreignError(path, 'the array is not stored in chunks');
   if (o.layout.grows)
@@ -558,7 +560,7 @@ function describe(hdf5, wanted, linked, address, info) {
     throw foreignError(path, "the array's chunks do not have the size that the format requires");
   const pipeline = pipelineOf(o.filters, elementSize);
   if (!pipeline)
-    throw foreignError(path, "the format does not allow the array's filters");
+    throw foreignError(path, "the array's filters are not supported by the format");
   if (o.space.dims[0] !== rows)
     throw formatError(path, "the array's length contradicts the counts in the header");
   if ((o.space.dims[1] ?? 0) !== (gates ? GATES_COLS : cols) || !(gates ? [1] : wanted.sizes).includes(elementSize) || o.type.signed !== wanted.signed)
