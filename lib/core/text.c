@@ -1,6 +1,6 @@
-/* Checks text for UTF-8 without control characters (RFC 3629) and ISO 8601 dates and times for
- * validity. Provides streams into memory that report a lack of memory, which open_memstream does
- * not always do. */
+/* Checks that text is valid UTF-8 (RFC 3629) without control characters. Checks dates and times of
+ * ISO 8601. Provides streams into memory that always report a lack of memory; open_memstream does
+ * not always report it. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -45,7 +45,8 @@ uint64_t ebpo_text_mark(const void *text, uint64_t size)
 
 /* --- dates --- */
 
-/* Reads `count` digits as a number from `least` to `most`; moves *text behind them. */
+/* Reads a number of exactly `count` digits and moves *text behind it. Returns false if a digit is
+ * missing or the number is not within `least` .. `most`. */
 static bool take_digits(const char **text, int count, int least, int most, int *out)
 {
     *out = 0;
@@ -57,14 +58,15 @@ static bool take_digits(const char **text, int count, int least, int most, int *
     return *out >= least && *out <= most;
 }
 
-static int days_of(int year, int month)
+/* Returns the number of days of a month. */
+static int days_in_month(int year, int month)
 {
     static const int days[] = { 31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31 };
     bool leaps = (year % 4 == 0 && year % 100 != 0) || year % 400 == 0;
     return days[month - 1] + (month == 2 && leaps);
 }
 
-/* Returns true for HH:MM, HH:MM:SS or with decimals of seconds, followed by Z, +HH:MM, -HH:MM or
+/* Returns true for HH:MM, HH:MM:SS and HH:MM:SS.decimals, each followed by Z, +HH:MM, -HH:MM or
  * nothing. */
 static bool is_time(const char *t)
 {
@@ -103,12 +105,15 @@ bool ebpo_is_date(const char *text)
         return false;
     if (*text == 0)
         return true;
-    if (*text++ != '-' || !take_digits(&text, 2, 1, days_of(year, month), &day))
+    if (*text++ != '-' || !take_digits(&text, 2, 1, days_in_month(year, month), &day))
         return false;
     return *text == 0 || (*text == 'T' && is_time(text + 1));
 }
 
+/* --- streams into memory --- */
+
 #ifdef EBPO_HAVE_FOPENCOOKIE
+/* Appends the data of a stream to its text; `write` function of fopencookie. */
 static ssize_t keep_text(void *cookie, const char *data, size_t bytes)
 {
     ebpo_text_stream *s = cookie;

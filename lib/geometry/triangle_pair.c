@@ -1,9 +1,10 @@
 /* The relation of two faces: apart, touching, crossing or coplanar; exact for every finite double.
  *
- * Faces whose planes intersect in a line are turned so that one corner of each is alone on its side
- * of the other plane; two orientations then compare the ends of both faces on that line (Devillers
- * and Guigue, "Faster Triangle-Triangle Intersection Tests", 2002). Faces in one plane are compared
- * as figures in that plane, projected along an axis. A face without area is the segment between its
+ * If the planes of the faces intersect in a line, the corners of each face are reordered so that
+ * the first corner is alone on its side of the other plane. Each face intersects the line in an
+ * interval. Two orientation tests (ebpo_orient3d) compare the ends of the intervals (Devillers and
+ * Guigue, "Faster Triangle-Triangle Intersection Tests", 2002). Faces in one plane are projected
+ * along an axis and compared in two dimensions. A face without area is the segment between its
  * least and greatest corners. Proofs: docs/develop/collision.md, "Kinds of pairs". */
 #include "core/strict_fp.h"
 
@@ -16,16 +17,16 @@
 #include "geometry/vec3.h"
 #include "geometry/predicates.h"
 
-/* --- figures in a plane, projected along an axis --- */
+/* --- faces and segments in one plane, projected along an axis --- */
 
-/* The projected corners of a face or segment, in order. With two corners it is a segment, and both
- * sides of its edge are outer sides. */
+/* The projected corners of a face or segment, in order. A segment has two corners; both sides of
+ * the segment are outer sides. */
 typedef struct projection {
     double corner[3][2];
     int corners;
 } projection;
 
-static projection seen_along(int axis, const double (*corner)[3], int corners)
+static projection project_along(int axis, const double (*corner)[3], int corners)
 {
     const int to[2] = { axis == 2 ? 0 : axis + 1, axis == 0 ? 2 : axis - 1 };
     projection f = { .corners = corners };
@@ -35,25 +36,27 @@ static projection seen_along(int axis, const double (*corner)[3], int corners)
     return f;
 }
 
-static int turn_of(const projection *f)
+static int orientation_of(const projection *f)
 {
     return ebpo_orient2d(f->corner[0], f->corner[1], f->corner[2]);
 }
 
 /* Returns an axis along which the projected face has an area, or -1 if the face has no area. */
-static int axis_of(const double corner[3][3])
+static int projection_axis(const double corner[3][3])
 {
     for (int k = 0; k < 3; k++) {
-        projection f = seen_along(k, corner, 3);
-        if (turn_of(&f) != 0)
+        projection f = project_along(k, corner, 3);
+        if (orientation_of(&f) != 0)
             return k;
     }
     return -1;
 }
 
-/* Returns how an edge separates its figure from the other one: 2: the other one is strictly beyond
- * the edge; 1: beyond it or on it; 0: not separated. */
-static int parted_by(const double from[2], const double to[2], int outer, const projection *other)
+/* Compares the other projection with an edge of the first one. Returns 2 if the other projection is
+ * strictly on the outer side of the edge's line, 1 if it is on the outer side or on the line,
+ * otherwise 0. */
+static int separated_by_edge(const double from[2], const double to[2], int outer,
+                             const projection *other)
 {
     int parted = 2;
     for (int i = 0; i < other->corners; i++) {
@@ -65,21 +68,23 @@ static int parted_by(const double from[2], const double to[2], int outer, const 
     return parted;
 }
 
-static int parted_by_edges(const projection *f, const projection *other)
+/* Returns the greatest result of separated_by_edge for the edges of f. */
+static int separated_by_edges(const projection *f, const projection *other)
 {
-    int most = 0, edges = f->corners == 3 ? 3 : 2, inner = f->corners == 3 ? turn_of(f) : 1;
+    int most = 0, edges = f->corners == 3 ? 3 : 2, inner = f->corners == 3 ? orientation_of(f) : 1;
     for (int i = 0; i < edges; i++) {
-        int parted = parted_by(f->corner[i], f->corner[i + 1 == edges ? 0 : i + 1], -inner, other);
+        int parted =
+            separated_by_edge(f->corner[i], f->corner[i + 1 == edges ? 0 : i + 1], -inner, other);
         most = parted > most ? parted : most;
     }
     return most;
 }
 
-/* Returns 2 if the figures have no common point, 1 if they have no common inner point, otherwise 0.
- */
+/* Returns 2 if the projections have no common point, 1 if they have common points but no common
+ * inner point, otherwise 0. */
 static int projections_separated(const projection *f, const projection *g)
 {
-    int by_f = parted_by_edges(f, g), by_g = parted_by_edges(g, f);
+    int by_f = separated_by_edges(f, g), by_g = separated_by_edges(g, f);
     return by_f > by_g ? by_f : by_g;
 }
 
@@ -109,7 +114,7 @@ static bool point_on_segment(const double p[3], const ends *s)
     return ebpo_point_on_triangle(p, s->at[0], s->at[1], s->at[1]);
 }
 
-/* Returns true if the inner points of two segments have one point in common. */
+/* Returns true if two segments have exactly one common point, which is not an end of either. */
 static bool segments_cross(const ends *s, const ends *t)
 {
     double corner[3][3];
@@ -117,11 +122,11 @@ static bool segments_cross(const ends *s, const ends *t)
         return false;
     memcpy(corner, s->at, sizeof s->at);
     memcpy(corner[2], t->at[0], sizeof corner[2]);
-    int axis = axis_of((const double(*)[3])corner);
+    int axis = projection_axis((const double(*)[3])corner);
     if (axis < 0)
         return false;
-    projection f = seen_along(axis, (const double(*)[3])s->at, 2),
-               g = seen_along(axis, (const double(*)[3])t->at, 2);
+    projection f = project_along(axis, (const double(*)[3])s->at, 2),
+               g = project_along(axis, (const double(*)[3])t->at, 2);
     int side[2][2];
     for (int i = 0; i < 2; i++) {
         side[0][i] = ebpo_orient2d(f.corner[0], f.corner[1], g.corner[i]);
@@ -147,7 +152,8 @@ static bool segment_intersects_triangle(const ends *s, const double t[3][3], int
     if (side[0] * side[1] > 0)
         return false;
     if (side[0] == 0 && side[1] == 0 && !s->point) {
-        projection f = seen_along(axis, t, 3), g = seen_along(axis, (const double(*)[3])s->at, 2);
+        projection f = project_along(axis, t, 3),
+                   g = project_along(axis, (const double(*)[3])s->at, 2);
         return projections_separated(&f, &g) != 2;
     }
     for (int i = 0; i < 2; i++)
@@ -159,14 +165,14 @@ static bool segment_intersects_triangle(const ends *s, const double t[3][3], int
     return left || (around[0] <= 0 && around[1] <= 0 && around[2] <= 0);
 }
 
-/* Classifies a pair where one face has no area, or both are in one plane. */
+/* Classifies a pair if a face has no area or both faces are in one plane. */
 static ebpo_pair_kind classify_flat(const double a[3][3], const double b[3][3])
 {
-    int axis_a = axis_of(a), axis_b = axis_of(b);
+    int axis_a = projection_axis(a), axis_b = projection_axis(b);
     if (axis_a >= 0 && axis_b >= 0) {
         static const ebpo_pair_kind kinds[] = { EBPO_PAIR_COPLANAR, EBPO_PAIR_TOUCHING,
                                                 EBPO_PAIR_APART };
-        projection f = seen_along(axis_a, a, 3), g = seen_along(axis_a, b, 3);
+        projection f = project_along(axis_a, a, 3), g = project_along(axis_a, b, 3);
         return kinds[projections_separated(&f, &g)];
     }
     ends s = ends_of(axis_a < 0 ? a : b);
@@ -198,24 +204,23 @@ static void sides_of_plane(const double plane[3][3], const double corner[3][3], 
         side[i] = ebpo_orient3d(plane[0], plane[1], plane[2], corner[i]);
 }
 
-static bool one_side(const int side[3])
+static bool all_on_one_side(const int side[3])
 {
     return side[0] != 0 && side[0] == side[1] && side[1] == side[2];
 }
 
-static bool within_plane(const int side[3]) { return !(side[0] | side[1] | side[2]); }
+static bool all_in_plane(const int side[3]) { return !(side[0] | side[1] | side[2]); }
 
 /* Returns true if corners are strictly on both sides of the plane; otherwise the face at most
  * touches the plane. */
-static bool has_both(const int side[3])
+static bool on_both_sides(const int side[3])
 {
     bool above = side[0] > 0 || side[1] > 0 || side[2] > 0;
     return above && (side[0] < 0 || side[1] < 0 || side[2] < 0);
 }
 
-/* Returns the corner that is alone strictly on one side, while the others are on the other side or
- * in the plane; or the corner that is alone in the plane, while both others are on one side.
- * Prefers the positive side. */
+/* Returns the only corner on the positive side of the plane. If there is none or more than one:
+ * the only corner on the negative side; otherwise the only corner in the plane. */
 static int corner_alone(const int side[3])
 {
     static const int order[] = { 1, -1, 0 };
@@ -228,8 +233,8 @@ static int corner_alone(const int side[3])
     return 0;
 }
 
-/* Turns the corners so that the one that is alone comes first. Returns true if it is not above the
- * others. */
+/* Reorders the corners cyclically so that the one that is alone comes first. Returns true if this
+ * corner is below another one: the other face's plane must then be flipped. */
 static bool turn_corners(const int side[3], int corner[3])
 {
     corner[0] = corner_alone(side);
@@ -250,15 +255,16 @@ bool ebpo_turn_pair(const double a[3][3], const double b[3][3], ebpo_turned_pair
 {
     *kind = EBPO_PAIR_APART;
     sides_of_plane(a, b, out->side_b);
-    if (one_side(out->side_b))
+    if (all_on_one_side(out->side_b))
         return false;
     sides_of_plane(b, a, out->side_a);
-    if (one_side(out->side_a))
+    if (all_on_one_side(out->side_a))
         return false;
-    if (within_plane(out->side_a) || within_plane(out->side_b)) {
+    if (all_in_plane(out->side_a) || all_in_plane(out->side_b)) {
         *kind = classify_flat(a, b);
         return false;
     }
+    /* side_a is relative to B's plane, so the corners of A determine if B's plane is flipped */
     out->flipped_b = turn_corners(out->side_a, out->a);
     out->flipped_a = turn_corners(out->side_b, out->b);
     if (out->flipped_b)
@@ -268,10 +274,10 @@ bool ebpo_turn_pair(const double a[3][3], const double b[3][3], ebpo_turned_pair
     return true;
 }
 
-int ebpo_compare_ends(const double a[3][3], const double b[3][3], const ebpo_turned_pair *t, int q,
-                      int v)
+int ebpo_compare_ends(const double a[3][3], const double b[3][3], const ebpo_turned_pair *t,
+                      int corner_a, int corner_b)
 {
-    return ebpo_orient3d(a[t->a[0]], a[t->a[q]], b[t->b[0]], b[t->b[v]]);
+    return ebpo_orient3d(a[t->a[0]], a[t->a[corner_a]], b[t->b[0]], b[t->b[corner_b]]);
 }
 
 ebpo_pair_kind ebpo_triangle_pair(const double a[3][3], const double b[3][3])
@@ -288,6 +294,6 @@ ebpo_pair_kind ebpo_triangle_pair(const double a[3][3], const double b[3][3])
     int upper = ebpo_compare_ends(a, b, &t, 2, 2);
     if (upper < 0)
         return EBPO_PAIR_APART;
-    bool through = has_both(t.side_a) && has_both(t.side_b);
+    bool through = on_both_sides(t.side_a) && on_both_sides(t.side_b);
     return through && lower < 0 && upper > 0 ? EBPO_PAIR_CROSSING : EBPO_PAIR_TOUCHING;
 }

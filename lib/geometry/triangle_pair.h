@@ -6,6 +6,7 @@
 
 #include <ebpo/pair.h>
 
+/* Compares two points by x, then y, then z: -1, 0 or 1. */
 static inline int ebpo_corner_order(const double p[3], const double q[3])
 {
     for (int k = 0; k < 3; k++)
@@ -14,20 +15,20 @@ static inline int ebpo_corner_order(const double p[3], const double q[3])
     return 0;
 }
 
-/* Returns the relation of two faces, exact for every finite double; docs/develop/collision.md
- * defines the kinds. Swapping the faces or renumbering corners changes nothing. Pure functions, any
- * thread. */
+/* Returns the relation of two faces, exact for every finite double. docs/develop/collision.md
+ * defines the kinds. The result does not depend on the order of the faces or of their corners. Pure
+ * functions, any thread. */
 
 ebpo_pair_kind ebpo_triangle_pair(const double a[3][3], const double b[3][3]);
 
 /* Two faces A and B whose planes intersect in a line that both faces reach, prepared for the tests
- * on that line. The corners are turned so that a[0] is alone on the positive side of B's plane, and
- * b[0] alone on that of A's plane. `flipped_b` and `flipped_a` say whether the orientation of B's
- * and A's plane was reversed for this. */
+ * on that line. The corners are reordered so that a[0] is alone on the positive side of B's plane,
+ * and b[0] is alone on the positive side of A's plane. For this purpose the orientation of a plane
+ * may be reversed: of A's plane if `flipped_a`, of B's plane if `flipped_b`. */
 typedef struct ebpo_turned_pair {
     int a[3], b[3]; /* indices of corners */
-    /* side of each corner, by its index in its face, relative to the other face's plane before it
-     * is flipped */
+    /* side of each corner, by the corner's original index, relative to the other face's plane
+     * before the plane is flipped */
     int side_a[3], side_b[3];
     bool flipped_a, flipped_b;
 } ebpo_turned_pair;
@@ -36,10 +37,11 @@ typedef struct ebpo_turned_pair {
 bool ebpo_turn_pair(const double a[3][3], const double b[3][3], ebpo_turned_pair *out,
                     ebpo_pair_kind *kind);
 
-/* Returns the sign of (end of B's edge b[0], b[v]) - (end of A's edge a[0], a[q]) on the common
- * line, directed by the orientation of a[0] a[1] a[2] and b[0] b[1] b[2]; 0: the edges intersect.
- */
-int ebpo_compare_ends(const double a[3][3], const double b[3][3], const ebpo_turned_pair *t, int q,
-                      int v);
+/* Compares the points where two edges intersect the common line of the planes: the edge from a[0]
+ * to a[corner_a], and the edge from b[0] to b[corner_b]. Returns the sign of (point of B's edge) -
+ * (point of A's edge) along the line; 0: the edges intersect. The orientations of the reordered
+ * faces define the direction of the line. */
+int ebpo_compare_ends(const double a[3][3], const double b[3][3], const ebpo_turned_pair *t,
+                      int corner_a, int corner_b);
 
 #endif

@@ -38,10 +38,9 @@ bool ebpo_h5_is_elsewhere(hid_t set);
 /* Returns the stored type for little-endian integers of `size` bytes; -1 for another size. */
 hid_t ebpo_h5_integer_type(unsigned size, bool is_signed);
 
-/* A virtual file driver, through which libhdf5 writes. libhdf5 1.10 does not survive a failing
- * write: unflushed data stays behind with an id that has lost its file, and libhdf5 fails on it
- * when it is closed or at exit. This driver stores the first failure, which all later calls of this
- * module report. To libhdf5 all writes appear to succeed, so libhdf5 always terminates. */
+/* A virtual file driver, through which libhdf5 writes. Stores the first failed write, which all
+ * later calls of this module report. For libhdf5 all writes appear to succeed; sink.c explains why.
+ */
 
 typedef struct ebpo_h5_sink {
     hid_t id;        /* libhdf5's registration of the driver */
@@ -58,8 +57,8 @@ typedef struct ebpo_h5_sink {
  * the scope. */
 EBPO_MUST_USE ebpo_status ebpo_h5_sink_open(ebpo_h5_sink **out, const char *path, const char *shown,
                                             ebpo_error *error);
-/* Makes a file access list use the sink; returns false when libhdf5 refuses. Call it inside the
- * scope. */
+/* Makes a file access property list use the sink; returns false when libhdf5 refuses. Call it
+ * inside the scope. */
 bool ebpo_h5_sink_use(ebpo_h5_sink *sink, hid_t fapl);
 /* Stores a failure, if it is the first one. */
 void ebpo_h5_sink_fail(ebpo_h5_sink *sink, const ebpo_error *error);

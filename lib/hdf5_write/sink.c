@@ -1,8 +1,9 @@
-/* The virtual file driver through which libhdf5 writes. libhdf5 1.10 does not survive a failing
- * write: unflushed data stays behind with an id that has lost its file, and libhdf5 fails on it at
- * exit. So the driver stores the first failure, which all later calls of this module report; to
- * libhdf5 all writes appear to succeed, so libhdf5 always terminates. Bytes go to a file or,
- * without one, to memory. */
+/* The virtual file driver through which libhdf5 writes to a file or to memory.
+ *
+ * libhdf5 1.10 does not survive a failed write: it keeps unflushed data and an id whose file is
+ * already released, and fails when it uses this id at exit. So the driver stores the first failure,
+ * and all later calls of this module report it. For libhdf5 all writes appear to succeed, so that
+ * libhdf5 always closes the file normally. */
 #include "hdf5_write/h5_parts.h"
 
 #include <errno.h>
@@ -15,17 +16,18 @@
 #include "core/alloc.h"
 #include "core/error.h"
 
-/* No system writes more in one call. */
+/* Maximum number of bytes for one call of pread or pwrite. Some systems transfer no more than about
+ * 2 GiB. */
 static const size_t PIECE_MAX = (size_t)1 << 30;
 
-/* libhdf5's view of an open file; the first member is libhdf5's own. */
+/* An open file, as libhdf5 sees it. libhdf5 uses only the first member. */
 typedef struct sink_file {
     H5FD_t libhdf5;
     ebpo_h5_sink *sink;
     haddr_t end_of_addresses;
 } sink_file;
 
-/* The content of a file access list. */
+/* The driver's data in a file access property list. */
 typedef struct sink_choice {
     ebpo_h5_sink *sink;
 } sink_choice;
@@ -104,8 +106,9 @@ static H5FD_t *sink_open(const char *name, unsigned flags, hid_t fapl, haddr_t a
 {
     (void)name;
     (void)address_max;
-    (void)
-        flags; /* the sink was empty when it was made; libhdf5 may open and close it at any time */
+    /* flags (create, truncate) are ignored: the sink is empty when it is made, and libhdf5 may open
+     * it again later, when it must not be truncated */
+    (void)flags;
     const sink_choice *choice = H5Pget_driver_info(fapl);
     if (!choice)
         return NULL;
@@ -125,7 +128,7 @@ static herr_t sink_close(H5FD_t *file)
     return 0;
 }
 
-/* Same as in libhdf5's own driver; the offsets of metadata depend on it. */
+/* Returns the same flags as libhdf5's default driver. The offsets of metadata depend on them. */
 static herr_t sink_query(const H5FD_t *file, unsigned long *flags)
 {
     (void)file;
@@ -153,7 +156,7 @@ static haddr_t sink_get_eof(const H5FD_t *file, H5FD_mem_t type)
     return ((const sink_file *)file)->sink->size;
 }
 
-/* Returns the number of bytes read; bytes beyond the end are zeros. */
+/* Returns the number of bytes read, which is less than `size` at the end of the file. */
 static size_t read_file(ebpo_h5_sink *sink, uint64_t at, size_t size, uint8_t *to)
 {
     size_t done = 0;
@@ -184,7 +187,7 @@ static herr_t sink_read(H5FD_t *file, H5FD_mem_t type, hid_t dxpl, haddr_t addre
         there = sink->size - address < size ? (size_t)(sink->size - address) : size;
     if (sink->fd < 0 && there)
         memcpy(buffer, sink->memory + address, there);
-    memset((uint8_t *)buffer + there, 0, size - there);
+    memset((uint8_t *)buffer + there, 0, size - there); /* bytes beyond the end are zeros */
     return 0;
 }
 
@@ -239,7 +242,7 @@ static herr_t sink_write(H5FD_t *file, H5FD_mem_t type, hid_t dxpl, haddr_t addr
     return 0;
 }
 
-/* Makes the file end at its last address. */
+/* Makes the file end at the end of its addresses. */
 static herr_t sink_truncate(H5FD_t *file, hid_t dxpl, hbool_t closing)
 {
     (void)dxpl;
@@ -262,7 +265,7 @@ static const H5FD_class_t sink_class = {
     .name = "ebpo sink",
     .maxaddr = (haddr_t)INT64_MAX,
     .fc_degree = H5F_CLOSE_STRONG,
-    /* libhdf5 copies it as bytes, because there are no functions to copy it */
+    /* libhdf5 copies this struct as bytes, because the class has no functions to copy it */
     .fapl_size = sizeof(sink_choice),
     .open = sink_open,
     .close = sink_close,
@@ -276,9 +279,9 @@ static const H5FD_class_t sink_class = {
     .fl_map = H5FD_FLMAP_DICHOTOMY,
 };
 
-/* Registers the driver for each file: the caller may have closed and reopened libhdf5 since. The
- * registration stays until the file is closed, because libhdf5 calls the driver's `close` through
- * it after releasing its own reference. */
+/* Registers the driver again for each file, because the caller may have closed libhdf5 (H5close)
+ * after the previous file. The registration stays until the file is closed: libhdf5 releases its
+ * own reference to the registration first, and calls the driver's `close` after that. */
 bool ebpo_h5_sink_use(ebpo_h5_sink *sink, hid_t fapl)
 {
     sink_choice choice = { sink };

@@ -1,8 +1,8 @@
-/* Sources of a file's bytes: a regular file by pread, memory of the caller, or a URL
- * (http_source.c), all as ebpo_source. An input is a source with a name for messages and a count of
- * reads; each read is bounded by the source's size. Files are not mapped, because the process would
- * end if another program shortened a mapped file. Also recognises URLs, and shows them without
- * passwords. */
+/* Sources of a file's bytes (ebpo_source): a regular file, which is read by pread, and memory of
+ * the caller. http_source.c has the source for URLs. An input is a source with a name for messages
+ * and a count of reads; each read must be within the source's size. Files are not mapped, because
+ * the process would end if another program shortened a mapped file. Also recognises URLs, and
+ * removes passwords from URLs for messages. */
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
@@ -18,7 +18,7 @@
 #include "core/error.h"
 #include "io/byte_source.h"
 
-/* No system reads more in one call. */
+/* Maximum number of bytes for one call of pread. Some systems read no more than about 2 GiB. */
 static const uint64_t PIECE_MAX = UINT64_C(1) << 30;
 
 typedef struct path_source {
@@ -66,7 +66,8 @@ static ebpo_status fail_to_open(const char *path, ebpo_error *error)
     return ebpo_fail_errno(error, path, "cannot be opened");
 }
 
-/* Opens non-blocking: a pipe must not block. */
+/* Opens a regular file and gets its size. The file is opened with O_NONBLOCK, so that the call does
+ * not wait if the path is a pipe. */
 static ebpo_status open_regular(const char *path, int *fd, uint64_t *size, ebpo_error *error)
 {
     struct stat facts;
@@ -152,8 +153,8 @@ ebpo_source ebpo_source_of_memory(const void *data, uint64_t size)
     };
 }
 
-/* Returns the number of bytes that the source fetched before it was opened. They are counted once,
- * however often this is called. */
+/* Returns the number of bytes at the beginning that the source had before the input was opened.
+ * ebpo_input_open adds these bytes to input->bytes, so reads of these bytes add nothing. */
 static uint64_t bytes_prefetched(const ebpo_input *input)
 {
     return input->source.prefetched < input->source.size ? input->source.prefetched
@@ -191,7 +192,7 @@ ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, uint64_t size, v
     if (offset > input->source.size || size > input->source.size - offset)
         return ebpo_fail_at(error, EBPO_E_FORMAT, input->shown, "", (int64_t)offset,
                             "bytes %" PRIu64 " to %" PRIu64
-                            " are named, but the file ends at %" PRIu64
+                            " are needed, but the file ends at %" PRIu64
                             "; get a fresh copy of the file",
                             offset, offset + size - 1, input->source.size);
     uint64_t begin = offset > bytes_prefetched(input) ? offset : bytes_prefetched(input);
@@ -217,7 +218,7 @@ void ebpo_input_expect(ebpo_input *input, const ebpo_range *ranges, size_t count
         return;
     for (size_t i = 0; i < count; i++)
         if (ranges[i].offset > size || ranges[i].size > size - ranges[i].offset)
-            return; /* the read will report it */
+            return; /* the read reports the error */
     input->source.prefetch(input->source.user, ranges, count);
 }
 

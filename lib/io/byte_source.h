@@ -1,5 +1,5 @@
-/* Sources of a file's bytes: regular files and memory as ebpo_source, and an input, which is a
- * source with a name and a count of its use. */
+/* Sources of a file's bytes (ebpo_source): regular files and memory. An input is a source with a
+ * name for messages and a count of reads. */
 #ifndef EBPO_IO_BYTE_SOURCE_H
 #define EBPO_IO_BYTE_SOURCE_H
 
@@ -22,7 +22,9 @@ ebpo_source ebpo_source_of_memory(const void *data, uint64_t size);
 typedef struct ebpo_input {
     ebpo_source source;
     char *shown; /* the name for messages */
-    _Atomic uint64_t bytes, reads;
+    /* bytes requested from the source, including those that it had before the input was opened */
+    _Atomic uint64_t bytes;
+    _Atomic uint64_t reads; /* number of requests */
 } ebpo_input;
 
 /* Takes ownership of the source; on failure (EBPO_E_MEMORY) closes it. `name` is copied. */
@@ -41,7 +43,7 @@ EBPO_MUST_USE ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, ui
  * copy in place of the named file (open_file.c). */
 int ebpo_input_descriptor(const ebpo_input *input);
 
-/* Returns true when prefetch hints are useful. */
+/* Returns true if the source accepts prefetch hints, as sources for remote files do. */
 static inline bool ebpo_input_expects(const ebpo_input *input)
 {
     return input->source.prefetch != NULL;
@@ -52,14 +54,15 @@ static inline bool ebpo_input_is_far(const ebpo_input *input)
     return input->source.prefetch && input->source.prefetched &&
            input->source.prefetched < input->source.size;
 }
-/* Passes on prefetch hints. Ranges beyond the source's end are ignored: reading them will fail. */
+/* Sends prefetch hints to the source. If a range is beyond the source's end, sends none: the read
+ * then fails. */
 void ebpo_input_expect(ebpo_input *input, const ebpo_range *ranges, size_t count);
 
-/* Returns true when the system accepts prefetch hints for the source, which help where the data is
- * on a disk: true for a file opened by its name. */
+/* Returns true if the operating system accepts prefetch hints for the input: the input is a file
+ * opened by its path. Such hints help if the data is on a disk. */
 bool ebpo_input_hints(const ebpo_input *input);
-/* Passes prefetch hints to the system, which starts reading without blocking. Large ranges are
- * skipped, because the system reads ahead within them by itself. */
+/* Sends prefetch hints to the operating system, which then reads in the background. Ranges of 1 MiB
+ * or more are skipped, because the system reads ahead within them by itself. */
 void ebpo_input_hint(ebpo_input *input, const ebpo_range *ranges, size_t count);
 
 /* Sources by URL (ebpo/http.h). */

@@ -156,8 +156,9 @@ typedef struct ebpo_import_format {
         *ending; /* ending of file names: ".obj"; without the dot, the mesh's source_format */
     /* Returns true if the file begins like files of this format. */
     bool (*recognise)(const uint8_t *data, uint64_t size);
-    bool mark_comes_first; /* the mark counts, whatever format the name indicates */
-    bool has_no_mark;      /* files of other formats may begin in the same way */
+    /* the beginning of the file decides, also if the name has the ending of another format */
+    bool mark_comes_first;
+    bool has_no_mark; /* files of other formats may begin in the same way */
     /* Exactly one of `build` and `read` is set. `build` adds the content of the file to a mesh
      * under construction. `read` creates the complete mesh, reports progress, and clears `out` on
      * failure. Errors are those of ebpo_import_memory. */

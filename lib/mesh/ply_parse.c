@@ -23,8 +23,8 @@ bool ebpo_ply_recognise(const uint8_t *data, uint64_t size)
     return ebpo_ply_first_line(data, size, &line_end) != NULL;
 }
 
-/* Computes the least number of bytes that all rows can take. Returns false when the number does not
- * fit 64 bits. */
+/* Computes the minimum number of bytes of all rows of an element. Returns false if the number does
+ * not fit into 64 bits. */
 static bool least_bytes(const ebpo_ply_parser *p, const ebpo_ply_element *element, uint64_t *bytes)
 {
     uint64_t row = element->row_bytes;
@@ -36,7 +36,7 @@ static bool least_bytes(const ebpo_ply_parser *p, const ebpo_ply_element *elemen
 
 /* Checks, before anything is allocated, that the file can hold the rows that its header declares.
  */
-static ebpo_status check_counts(ebpo_ply_parser *p)
+static ebpo_status check_file_size(ebpo_ply_parser *p)
 {
     uint64_t left = p->size - p->header.body;
     /* the blank after the last value may be missing */
@@ -63,7 +63,8 @@ static ebpo_status check_counts(ebpo_ply_parser *p)
     return EBPO_OK;
 }
 
-static ebpo_status check_parts(const ebpo_ply_parser *p)
+/* Checks that the mesh has faces, and not too many vertices or faces. */
+static ebpo_status check_counts(const ebpo_ply_parser *p)
 {
     const ebpo_ply_header *h = &p->header;
     uint64_t vertices = h->element[h->vertex].count,
@@ -82,8 +83,9 @@ static ebpo_status check_parts(const ebpo_ply_parser *p)
     return EBPO_OK;
 }
 
-/* Returns true if all three coordinates are floats; then the mesh stores floats. Otherwise it
- * stores doubles, which hold every other type exactly. Points are doubles. */
+/* Returns true if the mesh stores coordinates as floats: all three are floats in the file. Other
+ * types are stored as doubles, which represent them exactly. For a list of query points (p->strict)
+ * the coordinates are always stored as doubles. */
 static bool all_float(const ebpo_ply_parser *p)
 {
     const ebpo_ply_header *h = &p->header;
@@ -132,8 +134,8 @@ static ebpo_status read_element(ebpo_ply_parser *p, const ebpo_ply_element *elem
                                                 : ebpo_ply_binary_element(p, element, store);
 }
 
-/* Reads faces that come before the vertices: skips them, reads the vertices, then reads the faces,
- * because triangulation needs positions. */
+/* Reads the elements before the vertices, for example faces. read_body has skipped these elements,
+ * because the triangulation of faces needs the positions of vertices. */
 static ebpo_status read_early_faces(ebpo_ply_parser *p)
 {
     uint64_t at = p->at, line = p->line;
@@ -164,7 +166,7 @@ static ebpo_status read_body(ebpo_ply_parser *p)
     return status;
 }
 
-/* Gives back the unused capacity of the face array, which grows by halves. */
+/* Releases the unused capacity of the face array, which grows by half of its size at a time. */
 static void trim_faces(ebpo_ply_parser *p)
 {
     if (p->face_capacity == p->mesh->face_count || p->mesh->workspace)
@@ -183,6 +185,7 @@ static void describe_source(ebpo_ply_parser *p)
     p->mesh->source_size = p->size;
 }
 
+/* Notes in the attributes which content of the file was not read. */
 static ebpo_status note_unread(ebpo_ply_parser *p)
 {
     bool more = p->header.encoding == EBPO_PLY_ASCII && ebpo_ply_ascii_more(p);
@@ -208,7 +211,7 @@ static ebpo_status note_unread(ebpo_ply_parser *p)
     return EBPO_OK;
 }
 
-/* Releases everything except the mesh. */
+/* Frees everything except the mesh. */
 static void free_parser(ebpo_ply_parser *p)
 {
     if (p->c_locale)
@@ -233,9 +236,9 @@ ebpo_status ebpo_ply_parse_all(ebpo_mesh *out, const uint8_t *data, uint64_t siz
                           .error = error };
     ebpo_status status = ebpo_ply_header_parse(&p.header, data, size, p.name, error);
     if (status == EBPO_OK)
-        status = check_counts(&p);
+        status = check_file_size(&p);
     if (status == EBPO_OK)
-        status = check_parts(&p);
+        status = check_counts(&p);
     if (status == EBPO_OK)
         status = allocate_arrays(&p);
     if (status == EBPO_OK && attributes)
@@ -288,13 +291,13 @@ ebpo_status ebpo_points_parse_ply(const void *data, uint64_t size, const char *n
     *count = 0;
     ebpo_status status = ebpo_ply_header_parse(&p.header, p.data, size, p.name, error);
     if (status == EBPO_OK)
-        status = check_counts(&p);
+        status = check_file_size(&p);
     if (status == EBPO_OK)
         status = allocate_vertices(&p);
     p.at = p.header.body;
     p.line = p.header.body_line;
-    for (int64_t i = 0; status == EBPO_OK && i <= p.header.vertex;
-         i++) /* data after the vertices are not read */
+    /* data after the vertices is not read */
+    for (int64_t i = 0; status == EBPO_OK && i <= p.header.vertex; i++)
         status = read_element(&p, &p.header.element[i], i == p.header.vertex);
     if (status == EBPO_OK) {
         *xyz = mesh.xyz64;
