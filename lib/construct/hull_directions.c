@@ -1,13 +1,15 @@
-/* Computes a small convex hull. Only the directions of its facets are used, so that a rounding
- * error may enlarge an envelope but never breaks containment.
+/* Computes a small convex hull. Envelopes use only the directions of its facets. So a rounding
+ * error here may enlarge an envelope, but the envelope still contains the faces.
  *
- * The hull grows point by point: each point beyond the hull replaces the facets that the point is
- * above (a beneath-beyond algorithm in doubles). Points that are extreme along the axes and
- * diagonals come first, so that most other points are inside the hull when they are tested. Facets
- * are kept as planes by coordinate, for the kernel that tests a point against all of them
- * (sweep.h). Limits: EBPO_HULL_POINTS points, EBPO_HULL_FACETS facets; further points and facets
- * are omitted. Ties are ordered by indices of points, so that all machines return the same facets
- * in the same order. */
+ * The hull grows point by point: a point outside the hull is above some facets and replaces them by
+ * new facets (a beneath-beyond algorithm in doubles). Points that are extreme along the axes and
+ * diagonals come first, so that most other points are inside the hull when they are tested. The
+ * planes of the facets are stored as a structure of arrays (nx, ny, nz, d), for the kernel that
+ * tests a point against all planes (sweep.h).
+ *
+ * Limits: with more than EBPO_HULL_POINTS points there is no hull (0 facets). When the hull has
+ * EBPO_HULL_FACETS facets, the remaining points are omitted. Ties are ordered by indices of points,
+ * so that all machines return the same facets in the same order. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -22,20 +24,26 @@ static const double flat = 1e-9; /* a point nearer to a plane than this counts a
 
 _Static_assert((int)EBPO_HULL_FACETS <= (int)EBPO_SWEEP_PLANES, "sweeps have space for the facets");
 
-enum { SPACE = EBPO_HULL_FACETS, EXTREMES = 14, VISIBLE = 192 };
+enum {
+    SPACE = EBPO_HULL_FACETS,
+    EXTREMES = 14, /* number of directions of extreme points: axes and diagonals, both ways */
+    VISIBLE = 192  /* maximum number of facets that one point replaces */
+};
 
-/* Planes by coordinate: each point is tested against all of them. */
+/* The hull so far. */
 typedef struct hull {
     const ebpo_sweep *sweep;
     const double (*p)[3];
-    /* padding to a multiple of four: planes that no point is above */
+    /* planes n . x = d of the facets, padded to a multiple of four with planes that no point is
+     * above */
     double nx[SPACE + 4], ny[SPACE + 4], nz[SPACE + 4], d[SPACE + 4];
     double length[SPACE]; /* twice the area of each facet */
-    double beyond;        /* a point that is no farther from the hull is omitted */
+    double tolerance;     /* points at most this far outside the hull are omitted */
     uint16_t corner[SPACE][3];
     int count, capacity;
 } hull;
 
+/* Computes the normal of the triangle a, b, c; its length is twice the area. */
 static void cross_of(const double (*p)[3], int a, int b, int c, double n[3])
 {
     double u[3], v[3];
@@ -52,7 +60,7 @@ static void set_plane(hull *h, int i, const double n[3], double d)
     h->d[i] = d;
 }
 
-/* Makes the facet at index i; returns false when it has no area. */
+/* Makes the facet a, b, c at index i. Returns false if it has no area. */
 static bool make_facet(hull *h, int i, int a, int b, int c)
 {
     double n[3];
@@ -88,7 +96,8 @@ static void set_count(hull *h, int count)
 
 /* --- the first four facets --- */
 
-/* Finds the most extreme points along the axes and the diagonals, in both directions. */
+/* Finds the extreme point in each direction. Directions 2 w and 2 w + 1 are opposite; 0 to 5 are
+ * along the axes, the others along the diagonals. */
 static void find_extremes(const double (*p)[3], int count, int at[EXTREMES])
 {
     double best[EXTREMES];
@@ -113,6 +122,7 @@ static double distance_squared(const double a[3], const double b[3])
     return ebpo_vec3_dot(d, d);
 }
 
+/* Returns the height of p above the plane through `from` with normal n, multiplied by |n|. */
 static double height_above(const double n[3], const double from[3], const double p[3])
 {
     double difference[3];
@@ -120,7 +130,8 @@ static double height_above(const double n[3], const double from[3], const double
     return ebpo_vec3_dot(n, difference);
 }
 
-/* Finds four points far from each other; returns false when no four span a volume. */
+/* Finds four points far from each other. The fourth is below the facet of the first three. Returns
+ * false if the points span no volume. */
 static bool first_four(const double (*p)[3], int count, const int extremes[EXTREMES], int corner[4])
 {
     double best = -1, n[3];
@@ -144,7 +155,7 @@ static bool first_four(const double (*p)[3], int count, const int extremes[EXTRE
         if (fabs(h) > fabs(side))
             side = h, corner[3] = i;
     }
-    if (side > 0) { /* the fourth is behind the first three */
+    if (side > 0) { /* the fourth point is above the facet: reverse the facet */
         int swap = corner[1];
         corner[1] = corner[2];
         corner[2] = swap;
@@ -152,6 +163,7 @@ static bool first_four(const double (*p)[3], int count, const int extremes[EXTRE
     return fabs(side) > flat * length;
 }
 
+/* Makes the four facets of a tetrahedron. */
 static bool first_facets(hull *h, const int c[4])
 {
     static const int sides[4][3] = { { 0, 1, 2 }, { 0, 3, 1 }, { 1, 3, 2 }, { 2, 3, 0 } };
@@ -202,14 +214,15 @@ static void close_gaps(hull *h, const uint16_t *place, int from, int to, int cou
     set_count(h, count);
 }
 
-/* Adds a point to the hull. Returns false when too many facets change in one step; then no more
- * points can be added. (Facets may overlap then; they still give directions.) */
+/* Adds a point to the hull. Returns false if the point would replace more than VISIBLE facets or if
+ * the capacity is reached. The hull may then have overlapping facets, so no more points can be
+ * added, but its facets still give directions. */
 static bool add_point(hull *h, int point)
 {
     uint16_t visible[VISIBLE];
     uint32_t edges[3 * VISIBLE], reversed[3 * VISIBLE];
     const ebpo_sweep_planes planes = { h->nx, h->ny, h->nz, h->d, (h->count + 3) / 4 };
-    int seen = h->sweep->seen(&planes, h->p[point], h->beyond, flat, visible, VISIBLE), made = 0,
+    int seen = h->sweep->seen(&planes, h->p[point], h->tolerance, flat, visible, VISIBLE), made = 0,
         count = h->count;
     if (seen == 0)
         return true;
@@ -233,6 +246,7 @@ static bool add_point(hull *h, int point)
     return true;
 }
 
+/* Adds the extreme points, then all points, until a limit is reached. */
 static void grow_hull(hull *h, int count, const int extremes[EXTREMES])
 {
     for (int w = 0; w < EXTREMES; w++)
@@ -252,7 +266,7 @@ int ebpo_hull_facets(const double (*points)[3], int count, double tolerance,
     h.p = points;
     h.count = 0;
     h.capacity = capacity < SPACE ? capacity : SPACE;
-    h.beyond = tolerance;
+    h.tolerance = tolerance;
     if (count < 4 || capacity < 4 || count > EBPO_HULL_POINTS)
         return 0;
     find_extremes(points, count, extremes);

@@ -1,10 +1,13 @@
-/* Writes a file: ebpo_tree_write. The headers come first (groups, array headers, attributes, and
- * HDF5's indexes of chunks). The same file is first written in memory to determine their size. Then
- * several threads encode and compress chunks, some at a time. The chunks are appended in the order
- * of chunk_layout.c: first the chunks with which a reader locates a subtree, then all others. The
- * lists of chunk checksums and chunk offsets are the last chunks. Content checksums are computed
- * meanwhile. ebpo_file_repack reads a file and writes it again with other options. Source:
- * format-spec/README.md, sections 2, 9 and 20. */
+/* Writes a file: ebpo_tree_write. ebpo_file_repack reads a file and writes it again with other
+ * options. Source: format-spec/README.md, sections 2, 9 and 20.
+ *
+ * The headers (groups, array headers, attributes) come first in the file. To determine their size,
+ * the same file is first written in memory, with tiny chunks. Then several threads encode and
+ * compress the chunks of a window (WINDOW chunks) at a time. The chunks are appended in the order
+ * of chunk_layout.c: first the chunks with which a reader locates a subtree, then all others.
+ * HDF5's chunk indexes are one block before the first chunk of an array with several chunks. The
+ * list of chunk checksums and the list of chunk sizes are the last chunks. Content checksums are
+ * computed while chunks are compressed. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -29,19 +32,23 @@
 
 /* --- headers --- */
 
-/* The lists of all chunks, in file order. */
-typedef enum header_list { LIST_CHECKSUMS, LIST_PLACES, LISTS } header_list;
+/* The lists that have a row for each chunk. */
+typedef enum header_list {
+    LIST_CHECKSUMS, /* /chunk_sums: chunk checksums, in the order of arrays */
+    LIST_SIZES, /* /subtrees/places: stored sizes in file order; readers add them up to offsets */
+    LISTS
+} header_list;
 
 typedef struct file_headers {
-    ebpo_plan *plan; /* opening sets the handles of its arrays */
+    ebpo_plan *plan; /* lay_out and headers_begin_index set the handles of its arrays */
     ebpo_h5_out out;
     ebpo_h5_id root;
-    /* lists of all chunks; a list without rows is not written */
+    /* a list without rows is not written */
     ebpo_array_out list[LISTS];
     uint64_t chunks; /* number of chunks of the plan's arrays */
     int codec_level;
     uint64_t head_bytes;  /* size of the headers */
-    uint64_t index_bytes; /* size of HDF5's indexes; 0 if no array has several chunks */
+    uint64_t index_bytes; /* size of HDF5's chunk indexes; 0 if no array has several chunks */
 } file_headers;
 
 /* The file's first chunk, which contains the root's type. It is written with the headers. */
@@ -50,10 +57,12 @@ typedef struct first_chunk {
     size_t bytes;
 } first_chunk;
 
-/* HDF5 may enlarge a header within its metadata block by a tenth of the remaining space. This many
- * bytes are reserved if no other header follows in the block. */
+/* Bytes reserved after the array header if the file has only one array. No other array header
+ * follows in the metadata block, and HDF5 may then enlarge this header by up to a tenth of the
+ * block's free space. */
 enum { ALONE_BYTES = 4096 };
 
+/* Returns true if an array has several chunks: HDF5 then writes a chunk index. */
 static bool has_index(const ebpo_plan *plan)
 {
     for (unsigned i = 0; i < plan->count; i++)
@@ -62,6 +71,7 @@ static bool has_index(const ebpo_plan *plan)
     return false;
 }
 
+/* Describes the array of a list with this number of rows. */
 static void plan_list(file_headers *h, header_list list, ebpo_array_id id, uint64_t rows)
 {
     ebpo_array_out *a = &h->list[list];
@@ -74,8 +84,8 @@ static void plan_list(file_headers *h, header_list list, ebpo_array_id id, uint6
                                  .pipeline = h->plan->array[0].shape.pipeline };
 }
 
-/* Initialises the headers. The caller keeps the plan, and ends with headers_close and then
- * ebpo_h5_finish or ebpo_h5_discard. */
+/* Initialises the headers. The caller keeps the plan. At the end, the caller calls headers_close
+ * and then ebpo_h5_finish or ebpo_h5_discard. */
 static void headers_plan(file_headers *h, ebpo_plan *plan, uint64_t chunks,
                          const ebpo_write_options *options)
 {
@@ -85,7 +95,7 @@ static void headers_plan(file_headers *h, ebpo_plan *plan, uint64_t chunks,
     };
     h->out = (ebpo_h5_out)EBPO_H5_OUT_INIT;
     plan_list(h, LIST_CHECKSUMS, EBPO_A_CHUNK_CHECKSUMS, summed ? chunks : 0);
-    plan_list(h, LIST_PLACES, EBPO_A_PLACES,
+    plan_list(h, LIST_SIZES, EBPO_A_PLACES,
               plan->info.subtree_level ? chunks + has_index(plan) + summed : 0);
 }
 
@@ -110,8 +120,9 @@ static ebpo_status make_level_groups(file_headers *h, ebpo_error *error)
     return status;
 }
 
-/* Creates a group of the root with space for all arrays that the group may have. Does nothing if
- * the file does not fulfil `need`. */
+/* Creates a group in the root group, with space for links to all arrays that the group may have.
+ * Does nothing if the file does not have the arrays of this group (`need`: EBPO_NEEDS_MESH and so
+ * on). */
 static ebpo_status make_root_group(file_headers *h, const char *path, uint32_t need,
                                    ebpo_error *error)
 {
@@ -126,8 +137,8 @@ static ebpo_status make_root_group(file_headers *h, const char *path, uint32_t n
     return status;
 }
 
-/* Writes a list's offset and the file's size. Readers use the list only if both values still match.
- */
+/* Writes the offset of a list's chunk and the file's size as attributes of the list. Readers use
+ * the list only if both values are those of the file. */
 static ebpo_status headers_put_validity(file_headers *h, header_list list, uint64_t file_bytes,
                                         uint64_t offset, ebpo_error *error)
 {
@@ -154,9 +165,9 @@ static ebpo_status make_array(file_headers *h, ebpo_array_out *a, const first_ch
     return status;
 }
 
-/* Writes all headers and the first chunk. The first chunk is written before attributes enlarge the
- * header of the first array. HDF5 then cannot enlarge the metadata block at the end of the file and
- * must fill it. */
+/* Writes all headers and the first chunk. HDF5 extends a metadata block at the end of the file
+ * instead of using the block's free space. So the first chunk is written behind the block before
+ * attributes enlarge the header of the first array; all later headers then go into the block. */
 static ebpo_status lay_out(file_headers *h, const char *path, const char *shown,
                            uint64_t head_bytes, first_chunk first, ebpo_error *error)
 {
@@ -216,8 +227,8 @@ static ebpo_status headers_lay_out(file_headers *h, const char *path, const char
     return lay_out(h, path, shown, h->head_bytes, first, error);
 }
 
-/* Measures headers and HDF5's indexes by writing the same file in memory, with chunks of one byte.
- */
+/* Measures headers and HDF5's chunk indexes by writing the same file in memory, with chunks of one
+ * byte. */
 static ebpo_status headers_measure(file_headers *h, const char *shown, ebpo_error *error)
 {
     ebpo_plan *plan = h->plan;
@@ -235,8 +246,8 @@ static ebpo_status headers_measure(file_headers *h, const char *shown, ebpo_erro
     if (status == EBPO_OK)
         status = ebpo_h5_head_used(&h->out, capacity, &all, error);
     ebpo_h5_discard(&h->out);
-    /* 8 more bytes, as the last checksum of the headers may end in zero bytes, which are not
-     * counted as used */
+    /* 8 more bytes: the last checksum of the headers may end in zero bytes, which
+     * ebpo_h5_head_used does not count */
     h->head_bytes = (headers + 8 + 7) / 8 * 8;
     if (plan->count == 1)
         h->head_bytes += ALONE_BYTES;
@@ -245,8 +256,9 @@ static ebpo_status headers_measure(file_headers *h, const char *shown, ebpo_erro
     return status;
 }
 
-/* Opens the file again, so that HDF5 allocates its indexes as one block of index_bytes. HDF5
- * allocates them when the first chunk of an array with several chunks is written. */
+/* Opens the file again with metadata blocks of index_bytes, so that all chunk indexes of HDF5 are
+ * in one block. HDF5 allocates the block when the first chunk of an array with several chunks is
+ * written. */
 static ebpo_status headers_begin_index(file_headers *h, ebpo_error *error)
 {
     headers_close(h);
@@ -268,6 +280,7 @@ static ebpo_status headers_begin_index(file_headers *h, ebpo_error *error)
  */
 enum { WINDOW = 128 };
 
+/* A chunk of the window. */
 typedef struct slot {
     const ebpo_array_out *array;
     uint64_t chunk;
@@ -287,15 +300,17 @@ typedef struct writer {
     ebpo_chunk_order order;
     ebpo_array_digest *digest; /* [arrays of the plan] */
     ebpo_content content[EBPO_DIGESTS];
-    uint64_t chunk_bytes, chunks_done;
+    uint64_t chunk_bytes, chunks_done; /* stored bytes and number of the chunks so far */
     uint64_t *sum;       /* [chunks] rows of the list of chunk checksums, if it is written */
     uint64_t *first_sum; /* [arrays of the plan] index in `sum` of the array's first chunk */
-    uint64_t *place;     /* rows of the list of chunk offsets */
-    uint64_t place_count;
-    uint64_t top_bytes; /* end of the chunks with which a reader locates a subtree */
-    uint64_t index_at;  /* offset of HDF5's indexes; 0: none, or not yet written */
+    uint64_t *size_row;  /* rows of the list of chunk sizes, if it is written */
+    uint64_t size_rows;  /* number of these rows so far */
+    uint64_t top_bytes;  /* end of the chunks with which a reader locates a subtree */
+    uint64_t index_at;   /* offset of HDF5's chunk indexes; 0: none, or not yet written */
 } writer;
 
+/* Encodes the rows of chunks begin .. end - 1 of the window; pads the last chunk of an array with
+ * zeros. */
 static ebpo_status fill_slot(void *context, uint64_t begin, uint64_t end, unsigned worker,
                              ebpo_error *error)
 {
@@ -316,6 +331,8 @@ static ebpo_status fill_slot(void *context, uint64_t begin, uint64_t end, unsign
     return EBPO_OK;
 }
 
+/* Adds the chunks of the window to the digests of their arrays, and complete digests to the content
+ * checksums. */
 static void digest_slots(writer *w)
 {
     for (unsigned i = 0; i < w->used; i++) {
@@ -377,6 +394,7 @@ static ebpo_status compress_slot(void *context, uint64_t begin, uint64_t end, un
     return EBPO_OK;
 }
 
+/* Encodes and compresses all chunks of the window. */
 static ebpo_status encode_window(writer *w, ebpo_error *error)
 {
     unsigned threads = w->used > 4 ? w->threads : 1;
@@ -388,22 +406,24 @@ static ebpo_status encode_window(writer *w, ebpo_error *error)
     return status;
 }
 
-static void note_place(writer *w, uint32_t number, uint64_t bytes)
+/* Adds a row to the list of chunk sizes. */
+static void add_size_row(writer *w, uint32_t number, uint64_t bytes)
 {
-    if (!w->head.list[LIST_PLACES].shape.rows)
+    if (!w->head.list[LIST_SIZES].shape.rows)
         return;
-    w->place[w->place_count++] = ebpo_place(number, bytes);
+    w->size_row[w->size_rows++] = ebpo_place(number, bytes);
 }
 
-/* Adds a chunk to the lists and to the sizes. Called in file order, before the chunk is written. */
-static void place_chunk(writer *w, const slot *s)
+/* Adds a chunk to the lists and to the sums of sizes. Called in file order, before the chunk is
+ * written. */
+static void list_chunk(writer *w, const slot *s)
 {
     if (w->index_at == 0 && ebpo_shape_chunks(&s->array->shape) > 1) {
         w->index_at = w->head.head_bytes + w->chunk_bytes;
-        note_place(w, EBPO_PLACE_GAP, w->head.index_bytes);
+        add_size_row(w, EBPO_PLACE_GAP, w->head.index_bytes);
     }
     uint32_t number = ebpo_place_number(s->array->id, s->array->level);
-    note_place(w, number, s->stored_bytes);
+    add_size_row(w, number, s->stored_bytes);
     if (w->head.list[LIST_CHECKSUMS].shape.rows)
         w->sum[w->first_sum[s->array - w->plan.array] + s->chunk] =
             ebpo_place(number, ebpo_chunk_sum(s->stored, s->stored_bytes));
@@ -413,12 +433,13 @@ static void place_chunk(writer *w, const slot *s)
             w->head.head_bytes + w->chunk_bytes + (w->index_at ? w->head.index_bytes : 0);
 }
 
+/* Encodes and writes all chunks of the window, and empties the window. */
 static ebpo_status flush_window(writer *w, ebpo_error *error)
 {
     ebpo_status status = encode_window(w, error);
     for (unsigned i = 0; i < w->used && status == EBPO_OK; i++) {
         const slot *s = &w->slots[i];
-        place_chunk(w, s);
+        list_chunk(w, s);
         if (w->chunks_done++ == 0)
             continue; /* the first chunk was written with the headers */
         status = ebpo_h5_put_chunk(&w->head.out, s->array->path, s->array->handle, &s->array->shape,
@@ -444,6 +465,7 @@ static ebpo_status write_chunks(writer *w, ebpo_error *error)
     return status == EBPO_OK && w->used ? flush_window(w, error) : status;
 }
 
+/* Writes a list as one chunk. *bytes: stored size; 0 for a list without rows. */
 static ebpo_status write_list(writer *w, header_list list, const uint64_t *values, size_t *bytes,
                               ebpo_error *error)
 {
@@ -461,22 +483,23 @@ static ebpo_status write_list(writer *w, header_list list, const uint64_t *value
     return status;
 }
 
-/* Writes the lists, which are the last chunks of the file. If libhdf5 has placed other data between
- * the chunks, the lists are wrong and are marked as invalid. */
+/* Writes the lists, which are the last chunks of the file. If libhdf5 has written other data
+ * between the chunks, the lists are wrong: their attributes are then 0, so that readers ignore
+ * them. */
 static ebpo_status write_lists(writer *w, ebpo_error *error)
 {
     size_t bytes[LISTS];
     uint64_t offset = w->head.head_bytes + w->chunk_bytes + w->head.index_bytes, size = 0;
-    const uint64_t *values[LISTS] = { w->sum, w->place };
+    const uint64_t *values[LISTS] = { w->sum, w->size_row };
     ebpo_status status =
         write_list(w, LIST_CHECKSUMS, values[LIST_CHECKSUMS], &bytes[LIST_CHECKSUMS], error);
     if (status == EBPO_OK && bytes[LIST_CHECKSUMS])
-        note_place(w, ebpo_place_number(EBPO_A_CHUNK_CHECKSUMS, 0), bytes[LIST_CHECKSUMS]);
+        add_size_row(w, ebpo_place_number(EBPO_A_CHUNK_CHECKSUMS, 0), bytes[LIST_CHECKSUMS]);
     if (status == EBPO_OK)
-        status = write_list(w, LIST_PLACES, values[LIST_PLACES], &bytes[LIST_PLACES], error);
+        status = write_list(w, LIST_SIZES, values[LIST_SIZES], &bytes[LIST_SIZES], error);
     if (status == EBPO_OK)
         status = ebpo_h5_size(&w->head.out, &size, error);
-    bool holds = status == EBPO_OK && size == offset + bytes[LIST_CHECKSUMS] + bytes[LIST_PLACES];
+    bool holds = status == EBPO_OK && size == offset + bytes[LIST_CHECKSUMS] + bytes[LIST_SIZES];
     for (header_list l = 0; l < LISTS && status == EBPO_OK; l++) {
         if (w->head.list[l].shape.rows)
             status = headers_put_validity(&w->head, l, holds ? size : 0, holds ? offset : 0, error);
@@ -492,16 +515,16 @@ static ebpo_status make_window(writer *w, ebpo_error *error)
     uint64_t wanted = w->order.count < WINDOW ? w->order.count : WINDOW;
     w->threads = ebpo_thread_count(w->options->threads);
     w->coders = ebpo_alloc_zero(w->threads, sizeof *w->coders);
-    uint8_t *block = ebpo_alloc(wanted, slot_bytes);
-    w->slots[0].raw = block;
+    uint8_t *buffers = ebpo_alloc(wanted, slot_bytes);
+    w->slots[0].raw = buffers;
     w->digest = ebpo_alloc(w->plan.count, sizeof *w->digest);
-    w->place = ebpo_alloc(w->head.list[LIST_PLACES].shape.rows, sizeof *w->place);
+    w->size_row = ebpo_alloc(w->head.list[LIST_SIZES].shape.rows, sizeof *w->size_row);
     w->sum = ebpo_alloc(w->head.list[LIST_CHECKSUMS].shape.rows, sizeof *w->sum);
     w->first_sum = ebpo_alloc(w->plan.count, sizeof *w->first_sum);
-    if (!w->coders || !block || !w->digest || !w->place || !w->sum || !w->first_sum)
+    if (!w->coders || !buffers || !w->digest || !w->size_row || !w->sum || !w->first_sum)
         return ebpo_fail_memory(error, wanted * slot_bytes);
     for (unsigned i = 0; i < wanted; i++) {
-        w->slots[i].raw = block + i * slot_bytes;
+        w->slots[i].raw = buffers + i * slot_bytes;
         w->slots[i].stored = w->slots[i].raw + EBPO_CHUNK_BYTES_MAX;
     }
     uint64_t before = 0;
@@ -512,7 +535,7 @@ static ebpo_status make_window(writer *w, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Encodes the first chunk in advance. */
+/* Encodes the first chunk, which is written with the headers. */
 static ebpo_status encode_first(writer *w, uint8_t *stored, size_t *bytes, ebpo_error *error)
 {
     slot *s = &w->slots[0];
@@ -539,9 +562,12 @@ static ebpo_status put_digests(writer *w, ebpo_error *error)
                : status;
 }
 
+/* Writes the whole file. Does not check where libhdf5 places its metadata. Another version of
+ * libhdf5 may place metadata differently: readers accept such a file, but tests that compare bytes
+ * fail. */
 static ebpo_status write_file(writer *w, const char *path, const char *shown, ebpo_error *error)
 {
-    uint8_t first[256]; /* ample for the encoded chunk, which has two bytes */
+    uint8_t first[256]; /* more than enough: the first chunk has two bytes before it is encoded */
     size_t first_bytes = 0;
     ebpo_status status = encode_first(w, first, &first_bytes, error);
     if (status == EBPO_OK)
@@ -563,8 +589,6 @@ static ebpo_status write_file(writer *w, const char *path, const char *shown, eb
         status = ebpo_facts_put_top(&w->head.out, w->head.root, w->top_bytes, error);
     headers_close(&w->head);
     if (status == EBPO_OK)
-        /* another libhdf5 may place metadata differently: tests would fail, but readers accept it
-         */
         status = ebpo_h5_finish(&w->head.out, error);
     return status;
 }
@@ -583,8 +607,8 @@ static ebpo_status check_options(const ebpo_write_options *options, const char *
     return EBPO_OK;
 }
 
-/* Writes a file and publishes it under its name. If `publish` is NULL, writes directly to `path`.
- */
+/* Writes a file under a temporary name and renames it to `path`. If `publish` is NULL, writes
+ * directly to `path`. `shown`: name for messages. */
 static ebpo_status write_tree(const ebpo_tree *tree, const char *path, const char *shown,
                               ebpo_publish *publish, const ebpo_write_options *options,
                               ebpo_error *error)
@@ -620,7 +644,7 @@ static ebpo_status write_tree(const ebpo_tree *tree, const char *path, const cha
     free(w->coders);
     free(w->slots[0].raw);
     free(w->digest);
-    free(w->place);
+    free(w->size_row);
     free(w->sum);
     free(w->first_sum);
     ebpo_chunk_order_free(&w->order);
@@ -649,7 +673,8 @@ ebpo_status ebpo_tree_write_into(const ebpo_tree *tree, const char *path, const 
 
 /* --- repacking --- */
 
-/* Checks the content of the written file, and that it is the content of the file that was read. */
+/* Checks that the written file has the content checksums of the file that was read, and that its
+ * content matches them. If the checksums differ, checks the content of the file that was read. */
 static ebpo_status check_written(const ebpo_file *from, const ebpo_publish *out,
                                  const ebpo_read_options *read, ebpo_error *error)
 {
@@ -684,8 +709,9 @@ ebpo_status ebpo_file_repack(const ebpo_file *file, const char *path, const ebpo
     ebpo_tree tree = { 0 };
     ebpo_status status = EBPO_TAKE(ebpo_write_options, &wanted, write, error);
     wanted.parts = ~0u;
+    /* before reading, so that a folder without write permission is reported at once */
     if (status == EBPO_OK)
-        status = ebpo_publish_begin(&out, path, error); /* first, as the others may take long */
+        status = ebpo_publish_begin(&out, path, error);
     if (status == EBPO_OK) {
         ebpo_publish_expect_input(&out, &file->in);
         status = ebpo_file_read_tree(file, read, &tree, error);

@@ -36,7 +36,7 @@ enum { EBPO_NO_CELL_FACE = 6, EBPO_KIND_PLANES_MAX = 16 };
 /* A block in a leaf's list. Bits 0 to 28 are the block's number. Bit 29 is set in the last entry of
  * the leaf. Bits 32 to 39 are the lanes that the leaf lists, as other faces may share the block.
  * Bits 40 to 63 are a box around these faces in the cell, set in state EBPO_LEAF_BOUNDED: for each
- * axis four bits for the lower side and four bits for 15 less the upper side, in sixteenths of the
+ * axis four bits for the lower side and four bits for 15 minus the upper side, in sixteenths of the
  * cell, rounded outward. */
 typedef _Atomic uint64_t ebpo_listed_block;
 enum { EBPO_LISTED_CELLS = 16, EBPO_LISTED_BOX = 40, EBPO_LISTED_LANES = 32 };

@@ -1,10 +1,10 @@
-/* Finds the faces that intersect a box: their numbers, or their triangles block by block.
+/* Finds the faces that intersect a box: their indices, or their triangles in batches.
  *
- * The walk goes through the tree depth first, from accel to accel. In each accel it tests the boxes
- * of children, dropping only those certainly outside, then triangles exactly. In remote files the
- * walk sends prefetch hints for the subtrees that it will enter. A face that several subtrees list
- * is returned once, for the first of them. In a subset the query fails when an omitted node
- * intersects the box. */
+ * The walk visits the accels that intersect the box, depth first. In an accel it tests the boxes of
+ * the hierarchy and skips those that are certainly outside. Then it tests triangles exactly. In
+ * remote files the walk sends prefetch hints for the subtrees that it will enter. A face that
+ * several subtrees list is returned once. In a subset the query fails if an omitted node intersects
+ * the box. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -32,7 +32,7 @@ struct box_walk {
     /* For a remote file: the subtrees that the walk will enter, in order, and their number. */
     uint32_t *ahead;
     uint64_t ahead_count, ahead_capacity, entered;
-    /* Called for each accel that the box intersects, depth first; *enough ends the walk. */
+    /* Called for each accel that the box intersects, depth first. `enough` ends the walk. */
     ebpo_status (*take)(box_walk *walk, const ebpo_accel *s, ebpo_error *error);
 };
 
@@ -48,6 +48,7 @@ static ebpo_status check_box(const double min[3], const double max[3], ebpo_erro
 
 /* --- in one accel --- */
 
+/* Adds the slots of a block's faces that intersect the box. */
 static void try_block(box_walk *w, const ebpo_accel *s, uint32_t block)
 {
     for (uint32_t lane = 0; lane < EBPO_BLOCK && !w->no_memory; lane++) {
@@ -64,8 +65,8 @@ static void try_block(box_walk *w, const ebpo_accel *s, uint32_t block)
     }
 }
 
-/* Gathers faces. low, high: the box in the subtree's frame. Boxes of the hierarchy are enlarged by
- * more than the rounding error of floats here. */
+/* Adds the slots of the faces below a child of the hierarchy. low, high: the box in the subtree's
+ * frame. The hierarchy's boxes were enlarged by more than the rounding error of floats here. */
 static void gather_bound(box_walk *w, const ebpo_accel *s, const float low[3], const float high[3],
                          uint32_t child)
 {
@@ -91,7 +92,8 @@ static int compare_slots(const void *a, const void *b)
     return (*x > *y) - (*x < *y);
 }
 
-/* Blocks are numbered in the order of their faces. */
+/* Gathers the slots of one accel and passes them to w->take. Blocks are numbered in the order of
+ * their faces, so sorted slots are in the order of the file. */
 static ebpo_status gather_blocks(box_walk *w, const ebpo_accel *s, ebpo_error *error)
 {
     float low[3], high[3];
@@ -118,8 +120,8 @@ static bool box_matters(void *user, const ebpo_box *box, const ebpo_node *node)
     return ebpo_cell_intersects(box, node->cell, w->min, w->max);
 }
 
-/* Lists the subtrees that the walk will enter. Without memory for the list, each prefetch hint is
- * sent when its subtree is entered. */
+/* Lists the subtrees that the walk will enter. If there is no memory for the whole list, the
+ * other subtrees get their prefetch hints only when they are entered. */
 static void list_ahead(box_walk *w, const ebpo_box *box, ebpo_node node)
 {
     if (ebpo_node_is_uniform(&node) || !box_matters(w, box, &node) || w->no_memory)
@@ -135,8 +137,8 @@ static void list_ahead(box_walk *w, const ebpo_box *box, ebpo_node node)
         list_ahead(w, box, ebpo_model_child(w->context->model, &node, octant));
 }
 
-/* Sends prefetch hints before a subtree is entered: at the first of each window, for the whole
- * window. */
+/* Called before a subtree is entered. At every EBPO_HINTED_MAX-th subtree, sends prefetch hints for
+ * this subtree and the following ones, EBPO_HINTED_MAX in total. */
 static void hint_window(box_walk *w)
 {
     uint64_t at = w->entered++, left = at < w->ahead_count ? w->ahead_count - at : 0;
@@ -161,13 +163,13 @@ static ebpo_status gather_node(box_walk *w, const ebpo_box *box, ebpo_node node,
     return status;
 }
 
-/* Returns EBPO_E_ABSENT if an omitted part of a subset intersects the box. */
+/* Returns EBPO_E_ABSENT if an omitted node of a subset intersects the box. */
 static ebpo_status box_walk_check(box_walk *w, ebpo_error *error)
 {
     return ebpo_check_pruned(w->context, box_matters, w, error);
 }
 
-/* Runs the whole walk and frees the list of slots. */
+/* Runs the whole walk, and frees the lists of slots and of subtrees. */
 static ebpo_status box_walk_run(box_walk *w, ebpo_error *error)
 {
     const ebpo_model *m = w->context->model;
@@ -192,9 +194,9 @@ static bool touches_cell(const ebpo_box *box, const ebpo_node *node, const doubl
     return ebpo_triangle_intersects_box(triangle, low, high);
 }
 
-/* Finds the first accel, depth first, whose cell the face touches. Accels list the faces that touch
- * their cells, and some that only come near them (format-spec, section 5). A face is taken in this
- * first accel, so no list of visited faces is needed. */
+/* Finds the first accel, depth first, whose cell the face intersects. An accel lists the faces that
+ * intersect its cell, and some that are only near its cell (format-spec, section 5). Each face is
+ * taken in this first accel, so no list of visited faces is needed. */
 static bool find_first(const box_walk *w, const ebpo_box *box, ebpo_node node,
                        const double triangle[3][3], uint32_t *entry)
 {
@@ -209,23 +211,25 @@ static bool find_first(const box_walk *w, const ebpo_box *box, ebpo_node node,
     return found;
 }
 
-/* Returns true if the triangle, which intersects the box, is to be taken in the current accel. This
- * is true in exactly one accel. `own`: the current accel owns the face. */
-static bool box_walk_is_first(const box_walk *w, bool own, const double triangle[3][3])
+/* Returns true if the triangle, which intersects the box, is taken in the current accel. This is
+ * true in exactly one accel. `owned`: the current accel owns the face. */
+static bool box_walk_is_first(const box_walk *w, bool owned, const double triangle[3][3])
 {
     const ebpo_model *m = w->context->model;
     ebpo_box box = ebpo_model_box(m);
     uint32_t entry = 0;
     if (m->whole)
         return true;
-    if (own) /* no accel before this one has it */
+    /* No earlier accel lists an owned face. If the face is only near this accel's cell, a later
+     * accel takes it. */
+    if (owned)
         return touches_cell(&box, &w->below, triangle);
     return find_first(w, &box, ebpo_model_root(m), triangle, &entry) && entry == w->below.entry;
 }
 
-/* --- numbers of faces --- */
+/* --- indices of faces --- */
 
-/* A face: its number in the file, and the number that callers get. */
+/* A face: its index in the file, and the index that callers get. */
 typedef struct pair {
     uint64_t file_face, source_face;
 } pair;
@@ -236,7 +240,7 @@ typedef struct gathering {
     uint64_t count, capacity;
 } gathering;
 
-static ebpo_status take_face_number(box_walk *walk, const ebpo_accel *s, ebpo_error *error)
+static ebpo_status take_face_indices(box_walk *walk, const ebpo_accel *s, ebpo_error *error)
 {
     gathering *g = (gathering *)walk;
     if (!ebpo_grow(&g->list, &g->capacity, g->count + walk->count, sizeof *g->list))
@@ -264,9 +268,8 @@ static ebpo_status finish_faces(gathering *g, const uint64_t **faces, uint64_t *
     if (g->count)
         qsort(g->list, g->count, sizeof *g->list, compare_pairs);
     for (uint64_t i = 0; i < g->count; i++)
-        if (i == 0 || g->list[i].file_face != g->list[i - 1].file_face) /* subtrees share faces: a
-                                                                         * face may be in the list
-                                                                         * twice */
+        /* a face that several subtrees list may be in the list twice */
+        if (i == 0 || g->list[i].file_face != g->list[i - 1].file_face)
             c->faces[(*count)++] = g->list[i].source_face;
     *faces = c->faces;
     return EBPO_OK;
@@ -279,7 +282,7 @@ ebpo_status ebpo_faces_in_box(ebpo_context *context, const double min[3], const 
     *faces = NULL;
     *count = 0;
     gathering g = { .walk = {
-                        .context = context, .min = min, .max = max, .take = take_face_number } };
+                        .context = context, .min = min, .max = max, .take = take_face_indices } };
     ebpo_status status = check_box(min, max, error);
     if (status == EBPO_OK)
         status = ebpo_check_mesh(context->model, error);
@@ -293,44 +296,46 @@ ebpo_status ebpo_faces_in_box(ebpo_context *context, const double min[3], const 
     return status;
 }
 
-/* --- triangles, block by block --- */
+/* --- triangles in batches --- */
 
-typedef struct block {
+/* Triangles that are passed to the caller together. */
+typedef struct batch {
     double corners[EBPO_TRIANGLES_MAX][3][3];
     uint64_t faces[EBPO_TRIANGLES_MAX], file_faces[EBPO_TRIANGLES_MAX];
-} block;
+} batch;
 
 typedef struct delivery {
     box_walk walk; /* must be the first member */
-    block *block;
-    uint64_t count; /* triangles in the block */
+    batch *batch;
+    uint64_t count; /* triangles in the batch */
     ebpo_triangles_fn take;
     void *user;
 } delivery;
 
+/* Passes the batch to the caller and empties it. */
 static void hand_over(delivery *d)
 {
     ebpo_triangles all = { .count = d->count,
-                           .corners = (const double(*)[3][3])d->block->corners,
-                           .faces = d->block->faces,
-                           .file_faces = d->block->file_faces };
+                           .corners = (const double(*)[3][3])d->batch->corners,
+                           .faces = d->batch->faces,
+                           .file_faces = d->batch->file_faces };
     if (d->count && !d->walk.enough)
         d->walk.enough = !d->take(d->user, &all);
     d->count = 0;
 }
 
-static ebpo_status take_triangle(box_walk *walk, const ebpo_accel *s, ebpo_error *error)
+static ebpo_status take_triangles(box_walk *walk, const ebpo_accel *s, ebpo_error *error)
 {
     delivery *d = (delivery *)walk;
     (void)error;
     for (uint64_t i = 0; i < walk->count && !walk->enough; i++) {
         uint32_t local = ebpo_accel_slot_face(s, walk->slot[i]);
-        double(*corners)[3] = d->block->corners[d->count];
+        double(*corners)[3] = d->batch->corners[d->count];
         ebpo_accel_triangle(s, walk->slot[i], corners);
         if (!box_walk_is_first(walk, local >= s->shared_count, (const double(*)[3])corners))
             continue;
-        d->block->faces[d->count] = ebpo_accel_source_face(s, local);
-        d->block->file_faces[d->count++] = ebpo_accel_file_face(s, local);
+        d->batch->faces[d->count] = ebpo_accel_source_face(s, local);
+        d->batch->file_faces[d->count++] = ebpo_accel_file_face(s, local);
         if (d->count == EBPO_TRIANGLES_MAX)
             hand_over(d);
     }
@@ -341,21 +346,21 @@ ebpo_status ebpo_triangles_in_box(ebpo_context *context, const double min[3], co
                                   ebpo_triangles_fn function, void *user, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    delivery d = { .walk = { .context = context, .min = min, .max = max, .take = take_triangle },
+    delivery d = { .walk = { .context = context, .min = min, .max = max, .take = take_triangles },
                    .take = function,
                    .user = user };
     ebpo_status status = check_box(min, max, error);
     if (status == EBPO_OK)
         status = ebpo_check_mesh(context->model, error);
+    /* before the first triangle is passed to the caller */
     if (status == EBPO_OK)
-        status = box_walk_check(&d.walk, error); /* checked before the first triangle is passed to
-                                                  * the caller */
-    if (status == EBPO_OK && !(d.block = ebpo_alloc(1, sizeof *d.block)))
-        status = ebpo_fail_memory(error, sizeof *d.block);
+        status = box_walk_check(&d.walk, error);
+    if (status == EBPO_OK && !(d.batch = ebpo_alloc(1, sizeof *d.batch)))
+        status = ebpo_fail_memory(error, sizeof *d.batch);
     if (status == EBPO_OK)
         status = box_walk_run(&d.walk, error);
     if (status == EBPO_OK)
         hand_over(&d);
-    free(d.block);
+    free(d.batch);
     return status;
 }

@@ -1,9 +1,10 @@
 /* Kernels of point in solid: process the faces that a leaf lists, eight at a time.
  *
- * `crossings` counts the faces that a segment along an axis crosses, as far as single precision (in
- * accels of doubles: double precision) is certain. The other faces are decided exactly by inside.c.
- * `cell_faces` finds the cell faces that no face reaches, and the boxes of the leaf's list, at the
- * first queries in the leaf; its comparisons are exact.
+ * sum_crossings sums the crossings of a segment along an axis with the faces. It uses single
+ * precision, or double precision in accels of doubles. Faces that are not certain in this precision
+ * are decided exactly by inside.c. find_reached_cell_faces finds the cell faces that the leaf's
+ * faces reach, and computes the box of each block in the leaf's list. It is called once for each
+ * leaf, during one of the first queries there. Its comparisons are exact.
  *
  * Compiled for several instruction sets with the same results (core/cpu.h). Error bounds:
  * docs/develop/bounds.md; crossings: EBP 2017, 4.2. */
@@ -20,28 +21,30 @@
 
 /* --- crossings --- */
 
-/* Positions of eight faces relative to the segment's line: a bit for each face that turns left
- * around the line, turns right, or may do either. The other faces do not contain a point of the
- * line. */
+/* Positions of eight faces relative to the segment's line, as masks with a bit for each face: faces
+ * whose corners certainly turn left around the line, certainly turn right, or are not certain. All
+ * other faces certainly have no point on the line. */
 typedef struct turns {
     unsigned left, right, open;
 } turns;
 
-/* Combines the turns at the three edges of each face. */
-EBPO_EIGHT turns judge_turns(unsigned some_left, unsigned some_right, unsigned all_left,
-                             unsigned all_right, unsigned lanes)
+/* Combines the turns of the three edges of each face. */
+EBPO_EIGHT turns combine_turns(unsigned some_left, unsigned some_right, unsigned all_left,
+                               unsigned all_right, unsigned lanes)
 {
     return (turns){ lanes & all_left, lanes & all_right,
                     lanes & ~(all_left | all_right | (some_left & some_right)) };
 }
 
-/* Rounding: let R be the largest coordinate of the model's box and M its largest size. The error of
- * a difference q is 2^-23 of q plus 2^-47 R (two floats represent `from` to 2^-48 R). So the error
- * of a cross product is 2^-21 of the sum of its products' sizes plus 2^-45 R M, as no |q| is above
- * M. The error of underflow is far less, as R is above 2^-41 and M above 2^-40. */
+/* Rounding: let R be the greatest |coordinate| of the model's box and M the greatest side of the
+ * box. The error of a difference q is 2^-23 |q| plus 2^-47 R (two floats represent `from` to 2^-48
+ * R). No |q| is above M. So the error of a cross product is 2^-45 R M plus 2^-21 of the sum of the
+ * absolute values of its two products. The error of underflow is far less, because R is above 2^-41
+ * and M above 2^-40. */
 #define TURN_ERROR 0x1p-20f
 
-EBPO_EIGHT void see_axis(const ebpo_face_block *b, int axis, double from, f8 out[3])
+/* Computes the coordinates of the corners on an axis, minus `from`. */
+EBPO_EIGHT void load_relative(const ebpo_face_block *b, int axis, double from, f8 out[3])
 {
     float high = (float)from, low = (float)(from - (double)high);
     ebpo_face_block_floats(b, axis, out);
@@ -49,35 +52,37 @@ EBPO_EIGHT void see_axis(const ebpo_face_block *b, int axis, double from, f8 out
         out[i] = f8_sub(f8_sub(out[i], f8_all(high)), f8_all(low));
 }
 
+/* turn_error: the part of the error bound that does not depend on the face. */
 EBPO_EIGHT turns turns_of_floats(const ebpo_face_block *b, unsigned lanes, int u, int v,
                                  const ebpo_axis_segment *g, float turn_error)
 {
-    f8 x[3], y[3], zero = f8_all(0), left[3], right[3], lost = f8_all(turn_error);
-    see_axis(b, u, g->from[u], x);
-    see_axis(b, v, g->from[v], y);
+    f8 x[3], y[3], zero = f8_all(0), left[3], right[3], least_error = f8_all(turn_error);
+    load_relative(b, u, g->from[u], x);
+    load_relative(b, v, g->from[v], y);
     for (int i = 0; i < 3; i++) {
         int j = i == 2 ? 0 : i + 1;
         f8 p = f8_mul(x[i], y[j]), q = f8_mul(y[i], x[j]), turn = f8_sub(p, q);
         f8 size = f8_add(f8_abs(p), f8_abs(q));
-        f8 error = f8_add(f8_mul(size, f8_all(TURN_ERROR)), lost);
+        f8 error = f8_add(f8_mul(size, f8_all(TURN_ERROR)), least_error);
         left[i] = f8_less(error, turn);
         right[i] = f8_less(turn, f8_sub(zero, error));
     }
-    return judge_turns(f8_bits(f8_or(left[0], f8_or(left[1], left[2]))),
-                       f8_bits(f8_or(right[0], f8_or(right[1], right[2]))),
-                       f8_bits(f8_and(left[0], f8_and(left[1], left[2]))),
-                       f8_bits(f8_and(right[0], f8_and(right[1], right[2]))), lanes);
+    return combine_turns(f8_bits(f8_or(left[0], f8_or(left[1], left[2]))),
+                         f8_bits(f8_or(right[0], f8_or(right[1], right[2]))),
+                         f8_bits(f8_and(left[0], f8_and(left[1], left[2]))),
+                         f8_bits(f8_and(right[0], f8_and(right[1], right[2]))), lanes);
 }
 
-/* Rounding: the error of a difference of two doubles is 2^-53 of the difference; the error of a
- * cross product of two differences is 2^-50 of the sum of its products' sizes. The last term covers
- * underflow; overflow makes bounds infinite or NaN, and then nothing is certain. */
+/* Rounding: the error of a difference of two doubles is 2^-53 of the difference. The error of a
+ * cross product of two differences is 2^-50 of the sum of the absolute values of its two products.
+ * UNDERFLOW_ERROR is added for underflow. Overflow makes bounds infinite or NaN, and then nothing
+ * is certain. */
 #define CROSS_ERROR     0x1p-50
 #define HEIGHT_ERROR    0x1p-47
 #define UNDERFLOW_ERROR 0x1p-960
 
-/* Returns the cross product of corners relative to the line; *size: the sum of its products' sizes.
- */
+/* Returns the cross product of two corners relative to the line. *size: the sum of the absolute
+ * values of its two products. */
 EBPO_EIGHT double cross_product(double au, double av, double bu, double bv, double *size)
 {
     double p = au * bv, q = av * bu;
@@ -108,7 +113,7 @@ static turns turns_of_doubles(const ebpo_face_block *b, unsigned lanes, int u, i
         all[0] &= left;
         all[1] &= right;
     }
-    return judge_turns(some[0], some[1], all[0], all[1], lanes);
+    return combine_turns(some[0], some[1], all[0], all[1], lanes);
 }
 
 /* Returns the side of a face's plane on which the segment's point at coordinate `at` is: 1 above,
@@ -123,9 +128,10 @@ static int side_of_plane(const double weight[3], const double size[3], const dou
     return height > error ? 1 : height < -error ? -1 : 0;
 }
 
-/* Tests if a face that turns around the line intersects the line between the segment's ends: 1 yes,
- * 0 no, -1 not certain. */
-static int found_between(const double t[3][3], int u, int v, const ebpo_axis_segment *g, int turn)
+/* Tests if a face, which certainly intersects the segment's line, intersects the segment: 1 yes, 0
+ * no, -1 not certain. `turn`: as for side_of_plane. */
+static int intersects_segment(const double t[3][3], int u, int v, const ebpo_axis_segment *g,
+                              int turn)
 {
     double from = g->from[g->axis], weight[3], size[3], x[3], y[3],
            k[3] = { t[0][g->axis], t[1][g->axis], t[2][g->axis] };
@@ -149,7 +155,8 @@ static int found_between(const double t[3][3], int u, int v, const ebpo_axis_seg
     return at_from < 0 || at_to > 0 ? 0 : at_from > 0 && at_to < 0 ? 1 : -1;
 }
 
-/* Returns the certain crossings of a block's faces; appends the others to `open`. */
+/* Returns the sum of the certain crossings of a block's faces. Appends the slots of faces that are
+ * not certain to `open`. */
 EBPO_EIGHT int32_t cross_block(const ebpo_accel *s, uint64_t listed, int u, int v,
                                const ebpo_axis_segment *segment, uint32_t *open,
                                uint32_t *open_count)
@@ -163,16 +170,16 @@ EBPO_EIGHT int32_t cross_block(const ebpo_accel *s, uint64_t listed, int u, int 
     for (unsigned lanes = t.left | t.right | t.open; lanes; lanes &= lanes - 1) {
         unsigned lane = (unsigned)__builtin_ctz(lanes);
         uint32_t slot = block * EBPO_BLOCK + lane;
-        int intersected = -1, turn = t.left >> lane & 1 ? 1 : -1;
+        int crossings = -1, turn = t.left >> lane & 1 ? 1 : -1;
         if (!(t.open >> lane & 1)) {
             double corners[3][3];
             ebpo_accel_triangle(s, slot, corners);
-            intersected = found_between((const double(*)[3])corners, u, v, segment, turn);
+            crossings = intersects_segment((const double(*)[3])corners, u, v, segment, turn);
         }
-        if (intersected < 0)
+        if (crossings < 0)
             open[(*open_count)++] = slot;
         else
-            sum -= intersected * turn;
+            sum -= crossings * turn;
     }
     return sum;
 }
@@ -193,16 +200,17 @@ static int32_t sum_crossings(const ebpo_accel *s, const ebpo_listed_block *list,
 
 /* --- cell faces --- */
 
-/* A cell's faces, and the floats next to them: there is no float between a face and its float. */
+/* Coordinates of the cell faces: as doubles, and rounded down and up to the nearest floats. */
 typedef struct faces_of_cell {
     double low[3], high[3];
     double inverse[3]; /* inverse of the cell's size */
     float low_down[3], low_up[3], high_down[3], high_up[3];
-    bool fine; /* false in cells too small for boxes; a box is then the whole cell */
+    bool fine; /* false if the cell is too small for boxes: each box is then the whole cell */
 } faces_of_cell;
 
-/* Returns the float that is `steps` (-1, 0, 1) away, in the order of floats. The two zeros count as
- * two floats; rounding gives the zero with the number's sign. */
+/* Returns the float that is `steps` (-1, 0, 1) away, in the order of floats. -0 and +0 are two
+ * neighbouring floats here. The callers round a double to `f` first; a tiny double becomes the zero
+ * with its own sign. */
 static inline float step_float(float f, int32_t steps)
 {
     uint32_t bits;
@@ -213,14 +221,15 @@ static inline float step_float(float f, int32_t steps)
     return f;
 }
 
-/* Returns the greatest float that is at most x; branch-free, because the direction of rounding is
- * unpredictable. */
+/* Returns the greatest float that is at most x. The code is branch-free, because the direction of
+ * rounding is unpredictable. */
 static inline float float_below(double x)
 {
     float f = (float)x;
     return step_float(f, -(int32_t)((double)f > x));
 }
 
+/* Returns the least float that is at least x. */
 static inline float float_above(double x)
 {
     float f = (float)x;
@@ -246,7 +255,7 @@ static void find_cell_faces(const ebpo_accel *s, ebpo_cell cell, faces_of_cell *
 typedef struct spans {
     f8 least, most;      /* rounded outward */
     unsigned away;       /* faces that are entirely outside the cell on this axis */
-    unsigned touches[2]; /* faces that reach the cell's lower cell face, its upper one */
+    unsigned reaches[2]; /* faces that reach the cell's lower face, and its upper face */
 } spans;
 
 static inline spans span_floats(const ebpo_face_block *b, const faces_of_cell *w, int k)
@@ -258,8 +267,8 @@ static inline spans span_floats(const ebpo_face_block *b, const faces_of_cell *w
     out.most = f8_max3(x[0], x[1], x[2]);
     out.away = f8_bits(f8_or(f8_less(f8_all(w->high_down[k]), out.least),
                              f8_less(out.most, f8_all(w->low_up[k]))));
-    out.touches[0] = f8_bits(f8_at_most(out.least, f8_all(w->low_down[k])));
-    out.touches[1] = f8_bits(f8_at_most(f8_all(w->high_up[k]), out.most));
+    out.reaches[0] = f8_bits(f8_at_most(out.least, f8_all(w->low_down[k])));
+    out.reaches[1] = f8_bits(f8_at_most(f8_all(w->high_up[k]), out.most));
     return out;
 }
 
@@ -275,27 +284,28 @@ static spans span_doubles(const ebpo_face_block *b, const faces_of_cell *w, int 
         lows[lane] = float_below(least);
         highs[lane] = float_above(most);
         out.away |= (unsigned)((least > w->high[k]) | (most < w->low[k])) << lane;
-        out.touches[0] |= (unsigned)(least <= w->low[k]) << lane;
-        out.touches[1] |= (unsigned)(most >= w->high[k]) << lane;
+        out.reaches[0] |= (unsigned)(least <= w->low[k]) << lane;
+        out.reaches[1] |= (unsigned)(most >= w->high[k]) << lane;
     }
     out.least = f8_load(lows);
     out.most = f8_load(highs);
     return out;
 }
 
-/* Returns the lower side of a box in sixteenths of the cell (direction -1), or 15 less its upper
- * side (direction 1); 0 to 15. Widened by far more than the rounding error here and in queries
- * (2^-20 of a sixteenth). */
+/* Converts a side of a box to sixteenths of the cell, 0 to 15. Direction -1, for the lower side:
+ * returns the index of the sixteenth that contains the side. Direction 1, for the upper side:
+ * returns 15 minus this index. The box is first enlarged by 2^-8 of a sixteenth, which is far more
+ * than the rounding error here and in queries (2^-20 of a sixteenth). */
 static inline uint64_t find_sixteenth(float x, double low, double inverse, double direction)
 {
     double cells = ((double)x - low) * inverse * EBPO_LISTED_CELLS + direction * 0x1p-8;
     cells = direction < 0 ? cells : 16 - cells;
-    cells = cells > 0 ? cells : 0; /* two comparisons one after the other, so that the code is
-                                    * branch-free */
+    /* two separate comparisons, so that the code is branch-free */
+    cells = cells > 0 ? cells : 0;
     return (uint64_t)(int32_t)(cells < 15 ? cells : 15);
 }
 
-/* Returns a box around the listed faces whose boxes intersect the cell. */
+/* Returns a box around the faces in `near`, encoded as in an ebpo_listed_block. */
 static uint64_t box_of(const spans span[3], unsigned near, const faces_of_cell *w)
 {
     f8 none = f8_all(INFINITY), mask = f8_mask(near), zero = f8_all(0);
@@ -309,26 +319,27 @@ static uint64_t box_of(const spans span[3], unsigned near, const faces_of_cell *
     return box << EBPO_LISTED_BOX;
 }
 
-/* Sets the block's box. Returns the cell faces that the listed faces of the block reach, of those
- * whose boxes intersect the cell (bit 2 axis + side). The comparisons are exact. */
+/* Considers the listed faces of the block whose boxes intersect the cell. Sets the block's box to a
+ * box around these faces. Returns the cell faces that they reach: bit 2 axis + side. The
+ * comparisons are exact. */
 static unsigned bound_block(const ebpo_accel *s, ebpo_listed_block *at, const faces_of_cell *w)
 {
     uint64_t listed = ebpo_listed(at);
     ebpo_face_block b = ebpo_face_block_open(s, ebpo_listed_number(listed));
     spans span[3];
-    unsigned near = ebpo_listed_lanes(listed), come_to = 0;
+    unsigned near = ebpo_listed_lanes(listed), reached = 0;
     for (int k = 0; k < 3; k++) {
         span[k] = s->wide ? span_doubles(&b, w, k) : span_floats(&b, w, k);
         near &= ~span[k].away;
     }
     for (int i = 0; i < 6; i++)
-        come_to |= (unsigned)((near & span[i / 2].touches[i % 2]) != 0) << i;
+        reached |= (unsigned)((near & span[i / 2].reaches[i % 2]) != 0) << i;
     uint64_t box = !near ? UINT64_MAX << EBPO_LISTED_BOX : w->fine ? box_of(span, near, w) : 0;
     ebpo_list(at, listed | box);
-    return come_to;
+    return reached;
 }
 
-/* Prefetches blocks while the cell is read; of long lists only the first blocks. */
+/* Prefetches at most the first eight blocks of the list, while the cell's bounds are computed. */
 static void fetch_blocks(const ebpo_accel *s, const ebpo_listed_block *list)
 {
     for (int i = 0; i < 8; i++) {
@@ -341,7 +352,9 @@ static void fetch_blocks(const ebpo_accel *s, const ebpo_listed_block *list)
     }
 }
 
-static unsigned find_free_cell_faces(const ebpo_accel *s, ebpo_listed_block *list, ebpo_cell cell)
+/* Sets the boxes of a leaf's list. Returns the cell faces that the leaf's faces reach. */
+static unsigned find_reached_cell_faces(const ebpo_accel *s, ebpo_listed_block *list,
+                                        ebpo_cell cell)
 {
     faces_of_cell w;
     unsigned out = 0;
@@ -355,4 +368,4 @@ static unsigned find_free_cell_faces(const ebpo_accel *s, ebpo_listed_block *lis
 }
 
 const ebpo_inside_kernels EBPO_KERNEL(ebpo_inside_kernels) = { sum_crossings,
-                                                               find_free_cell_faces };
+                                                               find_reached_cell_faces };

@@ -1,11 +1,12 @@
-/* Verifies the table of subtrees (format-spec/README.md, section 9). One visit of the whole tree,
- * leaf by leaf in the order of the faces, counts all items again.
+/* Verifies the table of subtrees (format-spec/README.md, section 9). Visits the whole tree once,
+ * leaf by leaf in the order of the faces, and counts all items again.
  *
- * Every column of every row is recomputed: numbers of nodes, faces and vertices, and the shared
- * chunks (here: blocks) of faces and vertices, which must be exactly the listed ones. The writer
- * and the reader of the library proceed level by level; only the reading of arrays is shared with
- * them.
- */
+ * Every column of every row is recomputed: numbers of nodes, faces and vertices, and the chunks of
+ * /mesh/faces and /mesh/vertices that a subtree needs from earlier subtrees. The listed chunks must
+ * be exactly these. The specification and this file call them *blocks*.
+ *
+ * This check is independent of the writer and the reader of the library, which proceed level by
+ * level: they have only the reading of arrays in common. */
 #include "verify/verify_parts.h"
 
 #include <inttypes.h>
@@ -19,14 +20,14 @@
 
 #define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
 
-/* Columns with their numbers in the specification. FIRST_LEVEL begins the columns of the levels;
- * GRAY to END are relative to the first column of a level. */
+/* Columns of the table, numbered as in the specification. The columns of the levels begin at
+ * FIRST_LEVEL. GRAY to END are relative to the first column of a level. */
 enum {
-    FACES_BETWEEN,
+    FACES_BEFORE, /* faces between the previous subtree and this one */
     FACES,
-    VERTICES_BETWEEN,
+    VERTICES_BEFORE,
     VERTICES,
-    SHARED_FACES,
+    SHARED_FACES, /* number of blocks */
     SHARED_VERTICES,
     FIRST_LEVEL,
     GRAY = 0,
@@ -40,18 +41,23 @@ enum {
     MAX_COLS = FIRST_LEVEL + OF_A_LEVEL * EBPO_LEVELS_MAX
 };
 enum { ROWS_OF_FACES = 2048, ROWS_OF_VERTICES = 1024, SUBTREES_A_TIME = 128 };
-static const char *const names[] = { "faces before", "faces",           "vertices before",
-                                     "vertices",     "blocks of faces", "blocks of vertices" };
+static const char *const names[] = { "faces before the subtree",
+                                     "faces",
+                                     "vertices before the subtree",
+                                     "vertices",
+                                     "blocks of faces",
+                                     "blocks of vertices" };
 static const char *const level_names[] = { "gray nodes",  "leaves",     "black nodes",   "planes",
                                            "leaf planes", "references", "the faces' end" };
 
-/* A list of numbers. */
+/* A list of indices of faces or numbers of blocks. */
 typedef struct numbers {
     uint32_t *at;
     uint64_t count, capacity;
-    uint64_t different; /* count after the last sort_once, when all numbers were different */
+    uint64_t different; /* number of different ones when add_block last removed duplicates */
 } numbers;
 
+/* The visit of the tree, and the counts so far. */
 typedef struct recount {
     ebpo_tally *tally;
     const ebpo_reference_tree *view;
@@ -64,6 +70,7 @@ typedef struct recount {
     uint64_t subtree, faces, vertices;
     uint64_t outer_done;           /* compared rows of /subtrees/outer */
     uint64_t end[EBPO_LEVELS_MAX]; /* end of the new faces, by level */
+    /* columns: sums over all subtrees before the current one, counts of the current one */
     uint64_t sum[MAX_COLS], row[MAX_COLS];
     bool within;          /* the visit is within a subtree */
     numbers shared_faces; /* references of the leaves of the current subtree */
@@ -87,6 +94,7 @@ static int compare_numbers(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
+/* Sorts the list and removes duplicates. */
 static void sort_once(numbers *list)
 {
     uint64_t kept = 0;
@@ -118,7 +126,8 @@ static const char *column_name(const recount *c, unsigned column, int *level)
 
 /* --- comparing a subtree with its row --- */
 
-/* Compares the needed blocks with the distances in the next rows of /subtrees/outer. */
+/* Compares the needed blocks with the next rows of /subtrees/outer. A row is `from` minus the
+ * number of a block; the rows of a subtree are ascending. */
 static void compare_shared(recount *c, const char *what, uint64_t from, const numbers *needed,
                            unsigned column)
 {
@@ -139,6 +148,7 @@ static void compare_shared(recount *c, const char *what, uint64_t from, const nu
     c->outer_done += needed->count;
 }
 
+/* Adds the blocks of those vertices of a face that are below first_vertex. */
 static void note_vertices(recount *c, numbers *blocks, uint64_t face, uint64_t first_vertex)
 {
     for (int k = 0; k < 3; k++) {
@@ -148,6 +158,8 @@ static void note_vertices(recount *c, numbers *blocks, uint64_t face, uint64_t f
     }
 }
 
+/* Finds the blocks that the current subtree needs from earlier subtrees, and compares them with
+ * /subtrees/outer. */
 static void check_shared(recount *c)
 {
     numbers faces = { 0 }, vertices = { 0 };
@@ -170,6 +182,7 @@ static void check_shared(recount *c)
     c->shared_faces.count = 0;
 }
 
+/* Compares the counts of the current subtree with its row, and begins a new row. */
 static void check_row(recount *c)
 {
     ebpo_tally *tally = c->tally;
@@ -196,15 +209,16 @@ static void check_row(recount *c)
 
 /* --- visiting the tree --- */
 
-/* Counts the next `count` faces, which are new in a leaf, and the vertices that they use first. */
+/* Counts the next `count` faces, which are new in a leaf, and the vertices that no earlier face
+ * uses. */
 static void count_faces(recount *c, uint64_t count)
 {
     const ebpo_mesh *mesh = &c->view->tree->mesh;
     uint64_t seen = c->vertices;
     EBPO_FOR_ITEMS(c->view->workspace, i, 3 * c->faces, 3 * (c->faces + count))
         seen += mesh->faces[i] == seen;
-    c->row[c->within ? FACES : FACES_BETWEEN] += count;
-    c->row[c->within ? VERTICES : VERTICES_BETWEEN] += seen - c->vertices;
+    c->row[c->within ? FACES : FACES_BEFORE] += count;
+    c->row[c->within ? VERTICES : VERTICES_BEFORE] += seen - c->vertices;
     c->faces += count;
     c->vertices = seen;
 }

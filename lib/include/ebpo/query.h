@@ -789,10 +789,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_faces_in_box(ebpo_context *context, cons
                                                      const double max[3], const uint64_t **faces,
                                                      uint64_t *count, ebpo_error *error);
 
-/* Maximum number of triangles in a block. */
+/* Maximum number of triangles in a batch. */
 enum { EBPO_TRIANGLES_MAX = 1024 };
 
-/* A block of triangles; lent until the callback returns. */
+/* A batch of triangles; lent until the callback returns. */
 typedef struct ebpo_triangles {
     /* 1 to EBPO_TRIANGLES_MAX */
     uint64_t count;
@@ -810,7 +810,7 @@ typedef struct ebpo_triangles {
 typedef bool (*ebpo_triangles_fn)(void *user, const ebpo_triangles *triangles);
 
 /*
- * Passes the triangles of ebpo_faces_in_box with their corners to `take`, each once, in blocks.
+ * Passes the triangles of ebpo_faces_in_box with their corners to `take`, each once, in batches.
  * Memory stays within the model's budget for any number of triangles, plus 4 bytes for each
  * triangle of one subtree (or of the result, if everything is in memory).
  *
