@@ -12,15 +12,15 @@ enum {
     EBPO_SWEEP_PLANES = 2048 /* maximum */
 };
 
-/* Planes n . x = d by coordinate; the padding of the last four is a plane that no point is above.
- */
+/* Planes n . x = d as a structure of arrays. The padding of the last four is a plane that no point
+ * is above. */
 typedef struct ebpo_sweep_planes {
     const double *nx, *ny, *nz, *d;
     int fours;
 } ebpo_sweep_planes;
 
-/* Points in fours, by coordinate: x, y, z, and a value that is added to n . x. The padding of the
- * last four is a copy of a point. */
+/* Points in fours: four x, four y, four z, and four values that are added to n . x. The padding of
+ * the last four is a copy of a point. */
 typedef struct ebpo_sweep_points {
     const double (*point)[4][4]; /* [fours] */
     /* for each stretch: least and greatest coordinates, greatest added value */

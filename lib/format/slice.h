@@ -66,7 +66,7 @@ EBPO_MUST_USE ebpo_status ebpo_slice_read_all(ebpo_slice *out, const ebpo_file *
 /* Computes the sizes of a slice that ebpo_slice_read would read for this node. Reads no faces. */
 typedef struct ebpo_slice_size {
     uint64_t groups, leaves;
-    uint64_t refs;      /* references of leaves to faces that an earlier leaf lists first */
+    uint64_t refs;      /* references of leaves to faces that an earlier leaf already lists */
     uint64_t new_faces; /* owned faces */
     uint64_t outer;     /* maximum number of shared faces */
     uint64_t planes;    /* if planes are requested */

@@ -57,7 +57,7 @@ typedef struct first_chunk {
     size_t bytes;
 } first_chunk;
 
-/* Bytes reserved after the array header if the file has only one array. No other array header
+/* Bytes reserved after the array header if the plan has only one array. No other array header
  * follows in the metadata block, and HDF5 may then enlarge this header by up to a tenth of the
  * block's free space. */
 enum { ALONE_BYTES = 4096 };

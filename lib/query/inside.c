@@ -96,11 +96,13 @@ static ebpo_axis_segment cell_face_segment(const ebpo_box *box, uint8_t cell_fac
                                            const double p[3])
 {
     int axis = cell_face / 2;
-    ebpo_axis_segment g = { { p[0], p[1], p[2] },
-                            p[axis],
-                            axis,
-                            /* the cell face is at 15 above, or at 15 less 0 */
-                            reach_of(i) | (cell_face % 2 ? 0x0fu : 0xf0u) << 8 * axis };
+    ebpo_axis_segment g = {
+        { p[0], p[1], p[2] },
+        p[axis],
+        axis,
+        /* the cell face is at 15 (upper face), or at 0, stored as 15 (lower face) */
+        reach_of(i) | (cell_face % 2 ? 0x0fu : 0xf0u) << 8 * axis
+    };
     double end = ebpo_cell_face(box, axis, i->leaf.level, i->leaf.at[axis] + cell_face % 2);
     if (cell_face % 2)
         g.to = end;

@@ -52,7 +52,8 @@ EBPO_EIGHT void load_relative(const ebpo_face_block *b, int axis, double from, f
         out[i] = f8_sub(f8_sub(out[i], f8_all(high)), f8_all(low));
 }
 
-/* turn_error: the part of the error bound that does not depend on the face. */
+/* Computes the turns of a block's faces in single precision. turn_error: the part of the error
+ * bound that does not depend on the face. */
 EBPO_EIGHT turns turns_of_floats(const ebpo_face_block *b, unsigned lanes, int u, int v,
                                  const ebpo_axis_segment *g, float turn_error)
 {
@@ -90,6 +91,7 @@ EBPO_EIGHT double cross_product(double au, double av, double bu, double bv, doub
     return p - q;
 }
 
+/* Computes the turns of a block's faces in double precision. */
 static turns turns_of_doubles(const ebpo_face_block *b, unsigned lanes, int u, int v,
                               const ebpo_axis_segment *g)
 {
@@ -184,6 +186,7 @@ EBPO_EIGHT int32_t cross_block(const ebpo_accel *s, uint64_t listed, int u, int 
     return sum;
 }
 
+/* Sums the certain crossings of the segment with all listed faces. */
 static int32_t sum_crossings(const ebpo_accel *s, const ebpo_listed_block *list,
                              const ebpo_axis_segment *segment, uint32_t *open, uint32_t *open_count)
 {
@@ -251,7 +254,7 @@ static void find_cell_faces(const ebpo_accel *s, ebpo_cell cell, faces_of_cell *
     }
 }
 
-/* Extents of a block's faces on an axis; masks have a bit for each lane. */
+/* Extents of a block's faces on an axis, compared with the cell. Masks have a bit for each lane. */
 typedef struct spans {
     f8 least, most;      /* rounded outward */
     unsigned away;       /* faces that are entirely outside the cell on this axis */

@@ -58,7 +58,7 @@ ebpo_reference_node ebpo_reference_child(const ebpo_reference_tree *view,
  * planes of a leaf. Returns NULL, and *count is 0, when there are none. */
 const uint32_t *ebpo_reference_planes(const ebpo_reference_tree *view,
                                       const ebpo_reference_node *node, uint32_t *count);
-/* Returns the references of a leaf to faces that earlier leaves list first. */
+/* Returns the references of a leaf to faces that earlier leaves already list. */
 const uint32_t *ebpo_reference_refs(const ebpo_reference_tree *view,
                                     const ebpo_reference_node *leaf, uint32_t *count);
 /* Returns the winding number that is stored for a leaf (at its lowest corner) or a white or black

@@ -203,8 +203,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_subtree_get_node(ebpo_subtree *subtree, 
 
 /*
  * All faces that intersect the subtree's cell, in the order of the file. Leaves may also list faces
- * that are outside the cell by a rounding error. Shared faces come first: those that a leaf before
- * this subtree lists first. The others are owned faces. So of all disjoint subtrees that list a
+ * that are outside the cell by a rounding error. Shared faces come first: a leaf before this
+ * subtree already lists them. The others are owned faces. So of all disjoint subtrees that list a
  * face, exactly one owns the face; the whole tree owns all faces. In a subset (ebpo_subset), faces
  * that are only below pruned nodes are missing. Arrays are lent until the subtree is closed.
  */
