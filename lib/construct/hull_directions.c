@@ -7,9 +7,9 @@
  * planes of the facets are stored as a structure of arrays (nx, ny, nz, d), for the kernel that
  * tests a point against all planes (sweep.h).
  *
- * Limits: with more than EBPO_HULL_POINTS points there is no hull (0 facets). When the hull has
- * EBPO_HULL_FACETS facets, the remaining points are omitted. Ties are ordered by indices of points,
- * so that all machines return the same facets in the same order. */
+ * Limits: with more than EBPO_HULL_POINTS points there is no hull (0 facets). When the capacity for
+ * facets is reached (at most EBPO_HULL_FACETS), the remaining points are omitted. Ties are ordered
+ * by indices of points, so that all machines return the same facets in the same order. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -86,6 +86,7 @@ static void move_facet(hull *h, int to, int from)
     memcpy(h->corner[to], h->corner[from], sizeof h->corner[to]);
 }
 
+/* Sets the number of facets and pads the planes. */
 static void set_count(hull *h, int count)
 {
     static const double none[3];
@@ -205,12 +206,13 @@ static bool has_edge(const uint32_t *edges, int fours, uint32_t edge)
     return found;
 }
 
-/* Fills the slots that got no new facet with facets from the end. */
-static void close_gaps(hull *h, const uint16_t *place, int from, int to, int count)
+/* Removes the visible facets that no new facet has replaced: moves facets from the end to their
+ * indices. */
+static void close_gaps(hull *h, const uint16_t *index, int from, int to, int count)
 {
-    for (int i = to - 1; i >= from; i--) /* `place` ascends */
-        if (place[i] != --count)
-            move_facet(h, place[i], count);
+    for (int i = to - 1; i >= from; i--) /* `index` ascends */
+        if (index[i] != --count)
+            move_facet(h, index[i], count);
     set_count(h, count);
 }
 
@@ -234,8 +236,8 @@ static bool add_point(hull *h, int point)
             continue;
         if (made >= seen && count == h->capacity)
             return false;
-        int place = made < seen ? visible[made] : count;
-        if (!make_facet(h, place, (int)(edges[i] >> 16), (int)(edges[i] & 0xffff), point))
+        int index = made < seen ? visible[made] : count;
+        if (!make_facet(h, index, (int)(edges[i] >> 16), (int)(edges[i] & 0xffff), point))
             continue;
         count += made++ >= seen;
     }

@@ -89,14 +89,14 @@ static void plan_list(file_headers *h, header_list list, ebpo_array_id id, uint6
 static void headers_plan(file_headers *h, ebpo_plan *plan, uint64_t chunks,
                          const ebpo_write_options *options)
 {
-    bool summed = options->chunk_checksums == EBPO_CHECKSUMS_DEFAULT;
+    bool has_checksums = options->chunk_checksums == EBPO_CHECKSUMS_DEFAULT;
     *h = (file_headers){
         .plan = plan, .root = -1, .chunks = chunks, .codec_level = options->codec_level
     };
     h->out = (ebpo_h5_out)EBPO_H5_OUT_INIT;
-    plan_list(h, LIST_CHECKSUMS, EBPO_A_CHUNK_CHECKSUMS, summed ? chunks : 0);
+    plan_list(h, LIST_CHECKSUMS, EBPO_A_CHUNK_CHECKSUMS, has_checksums ? chunks : 0);
     plan_list(h, LIST_SIZES, EBPO_A_PLACES,
-              plan->info.subtree_level ? chunks + has_index(plan) + summed : 0);
+              plan->info.subtree_level ? chunks + has_index(plan) + has_checksums : 0);
 }
 
 static ebpo_status make_level_groups(file_headers *h, ebpo_error *error)
@@ -147,6 +147,7 @@ static ebpo_status headers_put_validity(file_headers *h, header_list list, uint6
     return status == EBPO_OK ? ebpo_h5_put_count(&h->out, id, "offset", offset, error) : status;
 }
 
+/* Creates an array with its attributes. Writes its first chunk if `first` is not NULL. */
 static ebpo_status make_array(file_headers *h, ebpo_array_out *a, const first_chunk *first,
                               ebpo_error *error)
 {
@@ -251,7 +252,7 @@ static ebpo_status headers_measure(file_headers *h, const char *shown, ebpo_erro
     h->head_bytes = (headers + 8 + 7) / 8 * 8;
     if (plan->count == 1)
         h->head_bytes += ALONE_BYTES;
-    /* the same for the last checksum of the indexes */
+    /* 8 more bytes for the same reason */
     h->index_bytes = has_index(plan) ? (all - headers + 8 + 7) / 8 * 8 : 0;
     return status;
 }
@@ -289,6 +290,7 @@ typedef struct slot {
     ebpo_status status;
 } slot;
 
+/* State of writing one file. */
 typedef struct writer {
     ebpo_plan plan;
     const ebpo_write_options *options;
@@ -301,12 +303,12 @@ typedef struct writer {
     ebpo_array_digest *digest; /* [arrays of the plan] */
     ebpo_content content[EBPO_DIGESTS];
     uint64_t chunk_bytes, chunks_done; /* stored bytes and number of the chunks so far */
-    uint64_t *sum;       /* [chunks] rows of the list of chunk checksums, if it is written */
-    uint64_t *first_sum; /* [arrays of the plan] index in `sum` of the array's first chunk */
-    uint64_t *size_row;  /* rows of the list of chunk sizes, if it is written */
-    uint64_t size_rows;  /* number of these rows so far */
-    uint64_t top_bytes;  /* end of the chunks with which a reader locates a subtree */
-    uint64_t index_at;   /* offset of HDF5's chunk indexes; 0: none, or not yet written */
+    uint64_t *checksum_row;   /* [chunks] rows of the list of chunk checksums, if it is written */
+    uint64_t *first_checksum; /* [arrays of the plan] index of the array's first chunk there */
+    uint64_t *size_row;       /* rows of the list of chunk sizes, if it is written */
+    uint64_t size_rows;       /* number of these rows so far */
+    uint64_t top_bytes;       /* end of the chunks with which a reader locates a subtree */
+    uint64_t index_at;        /* offset of HDF5's chunk indexes; 0: none, or not yet written */
 } writer;
 
 /* Encodes the rows of chunks begin .. end - 1 of the window; pads the last chunk of an array with
@@ -425,7 +427,7 @@ static void list_chunk(writer *w, const slot *s)
     uint32_t number = ebpo_place_number(s->array->id, s->array->level);
     add_size_row(w, number, s->stored_bytes);
     if (w->head.list[LIST_CHECKSUMS].shape.rows)
-        w->sum[w->first_sum[s->array - w->plan.array] + s->chunk] =
+        w->checksum_row[w->first_checksum[s->array - w->plan.array] + s->chunk] =
             ebpo_place(number, ebpo_chunk_sum(s->stored, s->stored_bytes));
     w->chunk_bytes += s->stored_bytes;
     if (w->chunks_done + 1 == w->order.top)
@@ -490,7 +492,7 @@ static ebpo_status write_lists(writer *w, ebpo_error *error)
 {
     size_t bytes[LISTS];
     uint64_t offset = w->head.head_bytes + w->chunk_bytes + w->head.index_bytes, size = 0;
-    const uint64_t *values[LISTS] = { w->sum, w->size_row };
+    const uint64_t *values[LISTS] = { w->checksum_row, w->size_row };
     ebpo_status status =
         write_list(w, LIST_CHECKSUMS, values[LIST_CHECKSUMS], &bytes[LIST_CHECKSUMS], error);
     if (status == EBPO_OK && bytes[LIST_CHECKSUMS])
@@ -519,9 +521,10 @@ static ebpo_status make_window(writer *w, ebpo_error *error)
     w->slots[0].raw = buffers;
     w->digest = ebpo_alloc(w->plan.count, sizeof *w->digest);
     w->size_row = ebpo_alloc(w->head.list[LIST_SIZES].shape.rows, sizeof *w->size_row);
-    w->sum = ebpo_alloc(w->head.list[LIST_CHECKSUMS].shape.rows, sizeof *w->sum);
-    w->first_sum = ebpo_alloc(w->plan.count, sizeof *w->first_sum);
-    if (!w->coders || !buffers || !w->digest || !w->size_row || !w->sum || !w->first_sum)
+    w->checksum_row = ebpo_alloc(w->head.list[LIST_CHECKSUMS].shape.rows, sizeof *w->checksum_row);
+    w->first_checksum = ebpo_alloc(w->plan.count, sizeof *w->first_checksum);
+    if (!w->coders || !buffers || !w->digest || !w->size_row || !w->checksum_row ||
+        !w->first_checksum)
         return ebpo_fail_memory(error, wanted * slot_bytes);
     for (unsigned i = 0; i < wanted; i++) {
         w->slots[i].raw = buffers + i * slot_bytes;
@@ -529,7 +532,7 @@ static ebpo_status make_window(writer *w, ebpo_error *error)
     }
     uint64_t before = 0;
     for (unsigned i = 0; i < w->plan.count; i++) {
-        w->first_sum[i] = before;
+        w->first_checksum[i] = before;
         before += ebpo_shape_chunks(&w->plan.array[i].shape);
     }
     return EBPO_OK;
@@ -645,8 +648,8 @@ static ebpo_status write_tree(const ebpo_tree *tree, const char *path, const cha
     free(w->slots[0].raw);
     free(w->digest);
     free(w->size_row);
-    free(w->sum);
-    free(w->first_sum);
+    free(w->checksum_row);
+    free(w->first_checksum);
     ebpo_chunk_order_free(&w->order);
     ebpo_plan_free(&w->plan);
     for (int i = 0; i < EBPO_DIGESTS; i++)

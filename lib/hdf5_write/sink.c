@@ -18,7 +18,7 @@
 
 /* Maximum number of bytes for one call of pread or pwrite. Some systems transfer no more than about
  * 2 GiB. */
-static const size_t PIECE_MAX = (size_t)1 << 30;
+static const size_t CALL_BYTES_MAX = (size_t)1 << 30;
 
 /* An open file, as libhdf5 sees it. libhdf5 uses only the first member. */
 typedef struct sink_file {
@@ -161,7 +161,7 @@ static size_t read_file(ebpo_h5_sink *sink, uint64_t at, size_t size, uint8_t *t
 {
     size_t done = 0;
     while (done < size) {
-        size_t piece = size - done < PIECE_MAX ? size - done : PIECE_MAX;
+        size_t piece = size - done < CALL_BYTES_MAX ? size - done : CALL_BYTES_MAX;
         ssize_t got = pread(sink->fd, to + done, piece, (off_t)(at + done));
         if (got < 0 && errno == EINTR)
             continue;
@@ -195,7 +195,7 @@ static void write_file(ebpo_h5_sink *sink, uint64_t at, size_t size, const uint8
 {
     size_t done = 0;
     while (done < size) {
-        size_t piece = size - done < PIECE_MAX ? size - done : PIECE_MAX;
+        size_t piece = size - done < CALL_BYTES_MAX ? size - done : CALL_BYTES_MAX;
         ssize_t put = pwrite(sink->fd, data + done, piece, (off_t)(at + done));
         if (put < 0 && errno == EINTR)
             continue;

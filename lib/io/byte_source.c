@@ -19,7 +19,7 @@
 #include "io/byte_source.h"
 
 /* Maximum number of bytes for one call of pread. Some systems read no more than about 2 GiB. */
-static const uint64_t PIECE_MAX = UINT64_C(1) << 30;
+static const uint64_t CALL_BYTES_MAX = UINT64_C(1) << 30;
 
 typedef struct path_source {
     int fd;
@@ -32,8 +32,8 @@ static ebpo_status path_read(void *user, uint64_t offset, uint64_t size, void *d
     const path_source *s = user;
     uint8_t *to = data;
     while (size) {
-        ssize_t got =
-            pread(s->fd, to, (size_t)(size < PIECE_MAX ? size : PIECE_MAX), (off_t)offset);
+        ssize_t got = pread(s->fd, to, (size_t)(size < CALL_BYTES_MAX ? size : CALL_BYTES_MAX),
+                            (off_t)offset);
         if (got < 0 && errno == EINTR)
             continue;
         if (got < 0)
