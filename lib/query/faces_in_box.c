@@ -23,16 +23,18 @@ typedef struct box_walk box_walk;
 struct box_walk {
     ebpo_context *context;
     const double *min, *max;
-    /* Slots of the faces of the current accel that intersect the box, in ascending order, which is
-     * the order of the file. */
+    /* slots of the faces of the current accel that intersect the box; sorted when `take` is called
+     */
     uint32_t *slot;
     uint64_t count, capacity;
-    ebpo_node below; /* the subtree's root, if the accel is not the whole tree */
-    bool no_memory, enough;
-    /* For a remote file: the subtrees that the walk will enter, in order, and their number. */
+    ebpo_node below; /* root of the current subtree, unless the accel is the whole tree */
+    bool no_memory;
+    bool enough; /* ends the walk; set by `take` */
+    /* for a remote file: the subtrees that the walk will enter, in order */
     uint32_t *ahead;
-    uint64_t ahead_count, ahead_capacity, entered;
-    /* Called for each accel that the box intersects, depth first. `enough` ends the walk. */
+    uint64_t ahead_count, ahead_capacity;
+    uint64_t entered; /* number of subtrees entered so far */
+    /* called for each accel that the box intersects, depth first */
     ebpo_status (*take)(box_walk *walk, const ebpo_accel *s, ebpo_error *error);
 };
 
@@ -67,7 +69,7 @@ static void try_block(box_walk *w, const ebpo_accel *s, uint32_t block)
 
 /* Adds the slots of the faces below a child of the hierarchy. low, high: the box in the subtree's
  * frame. The hierarchy's boxes were enlarged by more than the rounding error of floats here. */
-static void gather_bound(box_walk *w, const ebpo_accel *s, const float low[3], const float high[3],
+static void gather_child(box_walk *w, const ebpo_accel *s, const float low[3], const float high[3],
                          uint32_t child)
 {
     if (child & EBPO_IS_BLOCK) {
@@ -83,7 +85,7 @@ static void gather_bound(box_walk *w, const ebpo_accel *s, const float low[3], c
         apart = f8_or(apart, f8_or(f8_less(f8_all(high[k]), from), f8_less(to, f8_all(low[k]))));
     }
     for (unsigned lanes = ~f8_bits(apart) & ((1u << b->count) - 1); lanes; lanes &= lanes - 1)
-        gather_bound(w, s, low, high, b->child[__builtin_ctz(lanes)]);
+        gather_child(w, s, low, high, b->child[__builtin_ctz(lanes)]);
 }
 
 static int compare_slots(const void *a, const void *b)
@@ -94,7 +96,7 @@ static int compare_slots(const void *a, const void *b)
 
 /* Gathers the slots of one accel and passes them to w->take. Blocks are numbered in the order of
  * their faces, so sorted slots are in the order of the file. */
-static ebpo_status gather_blocks(box_walk *w, const ebpo_accel *s, ebpo_error *error)
+static ebpo_status gather_accel(box_walk *w, const ebpo_accel *s, ebpo_error *error)
 {
     float low[3], high[3];
     w->count = 0;
@@ -104,7 +106,7 @@ static ebpo_status gather_blocks(box_walk *w, const ebpo_accel *s, ebpo_error *e
         low[k] = (float)((w->min[k] - s->centre[k]) * s->scale);
         high[k] = (float)((w->max[k] - s->centre[k]) * s->scale);
     }
-    gather_bound(w, s, low, high, s->top);
+    gather_child(w, s, low, high, s->top);
     if (w->no_memory)
         return ebpo_fail_memory(error, (w->count + 1) * sizeof *w->slot);
     if (w->count)
@@ -114,7 +116,8 @@ static ebpo_status gather_blocks(box_walk *w, const ebpo_accel *s, ebpo_error *e
 
 /* --- in all accels --- */
 
-static bool box_matters(void *user, const ebpo_box *box, const ebpo_node *node)
+/* Returns true if the cell of the node intersects the box. */
+static bool intersects_box(void *user, const ebpo_box *box, const ebpo_node *node)
 {
     const box_walk *w = user;
     return ebpo_cell_intersects(box, node->cell, w->min, w->max);
@@ -124,7 +127,7 @@ static bool box_matters(void *user, const ebpo_box *box, const ebpo_node *node)
  * other subtrees get their prefetch hints only when they are entered. */
 static void list_ahead(box_walk *w, const ebpo_box *box, ebpo_node node)
 {
-    if (ebpo_node_is_uniform(&node) || !box_matters(w, box, &node) || w->no_memory)
+    if (ebpo_node_is_uniform(&node) || !intersects_box(w, box, &node) || w->no_memory)
         return;
     if (ebpo_node_is_below(&node)) {
         w->no_memory =
@@ -139,7 +142,7 @@ static void list_ahead(box_walk *w, const ebpo_box *box, ebpo_node node)
 
 /* Called before a subtree is entered. At every EBPO_HINTED_MAX-th subtree, sends prefetch hints for
  * this subtree and the following ones, EBPO_HINTED_MAX in total. */
-static void hint_window(box_walk *w)
+static void send_hints(box_walk *w)
 {
     uint64_t at = w->entered++, left = at < w->ahead_count ? w->ahead_count - at : 0;
     if (at % EBPO_HINTED_MAX == 0 && left)
@@ -147,16 +150,17 @@ static void hint_window(box_walk *w)
                           left < EBPO_HINTED_MAX ? left : EBPO_HINTED_MAX);
 }
 
+/* Gathers the slots of all subtrees below the node. */
 static ebpo_status gather_node(box_walk *w, const ebpo_box *box, ebpo_node node, ebpo_error *error)
 {
-    if (ebpo_node_is_uniform(&node) || !box_matters(w, box, &node))
+    if (ebpo_node_is_uniform(&node) || !intersects_box(w, box, &node))
         return EBPO_OK;
     ebpo_status status = EBPO_OK;
     if (ebpo_node_is_below(&node)) {
         w->below = node;
-        hint_window(w);
+        send_hints(w);
         status = ebpo_model_enter(w->context, &node, error);
-        return status == EBPO_OK ? gather_blocks(w, node.subtree, error) : status;
+        return status == EBPO_OK ? gather_accel(w, node.subtree, error) : status;
     }
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK && !w->enough; octant++)
         status = gather_node(w, box, ebpo_model_child(w->context->model, &node, octant), error);
@@ -166,7 +170,7 @@ static ebpo_status gather_node(box_walk *w, const ebpo_box *box, ebpo_node node,
 /* Returns EBPO_E_ABSENT if an omitted node of a subset intersects the box. */
 static ebpo_status box_walk_check(box_walk *w, ebpo_error *error)
 {
-    return ebpo_check_pruned(w->context, box_matters, w, error);
+    return ebpo_check_pruned(w->context, intersects_box, w, error);
 }
 
 /* Runs the whole walk, and frees the lists of slots and of subtrees. */
@@ -177,7 +181,7 @@ static ebpo_status box_walk_run(box_walk *w, ebpo_error *error)
     if (!m->whole && m->options.loading == EBPO_LOAD_CACHE && ebpo_input_expects(&m->file->in))
         list_ahead(w, &box, ebpo_model_root(m));
     w->no_memory = false;
-    ebpo_status status = m->whole ? gather_blocks(w, m->whole, error)
+    ebpo_status status = m->whole ? gather_accel(w, m->whole, error)
                                   : gather_node(w, &box, ebpo_model_root(m), error);
     free(w->slot);
     free(w->ahead);
@@ -187,7 +191,7 @@ static ebpo_status box_walk_run(box_walk *w, ebpo_error *error)
 
 /* --- each face once --- */
 
-static bool touches_cell(const ebpo_box *box, const ebpo_node *node, const double triangle[3][3])
+static bool intersects_cell(const ebpo_box *box, const ebpo_node *node, const double triangle[3][3])
 {
     double low[3], high[3];
     ebpo_cell_bounds(box, node->cell, low, high);
@@ -201,7 +205,7 @@ static bool find_first(const box_walk *w, const ebpo_box *box, ebpo_node node,
                        const double triangle[3][3], uint32_t *entry)
 {
     if (ebpo_node_is_uniform(&node) || !ebpo_cell_intersects(box, node.cell, w->min, w->max) ||
-        !touches_cell(box, &node, triangle))
+        !intersects_cell(box, &node, triangle))
         return false;
     *entry = node.entry;
     bool found = ebpo_node_is_below(&node);
@@ -223,7 +227,7 @@ static bool box_walk_is_first(const box_walk *w, bool owned, const double triang
     /* No earlier accel lists an owned face. If the face is only near this accel's cell, a later
      * accel takes it. */
     if (owned)
-        return touches_cell(&box, &w->below, triangle);
+        return intersects_cell(&box, &w->below, triangle);
     return find_first(w, &box, ebpo_model_root(m), triangle, &entry) && entry == w->below.entry;
 }
 
@@ -313,7 +317,7 @@ typedef struct delivery {
 } delivery;
 
 /* Passes the batch to the caller and empties it. */
-static void hand_over(delivery *d)
+static void pass_batch(delivery *d)
 {
     ebpo_triangles all = { .count = d->count,
                            .corners = (const double(*)[3][3])d->batch->corners,
@@ -337,7 +341,7 @@ static ebpo_status take_triangles(box_walk *walk, const ebpo_accel *s, ebpo_erro
         d->batch->faces[d->count] = ebpo_accel_source_face(s, local);
         d->batch->file_faces[d->count++] = ebpo_accel_file_face(s, local);
         if (d->count == EBPO_TRIANGLES_MAX)
-            hand_over(d);
+            pass_batch(d);
     }
     return EBPO_OK;
 }
@@ -360,7 +364,7 @@ ebpo_status ebpo_triangles_in_box(ebpo_context *context, const double min[3], co
     if (status == EBPO_OK)
         status = box_walk_run(&d.walk, error);
     if (status == EBPO_OK)
-        hand_over(&d);
+        pass_batch(&d);
     free(d.batch);
     return status;
 }

@@ -40,7 +40,10 @@ enum {
     OF_A_LEVEL,
     MAX_COLS = FIRST_LEVEL + OF_A_LEVEL * EBPO_LEVELS_MAX
 };
-enum { ROWS_OF_FACES = 2048, ROWS_OF_VERTICES = 1024, SUBTREES_A_TIME = 128 };
+/* rows of a block of faces, and of a block of vertices */
+enum { ROWS_OF_FACES = 2048, ROWS_OF_VERTICES = 1024 };
+/* number of subtrees after which unused pages of memory are released */
+enum { SUBTREES_A_TIME = 128 };
 static const char *const names[] = { "faces before the subtree",
                                      "faces",
                                      "vertices before the subtree",
@@ -62,13 +65,14 @@ typedef struct recount {
     ebpo_tally *tally;
     const ebpo_reference_tree *view;
     int level; /* level of the subtrees' roots */
-    unsigned cols, rows_of_chunk;
+    /* the arrays of /subtrees, as stored */
+    unsigned cols, rows_of_chunk; /* of `counts` */
     const uint32_t *counts, *outer;
     const uint64_t *index;
-    uint64_t subtrees, shared_rows;
-    /* numbers of items so far */
+    uint64_t subtrees, shared_rows; /* shared_rows: number of rows of `outer` */
+    /* numbers of subtrees, faces and vertices so far */
     uint64_t subtree, faces, vertices;
-    uint64_t outer_done;           /* compared rows of /subtrees/outer */
+    uint64_t outer_done;           /* number of compared rows of `outer` */
     uint64_t end[EBPO_LEVELS_MAX]; /* end of the new faces, by level */
     /* columns: sums over all subtrees before the current one, counts of the current one */
     uint64_t sum[MAX_COLS], row[MAX_COLS];
@@ -77,6 +81,7 @@ typedef struct recount {
     bool no_memory;
 } recount;
 
+/* Appends a number, unless it is equal to the last one. Returns false if there is no memory. */
 static bool add_number(ebpo_workspace *workspace, numbers *list, uint32_t number)
 {
     if (list->count && list->at[list->count - 1] == number)
@@ -116,6 +121,7 @@ static bool add_block(numbers *list, uint32_t block)
     return add_number(NULL, list, block);
 }
 
+/* Returns the name of a column. *level: its level, or -1. */
 static const char *column_name(const recount *c, unsigned column, int *level)
 {
     if (column < FIRST_LEVEL)
