@@ -144,7 +144,7 @@ static const char *fault_of_entry(const ebpo_catalogue_entry *e)
     if (e->surface && (!*e->surface || e->unseen))
         return "has no surface, but a path of a surface";
     if (e->numbers && !*e->numbers)
-        return "has an empty path of face numbers";
+        return "has an empty path for face indices";
     if ((unsigned)e->rule >= RULES)
         return "has an unknown winding rule";
     for (int k = 0; k < 3; k++)

@@ -211,7 +211,7 @@ typedef struct shot {
     ebpo_ray_sides sides;
     ebpo_ray_hit *out;
     uint64_t *model;
-    double *far; /* for hits whose t overflows (inf): t for the longer direction */
+    double *longer_t; /* t along the longer direction, for hits whose t is INFINITY */
 } shot;
 
 /* Returns the ray with a direction that is longer by a power of two, exactly, so that every hit's t
@@ -229,7 +229,8 @@ static ebpo_ray longer_ray(const ebpo_ray *ray)
     return out;
 }
 
-/* Returns true if a hit comes before the kept one. If both overflow, a longer ray decides. */
+/* Sets *nearer to true if a hit comes before the kept hit. If t is INFINITY for both, they are
+ * compared along a longer direction. */
 static ebpo_status is_nearer(const shot *s, ebpo_context *context, const ebpo_ray *ray,
                              const ebpo_ray_hit *hit, uint32_t item, bool *nearer,
                              ebpo_error *error)
@@ -244,9 +245,9 @@ static ebpo_status is_nearer(const shot *s, ebpo_context *context, const ebpo_ra
     how.sides = s->sides;
     how.threads = 1;
     ebpo_status status = ebpo_ray_first_many(context, &along, 1, &how, &there, error);
-    *nearer = kept->face == EBPO_NO_FACE || (kept->t == INFINITY && there.t < s->far[item]);
+    *nearer = kept->face == EBPO_NO_FACE || (kept->t == INFINITY && there.t < s->longer_t[item]);
     if (status == EBPO_OK && *nearer)
-        s->far[item] = there.t;
+        s->longer_t[item] = there.t;
     return status;
 }
 
@@ -298,17 +299,17 @@ static ebpo_status query_hits(ebpo_context *context, const ebpo_catalogue_held *
 static ebpo_status query_rays(const ebpo_catalogue_batch *a, const double *rows, uint32_t count,
                               void *out, uint64_t *model, ebpo_error *error)
 {
-    shot s = { a->options->sides, out, model, ebpo_alloc(count, sizeof *s.far) };
-    if (!s.far)
-        return ebpo_fail_memory(error, count * sizeof *s.far);
+    shot s = { a->options->sides, out, model, ebpo_alloc(count, sizeof *s.longer_t) };
+    if (!s.longer_t)
+        return ebpo_fail_memory(error, count * sizeof *s.longer_t);
     for (uint32_t i = 0; i < count; i++) {
         s.out[i] = (ebpo_ray_hit){ INFINITY, EBPO_NO_FACE, 0 };
-        s.far[i] = INFINITY;
+        s.longer_t[i] = INFINITY;
         model[i] = EBPO_CATALOGUE_NO_MODEL;
     }
     ebpo_status status = ebpo_catalogue_query_all(a, rows, count, 7, ebpo_catalogue_find_ray, true,
                                                   query_hits, &s, error);
-    free(s.far);
+    free(s.longer_t);
     return status;
 }
 

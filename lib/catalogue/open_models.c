@@ -99,8 +99,8 @@ static ebpo_status open_numbers(ebpo_catalogue_held *m, ebpo_error *error)
     ebpo_status status = ebpo_catalogue_numbers_open(&m->numbers, m->key.numbers, error);
     if (status == EBPO_OK && m->numbers.count != faces)
         status = ebpo_fail_file(error, EBPO_E_FORMAT, m->key.numbers,
-                                "expected a number for each face: %llu "
-                                "numbers of %llu faces",
+                                "expected an index for each face: %llu "
+                                "indices for %llu faces",
                                 (unsigned long long)m->numbers.count, (unsigned long long)faces);
     return status;
 }

@@ -317,7 +317,7 @@ class Parts(Case):
             with self.assertRaisesRegex(ebpo.FormatError, "negative"):
                 Catalogue([entry]).distance([entry.low])
         entries = [entry._replace(numbers=os.path.abspath("few.npy")) for entry in self.catalogue.entries]
-        with self.assertRaisesRegex(ebpo.FormatError, "few.npy: expected a number for each face: 3 numbers of"):
+        with self.assertRaisesRegex(ebpo.FormatError, "few.npy: expected an index for each face: 3 indices for"):
             Catalogue(entries, parts=True).distance(P[:99])
 
     def test_half_empty_cells(self):

@@ -15,10 +15,10 @@
  *
  * A *catalogue* is a list of models with boxes and digests. *Parts* are files of one model that was
  * cut; *caps* are faces that close a part where it was cut. A query opens only the models whose
- * boxes can contribute to the result. An opened model must agree with the catalogue in digest, box
- * and number of face indices; otherwise the query returns EBPO_E_FORMAT. Results are those of the
- * models (query.h); they do not depend on the budget. docs/guide/clusters.md describes the file
- * format and the results of parts.
+ * boxes can contribute to the result. An opened model must have the digest of its entry, must be
+ * within the entry's box, and must have as many faces as the file `numbers` has indices; otherwise
+ * the query returns EBPO_E_FORMAT. Results are those of the models (query.h) and do not depend on
+ * the budget. docs/guide/clusters.md describes the file format and the results of parts.
  */
 #ifndef EBPO_CATALOGUE_H
 #define EBPO_CATALOGUE_H
@@ -46,8 +46,8 @@ typedef struct ebpo_catalogue_entry {
     const char *surface;
 
     /*
-     * For a part: .npy file of integers, which are the indices of the surface's faces in the whole
-     * model; not empty. NULL: faces keep their indices.
+     * For a part: path of an .npy file with the index of each face of the surface in the whole
+     * model. Not an empty string. NULL: faces keep their indices.
      */
     const char *numbers;
 
@@ -59,7 +59,7 @@ typedef struct ebpo_catalogue_entry {
 
     /*
      * Data from the header of the file, for programs that read the catalogue; queries do not use
-     * it. If file_bytes is 0, these six members are unknown and not written.
+     * this data. If file_bytes is 0, these six members are unknown and not written.
      */
     uint64_t file_bytes, face_count, vertex_count;
     ebpo_rule rule;
@@ -74,8 +74,8 @@ typedef struct ebpo_catalogue_entry {
 } ebpo_catalogue_entry;
 
 /*
- * Opens a file for a query, by a path or URL of the catalogue. If this function fails, the query
- * returns its error. Called from any thread, including threads of the library.
+ * Opens a file for a query, by a path or URL that the catalogue contains. If this function fails,
+ * the query returns its error. Called from any thread, including threads of the library.
  */
 typedef ebpo_status (*ebpo_catalogue_open_fn)(void *user, const char *path, ebpo_file **out,
                                               ebpo_error *error);
@@ -283,7 +283,7 @@ EBPO_API ebpo_status ebpo_catalogue_models_get_stats(ebpo_catalogue_models *mode
  * Points and rays are as in query.h; for other values queries return EBPO_E_ARGUMENT with the
  * index. Points are processed along a curve, so that models and subtrees are opened few times. On
  * failure the results are unspecified. Errors are those of opening and querying models.
- * EBPO_E_LIMIT: the budget is too small for a model's share.
+ * EBPO_E_LIMIT: a model does not fit in its share of the budget.
  *
  * A query waits while other queries use the budget. Therefore a callback of a query, such as the
  * one that opens files, must not query the same ebpo_catalogue_models.
@@ -359,8 +359,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_catalogue_distance(
 
 /*
  * Finds the first face of any model hit by each of rays[count]. Of several models at the same
- * rounded t, the first is used. If t is INFINITY for several, a longer direction decides
- * (ebpo_ray_hit).
+ * rounded t, the first is used. If t is INFINITY for several models, their hits are compared
+ * along a direction that is longer by a power of two (see ebpo_ray_hit).
  *
  * model   as for ebpo_catalogue_distance
  *

@@ -31,8 +31,8 @@ typedef struct ebpo_lod_options {
     }
 
 /*
- * Computes the envelopes of a level: those of its gray nodes, and of the leaves and black nodes of
- * levels 0 to `level`. Each envelope is a convex polyhedron, cut from the node's cell by the
+ * Computes the envelopes of a level: of its gray nodes, and of the leaves and black nodes of levels
+ * 0 to `level`. Each envelope is a convex polyhedron, cut from the node's cell by the
  * half-spaces of the node and its ancestors. Leaves are cut by stored planes if the file has them,
  * else by planes derived from their faces (EBP 2017, 3.4).
  *
@@ -61,19 +61,20 @@ typedef struct ebpo_lod_node {
     double volume;
 
     /*
-     * Winding number. Black: in the cell. Leaf: at the lowest corner. Gray nodes, and surfaces: 0.
+     * Winding number. Black: in the cell. Leaf: at the lowest corner. 0 for gray nodes, and for
+     * nodes of surfaces.
      */
     int32_t winding;
 
     /* EBPO_GRAY (only on the requested level), EBPO_LEAF or EBPO_BLACK. */
     ebpo_node_type type;
 
-    /* Counts of the polyhedron, without polygons omitted by `cell_faces`. */
+    /* Counts of the polyhedron; polygons omitted by `cell_faces` are not counted. */
     uint32_t vertex_count, polygon_count;
 
     /*
-     * Colour: red + 256 green + 65,536 blue, sRGB. A gray node has its own colour; leaves and black
-     * nodes have that of their parent. 0x808080 if `coloured` is 0.
+     * Colour: red + 256 green + 65,536 blue, sRGB. A gray node has its own colour; a leaf or black
+     * node has the colour of its parent. 0x808080 if `coloured` is 0.
      */
     uint32_t colour;
 
@@ -82,11 +83,11 @@ typedef struct ebpo_lod_node {
 } ebpo_lod_node;
 
 /*
- * Nodes of the triangles of ebpo_lod_level, level by level, in the order of their octcodes; the
- * mesh has their vertices and triangles in the same order.
+ * Nodes of the triangles of ebpo_lod_level, level by level, in the order of their octcodes. The
+ * mesh has the nodes' vertices and triangles in the same order.
  *
- * A polygon of n corners is a fan of n - 2 triangles around its first corner: corners 0 and 1 of
- * its first triangle, then corner 2 of each.
+ * A polygon of n corners is a fan of n - 2 triangles around its first corner. The polygon's corners
+ * are corners 0 and 1 of the first triangle, then corner 2 of each triangle.
  */
 typedef struct ebpo_lod_nodes {
     uint64_t node_count, polygon_count;
@@ -106,8 +107,8 @@ typedef struct ebpo_lod_nodes {
 EBPO_API void ebpo_lod_nodes_free(ebpo_lod_nodes *nodes);
 
 /*
- * Computes the envelopes as ebpo_lod_level does, with their nodes, which ebpo_lod_nodes_free frees.
- * `nodes` may be NULL, and must be NULL without `out`.
+ * Computes the envelopes as ebpo_lod_level does, and their nodes, which ebpo_lod_nodes_free frees.
+ * `nodes` may be NULL, and must be NULL if `out` is NULL.
  *
  * Threads: any.
  */
@@ -117,8 +118,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_level_nodes(const ebpo_file *file, i
                                                         double *volume, ebpo_error *error);
 
 /*
- * Gets the colours of a level's vertices, which are those of their nodes. If the file has no
- * colours, there are none. Faces have no colours.
+ * Gets the colours of a level's vertices: each vertex has the colour of its node. If the file has
+ * no colours, `out` has none. Faces have no colours.
  *
  * vertex_count  of the mesh returned with the nodes
  * out           freed by ebpo_colours_free; cleared on failure
@@ -135,10 +136,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_colours(const ebpo_lod_nodes *nodes,
  * Computes normals for shading a level's polygons. A polygon on a plane of the envelope gets its
  * own normal. A polygon on a cell face is only a step between two envelopes; it gets the
  * area-weighted mean normal of the surrounding planes that face the same side, or its own normal if
- * there are none. Faces of the root cell count as planes. For images only: rounded, without
- * guarantee about the solid.
+ * there are no such planes. Cell faces of the root cell count as planes. For images only: the
+ * normals are rounded and guarantee nothing about the solid.
  *
- * info  of the file of the level
+ * info  of the level's file
  * mesh  returned with the nodes
  * out   [polygon_count][3] of length 1, or 0 for a polygon without area; allocated by the caller
  *

@@ -48,8 +48,8 @@ typedef struct ebpo_subset_options {
     size_t struct_size;
 
     /*
-     * Levels 0 to last_level are kept. -1: all. If the file is itself a subset, the value may be
-     * any level of the original file; all existing levels up to it are kept.
+     * Levels 0 to last_level are kept. -1: all. If the file is itself a subset, last_level may be
+     * any level of the original file; all existing levels up to last_level are kept.
      */
     int last_level;
 
@@ -66,8 +66,8 @@ typedef struct ebpo_subset_options {
     double min[3], max[3];
 
     /*
-     * ebpo_part bits: parts to keep, of those that the file has. Of the mesh, only faces that kept
-     * leaves list are kept. Without the mesh, maps are not kept.
+     * ebpo_part bits: parts to keep; parts that the file does not have are ignored. Of the mesh,
+     * only the faces in the lists of the kept leaves are kept. Without the mesh, maps are not kept.
      */
     uint32_t parts;
 
@@ -76,14 +76,14 @@ typedef struct ebpo_subset_options {
     int codec_level;
 
     /*
-     * Prunes nodes whose envelope has at most this error bound, in the model's unit. 0: none. See
-     * ebpo_subset.
+     * Prunes nodes whose envelope has at most this error bound, in the model's unit. 0: prunes no
+     * nodes for this reason. See ebpo_subset.
      */
     double max_error;
 
     /*
-     * Maximum size of the new file in bytes: the least max_error (to 1 %) with this size is found
-     * and used; if everything fits, no max_error is used. 0: no target. Not together with
+     * Maximum size of the new file in bytes. The least max_error (to 1 %) for which the file fits
+     * is found and used; if everything fits, no max_error is used. 0: no target. Not together with
      * max_error.
      */
     uint64_t target_bytes;
@@ -108,8 +108,8 @@ typedef struct ebpo_subset_options {
 
 /*
  * Estimates the memory in bytes that ebpo_subset needs with max_error or target_bytes, because it
- * then opens the whole model in memory. The estimate is from measurements of models with such
- * numbers of faces, and of faces per leaf.
+ * then opens the whole model in memory. The estimate uses the measured bytes per face, which depend
+ * on the number of faces per leaf.
  *
  * Threads: any.
  */
@@ -117,8 +117,8 @@ EBPO_API uint64_t ebpo_subset_memory(uint64_t face_count, uint32_t leaf_faces);
 
 /*
  * Writes the subset of a file to another file, which is replaced atomically. If everything is kept,
- * the content (content_sha256) is that of `file`. Memory: the result, and up to 64 MiB of the data
- * read.
+ * the content (content_sha256) is that of `file`. Needs memory for the result, and up to 64 MiB for
+ * data that is read.
  *
  * Guarantee of max_error for every node that was pruned for it: no point of its envelope, including
  * the interior, is farther than max_error from the solid and its faces (for a surface: from its
@@ -129,9 +129,9 @@ EBPO_API uint64_t ebpo_subset_memory(uint64_t face_count, uint32_t leaf_faces);
  *
  * EBPO_E_ARGUMENT: the level is not valid; the box has no points, or does not intersect the model's
  * root cell or the box of an earlier subset; or target_bytes is too small, and the message gives
- * the minimum. EBPO_E_ABSENT: max_error or target_bytes, and the file has no mesh or is a subset.
- * EBPO_E_IO: also if `path` is that of `file`, and another program has replaced it since opening.
- * The errors of reading.
+ * the minimum. EBPO_E_ABSENT: max_error or target_bytes is set, and the file has no mesh or is a
+ * subset. EBPO_E_IO: also if `path` is that of `file`, and another program has replaced the file
+ * since opening. The errors of reading.
  *
  * Threads: any.
  */
@@ -140,9 +140,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_subset(const ebpo_file *file, const char
                                                ebpo_error *error);
 
 /*
- * Writes the subset of a tree. The tree is first written to a temporary file beside `path`, as by
- * ebpo_tree_write; the result is that of ebpo_subset for this file. The tree is freed, also on
- * failure.
+ * Writes the subset of a tree. ebpo_tree_write first writes the tree to a temporary file beside
+ * `path`; the result is that of ebpo_subset for this file. The tree is freed, also on failure.
  *
  * Threads: one per tree.
  */
