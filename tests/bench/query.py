@@ -454,10 +454,10 @@ def write(options, bench, page, goals, short):
     head.text("# Query times", "", *short)
     made.text("## Measurement", "",
               f"Made by `{command_line(options)}` on {processor()}. Each query "
-              "runs on one thread of one core. A time is the processor time per query in us: the "
-              f"median of {options.rounds} rounds, or of half as many for models of more than two "
-              "million faces. Sections with other rules state them. *batch*: one call for all "
-              f"points. Load average {statistics.median(bench.load):.1f} (median), "
+              "runs on one thread of one core. Unless a section says otherwise, a time is the "
+              f"processor time per query in us, the median of {options.rounds} rounds (half as many "
+              "above two million faces). *batch*: one call for all points. Load average "
+              f"{statistics.median(bench.load):.1f} (median), "
               f"{max(bench.load):.1f} (maximum). Compare values within a row only. The results of "
               "the thesis come from another machine.")
     text = "\n".join(head.lines + goals.lines + made.lines + page.lines).rstrip("\n") + "\n"

@@ -73,7 +73,7 @@ def goals_table(results, memory, budget, tables, found):
     thesis = list(query_thesis.cells(tables))
     if thesis:
         slower = [what for what, ours, theirs in thesis if ours > theirs]
-        goals.rows.append(["modes of the EBP thesis (see below): times above those of the thesis", 0,
+        goals.rows.append(["modes of the EBP thesis (see below): times above the thesis", 0,
                            f"{len(slower)} of {len(thesis)}", "missed" if slower else "met"])
     if found["results"]:
         bad = sum(r["peers"]["ebpo"]["bits"] for r in found["results"][1])
@@ -84,9 +84,9 @@ def goals_table(results, memory, budget, tables, found):
               "The table begins with missed goals. A goal is an upper limit. Four values in a "
               "cell are for the models of "
               f"{', '.join(SIZES)} faces; *1 of 4*: one of them meets the goal. `a / b` is the value "
-              "of a divided by the value of b. The nearest-point library fcpw was not run here. Its "
-              "time is estimated as the time of Embree's point query, multiplied by a factor for "
-              "each of the four models. The factors come from another machine: "
+              "of a divided by the value of b. The time of fcpw, a nearest-point library, is "
+              "estimated: the time of Embree's point query, multiplied by a factor for each model "
+              "from another machine: "
               f"{', '.join(map(str, FCPW['path']))} (path) and "
               f"{', '.join(map(str, FCPW['uniform']))} (uniform).")
     page.table(["what", "goal", "measured", ""],

@@ -105,18 +105,16 @@ def write(page, model, tables):
     if not tables:
         return
     page.text("## Modes of the EBP thesis", "",
-              "EBP 2017 is a thesis on this data structure "
-              "([format specification](../../format-spec/README.md)). Its query modes are "
-              "reimplemented for comparison. The columns *EBP* are from tables 25, 26 and 28 of the "
-              "thesis: means of three models of 26 to 28 million faces. Our model is "
-              f"{model.name}, {model.faces:,} faces, with {MEMORY >> 20} MiB of memory and levels 0 "
-              f"to {CUT} in memory (`ebpo bench --memory {MEMORY} --cut-level {CUT}`). There are "
-              f"{COUNTS['uniform']:,} uniform points and {COUNTS['path']:,} points of a path. Times "
-              "are wall-clock times from a newly opened model and a cold file.")
+              "The columns *EBP* are from tables 25, 26 and 28 of the thesis "
+              "[EBP 2017](../../format-spec/README.md): means of three models of 26 to 28 million "
+              f"faces. Our model is {model.name}, {model.faces:,} faces, with {MEMORY >> 20} MiB and "
+              f"levels 0 to {CUT} in memory (`ebpo bench --memory {MEMORY} --cut-level {CUT}`). "
+              f"There are {COUNTS['uniform']:,} uniform points and {COUNTS['path']:,} points of a "
+              "path. Times are wall-clock times from a newly opened model and a cold file.")
     if "modes" in tables:
         page.text("The first table is for point in solid. `cache`: a cache of subtrees. `nodes`: reads "
                   "only the nodes on the path to the leaf, without a cache. `subtree`: one subtree "
-                  "at a time, without a cache. `-plain`: the same without envelopes.")
+                  "at a time, without a cache. `-plain`: without envelopes.")
         page.table(["mode", "uniform", "path", "peak MB", "EBP, random", "EBP, path"],
                    [[f"`{mode}`", us(o["uniform"][0]), us(o["path"][0]),
                      figure(max(o[p][2] for p in COUNTS) / 2**20)]
@@ -124,12 +122,11 @@ def write(page, model, tables):
     if "distances" in tables:
         page.text("The second table is for distances. `exact` returns the minimum; the other modes do "
                   "not guarantee it. `recursive`: distance to the faces below the deepest gray "
-                  "node around the point. `leaves`: distance to the faces of the leaf around the "
-                  "point. `envelope`: distance to the envelope of the deepest gray node around the "
-                  "point, down to a level. The numbers of uniform points and path points differ "
-                  f"for `recursive` ({OTHERS['recursive']['uniform']} and "
-                  f"{OTHERS['recursive']['path']:,}) and `envelope` "
-                  f"({OTHERS['envelope']['uniform']:,} and {OTHERS['envelope']['path']:,}). "
+                  "node around the point. `leaves`: to the faces of the leaf around the point. "
+                  "`envelope`: to the envelope of the deepest gray node around the point, down to a "
+                  f"level. `recursive` has {OTHERS['recursive']['uniform']} uniform and "
+                  f"{OTHERS['recursive']['path']:,} path points, `envelope` "
+                  f"{OTHERS['envelope']['uniform']:,} and {OTHERS['envelope']['path']:,}. "
                   "`recursive` is not comparable: for a point in a white node, our program visits "
                   "every leaf below the parent. For random points these leaves have millions of "
                   "faces.")
