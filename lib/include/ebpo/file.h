@@ -219,8 +219,13 @@ typedef struct ebpo_level_summary {
 
 /* All data of a file except its arrays. */
 typedef struct ebpo_info {
+    /* Version of the format. */
     int version_major, version_minor;
+
+    /* Program that wrote the file. */
     char generator[64];
+
+    /* The mesh file that was converted. */
     char source_name[256], source_format[16];
     uint8_t source_sha256[32];
     uint64_t source_size;
@@ -246,12 +251,13 @@ typedef struct ebpo_info {
     /* Deepest level for which the coordinates of cells are exact. */
     int grid_level;
 
-    /* Deepest level that was allowed in building. */
+    /* Upper limit for the levels when the tree was built. */
     int max_level;
 
     /* Levels 0 .. level_count - 1 are present. */
     int level_count;
 
+    /* As in ebpo_build_options (build.h). */
     uint32_t leaf_faces;
     double epsilon;
 
@@ -300,8 +306,8 @@ typedef struct ebpo_info {
     uint64_t top_bytes;
 
     /*
-     * True for a subset: children of some gray nodes were omitted (ebpo_subset). The following
-     * members describe what was requested.
+     * True for a subset: children of some gray nodes were omitted (ebpo_subset). The next members,
+     * up to kept_error, are the conditions of the request.
      */
     bool pruned;
 
@@ -494,8 +500,8 @@ typedef struct ebpo_file ebpo_file;
  * Neither this nor later reading uses libhdf5 or its plugins.
  *
  * Safe for untrusted files: for any bytes, memory accesses stay within allocations, and no code is
- * loaded or executed. Results for a manipulated file are those of its data; ebpo_verify checks that
- * its parts are consistent.
+ * loaded or executed. Results for a manipulated file are those of its data. ebpo_verify checks that
+ * the parts of a file are consistent.
  *
  * If another program truncates or damages an open file, reading returns EBPO_E_IO or EBPO_E_FORMAT.
  * Chunks have checksums, and the list of chunk checksums (ebpo_chunk_checksums) also detects
