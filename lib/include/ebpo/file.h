@@ -222,7 +222,7 @@ typedef struct ebpo_info {
     /* Version of the format. */
     int version_major, version_minor;
 
-    /* Program that wrote the file. */
+    /* Name and version of the program that built the model; copies keep it. */
     char generator[64];
 
     /* The mesh file that was converted. */
