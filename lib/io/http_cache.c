@@ -1,10 +1,10 @@
-/* Fetched parts of a file on a server. In memory there are pieces, in order and without overlaps.
- * Each is fetched by one request and kept while memory allows. Pieces with prefetch hints that are
- * not read yet are kept longest, then those read last. The cache folder, if there is one, holds
- * blocks as files, named by a digest of address and version, each with a SHA-256. Blocks are
- * written under temporary names, so any number of processes may share the folder. When its limit is
- * reached, the oldest blocks are removed. Nothing depends on the folder: missing or damaged blocks
- * are fetched. */
+/* Fetched parts of a file on a server. In memory there are cached ranges, in order and without
+ * overlaps. One request fetches each range, which is kept while memory allows. Ranges with prefetch
+ * hints that are not read yet are kept longest, then ranges that were read last. The cache folder,
+ * if there is one, holds blocks as files, named by a digest of address and version, each with a
+ * SHA-256. Blocks are written under temporary names, so any number of processes may share the
+ * folder. When its limit is reached, the oldest blocks are removed. Nothing depends on the folder:
+ * missing or damaged blocks are fetched. */
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -335,27 +335,27 @@ enum {
     GAP_BYTES = 16384,
     GAP_BYTES_OF_MANY = 32768,
     MANY = 256,
-    STALE_AFTER = 64 /* after so many later hints, a hinted piece will probably not be read */
+    STALE_AFTER = 64 /* after so many later hints, a hinted range will probably not be read */
 };
 
-typedef enum piece_state {
-    PIECE_NOTED,   /* nothing fetched */
-    PIECE_LOADING, /* a thread reads it from disk */
-    PIECE_COMING,  /* requested */
-    PIECE_THERE
-} piece_state;
+typedef enum range_state {
+    RANGE_NOTED,   /* nothing fetched */
+    RANGE_LOADING, /* a thread reads the range from disk */
+    RANGE_COMING,  /* requested */
+    RANGE_THERE
+} range_state;
 
 struct ebpo_cached_range {
     uint64_t begin, end;
     uint64_t wanted; /* hinted bytes that are not read yet */
-    uint64_t plan;   /* number of the last prefetch hint that included it */
+    uint64_t plan;   /* number of the last prefetch hint that included the range */
     uint64_t used;   /* time of the last read, by p->clock */
     bool fresh;      /* made for the current prefetch hint */
-    piece_state state;
-    unsigned users; /* threads that need it to stay in the list */
-    bool demanded;  /* a reader waits for it, and receives its failure */
+    range_state state;
+    unsigned users; /* threads that need the range to stay in the list */
+    bool demanded;  /* a reader waits for the range, and receives the error of its request */
     bool to_store;  /* fetched, not on disk yet */
-    /* the requested part: blocks at the ends of the piece may have come from disk */
+    /* the requested part: blocks at the ends of the range may have come from disk */
     uint64_t fetch_begin, fetch_end;
     ebpo_request request;
     uint8_t *data; /* [end - begin] */
@@ -363,13 +363,13 @@ struct ebpo_cached_range {
 
 /* --- the list; lock held in the functions below, except where noted --- */
 
-/* Returns the first piece that ends behind `at`. */
-static uint64_t find_piece(const ebpo_range_cache *p, uint64_t at)
+/* Returns the first range that ends behind `at`. */
+static uint64_t find_range(const ebpo_range_cache *p, uint64_t at)
 {
     uint64_t low = 0, high = p->count;
     while (low < high) {
         uint64_t middle = low + (high - low) / 2;
-        if (p->piece[middle]->end > at)
+        if (p->range[middle]->end > at)
             high = middle;
         else
             low = middle + 1;
@@ -377,59 +377,59 @@ static uint64_t find_piece(const ebpo_range_cache *p, uint64_t at)
     return low;
 }
 
-static uint64_t bytes_of(const ebpo_cached_range *piece) { return piece->end - piece->begin; }
+static uint64_t bytes_of(const ebpo_cached_range *range) { return range->end - range->begin; }
 
-static void drop_data(ebpo_range_cache *p, ebpo_cached_range *piece)
+static void drop_data(ebpo_range_cache *p, ebpo_cached_range *range)
 {
-    if (piece->data)
-        p->held -= bytes_of(piece);
-    free(piece->data);
-    piece->data = NULL;
-    piece->state = PIECE_NOTED;
+    if (range->data)
+        p->held -= bytes_of(range);
+    free(range->data);
+    range->data = NULL;
+    range->state = RANGE_NOTED;
 }
 
 static void remove_at(ebpo_range_cache *p, uint64_t i)
 {
-    ebpo_cached_range *piece = p->piece[i];
-    drop_data(p, piece);
-    free(piece);
-    memmove(p->piece + i, p->piece + i + 1, (p->count - i - 1) * sizeof *p->piece);
+    ebpo_cached_range *range = p->range[i];
+    drop_data(p, range);
+    free(range);
+    memmove(p->range + i, p->range + i + 1, (p->count - i - 1) * sizeof *p->range);
     p->count--;
 }
 
-static bool insert_piece(ebpo_range_cache *p, uint64_t i, uint64_t begin, uint64_t end)
+static bool insert_range(ebpo_range_cache *p, uint64_t i, uint64_t begin, uint64_t end)
 {
-    ebpo_cached_range *piece = ebpo_alloc_zero(1, sizeof *piece);
-    if (!piece || !ebpo_grow(&p->piece, &p->capacity, p->count + 1, sizeof *p->piece)) {
-        free(piece);
+    ebpo_cached_range *range = ebpo_alloc_zero(1, sizeof *range);
+    if (!range || !ebpo_grow(&p->range, &p->capacity, p->count + 1, sizeof *p->range)) {
+        free(range);
         return false;
     }
-    piece->begin = begin;
-    piece->end = end;
-    piece->plan = p->plan;
-    piece->fresh = p->hinting;
-    memmove(p->piece + i + 1, p->piece + i, (p->count - i) * sizeof *p->piece);
-    p->piece[i] = piece;
+    range->begin = begin;
+    range->end = end;
+    range->plan = p->plan;
+    range->fresh = p->hinting;
+    memmove(p->range + i + 1, p->range + i, (p->count - i) * sizeof *p->range);
+    p->range[i] = range;
     p->count++;
     return true;
 }
 
-/* Inserts [begin, end) in pieces of about equal size, at most EBPO_RANGE_BYTES, on the grid of the
+/* Inserts [begin, end) in ranges of about equal size, at most EBPO_RANGE_BYTES, on the grid of the
  * blocks. */
-static bool insert_pieces(ebpo_range_cache *p, uint64_t i, uint64_t begin, uint64_t end)
+static bool insert_ranges(ebpo_range_cache *p, uint64_t i, uint64_t begin, uint64_t end)
 {
     uint64_t number = (end - begin + EBPO_RANGE_BYTES - 1) / EBPO_RANGE_BYTES;
     uint64_t each = ((end - begin + number - 1) / number + p->block - 1) / p->block * p->block;
     for (; begin < end; i++) {
         uint64_t stop = end - begin <= each ? end : (begin + each) / p->block * p->block;
-        if (!insert_piece(p, i, begin, stop))
+        if (!insert_range(p, i, begin, stop))
             return false;
         begin = stop;
     }
     return true;
 }
 
-/* Makes pieces for uncovered parts of [begin, end). With a folder, whole blocks. */
+/* Makes ranges for uncovered parts of [begin, end). With a folder, whole blocks. */
 static bool cover_range(ebpo_range_cache *p, uint64_t begin, uint64_t end)
 {
     if (p->disk) {
@@ -439,19 +439,19 @@ static bool cover_range(ebpo_range_cache *p, uint64_t begin, uint64_t end)
     begin = begin < p->begin ? p->begin : begin;
     end = end > p->size ? p->size : end;
     while (begin < end) {
-        uint64_t i = find_piece(p, begin);
-        uint64_t next = i < p->count && p->piece[i]->begin < end ? p->piece[i]->begin : end;
-        if (begin < next && !insert_pieces(p, i, begin, next))
+        uint64_t i = find_range(p, begin);
+        uint64_t next = i < p->count && p->range[i]->begin < end ? p->range[i]->begin : end;
+        if (begin < next && !insert_ranges(p, i, begin, next))
             return false;
-        i = find_piece(p, next);
-        begin = next < end && i < p->count ? p->piece[i]->end : end;
+        i = find_range(p, next);
+        begin = next < end && i < p->count ? p->range[i]->end : end;
     }
     return true;
 }
 
 /* --- fetching --- */
 
-/* Returns true if a piece holds the whole block at an offset, or as much of it as the file has.
+/* Returns true if a range holds the whole block at an offset, or as much of it as the file has.
  * Only such blocks are stored on disk. */
 static bool has_block(const ebpo_range_cache *p, uint64_t at, uint64_t end)
 {
@@ -460,14 +460,14 @@ static bool has_block(const ebpo_range_cache *p, uint64_t at, uint64_t end)
 
 /* Reads blocks from disk, from both ends inwards; the lock is released meanwhile. The rest must be
  * requested. */
-static void load_from_disk(ebpo_range_cache *p, ebpo_cached_range *piece)
+static void load_from_disk(ebpo_range_cache *p, ebpo_cached_range *range)
 {
-    uint64_t begin = piece->begin, end = piece->end, got = 0;
-    piece->state = PIECE_LOADING;
+    uint64_t begin = range->begin, end = range->end, got = 0;
+    range->state = RANGE_LOADING;
     pthread_mutex_unlock(&p->lock);
     while (begin < end && has_block(p, begin, end)) {
         size_t size = (size_t)(end - begin < p->block ? end - begin : p->block);
-        if (!get_block(p->disk, begin / p->block, piece->data + (begin - piece->begin), size))
+        if (!get_block(p->disk, begin / p->block, range->data + (begin - range->begin), size))
             break;
         begin += size;
         got += size;
@@ -475,38 +475,38 @@ static void load_from_disk(ebpo_range_cache *p, ebpo_cached_range *piece)
     while (begin < end) {
         uint64_t block = (end - 1) / p->block, at = block * p->block;
         if (at <= begin || (end % p->block && end != p->size) ||
-            !get_block(p->disk, block, piece->data + (at - piece->begin), (size_t)(end - at)))
+            !get_block(p->disk, block, range->data + (at - range->begin), (size_t)(end - at)))
             break;
         got += end - at;
         end = at;
     }
     pthread_mutex_lock(&p->lock);
-    piece->fetch_begin = begin;
-    piece->fetch_end = end;
+    range->fetch_begin = begin;
+    range->fetch_end = end;
     p->disk_bytes += got;
     p->disk_hits += begin == end;
 }
 
-/* Returns true if no thread needs the piece to stay. */
-static bool is_idle(const ebpo_cached_range *piece)
+/* Returns true if no thread needs the range to stay. */
+static bool is_idle(const ebpo_cached_range *range)
 {
-    return piece->users == 0 && piece->data &&
-           (piece->state == PIECE_THERE || (piece->state == PIECE_COMING && piece->request.done));
+    return range->users == 0 && range->data &&
+           (range->state == RANGE_THERE || (range->state == RANGE_COMING && range->request.done));
 }
 
-/* Drops the piece that was read least recently; if none was read, one whose prefetch hint is old.
+/* Drops the range that was read least recently; if none was read, one whose prefetch hint is old.
  */
 static bool forget_one(ebpo_range_cache *p)
 {
     uint64_t read = p->count, stale = p->count;
     for (uint64_t i = 0; i < p->count; i++) {
-        const ebpo_cached_range *piece = p->piece[i];
-        if (!is_idle(piece))
+        const ebpo_cached_range *range = p->range[i];
+        if (!is_idle(range))
             continue;
-        if (piece->wanted == 0 && (read == p->count || piece->used < p->piece[read]->used))
+        if (range->wanted == 0 && (read == p->count || range->used < p->range[read]->used))
             read = i;
-        if (piece->wanted && piece->plan + STALE_AFTER < p->plan &&
-            (stale == p->count || piece->plan < p->piece[stale]->plan))
+        if (range->wanted && range->plan + STALE_AFTER < p->plan &&
+            (stale == p->count || range->plan < p->range[stale]->plan))
             stale = i;
     }
     uint64_t which = read < p->count ? read : stale;
@@ -522,68 +522,68 @@ static void reserve_space(ebpo_range_cache *p, uint64_t bytes)
         ;
 }
 
-/* Requests a piece that is only noted (PIECE_NOTED). Returns false when memory is short. */
-static bool start_request(ebpo_range_cache *p, ebpo_cached_range *piece, bool urgent)
+/* Requests a range that is only noted (RANGE_NOTED). Returns false when memory is short. */
+static bool start_request(ebpo_range_cache *p, ebpo_cached_range *range, bool urgent)
 {
-    piece->users++; /* must not be dropped here */
-    reserve_space(p, bytes_of(piece));
-    piece->users--;
-    piece->data = ebpo_alloc(bytes_of(piece), 1);
-    if (!piece->data)
+    range->users++; /* must not be dropped here */
+    reserve_space(p, bytes_of(range));
+    range->users--;
+    range->data = ebpo_alloc(bytes_of(range), 1);
+    if (!range->data)
         return false;
-    p->held += bytes_of(piece);
-    piece->fetch_begin = piece->begin;
-    piece->fetch_end = piece->end;
+    p->held += bytes_of(range);
+    range->fetch_begin = range->begin;
+    range->fetch_end = range->end;
     if (p->disk) {
-        piece->users++;
-        load_from_disk(p, piece);
-        piece->users--;
+        range->users++;
+        load_from_disk(p, range);
+        range->users--;
     }
-    piece->to_store = p->disk && piece->fetch_begin < piece->fetch_end;
-    if (piece->fetch_begin == piece->fetch_end) {
-        piece->state = PIECE_THERE;
+    range->to_store = p->disk && range->fetch_begin < range->fetch_end;
+    if (range->fetch_begin == range->fetch_end) {
+        range->state = RANGE_THERE;
         pthread_cond_broadcast(&p->done);
         return true;
     }
-    piece->state = PIECE_COMING;
-    piece->demanded = urgent;
-    piece->request = (ebpo_request){ .offset = piece->fetch_begin,
-                                     .size = piece->fetch_end - piece->fetch_begin,
-                                     .data = piece->data + (piece->fetch_begin - piece->begin) };
-    ebpo_transfers_add(p->transfers, &piece->request, urgent);
+    range->state = RANGE_COMING;
+    range->demanded = urgent;
+    range->request = (ebpo_request){ .offset = range->fetch_begin,
+                                     .size = range->fetch_end - range->fetch_begin,
+                                     .data = range->data + (range->fetch_begin - range->begin) };
+    ebpo_transfers_add(p->transfers, &range->request, urgent);
     return true;
 }
 
-/* Ends this thread's use of a piece, after reading `read` bytes of it. Its data stays until the
+/* Ends this thread's use of a range, after reading `read` bytes of it. Its data stays until the
  * memory is needed. */
-static void release_piece(ebpo_range_cache *p, ebpo_cached_range *piece, uint64_t read)
+static void release_range(ebpo_range_cache *p, ebpo_cached_range *range, uint64_t read)
 {
-    piece->users--;
-    piece->wanted -= read < piece->wanted ? read : piece->wanted;
+    range->users--;
+    range->wanted -= read < range->wanted ? read : range->wanted;
     if (read)
-        piece->used = ++p->clock;
+        range->used = ++p->clock;
     bool failed =
-        piece->state == PIECE_COMING && piece->request.done && piece->request.status != EBPO_OK;
-    if (piece->users)
+        range->state == RANGE_COMING && range->request.done && range->request.status != EBPO_OK;
+    if (range->users)
         return;
     if (failed)
-        drop_data(p, piece);
-    if (piece->wanted == 0 && piece->state == PIECE_NOTED)
-        remove_at(p, find_piece(p, piece->begin));
+        drop_data(p, range);
+    if (range->wanted == 0 && range->state == RANGE_NOTED)
+        remove_at(p, find_range(p, range->begin));
 }
 
 /* Reads ahead from an offset in the file, as far as the limit allows. */
 static void read_ahead(ebpo_range_cache *p, uint64_t from)
 {
-    for (uint64_t i = find_piece(p, from); i < p->count; i = find_piece(p, from)) {
-        ebpo_cached_range *piece = p->piece[i];
-        from = piece->end;
-        if (piece->state != PIECE_NOTED || piece->wanted == 0)
+    for (uint64_t i = find_range(p, from); i < p->count; i = find_range(p, from)) {
+        ebpo_cached_range *range = p->range[i];
+        from = range->end;
+        if (range->state != RANGE_NOTED || range->wanted == 0)
             continue;
-        piece->users++; /* must not be dropped here */
-        reserve_space(p, bytes_of(piece));
-        bool fits = p->held + bytes_of(piece) <= p->held_limit && start_request(p, piece, false);
-        release_piece(p, piece, 0);
+        range->users++; /* must not be dropped here */
+        reserve_space(p, bytes_of(range));
+        bool fits = p->held + bytes_of(range) <= p->held_limit && start_request(p, range, false);
+        release_range(p, range, 0);
         if (!fits)
             return;
     }
@@ -597,21 +597,21 @@ static int by_offset(const void *a, const void *b)
     return x->offset < y->offset ? -1 : x->offset > y->offset;
 }
 
-/* Adds hinted bytes; pieces in memory have been counted. */
-static void add_wanted(ebpo_range_cache *p, const ebpo_range *range)
+/* Adds the hinted bytes to `wanted` of each new cached range; older ranges have counted them. */
+static void add_wanted(ebpo_range_cache *p, const ebpo_range *hinted)
 {
-    uint64_t begin = range->offset, end = begin + range->size;
-    for (uint64_t i = find_piece(p, begin); i < p->count && p->piece[i]->begin < end; i++) {
-        ebpo_cached_range *piece = p->piece[i];
-        uint64_t from = piece->begin > begin ? piece->begin : begin,
-                 to = piece->end < end ? piece->end : end;
-        piece->plan = p->plan;
-        if (piece->fresh)
-            piece->wanted += to - from;
+    uint64_t begin = hinted->offset, end = begin + hinted->size;
+    for (uint64_t i = find_range(p, begin); i < p->count && p->range[i]->begin < end; i++) {
+        ebpo_cached_range *range = p->range[i];
+        uint64_t from = range->begin > begin ? range->begin : begin,
+                 to = range->end < end ? range->end : end;
+        range->plan = p->plan;
+        if (range->fresh)
+            range->wanted += to - from;
     }
 }
 
-/* Makes pieces for the ranges (sorted), one for ranges that are close together. */
+/* Makes cached ranges for hinted ranges (sorted), one for hinted ranges that are close together. */
 static void note_ranges(ebpo_range_cache *p, const ebpo_range *sorted, size_t count)
 {
     uint64_t before = p->count, gap = count > MANY ? GAP_BYTES_OF_MANY : GAP_BYTES;
@@ -625,14 +625,14 @@ static void note_ranges(ebpo_range_cache *p, const ebpo_range *sorted, size_t co
     }
     p->hinting = false;
     p->plan += p->count > before;
-    uint64_t first = find_piece(p, sorted[0].offset),
+    uint64_t first = find_range(p, sorted[0].offset),
              end = sorted[count - 1].offset + sorted[count - 1].size;
-    for (uint64_t i = first; i < p->count && p->piece[i]->begin < end; i++)
-        p->piece[i]->fresh |= p->piece[i]->wanted == 0; /* was read before, and is needed again */
+    for (uint64_t i = first; i < p->count && p->range[i]->begin < end; i++)
+        p->range[i]->fresh |= p->range[i]->wanted == 0; /* was read before, and is needed again */
     for (size_t i = 0; i < count; i++)
         add_wanted(p, &sorted[i]);
-    for (uint64_t i = first; i < p->count && p->piece[i]->begin < end; i++)
-        p->piece[i]->fresh = false;
+    for (uint64_t i = first; i < p->count && p->range[i]->begin < end; i++)
+        p->range[i]->fresh = false;
 }
 
 void ebpo_range_cache_hint(ebpo_range_cache *p, const ebpo_range *ranges, size_t count)
@@ -654,113 +654,113 @@ void ebpo_range_cache_hint(ebpo_range_cache *p, const ebpo_range *ranges, size_t
 /* --- reading --- */
 
 /* Stores a block; the lock is released meanwhile. */
-static void store_block(ebpo_range_cache *p, ebpo_cached_range *piece)
+static void store_block(ebpo_range_cache *p, ebpo_cached_range *range)
 {
-    piece->to_store = false;
+    range->to_store = false;
     pthread_mutex_unlock(&p->lock);
-    for (uint64_t at = piece->fetch_begin; at < piece->fetch_end; at += p->block) {
-        uint64_t left = piece->fetch_end - at;
-        if (has_block(p, at, piece->fetch_end))
-            put_block(p->disk, at / p->block, piece->data + (at - piece->begin),
+    for (uint64_t at = range->fetch_begin; at < range->fetch_end; at += p->block) {
+        uint64_t left = range->fetch_end - at;
+        if (has_block(p, at, range->fetch_end))
+            put_block(p->disk, at / p->block, range->data + (at - range->begin),
                       (size_t)(left < p->block ? left : p->block));
     }
     pthread_mutex_lock(&p->lock);
 }
 
-static bool has_come(const ebpo_cached_range *piece)
+static bool has_come(const ebpo_cached_range *range)
 {
-    return piece->to_store &&
-           (piece->state == PIECE_THERE || (piece->state == PIECE_COMING && piece->request.done &&
-                                            piece->request.status == EBPO_OK));
+    return range->to_store &&
+           (range->state == RANGE_THERE || (range->state == RANGE_COMING && range->request.done &&
+                                            range->request.status == EBPO_OK));
 }
 
-/* Stores one piece that has arrived but has not been read, so that it is not lost when the process
+/* Stores one range that has arrived but has not been read, so that it is not lost when the process
  * ends; returns false when there is none. The lock is released meanwhile. */
 static bool store_one(ebpo_range_cache *p)
 {
     for (uint64_t i = 0; p->disk && i < p->count; i++) {
-        ebpo_cached_range *piece = p->piece[i];
-        if (!has_come(piece))
+        ebpo_cached_range *range = p->range[i];
+        if (!has_come(range))
             continue;
-        piece->users++;
-        store_block(p, piece);
-        piece->users--;
+        range->users++;
+        store_block(p, range);
+        range->users--;
         return true;
     }
     return false;
 }
 
-/* Waits for a piece that this thread uses. A piece that failed while no thread waited is requested
+/* Waits for a range that this thread uses. A range that failed while no thread waited is requested
  * again. */
-static ebpo_status await_piece(ebpo_range_cache *p, ebpo_cached_range *piece, ebpo_error *error)
+static ebpo_status await_range(ebpo_range_cache *p, ebpo_cached_range *range, ebpo_error *error)
 {
-    while (piece->state != PIECE_THERE) {
-        if (piece->state == PIECE_COMING && piece->request.done) {
-            if (piece->request.status == EBPO_OK) {
-                piece->state = PIECE_THERE;
+    while (range->state != RANGE_THERE) {
+        if (range->state == RANGE_COMING && range->request.done) {
+            if (range->request.status == EBPO_OK) {
+                range->state = RANGE_THERE;
                 break;
             }
-            if (piece->demanded || piece->request.status == EBPO_E_CANCELLED) {
+            if (range->demanded || range->request.status == EBPO_E_CANCELLED) {
                 if (error)
-                    *error = piece->request.error;
-                return piece->request.status;
+                    *error = range->request.error;
+                return range->request.status;
             }
-            drop_data(p, piece);
+            drop_data(p, range);
         }
-        if (piece->state == PIECE_NOTED) {
-            if (!start_request(p, piece, true))
-                return ebpo_fail_memory(error, bytes_of(piece));
+        if (range->state == RANGE_NOTED) {
+            if (!start_request(p, range, true))
+                return ebpo_fail_memory(error, bytes_of(range));
             continue;
         }
-        if (piece->state == PIECE_COMING && !piece->request.done) {
-            piece->demanded = true;
-            ebpo_transfers_urge(p->transfers, &piece->request);
+        if (range->state == RANGE_COMING && !range->request.done) {
+            range->demanded = true;
+            ebpo_transfers_urge(p->transfers, &range->request);
         }
         if (!store_one(p))
             pthread_cond_wait(&p->done, &p->lock);
     }
-    if (piece->to_store)
-        store_block(p, piece);
+    if (range->to_store)
+        store_block(p, range);
     return EBPO_OK;
 }
 
-/* Reads bytes [at, end) as far as one piece has them; advances *at. */
-static ebpo_status read_piece(ebpo_range_cache *p, uint64_t *at, uint64_t end, uint8_t *data,
+/* Reads bytes [at, end) as far as one range has them; advances *at. */
+static ebpo_status read_range(ebpo_range_cache *p, uint64_t *at, uint64_t end, uint8_t *data,
                               ebpo_error *error)
 {
-    uint64_t i = find_piece(p, *at);
-    if (i == p->count || p->piece[i]->begin > *at) { /* the piece was dropped in the meantime */
+    uint64_t i = find_range(p, *at);
+    if (i == p->count || p->range[i]->begin > *at) { /* the range was dropped in the meantime */
         if (!cover_range(p, *at, end))
             return ebpo_fail_memory(error, end - *at);
-        i = find_piece(p, *at);
+        i = find_range(p, *at);
     }
-    ebpo_cached_range *piece = p->piece[i];
-    uint64_t size = (piece->end < end ? piece->end : end) - *at, next = piece->end;
-    piece->users++;
-    ebpo_status status = await_piece(p, piece, error);
+    ebpo_cached_range *range = p->range[i];
+    uint64_t size = (range->end < end ? range->end : end) - *at, next = range->end;
+    range->users++;
+    ebpo_status status = await_range(p, range, error);
     if (status == EBPO_OK) {
         read_ahead(p, next);
         pthread_mutex_unlock(&p->lock);
-        memcpy(data, piece->data + (*at - piece->begin), (size_t)size);
+        memcpy(data, range->data + (*at - range->begin), (size_t)size);
         pthread_mutex_lock(&p->lock);
     }
-    release_piece(p, piece, status == EBPO_OK ? size : 0);
+    release_range(p, range, status == EBPO_OK ? size : 0);
     *at += size;
     return status;
 }
 
-/* Requests all pieces of a long range at the same time. */
+/* Requests all ranges of a long range at the same time. */
 static void begin_read(ebpo_range_cache *p, uint64_t begin, uint64_t end)
 {
-    for (uint64_t i = find_piece(p, begin); i < p->count && p->piece[i]->begin < end;
-         i = find_piece(p, begin)) {
-        ebpo_cached_range *piece = p->piece[i];
-        begin = piece->end;
-        piece->users++;
-        reserve_space(p, bytes_of(piece));
-        if (piece->state == PIECE_NOTED && p->held + bytes_of(piece) <= p->held_limit)
-            (void)!start_request(p, piece, true);
-        piece->users--;
+    for (uint64_t i = find_range(p, begin); i < p->count && p->range[i]->begin < end;
+         i = find_range(p, begin)) {
+        ebpo_cached_range *range = p->range[i];
+        begin = range->end;
+        range->users++;
+        reserve_space(p, bytes_of(range));
+        if (range->state == RANGE_NOTED && p->held + bytes_of(range) <= p->held_limit)
+            (void)!start_request(p, range, true);
+        range->users--;
     }
 }
 
@@ -777,12 +777,12 @@ ebpo_status ebpo_range_cache_read(ebpo_range_cache *p, uint64_t offset, uint64_t
         begin_read(p, offset, end);
     while (at < end && status == EBPO_OK) {
         uint64_t before = at;
-        status = read_piece(p, &at, end, data + (before - offset), error);
+        status = read_range(p, &at, end, data + (before - offset), error);
     }
-    for (uint64_t i = find_piece(p, at);
-         status != EBPO_OK && i < p->count && p->piece[i]->begin < end; i++)
+    for (uint64_t i = find_range(p, at);
+         status != EBPO_OK && i < p->count && p->range[i]->begin < end; i++)
         /* this reader does not receive failures of these requests any more */
-        p->piece[i]->demanded = p->piece[i]->users > 0;
+        p->range[i]->demanded = p->range[i]->users > 0;
     p->wait_seconds += ebpo_seconds() - since;
     pthread_mutex_unlock(&p->lock);
     return status;
@@ -797,10 +797,10 @@ void ebpo_range_cache_clear(ebpo_range_cache *p)
         pthread_mutex_unlock(&p->lock);
     }
     for (uint64_t i = 0; i < p->count; i++) {
-        free(p->piece[i]->data);
-        free(p->piece[i]);
+        free(p->range[i]->data);
+        free(p->range[i]);
     }
-    free(p->piece);
-    p->piece = NULL;
+    free(p->range);
+    p->range = NULL;
     p->count = p->capacity = p->held = 0;
 }

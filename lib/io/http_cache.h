@@ -1,4 +1,4 @@
-/* Fetched parts of a file on a server: pieces in memory, and blocks in a folder that persist
+/* Fetched parts of a file on a server: ranges in memory, and blocks in a folder. Blocks persist
  * between sessions. */
 #ifndef EBPO_IO_HTTP_CACHE_H
 #define EBPO_IO_HTTP_CACHE_H
@@ -33,8 +33,8 @@ EBPO_MUST_USE ebpo_status ebpo_disk_open(ebpo_disk **out, const char *folder, ui
 void ebpo_disk_held(const ebpo_disk *disk, uint64_t *held, uint64_t *others);
 void ebpo_disk_close(ebpo_disk *disk);
 
-/* Reading and reading ahead: a file's bytes in pieces, each fetched by one request and kept while
- * memory allows. Pieces with prefetch hints that are not read yet are kept longest, then those read
+/* Reading and reading ahead: a file's bytes in ranges, each fetched by one request and kept while
+ * memory allows. Ranges with prefetch hints that are not read yet are kept longest, then those read
  * last. */
 
 enum { EBPO_RANGE_BYTES = 4 << 20 }; /* limit of one request */
@@ -48,11 +48,11 @@ typedef struct ebpo_range_cache {
     ebpo_transfers *transfers;
     ebpo_disk *disk;           /* or NULL */
     uint64_t block;            /* size of the disk's blocks */
-    uint64_t begin, size;      /* pieces are within [begin, size) */
-    uint64_t held_limit;       /* bytes of pieces; waiting readers may exceed it */
-    ebpo_cached_range **piece; /* [count] by offset, without overlaps */
+    uint64_t begin, size;      /* ranges are within [begin, size) */
+    uint64_t held_limit;       /* bytes of ranges; waiting readers may exceed it */
+    ebpo_cached_range **range; /* [count] by offset, without overlaps */
     uint64_t count, capacity;
-    /* bytes of fetched and requested pieces; number of prefetch hints with new ranges */
+    /* bytes of fetched and requested ranges; number of prefetch hints with new ranges */
     uint64_t held, plan;
     uint64_t clock; /* counts reads */
     bool hinting;
@@ -62,11 +62,11 @@ typedef struct ebpo_range_cache {
 
 /* Notes prefetch hints within [0, size), in any order. Ranges that cannot be noted for lack of
  * memory are read without a hint. */
-void ebpo_range_cache_hint(ebpo_range_cache *pieces, const ebpo_range *ranges, size_t count);
+void ebpo_range_cache_hint(ebpo_range_cache *cache, const ebpo_range *ranges, size_t count);
 /* Reads bytes [offset, offset + size) within [begin, size of the file). */
-EBPO_MUST_USE ebpo_status ebpo_range_cache_read(ebpo_range_cache *pieces, uint64_t offset,
+EBPO_MUST_USE ebpo_status ebpo_range_cache_read(ebpo_range_cache *cache, uint64_t offset,
                                                 uint64_t size, uint8_t *data, ebpo_error *error);
-/* Frees all pieces; call it after freeing the transfers. */
-void ebpo_range_cache_clear(ebpo_range_cache *pieces);
+/* Frees all ranges; call it after freeing the transfers. */
+void ebpo_range_cache_clear(ebpo_range_cache *cache);
 
 #endif

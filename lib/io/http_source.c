@@ -1,6 +1,6 @@
 /* A source by URL: its options are checked and copied, the first request returns the file's size,
- * version and head, and reads go to the cache of ranges (http_cache.c). A server without ranges
- * sends the whole file, which is then kept in memory, up to a limit. */
+ * version and head, and reads use the cache of ranges (http_cache.c). A server that does not
+ * support ranges sends the whole file, which is then kept in memory, up to a limit. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,9 +14,10 @@
 enum { HEAD_BYTES = EBPO_HTTP_HEAD, CONNECTIONS_MAX = 32 };
 
 typedef struct http_source {
-    char *url, shown[EBPO_SHOWN_BYTES];
-    ebpo_http_options options; /* owns its texts */
-    ebpo_range_cache pieces;   /* it also holds the lock and the transfers */
+    char *url;
+    char shown_url[EBPO_SHOWN_BYTES]; /* for messages: without passwords */
+    ebpo_http_options options;        /* owns its texts */
+    ebpo_range_cache cache;           /* also has the lock and the transfers */
     bool has_lock;
     ebpo_http_version version;
     uint8_t *head; /* the first bytes, or the whole file, kept in memory */
@@ -54,7 +55,8 @@ static bool copy_headers(ebpo_http_options *o)
     return true;
 }
 
-/* Copies all texts. After a failure all are set, too, so that they can be freed. */
+/* Replaces all texts by copies. After a failure, each text is a copy or NULL, so that
+ * free_options can free all texts. */
 static bool copy_options(ebpo_http_options *o)
 {
     bool good = copy_text(&o->user);
@@ -126,25 +128,25 @@ static ebpo_status source_read(void *user, uint64_t offset, uint64_t size, void 
         offset += here;
         size -= here;
     }
-    return size ? ebpo_range_cache_read(&s->pieces, offset, size, to, error) : EBPO_OK;
+    return size ? ebpo_range_cache_read(&s->cache, offset, size, to, error) : EBPO_OK;
 }
 
-static void source_expect(void *user, const ebpo_range *ranges, size_t count)
+static void source_prefetch(void *user, const ebpo_range *ranges, size_t count)
 {
     http_source *s = user;
     if (s->head_bytes < s->version.size)
-        ebpo_range_cache_hint(&s->pieces, ranges, count);
+        ebpo_range_cache_hint(&s->cache, ranges, count);
 }
 
 static void source_close(void *user)
 {
     http_source *s = user;
-    ebpo_transfers_free(s->pieces.transfers);
-    ebpo_range_cache_clear(&s->pieces);
-    ebpo_disk_close(s->pieces.disk);
+    ebpo_transfers_free(s->cache.transfers);
+    ebpo_range_cache_clear(&s->cache);
+    ebpo_disk_close(s->cache.disk);
     if (s->has_lock) {
-        pthread_mutex_destroy(&s->pieces.lock);
-        pthread_cond_destroy(&s->pieces.done);
+        pthread_mutex_destroy(&s->cache.lock);
+        pthread_cond_destroy(&s->cache.done);
     }
     free_options(&s->options);
     free(s->head);
@@ -158,14 +160,14 @@ bool ebpo_source_http_stats(const ebpo_source *source, ebpo_http_stats *out)
     if (source->read != source_read)
         return false;
     http_source *s = source->user;
-    pthread_mutex_lock(&s->pieces.lock);
-    ebpo_transfers_add_stats(s->pieces.transfers, out);
-    out->cache_hits = s->pieces.disk_hits;
-    out->cache_bytes = s->pieces.disk_bytes;
-    if (s->pieces.disk)
-        ebpo_disk_held(s->pieces.disk, &out->cache_held, &out->cache_others);
-    out->wait_seconds = s->pieces.wait_seconds;
-    pthread_mutex_unlock(&s->pieces.lock);
+    pthread_mutex_lock(&s->cache.lock);
+    ebpo_transfers_add_stats(s->cache.transfers, out);
+    out->cache_hits = s->cache.disk_hits;
+    out->cache_bytes = s->cache.disk_bytes;
+    if (s->cache.disk)
+        ebpo_disk_held(s->cache.disk, &out->cache_held, &out->cache_others);
+    out->wait_seconds = s->cache.wait_seconds;
+    pthread_mutex_unlock(&s->cache.lock);
     return true;
 }
 
@@ -173,13 +175,13 @@ bool ebpo_source_http_stats(const ebpo_source *source, ebpo_http_stats *out)
 
 static ebpo_status request_range(http_source *s, ebpo_request *r, ebpo_error *error)
 {
-    pthread_mutex_lock(&s->pieces.lock);
+    pthread_mutex_lock(&s->cache.lock);
     double since = ebpo_seconds();
-    ebpo_transfers_add(s->pieces.transfers, r, true);
+    ebpo_transfers_add(s->cache.transfers, r, true);
     while (!r->done)
-        pthread_cond_wait(&s->pieces.done, &s->pieces.lock);
-    s->pieces.wait_seconds += ebpo_seconds() - since;
-    pthread_mutex_unlock(&s->pieces.lock);
+        pthread_cond_wait(&s->cache.done, &s->cache.lock);
+    s->cache.wait_seconds += ebpo_seconds() - since;
+    pthread_mutex_unlock(&s->cache.lock);
     if (r->status != EBPO_OK && error)
         *error = r->error;
     return r->status;
@@ -187,9 +189,9 @@ static ebpo_status request_range(http_source *s, ebpo_request *r, ebpo_error *er
 
 static void pin_version(http_source *s)
 {
-    pthread_mutex_lock(&s->pieces.lock);
-    ebpo_transfers_pin(s->pieces.transfers, &s->version);
-    pthread_mutex_unlock(&s->pieces.lock);
+    pthread_mutex_lock(&s->cache.lock);
+    ebpo_transfers_pin(s->cache.transfers, &s->version);
+    pthread_mutex_unlock(&s->cache.lock);
 }
 
 /* Rejects an HTML or XML page: servers send one with a success status where a login is required. */
@@ -203,13 +205,14 @@ static ebpo_status check_type(const http_source *s, const ebpo_request *r, ebpo_
     if (!is_page && (!ebpo_http_response_is_text(r->type) ||
                      (s->head_bytes >= 4 && memcmp(s->head, signature, 4) == 0)))
         return EBPO_OK;
-    return ebpo_fail_file(error, EBPO_E_IO, s->shown,
+    return ebpo_fail_file(error, EBPO_E_IO, s->shown_url,
                           "the server returned %s, not a model; check the address, and whether it "
                           "wants a login",
                           *r->type ? r->type : "a page of HTML or XML");
 }
 
-/* Reads the first bytes, the size and the version; from a server without ranges, everything. */
+/* Reads the first bytes, the size and the version. A server that does not support ranges sends the
+ * whole file. */
 static ebpo_status read_head(http_source *s, ebpo_error *error)
 {
     s->head = ebpo_alloc(HEAD_BYTES, 1);
@@ -231,13 +234,13 @@ static ebpo_status read_head(http_source *s, ebpo_error *error)
     return check_type(s, &r, error);
 }
 
-/* Reads the whole file. It is needed without ETag and Last-Modified, where two responses may belong
- * to different versions. */
+/* Reads the whole file at once. This is necessary without ETag and Last-Modified: two responses may
+ * then belong to different versions. */
 static ebpo_status read_whole(http_source *s, ebpo_error *error)
 {
     if (s->version.size > s->options.whole_limit)
         return ebpo_fail_file(
-            error, EBPO_E_UNSUPPORTED, s->shown,
+            error, EBPO_E_UNSUPPORTED, s->shown_url,
             "the server sends neither ETag nor Last-Modified, so a change of the "
             "file could not be noticed, and its %llu bytes are more than "
             "would be read at once; download the file, or read it with --http-unversioned",
@@ -255,10 +258,10 @@ static ebpo_status read_whole(http_source *s, ebpo_error *error)
 static ebpo_status open_source(http_source *s, ebpo_error *error)
 {
     const ebpo_http_options *o = &s->options;
-    ebpo_status status = check_options(o, s->shown, error);
+    ebpo_status status = check_options(o, s->shown_url, error);
     if (status == EBPO_OK)
-        status = ebpo_transfers_make(&s->pieces.transfers, s->url, s->shown, o, &s->pieces.lock,
-                                     &s->pieces.done, error);
+        status = ebpo_transfers_make(&s->cache.transfers, s->url, s->shown_url, o, &s->cache.lock,
+                                     &s->cache.done, error);
     if (status == EBPO_OK)
         status = read_head(s, error);
     bool versioned = *s->version.etag || *s->version.modified;
@@ -266,17 +269,17 @@ static ebpo_status open_source(http_source *s, ebpo_error *error)
         status = read_whole(s, error);
     /* The folder is opened last, because the names of its blocks depend on the version. An unusable
      * folder is reported even where it is not needed. */
-    s->pieces.block = o->cache_block ? o->cache_block : EBPO_DISK_BLOCK;
+    s->cache.block = o->cache_block ? o->cache_block : EBPO_DISK_BLOCK;
     if (status == EBPO_OK && o->cache_folder)
-        status = ebpo_disk_open(&s->pieces.disk, o->cache_folder, o->cache_bytes, s->pieces.block,
+        status = ebpo_disk_open(&s->cache.disk, o->cache_folder, o->cache_bytes, s->cache.block,
                                 s->url, &s->version, error);
     if (status == EBPO_OK && !versioned) {
-        ebpo_disk_close(s->pieces.disk);
-        s->pieces.disk = NULL;
+        ebpo_disk_close(s->cache.disk);
+        s->cache.disk = NULL;
     }
-    s->pieces.begin = s->head_bytes;
-    s->pieces.size = s->version.size;
-    s->pieces.held_limit = o->memory;
+    s->cache.begin = s->head_bytes;
+    s->cache.size = s->version.size;
+    s->cache.held_limit = o->memory;
     return status;
 }
 
@@ -299,10 +302,10 @@ ebpo_status ebpo_source_of_url(const char *url, const ebpo_http_options *options
     s->options = wanted;
     bool copied = copy_options(&s->options);
     s->url = strdup(url);
-    ebpo_url_redact(url, s->shown, sizeof s->shown);
-    s->has_lock = pthread_mutex_init(&s->pieces.lock, NULL) == 0;
-    if (s->has_lock && pthread_cond_init(&s->pieces.done, NULL) != 0) {
-        pthread_mutex_destroy(&s->pieces.lock);
+    ebpo_url_redact(url, s->shown_url, sizeof s->shown_url);
+    s->has_lock = pthread_mutex_init(&s->cache.lock, NULL) == 0;
+    if (s->has_lock && pthread_cond_init(&s->cache.done, NULL) != 0) {
+        pthread_mutex_destroy(&s->cache.lock);
         s->has_lock = false;
     }
     status = copied && s->url && s->has_lock ? open_source(s, error)
@@ -315,7 +318,7 @@ ebpo_status ebpo_source_of_url(const char *url, const ebpo_http_options *options
     made.size = s->version.size;
     made.read = source_read;
     made.close = source_close;
-    made.prefetch = source_expect;
+    made.prefetch = source_prefetch;
     made.prefetched = s->head_bytes;
     return EBPO_GIVE(ebpo_source, out, &made);
 }
