@@ -1,9 +1,13 @@
 /* Double-double arithmetic for distances and rays, compiled once for each instruction set.
  *
- * On processors with FMA one instruction gives the rounding error of a product. Without it the
- * product is split (expansion.h). Errors of distances are bounded relative to the distance, and
- * errors of rays relative to the computed permanent (the sum of absolute values; as in
- * predicates.c), so both builds give the same decisions and results. */
+ * On processors with FMA one instruction computes the rounding error of a product. On other
+ * processors the factors are split (expansion.h). Both methods give the same value unless a number
+ * overflows or underflows.
+ *
+ * Errors of distances are bounded relative to the distance. Errors of rays are bounded relative to
+ * the computed permanent (the sum of absolute values, as in predicates.c). If the bound is too
+ * large to decide, the caller uses exact arithmetic. So all builds give the same decisions and
+ * results. */
 #include "core/strict_fp.h"
 
 #ifdef __FMA__
@@ -25,9 +29,10 @@ static inline ebpo_pair pair_root(ebpo_pair x)
     return ebpo_pair_add(ebpo_pair_of(first), ebpo_pair_of(rest.head / (2 * first)));
 }
 
-/* Returns the square root of a / b to a relative error of about 2^-100, by one Newton step from an
- * estimate that is accurate to 2^-50; the error of the step is half of the square of that. Compared
- * with pair_root and ebpo_pair_divide, this saves one root and two quotients. */
+/* Returns the square root of a / b to a relative error of about 2^-100, by one Newton step from the
+ * estimate `first`, which is accurate to 2^-50. The error of the step is half of the square of the
+ * estimate's error. Compared with pair_root and ebpo_pair_divide, this saves one root and two
+ * quotients. */
 static inline ebpo_pair root_of_quotient(ebpo_pair a, ebpo_pair b, double first)
 {
     ebpo_pair back = ebpo_pair_multiply(b, ebpo_two_product(first, first));
@@ -40,10 +45,11 @@ static inline double norm_1(const ebpo_pair a[3])
     return fabs(a[0].head) + fabs(a[1].head) + fabs(a[2].head);
 }
 
-/* Edges from corner 0, and the normal. */
+/* The edges e and f from corner 0, and the normal n. */
 typedef struct pair_plane {
-    ebpo_pair e[3], f[3], n[3], length2;
-    double size; /* at least |n| */
+    ebpo_pair e[3], f[3], n[3];
+    ebpo_pair length2; /* |n|^2 */
+    double size;       /* at least |n| */
 } pair_plane;
 
 static inline void make_plane(const double triangle[3][3], pair_plane *out)
@@ -64,7 +70,7 @@ static inline void to_corner(const double p[3], const double corner[3], ebpo_mea
     memcpy(out->point, corner, sizeof out->point);
 }
 
-/* Computes |corner x edge| / |edge|. */
+/* Computes the distance of p from the edge's line: |(from - p) x edge| / |edge|. */
 static inline void to_edge(const double p[3], const double from[3], const double to[3],
                            ebpo_measured *out)
 {
@@ -80,7 +86,7 @@ static inline void to_edge(const double p[3], const double from[3], const double
         out->point[k] = t < 0.5 ? from[k] + t * e[k].head : to[k] - (1 - t) * e[k].head;
 }
 
-/* Computes |corner . normal| / |normal|. */
+/* Computes the distance of p from the triangle's plane: |(corner - p) . normal| / |normal|. */
 static inline void to_plane(const double p[3], const double triangle[3][3], const pair_plane *plane,
                             ebpo_measured *out)
 {
@@ -95,7 +101,9 @@ static inline void to_plane(const double p[3], const double triangle[3][3], cons
         out->point[k] = p[k] + plane->n[k].head * share;
 }
 
-static inline bool to_normal(const pair_plane *plane, double normal[3])
+/* Computes the normal of length 1, or 0 for a triangle without area. Returns false if a component
+ * is not accurate enough. */
+static inline bool normal_of(const pair_plane *plane, double normal[3])
 {
     const ebpo_pair *e = plane->e, *f = plane->f, *n = plane->n;
     bool sure = plane->size > 0x1p-200 && plane->size < 0x1p200;
@@ -104,7 +112,7 @@ static inline bool to_normal(const pair_plane *plane, double normal[3])
         double products = fabs(e[u].head * f[v].head) + fabs(e[v].head * f[u].head);
         bool nothing = (e[u].head == 0 || f[v].head == 0) && (e[v].head == 0 || f[u].head == 0);
         /* The error is 2^-96 of the products. If each product has a factor of 0, the component is
-         * 0. */
+         * exactly 0. */
         sure = sure && (nothing || (fabs(n[k].head) > 0x1p-40 * products && products > 0x1p-800));
     }
     if (!sure)
@@ -128,14 +136,14 @@ static bool to_feature(const double p[3], const double triangle[3][3], ebpo_feat
         to_edge(p, triangle[i], triangle[i == 2 ? 0 : i + 1], out);
     else
         to_plane(p, triangle, &plane, out);
-    return !normal || to_normal(&plane, normal);
+    return !normal || normal_of(&plane, normal);
 }
 
 static bool unit_normal(const double triangle[3][3], double normal[3])
 {
     pair_plane plane;
     make_plane(triangle, &plane);
-    return to_normal(&plane, normal);
+    return normal_of(&plane, normal);
 }
 
 const ebpo_distance_pairs EBPO_KERNEL(ebpo_distance_pairs) = { to_feature, unit_normal };
@@ -145,7 +153,7 @@ const ebpo_distance_pairs EBPO_KERNEL(ebpo_distance_pairs) = { to_feature, unit_
 /* The slack (EBPO_RAY_SLACK) covers underflow. An overflow makes a bound infinite or NaN, so that
  * no comparison succeeds. */
 
-/* A normal and the sum of absolute values for each component. */
+/* A normal and, for each component, the sum of the absolute values of its products. */
 typedef struct plane_normal {
     ebpo_pair x[3];
     double permanent[3];
@@ -163,8 +171,8 @@ static inline plane_normal cross_bounded(const ebpo_pair f[3], const ebpo_pair g
     return n;
 }
 
-/* Returns n . y. The errors are some 12 * 2^-106 of the permanent in n, and as much in products and
- * sums; the bound of 2^-97 leaves a margin. */
+/* Returns n . y with an error bound. The error of n is some 12 * 2^-106 of the permanent, and the
+ * products and sums add as much; the bound of 2^-97 leaves a margin. */
 static inline ebpo_bounded dot_bounded(const plane_normal *n, const ebpo_pair y[3])
 {
     ebpo_pair first = ebpo_pair_multiply(n->x[0], y[0]), second = ebpo_pair_multiply(n->x[1], y[1]);

@@ -1,10 +1,10 @@
 /* Chunks as HDF5 stores them. A pipeline is a row of the table below: its HDF5 filters, and the
- * functions that encode and decode. The row determines everything else: shuffle before compression,
- * the fletcher32 checksum after it, the pipeline of a file's filters, the filters of a new array. A
- * new codec needs a number in chunk.h, a row, and its functions in a separate file, as
- * zstd_codec.c. Deflate needs only two calls of zlib, which are in this file. The output is bit for
- * bit that of libhdf5's own filters. Source: docs of HDF5 ("HDF5 filters"), format-spec/README.md,
- * section 2. */
+ * functions that encode and decode. The row determines if the values are shuffled before
+ * compression, if a fletcher32 checksum follows, which filters a new array gets, and by which
+ * filters the pipeline of an array in a file is recognized. A new codec needs a number in chunk.h,
+ * a row, and its functions in a separate file, such as zstd_codec.c. Deflate needs only two calls
+ * of zlib, which are in this file. The output is bit for bit that of libhdf5's own filters. Source:
+ * docs of HDF5 ("HDF5 filters"), format-spec/README.md, section 2. */
 #include <string.h>
 #include <zlib.h>
 
@@ -22,8 +22,8 @@ void ebpo_shuffle(const uint8_t *in, size_t bytes, size_t element_size, uint8_t 
             out[k * count + i] = in[i * element_size + k];
 }
 
-/* Restores elements of two bytes. There is a function for each common size, with a loop over
- * elements that compilers vectorise. */
+/* Restores elements of two bytes. Each common size has a separate function, whose loop over
+ * elements compilers vectorise. */
 static void unshuffle_two(const uint8_t *in, size_t count, uint8_t *out)
 {
     for (size_t i = 0; i < count; i++) {
@@ -61,7 +61,7 @@ uint32_t ebpo_fletcher32(const uint8_t *data, size_t bytes)
     uint32_t low = 0, high = 0;
     size_t words = bytes / 2;
     while (words) {
-        /* so many words that the sums do not overflow 32 bits before they are folded */
+        /* the sums of this many words do not overflow 32 bits before they are folded */
         size_t run = words > 360 ? 360 : words;
         words -= run;
         for (; run; run--, data += 2) {
@@ -174,9 +174,9 @@ bool ebpo_pipeline_of_filters(const unsigned *filters, int count, unsigned eleme
 {
     for (int i = 0; i < EBPO_PIPELINE_COUNT; i++) {
         const ebpo_pipeline_facts *row = &codecs[i].facts;
-        bool first = count > 0 && filters[0] == EBPO_FILTER_SHUFFLE;
-        int shuffles = row->compresses && (element_size > 1 || first);
-        if (count != row->filter_count + shuffles || (shuffles && !first))
+        bool begins_with_shuffle = count > 0 && filters[0] == EBPO_FILTER_SHUFFLE;
+        int shuffles = row->compresses && (element_size > 1 || begins_with_shuffle);
+        if (count != row->filter_count + shuffles || (shuffles && !begins_with_shuffle))
             continue;
         bool same = true;
         for (int k = 0; k < row->filter_count; k++)
@@ -193,21 +193,24 @@ bool ebpo_pipeline_of_filters(const unsigned *filters, int count, unsigned eleme
 
 void ebpo_chunk_coder_clear(ebpo_chunk_coder *coder) { ebpo_zstd_coder_clear(coder); }
 
-static ebpo_chunk_blocks blocks_of_planes(size_t raw_bytes, size_t element_size)
+/* Returns the blocks of a zstd frame for shuffled elements: one for each *byte plane*, which has
+ * the k-th bytes of all elements. */
+static ebpo_chunk_blocks blocks_of_byte_planes(size_t raw_bytes, size_t element_size)
 {
     enum {
-        /* below this, a separate table of codes for a plane, some 100 bytes, does not pay */
-        PLANE_LEAST = 1024
+        /* Minimum bytes of a byte plane for a separate block. A separate block has a separate table
+         * of codes, which takes some 100 bytes. */
+        BYTE_PLANE_LEAST = 1024
     };
     ebpo_chunk_blocks b = { .count = 0 };
     size_t plane = raw_bytes / element_size;
-    for (size_t at = plane; at < raw_bytes && plane >= PLANE_LEAST; at += plane)
+    for (size_t at = plane; at < raw_bytes && plane >= BYTE_PLANE_LEAST; at += plane)
         b.end[b.count++] = at;
     return b;
 }
 
-/* Returns the ends of the streams as blocks, without those of empty streams and the end of the
- * chunk. */
+/* Returns the blocks of a zstd frame for streams, which end at ends[count]: one for each stream
+ * that is not empty. */
 static ebpo_chunk_blocks blocks_of_streams(size_t raw_bytes, const size_t *ends, int count)
 {
     ebpo_chunk_blocks b = { .count = 0 };
@@ -235,7 +238,7 @@ ebpo_status ebpo_chunk_encode(ebpo_chunk_coder *coder, ebpo_pipeline pipeline, i
                               size_t element_size, const uint8_t *raw, size_t raw_bytes,
                               uint8_t *out, size_t *out_bytes)
 {
-    ebpo_chunk_blocks b = blocks_of_planes(raw_bytes, element_size);
+    ebpo_chunk_blocks b = blocks_of_byte_planes(raw_bytes, element_size);
     if (ebpo_pipeline_facts_of(pipeline)->compresses && element_size > 1) {
         ebpo_shuffle(raw, raw_bytes, element_size, coder->scratch);
         raw = coder->scratch;

@@ -25,8 +25,8 @@ static inline size_t ebpo_chunk_bound(size_t raw_bytes)
     return raw_bytes + raw_bytes / 256 + 1024;
 }
 
-/* The ends of the blocks of a chunk, without the last one. There are at most as many as the widest
- * element has bytes. */
+/* The ends of the blocks of a chunk's zstd frame, without the last block's end. There are at most
+ * as many as the widest element has bytes. */
 typedef struct ebpo_chunk_blocks {
     size_t end[8];
     int count;

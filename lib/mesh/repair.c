@@ -1,5 +1,6 @@
-/* Repairs a mesh. Performs the requested repairs in a fixed order. Also removes repeated faces, or
- * counts faces that are repeated by the positions of their corners. */
+/* Repairs a mesh: performs the requested repairs in a fixed order. Separate functions remove
+ * repeated faces, and count the faces whose corners have the same positions as those of another
+ * face. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -24,20 +25,23 @@ typedef struct dropping {
     ebpo_stars stars;
     ebpo_same_faces *scratch; /* one for each worker */
     unsigned threads;
-    uint64_t *gone; /* bit f is set if face f is to be removed */
-    uint64_t count, opposite;
+    uint64_t *gone;    /* bit f is set if face f is to be removed */
+    uint64_t count;    /* faces to be removed */
+    uint64_t opposite; /* of these: faces with the opposite orientation of the kept face */
 } dropping;
 
 static bool is_removed(const dropping *d, uint64_t f) { return d->gone[f / WORD] >> f % WORD & 1; }
 
-/* Returns true if the face runs from its lowest vertex to the lesser of the other two. */
+/* Returns true if the lesser of the other two vertices follows the lowest vertex. Repeated faces
+ * with different results have opposite orientations. */
 static bool runs_up(const uint32_t face[3])
 {
     int low = face[0] < face[1] ? (face[0] < face[2] ? 0 : 2) : (face[1] < face[2] ? 1 : 2);
     return face[(low + 1) % 3] < face[(low + 2) % 3];
 }
 
-static void note_repeated(dropping *d, const ebpo_same_faces *same)
+/* Marks all but the first face of each set of repeated faces. */
+static void mark_repeated(dropping *d, const ebpo_same_faces *same)
 {
     const uint32_t *faces = d->mesh->faces;
     uint64_t count = 0, opposite = 0, first = 0;
@@ -65,12 +69,12 @@ static ebpo_status find_repeated(void *context, uint64_t begin, uint64_t end, un
         uint64_t degree = ebpo_stars_degree(&d->stars, (uint32_t)v);
         if (!ebpo_same_faces_gather(&d->scratch[worker], &d->stars, d->mesh, (uint32_t)v))
             return ebpo_workspace_fail(d->mesh->workspace, degree * sizeof(ebpo_same_face), error);
-        note_repeated(d, &d->scratch[worker]);
+        mark_repeated(d, &d->scratch[worker]);
     }
     return EBPO_OK;
 }
 
-/* Adds source indices to a mesh in the source's order. */
+/* Adds source indices to a mesh that is in the source's order. */
 static ebpo_status add_source_indices(ebpo_mesh *mesh, ebpo_error *error)
 {
     if (mesh->arrangement)
@@ -95,7 +99,7 @@ static ebpo_status add_source_indices(ebpo_mesh *mesh, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Removes the faces in place: sorted faces stay sorted, and every vertex keeps a face. */
+/* Removes the marked faces in place: sorted faces stay sorted, and every vertex keeps a face. */
 static void remove_marked(const dropping *d)
 {
     ebpo_mesh *mesh = d->mesh;
@@ -113,7 +117,8 @@ static void remove_marked(const dropping *d)
     mesh->face_count = to;
 }
 
-static ebpo_status find_all(dropping *d, ebpo_error *error)
+/* Marks the repeated faces of the whole mesh. */
+static ebpo_status mark_all(dropping *d, ebpo_error *error)
 {
     const ebpo_mesh *mesh = d->mesh;
     uint64_t words = mesh->face_count / WORD + 1;
@@ -133,7 +138,7 @@ static ebpo_status find_all(dropping *d, ebpo_error *error)
 static ebpo_status drop_faces(dropping *d, ebpo_error *error)
 {
     ebpo_mesh *mesh = d->mesh;
-    ebpo_status status = find_all(d, error);
+    ebpo_status status = mark_all(d, error);
     if (status != EBPO_OK || d->count == 0)
         return status;
     status = ebpo_mesh_check_whole(mesh, error);
@@ -171,7 +176,7 @@ ebpo_status ebpo_mesh_drop_duplicates(ebpo_mesh *mesh, ebpo_repair_record *recor
     return status;
 }
 
-/* ---- by position ---- */
+/* --- faces with repeated positions --- */
 
 /* Sets each corner to the first vertex at its position. */
 static ebpo_status merge_corners(const ebpo_mesh *mesh, unsigned threads, uint32_t *corner,
@@ -201,7 +206,7 @@ ebpo_status ebpo_mesh_count_repeated(const ebpo_mesh *mesh, unsigned threads, eb
     status = welded.faces ? merge_corners(mesh, threads, welded.faces, error)
                           : ebpo_workspace_fail(mesh->workspace, bytes, error);
     if (status == EBPO_OK)
-        status = find_all(&d, error);
+        status = mark_all(&d, error);
     EBPO_FOR_ITEMS(mesh->workspace, f, 0, status == EBPO_OK ? mesh->face_count : 0)
         if (is_removed(&d, f))
             ebpo_finding_add(out, ebpo_mesh_source_face(mesh, f));
@@ -247,6 +252,7 @@ ebpo_status ebpo_mesh_orient(ebpo_mesh *mesh, ebpo_repair_record *record, ebpo_e
     return status;
 }
 
+/* Orients the mesh. With EBPO_REPAIR_EARLIER, as earlier builds did (mesh_parts.h). */
 static ebpo_status orient_mesh(ebpo_mesh *mesh, unsigned steps, ebpo_repair_record *record,
                                ebpo_error *error)
 {
@@ -271,7 +277,8 @@ ebpo_status ebpo_mesh_repair(ebpo_mesh *mesh, unsigned steps, double weld_distan
         status = ebpo_mesh_flip(mesh, record, error);
     if (status == EBPO_OK && steps & EBPO_REPAIR_FILL)
         status = ebpo_mesh_fill_holes(mesh, record, error);
-    /* components that were open may now be closed, and have an outside */
+    /* Components that were open may now be closed: then they have an outside, and are oriented
+     * again. */
     if (status == EBPO_OK && steps & EBPO_REPAIR_ORIENT && !(steps & EBPO_REPAIR_EARLIER) &&
         record->filled_holes > filled) {
         record->unorientable_components = unorientable;
