@@ -3,14 +3,14 @@
  * Independent models: a point is inside if it is inside any model. A model that has the point on a
  * face adds 0 to the sum.
  *
- * Parts of one model are closed by caps, which are not part of the whole surface. Where the point
- * is on no face and no cap, the winding numbers of all parts add up to that of the whole. A point
- * on a face of some part is doubtful. It is on the whole's surface if a real face intersects the
- * box of this one point, which is decided exactly. Otherwise it is on a cap, and its winding number
- * is counted along a ray through the surfaces, which have no caps: faces that the ray leaves
- * through less those that it enters through. A ray that hits an edge or runs along a face does not
- * decide, and another ray is cast. The directions are always the same, and every deciding ray gives
- * the same number.
+ * Parts of one model are closed by caps, which do not belong to the surface of the whole model. If
+ * the point is on no face and no cap, the winding numbers of all parts add up to that of the whole
+ * model. A point on a face or cap of a part is *doubtful*. The point is on the surface of the whole
+ * model if a face that is not a cap contains it; a box query for the point decides this exactly.
+ * Otherwise the point is on a cap. Then its winding number is counted along a ray through the
+ * surfaces, which have no caps: the number of faces where the ray leaves, minus the number of faces
+ * where it enters. A ray that hits an edge or runs along a face does not decide, and another ray is
+ * cast. The directions are always the same, and every ray that decides gives the same number.
  *
  * Source: docs/guide/clusters.md, "Beyond 2^32 faces". */
 #include "core/strict_fp.h"
@@ -29,7 +29,7 @@
 /* Maximum number of rays that are cast from a point. */
 enum { DIRECTIONS = 64 };
 
-/* Result for a point so far. */
+/* Result for a point, of the models queried so far. */
 typedef struct found {
     int64_t winding;
     bool in, on;
@@ -55,16 +55,16 @@ static ebpo_status query_windings(ebpo_context *context, const ebpo_catalogue_he
     return status;
 }
 
-/* --- doubtful points of parts: on faces --- */
+/* --- doubtful points of parts: on the surface --- */
 
-/* Points on faces or caps of a part, which have no sum yet. */
+/* Points on faces or caps of a part, whose results are not yet known. */
 typedef struct doubtful {
     uint32_t count;
     uint32_t *number; /* [count] index among all points */
     double *rows;     /* [count][7] as rays */
-    bool *real;       /* [count] true: the point is on a face of the whole */
-    int64_t *sum;     /* [count] sum of the last ray */
-    bool *plain;      /* [count] true: the last ray gives the winding number */
+    bool *on_surface; /* [count] true: the point is on the surface of the whole model */
+    int64_t *sum;     /* [count] winding number by the last ray */
+    bool *decided;    /* [count] true: the last ray gives the winding number */
 } doubtful;
 
 static ebpo_status query_box(ebpo_context *context, const ebpo_catalogue_held *model, void *user,
@@ -78,10 +78,10 @@ static ebpo_status query_box(ebpo_context *context, const ebpo_catalogue_held *m
         const uint64_t *faces;
         uint64_t count = 0;
         const double *p = run->rows + 7 * i;
-        if (!d->real[run->pair[i].item])
+        if (!d->on_surface[run->pair[i].item])
             status = ebpo_faces_in_box(context, p, p, &faces, &count, error);
         if (status == EBPO_OK && count)
-            d->real[run->pair[i].item] = true;
+            d->on_surface[run->pair[i].item] = true;
     }
     return status;
 }
@@ -119,7 +119,7 @@ static ebpo_status query_crossings(ebpo_context *context, const ebpo_catalogue_h
     for (uint64_t i = 0; i < run->count && status == EBPO_OK; i++)
         for (uint64_t k = begin[i]; k < begin[i + 1]; k++) {
             d->sum[run->pair[i].item] -= hits[k].side;
-            d->plain[run->pair[i].item] &= hits[k].side != 0;
+            d->decided[run->pair[i].item] &= hits[k].side != 0;
         }
     return status;
 }
@@ -136,14 +136,16 @@ static ebpo_status cast_rays(const ebpo_catalogue_batch *a, doubtful *d, uint64_
         memcpy(row + 3, direction, sizeof direction);
         row[6] = INFINITY;
         d->sum[i] = 0;
-        d->plain[i] = true;
+        d->decided[i] = true;
     }
     return ebpo_catalogue_query_all(a, d->rows, d->count, 7, ebpo_catalogue_find_ray, true,
                                     query_crossings, d, error);
 }
 
-static ebpo_status judge_points(const ebpo_catalogue_batch *a, doubtful *d, found *all,
-                                ebpo_error *error)
+/* Classifies the doubtful points: first points on the whole model's surface, then points on caps.
+ */
+static ebpo_status classify_doubtful(const ebpo_catalogue_batch *a, doubtful *d, found *all,
+                                     ebpo_error *error)
 {
     uint64_t state = 20;
     ebpo_status status = ebpo_catalogue_need_surface(a->c, error);
@@ -151,23 +153,24 @@ static ebpo_status judge_points(const ebpo_catalogue_batch *a, doubtful *d, foun
         status = ebpo_catalogue_query_all(a, d->rows, d->count, 7, ebpo_catalogue_find_point, true,
                                           query_box, d, error);
     if (status == EBPO_OK)
-        keep_unknown(d, d->real, true, all);
+        keep_unknown(d, d->on_surface, true, all);
     for (int i = 0; i < DIRECTIONS && d->count && status == EBPO_OK; i++) {
         status = cast_rays(a, d, &state, error);
         if (status == EBPO_OK)
-            keep_unknown(d, d->plain, false, all);
+            keep_unknown(d, d->decided, false, all);
     }
     if (status == EBPO_OK && d->count)
         status = ebpo_fail_file(error, EBPO_E_LIMIT, ebpo_catalogue_shown(a->c),
-                                "no ray from %g %g %g gives its winding number", d->rows[0],
-                                d->rows[1], d->rows[2]);
+                                "no ray from the point %g %g %g gives its winding number",
+                                d->rows[0], d->rows[1], d->rows[2]);
     return status;
 }
 
 /* --- parts together --- */
 
-static ebpo_status judge_doubtful(const ebpo_catalogue_batch *a, const double *points,
-                                  uint32_t count, found *all, ebpo_error *error)
+/* Finds the doubtful points, and corrects their results. */
+static ebpo_status correct_doubtful(const ebpo_catalogue_batch *a, const double *points,
+                                    uint32_t count, found *all, ebpo_error *error)
 {
     uint32_t most = 0;
     for (uint32_t i = 0; i < count; i++)
@@ -177,23 +180,23 @@ static ebpo_status judge_doubtful(const ebpo_catalogue_batch *a, const double *p
     doubtful d = { 0,
                    ebpo_alloc(most, sizeof *d.number),
                    ebpo_alloc(most, 7 * sizeof *d.rows),
-                   ebpo_alloc_zero(most, sizeof *d.real),
+                   ebpo_alloc_zero(most, sizeof *d.on_surface),
                    ebpo_alloc_zero(most, sizeof *d.sum),
-                   ebpo_alloc(most, sizeof *d.plain) };
-    bool fine = d.number && d.rows && d.real && d.sum && d.plain;
-    for (uint32_t i = 0; i < count && fine; i++)
+                   ebpo_alloc(most, sizeof *d.decided) };
+    bool good = d.number && d.rows && d.on_surface && d.sum && d.decided;
+    for (uint32_t i = 0; i < count && good; i++)
         if (all[i].on) {
             memcpy(d.rows + (size_t)7 * d.count, points + (size_t)3 * i, 3 * sizeof *points);
             memset(d.rows + (size_t)7 * d.count + 3, 0, 4 * sizeof *d.rows);
             d.number[d.count++] = i;
         }
-    ebpo_status status =
-        fine ? judge_points(a, &d, all, error) : ebpo_fail_memory(error, most * 8 * sizeof *d.rows);
+    ebpo_status status = good ? classify_doubtful(a, &d, all, error)
+                              : ebpo_fail_memory(error, most * 8 * sizeof *d.rows);
     free(d.number);
     free(d.rows);
-    free(d.real);
+    free(d.on_surface);
     free(d.sum);
-    free(d.plain);
+    free(d.decided);
     return status;
 }
 
@@ -217,7 +220,7 @@ ebpo_status ebpo_catalogue_query_inside(const ebpo_catalogue_batch *a, const dou
     ebpo_status status = ebpo_catalogue_query_all(a, rows, count, 3, ebpo_catalogue_find_point,
                                                   false, query_windings, all, error);
     if (status == EBPO_OK && how->parts)
-        status = judge_doubtful(a, rows, count, all, error);
+        status = correct_doubtful(a, rows, count, all, error);
     for (uint32_t i = 0; i < count && status == EBPO_OK; i++) {
         const found *f = &all[i];
         bool in = how->parts ? !f->on && is_inside(how->rule, f->winding) : f->in;

@@ -1,11 +1,12 @@
 /* Computes the colours of gray nodes: the mean, by area, of the colours of the faces below
  * (format-spec/README.md, section 19).
  *
- * Levels go from the deepest up: a group of eight gives the sums of the gray node above it. Nothing
- * is kept for each face; a face's part is computed again for each leaf that lists the face, as most
- * faces are in one leaf only. Weights and sums are integers, so the result is exact and does not
- * depend on the number of threads. Vertex colours are used, or face colours if vertices have no
- * colours or all the same. lib/verify computes the same colours with separate code. */
+ * Levels go from the deepest up: a group of eight gives the sums of the gray node above it. No
+ * data is kept for each face: the weight of a face is computed again for each leaf that lists the
+ * face, as most faces are in one leaf only. Weights and sums are integers, so the result is exact
+ * and does not depend on the number of threads. Vertex colours are used. Face colours are used
+ * instead if vertices have no colours, or all vertices have the same colour. lib/verify computes
+ * the same colours with separate code. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -22,27 +23,27 @@
 
 enum { GROUP_GRAIN = 1 << 12, GROUPS_A_TIME = 16 };
 
-/* Sums over the faces below a node, as often as leaves list them. */
+/* Sums over the faces below a node. A face counts once for each leaf that lists the face. */
 typedef struct colour_sums {
     ebpo_wide colour[3]; /* sums of 3 * weight * colour */
     ebpo_wide weight;    /* sum of 3 * weight */
 } colour_sums;
 
-/* Counts before a block of groups in its level. */
-typedef struct block_start {
+/* Numbers of leaves, gray nodes and references before a run of GROUP_GRAIN groups in its level. */
+typedef struct run_start {
     uint64_t leaf, gray, ref;
-} block_start;
+} run_start;
 
 typedef struct colouring {
     ebpo_tree *tree;
     double size;  /* largest side of the box */
     bool by_face; /* the columns are colours of faces, not of vertices */
     ebpo_colour_column column[EBPO_COLOUR_CHANNELS];
-    const ebpo_level *level; /* level whose groups are added up */
-    const block_start *start;
+    const ebpo_level *level;  /* level whose groups are added up */
+    const run_start *start;   /* one for each run of groups */
     const colour_sums *below; /* sums of the level's gray nodes */
-    colour_sums *above;       /* sums of its groups */
-    uint32_t *colours;        /* colours of its groups */
+    colour_sums *above;       /* sums of the level's groups */
+    uint32_t *colours;        /* colours of the level's groups */
 } colouring;
 
 static uint64_t weight_of(const colouring *c, uint64_t face)
@@ -88,7 +89,8 @@ static void add_leaf(const colouring *c, uint64_t leaf, uint64_t ref, colour_sum
         add_face(c, l->leaf_refs[ref + i], sums);
 }
 
-/* Returns the nearest integer to colour / weight, halves rounded up: a byte, found bit by bit. */
+/* Returns the integer nearest to colour / weight, halves rounded up. The result is a byte, which is
+ * found bit by bit. */
 static uint32_t mean_of_channel(ebpo_wide colour, ebpo_wide weight)
 {
     ebpo_wide most = ebpo_wide_plus(ebpo_wide_left(colour, 1), weight);
@@ -111,7 +113,7 @@ static ebpo_status add_groups(void *context, uint64_t begin, uint64_t end, unsig
                               ebpo_error *error)
 {
     const colouring *c = context;
-    block_start at = c->start[begin / GROUP_GRAIN];
+    run_start at = c->start[begin / GROUP_GRAIN];
     (void)worker, (void)error;
     EBPO_FOR_ITEMS_EVERY(c->tree->workspace, GROUPS_A_TIME, group, begin, end) {
         colour_sums sums = { .weight = 0 };
@@ -130,11 +132,11 @@ static ebpo_status add_groups(void *context, uint64_t begin, uint64_t end, unsig
     return EBPO_OK;
 }
 
-static block_start *find_starts(const colouring *c)
+static run_start *find_starts(const colouring *c)
 {
     const ebpo_level *l = c->level;
-    block_start at = { 0, 0, 0 },
-                *start = ebpo_alloc(l->group_count / GROUP_GRAIN + 1, sizeof *start);
+    run_start at = { 0, 0, 0 },
+              *start = ebpo_alloc(l->group_count / GROUP_GRAIN + 1, sizeof *start);
     EBPO_FOR_ITEMS(c->tree->workspace, group, 0, start ? l->group_count : 0) {
         if (group % GROUP_GRAIN == 0)
             start[group / GROUP_GRAIN] = at;
@@ -153,7 +155,7 @@ static ebpo_status colour_level(const ebpo_builder *b, colouring *c, int level,
     ebpo_workspace *workspace = c->tree->workspace;
     uint64_t groups = c->tree->level[level].group_count;
     c->level = &c->tree->level[level];
-    block_start *start = find_starts(c);
+    run_start *start = find_starts(c);
     c->start = start;
     c->above = ebpo_array_alloc(workspace, groups, sizeof *c->above);
     c->colours = ebpo_array_alloc(workspace, groups, sizeof *c->colours);
@@ -168,7 +170,7 @@ static ebpo_status colour_level(const ebpo_builder *b, colouring *c, int level,
     return status;
 }
 
-static bool all_the_same(const colouring *c)
+static bool have_equal_colours(const colouring *c)
 {
     uint8_t first[3];
     for (int k = 0; k < 3; k++)
@@ -186,7 +188,7 @@ static void choose_columns(colouring *c)
     ebpo_colour_column of_face[EBPO_COLOUR_CHANNELS];
     bool faces = ebpo_colour_columns(attributes, "face", of_face),
          vertices = ebpo_colour_columns(attributes, "vertex", c->column);
-    c->by_face = faces && (!vertices || all_the_same(c));
+    c->by_face = faces && (!vertices || have_equal_colours(c));
     for (int k = 0; k < EBPO_COLOUR_CHANNELS && c->by_face; k++)
         c->column[k] = of_face[k];
 }

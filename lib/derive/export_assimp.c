@@ -275,16 +275,17 @@ static ebpo_status gather_scene(scene *s, const ebpo_export_job *job, ebpo_error
 {
     const ebpo_info *info = ebpo_file_info(job->file);
     /* The mesh can be checked before anything is read. */
-    ebpo_status status = job->options->mesh ? ebpo_export_check_scene(job->path, info->vertex_count,
-                                                                      info->face_count, error)
-                                            : EBPO_OK;
+    ebpo_status status =
+        job->options->mesh
+            ? ebpo_export_check_assimp(job->path, info->vertex_count, info->face_count, error)
+            : EBPO_OK;
     uint64_t vertices = 0, faces = 0;
     for (int i = 0; i < ebpo_block_count(job->options) && status == EBPO_OK; i++) {
         ebpo_block block;
         status = ebpo_export_read_block(job, i, EBPO_SOURCE_ORDER, &block, error);
         if (status == EBPO_OK)
-            status = ebpo_export_check_scene(job->path, vertices += block.mesh.vertex_count,
-                                             faces += block.mesh.face_count, error);
+            status = ebpo_export_check_assimp(job->path, vertices += block.mesh.vertex_count,
+                                              faces += block.mesh.face_count, error);
         if (status == EBPO_OK && block.mesh.face_count)
             status = add_block(s, &block, error);
         ebpo_block_free(&block);

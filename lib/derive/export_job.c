@@ -1,7 +1,8 @@
-/* Functions that all export formats share. They read a block from the file: one level with its
- * nodes, or the mesh with its source's numbers, and the colours. They make the block's columns,
- * float32 coordinates for formats that need them, and the entries in the report. Where the counts
- * are known, limits of formats are checked before anything is read. */
+/* Functions that all export formats share. They read a block from the file: a level with its nodes
+ * and colours, or the mesh with its source indices and colours. They make the block's columns
+ * (values of each polygon or face), float32 coordinates for formats that need them, and the entries
+ * in the report. Where the counts are known, limits of formats are checked before anything is read.
+ */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -18,13 +19,13 @@
 #include "mesh/attributes.h"
 
 const ebpo_column ebpo_columns[EBPO_COLUMNS] = {
-    { "octcode", EBPO_H5_I64 },     /* of the node; mesh 0 */
-    { "level", EBPO_H5_I32 },       /* of the node in the octree; mesh -1 */
-    { "type", EBPO_H5_I32 },        /* as in ebpo_node_type; mesh -1 */
+    { "octcode", EBPO_H5_I64 },     /* of the node; 0 for the mesh */
+    { "level", EBPO_H5_I32 },       /* of the node in the octree; -1 for the mesh */
+    { "type", EBPO_H5_I32 },        /* of the node, as in ebpo_node_type; -1 for the mesh */
     { "winding", EBPO_H5_I32 },     /* black: in the cell; leaf: at its lowest corner; else 0 */
-    { "volume", EBPO_H5_F64 },      /* of the envelope; mesh 0 */
-    { "source_face", EBPO_H5_I64 }, /* number in the source mesh; envelopes, or without maps: -1 */
-    { "lod", EBPO_H5_I32 },         /* level of detail of the block; mesh -1 */
+    { "volume", EBPO_H5_F64 },      /* of the envelope; 0 for the mesh */
+    { "source_face", EBPO_H5_I64 }, /* source index; -1 for envelopes, and without maps */
+    { "lod", EBPO_H5_I32 },         /* level of the block; -1 for the mesh */
 };
 
 int ebpo_block_count(const ebpo_export_options *o)
@@ -39,7 +40,7 @@ int ebpo_block_level(const ebpo_export_options *o, int i)
                : -1;
 }
 
-/* Takes the caller's colours instead of the mesh's. */
+/* Replaces the colours of the mesh by the caller's colours. */
 static ebpo_status take_colours(ebpo_block *out, const uint8_t *rgba, ebpo_error *error)
 {
     uint64_t bytes = 4 * out->mesh.vertex_count;
@@ -75,7 +76,7 @@ static ebpo_status read_mesh(ebpo_block *out, const ebpo_file *file, ebpo_block_
     return status;
 }
 
-static ebpo_status block_read(ebpo_block *out, const ebpo_file *file, int level,
+static ebpo_status read_block(ebpo_block *out, const ebpo_file *file, int level,
                               ebpo_block_order order, const ebpo_export_options *options,
                               ebpo_error *error)
 {
@@ -102,7 +103,8 @@ void ebpo_block_free(ebpo_block *block)
     memset(block, 0, sizeof *block);
 }
 
-static void block_report(const ebpo_block *block, ebpo_export_report *report)
+/* Adds a block to the report. */
+static void report_block(const ebpo_block *block, ebpo_export_report *report)
 {
     bool mesh = block->level < 0;
     report->block[report->block_count++] =
@@ -225,9 +227,9 @@ ebpo_status ebpo_export_read_block(const ebpo_export_job *job, int i, ebpo_block
                             (uint64_t)ebpo_block_count(job->options), error))
         return EBPO_E_CANCELLED;
     ebpo_status status =
-        block_read(out, job->file, ebpo_block_level(job->options, i), order, job->options, error);
+        read_block(out, job->file, ebpo_block_level(job->options, i), order, job->options, error);
     if (status == EBPO_OK)
-        block_report(out, job->report);
+        report_block(out, job->report);
     if (status == EBPO_OK)
         report_colours(job, &out->colours);
     return status;
@@ -245,8 +247,8 @@ ebpo_status ebpo_export_check_glb(const char *path, uint64_t text, uint64_t bin,
         total);
 }
 
-ebpo_status ebpo_export_check_scene(const char *path, uint64_t vertices, uint64_t faces,
-                                    ebpo_error *error)
+ebpo_status ebpo_export_check_assimp(const char *path, uint64_t vertices, uint64_t faces,
+                                     ebpo_error *error)
 {
     if (vertices <= UINT32_MAX && faces <= UINT32_MAX / 3)
         return EBPO_OK;

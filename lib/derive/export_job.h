@@ -96,13 +96,13 @@ EBPO_MUST_USE ebpo_status ebpo_export_read_block(const ebpo_export_job *job, int
                                                  ebpo_error *error);
 
 /* These functions fail with EBPO_E_LIMIT for counts that a format cannot represent. GLB has sizes
- * of 32 bits; `text` and `bin` are the numbers of bytes of the JSON text and of the binary data.
- * For OBJ and STL, assimp numbers corners in 32 bits. */
+ * of 32 bits; `text` and `bin` are the sizes in bytes of the JSON text and of the binary data. OBJ
+ * and STL are written by assimp, which has 32-bit indices of corners. */
 enum { EBPO_GLB_HEADS = 28 };
 EBPO_MUST_USE ebpo_status ebpo_export_check_glb(const char *path, uint64_t text, uint64_t bin,
                                                 ebpo_error *error);
-EBPO_MUST_USE ebpo_status ebpo_export_check_scene(const char *path, uint64_t vertices,
-                                                  uint64_t faces, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_export_check_assimp(const char *path, uint64_t vertices,
+                                                   uint64_t faces, ebpo_error *error);
 
 /* Sets *out to the vertices minus the origin, as floats [vertex_count][3] to be freed by the
  * caller; NULL on failure (EBPO_E_MEMORY; EBPO_E_LIMIT: a coordinate out of range for float32).

@@ -4,10 +4,10 @@
  * on a cell face is a step between two envelopes and does not represent the surface: it gets the
  * direction of the planes around it.
  *
- * For each of the six sides, a normal is computed at every corner of a drawn cell: the mean,
- * weighted by area, of the plane polygons that face this side, over the nodes around the corner.
- * Between corners, normals are interpolated linearly. So planes on the other side of a thin part do
- * not count. */
+ * For each of the six sides of cells, a normal is computed at every corner of a drawn cell. The
+ * normal is the mean, weighted by area, of the plane polygons of the nodes around the corner. Only
+ * polygons that face this side count, so that polygons on the other side of a thin part are
+ * ignored. Between corners, normals are interpolated linearly. */
 #include "core/strict_fp.h"
 
 #include <ebpo/lod.h>
@@ -24,9 +24,10 @@
 
 enum { SIDES = 6, ON_PLANE = SIDES, DEEPEST = EBPO_LEVELS_MAX - 1 };
 
-static const uint32_t none = UINT32_MAX;
-/* cosine of the largest angle between a plane and a side */
-static const double least_turned = -0.3;
+static const uint32_t none = UINT32_MAX; /* not a corner index */
+/* A polygon faces a side if the cosine of the angle between their normals is greater than this. The
+ * value is below 0, so that a polygon may be turned away slightly. */
+static const double least_cosine = -0.3;
 
 typedef struct polygon {
     double area[3]; /* normal with a length of twice its area */
@@ -40,7 +41,7 @@ typedef struct lighting {
     polygon *polygons; /* [polygon_count] */
     uint32_t (*at)[8]; /* corner indices of each node */
     double (*sum)[4];  /* [corner_count] sums of normals and of their lengths */
-    uint64_t *keys;    /* [corner_count] positions */
+    uint64_t *keys;    /* [corner_count] positions, as key_of makes them */
     uint64_t corner_count, key_capacity;
 } lighting;
 
@@ -57,7 +58,7 @@ static void add_triangle(const ebpo_mesh *mesh, const uint32_t *face, double are
     }
 }
 
-/* Returns corner i of a fan. */
+/* Returns corner i of a polygon, whose triangles are a fan. */
 static const double *corner_of(const ebpo_mesh *mesh, const uint32_t *face, unsigned i)
 {
     uint32_t v = i < 2 ? face[i] : face[3 * (i - 2) + 2];
@@ -114,42 +115,44 @@ static uint64_t key_of(ebpo_cell cell, unsigned corner)
     return key;
 }
 
+/* Gives every corner position an index, and sets the corner indices of each node. Returns false
+ * when out of memory. */
 static bool number_corners(lighting *l)
 {
     uint64_t count = l->nodes->node_count, slots = ebpo_hash_slots(count * 8 / 3 * 4 + 1), at;
     uint32_t *table = ebpo_alloc(slots, sizeof *table);
-    bool fine = table != NULL;
-    if (fine)
+    bool good = table != NULL;
+    if (good)
         memset(table, 0xff, slots * sizeof *table);
-    for (uint64_t i = 0; i < count && fine; i++) {
+    for (uint64_t i = 0; i < count && good; i++) {
         ebpo_cell cell = ebpo_cell_of_octcode(l->nodes->nodes[i].octcode);
-        for (unsigned c = 0; c < 8 && fine; c++) {
+        for (unsigned c = 0; c < 8 && good; c++) {
             uint64_t key = key_of(cell, c);
             EBPO_HASH_FIND(at, ebpo_hash_number(key), slots - 1,
                            table[at] == none || l->keys[table[at]] == key);
             if (table[at] == none) {
-                fine = l->corner_count < none &&
+                good = l->corner_count < none &&
                        ebpo_grow(&l->keys, &l->key_capacity, l->corner_count + 1, sizeof *l->keys);
-                if (fine)
+                if (good)
                     l->keys[table[at] = (uint32_t)l->corner_count++] = key;
             }
             l->at[i][c] = table[at];
         }
     }
     free(table);
-    return fine;
+    return good;
 }
 
 /* --- sides --- */
 
-/* Sums the area vectors of a node's plane polygons that face a side. */
-static void node_sum(const polygon *p, uint32_t count, int side, double out[4])
+/* Sums the area vectors, and their lengths, of a node's plane polygons that face a side. */
+static void sum_node(const polygon *p, uint32_t count, int side, double out[4])
 {
     double sign = side % 2 ? 1 : -1;
     memset(out, 0, 4 * sizeof *out);
     for (uint32_t k = 0; k < count; k++, p++) {
         double length = sqrt(ebpo_vec3_dot(p->area, p->area));
-        if (p->side != ON_PLANE || !(sign * p->area[side / 2] > least_turned * length))
+        if (p->side != ON_PLANE || !(sign * p->area[side / 2] > least_cosine * length))
             continue;
         for (int axis = 0; axis < 3; axis++)
             out[axis] += p->area[axis];
@@ -157,13 +160,14 @@ static void node_sum(const polygon *p, uint32_t count, int side, double out[4])
     }
 }
 
+/* Sums the plane polygons that face a side, for each corner over the nodes around it. */
 static void sum_side(lighting *l, int side)
 {
     const polygon *p = l->polygons;
     memset(l->sum, 0, l->corner_count * sizeof *l->sum);
     for (uint64_t i = 0; i < l->nodes->node_count; i++) {
         double sum[4];
-        node_sum(p, l->nodes->nodes[i].polygon_count, side, sum);
+        sum_node(p, l->nodes->nodes[i].polygon_count, side, sum);
         p += l->nodes->nodes[i].polygon_count;
         for (int c = 0; c < 8 && sum[3] > 0; c++)
             for (int k = 0; k < 4; k++)
@@ -171,9 +175,9 @@ static void sum_side(lighting *l, int side)
     }
 }
 
-/* Interpolates between the corners of a cell. */
+/* Interpolates the mean normals of a cell's corners at a point in the cell. */
 static void direction_at(const lighting *l, ebpo_cell cell, const uint32_t at[8],
-                         const double place[3], double out[3])
+                         const double point[3], double out[3])
 {
     double low[3], high[3];
     ebpo_cell_bounds(&l->box, cell, low, high);
@@ -182,7 +186,7 @@ static void direction_at(const lighting *l, ebpo_cell cell, const uint32_t at[8]
         const double *sum = l->sum[at[c]];
         double share = 1;
         for (int k = 0; k < 3; k++) {
-            double x = (place[k] - low[k]) / (high[k] - low[k]);
+            double x = (point[k] - low[k]) / (high[k] - low[k]);
             share *= c >> k & 1 ? x : 1 - x;
         }
         for (int k = 0; k < 3 && sum[3] > 0; k++)
@@ -190,6 +194,7 @@ static void direction_at(const lighting *l, ebpo_cell cell, const uint32_t at[8]
     }
 }
 
+/* Sets `out` to the direction with a length of 1. A direction of length 0 does not change `out`. */
 static void put_normal(const double direction[3], float out[3])
 {
     double length = sqrt(ebpo_vec3_dot(direction, direction));
@@ -197,6 +202,7 @@ static void put_normal(const double direction[3], float out[3])
         out[k] = (float)(direction[k] / length);
 }
 
+/* Computes the normals of the polygons on one side of their cells. */
 static void light_side(const lighting *l, int side, float *out)
 {
     const polygon *p = l->polygons;

@@ -434,9 +434,10 @@ START_TEST(test_export_count_limits)
     ck_assert_int_eq(ebpo_export_check_glb("a.glb", 0, 12 * (TWO32 - 2) * 2, &error), EBPO_E_LIMIT);
     ck_assert_msg(strstr(error.message, "a.glb") && strstr(error.message, "gltf"), "%s",
                   error.message);
-    ck_assert_int_eq(ebpo_export_check_scene("a.stl", TWO32 - 2, 1431655765, &error), EBPO_OK);
-    ck_assert_int_eq(ebpo_export_check_scene("a.stl", TWO32 - 2, 1431655766, &error), EBPO_E_LIMIT);
-    ck_assert_int_eq(ebpo_export_check_scene("a.stl", TWO32, 5, &error), EBPO_E_LIMIT);
+    ck_assert_int_eq(ebpo_export_check_assimp("a.stl", TWO32 - 2, 1431655765, &error), EBPO_OK);
+    ck_assert_int_eq(ebpo_export_check_assimp("a.stl", TWO32 - 2, 1431655766, &error),
+                     EBPO_E_LIMIT);
+    ck_assert_int_eq(ebpo_export_check_assimp("a.stl", TWO32, 5, &error), EBPO_E_LIMIT);
     ck_assert_msg(strstr(error.message, "a.stl") && strstr(error.message, "coarser"), "%s",
                   error.message);
 }
