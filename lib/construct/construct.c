@@ -1,10 +1,12 @@
 /* Builds the tree of a mesh: runs the stages that builder.h lists, in order, and fills in the
  * result's ebpo_info.
  *
- * This file checks options and chooses the deepest level (EBP 2017, equation 3). All threads
- * process pieces. The envelopes of a piece need the envelope of its parent, so the top of the tree
- * comes first. With a selection from the leaves up, the planes of all nodes are chosen before the
- * top. ebpo_build takes over the mesh and frees it, also on failure. */
+ * This file checks options and chooses the deepest level (EBP 2017, equation 3). The tree is cut
+ * into pieces, which are subtrees, and the top, which is the nodes above the pieces. All threads
+ * process pieces. The envelopes of a piece need the envelope of the parent of its root, so the
+ * envelopes of the top are computed first. With a selection from the leaves up, the planes of all
+ * nodes are chosen before any envelope is computed. ebpo_build takes over the mesh and frees it,
+ * also on failure. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -24,7 +26,8 @@
 #include "construct/supports.h"
 #include "ebpo_config.h"
 
-/* Implements EBP 2017, equation 3: the least i >= 1 with L / 2^i below the mean edge. */
+/* Implements EBP 2017, equation 3: returns the least i >= 1 for which the longest side of the
+ * bounds, divided by 2^i, is less than the mean edge. */
 static int level_limit(const ebpo_mesh_report *report)
 {
     double side = 0;
@@ -156,7 +159,7 @@ static void fill_info(ebpo_info *info, const ebpo_builder *b, const ebpo_mesh *m
         info->parts &= ~(uint32_t)EBPO_PART_COLOURS;
 }
 
-/* Arranges the mesh again if the tree is deeper than its order supports. */
+/* Arranges the mesh again if the tree is deeper than the mesh's order supports. */
 static ebpo_status arrange_for_levels(ebpo_builder *b, ebpo_mesh *mesh, ebpo_error *error)
 {
     const ebpo_progress *progress = &b->options->progress;
@@ -226,14 +229,14 @@ static ebpo_status process_pieces(void *context, uint64_t begin, uint64_t end, u
         status = ebpo_build_partition(b, s, error);
         if (status == EBPO_OK)
             status = ebpo_build_number(b, s, error);
-        uint64_t cut = ebpo_clock();
-        job->cells_ns += cut - begun;
+        uint64_t numbered = ebpo_clock();
+        job->cells_ns += numbered - begun;
         if (status == EBPO_OK)
             status = ebpo_emit_piece(b, job->scratch[worker], s, error);
         ebpo_branch_release(s);
         if (status == EBPO_OK)
             status = ebpo_build_pack(b, s->out, error);
-        job->envelopes_ns += ebpo_clock() - cut;
+        job->envelopes_ns += ebpo_clock() - numbered;
     }
     return status;
 }
@@ -256,9 +259,9 @@ static ebpo_status build_pieces(ebpo_builder *b, ebpo_error *error)
     return status;
 }
 
-/* Builds the tree. With a selection from the root down, each piece is finished in one pass. With a
- * selection from the leaves up, the top needs the results of all pieces first: the pieces are
- * partitioned twice, as their nodes are not kept. */
+/* Builds the tree. With a selection from the root down, each piece is finished in one pass. With
+ * a selection from the leaves up, the top first needs the planes of all pieces. The pieces are
+ * then partitioned twice, because their nodes are not kept. */
 static ebpo_status build_tree(ebpo_builder *b, ebpo_error *error)
 {
     ebpo_status status = ebpo_build_corner_windings(b, error);

@@ -4,8 +4,9 @@
  * A leaf's candidates are the planes of its faces; a gray node's are the planes that its children
  * have chosen. Each node clips the whole cell, and the supports are computed from the corners of
  * the children's envelopes and from the solid itself, so containment never depends on rounded
- * corners. Each piece is partitioned, its planes are chosen, and its nodes are freed again; then
- * the nodes of the top follow, deepest level first, those of one level in parallel. */
+ * corners. Each piece is partitioned, its planes are chosen, and its nodes are freed again. Then
+ * planes are chosen for the nodes of the top, the deepest level first, and the nodes of a level in
+ * parallel. */
 #include "core/strict_fp.h"
 
 #include <math.h>

@@ -1,8 +1,9 @@
-/* Sorts records that do not fit into memory. Records are made, distributed to groups by the leading
- * bits of their keys, and each group is sorted in memory: by digits of the keys, and records with
- * equal keys by the comparison. Each of these three passes reads and writes in order, or at as many
- * positions as there are groups, so a workspace may keep the records in files. The result depends
- * neither on the number of threads nor on memory. */
+/* Sorts records that do not fit into memory, in three passes. The first pass makes the records.
+ * The second pass distributes the records to groups by the leading bits of their keys. The third
+ * pass sorts each group in memory, by the digits of the keys; the comparison orders records with
+ * equal keys. Each pass reads and writes in order, or at as many positions as there are groups,
+ * so a workspace may keep the records in files. The result depends neither on the number of
+ * threads nor on memory. */
 #include "core/sort.h"
 
 #include <stdlib.h>
@@ -12,17 +13,14 @@
 #include "core/error.h"
 #include "core/parallel.h"
 
-/* The approximate number of records in a group, chosen so that a group fits a core's own cache. The
- * number of groups is limited, because each group is a position that is written to at the same
- * time. */
 enum {
-    GROUP = 1 << 16,
-    LARGE_GROUP = 4 * GROUP,
-    GROUPS_MAX = 1024,
-    GRAIN = 1 << 14,
-    DIGIT = 256,
-    ALONE = 1 << 12,
-    JUMPS = 4
+    GROUP = 1 << 16,         /* approximate number of records in a group: fits a core's cache */
+    LARGE_GROUP = 4 * GROUP, /* a group with more records is sorted in the workspace */
+    GROUPS_MAX = 1024,       /* limited, because all groups are written to at the same time */
+    GRAIN = 1 << 14,         /* records for which a thread is called once */
+    DIGIT = 256,             /* values of a digit of a key */
+    ALONE_MAX = 1 << 12,     /* at most this number of records is sorted as one group */
+    RELEASE_EVERY = 4        /* pages are released after this number of copies to groups */
 };
 
 typedef struct sorting {
@@ -80,14 +78,15 @@ static bool form_groups(sorting *t)
     return t->next != NULL;
 }
 
-/* Sorts a piece by groups, in the core's own cache, then moves each group's records together. So
- * the number of jumps is at most the number of groups, whatever the order of the records. */
+/* Sorts the records [begin, end) by groups in the core's cache. Then copies the records of each
+ * group to the result with one call, so the number of write positions is at most the number of
+ * groups. */
 static ebpo_status deal_to_groups(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                   ebpo_error *error)
 {
     sorting *t = context;
     const ebpo_sort *s = t->s;
-    uint64_t past[GROUPS_MAX * 2], at = 0; /* end of each group's records, in this piece */
+    uint64_t past[GROUPS_MAX * 2], at = 0; /* end of each group's records, in this range */
     (void)worker;
     memset(past, 0, (size_t)t->groups * sizeof *past);
     uint8_t *here = ebpo_alloc(end - begin, s->record);
@@ -110,7 +109,7 @@ static ebpo_status deal_to_groups(void *context, uint64_t begin, uint64_t end, u
             continue;
         uint64_t place = __atomic_fetch_add(&t->next[g], count, __ATOMIC_RELAXED);
         memcpy(t->dealt + place * s->record, here + first * s->record, (size_t)count * s->record);
-        if (++runs % JUMPS == 0)
+        if (++runs % RELEASE_EVERY == 0)
             ebpo_release_pages(s->workspace);
     }
     free(here);
@@ -151,7 +150,7 @@ static keyed *sort_by_digits(keyed *from, keyed *to, uint64_t count)
     return from;
 }
 
-/* Sorts the records [begin, end) of one key; by insertion if they are few. */
+/* Sorts the records [begin, end), which have equal keys; by insertion if they are few. */
 static void break_ties(const ebpo_sort *s, uint8_t *records, uint64_t begin, uint64_t end)
 {
     enum { FEW = 16 };
@@ -174,13 +173,13 @@ static ebpo_status sort_group(const sorting *t, uint64_t g, ebpo_error *error)
     const ebpo_sort *s = t->s;
     uint64_t count = t->first[g + 1] - t->first[g];
     const uint8_t *group = t->dealt + t->first[g] * s->record;
-    /* records that differ in no leading bit */
-    ebpo_workspace *capacity = count > LARGE_GROUP ? s->workspace : NULL;
-    keyed *keys = ebpo_array_alloc(capacity, 2 * count, sizeof *keys);
-    uint8_t *sorted = ebpo_array_alloc(capacity, count, s->record);
+    /* A group is this large only if many records have equal leading bits. It may exceed memory. */
+    ebpo_workspace *storage = count > LARGE_GROUP ? s->workspace : NULL;
+    keyed *keys = ebpo_array_alloc(storage, 2 * count, sizeof *keys);
+    uint8_t *sorted = ebpo_array_alloc(storage, count, s->record);
     ebpo_status status = EBPO_OK;
     if (!keys || !sorted)
-        status = ebpo_workspace_fail(capacity, count * (2 * sizeof *keys + s->record), error);
+        status = ebpo_workspace_fail(storage, count * (2 * sizeof *keys + s->record), error);
     else {
         for (uint64_t i = 0; i < count; i++)
             keys[i] = (keyed){ key_of(group + i * s->record), i };
@@ -194,8 +193,8 @@ static ebpo_status sort_group(const sorting *t, uint64_t g, ebpo_error *error)
         }
         s->take(s->context, t->first[g], sorted, count);
     }
-    ebpo_array_free(capacity, keys);
-    ebpo_array_free(capacity, sorted);
+    ebpo_array_free(storage, keys);
+    ebpo_array_free(storage, sorted);
     return status;
 }
 
@@ -211,7 +210,7 @@ static ebpo_status sort_groups(void *context, uint64_t begin, uint64_t end, unsi
     return status;
 }
 
-/* Sorts records that are so few that they form one group, without bins or threads. */
+/* Sorts at most ALONE_MAX records as one group, without bins or threads. */
 static ebpo_status run_alone(sorting *t, ebpo_error *error)
 {
     const ebpo_sort *s = t->s;
@@ -277,7 +276,7 @@ ebpo_status ebpo_sort_run(const ebpo_sort *sort, ebpo_error *error)
                          sort->record);
     sorting t = { .s = sort };
     uint64_t bytes = sort->count * sort->record;
-    if (sort->count <= ALONE) {
+    if (sort->count <= ALONE_MAX) {
         ebpo_status status = run_alone(&t, error);
         free(t.dealt);
         return status;

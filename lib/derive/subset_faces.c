@@ -1,8 +1,8 @@
-/* Cuts the faces, vertices, maps and attributes of a subset. Depth first through the remaining
- * leaves, faces and vertices get new numbers in the order of the specification. Arrays that map old
- * numbers to new ones are as long as the source's mesh. They take little memory for a small subset:
- * pages that are never written take none, and faces that are close in space have close numbers.
- * Source: format-spec/README.md, section 5. */
+/* Copies the faces, vertices, maps and attributes of a subset, with new numbers. Faces and vertices
+ * are numbered in the order of the specification: by a depth-first walk through the remaining
+ * leaves. Arrays that map old numbers to new ones are as long as the original file's mesh. They
+ * take little memory for a small subset, because pages that are never written take none, and faces
+ * that are close in space have close numbers. Source: format-spec/README.md, section 5. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -17,7 +17,7 @@
 
 typedef struct numbering {
     ebpo_cutting *c;
-    uint32_t *number; /* [faces of the source] new number + 1; 0: none yet */
+    uint32_t *number; /* [faces of the original file] new number + 1; 0: none yet */
     uint32_t *old;    /* [count] old number of each new face */
     uint64_t count, capacity;
     /* for each level: index of the next group and leaf; references read and written so far */
@@ -42,9 +42,9 @@ static int compare_numbers(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Numbers the faces of a leaf. References to faces whose first leaf was removed become new faces of
- * this leaf, in the order of their old numbers, before the leaf's own new faces. The other
- * references stay references, renumbered in place. */
+/* Numbers the faces of a leaf. A reference to a face whose first leaf was removed becomes a new
+ * face of this leaf. These faces precede the faces that were new in this leaf before, in the
+ * order of their old numbers. The other references stay references and are renumbered in place. */
 static ebpo_status number_leaf(numbering *n, int level)
 {
     ebpo_level *l = &n->c->out->level[level];

@@ -21,7 +21,7 @@ typedef struct ebpo_cutting {
     ebpo_error *error;
 } ebpo_cutting;
 
-/* Cuts the levels of the subset (subset_levels.c). Face numbers are those of the source. */
+/* Cuts the levels of the subset (subset_levels.c). Face numbers are those of the original file. */
 EBPO_MUST_USE ebpo_status ebpo_cut_levels(ebpo_cutting *c);
 
 /* Renumbers the faces that the remaining leaves list, with their vertices and maps

@@ -21,8 +21,8 @@
 /* A finite double is an integer times a power of two. The coordinates of one axis are divided by a
  * common power of two, which scales the determinant by a positive factor and leaves integers. */
 
-/* Returns the largest e such that x is an integer multiple of 2^e with a 53-bit factor; INT_MAX for
- * 0, which is a multiple of all. */
+/* Returns the e for which x is 2^e times an integer of exactly 53 bits. Returns INT_MAX for 0,
+ * for which any e is possible. */
 static int unit_exponent(double x)
 {
     int e;
@@ -148,11 +148,12 @@ int ebpo_sign_of_products_exact(const double *factor, int n)
 /* --- expansions --- */
 
 /* Ranges. A double x with 2^-247 <= |x| <= 2^300 is an integer multiple of 2^-300. So are
- * differences of such numbers and their rounding errors; products of three are multiples of 2^-900
- * and below 2^910: no operation here overflows or underflows. */
+ * differences of such numbers and the rounding errors of these differences. Products of three
+ * are multiples of 2^-900 and below 2^910, so no operation here overflows or underflows. */
 
-/* The sum of absolute products times this factor bounds the error of using rounded differences in
- * place of exact ones: 3 eps, with a margin. */
+/* A difference is a pair: the head is the rounded difference, the tail its rounding error. The
+ * error of a determinant of the heads alone is at most 3 eps times the sum of the absolute
+ * products; 3 is rounded up to 4. */
 static const double heads_error = 4 * 0x1p-53;
 
 static bool in_range(const double *x, int n, double least, double largest)
@@ -198,7 +199,7 @@ static double power_below(double x)
     return x;
 }
 
-/* Scales a row to integers below 2^41 by a power of two; returns false when it has more bits. */
+/* Scales a row to integers below 2^41 by a power of two. Returns false if a value has more bits. */
 static bool row_to_integers(int64_t out[3], const ebpo_pair row[3])
 {
     double largest = fmax(fabs(row[0].head), fmax(fabs(row[1].head), fabs(row[2].head)));
@@ -214,9 +215,9 @@ static bool row_to_integers(int64_t out[3], const ebpo_pair row[3])
     return exact;
 }
 
-/* Computes the determinant of differences that are exact and have few bits, as those of float or
- * integer input. Each is below 2^41, so that minors are below 2^83 and the determinant below 2^126.
- * Returns false for other differences. */
+/* Computes the sign of the determinant of differences that are exact and have few bits, such as
+ * those of float or integer input. Each is below 2^41, so that minors are below 2^83 and the
+ * determinant below 2^126. Returns false for other differences. */
 static bool integer_determinant(int *sign, ebpo_pair m[3][3])
 {
     int64_t z[3][3];
@@ -233,7 +234,7 @@ static bool integer_determinant(int *sign, ebpo_pair m[3][3])
 }
 
 #else
-/* Without 128-bit integers, all decisions are left to expansions. */
+/* Without 128-bit integers, expansions make all decisions. */
 static bool integer_determinant(int *sign, ebpo_pair m[3][3])
 {
     (void)sign, (void)m;
@@ -241,7 +242,7 @@ static bool integer_determinant(int *sign, ebpo_pair m[3][3])
 }
 #endif
 
-/* Computes out = the determinant; capacity 192. */
+/* Computes out = the determinant; out has capacity for 192 components. Returns their number. */
 static int expand_determinant(double *out, ebpo_difference m[3][3])
 {
     double minor[16], term[3][64], two[128];
@@ -255,7 +256,7 @@ static int expand_determinant(double *out, ebpo_difference m[3][3])
     return ebpo_expansion_sum(out, two, two_n, term[2], term_n[2]);
 }
 
-/* Bounds the error of the determinant of the heads alone. */
+/* Returns a bound of the error of the determinant of the heads alone. */
 static double error_of_heads(ebpo_pair m[3][3])
 {
     double permanent = 0;
@@ -268,8 +269,8 @@ static double error_of_heads(ebpo_pair m[3][3])
 }
 
 /* Returns a lower bound of the absolute value of the expansion e, for n <= 24. Components do not
- * overlap, so the sum of their sizes is below twice the last one, and the error of adding them is
- * less than n eps of that. */
+ * overlap, so the sum of their absolute values is below twice that of the last one. The error of
+ * adding the components is less than n eps times this sum. */
 static double expansion_size(const double *e, int n)
 {
     double sum = 0;
@@ -342,8 +343,8 @@ int ebpo_sign_of_products_expansion(const double *factor, int n)
 /* --- filters, and the stages in turn --- */
 
 /* Error bounds: eps = 2^-53. Each bound holds for the computed permanent (the sum of absolute
- * values); the slack term covers underflow in the products, and an overflow makes the bound
- * infinite or NaN, so that no comparison succeeds. */
+ * values). The slack term covers underflow in the products. An overflow makes the bound infinite
+ * or NaN, so that no comparison succeeds. */
 static const double eps = 0x1p-53;
 /* Far above every underflow error (2^-1075 each), and normal: arithmetic on denormals is slow. */
 static const double slack = 0x1p-960;
@@ -376,8 +377,8 @@ int ebpo_orient2d(const double a[2], const double b[2], const double c[2])
     return sign != EBPO_SIGN_UNKNOWN ? sign : ebpo_orient2d_exact(a, b, c);
 }
 
-/* Returns the sign by floating point, if it is certain, from the differences of b, c, d to a, one
- * row for each axis. */
+/* Returns the sign that floating point gives for the differences b - a, c - a, d - a (one row
+ * for each axis), or EBPO_SIGN_UNKNOWN if it is not certain. */
 static int orient3d_filter(double m[3][3])
 {
     double det = 0, permanent = 0, third = 0;

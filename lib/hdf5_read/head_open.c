@@ -1,7 +1,8 @@
-/* Opens the head of an untrusted file, and finds objects by their paths: reads the superblock, and
- * follows links by name from the root group. Features that HDF5 allows and this format does not are
- * rejected with a specific message. Source: HDF5 File Format Specification 3.0, sections II.A and
- * IV.A.2.g; format-spec/README.md, section 2. */
+/* Opens the head of an untrusted file, and finds objects by their paths. The head is the superblock
+ * and the headers of all objects, at the start of the file. Objects are found by the names of
+ * links, from the root group on. HDF5 features that this format does not allow are rejected with a
+ * specific message. Source: HDF5 File Format Specification 3.0, sections II.A and IV.A.2.g;
+ * format-spec/README.md, section 2. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -33,8 +34,8 @@ static bool has_signature(ebpo_head_state *s)
     return first && memcmp(first, signature, sizeof signature) == 0;
 }
 
-/* Reads the superblock, which locates the root group. Returns false with the reason in the refusal.
- */
+/* Reads the superblock, which locates the root group. Returns false if it is refused, with the
+ * reason in s->refusal, or if it is damaged or not HDF5, without a reason. */
 static bool read_superblock(ebpo_head_state *s)
 {
     enum { BYTES = EBPO_HEAD_SUPERBLOCK_BYTES, OPEN_FOR_WRITING = 1 };
@@ -53,11 +54,11 @@ static bool read_superblock(ebpo_head_state *s)
                                               : "the HDF5 file has a superblock of version 0");
     if (version > 3)
         return ebpo_refuse_foreign(s, "the HDF5 file has a superblock of a later version");
-    bool sound = ebpo_head_sound(block, BYTES);
+    bool checksum_ok = ebpo_head_sound(block, BYTES);
     unsigned sizes = ebpo_cursor_u16(&c), flags = ebpo_cursor_u8(&c);
     uint64_t base = ebpo_cursor_u64(&c), extension = ebpo_cursor_u64(&c), end = ebpo_cursor_u64(&c);
     s->root = ebpo_cursor_u64(&c);
-    if (!sound || end == EBPO_NO_ADDRESS || end > s->bytes.input->source.size)
+    if (!checksum_ok || end == EBPO_NO_ADDRESS || end > s->bytes.input->source.size)
         return false;
     if (version == 3 && flags & OPEN_FOR_WRITING)
         return ebpo_refuse(s, "the HDF5 file was not finished by the program that wrote it");
@@ -81,9 +82,10 @@ ebpo_status ebpo_head_open(ebpo_head *head, ebpo_input *input, ebpo_error *error
         return status;
     static const char unknown[] =
         "not a whole HDF5 file; was it cut off in copying, or is it something else?";
-    const char *foreign = ebpo_foreign_bytes(s->bytes.first, s->bytes.first_bytes);
-    if (foreign && !s->refusal.what && !has_signature(s))
-        return ebpo_fail_at(error, EBPO_E_FORMAT, head->shown, "", 0, "%s", foreign);
+    /* a message about a file that is not HDF5, such as a compressed one */
+    const char *other_kind = ebpo_foreign_bytes(s->bytes.first, s->bytes.first_bytes);
+    if (other_kind && !s->refusal.what && !has_signature(s))
+        return ebpo_fail_at(error, EBPO_E_FORMAT, head->shown, "", 0, "%s", other_kind);
     return ebpo_head_fail(head, "", s->refusal.what ? "" : unknown, error);
 }
 
@@ -142,7 +144,8 @@ static bool link_is(ebpo_head_cursor c, const char *name, size_t length, uint64_
     return true;
 }
 
-/* Finds the links of a group with this name; returns their number. */
+/* Finds the links with this name in a group. Returns the number of links, and the target of the
+ * last one in *address. */
 static unsigned follow_name(const ebpo_head_header *group, const char *name, size_t length,
                             uint64_t *address)
 {

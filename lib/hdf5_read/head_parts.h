@@ -1,7 +1,7 @@
 /* Private to lib/hdf5_read: the parts of an open head. These are its bytes, which are read in few
- * reads, a cursor in them, headers of objects, and types, dimensions and filters. The library's
- * writer puts headers at the start of the file, and the index of large arrays in one piece behind
- * the first levels. */
+ * reads, a cursor in the bytes, headers of objects, and types, dimensions and filters. The
+ * library's writer puts headers at the start of the file, and the index of large arrays in one
+ * piece behind the first levels. */
 #ifndef EBPO_HDF5_READ_HEAD_PARTS_H
 #define EBPO_HDF5_READ_HEAD_PARTS_H
 
@@ -129,7 +129,7 @@ typedef struct ebpo_head_header {
 /* The reason of a refusal. */
 typedef struct ebpo_head_refusal {
     const char *what; /* NULL: no refusal */
-    bool foreign;     /* true if the file is not damaged, but only libhdf5 reads it */
+    bool foreign;     /* the file is valid HDF5 by another writer, which only libhdf5 reads */
 } ebpo_head_refusal;
 
 enum { EBPO_HEAD_SLOTS = 32 };
@@ -141,7 +141,7 @@ typedef struct ebpo_head_state {
     ebpo_head_refusal refusal;              /* the last refusal */
     ebpo_range *kept;                       /* see ebpo_head_keep_ranges */
     uint64_t kept_count, kept_capacity;
-    bool keeps, kept_short; /* kept_short: memory was short */
+    bool keeps, kept_short; /* kept_short: no memory to keep a range */
 } ebpo_head_state;
 
 /* Records a range of the file that is in use, if ebpo_head_keep_ranges was called. */
@@ -155,7 +155,8 @@ static inline void ebpo_head_note_range(ebpo_head_state *s, uint64_t at, uint64_
         s->kept_short = true;
 }
 
-/* Records the reason and returns false, so that `return` reads well. */
+/* Records the reason of a refusal. Returns false, which the caller can return.
+ * ebpo_refuse_foreign is for valid HDF5 of other writers. */
 static inline bool ebpo_refuse(ebpo_head_state *s, const char *what)
 {
     s->refusal = (ebpo_head_refusal){ what, false };

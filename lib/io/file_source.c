@@ -1,8 +1,8 @@
-/* Reads whole files into memory or a workspace: meshes, images, scenes. A file that changes while
- * it is read is rejected, according to its size, its times and, where these are in doubt, its
- * bytes. A file that is named in another file is opened below a folder and never outside it, in one
- * system call (openat2) where available. Files of other kinds are recognised by their first bytes,
- * and the message gives a remedy. */
+/* Reads whole files into memory or a workspace: meshes, images, scenes. A file that changes
+ * while it is read is rejected. The size and the times of the file show a change; if the times
+ * are not reliable, the bytes are compared. A file whose name comes from another file is opened
+ * only below a given folder, with one system call (openat2) if available. Files of other kinds
+ * are recognised by their first bytes, and the message gives a remedy. */
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
@@ -23,10 +23,10 @@
 #include "core/workspace.h"
 #include "io/file_source.h"
 
-enum { PIECE = 1 << 22, FRESH_NS = 100000000 };
+enum { READ_BYTES = 1 << 22, FRESH_NS = 100000000 };
 
-/* Returns true for a change less than 0.1 s ago, or in the future: file times have steps of some
- * milliseconds. */
+/* Returns true if the last change was less than 0.1 s ago, or is in the future. A later change
+ * may then have the same file time, because file times have steps of some milliseconds. */
 static bool is_fresh(const struct stat *st)
 {
     struct timespec now;
@@ -77,7 +77,8 @@ ebpo_status ebpo_whole_file_read(const ebpo_whole_file *file, uint64_t at, void 
 {
     uint8_t *next = to;
     while (bytes) {
-        ssize_t got = pread(file->fd, next, bytes < PIECE ? (size_t)bytes : PIECE, (off_t)at);
+        ssize_t got =
+            pread(file->fd, next, bytes < READ_BYTES ? (size_t)bytes : READ_BYTES, (off_t)at);
         if (got < 0 && errno == EINTR)
             continue;
         if (got < 0)
@@ -98,7 +99,7 @@ typedef struct loading {
     const char *path;
 } loading;
 
-static ebpo_status load_piece(void *context, uint64_t begin, uint64_t end, unsigned worker,
+static ebpo_status load_range(void *context, uint64_t begin, uint64_t end, unsigned worker,
                               ebpo_error *error)
 {
     const loading *l = context;
@@ -114,8 +115,8 @@ ebpo_status ebpo_whole_file_load(ebpo_whole_file *file, ebpo_workspace *workspac
         return EBPO_OK;
     if (file->size > PTRDIFF_MAX)
         return ebpo_fail_file(error, EBPO_E_LIMIT, path,
-                              "has %" PRIu64 " bytes, more than a program of %d bits can hold in "
-                              "one piece; read it with one of 64 bits",
+                              "has %" PRIu64 " bytes, more than a %d-bit program can hold in "
+                              "memory; read it with a 64-bit program",
                               file->size, (int)sizeof(size_t) * CHAR_BIT);
     file->workspace = workspace;
     file->buffer = ebpo_array_alloc(workspace, file->size, 1);
@@ -123,7 +124,7 @@ ebpo_status ebpo_whole_file_load(ebpo_whole_file *file, ebpo_workspace *workspac
         return ebpo_workspace_fail(workspace, file->size, error);
     loading l = { file, file->buffer, path };
     file->data = file->buffer;
-    return ebpo_parallel_for(threads, workspace, file->size, PIECE, load_piece, &l, progress,
+    return ebpo_parallel_for(threads, workspace, file->size, READ_BYTES, load_range, &l, progress,
                              "reading", error);
 }
 
@@ -294,7 +295,7 @@ static const struct {
     { "glTF", 4, "is a glTF file; save the mesh as PLY, OBJ, STL or OFF" },
 };
 
-/* Returns true for text of two bytes a character without a mark: every other byte is zero. */
+/* Returns true for UTF-16 text without a byte order mark: every other byte is zero. */
 static bool is_wide(const uint8_t *data, uint64_t size)
 {
     enum { CHARACTERS = 8 };
@@ -319,7 +320,7 @@ static bool begins_with(const char *text, uint64_t size, const char *word)
     return size >= n && strncasecmp(text, word, n) == 0;
 }
 
-/* Finds markup, which may begin behind white space. */
+/* Finds markup, which may follow white space. */
 static const char *find_markup(const char *text, uint64_t size)
 {
     for (; size && (*text == ' ' || (*text >= '\t' && *text <= '\r')); size--)

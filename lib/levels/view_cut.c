@@ -3,8 +3,8 @@
  * - An observer, prepared as a viewpoint, computes the distance of a cell, its size in pixels, and
  *   its visibility in the frustum. It gives each node a key for the order of priority. Comparisons
  *   allow for rounding: a barely visible cell counts as visible.
- * - The partial tree holds the delivered groups of siblings, each linked to its parent once it is
- *   complete.
+ * - The partial tree holds the delivered groups (eight siblings each). A complete group is linked
+ *   to its parent.
  * - The frontier holds the gray nodes of the cut in a binary heap, with the next one to refine on
  *   top. Equal keys are ordered by octcode, so that the order is deterministic. */
 #include "core/strict_fp.h"
@@ -59,8 +59,9 @@ static ebpo_status check_observer(const ebpo_observer *o, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Computes the side planes: inward normals t * forward +- right, where t is the tangent of half the
- * angle. */
+/* Computes the side planes and the plane through the eye. The inward normals of the side planes
+ * are t * forward +- side, where side is the direction to the right or up, and t is the tangent
+ * of half the angle of view in this direction. */
 static ebpo_status make_frustum(ebpo_viewpoint *s, const ebpo_observer *o, double tangent,
                                 ebpo_error *error)
 {
@@ -124,13 +125,13 @@ ebpo_seen ebpo_viewpoint_see(const ebpo_viewpoint *s, const ebpo_box *box, ebpo_
         out.distance2 += away * away;
     }
     for (int i = 0; i < 5 && !s->everywhere && out.seen; i++) {
-        double most = 0, reach = 0;
+        double most = 0, magnitude = 0;
         for (int k = 0; k < 3; k++) {
             double a = s->inward[i][k] * low[k], b = s->inward[i][k] * high[k];
             most += a > b ? a : b;
-            reach += fabs(a) + fabs(b);
+            magnitude += fabs(a) + fabs(b);
         }
-        out.seen = !(most < -SLACK * reach);
+        out.seen = !(most < -SLACK * magnitude);
     }
     return out;
 }
@@ -155,8 +156,8 @@ unsigned ebpo_viewpoint_octant(const ebpo_viewpoint *s, const ebpo_box *box, ebp
     return octant;
 }
 
-/* Returns the octants from the root down, each relative to the eye's octant, as one number. These
- * numbers have the order of the enumeration from front to back. */
+/* Returns one number of all octants on the path from the root, each relative to the eye's
+ * octant. The order of these numbers is the order from front to back. */
 static uint64_t octants_key(const ebpo_viewpoint *s, const ebpo_box *box, ebpo_octcode octcode)
 {
     int level = ebpo_octcode_level(octcode);
@@ -341,21 +342,22 @@ void ebpo_frontier_sort(ebpo_frontier *f)
         sink_down(f, i);
 }
 
-/* Uses a hash table of blocks; blocks that do not fit are omitted. */
+/* A block is `span` groups of a level's index. Uses a hash table of blocks. After
+ * EBPO_FRONTIER_BLOCKS different blocks, further blocks are omitted. */
 unsigned ebpo_frontier_blocks(const ebpo_frontier *f, uint64_t span,
                               uint64_t places[EBPO_FRONTIER_BLOCKS])
 {
     enum { SLOTS = 4 * EBPO_FRONTIER_BLOCKS };
     struct {
         uint64_t block, place;
-    } slot[SLOTS]; /* block 0: free */
+    } slot[SLOTS]; /* block 0: free; place: index in f->at of the block's first node */
     unsigned count = 0;
     memset(slot, 0, sizeof slot);
     for (uint64_t i = 0; i < f->count; i++) {
         const ebpo_waiting *w = &f->at[i];
         if (w->turn == EBPO_TURN_NEVER)
             continue;
-        /* includes the level; not 0 */
+        /* the number includes the level, so it is not 0 */
         uint64_t block = (w->below / span) << 6 | (uint64_t)(64 - __builtin_clzll(w->octcode));
         uint64_t at;
         EBPO_HASH_FIND(at, ebpo_hash_number(block), SLOTS - 1,

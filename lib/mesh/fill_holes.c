@@ -1,6 +1,6 @@
-/* Fills holes: each boundary loop becomes a fan or a triangulation of its outline
- * (geometry/polygon.h), oriented so that edges cancel. The rest of the mesh does not change. The
- * repair record counts the additions. */
+/* Fills holes: each boundary loop is triangulated (geometry/polygon.h). The triangles use each
+ * boundary edge in the direction opposite to that of the adjacent face. The rest of the mesh does
+ * not change. The repair record counts the additions. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -19,9 +19,10 @@
  * linear. */
 enum { SEARCHED_DEGREE = 4096, VERTEX_GRAIN = 1 << 13, LOOP_GRAIN = 16 };
 
-typedef struct placed {
-    uint32_t vertex, place;
-} placed;
+typedef struct loop_vertex {
+    uint32_t vertex;
+    uint32_t position; /* index in the loop */
+} loop_vertex;
 
 /* Scratch memory of a thread. */
 typedef struct scratch {
@@ -31,7 +32,7 @@ typedef struct scratch {
     uint32_t (*triangles)[3];
     uint64_t point_capacity, triangle_capacity;
     /* the loop's vertices, sorted for lookup */
-    placed sorted[EBPO_OPTIMAL_CHAIN];
+    loop_vertex sorted[EBPO_OPTIMAL_CHAIN];
     uint8_t taken[EBPO_OPTIMAL_CHAIN * EBPO_OPTIMAL_CHAIN];
 } scratch;
 
@@ -42,7 +43,8 @@ typedef struct filling {
     ebpo_stars stars;
     ebpo_boundary boundary;
     ebpo_loops loops;
-    uint64_t *before; /* [loops.count] triangles of the loops before it in the source */
+    uint64_t *before; /* [loops.count] number of triangles of the loops that precede each loop in
+                       * the source */
     uint64_t added;
 } filling;
 
@@ -91,7 +93,7 @@ static ebpo_status collect_boundary(filling *f, ebpo_error *error)
 
 static int by_vertex(const void *a, const void *b)
 {
-    const placed *x = a, *y = b;
+    const loop_vertex *x = a, *y = b;
     return (x->vertex > y->vertex) - (x->vertex < y->vertex);
 }
 
@@ -100,22 +102,24 @@ static void mark_taken(const filling *f, scratch *s, const uint32_t *loop, uint3
 {
     memset(s->taken, 0, (size_t)n * n);
     for (uint32_t i = 0; i < n; i++)
-        s->sorted[i] = (placed){ loop[i], i };
+        s->sorted[i] = (loop_vertex){ loop[i], i };
     qsort(s->sorted, n, sizeof *s->sorted, by_vertex);
     for (uint32_t i = 0; i < n; i++) {
         uint64_t begin = f->stars.first[loop[i]], end = f->stars.first[loop[i] + (uint64_t)1];
         for (uint64_t e = begin; e < end && end - begin <= SEARCHED_DEGREE; e++)
             for (int k = 0; k < 3; k++) {
-                placed wanted = { f->mesh->faces[3 * (uint64_t)f->stars.face[e] + (unsigned)k], 0 };
-                const placed *found = bsearch(&wanted, s->sorted, n, sizeof *s->sorted, by_vertex);
+                loop_vertex wanted = { f->mesh->faces[3 * (uint64_t)f->stars.face[e] + (unsigned)k],
+                                       0 };
+                const loop_vertex *found =
+                    bsearch(&wanted, s->sorted, n, sizeof *s->sorted, by_vertex);
                 if (found)
-                    s->taken[(size_t)i * n + found->place] =
-                        s->taken[(size_t)found->place * n + i] = 1;
+                    s->taken[(size_t)i * n + found->position] =
+                        s->taken[(size_t)found->position * n + i] = 1;
             }
     }
 }
 
-/* Fills a loop. Its triangles follow those of the loops before it in the source. */
+/* Fills a loop. Its triangles follow the triangles of the loops that precede it in the source. */
 static bool fill_loop(filling *f, scratch *s, uint64_t number)
 {
     const uint32_t *loop = f->loops.vertex + f->loops.first[number];
@@ -137,7 +141,8 @@ static bool fill_loop(filling *f, scratch *s, uint64_t number)
     if (!ebpo_triangulate_chain(&chain, s->triangles))
         return false;
     uint32_t *face = f->mesh->faces + 3 * (f->mesh->face_count + f->before[number]);
-    /* the triangles run against the chain, because the adjacent faces run along it */
+    /* the adjacent faces use the chain's edges forwards, so the triangles use these edges
+     * backwards */
     EBPO_FOR_ITEMS_SCATTERED(workspace, t, 0, n - 2)
         for (uint64_t k = 0; k < 3; k++)
             face[3 * t + k] = loop[s->triangles[t][2 - k]];
@@ -157,7 +162,7 @@ static ebpo_status fill_loops(void *context, uint64_t begin, uint64_t end, unsig
 
 /* --- all loops --- */
 
-/* Makes space after the mesh's faces, which do not change. */
+/* Reserves space after the mesh's faces, which do not change. */
 static ebpo_status reserve_space(filling *f, ebpo_error *error)
 {
     ebpo_mesh *mesh = f->mesh;
@@ -206,7 +211,7 @@ static ebpo_status run_filling(filling *f, ebpo_error *error)
     if (status != EBPO_OK)
         return status;
     mesh->face_count += f->added;
-    if (mesh->arrangement) { /* the new faces are at the end */
+    if (mesh->arrangement) { /* the faces are no longer in Morton order: drop the keys */
         ebpo_array_free(mesh->workspace, mesh->arrangement->key);
         mesh->arrangement->key = NULL;
     }

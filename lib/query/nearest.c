@@ -2,11 +2,12 @@
  *
  * The search is depth first, the nearest child first. It drops nodes that are certainly farther
  * than the best face. Bounds and triangles are in single precision with bounded errors
- * (nearest_kernels.c). The remaining faces are compared by certain bounds in double precision, and
- * exactly where these cannot separate two faces; of equally near faces the one with the least
- * number in the file is returned. For points too far for single precision, the search uses boxes in
- * doubles; for points too far for doubles, it uses keys (point_bounds.h). An ebpo_nearest may
- * search several accels one after the other. */
+ * (nearest_kernels.c). The remaining faces are compared by guaranteed bounds in double precision.
+ * If the bounds of two faces overlap, the faces are compared with exact arithmetic. Of equally near
+ * faces, the one with the lowest index in the file is returned. For points too far for single
+ * precision, the search uses boxes in double precision. For points too far for doubles, it uses
+ * keys: numbers in the order of the distances (point_bounds.h). An ebpo_nearest may search several
+ * accels one after the other. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -30,8 +31,8 @@ static bool is_edge(ebpo_feature feature)
     return feature >= EBPO_NEAR_EDGE0 && feature <= EBPO_NEAR_EDGE2;
 }
 
-/* Returns true if both nearest features are the same: faces around one vertex or edge are the most
- * frequent tie. */
+/* Returns true if the nearest features of both faces are the same vertex or edge. Such faces are
+ * the most frequent case of equal distances. */
 static bool same_feature(const double a[3][3], ebpo_feature of_a, const double b[3][3],
                          ebpo_feature of_b)
 {
@@ -59,8 +60,8 @@ int ebpo_near_compare(const double p[3], const double a[3][3], const ebpo_distan
 
 /* --- the search --- */
 
-/* Single precision cannot separate distances of points that are farther from a subtree than this
- * multiple of half its size. */
+/* If a point is farther from a subtree than this multiple of half the subtree's size, single
+ * precision cannot distinguish the distances of the subtree's faces. */
 #define FAR 32.0
 
 void ebpo_nearest_begin(ebpo_nearest *n, const ebpo_model *model, const double p[3],
@@ -97,7 +98,7 @@ static ebpo_far_keys keys_of(const ebpo_nearest *n, const double triangle[3][3])
     return n->far.far ? ebpo_far_face(&n->far, triangle) : (ebpo_far_keys){ -INFINITY, INFINITY };
 }
 
-/* Returns the exact sign of the face's distance less that of the nearest face so far. */
+/* Returns the exact sign of the face's distance minus the distance of the nearest face so far. */
 static int compare_with_nearest(const ebpo_nearest *n, const double triangle[3][3],
                                 const ebpo_distance_bounds *b, const ebpo_far_keys *keys)
 {
@@ -118,7 +119,7 @@ void ebpo_nearest_begin_with(ebpo_nearest *n, const double triangle[3][3], uint6
         take_face(n, triangle, &b, &keys, file_face, source_face);
 }
 
-/* Returns true if the face is the nearest so far. */
+/* Tests a face. Returns true if it is the nearest so far, and keeps it then. */
 static bool try_face(ebpo_nearest *n, const ebpo_accel *s, uint32_t slot)
 {
     uint32_t local = ebpo_accel_slot_face(s, slot);
@@ -175,8 +176,9 @@ static bool make_probe(const ebpo_accel *s, const double p[3], ebpo_probe *out)
     }
     out->scale = (float)s->scale;
     out->scale64 = s->scale;
-    /* the error of `local` is 2^-24 of `most` on each axis: docs/develop/bounds.md, "Limits of
-     * points" */
+    /* On each axis, the rounding error of `local` is at most 2^-24 times `most`; over three axes
+     * it is at most 1.74 times as much. The factor is 2^-22 to include the rounding of limits:
+     * docs/develop/bounds.md, "Limits of points". */
     out->error = (float)most * 0x1p-22f;
     return true;
 }
@@ -215,7 +217,8 @@ static void judge_waiting(ebpo_near_search *g)
     }
 }
 
-/* Stops at the deadline: the nodes on the stack give the bound of the unvisited part. */
+/* Ends the search at the deadline. The nodes on the stack give a lower bound of the distance to
+ * the faces that were not visited. */
 static void give_up(const ebpo_near_search *g)
 {
     ebpo_nearest *n = g->user;
@@ -276,8 +279,8 @@ typedef struct far_search {
     ebpo_far_frame frame;
 } far_search;
 
-/* Returns the children within the limit, a bit for each, by boxes and bounding cylinders. Cylinders
- * take more time: they are tested only for children that pass the test of boxes. */
+/* Returns the children within the limit, a bit for each. Tests boxes first, then the bounding
+ * cylinders of the remaining children, because a cylinder takes more time. */
 static unsigned far_children(const far_search *g, uint32_t node, double lower[8])
 {
     const ebpo_nearest *n = g->n;
@@ -329,8 +332,8 @@ static double box_distance(const ebpo_accel *s, const ebpo_bound *b, int lane, c
         return most;
     for (int k = 0; k < 3; k++)
         sum += d[k] / most * (d[k] / most);
-    /* p[k] is far away (by FAR) on the axis that matters, so the rounding error of the box sides is
-     * far below 2^-40 of that distance. */
+    /* On at least one axis, p is FAR times half the subtree's size away. So the rounding error
+     * of the box sides is far below 2^-40 of the distance. */
     return most * sqrt(sum) * (1 - 0x1p-40);
 }
 

@@ -1,13 +1,13 @@
-/* Verifies the face lists of leaves against the faces that touch them.
+/* Verifies the face lists of leaves against the faces that touch the leaves.
  *
  * A leaf must list every face that touches its closed cell. No face may touch a white or black
  * cell. The builder also lists faces for which its test is not certain. A listed face that does not
  * touch the leaf is therefore no violation if it touches the cell widened by 1/256; such faces are
  * only counted.
  *
- * A gray node is only allowed if a leaf in its place would list too many faces. To check this, the
- * different faces in the lists below the node are counted up to the limit. If there is not enough
- * memory to count them, the node passes. */
+ * A gray node is only allowed if a leaf in its place would list more faces than the limit of the
+ * file (`leaf_faces`). To check this, the different faces in the lists below the node are counted
+ * up to the limit. If there is not enough memory to count them, the node passes. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -63,9 +63,9 @@ static void check_near(ebpo_tally *tally, const ebpo_reference_tree *view,
     ebpo_frame frame = ebpo_frame_make(&view->box, leaf->cell);
     ebpo_corners corners;
     for (int k = 0; k < 3; k++) {
-        double more = (frame.high[k] - frame.low[k]) * 0x1p-8;
-        frame.low[k] -= more;
-        frame.high[k] += more;
+        double margin = (frame.high[k] - frame.low[k]) * 0x1p-8;
+        frame.low[k] -= margin;
+        frame.high[k] += margin;
         frame.inverse[k] = 1 / (frame.high[k] - frame.low[k]);
     }
     ebpo_face_corners(&view->tree->mesh, face, &corners);
@@ -73,7 +73,8 @@ static void check_near(ebpo_tally *tally, const ebpo_reference_tree *view,
         report_face(tally, leaf, face, "the leaf lists a face that is not near it");
 }
 
-static void check_spare(ebpo_tally *tally, const ebpo_reference_tree *view,
+/* Checks the listed faces that are not among `faces`, which touch the leaf. */
+static void check_extra(ebpo_tally *tally, const ebpo_reference_tree *view,
                         const ebpo_reference_node *leaf, const face_list *list,
                         const uint32_t *faces, uint64_t count)
 {
@@ -106,12 +107,14 @@ static void check_leaf(ebpo_tally *tally, const ebpo_reference_tree *view,
             report_face(tally, leaf, list.refs[i], "the list names the face twice or not in order");
     if (list.ref_count && list.refs[list.ref_count - 1] >= list.first)
         report_face(tally, leaf, list.refs[list.ref_count - 1],
-                    "the list refers to a face that is not below its first new face");
+                    "the list refers to a face whose index is not less than that of the list's "
+                    "first new face");
     tally->checks[EBPO_VERIFY_LISTS] += count + list.ref_count + list.new_count;
-    uint64_t spare = (uint64_t)list.ref_count + list.new_count - found;
-    tally->spare_entries += spare;
-    if (spare)
-        check_spare(tally, view, leaf, &list, faces, count);
+    /* listed faces that do not touch the leaf */
+    uint64_t extra = (uint64_t)list.ref_count + list.new_count - found;
+    tally->spare_entries += extra;
+    if (extra)
+        check_extra(tally, view, leaf, &list, faces, count);
 }
 
 void ebpo_check_terminal_lists(ebpo_tally *tally, const ebpo_reference_tree *view,
@@ -131,8 +134,9 @@ void ebpo_check_terminal_lists(ebpo_tally *tally, const ebpo_reference_tree *vie
 
 enum { LIMIT_OF_LISTS = 1 << 16 };
 
-/* Different faces listed below a node, up to `limit`. They are kept in a list of up to twice as
- * many faces or, if the limit is large, as a bit for each face of the mesh. */
+/* Different faces listed below a node, up to `limit`. They are kept in a list of about twice
+ * `limit` entries with repetitions or, if the limit is large, as a bit for each face of the
+ * mesh. */
 typedef struct gathering {
     uint32_t *faces;
     uint8_t *seen; /* bits; NULL if `faces` is used */
@@ -179,8 +183,8 @@ static void mark_list(gathering *g, const face_list *list)
  * to set `more`. */
 static void gather_list(gathering *g, const face_list *list)
 {
-    uint64_t more = (uint64_t)list->ref_count + list->new_count;
-    if (more > g->limit) {
+    uint64_t length = (uint64_t)list->ref_count + list->new_count;
+    if (length > g->limit) {
         g->more = true;
         return;
     }
@@ -188,9 +192,9 @@ static void gather_list(gathering *g, const face_list *list)
         mark_list(g, list);
         return;
     }
-    if (g->count + more > 2 * g->limit + 64)
+    if (g->count + length > 2 * g->limit + 64)
         keep_different(g);
-    if (!ebpo_grow(&g->faces, &g->capacity, g->count + more, sizeof *g->faces)) {
+    if (!ebpo_grow(&g->faces, &g->capacity, g->count + length, sizeof *g->faces)) {
         g->short_of_memory = true;
         return;
     }

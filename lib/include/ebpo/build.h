@@ -29,14 +29,15 @@ typedef enum ebpo_selection {
     /*
      * From the root down. Candidates are the directions of the hull of the solid in the cell. A
      * node starts with its parent's envelope. Planes are added greedily by the volume that they
-     * remove, if this is at least epsilon; then planes that cut off needles.
+     * remove, if this is at least epsilon. Then planes are added that cut off needles: long, thin
+     * parts of the envelope with little volume.
      */
     EBPO_SELECT_INHERIT = 0,
 
     /*
      * The other three selections are from the theses. Candidates are the normals of the faces below
      * the node. These selections go from the leaves up: the planes of a node are placed around the
-     * polygons of its children's planes (EBP 2017, 3.3.4.3 and 3.4.1; BP 2008, 3.4).
+     * facets of its children's envelopes (EBP 2017, 3.3.4.3 and 3.4.1; BP 2008, 3.4).
      */
     EBPO_SELECT_KMEDOIDS = 1, /* medoids of clusters of normals */
     EBPO_SELECT_OFFSET = 2,   /* planes that moved least from their faces */
@@ -80,8 +81,8 @@ typedef enum ebpo_normal_distance {
 } ebpo_normal_distance;
 
 /*
- * Seconds of two steps that `progress` does not separate, because both are done together for each
- * part of a tree. Summed over all threads.
+ * Seconds of two steps, summed over all threads. `progress` does not separate the steps, because
+ * each piece of the tree passes through both in turn.
  */
 typedef struct ebpo_build_times {
     size_t struct_size;
@@ -108,16 +109,16 @@ typedef struct ebpo_build_options {
     uint32_t leaf_faces;
 
     /*
-     * For EBPO_SELECT_INHERIT, and for leaf planes that are stored with it: 0 to 1. A plane is kept
-     * if it removes at least this share of the cell, or cuts off a part that extends beyond the
-     * plane by a tenth of the cell. In levels 0 to 4 the share is epsilon / 10, or less where the
-     * solid is thin.
+     * For EBPO_SELECT_INHERIT, 0 to 1; also used for the planes of leaves (EBPO_PART_LEAF_PLANES)
+     * with this selection. A plane is kept if it removes at least this share of the cell, or if it
+     * cuts off a portion of the envelope that extends beyond the plane by a tenth of the cell. In
+     * levels 0 to 4 the share is epsilon / 10, or less where the solid is thin.
      */
     double epsilon;
 
     /*
-     * ebpo_part bits: parts to make. Leaf planes are made only on request. Colours are stored only
-     * if the mesh has colours, and only with EBPO_PART_MESH.
+     * ebpo_part bits: parts of the file to make. Planes of leaves are made only on request. Colours
+     * are stored only if the mesh has colours, and only with EBPO_PART_MESH.
      */
     uint32_t parts;
 

@@ -176,12 +176,12 @@ typedef struct ebpo_mesh_read_options {
  * Triangle strips are converted to triangles.
  *
  * Binary coordinates keep every bit. Text of a PLY file is rounded correctly to the type in the
- * header. Text of other formats becomes floats if every coordinate is represented: the nearest
- * float, rounded to the last digit of the text, gives the text again. Otherwise all coordinates
- * become doubles. In files of other formats than PLY, vertices of equal position are merged, and
- * unreferenced vertices are omitted. In PLY files, unreferenced vertices are omitted if their
- * coordinates are not finite. ebpo_mesh_ignored describes unread data, and the largest difference
- * between floats and the text of a PLY file.
+ * header. Text of other formats becomes floats if floats represent every coordinate, and doubles
+ * otherwise. A float represents a coordinate if it is the nearest float and gives the text again
+ * when it is rounded to the digits of the text. In files of other formats than PLY, vertices of
+ * equal position are merged, and unreferenced vertices are omitted. In PLY files, unreferenced
+ * vertices are omitted if their coordinates are not finite. ebpo_mesh_ignored describes unread
+ * data, and the largest difference between floats and the text of a PLY file.
  *
  * Safe for untrusted files. The whole file is read into memory, or with `workspace` into one of its
  * arrays.
@@ -202,8 +202,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_read(const char *path,
  * untrusted data.
  *
  * name    for messages
- * xyz     [*count][3] doubles; floats and integers are converted exactly. Text of type float that
- *         no float represents becomes the nearest double. Freed by free().
+ * xyz     [*count][3] doubles; floats and integers are converted exactly. In text, a value of a
+ *         float property that no float represents (see ebpo_mesh_read) becomes the nearest double.
+ *         Freed by free().
  *
  * EBPO_E_FORMAT, EBPO_E_LIMIT.
  *
@@ -295,7 +296,8 @@ typedef struct ebpo_mesh_report {
     uint64_t edges;
 
     /*
-     * Number of parts of the mesh that share no vertices. Vertices without faces are not counted.
+     * Number of components: sets of faces that share no vertices with other faces. Vertices without
+     * faces are not counted.
      */
     uint64_t components;
 
@@ -439,10 +441,11 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_weld_within(ebpo_mesh *mesh, double
  * orientation, the first of the source stays. `repeated_faces` counts the others. The order and the
  * source indices are kept, and attributes of faces remain assigned by source index.
  *
- * A second face of the same orientation counts twice in winding numbers and volume. Two faces of
+ * Two faces of the same orientation count twice in winding numbers and volume. Two faces of
  * opposite orientation cancel, for example the two sides of a sheet, or the boundaries between
- * solids. So a mesh may be balanced with both and not with one of them. `dropped_opposite` counts
- * dropped faces of opposite orientation; ebpo_mesh_check and ebpo_mesh_try_repairs show the effect.
+ * solids. So a mesh may be balanced with both faces and not with one of them. `dropped_opposite`
+ * counts dropped faces of opposite orientation; ebpo_mesh_check and ebpo_mesh_try_repairs show the
+ * effect.
  *
  * EBPO_E_ARGUMENT: a component (ebpo_components_mesh) with repeated faces.
  *
@@ -474,17 +477,18 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_count_repeated(const ebpo_mesh *mes
  *
  * A *shell* is a closed set of faces, which uses each edge equally often in both directions. Its
  * faces are connected by edges that are used twice; so each of two cubes that share a vertex or an
- * edge is a shell. If a set of connected faces is not closed, it is joined with other sets around
- * edges that are used more often, so that faces of alternating direction close it (stacked cubes).
- * The order around an edge is decided exactly; faces in one plane are ordered by index. Faces that
- * already alternate are unchanged.
+ * edge is a shell. Such a set of connected faces may be open at edges that are used more than twice
+ * (stacked cubes). It is then joined with other sets at these edges: faces that follow one another
+ * around the edge get alternating directions, and are connected in pairs. The order around an edge
+ * is decided exactly; faces in one plane are ordered by index. Faces that already alternate are
+ * unchanged.
  *
  * A shell gets a positive volume, or a negative one if it is inside an odd number of other shells.
- * A shell is inside another one if its least and greatest vertices along each axis are: their exact
- * winding number is not zero. Open parts are turned so that most of their faces are unchanged. A
- * part that cannot be oriented is unchanged and counted. A part whose faces around an edge cannot
- * alternate is counted and oriented without this edge. Do not orient a mesh that has intended
- * solids inside other solids.
+ * A shell is inside another one if its least and greatest vertices along each axis are inside:
+ * their exact winding numbers with respect to the other shell are not zero. Open sets of faces are
+ * turned so that most of their faces are unchanged. A set that cannot be oriented is unchanged and
+ * counted. A set whose faces around an edge cannot alternate is counted and oriented without this
+ * edge. Do not orient a mesh that has intended solids inside other solids.
  *
  * Threads: one per mesh.
  */
@@ -581,10 +585,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_prepare(ebpo_mesh *mesh,
 /*
  * Components of a mesh. Faces that share vertices are in one component. A component is closed if it
  * uses each edge equally often in both directions. A closed component of negative volume is a
- * cavity. A cavity is joined to the closed component of positive volume that contains the first
- * vertex of the cavity's first face in the source: the exact winding number is not zero. Of several
- * such components, the one of least volume is used. A cavity that is in no other component stays a
- * separate component.
+ * cavity. A cavity is joined to the closed component of positive volume that surrounds it. A
+ * component surrounds a cavity if its exact winding number is not zero at the first vertex of the
+ * cavity's first face in the source. Of several such components, the one of least volume is used. A
+ * cavity that is in no other component stays a separate component.
  */
 typedef struct ebpo_components ebpo_components;
 

@@ -39,8 +39,8 @@ extern "C" {
 /* How data that is not in memory is loaded (EBP 2017, section 4.2). Results do not depend on it. */
 typedef enum ebpo_loading {
     /*
-     * Whole subtrees, kept while the budget allows; the least recently used are removed first
-     * (4.2.3).
+     * Whole subtrees, which are kept while the budget allows. The least recently used subtrees are
+     * removed first (4.2.3).
      */
     EBPO_LOAD_CACHE = 0,
 
@@ -59,8 +59,9 @@ typedef struct ebpo_model_options {
 
     /*
      * Memory limit of the model in bytes, including its caches and buffers for loading. 0: no
-     * limit; but 256 MiB for a file on a server (http.h) of more than 2 MiB if `cut_level` is -1.
-     * Such a file is loaded in parts for any budget if it has subtrees (ebpo_info.subtree_level).
+     * limit, except for a remote file (http.h) larger than 2 MiB with `cut_level` -1, where the
+     * limit is 256 MiB. Such a file is loaded in parts for any budget if it has subtrees
+     * (ebpo_info.subtree_level).
      *
      * Not included are the chunk directory of the file (24 bytes per chunk), decoders (about 250 kB
      * per loading thread) and contexts. A context holds results; for distances also 4 bytes per
@@ -70,8 +71,8 @@ typedef struct ebpo_model_options {
 
     /*
      * Levels 0 to cut_level stay in memory, and the subtrees below are loaded on demand. -1: chosen
-     * by the budget; everything is loaded at once if it fits. A file on a server of more than 2 MiB
-     * with subtrees is never loaded at once.
+     * by the budget; everything is loaded at once if it fits. A remote file that is larger than 2
+     * MiB and has subtrees is never loaded at once.
      */
     int cut_level;
 
@@ -193,7 +194,7 @@ typedef struct ebpo_model_stats {
     /* Budget in bytes. 0: none. */
     uint64_t budget;
 
-    /* Number of times that a query found a subtree in memory, and loaded a subtree. */
+    /* hits: number of times a query found a subtree in memory. loads: times it loaded one. */
     uint64_t hits, loads;
 
     /* Number of subtrees loaded in the background. */
@@ -212,21 +213,23 @@ typedef struct ebpo_model_stats {
     double load_seconds;
 
     /*
-     * Number of leaves in memory, and of frequently queried leaves by kind: general, one plane, two
-     * planes, convex set, concave set.
+     * leaves: number of leaves in memory. leaves_of_kind: those of them that were queried often, by
+     * the planes that bound the solid in the leaf: general, one plane, two planes, convex set,
+     * concave set. The kind of other leaves is not determined.
      */
     uint64_t leaves, leaves_of_kind[5];
 
     /*
      * Number of general leaves with a cell face that no face of the mesh intersects. In these
-     * leaves one segment decides.
+     * leaves, one segment from that cell face to the point is sufficient to compute the winding
+     * number.
      */
     uint64_t leaves_one_cell_face;
 
     /*
      * For distances while not everything was in memory: number of points, of subtrees searched, and
-     * of loads including those for the sign. Divided by the number of points, they are the cost of
-     * a query.
+     * of loads including those for the sign. The cost of a query is the second and the third
+     * number, divided by the number of points.
      */
     uint64_t distances, distance_subtrees, distance_loads;
 
@@ -366,14 +369,14 @@ typedef struct ebpo_inside_result {
 
     /*
      * Winding number. 0 for EBPO_ON and EBPO_MAYBE. With a level or deadline, 0 also if an envelope
-     * decided that the point is outside; with rules other than EBPO_RULE_NONZERO the true winding
-     * number may then be another number that is outside.
+     * decided that the point is outside. The true winding number may then differ from 0 with rules
+     * other than EBPO_RULE_NONZERO.
      */
     int32_t winding;
 
     /*
-     * EBPO_MAYBE: upper bound of the distance to the surface, which is the diagonal of the deepest
-     * visited cell. Else 0.
+     * EBPO_MAYBE: upper bound of the distance to the surface: the diagonal of the deepest visited
+     * cell. Else 0.
      */
     double doubt;
 } ebpo_inside_result;
@@ -418,8 +421,8 @@ typedef enum ebpo_distance_mode {
     EBPO_DISTANCE_LEAVES = 2,
 
     /*
-     * No faces: the distance from the envelope of the deepest gray node around the point, at most
-     * at `level`. The result is unsigned and not always the minimum; max_distance is ignored.
+     * No faces: the distance from the envelope of the deepest gray node around the point, in levels
+     * 0 to `level`. The result is unsigned and not always the minimum; max_distance is ignored.
      */
     EBPO_DISTANCE_ENVELOPE = 3
 } ebpo_distance_mode;
@@ -559,9 +562,9 @@ typedef bool (*ebpo_near_fn)(void *user, const ebpo_near_face *face);
  * take      must not use the context
  *
  * Uses at most 16 MiB besides the model's budget, for any number of faces: after every 65,536 faces
- * (without `most` also a few times at the beginning) the search starts again behind the last face.
- * Subtrees are loaded in order of distance, and only if they may contain a result. Each is loaded
- * once, if the budget is large enough to keep it.
+ * (without `most` also a few times at the beginning) the search starts again with the face that
+ * follows the last one in this order. Subtrees are loaded in order of distance, and only if they
+ * may contain a result. Each is loaded once, if the budget is large enough to keep it.
  *
  * EBPO_E_ABSENT: as for ebpo_distance. In a subset the call may pass some faces, which are correct,
  * before it returns this. EBPO_E_ARGUMENT: returned before the first face.
@@ -755,14 +758,14 @@ EBPO_API unsigned ebpo_sampler_columns(const ebpo_sampler *sampler);
  *
  * In doubles without fused operations: e = b - a, f = c - a, d = p - a, scaled by powers of two; D
  * = (e.e)(f.f) - (e.f)(e.f); w_b = ((f.f)(d.e) - (e.f)(d.f)) / D and w_c = ((e.e)(d.f) -
- * (e.f)(d.e)) / D, 0 if less; w_a = 1 - w_b - w_c, 0 if less; each is divided by their sum. Scalar
- * products add x, y, z in this order.
+ * (e.f)(d.e)) / D, or 0 if negative; w_a = 1 - w_b - w_c, or 0 if negative. Each weight is divided
+ * by the sum of the three. Scalar products add x, y, z in this order.
  *
  * The value is (w_a A + w_b B) + w_c C without terms of weight 0, clamped to the range of the
  * values used. At a corner it is the corner's value; if all three are equal, it is that value. If D
  * is at most 2^-900, with the greatest coordinate of e and f scaled to 1 to 2, the face has no
- * area: the weights are those along the longest of ab, ac, bc (the first of equal ones) at the
- * point nearest to d.
+ * area. The weights are then those of the point nearest to p on the longest of the edges ab, ac, bc
+ * (the first of equal ones).
  *
  * points   [count][3] finite
  * faces    [count] as in ebpo_distance_result; EBPO_NO_FACE: the values are NAN
@@ -831,7 +834,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_triangles_in_box(ebpo_context *context, 
 
 /* ---- mass ---- */
 
-/* Volume of a solid: of the points that the rule puts inside, in the cube of the model's unit. */
+/* Volume of a solid (all points that the rule puts inside), in cubic units of the model. */
 typedef struct ebpo_solid_volume {
     size_t struct_size;
 
@@ -907,7 +910,7 @@ typedef struct ebpo_mass {
 
 /*
  * Computes area, volume, centroid and inertia of the file's mesh by compensated sums. For several
- * components it includes ebpo_mesh_count_shells.
+ * components it also calls ebpo_mesh_count_shells.
  *
  * EBPO_E_ABSENT: the file has no mesh, or is a subset. Other errors are those of reading.
  *
