@@ -254,10 +254,10 @@ static ebpo_status inspect_pruned(ebpo_context *c, ebpo_nearest *n, ebpo_error *
     return status;
 }
 
-static void prefetch_around(ebpo_context *c, const double p[3], double reach)
+static void prefetch_around(ebpo_context *c, const double p[3], double search_distance)
 {
     if (ebpo_model_prefetches(c->model))
-        ebpo_context_prefetch(c, p, reach);
+        ebpo_context_prefetch(c, p, search_distance);
 }
 
 static ebpo_status exact_distance(ebpo_context *c, const double p[3],

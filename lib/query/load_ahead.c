@@ -1,13 +1,13 @@
-/* Loading ahead: before queries need subtrees, they are loaded, or prefetch hints for a remote file
+/* Loading ahead: subtrees are loaded before queries need them, or prefetch hints for a remote file
  * are sent.
  *
  * Prefetching requests the subtrees that queries near the last query may need, in the order of
  * their distance. EBP 2017, 4.2.3, loads the 26 neighbours of the subtree that contains the
  * position instead.
  *
- * A batch evaluates many points sorted along the Morton curve, so that subtrees are loaded few
- * times, and returns results in the order of the points; prefetch hints for the next points are
- * sent in windows. A batch belongs to one thread. */
+ * A batch evaluates many points in the order of the Morton curve, so that subtrees are loaded few
+ * times. For a remote file, it sends prefetch hints for some thousand points at a time, in advance.
+ * A batch belongs to one thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -27,7 +27,7 @@ typedef struct wanted {
     double lower; /* lower bound of the distance */
 } wanted;
 
-/* Search for the nearest subtrees within `limit` of p. */
+/* Search for the nearest subtrees within a distance of a point. */
 typedef struct subtree_search {
     ebpo_ranking ranking;
     double limit;
@@ -79,29 +79,32 @@ static double distance_apart(const double a[3], const double b[3])
     return fmax(fabs(a[0] - b[0]), fmax(fabs(a[1] - b[1]), fabs(a[2] - b[2])));
 }
 
-void ebpo_context_prefetch(ebpo_context *c, const double p[3], double reach)
+void ebpo_context_prefetch(ebpo_context *c, const double p[3], double search_distance)
 {
     const ebpo_model *m = c->model;
     ebpo_box box = ebpo_model_box(m);
     double side = longest_side(&box, m->top->cut_level);
     if (c->has_prefetched && distance_apart(p, c->prefetched_from) < side / 4 &&
-        fabs(reach) <= c->prefetched_reach + side / 4)
+        fabs(search_distance) <= c->prefetched_reach + side / 4)
         return;
     c->has_prefetched = true;
-    c->prefetched_reach = fabs(reach);
+    c->prefetched_reach = fabs(search_distance);
     memcpy(c->prefetched_from, p, sizeof c->prefetched_from);
-    /* When p moves by w, distances and their bounds change by at most w each: the subtrees needed
-     * until then are within `reach` + 2 w. A cell's diagonal is 1.73 sides. Where envelopes do not
-     * decide (rules other than nonzero), the query needs the cell that contains the point. */
+    /* Until the next prefetch, p moves by about a quarter side. When p moves by w, distances and
+     * their bounds change by at most w each. So queries need subtrees whose envelopes are within
+     * search_distance + 2 w, that is, half a side more. Under rules other than nonzero, envelopes
+     * do not decide: a query then needs the subtree whose cell contains the point, and the envelope
+     * of this subtree may be as far away as the cell's diagonal, 1.73 sides. The sum is 2.25 sides.
+     */
     uint64_t keys[EBPO_CACHE_AHEAD];
-    unsigned count = ebpo_subtrees_near(m, p, fabs(reach) + 2.25 * side, keys);
+    unsigned count = ebpo_subtrees_near(m, p, fabs(search_distance) + 2.25 * side, keys);
     for (unsigned i = 0; i < count; i++)
         keys[i] = ebpo_context_key(c, keys[i]);
     ebpo_cache_prefetch(m->cache, keys, count);
 }
 
-/* Returns the number, in the file's table of subtrees, of the subtree that contains `below`, if it
- * is to be loaded; UINT64_MAX: none. */
+/* Returns the number of a subtree in the file's table of subtrees. The result is the file's subtree
+ * that contains the subtree with number `below` in the top. UINT64_MAX: nothing is to be loaded. */
 static uint64_t table_number(const ebpo_context *c, uint32_t below)
 {
     const ebpo_model *m = c->model;
@@ -126,7 +129,7 @@ static int compare_numbers(const void *x, const void *y)
     return (a > b) - (a < b);
 }
 
-/* Sorts numbers in ascending order and removes duplicates; returns their count. */
+/* Sorts numbers in ascending order and removes duplicates; returns the new count. */
 static uint64_t sort_numbers(uint64_t *numbers, uint64_t count)
 {
     uint64_t kept = 0;
@@ -141,7 +144,7 @@ static uint64_t sort_numbers(uint64_t *numbers, uint64_t count)
 void ebpo_context_hint(const ebpo_context *c, const uint32_t *below, uint64_t count)
 {
     const ebpo_model *m = c->model;
-    ebpo_hints expected = EBPO_HINTS_INIT(m->file);
+    ebpo_hints hints = EBPO_HINTS_INIT(m->file);
     if (m->info->subtree_level == 0 || !ebpo_input_expects(&m->file->in) || count == 0)
         return;
     uint64_t found = 0, *numbers = ebpo_alloc(count, sizeof *numbers);
@@ -153,18 +156,19 @@ void ebpo_context_hint(const ebpo_context *c, const uint32_t *below, uint64_t co
     found = sort_numbers(numbers, found);
     ebpo_subtree_table_hint(m->chunks, numbers, found);
     for (uint64_t i = 0; i < found; i++)
-        ebpo_subtrees_hint(m->chunks, &expected, numbers[i], 1, ebpo_subtree_needs(c->planes),
+        ebpo_subtrees_hint(m->chunks, &hints, numbers[i], 1, ebpo_subtree_needs(c->planes),
                            EBPO_LEVELS_MAX, true);
-    ebpo_hint_all(&expected);
+    ebpo_hint_all(&hints);
     free(numbers);
 }
 
 /* --- batches --- */
 
-/* Number of subtrees in one prefetch hint, and of points from which they are gathered: some
- * megabytes. Two hints are in flight. */
+/* Maximum number of subtrees in one prefetch hint (some megabytes of data), and of points whose
+ * subtrees are in one hint. The data of two hints is being fetched at any time. */
 enum { SUBTREES_A_TIME = 128, POINTS_A_TIME = 4096 };
 
+/* A point and its position on the curve. */
 typedef struct placed {
     uint64_t key, point;
 } placed;
@@ -207,12 +211,13 @@ uint64_t *ebpo_curve_order(const ebpo_box *box, const double *points, uint64_t c
     return order;
 }
 
-/* Returns true if consecutive points are far apart. Such points are evaluated along the curve also
- * when everything is in memory: then the next point finds its data in the processor's caches, and
- * its result is near. The points of a path are in order already. */
+/* Returns true if consecutive points are far apart. Such points are evaluated along the curve even
+ * when the whole model is in memory: then the data for the next point is in the processor's caches,
+ * and its result is close to the previous result, from which the search starts. The points of a
+ * path already have such an order. */
 static bool are_scattered(const ebpo_box *box, const double *points, uint64_t count)
 {
-    const double far = 0x1p-5;
+    const double mean_least = 0x1p-5; /* as a share of the box */
     double sum = 0;
     for (uint64_t i = 1; i < count; i++) {
         double most = 0;
@@ -221,22 +226,24 @@ static bool are_scattered(const ebpo_box *box, const double *points, uint64_t co
                                   box->size[k]);
         sum += most;
     }
-    return count >= 32 && sum > far * (double)count;
+    return count >= 32 && sum > mean_least * (double)count;
 }
 
 void ebpo_batch_begin(ebpo_batch *b, ebpo_context *context, const double *points, uint64_t count,
-                      bool reach)
+                      bool searches_around)
 {
     const ebpo_model *m = context->model;
     ebpo_box box = ebpo_model_box(m);
-    *b = (ebpo_batch){ .context = context, .points = points, .count = count, .reach = reach };
-    if (m->whole && reach && are_scattered(&box, points, count))
+    *b = (ebpo_batch){
+        .context = context, .points = points, .count = count, .searches_around = searches_around
+    };
+    if (m->whole && searches_around && are_scattered(&box, points, count))
         b->order = ebpo_curve_order(&box, points, count);
     if (m->whole || count < 2 || m->options.loading != EBPO_LOAD_CACHE)
         return;
     b->order = ebpo_curve_order(&box, points, count);
-    b->far = ebpo_input_expects(&m->file->in) && m->info->subtree_level &&
-             m->info->parts & EBPO_PART_MESH;
+    b->sends_hints = ebpo_input_expects(&m->file->in) && m->info->subtree_level &&
+                     m->info->parts & EBPO_PART_MESH;
 }
 
 void ebpo_batch_end(ebpo_batch *b)
@@ -247,8 +254,10 @@ void ebpo_batch_end(ebpo_batch *b)
 
 /* --- prefetch hints --- */
 
-/* Returns the subtree where the search for a point begins; EBPO_NO_SUBTREE: the top decides. */
 #define EBPO_NO_SUBTREE UINT64_MAX
+
+/* Returns the subtree where the search for a point begins. EBPO_NO_SUBTREE: no subtree is needed,
+ * as the top decides. */
 static uint64_t home_of(const ebpo_batch *b, const double p[3])
 {
     const ebpo_model *m = b->context->model;
@@ -256,7 +265,7 @@ static uint64_t home_of(const ebpo_batch *b, const double p[3])
     uint32_t at[3];
     ebpo_box box = ebpo_model_box(m);
     int fine = m->info->level_count - 1;
-    if (b->reach)
+    if (b->searches_around)
         return ebpo_subtrees_near(m, p, INFINITY, keys) ? keys[0] : EBPO_NO_SUBTREE;
     if (!ebpo_locate(&box, fine, p, at))
         return EBPO_NO_SUBTREE;
@@ -287,19 +296,21 @@ static const double *ordered_point(const ebpo_batch *b, uint64_t i)
 /* Sends prefetch hints for the subtrees where the searches for the next points begin. */
 static void hint_next(ebpo_batch *b)
 {
-    uint64_t begin = b->reported;
-    while (b->reported < b->count && b->reported - begin < POINTS_A_TIME &&
+    uint64_t begin = b->hinted;
+    while (b->hinted < b->count && b->hinted - begin < POINTS_A_TIME &&
            b->below_count < SUBTREES_A_TIME) {
-        uint64_t before = b->below_count, home = home_of(b, ordered_point(b, b->reported++));
+        uint64_t before = b->below_count, home = home_of(b, ordered_point(b, b->hinted++));
         if (before == 0 || b->below[before - 1] != home)
             collect_subtree(b, home);
     }
     hint_collected(b);
 }
 
-/* Sends hints for other subtrees near the points, as far as the starting subtrees show which ones;
- * after that no subtree is requested separately. A subtree that cannot be loaded ends the search:
- * the query will return the error, and each further try may wait as long as the first. */
+/* Sends one hint for the other subtrees that the next points need, so that queries do not request
+ * them one by one. For each point, the subtree where the search begins is searched; its result
+ * bounds the distance, and so the subtrees that are needed. A subtree that cannot be loaded ends
+ * the search: the query will return the error, and each further try may wait as long as the first.
+ */
 static void search_around(ebpo_batch *b, uint64_t end)
 {
     ebpo_context *c = b->context;
@@ -324,14 +335,14 @@ static void search_around(ebpo_batch *b, uint64_t end)
 
 uint64_t ebpo_batch_next(ebpo_batch *b, uint64_t i)
 {
-    if (b->far && i == 0)
+    if (b->sends_hints && i == 0)
         hint_next(b);
-    if (b->far && i >= (b->reach ? b->searched : b->reported - (b->reported != 0)) &&
+    if (b->sends_hints && i >= (b->searches_around ? b->searched : b->hinted - (b->hinted != 0)) &&
         i < b->count) {
-        uint64_t end = b->reported;
-        if (b->reported < b->count)
+        uint64_t end = b->hinted;
+        if (b->hinted < b->count)
             hint_next(b);
-        if (b->reach)
+        if (b->searches_around)
             search_around(b, end);
     }
     return b->order ? b->order[i] : i;

@@ -4,11 +4,12 @@
 
 #include "query/query_model.h"
 
-/* Requests subtrees near p, the nearest first, when p has moved by a quarter of the side of a cell
- * of the cut level. These are the subtrees whose envelopes are within |reach| plus 2.25 such sides
- * of p. `reach`: search distance of the query at p, 0 for point in solid. For models with a cache
- * only. */
-void ebpo_context_prefetch(ebpo_context *context, const double p[3], double reach);
+/* Requests the subtrees whose envelopes are within |search_distance| plus 2.25 sides of p, the
+ * nearest first. A side is that of a cell of the cut level. Does nothing if, since the last
+ * prefetch, p has moved by less than a quarter side and the search distance has grown by at most as
+ * much. `search_distance`: of the query at p; 0 for point in solid. For models with a cache only.
+ */
+void ebpo_context_prefetch(ebpo_context *context, const double p[3], double search_distance);
 
 /* Lists the subtrees whose envelopes may be within `limit` of p, the nearest first; returns their
  * count. */
@@ -26,32 +27,33 @@ static inline bool ebpo_model_prefetches(const ebpo_model *m)
     return m->options.prefetch && !m->whole && m->options.loading == EBPO_LOAD_CACHE;
 }
 
-/* A batch of many points. They are evaluated along the Morton curve, so that subtrees are loaded
- * few times; for a remote file prefetch hints are sent in advance. One thread. */
+/* A batch of many points. The points are evaluated along the Morton curve, so that subtrees are
+ * loaded few times; for a remote file prefetch hints are sent in advance. One thread. */
 
 typedef struct ebpo_batch {
     ebpo_context *context;
     const double *points; /* [count][3], finite; owned by the caller */
     uint64_t count;
     uint64_t *order; /* [count] order of evaluation; NULL: in the given order */
-    bool far, reach;
-    uint64_t reported; /* number of points for whose subtrees hints have been sent */
-    uint64_t searched; /* number of points around which further subtrees have been searched */
+    bool sends_hints;
+    bool searches_around; /* queries search around the point (distances) */
+    uint64_t hinted;      /* number of points for whose subtrees hints have been sent */
+    uint64_t searched;    /* number of points around which further subtrees have been searched */
     uint32_t *below; /* [capacity] subtrees that are being collected, by their numbers in the top */
     uint64_t below_count, capacity;
 } ebpo_batch;
 
-/* Begins a batch. `reach`: queries search around the point (distances). Without memory for an
- * order, points are evaluated in the given order. */
+/* Begins a batch. `searches_around`: queries search around the point (distances). Without memory
+ * for an order, points are evaluated in the given order. */
 void ebpo_batch_begin(ebpo_batch *batch, ebpo_context *context, const double *points,
-                      uint64_t count, bool reach);
+                      uint64_t count, bool searches_around);
 void ebpo_batch_end(ebpo_batch *batch);
 
-/* Returns the numbers of the points [count] in the order of the Morton curve; a point outside the
+/* Returns the indices of the points [count] in the order of the Morton curve; a point outside the
  * box has the position of the nearest cell. The caller frees the array. NULL: no memory. */
 uint64_t *ebpo_curve_order(const ebpo_box *box, const double *points, uint64_t count);
 
-/* Returns the i-th point to evaluate; i goes from 0 on. */
+/* Returns the index of the i-th point to evaluate. Call it with i = 0, 1, 2, ... */
 uint64_t ebpo_batch_next(ebpo_batch *batch, uint64_t i);
 
 #endif
