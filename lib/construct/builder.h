@@ -101,11 +101,11 @@ typedef struct ebpo_builder {
     const uint32_t (*face)[3];
     ebpo_bounds bounds;
     uint32_t *number; /* final number of each face; a piece sets the numbers of its fresh faces */
-    /* nodes above the subtrees; `detail` of a leaf of the top is the number of a subtree */
+    /* the nodes above the pieces; `detail` of a leaf of the top is the index of a piece in `sub` */
     ebpo_branch top;
-    ebpo_branch *sub;
+    ebpo_branch *sub; /* [sub_count] the pieces */
     uint64_t sub_count, sub_capacity;
-    _Atomic uint64_t leaf_count, entry_count; /* in all subtrees so far */
+    _Atomic uint64_t leaf_count, entry_count; /* in all pieces so far */
     struct ebpo_top_envelope *top_envelope;   /* envelopes of the top's gray nodes, by detail */
     struct ebpo_store *store;
 } ebpo_builder;
@@ -116,7 +116,7 @@ static inline void ebpo_build_triangle(const ebpo_builder *b, uint32_t face, ebp
         ebpo_mesh_position(b->mesh, b->face[face][i], out->corner[i]);
 }
 
-/* Returns the face of an entry of a branch. */
+/* Returns the face of an entry of a piece or of the top. */
 static inline uint32_t ebpo_branch_face(const ebpo_branch *s, uint32_t entry)
 {
     return s->list ? s->list[entry] : entry;

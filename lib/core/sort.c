@@ -17,7 +17,7 @@ enum {
     GROUP = 1 << 16,         /* approximate number of records in a group: fits a core's cache */
     LARGE_GROUP = 4 * GROUP, /* a group with more records is sorted in the workspace */
     GROUPS_MAX = 1024,       /* limited, because all groups are written to at the same time */
-    GRAIN = 1 << 14,         /* records for which a thread is called once */
+    GRAIN = 1 << 14,         /* number of records for each call of a thread's function */
     DIGIT = 256,             /* values of a digit of a key */
     ALONE_MAX = 1 << 12,     /* at most this number of records is sorted as one group */
     RELEASE_EVERY = 4        /* pages are released after this number of copies to groups */
@@ -28,8 +28,8 @@ typedef struct sorting {
     uint8_t *made, *dealt; /* records in the order in which they were made, and by groups */
     uint64_t *first;       /* [groups + 1] first record of each group in `dealt` */
     uint64_t *next;        /* [groups] position of the group's next records */
-    uint32_t *group_of;    /* [EBPO_SORT_BINS] */
-    uint64_t *in_bin;      /* [EBPO_SORT_BINS] */
+    uint32_t *group_of;    /* [EBPO_SORT_BINS] group of each bin */
+    uint64_t *in_bin;      /* [EBPO_SORT_BINS] number of records by the leading bits of the key */
     uint64_t groups;
 } sorting;
 
@@ -228,8 +228,8 @@ static ebpo_status run_alone(sorting *t, ebpo_error *error)
     return status;
 }
 
-/* Returns the number of threads. Each thread holds one group; all together take an eighth of the
- * budget. */
+/* Returns the number of threads that sort groups. Each thread holds one group. All threads
+ * together use at most an eighth of the budget, unless one group needs more. */
 static unsigned threads_for_groups(const sorting *t)
 {
     const ebpo_sort *s = t->s;

@@ -1,9 +1,9 @@
 /* Orientation predicates and signs of sums of products, exact for every finite double.
  *
- * Each predicate passes stages, cheapest first: signs of factors, a floating-point filter, exact
- * arithmetic on doubles (expansions) where exponents are in range, and integers of any size.
- * Sources: Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric
- * Predicates", 1997; docs/develop/design.md. */
+ * Each predicate tries these stages, the cheapest first, until one gives a certain sign: signs of
+ * factors, a floating-point filter, exact arithmetic on doubles (expansions) if exponents are in
+ * range, and integers of any size. Sources: Shewchuk, "Adaptive Precision Floating-Point Arithmetic
+ * and Fast Robust Geometric Predicates", 1997; docs/develop/design.md. */
 #include "core/strict_fp.h"
 
 #include <gmp.h>
@@ -189,7 +189,7 @@ int ebpo_orient2d_expansion(const double a[2], const double b[2], const double c
 #ifdef EBPO_HAVE_INT128
 __extension__ typedef __int128 wide;
 
-/* Returns 2^(exponent of x), x normal and positive. */
+/* Returns the greatest power of two that is at most x. x is normal and positive. */
 static double power_below(double x)
 {
     uint64_t bits;
@@ -207,8 +207,8 @@ static bool row_to_integers(int64_t out[3], const ebpo_pair row[3])
     bool exact = true;
     for (int i = 0; i < 3; i++) {
         double x = row[i].head * scale;
-        /* Adding 1.5 * 2^52 rounds to an integer. A cast and back is less safe: GCC 12 drops such
-         * pairs when it vectorises. */
+        /* Adding 1.5 * 2^52 rounds to an integer. A cast to an integer and back would be less
+         * safe: GCC 12 removes such pairs of casts when it vectorises. */
         exact &= (x + 0x1.8p52) - 0x1.8p52 == x;
         out[i] = (int64_t)x;
     }

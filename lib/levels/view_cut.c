@@ -1,7 +1,7 @@
 /* Manages the cut of a view: the delivered nodes of the tree, and the order of refinement.
  *
- * - An observer, prepared as a viewpoint, computes the distance of a cell, its size in pixels, and
- *   its visibility in the frustum. It gives each node a key for the order of priority. Comparisons
+ * - A viewpoint is a prepared observer. It gives the distance of a cell, the cell's size in pixels
+ *   and visibility in the frustum, and the key of a node for the order of priority. Comparisons
  *   allow for rounding: a barely visible cell counts as visible.
  * - The partial tree holds the delivered groups (eight siblings each). A complete group is linked
  *   to its parent.
@@ -73,9 +73,9 @@ static ebpo_status make_frustum(ebpo_viewpoint *s, const ebpo_observer *o, doubl
         return ebpo_fail(error, EBPO_E_ARGUMENT, "the observer's upward direction is (0, 0, 0)");
     ebpo_vec3_cross(forward, up, side[0]);
     if (ebpo_vec3_dot(side[0], side[0]) < 1e-12 || !normalise_vector(side[0], side[0]))
-        return ebpo_fail(
-            error, EBPO_E_ARGUMENT,
-            "the observer's upward direction lies along the viewing direction; give another one");
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "the observer's upward direction is parallel to the viewing direction; "
+                         "give another one");
     ebpo_vec3_cross(side[0], forward, side[1]);
     double tangents[2] = { tangent * ((double)o->width / o->height), tangent };
     for (int i = 0; i < 2; i++)

@@ -33,6 +33,7 @@ typedef struct scratch {
     uint64_t point_capacity, triangle_capacity;
     /* the loop's vertices, sorted for lookup */
     loop_vertex sorted[EBPO_OPTIMAL_CHAIN];
+    /* [n][n] for a loop of n vertices: 1 if an edge of the mesh connects two of them */
     uint8_t taken[EBPO_OPTIMAL_CHAIN * EBPO_OPTIMAL_CHAIN];
 } scratch;
 

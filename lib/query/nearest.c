@@ -191,7 +191,7 @@ static float frame_limit(const ebpo_near_search *g)
     return limit < 0x1p60 ? (float)limit * (1 + 0x1p-20f) + FLT_MIN : 0x1p60f;
 }
 
-/* Compares the candidates, the most promising first. */
+/* Tests the candidates, the one with the least lower bound first. */
 static void judge_waiting(ebpo_near_search *g)
 {
     ebpo_nearest *n = g->user;
@@ -252,7 +252,7 @@ static void search_near(ebpo_nearest *n, const ebpo_nearest_kernels *kernels, eb
     judge_waiting(g);
 }
 
-/* --- in double precision --- */
+/* --- blocks and lanes, for the searches in double precision --- */
 
 static void try_block(ebpo_nearest *n, const ebpo_accel *s, uint32_t child)
 {

@@ -132,6 +132,7 @@ void ebpo_check_terminal_lists(ebpo_tally *tally, const ebpo_reference_tree *vie
                                              : "the face touches a black cell");
 }
 
+/* Greatest limit for which faces are gathered in a list. */
 enum { LIMIT_OF_LISTS = 1 << 16 };
 
 /* Different faces listed below a node, up to `limit`. They are kept in a list of about twice

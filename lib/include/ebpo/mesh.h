@@ -438,8 +438,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_weld_within(ebpo_mesh *mesh, double
 
 /*
  * Removes repeated faces: of all faces with the same three distinct vertices, in any rotation and
- * orientation, the first of the source stays. `repeated_faces` counts the others. The order and the
- * source indices are kept, and attributes of faces remain assigned by source index.
+ * orientation, the first one in the source stays. `repeated_faces` counts the others. The order and
+ * the source indices are kept, and attributes of faces remain assigned by source index.
  *
  * Two faces of the same orientation count twice in winding numbers and volume. Two faces of
  * opposite orientation cancel, for example the two sides of a sheet, or the boundaries between
@@ -472,8 +472,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_count_repeated(const ebpo_mesh *mes
                                                             ebpo_error *error);
 
 /*
- * Orients faces consistently: neighbours across edges that are used twice, and then shells
- * outwards, or inwards if they bound a cavity.
+ * Orients faces consistently. First, neighbours across edges that are used twice get consistent
+ * directions. Then shells are turned outwards, or inwards if they bound a cavity.
  *
  * A *shell* is a closed set of faces, which uses each edge equally often in both directions. Its
  * faces are connected by edges that are used twice; so each of two cubes that share a vertex or an

@@ -71,8 +71,8 @@ typedef struct ebpo_model_options {
 
     /*
      * Levels 0 to cut_level stay in memory, and the subtrees below are loaded on demand. -1: chosen
-     * by the budget; everything is loaded at once if it fits. A remote file that is larger than 2
-     * MiB and has subtrees is never loaded at once.
+     * by the budget; everything is loaded at once if it fits. A remote file that has subtrees and
+     * is larger than 2 MiB is never loaded at once.
      */
     int cut_level;
 
@@ -213,9 +213,9 @@ typedef struct ebpo_model_stats {
     double load_seconds;
 
     /*
-     * leaves: number of leaves in memory. leaves_of_kind: those of them that were queried often, by
-     * the planes that bound the solid in the leaf: general, one plane, two planes, convex set,
-     * concave set. The kind of other leaves is not determined.
+     * leaves: number of leaves in memory. leaves_of_kind: number of frequently queried leaves of
+     * each kind. The kind is the set of planes that bounds the solid in the leaf: general, one
+     * plane, two planes, convex set, concave set. The kind of other leaves is not determined.
      */
     uint64_t leaves, leaves_of_kind[5];
 
@@ -228,8 +228,8 @@ typedef struct ebpo_model_stats {
 
     /*
      * For distances while not everything was in memory: number of points, of subtrees searched, and
-     * of loads including those for the sign. The cost of a query is the second and the third
-     * number, divided by the number of points.
+     * of loads including those for the sign. To get the cost of a query, divide the second and the
+     * third number by the first one.
      */
     uint64_t distances, distance_subtrees, distance_loads;
 
@@ -330,7 +330,7 @@ enum { EBPO_LEVEL_ALL = -1 };
 typedef enum ebpo_envelopes {
     EBPO_ENVELOPES_AUTO = 0, /* where they avoid loading */
     EBPO_ENVELOPES_USE = 1,  /* at every gray node on the path (EBP 2017, 4.2.1) */
-    EBPO_ENVELOPES_SKIP = 2
+    EBPO_ENVELOPES_SKIP = 2  /* never */
 } ebpo_envelopes;
 
 typedef struct ebpo_inside_options {
@@ -375,8 +375,8 @@ typedef struct ebpo_inside_result {
     int32_t winding;
 
     /*
-     * EBPO_MAYBE: upper bound of the distance to the surface: the diagonal of the deepest visited
-     * cell. Else 0.
+     * EBPO_MAYBE: the diagonal of the deepest visited cell, which is an upper bound of the distance
+     * to the surface. Else 0.
      */
     double doubt;
 } ebpo_inside_result;
@@ -640,10 +640,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_any(ebpo_context *context, const dou
  * without area, and those whose plane contains the ray, count only with EBPO_RAY_BOTH.
  */
 typedef enum ebpo_ray_sides {
-    EBPO_RAY_BOTH = 0, /* all */
-    EBPO_RAY_FRONT =
-        1, /* triangles that the ray hits against their normal: from outside, for a solid */
-    EBPO_RAY_BACK = 2 /* triangles that the ray hits along their normal */
+    EBPO_RAY_BOTH = 0,  /* all triangles */
+    EBPO_RAY_FRONT = 1, /* triangles hit against their normal: from outside, for a solid */
+    EBPO_RAY_BACK = 2   /* triangles hit along their normal */
 } ebpo_ray_sides;
 
 typedef struct ebpo_ray_options {
@@ -847,8 +846,8 @@ typedef struct ebpo_solid_volume {
     double lo, hi;
 
     /*
-     * Integral of the winding number: the volume if winding numbers are only 0 and 1. A part with
-     * winding number 2 counts twice; a part with -1 is subtracted.
+     * Integral of the winding number: the volume if winding numbers are only 0 and 1. A region with
+     * winding number 2 counts twice; a region with -1 is subtracted.
      */
     double integral;
 } ebpo_solid_volume;
