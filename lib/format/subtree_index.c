@@ -1,9 +1,12 @@
 /* Locates subtrees and nodes in every array. The first part reads the file's table of subtrees. For
- * each subtree, it computes the sums of all counts before the subtree: from the sums that the file
- * stores for some rows, and the counts of the rows in between. It caches recently used rows. The
- * second part computes ranks: the planes, faces and nodes of each type before a node. It counts
- * from the subtree's row in levels below the subtrees' roots, and in other levels from an index
- * row, which exists for every 4,096 items. Results are checked against the counts in the header.
+ * a subtree, it computes the sums of all counts before the subtree: from the sums that the file
+ * stores for some rows, and the counts of the rows in between. It caches recently used rows.
+ *
+ * The second part computes ranks: the numbers of planes, faces and nodes of each type before a
+ * node. In levels below the subtrees' roots it begins at the subtree's row. In other levels it
+ * begins at a row of an index array, which has a row for every 4,096 items. Results are checked
+ * against the counts in the header.
+ *
  * The last part sends prefetch hints for subtrees. Source: format-spec/README.md, sections 4 and 9.
  */
 #include <stdlib.h>
@@ -22,8 +25,8 @@ static ebpo_status table_fails(const ebpo_chunks *chunks, ebpo_array_id id, cons
     return ebpo_chunks_fail(chunks, -1, id, what, error);
 }
 
-/* Returns the maximum of the sum of a column over all subtrees. *exact is true if the sum must be
- * equal to it. */
+/* Returns the maximum of a column's sum over all subtrees. Sets *exact to true if the sum must
+ * equal this maximum. */
 static uint64_t column_total(const ebpo_file *file, unsigned column, bool *exact)
 {
     const ebpo_info *info = &file->info;
@@ -50,7 +53,7 @@ static uint64_t column_total(const ebpo_file *file, unsigned column, bool *exact
     }
 }
 
-/* Reads the sums before a chunk of rows. For the number after the last chunk, returns the totals
+/* Reads the sums before a chunk of rows. If `chunk` is one past the last chunk, returns the maxima
  * from the header. */
 static ebpo_status sums_before(ebpo_chunks *chunks, uint64_t chunk, uint32_t cols, uint64_t *sums,
                                ebpo_error *error)
@@ -93,8 +96,8 @@ static void add_row(const subtree_counts *c, uint64_t subtree, uint64_t *sums)
         sums[k] += count_at(c, subtree, k);
 }
 
-/* Opens the chunk of rows that contains a subtree. Checks that the sums before the chunk plus its
- * counts are the sums after the chunk. */
+/* Opens the chunk of rows that contains a subtree. Checks that the sums before the chunk, plus the
+ * counts in the chunk, are the sums after the chunk. */
 static ebpo_status open_counts(ebpo_chunks *chunks, uint64_t subtree, subtree_counts *c,
                                ebpo_error *error)
 {
@@ -113,8 +116,9 @@ static ebpo_status open_counts(ebpo_chunks *chunks, uint64_t subtree, subtree_co
     for (uint64_t i = c->view.begin; i < c->view.end; i++)
         add_row(c, i, sums);
     bool last = c->view.end == array->shape.rows, exact;
-    if (last && sums[EBPO_S_SHARED_FACES] + sums[EBPO_S_SHARED_VERTICES] !=
-                    c->end[EBPO_S_SHARED_FACES]) /* both columns count rows of this array */
+    if (last &&
+        sums[EBPO_S_SHARED_FACES] + sums[EBPO_S_SHARED_VERTICES] !=
+            c->end[EBPO_S_SHARED_FACES]) /* the maximum of each: the rows of /subtrees/outer */
         status = table_fails(chunks, EBPO_A_SUBTREE_SHARED,
                              "its rows do not match the table's counts", error);
     for (uint32_t k = 0; k < c->cols && status == EBPO_OK; k++) {
@@ -128,7 +132,8 @@ static ebpo_status open_counts(ebpo_chunks *chunks, uint64_t subtree, subtree_co
     return status;
 }
 
-static void take_row(const subtree_counts *c, uint64_t subtree, ebpo_subtree_row *out)
+/* Computes the row of a subtree in the chunk. */
+static void sum_row(const subtree_counts *c, uint64_t subtree, ebpo_subtree_row *out)
 {
     out->subtree = subtree;
     memcpy(out->before, c->begin, sizeof out->before);
@@ -140,7 +145,7 @@ static void take_row(const subtree_counts *c, uint64_t subtree, ebpo_subtree_row
     out->vertex = out->after[EBPO_S_VERTICES_BEFORE] + out->before[EBPO_S_VERTICES];
 }
 
-/* Checks a row against the header: its sums of faces and vertices, and its numbers of nodes. */
+/* Checks a row against the header: the sums of faces and vertices, and the numbers of nodes. */
 static ebpo_status check_row(const ebpo_chunks *chunks, const ebpo_subtree_row *row,
                              ebpo_error *error)
 {
@@ -174,8 +179,9 @@ uint64_t ebpo_subtree_groups(const ebpo_info *info, const ebpo_subtree_row *row,
 
 /* --- cache of rows --- */
 
-/* Size of the cache. One subtree is requested repeatedly while it is read, and adding up a chunk of
- * rows takes most of the time of a request. Typically two threads read at once. */
+/* Size of the cache. The row of a subtree is needed repeatedly while the subtree is read, and
+ * making a row takes long, because a chunk of rows is added up. Typically two threads read at once.
+ */
 enum { KEPT = 4, BY_NUMBER = EBPO_SUBTREE_COLS /* no column: compare the subtree's number */ };
 
 struct ebpo_kept_rows {
@@ -203,7 +209,8 @@ static bool find_kept(ebpo_chunks *chunks, unsigned column, uint64_t item, ebpo_
     return found;
 }
 
-/* Checks a row, and caches it. Counted caches do not use this cache, so that each read counts. */
+/* Checks a row, and caches it. Caches that count the bytes read (ebpo_chunks_make_counted) do not
+ * use cached rows, so that every read is counted. */
 static ebpo_status keep_row(ebpo_chunks *chunks, const ebpo_subtree_row *row, ebpo_error *error)
 {
     ebpo_status status = check_row(chunks, row, error);
@@ -231,7 +238,7 @@ ebpo_status ebpo_subtree_table_row(ebpo_chunks *chunks, uint64_t subtree, ebpo_s
     ebpo_status status = open_counts(chunks, subtree, &c, error);
     if (status != EBPO_OK)
         return status;
-    take_row(&c, subtree, out);
+    sum_row(&c, subtree, out);
     ebpo_held_chunk_release(chunks, &c.view);
     return keep_row(chunks, out, error);
 }
@@ -273,7 +280,7 @@ ebpo_status ebpo_subtree_table_find(ebpo_chunks *chunks, unsigned column, uint64
         sum += count_at(&c, i, column);
         found = sum <= item ? i + 1 : found;
     }
-    take_row(&c, found, out);
+    sum_row(&c, found, out);
     ebpo_held_chunk_release(chunks, &c.view);
     return keep_row(chunks, out, error);
 }
@@ -318,40 +325,41 @@ bool ebpo_subtree_table_missing(ebpo_chunks *chunks, int level, ebpo_per per, ui
     return false;
 }
 
-/* Collects a chunk of the table, and the rows of /subtrees/outer of its subtrees. */
-static void hint_table_chunk(ebpo_chunks *chunks, ebpo_hints *e, uint64_t chunk)
+/* Adds to the hints a chunk of the table, and the rows of /subtrees/outer (the lists of shared
+ * chunks) for the subtrees in this chunk. */
+static void hint_table_chunk(ebpo_chunks *chunks, ebpo_hints *hints, uint64_t chunk)
 {
     const ebpo_shape *shape = &ebpo_reader_array(chunks->file, EBPO_A_SUBTREE_COUNTS, 0)->shape;
-    uint64_t sums[EBPO_SUBTREE_COLS], outer[2];
+    uint64_t sums[EBPO_SUBTREE_COLS], shared[2]; /* rows before and after the chunk's subtrees */
     for (int k = 0; k < 2; k++) {
         if (!ebpo_input_expects(&chunks->file->in) ||
             sums_before(chunks, chunk + (uint64_t)k, shape->cols, sums, NULL) != EBPO_OK)
             return; /* the later read reports errors */
-        outer[k] = sums[EBPO_S_SHARED_FACES] + sums[EBPO_S_SHARED_VERTICES];
+        shared[k] = sums[EBPO_S_SHARED_FACES] + sums[EBPO_S_SHARED_VERTICES];
     }
-    ebpo_chunks_hint(chunks, e, EBPO_A_SUBTREE_COUNTS, 0, chunk * shape->chunk_rows, 1);
-    if (outer[1] > outer[0])
-        ebpo_chunks_hint(chunks, e, EBPO_A_SUBTREE_SHARED, 0, outer[0], outer[1] - outer[0]);
+    ebpo_chunks_hint(chunks, hints, EBPO_A_SUBTREE_COUNTS, 0, chunk * shape->chunk_rows, 1);
+    if (shared[1] > shared[0])
+        ebpo_chunks_hint(chunks, hints, EBPO_A_SUBTREE_SHARED, 0, shared[0], shared[1] - shared[0]);
 }
 
 void ebpo_subtree_table_hint_run(ebpo_chunks *chunks, uint64_t first, uint64_t count)
 {
     uint64_t rows = ebpo_reader_array(chunks->file, EBPO_A_SUBTREE_COUNTS, 0)->shape.chunk_rows,
              all = ebpo_reader_array(chunks->file, EBPO_A_SUBTREE_COUNTS, 0)->shape.rows;
-    ebpo_hints e = EBPO_HINTS_INIT(chunks->file);
+    ebpo_hints hints = EBPO_HINTS_INIT(chunks->file);
     for (uint64_t at = first / rows * rows; at < first + count && at < all; at += rows)
-        hint_table_chunk(chunks, &e, at / rows);
-    ebpo_hint_all(&e);
+        hint_table_chunk(chunks, &hints, at / rows);
+    ebpo_hint_all(&hints);
 }
 
 void ebpo_subtree_table_hint(ebpo_chunks *chunks, const uint64_t *subtrees, uint64_t count)
 {
     uint64_t rows = ebpo_reader_array(chunks->file, EBPO_A_SUBTREE_COUNTS, 0)->shape.chunk_rows;
-    ebpo_hints e = EBPO_HINTS_INIT(chunks->file);
+    ebpo_hints hints = EBPO_HINTS_INIT(chunks->file);
     for (uint64_t i = 0; i < count; i++)
         if (i == 0 || subtrees[i] / rows != subtrees[i - 1] / rows)
-            hint_table_chunk(chunks, &e, subtrees[i] / rows);
-    ebpo_hint_all(&e);
+            hint_table_chunk(chunks, &hints, subtrees[i] / rows);
+    ebpo_hint_all(&hints);
 }
 
 /* --- ranks --- */
@@ -411,7 +419,7 @@ ebpo_status ebpo_chunks_sum(ebpo_chunks *chunks, ebpo_array_id id, int level, ui
     while (rows && (status = ebpo_held_chunk_move(chunks, &view, row, error)) == EBPO_OK) {
         uint64_t here = view.end - row < rows ? view.end - row : rows;
         if (!sum_rows(view.rows + (row - view.begin) * size, size, here, sum)) {
-            status = ebpo_chunks_fail(chunks, level, id, "the numbers are too large", error);
+            status = ebpo_chunks_fail(chunks, level, id, "the values are too large", error);
             break;
         }
         row += here;
@@ -439,24 +447,25 @@ static ebpo_status find_subtree(ebpo_chunks *chunks, int level, unsigned what, u
                                    item, row, error);
 }
 
-static uint64_t level_sum(const ebpo_chunks *chunks, const ebpo_subtree_row *row, int level,
-                          unsigned what)
+/* Returns the number of items of a level before the row's subtree. */
+static uint64_t items_before(const ebpo_chunks *chunks, const ebpo_subtree_row *row, int level,
+                             unsigned what)
 {
     return row->before[ebpo_subtree_column(&chunks->file->info, level, what)];
 }
 
-/* Returns the number of items of the row's subtree. */
-static uint64_t level_has(const ebpo_chunks *chunks, const ebpo_subtree_row *row, int level,
-                          unsigned what)
+/* Returns the number of items of a level in the row's subtree. */
+static uint64_t items_in(const ebpo_chunks *chunks, const ebpo_subtree_row *row, int level,
+                         unsigned what)
 {
     return row->after[ebpo_subtree_column(&chunks->file->info, level, what)] -
-           level_sum(chunks, row, level, what);
+           items_before(chunks, row, level, what);
 }
 
 static const char *const contradicts = "the index contradicts the counts in the header";
 
-/* Reports a row that assigns nodes to the wrong subtree. The check_ functions below detect such a
- * row by counting nodes, as the sums do not show it. */
+/* Reports a row that assigns nodes to the wrong subtree. The sums of the table do not show this
+ * error, so the check_ functions below count the nodes. */
 static ebpo_status row_contradicts(const ebpo_chunks *chunks, ebpo_error *error)
 {
     return ebpo_chunks_fail(chunks, -1, EBPO_A_SUBTREE_COUNTS,
@@ -472,46 +481,50 @@ static ebpo_status check_types(ebpo_chunks *chunks, int level, const ebpo_subtre
     ebpo_status status = ebpo_ranks_count_file(chunks, level, from, to - from, counts, error);
     if (status != EBPO_OK)
         return status;
-    return counts[EBPO_GRAY] == level_has(chunks, row, level, EBPO_S_GRAY) &&
-                   counts[EBPO_LEAF] == level_has(chunks, row, level, EBPO_S_LEAF) &&
-                   counts[EBPO_BLACK] == level_has(chunks, row, level, EBPO_S_BLACK)
+    return counts[EBPO_GRAY] == items_in(chunks, row, level, EBPO_S_GRAY) &&
+                   counts[EBPO_LEAF] == items_in(chunks, row, level, EBPO_S_LEAF) &&
+                   counts[EBPO_BLACK] == items_in(chunks, row, level, EBPO_S_BLACK)
                ? EBPO_OK
                : row_contradicts(chunks, error);
 }
 
-/* Checks the length of a subtree's list, column `what`, against the counts in array `id`. `nodes`:
- * the column of the nodes that have these counts. */
+/* Checks column `what` of a row: it must be the sum of array `id` over the subtree's nodes of the
+ * level. `nodes`: the column that counts these nodes. */
 static ebpo_status check_list(ebpo_chunks *chunks, int level, const ebpo_subtree_row *row,
                               ebpo_array_id id, unsigned nodes, unsigned what, ebpo_error *error)
 {
     uint64_t sum = 0;
-    ebpo_status status = ebpo_chunks_sum(chunks, id, level, level_sum(chunks, row, level, nodes),
-                                         level_has(chunks, row, level, nodes), &sum, error);
-    return status != EBPO_OK || sum == level_has(chunks, row, level, what)
+    ebpo_status status = ebpo_chunks_sum(chunks, id, level, items_before(chunks, row, level, nodes),
+                                         items_in(chunks, row, level, nodes), &sum, error);
+    return status != EBPO_OK || sum == items_in(chunks, row, level, what)
                ? status
                : row_contradicts(chunks, error);
 }
 
-/* Checks column EBPO_S_ENDS, and that the new faces of the subtree's leaves are within the range of
- * the subtree's owned faces. */
+/* Checks column EBPO_S_ENDS: it must be the number of faces that the subtree's leaves of the level
+ * skip or list first. Also checks that the faces that these leaves list first are owned faces of
+ * the subtree. */
 static ebpo_status check_ends(ebpo_chunks *chunks, int level, const ebpo_subtree_row *row,
                               ebpo_error *error)
 {
-    uint64_t first = level_sum(chunks, row, level, EBPO_S_LEAF),
-             leaves = level_has(chunks, row, level, EBPO_S_LEAF),
-             growth = level_has(chunks, row, level, EBPO_S_ENDS),
-             begin = level_sum(chunks, row, level, EBPO_S_ENDS), gap = 0, skip = 0, fresh = 0;
+    uint64_t first = items_before(chunks, row, level, EBPO_S_LEAF),
+             leaves = items_in(chunks, row, level, EBPO_S_LEAF),
+             growth = items_in(chunks, row, level, EBPO_S_ENDS),
+             begin = items_before(chunks, row, level, EBPO_S_ENDS), first_skip = 0, skipped = 0,
+             new_faces = 0;
     if (leaves == 0)
         return growth ? row_contradicts(chunks, error) : EBPO_OK;
-    ebpo_status status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_SKIP, level, first, 1, &gap, error);
+    ebpo_status status =
+        ebpo_chunks_sum(chunks, EBPO_A_LEAF_SKIP, level, first, 1, &first_skip, error);
     if (status == EBPO_OK)
-        status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_SKIP, level, first, leaves, &skip, error);
+        status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_SKIP, level, first, leaves, &skipped, error);
     if (status == EBPO_OK)
-        status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_NEW, level, first, leaves, &fresh, error);
+        status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_NEW, level, first, leaves, &new_faces, error);
     if (status != EBPO_OK)
         return status;
-    uint64_t has = row->after[EBPO_S_FACES] - row->before[EBPO_S_FACES];
-    return skip + fresh == growth && begin + gap >= row->face && begin + growth <= row->face + has
+    uint64_t owned = row->after[EBPO_S_FACES] - row->before[EBPO_S_FACES];
+    return skipped + new_faces == growth && begin + first_skip >= row->face &&
+                   begin + growth <= row->face + owned
                ? EBPO_OK
                : row_contradicts(chunks, error);
 }
@@ -529,8 +542,8 @@ ebpo_status ebpo_ranks_check(const ebpo_chunks *chunks, int level, const uint64_
     return EBPO_OK;
 }
 
-/* Finds the subtree that contains a group. Computes its first group of the level, *from, and the
- * ranks at which its nodes begin. */
+/* Finds the subtree that contains a group of a level. Sets *from to the subtree's first group of
+ * the level, and `ranks` to the ranks at which the subtree's nodes of the level begin. */
 static ebpo_status ranks_of_subtree(ebpo_chunks *chunks, int level, uint64_t group,
                                     uint64_t ranks[4], uint64_t *from, ebpo_error *error)
 {
@@ -545,9 +558,9 @@ static ebpo_status ranks_of_subtree(ebpo_chunks *chunks, int level, uint64_t gro
         return status;
     status = check_types(chunks, level, &row, error);
     *from = ebpo_subtree_groups(info, &row, level, false);
-    ranks[EBPO_GRAY] = level_sum(chunks, &row, level, EBPO_S_GRAY);
-    ranks[EBPO_LEAF] = level_sum(chunks, &row, level, EBPO_S_LEAF);
-    ranks[EBPO_BLACK] = level_sum(chunks, &row, level, EBPO_S_BLACK);
+    ranks[EBPO_GRAY] = items_before(chunks, &row, level, EBPO_S_GRAY);
+    ranks[EBPO_LEAF] = items_before(chunks, &row, level, EBPO_S_LEAF);
+    ranks[EBPO_BLACK] = items_before(chunks, &row, level, EBPO_S_BLACK);
     ranks[EBPO_WHITE] = 8 * *from - ranks[EBPO_GRAY] - ranks[EBPO_LEAF] - ranks[EBPO_BLACK];
     return status;
 }
@@ -582,8 +595,8 @@ ebpo_status ebpo_ranks_planes(ebpo_chunks *chunks, int level, uint64_t gray, uin
                                 EBPO_S_PLANES, error);
         if (status != EBPO_OK)
             return status;
-        from = level_sum(chunks, &row, level, EBPO_S_GRAY);
-        *planes = level_sum(chunks, &row, level, EBPO_S_PLANES);
+        from = items_before(chunks, &row, level, EBPO_S_GRAY);
+        *planes = items_before(chunks, &row, level, EBPO_S_PLANES);
     } else {
         status = index_row(chunks, EBPO_A_GRAY_INDEX, level, gray, 1, planes, error);
     }
@@ -614,10 +627,10 @@ static ebpo_status leaf_row(ebpo_chunks *chunks, int level, uint64_t leaf, bool 
         status = check_ends(chunks, level, &subtree, error);
     if (status != EBPO_OK)
         return status;
-    *from = level_sum(chunks, &subtree, level, EBPO_S_LEAF);
-    row[0] = level_sum(chunks, &subtree, level, EBPO_S_ENDS);
-    row[1] = level_sum(chunks, &subtree, level, EBPO_S_REFS);
-    row[2] = level_sum(chunks, &subtree, level, EBPO_S_LEAF_PLANES);
+    *from = items_before(chunks, &subtree, level, EBPO_S_LEAF);
+    row[0] = items_before(chunks, &subtree, level, EBPO_S_ENDS);
+    row[1] = items_before(chunks, &subtree, level, EBPO_S_REFS);
+    row[2] = items_before(chunks, &subtree, level, EBPO_S_LEAF_PLANES);
     return EBPO_OK;
 }
 
@@ -677,7 +690,7 @@ static void hint_rows(const hinting *t, ebpo_array_id id, int level, uint64_t be
         ebpo_chunks_hint(t->chunks, t->hints, id, level, begin, end - begin);
 }
 
-/* Returns the sum of a column of a level before or after the subtrees. */
+/* Returns the number of items of a level before the subtrees, or with `after` including them. */
 static uint64_t subtree_sum(const hinting *t, int level, unsigned what, bool after)
 {
     unsigned column = ebpo_subtree_column(&t->chunks->file->info, level, what);
@@ -715,18 +728,18 @@ static void hint_nodes(const hinting *t)
                           sum_of(t, ebpo_schema[id].per, level, true));
 }
 
-/* Collects the chunk of faces or vertices that is `distance` chunks before the chunk of row `from`.
- */
-static void hint_chunk(const hinting *t, ebpo_array_id id, uint64_t from, uint64_t block_rows,
+/* Adds to the hints the chunk of faces or vertices that is `distance` chunks before the chunk of
+ * row `from`. */
+static void hint_chunk(const hinting *t, ebpo_array_id id, uint64_t from, uint64_t chunk_rows,
                        uint32_t distance)
 {
-    uint64_t block = from / block_rows;
-    if (distance > block)
+    uint64_t chunk = from / chunk_rows;
+    if (distance > chunk)
         return;
-    hint_rows(t, id, 0, (block - distance) * block_rows, (block - distance) * block_rows + 1);
+    uint64_t row = (chunk - distance) * chunk_rows;
+    hint_rows(t, id, 0, row, row + 1);
     if (id == EBPO_A_FACES && t->needs & EBPO_NEEDS_MAPS)
-        hint_rows(t, EBPO_A_FACE_SOURCE, 0, (block - distance) * block_rows,
-                  (block - distance) * block_rows + block_rows);
+        hint_rows(t, EBPO_A_FACE_SOURCE, 0, row, row + chunk_rows);
 }
 
 static void hint_owned_faces(const hinting *t)
@@ -739,27 +752,27 @@ static void hint_owned_faces(const hinting *t)
         hint_rows(t, EBPO_A_FACE_SOURCE, 0, t->first->face, faces);
 }
 
-/* Collects the shared chunks in the subtree's rows of /subtrees/outer. The values are not checked,
- * as they are only used for hints. */
+/* Adds to the hints the chunks with a subtree's shared faces and vertices. The subtree's rows of
+ * /subtrees/outer list these chunks. The values are not checked, as only hints depend on them. */
 static void hint_shared(const hinting *t, const ebpo_subtree_row *row)
 {
-    enum { OUTER_MAX = 1 << 16 };
+    enum { SHARED_MAX = 1 << 16 };
     uint64_t first = row->before[EBPO_S_SHARED_FACES] + row->before[EBPO_S_SHARED_VERTICES],
              faces = row->after[EBPO_S_SHARED_FACES] - row->before[EBPO_S_SHARED_FACES],
              vertices = row->after[EBPO_S_SHARED_VERTICES] - row->before[EBPO_S_SHARED_VERTICES],
              count = faces + vertices;
     const ebpo_array_in *array = ebpo_reader_array(t->chunks->file, EBPO_A_SUBTREE_SHARED, 0);
-    uint32_t *outer;
-    if (!array->present || count == 0 || count > OUTER_MAX || first > array->shape.rows ||
+    uint32_t *shared;
+    if (!array->present || count == 0 || count > SHARED_MAX || first > array->shape.rows ||
         count > array->shape.rows - first ||
-        ebpo_chunks_take(t->chunks, EBPO_A_SUBTREE_SHARED, 0, first, count, sizeof *outer, &outer,
+        ebpo_chunks_take(t->chunks, EBPO_A_SUBTREE_SHARED, 0, first, count, sizeof *shared, &shared,
                          NULL) != EBPO_OK)
         return;
     for (uint64_t i = 0; i < count; i++)
         hint_chunk(t, i < faces ? EBPO_A_FACES : EBPO_A_VERTICES,
                    i < faces ? row->face : row->vertex,
-                   i < faces ? EBPO_FACE_BLOCK : EBPO_VERTEX_BLOCK, outer[i]);
-    free(outer);
+                   i < faces ? EBPO_FACE_BLOCK : EBPO_VERTEX_BLOCK, shared[i]);
+    free(shared);
 }
 
 void ebpo_subtrees_hint(ebpo_chunks *chunks, ebpo_hints *hints, uint64_t first, uint64_t count,

@@ -94,8 +94,7 @@ void ebpo_context_prefetch(ebpo_context *c, const double p[3], double search_dis
      * their bounds change by at most w each. So queries need subtrees whose envelopes are within
      * search_distance + 2 w, that is, half a side more. Under rules other than nonzero, envelopes
      * do not decide: a query then needs the subtree whose cell contains the point, and the envelope
-     * of this subtree may be as far away as the cell's diagonal, 1.73 sides. The sum is 2.25 sides.
-     */
+     * of this subtree may be a cell's diagonal away, 1.73 sides. The sum is 2.25 sides. */
     uint64_t keys[EBPO_CACHE_AHEAD];
     unsigned count = ebpo_subtrees_near(m, p, fabs(search_distance) + 2.25 * side, keys);
     for (unsigned i = 0; i < count; i++)
@@ -309,8 +308,7 @@ static void hint_next(ebpo_batch *b)
 /* Sends one hint for the other subtrees that the next points need, so that queries do not request
  * them one by one. For each point, the subtree where the search begins is searched; its result
  * bounds the distance, and so the subtrees that are needed. A subtree that cannot be loaded ends
- * the search: the query will return the error, and each further try may wait as long as the first.
- */
+ * the search: the query will return the error, and another try may wait as long as the first. */
 static void search_around(ebpo_batch *b, uint64_t end)
 {
     ebpo_context *c = b->context;

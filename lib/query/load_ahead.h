@@ -7,8 +7,8 @@
 /* Requests the subtrees whose envelopes are within |search_distance| plus 2.25 sides of p, the
  * nearest first. A side is that of a cell of the cut level. Does nothing if, since the last
  * prefetch, p has moved by less than a quarter side and the search distance has grown by at most as
- * much. `search_distance`: of the query at p; 0 for point in solid. For models with a cache only.
- */
+ * much. `search_distance`: that of the query at p; 0 for point in solid. Only for models with a
+ * cache. */
 void ebpo_context_prefetch(ebpo_context *context, const double p[3], double search_distance);
 
 /* Lists the subtrees whose envelopes may be within `limit` of p, the nearest first; returns their
