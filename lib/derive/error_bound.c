@@ -276,7 +276,7 @@ enum { QUERIES = 4096 };
 typedef struct earlier_results {
     double enough; /* least max_error that was enough */
     double failed; /* largest max_error that was not enough */
-    double lo;     /* a certain lower bound of the distance */
+    double lo;     /* a guaranteed lower bound of the distance */
 } earlier_results;
 
 struct ebpo_tolerance {

@@ -426,7 +426,7 @@ static ebpo_status search_nodes(survey *s, const ebpo_error_bound_options *o, eb
     return status;
 }
 
-/* Applies the certain bound of a coarser level to all nodes. */
+/* Applies the guaranteed bound of a coarser level to all nodes. */
 static void bound_by_coarser(survey *s, double at_most)
 {
     for (uint64_t i = 0; i < s->count && at_most > 0; i++) {

@@ -19,7 +19,7 @@ typedef enum ebpo_feature {
     EBPO_NEAR_UNKNOWN /* not certain, because of rounding */
 } ebpo_feature;
 
-/* Certain bounds: lo <= distance <= hi. Their gap is usually some 1e-15 of the greater of the
+/* Guaranteed bounds: lo <= distance <= hi. Their gap is usually some 1e-15 of the greater of the
  * distance and the largest |p - corner|. `feature` is certain unless UNKNOWN. Overflow and
  * underflow give wide bounds (lo = 0, hi = INFINITY), never wrong ones. */
 typedef struct ebpo_distance_bounds {

@@ -53,14 +53,14 @@ uint64_t ebpo_top_envelopes_estimate(const ebpo_info *info, int cut_level);
  * needs no further reading. When a search loads a subtree without need, nodes are added near the
  * query point: memory is used where bounds are too loose.
  *
- * Skeletons give lower bounds only. Subtrees are searched in the order of certain lower bounds
+ * Skeletons give lower bounds only. Subtrees are searched in the order of guaranteed lower bounds
  * until the next bound is beyond the found distance (nearest_subtrees.c): the searched subtrees are
  * those whose bound is at most the result. No upper bound could avoid searching one of these. */
 
 /* Any thread may use const skeletons; one thread at a time may change one. */
 typedef struct ebpo_skeleton ebpo_skeleton;
 
-/* Certain lower bounds of the distance to a subtree's faces, in the model's unit: to its owned
+/* Guaranteed lower bounds of the distance to a subtree's faces, in the model's unit: to its owned
  * faces, which no other subtree owns, and to its shared faces. INFINITY: there are no such faces.
  */
 typedef struct ebpo_skeleton_bounds {

@@ -104,7 +104,7 @@ void ebpo_deep_bounds_report(ebpo_model *model, unsigned loaded);
 
 /* --- a model: as a whole, or subtree by subtree, the nearest first --- */
 
-/* Visits nodes of the top and subtrees in the order of certain lower bounds of their distance,
+/* Visits nodes of the top and subtrees in the order of guaranteed lower bounds of their distance,
  * until the next bound is beyond the found distance. A subtree is searched, and loaded if needed,
  * only if its bound is at most the result, independent of the data in memory. After a deadline, the
  * first unvisited bound limits the result. */

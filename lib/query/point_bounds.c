@@ -1,4 +1,4 @@
-/* Certain bounds of the distance of a point to a cell, to the half-spaces of an envelope, and to
+/* Guaranteed bounds of the distance of a point to a cell, to the half-spaces of an envelope, and to
  * the hierarchy over faces.
  *
  * From a distance of 16 sizes of the model's box on, doubles hardly separate distances. There the

@@ -1,4 +1,4 @@
-/* Certain bounds of distances from a point to cells, to envelopes and, for a far point, also to
+/* Guaranteed bounds of distances from a point to cells, to envelopes and, for a far point, also to
  * boxes and faces. */
 #ifndef EBPO_QUERY_POINT_BOUNDS_H
 #define EBPO_QUERY_POINT_BOUNDS_H
@@ -14,7 +14,7 @@ double ebpo_cell_diagonal(const ebpo_box *box, ebpo_cell cell);
 bool ebpo_outside_planes(const ebpo_box *box, ebpo_cell cell, const uint32_t *codes, uint32_t count,
                          const double p[3]);
 
-/* Returns a certain lower bound of the distance of p to the cell cut by the half-spaces; the
+/* Returns a guaranteed lower bound of the distance of p to the cell cut by the half-spaces; the
  * computation may stop at any bound beyond `enough`. The other function returns an upper bound of
  * the distance to the farthest point of the cell. */
 double ebpo_envelope_distance(const ebpo_box *box, ebpo_cell cell, const uint32_t *codes,

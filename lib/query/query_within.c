@@ -5,7 +5,8 @@
  * small, for callers that need few faces. A band is searched depth first, the nearest child first.
  * Nodes and faces that are certainly beyond its limit, or certainly in an earlier band, are
  * skipped. The order is exact: by distance, then by number in the file. Subtrees that are not in
- * memory are loaded in the order of certain lower bounds, until the next bound is beyond the band.
+ * memory are loaded in the order of guaranteed lower bounds, until the next bound is beyond the
+ * band.
  */
 #include "core/strict_fp.h"
 
@@ -143,7 +144,7 @@ static double length_of_positive(const double x[3])
     return most * sqrt(a * a + b * b + c * c);
 }
 
-/* Computes certain bounds of the distances of all points of a child's box. */
+/* Computes guaranteed bounds of the distances of all points of a child's box. */
 static void box_bounds(const searching *g, const ebpo_bound *b, int lane, double *lower,
                        double *upper)
 {

@@ -33,8 +33,8 @@ typedef struct boundary_search {
     double tolerance;
     uint64_t most;  /* maximum number of cells */
     uint64_t cells; /* number of cells so far */
-    /* Certain bounds of the distance to the other side. Initially hi is the known bound. Both are
-     * INFINITY if there is no other side. */
+    /* Guaranteed bounds of the distance to the other side. Initially hi is the known bound. Both
+     * are INFINITY if there is no other side. */
     double lo, hi;
 } boundary_search;
 

@@ -1,4 +1,4 @@
-/* The first levels of a model's octree, kept for haptic steps: certain bounds without reading a
+/* The first levels of a model's octree, kept for haptic steps: guaranteed bounds without reading a
  * file. */
 #ifndef EBPO_HAPTIC_HELD_LEVELS_H
 #define EBPO_HAPTIC_HELD_LEVELS_H

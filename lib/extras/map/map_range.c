@@ -1,5 +1,5 @@
-/* Computes certain bounds of the greatest distance from a mesh's faces, including their interior,
- * to a model (a one-sided Hausdorff distance).
+/* Computes guaranteed bounds of the greatest distance from a mesh's faces, including their
+ * interior, to a model (a one-sided Hausdorff distance).
  *
  * Branch and bound over triangles, which are divided into four. When a point moves, its distance
  * changes by at most the length of the motion. So the distance of each point of a triangle is at

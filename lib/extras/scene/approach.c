@@ -6,8 +6,8 @@
  * The motion in between is shorter than the gap to the clearance, so no contact is missed. The
  * second search keeps parts of the interval in a heap by the least distance that each part allows.
  * It halves the first part until the result is within the tolerance. Jumps of routes are ends of
- * parts. A result is a pair of certain bounds. A search that needs too many evaluations returns its
- * current bounds.
+ * parts. A result is a pair of guaranteed bounds. A search that needs too many evaluations returns
+ * its current bounds.
  *
  * Source: docs/guide/scenes.md. */
 #include "core/strict_fp.h"

@@ -337,7 +337,7 @@ typedef enum ebpo_value_kind {
     EBPO_VALUE_BOUND = 2     /* in lo .. hi, but lo is only 0 or hi only INFINITY */
 } ebpo_value_kind;
 
-/* A value with certain bounds. */
+/* A value with guaranteed bounds. */
 typedef struct ebpo_certain {
     double lo, hi;
 

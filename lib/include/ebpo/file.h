@@ -157,7 +157,7 @@ typedef struct ebpo_level {
 
     uint64_t leaf_plane_count;
 
-    /* Volume of the envelopes of this level's gray nodes, in the cube of the model's unit. */
+    /* Volume of the envelopes of this level's gray nodes, in cubic units of the model. */
     double gray_volume;
 
     /*

@@ -19,7 +19,7 @@ typedef struct ebpo_limit_options {
 
     /*
      * 1: volumes as fractions of the root cell, 0 to 1, independent of the model's scale. 0:
-     * volumes in the cube of the model's unit.
+     * volumes in cubic units of the model.
      */
     uint64_t in_root_cells;
 } ebpo_limit_options;
@@ -29,7 +29,7 @@ typedef struct ebpo_limit_options {
         sizeof(ebpo_limit_options), 0, { NULL, NULL }, 0 \
     }
 
-/* Volumes are in the cube of the model's unit, or in root cells if requested. */
+/* Volumes are in cubic units of the model, or in root cells if requested. */
 typedef struct ebpo_limit {
     size_t struct_size;
 
@@ -56,8 +56,8 @@ typedef struct ebpo_limit {
  * there), summed over a level. qhull computes the hull from the parts of faces in the cell, and
  * from the corners of the cell that are inside the solid.
  *
- * The sum is rounded and not certified: use it for comparison. In the cube of the model's unit, the
- * sum is infinite or 0 if a double cannot hold the volume of a cell, with coordinates beyond about
+ * The sum is rounded and not certified: use it for comparison. In cubic units of the model, the sum
+ * is infinite or 0 if a double cannot hold the volume of a cell, with coordinates beyond about
  * 1e102 or below 1e-102.
  *
  * The decoded tree and mesh are in memory, and a number for each node of the level. The cost of a

@@ -40,7 +40,7 @@ typedef struct ebpo_lod_options {
  *
  * out      triangles with double vertices, in the order of the nodes; nodes share no vertices.
  *          Freed by ebpo_mesh_free. NULL: only the volume.
- * volume   sum of the polyhedra's volumes, in the cube of the model's unit; or NULL
+ * volume   sum of the polyhedra's volumes, in cubic units of the model; or NULL
  *
  * The level's nodes, their polygons and `out` are in memory that `workspace` does not limit. Memory
  * and time depend on the level; `progress` can stop the call.
@@ -57,7 +57,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_level(const ebpo_file *file, int lev
 typedef struct ebpo_lod_node {
     uint64_t octcode;
 
-    /* Volume of the envelope, in the cube of the model's unit. */
+    /* Volume of the envelope, in cubic units of the model. */
     double volume;
 
     /*

@@ -310,11 +310,11 @@ typedef struct ebpo_mesh_report {
     bool genus_known;
     int64_t genus;
 
-    /* Area, in the square of the source's unit. */
+    /* Area, in square units of the source. */
     double area;
 
     /*
-     * Signed volume, in the cube of the source's unit: the integral of the winding number (see
+     * Signed volume, in cubic units of the source: the integral of the winding number (see
      * ebpo_solid_volume_of in query.h). 0 for a surface.
      */
     double volume;

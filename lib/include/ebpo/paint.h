@@ -632,7 +632,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_colour_mesh(ebpo_mesh *mesh, const
                                                           ebpo_error *error);
 
 /*
- * An area, in the square of the model's unit. `lo` and `hi` are bounds of the area, except for the
+ * An area, in square units of the model. `lo` and `hi` are bounds of the area, except for the
  * rounding of sums (2^-40 of the area). `value` is an estimate.
  */
 typedef struct ebpo_paint_area {

@@ -131,8 +131,8 @@ typedef struct ebpo_shells {
 
     /*
      * Indexed by ebpo_rule, if `apart` is 1: volume of the solid that the rule gives, minus the
-     * signed volume of the mesh (the integral of the winding number), in the cube of the source's
-     * unit. The difference is 0 if each component outside all solids is oriented outwards and each
+     * signed volume of the mesh (the integral of the winding number), in cubic units of the source.
+     * The difference is 0 if each component outside all solids is oriented outwards and each
      * component inside a solid is oriented inwards.
      */
     double beyond[3];

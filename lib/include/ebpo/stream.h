@@ -67,8 +67,8 @@ typedef struct ebpo_stream_node {
     const double (*planes)[4];
 
     /*
-     * With `polygons`: volume of the envelope, in the cube of the model's unit. Black nodes: volume
-     * of the cell, also without `polygons`. White nodes: 0.
+     * With `polygons`: volume of the envelope, in cubic units of the model. Black nodes: volume of
+     * the cell, also without `polygons`. White nodes: 0.
      */
     double volume;
 
