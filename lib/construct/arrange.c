@@ -3,7 +3,7 @@
  *
  * The curve's box is chosen first: every cell face has to be exact in doubles, at every level in
  * use. Vertices are sorted by the octcode of their cell and, within a cell, by position, so that
- * equal positions are neighbours; vertices without faces go behind the others. Faces are sorted by
+ * equal positions are neighbours; vertices without faces come after the others. Faces are sorted by
  * their least vertex. Sorting uses the mesh's workspace, so that meshes larger than memory are
  * sorted too. The order of the source is kept in the mesh's arrangement. The result depends on the
  * mesh alone, not on the number of threads. */
@@ -176,7 +176,7 @@ static uint32_t cell_slot(const ebpo_box *box, int axis, int level, double x)
 }
 
 /* Returns an octcode, shifted as if it were of level 20, so that its leading bits are always at the
- * same position. Vertices without faces go behind all others. */
+ * same position. Vertices without faces come after all others. */
 static uint64_t key_of(const arranging *a, uint64_t v)
 {
     const ebpo_box *box = &a->to->box;

@@ -75,8 +75,8 @@ int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_choice *choice, uint3
 int ebpo_selection_wanted(int count, int level, double percent, double k_root);
 
 /* Selects every candidate that may remove 0.03 % of the cell or more, deepest cut first, then
- * planes that cut off needles. The result is nearly the tightest envelope, and with few candidates
- * this selection takes the least time. */
+ * planes that cut off needles (selections.c). The result is nearly the tightest envelope, and
+ * with few candidates this selection takes the least time. */
 int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, int most,
                     uint32_t *codes);
 

@@ -4,8 +4,8 @@
  *
  * - greedy (inherit): the plane that removes most volume comes first. Gains only shrink while the
  *   envelope does. So an earlier gain bounds the present gain, and most candidates are never
- *   evaluated again (lazy evaluation). A choice by volume alone leaves needles, so planes that cut
- *   off needles come last.
+ *   evaluated again (lazy evaluation). A choice by volume alone leaves needles: long, thin portions
+ *   of the envelope with little volume. So planes that cut off needles come last.
  * - random, offset, k-medoids: from the theses (EBP 2017, 3.3.4.3; BP 2008, 3.4.2). They choose a
  *   fixed number of candidates, without regard to the volume that these cut off.
  *
@@ -122,8 +122,7 @@ static void drop_first(ranked *heap, int *count)
         sift_down(heap, *count, 0);
 }
 
-/* Cuts off needles, which have hardly any volume, the longest first. Skips a plane if clipping by
- * it fails. */
+/* Cuts off needles, the longest first. Skips a plane if clipping by it fails. */
 static int cut_needles(ebpo_polytope *envelope, ranking *c, double reach, int most, int taken,
                        uint32_t *codes)
 {

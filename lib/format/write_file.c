@@ -167,8 +167,8 @@ static ebpo_status make_array(file_headers *h, ebpo_array_out *a, const first_ch
 }
 
 /* Writes all headers and the first chunk. HDF5 extends a metadata block at the end of the file
- * instead of using the block's free space. So the first chunk is written behind the block before
- * attributes enlarge the header of the first array; all later headers then go into the block. */
+ * instead of using the block's free space. So the first chunk is written after the block and before
+ * attributes enlarge the header of the first array. All later headers then go into the block. */
 static ebpo_status lay_out(file_headers *h, const char *path, const char *shown,
                            uint64_t head_bytes, first_chunk first, ebpo_error *error)
 {

@@ -34,7 +34,7 @@ typedef uint64_t ebpo_head_object;
  * EBPO_E_UNSUPPORTED, here and below, when another program has written the file in an unsupported
  * layout. */
 EBPO_MUST_USE ebpo_status ebpo_head_open(ebpo_head *head, ebpo_input *input, ebpo_error *error);
-/* Sets the range of further metadata in the file. It is then read in one piece. */
+/* Sets the range of the chunk index in the file. The range is then read at once. */
 void ebpo_head_hint_index(ebpo_head *head, ebpo_range index);
 /* Returns `status`, unless the input failed at any time since opening: then the input's status with
  * its message, because unreadable data may have been taken for absent. */

@@ -1,7 +1,7 @@
 /* Private to lib/hdf5_read: the parts of an open head. These are its bytes, which are read in few
  * reads, a cursor in the bytes, headers of objects, and types, dimensions and filters. The
- * library's writer puts headers at the start of the file, and the index of large arrays in one
- * piece behind the first levels. */
+ * library's writer puts headers at the start of the file. It puts the chunk index of arrays with
+ * more than one chunk after the first levels, as one contiguous range. */
 #ifndef EBPO_HDF5_READ_HEAD_PARTS_H
 #define EBPO_HDF5_READ_HEAD_PARTS_H
 
@@ -22,7 +22,7 @@ typedef struct ebpo_head_bytes {
     uint8_t *table; /* all of `index`, NULL until needed */
     uint8_t *large; /* a range that fits none of these */
     uint64_t first_bytes, window_at, window_bytes, large_capacity;
-    ebpo_range index; /* range of further metadata (ebpo_head_hint_index), or empty */
+    ebpo_range index; /* range of the chunk index (ebpo_head_hint_index), or empty */
     /* status of the input's first failure, after which nothing more is read */
     ebpo_status status;
     ebpo_error error;

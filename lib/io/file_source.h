@@ -14,11 +14,11 @@
 typedef struct ebpo_whole_file {
     const uint8_t *data;
     uint64_t size;
-    void *buffer; /* allocated memory behind `data`, or NULL */
+    void *buffer; /* allocated memory that holds `data`, or NULL */
     ebpo_workspace *workspace;
     int fd; /* stays open, for ebpo_whole_file_unchanged */
-    /* at opening: the times of its last change, and whether it had just been changed, so that the
-     * clock resolution could hide another change */
+    /* at opening: times of the last change. `fresh`: that change was so recent that a further
+     * change may get the same times */
     int64_t mtime_s, mtime_ns, ctime_s, ctime_ns;
     bool fresh;
 } ebpo_whole_file;
@@ -41,8 +41,8 @@ EBPO_MUST_USE ebpo_status ebpo_whole_file_take(ebpo_whole_file *out, int fd, con
 
 /* Reads all bytes, into an array of `workspace` (NULL: into memory) that is freed with the file;
  * `data` is not NULL then. Reports the stage "reading" to `progress`, which may be NULL. EBPO_E_IO
- * when the file has become shorter; EBPO_E_LIMIT when it is longer than an array may be, which on
- * machines of 32 bits is 2 GiB. */
+ * when the file has become shorter; EBPO_E_LIMIT when it is longer than an array may be, which is 2
+ * GiB on 32-bit machines. */
 EBPO_MUST_USE ebpo_status ebpo_whole_file_load(ebpo_whole_file *file, ebpo_workspace *workspace,
                                                unsigned threads, const ebpo_progress *progress,
                                                const char *path, ebpo_error *error);
@@ -51,17 +51,17 @@ EBPO_MUST_USE ebpo_status ebpo_whole_file_load(ebpo_whole_file *file, ebpo_works
 EBPO_MUST_USE ebpo_status ebpo_whole_file_read(const ebpo_whole_file *file, uint64_t at, void *to,
                                                uint64_t bytes, const char *path, ebpo_error *error);
 
-/* Returns EBPO_E_IO when the file has changed since opening, according to its size, the time of its
- * last change or, where that time could be set back or be too coarse, a comparison of its content
- * with `data` (which must then be loaded): the bytes read may belong to no single version. If
- * another file is renamed to `path`, that is not a change, because `file` still is the old file. */
+/* Returns EBPO_E_IO when the file has changed since opening: the bytes that were read may then
+ * belong to no single version. Compares the size and the time of the last change. If this time
+ * is not reliable, also compares the content with `data`, if it is loaded. Renaming another file
+ * to `path` is not a change, because `file` still is the old file. */
 EBPO_MUST_USE ebpo_status ebpo_whole_file_unchanged(const ebpo_whole_file *file, const char *path,
                                                     ebpo_error *error);
 
 /* Closes and clears. Harmless on EBPO_WHOLE_FILE_INIT. */
 void ebpo_whole_file_close(ebpo_whole_file *file);
 
-/* Returns the part of `path` behind the last '/'; points into `path`. */
+/* Returns the part of `path` after the last '/'; points into `path`. */
 const char *ebpo_path_name(const char *path);
 
 /* Finds the absolute path, without symbolic links to folders, of a file that need not exist; the

@@ -363,7 +363,7 @@ struct ebpo_cached_range {
 
 /* --- the list; lock held in the functions below, except where noted --- */
 
-/* Returns the first range that ends behind `at`. */
+/* Returns the first range that ends after `at`. */
 static uint64_t find_range(const ebpo_range_cache *p, uint64_t at)
 {
     uint64_t low = 0, high = p->count;

@@ -29,8 +29,8 @@ typedef enum ebpo_selection {
     /*
      * From the root down. Candidates are the directions of the hull of the solid in the cell. A
      * node starts with its parent's envelope. Planes are added greedily by the volume that they
-     * remove, if this is at least epsilon. Then planes are added that cut off needles: long, thin
-     * parts of the envelope with little volume.
+     * remove, if this is at least epsilon. Then planes are added that cut off needles: here, long,
+     * thin portions of the envelope with little volume.
      */
     EBPO_SELECT_INHERIT = 0,
 
@@ -40,7 +40,7 @@ typedef enum ebpo_selection {
      * facets of its children's envelopes (EBP 2017, 3.3.4.3 and 3.4.1; BP 2008, 3.4).
      */
     EBPO_SELECT_KMEDOIDS = 1, /* medoids of clusters of normals */
-    EBPO_SELECT_OFFSET = 2,   /* planes that moved least from their faces */
+    EBPO_SELECT_OFFSET = 2,   /* planes that had to move least from their faces */
     EBPO_SELECT_RANDOM = 3,   /* consecutive planes, from a random plane on */
 
     /* Number of selections. */
