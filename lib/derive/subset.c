@@ -218,7 +218,7 @@ static void hint_cut(const ebpo_cutting *c)
     ebpo_hints e = EBPO_HINTS_INIT(c->file);
     if (c->last_level > c->from->subtree_level)
         ebpo_hint_top(c->file);
-    if (c->options->boxed || c->need || !ebpo_input_expects(&c->file->in))
+    if (c->options->boxed || c->need || !ebpo_input_prefetches(&c->file->in))
         return;
     for (int level = 0; level <= c->last_level; level++)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)

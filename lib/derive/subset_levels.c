@@ -281,7 +281,7 @@ static ebpo_status pick_level(descent *d)
 {
     uint64_t count = 0;
     if (d->c->from->subtree_level && d->level == d->c->from->subtree_level + 1 &&
-        ebpo_input_expects(&d->c->file->in))
+        ebpo_input_prefetches(&d->c->file->in))
         hint_subtrees(d);
     ebpo_run *runs = ebpo_alloc(d->parent_count, sizeof *runs);
     if (!runs)

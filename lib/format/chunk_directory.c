@@ -325,7 +325,7 @@ static ebpo_status locate_by_index(ebpo_file *file, ebpo_error *error)
     ebpo_head head = EBPO_HEAD_INIT;
     ebpo_range index = { file->info.chunk_index_offset, file->info.chunk_index_bytes };
     if (index.size && index.offset + index.size > file->in.source.prefetched)
-        ebpo_input_expect(&file->in, &index, 1);
+        ebpo_input_prefetch(&file->in, &index, 1);
     ebpo_status status = ebpo_head_open(&head, &file->in, error);
     if (status == EBPO_OK)
         ebpo_head_hint_index(&head, index);

@@ -156,7 +156,7 @@ static void hint_around(ebpo_chunks *c, const ebpo_array_in *array, uint64_t chu
     uint64_t begin = chunk / AROUND * AROUND, count = ebpo_shape_chunks(&array->shape);
     ebpo_hints e = EBPO_HINTS_INIT(c->file);
     /* in files with subtrees, adjacent chunks belong to other arrays */
-    if (!ebpo_input_expects(&c->file->in) || c->file->info.subtree_level)
+    if (!ebpo_input_prefetches(&c->file->in) || c->file->info.subtree_level)
         return;
     hint_missing(c, &e, array, begin, count - begin < AROUND ? count : begin + AROUND);
     ebpo_hint_all(&e);

@@ -458,7 +458,8 @@ bool ebpo_group_is_far(ebpo_chunks *chunks, const ebpo_group_number *number, uns
 {
     ebpo_chunk_keys keys;
     ebpo_chunk_keys_begin(&keys);
-    return ebpo_input_expects(&chunks->file->in) && group_is_missing(chunks, number, wanted, &keys);
+    return ebpo_input_prefetches(&chunks->file->in) &&
+           group_is_missing(chunks, number, wanted, &keys);
 }
 
 ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_number *groups, unsigned count,

@@ -67,7 +67,7 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, ebpo_array_id id
     if (rows == 0 || (spec->if_needed && ebpo_head_find_kind(head, a->path) == EBPO_HEAD_ABSENT))
         return EBPO_OK;
     /* offsets of several chunks are read later from the index of remote files, or from the list */
-    uint64_t most = ebpo_input_is_far(&file->in) || file->has_places ? 1 : UINT64_MAX;
+    uint64_t most = ebpo_input_is_remote(&file->in) || file->has_places ? 1 : UINT64_MAX;
     char coding[EBPO_HEAD_CODING_BYTES];
     ebpo_status status =
         ebpo_head_read_array(head, a->path, most, ebpo_reader_rows_of_chunk(file, id), &a->shape,

@@ -407,7 +407,7 @@ void ebpo_faces_hint(ebpo_chunks *chunks, const uint32_t *faces, uint64_t count,
     const ebpo_array_in *array = ebpo_reader_array(chunks->file, EBPO_A_FACES, 0);
     uint64_t number = ebpo_shape_chunks(&array->shape), rows = array->shape.chunk_rows;
     ebpo_hints e = EBPO_HINTS_INIT(chunks->file);
-    bool *has = ebpo_input_expects(&chunks->file->in) ? chunks_of(array, faces, count) : NULL;
+    bool *has = ebpo_input_prefetches(&chunks->file->in) ? chunks_of(array, faces, count) : NULL;
     for (uint64_t i = 0; has && i < number; i++) {
         uint64_t first = chunks->seen ? chunks->seen[i] : 0,
                  end = chunks->seen && i + 1 < number ? chunks->seen[i + 1]
@@ -430,7 +430,7 @@ void ebpo_vertices_hint(ebpo_chunks *chunks, const uint32_t *vertices, uint64_t 
     const ebpo_array_in *array = ebpo_reader_array(chunks->file, EBPO_A_VERTICES, 0);
     uint64_t rows = array->shape.chunk_rows;
     ebpo_hints e = EBPO_HINTS_INIT(chunks->file);
-    bool *has = ebpo_input_expects(&chunks->file->in) ? chunks_of(array, vertices, count) : NULL;
+    bool *has = ebpo_input_prefetches(&chunks->file->in) ? chunks_of(array, vertices, count) : NULL;
     for (uint64_t i = 0; has && i < ebpo_shape_chunks(&array->shape); i++)
         if (has[i])
             hint_vertices(chunks, &e, i * rows, rows, parts);

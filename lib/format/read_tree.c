@@ -671,7 +671,7 @@ ebpo_status ebpo_file_check_content(const ebpo_file *file, const ebpo_read_optio
     content_job j = { .file = file, .alone = read };
     j.alone.threads = 1;
     /* arrays of a remote file in file order; otherwise the largest arrays first */
-    bool far = ebpo_input_expects(&file->in);
+    bool remote = ebpo_input_prefetches(&file->in);
     for (int id = EBPO_ARRAYS - 1; id >= EBPO_LEVEL_ARRAYS; id--)
         if (file->root_array[id].present && ebpo_content_has(&file->info, (ebpo_array_id)id))
             j.array[j.count++] = &file->root_array[id];
@@ -679,7 +679,7 @@ ebpo_status ebpo_file_check_content(const ebpo_file *file, const ebpo_read_optio
         for (int id = EBPO_LEVEL_ARRAYS - 1; id >= 0; id--)
             if (file->level_array[level][id].present)
                 j.array[j.count++] = &file->level_array[level][id];
-    for (unsigned i = 0; far && i < j.count / 2; i++) {
+    for (unsigned i = 0; remote && i < j.count / 2; i++) {
         const ebpo_array_in *other = j.array[i];
         j.array[i] = j.array[j.count - 1 - i];
         j.array[j.count - 1 - i] = other;

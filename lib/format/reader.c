@@ -102,7 +102,7 @@ static void add_range(ebpo_hints *e, uint64_t offset, uint64_t size)
 
 bool ebpo_hints_wanted(const ebpo_hints *e)
 {
-    return e->summed || ebpo_input_expects(&e->file->in) ||
+    return e->summed || ebpo_input_prefetches(&e->file->in) ||
            (e->near && ebpo_input_hints(&e->file->in));
 }
 
@@ -204,8 +204,8 @@ void ebpo_hint_all(ebpo_hints *e)
 {
     if (e->count && wants_checksums(e->file))
         add_range(e, where_checksums(e->file).offset, where_checksums(e->file).size);
-    if (ebpo_input_expects(&e->file->in))
-        ebpo_input_expect(&ebpo_reader_own(e->file)->in, e->range, e->count);
+    if (ebpo_input_prefetches(&e->file->in))
+        ebpo_input_prefetch(&ebpo_reader_own(e->file)->in, e->range, e->count);
     else
         hint_system(e);
     free(e->range);
@@ -225,7 +225,7 @@ void ebpo_hint_top(const ebpo_file *file)
     ebpo_file *own = ebpo_reader_own(file);
     uint64_t index_end = info->chunk_index_offset + info->chunk_index_bytes, from,
              top = info->top_bytes < info->file_bytes ? info->top_bytes : info->file_bytes;
-    if (!ebpo_input_expects(&file->in) || !file->has_places || atomic_load(&file->located) ||
+    if (!ebpo_input_prefetches(&file->in) || !file->has_places || atomic_load(&file->located) ||
         !is_top(info))
         return;
     const ebpo_chunk_location *places = file->root_array[EBPO_A_PLACES].chunks;
@@ -239,7 +239,7 @@ void ebpo_hint_top(const ebpo_file *file)
     from = from > index_end ? from : index_end;
     if (from < top)
         range[count++] = (ebpo_range){ from, top - from };
-    ebpo_input_expect(&own->in, range, count);
+    ebpo_input_prefetch(&own->in, range, count);
 }
 
 void ebpo_file_prefetch_levels(const ebpo_file *file, int first, int last)

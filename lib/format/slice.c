@@ -129,7 +129,7 @@ static void hint_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t *sin
     ebpo_hints e = EBPO_HINTS_INIT(chunks->file);
     /* rows before `next` are already collected */
     uint64_t chunk_rows = ebpo_reader_array(chunks->file, id, 0)->shape.chunk_rows, next = 0;
-    if (!ebpo_input_expects(&chunks->file->in))
+    if (!ebpo_input_prefetches(&chunks->file->in))
         return;
     for (uint64_t i = 0; i < singles; i++)
         if (single[i] >= next) {

@@ -332,7 +332,7 @@ static void hint_table_chunk(ebpo_chunks *chunks, ebpo_hints *hints, uint64_t ch
     const ebpo_shape *shape = &ebpo_reader_array(chunks->file, EBPO_A_SUBTREE_COUNTS, 0)->shape;
     uint64_t sums[EBPO_SUBTREE_COLS], shared[2]; /* rows before and after the chunk's subtrees */
     for (int k = 0; k < 2; k++) {
-        if (!ebpo_input_expects(&chunks->file->in) ||
+        if (!ebpo_input_prefetches(&chunks->file->in) ||
             sums_before(chunks, chunk + (uint64_t)k, shape->cols, sums, NULL) != EBPO_OK)
             return; /* the later read reports errors */
         shared[k] = sums[EBPO_S_SHARED_FACES] + sums[EBPO_S_SHARED_VERTICES];

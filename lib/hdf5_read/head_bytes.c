@@ -19,7 +19,7 @@ enum {
 ebpo_status ebpo_head_bytes_open(ebpo_head_bytes *b, ebpo_input *input, ebpo_error *error)
 {
     uint64_t bytes = input->source.size < FIRST_BYTES ? input->source.size : FIRST_BYTES;
-    if (ebpo_input_is_far(input) && input->source.prefetched < bytes)
+    if (ebpo_input_is_remote(input) && input->source.prefetched < bytes)
         bytes = input->source.prefetched;
     *b = (ebpo_head_bytes){
         .input = input, .first = ebpo_alloc(bytes, 1), .first_bytes = bytes, .status = EBPO_OK

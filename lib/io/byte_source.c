@@ -211,7 +211,7 @@ ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, uint64_t size, v
                         offset + size - 1);
 }
 
-void ebpo_input_expect(ebpo_input *input, const ebpo_range *ranges, size_t count)
+void ebpo_input_prefetch(ebpo_input *input, const ebpo_range *ranges, size_t count)
 {
     uint64_t size = input->source.size;
     if (!input->source.prefetch || count == 0)

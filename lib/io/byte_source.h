@@ -44,19 +44,19 @@ EBPO_MUST_USE ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, ui
 int ebpo_input_descriptor(const ebpo_input *input);
 
 /* Returns true if the source accepts prefetch hints, as sources for remote files do. */
-static inline bool ebpo_input_expects(const ebpo_input *input)
+static inline bool ebpo_input_prefetches(const ebpo_input *input)
 {
     return input->source.prefetch != NULL;
 }
-/* Returns true when opening should not read everything. */
-static inline bool ebpo_input_is_far(const ebpo_input *input)
+/* Returns true for a remote file, if opening should read only the bytes that are available. */
+static inline bool ebpo_input_is_remote(const ebpo_input *input)
 {
     return input->source.prefetch && input->source.prefetched &&
            input->source.prefetched < input->source.size;
 }
 /* Sends prefetch hints to the source. If a range is beyond the source's end, sends none: the read
  * then fails. */
-void ebpo_input_expect(ebpo_input *input, const ebpo_range *ranges, size_t count);
+void ebpo_input_prefetch(ebpo_input *input, const ebpo_range *ranges, size_t count);
 
 /* Returns true if the operating system accepts prefetch hints for the input: the input is a file
  * opened by its path. Such hints help if the data is on a disk. */

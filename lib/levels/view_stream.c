@@ -619,7 +619,7 @@ static ebpo_status read_group(ebpo_view_stream *s, const view_group *group, ebpo
     ebpo_status status = EBPO_OK;
     ebpo_chunks_limit(s->chunks, s->options.bytes ? s->options.bytes : UINT64_MAX);
     view_depth depth = { depth_below, s };
-    if (ebpo_input_expects(&s->chunks->file->in)) {
+    if (ebpo_input_prefetches(&s->chunks->file->in)) {
         if (read_at_once(s, group, wanted))
             return EBPO_OK;
         set_soon(s, group->parent ? group->parent : 1);

@@ -214,14 +214,14 @@ static bool reads_parts(const ebpo_file *file, bool default_memory)
 {
     const ebpo_info *info = ebpo_file_info(file);
     bool small = info->file_bytes <= FAR_WHOLE_BYTES;
-    return ebpo_input_is_far(&file->in) && !small && (info->subtree_level || default_memory);
+    return ebpo_input_is_remote(&file->in) && !small && (info->subtree_level || default_memory);
 }
 
 bool ebpo_default_memory(const ebpo_file *file, ebpo_model_options *o)
 {
     if (o->budget)
         o->memory = budget_left(o->budget);
-    bool is_default = !o->memory && ebpo_input_is_far(&file->in);
+    bool is_default = !o->memory && ebpo_input_is_remote(&file->in);
     if (is_default && o->cut_level < 0)
         o->memory = FAR_MEMORY;
     return is_default;

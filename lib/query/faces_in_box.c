@@ -178,7 +178,7 @@ static ebpo_status box_walk_run(box_walk *w, ebpo_error *error)
 {
     const ebpo_model *m = w->context->model;
     ebpo_box box = ebpo_model_box(m);
-    if (!m->whole && m->options.loading == EBPO_LOAD_CACHE && ebpo_input_expects(&m->file->in))
+    if (!m->whole && m->options.loading == EBPO_LOAD_CACHE && ebpo_input_prefetches(&m->file->in))
         list_ahead(w, &box, ebpo_model_root(m));
     w->no_memory = false;
     ebpo_status status = m->whole ? gather_accel(w, m->whole, error)

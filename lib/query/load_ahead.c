@@ -85,10 +85,10 @@ void ebpo_context_prefetch(ebpo_context *c, const double p[3], double search_dis
     ebpo_box box = ebpo_model_box(m);
     double side = longest_side(&box, m->top->cut_level);
     if (c->has_prefetched && distance_apart(p, c->prefetched_from) < side / 4 &&
-        fabs(search_distance) <= c->prefetched_reach + side / 4)
+        fabs(search_distance) <= c->prefetched_distance + side / 4)
         return;
     c->has_prefetched = true;
-    c->prefetched_reach = fabs(search_distance);
+    c->prefetched_distance = fabs(search_distance);
     memcpy(c->prefetched_from, p, sizeof c->prefetched_from);
     /* Until the next prefetch, p moves by about a quarter side. When p moves by w, distances and
      * their bounds change by at most w each. So queries need subtrees whose envelopes are within
@@ -144,7 +144,7 @@ void ebpo_context_hint(const ebpo_context *c, const uint32_t *below, uint64_t co
 {
     const ebpo_model *m = c->model;
     ebpo_hints hints = EBPO_HINTS_INIT(m->file);
-    if (m->info->subtree_level == 0 || !ebpo_input_expects(&m->file->in) || count == 0)
+    if (m->info->subtree_level == 0 || !ebpo_input_prefetches(&m->file->in) || count == 0)
         return;
     uint64_t found = 0, *numbers = ebpo_alloc(count, sizeof *numbers);
     for (uint64_t i = 0; numbers && i < count; i++) {
@@ -241,7 +241,7 @@ void ebpo_batch_begin(ebpo_batch *b, ebpo_context *context, const double *points
     if (m->whole || count < 2 || m->options.loading != EBPO_LOAD_CACHE)
         return;
     b->order = ebpo_curve_order(&box, points, count);
-    b->sends_hints = ebpo_input_expects(&m->file->in) && m->info->subtree_level &&
+    b->sends_hints = ebpo_input_prefetches(&m->file->in) && m->info->subtree_level &&
                      m->info->parts & EBPO_PART_MESH;
 }
 

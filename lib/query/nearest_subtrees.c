@@ -88,7 +88,7 @@ void ebpo_deep_bounds_make(ebpo_model *m)
 
 void ebpo_deep_bounds_report(ebpo_model *m, unsigned loaded)
 {
-    if (loaded <= NEW_AS_DEFAULT || m->deep_begun || ebpo_input_expects(&m->file->in))
+    if (loaded <= NEW_AS_DEFAULT || m->deep_begun || ebpo_input_prefetches(&m->file->in))
         return;
     uint64_t more = loaded - NEW_AS_DEFAULT;
     if (atomic_fetch_add(&m->new_loads, more) + more >= LOADS_TO_READ)

@@ -77,7 +77,7 @@ struct ebpo_context {
                                      * first use */
     bool has_prefetched;            /* position and search distance of the last query that
                                      * prefetched are valid */
-    double prefetched_from[3], prefetched_reach;
+    double prefetched_from[3], prefetched_distance;
     /* The last nearest face: the next ebpo_distance starts there, if enabled. */
     bool warm;
     double warm_triangle[3][3];

@@ -224,7 +224,7 @@ static bool lists_ahead(const within *w)
 {
     const ebpo_model *m = w->context->model;
     return !w->options->most && isfinite(w->band.radius) && !m->whole &&
-           m->options.loading == EBPO_LOAD_CACHE && ebpo_input_expects(&m->file->in);
+           m->options.loading == EBPO_LOAD_CACHE && ebpo_input_prefetches(&m->file->in);
 }
 
 static ebpo_status put_children(within *w, const ebpo_box *box, const ebpo_ranked *r,

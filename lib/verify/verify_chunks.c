@@ -516,7 +516,7 @@ ebpo_status ebpo_count_spare(const ebpo_file *file, const ebpo_progress *progres
     survey s = { .file = file, .progress = progress, .head = EBPO_HEAD_INIT };
     ebpo_error own = EBPO_ERROR_INIT;
     *spare = *filled = 0;
-    if (ebpo_input_expects(in))
+    if (ebpo_input_prefetches(in))
         return EBPO_OK;
     ebpo_status status = ebpo_head_open(&s.head, in, &own);
     if (status == EBPO_OK) {
@@ -616,7 +616,7 @@ ebpo_status ebpo_check_checksums(ebpo_tally *tally, const ebpo_file *file, ebpo_
     ebpo_error own = EBPO_ERROR_INIT;
     uint64_t *list = NULL;
     /* In a remote file each chunk would take a request. There, only the library's check is made. */
-    if (!file->has_checksums || ebpo_input_expects(&ebpo_reader_own(file)->in))
+    if (!file->has_checksums || ebpo_input_prefetches(&ebpo_reader_own(file)->in))
         return EBPO_OK;
     ebpo_status status = ebpo_file_locate(file, NULL, &own);
     if (status == EBPO_OK)
