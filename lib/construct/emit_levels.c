@@ -357,7 +357,7 @@ static bool any_has(const joiner *j, int level, int id)
 static void fill_default(const joiner *j, char *to, uint64_t bytes, int id)
 {
     /* the machine is little-endian, like the files */
-    int64_t value = ebpo_schema[id].standard;
+    int64_t value = ebpo_schema[id].default_value;
     EBPO_FOR_ITEMS(j->b->workspace, i, 0, bytes / ebpo_schema[id].held_size)
         memcpy(to + i * ebpo_schema[id].held_size, &value, ebpo_schema[id].held_size);
 }

@@ -80,7 +80,7 @@ static void note_column(kept_nodes *kept, int id, int type)
         (kept_column){ .from = ebpo_level_array(kept->from, id),
                        .to = ebpo_level_array(kept->to, id),
                        .size = ebpo_schema[id].held_size,
-                       .default_value = ebpo_schema[id].standard };
+                       .default_value = ebpo_schema[id].default_value };
 }
 
 /* Returns the index of the counts of a list; adds them at first use. */

@@ -40,8 +40,6 @@ static inline ebpo_array_in *ebpo_array_number(ebpo_file *file, int i)
 
 /* Returns the number that the list uses for an array. */
 uint32_t ebpo_place_number(ebpo_array_id id, int level);
-/* Returns EBPO_ARRAYS for an unknown array. */
-ebpo_array_id ebpo_place_array(uint32_t number, int *level); /* attributes have any number */
 
 /* Encode a row of the list (array number and stored bytes of a chunk), and decode it. */
 static inline uint64_t ebpo_place(uint32_t number, uint64_t bytes)

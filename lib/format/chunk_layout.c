@@ -256,7 +256,7 @@ int ebpo_subtree_level_for(const ebpo_info *info, uint64_t subtree_faces)
     return found;
 }
 
-void ebpo_subtree_checksums_free(ebpo_subtree_checksums *sums)
+void ebpo_subtree_sums_free(ebpo_subtree_sums *sums)
 {
     free(sums->before);
     free(sums->counts);
@@ -266,7 +266,7 @@ void ebpo_subtree_checksums_free(ebpo_subtree_checksums *sums)
 }
 
 typedef struct counting {
-    ebpo_subtree_checksums *sums;
+    ebpo_subtree_sums *sums;
     const ebpo_tree *tree;
     const ebpo_info *info;
 } counting;
@@ -414,7 +414,7 @@ static ebpo_status list_shared(const counting *c, ebpo_error *error)
  * counts. Returns false if a count exceeds its type. */
 static bool split_sums(const counting *c)
 {
-    ebpo_subtree_checksums *s = c->sums;
+    ebpo_subtree_sums *s = c->sums;
     uint32_t rows = ebpo_subtree_rows(c->info);
     bool fits = true;
     for (uint64_t i = 0; i < s->subtrees; i++) {
@@ -429,13 +429,13 @@ static bool split_sums(const counting *c)
     return fits;
 }
 
-ebpo_status ebpo_subtree_checksums_make(ebpo_subtree_checksums *out, const ebpo_tree *tree,
-                                        const ebpo_info *info, ebpo_error *error)
+ebpo_status ebpo_subtree_sums_make(ebpo_subtree_sums *out, const ebpo_tree *tree,
+                                   const ebpo_info *info, ebpo_error *error)
 {
     counting c = { out, tree, info };
     ebpo_status status = EBPO_OK;
-    *out = (ebpo_subtree_checksums){ .subtrees = info->level[info->subtree_level].gray_count,
-                                     .cols = ebpo_schema_cols(info, EBPO_A_SUBTREE_COUNTS) };
+    *out = (ebpo_subtree_sums){ .subtrees = info->level[info->subtree_level].gray_count,
+                                .cols = ebpo_schema_cols(info, EBPO_A_SUBTREE_COUNTS) };
     out->before = ebpo_alloc_zero((out->subtrees + 1) * out->cols, sizeof *out->before);
     out->counts = ebpo_alloc(out->subtrees * out->cols, sizeof *out->counts);
     out->index =
@@ -480,10 +480,10 @@ static uint64_t rows_before(const counting *c, ebpo_array_id id, int level, uint
 
 /* Returns the subtree of a row of an array of the mesh, of the maps, or of a level below the
  * subtrees' roots. Rows before the first subtree count as its rows. */
-static uint64_t subtree_of_row(const ebpo_subtree_checksums *sums, const ebpo_info *info,
+static uint64_t subtree_of_row(const ebpo_subtree_sums *sums, const ebpo_info *info,
                                ebpo_array_id id, int level, uint64_t row)
 {
-    counting c = { (ebpo_subtree_checksums *)sums, NULL, info };
+    counting c = { (ebpo_subtree_sums *)sums, NULL, info };
     uint64_t low = 0, high = sums->subtrees - 1;
     while (low < high) {
         uint64_t middle = low + (high - low + 1) / 2;

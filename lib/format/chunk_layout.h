@@ -11,7 +11,7 @@
 #include "mesh/attributes.h"
 
 /* The tables of subtrees: counts and their prefix sums (no checksums). */
-typedef struct ebpo_subtree_checksums {
+typedef struct ebpo_subtree_sums {
     uint64_t subtrees;
     uint32_t cols;
     uint64_t *before; /* [subtrees + 1][cols] sums of the columns before each subtree */
@@ -19,7 +19,7 @@ typedef struct ebpo_subtree_checksums {
     uint64_t *index;  /* [chunks of counts][cols] sums before each chunk of counts */
     uint32_t *outer;  /* [shared_count] /subtrees/outer */
     uint64_t shared_count, shared_capacity;
-} ebpo_subtree_checksums;
+} ebpo_subtree_sums;
 
 /* Returns the level of the subtrees' roots for a requested number of faces in a subtree, or 0 if
  * the file is written without subtrees. `subtree_faces`: as in ebpo_write_options. */
@@ -27,10 +27,9 @@ int ebpo_subtree_level_for(const ebpo_info *info, uint64_t subtree_faces);
 
 /* Computes the counts of the subtrees and the sums of these counts. `info`: as in the file to
  * write; its subtree_level is not 0. The caller has checked the tree. */
-EBPO_MUST_USE ebpo_status ebpo_subtree_checksums_make(ebpo_subtree_checksums *out,
-                                                      const ebpo_tree *tree, const ebpo_info *info,
-                                                      ebpo_error *error);
-void ebpo_subtree_checksums_free(ebpo_subtree_checksums *sums);
+EBPO_MUST_USE ebpo_status ebpo_subtree_sums_make(ebpo_subtree_sums *out, const ebpo_tree *tree,
+                                                 const ebpo_info *info, ebpo_error *error);
+void ebpo_subtree_sums_free(ebpo_subtree_sums *sums);
 
 /* --- arrays to write --- */
 
@@ -62,7 +61,7 @@ typedef struct ebpo_plan {
     unsigned count;
     uint64_t *index[EBPO_LEVELS_MAX][EBPO_INDEXES];
     uint64_t *faces_index;             /* vertices seen before each chunk of faces */
-    ebpo_subtree_checksums subtrees;   /* empty if info.subtree_level is 0 */
+    ebpo_subtree_sums subtrees;        /* empty if info.subtree_level is 0 */
     const ebpo_attributes *attributes; /* NULL: no attributes */
     ebpo_attribute_plan *attribute;    /* [attributes->count] */
     uint8_t attributes_sha256[32];

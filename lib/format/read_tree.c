@@ -238,7 +238,6 @@ typedef struct mesh_job {
     const ebpo_file *file;
     ebpo_mesh *mesh;
     uint64_t *faces_index; /* NULL: a single chunk */
-    uint64_t seen;
 } mesh_job;
 
 static ebpo_status take_vertices(void *context, const ebpo_array_in *array, uint64_t chunk,

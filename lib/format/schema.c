@@ -20,8 +20,8 @@
 #include "geometry/polytope.h"
 #include "hdf5_read/face_gates.h"
 
-#define REQUIRED       .if_needed = false
-#define USUALLY(value) .if_needed = true, .standard = (value)
+#define REQUIRED            .if_needed = false
+#define WITH_DEFAULT(value) .if_needed = true, .default_value = (value)
 #define OF_LEVEL(type, field)                                                          \
     .is_signed = _Generic((type)0, int8_t : 1, int16_t : 1, int32_t : 1, default : 0), \
     .held_size = sizeof(type), .held = offsetof(ebpo_level, field)
@@ -270,7 +270,7 @@ bool ebpo_level_is_default(const ebpo_level *level, int id)
     const char *values = ebpo_level_array(level, id);
     uint64_t count = values ? ebpo_level_rows(level, id) : 0;
     EBPO_FOR_ITEMS(level->workspace, i, 0, count)
-        if (!is_value(values + i * spec->held_size, spec->held_size, spec->standard))
+        if (!is_value(values + i * spec->held_size, spec->held_size, spec->default_value))
             return false;
     return true;
 }

@@ -117,8 +117,8 @@ typedef struct ebpo_array_spec {
     uint8_t cols;   /* 0: one dimension */
     uint8_t sizes;  /* sum of the allowed element sizes: 1 + 2 + 4 + 8 */
     bool is_signed;
-    bool if_needed;     /* may be absent although its rows exist: all values are then the default */
-    int8_t standard;    /* default value */
+    bool if_needed; /* may be absent although its rows exist: all values are then the default */
+    int8_t default_value;
     uint8_t since;      /* first minor version of the format with this array */
     uint8_t held_size;  /* size of an element in ebpo_level; 0: ebpo_level lacks the array */
     uint16_t held;      /* offset of the pointer in ebpo_level */

@@ -398,7 +398,7 @@ void ebpo_plan_free(ebpo_plan *plan)
             free(plan->index[level][i]);
     free(plan->faces_index);
     free(plan->attribute);
-    ebpo_subtree_checksums_free(&plan->subtrees);
+    ebpo_subtree_sums_free(&plan->subtrees);
     memset(plan, 0, sizeof *plan);
 }
 
@@ -649,7 +649,7 @@ ebpo_status ebpo_plan_make(ebpo_plan *plan, const ebpo_tree *tree,
     if (status == EBPO_OK && plan->info.parts & EBPO_PART_MESH)
         status = index_faces(plan, &check, error);
     if (status == EBPO_OK && plan->info.subtree_level)
-        status = ebpo_subtree_checksums_make(&plan->subtrees, tree, &plan->info, error);
+        status = ebpo_subtree_sums_make(&plan->subtrees, tree, &plan->info, error);
     if (status == EBPO_OK)
         status = attributes_plan(plan, shown, error);
     if (status != EBPO_OK)

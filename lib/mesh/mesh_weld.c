@@ -234,14 +234,14 @@ static ebpo_status group_within(welding *w, ebpo_error *error)
 static ebpo_status choose_staying(welding *w, ebpo_error *error)
 {
     const ebpo_mesh *mesh = w->mesh;
-    uint64_t intersected = 0;
+    uint64_t group_count = 0;
     w->from = ebpo_array_alloc(mesh->workspace, w->kept, sizeof *w->from);
     if (!w->from)
         return ebpo_workspace_fail(mesh->workspace, w->kept * sizeof *w->from, error);
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, v, 0, mesh->vertex_count) {
         uint32_t group = w->map[v];
-        if (group == intersected)
-            w->from[intersected++] = (uint32_t)v;
+        if (group == group_count)
+            w->from[group_count++] = (uint32_t)v;
         else if (ebpo_mesh_source_vertex(mesh, v) < ebpo_mesh_source_vertex(mesh, w->from[group]))
             w->from[group] = (uint32_t)v;
     }

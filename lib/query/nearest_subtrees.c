@@ -1,12 +1,12 @@
 /* Finds the nearest face of a model. Under a budget, subtrees are searched, and loaded, in the
  * order in which they may matter.
  *
- * Nodes of the top and subtrees wait in a queue, ordered by certain lower bounds of their distance.
- * The search ends when the next bound is beyond the best face. A subtree is loaded only if its
- * bound is at most the result, independent of the data in memory. Bounds come from a subtree's
- * skeleton, if it has ever been loaded (skeleton.c), else from the envelopes of the levels right
- * below the cut (deep bounds). Deep bounds are read once queries have loaded enough subtrees
- * without need. */
+ * Nodes of the top and subtrees wait in a queue, ordered by guaranteed lower bounds of their
+ * distance. The search ends when the next bound is beyond the best face. A subtree is loaded only
+ * if its bound is at most the result, independent of the data in memory. Bounds come from a
+ * subtree's skeleton, if it has ever been loaded (skeleton.c), else from the envelopes of the
+ * levels right below the cut (deep bounds). Deep bounds are read once queries have loaded enough
+ * subtrees without need. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -147,8 +147,8 @@ static void search_deep(deep_search *g, uint32_t gray, ebpo_cell cell, double pa
             g->best = child[i].lower;
 }
 
-/* Returns a certain lower bound, at least `lower`, for the solid's surface in the cell of a node of
- * the cut level; bounds beyond `limit` are not refined. Any thread. */
+/* Returns a guaranteed lower bound, at least `lower`, for the solid's surface in the cell of a node
+ * of the cut level; bounds beyond `limit` are not refined. Any thread. */
 static double bound_below_cut(const ebpo_ranking *ranking, const ebpo_node *node, double lower,
                               double limit)
 {
@@ -211,17 +211,17 @@ static ebpo_status add_children(searching *g, const ebpo_ranked *r, ebpo_error *
 
 static bool is_searched(const ebpo_context *c, uint32_t below)
 {
-    return c->seen[below] == 2 * c->current_query + 1;
+    return c->seen[below] == 2 * c->query_number + 1;
 }
 
 static ebpo_status begin_query(ebpo_context *c, ebpo_error *error)
 {
     uint64_t count = c->model->top->below_count;
     c->queue_count = 0;
-    if (c->seen && ++c->current_query < UINT32_MAX / 2)
+    if (c->seen && ++c->query_number < UINT32_MAX / 2)
         return EBPO_OK;
     free(c->seen);
-    c->current_query = 1;
+    c->query_number = 1;
     c->seen = ebpo_alloc_zero(count, sizeof *c->seen);
     return c->seen ? EBPO_OK : ebpo_fail_memory(error, count * sizeof *c->seen);
 }
@@ -237,7 +237,7 @@ static ebpo_status search_below(searching *g, ebpo_node node, ebpo_error *error)
     uint32_t below = ebpo_entry_value(node.entry);
     if (is_searched(g->c, below))
         return EBPO_OK;
-    g->c->seen[below] = 2 * g->c->current_query + 1;
+    g->c->seen[below] = 2 * g->c->query_number + 1;
     g->c->searched++;
     const ebpo_skeletons *skeletons = g->c->model->skeletons;
     bool is_new = !ebpo_skeletons_find(skeletons, below);
@@ -285,9 +285,9 @@ static ebpo_node node_below(const ebpo_model *m, uint32_t below)
 static ebpo_status consider_own(searching *g, uint32_t below, double lower, ebpo_error *error)
 {
     ebpo_context *c = g->c;
-    if (c->seen[below] >= 2 * c->current_query)
+    if (c->seen[below] >= 2 * c->query_number)
         return EBPO_OK;
-    c->seen[below] = 2 * c->current_query;
+    c->seen[below] = 2 * c->query_number;
     const ebpo_skeleton *k = ebpo_skeletons_find(c->model->skeletons, below);
     double own = skeleton_bounds(g, k).own;
     ebpo_ranked r = { node_below(c->model, below), fmax(lower, own), OWN };

@@ -159,9 +159,9 @@ struct ebpo_ray_search {
     void *user;
 
     /* ebpo_ray_search_accel sets the following fields. */
-    bool done;        /* the search is complete */
-    bool intersected; /* if any hit is wanted: some face is certainly hit (`decide` was not called)
-                       */
+    bool done;    /* the search is complete */
+    bool any_hit; /* if any hit is wanted: some face is certainly hit (`decide` was not called)
+                   */
     void (*judge)(ebpo_ray_search *search); /* tests all waiting candidates */
     const ebpo_accel *s;
     /* In the frame: the direction with a longest coordinate of 2^-12 to 2^12; the origin, moved
@@ -195,7 +195,7 @@ typedef struct ebpo_axis_segment {
     double to;
     int axis;
     /* Extent of the segment in the cell, in the encoding of an ebpo_listed_block; but for each axis
-     * it has the upper side and 15 less the lower side, rounded down. All ones: intersects
+     * it has the upper side and 15 minus the lower side, rounded down. All ones: intersects
      * everything. */
     uint32_t reach;
 } ebpo_axis_segment;

@@ -465,7 +465,7 @@ void ebpo_context_free(ebpo_context *c)
     free(c->open);
     free(c->hits);
     free(c->hit_begin);
-    free(c->intersected);
+    free(c->unsorted_hits);
     free(c->queue);
     free(c->seen);
     free(c->faces);

@@ -62,14 +62,14 @@ struct ebpo_context {
     uint64_t hit_capacity;
     uint64_t *hit_begin; /* hits of many rays */
     uint64_t hit_begin_capacity;
-    ebpo_ray_found *intersected; /* hits of one ray, before they are sorted */
+    ebpo_ray_found *unsorted_hits; /* hits of one ray, before they are sorted */
     uint64_t found_capacity;
     uint64_t *faces;
     uint64_t face_capacity;
     ebpo_ranked *queue; /* nodes to be searched: nearest_subtrees.c */
     uint64_t queue_count, queue_capacity;
     uint32_t *seen; /* marks of subtrees, and the number of the query: nearest_subtrees.c */
-    uint32_t current_query;
+    uint32_t query_number;
     uint64_t searched, loaded;      /* subtrees visited by distance queries; subtrees loaded by all
                                      * queries */
     ebpo_kept_envelopes *envelopes; /* envelopes for distances to them; or NULL */

@@ -223,7 +223,7 @@ EBPO_EIGHT void ray_block(ebpo_ray_search *r, uint32_t block, bool wide)
     if (!found.alive)
         return;
     if (r->wants == EBPO_WANTS_ANY && found.sure) {
-        r->intersected = r->done = true;
+        r->any_hit = r->done = true;
         return;
     }
     for (unsigned lanes = found.alive; lanes; lanes &= lanes - 1) {

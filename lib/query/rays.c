@@ -210,7 +210,7 @@ static void ray_search_accel(ebpo_ray_search *r, const ebpo_ray_kernels *kernels
     r->s = s;
     r->judge = judge_waiting;
     r->count = 0;
-    r->done = r->intersected = false;
+    r->done = r->any_hit = false;
     if (s->bound_count == 0)
         return;
     double most = to_frame(r);
@@ -267,9 +267,9 @@ static void casting_keep(casting *c, const ebpo_ray_found *m)
     } else if (c->wants == EBPO_WANTS_ANY) {
         c->count = 1;
         c->done = true;
-    } else if (ebpo_grow(&k->intersected, &k->found_capacity, c->count + 1,
-                         sizeof *k->intersected)) {
-        k->intersected[c->count++] = *m;
+    } else if (ebpo_grow(&k->unsorted_hits, &k->found_capacity, c->count + 1,
+                         sizeof *k->unsorted_hits)) {
+        k->unsorted_hits[c->count++] = *m;
     } else {
         c->done = c->no_memory = true;
     }
@@ -299,12 +299,12 @@ static ebpo_status casting_sort(casting *c, uint64_t begin, uint64_t *end, ebpo_
     *end = begin;
     if (!ebpo_grow(&k->hits, &k->hit_capacity, begin + c->count, sizeof *k->hits))
         return ebpo_fail_memory(error, (begin + c->count) * sizeof *k->hits);
-    sort_found(k->intersected, c->count, &c->ray);
+    sort_found(k->unsorted_hits, c->count, &c->ray);
     for (uint64_t i = 0; i < c->count; i++)
-        if (i == 0 || k->intersected[i].file_face !=
-                          k->intersected[i - 1].file_face) /* subtrees share faces: a face may be
-                                                            * hit twice */
-            k->hits[(*end)++] = hit_of(&k->intersected[i]);
+        if (i == 0 || k->unsorted_hits[i].file_face !=
+                          k->unsorted_hits[i - 1].file_face) /* subtrees share faces: a face may be
+                                                              * hit twice */
+            k->hits[(*end)++] = hit_of(&k->unsorted_hits[i]);
     return EBPO_OK;
 }
 
@@ -379,7 +379,7 @@ static void cast_subtree(casting *c, const ebpo_accel *s)
     r.decide = decide_face;
     r.user = c;
     ray_search_accel(&r, c->context->model->kernels.ray, s);
-    if (r.intersected) { /* only if any hit is wanted */
+    if (r.any_hit) { /* only if any hit is wanted */
         c->count = 1;
         c->done = true;
     }

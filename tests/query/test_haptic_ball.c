@@ -42,12 +42,12 @@ static void check_piece(judged *j, const double from[3], const double to[3])
 {
     const oracle_hit *hits;
     uint32_t count;
-    double way[3];
+    double motion[3];
     for (int i = 0; i < 3; i++)
-        way[i] = to[i] - from[i];
-    if (way[0] == 0 && way[1] == 0 && way[2] == 0)
+        motion[i] = to[i] - from[i];
+    if (motion[0] == 0 && motion[1] == 0 && motion[2] == 0)
         return;
-    oracle_ray(j->m->judge, from, way, 1, &hits, &count);
+    oracle_ray(j->m->judge, from, motion, 1, &hits, &count);
     for (uint32_t i = 0; i < count; i++)
         ck_assert_msg(!has_area(j, hits[i].face), "%s: the proxy went through face %u", j->m->name,
                       hits[i].face);
@@ -61,13 +61,13 @@ static void check_piece(judged *j, const double from[3], const double to[3])
 /* Checks all pieces of the proxy's path, which begins at the previous proxy position. */
 static void check_path(judged *j, const double to[3])
 {
-    double way[EBPO_HAPTIC_PATH_MAX][3];
-    uint32_t count = ebpo_haptic_ball_path(j->haptic, way);
+    double path[EBPO_HAPTIC_PATH_MAX][3];
+    uint32_t count = ebpo_haptic_ball_path(j->haptic, path);
     ck_assert_uint_ge(count, 1);
-    ck_assert_mem_eq(way[0], j->proxy, sizeof way[0]);
-    ck_assert_mem_eq(way[count - 1], to, sizeof way[0]);
+    ck_assert_mem_eq(path[0], j->proxy, sizeof path[0]);
+    ck_assert_mem_eq(path[count - 1], to, sizeof path[0]);
     for (uint32_t i = 1; i < count; i++)
-        check_piece(j, way[i - 1], way[i]);
+        check_piece(j, path[i - 1], path[i]);
 }
 
 static double apart(const double a[3], const double b[3])

@@ -171,16 +171,16 @@ static void judge_rest(const ball *b, const double device[3], uint64_t *state)
     ck_assert_double_ge(product(b->r.force, back), 0);
     ck_assert_double_gt(depth, 0);
     for (int k = 0; k < 4; k++) {
-        double to[3], way[3], length = 0;
+        double to[3], direction[3], length = 0;
         for (int i = 0; i < 3; i++) {
-            way[i] = ebpo_test_random_unit(state) - 0.5;
-            length = hypot(length, way[i]);
+            direction[i] = ebpo_test_random_unit(state) - 0.5;
+            length = hypot(length, direction[i]);
         }
-        double nearer = -product(way, back) / (length * depth);
+        double nearer = -product(direction, back) / (length * depth);
         if (nearer < 0.3 || depth < 100 * skin)
             continue;
         for (int i = 0; i < 3; i++)
-            to[i] = b->r.proxy[i] + 30 * skin * way[i] / length;
+            to[i] = b->r.proxy[i] + 30 * skin * direction[i] / length;
         ck_assert_msg(from_all(&b->m.mesh, to) < radius + skin, "%s: it could come nearer",
                       b->m.name);
     }
@@ -293,7 +293,8 @@ static void haptic_model(const char *name, ebpo_mesh mesh, double part, uint64_t
     for (int step_seconds = 0; gap > 4 * b.options.skin;
          step_seconds++) { /* free motion, as far as the reference implementation allows */
         ck_assert_int_lt(step_seconds, 200);
-        double way = apart(start, middle), go = fmin(1, (gap - 2 * b.options.skin) / way);
+        double remaining = apart(start, middle),
+               go = fmin(1, (gap - 2 * b.options.skin) / remaining);
         for (int k = 0; k < 3; k++)
             start[k] += go * (middle[k] - start[k]);
         ball_move(&b, start, 20);

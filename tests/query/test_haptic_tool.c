@@ -73,15 +73,15 @@ static void judge_point(judged *j, const double from[3], const double to[3])
     const oracle_hit *hits;
     oracle_nearest near;
     uint32_t count;
-    double way[3];
+    double motion[3];
     for (int i = 0; i < 3; i++)
-        way[i] = to[i] - from[i];
+        motion[i] = to[i] - from[i];
     oracle_find_nearest(j->m->judge, to, &near);
     ck_assert_msg(near.distance >= j->options.skin * 0.5, "%s: %g from a face, skin %g", j->m->name,
                   near.distance, j->options.skin);
-    if (way[0] == 0 && way[1] == 0 && way[2] == 0)
+    if (motion[0] == 0 && motion[1] == 0 && motion[2] == 0)
         return;
-    oracle_ray(j->m->judge, from, way, 1, &hits, &count);
+    oracle_ray(j->m->judge, from, motion, 1, &hits, &count);
     for (uint32_t i = 0; i < count; i++)
         ck_assert_msg(!has_area(j, hits[i].face), "%s: a point went through face %u", j->m->name,
                       hits[i].face);
@@ -89,16 +89,16 @@ static void judge_point(judged *j, const double from[3], const double to[3])
 
 static void check_path(judged *j, const ebpo_haptic_tool_result *r)
 {
-    double way[EBPO_HAPTIC_PATH_MAX][7];
-    uint32_t count = ebpo_haptic_tool_path(j->haptic, way);
+    double path[EBPO_HAPTIC_PATH_MAX][7];
+    uint32_t count = ebpo_haptic_tool_path(j->haptic, path);
     ck_assert_uint_ge(count, 1);
-    ck_assert_mem_eq(way[0], &j->proxy, sizeof j->proxy);
-    ck_assert_mem_eq(way[count - 1], r->proxy, sizeof r->proxy);
-    ck_assert_mem_eq(way[count - 1] + 3, r->turn, sizeof r->turn);
+    ck_assert_mem_eq(path[0], &j->proxy, sizeof j->proxy);
+    ck_assert_mem_eq(path[count - 1], r->proxy, sizeof r->proxy);
+    ck_assert_mem_eq(path[count - 1] + 3, r->turn, sizeof r->turn);
     for (uint32_t i = 1; i < count; i++) {
         pose from, to;
-        memcpy(&from, way[i - 1], sizeof from);
-        memcpy(&to, way[i], sizeof to);
+        memcpy(&from, path[i - 1], sizeof from);
+        memcpy(&to, path[i], sizeof to);
         for (int p = 0; p < POINTS; p++) {
             double a[3], b[3];
             point_at(&from, j->point[p], a);
@@ -111,13 +111,13 @@ static void check_path(judged *j, const ebpo_haptic_tool_result *r)
 /* Checks that a moving and rotating device gains no more energy than its longest step allows. */
 static void judge_energy(judged *j, const pose *device)
 {
-    double turn[3], way[3];
+    double turn[3], motion[3];
     turn_between(j->device.turn, device->turn, turn);
     for (int i = 0; i < 3; i++) {
-        way[i] = device->place[i] - j->device.place[i];
-        j->energy += j->force[i] * way[i] + j->torque[i] * turn[i];
+        motion[i] = device->place[i] - j->device.place[i];
+        j->energy += j->force[i] * motion[i] + j->torque[i] * turn[i];
     }
-    j->step = fmax(j->step, hypot(length(way), j->arm * length(turn)));
+    j->step = fmax(j->step, hypot(length(motion), j->arm * length(turn)));
     ck_assert_msg(j->energy <= j->options.stiffness * j->step * j->step * (1 + 1e-9),
                   "%s: contact gave energy %g, the longest step is %g", j->m->name, j->energy,
                   j->step);
@@ -269,10 +269,10 @@ static void hold_reference(const ebpo_tool_contacts *all, const double want[EBPO
 
 static double apart_by(const double a[EBPO_SCREW], const double b[EBPO_SCREW])
 {
-    double way[EBPO_SCREW];
+    double difference[EBPO_SCREW];
     for (int k = 0; k < EBPO_SCREW; k++)
-        way[k] = a[k] - b[k];
-    return ebpo_screw_length(way);
+        difference[k] = a[k] - b[k];
+    return ebpo_screw_length(difference);
 }
 
 /* Makes a contact of a point, with a lever of up to 3 arms, on a face with any upward normal. */
@@ -297,7 +297,7 @@ START_TEST(test_haptic_tool_contacts_never_pull)
     ebpo_tool_contacts all;
     uint64_t state = 77;
     for (int turn = 0; turn < 3000; turn++) {
-        double want[EBPO_SCREW], way[EBPO_SCREW], plain[EBPO_SCREW];
+        double want[EBPO_SCREW], held[EBPO_SCREW], plain[EBPO_SCREW];
         all.count = 0;
         for (uint64_t i = 0, count = 2 + ebpo_test_random(&state) % (PUSHING - 1); i < count; i++) {
             ebpo_tool_contact c;
@@ -306,10 +306,10 @@ START_TEST(test_haptic_tool_contacts_never_pull)
         }
         for (int k = 0; k < EBPO_SCREW; k++)
             want[k] = 2 * ebpo_test_random_unit(&state) - 1;
-        (void)ebpo_tool_hold(&all, want, 1e-6, true, way);
+        (void)ebpo_tool_hold(&all, want, 1e-6, true, held);
         hold_reference(&all, want, plain);
-        ck_assert_msg(apart_by(way, want) <= apart_by(plain, want) + 0.05,
-                      "turn %d: %g is restrained, expected %g", turn, apart_by(way, want),
+        ck_assert_msg(apart_by(held, want) <= apart_by(plain, want) + 0.05,
+                      "turn %d: %g is restrained, expected %g", turn, apart_by(held, want),
                       apart_by(plain, want));
     }
 }

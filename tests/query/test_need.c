@@ -356,21 +356,21 @@ START_TEST(test_subset_bytes_same_for_any_method)
         ebpo_subset_options o = EBPO_SUBSET_OPTIONS_INIT;
         o.max_error = i ? 0 : 0.05;
         o.target_bytes = i ? ebpo_file_info(m.file)->file_bytes / 2 : 0;
-        for (int way = 0; way < 3; way++) {
-            snprintf(path[way], sizeof path[way], "%s/%d.ebpo.h5", m.folder, way);
-            o.threads = way == 1 ? 3 : 1;
-            if (way < 2) {
-                fine(ebpo_subset(m.file, path[way], &o, &error), &error);
+        for (int variant = 0; variant < 3; variant++) {
+            snprintf(path[variant], sizeof path[variant], "%s/%d.ebpo.h5", m.folder, variant);
+            o.threads = variant == 1 ? 3 : 1;
+            if (variant < 2) {
+                fine(ebpo_subset(m.file, path[variant], &o, &error), &error);
             } else {
                 ebpo_tree tree;
                 fine(ebpo_file_read_tree(m.file, READ_BY(1), &tree, &error), &error);
-                fine(ebpo_subset_of_tree(&tree, path[way], &o, &error), &error);
+                fine(ebpo_subset_of_tree(&tree, path[variant], &o, &error), &error);
             }
-            FILE *f = fopen(path[way], "rb");
-            size[way] = fread(bytes[way], 1, sizeof bytes[way], f);
+            FILE *f = fopen(path[variant], "rb");
+            size[variant] = fread(bytes[variant], 1, sizeof bytes[variant], f);
             fclose(f);
-            unlink(path[way]);
-            ck_assert(size[way] == size[0] && memcmp(bytes[way], bytes[0], size[0]) == 0);
+            unlink(path[variant]);
+            ck_assert(size[variant] == size[0] && memcmp(bytes[variant], bytes[0], size[0]) == 0);
         }
     }
     query_model_free(&m);

@@ -43,15 +43,15 @@ static bool keep(void *user, const ebpo_near_face *face)
     return s->count < s->stop;
 }
 
-typedef struct current_query {
+typedef struct within_query {
     const query_model *m;
     ebpo_context *context;
     const double *p;
     double radius;
     uint64_t most, stop;
-} current_query;
+} within_query;
 
-static stream run_query(const current_query *q, ebpo_status *status, ebpo_error *error)
+static stream run_query(const within_query *q, ebpo_status *status, ebpo_error *error)
 {
     stream s = { .stop = q->stop };
     ebpo_within_options o = EBPO_WITHIN_OPTIONS_INIT;
@@ -61,7 +61,7 @@ static stream run_query(const current_query *q, ebpo_status *status, ebpo_error 
     return s;
 }
 
-static void judge(const current_query *q, const stream *s, const oracle_near *truth)
+static void judge(const within_query *q, const stream *s, const oracle_near *truth)
 {
     for (uint64_t i = 0; i < s->count; i++) {
         const ebpo_near_face *f = &s->face[i];
@@ -78,7 +78,7 @@ static void judge(const current_query *q, const stream *s, const oracle_near *tr
 }
 
 /* `truth`: all faces within the radius. */
-static void check_with(const current_query *q, const oracle_near *truth, uint64_t count)
+static void check_with(const within_query *q, const oracle_near *truth, uint64_t count)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_status status;
@@ -92,7 +92,7 @@ static void check_with(const current_query *q, const oracle_near *truth, uint64_
     free(s.face);
 }
 
-static void check(const current_query *q)
+static void check(const within_query *q)
 {
     uint32_t count;
     oracle_near *truth = oracle_order(q->m->judge, q->p, q->radius, &count);
@@ -101,13 +101,13 @@ static void check(const current_query *q)
 }
 
 /* Checks that the first face is the nearest one; its point is equal bit by bit. */
-static void compare_first(const current_query *q)
+static void compare_first(const within_query *q)
 {
     ebpo_distance_options o = EBPO_DISTANCE_OPTIONS_INIT;
     ebpo_distance_result nearest;
     ebpo_error why = EBPO_ERROR_INIT;
     ebpo_status status;
-    current_query first = *q;
+    within_query first = *q;
     o.unsigned_distance = true;
     first.most = 1;
     first.radius = INFINITY;
@@ -133,7 +133,7 @@ static void check_point(const query_model *m, ebpo_context *context, const doubl
     const double radii[] = { d, isinf(d) ? d : nextafter(d, INFINITY), d > 0 ? nextafter(d, 0) : 0,
                              0, d / 2 };
     const uint64_t most[] = { 0, 1, 7, count, count + (uint64_t)10 };
-    current_query q = { m, context, p, INFINITY, 0, UINT64_MAX };
+    within_query q = { m, context, p, INFINITY, 0, UINT64_MAX };
     compare_first(&q);
     /* only one query for large models, because far away everything needs slow exact arithmetic */
     for (uint64_t i = 0; i < (m->mesh.face_count > 500 ? 1 : 3); i++) {
@@ -160,7 +160,7 @@ static void check_points(const query_model *m, ebpo_context *context, uint64_t c
         points[k] = m->info.box_origin[k] + m->info.box_size[k] / 2;
     check_point(m, context, points, &seed);
     ebpo_test_point(&m->mesh, m->mesh.faces[0], points);
-    current_query q = { m, context, points, 0, 0, UINT64_MAX };
+    within_query q = { m, context, points, 0, 0, UINT64_MAX };
     check(&q);
     free(points);
 }
@@ -237,7 +237,7 @@ static uint64_t loads_for(const query_model *m, ebpo_loading loading, double rad
     ASSERT_OK(ebpo_model_new(m->file, &how, &model, error));
     ASSERT_OK(ebpo_context_new(model, &context, error));
     ebpo_test_point(&m->mesh, 5, p);
-    current_query q = { m, context, p, radius, most, UINT64_MAX };
+    within_query q = { m, context, p, radius, most, UINT64_MAX };
     check(&q);
     ebpo_model_get_stats(model, &stats);
     ebpo_context_free(context);
@@ -264,7 +264,7 @@ END_TEST
 /* --- subsets --- */
 
 /* Checks that faces are correct, and complete when no omitted part is near. */
-static bool query_part(const current_query *q)
+static bool query_part(const within_query *q)
 {
     uint32_t count;
     oracle_near *truth = oracle_order(q->m->judge, q->p, q->radius, &count);
@@ -309,12 +309,12 @@ START_TEST(test_within_subset_refuses_missing_region)
     for (uint64_t i = 0; i < query_scaled(100); i++) {
         double p[3];
         ebpo_test_point(&m.mesh, ebpo_test_random(&state) % m.mesh.vertex_count, p);
-        current_query q = { &m,
-                            context,
-                            p,
-                            i % 3 ? m.size / (double)(i % 16 + 2) : INFINITY,
-                            i % 3 == 2 ? 0 : i,
-                            UINT64_MAX };
+        within_query q = { &m,
+                           context,
+                           p,
+                           i % 3 ? m.size / (double)(i % 16 + 2) : INFINITY,
+                           i % 3 == 2 ? 0 : i,
+                           UINT64_MAX };
         bool fine = query_part(&q);
         answered += fine;
         refused += !fine;

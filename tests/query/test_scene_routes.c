@@ -190,14 +190,14 @@ END_TEST
 
 /* --- approaches --- */
 
-typedef struct ways {
+typedef struct approaches {
     ebpo_scene_approach_result list[PARTS * PARTS];
     uint64_t count;
-} ways;
+} approaches;
 
 static bool keep_approaches(void *user, const ebpo_scene_approach_result *list, uint64_t count)
 {
-    ways *w = user;
+    approaches *w = user;
     memcpy(w->list, list, count * sizeof *list);
     w->count = count;
     return true;
@@ -244,7 +244,7 @@ START_TEST(test_approach_finds_every_pair)
     uint64_t rounds = query_scaled(40) + 3, reached = 0, apart = 0;
     for (uint64_t n = 0; n < rounds; n++) {
         ebpo_scene_approach_options how = EBPO_SCENE_APPROACH_OPTIONS_INIT;
-        ways list[2] = { { .count = 0 }, { .count = 0 } };
+        approaches list[2] = { { .count = 0 }, { .count = 0 } };
         ebpo_scene *whole = some_scene(n), *part = packed_scene(whole, 0, LAST, 0);
         how.tolerance = tolerance;
         ASSERT_OK(ebpo_scene_approach(whole, 0, LAST, &how, keep_approaches, &list[0], error));
@@ -322,7 +322,7 @@ END_TEST
 /* Results of all queries of a scene, with freshly loaded models. */
 typedef struct all_results {
     intersected intersected;
-    ways ways;
+    approaches approaches;
     leasts leasts;
 } all_results;
 
@@ -335,7 +335,7 @@ static void query_by(uint64_t seed, unsigned threads, all_results *out)
     how.max_evaluations = 100;
     memset(out, 0, sizeof *out);
     ASSERT_OK(intersect_by(scene, 0.5, threads, &out->intersected, error));
-    ASSERT_OK(ebpo_scene_approach(scene, 0, LAST, &how, keep_approaches, &out->ways, error));
+    ASSERT_OK(ebpo_scene_approach(scene, 0, LAST, &how, keep_approaches, &out->approaches, error));
     ASSERT_OK(ebpo_scene_least_distances(scene, 0, LAST, &how, keep_leasts, &out->leasts, error));
     ebpo_scene_free(scene);
 }
@@ -347,7 +347,7 @@ START_TEST(test_scene_results_same_for_any_threads)
         query_by(n, 1, &one);
         query_by(n, 4, &many);
         ck_assert(memcmp(&one, &many, sizeof one) == 0);
-        ck_assert_uint_gt(one.ways.count, 0);
+        ck_assert_uint_gt(one.approaches.count, 0);
     }
 }
 END_TEST

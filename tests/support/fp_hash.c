@@ -332,7 +332,7 @@ static ebpo_status check_mesh(hashing *h, const degenerate_case *c, ebpo_mesh *m
 /* Hashes the other selections, also with leaf planes. */
 static void hash_selections(hashing *h, const degenerate_case *c)
 {
-    for (int way = 0; way < 5; way++) {
+    for (int i = 0; i < 5; i++) {
         static const ebpo_selection selections[] = { EBPO_SELECT_KMEDOIDS, EBPO_SELECT_KMEDOIDS,
                                                      EBPO_SELECT_OFFSET, EBPO_SELECT_RANDOM,
                                                      EBPO_SELECT_INHERIT };
@@ -347,8 +347,8 @@ static void hash_selections(hashing *h, const degenerate_case *c)
                 ebpo_mesh_free(&mesh);
             return;
         }
-        options.select = selections[way];
-        options.normals = way == 1 ? EBPO_NORMALS_ANGLE : EBPO_NORMALS_SPHERICAL;
+        options.select = selections[i];
+        options.normals = i == 1 ? EBPO_NORMALS_ANGLE : EBPO_NORMALS_SPHERICAL;
         options.parts |= EBPO_PART_LEAF_PLANES;
         CALL(status, ebpo_build(&mesh, &report, NULL, &options, &tree, &error));
         number(h, (uint64_t)status);

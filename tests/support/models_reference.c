@@ -64,7 +64,7 @@ static void turn_anyhow(ebpo_pose *p, uint64_t *state)
 void reference_pose(int kind, double size, uint64_t *state, ebpo_pose *a, ebpo_pose *b)
 {
     const pose_kind *k = &kinds[kind];
-    double way[3], length = 0;
+    double direction[3], length = 0;
     *a = *b = (ebpo_pose)EBPO_POSE_INIT;
     if (k->turn == QUARTER)
         turn_to(b, 1, 1, 0, 0);
@@ -74,11 +74,12 @@ void reference_pose(int kind, double size, uint64_t *state, ebpo_pose *a, ebpo_p
         turn_anyhow(a, state);
     b->scale = k->scale;
     for (int i = 0; i < 3; i++) {
-        way[i] = reference_uniform(state);
-        length += way[i] * way[i];
+        direction[i] = reference_uniform(state);
+        length += direction[i] * direction[i];
     }
     for (int i = 0; i < 3; i++) {
-        double move = size * k->along_any * way[i] / sqrt(length) + (i ? 0 : size * k->along_x);
+        double move =
+            size * k->along_any * direction[i] / sqrt(length) + (i ? 0 : size * k->along_x);
         a->translation[i] = size * k->both;
         b->translation[i] = size * k->both + move;
     }
@@ -176,17 +177,17 @@ uint64_t reference_pairs(const reference_faces *a, const reference_faces *b, ref
 }
 
 /* Returns true when the gap along one of some directions is certainly greater. */
-static bool farther(const double a[3][3], const double b[3][3], double way[][3], int ways,
-                    double distance)
+static bool farther(const double a[3][3], const double b[3][3], double direction[][3],
+                    int directions, double distance)
 {
-    for (int w = 0; w < ways; w++)
+    for (int w = 0; w < directions; w++)
         for (int sign = -1; sign < 2; sign += 2) {
             double ahead = -INFINITY, behind = INFINITY, size = 0;
             for (int i = 0; i < 3; i++) {
                 double x = 0, y = 0;
                 for (int k = 0; k < 3; k++) {
-                    x += sign * way[w][k] * a[i][k];
-                    y += sign * way[w][k] * b[i][k];
+                    x += sign * direction[w][k] * a[i][k];
+                    y += sign * direction[w][k] * b[i][k];
                     size = fmax(size, fmax(fabs(a[i][k]), fabs(b[i][k])));
                 }
                 ahead = fmax(ahead, x);
@@ -202,7 +203,7 @@ const char *reference_models_distance(const reference_faces *a, const reference_
                                       double distance, uint64_t at_a, uint64_t at_b)
 {
     double below = nextafter(distance, 0), above = nextafter(distance, INFINITY);
-    double way[16][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } };
+    double direction[16][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } };
     uint64_t state = 7;
     if (reference_pair_distance_compare((const double(*)[3])a->corner[at_a],
                                         (const double(*)[3])b->corner[at_b], above) > 0)
@@ -210,18 +211,18 @@ const char *reference_models_distance(const reference_faces *a, const reference_
     for (int w = 3; w < 16; w++) {
         double length = 0;
         for (int k = 0; k < 3; k++) {
-            way[w][k] =
+            direction[w][k] =
                 w == 3 ? b->corner[at_b][0][k] - a->corner[at_a][0][k] : reference_uniform(&state);
-            length += way[w][k] * way[w][k];
+            length += direction[w][k] * direction[w][k];
         }
         for (int k = 0; k < 3; k++)
-            way[w][k] /= length > 0 ? sqrt(length) * (1 + 1e-12) : 1;
+            direction[w][k] /= length > 0 ? sqrt(length) * (1 + 1e-12) : 1;
     }
     for (uint64_t i = 0; i < a->count; i++)
         for (uint64_t j = 0; j < b->count; j++) {
             const double(*f)[3] = (const double(*)[3])a->corner[i],
                   (*g)[3] = (const double(*)[3])b->corner[j];
-            if (!farther(f, g, way, 16, distance) &&
+            if (!farther(f, g, direction, 16, distance) &&
                 reference_pair_distance_compare(f, g, below) < 0)
                 return "another pair is nearer";
         }

@@ -72,11 +72,11 @@ static void nearly_through(double a[3][3], double b[3][3], int at, uint64_t *sta
 /* Puts the corners on one line, or at one point. */
 static void flatten(double t[3][3], uint64_t *state)
 {
-    int64_t way = reference_integer(state, 0, 3);
+    int64_t kind = reference_integer(state, 0, 3);
     for (int k = 0; k < 3; k++) {
         double d = t[1][k] - t[0][k];
-        t[2][k] = way == 0 ? t[0][k] : way == 1 ? t[1][k] : t[0][k] + (way == 2 ? 2 : -1) * d;
-        if (way == 0 && d == 1)
+        t[2][k] = kind == 0 ? t[0][k] : kind == 1 ? t[1][k] : t[0][k] + (kind == 2 ? 2 : -1) * d;
+        if (kind == 0 && d == 1)
             t[1][k] = t[0][k];
     }
 }

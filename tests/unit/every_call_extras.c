@@ -51,7 +51,7 @@ static ebpo_status query_two(ebpo_collider *collider, const ebpo_collide_options
     ebpo_face_pair pair;
     ebpo_collider_stats stats = EBPO_COLLIDER_STATS_INIT;
     const double up[3] = { 0, 0, 1 };
-    ebpo_separation way;
+    ebpo_separation separation;
     ebpo_clearance clearance;
     ebpo_certain depth[2];
     ebpo_relation_result relation;
@@ -72,7 +72,7 @@ static ebpo_status query_two(ebpo_collider *collider, const ebpo_collide_options
     if (status == EBPO_OK)
         status = ebpo_collide_depth(collider, options, 0.5, &depth[0], &depth[1], error);
     if (status == EBPO_OK)
-        status = ebpo_collide_separation(collider, options, up, &way, error);
+        status = ebpo_collide_separation(collider, options, up, &separation, error);
     if (status == EBPO_OK)
         status = ebpo_collide_relation(collider, options, &relation, error);
     if (status == EBPO_OK)
@@ -253,7 +253,7 @@ static ebpo_status touch(ebpo_model *model, ebpo_error *error)
     ebpo_haptic *touch;
     ebpo_haptic_ball_result result;
     ebpo_haptic_stats stats = EBPO_HAPTIC_STATS_INIT;
-    double way[EBPO_HAPTIC_PATH_MAX][3];
+    double path[EBPO_HAPTIC_PATH_MAX][3];
     ebpo_haptic_options options = EBPO_HAPTIC_OPTIONS_INIT;
     options.faces = 1 << 12;
     ebpo_status status = ebpo_haptic_new(model, &options, away, &touch, error);
@@ -264,7 +264,7 @@ static ebpo_status touch(ebpo_model *model, ebpo_error *error)
     double poses[EBPO_HAPTIC_PATH_MAX][7];
     static const double turn[4] = { 0, 0, 0, 1 };
     ebpo_haptic_step_ball(touch, away, &result);
-    (void)ebpo_haptic_ball_path(touch, way);
+    (void)ebpo_haptic_ball_path(touch, path);
     ebpo_haptic_step_probe(touch, away,
                            &sensed); /* a device of the wrong kind: an error is reported */
     ebpo_haptic_step_tool(touch, away, turn, &turned);
@@ -471,9 +471,9 @@ static bool count_clashes(void *user, const ebpo_scene_clash *clashes, uint64_t 
     return true;
 }
 
-static bool count_approaches(void *user, const ebpo_scene_approach_result *ways, uint64_t count)
+static bool count_approaches(void *user, const ebpo_scene_approach_result *results, uint64_t count)
 {
-    *(uint64_t *)user += count + (ways[0].reached != 1);
+    *(uint64_t *)user += count + (results[0].reached != 1);
     return true;
 }
 
@@ -559,17 +559,17 @@ static ebpo_status intersect_in_scene(ebpo_scene *scene, ebpo_error *error)
     ebpo_status status =
         ebpo_scene_find_clashes(scene, 1, &how, count_clashes, &clashes, &tested, error);
     ebpo_scene_approach_options along = EBPO_SCENE_APPROACH_OPTIONS_INIT;
-    uint64_t ways = 0;
+    uint64_t results = 0;
     if (status == EBPO_OK)
         status = inspect_clash(scene, error);
     along.threads = 1;
     along.tolerance = 0.01;
     if (status == EBPO_OK)
-        status = ebpo_scene_approach(scene, 0, 1, &along, count_approaches, &ways, error);
+        status = ebpo_scene_approach(scene, 0, 1, &along, count_approaches, &results, error);
     if (status == EBPO_OK)
-        status = ebpo_scene_least_distances(scene, 0, 1, &along, count_leasts, &ways, error);
-    return status == EBPO_OK && (clashes != 1 || tested != 1 || ways != 2) ? EBPO_E_ARGUMENT
-                                                                           : status;
+        status = ebpo_scene_least_distances(scene, 0, 1, &along, count_leasts, &results, error);
+    return status == EBPO_OK && (clashes != 1 || tested != 1 || results != 2) ? EBPO_E_ARGUMENT
+                                                                              : status;
 }
 
 static ebpo_status query_scene(ebpo_scene *scene, ebpo_error *error)

@@ -27,15 +27,15 @@ static void fine(ebpo_status status, const ebpo_error *error)
     ck_assert_msg(status == EBPO_OK, "%s: %s", ebpo_status_name(status), error->message);
 }
 
-/* --- a subset, opened in three ways --- */
+/* --- a subset, opened in three modes --- */
 
-enum { WAYS = 3 };
+enum { MODES = 3 };
 typedef struct part {
     char path[120];
     ebpo_file *file;
     const ebpo_info *info;
-    ebpo_model *model[WAYS];
-    ebpo_context *context[WAYS];
+    ebpo_model *model[MODES];
+    ebpo_context *context[MODES];
 } part;
 
 static void part_open(part *p, ebpo_file *from, const char *path,
@@ -47,21 +47,21 @@ static void part_open(part *p, ebpo_file *from, const char *path,
     fine(ebpo_subset(from, path, options, &error), &error);
     fine(ebpo_open(path, &p->file, &error), &error);
     p->info = ebpo_file_info(p->file);
-    for (int way = 0; way < WAYS; way++) {
+    for (int mode = 0; mode < MODES; mode++) {
         ebpo_model_options o = EBPO_MODEL_OPTIONS_INIT;
         o.threads = 1;
-        o.cut_level = way == 0 ? -1 : way;
-        o.loading = way == 2 ? EBPO_LOAD_NODES : EBPO_LOAD_CACHE;
-        fine(ebpo_model_new(p->file, &o, &p->model[way], &error), &error);
-        fine(ebpo_context_new(p->model[way], &p->context[way], &error), &error);
+        o.cut_level = mode == 0 ? -1 : mode;
+        o.loading = mode == 2 ? EBPO_LOAD_NODES : EBPO_LOAD_CACHE;
+        fine(ebpo_model_new(p->file, &o, &p->model[mode], &error), &error);
+        fine(ebpo_context_new(p->model[mode], &p->context[mode], &error), &error);
     }
 }
 
 static void part_close(part *p)
 {
-    for (int way = 0; way < WAYS; way++) {
-        ebpo_context_free(p->context[way]);
-        ebpo_model_free(p->model[way]);
+    for (int mode = 0; mode < MODES; mode++) {
+        ebpo_context_free(p->context[mode]);
+        ebpo_model_free(p->model[mode]);
     }
     ebpo_close(p->file);
     unlink(p->path);
@@ -102,7 +102,7 @@ static bool within(const double p[3], const ebpo_subset_options *o)
                          p[1] <= o->max[1] && p[2] >= o->min[2] && p[2] <= o->max[2]);
 }
 
-static void query_exact(tally *t, query_model *m, part *p, int way, const double point[3],
+static void query_exact(tally *t, query_model *m, part *p, int mode, const double point[3],
                         const ebpo_subset_options *cut, const query_truth *truth)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -111,7 +111,7 @@ static void query_exact(tally *t, query_model *m, part *p, int way, const double
     bool complete = cut->last_level < 0 && p->info->parts & EBPO_PART_MESH;
     if (m->info.solid) {
         fine(ebpo_inside(m->context, point, NULL, &whole, &error), &error);
-        ebpo_status status = ebpo_inside(p->context[way], point, NULL, &some, &error);
+        ebpo_status status = ebpo_inside(p->context[mode], point, NULL, &some, &error);
         ck_assert_msg(!complete || !within(point, cut) || status == EBPO_OK,
                       "a point in the box was refused: %s", error.message);
         if (answered(t, status, &error))
@@ -120,7 +120,7 @@ static void query_exact(tally *t, query_model *m, part *p, int way, const double
                           point[2], some.where, some.winding, whole.where, whole.winding);
     }
     fine(ebpo_distance(m->context, point, NULL, &far, &error), &error);
-    if (answered(t, ebpo_distance(p->context[way], point, NULL, &near, &error), &error))
+    if (answered(t, ebpo_distance(p->context[mode], point, NULL, &near, &error), &error))
         ck_assert_msg(memcmp(&far.distance, &near.distance, 8) == 0 &&
                           (far.face == near.face || truth->ties > 1 ||
                            !(p->info->parts & EBPO_PART_MAPS)),
@@ -129,7 +129,7 @@ static void query_exact(tally *t, query_model *m, part *p, int way, const double
                       far.distance, (long long)far.face);
 }
 
-static void query_limited(query_model *m, part *p, int way, const double point[3],
+static void query_limited(query_model *m, part *p, int mode, const double point[3],
                           const ebpo_subset_options *cut, const query_truth *truth)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -141,7 +141,7 @@ static void query_limited(query_model *m, part *p, int way, const double point[3
         ebpo_distance_result near, far;
         bool same = equal && (cut->last_level < 0 || o.level <= cut->last_level);
         if (m->info.solid) {
-            fine(ebpo_inside(p->context[way], point, &inside_options, &some, &error), &error);
+            fine(ebpo_inside(p->context[mode], point, &inside_options, &some, &error), &error);
             fine(ebpo_inside(m->context, point, &inside_options, &whole, &error), &error);
             ck_assert_msg(some.where == EBPO_MAYBE || some.where == truth->where,
                           "level %d: class %d, expected %d", o.level, some.where, truth->where);
@@ -149,7 +149,7 @@ static void query_limited(query_model *m, part *p, int way, const double point[3
             if (same)
                 ck_assert(some.where == whole.where && some.doubt == whole.doubt);
         }
-        fine(ebpo_distance(p->context[way], point, &o, &near, &error), &error);
+        fine(ebpo_distance(p->context[mode], point, &o, &near, &error), &error);
         fine(ebpo_distance(m->context, point, &o, &far, &error), &error);
         ck_assert_msg(near.lo <= truth->distance && truth->distance <= near.hi,
                       "level %d: %.17g is not within %.17g and %.17g", o.level, truth->distance,
@@ -158,7 +158,7 @@ static void query_limited(query_model *m, part *p, int way, const double point[3
             ck_assert(near.lo == far.lo && near.hi == far.hi);
         o.mode = EBPO_DISTANCE_ENVELOPE;
         fine(ebpo_distance(m->context, point, &o, &far, &error), &error);
-        ebpo_status status = ebpo_distance(p->context[way], point, &o, &near, &error);
+        ebpo_status status = ebpo_distance(p->context[mode], point, &o, &near, &error);
         ck_assert_msg(status == EBPO_OK || (status == EBPO_E_ABSENT && !same), "%s", error.message);
         if (status == EBPO_OK && cut->parts & EBPO_PART_PLANES)
             ck_assert_msg(near.distance == far.distance,
@@ -168,7 +168,7 @@ static void query_limited(query_model *m, part *p, int way, const double point[3
     }
 }
 
-static void query_rays(tally *t, query_model *m, part *p, int way, uint64_t seed)
+static void query_rays(tally *t, query_model *m, part *p, int mode, uint64_t seed)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     for (int i = 0; i < 20; i++) {
@@ -180,14 +180,16 @@ static void query_rays(tally *t, query_model *m, part *p, int way, uint64_t seed
         query_make_ray(m, &seed, origin, direction, &t_max);
         fine(ebpo_ray_first(m->context, origin, direction, t_max, &far, &hit, &error), &error);
         if (answered(t,
-                     ebpo_ray_first(p->context[way], origin, direction, t_max, &near, &too, &error),
+                     ebpo_ray_first(p->context[mode], origin, direction, t_max, &near, &too,
+                                    &error),
                      &error))
             /* among faces with equal t, the first face in the file is returned, which may be
              * another face in the subset */
             ck_assert(hit == too && (!hit || far.t == near.t));
         fine(ebpo_ray_all(m->context, origin, direction, t_max, &all, &count, &error), &error);
         if (answered(t,
-                     ebpo_ray_all(p->context[way], origin, direction, t_max, &some, &found, &error),
+                     ebpo_ray_all(p->context[mode], origin, direction, t_max, &some, &found,
+                                  &error),
                      &error))
             ck_assert(count == found);
     }
@@ -199,14 +201,14 @@ static int compare_faces(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-static void query_box(tally *t, query_model *m, part *p, int way, const double min[3],
+static void query_box(tally *t, query_model *m, part *p, int mode, const double min[3],
                       const double max[3], bool must)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     const uint64_t *all, *some;
     uint64_t count, found;
     fine(ebpo_faces_in_box(m->context, min, max, &all, &count, &error), &error);
-    ebpo_status status = ebpo_faces_in_box(p->context[way], min, max, &some, &found, &error);
+    ebpo_status status = ebpo_faces_in_box(p->context[mode], min, max, &some, &found, &error);
     ck_assert_msg(!must || status == EBPO_OK, "the kept box is refused: %s", error.message);
     if (!answered(t, status, &error))
         return;
@@ -299,18 +301,18 @@ static void compare_one(query_model *m, uint64_t seed, tally *t)
         for (int k = 0; k < 3; k++)
             points[3 * i + k] = o.min[k] + ebpo_test_random_unit(&seed) * (o.max[k] - o.min[k]);
     query_find_truths(m, points, POINTS, truth);
-    for (int way = 0; way < WAYS; way++) {
+    for (int mode = 0; mode < MODES; mode++) {
         for (int i = 0; i < POINTS; i++) {
-            query_limited(m, &p, way, points + 3 * i, &o, &truth[i]);
-            query_exact(t, m, &p, way, points + 3 * i, &o, &truth[i]);
+            query_limited(m, &p, mode, points + 3 * i, &o, &truth[i]);
+            query_exact(t, m, &p, mode, points + 3 * i, &o, &truth[i]);
         }
-        query_rays(t, m, &p, way, seed + (uint64_t)way);
+        query_rays(t, m, &p, mode, seed + (uint64_t)mode);
         bool all = o.last_level < 0 && p.info->parts & EBPO_PART_MESH;
         if (o.boxed)
-            query_box(t, m, &p, way, o.min, o.max, all);
+            query_box(t, m, &p, mode, o.min, o.max, all);
         ebpo_subset_options other = o;
         random_box(m, &seed, &other);
-        query_box(t, m, &p, way, other.min, other.max, all && !o.boxed);
+        query_box(t, m, &p, mode, other.min, other.max, all && !o.boxed);
     }
     part_close(&p);
 }

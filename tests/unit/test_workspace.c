@@ -106,42 +106,42 @@ END_TEST
 
 enum { PAGE = 4096, PAGES = 1 << 15, LINE = 64 };
 
-typedef struct touching {
+typedef struct page_writer {
     unsigned char *array;
     uint64_t most; /* greatest number of resident bytes */
-} touching;
+} page_writer;
 
-static void touch(touching *t, uint64_t byte)
+static void write_byte(page_writer *t, uint64_t byte)
 {
     t->array[byte] = 1;
     if (byte % (1 << 20) == 0)
         t->most = resident() > t->most ? resident() : t->most;
 }
 
-static ebpo_status haptic_pages(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                                ebpo_error *error)
+static ebpo_status write_pages(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
 {
     (void)worker, (void)error;
     for (uint64_t page = begin; page < end; page++)
-        touch(context, page * PAGE);
+        write_byte(context, page * PAGE);
     return EBPO_OK;
 }
 
-static void haptic_all(int way, ebpo_workspace *w, touching *t)
+static void write_all(int loop, ebpo_workspace *w, page_writer *t)
 {
-    if (way == 0)
+    if (loop == 0)
         EBPO_FOR_ITEMS(w, i, 0, (uint64_t)PAGES * PAGE / LINE)
-            touch(t, i * LINE);
-    if (way == 1)
+            write_byte(t, i * LINE);
+    if (loop == 1)
         EBPO_FOR_ITEMS_SCATTERED(w, page, 0, PAGES) {
-            touch(t, page * PAGE);
-            continue; /* this way also releases pages */
+            write_byte(t, page * PAGE);
+            continue; /* this loop also releases pages */
         }
-    if (way == 2)
+    if (loop == 2)
         EBPO_FOR_PIECES(w, page, PAGES, 256)
-            haptic_pages(t, page, page + 256, 0, NULL);
-    if (way == 3)
-        ck_assert_int_eq(ebpo_parallel_for(1, w, PAGES, 256, haptic_pages, t, NULL, "", NULL), 0);
+            write_pages(t, page, page + 256, 0, NULL);
+    if (loop == 3)
+        ck_assert_int_eq(ebpo_parallel_for(1, w, PAGES, 256, write_pages, t, NULL, "", NULL), 0);
 }
 
 START_TEST(test_workspace_loops_release_pages)
@@ -151,9 +151,9 @@ START_TEST(test_workspace_loops_release_pages)
 #endif
     uint64_t budget = (resident() + (32 << 20)) / 3 * 4;
     ebpo_workspace *w = make(budget);
-    touching t = { ebpo_array_alloc(w, (uint64_t)PAGES * PAGE, 1), 0 };
+    page_writer t = { ebpo_array_alloc(w, (uint64_t)PAGES * PAGE, 1), 0 };
     ck_assert_ptr_nonnull(t.array);
-    haptic_all(_i, w, &t);
+    write_all(_i, w, &t);
     ck_assert_msg(t.most <= budget, "%llu MiB of %llu", (unsigned long long)t.most >> 20,
                   (unsigned long long)budget >> 20);
     ebpo_array_free(w, t.array);

@@ -22,7 +22,7 @@
 
 ebpo_status ebpo_two_models_begin(ebpo_two_models *two, ebpo_pair_faces *places, ebpo_error *error)
 {
-    const ebpo_collision *q = places->current_query;
+    const ebpo_collision *q = places->collision;
     ebpo_status status = EBPO_OK;
     *two = (ebpo_two_models){ 0 };
     for (int i = 0; i < 2 && status == EBPO_OK; i++) {

@@ -384,7 +384,7 @@ static ebpo_status inspect_pair(searching *s, const ebpo_node_gap *pair, ebpo_er
     bool there;
     ebpo_status status = ebpo_subtree_search_load(&s->subtrees, pair->node, accel, &there, error);
     return status == EBPO_OK && there
-               ? distance_of_accels(s->subtrees.current_query, accel, pair->gap == 0, s->n, error)
+               ? distance_of_accels(s->subtrees.collision, accel, pair->gap == 0, s->n, error)
                : status;
 }
 
@@ -392,7 +392,7 @@ static ebpo_status add_node_pair(searching *s, const ebpo_posed_node node[2], do
                                  ebpo_error *error)
 {
     ebpo_node_gaps *nodes = &s->subtrees.nodes;
-    ebpo_model *const *model = s->subtrees.current_query->model;
+    ebpo_model *const *model = s->subtrees.collision->model;
     ebpo_node_gap pair = { { node[0], node[1] }, 0 };
     for (int i = 0; i < 2; i++)
         if (ebpo_entry_kind_of(node[i].entry) == EBPO_ENTRY_UNIFORM)
@@ -423,7 +423,7 @@ static ebpo_status search_subtrees(searching *s, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     ebpo_node_gaps *nodes = &s->subtrees.nodes;
-    const ebpo_collision *q = s->subtrees.current_query;
+    const ebpo_collision *q = s->subtrees.collision;
     while (nodes->count > 0 && status == EBPO_OK && !nearest_pair_is_done(s->n)) {
         ebpo_node_gap pair = ebpo_node_gaps_pop(nodes);
         int side = ebpo_subtree_search_side(&s->subtrees, pair.node);

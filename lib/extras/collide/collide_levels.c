@@ -17,7 +17,7 @@
 
 /* Zero at first. */
 typedef struct level_search {
-    const ebpo_collision *current_query;
+    const ebpo_collision *collision;
     ebpo_node_gaps nodes;
     /* output */
     double lo, hi;       /* bounds of the distance of faces */
@@ -47,7 +47,7 @@ static content content_of(const level_search *g, int side, const ebpo_posed_node
 
 static bool has_children(const level_search *g, const ebpo_posed_node *node)
 {
-    int level = g->current_query->options.level;
+    int level = g->collision->options.level;
     return ebpo_entry_kind_of(node->entry) == EBPO_ENTRY_GRAY &&
            (level < 0 || node->cell.level < level);
 }
@@ -91,7 +91,7 @@ static void widen_cell(double corner[8][3], double share)
 static bool shares_point(const level_search *g, double solid[8][3], double other[8][3], bool black)
 {
     int within = 0;
-    double middle[3], reach = g->current_query->reach;
+    double middle[3], reach = g->collision->reach;
     if (!black)
         widen_cell(other, 2 * EBPO_NEAR_SHARE);
     for (int c = 0; c < 8; c++)
@@ -181,7 +181,7 @@ static bool is_full(const level_search *g)
 {
     return g->nodes.count * sizeof *g->nodes.heap + g->nodes.side[0].bytes +
                g->nodes.side[1].bytes >
-           g->current_query->collider->options.memory;
+           g->collision->collider->options.memory;
 }
 
 /* Visits pairs in the order of their gaps. Skips pairs with a gap above `lo`, which is the least
@@ -192,10 +192,10 @@ static ebpo_status search_levels(level_search *g, ebpo_error *error)
     while (g->nodes.count > 0 && status == EBPO_OK) {
         ebpo_node_gap pair = ebpo_node_gaps_pop(&g->nodes);
         bool faces = has_faces(g, &pair);
-        g->current_query->collider->node_pairs++;
+        g->collision->collider->node_pairs++;
         if ((!faces && g->intersects) || pair.gap > g->lo)
             continue;
-        if (ebpo_collision_is_late(g->current_query) || is_full(g)) {
+        if (ebpo_collision_is_late(g->collision) || is_full(g)) {
             close_pair(g, &pair);
             close_all(g);
         } else if (has_children(g, &pair.node[0]) || has_children(g, &pair.node[1])) {
@@ -203,7 +203,7 @@ static ebpo_status search_levels(level_search *g, ebpo_error *error)
         } else {
             close_pair(g, &pair);
         }
-        if (!ebpo_progress_step(&g->current_query->options.progress, stage, 0, 0, error))
+        if (!ebpo_progress_step(&g->collision->options.progress, stage, 0, 0, error))
             return EBPO_E_CANCELLED;
     }
     return status;
@@ -211,7 +211,7 @@ static ebpo_status search_levels(level_search *g, ebpo_error *error)
 
 static ebpo_status level_search_run(level_search *g, const ebpo_collision *q, ebpo_error *error)
 {
-    g->current_query = q;
+    g->collision = q;
     g->lo = g->hi = INFINITY;
     ebpo_status status = ebpo_node_gaps_begin(&g->nodes, q, error);
     if (status != EBPO_OK)

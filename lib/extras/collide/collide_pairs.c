@@ -23,7 +23,7 @@
 /* Search for all intersecting pairs of faces of two accels, for a run of the first accel's faces.
  * Zero at first. */
 typedef struct gathering {
-    const ebpo_collision *current_query;
+    const ebpo_collision *collision;
     bool self;
     ebpo_node_pair *part; /* pairs of nodes from which threads continue */
     uint64_t parts, part_capacity;
@@ -203,7 +203,7 @@ static ebpo_status run_parts(void *user, uint64_t begin, uint64_t end, unsigned 
         uint64_t more = w->found_count - before;
         if (atomic_fetch_add(&g->found, more) + more > g->most)
             g->full = true;
-        if (ebpo_collision_is_late(g->current_query))
+        if (ebpo_collision_is_late(g->collision))
             return ebpo_fail(error, EBPO_E_CANCELLED, "%s: the deadline has passed", stage);
     }
     return EBPO_OK;
@@ -213,7 +213,7 @@ static ebpo_status run_parts(void *user, uint64_t begin, uint64_t end, unsigned 
  * pairs makes another query. */
 static bool take_walks(gathering *g)
 {
-    ebpo_collider *c = g->current_query->collider;
+    ebpo_collider *c = g->collision->collider;
     if (c->walks) {
         g->walk = c->walks;
         g->threads = c->walk_count;
@@ -276,9 +276,9 @@ static ebpo_status gather_pairs(gathering *g, const ebpo_accel_pair *pair, uint3
         return no_memory(&g->walk[0], error);
     uint64_t grain = g->parts / PARTS_EACH + 1;
     status = ebpo_parallel_for(g->threads, NULL, g->parts, grain, run_parts, g,
-                               &g->current_query->options.progress, stage, error);
+                               &g->collision->options.progress, stage, error);
     for (unsigned i = 0; i < g->threads; i++)
-        ebpo_collider_count(g->current_query->collider, &g->walk[i]);
+        ebpo_collider_count(g->collision->collider, &g->walk[i]);
     if (status != EBPO_OK || g->full)
         return status;
     return put_together(g, pair, error);
@@ -287,7 +287,7 @@ static ebpo_status gather_pairs(gathering *g, const ebpo_accel_pair *pair, uint3
 /* Returns the walks to the collider for the next query, which reuses their memory. */
 static void give_walks_back(gathering *g)
 {
-    ebpo_collider *c = g->current_query->collider;
+    ebpo_collider *c = g->collision->collider;
     for (unsigned i = 0; g->walk && i < g->threads; i++)
         ebpo_pair_walk_free(&g->walk[i]);
     if (c->walks) {
@@ -309,7 +309,7 @@ static void gathering_free(gathering *g)
 
 /* State of passing pairs to the caller. */
 typedef struct giving {
-    const ebpo_collision *current_query;
+    const ebpo_collision *collision;
     const ebpo_accel_pair *pair;
     ebpo_pairs_fn take;
     void *user;
@@ -324,7 +324,7 @@ static void give_pairs(giving *v, const ebpo_found_pair *found_pairs, uint64_t c
     for (uint64_t at = 0; at < count && !v->enough; at += GIVEN_AT_ONCE) {
         uint64_t n = count - at < GIVEN_AT_ONCE ? count - at : GIVEN_AT_ONCE;
         for (uint64_t i = 0; i < n; i++)
-            out[i] = ebpo_collision_pair(v->current_query, v->pair->accel[0], v->pair->accel[1],
+            out[i] = ebpo_collision_pair(v->collision, v->pair->accel[0], v->pair->accel[1],
                                          &found_pairs[at + i]);
         v->enough = !v->take(v->user, out, n);
     }
@@ -335,7 +335,7 @@ static void give_pairs(giving *v, const ebpo_found_pair *found_pairs, uint64_t c
 static ebpo_status in_runs(giving *v, gathering *g, ebpo_error *error)
 {
     uint32_t faces = v->pair->accel[0]->face_count, run = faces;
-    uint64_t most = v->current_query->collider->options.memory / (2 * sizeof(ebpo_found_pair)) + 1;
+    uint64_t most = v->collision->collider->options.memory / (2 * sizeof(ebpo_found_pair)) + 1;
     for (uint32_t begin = 0; begin < faces && !v->enough;) {
         uint32_t end = faces - begin > run ? begin + run : faces;
         g->most = end - begin == 1 ? UINT64_MAX : most;
@@ -368,7 +368,7 @@ static ebpo_status all_pairs(const ebpo_collision *q, bool self, ebpo_pairs_fn t
     if (pair.apart)
         return EBPO_OK;
     giving v = { q, &pair, take, user, false };
-    gathering g = { .current_query = q, .self = self };
+    gathering g = { .collision = q, .self = self };
     ebpo_status status = in_runs(&v, &g, error);
     gathering_free(&g);
     return status;

@@ -38,7 +38,7 @@ typedef struct separation_side {
 
 typedef struct separation_search {
     /* Input: */
-    const ebpo_collision *current_query;
+    const ebpo_collision *collision;
     double direction[3]; /* direction in which the query's first model moves; the greatest component
                           * is 1/2 .. 1 */
     /* Output: the last contact, in units of that direction, and its pair. Contacts before time 0 do
@@ -138,7 +138,7 @@ static void make_side(separation_search *s, int which, const ebpo_accel *accel)
     separation_side *side = &s->side[which];
     double centre[3];
     side->accel = accel;
-    side->posing = &s->current_query->posing[which].posing;
+    side->posing = &s->collision->posing[which].posing;
     ebpo_posing_apply(side->posing, side->accel->centre, centre);
     for (int i = 0; i < 3; i++) {
         for (int k = 0; k < 3; k++) {
@@ -158,7 +158,7 @@ static bool comes_first(const separation_search *s, const ebpo_found_pair *x)
     uint64_t a = ebpo_accel_file_face(s->side[0].accel, x->a),
              b = ebpo_accel_file_face(s->side[1].accel, x->b);
     const uint64_t has[2] = { s->pair.file_face_a, s->pair.file_face_b };
-    bool turned = s->current_query->turned;
+    bool turned = s->collision->turned;
     return a != has[turned] ? a < has[turned] : b < has[!turned];
 }
 
@@ -178,7 +178,7 @@ static void inspect_faces(separation_search *s, const double a[3][3], const doub
         mpz_swap(t.denominator, s->last.denominator);
         s->last.unit = t.unit;
         s->last.ever = true;
-        s->pair = ebpo_collision_pair(s->current_query, s->side[0].accel, s->side[1].accel, pair);
+        s->pair = ebpo_collision_pair(s->collision, s->side[0].accel, s->side[1].accel, pair);
         s->sure = fmax(0, nextafter(ebpo_sweep_time_round(&s->last), 0));
     }
     ebpo_sweep_time_clear(&t);
@@ -255,7 +255,7 @@ static void separation_search_begin(separation_search *s)
     ebpo_sweep_time_init(&s->last);
     make_axes(s->direction, s->axis);
     s->step = ebpo_vec3_dot(s->axis[0], s->direction);
-    s->lost = 0x1p-40 * s->current_query->reach;
+    s->lost = 0x1p-40 * s->collision->reach;
     s->hi = -1;
     s->pair = (ebpo_face_pair){ EBPO_NO_FACE, EBPO_NO_FACE,    EBPO_NO_FACE,
                                 EBPO_NO_FACE, EBPO_PAIR_APART, 0 };
@@ -274,14 +274,14 @@ static ebpo_status offer_tops(separation_search *s, ebpo_error *error)
 static ebpo_status separation_search_run(separation_search *s, const ebpo_accel *const accel[2],
                                          ebpo_error *error)
 {
-    const ebpo_progress *progress = &s->current_query->options.progress;
+    const ebpo_progress *progress = &s->collision->options.progress;
     if (accel[0]->bound_count == 0 || accel[1]->bound_count == 0)
         return EBPO_OK;
     for (int w = 0; w < 2; w++)
         make_side(s, w, accel[w]);
     ebpo_status status = offer_tops(s, error);
     while (status == EBPO_OK && s->count > 0 && s->pairs[0].most >= s->sure) {
-        if (ebpo_collision_is_late(s->current_query))
+        if (ebpo_collision_is_late(s->collision))
             break;
         if (s->evaluations % 64 == 0 &&
             !ebpo_progress_step(progress, "separation distance", 0, 0, error)) {
@@ -316,7 +316,7 @@ static ebpo_status cell_extent(searching *s, int which, ebpo_cell cell, separati
 {
     ebpo_posed_subtrees *side = &s->subtrees.nodes.side[which];
     ebpo_convex hull;
-    double slack = ebpo_posed_slack(side, cell, s->subtrees.current_query->reach);
+    double slack = ebpo_posed_slack(side, cell, s->subtrees.collision->reach);
     ebpo_status status = ebpo_posed_envelope(side, cell, &hull, error);
     for (int i = 0; i < 3 && status == EBPO_OK; i++) {
         const double *axis = s->search->axis[i];
@@ -373,7 +373,7 @@ static ebpo_status inspect_pair(searching *s, const ebpo_node_gap *pair, ebpo_er
 
 static ebpo_status search_node_pairs(searching *s, ebpo_error *error)
 {
-    const ebpo_collision *q = s->subtrees.current_query;
+    const ebpo_collision *q = s->subtrees.collision;
     ebpo_node_gaps *nodes = &s->subtrees.nodes;
     ebpo_posed_node root[2] = { ebpo_posed_root(&nodes->side[0]),
                                 ebpo_posed_root(&nodes->side[1]) };
@@ -398,7 +398,7 @@ static ebpo_status search_node_pairs(searching *s, ebpo_error *error)
 static ebpo_status separation_of_parts(separation_search *search, ebpo_error *error)
 {
     searching s = { .search = search };
-    ebpo_status status = ebpo_subtree_search_begin(&s.subtrees, search->current_query, error);
+    ebpo_status status = ebpo_subtree_search_begin(&s.subtrees, search->collision, error);
     if (status == EBPO_OK)
         status = search_node_pairs(&s, error);
     ebpo_subtree_search_end(&s.subtrees);
@@ -414,7 +414,7 @@ static int set_direction(separation_search *s, const double direction[3])
     (void)frexp(fmax(fabs(direction[0]), fmax(fabs(direction[1]), fabs(direction[2]))), &exponent);
     for (int k = 0; k < 3; k++)
         s->direction[k] =
-            ldexp(s->current_query->turned ? -direction[k] : direction[k], -exponent) + 0.0;
+            ldexp(s->collision->turned ? -direction[k] : direction[k], -exponent) + 0.0;
     return exponent;
 }
 
@@ -443,7 +443,7 @@ ebpo_status ebpo_collide_separation(ebpo_collider *c, const ebpo_collide_options
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status != EBPO_OK)
         return status;
-    separation_search s = { .current_query = &q };
+    separation_search s = { .collision = &q };
     int exponent = set_direction(&s, direction);
     separation_search_begin(&s);
     const ebpo_accel *const whole[2] = { q.model[0]->whole, q.model[1]->whole };

@@ -125,7 +125,7 @@ static const struct {
 enum { ROWS = 512 };
 
 typedef struct writing {
-    const ebpo_collision *current_query;
+    const ebpo_collision *collision;
     ebpo_pair_faces places;
     ebpo_h5_out out;
     ebpo_h5_table table[TABLES];
@@ -202,7 +202,7 @@ static bool take_rows(void *user, const ebpo_face_pair *pairs, uint64_t count)
 
 static ebpo_status write_tables(writing *w, const char *path, ebpo_publish *target)
 {
-    const ebpo_collision *q = w->current_query;
+    const ebpo_collision *q = w->collision;
     ebpo_status status = ebpo_h5_create_plain(&w->out, ebpo_publish_path(target), path, w->error);
     if (status == EBPO_OK)
         status = make_tables(w, w->error);
@@ -226,7 +226,7 @@ static ebpo_status write_hdf5(const ebpo_collision *q, const char *path, ebpo_pu
     writing *w = ebpo_alloc_zero(1, sizeof *w);
     if (!w)
         return ebpo_fail_memory(error, sizeof *w);
-    w->current_query = q;
+    w->collision = q;
     w->out = (ebpo_h5_out)EBPO_H5_OUT_INIT;
     w->error = error;
     for (int i = 0; i < TABLES; i++)
@@ -247,7 +247,7 @@ typedef struct painted {
     ebpo_mesh mesh;
     ebpo_faces_by_number parts;
     ebpo_red_source source;
-    uint64_t *intersected; /* a bit for each intersecting face */
+    uint64_t *intersecting; /* a bit for each intersecting face */
 } painted;
 
 typedef struct painting {
@@ -257,7 +257,7 @@ typedef struct painting {
 static bool take_found(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
     const painting *p = user;
-    uint64_t *a = p->side[0].intersected, *b = p->side[1].intersected;
+    uint64_t *a = p->side[0].intersecting, *b = p->side[1].intersecting;
     for (uint64_t i = 0; i < count; i++) {
         a[pairs[i].file_face_a / 64] |= UINT64_C(1) << pairs[i].file_face_a % 64;
         b[pairs[i].file_face_b / 64] |= UINT64_C(1) << pairs[i].file_face_b % 64;
@@ -278,8 +278,8 @@ static ebpo_status part_face(void *user, uint64_t number, uint32_t out[3], ebpo_
 static ebpo_status begin_painted(painted *p, const ebpo_model *model, ebpo_error *error)
 {
     const ebpo_info *info = model->info;
-    p->intersected = ebpo_alloc_zero(info->face_count / 64 + 1, 8);
-    if (!p->intersected)
+    p->intersecting = ebpo_alloc_zero(info->face_count / 64 + 1, 8);
+    if (!p->intersecting)
         return ebpo_fail_memory(error, info->face_count / 8);
     if (model->whole) {
         ebpo_status status = ebpo_file_read_mesh(model->file, NULL, &p->mesh, error);
@@ -296,7 +296,7 @@ static void end_painted(painted *p)
 {
     ebpo_faces_by_number_end(&p->parts);
     ebpo_mesh_free(&p->mesh);
-    free(p->intersected);
+    free(p->intersecting);
 }
 
 static ebpo_status write_ply(const ebpo_collision *q, ebpo_publish *target, ebpo_error *error)
@@ -312,7 +312,7 @@ static ebpo_status write_ply(const ebpo_collision *q, ebpo_publish *target, ebpo
     uint64_t before = ebpo_collision_bytes_read(q);
     for (int m = 0; m < 2; m++)
         red[m] = (ebpo_red_mesh){ p.side[m].source, &q->posing[(int)q->turned ^ m].posing,
-                                  p.side[m].intersected, colour[m] };
+                                  p.side[m].intersecting, colour[m] };
     if (status == EBPO_OK)
         status = ebpo_red_meshes_print(red, 2, target, error);
     q->collider->bytes_read += ebpo_collision_bytes_read(q) - before;

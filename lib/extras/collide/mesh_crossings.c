@@ -32,7 +32,7 @@ typedef struct crossings {
     ebpo_collider *collider;
     ebpo_publish target; /* the PLY file, if the caller wants one */
     ebpo_crossings_summary sum;
-    uint64_t *intersected; /* a bit for each face, by its number in the source */
+    uint64_t *intersecting; /* a bit for each face, by its number in the source */
     bool enough;
 } crossings;
 
@@ -123,8 +123,8 @@ static void common_point(const double a[3][3], const double b[3][3], int32_t kin
 static void note_face(crossings *c, uint64_t face)
 {
     uint64_t bit = UINT64_C(1) << face % 64;
-    c->sum.faces += !(c->intersected[face / 64] & bit);
-    c->intersected[face / 64] |= bit;
+    c->sum.faces += !(c->intersecting[face / 64] & bit);
+    c->intersecting[face / 64] |= bit;
 }
 
 static void fill_crossing(crossings *c, const ebpo_face_pair *pair, ebpo_crossing *out)
@@ -169,7 +169,7 @@ static ebpo_status paint_crossings(crossings *c, ebpo_workspace *workspace, ebpo
     ebpo_status status = ebpo_file_read_source_mesh(c->file, &how, &mesh, &source_order, error);
     if (status != EBPO_OK)
         return status;
-    const ebpo_red_mesh red = { ebpo_red_source_of(&mesh), NULL, c->intersected, "200 200 200" };
+    const ebpo_red_mesh red = { ebpo_red_source_of(&mesh), NULL, c->intersecting, "200 200 200" };
     status = ebpo_red_meshes_print(&red, 1, &c->target, error);
     ebpo_mesh_free(&mesh);
     return status == EBPO_OK ? ebpo_publish_commit(&c->target, error) : status;
@@ -183,8 +183,8 @@ static ebpo_status search_crossings(crossings *c, ebpo_mesh *mesh, const ebpo_me
     ebpo_status status = build_model(c, mesh, report, error);
     if (status != EBPO_OK)
         return status;
-    c->intersected = ebpo_alloc_zero(c->tree.mesh.face_count / 64 + 1, sizeof *c->intersected);
-    if (!c->intersected)
+    c->intersecting = ebpo_alloc_zero(c->tree.mesh.face_count / 64 + 1, sizeof *c->intersecting);
+    if (!c->intersecting)
         return ebpo_fail_memory(error, c->tree.mesh.face_count / 8);
     status = store_model(c, ebpo_workspace_folder(workspace), error);
     drop_levels(&c->tree);
@@ -201,7 +201,7 @@ static void close_all(crossings *c)
     ebpo_model_free(c->model);
     ebpo_close(c->file);
     ebpo_tree_free(&c->tree);
-    free(c->intersected);
+    free(c->intersecting);
     ebpo_publish_abort(&c->target);
 }
 

@@ -112,7 +112,7 @@ static ebpo_status make_slots(ebpo_collider *c, ebpo_error *error)
 ebpo_status ebpo_pair_faces_begin(ebpo_pair_faces *f, const ebpo_collision *q, ebpo_error *error)
 {
     ebpo_collider *c = q->collider;
-    f->current_query = q;
+    f->collision = q;
     ebpo_status status = make_slots(c, error);
     for (int i = 0; i < 2 && status == EBPO_OK; i++)
         ebpo_faces_by_number_begin(&f->side[i], c->model[i], c->slots[i]);
@@ -130,7 +130,7 @@ ebpo_status ebpo_pose_pair(ebpo_pair_faces *f, const ebpo_face_pair *pair, ebpo_
 {
     const uint64_t face[2] = { pair->file_face_a, pair->file_face_b };
     for (int i = 0; i < 2; i++) {
-        const ebpo_posing *posing = &f->current_query->posing[f->current_query->turned ^ i].posing;
+        const ebpo_posing *posing = &f->collision->posing[f->collision->turned ^ i].posing;
         ebpo_status status = ebpo_faces_by_number_get(&f->side[i], face[i], out->own[i], error);
         if (status != EBPO_OK)
             return status;

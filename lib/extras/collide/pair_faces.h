@@ -43,13 +43,12 @@ typedef struct ebpo_posed_pair {
 
 /* Looks up the faces of a query's pairs. */
 typedef struct ebpo_pair_faces {
-    const ebpo_collision *current_query;
+    const ebpo_collision *collision;
     ebpo_faces_by_number side[2]; /* the caller's A and B */
 } ebpo_pair_faces;
 
 /* Must be ended, also after a failure; a zero struct is allowed. */
-EBPO_MUST_USE ebpo_status ebpo_pair_faces_begin(ebpo_pair_faces *f,
-                                                const ebpo_collision *current_query,
+EBPO_MUST_USE ebpo_status ebpo_pair_faces_begin(ebpo_pair_faces *f, const ebpo_collision *collision,
                                                 ebpo_error *error);
 void ebpo_pair_faces_end(ebpo_pair_faces *f);
 

@@ -34,7 +34,7 @@
 /* Patches without contact, in the subtrees of one of the query's models; a whole model is its only
  * subtree. */
 typedef struct separate_patches {
-    const ebpo_collision *current_query;
+    const ebpo_collision *collision;
     ebpo_two_models *two;
     int m;
     uint64_t subtrees;
@@ -45,42 +45,42 @@ typedef struct separate_patches {
     uint32_t *patch;
 } separate_patches;
 
-static void separate_patches_begin(separate_patches *u, const ebpo_collision *current_query,
+static void separate_patches_begin(separate_patches *u, const ebpo_collision *collision,
                                    ebpo_two_models *two, int m)
 {
-    const ebpo_model *model = current_query->model[m];
-    *u = (separate_patches){ .current_query = current_query, .two = two, .m = m };
+    const ebpo_model *model = collision->model[m];
+    *u = (separate_patches){ .collision = collision, .two = two, .m = m };
     u->subtrees = model->whole ? 1 : model->top->below_count;
 }
 
 static void separate_patches_end(separate_patches *u) { free(u->patch); }
 
 static ebpo_status find_patches(separate_patches *u, const ebpo_accel *subtree,
-                                const uint32_t *slots, const uint64_t *intersected,
+                                const uint32_t *slots, const uint64_t *intersecting,
                                 ebpo_error *error)
 {
     u->first = subtree->first_face;
     u->count = subtree->face_count - subtree->shared_count;
-    return ebpo_face_patches(subtree, slots, intersected, &u->patch, error);
+    return ebpo_face_patches(subtree, slots, intersecting, &u->patch, error);
 }
 
-/* Loads the subtree, finds its patches and releases it. intersected: a bit for each face of the
+/* Loads the subtree, finds its patches and releases it. intersecting: a bit for each face of the
  * model. */
 static ebpo_status separate_patches_find(separate_patches *u, uint64_t number,
-                                         const uint64_t *intersected, ebpo_error *error)
+                                         const uint64_t *intersecting, ebpo_error *error)
 {
-    const ebpo_model *model = u->current_query->model[u->m];
+    const ebpo_model *model = u->collision->model[u->m];
     ebpo_context *context = u->two->context[u->m];
     ebpo_accel *subtree;
     free(u->patch);
     u->patch = NULL;
     if (model->whole)
-        return find_patches(u, model->whole, u->two->faces[u->m]->slots, intersected, error);
+        return find_patches(u, model->whole, u->two->faces[u->m]->slots, intersecting, error);
     ebpo_status status = ebpo_context_subtree(context, (uint32_t)number, &subtree, error);
     if (status != EBPO_OK)
         return status;
     uint32_t *slots = ebpo_face_slots(subtree);
-    status = slots ? find_patches(u, subtree, slots, intersected, error)
+    status = slots ? find_patches(u, subtree, slots, intersecting, error)
                    : ebpo_fail_memory(error, subtree->face_count * sizeof *slots);
     free(slots);
     ebpo_context_let_go(context);
@@ -123,15 +123,15 @@ static ebpo_status side_of_ball(const separate_patches *u, const double middle[3
 static ebpo_status separate_patches_side(const separate_patches *u, uint64_t number, int *in,
                                          ebpo_error *error)
 {
-    const ebpo_model *model = u->current_query->model[u->m];
-    ebpo_posed_subtrees as = { .model = model, .posing = u->current_query->posing[u->m].posing };
+    const ebpo_model *model = u->collision->model[u->m];
+    ebpo_posed_subtrees as = { .model = model, .posing = u->collision->posing[u->m].posing };
     double corner[8][3], middle[3];
     *in = -1;
     if (model->whole)
         return EBPO_OK;
     ebpo_cell cell = model->top->below[number].cell;
     double radius =
-        ebpo_posed_diagonal(&as, cell) / 2 + ebpo_posed_slack(&as, cell, u->current_query->reach);
+        ebpo_posed_diagonal(&as, cell) / 2 + ebpo_posed_slack(&as, cell, u->collision->reach);
     ebpo_posed_cell(&as, cell, corner);
     for (int k = 0; k < 3; k++)
         middle[k] = corner[0][k] / 2 + corner[7][k] / 2;
@@ -147,12 +147,12 @@ static const char stage[] = "relation";
 
 /* State of the search; models in the query's order. */
 typedef struct relating {
-    const ebpo_collision *current_query;
+    const ebpo_collision *collision;
     ebpo_pair_faces places;
     ebpo_two_models two;
     ebpo_relation_result *out;
-    uint64_t *intersected[2], *seen[2]; /* intersected: a bit for each face that intersects the
-                                         * other model; seen: for each examined face */
+    uint64_t *intersecting[2], *seen[2]; /* intersecting: a bit for each face that intersects the
+                                          * other model; seen: for each examined face */
     bool both, only[2];   /* both: there are inner points of both models; only: there are inner
                            * points of this model that are not in the other */
     bool examined;        /* a face with an area has been examined */
@@ -178,7 +178,7 @@ static bool is_decided(const relating *r)
 
 static uint64_t face_count(const relating *r, int m)
 {
-    return r->current_query->model[m]->info->face_count;
+    return r->collision->model[m]->info->face_count;
 }
 
 static bool has_bit(const uint64_t *bits, uint64_t i) { return bits[i / 64] >> i % 64 & 1; }
@@ -226,16 +226,16 @@ static bool inspect_pair_one(relating *r, int m, uint64_t face)
     set_bit(r->seen[m], face);
     r->status = ebpo_visit_around_face(&r->two, m, face, note_piece, &f, r->error);
     if (r->status == EBPO_OK && ++r->inspected % 64 == 0 &&
-        !ebpo_progress_step(&r->current_query->options.progress, stage, 0, 0, r->error))
+        !ebpo_progress_step(&r->collision->options.progress, stage, 0, 0, r->error))
         r->status = EBPO_E_CANCELLED;
-    r->open |= ebpo_collision_is_late(r->current_query);
+    r->open |= ebpo_collision_is_late(r->collision);
     return r->status == EBPO_OK && !r->open && !is_decided(r);
 }
 
 static bool inspect_pair(relating *r, const ebpo_face_pair *pair)
 {
     const uint64_t face[2] = { pair->file_face_a, pair->file_face_b };
-    bool turned = r->current_query->turned;
+    bool turned = r->collision->turned;
     return inspect_pair_one(r, 0, face[turned]) && inspect_pair_one(r, 1, face[!turned]);
 }
 
@@ -264,10 +264,10 @@ static bool note_pair(relating *r, const ebpo_face_pair *pair)
 static bool take_contacts(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
     relating *r = user;
-    bool turned = r->current_query->turned, more = true;
+    bool turned = r->collision->turned, more = true;
     for (uint64_t i = 0; i < count && more; i++) {
-        set_bit(r->intersected[turned], pairs[i].file_face_a);
-        set_bit(r->intersected[!turned], pairs[i].file_face_b);
+        set_bit(r->intersecting[turned], pairs[i].file_face_a);
+        set_bit(r->intersecting[!turned], pairs[i].file_face_b);
         if (are_surfaces(r))
             more = note_pair(r, &pairs[i]);
         else if (pairs[i].kind == EBPO_PAIR_CROSSING)
@@ -279,16 +279,16 @@ static bool take_contacts(void *user, const ebpo_face_pair *pairs, uint64_t coun
 /* Returns options with the remaining time. */
 static ebpo_collide_options options_left(const relating *r)
 {
-    ebpo_collide_options options = r->current_query->options;
+    ebpo_collide_options options = r->collision->options;
     uint64_t now = ebpo_clock();
-    if (r->current_query->late != UINT64_MAX)
-        options.deadline_ns = r->current_query->late > now ? r->current_query->late - now : 1;
+    if (r->collision->late != UINT64_MAX)
+        options.deadline_ns = r->collision->late > now ? r->collision->late - now : 1;
     return options;
 }
 
 static ebpo_status take_pairs(relating *r, ebpo_pairs_fn take, ebpo_error *error)
 {
-    const ebpo_collision *q = r->current_query;
+    const ebpo_collision *q = r->collision;
     ebpo_collide_options options = options_left(r);
     ebpo_two_models_let_go(&r->two);
     ebpo_status status = ebpo_collide_all(q->collider, &options, take, r, error);
@@ -309,7 +309,7 @@ static void inspect_found(relating *r)
     for (int m = 0; m < 2; m++) {
         uint64_t count = face_count(r, m);
         for (uint64_t f = 0; f < count && goes_on(r); f++)
-            if (has_bit(r->intersected[m], f))
+            if (has_bit(r->intersecting[m], f))
                 (void)inspect_pair_one(r, m, f);
     }
 }
@@ -330,7 +330,7 @@ static bool side_adds_nothing(const relating *r, int m, bool in)
 static void inspect_untouched_faces(relating *r, const separate_patches *u, uint64_t *done)
 {
     for (uint64_t i = 0; i < u->count && goes_on(r); i++) {
-        if (has_bit(r->intersected[u->m], u->first + i) || has_bit(done, u->patch[i]))
+        if (has_bit(r->intersecting[u->m], u->first + i) || has_bit(done, u->patch[i]))
             continue;
         r->examined = false;
         (void)inspect_pair_one(r, u->m, u->first + i);
@@ -348,7 +348,7 @@ static ebpo_status fail_bits(uint64_t count, ebpo_error *error)
 
 static void inspect_subtree(relating *r, separate_patches *u, uint64_t number)
 {
-    r->status = separate_patches_find(u, number, r->intersected[u->m], r->error);
+    r->status = separate_patches_find(u, number, r->intersecting[u->m], r->error);
     if (r->status != EBPO_OK)
         return;
     uint64_t *done = make_bits(u->count);
@@ -374,11 +374,11 @@ static void inspect_patches(relating *r, int m)
     separate_patches u;
     if (is_mixed(r) && r->two.solid[m])
         return;
-    separate_patches_begin(&u, r->current_query, &r->two, m);
+    separate_patches_begin(&u, r->collision, &r->two, m);
     for (uint64_t i = 0; i < u.subtrees && goes_on(r); i++) {
         if (!is_settled(r, &u, i) && r->status == EBPO_OK)
             inspect_subtree(r, &u, i);
-        r->open |= ebpo_collision_is_late(r->current_query);
+        r->open |= ebpo_collision_is_late(r->collision);
     }
     separate_patches_end(&u);
 }
@@ -407,11 +407,11 @@ static bool is_sound(relating *r, int m, uint64_t face)
 static bool take_sound(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
     relating *r = user;
-    bool turned = r->current_query->turned;
+    bool turned = r->collision->turned;
     for (uint64_t i = 0; i < count && !r->touch && r->status == EBPO_OK && !r->open; i++) {
         const uint64_t face[2] = { pairs[i].file_face_a, pairs[i].file_face_b };
         r->touch = is_sound(r, 0, face[turned]) && is_sound(r, 1, face[!turned]);
-        r->open |= ebpo_collision_is_late(r->current_query);
+        r->open |= ebpo_collision_is_late(r->collision);
     }
     return !r->touch && r->status == EBPO_OK && !r->open;
 }
@@ -421,9 +421,9 @@ static ebpo_status find_haptic(relating *r, ebpo_error *error)
     ebpo_status status = take_pairs(r, take_sound, error);
     uint64_t count = face_count(r, 0);
     for (uint64_t f = 0; f < count && status == EBPO_OK && !r->touch && !r->open; f++) {
-        if (has_bit(r->intersected[0], f))
+        if (has_bit(r->intersecting[0], f))
             status = ebpo_face_has_common_point(&r->two, 0, f, &r->touch, error);
-        r->open |= ebpo_collision_is_late(r->current_query);
+        r->open |= ebpo_collision_is_late(r->collision);
     }
     return status;
 }
@@ -435,7 +435,7 @@ static bool has_separate_area(relating *r, int m)
     bool has = false;
     for (uint64_t f = 0; f < face_count(r, m) && r->status == EBPO_OK && !has; f++) {
         double t[3][3];
-        if (!has_bit(r->intersected[m], f))
+        if (!has_bit(r->intersecting[m], f))
             r->status = ebpo_two_models_face(&r->two, m, f, t, &has, r->error);
     }
     return has;
@@ -463,7 +463,7 @@ static void find_any(relating *r)
  * decides. */
 static ebpo_status inspect_first(relating *r, ebpo_error *error)
 {
-    const ebpo_collision *q = r->current_query;
+    const ebpo_collision *q = r->collision;
     ebpo_collide_options options = options_left(r);
     ebpo_face_pair pair;
     ebpo_status status = ebpo_collide_first(q->collider, &options, &pair, &r->out->contact, error);
@@ -531,7 +531,7 @@ static bool are_boxes_apart(const ebpo_two_models *two)
 
 static ebpo_status find_relation(relating *r, ebpo_error *error)
 {
-    const ebpo_collision *q = r->current_query;
+    const ebpo_collision *q = r->collision;
     ebpo_status status = ebpo_two_models_begin(&r->two, &r->places, error);
     if (status != EBPO_OK)
         return status;
@@ -540,9 +540,9 @@ static ebpo_status find_relation(relating *r, ebpo_error *error)
         return EBPO_OK;
     for (int m = 0; m < 2; m++) {
         uint64_t count = face_count(r, m);
-        r->intersected[m] = make_bits(count);
+        r->intersecting[m] = make_bits(count);
         r->seen[m] = make_bits(count);
-        if (!r->intersected[m] || !r->seen[m])
+        if (!r->intersecting[m] || !r->seen[m])
             return fail_bits(count, error);
     }
     if (!is_same(q))
@@ -555,9 +555,9 @@ static ebpo_status find_relation(relating *r, ebpo_error *error)
  */
 static void count_loads(const relating *r, uint64_t bytes_before, uint64_t read_before)
 {
-    ebpo_collider *c = r->current_query->collider;
+    ebpo_collider *c = r->collision->collider;
     c->loads += ebpo_two_models_loads(&r->two);
-    c->bytes_read = bytes_before + ebpo_collision_bytes_read(r->current_query) - read_before;
+    c->bytes_read = bytes_before + ebpo_collision_bytes_read(r->collision) - read_before;
 }
 
 static void end_relating(relating *r)
@@ -565,7 +565,7 @@ static void end_relating(relating *r)
     ebpo_two_models_end(&r->two);
     ebpo_pair_faces_end(&r->places);
     for (int m = 0; m < 2; m++) {
-        free(r->intersected[m]);
+        free(r->intersecting[m]);
         free(r->seen[m]);
     }
 }
@@ -577,7 +577,7 @@ ebpo_status ebpo_collide_relation(ebpo_collider *c, const ebpo_collide_options *
     ebpo_collision q;
     *out = (ebpo_relation_result){ EBPO_RELATION_OPEN, -1 };
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
-    relating r = { .current_query = &q, .out = out, .error = error };
+    relating r = { .collision = &q, .out = out, .error = error };
     if (status == EBPO_OK)
         status = ebpo_pair_faces_begin(&r.places, &q, error);
     if (status != EBPO_OK)

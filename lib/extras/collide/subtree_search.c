@@ -85,7 +85,7 @@ ebpo_status ebpo_node_gap_of(ebpo_node_gaps *g, const ebpo_posed_node node[2], d
 ebpo_status ebpo_subtree_search_begin(ebpo_subtree_search *s, const ebpo_collision *q,
                                       ebpo_error *error)
 {
-    s->current_query = q;
+    s->collision = q;
     s->read_before = ebpo_collision_bytes_read(q);
     ebpo_status status = ebpo_node_gaps_begin(&s->nodes, q, error);
     for (int i = 0; i < 2 && status == EBPO_OK; i++) {
@@ -100,8 +100,8 @@ ebpo_status ebpo_subtree_search_begin(ebpo_subtree_search *s, const ebpo_collisi
 
 void ebpo_subtree_search_end(ebpo_subtree_search *s)
 {
-    ebpo_collider *c = s->current_query->collider;
-    c->bytes_read += ebpo_collision_bytes_read(s->current_query) - s->read_before;
+    ebpo_collider *c = s->collision->collider;
+    c->bytes_read += ebpo_collision_bytes_read(s->collision) - s->read_before;
     for (int i = 0; i < 2; i++) {
         c->loads += s->context[i] ? s->context[i]->loaded : 0;
         ebpo_context_free(s->context[i]);
@@ -122,7 +122,7 @@ int ebpo_subtree_search_side(const ebpo_subtree_search *s, const ebpo_posed_node
     int larger = ebpo_node_larger(&s->nodes, node);
     if (is_gray(&node[larger]))
         return larger;
-    return is_gray(&node[!larger]) && !s->current_query->model[!larger]->whole ? !larger : -1;
+    return is_gray(&node[!larger]) && !s->collision->model[!larger]->whole ? !larger : -1;
 }
 
 /* Returns true if a pair of subtrees has been visited. With a whole model and a model in parts,
@@ -130,7 +130,7 @@ int ebpo_subtree_search_side(const ebpo_subtree_search *s, const ebpo_posed_node
 static bool was_seen(const ebpo_subtree_search *s, const uint32_t number[2])
 {
     for (int i = 0; i < 2; i++)
-        if (s->current_query->model[!i]->whole && s->seen[i][number[i]])
+        if (s->collision->model[!i]->whole && s->seen[i][number[i]])
             return true;
     return false;
 }
@@ -138,11 +138,11 @@ static bool was_seen(const ebpo_subtree_search *s, const uint32_t number[2])
 ebpo_status ebpo_subtree_search_load(ebpo_subtree_search *s, const ebpo_posed_node node[2],
                                      const ebpo_accel *accel[2], bool *there, ebpo_error *error)
 {
-    ebpo_collider *c = s->current_query->collider;
+    ebpo_collider *c = s->collision->collider;
     uint32_t number[2];
     *there = false;
     for (int i = 0; i < 2; i++) {
-        const ebpo_model *m = s->current_query->model[i];
+        const ebpo_model *m = s->collision->model[i];
         number[i] = m->whole ? 0 : ebpo_entry_value(node[i].entry);
         if (!m->whole && m->top->below[number[i]].pruned)
             return EBPO_OK; /* the content of a pruned node is not in this file */
@@ -151,7 +151,7 @@ ebpo_status ebpo_subtree_search_load(ebpo_subtree_search *s, const ebpo_posed_no
         return EBPO_OK;
     c->subtree_pairs++;
     for (int i = 0; i < 2; i++) {
-        ebpo_accel *loaded = s->current_query->model[i]->whole;
+        ebpo_accel *loaded = s->collision->model[i]->whole;
         ebpo_status status =
             loaded ? EBPO_OK : ebpo_context_subtree(s->context[i], number[i], &loaded, error);
         if (status != EBPO_OK)

@@ -20,8 +20,7 @@ typedef struct ebpo_node_gaps {
 } ebpo_node_gaps;
 
 /* Begins a heap, which must be freed, also after a failure. */
-EBPO_MUST_USE ebpo_status ebpo_node_gaps_begin(ebpo_node_gaps *g,
-                                               const ebpo_collision *current_query,
+EBPO_MUST_USE ebpo_status ebpo_node_gaps_begin(ebpo_node_gaps *g, const ebpo_collision *collision,
                                                ebpo_error *error);
 void ebpo_node_gaps_free(ebpo_node_gaps *g);
 
@@ -30,7 +29,7 @@ EBPO_MUST_USE ebpo_status ebpo_node_gaps_push(ebpo_node_gaps *g, const ebpo_node
 /* Removes and returns the pair with the least gap; the heap must not be empty. */
 ebpo_node_gap ebpo_node_gaps_pop(ebpo_node_gaps *g);
 
-/* Computes a certain lower bound of the gap of two nodes' envelopes, 0 or more. */
+/* Computes a guaranteed lower bound of the gap of two nodes' envelopes, 0 or more. */
 EBPO_MUST_USE ebpo_status ebpo_node_gap_of(ebpo_node_gaps *g, const ebpo_posed_node node[2],
                                            double *out, ebpo_error *error);
 /* Returns an upper bound of the distance of two nodes that each have a face in or near their cell.
@@ -45,7 +44,7 @@ int ebpo_node_larger(const ebpo_node_gaps *g, const ebpo_posed_node node[2]);
 
 /* Zero at first. */
 typedef struct ebpo_subtree_search {
-    const ebpo_collision *current_query;
+    const ebpo_collision *collision;
     ebpo_node_gaps nodes;
     ebpo_context *context[2]; /* for models in parts */
     bool *seen[2];            /* visited subtrees */
@@ -54,7 +53,7 @@ typedef struct ebpo_subtree_search {
 
 /* Begins a search, which must be freed, also after a failure. */
 EBPO_MUST_USE ebpo_status ebpo_subtree_search_begin(ebpo_subtree_search *s,
-                                                    const ebpo_collision *current_query,
+                                                    const ebpo_collision *collision,
                                                     ebpo_error *error);
 /* Adds the loads and bytes read to the collider's counts. */
 void ebpo_subtree_search_end(ebpo_subtree_search *s);

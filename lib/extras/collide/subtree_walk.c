@@ -46,7 +46,7 @@ typedef struct stored_pair {
 
 /* Search of one thread. Zero at first. Its contexts hold the last two subtrees. */
 typedef struct subtree_walk {
-    const ebpo_collision *current_query;
+    const ebpo_collision *collision;
     bool self;
     ebpo_context *context[2]; /* for models in parts */
     ebpo_pair_walk walk;
@@ -228,14 +228,14 @@ static void sort_nearest_first(subtree_pairs *p)
         qsort(p->pair, p->count, sizeof *p->pair, by_nearness);
 }
 
-static ebpo_status subtree_walk_begin(subtree_walk *w, const ebpo_collision *current_query,
-                                      bool self, ebpo_error *error)
+static ebpo_status subtree_walk_begin(subtree_walk *w, const ebpo_collision *collision, bool self,
+                                      ebpo_error *error)
 {
-    w->current_query = current_query;
+    w->collision = collision;
     w->self = self;
     for (int i = 0; i < 2; i++)
-        if (!current_query->model[i]->whole && !w->context[i]) {
-            ebpo_status status = ebpo_context_new(current_query->model[i], &w->context[i], error);
+        if (!collision->model[i]->whole && !w->context[i]) {
+            ebpo_status status = ebpo_context_new(collision->model[i], &w->context[i], error);
             if (status != EBPO_OK)
                 return status;
         }
@@ -285,7 +285,7 @@ static ebpo_face_pair face_pair_of(const ebpo_collision *q, const stored_pair *t
 static ebpo_status load_subtree(subtree_walk *w, int side, uint32_t number, const ebpo_accel **out,
                                 ebpo_error *error)
 {
-    ebpo_accel *loaded = w->current_query->model[side]->whole;
+    ebpo_accel *loaded = w->collision->model[side]->whole;
     ebpo_status status =
         loaded ? EBPO_OK : ebpo_context_subtree(w->context[side], number, &loaded, error);
     *out = loaded;
@@ -320,7 +320,7 @@ static ebpo_status no_memory(const ebpo_pair_walk *w, ebpo_error *error)
 
 static ebpo_status walk_down(subtree_walk *w, const ebpo_accel *const accel[2], ebpo_error *error)
 {
-    const ebpo_collision *q = w->current_query;
+    const ebpo_collision *q = w->collision;
     const ebpo_block_posing *posing[2] = { &q->posing[0], &q->posing[1] };
     ebpo_accel_pair pair;
     ebpo_pair_walk *down = &w->walk;
@@ -368,7 +368,7 @@ static const char stage[] = "pairs of subtrees";
 enum { PAIRS_IN_A_ROW = 4 };
 
 typedef struct gathering_parts {
-    const ebpo_collision *current_query;
+    const ebpo_collision *collision;
     bool self;
     ebpo_posed_subtrees subtrees[2];
     subtree_pairs pairs;
@@ -386,8 +386,8 @@ typedef struct gathering_parts {
 
 static void count_walk(const gathering_parts *g, subtree_walk *w)
 {
-    g->current_query->collider->loads += subtree_walk_loads(w);
-    ebpo_collider_count(g->current_query->collider, &w->walk);
+    g->collision->collider->loads += subtree_walk_loads(w);
+    ebpo_collider_count(g->collision->collider, &w->walk);
 }
 
 /* --- waiting pairs --- */
@@ -471,7 +471,7 @@ static ebpo_status run_pairs(void *user, uint64_t begin, uint64_t end, unsigned 
             status = keep_pairs(g, pair, w, error);
         if (status != EBPO_OK)
             return status;
-        if (w->late || ebpo_collision_is_late(g->current_query))
+        if (w->late || ebpo_collision_is_late(g->collision))
             return ebpo_fail(error, EBPO_E_CANCELLED, "%s: the deadline has passed", stage);
     }
     return EBPO_OK;
@@ -481,7 +481,7 @@ static ebpo_status run_pairs(void *user, uint64_t begin, uint64_t end, unsigned 
  * one thread continues. */
 static ebpo_status run_all(gathering_parts *g, ebpo_error *error)
 {
-    const ebpo_progress *progress = &g->current_query->options.progress;
+    const ebpo_progress *progress = &g->collision->options.progress;
     ebpo_error many = EBPO_ERROR_INIT;
     ebpo_status status = EBPO_E_LIMIT;
     if (g->threads > 1)
@@ -515,7 +515,7 @@ static bool give_waiting(const gathering_parts *g, ebpo_pairs_fn take, void *use
     for (uint64_t at = 0; at < g->count; at += GIVEN_AT_ONCE) {
         uint64_t n = g->count - at < GIVEN_AT_ONCE ? g->count - at : GIVEN_AT_ONCE;
         for (uint64_t i = 0; i < n; i++)
-            out[i] = face_pair_of(g->current_query, &g->stored[at + i]);
+            out[i] = face_pair_of(g->collision, &g->stored[at + i]);
         if (!take(user, out, n))
             return false;
     }
@@ -524,7 +524,7 @@ static bool give_waiting(const gathering_parts *g, ebpo_pairs_fn take, void *use
 
 static ebpo_status in_passes(gathering_parts *g, ebpo_pairs_fn take, void *user, ebpo_error *error)
 {
-    uint64_t most = g->current_query->collider->options.memory / (2 * sizeof *g->stored) + 2;
+    uint64_t most = g->collision->collider->options.memory / (2 * sizeof *g->stored) + 2;
     for (g->from = 0; g->from < UINT64_MAX; g->from = g->to) {
         g->to = UINT64_MAX;
         g->count = 0;
@@ -543,7 +543,7 @@ static ebpo_status in_passes(gathering_parts *g, ebpo_pairs_fn take, void *user,
 
 static ebpo_status begin_gathering(gathering_parts *g, unsigned threads, ebpo_error *error)
 {
-    const ebpo_collision *q = g->current_query;
+    const ebpo_collision *q = g->collision;
     ebpo_status status = EBPO_OK;
     g->walk = ebpo_alloc_zero(threads, sizeof *g->walk);
     if (!g->walk)
@@ -568,8 +568,7 @@ static ebpo_status begin_gathering(gathering_parts *g, unsigned threads, ebpo_er
 
 static void end_gathering(gathering_parts *g)
 {
-    g->current_query->collider->bytes_read +=
-        ebpo_collision_bytes_read(g->current_query) - g->read_before;
+    g->collision->collider->bytes_read += ebpo_collision_bytes_read(g->collision) - g->read_before;
     for (unsigned i = 0; i < g->threads; i++) {
         count_walk(g, &g->walk[i]);
         subtree_walk_free(&g->walk[i]);
@@ -586,7 +585,7 @@ static void end_gathering(gathering_parts *g)
 ebpo_status ebpo_gather_parts(const ebpo_collision *q, bool self, ebpo_pairs_fn take, void *user,
                               ebpo_error *error)
 {
-    gathering_parts g = { .current_query = q, .self = self };
+    gathering_parts g = { .collision = q, .self = self };
     (void)pthread_mutex_init(&g.lock, NULL);
     ebpo_status status =
         begin_gathering(&g, ebpo_thread_count(q->collider->options.threads), error);
@@ -600,7 +599,7 @@ ebpo_status ebpo_gather_parts(const ebpo_collision *q, bool self, ebpo_pairs_fn 
 static ebpo_status search_first_parts(gathering_parts *g, ebpo_face_pair *out, int32_t *found,
                                       ebpo_error *error)
 {
-    const ebpo_collision *q = g->current_query;
+    const ebpo_collision *q = g->collision;
     subtree_walk *w = &g->walk[0];
     for (uint64_t i = 0; i < g->pairs.count; i++) {
         ebpo_status status = subtree_walk_pair(w, &g->pairs.pair[i], error);
@@ -623,7 +622,7 @@ static ebpo_status search_first_parts(gathering_parts *g, ebpo_face_pair *out, i
 ebpo_status ebpo_first_of_parts(const ebpo_collision *q, ebpo_face_pair *out, int32_t *found,
                                 ebpo_error *error)
 {
-    gathering_parts g = { .current_query = q };
+    gathering_parts g = { .collision = q };
     (void)pthread_mutex_init(&g.lock, NULL);
     ebpo_status status = begin_gathering(&g, 1, error);
     if (status == EBPO_OK) {

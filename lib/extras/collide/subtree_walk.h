@@ -5,12 +5,11 @@
 #include "extras/collide/collider.h"
 
 /* Fails with the errors of ebpo_collide_all. */
-EBPO_MUST_USE ebpo_status ebpo_gather_parts(const ebpo_collision *current_query, bool self,
+EBPO_MUST_USE ebpo_status ebpo_gather_parts(const ebpo_collision *collision, bool self,
                                             ebpo_pairs_fn take, void *user, ebpo_error *error);
 
 /* Finds an intersecting pair, as ebpo_collide_first returns it. */
-EBPO_MUST_USE ebpo_status ebpo_first_of_parts(const ebpo_collision *current_query,
-                                              ebpo_face_pair *out, int32_t *found,
-                                              ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_first_of_parts(const ebpo_collision *collision, ebpo_face_pair *out,
+                                              int32_t *found, ebpo_error *error);
 
 #endif

@@ -200,11 +200,11 @@ static ebpo_status count_all(const scene_two *two, ebpo_pair_faces *faces,
 static ebpo_status count_with_location(const scene_two *two, const ebpo_face_pair *first,
                                        ebpo_scene_clash *m, ebpo_error *error)
 {
-    ebpo_collision current_query;
-    ebpo_pair_faces faces = { .current_query = &current_query };
-    ebpo_status status = ebpo_collision_begin(&current_query, two->collider, two->options, error);
+    ebpo_collision collision;
+    ebpo_pair_faces faces = { .collision = &collision };
+    ebpo_status status = ebpo_collision_begin(&collision, two->collider, two->options, error);
     if (status == EBPO_OK)
-        status = ebpo_pair_faces_begin(&faces, &current_query, error);
+        status = ebpo_pair_faces_begin(&faces, &collision, error);
     if (status == EBPO_OK)
         status = count_all(two, &faces, first, m, error);
     ebpo_pair_faces_end(&faces);

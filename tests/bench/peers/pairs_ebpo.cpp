@@ -76,13 +76,13 @@ static bool keep(void *user, const ebpo_face_pair *pairs, uint64_t count)
     return true;
 }
 
-static double run_query(two &t, const bench::pose &p, const std::string &current_query,
+static double run_query(two &t, const bench::pose &p, const std::string &query,
                         bench::face_pairs &pairs)
 {
     t.take(p);
-    if (current_query == "distance" || current_query == "within")
-        return t.distance(current_query == "within" ? 1e-12 * t.diagonal : 0);
-    if (current_query == "all") {
+    if (query == "distance" || query == "within")
+        return t.distance(query == "within" ? 1e-12 * t.diagonal : 0);
+    if (query == "all") {
         check(ebpo_collide_all(t.collider, &t.options, keep, &pairs, &error));
         return static_cast<double>(pairs.size());
     }
@@ -179,9 +179,8 @@ int main(int count, char **argument)
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
     check(ebpo_model_get_stats(t.model, &stats));
     printf("made %.3f %" PRIu64 "\n", t.seconds, (uint64_t)stats.memory);
-    return bench::run_poses(argument + 2,
-                            [&](const bench::pose &p, const std::string &current_query,
-                                bench::face_pairs &pairs) {
-                                return run_query(t, p, current_query, pairs);
-                            });
+    return bench::run_poses(argument + 2, [&](const bench::pose &p, const std::string &query,
+                                              bench::face_pairs &pairs) {
+        return run_query(t, p, query, pairs);
+    });
 }

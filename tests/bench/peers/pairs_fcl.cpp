@@ -33,17 +33,16 @@ static fcl::Transform3d transform_of(const bench::pose &p)
     return out;
 }
 
-static double run_query(const tree &t, const bench::pose &p, const std::string &current_query,
+static double run_query(const tree &t, const bench::pose &p, const std::string &query,
                         bench::face_pairs &pairs)
 {
     fcl::Transform3d here = fcl::Transform3d::Identity(), there = transform_of(p);
-    if (current_query == "distance") {
+    if (query == "distance") {
         fcl::DistanceRequestd request(true, false);
         fcl::DistanceResultd result;
         return fcl::distance(&t, here, &t, there, request, result);
     }
-    fcl::CollisionRequestd request(current_query == "first" ? 1
-                                                            : std::numeric_limits<size_t>::max(),
+    fcl::CollisionRequestd request(query == "first" ? 1 : std::numeric_limits<size_t>::max(),
                                    false);
     fcl::CollisionResultd result;
     fcl::collide(&t, here, &t, there, request, result);
@@ -73,9 +72,8 @@ int main(int count, char **argument)
     clock_gettime(CLOCK_THREAD_CPUTIME_ID, &b);
     double build = (double)(b.tv_sec - a.tv_sec) + 1e-9 * (double)(b.tv_nsec - a.tv_nsec);
     printf("made %.3f %zu\n", build, allocated() - before);
-    return bench::run_poses(argument + 2,
-                            [&](const bench::pose &p, const std::string &current_query,
-                                bench::face_pairs &pairs) {
-                                return run_query(*t, p, current_query, pairs);
-                            });
+    return bench::run_poses(argument + 2, [&](const bench::pose &p, const std::string &query,
+                                              bench::face_pairs &pairs) {
+        return run_query(*t, p, query, pairs);
+    });
 }

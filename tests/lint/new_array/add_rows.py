@@ -13,7 +13,7 @@ ADDED = {
                "    uint32_t *plane_share; /* [leaf_plane_count] */\n"),
     "array_table.inc": (r"LEVEL_ARRAY\(GRAY_COLOURS,[^)]*\)\n",
                         'LEVEL_ARRAY(LEAF_MARK, leaf_mark, leaf_mark, uint8_t, 1, LEAF, ALWAYS, '
-                        '"plain", USUALLY(0), 1, "a mark")\n'
+                        '"plain", WITH_DEFAULT(0), 1, "a mark")\n'
                         'LEVEL_ARRAY(PLANE_SHARE, plane_share, plane_share, uint32_t, 1 + 2 + 4, '
                         'LEAF_PLANE, LEAF_PLANES, "plain",\n'
                         '            REQUIRED, 1, "faces behind each plane")\n'),
