@@ -196,11 +196,11 @@ static double pair_blocks_best(int i) { return pair_blocks_by(ebpo_pair_kernels_
 
 static void report_blocks(uint64_t *state)
 {
-    int meet = 0, certain = 0;
+    int contacts = 0, certain = 0;
     fill_blocks(state);
     for (int i = 0; i < BLOCKS; i++) {
         pair_blocks_best(i);
-        meet += (int)found.count;
+        contacts += (int)found.count;
         for (unsigned k = 0; k < found.count; k++)
             certain += (found.pair[k] & EBPO_CERTAINLY_CROSSING) != 0;
     }
@@ -209,7 +209,7 @@ static void report_blocks(uint64_t *state)
            ns_per_pair(turn_block, BLOCKS, ROUNDS), ns_per_pair(place_block, BLOCKS, ROUNDS),
            ns_per_pair(pair_blocks_base, BLOCKS, ROUNDS),
            ns_per_pair(pair_blocks_best, BLOCKS, ROUNDS), (double)certain / BLOCKS,
-           (double)(meet - certain) / BLOCKS);
+           (double)(contacts - certain) / BLOCKS);
 }
 
 int main(void)

@@ -67,18 +67,18 @@ static void compare(const reported *got, const reference_found *intersected, uin
 }
 
 static void inspect_distance(ebpo_collider *collider, const ebpo_collide_options *how,
-                             const reference_faces f[2], bool meet, counts *out)
+                             const reference_faces f[2], bool intersect, counts *out)
 {
     ebpo_clearance far;
     ebpo_error error = EBPO_ERROR_INIT;
     model_must(ebpo_collide_distance(collider, how, NULL, &far, &error), "distance", &error);
-    if ((far.distance.hi == 0) != meet || far.distance.lo != far.distance.hi)
+    if ((far.distance.hi == 0) != intersect || far.distance.lo != far.distance.hi)
         out->far_off++;
-    else if (!meet)
+    else if (!intersect)
         out->far_off +=
             reference_models_distance(&f[0], &f[1], far.distance.hi, far.pair.file_face_a,
                                       far.pair.file_face_b) != NULL;
-    out->apart += !meet;
+    out->apart += !intersect;
 }
 
 static void look(const query_model m[2], ebpo_collider *collider, int kind, uint64_t *state,

@@ -39,7 +39,7 @@ BLOCK = 1 << 20
 
 class Server(http.server.ThreadingHTTPServer):
     """Serves ranges of a file; returns 503 until `until`."""
-    daemon_threads, until, refused, answered, data = True, 0.0, 0, 0, b""
+    daemon_threads, until, refused, responses, data = True, 0.0, 0, 0, b""
 
 
 class Ranges(http.server.BaseHTTPRequestHandler):
@@ -51,7 +51,7 @@ class Ranges(http.server.BaseHTTPRequestHandler):
         first, last = int(requested[1]), min(int(requested[2]), len(self.server.data) - 1)
         part = b"" if away else self.server.data[first:last + 1]
         self.server.refused += away
-        self.server.answered += not away
+        self.server.responses += not away
         self.send_response(503 if away else 206)
         if not away:
             self.send_header("Content-Range", f"bytes {first}-{last}/{len(self.server.data)}")
@@ -155,7 +155,7 @@ def main():
     parser.add_argument("--folder", type=pathlib.Path)
     parser.add_argument("--only", nargs="*", default=["calm", "away", "stopped", "slow", "killed"])
     args = parser.parse_args()
-    args.folder = pathlib.Path(tempfile.mkdtemp(prefix="weather-", dir=args.folder))
+    args.folder = pathlib.Path(tempfile.mkdtemp(prefix="faults-", dir=args.folder))
     dask.config.set({"distributed.worker.use-file-locking": False, "temporary-directory": str(args.folder)})
     server = Server(("127.0.0.1", 0), Ranges)
     server.data = args.model.read_bytes()

@@ -1,4 +1,4 @@
-"""Remakes docs/pictures/touch.png: haptic_picture.py EBPO BUNNY.ply PICTURE
+"""Remakes docs/pictures/haptic.png: haptic_picture.py EBPO BUNNY.ply PICTURE
 
 PYTHONPATH must name the folder of the package ebpo. The device (orange, hidden inside) moves behind the surface of the
 bunny's flank; its proxy (red) stays outside.

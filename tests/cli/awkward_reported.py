@@ -140,5 +140,5 @@ with tempfile.TemporaryDirectory() as folder:
     names = list(MESHES)[::SHARE]
     for name in names:
         check_mesh(name, folder)
-print("\n".join(problems) or f"{len(names)} awkward meshes, told as they are")
+print("\n".join(problems) or f"{len(names)} awkward meshes are reported correctly")
 sys.exit(1 if problems else 0)

@@ -55,7 +55,7 @@ def main():
     subprocess.run(again, check=True)
     wrong += glob.glob(HIDDEN)
     if os.path.getsize(OUT) != 8 * (rows - rows // 2):
-        wrong.append(f"{os.path.getsize(OUT)} bytes of answers")
+        wrong.append(f"{os.path.getsize(OUT)} bytes of results")
     reported = subprocess.run(again, check=True, capture_output=True, text=True).stderr
     if "nothing to do" not in reported:
         wrong.append(reported)

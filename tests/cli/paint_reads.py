@@ -36,7 +36,7 @@ def vectors():
         reported = without_counts(json.loads(done.stdout or "{}"))
         expected = json.loads(path.with_name(path.name.replace(".paint.h5", ".json")).read_text())
         if {k: reported.get(k) for k in expected} != expected:
-            wrong.append(f"{path.name} is told differently {done.stderr}")
+            wrong.append(f"{path.name} is reported differently {done.stderr}")
     for path in sorted(folder.glob("failed/*.paint.h5")):
         done = subprocess.run(["ebpo", "paint", path], capture_output=True, text=True)
         if done.returncode != 1 or done.stdout or path.name not in done.stderr:
@@ -130,7 +130,7 @@ def areas(paint_path, model, n=24):
                 sums[layer] += part if last is not None and paint["strokes"][last]["kind"] == "paints" else 0
     for layer, (found, one) in enumerate(zip(sums, reported["layers"])):
         if abs(found - one["area"]) > 2e-3 * found or not one["lo"] <= one["area"] <= one["hi"] < 1.02 * one["lo"]:
-            wrong.append(f"layer {layer}: {found}, told {one}")
+            wrong.append(f"layer {layer}: {found}, reported {one}")
     return wrong
 
 
@@ -144,11 +144,11 @@ def baked(paint_path, model, out, glb=None):
     place = np.argsort(np.argsort(source))
     names = ("red", "green", "blue")
     base = np.stack([own[n] for n in names], axis=1) if "red" in own.dtype.names else np.full((len(own), 3), 230)
-    twin = np.array(read_paint.bake(paint, vertices, faces, base[place].astype("f8").tolist()))
+    reference = np.array(read_paint.bake(paint, vertices, faces, base[place].astype("f8").tolist()))
     colours = np.stack([got[n] for n in names], axis=1).astype(int)
     wrong = []
-    if (colours[place] != twin).any():
-        wrong.append(f"{(colours[place] != twin).any(axis=1).sum()} vertices have other colours")
+    if (colours[place] != reference).any():
+        wrong.append(f"{(colours[place] != reference).any(axis=1).sum()} vertices have other colours")
     if not (colours != base).any():
         wrong.append("nothing is painted")
     if rest != own_rest or any(got[n].tobytes() != own[n].tobytes() for n in own.dtype.names if n not in names):

@@ -15,20 +15,20 @@ parser.add_argument("what", choices=("pack", "unpack"))
 parser.add_argument("pack", type=pathlib.Path)
 parser.add_argument("folder", type=pathlib.Path)
 parser.add_argument("--most", type=int, default=1 << 22, help="bytes of the longest input")
-asked = parser.parse_args()
+options = parser.parse_args()
 
-if asked.what == "pack":
-    inputs = {path.read_bytes() for path in asked.folder.iterdir() if path.stat().st_size <= asked.most}
+if options.what == "pack":
+    inputs = {path.read_bytes() for path in options.folder.iterdir() if path.stat().st_size <= options.most}
     ordered = sorted(inputs, key=lambda data: (len(data), data))
-    asked.pack.write_bytes(b"".join(struct.pack("<I", len(data)) + data for data in ordered))
-    print(f"{asked.pack}: {len(ordered)} inputs, {asked.pack.stat().st_size} bytes")
+    options.pack.write_bytes(b"".join(struct.pack("<I", len(data)) + data for data in ordered))
+    print(f"{options.pack}: {len(ordered)} inputs, {options.pack.stat().st_size} bytes")
 else:
-    asked.folder.mkdir(parents=True, exist_ok=True)
-    data, at, count = asked.pack.read_bytes(), 0, 0
+    options.folder.mkdir(parents=True, exist_ok=True)
+    data, at, count = options.pack.read_bytes(), 0, 0
     while at < len(data):
         size = struct.unpack_from("<I", data, at)[0]
         one = data[at + 4:at + 4 + size]
-        (asked.folder / hashlib.sha1(one).hexdigest()).write_bytes(one)
+        (options.folder / hashlib.sha1(one).hexdigest()).write_bytes(one)
         at += 4 + size
         count += 1
-    print(f"{asked.folder}: {count} inputs")
+    print(f"{options.folder}: {count} inputs")

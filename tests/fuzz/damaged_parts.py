@@ -44,7 +44,7 @@ def judge(ebpo, right, name, counts):
     where = "array" if name else "head or unused"
     verified = run(ebpo, "verify", "d.ebpo.h5")
     named = bool(name) and name in verified.stderr
-    counts[where, "verify", "not seen" if verified.returncode == 0 else "named" if named else "told"] += 1
+    counts[where, "verify", "not seen" if verified.returncode == 0 else "named" if named else "reported"] += 1
     if verified.returncode not in (0, 1) or (name and verified.returncode == 1 and not named):
         wrong.append(f"verify: {verified.returncode} {verified.stderr}")
     repaired = run(ebpo, "recover", "-o", "r.ebpo.h5", "d.ebpo.h5")

@@ -52,7 +52,7 @@ put("codings", "corners_fan", bytes([4, 0]) + fan)
 put("codings", "gates_fan", bytes([5, 0]) + fan)
 put("codings", "gates_late_fan", bytes([5, 9]) + fan)
 
-# --- answers: flags, where from; lines ---
+# --- responses: flags, where from; lines ---
 lines = {
     "part": b"HTTP/1.1 206 Partial Content\r\nContent-Range: bytes 0-99/100000\r\nContent-Length: 100\r\n"
             b"ETag: \"tag\"\r\nLast-Modified: Mon, 23 Nov 2026 09:00:00 GMT\r\n\r\n",

@@ -9,7 +9,7 @@ import measured
 from query_page import Page, figure
 
 BEFORE, MIXED, AFTER = "before", "old file", "after"
-NAMES = {"waves": "round trips"}  # names on the page
+NAMES = {"least_round_trips": "round trips"}  # names on the page
 
 
 def middle(values):
@@ -65,13 +65,13 @@ class Found:
 def goals():
     """Yields the name of each measured value, its getter for a side, and the upper limit."""
     for query in "distance", "inside":
-        for what, most in (("waves", 4), ("requests", 20), ("bytes", 0.7e6), ("seconds", 0.8)):
+        for what, most in (("least_round_trips", 4), ("requests", 20), ("bytes", 0.7e6), ("seconds", 0.8)):
             yield (f"one {query}: {NAMES.get(what, what)}",
                    lambda f, s, a=(f"{query} one", what): f.values(s, *a), most)
-        for what, most in (("waves", 5), ("requests", 500), ("bytes", 20e6), ("seconds", 3)):
+        for what, most in (("least_round_trips", 5), ("requests", 500), ("bytes", 20e6), ("seconds", 3)):
             yield (f"100 near points, {query}: {NAMES.get(what, what)}",
                    lambda f, s, a=(f"{query} 100", what): f.values(s, *a), most)
-    yield "`fetch --box`: round trips", lambda f, s: f.values(s, "box", "waves"), 5
+    yield "`fetch --box`: round trips", lambda f, s: f.values(s, "box", "least_round_trips"), 5
     yield "`fetch --box`: bytes", lambda f, s: f.values(s, "box", "bytes"), 1.5e6
     yield "close-up, nodes: requests", lambda f, s: f.values(s, "view", "requests"), 20
     yield "close-up, nodes: bytes", lambda f, s: f.values(s, "view", "bytes"), 1e6
@@ -106,7 +106,7 @@ def goal_table(page, found, note):
 def summary(found):
     """Returns the result of the page in at most three sentences."""
     def of(name):
-        return (f"{middle_only(found.values(AFTER, name, 'waves'))} round trips, "
+        return (f"{middle_only(found.values(AFTER, name, 'least_round_trips'))} round trips, "
                 f"{middle_only(found.values(AFTER, name, 'requests'))} requests, "
                 f"{middle_only(found.values(AFTER, name, 'bytes'))} bytes and "
                 f"{middle_only(found.values(AFTER, name, 'seconds'))} s")
@@ -139,7 +139,7 @@ def query_table(page, found):
     page.table(["query", "round trips", "requests", "bytes", "s"],
                [[row["what"],
                  *(middle(found.values(AFTER, name, what))
-                   for what in ("waves", "requests", "bytes", "seconds"))]
+                   for what in ("least_round_trips", "requests", "bytes", "seconds"))]
                 for name, row in found.rows().items() if found.row(AFTER, name)])
     same = found.row(AFTER, "same")
     if same is not None:

@@ -136,7 +136,7 @@ class Line:
                 given()
         await asyncio.gather(take(), give())
 
-    def waves(self, connections):
+    def least_round_trips(self, connections):
         """Return the round trips since the last call: batches of requests that depend on each other.
 
         A request begins a new batch if it was sent after a response of the batch was complete. The exception is a request that

@@ -107,9 +107,9 @@ class Places:
 
 class Row:
     """Commands that run one by one. command: their text on the page; arguments: the arguments of each."""
-    def __init__(self, name, what, command, arguments, which="large", waves=True):
+    def __init__(self, name, what, command, arguments, which="large", least_round_trips=True):
         self.name, self.what, self.command = name, what, command
-        self.arguments, self.which, self.waves = arguments, which, waves
+        self.arguments, self.which, self.least_round_trips = arguments, which, least_round_trips
 
 
 def rows(large, small, work, singles, views):
@@ -140,13 +140,14 @@ def rows(large, small, work, singles, views):
         *(Row(f"levels {to}", f"levels 0 to {to}, types and planes", f"ebpo levels --max-level {to} URL",
               [["levels", "--max-level", to, "URL"]]) for to in (5, 8)),
         Row("no budget", "one inside, without `--memory`", "ebpo inside URL POINT",
-            points("inside", each[:1]), waves=False)]
+            points("inside", each[:1]), least_round_trips=False)]
     return {row.name: row for row in table}
 
 
 def run_row(server, line, side, row, work, connections=None):
-    """Run the commands one after the other, each in a new process. Return {requests, bytes, seconds or waves: [of each]}."""
-    out, found = work / "out.ebpo.h5", {"requests": [], "bytes": [], "seconds": [], "waves": []}
+    """Run the commands one after the other, each in a new process. Return {requests, bytes, seconds or
+    least_round_trips: [of each]}."""
+    out, found = work / "out.ebpo.h5", {"requests": [], "bytes": [], "seconds": [], "least_round_trips": []}
     name = side.link(row.which)
     for command in row.arguments:
         words = {"URL": f"http://127.0.0.1:{line.port}/{name}", "OUT": out}
@@ -163,7 +164,7 @@ def run_row(server, line, side, row, work, connections=None):
         count, size = server.traffic(name)
         found["requests"].append(count)
         found["bytes"].append(size)
-        found["waves"].append(line.waves(connections or 1000))
+        found["least_round_trips"].append(line.least_round_trips(connections or 1000))
         if not said and row.name != "box":
             raise RuntimeError(f"{side.name}, {row.name}: no result")
     return found
@@ -172,11 +173,11 @@ def run_row(server, line, side, row, work, connections=None):
 def measure(server, line, side, row, work):
     """Measures a row with the default connections, and its dependent round trips with 32."""
     found = run_row(server, line, side, row, work)
-    found["round_trips"] = found.pop("waves")
-    if row.waves:
+    found["round_trips"] = found.pop("least_round_trips")
+    if row.least_round_trips:
         # other load of the machine only increases the number
-        tries = [run_row(server, line, side, row, work, CONNECTIONS)["waves"] for _ in range(TRIES)]
-        found["waves"] = [min(each) for each in zip(*tries)]
+        tries = [run_row(server, line, side, row, work, CONNECTIONS)["least_round_trips"] for _ in range(TRIES)]
+        found["least_round_trips"] = [min(each) for each in zip(*tries)]
     return found
 
 
