@@ -100,7 +100,7 @@ traffic traffic_of(const ebpo_file *file)
     ebpo_file_get_stats(file, &stats);
     t.bytes = stats.bytes_read;
     t.reads = stats.reads;
-    t.far = ebpo_file_get_http_stats(file, &t.http) == EBPO_OK;
+    t.remote = ebpo_file_get_http_stats(file, &t.http) == EBPO_OK;
     return t;
 }
 
@@ -111,7 +111,7 @@ void remote_json(json *j, const traffic *t, const remote_values *values)
     json_object(j, "traffic");
     json_uint(j, "reads", t->reads);
     json_uint(j, "bytes_read", t->bytes);
-    if (t->far) {
+    if (t->remote) {
         json_uint(j, "requests", t->http.requests);
         json_uint(j, "bytes", t->http.bytes);
         json_uint(j, "retries", t->http.retries);
@@ -133,7 +133,7 @@ void remote_report(const traffic *t, const remote_values *values, bool as_json)
         json_finish(&j);
     } else if (values->stats) {
         fprintf(stderr, "reads %" PRIu64 ", bytes read %" PRIu64, t->reads, t->bytes);
-        if (t->far)
+        if (t->remote)
             fprintf(stderr,
                     ", requests %" PRIu64 ", bytes %" PRIu64 ", retries %" PRIu64
                     ", connections %" PRIu64 ", seconds waited %.6f, cache hits %" PRIu64

@@ -38,7 +38,7 @@ const char *remote_shown(const char *name);
 /* Traffic of a file since it was opened. */
 typedef struct traffic {
     uint64_t bytes, reads; /* requested from the source */
-    bool far;              /* the file is a URL */
+    bool remote;           /* the file is a URL */
     ebpo_http_stats http;
 } traffic;
 traffic traffic_of(const ebpo_file *file);

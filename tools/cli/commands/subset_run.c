@@ -187,10 +187,10 @@ static void print_summary(const subset_values *v, const char *out_path, const eb
     if (info->parts & EBPO_PART_MESH && info->face_count < from->face_count)
         printf(", %" PRIu64 " of %" PRIu64 " faces", info->face_count, from->face_count);
     subset_print_need(info, v->target_size && !v->parts && v->profile < 0 && !v->levels);
-    if (t->far)
+    if (t->remote)
         printf(", %s in %" PRIu64 " requests", words_bytes(got, sizeof got, t->http.bytes),
                t->http.requests);
-    if (t->far && t->http.cache_bytes)
+    if (t->remote && t->http.cache_bytes)
         printf(", %s fetched earlier", words_bytes(got, sizeof got, t->http.cache_bytes));
     printf(", in %.1f s\n", seconds);
 }
@@ -215,7 +215,7 @@ ebpo_status subset_report(const subset_values *v, const char *out_path, const eb
         json_object(&j, NULL);
         facts_json(&j, out_path, ebpo_file_info(file), &stored, NULL);
         json_uint(&j, "source_bytes", from->file_bytes);
-        if (t->far) {
+        if (t->remote) {
             json_uint(&j, "fetched_requests", t->http.requests);
             json_uint(&j, "fetched_bytes", t->http.bytes);
             json_uint(&j, "resumed_bytes", t->http.cache_bytes);
