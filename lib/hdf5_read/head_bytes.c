@@ -1,8 +1,8 @@
-/* Reads the bytes of an open head in few reads, and keeps the first failure. The first bytes hold
- * all headers and are fetched at once, the index of large arrays comes in one piece, and all else
- * is read through a window. Nothing beyond the end of the file is read, and nothing after a failure
- * of the input. An error gives the reason of the refusal, or, if the input itself failed, the
- * input's error. */
+/* Reads the bytes of an open head in few reads, and keeps the first failure. The first bytes
+ * hold all headers and are fetched at once. The chunk index of arrays with more than one chunk
+ * is also read at once. All other bytes are read through a window. Bytes beyond the end of the
+ * file are not read. After a failure of the input, nothing is read. An error gives the reason of
+ * the refusal, or the input's error if the input failed. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -65,7 +65,7 @@ static const uint8_t *read_table(ebpo_head_bytes *b, uint64_t at, uint64_t size)
 
 /* Returns the range of the window to read for an offset. Windows begin at multiples of half their
  * size, so that reading back and forth around an offset does not move them. They end before the
- * index, which is read in one piece. */
+ * chunk index, which is read at once. */
 static ebpo_range window_around(const ebpo_head_bytes *b, uint64_t at)
 {
     uint64_t begin = at / (WINDOW_BYTES / 2) * (WINDOW_BYTES / 2), end = b->input->source.size;

@@ -37,7 +37,8 @@ void ebpo_h5_close_id(const ebpo_h5_out *out, ebpo_h5_id id);
 EBPO_MUST_USE ebpo_status ebpo_h5_create(ebpo_h5_out *out, const char *path, const char *shown,
                                          uint64_t head_bytes, unsigned links, ebpo_error *error);
 /* Closes the file and reopens it; none of its objects may be open. Metadata that is allocated
- * afterwards is stored in one piece of `metadata_bytes` bytes, which is next in the file. */
+ * afterwards is stored in one contiguous range of `metadata_bytes` bytes, which is next in the
+ * file. */
 EBPO_MUST_USE ebpo_status ebpo_h5_reopen(ebpo_h5_out *out, uint64_t metadata_bytes,
                                          ebpo_error *error);
 /* Opens the root group for its attributes, or creates a group with capacity for `links` links. The

@@ -1,6 +1,6 @@
-/* Creates files in this library's layout: with headers in one piece at the start, links and
- * attributes in the object headers, and chunks that are already encoded. Spaces and property lists
- * are closed, also after an earlier failure. All calls after a failed write return the first
+/* Creates files in this library's layout: with headers as one contiguous range at the start, links
+ * and attributes in the object headers, and chunks that are already encoded. Spaces and property
+ * lists are closed, also after an earlier failure. All calls after a failed write return the first
  * failure (sink.c). Attributes of all kinds, also those of tables for other programs, are written
  * here. */
 #include <string.h>

@@ -226,7 +226,7 @@ static const ebpo_polytope *level_walk_envelope(const level_walk *w, const level
 
 /* --- the stream --- */
 
-enum { PIECE = 4096 }; /* nodes of a piece, the unit of parallel work */
+enum { RANGE_NODES = 4096 }; /* number of nodes in a range, the unit of parallel work */
 
 struct ebpo_stream {
     const ebpo_file *file;
@@ -329,12 +329,12 @@ typedef struct volumes {
 typedef struct job {
     const ebpo_stream *stream;
     int target;
-    level_walk *starts;             /* [pieces] */
-    volumes *found;                 /* [pieces] */
+    level_walk *starts;             /* [ranges] */
+    volumes *found;                 /* [ranges] */
     ebpo_envelope_stack *envelopes; /* [threads] */
 } job;
 
-static ebpo_status sum_pieces(void *context, uint64_t begin, uint64_t end, unsigned worker,
+static ebpo_status sum_ranges(void *context, uint64_t begin, uint64_t end, unsigned worker,
                               ebpo_error *error)
 {
     const job *j = context;
@@ -343,7 +343,7 @@ static ebpo_status sum_pieces(void *context, uint64_t begin, uint64_t end, unsig
     for (uint64_t i = begin; i < end; i++) {
         level_walk walk = j->starts[i];
         level_walk_node node;
-        for (int k = 0; k < PIECE && level_walk_next(&walk, &node); k++)
+        for (int k = 0; k < RANGE_NODES && level_walk_next(&walk, &node); k++)
             if (node.type != EBPO_WHITE)
                 *(node.type == EBPO_GRAY ? &j->found[i].gray : &j->found[i].terminal_volume) +=
                     ebpo_polytope_volume(level_walk_envelope(&walk, &node, &j->envelopes[worker])) *
@@ -352,8 +352,8 @@ static ebpo_status sum_pieces(void *context, uint64_t begin, uint64_t end, unsig
     return EBPO_OK;
 }
 
-/* Finds the start of each piece with a walk that computes no envelopes. Pieces, and therefore the
- * sum, do not depend on the number of threads. */
+/* Finds the start of each range with a walk that computes no envelopes. Ranges, and therefore
+ * the sum, do not depend on the number of threads. */
 static void find_starts(job *j)
 {
     level_walk walk;
@@ -361,8 +361,8 @@ static void find_starts(job *j)
     level_walk_begin(&walk, j->stream->kept, j->target, j->stream->info->pruned);
     uint64_t seen = 0;
     do {
-        if (seen % PIECE == 0)
-            j->starts[seen / PIECE] = walk;
+        if (seen % RANGE_NODES == 0)
+            j->starts[seen / RANGE_NODES] = walk;
         seen++;
     } while (level_walk_next(&walk, &node));
 }
@@ -371,20 +371,20 @@ static ebpo_status cut_volumes(const ebpo_stream *s, int target, uint64_t nodes,
                                ebpo_error *error)
 {
     unsigned threads = ebpo_thread_count(s->options.threads);
-    uint64_t pieces = nodes / PIECE + 1;
-    job j = { s, target, ebpo_alloc(pieces, sizeof *j.starts),
-              ebpo_alloc_zero(pieces, sizeof *j.found),
+    uint64_t ranges = nodes / RANGE_NODES + 1;
+    job j = { s, target, ebpo_alloc(ranges, sizeof *j.starts),
+              ebpo_alloc_zero(ranges, sizeof *j.found),
               ebpo_alloc_zero(threads, sizeof *j.envelopes) };
     ebpo_status status = EBPO_OK;
     if (!j.starts || !j.found || !j.envelopes) {
-        status = ebpo_fail_memory(error, pieces * (sizeof *j.starts + sizeof *j.found) +
+        status = ebpo_fail_memory(error, ranges * (sizeof *j.starts + sizeof *j.found) +
                                              threads * sizeof *j.envelopes);
         goto done;
     }
     find_starts(&j);
-    status = ebpo_parallel_for(threads, NULL, pieces, 1, sum_pieces, &j, NULL, "cutting envelopes",
+    status = ebpo_parallel_for(threads, NULL, ranges, 1, sum_ranges, &j, NULL, "cutting envelopes",
                                error);
-    for (uint64_t i = 0; i < pieces; i++) {
+    for (uint64_t i = 0; i < ranges; i++) {
         out->gray += j.found[i].gray;
         out->terminal_volume += j.found[i].terminal_volume;
     }
