@@ -22,7 +22,7 @@ typedef struct ebpo_nearest {
     double upper;     /* upper bound of the distance to the model's nearest face, or INFINITY */
     bool found;
     ebpo_distance_bounds bounds; /* bounds of the distance of the nearest face so far, which is
-                                    called the winner below */
+                                  * called the winner below */
     ebpo_far_keys keys;          /* keys of the winner, for a far point */
     double triangle[3][3];
     uint64_t file_face, source_face;
