@@ -126,8 +126,9 @@ static ebpo_status number_vertices(ebpo_cutting *c, vertices *v)
     return good ? EBPO_OK : ebpo_fail_memory(c->error, c->from->vertex_count * sizeof *v->number);
 }
 
-/* In a subset, attributes of elements other than vertices and faces are omitted, as they may refer
- * to removed elements. Textures stay. If nothing was pruned, everything is unchanged. */
+/* In a subset, attributes of elements other than vertices and faces are omitted, because their
+ * values may refer to removed elements. Textures stay. If nothing was pruned, everything is
+ * unchanged. */
 static ebpo_status begin_attributes(ebpo_cutting *c)
 {
     ebpo_read_options read = ebpo_read_threads(c->options->threads);

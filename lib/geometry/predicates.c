@@ -216,8 +216,8 @@ static bool row_to_integers(int64_t out[3], const ebpo_pair row[3])
 }
 
 /* Computes the sign of the determinant of differences that are exact and have few bits, such as
- * those of float or integer input. Each is below 2^41, so that minors are below 2^83 and the
- * determinant below 2^126. Returns false for other differences. */
+ * those of float or integer input. As scaled integers, the differences are below 2^41, so that
+ * minors are below 2^83 and the determinant below 2^126. Returns false for other differences. */
 static bool integer_determinant(int *sign, ebpo_pair m[3][3])
 {
     int64_t z[3][3];

@@ -119,7 +119,7 @@ void ebpo_nearest_begin_with(ebpo_nearest *n, const double triangle[3][3], uint6
         take_face(n, triangle, &b, &keys, file_face, source_face);
 }
 
-/* Tests a face. Returns true if it is the nearest so far, and keeps it then. */
+/* Tests a face. If the face is the nearest so far, keeps it and returns true. */
 static bool try_face(ebpo_nearest *n, const ebpo_accel *s, uint32_t slot)
 {
     uint32_t local = ebpo_accel_slot_face(s, slot);

@@ -386,8 +386,8 @@ typedef struct ebpo_repair_record {
     uint64_t dropped_opposite;
 
     /*
-     * Distance given to ebpo_mesh_weld_within, and the largest distance by which it moved a vertex.
-     * 0: it was not called.
+     * Distance given to ebpo_mesh_weld_within, and the largest distance by which this function
+     * moved a vertex. 0: the function was not called.
      */
     double weld_distance;
     double weld_moved;
@@ -397,8 +397,8 @@ typedef struct ebpo_repair_record {
 } ebpo_repair_record;
 
 /*
- * Rules for the repair functions: they add their counts to `record`, which the caller clears first,
- * and which may be NULL. They use all cores.
+ * Rules for the repair functions: each function adds its counts to `record`. The caller clears
+ * `record` first; NULL is allowed. The functions use all cores.
  *
  * EBPO_E_FORMAT: a vertex index is out of range. EBPO_E_LIMIT: more than 2^32 - 2 faces. EBPO_E_IO.
  * On failure the mesh is unchanged.
@@ -458,12 +458,12 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_drop_duplicates(ebpo_mesh *mesh,
 /*
  * Counts the faces that ebpo_mesh_drop_duplicates would remove after ebpo_mesh_weld: faces at the
  * three positions of an earlier face. If no positions are repeated (ebpo_mesh_report), the result
- * is that of `repeated_faces`.
+ * is equal to `repeated_faces`.
  *
  * out        count and first indices
  * opposite   count of faces whose orientation is opposite to that of the kept face
  *
- * Errors are those of ebpo_mesh_weld. On failure both are 0.
+ * Errors are those of ebpo_mesh_weld. On failure `out` and `opposite` are 0.
  *
  * Threads: any.
  */

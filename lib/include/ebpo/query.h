@@ -18,7 +18,7 @@
  *     ebpo_context_new(model, &context, &error);
  *     ebpo_inside(context, point, NULL, &result, &error);
  *
- * Results are exact: decisions equal those of arithmetic without rounding on the file's
+ * Results are exact: decisions are the same as with arithmetic without rounding on the file's
  * coordinates, for all finite doubles. Results do not depend on the compiler, the floating-point
  * environment, the number of threads, the memory budget or the loading mode.
  *
@@ -139,8 +139,8 @@ typedef struct ebpo_model_plan {
 
     /*
      * whole: least budget with which everything is in memory (remote files: see
-     * ebpo_model_options.memory). least: a sufficient budget, slightly above the minimum; with it,
-     * few subtrees are in memory at a time.
+     * ebpo_model_options.memory). least: a sufficient budget, slightly above the minimum. With this
+     * budget, few subtrees are in memory at a time.
      */
     uint64_t whole, least;
 
@@ -635,9 +635,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_any(ebpo_context *context, const dou
                                                 ebpo_error *error);
 
 /*
- * Sides of triangles that count. Only the normal of a triangle decides, at any of its points. An
- * edge or a vertex belongs to all its triangles, so there are no gaps between triangles. Triangles
- * without area, and those whose plane contains the ray, count only with EBPO_RAY_BOTH.
+ * Sides of triangles that count. Only the normal of a triangle decides, also if the ray hits an
+ * edge or a vertex. An edge or a vertex belongs to all its triangles, so there are no gaps between
+ * triangles. Triangles without area, and those whose plane contains the ray, count only with
+ * EBPO_RAY_BOTH.
  */
 typedef enum ebpo_ray_sides {
     EBPO_RAY_BOTH = 0,  /* all triangles */
@@ -761,10 +762,10 @@ EBPO_API unsigned ebpo_sampler_columns(const ebpo_sampler *sampler);
  * by the sum of the three. Scalar products add x, y, z in this order.
  *
  * The value is (w_a A + w_b B) + w_c C without terms of weight 0, clamped to the range of the
- * values used. At a corner it is the corner's value; if all three are equal, it is that value. If D
- * is at most 2^-900, with the greatest coordinate of e and f scaled to 1 to 2, the face has no
- * area. The weights are then those of the point nearest to p on the longest of the edges ab, ac, bc
- * (the first of equal ones).
+ * values used. At a corner, the result is the corner's value. If the three values are equal, the
+ * result is this value. If D is at most 2^-900, with the greatest coordinate of e and f scaled to 1
+ * to 2, the face has no area. The weights are then those of the point nearest to p on the longest
+ * of the edges ab, ac, bc (the first of equal ones).
  *
  * points   [count][3] finite
  * faces    [count] as in ebpo_distance_result; EBPO_NO_FACE: the values are NAN
@@ -877,8 +878,8 @@ typedef struct ebpo_mass {
     double area;
 
     /*
-     * Volume of the solid (ebpo_solid_volume_of); NAN if unknown, 0 for a surface. If it is 0, the
-     * following members are 0.
+     * Volume of the solid (ebpo_solid_volume_of); NAN if unknown, 0 for a surface. If the volume is
+     * 0, the following members are 0.
      */
     double volume;
 
