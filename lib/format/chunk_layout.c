@@ -261,7 +261,7 @@ void ebpo_subtree_sums_free(ebpo_subtree_sums *sums)
     free(sums->before);
     free(sums->counts);
     free(sums->index);
-    free(sums->outer);
+    free(sums->shared);
     memset(sums, 0, sizeof *sums);
 }
 
@@ -397,13 +397,13 @@ static ebpo_status list_shared(const counting *c, ebpo_error *error)
                                     c->tree->level[l].leaf_refs + first, end - first);
         }
         shared_blocks_use(&blocks, &c->tree->mesh, &own);
-        if (!ebpo_grow(&c->sums->outer, &c->sums->shared_capacity,
+        if (!ebpo_grow(&c->sums->shared, &c->sums->shared_capacity,
                        c->sums->shared_count + blocks.face_blocks + blocks.vertex_blocks +
                            1, /* never NULL */
-                       sizeof *c->sums->outer))
-            status = ebpo_fail_memory(error, c->sums->shared_count * sizeof *c->sums->outer);
+                       sizeof *c->sums->shared))
+            status = ebpo_fail_memory(error, c->sums->shared_count * sizeof *c->sums->shared);
         else
-            shared_blocks_take(&blocks, &own, c->sums->outer + c->sums->shared_count, from, to);
+            shared_blocks_take(&blocks, &own, c->sums->shared + c->sums->shared_count, from, to);
         c->sums->shared_count = to[EBPO_S_SHARED_FACES] + to[EBPO_S_SHARED_VERTICES];
     }
     shared_blocks_free(&blocks);

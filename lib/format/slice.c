@@ -170,7 +170,7 @@ static ebpo_status gather_rows(ebpo_chunks *chunks, ebpo_array_id id, size_t row
 
 /* --- local indices of faces --- */
 
-static ebpo_status collect_shared(ebpo_slice *slice, ebpo_compact *outer, ebpo_quota *space,
+static ebpo_status collect_shared(ebpo_slice *slice, ebpo_compact *shared, ebpo_quota *space,
                                   ebpo_error *error)
 {
     uint64_t capacity = 0;
@@ -179,20 +179,20 @@ static ebpo_status collect_shared(ebpo_slice *slice, ebpo_compact *outer, ebpo_q
             capacity += slice->level[i].leaf_refs[k] < slice->first_face;
     ebpo_status status = ebpo_quota_check(space, ebpo_compact_bytes(capacity), error);
     if (status == EBPO_OK)
-        status = ebpo_compact_make(outer, capacity, error);
+        status = ebpo_compact_make(shared, capacity, error);
     if (status != EBPO_OK)
         return status;
     for (int i = 0; i < slice->level_count; i++)
         for (uint64_t k = 0; k < slice->level[i].ref_count; k++)
             if (slice->level[i].leaf_refs[k] < slice->first_face)
-                compact_add(outer, slice->level[i].leaf_refs[k]);
-    return compact_sort(outer, error);
+                compact_add(shared, slice->level[i].leaf_refs[k]);
+    return compact_sort(shared, error);
 }
 
-static void localise_faces(ebpo_slice *slice, const ebpo_compact *outer)
+static void localise_faces(ebpo_slice *slice, const ebpo_compact *shared)
 {
     /* the index of an owned face decreases by the number of earlier faces that are not shared */
-    uint64_t less = slice->first_face - outer->count;
+    uint64_t less = slice->first_face - shared->count;
     for (int i = 0; i < slice->level_count; i++) {
         ebpo_level *level = &slice->level[i];
         for (uint64_t k = 0; k < level->leaf_count; k++)
@@ -200,7 +200,7 @@ static void localise_faces(ebpo_slice *slice, const ebpo_compact *outer)
         for (uint64_t k = 0; k < level->ref_count; k++) {
             uint32_t ref = level->leaf_refs[k];
             level->leaf_refs[k] =
-                ref < slice->first_face ? compact_find(outer, ref) : (uint32_t)(ref - less);
+                ref < slice->first_face ? compact_find(shared, ref) : (uint32_t)(ref - less);
         }
     }
 }
@@ -208,17 +208,17 @@ static void localise_faces(ebpo_slice *slice, const ebpo_compact *outer)
 /* Gives the faces local indices, and moves the list of shared faces to the slice. */
 static ebpo_status number_faces(ebpo_slice *slice, ebpo_quota *space, ebpo_error *error)
 {
-    ebpo_compact outer = { .slot = NULL };
-    ebpo_status status = collect_shared(slice, &outer, space, error);
+    ebpo_compact shared = { .slot = NULL };
+    ebpo_status status = collect_shared(slice, &shared, space, error);
     if (status == EBPO_OK)
-        localise_faces(slice, &outer);
-    if (status == EBPO_OK && outer.count) {
-        uint32_t *fit = ebpo_realloc(outer.sorted, outer.count, sizeof *fit);
-        slice->outer = fit ? fit : outer.sorted;
-        slice->shared_count = (uint32_t)outer.count;
-        outer.sorted = NULL;
+        localise_faces(slice, &shared);
+    if (status == EBPO_OK && shared.count) {
+        uint32_t *fit = ebpo_realloc(shared.sorted, shared.count, sizeof *fit);
+        slice->shared = fit ? fit : shared.sorted;
+        slice->shared_count = (uint32_t)shared.count;
+        shared.sorted = NULL;
     }
-    compact_free(&outer);
+    compact_free(&shared);
     return status;
 }
 
@@ -315,7 +315,7 @@ static ebpo_status take_source(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_erro
     slice->face_source = ebpo_alloc(slice->mesh.face_count, sizeof *slice->face_source);
     if (!slice->face_source)
         return ebpo_fail_memory(error, slice->mesh.face_count * sizeof *slice->face_source);
-    return gather_rows(chunks, EBPO_A_FACE_SOURCE, sizeof *slice->face_source, slice->outer,
+    return gather_rows(chunks, EBPO_A_FACE_SOURCE, sizeof *slice->face_source, slice->shared,
                        slice->shared_count, slice->first_face, slice->face_count,
                        slice->face_source, error);
 }
@@ -339,7 +339,7 @@ static ebpo_status slice_take_faces(ebpo_slice *slice, ebpo_chunks *chunks, bool
     slice->mesh.faces = ebpo_alloc(slice->mesh.face_count, ROW);
     if (!slice->mesh.faces)
         return ebpo_fail_memory(error, slice->mesh.face_count * ROW);
-    status = gather_rows(chunks, EBPO_A_FACES, ROW, slice->outer, slice->shared_count,
+    status = gather_rows(chunks, EBPO_A_FACES, ROW, slice->shared, slice->shared_count,
                          slice->first_face, slice->face_count, slice->mesh.faces, error);
     if (status == EBPO_OK)
         status = take_vertices(slice, chunks, space, error);
@@ -354,7 +354,7 @@ void ebpo_slice_free(ebpo_slice *slice)
         return;
     for (int i = 0; i < EBPO_LEVELS_MAX; i++)
         ebpo_level_free(&slice->level[i]);
-    free(slice->outer);
+    free(slice->shared);
     ebpo_mesh_free(&slice->mesh);
     ebpo_array_free(NULL, slice->face_source);
     memset(slice, 0, sizeof *slice);
@@ -683,7 +683,7 @@ ebpo_status ebpo_slice_measure_nodes(ebpo_chunks *chunks, const ebpo_node *root,
         status = measure_nodes(chunks, &x, &r, out, error);
     if (status == EBPO_OK && is_subtree(chunks, &x, root)) {
         status = measure_subtree(chunks, &x, root->rank, out, error);
-        out->outer = out->refs;
+        out->shared = out->refs;
         return status;
     }
     while (status == EBPO_OK && goes_on(&x, &r)) {
@@ -692,7 +692,7 @@ ebpo_status ebpo_slice_measure_nodes(ebpo_chunks *chunks, const ebpo_node *root,
         if (status == EBPO_OK)
             status = measure_nodes(chunks, &x, &r, out, error);
     }
-    out->outer = root->cell.level == 0 ? 0 : out->refs;
+    out->shared = root->cell.level == 0 ? 0 : out->refs;
     return status;
 }
 

@@ -23,7 +23,7 @@ typedef struct ebpo_slice {
     int level_count;
     ebpo_level level[EBPO_LEVELS_MAX];
     uint32_t shared_count;
-    uint32_t *outer; /* [shared_count] file indices, ascending */
+    uint32_t *shared; /* [shared_count] file indices, ascending */
     uint64_t first_face;
     uint64_t face_count; /* owned faces */
     ebpo_mesh mesh;      /* shared_count + face_count faces, vertices in any order */
@@ -68,7 +68,7 @@ typedef struct ebpo_slice_size {
     uint64_t groups, leaves;
     uint64_t refs;      /* references of leaves to faces that an earlier leaf already lists */
     uint64_t new_faces; /* owned faces */
-    uint64_t outer;     /* maximum number of shared faces */
+    uint64_t shared;    /* maximum number of shared faces */
     uint64_t planes;    /* if planes are requested */
 } ebpo_slice_size;
 EBPO_MUST_USE ebpo_status ebpo_slice_measure(ebpo_chunks *chunks, const ebpo_node *root,
@@ -81,7 +81,7 @@ EBPO_MUST_USE ebpo_status ebpo_slice_measure_nodes(ebpo_chunks *chunks, const eb
 /* Returns the file index of a local face. */
 static inline uint64_t ebpo_slice_file_face(const ebpo_slice *slice, uint32_t local)
 {
-    return local < slice->shared_count ? slice->outer[local]
+    return local < slice->shared_count ? slice->shared[local]
                                        : slice->first_face + (local - slice->shared_count);
 }
 

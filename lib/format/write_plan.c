@@ -596,7 +596,7 @@ static void find_values(const ebpo_plan *plan, ebpo_array_out *a)
     else if (a->id == EBPO_A_SUBTREE_COUNTS)
         a->values = plan->subtrees.counts;
     else if (a->id == EBPO_A_SUBTREE_SHARED)
-        a->values = plan->subtrees.outer;
+        a->values = plan->subtrees.shared;
     else if (ebpo_schema_is_held(a->id))
         a->values = ebpo_level_array(&plan->tree->level[a->level], a->id);
     else if (spec->per >= EBPO_PER_GROUP_BLOCK && spec->per <= EBPO_PER_LEAF_BLOCK)

@@ -221,7 +221,7 @@ typedef struct ebpo_accel {
     uint32_t bound_count;
     uint32_t top; /* the root of the hierarchy */
     uint32_t shared_count;
-    uint32_t *outer;       /* file indices of the shared faces, which are owned by other subtrees */
+    uint32_t *shared;      /* file indices of the shared faces, which are owned by other subtrees */
     uint64_t first_face;   /* index of the owned faces: first_face + local - shared_count */
     uint32_t *face_source; /* [local] or NULL */
     /* codes of gray nodes' planes, in the order of group numbers; only for subtrees loaded on
@@ -330,7 +330,7 @@ static inline void ebpo_accel_triangle(const ebpo_accel *s, uint32_t slot, doubl
 
 static inline uint64_t ebpo_accel_file_face(const ebpo_accel *s, uint32_t local)
 {
-    return local < s->shared_count ? s->outer[local] : s->first_face + (local - s->shared_count);
+    return local < s->shared_count ? s->shared[local] : s->first_face + (local - s->shared_count);
 }
 
 /* Prefetches the data that ebpo_accel_triangle will read. */

@@ -52,16 +52,16 @@ static uint64_t lesser_of(uint64_t a, uint64_t b) { return a < b ? a : b; }
 
 typedef struct counts {
     uint64_t groups, leaves, refs, uniform, planes, leaf_planes;
-    uint64_t faces, outer, vertices; /* faces include the shared ones */
-    bool below;                      /* true for a subtree, false for the whole model */
+    uint64_t faces, shared, vertices; /* faces include the shared ones */
+    bool below;                       /* true for a subtree, false for the whole model */
     bool keeps_planes;
 } counts;
 
 /* Sizes in bytes, computed from counts. */
 typedef struct sizes {
-    uint64_t levels, mesh, maps, outer; /* sizes of the parts of the slice */
-    uint64_t only_read;                 /* memory that is needed only while reading, not for a slice
-                                         * in memory */
+    uint64_t levels, mesh, maps, shared; /* sizes of the parts of the slice */
+    uint64_t only_read; /* memory that is needed only while reading, not for a slice
+                         * in memory */
     uint64_t nodes, list, planes, rows, slots;
     uint64_t reserve;
 } sizes;
@@ -74,7 +74,7 @@ static uint64_t grid_bytes(uint64_t groups)
 
 /* Returns the bytes of corner references to vertices of faces before the subtree: from shared faces
  * and their neighbours. */
-static uint64_t border_bytes(const counts *c) { return ebpo_compact_bytes(6 * c->outer); }
+static uint64_t border_bytes(const counts *c) { return ebpo_compact_bytes(6 * c->shared); }
 
 static sizes sizes_of(const counts *c, const ebpo_info *info)
 {
@@ -84,7 +84,7 @@ static sizes sizes_of(const counts *c, const ebpo_info *info)
         .levels = 3 * c->groups + 20 * c->leaves + 4 * (c->uniform + c->refs + c->planes),
         .mesh = 12 * c->faces + 3 * coordinate * c->vertices,
         .maps = maps * c->faces,
-        .outer = 4 * c->outer,
+        .shared = 4 * c->shared,
         .only_read =
             c->below ? border_bytes(c) : maps * c->vertices + c->leaves + 4 * c->leaf_planes,
         .nodes = c->groups * 32 + (c->below ? 0 : grid_bytes(c->groups)) +
@@ -117,7 +117,7 @@ static counts counts_of_all(const ebpo_info *info)
 static counts counts_of_slice(const ebpo_slice *slice, bool with_planes)
 {
     counts c = { .faces = slice->mesh.face_count,
-                 .outer = slice->shared_count,
+                 .shared = slice->shared_count,
                  .vertices = slice->mesh.vertex_count,
                  .below = slice->root.cell.level > 0,
                  .keeps_planes = with_planes };
@@ -138,9 +138,9 @@ static counts counts_of_slice(const ebpo_slice *slice, bool with_planes)
 static counts counts_of_size(const ebpo_slice_size *size, const ebpo_info *info, double roots,
                              uint64_t more)
 {
-    uint64_t own = size->new_faces, nodes = 8 * size->groups,
-             outer = lesser_of(size->refs, (uint64_t)(roots * sqrt((double)own)) + more),
-             faces = own + outer, vertices = faces / 4 * 3 + 64;
+    uint64_t owned = size->new_faces, nodes = 8 * size->groups,
+             shared = lesser_of(size->refs, (uint64_t)(roots * sqrt((double)owned)) + more),
+             faces = owned + shared, vertices = faces / 4 * 3 + 64;
     double of_face = info->face_count ? (double)info->vertex_count / (double)info->face_count : 0;
     return (counts){ .groups = size->groups,
                      .leaves = size->leaves,
@@ -148,7 +148,7 @@ static counts counts_of_size(const ebpo_slice_size *size, const ebpo_info *info,
                      .uniform = nodes > size->leaves ? nodes - size->leaves : 0,
                      .planes = size->planes,
                      .faces = faces,
-                     .outer = outer,
+                     .shared = shared,
                      .vertices = greater_of(vertices, (uint64_t)(1.25 * of_face * (double)faces)),
                      .below = true,
                      .keeps_planes = size->planes > 0 };
@@ -170,7 +170,7 @@ static found default_model(const counts *c, const ebpo_info *info)
 
 static uint64_t kept_bytes(const sizes *t, const found *f)
 {
-    return sizeof(ebpo_accel) + sizeof(ebpo_leaf_kinds) + t->maps + t->outer + t->nodes + t->list +
+    return sizeof(ebpo_accel) + sizeof(ebpo_leaf_kinds) + t->maps + t->shared + t->nodes + t->list +
            t->planes + t->rows + (f->units + 1) * EBPO_MESHLET_UNIT +
            (f->bounds + 1) * (sizeof(ebpo_bound) + sizeof(ebpo_bound_slab));
 }
@@ -189,7 +189,7 @@ static uint64_t peak_bytes(const sizes *t, const found *f)
              early = t->mesh + f->blocks * FOUND, extents = (f->blocks + f->bounds) * EXTENT,
              late = t->nodes + t->list, after = t->nodes + t->list + t->planes + t->rows,
              kept = kept_bytes(t, f) - after,
-             read = t->levels + t->mesh + t->outer + t->maps + t->only_read;
+             read = t->levels + t->mesh + t->shared + t->maps + t->only_read;
     uint64_t made =
         t->levels + kept + greater_of(greater_of(early, extents), late + t->slots) + layout;
     return greater_of(greater_of(read, made), t->levels + kept + after) + t->reserve;
@@ -241,7 +241,7 @@ uint64_t ebpo_accel_mean_bytes(const ebpo_slice_size *all, const ebpo_info *info
 void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
                          uint64_t *peak)
 {
-    uint64_t wide = accel_needs_doubles(info) ? 2 : 1, faces = size->new_faces + size->outer;
+    uint64_t wide = accel_needs_doubles(info) ? 2 : 1, faces = size->new_faces + size->shared;
     uint64_t blocks = faces / 4 + 2, bounds = blocks / 3 + 2;
     *keep = sizeof(ebpo_accel) + sizeof(ebpo_leaf_kinds) + size->groups * 64 +
             size->leaves * (sizeof(ebpo_accel_leaf) + 64) +
@@ -601,9 +601,9 @@ ebpo_status ebpo_accel_make_within(ebpo_accel **out, ebpo_slice *slice, const eb
                         "the model has too many faces to be held in memory at once; give a "
                         "memory budget")
             : make_stages(s, slice, info, space, threads, error);
-    s->outer = slice->outer;
+    s->shared = slice->shared;
     s->face_source = slice->face_source;
-    slice->outer = slice->face_source = NULL;
+    slice->shared = slice->face_source = NULL;
     ebpo_slice_free(slice);
     if (status != EBPO_OK) {
         ebpo_accel_free(s);
@@ -627,7 +627,7 @@ void ebpo_accel_free(ebpo_accel *s)
     free(s->meshlets);
     free(s->bound);
     free(s->slab);
-    free(s->outer);
+    free(s->shared);
     free(s->face_source);
     free(s->gray_planes);
     free(s->gray_first);

@@ -64,7 +64,7 @@ typedef struct ebpo_skeleton ebpo_skeleton;
  * faces, which no other subtree owns, and to its shared faces. INFINITY: there are no such faces.
  */
 typedef struct ebpo_skeleton_bounds {
-    double own, outer;
+    double owned, shared;
 } ebpo_skeleton_bounds;
 
 /* Makes a skeleton with at most `nodes` nodes, 1 to 8. Returns NULL if the subtree has no faces, if

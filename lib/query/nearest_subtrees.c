@@ -171,7 +171,7 @@ static double bound_below_cut(const ebpo_ranking *ranking, const ebpo_node *node
 
 /* Entries of the queue for a subtree: the node without further data; its owned faces; its shared
  * faces. */
-enum { NODE = 0, OWN, OUTER };
+enum { NODE = 0, OWNED, SHARED };
 
 typedef struct searching {
     ebpo_context *c;
@@ -289,8 +289,8 @@ static ebpo_status consider_own(searching *g, uint32_t below, double lower, ebpo
         return EBPO_OK;
     c->seen[below] = 2 * c->query_number;
     const ebpo_skeleton *k = ebpo_skeletons_find(c->model->skeletons, below);
-    double own = skeleton_bounds(g, k).own;
-    ebpo_ranked r = { node_below(c->model, below), fmax(lower, own), OWN };
+    double owned = skeleton_bounds(g, k).owned;
+    ebpo_ranked r = { node_below(c->model, below), fmax(lower, owned), OWNED };
     return r.lower <= ebpo_nearest_limit(g->n) ? ebpo_queue_push(c, &r, error) : EBPO_OK;
 }
 
@@ -301,7 +301,7 @@ typedef struct owners {
     uint64_t code; /* octcode of the other subtree */
     int level;
     double lower;
-    const ebpo_shared_box *outer;
+    const ebpo_shared_box *shared;
     bool (*visit)(struct owners *o, uint32_t below, ebpo_error *error);
     ebpo_status status;
 } owners;
@@ -314,7 +314,7 @@ static bool cell_intersects(const owners *o, ebpo_cell cell)
     ebpo_cell_bounds(&o->g->ranking.box, cell, low, high);
     for (int k = 0; k < 3; k++) {
         double near = (high[k] - low[k]) / 128 + (fabs(low[k]) + fabs(high[k])) * 0x1p-50;
-        if (o->outer->low[k] > high[k] + near || o->outer->high[k] < low[k] - near)
+        if (o->shared->low[k] > high[k] + near || o->shared->high[k] < low[k] - near)
             return false;
     }
     return true;
@@ -358,7 +358,7 @@ static bool visit_owners(owners *o, uint32_t entry, ebpo_cell cell, ebpo_error *
 static bool visit_all(owners *o, const ebpo_shared_box *boxes, unsigned count, ebpo_error *error)
 {
     for (unsigned i = 0; i < count; i++) {
-        o->outer = &boxes[i];
+        o->shared = &boxes[i];
         if (!visit_owners(o, o->g->c->model->top->nodes.root, (ebpo_cell){ 0, { 0, 0, 0 } }, error))
             return false;
     }
@@ -395,7 +395,7 @@ static double deep_bound(const searching *g, const ebpo_ranked *r)
  * bound. */
 static ebpo_status inspect_new(searching *g, const ebpo_ranked *r, ebpo_error *error)
 {
-    ebpo_ranked all = { r->node, deep_bound(g, r), OWN };
+    ebpo_ranked all = { r->node, deep_bound(g, r), OWNED };
     if (all.lower > ebpo_nearest_limit(g->n))
         return EBPO_OK;
     return all.lower > r->lower ? ebpo_queue_push(g->c, &all, error)
@@ -411,17 +411,17 @@ static ebpo_status inspect_subtree(searching *g, const ebpo_ranked *r, ebpo_erro
     if (!k)
         return inspect_new(g, r, error);
     ebpo_skeleton_bounds bounds = skeleton_bounds(g, k);
-    double least = fmax(r->lower, fmin(bounds.own, bounds.outer));
+    double least = fmax(r->lower, fmin(bounds.owned, bounds.shared));
     if (least > ebpo_nearest_limit(g->n))
         return EBPO_OK;
     bool there = is_there(g->c, below); /* then owned and shared faces are searched together */
     double lower = there ? r->lower : deep_bound(g, r);
-    ebpo_ranked own = { r->node, there ? least : fmax(lower, bounds.own), OWN },
-                outer = { r->node, there ? INFINITY : fmax(lower, bounds.outer), OUTER };
+    ebpo_ranked owned = { r->node, there ? least : fmax(lower, bounds.owned), OWNED },
+                shared = { r->node, there ? INFINITY : fmax(lower, bounds.shared), SHARED };
     double limit = ebpo_nearest_limit(g->n);
-    ebpo_status status = own.lower <= limit ? ebpo_queue_push(g->c, &own, error) : EBPO_OK;
-    if (status == EBPO_OK && outer.lower <= limit)
-        status = ebpo_queue_push(g->c, &outer, error);
+    ebpo_status status = owned.lower <= limit ? ebpo_queue_push(g->c, &owned, error) : EBPO_OK;
+    if (status == EBPO_OK && shared.lower <= limit)
+        status = ebpo_queue_push(g->c, &shared, error);
     return status;
 }
 
@@ -453,8 +453,8 @@ static ebpo_status search_parts(searching *g, ebpo_error *error)
             break;
         }
         status = !ebpo_node_is_below(&next.node) ? add_children(g, &next, error)
-                 : next.what == OWN              ? search_below(g, next.node, error)
-                 : next.what == OUTER            ? inspect_shared(g, &next, error)
+                 : next.what == OWNED            ? search_below(g, next.node, error)
+                 : next.what == SHARED           ? inspect_shared(g, &next, error)
                                                  : inspect_subtree(g, &next, error);
     }
     ebpo_deep_bounds_report(g->c->model, g->new_loads);

@@ -237,7 +237,7 @@ static double known_bound(const within *w, uint32_t below)
     if (!k)
         return 0;
     ebpo_skeleton_bounds b = ebpo_skeleton_lower_bounds(k, w->band.p, w->band.limit);
-    return fmin(b.own, b.outer);
+    return fmin(b.owned, b.shared);
 }
 
 /* Queues a node. Omitted parts of a subset are checked when the band is known. */

@@ -32,7 +32,7 @@ enum { PART_NODES = 8, PARTS = EBPO_SKELETON_NODES / PART_NODES, GROWN_AT_ONCE =
 struct ebpo_skeleton {
     double centre[3], scale; /* frame of the subtree */
     unsigned count, first;   /* number of nodes; maximum number in the first part */
-    uint8_t own, outer;      /* a bit for each child of node 0 that has owned faces, shared faces;
+    uint8_t owned, shared;   /* a bit for each child of node 0 that has owned faces, shared faces;
                               * no child has both */
     kept_node *_Atomic part[PARTS];
 };
@@ -79,7 +79,7 @@ static double squared_diagonal(const ebpo_bound *b, int lane)
 
 /* Returns true if the faces below the child are shared. Blocks, and so children of the topmost
  * node, hold either shared faces or owned ones: see blocks.c. */
-static bool is_outer(const ebpo_accel *s, uint32_t child)
+static bool is_shared(const ebpo_accel *s, uint32_t child)
 {
     while (!(child & EBPO_IS_BLOCK))
         child = s->bound[child].child[0];
@@ -90,10 +90,10 @@ static void note_kinds(ebpo_skeleton *k, const ebpo_accel *s)
 {
     const ebpo_bound *top = &s->bound[s->top];
     for (int lane = 0; lane < top->count; lane++)
-        if (is_outer(s, top->child[lane]))
-            k->outer |= (uint8_t)(1u << lane);
+        if (is_shared(s, top->child[lane]))
+            k->shared |= (uint8_t)(1u << lane);
         else
-            k->own |= (uint8_t)(1u << lane);
+            k->owned |= (uint8_t)(1u << lane);
 }
 
 /* Adds the one or two nodes below the topmost one that hold all shared faces: these faces are
@@ -102,21 +102,21 @@ static void keep_shared(ebpo_skeleton *k, const ebpo_accel *s)
 {
     kept_node *top = node_at(k, 0);
     for (int lane = 0; lane < top->bound.count && k->count < k->first; lane++)
-        if (k->outer >> lane & 1 && !(top->bound.child[lane] & EBPO_IS_BLOCK))
+        if (k->shared >> lane & 1 && !(top->bound.child[lane] & EBPO_IS_BLOCK))
             keep_child(k, s, &top->bound.child[lane]);
 }
 
 /* Adds, for owned faces, the node below the largest child without a node in the skeleton: the box
  * of this child is the loosest. */
-static bool keep_largest(ebpo_skeleton *k, const ebpo_accel *s, uint32_t outer_end)
+static bool keep_largest(ebpo_skeleton *k, const ebpo_accel *s, uint32_t shared_end)
 {
     double most = -1;
     uint32_t *place = NULL;
-    for (uint32_t number = 0; number < k->count; number += number ? 1 : outer_end) {
+    for (uint32_t number = 0; number < k->count; number += number ? 1 : shared_end) {
         ebpo_bound *b = &node_at(k, number)->bound;
         for (int lane = 0; lane < b->count; lane++) {
             bool leads_on =
-                !(b->child[lane] & (IS_KEPT | EBPO_IS_BLOCK)) && (number || k->own >> lane & 1);
+                !(b->child[lane] & (IS_KEPT | EBPO_IS_BLOCK)) && (number || k->owned >> lane & 1);
             double size = leads_on ? squared_diagonal(b, lane) : -1;
             if (size > most) {
                 most = size;
@@ -148,7 +148,7 @@ ebpo_skeleton *ebpo_skeleton_make(const ebpo_accel *s, unsigned nodes)
     keep_child(k, s, &top);
     note_kinds(k, s);
     keep_shared(k, s);
-    for (uint32_t outer_end = k->count; k->count < most && keep_largest(k, s, outer_end);)
+    for (uint32_t shared_end = k->count; k->count < most && keep_largest(k, s, shared_end);)
         ;
     return k;
 }
@@ -281,9 +281,9 @@ ebpo_skeleton_bounds ebpo_skeleton_lower_bounds(const ebpo_skeleton *k, const do
 {
     double p[3], limit2 = frame_limit2(k, limit);
     if (!to_frame(k, point, p))
-        return (ebpo_skeleton_bounds){ k->own ? 0 : INFINITY, k->outer ? 0 : INFINITY };
-    return (ebpo_skeleton_bounds){ lower_bound(k, k->own, p, limit2),
-                                   lower_bound(k, k->outer, p, limit2) };
+        return (ebpo_skeleton_bounds){ k->owned ? 0 : INFINITY, k->shared ? 0 : INFINITY };
+    return (ebpo_skeleton_bounds){ lower_bound(k, k->owned, p, limit2),
+                                   lower_bound(k, k->shared, p, limit2) };
 }
 
 /* --- for a far point --- */
@@ -321,11 +321,12 @@ ebpo_skeleton_bounds ebpo_skeleton_far_bounds(const ebpo_skeleton *k, const ebpo
     double reach = 1, beyond = nextafter(limit, INFINITY);
     for (int i = 0; i < 3; i++)
         reach = fmax(reach, fabs((double)top->origin[i]) + 255 * (double)top->step[i]);
-    far_search own = { k, far, ebpo_far_frame_of(far, k->centre, k->scale, reach), beyond },
-               outer = own;
-    search_below_far(&own, 0, k->own);
-    search_below_far(&outer, 0, k->outer);
-    return (ebpo_skeleton_bounds){ k->own ? own.best : INFINITY, k->outer ? outer.best : INFINITY };
+    far_search owned = { k, far, ebpo_far_frame_of(far, k->centre, k->scale, reach), beyond },
+               shared = owned;
+    search_below_far(&owned, 0, k->owned);
+    search_below_far(&shared, 0, k->shared);
+    return (ebpo_skeleton_bounds){ k->owned ? owned.best : INFINITY,
+                                   k->shared ? shared.best : INFINITY };
 }
 
 /* Allocates the next part of nodes if needed. Returns false if the skeleton has its maximum size,
@@ -348,11 +349,11 @@ void ebpo_skeleton_grow(ebpo_skeleton *k, const ebpo_accel *s, const double poin
                         bool (*take)(void *user, uint64_t bytes), void *user)
 {
     double p[3], limit2 = frame_limit2(k, limit);
-    if (!k->own || !to_frame(k, point, p))
+    if (!k->owned || !to_frame(k, point, p))
         return;
     for (int added = 0; added < GROWN_AT_ONCE; added++) {
         nearest_place best = { limit2, NULL };
-        search_below(k, 0, k->own, p, 0, &best);
+        search_below(k, 0, k->owned, p, 0, &best);
         if (!best.place || *best.place & EBPO_IS_BLOCK || !has_place(k, take, user))
             return;
         keep_child(k, s, best.place);
@@ -397,7 +398,7 @@ unsigned ebpo_skeleton_shared_boxes(const ebpo_skeleton *k, const double point[3
 {
     double p[3];
     bool near = to_frame(k, point, p);
-    return boxes_of(k, 0, k->outer, p, near ? frame_limit2(k, limit) : INFINITY, out);
+    return boxes_of(k, 0, k->shared, p, near ? frame_limit2(k, limit) : INFINITY, out);
 }
 
 /* --- the skeletons of a model --- */

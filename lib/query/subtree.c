@@ -618,7 +618,7 @@ static uint64_t bound_bytes(const ebpo_slice_size *size, const ebpo_info *info, 
         ALWAYS = 1 << 20
     };
     uint64_t number = info->double_coordinates ? sizeof(double) : sizeof(float),
-             faces = size->new_faces + size->outer,
+             faces = size->new_faces + size->shared,
              vertices = 3 * faces < info->vertex_count ? 3 * faces : info->vertex_count;
     return ALWAYS + size->groups * (8 * NODE + GROUP) + size->leaves * LEAF + size->planes * PLANE +
            size->refs * REFERENCE + faces * (FACE + (corners ? 9 * number : 0)) +
@@ -627,12 +627,12 @@ static uint64_t bound_bytes(const ebpo_slice_size *size, const ebpo_info *info, 
 
 /* Counts references to faces that are new before the subtree: an upper bound of the number of
  * shared faces. Reads the lists, of which most are references within the subtree. */
-static ebpo_status count_shared(const ebpo_subtree *s, ebpo_chunks *chunks, uint64_t *outer,
+static ebpo_status count_shared(const ebpo_subtree *s, ebpo_chunks *chunks, uint64_t *shared,
                                 ebpo_error *error)
 {
     ebpo_slice lists;
     uint64_t first = UINT64_MAX;
-    *outer = 0;
+    *shared = 0;
     ebpo_status status =
         ebpo_slice_read_nodes(&lists, chunks, &s->root, EBPO_NEEDS_ALWAYS | EBPO_NEEDS_MESH,
                               EBPO_SLICE_ALL, error);
@@ -643,7 +643,7 @@ static ebpo_status count_shared(const ebpo_subtree *s, ebpo_chunks *chunks, uint
             first = lists.level[i].leaf_first[0];
     for (int i = 0; i < lists.level_count; i++)
         for (uint64_t k = 0; k < lists.level[i].ref_count; k++)
-            *outer += lists.level[i].leaf_refs[k] < first;
+            *shared += lists.level[i].leaf_refs[k] < first;
     ebpo_slice_free(&lists);
     return EBPO_OK;
 }
@@ -660,11 +660,11 @@ static ebpo_status check_memory(const ebpo_subtree *s, ebpo_chunks *chunks, uint
     if (status != EBPO_OK)
         return status;
     ebpo_slice_size lists = size;
-    lists.outer = lists.new_faces = 0;
+    lists.shared = lists.new_faces = 0;
     uint64_t least = least_memory(bound_bytes(&size, info, whole, corners));
-    if (least > o->memory && size.outer &&
+    if (least > o->memory && size.shared &&
         least_memory(bound_bytes(&lists, info, whole, corners)) <= o->memory) {
-        status = count_shared(s, chunks, &size.outer, error);
+        status = count_shared(s, chunks, &size.shared, error);
         least = least_memory(bound_bytes(&size, info, whole, corners));
     }
     if (status != EBPO_OK || least <= o->memory)

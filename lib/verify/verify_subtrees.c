@@ -67,12 +67,12 @@ typedef struct recount {
     int level; /* level of the subtrees' roots */
     /* the arrays of /subtrees, as stored */
     unsigned cols, rows_of_chunk; /* of `counts` */
-    const uint32_t *counts, *outer;
+    const uint32_t *counts, *shared;
     const uint64_t *index;
-    uint64_t subtrees, shared_rows; /* shared_rows: number of rows of `outer` */
+    uint64_t subtrees, shared_rows; /* shared_rows: number of rows of `shared` */
     /* numbers of subtrees, faces and vertices so far */
     uint64_t subtree, faces, vertices;
-    uint64_t outer_done;           /* number of compared rows of `outer` */
+    uint64_t shared_done;          /* number of compared rows of `shared` */
     uint64_t end[EBPO_LEVELS_MAX]; /* end of the new faces, by level */
     /* columns: sums over all subtrees before the current one, counts of the current one */
     uint64_t sum[MAX_COLS], row[MAX_COLS];
@@ -138,10 +138,10 @@ static void compare_shared(recount *c, const char *what, uint64_t from, const nu
                            unsigned column)
 {
     ebpo_tally *tally = c->tally;
-    uint64_t first = c->outer_done, i = 0;
+    uint64_t first = c->shared_done, i = 0;
     for (; i < needed->count; i++)
-        if (first + i >= c->shared_rows || c->outer[first + i] > from ||
-            from - c->outer[first + i] != needed->at[needed->count - 1 - i])
+        if (first + i >= c->shared_rows || c->shared[first + i] > from ||
+            from - c->shared[first + i] != needed->at[needed->count - 1 - i])
             break;
     if (i < needed->count)
         CHECK(false,
@@ -151,7 +151,7 @@ static void compare_shared(recount *c, const char *what, uint64_t from, const nu
     else
         CHECK(true, "%s", "");
     c->row[column] = needed->count;
-    c->outer_done += needed->count;
+    c->shared_done += needed->count;
 }
 
 /* Adds the blocks of those vertices of a face that are below first_vertex. */
@@ -297,9 +297,9 @@ static ebpo_status recount_table(recount *c, ebpo_error *error)
     ebpo_tally *tally = c->tally;
     ebpo_reference_node root = ebpo_reference_root(c->view);
     visit_node(c, &root);
-    CHECK(c->outer_done == c->shared_rows,
+    CHECK(c->shared_done == c->shared_rows,
           "/subtrees/outer has %" PRIu64 " rows, but %" PRIu64 " blocks are needed", c->shared_rows,
-          c->outer_done);
+          c->shared_done);
     ebpo_array_free(c->view->workspace, c->shared_faces.at);
     return c->no_memory ? ebpo_workspace_fail_while(c->view->workspace, "counting subtrees", error)
                         : EBPO_OK;
@@ -310,7 +310,7 @@ ebpo_status ebpo_check_subtrees(ebpo_tally *tally, const ebpo_file *file,
                                 ebpo_error *error)
 {
     const ebpo_array_in *counts = ebpo_reader_array(file, EBPO_A_SUBTREE_COUNTS, 0),
-                        *outer = ebpo_reader_array(file, EBPO_A_SUBTREE_SHARED, 0);
+                        *shared = ebpo_reader_array(file, EBPO_A_SUBTREE_SHARED, 0);
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
     ebpo_error own = EBPO_ERROR_INIT;
     recount c = { .tally = tally, .view = view, .level = file->info.subtree_level };
@@ -320,20 +320,20 @@ ebpo_status ebpo_check_subtrees(ebpo_tally *tally, const ebpo_file *file,
         return EBPO_OK;
     c.cols = counts->shape.cols;
     c.rows_of_chunk = counts->shape.chunk_rows;
-    c.shared_rows = outer->present ? outer->shape.rows : 0;
+    c.shared_rows = shared->present ? shared->shape.rows : 0;
     ebpo_status status = ebpo_reader_make(file, EBPO_A_SUBTREE_COUNTS, 0, &read, sizeof *c.counts,
                                           (void *)&c.counts, &own);
     if (status == EBPO_OK)
         status = ebpo_reader_make(file, EBPO_A_SUBTREE_INDEX, 0, &read, sizeof *c.index,
                                   (void *)&c.index, &own);
     if (status == EBPO_OK)
-        status = ebpo_reader_make(file, EBPO_A_SUBTREE_SHARED, 0, &read, sizeof *c.outer,
-                                  (void *)&c.outer, &own);
+        status = ebpo_reader_make(file, EBPO_A_SUBTREE_SHARED, 0, &read, sizeof *c.shared,
+                                  (void *)&c.shared, &own);
     if (status == EBPO_OK)
         status = recount_table(&c, &own);
     ebpo_array_free(read.workspace, (void *)(uintptr_t)c.counts);
     ebpo_array_free(read.workspace, (void *)(uintptr_t)c.index);
-    ebpo_array_free(read.workspace, (void *)(uintptr_t)c.outer);
+    ebpo_array_free(read.workspace, (void *)(uintptr_t)c.shared);
     if (status != EBPO_E_FORMAT)
         return status == EBPO_OK ? EBPO_OK : ebpo_fail_with(error, &own);
     CHECK(false, "%s", own.message);

@@ -47,7 +47,7 @@ static uint64_t count_nearer(const ebpo_accel *s, const slots *all, const double
     uint64_t nearer = 0;
     for (uint64_t i = 0; i < all->count; i++) {
         uint32_t slot = all->list[i], local = ebpo_accel_slot_face(s, slot);
-        double t[3][3], lower = local < s->shared_count ? bounds.outer : bounds.own;
+        double t[3][3], lower = local < s->shared_count ? bounds.shared : bounds.owned;
         ebpo_distance_bounds b;
         ebpo_accel_triangle(s, slot, t);
         ebpo_triangle_distance_bounds(p, (const double(*)[3])t, &b);
@@ -60,13 +60,14 @@ static uint64_t count_nearer(const ebpo_accel *s, const slots *all, const double
 /* Checks bounds with a limit. Distances beyond the limit may be reported as infinite. */
 static void check_limit(const ebpo_skeleton *k, const double p[3], ebpo_skeleton_bounds all)
 {
-    double limit[] = { all.own * (1 - 0x1p-30), all.own, all.outer, all.own / 2 + all.outer / 2 };
+    double limit[] = { all.owned * (1 - 0x1p-30), all.owned, all.shared,
+                       all.owned / 2 + all.shared / 2 };
     for (int i = 0; i < 4; i++) {
         if (!isfinite(limit[i]))
             continue;
         ebpo_skeleton_bounds b = ebpo_skeleton_lower_bounds(k, p, limit[i]);
-        ck_assert(b.own == all.own || (b.own == INFINITY && all.own > limit[i]));
-        ck_assert(b.outer == all.outer || (b.outer == INFINITY && all.outer > limit[i]));
+        ck_assert(b.owned == all.owned || (b.owned == INFINITY && all.owned > limit[i]));
+        ck_assert(b.shared == all.shared || (b.shared == INFINITY && all.shared > limit[i]));
     }
 }
 
@@ -92,8 +93,8 @@ static void check_bounds(const ebpo_accel *s, const double *points, uint64_t cou
         ebpo_skeleton_grow(few[3], s, p, INFINITY, take, &space);
         for (int n = 0; n < 4; n++) {
             b[n] = ebpo_skeleton_lower_bounds(few[n], p, INFINITY);
-            ck_assert_double_ge(b[n].own, n ? b[n - 1].own : 0);
-            ck_assert_double_ge(b[n].outer, n ? b[n - 1].outer : 0);
+            ck_assert_double_ge(b[n].owned, n ? b[n - 1].owned : 0);
+            ck_assert_double_ge(b[n].shared, n ? b[n - 1].shared : 0);
             check_limit(few[n], p, b[n]);
         }
         ck_assert_uint_eq(count_nearer(s, &all, p, b[2]), 0);
@@ -113,7 +114,7 @@ static bool holds(const ebpo_shared_box *box, const double t[3][3])
 }
 
 /* Checks exactly that every shared face within the limit is in some box. */
-static void check_outer_boxes(const ebpo_accel *s, const double p[3], double limit)
+static void check_shared_boxes(const ebpo_accel *s, const double p[3], double limit)
 {
     ebpo_shared_box box[EBPO_SHARED_BOXES];
     ebpo_skeleton *k = s->shared_count ? ebpo_skeleton_make(s, 8) : NULL;
@@ -153,9 +154,9 @@ START_TEST(test_skeleton_bound_is_below_face_distance)
         ebpo_accel *s;
         ASSERT_OK(ebpo_context_subtree(context, below, &s, error));
         check_bounds(s, points, count);
-        check_outer_boxes(s, points, INFINITY);
-        check_outer_boxes(s, points, m.size / 4);
-        check_outer_boxes(s, points + 3, m.size / 16);
+        check_shared_boxes(s, points, INFINITY);
+        check_shared_boxes(s, points, m.size / 4);
+        check_shared_boxes(s, points + 3, m.size / 16);
     }
     ebpo_context_free(context);
     ebpo_model_free(model);

@@ -364,9 +364,9 @@ START_TEST(test_huge_memory_estimates_do_not_wrap)
                              .leaves = UINT64_C(1) << 34,
                              .refs = UINT64_C(1) << 36,
                              .new_faces = TWO32 - 2,
-                             .outer = UINT64_C(1) << 36 };
+                             .shared = UINT64_C(1) << 36 };
     ebpo_accel_estimate(&size, info, &keep, &peak);
-    ck_assert_uint_gt(keep, size.refs * sizeof(ebpo_listed_block) + size.outer * 72);
+    ck_assert_uint_gt(keep, size.refs * sizeof(ebpo_listed_block) + size.shared * 72);
     ck_assert_uint_gt(peak, keep);
     free(info);
 }

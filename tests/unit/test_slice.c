@@ -213,8 +213,8 @@ static void compare_counts(const compare *c, const ebpo_slice_size *size)
         sum.refs += l->ref_count;
         sum.new_faces += l->new_count;
     }
-    sum.outer = c->slice->root.cell.level == 0 ? 0 : sum.refs;
-    ck_assert_uint_le(c->slice->shared_count, sum.outer);
+    sum.shared = c->slice->root.cell.level == 0 ? 0 : sum.refs;
+    ck_assert_uint_le(c->slice->shared_count, sum.shared);
     ck_assert_uint_eq(sum.new_faces, c->slice->face_count);
     ck_assert_mem_eq(&sum, size, sizeof sum);
 }
@@ -227,8 +227,8 @@ static void compare_slice(const whole *w, const ebpo_slice *slice, const ebpo_sl
     compare_node(&c, 0, slice->root.type, slice->root.rank);
     compare_counts(&c, size);
     for (uint32_t k = 0; k < slice->shared_count; k++) {
-        ck_assert(c.listed[k] && slice->outer[k] < slice->first_face);
-        ck_assert(k == 0 || slice->outer[k] > slice->outer[k - 1]);
+        ck_assert(c.listed[k] && slice->shared[k] < slice->first_face);
+        ck_assert(k == 0 || slice->shared[k] > slice->shared[k - 1]);
     }
     compare_faces(slice, &w->tree);
     free(c.listed);
@@ -402,7 +402,7 @@ START_TEST(test_root_slice_is_whole_tree)
     ck_assert_int_eq(ebpo_slice_measure(w.chunks, &all.root, &size, NULL), EBPO_OK);
     ck_assert_int_eq(all.level_count, root.level_count);
     ck_assert(all.face_count == root.face_count && all.first_face == 0 && root.first_face == 0 &&
-              !all.outer && !root.outer);
+              !all.shared && !root.shared);
     same(all.face_source, root.face_source, all.face_count * 4);
     for (int i = 0; i < all.level_count; i++)
         same_level(&all.level[i], &root.level[i]);
