@@ -12,8 +12,9 @@
 
 #include "hdf5_read/codec.h"
 
-/* Filter pipelines; the first ones are those of ebpo_codec, in its order. Shuffle comes first where
- * elements have more than one byte (but not in the last two pipelines). */
+/* Filter pipelines. The first pipelines are those of ebpo_codec, in the order of ebpo_codec.
+ * Shuffle comes first where elements have more than one byte (but not in the last two pipelines).
+ */
 typedef enum ebpo_pipeline {
     EBPO_PIPELINE_ZSTD,     /* shuffle, zstd frame with content size and checksum */
     EBPO_PIPELINE_DEFLATE,  /* shuffle, zlib stream, fletcher32 */
