@@ -27,7 +27,7 @@ static ebpo_status table_fails(const ebpo_chunks *chunks, ebpo_array_id id, cons
 
 /* Returns the maximum of a column's sum over all subtrees. Sets *exact to true if the sum must
  * equal this maximum. */
-static uint64_t column_total(const ebpo_file *file, unsigned column, bool *exact)
+static uint64_t column_maximum(const ebpo_file *file, unsigned column, bool *exact)
 {
     const ebpo_info *info = &file->info;
     bool mesh = info->parts & EBPO_PART_MESH, planes = info->parts & EBPO_PART_PLANES,
@@ -63,14 +63,14 @@ static ebpo_status sums_before(ebpo_chunks *chunks, uint64_t chunk, uint32_t col
     ebpo_status status = EBPO_OK;
     if (chunk == index->shape.rows) {
         for (uint32_t k = 0; k < cols; k++)
-            sums[k] = column_total(chunks->file, k, &exact);
+            sums[k] = column_maximum(chunks->file, k, &exact);
         return EBPO_OK;
     }
     ebpo_held_chunk view = { .array = index };
     status = ebpo_held_chunk_move(chunks, &view, chunk, error);
     for (uint32_t k = 0; k < cols && status == EBPO_OK; k++) {
         sums[k] = ebpo_load64(view.rows + ((chunk - view.begin) * cols + k) * 8);
-        if (sums[k] > column_total(chunks->file, k, &exact) || (chunk == 0 && sums[k]))
+        if (sums[k] > column_maximum(chunks->file, k, &exact) || (chunk == 0 && sums[k]))
             status = table_fails(chunks, EBPO_A_SUBTREE_INDEX,
                                  "the sums contradict the counts in the header", error);
     }
@@ -122,7 +122,7 @@ static ebpo_status open_counts(ebpo_chunks *chunks, uint64_t subtree, subtree_co
         status = table_fails(chunks, EBPO_A_SUBTREE_SHARED,
                              "its rows do not match the table's counts", error);
     for (uint32_t k = 0; k < c->cols && status == EBPO_OK; k++) {
-        (void)column_total(chunks->file, k, &exact);
+        (void)column_maximum(chunks->file, k, &exact);
         if (last && !exact ? sums[k] > c->end[k] : sums[k] != c->end[k])
             status = table_fails(chunks, EBPO_A_SUBTREE_COUNTS,
                                  "the rows do not add up to the sums in the index", error);
@@ -472,6 +472,7 @@ static ebpo_status row_contradicts(const ebpo_chunks *chunks, ebpo_error *error)
                             "a row contradicts the nodes of its subtree", error);
 }
 
+/* Checks the row's numbers of nodes by counting the nodes of its subtree in the level. */
 static ebpo_status check_types(ebpo_chunks *chunks, int level, const ebpo_subtree_row *row,
                                ebpo_error *error)
 {
@@ -638,25 +639,27 @@ ebpo_status ebpo_ranks_leaf(ebpo_chunks *chunks, int level, uint64_t leaf, uint6
                             uint64_t *refs, ebpo_error *error)
 {
     const ebpo_info *info = &chunks->file->info;
-    uint64_t row[3], skip = 0, fresh = 0, listed = 0,
+    uint64_t row[3], skipped = 0, new_faces = 0, listed = 0,
                      from = leaf / EBPO_INDEX_ROWS * EBPO_INDEX_ROWS;
     ebpo_status status = leaf_row(chunks, level, leaf, true, row, &from, error);
     if (status == EBPO_OK)
-        status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_SKIP, level, from, leaf - from, &skip, error);
+        status =
+            ebpo_chunks_sum(chunks, EBPO_A_LEAF_SKIP, level, from, leaf - from, &skipped, error);
     if (status == EBPO_OK)
-        status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_NEW, level, from, leaf - from, &fresh, error);
+        status =
+            ebpo_chunks_sum(chunks, EBPO_A_LEAF_NEW, level, from, leaf - from, &new_faces, error);
     if (status == EBPO_OK)
         status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_REF_COUNT, level, from, leaf - from, &listed,
                                  error);
     if (status != EBPO_OK)
         return status;
-    if (row[0] > info->face_count || skip > info->face_count - row[0] ||
-        fresh > info->face_count - row[0] - skip)
+    if (row[0] > info->face_count || skipped > info->face_count - row[0] ||
+        new_faces > info->face_count - row[0] - skipped)
         return ebpo_chunks_fail(chunks, level, EBPO_A_LEAF_SKIP,
                                 "a leaf's new faces are beyond the last face", error);
     if (row[1] > info->level[level].ref_count || listed > info->level[level].ref_count - row[1])
         return ebpo_chunks_fail(chunks, level, EBPO_A_LEAF_INDEX, contradicts, error);
-    *end = row[0] + skip + fresh;
+    *end = row[0] + skipped + new_faces;
     *refs = row[1] + listed;
     return EBPO_OK;
 }
@@ -676,11 +679,14 @@ ebpo_status ebpo_ranks_leaf_planes(ebpo_chunks *chunks, int level, uint64_t leaf
     return status;
 }
 
+/* --- prefetch hints for subtrees --- */
+
+/* The hints for consecutive subtrees. */
 typedef struct hinting {
     ebpo_chunks *chunks;
     ebpo_hints *hints;
-    const ebpo_subtree_row *first, *last;
-    uint32_t needs;
+    const ebpo_subtree_row *first, *last; /* rows of the first and the last subtree */
+    uint32_t needs;                       /* EBPO_NEEDS_ bits: arrays that will be read */
     int last_level;
 } hinting;
 
@@ -697,7 +703,9 @@ static uint64_t subtree_sum(const hinting *t, int level, unsigned what, bool aft
     return after ? t->last->after[column] : t->first->before[column];
 }
 
-static uint64_t sum_of(const hinting *t, ebpo_per per, int level, bool after)
+/* Returns the number of rows, of an array with a row for each `per`, before the subtrees, or with
+ * `after` including them. */
+static uint64_t rows_before(const hinting *t, ebpo_per per, int level, bool after)
 {
     const ebpo_info *info = &t->chunks->file->info;
     uint64_t groups = ebpo_subtree_groups(info, after ? t->last : t->first, level, after);
@@ -717,6 +725,7 @@ static uint64_t sum_of(const hinting *t, ebpo_per per, int level, bool after)
     }
 }
 
+/* Adds the arrays of levels to the hints. */
 static void hint_nodes(const hinting *t)
 {
     const ebpo_info *info = &t->chunks->file->info;
@@ -724,8 +733,9 @@ static void hint_nodes(const hinting *t)
          level++)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
             if (ebpo_schema[id].needs & t->needs)
-                hint_rows(t, (ebpo_array_id)id, level, sum_of(t, ebpo_schema[id].per, level, false),
-                          sum_of(t, ebpo_schema[id].per, level, true));
+                hint_rows(t, (ebpo_array_id)id, level,
+                          rows_before(t, ebpo_schema[id].per, level, false),
+                          rows_before(t, ebpo_schema[id].per, level, true));
 }
 
 /* Adds to the hints the chunk of faces or vertices that is `distance` chunks before the chunk of
@@ -742,6 +752,7 @@ static void hint_chunk(const hinting *t, ebpo_array_id id, uint64_t from, uint64
         hint_rows(t, EBPO_A_FACE_SOURCE, 0, row, row + chunk_rows);
 }
 
+/* Adds the owned faces and vertices to the hints. */
 static void hint_owned_faces(const hinting *t)
 {
     uint64_t faces = t->last->after[EBPO_S_FACES_BEFORE] + t->last->after[EBPO_S_FACES],

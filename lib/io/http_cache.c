@@ -494,8 +494,7 @@ static bool is_idle(const ebpo_cached_range *range)
            (range->state == RANGE_THERE || (range->state == RANGE_COMING && range->request.done));
 }
 
-/* Drops the range that was read least recently; if none was read, one whose prefetch hint is old.
- */
+/* Drops the range that was read least recently; if none was read, a range with an old hint. */
 static bool forget_one(ebpo_range_cache *p)
 {
     uint64_t read = p->count, stale = p->count;
