@@ -22,9 +22,10 @@
 #include "query/nearest.h"
 #include "query/query_node.h"
 
+/* A subtree that a query may need. */
 typedef struct wanted {
-    uint64_t key;
-    double lower; /* lower bound of the distance */
+    uint64_t number; /* in the top */
+    double lower;    /* lower bound of the distance */
 } wanted;
 
 /* Search for the nearest subtrees within a distance of a point. */
@@ -35,12 +36,13 @@ typedef struct subtree_search {
     wanted list[EBPO_CACHE_AHEAD]; /* the nearest first */
 } subtree_search;
 
-static void add_subtree(subtree_search *l, uint64_t key, double lower)
+/* Inserts a subtree by its lower bound. If the list is full, drops the farthest subtree. */
+static void add_subtree(subtree_search *l, uint64_t number, double lower)
 {
     unsigned at = l->count < EBPO_CACHE_AHEAD ? l->count++ : EBPO_CACHE_AHEAD - 1;
     for (; at > 0 && l->list[at - 1].lower > lower; at--)
         l->list[at] = l->list[at - 1];
-    l->list[at] = (wanted){ key, lower };
+    l->list[at] = (wanted){ number, lower };
     if (l->count == EBPO_CACHE_AHEAD)
         l->limit = fmin(l->limit, l->list[EBPO_CACHE_AHEAD - 1].lower);
 }
@@ -60,12 +62,12 @@ static void search_below(subtree_search *l, ebpo_node node, double lower)
 }
 
 unsigned ebpo_subtrees_near(const ebpo_model *m, const double p[3], double limit,
-                            uint64_t keys[EBPO_CACHE_AHEAD])
+                            uint64_t numbers[EBPO_CACHE_AHEAD])
 {
     subtree_search l = { .ranking = ebpo_ranking_of(m, p, NULL), .limit = limit };
     search_below(&l, ebpo_model_root(m), ebpo_rank_root(&l.ranking));
     for (unsigned i = 0; i < l.count; i++)
-        keys[i] = l.list[i].key;
+        numbers[i] = l.list[i].number;
     return l.count;
 }
 
@@ -74,7 +76,8 @@ static double longest_side(const ebpo_box *box, int level)
     return ldexp(fmax(box->size[0], fmax(box->size[1], box->size[2])), -level);
 }
 
-static double distance_apart(const double a[3], const double b[3])
+/* Returns the largest difference of coordinates. */
+static double largest_difference(const double a[3], const double b[3])
 {
     return fmax(fabs(a[0] - b[0]), fmax(fabs(a[1] - b[1]), fabs(a[2] - b[2])));
 }
@@ -84,7 +87,7 @@ void ebpo_context_prefetch(ebpo_context *c, const double p[3], double search_dis
     const ebpo_model *m = c->model;
     ebpo_box box = ebpo_model_box(m);
     double side = longest_side(&box, m->top->cut_level);
-    if (c->has_prefetched && distance_apart(p, c->prefetched_from) < side / 4 &&
+    if (c->has_prefetched && largest_difference(p, c->prefetched_from) < side / 4 &&
         fabs(search_distance) <= c->prefetched_distance + side / 4)
         return;
     c->has_prefetched = true;
@@ -255,24 +258,25 @@ void ebpo_batch_end(ebpo_batch *b)
 
 #define EBPO_NO_SUBTREE UINT64_MAX
 
-/* Returns the subtree where the search for a point begins. EBPO_NO_SUBTREE: no subtree is needed,
- * as the top decides. */
+/* Returns the *home* of a point: the number in the top of the subtree where the search for the
+ * point begins. EBPO_NO_SUBTREE: no subtree is needed, as the top decides. */
 static uint64_t home_of(const ebpo_batch *b, const double p[3])
 {
     const ebpo_model *m = b->context->model;
-    uint64_t keys[EBPO_CACHE_AHEAD];
+    uint64_t near[EBPO_CACHE_AHEAD];
     uint32_t at[3];
     ebpo_box box = ebpo_model_box(m);
-    int fine = m->info->level_count - 1;
+    int deepest = m->info->level_count - 1;
     if (b->searches_around)
-        return ebpo_subtrees_near(m, p, INFINITY, keys) ? keys[0] : EBPO_NO_SUBTREE;
-    if (!ebpo_locate(&box, fine, p, at))
+        return ebpo_subtrees_near(m, p, INFINITY, near) ? near[0] : EBPO_NO_SUBTREE;
+    if (!ebpo_locate(&box, deepest, p, at))
         return EBPO_NO_SUBTREE;
-    uint32_t entry = ebpo_descend(&m->top->nodes, fine, at).entry;
+    uint32_t entry = ebpo_descend(&m->top->nodes, deepest, at).entry;
     return ebpo_entry_kind_of(entry) == EBPO_ENTRY_BELOW ? ebpo_entry_value(entry)
                                                          : EBPO_NO_SUBTREE;
 }
 
+/* Adds a subtree to the next hint, if it is not in memory. */
 static void collect_subtree(ebpo_batch *b, uint64_t below)
 {
     if (below != EBPO_NO_SUBTREE &&
@@ -292,7 +296,7 @@ static const double *ordered_point(const ebpo_batch *b, uint64_t i)
     return b->points + 3 * (b->order ? b->order[i] : i);
 }
 
-/* Sends prefetch hints for the subtrees where the searches for the next points begin. */
+/* Sends a prefetch hint for the homes of the next points. */
 static void hint_next(ebpo_batch *b)
 {
     uint64_t begin = b->hinted;
@@ -306,15 +310,15 @@ static void hint_next(ebpo_batch *b)
 }
 
 /* Sends one hint for the other subtrees that the next points need, so that queries do not request
- * them one by one. For each point, the subtree where the search begins is searched; its result
- * bounds the distance, and so the subtrees that are needed. A subtree that cannot be loaded ends
+ * them one by one. For each point, its home is searched; the result bounds the distance, and
+ * so the subtrees that are needed. A subtree that cannot be loaded ends
  * the search: the query will return the error, and another try may wait as long as the first. */
 static void search_around(ebpo_batch *b, uint64_t end)
 {
     ebpo_context *c = b->context;
     for (bool fails = false; b->searched < end && !fails; b->searched++) {
         const double *p = ordered_point(b, b->searched);
-        uint64_t home = home_of(b, p), keys[EBPO_CACHE_AHEAD];
+        uint64_t home = home_of(b, p), near[EBPO_CACHE_AHEAD];
         ebpo_accel *accel;
         ebpo_nearest n;
         if (home == EBPO_NO_SUBTREE || c->model->top->below[home].pruned)
@@ -324,9 +328,9 @@ static void search_around(ebpo_batch *b, uint64_t end)
             continue;
         ebpo_nearest_begin(&n, c->model, p, INFINITY);
         ebpo_nearest_search(&n, c, accel);
-        unsigned count = ebpo_subtrees_near(c->model, p, fmin(n.upper, n.limit), keys);
+        unsigned count = ebpo_subtrees_near(c->model, p, fmin(n.upper, n.limit), near);
         for (unsigned k = 0; k < count; k++)
-            collect_subtree(b, keys[k]);
+            collect_subtree(b, near[k]);
     }
     hint_collected(b);
 }

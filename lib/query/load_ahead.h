@@ -11,10 +11,10 @@
  * cache. */
 void ebpo_context_prefetch(ebpo_context *context, const double p[3], double search_distance);
 
-/* Lists the subtrees whose envelopes may be within `limit` of p, the nearest first; returns their
- * count. */
+/* Lists the subtrees whose envelopes may be within `limit` of p, the nearest first, by their
+ * numbers in the top; returns their count. */
 unsigned ebpo_subtrees_near(const ebpo_model *model, const double p[3], double limit,
-                            uint64_t keys[EBPO_CACHE_AHEAD]);
+                            uint64_t numbers[EBPO_CACHE_AHEAD]);
 
 /* Sends one prefetch hint for subtrees that will be entered soon, given by their numbers in the
  * top. For remote files that have a table of subtrees. Skips subtrees in memory. */
