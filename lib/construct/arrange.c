@@ -250,7 +250,7 @@ static void take_vertices(void *context, uint64_t place, const void *records, ui
         if (a->to->key)
             a->to->key[place] =
                 (key & ~UNREFERENCED) >> 3 * (EBPO_MAX_LEVEL - a->to->box.grid_level);
-        a->to->vertex_source[place] = at; /* converted to the source's numbers at the end */
+        a->to->vertex_source[place] = at; /* converted to source indices at the end */
     }
 }
 
@@ -418,8 +418,8 @@ static ebpo_status sort_faces(arranging *a, ebpo_error *error)
 
 /* --- the whole mesh --- */
 
-/* Composes the maps of a mesh that was arranged already: the source numbers of vertices come from
- * its map. The source numbers of faces were part of the sort keys. */
+/* Composes the maps of a mesh that was arranged already: the source indices of vertices come from
+ * its map. The source indices of faces were part of the sort keys. */
 static void compose_maps(const struct ebpo_arrangement *before, ebpo_workspace *workspace,
                          uint32_t *map, uint64_t count)
 {

@@ -12,7 +12,7 @@ EBPO_MUST_USE ebpo_status ebpo_arrange(ebpo_mesh *mesh, int level, unsigned thre
 
 /* Arranges a mesh before repairs: vertices without faces are sorted among the others, so that
  * vertices at one position are neighbours. Then checking and repairing access memory in order too;
- * afterwards ebpo_arrange sorts the changes. The final order and the source numbers are the same as
+ * afterwards ebpo_arrange sorts the changes. The final order and the source indices are the same as
  * without this call. */
 EBPO_MUST_USE ebpo_status ebpo_arrange_to_repair(ebpo_mesh *mesh, unsigned threads,
                                                  const ebpo_progress *progress, ebpo_error *error);

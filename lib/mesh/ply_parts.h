@@ -80,8 +80,8 @@ typedef struct ebpo_ply_header {
 enum { EBPO_PLY_HEADER_LONGEST = 1 << 20 };
 
 /* Parses the header at the start of `data`; `name` appears in messages. The words point into
- * `data`. On failure `out` is empty. Whether the counts fit the file is checked later, by
- * ebpo_ply_parse_memory. */
+ * `data`. On failure `out` is empty. ebpo_ply_parse_memory checks later that the counts fit the
+ * file. */
 EBPO_MUST_USE ebpo_status ebpo_ply_header_parse(ebpo_ply_header *out, const uint8_t *data,
                                                 uint64_t size, const char *name, ebpo_error *error);
 void ebpo_ply_header_free(ebpo_ply_header *header);

@@ -2,8 +2,8 @@
 read with h5py, with that of ebpo info and ebpo levels --nodes.
 
 Every envelope is a closed polyhedron in its node's cell, with its stated volume. The nodes of a level cover
-each position once, and their volumes add up to that of the level. The mesh is the source's, in the order of
-the source's numbers.
+each position once, and their volumes add up to that of the level. The mesh is the source mesh, in the
+order of source indices.
 """
 import json
 import math

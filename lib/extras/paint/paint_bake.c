@@ -211,7 +211,7 @@ typedef struct bake {
     ebpo_context *context;
     ebpo_reacher *reacher;
     uint32_t
-        *numbers;   /* source numbers of the mesh's faces, in ascending order; NULL: 0, 1, 2, ... */
+        *numbers;   /* source indices of the mesh's faces, in ascending order; NULL: 0, 1, 2, ... */
     uint32_t *slot; /* [vertex_count] index in `dyed`, plus 1; 0: none */
     dyed *dyed;
     uint64_t count, capacity, done;
@@ -226,7 +226,7 @@ static int by_value(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Reads the source numbers of the mesh's faces, if the numbers have gaps or exceed the mesh's
+/* Reads the source indices of the mesh's faces, if the numbers have gaps or exceed the mesh's
  * number of faces. The mesh is in the source's order. */
 static ebpo_status read_numbers(bake *b, ebpo_error *error)
 {

@@ -89,11 +89,11 @@ def records(path):
         yield f"{path}:{start + 1}", head.split(), facts, man
 
 
-def fact(where, facts, word, usual=None):
+def fact(where, facts, word, default=None):
     found = [text for name, text in facts if name == word]
-    if len(found) > 1 or (not found and usual is None):
+    if len(found) > 1 or (not found and default is None):
         raise Wrong(f"{where}: expected one line '{word}'")
-    return found[0] if found else usual
+    return found[0] if found else default
 
 
 def read_option(where, head, facts, man):
@@ -205,7 +205,7 @@ def read_command(folder, name, shared):
             operands = fact(where, facts, "operands")
             least, most = count_operands(where, facts)
             command = Command(name=name, operands=operands, least=least, most=most, runs=[],
-                              **{key: fact(where, facts, key, usual) for key, usual in
+                              **{key: fact(where, facts, key, default) for key, default in
                                  (("summary", None), ("text", ""), ("values", "values"),
                                   ("dash", ""), ("writes", ""))})
         elif head[0] == "option":

@@ -41,7 +41,7 @@ class Contacts(NamedTuple):
 class Clearance(NamedTuple):
     """The distance of two models.
 
-    lo, hi: certain bounds of the distance; equal when it is known. face_a, face_b: the nearest faces, -1:
+    lo, hi: guaranteed bounds of the distance; equal when it is known. face_a, face_b: the nearest faces, -1:
     not found. point_a, point_b: (3,) the nearest points.
     """
 
@@ -56,7 +56,7 @@ class Clearance(NamedTuple):
 class Separation(NamedTuple):
     """The separation distance of two models.
 
-    lo, hi: certain bounds, in multiples of the direction's length; equal when the distance is known.
+    lo, hi: guaranteed bounds, in multiples of the direction's length; equal when the distance is known.
     face_a, face_b: the faces that separate last.
     """
 

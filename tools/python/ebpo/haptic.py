@@ -34,7 +34,7 @@ class HapticResult(NamedTuple):
 class ProbeResult(NamedTuple):
     """Result of a haptic step of a probe.
 
-    distance: NaN if only its bounds are known. lo, hi: certain bounds of the distance.
+    distance: NaN if only its bounds are known. lo, hi: guaranteed bounds of the distance.
     """
 
     distance: float

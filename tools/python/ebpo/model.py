@@ -449,7 +449,7 @@ class Model:
 
     def distance_bounds(self, points: Any, *, level: int | None = None, deadline: float | None = None,
                         threads: int | None = None, progress: Progress | None = None) -> Bounds:
-        """Return certain bounds of distances.
+        """Return guaranteed bounds of distances.
 
         level: visit levels 0 to `level` only.
         deadline: time limit in seconds for each point.

@@ -21,7 +21,7 @@ const lengths = columnAs((v) => format.number(ofDiagonal(v)));
 const levelNumber = columnAs(format.level);
 const perQuestion = columnAs(format.number);
 
-// A certain bound; one that is more than 5 % above the lower one is marked.
+// A guaranteed bound; one that is more than 5 % above the lower one is marked.
 function upperBound(title, lo, hi) {
   const wide = (l) => l[hi] > 1.0501 * l[lo];
   return {
