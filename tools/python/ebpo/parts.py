@@ -67,7 +67,7 @@ class Mass(NamedTuple):
         following members.
     centroid: (3,). inertia: (3, 3), about the centroid. When the volume is nan, the winding number is the
         density.
-    volume_bounds: (2,), certain bounds of the volume.
+    volume_bounds: (2,), guaranteed bounds of the volume.
     integral: float, the integral of the winding number. It equals the volume when winding numbers are only
         0 and 1.
     """

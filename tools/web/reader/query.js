@@ -89,7 +89,7 @@ function cellFar(tree, node, p) {
   return (Math.sqrt(sum) + NEAR * Math.sqrt(size)) * MORE;
 }
 
-/** Returns { lo, hi }: certain bounds of the distance to the surface, from the cells of the loaded levels, down to `deepest`. */
+/** Returns { lo, hi }: guaranteed bounds of the distance to the surface, from the cells of the loaded levels, down to `deepest`. */
 export function distanceInterval(tree, p, deepest = tree.depth) {
   let lo = Infinity, hi = Infinity;
   const walk = (node, near) => {

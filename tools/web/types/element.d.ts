@@ -8,7 +8,7 @@ export interface PointResult {
   /** Distance to the nearest face, if `exact`. */
   distance?: number;
   nearest?: [number, number, number];
-  /** Certain bounds of the distance. */
+  /** Guaranteed bounds of the distance. */
   lo: number;
   hi: number;
   exact: boolean;
