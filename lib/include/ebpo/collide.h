@@ -579,8 +579,8 @@ typedef struct ebpo_crossings_summary {
  * take     NULL: only the summary
  * out      may be NULL
  *
- * EBPO_E_LIMIT: coordinates are too large for an exact grid, as for ebpo_build, or too little
- * memory. EBPO_E_IO: no space in the workspace, or `ply` cannot be written. EBPO_E_FORMAT: as for
+ * EBPO_E_LIMIT: a coordinate is beyond 2^1000 (ebpo_mesh_arrange), or there is too little memory.
+ * EBPO_E_IO: no space in the workspace, or `ply` cannot be written. EBPO_E_FORMAT: as for
  * ebpo_build.
  *
  * Threads: one per mesh.

@@ -77,7 +77,7 @@ typedef struct ebpo_mesh {
 
     /*
      * Original indices of vertices and faces, set by ebpo_mesh_arrange and
-     * ebpo_mesh_drop_duplicates. NULL: all vertices and faces of the source, in its order.
+     * ebpo_mesh_drop_duplicates. NULL: all vertices and faces of the source, in the source's order.
      */
     struct ebpo_arrangement *arrangement;
 
@@ -117,9 +117,13 @@ EBPO_API void ebpo_mesh_free(ebpo_mesh *mesh);
 EBPO_API const char *ebpo_mesh_attributes_lost(const ebpo_mesh *mesh);
 
 /*
- * Returns a text that describes data of the file that was omitted or not found: values that the
- * header of a PLY file does not describe, and missing texture coordinates to which faces of an OBJ
- * file refer. The text also describes data that was not read because no attributes were requested.
+ * Returns a text that describes data of the file that was omitted, rounded or not found. Examples:
+ * - values that the header of a PLY file does not describe
+ * - coordinates of a PLY text file whose digits do not fit in a float, although the header declares
+ *   floats; the text gives the largest rounding error
+ * - texture coordinates to which faces of an OBJ file refer, but which the file does not contain
+ * - data that was not read because no attributes were requested
+ *
  * NULL: no such data. Valid as long as the mesh.
  *
  * Threads: any.
@@ -152,12 +156,13 @@ typedef struct ebpo_mesh_read_options {
     /*
      * 1: also reads attributes, which ebpo_build stores. PLY: all properties of vertices, faces and
      * other elements, and comments. Other formats: colours, normals, texture coordinates, names of
-     * materials. Images to which a PLY file, or the material libraries of an OBJ file, refer: their
-     * names, and the digests of images in the file's folder or below. 0: reads no attributes.
+     * materials. PLY and OBJ: the names of texture images to which the file or its material
+     * libraries refer, and the digests of the images in the file's folder or below. 0: reads no
+     * attributes.
      */
     uint64_t attributes;
 
-    /* 1, with `attributes`: also reads the bytes of these images. 0: does not. */
+    /* 1, with `attributes`: also reads the bytes of these images. 0: does not read them. */
     uint64_t embed_textures;
 } ebpo_mesh_read_options;
 
@@ -168,7 +173,7 @@ typedef struct ebpo_mesh_read_options {
 
 /*
  * Reads a PLY, OBJ, STL or OFF file. The format is recognised by the first bytes, else by the file
- * name, else (OBJ) by the first word.
+ * name, else by the first word (OBJ).
  *
  * Polygons are triangulated, including concave ones and those that touch themselves (slits, bridges
  * to holes, pinched corners). A polygon whose outline crosses itself, such as a folded quad, is
@@ -177,11 +182,10 @@ typedef struct ebpo_mesh_read_options {
  *
  * Binary coordinates keep every bit. Text of a PLY file is rounded correctly to the type in the
  * header. Text of other formats becomes floats if floats represent every coordinate, and doubles
- * otherwise. A float represents a coordinate if it is the nearest float and gives the text again
- * when it is rounded to the digits of the text. In files of other formats than PLY, vertices of
- * equal position are merged, and unreferenced vertices are omitted. In PLY files, unreferenced
- * vertices are omitted if their coordinates are not finite. ebpo_mesh_ignored describes unread
- * data, and the largest difference between floats and the text of a PLY file.
+ * otherwise. A float represents a coordinate if the nearest float, rounded to the digits of the
+ * text, gives the text again. In OBJ, STL and OFF files, vertices of equal position are merged, and
+ * unreferenced vertices are omitted. In PLY files, unreferenced vertices are omitted if their
+ * coordinates are not finite. ebpo_mesh_ignored describes data that was omitted or rounded.
  *
  * Safe for untrusted files. The whole file is read into memory, or with `workspace` into one of its
  * arrays.
@@ -202,8 +206,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_read(const char *path,
  * untrusted data.
  *
  * name    for messages
- * xyz     [*count][3] doubles; floats and integers are converted exactly. In text, a value of a
- *         float property that no float represents (see ebpo_mesh_read) becomes the nearest double.
+ * xyz     [*count][3] doubles; floats and integers are converted exactly. If no float
+ *         represents a text value of a float property (see ebpo_mesh_read), the result is the
+ *         nearest double.
  *         Freed by free().
  *
  * EBPO_E_FORMAT, EBPO_E_LIMIT.
@@ -241,14 +246,14 @@ typedef struct ebpo_finding {
 
 /*
  * Properties of a mesh. Edges are undirected pairs of distinct vertex indices. The location of an
- * edge is the index of the lowest face that uses the edge; a face with two such edges is listed
- * twice.
+ * edge is the least source index of the faces that use the edge. If two edges of a finding have the
+ * same location, the index is listed twice.
  */
 typedef struct ebpo_mesh_report {
     /*
      * True if each edge is used equally often in both directions. Then winding numbers are well
-     * defined, and the mesh is a solid. Not every such mesh is a closed 2-manifold, as the theses
-     * require.
+     * defined, and the mesh is a solid. The theses require more: a closed 2-manifold (see
+     * `manifold`).
      */
     bool balanced;
 
@@ -345,8 +350,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_check(const ebpo_mesh *mesh, unsign
  * The mesh keeps the source indices, which reports and files use. ebpo_build calls this function if
  * needed.
  *
- * Errors are those of ebpo_mesh_check. EBPO_E_LIMIT: coordinates are too large for an exact grid.
- * On failure the mesh is unchanged.
+ * Errors are those of ebpo_mesh_check. EBPO_E_LIMIT: a coordinate is beyond 2^1000, so that the
+ * cell faces of an octree would not be exact doubles. On failure the mesh is unchanged.
  *
  * Threads: one per mesh.
  */
@@ -366,8 +371,8 @@ typedef struct ebpo_repair_record {
     uint64_t flipped_faces;
 
     /*
-     * Components that cannot be oriented, or whose faces around an edge cannot have alternating
-     * directions.
+     * Sets of faces that cannot be oriented, or whose faces around an edge cannot have alternating
+     * directions (see ebpo_mesh_orient).
      */
     uint64_t unorientable_components;
 
@@ -438,8 +443,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_weld_within(ebpo_mesh *mesh, double
 
 /*
  * Removes repeated faces: of all faces with the same three distinct vertices, in any rotation and
- * orientation, the first one in the source stays. `repeated_faces` counts the others. The order and
- * the source indices are kept, and attributes of faces remain assigned by source index.
+ * orientation, the first one in the source stays. `repeated_faces` of ebpo_mesh_report counts the
+ * others. The order and the source indices are kept, and attributes of faces remain assigned by
+ * source index.
  *
  * Two faces of the same orientation count twice in winding numbers and volume. Two faces of
  * opposite orientation cancel, for example the two sides of a sheet, or the boundaries between
@@ -475,20 +481,25 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_count_repeated(const ebpo_mesh *mes
  * Orients faces consistently. First, neighbours across edges that are used twice get consistent
  * directions. Then shells are turned outwards, or inwards if they bound a cavity.
  *
- * A *shell* is a closed set of faces, which uses each edge equally often in both directions. Its
- * faces are connected by edges that are used twice; so each of two cubes that share a vertex or an
- * edge is a shell. Such a set of connected faces may be open at edges that are used more than twice
- * (stacked cubes). It is then joined with other sets at these edges: faces that follow one another
- * around the edge get alternating directions, and are connected in pairs. The order around an edge
- * is decided exactly; faces in one plane are ordered by index. Faces that already alternate are
- * unchanged.
+ * A *patch* is a set of faces that are connected by edges that are used twice. A patch is a *shell*
+ * if it uses each edge equally often in both directions. So two cubes that share only a vertex or
+ * an edge are two shells.
+ *
+ * A patch may be open at edges that are used more than twice. Example: each of two stacked cubes
+ * has its own faces in the common square, so four faces use each side of the square. Such patches
+ * are joined at these edges. The faces at an edge are sorted by their angle around the edge, and
+ * each face gets the direction opposite to that of the previous face. The angles are compared
+ * exactly; faces at the same angle are ordered by source index. Faces that already alternate are
+ * unchanged. Joined patches are a shell if they use each edge equally often in both directions.
  *
  * A shell gets a positive volume, or a negative one if it is inside an odd number of other shells.
  * A shell is inside another one if its least and greatest vertices along each axis are inside:
- * their exact winding numbers with respect to the other shell are not zero. Open sets of faces are
- * turned so that most of their faces are unchanged. A set that cannot be oriented is unchanged and
- * counted. A set whose faces around an edge cannot alternate is counted and oriented without this
- * edge. Do not orient a mesh that has intended solids inside other solids.
+ * their exact winding numbers with respect to the other shell are not zero.
+ *
+ * An open patch is oriented so that most of its faces are unchanged. A patch that cannot be
+ * oriented is unchanged, and is counted in `unorientable_components`. Joined patches whose faces
+ * cannot alternate around all edges are counted there as well; each of them is then oriented as a
+ * separate patch. Do not orient a mesh that has intended solids inside other solids.
  *
  * Threads: one per mesh.
  */
@@ -524,7 +535,8 @@ typedef struct ebpo_prepare_options {
     /*
      * Steps, in this order: ebpo_mesh_weld, ebpo_mesh_drop_duplicates, ebpo_mesh_orient,
      * ebpo_mesh_flip, ebpo_mesh_fill_holes. After holes were filled, closed components are oriented
-     * again. STL is always welded, because its faces share no vertices.
+     * again. A mesh from STL (`source_format`) is always welded, because faces of STL share no
+     * vertices; ebpo_mesh_read has already merged them.
      */
     bool weld;
     bool orient;
@@ -568,7 +580,7 @@ typedef struct ebpo_prepared {
 /*
  * Prepares a mesh for ebpo_build: arranges the mesh, repairs it as requested, and checks it before
  * and after. Calls of the single functions give the same mesh and reports, but may need more
- * memory. A mesh whose coordinates are too large for an exact grid is checked as well, but
+ * memory. A mesh with coordinates beyond 2^1000 (ebpo_mesh_arrange) is checked as well, but
  * ebpo_build rejects it.
  *
  * Errors are those of the single calls. On failure `out` is cleared; the mesh is valid and includes

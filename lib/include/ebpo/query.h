@@ -36,7 +36,8 @@ extern "C" {
 
 /* ---- models and contexts ---- */
 
-/* How data that is not in memory is loaded (EBP 2017, section 4.2). Results do not depend on it. */
+/* How data that is not in memory is loaded (EBP 2017, section 4.2). All modes give equal results.
+ */
 typedef enum ebpo_loading {
     /*
      * Whole subtrees, which are kept while the budget allows. The least recently used subtrees are
@@ -60,8 +61,8 @@ typedef struct ebpo_model_options {
     /*
      * Memory limit of the model in bytes, including its caches and buffers for loading. 0: no
      * limit, except for a remote file (http.h) larger than 2 MiB with `cut_level` -1, where the
-     * limit is 256 MiB. Such a file is loaded in parts for any budget if it has subtrees
-     * (ebpo_info.subtree_level).
+     * limit is 256 MiB. If such a file has a table of subtrees (ebpo_info.subtree_level), it is
+     * loaded in parts for any budget.
      *
      * Not included are the chunk directory of the file (24 bytes per chunk), decoders (about 250 kB
      * per loading thread) and contexts. A context holds results; for distances also 4 bytes per
@@ -71,8 +72,8 @@ typedef struct ebpo_model_options {
 
     /*
      * Levels 0 to cut_level stay in memory, and the subtrees below are loaded on demand. -1: chosen
-     * by the budget; everything is loaded at once if it fits. A remote file that has subtrees and
-     * is larger than 2 MiB is never loaded at once.
+     * by the budget; everything is loaded at once if it fits. A remote file that has a table
+     * of subtrees and is larger than 2 MiB is never loaded at once.
      */
     int cut_level;
 
@@ -111,8 +112,9 @@ typedef struct ebpo_model ebpo_model;
  * mesh supports only queries with a level. The file must stay open as long as the model.
  *
  * EBPO_E_LIMIT: the budget is too small; the message names a sufficient one. An accepted budget
- * holds the average subtree many times but perhaps not the largest: a query that needs a larger
- * subtree returns EBPO_E_LIMIT. Other errors are those of reading.
+ * is large enough for many subtrees of average size, but perhaps not for the largest one. A query
+ * that needs a subtree larger than the budget allows returns EBPO_E_LIMIT. Other errors are those
+ * of reading.
  *
  * Threads: any.
  */
@@ -138,21 +140,26 @@ typedef struct ebpo_model_plan {
     uint64_t budget;
 
     /*
-     * whole: least budget with which everything is in memory (remote files: see
-     * ebpo_model_options.memory). least: a sufficient budget, slightly above the minimum. With this
-     * budget, few subtrees are in memory at a time.
+     * - whole: the smallest budget with which everything is in memory (for remote files, see
+     *   ebpo_model_options.memory).
+     * - least: a budget that ebpo_model_new accepts, slightly above the smallest one. With this
+     *   budget, few subtrees are in memory at a time.
      */
     uint64_t whole, least;
 
     /*
-     * Parts of the budget in bytes: for levels down to the cut level, for decoded chunks, and for
-     * skeletons (retained data of subtrees that are not in memory). Subtrees use the rest.
+     * Parts of the budget in bytes. Subtrees use the rest.
+     * - top: levels 0 to cut_level.
+     * - chunks: decoded chunks.
+     * - skeletons: data that is kept of subtrees after they leave memory.
      */
     uint64_t top, chunks, skeletons;
 
     /*
-     * Number of subtrees below the cut level; bytes of the average subtree; number of subtrees that
-     * are in memory at a time while no subtree is being loaded.
+     * - subtrees: number of subtrees below the cut level.
+     * - subtree_bytes: size of the average subtree in memory.
+     * - subtrees_held: number of average subtrees that fit in memory. Fewer fit while a subtree is
+     *   loaded, because loading needs buffers.
      */
     uint64_t subtrees, subtree_bytes, subtrees_held;
 } ebpo_model_plan;
@@ -194,7 +201,7 @@ typedef struct ebpo_model_stats {
     /* Budget in bytes. 0: none. */
     uint64_t budget;
 
-    /* hits: number of times a query found a subtree in memory. loads: times it loaded one. */
+    /* Number of times that a query found a subtree in memory (hits) or loaded it (loads). */
     uint64_t hits, loads;
 
     /* Number of subtrees loaded in the background. */
@@ -213,9 +220,15 @@ typedef struct ebpo_model_stats {
     double load_seconds;
 
     /*
-     * leaves: number of leaves in memory. leaves_of_kind: number of frequently queried leaves of
-     * each kind. The kind is the set of planes that bounds the solid in the leaf: general, one
-     * plane, two planes, convex set, concave set. The kind of other leaves is not determined.
+     * leaves: number of leaves in memory.
+     *
+     * leaves_of_kind: number of frequently queried leaves of each kind. The kind of other leaves is
+     * not determined. In the leaf's cell, the solid is bounded by:
+     * - [0] faces in any arrangement
+     * - [1] one plane
+     * - [2] two planes
+     * - [3] more planes; the solid is the intersection of their half-spaces (convex)
+     * - [4] more planes; the solid is the union of their half-spaces (concave)
      */
     uint64_t leaves, leaves_of_kind[5];
 
@@ -227,15 +240,17 @@ typedef struct ebpo_model_stats {
     uint64_t leaves_one_cell_face;
 
     /*
-     * For distances while not everything was in memory: number of points, of subtrees searched, and
-     * of loads including those for the sign. To get the cost of a query, divide the second and the
-     * third number by the first one.
+     * Counts for distance queries while not everything was in memory. To get the mean cost of a
+     * query, divide distance_subtrees and distance_loads by distances.
+     * - distances: number of points.
+     * - distance_subtrees: number of searched subtrees.
+     * - distance_loads: number of loaded subtrees, including those for the sign.
      */
     uint64_t distances, distance_subtrees, distance_loads;
 
     /*
-     * Part of `memory` in bytes for skeletons: retained data of subtrees that are not in memory,
-     * which avoids unnecessary loads.
+     * Part of `memory` in bytes for skeletons: data that is kept of subtrees after they leave
+     * memory. Skeletons avoid unnecessary loads.
      */
     uint64_t skeleton_bytes;
 } ebpo_model_stats;
@@ -445,8 +460,8 @@ typedef struct ebpo_distance_options {
     bool unsigned_distance;
 
     /*
-     * True: starts from the previous result of this context, which is faster for nearby points.
-     * Results do not depend on it.
+     * True: the search starts from the previous result of this context, which is faster for nearby
+     * points. Results do not depend on this option.
      */
     bool warm;
 
@@ -492,7 +507,7 @@ typedef struct ebpo_distance_result {
 
 /*
  * Computes the distance from a point to the model, and the nearest face (EBP 2017, 4.4). With a
- * level or a deadline the result is `lo` and `hi`; the distance is determined only if they are
+ * level or a deadline the result is `lo` and `hi`; `distance` is then NAN unless `lo` and `hi` are
  * equal.
  *
  * EBPO_E_ABSENT: the file has no mesh, no level is given, and the mode is not
@@ -561,13 +576,14 @@ typedef bool (*ebpo_near_fn)(void *user, const ebpo_near_face *face);
  * options   NULL: all faces of the model
  * take      must not use the context
  *
- * Uses at most 16 MiB besides the model's budget, for any number of faces: after every 65,536 faces
- * (without `most` also a few times at the beginning) the search starts again with the face that
- * follows the last one in this order. Subtrees are loaded in order of distance, and only if they
- * may contain a result. Each is loaded once, if the budget is large enough to keep it.
+ * Uses at most 16 MiB besides the model's budget, for any number of faces: a search finds at most
+ * 65,536 faces and passes them to `take`, and the next search finds the faces that follow. Without
+ * `most`, the first three searches find fewer faces: 256, 2,048 and 16,384. Subtrees are loaded in
+ * order of distance, and only if they may contain a result. Each subtree is loaded once, if the
+ * budget is large enough to keep it.
  *
- * EBPO_E_ABSENT: as for ebpo_distance. In a subset the call may pass some faces, which are correct,
- * before it returns this. EBPO_E_ARGUMENT: returned before the first face.
+ * EBPO_E_ABSENT: as for ebpo_distance. In a subset, the call may pass some faces before it returns
+ * this error; these faces are correct. EBPO_E_ARGUMENT: returned before the first face.
  *
  * Threads: one per context.
  */
@@ -581,9 +597,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_distance_within(ebpo_context *context,
 
 typedef struct ebpo_ray_hit {
     /*
-     * The hit is at origin + t direction. Correctly rounded. INFINITY with a face: t is larger than
-     * every double, because the direction is very short; a direction longer by a power of two gives
-     * a finite t for the same face. Hits are sorted by exact values.
+     * Parameter of the hit, which is at origin + t direction; correctly rounded. INFINITY with a
+     * face: t is larger than every double, because the direction is very short. A direction longer
+     * by a power of two gives a finite t for the same face. Hits are sorted by exact values of t.
      */
     double t;
 
@@ -697,9 +713,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_any_many(ebpo_context *context, cons
                                                      ebpo_error *error);
 
 /*
- * Finds all hits of rays[count] as ebpo_ray_all does; see ebpo_ray_first_many. Ray i has
- * hits[begin[i]] to hits[begin[i + 1] - 1]; `begin` has count + 1 items. Both are lent until the
- * next call with the context.
+ * Finds all hits of rays[count] as ebpo_ray_all does; see ebpo_ray_first_many. The hits
+ * of ray i are hits[begin[i]] to hits[begin[i + 1] - 1]; `begin` has count + 1 items. `hits` and
+ * `begin` are lent until the next call with the context.
  *
  * Threads: one per context.
  */
@@ -718,10 +734,10 @@ enum { EBPO_SAMPLER_MAX = 16 };
 typedef struct ebpo_sampler ebpo_sampler;
 
 /*
- * Reads the named attributes, and the data to find the values of a face. Memory, outside the
- * budgets of models: the values, the maps if present (4 bytes per face), and for attributes of
- * vertices the mesh (12 bytes per face, 12 or 24 per vertex). The file must stay open as long as
- * the sampler.
+ * Reads the named attributes, and the data to find the values of a face. This memory is not part of
+ * the budgets of models: the values, the maps if present (4 bytes per face), and for attributes of
+ * vertices the mesh (12 bytes per face, 12 or 24 bytes per vertex). The file must stay open as long
+ * as the sampler.
  *
  * names   separated by commas: "quality", "red,green,blue", or with the element, "face:red".
  *         Without an element, attributes of vertices are preferred to those of faces; of several
@@ -754,18 +770,24 @@ EBPO_API unsigned ebpo_sampler_columns(const ebpo_sampler *sampler);
  * Samples attributes at points on faces. Points and faces are those that distances (`point` and
  * `face`) and rays (origin + t direction) return. An attribute of faces gives the face's value. An
  * attribute of vertices gives a mean of the values A, B and C at the corners a, b and c, weighted
- * by the position of the point p; also if the values are labels.
+ * by the position of the point p. Values that are labels are also averaged.
  *
- * In doubles without fused operations: e = b - a, f = c - a, d = p - a, scaled by powers of two; D
- * = (e.e)(f.f) - (e.f)(e.f); w_b = ((f.f)(d.e) - (e.f)(d.f)) / D and w_c = ((e.e)(d.f) -
- * (e.f)(d.e)) / D, or 0 if negative; w_a = 1 - w_b - w_c, or 0 if negative. Each weight is divided
- * by the sum of the three. Scalar products add x, y, z in this order.
+ * The weights are computed in doubles, without fused operations. The vectors e = b - a, f = c - a
+ * and d = p - a are multiplied by one power of two, so that the greatest absolute coordinate of e
+ * and f is at least 1 and less than 2. Scalar products add x, y, z in this order.
+ *
+ *     D   = (e.e)(f.f) - (e.f)(e.f)
+ *     w_b = ((f.f)(d.e) - (e.f)(d.f)) / D, or 0 if negative
+ *     w_c = ((e.e)(d.f) - (e.f)(d.e)) / D, or 0 if negative
+ *     w_a = 1 - w_b - w_c, or 0 if negative
+ *
+ * Each weight is divided by the sum of the three. If D is at most 2^-900, the face counts as a face
+ * without area. The weights are then those of the point nearest to p on the longest of the edges
+ * ab, ac, bc (the first of several with equal length).
  *
  * The value is (w_a A + w_b B) + w_c C without terms of weight 0, clamped to the range of the
  * values used. At a corner, the result is the corner's value. If the three values are equal, the
- * result is this value. If D is at most 2^-900, with the greatest coordinate of e and f scaled to 1
- * to 2, the face has no area. The weights are then those of the point nearest to p on the longest
- * of the edges ab, ac, bc (the first of equal ones).
+ * result is this value.
  *
  * points   [count][3] finite
  * faces    [count] as in ebpo_distance_result; EBPO_NO_FACE: the values are NAN
@@ -839,10 +861,13 @@ typedef struct ebpo_solid_volume {
     size_t struct_size;
 
     /*
-     * Bounds of the volume. lo == hi: the volume is known except for rounding, if no component
-     * intersects itself, which is not tested. lo < hi: components intersect or repeat each other,
-     * or the mesh is not a 2-manifold; without `info` the bounds are then 0 and INFINITY. 0 and 0
-     * for a surface.
+     * Bounds of the volume; 0 and 0 for a surface.
+     *
+     * lo == hi: the volume is known except for rounding. This requires that no component intersects
+     * itself, which is not tested.
+     *
+     * lo < hi: components intersect or repeat each other, or the mesh is not a 2-manifold. Without
+     * `info` the bounds are then 0 and INFINITY.
      */
     double lo, hi;
 
@@ -860,8 +885,8 @@ typedef struct ebpo_solid_volume {
  *
  * report    of the mesh (ebpo_mesh_check); of a file: &info->report
  * rule      of a file: info->rule
- * shells    of the mesh (ebpo_mesh_count_shells); NULL: not counted; the volume of several
- *           components is then unknown
+ * shells    of the mesh (ebpo_mesh_count_shells); NULL: not counted, so the volume of several
+ *           components is unknown
  * info      of the mesh's file, whose black cells and envelopes bound the volume; NULL: no file
  *
  * Threads: any.
@@ -890,8 +915,9 @@ typedef struct ebpo_mass {
     double inertia[3][3];
 
     /*
-     * Area, volume and inertia in a unit of 2^exponent of the model's unit, in which the model is
-     * about 1 long. For very large or very small models, whose values above are infinite or 0.
+     * Area, volume and inertia in a scaled unit, which is 2^exponent times the model's unit. The
+     * model is about 1 long in the scaled unit. These members are for very large or very small
+     * models, whose members above are infinite or 0.
      */
     double scaled_area, scaled_volume, scaled_inertia[3][3];
     int64_t exponent;
