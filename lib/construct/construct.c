@@ -2,7 +2,8 @@
  * result's ebpo_info.
  *
  * This file checks options and chooses the deepest level (EBP 2017, equation 3). The tree is cut
- * into pieces, which are subtrees, and the top, which is the nodes above the pieces. All threads
+ * into pieces, which are subtrees, and the top, which is the nodes above the pieces. In the code,
+ * the top and each piece are an `ebpo_branch`: `b->top` and `b->sub[i]` (builder.h). All threads
  * process pieces. The envelopes of a piece need the envelope of the parent of its root, so the
  * envelopes of the top are computed first. With a selection from the leaves up, the planes of all
  * nodes are chosen before any envelope is computed. ebpo_build takes over the mesh and frees it,
@@ -86,8 +87,8 @@ static void copy_text(char *to, const char *from)
         strcpy(to, from); /* check_options checked the length */
 }
 
-/* Copies a name. Names of files may be any bytes; the format requires text. A byte that is neither
- * printable ASCII nor part of a valid UTF-8 sequence becomes "_". */
+/* Copies a name. Names of files may contain any bytes, but the format requires text. A byte that is
+ * neither printable ASCII nor part of a valid UTF-8 sequence becomes "_". */
 static void copy_name(char *to, const char *from)
 {
     while (*from) {
@@ -100,8 +101,8 @@ static void copy_name(char *to, const char *from)
         bool valid = length > 0 && c[0] >= 32 && c[0] != 127;
         for (int i = 1; i < length && valid; i++)
             valid = (c[i] & 0xc0) == 0x80;
-        /* Control characters of Latin 1, overlong sequences, surrogates, code points beyond
-         * Unicode. */
+        /* Not valid: control characters of Latin 1, overlong sequences, surrogates, code points
+         * beyond Unicode. */
         if ((c[0] == 0xc2 && c[1] < 0xa0) || (c[0] == 0xe0 && c[1] < 0xa0) ||
             (c[0] == 0xed && c[1] >= 0xa0) || (c[0] == 0xf0 && c[1] < 0x90) ||
             (c[0] == 0xf4 && c[1] >= 0x90))
@@ -224,18 +225,18 @@ static ebpo_status process_pieces(void *context, uint64_t begin, uint64_t end, u
     ebpo_builder *b = job->b;
     ebpo_status status = EBPO_OK;
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
-        ebpo_branch *s = &b->sub[i];
+        ebpo_branch *piece = &b->sub[i];
         uint64_t begun = ebpo_clock();
-        status = ebpo_build_partition(b, s, error);
+        status = ebpo_build_partition(b, piece, error);
         if (status == EBPO_OK)
-            status = ebpo_build_number(b, s, error);
+            status = ebpo_build_number(b, piece, error);
         uint64_t numbered = ebpo_clock();
         job->cells_ns += numbered - begun;
         if (status == EBPO_OK)
-            status = ebpo_emit_piece(b, job->scratch[worker], s, error);
-        ebpo_branch_release(s);
+            status = ebpo_emit_piece(b, job->scratch[worker], piece, error);
+        ebpo_branch_release(piece);
         if (status == EBPO_OK)
-            status = ebpo_build_pack(b, s->out, error);
+            status = ebpo_build_pack(b, piece->out, error);
         job->envelopes_ns += ebpo_clock() - numbered;
     }
     return status;

@@ -1,8 +1,8 @@
 /* Sorts records that do not fit into memory, in three passes. The first pass makes the records.
  * The second pass distributes the records to groups by the leading bits of their keys. The third
  * pass sorts each group in memory, by the digits of the keys; the comparison orders records with
- * equal keys. Each pass reads and writes in order, or at as many positions as there are groups,
- * so a workspace may keep the records in files. The result depends neither on the number of
+ * equal keys. Each pass reads and writes arrays in order, or at one position for each group. A
+ * workspace may therefore keep the arrays in files. The result depends neither on the number of
  * threads nor on memory. */
 #include "core/sort.h"
 
@@ -14,7 +14,7 @@
 #include "core/parallel.h"
 
 enum {
-    GROUP = 1 << 16,         /* approximate number of records in a group: fits a core's cache */
+    GROUP = 1 << 16,         /* least number of records in a group: fits a core's cache */
     LARGE_GROUP = 4 * GROUP, /* a group with more records is sorted in the workspace */
     GROUPS_MAX = 1024,       /* limited, because all groups are written to at the same time */
     GRAIN = 1 << 14,         /* number of records for each call of a thread's function */
@@ -25,11 +25,12 @@ enum {
 
 typedef struct sorting {
     const ebpo_sort *s;
-    uint8_t *made, *dealt; /* records in the order in which they were made, and by groups */
-    uint64_t *first;       /* [groups + 1] first record of each group in `dealt` */
-    uint64_t *next;        /* [groups] position of the group's next records */
-    uint32_t *group_of;    /* [EBPO_SORT_BINS] group of each bin */
-    uint64_t *in_bin;      /* [EBPO_SORT_BINS] number of records by the leading bits of the key */
+    uint8_t *made;      /* records in the order in which they were made */
+    uint8_t *dealt;     /* records by groups */
+    uint64_t *first;    /* [groups + 1] first record of each group in `dealt` */
+    uint64_t *next;     /* [groups] position in `dealt` of the group's next records */
+    uint32_t *group_of; /* [EBPO_SORT_BINS] group of each bin */
+    uint64_t *in_bin;   /* [EBPO_SORT_BINS] number of records by the leading bits of the key */
     uint64_t groups;
 } sorting;
 
@@ -53,7 +54,8 @@ static ebpo_status make_records(void *context, uint64_t begin, uint64_t end, uns
     return status;
 }
 
-/* Joins neighbouring bins until a group has enough records. */
+/* Forms groups of neighbouring bins. Each group has at least `enough` records, except the last
+ * group. */
 static bool form_groups(sorting *t)
 {
     uint64_t enough = t->s->count / GROUPS_MAX > GROUP ? t->s->count / GROUPS_MAX : GROUP,
@@ -78,33 +80,35 @@ static bool form_groups(sorting *t)
     return t->next != NULL;
 }
 
-/* Sorts the records [begin, end) by groups in the core's cache. Then copies the records of each
- * group to the result with one call, so the number of write positions is at most the number of
- * groups. */
+/* Distributes the records [begin, end) to the groups. First copies the records to `here`, ordered
+ * by group; `here` fits in the core's cache. Then copies the records of each group to `dealt` with
+ * one memcpy. A thread thus writes to `dealt` at one position at a time. */
 static ebpo_status deal_to_groups(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                   ebpo_error *error)
 {
     sorting *t = context;
     const ebpo_sort *s = t->s;
-    uint64_t past[GROUPS_MAX * 2], at = 0; /* end of each group's records, in this range */
+    /* for each group: number of records in this range, then the begin of these records in `here`,
+     * and after the copying their end */
+    uint64_t cursor[GROUPS_MAX * 2], at = 0;
     (void)worker;
-    memset(past, 0, (size_t)t->groups * sizeof *past);
+    memset(cursor, 0, (size_t)t->groups * sizeof *cursor);
     uint8_t *here = ebpo_alloc(end - begin, s->record);
     if (!here)
         return ebpo_fail_memory(error, (end - begin) * s->record);
     const uint8_t *from = t->made + begin * s->record;
     for (uint64_t i = begin; i < end; i++, from += s->record)
-        past[t->group_of[key_of(from) >> s->shift]]++;
+        cursor[t->group_of[key_of(from) >> s->shift]]++;
     for (uint64_t g = 0; g < t->groups; g++) {
-        uint64_t count = past[g];
-        past[g] = at;
+        uint64_t count = cursor[g];
+        cursor[g] = at;
         at += count;
     }
     from = t->made + begin * s->record;
     for (uint64_t i = begin; i < end; i++, from += s->record)
-        memcpy(here + past[t->group_of[key_of(from) >> s->shift]]++ * s->record, from, s->record);
-    for (uint64_t g = 0, first = 0, runs = 0; g < t->groups; first = past[g++]) {
-        uint64_t count = past[g] - first;
+        memcpy(here + cursor[t->group_of[key_of(from) >> s->shift]]++ * s->record, from, s->record);
+    for (uint64_t g = 0, first = 0, runs = 0; g < t->groups; first = cursor[g++]) {
+        uint64_t count = cursor[g] - first;
         if (count == 0)
             continue;
         uint64_t place = __atomic_fetch_add(&t->next[g], count, __ATOMIC_RELAXED);
@@ -150,7 +154,7 @@ static keyed *sort_by_digits(keyed *from, keyed *to, uint64_t count)
     return from;
 }
 
-/* Sorts the records [begin, end), which have equal keys; by insertion if they are few. */
+/* Sorts the records [begin, end), which have equal keys. Few records are sorted by insertion. */
 static void break_ties(const ebpo_sort *s, uint8_t *records, uint64_t begin, uint64_t end)
 {
     enum { FEW = 16 };
@@ -173,7 +177,8 @@ static ebpo_status sort_group(const sorting *t, uint64_t g, ebpo_error *error)
     const ebpo_sort *s = t->s;
     uint64_t count = t->first[g + 1] - t->first[g];
     const uint8_t *group = t->dealt + t->first[g] * s->record;
-    /* A group is this large only if many records have equal leading bits. It may exceed memory. */
+    /* A group is this large if there are more than GROUPS_MAX * LARGE_GROUP records in total, or if
+     * many records have equal leading bits. Such a group may exceed memory. */
     ebpo_workspace *storage = count > LARGE_GROUP ? s->workspace : NULL;
     keyed *keys = ebpo_array_alloc(storage, 2 * count, sizeof *keys);
     uint8_t *sorted = ebpo_array_alloc(storage, count, s->record);

@@ -1,8 +1,9 @@
 /* Copies the faces, vertices, maps and attributes of a subset, with new numbers. Faces and vertices
  * are numbered in the order of the specification: by a depth-first walk through the remaining
- * leaves. Arrays that map old numbers to new ones are as long as the original file's mesh. They
- * take little memory for a small subset, because pages that are never written take none, and faces
- * that are close in space have close numbers. Source: format-spec/README.md, section 5. */
+ * leaves. The arrays that map old numbers to new ones have an entry for each face or vertex of the
+ * original file. For a small subset these arrays take little memory: pages that are never written
+ * take no memory, and faces that are close in space have close numbers. Source:
+ * format-spec/README.md, section 5. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -20,7 +21,8 @@ typedef struct numbering {
     uint32_t *number; /* [faces of the original file] new number + 1; 0: none yet */
     uint32_t *old;    /* [count] old number of each new face */
     uint64_t count, capacity;
-    /* for each level: index of the next group and leaf; references read and written so far */
+    /* for each level: index of the next group and of the next leaf; number of references read and
+     * written so far */
     uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX], read[EBPO_LEVELS_MAX],
         written[EBPO_LEVELS_MAX];
     bool no_memory;
@@ -42,9 +44,11 @@ static int compare_numbers(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Numbers the faces of a leaf. A reference to a face whose first leaf was removed becomes a new
- * face of this leaf. These faces precede the faces that were new in this leaf before, in the
- * order of their old numbers. The other references stay references and are renumbered in place. */
+/* Numbers the faces of a leaf. In a file, the *new* faces of a leaf are the faces that no earlier
+ * leaf lists; the other listed faces are its *references*. If the subset contains none of the
+ * earlier leaves that list a reference, the reference becomes a new face. The new numbers of these
+ * faces precede those of the faces that are new in the original file. Both sets keep the order of
+ * their old numbers. The other references stay references and are renumbered in place. */
 static ebpo_status number_leaf(numbering *n, int level)
 {
     ebpo_level *l = &n->c->out->level[level];
@@ -117,7 +121,7 @@ static ebpo_status number_vertices(ebpo_cutting *c, vertices *v)
         mesh->faces[i] = v->number[vertex] - 1;
     }
     for (uint64_t i = 0; i < c->from->vertex_count && good && !c->out->info.pruned;
-         i++) /* a file from which nothing was pruned keeps vertices that no face uses */
+         i++) /* if nothing was pruned, vertices that no face uses are kept */
         if (v->number[i] == 0) {
             good = ebpo_grow(&v->old, &v->capacity, v->count + 1, sizeof *v->old);
             if (good)

@@ -149,11 +149,12 @@ int ebpo_sign_of_products_exact(const double *factor, int n)
 
 /* Ranges. A double x with 2^-247 <= |x| <= 2^300 is an integer multiple of 2^-300. So are
  * differences of such numbers and the rounding errors of these differences. Products of three
- * are multiples of 2^-900 and below 2^910, so no operation here overflows or underflows. */
+ * differences are multiples of 2^-900 and below 2^910, so no operation here overflows or
+ * underflows. */
 
 /* A difference is a pair: the head is the rounded difference, the tail its rounding error. The
- * error of a determinant of the heads alone is at most 3 eps times the sum of the absolute
- * products; 3 is rounded up to 4. */
+ * determinant of the heads differs from the exact determinant by at most 3 eps times the
+ * permanent (the sum of the absolute values of the products); 3 is rounded up to 4. */
 static const double heads_error = 4 * 0x1p-53;
 
 static bool in_range(const double *x, int n, double least, double largest)
@@ -256,7 +257,7 @@ static int expand_determinant(double *out, ebpo_difference m[3][3])
     return ebpo_expansion_sum(out, two, two_n, term[2], term_n[2]);
 }
 
-/* Returns a bound of the error of the determinant of the heads alone. */
+/* Returns a bound of the difference between the determinant of the heads and the exact one. */
 static double error_of_heads(ebpo_pair m[3][3])
 {
     double permanent = 0;
@@ -340,13 +341,15 @@ int ebpo_sign_of_products_expansion(const double *factor, int n)
     return ebpo_expansion_sign(sum[now], length);
 }
 
-/* --- filters, and the stages in turn --- */
+/* --- predicates: a filter, then the exact stages --- */
 
-/* Error bounds: eps = 2^-53. Each bound holds for the computed permanent (the sum of absolute
- * values). The slack term covers underflow in the products. An overflow makes the bound infinite
- * or NaN, so that no comparison succeeds. */
+/* An error bound is a factor times eps times the computed permanent, plus a term with `slack`.
+ * The factor is large enough to cover the rounding errors of the permanent too. The term with
+ * `slack` covers underflow in the products. An overflow makes the bound infinite or NaN, so that
+ * no comparison succeeds. */
 static const double eps = 0x1p-53;
-/* Far above every underflow error (2^-1075 each), and normal: arithmetic on denormals is slow. */
+/* Far above every underflow error (2^-1075 each), and a normal number, because arithmetic on
+ * denormal numbers is slow. */
 static const double slack = 0x1p-960;
 
 static inline int sign_of(double x) { return (x > 0) - (x < 0); }
@@ -377,8 +380,8 @@ int ebpo_orient2d(const double a[2], const double b[2], const double c[2])
     return sign != EBPO_SIGN_UNKNOWN ? sign : ebpo_orient2d_exact(a, b, c);
 }
 
-/* Returns the sign that floating point gives for the differences b - a, c - a, d - a (one row
- * for each axis), or EBPO_SIGN_UNKNOWN if it is not certain. */
+/* Computes the determinant of the differences b - a, c - a, d - a (one row for each axis) in
+ * floating point. Returns its sign, or EBPO_SIGN_UNKNOWN if the sign is not certain. */
 static int orient3d_filter(double m[3][3])
 {
     double det = 0, permanent = 0, third = 0;
@@ -412,7 +415,7 @@ int ebpo_orient3d(const double a[3], const double b[3], const double c[3], const
     for (int k = 0; k < 3; k++)
         if (m[k][0] == 0 && m[k][1] == 0 && m[k][2] == 0)
             return 0;
-    /* Two points are equal: faces that share a corner. */
+    /* Two points are equal, as for faces that share a corner. */
     if (same_point(a, b) || same_point(a, c) || same_point(a, d) || same_point(b, c) ||
         same_point(b, d) || same_point(c, d))
         return 0;

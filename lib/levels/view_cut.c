@@ -1,12 +1,13 @@
 /* Manages the cut of a view: the delivered nodes of the tree, and the order of refinement.
  *
- * - A viewpoint is a prepared observer. It gives the distance of a cell, the cell's size in pixels
- *   and visibility in the frustum, and the key of a node for the order of priority. Comparisons
- *   allow for rounding: a barely visible cell counts as visible.
- * - The partial tree holds the delivered groups (eight siblings each). A complete group is linked
- *   to its parent.
+ * - A viewpoint is a prepared observer. It gives the distance of a cell, the cell's size in pixels,
+ *   the cell's visibility in the frustum, and the priority key of a node. Comparisons allow for
+ *   rounding: a barely visible cell counts as visible.
+ * - The partial tree holds the delivered groups (eight siblings each). A group is linked to its
+ *   parent after all nodes of the group have been delivered.
  * - The frontier holds the gray nodes of the cut in a binary heap, with the next one to refine on
- *   top. Equal keys are ordered by octcode, so that the order is deterministic. */
+ *   top. Nodes are ordered by turn (visible, not visible, never refined), then by key, then by
+ *   octcode. So no two nodes are equal, and the order is deterministic. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -22,8 +23,8 @@
 
 /* --- the observer --- */
 
-/* relative bound of the rounding error of a sum of three products, with a large margin, so that
- * barely visible cells count as visible */
+/* Bound of the relative rounding error of a sum of three products. A large margin is included, so
+ * that barely visible cells count as visible. */
 static const double SLACK = 1e-12;
 
 /* Scales a vector of any length to length 1; returns false for (0, 0, 0). */
@@ -156,8 +157,8 @@ unsigned ebpo_viewpoint_octant(const ebpo_viewpoint *s, const ebpo_box *box, ebp
     return octant;
 }
 
-/* Returns one number of all octants on the path from the root, each relative to the eye's
- * octant. The order of these numbers is the order from front to back. */
+/* Returns a key of the octants on the path from the root, each relative to the octant of the eye
+ * (ebpo_viewpoint_octant). Ascending keys are the order from front to back. */
 static uint64_t octants_key(const ebpo_viewpoint *s, const ebpo_box *box, ebpo_octcode octcode)
 {
     int level = ebpo_octcode_level(octcode);
@@ -223,7 +224,7 @@ ebpo_status ebpo_partial_add(ebpo_partial *g, const ebpo_info *info, uint64_t pa
 {
     int level = parent ? ebpo_octcode_level(parent) + 1 : 0;
     uint64_t grays = ebpo_group_count(read->types, EBPO_GRAY, 8);
-    /* without this check, a damaged index could assign one node to many parents, endlessly */
+    /* Without this check, a damaged index could assign one group to many parents without end. */
     if (grays > info->level[level].gray_count - g->grays[level])
         return ebpo_fail(
             error, EBPO_E_FORMAT,
@@ -268,16 +269,18 @@ const ebpo_polytope *ebpo_partial_envelope(const ebpo_partial *g, ebpo_partial_n
     if (ebpo_partial_type(g, node) == EBPO_BLACK)
         return ebpo_envelope_put_cube(e, octcode);
     for (int depth = 0; depth <= level; depth++) {
-        ebpo_octcode own = octcode >> 3 * (level - depth);
+        /* octcode of the ancestor at this depth; at the last depth, of the node */
+        ebpo_octcode ancestor = octcode >> 3 * (level - depth);
         if (depth == level)
-            at = node; /* its group may not be linked yet */
+            at = node; /* the node's group may not be linked yet */
         else if (depth)
-            at = (ebpo_partial_node){ g->group[at.group].child[at.octant], (uint8_t)(own & 7) };
-        envelope = ebpo_envelope_held(e, own);
+            at =
+                (ebpo_partial_node){ g->group[at.group].child[at.octant], (uint8_t)(ancestor & 7) };
+        envelope = ebpo_envelope_held(e, ancestor);
         if (!envelope) {
             unsigned count;
             const uint32_t *codes = ebpo_partial_codes(g, at, &count);
-            envelope = ebpo_envelope_put(e, own, codes, count);
+            envelope = ebpo_envelope_put(e, ancestor, codes, count);
         }
     }
     return envelope;
@@ -336,28 +339,29 @@ ebpo_waiting ebpo_frontier_pop(ebpo_frontier *f)
     return top;
 }
 
-void ebpo_frontier_sort(ebpo_frontier *f)
+void ebpo_frontier_restore(ebpo_frontier *f)
 {
     for (uint64_t i = f->count / 2; i-- > 0;)
         sink_down(f, i);
 }
 
-/* A block is `span` groups of a level's index. Uses a hash table of blocks. After
- * EBPO_FRONTIER_BLOCKS different blocks, further blocks are omitted. */
+/* Finds the blocks in a hash table. When the table has EBPO_FRONTIER_BLOCKS blocks, nodes of other
+ * blocks are skipped. */
 unsigned ebpo_frontier_blocks(const ebpo_frontier *f, uint64_t span,
-                              uint64_t places[EBPO_FRONTIER_BLOCKS])
+                              uint64_t best[EBPO_FRONTIER_BLOCKS])
 {
     enum { SLOTS = 4 * EBPO_FRONTIER_BLOCKS };
     struct {
-        uint64_t block, place;
-    } slot[SLOTS]; /* block 0: free; place: index in f->at of the block's first node */
+        uint64_t block;      /* 0: the slot is free */
+        uint64_t first_node; /* index in f->at of the block's node that is refined first */
+    } slot[SLOTS];
     unsigned count = 0;
     memset(slot, 0, sizeof slot);
     for (uint64_t i = 0; i < f->count; i++) {
         const ebpo_waiting *w = &f->at[i];
         if (w->turn == EBPO_TURN_NEVER)
             continue;
-        /* the number includes the level, so it is not 0 */
+        /* The block's number includes the level, so the number is not 0. */
         uint64_t block = (w->below / span) << 6 | (uint64_t)(64 - __builtin_clzll(w->octcode));
         uint64_t at;
         EBPO_HASH_FIND(at, ebpo_hash_number(block), SLOTS - 1,
@@ -365,17 +369,17 @@ unsigned ebpo_frontier_blocks(const ebpo_frontier *f, uint64_t span,
         if (!slot[at].block && count == EBPO_FRONTIER_BLOCKS)
             continue;
         count += !slot[at].block;
-        if (!slot[at].block || waits_before(w, &f->at[slot[at].place]))
-            slot[at].place = i;
+        if (!slot[at].block || waits_before(w, &f->at[slot[at].first_node]))
+            slot[at].first_node = i;
         slot[at].block = block;
     }
     count = 0;
     for (unsigned at = 0; at < SLOTS; at++)
         if (slot[at].block) {
             unsigned i = count++;
-            for (; i > 0 && waits_before(&f->at[slot[at].place], &f->at[places[i - 1]]); i--)
-                places[i] = places[i - 1];
-            places[i] = slot[at].place;
+            for (; i > 0 && waits_before(&f->at[slot[at].first_node], &f->at[best[i - 1]]); i--)
+                best[i] = best[i - 1];
+            best[i] = slot[at].first_node;
         }
     return count;
 }

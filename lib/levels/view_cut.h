@@ -55,7 +55,8 @@ uint64_t ebpo_viewpoint_key(const ebpo_viewpoint *viewpoint, const ebpo_box *box
 
 /* --- the delivered part of a tree --- */
 
-/* A group of siblings, linked to its parent once it is complete. */
+/* A group of siblings. The group is linked to its parent (`child` of the parent's group) after all
+ * nodes of the group have been delivered. */
 typedef struct ebpo_partial_group {
     uint64_t parent;     /* octcode; 0: the root's group */
     uint64_t first_gray; /* rank in its level of the group's first gray node */
@@ -122,10 +123,10 @@ const ebpo_polytope *ebpo_partial_envelope(const ebpo_partial *partial, ebpo_par
 typedef enum ebpo_turn { EBPO_TURN_SEEN, EBPO_TURN_UNSEEN, EBPO_TURN_NEVER } ebpo_turn;
 
 typedef struct ebpo_waiting {
-    uint64_t key, octcode; /* sorted by key, then by octcode */
+    uint64_t key, octcode; /* nodes are ordered by turn, then by key, then by octcode */
     uint64_t below;        /* index of the children's group in the children's level */
     uint32_t group;
-    uint8_t octant, turn;
+    uint8_t octant, turn; /* turn: ebpo_turn */
 } ebpo_waiting;
 
 typedef struct ebpo_frontier {
@@ -140,14 +141,14 @@ EBPO_MUST_USE ebpo_status ebpo_frontier_reserve(ebpo_frontier *frontier, uint64_
 void ebpo_frontier_push(ebpo_frontier *frontier, ebpo_waiting node);
 /* Removes and returns the top. */
 ebpo_waiting ebpo_frontier_pop(ebpo_frontier *frontier);
-/* Restores the order after keys or turns have changed. */
-void ebpo_frontier_sort(ebpo_frontier *frontier);
-/* The children's groups of a level form blocks of `span` groups. For each block, finds the node
- * that will be refined first. Writes the indices of these nodes in frontier->at to `places`, in the
- * order of refinement, beginning with the top. Returns their number, at most EBPO_FRONTIER_BLOCKS.
- */
+/* Restores the heap after keys or turns have changed. */
+void ebpo_frontier_restore(ebpo_frontier *frontier);
+/* A block is `span` neighbouring groups of a level. A node of the frontier belongs to the block of
+ * its children's group. For each block, finds the node that will be refined first. Writes the
+ * indices of these nodes in frontier->at to `best`, in the order of refinement, beginning with the
+ * top. Returns the number of indices, at most EBPO_FRONTIER_BLOCKS. */
 enum { EBPO_FRONTIER_BLOCKS = 1024 };
 unsigned ebpo_frontier_blocks(const ebpo_frontier *frontier, uint64_t span,
-                              uint64_t places[EBPO_FRONTIER_BLOCKS]);
+                              uint64_t best[EBPO_FRONTIER_BLOCKS]);
 
 #endif

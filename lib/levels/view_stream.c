@@ -549,7 +549,7 @@ ebpo_status ebpo_view_stream_change(ebpo_view_stream *s, const ebpo_view_options
         return status;
     for (uint64_t i = 0; i < s->frontier.count; i++)
         rank_waiting(s, &s->frontier.at[i]);
-    ebpo_frontier_sort(&s->frontier);
+    ebpo_frontier_restore(&s->frontier);
     return EBPO_OK;
 }
 

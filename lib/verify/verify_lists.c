@@ -24,8 +24,8 @@ static void report_face(ebpo_tally *tally, const ebpo_reference_node *node, uint
                          &(ebpo_verify_place){ node->code, face, EBPO_NO_PLANE }, "%s", text);
 }
 
-/* The face list of a leaf, ascending: the references, then the range of new faces. The tree has
- * passed ebpo_check_shape. */
+/* The face list of a leaf, in ascending order: first the references (faces that an earlier leaf
+ * lists), then the range of new faces. The tree has passed ebpo_check_shape. */
 typedef struct face_list {
     const uint32_t *refs;
     uint32_t ref_count, new_count;
@@ -41,7 +41,7 @@ static face_list list_of(const ebpo_reference_tree *view, const ebpo_reference_n
     return list;
 }
 
-/* Returns true if `faces`, which are ascending, contain the face. */
+/* Returns true if `faces` contains the face. `faces` is in ascending order. */
 static bool is_among(const uint32_t *faces, uint64_t count, uint32_t face)
 {
     uint64_t low = 0, high = count;
@@ -73,7 +73,7 @@ static void check_near(ebpo_tally *tally, const ebpo_reference_tree *view,
         report_face(tally, leaf, face, "the leaf lists a face that is not near it");
 }
 
-/* Checks the listed faces that are not among `faces`, which touch the leaf. */
+/* Checks the listed faces that do not touch the leaf. `faces` are all faces that touch it. */
 static void check_extra(ebpo_tally *tally, const ebpo_reference_tree *view,
                         const ebpo_reference_node *leaf, const face_list *list,
                         const uint32_t *faces, uint64_t count)
@@ -132,17 +132,17 @@ void ebpo_check_terminal_lists(ebpo_tally *tally, const ebpo_reference_tree *vie
                                              : "the face touches a black cell");
 }
 
-/* Greatest limit for which faces are gathered in a list. */
+/* If the limit of a `gathering` is greater, bits are used instead of a list. */
 enum { LIMIT_OF_LISTS = 1 << 16 };
 
-/* Different faces listed below a node, up to `limit`. They are kept in a list of about twice
- * `limit` entries with repetitions or, if the limit is large, as a bit for each face of the
- * mesh. */
+/* The different faces that the leaves below a node list. Faces are gathered only until there are
+ * more than `limit`. They are kept in a list of at most about twice `limit` entries, which may
+ * contain repetitions. If the limit is large, one bit for each face of the mesh is used instead. */
 typedef struct gathering {
     uint32_t *faces;
     uint8_t *seen; /* bits; NULL if `faces` is used */
     uint64_t count, capacity, limit;
-    bool more; /* there are more different faces than the limit */
+    bool more; /* there are more different faces than `limit` */
     bool short_of_memory;
 } gathering;
 
@@ -236,6 +236,6 @@ bool ebpo_lists_more_faces(const ebpo_reference_tree *view, const ebpo_reference
         keep_different(&g);
     free(g.faces);
     ebpo_array_free(view->workspace, g.seen);
-    /* a lack of memory is no violation of the file */
+    /* A lack of memory does not make the file invalid. */
     return g.more || g.short_of_memory;
 }
