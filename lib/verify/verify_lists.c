@@ -132,7 +132,7 @@ void ebpo_check_terminal_lists(ebpo_tally *tally, const ebpo_reference_tree *vie
                                              : "the face touches a black cell");
 }
 
-/* If the limit of a `gathering` is greater, bits are used instead of a list. */
+/* If the limit of a `gathering` is greater than this, bits are used instead of a list. */
 enum { LIMIT_OF_LISTS = 1 << 16 };
 
 /* The different faces that the leaves below a node list. Faces are gathered only until there are

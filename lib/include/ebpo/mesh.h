@@ -55,8 +55,11 @@ typedef struct ebpo_mesh {
     uint32_t *faces;
 
     /*
-     * Number of faces of the source that reading changed: polygons of more than three corners,
-     * concave polygons among these, triangle strips, and omitted faces of fewer than three corners.
+     * Numbers of faces of the source that reading changed.
+     * - polygons_triangulated: polygons of more than three corners.
+     * - polygons_concave: concave polygons among these.
+     * - strips: triangle strips.
+     * - polygons_dropped: omitted faces of fewer than three corners.
      */
     uint64_t polygons_triangulated;
     uint64_t polygons_concave;
@@ -206,10 +209,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_read(const char *path,
  * untrusted data.
  *
  * name    for messages
- * xyz     [*count][3] doubles; floats and integers are converted exactly. If no float
- *         represents a text value of a float property (see ebpo_mesh_read), the result is the
- *         nearest double.
- *         Freed by free().
+ * xyz     [*count][3] doubles, freed by free(). Binary floats and integers are converted exactly.
+ * If no float represents a text value of a float property (see ebpo_mesh_read), the result is the
+ * nearest double.
  *
  * EBPO_E_FORMAT, EBPO_E_LIMIT.
  *
@@ -221,9 +223,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_points_parse_ply(const void *data, uint6
 
 /*
  * Writes a binary little-endian PLY file, which is replaced atomically. Vertices are floats or
- * doubles as in the mesh, triangles are int32 or uint32. Attributes keep the order and types of the
- * PLY file that they were read from, with its comments; the mesh must then be in the order of its
- * source.
+ * doubles as in the mesh, triangles are int32 or uint32. Attributes that were read from a PLY file
+ * keep their order and types, and the comments of that file are also written. A mesh with
+ * attributes must be in the order of its source.
  *
  * EBPO_E_ARGUMENT: the mesh is not valid. EBPO_E_IO.
  *
@@ -397,7 +399,7 @@ typedef struct ebpo_repair_record {
     double weld_distance;
     double weld_moved;
 
-    /* Faces that use a vertex twice after ebpo_mesh_weld_within, and have no area. */
+    /* Faces that use a vertex twice after ebpo_mesh_weld_within, and therefore have no area. */
     uint64_t collapsed_faces;
 } ebpo_repair_record;
 
@@ -447,7 +449,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_weld_within(ebpo_mesh *mesh, double
  * others. The order and the source indices are kept, and attributes of faces remain assigned by
  * source index.
  *
- * Two faces of the same orientation count twice in winding numbers and volume. Two faces of
+ * Repeated faces of the same orientation count twice in winding numbers and volume. Two faces of
  * opposite orientation cancel, for example the two sides of a sheet, or the boundaries between
  * solids. So a mesh may be balanced with both faces and not with one of them. `dropped_opposite`
  * counts dropped faces of opposite orientation; ebpo_mesh_check and ebpo_mesh_try_repairs show the
@@ -497,9 +499,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_count_repeated(const ebpo_mesh *mes
  * their exact winding numbers with respect to the other shell are not zero.
  *
  * An open patch is oriented so that most of its faces are unchanged. A patch that cannot be
- * oriented is unchanged, and is counted in `unorientable_components`. Joined patches whose faces
- * cannot alternate around all edges are counted there as well; each of them is then oriented as a
- * separate patch. Do not orient a mesh that has intended solids inside other solids.
+ * oriented is unchanged, and is counted in `unorientable_components`. A set of joined patches
+ * whose faces cannot alternate around all edges is also counted there; its patches are then
+ * oriented separately. Do not orient a mesh that has intended solids inside other solids.
  *
  * Threads: one per mesh.
  */
@@ -520,7 +522,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_flip(ebpo_mesh *mesh, ebpo_repair_r
  *
  * A loop of up to 256 edges gets the triangulation of least area that, if possible, does not use an
  * existing edge again. Longer loops are closed by ear clipping. Chains of boundary edges that do
- * not close because orientations differ (see ebpo_mesh_orient) are unchanged, and counted.
+ * not close because orientations differ (see ebpo_mesh_orient) are unchanged, and are counted in
+ * `unfilled_holes`.
  *
  * Threads: one per mesh.
  */
@@ -660,9 +663,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_components_get(const ebpo_components *co
                                                        ebpo_error *error);
 
 /*
- * Makes component `number` as a mesh, in the workspace of the whole mesh. It keeps the source
- * indices, which reports and files use. Repair the whole mesh before this call: ebpo_mesh_weld,
- * ebpo_mesh_drop_duplicates and ebpo_mesh_fill_holes reject a component that they would change.
+ * Makes component `number` as a mesh, in the workspace of the whole mesh. The new mesh keeps the
+ * source indices, which reports and files use. Repair the whole mesh before this call:
+ * ebpo_mesh_weld, ebpo_mesh_drop_duplicates and ebpo_mesh_fill_holes reject a component that they
+ * would change.
  *
  * out   freed by ebpo_mesh_free; cleared on failure
  *

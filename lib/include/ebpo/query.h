@@ -71,9 +71,9 @@ typedef struct ebpo_model_options {
     uint64_t memory;
 
     /*
-     * Levels 0 to cut_level stay in memory, and the subtrees below are loaded on demand. -1: chosen
-     * by the budget; everything is loaded at once if it fits. A remote file that has a table
-     * of subtrees and is larger than 2 MiB is never loaded at once.
+     * Levels 0 to cut_level stay in memory, and the subtrees below are loaded on demand. -1: the
+     * level is chosen by the budget. If everything fits, everything is loaded at once, except for
+     * a remote file that has a table of subtrees and is larger than 2 MiB.
      */
     int cut_level;
 
@@ -104,7 +104,7 @@ typedef struct ebpo_model_options {
         sizeof(ebpo_model_options), 0, -1, EBPO_LOAD_CACHE, false, 0, { NULL, NULL }, NULL \
     }
 
-/* The part of a file that is in memory, prepared for fast queries. Threads share a model. */
+/* The part of a file that is in memory, prepared for fast queries. Threads may share a model. */
 typedef struct ebpo_model ebpo_model;
 
 /*
@@ -185,7 +185,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_model_memory(const ebpo_file *file,
  */
 EBPO_API void ebpo_model_free(ebpo_model *model);
 
-/* Sums since the model was made, over all contexts. */
+/* Statistics of a model. Counts and times are sums over all contexts since the model was made. */
 typedef struct ebpo_model_stats {
     size_t struct_size;
 
@@ -361,7 +361,8 @@ typedef struct ebpo_inside_options {
 
     /*
      * The query stops after about this many nanoseconds per point, and returns a certain result or
-     * EBPO_MAYBE. 0: no deadline. A started subtree or leaf is completed.
+     * EBPO_MAYBE. 0: no deadline. The query completes a subtree or leaf that it has
+     * started.
      */
     uint64_t deadline_ns;
 } ebpo_inside_options;
@@ -607,9 +608,9 @@ typedef struct ebpo_ray_hit {
     uint64_t face;
 
     /*
-     * 1: the ray passes through the interior of the face against its normal (enters). -1: along its
-     * normal (leaves). 0: the ray hits an edge or a vertex, or is in the face's plane, or the face
-     * has no area.
+     * 1: the ray enters: it passes through the interior of the face against the face's normal. -1:
+     * the ray exits: it passes through along the normal. 0: the ray hits an edge or a vertex, or is
+     * in the face's plane, or the face has no area.
      */
     int32_t side;
 } ebpo_ray_hit;
@@ -689,7 +690,7 @@ typedef struct ebpo_ray {
  * Finds the first hit of rays[count] as ebpo_ray_first does, into out[count]. Without a hit, t is
  * INFINITY and the face is EBPO_NO_FACE. Results do not depend on threads or other rays. If not
  * everything is in memory, rays are ordered along a curve by their entry into the model, so that
- * subtrees are loaded few times.
+ * each subtree is loaded only a few times.
  *
  * EBPO_E_ARGUMENT: a ray is not valid; the message has its index, and no ray is computed. Other
  * errors are those of ebpo_ray_first, for the first failed ray in processing order. On failure
@@ -730,7 +731,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_all_many(ebpo_context *context, cons
 /* Maximum number of attributes of a sampler. */
 enum { EBPO_SAMPLER_MAX = 16 };
 
-/* Attributes of a file (ebpo_file_attribute), for sampling at points on faces. Threads share it. */
+/*
+ * Attributes of a file (ebpo_file_attribute), for sampling at points on faces. Threads may share a
+ * sampler.
+ */
 typedef struct ebpo_sampler ebpo_sampler;
 
 /*
@@ -739,9 +743,10 @@ typedef struct ebpo_sampler ebpo_sampler;
  * vertices the mesh (12 bytes per face, 12 or 24 bytes per vertex). The file must stay open as long
  * as the sampler.
  *
- * names   separated by commas: "quality", "red,green,blue", or with the element, "face:red".
- *         Without an element, attributes of vertices are preferred to those of faces; of several
- *         with equal names, the first in the file is used. Lists are not supported
+ * names   separated by commas, such as "quality" or "red,green,blue". "face:red" also gives the
+ *         element. Without an element, attributes of vertices are preferred to those of faces. Of
+ *         several attributes with equal names, the first one in the file is used. Attributes whose
+ *         values are lists are not supported.
  *
  * EBPO_E_ABSENT: no such attribute, or the file has no mesh. EBPO_E_ARGUMENT: more than
  * EBPO_SAMPLER_MAX names. Other errors are those of reading.
@@ -836,11 +841,11 @@ typedef bool (*ebpo_triangles_fn)(void *user, const ebpo_triangles *triangles);
 
 /*
  * Passes the triangles of ebpo_faces_in_box with their corners to `take`, each once, in batches.
- * Memory stays within the model's budget for any number of triangles, plus 4 bytes for each
- * triangle of one subtree (or of the result, if everything is in memory).
+ * Besides the model's budget, this call needs 4 bytes for each triangle of one subtree (or of the
+ * result, if everything is in memory).
  *
- * Triangles are in the order of the file if everything is in memory. Else subtrees (below the cut
- * level) are depth first, and the triangles of a subtree are in the order of the file.
+ * Triangles are in the order of the file if everything is in memory. Else the subtrees below the
+ * cut level are in depth-first order, and the triangles of a subtree are in the order of the file.
  *
  * take   must not use the context
  *
@@ -856,7 +861,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_triangles_in_box(ebpo_context *context, 
 
 /* ---- mass ---- */
 
-/* Volume of a solid (all points that the rule puts inside), in cubic units of the model. */
+/* Volume of a solid (all points that are inside by the rule), in cubic units of the model. */
 typedef struct ebpo_solid_volume {
     size_t struct_size;
 
@@ -883,8 +888,8 @@ typedef struct ebpo_solid_volume {
 /*
  * Computes bounds of the volume of the solid, in negligible time.
  *
- * report    of the mesh (ebpo_mesh_check); of a file: &info->report
- * rule      of a file: info->rule
+ * report    of the mesh (ebpo_mesh_check); for a file: &info->report
+ * rule      for a file: info->rule
  * shells    of the mesh (ebpo_mesh_count_shells); NULL: not counted, so the volume of several
  *           components is unknown
  * info      of the mesh's file, whose black cells and envelopes bound the volume; NULL: no file
