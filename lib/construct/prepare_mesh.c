@@ -2,7 +2,7 @@
  *
  * ebpo_mesh_prepare sorts the mesh along the curve first, so that each later step accesses memory
  * in order; then it checks, repairs as the options request, sorts again and checks again. A mesh
- * that is too large for an exact grid is still checked; building refuses it.
+ * with coordinates beyond 2^1000 (ebpo_mesh_arrange) is still checked; ebpo_build rejects it.
  *
  * ebpo_mesh_try_repairs applies sequences of repairs to copies of the mesh, shorter sequences
  * first, until one leaves a solid without doubts. Doubts are reasons why a solid may differ from
@@ -29,8 +29,8 @@ typedef struct preparation {
     ebpo_prepared *out;
 } preparation;
 
-/* Accepts coordinates that are too large for an exact grid, as checking is still possible. Building
- * reports this error again. */
+/* Ignores the error for coordinates beyond 2^1000, as checking is still possible. ebpo_build
+ * reports the error again. */
 static ebpo_status accept_too_large(ebpo_status status, const ebpo_error *local, ebpo_error *error)
 {
     if (status == EBPO_OK || status == EBPO_E_LIMIT)
