@@ -52,7 +52,7 @@ TEST_SUITE(degenerate)
         fprintf(stderr, "test_degenerate: no case has '%s' in its name\n", wanted);
         exit(2);
     }
-    Suite *suite = suite_create("stiff");
+    Suite *suite = suite_create("degenerate");
     TCase *tests = tcase_create("cases");
     tcase_set_timeout(tests, 600);
     tcase_add_loop_test(tests, test_degenerate_models_convert_and_query, 0, degenerate_case_count);

@@ -478,7 +478,7 @@ END_TEST
 
 TEST_SUITE(haptic_tool)
 {
-    Suite *suite = suite_create("touch_tool");
+    Suite *suite = suite_create("haptic_tool");
     TCase *tools = tcase_create("tool");
     watch_gmp();
     tcase_set_timeout(tools, 600);
