@@ -588,8 +588,8 @@ END_TEST
 
 TEST_SUITE(haptic_ball)
 {
-    Suite *suite = suite_create("touch_hand");
-    TCase *device = tcase_create("hand");
+    Suite *suite = suite_create("haptic_ball");
+    TCase *device = tcase_create("device");
     watch_gmp();
     tcase_set_timeout(device, 600);
     tcase_add_loop_test(device, test_haptic_proxy_never_penetrates, 0, WILD);

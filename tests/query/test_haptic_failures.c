@@ -114,7 +114,7 @@ END_TEST
 
 TEST_SUITE(haptic_failures)
 {
-    Suite *suite = suite_create("touch_fails");
+    Suite *suite = suite_create("haptic_failures");
     TCase *tests = tcase_create("all");
     tcase_set_timeout(tests, 300);
     tcase_add_loop_test(tests, test_haptic_step_reports_source_failure, 0, 3);

@@ -403,7 +403,7 @@ END_TEST
 
 TEST_SUITE(haptic_models)
 {
-    Suite *suite = suite_create("touch_models");
+    Suite *suite = suite_create("haptic_models");
     TCase *models = tcase_create("models");
     watch_gmp();
     tcase_set_timeout(models, 7200);

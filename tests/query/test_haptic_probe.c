@@ -225,7 +225,7 @@ END_TEST
 
 TEST_SUITE(haptic_probe)
 {
-    Suite *suite = suite_create("touch_probe");
+    Suite *suite = suite_create("haptic_probe");
     TCase *probes = tcase_create("probe");
     watch_gmp();
     tcase_set_timeout(probes, 600);

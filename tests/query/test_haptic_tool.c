@@ -477,9 +477,37 @@ START_TEST(test_haptic_step_time_with_many_points)
 }
 END_TEST
 
+static int by_gap(const void *a, const void *b)
+{
+    const double *x = a, *y = b;
+    return (*x > *y) - (*x < *y);
+}
+
+START_TEST(test_haptic_tool_keeps_nearest_contacts)
+{
+    enum { ADDED = 3 * EBPO_CONTACTS_MAX };
+    static ebpo_tool_contacts kept;
+    double gap[ADDED], found[EBPO_CONTACTS_MAX];
+    uint64_t state = 71;
+    for (int round = 0; round < 20; round++) {
+        kept.count = 0;
+        for (int i = 0; i < ADDED; i++) {
+            gap[i] = ebpo_test_random_unit(&state);
+            ebpo_tool_contact_add(&kept, &(ebpo_tool_contact){ .gap = gap[i] });
+        }
+        ck_assert_int_eq(kept.count, EBPO_CONTACTS_MAX);
+        for (int i = 0; i < EBPO_CONTACTS_MAX; i++)
+            found[i] = kept.at[i].gap;
+        qsort(gap, ADDED, sizeof *gap, by_gap);
+        qsort(found, EBPO_CONTACTS_MAX, sizeof *found, by_gap);
+        ck_assert_mem_eq(found, gap, sizeof found);
+    }
+}
+END_TEST
+
 TEST_SUITE(haptic_tool)
 {
-    Suite *suite = suite_create("touch_tool");
+    Suite *suite = suite_create("haptic_tool");
     TCase *tools = tcase_create("tool");
     watch_gmp();
     tcase_set_timeout(tools, 600);
@@ -489,6 +517,7 @@ TEST_SUITE(haptic_tool)
     tcase_add_test(tools, test_haptic_tool_contacts_never_pull);
     tcase_add_test(tools, test_haptic_friction_holds_plate);
     tcase_add_test(tools, test_haptic_step_time_with_many_points);
+    tcase_add_test(tools, test_haptic_tool_keeps_nearest_contacts);
     suite_add_tcase(suite, tools);
     return suite;
 }

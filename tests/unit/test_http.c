@@ -645,6 +645,45 @@ START_TEST(test_http_cache_is_reused_and_checked)
 }
 END_TEST
 
+/* Gives each full block the name of the full block before. */
+static void rotate_names(const char *name)
+{
+    static char before[400];
+    char spare[420];
+    struct stat st;
+    if (stat(name, &st) != 0 || (before[0] && (uint64_t)st.st_size != total))
+        return;
+    total = (uint64_t)st.st_size;
+    if (before[0]) {
+        snprintf(spare, sizeof spare, "%s.spare", before);
+        ck_assert(rename(before, spare) == 0 && rename(name, before) == 0 &&
+                  rename(spare, name) == 0);
+    }
+    snprintf(before, sizeof before, "%s", name);
+}
+
+static void append_byte(const char *name)
+{
+    int fd = open(name, O_WRONLY | O_APPEND);
+    ck_assert_int_eq(write(fd, "x", 1), 1);
+    close(fd);
+}
+
+/* The checksum of such blocks is valid: it covers neither the name nor the size of the file. */
+START_TEST(test_http_cache_rejects_exchanged_and_longer_blocks)
+{
+    char url[300];
+    snprintf(url, sizeof url, "%s", web_url("good"));
+    ck_assert_uint_gt(visit_cached(url, 1 << 30).requests, 1);
+    ck_assert_int_gt(each_file(rotate_names), 80);
+    ck_assert_uint_gt(visit_cached(url, 1 << 30).requests, 1);
+    ck_assert_uint_eq(visit_cached(url, 1 << 30).requests, 1);
+    ck_assert_int_gt(each_file(append_byte), 80);
+    ck_assert_uint_gt(visit_cached(url, 1 << 30).requests, 1);
+    ck_assert_uint_eq(visit_cached(url, 1 << 30).requests, 1);
+}
+END_TEST
+
 /* Data from the cache folder equals the file, for any ranges read before. */
 START_TEST(test_http_cache_serves_other_ranges)
 {
@@ -904,6 +943,7 @@ TEST_SUITE(http)
     tcase_add_test(tests, test_http_ranges_beyond_4_gib);
     tcase_add_test(tests, test_http_long_etags_compare_fully);
     tcase_add_test(folder, test_http_cache_is_reused_and_checked);
+    tcase_add_test(folder, test_http_cache_rejects_exchanged_and_longer_blocks);
     tcase_add_test(folder, test_http_cache_serves_other_ranges);
     tcase_add_test(folder, test_http_cache_keeps_size_limit);
     tcase_add_test(folder, test_http_cache_rejects_other_version);

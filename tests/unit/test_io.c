@@ -178,6 +178,24 @@ START_TEST(test_signal_handler_removes_unfinished_output)
 }
 END_TEST
 
+/* The path has a parent folder, a last part of one letter, and slashes at the end. */
+START_TEST(test_folder_of_ended_process_is_removed)
+{
+    char path[400], *making;
+    snprintf(path, sizeof path, "%s/f//", folder);
+    pid_t child = fork();
+    if (child == 0)
+        _exit(ebpo_folder_begin(path, &making, NULL) == EBPO_OK ? 0 : 1);
+    int status;
+    ck_assert(waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 0);
+    ck_assert_int_eq(scratch_entries(), 1);
+    ck_assert(ebpo_folder_begin(path, &making, NULL) == EBPO_OK);
+    ck_assert_int_eq(scratch_entries(), 1);
+    ck_assert(strncmp(making, path, strlen(path) - 2) == 0 && rmdir(making) == 0);
+    free(making);
+}
+END_TEST
+
 /* --- locks, and outputs made from the files that they replace --- */
 
 START_TEST(test_lock_waits_and_leaves_no_file)
@@ -458,6 +476,7 @@ TEST_SUITE(io)
     tcase_add_test(tests, test_irreplaceable_targets_are_refused);
     tcase_add_test(tests, test_output_slots_are_limited_and_reused);
     tcase_add_test(tests, test_signal_handler_removes_unfinished_output);
+    tcase_add_test(tests, test_folder_of_ended_process_is_removed);
     tcase_add_test(tests, test_lock_waits_and_leaves_no_file);
     tcase_add_test(tests, test_lock_wait_can_be_cancelled);
     tcase_add_test(tests, test_lock_skips_read_only_folder);

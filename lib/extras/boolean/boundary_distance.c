@@ -3,8 +3,12 @@
  * The boundary is a part of the operands' faces, so no point of the boundary is nearer than the
  * nearest face. If the result changes just behind that face, the face's distance is the result.
  * Otherwise a search over cells of the world, the nearest first, bounds the distance to the other
- * side. Decided cells end the search. Mixed cells are divided, until the tolerance or the maximum
- * number of cells is reached. */
+ * side. Decided cells end the search. Mixed cells are divided.
+ *
+ * A first search does not divide cells that are small compared with the tolerance. It finds an
+ * upper bound: without this limit, a boundary in front of the nearest decided cell would be divided
+ * into too many cells. If the bounds are too wide, a second search divides down to the finest
+ * cells. Both searches stop at the maximum number of cells. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -31,6 +35,7 @@ typedef struct boundary_search {
     const double *point;
     unsigned side; /* state of the result at the point: EBPO_MAY_IN or EBPO_MAY_OUT */
     double tolerance;
+    double grain;   /* cells smaller than this part of their distance are not divided */
     uint64_t most;  /* maximum number of cells */
     uint64_t cells; /* number of cells so far */
     /* Guaranteed bounds of the distance to the other side. Initially hi is the known bound. Both
@@ -87,7 +92,13 @@ static void bound_by_root_sides(boundary_search *s, const ebpo_world *w)
                                 (1 + 0x1p-46));
 }
 
-/* Decides the current cell. *unclear: least distance of mixed cells of the finest level. */
+static bool is_divided(const boundary_search *s, const ebpo_world *w, const waiting *at)
+{
+    int level = at->cell.cell.level;
+    return level < w->level && !(ebpo_world_edge(w, level) < s->grain * at->near);
+}
+
+/* Decides the current cell. *unclear: least distance of mixed cells that are not divided. */
 static ebpo_status settle_cell(boundary_search *s, const ebpo_world *w, queue *q, waiting *at,
                                double *unclear, ebpo_error *error)
 {
@@ -100,14 +111,20 @@ static ebpo_status settle_cell(boundary_search *s, const ebpo_world *w, queue *q
         s->hi = fmin(s->hi, distance_to(s, w, at->cell.cell) * (1 + 0x1p-46));
         return EBPO_OK;
     }
-    if (at->cell.cell.level == w->level)
+    if (!is_divided(s, w, at)) {
         *unclear = fmin(*unclear, at->near);
-    for (unsigned octant = 0; octant < 8 && status == EBPO_OK && at->cell.cell.level < w->level;
-         octant++) {
+        return EBPO_OK;
+    }
+    for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
         ebpo_world_cell child = ebpo_world_child(&at->cell, octant);
         status = push_cell(s, w, q, &child, error);
     }
     return status;
+}
+
+static bool is_close(const boundary_search *s, double lo)
+{
+    return s->hi < INFINITY && s->hi - lo <= s->tolerance * s->hi;
 }
 
 static ebpo_status search_cells(boundary_search *s, const ebpo_world *w, queue *q,
@@ -116,18 +133,17 @@ static ebpo_status search_cells(boundary_search *s, const ebpo_world *w, queue *
     const ebpo_world_cell root = { { 0, { 0, 0, 0 } }, 0, 0 };
     double unclear = INFINITY;
     bound_by_root_sides(s, w);
+    q->count = 0;
     ebpo_status status = push_cell(s, w, q, &root, error);
-    uint64_t begun = s->cells;
     while (status == EBPO_OK && q->count) {
-        double least = fmin(q->list[0].near, unclear);
-        bool enough = s->hi < INFINITY && s->hi - least <= s->tolerance * s->hi;
-        if (q->list[0].near >= s->hi || enough || s->cells - begun >= s->most)
+        double near = q->list[0].near;
+        if (near >= s->hi || is_close(s, fmin(near, unclear)) || s->cells >= s->most)
             break;
         waiting at = heap_take(q->list, q->count--);
         s->cells++;
         status = settle_cell(s, w, q, &at, &unclear, error);
     }
-    s->lo = fmin(fmin(q->count ? q->list[0].near : INFINITY, unclear), s->hi);
+    s->lo = fmin(fmax(s->lo, fmin(q->count ? q->list[0].near : INFINITY, unclear)), s->hi);
     return status;
 }
 
@@ -145,9 +161,12 @@ static ebpo_status search_boundary(boundary_search *s, ebpo_error *error)
     ebpo_world w;
     queue q = { NULL, 0, 0 };
     ebpo_status status = make_world(&w, s->boolean, error);
-    s->lo = INFINITY;
-    if (status == EBPO_OK && w.edge > 0)
+    s->lo = status == EBPO_OK && w.edge > 0 ? 0 : INFINITY;
+    s->grain = fmax(s->tolerance, 0x1p-10) / 4;
+    for (int i = 0; i < 2 && status == EBPO_OK && s->lo < s->hi && !is_close(s, s->lo); i++) {
         status = search_cells(s, &w, &q, error);
+        s->grain = 0;
+    }
     free(q.list);
     return status;
 }
