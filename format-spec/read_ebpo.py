@@ -196,7 +196,8 @@ def arrays(file):
     names = ["/mesh/vertices", "/mesh/faces"] + ["/mesh/faces_index"] * several if mesh else []
     names += ["/maps/vertex_source", "/maps/face_source"] if "maps" in listed_parts else []
     if "subtrees" in listed_parts:
-        names += ["/subtrees/index", "/subtrees/counts", "/subtrees/places"] + ["/subtrees/outer"] * ("outer" in file["/subtrees"])
+        names += ["/subtrees/index", "/subtrees/counts", "/subtrees/chunk_directory"]
+        names += ["/subtrees/shared_chunks"] * ("shared_chunks" in file["/subtrees"])
     out.update({name: file[name] for name in names})
     return out
 
@@ -308,7 +309,7 @@ def check_faces_of_subtrees(file, counts, sums, firsts, refs):
         return
     corners = faces(file["/mesh/faces"]).reshape(-1, 3).astype("i8")
     before = (sums - counts).astype("i8")
-    outer = file["/subtrees/outer"][...] if "outer" in file["/subtrees"] else np.zeros(0, "u4")
+    outer = file["/subtrees/shared_chunks"][...] if "shared_chunks" in file["/subtrees"] else np.zeros(0, "u4")
     for i, row in enumerate(counts.astype("i8")):
         first, vertex = (before[i, k] + before[i, k + 1] + row[k] for k in (0, 2))
         own, older = corners[first:first + row[1]], refs[i][refs[i] < first]
@@ -327,7 +328,7 @@ LEVEL_NAMES = ["types", "plane_counts", "planes", "leaf_winding", "black_winding
                "leaf_index", "leaf_plane_counts", "leaf_planes", "gray_colours"]
 ROOT_PATHS = {4096: "/mesh/vertices", 4097: "/mesh/faces", 4098: "/mesh/faces_index",
               4099: "/maps/vertex_source", 4100: "/maps/face_source", 4112: "/subtrees/index",
-              4113: "/subtrees/counts", 4114: "/subtrees/outer"}
+              4113: "/subtrees/counts", 4114: "/subtrees/shared_chunks"}
 
 
 def path_of(number):
@@ -386,14 +387,14 @@ def check_frames(file):
 
 def check_sums(file):
     """README.md, "Sums of chunks": each chunk of the arrays that the head calls for ends as the list says."""
-    if "chunk_sums" not in file or not holds(file, "/chunk_sums"):
+    if "chunk_checksums" not in file or not holds(file, "/chunk_checksums"):
         return
-    numbers, sums = np.divmod(file["/chunk_sums"][...], np.uint64(1 << 32))
-    assert (numbers[:-1] <= numbers[1:]).all(), "chunk_sums: not in order"
+    numbers, sums = np.divmod(file["/chunk_checksums"][...], np.uint64(1 << 32))
+    assert (numbers[:-1] <= numbers[1:]).all(), "chunk_checksums: not in order"
     listed_paths = {path_of(int(number)): int(number) for number in np.unique(numbers)}
     stored = pathlib.Path(file.filename).read_bytes()
     for path, dataset in arrays(file).items():
-        if path != "/subtrees/places":
+        if path != "/subtrees/chunk_directory":
             chunks = [dataset.id.get_chunk_info(i) for i in range(dataset.id.get_num_chunks())]
             ends = [int.from_bytes(stored[c.byte_offset:c.byte_offset + c.size][-4:], "little") for c in chunks]
             assert ends == sums[numbers == listed_paths[path]].tolist(), f"{path}: another chunk's bytes"
@@ -401,10 +402,10 @@ def check_sums(file):
 
 def check_places(file):
     """The list of chunks leads to where HDF5 says that they are; it is ignored where its attributes are not true."""
-    own = file["/subtrees/places"].id.get_chunk_info(0)
-    if not holds(file, "/subtrees/places"):
+    own = file["/subtrees/chunk_directory"].id.get_chunk_info(0)
+    if not holds(file, "/subtrees/chunk_directory"):
         return
-    places, seen = file["/subtrees/places"], {}
+    places, seen = file["/subtrees/chunk_directory"], {}
     at = file["/levels/00/types"].id.get_chunk_info(0).byte_offset
     for place in places[...]:
         number, size = divmod(int(place), 1 << 32)
@@ -421,7 +422,7 @@ def check_places(file):
 def attribute_values(dataset, kind):
     """README.md, "Attributes": rows of values, by the array's coding. `kind`: a type of numpy."""
     code, word = dataset.dtype, text(dataset.attrs["coding"])
-    assert word in ("plain", "columns") and code.itemsize == np.dtype(kind).itemsize, dataset.name
+    assert word in ("plain", "column-delta") and code.itemsize == np.dtype(kind).itemsize, dataset.name
     if word == "plain":
         return dataset[...].view(kind)
     parts = []
@@ -449,10 +450,11 @@ def read_attributes(file):
     for number in range(int(group.attrs["arrays"])):
         path = f"/attributes/{number:03d}"
         array, kind = file[path], ATTRIBUTE_TYPES[text(file[path].attrs["type"])]
-        one = {name: text(array.attrs[name]) for name in ("element", "names", "type")}
+        one = {name: text(array.attrs[attribute]) for name, attribute in
+               (("element", "element"), ("names", "columns"), ("type", "type"))}
         one["list"] = text(array.attrs["list"]) if "list" in array.attrs else None
         assert one["list"] is None or one["list"] in list(ATTRIBUTE_TYPES)[:6]
-        different = one["list"] is not None and array.attrs["different"] == 1
+        different = one["list"] is not None and array.attrs["lengths_differ"] == 1
         values = digest(path, attribute_values(array, "u8" if different else kind))
         one["rows"], one["ends"] = len(values), listed(values) if different else None
         if different:
@@ -487,7 +489,7 @@ def colours_of(file, element):
         if text(array.attrs["element"]) == element and "list" not in array.attrs:
             kind = text(array.attrs["type"])
             values = attribute_values(array, ATTRIBUTE_TYPES[kind]).reshape(len(array), -1)
-            for column, name in enumerate(text(array.attrs["names"]).split(" ")):
+            for column, name in enumerate(text(array.attrs["columns"]).split(" ")):
                 full = {"uint16": 65535, "float32": 1, "float64": 1}.get(kind, 255)
                 found.setdefault(name, values[:, column].astype("f8") / full * 255)
     for names in (["red", "green", "blue"], ["diffuse_red", "diffuse_green", "diffuse_blue"]):

@@ -1,10 +1,10 @@
 /* Manages the chunk directory: the offset, the stored size and the checksum of every chunk of an
- * open file. Offsets are read from the file's list of all chunks (/subtrees/places), or from HDF5's
- * index of each array. They are read only when needed, as they may be long or remote, and once,
- * under the file's lock. The checksums (/chunk_sums) detect an intact chunk that belongs to
- * another position or another version of the file. Each list is a single chunk, however long, so
- * both have a separate encoder and decoder. The sum of stored sizes is checked against the size of
- * the file before chunks are decoded. Source: format-spec/README.md, sections 9 and 20. */
+ * open file. Offsets are read from the file's list of all chunks (/subtrees/chunk_directory), or
+ * from HDF5's index of each array. They are read only when needed, as they may be long or remote,
+ * and once, under the file's lock. The checksums (/chunk_checksums) detect an intact chunk that
+ * belongs to another position or another version of the file. Each list is a single chunk, however
+ * long, so both have a separate encoder and decoder. The sum of stored sizes is checked against the
+ * size of the file before chunks are decoded. Source: format-spec/README.md, sections 9 and 20. */
 #include <stdio.h>
 #include <stdlib.h>
 

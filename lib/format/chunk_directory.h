@@ -33,7 +33,8 @@ static inline ebpo_array_in *ebpo_array_number(ebpo_file *file, int i)
                : &file->attributes.array[i - EBPO_ARRAYS_OF_FORMAT];
 }
 
-/* --- the list of all chunks, /subtrees/places: format-spec/README.md, section 9, "Places" --- */
+/* --- the list of all chunks, /subtrees/chunk_directory: format-spec/README.md, section 9, "Places"
+ * --- */
 
 /* Marks a gap. */
 #define EBPO_PLACE_GAP UINT32_MAX

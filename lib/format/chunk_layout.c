@@ -2,7 +2,7 @@
  * array, the order of chunks, and the chunks that each subtree needs. Levels near the root are
  * stored whole. Deep levels are stored subtree by subtree, so that one subtree is one range of
  * bytes, except for the chunks of faces and vertices that it shares with subtrees before it. These
- * shared chunks are listed in /subtrees/outer, and the sums before each subtree in
+ * shared chunks are listed in /subtrees/shared_chunks, and the sums before each subtree in
  * /subtrees/counts. All computations use integers, because the bytes of a file depend on them.
  * Source: format-spec/README.md, section 9. */
 #include <stdlib.h>

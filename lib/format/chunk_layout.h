@@ -90,7 +90,7 @@ typedef struct ebpo_ordered_chunk {
 } ebpo_ordered_chunk;
 
 typedef struct ebpo_chunk_order {
-    ebpo_ordered_chunk *chunk; /* [count]; all except /subtrees/places */
+    ebpo_ordered_chunk *chunk; /* [count]; all except /subtrees/chunk_directory */
     uint64_t count;
     uint64_t top; /* number of chunks needed to look up a subtree */
 } ebpo_chunk_order;

@@ -317,7 +317,10 @@ static const char FORMAT_VERSION[] = "1.1";
 static const char ABOUT[] = "A triangle mesh with an octree of convex envelopes (EBP-Octree), "
                             "level by level: /levels/00 and so on, "
                             "then /mesh, then /maps. Each array's attributes name its coding; the "
-                            "specification is format-spec/README.md of ebpo.";
+                            "specification is format-spec/README.md of ebpo. Attributes of this "
+                            "group: leaf_faces is the number of faces above which a cell was to be "
+                            "divided; down to level grid_level all cell faces are exact doubles, "
+                            "and levels above level_count - 1 are not in the file.";
 
 static ebpo_status put_word(ebpo_h5_out *out, ebpo_h5_id id, const fact *f, const void *field,
                             ebpo_error *error)

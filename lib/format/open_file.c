@@ -63,6 +63,9 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, ebpo_array_id id
     bool gates = id == EBPO_A_FACES && file->info.gates;
     *a = (ebpo_array_in){ .id = id, .level = level };
     ebpo_schema_path(id, level, a->path);
+    if (ebpo_schema_former(id) && ebpo_head_look(head, a->path) == EBPO_HEAD_ABSENT &&
+        ebpo_head_look(head, ebpo_schema_former(id)) != EBPO_HEAD_ABSENT)
+        snprintf(a->path, sizeof a->path, "%s", ebpo_schema_former(id));
     if (rows == 0 || (spec->if_needed && ebpo_head_look(head, a->path) == EBPO_HEAD_ABSENT))
         return EBPO_OK;
     /* offsets of several chunks are in the index or in a list */

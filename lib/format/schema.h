@@ -61,6 +61,7 @@ enum {
     EBPO_INDEX_ROWS = 4096,            /* items between two rows of an index array */
     EBPO_COLOUR_OF_NOTHING = 0x808080, /* for gray nodes without a known colour */
     EBPO_PATH_BYTES = 48,
+    EBPO_COLUMNS_BYTES = 2048, /* of the attribute `columns`, with its end */
     /* with the part `subtrees` (format-spec/README.md, section 9) */
     EBPO_FACE_BLOCK = 2048, /* rows of a chunk */
     EBPO_VERTEX_BLOCK = 1024,
@@ -75,7 +76,7 @@ enum {
     EBPO_S_FACES,
     EBPO_S_VERTICES_BEFORE, /* first used by these faces */
     EBPO_S_VERTICES,
-    EBPO_S_SHARED_FACES, /* rows of /subtrees/outer for blocks of faces */
+    EBPO_S_SHARED_FACES, /* rows of /subtrees/shared_chunks for blocks of faces */
     EBPO_S_SHARED_VERTICES,
     EBPO_SUBTREE_LEVELS /* then for each level below the roots: */
 };
@@ -131,6 +132,13 @@ ebpo_shape ebpo_stored_shape(const ebpo_shape *given, bool gates);
 
 /* Writes the absolute path of an array; `level` matters for level arrays only. */
 void ebpo_schema_path(ebpo_array_id id, int level, char path[EBPO_PATH_BYTES]);
+
+/* Returns the path of an array in files that were written before format 1.1 had its final names, or
+ * NULL. */
+const char *ebpo_schema_former(ebpo_array_id id);
+
+/* Writes the attribute `columns`: a name for each column; "" for arrays of one dimension. */
+void ebpo_schema_columns(const ebpo_info *info, ebpo_array_id id, char names[EBPO_COLUMNS_BYTES]);
 
 /* Returns the columns of an array; 0: one dimension. */
 uint32_t ebpo_schema_cols(const ebpo_info *info, ebpo_array_id id);
@@ -257,5 +265,8 @@ static inline int ebpo_items_number(uint64_t n) { return 2 + 2 * (int)n; }
 void ebpo_attribute_path(int number, char path[EBPO_PATH_BYTES]);
 
 extern const char ebpo_coding_plain[], ebpo_coding_columns[];
+
+/* The former name of ebpo_coding_columns, which readers take. */
+#define EBPO_CODING_COLUMNS_FORMER "columns"
 
 #endif

@@ -125,7 +125,7 @@ static void compare_shared(recount *c, const char *what, uint64_t from, const nu
             break;
     if (i < needed->count)
         CHECK(false,
-              "/subtrees/outer, subtree %" PRIu64 ": needs block %" PRIu32
+              "/subtrees/shared_chunks, subtree %" PRIu64 ": needs block %" PRIu32
               " of %s, which is not the next entry of the list",
               c->subtree, needed->at[needed->count - 1 - i], what);
     else
@@ -273,8 +273,8 @@ static ebpo_status recount_table(recount *c, ebpo_error *error)
     ebpo_reference_node root = ebpo_reference_root(c->view);
     see_node(c, &root);
     CHECK(c->outer_done == c->shared_rows,
-          "/subtrees/outer has %" PRIu64 " rows, but %" PRIu64 " blocks are needed", c->shared_rows,
-          c->outer_done);
+          "/subtrees/shared_chunks has %" PRIu64 " rows, but %" PRIu64 " blocks are needed",
+          c->shared_rows, c->outer_done);
     ebpo_array_free(c->view->workspace, c->shared_faces.at);
     return c->no_memory ? ebpo_workspace_fail_while(c->view->workspace, "counting subtrees", error)
                         : EBPO_OK;

@@ -237,7 +237,7 @@ static herr_t take_array(hid_t object, const char *name, const H5O_info_t *info,
     if (colours != all->of_colours)
         return 0;
     if (info->type != H5O_TYPE_DATASET || strncmp(name, "x-", 2) == 0 ||
-        strcmp(name, "chunk_sums") == 0 || strncmp(name, "attributes/", 11) == 0)
+        strcmp(name, "chunk_checksums") == 0 || strncmp(name, "attributes/", 11) == 0)
         return 0;
     snprintf(path, sizeof path, "/%s", name);
     need(all->count < 512, "too many arrays");

@@ -115,11 +115,14 @@ static void v_group_for_array(void)
 static void v_subtree_level(void) { set_int("/", "subtree_level", 0); }
 static void v_subtree_table(void) { drop("/subtrees/counts"); }
 /* Its bytes stay, so that the list is still valid for a reader. */
-static void v_places_array(void) { poke("/subtrees/places", 1, INT64_C(4097) << 32 | 8); }
-static void v_places_end(void) { poke("/subtrees/places", 1, 1 << 30); }
-static void v_places_bytes(void) { poke("/subtrees/places", 0, 1027); } /* of two, unfiltered */
-static void v_places(void) { drop("/subtrees/places"); }
-static void v_outer(void) { drop("/subtrees/outer"); }
+static void v_places_array(void) { poke("/subtrees/chunk_directory", 1, INT64_C(4097) << 32 | 8); }
+static void v_places_end(void) { poke("/subtrees/chunk_directory", 1, 1 << 30); }
+static void v_places_bytes(void)
+{
+    poke("/subtrees/chunk_directory", 0, 1027);
+} /* of two, unfiltered */
+static void v_places(void) { drop("/subtrees/chunk_directory"); }
+static void v_outer(void) { drop("/subtrees/shared_chunks"); }
 static void v_soft_link(void)
 {
     drop("/mesh/faces");
@@ -361,7 +364,7 @@ static void v_attributes_missing(void) { drop("/attributes/003"); }
 static void v_attributes_many(void) { set_count("/attributes", "arrays", 1001); }
 static void v_attributes_type(void) { set_text("/attributes/003", "type", "int64"); }
 static void v_attributes_width(void) { set_text("/attributes/003", "type", "int32"); }
-static void v_attributes_names(void) { set_text("/attributes/000", "names", "red green"); }
+static void v_attributes_names(void) { set_text("/attributes/000", "columns", "red green"); }
 static void v_attributes_element(void) { set_text("/attributes/003", "element", "edge"); }
 static void v_attributes_coding(void) { set_text("/attributes/001", "coding", "delta"); }
 static void v_attributes_ends(void) { poke("/attributes/006", 2, 1); }
@@ -398,11 +401,11 @@ static void v_gates_long(void)
     for (unsigned i = 4; i < 9; i++)
         poke("/mesh/faces", 16 + 4 * i, 1 + i % 3);
 }
-static void v_attributes_image(void) { set_text("/attributes/001", "names", "sha256"); }
+static void v_attributes_image(void) { set_text("/attributes/001", "columns", "sha256"); }
 /* The row of the colour of the root becomes a row of a missing array; the number of the first one
  * is beyond those after it. */
-static void v_checksums_fewer(void) { poke("/chunk_sums", 3, INT64_C(14) << 32); }
-static void v_checksums_order(void) { poke("/chunk_sums", 0, INT64_C(70) << 32); }
+static void v_checksums_fewer(void) { poke("/chunk_checksums", 3, INT64_C(14) << 32); }
+static void v_checksums_order(void) { poke("/chunk_checksums", 0, INT64_C(70) << 32); }
 static void v_content(void) { poke("/mesh/vertices", 0, 2); }
 
 typedef enum late_change {
@@ -470,9 +473,11 @@ static const failed_vector failed[] = {
     { "places_beyond_the_end", CHUNKS, v_places_end, NONE, "9",
       "reaches beyond the end of the file" },
     { "places_of_impossible_bytes", CHUNKS, v_places_bytes, NONE, "9", "more than it can have" },
-    { "places_missing", SUBTREES, v_places, NONE, "9", "`/subtrees/places` must be there" },
+    { "places_missing", SUBTREES, v_places, NONE, "9",
+      "`/subtrees/chunk_directory` must be there" },
     { "subtree_outer_missing", CHUNKS, v_outer, NONE, "4",
-      "only `black_winding`, `white_winding` and an empty `/subtrees/outer` may be absent" },
+      "only `black_winding`, `white_winding` and an empty `/subtrees/shared_chunks` may be "
+      "absent" },
     { "pruned_in_a_whole_file", DEEP, v_pruned_whole, NONE, "4",
       "`pruned` is 0 in files that are no subsets" },
     { "attribute_missing", LEAVES, v_attribute_missing, NONE, "3",
@@ -613,7 +618,7 @@ static const failed_vector failed[] = {
     { "attributes_of_other_rows", COLOURED, v_attributes_element, NONE, "18",
       "must have equally many rows" },
     { "attributes_of_unknown_coding", COLOURED, v_attributes_coding, NONE, "18",
-      "`plain` or `columns`" },
+      "`plain` or `column-delta`" },
     { "attributes_lists_end_before", COLOURED, v_attributes_ends, NONE, "18",
       "less than the row before" },
     { "attributes_lists_end_beyond", COLOURED, v_attributes_items, NONE, "18",

@@ -331,7 +331,7 @@ const ROOT_ARRAYS = {
 /** Throws unless an array's attribute names the coding that the format requires. Older files have `delta` for leaf_skip. */
 export function checkCoding(attributes, path, gates) {
   const word = new Facts(attributes, path).text('coding', 15), name = path.startsWith('/levels/') ? path.slice(path.lastIndexOf('/') + 1) : path;
-  if (!(path.startsWith('/attributes/') ? ['plain', 'columns'] : gates ? ['gates'] : CODINGS[name] ?? ['plain']).includes(word))
+  if (!(path.startsWith('/attributes/') ? ['plain', 'column-delta'] : gates ? ['gates'] : CODINGS[name] ?? ['plain']).includes(word))
     throw formatError(path, "the array's coding is not valid for this array");
 }
 
@@ -344,7 +344,7 @@ export function attributesFacts(attributes, path) {
 /** Returns the columns of /subtrees/counts. */
 export const subtreeCols = (info) => 6 + 7 * (info.level_count - 1 - info.subtree_level);
 
-export const PLACES = '/subtrees/places', CHUNK_SUMS = '/chunk_sums';
+export const PLACES = '/subtrees/chunk_directory', CHUNK_SUMS = '/chunk_checksums';
 
 /** Returns true for lists about all chunks. Such a list is itself a single chunk, and no list contains it. */
 export const isList = (path) => path === PLACES || path === CHUNK_SUMS;
@@ -353,7 +353,7 @@ export const isList = (path) => path === PLACES || path === CHUNK_SUMS;
 const subtreeArrays = (info) => (info.subtree_level === undefined ? [] : [
   { path: '/subtrees/counts', cols: subtreeCols(info), sizes: [4], rows: info.levels[info.subtree_level].gray },
   { path: '/subtrees/index', cols: subtreeCols(info), sizes: [8], rows: undefined },
-  { path: '/subtrees/outer', cols: 0, sizes: [4], rows: undefined, mayBeAbsent: true },
+  { path: '/subtrees/shared_chunks', cols: 0, sizes: [4], rows: undefined, mayBeAbsent: true },
   { path: PLACES, cols: 0, sizes: [8], rows: undefined },
 ]);
 

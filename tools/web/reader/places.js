@@ -9,7 +9,8 @@ export function placeNumber(path, level, order) {
 }
 
 const ROOT_NUMBERS = { '/mesh/vertices': 4096, '/mesh/faces': 4097, '/mesh/faces_index': 4098, '/maps/vertex_source': 4099, '/maps/face_source': 4100,
-  '/subtrees/index': 4112, '/subtrees/counts': 4113, '/subtrees/outer': 4114, '/subtrees/places': 4115, '/chunk_sums': 4116 }; // the chunk directory and the checksums do not list themselves
+  '/subtrees/index': 4112, '/subtrees/counts': 4113, '/subtrees/shared_chunks': 4114,
+  '/subtrees/chunk_directory': 4115, '/chunk_checksums': 4116 }; // the chunk directory and the checksums do not list themselves
 
 const WHERE = PLACES;
 

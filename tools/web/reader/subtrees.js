@@ -22,7 +22,7 @@ export class Subtrees {
     this.info = store.info;
     this.cols = subtreeCols(store.info);
     this.counts = store.arrays.get(COUNTS);
-    this.outer = store.arrays.get('/subtrees/outer');
+    this.outer = store.arrays.get('/subtrees/shared_chunks');
     this.limits = limits(store.info, this.outer?.rows ?? 0);
     this.checked = new Set(); // chunks of counts that add up
   }
@@ -89,7 +89,7 @@ export class Subtrees {
 
   /** Chunks of faces and vertices of some subtrees, as far as the table knows them: [{ array, chunk }]. */
   async blocks(rows) {
-    const ranges = rows.map((r) => ({ path: '/subtrees/outer', from: r.outer, to: r.outer + r.outerFaces + r.outerVertices })), { store } = this;
+    const ranges = rows.map((r) => ({ path: '/subtrees/shared_chunks', from: r.outer, to: r.outer + r.outerFaces + r.outerVertices })), { store } = this;
     const outer = await store.rows(ranges), out = new Map();
     const add = (path, first, count, distances) => {
       const array = store.arrays.get(path), rows = FIXED_ROWS[path], block = Math.floor(first / rows); // the array may be shorter than a block

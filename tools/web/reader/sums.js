@@ -1,7 +1,7 @@
 // Reads the chunk checksums, an optional list that detects swapped chunks: format-spec/README.md, section 20.
 import { formatError } from './error.js';
 
-const WHERE = '/chunk_sums';
+const WHERE = '/chunk_checksums';
 
 /** `rows`: for each chunk, its sum and its array's number; `arrays`: those of the file. -> Map(array, Uint32Array of sums). */
 export function readSums(rows, arrays) {

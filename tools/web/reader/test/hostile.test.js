@@ -79,7 +79,7 @@ function withWrongEnd(data, { at, bytes: length }) {
 }
 
 test('levels that have come are given before the list of sums; a wrong one among them is told when that has come', async () => {
-  const list = (await openEbpo(summed)).arrays.get('/chunk_sums').chunks[0], wrong = withWrongEnd(summed, list);
+  const list = (await openEbpo(summed)).arrays.get('/chunk_checksums').chunks[0], wrong = withWrongEnd(summed, list);
   for (const data of [summed, wrong]) {
     let open;
     const file = await openEbpo(new SlowSource(data, list.at, new Promise((done) => (open = done))));
@@ -96,7 +96,8 @@ test('levels that have come are given before the list of sums; a wrong one among
 
 // The list of a file with arrays of several chunks, as pairs of bytes and number.
 const many = await openEbpo(readFileSync(new URL('../../../../format-spec/vectors/passed/16_many_subtrees.ebpo.h5', import.meta.url)));
-const list = many.arrays.get('/subtrees/places'), arrays = [...many.arrays.values()].filter((a) => a !== list), [stored] = await Promise.all(many.store.cache.decoded([{ array: list, chunk: 0 }]));
+const list = many.arrays.get('/subtrees/chunk_directory');
+const arrays = [...many.arrays.values()].filter((a) => a !== list), [stored] = await Promise.all(many.store.cache.decoded([{ array: list, chunk: 0 }]));
 const placed = (change) => {
   const rows = new Uint32Array(stored.slice().buffer);
   change(rows, rows.length - 2);
@@ -106,13 +107,13 @@ const placed = (change) => {
 test('places: a chunk too many, too few, too large, beyond the end, elsewhere', async () => {
   assert.deepEqual([...placed(() => {}).values()].map((chunks) => chunks.length), arrays.map((a) => a.chunkCount));
   const wrong = (change, said) => assert.throws(() => placed(change), (error) => error instanceof EbpoError && error.code === 'FORMAT' && said.test(error.message));
-  wrong((rows) => (rows[3] = rows[1]), /\/subtrees\/places: .*more chunks/);
-  wrong((rows, last) => (rows[last + 1] = 70000), /\/subtrees\/places: .*fewer chunks/);
-  wrong((rows, last) => (rows[last] = 2 ** 32 - 1), /\/subtrees\/places: a chunk reaches beyond the end/);
-  wrong((rows) => (rows[6] += 1), /\/subtrees\/places: .*lies elsewhere/);
-  wrong((rows) => (rows[6] = 0), /\/subtrees\/places: .*size that it cannot have/);
-  wrong((rows) => (rows[6] = 100000), /\/subtrees\/places: .*(size that it cannot have|beyond the end)/);
-  wrong((rows) => rows.fill(70000), /\/subtrees\/places: the chunks of level 0 are not in it/);
+  wrong((rows) => (rows[3] = rows[1]), /\/subtrees\/chunk_directory: .*more chunks/);
+  wrong((rows, last) => (rows[last + 1] = 70000), /\/subtrees\/chunk_directory: .*fewer chunks/);
+  wrong((rows, last) => (rows[last] = 2 ** 32 - 1), /\/subtrees\/chunk_directory: a chunk reaches beyond the end/);
+  wrong((rows) => (rows[6] += 1), /\/subtrees\/chunk_directory: .*lies elsewhere/);
+  wrong((rows) => (rows[6] = 0), /\/subtrees\/chunk_directory: .*size that it cannot have/);
+  wrong((rows) => (rows[6] = 100000), /\/subtrees\/chunk_directory: .*(size that it cannot have|beyond the end)/);
+  wrong((rows) => rows.fill(70000), /\/subtrees\/chunk_directory: the chunks of level 0 are not in it/);
   await many.locate();
   for (const [array, chunks] of placed(() => {}))
     assert.deepEqual(chunks, array.chunks.map(({ at, bytes }) => ({ at, bytes })), array.path);
@@ -121,7 +122,7 @@ test('places: a chunk too many, too few, too large, beyond the end, elsewhere', 
 test('places that say that they are stale are not used', async () => {
   const bytes = many.source.data;
   async function placesOf(change) {
-    const file = await openEbpo(bytes), { attributes } = file.arrays.get('/subtrees/places').object;
+    const file = await openEbpo(bytes), { attributes } = file.arrays.get('/subtrees/chunk_directory').object;
     change(attributes);
     let reads = 0;
     const { cache } = file.store, decoded = cache.decoded.bind(cache);
@@ -183,7 +184,7 @@ test('500 changes of the tables at random: an error, or the same', async () => {
 });
 
 test('a list whose own place is not known does not hold', () => {
-  const places = good.arrays.get('/subtrees/places');
+  const places = good.arrays.get('/subtrees/chunk_directory');
   assert.equal(placesHold(places, original.length), true);
   assert.equal(placesHold(places, original.length + 1), false);
   assert.equal(placesHold({ ...places, chunks: undefined }, original.length), false);
