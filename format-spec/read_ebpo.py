@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A second reader of .ebpo.h5 files, laid out like README.md: h5py and numpy only, none of the library's code.
+"""A second reader of .ebpo.h5 files, for README.md and the annexes: h5py and numpy only, none of the library's code.
 
     read_ebpo.py FILE [EXPECTED.json]
     read_ebpo.py --vectors FOLDER
@@ -173,7 +173,7 @@ def leaf_refs(level, first):
 
 
 def arrays(file):
-    """README.md, "Arrays": {path: dataset}, of those that the head calls for; what else stands there is ignored."""
+    """README.md, sections 6 and 9: {path: dataset}, of those that the head calls for; what else stands there is ignored."""
     listed_parts = parts_of(file)
     mesh, planes, leaf_planes, colours = (part in listed_parts for part in ("mesh", "planes", "leaf-planes", "colours"))
     out, groups, attrs = {}, 1, file.attrs
@@ -213,7 +213,7 @@ CODINGS = {"leaf_skip": ("skips", "delta"), "leaf_refs": ("gap",), "mesh/vertice
 
 
 def check_codings(file):
-    """README.md, "Codings": each array names the one that it has. `delta` at leaf_skip is of older files."""
+    """README.md, section 9: each array names the one that it has. `delta` at leaf_skip is of older files."""
     gates = "gates" in parts_of(file)
     for path, item in arrays(file).items():
         wanted = path.split("/")[-1] if path.startswith("/levels/") else path[1:]
@@ -245,7 +245,7 @@ def as_without_subtrees(name, dataset):
 
 
 def content_sha256(file, of_colours=False):
-    """README.md, "Content checksum". `of_colours`: colours_sha256."""
+    """checksums.md, section 1. `of_colours`: colours_sha256."""
     total, subtrees = hashlib.sha256(), "subtrees" in parts_of(file)
     for name, dataset in sorted(arrays(file).items()):
         if name.startswith("/subtrees/") or name.endswith("/gray_colours") != of_colours:
@@ -258,7 +258,7 @@ def content_sha256(file, of_colours=False):
 
 
 def check_subtrees(file):
-    """README.md, "Subtrees": the table adds up to what the tree has, and the list to the file."""
+    """subtrees.md: the table adds up to what the tree has, and the list to the file."""
     counts, index = (file[f"/subtrees/{name}"] for name in ("counts", "index"))
     rows, sums = counts.chunks[0], np.cumsum(counts[...].astype("u8"), axis=0)
     assert (index[1:] == sums[rows - 1:(len(index) - 1) * rows:rows]).all() and not index[0].any()
@@ -332,7 +332,7 @@ ROOT_PATHS = {4096: "/mesh/vertices", 4097: "/mesh/faces", 4098: "/mesh/faces_in
 
 
 def path_of(number):
-    """README.md, "Places": the array that a number stands for; None: a gap, or not one of sections 4 and 9."""
+    """subtrees.md, section 3: the array that a number stands for; None: a gap, or not one of sections 6 and 9, or of annex C."""
     level, name = divmod(number, 64)
     if level < 64:
         return f"/levels/{level:02d}/{LEVEL_NAMES[name]}" if name < len(LEVEL_NAMES) else None
@@ -341,8 +341,10 @@ def path_of(number):
 
 def holds(file, path):
     """Whether a list about all chunks is true: other programs that write the file anew leave it as it was."""
-    own, stated = file[path].id.get_chunk_info(0), {k: one(v) for k, v in file[path].attrs.items() if k in ("file_bytes", "offset")}
-    return stated == {"file_bytes": pathlib.Path(file.filename).stat().st_size, "offset": own.byte_offset}
+    stated = {k: one(v) for k, v in file[path].attrs.items() if k in ("file_bytes", "offset")}
+    if stated.get("file_bytes") != pathlib.Path(file.filename).stat().st_size:
+        return False
+    return stated.get("offset") == file[path].id.get_chunk_info(0).byte_offset
 
 
 def literals_bytes(block):
@@ -377,7 +379,7 @@ def check_frame(frame, path):
 
 
 def check_frames(file):
-    """README.md, "HDF5": the frames of a file whose pipeline is zstd."""
+    """README.md, section 4: the frames of a file whose pipeline is zstd."""
     for path, dataset in arrays(file).items():
         pipeline = dataset.id.get_create_plist()
         if any(pipeline.get_filter(i)[0] == 32015 for i in range(pipeline.get_nfilters())):
@@ -386,7 +388,7 @@ def check_frames(file):
 
 
 def check_sums(file):
-    """README.md, "Sums of chunks": each chunk of the arrays that the head calls for ends as the list says."""
+    """checksums.md, section 3: each chunk of the arrays that the head calls for ends as the list says."""
     if "chunk_checksums" not in file or not holds(file, "/chunk_checksums"):
         return
     numbers, sums = np.divmod(file["/chunk_checksums"][...], np.uint64(1 << 32))
@@ -402,7 +404,6 @@ def check_sums(file):
 
 def check_places(file):
     """The list of chunks leads to where HDF5 says that they are; it is ignored where its attributes are not true."""
-    own = file["/subtrees/chunk_directory"].id.get_chunk_info(0)
     if not holds(file, "/subtrees/chunk_directory"):
         return
     places, seen = file["/subtrees/chunk_directory"], {}
@@ -416,11 +417,10 @@ def check_places(file):
             seen[path] += 1
         at += int(size)
     assert all(count == file[path].id.get_num_chunks() for path, count in seen.items())
-    assert own.byte_offset + own.size == pathlib.Path(file.filename).stat().st_size
 
 
 def attribute_values(dataset, kind):
-    """README.md, "Attributes": rows of values, by the array's coding. `kind`: a type of numpy."""
+    """attributes.md: rows of values, by the array's coding. `kind`: a type of numpy."""
     code, word = dataset.dtype, text(dataset.attrs["coding"])
     assert word in ("plain", "column-delta") and code.itemsize == np.dtype(kind).itemsize, dataset.name
     if word == "plain":
@@ -440,7 +440,7 @@ ATTRIBUTE_TYPES = {"int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "
 
 
 def read_attributes(file):
-    """README.md, "Attributes": the part as vectors' .attributes.json have it, if its checksum is right."""
+    """attributes.md: the part as vectors' .attributes.json have it, if its checksum is right."""
     group, digests, out, images = file["/attributes"], {}, [], {}
 
     def digest(path, values):
@@ -482,7 +482,7 @@ def read_attributes(file):
 
 
 def colours_of(file, element):
-    """README.md, "Names": red, green and blue of vertices or faces as bytes; None: they have none."""
+    """attributes.md, section 4: red, green and blue of vertices or faces as bytes; None: they have none."""
     found = {}
     for number in range(int(file["/attributes"].attrs["arrays"])):
         array = file[f"/attributes/{number:03d}"]
@@ -500,7 +500,7 @@ def colours_of(file, element):
 
 
 def face_sums(file):
-    """README.md, "Colours of envelopes": of each face weight times thrice the colour, and thrice the weight; None: no colours."""
+    """colours.md: of each face weight times thrice the colour, and thrice the weight; None: no colours."""
     of_vertex, of_face = colours_of(file, "vertex"), colours_of(file, "face")
     if of_vertex is None and of_face is None:
         return None
@@ -607,7 +607,7 @@ def check_pruned(file, subset):
 
 
 def plane_of(code):
-    """README.md, "Envelopes": the half-space n . xi <= d / 4096 of a code."""
+    """README.md, section 8: the half-space n . xi <= d / 4096 of a code."""
     u, v, q = (code & 1023) - 511, (code >> 10 & 1023) - 511, code >> 20
     n = [u, v, 511 - abs(u) - abs(v)]
     if n[2] < 0:

@@ -1,5 +1,5 @@
 /* Computes the colours of gray nodes: the mean, by area, of the colours of the faces below
- * (format-spec/README.md, section 19).
+ * (format-spec/colours.md).
  *
  * Levels go from the deepest up: a group of eight gives the sums of the gray node above it. Nothing
  * is kept for each face; a face's part is computed for each leaf that lists it, as leaves list few

@@ -33,7 +33,7 @@ double ebpo_cell_frame_model_length(const ebpo_cell_frame *f, double length);
 double ebpo_cell_frame_apart(const ebpo_cell_frame *f, const double a[3], const double b[3]);
 
 /* Returns an upper bound of the distance of every point of the cell, or of one `levels` below, to a
- * face that is known to touch it or nearly so (format-spec, section 5). */
+ * face that is known to touch it or nearly so (format-spec, section 7). */
 double ebpo_cell_frame_diagonal(const ebpo_cell_frame *f, int levels);
 
 /* Returns an upper bound of the distance of a point (cell coordinates) to a triangle of the model,

@@ -2,7 +2,7 @@
  * leaves, faces and vertices get new numbers in the order of the specification. Arrays from old
  * numbers to new ones are as long as the source's mesh. Pages that are never written take no
  * memory, and faces that are close in space have close numbers. Source: format-spec/README.md,
- * section 5. */
+ * section 7. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>

@@ -4,7 +4,7 @@
  * bytes, except for the chunks of faces and vertices that it shares with subtrees before it. These
  * shared chunks are listed in /subtrees/shared_chunks, and the sums before each subtree in
  * /subtrees/counts. All computations use integers, because the bytes of a file depend on them.
- * Source: format-spec/README.md, section 9. */
+ * Source: format-spec/subtrees.md. */
 #include <stdlib.h>
 #include <string.h>
 

@@ -1,5 +1,5 @@
 /* Layout of a file to write: the list of arrays, the rows and order of their chunks, and the counts
- * of subtrees. format-spec/README.md, section 9. */
+ * of subtrees. format-spec/subtrees.md. */
 #ifndef EBPO_FORMAT_CHUNK_LAYOUT_H
 #define EBPO_FORMAT_CHUNK_LAYOUT_H
 

@@ -2,7 +2,7 @@
  * array as stored before shuffle and compression. It does not depend on the codec, chunks or HDF5.
  * Where a coding depends on the chunks (vertex indices in faces), rows are recoded as in a file
  * without subtrees. The part `attributes` has a separate checksum of its values, so the content
- * checksum is the same with and without it. Source: format-spec/README.md, section 8. */
+ * checksum is the same with and without it. Source: format-spec/checksums.md. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -3,7 +3,7 @@
  * and reading loop over these rows, so that both agree on names and types. A reader rejects a newer
  * version and unknown required parts before it reads anything else. Before memory is sized by the
  * attributes, check_ functions test their consistency: ranges, and sums over the levels. Source:
- * format-spec/README.md, section 3. */
+ * format-spec/README.md, section 5. */
 #include <inttypes.h>
 #include <math.h>
 #include <stddef.h>

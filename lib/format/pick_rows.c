@@ -2,7 +2,7 @@
  * runs returns all arrays of the level for these nodes, including lists that counts divide, and
  * checks the values like schema.c checks levels. Rows of the mesh's arrays and of attributes are
  * read in any order, chunk by chunk. Prefetch hints for all chunks are sent first, and each chunk
- * is fetched once. Source: format-spec/README.md, sections 4 and 5. */
+ * is fetched once. Source: format-spec/README.md, sections 6 and 7. */
 #include <stdlib.h>
 #include <string.h>
 

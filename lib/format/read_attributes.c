@@ -1,7 +1,7 @@
 /* Reads attributes of vertices, faces and other elements. Opening a file finds the arrays of
  * /attributes and checks their heads (names, types, ranges, lists of different lengths). Values are
  * read later, as whole arrays, and compared with the checksum of the part. Source:
- * format-spec/README.md, "Attributes". */
+ * format-spec/attributes.md. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

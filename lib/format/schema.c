@@ -3,7 +3,7 @@
  * for the writer, the reader and subsets, so that each array is named once. The second part checks
  * the arrays of a tree from a file (EBPO_E_FORMAT) or from a caller who writes it
  * (EBPO_E_ARGUMENT); each check names the level, the array and the constraint. Source:
- * format-spec/README.md, "Arrays" and "Constraints". */
+ * format-spec/README.md, sections 6 and 9. */
 #include <inttypes.h>
 #include <math.h>
 #include <stddef.h>

@@ -1,5 +1,5 @@
 /* Arrays of a file: the rows of array_table.inc as an enumeration and a table.
- * format-spec/README.md, "Arrays". */
+ * format-spec/README.md, sections 6 and 9. */
 #ifndef EBPO_FORMAT_SCHEMA_H
 #define EBPO_FORMAT_SCHEMA_H
 
@@ -62,7 +62,7 @@ enum {
     EBPO_COLOUR_OF_NOTHING = 0x808080, /* for gray nodes without a known colour */
     EBPO_PATH_BYTES = 48,
     EBPO_COLUMNS_BYTES = 2048, /* of the attribute `columns`, with its end */
-    /* with the part `subtrees` (format-spec/README.md, section 9) */
+    /* with the part `subtrees` (format-spec/subtrees.md) */
     EBPO_FACE_BLOCK = 2048, /* rows of a chunk */
     EBPO_VERTEX_BLOCK = 1024,
     EBPO_SUBTREE_ROWS = 128,
@@ -225,7 +225,7 @@ ebpo_level_summary ebpo_level_summarise(const ebpo_level *level, uint32_t parts)
 ebpo_level ebpo_level_of_summary(const ebpo_info *info, int level);
 
 /* Constraints on a tree from a file or from a caller who writes one: format-spec/README.md,
- * "Constraints". */
+ * sections 6 and 9. */
 
 /* Subject of the check: a file (EBPO_E_FORMAT) or a caller's tree (EBPO_E_ARGUMENT). */
 typedef struct ebpo_check {
@@ -257,7 +257,7 @@ EBPO_MUST_USE ebpo_status ebpo_check_finite(const ebpo_check *check, const ebpo_
                                             ebpo_error *error);
 
 /* The arrays of /attributes in a file: a header, then for each attribute array its values and, for
- * lists of different lengths, their items. format-spec/README.md, "Attributes". */
+ * lists of different lengths, their items. format-spec/attributes.md. */
 
 /* Convert between attribute arrays, their numbers and paths. */
 static inline int ebpo_values_number(uint64_t n) { return 1 + 2 * (int)n; }

@@ -4,7 +4,7 @@
  * nodes of each type before a node. Levels below the roots of subtrees begin at the subtree's row;
  * other levels have an index row for every 4,096 items, from which counting continues. Results are
  * checked against the counts in the head. The last part sends prefetch hints for subtrees. Source:
- * format-spec/README.md, sections 4 and 9. */
+ * format-spec/subtrees.md. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -171,11 +171,16 @@ uint64_t ebpo_subtree_groups(const ebpo_info *info, const ebpo_subtree_row *row,
 /* --- cache of rows: one subtree is requested repeatedly while it is read, and summing a chunk of
  * rows takes longer than the rest of a request --- */
 
-enum { KEPT = 4 /* threads that read at once, typically two */, BY_NUMBER = EBPO_SUBTREE_COLS };
+enum {
+    KEPT = 4 /* threads that read at once, typically two */,
+    FACES_KNOWN = 64,
+    BY_NUMBER = EBPO_SUBTREE_COLS
+};
 
 struct ebpo_kept_rows {
     ebpo_subtree_row row[KEPT];
     unsigned count, next;
+    uint64_t faces_known[FACES_KNOWN]; /* numbers of subtrees, plus 1 */
 };
 
 static bool row_holds(const ebpo_subtree_row *row, unsigned column, uint64_t item)
@@ -214,6 +219,22 @@ static ebpo_status keep_row(ebpo_chunks *chunks, const ebpo_subtree_row *row, eb
     }
     pthread_mutex_unlock(&chunks->lock);
     return EBPO_OK;
+}
+
+bool ebpo_subtree_faces_known(ebpo_chunks *chunks, uint64_t subtree)
+{
+    pthread_mutex_lock(&chunks->lock);
+    bool known = chunks->rows && chunks->rows->faces_known[subtree % FACES_KNOWN] == subtree + 1;
+    pthread_mutex_unlock(&chunks->lock);
+    return known;
+}
+
+void ebpo_subtree_faces_note(ebpo_chunks *chunks, uint64_t subtree)
+{
+    pthread_mutex_lock(&chunks->lock);
+    if (chunks->rows)
+        chunks->rows->faces_known[subtree % FACES_KNOWN] = subtree + 1;
+    pthread_mutex_unlock(&chunks->lock);
 }
 
 ebpo_status ebpo_subtree_table_row(ebpo_chunks *chunks, uint64_t subtree, ebpo_subtree_row *out,

@@ -1,5 +1,5 @@
 /* Locates subtrees, groups, planes and faces in every array. Results are consistent with the counts
- * in the head. Any thread. format-spec/README.md, sections 4 and 9. */
+ * in the head. Any thread. format-spec/subtrees.md. */
 #ifndef EBPO_FORMAT_SUBTREE_INDEX_H
 #define EBPO_FORMAT_SUBTREE_INDEX_H
 
@@ -27,6 +27,10 @@ EBPO_MUST_USE ebpo_status ebpo_subtree_table_row(ebpo_chunks *chunks, uint64_t s
 EBPO_MUST_USE ebpo_status ebpo_subtree_table_find(ebpo_chunks *chunks, unsigned column,
                                                   uint64_t item, ebpo_subtree_row *out,
                                                   ebpo_error *error);
+
+/* Remember that the faces of a subtree were checked (subtree_faces.h); some are forgotten. */
+bool ebpo_subtree_faces_known(ebpo_chunks *chunks, uint64_t subtree);
+void ebpo_subtree_faces_note(ebpo_chunks *chunks, uint64_t subtree);
 
 /* Returns the groups of a level before or after the row's subtree. */
 uint64_t ebpo_subtree_groups(const ebpo_info *info, const ebpo_subtree_row *row, int level,

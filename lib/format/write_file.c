@@ -4,7 +4,7 @@
  * chunk_layout.c: first those of the top levels, which looking up a subtree needs, then all others.
  * The lists of chunk offsets and chunk checksums are the last chunks. Content checksums are
  * computed meanwhile. ebpo_file_repack reads a file and writes it again with other options. Source:
- * format-spec/README.md, sections 2, 9 and 20. */
+ * format-spec/hdf5-messages.md, section 1; subtrees.md. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -4,7 +4,7 @@
  * new codec needs a number in chunk.h, a row, and its functions in a separate file, as
  * zstd_codec.c. Deflate needs only two calls of zlib, which are in this file. The output is bit for
  * bit that of libhdf5's own filters. Source: docs of HDF5 ("HDF5 filters"), format-spec/README.md,
- * section 2. */
+ * section 4. */
 #include <string.h>
 #include <zlib.h>
 

@@ -1,7 +1,7 @@
 /* Opens the head of an untrusted file, and finds objects by their paths: reads the superblock, and
  * follows links by name from the root group. Features that HDF5 allows and this format does not are
  * rejected with a specific message. Source: HDF5 File Format Specification 3.0, sections II.A and
- * IV.A.2.g; format-spec/README.md, section 2. */
+ * IV.A.2.g; format-spec/hdf5-messages.md. */
 #include <stdlib.h>
 #include <string.h>
 

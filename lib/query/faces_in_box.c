@@ -193,7 +193,7 @@ static bool touches_cell(const ebpo_box *box, const ebpo_node *node, const doubl
 }
 
 /* Finds the first accel, depth first, whose cell the face touches. Accels list the faces that touch
- * their cells, and some that only come near them (format-spec, section 5). A face is taken in this
+ * their cells, and some that only come near them (format-spec, section 7). A face is taken in this
  * first accel, so no list of visited faces is needed. */
 static bool find_first(const box_walk *w, const ebpo_box *box, ebpo_node node,
                        const double triangle[3][3], uint32_t *entry)

@@ -1,4 +1,4 @@
-/* Verifies how the file stores its chunks (format-spec/README.md, sections 7 and 20).
+/* Verifies how the file stores its chunks (format-spec/gates.md, checksums.md).
  *
  * - Chunks of faces with the coding `gates` are decoded by a second reader, which follows the
  *   specification line by line without regard to speed, and compared with the library's result.
@@ -325,13 +325,8 @@ static void compare_row(places_comparison *c, uint64_t row, uint64_t at, uint32_
     ebpo_tally *tally = c->tally;
     uint32_t number = (uint32_t)(c->list[row] >> 32);
     indexed *of = find_indexed(c, number);
-    if (!of) {
-        CHECK(number >= 4096,
-              "/subtrees/chunk_directory, row %" PRIu64 ": number %" PRIu32
-              " is of an array that is not in the file",
-              row, number);
+    if (!of) /* a gap, or an array that is not called for */
         return;
-    }
     if (!CHECK(of->listed < of->count,
                "/subtrees/chunk_directory, row %" PRIu64 ": %s has only %" PRIu64 " chunks", row,
                of->array->path, of->count))

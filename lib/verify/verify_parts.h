@@ -15,7 +15,7 @@
 EBPO_MUST_USE ebpo_status ebpo_verify_tree(ebpo_tally *tally, const ebpo_tree *tree,
                                            const ebpo_verify_options *options, ebpo_error *error);
 
-/* --- verify_chunks.c: a second reader of the coding gates (format-spec/README.md, section 7) ---
+/* --- verify_chunks.c: a second reader of the coding gates (format-spec/gates.md) ---
  */
 
 /* Decodes a chunk of `rows` faces of 13 bytes each; rows > 0. On entry `seen` is the number of

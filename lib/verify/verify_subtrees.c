@@ -1,8 +1,8 @@
-/* Verifies the table of subtrees (format-spec/README.md, section 9) by recounting it: one visit of
+/* Verifies the table of subtrees (format-spec/subtrees.md) by recounting it: one visit of
  * the whole tree, leaf by leaf in the order of the faces.
  *
- * Every column of every row is recomputed: ranks, faces, vertices, and the blocks of shared faces
- * and vertices that are stored with other subtrees, where exactly the needed ones must be listed.
+ * Every column of every row is recomputed but the numbers of shared chunks: what
+ * /subtrees/shared_chunks names is a hint. Their sums must match its rows.
  * Writer and reader proceed level by level; only the reading of arrays is shared with them. */
 #include "verify/verify_parts.h"
 
@@ -36,72 +36,25 @@ enum {
     OF_A_LEVEL,
     MAX_COLS = FIRST_LEVEL + OF_A_LEVEL * EBPO_LEVELS_MAX
 };
-enum { ROWS_OF_FACES = 2048, ROWS_OF_VERTICES = 1024, SUBTREES_A_TIME = 128 };
+enum { SUBTREES_A_TIME = 128 };
 static const char *const names[] = { "faces before", "faces",           "vertices before",
                                      "vertices",     "blocks of faces", "blocks of vertices" };
 static const char *const level_names[] = { "gray nodes",  "leaves",     "black nodes",   "planes",
                                            "leaf planes", "references", "the faces' end" };
-
-/* Numbers in order of appearance. */
-typedef struct numbers {
-    uint32_t *at;
-    uint64_t count, capacity;
-    uint64_t different; /* count at the last sort */
-} numbers;
 
 typedef struct recount {
     ebpo_tally *tally;
     const ebpo_reference_tree *view;
     int level; /* level of the subtrees' roots */
     unsigned cols, rows_of_chunk;
-    const uint32_t *counts, *outer;
+    const uint32_t *counts;
     const uint64_t *index;
     uint64_t subtrees, shared_rows;
     /* counts so far */
-    uint64_t subtree, faces, vertices, outer_done, end[EBPO_LEVELS_MAX];
+    uint64_t subtree, faces, vertices, shared_done, end[EBPO_LEVELS_MAX];
     uint64_t sum[MAX_COLS], row[MAX_COLS];
     bool within; /* within a subtree */
-    numbers shared_faces;
-    bool no_memory;
 } recount;
-
-static bool add_number(ebpo_workspace *workspace, numbers *list, uint32_t number)
-{
-    if (list->count && list->at[list->count - 1] == number)
-        return true;
-    if (!ebpo_array_grow_late(workspace, &list->at, &list->capacity, list->count + 1,
-                              sizeof *list->at))
-        return false;
-    list->at[list->count++] = number;
-    return true;
-}
-
-static int compare_numbers(const void *a, const void *b)
-{
-    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
-    return (x > y) - (x < y);
-}
-
-static void sort_once(numbers *list)
-{
-    uint64_t kept = 0;
-    if (list->count)
-        qsort(list->at, list->count, sizeof *list->at, compare_numbers);
-    for (uint64_t i = 0; i < list->count; i++)
-        if (!kept || list->at[kept - 1] != list->at[i])
-            list->at[kept++] = list->at[i];
-    list->count = kept;
-}
-
-/* Adds numbers that recur often, without keeping each occurrence. */
-static bool add_block(numbers *list, uint32_t block)
-{
-    if (list->count >= 2 * list->different + 4096) {
-        sort_once(list);
-        list->different = list->count;
-    }
-    return add_number(NULL, list, block);
-}
 
 static const char *column_name(const recount *c, unsigned column, int *level)
 {
@@ -113,71 +66,20 @@ static const char *column_name(const recount *c, unsigned column, int *level)
 
 /* --- comparing a complete subtree with its row --- */
 
-/* Compares the distances that must be listed with the stored ones. */
-static void compare_shared(recount *c, const char *what, uint64_t from, const numbers *needed,
-                           unsigned column)
-{
-    ebpo_tally *tally = c->tally;
-    uint64_t first = c->outer_done, i = 0;
-    for (; i < needed->count; i++)
-        if (first + i >= c->shared_rows || c->outer[first + i] > from ||
-            from - c->outer[first + i] != needed->at[needed->count - 1 - i])
-            break;
-    if (i < needed->count)
-        CHECK(false,
-              "/subtrees/shared_chunks, subtree %" PRIu64 ": needs block %" PRIu32
-              " of %s, which is not the next entry of the list",
-              c->subtree, needed->at[needed->count - 1 - i], what);
-    else
-        CHECK(true, "%s", "");
-    c->row[column] = needed->count;
-    c->outer_done += needed->count;
-}
-
-static void note_vertices(recount *c, numbers *blocks, uint64_t face, uint64_t first_vertex)
-{
-    for (int k = 0; k < 3; k++) {
-        uint32_t vertex = c->view->tree->mesh.faces[3 * face + (uint64_t)k];
-        if (vertex < first_vertex && !add_block(blocks, vertex / ROWS_OF_VERTICES))
-            c->no_memory = true;
-    }
-}
-
-static void check_shared(recount *c)
-{
-    numbers faces = { 0 }, vertices = { 0 };
-    uint64_t first_face = c->faces - c->row[FACES], first_vertex = c->vertices - c->row[VERTICES];
-    EBPO_FOR_ITEMS_SCATTERED(c->view->workspace, i, 0, c->shared_faces.count)
-        if (c->shared_faces.at[i] < first_face) {
-            if (!add_block(&faces, c->shared_faces.at[i] / ROWS_OF_FACES))
-                c->no_memory = true;
-            note_vertices(c, &vertices, c->shared_faces.at[i], first_vertex);
-        }
-    EBPO_FOR_ITEMS(c->view->workspace, face, first_face, c->faces)
-        note_vertices(c, &vertices, face, first_vertex);
-    sort_once(&faces);
-    sort_once(&vertices);
-    compare_shared(c, "/mesh/faces", first_face / ROWS_OF_FACES, &faces, SHARED_FACES);
-    compare_shared(c, "/mesh/vertices", first_vertex / ROWS_OF_VERTICES, &vertices,
-                   SHARED_VERTICES);
-    free(faces.at);
-    free(vertices.at);
-    c->shared_faces.count = 0;
-}
-
 static void check_row(recount *c)
 {
     ebpo_tally *tally = c->tally;
     const uint32_t *stated = c->counts + c->subtree * c->cols;
     int level;
-    if (c->view->has_mesh)
-        check_shared(c);
+    c->row[SHARED_FACES] = stated[SHARED_FACES]; /* a hint, as what the list names */
+    c->row[SHARED_VERTICES] = stated[SHARED_VERTICES];
+    c->shared_done += c->row[SHARED_FACES] + c->row[SHARED_VERTICES];
     for (unsigned k = 0; k < c->cols; k++) {
         const char *name = column_name(c, k, &level);
         if (c->subtree % c->rows_of_chunk == 0)
             CHECK(c->index[c->subtree / c->rows_of_chunk * c->cols + k] == c->sum[k],
                   "/subtrees/index, before subtree %" PRIu64 ", column %u (%s): states %" PRIu64
-                  ", there are %" PRIu64,
+                  ", and /subtrees/counts should add up to %" PRIu64,
                   c->subtree, k, name, c->index[c->subtree / c->rows_of_chunk * c->cols + k],
                   c->sum[k]);
         CHECK(stated[k] == c->row[k],
@@ -216,11 +118,8 @@ static void see_leaf(recount *c, const ebpo_reference_node *leaf, uint64_t *row)
     if (!c->view->has_mesh)
         return;
     if (c->within) {
-        const uint32_t *face = ebpo_reference_refs(c->view, leaf, &references);
+        (void)ebpo_reference_refs(c->view, leaf, &references);
         uint64_t end = level->leaf_first[leaf->rank] + level->leaf_new[leaf->rank];
-        EBPO_FOR_ITEMS(c->view->workspace, i, 0, references)
-            if (!add_number(c->view->workspace, &c->shared_faces, face[i]))
-                c->no_memory = true;
         row[REFERENCES] += references;
         row[END] += end - c->end[leaf->cell.level];
         c->end[leaf->cell.level] = end;
@@ -267,17 +166,14 @@ static void see_node(recount *c, const ebpo_reference_node *node)
         see_children(c, node);
 }
 
-static ebpo_status recount_table(recount *c, ebpo_error *error)
+static void recount_table(recount *c)
 {
     ebpo_tally *tally = c->tally;
     ebpo_reference_node root = ebpo_reference_root(c->view);
     see_node(c, &root);
-    CHECK(c->outer_done == c->shared_rows,
-          "/subtrees/shared_chunks has %" PRIu64 " rows, but %" PRIu64 " blocks are needed",
-          c->shared_rows, c->outer_done);
-    ebpo_array_free(c->view->workspace, c->shared_faces.at);
-    return c->no_memory ? ebpo_workspace_fail_while(c->view->workspace, "counting subtrees", error)
-                        : EBPO_OK;
+    CHECK(c->shared_done == c->shared_rows,
+          "/subtrees/counts counts %" PRIu64 " rows of /subtrees/shared_chunks, which has %" PRIu64,
+          c->shared_done, c->shared_rows);
 }
 
 ebpo_status ebpo_check_subtrees(ebpo_tally *tally, const ebpo_file *file,
@@ -302,13 +198,9 @@ ebpo_status ebpo_check_subtrees(ebpo_tally *tally, const ebpo_file *file,
         status = ebpo_reader_make(file, EBPO_A_SUBTREE_INDEX, 0, &read, sizeof *c.index,
                                   (void *)&c.index, &own);
     if (status == EBPO_OK)
-        status = ebpo_reader_make(file, EBPO_A_SUBTREE_SHARED, 0, &read, sizeof *c.outer,
-                                  (void *)&c.outer, &own);
-    if (status == EBPO_OK)
-        status = recount_table(&c, &own);
+        recount_table(&c);
     ebpo_array_free(read.workspace, (void *)(uintptr_t)c.counts);
     ebpo_array_free(read.workspace, (void *)(uintptr_t)c.index);
-    ebpo_array_free(read.workspace, (void *)(uintptr_t)c.outer);
     if (status != EBPO_E_FORMAT)
         return status == EBPO_OK ? EBPO_OK : ebpo_fail_with(error, &own);
     CHECK(false, "%s", own.message);

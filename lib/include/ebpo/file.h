@@ -68,7 +68,7 @@ typedef enum ebpo_codec {
     EBPO_CODEC_NONE = 2
 } ebpo_codec;
 
-/* Coding of the vertex indices of faces (format-spec/README.md, section 7). */
+/* Coding of the vertex indices of faces (format-spec/README.md, section 9). */
 typedef enum ebpo_face_coding {
     /* When copying a file: its coding, except for EBPO_CODEC_NONE. Else EBPO_FACES_HIGH_WATER. */
     EBPO_FACES_DEFAULT = 0,
@@ -356,7 +356,7 @@ EBPO_API void ebpo_tree_free(ebpo_tree *tree);
 
 /*
  * Chunk checksums: a list that repeats the checksum at the end of each chunk
- * (format-spec/README.md, section 20). With this list, readers detect a chunk that was exchanged
+ * (format-spec/checksums.md). With this list, readers detect a chunk that was exchanged
  * with another chunk or with another version of the chunk.
  */
 typedef enum ebpo_chunk_checksums {

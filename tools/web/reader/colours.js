@@ -1,4 +1,4 @@
-// Finds the colour attributes of a file and converts them to bytes: format-spec/README.md, section 18.
+// Finds the colour attributes of a file and converts them to bytes: format-spec/attributes.md.
 import { formatError } from './error.js';
 
 const CHANNELS = [['red', 'green', 'blue'], ['diffuse_red', 'diffuse_green', 'diffuse_blue']];

@@ -1,4 +1,4 @@
-// Decodes faces across edges (coding `gates`, format-spec/README.md, section 7): converts a chunk's streams to high-water codes.
+// Decodes faces across edges (coding `gates`, format-spec/gates.md): converts a chunk's streams to high-water codes.
 
 export const GATES_COLS = 13;
 const OPEN_MOST = 64, NEAR = 32, LOW_END = 224, LONG = 240;

@@ -1,6 +1,6 @@
-// Reads the chunk directory of files with subtrees: format-spec/README.md, section 9, "Places".
+// Reads the chunk directory of files with subtrees: format-spec/subtrees.md, section 3.
 import { formatError } from './error.js';
-import { LEVELS_MAX, LEVEL_ARRAY_COUNT, PLACES } from './facts.js';
+import { PLACES } from './facts.js';
 
 /** Returns the number of an array in the directory. `order`: the array's index in its level. */
 export function placeNumber(path, level, order) {
@@ -14,19 +14,21 @@ const ROOT_NUMBERS = { '/mesh/vertices': 4096, '/mesh/faces': 4097, '/mesh/faces
 
 const WHERE = PLACES;
 
-// Returns true when an array with this number may be in the directory. Other numbers are gaps or belong to later versions.
-function isArray(number) {
-  return number < 64 * LEVELS_MAX ? number % 64 < LEVEL_ARRAY_COUNT : number < ROOT_NUMBERS[WHERE] && Object.values(ROOT_NUMBERS).includes(number);
+function stated(attributes, name) {
+  const a = attributes?.get(name);
+  return a?.type?.class === 'integer' && a.type.size === 8 && !a.type.signed && a.type.little && a.data.length >= 8
+    ? Number(new DataView(a.data.buffer, a.data.byteOffset, 8).getBigUint64(0, true)) : undefined;
+}
+
+/** Returns true when an object states the size of the file: only then is it a list about all chunks, whatever else it is. */
+export function statesSize(hdf5, address, path, size) {
+  return address !== undefined && stated(hdf5.object(address, path).attributes, 'file_bytes') === size;
 }
 
 /** Returns true when a list about all chunks is still valid. Other programs that rewrite the file keep the old list. */
 export function placesHold(places, size) {
-  const { attributes } = places.object, stated = (name) => {
-    const a = attributes.get(name);
-    return a?.type?.class === 'integer' && a.type.size === 8 && !a.type.signed && a.type.little && a.data.length >= 8
-      ? Number(new DataView(a.data.buffer, a.data.byteOffset, 8).getBigUint64(0, true)) : undefined;
-  };
-  return stated('file_bytes') === size && places.chunks !== undefined && stated('offset') === places.chunks[0].at;
+  const { attributes } = places.object;
+  return stated(attributes, 'file_bytes') === size && places.chunks !== undefined && stated(attributes, 'offset') === places.chunks[0].at;
 }
 
 // The offset of the directory: the header of an array with a single chunk has it.
@@ -61,8 +63,6 @@ export function readPlaces(rows, arrays, size) {
         throw formatError(WHERE, `a chunk of ${array.path} has a size that it cannot have`);
       chunks.push({ at, bytes });
     }
-    if (!array && isArray(rows[i + 1]))
-      throw formatError(WHERE, 'it has a chunk of an array that the file does not have');
     at += bytes;
   }
   for (const [array, chunks] of out) {

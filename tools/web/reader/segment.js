@@ -25,7 +25,7 @@ const NONE = new Uint32Array(0);
 
 export class Segment {
   /**
-   * Groups from `group` on, with the arrays of format-spec, section 4, from there on. `first`: ranks of the first white, black, leaf, gray node.
+   * Groups from `group` on, with the arrays of format-spec, section 6, from there on. `first`: ranks of the first white, black, leaf, gray node.
    * Planes and colours are undefined where they were not read.
    */
   constructor({ level, group = 0, first = [0, 0, 0, 0], types, planeCounts, planes, leafPlaneCounts, leafPlanes, leafWinding, blackWinding, whiteWinding, grayColours }) {

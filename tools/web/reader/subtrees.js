@@ -1,4 +1,4 @@
-// Reads the table of subtrees: the counts and the first rows of each subtree in every array. format-spec/README.md, section 9, "The table".
+// Reads the table of subtrees: the counts and the first rows of each subtree in every array. format-spec/subtrees.md, section 1.
 import { formatError } from './error.js';
 import { FIXED_ROWS, subtreeCols } from './facts.js';
 

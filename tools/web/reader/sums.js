@@ -1,4 +1,4 @@
-// Reads the chunk checksums, an optional list that detects swapped chunks: format-spec/README.md, section 20.
+// Reads the chunk checksums, an optional list that detects swapped chunks: format-spec/checksums.md, section 3.
 import { formatError } from './error.js';
 
 const WHERE = '/chunk_checksums';
