@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A second reader of .ebpo.h5 files, laid out like README.md: h5py and numpy only, none of the library's code.
+"""A second reader of .ebpo.h5 files, for README.md and the annexes: h5py and numpy only, none of the library's code.
 
     read_ebpo.py FILE [EXPECTED.json]
     read_ebpo.py --vectors FOLDER
@@ -173,7 +173,7 @@ def leaf_refs(level, first):
 
 
 def arrays(file):
-    """README.md, "Arrays": {path: dataset}, of those that the head calls for; what else stands there is ignored."""
+    """README.md, sections 6 and 9: {path: dataset}, of those that the head calls for; what else stands there is ignored."""
     listed_parts = parts_of(file)
     mesh, planes, leaf_planes, colours = (part in listed_parts for part in ("mesh", "planes", "leaf-planes", "colours"))
     out, groups, attrs = {}, 1, file.attrs
@@ -196,7 +196,8 @@ def arrays(file):
     names = ["/mesh/vertices", "/mesh/faces"] + ["/mesh/faces_index"] * several if mesh else []
     names += ["/maps/vertex_source", "/maps/face_source"] if "maps" in listed_parts else []
     if "subtrees" in listed_parts:
-        names += ["/subtrees/index", "/subtrees/counts", "/subtrees/places"] + ["/subtrees/outer"] * ("outer" in file["/subtrees"])
+        names += ["/subtrees/index", "/subtrees/counts", "/subtrees/chunk_directory"]
+        names += ["/subtrees/shared_chunks"] * ("shared_chunks" in file["/subtrees"])
     out.update({name: file[name] for name in names})
     return out
 
@@ -212,7 +213,7 @@ CODINGS = {"leaf_skip": ("skips", "delta"), "leaf_refs": ("gap",), "mesh/vertice
 
 
 def check_codings(file):
-    """README.md, "Codings": each array names the one that it has. `delta` at leaf_skip is of older files."""
+    """README.md, section 9: each array names the one that it has. `delta` at leaf_skip is of older files."""
     gates = "gates" in parts_of(file)
     for path, item in arrays(file).items():
         wanted = path.split("/")[-1] if path.startswith("/levels/") else path[1:]
@@ -244,7 +245,7 @@ def as_without_subtrees(name, dataset):
 
 
 def content_sha256(file, of_colours=False):
-    """README.md, "Content checksum". `of_colours`: colours_sha256."""
+    """checksums.md, section 1. `of_colours`: colours_sha256."""
     total, subtrees = hashlib.sha256(), "subtrees" in parts_of(file)
     for name, dataset in sorted(arrays(file).items()):
         if name.startswith("/subtrees/") or name.endswith("/gray_colours") != of_colours:
@@ -257,7 +258,7 @@ def content_sha256(file, of_colours=False):
 
 
 def check_subtrees(file):
-    """README.md, "Subtrees": the table adds up to what the tree has, and the list to the file."""
+    """subtrees.md: the table adds up to what the tree has, and the list to the file."""
     counts, index = (file[f"/subtrees/{name}"] for name in ("counts", "index"))
     rows, sums = counts.chunks[0], np.cumsum(counts[...].astype("u8"), axis=0)
     assert (index[1:] == sums[rows - 1:(len(index) - 1) * rows:rows]).all() and not index[0].any()
@@ -308,7 +309,7 @@ def check_faces_of_subtrees(file, counts, sums, firsts, refs):
         return
     corners = faces(file["/mesh/faces"]).reshape(-1, 3).astype("i8")
     before = (sums - counts).astype("i8")
-    outer = file["/subtrees/outer"][...] if "outer" in file["/subtrees"] else np.zeros(0, "u4")
+    outer = file["/subtrees/shared_chunks"][...] if "shared_chunks" in file["/subtrees"] else np.zeros(0, "u4")
     for i, row in enumerate(counts.astype("i8")):
         first, vertex = (before[i, k] + before[i, k + 1] + row[k] for k in (0, 2))
         own, older = corners[first:first + row[1]], refs[i][refs[i] < first]
@@ -327,11 +328,11 @@ LEVEL_NAMES = ["types", "plane_counts", "planes", "leaf_winding", "black_winding
                "leaf_index", "leaf_plane_counts", "leaf_planes", "gray_colours"]
 ROOT_PATHS = {4096: "/mesh/vertices", 4097: "/mesh/faces", 4098: "/mesh/faces_index",
               4099: "/maps/vertex_source", 4100: "/maps/face_source", 4112: "/subtrees/index",
-              4113: "/subtrees/counts", 4114: "/subtrees/outer"}
+              4113: "/subtrees/counts", 4114: "/subtrees/shared_chunks"}
 
 
 def path_of(number):
-    """README.md, "Places": the array that a number stands for; None: a gap, or not one of sections 4 and 9."""
+    """subtrees.md, section 3: the array that a number stands for; None: a gap, or not one of sections 6 and 9, or of annex C."""
     level, name = divmod(number, 64)
     if level < 64:
         return f"/levels/{level:02d}/{LEVEL_NAMES[name]}" if name < len(LEVEL_NAMES) else None
@@ -340,8 +341,10 @@ def path_of(number):
 
 def holds(file, path):
     """Whether a list about all chunks is true: other programs that write the file anew leave it as it was."""
-    own, stated = file[path].id.get_chunk_info(0), {k: one(v) for k, v in file[path].attrs.items() if k in ("file_bytes", "offset")}
-    return stated == {"file_bytes": pathlib.Path(file.filename).stat().st_size, "offset": own.byte_offset}
+    stated = {k: one(v) for k, v in file[path].attrs.items() if k in ("file_bytes", "offset")}
+    if stated.get("file_bytes") != pathlib.Path(file.filename).stat().st_size:
+        return False
+    return stated.get("offset") == file[path].id.get_chunk_info(0).byte_offset
 
 
 def literals_bytes(block):
@@ -376,7 +379,7 @@ def check_frame(frame, path):
 
 
 def check_frames(file):
-    """README.md, "HDF5": the frames of a file whose pipeline is zstd."""
+    """README.md, section 4: the frames of a file whose pipeline is zstd."""
     for path, dataset in arrays(file).items():
         pipeline = dataset.id.get_create_plist()
         if any(pipeline.get_filter(i)[0] == 32015 for i in range(pipeline.get_nfilters())):
@@ -385,15 +388,15 @@ def check_frames(file):
 
 
 def check_sums(file):
-    """README.md, "Sums of chunks": each chunk of the arrays that the head calls for ends as the list says."""
-    if "chunk_sums" not in file or not holds(file, "/chunk_sums"):
+    """checksums.md, section 3: each chunk of the arrays that the head calls for ends as the list says."""
+    if "chunk_checksums" not in file or not holds(file, "/chunk_checksums"):
         return
-    numbers, sums = np.divmod(file["/chunk_sums"][...], np.uint64(1 << 32))
-    assert (numbers[:-1] <= numbers[1:]).all(), "chunk_sums: not in order"
+    numbers, sums = np.divmod(file["/chunk_checksums"][...], np.uint64(1 << 32))
+    assert (numbers[:-1] <= numbers[1:]).all(), "chunk_checksums: not in order"
     listed_paths = {path_of(int(number)): int(number) for number in np.unique(numbers)}
     stored = pathlib.Path(file.filename).read_bytes()
     for path, dataset in arrays(file).items():
-        if path != "/subtrees/places":
+        if path != "/subtrees/chunk_directory":
             chunks = [dataset.id.get_chunk_info(i) for i in range(dataset.id.get_num_chunks())]
             ends = [int.from_bytes(stored[c.byte_offset:c.byte_offset + c.size][-4:], "little") for c in chunks]
             assert ends == sums[numbers == listed_paths[path]].tolist(), f"{path}: another chunk's bytes"
@@ -401,10 +404,9 @@ def check_sums(file):
 
 def check_places(file):
     """The list of chunks leads to where HDF5 says that they are; it is ignored where its attributes are not true."""
-    own = file["/subtrees/places"].id.get_chunk_info(0)
-    if not holds(file, "/subtrees/places"):
+    if not holds(file, "/subtrees/chunk_directory"):
         return
-    places, seen = file["/subtrees/places"], {}
+    places, seen = file["/subtrees/chunk_directory"], {}
     at = file["/levels/00/types"].id.get_chunk_info(0).byte_offset
     for place in places[...]:
         number, size = divmod(int(place), 1 << 32)
@@ -415,13 +417,12 @@ def check_places(file):
             seen[path] += 1
         at += int(size)
     assert all(count == file[path].id.get_num_chunks() for path, count in seen.items())
-    assert own.byte_offset + own.size == pathlib.Path(file.filename).stat().st_size
 
 
 def attribute_values(dataset, kind):
-    """README.md, "Attributes": rows of values, by the array's coding. `kind`: a type of numpy."""
+    """attributes.md: rows of values, by the array's coding. `kind`: a type of numpy."""
     code, word = dataset.dtype, text(dataset.attrs["coding"])
-    assert word in ("plain", "columns") and code.itemsize == np.dtype(kind).itemsize, dataset.name
+    assert word in ("plain", "column-delta") and code.itemsize == np.dtype(kind).itemsize, dataset.name
     if word == "plain":
         return dataset[...].view(kind)
     parts = []
@@ -439,7 +440,7 @@ ATTRIBUTE_TYPES = {"int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "
 
 
 def read_attributes(file):
-    """README.md, "Attributes": the part as vectors' .attributes.json have it, if its checksum is right."""
+    """attributes.md: the part as vectors' .attributes.json have it, if its checksum is right."""
     group, digests, out, images = file["/attributes"], {}, [], {}
 
     def digest(path, values):
@@ -449,10 +450,11 @@ def read_attributes(file):
     for number in range(int(group.attrs["arrays"])):
         path = f"/attributes/{number:03d}"
         array, kind = file[path], ATTRIBUTE_TYPES[text(file[path].attrs["type"])]
-        one = {name: text(array.attrs[name]) for name in ("element", "names", "type")}
+        one = {name: text(array.attrs[attribute]) for name, attribute in
+               (("element", "element"), ("names", "columns"), ("type", "type"))}
         one["list"] = text(array.attrs["list"]) if "list" in array.attrs else None
         assert one["list"] is None or one["list"] in list(ATTRIBUTE_TYPES)[:6]
-        different = one["list"] is not None and array.attrs["different"] == 1
+        different = one["list"] is not None and array.attrs["lengths_differ"] == 1
         values = digest(path, attribute_values(array, "u8" if different else kind))
         one["rows"], one["ends"] = len(values), listed(values) if different else None
         if different:
@@ -480,14 +482,14 @@ def read_attributes(file):
 
 
 def colours_of(file, element):
-    """README.md, "Names": red, green and blue of vertices or faces as bytes; None: they have none."""
+    """attributes.md, section 4: red, green and blue of vertices or faces as bytes; None: they have none."""
     found = {}
     for number in range(int(file["/attributes"].attrs["arrays"])):
         array = file[f"/attributes/{number:03d}"]
         if text(array.attrs["element"]) == element and "list" not in array.attrs:
             kind = text(array.attrs["type"])
             values = attribute_values(array, ATTRIBUTE_TYPES[kind]).reshape(len(array), -1)
-            for column, name in enumerate(text(array.attrs["names"]).split(" ")):
+            for column, name in enumerate(text(array.attrs["columns"]).split(" ")):
                 full = {"uint16": 65535, "float32": 1, "float64": 1}.get(kind, 255)
                 found.setdefault(name, values[:, column].astype("f8") / full * 255)
     for names in (["red", "green", "blue"], ["diffuse_red", "diffuse_green", "diffuse_blue"]):
@@ -498,7 +500,7 @@ def colours_of(file, element):
 
 
 def face_sums(file):
-    """README.md, "Colours of envelopes": of each face weight times thrice the colour, and thrice the weight; None: no colours."""
+    """colours.md: of each face weight times thrice the colour, and thrice the weight; None: no colours."""
     of_vertex, of_face = colours_of(file, "vertex"), colours_of(file, "face")
     if of_vertex is None and of_face is None:
         return None
@@ -605,7 +607,7 @@ def check_pruned(file, subset):
 
 
 def plane_of(code):
-    """README.md, "Envelopes": the half-space n . xi <= d / 4096 of a code."""
+    """README.md, section 8: the half-space n . xi <= d / 4096 of a code."""
     u, v, q = (code & 1023) - 511, (code >> 10 & 1023) - 511, code >> 20
     n = [u, v, 511 - abs(u) - abs(v)]
     if n[2] < 0:

@@ -52,7 +52,7 @@ ebpo_status ebpo_build_number(ebpo_builder *b, ebpo_branch *s, ebpo_error *error
 /* Puts the mesh into its final order. */
 ebpo_status ebpo_build_mesh(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, ebpo_error *error);
 
-/* --- gray_colours.c (format-spec/README.md, section 19) --- */
+/* --- gray_colours.c (format-spec/colours.md) --- */
 
 /* Computes colours for a tree with levels, mesh and coloured attributes. Returns EBPO_E_MEMORY,
  * EBPO_E_IO, EBPO_E_CANCELLED. */

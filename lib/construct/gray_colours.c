@@ -1,5 +1,5 @@
 /* Computes the colours of gray nodes: the mean, by area, of the colours of the faces below
- * (format-spec/README.md, section 19).
+ * (format-spec/colours.md).
  *
  * Levels go from the deepest up: a group of eight gives the sums of the gray node above it. No
  * data is kept for each face: the weight of a face is computed again for each leaf that lists the

@@ -36,7 +36,7 @@ double ebpo_cell_frame_model_length(const ebpo_cell_frame *f, double length);
  * distance is in the frame's unit. */
 double ebpo_cell_frame_apart(const ebpo_cell_frame *f, const double a[3], const double b[3]);
 
-/* A face that touches a cell, perhaps up to a rounding error (format-spec, section 5), is at most
+/* A face that touches a cell, perhaps up to a rounding error (format-spec, section 7), is at most
  * this far from every point of the cell. The cell is `levels` below the frame's cell. */
 double ebpo_cell_frame_diagonal(const ebpo_cell_frame *f, int levels);
 

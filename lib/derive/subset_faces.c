@@ -3,7 +3,7 @@
  * leaves. The arrays that map old numbers to new ones have an entry for each face or vertex of the
  * original file. For a small subset these arrays take little memory: pages that are never written
  * take no memory, and faces that are close in space have close numbers. Source:
- * format-spec/README.md, section 5. */
+ * format-spec/README.md, section 7. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>

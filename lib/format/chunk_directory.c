@@ -1,11 +1,11 @@
 /* Manages the chunk directory: the offset, the stored size and the checksum of every chunk of an
- * open file. Offsets are read from the file's list of all chunks (/subtrees/places), or from HDF5's
- * index of each array. The list and the indexes may be long or remote. They are therefore read only
- * when needed, and only once, under the file's lock. The checksums (/chunk_sums) detect an intact
- * chunk that belongs to another position or another version of the file. Each of the two lists is a
- * single chunk, however long, so they have a separate encoder and decoder. The sum of stored sizes
- * is checked against the size of the file before chunks are decoded. Source: format-spec/README.md,
- * sections 9 and 20. */
+ * open file. Offsets are read from the file's list of all chunks (/subtrees/chunk_directory), or
+ * from HDF5's index of each array. The list and the indexes may be long or remote. They are
+ * therefore read only when needed, and only once, under the file's lock. The checksums
+ * (/chunk_checksums) detect an intact chunk that belongs to another position or another version of
+ * the file. Each of the two lists is a single chunk, however long, so they have a separate encoder
+ * and decoder. The sum of stored sizes is checked against the size of the file before chunks are
+ * decoded. Source: format-spec/subtrees.md and checksums.md. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -335,7 +335,7 @@ static ebpo_status locate_by_index(ebpo_file *file, ebpo_error *error)
     return status == EBPO_OK ? ebpo_stored_check(file, error) : status;
 }
 
-/* --- chunk offsets from the list of all chunks (format-spec/README.md, section 9) --- */
+/* --- chunk offsets from the list of all chunks (format-spec/subtrees.md) --- */
 
 /* Number of chunks of each array in the rows read so far. */
 typedef struct listing {
@@ -368,7 +368,9 @@ static ebpo_status list_chunk(listing *l, uint32_t number, ebpo_chunk_location c
                        : id == EBPO_A_ATTRIBUTE ? &l->file->attributes.array[level]
                                                 : &l->file->root_array[id];
     uint64_t *seen = seen_of(l, id, level);
-    if (!a->present || *seen == ebpo_shape_chunks(&a->shape))
+    if (!a->present)
+        return EBPO_OK; /* not called for */
+    if (*seen == ebpo_shape_chunks(&a->shape))
         return list_fails(l->file, "the list has more chunks than", a->path, error);
     if (chunk.bytes == 0 || chunk.bytes > ebpo_reader_chunk_bound(a))
         return list_fails(l->file, "the list has an impossible chunk size for", a->path, error);

@@ -1,5 +1,5 @@
-/* Offset, stored size and checksum of every chunk of an open file. format-spec/README.md, sections
- * 9 and 20. */
+/* Offset, stored size and checksum of every chunk of an open file. format-spec/subtrees.md
+ * and checksums.md. */
 #ifndef EBPO_FORMAT_CHUNK_DIRECTORY_H
 #define EBPO_FORMAT_CHUNK_DIRECTORY_H
 
@@ -33,7 +33,8 @@ static inline ebpo_array_in *ebpo_array_number(ebpo_file *file, int i)
                : &file->attributes.array[i - EBPO_ARRAYS_OF_FORMAT];
 }
 
-/* --- the list of all chunks, /subtrees/places: format-spec/README.md, section 9, "Places" --- */
+/* --- the list of all chunks, /subtrees/chunk_directory: format-spec/subtrees.md, section 3
+ * --- */
 
 /* Array number of a list row that describes bytes between chunks. */
 #define EBPO_PLACE_GAP UINT32_MAX
@@ -83,7 +84,7 @@ EBPO_MUST_USE ebpo_status ebpo_stored_check_expansion(const ebpo_file *file, uin
 
 /* The list /chunk_sums contains the last four bytes of every chunk of a file. The checksum inside a
  * chunk does not identify the chunk. Without the list, a chunk of another position or file version
- * would be accepted. format-spec/README.md, section 20. */
+ * would be accepted. format-spec/checksums.md --- */
 
 /* Returns the list entry of a chunk: its last four bytes, which are its checksum in every pipeline
  * that has one. `bytes`: stored size, at least four. */

@@ -1,10 +1,10 @@
 /* Computes the layout of a file's chunks, for the writer: the number of rows in the chunks of each
  * array, the order of chunks, and the chunks that each subtree needs. Levels near the root are
  * stored whole. Deep levels are stored subtree by subtree. One subtree is one range of bytes,
- * except for the chunks of faces and vertices that it shares with earlier subtrees. /subtrees/outer
- * lists these shared chunks. /subtrees/counts contains the numbers of items of each subtree. All
- * computations use integers, because the bytes of a file depend on them. Source:
- * format-spec/README.md, section 9. */
+ * except for the chunks of faces and vertices that it shares with earlier subtrees. These
+ * shared chunks are listed in /subtrees/shared_chunks. /subtrees/counts contains the numbers of
+ * items of each subtree. All computations use integers, because the bytes of a file depend on them.
+ * Source: format-spec/subtrees.md. */
 #include <stdlib.h>
 #include <string.h>
 

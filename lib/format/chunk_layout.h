@@ -1,5 +1,5 @@
 /* Layout of a file to write: the list of arrays, the rows and order of their chunks, and the counts
- * of subtrees. format-spec/README.md, section 9. */
+ * of subtrees. format-spec/subtrees.md. */
 #ifndef EBPO_FORMAT_CHUNK_LAYOUT_H
 #define EBPO_FORMAT_CHUNK_LAYOUT_H
 
@@ -90,7 +90,7 @@ typedef struct ebpo_ordered_chunk {
 } ebpo_ordered_chunk;
 
 typedef struct ebpo_chunk_order {
-    ebpo_ordered_chunk *chunk; /* [count]; all except /subtrees/places */
+    ebpo_ordered_chunk *chunk; /* [count]; all except /subtrees/chunk_directory */
     uint64_t count;
     uint64_t top; /* number of chunks at the beginning that are needed to locate a subtree */
 } ebpo_chunk_order;

@@ -3,7 +3,7 @@
  * depend on the codec, the chunks or HDF5. Codes that restart at each chunk (vertices, maps) are
  * recoded as in a file without subtrees. The part `attributes` has a separate checksum of its
  * values, so the content checksum is the same with and without attributes. Source:
- * format-spec/README.md, section 8. */
+ * format-spec/checksums.md. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

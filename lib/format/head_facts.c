@@ -3,7 +3,7 @@
  * attribute. Writing and reading loop over these rows, and so agree on names and types. A reader
  * rejects a newer version and unknown required parts before it reads anything else. The check_
  * functions test ranges, and sums over the levels, before memory is allocated by these values.
- * Source: format-spec/README.md, section 3. */
+ * Source: format-spec/README.md, section 5. */
 #include <inttypes.h>
 #include <math.h>
 #include <stddef.h>
@@ -319,7 +319,10 @@ static const char FORMAT_VERSION[] = "1.1";
 static const char ABOUT[] = "A triangle mesh with an octree of convex envelopes (EBP-Octree), "
                             "level by level: /levels/00 and so on, "
                             "then /mesh, then /maps. Each array's attributes name its coding; the "
-                            "specification is format-spec/README.md of ebpo.";
+                            "specification is format-spec/README.md of ebpo. Attributes of this "
+                            "group: leaf_faces is the number of faces above which a cell was to be "
+                            "divided; down to level grid_level all cell faces are exact doubles, "
+                            "and levels above level_count - 1 are not in the file.";
 
 static ebpo_status put_word(ebpo_h5_out *out, ebpo_h5_id id, const fact *f, const void *field,
                             ebpo_error *error)

@@ -3,7 +3,7 @@
  * it. The decoded size is limited relative to the file size. The second part opens files that other
  * programs have rewritten with another HDF5 layout. libhdf5 copies such a file in a separate
  * process with limits of memory, time and bytes written. The copy is opened like any other file.
- * Source: format-spec/README.md, sections 2 and 3; docs/develop/threats.md. */
+ * Source: format-spec/README.md, sections 4 and 5; docs/develop/threats.md. */
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
@@ -64,6 +64,9 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, ebpo_array_id id
     bool gates = id == EBPO_A_FACES && file->info.gates;
     *a = (ebpo_array_in){ .id = id, .level = level };
     ebpo_schema_path(id, level, a->path);
+    if (ebpo_schema_former(id) && ebpo_head_look(head, a->path) == EBPO_HEAD_ABSENT &&
+        ebpo_head_look(head, ebpo_schema_former(id)) != EBPO_HEAD_ABSENT)
+        snprintf(a->path, sizeof a->path, "%s", ebpo_schema_former(id));
     if (rows == 0 || (spec->if_needed && ebpo_head_find_kind(head, a->path) == EBPO_HEAD_ABSENT))
         return EBPO_OK;
     /* offsets of several chunks are read later from the index of remote files, or from the list */
@@ -141,10 +144,22 @@ static ebpo_status check_pipelines(const ebpo_file *file, ebpo_error *error)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS && status == EBPO_OK; id++)
             status = check_pipeline(file, &file->level_array[level][id], error);
     for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS && status == EBPO_OK; id++)
-        status = check_pipeline(file, &file->root_array[id], error);
+        if (id != EBPO_A_CHUNK_CHECKSUMS || file->has_checksums)
+            status = check_pipeline(file, &file->root_array[id], error);
     for (int i = 0; i < file->attributes.arrays && status == EBPO_OK; i++)
         status = check_pipeline(file, &file->attributes.array[i], error);
     return status;
+}
+
+/* Returns true if a list about all chunks states the size of this file. Programs that rewrite a
+ * file keep the attribute, or drop it. */
+static bool states_size(const ebpo_file *file, ebpo_head *head, const char *path)
+{
+    ebpo_head_object id;
+    uint64_t bytes = 0;
+    return ebpo_head_open_array(head, path, &id, NULL) == EBPO_OK &&
+           ebpo_head_get_count(head, id, path, "file_bytes", &bytes, NULL) == EBPO_OK &&
+           bytes == file->info.file_bytes;
 }
 
 /* Opens a list of all chunks. *valid is false if another program has rewritten the file, as the
@@ -169,6 +184,18 @@ static ebpo_status open_list(ebpo_file *file, ebpo_head *head, ebpo_array_id lis
     return EBPO_OK;
 }
 
+/* Opens the chunk checksums, which are ignored, whatever they are, if they are not valid. */
+static ebpo_status open_checksums(ebpo_file *file, ebpo_head *head, ebpo_error *error)
+{
+    ebpo_array_in *a = &file->root_array[EBPO_A_CHUNK_CHECKSUMS];
+    ebpo_status status = open_list(file, head, EBPO_A_CHUNK_CHECKSUMS, &file->has_checksums, error);
+    bool wrong = status == EBPO_E_FORMAT || status == EBPO_E_UNSUPPORTED;
+    if (!wrong || states_size(file, head, a->path))
+        return status;
+    a->present = false;
+    return EBPO_OK;
+}
+
 static ebpo_status open_arrays(ebpo_file *file, ebpo_head *head, ebpo_error *error)
 {
     ebpo_info *info = &file->info;
@@ -178,7 +205,7 @@ static ebpo_status open_arrays(ebpo_file *file, ebpo_head *head, ebpo_error *err
     if (status == EBPO_OK && info->subtree_level)
         status = open_list(file, head, EBPO_A_PLACES, &file->has_places, error);
     if (status == EBPO_OK)
-        status = open_list(file, head, EBPO_A_CHUNK_CHECKSUMS, &file->has_checksums, error);
+        status = open_checksums(file, head, error);
     if (status == EBPO_OK)
         status = open_group(head, "/mesh", info->parts & EBPO_PART_MESH, error);
     if (status == EBPO_OK)

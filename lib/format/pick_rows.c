@@ -2,7 +2,7 @@
  * runs, all arrays of the level are read for the nodes in these groups, including lists of planes
  * and references. Their values are checked as schema.c checks levels. Rows of the mesh's arrays and
  * of attributes are read in any order, chunk by chunk. Prefetch hints for all chunks are sent
- * first, and each chunk is fetched once. Source: format-spec/README.md, sections 4 and 5. */
+ * first, and each chunk is fetched once. Source: format-spec/README.md, sections 6 and 7. */
 #include <stdlib.h>
 #include <string.h>
 

@@ -1,7 +1,7 @@
 /* Reads attributes of vertices, faces and other elements. When a file is opened, the arrays of
  * /attributes are located, and their HDF5 attributes are checked (names, types, ranges, lists of
  * different lengths). Values are read later, as whole arrays, and compared with the checksum of the
- * part. Source: format-spec/README.md, "Attributes". */
+ * part. Source: format-spec/attributes.md. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -59,11 +59,13 @@ static ebpo_status get_list(ebpo_file *file, ebpo_head *head, ebpo_head_object i
     if (status == EBPO_OK && a->list >= EBPO_ATTRIBUTE_FLOAT32)
         status = attribute_head_wrong(file, path, "a list length is not an integer", error);
     if (status == EBPO_OK)
-        status = required_value(file, path,
-                                ebpo_head_get_count(head, id, path, "different", &differ, error),
-                                "different", error);
+        status = ebpo_head_get_count(head, id, path, "lengths_differ", &differ, error);
+    if (status == EBPO_E_ABSENT) /* the former name */
+        status = ebpo_head_get_count(head, id, path, "different", &differ, error);
+    status = required_value(file, path, status, "lengths_differ", error);
     if (status == EBPO_OK && differ > 1)
-        status = attribute_head_wrong(file, path, "attribute different is neither 0 nor 1", error);
+        status =
+            attribute_head_wrong(file, path, "attribute lengths_differ is neither 0 nor 1", error);
     *different = differ;
     return status;
 }
@@ -81,10 +83,10 @@ static ebpo_status get_head(ebpo_file *file, ebpo_head *head, const char *path,
                                                    sizeof a->element, error),
                                 "element", error);
     if (status == EBPO_OK)
-        status = required_value(file, path,
-                                ebpo_head_get_text(head, id, path, "names", a->names,
-                                                   sizeof a->names, error),
-                                "names", error);
+        status = ebpo_head_get_text(head, id, path, "columns", a->names, sizeof a->names, error);
+    if (status == EBPO_E_ABSENT) /* the former name */
+        status = ebpo_head_get_text(head, id, path, "names", a->names, sizeof a->names, error);
+    status = required_value(file, path, status, "columns", error);
     if (status == EBPO_OK)
         status = required_value(file, path, get_type(file, head, id, path, "type", &type, error),
                                 "type", error);
@@ -108,6 +110,8 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, int number, ebpo
                              &a->shape, coding, &a->chunks, &a->stored_bytes, error);
     if (status != EBPO_OK)
         return status;
+    if (strcmp(coding, EBPO_CODING_COLUMNS_FORMER) == 0)
+        snprintf(coding, sizeof coding, "%s", ebpo_coding_columns);
     a->coding = strcmp(coding, ebpo_coding_columns) == 0 ? ebpo_coding_columns : ebpo_coding_plain;
     a->present = true;
     if (!a->chunks)

@@ -3,7 +3,7 @@
  * codings and needs from the list, for the writer, the reader and subsets. The second part checks
  * the arrays of a tree from a file (EBPO_E_FORMAT), or from a caller who writes the tree
  * (EBPO_E_ARGUMENT). Each error names the level, the array and the constraint. Source:
- * format-spec/README.md, "Arrays" and "Constraints". */
+ * format-spec/README.md, sections 6 and 9. */
 #include <inttypes.h>
 #include <math.h>
 #include <stddef.h>
@@ -135,6 +135,45 @@ void ebpo_schema_path(ebpo_array_id id, int level, char path[EBPO_PATH_BYTES])
         snprintf(path, EBPO_PATH_BYTES, "/levels/%02d/%s", level, ebpo_schema[id].name);
     else
         snprintf(path, EBPO_PATH_BYTES, "%s", ebpo_schema[id].name);
+}
+
+const char *ebpo_schema_former(ebpo_array_id id)
+{
+    return id == EBPO_A_SUBTREE_SHARED    ? "/subtrees/outer"
+           : id == EBPO_A_PLACES          ? "/subtrees/places"
+           : id == EBPO_A_CHUNK_CHECKSUMS ? "/chunk_sums"
+                                          : NULL;
+}
+
+/* Appends the names of the columns of /subtrees/counts. */
+static void subtree_columns(const ebpo_info *info, char names[EBPO_COLUMNS_BYTES])
+{
+    static const char *const of_level[EBPO_SUBTREE_LEVEL_COLS] = {
+        "gray", "leaf", "black", "planes", "leaf_planes", "references", "face_end"
+    };
+    size_t used = (size_t)snprintf(names, EBPO_COLUMNS_BYTES,
+                                   "faces_before faces vertices_before vertices "
+                                   "shared_face_chunks shared_vertex_chunks");
+    for (int level = info->subtree_level + 1; level < info->level_count; level++)
+        for (int k = 0; k < EBPO_SUBTREE_LEVEL_COLS; k++)
+            used += (size_t)snprintf(names + used, EBPO_COLUMNS_BYTES - used, " %02d/%s", level,
+                                     of_level[k]);
+}
+
+void ebpo_schema_columns(const ebpo_info *info, ebpo_array_id id, char names[EBPO_COLUMNS_BYTES])
+{
+    static const char *const fixed[EBPO_ARRAYS] = {
+        [EBPO_A_TYPES_INDEX] = "white black leaf gray",
+        [EBPO_A_GRAY_INDEX] = "planes",
+        [EBPO_A_LEAF_INDEX] = "face_end references leaf_planes",
+        [EBPO_A_VERTICES] = "x y z",
+        [EBPO_A_FACES] = "first second third",
+        [EBPO_A_FACES_INDEX] = "vertices",
+    };
+    if (id == EBPO_A_SUBTREE_INDEX || id == EBPO_A_SUBTREE_COUNTS)
+        subtree_columns(info, names);
+    else
+        snprintf(names, EBPO_COLUMNS_BYTES, "%s", fixed[id] ? fixed[id] : "");
 }
 
 ebpo_shape ebpo_stored_shape(const ebpo_shape *given, bool gates)
@@ -565,7 +604,7 @@ ebpo_status ebpo_check_finite(const ebpo_check *check, const ebpo_mesh *mesh, eb
 
 /* --- names of the arrays of attributes, and of their codings --- */
 
-const char ebpo_coding_plain[] = "plain", ebpo_coding_columns[] = "columns";
+const char ebpo_coding_plain[] = "plain", ebpo_coding_columns[] = "column-delta";
 
 void ebpo_attribute_path(int number, char path[EBPO_PATH_BYTES])
 {

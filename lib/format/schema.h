@@ -1,5 +1,5 @@
 /* Arrays of a file: the rows of array_table.inc as an enumeration and a table.
- * format-spec/README.md, "Arrays". */
+ * format-spec/README.md, sections 6 and 9. */
 #ifndef EBPO_FORMAT_SCHEMA_H
 #define EBPO_FORMAT_SCHEMA_H
 
@@ -63,7 +63,8 @@ enum {
     EBPO_INDEX_ROWS = 4096,            /* items between two rows of an index array */
     EBPO_COLOUR_OF_NOTHING = 0x808080, /* for gray nodes without a known colour */
     EBPO_PATH_BYTES = 48,
-    /* with the part `subtrees` (format-spec/README.md, section 9) */
+    EBPO_COLUMNS_BYTES = 2048, /* of the attribute `columns`, with its end */
+    /* with the part `subtrees` (format-spec/subtrees.md) */
     EBPO_FACE_BLOCK = 2048, /* rows of a chunk */
     EBPO_VERTEX_BLOCK = 1024,
     EBPO_SUBTREE_ROWS = 128,
@@ -78,7 +79,7 @@ enum {
     EBPO_S_FACES,
     EBPO_S_VERTICES_BEFORE, /* first used by these faces */
     EBPO_S_VERTICES,
-    EBPO_S_SHARED_FACES,    /* rows of /subtrees/outer for chunks of faces */
+    EBPO_S_SHARED_FACES,    /* rows of /subtrees/shared_chunks for chunks of faces */
     EBPO_S_SHARED_VERTICES, /* rows of /subtrees/outer for chunks of vertices */
     EBPO_SUBTREE_LEVELS     /* first of the columns of levels */
 };
@@ -137,7 +138,14 @@ ebpo_shape ebpo_stored_shape(const ebpo_shape *given, bool gates);
 /* Writes the absolute path of an array; `level` matters for level arrays only. */
 void ebpo_schema_path(ebpo_array_id id, int level, char path[EBPO_PATH_BYTES]);
 
-/* Returns the number of columns of an array; 0: one dimension. */
+/* Returns the path of an array in files that were written before format 1.1 had its final names, or
+ * NULL. */
+const char *ebpo_schema_former(ebpo_array_id id);
+
+/* Writes the attribute `columns`: a name for each column; "" for arrays of one dimension. */
+void ebpo_schema_columns(const ebpo_info *info, ebpo_array_id id, char names[EBPO_COLUMNS_BYTES]);
+
+/* Returns the columns of an array; 0: one dimension. */
 uint32_t ebpo_schema_cols(const ebpo_info *info, ebpo_array_id id);
 
 /* Returns the number of rows that the header's counts and parts require, or EBPO_ROWS_STATED.
@@ -224,7 +232,7 @@ ebpo_level_summary ebpo_level_summarise(const ebpo_level *level, uint32_t parts)
 ebpo_level ebpo_level_of_summary(const ebpo_info *info, int level);
 
 /* Constraints on a tree from a file or from a caller who writes one: format-spec/README.md,
- * "Constraints". */
+ * sections 6 and 9. */
 
 /* Subject of the check: a file (EBPO_E_FORMAT) or a caller's tree (EBPO_E_ARGUMENT). */
 typedef struct ebpo_check {
@@ -257,13 +265,15 @@ EBPO_MUST_USE ebpo_status ebpo_check_finite(const ebpo_check *check, const ebpo_
                                             ebpo_error *error);
 
 /* Numbers of the arrays in /attributes: 0 is the header. Attribute array n has an array of values
- * and, for lists of different lengths, an array of their items. format-spec/README.md,
- * "Attributes". */
+ * and, for lists of different lengths, an array of their items. format-spec/attributes.md. */
 static inline int ebpo_values_number(uint64_t n) { return 1 + 2 * (int)n; }
 static inline int ebpo_items_number(uint64_t n) { return 2 + 2 * (int)n; }
 /* Writes the absolute path of an array in /attributes. */
 void ebpo_attribute_path(int number, char path[EBPO_PATH_BYTES]);
 
 extern const char ebpo_coding_plain[], ebpo_coding_columns[];
+
+/* The former name of ebpo_coding_columns, which readers take. */
+#define EBPO_CODING_COLUMNS_FORMER "columns"
 
 #endif

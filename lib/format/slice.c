@@ -3,7 +3,7 @@
  * these faces. Faces have local indices: first the shared faces, in ascending order of their file
  * indices, then the owned faces. A hash table (ebpo_compact) maps scattered indices to dense ones.
  * A caller may limit the memory (ebpo_quota); the bytes of each array are reserved before it is
- * allocated. Source: format-spec/README.md, sections 4 and 5. */
+ * allocated. Source: format-spec/README.md, sections 6 and 7. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -16,6 +16,7 @@
 #include "format/pick_rows.h"
 #include "format/reader.h"
 #include "format/slice.h"
+#include "format/subtree_faces.h"
 #include "format/subtree_index.h"
 #include "geometry/level_nodes.h"
 
@@ -554,6 +555,9 @@ static ebpo_status read_extent(ebpo_slice *out, ebpo_chunks *chunks, const ebpo_
     out->root = *root;
     out->pruned = chunks->file->info.pruned;
     ebpo_status status = read_levels(out, chunks, x, error);
+    if (status == EBPO_OK && x->needs & EBPO_NEEDS_MESH &&
+        ebpo_subtree_table_has(chunks->file, root->cell.level))
+        status = ebpo_subtree_faces_check(chunks, root, error);
     if (status != EBPO_OK)
         ebpo_slice_free(out);
     return status;

@@ -7,7 +7,7 @@
  * begins at a row of an index array, which has a row for every 4,096 items. Results are checked
  * against the counts in the header.
  *
- * The last part sends prefetch hints for subtrees. Source: format-spec/README.md, sections 4 and 9.
+ * The last part sends prefetch hints for subtrees. Source: format-spec/subtrees.md.
  */
 #include <stdlib.h>
 #include <string.h>
@@ -182,11 +182,17 @@ uint64_t ebpo_subtree_groups(const ebpo_info *info, const ebpo_subtree_row *row,
 /* Size of the cache. The row of a subtree is needed repeatedly while the subtree is read, and
  * making a row takes long, because a chunk of rows is added up. Typically two threads read at once.
  */
-enum { KEPT = 4, BY_NUMBER = EBPO_SUBTREE_COLS /* no column: compare the subtree's number */ };
+enum {
+    KEPT = 4,
+    BY_NUMBER = EBPO_SUBTREE_COLS /* no column: compare the subtree's number */,
+    FACES_KNOWN = 64,
+    BY_NUMBER = EBPO_SUBTREE_COLS
+};
 
 struct ebpo_kept_rows {
     ebpo_subtree_row row[KEPT];
     unsigned count, next;
+    uint64_t faces_known[FACES_KNOWN]; /* numbers of subtrees, plus 1 */
 };
 
 static bool row_holds(const ebpo_subtree_row *row, unsigned column, uint64_t item)
@@ -227,6 +233,22 @@ static ebpo_status keep_row(ebpo_chunks *chunks, const ebpo_subtree_row *row, eb
     }
     pthread_mutex_unlock(&chunks->lock);
     return EBPO_OK;
+}
+
+bool ebpo_subtree_faces_known(ebpo_chunks *chunks, uint64_t subtree)
+{
+    pthread_mutex_lock(&chunks->lock);
+    bool known = chunks->rows && chunks->rows->faces_known[subtree % FACES_KNOWN] == subtree + 1;
+    pthread_mutex_unlock(&chunks->lock);
+    return known;
+}
+
+void ebpo_subtree_faces_note(ebpo_chunks *chunks, uint64_t subtree)
+{
+    pthread_mutex_lock(&chunks->lock);
+    if (chunks->rows)
+        chunks->rows->faces_known[subtree % FACES_KNOWN] = subtree + 1;
+    pthread_mutex_unlock(&chunks->lock);
 }
 
 ebpo_status ebpo_subtree_table_row(ebpo_chunks *chunks, uint64_t subtree, ebpo_subtree_row *out,

@@ -1,6 +1,5 @@
 /* Locates the rows of subtrees, groups, planes and faces in every array. Results are consistent
- * with the counts in the header. Any thread may call these functions. format-spec/README.md,
- * sections 4 and 9. */
+ * with the counts in the header. Any thread may call these functions. format-spec/subtrees.md. */
 #ifndef EBPO_FORMAT_SUBTREE_INDEX_H
 #define EBPO_FORMAT_SUBTREE_INDEX_H
 
@@ -30,6 +29,10 @@ EBPO_MUST_USE ebpo_status ebpo_subtree_table_row(ebpo_chunks *chunks, uint64_t s
 EBPO_MUST_USE ebpo_status ebpo_subtree_table_find(ebpo_chunks *chunks, unsigned column,
                                                   uint64_t item, ebpo_subtree_row *out,
                                                   ebpo_error *error);
+
+/* Remember that the faces of a subtree were checked (subtree_faces.h); some are forgotten. */
+bool ebpo_subtree_faces_known(ebpo_chunks *chunks, uint64_t subtree);
+void ebpo_subtree_faces_note(ebpo_chunks *chunks, uint64_t subtree);
 
 /* Returns the number of groups of a level before the row's subtree, or with `after` the number
  * including the subtree. */

@@ -7,7 +7,7 @@
  * of chunk_layout.c: first the chunks with which a reader locates a subtree, then all others.
  * HDF5's chunk indexes are one block before the first chunk of an array with several chunks. The
  * list of chunk checksums and the list of chunk sizes are the last chunks. Content checksums are
- * computed while chunks are compressed. */
+ * format-spec/hdf5-messages.md, section 1; subtrees.md. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -105,6 +105,9 @@ static ebpo_status make_level_groups(file_headers *h, ebpo_error *error)
     ebpo_h5_id id;
     ebpo_status status =
         ebpo_h5_make_group(&h->out, "/levels", (unsigned)info->level_count, &id, error);
+    if (status == EBPO_OK)
+        status =
+            ebpo_h5_put_text(&h->out, id, "about", "levels of the octree, the root first", error);
     ebpo_h5_close_id(&h->out, status == EBPO_OK ? id : -1);
     for (int level = 0; level < info->level_count && status == EBPO_OK; level++) {
         char path[EBPO_PATH_BYTES];
@@ -115,6 +118,10 @@ static ebpo_status make_level_groups(file_headers *h, ebpo_error *error)
         status = ebpo_h5_make_group(&h->out, path, links, &id, error);
         if (status == EBPO_OK)
             status = ebpo_facts_put_level(&h->out, id, &info->level[level], error);
+        if (status == EBPO_OK)
+            status = ebpo_h5_put_text(&h->out, id, "about",
+                                      "one level: the attributes count its nodes, planes and faces",
+                                      error);
         ebpo_h5_close_id(&h->out, id);
     }
     return status;
@@ -124,7 +131,7 @@ static ebpo_status make_level_groups(file_headers *h, ebpo_error *error)
  * Does nothing if the file does not have the arrays of this group (`need`: EBPO_NEEDS_MESH and so
  * on). */
 static ebpo_status make_root_group(file_headers *h, const char *path, uint32_t need,
-                                   ebpo_error *error)
+                                   const char *about, ebpo_error *error)
 {
     unsigned links = 0;
     ebpo_h5_id id = -1;
@@ -133,6 +140,8 @@ static ebpo_status make_root_group(file_headers *h, const char *path, uint32_t n
     for (int k = EBPO_LEVEL_ARRAYS; k < EBPO_ARRAYS; k++)
         links += (ebpo_schema[k].needs & need) != 0;
     ebpo_status status = ebpo_h5_make_group(&h->out, path, links, &id, error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_put_text(&h->out, id, "about", about, error);
     ebpo_h5_close_id(&h->out, id);
     return status;
 }
@@ -163,6 +172,11 @@ static ebpo_status make_array(file_headers *h, ebpo_array_out *a, const first_ch
                                   a->gates ? EBPO_GATES_CODING : ebpo_schema[a->id].coding, error);
     if (status == EBPO_OK)
         status = ebpo_h5_put_text(&h->out, a->handle, "about", ebpo_schema[a->id].about, error);
+    if (status == EBPO_OK && shape.cols && !a->gates) {
+        char columns[EBPO_COLUMNS_BYTES];
+        ebpo_schema_columns(&h->plan->info, a->id, columns);
+        status = ebpo_h5_put_text(&h->out, a->handle, "columns", columns, error);
+    }
     return status;
 }
 
@@ -186,11 +200,14 @@ static ebpo_status lay_out(file_headers *h, const char *path, const char *shown,
     if (status == EBPO_OK)
         status = make_level_groups(h, error);
     if (status == EBPO_OK)
-        status = make_root_group(h, "/mesh", EBPO_NEEDS_MESH, error);
+        status = make_root_group(h, "/mesh", EBPO_NEEDS_MESH,
+                                 "the triangle mesh, in the order of the leaves", error);
     if (status == EBPO_OK)
-        status = make_root_group(h, "/maps", EBPO_NEEDS_MAPS, error);
+        status = make_root_group(h, "/maps", EBPO_NEEDS_MAPS,
+                                 "numbers of the vertices and faces in the source", error);
     if (status == EBPO_OK)
-        status = make_root_group(h, "/subtrees", EBPO_NEEDS_SUBTREES, error);
+        status = make_root_group(h, "/subtrees", EBPO_NEEDS_SUBTREES,
+                                 "where the rows of each subtree begin in every array", error);
     if (status == EBPO_OK)
         status = ebpo_attributes_put_group(&h->out, plan, error);
     for (unsigned i = 0; i < plan->count && status == EBPO_OK; i++)

@@ -272,6 +272,10 @@ ebpo_status ebpo_attributes_put_group(ebpo_h5_out *out, const ebpo_plan *plan, e
         status = ebpo_h5_put_count(out, id, "arrays", plan->attributes->count, error);
     if (status == EBPO_OK)
         status = ebpo_h5_put_text(out, id, "sha256", hex, error);
+    if (status == EBPO_OK)
+        status =
+            ebpo_h5_put_text(out, id, "about",
+                             "values that the source has for vertices, faces and others", error);
     ebpo_h5_close_id(out, id);
     return status;
 }
@@ -284,7 +288,7 @@ static ebpo_status put_list(ebpo_h5_out *out, ebpo_h5_id id, const ebpo_attribut
     ebpo_status status =
         ebpo_h5_put_text(out, id, "list", ebpo_attribute_type_name((ebpo_attribute_type)a->list),
                          error);
-    return status == EBPO_OK ? ebpo_h5_put_count(out, id, "different", a->ends != NULL, error)
+    return status == EBPO_OK ? ebpo_h5_put_count(out, id, "lengths_differ", a->ends != NULL, error)
                              : status;
 }
 
@@ -294,6 +298,14 @@ ebpo_status ebpo_attributes_put_array(ebpo_h5_out *out, const ebpo_plan *plan,
     ebpo_status status =
         ebpo_h5_put_text(out, array->handle, "coding",
                          array->columns ? ebpo_coding_columns : ebpo_coding_plain, error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_put_text(out, array->handle, "about",
+                                  array->level == 0       ? "header of the source file"
+                                  : array->level % 2 == 0 ? "items of the lists of the array before"
+                                  : plan->attributes->array[(array->level - 1) / 2].ends
+                                      ? "end of each element's list in the items"
+                                      : "values of each element, named by columns",
+                                  error);
     if (array->level % 2 == 0)
         return status;
     uint64_t n = (uint64_t)(array->level - 1) / 2;
@@ -301,7 +313,7 @@ ebpo_status ebpo_attributes_put_array(ebpo_h5_out *out, const ebpo_plan *plan,
     if (status == EBPO_OK)
         status = ebpo_h5_put_text(out, array->handle, "element", a->element, error);
     if (status == EBPO_OK)
-        status = ebpo_h5_put_text(out, array->handle, "names", a->names, error);
+        status = ebpo_h5_put_text(out, array->handle, "columns", a->names, error);
     if (status == EBPO_OK)
         status =
             ebpo_h5_put_text(out, array->handle, "type", ebpo_attribute_type_name(a->type), error);

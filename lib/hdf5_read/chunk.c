@@ -4,7 +4,7 @@
  * filters the pipeline of an array in a file is recognized. A new codec needs a number in chunk.h,
  * a row, and its functions in a separate file, such as zstd_codec.c. Deflate needs only two calls
  * of zlib, which are in this file. The output is bit for bit that of libhdf5's own filters. Source:
- * docs of HDF5 ("HDF5 filters"), format-spec/README.md, section 2. */
+ * docs of HDF5 ("HDF5 filters"), format-spec/README.md, section 4. */
 #include <string.h>
 #include <zlib.h>
 

@@ -1,4 +1,4 @@
-/* Number codings of format-spec/README.md, section "Codings", which turn arrays into small numbers
+/* Number codings of format-spec/README.md, section 9, which turn arrays into small numbers
  * before compression. Encoding and decoding are exact inverses for every bit pattern. Arrays in
  * files are little-endian; `file` pointers need no alignment. Pure functions, any thread. */
 #ifndef EBPO_HDF5_READ_CODING_H

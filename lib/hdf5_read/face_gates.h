@@ -1,4 +1,4 @@
-/* The coding `gates` of format-spec/README.md, section 7: represents each face of a chunk by the
+/* The coding `gates` of format-spec/gates.md: represents each face of a chunk by the
  * edge of an earlier face across which it is, and its third vertex. Pure functions, any thread. */
 #ifndef EBPO_HDF5_READ_FACE_GATES_H
 #define EBPO_HDF5_READ_FACE_GATES_H

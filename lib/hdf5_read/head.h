@@ -1,5 +1,5 @@
 /* Reads the head of an untrusted file: objects, attributes, and chunk offsets. It supports the part
- * of HDF5's file format that section 2 of the specification allows writers, and rejects the rest
+ * of HDF5's file format that section 4 of the specification allows writers, and rejects the rest
  * with specific messages; it does not use libhdf5. Every block's checksum is compared, every count
  * and address is bounded before use, and there are no cycles. Errors name file and object. A head
  * is used by one thread. Source: The HDF Group, "HDF5 File Format Specification Version 3.0". */

@@ -1,7 +1,7 @@
 /* Reads arrays: checks their shape against the format, and finds their chunks. Three of HDF5's
  * chunk indexes are read (a single chunk, an implicit index, a fixed array with pages); each chunk
  * must be within the file and below the size that its filters can give. Source: HDF5 File Format
- * Specification 3.0, sections IV.A.2.i and VII; format-spec/README.md, section 2. */
+ * Specification 3.0, sections IV.A.2.i and VII; format-spec/hdf5-messages.md. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -2,7 +2,7 @@
  * and the headers of all objects, at the start of the file. Objects are found by the names of
  * links, from the root group on. HDF5 features that this format does not allow are rejected with a
  * specific message. Source: HDF5 File Format Specification 3.0, sections II.A and IV.A.2.g;
- * format-spec/README.md, section 2. */
+ * format-spec/hdf5-messages.md. */
 #include <stdlib.h>
 #include <string.h>
 

@@ -343,7 +343,7 @@ static void copy_array(copying *c, hid_t group, const char *name, const char *pa
 {
     array_copy a = { .set = H5Dopen2(group, name, c->access), .path = path };
     a.plist = a.set >= 0 ? H5Dget_create_plist(a.set) : -1;
-    if (strcmp(path, "/subtrees/places") == 0)
+    if (strcmp(path, "/subtrees/chunk_directory") == 0 || strcmp(path, "/subtrees/places") == 0)
         make_places(c, path);
     else if (inspect_object(c, &a))
         copy_values(c, &a);

@@ -1,6 +1,6 @@
 /* Attributes of a mesh: numeric data beyond positions and corners, such as colours, normals and
  * labels. Each array belongs to the vertices or faces, in the order of the source, or to another
- * element of the source. Source: format-spec/README.md, "Attributes". For use by one thread. */
+ * element of the source. Source: format-spec/attributes.md. For use by one thread. */
 #ifndef EBPO_MESH_ATTRIBUTES_H
 #define EBPO_MESH_ATTRIBUTES_H
 

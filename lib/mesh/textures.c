@@ -1,5 +1,5 @@
 /* Finds image files that a source names and stores them: a row of the element `ebpo:texture` for
- * each, with its name and bytes (format-spec/README.md, "Attributes"). Names come from comments of
+ * each, with its name and bytes (format-spec/attributes.md). Names come from comments of
  * a PLY file and from the material libraries of an OBJ file. Files are searched only in the
  * source's folder and below. Files that are missing, too large or not images are reported and
  * omitted. */

@@ -1,5 +1,5 @@
 /* Image files that a source names. Each is a row of the element `ebpo:texture`, with lists of
- * bytes. Source: format-spec/README.md, "Attributes". For use by one thread. */
+ * bytes. Source: format-spec/attributes.md. For use by one thread. */
 #ifndef EBPO_MESH_TEXTURES_H
 #define EBPO_MESH_TEXTURES_H
 

@@ -58,7 +58,7 @@ static inline unsigned ebpo_listed_lanes(uint64_t b) { return b >> EBPO_LISTED_L
 typedef struct ebpo_accel_leaf {
     uint32_t list;           /* the leaf's blocks begin at list[list] of the subtree */
     int32_t winding;         /* winding number at the lowest corner, shifted (format-spec, section
-                              * 5) */
+                              * 10) */
     uint32_t rows;           /* for kinds other than general: EBPO_KIND_ROW */
     _Atomic uint8_t kind;    /* ebpo_leaf_kind; for surfaces always EBPO_LEAF_GENERAL */
     _Atomic uint8_t queries; /* approximate number of queries until the kind is known */

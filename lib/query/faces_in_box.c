@@ -199,7 +199,7 @@ static bool intersects_cell(const ebpo_box *box, const ebpo_node *node, const do
 }
 
 /* Finds the first accel, depth first, whose cell the face intersects. An accel lists the faces that
- * intersect its cell, and some that are only near its cell (format-spec, section 5). Each face is
+ * intersect its cell, and some that are only near its cell (format-spec, section 7). Each face is
  * taken in this first accel, so no list of visited faces is needed. */
 static bool find_first(const box_walk *w, const ebpo_box *box, ebpo_node node,
                        const double triangle[3][3], uint32_t *entry)

@@ -10,7 +10,7 @@
  * loads subtrees on the way; with EBPO_LOAD_NODES it reads only the nodes on the way. Envelopes
  * decide pruned nodes, or the query fails with EBPO_E_ABSENT.
  *
- * Sources: EBP 2017, 4.2; format-spec, section 5. */
+ * Sources: EBP 2017, 4.2; format-spec, section 10. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -124,7 +124,7 @@ static bool from_cell_face(const ebpo_inside_kernels *kernels, const ebpo_accel 
     return true;
 }
 
-/* Finds the winding number by three segments from the lowest corner: format-spec, section 5. The
+/* Finds the winding number by three segments from the lowest corner: format-spec, section 10. The
  * last segment finds the faces that contain the point. `boxed`: the boxes of the leaf's list are
  * known. */
 static bool from_corner(const ebpo_inside_kernels *kernels, const ebpo_accel *s,

@@ -4,7 +4,7 @@
  * From a distance of 16 sizes of the model's box on, doubles hardly separate distances. There the
  * bounds are those of keys, which grow with the distance (point_bounds.h). Upper bounds include
  * faces that a node may list without containing them: faces within 1/256 of the cell's size
- * (format-spec, section 5). Rounding: docs/develop/bounds.md, "Points far away". */
+ * (format-spec, section 7). Rounding: docs/develop/bounds.md, "Points far away". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -14,7 +14,7 @@
 #include "query/point_bounds.h"
 
 /* A node may list a face that is outside its cell but near it: within 1/256 of the cell's size on
- * each axis (format-spec, section 5). This value adds a margin for rounding. */
+ * each axis (format-spec, section 7). This value adds a margin for rounding. */
 static const double near_share = 0x1.1p-8;
 
 static void cell_size(const ebpo_box *box, ebpo_cell cell, double low[3], double size[3])

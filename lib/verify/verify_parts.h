@@ -16,7 +16,7 @@ EBPO_MUST_USE ebpo_status ebpo_verify_tree(ebpo_tally *tally, const ebpo_tree *t
                                            const ebpo_verify_options *options, ebpo_error *error);
 
 /* --- verify_chunks.c: reference implementation of a reader of the coding `gates`
- * (format-spec/README.md, section 7) --- */
+ * (format-spec/gates.md) --- */
 
 /* Decodes a chunk of `rows` faces of 13 bytes each; rows > 0. On entry, *seen is the number of
  * vertices that the faces before the chunk use; on return, it includes the chunk's faces. Returns

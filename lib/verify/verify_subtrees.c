@@ -1,9 +1,8 @@
-/* Verifies the table of subtrees (format-spec/README.md, section 9). Visits the whole tree once,
- * leaf by leaf in the order of the faces, and counts all items again.
+/* Verifies the table of subtrees (format-spec/subtrees.md). Visits the whole tree once, leaf by
+ * leaf in the order of the faces, and counts all items again.
  *
- * Every column of every row is recomputed: numbers of nodes, faces and vertices, and the chunks of
- * /mesh/faces and /mesh/vertices that a subtree needs from earlier subtrees. The listed chunks must
- * be exactly these. The specification and this file call them *blocks*.
+ * Every column of every row is recomputed except the numbers of shared chunks:
+ * /subtrees/shared_chunks is a hint. Only the sums of these numbers must match its rows.
  *
  * This check is independent of the writer and the reader of the library, which proceed level by
  * level: they have only the reading of arrays in common. */
@@ -27,7 +26,7 @@ enum {
     FACES,
     VERTICES_BEFORE,
     VERTICES,
-    SHARED_FACES, /* number of blocks */
+    SHARED_FACES, /* number of chunks */
     SHARED_VERTICES,
     FIRST_LEVEL,
     GRAY = 0,
@@ -40,9 +39,6 @@ enum {
     OF_A_LEVEL,
     MAX_COLS = FIRST_LEVEL + OF_A_LEVEL * EBPO_LEVELS_MAX
 };
-/* rows of a block of faces, and of a block of vertices */
-enum { ROWS_OF_FACES = 2048, ROWS_OF_VERTICES = 1024 };
-/* number of subtrees after which unused pages of memory are released */
 enum { SUBTREES_A_TIME = 128 };
 static const char *const names[] = { "faces before the subtree",
                                      "faces",
@@ -53,75 +49,24 @@ static const char *const names[] = { "faces before the subtree",
 static const char *const level_names[] = { "gray nodes",  "leaves",     "black nodes",   "planes",
                                            "leaf planes", "references", "the faces' end" };
 
-/* A list of indices of faces or numbers of blocks. */
-typedef struct numbers {
-    uint32_t *at;
-    uint64_t count, capacity;
-    uint64_t different; /* number of different ones when add_block last removed duplicates */
-} numbers;
-
-/* The visit of the tree, and the counts so far. */
 typedef struct recount {
     ebpo_tally *tally;
     const ebpo_reference_tree *view;
     int level; /* level of the subtrees' roots */
     /* the arrays of /subtrees, as stored */
     unsigned cols, rows_of_chunk; /* of `counts` */
-    const uint32_t *counts, *shared;
+    const uint32_t *counts;
     const uint64_t *index;
-    uint64_t subtrees, shared_rows; /* shared_rows: number of rows of `shared` */
+    uint64_t subtrees, shared_rows; /* shared_rows: number of rows of /subtrees/shared_chunks */
     /* numbers of subtrees, faces and vertices so far */
     uint64_t subtree, faces, vertices;
-    uint64_t shared_done;          /* number of compared rows of `shared` */
-    uint64_t end[EBPO_LEVELS_MAX]; /* end of the new faces, by level */
+    uint64_t shared_done, end[EBPO_LEVELS_MAX]; /* end of the new faces, by level */
     /* columns: sums over all subtrees before the current one, counts of the current one */
     uint64_t sum[MAX_COLS], row[MAX_COLS];
-    bool within;          /* the visit is within a subtree */
-    numbers shared_faces; /* references of the leaves of the current subtree */
-    bool no_memory;
+    bool within; /* the visit is within a subtree */
 } recount;
 
-/* Appends a number, unless it is equal to the last one. Returns false if there is no memory. */
-static bool add_number(ebpo_workspace *workspace, numbers *list, uint32_t number)
-{
-    if (list->count && list->at[list->count - 1] == number)
-        return true;
-    if (!ebpo_array_grow_late(workspace, &list->at, &list->capacity, list->count + 1,
-                              sizeof *list->at))
-        return false;
-    list->at[list->count++] = number;
-    return true;
-}
-
-static int compare_numbers(const void *a, const void *b)
-{
-    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
-    return (x > y) - (x < y);
-}
-
-/* Sorts the list and removes duplicates. */
-static void sort_once(numbers *list)
-{
-    uint64_t kept = 0;
-    if (list->count)
-        qsort(list->at, list->count, sizeof *list->at, compare_numbers);
-    for (uint64_t i = 0; i < list->count; i++)
-        if (!kept || list->at[kept - 1] != list->at[i])
-            list->at[kept++] = list->at[i];
-    list->count = kept;
-}
-
-/* Adds a number that may recur often. Removes duplicates from time to time. */
-static bool add_block(numbers *list, uint32_t block)
-{
-    if (list->count >= 2 * list->different + 4096) {
-        sort_once(list);
-        list->different = list->count;
-    }
-    return add_number(NULL, list, block);
-}
-
-/* Returns the name of a column. *level: its level, or -1. */
+/* Returns the name of a column. *level: the level to which it belongs, or -1. */
 static const char *column_name(const recount *c, unsigned column, int *level)
 {
     if (column < FIRST_LEVEL)
@@ -130,63 +75,7 @@ static const char *column_name(const recount *c, unsigned column, int *level)
     return level_names[(column - FIRST_LEVEL) % OF_A_LEVEL];
 }
 
-/* --- comparing a subtree with its row --- */
-
-/* Compares the needed blocks with the next rows of /subtrees/outer. A row is `from` minus the
- * number of a block; the rows of a subtree are ascending. */
-static void compare_shared(recount *c, const char *what, uint64_t from, const numbers *needed,
-                           unsigned column)
-{
-    ebpo_tally *tally = c->tally;
-    uint64_t first = c->shared_done, i = 0;
-    for (; i < needed->count; i++)
-        if (first + i >= c->shared_rows || c->shared[first + i] > from ||
-            from - c->shared[first + i] != needed->at[needed->count - 1 - i])
-            break;
-    if (i < needed->count)
-        CHECK(false,
-              "/subtrees/outer, subtree %" PRIu64 ": needs block %" PRIu32
-              " of %s, which is not the next entry of the list",
-              c->subtree, needed->at[needed->count - 1 - i], what);
-    else
-        CHECK(true, "%s", "");
-    c->row[column] = needed->count;
-    c->shared_done += needed->count;
-}
-
-/* Adds the blocks of those vertices of a face that are below first_vertex. */
-static void note_vertices(recount *c, numbers *blocks, uint64_t face, uint64_t first_vertex)
-{
-    for (int k = 0; k < 3; k++) {
-        uint32_t vertex = c->view->tree->mesh.faces[3 * face + (uint64_t)k];
-        if (vertex < first_vertex && !add_block(blocks, vertex / ROWS_OF_VERTICES))
-            c->no_memory = true;
-    }
-}
-
-/* Finds the blocks that the current subtree needs from earlier subtrees, and compares them with
- * /subtrees/outer. */
-static void check_shared(recount *c)
-{
-    numbers faces = { 0 }, vertices = { 0 };
-    uint64_t first_face = c->faces - c->row[FACES], first_vertex = c->vertices - c->row[VERTICES];
-    EBPO_FOR_ITEMS_SCATTERED(c->view->workspace, i, 0, c->shared_faces.count)
-        if (c->shared_faces.at[i] < first_face) {
-            if (!add_block(&faces, c->shared_faces.at[i] / ROWS_OF_FACES))
-                c->no_memory = true;
-            note_vertices(c, &vertices, c->shared_faces.at[i], first_vertex);
-        }
-    EBPO_FOR_ITEMS(c->view->workspace, face, first_face, c->faces)
-        note_vertices(c, &vertices, face, first_vertex);
-    sort_once(&faces);
-    sort_once(&vertices);
-    compare_shared(c, "/mesh/faces", first_face / ROWS_OF_FACES, &faces, SHARED_FACES);
-    compare_shared(c, "/mesh/vertices", first_vertex / ROWS_OF_VERTICES, &vertices,
-                   SHARED_VERTICES);
-    free(faces.at);
-    free(vertices.at);
-    c->shared_faces.count = 0;
-}
+/* --- comparing a complete subtree with its row --- */
 
 /* Compares the counts of the current subtree with its row, and begins a new row. */
 static void check_row(recount *c)
@@ -194,14 +83,15 @@ static void check_row(recount *c)
     ebpo_tally *tally = c->tally;
     const uint32_t *stated = c->counts + c->subtree * c->cols;
     int level;
-    if (c->view->has_mesh)
-        check_shared(c);
+    c->row[SHARED_FACES] = stated[SHARED_FACES]; /* a hint, as what the list names */
+    c->row[SHARED_VERTICES] = stated[SHARED_VERTICES];
+    c->shared_done += c->row[SHARED_FACES] + c->row[SHARED_VERTICES];
     for (unsigned k = 0; k < c->cols; k++) {
         const char *name = column_name(c, k, &level);
         if (c->subtree % c->rows_of_chunk == 0)
             CHECK(c->index[c->subtree / c->rows_of_chunk * c->cols + k] == c->sum[k],
                   "/subtrees/index, before subtree %" PRIu64 ", column %u (%s): states %" PRIu64
-                  ", there are %" PRIu64,
+                  ", and /subtrees/counts should add up to %" PRIu64,
                   c->subtree, k, name, c->index[c->subtree / c->rows_of_chunk * c->cols + k],
                   c->sum[k]);
         CHECK(stated[k] == c->row[k],
@@ -241,11 +131,8 @@ static void count_leaf(recount *c, const ebpo_reference_node *leaf, uint64_t *ro
     if (!c->view->has_mesh)
         return;
     if (c->within) {
-        const uint32_t *face = ebpo_reference_refs(c->view, leaf, &references);
+        (void)ebpo_reference_refs(c->view, leaf, &references);
         uint64_t end = level->leaf_first[leaf->rank] + level->leaf_new[leaf->rank];
-        EBPO_FOR_ITEMS(c->view->workspace, i, 0, references)
-            if (!add_number(c->view->workspace, &c->shared_faces, face[i]))
-                c->no_memory = true;
         row[REFERENCES] += references;
         row[END] += end - c->end[leaf->cell.level];
         c->end[leaf->cell.level] = end;
@@ -292,17 +179,14 @@ static void visit_node(recount *c, const ebpo_reference_node *node)
         visit_children(c, node);
 }
 
-static ebpo_status recount_table(recount *c, ebpo_error *error)
+static void recount_table(recount *c)
 {
     ebpo_tally *tally = c->tally;
     ebpo_reference_node root = ebpo_reference_root(c->view);
     visit_node(c, &root);
     CHECK(c->shared_done == c->shared_rows,
-          "/subtrees/outer has %" PRIu64 " rows, but %" PRIu64 " blocks are needed", c->shared_rows,
-          c->shared_done);
-    ebpo_array_free(c->view->workspace, c->shared_faces.at);
-    return c->no_memory ? ebpo_workspace_fail_while(c->view->workspace, "counting subtrees", error)
-                        : EBPO_OK;
+          "/subtrees/counts counts %" PRIu64 " rows of /subtrees/shared_chunks, which has %" PRIu64,
+          c->shared_done, c->shared_rows);
 }
 
 ebpo_status ebpo_check_subtrees(ebpo_tally *tally, const ebpo_file *file,
@@ -327,13 +211,9 @@ ebpo_status ebpo_check_subtrees(ebpo_tally *tally, const ebpo_file *file,
         status = ebpo_reader_make(file, EBPO_A_SUBTREE_INDEX, 0, &read, sizeof *c.index,
                                   (void *)&c.index, &own);
     if (status == EBPO_OK)
-        status = ebpo_reader_make(file, EBPO_A_SUBTREE_SHARED, 0, &read, sizeof *c.shared,
-                                  (void *)&c.shared, &own);
-    if (status == EBPO_OK)
-        status = recount_table(&c, &own);
+        recount_table(&c);
     ebpo_array_free(read.workspace, (void *)(uintptr_t)c.counts);
     ebpo_array_free(read.workspace, (void *)(uintptr_t)c.index);
-    ebpo_array_free(read.workspace, (void *)(uintptr_t)c.shared);
     if (status != EBPO_E_FORMAT)
         return status == EBPO_OK ? EBPO_OK : ebpo_fail_with(error, &own);
     CHECK(false, "%s", own.message);

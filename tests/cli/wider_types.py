@@ -19,7 +19,7 @@ with h5py.File(sys.argv[1], "r+", libver=("v110", "v110")) as f:
         new.attrs.create(name, value, dtype=types[name])
     names = []
     f.visititems(lambda name, item: names.append("/" + name) if isinstance(item, h5py.Dataset)
-                 and name != "chunk_sums" else None)
+                 and name != "chunk_checksums" else None)
     total = hashlib.sha256()
     for name in sorted(names):
         total.update(name.encode() + b"\0" + hashlib.sha256(f[name][...].tobytes()).digest())

@@ -10,7 +10,7 @@
  * verifies, and names damage that verifying does not detect. -w: keeps files that gave wrong
  * results.
  *
- * The checksum of a chunk does not cover its offset: in files without /chunk_sums, chunks that
+ * The checksum of a chunk does not cover its offset: in files without /chunk_checksums, chunks that
  * were exchanged, or come from another file, are detected at the latest by content_sha256, when
  * verifying. In files with it every query must detect them.
  *

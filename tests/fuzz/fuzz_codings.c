@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
  * Any bytes as coded numbers: each coding is decoded, and encoding again gives the same bytes, as
- * section 7 of format-spec/README.md says.
+ * section 9 of format-spec/README.md says.
  *
  * Input: a byte for the coding, a byte for its kinds, the numbers. */
 #include "fuzz_support.h"

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """test_array_table.py SOURCE: what is said of arrays in other languages says the same as the
 library's table, row by row:
-the specification's sections 4 and 7, its reader in Python, the viewer's reader."""
+the specification's sections 6 and 9, its reader in Python, the viewer's reader."""
 import pathlib
 import re
 import sys
@@ -27,7 +27,8 @@ def table(text):
 
 
 def of_specification(text):
-    section = re.search(r"^## 4\. .*?^## 5\. ", text, re.M | re.S).group(0)
+    section = "".join(re.search(rf"^## {number}\. .*?^## {number + 1}\. ", text, re.M | re.S).group(0)
+                      for number in (6, 9))
     rows = []
     for name, types in re.findall(r"^\| `([\w/]+)` \| ([^|]*) \|", section, re.M):
         found = re.findall(r"\b([ui])(8|16|32|64)\b", types)
@@ -55,7 +56,7 @@ def compare(where, rows, wanted):
 
 
 def check_codings(root, text):
-    """Each array's coding: in the specification's section 7, and in both other readers."""
+    """Each array's coding: in the specification's section 9, and in both other readers."""
     wanted = {}
     for _, inside in re.findall(r"^(LEVEL_ARRAY|ROOT_ARRAY)\((.*?)\)\n", re.sub(r"\n +", " ", text),
                                 re.M):
@@ -63,17 +64,17 @@ def check_codings(root, text):
                                   inside)[0]
         if coding != "plain":
             wanted[name] = coding
-    section = re.search(r"^## 7\. .*?^## 8\. ", (root / "format-spec/README.md").read_text(),
+    section = re.search(r"^## 9\. .*?^## 10\. ", (root / "format-spec/README.md").read_text(),
                         re.M | re.S).group(0)
     said = {name: coding for coding, names in re.findall(r"^\| `([\w-]+)` \| ([^|]*) \|", section, re.M)
             for name in re.findall(r"`([\w/]+)`", names.split(";")[0]) if coding != "gates"}
     others = [] if "| `gates` | `/mesh/faces`;" in section else \
-        ["format-spec/README.md, section 7: gates is not a coding of /mesh/faces"]
+        ["format-spec/README.md, section 9: gates is not a coding of /mesh/faces"]
     viewer = re.search(r"^const CODINGS = .*?^};", (root / "tools/web/reader/facts.js").read_text(),
                        re.M | re.S).group(0)
     python = re.search(r"^CODINGS = .*?\}$", (root / "format-spec/read_ebpo.py").read_text(),
                        re.M | re.S).group(0)
-    found = {"format-spec/README.md, section 7": said,
+    found = {"format-spec/README.md, section 9": said,
              "tools/web/reader/facts.js":
              dict(re.findall(r"'?([\w/]+)'?: \['([\w-]+)'", viewer)),
              "format-spec/read_ebpo.py":
@@ -105,7 +106,7 @@ def main():
     rows, held = table((root / "lib/format/array_table.inc").read_text())
     if len(rows) < 20:
         sys.exit(f"only {len(rows)} rows found in array_table.inc: this test no longer reads it")
-    problems = compare("format-spec/README.md, section 4",
+    problems = compare("format-spec/README.md, section 6",
                        of_specification((root / "format-spec/README.md").read_text()), rows)
     problems += compare("tools/web/reader/facts.js",
                         of_viewer((root / "tools/web/reader/facts.js").read_text()), rows)

@@ -14,12 +14,13 @@ SOME = ("selection_percent", "selection_k_root", "selection_seed", "subtree_leve
         "mend_dropped_faces", "mend_weld_distance", "mend_weld_moved", "mend_collapsed_faces")
 
 root = pathlib.Path(sys.argv[1])
-section = re.search(r"^## 3\. .*?^## 4\. ", (root / "format-spec/README.md").read_text(),
+section = re.search(r"^## 5\. .*?^## 6\. ", (root / "format-spec/README.md").read_text(),
                     re.M | re.S).group(0)
 said = {}
 for row in re.findall(r"^\| (`.*) \|$", section, re.M):
-    cells = [cell.strip() for cell in row.split(" | ")]
-    if len(cells) == 7:
+    cells = [cell.strip() for cell in row.split("|")]
+    if len(cells) == 4:
+        cells = [cells[0], cells[1].rstrip("?"), "no" if cells[1].endswith("?") else "yes", cells[2]]
         said.update({name: cells for name in re.findall(r"`([a-z0-9_]+)`", cells[0])})
 table = (root / "lib/format/head_facts.c").read_text()
 written = dict(re.findall(r'\{ "(\w+)", FACT_(\w+),', table))
@@ -34,7 +35,7 @@ for name, kind in written.items():
         problems.append(f"{name}: no row")
     elif said[name][1] != kind_said or (name not in SOME and said[name][2] != required):
         problems.append(f"{name}: {said[name][1:3]}, and it is {kind_said}, required: {required}")
-    elif kind in ("TEXT", "NOTE") and f".. {room[name]} bytes" not in said[name][3]:
+    elif kind in ("TEXT", "NOTE") and not said[name][3].endswith(f".. {room[name]:,}"):
         problems.append(f"{name}: {said[name][3]}, and the library has room for {room[name]} bytes")
 for source in ("head_facts.c",):
     named = re.findall(r'(?:put|get)_\w+\([^;]*?"([a-z0-9_]+)"',

@@ -22,7 +22,7 @@ texts = {name: record(name) for name in ("convert", "report")}
 missing = []
 for name in names:
     if name != "inherit" and f"`{name}`" not in spec:
-        missing.append(f"format-spec/README.md, section 3, selection: `{name}` is missing")
+        missing.append(f"format-spec/README.md, section 5, selection: `{name}` is missing")
     for command, text in texts.items():
         words, in_help, manual = (set(re.findall(r"\w+", part)) for part in (
             re.search(r"^  (?:word|set) (.*)", text, re.MULTILINE).group(1),

@@ -73,12 +73,16 @@ uint64_t count_of(const char *object, const char *name)
     return value;
 }
 
-static void set_number(const char *object, const char *name, hid_t type, int64_t value)
+static void set_number_of(const char *object, const char *name, hid_t type, const void *value)
 {
     hid_t id = H5Oopen(changed, object, H5P_DEFAULT), attribute = H5Aopen(id, name, H5P_DEFAULT);
-    need(H5Awrite(attribute, type, &value) >= 0, name);
+    need(H5Awrite(attribute, type, value) >= 0, name);
     H5Aclose(attribute);
     H5Oclose(id);
+}
+static void set_number(const char *object, const char *name, hid_t type, int64_t value)
+{
+    set_number_of(object, name, type, &value);
 }
 void set_int(const char *object, const char *name, int64_t value)
 {
@@ -95,6 +99,32 @@ void set_reals(const char *name, double a, double b, double c)
     hid_t attribute = H5Aopen_by_name(changed, "/", name, H5P_DEFAULT, H5P_DEFAULT);
     need(H5Awrite(attribute, H5T_NATIVE_DOUBLE, values) >= 0, name);
     H5Aclose(attribute);
+}
+
+void set_six(const char *name, const double values[6])
+{
+    hid_t attribute = H5Aopen_by_name(changed, "/", name, H5P_DEFAULT, H5P_DEFAULT);
+    need(H5Awrite(attribute, H5T_NATIVE_DOUBLE, values) >= 0, name);
+    H5Aclose(attribute);
+}
+
+void set_real(const char *object, const char *name, double value)
+{
+    set_number_of(object, name, H5T_NATIVE_DOUBLE, &value);
+}
+
+void get_text(const char *object, const char *name, char *text, size_t size)
+{
+    hid_t attribute = H5Aopen_by_name(changed, object, name, H5P_DEFAULT, H5P_DEFAULT),
+          type = H5Aget_type(attribute);
+    need(H5Tget_size(type) < size && H5Aread(attribute, type, text) >= 0, name);
+    H5Tclose(type);
+    H5Aclose(attribute);
+}
+
+void add_real(const char *object, const char *name, double value)
+{
+    put_anew(object, name, H5T_IEEE_F64LE, H5Screate(H5S_SCALAR), H5T_NATIVE_DOUBLE, &value);
 }
 
 void add_count(const char *object, const char *name, uint64_t value)
@@ -120,6 +150,17 @@ void poke(const char *path, unsigned at, int64_t value)
     hid_t id = H5Dopen2(changed, path, H5P_DEFAULT);
     need(H5Dread(id, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0, path);
     values[at] = value;
+    need(H5Dwrite(id, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0, path);
+    H5Dclose(id);
+    free(values);
+}
+
+void add_to(const char *path, unsigned at, int64_t by)
+{
+    int64_t *values = calloc(1 << 20, sizeof *values);
+    hid_t id = H5Dopen2(changed, path, H5P_DEFAULT);
+    need(H5Dread(id, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0, path);
+    values[at] += by;
     need(H5Dwrite(id, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0, path);
     H5Dclose(id);
     free(values);
@@ -160,11 +201,13 @@ static hid_t make_array(const new_array *a, const char *path)
 
 static void write_values(hid_t id, const char *path, const new_array *a)
 {
-    static const int64_t zeros[4096];
+    int64_t *zeros =
+        a->values ? NULL : calloc(a->rows * (a->cols ? a->cols : 1) + 1, sizeof *zeros);
     if (!a->unwritten)
         need(H5Dwrite(id, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT,
                       a->values ? a->values : zeros) >= 0,
              path);
+    free(zeros);
 }
 
 void add_array(const char *path, new_array a)
@@ -237,7 +280,7 @@ static herr_t take_array(hid_t object, const char *name, const H5O_info_t *info,
     if (colours != all->of_colours)
         return 0;
     if (info->type != H5O_TYPE_DATASET || strncmp(name, "x-", 2) == 0 ||
-        strcmp(name, "chunk_sums") == 0 || strncmp(name, "attributes/", 11) == 0)
+        strcmp(name, "chunk_checksums") == 0 || strncmp(name, "attributes/", 11) == 0)
         return 0;
     snprintf(path, sizeof path, "/%s", name);
     need(all->count < 512, "too many arrays");

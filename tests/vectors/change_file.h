@@ -42,9 +42,16 @@ typedef struct new_array {
     hsize_t rows, cols, chunk; /* cols 0: one dimension; chunk 0: contiguous */
     bool unlimited, unwritten;
     void (*filters)(hid_t);
-    const int64_t *values; /* NULL: zeros, at most 4096 */
+    const int64_t *values; /* NULL: zeros */
 } new_array;
 void replace(const char *path, new_array a);
+/* Adds to one value of an array. */
+void add_to(const char *path, unsigned at, int64_t by);
+/* Adds a number to an object; sets the six numbers of an attribute of the root. */
+void set_real(const char *object, const char *name, double value);
+void get_text(const char *object, const char *name, char *text, size_t size);
+void add_real(const char *object, const char *name, double value);
+void set_six(const char *name, const double values[6]);
 /* Adds an array at a new path, without attributes. */
 void add_array(const char *path, new_array a);
 /* Writes the same values with other filters: of at most 64 elements. */

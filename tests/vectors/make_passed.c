@@ -1,4 +1,5 @@
-/* Makes the passed vectors, in an order in which each needs only features of earlier ones. */
+/* Makes the passed vectors, in an order in which each needs only features of earlier ones. Vector
+ * 20 is a file of version 1.0, which no longer changes and is not made here. */
 #include "make_parts.h"
 
 #include <math.h>
@@ -294,13 +295,6 @@ static void of_a_later_version(void)
     H5Pclose(plist);
 }
 
-static void of_version_1_0(void)
-{
-    set_text("/", "format_version", "1.0");
-    set_int("/", "format_version_minor", 0);
-    set_text("/levels/01/leaf_skip", "coding", "delta");
-}
-
 /* The arrays stay in the file, and do not count. */
 static void without_the_word_maps(void)
 {
@@ -361,16 +355,18 @@ static void shuffle_bytes(void)
 /* The list is wrong, and readers must ignore it. */
 static void without_offset_of_places(void)
 {
-    drop_attribute("/subtrees/places", "offset");
-    poke("/subtrees/places", 1, INT64_C(4097) << 32 | 8);
+    drop_attribute("/subtrees/chunk_directory", "offset");
+    poke("/subtrees/chunk_directory", 1, INT64_C(4097) << 32 | 8);
 }
-static void with_false_places(void) { poke("/subtrees/places", 1, INT64_C(4097) << 32 | 8); }
+static void with_false_places(void)
+{
+    poke("/subtrees/chunk_directory", 1, INT64_C(4097) << 32 | 8);
+}
 
 static void make_derived(void)
 {
     derive("18_one_leaf_bare", "03_one_leaf", without_filters);
     derive("19_unknown_optional_part", "03_one_leaf", of_a_later_version);
-    derive("20_version_1_0", "05_two_levels", of_version_1_0);
     derive("33_part_not_listed", "05_two_levels", without_the_word_maps);
     derive("34_attributes_of_other_programs", "05_two_levels", with_attributes_of_others);
     derive("35_arrays_not_called_for", "05_two_levels", with_arrays_not_called_for);
@@ -667,15 +663,44 @@ static void make_welded(void)
 /* The list is outdated, but states that it is not valid. */
 static void stale_checksums(void)
 {
-    poke("/chunk_sums", 0, 1);
-    poke("/chunk_sums", 2, 12345);
-    drop_attribute("/chunk_sums", "offset");
+    poke("/chunk_checksums", 0, 1);
+    poke("/chunk_checksums", 2, 12345);
+    drop_attribute("/chunk_checksums", "offset");
+}
+
+static size_t file_size;
+static void put_size(void)
+{
+    set_count("/chunk_checksums", "file_bytes", (int64_t)file_size);
+    set_count("/subtrees/chunk_directory", "file_bytes", (int64_t)file_size);
+}
+
+/* The object is not a list of checksums, and does not state the size of the file. */
+static void checksums_of_others(void)
+{
+    replace("/chunk_checksums", (new_array){ H5T_IEEE_F32BE, 3, 2, 0, false, false, NULL, NULL });
 }
 
 /* Their rows stay in the list, as those of arrays added by a later version. */
 static void without_the_word_colours(void)
 {
     set_text("/", "optional_parts", "planes maps leaf-planes attributes");
+}
+
+/* Adding attributes to a file enlarges it: the lists about chunks state the current size. */
+static void state_size(const char *name)
+{
+    char path[512];
+    size_t size;
+    ebpo_tree back;
+    ebpo_error error = EBPO_ERROR_INIT;
+    snprintf(path, sizeof path, "%s/passed/%s.ebpo.h5", folder, name);
+    free(slurp(path, &size));
+    file_size = size;
+    change_objects(path, put_size);
+    if (vector_read(path, &back, &error) != EBPO_OK)
+        die(name, error.message);
+    ebpo_tree_free(&back);
 }
 
 static void make_sums(void)
@@ -691,7 +716,76 @@ static void make_sums(void)
     write_file("55_chunk_sums_of_subtrees", &tree, &options);
     derive("56_chunk_sums_of_a_part_not_listed", "55_chunk_sums_of_subtrees",
            without_the_word_colours);
+    state_size("56_chunk_sums_of_a_part_not_listed");
     derive("57_chunk_sums_without_offset", "55_chunk_sums_of_subtrees", stale_checksums);
+    derive("63_chunk_checksums_of_others", "54_chunk_sums", checksums_of_others);
+}
+
+/* --- subtrees and gates, in files that are large enough --- */
+
+/* Columns of bytes, and of numbers. */
+static void add_smooth(ebpo_mesh *mesh)
+{
+    ebpo_attribute colour = { .element = "vertex",
+                              .names = "label layer order",
+                              .type = EBPO_ATTRIBUTE_UINT8,
+                              .list = EBPO_ATTRIBUTE_NO_LIST,
+                              .columns = 3 },
+                   smooth = { .element = "vertex",
+                              .names = "height slope",
+                              .type = EBPO_ATTRIBUTE_FLOAT64,
+                              .list = EBPO_ATTRIBUTE_NO_LIST,
+                              .columns = 2 };
+    mesh->attributes = ebpo_attributes_make(NULL);
+    if (!mesh->attributes || !ebpo_attributes_add(mesh->attributes, &colour) ||
+        !ebpo_attributes_add(mesh->attributes, &smooth))
+        die("smooth", "no memory");
+    for (int k = 0; k < 2; k++) {
+        ebpo_attribute *a = &mesh->attributes->array[k];
+        uint64_t items = mesh->vertex_count * a->columns;
+        if (!ebpo_attribute_reserve(NULL, a, mesh->vertex_count, items))
+            die("smooth", "no memory");
+        a->rows = mesh->vertex_count;
+        for (uint64_t i = 0; i < items; i++) {
+            double value = (double)(float)mesh->xyz64[i / 2 * 3 + 2 * (i % 2)];
+            if (k)
+                memcpy(a->values + 8 * i, &value, sizeof value);
+            else
+                a->values[i] = (uint8_t)(i * i >> 7);
+        }
+    }
+}
+
+/* A tetrahedron, and faces that share only one of its vertices, whose number is soon far back. */
+static ebpo_mesh fan(uint32_t faces)
+{
+    ebpo_mesh mesh = ebpo_test_tetrahedron(1);
+    for (uint32_t i = 0; i < faces; i++) {
+        double x = 2 + (double)(i % 64) / 64, y = (double)(i / 64) / 64;
+        uint32_t a = ebpo_test_append_vertex(&mesh, x, y, 1),
+                 b = ebpo_test_append_vertex(&mesh, x + 1.0 / 256, y, 1);
+        ebpo_test_append_face(&mesh, 0, a, b);
+    }
+    return mesh;
+}
+
+static void make_long(void)
+{
+    ebpo_tree tree;
+    ebpo_subset_options box = EBPO_SUBSET_OPTIONS_INIT;
+    build_float(&tree, fan(2400), (how){ 0, 10000, 0, 0, 0, 0, 0 });
+    write_gates("59_gates_of_five_bytes", &tree, EBPO_CODEC_ZSTD, 0);
+    box.boxed = true;
+    for (int k = 0; k < 3; k++)
+        box.max[k] = 0.6;
+    subset(&tree, "16_many_subtrees", &box);
+    write_laid_out("60_subset_with_subtrees", &tree, EBPO_CODEC_ZSTD, ~0u, 10);
+    build_mesh(&tree, ebpo_test_torus(1, 0.375, 80, 32), (how){ 5, 6, 0, 0, 0, 0, 0 });
+    write_laid_out("61_doubles_with_subtrees", &tree, EBPO_CODEC_ZSTD, ~0u, 10);
+    ebpo_mesh mesh = ebpo_test_torus(1, 0.375, 80, 32);
+    add_smooth(&mesh);
+    build_float(&tree, mesh, (how){ 4, 64, 0, 0, 0, 0, 0 });
+    write_laid_out("62_column_delta_over_chunks", &tree, EBPO_CODEC_ZSTD, ~0u, 100);
 }
 
 void make_passed(const char *to)
@@ -710,4 +804,5 @@ void make_passed(const char *to)
     make_dropped();
     make_sums();
     make_welded();
+    make_long();
 }

@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
-"""test_worked_example.py SOURCE [--update]: the table of the specification's section 10 says where
-the chunks of its vector lie, and what is in them, as HDF5 has it. --update puts the right offsets
-and sizes in; what is in the chunks, people write."""
+"""test_worked_example.py SOURCE [--update]: compares the worked example of format-spec/vectors/README.md
+with its vector: offsets of chunks, and their contents. --update corrects offsets and sizes only."""
 import pathlib
 import re
 import struct
@@ -11,11 +10,11 @@ import h5py
 
 CHECKSUM = 4  # fletcher32, behind each chunk
 source, update = pathlib.Path(sys.argv[1]), "--update" in sys.argv
-page = source / "format-spec" / "README.md"
+page = source / "format-spec" / "vectors" / "README.md"
 text = page.read_text()
-begin, end = text.index("## 10. "), text.index("## 11. ")
+begin, end = text.index("## 1. "), text.index("## 2. ")
 section = text[begin:end]
-vector = page.parent / re.search(r"\[(vectors/\S+)\]", section).group(1)
+vector = page.parent / re.search(r"\[(passed/\S+)\]", section).group(1)
 
 
 def bytes_of(cell):
@@ -55,6 +54,6 @@ if sizes not in section:
 if update:
     page.write_text(text[:begin] + mended + text[end:])
 elif problems:
-    print(f"{page}, section 10, and {vector.name}:", *problems, sep="\n  ")
+    print(f"{page}, section 1, and {vector.name}:", *problems, sep="\n  ")
     print("After a change that is meant: tests/vectors/test_worked_example.py . --update")
     sys.exit(1)

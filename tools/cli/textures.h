@@ -1,4 +1,4 @@
-/* Reads and writes images named by the attributes of a file: format-spec/README.md, section 18. */
+/* Reads and writes images named by the attributes of a file: format-spec/attributes.md. */
 #ifndef EBPO_TOOLS_TEXTURES_H
 #define EBPO_TOOLS_TEXTURES_H
 

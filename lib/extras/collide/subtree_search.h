@@ -39,7 +39,7 @@ double ebpo_node_far_bound(const ebpo_node_gaps *g, const ebpo_posed_node node[2
 int ebpo_node_larger(const ebpo_node_gaps *g, const ebpo_posed_node node[2]);
 
 /* A node may list a face that is outside its cell but near it: within 1/256 of the cell's size on
- * each axis (format-spec, section 5). This value adds a margin for rounding. */
+ * each axis (format-spec, section 7). This value adds a margin for rounding. */
 #define EBPO_NEAR_SHARE 0x1.1p-8
 
 /* Zero at first. */

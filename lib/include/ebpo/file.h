@@ -68,7 +68,7 @@ typedef enum ebpo_codec {
     EBPO_CODEC_NONE = 2
 } ebpo_codec;
 
-/* Coding of the vertex indices of faces (format-spec/README.md, section 7). */
+/* Coding of the vertex indices of faces (format-spec/README.md, section 9). */
 typedef enum ebpo_face_coding {
     /*
      * EBPO_FACES_GATES if the tree is from a file with this coding and the new file's codec is not
@@ -378,7 +378,7 @@ EBPO_API void ebpo_tree_free(ebpo_tree *tree);
 
 /*
  * Chunk checksums. Each chunk ends with a checksum; this list has a copy of the checksums of all
- * chunks (format-spec/README.md, section 20). With the list, readers detect a chunk that was
+ * chunks (format-spec/checksums.md). With the list, readers detect a chunk that was
  * replaced by another chunk or by another version of the chunk.
  */
 typedef enum ebpo_chunk_checksums {

@@ -22,7 +22,7 @@
  * coordinates, for all finite doubles. Results do not depend on the compiler, the floating-point
  * environment, the number of threads, the memory budget or the loading mode.
  *
- * Methods: BP 2008, chapter 5; EBP 2017, chapter 4; format-spec/README.md, section 5.
+ * Methods: BP 2008, chapter 5; EBP 2017, chapter 4; format-spec/README.md, section 10.
  */
 #ifndef EBPO_QUERY_H
 #define EBPO_QUERY_H

@@ -9,7 +9,7 @@
  * `file` may be opened by its URL: only kept data is fetched.
  *
  * The tree is cut at gray nodes, which are then *pruned*: they have envelopes and no children
- * (format-spec/README.md, section 5). Results from such a file are never wrong. Where data is
+ * (format-spec/README.md, section 7). Results from such a file are never wrong. Where data is
  * missing, queries with a level return EBPO_MAYBE or a wider interval, and exact queries
  * EBPO_E_ABSENT.
  */

@@ -56,7 +56,7 @@ const ways = ['flips', 'zeros', 'ones', 'cuts', 'swaps', 'of another'];
 async function damage(path) {
   const good = readFileSync(path), name = basename(path), right = await queryAll(good), step = Number(option.e), wrongs = [];
   const counts = Object.fromEntries(ways.map((way) => [way, { tried: 0, refused: 0, noticed: 0, harmless: 0, wrong: 0 }]));
-  const summed = right.chunks.some((c) => c.path === '/chunk_sums');
+  const summed = right.chunks.some((c) => c.path === '/chunk_checksums');
   const judge = async (way, at, bytes) => {
     const found = await queryAll(Buffer.from(bytes)).catch((error) => crashed(name, `${way}, byte ${at}`, bytes, error)), count = counts[way];
     count.tried++;

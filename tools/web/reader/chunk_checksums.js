@@ -1,7 +1,7 @@
-// Reads the chunk checksums, an optional list that detects swapped chunks: format-spec/README.md, section 20.
+// Reads the chunk checksums, an optional list that detects swapped chunks: format-spec/checksums.md, section 3.
 import { formatError } from './error.js';
 
-const WHERE = '/chunk_sums';
+const WHERE = '/chunk_checksums';
 
 /** Decodes the chunk checksums. `rows`: for each chunk, its checksum and its array's number; `arrays`: the file's arrays. Returns Map(array, Uint32Array of checksums). */
 export function readChecksums(rows, arrays) {

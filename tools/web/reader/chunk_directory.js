@@ -1,6 +1,6 @@
-// Reads the chunk directory of files with subtrees: format-spec/README.md, section 9, "Places".
+// Reads the chunk directory of files with subtrees: format-spec/subtrees.md, section 3.
 import { formatError } from './error.js';
-import { LEVELS_MAX, LEVEL_ARRAY_COUNT, PLACES } from './facts.js';
+import { PLACES } from './facts.js';
 
 /** Returns the number of an array in the directory. `order`: the array's index in its level. */
 export function arrayNumber(path, level, order) {
@@ -9,23 +9,26 @@ export function arrayNumber(path, level, order) {
 }
 
 const ROOT_NUMBERS = { '/mesh/vertices': 4096, '/mesh/faces': 4097, '/mesh/faces_index': 4098, '/maps/vertex_source': 4099, '/maps/face_source': 4100,
-  '/subtrees/index': 4112, '/subtrees/counts': 4113, '/subtrees/outer': 4114, '/subtrees/places': 4115, '/chunk_sums': 4116 }; // the chunk directory does not list itself, nor do the chunk checksums
+  '/subtrees/index': 4112, '/subtrees/counts': 4113, '/subtrees/shared_chunks': 4114,
+  '/subtrees/chunk_directory': 4115, '/chunk_checksums': 4116 }; // the chunk directory does not list itself, nor do the chunk checksums
 
 const WHERE = PLACES;
 
-// Returns true when an array with this number may be in the directory. Other numbers are gaps or belong to later versions.
-function isArray(number) {
-  return number < 64 * LEVELS_MAX ? number % 64 < LEVEL_ARRAY_COUNT : number < ROOT_NUMBERS[WHERE] && Object.values(ROOT_NUMBERS).includes(number);
+function stated(attributes, name) {
+  const a = attributes?.get(name);
+  return a?.type?.class === 'integer' && a.type.size === 8 && !a.type.signed && a.type.little && a.data.length >= 8
+    ? Number(new DataView(a.data.buffer, a.data.byteOffset, 8).getBigUint64(0, true)) : undefined;
+}
+
+/** Returns true when an object states the size of the file: only then is it a list about all chunks, whatever else it is. */
+export function statesSize(hdf5, address, path, size) {
+  return address !== undefined && stated(hdf5.object(address, path).attributes, 'file_bytes') === size;
 }
 
 /** Returns true when a list of all chunks is valid. A program that rewrites the file may keep an old list, which is then invalid. */
 export function isListValid(list, size) {
-  const { attributes } = list.object, stated = (name) => {
-    const a = attributes.get(name);
-    return a?.type?.class === 'integer' && a.type.size === 8 && !a.type.signed && a.type.little && a.data.length >= 8
-      ? Number(new DataView(a.data.buffer, a.data.byteOffset, 8).getBigUint64(0, true)) : undefined;
-  };
-  return stated('file_bytes') === size && list.chunks !== undefined && stated('offset') === list.chunks[0].at;
+  const { attributes } = list.object;
+  return stated(attributes, 'file_bytes') === size && list.chunks !== undefined && stated(attributes, 'offset') === list.chunks[0].at;
 }
 
 // Returns the offset of the first chunk in the directory, from the header of a level-0 array, which has a single chunk.
@@ -60,8 +63,6 @@ export function readDirectory(rows, arrays, size) {
         throw formatError(WHERE, `a chunk of ${array.path} has an invalid size`);
       chunks.push({ at, bytes });
     }
-    if (!array && isArray(rows[i + 1]))
-      throw formatError(WHERE, 'the list has a chunk of an array that the file does not have');
     at += bytes;
   }
   for (const [array, chunks] of out) {

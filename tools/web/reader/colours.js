@@ -1,4 +1,4 @@
-// Finds the colour attributes of a file and converts them to bytes: format-spec/README.md, section 18.
+// Finds the colour attributes of a file and converts them to bytes: format-spec/attributes.md.
 import { formatError } from './error.js';
 
 const CHANNELS = [['red', 'green', 'blue'], ['diffuse_red', 'diffuse_green', 'diffuse_blue']];
@@ -10,12 +10,12 @@ const ARRAYS_MOST = 1000, COLUMNS_MOST = 64;
 
 /** Returns the description of an array of the group, or undefined when it cannot hold colours. `text(name)` returns an attribute. */
 export function describeColumns(path, text, isList) {
-  const element = text('element'), names = text('names').split(' '), type = text('type'), coding = text('coding');
+  const element = text('element'), names = text('columns').split(' '), type = text('type'), coding = text('coding');
   if (isList || !['vertex', 'face'].includes(element))
     return undefined;
   if (!TYPES[type])
     throw formatError(path, 'attribute type: the format does not allow this value');
-  if (names.length > COLUMNS_MOST || !['plain', 'columns'].includes(coding))
+  if (names.length > COLUMNS_MOST || !['plain', 'column-delta'].includes(coding))
     throw formatError(path, "the format does not allow the array's number of columns or its coding");
   return { path, element, names, type, coding, elementSize: TYPES[type][0].BYTES_PER_ELEMENT };
 }
@@ -51,10 +51,10 @@ export function chooseColours(described) {
 export function decodeColours(bytes, array, rows) {
   const { cols, elementSize, columns: { type, coding } } = array, [Type, full] = TYPES[type], width = Math.max(cols, 1), out = new Uint8Array(rows * width);
   const whole = bytes.slice(0, rows * width * elementSize), values = new Type(whole.buffer);
-  if (coding === 'columns')
+  if (coding === 'column-delta')
     undo(whole, elementSize, type.startsWith('float'), rows);
   for (let i = 0; i < out.length; i++) {
-    const to = coding === 'columns' ? i % rows * width + Math.floor(i / rows) : i;
+    const to = coding === 'column-delta' ? i % rows * width + Math.floor(i / rows) : i;
     out[to] = Math.min(255, Math.max(0, values[i] / full * 255)) + 0.5; // NaN becomes 0
   }
   return out;

@@ -1,4 +1,4 @@
-// Decodes stored arrays to values and checks the values: format-spec/README.md, sections 4, 5 and 7.
+// Decodes stored arrays to values and checks the values: format-spec/README.md, sections 6, 7 and 9.
 import { formatError } from './error.js';
 import { INDEX_ROWS } from './facts.js';
 

@@ -31,7 +31,7 @@ const CUBE = {
 };
 export const cube = () => CUBE;
 
-/** Returns the half-space 4096 * (n . xi) <= d of a plane code (format-spec, section 6) as integers { n, d }. */
+/** Returns the half-space 4096 * (n . xi) <= d of a plane code (format-spec, section 8) as integers { n, d }. */
 export function decodePlane(code) {
   const u = (code & 1023) - 511, v = (code >>> 10 & 1023) - 511, w = 511 - Math.abs(u) - Math.abs(v);
   const n = w >= 0 ? [u, v, w] : [(u < 0 ? -1 : 1) * (511 - Math.abs(v)), (v < 0 ? -1 : 1) * (511 - Math.abs(u)), w];

@@ -1,4 +1,4 @@
-// Reads a file's header: root attributes, levels, and the table of arrays. format-spec/README.md, sections 3 and 4.
+// Reads a file's header: root attributes, levels, and the table of arrays. format-spec/README.md, sections 5 and 6.
 import { CHUNK_BYTES_MAX } from './chunk.js';
 import { EbpoError, formatError } from './error.js';
 import { text } from './hdf5.js';
@@ -8,7 +8,7 @@ const MESH_MAX = 2 ** 32 - 2, NODES_MAX = 2 ** 40;
 const KNOWN_PARTS = ['levels', 'mesh', 'planes', 'maps', 'leaf-planes', 'attributes', 'colours', 'subtrees', 'gates', 'pruned'];
 
 const WORDS = { kind: ['surface', 'solid'], winding_rule: ['nonzero', 'evenodd', 'positive'], coordinate_type: ['float32', 'float64'] };
-const TEXTS = ['source_name', 'source_format', 'unit', 'crs', 'date'];
+const TEXTS = { source_name: 255, source_format: 15, unit: 31, crs: 255, date: 31 }; // most bytes
 const FLAGS = ['mend_weld', 'mend_orient', 'mend_fill_holes', 'mesh_balanced', 'mesh_manifold', 'mesh_genus_known'];
 const COUNTS = ['source_size', 'vertex_count', 'face_count', 'source_vertex_count', 'source_face_count', 'leaf_faces', 'mend_welded_vertices',
   'mend_flipped_faces', 'mend_unorientable', 'mend_filled_holes', 'mend_added_faces', 'mend_unfilled_holes', 'mesh_boundary_edges',
@@ -120,6 +120,16 @@ function readParts(facts) {
   return seen;
 }
 
+// Checks how planes were chosen; nothing else depends on it.
+function readSelection(facts) {
+  if (!facts.has('selection') || !['kmedoids', 'offset', 'random'].includes(facts.text('selection', 63)))
+    return;
+  const [percent] = facts.reals('selection_percent', 1), [kRoot] = facts.reals('selection_k_root', 1);
+  facts.count('selection_seed', Number.MAX_VALUE);
+  if (!(percent >= 0 && percent <= 100) || !(kRoot >= 0 && Number.isFinite(kRoot)))
+    throw facts.fail('selection_percent', 'it has a value that the format does not allow');
+}
+
 /** Returns the root's attributes as an object with the attributes' names, and `parts`, a Set of words. */
 export function readFacts(attributes) {
   const facts = new Facts(attributes, '/'), out = {};
@@ -137,9 +147,10 @@ export function readFacts(attributes) {
   if (facts.has('format_version') && facts.text('format_version') === '1.0-draft') // files of the draft have the same version numbers; only this text differs
     throw new EbpoError('VERSION', 'the file was written by a draft of the format, which is no longer supported; convert the model again');
   out.parts = readParts(facts);
-  out.generator = facts.text('generator');
-  for (const name of TEXTS)
-    out[name] = facts.has(name) ? facts.text(name) || undefined : undefined;
+  out.generator = facts.text('generator', 63);
+  for (const [name, most] of Object.entries(TEXTS))
+    out[name] = facts.has(name) ? facts.text(name, most) || undefined : undefined;
+  readSelection(facts);
   for (const name of Object.keys(WORDS))
     out[name] = facts.word(name);
   for (const name of FLAGS)
@@ -200,7 +211,7 @@ export function readLevelFacts(attributes, where) {
   return out;
 }
 
-/** Returns true when an axis of the root box is on a grid of exact doubles (format-spec, section 5). Computes exactly, in integers. */
+/** Returns true when an axis of the root box is on a grid of exact doubles (format-spec, section 7). Computes exactly, in integers. */
 function axisValid(origin, size, gridLevel) {
   const largest = 2 ** 1002;
   if (!(Math.abs(origin) <= largest && size > 0 && size <= largest))
@@ -315,7 +326,6 @@ const LEVEL_ARRAYS = {
   leaf_planes: [0, [4], false, (info, s) => has(info, 'leaf-planes', s.leaf_planes)],
   gray_colours: [0, [4], false, (info, s) => has(info, 'colours', s.gray)],
 };
-export const LEVEL_ARRAY_COUNT = Object.keys(LEVEL_ARRAYS).length;
 const CODINGS = { // the coding of other arrays is plain
   leaf_skip: ['skips', 'delta'], leaf_refs: ['gap'], '/mesh/vertices': ['delta'], '/mesh/faces': ['high-water'], '/maps/vertex_source': ['delta'],
   '/maps/face_source': ['delta'],
@@ -335,7 +345,7 @@ const ROOT_ARRAYS = {
 /** Throws unless an array's attribute names the coding that the format requires. Older files have `delta` for leaf_skip. */
 export function checkCoding(attributes, path, gates) {
   const word = new Facts(attributes, path).text('coding', 15), name = path.startsWith('/levels/') ? path.slice(path.lastIndexOf('/') + 1) : path;
-  if (!(path.startsWith('/attributes/') ? ['plain', 'columns'] : gates ? ['gates'] : CODINGS[name] ?? ['plain']).includes(word))
+  if (!(path.startsWith('/attributes/') ? ['plain', 'column-delta'] : gates ? ['gates'] : CODINGS[name] ?? ['plain']).includes(word))
     throw formatError(path, "the array's coding is not valid for this array");
 }
 
@@ -348,7 +358,7 @@ export function attributesFacts(attributes, path) {
 /** Returns the columns of /subtrees/counts. */
 export const subtreeCols = (info) => 6 + 7 * (info.level_count - 1 - info.subtree_level);
 
-export const PLACES = '/subtrees/places', CHUNK_SUMS = '/chunk_sums';
+export const PLACES = '/subtrees/chunk_directory', CHUNK_SUMS = '/chunk_checksums';
 
 /** Returns true for lists about all chunks. Such a list is itself a single chunk, and no list contains it. */
 export const isList = (path) => path === PLACES || path === CHUNK_SUMS;
@@ -357,7 +367,7 @@ export const isList = (path) => path === PLACES || path === CHUNK_SUMS;
 const subtreeArrays = (info) => (info.subtree_level === undefined ? [] : [
   { path: '/subtrees/counts', cols: subtreeCols(info), sizes: [4], rows: info.levels[info.subtree_level].gray },
   { path: '/subtrees/index', cols: subtreeCols(info), sizes: [8], rows: undefined },
-  { path: '/subtrees/outer', cols: 0, sizes: [4], rows: undefined, mayBeAbsent: true },
+  { path: '/subtrees/shared_chunks', cols: 0, sizes: [4], rows: undefined, mayBeAbsent: true },
   { path: PLACES, cols: 0, sizes: [8], rows: undefined },
 ]);
 

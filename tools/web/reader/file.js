@@ -2,12 +2,12 @@
 import { CHUNK_BYTES_MAX, chunkBound, pipelineOf } from './chunk.js';
 import { EbpoError, foreignError, formatError } from './error.js';
 import { chooseColours, columnPaths, describeColumns } from './colours.js';
-import { INDEX_ROWS, PLACES, arraysOf, attributesFacts, checkCoding, checkFacts, chunkRows, chunkRowsFit, isList, readFacts, readLevelFacts } from './facts.js';
+import { CHUNK_SUMS, INDEX_ROWS, PLACES, arraysOf, attributesFacts, checkCoding, checkFacts, chunkRows, chunkRowsFit, isList, readFacts, readLevelFacts } from './facts.js';
 import { GATES_COLS } from './gates.js';
 import { Hdf5, NeedBytes } from './hdf5.js';
 import { checkIndexes, checkLevel, checkOrder, decodeFaces, decodeLeaves, decodeMap, decodeVertices, recode } from './decode.js';
 import { Parts } from './parts.js';
-import { arrayNumber, isListValid, readDirectory } from './chunk_directory.js';
+import { arrayNumber, isListValid, readPlaces, statesSize } from './chunk_directory.js';
 import { sourceOf } from './source.js';
 import { Store, everyChunk } from './store.js';
 
@@ -111,6 +111,8 @@ export class EbpoFile {
       const cut = wanted.path.lastIndexOf('/'), links = objects.get(wanted.path.slice(0, cut) || '/').links, name = wanted.path.slice(cut + 1);
       if (wanted.mayBeAbsent && !links.has(name))
         continue;
+      if (wanted.path === CHUNK_SUMS && !statesSize(hdf5, links.get(name), wanted.path, this.source.size))
+        continue; // left by a program that rewrote the file
       arrays.set(wanted.path, describe(hdf5, wanted, links.has(name), links.get(name), info));
     }
     if (info.parts.has('attributes') && arrays.get('/levels/00/types').pipeline !== 'bare') // without chunk checksums, the attributes' checksum would have to be compared
@@ -254,7 +256,7 @@ export class EbpoFile {
    * Reads levels first .. last in as few requests as possible. With `faces`, reads the face lists of their leaves too.
    * Each: { level, summary, groups, types, planeCounts, planes, leafWinding, blackWinding, whiteWinding, leafPlaneCounts, leafPlanes,
    *         leafFirst, leafNew, leafRefCount, leafRefs }
-   * as typed arrays; undefined where the file has no such array (format-spec, section 4). Windings are Int32Array, leafRefs ascending.
+   * as typed arrays; undefined where the file has no such array (format-spec, section 6). Windings are Int32Array, leafRefs ascending.
    */
   async levels(first, last, { faces = false } = {}) {
     if (!(first >= 0 && first <= last && last < this.info.level_count))
@@ -476,7 +478,7 @@ export class EbpoFile {
     }
   }
 
-  /** Compares content_sha256 and colours_sha256 (format-spec, section 8). Reads the whole file. Pages can use it only over https and from localhost. */
+  /** Compares content_sha256 and colours_sha256 (format-spec/checksums.md). Reads the whole file. Pages can use it only over https and from localhost. */
   async verifyContent() {
     const of = (path) => (path.endsWith('/gray_colours') ? 'colours_sha256' : 'content_sha256');
     const paths = [...this.arrays.keys()].filter((p) => !isList(p) && !/^\/(subtrees|attributes)\//.test(p)).sort();

@@ -1,4 +1,4 @@
-// Decodes the coding `gates` of faces (format-spec/README.md, section 7), which codes faces across open edges: converts a chunk's streams to high-water codes.
+// Decodes the coding `gates` of faces (format-spec/gates.md), which codes faces across open edges: converts a chunk's streams to high-water codes.
 
 export const GATES_COLS = 13;
 const OPEN_MOST = 64, NEAR = 32, LOW_END = 224, LONG = 240;

@@ -7,7 +7,7 @@ import { axisCrossing, onTriangle } from './predicates.js';
 
 const MORE = 1 + 1e-12, LESS = 1 - 1e-12; // factors for lengths: the rounding error is about 1e-15
 const TOGETHER = 8, TOGETHER_MOST = 64;   // initial and greatest number of leaves whose faces are requested together
-const NEAR = 1 / 256;                     // a gray node or leaf has surface within its cell enlarged by this share: format-spec, section 5
+const NEAR = 1 / 256;                     // a gray node or leaf has surface within its cell enlarged by this share: format-spec, section 7
 
 /** Returns true when p is certainly outside one of the node's own half-spaces. Computes in doubles with a margin: values are up to 2^22, errors below 1e-8. */
 function beyondPlanes(tree, node, p) {

@@ -25,7 +25,7 @@ const NONE = new Uint32Array(0);
 
 export class Segment {
   /**
-   * Creates a segment whose first group is `group`. The arrays are ranges of the arrays in format-spec, section 4. `first`: ranks of the first white, black, leaf
+   * Creates a segment whose first group is `group`. The arrays are ranges of the arrays in format-spec, section 6, from there on. `first`: ranks of the first white, black, leaf
    * and gray node. Arrays that were not read are undefined.
    */
   constructor({ level, group = 0, first = [0, 0, 0, 0], types, planeCounts, planes, leafPlaneCounts, leafPlanes, leafWinding, blackWinding, whiteWinding, grayColours }) {

@@ -1,4 +1,4 @@
-// Reads the table of subtrees: the counts and the first rows of each subtree in every array. format-spec/README.md, section 9, "The table".
+// Reads the table of subtrees: the counts and the first rows of each subtree in every array. format-spec/subtrees.md, section 1.
 import { formatError } from './error.js';
 import { FIXED_ROWS, subtreeCols } from './facts.js';
 
@@ -22,7 +22,7 @@ export class Subtrees {
     this.info = store.info;
     this.cols = subtreeCols(store.info);
     this.counts = store.arrays.get(COUNTS);
-    this.outer = store.arrays.get('/subtrees/outer');
+    this.outer = store.arrays.get('/subtrees/shared_chunks');
     this.limits = limits(store.info, this.outer?.rows ?? 0);
     this.checked = new Set(); // chunks of counts whose sums were checked
   }
@@ -89,7 +89,7 @@ export class Subtrees {
 
   /** Returns the chunks of faces and vertices of subtrees that the table names: [{ array, chunk }]. */
   async blocks(rows) {
-    const ranges = rows.map((r) => ({ path: '/subtrees/outer', from: r.outer, to: r.outer + r.outerFaces + r.outerVertices })), { store } = this;
+    const ranges = rows.map((r) => ({ path: '/subtrees/shared_chunks', from: r.outer, to: r.outer + r.outerFaces + r.outerVertices })), { store } = this;
     const outer = await store.rows(ranges), out = new Map();
     const add = (path, first, count, distances) => {
       const array = store.arrays.get(path), rows = FIXED_ROWS[path], block = Math.floor(first / rows); // `block` may be beyond the end of a short array

@@ -1,4 +1,4 @@
-// Builds the octree of nodes with children from levels as they arrive: format-spec/README.md, section 5.
+// Builds the octree of nodes with children from levels as they arrive: format-spec/README.md, section 7.
 import { BLACK, GRAY, LEAF } from './decode.js';
 import { cube, envelope } from './envelope.js';
 import { INDEX_ROWS } from './facts.js';

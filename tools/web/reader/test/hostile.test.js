@@ -79,7 +79,7 @@ function withWrongEnd(data, { at, bytes: length }) {
 }
 
 test('levels are returned before the chunk checksums arrive; a wrong level is reported when they have arrived', async () => {
-  const list = (await openEbpo(summed)).arrays.get('/chunk_sums').chunks[0], wrong = withWrongEnd(summed, list);
+  const list = (await openEbpo(summed)).arrays.get('/chunk_checksums').chunks[0], wrong = withWrongEnd(summed, list);
   for (const data of [summed, wrong]) {
     let open;
     const file = await openEbpo(new SlowSource(data, list.at, new Promise((done) => (open = done))));
@@ -96,7 +96,8 @@ test('levels are returned before the chunk checksums arrive; a wrong level is re
 
 // The chunk directory of a file that has arrays with several chunks, as pairs of size and number.
 const many = await openEbpo(readFileSync(new URL('../../../../format-spec/vectors/passed/16_many_subtrees.ebpo.h5', import.meta.url)));
-const list = many.arrays.get('/subtrees/places'), arrays = [...many.arrays.values()].filter((a) => a !== list), [stored] = await Promise.all(many.store.cache.decoded([{ array: list, chunk: 0 }]));
+const list = many.arrays.get('/subtrees/chunk_directory');
+const arrays = [...many.arrays.values()].filter((a) => a !== list), [stored] = await Promise.all(many.store.cache.decoded([{ array: list, chunk: 0 }]));
 const placed = (change) => {
   const rows = new Uint32Array(stored.slice().buffer);
   change(rows, rows.length - 2);
@@ -106,13 +107,13 @@ const placed = (change) => {
 test('chunk directory: a chunk too many, too few, too large, beyond the end, at a wrong offset', async () => {
   assert.deepEqual([...placed(() => {}).values()].map((chunks) => chunks.length), arrays.map((a) => a.chunkCount));
   const wrong = (change, expected) => assert.throws(() => placed(change), (error) => error instanceof EbpoError && error.code === 'FORMAT' && expected.test(error.message));
-  wrong((rows) => (rows[3] = rows[1]), /\/subtrees\/places: .*more chunks/);
-  wrong((rows, last) => (rows[last + 1] = 70000), /\/subtrees\/places: .*fewer chunks/);
-  wrong((rows, last) => (rows[last] = 2 ** 32 - 1), /\/subtrees\/places: a chunk reaches beyond the end/);
-  wrong((rows) => (rows[6] += 1), /\/subtrees\/places: .*at another offset/);
-  wrong((rows) => (rows[6] = 0), /\/subtrees\/places: .*invalid size/);
-  wrong((rows) => (rows[6] = 100000), /\/subtrees\/places: .*(invalid size|beyond the end)/);
-  wrong((rows) => rows.fill(70000), /\/subtrees\/places: the chunks of level 0 are missing/);
+  wrong((rows) => (rows[3] = rows[1]), /\/subtrees\/chunk_directory: .*more chunks/);
+  wrong((rows, last) => (rows[last + 1] = 70000), /\/subtrees\/chunk_directory: .*fewer chunks/);
+  wrong((rows, last) => (rows[last] = 2 ** 32 - 1), /\/subtrees\/chunk_directory: a chunk reaches beyond the end/);
+  wrong((rows) => (rows[6] += 1), /\/subtrees\/chunk_directory: .*at another offset/);
+  wrong((rows) => (rows[6] = 0), /\/subtrees\/chunk_directory: .*invalid size/);
+  wrong((rows) => (rows[6] = 100000), /\/subtrees\/chunk_directory: .*(invalid size|beyond the end)/);
+  wrong((rows) => rows.fill(70000), /\/subtrees\/chunk_directory: the chunks of level 0 are missing/);
   await many.locate();
   for (const [array, chunks] of placed(() => {}))
     assert.deepEqual(chunks, array.chunks.map(({ at, bytes }) => ({ at, bytes })), array.path);
@@ -121,7 +122,7 @@ test('chunk directory: a chunk too many, too few, too large, beyond the end, at 
 test('outdated chunk directories are not used', async () => {
   const bytes = many.source.data;
   async function positionsOf(change) {
-    const file = await openEbpo(bytes), { attributes } = file.arrays.get('/subtrees/places').object;
+    const file = await openEbpo(bytes), { attributes } = file.arrays.get('/subtrees/chunk_directory').object;
     change(attributes);
     let reads = 0;
     const { cache } = file.store, decoded = cache.decoded.bind(cache);
@@ -183,7 +184,7 @@ test('500 random changes of the tables: an error or the same result', async () =
 });
 
 test('a chunk directory without a known offset is invalid', () => {
-  const places = good.arrays.get('/subtrees/places');
+  const places = good.arrays.get('/subtrees/chunk_directory');
   assert.equal(isListValid(places, original.length), true);
   assert.equal(isListValid(places, original.length + 1), false);
   assert.equal(isListValid({ ...places, chunks: undefined }, original.length), false);

@@ -1,0 +1,113 @@
+/* Checks the faces of a subtree against the file's table of subtrees. Only a visit of all leaves in
+ * depth-first order determines where the new faces of each level begin: a wrong column of ends
+ * shifts the faces of one level, and no sum detects that. The leaves of a whole subtree are
+ * checked where they are read; this check is for readers of a part of a subtree. One chunk of each
+ * array and level is pinned at a time; nothing is allocated. Source: format-spec/subtrees.md,
+ * rule RC.4. */
+#include <string.h>
+
+#include "core/endian.h"
+#include "format/subtree_faces.h"
+#include "format/subtree_index.h"
+#include "geometry/level_nodes.h"
+
+enum { TYPES, SKIP, NEW, LISTS };
+
+typedef struct visit {
+    ebpo_chunks *chunks;
+    const ebpo_subtree_row *row;
+    ebpo_held_chunk view[EBPO_LEVELS_MAX][LISTS];
+    /* of each level: next group and leaf, and the end of the new faces of the leaf before */
+    uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX], end[EBPO_LEVELS_MAX];
+    uint64_t face; /* next new face */
+} visit;
+
+static ebpo_status faces_differ(const visit *v, ebpo_error *error)
+{
+    return ebpo_chunks_fail(v->chunks, -1, EBPO_A_SUBTREE_COUNTS,
+                            "a row contradicts the faces of its subtree", error);
+}
+
+static ebpo_status load_item(visit *v, int level, int list, uint64_t at, uint64_t *value,
+                             ebpo_error *error)
+{
+    ebpo_held_chunk *view = &v->view[level][list];
+    if (at >= view->array->shape.rows || !view->array->present)
+        return faces_differ(v, error);
+    ebpo_status status = ebpo_held_chunk_move(v->chunks, view, at, error);
+    if (status != EBPO_OK)
+        return status;
+    unsigned size = view->array->shape.element_size;
+    const uint8_t *bytes = view->rows + (at - view->begin) * size;
+    *value = size == 1 ? *bytes : size == 2 ? ebpo_load16(bytes) : ebpo_load32(bytes);
+    return EBPO_OK;
+}
+
+static ebpo_status visit_leaf(visit *v, int level, ebpo_error *error)
+{
+    uint64_t at = v->leaf[level]++, skip = 0, fresh = 0;
+    ebpo_status status = load_item(v, level, SKIP, at, &skip, error);
+    if (status == EBPO_OK)
+        status = load_item(v, level, NEW, at, &fresh, error);
+    if (status == EBPO_OK && v->end[level] + skip != v->face)
+        status = faces_differ(v, error);
+    v->face += fresh;
+    v->end[level] = v->face;
+    return status;
+}
+
+static ebpo_status visit_group(visit *v, int level, ebpo_error *error)
+{
+    const ebpo_info *info = &v->chunks->file->info;
+    uint64_t types = 0;
+    ebpo_status status = v->group[level] < ebpo_subtree_groups(info, v->row, level, true)
+                             ? load_item(v, level, TYPES, v->group[level]++, &types, error)
+                             : faces_differ(v, error);
+    for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
+        ebpo_node_type type = ebpo_group_type((uint16_t)types, octant);
+        if (type == EBPO_GRAY && level + 1 < info->level_count)
+            status = visit_group(v, level + 1, error);
+        else if (type == EBPO_LEAF)
+            status = visit_leaf(v, level, error);
+    }
+    return status;
+}
+
+static ebpo_status visit_subtree(ebpo_chunks *chunks, const ebpo_subtree_row *row,
+                                 ebpo_error *error)
+{
+    static const ebpo_array_id arrays[LISTS] = { EBPO_A_TYPES, EBPO_A_LEAF_SKIP, EBPO_A_LEAF_NEW };
+    const ebpo_info *info = &chunks->file->info;
+    visit v = { .chunks = chunks, .row = row, .face = row->face };
+    for (int level = info->subtree_level + 1; level < info->level_count; level++) {
+        v.group[level] = ebpo_subtree_groups(info, row, level, false);
+        v.leaf[level] = row->before[ebpo_subtree_column(info, level, EBPO_S_LEAF)];
+        v.end[level] = row->before[ebpo_subtree_column(info, level, EBPO_S_ENDS)];
+        for (int list = 0; list < LISTS; list++)
+            v.view[level][list].array = ebpo_reader_array(chunks->file, arrays[list], level);
+    }
+    ebpo_status status = visit_group(&v, info->subtree_level + 1, error);
+    for (int level = info->subtree_level + 1; level < info->level_count; level++)
+        for (int list = 0; list < LISTS; list++)
+            ebpo_held_chunk_release(chunks, &v.view[level][list]);
+    uint64_t has = row->after[EBPO_S_FACES] - row->before[EBPO_S_FACES];
+    return status == EBPO_OK && v.face != row->face + has ? faces_differ(&v, error) : status;
+}
+
+ebpo_status ebpo_subtree_faces_check(ebpo_chunks *chunks, const ebpo_node *node, ebpo_error *error)
+{
+    const ebpo_info *info = &chunks->file->info;
+    ebpo_subtree_row row;
+    if (chunks->counted)
+        return EBPO_OK;
+    unsigned what = node->type == EBPO_GRAY ? EBPO_S_GRAY : EBPO_S_LEAF;
+    ebpo_status status =
+        ebpo_subtree_table_find(chunks, ebpo_subtree_column(info, node->cell.level, what),
+                                node->rank, &row, error);
+    if (status != EBPO_OK || ebpo_subtree_faces_known(chunks, row.subtree))
+        return status;
+    status = visit_subtree(chunks, &row, error);
+    if (status == EBPO_OK)
+        ebpo_subtree_faces_note(chunks, row.subtree);
+    return status;
+}
