@@ -118,7 +118,7 @@ void ebpo_corner_windings(const ebpo_box *box, ebpo_cell cell, const ebpo_triang
  * cell, on return the leaf's. `inside_corners`: bit i set when corner i is in the solid; `epsilon`
  * > 0: greedy selection, for planes that will be stored; 0: ebpo_select_all, for planes that are
  * derived and cost no byte. Writes at most EBPO_PLANES_MAX codes and returns their number. EBP
- * 2017, section 3.4. */
+ * 2017, section 3.3.4. */
 int ebpo_leaf_planes(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces,
                      uint64_t count, unsigned inside_corners, double epsilon,
                      ebpo_polytope *envelope, uint32_t codes[EBPO_PLANES_MAX]);
