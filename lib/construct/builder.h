@@ -108,6 +108,7 @@ typedef struct ebpo_builder {
     _Atomic uint64_t leaf_count, entry_count; /* in all pieces so far */
     struct ebpo_top_envelope *top_envelope;   /* envelopes of the top's gray nodes, by detail */
     struct ebpo_store *store;
+    const struct ebpo_thesis_run *thesis; /* NULL: a tree for a file is built */
 } ebpo_builder;
 
 static inline void ebpo_build_triangle(const ebpo_builder *b, uint32_t face, ebpo_triangle *out)

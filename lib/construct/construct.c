@@ -25,6 +25,7 @@
 #include "construct/planes.h"
 #include "construct/construct_stages.h"
 #include "construct/supports.h"
+#include "construct/thesis_levels.h"
 #include "ebpo_config.h"
 
 /* Implements EBP 2017, equation 3: returns the least i >= 1 for which the longest side of the
@@ -268,6 +269,8 @@ static ebpo_status build_tree(ebpo_builder *b, ebpo_error *error)
     ebpo_status status = ebpo_build_corner_windings(b, error);
     if (status == EBPO_OK)
         status = ebpo_build_propose(b, error);
+    if (b->thesis)
+        return status;
     if (status == EBPO_OK)
         status = ebpo_build_top(b, error);
     if (status == EBPO_OK)
@@ -280,6 +283,8 @@ static ebpo_status run_stages(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, 
     ebpo_status status = ebpo_build_split(b, error);
     if (status == EBPO_OK)
         status = build_tree(b, error);
+    if (b->thesis)
+        return status;
     if (status == EBPO_OK && !ebpo_progress_stage(&b->options->progress, "joining levels", error))
         status = EBPO_E_CANCELLED;
     if (status == EBPO_OK)
@@ -296,16 +301,18 @@ static ebpo_status run_stages(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, 
     return status;
 }
 
-ebpo_status ebpo_build(ebpo_mesh *mesh, const ebpo_mesh_report *report,
-                       const ebpo_repair_record *repair_record, const ebpo_build_options *options,
-                       ebpo_tree *out, ebpo_error *error)
+static ebpo_status build_mesh(ebpo_mesh *mesh, const ebpo_mesh_report *report,
+                              const ebpo_repair_record *repair_record,
+                              const ebpo_build_options *options, const ebpo_thesis_run *thesis,
+                              ebpo_tree *out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     ebpo_build_options wanted = EBPO_BUILD_OPTIONS_INIT;
     ebpo_build_times times = EBPO_BUILD_TIMES_INIT, *requested = NULL;
     ebpo_builder b = { .workspace = mesh->workspace,
                        .top.workspace = mesh->workspace,
-                       .bounds.workspace = mesh->workspace };
+                       .bounds.workspace = mesh->workspace,
+                       .thesis = thesis };
     memset(out, 0, sizeof *out);
     out->workspace = out->mesh.workspace = mesh->workspace;
     for (int i = 0; i < EBPO_LEVELS_MAX; i++)
@@ -333,5 +340,43 @@ ebpo_status ebpo_build(ebpo_mesh *mesh, const ebpo_mesh_report *report,
     ebpo_mesh_free(mesh);
     if (status != EBPO_OK)
         ebpo_tree_free(out);
+    return status;
+}
+
+ebpo_status ebpo_build(ebpo_mesh *mesh, const ebpo_mesh_report *report,
+                       const ebpo_repair_record *repair_record, const ebpo_build_options *options,
+                       ebpo_tree *out, ebpo_error *error)
+{
+    return build_mesh(mesh, report, repair_record, options, NULL, out, error);
+}
+
+ebpo_status ebpo_build_as_theses(ebpo_mesh *mesh, const ebpo_mesh_report *report,
+                                 const ebpo_build_options *options, ebpo_coalescing coalesce,
+                                 ebpo_thesis_levels *out, ebpo_error *error)
+{
+    ebpo_build_options wanted = EBPO_BUILD_OPTIONS_INIT;
+    ebpo_thesis_levels levels = EBPO_THESIS_LEVELS_INIT;
+    ebpo_thesis_run run = { coalesce, &levels };
+    ebpo_tree none;
+    ebpo_status status = EBPO_TAKE(ebpo_build_options, &wanted, options, error);
+    if (status == EBPO_OK)
+        status = EBPO_CHECK_SIZED(ebpo_thesis_levels, out, error);
+    if (status == EBPO_OK && (unsigned)coalesce > EBPO_COALESCE_MEAN)
+        status = ebpo_fail(error, EBPO_E_ARGUMENT, "unknown criterion of leaves %d", (int)coalesce);
+    const ebpo_selection_traits *traits = ebpo_selection_describe(wanted.select);
+    if (status == EBPO_OK && !(traits && traits->from_leaves))
+        status = ebpo_fail(error, EBPO_E_ARGUMENT,
+                           "selection %d is not one of the theses: kmedoids, offset or random",
+                           (int)wanted.select);
+    if (status != EBPO_OK) {
+        ebpo_mesh_free(mesh);
+        return status;
+    }
+    wanted.parts |= EBPO_PART_PLANES | EBPO_PART_LEAF_PLANES;
+    status = build_mesh(mesh, report, NULL, &wanted, &run, &none, error);
+    if (status == EBPO_OK) {
+        ebpo_tree_free(&none);
+        EBPO_GIVE(ebpo_thesis_levels, out, &levels);
+    }
     return status;
 }

@@ -1,4 +1,4 @@
-/* Computes the envelope of a leaf from its faces (EBP 2017, 3.4). Readers derive the same planes
+/* Computes the envelope of a leaf from its faces (EBP 2017, 3.3.4). Readers derive the same planes
  * from the same faces, bit for bit, so most files do not store them.
  *
  * The candidates' directions are those of the convex hull of the extreme points: the corners of the

@@ -16,6 +16,7 @@
 #include "construct/construct_stages.h"
 #include "construct/pieces.h"
 #include "construct/supports.h"
+#include "construct/thesis_levels.h"
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/hash.h"
@@ -54,9 +55,15 @@ typedef struct grower {
     ebpo_error *error;
 } grower;
 
+/* Returns true when leaves are made by a criterion of the theses, after all levels. */
+static bool coalesces_late(const ebpo_builder *b)
+{
+    return b->thesis && b->thesis->coalesce != EBPO_COALESCE_DISTINCT;
+}
+
 static bool is_leaf(const ebpo_builder *b, int level, uint64_t count)
 {
-    return level == b->max_level || count <= b->options->leaf_faces;
+    return level == b->max_level || (count <= b->options->leaf_faces && !coalesces_late(b));
 }
 
 ebpo_status ebpo_build_check_lists(uint64_t face_count, uint64_t leaves, uint64_t entries,
@@ -174,8 +181,9 @@ static bool set_has(const face_set *set, uint32_t face)
 /* Empties the set, which has space for one face more than a leaf may list. */
 static bool set_start(face_set *set, uint64_t most)
 {
-    if (!set->slots) {
+    if (!set->slots || set->mask < 2 * (most + 2) - 1) {
         uint64_t size = ebpo_hash_slots(2 * (most + 2));
+        free(set->slots);
         set->slots = ebpo_alloc_zero(size, sizeof *set->slots);
         set->mask = size - 1;
     }
@@ -195,6 +203,8 @@ static ebpo_status collapse_if_few(grower *g, uint32_t index, ebpo_cell cell, ui
     ebpo_build_detail d = s->details[gray.detail];
     uint64_t most =
         g->b->options->leaf_faces < g->b->face_count ? g->b->options->leaf_faces : g->b->face_count;
+    if (coalesces_late(g->b) && !ebpo_thesis_coalesces(g->b, s, index, &most))
+        return EBPO_OK;
     if (!set_start(&g->set, most))
         return no_memory_for_cells(g->error);
     for (uint64_t i = d.entry_begin; i < d.entry_end; i++) {

@@ -86,6 +86,7 @@ void ebpo_proposals_free(ebpo_proposals *p)
         free(p->count);
         free(p->codes);
     }
+    free(p->thesis);
     ebpo_handover_free(&p->root);
     free(p);
 }
@@ -105,7 +106,7 @@ bool ebpo_handover_add(ebpo_handover *h, uint32_t normal, double origin)
 {
     if (!ebpo_grow(&h->offers, &h->offer_capacity, h->offer_count + 1, sizeof *h->offers))
         return false;
-    h->offers[h->offer_count++] = (ebpo_offer){ normal, origin };
+    h->offers[h->offer_count++] = (ebpo_offer){ normal, 0, origin };
     return true;
 }
 

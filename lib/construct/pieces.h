@@ -25,9 +25,10 @@ void ebpo_piece_levels_free(ebpo_piece_level *out);
 
 /* --- planes chosen from the leaves up, and the data that nodes pass to their parents --- */
 
-/* A plane that a node's parent may choose. */
+/* A plane that a node's parent may choose: its normal, its position in the node's order, and n . xi
+ * of its face. */
 typedef struct ebpo_offer {
-    uint32_t normal;
+    uint32_t normal, place;
     double origin; /* n . xi at the centroid of the plane's face */
 } ebpo_offer;
 
@@ -45,8 +46,9 @@ typedef struct ebpo_proposals {
     uint8_t *count;  /* [detail_count] */
     uint32_t *codes;
     uint64_t code_count, code_capacity;
-    bool packed;        /* the arrays are in the builder's store */
-    ebpo_handover root; /* data of a subtree's root, until the top has used them */
+    bool packed;               /* the arrays are in the builder's store */
+    ebpo_thesis_level *thesis; /* [EBPO_LEVELS_MAX] sums; NULL: a tree for a file is built */
+    ebpo_handover root;        /* data of a subtree's root, until the top has used them */
 } ebpo_proposals;
 
 /* Makes proposals without planes. Returns false when out of memory. */

@@ -39,7 +39,10 @@ typedef struct ebpo_candidate {
 typedef struct ebpo_choice {
     const ebpo_candidate *candidates; /* [count] no two have the same normal */
     int count;                        /* number of candidates */
-    int most;                         /* maximum number of codes */
+    /* random: [count] the candidates in the node's order, that of its faces or of its children;
+     * NULL: the order of the array */
+    const int *order;
+    int most; /* maximum number of codes */
     /* greedy selection: volume that no candidate can remove, in cells (0: not known) */
     double core;
     /* greedy selection: a plane must remove at least `epsilon` of the cell's volume, or cut off a
@@ -63,15 +66,22 @@ typedef int (*ebpo_select_fn)(ebpo_polytope *envelope, const ebpo_choice *choice
  * from its parent's envelope. */
 ebpo_select_fn ebpo_selection_function(ebpo_selection selection);
 
+/* Sets chosen[i] for the candidates that a selection of the theses takes, whatever they cut.
+ * Candidates may have equal normals. Returns false when out of memory. */
+bool ebpo_choose_candidates(ebpo_selection selection, const ebpo_choice *choice, bool *chosen);
+
 /* Takes, again and again, the plane that removes the most volume, until the gain falls below
  * epsilon * cell volume. Gains are evaluated lazily. */
 int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes);
 
-/* Returns how many of `count` candidates a selection of the theses chooses: `percent` of the
- * candidates, rounded up (EBP 2017, equation 5). With k_root > 0, the number is K of BP (2008,
- * 3.5.1): k_root / 2^level, halved until K is below `count`. As in BP, all candidates are chosen if
- * k_root / 2^level is below 1. The number is at most EBPO_PLANES_STORED: more planes cannot be
- * stored, and clusters for more planes would not be the best clusters for the stored planes. */
+/* Returns how many of `count` candidates the theses choose: `percent` of the candidates, rounded up
+ * (EBP 2017, equation 5). With k_root > 0, the number is K of BP (2008, 3.5.1): k_root / 2^level,
+ * halved until K is below `count`. As in BP, all candidates are chosen if k_root / 2^level is below
+ * 1. */
+int ebpo_selection_requested(int count, int level, double percent, double k_root);
+
+/* Returns the same number, but at most EBPO_PLANES_STORED: more planes cannot be stored, and clusters
+ * for more planes would not be the best clusters for the stored planes. */
 int ebpo_selection_wanted(int count, int level, double percent, double k_root);
 
 /* Selects every candidate that may remove 0.03 % of the cell or more, deepest cut first, then
@@ -109,7 +119,7 @@ void ebpo_corner_windings(const ebpo_box *box, ebpo_cell cell, const ebpo_triang
  * cell, on return the leaf's. `inside_corners`: bit i is set when corner i is in the solid. With
  * `epsilon` > 0, the selection is greedy, for planes that will be stored. With 0, it is
  * ebpo_select_all, for planes that readers derive and that need no storage. Writes at most
- * EBPO_PLANES_MAX codes and returns their number. EBP 2017, section 3.4. */
+ * EBPO_PLANES_MAX codes and returns their number. EBP 2017, section 3.3.4. */
 int ebpo_leaf_planes(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces,
                      uint64_t count, unsigned inside_corners, double epsilon,
                      ebpo_polytope *envelope, uint32_t codes[EBPO_PLANES_MAX]);

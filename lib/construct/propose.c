@@ -17,6 +17,7 @@
 #include "construct/construct_stages.h"
 #include "construct/pieces.h"
 #include "construct/supports.h"
+#include "construct/thesis_levels.h"
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/parallel.h"
@@ -33,7 +34,9 @@ typedef struct proposer {
     ebpo_select_fn select;
     ebpo_supports supports;
     ebpo_candidate *candidates;
-    uint64_t candidate_capacity;
+    int *order; /* of the candidates in the node */
+    uint64_t candidate_capacity, order_capacity;
+    ebpo_large_polytope own; /* for envelopes without limits */
 } proposer;
 
 /* --- choosing, for leaves and gray nodes alike --- */
@@ -57,12 +60,32 @@ static int by_normal_alone(const void *a, const void *b)
  * without a limit on faces have more. */
 enum { CANDIDATES_MAX = 4096 };
 
-/* Makes a candidate for each distinct normal. Supports are computed later. */
-static bool make_candidates(proposer *p, ebpo_handover *given)
+static int by_place(const void *a, const void *b)
+{
+    const uint64_t *x = a, *y = b;
+    return (*x > *y) - (*x < *y);
+}
+
+/* Sorts the candidates' numbers as the node has them. */
+static bool sort_order(proposer *p, const ebpo_handover *given)
+{
+    uint64_t *pair = ebpo_alloc(given->offer_count, sizeof *pair);
+    for (uint64_t i = 0; pair && i < given->offer_count; i++)
+        pair[i] = (uint64_t)given->offers[i].place << 32 | i;
+    if (pair)
+        qsort(pair, given->offer_count, sizeof *pair, by_place);
+    for (uint64_t i = 0; pair && i < given->offer_count; i++)
+        p->order[i] = (int)(pair[i] & UINT32_MAX);
+    free(pair);
+    return pair != NULL;
+}
+
+/* Keeps one of equal normals, and thins out. */
+static void thin_offers(ebpo_handover *given)
 {
     uint64_t kept = 0;
-    if (given->offer_count == 0)
-        return true;
+    for (uint64_t i = 0; i < given->offer_count; i++)
+        given->offers[i].place = (uint32_t)i;
     qsort(given->offers, given->offer_count, sizeof *given->offers, by_normal);
     for (uint64_t i = 0; i < given->offer_count; i++)
         if (i == 0 || given->offers[i].normal != given->offers[i - 1].normal)
@@ -71,12 +94,24 @@ static bool make_candidates(proposer *p, ebpo_handover *given)
     given->offer_count = 0;
     for (uint64_t i = 0; i < kept; i += step)
         given->offers[given->offer_count++] = given->offers[i];
-    kept = given->offer_count;
-    if (!ebpo_grow(&p->candidates, &p->candidate_capacity, kept, sizeof *p->candidates))
+}
+
+/* Makes candidates of the offers. Supports are computed later. */
+static bool make_candidates(proposer *p, ebpo_handover *given)
+{
+    if (given->offer_count == 0)
+        return true;
+    if (!p->b->thesis)
+        thin_offers(given);
+    uint64_t kept = given->offer_count;
+    if (!ebpo_grow(&p->candidates, &p->candidate_capacity, kept, sizeof *p->candidates) ||
+        !ebpo_grow(&p->order, &p->order_capacity, kept, sizeof *p->order))
         return false;
-    for (uint64_t i = 0; i < kept; i++)
+    for (uint64_t i = 0; i < kept; i++) {
         p->candidates[i] = (ebpo_candidate){ .normal = given->offers[i].normal, .support = -1e300 };
-    return true;
+        p->order[i] = (int)i;
+    }
+    return p->b->thesis || sort_order(p, given);
 }
 
 static void raise_support(ebpo_candidate *c, const double point[3], double slack)
@@ -98,8 +133,8 @@ static double moved_by(const ebpo_offer *offer, double support, const double siz
 }
 
 /* Chooses planes from p->candidates, stores them and makes the data for the parent. */
-static bool choose_planes(proposer *p, uint32_t detail, ebpo_cell cell, const ebpo_handover *given,
-                          ebpo_handover *out)
+static bool choose_planes(proposer *p, uint32_t detail, ebpo_cell cell, uint64_t leaf_faces,
+                          const ebpo_handover *given, ebpo_handover *out)
 {
     const ebpo_build_options *o = p->b->options;
     ebpo_proposals *all = p->s->proposals;
@@ -114,11 +149,15 @@ static bool choose_planes(proposer *p, uint32_t detail, ebpo_cell cell, const eb
     ebpo_choice choice = { .candidates = p->candidates,
                            .count = (int)given->offer_count,
                            .most = EBPO_PLANES_STORED,
+                           .order = p->order,
                            .cell_size = size,
                            .normals = o->normals,
                            .wanted = ebpo_selection_wanted((int)given->offer_count, cell.level,
                                                            o->percent, o->k_root),
                            .seed = o->seed ^ ebpo_octcode_of_cell(cell) * 0x9e3779b97f4a7c15u };
+    if (p->b->thesis)
+        return ebpo_thesis_choose(p->b, &p->own, all->thesis, cell, leaf_faces, &choice, given,
+                                  out);
     int count = p->select(&own, &choice, codes);
     if (count < 0 || !ebpo_grow(&all->codes, &all->code_capacity, all->code_count + (uint64_t)count,
                                 sizeof *all->codes))
@@ -200,7 +239,7 @@ static bool propose_leaf(proposer *p, uint32_t detail, ebpo_cell cell, int32_t w
     bool good = offer_faces(p, d, cell, &given) && make_candidates(p, &given);
     if (good) {
         leaf_supports(p, d, cell, winding, given.offer_count);
-        good = choose_planes(p, detail, cell, &given, out);
+        good = choose_planes(p, detail, cell, d->entry_end - d->entry_begin, &given, out);
     }
     ebpo_handover_free(&given);
     return good;
@@ -232,7 +271,7 @@ static bool propose_gray(proposer *p, uint32_t detail, ebpo_cell cell, int32_t w
 {
     return make_candidates(p, given) &&
            gray_supports(p, &p->s->details[detail], cell, winding, given) &&
-           choose_planes(p, detail, cell, given, out);
+           choose_planes(p, detail, cell, 0, given, out);
 }
 
 static bool propose_node(proposer *p, uint32_t index, ebpo_cell cell, int32_t winding,
@@ -241,6 +280,8 @@ static bool propose_node(proposer *p, uint32_t index, ebpo_cell cell, int32_t wi
     ebpo_build_node node = p->s->nodes[index];
     if (node.type == EBPO_LEAF)
         return propose_leaf(p, node.detail, cell, winding, out);
+    if (node.type != EBPO_GRAY && p->b->thesis)
+        ebpo_thesis_add_empty(p->b, p->s->proposals->thesis, cell.level, winding);
     if (node.type != EBPO_GRAY)
         return true;
     int32_t offset[8];
@@ -263,6 +304,8 @@ static void proposer_free(proposer *p)
 {
     ebpo_supports_free(&p->supports);
     free(p->candidates);
+    free(p->order);
+    ebpo_large_free(&p->own);
 }
 
 /* Chooses the planes of one gray node from its children's data. Returns false when out of memory.
@@ -281,6 +324,13 @@ static bool propose_one_gray(const ebpo_builder *b, ebpo_branch *s, uint32_t det
 static ebpo_status no_memory(ebpo_error *error)
 {
     return ebpo_fail(error, EBPO_E_MEMORY, "out of memory while choosing planes");
+}
+
+static bool make_proposals(const ebpo_builder *b, ebpo_branch *s)
+{
+    return ebpo_proposals_make(s) &&
+           (!b->thesis || (s->proposals->thesis =
+                               ebpo_alloc_zero(EBPO_LEVELS_MAX, sizeof *s->proposals->thesis)));
 }
 
 /* Moves the proposals to the builder's store until the walk down needs them. */
@@ -323,7 +373,7 @@ static ebpo_status propose_pieces(void *context, uint64_t first, uint64_t last, 
         p.s = &b->sub[i];
         status = ebpo_build_partition(b, p.s, error);
         if (status == EBPO_OK &&
-            (!ebpo_proposals_make(p.s) ||
+            (!make_proposals(b, p.s) ||
              !propose_node(&p, 0, p.s->cell, p.s->winding, &p.s->proposals->root)))
             status = no_memory(error);
         if (status == EBPO_OK)
@@ -347,6 +397,7 @@ typedef struct top_node {
     unsigned octant;
     uint32_t codes[EBPO_PLANES_STORED];
     int count;
+    ebpo_thesis_level *thesis; /* as that of ebpo_proposals */
 } top_node;
 
 typedef struct top_list {
@@ -400,10 +451,15 @@ static ebpo_status propose_top_nodes(void *context, uint64_t first, uint64_t las
         const ebpo_build_node *node = &b->top.nodes[n->node];
         ebpo_branch alone = b->top; /* with separate proposals: other threads are running */
         uint32_t detail = node->detail;
+        int32_t offset[8];
+        ebpo_child_windings(b, &b->top, node->child, offset);
         alone.proposals = NULL;
-        bool good = ebpo_proposals_make(&alone);
+        bool good = make_proposals(b, &alone);
         for (unsigned o = 0; o < 8 && good; o++) {
             const ebpo_build_node *child = &b->top.nodes[node->child + o];
+            if (child->type == EBPO_WHITE && b->thesis)
+                ebpo_thesis_add_empty(b, alone.proposals->thesis, n->cell.level + 1,
+                                      n->winding + offset[o]);
             if (child->type != EBPO_LEAF)
                 continue;
             ebpo_handover *root = &b->sub[child->detail].proposals->root;
@@ -414,6 +470,8 @@ static ebpo_status propose_top_nodes(void *context, uint64_t first, uint64_t las
         if (good) {
             const uint32_t *codes = ebpo_proposed(&alone, detail, &n->count);
             memcpy(n->codes, codes, (size_t)n->count * sizeof *codes);
+            n->thesis = alone.proposals->thesis;
+            alone.proposals->thesis = NULL;
         } else
             status = no_memory(error);
         ebpo_handover_free(&n->given);
@@ -469,6 +527,16 @@ static ebpo_status propose_top(top_list *t, ebpo_pass *pass, ebpo_error *error)
     return status;
 }
 
+/* Adds up in a fixed order: the sums do not depend on threads. */
+static void add_up_levels(const top_list *t)
+{
+    ebpo_builder *b = t->b;
+    for (uint64_t i = 0; i < b->sub_count; i++)
+        ebpo_thesis_add_up(b->thesis->out, b->sub[i].proposals->thesis);
+    for (uint64_t i = 0; i < t->count; i++)
+        ebpo_thesis_add_up(b->thesis->out, t->nodes[i].thesis);
+}
+
 ebpo_status ebpo_build_propose(ebpo_builder *b, ebpo_error *error)
 {
     if (!ebpo_selection_describe(b->options->select)->from_leaves ||
@@ -487,7 +555,10 @@ ebpo_status ebpo_build_propose(ebpo_builder *b, ebpo_error *error)
         status = propose_top(&t, &pass, error);
     if (status == EBPO_OK && !store_top(&t))
         status = no_memory(error);
+    if (status == EBPO_OK && b->thesis)
+        add_up_levels(&t);
     for (uint64_t i = 0; i < t.count; i++) {
+        free(t.nodes[i].thesis);
         ebpo_handover_free(&t.nodes[i].given);
         ebpo_handover_free(&t.nodes[i].out);
     }

@@ -197,6 +197,8 @@ int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, i
     return cut_needles(envelope, &c, ebpo_needle, most, taken, codes);
 }
 
+/* --- the selections of the theses --- */
+
 /* Clips by the chosen candidates in ascending order of their indices. Drops candidates that cut
  * nothing by then. At most `most` candidates are chosen (ebpo_selection_wanted), so this loop omits
  * none for lack of space: as candidates are sorted by direction, those would all face in similar
@@ -218,19 +220,16 @@ static int clip_by_chosen(ebpo_polytope *envelope, const ebpo_choice *choice, co
 
 /* --- random --- */
 
-static int select_random(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes)
+/* Chooses consecutive candidates in the node's order, from a random one on (EBP 2017, 3.3.4.3).
+ * Candidates sorted by direction would give planes that face to one side. */
+static bool choose_random(const ebpo_choice *choice, bool *chosen)
 {
-    if (!choice->count)
-        return 0;
-    bool *chosen = ebpo_alloc_zero((uint64_t)choice->count, sizeof *chosen);
-    if (!chosen)
-        return -1;
     uint64_t state = choice->seed, first = ebpo_random_next(&state) % (uint64_t)choice->count;
-    for (int i = 0; i < choice->wanted && i < choice->count; i++)
-        chosen[(first + (uint64_t)i) % (uint64_t)choice->count] = true;
-    int taken = clip_by_chosen(envelope, choice, chosen, codes);
-    free(chosen);
-    return taken;
+    for (int i = 0; i < choice->wanted && i < choice->count; i++) {
+        uint64_t at = (first + (uint64_t)i) % (uint64_t)choice->count;
+        chosen[choice->order ? choice->order[at] : (int)at] = true;
+    }
+    return true;
 }
 
 /* --- least offset --- */
@@ -248,24 +247,18 @@ static int by_offset(const void *a, const void *b)
     return x->which - y->which;
 }
 
-static int select_offset(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes)
+static bool choose_offset(const ebpo_choice *choice, bool *chosen)
 {
-    if (!choice->count)
-        return 0;
     moved *order = ebpo_alloc((uint64_t)choice->count, sizeof *order);
-    bool *chosen = ebpo_alloc_zero((uint64_t)choice->count, sizeof *chosen);
-    int taken = -1;
-    if (order && chosen) {
-        for (int i = 0; i < choice->count; i++)
-            order[i] = (moved){ choice->candidates[i].moved, i };
-        qsort(order, (size_t)choice->count, sizeof *order, by_offset);
-        for (int i = 0; i < choice->wanted && i < choice->count; i++)
-            chosen[order[i].which] = true;
-        taken = clip_by_chosen(envelope, choice, chosen, codes);
-    }
+    if (!order)
+        return false;
+    for (int i = 0; i < choice->count; i++)
+        order[i] = (moved){ choice->candidates[i].moved, i };
+    qsort(order, (size_t)choice->count, sizeof *order, by_offset);
+    for (int i = 0; i < choice->wanted && i < choice->count; i++)
+        chosen[order[i].which] = true;
     free(order);
-    free(chosen);
-    return taken;
+    return true;
 }
 
 /* --- k-medoids: PAM, as the theses cite it after Ng and Han 1994. The swap of least cost is found
@@ -274,9 +267,11 @@ static int select_offset(ebpo_polytope *envelope, const ebpo_choice *choice, uin
 
 typedef struct clustering {
     int count, wanted;
-    float *distance;       /* [count][count] */
+    double (*at)[3];       /* [count] normals, as place_normal */
+    float *distance;       /* [count][count]; NULL: `row` is computed when needed */
+    float *row;            /* [count] */
     int *medoid;           /* [wanted] */
-    bool *chosen;          /* [count] */
+    bool *chosen;          /* [count] the caller's */
     int *nearest;          /* [count] index in `medoid` */
     float *first, *second; /* [count] distance of the nearest medoid and of the next */
     double *lost;          /* [wanted] change of the cost when the medoid is removed */
@@ -329,38 +324,58 @@ static void place_normal(const ebpo_choice *choice, uint32_t normal, double out[
     out[0] = around, out[1] = down, out[2] = 0;
 }
 
-static bool clustering_make(clustering *c, const ebpo_choice *choice)
+/* Distances of at most this many candidates are kept. */
+enum { DISTANCES_KEPT = 4096 };
+
+static void compute_row(const clustering *c, int i, float *row)
+{
+    for (int j = 0; j < c->count; j++) {
+        double x = c->at[i][0] - c->at[j][0], y = c->at[i][1] - c->at[j][1],
+               z = c->at[i][2] - c->at[j][2];
+        row[j] = (float)(x * x + y * y + z * z);
+    }
+}
+
+/* Returns the distances of candidate i, valid until the next call. */
+static const float *distances_of(clustering *c, int i)
+{
+    if (c->distance)
+        return c->distance + (size_t)i * (size_t)c->count;
+    compute_row(c, i, c->row);
+    return c->row;
+}
+
+static bool clustering_make(clustering *c, const ebpo_choice *choice, bool *chosen)
 {
     uint64_t n = (uint64_t)choice->count, k = (uint64_t)choice->wanted;
-    double(*at)[3] = ebpo_alloc(n, sizeof *at);
+    bool kept = n <= DISTANCES_KEPT;
     *c = (clustering){ .count = choice->count,
                        .wanted = choice->wanted,
-                       .distance = ebpo_alloc(n * n, sizeof *c->distance),
+                       .at = ebpo_alloc(n, sizeof *c->at),
+                       .distance = kept ? ebpo_alloc(n * n, sizeof *c->distance) : NULL,
+                       .row = ebpo_alloc(n, sizeof *c->row),
                        .medoid = ebpo_alloc(k, sizeof *c->medoid),
-                       .chosen = ebpo_alloc_zero(n, sizeof *c->chosen),
+                       .chosen = chosen,
                        .nearest = ebpo_alloc(n, sizeof *c->nearest),
                        .first = ebpo_alloc(n, sizeof *c->first),
                        .second = ebpo_alloc(n, sizeof *c->second),
                        .lost = ebpo_alloc(k, sizeof *c->lost),
                        .gain = ebpo_alloc(k, sizeof *c->gain) };
-    bool good = at && c->distance && c->medoid && c->chosen && c->nearest && c->first &&
+    bool good = c->at && (c->distance || !kept) && c->row && c->medoid && c->nearest && c->first &&
                 c->second && c->lost && c->gain;
     for (uint64_t i = 0; i < n && good; i++)
-        place_normal(choice, choice->candidates[i].normal, at[i]);
-    for (uint64_t i = 0; i < n && good; i++)
-        for (uint64_t j = 0; j < n; j++) {
-            double x = at[i][0] - at[j][0], y = at[i][1] - at[j][1], z = at[i][2] - at[j][2];
-            c->distance[i * n + j] = (float)(x * x + y * y + z * z);
-        }
-    free(at);
+        place_normal(choice, choice->candidates[i].normal, c->at[i]);
+    for (uint64_t i = 0; i < n && good && kept; i++)
+        compute_row(c, (int)i, c->distance + i * n);
     return good;
 }
 
 static void clustering_free(clustering *c)
 {
+    free(c->at);
     free(c->distance);
+    free(c->row);
     free(c->medoid);
-    free(c->chosen);
     free(c->nearest);
     free(c->first);
     free(c->second);
@@ -382,7 +397,7 @@ static void choose_at_random(clustering *c, uint64_t seed)
 static void assign_medoids(clustering *c)
 {
     for (int i = 0; i < c->count; i++) {
-        const float *row = c->distance + (size_t)i * (size_t)c->count;
+        const float *row = distances_of(c, i);
         c->first[i] = c->second[i] = INFINITY;
         c->nearest[i] = 0;
         for (int m = 0; m < c->wanted; m++) {
@@ -401,7 +416,7 @@ static void assign_medoids(clustering *c)
  */
 static double best_swap_for(clustering *c, int h, int *which)
 {
-    const float *row = c->distance + (size_t)h * (size_t)c->count;
+    const float *row = distances_of(c, h);
     double shared = 0;
     memcpy(c->gain, c->lost, (size_t)c->wanted * sizeof *c->gain);
     for (int i = 0; i < c->count; i++) {
@@ -449,27 +464,27 @@ static void single_medoid(clustering *c)
     memset(c->chosen, 0, (size_t)c->count * sizeof *c->chosen);
     int at = 0;
     for (int h = 0; h < c->count; h++) {
+        const float *row = distances_of(c, h);
         double sum = 0;
         for (int i = 0; i < c->count; i++)
-            sum += (double)c->distance[(size_t)h * (size_t)c->count + (size_t)i];
+            sum += (double)row[i];
         if (sum < best)
             best = sum, at = h;
     }
     c->chosen[at] = true;
 }
 
-/* Selects by k-medoids. */
-static int select_kmedoids(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes)
+static bool choose_kmedoids(const ebpo_choice *choice, bool *chosen)
 {
     /* each swap lowers the cost; this only prevents endless loops by rounding */
     enum { SWAPS_MAX = 100000 };
     ebpo_choice all = *choice;
-    if (!choice->count || choice->wanted < 1)
-        return 0;
+    if (choice->wanted < 1)
+        return true;
     all.wanted = choice->wanted < choice->count ? choice->wanted : choice->count;
     clustering c;
-    int taken = -1;
-    if (clustering_make(&c, &all)) {
+    bool good = clustering_make(&c, &all, chosen);
+    if (good) {
         choose_at_random(&c, choice->seed);
         if (all.wanted == 1)
             single_medoid(&c);
@@ -479,13 +494,54 @@ static int select_kmedoids(ebpo_polytope *envelope, const ebpo_choice *choice, u
                 assign_medoids(&c);
             while (swap_once(&c) && ++swaps < SWAPS_MAX);
         }
-        taken = clip_by_chosen(envelope, choice, c.chosen, codes);
     }
     clustering_free(&c);
-    return taken;
+    return good;
 }
 
 /* --- the table --- */
+
+/* Chooses candidates, at least one, for a selection of the theses; returns false when out of
+ * memory. */
+typedef bool (*choose_fn)(const ebpo_choice *choice, bool *chosen);
+
+static const choose_fn choosers[EBPO_SELECTION_COUNT] = {
+    [EBPO_SELECT_KMEDOIDS] = choose_kmedoids,
+    [EBPO_SELECT_OFFSET] = choose_offset,
+    [EBPO_SELECT_RANDOM] = choose_random,
+};
+
+bool ebpo_choose_candidates(ebpo_selection selection, const ebpo_choice *choice, bool *chosen)
+{
+    memset(chosen, 0, (size_t)choice->count * sizeof *chosen);
+    return !choice->count || choosers[selection](choice, chosen);
+}
+
+static int select_as_theses(ebpo_selection selection, ebpo_polytope *envelope,
+                            const ebpo_choice *choice, uint32_t *codes)
+{
+    bool *chosen = ebpo_alloc((uint64_t)choice->count + 1, sizeof *chosen);
+    int taken = -1;
+    if (chosen && ebpo_choose_candidates(selection, choice, chosen))
+        taken = clip_by_chosen(envelope, choice, chosen, codes);
+    free(chosen);
+    return taken;
+}
+
+static int select_kmedoids(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes)
+{
+    return select_as_theses(EBPO_SELECT_KMEDOIDS, envelope, choice, codes);
+}
+
+static int select_offset(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes)
+{
+    return select_as_theses(EBPO_SELECT_OFFSET, envelope, choice, codes);
+}
+
+static int select_random(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes)
+{
+    return select_as_theses(EBPO_SELECT_RANDOM, envelope, choice, codes);
+}
 
 static const ebpo_select_fn selection_functions[] = {
     [EBPO_SELECT_INHERIT] = ebpo_select_greedy,
@@ -501,8 +557,7 @@ ebpo_select_fn ebpo_selection_function(ebpo_selection selection)
     return (unsigned)selection < EBPO_SELECTION_COUNT ? selection_functions[selection] : NULL;
 }
 
-/* Computes equation 5, or K of BP. */
-static int requested_number(int count, int level, double percent, double k_root)
+int ebpo_selection_requested(int count, int level, double percent, double k_root)
 {
     if (!(k_root > 0))
         return (int)ceil(count * percent / 100);
@@ -516,6 +571,6 @@ static int requested_number(int count, int level, double percent, double k_root)
 
 int ebpo_selection_wanted(int count, int level, double percent, double k_root)
 {
-    int wanted = requested_number(count, level, percent, k_root);
+    int wanted = ebpo_selection_requested(count, level, percent, k_root);
     return wanted < EBPO_PLANES_STORED ? wanted : EBPO_PLANES_STORED;
 }

@@ -172,10 +172,7 @@ CROSSINGS_HEAD = [
     "## One model through another", "",
     "Scenarios 5.6 and 5.7 of the EBP thesis: the second model moves along x through the first, "
     "with an offset of 1 % of the diagonal from the center. Each step is queried once; processor "
-    "time includes loading. The thesis reports, on other machines, 38,264 pairs a step at 0.009 us "
-    "for Lucy with "
-    "itself (table 31, 28 M faces, "
-    "optimised), and a contact test of 2.5 M with 2.5 M faces in 29.2 us (table 33).", "",
+    "time includes loading. [theses.md](theses.md) explains which values of the thesis are comparable.", "",
     "| models | budget each | first contact, us: mean, worst | pairs a step | "
     "all pairs, us: mean, worst | us per pair | loads a step | MB read a step |",
     "|---|---|---|---|---|---|---|---|"]

@@ -22,8 +22,10 @@ NAMES = (arguments[2:] or ["dragon100k", "bunny_closed", "armadillo", "fertility
                            "cad_adis16480"])
 WAYS = {"inherit": [], "kmedoids": ["--select", "kmedoids"],
         "kmedoids, angle": ["--select", "kmedoids", "--normals", "angle"],
-        "offset": ["--select", "offset"], "random": ["--select", "random"],
-        "BP, K = 1 %": ["--select", "kmedoids", "--k-root", "1%"]}
+        "offset": ["--select", "offset"], "random": ["--select", "random"]}
+# As BP 2008: N = 50 by its criterion 1, any number of planes in a node.
+BP = ["--select", "kmedoids", "--k-root", "1%", "--unlimited", "--coalesce", "sum", "--leaf-faces", 50,
+      "--points", 1, "--no-pictures"]
 VERDICT, SIZES, GOAL_ROWS = {}, {}, []
 
 
@@ -34,6 +36,16 @@ def run(*command):
 
 def row(*cells):
     return "| " + " | ".join(str(c) for c in cells) + " |\n"
+
+
+def bp_row(name, folder, limits, volume):
+    method = json.loads(run("report", "-q", "--json", *BP, "-o", folder / "report",
+                            models / f"{name}.ply"))["methods"][0]
+    levels = method["unlimited"]["levels"]
+    ratios = [f"{(x['envelope_volume'] - volume) / (l - volume):.3f}" if l > volume * (1 + 1e-9) else "-"
+              for x, (l, _) in zip(levels, limits)]
+    return row("BP, K = 1 %", *ratios, *["-"] * (len(limits) - len(ratios)),
+               f"{sum(x['planes'] for x in levels):,}", "-")
 
 
 def table(name, folder):
@@ -59,6 +71,7 @@ def table(name, folder):
                       *(f"{(v - volume) / (l - volume):.3f}" if l > volume * (1 + 1e-9) else "-"
                         for v, (l, _) in zip(excess, limits)),
                       f"{sum(x['planes'] for x in info['levels']):,}", f"{path.stat().st_size:,}")
+    ratios += bp_row(name, folder, limits, volume)
     ratios += row("limit, % of solid", *(f"{100 * l / volume:.2f}" for l, _ in limits), "", "")
     worst = {"levels 0 to 3": (max(VERDICT[name][:4]), 1.2),
              "levels 4 to 6": (max(VERDICT[name][4:7] or [0]), 1.5)}
@@ -90,12 +103,12 @@ machine.
 The limit is the convex hull of the solid in each cell (`ebpo measure --hulls`, computed by qhull): no convex envelopes
 of the same cells are smaller. `inherit` is the default selection of planes ([design](../develop/design.md)). The other
 rows are the methods of the theses: k-medoids, offset and random selection with 40 % of the planes (EBP-Octree), and the
-BP-Octree with K = 1 %. A node has at most 255 planes, so the upper levels of `BP, K = 1 %` have fewer planes than in
-the thesis, which has 656 at the root of the bunny and 1,228 at that of the armadillo. [transmission.md](transmission.md)
-has the volumes of the thesis.
+BP-Octree with K = 1 %, computed in memory with N = 50 by the thesis' criterion and with any number of planes in a node
+(`report --unlimited --coalesce sum`). [theses.md](theses.md) has the volumes of the theses.
 
-All files are divided down to the deepest level (`--leaf-faces 0`) and store leaf planes. `ebpo verify` reports 0
+The files are divided down to the deepest level (`--leaf-faces 0`) and store leaf planes. `ebpo verify` reports 0
 violations for each.
+The limit is that of their cells; the leaves of `BP, K = 1 %` are larger.
 
 The tables list by level the excess over the volume of the solid, divided by that of the limit. The row *limit* is the
 volume of the limit in percent of the solid.

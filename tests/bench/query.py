@@ -24,9 +24,8 @@ from query_goals import goals_table, summary
 from query_page import Page, figure, handwritten, ratio, reflow, us
 from query_programs import Bench, Model, Server, differences, grown, lengths_of, middle
 import query_checks
-import query_thesis
 
-SECTIONS = ["rays", "distance", "inside", "memory", "budget", "modes", "distance-modes", "opening",
+SECTIONS = ["rays", "distance", "inside", "memory", "budget", "opening",
             "results"]
 MORE = ["leaves", "misses"]  # sections that are printed only if --sections names them
 RAYS = ["uniform", "camera", "segments", "degenerate"]
@@ -365,7 +364,7 @@ class Made:
 
     def __init__(self, bench):
         self.bench = bench
-        self.results, self.memory, self.tables = {}, {}, {}
+        self.results, self.memory = {}, {}
         self.budget, self.more = [], Page()
         self.found = {"results": None, "misses": None}
 
@@ -381,11 +380,10 @@ class Made:
             section_memory(page, self.memory)
         if self.budget:
             section_budget(page, largest, self.budget)
-        query_thesis.write(page, largest, self.tables)
         page.lines += self.more.lines
         query_checks.write(page, self.found)
         write(self.bench.options, self.bench, page,
-              goals_table(self.results, self.memory, self.budget, self.tables, self.found),
+              goals_table(self.results, self.memory, self.budget, self.found),
               summary(self.results, self.memory, self.budget, self.found))
 
 
@@ -445,7 +443,6 @@ def main():
     if "budget" in wanted:
         made.budget = measure_budget(bench, models[-1])
         made.publish(models[-1])
-    made.tables = query_thesis.tables(bench, models[-1], wanted)
     made.publish(models[-1])
 
 

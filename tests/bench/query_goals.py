@@ -1,5 +1,4 @@
 """The beginning of docs/measured/queries.md: the result in short, and the goals."""
-import query_thesis
 from query_page import Page, figure, quotient
 
 SIZES = ["70 K", "1 M", "5.5 M", "25.6 M"]
@@ -54,7 +53,7 @@ def point_goals(goals, results):
               column(results, "path", "inside", "ebpo"), INSIDE)
 
 
-def goals_table(results, memory, budget, tables, found):
+def goals_table(results, memory, budget, found):
     goals, page = Goals(), Page()
     ray_goals(goals, results)
     point_goals(goals, results)
@@ -70,11 +69,6 @@ def goals_table(results, memory, budget, tables, found):
         if r and points == "path":
             goals.add(f"{query} along a path, 256 MiB, p99.9, ms", 1,
                       [r["p999_ns"] / 1e6], [1])
-    thesis = list(query_thesis.cells(tables))
-    if thesis:
-        slower = [what for what, ours, theirs in thesis if ours > theirs]
-        goals.rows.append(["modes of the EBP thesis (see below): times above the thesis", 0,
-                           f"{len(slower)} of {len(thesis)}", "missed" if slower else "met"])
     if found["results"]:
         bad = sum(r["peers"]["ebpo"]["bits"] for r in found["results"][1])
         judged = sum(r["count"] for r in found["results"][1])

@@ -1,6 +1,5 @@
 #!/usr/bin/env python3
-"""Remakes docs/measured/transmission.md: bytes to fetch for a level, compared with the compressed PLY
-and the BP-Octree thesis.
+"""Remakes docs/measured/transmission.md: bytes to fetch for a level, compared with the compressed PLY.
 
     /usr/bin/python3 tests/bench/transmission.py BUILD_DIR MODEL.ply... -o
     docs/measured/transmission.md
@@ -8,7 +7,6 @@ and the BP-Octree thesis.
 Needs h5py and the zstd command. No result depends on the machine.
 """
 import argparse
-import itertools
 import json
 import pathlib
 import struct
@@ -21,16 +19,6 @@ import numpy
 from query_page import reflow
 
 GOALS = [10, 3, 1]  # percent of excess
-# Melero 2008, tables 4.4 and 4.6 ("Transm. at Level") and the volumes of figure 4.17 by level, in
-# percent.
-THESIS = {
-    "bunny_closed": ("bunny, 71,040 faces", [13035, 31384, 73558, 232372, 1006872, 3248614, 879022,
-                                             516],
-                     [171.41, 144.71, 119.92, 107.33, 103.11, 101.14, 100.55]),
-    "armadillo": ("armadillo, 150,000 faces",
-                  [24407, 53964, 103635, 229999, 488111, 1177844, 4433262, 5489803, 20324],
-                  [388.73, 214.88, 139.57, 116.78, 107.99, 103.45, 101.57, 100.92]),
-}
 BLACK = 1
 
 
@@ -154,18 +142,11 @@ def level_cells(m, i):
 
 def level_table(plain, planes):
     columns = ["bytes", "excess, %", "vertex distance, %", "error bound, %"]
-    _, sent, volume = THESIS.get(plain["name"], ("", [], []))
-    total = list(itertools.accumulate(sent))
-    rows = [["level", *columns, *(f"leaf planes: {c}" if c == "bytes" else c for c in columns),
-             *(["BP-Octree: bytes", "excess, %"] if sent else [])]]
-    for i in range(max(len(total), len(plain["rows"]))):
-        row = [i, *level_cells(plain, i), *level_cells(planes, i)]
-        if sent:
-            row += [f"{total[i]:,}" if i < len(total) else "",
-                    f"{volume[i] - 100:.2f}" if i < len(volume) else ""]
-        rows.append(row)
+    rows = [["level", *columns, *(f"leaf planes: {c}" if c == "bytes" else c for c in columns)]]
+    rows += [[i, *level_cells(plain, i), *level_cells(planes, i)]
+             for i in range(len(plain["rows"]))]
     sizes = [f"{m['info']['bytes']['file']:,}" for m in (plain, planes)]
-    rows.append(["file", sizes[0], "", "", "", sizes[1], "", "", ""] + ["", ""] * bool(sent))
+    rows.append(["file", sizes[0], "", "", "", sizes[1], "", "", ""])
     return f"**{plain['name']}**\n\n" + table(*rows)
 
 
@@ -211,8 +192,7 @@ The table has the bytes, their share of the compressed PLY, and the level.
 LEVELS = """## By level
 
 *file*: the whole file with the mesh, its source order and checksums. Vertex distances and error bounds end at the
-level that reaches the last goal. The columns *BP-Octree* are sums of tables 4.4 and 4.6 of Melero 2008: uncompressed,
-with the faces and vertices of each level's leaves, for a bunny of 71,040 and an armadillo of 150,000 faces.
+level that reaches the last goal. [theses.md](theses.md) compares the bytes with those of the BP-Octree, by one cost model.
 """
 
 

@@ -323,6 +323,25 @@ static ebpo_status build(every_call_env *e, const char *name, ebpo_selection sel
     return status;
 }
 
+/* ebpo_build_as_theses consumes the mesh, also on failure. */
+static ebpo_status call_build_as_theses(every_call_env *e)
+{
+    ebpo_mesh mesh;
+    ebpo_prepared prepared = EBPO_PREPARED_INIT;
+    ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
+    ebpo_thesis_levels levels = EBPO_THESIS_LEVELS_INIT;
+    options.select = EBPO_SELECT_KMEDOIDS;
+    options.threads = 1;
+    ebpo_status status = every_call_read(e, EVERY_CALL_PLY, &mesh);
+    if (status == EBPO_OK)
+        status = every_call_prepare(&mesh, &prepared, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_build_as_theses(&mesh, &prepared.report, &options, EBPO_COALESCE_SUM, &levels,
+                                      e->error);
+    ebpo_mesh_free(&mesh);
+    return status;
+}
+
 static ebpo_status call_build(every_call_env *e)
 {
     return build(e, EVERY_CALL_PLY, EBPO_SELECT_INHERIT, 1);
@@ -369,6 +388,7 @@ const every_call every_call_meshes[] = {
     { "build", call_build },
     { "build_crossing", call_build_crossing },
     { "build_kmedoids", call_build_kmedoids },
+    { "build_as_theses", call_build_as_theses },
     { "build_threads", call_build_threads },
     { NULL, NULL },
 };

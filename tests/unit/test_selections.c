@@ -181,6 +181,36 @@ START_TEST(test_random_selection_starts_at_seed_position)
 }
 END_TEST
 
+/* The run follows the node's order of candidates, not the order in which they are sorted. */
+START_TEST(test_random_selection_follows_order_of_node)
+{
+    uint64_t seed = 17;
+    ebpo_candidate c[LIMIT];
+    int order[20], place[20];
+    ebpo_choice choice = { .candidates = c,
+                           .count = make_candidates(c, 20, &seed),
+                           .most = EBPO_PLANES_STORED,
+                           .order = order,
+                           .cell_size = unit_cell,
+                           .wanted = 6 };
+    for (int i = 0; i < 20; i++) {
+        order[i] = 7 * i % 20;
+        place[order[i]] = i;
+    }
+    for (int round = 0; round < 100; round++) {
+        bool chosen[LIMIT], at[20] = { false };
+        int begins = 0;
+        choice.seed = ebpo_test_random(&seed);
+        ck_assert_int_eq(choose(EBPO_SELECT_RANDOM, &choice, chosen), 6);
+        for (int i = 0; i < 20; i++)
+            at[place[i]] = chosen[i];
+        for (int i = 0; i < 20; i++)
+            begins += at[i] && !at[(i + 19) % 20];
+        ck_assert_int_eq(begins, 1);
+    }
+}
+END_TEST
+
 START_TEST(test_plane_counts_match_theses)
 {
     ck_assert_int_eq(ebpo_selection_wanted(10, 3, 40, 0), 4);
@@ -196,6 +226,10 @@ START_TEST(test_plane_counts_match_theses)
     ck_assert_int_eq(ebpo_selection_wanted(1000, 0, 40, 694), EBPO_PLANES_STORED);
     ck_assert_int_eq(ebpo_selection_wanted(1000, 0, 40, 0), EBPO_PLANES_STORED);
     ck_assert_int_eq(ebpo_selection_wanted(1000, 30, 40, 694), EBPO_PLANES_STORED);
+    /* without files there is no limit */
+    ck_assert_int_eq(ebpo_selection_requested(10000, 0, 40, 8714), 8714);
+    ck_assert_int_eq(ebpo_selection_requested(7287, 0, 40, 8714), 4357);
+    ck_assert_int_eq(ebpo_selection_requested(10000, 0, 40, 0), 4000);
 }
 END_TEST
 
@@ -595,6 +629,7 @@ TEST_SUITE(selections)
     tcase_add_test(tests, test_kmedoids_swap_is_not_cheaper);
     tcase_add_test(tests, test_least_offset_selects_least_moved);
     tcase_add_test(tests, test_random_selection_starts_at_seed_position);
+    tcase_add_test(tests, test_random_selection_follows_order_of_node);
     tcase_add_test(tests, test_plane_counts_match_theses);
     tcase_add_test(tests, test_hull_facets_match_triple_search);
     tcase_add_test(tests, test_hull_of_nearly_flat_points);

@@ -191,6 +191,56 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_build(ebpo_mesh *mesh, const ebpo_mesh_r
                                               const ebpo_build_options *options, ebpo_tree *out,
                                               ebpo_error *error);
 
+/* Criterion by which leaves with few faces become one leaf (BP 2008, 3.3.1). */
+typedef enum ebpo_coalescing {
+    /* A node with at most leaf_faces faces is a leaf. */
+    EBPO_COALESCE_DISTINCT = 0,
+
+    /*
+     * Eight siblings become one leaf while their lists have fewer than leaf_faces entries together:
+     * a face in several lists counts several times (criterion 1, algorithm 4).
+     */
+    EBPO_COALESCE_SUM = 1,
+
+    /* Siblings become one leaf while the mean of their lists is below leaf_faces (criterion 2). */
+    EBPO_COALESCE_MEAN = 2
+} ebpo_coalescing;
+
+/* The nodes of one level, and the volumes of their envelopes, in the model's unit cubed. */
+typedef struct ebpo_thesis_level {
+    uint64_t gray_count, leaf_count, black_count;
+    uint64_t leaf_faces; /* entries of the leaves' lists of faces */
+    uint64_t plane_count, leaf_plane_count;
+    double gray_volume, leaf_volume, black_volume;
+} ebpo_thesis_level;
+
+typedef struct ebpo_thesis_levels {
+    size_t struct_size;
+    int level_count;
+    ebpo_thesis_level level[EBPO_LEVELS_MAX];
+} ebpo_thesis_levels;
+
+#define EBPO_THESIS_LEVELS_INIT EBPO_SIZED(ebpo_thesis_levels)
+
+/*
+ * Computes the levels of a mesh as the theses do, for comparison; nothing can be stored. Without
+ * the limits of files: a node may have more than 255 planes, and candidates with equal normals all
+ * count. The selection must be one of the theses. The mesh is empty afterwards, also on failure.
+ *
+ * report    as for ebpo_build
+ * options   as for ebpo_build; parts are ignored
+ *
+ * EBPO_E_ARGUMENT: an option is out of range, or the selection is none of the theses. Other errors:
+ * as ebpo_build.
+ *
+ * Threads: one per mesh.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_build_as_theses(ebpo_mesh *mesh,
+                                                        const ebpo_mesh_report *report,
+                                                        const ebpo_build_options *options,
+                                                        ebpo_coalescing coalesce,
+                                                        ebpo_thesis_levels *out, ebpo_error *error);
+
 #ifdef __cplusplus
 }
 #endif

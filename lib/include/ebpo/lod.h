@@ -34,7 +34,7 @@ typedef struct ebpo_lod_options {
  * Computes the envelopes of a level: of its gray nodes, and of the leaves and black nodes of levels
  * 0 to `level`. Each envelope is a convex polyhedron, cut from the node's cell by the
  * half-spaces of the node and its ancestors. Leaves are cut by stored planes if the file has them,
- * else by planes derived from their faces (EBP 2017, 3.4).
+ * else by planes derived from their faces (EBP 2017, 3.3.4).
  *
  * The polygons are rounded. Only the decoded half-spaces are guaranteed to contain the solid.
  *

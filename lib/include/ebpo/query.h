@@ -398,8 +398,8 @@ typedef struct ebpo_inside_result {
 } ebpo_inside_result;
 
 /*
- * Classifies a point as inside, outside or on the surface (BP 2008, section 5.1; EBP 2017, section
- * 4.2).
+ * Classifies a point as inside, outside or on the surface (BP 2008, section 5.2.1; EBP 2017,
+ * section 4.2).
  *
  * EBPO_E_NOT_SOLID: the model is a surface. EBPO_E_ABSENT: the file has no mesh and no level is
  * given, or a subset lacks the required data.

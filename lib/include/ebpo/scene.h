@@ -409,8 +409,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_instance_box(const ebpo_scene *sce
                                                            ebpo_error *error);
 
 /*
- * Computes a box that contains all instances at all times in from .. to (EBP 2017, 5.6.1). Without
- * instances, `min` is INFINITY and `max` is -INFINITY.
+ * Computes a box that contains all instances at all times in from .. to. Without instances, `min`
+ * is INFINITY and `max` is -INFINITY. The scene of EBP 2017, 5.6.1, is another box: four times the
+ * extents, about the mean of the centres of mass.
  *
  * Errors are those of ebpo_scene_motion. EBPO_E_ARGUMENT: also if the model of an instance was
  * added after the last ebpo_scene_load.

@@ -175,7 +175,7 @@ typedef struct ebpo_subtree_node {
 
     /*
      * As in streams (stream.h), with polygons only if requested. Leaves without stored planes have
-     * planes derived from their faces if the subtree has faces (EBP 2017, 3.4).
+     * planes derived from their faces if the subtree has faces (EBP 2017, 3.3.4).
      */
     ebpo_stream_node node;
 

@@ -14,6 +14,7 @@
 #include "cli/report/report_output.h"
 
 static const char *const up_words[] = { "x", "y", "z", NULL };
+static const char *const coalesce_words[] = { "distinct", "sum", "mean", NULL };
 
 #include "cli/options/report.inc"
 
@@ -98,13 +99,19 @@ static int read_options(comparison *c, report_values *v, bool mesh)
             "--view", v->view,
             "an azimuth from -360 to 360, a comma, and an elevation from -90 to 90");
     bool building = v->select || v->percent || v->k_root || v->normals >= 0 || v->max_level >= 0 ||
-                    v->leaf_faces >= 0 || v->epsilon >= 0 || v->keep;
+                    v->leaf_faces >= 0 || v->epsilon >= 0 || v->keep || v->unlimited;
     if (!mesh && building)
         return command_usage(
             "report", "--select, --percent, --k-root, --normals, --max-level, --leaf-faces, "
-                      "--epsilon and --keep only apply to a mesh, from which files are made");
+                      "--epsilon, --unlimited and --keep only apply to a mesh, from which files "
+                      "are made");
+    if (v->coalesce >= 0 && !v->unlimited)
+        return command_usage("report", "--coalesce applies to --unlimited only");
     const ebpo_build_options standard = EBPO_BUILD_OPTIONS_INIT;
     v->select = v->select ? v->select : 1u << EBPO_SELECT_INHERIT;
+    if (v->unlimited && v->select == 1u << EBPO_SELECT_INHERIT)
+        return command_usage("report",
+                             "--unlimited is for --select kmedoids, offset or random; add one");
     int code = read_settings(c, v);
     if (code != EXIT_FINE)
         return code;
@@ -228,6 +235,7 @@ static const report_values standard = { .normals = -1,
                                         .max_level = -1,
                                         .leaf_faces = -1,
                                         .epsilon = -1,
+                                        .coalesce = -1,
                                         .points = 5000,
                                         .seed = 1,
                                         .up = 1,

@@ -239,9 +239,11 @@ ebpo_status method_without(method *m, const char *what, ebpo_status status, ebpo
 
 void comparison_free(comparison *c)
 {
-    for (int i = 0; i < c->count; i++)
+    for (int i = 0; i < c->count; i++) {
+        free(c->methods[i].unlimited);
         for (int k = 0; k < EBPO_LEVELS_MAX; k++)
             free(c->methods[i].picture[k]);
+    }
     free(c->methods);
     free(c->portrait);
     free(c->uniform);

@@ -150,6 +150,8 @@ typedef struct method {
     round_times round[ROUNDS];
     need_result need[NEEDS];
     int need_count, note_count;
+    ebpo_thesis_levels *unlimited; /* --unlimited; NULL: not computed */
+    double unlimited_seconds;
     char note[METHOD_NOTES][320];
     char *picture[EBPO_LEVELS_MAX]; /* data URIs, or NULL */
 } method;
@@ -162,7 +164,8 @@ typedef struct report_values {
     int64_t max_level, leaf_faces, points, seed, threads;
     const char *view, *memory;
     arg_list names;
-    bool no_pictures, need, keep, json, quiet;
+    int coalesce;
+    bool no_pictures, need, keep, json, quiet, unlimited;
     remote_values remote;
 } report_values;
 

@@ -86,6 +86,11 @@ static int add_file(comparison *c, const char *path)
 
 /* --- from a mesh --- */
 
+typedef struct built {
+    double seconds, unlimited_seconds;
+    ebpo_thesis_levels *levels; /* NULL: not computed */
+} built;
+
 static void build_options(const comparison *c, int selection, const plane_setting *setting,
                           ebpo_build_options *o)
 {
@@ -104,10 +109,30 @@ static void build_options(const comparison *c, int selection, const plane_settin
     o->progress = c->progress;
 }
 
+/* Computes the levels without the limits of files, from the mesh, which it consumes. */
+static ebpo_status compute_unlimited(const comparison *c, mesh_input *p,
+                                     const ebpo_build_options *build, built *out, ebpo_error *error)
+{
+    ebpo_coalescing coalesce =
+        c->v->coalesce >= 0 ? (ebpo_coalescing)c->v->coalesce : EBPO_COALESCE_DISTINCT;
+    out->levels = calloc(1, sizeof *out->levels);
+    if (!out->levels) {
+        ebpo_mesh_free(&p->mesh);
+        snprintf(error->message, sizeof error->message, "not enough memory for the levels");
+        return error->status = EBPO_E_MEMORY;
+    }
+    *out->levels = (ebpo_thesis_levels)EBPO_THESIS_LEVELS_INIT;
+    double begin = progress_now();
+    ebpo_status status =
+        ebpo_build_as_theses(&p->mesh, &p->prepared.report, build, coalesce, out->levels, error);
+    out->unlimited_seconds = progress_now() - begin;
+    return status;
+}
+
 /* The builder consumes the mesh, so it is read for each method. */
 static ebpo_status build_one(comparison *c, const char *mesh, int selection,
-                             const plane_setting *setting, const char *path, double *seconds,
-                             ebpo_error *error)
+                             const plane_setting *setting, const char *path, bool unlimited,
+                             built *out, ebpo_error *error)
 {
     ebpo_build_options build;
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
@@ -129,9 +154,11 @@ static ebpo_status build_one(comparison *c, const char *mesh, int selection,
         ebpo_mesh_free(&p.mesh);
         return status;
     }
+    if (unlimited)
+        return compute_unlimited(c, &p, &build, out, error);
     double begin = progress_now();
     status = ebpo_build(&p.mesh, &p.prepared.report, &p.prepared.record, &build, &tree, error);
-    *seconds = progress_now() - begin;
+    out->seconds = progress_now() - begin;
     if (status != EBPO_OK)
         return status;
     write.threads = build.threads;
@@ -146,15 +173,23 @@ static int build_method(comparison *c, const char *mesh, int selection,
 {
     char path[sizeof c->folder + 64];
     ebpo_error error = EBPO_ERROR_INIT;
-    double seconds = 0;
+    built out = { 0 };
+    bool unlimited =
+        c->v->unlimited && ebpo_selection_describe((ebpo_selection)selection)->from_leaves;
     snprintf(path, sizeof path, "%s/%s%s.ebpo.h5", c->folder, selection_words[selection],
              setting->word);
-    if (build_one(c, mesh, selection, setting, path, &seconds, &error) != EBPO_OK)
+    if (build_one(c, mesh, selection, setting, path, false, &out, &error) != EBPO_OK)
         return command_failed("report", &error);
     int code = add_file(c, path);
-    if (code == EXIT_FINE)
-        c->methods[c->count - 1].whole[OF_BUILD_SECONDS] = seconds;
-    return code;
+    if (code != EXIT_FINE)
+        return code;
+    method *m = &c->methods[c->count - 1];
+    m->whole[OF_BUILD_SECONDS] = out.seconds;
+    ebpo_status status =
+        unlimited ? build_one(c, mesh, selection, setting, path, true, &out, &error) : EBPO_OK;
+    m->unlimited = out.levels;
+    m->unlimited_seconds = out.unlimited_seconds;
+    return status == EBPO_OK ? EXIT_FINE : command_failed("report", &error);
 }
 
 static int settings_of(const comparison *c, int selection)

@@ -25,6 +25,31 @@ static void print_metrics(json *j, const metric_name *q, const double *v, int co
         json_real(j, q[i].name, v[i]);
 }
 
+/* Prints the volume that represents the solid at a level: its nodes, and the leaves and black nodes
+ * above. */
+static void print_unlimited(json *j, const method *m)
+{
+    double above = 0;
+    json_object(j, "unlimited");
+    json_real(j, "seconds", m->unlimited_seconds);
+    json_array(j, "levels");
+    for (int i = 0; i < m->unlimited->level_count; i++) {
+        const ebpo_thesis_level *l = &m->unlimited->level[i];
+        above += l->leaf_volume + l->black_volume;
+        json_object(j, NULL);
+        json_int(j, "level", i);
+        json_uint(j, "gray", l->gray_count);
+        json_uint(j, "leaf", l->leaf_count);
+        json_uint(j, "leaf_faces", l->leaf_faces);
+        json_uint(j, "planes", l->plane_count);
+        json_uint(j, "leaf_planes", l->leaf_plane_count);
+        json_real(j, "envelope_volume", above + l->gray_volume);
+        json_end(j);
+    }
+    json_end(j);
+    json_end(j);
+}
+
 static void one_method(json *j, const comparison *c, const method *m)
 {
     json_object(j, NULL);
@@ -48,6 +73,8 @@ static void one_method(json *j, const comparison *c, const method *m)
         json_end(j);
     }
     json_end(j);
+    if (m->unlimited)
+        print_unlimited(j, m);
     json_array(j, "deadlines");
     for (int i = 0; i < DEADLINES; i++) {
         json_object(j, NULL);

@@ -1,0 +1,276 @@
+/* Convex polytopes without a limit on faces: the method of geometry/polytope.c (BP 2008, section
+ * 3.4.3) on arrays that grow. A cut builds a second shape, which replaces the first if the cut
+ * succeeds. Vertices within a tolerance of the cutting plane are on it. A cut that rounding would
+ * spoil is refused, so the polytope is never too small. */
+#include "core/strict_fp.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "construct/large_polytope.h"
+#include "core/alloc.h"
+#include "core/hash.h"
+#include "geometry/vec3.h"
+
+static const double tolerance = 1e-10;
+
+static const uint32_t no_vertex = UINT32_MAX;
+
+struct ebpo_large_edge {
+    uint64_t key; /* the ends' numbers, inner end first; 0: empty slot */
+    uint32_t vertex;
+};
+
+/* --- shapes --- */
+
+static bool shape_begin(ebpo_large_shape *s)
+{
+    s->vertex_count = s->corner_count = s->face_count = 0;
+    if (!ebpo_grow(&s->first, &s->first_capacity, 1, sizeof *s->first))
+        return false;
+    s->first[0] = 0;
+    return true;
+}
+
+static uint32_t shape_vertex(ebpo_large_polytope *p, ebpo_large_shape *s, const double x[3])
+{
+    if (!ebpo_grow(&s->vertex, &s->vertex_capacity, s->vertex_count + 1, sizeof *s->vertex)) {
+        p->no_memory = true;
+        return 0;
+    }
+    memcpy(s->vertex[s->vertex_count], x, sizeof *s->vertex);
+    return (uint32_t)s->vertex_count++;
+}
+
+static void shape_corner(ebpo_large_polytope *p, ebpo_large_shape *s, uint32_t vertex)
+{
+    uint64_t start = s->first[s->face_count];
+    if (s->corner_count > start && s->corner[s->corner_count - 1] == vertex)
+        return;
+    if (!ebpo_grow(&s->corner, &s->corner_capacity, s->corner_count + 1, sizeof *s->corner)) {
+        p->no_memory = true;
+        return;
+    }
+    s->corner[s->corner_count++] = vertex;
+}
+
+/* Ends the loop of a face; drops a face with less than three corners. */
+static void shape_face(ebpo_large_polytope *p, ebpo_large_shape *s, int32_t tag)
+{
+    uint64_t start = s->first[s->face_count];
+    while (s->corner_count > start + 1 && s->corner[s->corner_count - 1] == s->corner[start])
+        s->corner_count--;
+    if (s->corner_count - start < 3) {
+        s->corner_count = start;
+        return;
+    }
+    if (!ebpo_grow(&s->first, &s->first_capacity, s->face_count + 2, sizeof *s->first) ||
+        !ebpo_grow(&s->tag, &s->tag_capacity, s->face_count + 1, sizeof *s->tag)) {
+        p->no_memory = true;
+        return;
+    }
+    s->tag[s->face_count++] = tag;
+    s->first[s->face_count] = s->corner_count;
+}
+
+static void shape_free(ebpo_large_shape *s)
+{
+    free(s->vertex);
+    free(s->corner);
+    free(s->first);
+    free(s->tag);
+    *s = (ebpo_large_shape){ 0 };
+}
+
+bool ebpo_large_cube(ebpo_large_polytope *p)
+{
+    ebpo_polytope cube;
+    ebpo_polytope_cube(&cube);
+    p->no_memory = false;
+    if (!shape_begin(&p->now))
+        return false;
+    for (int i = 0; i < cube.vertex_count; i++)
+        shape_vertex(p, &p->now, cube.vertex[i]);
+    for (int f = 0; f < cube.face_count && !p->no_memory; f++) {
+        for (int i = cube.first[f]; i < cube.first[f + 1]; i++)
+            shape_corner(p, &p->now, cube.corner[i]);
+        shape_face(p, &p->now, cube.tag[f]);
+    }
+    return !p->no_memory;
+}
+
+void ebpo_large_free(ebpo_large_polytope *p)
+{
+    shape_free(&p->now);
+    shape_free(&p->next);
+    free(p->distance);
+    free(p->number);
+    free(p->cap);
+    free(p->on);
+    free(p->edge);
+    free(p->rim);
+    *p = (ebpo_large_polytope){ 0 };
+}
+
+double ebpo_large_volume(const ebpo_large_polytope *p)
+{
+    const ebpo_large_shape *s = &p->now;
+    double sum = 0;
+    for (uint64_t f = 0; f < s->face_count; f++) {
+        double a[3], b[3], c[3], n[3];
+        ebpo_vec3_subtract(s->vertex[s->corner[s->first[f]]], s->vertex[0], a);
+        for (uint64_t i = s->first[f] + 1; i + 1 < s->first[f + 1]; i++) {
+            ebpo_vec3_subtract(s->vertex[s->corner[i]], s->vertex[0], b);
+            ebpo_vec3_subtract(s->vertex[s->corner[i + 1]], s->vertex[0], c);
+            ebpo_vec3_cross(b, c, n);
+            sum += ebpo_vec3_dot(a, n);
+        }
+    }
+    return sum / 6;
+}
+
+/* --- clipping --- */
+
+static bool is_out(const ebpo_large_polytope *p, uint32_t v) { return p->distance[v] > tolerance; }
+
+/* Returns the vertex of the cut on an edge; the same for both faces at the edge. */
+static uint32_t edge_vertex(ebpo_large_polytope *p, uint32_t in, uint32_t out)
+{
+    uint64_t key = ((uint64_t)in << 32 | out) + 1, at, mask = p->edge_slots - 1;
+    if (p->distance[in] >= -tolerance)
+        return p->number[in];
+    EBPO_HASH_FIND(at, ebpo_hash_number(key), mask, !p->edge[at].key || p->edge[at].key == key);
+    if (!p->edge[at].key) {
+        double x[3], t = p->distance[in] / (p->distance[in] - p->distance[out]);
+        const double *a = p->now.vertex[in], *b = p->now.vertex[out];
+        for (int k = 0; k < 3; k++)
+            x[k] = a[k] + t * (b[k] - a[k]);
+        p->edge[at] = (struct ebpo_large_edge){ key, shape_vertex(p, &p->next, x) };
+    }
+    return p->edge[at].vertex;
+}
+
+static void note_rim(ebpo_large_polytope *p, uint32_t from, uint32_t to)
+{
+    if (from == to || !p->on[from] || !p->on[to])
+        return;
+    if (!ebpo_grow(&p->rim, &p->rim_capacity, p->rims + 1, sizeof *p->rim))
+        p->no_memory = true;
+    else
+        p->rim[p->rims++] = (struct ebpo_large_rim){ from, to };
+}
+
+/* Copies the part of a face within the half-space, and notes its edges on the plane. */
+static void clip_loop(ebpo_large_polytope *p, uint64_t f)
+{
+    const ebpo_large_shape *s = &p->now;
+    ebpo_large_shape *to = &p->next;
+    const uint32_t *loop = s->corner + s->first[f];
+    uint64_t count = s->first[f + 1] - s->first[f], start = to->corner_count;
+    bool inside = false;
+    for (uint64_t i = 0; i < count; i++)
+        inside |= p->distance[loop[i]] < -tolerance;
+    for (uint64_t i = 0; i < count && inside && !p->no_memory; i++) {
+        uint32_t a = loop[i], b = loop[i + 1 < count ? i + 1 : 0];
+        if (!is_out(p, a))
+            shape_corner(p, to, p->number[a]);
+        if (is_out(p, a) != is_out(p, b))
+            shape_corner(p, to, is_out(p, a) ? edge_vertex(p, b, a) : edge_vertex(p, a, b));
+    }
+    if (!inside || p->no_memory)
+        return;
+    shape_face(p, to, s->tag[f]);
+    for (uint64_t i = start; i < to->corner_count; i++)
+        note_rim(p, to->corner[i], to->corner[i + 1 < to->corner_count ? i + 1 : start]);
+}
+
+static bool is_paired(const ebpo_large_polytope *p, uint64_t i)
+{
+    for (uint64_t j = 0; p->touched && j < p->rims; j++)
+        if (p->rim[i].from == p->rim[j].to && p->rim[i].to == p->rim[j].from)
+            return true;
+    return false;
+}
+
+/* Closes the cap, whose loop is the rim reversed. A rim edge in both directions is between two kept
+ * faces. */
+static bool close_loop(ebpo_large_polytope *p, int32_t tag)
+{
+    uint64_t open = 0, steps = 0;
+    uint32_t begin = no_vertex;
+    if (!ebpo_grow(&p->cap, &p->cap_capacity, p->next.vertex_count, sizeof *p->cap))
+        return !(p->no_memory = true);
+    for (uint64_t i = 0; i < p->next.vertex_count; i++)
+        p->cap[i] = no_vertex;
+    for (uint64_t i = 0; i < p->rims; i++) {
+        if (is_paired(p, i))
+            continue;
+        if (p->cap[p->rim[i].to] != no_vertex)
+            return false;
+        p->cap[p->rim[i].to] = p->rim[i].from;
+        begin = p->rim[i].to;
+        open++;
+    }
+    if (open < 3)
+        return false;
+    uint32_t at = begin;
+    do {
+        shape_corner(p, &p->next, at);
+        at = p->cap[at];
+        steps++;
+    } while (at != no_vertex && at != begin && steps <= open);
+    shape_face(p, &p->next, tag);
+    return at == begin && steps == open;
+}
+
+/* Prepares the work space: vertices that remain, and an empty table of cut edges. */
+static bool begin_cut(ebpo_large_polytope *p)
+{
+    uint64_t edges = p->now.corner_count / 2 + 1;
+    p->rims = 0;
+    p->touched = false;
+    p->edge_slots = ebpo_hash_slots(2 * edges);
+    if (!shape_begin(&p->next) ||
+        !ebpo_grow(&p->number, &p->number_capacity, p->now.vertex_count, sizeof *p->number) ||
+        !ebpo_grow(&p->on, &p->on_capacity, p->now.vertex_count + edges, sizeof *p->on) ||
+        !ebpo_grow(&p->edge, &p->edge_capacity, p->edge_slots, sizeof *p->edge))
+        return !(p->no_memory = true);
+    memset(p->edge, 0, (size_t)p->edge_slots * sizeof *p->edge);
+    memset(p->on, true, (size_t)(p->now.vertex_count + edges)); /* new vertices are on the plane */
+    for (uint64_t i = 0; i < p->now.vertex_count; i++) {
+        if (is_out(p, (uint32_t)i))
+            continue;
+        bool on = p->distance[i] >= -tolerance;
+        p->number[i] = shape_vertex(p, &p->next, p->now.vertex[i]);
+        p->on[p->number[i]] = on;
+        p->touched |= on;
+    }
+    return !p->no_memory;
+}
+
+ebpo_clip ebpo_large_clip(ebpo_large_polytope *p, const double n[3], double d, int32_t tag)
+{
+    double most = -1e300, least = 1e300;
+    if (!ebpo_grow(&p->distance, &p->distance_capacity, p->now.vertex_count, sizeof *p->distance)) {
+        p->no_memory = true;
+        return EBPO_CLIP_REFUSED;
+    }
+    for (uint64_t i = 0; i < p->now.vertex_count; i++) {
+        double e = ebpo_vec3_dot(n, p->now.vertex[i]) - d;
+        p->distance[i] = e;
+        most = e > most ? e : most;
+        least = e < least ? e : least;
+    }
+    if (most <= tolerance)
+        return EBPO_CLIP_NONE;
+    if (least >= -1e-7 || !begin_cut(p))
+        return EBPO_CLIP_REFUSED;
+    for (uint64_t f = 0; f < p->now.face_count && !p->no_memory; f++)
+        clip_loop(p, f);
+    if (p->no_memory || !close_loop(p, tag) || p->no_memory || p->next.face_count < 4)
+        return EBPO_CLIP_REFUSED;
+    ebpo_large_shape old = p->now;
+    p->now = p->next;
+    p->next = old;
+    return EBPO_CLIP_CUT;
+}

@@ -1,0 +1,48 @@
+/* A convex polytope with any number of faces (large_polytope.c), for envelopes of the theses, which
+ * may have thousands of planes. ebpo_polytope holds the 255 planes that a file stores. */
+#ifndef EBPO_CONSTRUCT_LARGE_POLYTOPE_H
+#define EBPO_CONSTRUCT_LARGE_POLYTOPE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "geometry/polytope.h"
+
+/* Loops of vertices, as in ebpo_polytope. */
+typedef struct ebpo_large_shape {
+    double (*vertex)[3];
+    uint32_t *corner; /* vertices of the faces, one face after the other */
+    uint64_t *first;  /* [face_count + 1] index in `corner` */
+    int32_t *tag;     /* [face_count] */
+    uint64_t vertex_count, corner_count, face_count;
+    uint64_t vertex_capacity, corner_capacity, first_capacity, tag_capacity;
+} ebpo_large_shape;
+
+typedef struct ebpo_large_polytope {
+    ebpo_large_shape now, next;   /* next: work space */
+    double *distance;             /* [vertices of now] from the cutting plane */
+    uint32_t *number;             /* [vertices of now] index in next */
+    uint32_t *cap;                /* [vertices of next] successor in the loop of the cap */
+    bool *on;                     /* [vertices of next] the vertex is on the cutting plane */
+    struct ebpo_large_edge *edge; /* hash table of the cut edges */
+    struct ebpo_large_rim {
+        uint32_t from, to;
+    } * rim; /* edges of kept faces on the cutting plane */
+    uint64_t rims, distance_capacity, number_capacity, cap_capacity, on_capacity, edge_capacity,
+        edge_slots, rim_capacity;
+    bool touched; /* old vertices are on the plane: a rim edge may be between two kept faces */
+    bool no_memory;
+} ebpo_large_polytope;
+
+/* Makes the unit cube; `p` starts as zeros and may be used again. Returns false when out of memory.
+ */
+bool ebpo_large_cube(ebpo_large_polytope *p);
+
+/* Keeps n . x <= d, as ebpo_polytope_clip. EBPO_CLIP_REFUSED with no_memory set: out of memory. */
+ebpo_clip ebpo_large_clip(ebpo_large_polytope *p, const double n[3], double d, int32_t tag);
+
+double ebpo_large_volume(const ebpo_large_polytope *p);
+
+void ebpo_large_free(ebpo_large_polytope *p);
+
+#endif

@@ -1,0 +1,245 @@
+"""The runs of theses.py: each is a step whose result is kept as JSON, so that an interrupted script
+continues where it stopped."""
+import json
+import os
+import time
+
+import measured
+
+PERCENTS = (10, 20, 30, 40, 50)
+# EBP counts the root as level 1 and keeps levels 1 to 5: our levels 0 to 4.
+CUT = 4
+MODES = ("cache", "nodes", "subtree", "cache-plain", "nodes-plain", "subtree-plain")
+MEMORY = 16 << 20
+POINTS, FEW_POINTS = 100_000, 1_000
+
+
+class Runs:
+    def __init__(self, build, models, work):
+        self.build, self.models, self.work = build, models, work
+        (work / "results").mkdir(parents=True, exist_ok=True)
+        self.ebpo, self.generate = build / "tools/ebpo", build / "samples/ebpo-generate"
+
+    # --- files ---
+
+    def model(self, name):
+        """The path of a mesh: shared, or made in the work folder."""
+        made = self.work / f"{name}.ply"
+        return made if made.exists() else self.models / f"{name}.ply"
+
+    def file(self, name):
+        return self.work / f"{name}.ebpo.h5"
+
+    def path_of(self, step):
+        return self.work / "results" / f"{step}.json"
+
+    def result(self, step):
+        """The result of a step; None if it was not run."""
+        path = self.path_of(step)
+        return json.loads(path.read_text()) if path.exists() else None
+
+    def run_step(self, step):
+        begun = time.monotonic()
+        out = STEPS[step][1](self)
+        out["step_seconds"] = time.monotonic() - begun
+        out["load"] = os.getloadavg()[0]
+        part = self.path_of(step).with_suffix(".part")
+        part.write_text(json.dumps(out, indent=1))
+        part.rename(self.path_of(step))
+
+    # --- commands ---
+
+    def call(self, *words):
+        return measured.run(*words)
+
+    def json_of(self, *words):
+        return json.loads(self.call(self.ebpo, *words)["printed"])
+
+    def mesh(self, name, *words):
+        """Makes a mesh in the work folder."""
+        if not (self.work / f"{name}.ply").exists():
+            part = self.work / f"{name}.part.ply"
+            self.call(*words, part)
+            part.rename(self.work / f"{name}.ply")
+
+    def convert(self, name, mesh, *options):
+        """Builds a file: seconds of the command and of the stages, peak memory, bytes, levels."""
+        out = self.file(name)
+        took = self.call(self.ebpo, "convert", "--json", "-q", *options, mesh, out)
+        told = json.loads(took["printed"])
+        return {"wall": took["wall"], "cpu": took["cpu"], "peak": took["peak"],
+                "build": told["thesis_stages"][6]["seconds"], "faces": told["faces"],
+                "vertices": told["vertices"], "ply": os.path.getsize(mesh),
+                "bytes": os.path.getsize(out), "parts": told["bytes"],
+                "levels": self.json_of("info", "--json", out)["levels"]}
+
+    def report(self, mesh, *options):
+        """The methods of a report, without what was timed for deadlines and budgets."""
+        told = self.json_of("report", "--json", "-q", "--no-pictures", *options, "-o",
+                            self.work / "report", mesh)
+        volume = told["model"].get("volume") or told["model"].get("winding_integral")
+        return {"volume": volume, "faces": told["model"]["faces"],
+                "methods": [{k: v for k, v in m.items() if k not in ("deadlines", "budgets")}
+                            for m in told["methods"]]}
+
+    def bench(self, name, *options):
+        told = self.json_of("bench", "--json", *options, self.file(name))
+        return {k: told[k] for k in ("ns", "batch_ns", "count", "open_seconds",
+                                     "cold_open_seconds", "cold_first_result_seconds", "model")
+                if k in told}
+
+
+# --- steps ---
+
+def small(name):
+    """Our default on a model: the fastest of three builds, size, levels, loading and queries."""
+    def step(runs):
+        out = min((runs.convert(name, runs.model(name)) for _ in range(3)),
+                  key=lambda built: built["build"])
+        out["derived"] = runs.json_of("measure", "--json", "--derived", runs.file(name))["levels"]
+        out["inside"] = runs.bench(name, "--count", 1_000_000)
+        out["distance"] = runs.bench(name, "--query", "distance", "--count", POINTS)
+        return out
+    return step
+
+
+def repaired(runs):
+    """The dragon as a solid: equal positions merged."""
+    runs.call(runs.ebpo, "convert", "-q", "--weld", runs.models / "dragon_vrip.ply",
+              runs.file("dragon_solid"))
+    runs.mesh("dragon_solid", runs.ebpo, "extract", "-q", "--mesh", runs.file("dragon_solid"))
+    return small("dragon_solid")(runs)
+
+
+def as_bp(name, k_root):
+    """BP-Octree: k-medoids, K of the faces, leaves by criterion 1 with N = 50, nine levels."""
+    def step(runs):
+        return runs.report(runs.model(name), "--select", "kmedoids", "--k-root", k_root,
+                           "--unlimited", "--coalesce", "sum", "--leaf-faces", 50, "--max-level",
+                           9, "--points", 1)
+    return step
+
+
+def sent(name):
+    """Our levels in the cost model of the theses, with leaves of 50 faces."""
+    def step(runs):
+        return runs.report(runs.model(name), "--leaf-faces", 50, "--points", 1)
+    return step
+
+
+def leaves(name):
+    """Number of leaves by criteria 1 and 2 of BP, and by ours."""
+    def step(runs):
+        out = {}
+        for rule, number in (("distinct", 50), ("sum", 50), ("mean", 20)):
+            told = runs.report(runs.model(name), "--select", "offset", "--unlimited", "--coalesce",
+                               rule, "--leaf-faces", number, "--max-level", 9, "--points", 1)
+            out[rule] = told["methods"][0]["unlimited"]["levels"]
+        return out
+    return step
+
+
+def methods(name, percents, *options):
+    """The three selections of EBP, with limits and without, and our default."""
+    def step(runs):
+        out = runs.report(runs.model(name), "--select", "inherit,kmedoids,offset", "--percent",
+                          ",".join(map(str, percents)), "--unlimited", "--points", 1, *options)
+        more = runs.report(runs.model(name), "--select", "random", "--percent",
+                           ",".join(map(str, percents)), "--unlimited", "--points", 1, *options)
+        out["methods"] += more["methods"]
+        return out
+    return step
+
+
+def grown(name, times):
+    def step(runs):
+        runs.mesh(name, runs.generate, "--base", runs.models / "lucy100k.ply", "--subdivide", times)
+        return {"bytes": os.path.getsize(runs.model(name))}
+    return step
+
+
+def large(runs):
+    """Our default on the large model."""
+    out = runs.convert("lucy_x256", runs.model("lucy_x256"), "--memory", "1GiB")
+    out["memory"] = runs.json_of("info", "--json", "--memory", "16MiB", runs.file("lucy_x256"))
+    out["memory"] = out["memory"]["memory"]
+    return out
+
+
+def large_selection(select, percent):
+    def step(runs):
+        name = f"lucy_x256_{select}_{percent}"
+        out = runs.convert(name, runs.model("lucy_x256"), "--memory", "1GiB", "--select", select,
+                           "--percent", percent, "--profile", "full")
+        os.remove(runs.file(name))
+        return out
+    return step
+
+
+def modes(points):
+    """EBP tables 21, 22, 25 and 28, with EBP's cut level. Exact distances of uniform points are few:
+    each loads several subtrees."""
+    def step(runs):
+        words = ["--points", points, "--cut-level", CUT, "--memory", MEMORY]
+        out = {mode: runs.bench("lucy_x256", *words, "--count", POINTS, "--mode", mode)
+               for mode in MODES}
+        few = POINTS if points == "path" else FEW_POINTS
+        out["distance"] = runs.bench("lucy_x256", *words, "--count", few, "--query", "distance")
+        return out
+    return step
+
+
+def levels(points):
+    """EBP tables 23, 24, 26 and 28: to a level."""
+    def step(runs):
+        words = ["--points", points, "--count", POINTS, "--cut-level", CUT, "--memory", MEMORY]
+        deepest = len(runs.result("large")["levels"]) - 1
+        out = {"inside": [], "distance": []}
+        for level in range(deepest + 1):
+            out["inside"].append(runs.bench("lucy_x256", *words, "--mode", "cache", "--max-level",
+                                            level)["ns"]["mean"])
+            out["distance"].append(runs.bench("lucy_x256", *words, "--query", "distance", "--mode",
+                                              "envelope", "--max-level", level)["ns"]["mean"])
+        return out
+    return step
+
+
+def memory_by_level(runs):
+    """EBP tables 5 to 7 and 16: memory with levels 0 to C kept, before anything else is loaded."""
+    out = {"open": [], "bytes": []}
+    for cut in range(8):
+        told = runs.bench("lucy_x256", "--count", 1, "--cut-level", cut)
+        out["bytes"].append(told["model"]["memory"])
+        out["open"].append(told["cold_first_result_seconds"])
+    return out
+
+
+# Name: (what it is for, the function). The order is that in which the script runs them.
+STEPS = {
+    "bunny": ("our default on the bunny", small("bunny_closed")),
+    "bunny_bp": ("BP tables 3.3, 3.9, 4.1, 4.3", as_bp("bunny_closed", "1%")),
+    "bunny_sent": ("BP table 4.4", sent("bunny_closed")),
+    "bunny_leaves": ("BP table 3.1", leaves("bunny_closed")),
+    "dragon": ("our default on the dragon", repaired),
+    "dragon_bp_0.1": ("BP tables 3.5, 3.6, K = 0.1 %", as_bp("dragon_solid", "0.1%")),
+    "lucy_methods": ("EBP tables 2 to 14 on 99,970 faces", methods("lucy100k", PERCENTS)),
+    "grow16": ("a mesh of 1.6 million faces", grown("lucy_x16", 2)),
+    "grow256": ("a mesh of 25.6 million faces", grown("lucy_x256", 4)),
+    "large": ("our default on 25.6 million faces", large),
+    "memory": ("EBP tables 1, 5 to 7, 11, 16, 17, 19", memory_by_level),
+    "modes_path": ("EBP tables 22, 25, 27, 28", modes("path")),
+    "levels_path": ("EBP tables 24, 26, 28", levels("path")),
+    "modes_uniform": ("EBP tables 21, 25, 27, 28", modes("uniform")),
+    "levels_uniform": ("EBP tables 23, 26, 28", levels("uniform")),
+    "large_kmedoids_40": ("EBP tables 4, 10, 14 to 20", large_selection("kmedoids", 40)),
+    "dragon_bp_1": ("BP tables 3.3, 3.5, 3.9, 4.1, 4.3", as_bp("dragon_solid", "1%")),
+    "lucy16_methods_40": ("EBP tables 12 to 14, 40 %, 1.6 million faces",
+                          methods("lucy_x16", (40,), "--levels", "0-6")),
+    "dragon_sent": ("BP table 4.11", sent("dragon_solid")),
+    "large_offset_40": ("EBP tables 2, 8, 12", large_selection("offset", 40)),
+    "large_random_40": ("EBP tables 3, 9, 13", large_selection("random", 40)),
+} | {f"large_{select}_{percent}": (f"EBP tables 2 to 14, {percent} %",
+                                   large_selection(select, percent))
+     for percent in (10, 20, 30, 50) for select in ("kmedoids", "offset", "random")} | {
+    f"dragon_bp_{k}": (f"BP tables 3.5 and 3.6, K = {k} %", as_bp("dragon_solid", f"{k}%"))
+    for k in ("0.01", "0.05", "0.5", "5")}
