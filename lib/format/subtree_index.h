@@ -31,8 +31,8 @@ EBPO_MUST_USE ebpo_status ebpo_subtree_table_find(ebpo_chunks *chunks, unsigned 
                                                   uint64_t item, ebpo_subtree_row *out,
                                                   ebpo_error *error);
 
-/* Returns the number of groups of a level before the row's subtree, or with `after` the number
- * including the subtree. */
+/* Returns the number of groups of a level before the row's subtree. If `after` is true, the groups
+ * of the subtree are included. */
 uint64_t ebpo_subtree_groups(const ebpo_info *info, const ebpo_subtree_row *row, int level,
                              bool after);
 
