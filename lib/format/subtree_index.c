@@ -3,9 +3,9 @@
  * stores for some rows, and the counts of the rows in between. It caches recently used rows.
  *
  * The second part computes ranks: the numbers of planes, faces and nodes of each type before a
- * node. In levels below the subtrees' roots it begins at the subtree's row. In other levels it
- * begins at a row of an index array, which has a row for every 4,096 items. Results are checked
- * against the counts in the header.
+ * node. In levels below the subtrees' roots, counting begins at the row of the node's subtree. In
+ * other levels, counting begins at a row of an index array, which has a row for every 4,096 items.
+ * Results are checked against the counts in the header.
  *
  * The last part sends prefetch hints for subtrees. Source: format-spec/README.md, sections 4 and 9.
  */
@@ -147,7 +147,8 @@ static void sum_row(const subtree_counts *c, uint64_t subtree, ebpo_subtree_row 
     out->vertex = out->after[EBPO_S_VERTICES_BEFORE] + out->before[EBPO_S_VERTICES];
 }
 
-/* Checks a row against the header: the sums of faces and vertices, and the numbers of nodes. */
+/* Checks a row: the sums of faces and vertices against the header, and the numbers of nodes against
+ * the numbers of groups. */
 static ebpo_status check_row(const ebpo_chunks *chunks, const ebpo_subtree_row *row,
                              ebpo_error *error)
 {
@@ -247,7 +248,7 @@ ebpo_status ebpo_subtree_table_row(ebpo_chunks *chunks, uint64_t subtree, ebpo_s
     return keep_row(chunks, out, error);
 }
 
-/* Finds the last chunk of rows with at most `item` items before it. */
+/* Finds the last chunk of rows with at most `item` items of the column before the chunk. */
 static ebpo_status find_chunk(ebpo_chunks *chunks, unsigned column, uint64_t item, uint64_t *out,
                               ebpo_error *error)
 {

@@ -1,8 +1,8 @@
 /* Computes normals for the polygons of a level, for shading.
  *
  * A polygon on a plane is nearly parallel to the surface and keeps the plane's direction. A polygon
- * on a cell face is a step between two envelopes and does not represent the surface: it gets the
- * direction of the planes around it.
+ * on a cell face is a step between two envelopes and does not represent the surface. Such a polygon
+ * gets the direction of the plane polygons around it.
  *
  * These directions are computed in six passes, one for each side of cells (lower x, upper x, ...).
  * In each pass, every corner of every drawn cell gets a normal: the mean of the normals, weighted

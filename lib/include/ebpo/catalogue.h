@@ -17,9 +17,9 @@
  * cut; *caps* are faces that close a part where it was cut. A query opens only the models whose
  * boxes can contribute to the result. An opened model must have the digest of its entry and must be
  * within the entry's box. If the entry names a file of face indices (`numbers`), this file must
- * have one index for each face of the model. Otherwise the query returns EBPO_E_FORMAT. Results are
- * those of the models (query.h) and do not depend on the budget. docs/guide/clusters.md describes
- * the file format and the results of parts.
+ * have one index for each face of the model that distances and rays use. Otherwise the query
+ * returns EBPO_E_FORMAT. Results are those of the models (query.h) and do not depend on the budget.
+ * docs/guide/clusters.md describes the file format and the results of parts.
  */
 #ifndef EBPO_CATALOGUE_H
 #define EBPO_CATALOGUE_H

@@ -133,7 +133,7 @@ EBPO_API uint64_t ebpo_subset_memory(uint64_t face_count, uint32_t leaf_faces);
  * root cell or the box of an earlier subset; or target_bytes is too small, and the message gives
  * the minimum. EBPO_E_ABSENT: max_error or target_bytes is set, and the file has no mesh or is a
  * subset. EBPO_E_IO: also if `path` is that of `file`, and another program has replaced the file
- * since opening. The errors of reading.
+ * since opening. Also the errors of reading.
  *
  * Threads: any.
  */
