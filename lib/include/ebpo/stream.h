@@ -38,8 +38,9 @@ typedef struct ebpo_stream_options {
  * leaf of a file without EBPO_PART_LEAF_PLANES has no planes: its envelope is the part of its
  * parent's envelope in the leaf's cell.
  *
- * The polygons of an envelope are rounded, and negligible cuts are omitted. They enclose a slightly
- * larger volume than the envelope rather than a smaller one.
+ * The vertices of an envelope's polygons are rounded, and negligible cuts are omitted. So the
+ * polygons usually enclose slightly more than the envelope. `planes` is guaranteed to contain the
+ * envelope; the polygons are not.
  */
 typedef struct ebpo_stream_node {
     /* A leading 1, then three bits for each level. */
