@@ -254,7 +254,7 @@ static const ebpo_import_format *mesh_format(const uint8_t *begin, uint64_t size
                                              uint64_t whole_size)
 {
     const ebpo_import_format *format = ebpo_import_recognise(begin, size, "");
-    if (format && format->mark_comes_first)
+    if (format && format->beginning_decides)
         return format;
     if (ebpo_stl_states_size(begin, size, whole_size)) /* binary STL may begin with any bytes */
         return &ebpo_import_stl;

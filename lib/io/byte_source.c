@@ -111,7 +111,7 @@ int ebpo_input_descriptor(const ebpo_input *input)
     return input->source.read == path_read && strcmp(s->path, input->shown) == 0 ? s->fd : -1;
 }
 
-bool ebpo_input_hints(const ebpo_input *input)
+bool ebpo_input_can_advise(const ebpo_input *input)
 {
 #ifdef POSIX_FADV_WILLNEED
     return input->source.read == path_read;
@@ -121,12 +121,12 @@ bool ebpo_input_hints(const ebpo_input *input)
 #endif
 }
 
-void ebpo_input_hint(ebpo_input *input, const ebpo_range *ranges, size_t count)
+void ebpo_input_advise(ebpo_input *input, const ebpo_range *ranges, size_t count)
 {
     enum { LARGE = 1 << 20 };
 #ifdef POSIX_FADV_WILLNEED
     const path_source *s = input->source.user;
-    for (size_t i = 0; i < count && ebpo_input_hints(input); i++)
+    for (size_t i = 0; i < count && ebpo_input_can_advise(input); i++)
         if (ranges[i].size < LARGE && ranges[i].offset <= input->source.size)
             (void)posix_fadvise(s->fd, (off_t)ranges[i].offset, (off_t)ranges[i].size,
                                 POSIX_FADV_WILLNEED); /* reading reports errors */

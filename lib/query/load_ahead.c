@@ -51,7 +51,7 @@ static void search_below(subtree_search *l, ebpo_node node, double lower)
 {
     if (lower > l->limit || ebpo_node_is_uniform(&node) || node.pruned)
         return;
-    if (ebpo_node_is_below(&node)) {
+    if (ebpo_node_is_subtree_root(&node)) {
         add_subtree(l, ebpo_entry_value(node.entry), lower);
         return;
     }
@@ -277,8 +277,8 @@ static uint64_t home_of(const ebpo_batch *b, const double p[3])
     if (!ebpo_locate(&box, deepest, p, at))
         return EBPO_NO_SUBTREE;
     uint32_t entry = ebpo_descend(&m->top->nodes, deepest, at).entry;
-    return ebpo_entry_kind_of(entry) == EBPO_ENTRY_BELOW ? ebpo_entry_value(entry)
-                                                         : EBPO_NO_SUBTREE;
+    return ebpo_entry_kind_of(entry) == EBPO_ENTRY_SUBTREE_ROOT ? ebpo_entry_value(entry)
+                                                                : EBPO_NO_SUBTREE;
 }
 
 /* Adds a subtree to the next hint, if it is not in memory. */

@@ -2,11 +2,12 @@
  * leaf by leaf in the order of the faces, and counts all items again.
  *
  * Every column of every row is recomputed: numbers of nodes, faces and vertices, and the chunks of
- * /mesh/faces and /mesh/vertices that a subtree needs from earlier subtrees. The listed chunks must
- * be exactly these. The specification and this file call them *blocks*.
+ * /mesh/faces and /mesh/vertices that a subtree needs from earlier subtrees. /subtrees/outer must
+ * list exactly these chunks. As in the specification, these chunks are called *blocks* here; they
+ * are not the blocks of eight faces.
  *
- * This check is independent of the writer and the reader of the library, which proceed level by
- * level: they have only the reading of arrays in common. */
+ * The writer and the reader of the library proceed level by level. This check is independent of
+ * them: it shares only the reading of arrays with the reader. */
 #include "verify/verify_parts.h"
 
 #include <inttypes.h>
@@ -21,14 +22,14 @@
 #define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
 
 /* Columns of the table, numbered as in the specification. The columns of the levels begin at
- * FIRST_LEVEL. GRAY to END are relative to the first column of a level. */
+ * FIRST_LEVEL. GRAY to END_INCREASE are relative to the first column of a level. */
 enum {
     FACES_BEFORE, /* faces between the previous subtree and this one */
     FACES,
     VERTICES_BEFORE,
     VERTICES,
-    SHARED_FACES, /* number of blocks */
-    SHARED_VERTICES,
+    FACE_BLOCKS,   /* number of blocks of faces that the subtree needs from earlier subtrees */
+    VERTEX_BLOCKS, /* number of such blocks of vertices */
     FIRST_LEVEL,
     GRAY = 0,
     LEAF,
@@ -36,11 +37,11 @@ enum {
     PLANES,
     LEAF_PLANES,
     REFERENCES,
-    END,
-    OF_A_LEVEL,
+    END_INCREASE, /* increase of the end of the new faces (one past the last) in the level */
+    OF_A_LEVEL,   /* number of columns of a level */
     MAX_COLS = FIRST_LEVEL + OF_A_LEVEL * EBPO_LEVELS_MAX
 };
-/* rows of a block of faces, and of a block of vertices */
+/* number of rows of a block of faces, and of a block of vertices */
 enum { ROWS_OF_FACES = 2048, ROWS_OF_VERTICES = 1024 };
 /* number of subtrees after which unused pages of memory are released */
 enum { SUBTREES_A_TIME = 128 };
@@ -50,14 +51,19 @@ static const char *const names[] = { "faces before the subtree",
                                      "vertices",
                                      "blocks of faces",
                                      "blocks of vertices" };
-static const char *const level_names[] = { "gray nodes",  "leaves",     "black nodes",   "planes",
-                                           "leaf planes", "references", "the faces' end" };
+static const char *const level_names[] = { "gray nodes",
+                                           "leaves",
+                                           "black nodes",
+                                           "planes",
+                                           "leaf planes",
+                                           "references",
+                                           "increase of the end of new faces" };
 
 /* A list of indices of faces or numbers of blocks. */
 typedef struct numbers {
     uint32_t *at;
     uint64_t count, capacity;
-    uint64_t different; /* number of different ones when add_block last removed duplicates */
+    uint64_t different; /* number of different items when add_block last removed duplicates */
 } numbers;
 
 /* The visit of the tree, and the counts so far. */
@@ -66,7 +72,7 @@ typedef struct recount {
     const ebpo_reference_tree *view;
     int level; /* level of the subtrees' roots */
     /* the arrays of /subtrees, as stored */
-    unsigned cols, rows_of_chunk; /* of `counts` */
+    unsigned cols, rows_of_chunk; /* number of columns of `counts`, and of rows of its chunks */
     const uint32_t *counts, *shared;
     const uint64_t *index;
     uint64_t subtrees, shared_rows; /* shared_rows: number of rows of `shared` */
@@ -76,8 +82,8 @@ typedef struct recount {
     uint64_t end[EBPO_LEVELS_MAX]; /* end of the new faces, by level */
     /* columns: sums over all subtrees before the current one, counts of the current one */
     uint64_t sum[MAX_COLS], row[MAX_COLS];
-    bool within;          /* the visit is within a subtree */
-    numbers shared_faces; /* references of the leaves of the current subtree */
+    bool within;        /* the visit is within a subtree */
+    numbers references; /* of the leaves of the current subtree, to faces of any subtree */
     bool no_memory;
 } recount;
 
@@ -111,7 +117,8 @@ static void sort_once(numbers *list)
     list->count = kept;
 }
 
-/* Adds a number that may recur often. Removes duplicates from time to time. */
+/* Appends a block's number, which may be in the list already. Removes duplicates from time to time.
+ * Returns false if there is no memory. */
 static bool add_block(numbers *list, uint32_t block)
 {
     if (list->count >= 2 * list->different + 4096) {
@@ -121,7 +128,7 @@ static bool add_block(numbers *list, uint32_t block)
     return add_number(NULL, list, block);
 }
 
-/* Returns the name of a column. *level: its level, or -1. */
+/* Returns the name of a column. *level: the column's level, or -1 if it belongs to no level. */
 static const char *column_name(const recount *c, unsigned column, int *level)
 {
     if (column < FIRST_LEVEL)
@@ -133,7 +140,8 @@ static const char *column_name(const recount *c, unsigned column, int *level)
 /* --- comparing a subtree with its row --- */
 
 /* Compares the needed blocks with the next rows of /subtrees/outer. A row is `from` minus the
- * number of a block; the rows of a subtree are ascending. */
+ * number of a block. The rows of a subtree ascend, so its blocks descend. what: name of the blocks'
+ * array. `column` gets the number of blocks. */
 static void compare_shared(recount *c, const char *what, uint64_t from, const numbers *needed,
                            unsigned column)
 {
@@ -170,22 +178,21 @@ static void check_shared(recount *c)
 {
     numbers faces = { 0 }, vertices = { 0 };
     uint64_t first_face = c->faces - c->row[FACES], first_vertex = c->vertices - c->row[VERTICES];
-    EBPO_FOR_ITEMS_SCATTERED(c->view->workspace, i, 0, c->shared_faces.count)
-        if (c->shared_faces.at[i] < first_face) {
-            if (!add_block(&faces, c->shared_faces.at[i] / ROWS_OF_FACES))
+    EBPO_FOR_ITEMS_SCATTERED(c->view->workspace, i, 0, c->references.count)
+        if (c->references.at[i] < first_face) {
+            if (!add_block(&faces, c->references.at[i] / ROWS_OF_FACES))
                 c->no_memory = true;
-            note_vertices(c, &vertices, c->shared_faces.at[i], first_vertex);
+            note_vertices(c, &vertices, c->references.at[i], first_vertex);
         }
     EBPO_FOR_ITEMS(c->view->workspace, face, first_face, c->faces)
         note_vertices(c, &vertices, face, first_vertex);
     sort_once(&faces);
     sort_once(&vertices);
-    compare_shared(c, "/mesh/faces", first_face / ROWS_OF_FACES, &faces, SHARED_FACES);
-    compare_shared(c, "/mesh/vertices", first_vertex / ROWS_OF_VERTICES, &vertices,
-                   SHARED_VERTICES);
+    compare_shared(c, "/mesh/faces", first_face / ROWS_OF_FACES, &faces, FACE_BLOCKS);
+    compare_shared(c, "/mesh/vertices", first_vertex / ROWS_OF_VERTICES, &vertices, VERTEX_BLOCKS);
     free(faces.at);
     free(vertices.at);
-    c->shared_faces.count = 0;
+    c->references.count = 0;
 }
 
 /* Compares the counts of the current subtree with its row, and begins a new row. */
@@ -244,10 +251,10 @@ static void count_leaf(recount *c, const ebpo_reference_node *leaf, uint64_t *ro
         const uint32_t *face = ebpo_reference_refs(c->view, leaf, &references);
         uint64_t end = level->leaf_first[leaf->rank] + level->leaf_new[leaf->rank];
         EBPO_FOR_ITEMS(c->view->workspace, i, 0, references)
-            if (!add_number(c->view->workspace, &c->shared_faces, face[i]))
+            if (!add_number(c->view->workspace, &c->references, face[i]))
                 c->no_memory = true;
         row[REFERENCES] += references;
-        row[END] += end - c->end[leaf->cell.level];
+        row[END_INCREASE] += end - c->end[leaf->cell.level];
         c->end[leaf->cell.level] = end;
     }
     /* ebpo_check_structure checks that the leaves' new faces are consecutive */
@@ -300,7 +307,7 @@ static ebpo_status recount_table(recount *c, ebpo_error *error)
     CHECK(c->shared_done == c->shared_rows,
           "/subtrees/outer has %" PRIu64 " rows, but %" PRIu64 " blocks are needed", c->shared_rows,
           c->shared_done);
-    ebpo_array_free(c->view->workspace, c->shared_faces.at);
+    ebpo_array_free(c->view->workspace, c->references.at);
     return c->no_memory ? ebpo_workspace_fail_while(c->view->workspace, "counting subtrees", error)
                         : EBPO_OK;
 }
