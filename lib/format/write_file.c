@@ -138,7 +138,7 @@ static ebpo_status make_root_group(file_headers *h, const char *path, uint32_t n
 }
 
 /* Writes the offset of a list's chunk and the file's size as attributes of the list. Readers use
- * the list only if both values are those of the file. */
+ * the list only if both values match the file. */
 static ebpo_status headers_put_validity(file_headers *h, header_list list, uint64_t file_bytes,
                                         uint64_t offset, ebpo_error *error)
 {
@@ -278,8 +278,8 @@ static ebpo_status headers_begin_index(file_headers *h, ebpo_error *error)
 
 /* --- chunks --- */
 
-/* Number of chunks in memory at a time (a window): 8 MiB before compression, and as much after it.
- */
+/* Number of chunks that are in memory together, which is called a window. They have up to 8 MiB
+ * before compression, and the compressed chunks have space for as much. */
 enum { WINDOW = 128 };
 
 /* A chunk of the window. */

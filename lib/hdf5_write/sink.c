@@ -265,7 +265,7 @@ static const H5FD_class_t sink_class = {
     .name = "ebpo sink",
     .maxaddr = (haddr_t)INT64_MAX,
     .fc_degree = H5F_CLOSE_STRONG,
-    /* libhdf5 copies this struct as bytes, because the class has no functions to copy it */
+    /* libhdf5 copies a sink_choice as bytes, because this class has no function to copy it */
     .fapl_size = sizeof(sink_choice),
     .open = sink_open,
     .close = sink_close,

@@ -1,8 +1,9 @@
 /* Sources of a file's bytes (ebpo_source): a regular file, which is read by pread, and memory of
  * the caller. http_source.c has the source for URLs. An input is a source with a name for messages
- * and a count of reads; each read must be within the source's size. Files are not mapped, because
- * the process would end if another program shortened a mapped file. Also recognises URLs, and
- * removes passwords from URLs for messages. */
+ * and a count of reads. Each read must be within the source's size. Files are not mapped, because
+ * the process would end if another program shortened a mapped file.
+ *
+ * This file also recognises URLs, and removes passwords and queries from URLs for messages. */
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
@@ -147,7 +148,7 @@ static ebpo_status memory_read(void *user, uint64_t offset, uint64_t size, void 
 
 ebpo_source ebpo_source_of_memory(const void *data, uint64_t size)
 {
-    /* `user` is not const, but the source only reads */
+    /* The cast removes const because `user` is not const. The source only reads the data. */
     return (ebpo_source){
         sizeof(ebpo_source), (void *)(uintptr_t)data, size, memory_read, NULL, NULL, 0
     };
@@ -243,8 +244,8 @@ char *ebpo_url_redact(const char *name, char *out, size_t capacity)
         const char *host = strstr(name, "//") + 2;
         used = append_text(out, 0, capacity, name, (size_t)(host - name));
         for (size_t i = strcspn(host, "/?#"); i > 0; i--)
-            /* the last @ counts: a password with @ makes the URL invalid, but must not be shown
-             * either */
+            /* The last @ ends the password. A password that contains an @ makes the URL invalid,
+             * but must not be shown either. */
             if (host[i - 1] == '@') {
                 host += i;
                 break;

@@ -125,10 +125,10 @@ static turns turns_of_doubles(const ebpo_face_block *b, unsigned lanes, int u, i
 }
 
 /* Compares the point where the segment's line intersects a face's plane with the coordinate `at` on
- * the segment's axis. Returns 1 if the point is above `at`, -1 if it is below, 0 if this is not
- * certain. weight, size: for each edge, the cross product of its corners and its size (see
- * cross_product). k: the corners' coordinates on the axis. `turn`: 1 if the face's corners turn
- * left around the line, -1 if they turn right. */
+ * the segment's axis. Returns 1 if the point's coordinate is greater than `at`, -1 if it is less, 0
+ * if this is not certain. weight, size: for each edge, the cross product of its corners and its
+ * size (see cross_product). k: the corners' coordinates on the axis. `turn`: 1 if the face's
+ * corners turn left around the line, -1 if they turn right. */
 static int compare_plane(const double weight[3], const double size[3], const double k[3], double at,
                          int turn)
 {

@@ -80,7 +80,7 @@ typedef struct recount {
     uint64_t subtree, faces, vertices;
     uint64_t shared_done;          /* number of compared rows of `shared` */
     uint64_t end[EBPO_LEVELS_MAX]; /* end of the new faces, by level */
-    /* columns: sums over all subtrees before the current one, counts of the current one */
+    /* for each column: sum over all subtrees before the current one; count in the current one */
     uint64_t sum[MAX_COLS], row[MAX_COLS];
     bool within;        /* the visit is within a subtree */
     numbers references; /* of the leaves of the current subtree, to faces of any subtree */
@@ -142,7 +142,7 @@ static const char *column_name(const recount *c, unsigned column, int *level)
 /* Compares the needed blocks with the next rows of /subtrees/outer. A row is `from` minus the
  * number of a block. The rows of a subtree ascend, so its blocks descend. what: name of the blocks'
  * array. `column` gets the number of blocks. */
-static void compare_shared(recount *c, const char *what, uint64_t from, const numbers *needed,
+static void compare_blocks(recount *c, const char *what, uint64_t from, const numbers *needed,
                            unsigned column)
 {
     ebpo_tally *tally = c->tally;
@@ -162,7 +162,7 @@ static void compare_shared(recount *c, const char *what, uint64_t from, const nu
     c->shared_done += needed->count;
 }
 
-/* Adds the blocks of those vertices of a face that are below first_vertex. */
+/* Adds the blocks of those vertices of a face whose indices are below first_vertex. */
 static void note_vertices(recount *c, numbers *blocks, uint64_t face, uint64_t first_vertex)
 {
     for (int k = 0; k < 3; k++) {
@@ -174,7 +174,7 @@ static void note_vertices(recount *c, numbers *blocks, uint64_t face, uint64_t f
 
 /* Finds the blocks that the current subtree needs from earlier subtrees, and compares them with
  * /subtrees/outer. */
-static void check_shared(recount *c)
+static void check_blocks(recount *c)
 {
     numbers faces = { 0 }, vertices = { 0 };
     uint64_t first_face = c->faces - c->row[FACES], first_vertex = c->vertices - c->row[VERTICES];
@@ -188,8 +188,8 @@ static void check_shared(recount *c)
         note_vertices(c, &vertices, face, first_vertex);
     sort_once(&faces);
     sort_once(&vertices);
-    compare_shared(c, "/mesh/faces", first_face / ROWS_OF_FACES, &faces, FACE_BLOCKS);
-    compare_shared(c, "/mesh/vertices", first_vertex / ROWS_OF_VERTICES, &vertices, VERTEX_BLOCKS);
+    compare_blocks(c, "/mesh/faces", first_face / ROWS_OF_FACES, &faces, FACE_BLOCKS);
+    compare_blocks(c, "/mesh/vertices", first_vertex / ROWS_OF_VERTICES, &vertices, VERTEX_BLOCKS);
     free(faces.at);
     free(vertices.at);
     c->references.count = 0;
@@ -202,7 +202,7 @@ static void check_row(recount *c)
     const uint32_t *stated = c->counts + c->subtree * c->cols;
     int level;
     if (c->view->has_mesh)
-        check_shared(c);
+        check_blocks(c);
     for (unsigned k = 0; k < c->cols; k++) {
         const char *name = column_name(c, k, &level);
         if (c->subtree % c->rows_of_chunk == 0)

@@ -116,14 +116,14 @@ typedef struct ebpo_shells {
     /* Number of shells. Shells of volume 0 are not counted. */
     uint64_t closed;
 
-    /* Number of these that are oriented inwards, inside an even number of other shells. */
+    /* Number of shells that are oriented inwards and inside an even number of other shells. */
     uint64_t inside_out;
 
-    /* Number of these that are oriented inwards, inside an odd number of other shells. */
+    /* Number of shells that are oriented inwards and inside an odd number of other shells. */
     uint64_t cavities;
 
     /*
-     * Number of these that are oriented outwards, inside an odd number of other shells: solids
+     * Number of shells that are oriented outwards and inside an odd number of other shells: solids
      * inside other solids.
      */
     uint64_t nested;
