@@ -27,7 +27,7 @@
  * models. The system may allow fewer: each model has one or two open files. */
 enum { SHARES = 8, OPEN_MAX = 256, DESCRIPTORS_EACH = 4, CONTEXTS_KEPT = 256 };
 
-/* What identifies a requested model. */
+/* Identity of a requested model. */
 typedef struct wanted {
     const char *path, *numbers; /* numbers: NULL if there are no face numbers */
     uint8_t digest[32];

@@ -1,12 +1,12 @@
 /* Computes the colours of gray nodes: the mean, by area, of the colours of the faces below
  * (format-spec/colours.md).
  *
- * Levels go from the deepest up: a group of eight gives the sums of the gray node above it. No
- * data is kept for each face: the weight of a face is computed again for each leaf that lists the
- * face, as most faces are in one leaf only. Weights and sums are integers, so the result is exact
- * and does not depend on the number of threads. Vertex colours are used. Face colours are used
- * instead if vertices have no colours, or all vertices have the same colour. lib/verify computes
- * the same colours with separate code. */
+ * The levels are processed from the deepest upwards: the sums of a gray node are those of its
+ * group of eight children. No data is kept for each face: the weight of a face is computed again
+ * for each leaf that lists the face, as most faces are in one leaf only. Weights and sums are
+ * integers, so the result is exact and does not depend on the number of threads. Vertex colours are
+ * used. If vertices have no colours, or all have the same colour, face colours are used instead, if
+ * there are any. lib/verify computes the same colours with separate code. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -29,7 +29,8 @@ typedef struct colour_sums {
     ebpo_wide weight;    /* sum of 3 * weight */
 } colour_sums;
 
-/* Numbers of leaves, gray nodes and references before a run of GROUP_GRAIN groups in its level. */
+/* Numbers of leaves, gray nodes and entries of leaf_refs of a level before a run of GROUP_GRAIN
+ * groups. leaf_refs lists the faces of each leaf that an earlier leaf lists first. */
 typedef struct run_start {
     uint64_t leaf, gray, ref;
 } run_start;
@@ -148,7 +149,7 @@ static run_start *find_starts(const colouring *c)
     return start;
 }
 
-/* Colours the gray nodes of the level above `level`. */
+/* Colours the gray nodes of level `level` - 1, the parents of the groups of `level`. */
 static ebpo_status colour_level(const ebpo_builder *b, colouring *c, int level,
                                 const ebpo_progress *progress, ebpo_error *error)
 {

@@ -20,7 +20,8 @@
 #include "construct/sweep.h"
 #include "geometry/vec3.h"
 
-static const double flat = 1e-9; /* a point nearer to a plane than this counts as on the plane */
+/* a point whose distance from a plane is less than this counts as on the plane */
+static const double flat = 1e-9;
 
 _Static_assert((int)EBPO_HULL_FACETS <= (int)EBPO_SWEEP_PLANES, "sweeps have space for the facets");
 
@@ -40,10 +41,10 @@ typedef struct hull {
     double length[SPACE]; /* twice the area of each facet */
     double tolerance;     /* points at most this far outside the hull are omitted */
     uint16_t corner[SPACE][3];
-    int count, capacity;
+    int count, capacity; /* number of facets, and its limit */
 } hull;
 
-/* Computes the normal of the triangle a, b, c; its length is twice the area. */
+/* Computes the normal of the triangle a, b, c. Its length is twice the triangle's area. */
 static void cross_of(const double (*p)[3], int a, int b, int c, double n[3])
 {
     double u[3], v[3];
@@ -60,7 +61,7 @@ static void set_plane(hull *h, int i, const double n[3], double d)
     h->d[i] = d;
 }
 
-/* Makes the facet a, b, c at index i. Returns false if it has no area. */
+/* Makes facet i with the corners a, b and c. Returns false if the facet has no area. */
 static bool make_facet(hull *h, int i, int a, int b, int c)
 {
     double n[3];
@@ -178,7 +179,7 @@ static bool first_facets(hull *h, const int c[4])
 /* --- adding a point --- */
 
 /* Lists the edges of the visible facets as from << 16 | to in `edges`, and as to << 16 | from in
- * `reversed`. Pads `edges` to a multiple of four with invalid edges. */
+ * `reversed`. Returns their number. Pads `edges` to a multiple of four with invalid edges. */
 static int edges_of(const hull *h, const uint16_t *visible, int seen, uint32_t *edges,
                     uint32_t *reversed)
 {
@@ -206,11 +207,13 @@ static bool has_edge(const uint32_t *edges, int fours, uint32_t edge)
     return found;
 }
 
-/* Removes the visible facets that no new facet has replaced: moves facets from the end to their
- * indices. */
+/* Removes the visible facets that no new facet has replaced: those with the numbers index[from] ..
+ * index[to - 1], in ascending order. `count`: number of facets before. Moves the last facet to the
+ * number of each removed facet. The greatest number comes first, so that the last facet is never
+ * one that is still to be removed. */
 static void close_gaps(hull *h, const uint16_t *index, int from, int to, int count)
 {
-    for (int i = to - 1; i >= from; i--) /* `index` ascends */
+    for (int i = to - 1; i >= from; i--)
         if (index[i] != --count)
             move_facet(h, index[i], count);
     set_count(h, count);

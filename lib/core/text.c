@@ -1,6 +1,7 @@
 /* Checks that text is valid UTF-8 (RFC 3629) without control characters. Checks dates and times of
- * ISO 8601. Provides streams into memory that always report a lack of memory; open_memstream does
- * not always report it. */
+ * ISO 8601. Provides streams into memory: with fopencookie they always report a lack of memory.
+ * Where the C library has no fopencookie, they use open_memstream, which does not always report it.
+ */
 #include <stdlib.h>
 #include <string.h>
 
@@ -38,15 +39,15 @@ bool ebpo_text_ok(const char *text)
     return ebpo_text_is_utf8(text);
 }
 
-uint64_t ebpo_text_mark(const void *text, uint64_t size)
+uint64_t ebpo_text_bom_length(const void *text, uint64_t size)
 {
     return size >= 3 && memcmp(text, "\xef\xbb\xbf", 3) == 0 ? 3 : 0;
 }
 
 /* --- dates --- */
 
-/* Reads a number of exactly `count` digits and moves *text behind it. Returns false if a digit is
- * missing or the number is not within `least` .. `most`. */
+/* Reads a number of exactly `count` digits and moves *text to the first character after it. Returns
+ * false if a digit is missing or the number is not within `least` .. `most`. */
 static bool take_digits(const char **text, int count, int least, int most, int *out)
 {
     *out = 0;
@@ -113,7 +114,8 @@ bool ebpo_is_date(const char *text)
 /* --- streams into memory --- */
 
 #ifdef EBPO_HAVE_FOPENCOOKIE
-/* Appends the data of a stream to its text; `write` function of fopencookie. */
+/* Appends data that was written to the stream to its text. This is the `write` function of
+ * fopencookie. */
 static ssize_t keep_text(void *cookie, const char *data, size_t bytes)
 {
     ebpo_text_stream *s = cookie;

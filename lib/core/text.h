@@ -12,10 +12,10 @@ bool ebpo_text_is_utf8(const char *text);
 bool ebpo_text_ok(const char *text);
 
 /* Returns the length of the UTF-8 byte order mark at the beginning of text, or 0. */
-uint64_t ebpo_text_mark(const void *text, uint64_t size);
+uint64_t ebpo_text_bom_length(const void *text, uint64_t size);
 
-/* A stream into memory that reports a lack of memory: open_memstream of the C library may lose data
- * silently. It is used only where there is no alternative. */
+/* A stream into memory that reports a lack of memory. open_memstream of the C library may lose data
+ * silently, so it is used only where the C library has no fopencookie. */
 
 typedef struct ebpo_text_stream {
     char *text; /* NUL-terminated after the end; the caller frees it */

@@ -64,8 +64,8 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, ebpo_array_id id
     bool gates = id == EBPO_A_FACES && file->info.gates;
     *a = (ebpo_array_in){ .id = id, .level = level };
     ebpo_schema_path(id, level, a->path);
-    if (ebpo_schema_former(id) && ebpo_head_look(head, a->path) == EBPO_HEAD_ABSENT &&
-        ebpo_head_look(head, ebpo_schema_former(id)) != EBPO_HEAD_ABSENT)
+    if (ebpo_schema_former(id) && ebpo_head_find_kind(head, a->path) == EBPO_HEAD_ABSENT &&
+        ebpo_head_find_kind(head, ebpo_schema_former(id)) != EBPO_HEAD_ABSENT)
         snprintf(a->path, sizeof a->path, "%s", ebpo_schema_former(id));
     if (rows == 0 || (spec->if_needed && ebpo_head_find_kind(head, a->path) == EBPO_HEAD_ABSENT))
         return EBPO_OK;
@@ -281,7 +281,7 @@ static const ebpo_import_format *mesh_format(const uint8_t *begin, uint64_t size
                                              uint64_t whole_size)
 {
     const ebpo_import_format *format = ebpo_import_recognise(begin, size, "");
-    if (format && format->mark_comes_first)
+    if (format && format->beginning_decides)
         return format;
     if (ebpo_stl_states_size(begin, size, whole_size)) /* binary STL may begin with any bytes */
         return &ebpo_import_stl;

@@ -103,7 +103,7 @@ static void add_range(ebpo_hints *e, uint64_t offset, uint64_t size)
 bool ebpo_hints_wanted(const ebpo_hints *e)
 {
     return e->summed || ebpo_input_prefetches(&e->file->in) ||
-           (e->near && ebpo_input_hints(&e->file->in));
+           (e->near && ebpo_input_can_advise(&e->file->in));
 }
 
 void ebpo_hint_chunks(ebpo_hints *e, const ebpo_array_in *array, uint64_t begin, uint64_t end)
@@ -173,7 +173,7 @@ static void hint_system(ebpo_hints *e)
 {
     enum { BETWEEN = 16 << 10 };
     join_ranges(e, BETWEEN);
-    ebpo_input_hint(&ebpo_reader_own(e->file)->in, e->range, e->count);
+    ebpo_input_advise(&ebpo_reader_own(e->file)->in, e->range, e->count);
 }
 
 uint64_t ebpo_hints_bytes(ebpo_hints *e)

@@ -3,9 +3,9 @@
  * stores for some rows, and the counts of the rows in between. It caches recently used rows.
  *
  * The second part computes ranks: the numbers of planes, faces and nodes of each type before a
- * node. In levels below the subtrees' roots it begins at the subtree's row. In other levels it
- * begins at a row of an index array, which has a row for every 4,096 items. Results are checked
- * against the counts in the header.
+ * node. In levels below the subtrees' roots, counting begins at the row of the node's subtree. In
+ * other levels, counting begins at a row of an index array, which has a row for every 4,096 items.
+ * Results are checked against the counts in the header.
  *
  * The last part sends prefetch hints for subtrees. Source: format-spec/subtrees.md.
  */
@@ -25,8 +25,9 @@ static ebpo_status table_fails(const ebpo_chunks *chunks, ebpo_array_id id, cons
     return ebpo_chunks_fail(chunks, -1, id, what, error);
 }
 
-/* Returns the maximum of a column's sum over all subtrees. Sets *exact to true if the sum must
- * equal this maximum. */
+/* Returns an upper bound of the sum of a column over all subtrees: a count from the header, or the
+ * number of rows of /subtrees/shared_chunks. Sets *exact to true if the sum must equal this bound.
+ */
 static uint64_t column_maximum(const ebpo_file *file, unsigned column, bool *exact)
 {
     const ebpo_info *info = &file->info;
@@ -53,8 +54,8 @@ static uint64_t column_maximum(const ebpo_file *file, unsigned column, bool *exa
     }
 }
 
-/* Reads the sums before a chunk of rows. If `chunk` is one past the last chunk, returns the maxima
- * from the header. */
+/* Reads the sums before a chunk of rows. If `chunk` is one past the last chunk, sets the sums to
+ * the upper bounds (column_maximum). */
 static ebpo_status sums_before(ebpo_chunks *chunks, uint64_t chunk, uint32_t cols, uint64_t *sums,
                                ebpo_error *error)
 {
@@ -97,7 +98,8 @@ static void add_row(const subtree_counts *c, uint64_t subtree, uint64_t *sums)
 }
 
 /* Opens the chunk of rows that contains a subtree. Checks that the sums before the chunk, plus the
- * counts in the chunk, are the sums after the chunk. */
+ * counts in the chunk, are the sums after the chunk. After the last chunk, some sums have only an
+ * upper bound (column_maximum). */
 static ebpo_status open_counts(ebpo_chunks *chunks, uint64_t subtree, subtree_counts *c,
                                ebpo_error *error)
 {
@@ -116,9 +118,10 @@ static ebpo_status open_counts(ebpo_chunks *chunks, uint64_t subtree, subtree_co
     for (uint64_t i = c->view.begin; i < c->view.end; i++)
         add_row(c, i, sums);
     bool last = c->view.end == array->shape.rows, exact;
+    /* For the last chunk, c->end of either column is the number of rows of /subtrees/shared_chunks.
+     * The two sums must add up to this number. */
     if (last &&
-        sums[EBPO_S_SHARED_FACES] + sums[EBPO_S_SHARED_VERTICES] !=
-            c->end[EBPO_S_SHARED_FACES]) /* the maximum of each: the rows of /subtrees/outer */
+        sums[EBPO_S_SHARED_FACES] + sums[EBPO_S_SHARED_VERTICES] != c->end[EBPO_S_SHARED_FACES])
         status = table_fails(chunks, EBPO_A_SUBTREE_SHARED,
                              "its rows do not match the table's counts", error);
     for (uint32_t k = 0; k < c->cols && status == EBPO_OK; k++) {
@@ -145,7 +148,8 @@ static void sum_row(const subtree_counts *c, uint64_t subtree, ebpo_subtree_row 
     out->vertex = out->after[EBPO_S_VERTICES_BEFORE] + out->before[EBPO_S_VERTICES];
 }
 
-/* Checks a row against the header: the sums of faces and vertices, and the numbers of nodes. */
+/* Checks a row: the sums of faces and vertices against the header, and the numbers of nodes against
+ * the numbers of groups. */
 static ebpo_status check_row(const ebpo_chunks *chunks, const ebpo_subtree_row *row,
                              ebpo_error *error)
 {
@@ -179,14 +183,12 @@ uint64_t ebpo_subtree_groups(const ebpo_info *info, const ebpo_subtree_row *row,
 
 /* --- cache of rows --- */
 
-/* Size of the cache. The row of a subtree is needed repeatedly while the subtree is read, and
- * making a row takes long, because a chunk of rows is added up. Typically two threads read at once.
- */
+/* The row of a subtree is needed repeatedly while the subtree is read. Computing a row takes long,
+ * because a chunk of rows is added up. Typically two threads read at once. */
 enum {
-    KEPT = 4,
-    BY_NUMBER = EBPO_SUBTREE_COLS /* no column: compare the subtree's number */,
-    FACES_KNOWN = 64,
-    BY_NUMBER = EBPO_SUBTREE_COLS
+    KEPT = 4,                     /* number of rows in the cache */
+    FACES_KNOWN = 64,             /* number of remembered subtrees whose faces were checked */
+    BY_NUMBER = EBPO_SUBTREE_COLS /* in place of a column: find a row by the subtree's index */
 };
 
 struct ebpo_kept_rows {
@@ -201,8 +203,8 @@ static bool row_holds(const ebpo_subtree_row *row, unsigned column, uint64_t ite
                                : row->before[column] <= item && item < row->after[column];
 }
 
-/* Finds a cached row: of subtree `item` if column is BY_NUMBER, otherwise of the subtree that
- * contains item `item` of the column. */
+/* Finds a cached row. If `column` is BY_NUMBER, finds the row of subtree `item`. Otherwise finds
+ * the row of the subtree that contains item `item` of the column. */
 static bool find_kept(ebpo_chunks *chunks, unsigned column, uint64_t item, ebpo_subtree_row *out)
 {
     bool found = false;
@@ -215,8 +217,8 @@ static bool find_kept(ebpo_chunks *chunks, unsigned column, uint64_t item, ebpo_
     return found;
 }
 
-/* Checks a row, and caches it. Caches that count the bytes read (ebpo_chunks_make_counted) do not
- * use cached rows, so that every read is counted. */
+/* Checks a row, and adds it to the cache of rows. Counted chunks (ebpo_chunks_make_counted) have no
+ * cache of rows, so that every read is counted. */
 static ebpo_status keep_row(ebpo_chunks *chunks, const ebpo_subtree_row *row, ebpo_error *error)
 {
     ebpo_status status = check_row(chunks, row, error);
@@ -265,7 +267,7 @@ ebpo_status ebpo_subtree_table_row(ebpo_chunks *chunks, uint64_t subtree, ebpo_s
     return keep_row(chunks, out, error);
 }
 
-/* Finds the last chunk of rows with at most `item` items before it. */
+/* Finds the last chunk of rows with at most `item` items of the column before the chunk. */
 static ebpo_status find_chunk(ebpo_chunks *chunks, unsigned column, uint64_t item, uint64_t *out,
                               ebpo_error *error)
 {
@@ -347,8 +349,8 @@ bool ebpo_subtree_table_missing(ebpo_chunks *chunks, int level, ebpo_per per, ui
     return false;
 }
 
-/* Adds to the hints a chunk of the table, and the rows of /subtrees/outer (the lists of shared
- * chunks) for the subtrees in this chunk. */
+/* Adds to the hints a chunk of the table, and the rows of /subtrees/shared_chunks (the lists of
+ * shared chunks) for the subtrees in this chunk. */
 static void hint_table_chunk(ebpo_chunks *chunks, ebpo_hints *hints, uint64_t chunk)
 {
     const ebpo_shape *shape = &ebpo_reader_array(chunks->file, EBPO_A_SUBTREE_COUNTS, 0)->shape;
@@ -524,9 +526,10 @@ static ebpo_status check_list(ebpo_chunks *chunks, int level, const ebpo_subtree
                : row_contradicts(chunks, error);
 }
 
-/* Checks column EBPO_S_ENDS: it must be the number of faces that the subtree's leaves of the level
- * skip or list first. Also checks that the faces that these leaves list first are owned faces of
- * the subtree. */
+/* Checks column EBPO_S_ENDS, the increase of the end of the new faces in the level. The column must
+ * be the sum, over the subtree's leaves of the level, of leaf_new (new faces of the leaf) and
+ * leaf_skip (new faces of leaves of other levels before the leaf). Also checks that the new faces
+ * of these leaves are owned faces of the subtree. */
 static ebpo_status check_ends(ebpo_chunks *chunks, int level, const ebpo_subtree_row *row,
                               ebpo_error *error)
 {
@@ -632,8 +635,11 @@ ebpo_status ebpo_ranks_planes(ebpo_chunks *chunks, int level, uint64_t gray, uin
     return status;
 }
 
-/* Reads the row of leaf_index, or of the table, that precedes a leaf. With the table, *from is the
- * leaf at which the row begins. `faces`: checks the sums of faces, otherwise of planes. */
+/* Reads the row of leaf_index, or of the table, that precedes a leaf. Sets row[0] to the end of the
+ * new faces (one past the last), row[1] to the number of references, and row[2] to the number of
+ * leaf planes, all for the leaves of the level before the row. With the table, sets *from to the
+ * subtree's first leaf of the level. `faces`: checks the table's sums of faces; otherwise those of
+ * planes. */
 static ebpo_status leaf_row(ebpo_chunks *chunks, int level, uint64_t leaf, bool faces,
                             uint64_t row[3], uint64_t *from, ebpo_error *error)
 {
@@ -718,15 +724,16 @@ static void hint_rows(const hinting *t, ebpo_array_id id, int level, uint64_t be
         ebpo_chunks_hint(t->chunks, t->hints, id, level, begin, end - begin);
 }
 
-/* Returns the number of items of a level before the subtrees, or with `after` including them. */
+/* Returns the number of items of a level before the subtrees. If `after` is true, the items of the
+ * subtrees are included. */
 static uint64_t subtree_sum(const hinting *t, int level, unsigned what, bool after)
 {
     unsigned column = ebpo_subtree_column(&t->chunks->file->info, level, what);
     return after ? t->last->after[column] : t->first->before[column];
 }
 
-/* Returns the number of rows, of an array with a row for each `per`, before the subtrees, or with
- * `after` including them. */
+/* For an array with one row for each `per`: returns the number of rows before the subtrees. If
+ * `after` is true, the rows of the subtrees are included. */
 static uint64_t rows_before(const hinting *t, ebpo_per per, int level, bool after)
 {
     const ebpo_info *info = &t->chunks->file->info;
@@ -786,7 +793,8 @@ static void hint_owned_faces(const hinting *t)
 }
 
 /* Adds to the hints the chunks with a subtree's shared faces and vertices. The subtree's rows of
- * /subtrees/outer list these chunks. The values are not checked, as only hints depend on them. */
+ * /subtrees/shared_chunks list these chunks. The values are not checked, as only hints depend on
+ * them. */
 static void hint_shared(const hinting *t, const ebpo_subtree_row *row)
 {
     enum { SHARED_MAX = 1 << 16 };

@@ -15,7 +15,7 @@ typedef struct ebpo_subtree_row {
     uint64_t face, vertex;              /* first owned face and vertex of the subtree */
 } ebpo_subtree_row;
 
-/* Returns true if the table covers a level's nodes: those below the subtrees' roots. */
+/* Returns true if the table covers a level: it covers the levels below the subtrees' roots. */
 static inline bool ebpo_subtree_table_has(const ebpo_file *file, int level)
 {
     return file->info.subtree_level && level > file->info.subtree_level;
@@ -24,8 +24,8 @@ static inline bool ebpo_subtree_table_has(const ebpo_file *file, int level)
 /* Reads a subtree's row; the index must be less than the number of subtrees. */
 EBPO_MUST_USE ebpo_status ebpo_subtree_table_row(ebpo_chunks *chunks, uint64_t subtree,
                                                  ebpo_subtree_row *out, ebpo_error *error);
-/* Finds the last subtree that begins at or before item number `item` of those that column `column`
- * counts. */
+/* Finds the subtree that contains item number `item` of the items that column `column` counts. More
+ * exactly, finds the last subtree that has at most `item` such items before it. */
 EBPO_MUST_USE ebpo_status ebpo_subtree_table_find(ebpo_chunks *chunks, unsigned column,
                                                   uint64_t item, ebpo_subtree_row *out,
                                                   ebpo_error *error);
@@ -34,8 +34,8 @@ EBPO_MUST_USE ebpo_status ebpo_subtree_table_find(ebpo_chunks *chunks, unsigned 
 bool ebpo_subtree_faces_known(ebpo_chunks *chunks, uint64_t subtree);
 void ebpo_subtree_faces_note(ebpo_chunks *chunks, uint64_t subtree);
 
-/* Returns the number of groups of a level before the row's subtree, or with `after` the number
- * including the subtree. */
+/* Returns the number of groups of a level before the row's subtree. If `after` is true, the groups
+ * of the subtree are included. */
 uint64_t ebpo_subtree_groups(const ebpo_info *info, const ebpo_subtree_row *row, int level,
                              bool after);
 

@@ -1,13 +1,14 @@
 /* Writes a file: ebpo_tree_write. ebpo_file_repack reads a file and writes it again with other
- * options. Source: format-spec/README.md, sections 2, 9 and 20.
+ * options. Source: format-spec/hdf5-messages.md and subtrees.md.
  *
  * The headers (groups, array headers, attributes) come first in the file. To determine their size,
  * the same file is first written in memory, with tiny chunks. Then several threads encode and
- * compress the chunks of a window (WINDOW chunks) at a time. The chunks are appended in the order
- * of chunk_layout.c: first the chunks with which a reader locates a subtree, then all others.
- * HDF5's chunk indexes are one block before the first chunk of an array with several chunks. The
- * list of chunk checksums and the list of chunk sizes are the last chunks. Content checksums are
- * format-spec/hdf5-messages.md, section 1; subtrees.md. */
+ * compress WINDOW chunks (a window) at a time. The chunks are appended in the order of
+ * chunk_layout.c: first the chunks with which a reader locates a subtree, then all others.
+ *
+ * All chunk indexes of HDF5 form one metadata block. It is stored immediately before the first
+ * chunk that belongs to an array with several chunks. The list of chunk checksums and the list of
+ * chunk sizes are the last chunks. Content checksums are computed while chunks are compressed. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -35,7 +36,7 @@
 /* The lists that have a row for each chunk. */
 typedef enum header_list {
     LIST_CHECKSUMS, /* /chunk_sums: chunk checksums, in the order of arrays */
-    LIST_SIZES, /* /subtrees/places: stored sizes in file order; readers add them up to offsets */
+    LIST_SIZES,     /* /subtrees/places: stored sizes in file order; their sums are chunk offsets */
     LISTS
 } header_list;
 
@@ -43,9 +44,8 @@ typedef struct file_headers {
     ebpo_plan *plan; /* lay_out and headers_begin_index set the handles of its arrays */
     ebpo_h5_out out;
     ebpo_h5_id root;
-    /* a list without rows is not written */
-    ebpo_array_out list[LISTS];
-    uint64_t chunks; /* number of chunks of the plan's arrays */
+    ebpo_array_out list[LISTS]; /* a list without rows is not written */
+    uint64_t chunks;            /* number of chunks of the plan's arrays */
     int codec_level;
     uint64_t head_bytes;  /* size of the headers */
     uint64_t index_bytes; /* size of HDF5's chunk indexes; 0 if no array has several chunks */
@@ -147,7 +147,7 @@ static ebpo_status make_root_group(file_headers *h, const char *path, uint32_t n
 }
 
 /* Writes the offset of a list's chunk and the file's size as attributes of the list. Readers use
- * the list only if both values are those of the file. */
+ * the list only if both values match the file. */
 static ebpo_status headers_put_validity(file_headers *h, header_list list, uint64_t file_bytes,
                                         uint64_t offset, ebpo_error *error)
 {
@@ -180,9 +180,10 @@ static ebpo_status make_array(file_headers *h, ebpo_array_out *a, const first_ch
     return status;
 }
 
-/* Writes all headers and the first chunk. HDF5 extends a metadata block at the end of the file
- * instead of using the block's free space. So the first chunk is written after the block and before
- * attributes enlarge the header of the first array. All later headers then go into the block. */
+/* Writes all headers and the first chunk. If a metadata block is the last thing in the file, HDF5
+ * enlarges the block instead of using its free space. So the first chunk is written early, before
+ * the attributes of the first array. The chunk is then stored after the block. The block cannot
+ * grow any more, so all later headers use its free space. */
 static ebpo_status lay_out(file_headers *h, const char *path, const char *shown,
                            uint64_t head_bytes, first_chunk first, ebpo_error *error)
 {
@@ -237,8 +238,8 @@ static void headers_close(file_headers *h)
     h->root = -1;
 }
 
-/* Writes the headers to the file after headers_measure, and leaves the file open. `shown`: name for
- * messages. */
+/* Writes the headers to the file and leaves the file open. headers_measure must have been called.
+ * `shown`: name of the file for messages. */
 static ebpo_status headers_lay_out(file_headers *h, const char *path, const char *shown,
                                    first_chunk first, ebpo_error *error)
 {
@@ -294,8 +295,8 @@ static ebpo_status headers_begin_index(file_headers *h, ebpo_error *error)
 
 /* --- chunks --- */
 
-/* Number of chunks in memory at a time (a window): 8 MiB before compression, and as much after it.
- */
+/* Number of chunks that are in memory together, which is called a window. They have up to 8 MiB
+ * before compression, and the compressed chunks have space for as much. */
 enum { WINDOW = 128 };
 
 /* A chunk of the window. */
@@ -328,7 +329,7 @@ typedef struct writer {
     uint64_t index_at;        /* offset of HDF5's chunk indexes; 0: none, or not yet written */
 } writer;
 
-/* Encodes the rows of chunks begin .. end - 1 of the window; pads the last chunk of an array with
+/* Encodes the rows of chunks begin .. end - 1 of the window. Pads the last chunk of an array with
  * zeros. */
 static ebpo_status fill_slot(void *context, uint64_t begin, uint64_t end, unsigned worker,
                              ebpo_error *error)
@@ -350,8 +351,8 @@ static ebpo_status fill_slot(void *context, uint64_t begin, uint64_t end, unsign
     return EBPO_OK;
 }
 
-/* Adds the chunks of the window to the digests of their arrays, and complete digests to the content
- * checksums. */
+/* Adds the chunks of the window to the digests of their arrays. Adds each digest that is then
+ * complete to the content checksums. */
 static void digest_slots(writer *w)
 {
     for (unsigned i = 0; i < w->used; i++) {
@@ -433,8 +434,8 @@ static void add_size_row(writer *w, uint32_t number, uint64_t bytes)
     w->size_row[w->size_rows++] = ebpo_place(number, bytes);
 }
 
-/* Adds a chunk to the lists and to the sums of sizes. Called in file order, before the chunk is
- * written. */
+/* Adds a chunk to the lists, and its size to the sizes so far. Called in file order, before the
+ * chunk is written. */
 static void list_chunk(writer *w, const slot *s)
 {
     if (w->index_at == 0 && ebpo_shape_chunks(&s->array->shape) > 1) {
@@ -503,8 +504,8 @@ static ebpo_status write_list(writer *w, header_list list, const uint64_t *value
 }
 
 /* Writes the lists, which are the last chunks of the file. If libhdf5 has written other data
- * between the chunks, the lists are wrong: their attributes are then 0, so that readers ignore
- * them. */
+ * between the chunks, the lists are wrong. The attributes of the lists are then 0, so that readers
+ * ignore the lists. */
 static ebpo_status write_lists(writer *w, ebpo_error *error)
 {
     size_t bytes[LISTS];
@@ -518,10 +519,10 @@ static ebpo_status write_lists(writer *w, ebpo_error *error)
         status = write_list(w, LIST_SIZES, values[LIST_SIZES], &bytes[LIST_SIZES], error);
     if (status == EBPO_OK)
         status = ebpo_h5_size(&w->head.out, &size, error);
-    bool holds = status == EBPO_OK && size == offset + bytes[LIST_CHECKSUMS] + bytes[LIST_SIZES];
+    bool valid = status == EBPO_OK && size == offset + bytes[LIST_CHECKSUMS] + bytes[LIST_SIZES];
     for (header_list l = 0; l < LISTS && status == EBPO_OK; l++) {
         if (w->head.list[l].shape.rows)
-            status = headers_put_validity(&w->head, l, holds ? size : 0, holds ? offset : 0, error);
+            status = headers_put_validity(&w->head, l, valid ? size : 0, valid ? offset : 0, error);
         offset += bytes[l];
     }
     return status;
@@ -693,8 +694,9 @@ ebpo_status ebpo_tree_write_into(const ebpo_tree *tree, const char *path, const 
 
 /* --- repacking --- */
 
-/* Checks that the written file has the content checksums of the file that was read, and that its
- * content matches them. If the checksums differ, checks the content of the file that was read. */
+/* Checks that the written file has the content checksums of `from`, the file that was read. If they
+ * are equal, also checks the content of the written file. If they differ, returns an error, after
+ * checking the content of `from` to find the reason. */
 static ebpo_status check_written(const ebpo_file *from, const ebpo_publish *out,
                                  const ebpo_read_options *read, ebpo_error *error)
 {

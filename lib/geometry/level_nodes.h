@@ -170,9 +170,9 @@ typedef enum ebpo_entry_kind {
     EBPO_ENTRY_UNIFORM = 0, /* white or black; value: winding number + EBPO_ENTRY_ZERO */
     EBPO_ENTRY_LEAF = 1,    /* value: index of the leaf */
     EBPO_ENTRY_GRAY = 2,    /* value: index of the group of its eight children */
-    /* in the top of a tree: value: index of a subtree that is loaded on demand; in a subtree: a
-     * pruned node; value: its index among gray nodes */
-    EBPO_ENTRY_BELOW = 3
+    /* in the top of a tree: root of a subtree that is loaded on demand, or a pruned node; value:
+     * index of the subtree. In a subtree: a pruned node; value: its index among gray nodes */
+    EBPO_ENTRY_SUBTREE_ROOT = 3
 } ebpo_entry_kind;
 enum { EBPO_ENTRY_ZERO = 1 << 29 };
 
@@ -209,7 +209,7 @@ static inline ebpo_node ebpo_entry_node(uint32_t entry, ebpo_cell cell, ebpo_rul
         node.type = ebpo_rule_inside(rule, ebpo_entry_winding(entry)) ? EBPO_BLACK : EBPO_WHITE;
         break;
     case EBPO_ENTRY_LEAF: node.type = EBPO_LEAF; break;
-    case EBPO_ENTRY_BELOW: node.pruned = true; break;
+    case EBPO_ENTRY_SUBTREE_ROOT: node.pruned = true; break;
     case EBPO_ENTRY_GRAY: break;
     }
     return node;

@@ -38,9 +38,8 @@ bool ebpo_h5_is_elsewhere(hid_t set);
 /* Returns the stored type for little-endian integers of `size` bytes; -1 for another size. */
 hid_t ebpo_h5_integer_type(unsigned size, bool is_signed);
 
-/* A virtual file driver, through which libhdf5 writes. Stores the first failed write, which all
- * later calls of this module report. For libhdf5 all writes appear to succeed; sink.c explains why.
- */
+/* A virtual file driver, through which libhdf5 writes. It stores the first failed write, but
+ * reports every write to libhdf5 as successful; sink.c explains why. */
 
 typedef struct ebpo_h5_sink {
     hid_t id;        /* libhdf5's registration of the driver */

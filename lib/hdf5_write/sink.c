@@ -2,8 +2,8 @@
  *
  * libhdf5 1.10 does not survive a failed write: it keeps unflushed data and an id whose file is
  * already released, and fails when it uses this id at exit. So the driver stores the first failure,
- * and all later calls of this module report it. For libhdf5 all writes appear to succeed, so that
- * libhdf5 always closes the file normally. */
+ * and reports every write to libhdf5 as successful. libhdf5 then always closes the file normally.
+ * ebpo_h5_sink_status and ebpo_h5_sink_close return the stored failure. */
 #include "hdf5_write/h5_parts.h"
 
 #include <errno.h>
@@ -99,15 +99,15 @@ void ebpo_h5_sink_abandon(ebpo_h5_sink *sink)
 {
     release_sink(sink);
     if (sink->status == EBPO_OK)
-        sink->status = EBPO_E_MEMORY; /* nothing more is written */
+        sink->status = EBPO_E_MEMORY; /* any error makes later writes of libhdf5 do nothing */
 }
 
 static H5FD_t *sink_open(const char *name, unsigned flags, hid_t fapl, haddr_t address_max)
 {
     (void)name;
     (void)address_max;
-    /* flags (create, truncate) are ignored: the sink is empty when it is made, and libhdf5 may open
-     * it again later, when it must not be truncated */
+    /* flags (create, truncate) are ignored: the sink is empty when it is made. libhdf5 may open it
+     * again later, and it must not be truncated then. */
     (void)flags;
     const sink_choice *choice = H5Pget_driver_info(fapl);
     if (!choice)
@@ -242,7 +242,7 @@ static herr_t sink_write(H5FD_t *file, H5FD_mem_t type, hid_t dxpl, haddr_t addr
     return 0;
 }
 
-/* Makes the file end at the end of its addresses. */
+/* Sets the size of the file to the end of the addresses that libhdf5 has allocated. */
 static herr_t sink_truncate(H5FD_t *file, hid_t dxpl, hbool_t closing)
 {
     (void)dxpl;
@@ -265,7 +265,7 @@ static const H5FD_class_t sink_class = {
     .name = "ebpo sink",
     .maxaddr = (haddr_t)INT64_MAX,
     .fc_degree = H5F_CLOSE_STRONG,
-    /* libhdf5 copies this struct as bytes, because the class has no functions to copy it */
+    /* libhdf5 copies a sink_choice as bytes, because this class has no function to copy it */
     .fapl_size = sizeof(sink_choice),
     .open = sink_open,
     .close = sink_close,
@@ -280,8 +280,9 @@ static const H5FD_class_t sink_class = {
 };
 
 /* Registers the driver again for each file, because the caller may have closed libhdf5 (H5close)
- * after the previous file. The registration stays until the file is closed: libhdf5 releases its
- * own reference to the registration first, and calls the driver's `close` after that. */
+ * after the previous file. sink->id keeps the driver registered until ebpo_h5_sink_close. This is
+ * necessary because libhdf5, when it closes a file, releases its own reference to the driver before
+ * it calls the driver's `close`. */
 bool ebpo_h5_sink_use(ebpo_h5_sink *sink, hid_t fapl)
 {
     sink_choice choice = { sink };

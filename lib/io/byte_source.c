@@ -1,8 +1,9 @@
 /* Sources of a file's bytes (ebpo_source): a regular file, which is read by pread, and memory of
  * the caller. http_source.c has the source for URLs. An input is a source with a name for messages
- * and a count of reads; each read must be within the source's size. Files are not mapped, because
- * the process would end if another program shortened a mapped file. Also recognises URLs, and
- * removes passwords from URLs for messages. */
+ * and a count of reads. Each read must be within the source's size. Files are not mapped, because
+ * the process would end if another program shortened a mapped file.
+ *
+ * This file also recognises URLs, and removes passwords and queries from URLs for messages. */
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
@@ -111,7 +112,7 @@ int ebpo_input_descriptor(const ebpo_input *input)
     return input->source.read == path_read && strcmp(s->path, input->shown) == 0 ? s->fd : -1;
 }
 
-bool ebpo_input_hints(const ebpo_input *input)
+bool ebpo_input_can_advise(const ebpo_input *input)
 {
 #ifdef POSIX_FADV_WILLNEED
     return input->source.read == path_read;
@@ -121,12 +122,12 @@ bool ebpo_input_hints(const ebpo_input *input)
 #endif
 }
 
-void ebpo_input_hint(ebpo_input *input, const ebpo_range *ranges, size_t count)
+void ebpo_input_advise(ebpo_input *input, const ebpo_range *ranges, size_t count)
 {
     enum { LARGE = 1 << 20 };
 #ifdef POSIX_FADV_WILLNEED
     const path_source *s = input->source.user;
-    for (size_t i = 0; i < count && ebpo_input_hints(input); i++)
+    for (size_t i = 0; i < count && ebpo_input_can_advise(input); i++)
         if (ranges[i].size < LARGE && ranges[i].offset <= input->source.size)
             (void)posix_fadvise(s->fd, (off_t)ranges[i].offset, (off_t)ranges[i].size,
                                 POSIX_FADV_WILLNEED); /* reading reports errors */
@@ -147,7 +148,7 @@ static ebpo_status memory_read(void *user, uint64_t offset, uint64_t size, void 
 
 ebpo_source ebpo_source_of_memory(const void *data, uint64_t size)
 {
-    /* `user` is not const, but the source only reads */
+    /* The cast removes const because `user` is not const. The source only reads the data. */
     return (ebpo_source){
         sizeof(ebpo_source), (void *)(uintptr_t)data, size, memory_read, NULL, NULL, 0
     };
@@ -243,8 +244,8 @@ char *ebpo_url_redact(const char *name, char *out, size_t capacity)
         const char *host = strstr(name, "//") + 2;
         used = append_text(out, 0, capacity, name, (size_t)(host - name));
         for (size_t i = strcspn(host, "/?#"); i > 0; i--)
-            /* the last @ counts: a password with @ makes the URL invalid, but must not be shown
-             * either */
+            /* The last @ ends the password. A password that contains an @ makes the URL invalid,
+             * but must not be shown either. */
             if (host[i - 1] == '@') {
                 host += i;
                 break;

@@ -58,12 +58,12 @@ static inline bool ebpo_input_is_remote(const ebpo_input *input)
  * then fails. */
 void ebpo_input_prefetch(ebpo_input *input, const ebpo_range *ranges, size_t count);
 
-/* Returns true if the operating system accepts prefetch hints for the input: the input is a file
- * opened by its path. Such hints help if the data is on a disk. */
-bool ebpo_input_hints(const ebpo_input *input);
+/* Returns true if ebpo_input_advise can send prefetch hints to the operating system: the input is a
+ * file opened by its path. Such hints help if the data is on a disk. */
+bool ebpo_input_can_advise(const ebpo_input *input);
 /* Sends prefetch hints to the operating system, which then reads in the background. Ranges of 1 MiB
  * or more are skipped, because the system reads ahead within them by itself. */
-void ebpo_input_hint(ebpo_input *input, const ebpo_range *ranges, size_t count);
+void ebpo_input_advise(ebpo_input *input, const ebpo_range *ranges, size_t count);
 
 /* Sources by URL (ebpo/http.h). */
 

@@ -341,8 +341,8 @@ const char *ebpo_foreign_bytes(const uint8_t *data, uint64_t size)
             return kinds[i].what;
     if (is_wide(data, size))
         return "is text of two bytes a character (UTF-16); save it as UTF-8";
-    uint64_t mark = ebpo_text_mark(data, size);
-    return find_markup((const char *)data + mark, size - mark);
+    uint64_t bom = ebpo_text_bom_length(data, size);
+    return find_markup((const char *)data + bom, size - bom);
 }
 
 bool ebpo_bytes_are_text(const uint8_t *data, uint64_t size)

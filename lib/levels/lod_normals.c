@@ -1,13 +1,14 @@
 /* Computes normals for the polygons of a level, for shading.
  *
  * A polygon on a plane is nearly parallel to the surface and keeps the plane's direction. A polygon
- * on a cell face is a step between two envelopes and does not represent the surface: it gets the
- * direction of the planes around it.
+ * on a cell face is a step between two envelopes and does not represent the surface. Such a polygon
+ * gets the direction of the plane polygons around it.
  *
- * For each of the six sides of cells, a normal is computed at every corner of a drawn cell. The
- * normal is the mean, weighted by area, of the plane polygons of the nodes around the corner. Only
- * polygons that face this side count, so that polygons on the other side of a thin part are
- * ignored. Between corners, normals are interpolated linearly. */
+ * These directions are computed in six passes, one for each side of cells (lower x, upper x, ...).
+ * In each pass, every corner of every drawn cell gets a normal: the mean of the normals, weighted
+ * by area, of the plane polygons of the nodes around the corner. Only polygons that face this side
+ * count, so that polygons on the other side of a thin part are ignored. A polygon on this side of a
+ * cell gets the normal that is interpolated linearly between the corners of the cell. */
 #include "core/strict_fp.h"
 
 #include <ebpo/lod.h>
@@ -30,7 +31,7 @@ static const uint32_t none = UINT32_MAX; /* not a corner index */
 static const double least_cosine = -0.3;
 
 typedef struct polygon {
-    double area[3]; /* normal with a length of twice its area */
+    double area[3]; /* normal; its length is twice the polygon's area */
     double middle[3];
     int side; /* 2 * axis, plus 1 for the upper side; or ON_PLANE */
 } polygon;
@@ -160,7 +161,8 @@ static void sum_node(const polygon *p, uint32_t count, int side, double out[4])
     }
 }
 
-/* Sums the plane polygons that face a side, for each corner over the nodes around it. */
+/* Sums, for each corner, the normals of the plane polygons that face a side, over all nodes around
+ * the corner. */
 static void sum_side(lighting *l, int side)
 {
     const polygon *p = l->polygons;

@@ -104,7 +104,7 @@ const ebpo_import_format *ebpo_import_recognise(const uint8_t *data, uint64_t si
                                                 const char *name)
 {
     for (size_t i = 0; i < FORMATS; i++)
-        if (formats[i]->mark_comes_first && formats[i]->recognise(data, size))
+        if (formats[i]->beginning_decides && formats[i]->recognise(data, size))
             return formats[i];
     for (size_t i = 0; i < FORMATS; i++)
         if (formats[i]->recognise(data, size) || name_ends(name, formats[i]->ending))
@@ -112,26 +112,26 @@ const ebpo_import_format *ebpo_import_recognise(const uint8_t *data, uint64_t si
     return NULL;
 }
 
-/* Returns true if the file has the mark of a format, whatever else it resembles. */
-static bool has_mark(const uint8_t *data, uint64_t size)
+/* Returns true if the file begins with the signature of a format. */
+static bool has_signature(const uint8_t *data, uint64_t size)
 {
     for (size_t i = 0; i < FORMATS; i++)
-        if (!formats[i]->has_no_mark && formats[i]->recognise(data, size))
+        if (!formats[i]->has_no_signature && formats[i]->recognise(data, size))
             return true;
     return false;
 }
 
-/* Checks the ending of the name: rejects a file without its format's mark if its name has the
- * ending of another format. */
+/* Checks the ending of the name. `format`: the format of this ending. Rejects the file if it begins
+ * like a file of another format that has no signature. */
 static ebpo_status check_name(const ebpo_import_format *format, const ebpo_import_job *job,
                               ebpo_error *error)
 {
-    if (format->has_no_mark || format->recognise(job->data, job->size) ||
+    if (format->has_no_signature || format->recognise(job->data, job->size) ||
         !ebpo_bytes_are_text(job->data, job->size))
         return EBPO_OK;
     for (size_t i = 0; i < FORMATS; i++) {
         const ebpo_import_format *other = formats[i];
-        if (other->has_no_mark && other->recognise(job->data, job->size))
+        if (other->has_no_signature && other->recognise(job->data, job->size))
             return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_path_name(job->name),
                                   "begins like %s file, but its name indicates %s; rename it to "
                                   "end in %s",
@@ -170,7 +170,8 @@ ebpo_status ebpo_import_any(ebpo_mesh *out, const ebpo_import_job *job, ebpo_err
                *name = ebpo_path_name(job->name);
     const ebpo_import_format *format = ebpo_import_recognise(job->data, job->size, job->name);
     char list[LIST_TEXT];
-    if (foreign && has_mark(job->data, job->size)) /* a binary STL file may begin with any bytes */
+    /* a binary STL file may begin like a file of another type */
+    if (foreign && has_signature(job->data, job->size))
         foreign = NULL;
     if (!foreign && format)
         return ebpo_import_memory(out, format, job, error);

@@ -7,8 +7,9 @@
 
 #include "mesh/import_build.h"
 
-/* Recognises the format by the first bytes, otherwise by the ending of `name`. An OBJ file has no
- * mark and is recognised by its first word outside comments. Returns NULL for an unknown format. */
+/* Recognises the format by the first bytes, otherwise by the ending of `name`. OBJ files have no
+ * signature: an OBJ file is recognised by its first word outside comments. Returns NULL for an
+ * unknown format. */
 const ebpo_import_format *ebpo_import_recognise(const uint8_t *data, uint64_t size,
                                                 const char *name);
 

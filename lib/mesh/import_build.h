@@ -156,9 +156,12 @@ typedef struct ebpo_import_format {
         *ending; /* ending of file names: ".obj"; without the dot, the mesh's source_format */
     /* Returns true if the file begins like files of this format. */
     bool (*recognise)(const uint8_t *data, uint64_t size);
-    /* the beginning of the file decides, also if the name has the ending of another format */
-    bool mark_comes_first;
-    bool has_no_mark; /* files of other formats may begin in the same way */
+    /* a file that begins like this format is read as this format, also if its name has the ending
+     * of another format */
+    bool beginning_decides;
+    /* files of other formats may begin in the same way, so the beginning does not identify the
+     * format */
+    bool has_no_signature;
     /* Exactly one of `build` and `read` is set. `build` adds the content of the file to a mesh
      * under construction. `read` creates the complete mesh, reports progress, and clears `out` on
      * failure. Errors are those of ebpo_import_memory. */

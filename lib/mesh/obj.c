@@ -56,7 +56,7 @@ static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\v' || c ==
 
 ebpo_obj_text ebpo_obj_text_begin(const uint8_t *data, uint64_t size)
 {
-    return (ebpo_obj_text){ (const char *)data + ebpo_text_mark(data, size),
+    return (ebpo_obj_text){ (const char *)data + ebpo_text_bom_length(data, size),
                             (const char *)data + size, 1, false };
 }
 
@@ -783,5 +783,5 @@ static bool begins_as_obj(const uint8_t *data, uint64_t size)
 const ebpo_import_format ebpo_import_obj = { .called = "an OBJ",
                                              .ending = ".obj",
                                              .recognise = begins_as_obj,
-                                             .has_no_mark = true,
+                                             .has_no_signature = true,
                                              .build = build_obj };

@@ -161,7 +161,8 @@ static size_t read_kind(off_word word, off_reading *r, bool *dimension)
  * the vertex values. */
 static bool has_off_word(const uint8_t *data, uint64_t size)
 {
-    off_text t = { (const char *)data + ebpo_text_mark(data, size), (const char *)data + size, 1 };
+    off_text t = { (const char *)data + ebpo_text_bom_length(data, size), (const char *)data + size,
+                   1 };
     off_word word;
     bool dimension, found = next_word(&t, &word) && t.at < t.end;
     size_t length = found ? read_kind(word, NULL, &dimension) : 0;
@@ -508,7 +509,7 @@ static ebpo_status read_rows(off_reading *r)
 static ebpo_status build_off(ebpo_import_build *b, const ebpo_import_job *job)
 {
     off_reading r = { .build = b, .begin = (const char *)job->data, .size = job->size };
-    r.text = (off_text){ r.begin + ebpo_text_mark(job->data, r.size), r.begin + r.size, 1 };
+    r.text = (off_text){ r.begin + ebpo_text_bom_length(job->data, r.size), r.begin + r.size, 1 };
     ebpo_status status = read_head(&r);
     if (status == EBPO_OK)
         status = read_rows(&r);

@@ -262,7 +262,7 @@ static ebpo_status read_statement(reader *r, ebpo_ply_word line, bool *ended)
 
 const char *ebpo_ply_first_line(const uint8_t *data, uint64_t size, char *line_end)
 {
-    const char *at = (const char *)data + ebpo_text_mark(data, size),
+    const char *at = (const char *)data + ebpo_text_bom_length(data, size),
                *end = (const char *)data + size;
     if (end - at < 4 || memcmp(at, "ply", 3) != 0)
         return NULL;

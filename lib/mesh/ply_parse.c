@@ -275,7 +275,7 @@ static ebpo_status read_ply(ebpo_mesh *out, const ebpo_import_job *job, ebpo_err
 const ebpo_import_format ebpo_import_ply = { .called = "a PLY",
                                              .ending = ".ply",
                                              .recognise = ebpo_ply_recognise,
-                                             .mark_comes_first = true,
+                                             .beginning_decides = true,
                                              .read = read_ply };
 
 ebpo_status ebpo_points_parse_ply(const void *data, uint64_t size, const char *name, double **xyz,

@@ -1,6 +1,6 @@
 /* Repairs a mesh: performs the requested repairs in a fixed order. Separate functions remove
- * repeated faces, and count the faces whose corners have the same positions as those of another
- * face. */
+ * repeated faces, and count the faces whose corners have the same positions as the corners of
+ * another face. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -32,8 +32,8 @@ typedef struct dropping {
 
 static bool is_removed(const dropping *d, uint64_t f) { return d->gone[f / WORD] >> f % WORD & 1; }
 
-/* Returns true if the lesser of the other two vertices follows the lowest vertex. Repeated faces
- * with different results have opposite orientations. */
+/* Starts at the face's lowest vertex, and returns true if the second vertex is lower than the
+ * third. Repeated faces with different results have opposite orientations. */
 static bool runs_up(const uint32_t face[3])
 {
     int low = face[0] < face[1] ? (face[0] < face[2] ? 0 : 2) : (face[1] < face[2] ? 1 : 2);
@@ -176,7 +176,7 @@ ebpo_status ebpo_mesh_drop_duplicates(ebpo_mesh *mesh, ebpo_repair_record *recor
     return status;
 }
 
-/* --- faces with repeated positions --- */
+/* --- faces with the positions of another face --- */
 
 /* Sets each corner to the first vertex at its position. */
 static ebpo_status merge_corners(const ebpo_mesh *mesh, unsigned threads, uint32_t *corner,
@@ -252,7 +252,7 @@ ebpo_status ebpo_mesh_orient(ebpo_mesh *mesh, ebpo_repair_record *record, ebpo_e
     return status;
 }
 
-/* Orients the mesh. With EBPO_REPAIR_EARLIER, as earlier builds did (mesh_parts.h). */
+/* Orients the mesh. With EBPO_REPAIR_EARLIER, gives the result of earlier builds (mesh_parts.h). */
 static ebpo_status orient_mesh(ebpo_mesh *mesh, unsigned steps, ebpo_repair_record *record,
                                ebpo_error *error)
 {
@@ -277,8 +277,8 @@ ebpo_status ebpo_mesh_repair(ebpo_mesh *mesh, unsigned steps, double weld_distan
         status = ebpo_mesh_flip(mesh, record, error);
     if (status == EBPO_OK && steps & EBPO_REPAIR_FILL)
         status = ebpo_mesh_fill_holes(mesh, record, error);
-    /* Components that were open may now be closed: then they have an outside, and are oriented
-     * again. */
+    /* Filling holes can close components. A closed component has an outside, which determines its
+     * orientation. So the mesh is oriented again. */
     if (status == EBPO_OK && steps & EBPO_REPAIR_ORIENT && !(steps & EBPO_REPAIR_EARLIER) &&
         record->filled_holes > filled) {
         record->unorientable_components = unorientable;

@@ -328,9 +328,9 @@ static bool is_blank(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
 
 static bool begins_solid(const uint8_t *data, uint64_t size)
 {
-    uint64_t mark = ebpo_text_mark(data, size);
-    data += mark;
-    size -= mark;
+    uint64_t bom = ebpo_text_bom_length(data, size);
+    data += bom;
+    size -= bom;
     while (size && is_blank((char)*data)) {
         data++;
         size--;
@@ -341,7 +341,7 @@ static bool begins_solid(const uint8_t *data, uint64_t size)
 
 /* Returns true for the bytes of an STL file: binary if the declared faces fill the file, regardless
  * of its first bytes; otherwise text that begins with the word solid. */
-static bool has_stl_mark(const uint8_t *data, uint64_t size)
+static bool has_stl_signature(const uint8_t *data, uint64_t size)
 {
     return begins_solid(data, size) || fits_binary(data, size);
 }
@@ -570,7 +570,7 @@ static ebpo_status build_stl(ebpo_import_build *b, const ebpo_import_job *job)
 {
     const uint8_t *data = job->data;
     uint64_t size = job->size;
-    const char *text = (const char *)data + ebpo_text_mark(data, size);
+    const char *text = (const char *)data + ebpo_text_bom_length(data, size);
     stl_text t = {
         .build = b, .begin = text, .at = text, .end = (const char *)data + size, .line = 1
     };
@@ -592,5 +592,5 @@ static ebpo_status build_stl(ebpo_import_build *b, const ebpo_import_job *job)
 }
 
 const ebpo_import_format ebpo_import_stl = {
-    .called = "an STL", .ending = ".stl", .recognise = has_stl_mark, .build = build_stl
+    .called = "an STL", .ending = ".stl", .recognise = has_stl_signature, .build = build_stl
 };

@@ -388,8 +388,8 @@ static bool span_begins(span word, const char *text)
 /* Returns the text after an optional byte order mark. */
 static span whole_text(const uint8_t *text, uint64_t bytes)
 {
-    uint64_t mark = ebpo_text_mark(text, bytes);
-    return (span){ (const char *)text + mark, bytes - mark };
+    uint64_t bom = ebpo_text_bom_length(text, bytes);
+    return (span){ (const char *)text + bom, bytes - mark };
 }
 
 /* Reads the next line. Returns false when there is none. */

@@ -214,7 +214,8 @@ typedef struct ebpo_accel {
     uint64_t units;
     uint32_t face_count;
     double centre[3], scale;
-    float turn_error; /* for blocks of floats; see query/inside_kernels.c */
+    float turn_error_constant; /* part of an error bound for blocks of floats; see
+                                * query/inside_kernels.c */
     double reach; /* upper bound of the coordinates of decoded boxes, in the frame; at least 1 */
     ebpo_bound *bound;
     ebpo_bound_slab *slab; /* [bound_count] */

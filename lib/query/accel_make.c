@@ -383,7 +383,7 @@ static uint32_t walk_node(walk *w, int depth, ebpo_node_type type)
             w->rank[depth + 1][EBPO_WHITE] += 8; /* position of its children */
             memset(w->s->nodes.group[group], 0xff, sizeof w->s->nodes.group[group]);
         }
-        return ebpo_entry(EBPO_ENTRY_BELOW, (uint32_t)group);
+        return ebpo_entry(EBPO_ENTRY_SUBTREE_ROOT, (uint32_t)group);
     }
     uint16_t types = w->slice->level[depth + 1].types[rank];
     for (unsigned octant = 0; octant < 8; octant++)
@@ -457,9 +457,9 @@ static ebpo_status accel_fill_nodes(ebpo_accel *s, const ebpo_slice *slice,
 
 /* --- the stages --- */
 
-/* Returns the rounding error of floats in a cross product of differences of coordinates, with a
- * margin. */
-static double turn_error(const ebpo_box *box)
+/* Returns the constant part of the error bound of a cross product of differences of coordinates in
+ * floats (see query/inside_kernels.c). */
+static double turn_error_constant(const ebpo_box *box)
 {
     double reach = 0, size = 0;
     for (int k = 0; k < 3; k++) {
@@ -479,7 +479,7 @@ static void make_frame(ebpo_accel *s)
     }
     int exponent;
     frexp(most, &exponent);
-    s->turn_error = (float)turn_error(&s->box);
+    s->turn_error_constant = (float)turn_error_constant(&s->box);
     s->scale = ldexp(1, exponent < -1000 ? 1000 : exponent > 1000 ? -1000 : 1 - exponent);
 }
 

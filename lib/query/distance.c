@@ -32,7 +32,7 @@ static ebpo_status all_leaves(ebpo_context *c, ebpo_nearest *n, ebpo_node node, 
     ebpo_status status = EBPO_OK;
     if (ebpo_node_is_uniform(&node))
         return EBPO_OK;
-    if (ebpo_node_is_below(&node)) {
+    if (ebpo_node_is_subtree_root(&node)) {
         status = ebpo_model_enter(c, &node, error);
         if (status == EBPO_OK)
             ebpo_nearest_search(n, c, node.subtree);
@@ -62,7 +62,7 @@ static ebpo_status distance_around(ebpo_context *c, const double p[3],
     ebpo_node node = ebpo_model_root(c->model), gray = node;
     ebpo_status status = EBPO_OK;
     while (status == EBPO_OK && !ebpo_node_is_uniform(&node)) {
-        if (ebpo_node_is_below(&node))
+        if (ebpo_node_is_subtree_root(&node))
             status = ebpo_model_enter(c, &node, error);
         if (status != EBPO_OK || ebpo_entry_kind_of(node.entry) == EBPO_ENTRY_LEAF)
             break;
@@ -135,7 +135,7 @@ static ebpo_status follow_cells(ebpo_context *c, const uint32_t at[3], int level
         out->node[out->count++] = node;
         if ((level >= 0 && node.cell.level >= level) || node.type != EBPO_GRAY)
             return EBPO_OK;
-        if (ebpo_node_is_below(&node)) {
+        if (ebpo_node_is_subtree_root(&node)) {
             ebpo_status status = ebpo_model_enter(c, &node, error);
             if (status != EBPO_OK)
                 return status;
@@ -224,11 +224,11 @@ static ebpo_status pruned_within(ebpo_context *c, const ebpo_nearest *n,
     double limit = ebpo_nearest_limit(n);
     if (lower > limit || ebpo_node_is_uniform(&node) || node.type != EBPO_GRAY)
         return EBPO_OK;
-    if (node.pruned || (ebpo_node_is_below(&node) && n->late)) {
+    if (node.pruned || (ebpo_node_is_subtree_root(&node) && n->late)) {
         *nearest = fmin(*nearest, lower);
         return n->late ? EBPO_OK : ebpo_fail_pruned(m, node.cell, error);
     }
-    if (ebpo_node_is_below(&node))
+    if (ebpo_node_is_subtree_root(&node))
         status = ebpo_model_enter(c, &node, error);
     if (status != EBPO_OK)
         return status;
@@ -322,7 +322,7 @@ static ebpo_status narrow_interval(interval *v, ebpo_node node, double lower, eb
         v->lo = fmin(v->lo, lower);
         return EBPO_OK;
     }
-    if (ebpo_node_is_below(&node)) {
+    if (ebpo_node_is_subtree_root(&node)) {
         ebpo_status status = ebpo_model_enter(v->c, &node, error);
         if (status != EBPO_OK)
             return status;

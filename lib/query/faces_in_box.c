@@ -3,7 +3,7 @@
  * The walk visits the accels that intersect the box, depth first. In an accel it tests the boxes of
  * the hierarchy and skips those that are certainly outside. Then it tests triangles exactly. In
  * remote files the walk sends prefetch hints for the subtrees that it will enter. A face that
- * several subtrees list is returned once. In a subset the query fails if an omitted node intersects
+ * several subtrees list is returned once. In a subset the query fails if a pruned node intersects
  * the box. */
 #include "core/strict_fp.h"
 
@@ -23,11 +23,10 @@ typedef struct box_walk box_walk;
 struct box_walk {
     ebpo_context *context;
     const double *min, *max;
-    /* slots of the faces of the current accel that intersect the box; sorted when `take` is called
-     */
+    /* slots of the current accel's faces that intersect the box; sorted when `take` is called */
     uint32_t *slot;
     uint64_t count, capacity;
-    ebpo_node below; /* root of the current subtree, unless the accel is the whole tree */
+    ebpo_node subtree_root; /* of the current subtree; not set if the accel is the whole tree */
     bool no_memory;
     bool enough; /* ends the walk; set by `take` */
     /* for a remote file: the subtrees that the walk will enter, in order */
@@ -50,7 +49,7 @@ static ebpo_status check_box(const double min[3], const double max[3], ebpo_erro
 
 /* --- in one accel --- */
 
-/* Adds the slots of a block's faces that intersect the box. */
+/* Adds the slots of those faces of a block that intersect the box. */
 static void try_block(box_walk *w, const ebpo_accel *s, uint32_t block)
 {
     for (uint32_t lane = 0; lane < EBPO_BLOCK && !w->no_memory; lane++) {
@@ -67,8 +66,9 @@ static void try_block(box_walk *w, const ebpo_accel *s, uint32_t block)
     }
 }
 
-/* Adds the slots of the faces below a child of the hierarchy. low, high: the box in the subtree's
- * frame. The hierarchy's boxes were enlarged by more than the rounding error of floats here. */
+/* Adds the slots of the faces below a child of a node of the hierarchy. low, high: the query's box
+ * in the subtree's frame. The hierarchy's boxes were enlarged by more than the rounding error of
+ * floats here. */
 static void gather_child(box_walk *w, const ebpo_accel *s, const float low[3], const float high[3],
                          uint32_t child)
 {
@@ -123,13 +123,13 @@ static bool intersects_box(void *user, const ebpo_box *box, const ebpo_node *nod
     return ebpo_cell_intersects(box, node->cell, w->min, w->max);
 }
 
-/* Lists the subtrees that the walk will enter. If there is no memory for the whole list, the
- * other subtrees get their prefetch hints only when they are entered. */
+/* Lists the subtrees that the walk will enter. If there is no memory for the whole list, the other
+ * subtrees get prefetch hints only when they are read. */
 static void list_ahead(box_walk *w, const ebpo_box *box, ebpo_node node)
 {
     if (ebpo_node_is_uniform(&node) || !intersects_box(w, box, &node) || w->no_memory)
         return;
-    if (ebpo_node_is_below(&node)) {
+    if (ebpo_node_is_subtree_root(&node)) {
         w->no_memory =
             !ebpo_grow(&w->ahead, &w->ahead_capacity, w->ahead_count + 1, sizeof *w->ahead);
         if (!w->no_memory)
@@ -150,14 +150,14 @@ static void send_hints(box_walk *w)
                           left < EBPO_HINTED_MAX ? left : EBPO_HINTED_MAX);
 }
 
-/* Gathers the slots of all subtrees below the node. */
+/* Gathers the slots of all subtrees at or below the node. */
 static ebpo_status gather_node(box_walk *w, const ebpo_box *box, ebpo_node node, ebpo_error *error)
 {
     if (ebpo_node_is_uniform(&node) || !intersects_box(w, box, &node))
         return EBPO_OK;
     ebpo_status status = EBPO_OK;
-    if (ebpo_node_is_below(&node)) {
-        w->below = node;
+    if (ebpo_node_is_subtree_root(&node)) {
+        w->subtree_root = node;
         send_hints(w);
         status = ebpo_model_enter(w->context, &node, error);
         return status == EBPO_OK ? gather_accel(w, node.subtree, error) : status;
@@ -167,7 +167,7 @@ static ebpo_status gather_node(box_walk *w, const ebpo_box *box, ebpo_node node,
     return status;
 }
 
-/* Returns EBPO_E_ABSENT if an omitted node of a subset intersects the box. */
+/* Returns EBPO_E_ABSENT if a pruned node of a subset intersects the box. */
 static ebpo_status box_walk_check(box_walk *w, ebpo_error *error)
 {
     return ebpo_check_pruned(w->context, intersects_box, w, error);
@@ -198,9 +198,10 @@ static bool intersects_cell(const ebpo_box *box, const ebpo_node *node, const do
     return ebpo_triangle_intersects_box(triangle, low, high);
 }
 
-/* Finds the first accel, depth first, whose cell the face intersects. An accel lists the faces that
- * intersect its cell, and some that are only near its cell (format-spec, section 7). Each face is
- * taken in this first accel, so no list of visited faces is needed. */
+/* Finds the first accel, depth first, whose cell the triangle intersects. *entry: entry of its
+ * root. Returns false if there is none. An accel lists the faces that intersect its cell, and some
+ * that are only near its cell (format-spec, section 7). Each face is taken in this first accel, so
+ * no list of visited faces is needed. */
 static bool find_first(const box_walk *w, const ebpo_box *box, ebpo_node node,
                        const double triangle[3][3], uint32_t *entry)
 {
@@ -208,8 +209,8 @@ static bool find_first(const box_walk *w, const ebpo_box *box, ebpo_node node,
         !intersects_cell(box, &node, triangle))
         return false;
     *entry = node.entry;
-    bool found = ebpo_node_is_below(&node);
-    for (unsigned octant = 0; octant < 8 && !ebpo_node_is_below(&node) && !found; octant++)
+    bool found = ebpo_node_is_subtree_root(&node);
+    for (unsigned octant = 0; octant < 8 && !ebpo_node_is_subtree_root(&node) && !found; octant++)
         found =
             find_first(w, box, ebpo_model_child(w->context->model, &node, octant), triangle, entry);
     return found;
@@ -227,8 +228,9 @@ static bool box_walk_is_first(const box_walk *w, bool owned, const double triang
     /* No earlier accel lists an owned face. If the face is only near this accel's cell, a later
      * accel takes it. */
     if (owned)
-        return intersects_cell(&box, &w->below, triangle);
-    return find_first(w, &box, ebpo_model_root(m), triangle, &entry) && entry == w->below.entry;
+        return intersects_cell(&box, &w->subtree_root, triangle);
+    return find_first(w, &box, ebpo_model_root(m), triangle, &entry) &&
+           entry == w->subtree_root.entry;
 }
 
 /* --- indices of faces --- */

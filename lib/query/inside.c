@@ -277,7 +277,7 @@ static ebpo_status inside_subtree(ebpo_context *context, const ebpo_accel *s,
         inside_uniform(context, d.entry, out);
         return EBPO_OK;
     }
-    if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_BELOW)
+    if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_SUBTREE_ROOT)
         return inside_pruned(context, p, out, error);
     return inside_leaf(context, s, ebpo_entry_value(d.entry), d.level, place, p, out, error);
 }
@@ -381,7 +381,7 @@ static ebpo_status inside_together(ebpo_context *context, const ebpo_accel *s, c
             give_out(&out[i]);
         } else if (ebpo_entry_kind_of(l[i].d.entry) == EBPO_ENTRY_UNIFORM) {
             inside_uniform(context, l[i].d.entry, &out[i]);
-        } else if (ebpo_entry_kind_of(l[i].d.entry) == EBPO_ENTRY_BELOW) {
+        } else if (ebpo_entry_kind_of(l[i].d.entry) == EBPO_ENTRY_SUBTREE_ROOT) {
             ebpo_status status = inside_pruned(context, points + 3 * i, &out[i], error);
             if (status != EBPO_OK)
                 return status;
@@ -486,7 +486,7 @@ static ebpo_status walk_down(inside_query *a, ebpo_inside_result *out, ebpo_erro
     for (;;) {
         if (decide_at(a, &node, out))
             return EBPO_OK;
-        if (ebpo_node_is_below(&node)) {
+        if (ebpo_node_is_subtree_root(&node)) {
             ebpo_status status = ebpo_model_enter(a->context, &node, error);
             if (status != EBPO_OK)
                 return status;
@@ -572,7 +572,7 @@ static ebpo_status pass_gray(inside_query *a, ebpo_cursor *c, bool *done, ebpo_i
     return status;
 }
 
-/* Walks down from a node of the kind BELOW (the root of a subtree that is not in the top). */
+/* Walks down from the root of a subtree by reading nodes from the file. */
 static ebpo_status walk_file(inside_query *a, const ebpo_node *below, ebpo_inside_result *out,
                              ebpo_error *error)
 {
@@ -600,7 +600,7 @@ static ebpo_status walk_nodes(inside_query *a, ebpo_inside_result *out, ebpo_err
     const ebpo_model *m = a->context->model;
     int fine = m->info->level_count - 1;
     ebpo_node node = ebpo_model_root(m);
-    while (!ebpo_node_is_below(&node)) {
+    while (!ebpo_node_is_subtree_root(&node)) {
         if (decide_at(a, &node, out))
             return EBPO_OK;
         node = ebpo_model_child(m, &node, ebpo_octant_at(a->place.at, fine - node.cell.level - 1));
@@ -613,12 +613,12 @@ static ebpo_status walk_nodes(inside_query *a, ebpo_inside_result *out, ebpo_err
 static const ebpo_accel *held_around(const inside_query *a, uint32_t *entry)
 {
     const ebpo_context *c = a->context;
-    *entry = ebpo_entry(EBPO_ENTRY_BELOW, 0);
+    *entry = ebpo_entry(EBPO_ENTRY_SUBTREE_ROOT, 0);
     if (c->model->whole)
         return c->model->whole;
     *entry =
         ebpo_descend(&c->model->top->nodes, c->model->info->level_count - 1, a->place.at).entry;
-    bool below = ebpo_entry_kind_of(*entry) == EBPO_ENTRY_BELOW;
+    bool below = ebpo_entry_kind_of(*entry) == EBPO_ENTRY_SUBTREE_ROOT;
     return below && ebpo_context_has_pinned(c, ebpo_entry_value(*entry)) ? c->pinned : NULL;
 }
 
@@ -643,7 +643,7 @@ static bool result_in_memory(inside_query *a, ebpo_inside_result *out, ebpo_stat
     }
     int fine = m->info->level_count - 1;
     ebpo_descent d = ebpo_descend(&held->nodes, fine, a->place.at);
-    if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_BELOW)
+    if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_SUBTREE_ROOT)
         return false; /* pruned: an envelope may decide */
     ebpo_cell cell = ebpo_descent_cell(&d, fine, a->place.at);
     if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_UNIFORM)

@@ -2,9 +2,11 @@
  *
  * sum_crossings sums the crossings of a segment along an axis with the faces. It uses single
  * precision, or double precision in accels of doubles. Faces that are not certain in this precision
- * are decided exactly by inside.c. find_reached_cell_faces finds the cell faces that the leaf's
- * faces reach, and computes the box of each block in the leaf's list. It is called once for each
- * leaf, during one of the first queries there. Its comparisons are exact.
+ * are decided exactly by inside.c.
+ *
+ * find_reached_cell_faces finds the cell faces that the leaf's faces reach, and computes the box of
+ * each block in the leaf's list. It is called once for each leaf, during one of the first queries
+ * in this leaf. Its comparisons are exact.
  *
  * Compiled for several instruction sets with the same results (core/cpu.h). Error bounds:
  * docs/develop/bounds.md; crossings: EBP 2017, 4.2. */
@@ -21,11 +23,12 @@
 
 /* --- crossings --- */
 
-/* Positions of eight faces relative to the segment's line, as masks with a bit for each face: faces
- * whose corners certainly turn left around the line, certainly turn right, or are not certain. All
- * other faces certainly have no point on the line. */
+/* Positions of eight faces relative to the segment's line, as masks with a bit for each face. Faces
+ * without a bit certainly have no point on the line. */
 typedef struct turns {
-    unsigned left, right, open;
+    unsigned left;  /* the corners certainly turn left around the line */
+    unsigned right; /* the corners certainly turn right around the line */
+    unsigned open;  /* not certain */
 } turns;
 
 /* Combines the turns of the three edges of each face. */
@@ -37,13 +40,16 @@ EBPO_EIGHT turns combine_turns(unsigned some_left, unsigned some_right, unsigned
 }
 
 /* Rounding: let R be the greatest |coordinate| of the model's box and M the greatest side of the
- * box. The error of a difference q is 2^-23 |q| plus 2^-47 R (two floats represent `from` to 2^-48
- * R). No |q| is above M. So the error of a cross product is 2^-45 R M plus 2^-21 of the sum of the
- * absolute values of its two products. The error of underflow is far less, because R is above 2^-41
- * and M above 2^-40. */
-#define TURN_ERROR 0x1p-20f
+ * box. Two floats represent `from` to 2^-48 R. So the error of a difference e of coordinates is
+ * 2^-23 |e| plus 2^-47 R. No |e| is above M. So the error of a cross product is 2^-45 R M plus
+ * 2^-21 of the sum of the absolute values of its two products.
+ *
+ * The code uses larger bounds: 2^-43 R M (`turn_error_constant` of ebpo_accel) plus
+ * TURN_ERROR_FACTOR times this sum. They also cover the rounding of the bounds themselves, and
+ * underflow: accels with blocks of floats have R above 2^-41 and M above 2^-40. */
+#define TURN_ERROR_FACTOR 0x1p-20f
 
-/* Computes the coordinates of the corners on an axis, minus `from`. */
+/* Computes the coordinates of the faces' corners on an axis, minus `from`. */
 EBPO_EIGHT void load_relative(const ebpo_face_block *b, int axis, double from, f8 out[3])
 {
     float high = (float)from, low = (float)(from - (double)high);
@@ -52,19 +58,19 @@ EBPO_EIGHT void load_relative(const ebpo_face_block *b, int axis, double from, f
         out[i] = f8_sub(f8_sub(out[i], f8_all(high)), f8_all(low));
 }
 
-/* Computes the turns of a block's faces in single precision. turn_error: the part of the error
+/* Computes the turns of a block's faces in single precision. error_constant: the part of the error
  * bound that does not depend on the face. */
 EBPO_EIGHT turns turns_of_floats(const ebpo_face_block *b, unsigned lanes, int u, int v,
-                                 const ebpo_axis_segment *g, float turn_error)
+                                 const ebpo_axis_segment *g, float error_constant)
 {
-    f8 x[3], y[3], zero = f8_all(0), left[3], right[3], least_error = f8_all(turn_error);
+    f8 x[3], y[3], zero = f8_all(0), left[3], right[3];
     load_relative(b, u, g->from[u], x);
     load_relative(b, v, g->from[v], y);
     for (int i = 0; i < 3; i++) {
         int j = i == 2 ? 0 : i + 1;
         f8 p = f8_mul(x[i], y[j]), q = f8_mul(y[i], x[j]), turn = f8_sub(p, q);
         f8 size = f8_add(f8_abs(p), f8_abs(q));
-        f8 error = f8_add(f8_mul(size, f8_all(TURN_ERROR)), least_error);
+        f8 error = f8_add(f8_mul(size, f8_all(TURN_ERROR_FACTOR)), f8_all(error_constant));
         left[i] = f8_less(error, turn);
         right[i] = f8_less(turn, f8_sub(zero, error));
     }
@@ -118,9 +124,12 @@ static turns turns_of_doubles(const ebpo_face_block *b, unsigned lanes, int u, i
     return combine_turns(some[0], some[1], all[0], all[1], lanes);
 }
 
-/* Returns the side of a face's plane on which the segment's point at coordinate `at` is: 1 above,
- * -1 below, 0 not certain. `turn` is 1 for a face that turns left around the line. */
-static int side_of_plane(const double weight[3], const double size[3], const double k[3], double at,
+/* Compares the point where the segment's line intersects a face's plane with the coordinate `at` on
+ * the segment's axis. Returns 1 if the point's coordinate is greater than `at`, -1 if it is less, 0
+ * if this is not certain. weight, size: for each edge, the cross product of its corners and its
+ * size (see cross_product). k: the corners' coordinates on the axis. `turn`: 1 if the face's
+ * corners turn left around the line, -1 if they turn right. */
+static int compare_plane(const double weight[3], const double size[3], const double k[3], double at,
                          int turn)
 {
     double a = k[0] - at, b = k[1] - at, c = k[2] - at;
@@ -131,7 +140,7 @@ static int side_of_plane(const double weight[3], const double size[3], const dou
 }
 
 /* Tests if a face, which certainly intersects the segment's line, intersects the segment: 1 yes, 0
- * no, -1 not certain. `turn`: as for side_of_plane. */
+ * no, -1 not certain. t: the face's corners. `turn`: as for compare_plane. */
 static int intersects_segment(const double t[3][3], int u, int v, const ebpo_axis_segment *g,
                               int turn)
 {
@@ -152,8 +161,8 @@ static int intersects_segment(const double t[3][3], int u, int v, const ebpo_axi
         int j = i == 2 ? 0 : i + 1;
         weight[i] = cross_product(x[i], y[i], x[j], y[j], &size[i]);
     }
-    int at_from = least > from ? 1 : side_of_plane(weight, size, k, from, turn),
-        at_to = most < g->to ? -1 : side_of_plane(weight, size, k, g->to, turn);
+    int at_from = least > from ? 1 : compare_plane(weight, size, k, from, turn),
+        at_to = most < g->to ? -1 : compare_plane(weight, size, k, g->to, turn);
     return at_from < 0 || at_to > 0 ? 0 : at_from > 0 && at_to < 0 ? 1 : -1;
 }
 
@@ -165,9 +174,9 @@ EBPO_EIGHT int32_t cross_block(const ebpo_accel *s, uint64_t listed, int u, int 
 {
     uint32_t block = ebpo_listed_number(listed);
     ebpo_face_block b = ebpo_face_block_open(s, block);
-    turns t = s->wide
-                  ? turns_of_doubles(&b, ebpo_listed_lanes(listed), u, v, segment)
-                  : turns_of_floats(&b, ebpo_listed_lanes(listed), u, v, segment, s->turn_error);
+    turns t = s->wide ? turns_of_doubles(&b, ebpo_listed_lanes(listed), u, v, segment)
+                      : turns_of_floats(&b, ebpo_listed_lanes(listed), u, v, segment,
+                                        s->turn_error_constant);
     int32_t sum = 0;
     for (unsigned lanes = t.left | t.right | t.open; lanes; lanes &= lanes - 1) {
         unsigned lane = (unsigned)__builtin_ctz(lanes);
@@ -212,8 +221,8 @@ typedef struct faces_of_cell {
 } faces_of_cell;
 
 /* Returns the float that is `steps` (-1, 0, 1) away, in the order of floats. -0 and +0 are two
- * neighbouring floats here. The callers round a double to `f` first; a tiny double becomes the zero
- * with its own sign. */
+ * neighbouring floats here. This is correct for the callers: rounding a tiny double to a float
+ * gives the zero with the double's sign, so the next float is on the other side of the double. */
 static inline float step_float(float f, int32_t steps)
 {
     uint32_t bits;
@@ -308,7 +317,8 @@ static inline uint64_t find_sixteenth(float x, double low, double inverse, doubl
     return (uint64_t)(int32_t)(cells < 15 ? cells : 15);
 }
 
-/* Returns a box around the faces in `near`, encoded as in an ebpo_listed_block. */
+/* Returns a box around the faces in `near` (a bit for each lane), encoded as in an
+ * ebpo_listed_block. */
 static uint64_t box_of(const spans span[3], unsigned near, const faces_of_cell *w)
 {
     f8 none = f8_all(INFINITY), mask = f8_mask(near), zero = f8_all(0);
@@ -322,9 +332,9 @@ static uint64_t box_of(const spans span[3], unsigned near, const faces_of_cell *
     return box << EBPO_LISTED_BOX;
 }
 
-/* Considers the listed faces of the block whose boxes intersect the cell. Sets the block's box to a
- * box around these faces. Returns the cell faces that they reach: bit 2 axis + side. The
- * comparisons are exact. */
+/* Considers those listed faces of the block that have a bounding box that intersects the cell. Sets
+ * the block's box in the list to a box around these faces. Returns the cell faces that these faces
+ * reach, as bits 2 axis + side. The comparisons are exact. */
 static unsigned bound_block(const ebpo_accel *s, ebpo_listed_block *at, const faces_of_cell *w)
 {
     uint64_t listed = ebpo_listed(at);
@@ -342,7 +352,8 @@ static unsigned bound_block(const ebpo_accel *s, ebpo_listed_block *at, const fa
     return reached;
 }
 
-/* Prefetches at most the first eight blocks of the list, while the cell's bounds are computed. */
+/* Prefetches the first eight blocks of the list, or all if the list is shorter, into the
+ * processor's cache. They arrive while the cell's bounds are computed. */
 static void fetch_blocks(const ebpo_accel *s, const ebpo_listed_block *list)
 {
     for (int i = 0; i < 8; i++) {
@@ -355,7 +366,8 @@ static void fetch_blocks(const ebpo_accel *s, const ebpo_listed_block *list)
     }
 }
 
-/* Sets the boxes of a leaf's list. Returns the cell faces that the leaf's faces reach. */
+/* Sets the boxes of all blocks in a leaf's list. Returns the cell faces that the leaf's faces
+ * reach, as bits 2 axis + side. */
 static unsigned find_reached_cell_faces(const ebpo_accel *s, ebpo_listed_block *list,
                                         ebpo_cell cell)
 {

@@ -1,13 +1,13 @@
-/* Loading ahead: subtrees are loaded before queries need them, or prefetch hints for a remote file
- * are sent.
+/* Loading ahead: loads subtrees before queries need them, or sends prefetch hints for a remote
+ * file.
  *
- * Prefetching requests the subtrees that queries near the last query may need, in the order of
- * their distance. EBP 2017, 4.2.3, loads the 26 neighbours of the subtree that contains the
+ * A prefetch requests the subtrees that queries near the last query may need, in the order of their
+ * distance. EBP 2017, 4.2.3, loads the 26 neighbours of the subtree that contains the
  * position instead.
  *
  * A batch evaluates many points in the order of the Morton curve, so that subtrees are loaded few
- * times. For a remote file, it sends prefetch hints for some thousand points at a time, in advance.
- * A batch belongs to one thread. */
+ * times. For a remote file, the batch sends prefetch hints for some thousand points at a time, in
+ * advance. A batch belongs to one thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -24,7 +24,7 @@
 
 /* A subtree that a query may need. */
 typedef struct wanted {
-    uint64_t number; /* in the top */
+    uint64_t number; /* index of top->below */
     double lower;    /* lower bound of the distance */
 } wanted;
 
@@ -51,7 +51,7 @@ static void search_below(subtree_search *l, ebpo_node node, double lower)
 {
     if (lower > l->limit || ebpo_node_is_uniform(&node) || node.pruned)
         return;
-    if (ebpo_node_is_below(&node)) {
+    if (ebpo_node_is_subtree_root(&node)) {
         add_subtree(l, ebpo_entry_value(node.entry), lower);
         return;
     }
@@ -93,11 +93,12 @@ void ebpo_context_prefetch(ebpo_context *c, const double p[3], double search_dis
     c->has_prefetched = true;
     c->prefetched_distance = fabs(search_distance);
     memcpy(c->prefetched_from, p, sizeof c->prefetched_from);
-    /* Until the next prefetch, p moves by about a quarter side. When p moves by w, distances and
-     * their bounds change by at most w each. So queries need subtrees whose envelopes are within
-     * search_distance + 2 w, that is, half a side more. Under rules other than nonzero, envelopes
-     * do not decide: a query then needs the subtree whose cell contains the point, and the envelope
-     * of this subtree may be a cell's diagonal away, 1.73 sides. The sum is 2.25 sides. */
+    /* Let w be a quarter side. Until the next prefetch, p moves by about w. Then envelopes come
+     * nearer by at most w, and the search distance grows by at most w. So queries need subtrees
+     * whose envelopes are within search_distance + 2 w: 0.5 sides are added.
+     * Under rules other than nonzero, envelopes do not decide: a query then needs the subtree whose
+     * cell contains the point. The envelope of this subtree may be a cell's diagonal away: 1.73
+     * sides are added. The sum, 2.23 sides, is rounded up to 2.25. */
     uint64_t keys[EBPO_CACHE_AHEAD];
     unsigned count = ebpo_subtrees_near(m, p, fabs(search_distance) + 2.25 * side, keys);
     for (unsigned i = 0; i < count; i++)
@@ -105,8 +106,9 @@ void ebpo_context_prefetch(ebpo_context *c, const double p[3], double search_dis
     ebpo_cache_prefetch(m->cache, keys, count);
 }
 
-/* Returns the number of a subtree in the file's table of subtrees. The result is the file's subtree
- * that contains the subtree with number `below` in the top. UINT64_MAX: nothing is to be loaded. */
+/* Returns the row of the file's table whose subtree contains the node top->below[below]. This node
+ * can be deeper than the root of the table's subtree. UINT64_MAX: no hint is needed, or no row is
+ * found. */
 static uint64_t table_number(const ebpo_context *c, uint32_t below)
 {
     const ebpo_model *m = c->model;
@@ -166,9 +168,12 @@ void ebpo_context_hint(const ebpo_context *c, const uint32_t *below, uint64_t co
 
 /* --- batches --- */
 
-/* Maximum number of subtrees in one prefetch hint (some megabytes of data), and of points whose
- * subtrees are in one hint. The data of two hints is being fetched at any time. */
-enum { SUBTREES_A_TIME = 128, POINTS_A_TIME = 4096 };
+/* Limits of a prefetch hint for homes (home_of). The data of two hints is being fetched at any
+ * time. */
+enum {
+    SUBTREES_A_TIME = 128, /* maximum number of subtrees: some megabytes of data */
+    POINTS_A_TIME = 4096   /* maximum number of points whose homes are in the hint */
+};
 
 /* A point and its position on the curve. */
 typedef struct placed {
@@ -214,9 +219,9 @@ uint64_t *ebpo_curve_order(const ebpo_box *box, const double *points, uint64_t c
 }
 
 /* Returns true if consecutive points are far apart. Such points are evaluated along the curve even
- * when the whole model is in memory: then the data for the next point is in the processor's caches,
- * and its result is close to the previous result, from which the search starts. The points of a
- * path already have such an order. */
+ * when the whole model is in memory. Then the data for the next point is in the processor's caches.
+ * The search starts from the previous point's result, which is close to the next point's result.
+ * The points of a path already have such an order. */
 static bool are_scattered(const ebpo_box *box, const double *points, uint64_t count)
 {
     const double mean_least = 0x1p-5; /* as a share of the box */
@@ -258,8 +263,8 @@ void ebpo_batch_end(ebpo_batch *b)
 
 #define EBPO_NO_SUBTREE UINT64_MAX
 
-/* Returns the *home* of a point: the number in the top of the subtree where the search for the
- * point begins. EBPO_NO_SUBTREE: no subtree is needed, as the top decides. */
+/* Returns the *home* of a point: the subtree where the query of the point begins, as an index of
+ * top->below. EBPO_NO_SUBTREE: the query needs no subtree, as the top decides. */
 static uint64_t home_of(const ebpo_batch *b, const double p[3])
 {
     const ebpo_model *m = b->context->model;
@@ -272,8 +277,8 @@ static uint64_t home_of(const ebpo_batch *b, const double p[3])
     if (!ebpo_locate(&box, deepest, p, at))
         return EBPO_NO_SUBTREE;
     uint32_t entry = ebpo_descend(&m->top->nodes, deepest, at).entry;
-    return ebpo_entry_kind_of(entry) == EBPO_ENTRY_BELOW ? ebpo_entry_value(entry)
-                                                         : EBPO_NO_SUBTREE;
+    return ebpo_entry_kind_of(entry) == EBPO_ENTRY_SUBTREE_ROOT ? ebpo_entry_value(entry)
+                                                                : EBPO_NO_SUBTREE;
 }
 
 /* Adds a subtree to the next hint, if it is not in memory. */
@@ -310,9 +315,9 @@ static void hint_next(ebpo_batch *b)
 }
 
 /* Sends one hint for the other subtrees that the next points need, so that queries do not request
- * them one by one. For each point, its home is searched; the result bounds the distance, and
- * so the subtrees that are needed. A subtree that cannot be loaded ends
- * the search: the query will return the error, and another try may wait as long as the first. */
+ * these subtrees one by one. Finds the nearest face in each point's home. The distance of this face
+ * is an upper bound: subtrees beyond it are not needed. If a home cannot be loaded, the loop ends,
+ * because the next home could again wait for a time-out. The query returns the error. */
 static void search_around(ebpo_batch *b, uint64_t end)
 {
     ebpo_context *c = b->context;

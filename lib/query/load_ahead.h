@@ -11,14 +11,16 @@
  * cache. */
 void ebpo_context_prefetch(ebpo_context *context, const double p[3], double search_distance);
 
-/* Lists the subtrees whose envelopes may be within `limit` of p, the nearest first, by their
- * numbers in the top; returns their count. */
+/* Lists the subtrees whose envelopes may be within `limit` of p, the nearest first, as indices of
+ * top->below. Returns the number of subtrees. */
 unsigned ebpo_subtrees_near(const ebpo_model *model, const double p[3], double limit,
                             uint64_t numbers[EBPO_CACHE_AHEAD]);
 
-/* Sends one prefetch hint for subtrees that will be entered soon, given by their numbers in the
- * top. For remote files that have a table of subtrees. Skips subtrees in memory. */
+/* Maximum number of subtrees in one hint, except for hints of batches. */
 enum { EBPO_HINTED_MAX = 64 };
+
+/* Sends one prefetch hint for subtrees that queries will visit soon. `below` has their indices of
+ * top->below. For remote files that have a table of subtrees. Skips subtrees in memory. */
 void ebpo_context_hint(const ebpo_context *context, const uint32_t *below, uint64_t count);
 
 /* Returns true when the model's options enable prefetching. */
@@ -28,7 +30,7 @@ static inline bool ebpo_model_prefetches(const ebpo_model *m)
 }
 
 /* A batch of many points. The points are evaluated along the Morton curve, so that subtrees are
- * loaded few times; for a remote file prefetch hints are sent in advance. One thread. */
+ * loaded few times. For a remote file, prefetch hints are sent in advance. One thread. */
 
 typedef struct ebpo_batch {
     ebpo_context *context;
@@ -39,7 +41,7 @@ typedef struct ebpo_batch {
     bool searches_around; /* queries search around the point (distances) */
     uint64_t hinted;      /* number of points for whose subtrees hints have been sent */
     uint64_t searched;    /* number of points around which further subtrees have been searched */
-    uint32_t *below; /* [capacity] subtrees that are being collected, by their numbers in the top */
+    uint32_t *below;      /* [capacity] subtrees of the next hint, as indices of top->below */
     uint64_t below_count, capacity;
 } ebpo_batch;
 

@@ -9,8 +9,7 @@
 #include "query/accel.h"
 #include "query/point_bounds.h"
 
-/* --- the top: levels 0 .. cut level without faces, and the nodes below. Immutable; any thread ---
- */
+/* --- the top: levels 0 .. cut level, without faces. Immutable; any thread --- */
 
 typedef struct ebpo_top_planes {
     uint32_t first;
@@ -19,15 +18,16 @@ typedef struct ebpo_top_planes {
 
 typedef struct ebpo_top {
     int cut_level;
-    /* Entries are UNIFORM, GRAY (levels above the cut), or BELOW: gray nodes of the cut level,
-     * leaves down to this level, and pruned nodes. */
+    /* Entries are UNIFORM, GRAY (gray nodes above the cut level), or SUBTREE_ROOT: gray nodes of
+     * the cut level, leaves down to this level, and pruned nodes. */
     ebpo_node_table nodes;
     uint32_t *planes;      /* codes of all planes */
     ebpo_top_planes *gray; /* planes of the gray node whose children are group g */
 
     uint64_t below_count;
-    ebpo_node *below;              /* nodes of the kind BELOW; NULL in a table of envelopes alone */
-    ebpo_top_planes *below_planes; /* [below_count]; leaves have none */
+    /* [below_count] nodes of the kind SUBTREE_ROOT; NULL in a table of envelopes alone */
+    ebpo_node *below;
+    ebpo_top_planes *below_planes; /* [below_count] planes of these nodes; leaves have none */
     uint64_t bytes;
 } ebpo_top;
 

@@ -110,7 +110,8 @@ typedef struct deep_child {
 static ebpo_top_planes planes_of(const ebpo_top *t, uint32_t entry)
 {
     uint32_t value = ebpo_entry_value(entry);
-    return ebpo_entry_kind_of(entry) == EBPO_ENTRY_BELOW ? t->below_planes[value] : t->gray[value];
+    return ebpo_entry_kind_of(entry) == EBPO_ENTRY_SUBTREE_ROOT ? t->below_planes[value]
+                                                                : t->gray[value];
 }
 
 /* Ranks the children that may be nearer than the best distance, the nearest first. */
@@ -186,7 +187,7 @@ static ebpo_status add_node(searching *g, const ebpo_ranked *r, ebpo_error *erro
     if (r->lower > ebpo_nearest_limit(n) || ebpo_node_is_uniform(&r->node) ||
         r->node.pruned) /* pruned: inspect_pruned handles the node */
         return EBPO_OK;
-    if (ebpo_node_is_below(&r->node)) {
+    if (ebpo_node_is_subtree_root(&r->node)) {
         /* the node contains a face */
         double end = ebpo_rank_cell_end(&g->ranking, r->node.cell);
         n->upper = fmin(n->upper, n->far.far ? ebpo_far_upper(&n->far, end) : end);
@@ -276,7 +277,7 @@ static ebpo_skeleton_bounds skeleton_bounds(const searching *g, const ebpo_skele
 static ebpo_node node_below(const ebpo_model *m, uint32_t below)
 {
     ebpo_node node = m->top->below[below];
-    node.entry = ebpo_entry(EBPO_ENTRY_BELOW, below);
+    node.entry = ebpo_entry(EBPO_ENTRY_SUBTREE_ROOT, below);
     return node;
 }
 
@@ -346,7 +347,7 @@ static bool visit_owners(owners *o, uint32_t entry, ebpo_cell cell, ebpo_error *
     if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_UNIFORM || !comes_before(o, cell) ||
         !cell_intersects(o, cell))
         return true;
-    if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_BELOW)
+    if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_SUBTREE_ROOT)
         return ebpo_octcode_of_cell(cell) == o->code || o->visit(o, ebpo_entry_value(entry), error);
     for (unsigned octant = 0; octant < 8; octant++)
         if (!visit_owners(o, ebpo_table_child(nodes, entry, octant), ebpo_cell_child(cell, octant),
@@ -452,10 +453,10 @@ static ebpo_status search_parts(searching *g, ebpo_error *error)
             ebpo_nearest_pass_over(n, next.lower);
             break;
         }
-        status = !ebpo_node_is_below(&next.node) ? add_children(g, &next, error)
-                 : next.what == OWNED            ? search_below(g, next.node, error)
-                 : next.what == SHARED           ? inspect_shared(g, &next, error)
-                                                 : inspect_subtree(g, &next, error);
+        status = !ebpo_node_is_subtree_root(&next.node) ? add_children(g, &next, error)
+                 : next.what == OWNED                   ? search_below(g, next.node, error)
+                 : next.what == SHARED                  ? inspect_shared(g, &next, error)
+                                                        : inspect_subtree(g, &next, error);
     }
     ebpo_deep_bounds_report(g->c->model, g->new_loads);
     return status;

@@ -29,7 +29,7 @@ struct ebpo_model {
     bool results_inside; /* `whole` is a solid with its mesh */
     ebpo_top *top;       /* levels 0 .. cut level */
     ebpo_chunks *chunks;
-    ebpo_cache *cache;         /* subtrees by their number in the top */
+    ebpo_cache *cache;         /* subtrees by their index in top->below */
     ebpo_skeletons *skeletons; /* skeletons of subtrees that have been loaded; or NULL */
     _Atomic(ebpo_top *) deep;  /* levels below the cut: nearest_subtrees.c; or NULL */
     atomic_bool deep_begun;

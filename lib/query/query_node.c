@@ -83,7 +83,7 @@ const ebpo_node_source ebpo_accel_source = { accel_children, copy_accel_planes, 
 static ebpo_node top_node_of(const ebpo_model *model, uint32_t entry, ebpo_cell cell)
 {
     ebpo_node node = ebpo_entry_node(entry, cell, model->info->rule);
-    if (ebpo_node_is_below(&node)) {
+    if (ebpo_node_is_subtree_root(&node)) {
         const ebpo_node *below = &model->top->below[ebpo_entry_value(entry)];
         node.type = below->type;
         node.pruned = below->pruned;
@@ -116,7 +116,8 @@ ebpo_status ebpo_model_enter(ebpo_context *context, ebpo_node *node, ebpo_error 
         return status;
     node->subtree = subtree;
     node->entry = subtree->nodes.root;
-    if (ebpo_node_is_below(node)) /* possible in a file whose counts do not include the node */
+    /* a pruned node, in a file whose counts do not include the node */
+    if (ebpo_node_is_subtree_root(node))
         return ebpo_fail_pruned(context->model, node->cell, error);
     return EBPO_OK;
 }
@@ -124,7 +125,7 @@ ebpo_status ebpo_model_enter(ebpo_context *context, ebpo_node *node, ebpo_error 
 const uint32_t *ebpo_model_planes(const ebpo_model *model, const ebpo_node *node, uint32_t *count)
 {
     uint32_t value = ebpo_entry_value(node->entry);
-    bool below = ebpo_node_is_below(node);
+    bool below = ebpo_node_is_subtree_root(node);
     *count = 0;
     if (node->subtree)
         return accel_planes(node->subtree, node, count);
@@ -198,7 +199,7 @@ static ebpo_status model_children(void *holder, ebpo_node *gray, ebpo_node child
     if (gray->pruned)
         return EBPO_OK;
     context->planes = true; /* cursors may request planes */
-    if (ebpo_node_is_below(gray))
+    if (ebpo_node_is_subtree_root(gray))
         status = ebpo_model_enter(context, gray, error);
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++)
         child[octant] = ebpo_model_child(context->model, gray, octant);
@@ -268,7 +269,7 @@ static ebpo_status check_below(const checking *k, ebpo_node node, ebpo_error *er
     if (ebpo_node_is_uniform(&node) || node.type != EBPO_GRAY ||
         !k->matters(k->user, &k->box, &node))
         return EBPO_OK;
-    if (ebpo_node_is_below(&node)) /* entering fails for pruned nodes */
+    if (ebpo_node_is_subtree_root(&node)) /* entering fails for pruned nodes */
         status = ebpo_model_enter(k->context, &node, error);
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++)
         status = check_below(k, ebpo_model_child(k->context->model, &node, octant), error);

@@ -8,19 +8,20 @@
 
 ebpo_node ebpo_model_root(const ebpo_model *model);
 
-/* Returns true for a node BELOW: one below which another table begins. That is a subtree that is
- * loaded on demand, or nothing for a pruned node, which cannot be entered. */
-static inline bool ebpo_node_is_below(const ebpo_node *node)
+/* Returns true for a node of the kind SUBTREE_ROOT: the root of a subtree that is loaded on demand.
+ * Also true for a pruned node, whose subtree is not in the file and cannot be entered. */
+static inline bool ebpo_node_is_subtree_root(const ebpo_node *node)
 {
-    return ebpo_entry_kind_of(node->entry) == EBPO_ENTRY_BELOW;
+    return ebpo_entry_kind_of(node->entry) == EBPO_ENTRY_SUBTREE_ROOT;
 }
 
-/* Returns EBPO_E_ABSENT for a pruned node. For a node BELOW: replaces it by the root of its
- * subtree, loaded if needed; the subtree stays until the context enters another one. */
+/* Enters a subtree. `node` is of the kind SUBTREE_ROOT, and becomes the root node in the subtree's
+ * table. The subtree is loaded if needed, and stays until the context enters another one. Returns
+ * EBPO_E_ABSENT for a pruned node. */
 EBPO_MUST_USE ebpo_status ebpo_model_enter(ebpo_context *context, ebpo_node *node,
                                            ebpo_error *error);
 
-/* Returns the child of a gray node that is not BELOW. */
+/* Returns a child of a gray node that is not of the kind SUBTREE_ROOT. */
 ebpo_node ebpo_model_child(const ebpo_model *model, const ebpo_node *gray, unsigned octant);
 
 /* For cursors (geometry/cursor.h); the cursor's holder is an ebpo_context, which loads subtrees as

@@ -81,7 +81,7 @@ static ebpo_status add_below(reading *r, const ebpo_level *level, const ebpo_nod
                          t->cut_level);
     if (!r->envelopes)
         t->below[r->below] = *node;
-    *entry = ebpo_entry(EBPO_ENTRY_BELOW, (uint32_t)r->below);
+    *entry = ebpo_entry(EBPO_ENTRY_SUBTREE_ROOT, (uint32_t)r->below);
     uint32_t count =
         node->type == EBPO_GRAY && level->plane_counts ? level->plane_counts[node->rank] : 0;
     return add_planes(r, level, count, in_level, &t->below_planes[r->below++]);

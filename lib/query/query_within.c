@@ -246,7 +246,7 @@ static ebpo_status put_node(within *w, const ebpo_box *box, const ebpo_ranked *r
     if (ebpo_node_is_uniform(&r->node) || r->node.pruned || r->lower > w->band.limit ||
         near_band_is_past(&w->band, ebpo_cell_far(box, r->node.cell, w->band.p)))
         return EBPO_OK;
-    if (!ebpo_node_is_below(&r->node))
+    if (!ebpo_node_is_subtree_root(&r->node))
         return w->ahead ? put_children(w, box, r, error) : ebpo_queue_push(w->context, r, error);
     ebpo_ranked below = *r;
     below.lower = fmax(r->lower, known_bound(w, ebpo_entry_value(r->node.entry)));
@@ -308,8 +308,8 @@ static ebpo_status search_parts(within *w, ebpo_error *error)
         ebpo_ranked r = ebpo_queue_pop(c);
         if (r.lower > w->band.limit)
             break;
-        status = ebpo_node_is_below(&r.node) ? search_below(w, &r, error)
-                                             : put_children(w, &box, &r, error);
+        status = ebpo_node_is_subtree_root(&r.node) ? search_below(w, &r, error)
+                                                    : put_children(w, &box, &r, error);
     }
     return status;
 }

@@ -406,7 +406,7 @@ static ebpo_status cast_node(casting *c, const ebpo_box *box, ebpo_node node, eb
     if (c->done || ebpo_node_is_uniform(&node) || !intersects_cell(c, box, &node) ||
         node.pruned) /* pruned: ray_walk handles the node */
         return EBPO_OK;
-    if (ebpo_node_is_below(&node)) {
+    if (ebpo_node_is_subtree_root(&node)) {
         ebpo_status status = ebpo_model_enter(c->context, &node, error);
         if (status == EBPO_OK)
             cast_subtree(c, node.subtree);

@@ -30,7 +30,7 @@ static void turns_of(const ebpo_accel *s, uint32_t block, const ebpo_axis_segmen
     ebpo_face_block b = ebpo_face_block_open(s, block);
     int u = segment->axis == 2 ? 0 : segment->axis + 1,
         v = segment->axis == 0 ? 2 : segment->axis - 1;
-    turns t = turns_of_floats(&b, ebpo_face_block_lanes(&b), u, v, segment, s->turn_error);
+    turns t = turns_of_floats(&b, ebpo_face_block_lanes(&b), u, v, segment, s->turn_error_constant);
     *left = t.left;
     *right = t.right;
     *open = t.open;

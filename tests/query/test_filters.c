@@ -172,7 +172,7 @@ static void make_line(block *b, ebpo_axis_segment *g, uint64_t *state)
         reach = fmax(reach, fmax(fabs(low[k]), fabs(high[k])));
         size = fmax(size, high[k] - low[k]);
     }
-    b->s.turn_error = (float)(0x1p-43 * reach * size);
+    b->s.turn_error_constant = (float)(0x1p-43 * reach * size);
     *g =
         (ebpo_axis_segment){ .axis = (int)reference_integer(state, 0, 2), .reach = EBPO_REACH_ALL };
     memcpy(g->from, p, sizeof p);

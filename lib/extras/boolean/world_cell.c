@@ -55,7 +55,7 @@ static void inspect_node(ball *b, const ebpo_node *node)
         b->seen |= kind;
         if (square < b->square * (1 - 0x1p-48) && b->square > 0x1p-900)
             b->sure |= kind;
-    } else if (node->type != EBPO_GRAY || node->pruned || ebpo_node_is_below(node)) {
+    } else if (node->type != EBPO_GRAY || node->pruned || ebpo_node_is_subtree_root(node)) {
         b->seen |= SEEN_FACES;
     } else {
         for (unsigned octant = 0; octant < 8; octant++) {

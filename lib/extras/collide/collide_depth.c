@@ -362,7 +362,7 @@ static ebpo_status find_node(going_down *g, ebpo_cell cell, ebpo_node *out, ebpo
     *out = ebpo_model_root(context->model);
     for (int level = 0;; level++) {
         ebpo_status status = EBPO_OK;
-        if (ebpo_node_is_below(out) && !out->pruned)
+        if (ebpo_node_is_subtree_root(out) && !out->pruned)
             status = ebpo_model_enter(context, out, error);
         if (status != EBPO_OK || level == cell.level)
             return status;

@@ -174,7 +174,7 @@ ebpo_posed_node ebpo_posed_subtree_root(const ebpo_posed_subtrees *s)
 {
     ebpo_posed_node root = ebpo_posed_root(s);
     if (s->model->whole)
-        root.entry = ebpo_entry(EBPO_ENTRY_BELOW, 0);
+        root.entry = ebpo_entry(EBPO_ENTRY_SUBTREE_ROOT, 0);
     return root;
 }
 

@@ -130,7 +130,7 @@ static ebpo_status descend_pair(const finding *f, const ebpo_posed_node node[2])
     for (int i = 0; i < 2; i++) {
         if (ebpo_entry_kind_of(node[i].entry) == EBPO_ENTRY_UNIFORM)
             return EBPO_OK;
-        below[i] = ebpo_entry_kind_of(node[i].entry) == EBPO_ENTRY_BELOW;
+        below[i] = ebpo_entry_kind_of(node[i].entry) == EBPO_ENTRY_SUBTREE_ROOT;
     }
     if (cells_apart(f, node))
         return EBPO_OK;

@@ -22,9 +22,9 @@
 #include "extras/scene/json_reader.h"
 #include "extras/scene/scene_parts.h"
 
-size_t ebpo_scene_text_mark(const char *text, size_t size)
+size_t ebpo_scene_bom_length(const char *text, size_t size)
 {
-    return (size_t)ebpo_text_mark(text, size);
+    return (size_t)ebpo_text_bom_length(text, size);
 }
 
 /* Returns the index after the string that begins at text[i], or `size`. */

@@ -158,7 +158,7 @@ static ebpo_status read_text(const ebpo_whole_file *file, ebpo_scene_route *rout
                 newlocale(LC_ALL_MASK, "C", (locale_t)0) };
     ebpo_status status;
     const char *foreign = ebpo_foreign_bytes(file->data, file->size);
-    l.at += ebpo_scene_text_mark(l.at, file->size);
+    l.at += ebpo_scene_bom_length(l.at, file->size);
     if (foreign)
         status = ebpo_fail_file(error, EBPO_E_FORMAT, path, "%s", foreign);
     else if (!l.c_locale)

@@ -53,7 +53,7 @@ static ebpo_status open_parse(const char *text, size_t size, const char *name, c
                               ebpo_error *error)
 {
     ebpo_scene *scene = NULL;
-    size_t mark = ebpo_scene_text_mark(text, size);
+    size_t mark = ebpo_scene_bom_length(text, size);
     text += mark;
     size -= mark;
     ebpo_status status = folder ? ebpo_scene_new(&scene, error) : ebpo_fail_memory(error, 1);

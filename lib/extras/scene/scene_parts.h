@@ -186,7 +186,7 @@ char *ebpo_scene_folder_of(const char *path);
 /* --- the text of a scene file --- */
 
 /* Returns the length of a UTF-8 byte order mark at the beginning of a text: 0 or 3. */
-size_t ebpo_scene_text_mark(const char *text, size_t size);
+size_t ebpo_scene_bom_length(const char *text, size_t size);
 
 /* Returns EBPO_E_LIMIT for more than `max_values` values or 32 levels, without parsing. */
 EBPO_MUST_USE ebpo_status ebpo_scene_text_fits(const char *text, size_t size, uint64_t max_values,

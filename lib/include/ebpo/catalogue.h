@@ -15,10 +15,11 @@
  *
  * A *catalogue* is a list of models with boxes and digests. *Parts* are files of one model that was
  * cut; *caps* are faces that close a part where it was cut. A query opens only the models whose
- * boxes can contribute to the result. An opened model must have the digest of its entry, must be
- * within the entry's box, and must have as many faces as the file `numbers` has indices; otherwise
- * the query returns EBPO_E_FORMAT. Results are those of the models (query.h) and do not depend on
- * the budget. docs/guide/clusters.md describes the file format and the results of parts.
+ * boxes can contribute to the result. An opened model must have the digest of its entry and must be
+ * within the entry's box. If the entry names a file of face indices (`numbers`), this file must
+ * have one index for each face of the model that distances and rays use. Otherwise the query
+ * returns EBPO_E_FORMAT. Results are those of the models (query.h) and do not depend on the budget.
+ * docs/guide/clusters.md describes the file format and the results of parts.
  */
 #ifndef EBPO_CATALOGUE_H
 #define EBPO_CATALOGUE_H
@@ -36,12 +37,15 @@ typedef struct ebpo_catalogue ebpo_catalogue;
 
 /* Description of a model in a catalogue. */
 typedef struct ebpo_catalogue_entry {
-    /* Path or URL of the model for winding numbers. Not NULL, not empty. */
+    /*
+     * Path or URL of the model. For a part with `surface`: of the model with caps, which gives
+     * winding numbers. Not NULL, not empty.
+     */
     const char *path;
 
     /*
-     * For a part: path or URL of the model without caps, for distances and rays. NULL: the model at
-     * `path`.
+     * For a part: path or URL of the model without caps, for distances and rays. NULL: distances
+     * and rays use the model at `path`.
      */
     const char *surface;
 
@@ -51,7 +55,7 @@ typedef struct ebpo_catalogue_entry {
      */
     const char *numbers;
 
-    /* content_sha256 of both files. */
+    /* content_sha256 of the models at `path` and `surface`. */
     uint8_t digest[32], surface_digest[32];
 
     /* Box that contains the model: finite, min <= max on each axis. */
@@ -65,6 +69,7 @@ typedef struct ebpo_catalogue_entry {
     ebpo_rule rule;
     bool mesh, pruned;
 
+    /* True: the model is a solid; false: it is a surface. */
     bool solid;
 
     /* True for a part that consists only of caps: distances and rays ignore it. */
@@ -154,8 +159,8 @@ EBPO_API void ebpo_catalogue_free(ebpo_catalogue *catalogue);
 
 /*
  * Writes the catalogue as a JSON file, which is replaced atomically. Paths that begin with the same
- * bytes as the folder of `path` become relative; others are unchanged. When read again, relative
- * paths are based on that folder.
+ * bytes as the folder of `path` become relative; others are unchanged. When the catalogue is read
+ * again, relative paths are based on that folder.
  *
  * EBPO_E_ARGUMENT: a path is not UTF-8. EBPO_E_IO.
  *
@@ -280,10 +285,11 @@ EBPO_API ebpo_status ebpo_catalogue_models_get_stats(ebpo_catalogue_models *mode
 /* ---- queries ---- */
 
 /*
- * Points and rays are as in query.h; for other values queries return EBPO_E_ARGUMENT with the
- * index. Points are processed along a curve, so that models and subtrees are opened few times. On
- * failure the results are unspecified. Errors are those of opening and querying models.
- * EBPO_E_LIMIT: a model does not fit in its share of the budget.
+ * query.h gives the valid values of points and rays. For other values, queries return
+ * EBPO_E_ARGUMENT, and the message gives the index. Points are processed along a curve, so that
+ * models and subtrees are loaded few times. On failure the results are unspecified. Errors are
+ * those of opening and querying models. EBPO_E_LIMIT: a model does not fit in its share of the
+ * budget.
  *
  * A query waits while other queries use the budget. Therefore a callback of a query, such as the
  * one that opens files, must not query the same ebpo_catalogue_models.
@@ -327,9 +333,9 @@ typedef struct ebpo_catalogue_query_options {
  * model with the point on a face adds 0. A point is inside if it is inside any model; else it is on
  * a face if it is on a face of any model.
  *
- * For parts the result is exactly that of the whole model, also on caps: the rule is applied to the
- * sum. EBPO_E_LIMIT: 64 rays from a point on a cap all hit edges. EBPO_E_ABSENT: a point is on a
- * cap, and the catalogue has no surface of any part.
+ * For parts, the rule is applied to the sum. The result is exactly that of the whole model, also
+ * for points on caps. EBPO_E_LIMIT: each of 64 rays from a point on a cap hits an edge or runs
+ * along a face. EBPO_E_ABSENT: a point is on a cap, and the catalogue has no surface of any part.
  *
  * EBPO_E_NOT_SOLID: a model is a surface.
  *
@@ -341,10 +347,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_catalogue_inside(
     ebpo_error *error);
 
 /*
- * Finds the nearest face of any model within max_distance, for points[count][3]. Of several models
- * at the same rounded distance, the first is used. If all models are solids, distances of points
- * inside (ebpo_catalogue_inside) are negative. `lo` and `hi` are both the unsigned distance, or 0
- * without a result.
+ * Finds the nearest face of any model within max_distance, for points[count][3]. If several models
+ * have the same rounded distance, the first of them is used. If all models are solids, distances of
+ * points inside (ebpo_catalogue_inside) are negative. `lo` and `hi` are both the unsigned distance,
+ * or 0 if no face is found.
  *
  * model   [count] index of the entry; EBPO_CATALOGUE_NO_MODEL: no such face
  *
@@ -358,9 +364,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_catalogue_distance(
     uint64_t *model, ebpo_error *error);
 
 /*
- * Finds the first face of any model hit by each of rays[count]. Of several models at the same
- * rounded t, the first is used. If t is INFINITY for several models, their hits are compared
- * along a direction that is longer by a power of two (see ebpo_ray_hit).
+ * Finds the first face of any model hit by each of rays[count]. If several models have the same
+ * rounded t, the first of them is used. Exception: several models have hits whose t exceeds the
+ * range of double (INFINITY with a face). These hits are compared along a direction that is longer
+ * by a power of two (see ebpo_ray_hit).
  *
  * model   as for ebpo_catalogue_distance
  *

@@ -168,8 +168,9 @@ typedef struct ebpo_level {
     double leaf_volume;
 
     /*
-     * Number of pruned gray nodes. The group of a pruned node in the next level is 0 and counts as
-     * eight white nodes. On the last level, all gray nodes are pruned and have no groups.
+     * Number of pruned gray nodes. The children of a pruned node have a group in the next level.
+     * The word of this group in `types` is 0, so it counts as eight white nodes. On the last level,
+     * all gray nodes are pruned, and their children have no groups.
      */
     uint64_t pruned_count;
 
@@ -193,8 +194,8 @@ EBPO_API void ebpo_level_free(ebpo_level *level);
 /*
  * Decodes the half-space of a plane code. Coordinates are those of the node's cell: xi = (p -
  * corner) / cell size on each axis, 0 to 1. The half-space contains the points with 4096 * (n . xi)
- * <= d. All values are integers, |n0| + |n1| + |n2| = 511, and readers never round. Returns false
- * for invalid codes.
+ * <= d. n and d are integers, and |n0| + |n1| + |n2| = 511. The half-space is exact: readers use
+ * these integers without rounding. Returns false for invalid codes.
  *
  * Threads: any.
  */
@@ -208,12 +209,12 @@ typedef struct ebpo_level_summary {
     /* Sum of leaf_new: each face counts in the first leaf that it intersects. */
     uint64_t new_count;
 
-    /* Number of references from other leaves to these faces. */
+    /* Number of references of this level's leaves to other faces, as in ebpo_level. */
     uint64_t ref_count;
 
     double gray_volume, leaf_volume;
 
-    /* Number of pruned gray nodes. For each, white_count of the next level includes eight. */
+    /* Number of pruned gray nodes. `white_count` of the next level includes eight for each. */
     uint64_t pruned_count;
 } ebpo_level_summary;
 
@@ -406,12 +407,15 @@ typedef struct ebpo_write_options {
 
     /*
      * Selects the level whose gray nodes are the roots of subtrees (format-spec/README.md, section
-     * 9): the deepest level with at least this mean number of faces per gray node, or level 1 if
-     * there is none. The data of a subtree is contiguous, so that one read loads it.
+     * 9). This is the deepest level with at least this mean number of faces per gray node. If no
+     * level has this mean, it is level 1. The data of a subtree is contiguous, so that one read
+     * loads it.
      *
-     * 0: 1,024; the file has no subtrees if no level has this mean, or if the mesh has fewer than
-     * 131,072 faces. EBPO_NO_SUBTREES: no subtrees, as in format 1.0. Trees of fewer than three
-     * levels have no subtrees.
+     * 0 (default): selects as 1,024 does, with two differences. The file has no subtrees if no
+     * level has this mean, or if the mesh has fewer than 131,072 faces.
+     *
+     * EBPO_NO_SUBTREES: no subtrees, as in format 1.0. Trees of fewer than three levels never have
+     * subtrees.
      */
     uint64_t subtree_faces;
 
@@ -500,14 +504,15 @@ typedef struct ebpo_file ebpo_file;
  * Neither this nor later reading uses libhdf5 or its plugins.
  *
  * Safe for untrusted files: for any bytes, memory accesses stay within allocations, and no code is
- * loaded or executed. Results for a manipulated file are those of its data. ebpo_verify checks that
- * the parts of a file are consistent.
+ * loaded or executed. Results are computed from the data in the file, so a manipulated file can
+ * give wrong results. ebpo_verify checks that the parts of a file are consistent.
  *
  * If another program truncates or damages an open file, reading returns EBPO_E_IO or EBPO_E_FORMAT.
  * Chunks have checksums, and the list of chunk checksums (ebpo_chunk_checksums) also detects
  * exchanged chunks. For files without this list, ebpo_file_check_content detects exchanged chunks.
- * If chunks have no checksums, as in copies by other programs, opening reads the whole file and
- * compares content_sha256. Changes after opening are not detected.
+ *
+ * In copies by other programs, chunks may have no checksums. Opening such a file reads the whole
+ * file and compares content_sha256. Later changes of such a file are not detected.
  *
  * EBPO_E_IO. EBPO_E_FORMAT: not an .ebpo.h5 file, or damaged. EBPO_E_VERSION: the file has another
  * major version, or a part that this library does not know. EBPO_E_UNSUPPORTED: another program,

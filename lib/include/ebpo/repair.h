@@ -3,7 +3,7 @@
  *
  *   ebpo_mesh_try_repairs    tries sequences of repairs and chooses the shortest successful one
  *   ebpo_mesh_count_shells   counts shells (closed sets of faces) by orientation and nesting
- *   ebpo_mesh_doubts         reasons why a solid is probably not the intended one
+ *   ebpo_mesh_doubts         reasons why a mesh is no solid, or probably not the intended solid
  */
 #ifndef EBPO_REPAIR_H
 #define EBPO_REPAIR_H
@@ -14,7 +14,9 @@
 extern "C" {
 #endif
 
-/* Reasons why a mesh is not a solid, or probably not the intended one. Bits. */
+/*
+ * Reasons why a mesh is not a solid, or is a solid that its author probably did not intend. Bits.
+ */
 typedef enum ebpo_doubt {
     /* The mesh has unbalanced edges (ebpo_mesh_report): it is not closed. */
     EBPO_DOUBT_OPEN = 1 << 0,
@@ -42,8 +44,8 @@ typedef enum ebpo_doubt {
 /*
  * Returns the doubts about the current mesh.
  *
- * area     of the mesh before repairs. 0: unknown; the added area is then not tested
- * report   of the current mesh
+ * area     area of the mesh before repairs. 0: unknown; the added area is then not tested
+ * report   report on the current mesh
  * record   repairs that were made; NULL: none
  *
  * Threads: any.
@@ -53,15 +55,21 @@ EBPO_API uint32_t ebpo_mesh_doubts(double area, const ebpo_mesh_report *report,
 
 #define EBPO_REPAIR_TRIES 12
 
-/* One sequence of steps; `record` contains the requested steps. */
+/* One sequence of steps that was tried. */
 typedef struct ebpo_repair_try {
+    /* Requested steps, and the changes that they made. */
     ebpo_repair_record record;
+
+    /* Report on the mesh after these steps. */
     ebpo_mesh_report report;
 
     /* ebpo_doubt bits */
     uint32_t doubts;
 
-    /* Bits: 1 welded, 2 oriented, 4 holes filled, 32 repeated faces dropped. */
+    /*
+     * The requested steps of `record` as bits: 1 weld, 2 orient, 4 fill holes, 32 drop repeated
+     * faces. The bits 8 and 16 are not set.
+     */
     uint32_t steps;
 } ebpo_repair_try;
 
@@ -73,8 +81,8 @@ typedef struct ebpo_repairs {
     ebpo_repair_try tries[EBPO_REPAIR_TRIES];
 
     /*
-     * Index of the try without doubts, which is the last try. -1: every try has doubts, or the mesh
-     * had no doubts without repairs.
+     * Index of the try without doubts, which is the last try. -1: every try has doubts, or there
+     * are no doubts about the unrepaired mesh.
      */
     int64_t chosen;
 } ebpo_repairs;
@@ -84,10 +92,10 @@ typedef struct ebpo_repairs {
 /*
  * Tries ebpo_mesh_weld, ebpo_mesh_drop_duplicates, ebpo_mesh_orient and ebpo_mesh_fill_holes, in
  * this order, on a copy of the mesh without attributes. The copy is allocated in the workspace of
- * the mesh. Sequences that cannot help are skipped. If no repair is needed, only dropping repeated
- * faces is tried.
+ * the mesh. Sequences that cannot help are skipped. If there are no doubts about the mesh, only
+ * the step that drops repeated faces is tried.
  *
- * report   of the current mesh (ebpo_mesh_check, ebpo_mesh_prepare)
+ * report   report on the current mesh (ebpo_mesh_check, ebpo_mesh_prepare)
  *
  * Errors are those of the repairs and of ebpo_mesh_check. On failure `out` is cleared.
  *
@@ -108,14 +116,14 @@ typedef struct ebpo_shells {
     /* Number of shells. Shells of volume 0 are not counted. */
     uint64_t closed;
 
-    /* Number of these that are oriented inwards, inside an even number of other shells. */
+    /* Number of shells that are oriented inwards and inside an even number of other shells. */
     uint64_t inside_out;
 
-    /* Number of these that are oriented inwards, inside an odd number of other shells. */
+    /* Number of shells that are oriented inwards and inside an odd number of other shells. */
     uint64_t cavities;
 
     /*
-     * Number of these that are oriented outwards, inside an odd number of other shells: solids
+     * Number of shells that are oriented outwards and inside an odd number of other shells: solids
      * inside other solids.
      */
     uint64_t nested;
@@ -130,10 +138,10 @@ typedef struct ebpo_shells {
     uint32_t reserved;
 
     /*
-     * Indexed by ebpo_rule, if `apart` is 1: volume of the solid that the rule gives, minus the
-     * signed volume of the mesh (the integral of the winding number), in cubic units of the source.
-     * The difference is 0 if each component outside all solids is oriented outwards and each
-     * component inside a solid is oriented inwards.
+     * Differences of volumes, indexed by ebpo_rule: volume of the solid under this rule, minus the
+     * signed volume of the mesh (the integral of the winding number). In cubic units of the source.
+     * Valid only if `apart` is 1; else 0. A difference is also 0 if each component outside all
+     * solids is oriented outwards and each component inside a solid is oriented inwards.
      */
     double beyond[3];
 } ebpo_shells;

@@ -34,12 +34,13 @@ typedef struct ebpo_stream_options {
     }
 
 /*
- * One node. Its pointers are lent until the next call with the stream. The mesh is never read. A
+ * One node. Its pointers are valid until the next call with the stream. The mesh is never read. A
  * leaf of a file without EBPO_PART_LEAF_PLANES has no planes: its envelope is the part of its
  * parent's envelope in the leaf's cell.
  *
- * The polygons of an envelope are rounded, and negligible cuts are omitted. They enclose a slightly
- * larger volume than the envelope rather than a smaller one.
+ * The vertices of an envelope's polygons are rounded, and negligible cuts are omitted. So the
+ * polygons usually enclose slightly more than the envelope. `planes` is guaranteed to contain the
+ * envelope; the polygons are not.
  */
 typedef struct ebpo_stream_node {
     /* A leading 1, then three bits for each level. */
@@ -85,8 +86,8 @@ typedef struct ebpo_stream_node {
     const uint32_t *corners;
 
     /*
-     * Colour: red + 256 green + 65,536 blue, sRGB. Other nodes than gray ones have the colour of
-     * their parent. 0x808080 if `coloured` is 0.
+     * Colour: red + 256 green + 65,536 blue, sRGB. Nodes that are not gray have the colour of their
+     * parent. 0x808080 if `coloured` is 0.
      */
     uint32_t colour;
 
@@ -104,9 +105,10 @@ typedef struct ebpo_stream_level {
     uint64_t cumulative_bytes;
 
     /*
-     * Volume of the model's outer approximation at this level: envelopes of its gray nodes and of
-     * all leaves so far, and all black cells so far. With `polygons` it is the sum of the nodes'
-     * volumes, otherwise the value stored in the file.
+     * Volume of the model's outer approximation at this level. This is the volume of the envelopes
+     * of this level's gray nodes, and of all leaves and black cells of levels 0 to `level`. With
+     * `polygons` it is the sum of the nodes' volumes, otherwise it is computed from the volumes
+     * stored in the file.
      *
      * The envelopes of leaves are cut by the stored planes of the leaves, or only by the planes of
      * their ancestors if no planes of leaves are stored. Planes derived from the faces would cut

@@ -31,8 +31,8 @@ typedef enum ebpo_profile {
     EBPO_PROFILE_LOD = 1,
 
     /*
-     * Parts for exact queries: nodes, envelopes, mesh. Without maps and stored leaf planes, which
-     * can be derived.
+     * Parts for exact queries: nodes, envelopes, mesh. Without maps. Without stored leaf planes,
+     * because leaf planes can be derived.
      */
     EBPO_PROFILE_COLLISION = 2
 } ebpo_profile;
@@ -66,8 +66,9 @@ typedef struct ebpo_subset_options {
     double min[3], max[3];
 
     /*
-     * ebpo_part bits: parts to keep; parts that the file does not have are ignored. Of the mesh,
-     * only the faces in the lists of the kept leaves are kept. Without the mesh, maps are not kept.
+     * ebpo_part bits: parts to keep. Parts that the file does not have are ignored. The new mesh
+     * has only the faces in the lists of the kept leaves. Maps and attributes are kept only
+     * together with the mesh.
      */
     uint32_t parts;
 
@@ -120,18 +121,19 @@ EBPO_API uint64_t ebpo_subset_memory(uint64_t face_count, uint32_t leaf_faces);
  * the content (content_sha256) is that of `file`. Needs memory for the result, and up to 64 MiB for
  * data that is read.
  *
- * Guarantee of max_error for every node that was pruned for it: no point of its envelope, including
- * the interior, is farther than max_error from the solid and its faces (for a surface: from its
- * faces). `kept_error` of ebpo_info is this max_error. A leaf becomes a pruned node without planes
- * if the planes of its parent suffice. Leaves that are kept have the error bound that they have in
- * `file`, which may be larger than max_error. A smaller max_error keeps all nodes that a larger one
- * keeps. The whole model is opened in memory, see ebpo_subset_memory.
+ * Guarantee for every node that was pruned because of max_error: no point of the node's envelope,
+ * including the interior, is farther than max_error from the solid and its faces (for a surface:
+ * from its faces). `kept_error` of ebpo_info is this max_error. A leaf is pruned, too, if the
+ * planes of its ancestors alone satisfy max_error: in the new file it is a pruned gray node without
+ * planes. Kept leaves have the same error bound as in `file`, which may be larger than max_error. A
+ * smaller max_error keeps all nodes that a larger max_error keeps. With max_error or target_bytes,
+ * the whole model is opened in memory (see ebpo_subset_memory).
  *
  * EBPO_E_ARGUMENT: the level is not valid; the box has no points, or does not intersect the model's
  * root cell or the box of an earlier subset; or target_bytes is too small, and the message gives
  * the minimum. EBPO_E_ABSENT: max_error or target_bytes is set, and the file has no mesh or is a
  * subset. EBPO_E_IO: also if `path` is that of `file`, and another program has replaced the file
- * since opening. The errors of reading.
+ * since opening. Also the errors of reading.
  *
  * Threads: any.
  */
