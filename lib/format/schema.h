@@ -264,6 +264,9 @@ static inline int ebpo_values_number(uint64_t n) { return 1 + 2 * (int)n; }
 static inline int ebpo_items_number(uint64_t n) { return 2 + 2 * (int)n; }
 void ebpo_attribute_path(int number, char path[EBPO_PATH_BYTES]);
 
+/* Returns the attribute `about`. `ends`: the array's lists have different lengths. */
+const char *ebpo_attribute_about(int number, bool ends);
+
 extern const char ebpo_coding_plain[], ebpo_coding_columns[];
 
 /* The former name of ebpo_coding_columns, which readers take. */
