@@ -531,6 +531,11 @@ bool ebpo_file_array(const ebpo_file *file, unsigned n, ebpo_array_facts *out)
                                .coding =
                                    array->coding ? array->coding : ebpo_schema[array->id].coding,
                                .about = ebpo_schema[array->id].about };
+    if (array->id == EBPO_A_ATTRIBUTE)
+        facts.about =
+            ebpo_attribute_about(array->level,
+                                 array->level % 2 &&
+                                     file->attributes.head[(array->level - 1) / 2].different);
     snprintf(facts.path, sizeof facts.path, "%s", array->path);
     return EBPO_GIVE(ebpo_array_facts, out, &facts) == EBPO_OK;
 }

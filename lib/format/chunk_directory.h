@@ -82,7 +82,7 @@ EBPO_MUST_USE ebpo_status ebpo_stored_check_expansion(const ebpo_file *file, uin
 
 /* --- checksums --- */
 
-/* The list /chunk_sums contains the last four bytes of every chunk of a file. The checksum inside a
+/* The list /chunk_checksums contains the last four bytes of every chunk of a file. The checksum inside a
  * chunk does not identify the chunk. Without the list, a chunk of another position or file version
  * would be accepted. format-spec/checksums.md --- */
 

@@ -17,7 +17,7 @@ typedef struct ebpo_subtree_sums {
     uint64_t *before; /* [subtrees + 1][cols] sums of the columns before each subtree */
     uint32_t *counts; /* [subtrees][cols] /subtrees/counts */
     uint64_t *index;  /* [chunks of counts][cols] sums before each chunk of counts */
-    uint32_t *shared; /* [shared_count] /subtrees/outer */
+    uint32_t *shared; /* [shared_count] /subtrees/shared_chunks */
     uint64_t shared_count, shared_capacity;
 } ebpo_subtree_sums;
 

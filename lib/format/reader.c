@@ -309,7 +309,7 @@ static ebpo_status unpack_stored(const ebpo_file *file, const ebpo_array_in *arr
     size_t bytes = shape.chunk_rows * ebpo_shape_row_bytes(&shape);
     const char *why;
     if (!ebpo_chunk_fits(file, array, chunk, stored, array->chunks[chunk].bytes))
-        return chunk_damaged(file, array, chunk, "its checksum is not the one in /chunk_sums",
+        return chunk_damaged(file, array, chunk, "its checksum is not the one in /chunk_checksums",
                              error);
     ebpo_status status = ebpo_chunk_decode(coder, shape.pipeline, shape.element_size, stored,
                                            array->chunks[chunk].bytes, raw, bytes, &why);

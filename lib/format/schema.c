@@ -615,6 +615,14 @@ void ebpo_attribute_path(int number, char path[EBPO_PATH_BYTES])
                  number % 2 ? "" : "_items");
 }
 
+const char *ebpo_attribute_about(int number, bool ends)
+{
+    return number == 0       ? "header of the source file"
+           : number % 2 == 0 ? "items of the lists of the array before"
+           : ends            ? "end of each element's list in the items"
+                             : "values of each element, named by columns";
+}
+
 /* --- plane codes --- */
 
 bool ebpo_plane_decode(uint32_t code, int32_t n[3], int32_t *d)

@@ -80,7 +80,7 @@ enum {
     EBPO_S_VERTICES_BEFORE, /* first used by these faces */
     EBPO_S_VERTICES,
     EBPO_S_SHARED_FACES,    /* rows of /subtrees/shared_chunks for chunks of faces */
-    EBPO_S_SHARED_VERTICES, /* rows of /subtrees/outer for chunks of vertices */
+    EBPO_S_SHARED_VERTICES, /* rows of /subtrees/shared_chunks for chunks of vertices */
     EBPO_SUBTREE_LEVELS     /* first of the columns of levels */
 };
 /* Columns of each level below the subtrees' roots. */
@@ -270,6 +270,9 @@ static inline int ebpo_values_number(uint64_t n) { return 1 + 2 * (int)n; }
 static inline int ebpo_items_number(uint64_t n) { return 2 + 2 * (int)n; }
 /* Writes the absolute path of an array in /attributes. */
 void ebpo_attribute_path(int number, char path[EBPO_PATH_BYTES]);
+
+/* Returns the attribute `about`. `ends`: the array's lists have different lengths. */
+const char *ebpo_attribute_about(int number, bool ends);
 
 extern const char ebpo_coding_plain[], ebpo_coding_columns[];
 

@@ -35,8 +35,8 @@
 
 /* The lists that have a row for each chunk. */
 typedef enum header_list {
-    LIST_CHECKSUMS, /* /chunk_sums: chunk checksums, in the order of arrays */
-    LIST_SIZES,     /* /subtrees/places: stored sizes in file order; their sums are chunk offsets */
+    LIST_CHECKSUMS, /* /chunk_checksums: chunk checksums, in the order of arrays */
+    LIST_SIZES,     /* /subtrees/chunk_directory: stored sizes in file order; their sums are chunk offsets */
     LISTS
 } header_list;
 

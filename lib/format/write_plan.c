@@ -299,13 +299,12 @@ ebpo_status ebpo_attributes_put_array(ebpo_h5_out *out, const ebpo_plan *plan,
         ebpo_h5_put_text(out, array->handle, "coding",
                          array->columns ? ebpo_coding_columns : ebpo_coding_plain, error);
     if (status == EBPO_OK)
-        status = ebpo_h5_put_text(out, array->handle, "about",
-                                  array->level == 0       ? "header of the source file"
-                                  : array->level % 2 == 0 ? "items of the lists of the array before"
-                                  : plan->attributes->array[(array->level - 1) / 2].ends
-                                      ? "end of each element's list in the items"
-                                      : "values of each element, named by columns",
-                                  error);
+        status = ebpo_h5_put_text(
+            out, array->handle, "about",
+            ebpo_attribute_about(array->level,
+                                 array->level % 2 &&
+                                     plan->attributes->array[(array->level - 1) / 2].ends),
+            error);
     if (array->level % 2 == 0)
         return status;
     uint64_t n = (uint64_t)(array->level - 1) / 2;

@@ -38,7 +38,7 @@ EBPO_MUST_USE ebpo_status ebpo_check_source(ebpo_tally *tally, const ebpo_file *
 /* --- verify_subtrees.c, verify_chunks.c: subtrees and chunks --- */
 
 /* Checks every column of the table of subtrees, by visiting the tree depth first. Also checks that
- * /subtrees/outer lists exactly the needed shared chunks. Does nothing for files without subtrees.
+ * Does nothing for files without subtrees.
  */
 EBPO_MUST_USE ebpo_status ebpo_check_subtrees(ebpo_tally *tally, const ebpo_file *file,
                                               const ebpo_reference_tree *view,
