@@ -389,7 +389,7 @@ static bool span_begins(span word, const char *text)
 static span whole_text(const uint8_t *text, uint64_t bytes)
 {
     uint64_t bom = ebpo_text_bom_length(text, bytes);
-    return (span){ (const char *)text + bom, bytes - mark };
+    return (span){ (const char *)text + bom, bytes - bom };
 }
 
 /* Reads the next line. Returns false when there is none. */

@@ -37,9 +37,8 @@ EBPO_MUST_USE ebpo_status ebpo_check_source(ebpo_tally *tally, const ebpo_file *
 
 /* --- verify_subtrees.c, verify_chunks.c: subtrees and chunks --- */
 
-/* Checks every column of the table of subtrees, by visiting the tree depth first. Also checks that
- * Does nothing for files without subtrees.
- */
+/* Checks every column of the table of subtrees, by visiting the tree depth first. Does
+ * nothing for files without subtrees. */
 EBPO_MUST_USE ebpo_status ebpo_check_subtrees(ebpo_tally *tally, const ebpo_file *file,
                                               const ebpo_reference_tree *view,
                                               const ebpo_verify_options *options,
