@@ -450,8 +450,7 @@ def write(options, bench, page, goals, short):
               f"medians of {options.rounds} turns (half of that above two million faces) of "
               "processor time in us per query, unless a section says otherwise. *batch*: one "
               f"call for all points. Load average {statistics.median(bench.load):.1f} (median), "
-              f"{max(bench.load):.1f} (maximum). Compare values within a row only. The results of "
-              "the theses are of other machines.")
+              f"{max(bench.load):.1f} (maximum). Compare values within a row only.")
     text = "\n".join(head.lines + goals.lines + made.lines + page.lines).rstrip("\n") + "\n"
     pathlib.Path(options.output).write_text(reflow(text + handwritten(options.output)))
 

@@ -217,8 +217,9 @@ def selections(page, runs):
         return
     page.text("## Three selections, 10 to 50 % (EBP tables 2 to 14)", "",
               f"EBP: Amazona of {theirs.EBP_FACES['Amazona']:,} faces. Here: Lucy of {found['faces']:,} faces, "
-              "`report --unlimited`; so compare the order of the rows, not their values. *Random* takes a run of "
-              "planes in the node's order. L0 to L4 of percent of the solid.")
+              "`report --unlimited --leaf-faces 0`: as in EBP, all leaves are on the deepest level. Compare the "
+              "order of the rows, not their values. *Random* takes a run of planes in the node's order. *s* is the "
+              "build of the file with at most 255 planes a node. Volumes in percent of the solid.")
     rows = []
     byname = {m["name"]: m for m in found["methods"]}
     for select in SELECTIONS:
@@ -230,9 +231,9 @@ def selections(page, runs):
                          *(f"{v[i]:.1f}" for v in theirs.EBP_VOLUME[select][:5]),
                          figure(method["build_seconds"]), f"{method['file_bytes'] / 1e6:.2f}",
                          *(f"{v:.1f}" for v in free[:5])])
-    ours = byname["inherit"]
-    rows.append(["our default", *["-"] * 7, figure(ours["build_seconds"]), f"{ours['file_bytes'] / 1e6:.2f}",
-                 *(f"{v:.1f}" for v in file_volume(found, ours)[:5])])
+    ours = found["ours"]
+    rows.append(["our default", *["-"] * 7, figure(ours["build"]), f"{ours['bytes'] / 1e6:.2f}",
+                 *(f"{v:.1f}" for v in of_levels(ours)[:5])])
     page.table(["", "EBP: s", "GB", "L0", "L1", "L2", "L3", "L4", "here: s", "MB", "L0", "L1", "L2", "L3", "L4"],
                rows)
     beats = [sum(a < b for a, b in zip(free_volume(found, byname[f"random-{p}%"])[:8],
@@ -242,12 +243,12 @@ def selections(page, runs):
         + ". In EBP it is 8 of 8 at 40 %.")
     other = runs.result("lucy16_methods_40")
     if other:
-        page.text(f"With {other['faces']:,} faces and 40 %, L0 to L6:")
+        page.text(f"With {other['faces']:,} faces and 40 %:")
         page.table(["", *(f"L{i}" for i in range(7)), "planes at the root", "build, s"],
-                   [[m["name"] + (" without limits" if "unlimited" in m else ""),
-                     *padded(percent((free_volume(other, m) if "unlimited" in m else file_volume(other, m))), 7),
-                     m["unlimited"]["levels"][0]["planes"] if "unlimited" in m else m["levels"][0]["planes"],
-                     figure(m["build_seconds"])] for m in other["methods"]])
+                   [[m["name"], *padded(percent(free_volume(other, m)), 7), m["unlimited"]["levels"][0]["planes"],
+                     figure(m["unlimited"]["seconds"])] for m in other["methods"]]
+                   + [["our default", *padded(percent(of_levels(other["ours"])), 7),
+                       other["ours"]["levels"][0]["planes"], figure(other["ours"]["build"])]])
 
 
 def queries(page, runs):
@@ -258,7 +259,7 @@ def queries(page, runs):
     mean = lambda step, mode: step[mode]["ns"]["mean"] / 1000 if step else None
     page.text("## Points out of core (EBP tables 21 to 28)", "",
               f"EBP: Lucy, 10^6 points, levels 1 to 5 in memory. Ours: {runs.result('large')['faces']:,} faces, the "
-              "same levels in memory (L0 to L4, `--cut-level 4`), 16 MiB, 100,000 uniform points and 100,000 of a path, "
+              "same levels in memory (L0 to L4, `--cut-level 4`), 32 MiB, 100,000 uniform points and 100,000 of a path, "
               "single calls, wall-clock us, loading included. EBP does not state if files were cached; "
               "here they are in the page cache after the first query.")
     rows = [[f"`{mode}`", figure(mean(few, mode) if few else None), figure(mean(path, mode)),
@@ -360,8 +361,8 @@ def not_run(page, runs):
               f"The script needs 3 GB of disk and 8 GB of memory. The {len(STEPS) - len(missing)} steps on this page took "
               f"{seconds / 3600:.1f} hours on the busy machine; the others need several hours, mainly the builds of 25.6 "
               "million faces and the dragon with K = 5 %. " + (
-                  "Not run: " + "; ".join(f"`{n}` ({STEPS[n][0]})" for n in missing) + "." if missing else
-                  "All steps were run."))
+                  "Run `theses.py` again for these steps (`--list` describes them): "
+                  + ", ".join(f"`{n}`" for n in missing) + "." if missing else "All steps were run."))
 
 
 def plots(runs, folder):
@@ -388,9 +389,19 @@ def plots(runs, folder):
                     if (r := runs.result(f"large_{s}_{p}"))]
             if here:
                 lines.append((f"{s} here", here))
-        lines.append(("our default", [(big["build"], big["levels"][4]["percent_of_solid"] - 100)]))
-        made.append(plot(folder / "theses-time.svg", "26 to 28 million faces: error of level 4 against build time",
+        lines.append(("EBP, Lucy, kmedoids, 30 and 40 %", theirs.EBP_LUCY_TIMES))
+        lines.append(("our default, Lucy", [(big["build"], big["levels"][4]["percent_of_solid"] - 100)]))
+        made.append(plot(folder / "theses-time.svg", "Amazona and Lucy, 26 to 28 million faces: error of L4 against time",
                          "build, s", "excess volume, %", lines))
+    small = runs.result("lucy_methods")
+    if small:
+        lines = [(f"{s}, 10 to 50 %", [(m["unlimited"]["seconds"], free_volume(small, m)[4] - 100)
+                                       for p in PERCENTS for m in small["methods"] if m["name"] == f"{s}-{p}%"])
+                 for s in SELECTIONS]
+        lines.append(("our default", [(small["ours"]["build"], of_levels(small["ours"])[4] - 100)]))
+        made.append(plot(folder / "theses-time-here.svg",
+                         f"Lucy, {small['faces']:,} faces, one machine: error of L4 against build time", "build, s",
+                         "excess volume, %", lines))
     if big and memory:
         made.append(plot(folder / "theses-memory.svg", "Lucy, 26 to 28 million faces: error against memory",
                          "memory of the levels, MB", "excess volume, %", [
