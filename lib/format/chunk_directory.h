@@ -82,9 +82,9 @@ EBPO_MUST_USE ebpo_status ebpo_stored_check_expansion(const ebpo_file *file, uin
 
 /* --- checksums --- */
 
-/* The list /chunk_checksums contains the last four bytes of every chunk of a file. The checksum inside a
- * chunk does not identify the chunk. Without the list, a chunk of another position or file version
- * would be accepted. format-spec/checksums.md --- */
+/* The list /chunk_checksums contains the last four bytes of every chunk of a file. The checksum
+ * inside a chunk does not identify the chunk. Without the list, a chunk of another position or file
+ * version would be accepted. format-spec/checksums.md --- */
 
 /* Returns the list entry of a chunk: its last four bytes, which are its checksum in every pipeline
  * that has one. `bytes`: stored size, at least four. */

@@ -119,8 +119,8 @@ static ebpo_status open_counts(ebpo_chunks *chunks, uint64_t subtree, subtree_co
         add_row(c, i, sums);
     bool last = c->view.end == array->shape.rows, exact;
     /* The sums of the columns EBPO_S_SHARED_FACES and EBPO_S_SHARED_VERTICES must add up to the
-     * number of rows of /subtrees/shared_chunks. For the last chunk, c->end of each of these columns
-     * is this number. */
+     * number of rows of /subtrees/shared_chunks. For the last chunk, c->end of each of these
+     * columns is this number. */
     if (last &&
         sums[EBPO_S_SHARED_FACES] + sums[EBPO_S_SHARED_VERTICES] != c->end[EBPO_S_SHARED_FACES])
         status = table_fails(chunks, EBPO_A_SUBTREE_SHARED,

@@ -36,7 +36,8 @@
 /* The lists that have a row for each chunk. */
 typedef enum header_list {
     LIST_CHECKSUMS, /* /chunk_checksums: chunk checksums, in the order of arrays */
-    LIST_SIZES,     /* /subtrees/chunk_directory: stored sizes in file order; their sums are chunk offsets */
+    LIST_SIZES,     /* /subtrees/chunk_directory: stored sizes in file order; their sums are chunk
+                       offsets */
     LISTS
 } header_list;
 
