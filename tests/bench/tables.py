@@ -29,7 +29,7 @@ CHECK = """
 `ebpo check` was measured separately, on two busy cores:
 
 - `--crossings --memory 256MiB` of a torus of 1,000,832 faces: 6.6 s of CPU time and 117 MB on one thread, 6.4 s and
-  118 MB on two. It compares positions, not indices, and finds the same pairs for any number of threads.
+  118 MB on two.
 - 100,000 closed components within another component (`tests/bench/many_shells.py`, 820,000 faces): 6.9 s and 135 MB.
   The time grows linearly with the faces: 6.2 to 8.4 us per face.
 """
