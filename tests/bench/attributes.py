@@ -119,8 +119,7 @@ Made by `tests/bench/attributes.py EBPO {names} > docs/measured/attributes.md`; 
 the machine. `tests/cli/same_ply.py`, a separate PLY reader, compares each source with the mesh of four copies: the
 whole file, a subset, the file by `ebpo fetch`, and the subset by `ebpo fetch`. The subset is one of the eight parts
 of the box. Every vertex and face of the subset must be in the source, with its values and in the same order. Models
-whose subset is empty: {empty}. Polygons and strips become triangles with the corners and values of their
-source.
+whose subset is empty: {empty}.
 """
 MORE = """
 *PLY*: bytes of the source. *file without*, *with*: bytes of the file without and with attributes.
