@@ -126,10 +126,7 @@ static void row(const degenerate_case *c, FILE *out, totals *sum)
         return;
     }
     degenerate_case tame = tame_like(faces);
-    fprintf(out, " %s",
-            r.fault[0]   ? "**not stable**"
-            : c->surface ? "surface"
-                         : "solid");
+    fprintf(out, " %s", r.fault[0] ? "**not stable**" : c->surface ? "surface" : "solid");
     if (r.has_volume && r.volume_error != 0)
         fprintf(out, "; volume error %.1g", r.volume_error);
     fputs(" |", out);
