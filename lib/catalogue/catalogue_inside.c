@@ -1,4 +1,4 @@
-/* Classifies points by winding numbers, summed over the models whose boxes contain them.
+/* Classifies points by winding numbers, summed over the models whose boxes contain the points.
  *
  * Independent models: a point is inside if it is inside any model. A model that has the point on a
  * face adds 0 to the sum.
@@ -7,10 +7,11 @@
  * the point is on no face and no cap, the winding numbers of all parts add up to that of the whole
  * model. A point on a face or cap of a part is *doubtful*. The point is on the surface of the whole
  * model if a face that is not a cap contains it; a box query for the point decides this exactly.
- * Otherwise the point is on a cap. Then its winding number is counted along a ray through the
- * surfaces, which have no caps: the number of faces where the ray leaves, minus the number of faces
- * where it enters. A ray that hits an edge or runs along a face does not decide, and another ray is
- * cast. The directions are always the same, and every ray that decides gives the same number.
+ * Otherwise the point is on a cap. Then the point's winding number is counted along a ray through
+ * the surfaces, which have no caps: the number of faces where the ray leaves the solid, minus the
+ * number of faces where the ray enters the solid. If a ray hits an edge or runs along a face, its
+ * crossings are not counted, and another ray is cast. The directions are always the same. Every ray
+ * whose crossings are counted gives the same winding number.
  *
  * Source: docs/guide/clusters.md, "Beyond 2^32 faces". */
 #include "core/strict_fp.h"
@@ -29,7 +30,7 @@
 /* Maximum number of rays that are cast from a point. */
 enum { DIRECTIONS = 64 };
 
-/* Result for a point, of the models queried so far. */
+/* Result for a point, from the models queried so far. */
 typedef struct found {
     int64_t winding;
     bool in, on;
@@ -57,11 +58,11 @@ static ebpo_status query_windings(ebpo_context *context, const ebpo_catalogue_he
 
 /* --- doubtful points of parts: on the surface --- */
 
-/* Points on faces or caps of a part, whose results are not yet known. */
+/* Doubtful points whose results are not yet known. */
 typedef struct doubtful {
     uint32_t count;
     uint32_t *number; /* [count] index among all points */
-    double *rows;     /* [count][7] as rays */
+    double *rows;     /* [count][7] rays from the points */
     bool *on_surface; /* [count] true: the point is on the surface of the whole model */
     int64_t *sum;     /* [count] winding number by the last ray */
     bool *decided;    /* [count] true: the last ray gives the winding number */
@@ -86,7 +87,8 @@ static ebpo_status query_box(ebpo_context *context, const ebpo_catalogue_held *m
     return status;
 }
 
-/* Writes the results of the points with known[i] to `all`, and keeps the other points in `d`. */
+/* Writes the results of the points with known[i] to `all`, and keeps the other points in `d`. `on`:
+ * the known points are on the surface; otherwise d->sum has their winding numbers. */
 static void keep_unknown(doubtful *d, const bool *known, bool on, found *all)
 {
     uint32_t kept = 0;

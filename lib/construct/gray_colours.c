@@ -30,7 +30,8 @@ typedef struct colour_sums {
 } colour_sums;
 
 /* Numbers of leaves, gray nodes and entries of leaf_refs of a level before a run of GROUP_GRAIN
- * groups. leaf_refs lists the faces of each leaf that an earlier leaf lists first. */
+ * groups. For each leaf, leaf_refs has the *references*: the faces that an earlier leaf also lists.
+ */
 typedef struct run_start {
     uint64_t leaf, gray, ref;
 } run_start;

@@ -91,7 +91,9 @@ enum {
     EBPO_S_PLANES,
     EBPO_S_LEAF_PLANES,
     EBPO_S_REFS,
-    EBPO_S_ENDS, /* increase of the end of the new faces (one past the last) in the level */
+    /* The end of the new faces is one past the last new face of the level's leaves so far. The
+     * column has the end after the subtree's leaves, minus the end before these leaves. */
+    EBPO_S_ENDS,
     EBPO_SUBTREE_LEVEL_COLS
 };
 

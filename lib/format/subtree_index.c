@@ -118,8 +118,9 @@ static ebpo_status open_counts(ebpo_chunks *chunks, uint64_t subtree, subtree_co
     for (uint64_t i = c->view.begin; i < c->view.end; i++)
         add_row(c, i, sums);
     bool last = c->view.end == array->shape.rows, exact;
-    /* For the last chunk, c->end of either column is the number of rows of /subtrees/shared_chunks.
-     * The two sums must add up to this number. */
+    /* The sums of the columns EBPO_S_SHARED_FACES and EBPO_S_SHARED_VERTICES must add up to the
+     * number of rows of /subtrees/shared_chunks. For the last chunk, c->end of each of these columns
+     * is this number. */
     if (last &&
         sums[EBPO_S_SHARED_FACES] + sums[EBPO_S_SHARED_VERTICES] != c->end[EBPO_S_SHARED_FACES])
         status = table_fails(chunks, EBPO_A_SUBTREE_SHARED,
@@ -144,6 +145,9 @@ static void sum_row(const subtree_counts *c, uint64_t subtree, ebpo_subtree_row 
         add_row(c, i, out->before);
     memcpy(out->after, out->before, sizeof out->after);
     add_row(c, subtree, out->after);
+    /* The index of the subtree's first owned face. This row's EBPO_S_FACES_BEFORE counts the new
+     * faces between the previous subtree and this one. These faces precede the owned faces, so the
+     * sum includes this row's count. The same is true for vertices. */
     out->face = out->after[EBPO_S_FACES_BEFORE] + out->before[EBPO_S_FACES];
     out->vertex = out->after[EBPO_S_VERTICES_BEFORE] + out->before[EBPO_S_VERTICES];
 }
@@ -267,7 +271,8 @@ ebpo_status ebpo_subtree_table_row(ebpo_chunks *chunks, uint64_t subtree, ebpo_s
     return keep_row(chunks, out, error);
 }
 
-/* Finds the last chunk of rows with at most `item` items of the column before the chunk. */
+/* Finds the chunk of rows that contains item `item` of the column. This is the last chunk before
+ * which the sum of the column is at most `item`. */
 static ebpo_status find_chunk(ebpo_chunks *chunks, unsigned column, uint64_t item, uint64_t *out,
                               ebpo_error *error)
 {
@@ -349,8 +354,8 @@ bool ebpo_subtree_table_missing(ebpo_chunks *chunks, int level, ebpo_per per, ui
     return false;
 }
 
-/* Adds to the hints a chunk of the table, and the rows of /subtrees/shared_chunks (the lists of
- * shared chunks) for the subtrees in this chunk. */
+/* Adds to the hints a chunk of the table, and the rows of /subtrees/shared_chunks for the subtrees
+ * in this chunk. These rows list the chunks with the subtrees' shared faces and vertices. */
 static void hint_table_chunk(ebpo_chunks *chunks, ebpo_hints *hints, uint64_t chunk)
 {
     const ebpo_shape *shape = &ebpo_reader_array(chunks->file, EBPO_A_SUBTREE_COUNTS, 0)->shape;
@@ -526,10 +531,12 @@ static ebpo_status check_list(ebpo_chunks *chunks, int level, const ebpo_subtree
                : row_contradicts(chunks, error);
 }
 
-/* Checks column EBPO_S_ENDS, the increase of the end of the new faces in the level. The column must
- * be the sum, over the subtree's leaves of the level, of leaf_new (new faces of the leaf) and
- * leaf_skip (new faces of leaves of other levels before the leaf). Also checks that the new faces
- * of these leaves are owned faces of the subtree. */
+/* Checks column EBPO_S_ENDS of a row. The *end of the new faces* is one past the last new face of
+ * the leaves of the level so far. The column has the end after the subtree's leaves, minus the end
+ * before these leaves. The column must be the sum of leaf_new and leaf_skip over these leaves.
+ * leaf_new is the number of new faces of a leaf. leaf_skip is the number of new faces of other
+ * levels between the previous leaf of the level and the leaf. Also checks that the new faces of
+ * these leaves are owned faces of the subtree. */
 static ebpo_status check_ends(ebpo_chunks *chunks, int level, const ebpo_subtree_row *row,
                               ebpo_error *error)
 {
@@ -635,11 +642,11 @@ ebpo_status ebpo_ranks_planes(ebpo_chunks *chunks, int level, uint64_t gray, uin
     return status;
 }
 
-/* Reads the row of leaf_index, or of the table, that precedes a leaf. Sets row[0] to the end of the
- * new faces (one past the last), row[1] to the number of references, and row[2] to the number of
- * leaf planes, all for the leaves of the level before the row. With the table, sets *from to the
- * subtree's first leaf of the level. `faces`: checks the table's sums of faces; otherwise those of
- * planes. */
+/* Reads the row of leaf_index, or of the table, that precedes a leaf. For the leaves of the level
+ * before the row, sets row[0] to the end of the new faces (one past the last), row[1] to the number
+ * of references, and row[2] to the number of leaf planes. If the row is of the table, sets *from to
+ * the subtree's first leaf of the level. `faces`: checks the table's sums of faces; otherwise the
+ * table's sums of planes. */
 static ebpo_status leaf_row(ebpo_chunks *chunks, int level, uint64_t leaf, bool faces,
                             uint64_t row[3], uint64_t *from, ebpo_error *error)
 {
@@ -732,8 +739,8 @@ static uint64_t subtree_sum(const hinting *t, int level, unsigned what, bool aft
     return after ? t->last->after[column] : t->first->before[column];
 }
 
-/* For an array with one row for each `per`: returns the number of rows before the subtrees. If
- * `after` is true, the rows of the subtrees are included. */
+/* Returns the number of rows of an array before the subtrees. If `after` is true, the rows of the
+ * subtrees are included. `per`: the array has one row for each item of this kind. */
 static uint64_t rows_before(const hinting *t, ebpo_per per, int level, bool after)
 {
     const ebpo_info *info = &t->chunks->file->info;

@@ -4,8 +4,8 @@
  * all levels are u times integers of at most 53 bits. So every cell face is a double without
  * rounding, and neighbouring cells agree on it.
  *
- * An octcode is a leading 1 and three bits for each level (EBP 2017, section 3.2.3), the interleaved
- * bits of the cell's position. */
+ * An octcode is a leading 1 and three bits for each level (EBP 2017, section 3.2.3), the
+ * interleaved bits of the cell's position. */
 #include "core/strict_fp.h"
 
 #include <math.h>

@@ -225,8 +225,8 @@ static inline double ebpo_cell_face_point(const ebpo_box *box, ebpo_cell cell, i
 
 /* Octcodes: locational codes of octree nodes. 64 bits: a leading 1, then three bits for each level,
  * the most significant first; the root is 1. Numeric order is breadth-first order. Bit 0 of each
- * triple is x, bit 1 y, bit 2 z. Source: EBP 2017, section 3.2.3 (there with separate level bits and
- * at most 20 levels). */
+ * triple is x, bit 1 y, bit 2 z. Source: EBP 2017, section 3.2.3 (there with separate level bits
+ * and at most 20 levels). */
 
 typedef uint64_t ebpo_octcode;
 

@@ -1,10 +1,10 @@
 /* Chunks as HDF5 stores them. A pipeline is a row of the table below: its HDF5 filters, and the
  * functions that encode and decode. The row determines if the values are shuffled before
- * compression, if a fletcher32 checksum follows, which filters a new array gets, and by which
- * filters the pipeline of an array in a file is recognized. A new codec needs a number in chunk.h,
- * a row, and its functions in a separate file, such as zstd_codec.c. Deflate needs only two calls
- * of zlib, which are in this file. The output is bit for bit that of libhdf5's own filters. Source:
- * docs of HDF5 ("HDF5 filters"), format-spec/README.md, section 4. */
+ * compression, and if a fletcher32 checksum follows. A new array gets the filters of the row. The
+ * pipeline of an array in a file is recognized by these filters. A new codec needs a number in
+ * chunk.h, a row, and its functions in a separate file, such as zstd_codec.c. Deflate needs only
+ * two calls of zlib, which are in this file. The output is bit for bit that of libhdf5's own
+ * filters. Source: docs of HDF5 ("HDF5 filters"), format-spec/README.md, section 4. */
 #include <string.h>
 #include <zlib.h>
 
@@ -193,13 +193,13 @@ bool ebpo_pipeline_of_filters(const unsigned *filters, int count, unsigned eleme
 
 void ebpo_chunk_coder_clear(ebpo_chunk_coder *coder) { ebpo_zstd_coder_clear(coder); }
 
-/* Returns the blocks of a zstd frame for shuffled elements: one for each *byte plane*, which has
- * the k-th bytes of all elements. */
+/* Returns the blocks of a zstd frame for shuffled elements: one block for each *byte plane*. Byte
+ * plane k has the k-th bytes of all elements. The end of the last block is not stored. */
 static ebpo_chunk_blocks blocks_of_byte_planes(size_t raw_bytes, size_t element_size)
 {
     enum {
-        /* Minimum bytes of a byte plane for a separate block. A separate block has a separate table
-         * of codes, which takes some 100 bytes. */
+        /* Minimum bytes of a byte plane for a separate block. Each block has a table of codes of
+         * some 100 bytes. */
         BYTE_PLANE_LEAST = 1024
     };
     ebpo_chunk_blocks b = { .count = 0 };
@@ -209,8 +209,8 @@ static ebpo_chunk_blocks blocks_of_byte_planes(size_t raw_bytes, size_t element_
     return b;
 }
 
-/* Returns the blocks of a zstd frame for streams, which end at ends[count]: one for each stream
- * that is not empty. */
+/* Returns the blocks of a zstd frame for streams: one block for each stream that is not empty.
+ * Stream i ends at ends[i]. The end of the last block is not stored. */
 static ebpo_chunk_blocks blocks_of_streams(size_t raw_bytes, const size_t *ends, int count)
 {
     ebpo_chunk_blocks b = { .count = 0 };

@@ -267,8 +267,9 @@ static ebpo_status open_source(http_source *s, ebpo_error *error)
     bool versioned = *s->version.etag || *s->version.modified;
     if (status == EBPO_OK && s->head_bytes < s->version.size && !versioned && !o->unversioned)
         status = read_whole(s, error);
-    /* The folder is opened last, because the names of its blocks depend on the version. An unusable
-     * folder is reported even where it is not needed. */
+    /* The folder is opened last, because the names of its blocks depend on the file's version. A
+     * file without a version is not cached. The folder is opened for such a file too, so that an
+     * unusable folder is always reported. */
     s->cache.block = o->cache_block ? o->cache_block : EBPO_DISK_BLOCK;
     if (status == EBPO_OK && o->cache_folder)
         status = ebpo_disk_open(&s->cache.disk, o->cache_folder, o->cache_bytes, s->cache.block,

@@ -32,8 +32,9 @@ typedef struct dropping {
 
 static bool is_removed(const dropping *d, uint64_t f) { return d->gone[f / WORD] >> f % WORD & 1; }
 
-/* Starts at the face's lowest vertex, and returns true if the second vertex is lower than the
- * third. Repeated faces with different results have opposite orientations. */
+/* Starts at the vertex with the face's lowest index. Returns true if the index of the next vertex
+ * is lower than that of the last vertex. Repeated faces with different results have opposite
+ * orientations. */
 static bool runs_up(const uint32_t face[3])
 {
     int low = face[0] < face[1] ? (face[0] < face[2] ? 0 : 2) : (face[1] < face[2] ? 1 : 2);

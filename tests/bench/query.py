@@ -455,8 +455,7 @@ def write(options, bench, page, goals, short):
               f"processor time per query in us, the median of {options.rounds} rounds (half as many "
               "above two million faces). *batch*: one call for all points. Load average "
               f"{statistics.median(bench.load):.1f} (median), "
-              f"{max(bench.load):.1f} (maximum). Compare values within a row only. The results of "
-              "the thesis come from another machine.")
+              f"{max(bench.load):.1f} (maximum). Compare values within a row only.")
     text = "\n".join(head.lines + goals.lines + made.lines + page.lines).rstrip("\n") + "\n"
     pathlib.Path(options.output).write_text(reflow(text + handwritten(options.output)))
 

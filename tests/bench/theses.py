@@ -50,7 +50,8 @@ def build_and_size(page, runs):
     page.text("## Build and size (BP tables 3.3 and 3.9)", "",
               "*Build*: from the checked mesh, all cores here. *Of the PLY*: bytes of the index and all data "
               "needed for queries, divided by the bytes of the PLY with 12 B per vertex and 13 B per face. BP: "
-              "`.bpn` and `.bpl`, without the mesh. Ours: the whole file, mesh included.")
+              "`.bpn` and `.bpl`, without the mesh. BP prints 2.60 for the bunny; its kilobytes give 2.21. Ours: the whole "
+              "file, mesh included.")
     rows = []
     for name, thesis, step, as_bp in (("bunny", "bunny", "bunny", "bunny_bp"),
                                       ("dragon", "dragon", "dragon", "dragon_bp_1")):
@@ -78,31 +79,27 @@ def volumes(page, runs):
         for k, step in steps:
             published = theirs.BP_VOLUME[thesis] if k == "1" else theirs.BP_K_VOLUME[k]
             found = runs.result(step)
-            rows.append([f"BP, K = {k} %", *padded(percent(published), count)])
             if not found:
-                rows.append([f"BP here, K = {k} %", *padded(["not run"], count)])
                 continue
+            rows.append([f"BP, K = {k} %", *padded(percent(published), count)])
             method = found["methods"][0]
             rows.append([f"BP here, K = {k} %", *padded(percent(free_volume(found, method)), count)])
-            rows.append([f"in a file, K = {k} %", *padded(percent(file_volume(found, method)), count)])
+            if len(method["levels"]) > 3:
+                rows.append([f"in a file, K = {k} %", *padded(percent(file_volume(found, method)), count)])
         ours = runs.result(default)
         if ours:
             rows.append(["our default", *padded(percent(of_levels(ours)), count)])
         rows.append(["planes, BP, K = 1 %", *padded([f"{n:,}" for n in theirs.BP_PLANES[thesis]], count)])
-        for k, step in steps:
-            found = runs.result(step)
-            if found:
-                rows.append([f"planes, BP here, K = {k} %", *padded(
-                    [f"{n:,}" for n in all_planes(found["methods"][0]["unlimited"]["levels"])], count)])
+        found = next((r for k, step in steps if k == "1" and (r := runs.result(step))), None)
+        if found:
+            rows.append(["planes, BP here, K = 1 %", *padded(
+                [f"{n:,}" for n in all_planes(found["methods"][0]["unlimited"]["levels"])], count)])
         if ours:
             rows.append(["planes, our default", *padded([f"{l['planes']:,}" for l in ours["levels"]], count)])
         page.text(f"**{name}**")
         page.table(["", *(f"L{i}" for i in range(count))], rows)
-    page.text("Our default stores planes of gray nodes only; planes of leaves are derived from faces. K at the "
-              "root of the dragon: " + "; ".join(
-                  f"K = {k} %: BP {n:,} planes" + (
-                      f", here {runs.result(f'dragon_bp_{k}')['methods'][0]['unlimited']['levels'][0]['planes']:,}"
-                      if runs.result(f"dragon_bp_{k}") else ", not run") for k, n in theirs.BP_ROOT.items()) + ".")
+    page.text("Our default stores planes of gray nodes only; planes of leaves are derived from faces. BP's root has "
+              + ", ".join(f"{n:,} planes with K = {k} %" for k, n in theirs.BP_ROOT.items()) + " (table 3.5).")
 
 
 def leaves(page, runs):
@@ -120,8 +117,8 @@ def leaves(page, runs):
                           ("N distinct faces (`distinct`)", [l["leaf"] for l in found["distinct"]]),
                           ("BP, criterion 2", theirs.BP_LEAVES["mean"]),
                           ("criterion 2 here (`mean`)", [l["leaf"] for l in found["mean"]])):
-        rows.append([title, *padded([f"{n:,}" for n in counts], 8), f"{sum(counts):,}"])
-    page.table(["", *(f"L{i}" for i in range(8)), "sum"], rows)
+        rows.append([title, *padded([f"{n:,}" for n in counts], 8)[2:], f"{sum(counts):,}"])
+    page.table(["", *(f"L{i}" for i in range(2, 8)), "sum"], rows)
 
 
 def sending(page, runs):
@@ -217,8 +214,9 @@ def selections(page, runs):
         return
     page.text("## Three selections, 10 to 50 % (EBP tables 2 to 14)", "",
               f"EBP: Amazona of {theirs.EBP_FACES['Amazona']:,} faces. Here: Lucy of {found['faces']:,} faces, "
-              "`report --unlimited`; so compare the order of the rows, not their values. *Random* takes a run of "
-              "planes in the node's order. L0 to L4 of percent of the solid.")
+              "`report --unlimited --leaf-faces 0`: as in EBP, all leaves are on the deepest level. Compare the "
+              "order of the rows, not their values. *Random* takes a run of planes in the node's order. *s* is the "
+              "build of the file with at most 255 planes a node. Volumes in percent of the solid.")
     rows = []
     byname = {m["name"]: m for m in found["methods"]}
     for select in SELECTIONS:
@@ -227,14 +225,13 @@ def selections(page, runs):
             size = theirs.EBP_OTHER_BYTES + theirs.EBP_BPL[select][i] + theirs.EBP_BVP[select][i]
             free = free_volume(found, method)
             rows.append([f"{select} {p} %", figure(theirs.EBP_BUILD[select][i]), f"{size / GB:.1f}",
-                         *(f"{v[i]:.1f}" for v in theirs.EBP_VOLUME[select][:5]),
+                         *(f"{v[i]:.1f}" for v in theirs.EBP_VOLUME[select][:5:4]),
                          figure(method["build_seconds"]), f"{method['file_bytes'] / 1e6:.2f}",
-                         *(f"{v:.1f}" for v in free[:5])])
-    ours = byname["inherit"]
-    rows.append(["our default", *["-"] * 7, figure(ours["build_seconds"]), f"{ours['file_bytes'] / 1e6:.2f}",
-                 *(f"{v:.1f}" for v in file_volume(found, ours)[:5])])
-    page.table(["", "EBP: s", "GB", "L0", "L1", "L2", "L3", "L4", "here: s", "MB", "L0", "L1", "L2", "L3", "L4"],
-               rows)
+                         *(f"{v:.1f}" for v in free[:5:4])])
+    ours = found["ours"]
+    rows.append(["our default", *["-"] * 4, figure(ours["build"]), f"{ours['bytes'] / 1e6:.2f}",
+                 *(f"{v:.1f}" for v in of_levels(ours)[:5:4])])
+    page.table(["", "EBP: s", "GB", "L0", "L4", "here: s", "MB", "L0", "L4"], rows)
     beats = [sum(a < b for a, b in zip(free_volume(found, byname[f"random-{p}%"])[:8],
                                        free_volume(found, byname[f"offset-{p}%"])[:8])) for p in PERCENTS]
     page.text("Random has less volume than offset in " + ", ".join(
@@ -242,12 +239,23 @@ def selections(page, runs):
         + ". In EBP it is 8 of 8 at 40 %.")
     other = runs.result("lucy16_methods_40")
     if other:
-        page.text(f"With {other['faces']:,} faces and 40 %, L0 to L6:")
+        page.text(f"With {other['faces']:,} faces and 40 %:")
         page.table(["", *(f"L{i}" for i in range(7)), "planes at the root", "build, s"],
-                   [[m["name"] + (" without limits" if "unlimited" in m else ""),
-                     *padded(percent((free_volume(other, m) if "unlimited" in m else file_volume(other, m))), 7),
-                     m["unlimited"]["levels"][0]["planes"] if "unlimited" in m else m["levels"][0]["planes"],
-                     figure(m["build_seconds"])] for m in other["methods"]])
+                   [[m["name"], *padded(percent(free_volume(other, m)), 7), m["unlimited"]["levels"][0]["planes"],
+                     figure(m["unlimited"]["seconds"])] for m in other["methods"]]
+                   + [["our default", *padded(percent(of_levels(other["ours"])), 7),
+                       other["ours"]["levels"][0]["planes"], figure(other["ours"]["build"])]])
+
+
+def slower_cells(runs):
+    """The levels of EBP's tables, all of them, at which ours takes longer."""
+    out = []
+    for points, column in (("uniform", 0), ("path", 1)):
+        found = runs.result(f"levels_{points}")
+        for query, table in (("inside", theirs.EBP_INSIDE_LEVELS), ("distance", theirs.EBP_DISTANCE_LEVELS)):
+            out += [f"{query} {points} L{i}" for i, row in enumerate(table)
+                    if found and i < len(found[query]) and row[column] and found[query][i] / 1000 > row[column]]
+    return out
 
 
 def queries(page, runs):
@@ -258,7 +266,7 @@ def queries(page, runs):
     mean = lambda step, mode: step[mode]["ns"]["mean"] / 1000 if step else None
     page.text("## Points out of core (EBP tables 21 to 28)", "",
               f"EBP: Lucy, 10^6 points, levels 1 to 5 in memory. Ours: {runs.result('large')['faces']:,} faces, the "
-              "same levels in memory (L0 to L4, `--cut-level 4`), 16 MiB, 100,000 uniform points and 100,000 of a path, "
+              "same levels in memory (L0 to L4, `--cut-level 4`), 32 MiB, 100,000 uniform points and 100,000 of a path, "
               "single calls, wall-clock us, loading included. EBP does not state if files were cached; "
               "here they are in the page cache after the first query.")
     rows = [[f"`{mode}`", figure(mean(few, mode) if few else None), figure(mean(path, mode)),
@@ -274,26 +282,25 @@ def queries(page, runs):
     page.text("To a level, at equal depth: EBP's level k is our level k - 1 (its algorithm 7 starts with the root as "
               "level 1). Point in solid with cache, and distance to the envelope:")
     rows = []
-    for i in range(min(len(deep_path["inside"]), 11)):
+    for i in (0, 2, 4, 5, 7, 10):
         rows.append([f"L{i}", *(figure(d["inside"][i] / 1000 if d else None) for d in (deep, deep_path)),
                      *(figure(t) for t in theirs.EBP_INSIDE_LEVELS[i]),
                      *(figure(d["distance"][i] / 1000 if d else None) for d in (deep, deep_path)),
                      *(figure(t) for t in theirs.EBP_DISTANCE_LEVELS[i])])
     page.table(["", "inside: uniform", "path", "EBP", "EBP, path", "distance: uniform", "path", "EBP", "EBP, path"],
                rows)
+    slow = slower_cells(runs)
+    page.text("Slower than EBP: " + (", ".join(slow) or "none") + ".")
     page.text("EBP prints 0 us for Lucy, random, third level (table 27), and the mean of table 28 contains it; we "
               "omit it. Its text says that the recursive method takes less time than the leaves. That is true of "
               "the means only: it is slower for two of three models.")
 
 
-def collisions(page, out):
+def collisions(page):
     page.text("## Collision (EBP tables 29 to 33)", "",
-              "Ours: rows of [collide.md](collide.md), which has the command; processor time, one thread.")
-    text = (out.parent / "collide.md").read_text(encoding="utf-8").split("## One model through another")[-1]
-    rows = [[c.strip() for c in line.strip("|\n").split("|")] for line in text.split("\n")
-            if " through " in line and line.startswith("|")]
-    page.table(["ours", "budget", "first contact, us: mean, worst", "pairs a step", "us a pair"],
-               [[r[0], r[1], r[2], r[3], r[5]] for r in rows])
+              "Ours, from [collide.md](collide.md), which has the command, for a Lucy of 25.6 million faces through itself: "
+              "44,646 pairs a step; 0.44 us a pair in memory and 33.4 us with 256 MiB; a first contact takes 19.3 us in "
+              "memory (mean) and 130 us at most.")
     page.table(["EBP: scenario", "pairs a step", "us a pair", "optimised"],
                [[name, f"{pairs:,.0f}", a, b] for name, pairs, a, b in theirs.EBP_PAIRS])
     page.table(["EBP: first contact", "us", "PQP in EBP, us"], [[n, t, q] for n, t, q in theirs.EBP_FIRST])
@@ -313,14 +320,15 @@ def summary(runs):
     bunny, dragon, large = (runs.result(s) for s in ("bunny", "dragon", "large"))
     copy, memory, path = (runs.result(s) for s in ("bunny_bp", "memory", "modes_path"))
     sent, lucy = runs.result("bunny_sent"), theirs.EBP_LUCY
-    lines = []
+    lines, slow = [], slower_cells(runs)
     if dragon:
         volume, known = of_levels(dragon), theirs.BP_VOLUME["dragon"]
         worse = [f"L{i}" for i, (a, b) in enumerate(zip(volume, known)) if a > b]
         better = [f"L{i}" for i, (a, b) in enumerate(zip(volume, known)) if a < b]
         lines.append(f"- *Not better*: the stored levels of the dragon have more volume than BP's at {', '.join(worse)} "
                      "(ours store no planes of leaves there). A Lucy under 256 MiB collides 50 to 80 times more slowly than "
-                     "in memory. Our deterministic files hold at most 255 planes a node; BP's root has 2,955.")
+                     "in memory. Files hold at most 255 planes a node; BP's root has 2,955."
+                     + (f" {len(slow)} of 42 cells of EBP's tables by level are slower here." if slow else ""))
         lines.append(f"- *Volume*: at {better[0]} to {better[-1]} the dragon's envelopes have less volume than BP's, with "
                      f"{theirs.BP_PLANES['dragon'][0] / dragon['levels'][0]['planes']:.0f} to "
                      f"{theirs.BP_PLANES['dragon'][4] / dragon['levels'][4]['planes']:.0f} times fewer planes (L0, L4).")
@@ -360,8 +368,8 @@ def not_run(page, runs):
               f"The script needs 3 GB of disk and 8 GB of memory. The {len(STEPS) - len(missing)} steps on this page took "
               f"{seconds / 3600:.1f} hours on the busy machine; the others need several hours, mainly the builds of 25.6 "
               "million faces and the dragon with K = 5 %. " + (
-                  "Not run: " + "; ".join(f"`{n}` ({STEPS[n][0]})" for n in missing) + "." if missing else
-                  "All steps were run."))
+                  "Run `theses.py` again for these steps (`--list` describes them): "
+                  + ", ".join(f"`{n}`" for n in missing) + "." if missing else "All steps were run."))
 
 
 def plots(runs, folder):
@@ -388,9 +396,19 @@ def plots(runs, folder):
                     if (r := runs.result(f"large_{s}_{p}"))]
             if here:
                 lines.append((f"{s} here", here))
-        lines.append(("our default", [(big["build"], big["levels"][4]["percent_of_solid"] - 100)]))
-        made.append(plot(folder / "theses-time.svg", "26 to 28 million faces: error of level 4 against build time",
+        lines.append(("EBP, Lucy, kmedoids, 30 and 40 %", theirs.EBP_LUCY_TIMES))
+        lines.append(("our default, Lucy", [(big["build"], big["levels"][4]["percent_of_solid"] - 100)]))
+        made.append(plot(folder / "theses-time.svg", "Amazona and Lucy, 26 to 28 million faces: error of L4 against time",
                          "build, s", "excess volume, %", lines))
+    small = runs.result("lucy_methods")
+    if small:
+        lines = [(f"{s}, 10 to 50 %", [(m["unlimited"]["seconds"], free_volume(small, m)[4] - 100)
+                                       for p in PERCENTS for m in small["methods"] if m["name"] == f"{s}-{p}%"])
+                 for s in SELECTIONS]
+        lines.append(("our default", [(small["ours"]["build"], of_levels(small["ours"])[4] - 100)]))
+        made.append(plot(folder / "theses-time-here.svg",
+                         f"Lucy, {small['faces']:,} faces, one machine: error of L4 against build time", "build, s",
+                         "excess volume, %", lines))
     if big and memory:
         made.append(plot(folder / "theses-memory.svg", "Lucy, 26 to 28 million faces: error against memory",
                          "memory of the levels, MB", "excess volume, %", [
@@ -408,7 +426,7 @@ def write(runs, out, pictures):
     page.text("## Settings", "",
               f"Made by `tests/bench/theses.py BUILD_DIR MODELS_DIR WORK_DIR -o docs/measured/theses.md` on "
               f"{measured.machine()}. Machines of the theses: {'; '.join(theirs.MACHINES)}. Times of different "
-              "machines: only orders of magnitude and shapes are comparable. The machine was shared, with a load "
+              "machines are comparable in orders of magnitude only. Ours was busy, with a load "
               f"of {max((runs.result(s) or {'load': 0})['load'] for s in STEPS):.0f} at most. The bunny has "
               "69,666 faces (BP: 71,040); the dragon is BP's, 871,414 faces, with equal positions merged "
               "(`--weld`) so that it bounds a solid.")
@@ -417,7 +435,7 @@ def write(runs, out, pictures):
         page.text("\n".join(f"![{title}](../pictures/{name})" for name, title in made))
     for section in (build_and_size, volumes, leaves, sending, points_bp, large_build, selections, queries):
         section(page, runs)
-    collisions(page, pathlib.Path(out))
+    collisions(page)
     not_run(page, runs)
     pathlib.Path(out).write_text(reflow("\n".join(page.lines)).rstrip("\n") + "\n" + tail)
 

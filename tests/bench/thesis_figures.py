@@ -72,6 +72,8 @@ EBP_LUCY = {"ply": 533_061_632, "collisions": 4_701_104_870, "rendering": 13_319
                    3877.1204, 11955.4609),
             "volume": (466.70, 231.79, 169.64, 127.32, 115.50, 107.67, 102.69, 100.84, 100.28, 100.10,
                        100.04)}
+# Lucy, k-medoids, 30 and 40 %: seconds, and excess volume of the fifth level.
+EBP_LUCY_TIMES = [(3050.69, 24.67), (3524.47, 15.50)]
 # EBP tables 21 and 22, Lucy: us for a test of a random point, and of a point of a path.
 EBP_MODES = {"cache": (1986.73, 290.82), "nodes": (1291.53, 436.85), "subtree": (1355.21, 373.84),
              "cache-plain": (2396.08, 320.14), "nodes-plain": (1791.04, 364.22),

@@ -2,7 +2,7 @@
 import html
 import math
 
-WIDTH, HEIGHT, LEFT, TOP, RIGHT, BOTTOM = 680, 420, 62, 36, 16, 46
+WIDTH, HEIGHT, LEFT, TOP, RIGHT, BOTTOM = 680, 400, 62, 36, 30, 46
 COLOURS = ("#b3452c", "#d8923b", "#7c6a9c", "#5a8f5a", "#8a8a8a", "#4c78a8", "#1b4f8f")
 
 
@@ -20,13 +20,14 @@ def plot(path, title, x_title, y_title, lines):
     lines = [(name, [(x, y) for x, y in points if x > 0 and y > 0]) for name, points in lines]
     x_low, x_high = decades([x for _, points in lines for x, _ in points])
     y_low, y_high = decades([y for _, points in lines for _, y in points])
+    tall = HEIGHT + 17 * ((len(lines) + 1) // 2) + 6
     width, height = WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM
 
     def at(x, y):
         return (LEFT + width * (math.log10(x) - x_low) / (x_high - x_low),
                 TOP + height * (y_high - math.log10(y)) / (y_high - y_low))
-    out = [f"<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 {WIDTH} {HEIGHT}' font-family='sans-serif' "
-           f"font-size='12'><rect width='{WIDTH}' height='{HEIGHT}' fill='white'/>"
+    out = [f"<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 {WIDTH} {tall}' font-family='sans-serif' "
+           f"font-size='12'><rect width='{WIDTH}' height='{tall}' fill='white'/>"
            f"<text x='{LEFT}' y='20' font-size='14'>{html.escape(title)}</text>"]
     for power in range(x_low, x_high + 1):
         x, _ = at(10**power, 10**y_low)
@@ -44,9 +45,8 @@ def plot(path, title, x_title, y_title, lines):
         out.append(f"<polyline fill='none' stroke='{colour}' stroke-width='2' points='"
                    + " ".join(f"{x:.1f},{y:.1f}" for x, y in spots) + "'/>")
         out += [f"<circle cx='{x:.1f}' cy='{y:.1f}' r='3.5' fill='{colour}'/>" for x, y in spots]
-        y = TOP + 14 + 17 * i
-        out.append(f"<rect x='{WIDTH - RIGHT - 262}' y='{y - 9}' width='254' height='15' fill='white' opacity='0.8'/>"
-                   f"<circle cx='{WIDTH - RIGHT - 254}' cy='{y - 4}' r='4' fill='{colour}'/>"
-                   f"<text x='{WIDTH - RIGHT - 244}' y='{y}'>{html.escape(name)}</text>")
+        x, y = LEFT + 310 * (i % 2), HEIGHT + 8 + 17 * (i // 2)
+        out.append(f"<circle cx='{x}' cy='{y - 4}' r='4' fill='{colour}'/>"
+                   f"<text x='{x + 10}' y='{y}'>{html.escape(name)}</text>")
     path.write_text("\n".join(out) + "</svg>\n")
     return path.name, title

@@ -7,10 +7,12 @@ import time
 import measured
 
 PERCENTS = (10, 20, 30, 40, 50)
+# EBP has no criterion for leaves: all are on the deepest level.
+EBP = ("--unlimited", "--leaf-faces", 0, "--points", 1)
 # EBP counts the root as level 1 and keeps levels 1 to 5: our levels 0 to 4.
 CUT = 4
 MODES = ("cache", "nodes", "subtree", "cache-plain", "nodes-plain", "subtree-plain")
-MEMORY = 16 << 20
+MEMORY = 32 << 20
 POINTS, FEW_POINTS = 100_000, 1_000
 
 
@@ -111,12 +113,13 @@ def repaired(runs):
     return small("dragon_solid")(runs)
 
 
-def as_bp(name, k_root):
-    """BP-Octree: k-medoids, K of the faces, leaves by criterion 1 with N = 50, nine levels."""
+def as_bp(name, k_root, measured_levels="0-"):
+    """BP-Octree: k-medoids, K of the faces, leaves by criterion 1 with N = 50, nine levels. Levels
+    without limits are all computed; `measured_levels` are those of the file."""
     def step(runs):
         return runs.report(runs.model(name), "--select", "kmedoids", "--k-root", k_root,
                            "--unlimited", "--coalesce", "sum", "--leaf-faces", 50, "--max-level",
-                           9, "--points", 1)
+                           9, "--points", 1, "--levels", measured_levels)
     return step
 
 
@@ -139,14 +142,16 @@ def leaves(name):
     return step
 
 
-def methods(name, percents, *options):
-    """The three selections of EBP, with limits and without, and our default."""
+def methods(name, percents):
+    """The three selections of EBP without limits, with leaves on the deepest level only; and our
+    default."""
     def step(runs):
-        out = runs.report(runs.model(name), "--select", "inherit,kmedoids,offset", "--percent",
-                          ",".join(map(str, percents)), "--unlimited", "--points", 1, *options)
+        out = runs.report(runs.model(name), "--select", "kmedoids,offset", "--percent",
+                          ",".join(map(str, percents)), *EBP, "--levels", "0-1")
         more = runs.report(runs.model(name), "--select", "random", "--percent",
-                           ",".join(map(str, percents)), "--unlimited", "--points", 1, *options)
+                           ",".join(map(str, percents)), *EBP, "--levels", "0-1")
         out["methods"] += more["methods"]
+        out["ours"] = runs.convert(name, runs.model(name))
         return out
     return step
 
@@ -170,7 +175,7 @@ def large_selection(select, percent):
     def step(runs):
         name = f"lucy_x256_{select}_{percent}"
         out = runs.convert(name, runs.model("lucy_x256"), "--memory", "1GiB", "--select", select,
-                           "--percent", percent, "--profile", "full")
+                           "--percent", percent, "--leaf-faces", 0, "--profile", "full")
         os.remove(runs.file(name))
         return out
     return step
@@ -221,7 +226,7 @@ STEPS = {
     "bunny_sent": ("BP table 4.4", sent("bunny_closed")),
     "bunny_leaves": ("BP table 3.1", leaves("bunny_closed")),
     "dragon": ("our default on the dragon", repaired),
-    "dragon_bp_0.1": ("BP tables 3.5, 3.6, K = 0.1 %", as_bp("dragon_solid", "0.1%")),
+    "dragon_bp_0.1": ("BP tables 3.5, 3.6, K = 0.1 %", as_bp("dragon_solid", "0.1%", "0-2")),
     "lucy_methods": ("EBP tables 2 to 14 on 99,970 faces", methods("lucy100k", PERCENTS)),
     "grow16": ("a mesh of 1.6 million faces", grown("lucy_x16", 2)),
     "grow256": ("a mesh of 25.6 million faces", grown("lucy_x256", 4)),
@@ -232,14 +237,14 @@ STEPS = {
     "modes_uniform": ("EBP tables 21, 25, 27, 28", modes("uniform")),
     "levels_uniform": ("EBP tables 23, 26, 28", levels("uniform")),
     "large_kmedoids_40": ("EBP tables 4, 10, 14 to 20", large_selection("kmedoids", 40)),
-    "dragon_bp_1": ("BP tables 3.3, 3.5, 3.9, 4.1, 4.3", as_bp("dragon_solid", "1%")),
+    "dragon_bp_1": ("BP tables 3.3, 3.5, 3.9, 4.1, 4.3", as_bp("dragon_solid", "1%", "0-2")),
     "lucy16_methods_40": ("EBP tables 12 to 14, 40 %, 1.6 million faces",
-                          methods("lucy_x16", (40,), "--levels", "0-6")),
+                          methods("lucy_x16", (40,))),
     "dragon_sent": ("BP table 4.11", sent("dragon_solid")),
     "large_offset_40": ("EBP tables 2, 8, 12", large_selection("offset", 40)),
     "large_random_40": ("EBP tables 3, 9, 13", large_selection("random", 40)),
 } | {f"large_{select}_{percent}": (f"EBP tables 2 to 14, {percent} %",
                                    large_selection(select, percent))
      for percent in (10, 20, 30, 50) for select in ("kmedoids", "offset", "random")} | {
-    f"dragon_bp_{k}": (f"BP tables 3.5 and 3.6, K = {k} %", as_bp("dragon_solid", f"{k}%"))
+    f"dragon_bp_{k}": (f"BP tables 3.5 and 3.6, K = {k} %", as_bp("dragon_solid", f"{k}%", "0-2"))
     for k in ("0.01", "0.05", "0.5", "5")}

@@ -158,7 +158,7 @@ static const struct {
     { "\"box_min\": [0,", "\"box_min\": [9,", EBPO_E_FORMAT, "box_min is above box_max" },
     { "\"box_min\": [0,", "\"box_min\": [0.25,", EBPO_E_FORMAT, "not within the box" },
     { "\"pruned\": false", "\"numbers\": \"none.npy\"", EBPO_E_FORMAT, "none.npy" },
-    { "\"pruned\": false", "\"numbers\": \"few.npy\"", EBPO_E_FORMAT, "3 numbers of 300 faces" },
+    { "\"pruned\": false", "\"numbers\": \"few.npy\"", EBPO_E_FORMAT, "3 indices for 300 faces" },
     { "\"pruned\": false", "\"numbers\": \"low.npy\"", EBPO_E_FORMAT, "negative" },
     { "\"pruned\": false", "\"surface\": \"x\"", EBPO_E_FORMAT, "surface_sha256 is not a digest" },
     { "\"pruned\": false", "\"surface\": null", EBPO_E_ABSENT, "caps only" },

@@ -323,7 +323,7 @@ START_TEST(test_paint_points_are_checked_against_model)
     s.points = &far;
     ck_assert(ebpo_paint_add_stroke(o.paint, &s, NULL) == EBPO_OK);
     ck_assert(ebpo_paint_check_points(o.paint, o.context, NULL, &error) == EBPO_E_FORMAT);
-    ck_assert(strstr(error.message, "stroke 12 of the paint is not on face") != NULL);
+    ck_assert(strstr(error.message, "stroke 12 of the paint is not on its face") != NULL);
     ck_assert(ebpo_paint_remove_stroke(o.paint, 12, NULL) == EBPO_OK);
     n.at = q;
     n.at.face = 1 << 20; /* a face that does not exist */

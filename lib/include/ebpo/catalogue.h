@@ -16,9 +16,10 @@
  * A *catalogue* is a list of models with boxes and digests. *Parts* are files of one model that was
  * cut; *caps* are faces that close a part where it was cut. A query opens only the models whose
  * boxes can contribute to the result. An opened model must have the digest of its entry and must be
- * within the entry's box. If the entry names a file of face indices (`numbers`), this file must
- * have one index for each face of the model that distances and rays use. Otherwise the query
- * returns EBPO_E_FORMAT. Results are those of the models (query.h) and do not depend on the budget.
+ * within the entry's box. Distances and rays use the entry's model at `surface`, or at `path` if
+ * `surface` is NULL. If the entry names a file of face indices (`numbers`), this file must have one
+ * index for each face of that model. If one of these conditions is not met, the query returns
+ * EBPO_E_FORMAT. Results are those of the models (query.h) and do not depend on the budget.
  * docs/guide/clusters.md describes the file format and the results of parts.
  */
 #ifndef EBPO_CATALOGUE_H
@@ -50,8 +51,9 @@ typedef struct ebpo_catalogue_entry {
     const char *surface;
 
     /*
-     * For a part: path of an .npy file with the index of each face of the surface in the whole
-     * model. Not an empty string. NULL: faces keep their indices.
+     * For a part: path of an .npy file of face indices. For each face of the model that is used for
+     * distances and rays, the file has the face's index in the whole model. Not an empty string.
+     * NULL: faces keep their indices.
      */
     const char *numbers;
 
@@ -80,14 +82,14 @@ typedef struct ebpo_catalogue_entry {
 
 /*
  * Opens a file for a query, by a path or URL that the catalogue contains. If this function fails,
- * the query returns its error. Called from any thread, including threads of the library.
+ * the query returns the function's error. Called from any thread, including threads of the library.
  */
 typedef ebpo_status (*ebpo_catalogue_open_fn)(void *user, const char *path, ebpo_file **out,
                                               ebpo_error *error);
 
 /*
  * Closes the file, in any thread. This function must not call functions of the same
- * ebpo_catalogue_models, because its lock is held.
+ * ebpo_catalogue_models, because the lock of that object is held.
  */
 typedef void (*ebpo_catalogue_close_fn)(void *user, ebpo_file *file);
 
@@ -121,7 +123,7 @@ typedef struct ebpo_catalogue_options {
  * Relative paths are based on the file's folder. Unknown members are ignored.
  *
  * EBPO_E_FORMAT: not a catalogue; the message gives the location. EBPO_E_VERSION: another version.
- * EBPO_E_LIMIT: more than 1 GiB. EBPO_E_IO.
+ * EBPO_E_LIMIT: the file has more than 1 GiB. EBPO_E_IO.
  *
  * Threads: any.
  */
@@ -151,7 +153,8 @@ EBPO_API void ebpo_catalogue_entry_of(const ebpo_file *file, const char *path,
                                       ebpo_catalogue_entry *out);
 
 /*
- * Frees a catalogue; only after all its queries. Models that queries opened stay open.
+ * Frees a catalogue. Call this function only after all queries of the catalogue have returned.
+ * Models that queries opened stay open.
  *
  * Threads: one per catalogue.
  */
@@ -199,8 +202,8 @@ EBPO_API ebpo_status ebpo_catalogue_get_facts(const ebpo_catalogue *catalogue,
                                               ebpo_catalogue_facts *out);
 
 /*
- * Returns entry `number`, with paths as they are opened. Lent until the catalogue is freed. NULL:
- * `number` is out of range.
+ * Returns entry `number`. Relative paths in the entry are already joined with their base folder.
+ * Lent until the catalogue is freed. NULL: `number` is out of range.
  *
  * Threads: any.
  */
@@ -264,7 +267,7 @@ EBPO_API void ebpo_catalogue_models_close_idle(ebpo_catalogue_models *models);
 typedef struct ebpo_catalogue_models_stats {
     size_t struct_size;
 
-    /* Number of models opened and closed since the beginning, and of models open now. */
+    /* Numbers of models: opened since the object was made, closed since then, and open now. */
     uint64_t opened, closed, open;
 } ebpo_catalogue_models_stats;
 
@@ -348,11 +351,11 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_catalogue_inside(
 
 /*
  * Finds the nearest face of any model within max_distance, for points[count][3]. If several models
- * have the same rounded distance, the first of them is used. If all models are solids, distances of
- * points inside (ebpo_catalogue_inside) are negative. `lo` and `hi` are both the unsigned distance,
- * or 0 if no face is found.
+ * have the same rounded distance, the first of these models is used. If all models are solids,
+ * distances of points inside (ebpo_catalogue_inside) are negative. `lo` and `hi` are both the
+ * unsigned distance, or 0 if no face is found.
  *
- * model   [count] index of the entry; EBPO_CATALOGUE_NO_MODEL: no such face
+ * model   [count] index of the entry; EBPO_CATALOGUE_NO_MODEL: no face is found
  *
  * EBPO_E_ABSENT: all entries are unseen.
  *
@@ -364,10 +367,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_catalogue_distance(
     uint64_t *model, ebpo_error *error);
 
 /*
- * Finds the first face of any model hit by each of rays[count]. If several models have the same
- * rounded t, the first of them is used. Exception: several models have hits whose t exceeds the
- * range of double (INFINITY with a face). These hits are compared along a direction that is longer
- * by a power of two (see ebpo_ray_hit).
+ * For each of rays[count], finds the first face of any model that the ray hits. If several models
+ * have the same rounded t, the first of these models is used. Exception: several models have hits
+ * whose t exceeds the range of double (INFINITY with a face). These hits are compared along a
+ * direction that is longer by a power of two (see ebpo_ray_hit).
  *
  * model   as for ebpo_catalogue_distance
  *

@@ -45,7 +45,7 @@ typedef struct ebpo_lod_options {
  * The level's nodes, their polygons and `out` are in memory that `workspace` does not limit. Memory
  * and time depend on the level; `progress` can stop the call.
  *
- * EBPO_E_LIMIT: more than 2^32 - 2 vertices or triangles. The errors of reading.
+ * EBPO_E_LIMIT: more than 2^32 - 2 vertices or triangles. Also the errors of reading the file.
  *
  * Threads: any.
  */
@@ -83,8 +83,8 @@ typedef struct ebpo_lod_node {
 } ebpo_lod_node;
 
 /*
- * Nodes of the triangles of ebpo_lod_level, level by level, in the order of their octcodes. The
- * mesh has the nodes' vertices and triangles in the same order.
+ * The nodes whose envelopes ebpo_lod_level computes, level by level, in the order of their
+ * octcodes. The mesh has the nodes' vertices and triangles in the same order.
  *
  * A polygon of n corners is a fan of n - 2 triangles around its first corner. The polygon's corners
  * are corners 0 and 1 of the first triangle, then corner 2 of each triangle.
@@ -107,8 +107,9 @@ typedef struct ebpo_lod_nodes {
 EBPO_API void ebpo_lod_nodes_free(ebpo_lod_nodes *nodes);
 
 /*
- * Computes the envelopes as ebpo_lod_level does, and their nodes, which ebpo_lod_nodes_free frees.
- * `nodes` may be NULL, and must be NULL if `out` is NULL.
+ * Computes the envelopes as ebpo_lod_level does, and describes their nodes in `nodes`.
+ *
+ * nodes   freed by ebpo_lod_nodes_free. May be NULL, and must be NULL if `out` is NULL
  *
  * Threads: any.
  */
@@ -134,10 +135,11 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_colours(const ebpo_lod_nodes *nodes,
 
 /*
  * Computes normals for shading a level's polygons. A polygon on a plane of the envelope gets its
- * own normal. A polygon on a cell face is only a step between two envelopes; it gets the
- * area-weighted mean normal of the surrounding planes that face the same side, or its own normal if
- * there are no such planes. Cell faces of the root cell count as planes. For images only: the
- * normals are rounded and guarantee nothing about the solid.
+ * own normal. A polygon on a cell face is only a step between two envelopes. Such a polygon gets a
+ * mean normal, weighted by area. The mean is taken over nearby polygons that are on planes and face
+ * roughly the same way as the cell face. If there are none, the polygon gets its own normal. Cell
+ * faces of the root cell count as planes. For images only: the normals are rounded and guarantee
+ * nothing about the solid.
  *
  * info  of the level's file
  * mesh  returned with the nodes

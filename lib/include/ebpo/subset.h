@@ -10,7 +10,7 @@
  *
  * The tree is cut at gray nodes, which are then *pruned*: they have envelopes and no children
  * (format-spec/README.md, section 7). Results from such a file are never wrong. Where data is
- * missing, queries with a level return EBPO_MAYBE or a wider interval, and exact queries
+ * missing, queries with a level return EBPO_MAYBE or a wider interval. Exact queries return
  * EBPO_E_ABSENT.
  */
 #ifndef EBPO_SUBSET_H
@@ -31,8 +31,8 @@ typedef enum ebpo_profile {
     EBPO_PROFILE_LOD = 1,
 
     /*
-     * Parts for exact queries: nodes, envelopes, mesh. Without maps. Without stored leaf planes,
-     * because leaf planes can be derived.
+     * Parts for exact queries: nodes, envelopes, mesh. Maps and stored leaf planes are omitted.
+     * Leaf planes can be derived from the mesh.
      */
     EBPO_PROFILE_COLLISION = 2
 } ebpo_profile;
@@ -84,8 +84,8 @@ typedef struct ebpo_subset_options {
 
     /*
      * Maximum size of the new file in bytes. The least max_error (to 1 %) for which the file fits
-     * is found and used; if everything fits, no max_error is used. 0: no target. Not together with
-     * max_error.
+     * is found and used. If everything fits, no max_error is used. 0: no target. target_bytes and
+     * max_error cannot be set together.
      */
     uint64_t target_bytes;
 
@@ -133,7 +133,7 @@ EBPO_API uint64_t ebpo_subset_memory(uint64_t face_count, uint32_t leaf_faces);
  * root cell or the box of an earlier subset; or target_bytes is too small, and the message gives
  * the minimum. EBPO_E_ABSENT: max_error or target_bytes is set, and the file has no mesh or is a
  * subset. EBPO_E_IO: also if `path` is that of `file`, and another program has replaced the file
- * since opening. Also the errors of reading.
+ * since opening. Also the errors of reading the file.
  *
  * Threads: any.
  */
