@@ -126,9 +126,9 @@ static void row(const degenerate_case *c, FILE *out, totals *sum)
         return;
     }
     degenerate_case tame = tame_like(faces);
-    fprintf(out, " %s", r.fault[0] ? "**not stable**" : c->surface ? "surface" : "solid");
+    fputs(r.fault[0] ? " **not stable**" : c->surface ? " surface" : "", out);
     if (r.has_volume && r.volume_error != 0)
-        fprintf(out, "; volume error %.1g", r.volume_error);
+        fprintf(out, " volume error %.1g", r.volume_error);
     fputs(" |", out);
     put(out, " %.3g |", r.has_volume ? 100 * r.excess : NAN);
     put(out, " %.2g |", build_ratio(c, &tame));
@@ -155,6 +155,7 @@ static const char introduction[] =
     "rational arithmetic\n"
     "(`tests/support/oracle.h`).\n"
     "\n"
+    "- *outcome*: a solid, unless the column says otherwise.\n"
     "- *volume error*: relative error of `ebpo measure` where the exact volume is a normal "
     "double and the error is not 0;\n"
     "  at most 1e-15 unless the case allows more.\n"
