@@ -119,8 +119,7 @@ Made by `tests/bench/attributes.py EBPO {names} > docs/measured/attributes.md`; 
 the machine. `tests/cli/same_ply.py`, a separate PLY reader, compares each source with the mesh of four copies: the
 whole file, a subset, the file by `ebpo fetch`, and the subset by `ebpo fetch`. The subset is one of the eight parts
 of the box. Every vertex and face of the subset must be in the source, with its values and in the same order. Models
-whose subset is empty: {empty}. Polygons and strips become triangles with the corners and values of their
-source.
+whose subset is empty: {empty}.
 """
 MORE = """
 *PLY*: bytes of the source. *file without*, *with*: bytes of the file without and with attributes.
@@ -130,7 +129,7 @@ description, source header and colours of envelopes.
 
 
 def write(names, rows):
-    """Prints the page: the result, models without attributes as a list, the others as a table."""
+    """Prints the page: the result, and a table of the models with attributes."""
     shares = [float(r[9]) for r in rows if r[7] and r[2] > 1000]
     equal = sum("**differs**" not in r for r in rows)
     print(reflow(HEAD.format(equal=equal, count=len(rows), low=min(shares), high=max(shares), names=names,
@@ -138,7 +137,6 @@ def write(names, rows):
     for r in rows:
         if "**differs**" in r:
             print(f"- differs: {r[0]}, {dict(zip(('whole', 'subset', 'fetch', 'fetch, box'), r[10:]))}")
-    print(reflow("Models without attributes: " + ", ".join(r[0] for r in rows if not r[7]) + "."))
     print(reflow(MORE))
     cells = ("model", "vertices", "faces", "attributes", "PLY", "file without", "with", "raw", "more", "more / raw")
     print("| " + " | ".join(cells) + " |\n" + "|---" * len(cells) + "|")

@@ -122,16 +122,14 @@ static void row(const degenerate_case *c, FILE *out, totals *sum)
         fprintf(stderr, "not stable: %s\n", r.fault);
     fprintf(out, "| %s | %llu |", c->name, (unsigned long long)r.faces);
     if (r.status != EBPO_OK) {
-        fprintf(out, " %s `%s` | | | | | |\n", r.fault[0] ? "**fails**" : "refused:", r.message);
+        fprintf(out, " %s `%s` | | | |\n", r.fault[0] ? "**fails**" : "refused:", r.message);
         return;
     }
     degenerate_case tame = tame_like(faces);
-    fprintf(out, " %s | %llu |",
-            r.fault[0]   ? "**not stable**"
-            : c->surface ? "surface"
-                         : "solid",
-            (unsigned long long)r.queries);
-    put(out, " %.1g |", r.has_volume ? r.volume_error : NAN);
+    fputs(r.fault[0] ? " **not stable**" : c->surface ? " surface" : "", out);
+    if (r.has_volume && r.volume_error != 0)
+        fprintf(out, " volume error %.1g", r.volume_error);
+    fputs(" |", out);
     put(out, " %.3g |", r.has_volume ? 100 * r.excess : NAN);
     put(out, " %.2g |", build_ratio(c, &tame));
     put(out, " %.2g |", distance_seconds(c) / distance_seconds(&tame));
@@ -151,12 +149,16 @@ static const char introduction[] =
     " with the nearest\n"
     "face, point and normal, and rays. Query points are on vertices, edges, faces and cell "
     "faces, next to them,\n"
-    "between them and far away. The reference is brute force in rational arithmetic "
+    "between them and far away. A solid has 2,251 queries below 500 faces, 451 below 15,000, 91 "
+    "below 150,000, and\n"
+    "else 23; a surface has 1,251 below 500 faces, and else 251. The reference is brute force in "
+    "rational arithmetic\n"
     "(`tests/support/oracle.h`).\n"
     "\n"
-    "- *volume error*: relative error of `ebpo measure`, at most 1e-15 unless the case allows"
-    " more. Empty where the\n"
-    "  exact volume is not a normal double.\n"
+    "- *outcome*: a solid, unless the column says otherwise.\n"
+    "- *volume error*: relative error of `ebpo measure` where the exact volume is a normal "
+    "double and the error is not 0;\n"
+    "  at most 1e-15 unless the case allows more.\n"
     "- *excess %*: volume of the last level's envelopes over the solid, in percent. Empty "
     "where shells overlap and\n"
     "  the volume of the solid is unknown.\n"
@@ -164,8 +166,8 @@ static const char introduction[] =
     " up to 5 runs on one\n"
     "  thread.\n"
     "\n"
-    "| case | faces | outcome | queries | volume error | excess % | build | distance |\n"
-    "|---|---|---|---|---|---|---|---|\n";
+    "| case | faces | outcome | excess % | build | distance |\n"
+    "|---|---|---|---|---|---|\n";
 
 int main(int argc, char **argv)
 {

@@ -88,7 +88,6 @@ def main(ebpo, model, seconds="600"):
 
 - With {info["faces"]:,} faces and a budget of 256 MiB, a step of the ball at 1 kHz takes {us(first["p50"])} us (median) and
   {us(first["p99_9"])} us (p99.9).
-- {first["over_ms"]} of {first["steps"]:,} steps take more than 1 ms; the longest takes {us(first["max"])} us.
 - A loop of the same arithmetic without the library shows the delays of the machine (`tests/bench/machine_delays.c`):
   {sums}
 
