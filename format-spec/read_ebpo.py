@@ -450,8 +450,7 @@ def read_attributes(file):
     for number in range(int(group.attrs["arrays"])):
         path = f"/attributes/{number:03d}"
         array, kind = file[path], ATTRIBUTE_TYPES[text(file[path].attrs["type"])]
-        one = {name: text(array.attrs[attribute]) for name, attribute in
-               (("element", "element"), ("names", "columns"), ("type", "type"))}
+        one = {name: text(array.attrs[name]) for name in ("element", "columns", "type")}
         one["list"] = text(array.attrs["list"]) if "list" in array.attrs else None
         assert one["list"] is None or one["list"] in list(ATTRIBUTE_TYPES)[:6]
         different = one["list"] is not None and array.attrs["lengths_differ"] == 1
@@ -465,8 +464,8 @@ def read_attributes(file):
             assert ends[-1] == len(values), f"{path}: items"
         assert one["element"] not in ("vertex", "face") or one["rows"] == file.attrs[one["element"] + "_count"], path
         if one["element"] == "ebpo:texture" and different:
-            images[one["names"]] = [part.tobytes() for part in np.split(values, ends[:-1])]
-        columns = len(one["names"].split(" "))
+            images[one["columns"]] = [part.tobytes() for part in np.split(values, ends[:-1])]
+        columns = len(one["columns"].split(" "))
         assert values.ndim == 1 or columns == values.shape[1] or one["list"] is not None, path
         bits = values.view("u%d" % values.dtype.itemsize)
         one["bits"] = listed(bits)                       # of floats: as integers, as NaN is none of JSON's numbers

@@ -54,6 +54,18 @@ static bool type_fits(const ebpo_info *info, ebpo_array_in *a, bool gates)
     return fits;
 }
 
+/* Returns the rows of a full chunk of the arrays with subtrees whose chunks have a fixed number of
+ * rows. Returns 0 for other arrays. */
+static uint32_t block_rows(const ebpo_info *info, ebpo_array_id id)
+{
+    if (!info->subtree_level)
+        return 0;
+    return id == EBPO_A_FACES            ? EBPO_FACE_BLOCK
+           : id == EBPO_A_VERTICES       ? EBPO_VERTEX_BLOCK
+           : id == EBPO_A_SUBTREE_COUNTS ? ebpo_subtree_rows(info)
+                                         : 0;
+}
+
 static ebpo_status open_array(ebpo_file *file, ebpo_head *head, ebpo_array_id id, int level,
                               ebpo_error *error)
 {
@@ -88,10 +100,8 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, ebpo_array_id id
         return ebpo_check_fail(&check, -1, a->path,
                                "the array has the wrong type or the wrong number of columns",
                                error);
-    if (file->info.subtree_level && a->shape.chunk_rows != a->shape.rows &&
-        ((id == EBPO_A_FACES && a->shape.chunk_rows != EBPO_FACE_BLOCK) ||
-         (id == EBPO_A_VERTICES && a->shape.chunk_rows != EBPO_VERTEX_BLOCK) ||
-         (id == EBPO_A_SUBTREE_COUNTS && a->shape.chunk_rows != ebpo_subtree_rows(&file->info))))
+    uint32_t block = block_rows(&file->info, id);
+    if (block && a->shape.chunk_rows != (rows < block ? rows : block))
         return ebpo_check_fail(&check, -1, a->path,
                                "the array's chunks do not have the size that the format requires",
                                error);
@@ -184,12 +194,15 @@ static ebpo_status open_list(ebpo_file *file, ebpo_head *head, ebpo_array_id lis
     return EBPO_OK;
 }
 
-/* Opens the chunk checksums, which are ignored, whatever they are, if they are not valid. */
+/* Opens the chunk checksums. They are ignored, whatever they are, if they do not state the size of
+ * the file, and if they are bare, because the last bytes of bare chunks are no checksum. */
 static ebpo_status open_checksums(ebpo_file *file, ebpo_head *head, ebpo_error *error)
 {
     ebpo_array_in *a = &file->root_array[EBPO_A_CHUNK_CHECKSUMS];
     ebpo_status status = open_list(file, head, EBPO_A_CHUNK_CHECKSUMS, &file->has_checksums, error);
     bool wrong = status == EBPO_E_FORMAT || status == EBPO_E_UNSUPPORTED;
+    if (status == EBPO_OK && a->present && a->shape.pipeline == EBPO_PIPELINE_BARE)
+        file->has_checksums = false;
     if (!wrong || states_size(file, head, a->path))
         return status;
     a->present = false;

@@ -251,7 +251,6 @@ typedef struct places_comparison {
     indexed array[LIMIT];
     unsigned arrays;
     uint64_t *list, rows;
-    uint64_t top; /* end of the bytes with which a reader locates a subtree */
 } places_comparison;
 
 /* Reads HDF5's index of an array that is present. `number`: the array's number in the
@@ -320,12 +319,6 @@ static indexed *find_indexed(places_comparison *c, uint32_t number)
     return NULL;
 }
 
-static bool is_top(const places_comparison *c, const indexed *of)
-{
-    return of->number == 4112 ||
-           (of->number < 4096 && of->array->level <= c->file->info.subtree_level);
-}
-
 static void compare_row(places_comparison *c, uint64_t row, uint64_t at, uint32_t bytes)
 {
     ebpo_tally *tally = c->tally;
@@ -342,8 +335,6 @@ static void compare_row(places_comparison *c, uint64_t row, uint64_t at, uint32_
           "/subtrees/chunk_directory, row %" PRIu64 ": %" PRIu32 " bytes at %" PRIu64
           " as chunk %" PRIu64 " of %s, but HDF5 has %" PRIu32 " at %" PRIu64,
           row, bytes, at, of->listed - 1, of->array->path, chunk->bytes, chunk->address);
-    if (is_top(c, of) && chunk->address + chunk->bytes > c->top)
-        c->top = chunk->address + chunk->bytes;
 }
 
 static void compare_directory(places_comparison *c)
@@ -359,9 +350,6 @@ static void compare_directory(places_comparison *c)
         CHECK(c->array[i].listed == c->array[i].count,
               "/subtrees/chunk_directory has %" PRIu64 " of the %" PRIu64 " chunks of %s",
               c->array[i].listed, c->array[i].count, c->array[i].array->path);
-    uint64_t top = c->file->info.top_bytes;
-    CHECK(top == 0 || (top >= c->top && top <= c->file->info.file_bytes),
-          "top_bytes states %" PRIu64 ", but locating a subtree reads up to %" PRIu64, top, c->top);
 }
 
 ebpo_status ebpo_check_places(ebpo_tally *tally, const ebpo_file *file,

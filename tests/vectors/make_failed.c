@@ -32,7 +32,7 @@ static const char *folder;
 #define GATES     "47_gates_unfiltered"
 #define TEXTURED  "51_textures"
 #define WELDED    "58_welded_within_a_distance"
-#define SUMMED    "55_chunk_sums_of_subtrees"
+#define SUMMED    "55_chunk_checksums_of_subtrees"
 #define SURFACE   "07_surface"
 #define CLOSE     "26_subset_error"
 #define MANY      "16_many_subtrees"
@@ -559,7 +559,7 @@ static const failed_vector failed[] = {
     { "user_block", LEAVES, NULL, USER_BLOCK, "R4.2" },
     { "head_bit_flipped", LEAVES, NULL, FLIP_HEAD, "R4.3" },
     { "format_wrong", LEAVES, v_format, NONE, "R5.6" },
-    { "format_missing", LEAVES, v_format_missing, NONE, "R5.6" },
+    { "format_missing", LEAVES, v_format_missing, NONE, "R5.1" },
     { "version_major_2", LEAVES, v_major, NONE, "R5.7" },
     { "version_draft", LEAVES, v_draft, NONE, "R5.8" },
     { "required_part_unknown", LEAVES, v_required, NONE, "R5.17" },
@@ -583,12 +583,12 @@ static const failed_vector failed[] = {
     { "pruned_not_counted", BOXED, v_pruned_less, NONE, "R6.11" },
     { "subtree_level_0", SUBTREES, v_subtree_level, NONE, "R5.2" },
     { "subtree_table_missing", SUBTREES, v_subtree_table, NONE, "R4.10" },
-    { "places_of_another_array", CHUNKS, v_places_array, NONE, "RC.5" },
-    { "places_beyond_the_end", CHUNKS, v_places_end, NONE, "RC.6" },
-    { "places_of_impossible_bytes", CHUNKS, v_places_bytes, NONE, "RC.7" },
-    { "places_missing", SUBTREES, v_places, NONE, "R4.10" },
-    { "subtree_outer_missing", CHUNKS, v_outer, NONE, "RC.3" },
-    { "pruned_in_a_whole_file", DEEP, v_pruned_whole, NONE, "R6.5" },
+    { "chunk_directory_of_another_array", CHUNKS, v_places_array, NONE, "RC.5" },
+    { "chunk_directory_beyond_the_end", CHUNKS, v_places_end, NONE, "RC.6" },
+    { "chunk_directory_of_impossible_bytes", CHUNKS, v_places_bytes, NONE, "RC.7" },
+    { "chunk_directory_missing", SUBTREES, v_places, NONE, "R4.10" },
+    { "shared_chunks_missing", CHUNKS, v_outer, NONE, "RC.3" },
+    { "pruned_in_a_whole_file", DEEP, v_pruned_whole, NONE, "R6.6" },
     { "attribute_missing", LEAVES, v_attribute_missing, NONE, "R5.1" },
     { "attribute_of_wrong_type", LEAVES, v_attribute_type, NONE, "R4.22" },
     { "text_of_variable_length", LEAVES, v_variable, NONE, "R4.23" },
@@ -679,7 +679,7 @@ static const failed_vector failed[] = {
     { "attributes_too_many", COLOURED, v_attributes_many, NONE, "RD.1" },
     { "attributes_of_unknown_type", COLOURED, v_attributes_type, NONE, "R5.4" },
     { "attributes_of_other_width", COLOURED, v_attributes_width, NONE, "RD.2" },
-    { "attributes_without_names", COLOURED, v_attributes_names, NONE, "RD.4" },
+    { "attributes_with_too_few_columns", COLOURED, v_attributes_names, NONE, "RD.4" },
     { "attributes_of_other_rows", COLOURED, v_attributes_element, NONE, "RD.3" },
     { "attributes_of_unknown_coding", COLOURED, v_attributes_coding, NONE, "R4.24" },
     { "attributes_lists_end_before", COLOURED, v_attributes_ends, NONE, "RD.5" },
@@ -690,8 +690,8 @@ static const failed_vector failed[] = {
     { "colours_changed", PAINTED, v_colours_changed, NONE, "RE.2" },
     { "attributes_without_mesh", COLOURED, v_attributes_no_mesh, NONE, "R5.18" },
     { "chunk_in_place_of_another", SUMMED, NULL, MOVE_CHUNKS, "RF.4" },
-    { "chunk_sums_of_fewer_chunks", SUMMED, v_checksums_fewer, NONE, "RF.3" },
-    { "chunk_sums_out_of_order", SUMMED, v_checksums_order, NONE, "RF.2" },
+    { "chunk_checksums_of_fewer_chunks", SUMMED, v_checksums_fewer, NONE, "RF.3" },
+    { "chunk_checksums_out_of_order", SUMMED, v_checksums_order, NONE, "RF.2" },
     { "attributes_image_of_another_digest", TEXTURED, v_attributes_image, NONE, "RD.9" },
     { "chunk_fletcher32_wrong", ONE, NULL, FLIP_CHUNK, "R4.17" },
     { "unit_too_long", LEAVES, v_unit_long, NONE, "R5.3" },
@@ -710,7 +710,7 @@ static const failed_vector failed[] = {
     { "subtree_counts_wrong", CHUNKS, v_subtree_counts, NONE, "RC.2" },
     { "subtree_row_of_other_nodes", MANY, v_subtree_gray, NONE, "RC.4" },
     { "subtree_row_of_another_end", CHUNKS, v_subtree_end, NONE, "RC.4" },
-    { "places_contradict_a_header", CHUNKS, v_places_header, NONE, "RC.8" },
+    { "chunk_directory_contradicts_a_header", CHUNKS, v_places_header, NONE, "RC.8" },
     { "attributes_header_too_long", COLOURED, v_header_long, NONE, "RD.6" },
     { "attributes_textures_too_many", TEXTURED, v_textures, NONE, "RD.8" },
     { "attributes_texture_texts_too_long", TEXTURED, v_texture_texts, NONE, "RD.8" },

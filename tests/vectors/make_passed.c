@@ -371,7 +371,7 @@ static void make_derived(void)
     derive("34_attributes_of_other_programs", "05_two_levels", with_attributes_of_others);
     derive("35_arrays_not_called_for", "05_two_levels", with_arrays_not_called_for);
     derive("36_shuffled_bytes", "02_one_leaf_deflate", shuffle_bytes);
-    derive("37_places_without_offset", "17_chunks_of_subtrees_unfiltered",
+    derive("37_chunk_directory_without_offset", "17_chunks_of_subtrees_unfiltered",
            without_offset_of_places);
     derive_longer("38_bytes_behind_the_end", "17_chunks_of_subtrees_unfiltered", with_false_places,
                   16);
@@ -709,16 +709,16 @@ static void make_sums(void)
     ebpo_write_options options = laid_out(EBPO_CODEC_ZSTD, ~0u, 0);
     options.chunk_checksums = EBPO_CHECKSUMS_DEFAULT;
     build(&tree, 4, false, 2, 1, EBPO_PART_LEAF_PLANES);
-    write_file("54_chunk_sums", &tree, &options);
+    write_file("54_chunk_checksums", &tree, &options);
     options = laid_out(EBPO_CODEC_NONE, ~0u, 1);
     options.chunk_checksums = EBPO_CHECKSUMS_DEFAULT;
     build_mesh(&tree, read_coloured(), (how){ 3, 1, EBPO_PART_LEAF_PLANES, 0, 0, 0, 0 });
-    write_file("55_chunk_sums_of_subtrees", &tree, &options);
-    derive("56_chunk_sums_of_a_part_not_listed", "55_chunk_sums_of_subtrees",
+    write_file("55_chunk_checksums_of_subtrees", &tree, &options);
+    derive("56_chunk_checksums_of_a_part_not_listed", "55_chunk_checksums_of_subtrees",
            without_the_word_colours);
-    state_size("56_chunk_sums_of_a_part_not_listed");
-    derive("57_chunk_sums_without_offset", "55_chunk_sums_of_subtrees", stale_checksums);
-    derive("63_chunk_checksums_of_others", "54_chunk_sums", checksums_of_others);
+    state_size("56_chunk_checksums_of_a_part_not_listed");
+    derive("57_chunk_checksums_without_offset", "55_chunk_checksums_of_subtrees", stale_checksums);
+    derive("63_chunk_checksums_of_others", "54_chunk_checksums", checksums_of_others);
 }
 
 /* --- subtrees and gates, in files that are large enough --- */

@@ -7,7 +7,7 @@ import sys
 import h5py
 
 VECTORS = ("06_four_levels_leaf_planes", "28_leaf_index", "29_types_and_gray_index", "32_chunks_of_maps",
-           "41_attributes_of_a_subset", "50_gates_of_subtrees", "51_textures", "55_chunk_sums_of_subtrees",
+           "41_attributes_of_a_subset", "50_gates_of_subtrees", "51_textures", "55_chunk_checksums_of_subtrees",
            "60_subset_with_subtrees")
 folder = pathlib.Path(sys.argv[1]) / "format-spec" / "vectors" / "passed"
 problems, seen = [], 0

@@ -7,7 +7,7 @@ import { GATES_COLS } from './gates.js';
 import { Hdf5, NeedBytes } from './hdf5.js';
 import { checkIndexes, checkLevel, checkOrder, decodeFaces, decodeLeaves, decodeMap, decodeVertices, recode } from './decode.js';
 import { Parts } from './parts.js';
-import { arrayNumber, isListValid, readPlaces, statesSize } from './chunk_directory.js';
+import { arrayNumber, isListValid, readDirectory, statesSize } from './chunk_directory.js';
 import { sourceOf } from './source.js';
 import { Store, everyChunk } from './store.js';
 
@@ -118,7 +118,8 @@ export class EbpoFile {
     if (info.parts.has('attributes') && arrays.get('/levels/00/types').pipeline !== 'bare') // without chunk checksums, the attributes' checksum would have to be compared
       this.colours = this.#findColours(hdf5, group('/attributes', root.links.get('attributes')), info, arrays);
     for (const array of arrays.values())
-      if (array.pipeline !== arrays.get('/levels/00/types').pipeline)
+      if (array.pipeline !== arrays.get('/levels/00/types').pipeline &&
+          (array.path !== CHUNK_SUMS || isListValid(array, this.source.size)))
         throw foreignError(array.path, "the array's filters differ from those of the file's first array");
     const counts = arrays.get('/subtrees/counts');
     if (counts && arrays.get('/subtrees/index').rows !== counts.chunkCount)

@@ -21,7 +21,7 @@ export class Store {
    */
   sums() {
     const list = this.arrays.get(CHUNK_SUMS);
-    if (!list || !isListValid(list, this.cache.source.size))
+    if (!list || list.pipeline === 'bare' || !isListValid(list, this.cache.source.size))
       return Promise.resolve(undefined);
     this.ends ??= this.#readChecksums(list);
     this.ends.catch(() => (this.ends = undefined)); // the next call tries again

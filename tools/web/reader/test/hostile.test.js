@@ -42,7 +42,7 @@ async function refused(bytes, expected, read = readBySubtree) {
 
 // --- chunk checksums ---
 
-const summed = readFileSync(new URL('../../../../format-spec/vectors/passed/55_chunk_sums_of_subtrees.ebpo.h5', import.meta.url));
+const summed = readFileSync(new URL('../../../../format-spec/vectors/passed/55_chunk_checksums_of_subtrees.ebpo.h5', import.meta.url));
 
 // A source whose bytes before `limit` arrive immediately, and the others when `gate` resolves.
 class SlowSource {
