@@ -80,8 +80,8 @@ int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_choice *choice, uint3
  * 1. */
 int ebpo_selection_requested(int count, int level, double percent, double k_root);
 
-/* Returns the same number, but at most EBPO_PLANES_STORED: more planes cannot be stored, and clusters
- * for more planes would not be the best clusters for the stored planes. */
+/* Returns the same number, but at most EBPO_PLANES_STORED: more planes cannot be stored, and
+ * clusters for more planes would not be the best clusters for the stored planes. */
 int ebpo_selection_wanted(int count, int level, double percent, double k_root);
 
 /* Selects every candidate that may remove 0.03 % of the cell or more, deepest cut first, then

@@ -41,7 +41,8 @@ static inline void attributes_json(FILE *out, const ebpo_attributes *all)
     fprintf(out, ",\n \"arrays\": [");
     for (uint64_t i = 0; i < all->count; i++) {
         const ebpo_attribute *a = &all->array[i];
-        fprintf(out, "%s\n  {\"element\": \"%s\", \"columns\": \"%s\", \"type\": \"%s\", \"list\": ",
+        fprintf(out,
+                "%s\n  {\"element\": \"%s\", \"columns\": \"%s\", \"type\": \"%s\", \"list\": ",
                 i ? "," : "", a->element, a->names, ebpo_attribute_type_name(a->type));
         if (a->list == EBPO_ATTRIBUTE_NO_LIST)
             fprintf(out, "null");

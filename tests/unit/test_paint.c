@@ -329,7 +329,7 @@ START_TEST(test_paint_points_are_checked_against_model)
     n.at.face = 1 << 20; /* a face that does not exist */
     ck_assert(ebpo_paint_add_note(o.paint, &n, NULL) == EBPO_OK);
     ck_assert(ebpo_paint_check_points(o.paint, o.context, NULL, &error) == EBPO_E_FORMAT);
-    ck_assert(strstr(error.message, "note 3 of the paint is not on face 1048576") != NULL);
+    ck_assert(strstr(error.message, "note 3 of the paint is not on its face 1048576") != NULL);
     close_model(&o);
 }
 END_TEST
