@@ -368,9 +368,9 @@ def not_run(page, runs):
     missing = [name for name in STEPS if not runs.result(name)]
     seconds = sum(runs.result(name)["step_seconds"] for name in STEPS if runs.result(name))
     page.text("## Cost of the script, and rows that were not run", "",
-              f"The script needs 3 GB of disk and 8 GB of memory. The {len(STEPS) - len(missing)} steps on this page took "
-              f"{seconds / 3600:.1f} hours on the busy machine; the others need several hours, mainly the builds of 25.6 "
-              "million faces and the dragon with K = 5 %. " + (
+              f"The {len(STEPS) - len(missing)} steps on this page took {seconds / 3600:.1f} hours on the busy machine, "
+              "0.8 GB of disk and 0.8 GB of memory. Estimated for all steps: 15 hours, mainly 15 builds of 25.6 million "
+              "faces, and 3 GB of disk. " + (
                   "Run `theses.py` again for these steps (`--list` describes them): "
                   + ", ".join(f"`{n}`" for n in missing) + "." if missing else "All steps were run."))
 
