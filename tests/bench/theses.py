@@ -40,6 +40,16 @@ def of_levels(step):
     return [l.get("percent_of_solid", l.get("percent_of_integral")) for l in step["levels"]]
 
 
+def by_faces(step):
+    """Volumes with planes of leaves that are derived from faces."""
+    solid = step["levels"][0]["envelope_volume"] / of_levels(step)[0]
+    return [l["derived_volume"] / solid for l in step["derived"]]
+
+
+def above(volumes, known):
+    return [f"L{i}" for i, (a, b) in enumerate(zip(volumes, known)) if a > b]
+
+
 def all_planes(levels):
     return [l["planes"] + l["leaf_planes"] for l in levels]
 
@@ -79,9 +89,10 @@ def volumes(page, runs):
         for k, step in steps:
             published = theirs.BP_VOLUME[thesis] if k == "1" else theirs.BP_K_VOLUME[k]
             found = runs.result(step)
+            if found or k == "1":
+                rows.append([f"BP, K = {k} %", *padded(percent(published), count)])
             if not found:
                 continue
-            rows.append([f"BP, K = {k} %", *padded(percent(published), count)])
             method = found["methods"][0]
             rows.append([f"BP here, K = {k} %", *padded(percent(free_volume(found, method)), count)])
             if len(method["levels"]) > 3:
@@ -89,6 +100,7 @@ def volumes(page, runs):
         ours = runs.result(default)
         if ours:
             rows.append(["our default", *padded(percent(of_levels(ours)), count)])
+            rows.append(["our default, leaves by faces", *padded(percent(by_faces(ours)), count)])
         rows.append(["planes, BP, K = 1 %", *padded([f"{n:,}" for n in theirs.BP_PLANES[thesis]], count)])
         found = next((r for k, step in steps if k == "1" and (r := runs.result(step))), None)
         if found:
@@ -322,12 +334,14 @@ def summary(runs):
     copy, memory, path = (runs.result(s) for s in ("bunny_bp", "memory", "modes_path"))
     sent, lucy = runs.result("bunny_sent"), theirs.EBP_LUCY
     lines, slow, few = [], slower_cells(runs), runs.result("modes_uniform")
-    if dragon:
-        volume, known = of_levels(dragon), theirs.BP_VOLUME["dragon"]
-        worse = [f"L{i}" for i, (a, b) in enumerate(zip(volume, known)) if a > b]
-        better = [f"L{i}" for i, (a, b) in enumerate(zip(volume, known)) if a < b]
-        lines.append(f"- *Not better*: volume of the dragon's {', '.join(worse)} (stored planes only); files hold at most 255 "
-                     "planes a node (BP's root: 2,955); a pair of faces of two Lucys takes 50 to 80 times as long under 256 MiB"
+    if dragon and bunny:
+        known = theirs.BP_VOLUME
+        better = [f"L{i}" for i, (a, b) in enumerate(zip(of_levels(dragon), known["dragon"])) if a < b]
+        with_faces = above(by_faces(dragon), known["dragon"]) + above(by_faces(bunny), known["bunny"])
+        lines.append("- *Not better*: volume of stored planes at the dragon's "
+                     f"{', '.join(above(of_levels(dragon), known['dragon']))} and the bunny's "
+                     f"{', '.join(above(of_levels(bunny), known['bunny']))} (with planes derived from faces: "
+                     f"{', '.join(with_faces) or 'none'}); files hold at most 255 planes a node (BP's root: 2,955); a pair of faces of two Lucys takes 50 to 80 times as long under 256 MiB"
                      + (f"; an exact distance of a uniform point takes {few['distance']['ns']['mean'] / 1e6:.0f} ms at EBP's cut "
                         "level, EBP's inexact one 0.9 ms" if few else "")
                      + (f"; slower by level: {', '.join(slow)}" if slow else "") + ".")
