@@ -110,8 +110,8 @@ def volumes(page, runs):
             rows.append(["planes, our default", *padded([f"{l['planes']:,}" for l in ours["levels"]], count)])
         page.text(f"**{name}**")
         page.table(["", *(f"L{i}" for i in range(count))], rows)
-    page.text("Our default stores planes of gray nodes only; planes of leaves are derived from faces. BP's root has "
-              + ", ".join(f"{n:,} planes with K = {k} %" for k, n in theirs.BP_ROOT.items()) + " (table 3.5).")
+    page.text("Our default stores planes of gray nodes only; planes of leaves are derived from faces. Planes "
+              "of BP's root (table 3.5): " + ", ".join(f"{n:,} (K = {k} %)" for k, n in theirs.BP_ROOT.items()) + ".")
 
 
 def leaves(page, runs):
@@ -168,8 +168,7 @@ def points_bp(page, runs):
                          figure(ours["inside"]["ns"]["mean"] / 1000), figure(ours["distance"]["ns"]["mean"] / 1000)])
     page.text("## Points, whole model in memory (BP table 5.1)", "",
               "Uniform points in the box: 10^7 in BP, 10^6 here (10^5 for distances), one thread. BP prints 1 to 2 "
-              "million distances per second in figures 5.6 and 5.7; its method returns the nearest face of a bounded "
-              "search, ours the exact distance with sign.")
+              "million distances per second in figures 5.6 and 5.7, by a bounded search.")
     page.table(["model", "BP, 10^6 tests/s", "ours, 10^6 tests/s", "ours, single call, us",
                 "ours, exact distance, us"], rows)
 
@@ -188,7 +187,6 @@ def large_build(page, runs):
     memory = runs.result("memory")
     rows = [["build, s", figure(lucy["build"]), figure(ours["build"])],
             ["processor time of the command, s", "-", figure(ours["cpu"])],
-            ["whole command, s", "-", figure(ours["wall"])],
             ["peak memory of the build, MiB", "-", figure(ours["peak"] / 2**20)],
             ["PLY, 10^6 B", figure(lucy["ply"] / 1e6), figure(ours["ply"] / 1e6)],
             ["files for collisions, 10^6 B", figure(lucy["collisions"] / 1e6), figure(ours["bytes"] / 1e6)],
@@ -319,13 +317,12 @@ def collisions(page):
     page.table(["EBP: first contact", "us", "PQP in EBP, us"], [[n, t, q] for n, t, q in theirs.EBP_FIRST])
     page.text("- *Not comparable*: microseconds a pair. EBP's 0.009 us are about 30 clock cycles, less than one "
               "intersection test of two triangles takes. EBP's text says that the optimisation gains about 10 %; its "
-              "tables show a factor of 8 to 10. Loading is not mentioned.",
-              "- *Not comparable*: pairs a step. The models, poses and number of steps differ.",
+              "tables show a factor of 8 to 10.",
+              "- *Not comparable*: pairs a step, as models and poses differ.",
               "- *Comparable in order of magnitude*: a first contact, with the models in memory. PQP's 26 s for a "
-              "first contact is not a time of PQP's test alone: in [collide.md](collide.md) a peer of its kind takes "
-              "less than 0.1 ms.",
+              "first contact is not the time of PQP's test alone: FCL takes less than 0.1 ms.",
               "- *Worse here*: with a budget of 256 MiB a pair takes 50 to 80 times as long as in memory, because steps "
-              "load subtrees. EBP does not separate the two cases.")
+              "load subtrees.")
 
 
 def summary(runs):
@@ -341,7 +338,10 @@ def summary(runs):
         lines.append("- *Not better*: volume of stored planes at the dragon's "
                      f"{', '.join(above(of_levels(dragon), known['dragon']))} and the bunny's "
                      f"{', '.join(above(of_levels(bunny), known['bunny']))} (with planes derived from faces: "
-                     f"{', '.join(with_faces) or 'none'}); files hold at most 255 planes a node (BP's root: 2,955); a pair of faces of two Lucys takes 50 to 80 times as long under 256 MiB"
+                     f"{', '.join(with_faces) or 'none'})"
+                     + (f", Lucy's {', '.join(above(of_levels(large), lucy['volume']))}" if large else "")
+                     + "; at most 255 planes a node in files (BP's root: 2,955); a pair of faces of two Lucys takes 50 to "
+                     "80 times as long under 256 MiB"
                      + (f"; an exact distance of a uniform point takes {few['distance']['ns']['mean'] / 1e6:.0f} ms at EBP's cut "
                         "level, EBP's inexact one 0.9 ms" if few else "")
                      + (f"; slower by level: {', '.join(slow)}" if slow else "") + ".")
@@ -385,8 +385,11 @@ def not_run(page, runs):
               f"The {len(STEPS) - len(missing)} steps on this page took {seconds / 3600:.1f} hours on the busy machine, "
               "0.8 GB of disk and 0.8 GB of memory. Estimated for all steps: 15 hours, mainly 15 builds of 25.6 million "
               "faces, and 3 GB of disk. " + (
-                  "Run `theses.py` again for these steps (`--list` describes them): "
-                  + ", ".join(f"`{n}`" for n in missing) + "." if missing else "All steps were run."))
+                  "Not run (`--list` describes them; run the script again): " + ", ".join(
+                      f"`{n}`" for n in missing if not n.startswith("large_")) + (
+                      f" and {len([n for n in missing if n.startswith('large_')])} steps `large_*` (EBP's selections on "
+                      "25.6 million faces)." if any(n.startswith("large_") for n in missing) else ".")
+                  if missing else "All steps were run."))
 
 
 def plots(runs, folder):
