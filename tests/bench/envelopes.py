@@ -25,7 +25,7 @@ WAYS = {"inherit": [], "kmedoids": ["--select", "kmedoids"],
         "offset": ["--select", "offset"], "random": ["--select", "random"]}
 # As BP 2008: N = 50 by its criterion 1, any number of planes in a node.
 BP = ["--select", "kmedoids", "--k-root", "1%", "--unlimited", "--coalesce", "sum", "--leaf-faces", 50,
-      "--points", 1, "--no-pictures"]
+      "--points", 1, "--no-pictures", "--levels", "0-0"]
 VERDICT, SIZES, GOAL_ROWS = {}, {}, []
 
 

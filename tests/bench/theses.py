@@ -40,6 +40,16 @@ def of_levels(step):
     return [l.get("percent_of_solid", l.get("percent_of_integral")) for l in step["levels"]]
 
 
+def by_faces(step):
+    """Volumes with planes of leaves that are derived from faces."""
+    solid = step["levels"][0]["envelope_volume"] / of_levels(step)[0]
+    return [l["derived_volume"] / solid for l in step["derived"]]
+
+
+def above(volumes, known):
+    return [f"L{i}" for i, (a, b) in enumerate(zip(volumes, known)) if a > b]
+
+
 def all_planes(levels):
     return [l["planes"] + l["leaf_planes"] for l in levels]
 
@@ -79,9 +89,10 @@ def volumes(page, runs):
         for k, step in steps:
             published = theirs.BP_VOLUME[thesis] if k == "1" else theirs.BP_K_VOLUME[k]
             found = runs.result(step)
+            if found or k == "1":
+                rows.append([f"BP, K = {k} %", *padded(percent(published), count)])
             if not found:
                 continue
-            rows.append([f"BP, K = {k} %", *padded(percent(published), count)])
             method = found["methods"][0]
             rows.append([f"BP here, K = {k} %", *padded(percent(free_volume(found, method)), count)])
             if len(method["levels"]) > 3:
@@ -89,6 +100,7 @@ def volumes(page, runs):
         ours = runs.result(default)
         if ours:
             rows.append(["our default", *padded(percent(of_levels(ours)), count)])
+            rows.append(["our default, leaves by faces", *padded(percent(by_faces(ours)), count)])
         rows.append(["planes, BP, K = 1 %", *padded([f"{n:,}" for n in theirs.BP_PLANES[thesis]], count)])
         found = next((r for k, step in steps if k == "1" and (r := runs.result(step))), None)
         if found:
@@ -98,8 +110,8 @@ def volumes(page, runs):
             rows.append(["planes, our default", *padded([f"{l['planes']:,}" for l in ours["levels"]], count)])
         page.text(f"**{name}**")
         page.table(["", *(f"L{i}" for i in range(count))], rows)
-    page.text("Our default stores planes of gray nodes only; planes of leaves are derived from faces. BP's root has "
-              + ", ".join(f"{n:,} planes with K = {k} %" for k, n in theirs.BP_ROOT.items()) + " (table 3.5).")
+    page.text("Our default stores planes of gray nodes only; planes of leaves are derived from faces. Planes "
+              "of BP's root (table 3.5): " + ", ".join(f"{n:,} (K = {k} %)" for k, n in theirs.BP_ROOT.items()) + ".")
 
 
 def leaves(page, runs):
@@ -156,8 +168,7 @@ def points_bp(page, runs):
                          figure(ours["inside"]["ns"]["mean"] / 1000), figure(ours["distance"]["ns"]["mean"] / 1000)])
     page.text("## Points, whole model in memory (BP table 5.1)", "",
               "Uniform points in the box: 10^7 in BP, 10^6 here (10^5 for distances), one thread. BP prints 1 to 2 "
-              "million distances per second in figures 5.6 and 5.7; its method returns the nearest face of a bounded "
-              "search, ours the exact distance with sign.")
+              "million distances per second in figures 5.6 and 5.7, by a bounded search.")
     page.table(["model", "BP, 10^6 tests/s", "ours, 10^6 tests/s", "ours, single call, us",
                 "ours, exact distance, us"], rows)
 
@@ -176,7 +187,6 @@ def large_build(page, runs):
     memory = runs.result("memory")
     rows = [["build, s", figure(lucy["build"]), figure(ours["build"])],
             ["processor time of the command, s", "-", figure(ours["cpu"])],
-            ["whole command, s", "-", figure(ours["wall"])],
             ["peak memory of the build, MiB", "-", figure(ours["peak"] / 2**20)],
             ["PLY, 10^6 B", figure(lucy["ply"] / 1e6), figure(ours["ply"] / 1e6)],
             ["files for collisions, 10^6 B", figure(lucy["collisions"] / 1e6), figure(ours["bytes"] / 1e6)],
@@ -307,13 +317,12 @@ def collisions(page):
     page.table(["EBP: first contact", "us", "PQP in EBP, us"], [[n, t, q] for n, t, q in theirs.EBP_FIRST])
     page.text("- *Not comparable*: microseconds a pair. EBP's 0.009 us are about 30 clock cycles, less than one "
               "intersection test of two triangles takes. EBP's text says that the optimisation gains about 10 %; its "
-              "tables show a factor of 8 to 10. Loading is not mentioned.",
-              "- *Not comparable*: pairs a step. The models, poses and number of steps differ.",
+              "tables show a factor of 8 to 10.",
+              "- *Not comparable*: pairs a step, as models and poses differ.",
               "- *Comparable in order of magnitude*: a first contact, with the models in memory. PQP's 26 s for a "
-              "first contact is not a time of PQP's test alone: in [collide.md](collide.md) a peer of its kind takes "
-              "less than 0.1 ms.",
+              "first contact is not the time of PQP's test alone: FCL takes less than 0.1 ms.",
               "- *Worse here*: with a budget of 256 MiB a pair takes 50 to 80 times as long as in memory, because steps "
-              "load subtrees. EBP does not separate the two cases.")
+              "load subtrees.")
 
 
 def summary(runs):
@@ -322,12 +331,17 @@ def summary(runs):
     copy, memory, path = (runs.result(s) for s in ("bunny_bp", "memory", "modes_path"))
     sent, lucy = runs.result("bunny_sent"), theirs.EBP_LUCY
     lines, slow, few = [], slower_cells(runs), runs.result("modes_uniform")
-    if dragon:
-        volume, known = of_levels(dragon), theirs.BP_VOLUME["dragon"]
-        worse = [f"L{i}" for i, (a, b) in enumerate(zip(volume, known)) if a > b]
-        better = [f"L{i}" for i, (a, b) in enumerate(zip(volume, known)) if a < b]
-        lines.append(f"- *Not better*: volume of the dragon's {', '.join(worse)} (stored planes only); files hold at most 255 "
-                     "planes a node (BP's root: 2,955); a pair of faces of two Lucys takes 50 to 80 times as long under 256 MiB"
+    if dragon and bunny:
+        known = theirs.BP_VOLUME
+        better = [f"L{i}" for i, (a, b) in enumerate(zip(of_levels(dragon), known["dragon"])) if a < b]
+        with_faces = above(by_faces(dragon), known["dragon"]) + above(by_faces(bunny), known["bunny"])
+        lines.append("- *Not better*: volume of stored planes at the dragon's "
+                     f"{', '.join(above(of_levels(dragon), known['dragon']))} and the bunny's "
+                     f"{', '.join(above(of_levels(bunny), known['bunny']))} (with planes derived from faces: "
+                     f"{', '.join(with_faces) or 'none'})"
+                     + (f", Lucy's {', '.join(above(of_levels(large), lucy['volume']))}" if large else "")
+                     + "; at most 255 planes a node in files (BP's root: 2,955); a pair of faces of two Lucys takes 50 to "
+                     "80 times as long under 256 MiB"
                      + (f"; an exact distance of a uniform point takes {few['distance']['ns']['mean'] / 1e6:.0f} ms at EBP's cut "
                         "level, EBP's inexact one 0.9 ms" if few else "")
                      + (f"; slower by level: {', '.join(slow)}" if slow else "") + ".")
@@ -368,11 +382,14 @@ def not_run(page, runs):
     missing = [name for name in STEPS if not runs.result(name)]
     seconds = sum(runs.result(name)["step_seconds"] for name in STEPS if runs.result(name))
     page.text("## Cost of the script, and rows that were not run", "",
-              f"The script needs 3 GB of disk and 8 GB of memory. The {len(STEPS) - len(missing)} steps on this page took "
-              f"{seconds / 3600:.1f} hours on the busy machine; the others need several hours, mainly the builds of 25.6 "
-              "million faces and the dragon with K = 5 %. " + (
-                  "Run `theses.py` again for these steps (`--list` describes them): "
-                  + ", ".join(f"`{n}`" for n in missing) + "." if missing else "All steps were run."))
+              f"The {len(STEPS) - len(missing)} steps on this page took {seconds / 3600:.1f} hours on the busy machine, "
+              "0.8 GB of disk and 0.8 GB of memory. Estimated for all steps: 15 hours, mainly 15 builds of 25.6 million "
+              "faces, and 3 GB of disk. " + (
+                  "Not run (`--list` describes them; run the script again): " + ", ".join(
+                      f"`{n}`" for n in missing if not n.startswith("large_")) + (
+                      f" and {len([n for n in missing if n.startswith('large_')])} steps `large_*` (EBP's selections on "
+                      "25.6 million faces)." if any(n.startswith("large_") for n in missing) else ".")
+                  if missing else "All steps were run."))
 
 
 def plots(runs, folder):

@@ -483,7 +483,7 @@ async function measures(browser, address) {
   await page.waitForFunction(() => window.ebpoViewer.paint);
   await page.evaluate(() => document.querySelectorAll('#panel details').forEach((d) => (d.open = true)));
   await page.click('#sectionOn');
-  await page.waitForSelector('#sectionAnswer:not([hidden])');
+  await page.waitForSelector('#sectionResult:not([hidden])');
   const { info, vertices, faces } = await openEbpo(readFileSync(model)).then(async (file) => ({ info: file.info, ...await file.mesh() })), segments = [];
   cutFaces(Float64Array.from([...faces].flatMap((v) => [...vertices.subarray(3 * v, 3 * v + 3)])), 2, info.box_origin[2] + 0.5 * info.box_size[2], segments);
   assert.equal(Number(await page.textContent('#sectionArea')), Number(measureOf(segments).area.toPrecision(6)));
