@@ -262,8 +262,8 @@ static ebpo_status build_pieces(ebpo_builder *b, ebpo_error *error)
 }
 
 /* Builds the tree. With a selection from the root down, each piece is finished in one pass. With
- * a selection from the leaves up, the top first needs the planes of all pieces. The pieces are
- * then partitioned twice, because their nodes are not kept. */
+ * a selection from the leaves up, the top first needs the planes of all pieces. In this case
+ * each piece is divided into nodes twice, because its nodes are not kept. */
 static ebpo_status build_tree(ebpo_builder *b, ebpo_error *error)
 {
     ebpo_status status = ebpo_build_corner_windings(b, error);

@@ -177,8 +177,9 @@ static ebpo_status sort_group(const sorting *t, uint64_t g, ebpo_error *error)
     const ebpo_sort *s = t->s;
     uint64_t count = t->first[g + 1] - t->first[g];
     const uint8_t *group = t->dealt + t->first[g] * s->record;
-    /* A group is this large if there are more than GROUPS_MAX * LARGE_GROUP records in total, or if
-     * many records have equal leading bits. Such a group may exceed memory. */
+    /* A group has more than LARGE_GROUP records if there are more than GROUPS_MAX * LARGE_GROUP
+     * records in total, or if many records have equal leading bits. Such a group may exceed memory.
+     */
     ebpo_workspace *storage = count > LARGE_GROUP ? s->workspace : NULL;
     keyed *keys = ebpo_array_alloc(storage, 2 * count, sizeof *keys);
     uint8_t *sorted = ebpo_array_alloc(storage, count, s->record);

@@ -46,9 +46,10 @@ static int compare_numbers(const void *a, const void *b)
 
 /* Numbers the faces of a leaf. In a file, the *new* faces of a leaf are the faces that no earlier
  * leaf lists; the other listed faces are its *references*. If the subset contains none of the
- * earlier leaves that list a reference, the reference becomes a new face. The new numbers of these
- * faces precede those of the faces that are new in the original file. Both sets keep the order of
- * their old numbers. The other references stay references and are renumbered in place. */
+ * earlier leaves that list a reference, the reference becomes a new face of this leaf. In the
+ * subset, these former references are numbered first. The new faces of the original file follow.
+ * Both sets keep the order of their old numbers. The other references stay references and are
+ * renumbered in place. */
 static ebpo_status number_leaf(numbering *n, int level)
 {
     ebpo_level *l = &n->c->out->level[level];

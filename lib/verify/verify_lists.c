@@ -55,8 +55,8 @@ static bool is_among(const uint32_t *faces, uint64_t count, uint32_t face)
     return low < count && faces[low] == face;
 }
 
-/* Checks that a listed face touches the leaf's cell widened by 1/256. Level-limited distances
- * depend on this. */
+/* Checks that a listed face touches the leaf's cell widened by 1/256. Distance queries with a
+ * level depend on this. */
 static void check_near(ebpo_tally *tally, const ebpo_reference_tree *view,
                        const ebpo_reference_node *leaf, uint32_t face)
 {

@@ -125,7 +125,7 @@ typedef struct ebpo_build_options {
     /* Rule that decides which points belong to the solid. */
     ebpo_rule rule;
 
-    /* True: reject a mesh that is not balanced with EBPO_E_NOT_SOLID. */
+    /* True: return EBPO_E_NOT_SOLID for a mesh that is not balanced. */
     bool require_solid;
 
     unsigned threads;

@@ -488,11 +488,12 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_count_repeated(const ebpo_mesh *mes
  * an edge are two shells.
  *
  * A patch may be open at edges that are used more than twice. Example: each of two stacked cubes
- * has its own faces in the common square, so four faces use each side of the square. Such patches
- * are joined at these edges. The faces at an edge are sorted by their angle around the edge, and
- * each face gets the direction opposite to that of the previous face. The angles are compared
- * exactly; faces at the same angle are ordered by source index. Faces that already alternate are
- * unchanged. Joined patches are a shell if they use each edge equally often in both directions.
+ * has its own faces in the common square, so four faces use each side of the square. The square of
+ * a cube is one patch and its other sides are another one, and both are open. Such patches are
+ * joined at these edges. The faces at an edge are sorted by their angle around the edge, and each
+ * face gets the direction opposite to that of the previous face. The angles are compared exactly;
+ * faces at the same angle are ordered by source index. Faces that already alternate are unchanged.
+ * Joined patches are a shell if they use each edge equally often in both directions.
  *
  * A shell gets a positive volume, or a negative one if it is inside an odd number of other shells.
  * A shell is inside another one if its least and greatest vertices along each axis are inside:
@@ -509,7 +510,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_orient(ebpo_mesh *mesh, ebpo_repair
                                                     ebpo_error *error);
 
 /*
- * Reverses every face. Adds to `flipped_faces` of the record and does not set a requested step.
+ * Reverses every face. Adds to `flipped_faces` of the record. Sets none of its flags of requested
+ * steps.
  *
  * Threads: one per mesh.
  */
@@ -538,8 +540,8 @@ typedef struct ebpo_prepare_options {
     /*
      * Steps, in this order: ebpo_mesh_weld, ebpo_mesh_drop_duplicates, ebpo_mesh_orient,
      * ebpo_mesh_flip, ebpo_mesh_fill_holes. After holes were filled, closed components are oriented
-     * again. A mesh from STL (`source_format`) is always welded, because faces of STL share no
-     * vertices; ebpo_mesh_read has already merged them.
+     * again. A mesh from STL (`source_format`) is welded also if `weld` is false. This does not
+     * change a mesh from ebpo_mesh_read, which has already merged vertices at equal positions.
      */
     bool weld;
     bool orient;

@@ -112,7 +112,7 @@ typedef struct ebpo_model ebpo_model;
  * mesh supports only queries with a level. The file must stay open as long as the model.
  *
  * EBPO_E_LIMIT: the budget is too small; the message names a sufficient one. An accepted budget
- * is large enough for many subtrees of average size, but perhaps not for the largest one. A query
+ * is large enough for some subtrees of average size, but perhaps not for the largest one. A query
  * that needs a subtree larger than the budget allows returns EBPO_E_LIMIT. Other errors are those
  * of reading.
  *
@@ -143,7 +143,7 @@ typedef struct ebpo_model_plan {
      * - whole: the smallest budget with which everything is in memory (for remote files, see
      *   ebpo_model_options.memory).
      * - least: a budget that ebpo_model_new accepts, slightly above the smallest one. With this
-     *   budget, few subtrees are in memory at a time.
+     *   budget, some subtrees of average size are in memory at a time.
      */
     uint64_t whole, least;
 
@@ -233,7 +233,7 @@ typedef struct ebpo_model_stats {
     uint64_t leaves, leaves_of_kind[5];
 
     /*
-     * Number of general leaves with a cell face that no face of the mesh intersects. In these
+     * Number of leaves of kind [0] with a cell face that no face of the mesh intersects. In these
      * leaves, one segment from that cell face to the point is sufficient to compute the winding
      * number.
      */
@@ -871,8 +871,8 @@ typedef struct ebpo_solid_volume {
      * lo == hi: the volume is known except for rounding. This requires that no component intersects
      * itself, which is not tested.
      *
-     * lo < hi: components intersect or repeat each other, or the mesh is not a 2-manifold. Without
-     * `info` the bounds are then 0 and INFINITY.
+     * lo < hi: components intersect or repeat each other, or the mesh is not a 2-manifold. If the
+     * argument `info` is NULL, the bounds are then 0 and INFINITY.
      */
     double lo, hi;
 
@@ -913,7 +913,8 @@ typedef struct ebpo_mass {
      */
     double volume;
 
-    /* Centroid of the solid; if the volume is unknown, the winding number is the density. */
+    /* Centroid of the solid. If the volume is unknown, points are weighted by their winding
+     * numbers. */
     double centroid[3];
 
     /* About the centroid, for density 1. */
