@@ -69,27 +69,27 @@ class Runs:
         """Builds a file: seconds of the command and of the stages, peak memory, bytes, levels."""
         out = self.file(name)
         took = self.call(self.ebpo, "convert", "--json", "-q", *options, mesh, out)
-        told = json.loads(took["printed"])
+        stated = json.loads(took["printed"])
         return {"wall": took["wall"], "cpu": took["cpu"], "peak": took["peak"],
-                "build": told["thesis_stages"][6]["seconds"], "faces": told["faces"],
-                "vertices": told["vertices"], "ply": os.path.getsize(mesh),
-                "bytes": os.path.getsize(out), "parts": told["bytes"],
+                "build": stated["thesis_stages"][6]["seconds"], "faces": stated["faces"],
+                "vertices": stated["vertices"], "ply": os.path.getsize(mesh),
+                "bytes": os.path.getsize(out), "parts": stated["bytes"],
                 "levels": self.json_of("info", "--json", out)["levels"]}
 
     def report(self, mesh, *options):
         """The methods of a report, without what was timed for deadlines and budgets."""
-        told = self.json_of("report", "--json", "-q", "--no-pictures", *options, "-o",
+        stated = self.json_of("report", "--json", "-q", "--no-pictures", *options, "-o",
                             self.work / "report", mesh)
-        volume = told["model"].get("volume") or told["model"].get("winding_integral")
-        return {"volume": volume, "faces": told["model"]["faces"],
+        volume = stated["model"].get("volume") or stated["model"].get("winding_integral")
+        return {"volume": volume, "faces": stated["model"]["faces"],
                 "methods": [{k: v for k, v in m.items() if k not in ("deadlines", "budgets")}
-                            for m in told["methods"]]}
+                            for m in stated["methods"]]}
 
     def bench(self, name, *options):
-        told = self.json_of("bench", "--json", *options, self.file(name))
-        return {k: told[k] for k in ("ns", "batch_ns", "count", "open_seconds",
+        stated = self.json_of("bench", "--json", *options, self.file(name))
+        return {k: stated[k] for k in ("ns", "batch_ns", "count", "open_seconds",
                                      "cold_open_seconds", "cold_first_result_seconds", "model")
-                if k in told}
+                if k in stated}
 
 
 # --- steps ---
@@ -136,9 +136,9 @@ def leaves(name):
     def step(runs):
         out = {}
         for rule, number in (("distinct", 50), ("sum", 50), ("mean", 20)):
-            told = runs.report(runs.model(name), "--select", "offset", "--unlimited", "--coalesce",
+            stated = runs.report(runs.model(name), "--select", "offset", "--unlimited", "--coalesce",
                                rule, "--leaf-faces", number, "--max-level", 9, "--points", 1)
-            out[rule] = told["methods"][0]["unlimited"]["levels"]
+            out[rule] = stated["methods"][0]["unlimited"]["levels"]
         return out
     return step
 
@@ -218,9 +218,9 @@ def memory_by_level(runs):
     """EBP tables 5 to 7 and 16: memory with levels 0 to C kept, before anything else is loaded."""
     out = {"open": [], "bytes": []}
     for cut in range(8):
-        told = runs.bench("lucy_x256", "--count", 1, "--cut-level", cut)
-        out["bytes"].append(told["model"]["memory"])
-        out["open"].append(told["cold_first_result_seconds"])
+        stated = runs.bench("lucy_x256", "--count", 1, "--cut-level", cut)
+        out["bytes"].append(stated["model"]["memory"])
+        out["open"].append(stated["cold_first_result_seconds"])
     return out
 
 
