@@ -79,7 +79,7 @@ class Runs:
     def report(self, mesh, *options):
         """The methods of a report, without what was timed for deadlines and budgets."""
         stated = self.json_of("report", "--json", "-q", "--no-pictures", *options, "-o",
-                            self.work / "report", mesh)
+                              self.work / "report", mesh)
         volume = stated["model"].get("volume") or stated["model"].get("winding_integral")
         return {"volume": volume, "faces": stated["model"]["faces"],
                 "methods": [{k: v for k, v in m.items() if k not in ("deadlines", "budgets")}
@@ -88,7 +88,7 @@ class Runs:
     def bench(self, name, *options):
         stated = self.json_of("bench", "--json", *options, self.file(name))
         return {k: stated[k] for k in ("ns", "batch_ns", "count", "open_seconds",
-                                     "cold_open_seconds", "cold_first_result_seconds", "model")
+                                       "cold_open_seconds", "cold_first_result_seconds", "model")
                 if k in stated}
 
 
@@ -137,7 +137,7 @@ def leaves(name):
         out = {}
         for rule, number in (("distinct", 50), ("sum", 50), ("mean", 20)):
             stated = runs.report(runs.model(name), "--select", "offset", "--unlimited", "--coalesce",
-                               rule, "--leaf-faces", number, "--max-level", 9, "--points", 1)
+                                 rule, "--leaf-faces", number, "--max-level", 9, "--points", 1)
             out[rule] = stated["methods"][0]["unlimited"]["levels"]
         return out
     return step
