@@ -109,7 +109,8 @@ ebpo_status ebpo_head_close(ebpo_head *head, ebpo_status status, ebpo_error *err
 void ebpo_head_keep_ranges(ebpo_head *head)
 {
     head->state->keeps = true;
-    for (int i = 0; i < EBPO_HEAD_SLOTS; i++) /* the headers are read again when needed */
+    for (int i = 0; i < EBPO_HEAD_SLOTS;
+         i++) /* headers are read again, so that their ranges are kept too */
         head->state->slot[i].used = 0;
 }
 
@@ -121,7 +122,7 @@ ebpo_status ebpo_head_take_ranges(ebpo_head *head, ebpo_range **ranges, uint64_t
     *count = s->kept_count;
     s->kept = NULL;
     s->kept_count = s->kept_capacity = 0;
-    return s->kept_short ? ebpo_fail_memory(error, *count * sizeof **ranges) : EBPO_OK;
+    return s->kept_no_memory ? ebpo_fail_memory(error, *count * sizeof **ranges) : EBPO_OK;
 }
 
 /* Returns true if a link message has this name. Sets *address to its target, or EBPO_NO_ADDRESS for

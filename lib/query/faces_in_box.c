@@ -106,7 +106,7 @@ static ebpo_status gather_accel(box_walk *w, const ebpo_accel *s, ebpo_error *er
         low[k] = (float)((w->min[k] - s->centre[k]) * s->scale);
         high[k] = (float)((w->max[k] - s->centre[k]) * s->scale);
     }
-    gather_child(w, s, low, high, s->top);
+    gather_child(w, s, low, high, s->root_bound);
     if (w->no_memory)
         return ebpo_fail_memory(error, (w->count + 1) * sizeof *w->slot);
     if (w->count)

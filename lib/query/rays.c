@@ -152,7 +152,7 @@ static bool move_origin(ebpo_ray_search *r, double *most)
 {
     const ebpo_accel *s = r->s;
     double t;
-    if (!enters_cube(r, s->reach, &t))
+    if (!enters_cube(r, s->largest_coordinate, &t))
         return false;
     r->moved = t;
     *most = 0;
@@ -174,7 +174,7 @@ static void set_error(ebpo_ray_search *r, double most)
 {
     const double *c = r->s->centre;
     double unit = (fabs(c[0]) + fabs(c[1]) + fabs(c[2])) * r->s->scale;
-    r->error = 0x1p-45 * (most + unit) + 0x1p-55 * r->s->reach + 0x1p-53;
+    r->error = 0x1p-45 * (most + unit) + 0x1p-55 * r->s->largest_coordinate + 0x1p-53;
     r->blur = most < 0x1p30 ? (float)(r->error * 0x1p23 + 0x1p-30) : INFINITY;
     if (most < 0x1p80)
         return;
@@ -214,7 +214,8 @@ static void ray_search_accel(ebpo_ray_search *r, const ebpo_ray_kernels *kernels
     if (s->bound_count == 0)
         return;
     double most = to_frame(r);
-    if (!(most <= near_enough * s->reach) && most < 0x1p46 * s->reach && !move_origin(r, &most))
+    if (!(most <= near_enough * s->largest_coordinate) && most < 0x1p46 * s->largest_coordinate &&
+        !move_origin(r, &most))
         return;
     set_error(r, most);
     r->surely = frame_t(r, r->ray->t_max, -1);
