@@ -143,7 +143,7 @@ typedef struct ebpo_shells {
      * Valid only if `apart` is 1; else 0. A difference is also 0 if each component outside all
      * solids is oriented outwards and each component inside a solid is oriented inwards.
      */
-    double beyond[3];
+    double volume_difference[3];
 } ebpo_shells;
 
 #define EBPO_SHELLS_INIT EBPO_SIZED(ebpo_shells)
