@@ -255,6 +255,7 @@ static void discard_bad_index(ebpo_info *info, uint64_t size)
 static ebpo_status read_head(ebpo_file *file, ebpo_head *head, ebpo_error *error)
 {
     ebpo_head_object root;
+    file->end = head->end;
     ebpo_status status = ebpo_head_open_group(head, "/", &root, error);
     if (status == EBPO_OK)
         status = ebpo_facts_get(head, root, &file->info, error);
