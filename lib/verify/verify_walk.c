@@ -142,7 +142,7 @@ static void check_worth(const walk *w, ebpo_tally *tally, const ebpo_reference_n
         ebpo_tally_violation(
             tally, EBPO_VERIFY_STRUCTURE,
             &(ebpo_verify_place){ node->code, EBPO_NO_FACE, EBPO_NO_PLANE },
-            "the node is gray, but its leaves list no more faces than one leaf may");
+            "the node is gray, but its leaves list at most leaf_faces faces");
 }
 
 /* Checks the corners of a gray node, after its children have been visited. */

@@ -489,6 +489,19 @@ static void move_items(unsigned column)
     add_to("/subtrees/counts", column, 1);
     add_to("/subtrees/counts", cols + column, -1);
 }
+/* Chunks of 512 rows, where 1,024 are stated; of 48, which is no power of two. */
+static void v_rows_of_vertices(void)
+{
+    hsize_t rows = count_of("/", "vertex_count");
+    replace("/mesh/vertices",
+            (new_array){ H5T_STD_U32LE, rows, 3, 512, false, false, checksum, NULL });
+}
+static void v_rows_of_level(void)
+{
+    hsize_t leaves = count_of("/levels/04", "leaf");
+    replace("/levels/04/leaf_skip",
+            (new_array){ H5T_STD_U32LE, leaves, 0, 48, false, false, checksum, NULL });
+}
 static void v_subtree_gray(void) { move_items(GRAY_COLUMN); }
 static void v_subtree_end(void) { move_items(END_COLUMN); }
 /* A byte more for the first chunk, and one less for the second. */
@@ -728,6 +741,8 @@ static const failed_vector failed[] = {
     { "subtree_index_not_0", CHUNKS, v_subtree_index, NONE, "RC.1" },
     { "subtree_index_wrong", MANY, v_subtree_sum, NONE, "RC.2" },
     { "subtree_counts_wrong", CHUNKS, v_subtree_counts, NONE, "RC.2" },
+    { "subtree_chunks_of_vertices", CHUNKS, v_rows_of_vertices, NONE, "R4.11" },
+    { "subtree_chunks_of_a_level", CHUNKS, v_rows_of_level, NONE, "R4.11" },
     { "subtree_row_of_other_nodes", MANY, v_subtree_gray, NONE, "RC.4" },
     { "subtree_row_of_another_end", CHUNKS, v_subtree_end, NONE, "RC.4" },
     { "chunk_directory_contradicts_a_header", CHUNKS, v_places_header, NONE, "RC.8" },
