@@ -237,9 +237,9 @@ static ebpo_status keep_row(ebpo_chunks *chunks, const ebpo_subtree_row *row, eb
         return status;
     pthread_mutex_lock(&chunks->lock);
     if (!chunks->rows)
-        chunks->rows = ebpo_alloc_zero(
-            1, sizeof *chunks->rows + remembered_subtrees(&chunks->file->info) / 8 +
-                   1); /* without memory, rows are not cached */
+        chunks->rows =
+            ebpo_alloc_zero(1, sizeof *chunks->rows + remembered_subtrees(&chunks->file->info) / 8 +
+                                   1); /* without memory, rows are not cached */
     if (chunks->rows) {
         chunks->rows->row[chunks->rows->next] = *row;
         chunks->rows->next = (chunks->rows->next + 1) % KEPT;

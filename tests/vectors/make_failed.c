@@ -306,7 +306,7 @@ static void v_types_index(void) { poke("/levels/07/types_index", 5, 1); }
 static void v_gray_index(void) { poke("/levels/06/gray_index", 1, 3); }
 static void v_leaf_index(void) { poke("/levels/06/leaf_index", 4, 7); }
 
-/* The leaves of the last group get another type, 0 (white) or 1 (black): all other data is adapted. */
+/* The leaves of the last group get another type, 0 (white) or 1 (black); other data is adapted. */
 static void replace_leaves(int64_t other)
 {
     int64_t types[64], winding[512], leaves = 0, rank = 0;
