@@ -194,7 +194,7 @@ ebpo_status ebpo_stored_check(const ebpo_file *file, ebpo_error *error)
                       sizes.subtree_bytes + sizes.attribute_bytes + sizes.sum_bytes;
     for (int level = 0; level < file->info.level_count; level++)
         stored += sizes.level_bytes[level];
-    if (stored > file->info.file_bytes)
+    if (stored > file->end)
         return ebpo_fail_file(
             error, EBPO_E_FORMAT, file->in.shown,
             "the arrays' chunks take more space than the file has; get a fresh copy of the file");
@@ -418,7 +418,7 @@ static ebpo_status list_chunks(ebpo_file *file, const uint64_t *places, uint64_t
     if (l)
         l->file = file;
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
-        if (ebpo_place_bytes_of(places[i]) > file->info.file_bytes - at)
+        if (ebpo_place_bytes_of(places[i]) > file->end - at)
             status =
                 list_fails(file, "a chunk is beyond the end of the file in", "the list", error);
         else

@@ -76,6 +76,7 @@ typedef struct ebpo_attributes_in {
 
 struct ebpo_file {
     ebpo_input in;
+    uint64_t end; /* of the HDF5 file; the stored file may have more bytes */
     ebpo_info info;
     ebpo_array_in level_array[EBPO_LEVELS_MAX][EBPO_LEVEL_ARRAYS];
     ebpo_array_in root_array[EBPO_ARRAYS]; /* from EBPO_A_VERTICES on */

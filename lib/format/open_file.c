@@ -102,9 +102,9 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, ebpo_array_id id
                                error);
     uint32_t block = block_rows(&file->info, id);
     if (block && a->shape.chunk_rows != (rows < block ? rows : block))
-        return ebpo_check_fail(&check, -1, a->path,
-                               "the array's chunks do not have the size that the format requires",
-                               error);
+        return ebpo_fail_at(error, EBPO_E_UNSUPPORTED, file->in.shown, a->path, -1,
+                            "the array's chunks do not have the size that the format "
+                            "requires, " EBPO_HEAD_FOREIGN);
     bool wide = file->info.double_coordinates;
     if (id == EBPO_A_VERTICES && a->shape.element_size != (wide ? 8 : 4))
         return ebpo_check_fail(&check, -1, a->path, "the array's type contradicts coordinate_type",
@@ -255,6 +255,7 @@ static void discard_bad_index(ebpo_info *info, uint64_t size)
 static ebpo_status read_head(ebpo_file *file, ebpo_head *head, ebpo_error *error)
 {
     ebpo_head_object root;
+    file->end = head->end;
     ebpo_status status = ebpo_head_open_group(head, "/", &root, error);
     if (status == EBPO_OK)
         status = ebpo_facts_get(head, root, &file->info, error);

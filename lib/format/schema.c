@@ -382,19 +382,24 @@ static ebpo_status check_types(const ebpo_check *check, const ebpo_info *info, i
                                error);
     if (level == 0 && arrays->types[0] > 3)
         return ebpo_check_fail(check, level, "types", "the root has siblings", error);
-    uint64_t empty = 0;
+    uint64_t empty = 0, closed = 0;
     EBPO_FOR_ITEMS(check->workspace, i, 0, groups) {
         for (unsigned octant = 0; octant < ebpo_group_octants(level); octant++)
             counts[ebpo_group_type(arrays->types[i], octant)]++;
     }
-    for (uint64_t i = 0; i < groups; i++)
+    for (uint64_t i = 0; i < groups; i++) {
         empty += arrays->types[i] == 0;
+        closed += arrays->types[i] != 0 && !ebpo_group_lists_faces(arrays->types[i]);
+    }
+    if (level && closed)
+        return ebpo_check_fail(check, level, "types",
+                               "a gray node has no child that is gray or a leaf", error);
     if (level && empty != info->level[level - 1].pruned_count)
         return ebpo_check_fail(
             check, level, "types",
             info->pruned ? "there is not exactly one empty group for each pruned node of the "
                            "level above"
-                         : "a group is 0: all children of a gray node are white",
+                         : "a gray node has no child that is gray or a leaf",
             error);
     const ebpo_level_summary *s = &info->level[level];
     if (counts[EBPO_WHITE] != s->white_count || counts[EBPO_BLACK] != s->black_count ||

@@ -232,11 +232,11 @@ void replace(const char *path, new_array a)
 
 void refilter(const char *path, void (*filters)(hid_t))
 {
-    int64_t values[64];
+    int64_t values[256];
     hsize_t dims[2] = { 0, 0 };
     hid_t id = H5Dopen2(changed, path, H5P_DEFAULT), space = H5Dget_space(id),
           type = H5Dget_type(id);
-    need(H5Sget_simple_extent_npoints(space) <= 64, path);
+    need(H5Sget_simple_extent_npoints(space) <= 256, path);
     H5Sget_simple_extent_dims(space, dims, NULL);
     need(H5Dread(id, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0, path);
     replace(path, (new_array){ .type = type,
