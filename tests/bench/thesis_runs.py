@@ -15,6 +15,12 @@ MODES = ("cache", "nodes", "subtree", "cache-plain", "nodes-plain", "subtree-pla
 MEMORY = 32 << 20
 SHOWN_LEVELS = (0, 2, 4, 5, 7, 10)
 POINTS, FEW_POINTS = 100_000, 1_000
+CROSSING_STEPS = 40
+# Name, the fixed model, the one that moves, and its size: its diagonal divided by the other's.
+SCENARIOS = (("lucy_lucy", "lucy_x256", "lucy_x256", 1), ("lucy_armadillo", "lucy_x256", "armadillo", 0.5),
+             ("lucy16_lucy16", "lucy_x16", "lucy_x16", 1),
+             ("armadillo_armadillo", "armadillo_x4", "armadillo_x4", 1),
+             ("lucy16_armadillo", "lucy_x16", "armadillo_x4", 0.5))
 
 
 class Runs:
@@ -91,6 +97,12 @@ class Runs:
                                        "cold_open_seconds", "cold_first_result_seconds", "model")
                 if k in stated}
 
+    def crossing(self, a, b, size, query, budget):
+        """For each step of a crossing: microseconds, pairs, loaded subtrees and bytes."""
+        printed = self.call(self.build / "tests/bench/peers/crossing_ebpo", self.file(a), self.file(b),
+                            CROSSING_STEPS, query, size, budget)["printed"]
+        return [[float(x) for x in line.split()] for line in printed.splitlines()[1:]]
+
 
 # --- steps ---
 
@@ -132,13 +144,22 @@ def sent(name):
 
 
 def leaves(name):
-    """Number of leaves by criteria 1 and 2 of BP, and by ours."""
+    """Number of leaves by criteria 1 and 2 of BP, and by ours; and, for each level, the nodes with
+    faces and the lengths of their lists."""
     def step(runs):
         out = {}
-        for rule, number in (("distinct", 50), ("sum", 50), ("mean", 20)):
+        for rule, number in (("sum", 50), ("mean", 20)):
             stated = runs.report(runs.model(name), "--select", "offset", "--unlimited", "--coalesce",
                                  rule, "--leaf-faces", number, "--max-level", 9, "--points", 1)
             out[rule] = stated["methods"][0]["unlimited"]["levels"]
+        out["distinct"] = {number: [{k: l[k] for k in ("gray", "leaf")} for l in runs.convert(
+            f"{name}_leaves", runs.model(name), "--leaf-faces", number)["levels"]]
+            for number in (50, 49, 16)}
+        deepest = [runs.convert(f"{name}_leaves", runs.model(name), "--leaf-faces", 0, "--max-level",
+                                level)["levels"][-1] for level in range(1, 8)]
+        out["nodes"] = [l["leaf"] for l in deepest]
+        out["entries"] = [l["faces_new"] + l["faces_again"] for l in deepest]
+        os.remove(runs.file(f"{name}_leaves"))
         return out
     return step
 
@@ -214,6 +235,20 @@ def levels(points):
     return step
 
 
+def collisions(runs):
+    """EBP tables 30, 31 and 33: one model moves through another, in memory and with a budget."""
+    for name, base, times in (("armadillo_x4", "armadillo", 1), ("lucy_x16", "lucy100k", 2)):
+        runs.mesh(name, runs.generate, "--base", runs.models / f"{base}.ply", "--subdivide", times)
+    for name in ("armadillo", "armadillo_x4", "lucy_x16"):
+        runs.convert(name, runs.model(name))
+    out = {}
+    for name, a, b, size in SCENARIOS:
+        out[name] = {"first": runs.crossing(a, b, size, "first", 0), "all": runs.crossing(a, b, size, "all", 0)}
+        if "lucy_x256" in (a, b):
+            out[name]["budget"] = runs.crossing(a, b, size, "all", 256 << 20)
+    return out
+
+
 def memory_by_level(runs):
     """EBP tables 5 to 7 and 16: memory with levels 0 to C kept, before anything else is loaded."""
     out = {"open": [], "bytes": []}
@@ -230,6 +265,8 @@ STEPS = {
     "bunny_bp": ("BP tables 3.3, 3.9, 4.1, 4.3", as_bp("bunny_closed", "1%")),
     "bunny_sent": ("BP table 4.4", sent("bunny_closed")),
     "bunny_leaves": ("BP table 3.1", leaves("bunny_closed")),
+    **{f"bunny_bp_{k}": (f"BP tables 3.4 to 3.8, K = {k} %", as_bp("bunny_closed", f"{k}%", "0-2"))
+       for k in ("0.05", "0.1", "0.5", "5")},
     "dragon": ("our default on the dragon", repaired),
     "dragon_bp_0.1": ("BP tables 3.5, 3.6, K = 0.1 %", as_bp("dragon_solid", "0.1%", "0-2")),
     "lucy_methods": ("EBP tables 2 to 14 on 99,970 faces", methods("lucy100k", PERCENTS)),
@@ -237,6 +274,7 @@ STEPS = {
     "grow256": ("a mesh of 25.6 million faces", grown("lucy_x256", 4)),
     "large": ("our default on 25.6 million faces", large),
     "memory": ("EBP tables 1, 5 to 7, 11, 16, 17, 19", memory_by_level),
+    "collisions": ("EBP tables 29 to 33", collisions),
     "modes_path": ("EBP tables 22, 25, 27, 28", modes("path")),
     "levels_path": ("EBP tables 24, 26, 28", levels("path")),
     "modes_uniform": ("EBP tables 21, 25, 27, 28", modes("uniform")),
