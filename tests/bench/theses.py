@@ -18,7 +18,7 @@ from query_page import Page, handwritten, reflow
 from thesis_bp import above, by_faces, free_volume, of_levels, sent_factors
 from thesis_ebp import SELECTIONS, contact_times, pair_time, slower_cells
 from thesis_plots import plot
-from thesis_runs import PERCENTS, STEPS, Runs
+from thesis_runs import LARGE_MINUTES, MINUTES, PERCENTS, STEPS, Runs
 
 
 def levels_of(names):
@@ -108,13 +108,13 @@ def not_run(page, runs):
     seconds = sum(runs.result(name)["step_seconds"] for name in STEPS if runs.result(name))
     page.text("## Cost of the script, and rows that were not run", "",
               f"The {len(STEPS) - len(missing)} steps on this page took {seconds / 3600:.1f} hours on the busy machine, "
-              "0.8 GB of disk and 0.8 GB of memory. Estimated for all steps: 15 hours, mainly 15 builds of 25.6 million "
-              "faces, and 3 GB of disk. " + (
-                  "Not run (`--list` describes them; run the script again): " + ", ".join(
-                      f"`{n}`" for n in missing if not n.startswith("large_")) + (
-                      f" and {len([n for n in missing if n.startswith('large_')])} steps `large_*` (EBP's selections on "
-                      "25.6 million faces)." if any(n.startswith("large_") for n in missing) else ".")
-                  if missing else "All steps were run."))
+              "1.1 GB of disk and 0.8 GB of memory. All steps need about 5 hours of one core and 3 GB of disk.")
+    if missing:
+        few = ", ".join(f"`{name}` ({MINUTES.get(name, 'unknown')})" for name in missing if not name.startswith("large_"))
+        many = [name for name in missing if name.startswith("large_")]
+        page.text("Not run, with the expected minutes of one core: " + ", ".join(filter(None, (
+            few, f"{len(many)} steps `large_*` ({LARGE_MINUTES} each: 256 times those of 99,970 faces)" if many else "")))
+            + ".")
 
 
 def plots(runs, folder):
@@ -143,7 +143,7 @@ def plots(runs, folder):
                 lines.append((f"{s} here", here))
         lines.append(("EBP, Lucy, kmedoids, 30 and 40 %", theirs.EBP_LUCY_TIMES))
         lines.append(("our default, Lucy", [(big["build"], big["levels"][4]["percent_of_solid"] - 100)]))
-        made.append(plot(folder / "theses-time.svg", "Amazona and Lucy, 26 to 28 million faces: error of L4 against time",
+        made.append(plot(folder / "theses-time.svg", "26 to 28 million faces: error of L4 against time",
                          "build, s", "excess volume, %", lines))
     small = runs.result("lucy_methods")
     if small:
@@ -152,7 +152,7 @@ def plots(runs, folder):
                  for s in SELECTIONS]
         lines.append(("our default", [(small["ours"]["build"], of_levels(small["ours"])[4] - 100)]))
         made.append(plot(folder / "theses-time-here.svg",
-                         f"Lucy, {small['faces']:,} faces, one machine: error of L4 against build time", "build, s",
+                         f"Lucy, {small['faces']:,} faces, here: error of L4 against time", "build, s",
                          "excess volume, %", lines))
     if big and memory:
         made.append(plot(folder / "theses-memory.svg", "Lucy, 26 to 28 million faces: error against memory",
@@ -170,11 +170,10 @@ def write(runs, out, pictures):
     page.text("# Compared with the theses", "", *summary(runs))
     page.text("## Settings", "",
               f"Made by `tests/bench/theses.py BUILD_DIR MODELS_DIR WORK_DIR -o docs/measured/theses.md` on "
-              f"{measured.machine()}. Machines of the theses: {'; '.join(theirs.MACHINES)}. Times of different "
-              "machines are comparable in orders of magnitude only. Ours was busy, with a load "
-              f"of {max((runs.result(s) or {'load': 0})['load'] for s in STEPS):.0f} at most. The bunny has "
-              "69,666 faces (BP: 71,040); the dragon is BP's, 871,414 faces, with equal positions merged "
-              "(`--weld`) so that it bounds a solid.")
+              f"{measured.machine()}, with a load of {max((runs.result(s) or {'load': 0})['load'] for s in STEPS):.0f} at "
+              f"most. {'; '.join(theirs.MACHINES)}. Times of different machines are comparable in orders of magnitude only. "
+              "The bunny has 69,666 faces (BP: 71,040); the dragon is BP's, with equal positions merged (`--weld`) so that it "
+              "bounds a solid.")
     made = plots(runs, pathlib.Path(pictures))
     if made:
         page.text("\n".join(f"![{title}](../pictures/{name})" for name, title in made))

@@ -19,18 +19,16 @@ def large_build(page, runs):
         return
     page.text("## 28 million faces: build, size, load (EBP tables 2 to 4, 8 to 11, 15, 18, 19)", "",
               f"EBP: Lucy of {theirs.EBP_FACES['Lucy']:,} faces, k-medoids, 40 %. Ours: a Lucy of {ours['faces']:,} "
-              "faces, grown from 99,970 (`ebpo-generate --base lucy100k.ply --subdivide 4`: each step makes four "
-              "faces of one). `ebpo convert --memory 1GiB`. *Load*: EBP's root "
-              "levels; here from a cold file to the first exact result, with a cut at the same level.")
+              "faces, grown from 99,970 (`ebpo-generate --base lucy100k.ply --subdivide 4`); `ebpo convert --memory 1GiB`. "
+              "*Load*: EBP's root levels; here from a cold file to the first exact result, with the same cut level.")
     memory = runs.result("memory")
     rows = [["build, s", figure(lucy["build"]), figure(ours["build"])],
             ["processor time of the command, s", "-", figure(ours["cpu"])],
             ["peak memory of the build, MiB", "-", figure(ours["peak"] / 2**20)],
-            ["PLY, 10^6 B", figure(lucy["ply"] / 1e6), figure(ours["ply"] / 1e6)],
-            ["files for collisions, 10^6 B", figure(lucy["collisions"] / 1e6), figure(ours["bytes"] / 1e6)],
-            ["the same / PLY", f"{lucy['collisions'] / lucy['ply']:.2f}", f"{ours['bytes'] / ours['ply']:.3f}"],
-            ["files for collisions and drawing, 10^6 B", figure(lucy["rendering"] / 1e6),
-             figure(ours["bytes"] / 1e6)],
+            ["PLY, MB", figure(lucy["ply"] / 1e6), figure(ours["ply"] / 1e6)],
+            ["files, MB; divided by PLY", f"{figure(lucy['collisions'] / 1e6)}; {lucy['collisions'] / lucy['ply']:.2f}",
+             f"{figure(ours['bytes'] / 1e6)}; {ours['bytes'] / ours['ply']:.3f}"],
+            ["files with data for drawing, MB", figure(lucy["rendering"] / 1e6), "the same"],
             ["bytes per face", figure(lucy["collisions"] / theirs.EBP_FACES["Lucy"]),
              figure(ours["bytes"] / ours["faces"])]]
     if memory:
@@ -52,7 +50,6 @@ def large_build(page, runs):
     if memory:
         rows.append(["MB to this level, EBP (table 16)", *(figure(x) for x in accumulate(lucy["mb"]))])
         rows.append(["MB to this level, ours", *padded([figure(x / 1e6) for x in memory["bytes"]], 11)])
-    rows.append(["bytes to this level, ours", *padded([f"{l['cumulative_bytes']:,}" for l in ours["levels"]], 11)])
     page.table(head, rows)
 
 
@@ -66,8 +63,8 @@ def selections(page, runs):
     page.text("## Three selections, 10 to 50 % (EBP tables 2 to 14)", "",
               f"EBP: Amazona of {theirs.EBP_FACES['Amazona']:,} faces. Here: Lucy of {found['faces']:,} faces, "
               "`report --unlimited --leaf-faces 0`: as in EBP, all leaves are on the deepest level. Compare the "
-              "order of the rows, not their values. *Random* takes a run of planes in the node's order. *s* is the "
-              "build of the file with at most 255 planes a node. Volumes in percent of the solid. EBP's files of 10 to 50 % take "
+              "order of the rows, not their values. *s*: build of a file, which has at most 255 planes a node. L0, L4: volume in "
+              "percent. EBP's files take "
               f"{min(theirs_gb):.1f} to {max(theirs_gb):.1f} GB, ours {min(ours_mb):.1f} to {max(ours_mb):.1f} MB, our default "
               f"{found['ours']['bytes'] / 1e6:.1f} MB.")
     rows = []
@@ -117,8 +114,7 @@ def queries(page, runs):
     page.text("## Points out of core (EBP tables 21 to 28)", "",
               f"EBP: Lucy, 10^6 points, levels 1 to 5 in memory. Ours: {runs.result('large')['faces']:,} faces, the "
               "same levels in memory (L0 to L4, `--cut-level 4`), 32 MiB, 100,000 uniform points and 100,000 of a path, "
-              "single calls, wall-clock us, loading included. EBP does not state if files were cached; "
-              "here they are in the page cache after the first query.")
+              "single calls, wall-clock us, loading included; files are in the page cache (EBP does not state it).")
     rows = [[f"`{mode}`", figure(mean(few, mode) if few else None), figure(mean(path, mode)),
              *(figure(t) for t in theirs.EBP_MODES[mode])] for mode in theirs.EBP_MODES]
     rows.append(["exact distance" + (f" ({few['distance']['count']:,} uniform points)" if few else ""),
@@ -139,8 +135,7 @@ def queries(page, runs):
                      *(figure(t) for t in theirs.EBP_DISTANCE_LEVELS[i])])
     page.table(["", "inside: uniform", "path", "EBP", "EBP, path", "distance: uniform", "path", "EBP", "EBP, path"],
                rows)
-    page.text("EBP prints 0 us for Lucy, random, third level (table 27), and the mean of table 28 contains it; we "
-              "omit it.")
+    page.text("We omit EBP's 0 us for random points at the third level (table 27), which the mean of table 28 contains.")
 
 
 def pair_time(steps):
@@ -158,27 +153,25 @@ def collisions(page, runs):
     if not found:
         return
     page.text("## Collision (EBP tables 29 to 33)", "",
-              f"One model moves along x through another in {CROSSING_STEPS + 1} steps (`crossing_ebpo`), as in EBP. Ours: one "
-              "thread, processor time; in memory, or with 256 MiB for each model.")
+              f"One model moves along x through another (`crossing_ebpo`, {CROSSING_STEPS + 1} steps). Ours: one "
+              "thread, processor time, in memory or with 256 MiB for each model. EBP's other two scenarios of table 30 have "
+              "models that are not available.")
     rows = []
     for name, pairs, plain, optimised, ours in theirs.EBP_PAIRS:
-        row = [name, f"{pairs:,.0f}", plain, optimised]
         if ours:
             steps = found[ours]["all"]
-            row += [OURS[ours], f"{statistics.mean(s[1] for s in steps):,.0f}", figure(pair_time(steps)),
-                    figure(pair_time(found[ours]["budget"]))]
-        rows.append(row + ["-"] * (8 - len(row)))
+            rows.append([name, f"{pairs:,.0f}", plain, optimised, OURS[ours], f"{statistics.mean(s[1] for s in steps):,.0f}",
+                         figure(pair_time(steps)), figure(pair_time(found[ours]["budget"]))])
     page.table(["EBP: models", "pairs a step", "us a pair", "optimised", "ours: models", "pairs a step", "us a pair",
                 "256 MiB"], rows)
-    page.text("First contact, mean us of a step:")
+    page.text("First contact, us:")
     page.table(["EBP: models", "EBP", "optimised", "PQP", "SWIFT++", "gProximity (GPU)", "ours: models", "mean", "worst"],
                [[name, *(figure(t) for t in times), OURS[ours], *(figure(t) for t in contact_times(found[ours]["first"]))]
                 for name, times, ours in theirs.EBP_FIRST])
     gains = [a / b for _, _, a, b, _ in theirs.EBP_PAIRS]
-    page.text("- *Not comparable*: microseconds a pair. EBP's 0.009 us are about 30 clock cycles, less than one "
-              "intersection test of two triangles takes. EBP's text says that the optimisation gains about 10 %; its "
+    page.text("- *Not comparable*: time of a pair. EBP's 0.009 us are about 30 clock cycles, less than one "
+              "test of two triangles takes. Its text says that the optimisation gains about 10 %; its "
               f"tables show a factor of {min(gains):.1f} to {max(gains):.1f}.",
-              "- *Not comparable*: pairs a step, as models and poses differ.",
-              "- *Comparable in order of magnitude*: a first contact, with the models in memory. PQP's 26 s are "
-              "not the time of PQP's test alone: FCL takes less than 0.1 ms ([collide](collide.md)). SWIFT++ does not load "
-              "2.5 million faces.")
+              "- *Not comparable*: pairs a step; models and poses differ.",
+              "- *Comparable in order of magnitude*: a first contact. EBP does not explain PQP's 26 s; FCL takes less "
+              "than 0.1 ms ([collide](collide.md)). SWIFT++ does not load 2.5 million faces.")

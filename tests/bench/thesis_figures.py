@@ -44,6 +44,10 @@ BP_SENT = {"bunny": ((656, 0, 634, 0, 0, 0, 0, 0, 13_035),
                       (672812, 528315, 494001, 1155304, 757590, 3465912, 3280744, 111654, 25_940_696),
                       (26074, 19949, 19855, 52722, 35932, 158166, 149398, 5486, 710_344))}
 
+# BP tables 3.4 (s for K = 1 and 0.05 %) and 3.7, 3.8 (percent of volume at L0 for K = 1 and 0.1 %).
+BP_K_SECONDS = {"Happy Buddha": (1573.40, 160.82), "Blade": (1565.60, 315.91), "Asian Dragon": (8614.58, 1599.98)}
+BP_K_ROOT_VOLUME = {"Happy Buddha": (196.91, 249.85), "Blade": (373.79, 458.38)}
+
 EBP_FACES = {"Amazona": 28_099_530, "Lucy": 28_055_742}
 EBP_LEVEL_COUNT = 11
 # EBP tables 2 to 4: bytes of .bpl and .bvp of Amazona, 10 to 50 %; the other files do not change.

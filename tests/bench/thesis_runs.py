@@ -291,3 +291,8 @@ STEPS = {
      for percent in (10, 20, 30, 50) for select in ("kmedoids", "offset", "random")} | {
     f"dragon_bp_{k}": (f"BP tables 3.5 and 3.6, K = {k} %", as_bp("dragon_solid", f"{k}%", "0-2"))
     for k in ("0.01", "0.05", "0.5", "5")}
+
+# Expected minutes of one core for steps that are often omitted.
+MINUTES = {"levels_uniform": "20", "lucy16_methods_40": "7", "dragon_bp_1": "10", "dragon_bp_0.5": "10",
+           "dragon_bp_5": "30", "bunny_bp_5": "2", "dragon_sent": "1"}
+LARGE_MINUTES = "11 to 16"
