@@ -15,7 +15,7 @@ import thesis_bp
 import thesis_ebp
 import thesis_figures as theirs
 from query_page import Page, handwritten, reflow
-from thesis_bp import above, by_faces, free_volume, of_levels, sent_factors
+from thesis_bp import above, free_volume, of_levels, sent_factors
 from thesis_ebp import SELECTIONS, contact_times, pair_time, slower_cells
 from thesis_plots import plot
 from thesis_runs import LARGE_MINUTES, MINUTES, PERCENTS, STEPS, Runs
@@ -31,41 +31,37 @@ def levels_of(names):
     return " to ".join(out) if len(out) == 2 and len(numbers) > 2 else ", ".join(out)
 
 
+def span(values):
+    return f"{min(values):.1f} to {max(values):.{0 if max(values) >= 10 else 1}f}"
+
+
 def advantages(runs):
     """What is better than in the theses, by how much."""
-    bunny, dragon, large, memory, lucy = (*(runs.result(s) for s in ("bunny", "dragon", "large", "memory")),
-                                          theirs.EBP_LUCY)
-    path, uniform = runs.result("modes_path"), runs.result("modes_uniform")
-    out = []
-    if dragon and large:
-        out.append(f"build {theirs.BP_MODELS['dragon']['build'] / dragon['build']:.0f} times (dragon, BP) and "
-                   f"{lucy['build'] / large['build']:.1f} times as fast (Lucy, EBP)")
+    bunny, dragon, large, memory = (runs.result(s) for s in ("bunny", "dragon", "large", "memory"))
+    path, uniform, contact = (runs.result(s) for s in ("modes_path", "modes_uniform", "collisions"))
+    out, lucy = [], theirs.EBP_LUCY
+    if bunny and dragon and large:
         kb = [(theirs.BP_MODELS[m]["kb"][0] + theirs.BP_MODELS[m]["kb"][1]) * 1024 / r["bytes"]
               for m, r in (("bunny", bunny), ("dragon", dragon))]
         per_face = lucy["collisions"] / theirs.EBP_FACES["Lucy"] / (large["bytes"] / large["faces"])
-        out.append(f"BP's index alone takes {min(kb):.1f} to {max(kb):.1f} times our whole file, EBP's files "
-                   f"{per_face:.0f} times per face")
-    if memory:
-        out.append(f"loading {lucy['load'] / memory['open'][4]:.0f} times as fast")
-    if path and uniform:
-        ranges = []
-        for column, found in ((1, path), (0, uniform)):
-            factors = [theirs.EBP_MODES[m][column] * 1000 / found[m]["ns"]["mean"] for m in theirs.EBP_MODES]
-            ranges.append(f"{min(factors):.1f} to {max(factors):.0f}")
-        out.append(f"points out of core {ranges[0]} (path) and {ranges[1]} times as fast (uniform)")
-    contact = runs.result("collisions")
+        out.append(f"the whole file is {span(kb)} times smaller than BP's index, {per_face:.0f} times than EBP's files (per face)")
+        out.append(f"build {theirs.BP_MODELS['dragon']['build'] / dragon['build']:.0f} (dragon, BP) and "
+                   f"{lucy['build'] / large['build']:.1f} times (Lucy, EBP) as fast")
+    if memory and path and uniform:
+        factors = [[theirs.EBP_MODES[m][column] * 1000 / found[m]["ns"]["mean"] for m in theirs.EBP_MODES]
+                   for column, found in ((1, path), (0, uniform))]
+        out.append(f"loading {lucy['load'] / memory['open'][4]:.0f}, points out of core {span(factors[0])} (path) and "
+                   f"{span(factors[1])} times (uniform)")
     if contact:
-        factors = [times[1] / contact_times(contact[ours]["first"])[0] for _, times, ours in theirs.EBP_FIRST]
-        if min(factors) > 1:
-            out.append(f"a first contact {min(factors):.1f} to {max(factors):.1f} times as fast")
+        out.append(f"a first contact {span([t[1] / contact_times(contact[o]['first'])[0] for _, t, o in theirs.EBP_FIRST])} times")
     sent = sent_factors(runs, "bunny") + sent_factors(runs, "dragon")
     if sent:
-        out.append(f"bytes to send {min(sent):.1f} to {max(sent):.0f} times fewer (one cost model)")
+        out.append(f"{span(sent)} times fewer bytes to send")
     if dragon:
         better = [f"L{i}" for i, (a, b) in enumerate(zip(of_levels(dragon), theirs.BP_VOLUME["dragon"])) if a < b]
-        fewer = [theirs.BP_PLANES["dragon"][i] / dragon["levels"][i]["planes"] for i in (0, 4)]
-        out.append(f"less volume at the dragon's {levels_of(better)} with {min(fewer):.0f} to {max(fewer):.0f} times fewer "
-                   "planes (L0, L4)")
+        fewer = [theirs.BP_PLANES["dragon"][i] / dragon["levels"][i]["planes"] for i in range(5)]
+        out.append(f"less volume at the dragon's {levels_of(better)}, with {min(fewer):.0f} to {max(fewer):.0f} times fewer "
+                   "planes")
     return out
 
 
@@ -75,31 +71,27 @@ def losses(runs):
     path, uniform, contact = (runs.result(s) for s in ("modes_path", "modes_uniform", "collisions"))
     out, known = [], theirs.BP_VOLUME
     if bunny and dragon and large:
-        with_faces = above(by_faces(dragon), known["dragon"]) + above(by_faces(bunny), known["bunny"])
-        out.append(f"volume of stored planes at the dragon's {levels_of(above(of_levels(dragon), known['dragon']))}, the bunny's "
-                   f"{levels_of(above(of_levels(bunny), known['bunny']))} (with planes derived from faces: "
-                   f"{', '.join(with_faces) or 'none'}), Lucy's "
-                   f"{levels_of(above(of_levels(large), theirs.EBP_LUCY['volume']))}")
-        out.append(f"exact distances: in memory {bunny['distance']['ns']['mean'] / 1000:.1f} to "
-                   f"{dragon['distance']['ns']['mean'] / 1000:.0f} us (BP, bounded search: 0.5 to 1)"
-                   + (f", out of core {path['distance']['ns']['mean'] / 1000:.0f} us along a path, "
-                      f"{uniform['distance']['ns']['mean'] / 1e6:.0f} ms uniform (EBP, not always the minimum: 15, 878 us)"
+        dense = [l for l in above(of_levels(dragon), theirs.BP_K_VOLUME["5"])
+                 if l not in above(of_levels(dragon), known["dragon"])]
+        out.append(f"volume at the dragon's {levels_of(above(of_levels(dragon), known['dragon']))}, the bunny's "
+                   f"{levels_of(above(of_levels(bunny), known['bunny']))}, Lucy's {levels_of(above(of_levels(large), theirs.EBP_LUCY['volume']))}"
+                   f", for K = 5 % the dragon's {levels_of(dense)}")
+        out.append(f"an exact distance: {span([d['distance']['ns']['mean'] / 1000 for d in (bunny, dragon)])} us in memory (BP, "
+                   "bounded: 0.5 to 1)"
+                   + (f", {path['distance']['ns']['mean'] / 1000:.0f} us (path) and "
+                      f"{uniform['distance']['ns']['mean'] / 1e6:.0f} ms (uniform) out of core (EBP, not exact: 15, 878 us)"
                       if path and uniform else ""))
-    slow = slower_cells(runs)
-    out += [f"{title}: {levels_of(names)}" for title, names in slow.items() if names]
+    out += [f"{title}: {levels_of(names)}" for title, names in slower_cells(runs).items() if names]
     if contact:
-        first = [(contact_times(contact[ours]["first"])[0] / times[1], name) for name, times, ours in theirs.EBP_FIRST]
-        worse = [f"{name} {factor:.1f} times as slow" for factor, name in first if factor > 1]
-        out += ["first contact: " + ", ".join(worse)] if worse else []
         steps = contact["lucy_lucy"]
-        out.append(f"a pair of faces of two Lucys {pair_time(steps['all']):.2f} us, "
-                   f"{pair_time(steps['budget']):.1f} with 256 MiB (EBP: 0.09; not comparable)")
-    return out + ["at most 255 planes a node in files (BP: 2,955)"]
+        out.append(f"a pair of faces: {pair_time(steps['all']):.1f} us, with 256 MiB {pair_time(steps['budget']):.0f} "
+                   "(EBP: 0.09)")
+    return out + ["at most 255 planes a node (BP: 2,955)"]
 
 
 def summary(runs):
     """The result, in the first ten lines: what is better, by how much, and what is not."""
-    return [f"- *Better* (times: other machines): {'; '.join(advantages(runs))}.",
+    return [f"- *Better* (speeds: other machines): {'; '.join(advantages(runs))}.",
             f"- *Not better*: {'; '.join(losses(runs))}."]
 
 

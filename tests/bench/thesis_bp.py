@@ -63,13 +63,15 @@ def volumes(page, runs):
               "Volume of the envelopes in percent of the solid, then planes; ours are those of gray nodes, as planes of leaves are "
               "derived from faces. *BP here*: k-medoids, N = 50 by criterion 1, nine levels, `report --unlimited --coalesce "
               "sum`. *In a file*: at most 255 planes a node and distinct faces.")
-    for name, step in (("bunny", "bunny_bp"), ("dragon", "dragon_bp_1")):
+    for name, steps in (("bunny", ["bunny_bp"]), ("dragon", ["dragon_bp_1", "dragon100k_bp_1"])):
+        step = next((s for s in steps if runs.result(s)), steps[0])
         count = len(theirs.BP_VOLUME[name])
         rows = [["BP, K = 1 %", *padded(percent(theirs.BP_VOLUME[name]), count)]]
         found, ours = runs.result(step), runs.result(name)
         if found:
             method = found["methods"][0]
-            rows.append(["BP here, K = 1 %", *padded(percent(free_volume(found, method)), count)])
+            here = "BP here" + (f", {found['faces']:,} faces" if step == "dragon100k_bp_1" else "")
+            rows.append([f"{here}, K = 1 %", *padded(percent(free_volume(found, method)), count)])
             if len(method["levels"]) > 3:
                 rows.append(["in a file, K = 1 %", *padded(percent(file_volume(found, method)), count)])
         if ours:
@@ -77,7 +79,7 @@ def volumes(page, runs):
             rows.append(["our default, leaves by faces", *padded(percent(by_faces(ours)), count)])
         rows.append(["planes, BP", *padded([f"{n:,}" for n in theirs.BP_PLANES[name]], count)])
         if found:
-            rows.append(["planes, BP here", *padded(
+            rows.append([f"planes, {here}", *padded(
                 [f"{n:,}" for n in all_planes(found["methods"][0]["unlimited"]["levels"])], count)])
         if ours:
             rows.append(["planes, our default", *padded([f"{l['planes']:,}" for l in ours["levels"]], count)])

@@ -98,7 +98,7 @@ def slower_cells(runs):
     out = {}
     for points, column in (("uniform", 0), ("path", 1)):
         found = runs.result(f"levels_{points}")
-        for query, table in (("inside", theirs.EBP_INSIDE_LEVELS), ("distance to the envelope", theirs.EBP_DISTANCE_LEVELS)):
+        for query, table in (("inside", theirs.EBP_INSIDE_LEVELS), ("distance to envelopes", theirs.EBP_DISTANCE_LEVELS)):
             here = found[query.split()[0]] if found else []
             out[f"{query}, {points}"] = [f"L{i}" for i, (row, ns) in enumerate(zip(table, here))
                                          if row[column] and ns and ns / 1000 > row[column]]
