@@ -114,11 +114,10 @@ def choices_of_k(page, runs):
                 "bunny, root", "L0", "L4"], rows)
     dense, middle, sparse = (of_one_k(runs, "bunny", k) for k in ("1", "0.1", "0.05"))
     if dense and middle and sparse:
-        faster = ", ".join(f"{a / b:.1f} times ({name})" for name, (a, b) in theirs.BP_K_SECONDS.items())
+        faster = ", ".join(f"{a / b:.1f} ({name})" for name, (a, b) in theirs.BP_K_SECONDS.items())
         larger = ", ".join(f"{b / a:.2f} ({name})" for name, (a, b) in theirs.BP_K_ROOT_VOLUME.items())
-        page.text(f"With K = 0.05 % instead of 1 %, BP builds faster: {faster}; here {dense[2] / sparse[2]:.1f} times "
-                  f"(bunny). With 0.1 % its volume at L0 grows by a factor of {larger}; here "
-                  f"{middle[1][0] / dense[1][0]:.2f} (bunny).")
+        page.text(f"With K = 0.05 % instead of 1 %, BP builds faster by factors of {faster}; here {dense[2] / sparse[2]:.1f} "
+                  f"(bunny). With 0.1 %, its volume of L0 grows by {larger}; here {middle[1][0] / dense[1][0]:.2f} (bunny).")
 
 
 def leaf_counts(levels):
@@ -136,7 +135,7 @@ def leaves(page, runs):
               "of a node with at most `--leaf-faces` distinct faces. "
               f"On average, the {nodes:,} nodes with faces of level 5 have {entries[0] / nodes:.1f} distinct faces, and "
               f"the lists of their children {entries[1] / nodes:.1f} (`convert --leaf-faces 0 --max-level 5` and `6`, "
-              f"`info`). So BP's rule divides {found['sum'][5]['gray']:,} of them, ours with 49 "
+              f"`info`). So BP's rule divides {found['sum'][5]['gray']:,} of them, `--leaf-faces 49` "
               f"{found['distinct']['49'][5]['gray']:,}. Criterion 2 joins siblings while "
               "their mean is below AV = 20; BP's counts are those found here, one level lower.")
     rows = []

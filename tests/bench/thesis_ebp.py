@@ -5,7 +5,7 @@ import statistics
 import thesis_figures as theirs
 from query_page import figure
 from thesis_bp import free_volume, of_levels, padded, percent
-from thesis_runs import CROSSING_STEPS, PERCENTS, SHOWN_LEVELS
+from thesis_runs import CROSSING_STEPS, PERCENTS, SHOWN_LEVELS, SOME_POINTS
 
 SELECTIONS = ("kmedoids", "offset", "random")
 OURS = {"lucy_lucy": "Lucy 25.6 M, itself", "lucy_armadillo": "Lucy 25.6 M, armadillo 86 K",
@@ -112,9 +112,9 @@ def queries(page, runs):
     few = uniform or {}
     mean = lambda step, mode: step[mode]["ns"]["mean"] / 1000 if step else None
     page.text("## Points out of core (EBP tables 21 to 28)", "",
-              f"EBP: Lucy, 10^6 points, levels 1 to 5 in memory. Ours: {runs.result('large')['faces']:,} faces, the "
-              "same levels in memory (L0 to L4, `--cut-level 4`), 32 MiB, 100,000 uniform points and 100,000 of a path, "
-              "single calls, wall-clock us, loading included; files are in the page cache (EBP does not state it).")
+              "EBP: Lucy, 10^6 points, levels 1 to 5 in memory. Ours: Lucy of 25.6 million faces, the same levels in memory "
+              "(L0 to L4, `--cut-level 4`), 32 MiB, 100,000 points, single calls, wall-clock us, loading included; "
+              "files are in the page cache (EBP does not state it).")
     rows = [[f"`{mode}`", figure(mean(few, mode) if few else None), figure(mean(path, mode)),
              *(figure(t) for t in theirs.EBP_MODES[mode])] for mode in theirs.EBP_MODES]
     rows.append(["exact distance" + (f" ({few['distance']['count']:,} uniform points)" if few else ""),
@@ -125,8 +125,8 @@ def queries(page, runs):
     deep, deep_path = runs.result("levels_uniform"), runs.result("levels_path")
     if not deep_path:
         return
-    page.text("To a level, at equal depth: EBP's level k is our level k - 1 (its algorithm 7 starts with the root as "
-              "level 1). Point in solid with cache, and distance to the envelope:")
+    page.text("To a level: EBP's level k is our level k - 1, as its algorithm 7 starts with the root as level 1. Point in solid "
+              f"with cache, and distance to the envelope ({SOME_POINTS:,} uniform points):")
     rows = []
     for i in SHOWN_LEVELS:
         rows.append([f"L{i}", *(figure(d["inside"][i] / 1000 if d else None) for d in (deep, deep_path)),
@@ -154,8 +154,8 @@ def collisions(page, runs):
         return
     page.text("## Collision (EBP tables 29 to 33)", "",
               f"One model moves along x through another (`crossing_ebpo`, {CROSSING_STEPS + 1} steps). Ours: one "
-              "thread, processor time, in memory or with 256 MiB for each model. EBP's other two scenarios of table 30 have "
-              "models that are not available.")
+              "thread, processor time, in memory or with 256 MiB for each model. Models of EBP's other two scenarios are not "
+              "available.")
     rows = []
     for name, pairs, plain, optimised, ours in theirs.EBP_PAIRS:
         if ours:
