@@ -71,11 +71,11 @@ def losses(runs):
     path, uniform, contact = (runs.result(s) for s in ("modes_path", "modes_uniform", "collisions"))
     out, known = [], theirs.BP_VOLUME
     if bunny and dragon and large:
-        dense = [l for l in above(of_levels(dragon), theirs.BP_K_VOLUME["5"])
-                 if l not in above(of_levels(dragon), known["dragon"])]
-        out.append(f"volume at the dragon's {levels_of(above(of_levels(dragon), known['dragon']))}, the bunny's "
-                   f"{levels_of(above(of_levels(bunny), known['bunny']))}, Lucy's {levels_of(above(of_levels(large), theirs.EBP_LUCY['volume']))}"
-                   f", for K = 5 % the dragon's {levels_of(dense)}")
+        of_dragon, of_bunny = above(of_levels(dragon), known["dragon"]), above(of_levels(bunny), known["bunny"])
+        of_lucy = above(of_levels(large), theirs.EBP_LUCY["volume"])
+        dense = [l for l in above(of_levels(dragon), theirs.BP_K_VOLUME["5"]) if l not in of_dragon]
+        out.append(f"volume at the dragon's {levels_of(of_dragon)}, the bunny's {levels_of(of_bunny)}, Lucy's "
+                   f"{levels_of(of_lucy)}, for K = 5 % the dragon's {levels_of(dense)}")
         out.append(f"an exact distance: {span([d['distance']['ns']['mean'] / 1000 for d in (bunny, dragon)])} us in memory (BP, "
                    "bounded: 0.5 to 1)"
                    + (f", {path['distance']['ns']['mean'] / 1000:.0f} us (path) and "
