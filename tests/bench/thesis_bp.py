@@ -70,16 +70,16 @@ def volumes(page, runs):
         found, ours = runs.result(step), runs.result(name)
         if found:
             method = found["methods"][0]
-            here = "BP here" + (f", {found['faces']:,} faces" if step == "dragon100k_bp_1" else "")
-            rows.append([f"{here}, K = 1 %", *padded(percent(free_volume(found, method)), count)])
+            few = f" ({found['faces']:,} faces)" if step == "dragon100k_bp_1" else ""
+            rows.append([f"BP here, K = 1 %{few}", *padded(percent(free_volume(found, method)), count)])
             if len(method["levels"]) > 3:
                 rows.append(["in a file, K = 1 %", *padded(percent(file_volume(found, method)), count)])
         if ours:
             rows.append(["our default", *padded(percent(of_levels(ours)), count)])
             rows.append(["our default, leaves by faces", *padded(percent(by_faces(ours)), count)])
         rows.append(["planes, BP", *padded([f"{n:,}" for n in theirs.BP_PLANES[name]], count)])
-        if found:
-            rows.append([f"planes, {here}", *padded(
+        if found and not few:
+            rows.append(["planes, BP here", *padded(
                 [f"{n:,}" for n in all_planes(found["methods"][0]["unlimited"]["levels"])], count)])
         if ours:
             rows.append(["planes, our default", *padded([f"{l['planes']:,}" for l in ours["levels"]], count)])
@@ -177,8 +177,7 @@ def sending(page, runs):
               "bunny do not: the row of level 5 has about the geometry of level 6, that of level 6 "
               "little of it. *Here*: by the same model, with leaves of 50 faces and stored leaf planes. At the bunny's level "
               f"{last['level']} ours has an excess volume of {last['excess']:.2f} %, BP's "
-              f"{theirs.BP_VOLUME['bunny'][last['level']] - 100:.2f} %. [transmission](transmission.md) has the bytes of "
-              "our files.")
+              f"{theirs.BP_VOLUME['bunny'][last['level']] - 100:.2f} %.")
     rows = []
     for i in range(10):
         row = [i]

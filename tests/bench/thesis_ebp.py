@@ -24,7 +24,6 @@ def large_build(page, runs):
     memory = runs.result("memory")
     rows = [["build, s", figure(lucy["build"]), figure(ours["build"])],
             ["processor time of the command, s", "-", figure(ours["cpu"])],
-            ["peak memory of the build, MiB", "-", figure(ours["peak"] / 2**20)],
             ["PLY, MB", figure(lucy["ply"] / 1e6), figure(ours["ply"] / 1e6)],
             ["files, MB; divided by PLY", f"{figure(lucy['collisions'] / 1e6)}; {lucy['collisions'] / lucy['ply']:.2f}",
              f"{figure(ours['bytes'] / 1e6)}; {ours['bytes'] / ours['ply']:.3f}"],
@@ -154,8 +153,7 @@ def collisions(page, runs):
         return
     page.text("## Collision (EBP tables 29 to 33)", "",
               f"One model moves along x through another (`crossing_ebpo`, {CROSSING_STEPS + 1} steps). Ours: one "
-              "thread, processor time, in memory or with 256 MiB for each model. Models of EBP's other two scenarios are not "
-              "available.")
+              "thread, processor time, in memory or with 256 MiB for each model.")
     rows = []
     for name, pairs, plain, optimised, ours in theirs.EBP_PAIRS:
         if ours:
