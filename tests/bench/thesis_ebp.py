@@ -125,7 +125,7 @@ def queries(page, runs):
     if not deep_path:
         return
     page.text("To a level: EBP's level k is our level k - 1, as its algorithm 7 starts with the root as level 1. Point in solid "
-              f"with cache, and distance to the envelope ({SOME_POINTS:,} uniform points):")
+              f"with cache, and distance to the envelope (uniform: at most this processor time, from L5 on {SOME_POINTS:,} points):")
     rows = []
     for i in SHOWN_LEVELS:
         rows.append([f"L{i}", *(figure(d["inside"][i] / 1000 if d else None) for d in (deep, deep_path)),

@@ -15,6 +15,8 @@ MODES = ("cache", "nodes", "subtree", "cache-plain", "nodes-plain", "subtree-pla
 MEMORY = 32 << 20
 SHOWN_LEVELS = (0, 4, 5, 7, 10)
 POINTS, SOME_POINTS, FEW_POINTS = 100_000, 10_000, 1_000
+LEVEL_WORDS = ("--cut-level", CUT, "--memory", MEMORY)
+LEVEL_QUERIES = {"inside": ("--mode", "cache"), "distance": ("--query", "distance", "--mode", "envelope")}
 CROSSING_STEPS = 40
 # Name, the fixed model, the one that moves, and its size: its diagonal divided by the other's.
 SCENARIOS = (("lucy_lucy", "lucy_x256", "lucy_x256", 1), ("lucy_armadillo", "lucy_x256", "armadillo", 0.5),
@@ -216,24 +218,29 @@ def modes(points):
     return step
 
 
-def levels(points):
-    """EBP tables 23, 24, 26 and 28: to a level. Uniform points are fewer, as each loads a subtree."""
-    def step(runs):
-        count = POINTS if points == "path" else SOME_POINTS
-        words = ["--points", points, "--count", count, "--cut-level", CUT, "--memory", MEMORY]
-        deepest = len(runs.result("large")["levels"]) - 1
-        out = {"inside": [], "distance": []}
-        for level in range(deepest + 1):
-            if points == "uniform" and level not in SHOWN_LEVELS:  # each takes minutes
-                out["inside"].append(None)
-                out["distance"].append(None)
-                continue
-            out["inside"].append(runs.bench("lucy_x256", *words, "--mode", "cache", "--max-level",
-                                            level)["ns"]["mean"])
-            out["distance"].append(runs.bench("lucy_x256", *words, "--query", "distance", "--mode",
-                                              "envelope", "--max-level", level)["ns"]["mean"])
-        return out
-    return step
+def levels_path(runs):
+    """EBP tables 24, 26 and 28: to a level, wall-clock ns."""
+    words = ["--points", "path", "--count", POINTS, *LEVEL_WORDS]
+    deepest = len(runs.result("large")["levels"]) - 1
+    return {query: [runs.bench("lucy_x256", *words, *mode, "--max-level", level)["ns"]["mean"]
+                    for level in range(deepest + 1)] for query, mode in LEVEL_QUERIES.items()}
+
+
+def levels_uniform(runs):
+    """EBP tables 23, 26 and 28: to a level, processor time in ns, without opening: an upper bound, as it is
+    that of single calls and of one batch. Below the cut level, points are fewer, as each loads a subtree."""
+    def processor(count, *mode):
+        return runs.call(runs.ebpo, "bench", "--json", "--points", "uniform", "--count", count, *LEVEL_WORDS,
+                         *mode, runs.file("lucy_x256"))["cpu"]
+    out = {}
+    for query, mode in LEVEL_QUERIES.items():
+        opening = min(processor(1, *mode) for _ in range(3))
+        out[query] = [None] * (max(SHOWN_LEVELS) + 1)
+        for level in SHOWN_LEVELS:
+            count = POINTS if level <= CUT else SOME_POINTS
+            took = processor(count, *mode, "--max-level", level) - opening
+            out[query][level] = 1e9 * took / count
+    return out
 
 
 def collisions(runs):
@@ -278,9 +285,9 @@ STEPS = {
     "memory": ("EBP tables 1, 5 to 7, 11, 16, 17, 19", memory_by_level),
     "collisions": ("EBP tables 29 to 33", collisions),
     "modes_path": ("EBP tables 22, 25, 27, 28", modes("path")),
-    "levels_path": ("EBP tables 24, 26, 28", levels("path")),
+    "levels_path": ("EBP tables 24, 26, 28", levels_path),
     "modes_uniform": ("EBP tables 21, 25, 27, 28", modes("uniform")),
-    "levels_uniform": ("EBP tables 23, 26, 28", levels("uniform")),
+    "levels_uniform": ("EBP tables 23, 26, 28", levels_uniform),
     "large_kmedoids_40": ("EBP tables 4, 10, 14 to 20", large_selection("kmedoids", 40)),
     "dragon_bp_1": ("BP tables 3.3, 3.5, 3.9, 4.1, 4.3", as_bp("dragon_solid", "1%", "0-2")),
     "lucy16_methods_40": ("EBP tables 12 to 14, 40 %, 1.6 million faces",
