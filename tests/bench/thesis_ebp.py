@@ -25,7 +25,8 @@ def large_build(page, runs):
     rows = [["build, s", figure(lucy["build"]), figure(ours["build"])],
             ["processor time of the command, s", "-", figure(ours["cpu"])],
             ["PLY, MB", figure(lucy["ply"] / 1e6), figure(ours["ply"] / 1e6)],
-            ["files without data for drawing, MB; divided by PLY", f"{figure(lucy['collisions'] / 1e6)}; {lucy['collisions'] / lucy['ply']:.2f}",
+            ["files without data for drawing, MB; divided by PLY",
+             f"{figure(lucy['collisions'] / 1e6)}; {lucy['collisions'] / lucy['ply']:.2f}",
              f"{figure(ours['bytes'] / 1e6)}; {ours['bytes'] / ours['ply']:.3f}"],
             ["bytes per face", figure(lucy["collisions"] / theirs.EBP_FACES["Lucy"]),
              figure(ours["bytes"] / ours["faces"])]]
