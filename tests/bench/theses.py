@@ -4,6 +4,7 @@
     theses.py BUILD_DIR MODELS_DIR WORK_DIR [-o docs/measured/theses.md] [--pictures docs/pictures]
               [--run STEP... | --no-run]
 
+BUILD_DIR is a release build with -Dpeers=enabled (the step `collisions` runs crossing_ebpo).
 Each step's result is kept in WORK_DIR/results, so the script continues where it stopped; --list
 prints the steps. The page has the steps that were run, and names the others."""
 import argparse

@@ -135,8 +135,8 @@ def leaves(page, runs):
               "of a node with at most `--leaf-faces` distinct faces. "
               f"On average, the {nodes:,} nodes with faces of level 5 have {entries[0] / nodes:.1f} distinct faces, and "
               f"the lists of their children {entries[1] / nodes:.1f} (`convert --leaf-faces 0 --max-level 5` and `6`, "
-              f"`info`). So BP's rule divides {found['sum'][5]['gray']:,} of them, `--leaf-faces 49` "
-              f"{found['distinct']['49'][5]['gray']:,}. Criterion 2 joins siblings while "
+              f"`info`). So BP's rule divides {found['sum'][5]['gray']:,} of them, ours "
+              f"(`--leaf-faces 49`) {found['distinct']['49'][5]['gray']:,}. Criterion 2 joins siblings while "
               "their mean is below AV = 20; BP's counts are those found here, one level lower.")
     rows = []
     for title, counts in (("BP, criterion 1", theirs.BP_LEAVES["sum"]),
