@@ -302,6 +302,6 @@ STEPS = {
     for k in ("0.01", "0.05", "0.5", "5")}
 
 # Expected minutes of one core for steps that are often omitted.
-MINUTES = {"levels_uniform": 3, "lucy16_methods_40": 7, "bunny_bp_5": 5, "dragon_bp_0.5": 30, "dragon_bp_1": 30,
+MINUTES = {"levels_uniform": 3, "lucy16_methods_40": 7, "bunny_bp_5": 10, "dragon_bp_0.5": 30, "dragon_bp_1": 30,
            "dragon_bp_5": 30}
 LARGE_MINUTES = "11 to 16"
