@@ -26,6 +26,7 @@ START_TEST(test_error_of_missing_file)
     ck_assert_str_eq(error.file, "/no/such/file.ebpo.h5");
     ck_assert_str_eq(error.object, "");
     ck_assert_int_eq(error.offset, -1);
+    ck_assert_int_eq(error.system_error, ENOENT);
     assert_begins(&error);
 }
 END_TEST
