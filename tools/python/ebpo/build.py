@@ -66,8 +66,6 @@ def convert(mesh: AnyMesh, output: Path, *, overwrite: bool = False, parts: str 
     """
     if date and not lib.ebpo_is_date(date):
         raise ValueError(f"date: {date!r} is not a valid date in ISO 8601, such as 2026-11-26")
-    if unit and unit not in UNITS:
-        warnings.warn(f"unit: {unit!r} is not a known unit of length, such as 'mm'; it is stored as it is", stacklevel=2)
     for what, given, known in (("rule", rule, RULES), ("codec", codec, CODECS)):
         if given not in known:
             raise ValueError(f"{what}: expected one of {', '.join(map(repr, known))}, not {given!r}")
@@ -96,6 +94,8 @@ def convert(mesh: AnyMesh, output: Path, *, overwrite: bool = False, parts: str 
              ctypes.byref(build), tree)
         write = made(c.ebpo_write_options, codec=CODECS[codec], codec_level=codec_level, **common)
         call("ebpo_tree_write", tree, path(output, "output"), ctypes.byref(write))
+    if unit and unit not in UNITS:
+        warnings.warn(f"unit: {unit!r} is not a known unit of length, such as 'mm'; it is stored as it is", stacklevel=2)
     return open_model(output)
 
 

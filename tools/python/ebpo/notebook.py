@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import base64
+import contextlib
 import html
 import struct
 import zlib
@@ -33,11 +34,11 @@ def html_of(model: Model) -> str:
         rows.append(("CRS", info.crs))
     cells = "".join(f"<tr><th style='text-align:left'>{name}</th><td style='text-align:left'>{html.escape(text)}</td></tr>"
                     for name, text in rows)
-    try:
-        data = base64.b64encode(png_of(picture(model))).decode()
-        image = f"<img alt='envelopes of a coarse level' src='data:image/png;base64,{data}'>"
-    except (Error, ValueError):  # for example: the file has no envelopes
-        image = ""
+    image = ""
+    if "planes" in info.parts:
+        with contextlib.suppress(Error, ValueError):  # the facts are useful without a picture
+            data = base64.b64encode(png_of(picture(model))).decode()
+            image = f"<img alt='envelopes of a coarse level' src='data:image/png;base64,{data}'>"
     return f"<table><tr><td>{image}</td><td><table>{cells}</table></td></tr></table>"
 
 

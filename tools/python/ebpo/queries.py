@@ -106,7 +106,7 @@ class Rows:
 def shaped(values: np.ndarray, shape: tuple[int, ...], valid: np.ndarray | None, missing: Any) -> Any:
     """Return one result for each item of `shape`. A single result is a scalar, unless it has columns."""
     if valid is not None:
-        every = np.full((len(valid), *values.shape[1:]), missing, values.dtype)
+        every = np.full((len(valid), *values.shape[1:]), np.array(missing, values.dtype))
         every[valid] = values
         values = every
     return values[0] if shape == () else values.reshape(*shape, *values.shape[1:])
