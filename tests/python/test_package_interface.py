@@ -27,11 +27,10 @@ from ebpo import notebook
 
 P = points(3000)
 USES = '''
-import functools
-import numpy as np, ebpo
+import numpy as np, numpy.typing as npt, ebpo
 m: ebpo.Model = ebpo.open("scan.ebpo.h5", memory="1G", headers={"A": "b"})
 P = np.zeros((4, 3), np.float32)
-inside: np.ndarray = m.inside(P, nan="propagate")
+inside: npt.NDArray[np.bool_] = m.inside(P, nan="propagate")
 d, point, normal, face = m.distance([[0, 0, 0]], max_distance=1)
 total: float = float(d.sum()) + m.volume + m.measure().area + m.bounds.max()
 hits = m.ray(P, [0, 0, 1], sides="front")

@@ -10,8 +10,8 @@ from .parts import Mass, Mesh
 from .signatures import ArrayLike, Bools, Doubles, Int64s, Uint32s, Vertices
 
 if TYPE_CHECKING:
-    import pyvista
-    import trimesh
+    import pyvista  # type: ignore[import-not-found, import-untyped, unused-ignore]
+    import trimesh  # type: ignore[import-not-found, import-untyped, unused-ignore]
 
 
 def arrays_of(mesh: Any) -> tuple[Any, Any]:

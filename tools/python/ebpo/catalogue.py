@@ -246,7 +246,8 @@ def interruptible(work: Callable[[Any], None], rows: int) -> None:
     if rows < LONG or threading.current_thread() is not threading.main_thread():
         work(c.ebpo_progress())
         return
-    stopped, ended, once, failed = threading.Event(), threading.Event(), threading.Lock(), []
+    stopped, ended, once = threading.Event(), threading.Event(), threading.Lock()
+    failed: list[BaseException] = []
 
     def body() -> None:
         if not once.acquire(blocking=False):  # after an interrupt of start() the thread may be started twice

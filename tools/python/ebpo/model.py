@@ -23,8 +23,8 @@ from .signatures import ArrayLike, Doubles, Path, Progress, Size, Source
 from .sources import opened
 
 if TYPE_CHECKING:
-    import pyvista
-    import trimesh
+    import pyvista  # type: ignore[import-not-found, import-untyped, unused-ignore]
+    import trimesh  # type: ignore[import-not-found, import-untyped, unused-ignore]
     from .adapters import TrimeshLike
 
 # For each kind of query: the share of its time that partial loading costs
@@ -310,7 +310,7 @@ class Model(PointQueries):
                 np.minimum(box[0], corners.min(axis=0, initial=np.inf), out=box[0])
                 np.maximum(box[1], corners.max(axis=0, initial=-np.inf), out=box[1])
 
-            self._triangles(*self.info.box, take)
+            self._triangles(self.info.box[0], self.info.box[1], take)
             self._bounds = box
         return self._bounds.copy()
 

@@ -6,6 +6,7 @@ import os
 from typing import Any
 
 from . import _declared as c
+from ._checked import members_of
 from ._library import Handle, lib, made, size_in_bytes, text
 from .errors import BY_STATUS, Error
 from .forks import renew_after_fork
@@ -13,9 +14,9 @@ from .signatures import Size
 from .sources import opened, shown
 
 BUDGET = 1 << 30
-CODES = {kind: code for code, kind in BY_STATUS.items()}
+CODES: dict[type, int] = {kind: code for code, kind in BY_STATUS.items()}
 IO, CANCELLED = -3, -9
-ENTRY: dict = {name: kind for name, kind in c.ebpo_catalogue_options._fields_}
+ENTRY: dict = dict(members_of(c.ebpo_catalogue_options))
 
 _files: dict[int, Handle] = {}  # files that the library has open, by their addresses
 _options: list[dict] = []  # options of catalogues; the number of an opener is its index here plus 1

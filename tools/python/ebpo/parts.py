@@ -8,7 +8,7 @@ from typing import Any, Iterator, NamedTuple
 import numpy as np
 
 from . import _declared as c
-from ._checked import integers
+from ._checked import integers, members_of
 from ._library import Handle, Struct, array, call, copied, lib, made, text
 from .signatures import ArrayLike, Doubles, Int8s, Int32s, Int64s, Uint8s, Uint32s, Uint64s, Vertices
 
@@ -115,7 +115,7 @@ class Info:
                 return bytes(value).hex()
             return np.array(np.ctypeslib.as_array(value))
         if isinstance(value, ctypes.Structure):
-            return {n: Info._plain(getattr(value, n), n) for n, _ in value._fields_}
+            return {n: Info._plain(getattr(value, n), n) for n, _ in members_of(value)}
         return value
 
     def __getattr__(self, name: str) -> Any:

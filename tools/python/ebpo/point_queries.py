@@ -88,12 +88,13 @@ class PointQueries(RayQueries):
         out = Located(np.empty(rows.count, np.int8), np.empty(rows.count, np.int32), np.empty(rows.count))
 
         def put(results: np.ndarray, begin: int, end: int) -> None:
+            array: Any
             for array, name in zip(out, Located._fields):
                 array[begin:end] = results[name]
 
         self._query(rows, "ebpo_inside_many", options, INSIDE, put, threads, progress, "inside")
-        missing = c.EBPO_MAYBE, 0, np.nan
-        return Located(*(rows.result(array, value) for array, value in zip(out, missing)))
+        return Located(rows.result(out.where, c.EBPO_MAYBE), rows.result(out.winding, 0),
+                       rows.result(out.doubt, np.nan))
 
     @staticmethod
     def _inside_options(level: int | None, deadline: float | None) -> Any:

@@ -3,7 +3,8 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
-from typing import Any, Callable, NamedTuple
+import dataclasses
+from typing import Any, Callable
 
 import numpy as np
 
@@ -23,7 +24,8 @@ HIT = np.dtype(c.ebpo_ray_hit)
 SIDES = {"both": c.EBPO_RAY_BOTH, "front": c.EBPO_RAY_FRONT, "back": c.EBPO_RAY_BACK}
 
 
-class Rays(NamedTuple):
+@dataclasses.dataclass(frozen=True)
+class Rays:
     """Rays of a call. shape: that of the results. valid: the rays without NaN; None: all."""
 
     count: int

@@ -12,13 +12,13 @@ from typing import Any, Mapping
 import numpy as np
 
 from . import _declared as c
-from ._checked import path, text, within
+from ._checked import members_of, path, text, within
 from ._library import Handle, call, made, of_members, size_in_bytes
 from .errors import ArgumentError, Error, IOFailure, UnsupportedError
 from .ranges import CONNECTIONS, Ranges, read_whole
 from .web import Patience, Web
 
-FUNCTIONS: dict = {name: kind for name, kind in c.ebpo_source._fields_}
+FUNCTIONS: dict = dict(members_of(c.ebpo_source))
 RANGE = np.dtype(c.ebpo_range)
 IO, CANCELLED = -3, -9
 
@@ -69,7 +69,7 @@ class Stored:
 
     def __init__(self, url: str, storage_options: Mapping[str, Any] | None = None) -> None:
         try:
-            import fsspec
+            import fsspec  # type: ignore[import-not-found, import-untyped, unused-ignore]
         except ImportError:
             raise ImportError(f"{url}: this kind of URL needs fsspec, which is not installed") from None
         self.fs, self.path = fsspec.core.url_to_fs(url, **(storage_options or {}))
