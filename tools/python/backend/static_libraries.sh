@@ -67,7 +67,7 @@ build() {
         ;;
     hdf5)
         CFLAGS="$CFLAGS -w -Wno-implicit-int" ./configure $common $hdf5 && make -j"$jobs" -C src && make -C src install &&
-            describe hdf5 "-lz -lm -ldl" "$2"
+            describe hdf5 "-lz -lm -ldl" "$2" && mv "$prefix/lib/pkgconfig/hdf5.pc" "$prefix/lib/pkgconfig/hdf5-serial.pc"
         ;;
     esac
 }

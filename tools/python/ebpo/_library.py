@@ -25,7 +25,7 @@ def candidates():
     if os.environ.get("EBPO_LIBRARY"):
         yield os.environ["EBPO_LIBRARY"]
         return
-    yield from map(str, sorted(HERE.glob("libebpo.so*")))  # the library in a wheel
+    yield from map(str, sorted(HERE.glob("lib/libebpo.so*")))  # the library in a wheel
     several = sysconfig.get_config_var("MULTIARCH") or "."  # Debian has a folder for each machine type
     for folder in (HERE.parents[2], HERE.parents[2] / "lib", HERE.parents[2] / several):  # prefix, build, Debian
         yield from map(str, sorted(folder.glob("libebpo.so.?")))
