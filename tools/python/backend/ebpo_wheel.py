@@ -94,8 +94,7 @@ def build(folder, libraries, setup_args):
     run("sh", pathlib.Path(__file__).with_name("static_libraries.sh"), libraries, **named)
     named["PKG_CONFIG_LIBDIR"] = str(libraries / "lib/pkgconfig")
     print(run("meson", "setup", folder, ROOT, *SETUP, *setup_args, **named), flush=True)
-    modules = [f"tools/python/ebpo/{path.name}" for path in package_in(ROOT / "tools/python/ebpo")]
-    run("ninja", "-C", folder, "tools/ebpo", "lib/hdf5_write/libebpo_h5zstd.so", "tools/python/ebpo/_declared.py", *modules)
+    run("ninja", "-C", folder)
 
 
 def installed(folder, target):
@@ -228,7 +227,8 @@ def build_sdist(sdist_directory, config_settings=None):
 def main():
     if len(sys.argv) != 3:
         sys.exit(__doc__)
-    name = pack(sys.argv[1], sys.argv[2])
+    libraries = os.environ.get("EBPO_LIBRARIES")
+    name = pack(sys.argv[1], sys.argv[2], libraries and pathlib.Path(libraries))
     print(f"{sys.argv[2]}/{name}: {os.path.getsize(pathlib.Path(sys.argv[2]) / name)} bytes")
 
 
