@@ -174,16 +174,16 @@ typedef struct ebpo_error {
     int64_t offset;
 
     /*
-     * errno of the system call that failed, such as ENOENT; 0 if none, or not recorded. ENOENT is also
-     * set when a web server has no such file.
+     * errno of the system call that failed, such as ENOENT; 0 if none, or not recorded. ENOENT is
+     * also set when a web server has no such file.
      */
     int64_t system_error;
 
     uint64_t reserved[3];
 } ebpo_error;
 
-#define EBPO_ERROR_INIT                \
-    {                                  \
+#define EBPO_ERROR_INIT                   \
+    {                                     \
         EBPO_OK, "", "", "", -1, 0, { 0 } \
     }
 

@@ -35,7 +35,8 @@ export RANLIB="${RANLIB:-ranlib}" PKG_CONFIG_LIBDIR="$prefix/lib/pkgconfig" CPPF
 export LDFLAGS="-L$prefix/lib" LC_ALL=C
 jobs=$(nproc)
 machine=$(uname -m)-pc-linux-gnu # without it GMP uses instructions that only this processor has
-common="--prefix=$prefix --libdir=$prefix/lib --disable-shared --enable-static --with-pic --build=$machine --host=$machine"
+common="--prefix=$prefix --libdir=$prefix/lib --disable-shared --enable-static --with-pic --build=$machine
+    --host=$machine"
 hdf5="--disable-hl --disable-fortran --disable-cxx --disable-tests --disable-tools --disable-parallel
     --enable-build-mode=production --disable-embedded-libinfo --without-szlib --with-zlib=$prefix"
 
@@ -66,8 +67,9 @@ build() {
             describe jansson "" "$2"
         ;;
     hdf5)
-        CFLAGS="$CFLAGS -w -Wno-implicit-int" ./configure $common $hdf5 && make -j"$jobs" -C src && make -C src install &&
-            describe hdf5 "-lz -lm -ldl" "$2" && mv "$prefix/lib/pkgconfig/hdf5.pc" "$prefix/lib/pkgconfig/hdf5-serial.pc"
+        CFLAGS="$CFLAGS -w -Wno-implicit-int" ./configure $common $hdf5 && make -j"$jobs" -C src &&
+            make -C src install && describe hdf5 "-lz -lm -ldl" "$2" &&
+            mv "$prefix/lib/pkgconfig/hdf5.pc" "$prefix/lib/pkgconfig/hdf5-serial.pc"
         ;;
     esac
 }

@@ -279,7 +279,8 @@ class Collider:
         return Clearance(out.distance.lo, out.distance.hi, number(out.pair.face_a), number(out.pair.face_b),
                          np.array(out.point_a), np.array(out.point_b))
 
-    def depth(self, tolerance: float, pose_a: Pose | None = None, pose_b: Pose | None = None) -> tuple[tuple[float, float], tuple[float, float]]:
+    def depth(self, tolerance: float, pose_a: Pose | None = None, pose_b: Pose | None = None
+              ) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return the depth of a's surface in b, and of b's surface in a: (lo, hi) each, at most `tolerance` apart.
 
         >>> (lo, hi), _ = Collider(cube, cube).depth(.01, pose_b=pose(translation=[.75, 0, 0]))
@@ -291,7 +292,8 @@ class Collider:
             call("ebpo_collide_depth", self._handle, options, tolerance, ctypes.byref(a_in_b), ctypes.byref(b_in_a))
         return (a_in_b.lo, a_in_b.hi), (b_in_a.lo, b_in_a.hi)
 
-    def separation(self, direction: ArrayLike, pose_a: Pose | None = None, pose_b: Pose | None = None) -> Separation:
+    def separation(self, direction: ArrayLike, pose_a: Pose | None = None,
+                   pose_b: Pose | None = None) -> Separation:
         """Return the separation distance of a from b along a direction, in multiples of the direction's length.
 
         >>> Collider(cube, cube).separation([1, 0, 0], pose_b=pose(translation=[-.25, 0, 0])).hi

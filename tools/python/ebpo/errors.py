@@ -118,5 +118,6 @@ BY_ERRNO: dict[int, type[IOFailure]] = {
     errno.ENOENT: MissingFileError, errno.EACCES: FileAccessError, errno.EPERM: FileAccessError,
     errno.EISDIR: FolderError, errno.EEXIST: ExistingFileError}
 
-BY_STATUS: dict[int, type[Error]] = {-1: NoMemory, -2: ArgumentError, -3: IOFailure, -4: FormatError, -5: VersionError, -6: UnsupportedError,
-             -7: NotSolidError, -8: LimitError, -9: Cancelled, -10: AbsentError}
+BY_STATUS: dict[int, type[Error]] = {
+    -1: NoMemory, -2: ArgumentError, -3: IOFailure, -4: FormatError, -5: VersionError, -6: UnsupportedError,
+    -7: NotSolidError, -8: LimitError, -9: Cancelled, -10: AbsentError}
