@@ -88,5 +88,7 @@ for name in $names; do
     done
     version=$(sed -n 's/^Version: \([0-9.]*\).*/\1/p' "$found")
     (cd "$work/$name" && build "$name" "$version") || failed "$name"
-    cp "$work/$name/debian/copyright" "$prefix/licences/$name.txt"
+    (cd "$work/$name" && for file in debian/copyright COPYING* LICENSE*; do
+        [ ! -f "$file" ] || printf '%s:\n\n%s\n\n' "${file##*/}" "$(cat "$file")"
+    done) >"$prefix/licences/$name.txt"
 done
