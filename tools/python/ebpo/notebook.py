@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from .model import Model
 
 WIDTH, HEIGHT = 240, 180
-FACES = 8000  # greatest number of triangles of a picture
-NODES = 500  # greatest number of nodes of a level that is drawn
+FACES = 40000  # greatest number of triangles of a picture
+NODES = 1500  # greatest number of nodes of a level that is drawn
 LIGHT = np.array([-0.35, -0.5, 0.79])
 COLOUR = np.array([122, 160, 196])
 
@@ -48,7 +48,7 @@ def picture(model: Model) -> np.ndarray:
               if facts["gray_count"] + facts["leaf_count"] <= NODES]
     image = np.zeros((HEIGHT, WIDTH, 4), np.uint8)
     for level in reversed(levels or [0]):
-        given = model.level(level, cell_faces=level == 0)
+        given = model.level(level)
         if 0 < len(given.faces) <= FACES:
             draw(image, given.vertices[given.faces])
             break
@@ -67,10 +67,11 @@ def draw(image: np.ndarray, corners: np.ndarray) -> None:
     x = (points[:, :, 0] - (low[0] + high[0]) / 2) * scale + WIDTH / 2
     y = HEIGHT / 2 - (points[:, :, 1] - (low[1] + high[1]) / 2) * scale
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals[normals @ view[2] < 0] *= -1  # faces behind narrow gaps between envelopes
     normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
     shade = 0.35 + 0.65 * np.clip(normals @ (LIGHT / np.linalg.norm(LIGHT)), 0, 1)
     depth = np.full((HEIGHT, WIDTH), -np.inf)
-    for i in np.flatnonzero(normals @ view[2] > 0):
+    for i in range(len(corners)):
         draw_triangle(image, depth, x[i], y[i], points[i, :, 2], np.append(COLOUR * shade[i], 255))
 
 
