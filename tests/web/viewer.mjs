@@ -797,7 +797,18 @@ async function together(browser, address) {
   await page.mouse.click(...await spot([2.5, 0.5, 1])); // the middle of the red cube's front
   await page.waitForFunction(() => document.getElementById('chosenWhere').textContent !== '');
   assert.equal(await page.textContent('#chosenName'), 'red');
-  assert.match(await page.textContent('#chosenNote'), /to the nearest face; at 2\.5, 0\.5, 1$/);
+  assert.match(await page.textContent('#chosenNote'), /within the accuracy of the click; at 2\.5, 0\.5, 1$/);
+  assert.equal(await page.textContent('#chosenWhere'), 'On the surface');
+  await page.waitForFunction(() => /chosen=red/.test(location.search) && /point=2\.5/.test(location.search) && !/level=/.test(location.search));
+  await page.keyboard.press('l');
+  assert.match(await page.inputValue('#shareLink'), /chosen=red/);
+  assert.match(await page.inputValue('#shareElement'), /<ebpo-part src="models\/red\.ebpo\.h5" pose="2,0,0"><\/ebpo-part><\/ebpo-viewer>$/);
+  await page.keyboard.press('Escape');
+  const linked = await show(browser, page.url());
+  await settled(linked);
+  await linked.waitForFunction(() => document.getElementById('chosenWhere').textContent !== '');
+  assert.equal(await linked.textContent('#chosenName'), 'red');
+  await linked.close();
   // Measures between two points of the cube with a distance of 0.6 in world coordinates.
   await page.keyboard.press('d');
   for (const x of [2.2, 2.8])
@@ -834,6 +845,80 @@ async function together(browser, address) {
   await wrong.waitForSelector('#error', { state: 'visible' });
   assert.match(await wrong.textContent('#errorWhat'), /index\.json: the scene: is not an object/);
   await wrong.close();
+}
+
+// A link contains the theme and the switches of shading, wireframe and cells.
+async function sharesSwitches(browser, address) {
+  const page = await show(browser, `${address}?file=models/small.ebpo.h5&level=3`);
+  await settled(page);
+  await page.waitForSelector('#toolShare');
+  for (const key of ['t', 'w', 'e', 'a'])
+    await page.keyboard.press(key);
+  await page.waitForFunction(() => /show=depth,occlusion,wireframe&theme=light/.test(location.search));
+  await page.goto(page.url());
+  await settled(page);
+  await page.waitForSelector('#ambient');
+  assert.deepEqual(await page.evaluate(() => ['dome', 'ambient', 'wire', 'cells'].map((id) => document.getElementById(id).checked)), [true, true, true, false]);
+  assert.equal(await page.evaluate(() => document.documentElement.dataset.theme), 'light');
+  await page.close();
+}
+
+// A point can be entered without a mouse, the slider announces its levels, and on a narrow page a tap shows its result over the picture.
+async function pointsWithoutMouse(browser, address) {
+  const page = await show(browser, `${address}?file=models/red.ebpo.h5`), answered = () => page.waitForFunction(() => window.ebpoViewer.state.probe?.exact);
+  await settled(page);
+  for (const [id, text] of [['px', '0.5'], ['py', '0.5'], ['pz', '0.25']])
+    await page.fill(`#${id}`, text);
+  await page.keyboard.press('Tab');
+  await answered();
+  assert.deepEqual([await page.textContent('#where'), await page.textContent('#distance')], ['Inside', '0.25']);
+  assert.match(await page.getAttribute('#level', 'aria-valuetext'), /^all levels, and the mesh$/);
+  assert.ok(await page.isHidden('#pointCard'));
+  await page.setViewportSize({ width: 390, height: 700 });
+  await page.keyboard.press('Escape');
+  await page.keyboard.press('p');
+  await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+  await page.mouse.click(195, 350);
+  await answered();
+  assert.ok(await page.isHidden('#panel') && await page.isVisible('#pointCard'));
+  assert.equal(await page.textContent('#pointCard strong'), 'On the surface'); // the click is only as accurate as a pixel
+  await page.close();
+}
+
+// The page explains a missing or lost graphics context. The picture returns with the context.
+async function graphics(browser, address) {
+  const quiet = complaints.length, none = await browser.newPage();
+  await none.addInitScript(() => {
+    HTMLCanvasElement.prototype.getContext = () => null;
+  });
+  await none.goto(`${address}?file=models/red.ebpo.h5`, { waitUntil: 'commit' });
+  await none.waitForSelector('#error:not([hidden]):has-text("WebGL 2")');
+  assert.ok(await none.isHidden('#opening'));
+  await none.close();
+  const page = await show(browser, `${address}?file=models/red.ebpo.h5`);
+  await settled(page);
+  const before = (await look(page)).share, extension = await page.evaluateHandle(() => document.getElementById('canvas').getContext('webgl2').getExtension('WEBGL_lose_context'));
+  await extension.evaluate((it) => it.loseContext());
+  await page.waitForSelector('#error:not([hidden]):has-text("graphics context")');
+  await extension.evaluate((it) => it.restoreContext());
+  await page.waitForSelector('#error', { state: 'hidden' });
+  await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+  assert.ok(Math.abs((await look(page)).share - before) < 0.01);
+  await page.close();
+  complaints.length = quiet;
+}
+
+// The connection fails while the page's tools are loaded. Retry loads the tools.
+async function toolsAgain(browser, address) {
+  const quiet = complaints.length, context = await browser.newContext({ viewport: SIZE, reducedMotion: 'reduce' });
+  await context.route('**/more.js', (route) => route.abort());
+  const page = await context.newPage();
+  await page.goto(`${address}?file=models/red.ebpo.h5`);
+  await page.waitForSelector('#error:not([hidden]):has-text("tools could not be loaded")');
+  await page.click('#errorRetry');
+  await page.waitForSelector('#toolShare');
+  await context.close();
+  complaints.length = quiet;
 }
 
 // A page opened from disk explains that it must be served.
@@ -908,6 +993,10 @@ async function main() {
   await step('saved views are exchanged as files', () => viewsAsFiles(browser, address));
   await step('paint is visible only on connected faces', () => paintsByReach(browser, address));
   await step('several models and scenes are shown together', () => together(browser, address));
+  await step('links contain the theme and the switches', () => sharesSwitches(browser, address));
+  await step('points need neither a mouse nor the panel', () => pointsWithoutMouse(browser, address));
+  await step('a missing or lost graphics context is explained', () => graphics(browser, address));
+  await step('tools that could not be loaded are loaded again', () => toolsAgain(browser, address));
   await step('ambient occlusion darkens inner edges', () => occludes(browser, address));
   const quiet = complaints.length;
   await step('the element and the three.js object work in a page of another origin', () => embeds(browser, address));

@@ -4,6 +4,7 @@ import { frameMs, frameTook, makeLevels, showLevel, showLevels, showStats } from
 import { busy, bytes, showError, showLine, showOpening } from './line.js';
 import { probeAt, probeShown, probeWith } from './probe.js';
 import { listSamples } from './samples.js';
+import { applyShown } from './shading.js';
 import { Scene } from './scene.js';
 import { LEVEL_COLOURS, MESH_COLOUR, TYPE_COLOURS } from './shade.js';
 import { address, changed, fileOfEntry, pushStep, setHomeView, setPicture, viewParameters } from './share.js';
@@ -16,9 +17,27 @@ let timer; // until the camera is sent to the worker
 let coming; // a promise of more.js, once it has been requested
 
 const boot = window.ebpoBoot, { worker } = boot; // boot.js may already have requested a file
-const scene = new Scene($('canvas'), boot, { changed: cameraMoved, drawn: frameDrawn });
+const scene = makeScene();
 probeWith(scene, worker);
 setPicture(scene);
+
+// Reports a browser without WebGL 2, in which no part of the page can work.
+function makeScene() {
+  try {
+    return new Scene($('canvas'), boot, { changed: cameraMoved, drawn: frameDrawn, lost: contextLost });
+  } catch (error) {
+    boot.over();
+    showOpening();
+    $('start').hidden = true;
+    showError({ message: 'this page draws with WebGL 2, which this browser does not provide; enable hardware acceleration in its settings, or use another browser' });
+    throw error;
+  }
+}
+
+// The browser takes the graphics context away when memory is short or the driver restarts, and usually restores it soon.
+function contextLost(lost) {
+  showError(lost ? { message: 'the browser has taken the graphics context away; wait until it is restored, or close other pages and reload this page' } : undefined);
+}
 
 // --- opening ---
 
@@ -151,7 +170,7 @@ const handlers = {
     scene.setTiles(m.set, m.removed);
     if (m.set.length) {
       if (state.shownAfter === undefined)
-        setTimeout(more, MORE_MS);
+        setTimeout(() => more(), MORE_MS);
       state.shownAfter ??= m.ms;
       showOpening();
     }
@@ -161,7 +180,7 @@ const handlers = {
   },
   probed(m) {
     state.traffic = m.traffic;
-    state.probe = m;
+    state.probe = { ...m, precision: state.probe?.precision ?? 0 };
     probeShown();
     showStats(scene.cellFaces);
     emit('probed');
@@ -290,7 +309,7 @@ function cutChanged() {
 }
 
 // Applies all parameters of a view in an address.
-function showView({ camera, level, clip, box, point, measured, colouring, cellFaces, detail: pixels }) {
+function showView({ camera, level, clip, box, point, measured, colouring, cellFaces, detail: pixels, shown }) {
   home(camera);
   $('level').value = level ?? $('level').max;
   $('detail').value = pixels;
@@ -305,6 +324,7 @@ function showView({ camera, level, clip, box, point, measured, colouring, cellFa
   colouringChanged();
   $('cellFaces').checked = cellFaces;
   scene.setCellFaces(cellFaces);
+  applyShown(shown);
   levelChanged();
   if (point || state.probe)
     probeAt(point);
@@ -316,6 +336,7 @@ function setTheme(theme) {
   document.documentElement.dataset.theme = theme;
   scene.setTheme(theme === 'dark');
   emit('theme');
+  (state.together ?? { changed }).changed();
 }
 
 function layout() {
@@ -345,8 +366,10 @@ $('cellFaces').onchange = () => {
   changed();
 };
 $('own').onchange = () => scene.setOwnColours($('own').checked);
-$('wire').onchange = requestCut;
-$('cells').onchange = requestCut;
+$('wire').onchange = $('cells').onchange = () => {
+  requestCut();
+  changed();
+};
 $('colouring').onchange = colouringChanged;
 $('clipAxis').onchange = cutChanged;
 $('clipAt').oninput = cutChanged;
@@ -370,8 +393,10 @@ $('canvas').addEventListener('pointerup', (e) => {
   if (!down || Math.hypot(e.clientX - down[0], e.clientY - down[1]) > 4 || !state.info)
     return;
   const point = scene.pick(e.clientX, e.clientY);
-  if (point)
-    (state.clicked ?? ((p) => (state.together ? state.together.clicked(p) : probeAt(p))))(toModel(point)); // an active tool receives the point
+  if (!point)
+    return;
+  const query = (p) => (state.together ? state.together.clicked(p) : probeAt(p, scene.pickPrecision(point) / state.scene.scale));
+  (state.clicked ?? query)(toModel(point)); // an active tool receives the point
 });
 
 addEventListener('dragover', (e) => {
@@ -467,9 +492,14 @@ on('complaint', (message) => showError({ message }));
 
 // --- tools that are loaded later: measuring, notes, the pen, sharing ---
 
-function more() {
-  coming ??= import('./more.js').then((m) => m.begin({ scene, worker, requestCut, cutChanged, changed, address, shownAs: (query) => showView(viewParameters(query)), layout, query: boot.query }),
-    (error) => showError({ message: `The page's tools could not be loaded (${error.message}); reload the page` }));
+// Browsers do not request a module again whose loading failed. A retry therefore uses another address of the same file.
+function more(attempt = 0) {
+  coming ??= import(new URL(attempt ? `more.js?attempt=${attempt}` : 'more.js', import.meta.url).href).then(
+    (m) => m.begin({ scene, worker, requestCut, cutChanged, changed, address, shownAs: (query) => showView(viewParameters(query)), layout, query: boot.query }),
+    () => {
+      coming = undefined;
+      showError({ message: "the page's tools could not be loaded; check the connection" }, () => more(attempt + 1));
+    });
   return coming;
 }
 

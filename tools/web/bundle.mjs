@@ -32,7 +32,7 @@ const common = { outdir: folder, bundle: true, minify: true, format: 'esm', targ
 // Modules that are loaded later import shared modules from app.js. A second copy would have separate state and a second three.js.
 const fromApp = { name: 'from-app', setup: ({ onResolve }) => onResolve({ filter: /\/(state|scene|shade)\.js$/ }, () => ({ path: './app.js', external: true })) };
 const built = await Promise.all([
-  build({ ...common, entryPoints: ['app.js', 'worker.js'].map((name) => join(here, name)), external: ['./more.js', './together.js', 'node:*'] }),
+  build({ ...common, entryPoints: ['app.js', 'worker.js'].map((name) => join(here, name)), external: ['./together.js', 'node:*'] }),
   build({ ...common, entryPoints: ['more.js', 'together.js', 'more.css'].map((name) => join(here, name)), plugins: [fromApp], external: ['node:*'] }),
 ]);
 const files = new Map([['index.html', Buffer.from(page)], ['icon.svg', Buffer.from(read('icon.svg'))],

@@ -51,7 +51,8 @@ export class EbpoViewerElement extends HTMLElement {
       return;
     const canvas = this.#part('canvas');
     canvas.ariaLabel = this.getAttribute('alt') ?? 'A model in three dimensions: drag or arrow keys turn it, wheel, + and - zoom';
-    this.#scene = new Scene(canvas, { contextOptions: { antialias: true }, fieldOfView: FIELD_OF_VIEW }, { changed: () => this.#moved(), drawn() {} });
+    this.#scene = new Scene(canvas, { contextOptions: { antialias: true }, fieldOfView: FIELD_OF_VIEW }, { changed: () => this.#moved(), drawn() {},
+      lost: (gone) => this.#showMessage(gone ? 'The browser has taken the graphics context away.' : '') });
     this.#listen(canvas);
     EbpoViewerElement.observedAttributes.filter((name) => !OPENS.includes(name) && this.hasAttribute(name)).forEach((name) => this.#apply(name));
     if (!this.hasAttribute('theme'))

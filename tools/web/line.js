@@ -58,3 +58,12 @@ export function showError(error, retry) {
     retry();
   };
 }
+
+/** Shows a query's result over the picture while the panel is hidden; hides it without a title. `kind`: the class of the title's colour. */
+export function showPointCard(title, note = '', kind = '') {
+  const card = $('pointCard'), [strong, span] = card.children;
+  card.hidden = !title;
+  strong.textContent = title ?? '';
+  strong.className = kind;
+  span.textContent = note;
+}

@@ -21,12 +21,18 @@ export async function begin(page) {
   const pipeline = scene.pipeline = new Pipeline(kit), pen = addPen(page, pipeline);
   addNotes(page, pen.drawing);
   pen.begin(); // its section is the last one; it also notifies the other sections
-  addShading(scene, pipeline);
-  addSharing(page);
+  addShading(scene, pipeline, page.changed);
+  addSharing({ address: page.address, elementOf });
   addCompass(page);
   addHelp();
-  on('key', (e) => e.key.toLowerCase() === 'l' && $('toolShare').click());
   state.more = true;
+}
+
+// Returns the element <ebpo-viewer> of a link to one model.
+function elementOf(query) {
+  const names = ['view', 'level', 'detail', 'clip', 'box', 'point', 'colour', 'cell-faces', 'theme'].filter((name) => query.has(name));
+  const local = typeof state.what !== 'string';
+  return { local, attributes: [['src', local ? 'ADDRESS' : state.what], ...names.map((name) => [name, query.get(name)])] };
 }
 
 // Enables the keys of the loaded modules only.

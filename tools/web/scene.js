@@ -9,11 +9,15 @@ export const kit = { InstancedBufferAttribute: THREE.InstancedBufferAttribute, I
     Matrix4: THREE.Matrix4, Mesh: THREE.Mesh, Scene: THREE.Scene, ShaderMaterial: THREE.ShaderMaterial, Sphere: THREE.Sphere,
   Vector2: THREE.Vector2, Vector3: THREE.Vector3, WebGLRenderTarget: THREE.WebGLRenderTarget };
 
+const PICK_ROUNDING = 1e-6; // of a picked point: drawn triangles have coordinates in single precision
 const TURN = Math.PI / 24, MOVE = 0.06; // steps of the keys: radians, and shares of the distance
 
 export class Scene {
-  /** Calls `changed()` when the camera has moved, and `drawn(ms)` after each frame. */
-  constructor(canvas, { context, contextOptions, fieldOfView }, { changed, drawn }) {
+  /**
+   * Calls `changed()` when the camera has moved, `drawn(ms)` after each frame, and `lost(true)` when the browser takes the graphics context away and `lost(false)`
+   * when the context is restored.
+   */
+  constructor(canvas, { context, contextOptions, fieldOfView }, { changed, drawn, lost = () => {} }) {
     this.canvas = canvas;
     this.drawn = drawn;
     this.renderer = new THREE.WebGLRenderer({ canvas, context, ...contextOptions });
@@ -36,6 +40,11 @@ export class Scene {
     this.pipeline = undefined; // { render(scene), resize(scene) } draws instead of the renderer, if present
     this.#warmUp();
     this.#makeProbe();
+    for (const [event, gone] of [['webglcontextlost', true], ['webglcontextrestored', false]])
+      canvas.addEventListener(event, () => { // three.js uploads everything again at the next frame
+        lost(gone);
+        this.redraw();
+      });
     this.observer = new ResizeObserver(() => this.resize());
     this.observer.observe(canvas.parentElement);
     this.resize();
@@ -216,6 +225,11 @@ export class Scene {
     this.picked = found?.hit;
     this.pickedCut = found?.onCut ?? false; // the point is on the section, not on the surface
     return found?.point;
+  }
+
+  /** Returns the accuracy of the last picked point, as a length of the scene: half a pixel for a point on the drawn surface, and 0 on a section. */
+  pickPrecision(point) {
+    return this.pickedCut ? 0 : Math.max(0.5 / this.pixelsAt(point), PICK_ROUNDING);
   }
 
   /** Returns the size of a length of 1 at a point, in pixels of the page. */

@@ -1,11 +1,15 @@
 // Offers texts to copy: a link to this view, HTML for a page, an element.
 import { make } from './parts.js';
-import { $, state } from './state.js';
+import { $, on, state } from './state.js';
 
-const quoted = (text) => text.replace(/[&"<>]/g, (c) => ({ '&': '&amp;', '"': '&quot;', '<': '&lt;', '>': '&gt;' })[c]);
+/** Returns a text as the value of an HTML attribute. */
+export const quoted = (text) => text.replace(/[&"<>]/g, (c) => ({ '&': '&amp;', '"': '&quot;', '<': '&lt;', '>': '&gt;' })[c]);
 
-/** `address()`: returns the address of this view. */
-export function addSharing({ address }) {
+/**
+ * `address()`: returns the address of this view. `elementOf(query)`: returns, for the query of this address, the attributes [[name, value]] of an element
+ * <ebpo-viewer>, the HTML of its children if it has some, and `local`: true if a file is on this computer only.
+ */
+export function addSharing({ address, elementOf }) {
   const button = make('button', 'Share', { id: 'toolShare', className: 'ghost', title: 'Link, iframe, element (L)' }), dialog = document.createElement('dialog');
   dialog.id = 'share';
   dialog.ariaLabel = 'Share this view';
@@ -23,13 +27,12 @@ export function addSharing({ address }) {
     setTimeout(() => (b.textContent = 'Copy'), 1500);
   }));
   button.onclick = () => {
-    const link = address(), query = new URL(link).searchParams, attributes = ['view', 'level', 'detail', 'clip', 'box', 'point', 'colour', 'cell-faces'].filter((name) => query.has(name));
-    const local = typeof state.what !== 'string';
+    const link = address(), { attributes, children = '', local = false } = elementOf(new URL(link).searchParams);
     $('shareHint').textContent = local ? 'This file is on this computer. To share the view, put the file on a server and give its address in ?file=.' : '';
     $('shareLink').value = link;
     $('shareFrame').value = `<iframe src="${quoted(link)}" width="800" height="600" style="border:0" title="${quoted(state.shownName ?? '')}"></iframe>`;
-    const chosen = attributes.map((name) => `${name}="${quoted(query.get(name))}" `).join('');
-    $('shareElement').value = `<ebpo-viewer src="${quoted(local ? 'ADDRESS' : state.what)}" ${chosen}style="height: 600px"></ebpo-viewer>`;
+    $('shareElement').value = `<ebpo-viewer ${attributes.map(([name, value]) => `${name}="${quoted(value)}" `).join('')}style="height: 600px">${children}</ebpo-viewer>`;
     dialog.showModal();
   };
+  on('key', (e) => e.key.toLowerCase() === 'l' && button.click());
 }

@@ -37,6 +37,7 @@ export function showLevels() {
 export function showLevel() {
   const at = Number($('level').value), i = state.info, mesh = at === i.level_count;
   $('levelText').textContent = mesh ? 'all, and the mesh' : `0 to ${at}`;
+  $('level').ariaValueText = mesh ? 'all levels, and the mesh' : `levels 0 to ${at} of ${i.level_count - 1}`;
   $('levelHint').textContent = mesh ? 'Refined where it is visible; leaves show the real faces.' : `Envelopes of level ${at} and of leaves above it: ${bytesOf(state.bytesTo[at])} of the file.`;
   const excess = volumeExcess(Math.min(at, i.level_count - 1));
   $('sExcess').textContent = excess === undefined || mesh ? '–' : `+${excess < 10 ? excess.toFixed(2) : excess.toFixed(0)} %`;

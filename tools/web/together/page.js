@@ -2,13 +2,14 @@
 import { Assembly, COLOURS } from './assembly.js';
 import { boxText, cameraOf, cameraText, boxOf, pointsOf, pointsText, withQuery } from '../address.js';
 import { addCompass } from '../compass.js';
-import { busy, bytes, showError, showLine } from '../line.js';
+import { busy, bytes, showError, showLine, showPointCard } from '../line.js';
 import { addDistances } from '../measure.js';
 import { complain, make, markOn, section } from '../parts.js';
 import { Pipeline } from '../pipeline.js';
 import { kit } from '../scene.js';
 import { addSectionBox } from '../section_box.js';
-import { addShading, styled } from '../shading.js';
+import { addShading, shownText, styled, themeText } from '../shading.js';
+import { addSharing, quoted } from '../sharebox.js';
 import { $, count, emit, length, on, state, toScene } from '../state.js';
 import { cameraAt } from './scene_file.js';
 
@@ -111,7 +112,8 @@ class Together {
     section('Selected instance', CHOSEN, { open: true });
     addSectionBox({ cutChanged: () => this.#cut() });
     addDistances({ scene, placeOf: (point) => this.#placeOf(point), changed: () => this.changed() });
-    addShading(scene, scene.pipeline = new Pipeline(kit));
+    addShading(scene, scene.pipeline = new Pipeline(kit), () => this.changed());
+    addSharing({ address: () => this.address(), elementOf: (query) => this.#elementOf(query) });
     addCompass({ scene, changed: () => this.changed(), up: assembly.up });
     this.#rows();
     this.#layers();
@@ -232,15 +234,18 @@ class Together {
   /** Handles a click. app.js calls it with the clicked point in world coordinates. */
   clicked(point) {
     const instance = this.scene.picked && this.assembly.instanceOf(this.scene.picked);
-    this.#choose(instance, instance && this.assembly.inModel(instance, point));
+    this.#choose(instance, instance && this.assembly.inModel(instance, point), this.scene.pickPrecision(toScene(point)) / state.scene.scale);
   }
 
-  async #choose(instance, point) {
+  // `precision`: the accuracy of a clicked point, in world coordinates.
+  async #choose(instance, point, precision = 0) {
     const { assembly } = this, queries = this.queries = (this.queries ?? 0) + 1, model = instance && assembly.models[instance.model];
     assembly.chosen = instance;
     this.point = point;
     this.near = undefined;
     $('chosen').hidden = !instance;
+    showPointCard(instance?.name);
+    this.changed();
     $('chosenHint').hidden = Boolean(instance);
     this.#marks();
     this.moved();
@@ -254,7 +259,7 @@ class Together {
       if (queries !== this.queries)
         return;
       this.near = response.nearest;
-      this.#showResult(model, response, instance.now.scale);
+      this.#showResult(model, response, instance.now.scale, precision);
       this.#marks();
     } catch (error) {
       if (error.name !== 'AbortError')
@@ -275,11 +280,14 @@ class Together {
       $('chosenOpen').href = withQuery(new URL(location.pathname, location.href).href, [['file', file]]);
   }
 
-  #showResult({ info }, { where, distance, lo, hi, exact }, scale) {
-    const words = { in: 'Inside', out: 'Outside', on: 'On the surface', maybe: 'Undecided' };
-    $('chosenWhere').textContent = info.solid ? words[where] ?? '' : 'A surface';
-    $('chosenNote').textContent = `${exact ? `${length(distance * scale, 6)} to the nearest face` : `${length(lo * scale, 3)} – ${length(hi * scale, 3)} to the surface`}; at ` +
+  #showResult({ info }, { where, distance, lo, hi, exact }, scale, precision) {
+    const words = { in: 'Inside', out: 'Outside', on: 'On the surface', maybe: 'Undecided' }, onSurface = exact && distance * scale <= precision;
+    $('chosenWhere').textContent = onSurface ? words.on : info.solid ? words[where] ?? '' : 'A surface';
+    const near = onSurface ? 'within the accuracy of the click' : exact ? `${length(distance * scale, 6)} to the nearest face`
+      : `${length(lo * scale, 3)} – ${length(hi * scale, 3)} to the surface`;
+    $('chosenNote').textContent = `${near}; at ` +
       this.assembly.inWorld(this.assembly.chosen, this.point).map((x) => Number(x.toPrecision(6))).join(', ');
+    showPointCard(this.assembly.chosen.name, `${$('chosenWhere').textContent}, ${$('chosenNote').textContent}`);
   }
 
   // Shows the query point and its nearest point, which move with their instance.
@@ -362,6 +370,9 @@ class Together {
     if (state.box)
       this.#cut();
     state.measured = pointsOf(query.get('measure'));
+    const instance = assembly.instances.find((i) => i.name === query.get('chosen')), [point] = pointsOf(query.get('point')) ?? [];
+    if (instance)
+      this.#choose(instance, point && assembly.inModel(instance, point));
   }
 
   /** Returns the address of the current view. */
@@ -369,8 +380,17 @@ class Together {
     const { assembly, scene } = this, view = cameraText(scene.place), diagonal = Math.hypot(...assembly.box.size);
     const hidden = [...assembly.models.filter((m) => !m.visible).map((m) => m.name), ...this.hiddenLayers];
     const colours = assembly.models.filter((m, i) => m.colour !== COLOURS[i % COLOURS.length]).map((m) => `${m.name}:${m.colour.slice(1)}`);
-    return withQuery(location.href, [['view', view === this.homeView ? undefined : view], ['time', assembly.time === assembly.from ? undefined : assembly.time.toFixed(3)],
+    const chosen = assembly.chosen?.name, point = chosen && this.point && assembly.inWorld(assembly.chosen, this.point);
+    return withQuery(location.href, [['chosen', chosen], ['point', point && pointsText([point], diagonal)], ['show', shownText()], ['theme', themeText()],
+      ['view', view === this.homeView ? undefined : view], ['time', assembly.time === assembly.from ? undefined : assembly.time.toFixed(3)],
       ['hide', hidden.join('|')], ['colours', colours.join('|')], ['box', boxText(state.box)], ['measure', state.measured?.length ? pointsText(state.measured, diagonal) : undefined]]);
+  }
+
+  // Returns the element <ebpo-viewer> of a link to the scene or the models; the argument of addSharing().
+  #elementOf(query) {
+    const attributes = ['scene', 'up', 'remote', 'view', 'time', 'hide', 'colours', 'box', 'theme'].filter((name) => query.has(name)).map((name) => [name, query.get(name)]);
+    const poses = query.getAll('pose'), children = query.getAll('model').map((src, i) => `<ebpo-part src="${quoted(src)}"${poses[i] ? ` pose="${quoted(poses[i])}"` : ''}></ebpo-part>`);
+    return { attributes, children: children.join(''), local: Boolean(this.requested.local) };
   }
 
   changed() {
