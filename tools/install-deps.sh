@@ -16,7 +16,7 @@ for option in "$@"; do
     case $option in
     --tests)
         packages="$packages abigail-tools check git hdf5-tools python3 python3-h5py python3-numpy \
-            clang clang-format libclang-rt-14-dev mandoc chromium patchelf python3-pip python3-dask \
+            clang clang-format libclang-rt-14-dev mandoc chromium python3-pip python3-dask \
             python3-distributed python3-yaml libopenmpi-dev openmpi-bin ruby zsh fish $viewer"
         [ $modules = yes ] || modules=tests ;;
     --demo) packages="$packages hdf5-tools glmark2-data python3-h5py" ;;

@@ -78,9 +78,11 @@ static ebpo_status open_regular(const char *path, int *fd, uint64_t *size, ebpo_
         return fail_to_open(path, error);
     if (fstat(*fd, &facts) < 0)
         status = ebpo_fail_errno(error, path, "cannot be examined");
-    else if (!S_ISREG(facts.st_mode))
+    else if (!S_ISREG(facts.st_mode)) {
         status = ebpo_fail_file(error, EBPO_E_IO, path, "not a regular file");
-    else
+        if (error && S_ISDIR(facts.st_mode))
+            error->system_error = EISDIR;
+    } else
         *size = (uint64_t)facts.st_size;
     if (status != EBPO_OK)
         close(*fd);

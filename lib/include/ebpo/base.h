@@ -173,12 +173,18 @@ typedef struct ebpo_error {
     /* Byte offset of the error in the file; -1 if unknown. */
     int64_t offset;
 
-    uint64_t reserved[4];
+    /*
+     * errno of the system call that failed, such as ENOENT; 0 if none, or not recorded. ENOENT is
+     * also set when a web server has no such file.
+     */
+    int64_t system_error;
+
+    uint64_t reserved[3];
 } ebpo_error;
 
-#define EBPO_ERROR_INIT                \
-    {                                  \
-        EBPO_OK, "", "", "", -1, { 0 } \
+#define EBPO_ERROR_INIT                   \
+    {                                     \
+        EBPO_OK, "", "", "", -1, 0, { 0 } \
     }
 
 /*

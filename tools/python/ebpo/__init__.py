@@ -11,14 +11,15 @@ from __future__ import annotations
 
 from ._declared import (ClashKind, NodeType, PaintKind, PairKind, Part, Relation, Rule, Where)
 from ._library import lib as _lib
-from .adapters import from_trimesh
 from .queries import bar
 from .catalogue import Catalogue
 from .collide import Collider, pose
 from .build import convert
-from .errors import (AbsentError, ArgumentError, Cancelled, Error, FormatError, IOFailure, LimitError, NoMemory,
-                     NotSolidError, UnsupportedError, VersionError)
-from .model import AllHits, Bounds, Hits, Located, Model, Nearest, open
+from .errors import (AbsentError, ArgumentError, Cancelled, Error, ExistingFileError, FileAccessError, FolderError,
+                     FormatError, IOFailure, LimitError, MissingFileError, NoMemory, NotSolidError, UnsupportedError,
+                     VersionError)
+from .model import Model, open
+from .results import AllHits, Bounds, Hits, Located, Nearest
 from .paint import Areas, Paint, Stroke
 from .parts import Attributes, Info, Level, Maps, Mass, Mesh, Subtree, half_spaces
 from .scene import Scene, open_scene
@@ -42,7 +43,8 @@ __all__ = [
     "Mesh", "Maps", "Level", "Subtree", "Attributes", "Mass", "NodeType", "Part", "Rule", "half_spaces",
     "Catalogue", "Collider", "pose", "Relation", "PairKind", "Scene", "open_scene", "ClashKind",
     "Haptic", "HapticResult", "ProbeResult", "Paint", "Stroke", "Areas", "PaintKind",
-    "convert", "from_trimesh", "bar", "library",
+    "convert", "bar", "library",
     "Error", "ArgumentError", "IOFailure", "FormatError", "VersionError", "UnsupportedError", "NotSolidError",
-    "LimitError", "Cancelled", "AbsentError", "NoMemory",
+    "LimitError", "Cancelled", "AbsentError", "NoMemory", "MissingFileError", "FileAccessError", "FolderError",
+    "ExistingFileError",
 ]

@@ -5,19 +5,20 @@ import ctypes
 import functools
 import io
 import os
+import stat
 import threading
-from typing import Any
+from typing import Any, Mapping
 
 import numpy as np
 
 from . import _declared as c
-from ._checked import path, text, within
+from ._checked import members_of, path, text, within
 from ._library import Handle, call, made, of_members, size_in_bytes
 from .errors import ArgumentError, Error, IOFailure, UnsupportedError
 from .ranges import CONNECTIONS, Ranges, read_whole
 from .web import Patience, Web
 
-FUNCTIONS: dict = {name: kind for name, kind in c.ebpo_source._fields_}
+FUNCTIONS: dict = dict(members_of(c.ebpo_source))
 RANGE = np.dtype(c.ebpo_range)
 IO, CANCELLED = -3, -9
 
@@ -43,12 +44,32 @@ class Seekable:
         return data
 
 
+class Positioned:
+    """A file that the operating system reads. The position of the file object is neither used nor changed."""
+
+    def __init__(self, file: Any) -> None:
+        self.file, self.size = file, os.fstat(file.fileno()).st_size
+
+    @staticmethod
+    def fits(file: Any) -> bool:
+        """Return True for unmodified bytes of a regular file. Other files, such as GzipFile, may have a fileno() too."""
+        raw = getattr(file, "raw", None) if type(file) in (io.BufferedReader, io.BufferedRandom) else file
+        return hasattr(os, "pread") and type(raw) is io.FileIO and stat.S_ISREG(os.fstat(raw.fileno()).st_mode)
+
+    def read_range(self, offset: int, size: int) -> bytes:
+        parts = []
+        while size and (data := os.pread(self.file.fileno(), size, offset)):
+            parts.append(data)
+            offset, size = offset + len(data), size - len(data)
+        return b"".join(parts)
+
+
 class Stored:
     """A path of an fsspec file system, read by ranges."""
 
-    def __init__(self, url: str, storage_options: dict | None = None) -> None:
+    def __init__(self, url: str, storage_options: Mapping[str, Any] | None = None) -> None:
         try:
-            import fsspec
+            import fsspec  # type: ignore[import-not-found, import-untyped, unused-ignore]
         except ImportError:
             raise ImportError(f"{url}: this kind of URL needs fsspec, which is not installed") from None
         self.fs, self.path = fsspec.core.url_to_fs(url, **(storage_options or {}))
@@ -174,7 +195,8 @@ def by_ranges(ranges: Any, name: str, max_expansion: int = 0) -> Handle:
     return by_name(shown(name), max_expansion, keep=(source,), source=source.struct)
 
 
-def opened(source: Any, http: dict, storage_options: dict | None, max_expansion: int = 0) -> Handle:
+def opened(source: Any, http: dict[str, Any], storage_options: Mapping[str, Any] | None,
+           max_expansion: int = 0) -> Handle:
     """Return an open ebpo_file of any source that `ebpo.open` supports."""
     if isinstance(source, (str, os.PathLike)):
         name = os.fspath(source)
@@ -219,6 +241,8 @@ def of_file(file: Any, name: str) -> Any:
     """Return a reader of a file object: a Seekable on this machine, else a Ranges."""
     if Uncached.fits(file):
         return far(Uncached(file), file.size, name)
+    if Positioned.fits(file):
+        return Positioned(file)
     seekable = Seekable(file)
     if isinstance(file, io.BytesIO) or is_of_system(file):
         return seekable
