@@ -26,9 +26,9 @@
  *   from ebpo_async_source.
  * - Outputs are unspecified, and callbacks may have received some results. The repeated call starts
  *   again and passes all results. Streams continue with the item that was not returned.
- * - Batches of points and rays keep their completed results if options.done is given (query.h). When
- *   *done has changed, end the operation after ebpo_async_needed and begin another one: the bytes
- *   of completed points need not stay.
+ * - Batches of points and rays keep their completed results if options.done is given (query.h).
+ * When *done has changed, end the operation after ebpo_async_needed and begin another one: the
+ * bytes of completed points need not stay.
  *
  * The number of repetitions is limited, for any memory budget: bytes that were supplied or read
  * since the operation began stay available until it ends, so each repetition completes or needs
@@ -70,8 +70,8 @@ EBPO_API void ebpo_async_free(ebpo_async *async);
 
 /*
  * Makes a source for ebpo_open_source. Any number of files may be opened, one source for each.
- * Initialize `out` with EBPO_SOURCE_INIT. Reading can return EBPO_E_PENDING, and EBPO_E_IO after the
- * file has changed.
+ * Initialize `out` with EBPO_SOURCE_INIT. Reading can return EBPO_E_PENDING, and EBPO_E_IO after
+ * the file has changed.
  *
  * Threads: any.
  */
