@@ -74,16 +74,15 @@ START_TEST(test_needed_ranges_are_sorted_and_merged)
     const ebpo_range hints[] = { { 9 * FAR, 100 }, { 5 * FAR, 100 }, { 5 * FAR + 16000, 50 } };
     ck_assert(read_range(&source, 7 * FAR, 10) == EBPO_E_PENDING);
     source.prefetch(source.user, hints, 3);
-    expect_needed(a, 3,
-                  (ebpo_range[]){ { 5 * FAR, 16050 }, { 7 * FAR, 10 }, { 9 * FAR, 100 } });
+    expect_needed(a, 3, (ebpo_range[]){ { 5 * FAR, 16050 }, { 7 * FAR, 10 }, { 9 * FAR, 100 } });
     expect_needed(a, 0, NULL); /* each range is returned once */
     ck_assert(supply(a, 5 * FAR + 100, 200, NULL) == EBPO_OK);
     ck_assert(read_range(&source, 5 * FAR, 1000) == EBPO_E_PENDING);
     expect_needed(a, 2, (ebpo_range[]){ { 5 * FAR, 100 }, { 5 * FAR + 300, 700 } });
     ck_assert(read_range(&source, 100 * FAR, 9 * FAR) == EBPO_E_PENDING);
-    expect_needed(a, 3, (ebpo_range[]){ { 100 * FAR, 3 * FAR },
-                                        { 103 * FAR, 3 * FAR },
-                                        { 106 * FAR, 3 * FAR } });
+    expect_needed(a, 3,
+                  (ebpo_range[]){
+                      { 100 * FAR, 3 * FAR }, { 103 * FAR, 3 * FAR }, { 106 * FAR, 3 * FAR } });
     ebpo_async_free(a);
 }
 END_TEST
@@ -95,7 +94,8 @@ START_TEST(test_supplied_bytes_are_read)
     uint64_t state = 5;
     static uint8_t known[1 << 20];
     for (int n = 0; n < 3000; n++) {
-        uint64_t offset = ebpo_test_random(&state) % (1 << 20), size = ebpo_test_random(&state) % 4000;
+        uint64_t offset = ebpo_test_random(&state) % (1 << 20),
+                 size = ebpo_test_random(&state) % 4000;
         size = size > (1 << 20) - offset ? (1 << 20) - offset : size + (offset < (1 << 20));
         size = size > (1 << 20) - offset ? (1 << 20) - offset : size;
         bool available = true;
@@ -399,8 +399,7 @@ static ebpo_status sum_export(const ebpo_file *file, pending_source *p, uint64_t
 static ebpo_status sum_repacked(const ebpo_file *file, pending_source *p, uint64_t *sum)
 {
     (void)p;
-    ebpo_status status =
-        ebpo_file_repack(file, scratch("repacked.ebpo.h5"), NULL, NULL, &error);
+    ebpo_status status = ebpo_file_repack(file, scratch("repacked.ebpo.h5"), NULL, NULL, &error);
     if (status == EBPO_OK)
         add_file(sum, scratch("repacked.ebpo.h5"));
     return status;
@@ -430,14 +429,22 @@ static const struct {
     reading_fn call;
     unsigned rounds; /* maximum number of round trips */
 } readings[] = {
-    { "levels", sum_levels, 30 },      { "sizes", sum_sizes, 3 },
-    { "mesh", sum_mesh, 4 },           { "source mesh", sum_source_mesh, 6 },
-    { "tree", sum_tree, 6 },           { "polygons", sum_polygons, 8 },
-    { "stream", sum_stream, 20 },      { "view", sum_view, 8 },
-    { "small view", sum_small_view, 60 }, { "subtrees", sum_subtrees, 30 },
-    { "mass", sum_mass, 6 },           { "subset", sum_subset, 6 },
-    { "export", sum_export, 6 },       { "repacked", sum_repacked, 6 },
-    { "violations", sum_violations, 60 }, { "limit", sum_limit, 20 },
+    { "levels", sum_levels, 30 },
+    { "sizes", sum_sizes, 3 },
+    { "mesh", sum_mesh, 4 },
+    { "source mesh", sum_source_mesh, 6 },
+    { "tree", sum_tree, 6 },
+    { "polygons", sum_polygons, 8 },
+    { "stream", sum_stream, 20 },
+    { "view", sum_view, 8 },
+    { "small view", sum_small_view, 60 },
+    { "subtrees", sum_subtrees, 30 },
+    { "mass", sum_mass, 6 },
+    { "subset", sum_subset, 6 },
+    { "export", sum_export, 6 },
+    { "repacked", sum_repacked, 6 },
+    { "violations", sum_violations, 60 },
+    { "limit", sum_limit, 20 },
 };
 enum { READINGS = sizeof readings / sizeof *readings };
 
