@@ -784,7 +784,7 @@ ebpo_status ebpo_give_sign(ebpo_context *c, const double p[3], const ebpo_distan
     ebpo_inside_options plain = EBPO_INSIDE_OPTIONS_INIT;
     if (!c->model->info->solid || o->unsigned_distance || out->face == EBPO_NO_FACE)
         return EBPO_OK;
-    ebpo_status status = c->model->whole ? inside_whole(c, p, 1, &where, error)
+    ebpo_status status = c->model->whole ? inside_whole(c, p, 1, NULL, &where, error)
                                          : inside_walk(c, p, &plain, &where, error);
     if (status == EBPO_OK && where.where == EBPO_IN)
         out->distance = -out->distance;
