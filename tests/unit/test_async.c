@@ -1,5 +1,6 @@
 /* Tests files whose bytes arrive asynchronously: the object that holds the bytes, and the functions
  * that read files. */
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
