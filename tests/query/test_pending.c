@@ -60,8 +60,7 @@ static ebpo_status sum_inside(subject *s, uint64_t *sum)
 static ebpo_status sum_inside_many(subject *s, uint64_t *sum)
 {
     ebpo_inside_result result[POINTS] = { { 0 } };
-    ebpo_status status =
-        ebpo_inside_many(s->context, s->points[0], POINTS, NULL, result, &error);
+    ebpo_status status = ebpo_inside_many(s->context, s->points[0], POINTS, NULL, result, &error);
     for (int i = 0; i < POINTS; i++)
         add(sum, &result[i].winding, sizeof result[i].winding);
     return status;
@@ -94,8 +93,7 @@ static ebpo_status sum_distance(subject *s, uint64_t *sum)
 static ebpo_status sum_distances(subject *s, uint64_t *sum)
 {
     ebpo_distance_result result[POINTS] = { { 0 } };
-    ebpo_status status =
-        ebpo_distance_many(s->context, s->points[0], POINTS, NULL, result, &error);
+    ebpo_status status = ebpo_distance_many(s->context, s->points[0], POINTS, NULL, result, &error);
     add(sum, result, sizeof result);
     return status;
 }
@@ -265,8 +263,7 @@ static ebpo_status sum_collisions(subject *s, uint64_t *sum)
 static ebpo_status sum_map(subject *s, uint64_t *sum)
 {
     double distances[POINTS] = { 0 };
-    ebpo_status status =
-        ebpo_map_points(s->model, s->points[0], POINTS, NULL, distances, &error);
+    ebpo_status status = ebpo_map_points(s->model, s->points[0], POINTS, NULL, distances, &error);
     add(sum, distances, sizeof distances);
     return status;
 }
@@ -296,22 +293,15 @@ static const struct {
     query_fn query;
     bool many; /* round trips may be fewer than those of a source that waits, but also more */
 } queries[] = {
-    { "inside", sum_inside, false },
-    { "inside_many", sum_inside_many, false },
-    { "envelopes", sum_envelopes, true },
-    { "distance", sum_distance, false },
-    { "distances", sum_distances, false },
-    { "modes", sum_modes, true },
-    { "within", sum_within, false },
-    { "first_hit", sum_first_hit, false },
-    { "any_hit", sum_any_hit, false },
-    { "hits", sum_hits, false },
-    { "many_rays", sum_many_rays, true },
-    { "box", sum_box, false },
+    { "inside", sum_inside, false },        { "inside_many", sum_inside_many, false },
+    { "envelopes", sum_envelopes, true },   { "distance", sum_distance, false },
+    { "distances", sum_distances, false },  { "modes", sum_modes, true },
+    { "within", sum_within, false },        { "first_hit", sum_first_hit, false },
+    { "any_hit", sum_any_hit, false },      { "hits", sum_hits, false },
+    { "many_rays", sum_many_rays, true },   { "box", sum_box, false },
     { "triangles", sum_triangles, false },
 #if EBPO_HAVE_EXTRAS
-    { "collisions", sum_collisions, true },
-    { "map", sum_map, true },
+    { "collisions", sum_collisions, true }, { "map", sum_map, true },
     { "union", sum_union, true },
 #endif
 };
@@ -438,23 +428,23 @@ END_TEST
 enum { MANY = 3000, RAYS = 1500 };
 
 /* A batch of queries; `done` may be NULL. */
-typedef ebpo_status (*batch_fn)(subject *s, const double (*points)[3], bool *done, void *out);
+typedef ebpo_status (*batch_fn)(subject *s, double (*points)[3], bool *done, void *out);
 
-static ebpo_status batch_inside(subject *s, const double (*points)[3], bool *done, void *out)
+static ebpo_status batch_inside(subject *s, double (*points)[3], bool *done, void *out)
 {
     ebpo_inside_options options = EBPO_INSIDE_OPTIONS_INIT;
     options.done = done;
     return ebpo_inside_many(s->context, points[0], MANY, &options, out, &error);
 }
 
-static ebpo_status batch_distance(subject *s, const double (*points)[3], bool *done, void *out)
+static ebpo_status batch_distance(subject *s, double (*points)[3], bool *done, void *out)
 {
     ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
     options.done = done;
     return ebpo_distance_many(s->context, points[0], MANY, &options, out, &error);
 }
 
-static ebpo_status batch_rays(subject *s, const double (*points)[3], bool *done, void *out)
+static ebpo_status batch_rays(subject *s, double (*points)[3], bool *done, void *out)
 {
     static ebpo_ray rays[RAYS];
     ebpo_ray_options options = EBPO_RAY_OPTIONS_INIT;
@@ -481,8 +471,7 @@ static uint64_t count_done(const bool *done, uint64_t count)
 }
 
 /* Completed points keep their results, so their bytes need not stay. Fills `out`. */
-static void run_batch(int number, subject *s, pending_source *p, const double (*points)[3],
-                      uint8_t *out)
+static void run_batch(int number, subject *s, pending_source *p, double (*points)[3], uint8_t *out)
 {
     static bool done[MANY];
     uint64_t before = 0, count = batches[number].count;
@@ -508,8 +497,8 @@ START_TEST(test_batches_resume)
     uint8_t *expected = calloc(bytes, 1), *found = calloc(bytes, 1);
     for (int i = 0; i < MANY; i++)
         for (int k = 0; k < 3; k++)
-            points[i][k] = (k == 2 ? 1.5 : 6) *
-                           ((double)(ebpo_test_random(&state) % 100000) / 100000 - 0.5);
+            points[i][k] =
+                (k == 2 ? 1.5 : 6) * ((double)(ebpo_test_random(&state) % 100000) / 100000 - 0.5);
     two_layouts_build(&l, ebpo_test_torus(2, 0.7, 400, 240), 9, ALL, EBPO_CODEC_ZSTD, 400);
     subject near = { .file = l.without }, far;
     make_model(&near, NULL, 64 << 20);
@@ -521,7 +510,9 @@ START_TEST(test_batches_resume)
     ck_assert(memcmp(expected, found, bytes) == 0);
     ck_assert_msg(p.rounds <= 120, "%d round trips", (int)p.rounds);
     ck_assert_msg(p.peak < p.size, "%d of %d bytes held", (int)p.peak, (int)p.size);
-    printf("batch %d: %d rounds, %d requests, %d fetched of %d, peak %d\n", _i, (int)p.rounds, (int)p.requests, (int)p.fetched, (int)p.size, (int)p.peak); fflush(stdout);
+    printf("batch %d: %d rounds, %d requests, %d fetched of %d, peak %d\n", _i, (int)p.rounds,
+           (int)p.requests, (int)p.fetched, (int)p.size, (int)p.peak);
+    fflush(stdout);
     free_model(&near);
     free_model(&far);
     ebpo_close(far.file);
@@ -539,7 +530,7 @@ typedef struct worker {
     ebpo_model *model;
     pending_source *source;
     pthread_mutex_t *lock;
-    const double (*points)[3];
+    double (*points)[3];
     double sum;
 } worker;
 
@@ -607,13 +598,16 @@ END_TEST
 TEST_SUITE(pending)
 {
     Suite *suite = suite_create("pending");
-    TCase *tests = tcase_create("pending");
+    TCase *tests = tcase_create("single"), *many = tcase_create("many");
     tcase_set_timeout(tests, 900);
     tcase_add_checked_fixture(tests, scratch_enter, scratch_leave);
     tcase_add_loop_test(tests, test_query_round_trips, 0, QUERIES);
     tcase_add_loop_test(tests, test_queries_within_smallest_budget, 0, QUERIES);
-    tcase_add_loop_test(tests, test_batches_resume, 0, sizeof batches / sizeof *batches);
-    tcase_add_test(tests, test_threads_share_a_source);
     suite_add_tcase(suite, tests);
+    tcase_set_timeout(many, 900);
+    tcase_add_checked_fixture(many, scratch_enter, scratch_leave);
+    tcase_add_loop_test(many, test_batches_resume, 0, sizeof batches / sizeof *batches);
+    tcase_add_test(many, test_threads_share_a_source);
+    suite_add_tcase(suite, many);
     return suite;
 }
