@@ -3,11 +3,12 @@
 import asyncio
 import contextlib
 import http.server
+import pathlib
 import re
+import subprocess
 import threading
-import unittest
 
-from package_support import Case, model, np, points, run
+from package_support import GENERATE, Case, model, np, points, run
 
 import ebpo
 
@@ -67,9 +68,10 @@ def serving(data):
 class Async(Case):
     @classmethod
     def setUpClass(cls):
-        cls.path = model("sphere")
-        cls.data = cls.path.read_bytes()
-        cls.near = ebpo.open(cls.path)
+        subprocess.run([GENERATE, "--base", "sphere", "--faces", "40000", "remote.ply"], check=True,
+                       capture_output=True)
+        cls.near = model("remote")
+        cls.data = pathlib.Path("remote.ebpo.h5").read_bytes()
         cls.expected = cls.near.inside(P), cls.near.distance(P), cls.near.ray(P, [0, 0, 1.])
 
     async def check(self, far):
