@@ -477,6 +477,7 @@ static void run_batch(int number, subject *s, pending_source *p, double (*points
     ebpo_status status;
     memset(done, 0, sizeof done);
     while ((status = batches[number].batch(s, points, done, out)) == EBPO_E_PENDING) {
+        ck_assert_msg(error.status == EBPO_E_PENDING, "%s", error.message);
         uint64_t now = count_done(done, count);
         ck_assert(now >= before && now < count);
         ck_assert(now > before ? pending_progress(p, status) : pending_again(p, status));
