@@ -11,13 +11,14 @@ from __future__ import annotations
 
 from ._declared import (ClashKind, NodeType, PaintKind, PairKind, Part, Relation, Rule, Where)
 from ._library import lib as _lib
+from .asynchronous import AsyncModel, open_async
 from .queries import bar
 from .catalogue import Catalogue
 from .collide import Collider, pose
 from .build import convert
 from .errors import (AbsentError, ArgumentError, Cancelled, Error, ExistingFileError, FileAccessError, FolderError,
-                     FormatError, IOFailure, LimitError, MissingFileError, NoMemory, NotSolidError, UnsupportedError,
-                     VersionError)
+                     FormatError, IOFailure, LimitError, MissingFileError, NoMemory, NotSolidError, Pending,
+                     UnsupportedError, VersionError)
 from .model import Model, open
 from .results import AllHits, Bounds, Hits, Located, Nearest
 from .paint import Areas, Paint, Stroke
@@ -39,12 +40,12 @@ def library() -> str:
 
 
 __all__ = [
-    "open", "Model", "Info", "Located", "Nearest", "Bounds", "Hits", "AllHits", "Where",
+    "open", "Model", "open_async", "AsyncModel", "Info", "Located", "Nearest", "Bounds", "Hits", "AllHits", "Where",
     "Mesh", "Maps", "Level", "Subtree", "Attributes", "Mass", "NodeType", "Part", "Rule", "half_spaces",
     "Catalogue", "Collider", "pose", "Relation", "PairKind", "Scene", "open_scene", "ClashKind",
     "Haptic", "HapticResult", "ProbeResult", "Paint", "Stroke", "Areas", "PaintKind",
     "convert", "bar", "library",
     "Error", "ArgumentError", "IOFailure", "FormatError", "VersionError", "UnsupportedError", "NotSolidError",
-    "LimitError", "Cancelled", "AbsentError", "NoMemory", "MissingFileError", "FileAccessError", "FolderError",
-    "ExistingFileError",
+    "LimitError", "Cancelled", "AbsentError", "NoMemory", "Pending", "MissingFileError", "FileAccessError",
+    "FolderError", "ExistingFileError",
 ]
