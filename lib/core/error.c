@@ -31,6 +31,7 @@ const char *ebpo_status_name(ebpo_status status)
     case EBPO_E_LIMIT: return "EBPO_E_LIMIT";
     case EBPO_E_CANCELLED: return "EBPO_E_CANCELLED";
     case EBPO_E_ABSENT: return "EBPO_E_ABSENT";
+    case EBPO_E_PENDING: return "EBPO_E_PENDING";
     }
     return "unknown status";
 }

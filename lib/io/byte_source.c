@@ -197,10 +197,12 @@ ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, uint64_t size, v
                             "; get a fresh copy of the file",
                             offset, offset + size - 1, input->source.size);
     uint64_t begin = offset > bytes_prefetched(input) ? offset : bytes_prefetched(input);
-    atomic_fetch_add_explicit(&input->bytes, offset + size > begin ? offset + size - begin : 0,
-                              memory_order_relaxed);
-    atomic_fetch_add_explicit(&input->reads, 1, memory_order_relaxed);
     ebpo_status status = input->source.read(input->source.user, offset, size, data, &cause);
+    if (status != EBPO_E_PENDING) { /* the read is repeated */
+        atomic_fetch_add_explicit(&input->bytes, offset + size > begin ? offset + size - begin : 0,
+                                  memory_order_relaxed);
+        atomic_fetch_add_explicit(&input->reads, 1, memory_order_relaxed);
+    }
     if (status == EBPO_OK)
         return EBPO_OK;
     if (*cause.message) {

@@ -148,7 +148,8 @@ typedef enum ebpo_status {
     EBPO_E_NOT_SOLID = -7,   /* a solid is required, and the mesh is not balanced */
     EBPO_E_LIMIT = -8,       /* a count or size exceeds a stated limit */
     EBPO_E_CANCELLED = -9,   /* a callback requested to stop */
-    EBPO_E_ABSENT = -10      /* the file does not contain the required data */
+    EBPO_E_ABSENT = -10,     /* the file does not contain the required data */
+    EBPO_E_PENDING = -11     /* bytes of the file are not available yet (async.h) */
 } ebpo_status;
 
 /*
