@@ -82,14 +82,24 @@ build_nettle() {
 }
 
 build_gmp() {
-    mkdir -p "$deps/gmp"
+    mkdir -p "$deps/gmp" "$sources/gmp/doc"
+    printf 'all:\n' >"$sources/gmp/doc/Makefile.in" # which Debian omits with the manual
+    # Integers and rationals alone, without the functions for output and random numbers.
+    common="assert errno extract-dbl invalid memory mp_bpl mp_clz_tab mp_dv_tab mp_minv_tab mp_get_fns mp_set_fns
+        primesieve tal-reent"
     (
         cd "$deps/gmp"
-        CC=emcc AR=emar RANLIB=emranlib NM="emnm" CC_FOR_BUILD=cc CFLAGS="$flags" "$sources/gmp/configure" --host=none \
-            --disable-assembly --disable-shared --disable-cxx >configure.log 2>&1
-        make -j"$jobs" libgmp.la >make.log 2>&1
+        CC=emcc AR=emar RANLIB=emranlib NM=emnm CC_FOR_BUILD=cc CFLAGS="$flags" "$sources/gmp/configure" \
+            --host=none --disable-assembly --disable-shared --disable-cxx >configure.log 2>&1
+        {
+            make gmp.h fac_table.h fib_table.h mp_bases.h
+            for part in mpn mpz mpq; do make -j"$jobs" -C $part; done
+            # shellcheck disable=SC2046
+            make -j"$jobs" $(printf '%s.lo ' $common)
+        } >make.log 2>&1
+        rm -f "$deps/lib/libgmp.a"
+        emar rcsD "$deps/lib/libgmp.a" ./*.o mpn/*.o mpz/*.o mpq/*.o
     ) || { tail -n 5 "$deps/gmp"/*.log >&2; exit 1; }
-    cp "$deps/gmp/.libs/libgmp.a" "$deps/lib"
     cp "$deps/gmp/gmp.h" "$deps/include"
     describe_library gmp 6.2.1
 }
@@ -119,12 +129,35 @@ c_args = [${words%, }]
 EOF
     [ -f "$folder/lib/build.ninja" ] ||
         meson setup "$folder/lib" "$root" --cross-file "$folder/emscripten.ini" --buildtype=plain \
-            -Dwerror=true -Dhdf5=disabled -Dhttp=disabled -Dassimp=disabled -Drender=disabled \
-            -Dcaptions=disabled -Dqhull=disabled -Dtests=disabled -Dchart_js=none >"$folder/meson.log"
+            -Dhdf5=disabled -Dhttp=disabled -Dassimp=disabled -Drender=disabled -Dcaptions=disabled \
+            -Dqhull=disabled -Dtests=disabled -Dchart_js=none >"$folder/meson.log"
     ninja -C "$folder/lib" -j"$jobs" lib/libebpo-internal.a
+}
+
+# Links a module of the package: FILE.wasm of C files in module/.
+link_module() { # file, C files...
+    output=$folder/package/$1
+    shift
+    # shellcheck disable=SC2086
+    (cd "$here/module" && emcc $flags -std=gnu11 -ffp-contract=off -Wall -Wextra -I"$root/lib/include" "$@" \
+        "$folder/lib/lib/libebpo-internal.a" "$folder"/lib/lib/libebpo-kernels-base.a -L"$deps/lib" \
+        -lzstd -lz -lgmp -lnettle --no-entry -sSTANDALONE_WASM -sIMPORTED_MEMORY -sALLOW_MEMORY_GROWTH \
+        -sMAXIMUM_MEMORY=4GB -sINITIAL_MEMORY=8MB -sTOTAL_STACK=2MB -sABORTING_MALLOC=0 -sWASM_BIGINT \
+        -sEXPORTED_FUNCTIONS=_malloc,_free -o "$output")
+}
+
+build_package() {
+    rm -rf "$folder/package"
+    mkdir -p "$folder/package"
+    link_module ebpo.wasm object.c queries.c levels.c
+    link_module ebpo-collide.wasm object.c queries.c levels.c collide.c
+    version=$(sed -n "s/^  version: '\(.*\)',$/\1/p" "$root/meson.build")
+    cp "$here"/ebpo/*.js "$here"/ebpo/*.d.ts "$here/ebpo/README.md" "$root/LICENSE" "$folder/package"
+    sed "s/@VERSION@/$version/" "$here/ebpo/package.json.in" >"$folder/package/package.json"
 }
 
 mkdir -p "$deps/include"
 [ -f "$sources/.done" ] || { fetch_sources && touch "$sources/.done"; }
 [ -f "$deps/.done" ] || { build_zstd && build_zlib && build_nettle && build_gmp && touch "$deps/.done"; }
 build_library
+build_package

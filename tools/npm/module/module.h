@@ -18,6 +18,7 @@ typedef struct ebpo_js_array {
     size_t bytes, capacity;
 } ebpo_js_array;
 
+/* A model, or a stream of the file of a model. */
 typedef struct ebpo_js_object {
     ebpo_async *async;
     ebpo_file *file;
@@ -31,6 +32,8 @@ typedef struct ebpo_js_object {
 
 /* Empties all result arrays. */
 void ebpo_js_clear(ebpo_js_object *object);
+
+void ebpo_js_free_arrays(ebpo_js_object *object);
 
 /* Appends bytes to result array n. Returns EBPO_E_MEMORY with an error if they do not fit. */
 EBPO_MUST_USE ebpo_status ebpo_js_put(ebpo_js_object *object, unsigned n, const void *data,

@@ -49,6 +49,12 @@ ebpo_status ebpo_js_put(ebpo_js_object *object, unsigned n, const void *data, si
     return EBPO_OK;
 }
 
+void ebpo_js_free_arrays(ebpo_js_object *object)
+{
+    for (unsigned n = 0; n < EBPO_JS_ARRAYS; n++)
+        free(object->array[n].data);
+}
+
 void *EBPO_JS(ebpo_js_data)(const ebpo_js_object *object, unsigned n)
 {
     return object->array[n].data;
@@ -90,13 +96,11 @@ ebpo_js_object *EBPO_JS(ebpo_js_new)(double size, const char *name, const char *
 
 void EBPO_JS(ebpo_js_free)(ebpo_js_object *object)
 {
-    ebpo_stream_free(object->stream);
     ebpo_context_free(object->context);
     ebpo_model_free(object->model);
     ebpo_close(object->file);
     ebpo_async_free(object->async);
-    for (unsigned n = 0; n < EBPO_JS_ARRAYS; n++)
-        free(object->array[n].data);
+    ebpo_js_free_arrays(object);
     free(object);
 }
 
@@ -136,10 +140,15 @@ int EBPO_JS(ebpo_js_supply)(ebpo_js_object *object, double offset, double size, 
 
 /* ---- opening ---- */
 
-int EBPO_JS(ebpo_js_open)(ebpo_js_object *object, const char *name)
+/* Opens the file. `whole`: all bytes are supplied already, so nothing is fetched in advance. */
+int EBPO_JS(ebpo_js_open)(ebpo_js_object *object, const char *name, int whole)
 {
     ebpo_source source = EBPO_SOURCE_INIT;
     ebpo_status status = ebpo_async_source(object->async, &source, &object->error);
+    if (whole) {
+        source.prefetch = NULL;
+        source.prefetched = 0;
+    }
     if (status == EBPO_OK)
         status = ebpo_open_source(&source, name, &object->file, &object->error);
     return status;
