@@ -1,7 +1,7 @@
 /* Sources of files whose bytes arrive asynchronously (ebpo/async.h). Supplied bytes are extents, in
  * order and without overlaps. A read copies from extents, or notes the missing ranges as wanted and
- * returns EBPO_E_PENDING. Prefetch hints are noted in the same way, so the caller fetches all ranges
- * of a round trip together.
+ * returns EBPO_E_PENDING. Prefetch hints are noted in the same way, so the caller fetches all
+ * ranges of a round trip together.
  *
  * A clock counts reads, supplied ranges and operations. An extent that was used since the oldest
  * running operation began is never removed. So the available bytes only grow while an operation is
@@ -17,12 +17,12 @@
 #include "core/error.h"
 
 enum {
-    HEAD_BYTES = 131072,     /* as for URLs (http_cache.h): opening reads only these bytes */
-    RANGE_BYTES = 4 << 20,   /* limit of one needed range */
-    GAP_BYTES = 16384,       /* smaller gaps are fetched too: that is faster than another request */
+    HEAD_BYTES = 131072,   /* as for URLs (http_cache.h): opening reads only these bytes */
+    RANGE_BYTES = 4 << 20, /* limit of one needed range */
+    GAP_BYTES = 16384,     /* smaller gaps are fetched too: that is faster than another request */
     GAP_BYTES_OF_MANY = 32768,
     MANY = 256,
-    COMPACT_COUNT = 1 << 16  /* number of wanted ranges that are merged before more are noted */
+    COMPACT_COUNT = 1 << 16 /* number of wanted ranges that are merged before more are noted */
 };
 
 typedef struct extent {
@@ -113,7 +113,8 @@ static bool insert_extent(ebpo_async *a, uint64_t begin, uint64_t end, const uin
 /* Returns false if the bytes differ from available ones. */
 static bool compare_bytes(const ebpo_async *a, uint64_t begin, uint64_t end, const uint8_t *bytes)
 {
-    for (uint64_t i = find_extent(a, begin); i < a->extent_count && a->extents[i].begin < end; i++) {
+    for (uint64_t i = find_extent(a, begin); i < a->extent_count && a->extents[i].begin < end;
+         i++) {
         const extent *e = &a->extents[i];
         uint64_t from = e->begin > begin ? e->begin : begin, to = e->end < end ? e->end : end;
         if (memcmp(e->bytes + (from - e->begin), bytes + (from - begin), (size_t)(to - from)) != 0)
@@ -383,8 +384,8 @@ static bool check_version(ebpo_async *a, const char *version)
     return true; /* without memory, the next call compares nothing either */
 }
 
-static ebpo_status store_supplied(ebpo_async *a, uint64_t begin, uint64_t end,
-                                  const uint8_t *bytes, ebpo_error *error)
+static ebpo_status store_supplied(ebpo_async *a, uint64_t begin, uint64_t end, const uint8_t *bytes,
+                                  ebpo_error *error)
 {
     for (ebpo_range m = first_missing(a, begin, end); m.size;
          m = first_missing(a, m.offset + m.size, end)) {
