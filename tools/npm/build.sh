@@ -14,7 +14,8 @@ jobs=${EBPO_JOBS:-$(nproc)}
 # Debian's emcc runs scripts that use Debian's modules for node.
 export NODE_PATH=/usr/share/nodejs
 # The module holds no path of the build.
-flags="-O3 -msimd128 -ffunction-sections -fdata-sections -ffile-prefix-map=$folder=. -ffile-prefix-map=$root=."
+flags="-O3 -msimd128 -ffunction-sections -fdata-sections -ffile-prefix-map=$folder=. -ffile-prefix-map=$root=.
+    -Wno-ignored-optimization-argument"
 
 # Downloads the source packages, without changes to the system's lists of packages.
 fetch_sources() {
@@ -26,7 +27,7 @@ fetch_sources() {
     apt="apt-get -qq -o Dir::Etc::SourceList=/dev/null -o Dir::Etc::SourceParts=$sources/parts
         -o Dir::State::Lists=$sources/lists -o APT::Sandbox::User=$(id -un)"
     $apt update
-    (cd "$sources/files" && $apt source --download-only libzstd zlib gmp nettle jansson)
+    (cd "$sources/files" && $apt source --download-only libzstd zlib gmp nettle)
     for package in "$sources"/files/*.dsc; do
         name=$(basename "$package" | sed 's/_.*//')
         rm -rf "${sources:?}/$name"
@@ -92,7 +93,8 @@ build_gmp() {
         CC=emcc AR=emar RANLIB=emranlib NM=emnm CC_FOR_BUILD=cc CFLAGS="$flags" "$sources/gmp/configure" \
             --host=none --disable-assembly --disable-shared --disable-cxx >configure.log 2>&1
         {
-            make gmp.h fac_table.h fib_table.h mp_bases.h
+            make gmp.h fac_table.h fib_table.h mp_bases.h trialdivtab.h mpn/fib_table.c mpn/mp_bases.c \
+                mpn/jacobitab.h mpn/perfsqr.h sieve_table.h
             for part in mpn mpz mpq; do make -j"$jobs" -C $part; done
             # shellcheck disable=SC2046
             make -j"$jobs" $(printf '%s.lo ' $common)
@@ -105,11 +107,8 @@ build_gmp() {
 }
 
 build_library() {
-    # Headers alone: scenes, which read JSON, are compiled but not linked.
-    cp "$sources"/jansson/src/jansson.h "$sources"/jansson/android/jansson_config.h "$deps/include"
-    describe_library jansson 2.14
-    sed -i '/^Libs/d' "$deps/pkgconfig/jansson.pc"
-    words=$(printf "'%s', " $flags)
+    describe_library jansson 2.14 # which meson.build requires; the folders below do not use it
+    words=$(printf "'%s', " $flags "-I$deps/include")
     cat >"$folder/emscripten.ini" <<EOF
 [binaries]
 c = 'emcc'
@@ -131,7 +130,14 @@ EOF
         meson setup "$folder/lib" "$root" --cross-file "$folder/emscripten.ini" --buildtype=plain \
             -Dhdf5=disabled -Dhttp=disabled -Dassimp=disabled -Drender=disabled -Dcaptions=disabled \
             -Dqhull=disabled -Dtests=disabled -Dchart_js=none >"$folder/meson.log"
-    ninja -C "$folder/lib" -j"$jobs" lib/libebpo-internal.a
+    # The folders of lib that the modules use, and all kernels.
+    objects=$(ninja -C "$folder/lib" -t targets all | sed -n 's/: c_COMPILER$//p' | grep -E \
+        '/(core|geometry|io|hdf5_read|hdf5_write|mesh|format|levels|query|extras_collide)_[^/]*\.o$')
+    # shellcheck disable=SC2086
+    ninja -C "$folder/lib" -j"$jobs" $objects >"$folder/ninja.log" || { tail -n 20 "$folder/ninja.log" >&2; exit 1; }
+    rm -f "$deps/lib/libebpo.a"
+    # shellcheck disable=SC2086
+    (cd "$folder/lib" && emar rcsD "$deps/lib/libebpo.a" $objects)
 }
 
 # Links a module of the package: FILE.wasm of C files in module/.
@@ -140,8 +146,7 @@ link_module() { # file, C files...
     shift
     # shellcheck disable=SC2086
     (cd "$here/module" && emcc $flags -std=gnu11 -ffp-contract=off -Wall -Wextra -I"$root/lib/include" "$@" \
-        "$folder/lib/lib/libebpo-internal.a" "$folder"/lib/lib/libebpo-kernels-base.a -L"$deps/lib" \
-        -lzstd -lz -lgmp -lnettle --no-entry -sSTANDALONE_WASM -sIMPORTED_MEMORY -sALLOW_MEMORY_GROWTH \
+        -L"$deps/lib" -lebpo -lzstd -lz -lgmp -lnettle --no-entry -sSTANDALONE_WASM -sIMPORTED_MEMORY -sALLOW_MEMORY_GROWTH \
         -sMAXIMUM_MEMORY=4GB -sINITIAL_MEMORY=8MB -sTOTAL_STACK=2MB -sABORTING_MALLOC=0 -sWASM_BIGINT \
         -sEXPORTED_FUNCTIONS=_malloc,_free -o "$output")
 }

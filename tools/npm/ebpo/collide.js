@@ -22,30 +22,31 @@ const posesOf = ({ poseA = {}, poseB = {} } = {}) => Float64Array.from([poseA, p
 
 /** Two models, for queries of pairs. */
 export class Pair {
-  #a;
-  #b;
+  #models;
+  #objects;
   #heap;
   #pair;
 
   /** Use pair(). */
   constructor(a, b) {
-    [this.#a, this.#b] = [Model.parts(a), Model.parts(b)];
-    this.#heap = this.#a.heap;
-    if (this.#b.heap !== this.#heap || !this.#heap.exports.ebpo_js_pair_new)
+    const parts = [a, b].map(Model.parts);
+    this.#models = a === b ? [a] : [a, b];
+    this.#objects = parts.map(({ object }) => object);
+    this.#heap = parts[0].heap;
+    if (parts[1].heap !== this.#heap || !this.#heap.exports.ebpo_js_pair_new)
       throw new EbpoArgumentError('open both models with open() of ebpo/collide, the second one with the option beside', { status: 'EBPO_E_ARGUMENT' });
     this.#pair = this.#heap.call('ebpo_js_pair_new');
     if (!this.#pair)
       throw errorOf(-1, 'not enough memory for the pair', '', -1);
   }
 
-  /** Repeats a call until the bytes of both models have arrived. */
-  async #run(call, signal) {
-    await this.#a.run(() => call(), signal, this.#pair, this.#b);
+  #run(call, signal) {
+    return Model.repeat(this.#models, call, this.#pair, signal);
   }
 
   /** Makes the pair. */
   async make(signal) {
-    await this.#run(() => this.#heap.call('ebpo_js_pair_make', this.#pair, this.#a.object, this.#b.object), signal);
+    await this.#run(() => this.#heap.call('ebpo_js_pair_make', this.#pair, ...this.#objects), signal);
     return this;
   }
 

@@ -7,7 +7,8 @@ const PENDING = -11;
 const BATCH = 16384; // points of one call
 const TURN = 50; // milliseconds after which a long query lets other events run
 const SIDES = { both: 0, front: 1, back: 2 };
-const LARGE = 4 << 20;
+const LARGE = 4 << 20; // bytes of one request when the whole file is read
+const KEPT = 4; // query objects that are kept for later queries
 
 /** Lets the event loop run. */
 const turn = () => new Promise((resolve) => setTimeout(resolve));
@@ -42,6 +43,8 @@ export class Model {
   #source;
   #version;
   #flights = new Set(); // ranges that are being fetched
+  #idle = []; // query objects that are not in use
+  #used = new Set(); // query objects in use
   #disposed = false;
   #info;
 
@@ -66,9 +69,8 @@ export class Model {
         ranges.push({ offset, size: Math.min(LARGE, size - offset) });
       await this.#fetch(ranges, signal);
     }
-    await this.#run(() => this.#heap.lend(name ?? 'model', (text) => this.#heap.call('ebpo_js_open', this.#object, text, +!whole)), signal);
-    if (this.info.hasMesh || this.info.levels.length)
-      await this.#run(() => this.#heap.call('ebpo_js_load', this.#object, memory, level), signal);
+    await this.#repeat(() => this.#heap.lend(name ?? 'model', (text) => this.#heap.call('ebpo_js_open', this.#object, text, +whole)), this.#object, signal);
+    await this.#repeat(() => this.#heap.call('ebpo_js_load', this.#object, memory, level), this.#object, signal);
     return this;
   }
 
@@ -120,46 +122,113 @@ export class Model {
       throw this.#heap.error(object, status);
   }
 
-  /** Calls until the bytes that the call needs have arrived. */
-  async #run(call, signal, object = this.#object) {
-    this.#alive();
+  #begin() {
+    return this.#heap.call('ebpo_js_begin', this.#object);
+  }
+
+  #end(operation) {
+    if (!this.#disposed && !this.#heap.failed)
+      this.#heap.call('ebpo_js_end', this.#object, operation);
+  }
+
+  /** Calls until the bytes of all models that the call needs have arrived. `completed` returns the number of results that need
+   * no more bytes. */
+  static async repeat(models, call, object, signal, completed = () => 0) {
     signal?.throwIfAborted();
-    const operation = this.#heap.call('ebpo_js_begin', this.#object);
+    let operations = models.map((model) => model.#begin()), results = 0;
     try {
       for (let status; (status = call());) {
         if (status !== PENDING)
-          this.#check(status, object);
-        await this.#fetch(this.#needed(), signal);
+          throw models[0].#heap.error(object, status);
+        const needed = models.map((model) => model.#needed()), now = completed();
+        if (now > results) { // bytes of completed results need not stay
+          results = now;
+          models.forEach((model, i) => model.#end(operations[i]));
+          operations = models.map((model) => model.#begin());
+        }
+        await Promise.all(models.map((model, i) => model.#fetch(needed[i], signal)));
+        models.forEach((model) => model.#alive());
         signal?.throwIfAborted();
-        this.#alive();
       }
     } finally {
-      if (!this.#disposed && !this.#heap.failed)
-        this.#heap.call('ebpo_js_end', this.#object, operation);
+      models.forEach((model, i) => model.#end(operations[i]));
     }
   }
 
-  #runNow(call) {
+  #repeat(call, object, signal, completed) {
+    return Model.repeat([this], call, object, signal, completed);
+  }
+
+  // ---- query objects: each has the results of one query at a time ----
+
+  #take() {
     this.#alive();
-    const operation = this.#heap.call('ebpo_js_begin', this.#object);
+    const query = this.#idle.pop() ?? this.#heap.call('ebpo_js_query', this.#object);
+    if (!query)
+      throw errorOf(-1, 'not enough memory for a query', '', -1);
+    this.#heap.call('ebpo_js_start', query);
+    this.#used.add(query);
+    return query;
+  }
+
+  #give(query) {
+    if (this.#disposed || this.#heap.failed)
+      return;
+    this.#used.delete(query);
+    if (this.#idle.length < KEPT)
+      this.#idle.push(query);
+    else
+      this.#heap.call('ebpo_js_query_free', query);
+  }
+
+  #results(query) {
+    return (n, Type) => this.#heap.result(query, n, Type);
+  }
+
+  /** Evaluates call(query), and returns read(array). */
+  async #run({ call, read, completed }, signal) {
+    const query = this.#take();
     try {
-      this.#check(call());
+      await this.#repeat(() => call(query), query, signal, completed && (() => this.#heap.call('ebpo_js_completed', query)));
+      return read(this.#results(query));
     } finally {
-      if (!this.#heap.failed)
-        this.#heap.call('ebpo_js_end', this.#object, operation);
+      this.#give(query);
     }
+  }
+
+  #runNow({ call, read }) {
+    const query = this.#take(), operation = this.#begin();
+    try {
+      this.#check(call(query), query);
+      return read(this.#results(query));
+    } finally {
+      this.#end(operation);
+      this.#give(query);
+    }
+  }
+
+  /** Returns a call of an exported function with a query object. */
+  #of(name, ...args) {
+    return (query) => this.#heap.call(name, query, ...args);
   }
 
   // ---- queries ----
 
-  /** Evaluates a query of many items in batches; `query` is {values, columns, call, read}. */
-  async #many({ values, columns, call, read }, signal) {
+  /** Returns queries of batches of values, which are {name, values, columns, args, read, completed, most}. */
+  #batches({ name, values, columns, args, read, completed = true, most = BATCH }) {
+    const out = [];
+    for (let first = 0; first === 0 || first < values.length; first += most * columns) {
+      const part = values.subarray(first, first + most * columns);
+      out.push({ read, completed, call: (query) => this.#heap.lend(part, (at) => this.#heap.call(name, query, at, part.length / columns, ...args)) });
+    }
+    return out;
+  }
+
+  async #many(batches, signal) {
     const parts = [];
     let began = performance.now();
-    for (let first = 0; first === 0 || first < values.length; first += BATCH * columns) {
-      const part = values.subarray(first, first + BATCH * columns);
-      await this.#run(() => this.#heap.lend(part, (at) => call(at, part.length / columns)), signal);
-      parts.push(read());
+    for (const batch of this.#batches(batches)) {
+      parts.push(await this.#run(batch, signal));
       if (performance.now() - began > TURN) {
         await turn();
         began = performance.now();
@@ -168,24 +237,13 @@ export class Model {
     return parts;
   }
 
-  #manyNow({ values, columns, call, read }) {
-    const parts = [];
-    for (let first = 0; first === 0 || first < values.length; first += BATCH * columns) {
-      const part = values.subarray(first, first + BATCH * columns);
-      this.#runNow(() => this.#heap.lend(part, (at) => call(at, part.length / columns)));
-      parts.push(read());
-    }
-    return parts;
-  }
-
-  #array(n, Type) {
-    return this.#heap.result(this.#object, n, Type);
+  #manyNow(batches) {
+    return this.#batches(batches).map((batch) => this.#runNow(batch));
   }
 
   #inside(points, { level = -1 } = {}) {
-    return { values: doubles(points, 3, 'point'), columns: 3,
-      call: (at, count) => this.#heap.call('ebpo_js_inside', this.#object, at, count, level),
-      read: () => ({ where: this.#array(0, Int8Array), winding: this.#array(1, Int32Array) }) };
+    return { name: 'ebpo_js_inside', values: doubles(points, 3, 'point'), columns: 3, args: [level],
+      read: (array) => ({ where: array(0, Int8Array), winding: array(1, Int32Array) }) };
   }
 
   async inside(points, options = {}) {
@@ -197,10 +255,9 @@ export class Model {
   }
 
   #distance(points, { level = -1, maxDistance = Infinity, unsigned = false } = {}) {
-    return { values: doubles(points, 3, 'point'), columns: 3,
-      call: (at, count) => this.#heap.call('ebpo_js_distance', this.#object, at, count, level, maxDistance, +unsigned),
-      read: () => ({ distance: this.#array(0, Float64Array), point: this.#array(2, Float64Array), normal: this.#array(3, Float64Array),
-        face: this.#array(4, Uint32Array), lo: this.#array(5, Float64Array), hi: this.#array(1, Float64Array) }) };
+    return { name: 'ebpo_js_distance', values: doubles(points, 3, 'point'), columns: 3, args: [level, maxDistance, +unsigned],
+      read: (array) => ({ distance: array(0, Float64Array), point: array(2, Float64Array), normal: array(3, Float64Array),
+        face: array(4, Uint32Array), lo: array(5, Float64Array), hi: array(1, Float64Array) }) };
   }
 
   async distance(points, options = {}) {
@@ -213,30 +270,25 @@ export class Model {
 
   #nearest(point, { radius = Infinity, most = radius === Infinity ? 1 : 0 } = {}) {
     const values = doubles(point, 3, 'point');
-    return { call: () => this.#heap.lend(values, (at) => this.#heap.call('ebpo_js_within', this.#object, at, radius, most)),
-      read: () => ({ distance: this.#array(0, Float64Array), point: this.#array(2, Float64Array), normal: this.#array(3, Float64Array),
-        face: this.#array(4, Uint32Array) }) };
+    return { call: (query) => this.#heap.lend(values, (at) => this.#heap.call('ebpo_js_within', query, at, radius, most)),
+      read: (array) => ({ distance: array(0, Float64Array), point: array(2, Float64Array), normal: array(3, Float64Array), face: array(4, Uint32Array) }) };
   }
 
   async nearest(point, options = {}) {
-    const query = this.#nearest(point, options);
-    await this.#run(query.call, options.signal);
-    return query.read();
+    return this.#run(this.#nearest(point, options), options.signal);
   }
 
   nearestSync(point, options = {}) {
-    const query = this.#nearest(point, options);
-    this.#runNow(query.call);
-    return query.read();
+    return this.#runNow(this.#nearest(point, options));
   }
 
   #rays(name, rays, { tMax = Infinity, sides = 'both' } = {}) {
     if (!(sides in SIDES))
       throw new EbpoArgumentError(`sides is both, front or back, not ${sides}`, { status: 'EBPO_E_ARGUMENT' });
-    return { values: doubles(rays, 6, 'ray'), columns: 6, call: (at, count) => this.#heap.call(name, this.#object, at, count, tMax, SIDES[sides]),
-      read: () => name === 'ebpo_js_ray_any' ? { hit: this.#array(0, Uint8Array) }
-        : { t: this.#array(0, Float64Array), face: this.#array(1, Uint32Array), side: this.#array(2, Int8Array),
-          ...(name === 'ebpo_js_ray_all' ? { begin: this.#array(3, Uint32Array) } : {}) } };
+    const all = name === 'ebpo_js_ray_all';
+    return { name, values: doubles(rays, 6, 'ray'), columns: 6, args: [tMax, SIDES[sides]], completed: !all, most: all ? BATCH / 16 : BATCH,
+      read: (array) => name === 'ebpo_js_ray_any' ? { hit: array(0, Uint8Array) }
+        : { t: array(0, Float64Array), face: array(1, Uint32Array), side: array(2, Int8Array), ...(all ? { begin: array(3, Uint32Array) } : {}) } };
   }
 
   async rays(rays, options = {}) {
@@ -280,72 +332,71 @@ export class Model {
     const box = Float64Array.of(...min, ...max);
     if (box.length !== 6)
       throw new EbpoArgumentError('expected three numbers for each corner of the box', { status: 'EBPO_E_ARGUMENT' });
-    return () => this.#heap.lend(box, (at) => this.#heap.call(name, this.#object, at));
+    return { call: (query) => this.#heap.lend(box, (at) => this.#heap.call(name, query, at)),
+      read: (array) => name === 'ebpo_js_box_faces' ? array(0, Uint32Array) : { face: array(0, Uint32Array), corners: array(1, Float64Array) } };
   }
 
   async boxFaces(min, max, { signal } = {}) {
-    await this.#run(this.#box('ebpo_js_box_faces', min, max), signal);
-    return this.#array(0, Uint32Array);
+    return this.#run(this.#box('ebpo_js_box_faces', min, max), signal);
   }
 
   boxFacesSync(min, max) {
-    this.#runNow(this.#box('ebpo_js_box_faces', min, max));
-    return this.#array(0, Uint32Array);
+    return this.#runNow(this.#box('ebpo_js_box_faces', min, max));
   }
 
   async boxTriangles(min, max, { signal } = {}) {
-    await this.#run(this.#box('ebpo_js_box_triangles', min, max), signal);
-    return { face: this.#array(0, Uint32Array), corners: this.#array(1, Float64Array) };
+    return this.#run(this.#box('ebpo_js_box_triangles', min, max), signal);
   }
 
   // ---- the file ----
 
   get info() {
-    if (!this.#info) {
-      this.#alive();
-      this.#check(this.#heap.call('ebpo_js_info', this.#object));
-      this.#info = JSON.parse(new TextDecoder().decode(this.#array(0, Uint8Array)));
-    }
+    this.#info ??= JSON.parse(new TextDecoder().decode(this.#fact('ebpo_js_info', Uint8Array)));
     return this.#info;
   }
 
   get stats() {
-    this.#alive();
-    this.#check(this.#heap.call('ebpo_js_stats', this.#object));
-    const [memory, memoryPeak, budget, resident, cutLevel, hits, loads, evicted, bytesRead, reads, suppliedBytes] = this.#array(0, Float64Array);
+    const [memory, memoryPeak, budget, resident, cutLevel, hits, loads, evicted, bytesRead, reads, suppliedBytes] =
+      this.#fact('ebpo_js_stats', Float64Array);
     return { memory, memoryPeak, budget, resident: !!resident, cutLevel, hits, loads, evicted, bytesRead, reads, suppliedBytes,
       heap: this.#heap.memory.buffer.byteLength };
   }
 
+  #fact(name, Type) {
+    this.#alive();
+    this.#check(this.#heap.call(name, this.#object));
+    return this.#heap.result(this.#object, 0, Type);
+  }
+
   async measure({ signal } = {}) {
-    await this.#run(() => this.#heap.call('ebpo_js_measure', this.#object), signal);
-    const x = this.#array(0, Float64Array);
+    const read = (array) => array(0, Float64Array), x = await this.#run({ call: this.#of('ebpo_js_measure'), read }, signal);
     return { area: x[0], volume: x[1], centroid: x.slice(2, 5), inertia: x.slice(5, 14), volumeLo: x[14], volumeHi: x[15], integral: x[16] };
   }
 
+  async check({ signal } = {}) {
+    await this.#run({ call: this.#of('ebpo_js_check'), read: () => {} }, signal);
+  }
+
   async mesh({ signal } = {}) {
-    await this.#run(() => this.#heap.call('ebpo_js_mesh', this.#object), signal);
-    const floats = this.#array(0, Float32Array);
-    return { vertices: floats.length ? floats : this.#array(1, Float64Array), faces: this.#array(2, Uint32Array) };
+    const read = (array) => ({ vertices: array(0, Float32Array).length ? array(0, Float32Array) : array(1, Float64Array), faces: array(2, Uint32Array) });
+    return this.#run({ call: this.#of('ebpo_js_mesh'), read }, signal);
   }
 
   async level(level, { cellFaces = true, signal } = {}) {
-    await this.#run(() => this.#heap.call('ebpo_js_level', this.#object, level, +cellFaces), signal);
-    return { level, vertices: this.#array(0, Float64Array), triangles: this.#array(1, Uint32Array), corners: this.#array(2, Uint8Array),
-      normals: this.#array(3, Float32Array), octcode: this.#array(4, BigUint64Array), type: this.#array(5, Uint8Array),
-      winding: this.#array(6, Int32Array), nodeVolume: this.#array(7, Float64Array), vertexCount: this.#array(8, Uint32Array),
-      polygonCount: this.#array(9, Uint32Array), colour: this.#array(10, Uint32Array), volume: this.#array(11, Float64Array)[0] };
+    const read = (array) => ({ level, vertices: array(0, Float64Array), triangles: array(1, Uint32Array), corners: array(2, Uint8Array),
+      normals: array(3, Float32Array), octcode: array(4, BigUint64Array), type: array(5, Uint8Array), winding: array(6, Int32Array),
+      nodeVolume: array(7, Float64Array), vertexCount: array(8, Uint32Array), polygonCount: array(9, Uint32Array),
+      colour: array(10, Uint32Array), volume: array(11, Float64Array)[0] });
+    return this.#run({ call: this.#of('ebpo_js_level', level, +cellFaces), read }, signal);
   }
 
   async* levels({ planes = true, polygons = false, signal } = {}) {
-    this.#alive();
-    const heap = this.#heap, stream = heap.call('ebpo_js_stream', this.#object, +planes, +polygons);
-    if (!stream)
-      throw errorOf(-1, 'not enough memory for the stream', '', -1);
-    const array = (n, Type) => heap.result(stream, n, Type);
+    const query = this.#take(), heap = this.#heap, array = this.#results(query);
     try {
+      this.#check(heap.call('ebpo_js_stream', query, +planes, +polygons), query);
       for (;;) {
-        await this.#run(() => heap.call('ebpo_js_next_level', stream), signal, stream);
+        this.#alive();
+        await this.#repeat(() => heap.call('ebpo_js_next_level', query), query, signal);
         const facts = array(13, Float64Array);
         if (!facts.length)
           return;
@@ -356,22 +407,26 @@ export class Model {
             polygonFirst: array(11, Uint32Array), corners: array(12, Uint32Array) } : {}) };
       }
     } finally {
-      if (!this.#disposed && !heap.failed)
-        heap.call('ebpo_js_stream_free', stream);
+      if (!this.#disposed && !heap.failed) {
+        this.#used.delete(query);
+        heap.call('ebpo_js_query_free', query);
+      }
     }
   }
 
   /** Frees the model. The heap of models that were opened alone is collected with them. */
   dispose() {
-    if (!this.#disposed && !this.#heap.failed)
+    if (!this.#disposed && !this.#heap.failed) {
+      [...this.#idle, ...this.#used].forEach((query) => this.#heap.call('ebpo_js_query_free', query));
       this.#heap.call('ebpo_js_free', this.#object);
+    }
     this.#disposed = true;
   }
 
   /** For collide.js: heap and object of a model. */
   static parts(model) {
     model.#alive();
-    return { heap: model.#heap, object: model.#object, run: (call, signal) => model.#run(call, signal) };
+    return { heap: model.#heap, object: model.#object };
   }
 }
 

@@ -6,28 +6,14 @@
 
 /* ---- streams ---- */
 
-/* Returns a stream of the model's file; NULL: not enough memory. Free it before the model. */
-ebpo_js_object *EBPO_JS(ebpo_js_stream)(const ebpo_js_object *model, int planes, int polygons)
+/* Makes the stream of a query object. */
+int EBPO_JS(ebpo_js_stream)(ebpo_js_object *object, int planes, int polygons)
 {
     ebpo_stream_options options = EBPO_STREAM_OPTIONS_INIT;
-    ebpo_js_object *object = calloc(1, sizeof *object);
-    if (!object)
-        return NULL;
-    object->error = (ebpo_error)EBPO_ERROR_INIT;
     options.planes = planes;
     options.polygons = polygons;
     options.threads = 1;
-    if (ebpo_stream_new(model->file, &options, &object->stream, &object->error) == EBPO_OK)
-        return object;
-    free(object);
-    return NULL;
-}
-
-void EBPO_JS(ebpo_js_stream_free)(ebpo_js_object *object)
-{
-    ebpo_stream_free(object->stream);
-    ebpo_js_free_arrays(object);
-    free(object);
+    return ebpo_stream_new(object->file, &options, &object->stream, &object->error);
 }
 
 /* Result arrays of a level of the stream. */

@@ -18,7 +18,7 @@ typedef struct ebpo_js_array {
     size_t bytes, capacity;
 } ebpo_js_array;
 
-/* A model, or a stream of the file of a model. */
+/* A model; or a query or stream, which borrows `async`, `file` and `model` of a model. */
 typedef struct ebpo_js_object {
     ebpo_async *async;
     ebpo_file *file;
@@ -41,5 +41,9 @@ EBPO_MUST_USE ebpo_status ebpo_js_put(ebpo_js_object *object, unsigned n, const 
 
 /* Appends uninitialized bytes to result array n. Returns NULL, with an error, if they do not fit. */
 void *ebpo_js_extend(ebpo_js_object *object, unsigned n, uint64_t count, size_t size);
+
+/* Returns result array n with `count` items, zeroed unless it had that size already. Returns NULL,
+ * with an error, if they do not fit. */
+void *ebpo_js_fixed(ebpo_js_object *object, unsigned n, uint64_t count, size_t size);
 
 #endif

@@ -39,6 +39,18 @@ void *ebpo_js_extend(ebpo_js_object *object, unsigned n, uint64_t count, size_t 
     return out;
 }
 
+void *ebpo_js_fixed(ebpo_js_object *object, unsigned n, uint64_t count, size_t size)
+{
+    ebpo_js_array *a = &object->array[n];
+    if (count && a->bytes == count * size)
+        return a->data;
+    a->bytes = 0;
+    void *out = ebpo_js_extend(object, n, count, size);
+    if (out)
+        memset(out, 0, a->bytes);
+    return out;
+}
+
 ebpo_status ebpo_js_put(ebpo_js_object *object, unsigned n, const void *data, size_t bytes)
 {
     void *out = ebpo_js_extend(object, n, bytes, 1);
@@ -94,9 +106,9 @@ ebpo_js_object *EBPO_JS(ebpo_js_new)(double size, const char *name, const char *
     return NULL;
 }
 
+/* Frees a model, after its queries and streams. */
 void EBPO_JS(ebpo_js_free)(ebpo_js_object *object)
 {
-    ebpo_context_free(object->context);
     ebpo_model_free(object->model);
     ebpo_close(object->file);
     ebpo_async_free(object->async);
@@ -154,19 +166,43 @@ int EBPO_JS(ebpo_js_open)(ebpo_js_object *object, const char *name, int whole)
     return status;
 }
 
-/* Makes the model and its context. A repeated call after EBPO_E_PENDING continues. */
 int EBPO_JS(ebpo_js_load)(ebpo_js_object *object, double memory, int cut_level)
 {
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
     options.memory = (uint64_t)memory;
     options.cut_level = cut_level;
     options.threads = 1;
-    ebpo_status status = EBPO_OK;
-    if (!object->model)
-        status = ebpo_model_new(object->file, &options, &object->model, &object->error);
-    if (status == EBPO_OK && !object->context)
-        status = ebpo_context_new(object->model, &object->context, &object->error);
-    return status;
+    return ebpo_model_new(object->file, &options, &object->model, &object->error);
+}
+
+/* ---- queries ---- */
+
+/* Returns an object for queries of a model, one at a time; NULL: not enough memory. Streams and
+ * information of the file need no model. */
+ebpo_js_object *EBPO_JS(ebpo_js_query)(const ebpo_js_object *model)
+{
+    ebpo_js_object *object = calloc(1, sizeof *object);
+    if (!object)
+        return NULL;
+    object->error = (ebpo_error)EBPO_ERROR_INIT;
+    object->file = model->file;
+    object->model = model->model;
+    object->async = model->async;
+    if (!model->model || ebpo_context_new(model->model, &object->context, &object->error) == EBPO_OK)
+        return object;
+    free(object);
+    return NULL;
+}
+
+/* Begins another query. */
+void EBPO_JS(ebpo_js_start)(ebpo_js_object *object) { ebpo_js_clear(object); }
+
+void EBPO_JS(ebpo_js_query_free)(ebpo_js_object *object)
+{
+    ebpo_stream_free(object->stream);
+    ebpo_context_free(object->context);
+    ebpo_js_free_arrays(object);
+    free(object);
 }
 
 /* ---- information ---- */
@@ -287,4 +323,17 @@ int EBPO_JS(ebpo_js_measure)(ebpo_js_object *object)
     values[15] = m.volume_hi;
     values[16] = m.integral;
     return ebpo_js_put(object, 0, values, sizeof values);
+}
+
+/* Reads all arrays of the file, and compares their content with its checksum. */
+int EBPO_JS(ebpo_js_check)(ebpo_js_object *object)
+{
+    ebpo_read_options options = EBPO_READ_OPTIONS_INIT;
+    ebpo_tree tree = { 0 };
+    options.threads = 1;
+    ebpo_status status = ebpo_file_read_tree(object->file, &options, &tree, &object->error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_tree_free(&tree);
+    return ebpo_file_check_content(object->file, &options, &object->error);
 }

@@ -1,6 +1,7 @@
 /* Queries of many points, rays and boxes for the WebAssembly module. Inputs are arrays of doubles;
  * results are one array for each member of the library's result structs. Indices of faces have 32
- * bits; UINT32_MAX is EBPO_NO_FACE. */
+ * bits; UINT32_MAX is EBPO_NO_FACE. A call after EBPO_E_PENDING has the same arguments and keeps
+ * completed items. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -11,16 +12,33 @@ static uint32_t face_index(uint64_t face)
     return face == EBPO_NO_FACE ? UINT32_MAX : (uint32_t)face;
 }
 
+/* Array of the flags of completed items. */
+enum { DONE = 15 };
+
+static bool *done_flags(ebpo_js_object *object, uint32_t count)
+{
+    return ebpo_js_fixed(object, DONE, count, sizeof(bool));
+}
+
+/* Returns the number of completed items of a query. */
+double EBPO_JS(ebpo_js_completed)(const ebpo_js_object *object)
+{
+    size_t completed = 0;
+    for (size_t i = 0; i < object->array[DONE].bytes; i++)
+        completed += object->array[DONE].data[i];
+    return (double)completed;
+}
+
 /* Array 0: ebpo_where, int8. Array 1: winding numbers, int32. */
 int EBPO_JS(ebpo_js_inside)(ebpo_js_object *object, const double *points, uint32_t count, int level)
 {
     ebpo_inside_options options = EBPO_INSIDE_OPTIONS_INIT;
     options.level = level;
-    ebpo_js_clear(object);
-    ebpo_inside_result *results = ebpo_js_extend(object, 2, count, sizeof *results);
-    int8_t *where = ebpo_js_extend(object, 0, count, sizeof *where);
-    int32_t *winding = ebpo_js_extend(object, 1, count, sizeof *winding);
-    if (!results || !where || !winding)
+    options.done = done_flags(object, count);
+    ebpo_inside_result *results = ebpo_js_fixed(object, 2, count, sizeof *results);
+    int8_t *where = ebpo_js_fixed(object, 0, count, sizeof *where);
+    int32_t *winding = ebpo_js_fixed(object, 1, count, sizeof *winding);
+    if (!options.done || !results || !where || !winding)
         return EBPO_E_MEMORY;
     ebpo_status status = ebpo_inside_many(object->context, points, count, &options, results,
                                           &object->error);
@@ -40,15 +58,15 @@ int EBPO_JS(ebpo_js_distance)(ebpo_js_object *object, const double *points, uint
     options.level = level;
     options.max_distance = max_distance;
     options.unsigned_distance = is_unsigned;
-    ebpo_js_clear(object);
-    ebpo_distance_result *results = ebpo_js_extend(object, 6, count, sizeof *results);
-    double *distance = ebpo_js_extend(object, 0, count, sizeof *distance);
-    double *hi = ebpo_js_extend(object, 1, count, sizeof *hi);
-    double(*point)[3] = ebpo_js_extend(object, 2, count, sizeof *point);
-    double(*normal)[3] = ebpo_js_extend(object, 3, count, sizeof *normal);
-    uint32_t *face = ebpo_js_extend(object, 4, count, sizeof *face);
-    double *lo = ebpo_js_extend(object, 5, count, sizeof *lo);
-    if (!results || !distance || !hi || !point || !normal || !face || !lo)
+    options.done = done_flags(object, count);
+    ebpo_distance_result *results = ebpo_js_fixed(object, 6, count, sizeof *results);
+    double *distance = ebpo_js_fixed(object, 0, count, sizeof *distance);
+    double *hi = ebpo_js_fixed(object, 1, count, sizeof *hi);
+    double(*point)[3] = ebpo_js_fixed(object, 2, count, sizeof *point);
+    double(*normal)[3] = ebpo_js_fixed(object, 3, count, sizeof *normal);
+    uint32_t *face = ebpo_js_fixed(object, 4, count, sizeof *face);
+    double *lo = ebpo_js_fixed(object, 5, count, sizeof *lo);
+    if (!options.done || !results || !distance || !hi || !point || !normal || !face || !lo)
         return EBPO_E_MEMORY;
     ebpo_status status = ebpo_distance_many(object->context, points, count, &options, results,
                                             &object->error);
@@ -93,7 +111,7 @@ int EBPO_JS(ebpo_js_within)(ebpo_js_object *object, const double *point, double 
 static ebpo_ray *make_rays(ebpo_js_object *object, const double *lines, uint32_t count,
                            double t_max)
 {
-    ebpo_ray *rays = ebpo_js_extend(object, 6, count, sizeof *rays);
+    ebpo_ray *rays = ebpo_js_fixed(object, 6, count, sizeof *rays);
     for (uint32_t i = 0; i < count && rays; i++) {
         memcpy(rays[i].origin, lines + 6 * (size_t)i, sizeof rays[i].origin);
         memcpy(rays[i].direction, lines + 6 * (size_t)i + 3, sizeof rays[i].direction);
@@ -105,9 +123,9 @@ static ebpo_ray *make_rays(ebpo_js_object *object, const double *lines, uint32_t
 /* Puts t into array 0, faces into array 1, sides into array 2. */
 static ebpo_status put_hits(ebpo_js_object *object, const ebpo_ray_hit *hits, uint64_t count)
 {
-    double *t = ebpo_js_extend(object, 0, count, sizeof *t);
-    uint32_t *face = ebpo_js_extend(object, 1, count, sizeof *face);
-    int8_t *side = ebpo_js_extend(object, 2, count, sizeof *side);
+    double *t = ebpo_js_fixed(object, 0, count, sizeof *t);
+    uint32_t *face = ebpo_js_fixed(object, 1, count, sizeof *face);
+    int8_t *side = ebpo_js_fixed(object, 2, count, sizeof *side);
     if (!t || !face || !side)
         return EBPO_E_MEMORY;
     for (uint64_t i = 0; i < count; i++) {
@@ -124,10 +142,10 @@ int EBPO_JS(ebpo_js_ray_first)(ebpo_js_object *object, const double *lines, uint
     ebpo_ray_options options = EBPO_RAY_OPTIONS_INIT;
     options.sides = (ebpo_ray_sides)sides;
     options.threads = 1;
-    ebpo_js_clear(object);
+    options.done = done_flags(object, count);
     ebpo_ray *rays = make_rays(object, lines, count, t_max);
-    ebpo_ray_hit *hits = ebpo_js_extend(object, 7, count, sizeof *hits);
-    if (!rays || !hits)
+    ebpo_ray_hit *hits = ebpo_js_fixed(object, 7, count, sizeof *hits);
+    if (!options.done || !rays || !hits)
         return EBPO_E_MEMORY;
     ebpo_status status = ebpo_ray_first_many(object->context, rays, count, &options, hits,
                                              &object->error);
@@ -164,10 +182,10 @@ int EBPO_JS(ebpo_js_ray_any)(ebpo_js_object *object, const double *lines, uint32
     ebpo_ray_options options = EBPO_RAY_OPTIONS_INIT;
     options.sides = (ebpo_ray_sides)sides;
     options.threads = 1;
-    ebpo_js_clear(object);
+    options.done = done_flags(object, count);
     ebpo_ray *rays = make_rays(object, lines, count, t_max);
-    bool *any = ebpo_js_extend(object, 0, count, sizeof *any);
-    if (!rays || !any)
+    bool *any = ebpo_js_fixed(object, 0, count, sizeof *any);
+    if (!options.done || !rays || !any)
         return EBPO_E_MEMORY;
     return ebpo_ray_any_many(object->context, rays, count, &options, any, &object->error);
 }
