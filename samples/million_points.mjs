@@ -18,7 +18,8 @@ const points = new Float64Array(3e6).map((_, i) => origin[i % 3] + size[i % 3] *
 
 const began = performance.now();
 const { distance } = await model.distance(points);
-console.log(`${points.length / 3} distances in ${((performance.now() - began) / 1000).toFixed(1)} s, from ${distance.reduce((a, b) => Math.min(a, b))} to ${distance.reduce((a, b) => Math.max(a, b))}`);
+const seconds = (performance.now() - began) / 1000, [least, most] = ['min', 'max'].map((name) => distance.reduce((a, b) => Math[name](a, b)));
+console.log(`${distance.length} distances in ${seconds.toFixed(1)} s, from ${least} to ${most}`);
 if (solid) {
   const { where } = await model.inside(points);
   console.log(`volume by points: ${size[0] * size[1] * size[2] * where.filter((x) => x === IN).length / where.length}`);

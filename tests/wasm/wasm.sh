@@ -5,7 +5,7 @@ node=$1 root=$2 folder=$3
 EBPO_NATIVE=$(realpath "$4") ebpo=$(realpath "$5")
 command -v emcc >/dev/null || { echo "skipped: emcc is missing (Debian: emscripten)"; exit 77; }
 sh "$root/tools/npm/build.sh" "$folder"
-EBPO_PACKAGE=$folder/package EBPO_VECTORS=$root/format-spec/vectors EBPO_FUZZ=$folder/fuzz EBPO_FILES=
+EBPO_ROOT=$root EBPO_PACKAGE=$folder/package EBPO_VECTORS=$root/format-spec/vectors EBPO_FUZZ=$folder/fuzz EBPO_FILES=
 # Compressed size of the core, as servers send it.
 gzip -9c "$EBPO_PACKAGE/ebpo.wasm" >"$folder/ebpo.wasm.gz"
 bytes=$(wc -c <"$folder/ebpo.wasm.gz")
@@ -21,5 +21,5 @@ for model in bunny_closed fertility armadillo igea cad_adis16480 conrod thingi99
     [ -f "$file" ] || "$ebpo" convert -q "$EBPO_MODELS/$model.ply" "$file" 2>/dev/null
     EBPO_FILES="$EBPO_FILES $file"
 done
-export EBPO_NATIVE EBPO_PACKAGE EBPO_VECTORS EBPO_FUZZ EBPO_FILES
+export EBPO_ROOT EBPO_NATIVE EBPO_PACKAGE EBPO_VECTORS EBPO_FUZZ EBPO_FILES
 exec "$node" --test "$root/tests/wasm"

@@ -134,7 +134,8 @@ EOF
     objects=$(ninja -C "$folder/lib" -t targets all | sed -n 's/: c_COMPILER$//p' | grep -E \
         '/(core|geometry|io|hdf5_read|hdf5_write|mesh|format|levels|query|extras_collide)_[^/]*\.o$')
     # shellcheck disable=SC2086
-    ninja -C "$folder/lib" -j"$jobs" $objects >"$folder/ninja.log" || { tail -n 20 "$folder/ninja.log" >&2; exit 1; }
+    ninja -C "$folder/lib" -j"$jobs" $objects >"$folder/ninja.log" ||
+        { tail -n 20 "$folder/ninja.log" >&2; exit 1; }
     rm -f "$deps/lib/libebpo.a"
     # shellcheck disable=SC2086
     (cd "$folder/lib" && emar rcsD "$deps/lib/libebpo.a" $objects)
@@ -145,9 +146,11 @@ link_module() { # file, C files...
     output=$folder/package/$1
     shift
     # shellcheck disable=SC2086
-    (cd "$here/module" && emcc $flags -std=gnu11 -ffp-contract=off -Wall -Wextra -I"$root/lib/include" "$@" \
-        -L"$deps/lib" -lebpo -lzstd -lz -lgmp -lnettle --no-entry -sSTANDALONE_WASM -sIMPORTED_MEMORY -sALLOW_MEMORY_GROWTH \
-        -sMAXIMUM_MEMORY=4GB -sINITIAL_MEMORY=8MB -sTOTAL_STACK=2MB -sABORTING_MALLOC=0 -sWASM_BIGINT \
+    (cd "$here/module" && emcc $flags -std=gnu11 -ffp-contract=off -Wall -Wextra \
+        -I"$root/lib/include" "$@" \
+        -L"$deps/lib" -lebpo -lzstd -lz -lgmp -lnettle --no-entry -sSTANDALONE_WASM \
+        -sIMPORTED_MEMORY -sALLOW_MEMORY_GROWTH -sMAXIMUM_MEMORY=4GB -sINITIAL_MEMORY=8MB \
+        -sTOTAL_STACK=2MB -sABORTING_MALLOC=0 -sWASM_BIGINT \
         -sEXPORTED_FUNCTIONS=_malloc,_free -o "$output")
 }
 
