@@ -132,7 +132,7 @@ EOF
             -Dqhull=disabled -Dtests=disabled -Dchart_js=none >"$folder/meson.log"
     # The folders of lib that the modules use, and all kernels.
     objects=$(ninja -C "$folder/lib" -t targets all | sed -n 's/: c_COMPILER$//p' | grep -E \
-        '/(core|geometry|io|hdf5_read|hdf5_write|mesh|format|levels|query|extras_collide)_[^/]*\.o$')
+        '/(core|geometry|io|hdf5_read|hdf5_write|mesh|format|construct|levels|query|extras_collide)_[^/]*\.o$')
     # shellcheck disable=SC2086
     ninja -C "$folder/lib" -j"$jobs" $objects >"$folder/ninja.log" ||
         { tail -n 20 "$folder/ninja.log" >&2; exit 1; }
@@ -147,7 +147,7 @@ link_module() { # file, C files...
     shift
     # shellcheck disable=SC2086
     (cd "$here/module" && emcc $flags -std=gnu11 -ffp-contract=off -Wall -Wextra \
-        -I"$root/lib/include" "$@" \
+        -I"$root/lib/include" -I"$deps/include" "$@" \
         -L"$deps/lib" -lebpo -lzstd -lz -lgmp -lnettle --no-entry -sSTANDALONE_WASM \
         -sIMPORTED_MEMORY -sALLOW_MEMORY_GROWTH -sMAXIMUM_MEMORY=4GB -sINITIAL_MEMORY=8MB \
         -sTOTAL_STACK=2MB -sABORTING_MALLOC=0 -sWASM_BIGINT \
@@ -157,8 +157,8 @@ link_module() { # file, C files...
 build_package() {
     rm -rf "$folder/package"
     mkdir -p "$folder/package"
-    link_module ebpo.wasm object.c queries.c levels.c
-    link_module ebpo-collide.wasm object.c queries.c levels.c collide.c
+    link_module ebpo.wasm object.c queries.c levels.c no_encoders.c
+    link_module ebpo-collide.wasm object.c queries.c levels.c no_encoders.c collide.c
     version=$(sed -n "s/^  version: '\(.*\)',$/\1/p" "$root/meson.build")
     cp "$here"/ebpo/*.js "$here"/ebpo/*.d.ts "$here/ebpo/README.md" "$root/LICENSE" "$folder/package"
     sed "s/@VERSION@/$version/" "$here/ebpo/package.json.in" >"$folder/package/package.json"
