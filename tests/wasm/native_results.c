@@ -200,33 +200,45 @@ static void write_boxes(ebpo_context *context, const double *boxes, uint64_t n)
     end_sections(s, 3);
 }
 
-/* Nodes of all levels, and the polygons of the last but one. */
+static bool next_level(ebpo_stream *stream, ebpo_stream_level *out)
+{
+    bool more = false;
+    require(ebpo_stream_next_level(stream, out, &more, &error) == EBPO_OK, "levels");
+    return more;
+}
+
+static bool next_node(ebpo_stream *stream, ebpo_stream_node *out)
+{
+    bool more = false;
+    require(ebpo_stream_next_node(stream, out, &more, &error) == EBPO_OK, "nodes");
+    return more;
+}
+
+/* Nodes of all levels, with their polygons. */
 static void write_levels(const ebpo_file *file)
 {
     section s[5];
     ebpo_stream_options options = EBPO_STREAM_OPTIONS_INIT;
     ebpo_stream *stream;
     ebpo_stream_level level;
-    bool more;
     options.polygons = true;
     require(ebpo_stream_new(file, &options, &stream, &error) == EBPO_OK, "stream");
     begin_sections(s, 5);
-    while (ebpo_stream_next_level(stream, &level, &more, &error) == EBPO_OK && more) {
+    while (next_level(stream, &level)) {
         ebpo_stream_node node;
-        while (ebpo_stream_next_node(stream, &node, &more, &error) == EBPO_OK && more) {
+        while (next_node(stream, &node)) {
             PUT(s[0], node.octcode);
             PUT(s[1], node.winding);
             PUT(s[2], node.volume);
             fwrite(node.planes, sizeof *node.planes, node.plane_count, s[3].stream);
             fwrite(node.vertices, sizeof *node.vertices, node.vertex_count, s[4].stream);
         }
-        require(error.status == EBPO_OK, "nodes");
     }
-    require(error.status == EBPO_OK, "levels");
     end_sections(s, 5);
     ebpo_stream_free(stream);
 }
 
+/* The polygons of level 4, or of the last one. */
 static void write_level(const ebpo_file *file)
 {
     ebpo_mesh mesh = { 0 };

@@ -22,7 +22,7 @@ void *ebpo_js_extend(ebpo_js_object *object, unsigned n, uint64_t count, size_t 
     uint64_t bytes = a->bytes + count * size;
     if (count > SIZE_MAX / 2 / size || bytes > SIZE_MAX / 2)
         bytes = UINT64_MAX;
-    if (bytes > a->capacity) {
+    if (bytes > a->capacity || !a->data) {
         uint64_t capacity = bytes < 256 ? 256 : bytes + (a->bytes ? bytes / 2 : 0);
         uint8_t *data = capacity < SIZE_MAX / 2 ? realloc(a->data, (size_t)capacity) : NULL;
         if (!data) {
