@@ -324,16 +324,3 @@ int EBPO_JS(ebpo_js_measure)(ebpo_js_object *object)
     values[16] = m.integral;
     return ebpo_js_put(object, 0, values, sizeof values);
 }
-
-/* Reads all arrays of the file, and compares their content with its checksum. */
-int EBPO_JS(ebpo_js_check)(ebpo_js_object *object)
-{
-    ebpo_read_options options = EBPO_READ_OPTIONS_INIT;
-    ebpo_tree tree = { 0 };
-    options.threads = 1;
-    ebpo_status status = ebpo_file_read_tree(object->file, &options, &tree, &object->error);
-    if (status != EBPO_OK)
-        return status;
-    ebpo_tree_free(&tree);
-    return ebpo_file_check_content(object->file, &options, &object->error);
-}
