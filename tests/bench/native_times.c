@@ -1,6 +1,6 @@
-/* Times queries natively for web.mjs: native_times MODEL INPUTS ROUNDS. INPUTS: doubles: n, n points
- * [3], n rays [6]. Prints the least time of the rounds as JSON, in microseconds per item, on one
- * thread. */
+/* Times queries natively for web.mjs: native_times MODEL INPUTS. INPUTS: doubles: a count n, the
+ * number of rounds, and for each round n points [3] and n rays [6]. Prints the medians of the rounds
+ * as JSON, in microseconds per item, on one thread. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -25,60 +25,99 @@ static double read_clock(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
+typedef struct inputs {
+    uint64_t n;
+    FILE *file;
+    double *points, *lines;
+    ebpo_ray *rays;
+} inputs;
+
+static void *allocate(uint64_t count, size_t size)
+{
+    void *out = calloc(count, size);
+    require(out != NULL, "memory");
+    return out;
+}
+
+static void read_round(inputs *in)
+{
+    require(fread(in->points, 24, in->n, in->file) == in->n &&
+                fread(in->lines, 48, in->n, in->file) == in->n,
+            "inputs");
+    for (uint64_t i = 0; i < in->n; i++)
+        for (uint64_t k = 0; k < 3; k++) {
+            in->rays[i].origin[k] = in->lines[6 * i + k];
+            in->rays[i].direction[k] = in->lines[6 * i + 3 + k];
+            in->rays[i].t_max = INFINITY;
+        }
+}
+
+static int compare_doubles(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+enum { MAX_ROUNDS = 100 };
+static double times[3][MAX_ROUNDS];
+
+static void time_rounds(ebpo_context *context, inputs *in, int rounds)
+{
+    ebpo_ray_options rays = EBPO_RAY_OPTIONS_INIT;
+    ebpo_distance_options distances = EBPO_DISTANCE_OPTIONS_INIT;
+    ebpo_ray_hit *hits = allocate(in->n, sizeof *hits);
+    ebpo_distance_result *near = allocate(in->n, sizeof *near);
+    ebpo_inside_result *where = allocate(in->n, sizeof *where);
+    rays.threads = 1;
+    distances.unsigned_distance = true;
+    for (int round = 0; round < rounds; round++) {
+        read_round(in);
+        double t[4] = { read_clock() };
+        require(ebpo_ray_first_many(context, in->rays, in->n, &rays, hits, &error) == EBPO_OK,
+                "rays");
+        t[1] = read_clock();
+        require(ebpo_distance_many(context, in->points, in->n, &distances, near, &error) == EBPO_OK,
+                "distances");
+        t[2] = read_clock();
+        require(ebpo_inside_many(context, in->points, in->n, NULL, where, &error) == EBPO_OK,
+                "points");
+        t[3] = read_clock();
+        for (int k = 0; k < 3; k++)
+            times[k][round] = 1e6 * (t[k + 1] - t[k]) / (double)in->n;
+    }
+    for (int k = 0; k < 3; k++)
+        qsort(times[k], (size_t)rounds, sizeof times[k][0], compare_doubles);
+    free(hits);
+    free(near);
+    free(where);
+}
+
 int main(int argc, char **argv)
 {
-    double count, least[3] = { INFINITY, INFINITY, INFINITY };
+    double head[2];
     ebpo_file *file;
     ebpo_model *model;
     ebpo_context *context;
-    ebpo_ray_options ray_options = EBPO_RAY_OPTIONS_INIT;
-    ebpo_distance_options distance_options = EBPO_DISTANCE_OPTIONS_INIT;
-    require(argc == 4, "usage: native_times MODEL INPUTS ROUNDS");
-    FILE *in = fopen(argv[2], "rb");
-    require(in && fread(&count, sizeof count, 1, in) == 1, argv[2]);
-    uint64_t n = (uint64_t)count;
-    double *points = malloc(n * 3 * sizeof *points), *lines = malloc(n * 6 * sizeof *lines);
-    ebpo_ray *rays = malloc(n * sizeof *rays);
-    ebpo_ray_hit *hits = malloc(n * sizeof *hits);
-    ebpo_distance_result *distances = malloc(n * sizeof *distances);
-    ebpo_inside_result *insides = malloc(n * sizeof *insides);
-    require(points && lines && rays && hits && distances && insides, "memory");
-    require(fread(points, 24, n, in) == n && fread(lines, 48, n, in) == n, argv[2]);
-    fclose(in);
-    for (uint64_t i = 0; i < n; i++)
-        for (uint64_t k = 0; k < 3; k++) {
-            rays[i].origin[k] = lines[6 * i + k];
-            rays[i].direction[k] = lines[6 * i + 3 + k];
-            rays[i].t_max = INFINITY;
-        }
-    ray_options.threads = 1;
-    distance_options.unsigned_distance = true;
+    require(argc == 3, "usage: native_times MODEL INPUTS");
+    inputs in = { .file = fopen(argv[2], "rb") };
+    require(in.file && fread(head, sizeof head, 1, in.file) == 1 && head[1] <= MAX_ROUNDS, argv[2]);
+    in.n = (uint64_t)head[0];
+    in.points = allocate(in.n, 24);
+    in.lines = allocate(in.n, 48);
+    in.rays = allocate(in.n, sizeof *in.rays);
     require(ebpo_open(argv[1], &file, &error) == EBPO_OK, argv[1]);
     require(ebpo_model_new(file, NULL, &model, &error) == EBPO_OK, argv[1]);
     require(ebpo_context_new(model, &context, &error) == EBPO_OK, argv[1]);
-    for (int round = 0; round < atoi(argv[3]); round++) {
-        double t[4] = { read_clock() };
-        require(ebpo_ray_first_many(context, rays, n, &ray_options, hits, &error) == EBPO_OK, "rays");
-        t[1] = read_clock();
-        require(ebpo_distance_many(context, points, n, &distance_options, distances, &error) ==
-                    EBPO_OK,
-                "distances");
-        t[2] = read_clock();
-        require(ebpo_inside_many(context, points, n, NULL, insides, &error) == EBPO_OK, "points");
-        t[3] = read_clock();
-        for (int k = 0; k < 3; k++)
-            least[k] = fmin(least[k], t[k + 1] - t[k]);
-    }
-    printf("{\"first hit\":%g,\"nearest\":%g,\"inside\":%g}\n", 1e6 * least[0] / count,
-           1e6 * least[1] / count, 1e6 * least[2] / count);
+    int rounds = (int)head[1];
+    time_rounds(context, &in, rounds);
+    printf("{\"first hit\":%g,\"nearest\":%g,\"inside\":%g}\n", times[0][rounds / 2],
+           times[1][rounds / 2], times[2][rounds / 2]);
     ebpo_context_free(context);
     ebpo_model_free(model);
     ebpo_close(file);
-    free(points);
-    free(lines);
-    free(rays);
-    free(hits);
-    free(distances);
-    free(insides);
+    fclose(in.file);
+    free(in.points);
+    free(in.lines);
+    free(in.rays);
     return 0;
 }

@@ -2,11 +2,10 @@
 //   node web.mjs PACKAGE MODEL MODULES [--native NATIVE_TIMES] [--rounds N]
 // PACKAGE: folder made by tools/npm/build.sh; MODEL: an .ebpo.h5 file of a solid; MODULES: a folder with node_modules of
 // three and three-mesh-bvh; NATIVE_TIMES: native_times (tests/bench), built with and without kernels for AVX2.
-// Prints Markdown: times to the first result, and times per query, which are the least of N rounds (default 5).
+// Prints Markdown: times to the first result, and times per query, which are medians of N rounds (default 5) with other inputs.
 import { execFileSync } from 'node:child_process';
 import { createServer } from 'node:http';
 import { closeSync, fstatSync, openSync, readFileSync, readSync, writeFileSync, mkdtempSync, rmSync } from 'node:fs';
-import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { join, resolve } from 'node:path';
 import { pathToFileURL } from 'node:url';
@@ -14,9 +13,8 @@ import { pathToFileURL } from 'node:url';
 const [folder, file, modules] = process.argv.slice(2), option = (name) => process.argv[process.argv.indexOf(name) + 1];
 const native = process.argv.includes('--native') ? option('--native') : null, rounds = process.argv.includes('--rounds') ? +option('--rounds') : 5;
 const { open } = await import(pathToFileURL(resolve(folder, 'index.js')));
-const require = createRequire(resolve(modules, 'x.js'));
-const load = async (name) => import(pathToFileURL(require.resolve(name)));
-const THREE = await load('three'), { MeshBVH } = await load('three-mesh-bvh');
+const load = (path) => import(pathToFileURL(resolve(modules, 'node_modules', path)));
+const THREE = await load('three/build/three.module.js'), { MeshBVH } = await load('three-mesh-bvh/src/index.js');
 
 const COUNT = 20000, NEAR = 2000;
 const now = () => performance.now();
@@ -35,20 +33,22 @@ function serve() {
     close: () => { server.close(); closeSync(descriptor); } })));
 }
 
-/** Returns the least time of the rounds, in microseconds per item. */
+const median = (x) => x.sort((a, b) => a - b)[x.length >> 1];
+
+/** Returns the median time of the rounds, in microseconds per item. */
 async function measure(count, run) {
-  let least = Infinity;
-  for (let i = 0; i < rounds; i++) {
+  const times = [];
+  for (const input of inputs) {
     const began = now();
-    await run();
-    least = Math.min(least, now() - began);
+    await run(input);
+    times.push(now() - began);
   }
-  return 1000 * least / count;
+  return 1000 * median(times) / count;
 }
 
 /** Points and rays: half near the surface, half anywhere in the box. */
-function makeInputs({ origin, size }, vertices) {
-  let state = 7;
+function makeInputs({ origin, size }, vertices, seed) {
+  let state = seed;
   const next = () => (state = (Math.imul(state, 1664525) + 1013904223) >>> 0) / 2 ** 32;
   const points = new Float64Array(3 * COUNT), rays = new Float64Array(6 * COUNT);
   for (let i = 0; i < COUNT; i++) {
@@ -70,7 +70,7 @@ const point = ({ origin, size }) => origin.map((x, i) => x + size[i] / 3);
 let began = now();
 let model = await open(server.url);
 await model.distance(point(model.info));
-const firstFromUrl = now() - began, remote = { ...server.seen };
+const firstFromUrl = now() - began, remote = { ...server.seen, ...model.stats };
 model.dispose();
 began = now();
 model = await open(server.url);
@@ -83,7 +83,8 @@ began = now();
 model = await open(readFileSync(file));
 await model.distance(point(model.info));
 const firstWhole = now() - began;
-const mesh = await model.mesh(), { info } = model, { points, rays } = makeInputs(info, mesh.vertices);
+const mesh = await model.mesh(), { info } = model;
+const inputs = Array.from({ length: rounds }, (_, i) => makeInputs(info, mesh.vertices, 7 + i));
 
 // three-mesh-bvh begins with the arrays of the mesh, without reading a file.
 began = now();
@@ -93,44 +94,41 @@ geometry.setIndex(new THREE.BufferAttribute(mesh.faces.slice(), 1));
 const bvh = new MeshBVH(geometry), built = now() - began;
 
 // ---- times per query ----
-const near = points.subarray(0, 3 * NEAR), ray = new THREE.Ray(), target = {}, at = new THREE.Vector3();
+const ray = new THREE.Ray(), target = {}, at = new THREE.Vector3();
+const each = (count, columns, values, run) => {
+  for (let i = 0; i < count; i++)
+    run(values.subarray(columns * i, columns * i + columns));
+};
 const ours = {
-  'first hit': await measure(COUNT, () => model.raysSync(rays)),
-  nearest: await measure(COUNT, () => model.distanceSync(points, { unsigned: true })),
-  inside: await measure(COUNT, () => model.insideSync(points)),
+  'first hit': await measure(COUNT, ({ rays }) => model.raysSync(rays)),
+  nearest: await measure(COUNT, ({ points }) => model.distanceSync(points, { unsigned: true })),
+  inside: await measure(COUNT, ({ points }) => model.insideSync(points)),
 };
 const one = { // one item a call
-  'first hit': await measure(NEAR, () => { for (let i = 0; i < NEAR; i++) model.raysSync(rays.subarray(6 * i, 6 * i + 6)); }),
-  nearest: await measure(NEAR, () => { for (let i = 0; i < NEAR; i++) model.distanceSync(near.subarray(3 * i, 3 * i + 3), { unsigned: true }); }),
-  inside: await measure(NEAR, () => { for (let i = 0; i < NEAR; i++) model.insideSync(near.subarray(3 * i, 3 * i + 3)); }),
+  'first hit': await measure(NEAR, ({ rays }) => each(NEAR, 6, rays, (x) => model.raysSync(x))),
+  nearest: await measure(NEAR, ({ points }) => each(NEAR, 3, points, (x) => model.distanceSync(x, { unsigned: true }))),
+  inside: await measure(NEAR, ({ points }) => each(NEAR, 3, points, (x) => model.insideSync(x))),
 };
 const theirs = {
-  'first hit': await measure(COUNT, () => {
-    for (let i = 0; i < COUNT; i++) {
-      ray.origin.fromArray(rays, 6 * i);
-      ray.direction.fromArray(rays, 6 * i + 3).normalize();
-      bvh.raycastFirst(ray, THREE.DoubleSide);
-    }
-  }),
-  nearest: await measure(NEAR, () => {
-    for (let i = 0; i < NEAR; i++)
-      bvh.closestPointToPoint(at.fromArray(near, 3 * i), target);
-  }),
-  inside: await measure(NEAR, () => {
-    for (let i = 0; i < NEAR; i++) {
-      ray.origin.fromArray(near, 3 * i);
-      ray.direction.set(0.371, 0.557, 0.743);
-      new Set(bvh.raycast(ray, THREE.DoubleSide).map((hit) => hit.distance)).size % 2;
-    }
-  }),
+  'first hit': await measure(COUNT, ({ rays }) => each(COUNT, 6, rays, (x) => {
+    ray.origin.fromArray(x);
+    ray.direction.fromArray(x, 3).normalize();
+    bvh.raycastFirst(ray, THREE.DoubleSide);
+  })),
+  nearest: await measure(NEAR, ({ points }) => each(NEAR, 3, points, (x) => bvh.closestPointToPoint(at.fromArray(x), target))),
+  inside: await measure(NEAR, ({ points }) => each(NEAR, 3, points, (x) => { // by parity
+    ray.origin.fromArray(x);
+    ray.direction.set(0.371, 0.557, 0.743);
+    new Set(bvh.raycast(ray, THREE.DoubleSide).map((hit) => hit.distance)).size % 2;
+  })),
 };
 
 // ---- native times of the same queries ----
 let natives = {};
 if (native) {
   const work = mkdtempSync(join(tmpdir(), 'ebpo-web-')), input = join(work, 'inputs');
-  writeFileSync(input, Buffer.concat([Float64Array.of(COUNT), points, rays].map((x) => Buffer.from(x.buffer))));
-  natives = JSON.parse(execFileSync(native, [file, input, String(rounds)], { encoding: 'utf8' }));
+  writeFileSync(input, Buffer.concat([Float64Array.of(COUNT, rounds), ...inputs.flatMap(({ points, rays }) => [points, rays])].map((x) => Buffer.from(x.buffer))));
+  natives = JSON.parse(execFileSync(native, [file, input], { encoding: 'utf8' }));
   rmSync(work, { recursive: true });
 }
 
@@ -139,7 +137,7 @@ console.log(`${info.faces} faces, ${info.fileBytes} bytes; node ${process.versio
 
 | until the first result | ms |
 |---|---|
-| ebpo, URL, a distance (${remote.requests} requests, ${remote.bytes} bytes) | ${ms(firstFromUrl)} |
+| ebpo, URL, a distance (${remote.roundTrips} round trips, ${remote.requests} requests, ${remote.bytes} bytes) | ${ms(firstFromUrl)} |
 | ebpo, URL, polygons of levels 0 to 4 | ${ms(levelFromUrl)} |
 | ebpo, whole file, a distance | ${ms(firstWhole)} |
 | three-mesh-bvh, tree of the mesh in memory | ${ms(built)} |

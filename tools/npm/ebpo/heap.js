@@ -3,6 +3,7 @@ import { EbpoError, EbpoLimitError, errorOf } from './errors.js';
 
 // Pages of the heap: their size, and the number that build.sh gives the module (INITIAL_MEMORY).
 const PAGE = 65536, PAGES = 128;
+const SCRATCH = 4096;
 const text = new TextEncoder();
 const modules = new Map();
 
@@ -29,6 +30,11 @@ export function loadModule(url) {
 
 /** One instance: its own memory of at most `limit` bytes. */
 export class Heap {
+  #views = new Map();
+  #scratch; // SCRATCH bytes for small arguments
+  #used = 0; // of them
+  #table; // offset of the table of result arrays in an object
+
   constructor(module, limit = 2 ** 32) {
     this.memory = new WebAssembly.Memory({ initial: PAGES, maximum: Math.max(PAGES, Math.min(65536, Math.floor(limit / PAGE))) });
     const imports = {};
@@ -38,6 +44,7 @@ export class Heap {
     this.failed = false;
     this.exports = new WebAssembly.Instance(module, imports).exports;
     this.exports._initialize?.();
+    this.#scratch = this.call('malloc', SCRATCH);
   }
 
   #system(name) {
@@ -68,19 +75,29 @@ export class Heap {
     }
   }
 
-  /** Copies bytes, doubles or text to new memory, calls use(address), and frees it. */
+  /** Returns a view of the whole memory. */
+  #view(Type) {
+    let view = this.#views.get(Type);
+    if (!view?.length) // the memory has grown
+      this.#views.set(Type, view = new Type(this.memory.buffer));
+    return view;
+  }
+
+  /** Copies bytes, doubles or text to memory, and calls use(address), which may keep no address. */
   lend(data, use) {
-    if (data === null)
-      return use(0);
-    const bytes = typeof data === 'string' ? text.encode(`${data}\0`) : new Uint8Array(data.buffer, data.byteOffset, data.byteLength);
-    const at = this.call('malloc', Math.max(1, bytes.length)) >>> 0;
+    const bytes = typeof data === 'string' ? text.encode(`${data}\0`) : data, end = this.#used + (bytes.byteLength + 7 & ~7);
+    const small = end <= SCRATCH, at = small ? this.#scratch + this.#used : this.call('malloc', bytes.byteLength) >>> 0;
     if (!at)
       throw new EbpoLimitError('not enough memory for the arguments', { status: 'EBPO_E_MEMORY' });
+    const used = this.#used;
     try {
-      new Uint8Array(this.memory.buffer).set(bytes, at);
+      this.#view(bytes instanceof Float64Array ? Float64Array : Uint8Array).set(bytes, at / bytes.BYTES_PER_ELEMENT);
+      if (small)
+        this.#used = end;
       return use(at);
     } finally {
-      if (!this.failed)
+      this.#used = used;
+      if (!small && !this.failed)
         this.call('free', at);
     }
   }
@@ -92,8 +109,10 @@ export class Heap {
 
   /** Returns a copy of result array n of an object, as a typed array of the class Type. */
   result(object, n, Type) {
-    const at = this.call('ebpo_js_data', object, n) >>> 0, bytes = this.call('ebpo_js_bytes', object, n);
-    return bytes ? new Type(this.memory.buffer.slice(at, at + bytes)) : new Type(0);
+    this.#table ??= this.call('ebpo_js_table', object) - object;
+    const numbers = this.#view(Uint32Array), entry = (object + this.#table >>> 2) + 3 * n, size = Type.BYTES_PER_ELEMENT;
+    const first = numbers[entry] / size;
+    return this.#view(Type).slice(first, first + numbers[entry + 1] / size);
   }
 
   /** Returns the error of an object's last call. */

@@ -51,6 +51,8 @@ export interface Info {
 export interface Stats {
   memory: number; memoryPeak: number; budget: number; resident: boolean; cutLevel: number; hits: number; loads: number;
   evicted: number; bytesRead: number; reads: number; suppliedBytes: number;
+  /** Number of times that bytes were requested from the source; all ranges of a time are requested together. */
+  roundTrips: number;
   /** Size of the WebAssembly memory in bytes. */
   heap: number;
 }

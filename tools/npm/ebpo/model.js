@@ -45,6 +45,7 @@ export class Model {
   #flights = new Set(); // ranges that are being fetched
   #idle = []; // query objects that are not in use
   #used = new Set(); // query objects in use
+  #roundTrips = 0;
   #disposed = false;
   #info;
 
@@ -94,6 +95,7 @@ export class Model {
     if (wanted.length) {
       const flights = wanted.map((range) => ({ ...range }));
       const done = this.#source.read(wanted, signal);
+      this.#roundTrips++;
       for (const flight of flights)
         this.#flights.add(Object.assign(flight, { done }));
       let parts;
@@ -197,12 +199,11 @@ export class Model {
   }
 
   #runNow({ call, read }) {
-    const query = this.#take(), operation = this.#begin();
+    const query = this.#take();
     try {
       this.#check(call(query), query);
       return read(this.#results(query));
     } finally {
-      this.#end(operation);
       this.#give(query);
     }
   }
@@ -358,7 +359,7 @@ export class Model {
   get stats() {
     const [memory, memoryPeak, budget, resident, cutLevel, hits, loads, evicted, bytesRead, reads, suppliedBytes] =
       this.#fact('ebpo_js_stats', Float64Array);
-    return { memory, memoryPeak, budget, resident: !!resident, cutLevel, hits, loads, evicted, bytesRead, reads, suppliedBytes,
+    return { memory, memoryPeak, budget, resident: !!resident, cutLevel, hits, loads, evicted, bytesRead, reads, suppliedBytes, roundTrips: this.#roundTrips,
       heap: this.#heap.memory.buffer.byteLength };
   }
 

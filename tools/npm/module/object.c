@@ -67,15 +67,8 @@ void ebpo_js_free_arrays(ebpo_js_object *object)
         free(object->array[n].data);
 }
 
-void *EBPO_JS(ebpo_js_data)(const ebpo_js_object *object, unsigned n)
-{
-    return object->array[n].data;
-}
-
-double EBPO_JS(ebpo_js_bytes)(const ebpo_js_object *object, unsigned n)
-{
-    return (double)object->array[n].bytes;
-}
+/* Returns the result arrays, whose members JavaScript reads: ebpo_js_array has three of 4 bytes. */
+const ebpo_js_array *EBPO_JS(ebpo_js_table)(const ebpo_js_object *object) { return object->array; }
 
 const char *EBPO_JS(ebpo_js_message)(const ebpo_js_object *object)
 {
