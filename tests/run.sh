@@ -21,12 +21,12 @@ esac
 # tests/meson.build says what the suites are.
 plan() { # build
     case $tier-$1 in
-    quick-*) echo "0.02 full costly once viewer calls" ;;
+    quick-*) echo "0.02 full costly once viewer wasm calls" ;;
     full-gcc) echo "0.2" ;;
     full-clang | full-undefined) echo "0.03" ;;
     full-sanitize) echo "0.02" ;;
-    default-gcc) echo "0.05 full viewer" ;;
-    default-clang) echo "0.1 full once costly viewer calls" ;;
+    default-gcc) echo "0.05 full viewer wasm" ;;
+    default-clang) echo "0.1 full once costly viewer wasm calls" ;;
     default-sanitize | default-undefined) echo "0.02 full once costly slow viewer calls" ;;
     *-memory) echo "1" ;; # one suite
     full-thread) echo "0.3" ;;
