@@ -22,7 +22,7 @@ esac
 plan() { # build
     case $tier-$1 in
     quick-*) echo "0.02 full costly once viewer wasm calls" ;;
-    full-gcc) echo "0.2" ;;
+    full-gcc) echo "1" ;;
     full-clang | full-undefined) echo "0.03" ;;
     full-sanitize) echo "0.02" ;;
     default-gcc) echo "0.05 full viewer wasm" ;;
