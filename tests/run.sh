@@ -22,12 +22,14 @@ esac
 plan() { # build
     case $tier-$1 in
     quick-*) echo "0.02 full costly once viewer calls" ;;
-    full-gcc) echo "1" ;;
-    full-clang | full-sanitize | full-undefined) echo "0.2" ;;
+    full-gcc) echo "0.2" ;;
+    full-clang | full-undefined) echo "0.03" ;;
+    full-sanitize) echo "0.02" ;;
     default-gcc) echo "0.05 full viewer" ;;
     default-clang) echo "0.1 full once costly viewer calls" ;;
     default-sanitize | default-undefined) echo "0.02 full once costly slow viewer calls" ;;
-    full-thread | *-memory) echo "1" ;; # one suite
+    *-memory) echo "1" ;; # one suite
+    full-thread) echo "0.3" ;;
     *-thread) echo "0.1" ;;
     *-posix) echo "0.1" ;;           # the tests that are named here
     esac
