@@ -258,6 +258,10 @@ static bool call_with_failure(const every_call *c, every_call_env *e, unsigned k
                   kinds, number);
     ck_assert_msg(status != EBPO_E_FORMAT, "%s: %#x, %llu: reported as damage: %s", c->name, kinds,
                   number, error.message);
+    ck_assert_msg(status == EBPO_OK || status == EBPO_E_MEMORY || status == EBPO_E_IO ||
+                      kinds != MEMORY,
+                  "%s: %llu: without memory the status is %s: %s", c->name, number,
+                  ebpo_status_name(status), error.message);
     expect_workspace_empty(e, c->name);
     ck_assert_msg(open_files() <= files, "%s: %#x, %llu: a file stays open", c->name, kinds,
                   number);
