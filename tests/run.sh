@@ -2,7 +2,7 @@
 # Builds the project and runs its tests, and stops at the first failure. Warnings are errors.
 #   tests/run.sh         what CI runs
 #   tests/run.sh quick   gcc alone and few inputs: while you work
-#   tests/run.sh full    every check in every build, with all inputs: before a release
+#   tests/run.sh full    every check in every build, with more inputs: before a release
 #   tests/run.sh [quick|full] BUILD...   only these builds of the tier
 # Builds: gcc; clang; sanitize (gcc with address and undefined); undefined (clang); thread; memory (the fuzz
 # targets and their corpora); posix (without what Linux has beyond POSIX). plan() says what each tier leaves out.
