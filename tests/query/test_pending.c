@@ -392,6 +392,8 @@ static void build(two_layouts *l)
 /* A cold query needs as many round trips as with a source that waits. */
 START_TEST(test_query_round_trips)
 {
+    if (!ebpo_test_wanted(_i))
+        return;
     two_layouts l;
     uint64_t waves, rounds;
     build(&l);
@@ -407,6 +409,8 @@ END_TEST
 /* Within the smallest budget, each query is completed in a bounded number of round trips. */
 START_TEST(test_queries_within_smallest_budget)
 {
+    if (!ebpo_test_wanted(_i))
+        return;
     two_layouts l;
     uint64_t waves, rounds;
     build(&l);

@@ -346,6 +346,15 @@ static ebpo_status sum_small_view(const ebpo_file *file, pending_source *p, uint
     return sum_view_of(file, p, sum, &view);
 }
 
+/* A view that ends at a number of bytes of the file. */
+static ebpo_status sum_short_view(const ebpo_file *file, pending_source *p, uint64_t *sum)
+{
+    ebpo_view_options view = EBPO_VIEW_OPTIONS_INIT;
+    view.bytes = 60000;
+    view.planes = true;
+    return sum_view_of(file, p, sum, &view);
+}
+
 static ebpo_status sum_subtrees(const ebpo_file *file, pending_source *p, uint64_t *sum)
 {
     ebpo_status status = EBPO_OK;
@@ -438,6 +447,7 @@ static const struct {
     { "stream", sum_stream },
     { "view", sum_view },
     { "small view", sum_small_view },
+    { "short view", sum_short_view },
     { "subtrees", sum_subtrees },
     { "mass", sum_mass },
     { "subset", sum_subset },
