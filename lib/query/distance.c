@@ -446,9 +446,9 @@ ebpo_status ebpo_distance_many(ebpo_context *context, const double *points, uint
         if (o->done && o->done[k])
             continue;
         status = distance_of_point(context, points + 3 * k, o, &out[k], error);
-        status = ebpo_batch_note(&batch, i, k, status);
+        status = ebpo_batch_note(&batch, i, k, status, error);
     }
-    status = ebpo_batch_end(&batch, status);
+    status = ebpo_batch_end(&batch, status, error);
     count_work(context, status == EBPO_OK ? count : 0, searched, loaded);
     return status;
 }

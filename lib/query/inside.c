@@ -744,9 +744,9 @@ ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64
         if (status == EBPO_OK && ebpo_model_prefetches(m) &&
             (o->level < 0 || o->level > m->top->cut_level))
             ebpo_context_prefetch(context, points + 3 * k, 0);
-        status = ebpo_batch_note(&batch, i, k, status);
+        status = ebpo_batch_note(&batch, i, k, status, error);
     }
-    return ebpo_batch_end(&batch, status);
+    return ebpo_batch_end(&batch, status, error);
 }
 
 /* Returns true if the query has no special options and everything is in memory: only the point must

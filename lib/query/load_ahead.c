@@ -15,6 +15,7 @@
 #include <string.h>
 
 #include "core/alloc.h"
+#include "core/error.h"
 #include "format/reader.h"
 #include "format/subtree_index.h"
 #include "geometry/cells.h"
@@ -267,11 +268,13 @@ void ebpo_batch_begin(ebpo_batch *b)
                      m->info->parts & EBPO_PART_MESH;
 }
 
-ebpo_status ebpo_batch_end(ebpo_batch *b, ebpo_status status)
+ebpo_status ebpo_batch_end(ebpo_batch *b, ebpo_status status, ebpo_error *error)
 {
     free(b->order);
     free(b->below);
-    return status == EBPO_OK && b->pending ? EBPO_E_PENDING : status;
+    if (!b->pending || (status != EBPO_OK && status != EBPO_E_PENDING))
+        return status;
+    return ebpo_fail_with(error, &b->why_pending); /* later points may have changed *error */
 }
 
 /* --- prefetch hints --- */
@@ -381,13 +384,15 @@ static uint64_t end_of_pass(const ebpo_batch *b)
     return b->searches_around ? b->searched : b->hinted == b->count ? b->count : b->hinted - 1;
 }
 
-ebpo_status ebpo_batch_note(ebpo_batch *b, uint64_t i, uint64_t point, ebpo_status status)
+ebpo_status ebpo_batch_note(ebpo_batch *b, uint64_t i, uint64_t point, ebpo_status status,
+                            const ebpo_error *error)
 {
     if (status == EBPO_OK && b->done)
         b->done[point] = true;
     if (status == EBPO_E_PENDING && !b->pending) {
         b->pending = true;
         b->first_pending = i;
+        b->why_pending = error ? *error : (ebpo_error){ .status = status, .offset = -1 };
     }
     if (!b->pending || (status != EBPO_OK && status != EBPO_E_PENDING))
         return status;

@@ -48,6 +48,7 @@ typedef struct ebpo_batch {
     bool pending;           /* bytes for some points are not available yet */
     uint64_t first_pending; /* turn of the first such point */
     uint64_t pending_home;  /* the last subtree that was not available */
+    ebpo_error why_pending;
 } ebpo_batch;
 
 /* Begins a batch, whose context, points, count, done, as_given and searches_around the caller has
@@ -56,7 +57,7 @@ typedef struct ebpo_batch {
 void ebpo_batch_begin(ebpo_batch *batch);
 /* Ends a batch. Returns its status, which is EBPO_E_PENDING if bytes for some points are not
  * available. */
-EBPO_MUST_USE ebpo_status ebpo_batch_end(ebpo_batch *batch, ebpo_status status);
+EBPO_MUST_USE ebpo_status ebpo_batch_end(ebpo_batch *batch, ebpo_status status, ebpo_error *error);
 
 /* Returns the indices of the points [count] in the order of the Morton curve; a point outside the
  * box has the position of the nearest cell. The caller frees the array. NULL: no memory. */
@@ -69,6 +70,6 @@ uint64_t ebpo_batch_next(ebpo_batch *batch, uint64_t i);
  * goes on with the next point: also after EBPO_E_PENDING, so that one round trip fetches the bytes
  * for all points whose subtrees have been hinted. */
 EBPO_MUST_USE ebpo_status ebpo_batch_note(ebpo_batch *batch, uint64_t i, uint64_t point,
-                                          ebpo_status status);
+                                          ebpo_status status, const ebpo_error *error);
 
 #endif

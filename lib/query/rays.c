@@ -565,9 +565,9 @@ static ebpo_status result_piece(void *user, uint64_t begin, uint64_t end, unsign
         status = result_ray(b, ray, worker, error);
         if (status == EBPO_OK && b->options.done)
             b->options.done[ray] = true;
-        status = ebpo_batch_note(&along, i, k, status);
+        status = ebpo_batch_note(&along, i, k, status, error);
     }
-    return ebpo_batch_end(&along, status);
+    return ebpo_batch_end(&along, status, error);
 }
 
 /* --- the order of work --- */

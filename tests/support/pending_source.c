@@ -5,7 +5,7 @@
 #include <string.h>
 
 /* A larger number of round trips is a livelock. */
-enum { ROUNDS_MAX = 100000 };
+enum { ROUNDS_MAX = 5000 };
 
 static void must(bool good, const char *what, const ebpo_error *error)
 {
@@ -28,6 +28,7 @@ void pending_begin(pending_source *p, const char *path, uint64_t memory)
     must(ebpo_async_new(p->size, "pending", "1", memory, &p->async, &error) == EBPO_OK,
          "ebpo_async_new", &error);
     p->operation = ebpo_async_begin(p->async);
+    p->last_call = ebpo_async_begin(p->async);
 }
 
 void pending_end(pending_source *p)
@@ -57,25 +58,34 @@ ebpo_file *pending_open(pending_source *p, uint64_t head)
     return file;
 }
 
-void pending_restart(pending_source *p)
+/* Ends the operation. The bytes that the last call used stay until the next call ends too. */
+static void restart(pending_source *p)
 {
     ebpo_async_end(p->async, p->operation);
-    p->operation = ebpo_async_begin(p->async);
+    p->operation = p->last_call;
+    p->last_call = ebpo_async_begin(p->async);
 }
 
-bool pending_again(pending_source *p, ebpo_status status)
+static bool supply_needed(pending_source *p, ebpo_status status, bool progress)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     const ebpo_range *range;
     size_t count;
     uint64_t end = 0;
     if (status != EBPO_E_PENDING) {
-        pending_restart(p);
+        restart(p);
+        restart(p);
         return false;
     }
     must(ebpo_async_needed(p->async, &range, &count, &error) == EBPO_OK, "needed", &error);
     must(count > 0 && p->rounds++ < ROUNDS_MAX, "a pending call needs no bytes", &error);
     p->requests += count;
+    if (progress) {
+        restart(p);
+    } else {
+        ebpo_async_end(p->async, p->last_call);
+        p->last_call = ebpo_async_begin(p->async);
+    }
     for (size_t i = 0; i < count; i++) {
         must(range[i].size && range[i].offset >= end, "the ranges are not in order", &error);
         end = range[i].offset + range[i].size;
@@ -88,4 +98,14 @@ bool pending_again(pending_source *p, ebpo_status status)
     if (ebpo_async_bytes(p->async) > p->peak)
         p->peak = ebpo_async_bytes(p->async);
     return true;
+}
+
+bool pending_again(pending_source *p, ebpo_status status)
+{
+    return supply_needed(p, status, false);
+}
+
+bool pending_progress(pending_source *p, ebpo_status status)
+{
+    return supply_needed(p, status, true);
 }

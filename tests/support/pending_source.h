@@ -9,7 +9,7 @@ typedef struct pending_source {
     ebpo_async *async;
     uint8_t *data;
     uint64_t size;
-    uint64_t operation;
+    uint64_t operation, last_call; /* operations: the call with its repetitions; the last call */
     /* number of round trips, of ranges, and of bytes in them */
     uint64_t rounds, requests, fetched;
     uint64_t peak; /* maximum number of bytes held */
@@ -26,7 +26,8 @@ ebpo_file *pending_open(pending_source *p, uint64_t head);
  * Otherwise ends the operation and begins the next one. */
 bool pending_again(pending_source *p, ebpo_status status);
 
-/* Ends the operation and begins the next one: completed parts of a batch need no bytes. */
-void pending_restart(pending_source *p);
+/* Same as pending_again, for a batch that has completed some items: bytes that the last call did
+ * not use need not stay. */
+bool pending_progress(pending_source *p, ebpo_status status);
 
 #endif

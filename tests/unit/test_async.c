@@ -346,6 +346,15 @@ static ebpo_status sum_small_view(const ebpo_file *file, pending_source *p, uint
     return sum_view_of(file, p, sum, &view);
 }
 
+/* A view that ends at a number of bytes of the file. */
+static ebpo_status sum_short_view(const ebpo_file *file, pending_source *p, uint64_t *sum)
+{
+    ebpo_view_options view = EBPO_VIEW_OPTIONS_INIT;
+    view.bytes = 60000;
+    view.planes = true;
+    return sum_view_of(file, p, sum, &view);
+}
+
 static ebpo_status sum_subtrees(const ebpo_file *file, pending_source *p, uint64_t *sum)
 {
     ebpo_status status = EBPO_OK;
@@ -429,14 +438,23 @@ static const struct {
     const char *name;
     reading_fn call;
 } readings[] = {
-    { "levels", sum_levels },         { "sizes", sum_sizes },
-    { "mesh", sum_mesh },             { "source mesh", sum_source_mesh },
-    { "tree", sum_tree },             { "polygons", sum_polygons },
-    { "stream", sum_stream },         { "view", sum_view },
-    { "small view", sum_small_view }, { "subtrees", sum_subtrees },
-    { "mass", sum_mass },             { "subset", sum_subset },
-    { "export", sum_export },         { "repacked", sum_repacked },
-    { "violations", sum_violations }, { "limit", sum_limit },
+    { "levels", sum_levels },
+    { "sizes", sum_sizes },
+    { "mesh", sum_mesh },
+    { "source mesh", sum_source_mesh },
+    { "tree", sum_tree },
+    { "polygons", sum_polygons },
+    { "stream", sum_stream },
+    { "view", sum_view },
+    { "small view", sum_small_view },
+    { "short view", sum_short_view },
+    { "subtrees", sum_subtrees },
+    { "mass", sum_mass },
+    { "subset", sum_subset },
+    { "export", sum_export },
+    { "repacked", sum_repacked },
+    { "violations", sum_violations },
+    { "limit", sum_limit },
 };
 enum { READINGS = sizeof readings / sizeof *readings };
 
@@ -488,7 +506,8 @@ START_TEST(test_file_functions_resume)
         uint64_t waiting = call_waiting(readings[_i].call, path, &waves),
                  pending = call_pending(readings[_i].call, path, UINT64_MAX, &rounds),
                  short_lived = call_pending(readings[_i].call, path, 0, &more);
-        ck_assert_msg(waiting == pending && waiting == short_lived, "%s: results differ", readings[_i].name);
+        ck_assert_msg(waiting == pending && waiting == short_lived, "%s: results differ",
+                      readings[_i].name);
         ck_assert_msg(rounds <= waves, "%s: %d round trips, %d expected", readings[_i].name,
                       (int)rounds, (int)waves);
     }

@@ -27,8 +27,10 @@
  * - Outputs are unspecified, and callbacks may have received some results. The repeated call starts
  *   again and passes all results. Streams continue with the item that was not returned.
  * - Batches of points and rays keep their completed results if options.done is given (query.h).
- * When *done has changed, end the operation after ebpo_async_needed and begin another one: the
- * bytes of completed points need not stay.
+ *   Begin an operation before each repetition, too. If the repetition has completed some items, end
+ *   the older operation after ebpo_async_needed: bytes that the repetition did not use need not
+ *   stay. If not, end the newer one.
+ * - Haptic rendering does not support such files, as its thread loads data in the background.
  *
  * The number of repetitions is limited, for any memory budget: bytes that were supplied or read
  * since the operation began stay available until it ends, so each repetition completes or needs

@@ -467,7 +467,8 @@ typedef struct ebpo_source {
 
     /*
      * Fills `data` with `size` bytes from `offset` on, or fails. The range is within the source.
-     * Called by any thread that uses the file.
+     * EBPO_E_PENDING: the bytes are not available yet (async.h). Called by any thread that uses the
+     * file.
      */
     ebpo_status (*read)(void *user, uint64_t offset, uint64_t size, void *data, ebpo_error *error);
 

@@ -68,9 +68,13 @@ class AbsentError(Error, LookupError):
     """The file was written without a part that the query needs."""
 
 
+class Pending(Error):
+    """Bytes of the file have not arrived. `AsyncModel` fetches them and repeats the call."""
+
+
 class NoMemory(Error, MemoryError):
     """An allocation failed."""
 
 
 BY_STATUS = {-1: NoMemory, -2: ArgumentError, -3: IOFailure, -4: FormatError, -5: VersionError, -6: UnsupportedError,
-             -7: NotSolidError, -8: LimitError, -9: Cancelled, -10: AbsentError}
+             -7: NotSolidError, -8: LimitError, -9: Cancelled, -10: AbsentError, -11: Pending}

@@ -6,13 +6,14 @@ import functools
 import io
 import os
 import threading
+import weakref
 from typing import Any
 
 import numpy as np
 
 from . import _declared as c
 from ._checked import path, text, within
-from ._library import Handle, call, made, of_members, size_in_bytes
+from ._library import Handle, call, error_of, made, of_members, size_in_bytes
 from .errors import ArgumentError, Error, IOFailure, UnsupportedError
 from .ranges import CONNECTIONS, Ranges, read_whole
 from .web import Patience, Web
@@ -168,6 +169,35 @@ def by_url(url: str, http: dict, max_expansion: int) -> Handle:
     return by_ranges(far(web, web.size, web.shown, connections=connections), web.shown, max_expansion)
 
 
+class ByUrl:
+    """A URL whose ranges are fetched together."""
+
+    def __init__(self, url: str, http: dict) -> None:
+        struct, self.keep = http_options(http)
+        self.source = made(c.ebpo_source)
+        if has_http():
+            call("ebpo_source_of_url", url, ctypes.byref(struct), ctypes.byref(self.source))
+        else:
+            web = Web(url, **{name: value for name, value in http.items() if name != "connections"})
+            self.keep = [Source(far(web, web.size, web.shown))]
+            self.source = self.keep[0].struct
+        self.size = self.source.size
+        self._end = weakref.finalize(self, self.source.close, self.source.user)
+
+    def fetch(self, ranges: list[tuple[int, int]]) -> list[np.ndarray]:
+        """Return the bytes of ranges, which are requested at the same time."""
+        hints, out = np.array(ranges, RANGE), []
+        self.source.prefetch(self.source.user, hints.ctypes.data, len(hints))
+        for offset, size in ranges:
+            data, error = np.empty(size, np.uint8), made(c.ebpo_error)
+            status = self.source.read(self.source.user, offset, size, data.ctypes.data, ctypes.addressof(error))
+            if status:
+                error.status = status
+                raise error_of(error)
+            out.append(data)
+        return out
+
+
 def by_ranges(ranges: Any, name: str, max_expansion: int = 0) -> Handle:
     """Open a Ranges, or an object with `size` and `read_range` on this machine."""
     source = Source(ranges)
@@ -176,6 +206,8 @@ def by_ranges(ranges: Any, name: str, max_expansion: int = 0) -> Handle:
 
 def opened(source: Any, http: dict, storage_options: dict | None, max_expansion: int = 0) -> Handle:
     """Return an open ebpo_file of any source that `ebpo.open` supports."""
+    if hasattr(source, "async_source"):
+        return by_name(shown(source.name), max_expansion, keep=(source,), source=source.async_source())
     if isinstance(source, (str, os.PathLike)):
         name = os.fspath(source)
         if isinstance(name, str) and name.startswith(("http://", "https://")) and storage_options is None:
