@@ -21,11 +21,11 @@ esac
 # tests/meson.build says what the suites are.
 plan() { # build
     case $tier-$1 in
-    quick-*) echo "0.02 full costly once viewer calls" ;;
+    quick-*) echo "0.02 full costly once viewer wasm calls" ;;
     full-gcc) echo "1" ;;
-    full-clang | full-sanitize | full-undefined) echo "0.2" ;;
-    default-gcc) echo "0.05 full viewer" ;;
-    default-clang) echo "0.1 full once costly viewer calls" ;;
+    full-clang | full-sanitize | full-undefined) echo "0.2 wasm" ;;
+    default-gcc) echo "0.05 full viewer wasm" ;;
+    default-clang) echo "0.1 full once costly viewer wasm calls" ;;
     default-sanitize | default-undefined) echo "0.02 full once costly slow viewer calls" ;;
     full-thread | *-memory) echo "1" ;; # one suite
     *-thread) echo "0.1" ;;

@@ -7,7 +7,8 @@ command -v emcc >/dev/null || { echo "skipped: emcc is missing (Debian: emscript
 sh "$root/tools/npm/build.sh" "$folder"
 EBPO_ROOT=$root EBPO_PACKAGE=$folder/package EBPO_VECTORS=$root/format-spec/vectors EBPO_FUZZ=$folder/fuzz EBPO_FILES=
 # Compressed size of the core, as servers send it.
-"$node" -e 'const { constants, brotliCompressSync, gzipSync } = require("zlib"), bytes = require("fs").readFileSync(process.argv[1]);
+"$node" -e 'const { constants, brotliCompressSync, gzipSync } = require("zlib");
+const bytes = require("fs").readFileSync(process.argv[1]);
 const size = brotliCompressSync(bytes, { params: { [constants.BROTLI_PARAM_QUALITY]: 11 } }).length;
 console.log(`ebpo.wasm: ${size} bytes with brotli, ${gzipSync(bytes, { level: 9 }).length} with gzip`);
 process.exit(size > 400000 ? 1 : 0)' "$EBPO_PACKAGE/ebpo.wasm"
