@@ -1,7 +1,8 @@
 #!/bin/sh
 # Installs the Debian packages that building needs; with --tests also what the tests need, with
 # --demo what the quick start needs, with --bench the peers of the benchmarks and profilers, with
-# --viewer what serves the web viewer, with --paraview ParaView (1 GB).
+# --viewer what serves the web viewer, with --npm what builds the npm package, with --paraview
+# ParaView (1 GB).
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 # Debian's nodejs comes without npm; others' brings it and conflicts with Debian's.
@@ -23,9 +24,10 @@ for option in "$@"; do
     --bench)
         packages="$packages libembree-dev libcgal-dev libfcl-dev libjpeg62-turbo-dev python3 \
             linux-perf valgrind" ;;
+    --npm) packages="$packages emscripten nodejs" ;;
     --paraview) packages="$packages paraview python3-paraview xvfb xauth" ;;
     --viewer) packages="$packages $viewer" modules=yes ;;
-    *) echo "usage: install-deps.sh [--tests] [--demo] [--bench] [--viewer] [--paraview]" \
+    *) echo "usage: install-deps.sh [--tests] [--demo] [--bench] [--viewer] [--npm] [--paraview]" \
         >&2; exit 2 ;;
     esac
 done

@@ -144,8 +144,8 @@ void drop_attribute(const char *object, const char *name)
 void drop(const char *path) { need(H5Ldelete(changed, path, H5P_DEFAULT) >= 0, path); }
 
 /* Sets one value of an array, counted row by row. */
-/* Multiplies an array's value by `factor`, and adds `by`. The other values are unchanged, also those
- * above 2^63. */
+/* Multiplies an array's value by `factor`, and adds `by`. The other values are unchanged, also
+ * those above 2^63. */
 static void change_value(const char *path, unsigned at, int64_t factor, int64_t by)
 {
     int64_t *values = calloc(1 << 20, sizeof *values);

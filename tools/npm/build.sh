@@ -13,9 +13,10 @@ sources=$folder/sources deps=$folder/deps
 jobs=${EBPO_JOBS:-$(nproc)}
 # Debian's emcc runs scripts that use Debian's modules for node.
 export NODE_PATH=/usr/share/nodejs
-# The module holds no path of the build.
-flags="-O3 -msimd128 -ffunction-sections -fdata-sections -ffile-prefix-map=$folder=. -ffile-prefix-map=$root=.
-    -Wno-ignored-optimization-argument"
+# The module contains no path of the build; Meson's paths are relative.
+relative=$(realpath --relative-to="$folder/lib" "$root")
+flags="-O3 -msimd128 -ffunction-sections -fdata-sections -Wno-ignored-optimization-argument
+    -ffile-prefix-map=$folder=. -ffile-prefix-map=$root=. -ffile-prefix-map=$relative=."
 
 # Downloads the source packages, without changes to the system's lists of packages.
 fetch_sources() {

@@ -1,10 +1,8 @@
 // The worker of worker.js: one model. Messages {id, method, args} and {id, abort}; replies {id, result} or {id, error}.
 import { open } from './index.js';
 
-let model;
+let model, port;
 const streams = new Map(), running = new Map();
-const port = typeof self !== 'undefined' && typeof self.postMessage === 'function' ? self
-  : (await import(/* webpackIgnore: true */ /* @vite-ignore */ 'node:worker_threads')).parentPort;
 
 const calls = {
   open: async (signal, from, options) => {
@@ -41,7 +39,13 @@ async function receive({ id, method, args, abort }) {
   running.delete(id);
 }
 
-if (port.on)
-  port.on('message', receive);
-else
+// No top-level await, which bundlers of workers do not support.
+if (typeof self !== 'undefined' && typeof self.postMessage === 'function') {
+  port = self;
   port.onmessage = ({ data }) => receive(data);
+} else {
+  import(/* webpackIgnore: true */ /* @vite-ignore */ 'node:worker_threads').then(({ parentPort }) => {
+    port = parentPort;
+    port.on('message', receive);
+  });
+}
