@@ -23,12 +23,8 @@ plan() { # build
     case $tier-$1 in
     quick-*) echo "0.02 full costly once viewer wasm calls" ;;
     full-gcc) echo "1" ;;
-<<<<<<< HEAD
-    full-clang | full-undefined) echo "0.03" ;;
-    full-sanitize) echo "0.02" ;;
-=======
-    full-clang | full-sanitize | full-undefined) echo "0.2 wasm" ;;
->>>>>>> h38w
+    full-clang | full-undefined) echo "0.03 wasm" ;;
+    full-sanitize) echo "0.02 wasm" ;;
     default-gcc) echo "0.05 full viewer wasm" ;;
     default-clang) echo "0.1 full once costly viewer wasm calls" ;;
     default-sanitize | default-undefined) echo "0.02 full once costly slow viewer calls" ;;
