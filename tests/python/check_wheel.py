@@ -32,14 +32,17 @@ def check(label, *words, **options):
 
 
 def check_file(wheel):
-    """Check the size and the licences of a wheel."""
+    """Check the size and the licences of a wheel, and that it names no folder of the machine that built it."""
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
+        named = [name for name in names if str(HERE.parents[1])[1:].encode() in archive.read(name)]
     wanted = {"ebpo", "gmp", "hdf5", "jansson", "libzstd", "nettle", "zlib"}
     found = {pathlib.PurePath(name).stem for name in names if "/licenses/" in name}
     size = os.path.getsize(wheel)
     print(f"{os.path.basename(wheel)}: {size} bytes, licences: {', '.join(sorted(found))}")
-    return size <= LIMIT and wanted <= found
+    if named:
+        print(f"FAILED: the folder of the sources is named in {', '.join(named)}")
+    return size <= LIMIT and wanted <= found and not named
 
 
 def check_python(python, build, wheel):

@@ -93,6 +93,8 @@ def build(folder, libraries, setup_args):
     named = compilers(folder.parent)
     run("sh", pathlib.Path(__file__).with_name("static_libraries.sh"), libraries, **named)
     named["PKG_CONFIG_LIBDIR"] = str(libraries / "lib/pkgconfig")
+    # The names of source files in the library must not depend on the folders.
+    named["CFLAGS"] = f"-ffile-prefix-map={os.path.relpath(ROOT, folder)}/= {os.environ.get('CFLAGS', '')}"
     print(run("meson", "setup", folder, ROOT, *SETUP, *setup_args, **named), flush=True)
     run("ninja", "-C", folder)
 
