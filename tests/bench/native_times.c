@@ -1,6 +1,6 @@
 /* Times queries natively for web.mjs: native_times MODEL INPUTS. INPUTS: doubles: a count n, the
- * number of rounds, and for each round n points [3] and n rays [6]. Prints the medians of the rounds
- * without the first one as JSON, in microseconds of processor time per item. */
+ * number of rounds, and for each round n points [3] and n rays [6]. Prints the medians of the
+ * rounds without the first one as JSON, in microseconds of processor time per item. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -100,7 +100,9 @@ int main(int argc, char **argv)
     ebpo_context *context;
     require(argc == 3, "usage: native_times MODEL INPUTS");
     inputs in = { .file = fopen(argv[2], "rb") };
-    require(in.file && fread(head, sizeof head, 1, in.file) == 1 && head[1] >= 2 && head[1] <= MAX_ROUNDS, argv[2]);
+    require(in.file && fread(head, sizeof head, 1, in.file) == 1 && head[1] >= 2 &&
+                head[1] <= MAX_ROUNDS,
+            argv[2]);
     in.n = (uint64_t)head[0];
     in.points = allocate(in.n, 24);
     in.lines = allocate(in.n, 48);

@@ -42,7 +42,6 @@ typedef struct section {
     FILE *stream;
 } section;
 
-
 static void begin_sections(section *s, unsigned count)
 {
     for (unsigned i = 0; i < count; i++) {
@@ -263,7 +262,8 @@ static void write_mesh(const ebpo_file *file)
     ebpo_mesh mesh = { 0 };
     require(ebpo_file_read_mesh(file, NULL, &mesh, &error) == EBPO_OK, "mesh");
     uint64_t size = mesh.xyz32 ? sizeof *mesh.xyz32 : sizeof *mesh.xyz64;
-    write_section(mesh.xyz32 ? (void *)mesh.xyz32 : (void *)mesh.xyz64, mesh.vertex_count * 3 * size);
+    write_section(mesh.xyz32 ? (void *)mesh.xyz32 : (void *)mesh.xyz64,
+                  mesh.vertex_count * 3 * size);
     write_section(mesh.faces, mesh.face_count * 3 * sizeof *mesh.faces);
     ebpo_mesh_free(&mesh);
 }

@@ -38,7 +38,8 @@ static ebpo_status check_subtrees(ebpo_js_object *object, const ebpo_tree *tree)
     return status;
 }
 
-/* Reads all arrays of the file, compares their content with its checksum, and opens all subtrees. */
+/* Reads all arrays of the file, compares their content with its checksum, and opens all subtrees.
+ */
 int EBPO_JS(ebpo_js_check)(ebpo_js_object *object)
 {
     ebpo_read_options options = EBPO_READ_OPTIONS_INIT;

@@ -73,8 +73,8 @@ int EBPO_JS(ebpo_js_pair_first)(ebpo_js_pair *pair, const double *poses)
     ebpo_face_pair found;
     int32_t count = 0;
     ebpo_js_clear(&pair->object);
-    ebpo_status status = ebpo_collide_first(pair->collider, &options, &found, &count,
-                                            &pair->object.error);
+    ebpo_status status =
+        ebpo_collide_first(pair->collider, &options, &found, &count, &pair->object.error);
     if (status == EBPO_OK && count == 1 && !take_pairs(&pair->object, &found, 1))
         status = EBPO_E_MEMORY;
     return status;
@@ -85,8 +85,8 @@ int EBPO_JS(ebpo_js_pair_all)(ebpo_js_pair *pair, const double *poses)
     ebpo_collide_options options = read_options(poses);
     ebpo_js_clear(&pair->object);
     pair->object.error.status = EBPO_OK;
-    ebpo_status status = ebpo_collide_all(pair->collider, &options, take_pairs, &pair->object,
-                                          &pair->object.error);
+    ebpo_status status =
+        ebpo_collide_all(pair->collider, &options, take_pairs, &pair->object, &pair->object.error);
     return pair->object.error.status == EBPO_E_MEMORY ? EBPO_E_MEMORY : status;
 }
 
@@ -96,8 +96,8 @@ int EBPO_JS(ebpo_js_pair_relation)(ebpo_js_pair *pair, const double *poses)
     ebpo_collide_options options = read_options(poses);
     ebpo_relation_result result;
     ebpo_js_clear(&pair->object);
-    ebpo_status status = ebpo_collide_relation(pair->collider, &options, &result,
-                                               &pair->object.error);
+    ebpo_status status =
+        ebpo_collide_relation(pair->collider, &options, &result, &pair->object.error);
     int32_t out[2] = { result.relation, result.contact };
     return status == EBPO_OK ? ebpo_js_put(&pair->object, 0, out, sizeof out) : status;
 }
@@ -110,8 +110,8 @@ int EBPO_JS(ebpo_js_pair_distance)(ebpo_js_pair *pair, const double *poses, doub
     ebpo_clearance result;
     clearance.tolerance = tolerance;
     ebpo_js_clear(&pair->object);
-    ebpo_status status = ebpo_collide_distance(pair->collider, &options, &clearance, &result,
-                                               &pair->object.error);
+    ebpo_status status =
+        ebpo_collide_distance(pair->collider, &options, &clearance, &result, &pair->object.error);
     if (status != EBPO_OK)
         return status;
     double out[8] = { result.distance.lo, result.distance.hi };

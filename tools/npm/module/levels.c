@@ -42,11 +42,11 @@ static bool put_polygons(ebpo_js_object *object, const ebpo_stream_node *n)
     if (!n->polygon_count)
         return true;
     return ebpo_js_put(object, VERTICES, n->vertices, n->vertex_count * sizeof *n->vertices) ==
-        EBPO_OK &&
-        ebpo_js_put(object, POLYGON_FIRST, n->polygon_first, 4 * (n->polygon_count + 1)) ==
-        EBPO_OK &&
-        ebpo_js_put(object, CORNERS, n->corners, 4 * n->polygon_first[n->polygon_count]) ==
-        EBPO_OK;
+               EBPO_OK &&
+           ebpo_js_put(object, POLYGON_FIRST, n->polygon_first, 4 * (n->polygon_count + 1)) ==
+               EBPO_OK &&
+           ebpo_js_put(object, CORNERS, n->corners, 4 * n->polygon_first[n->polygon_count]) ==
+               EBPO_OK;
 }
 
 static bool put_node(ebpo_js_object *object, const ebpo_stream_node *n)
@@ -55,14 +55,14 @@ static bool put_node(ebpo_js_object *object, const ebpo_stream_node *n)
     uint32_t colour = n->coloured ? n->colour : UINT32_MAX;
     double cell[6] = { n->min[0], n->min[1], n->min[2], n->max[0], n->max[1], n->max[2] };
     return ebpo_js_put(object, NODE_CODES, &n->octcode, sizeof n->octcode) == EBPO_OK &&
-        ebpo_js_put(object, NODE_TYPES, &type, sizeof type) == EBPO_OK &&
-        ebpo_js_put(object, NODE_WINDINGS, &n->winding, sizeof n->winding) == EBPO_OK &&
-        ebpo_js_put(object, NODE_CELLS, cell, sizeof cell) == EBPO_OK &&
-        ebpo_js_put(object, NODE_VOLUMES, &n->volume, sizeof n->volume) == EBPO_OK &&
-        ebpo_js_put(object, NODE_COLOURS, &colour, sizeof colour) == EBPO_OK &&
-        ebpo_js_put(object, PLANE_COUNTS, &n->plane_count, sizeof n->plane_count) == EBPO_OK &&
-        ebpo_js_put(object, PLANES, n->planes, n->plane_count * sizeof *n->planes) == EBPO_OK &&
-        put_polygons(object, n);
+           ebpo_js_put(object, NODE_TYPES, &type, sizeof type) == EBPO_OK &&
+           ebpo_js_put(object, NODE_WINDINGS, &n->winding, sizeof n->winding) == EBPO_OK &&
+           ebpo_js_put(object, NODE_CELLS, cell, sizeof cell) == EBPO_OK &&
+           ebpo_js_put(object, NODE_VOLUMES, &n->volume, sizeof n->volume) == EBPO_OK &&
+           ebpo_js_put(object, NODE_COLOURS, &colour, sizeof colour) == EBPO_OK &&
+           ebpo_js_put(object, PLANE_COUNTS, &n->plane_count, sizeof n->plane_count) == EBPO_OK &&
+           ebpo_js_put(object, PLANES, n->planes, n->plane_count * sizeof *n->planes) == EBPO_OK &&
+           put_polygons(object, n);
 }
 
 /* Reads the next level of the stream. Array LEVEL_FACTS is empty after the last one. The call after
@@ -106,21 +106,21 @@ static ebpo_status put_lod(ebpo_js_object *object, const ebpo_mesh *mesh,
                                                     normals, &object->error)
                                  : EBPO_E_MEMORY;
     bool ok = status == EBPO_OK &&
-        ebpo_js_put(object, 0, mesh->xyz64, (size_t)mesh->vertex_count * 24) == EBPO_OK &&
-        ebpo_js_put(object, 1, mesh->faces, (size_t)mesh->face_count * 12) == EBPO_OK &&
-        ebpo_js_put(object, 2, nodes->corners, polygons) == EBPO_OK &&
-        ebpo_js_put(object, 11, &volume, sizeof volume) == EBPO_OK;
+              ebpo_js_put(object, 0, mesh->xyz64, (size_t)mesh->vertex_count * 24) == EBPO_OK &&
+              ebpo_js_put(object, 1, mesh->faces, (size_t)mesh->face_count * 12) == EBPO_OK &&
+              ebpo_js_put(object, 2, nodes->corners, polygons) == EBPO_OK &&
+              ebpo_js_put(object, 11, &volume, sizeof volume) == EBPO_OK;
     for (uint64_t i = 0; i < nodes->node_count && ok; i++) {
         const ebpo_lod_node *n = &nodes->nodes[i];
         uint8_t type = (uint8_t)n->type;
         uint32_t colour = n->coloured ? n->colour : UINT32_MAX;
         ok = ebpo_js_put(object, 4, &n->octcode, sizeof n->octcode) == EBPO_OK &&
-            ebpo_js_put(object, 5, &type, sizeof type) == EBPO_OK &&
-            ebpo_js_put(object, 6, &n->winding, sizeof n->winding) == EBPO_OK &&
-            ebpo_js_put(object, 7, &n->volume, sizeof n->volume) == EBPO_OK &&
-            ebpo_js_put(object, 8, &n->vertex_count, sizeof n->vertex_count) == EBPO_OK &&
-            ebpo_js_put(object, 9, &n->polygon_count, sizeof n->polygon_count) == EBPO_OK &&
-            ebpo_js_put(object, 10, &colour, sizeof colour) == EBPO_OK;
+             ebpo_js_put(object, 5, &type, sizeof type) == EBPO_OK &&
+             ebpo_js_put(object, 6, &n->winding, sizeof n->winding) == EBPO_OK &&
+             ebpo_js_put(object, 7, &n->volume, sizeof n->volume) == EBPO_OK &&
+             ebpo_js_put(object, 8, &n->vertex_count, sizeof n->vertex_count) == EBPO_OK &&
+             ebpo_js_put(object, 9, &n->polygon_count, sizeof n->polygon_count) == EBPO_OK &&
+             ebpo_js_put(object, 10, &colour, sizeof colour) == EBPO_OK;
     }
     return status != EBPO_OK ? status : ok ? EBPO_OK : EBPO_E_MEMORY;
 }
@@ -137,8 +137,8 @@ int EBPO_JS(ebpo_js_level)(ebpo_js_object *object, int level, int cell_faces)
     options.cell_faces = cell_faces;
     options.threads = 1;
     ebpo_js_clear(object);
-    ebpo_status status = ebpo_lod_level_nodes(object->file, level, &options, &mesh, &nodes,
-                                              &volume, &object->error);
+    ebpo_status status =
+        ebpo_lod_level_nodes(object->file, level, &options, &mesh, &nodes, &volume, &object->error);
     if (status == EBPO_OK)
         status = put_lod(object, &mesh, &nodes, volume);
     ebpo_lod_nodes_free(&nodes);

@@ -1,6 +1,6 @@
-/* Interface of the WebAssembly module for tools/npm/ebpo: one object for each opened file. The results of
- * a call are arrays of the object, which the next call of the object replaces. Sizes and offsets
- * are doubles, because JavaScript has no 64-bit integers without conversions. */
+/* Interface of the WebAssembly module for tools/npm/ebpo: one object for each opened file. The
+ * results of a call are arrays of the object, which the next call of the object replaces. Sizes and
+ * offsets are doubles, because JavaScript has no 64-bit integers without conversions. */
 #ifndef EBPO_MODULE_H
 #define EBPO_MODULE_H
 
@@ -39,7 +39,8 @@ void ebpo_js_free_arrays(ebpo_js_object *object);
 EBPO_MUST_USE ebpo_status ebpo_js_put(ebpo_js_object *object, unsigned n, const void *data,
                                       size_t bytes);
 
-/* Appends uninitialized bytes to result array n. Returns NULL, with an error, if they do not fit. */
+/* Appends uninitialized bytes to result array n. Returns NULL, with an error, if they do not fit.
+ */
 void *ebpo_js_extend(ebpo_js_object *object, unsigned n, uint64_t count, size_t size);
 
 /* Returns result array n with `count` items, zeroed unless it had that size already. Returns NULL,

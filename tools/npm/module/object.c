@@ -70,10 +70,7 @@ void ebpo_js_free_arrays(ebpo_js_object *object)
 /* Returns the result arrays, whose members JavaScript reads: ebpo_js_array has three of 4 bytes. */
 const ebpo_js_array *EBPO_JS(ebpo_js_table)(const ebpo_js_object *object) { return object->array; }
 
-const char *EBPO_JS(ebpo_js_message)(const ebpo_js_object *object)
-{
-    return object->error.message;
-}
+const char *EBPO_JS(ebpo_js_message)(const ebpo_js_object *object) { return object->error.message; }
 
 const char *EBPO_JS(ebpo_js_path)(const ebpo_js_object *object) { return object->error.object; }
 
@@ -181,7 +178,8 @@ ebpo_js_object *EBPO_JS(ebpo_js_query)(const ebpo_js_object *model)
     object->file = model->file;
     object->model = model->model;
     object->async = model->async;
-    if (!model->model || ebpo_context_new(model->model, &object->context, &object->error) == EBPO_OK)
+    if (!model->model ||
+        ebpo_context_new(model->model, &object->context, &object->error) == EBPO_OK)
         return object;
     free(object);
     return NULL;
@@ -261,26 +259,26 @@ int EBPO_JS(ebpo_js_info)(ebpo_js_object *object)
     const ebpo_info *info = ebpo_file_info(object->file);
     ebpo_js_clear(object);
     bool ok = put_text(object, "{") == EBPO_OK &&
-        put_string(object, "generator", info->generator) == EBPO_OK &&
-        put_string(object, "sourceName", info->source_name) == EBPO_OK &&
-        put_string(object, "sourceFormat", info->source_format) == EBPO_OK &&
-        put_string(object, "unit", info->unit) == EBPO_OK &&
-        put_string(object, "crs", info->crs) == EBPO_OK &&
-        put_string(object, "date", info->date) == EBPO_OK &&
-        put_string(object, "rule", rule_words[info->rule]) == EBPO_OK &&
-        put_hash(object, "contentSha256", info->content_sha256) == EBPO_OK &&
-        put_text(object, "\"version\":[%d,%d],\"solid\":%s,\"pruned\":%s,\"hasMesh\":%s,",
-                 info->version_major, info->version_minor, info->solid ? "true" : "false",
-                 info->pruned ? "true" : "false",
-                 info->parts & EBPO_PART_MESH ? "true" : "false") == EBPO_OK &&
-        put_vector(object, "origin", info->box_origin) == EBPO_OK &&
-        put_vector(object, "size", info->box_size) == EBPO_OK &&
-        put_number(object, "vertices", (double)info->vertex_count) == EBPO_OK &&
-        put_number(object, "faces", (double)info->face_count) == EBPO_OK &&
-        put_number(object, "sourceFaces", (double)info->source_face_count) == EBPO_OK &&
-        put_number(object, "parts", info->parts) == EBPO_OK &&
-        put_number(object, "fileBytes", (double)info->file_bytes) == EBPO_OK &&
-        put_text(object, "\"levels\":[") == EBPO_OK;
+              put_string(object, "generator", info->generator) == EBPO_OK &&
+              put_string(object, "sourceName", info->source_name) == EBPO_OK &&
+              put_string(object, "sourceFormat", info->source_format) == EBPO_OK &&
+              put_string(object, "unit", info->unit) == EBPO_OK &&
+              put_string(object, "crs", info->crs) == EBPO_OK &&
+              put_string(object, "date", info->date) == EBPO_OK &&
+              put_string(object, "rule", rule_words[info->rule]) == EBPO_OK &&
+              put_hash(object, "contentSha256", info->content_sha256) == EBPO_OK &&
+              put_text(object, "\"version\":[%d,%d],\"solid\":%s,\"pruned\":%s,\"hasMesh\":%s,",
+                       info->version_major, info->version_minor, info->solid ? "true" : "false",
+                       info->pruned ? "true" : "false",
+                       info->parts & EBPO_PART_MESH ? "true" : "false") == EBPO_OK &&
+              put_vector(object, "origin", info->box_origin) == EBPO_OK &&
+              put_vector(object, "size", info->box_size) == EBPO_OK &&
+              put_number(object, "vertices", (double)info->vertex_count) == EBPO_OK &&
+              put_number(object, "faces", (double)info->face_count) == EBPO_OK &&
+              put_number(object, "sourceFaces", (double)info->source_face_count) == EBPO_OK &&
+              put_number(object, "parts", info->parts) == EBPO_OK &&
+              put_number(object, "fileBytes", (double)info->file_bytes) == EBPO_OK &&
+              put_text(object, "\"levels\":[") == EBPO_OK;
     for (int k = 0; k < info->level_count && ok; k++)
         ok = put_level(object, &info->level[k], k + 1 == info->level_count) == EBPO_OK;
     return ok && put_text(object, "]}") == EBPO_OK ? EBPO_OK : EBPO_E_MEMORY;
@@ -294,9 +292,16 @@ int EBPO_JS(ebpo_js_stats)(ebpo_js_object *object)
     ebpo_js_clear(object);
     if (object->model)
         ebpo_model_get_stats(object->model, &s);
-    double values[] = { (double)s.memory, (double)s.memory_peak, (double)s.budget, s.resident,
-                        s.cut_level, (double)s.hits, (double)s.loads, (double)s.evicted,
-                        (double)s.bytes_read, (double)s.reads,
+    double values[] = { (double)s.memory,
+                        (double)s.memory_peak,
+                        (double)s.budget,
+                        s.resident,
+                        s.cut_level,
+                        (double)s.hits,
+                        (double)s.loads,
+                        (double)s.evicted,
+                        (double)s.bytes_read,
+                        (double)s.reads,
                         (double)ebpo_async_bytes(object->async) };
     return ebpo_js_put(object, 0, values, sizeof values);
 }

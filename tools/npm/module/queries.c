@@ -40,8 +40,8 @@ int EBPO_JS(ebpo_js_inside)(ebpo_js_object *object, const double *points, uint32
     int32_t *winding = ebpo_js_fixed(object, 1, count, sizeof *winding);
     if (!options.done || !results || !where || !winding)
         return EBPO_E_MEMORY;
-    ebpo_status status = ebpo_inside_many(object->context, points, count, &options, results,
-                                          &object->error);
+    ebpo_status status =
+        ebpo_inside_many(object->context, points, count, &options, results, &object->error);
     for (uint32_t i = 0; i < count && status == EBPO_OK; i++) {
         where[i] = (int8_t)results[i].where;
         winding[i] = results[i].winding;
@@ -68,8 +68,8 @@ int EBPO_JS(ebpo_js_distance)(ebpo_js_object *object, const double *points, uint
     double *lo = ebpo_js_fixed(object, 5, count, sizeof *lo);
     if (!options.done || !results || !distance || !hi || !point || !normal || !face || !lo)
         return EBPO_E_MEMORY;
-    ebpo_status status = ebpo_distance_many(object->context, points, count, &options, results,
-                                            &object->error);
+    ebpo_status status =
+        ebpo_distance_many(object->context, points, count, &options, results, &object->error);
     for (uint32_t i = 0; i < count && status == EBPO_OK; i++) {
         const ebpo_distance_result *r = &results[i];
         distance[i] = r->distance;
@@ -87,9 +87,9 @@ static bool take_near_face(void *user, const ebpo_near_face *near)
     ebpo_js_object *object = user;
     uint32_t face = face_index(near->face);
     return ebpo_js_put(object, 0, &near->distance, sizeof near->distance) == EBPO_OK &&
-        ebpo_js_put(object, 2, near->point, sizeof near->point) == EBPO_OK &&
-        ebpo_js_put(object, 3, near->normal, sizeof near->normal) == EBPO_OK &&
-        ebpo_js_put(object, 4, &face, sizeof face) == EBPO_OK;
+           ebpo_js_put(object, 2, near->point, sizeof near->point) == EBPO_OK &&
+           ebpo_js_put(object, 3, near->normal, sizeof near->normal) == EBPO_OK &&
+           ebpo_js_put(object, 4, &face, sizeof face) == EBPO_OK;
 }
 
 /* The faces nearest to a point, in arrays as ebpo_js_distance. `most` 0: all. */
@@ -147,8 +147,8 @@ int EBPO_JS(ebpo_js_ray_first)(ebpo_js_object *object, const double *lines, uint
     ebpo_ray_hit *hits = ebpo_js_fixed(object, 7, count, sizeof *hits);
     if (!options.done || !rays || !hits)
         return EBPO_E_MEMORY;
-    ebpo_status status = ebpo_ray_first_many(object->context, rays, count, &options, hits,
-                                             &object->error);
+    ebpo_status status =
+        ebpo_ray_first_many(object->context, rays, count, &options, hits, &object->error);
     return status == EBPO_OK ? put_hits(object, hits, count) : status;
 }
 
@@ -166,8 +166,8 @@ int EBPO_JS(ebpo_js_ray_all)(ebpo_js_object *object, const double *lines, uint32
     uint32_t *first = ebpo_js_extend(object, 3, (uint64_t)count + 1, sizeof *first);
     if (!rays || !first)
         return EBPO_E_MEMORY;
-    ebpo_status status = ebpo_ray_all_many(object->context, rays, count, &options, &hits, &begin,
-                                           &object->error);
+    ebpo_status status =
+        ebpo_ray_all_many(object->context, rays, count, &options, &hits, &begin, &object->error);
     if (status != EBPO_OK)
         return status;
     for (uint32_t i = 0; i <= count; i++)
@@ -198,8 +198,8 @@ int EBPO_JS(ebpo_js_box_faces)(ebpo_js_object *object, const double *box)
     const uint64_t *faces = NULL;
     uint64_t count = 0;
     ebpo_js_clear(object);
-    ebpo_status status = ebpo_faces_in_box(object->context, box, box + 3, &faces, &count,
-                                           &object->error);
+    ebpo_status status =
+        ebpo_faces_in_box(object->context, box, box + 3, &faces, &count, &object->error);
     uint32_t *out = status == EBPO_OK ? ebpo_js_extend(object, 0, count, sizeof *out) : NULL;
     if (!out)
         return status == EBPO_OK ? EBPO_E_MEMORY : status;
