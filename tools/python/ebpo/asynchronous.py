@@ -4,7 +4,7 @@ from __future__ import annotations
 import asyncio
 import concurrent.futures
 import ctypes
-from typing import Any, Callable
+from typing import Any, Callable, TypeVar
 
 import numpy as np
 
@@ -12,14 +12,16 @@ from . import _declared as c
 from ._library import Handle, call, lib, made, size_in_bytes
 from .errors import IOFailure, Pending
 from .model import Model
+from .parts import Level
 from .point_queries import DISTANCE, INSIDE
 from .queries import Rows
 from .ray_queries import HIT, SIDES, rays_of
 from .results import Hits, Nearest
-from .signatures import ArrayLike, Bools, NanPolicy, Sides
+from .signatures import ArrayLike, AsyncByteRanges, Bools, HttpOptions, NanPolicy, Sides, Size
 from .sources import ByUrl, shown
 
 RANGE = np.dtype(c.ebpo_range)
+Result = TypeVar("Result")
 MEMORY = 48 << 20  # bytes that were fetched and are not in use
 
 
@@ -56,7 +58,7 @@ class AsyncModel:
     info: the facts of the file.
     """
 
-    def __init__(self, arriving: Arriving, fetch: Callable, keep: Any) -> None:
+    def __init__(self, arriving: Arriving, fetch: Callable, keep: object) -> None:
         self._arriving, self._fetch, self._keep = arriving, fetch, keep
         self._lock, self._pool = asyncio.Lock(), concurrent.futures.ThreadPoolExecutor(1)
         self._model: Any = None
@@ -90,7 +92,7 @@ class AsyncModel:
         self._model = await self._repeat(lambda: Model(self._arriving, options))
         self.info = self._model.info
 
-    async def run(self, function: Callable[[Model], Any]) -> Any:
+    async def run(self, function: Callable[[Model], Result]) -> Result:
         """Return function(model), for a function that uses any methods of `Model`.
 
         The function is called again, from its beginning, after bytes that it needs have been fetched.
@@ -136,7 +138,7 @@ class AsyncModel:
         return Hits(rays.result(found["t"].copy(), np.nan), rays.result(found["face"].view(np.int64).copy(), -1),
                     rays.result(found["side"].copy(), 0))
 
-    async def level(self, number: int) -> Any:
+    async def level(self, number: int) -> Level:
         """Return a level, as `Model.level` does."""
         return await self.run(lambda model: model.level(number))
 
@@ -153,8 +155,8 @@ class AsyncModel:
         self.close()
 
 
-async def open_async(source: Any, *, memory: int | str | None = None, cut_level: int | None = None,
-                     buffer: int | str = MEMORY, **http: Any) -> AsyncModel:
+async def open_async(source: str | AsyncByteRanges, *, memory: Size | None = None, cut_level: int | None = None,
+                     buffer: Size = MEMORY, http: HttpOptions | None = None) -> AsyncModel:
     """Open a file for asyncio. Reads only its header.
 
     source: a URL (http, https), or an object with `size` and a coroutine `fetch(ranges)`. `ranges` is a list of
@@ -162,13 +164,13 @@ async def open_async(source: Any, *, memory: int | str | None = None, cut_level:
         same time, and raise an exception if the file has changed.
     memory, cut_level: as for `open`.
     buffer: number of fetched bytes that are kept for later calls.
-    http: options for URLs, as for `open`.
+    http: options for URLs, as for `open`: {"headers": {"Name": "value"}}.
 
     >>> model = await ebpo.open_async("https://example.org/model.ebpo.h5")
     >>> await model.inside(points)
     """
     if isinstance(source, str):
-        url = await asyncio.to_thread(ByUrl, source, http)
+        url = await asyncio.to_thread(ByUrl, source, dict(http or {}))
 
         async def fetch(ranges: list) -> list:
             return await asyncio.to_thread(url.fetch, ranges)

@@ -82,6 +82,15 @@ class ByteRanges(Protocol):
     def read_range(self, offset: int, size: int) -> bytes: ...
 
 
+class AsyncByteRanges(Protocol):
+    """A source of bytes for asyncio. fetch returns the bytes of each (offset, size)."""
+
+    @property
+    def size(self) -> int: ...
+
+    async def fetch(self, ranges: list[tuple[int, int]]) -> list[bytes]: ...
+
+
 class SeekableFile(Protocol):
     """A binary file object."""
 
