@@ -97,7 +97,7 @@ class AsyncModel:
 
         The function is called again, from its beginning, after bytes that it needs have been fetched.
 
-        >>> await model.run(lambda m: m.subtree(9))
+        For example: await model.run(lambda m: m.subtree(9))
         """
         return await self._repeat(lambda: function(self._model))
 
@@ -166,8 +166,10 @@ async def open_async(source: str | AsyncByteRanges, *, memory: Size | None = Non
     buffer: number of fetched bytes that are kept for later calls.
     http: options for URLs, as for `open`: {"headers": {"Name": "value"}}.
 
-    >>> model = await ebpo.open_async("https://example.org/model.ebpo.h5")
-    >>> await model.inside(points)
+    For example:
+
+        model = await ebpo.open_async("https://example.org/model.ebpo.h5")
+        await model.inside(points)
     """
     if isinstance(source, str):
         url = await asyncio.to_thread(ByUrl, source, dict(http or {}))
