@@ -137,23 +137,29 @@ export class Model {
    * no more bytes. */
   static async repeat(models, call, object, signal, completed = () => 0) {
     signal?.throwIfAborted();
-    let operations = models.map((model) => model.#begin()), results = 0;
+    const begin = () => models.map((model) => model.#begin()), end = (operations) => models.forEach((model, i) => model.#end(operations[i]));
+    let kept = begin(), results = 0; // bytes used since `kept` began stay available
     try {
-      for (let status; (status = call());) {
+      for (;;) {
+        const repetition = begin(), status = call(), now = status === PENDING ? completed() : results;
+        if (now > results) { // bytes of completed results that this repetition did not use need not stay
+          end(kept);
+          kept = repetition;
+          results = now;
+        } else {
+          end(repetition);
+        }
+        if (!status)
+          return;
         if (status !== PENDING)
           throw models[0].#heap.error(object, status);
-        const needed = models.map((model) => model.#needed()), now = completed();
-        if (now > results) { // bytes of completed results need not stay
-          results = now;
-          models.forEach((model, i) => model.#end(operations[i]));
-          operations = models.map((model) => model.#begin());
-        }
+        const needed = models.map((model) => model.#needed());
         await Promise.all(models.map((model, i) => model.#fetch(needed[i], signal)));
         models.forEach((model) => model.#alive());
         signal?.throwIfAborted();
       }
     } finally {
-      models.forEach((model, i) => model.#end(operations[i]));
+      end(kept);
     }
   }
 
