@@ -126,7 +126,7 @@ bool ebpo_input_can_advise(const ebpo_input *input)
 
 void ebpo_input_advise(ebpo_input *input, const ebpo_range *ranges, size_t count)
 {
-    enum { LARGE = 1 << 20 };
+    enum { LARGE = 1 << 20 }; /* within larger ranges, the system reads ahead by itself */
 #ifdef POSIX_FADV_WILLNEED
     const path_source *s = input->source.user;
     for (size_t i = 0; i < count && ebpo_input_can_advise(input); i++)
@@ -200,7 +200,7 @@ ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, uint64_t size, v
                             offset, offset + size - 1, input->source.size);
     uint64_t begin = offset > bytes_prefetched(input) ? offset : bytes_prefetched(input);
     ebpo_status status = input->source.read(input->source.user, offset, size, data, &cause);
-    if (status != EBPO_E_PENDING) { /* the read is repeated */
+    if (status != EBPO_E_PENDING) { /* a pending read is repeated, and counted then */
         atomic_fetch_add_explicit(&input->bytes, offset + size > begin ? offset + size - begin : 0,
                                   memory_order_relaxed);
         atomic_fetch_add_explicit(&input->reads, 1, memory_order_relaxed);
