@@ -83,7 +83,7 @@ struct ebpo_file {
     ebpo_attributes_in attributes;
     pthread_mutex_t lock;
     atomic_bool located; /* the chunks of all arrays are located */
-    bool has_places;     /* the file has a list of chunk offsets */
+    bool has_directory;  /* the file has a list of chunk offsets */
     bool has_checksums;  /* the file has a list of chunk checksums: chunk_directory.h */
     atomic_bool summed;  /* the list of chunk checksums has been read */
     uint32_t *checksums; /* NULL until then */

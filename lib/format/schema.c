@@ -67,15 +67,15 @@ const ebpo_array_spec ebpo_schema[EBPO_ARRAYS] = {
                       .bytes = offsetof(ebpo_stored_sizes, subtree_bytes),   \
                       .coding = "plain",                                     \
                       .about = about_ },
-#define SUM_ARRAY(ID, path, stored, per_, about_)                      \
-    [EBPO_A_##ID] = { .name = path,                                    \
-                      .per = EBPO_PER_##per_,                          \
-                      .needs = EBPO_NEEDS_ALWAYS,                      \
-                      .sizes = stored,                                 \
-                      .since = 1,                                      \
-                      .if_needed = true,                               \
-                      .bytes = offsetof(ebpo_stored_sizes, sum_bytes), \
-                      .coding = "plain",                               \
+#define SUM_ARRAY(ID, path, stored, per_, about_)                           \
+    [EBPO_A_##ID] = { .name = path,                                         \
+                      .per = EBPO_PER_##per_,                               \
+                      .needs = EBPO_NEEDS_ALWAYS,                           \
+                      .sizes = stored,                                      \
+                      .since = 1,                                           \
+                      .if_needed = true,                                    \
+                      .bytes = offsetof(ebpo_stored_sizes, checksum_bytes), \
+                      .coding = "plain",                                    \
                       .about = about_ },
 #include "format/array_table.inc"
     [EBPO_A_ATTRIBUTE] = { .name = "/attributes",
@@ -140,7 +140,7 @@ void ebpo_schema_path(ebpo_array_id id, int level, char path[EBPO_PATH_BYTES])
 const char *ebpo_schema_former(ebpo_array_id id)
 {
     return id == EBPO_A_SUBTREE_SHARED    ? "/subtrees/outer"
-           : id == EBPO_A_PLACES          ? "/subtrees/places"
+           : id == EBPO_A_CHUNK_DIRECTORY ? "/subtrees/places"
            : id == EBPO_A_CHUNK_CHECKSUMS ? "/chunk_sums"
                                           : NULL;
 }

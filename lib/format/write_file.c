@@ -96,7 +96,7 @@ static void headers_plan(file_headers *h, ebpo_plan *plan, uint64_t chunks,
     };
     h->out = (ebpo_h5_out)EBPO_H5_OUT_INIT;
     plan_list(h, LIST_CHECKSUMS, EBPO_A_CHUNK_CHECKSUMS, has_checksums ? chunks : 0);
-    plan_list(h, LIST_SIZES, EBPO_A_PLACES,
+    plan_list(h, LIST_SIZES, EBPO_A_CHUNK_DIRECTORY,
               plan->info.subtree_level ? chunks + has_index(plan) + has_checksums : 0);
 }
 
@@ -433,7 +433,7 @@ static void add_size_row(writer *w, uint32_t number, uint64_t bytes)
 {
     if (!w->head.list[LIST_SIZES].shape.rows)
         return;
-    w->size_row[w->size_rows++] = ebpo_place(number, bytes);
+    w->size_row[w->size_rows++] = ebpo_list_row(number, bytes);
 }
 
 /* Adds a chunk to the lists, and its size to the total (chunk_bytes). Called in file order, before
@@ -442,13 +442,13 @@ static void list_chunk(writer *w, const slot *s)
 {
     if (w->index_at == 0 && ebpo_shape_chunks(&s->array->shape) > 1) {
         w->index_at = w->head.head_bytes + w->chunk_bytes;
-        add_size_row(w, EBPO_PLACE_GAP, w->head.index_bytes);
+        add_size_row(w, EBPO_ROW_NO_ARRAY, w->head.index_bytes);
     }
-    uint32_t number = ebpo_place_number(s->array->id, s->array->level);
+    uint32_t number = ebpo_array_list_number(s->array->id, s->array->level);
     add_size_row(w, number, s->stored_bytes);
     if (w->head.list[LIST_CHECKSUMS].shape.rows)
         w->checksum_row[w->first_checksum[s->array - w->plan.array] + s->chunk] =
-            ebpo_place(number, ebpo_chunk_sum(s->stored, s->stored_bytes));
+            ebpo_list_row(number, ebpo_chunk_checksum(s->stored, s->stored_bytes));
     w->chunk_bytes += s->stored_bytes;
     if (w->chunks_done + 1 == w->order.top)
         w->top_bytes =
@@ -516,7 +516,7 @@ static ebpo_status write_lists(writer *w, ebpo_error *error)
     ebpo_status status =
         write_list(w, LIST_CHECKSUMS, values[LIST_CHECKSUMS], &bytes[LIST_CHECKSUMS], error);
     if (status == EBPO_OK && bytes[LIST_CHECKSUMS])
-        add_size_row(w, ebpo_place_number(EBPO_A_CHUNK_CHECKSUMS, 0), bytes[LIST_CHECKSUMS]);
+        add_size_row(w, ebpo_array_list_number(EBPO_A_CHUNK_CHECKSUMS, 0), bytes[LIST_CHECKSUMS]);
     if (status == EBPO_OK)
         status = write_list(w, LIST_SIZES, values[LIST_SIZES], &bytes[LIST_SIZES], error);
     if (status == EBPO_OK)

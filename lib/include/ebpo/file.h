@@ -751,7 +751,7 @@ typedef struct ebpo_stored_sizes {
     uint64_t attribute_bytes;
 
     /* List of chunk checksums. */
-    uint64_t sum_bytes;
+    uint64_t checksum_bytes;
 } ebpo_stored_sizes;
 
 #define EBPO_STORED_SIZES_INIT EBPO_SIZED(ebpo_stored_sizes)
