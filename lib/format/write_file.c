@@ -42,7 +42,7 @@ typedef enum header_list {
 } header_list;
 
 typedef struct file_headers {
-    ebpo_plan *plan; /* lay_out and headers_begin_index set the handles of its arrays */
+    ebpo_plan *plan; /* write_headers and headers_begin_index set the handles of its arrays */
     ebpo_h5_out out;
     ebpo_h5_id root;
     ebpo_array_out list[LISTS]; /* a list without rows is not written */
@@ -254,7 +254,7 @@ static ebpo_status headers_measure(file_headers *h, const char *shown, ebpo_erro
     ebpo_plan *plan = h->plan;
     uint64_t capacity = (256 << 10) + (4 << 10) * (uint64_t)plan->count + 32 * h->chunks,
              headers = 0, all = 0;
-    ebpo_status status = lay_out(h, NULL, shown, capacity, (first_chunk){ "", 1 }, error);
+    ebpo_status status = write_headers(h, NULL, shown, capacity, (first_chunk){ "", 1 }, error);
     if (status == EBPO_OK)
         status = ebpo_h5_head_used(&h->out, capacity, &headers, error);
     for (unsigned i = 0; i < plan->count && status == EBPO_OK; i++) {
