@@ -18,17 +18,9 @@ relative=$(realpath --relative-to="$folder/lib" "$root")
 flags="-O3 -msimd128 -ffunction-sections -fdata-sections -Wno-ignored-optimization-argument
     -ffile-prefix-map=$folder=. -ffile-prefix-map=$root=. -ffile-prefix-map=$relative=."
 
-# Downloads the source packages, without changes to the system's lists of packages.
+# Downloads and unpacks the source packages.
 fetch_sources() {
-    mkdir -p "$sources/parts" "$sources/lists/partial" "$sources/files"
-    for list in /etc/apt/sources.list.d/debian.sources /etc/apt/sources.list; do
-        [ ! -f "$list" ] || sed 's/^Types: .*/Types: deb-src/; s/^deb /deb-src /' "$list" \
-            >"$sources/parts/$(basename "$list" | sed 's/^sources.list$/debian.list/')"
-    done
-    apt="apt-get -qq -o Dir::Etc::SourceList=/dev/null -o Dir::Etc::SourceParts=$sources/parts
-        -o Dir::State::Lists=$sources/lists -o APT::Sandbox::User=$(id -un)"
-    $apt update
-    (cd "$sources/files" && $apt source --download-only libzstd zlib gmp nettle)
+    sh "$root/tools/packaging/debian_sources.sh" "$sources/files" libzstd zlib gmp nettle
     for package in "$sources"/files/*.dsc; do
         name=$(basename "$package" | sed 's/_.*//')
         rm -rf "${sources:?}/$name"

@@ -136,12 +136,18 @@ static ebpo_status put_hits(ebpo_js_object *object, const ebpo_ray_hit *hits, ui
     return EBPO_OK;
 }
 
-int EBPO_JS(ebpo_js_ray_first)(ebpo_js_object *object, const double *lines, uint32_t count,
-                               double t_max, int sides)
+static ebpo_ray_options ray_options(int sides)
 {
     ebpo_ray_options options = EBPO_RAY_OPTIONS_INIT;
     options.sides = (ebpo_ray_sides)sides;
     options.threads = 1;
+    return options;
+}
+
+int EBPO_JS(ebpo_js_ray_first)(ebpo_js_object *object, const double *lines, uint32_t count,
+                               double t_max, int sides)
+{
+    ebpo_ray_options options = ray_options(sides);
     options.done = done_flags(object, count);
     ebpo_ray *rays = make_rays(object, lines, count, t_max);
     ebpo_ray_hit *hits = ebpo_js_fixed(object, 7, count, sizeof *hits);
@@ -158,9 +164,7 @@ int EBPO_JS(ebpo_js_ray_all)(ebpo_js_object *object, const double *lines, uint32
 {
     const ebpo_ray_hit *hits = NULL;
     const uint64_t *begin = NULL;
-    ebpo_ray_options options = EBPO_RAY_OPTIONS_INIT;
-    options.sides = (ebpo_ray_sides)sides;
-    options.threads = 1;
+    ebpo_ray_options options = ray_options(sides);
     ebpo_js_clear(object);
     ebpo_ray *rays = make_rays(object, lines, count, t_max);
     uint32_t *first = ebpo_js_extend(object, 3, (uint64_t)count + 1, sizeof *first);
@@ -179,9 +183,7 @@ int EBPO_JS(ebpo_js_ray_all)(ebpo_js_object *object, const double *lines, uint32
 int EBPO_JS(ebpo_js_ray_any)(ebpo_js_object *object, const double *lines, uint32_t count,
                              double t_max, int sides)
 {
-    ebpo_ray_options options = EBPO_RAY_OPTIONS_INIT;
-    options.sides = (ebpo_ray_sides)sides;
-    options.threads = 1;
+    ebpo_ray_options options = ray_options(sides);
     options.done = done_flags(object, count);
     ebpo_ray *rays = make_rays(object, lines, count, t_max);
     bool *any = ebpo_js_fixed(object, 0, count, sizeof *any);

@@ -4,9 +4,10 @@
 #     CC=COMPILER sh static_libraries.sh PREFIX
 #
 # Writes PREFIX/lib, PREFIX/include and PREFIX/licences. Packages in $EBPO_SOURCES (a folder with .dsc files) are
-# used; without this variable apt downloads them from the mirror $EBPO_DEBIAN_MIRROR, and checks their signatures.
+# used; without this variable debian_sources.sh downloads them.
 # The symbols are hidden, so that other copies of these libraries in the same process are not affected.
 set -eu
+here=$(cd "$(dirname "$0")" && pwd)
 prefix=$1
 mkdir -p "$prefix/lib" "$prefix/licences"
 prefix=$(cd "$prefix" && pwd)
@@ -19,15 +20,8 @@ failed() { echo "static_libraries.sh: $1 failed; the messages are in $prefix/log
 names="zlib libzstd gmp nettle jansson hdf5"
 sources=${EBPO_SOURCES:-$work}
 if [ -z "${EBPO_SOURCES:-}" ]; then
-    mkdir -p "$work/lists/partial" "$work/cache/archives/partial"
-    echo "deb-src [signed-by=/usr/share/keyrings/debian-archive-keyring.gpg]" \
-        "${EBPO_DEBIAN_MIRROR:-http://deb.debian.org/debian} bookworm main" >"$work/debian.list"
-    apt() {
-        apt-get -q -o Dir::Etc::SourceList="$work/debian.list" -o Dir::Etc::SourceParts=- \
-            -o Dir::State::Lists="$work/lists" -o Dir::Cache="$work/cache" -o APT::Sandbox::User="$(id -un)" "$@"
-    }
     # shellcheck disable=SC2086 # a list of names
-    (cd "$work" && apt update && apt source --download-only $names) || failed "the download of $names"
+    sh "$here/../../packaging/debian_sources.sh" "$work" $names || failed "the download of $names"
 fi
 
 export CC CFLAGS="-O2 -fPIC -fvisibility=hidden -ffile-prefix-map=$work=. ${CFLAGS:-}" AR="${AR:-ar}"
