@@ -12,7 +12,8 @@ for list in /etc/apt/sources.list.d/debian.sources /etc/apt/sources.list; do
 done
 apt() {
     apt-get -qq -o Dir::Etc::SourceList=/dev/null -o Dir::Etc::SourceParts="$folder/apt/parts" \
-        -o Dir::State::Lists="$folder/apt/lists" -o Dir::Cache="$folder/apt/cache" -o APT::Sandbox::User="$(id -un)" "$@"
+        -o Dir::State::Lists="$folder/apt/lists" -o Dir::Cache="$folder/apt/cache" \
+        -o APT::Sandbox::User="$(id -un)" "$@"
 }
 apt update
 (cd "$folder" && apt source --download-only "$@")
