@@ -69,7 +69,7 @@ START_TEST(test_prefetch_covers_nearby_queries)
 {
     query_model m;
     uint64_t count = query_scaled(200), looked = 0;
-    double *points = query_capacity(2 * count, 3 * sizeof *points);
+    double *points = query_alloc(2 * count, 3 * sizeof *points);
     query_model_make(&m, cases[_i].name, query_solid_by_name(cases[_i].name),
                      &query_variants[cases[_i].variant]);
     query_make_points(&m, 2 * count, (uint64_t)_i + 77, points);
@@ -98,7 +98,7 @@ START_TEST(test_prefetch_orders_nearest_first)
 {
     query_model m;
     uint64_t count = query_scaled(100);
-    double *points = query_capacity(count, 3 * sizeof *points);
+    double *points = query_alloc(count, 3 * sizeof *points);
     query_model_make(&m, cases[_i].name, query_solid_by_name(cases[_i].name),
                      &query_variants[cases[_i].variant]);
     query_make_points(&m, count, (uint64_t)_i + 78, points);

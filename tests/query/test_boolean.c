@@ -43,8 +43,8 @@ static void operand_make(operand *o, const char *solid, int variant, const ebpo_
     o->pose = *pose;
     const ebpo_mesh *from = &o->model.mesh;
     o->posed = (ebpo_mesh){ .vertex_count = from->vertex_count, .face_count = from->face_count };
-    o->posed.xyz64 = query_capacity(from->vertex_count, sizeof(double[3]));
-    o->posed.faces = query_capacity(from->face_count, sizeof(uint32_t[3]));
+    o->posed.xyz64 = query_alloc(from->vertex_count, sizeof(double[3]));
+    o->posed.faces = query_alloc(from->face_count, sizeof(uint32_t[3]));
     memcpy(o->posed.faces, from->faces, from->face_count * sizeof(uint32_t[3]));
     for (uint64_t v = 0; v < from->vertex_count; v++) {
         double x[3];
@@ -243,8 +243,8 @@ static void run_query(operand *o, const formula *f, uint64_t count, uint64_t see
 {
     ebpo_boolean_operand operands[OPERANDS];
     ebpo_boolean *boolean;
-    double *points = query_capacity(count, sizeof(double[3]));
-    ebpo_boolean_result *got = query_capacity(count, sizeof *got);
+    double *points = query_alloc(count, sizeof(double[3]));
+    ebpo_boolean_result *got = query_alloc(count, sizeof *got);
     uint64_t state = seed;
     for (int i = 0; i < OPERANDS; i++)
         operands[i] = (ebpo_boolean_operand){ o[i].model.model, o[i].pose };

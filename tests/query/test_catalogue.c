@@ -44,8 +44,8 @@ static void make_models(void)
         query_model_make(&model[i], "catalogue", mesh_of(i), &query_variants[0]);
         ebpo_catalogue_entry_of(model[i].file, model[i].path, &entry[i]);
     }
-    points = query_capacity(POINTS, 3 * sizeof *points);
-    rays = query_capacity(RAYS, sizeof *rays);
+    points = query_alloc(POINTS, 3 * sizeof *points);
+    rays = query_alloc(RAYS, sizeof *rays);
     for (int i = 0; i < MODELS; i++)
         query_make_points(&model[i], POINTS / MODELS, seed + (uint64_t)i,
                           points + 3 * (POINTS / MODELS) * i);
@@ -167,10 +167,10 @@ static void judge_rays(const ebpo_ray_hit *got, const uint64_t *intersected)
 static void query_everything(open_catalogue *a, unsigned threads)
 {
     ebpo_catalogue_query_options o = on_threads(threads);
-    ebpo_inside_result *inside = query_capacity(POINTS, sizeof *inside);
-    ebpo_distance_result *distance = query_capacity(POINTS, sizeof *distance);
-    ebpo_ray_hit *hits = query_capacity(RAYS, sizeof *hits);
-    uint64_t *number = query_capacity(POINTS, sizeof *number);
+    ebpo_inside_result *inside = query_alloc(POINTS, sizeof *inside);
+    ebpo_distance_result *distance = query_alloc(POINTS, sizeof *distance);
+    ebpo_ray_hit *hits = query_alloc(RAYS, sizeof *hits);
+    uint64_t *number = query_alloc(POINTS, sizeof *number);
     ASSERT_OK(ebpo_catalogue_inside(a->catalogue, a->models, points, POINTS, &o, inside, error));
     judge_inside(inside);
     ASSERT_OK(ebpo_catalogue_distance(a->catalogue, a->models, points, POINTS, &o, distance, number,
@@ -409,7 +409,7 @@ START_TEST(test_catalogue_uses_callers_open_function)
     opener o = { .fails = 3 };
     ebpo_catalogue_options how = EBPO_CATALOGUE_OPTIONS_INIT;
     ebpo_catalogue_models_options few = EBPO_CATALOGUE_MODELS_OPTIONS_INIT;
-    ebpo_inside_result *out = query_capacity(POINTS, sizeof *out);
+    ebpo_inside_result *out = query_alloc(POINTS, sizeof *out);
     open_catalogue a;
     how.open_file = open_counted;
     how.close_file = close_counted;
@@ -443,7 +443,7 @@ START_TEST(test_catalogue_query_validation_and_cancel)
 {
     ebpo_error reported = EBPO_ERROR_INIT;
     ebpo_catalogue_query_options o = on_threads(1);
-    ebpo_inside_result *out = query_capacity(POINTS, sizeof *out);
+    ebpo_inside_result *out = query_alloc(POINTS, sizeof *out);
     ebpo_distance_result distance;
     ebpo_ray ray = { { 9, 9, 9 }, { 0, 0, 0 }, 1 };
     ebpo_ray_hit hit;

@@ -29,7 +29,7 @@ static char *text_of(const char *path)
 {
     FILE *in = fopen(path, "rb");
     ck_assert_ptr_nonnull(in);
-    char *text = query_capacity(1 << 16, 1);
+    char *text = query_alloc(1 << 16, 1);
     size_t size = fread(text, 1, (1 << 16) - 1, in);
     text[size] = 0;
     fclose(in);

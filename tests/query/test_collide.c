@@ -100,7 +100,7 @@ static pair_list brute_force(const query_model *a, const ebpo_pose *pa, const qu
                              const ebpo_pose *pb)
 {
     pair_list out = { 0 };
-    double(*faces)[3][3] = query_capacity(b->mesh.face_count, sizeof *faces);
+    double(*faces)[3][3] = query_alloc(b->mesh.face_count, sizeof *faces);
     for (uint64_t j = 0; j < b->mesh.face_count; j++)
         posed_face(b, pb, j, faces[j]);
     for (uint64_t i = 0; i < a->mesh.face_count; i++) {

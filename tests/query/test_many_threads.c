@@ -210,7 +210,7 @@ static bool is_own(const worker *w, int kind, bool wanted, const ebpo_error *err
 
 /* Runs a query. The first query of each thread has injected faults, so that faults occur for any
  * number of queries: at that time not everything is in memory. */
-static void query_one(worker *w, bool first)
+static void query_check_points(worker *w, bool first)
 {
     int kind = (int)draw(w, MIX_KINDS);
     bool wanted = w->s->place != FROM_FILE && (draw(w, 8) == 0 || first);
@@ -255,7 +255,7 @@ static void *work(void *user)
             break;
         if (i % 20 == 0 && !change_context(w))
             break;
-        query_one(w, i == 0);
+        query_check_points(w, i == 0);
         if (ebpo_budget_get_stats(s->budget, &stats) != EBPO_OK || stats.memory > stats.budget)
             report(w, 0, 0, "more memory is used than the budget");
     }

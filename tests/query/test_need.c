@@ -77,14 +77,13 @@ static uint64_t missing(ebpo_file *coarse, ebpo_file *fine_file, uint64_t *nodes
     fine(ebpo_file_read_tree(fine_file, READ_BY(1), &b, &error), &error);
     struct pair {
         uint64_t a, b;
-    } *now = query_capacity(1, sizeof *now), *next;
+    } *now = query_alloc(1, sizeof *now), *next;
     uint64_t count = 1;
     *now = (struct pair){ 0, 0 };
     for (int level = 0; level < a.info.level_count && count; level++) {
         const ebpo_level *x = &a.level[level], *y = &b.level[level];
-        uint64_t *rank[2] = { query_capacity(x->group_count + 1, 8),
-                              query_capacity(level < b.info.level_count ? y->group_count + 1 : 1,
-                                             8) };
+        uint64_t *rank[2] = { query_alloc(x->group_count + 1, 8),
+                              query_alloc(level < b.info.level_count ? y->group_count + 1 : 1, 8) };
         const ebpo_level *of[2] = { x, y };
         for (int f = 0; f < 2; f++) {
             uint64_t sum = 0;
@@ -95,7 +94,7 @@ static uint64_t missing(ebpo_file *coarse, ebpo_file *fine_file, uint64_t *nodes
                     sum += (of[f]->types[i] >> 2 * k & 3) == EBPO_GRAY;
             }
         }
-        next = query_capacity(8 * count, sizeof *next);
+        next = query_alloc(8 * count, sizeof *next);
         uint64_t kept = 0;
         for (uint64_t i = 0; i < count; i++) {
             bool there = level < b.info.level_count && y->types[now[i].b] != 0;

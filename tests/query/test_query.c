@@ -23,7 +23,7 @@ START_TEST(test_difficult_points_match_brute_force)
     query_model m;
     query_model_make(&m, query_solid_name(solid), query_solid_make(solid),
                      &query_variants[variant]);
-    query_one(&m, query_scaled(points_for(m.name, m.mesh.face_count)), (uint64_t)_i);
+    query_check_points(&m, query_scaled(points_for(m.name, m.mesh.face_count)), (uint64_t)_i);
     query_model_free(&m);
 }
 END_TEST
@@ -117,9 +117,9 @@ START_TEST(test_surface_has_distance_but_no_inside)
     query_model_make(&m, name, query_solid_by_name(name), &query_variants[0]);
     ck_assert(!m.info.solid);
     uint64_t count = query_scaled(3000);
-    double *points = query_capacity(count, 3 * sizeof *points);
-    query_truth *truth = query_capacity(count, sizeof *truth);
-    ebpo_distance_result *distance = query_capacity(count, sizeof *distance);
+    double *points = query_alloc(count, 3 * sizeof *points);
+    query_truth *truth = query_alloc(count, sizeof *truth);
+    ebpo_distance_result *distance = query_alloc(count, sizeof *distance);
     ebpo_inside_result inside;
     ebpo_error error = EBPO_ERROR_INIT;
     query_make_points(&m, count, 3, points);

@@ -101,9 +101,9 @@ static void begin(fixture *a, int i)
     query_model_make(&a->m, cases[i].name, query_solid_by_name(cases[i].name),
                      &query_variants[cases[i].variant]);
     a->count = query_scaled(POINTS);
-    a->points = query_capacity(a->count, 3 * sizeof *a->points);
-    a->truth = query_capacity(a->count, sizeof *a->truth);
-    a->got = query_capacity(a->count, sizeof *a->got);
+    a->points = query_alloc(a->count, 3 * sizeof *a->points);
+    a->truth = query_alloc(a->count, sizeof *a->truth);
+    a->got = query_alloc(a->count, sizeof *a->got);
     for (uint64_t k = 0; k < a->count; k++)
         far_point(&a->m, &state, a->points + 3 * k);
     query_find_truths(&a->m, a->points, a->count, a->truth);

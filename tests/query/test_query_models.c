@@ -20,7 +20,7 @@ START_TEST(test_real_models_match_brute_force)
     ck_assert_msg(ebpo_mesh_read(path, NULL, &mesh, &error) == EBPO_OK, "%s", error.message);
     query_model m;
     query_model_make(&m, names[_i], mesh, &query_variants[0]);
-    query_one(&m, query_scaled(2000), (uint64_t)_i + 31);
+    query_check_points(&m, query_scaled(2000), (uint64_t)_i + 31);
     query_model_free(&m);
 }
 END_TEST

@@ -34,10 +34,10 @@ typedef struct fixture {
 static void reserve_space(fixture *a, uint64_t count)
 {
     a->count = count;
-    a->points = query_capacity(count, 3 * sizeof *a->points);
-    a->truth = query_capacity(count, sizeof *a->truth);
-    a->inside = query_capacity(count, sizeof *a->inside);
-    a->distance = query_capacity(count, sizeof *a->distance);
+    a->points = query_alloc(count, 3 * sizeof *a->points);
+    a->truth = query_alloc(count, sizeof *a->truth);
+    a->inside = query_alloc(count, sizeof *a->inside);
+    a->distance = query_alloc(count, sizeof *a->distance);
 }
 
 static void begin(fixture *a, int i, uint64_t count)
@@ -278,8 +278,8 @@ START_TEST(test_level_limited_results_ignore_loaded_data)
         return;
     fixture a;
     begin(&a, _i, 300);
-    ebpo_distance_result *first = query_capacity(a.count, sizeof *first);
-    ebpo_inside_result *where = query_capacity(a.count, sizeof *where);
+    ebpo_distance_result *first = query_alloc(a.count, sizeof *first);
+    ebpo_inside_result *where = query_alloc(a.count, sizeof *where);
     for (int level = 0; level < a.m.info.level_count; level += 2) {
         ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
         options.level = level;

@@ -69,7 +69,7 @@ static void query_solid(uint64_t seed)
     snprintf(name, sizeof name, "EBPO_TEST_SEED=%llu", (unsigned long long)seed);
     query_model_make(&m, name, query_random_solid(seed, seed % 4 != 3),
                      &query_variants[seed % (uint64_t)query_variant_count]);
-    query_one(&m, POINTS, seed);
+    query_check_points(&m, POINTS, seed);
     query_rays(&m, &state);
     query_boxes(&m, &state);
     query_model_free(&m);

@@ -16,7 +16,7 @@ typedef struct results {
 
 static ebpo_ray *make_rays(query_model *m, uint64_t count, uint64_t seed)
 {
-    ebpo_ray *rays = query_capacity(count, sizeof *rays);
+    ebpo_ray *rays = query_alloc(count, sizeof *rays);
     for (uint64_t i = 0; i < count; i++) {
         ebpo_ray *r = &rays[i];
         query_make_ray(m, &seed, r->origin, r->direction, &r->t_max);
@@ -53,8 +53,7 @@ static void query_together(ebpo_context *context, ebpo_context *other, const ebp
     const ebpo_ray_hit *hits, *single;
     const uint64_t *begin;
     uint64_t n;
-    results got = { query_capacity(count, sizeof *got.first),
-                    query_capacity(count, sizeof *got.any) };
+    results got = { query_alloc(count, sizeof *got.first), query_alloc(count, sizeof *got.any) };
     options.threads = threads;
     ASSERT_OK(ebpo_ray_first_many(context, rays, count, &options, got.first, error));
     ASSERT_OK(ebpo_ray_any_many(context, rays, count, &options, got.any, error));
@@ -79,8 +78,8 @@ START_TEST(test_ray_batch_matches_single_rays)
     query_model_make(&m, "sphere", query_solid_by_name("sphere"), &query_variants[5]);
     uint64_t count = _i == 2 ? 100 : 1100; /* enough pieces for several threads */
     ebpo_ray *rays = make_rays(&m, count, 7);
-    results expected = { query_capacity(count, sizeof *expected.first),
-                         query_capacity(count, sizeof *expected.any) };
+    results expected = { query_alloc(count, sizeof *expected.first),
+                         query_alloc(count, sizeof *expected.any) };
     query_singly(m.context, rays, count, &expected);
     ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
     how.cut_level = _i ? 2 : -1;
@@ -182,7 +181,7 @@ START_TEST(test_rays_detect_inside_of_convex_solids)
     query_model m;
     query_model_make(&m, names[_i], query_solid_by_name(names[_i]), &query_variants[5]);
     uint64_t state = 5, count = query_scaled(3000), wrong = 0;
-    double *points = query_capacity(count, 3 * sizeof *points);
+    double *points = query_alloc(count, 3 * sizeof *points);
     query_make_points(&m, count, 9, points);
     for (uint64_t i = 0; i < count; i++) {
         ebpo_inside_result where;
@@ -206,7 +205,7 @@ START_TEST(test_rays_detect_inside_of_solids)
     query_model_make(&m, query_solid_name(_i), query_solid_make(_i),
                      &query_variants[_i % query_variant_count]);
     uint64_t state = 5, count = query_scaled(m.mesh.face_count > 500 ? 500 : 2000), wrong = 0;
-    double *points = query_capacity(count, 3 * sizeof *points);
+    double *points = query_alloc(count, 3 * sizeof *points);
     query_make_points(&m, count, 9, points);
     for (uint64_t i = 0; i < count && m.info.solid; i++) {
         ebpo_inside_result where;

@@ -154,7 +154,7 @@ START_TEST(test_box_queries_match_brute_force)
                      &query_variants[(_i + 1) % query_variant_count]);
     uint64_t count = query_scaled(m.mesh.face_count > 500 ? 200 : 1500), wrong = 0,
              state = (uint64_t)_i;
-    double(*p)[3] = query_capacity(2 * count, sizeof *p);
+    double(*p)[3] = query_alloc(2 * count, sizeof *p);
     if (strcmp(m.name, "all_scales") == 0)
         count = query_scaled(100);
     query_make_points(&m, 2 * count, (uint64_t)_i + 77, p[0]);
@@ -242,7 +242,7 @@ static bool query_triangles(query_model *m, ebpo_context *context, bool resident
     uint32_t n;
     ebpo_error error = EBPO_ERROR_INIT;
     gathered g = { .m = m, .most = UINT64_MAX, .fine = true, .ascending = true };
-    g.face = query_capacity(m->mesh.face_count + 1, sizeof *g.face);
+    g.face = query_alloc(m->mesh.face_count + 1, sizeof *g.face);
     oracle_box(m->judge, low, high, &expected, &n);
     ck_assert_msg(ebpo_triangles_in_box(context, low, high, keep_triangles, &g, &error) == EBPO_OK,
                   "%s", error.message);
@@ -271,7 +271,7 @@ START_TEST(test_box_query_returns_each_triangle_once)
     ebpo_model *model[MODES];
     ebpo_context *context[MODES];
     uint64_t count = query_scaled(100), wrong = 0;
-    double(*p)[3] = query_capacity(2 * count, sizeof *p);
+    double(*p)[3] = query_alloc(2 * count, sizeof *p);
     query_model_make(&m, query_solid_name(_i), query_solid_make(_i),
                      &query_variants[(_i + 2) % query_variant_count]);
     for (int mode = 0; mode < MODES; mode++)
@@ -355,7 +355,7 @@ static void take_all(const query_model *m, ebpo_context *context)
     for (int turn = 0; turn < 2; turn++) {
         static const double low[3] = { -9, -9, -9 }, high[3] = { 9, 9, 9 };
         gathered g = { .m = m, .most = turn ? 3 : UINT64_MAX, .fine = true };
-        g.face = query_capacity(m->mesh.face_count + 1, sizeof *g.face);
+        g.face = query_alloc(m->mesh.face_count + 1, sizeof *g.face);
         ASSERT_OK(ebpo_triangles_in_box(context, low, high, keep_triangles, &g, error));
         ck_assert(g.fine);
         ck_assert_uint_eq(g.count, turn ? 3 * EBPO_TRIANGLES_MAX : m->mesh.face_count);

@@ -151,7 +151,7 @@ static void check_point(const query_model *m, ebpo_context *context, const doubl
 
 static void check_points(const query_model *m, ebpo_context *context, uint64_t count, uint64_t seed)
 {
-    double *points = query_capacity(count, 3 * sizeof *points);
+    double *points = query_alloc(count, 3 * sizeof *points);
     query_make_points(m, count, seed, points);
     for (uint64_t i = 0; i < count; i++)
         check_point(m, context, points + 3 * i, &seed);

@@ -141,7 +141,7 @@ START_TEST(test_skeleton_bound_is_below_face_distance)
     query_model_make(&m, query_solid_name(_i), query_solid_make(_i),
                      &query_variants[_i % query_variant_count]);
     uint64_t count = query_scaled(40 + 20000 / m.mesh.face_count);
-    double *points = query_capacity(count, 3 * sizeof *points);
+    double *points = query_alloc(count, 3 * sizeof *points);
     query_make_points(&m, count, (uint64_t)_i, points);
     check_bounds(m.model->whole, points, count);
     ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
@@ -184,9 +184,9 @@ static void begin(fixture *s, int solid, int variant, const ebpo_model_options *
     ASSERT_OK(ebpo_model_new(s->m.file, how, &s->model, error));
     ASSERT_OK(ebpo_context_new(s->model, &s->context, error));
     s->count = count ? count : query_scaled(100 + 100000 / s->m.mesh.face_count);
-    s->points = query_capacity(s->count, 3 * sizeof *s->points);
-    s->truth = query_capacity(s->count, sizeof *s->truth);
-    s->got = query_capacity(s->count, sizeof *s->got);
+    s->points = query_alloc(s->count, 3 * sizeof *s->points);
+    s->truth = query_alloc(s->count, sizeof *s->truth);
+    s->got = query_alloc(s->count, sizeof *s->got);
     query_make_points(&s->m, s->count, 7, s->points);
     query_find_truths(&s->m, s->points, s->count, s->truth);
 }

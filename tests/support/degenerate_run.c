@@ -76,10 +76,10 @@ static void run_verify(const query_model *m, const ebpo_mesh *source, degenerate
 static bool query_points(query_model *m, uint64_t count, degenerate_result *r)
 {
     enum { BATCH = 256 };
-    double *points = query_capacity(count, 3 * sizeof *points);
-    query_truth *truth = query_capacity(BATCH, sizeof *truth);
-    ebpo_inside_result *inside = query_capacity(BATCH, sizeof *inside);
-    ebpo_distance_result *distance = query_capacity(BATCH, sizeof *distance);
+    double *points = query_alloc(count, 3 * sizeof *points);
+    query_truth *truth = query_alloc(BATCH, sizeof *truth);
+    ebpo_inside_result *inside = query_alloc(BATCH, sizeof *inside);
+    ebpo_distance_result *distance = query_alloc(BATCH, sizeof *distance);
     ebpo_error error = EBPO_ERROR_INIT;
     bool fine = true;
     query_make_points(m, count, 1, points);
@@ -187,12 +187,12 @@ static ebpo_mesh copy_of(const ebpo_mesh *mesh)
     ebpo_mesh copy = *mesh;
     size_t size = 3 * mesh->vertex_count;
     if (mesh->xyz32)
-        copy.xyz32 = memcpy(query_capacity(size, sizeof *copy.xyz32), mesh->xyz32,
-                            size * sizeof *copy.xyz32);
+        copy.xyz32 =
+            memcpy(query_alloc(size, sizeof *copy.xyz32), mesh->xyz32, size * sizeof *copy.xyz32);
     if (mesh->xyz64)
-        copy.xyz64 = memcpy(query_capacity(size, sizeof *copy.xyz64), mesh->xyz64,
-                            size * sizeof *copy.xyz64);
-    copy.faces = memcpy(query_capacity(mesh->face_count, 3 * sizeof *copy.faces), mesh->faces,
+        copy.xyz64 =
+            memcpy(query_alloc(size, sizeof *copy.xyz64), mesh->xyz64, size * sizeof *copy.xyz64);
+    copy.faces = memcpy(query_alloc(mesh->face_count, 3 * sizeof *copy.faces), mesh->faces,
                         mesh->face_count * 3 * sizeof *copy.faces);
     return copy;
 }

@@ -112,7 +112,7 @@ static ebpo_mesh prism(const double (*profile)[2], uint32_t n, double length)
 ebpo_mesh degenerate_cylinder(const degenerate_case *c)
 {
     uint32_t n = (uint32_t)c->a[0];
-    double(*p)[2] = query_capacity(n + 1, sizeof *p);
+    double(*p)[2] = query_alloc(n + 1, sizeof *p);
     p[0][0] = p[0][1] = 0;
     for (uint32_t i = 0; i < n; i++)
         ebpo_test_circle(i, n, &p[i + 1][0], &p[i + 1][1]);
@@ -124,7 +124,7 @@ ebpo_mesh degenerate_cylinder(const degenerate_case *c)
 ebpo_mesh degenerate_dome(const degenerate_case *c)
 {
     uint32_t n = (uint32_t)c->a[0];
-    double(*p)[2] = query_capacity(n + 4, sizeof *p), step = c->a[1] / n, half = c->a[1] / 2;
+    double(*p)[2] = query_alloc(n + 4, sizeof *p), step = c->a[1] / n, half = c->a[1] / 2;
     p[0][0] = 0, p[0][1] = -half;
     for (uint32_t i = 0; i <= n; i++) { /* a parabola: slopes grow by equal steps */
         double x = half - i * step;
@@ -372,7 +372,7 @@ ebpo_mesh degenerate_menger(const degenerate_case *c)
     uint32_t n = 1;
     for (int i = 0; i < (int)c->a[0]; i++)
         n *= 3;
-    uint8_t *filled = query_capacity((uint64_t)n * n * n, 1);
+    uint8_t *filled = query_alloc((uint64_t)n * n * n, 1);
     for (uint32_t z = 0; z < n; z++)
         for (uint32_t y = 0; y < n; y++)
             for (uint32_t x = 0; x < n; x++) {
@@ -389,7 +389,7 @@ ebpo_mesh degenerate_menger(const degenerate_case *c)
 ebpo_mesh degenerate_checkers(const degenerate_case *c)
 {
     uint32_t n = (uint32_t)c->a[0];
-    uint8_t *filled = query_capacity((uint64_t)n * n * n, 1);
+    uint8_t *filled = query_alloc((uint64_t)n * n * n, 1);
     for (uint32_t i = 0; i < n * n * n; i++)
         filled[i] = (i % n + i / n % n + i / n / n) % 2;
     ebpo_mesh m = ebpo_test_voxels(filled, n, 1);

@@ -288,7 +288,7 @@ static void hash_queries(hashing *h, const degenerate_case *c, query_model *m, u
         CALL(status, ebpo_context_new(m->model, &m->context, &error));
     if (status != EBPO_OK)
         fail(c, "open", &error);
-    double *points = query_capacity(queries, 3 * sizeof *points);
+    double *points = query_alloc(queries, 3 * sizeof *points);
     query_make_points(m, queries, 9, points);
     for (uint64_t i = 0; i < queries; i++)
         if (isfinite(points[3 * i]) && isfinite(points[3 * i + 1]) && isfinite(points[3 * i + 2]))

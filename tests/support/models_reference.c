@@ -108,8 +108,8 @@ static int by_x(const void *p, const void *q)
 void reference_faces_make(reference_faces *out, const query_model *m, const ebpo_pose *pose)
 {
     out->count = m->mesh.face_count;
-    out->corner = query_capacity(out->count + 1, sizeof *out->corner);
-    out->order = query_capacity(out->count + 1, sizeof *out->order);
+    out->corner = query_alloc(out->count + 1, sizeof *out->corner);
+    out->order = query_alloc(out->count + 1, sizeof *out->order);
     for (uint64_t i = 0; i < 3 * out->count; i++) {
         double x[3];
         ebpo_test_point(&m->mesh, m->mesh.faces[i], x);
@@ -153,7 +153,7 @@ static bool boxes_intersect(const double a[3][3], const double b[3][3])
 uint64_t reference_pairs(const reference_faces *a, const reference_faces *b, reference_found **out)
 {
     uint64_t count = 0, capacity = 64;
-    *out = query_capacity(capacity, sizeof **out);
+    *out = query_alloc(capacity, sizeof **out);
     for (uint64_t i = 0; i < a->count; i++) {
         const double(*face)[3] = (const double(*)[3])a->corner[i];
         for (uint64_t n = 0; n < b->count; n++) {

@@ -23,7 +23,7 @@
 
 enum { SHOWN = 3 };
 
-void *query_capacity(uint64_t count, size_t size)
+void *query_alloc(uint64_t count, size_t size)
 {
     void *block = calloc(count + 1, size);
     if (!block)
@@ -93,7 +93,7 @@ static void measure(query_model *m)
             m->largest = fmax(m->largest, fabs(p[k]));
         }
     }
-    m->normal = query_capacity(m->mesh.face_count, sizeof *m->normal);
+    m->normal = query_alloc(m->mesh.face_count, sizeof *m->normal);
     for (uint32_t f = 0; f < m->mesh.face_count; f++)
         oracle_normal(m->judge, f, m->normal[f]);
 }
@@ -403,13 +403,13 @@ bool query_one_ray(query_model *m, ebpo_context *context, const query_ray *r)
     return hits_fit(m, r, expected, n, hits, count) && query_sides(m, context, r, expected, n);
 }
 
-void query_one(query_model *m, uint64_t count, uint64_t seed)
+void query_check_points(query_model *m, uint64_t count, uint64_t seed)
 {
     enum { BATCH = 512 };
-    double *points = query_capacity(count, 3 * sizeof *points);
-    query_truth *truth = query_capacity(BATCH, sizeof *truth);
-    ebpo_inside_result *inside = query_capacity(BATCH, sizeof *inside);
-    ebpo_distance_result *distance = query_capacity(BATCH, sizeof *distance);
+    double *points = query_alloc(count, 3 * sizeof *points);
+    query_truth *truth = query_alloc(BATCH, sizeof *truth);
+    ebpo_inside_result *inside = query_alloc(BATCH, sizeof *inside);
+    ebpo_distance_result *distance = query_alloc(BATCH, sizeof *distance);
     ebpo_error error = EBPO_ERROR_INIT;
     uint64_t wrong = 0;
     query_make_points(m, count, seed, points);

@@ -9,7 +9,7 @@
 #include "scratch.h"
 #include "solids.h"
 
-/* For Check tests: `call` may name `error`. */
+/* For Check tests. The macro declares `ebpo_error *error`, which `call` can pass on. */
 #define ASSERT_OK(call)                                                     \
     do {                                                                    \
         ebpo_error error_ = EBPO_ERROR_INIT, *error = &error_;              \
@@ -40,7 +40,7 @@ extern const int query_variant_count;
  * a grid of small integers or anywhere. */
 ebpo_mesh query_random_solid(uint64_t seed, bool on_grid);
 
-/* Returns the options that distance and inside queries share. */
+/* Returns options of inside queries with the level and the deadline of `o`. */
 static inline ebpo_inside_options query_inside_like(const ebpo_distance_options *o)
 {
     ebpo_inside_options inside = EBPO_INSIDE_OPTIONS_INIT;
@@ -69,8 +69,8 @@ typedef struct query_model {
 void query_model_make(query_model *m, const char *name, ebpo_mesh mesh,
                       const query_variant *variant);
 void query_model_free(query_model *m);
-/* Does the same for programs without Check, and for tests of the failure. Returns the library's
- * status. On failure no files or memory remain. */
+/* As query_model_make, but returns the library's status instead of failing the test. On failure no
+ * files or memory remain. */
 ebpo_status query_model_try(query_model *m, const char *name, ebpo_mesh mesh,
                             const query_variant *variant, ebpo_error *error);
 /* Only checks and builds, with one thread; the mesh is consumed. */
@@ -82,8 +82,8 @@ typedef struct query_truth {
     double distance; /* correctly rounded, not signed */
     int32_t winding; /* 0 on a face */
     int32_t where;   /* IN, OUT or ON; a surface: OUT or ON */
-    uint64_t face;   /* source index of the nearest face that is first in the file */
-    uint32_t file_face, ties;
+    uint64_t face;   /* source index of the nearest face; of several, the first in the file */
+    uint32_t file_face, ties; /* its index in the file; number of nearest faces */
 } query_truth;
 void query_find_truths(query_model *m, const double *points, uint64_t count, query_truth *out);
 
@@ -93,7 +93,7 @@ uint64_t query_wrong_inside(const query_model *m, const double *points, const qu
                             uint64_t count, const ebpo_inside_result *got);
 uint64_t query_wrong_distance(const query_model *m, const double *points, const query_truth *truth,
                               uint64_t count, bool is_unsigned, const ebpo_distance_result *got);
-/* Does the same for results limited by a level or a deadline. */
+/* As the two functions above, for results limited by a level or a deadline. */
 uint64_t query_wrong_limited_inside(const query_model *m, const double *points,
                                     const query_truth *truth, uint64_t count,
                                     const ebpo_inside_result *got);
@@ -101,15 +101,15 @@ uint64_t query_wrong_limited_distance(const query_model *m, const double *points
                                       const query_truth *truth, uint64_t count,
                                       const ebpo_distance_result *got);
 
-/* Queries `count` hard points of `seed` in batches, inside and distance; fails the test on a wrong
- * result. */
-void query_one(query_model *m, uint64_t count, uint64_t seed);
+/* Makes `count` hard points from `seed`, runs inside and distance queries of them in batches, and
+ * fails the test on a wrong result. */
+void query_check_points(query_model *m, uint64_t count, uint64_t seed);
 
 /* Returns the index that queries return for a face of the file. */
 uint64_t query_reported(const query_model *m, uint32_t face);
 
-/* Compares a ray's hits, the first one and all, with the oracle; prints a wrong one and returns
- * false. */
+/* Compares the first hit of a ray and all its hits with the oracle. If one is wrong, prints it and
+ * returns false. */
 typedef struct query_ray {
     double origin[3], direction[3], t_max;
 } query_ray;
@@ -121,13 +121,15 @@ uint64_t query_scaled(uint64_t count);
 /* --- points: query_points.c --- */
 
 /* Makes `count` points [3]: vertices, points of edges and faces, cell faces and corners of all
- * levels, mixed coordinates of vertices, midpoints between vertices, near the surface, random,
- * outside, far away; half of them moved by an ulp on some axes. */
+ * levels, points whose coordinates come from different vertices, midpoints between vertices, points
+ * near the surface, random ones, outside and far away. Half of them are moved by an ulp on some
+ * axes. */
 void query_make_points(const query_model *m, uint64_t count, uint64_t seed, double *out);
-/* Makes rays likewise: through vertices, along edges, within faces, between hard points. */
+/* Makes a hard ray: through vertices, along an edge, within a face, or between hard points. */
 void query_make_ray(const query_model *m, uint64_t *state, double origin[3], double direction[3],
                     double *t_max);
 
-void *query_capacity(uint64_t count, size_t size);
+/* Allocates zeroed memory for count + 1 items of `size` bytes, or aborts. */
+void *query_alloc(uint64_t count, size_t size);
 
 #endif

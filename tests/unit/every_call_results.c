@@ -35,7 +35,7 @@ static bool count_faces(void *user, const ebpo_near_face *face)
     return true;
 }
 
-static ebpo_status query_one(ebpo_context *context, ebpo_error *error)
+static ebpo_status query_check_points(ebpo_context *context, ebpo_error *error)
 {
     static const double point[3] = { 3, 0.1, 0.2 };
     ebpo_inside_result inside;
@@ -101,7 +101,7 @@ static ebpo_status query_all(ebpo_model *model, ebpo_error *error)
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
     ebpo_status status = ebpo_context_new(model, &context, error);
     if (status == EBPO_OK)
-        status = query_one(context, error);
+        status = query_check_points(context, error);
     if (status == EBPO_OK)
         status = query_many(context, error);
     if (status == EBPO_OK)

@@ -243,7 +243,7 @@ static void some_route(ebpo_scene_route *route, uint64_t *state, int keys)
     for (int i = 0; i < keys; i++) {
         ebpo_route_key key = { .time = i, .scale = 1 + 0.5 * fabs(some(state, 1)) };
         for (int k = 0; k < 4; k++)
-            key.turn[k] = some(state, 1) + (k == 3 ? 1e-3 : 0);
+            key.quaternion[k] = some(state, 1) + (k == 3 ? 1e-3 : 0);
         for (int k = 0; k < 3; k++)
             key.translation[k] = some(state, 3);
         fine(ebpo_scene_add_key(route, &key, &error));
@@ -270,7 +270,7 @@ START_TEST(test_scene_route_turns_evenly)
         if (u >= 1)
             continue;
         ebpo_scene_route_at(&route, i + u, &p);
-        sine_reference(route.keys[i].turn, route.keys[i + 1].turn, (i + u) - i, q);
+        sine_reference(route.keys[i].quaternion, route.keys[i + 1].quaternion, (i + u) - i, q);
         double reference[3][3] = {
             { 1 - 2 * (q[1] * q[1] + q[2] * q[2]), 2 * (q[0] * q[1] - q[2] * q[3]),
               2 * (q[0] * q[2] + q[1] * q[3]) },
@@ -296,7 +296,7 @@ START_TEST(test_scene_matrix_to_quaternion)
         ebpo_scene_route one = { 0 };
         ebpo_route_key key = { .scale = 1 };
         ebpo_scene_route_at(&route, i, &p);
-        ebpo_scene_turn_of_matrix((const double(*)[3])p.rotation, key.turn);
+        ebpo_scene_quaternion_of_matrix((const double(*)[3])p.rotation, key.quaternion);
         fine(ebpo_scene_add_key(&one, &key, &error));
         ebpo_scene_route_at(&one, 0, &again);
         for (int k = 0; k < 9; k++)

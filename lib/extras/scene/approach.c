@@ -3,11 +3,11 @@
  *
  * Both searches evaluate the distance at some times, and use one bound: the distance of two
  * instances changes by at most their motion. The first search goes from one evaluation to the next.
- * The motion in between is shorter than the gap to the clearance, so no contact is missed. The
- * second search keeps parts of the interval in a heap by the least distance that each part allows.
- * It halves the first part until the result is within the tolerance. Jumps of routes are ends of
- * parts. A result is a pair of guaranteed bounds. A search that needs too many evaluations returns
- * its current bounds.
+ * The motion in between is shorter than the distance minus the clearance, so no contact is missed.
+ * The second search divides the interval into parts, and keeps them in a heap, ordered by a lower
+ * bound of the distance in each part. It halves the first part until the result is within the
+ * tolerance. Routes jump only at ends of parts. A result is a pair of guaranteed bounds. A search
+ * that needs too many evaluations returns its current bounds.
  *
  * Source: docs/guide/scenes.md. */
 #include "core/strict_fp.h"
@@ -21,15 +21,17 @@
 #include "core/sort.h"
 #include "extras/scene/instance_pair.h"
 
-typedef struct travel {
+/* The search for the first approach of each pair. */
+typedef struct approach_search {
     const ebpo_scene *scene;
     ebpo_scene_approach_options how;
     double from, to;
-} travel;
+} approach_search;
 
-/* Returns the time of the next evaluation: until then the motion is shorter than `gap`. Returns
- * w->time if no later time is possible. */
-static ebpo_status next_evaluation(const travel *t, const ebpo_scene_evaluations *evaluations,
+/* Sets *next to the time of the next evaluation: from w->time until then, the motion is shorter
+ * than `gap`. *next is w->time if no later time is possible. */
+static ebpo_status next_evaluation(const approach_search *t,
+                                   const ebpo_scene_evaluations *evaluations,
                                    const ebpo_scene_approach_result *w, double gap, double *next,
                                    ebpo_error *error)
 {
@@ -52,8 +54,8 @@ static ebpo_status next_evaluation(const travel *t, const ebpo_scene_evaluations
     return status;
 }
 
-/* Moves past a jump. *next stays unchanged if there is no jump; then the bound of rounding exceeds
- * the gap even for the shortest time. */
+/* Sets *next to the next representable time if the pair jumps there. Otherwise *next stays
+ * unchanged: the bound of rounding exceeds the gap even for the shortest time. */
 static ebpo_status move_past_jump(const ebpo_scene_evaluations *evaluations,
                                   const ebpo_scene_approach_result *w, double *next,
                                   ebpo_error *error)
@@ -65,23 +67,25 @@ static ebpo_status move_past_jump(const ebpo_scene_evaluations *evaluations,
     return status;
 }
 
-static bool is_reached(const travel *t, const ebpo_scene_approach_result *w)
+static bool is_reached(const approach_search *t, const ebpo_scene_approach_result *w)
 {
     return ebpo_scene_is_within(w->hi, w->clearance, t->how.tolerance);
 }
 
-static ebpo_status approach_evaluate(const travel *t, ebpo_scene_evaluations *evaluations,
+static ebpo_status approach_evaluate(const approach_search *t, ebpo_scene_evaluations *evaluations,
                                      ebpo_scene_approach_result *w, ebpo_error *error)
 {
     ebpo_status status = ebpo_scene_evaluate(evaluations, w->time, &w->lo, &w->hi, error);
     w->evaluations++;
     if (status != EBPO_OK || is_reached(t, w) || evaluations->gap > w->clearance)
         return status;
-    return ebpo_scene_lacks(t->scene, evaluations->pair, evaluations->lacking, w->time, false,
-                            error);
+    return ebpo_scene_fail_omitted(t->scene, evaluations->pair, evaluations->lacking, w->time,
+                                   false, error);
 }
 
-static ebpo_status follow_pair(const travel *t, ebpo_scene_evaluations *evaluations,
+/* Goes from evaluation to evaluation, until the pair is reached, the time ends, or the search must
+ * be given up. */
+static ebpo_status follow_pair(const approach_search *t, ebpo_scene_evaluations *evaluations,
                                ebpo_scene_approach_result *w, ebpo_error *error)
 {
     for (;;) {
@@ -108,7 +112,7 @@ static ebpo_status follow_pair(const travel *t, ebpo_scene_evaluations *evaluati
 static ebpo_status find_approach(const void *how, const ebpo_scene_pair *pair, void *result,
                                  ebpo_error *error)
 {
-    const travel *t = how;
+    const approach_search *t = how;
     ebpo_scene_approach_result *approach = result;
     ebpo_scene_evaluations evaluations;
     *approach = (ebpo_scene_approach_result){
@@ -127,7 +131,9 @@ ebpo_status ebpo_scene_approach(ebpo_scene *scene, double from, double to,
                                 ebpo_scene_approaches_fn take, void *user, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    travel t = { .scene = scene, .how = EBPO_SCENE_APPROACH_OPTIONS_INIT, .from = from, .to = to };
+    approach_search t = {
+        .scene = scene, .how = EBPO_SCENE_APPROACH_OPTIONS_INIT, .from = from, .to = to
+    };
     void *approaches = NULL;
     uint64_t count = 0;
     ebpo_status status = ebpo_scene_take_approach_options(&t.how, options, error);
@@ -155,28 +161,28 @@ typedef struct least_search {
 } least_search;
 
 /* A part of the interval of time; no route jumps inside it. */
-typedef struct part {
+typedef struct time_part {
     double from, to;
     double at_from, at_to; /* lower bounds of the distance at both ends */
-    double motion;         /* bound of the motion of both instances */
+    double motion;         /* bound of the change of the distance in the part */
     double least;          /* lower bound of the distance in the part */
-} part;
+} time_part;
 
 typedef struct part_search {
     ebpo_scene_evaluations evaluations;
     ebpo_scene_least *out;
-    double limit; /* least bound by omitted faces so far; the lower bound of the result cannot
-                   * exceed it */
-    EBPO_SCENE_LIST(part, parts); /* a heap: the part with the least `least` first */
+    double limit; /* least lower bound that omitted faces gave so far: the lower bound of the
+                   * result cannot exceed it. INFINITY: none */
+    EBPO_SCENE_LIST(time_part, parts); /* a heap: the part with the least `least` first */
 } part_search;
 
 /* --- parts --- */
 
-static bool is_less(const part *a, const part *b) { return a->least < b->least; }
+static bool is_less(const time_part *a, const time_part *b) { return a->least < b->least; }
 
-EBPO_HEAP(heap, part, is_less)
+EBPO_HEAP(heap, time_part, is_less)
 
-static ebpo_status put_part(part_search *s, const part *p, ebpo_error *error)
+static ebpo_status put_part(part_search *s, const time_part *p, ebpo_error *error)
 {
     uint64_t count = s->parts_count;
     if (!ebpo_grow(&s->parts, &s->parts_capacity, count + 1, sizeof *s->parts))
@@ -187,6 +193,7 @@ static ebpo_status put_part(part_search *s, const part *p, ebpo_error *error)
 
 /* --- evaluations --- */
 
+/* Evaluates the distance at a time, sets *lo, and updates the upper bound of the result. */
 static ebpo_status least_distance_evaluate(part_search *s, double time, double *lo,
                                            ebpo_error *error)
 {
@@ -202,9 +209,9 @@ static ebpo_status least_distance_evaluate(part_search *s, double time, double *
     return status;
 }
 
-/* Adds a part. Between its ends the distance may be less than at the ends, by up to half of the
- * rest of the motion. */
-static ebpo_status add_part(part_search *s, part p, ebpo_error *error)
+/* Adds a part. Going from one end to the other, the distance changes by at most p.motion in total,
+ * so between the ends it is at least (at_from + at_to - motion) / 2. */
+static ebpo_status add_part(part_search *s, time_part p, ebpo_error *error)
 {
     ebpo_status status =
         ebpo_scene_evaluations_motion(&s->evaluations, p.from, p.to, &p.motion, error);
@@ -215,15 +222,15 @@ static ebpo_status add_part(part_search *s, part p, ebpo_error *error)
     return put_part(s, &p, error);
 }
 
-static ebpo_status least_distance_halve(part_search *s, const part *p, double middle,
+static ebpo_status least_distance_halve(part_search *s, const time_part *p, double middle,
                                         ebpo_error *error)
 {
     double at_middle;
     ebpo_status status = least_distance_evaluate(s, middle, &at_middle, error);
     if (status == EBPO_OK)
-        status = add_part(s, (part){ p->from, middle, p->at_from, at_middle, 0, 0 }, error);
+        status = add_part(s, (time_part){ p->from, middle, p->at_from, at_middle, 0, 0 }, error);
     return status == EBPO_OK
-               ? add_part(s, (part){ middle, p->to, at_middle, p->at_to, 0, 0 }, error)
+               ? add_part(s, (time_part){ middle, p->to, at_middle, p->at_to, 0, 0 }, error)
                : status;
 }
 
@@ -231,7 +238,7 @@ static ebpo_status least_distance_halve(part_search *s, const part *p, double mi
  * their pair does not jump. */
 static double next_jump(const part_search *s, double from, double to)
 {
-    return s->evaluations.rides
+    return s->evaluations.shares_route
                ? to
                : ebpo_scene_pair_next(s->evaluations.scene, s->evaluations.pair, from, to);
 }
@@ -242,7 +249,7 @@ static ebpo_status begin_parts(part_search *s, double from, double to, ebpo_erro
     ebpo_status status = EBPO_OK;
     for (double at = from; status == EBPO_OK;) {
         double next = next_jump(s, at, to), end = next > at ? nextafter(next, -INFINITY) : at;
-        part p = { .from = at, .to = end };
+        time_part p = { .from = at, .to = end };
         status = least_distance_evaluate(s, at, &p.at_from, error);
         p.at_to = p.at_from;
         if (status == EBPO_OK && end > at)
@@ -256,18 +263,22 @@ static ebpo_status begin_parts(part_search *s, double from, double to, ebpo_erro
     return status;
 }
 
-/* Returns true if the bound of the first part is good enough, or cannot be improved. */
-static bool is_done(const part_search *s, const part *p, double middle, const least_search *how)
+/* Returns true if the lower bound of the first part is within the tolerance or cannot be improved:
+ * omitted faces limit it, evaluations are used up, or the part is too short. */
+static bool is_done(const part_search *s, const time_part *p, double middle,
+                    const least_search *how)
 {
-    double hi = s->out->hi, open = hi - s->limit; /* below 0: no omitted face matters */
+    double hi = s->out->hi;
+    double open = hi - s->limit; /* the part of hi - lo that omitted faces leave; <= 0: none */
     return ebpo_scene_is_within(hi, p->least, how->tolerance) || s->limit - p->least <= open / 8 ||
            s->out->evaluations >= how->max_evaluations || p->motion <= how->tolerance / 8 ||
            !(middle > p->from && middle < p->to);
 }
 
-/* Returns true if nearly all of the part's motion is rounding, which does not shrink with the part.
- */
-static ebpo_status is_rounding(const part_search *s, const part *p, bool *out, ebpo_error *error)
+/* Sets *out to true if at least half of the part's motion is a bound of rounding, which does not
+ * shrink when the part is halved. */
+static ebpo_status is_rounding(const part_search *s, const time_part *p, bool *out,
+                               ebpo_error *error)
 {
     double least = 0;
     ebpo_status status = ebpo_scene_evaluations_motion(&s->evaluations, p->from,
@@ -276,11 +287,12 @@ static ebpo_status is_rounding(const part_search *s, const part *p, bool *out, e
     return status;
 }
 
+/* Halves the first part of the heap until its lower bound is good enough. */
 static ebpo_status least_distance_narrow(part_search *s, const least_search *how, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     while (status == EBPO_OK) {
-        part p = heap_take(s->parts, s->parts_count--);
+        time_part p = heap_take(s->parts, s->parts_count--);
         double middle = p.from + (p.to - p.from) / 2;
         s->out->lo = fmin(p.least, s->out->hi);
         bool done = is_done(s, &p, middle, how);

@@ -26,10 +26,10 @@
 
 /* Two instances at their poses. */
 typedef struct scene_two {
-    const ebpo_scene_clash_options *how;
+    const ebpo_scene_clash_options *how; /* requested results */
     ebpo_collider *collider;
-    const ebpo_collide_options *options;
-    bool solid[2];
+    const ebpo_collide_options *options; /* poses */
+    bool solid[2];                       /* the model is a solid, not a surface */
 } scene_two;
 
 /* Marks all results as unknown. */
@@ -43,8 +43,7 @@ static void clear_results(ebpo_scene_clash *m)
     m->depth[0] = m->depth[1] = unknown;
 }
 
-/* Widens the box of locations by a point. If one of two values is NAN, the result is the other one.
- */
+/* Widens the box of locations by a point. A box that is still NAN becomes the point. */
 static void widen_location_box(ebpo_scene_clash *m, const double p[3])
 {
     for (int k = 0; k < 3; k++) {
@@ -61,13 +60,12 @@ static void set_location(ebpo_scene_clash *m, const double location[3])
 
 /* --- all pairs --- */
 
-/* Counts pairs of faces by kind, and keeps the first one by numbers. Stops at the first crossing
- * pair if the options need no more. */
+/* Counts pairs of faces by kind, and keeps the pair with the least indices. */
 typedef struct tally {
     ebpo_scene_clash *m;
     ebpo_pair_faces *faces; /* for finding locations; NULL: not requested */
     ebpo_face_pair first;
-    bool enough;
+    bool kind_only;    /* the first crossing pair is enough: stop there, and keep `first` */
     ebpo_error *error; /* error of `status` */
     ebpo_status status;
 } tally;
@@ -97,9 +95,9 @@ static bool count_faces(void *user, const ebpo_face_pair *pairs, uint64_t count)
         t->m->touching += pairs[i].kind == EBPO_PAIR_TOUCHING;
         t->m->crossing += pairs[i].kind == EBPO_PAIR_CROSSING;
         t->m->coplanar += pairs[i].kind == EBPO_PAIR_COPLANAR;
-        if (t->enough && t->m->crossing)
+        if (t->kind_only && t->m->crossing)
             return false;
-        if (!t->enough && comes_first(&pairs[i], &t->first))
+        if (!t->kind_only && comes_first(&pairs[i], &t->first))
             t->first = pairs[i];
         if (t->faces && pairs[i].kind == EBPO_PAIR_CROSSING && !note_segment(t, &pairs[i]))
             return false;
@@ -114,8 +112,8 @@ static bool count_lines(void *user, const ebpo_polyline *line)
     return true;
 }
 
-/* Sets the lines of contact. If the collider's memory for segments does not suffice, the report has
- * no lines, but does not fail; other errors are failures. */
+/* Sets the number of lines of contact; UINT64_MAX: the collider's memory for segments does not
+ * suffice to count them. */
 static ebpo_status report_lines(const scene_two *two, ebpo_scene_clash *m, ebpo_error *error)
 {
     if (m->crossing > ebpo_contact_lines_max(two->collider)) {
@@ -127,8 +125,8 @@ static ebpo_status report_lines(const scene_two *two, ebpo_scene_clash *m, ebpo_
 
 /* --- locations --- */
 
-/* Returns a point of both faces: an end of their common segment, or a point of their nearest
- * features. */
+/* Computes a common point of two faces: an end of their common segment if they cross, otherwise a
+ * nearest point. */
 static ebpo_status common_point(ebpo_pair_faces *of, const ebpo_face_pair *pair, double out[3],
                                 ebpo_error *error)
 {
@@ -150,8 +148,8 @@ static ebpo_status common_point(ebpo_pair_faces *of, const ebpo_face_pair *pair,
     return EBPO_OK;
 }
 
-/* Finds a location of contact. The distance query of intersecting models begins with their first
- * contact and returns a point of it; this needs no table of all faces. */
+/* Finds a location of contact by a distance query: if models intersect, it returns a point of the
+ * first contact that it finds. This needs no table of all faces. */
 static ebpo_status locate_first(const scene_two *two, ebpo_scene_clash *m, ebpo_error *error)
 {
     ebpo_clearance found;
@@ -177,7 +175,8 @@ static void scene_report_nearest(const scene_two *two, const ebpo_clearance *nea
 
 /* --- intersecting faces --- */
 
-/* Counts pairs of faces. `faces`: NULL, or for finding locations. */
+/* Counts all pairs of intersecting faces and the lines of contact. `faces`: for finding locations;
+ * NULL: not requested. `first`: a pair that intersects. */
 static ebpo_status count_all(const scene_two *two, ebpo_pair_faces *faces,
                              const ebpo_face_pair *first, ebpo_scene_clash *m, ebpo_error *error)
 {
@@ -211,6 +210,7 @@ static ebpo_status count_with_location(const scene_two *two, const ebpo_face_pai
     return status;
 }
 
+/* Searches for a crossing pair of faces only, which decides the kind. */
 static ebpo_status find_kind(const scene_two *two, const ebpo_face_pair *first, ebpo_scene_clash *m,
                              ebpo_error *error)
 {
@@ -233,8 +233,8 @@ static ebpo_status scene_report_contacts(const scene_two *two, const ebpo_face_p
     return status == EBPO_OK && two->how->locations ? locate_first(two, m, error) : status;
 }
 
-/* Returns true if a point of one model is inside the other. Otherwise the depth is 0, and is not
- * searched: for faces that are on each other the search would take long. */
+/* Returns true if a point of one model is inside the other. Otherwise the depth is 0, and no search
+ * is necessary, which would take long for faces that overlap in one plane. */
 static bool is_any_inner(int32_t relation)
 {
     return relation == EBPO_INTERSECTING || relation == EBPO_A_INSIDE_B ||
@@ -305,7 +305,9 @@ static ebpo_status query_relation(const scene_two *two, ebpo_scene_clash *m, ebp
     return status;
 }
 
-static ebpo_status query_apart(const scene_two *two, ebpo_scene_clash *m, ebpo_error *error)
+/* Sets the results of a pair whose faces do not intersect. */
+static ebpo_status query_disjoint_faces(const scene_two *two, ebpo_scene_clash *m,
+                                        ebpo_error *error)
 {
     ebpo_clearance found;
     ebpo_status status = two->how->relate ? query_relation(two, m, error) : EBPO_OK;
@@ -329,7 +331,7 @@ static ebpo_status query_faces(const scene_two *two, ebpo_scene_clash *m, ebpo_e
     if (status != EBPO_OK)
         return status;
     if (found <= 0)
-        return query_apart(two, m, error);
+        return query_disjoint_faces(two, m, error);
     status = scene_report_contacts(two, &first, m, error);
     m->kind = kind_of(m);
     if (status == EBPO_OK && two->how->relate)
@@ -339,14 +341,14 @@ static ebpo_status query_faces(const scene_two *two, ebpo_scene_clash *m, ebpo_e
 
 /* Checks that parts omitted from a file do not matter. If one instance is inside a solid, any face
  * may matter. */
-static ebpo_status check_omitted(const clash_query *a, const ebpo_scene_pair *pair,
-                                 ebpo_error *error)
+static ebpo_status check_omitted_faces(const clash_query *a, const ebpo_scene_pair *pair,
+                                       ebpo_error *error)
 {
     double gap = INFINITY;
     uint64_t lacking = 0;
     ebpo_status status = ebpo_scene_omitted(a->scene, pair, a->time, &gap, &lacking, error);
     if (status == EBPO_OK && (!(gap > pair->clearance) || (a->how.relate && gap < INFINITY)))
-        status = ebpo_scene_lacks(a->scene, pair, lacking, a->time, a->how.relate, error);
+        status = ebpo_scene_fail_omitted(a->scene, pair, lacking, a->time, a->how.relate, error);
     return status;
 }
 
@@ -366,7 +368,7 @@ static ebpo_status query_pair(const void *how, const ebpo_scene_pair *pair, void
     clear_results(m);
     ebpo_status status = ebpo_scene_pose_pair(a->scene, pair, a->time, &options, error);
     if (status == EBPO_OK)
-        status = check_omitted(a, pair, error);
+        status = check_omitted_faces(a, pair, error);
     if (status == EBPO_OK)
         status = ebpo_scene_collider(a->scene, pair, 1, &collider, error);
     scene_two two = {
@@ -378,7 +380,8 @@ static ebpo_status query_pair(const void *how, const ebpo_scene_pair *pair, void
     return status;
 }
 
-static void clashes_give(ebpo_scene_clash *clashes, uint64_t count, ebpo_scene_clashes_fn take,
+/* Passes the clashes to the caller, without pairs of kind EBPO_CLASH_NONE. */
+static void pass_clashes(ebpo_scene_clash *clashes, uint64_t count, ebpo_scene_clashes_fn take,
                          void *user)
 {
     uint64_t kept = 0;
@@ -412,7 +415,7 @@ ebpo_status ebpo_scene_find_clashes(ebpo_scene *scene, double time,
     if (status == EBPO_OK)
         status = ebpo_scene_find_in_pairs(scene, time, time, &search, &clashes, &count, error);
     if (status == EBPO_OK)
-        clashes_give(clashes, count, take, user);
+        pass_clashes(clashes, count, take, user);
     if (tested)
         *tested = count;
     free(clashes);
@@ -431,7 +434,7 @@ ebpo_status ebpo_scene_collide(ebpo_scene *scene, uint64_t a, uint64_t b, double
     if (status == EBPO_OK)
         status = ebpo_scene_make_models(scene, &pair, 1, error);
     if (status == EBPO_OK)
-        status = check_omitted(&one, &pair, error);
+        status = check_omitted_faces(&one, &pair, error);
     if (status == EBPO_OK)
         status = ebpo_scene_collider(scene, &pair, threads, &collider, error);
     if (status == EBPO_OK && collider)

@@ -1,9 +1,9 @@
-/* Two instances of a scene at a time: the position of one in the other's coordinates, their
- * relative motion, their distance, and the relevant parts that their files omit.
+/* Two instances of a scene at a time: the box of one in the other's coordinates, bounds of their
+ * relative motion and of their distance, and the faces that their files omit.
  *
  * Boxes and lengths are rounded outwards, so that every bound is certain in spite of rounding. A
- * file that is a subset has only the faces of its kept box: up to six boxes around the kept box
- * bound the omitted part. Two instances that follow one route have no relative motion except by
+ * file that is a subset has only the faces in its kept box; up to six boxes around the kept box
+ * contain the omitted faces. Two instances that follow one route have no relative motion except by
  * rounding and scale.
  *
  * ebpo_scene_find_in_pairs evaluates a list of pairs on all cores. Each pair has a separate
@@ -21,10 +21,10 @@
 #include "extras/scene/instance_pair.h"
 #include "geometry/pose.h"
 
-/* relative margin for sums of a few products: far above their rounding */
+/* Relative margin for sums of a few products: far above their rounding. */
 static const double slack = 0x1p-44;
 
-static const ebpo_scene_model_entry *omitted_model_of(const ebpo_scene *scene, uint64_t instance)
+static const ebpo_scene_model_entry *model_of_instance(const ebpo_scene *scene, uint64_t instance)
 {
     return &scene->models[scene->instances[instance].as.model];
 }
@@ -32,7 +32,7 @@ static const ebpo_scene_model_entry *omitted_model_of(const ebpo_scene *scene, u
 static ebpo_status posing_of(const ebpo_scene *scene, uint64_t instance, double time,
                              ebpo_posing *out, ebpo_error *error)
 {
-    const ebpo_scene_model_entry *m = omitted_model_of(scene, instance);
+    const ebpo_scene_model_entry *m = model_of_instance(scene, instance);
     double reach[3];
     ebpo_pose pose;
     for (int k = 0; k < 3; k++)
@@ -41,10 +41,11 @@ static ebpo_status posing_of(const ebpo_scene *scene, uint64_t instance, double 
     return status == EBPO_OK ? ebpo_posing_make(out, &pose, reach, error) : status;
 }
 
-/* The box of a model in the world: its centre, and a vector of half its size along each of its
- * axes. */
+/* The box of a model in the world. */
 typedef struct posed_box {
-    double middle[3], half[3][3], size;
+    double middle[3];  /* its centre */
+    double half[3][3]; /* [axis of the box] vector from the centre to the middle of a side */
+    double size;       /* sum of the terms of the coordinates, for bounds of rounding */
 } posed_box;
 
 static void pose_box(const ebpo_posing *p, const ebpo_scene_model_entry *m, posed_box *out)
@@ -64,10 +65,11 @@ static void pose_box(const ebpo_posing *p, const ebpo_scene_model_entry *m, pose
     }
 }
 
-ebpo_status ebpo_scene_seen_from(const ebpo_scene *scene, uint64_t of, uint64_t other, double time,
-                                 ebpo_scene_seen *out, ebpo_error *error)
+ebpo_status ebpo_scene_make_relative_box(const ebpo_scene *scene, uint64_t of, uint64_t other,
+                                         double time, ebpo_scene_relative_box *out,
+                                         ebpo_error *error)
 {
-    const ebpo_scene_model_entry *m = omitted_model_of(scene, of);
+    const ebpo_scene_model_entry *m = model_of_instance(scene, of);
     ebpo_posing from, at;
     posed_box b;
     ebpo_status status = posing_of(scene, of, time, &from, error);
@@ -75,7 +77,7 @@ ebpo_status ebpo_scene_seen_from(const ebpo_scene *scene, uint64_t of, uint64_t 
         status = posing_of(scene, other, time, &at, error);
     if (status != EBPO_OK)
         return status;
-    pose_box(&at, omitted_model_of(scene, other), &b);
+    pose_box(&at, model_of_instance(scene, other), &b);
     double scale = from.scale, sizes = b.size, reach = 0;
     for (int i = 0; i < 3; i++) {
         sizes += fabs(from.translation[i]);
@@ -102,7 +104,7 @@ ebpo_status ebpo_scene_seen_from(const ebpo_scene *scene, uint64_t of, uint64_t 
     return EBPO_OK;
 }
 
-double ebpo_scene_space_gap(const ebpo_scene_space *a, const ebpo_scene_space *b)
+double ebpo_scene_bounds_gap(const ebpo_scene_bounds *a, const ebpo_scene_bounds *b)
 {
     double apart[3];
     for (int k = 0; k < 3; k++)
@@ -110,9 +112,9 @@ double ebpo_scene_space_gap(const ebpo_scene_space *a, const ebpo_scene_space *b
     return ebpo_scene_length_above(apart) * (1 - 8 * slack);
 }
 
-/* Computes the part of a model's box whose faces are in its file. Returns false if the file has all
- * faces. */
-static bool held_box(const ebpo_scene *scene, uint64_t instance, ebpo_scene_space *out)
+/* Computes the box of the faces that are in a model's file; empty: no faces are certain to be
+ * there. Returns false if the file has all faces. */
+static bool held_box(const ebpo_scene *scene, uint64_t instance, ebpo_scene_bounds *out)
 {
     const ebpo_info *info =
         ebpo_file_info(ebpo_scene_file(scene, scene->instances[instance].as.model));
@@ -127,37 +129,38 @@ static bool held_box(const ebpo_scene *scene, uint64_t instance, ebpo_scene_spac
     return true;
 }
 
-/* Returns the distance of `other` from the part of the box `all` that is outside `held`. This part
- * consists of up to six boxes on the sides of `held`. */
-static double gap_around(const ebpo_scene_space *all, const ebpo_scene_space *held,
-                         const ebpo_scene_space *other)
+/* Returns a lower bound of the distance of `other` from the part of the box `all` that is outside
+ * the box `held`. This part consists of up to six boxes on the sides of `held`. */
+static double gap_around(const ebpo_scene_bounds *all, const ebpo_scene_bounds *held,
+                         const ebpo_scene_bounds *other)
 {
     double gap = INFINITY;
     for (int k = 0; k < 3; k++) {
-        ebpo_scene_space side = *all;
+        ebpo_scene_bounds side = *all;
         side.max[k] = fmin(held->min[k], all->max[k]);
         if (all->min[k] < held->min[k])
-            gap = fmin(gap, ebpo_scene_space_gap(&side, other));
+            gap = fmin(gap, ebpo_scene_bounds_gap(&side, other));
         side = *all;
         side.min[k] = fmax(held->max[k], all->min[k]);
         if (all->max[k] > held->max[k])
-            gap = fmin(gap, ebpo_scene_space_gap(&side, other));
+            gap = fmin(gap, ebpo_scene_bounds_gap(&side, other));
     }
     return gap;
 }
 
+/* Sets *gap to a lower bound of the distance of omitted faces of `of` from `other`. */
 static ebpo_status omitted_of(const ebpo_scene *scene, uint64_t of, uint64_t other, double time,
                               double *gap, ebpo_error *error)
 {
-    const ebpo_scene_model_entry *m = omitted_model_of(scene, of);
-    ebpo_scene_space held, all;
-    ebpo_scene_seen seen;
+    const ebpo_scene_model_entry *m = model_of_instance(scene, of);
+    ebpo_scene_bounds held, all;
+    ebpo_scene_relative_box seen;
     *gap = INFINITY;
     if (!held_box(scene, of, &held))
         return EBPO_OK;
     memcpy(all.min, m->min, sizeof all.min);
     memcpy(all.max, m->max, sizeof all.max);
-    ebpo_status status = ebpo_scene_seen_from(scene, of, other, time, &seen, error);
+    ebpo_status status = ebpo_scene_make_relative_box(scene, of, other, time, &seen, error);
     if (status == EBPO_OK)
         *gap = gap_around(&all, &held, &seen.box) * seen.unit;
     return status;
@@ -177,10 +180,10 @@ ebpo_status ebpo_scene_omitted(const ebpo_scene *scene, const ebpo_scene_pair *p
     return EBPO_OK;
 }
 
-ebpo_status ebpo_scene_lacks(const ebpo_scene *scene, const ebpo_scene_pair *pair, uint64_t lacking,
-                             double time, bool solids, ebpo_error *error)
+ebpo_status ebpo_scene_fail_omitted(const ebpo_scene *scene, const ebpo_scene_pair *pair,
+                                    uint64_t lacking, double time, bool solids, ebpo_error *error)
 {
-    const ebpo_scene_model_entry *m = omitted_model_of(scene, lacking);
+    const ebpo_scene_model_entry *m = model_of_instance(scene, lacking);
     return ebpo_fail(
         error, EBPO_E_ABSENT,
         "instances '%.80s' and '%.80s' at time %.9g: the file of model '%.80s' is a subset or "
@@ -206,8 +209,8 @@ static bool follows_one_route(const ebpo_scene *scene, const ebpo_scene_pair *pa
                       memcmp(a->keys, b->keys, a->count * sizeof *a->keys) == 0);
 }
 
-/* Returns the order of magnitude of the change of the pair's distance by rounding on its routes; 0:
- * neither instance moves. */
+/* Returns a bound of the change of the pair's distance that rounding of its routes causes; 0:
+ * neither instance has a route. */
 static double pair_rounding(const ebpo_scene *scene, const ebpo_scene_pair *pair)
 {
     double sum = 0;
@@ -235,9 +238,10 @@ static double motion_on_one_route(const ebpo_scene *scene, const ebpo_scene_pair
 }
 
 /* Sets *out to a bound of the change of the pair's distance between two times; INFINITY over a
- * jump. rides: result of follows_one_route. */
-static ebpo_status pair_motion(const ebpo_scene *scene, const ebpo_scene_pair *pair, bool rides,
-                               double from, double to, double *out, ebpo_error *error)
+ * jump. shares_route: result of follows_one_route. */
+static ebpo_status pair_motion(const ebpo_scene *scene, const ebpo_scene_pair *pair,
+                               bool shares_route, double from, double to, double *out,
+                               ebpo_error *error)
 {
     double a, b;
     ebpo_status status = ebpo_scene_motion(scene, pair->a, from, to, &a, error);
@@ -246,7 +250,7 @@ static ebpo_status pair_motion(const ebpo_scene *scene, const ebpo_scene_pair *p
     if (status != EBPO_OK)
         return status;
     *out = (a + b) * (1 + 0x1p-50);
-    if (rides && from < to)
+    if (shares_route && from < to)
         *out = fmin(*out, motion_on_one_route(scene, pair, from, to));
     return EBPO_OK;
 }
@@ -312,16 +316,16 @@ static ebpo_status list_pairs(ebpo_scene *scene, double from, double to, ebpo_sc
     return status;
 }
 
-typedef struct pair_finds {
+typedef struct pair_results {
     const ebpo_scene_search *search;
     const ebpo_scene_pair *pairs;
     char *results;
-} pair_finds;
+} pair_results;
 
-static ebpo_status find_some(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                             ebpo_error *error)
+static ebpo_status find_in_range(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                 ebpo_error *error)
 {
-    const pair_finds *f = context;
+    const pair_results *f = context;
     const ebpo_scene_search *s = f->search;
     ebpo_status status = EBPO_OK;
     (void)worker;
@@ -340,11 +344,11 @@ ebpo_status ebpo_scene_find_in_pairs(ebpo_scene *scene, double from, double to,
     *results = ebpo_alloc(list.count, search->result_size);
     if (status == EBPO_OK && !*results)
         status = ebpo_fail_memory(error, list.count * search->result_size);
-    pair_finds finds = { search, list.pairs, *results };
+    pair_results finds = { search, list.pairs, *results };
     if (status == EBPO_OK)
         status =
             ebpo_parallel_for(ebpo_thread_count(search->threads), NULL, list.count, search->grain,
-                              find_some, &finds, search->progress, search->stage, error);
+                              find_in_range, &finds, search->progress, search->stage, error);
     free(list.pairs);
     return status;
 }
@@ -379,7 +383,8 @@ ebpo_status ebpo_scene_pose_pair(const ebpo_scene *scene, const ebpo_scene_pair 
     return status == EBPO_OK ? ebpo_scene_pose(scene, pair->b, time, &out->pose_b, error) : status;
 }
 
-/* Bounds the distance. Without a collider, no faces in the files can be near. */
+/* Bounds the distance of the faces in both files at a time. Without a collider, one of the files
+ * has no faces: both bounds are INFINITY. */
 static ebpo_status query_distance(ebpo_scene_evaluations *l, double time, double *lo, double *hi,
                                   ebpo_error *error)
 {
@@ -415,14 +420,14 @@ ebpo_status ebpo_scene_evaluations_begin(ebpo_scene_evaluations *l, const ebpo_s
     *l = (ebpo_scene_evaluations){ .scene = scene, .pair = pair, .tolerance = tolerance / 4 };
     /* a smaller tolerance would take long, and the additional digits change with every pose */
     l->tolerance = fmax(l->tolerance, pair_rounding(scene, pair) / 16);
-    l->rides = follows_one_route(scene, pair);
+    l->shares_route = follows_one_route(scene, pair);
     return ebpo_scene_collider(scene, pair, 1, &l->collider, error);
 }
 
 ebpo_status ebpo_scene_evaluations_motion(const ebpo_scene_evaluations *l, double from, double to,
                                           double *out, ebpo_error *error)
 {
-    return pair_motion(l->scene, l->pair, l->rides, from, to, out, error);
+    return pair_motion(l->scene, l->pair, l->shares_route, from, to, out, error);
 }
 
 bool ebpo_scene_is_within(double hi, double lo, double tolerance)

@@ -7,37 +7,38 @@
 
 #include "extras/scene/scene_parts.h"
 
-typedef struct ebpo_scene_space {
+typedef struct ebpo_scene_bounds {
     double min[3], max[3];
-} ebpo_scene_space;
+} ebpo_scene_bounds;
 
-/* One instance in another's coordinates. */
-typedef struct ebpo_scene_seen {
-    ebpo_scene_space box;
-    double rounding; /* widening of the box for rounding */
-    double unit;     /* least length in the world of a length of 1 in these coordinates */
-} ebpo_scene_seen;
+/* The box of one instance in the coordinates of another one's model. */
+typedef struct ebpo_scene_relative_box {
+    ebpo_scene_bounds box;
+    double rounding; /* by how much `box` has been widened on each side for rounding */
+    double unit;     /* a length of 1 in these coordinates is at least this long in the world */
+} ebpo_scene_relative_box;
 
-/* Returns a box in the coordinates of the instance `of` that contains the box of `other` at a time.
- * Fails with EBPO_E_ARGUMENT (a pose). */
-EBPO_MUST_USE ebpo_status ebpo_scene_seen_from(const ebpo_scene *scene, uint64_t of, uint64_t other,
-                                               double time, ebpo_scene_seen *out,
-                                               ebpo_error *error);
+/* Computes a box in the coordinates of the instance `of` that contains the box of `other` at a
+ * time. Fails with EBPO_E_ARGUMENT if a pose is out of range. */
+EBPO_MUST_USE ebpo_status ebpo_scene_make_relative_box(const ebpo_scene *scene, uint64_t of,
+                                                       uint64_t other, double time,
+                                                       ebpo_scene_relative_box *out,
+                                                       ebpo_error *error);
 
 /* Returns the distance of two boxes, rounded down. */
-double ebpo_scene_space_gap(const ebpo_scene_space *a, const ebpo_scene_space *b);
+double ebpo_scene_bounds_gap(const ebpo_scene_bounds *a, const ebpo_scene_bounds *b);
 
-/* Bounds the distance of omitted faces of a pair at a time. If one of two faces is omitted from its
- * model's file, the faces are not nearer than *gap; INFINITY: nothing is omitted. *lacking: an
- * instance whose file omits faces. */
+/* Sets *gap to a lower bound of the distance, at a time, between a face of a and a face of b of
+ * which at least one is omitted from its file; INFINITY: no face is omitted. *lacking: an instance
+ * whose file omits faces. */
 EBPO_MUST_USE ebpo_status ebpo_scene_omitted(const ebpo_scene *scene, const ebpo_scene_pair *pair,
                                              double time, double *gap, uint64_t *lacking,
                                              ebpo_error *error);
 
-/* Returns EBPO_E_ABSENT with a message: an omitted part of this instance's file may be nearer than
- * the query allows; or, with `solids`, may be around the other instance. */
-ebpo_status ebpo_scene_lacks(const ebpo_scene *scene, const ebpo_scene_pair *pair, uint64_t lacking,
-                             double time, bool solids, ebpo_error *error);
+/* Reports that faces that the file of the instance `lacking` omits may change the result. Always
+ * returns EBPO_E_ABSENT. `solids`: the omitted faces may enclose the other instance. */
+ebpo_status ebpo_scene_fail_omitted(const ebpo_scene *scene, const ebpo_scene_pair *pair,
+                                    uint64_t lacking, double time, bool solids, ebpo_error *error);
 
 /* Relative motion of two instances. */
 
@@ -45,7 +46,7 @@ ebpo_status ebpo_scene_lacks(const ebpo_scene *scene, const ebpo_scene_pair *pai
 double ebpo_scene_pair_next(const ebpo_scene *scene, const ebpo_scene_pair *pair, double from,
                             double to);
 
-/* Pairs of instances, each evaluated by any thread. */
+/* Evaluation of many pairs on several threads, each pair by one of them. */
 
 typedef struct ebpo_scene_pairs_list {
     ebpo_scene_pair *pairs; /* from malloc */
@@ -55,11 +56,11 @@ typedef struct ebpo_scene_pairs_list {
 /* Lists the pairs of ebpo_scene_pairs. On failure there is nothing to free. */
 EBPO_MUST_USE ebpo_status ebpo_scene_keep_pairs(const ebpo_scene *scene, double from, double to,
                                                 ebpo_scene_pairs_list *out, ebpo_error *error);
-/* Finds a result for one pair. how: data of the search. */
+/* Computes the result of one pair. how: the data of ebpo_scene_search. */
 typedef ebpo_status (*ebpo_scene_find_fn)(const void *how, const ebpo_scene_pair *pair,
                                           void *result, ebpo_error *error);
 
-/* A search in each pair separately. */
+/* How to compute the results of many pairs. */
 typedef struct ebpo_scene_search {
     ebpo_scene_find_fn find;
     const void *how;
@@ -70,17 +71,18 @@ typedef struct ebpo_scene_search {
     const char *stage;
 } ebpo_scene_search;
 
-/* Lists the pairs, makes their models, and finds the result of each pair on all cores. *results has
- * the order of the pairs; free it, also on failure. *count is 0 without a list. */
+/* Lists the pairs, makes their models, and computes the result of each pair. *results has the order
+ * of the pairs; free it, also on failure. *count is 0 if the pairs could not be listed. */
 EBPO_MUST_USE ebpo_status ebpo_scene_find_in_pairs(ebpo_scene *scene, double from, double to,
                                                    const ebpo_scene_search *search, void **results,
                                                    uint64_t *count, ebpo_error *error);
 
-/* Makes models in sequence; queries then share them. */
+/* Makes the models of all pairs, one after the other; queries on several threads then share them.
+ */
 EBPO_MUST_USE ebpo_status ebpo_scene_make_models(ebpo_scene *scene, const ebpo_scene_pair *pairs,
                                                  uint64_t count, ebpo_error *error);
-/* Makes a collider for one of these pairs. NULL: a file has no mesh; then ebpo_scene_omitted treats
- * the whole file as omitted. */
+/* Makes a collider for a pair whose models have been made. *out is NULL if one of the files has no
+ * mesh; then ebpo_scene_omitted counts all its faces as omitted. */
 EBPO_MUST_USE ebpo_status ebpo_scene_collider(const ebpo_scene *scene, const ebpo_scene_pair *pair,
                                               unsigned threads, ebpo_collider **out,
                                               ebpo_error *error);
@@ -96,19 +98,20 @@ typedef struct ebpo_scene_evaluations {
     const ebpo_scene_pair *pair;
     ebpo_collider *collider; /* from ebpo_scene_collider; must be freed */
     double tolerance;        /* tolerance of one evaluation */
-    bool rides;              /* both follow one route */
+    bool shares_route;       /* both follow one route */
     double gap;              /* result of ebpo_scene_omitted at the last evaluation */
     uint64_t lacking;        /* instance whose file omits faces, from the same call */
 } ebpo_scene_evaluations;
 
-/* Begins evaluations. `tolerance`: tolerance of the result; an evaluation uses a quarter of it, or
- * the limit of rounding. Free the collider, also on failure. */
+/* Begins evaluations. `tolerance`: tolerance of the result. An evaluation uses a quarter of it, but
+ * not less than the limit of rounding. Free the collider, also on failure. */
 EBPO_MUST_USE ebpo_status ebpo_scene_evaluations_begin(ebpo_scene_evaluations *evaluations,
                                                        const ebpo_scene *scene,
                                                        const ebpo_scene_pair *pair,
                                                        double tolerance, ebpo_error *error);
 
-/* Bounds the motion of the pair, as pair_motion does. */
+/* Sets *out to a bound of the change of the pair's distance between two times; INFINITY over a
+ * jump. */
 EBPO_MUST_USE ebpo_status ebpo_scene_evaluations_motion(const ebpo_scene_evaluations *evaluations,
                                                         double from, double to, double *out,
                                                         ebpo_error *error);
@@ -117,7 +120,7 @@ EBPO_MUST_USE ebpo_status ebpo_scene_evaluations_motion(const ebpo_scene_evaluat
 EBPO_MUST_USE ebpo_status ebpo_scene_evaluate(ebpo_scene_evaluations *evaluations, double time,
                                               double *lo, double *hi, ebpo_error *error);
 
-/* Returns true if `hi` is at most the tolerance above `lo`, in real numbers. */
+/* Returns true if hi - lo is certainly at most the tolerance, in spite of rounding. */
 bool ebpo_scene_is_within(double hi, double lo, double tolerance);
 
 /* Reads the options, with the default number of evaluations. Fails with EBPO_E_ARGUMENT if the

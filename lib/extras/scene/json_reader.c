@@ -105,8 +105,8 @@ static bool key_is(const cursor *c, const char *key)
     return *c->at == '"' && strncmp(c->at + 1, key, size) == 0 && c->at[1 + size] == '"';
 }
 
-/* Moves from the bracket at `c` to the value in it that has the key or index `at`. Returns false if
- * there is none. */
+/* Moves from the opening bracket at `c` to the value with the key or index `at` in these brackets.
+ * Returns false if there is none. */
 static bool json_text_enter(cursor *c, const ebpo_scene_at *at)
 {
     bool object = *c->at == '{';
@@ -128,8 +128,8 @@ static bool json_text_enter(cursor *c, const ebpo_scene_at *at)
     return false;
 }
 
-/* Returns the line, from 1, on which the value at path[count] begins in valid JSON. If the value
- * does not exist, returns the line of the deepest existing value on its path. */
+/* Returns the line, from 1, on which a value begins in valid JSON. The value has a path of `count`
+ * steps. If it does not exist, returns the line of the deepest existing value on its path. */
 static uint64_t find_line(const char *text, const ebpo_scene_at *path, int count)
 {
     cursor c = { text, 1 };
@@ -153,7 +153,7 @@ void ebpo_json_enter(ebpo_json_reader *r, const char *key, uint64_t item)
 
 void ebpo_json_leave(ebpo_json_reader *r) { r->depth--; }
 
-/* Writes "instances[3].pose", cut to fit. */
+/* Writes the path of the current value, such as "instances[3].pose", cut to fit. */
 static void show_path(const ebpo_json_reader *r, char *out, size_t space)
 {
     size_t used = 0;

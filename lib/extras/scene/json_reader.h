@@ -6,15 +6,16 @@
 
 typedef struct ebpo_json_reader {
     ebpo_scene *scene;
-    const char *text, *name;
+    const char *text, *name; /* the scene file's text, and its name for messages */
     const ebpo_scene_options *options;
     uint64_t pose_bytes; /* number of bytes that may still be read from files of poses */
     ebpo_scene_at path[EBPO_SCENE_DEPTH];
-    int depth;
+    int depth; /* number of steps in `path` */
     ebpo_error *error;
 } ebpo_json_reader;
 
-/* The first function enters a member, or an item if `key` is NULL; the second leaves it. */
+/* The first function adds a member, or an item if `key` is NULL, to the path of the current value;
+ * the second removes it from the path. */
 void ebpo_json_enter(ebpo_json_reader *r, const char *key, uint64_t item);
 void ebpo_json_leave(ebpo_json_reader *r);
 
@@ -22,7 +23,8 @@ void ebpo_json_leave(ebpo_json_reader *r);
 ebpo_status ebpo_json_bad(ebpo_json_reader *r, const char *format, ...) EBPO_PRINTF(2, 3);
 /* Returns EBPO_E_FORMAT with a message about the member `key` of the entered value. */
 ebpo_status ebpo_json_bad_at(ebpo_json_reader *r, const char *key, const char *what);
-/* Turns EBPO_E_ARGUMENT into the error of ebpo_json_bad; returns other errors unchanged. */
+/* Converts EBPO_E_ARGUMENT with the message `why` into the error of ebpo_json_bad; returns other
+ * errors unchanged. */
 ebpo_status ebpo_json_judge(ebpo_json_reader *r, ebpo_status status, const ebpo_error *why);
 
 /* Checks that the value is an object with only these members (NULL ends the list) and private ones,
@@ -30,8 +32,8 @@ ebpo_status ebpo_json_judge(ebpo_json_reader *r, ebpo_status status, const ebpo_
 EBPO_MUST_USE ebpo_status ebpo_json_members(ebpo_json_reader *r, const json_t *value,
                                             const char *const *known);
 
-/* Reads a member. If the member is missing, *out stays unchanged; EBPO_E_FORMAT if it is also
- * `needed`. */
+/* Read a member. If the member is missing, *out stays unchanged; if it is also `needed`, the
+ * function fails with EBPO_E_FORMAT. */
 EBPO_MUST_USE ebpo_status ebpo_json_get_text(ebpo_json_reader *r, const json_t *object,
                                              const char *key, bool needed, const char **out);
 EBPO_MUST_USE ebpo_status ebpo_json_get_flag(ebpo_json_reader *r, const json_t *object,

@@ -4,8 +4,9 @@
  * sums, products, quotients and square roots are used, so that a pose has the same bits on every
  * machine.
  *
- * Bounds hold between two times without a key between them: the length of the motion, its distance
- * from the straight line, and the part that rounding alone causes. They are rounded upwards. */
+ * Three bounds hold between two times with no key between them: of the length of the motion, of its
+ * distance from the straight line, and of the motion that rounding alone causes. They are rounded
+ * upwards. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -18,37 +19,37 @@
 
 /* Relative rounding error of lengths after a few dozen operations, each with an error of 2^-53. */
 static const double slack = 0x1p-44;
-/* Differences of greater times would not be finite. */
+/* Greatest time: differences of such times are finite. */
 static const double max_time = 0x1p1000;
 
-void ebpo_scene_turn_of_matrix(const double m[3][3], double turn[4])
+void ebpo_scene_quaternion_of_matrix(const double m[3][3], double quaternion[4])
 {
     double trace = m[0][0] + m[1][1] + m[2][2];
     int i = m[1][1] > m[0][0] ? 1 : 0;
     i = m[2][2] > m[i][i] ? 2 : i;
     if (trace > m[i][i]) { /* the real part is the greatest */
-        turn[0] = m[2][1] - m[1][2];
-        turn[1] = m[0][2] - m[2][0];
-        turn[2] = m[1][0] - m[0][1];
-        turn[3] = 1 + trace;
+        quaternion[0] = m[2][1] - m[1][2];
+        quaternion[1] = m[0][2] - m[2][0];
+        quaternion[2] = m[1][0] - m[0][1];
+        quaternion[3] = 1 + trace;
         return;
     }
     int j = (i + 1) % 3, k = (i + 2) % 3;
-    turn[i] = 1 + m[i][i] - m[j][j] - m[k][k];
-    turn[j] = m[j][i] + m[i][j];
-    turn[k] = m[k][i] + m[i][k];
-    turn[3] = m[k][j] - m[j][k];
+    quaternion[i] = 1 + m[i][i] - m[j][j] - m[k][k];
+    quaternion[j] = m[j][i] + m[i][j];
+    quaternion[k] = m[k][i] + m[i][k];
+    quaternion[3] = m[k][j] - m[j][k];
 }
 
+/* Returns true if the time, translation and scale of a key are in range. */
 static bool route_fits(const ebpo_route_key *key)
 {
-    static const double nowhere[3] = { 0, 0, 0 };
+    static const double origin[3] = { 0, 0, 0 };
     ebpo_pose pose = EBPO_POSE_INIT;
     ebpo_posing posing;
     memcpy(pose.translation, key->translation, sizeof pose.translation);
     pose.scale = key->scale;
-    return fabs(key->time) <= max_time &&
-           ebpo_posing_make(&posing, &pose, nowhere, NULL) == EBPO_OK;
+    return fabs(key->time) <= max_time && ebpo_posing_make(&posing, &pose, origin, NULL) == EBPO_OK;
 }
 
 ebpo_status ebpo_scene_add_key(ebpo_scene_route *route, const ebpo_route_key *key,
@@ -60,7 +61,7 @@ ebpo_status ebpo_scene_add_key(ebpo_scene_route *route, const ebpo_route_key *ke
             error, EBPO_E_ARGUMENT,
             "a number is not finite, the time is beyond 2^1000, or the scale is not from "
             "2^-300 to 2^300");
-    if (!ebpo_quaternion_normalise(k.turn))
+    if (!ebpo_quaternion_normalise(k.quaternion))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "the quaternion is 0 or too long");
     if (route->count && !(k.time > route->keys[route->count - 1].time))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "time %g is not above the previous one, %g",
@@ -87,7 +88,7 @@ static uint64_t key_at(const ebpo_scene_route *route, double time)
 
 /* Interpolates at constant speed along the shorter arc. The arc is halved until chord and arc are
  * equal. */
-static void turn_between(const double from[4], const double to[4], double u, double out[4])
+static void interpolate_rotation(const double from[4], const double to[4], double u, double out[4])
 {
     double a[4], b[4];
     double dot = (from[0] * to[0] + from[1] * to[1]) + (from[2] * to[2] + from[3] * to[3]);
@@ -116,14 +117,14 @@ void ebpo_scene_route_at(const ebpo_scene_route *route, double time, ebpo_pose *
     const ebpo_route_key *a = &route->keys[n], *b = n + 1 < route->count ? a + 1 : a;
     *out = (ebpo_pose)EBPO_POSE_INIT;
     if (a == b || route->jumps || time <= a->time) {
-        ebpo_quaternion_matrix(a->turn, out->rotation);
+        ebpo_quaternion_matrix(a->quaternion, out->rotation);
         memcpy(out->translation, a->translation, sizeof out->translation);
         out->scale = a->scale;
         return;
     }
-    double u = (time - a->time) / (b->time - a->time), turn[4];
-    turn_between(a->turn, b->turn, u, turn);
-    ebpo_quaternion_matrix(turn, out->rotation);
+    double u = (time - a->time) / (b->time - a->time), quaternion[4];
+    interpolate_rotation(a->quaternion, b->quaternion, u, quaternion);
+    ebpo_quaternion_matrix(quaternion, out->rotation);
     for (int k = 0; k < 3; k++)
         out->translation[k] = a->translation[k] + u * (b->translation[k] - a->translation[k]);
     out->scale = a->scale + u * (b->scale - a->scale);
@@ -152,8 +153,8 @@ double ebpo_scene_route_next(const ebpo_scene_route *route, double from, double 
     return n + 1 < route->count ? fmin(to, route->keys[n + 1].time) : to;
 }
 
-/* Returns an upper bound of the angle of a rotation, in radians. The angle is twice that between
- * the quaternions, from the series of asin. */
+/* Returns an upper bound of the angle, in radians, of the rotation from a to b. It is twice the
+ * angle between the quaternions, which is 2 asin(chord / 2) by the series of asin. */
 static double angle_between(const double a[4], const double b[4])
 {
     double less[4], more[4];
@@ -198,30 +199,35 @@ ebpo_scene_step ebpo_scene_route_step(const ebpo_scene_route *route, double from
         vector[k] = b->translation[k] - a->translation[k];
         size += fabs(a->translation[k]) + fabs(b->translation[k]);
     }
-    double angle = angle_between(a->turn, b->turn), scale = fmax(a->scale, b->scale);
-    double grows = fabs(b->scale - a->scale);
-    double turned = angle * part, grown = grows * part;
+    double angle = angle_between(a->quaternion, b->quaternion), scale = fmax(a->scale, b->scale);
+    double step_angle = angle * part, scale_change = fabs(b->scale - a->scale) * part;
     double rounding = slack * (size + (reach.length + reach.size) * scale);
     return (ebpo_scene_step){
-        (ebpo_scene_length_above(vector) * part + reach.length * (scale * turned + grown)) *
+        (ebpo_scene_length_above(vector) * part +
+         reach.length * (scale * step_angle + scale_change)) *
                 (1 + slack) +
             rounding,
-        reach.length / 8 * (scale * turned * turned + 2 * grown * turned) * (1 + slack) + rounding,
+        reach.length / 8 * (scale * step_angle * step_angle + 2 * scale_change * step_angle) *
+                (1 + slack) +
+            rounding,
     };
 }
 
-/* Poses of a route one after the other: the last scale, the sum of its changes, the greatest scale,
- * and the greatest 1-norm of a translation. */
-typedef struct growing {
-    double scale, grown, most, size;
-} growing;
+/* Statistics of the scales and translations of a sequence of poses. */
+typedef struct pose_statistics {
+    double scale;        /* of the last pose */
+    double scale_change; /* sum of the absolute changes of the scale */
+    double most;         /* greatest scale */
+    double size;         /* greatest 1-norm of a translation */
+} pose_statistics;
 
-static void grow_to(growing *g, double scale, const double translation[3])
+/* Adds a pose to the statistics. */
+static void add_pose_statistics(pose_statistics *g, double scale, const double translation[3])
 {
     double size = 0;
     for (int k = 0; k < 3; k++)
         size += fabs(translation[k]);
-    g->grown += fabs(scale - g->scale);
+    g->scale_change += fabs(scale - g->scale);
     g->scale = scale;
     g->most = fmax(g->most, scale);
     g->size = fmax(g->size, size);
@@ -232,23 +238,23 @@ double ebpo_scene_route_growth(const ebpo_scene_route *route, double from, doubl
 {
     ebpo_pose at;
     ebpo_scene_route_at(route, from, &at);
-    growing g = { .scale = at.scale };
-    grow_to(&g, at.scale, at.translation);
+    pose_statistics g = { .scale = at.scale };
+    add_pose_statistics(&g, at.scale, at.translation);
     for (uint64_t n = key_at(route, from) + 1; n < route->count; n++) {
         if (!(route->keys[n].time < to))
             break;
-        grow_to(&g, route->keys[n].scale, route->keys[n].translation);
+        add_pose_statistics(&g, route->keys[n].scale, route->keys[n].translation);
     }
     ebpo_scene_route_at(route, to, &at);
-    grow_to(&g, at.scale, at.translation);
-    return reach.length * g.grown * (1 + slack) +
+    add_pose_statistics(&g, at.scale, at.translation);
+    return reach.length * g.scale_change * (1 + slack) +
            slack * (2 * g.size + (reach.length + reach.size) * g.most);
 }
 
 double ebpo_scene_route_rounding(const ebpo_scene_route *route, ebpo_scene_reach reach)
 {
-    growing g = { .scale = 0 };
+    pose_statistics g = { .scale = 0 };
     for (uint64_t n = 0; n < route->count; n++)
-        grow_to(&g, route->keys[n].scale, route->keys[n].translation);
+        add_pose_statistics(&g, route->keys[n].scale, route->keys[n].translation);
     return slack * (g.size + (reach.length + reach.size) * g.most);
 }

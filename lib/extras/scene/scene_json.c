@@ -26,14 +26,17 @@ static const char *const columns[COLUMNS] = {
     "time", "x", "y", "z", "qx", "qy", "qz", "qw", "scale"
 };
 
-typedef struct lines {
-    const char *at, *end, *name;
-    uint64_t line;
-    int field[COLUMNS]; /* index of each column's field; -1: missing */
-    int fields;
+/* The text of a CSV file while it is read. */
+typedef struct csv_lines {
+    const char *at, *end; /* the text that has not been read */
+    const char *name;     /* for messages */
+    uint64_t line;        /* number of lines read */
+    int field[COLUMNS];   /* [column] index of its field in each line; -1: missing */
+    int fields;           /* number of fields of each line */
     locale_t c_locale;
-} lines;
+} csv_lines;
 
+/* A part of the text: a line or a field, without blanks at its ends. */
 typedef struct csv_text {
     const char *at;
     size_t size;
@@ -49,7 +52,7 @@ static csv_text csv_trimmed(const char *from, const char *to)
 }
 
 /* Reads the next line that is not empty. */
-static bool next_line(lines *l, csv_text *out)
+static bool next_line(csv_lines *l, csv_text *out)
 {
     while (l->at < l->end) {
         const char *end = memchr(l->at, '\n', (size_t)(l->end - l->at));
@@ -81,13 +84,13 @@ static int csv_split(csv_text line, csv_text field[FIELDS_MAX])
     }
 }
 
-static ebpo_status csv_bad(const lines *l, const char *what, ebpo_error *error)
+static ebpo_status csv_bad(const csv_lines *l, const char *what, ebpo_error *error)
 {
     return ebpo_fail_file(error, EBPO_E_FORMAT, l->name, "line %llu: %s",
                           (unsigned long long)l->line, what);
 }
 
-static ebpo_status read_header(lines *l, ebpo_error *error)
+static ebpo_status read_header(csv_lines *l, ebpo_error *error)
 {
     csv_text line, field[FIELDS_MAX];
     for (int k = 0; k < COLUMNS; k++)
@@ -112,7 +115,7 @@ static ebpo_status read_header(lines *l, ebpo_error *error)
     return EBPO_OK;
 }
 
-static ebpo_status read_row(lines *l, csv_text line, ebpo_scene_route *route, ebpo_error *error)
+static ebpo_status read_row(csv_lines *l, csv_text line, ebpo_scene_route *route, ebpo_error *error)
 {
     csv_text field[FIELDS_MAX];
     double v[COLUMNS] = { [8] = 1 };
@@ -135,7 +138,7 @@ static ebpo_status read_row(lines *l, csv_text line, ebpo_scene_route *route, eb
                                      : EBPO_OK;
 }
 
-static ebpo_status read_rows(lines *l, ebpo_scene_route *route, ebpo_error *error)
+static ebpo_status read_rows(csv_lines *l, ebpo_scene_route *route, ebpo_error *error)
 {
     csv_text line;
     ebpo_status status = read_header(l, error);
@@ -149,13 +152,13 @@ static ebpo_status read_rows(lines *l, ebpo_scene_route *route, ebpo_error *erro
 static ebpo_status read_text(const ebpo_whole_file *file, ebpo_scene_route *route, const char *path,
                              ebpo_error *error)
 {
-    lines l = { (const char *)file->data,
-                (const char *)file->data + file->size,
-                path,
-                0,
-                { 0 },
-                0,
-                newlocale(LC_ALL_MASK, "C", (locale_t)0) };
+    csv_lines l = { (const char *)file->data,
+                    (const char *)file->data + file->size,
+                    path,
+                    0,
+                    { 0 },
+                    0,
+                    newlocale(LC_ALL_MASK, "C", (locale_t)0) };
     ebpo_status status;
     const char *foreign = ebpo_foreign_bytes(file->data, file->size);
     l.at += ebpo_scene_bom_length(l.at, file->size);
@@ -170,7 +173,8 @@ static ebpo_status read_text(const ebpo_whole_file *file, ebpo_scene_route *rout
     return status;
 }
 
-/* Adds the poses of a file to a route. *left: number of bytes that may still be read. */
+/* Adds the poses of a CSV file to a route. *left: number of bytes that may still be read from such
+ * files; it decreases by the size of this one. */
 static ebpo_status read_csv_file(ebpo_scene_route *route, const char *path, uint64_t *left,
                                  ebpo_error *error)
 {
@@ -196,8 +200,8 @@ static ebpo_status read_csv_file(ebpo_scene_route *route, const char *path, uint
 /* A pose whose rotation may be given as a matrix, or as a quaternion x, y, z, w of any length. */
 typedef struct read_pose {
     ebpo_pose pose;
-    double turn[4];
-    bool has_turn;
+    double quaternion[4];
+    bool has_quaternion;
 } read_pose;
 
 static ebpo_status pose_members(ebpo_json_reader *r, const json_t *value, read_pose *out)
@@ -210,30 +214,31 @@ static ebpo_status pose_members(ebpo_json_reader *r, const json_t *value, read_p
     if (status == EBPO_OK)
         status = ebpo_json_get_reals(r, value, "rotation", false, &p->rotation[0][0], 9);
     if (status == EBPO_OK)
-        status = ebpo_json_get_reals(r, value, "quaternion", false, out->turn, 4);
+        status = ebpo_json_get_reals(r, value, "quaternion", false, out->quaternion, 4);
     if (status == EBPO_OK)
         status = ebpo_json_get_real(r, value, "scale", false, &p->scale);
-    out->has_turn = json_object_get(value, "quaternion") != NULL;
-    if (status == EBPO_OK && out->has_turn && json_object_get(value, "rotation"))
+    out->has_quaternion = json_object_get(value, "quaternion") != NULL;
+    if (status == EBPO_OK && out->has_quaternion && json_object_get(value, "rotation"))
         return ebpo_json_bad(r, "has both rotation and quaternion");
     return status;
 }
 
-/* Converts a pose to a key, whose quaternion has a length of 1. */
-static ebpo_status key_of(ebpo_json_reader *r, const read_pose *p, double time,
-                          ebpo_scene_route *route)
+/* Appends a pose to a route, as a key with a unit quaternion. */
+static ebpo_status add_pose_key(ebpo_json_reader *r, const read_pose *p, double time,
+                                ebpo_scene_route *route)
 {
-    static const double nowhere[3] = { 0, 0, 0 };
+    static const double origin[3] = { 0, 0, 0 };
     ebpo_error why = EBPO_ERROR_INIT;
     ebpo_posing posing;
     ebpo_route_key key = { .time = time, .scale = p->pose.scale };
     memcpy(key.translation, p->pose.translation, sizeof key.translation);
-    memcpy(key.turn, p->turn, sizeof key.turn);
-    if (!p->has_turn) {
-        ebpo_status status = ebpo_posing_make(&posing, &p->pose, nowhere, &why);
+    memcpy(key.quaternion, p->quaternion, sizeof key.quaternion);
+    if (!p->has_quaternion) {
+        /* `posing` is not used: this only checks the matrix */
+        ebpo_status status = ebpo_posing_make(&posing, &p->pose, origin, &why);
         if (status != EBPO_OK)
             return ebpo_json_judge(r, status, &why);
-        ebpo_scene_turn_of_matrix(p->pose.rotation, key.turn);
+        ebpo_scene_quaternion_of_matrix(p->pose.rotation, key.quaternion);
     }
     return ebpo_json_judge(r, ebpo_scene_add_key(route, &key, &why), &why);
 }
@@ -246,14 +251,14 @@ static ebpo_status json_read_pose(ebpo_json_reader *r, const json_t *object, con
     if (!value)
         return EBPO_OK;
     read_pose p = { .pose = EBPO_POSE_INIT };
-    ebpo_scene_route alone = { 0 };
+    ebpo_scene_route single = { 0 };
     ebpo_json_enter(r, key, 0);
     ebpo_status status = pose_members(r, value, &p);
-    if (status == EBPO_OK && p.has_turn) {
-        status = key_of(r, &p, 0, &alone);
+    if (status == EBPO_OK && p.has_quaternion) {
+        status = add_pose_key(r, &p, 0, &single);
         if (status == EBPO_OK)
-            ebpo_scene_route_at(&alone, 0, &p.pose);
-        free(alone.keys);
+            ebpo_scene_route_at(&single, 0, &p.pose);
+        free(single.keys);
     }
     ebpo_json_leave(r);
     *out = p.pose; /* a rotation given as a matrix is checked with the instance */
@@ -279,7 +284,7 @@ static ebpo_status read_key(ebpo_json_reader *r, const char *name, const json_t 
     ebpo_json_enter(r, "pose", 0);
     status = pose_members(r, json_object_get(value, "pose"), &p);
     ebpo_json_leave(r);
-    return status == EBPO_OK ? key_of(r, &p, time, last_route(r)) : status;
+    return status == EBPO_OK ? add_pose_key(r, &p, time, last_route(r)) : status;
 }
 
 static ebpo_status read_poses(ebpo_json_reader *r, const json_t *value)
@@ -299,7 +304,7 @@ static ebpo_status read_poses(ebpo_json_reader *r, const json_t *value)
         ebpo_json_enter(r, NULL, i);
         status = pose_members(r, json_array_get(poses, i), &p);
         if (status == EBPO_OK)
-            status = key_of(r, &p, begin + step * (double)i, last_route(r));
+            status = add_pose_key(r, &p, begin + step * (double)i, last_route(r));
         ebpo_json_leave(r);
     }
     ebpo_json_leave(r);
@@ -312,14 +317,14 @@ static ebpo_status read_csv(ebpo_json_reader *r, const json_t *value)
     ebpo_status status = ebpo_json_get_text(r, value, "csv", true, &path);
     if (status != EBPO_OK)
         return status;
-    ebpo_scene_options here = *r->options;
-    here.remote = false;
-    const char *refused = ebpo_scene_path_refused(path, &here, false);
+    ebpo_scene_options own = *r->options;
+    own.remote = false;
+    const char *refused = ebpo_scene_path_refused(path, &own, false);
     if (refused)
         return ebpo_json_bad_at(r, "csv", refused);
     char *joined = ebpo_scene_join_path(r->scene->folder, path);
     status = joined ? EBPO_OK : ebpo_fail_memory(r->error, strlen(path));
-    if (status == EBPO_OK && !here.outside)
+    if (status == EBPO_OK && !own.outside)
         status = ebpo_scene_stays_within(r->scene->folder, joined, r->error);
     if (status == EBPO_OK)
         status = read_csv_file(last_route(r), joined, &r->pose_bytes, r->error);
@@ -554,8 +559,8 @@ static ebpo_status read_camera(ebpo_json_reader *r, const char *key, const json_
 
 /* --- rules --- */
 
-/* Reads an array of two selectors. */
-static ebpo_status read_two(ebpo_json_reader *r, const json_t *two, uint64_t set[2])
+/* Reads an array of two selectors, and sets the indices of their sets. */
+static ebpo_status read_selectors(ebpo_json_reader *r, const json_t *two, uint64_t set[2])
 {
     if (!json_is_array(two) || json_array_size(two) != 2)
         return ebpo_json_bad(r, "is not an array of two names");
@@ -577,7 +582,7 @@ static ebpo_status read_ignored(ebpo_json_reader *r, const char *key, const json
 {
     (void)key;
     uint64_t set[2];
-    ebpo_status status = read_two(r, value, set);
+    ebpo_status status = read_selectors(r, value, set);
     return status == EBPO_OK ? ebpo_scene_add_rule(r->scene, set[0], set[1], -1, r->error) : status;
 }
 
@@ -591,7 +596,7 @@ static ebpo_status read_clearance(ebpo_json_reader *r, const char *key, const js
     if (status != EBPO_OK)
         return status;
     ebpo_json_enter(r, "between", 0);
-    status = read_two(r, json_object_get(value, "between"), set);
+    status = read_selectors(r, json_object_get(value, "between"), set);
     ebpo_json_leave(r);
     if (status == EBPO_OK)
         status = ebpo_json_get_real(r, value, "distance", true, &distance);
@@ -648,7 +653,7 @@ static ebpo_status read_root(ebpo_json_reader *r, const json_t *root)
     return status == EBPO_OK ? ebpo_json_each_item(r, root, "clearance", read_clearance) : status;
 }
 
-static ebpo_status parse_failed(const char *name, const json_error_t *e, ebpo_error *error)
+static ebpo_status report_parse_error(const char *name, const json_error_t *e, ebpo_error *error)
 {
     char what[JSON_ERROR_TEXT_LENGTH];
     size_t i = 0;
@@ -682,7 +687,7 @@ ebpo_status ebpo_scene_read_json(ebpo_scene *scene, const char *text, size_t siz
     json_t *root =
         json_loadb(text, size, JSON_REJECT_DUPLICATES | JSON_DECODE_INT_AS_REAL, &parsed);
     if (!root)
-        return parse_failed(name, &parsed, error);
+        return report_parse_error(name, &parsed, error);
     ebpo_json_reader r = { .scene = scene,
                            .text = text,
                            .name = name,

@@ -1,9 +1,10 @@
 /* A scene as an object: its names, checks of the files that it names, adding its members, and
  * returning them.
  *
- * Each kind of member has separate names; layers, groups and instances share one space of
- * selectors, which rules use. A selector is a set. Every instance belongs to the set of all, to its
- * own set, to that of its layer and to those of its groups.
+ * Models, routes and cameras each have a separate name space. Layers, groups and instances share
+ * one. In rules, a name is a selector: it stands for a set of instances. Every instance belongs to
+ * the set of all instances, to a set that has only this instance, to the set of its layer and to
+ * those of its groups.
  *
  * A scene that is untrusted input may name only files in its own folder or below, unless the
  * options allow others. Symbolic links that lead out of the folder are rejected. */
@@ -34,8 +35,8 @@ static bool is_plain(const char *name)
     return text != NULL;
 }
 
-/* Checks a name: 1 to 255 bytes of UTF-8 without control characters, which do not begin like a
- * selector. */
+/* Checks a name: 1 to 255 bytes of UTF-8 without control characters. It must not be "*", nor begin
+ * with "layer:" or "group:". what: for messages, such as "a model". */
 static ebpo_status check_name(const char *name, const char *what, ebpo_error *error)
 {
     size_t size = name ? strnlen(name, NAME_MAX + 1) : 0;
@@ -52,7 +53,8 @@ static ebpo_status check_name(const char *name, const char *what, ebpo_error *er
     return EBPO_OK;
 }
 
-static void names_join(char *out, size_t space, const char *kind, const char *name)
+/* Writes the key of a name in scene->names: its kind, then the name. */
+static void join_name(char *out, size_t space, const char *kind, const char *name)
 {
     size_t begin = strlen(kind), size = strnlen(name, space - begin - 1);
     memcpy(out, kind, begin);
@@ -63,7 +65,7 @@ static void names_join(char *out, size_t space, const char *kind, const char *na
 uint64_t ebpo_scene_find_name(const ebpo_scene *scene, const char *kind, const char *name)
 {
     char key[KIND_MAX + NAME_MAX + 2];
-    names_join(key, sizeof key, kind, name);
+    join_name(key, sizeof key, kind, name);
     const json_t *number = json_object_get(scene->names, key);
     return number ? (uint64_t)json_integer_value(number) : EBPO_SCENE_NONE;
 }
@@ -74,7 +76,7 @@ static ebpo_status put_name(ebpo_scene *scene, const char *kind, const char *nam
                             ebpo_error *error)
 {
     char key[KIND_MAX + NAME_MAX + 2];
-    names_join(key, sizeof key, kind, name);
+    join_name(key, sizeof key, kind, name);
     if (json_object_get(scene->names, key))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "the name '%.80s' exists already", name);
     if (json_object_set_new(scene->names, key, json_integer((json_int_t)number)) != 0)
@@ -82,7 +84,7 @@ static ebpo_status put_name(ebpo_scene *scene, const char *kind, const char *nam
     return EBPO_OK;
 }
 
-/* Adds a set; *set may be NULL. */
+/* Adds a set, and sets *set to its index unless `set` is NULL. kind: "", "layer:" or "group:". */
 static ebpo_status add_set(ebpo_scene *scene, const char *kind, const char *name, uint64_t *set,
                            ebpo_error *error)
 {
@@ -292,7 +294,7 @@ ebpo_status ebpo_scene_add_model(ebpo_scene *scene, const char *name, const char
 static ebpo_status check_instance(const ebpo_scene *scene, const ebpo_scene_instance *i,
                                   ebpo_error *error)
 {
-    static const double nowhere[3] = { 0, 0, 0 };
+    static const double origin[3] = { 0, 0, 0 };
     ebpo_posing posing;
     ebpo_status status = check_name(i->name, "an instance", error);
     if (status != EBPO_OK)
@@ -308,10 +310,11 @@ static ebpo_status check_instance(const ebpo_scene *scene, const ebpo_scene_inst
                          (unsigned long long)i->layer);
     if (i->fixed && i->route != EBPO_SCENE_NONE)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "a fixed instance has no route");
-    return ebpo_posing_make(&posing, &i->pose, nowhere, error);
+    return ebpo_posing_make(&posing, &i->pose, origin, error); /* only checks the pose */
 }
 
-static ebpo_status own_sets(ebpo_scene *scene, uint64_t set, ebpo_error *error)
+/* Puts the newest instance into the set of all instances, that of its layer, and `set`. */
+static ebpo_status join_own_sets(ebpo_scene *scene, uint64_t set, ebpo_error *error)
 {
     const ebpo_scene_instance_entry *i = &scene->instances[scene->instances_count - 1];
     ebpo_status status = ebpo_scene_join_set(scene, EBPO_SCENE_ALL_SET, error);
@@ -343,7 +346,7 @@ ebpo_status ebpo_scene_add_instance(ebpo_scene *scene, const ebpo_scene_instance
     scene->models[as.model].instances++;
     if (number)
         *number = n;
-    return own_sets(scene, set, error);
+    return join_own_sets(scene, set, error);
 }
 
 ebpo_status ebpo_scene_join_set(ebpo_scene *scene, uint64_t set, ebpo_error *error)
@@ -428,8 +431,8 @@ ebpo_status ebpo_scene_add_rule(ebpo_scene *scene, uint64_t a, uint64_t b, doubl
         return status;
     scene->rules[scene->rules_count++] =
         (ebpo_scene_rule_entry){ a < b ? a : b, a < b ? b : a, clearance };
-    scene->ignored += clearance < 0;
-    scene->clearances += clearance >= 0;
+    scene->ignored_count += clearance < 0;
+    scene->clearance_count += clearance >= 0;
     return EBPO_OK;
 }
 
@@ -461,8 +464,8 @@ ebpo_status ebpo_scene_get_counts(const ebpo_scene *scene, ebpo_scene_counts *ou
     c.groups = scene->groups_count;
     c.routes = scene->routes_count;
     c.cameras = scene->cameras_count;
-    c.ignored = scene->ignored;
-    c.clearances = scene->clearances;
+    c.ignored = scene->ignored_count;
+    c.clearances = scene->clearance_count;
     for (uint64_t i = 0; i < scene->instances_count; i++)
         c.fixed += scene->instances[i].as.fixed;
     add_times(scene, &c);

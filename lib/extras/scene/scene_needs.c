@@ -3,10 +3,12 @@
  *
  * Boxes are in the model's own coordinates, and contain all parts that another instance comes near.
  * They are computed over steps of time so short that no instance moves far. They are rounded
- * outwards, so that queries in a subset of this box return the same results as in the whole file.
+ * outwards, so that a subset file that was cut with this box returns the same results as the whole
+ * file.
  *
- * A view needs the levels whose cells are larger than a pixel. A node's envelope and its content
- * are both in its cell, so finer levels make no visible difference. */
+ * A view needs the levels up to the first one whose cells have a diagonal of at most one pixel. A
+ * node's envelope and its content are both in its cell, so finer levels make no visible difference.
+ */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -20,16 +22,17 @@
 #include "extras/scene/instance_pair.h"
 #include "extras/scene/scene_needs.h"
 
+/* Greatest number of times that the interval between two keys is halved. */
 enum { HALVINGS = 12 };
 
-/* An instance that another one approaches. */
-typedef struct nearing {
+/* The search for the parts of the instance `of` that the instance `other` comes near. */
+typedef struct near_search {
     ebpo_scene_needs *needs;
     const ebpo_scene *scene;
     uint64_t of, other;
     double clearance, margin; /* lengths in the world */
     ebpo_scene_file_need *need;
-} nearing;
+} near_search;
 
 static ebpo_scene_file_need *need_of(const ebpo_scene_needs *n, uint64_t instance)
 {
@@ -42,9 +45,9 @@ static const ebpo_scene_route *route_of(const ebpo_scene *scene, uint64_t instan
     return route == EBPO_SCENE_NONE ? NULL : &scene->routes[route];
 }
 
-/* Bounds the distance of points near the other instance from the origin of the route, in the
- * route's unit. */
-static ebpo_status reach_of_other(const nearing *n, const ebpo_scene_route *route, double from,
+/* Bounds how far the other instance is from the origin of this instance's route, in the unit of
+ * that route. */
+static ebpo_status reach_of_other(const near_search *n, const ebpo_scene_route *route, double from,
                                   double to, double *reach)
 {
     double min[3], max[3], far[3];
@@ -64,7 +67,7 @@ static ebpo_status reach_of_other(const nearing *n, const ebpo_scene_route *rout
 
 /* Bounds the motion of the other instance relative to this one, in the world's unit. There must be
  * no key between the times. */
-static ebpo_status motion_seen(const nearing *n, double from, double to, double *out)
+static ebpo_status relative_motion(const near_search *n, double from, double to, double *out)
 {
     const ebpo_scene_route *route = route_of(n->scene, n->of);
     double reach = 0, own = 0;
@@ -79,17 +82,19 @@ static ebpo_status motion_seen(const nearing *n, double from, double to, double 
 
 /* Computes the part of the model's box that the other instance may come near between two times.
  * *any is false if there is no such part. */
-static ebpo_status near_box(const nearing *n, double from, double to, double motion,
-                            ebpo_scene_space *out, bool *any)
+static ebpo_status near_box(const near_search *n, double from, double to, double motion,
+                            ebpo_scene_bounds *out, bool *any)
 {
-    ebpo_scene_seen at, later;
+    ebpo_scene_relative_box at, later;
     ebpo_status status =
-        ebpo_scene_seen_from(n->scene, n->of, n->other, from, &at, n->needs->error);
+        ebpo_scene_make_relative_box(n->scene, n->of, n->other, from, &at, n->needs->error);
     if (status == EBPO_OK)
-        status = ebpo_scene_seen_from(n->scene, n->of, n->other, to, &later, n->needs->error);
+        status =
+            ebpo_scene_make_relative_box(n->scene, n->of, n->other, to, &later, n->needs->error);
     if (status != EBPO_OK)
         return status;
-    /* more than the effect of rounding between these times, even if all other terms are 0 */
+    /* the last term bounds the rounding of the boxes between these times, even if all others are 0
+     */
     double grow = (n->clearance + n->margin + motion) / fmin(at.unit, later.unit) * (1 + 0x1p-40) +
                   2 * fmax(at.rounding, later.rounding);
     *any = true;
@@ -103,7 +108,7 @@ static ebpo_status near_box(const nearing *n, double from, double to, double mot
     return EBPO_OK;
 }
 
-static bool is_within(const ebpo_scene_space *a, const ebpo_scene_file_need *need)
+static bool is_within(const ebpo_scene_bounds *a, const ebpo_scene_file_need *need)
 {
     bool within = need->any;
     for (int k = 0; k < 3; k++)
@@ -111,7 +116,7 @@ static bool is_within(const ebpo_scene_space *a, const ebpo_scene_file_need *nee
     return within;
 }
 
-static void needs_join(ebpo_scene_file_need *need, const ebpo_scene_space *box)
+static void join_need_box(ebpo_scene_file_need *need, const ebpo_scene_bounds *box)
 {
     if (!need->any)
         need->box = *box;
@@ -122,37 +127,39 @@ static void needs_join(ebpo_scene_file_need *need, const ebpo_scene_space *box)
     }
 }
 
-static ebpo_status come_near(const nearing *n, double from, double to, int halvings)
+/* Adds the part of the model that the other instance comes near between two times. Halves the
+ * interval while the instances move by more than the margin, at most `halvings` times. */
+static ebpo_status add_near_between(const near_search *n, double from, double to, int halvings)
 {
     double motion, middle = from + (to - from) / 2;
-    ebpo_scene_space box;
+    ebpo_scene_bounds box;
     bool any = false;
-    ebpo_status status = motion_seen(n, from, to, &motion);
+    ebpo_status status = relative_motion(n, from, to, &motion);
     if (status == EBPO_OK)
         status = near_box(n, from, to, motion, &box, &any);
     if (status != EBPO_OK || !any || is_within(&box, n->need))
         return status;
     if (motion <= n->margin || halvings == 0 || !(middle > from && middle < to)) {
-        needs_join(n->need, &box);
+        join_need_box(n->need, &box);
         return EBPO_OK;
     }
-    status = come_near(n, from, middle, halvings - 1);
-    return status == EBPO_OK ? come_near(n, middle, to, halvings - 1) : status;
+    status = add_near_between(n, from, middle, halvings - 1);
+    return status == EBPO_OK ? add_near_between(n, middle, to, halvings - 1) : status;
 }
 
-/* Goes from key to key of both routes. Each key begins a new part, because routes may jump there.
- */
-static ebpo_status add_near_parts(const nearing *n)
+/* Adds the near parts over the whole interval, from key to key of both routes. Each key begins a
+ * new interval, because routes may jump there. */
+static ebpo_status add_near_parts(const near_search *n)
 {
     const ebpo_scene_pair pair = { n->of, n->other, 0 };
     double to = n->needs->to;
     ebpo_status status = EBPO_OK;
     for (double at = n->needs->from; at < to && status == EBPO_OK;) {
         double next = ebpo_scene_pair_next(n->scene, &pair, at, to);
-        status = come_near(n, at, nextafter(next, -INFINITY), HALVINGS);
+        status = add_near_between(n, at, nextafter(next, -INFINITY), HALVINGS);
         at = next;
     }
-    return status == EBPO_OK ? come_near(n, to, to, HALVINGS) : status;
+    return status == EBPO_OK ? add_near_between(n, to, to, HALVINGS) : status;
 }
 
 /* Returns the longest side of an instance's box in the world. */
@@ -168,7 +175,8 @@ static double size_of(const ebpo_scene *scene, uint64_t instance, double time)
     return size * pose.scale;
 }
 
-/* Returns the default margin of a pair; a point has no size. */
+/* Returns the default margin of a pair: 1/32 of the size of the smaller instance; of the larger one
+ * if the smaller is a point. */
 static double default_margin(const ebpo_scene_needs *needs, const ebpo_scene_pair *pair)
 {
     double a = size_of(needs->scene, pair->a, needs->from);
@@ -176,8 +184,9 @@ static double default_margin(const ebpo_scene_needs *needs, const ebpo_scene_pai
     return (fmin(a, b) > 0 ? fmin(a, b) : fmax(a, b)) / 32;
 }
 
-/* Adds all faces of a model to the need, because the solid may contain the other instance. */
-static void add_whole(ebpo_scene_needs *needs, const ebpo_scene_pair *pair)
+/* Marks both models of the pair as needed completely, because either solid may contain the other
+ * instance. */
+static void add_complete_models(ebpo_scene_needs *needs, const ebpo_scene_pair *pair)
 {
     for (int i = 0; i < 2; i++) {
         ebpo_scene_file_need *need = need_of(needs, i ? pair->b : pair->a);
@@ -190,19 +199,19 @@ static void add_whole(ebpo_scene_needs *needs, const ebpo_scene_pair *pair)
 static ebpo_status add_pair(ebpo_scene_needs *needs, const ebpo_scene_pair *pair)
 {
     if (needs->how.purpose == EBPO_SCENE_FOR_SOLIDS) {
-        add_whole(needs, pair);
+        add_complete_models(needs, pair);
         return EBPO_OK;
     }
     bool inside = needs->how.purpose == EBPO_SCENE_FOR_INSIDE;
     double margin = needs->how.margin > 0 ? needs->how.margin : default_margin(needs, pair);
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < 2 && status == EBPO_OK; i++) {
-        nearing n = { .needs = needs,
-                      .scene = needs->scene,
-                      .of = i ? pair->b : pair->a,
-                      .other = i ? pair->a : pair->b,
-                      .clearance = inside ? 0 : pair->clearance,
-                      .margin = margin };
+        near_search n = { .needs = needs,
+                          .scene = needs->scene,
+                          .of = i ? pair->b : pair->a,
+                          .other = i ? pair->a : pair->b,
+                          .clearance = inside ? 0 : pair->clearance,
+                          .margin = margin };
         n.need = need_of(needs, n.of);
         n.need->users++;
         status = add_near_parts(&n);
@@ -307,17 +316,18 @@ ebpo_status ebpo_scene_report_need(const ebpo_scene_needs *needs, uint64_t model
 
 /* --- views --- */
 
-enum { STEPS = 16 }; /* number of parts of a camera's path between two keys */
+enum { VIEW_STEPS = 16 }; /* number of parts of a camera's path between two keys */
 
-typedef struct seeing {
+/* The search for the levels that a camera can resolve. */
+typedef struct view_search {
     ebpo_scene_needs *needs;
     const ebpo_scene_camera *camera;
     double pixel; /* width of a pixel at a distance of 1 */
-} seeing;
+} view_search;
 
 /* Computes a box that contains the camera's eye between two times, without a key of the camera's
  * route between them. */
-static void eye_box(const seeing *s, double from, double to, ebpo_scene_space *out)
+static void eye_box(const view_search *s, double from, double to, ebpo_scene_bounds *out)
 {
     const ebpo_scene_camera *c = s->camera;
     ebpo_pose at;
@@ -341,12 +351,12 @@ static void eye_box(const seeing *s, double from, double to, ebpo_scene_space *o
     }
 }
 
-/* Computes the least distance of an instance from the eye over a part of the time, and the
- * instance's greatest scale. */
-static ebpo_status distance_between(const seeing *s, uint64_t instance, double from, double to,
+/* Computes the least distance of an instance from the eye between two times, and the instance's
+ * greatest scale. */
+static ebpo_status distance_between(const view_search *s, uint64_t instance, double from, double to,
                                     double *distance, double *scale)
 {
-    ebpo_scene_space eye, box;
+    ebpo_scene_bounds eye, box;
     ebpo_pose at[2];
     eye_box(s, from, to, &eye);
     ebpo_status status = ebpo_scene_instance_box(s->needs->scene, instance, from, to, box.min,
@@ -355,13 +365,13 @@ static ebpo_status distance_between(const seeing *s, uint64_t instance, double f
         status = ebpo_scene_pose(s->needs->scene, instance, i ? to : from, &at[i], s->needs->error);
     if (status != EBPO_OK)
         return status;
-    *distance = ebpo_scene_space_gap(&eye, &box);
+    *distance = ebpo_scene_bounds_gap(&eye, &box);
     *scale = fmax(at[0].scale, at[1].scale);
     return EBPO_OK;
 }
 
 /* Returns true if a box is behind a static camera, which then cannot see it. */
-static bool is_behind(const seeing *s, const ebpo_scene_space *box)
+static bool is_behind(const view_search *s, const ebpo_scene_bounds *box)
 {
     const ebpo_scene_camera *c = s->camera;
     double most = -INFINITY;
@@ -375,7 +385,8 @@ static bool is_behind(const seeing *s, const ebpo_scene_space *box)
     return c->route == EBPO_SCENE_NONE && most < 0;
 }
 
-/* Returns the first level whose cells are at most of this size; -1: all levels are needed. */
+/* Returns the first level whose cells have a diagonal of at most `size`; -1: no level except
+ * perhaps the last has such cells, so all levels are needed. */
 static int level_for(const ebpo_info *info, double size)
 {
     double cell = ebpo_scene_length_above(info->box_size);
@@ -385,12 +396,14 @@ static int level_for(const ebpo_info *info, double size)
     return -1;
 }
 
-static ebpo_status see_instance(const seeing *s, uint64_t instance, double from, double to)
+/* Adds the levels that the camera can resolve of one instance between two times. */
+static ebpo_status add_instance_view(const view_search *s, uint64_t instance, double from,
+                                     double to)
 {
     const ebpo_scene *scene = s->needs->scene;
     uint64_t file = scene->models[scene->instances[instance].as.model].file;
     ebpo_scene_file_need *need = &s->needs->files[file];
-    ebpo_scene_space box;
+    ebpo_scene_bounds box;
     double distance, scale;
     ebpo_status status =
         ebpo_scene_instance_box(scene, instance, from, to, box.min, box.max, s->needs->error);
@@ -406,30 +419,30 @@ static ebpo_status see_instance(const seeing *s, uint64_t instance, double from,
     return EBPO_OK;
 }
 
-static ebpo_status see_from(const seeing *s, double from, double to)
+static ebpo_status add_views_between(const view_search *s, double from, double to)
 {
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < s->needs->scene->instances_count && status == EBPO_OK; i++)
-        status = see_instance(s, i, from, to);
+        status = add_instance_view(s, i, from, to);
     return status;
 }
 
-/* Goes from key to key of the camera's route, in steps. */
-static ebpo_status see_along(const seeing *s)
+/* Adds the views over the whole interval: in steps from key to key of the camera's route. */
+static ebpo_status add_views_along_route(const view_search *s)
 {
     const ebpo_scene_needs *n = s->needs;
     const ebpo_scene_route *route =
         s->camera->route == EBPO_SCENE_NONE ? NULL : &n->scene->routes[s->camera->route];
-    ebpo_status status = route ? EBPO_OK : see_from(s, n->from, n->to);
+    ebpo_status status = route ? EBPO_OK : add_views_between(s, n->from, n->to);
     for (double at = n->from; route && at < n->to && status == EBPO_OK;) {
         double next = ebpo_scene_route_next(route, at, n->to);
-        for (int i = 0; i < STEPS && status == EBPO_OK; i++)
-            status = see_from(s, at + (next - at) * i / STEPS,
-                              i + 1 < STEPS ? at + (next - at) * (i + 1) / STEPS
-                                            : nextafter(next, -INFINITY));
+        for (int i = 0; i < VIEW_STEPS && status == EBPO_OK; i++)
+            status = add_views_between(s, at + (next - at) * i / VIEW_STEPS,
+                                       i + 1 < VIEW_STEPS ? at + (next - at) * (i + 1) / VIEW_STEPS
+                                                          : nextafter(next, -INFINITY));
         at = next;
     }
-    return status == EBPO_OK ? see_from(s, n->to, n->to) : status;
+    return status == EBPO_OK ? add_views_between(s, n->to, n->to) : status;
 }
 
 ebpo_status ebpo_scene_add_views(ebpo_scene_needs *needs)
@@ -438,8 +451,8 @@ ebpo_status ebpo_scene_add_views(ebpo_scene_needs *needs)
     for (uint64_t i = 0; i < needs->scene->cameras_count && status == EBPO_OK; i++) {
         const ebpo_scene_camera *c = &needs->scene->cameras[i];
         double half = c->fov * (3.14159265358979323846 / 360);
-        seeing s = { needs, c, 2 * tan(half) / c->height };
-        status = see_along(&s);
+        view_search s = { needs, c, 2 * tan(half) / c->height };
+        status = add_views_along_route(&s);
         for (uint64_t f = 0; f < needs->scene->files_count; f++)
             needs->files[f].users++;
     }

@@ -47,15 +47,16 @@ static ebpo_status keep_text(ebpo_scene *scene, const char *text, size_t size, e
     return EBPO_OK;
 }
 
-/* Makes a scene of the text. Takes ownership of `folder`; NULL: allocating it has failed. */
-static ebpo_status open_parse(const char *text, size_t size, const char *name, char *folder,
-                              const ebpo_scene_options *options, ebpo_scene **out,
-                              ebpo_error *error)
+/* Makes a scene of the text of a scene file. Takes ownership of `folder`; NULL: its allocation has
+ * failed. */
+static ebpo_status parse_scene(const char *text, size_t size, const char *name, char *folder,
+                               const ebpo_scene_options *options, ebpo_scene **out,
+                               ebpo_error *error)
 {
     ebpo_scene *scene = NULL;
-    size_t mark = ebpo_scene_bom_length(text, size);
-    text += mark;
-    size -= mark;
+    size_t bom_length = ebpo_scene_bom_length(text, size);
+    text += bom_length;
+    size -= bom_length;
     ebpo_status status = folder ? ebpo_scene_new(&scene, error) : ebpo_fail_memory(error, 1);
     if (status == EBPO_OK) {
         free(scene->folder);
@@ -98,7 +99,7 @@ ebpo_status ebpo_scene_parse(const char *text, size_t size, const char *name, co
     ebpo_status status = take_options(&own, options, error);
     if (status != EBPO_OK)
         return status;
-    return open_parse(text, size, name, folder_with_slash(folder), &own, out, error);
+    return parse_scene(text, size, name, folder_with_slash(folder), &own, out, error);
 }
 
 ebpo_status ebpo_scene_open(const char *path, const ebpo_scene_options *options, ebpo_scene **out,
@@ -116,8 +117,8 @@ ebpo_status ebpo_scene_open(const char *path, const ebpo_scene_options *options,
     if (status == EBPO_OK)
         status = ebpo_whole_file_load(&file, NULL, 1, NULL, path, error);
     if (status == EBPO_OK)
-        status = open_parse((const char *)file.data, file.size, path, ebpo_scene_folder_of(path),
-                            &own, out, error);
+        status = parse_scene((const char *)file.data, file.size, path, ebpo_scene_folder_of(path),
+                             &own, out, error);
     if (status == EBPO_OK)
         status = ebpo_whole_file_unchanged(&file, path, error);
     if (status != EBPO_OK) {
@@ -130,6 +131,7 @@ ebpo_status ebpo_scene_open(const char *path, const ebpo_scene_options *options,
 
 /* --- models --- */
 
+/* Opens a file unless it is open already, and sets *number to its index in scene->files. */
 static ebpo_status open_file(ebpo_scene *scene, const char *path, uint64_t max_expansion,
                              uint64_t *number, ebpo_error *error)
 {
@@ -154,9 +156,9 @@ static ebpo_status open_file(ebpo_scene *scene, const char *path, uint64_t max_e
     return EBPO_OK;
 }
 
-/* Sets the model's box to the box of its faces, as the file states it, if that is within the root
- * cell; else to the root cell. */
-static void box_of(ebpo_scene_model_entry *m, const ebpo_info *info)
+/* Sets the model's box, on each axis, to that of its faces, as the file states it, if that is
+ * within the root cell; else to that of the root cell. */
+static void set_model_box(ebpo_scene_model_entry *m, const ebpo_info *info)
 {
     for (int k = 0; k < 3; k++) {
         double low = info->box_origin[k], high = low + info->box_size[k];
@@ -185,6 +187,7 @@ static ebpo_status load_model(ebpo_scene *scene, ebpo_scene_model_entry *m, uint
 {
     char *path = ebpo_scene_join_path(scene->folder, m->path);
     uint64_t number = 0;
+    /* the model was read from the scene file, not added by the caller */
     bool of_text = (uint64_t)(m - scene->models) < scene->text_models;
     ebpo_status status = path ? EBPO_OK : ebpo_fail_memory(error, strlen(m->path));
     if (status == EBPO_OK && of_text && !scene->outside)
@@ -197,12 +200,13 @@ static ebpo_status load_model(ebpo_scene *scene, ebpo_scene_model_entry *m, uint
     const ebpo_info *info = ebpo_file_info(scene->files[number].file);
     status = check_digest(m, info, error);
     if (status == EBPO_OK) {
-        box_of(m, info);
+        set_model_box(m, info);
         m->file = number;
     }
     return status;
 }
 
+/* Checks that the posed coordinates of the instance's model are in range. */
 static ebpo_status check_reach(const ebpo_scene *scene, const ebpo_scene_instance_entry *i,
                                ebpo_error *error)
 {

@@ -1,5 +1,5 @@
-/* Plans and packs a scene: finds the bytes of its models' files that are needed, and writes a
- * folder that has only these bytes.
+/* Plans and packs a scene: finds the parts of its models' files that are needed, and writes a
+ * folder that has only these parts.
  *
  * Packing writes a subset of each file (scene_needs.c), copies the files of poses, and writes a
  * scene file like the original with other paths and digests. The folder is written beside its
@@ -27,12 +27,11 @@
 #include "format/file_in.h"
 #include "io/file_source.h"
 
-/* Names in the folder: the scene file; a model's file, by its index in scene->files; a route's
- * poses. */
+/* Name of the scene file in the folder. */
 #define SCENE_PACKED "packed.scene.json"
 
-/* Reads the options; the scene and its times are valid. */
-static ebpo_status scene_plan_check(ebpo_scene_needs *needs, const ebpo_plan_options *options)
+/* Sets needs->how from the options, and checks the options, the times and the scene. */
+static ebpo_status check_plan_options(ebpo_scene_needs *needs, const ebpo_plan_options *options)
 {
     const ebpo_scene *scene = needs->scene;
     ebpo_error *error = needs->error;
@@ -56,7 +55,7 @@ static ebpo_status scene_plan_check(ebpo_scene_needs *needs, const ebpo_plan_opt
 }
 
 /* Finds the needed part of each file. Free needs->files, also on failure. */
-static ebpo_status scene_plan_needs(ebpo_scene_needs *needs)
+static ebpo_status find_needs(ebpo_scene_needs *needs)
 {
     ebpo_status status = ebpo_scene_begin_needs(needs);
     if (status == EBPO_OK)
@@ -67,8 +66,8 @@ static ebpo_status scene_plan_needs(ebpo_scene_needs *needs)
     return status;
 }
 
-/* Returns the need of each model; free it, also on failure. */
-static ebpo_status scene_plan_list(const ebpo_scene_needs *needs, ebpo_scene_need **out)
+/* Sets *out to a list of the needs of all models; free it, also on failure. */
+static ebpo_status list_needs(const ebpo_scene_needs *needs, ebpo_scene_need **out)
 {
     uint64_t count = needs->scene->models_count;
     ebpo_scene_need *list = ebpo_alloc(count, sizeof *list);
@@ -86,11 +85,11 @@ ebpo_status ebpo_scene_plan(ebpo_scene *scene, double from, double to,
     EBPO_DEFAULT_FP;
     ebpo_scene_needs needs = { .scene = scene, .from = from, .to = to, .error = error };
     ebpo_scene_need *list = NULL;
-    ebpo_status status = scene_plan_check(&needs, options);
+    ebpo_status status = check_plan_options(&needs, options);
     if (status == EBPO_OK)
-        status = scene_plan_needs(&needs);
+        status = find_needs(&needs);
     if (status == EBPO_OK)
-        status = scene_plan_list(&needs, &list);
+        status = list_needs(&needs, &list);
     if (status == EBPO_OK && scene->models_count)
         (void)take(user, list, scene->models_count);
     free(list);
@@ -98,11 +97,13 @@ ebpo_status ebpo_scene_plan(ebpo_scene *scene, double from, double to,
     return status;
 }
 
+/* Writes the name of a model's file in the folder. file: index in scene->files. */
 static void scene_packed_name(uint64_t file, char name[40])
 {
     snprintf(name, 40, "model-%" PRIu64 ".ebpo.h5", file);
 }
 
+/* Writes the name of the file of a route's poses in the folder. */
 static void scene_packed_route(uint64_t route, char name[40])
 {
     snprintf(name, 40, "route-%" PRIu64 ".csv", route);
@@ -132,8 +133,8 @@ static ebpo_status name_files(json_t *root, const ebpo_scene *scene, const ebpo_
     return set ? EBPO_OK : ebpo_fail_memory(error, 1);
 }
 
-static ebpo_status write_in(const char *folder, const char *name, const void *data, size_t size,
-                            ebpo_error *error)
+static ebpo_status write_in_folder(const char *folder, const char *name, const void *data,
+                                   size_t size, ebpo_error *error)
 {
     char *path = malloc(strlen(folder) + strlen(name) + 2);
     if (!path)
@@ -144,7 +145,7 @@ static ebpo_status write_in(const char *folder, const char *name, const void *da
     return status;
 }
 
-/* Copies poses byte for byte, so that they do not change. */
+/* Copies a CSV file of poses byte for byte, so that the numbers stay the same. */
 static ebpo_status copy_poses(const ebpo_scene *scene, const char *csv, const char *folder,
                               const char *name, ebpo_error *error)
 {
@@ -160,7 +161,7 @@ static ebpo_status copy_poses(const ebpo_scene *scene, const char *csv, const ch
     if (status == EBPO_OK)
         status = ebpo_whole_file_unchanged(&file, path, error);
     if (status == EBPO_OK)
-        status = write_in(folder, name, file.data, file.size, error);
+        status = write_in_folder(folder, name, file.data, file.size, error);
     ebpo_whole_file_close(&file);
     free(path);
     return status;
@@ -199,7 +200,7 @@ static ebpo_status scene_write_packed(const ebpo_scene *scene, const ebpo_scene_
     char *text =
         status == EBPO_OK ? json_dumps(root, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL;
     if (status == EBPO_OK)
-        status = text ? write_in(folder, SCENE_PACKED, text, strlen(text), error)
+        status = text ? write_in_folder(folder, SCENE_PACKED, text, strlen(text), error)
                       : ebpo_fail_memory(error, scene->text_size);
     free(text);
     json_decref(root);
@@ -210,7 +211,7 @@ typedef struct packing {
     ebpo_scene_needs needs;
     ebpo_pack_options how;
     const char *folder;
-    char *making; /* name of the folder until it is complete */
+    char *partial_folder; /* name of the folder until it is complete */
     ebpo_scene_packed *files;
     ebpo_error *error;
 } packing;
@@ -252,17 +253,17 @@ static void remove_folder(const ebpo_scene *scene, const char *folder)
 
 static ebpo_status publish_folder(packing *p)
 {
-    ebpo_status status = ebpo_folder_publish(p->making, p->folder, p->error);
+    ebpo_status status = ebpo_folder_publish(p->partial_folder, p->folder, p->error);
     if (status == EBPO_OK) {
-        free(p->making);
-        p->making = NULL;
+        free(p->partial_folder);
+        p->partial_folder = NULL;
     }
     return status;
 }
 
 /* --- models --- */
 
-/* Reads the size and the digest of a file on disk. */
+/* Reads the size, the error bound and the digest of a file that was just written. */
 static ebpo_status inspect_file(packing *p, const char *path, ebpo_scene_packed *out)
 {
     ebpo_file *file = NULL;
@@ -284,6 +285,7 @@ static uint64_t bytes_read(const ebpo_file *file)
     return s.bytes_read;
 }
 
+/* Writes the needed part of a file of models. target: greatest size in bytes; 0: no limit. */
 static ebpo_status write_file(packing *p, uint64_t number, uint64_t target)
 {
     ebpo_scene_packed *out = &p->files[number];
@@ -291,9 +293,9 @@ static ebpo_status write_file(packing *p, uint64_t number, uint64_t target)
     ebpo_subset_options o = ebpo_scene_need_options(&p->needs, number);
     char name[40];
     scene_packed_name(number, name);
-    char *path = path_in(p->making, name);
+    char *path = path_in(p->partial_folder, name);
     if (!path)
-        return ebpo_fail_memory(p->error, strlen(p->making));
+        return ebpo_fail_memory(p->error, strlen(p->partial_folder));
     uint64_t before = bytes_read(file);
     o.target_bytes = target;
     o.threads = p->how.threads;
@@ -316,9 +318,9 @@ static uint64_t sum_of_files(const packing *p)
     return sum;
 }
 
-/* Reduces a plan that is too large. The need of each file is reduced by the same share, except for
- * files of which nothing is needed. */
-static ebpo_status pack_shrink(packing *p)
+/* Writes files again if their sum is above the target size. Each is reduced by the same factor,
+ * except the files of which only the root is needed. */
+static ebpo_status shrink_to_target(packing *p)
 {
     uint64_t fixed = 0, sum = sum_of_files(p), target = p->how.target_bytes;
     ebpo_status status = EBPO_OK;
@@ -342,12 +344,13 @@ static ebpo_status write_files(packing *p)
         return ebpo_fail_memory(p->error, count * sizeof *p->files);
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
         status = write_file(p, i, 0);
-    return status == EBPO_OK ? pack_shrink(p) : status;
+    return status == EBPO_OK ? shrink_to_target(p) : status;
 }
 
 /* --- packing --- */
 
-static ebpo_status pack_check(packing *p, const ebpo_pack_options *options)
+/* Sets p->how from the options, and checks the options and the scene. */
+static ebpo_status check_pack_options(packing *p, const ebpo_pack_options *options)
 {
     const ebpo_scene *scene = p->needs.scene;
     ebpo_plan_options plan = EBPO_PLAN_OPTIONS_INIT;
@@ -363,7 +366,7 @@ static ebpo_status pack_check(packing *p, const ebpo_pack_options *options)
         return ebpo_fail(p->error, EBPO_E_ARGUMENT,
                          "only a scene that was read from a file, without additions, can be "
                          "packed");
-    return scene_plan_check(&p->needs, &plan);
+    return check_plan_options(&p->needs, &plan);
 }
 
 /* Lists the packed files of models. This is done before publishing, because nothing may fail
@@ -393,25 +396,25 @@ ebpo_status ebpo_scene_pack(ebpo_scene *scene, const char *folder, double from, 
                   .folder = folder,
                   .error = error };
     ebpo_scene_packed *list = NULL;
-    ebpo_status status = pack_check(&p, options);
+    ebpo_status status = check_pack_options(&p, options);
     if (status == EBPO_OK)
-        status = ebpo_folder_begin(folder, &p.making, error);
+        status = ebpo_folder_begin(folder, &p.partial_folder, error);
     if (status == EBPO_OK)
-        status = scene_plan_needs(&p.needs);
+        status = find_needs(&p.needs);
     if (status == EBPO_OK)
         status = write_files(&p);
     if (status == EBPO_OK)
-        status = scene_write_packed(scene, p.files, p.making, error);
+        status = scene_write_packed(scene, p.files, p.partial_folder, error);
     if (status == EBPO_OK)
         status = list_packed(&p, &list);
     if (status == EBPO_OK)
         status = publish_folder(&p);
     if (status == EBPO_OK && scene->models_count && take)
         (void)take(user, list, scene->models_count);
-    if (p.making)
-        remove_folder(scene, p.making);
+    if (p.partial_folder)
+        remove_folder(scene, p.partial_folder);
     free(list);
-    free(p.making);
+    free(p.partial_folder);
     free(p.files);
     free(p.needs.files);
     return status;

@@ -4,9 +4,9 @@
  * Rules select the pairs and their clearances. If several rules apply to a pair, the greatest
  * clearance counts; a rule that ignores the pair overrides all others.
  *
- * The box of an instance contains the instance at all times of the interval. Between keys the box
- * is made in steps of little rotation; each step is widened by the distance of the motion from a
- * straight line.
+ * The box of an instance contains the instance at all times of the interval. The time between two
+ * keys is divided into steps of little rotation. The boxes at both ends of a step are widened by
+ * the greatest distance of the motion from a straight line.
  *
  * Sweep and prune sorts boxes along the axis with the least expected overlap. Pairs are returned in
  * the order of their instances. If a test is in doubt, the pair is returned. */
@@ -70,8 +70,8 @@ void ebpo_scene_sort_rules(ebpo_scene *scene)
         sort_sets(&scene->instances[i]);
 }
 
-/* Returns the clearance of the rule of two sets; below 0: pairs are ignored. Returns 0 if there is
- * no rule. */
+/* Returns the clearance of the rule for two sets; below 0: pairs are ignored. Returns 0 if there is
+ * no such rule. */
 static double rule_of(const ebpo_scene *scene, uint64_t a, uint64_t b)
 {
     ebpo_scene_rule_entry wanted = { a < b ? a : b, a < b ? b : a, 0 };
@@ -80,13 +80,14 @@ static double rule_of(const ebpo_scene *scene, uint64_t a, uint64_t b)
     return rule ? rule->clearance : 0;
 }
 
-/* Applies a rule to a pair; returns false if the rule ignores the pair. */
+/* Applies the clearance `rule` of a rule to a pair; returns false if the rule ignores the pair. */
 static bool take_rule(double rule, double *clearance)
 {
     *clearance = fmax(*clearance, rule);
     return rule >= 0;
 }
 
+/* Applies all rules for a set of x and a set of y: looks up the rule of each pair of sets. */
 static bool by_sets(const ebpo_scene *scene, const ebpo_scene_instance_entry *x,
                     const ebpo_scene_instance_entry *y, double *clearance)
 {
@@ -102,6 +103,7 @@ static bool is_in(const ebpo_scene_instance_entry *i, uint64_t set)
     return bsearch(&set, i->sets, i->set_count, sizeof set, compare_sets) != NULL;
 }
 
+/* Does the same as by_sets, but tests each rule of the scene. */
 static bool by_rules(const ebpo_scene *scene, const ebpo_scene_instance_entry *x,
                      const ebpo_scene_instance_entry *y, double *clearance)
 {
@@ -122,16 +124,18 @@ bool ebpo_scene_pair_rule(const ebpo_scene *scene, uint64_t a, uint64_t b, doubl
     const ebpo_scene_instance_entry *x = &scene->instances[a], *y = &scene->instances[b];
     if (x->as.fixed && y->as.fixed)
         return false;
-    /* if both instances have 100,000 groups, looking up all pairs of groups would take hours */
-    bool few = scene->rules_count < (uint64_t)x->set_count * y->set_count;
-    return (few ? by_rules : by_sets)(scene, x, y, clearance);
+    /* test every rule if there are fewer rules than pairs of sets: if both instances have 100,000
+     * groups, looking up all pairs of groups would take hours */
+    bool by_rule = scene->rules_count < (uint64_t)x->set_count * y->set_count;
+    return (by_rule ? by_rules : by_sets)(scene, x, y, clearance);
 }
 
 /* --- poses, boxes and motion --- */
 
+/* Relative margin for sums of a few products: far above their rounding. */
 static const double slack = 0x1p-44;
 /* Rotation in one step of a box, in radians. */
-static const double step_turn = 0.125;
+static const double step_angle = 0.125;
 
 static const ebpo_scene_route *route_of(const ebpo_scene *scene, const ebpo_scene_instance_entry *i)
 {
@@ -204,6 +208,7 @@ static void posed_box(const ebpo_pose *pose, const ebpo_scene_model_entry *m, do
 /* Returns x, or `all` if x is NaN: after an overflow the bound is unknown. */
 static double or_else(double x, double all) { return isnan(x) ? all : x; }
 
+/* Widens a box by the box low .. high, which is first enlarged on each side. */
 static void join_box(double min[3], double max[3], const double low[3], const double high[3],
                      double by)
 {
@@ -236,6 +241,7 @@ ebpo_scene_reach ebpo_scene_reach_of(const ebpo_scene *scene, const ebpo_scene_i
     return reach;
 }
 
+/* Widens min .. max by the box of the instance at a time, enlarged by `by` on each side. */
 static void box_at(const ebpo_scene *scene, const ebpo_scene_instance_entry *i, double time,
                    double by, double min[3], double max[3])
 {
@@ -246,16 +252,17 @@ static void box_at(const ebpo_scene *scene, const ebpo_scene_instance_entry *i, 
     join_box(min, max, low, high, by);
 }
 
-/* Computes a box that contains the instance between two times, without a key between them, in steps
- * of little rotation. */
+/* Widens min .. max so that it contains the instance between two times, with no key between them.
+ * The number of steps follows from the angle of rotation, which is estimated from the sag of the
+ * whole arc: sag = reach * angle^2 / 8. */
 static void box_between(const ebpo_scene *scene, const ebpo_scene_instance_entry *i,
                         ebpo_scene_reach reach, double from, double to, double min[3],
                         double max[3])
 {
     const ebpo_scene_route *route = route_of(scene, i);
     ebpo_scene_step all = ebpo_scene_route_step(route, from, to, reach);
-    double turned = reach.length > 0 ? sqrt(8 * all.sag / reach.length) : 0;
-    int steps = turned < 32 * step_turn ? 1 + (int)(turned / step_turn) : 32;
+    double angle = reach.length > 0 ? sqrt(8 * all.sag / reach.length) : 0;
+    int steps = angle < 32 * step_angle ? 1 + (int)(angle / step_angle) : 32;
     for (int n = 0; n < steps; n++) {
         double begin = n == 0 ? from : from + (to - from) * n / steps;
         double end = n + 1 == steps ? to : from + (to - from) * (n + 1) / steps;
@@ -265,6 +272,7 @@ static void box_between(const ebpo_scene *scene, const ebpo_scene_instance_entry
     }
 }
 
+/* Widens min .. max so that it contains the instance at all times from .. to. */
 static void swept_box(const ebpo_scene *scene, const ebpo_scene_instance_entry *i, double from,
                       double to, double min[3], double max[3])
 {
@@ -295,9 +303,11 @@ ebpo_status ebpo_scene_motion(const ebpo_scene *scene, uint64_t instance, double
     for (double at = from; route && at < to;) {
         double next = ebpo_scene_route_next(route, at, to);
         sum += ebpo_scene_route_step(route, at, next, reach).length;
-        bool key = next > route->keys[0].time && ebpo_scene_route_next(route, next, INFINITY) >
-                                                     ebpo_scene_route_next(route, at, INFINITY);
-        if (route->jumps && key)
+        /* `next` is a key other than the first: after it, another key follows */
+        bool ends_at_key =
+            next > route->keys[0].time && ebpo_scene_route_next(route, next, INFINITY) >
+                                              ebpo_scene_route_next(route, at, INFINITY);
+        if (route->jumps && ends_at_key)
             sum = INFINITY;
         at = next;
     }
@@ -381,9 +391,8 @@ static int best_axis(const sweep *s)
     return best;
 }
 
-/* Exchanges axes in each box, so that the chosen axis is the first one while boxes are sorted and
- * swept. */
-static void turn_axis(sweep *s, int axis)
+/* Exchanges the first axis of each box with the chosen one, by which boxes are sorted and swept. */
+static void swap_axes(sweep *s, int axis)
 {
     for (uint64_t i = 0; i < s->count; i++) {
         box *b = &s->boxes[i];
@@ -415,6 +424,8 @@ static bool near_each_other(const box *x, const box *y, double by)
     return true;
 }
 
+/* Adds a pair of boxes to the result if the rules do not ignore it and its boxes are within its
+ * clearance. */
 static ebpo_status take_pair(sweep *s, const box *x, const box *y, ebpo_error *error)
 {
     ebpo_scene_pair pair = { x->instance, y->instance, 0 };
@@ -481,7 +492,7 @@ ebpo_status ebpo_scene_pairs(const ebpo_scene *scene, double from, double to,
     ebpo_status status =
         s.boxes ? make_boxes(&s, from, to, error) : ebpo_fail_memory(error, s.count * sizeof(box));
     if (status == EBPO_OK && s.count) {
-        turn_axis(&s, best_axis(&s));
+        swap_axes(&s, best_axis(&s));
         qsort(s.boxes, s.count, sizeof *s.boxes, compare_boxes);
         status = sweep_boxes(&s, error);
     }

@@ -15,7 +15,7 @@
 #include "io/publish.h"
 #include "extras/scene/scene_parts.h"
 
-/* Columns of frames come first, then those of clashes. */
+/* Datasets of the file: those of /frames come first, then those of /clashes. */
 enum {
     TIME,
     FIRST_CLASH,
@@ -100,6 +100,7 @@ static const char *instance_name(const ebpo_scene *scene, uint64_t i)
 
 static const char *model_name(const ebpo_scene *scene, uint64_t i) { return scene->models[i].name; }
 
+/* Writes names, each ended by a 0 byte, to a dataset. */
 static ebpo_status put_names(ebpo_scene_report *r, const char *path,
                              const char *(*name)(const ebpo_scene *, uint64_t), uint64_t count,
                              ebpo_error *error)
@@ -255,7 +256,7 @@ typedef struct rows {
         depth[ROWS][4];
 } rows;
 
-/* Returns the number of an object, or -1 if it is missing. */
+/* Returns an index or a count as a signed number; -1: there is none. */
 static int64_t record_number(uint64_t n) { return n > INT64_MAX ? -1 : (int64_t)n; }
 
 static void fill_row(rows *out, uint64_t i, const ebpo_scene_clash *m, int64_t frame)
