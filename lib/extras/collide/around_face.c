@@ -1,6 +1,7 @@
-/* Finds which models are on either side of a posed face of two models. The face is cut into pieces
- * along the faces of both models that intersect it (face_pieces.h). At a point of each piece, the
- * winding numbers of both models show which sides of the piece are in each model.
+/* Finds on which sides of a posed face each of two models is. The face, which belongs to one of
+ * them, is cut into pieces along the faces of both models that intersect it (face_pieces.h). At a
+ * point of each piece, the winding numbers of both models show which sides of the piece are in each
+ * model.
  *
  * All decisions are exact: points are fractions, and posed coordinates are the doubles that
  * geometry/pose.h defines. Only the faces near a point are looked up in the models' hierarchies, so
@@ -91,6 +92,7 @@ static bool near_box(const cutting *c, const double t[3][3])
     return true;
 }
 
+/* Adds the cuts of faces that intersect the box of the face. */
 static bool cut_by(void *user, const ebpo_triangles *triangles)
 {
     const cutting *c = user;
@@ -147,6 +149,7 @@ static bool shift_is_front(const ebpo_face_cuts *f)
     return sign > 0;
 }
 
+/* Sets *in to the sides of a piece that are in the interior of solid i. */
 static ebpo_status sides_of_solid(const piece_visit *l, const ebpo_piece *piece, int i,
                                   unsigned *in, ebpo_error *error)
 {
@@ -200,7 +203,7 @@ ebpo_status ebpo_visit_around_face(ebpo_two_models *two, int m, uint64_t face, e
     return status == EBPO_OK ? visit_pieces(&l, &two->pieces, error) : status;
 }
 
-/* --- points of the models as closed sets --- */
+/* --- points of the models with their boundaries --- */
 
 /* Faces of a model near a point. */
 typedef struct faces_at {
@@ -218,6 +221,7 @@ static bool note_faces(void *user, const ebpo_triangles *triangles)
     return !n->no_memory;
 }
 
+/* Finds the faces of model m whose posed boxes may contain the point x. */
 static ebpo_status find_faces(ebpo_two_models *two, int m, const mpq_t x[3], faces_at *n,
                               ebpo_error *error)
 {
@@ -247,7 +251,8 @@ static bool note_side(void *user, const ebpo_around *around)
     return !a->in;
 }
 
-/* Examines one face that may contain the point. */
+/* Examines one face that may contain the point x: sets a->on if it does, and a->in if the model is
+ * also on a side of it there. */
 static ebpo_status query_face(face_query *a, uint64_t face, const mpq_t x[3], ebpo_error *error)
 {
     double t[3][3];
@@ -267,7 +272,7 @@ static ebpo_status query_face(face_query *a, uint64_t face, const mpq_t x[3], eb
     return status == EBPO_OK && !a->in ? visit_pieces(&l, &two->others, error) : status;
 }
 
-/* Finds if model m, as a closed set, contains the point. */
+/* Sets *has to true if model m with its boundary contains the point x. */
 static ebpo_status has_point(ebpo_two_models *two, int m, const mpq_t x[3], bool *has,
                              ebpo_error *error)
 {
@@ -291,6 +296,7 @@ typedef struct common {
     bool *has;
 } common;
 
+/* Tests a vertex of the pieces; ends the visits with EBPO_E_CANCELLED if both models contain it. */
 static ebpo_status query_both(void *user, const mpq_t x[3], ebpo_error *error)
 {
     const common *c = user;

@@ -1,5 +1,5 @@
-/* Finds which models are on either side of the pieces of a posed face, for two models, exactly. One
- * thread. */
+/* Finds, exactly, on which sides of a posed face each of two models is. For one thread at a time.
+ */
 #ifndef EBPO_COLLIDE_AROUND_FACE_H
 #define EBPO_COLLIDE_AROUND_FACE_H
 
@@ -14,12 +14,12 @@ typedef struct ebpo_two_models {
     ebpo_faces_by_number *faces[2];
     bool solid[2];
     ebpo_rule rule[2];
-    ebpo_face_cuts pieces, /* cuts of the examined face */
-        others;            /* cuts of faces around one of its vertices */
+    ebpo_face_cuts pieces; /* cuts of the examined face */
+    ebpo_face_cuts others; /* cuts of faces around one of its vertices */
 } ebpo_two_models;
 
-/* Faces are looked up in `places`, which must live longer than `two`. Fails with the errors of
- * posing and of contexts. */
+/* Prepares both models of the query places->collision. Faces are looked up in `places`, which must
+ * live longer than `two`. Fails with the errors of posing and of contexts. */
 EBPO_MUST_USE ebpo_status ebpo_two_models_begin(ebpo_two_models *two, ebpo_pair_faces *places,
                                                 ebpo_error *error);
 /* Releases the memory of subtrees until the next query. */
@@ -28,20 +28,20 @@ void ebpo_two_models_let_go(ebpo_two_models *two);
 uint64_t ebpo_two_models_loads(const ebpo_two_models *two);
 void ebpo_two_models_end(ebpo_two_models *two);
 
-/* Sides of a face: in front, to which its normal points, and behind. */
+/* Sides of a face: its normal points to the front. */
 enum { EBPO_SIDE_FRONT = 1, EBPO_SIDE_BACK = 2, EBPO_SIDE_BOTH = 3 };
 
-/* A piece of a face. */
+/* What is around a piece of a face. */
 typedef struct ebpo_around {
-    /* For each model: bits of the sides of the piece on which there is the model's interior. For a
-     * surface: both sides if the surface contains the piece, else 0. */
+    /* [model] bits of the sides of the piece that are in the interior of the solid. For a surface:
+     * EBPO_SIDE_BOTH if the surface contains the piece, otherwise 0. */
     unsigned in[2];
 } ebpo_around;
 
-/* Returns false to stop the visits; the function that visits then succeeds. */
+/* Called for each piece; returns false to stop. The function that calls it then succeeds. */
 typedef bool (*ebpo_around_fn)(void *user, const ebpo_around *around);
 
-/* Returns a face of model m at its pose. *has_area is false if the corners are on one line. */
+/* Computes the posed corners of a face of model m. *has_area is false if they are on one line. */
 EBPO_MUST_USE ebpo_status ebpo_two_models_face(const ebpo_two_models *two, int m, uint64_t face,
                                                double out[3][3], bool *has_area, ebpo_error *error);
 
@@ -51,7 +51,8 @@ EBPO_MUST_USE ebpo_status ebpo_visit_around_face(ebpo_two_models *two, int m, ui
                                                  ebpo_around_fn visit, void *user,
                                                  ebpo_error *error);
 
-/* Finds if a face of model m has a point that belongs to both models, as closed sets. */
+/* Sets *has to true if a face of model m has a point that belongs to both models, each with its
+ * boundary. */
 EBPO_MUST_USE ebpo_status ebpo_face_has_common_point(ebpo_two_models *two, int m, uint64_t face,
                                                      bool *has, ebpo_error *error);
 

@@ -4,8 +4,8 @@
  * order that does not change when the caller swaps them, so results do not depend on the caller's
  * order.
  *
- * A collider belongs to one thread at a time. Colliders of models that are subsets are refused,
- * except where the caller knows which parts are omitted (ebpo_collider_of_parts). */
+ * A collider belongs to one thread at a time. ebpo_collider_new refuses models that are subsets;
+ * ebpo_collider_of_parts accepts them for callers that know which parts are omitted. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -159,7 +159,7 @@ bool ebpo_collision_is_late(const ebpo_collision *q)
     return q->late != UINT64_MAX && ebpo_clock() >= q->late;
 }
 
-/* Counts a file that both models use once. */
+/* A file that both models use is counted once. */
 uint64_t ebpo_collision_bytes_read(const ebpo_collision *q)
 {
     uint64_t bytes = 0;
@@ -182,8 +182,6 @@ ebpo_face_pair ebpo_collision_pair(const ebpo_collision *q, const ebpo_accel *fi
     int a = q->turned, b = !q->turned;
     return (ebpo_face_pair){ source[a], source[b], file[a], file[b], pair->kind, 0 };
 }
-
-/* Chooses the kernels of a walk. */
 
 void ebpo_pair_walk_begin(ebpo_pair_walk *w, const ebpo_accel_pair *pair)
 {

@@ -1,4 +1,4 @@
-/* A collider, and the common first step of all queries of two models. */
+/* A collider, and the common beginning of all queries on two models. */
 #ifndef EBPO_COLLIDE_COLLIDER_H
 #define EBPO_COLLIDE_COLLIDER_H
 
@@ -9,7 +9,8 @@
 #include "extras/collide/hierarchy_walk.h"
 #include "query/query_model.h"
 
-/* As ebpo_collider_new, for models that may be subsets: results are about the faces in the files.
+/* As ebpo_collider_new, but the models may be subsets: results consider only the faces in the
+ * files.
  */
 EBPO_MUST_USE ebpo_status ebpo_collider_of_parts(ebpo_model *a, ebpo_model *b,
                                                  const ebpo_collider_options *options,
@@ -19,26 +20,27 @@ struct ebpo_collider {
     ebpo_model *model[2]; /* in the caller's order */
     ebpo_collider_options options;
     ebpo_pair_walk walk;   /* walk of the calling thread */
-    ebpo_pair_walk *walks; /* walks of the threads that find all pairs, between queries; NULL: none
-                            * are kept */
+    ebpo_pair_walk *walks; /* [walk_count] walks of other threads, kept for the next query that
+                            * finds all pairs; or NULL */
     unsigned walk_count;
-    uint64_t node_pairs, block_pairs, exact;
-    uint64_t subtree_pairs, subtrees, loads, bytes_read; /* counts for models in parts */
+    uint64_t node_pairs, block_pairs, exact;             /* as in ebpo_collider_stats */
+    uint64_t subtree_pairs, subtrees, loads, bytes_read; /* the same for models in parts */
     struct ebpo_gap_search *gap;   /* state of distance queries, after the first one */
     struct ebpo_face_two *nearest; /* the last nearest pair, of the caller's A and B; or NULL */
     ebpo_context *context[2]; /* contexts of depth queries, after the first one of that model */
-    uint32_t *slots[2];       /* slots of faces by numbers in the file, after the first query that
-                               * needs them */
+    uint32_t *slots[2];       /* ebpo_face_slots of whole models, after the first query that needs
+                               * them */
 };
 
-/* A query: options checked, models in an order that does not change when the caller swaps them. */
+/* A query with checked options. Its models are in an order that stays the same when the caller
+ * swaps them. */
 typedef struct ebpo_collision {
     ebpo_collider *collider;
     ebpo_collide_options options;
     bool turned; /* the caller's B comes first */
     ebpo_model *model[2];
     ebpo_block_posing posing[2];
-    double reach;  /* greatest size of posed coordinates */
+    double reach;  /* bound of the sizes of posed coordinates */
     uint64_t late; /* deadline, a time of ebpo_clock; UINT64_MAX: none */
 } ebpo_collision;
 
@@ -46,10 +48,11 @@ EBPO_MUST_USE ebpo_status ebpo_collision_begin(ebpo_collision *out, ebpo_collide
                                                const ebpo_collide_options *options,
                                                ebpo_error *error);
 
+/* Returns true if the deadline has passed. */
 bool ebpo_collision_is_late(const ebpo_collision *collision);
 
-/* Finds the first contact of two accels of the query's models. Stores it in found_pairs[0] and
- * found_slot of the collider's walk. *found is set as by ebpo_collide_first. */
+/* Finds a contact of two hierarchies of the query's models: in found_pairs[0] and found_slot of the
+ * collider's walk. *found is set as by ebpo_collide_first. stage: for the progress function. */
 EBPO_MUST_USE ebpo_status ebpo_collision_first(const ebpo_collision *collision,
                                                const ebpo_accel *const accel[2], const char *stage,
                                                int32_t *found, ebpo_error *error);
@@ -67,17 +70,17 @@ void ebpo_pair_walk_begin(ebpo_pair_walk *walk, const ebpo_accel_pair *pair);
 /* Adds a walk's counts to the collider's. */
 void ebpo_collider_count(ebpo_collider *collider, ebpo_pair_walk *walk);
 
-/* Converts local numbers of two accels to the pair that the caller receives. */
+/* Converts a pair of local face indices of two accels to the pair that the caller receives. */
 ebpo_face_pair ebpo_collision_pair(const ebpo_collision *collision, const ebpo_accel *first,
                                    const ebpo_accel *second, const ebpo_found_pair *pair);
 
-/* As ebpo_collide_self; both poses of the options are equal. */
+/* Finds the pairs of ebpo_collide_self at a pose, which both poses of the options have. */
 EBPO_MUST_USE ebpo_status ebpo_collide_self_posed(ebpo_collider *collider,
                                                   const ebpo_collide_options *options,
                                                   ebpo_pairs_fn take, void *user,
                                                   ebpo_error *error);
 
-/* Returns the interval lo .. hi with its kind. */
+/* Returns the interval lo .. hi as a result, with its kind. */
 static inline ebpo_certain ebpo_certain_of(double lo, double hi)
 {
     bool bound = lo != hi && (lo == 0 || isinf(hi));

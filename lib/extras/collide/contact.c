@@ -1,11 +1,11 @@
-/* Computes where two crossing faces intersect: the ends of the common segment.
+/* Computes the segment that two crossing faces have in common, by its ends.
  *
  * Exact signs (geometry/predicates.h) decide which edges pierce the other face, so the ends are on
  * the right edges. The point where an edge pierces a plane is computed in double-double arithmetic.
- * Where numbers are too large or too small for its error bounds, the point is computed exactly with
+ * If numbers are too large or too small for its error bounds, the point is computed exactly with
  * GMP and rounded once. Neither the order of the faces nor that of their corners changes a bit of
- * the points. Bounds: docs/develop/collision.md, "Contact of a crossing pair". Pure functions, any
- * thread. */
+ * the points. Bounds: docs/develop/collision.md, "Contact of a crossing pair". The functions are
+ * pure and can be called from any thread. */
 #include "core/strict_fp.h"
 
 #include "extras/collide/face_pairs.h"
@@ -17,8 +17,8 @@
 #include "geometry/integer_vectors.h"
 #include "geometry/triangle_pair.h"
 
-/* An edge that goes from below a plane to above it. The ends of the edge and the corners of the
- * plane are sorted by coordinates. */
+/* An edge with its ends on different sides of a plane, and three points of the plane. The ends and
+ * the points are each sorted by coordinates. */
 typedef struct piercing {
     const double *end[2], *plane[3];
 } piercing;
@@ -43,8 +43,8 @@ static piercing piercing_of(const double edge_of[3][3], int from, int to, const 
 
 /* --- the point, in double-double arithmetic --- */
 
-/* Computes the height of `point` over the plane, times the normal's length. Returns the sum of the
- * sizes of its products. */
+/* Computes the signed distance of `point` from the plane through `from`, times the normal's length.
+ * Returns the sum of the absolute values of its products, for the error bound. */
 static double height_over(const ebpo_pair normal[3], const double products[3], const double *from,
                           const double *point, ebpo_pair *height)
 {
@@ -58,7 +58,7 @@ static double height_over(const ebpo_pair normal[3], const double products[3], c
 }
 
 /* Computes the position of the point as a fraction of the edge: height[0] / (height[0] -
- * height[1]). Returns false if it is not certain enough. */
+ * height[1]). Returns false if its error may be too large. */
 static bool share_of_edge(const piercing *p, ebpo_pair *share)
 {
     ebpo_pair e[3], f[3], normal[3], height[2];
@@ -92,6 +92,7 @@ static bool is_ordinary(const piercing *p)
     return true;
 }
 
+/* Computes the point in double-double arithmetic; returns false if its error may be too large. */
 static bool point_by_pairs(const piercing *p, double out[3])
 {
     ebpo_pair share, d[3];
@@ -127,7 +128,8 @@ static void set_exact(exact_piercing *e, const piercing *p, int unit)
     }
 }
 
-/* Computes the point from heights h0 and h1 of different signs: (end1 h0 - end0 h1) / (h0 - h1). */
+/* Computes the point (end1 h0 - end0 h1) / (h0 - h1), where h0 and h1, of different signs, are the
+ * heights of the ends over the plane. */
 static void exact_point(exact_piercing *e, int unit, double out[3])
 {
     if (mpz_sgn(e->height[0]) < 0 || mpz_sgn(e->height[1]) > 0)
@@ -170,8 +172,7 @@ static void compute_piercing(const piercing *p, double out[3])
 
 /* --- which edge pierces --- */
 
-/* An edge of a face, beginning at the corner that is alone on its side of the other face's plane.
- */
+/* An edge of a face, from the corner that is the only one on its side of the other face's plane. */
 typedef struct edge {
     const double (*face)[3], (*plane)[3];
     int from, to;
@@ -186,6 +187,7 @@ static ebpo_feature feature_of(const edge *e)
     return (ebpo_feature)(EBPO_NEAR_EDGE0 + (e->to == next ? e->from : e->to));
 }
 
+/* Computes the point where an edge intersects the other face's plane. */
 static void end_of(const edge *e, double out[3])
 {
     if (e->ends_there) {
@@ -196,8 +198,8 @@ static void end_of(const edge *e, double out[3])
     compute_piercing(&p, out);
 }
 
-/* Chooses one of two edges that intersect the other plane: the one that ends there, else the lesser
- * one. */
+/* Chooses one of two edges with the same piercing point: the one that ends there, otherwise the one
+ * whose ends are less by coordinates. */
 static const edge *choose_edge(const edge *a, const edge *b)
 {
     if (a->ends_there || b->ends_there)

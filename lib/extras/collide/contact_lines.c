@@ -1,10 +1,10 @@
-/* Joins the segments of all crossing pairs to lines of contact, where segments end at the same
- * features of the same faces.
+/* Joins the segments of all crossing pairs to lines of contact. Two segments are joined where they
+ * end at the same features of the same faces.
  *
- * Each end has a key: the edge or corner of the face that contains the end, and the face of the
- * other model. Ends with equal keys are the same point. Corners with equal coordinates have equal
- * numbers (face_patches.h). A line continues where exactly one segment ends and exactly one begins;
- * at all other points it ends. */
+ * Each end has a key: the edge or corner that contains the end, and the face of the other model.
+ * Ends with equal keys are the same point. Corners with equal coordinates have the same index
+ * (face_patches.h). A line continues where exactly one segment ends and exactly one begins; at all
+ * other points it ends. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -19,11 +19,11 @@
 
 #define NONE UINT32_MAX
 
-/* Key of an end: the feature of each model that contains the end. An edge is two corners, the
- * lesser first. A corner is a corner and NONE. A face is NONE and the face. */
+/* Key of an end: for each model the feature that contains the end. An edge is the indices of its
+ * two corners, the lesser first; a corner is its index and NONE; a face is NONE and its index. */
 typedef struct end_key {
-    uint32_t on[2][2];
-    uint32_t end; /* twice the segment's number, plus 1 for its second end */
+    uint32_t on[2][2]; /* [model] */
+    uint32_t end;      /* twice the segment's index, plus 1 for its second end */
 } end_key;
 
 typedef struct segment {
@@ -34,23 +34,24 @@ typedef struct segment {
 } segment;
 
 typedef struct lines {
-    ebpo_pair_faces places;
-    uint64_t most; /* maximum number of segments */
-    segment *segment;
-    end_key *key; /* two for each segment */
+    ebpo_pair_faces places; /* for looking up faces */
+    uint64_t most;          /* maximum number of segments */
+    segment *segment;       /* [count] */
+    end_key *key;           /* two for each segment */
     uint64_t count, capacity, key_capacity;
     ebpo_corner_ids corners[2];
     ebpo_polyline line;
     double *points, *normals;
     uint64_t *faces;
     uint64_t points_capacity, normals_capacity, faces_capacity;
-    bool full, no_memory;
-    ebpo_error *error; /* error of `status` */
+    bool full, no_memory; /* there are more than `most` segments; memory is short */
+    ebpo_error *error;    /* error of `status` */
     ebpo_status status;
 } lines;
 
 /* --- gathering --- */
 
+/* Computes the unit normal of a face; 0, 0, 0 if it has no area in doubles. */
 static void unit_normal(const double t[3][3], double out[3])
 {
     double e[2][3], most[2] = { 0, 0 }, length;
@@ -71,8 +72,8 @@ static void unit_normal(const double t[3][3], double out[3])
         out[k] /= length;
 }
 
-/* Sets the feature `on` of a face of the caller's model m; `t` has the face's corners as in the
- * file. Returns false without memory. */
+/* Sets `out` to the key of the feature `on` (an ebpo_feature) of a face of the caller's model m.
+ * `t` has the face's corners as in the file. Returns false without memory. */
 static bool set_feature(lines *l, int m, uint64_t face, const double t[3][3], unsigned on,
                         uint32_t out[2])
 {
@@ -93,7 +94,8 @@ static bool set_feature(lines *l, int m, uint64_t face, const double t[3][3], un
     return true;
 }
 
-/* Returns false without memory. */
+/* Adds the segment of a crossing pair, with the keys of its ends. Returns false without memory;
+ * sets l->status after other failures. */
 static bool add_segment(lines *l, const ebpo_face_pair *pair)
 {
     ebpo_posed_pair faces;
@@ -154,6 +156,7 @@ static int by_features(const void *x, const void *y)
     return order ? order : (p->end > q->end) - (p->end < q->end);
 }
 
+/* Joins segments where exactly one ends and exactly one begins. */
 static void join_segments(lines *l)
 {
     uint64_t n = 2 * l->count;
@@ -175,15 +178,16 @@ static void join_segments(lines *l)
 
 static bool add_point(lines *l, const double at[3])
 {
-    const double x[3] = { at[0], at[1],
-                          at[2] }; /* a copy: `at` may point into the array that grows */
+    /* a copy, because `at` may point into the array that grows */
+    const double x[3] = { at[0], at[1], at[2] };
     if (!ebpo_grow(&l->points, &l->points_capacity, 3 * (l->line.count + 1), sizeof *l->points))
         return false;
     memcpy(l->points + 3 * l->line.count++, x, sizeof x);
     return true;
 }
 
-/* Adds the first point of a segment. The next segment begins at this segment's end. */
+/* Adds the first point of a segment, its faces and normals. The segment's second point is the first
+ * one of the next segment. */
 static bool add_to_line(lines *l, segment *s)
 {
     uint64_t n = l->line.count;
@@ -198,7 +202,7 @@ static bool add_to_line(lines *l, segment *s)
     return true;
 }
 
-/* Makes the line that begins with segment i, in the order of segments. */
+/* Makes the line that contains segment i, the first segment that is not yet reported. */
 static bool make_line(lines *l, uint32_t i)
 {
     uint32_t first = i, last = NONE;

@@ -2,7 +2,7 @@
  *
  * Faces are connected by corners with equal coordinates, or by edges that two faces share. They are
  * joined in a disjoint-set forest whose roots are the first faces of the patches. A hash table
- * numbers corners: equal coordinates have equal numbers (0 and -0 are equal).
+ * gives corners with equal coordinates the same index (0 and -0 are equal).
  *
  * A patch whose faces intersect no face of the other model lies entirely on one side of that model.
  * The relation of two models and the exact volumes of results rely on this. */
@@ -20,8 +20,8 @@
 
 /* --- joined faces --- */
 
-/* Returns the first face that is joined with `face` so far, and shortens paths. Initially
- * first[face] = face. */
+/* Returns the first face that is joined with `face` so far, and shortens paths in the forest
+ * `first`. Initially first[face] = face. */
 static inline uint32_t first_joined(uint32_t *first, uint32_t face)
 {
     while (first[face] != face) {
@@ -54,7 +54,7 @@ static bool same_corner(const double p[3], const double q[3])
     return p[0] == q[0] && p[1] == q[1] && p[2] == q[2];
 }
 
-/* Returns the corner's entry of the table, or a free entry. */
+/* Returns the corner's entry of the table, or the free entry where it can be added. */
 static uint32_t *find_corner(const ebpo_corner_ids *ids, const double x[3])
 {
     uint64_t i = hash_of(x) & (ids->table_size - 1);
@@ -102,10 +102,11 @@ void ebpo_corner_ids_free(ebpo_corner_ids *ids)
 
 typedef struct joining {
     ebpo_corner_ids corners;
-    uint32_t *user; /* for each corner: a face that has it */
-    uint64_t users;
+    uint32_t *user; /* [corner] a face that has it */
+    uint64_t users; /* capacity of `user` */
 } joining;
 
+/* Joins a face with the faces that have one of its corners. Returns false without memory. */
 static bool join_face(joining *j, uint32_t *patch, uint32_t face, const double t[3][3])
 {
     for (int i = 0; i < 3; i++) {
@@ -153,8 +154,9 @@ ebpo_status ebpo_face_patches(const ebpo_accel *subtree, const uint32_t *slots,
 
 /* --- patches over edges --- */
 
-/* Each edge is listed at its corner with the smaller number; an entry has the other corner and the
- * face. Two equal entries of a sorted list connect their faces. */
+/* Each edge of a face is in the list of its corner with the lesser index. An entry has the other
+ * corner and the face. If exactly two entries of a list have the same other corner, their faces are
+ * joined. */
 
 #define NO_CORNER UINT32_MAX
 
@@ -166,6 +168,7 @@ typedef struct edges {
     uint32_t *patch;
 } edges;
 
+/* Sets the corners of all faces, and makes each face a patch. Returns false without memory. */
 static bool number_corners(edges *e, ebpo_corner_ids *ids, const uint32_t *slots,
                            const ebpo_posing *posing)
 {
@@ -182,7 +185,9 @@ static bool number_corners(edges *e, ebpo_corner_ids *ids, const uint32_t *slots
     return true;
 }
 
-/* Sets the lesser and the other corner of edge i. Returns false if the face has no area. */
+/* Sets *lesser and *other to the corners of edge i of face f. Returns false if the face has no
+ * area.
+ */
 static bool edge_of(const edges *e, uint32_t f, int i, uint32_t *lesser, uint32_t *other)
 {
     uint32_t a = e->corner[f][i], b = e->corner[f][i == 2 ? 0 : i + 1];

@@ -1,4 +1,4 @@
-/* Patches of connected faces, and the numbers of corners that are used to find them. */
+/* Finds patches of connected faces. */
 #ifndef EBPO_COLLIDE_FACE_PATCHES_H
 #define EBPO_COLLIDE_FACE_PATCHES_H
 
@@ -8,29 +8,33 @@
 #include "geometry/pose.h"
 #include "query/accel.h"
 
-/* Numbers of corners: equal coordinates have equal numbers (0 and -0 are equal). Zero at first. */
+/* A table that gives each corner an index; corners with equal coordinates have the same index (0
+ * and -0 are equal). An empty table is zero. */
 typedef struct ebpo_corner_ids {
     double (*at)[3]; /* [count] */
     uint64_t count, capacity;
-    uint32_t *table; /* open addressing: the corner's number + 1; 0: free */
+    uint32_t *table; /* [table_size] hash table: a corner's index + 1; 0: free */
     uint64_t table_size;
 } ebpo_corner_ids;
 
-/* Finds or adds a corner. Returns false without memory or with 2^32 - 2 corners. */
+/* Finds or adds the corner x, and sets *id to its index. Returns false without memory or with 2^32
+ * - 2 corners. */
 bool ebpo_corner_id(ebpo_corner_ids *ids, const double x[3], uint32_t *id);
 void ebpo_corner_ids_free(ebpo_corner_ids *ids);
 
-/* Finds the patches of a subtree's owned faces, connected by corners with equal coordinates.
- * (*out)[i] is the first face of the patch of the owned face whose index in the file is first_face
- * + i. Omitted faces (`omitted` has a bit for each face of the file) connect no other faces, and
- * each of them is a patch. The caller frees the result. */
+/* Finds the patches of a subtree's owned faces, which are connected by corners with equal
+ * coordinates. (*out)[i] is the first face of the patch of the owned face i, whose index in the
+ * file is subtree->first_face + i. Omitted faces (`omitted` has a bit for each face of the file)
+ * connect no other faces; each of them is a separate patch. slots: ebpo_face_slots. The caller
+ * frees the result. */
 EBPO_MUST_USE ebpo_status ebpo_face_patches(const ebpo_accel *subtree, const uint32_t *slots,
                                             const uint64_t *omitted, uint32_t **out,
                                             ebpo_error *error);
 
-/* Finds the patches of a whole model at a pose, connected by edges (equal posed corners) that
- * exactly two faces with an area share. (*out)[i] is the first face of the patch of the face whose
- * index in the file is i. A face without area is a separate patch. The caller frees the result. */
+/* Finds the patches of a whole model at a pose. They are connected by edges (pairs of equal posed
+ * corners) that exactly two faces with an area share. (*out)[i] is the first face of the patch of
+ * the face whose index in the file is i. A face without area is a separate patch. slots:
+ * ebpo_face_slots. The caller frees the result. */
 EBPO_MUST_USE ebpo_status ebpo_edge_patches(const ebpo_accel *whole, const uint32_t *slots,
                                             const ebpo_posing *posing, uint32_t **out,
                                             ebpo_error *error);

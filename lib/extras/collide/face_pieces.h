@@ -1,5 +1,5 @@
-/* Computes the pieces of a face that other faces cut. Exact: for each piece a point, in fractions,
- * that is on no cut. One thread. */
+/* Computes the pieces into which other faces cut a face: for each piece, exactly, a point in
+ * fractions that is on no cut. For one thread at a time. */
 #ifndef EBPO_COLLIDE_FACE_PIECES_H
 #define EBPO_COLLIDE_FACE_PIECES_H
 
@@ -9,9 +9,10 @@
 
 #include <ebpo/base.h>
 
-/* A cut, seen along an axis: p[0] <= p[1]. */
+/* A cut: a segment of the face, projected along an axis to coordinates p and q. */
 typedef struct ebpo_face_cut {
-    mpq_t p[2], q[2], slope; /* slope: dq / dp, for cuts with p[0] < p[1] */
+    mpq_t p[2], q[2]; /* both ends, p[0] <= p[1] */
+    mpq_t slope;      /* dq / dp, for cuts with p[0] < p[1] */
 } ebpo_face_cut;
 
 /* Another face with an area in the same plane. */
@@ -21,23 +22,25 @@ typedef struct ebpo_flat_face {
     bool same_direction; /* its normal and the normal of the cut face have the same direction */
 } ebpo_flat_face;
 
-/* Bounds of a piece at the right end of a strip. A strip is the part of the view between two
+/* Bounds of q of a piece at the end of a strip. A strip is the part of the projection between two
  * neighbouring events. */
 typedef struct ebpo_piece_end {
     mpq_t low, high;
 } ebpo_piece_end;
 
-/* State of one face; arrays are reused for the next. Zero at first. */
+/* The cuts of one face; its memory is reused for the next face. Zero before the first face. */
 typedef struct ebpo_face_cuts {
     double corner[3][3];
-    int axis, u, v;          /* the view is along `axis`: p is coordinate u, q coordinate v */
-    int turn;                /* orientation of the corners in the view */
+    int axis, u, v;          /* the projection is along `axis`: p is coordinate u, q coordinate v */
+    int turn;                /* orientation of the projected corners: 1 or -1 */
     mpq_t normal[3], offset; /* the face's plane: normal . x = offset */
     mpq_t scratch[8];
     bool made, no_memory;
-    bool all_cuts; /* includes cuts that only touch the face's border */
-    bool has_target;
-    mpq_t target[2]; /* the point that pieces are tested to contain */
+    bool all_cuts;   /* includes cuts that only touch the face's border */
+    bool has_target; /* pieces are tested for containing the target */
+    mpq_t target[2];
+    /* In each array, the first `..._made` items are initialised; the first `cuts`, `events`, ...
+     * are of this face. */
     ebpo_face_cut *cut;
     uint64_t cuts, cuts_made, cut_capacity;
     mpq_t *event; /* values of p between which no cut begins, ends or crosses */
@@ -54,23 +57,23 @@ typedef struct ebpo_face_cuts {
     uint64_t ends[2], ends_made[2], end_capacity[2];
 } ebpo_face_cuts;
 
-/* Begins a new face, which must have an area. */
+/* Begins a new face, which must have an area. all_cuts: see ebpo_face_cuts. */
 void ebpo_face_cuts_begin(ebpo_face_cuts *f, const double corner[3][3], bool all_cuts);
-/* Adds another face, of model 0 or 1. */
+/* Adds the cut of another face, which belongs to model 0 or 1. */
 void ebpo_face_cuts_add(ebpo_face_cuts *f, const double other[3][3], int model);
-/* Sets a target; needs all_cuts. Returns false if x is not on the face. Otherwise at_target is set
- * for each piece that is visited later. */
+/* Sets the target x, which needs all_cuts. Returns false if x is not on the face. Otherwise
+ * ebpo_piece.at_target is set for each piece that is visited later. */
 bool ebpo_face_cuts_target(ebpo_face_cuts *f, const mpq_t x[3]);
 void ebpo_face_cuts_free(ebpo_face_cuts *f);
 
 /* --- pieces --- */
 
-/* A point of a piece, and what is around it. */
+/* A point of a piece, and the other faces that contain it. */
 typedef struct ebpo_piece {
     const mpq_t *x; /* [3] the point */
-    /* The model's other faces that are in the face's plane at the point. `covered`: there is at
-     * least one. `jump`: their contribution to the winding number behind the face, minus their
-     * contribution in front (the normal points to the front). */
+    /* [model] `covered`: at least one other face of the model, in the plane of this face, contains
+     * the point. `jump`: the contribution of these faces to the winding number behind this face,
+     * minus their contribution in front of it (the normal points to the front). */
     bool covered[2];
     int32_t jump[2];
     bool at_target; /* the target is in the piece or on its border */
@@ -82,9 +85,9 @@ typedef ebpo_status (*ebpo_piece_fn)(void *user, const ebpo_piece *piece, ebpo_e
  * all_cuts, any piece may be). Fails with EBPO_E_MEMORY and the errors of `visit`. */
 EBPO_MUST_USE ebpo_status ebpo_face_pieces_visit(ebpo_face_cuts *f, ebpo_piece_fn visit, void *user,
                                                  ebpo_error *error);
-/* Needs all_cuts. Visits the points of the closed face that are corners, ends of cuts or
- * intersections of two cuts; some of them repeatedly. Afterwards `f` must not be used until the
- * next begin. */
+/* Needs all_cuts. Visits the points of the face, with its border, that are corners, ends of cuts or
+ * intersections of two cuts; some of them repeatedly. Afterwards `f` must not be used until
+ * ebpo_face_cuts_begin. */
 typedef ebpo_status (*ebpo_vertex_fn)(void *user, const mpq_t x[3], ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_face_pieces_vertices(ebpo_face_cuts *f, ebpo_vertex_fn visit,
                                                     void *user, ebpo_error *error);

@@ -1,5 +1,5 @@
-/* States of the walks through the hierarchies of two accels at poses: ebpo_pair_walk finds the
- * faces that intersect, ebpo_gap_search the nearest ones. One thread each. */
+/* Walks through the hierarchies of two accels at poses: ebpo_pair_walk finds the faces that
+ * intersect, ebpo_gap_search the nearest ones. Each walk is for one thread at a time. */
 #ifndef EBPO_COLLIDE_HIERARCHY_WALK_H
 #define EBPO_COLLIDE_HIERARCHY_WALK_H
 
@@ -9,27 +9,28 @@
 #include "extras/collide/face_pairs.h"
 #include "extras/collide/posed_frames.h"
 
-/* A pair of children of nodes, each given as the node's number << 3 | lane. */
+/* A pair of children of nodes, each given as 8 * the node's index + the child's lane. */
 typedef struct ebpo_node_pair {
     uint32_t a, b;
     float key; /* the search for the first contact visits greater keys first */
 } ebpo_node_pair;
 
-/* Intersecting faces, by their local numbers. */
+/* A pair of intersecting faces, by their local indices. */
 typedef struct ebpo_found_pair {
     uint32_t a, b;
     int32_t kind; /* ebpo_pair_kind, not EBPO_PAIR_APART */
 } ebpo_found_pair;
 
-/* A node's children in the frames of both models. Coordinates are relative to the node's origin:
- * rotated to the other frame, but not translated. */
+/* A node's children in its model's frame, and (with a 2 in the name) in the other model's frame:
+ * rotated, but not translated. Coordinates are relative to the node's origin. */
 typedef struct ebpo_turned_node {
     _Alignas(32) float c[3][8], e[3][8]; /* middles and half sides of boxes */
     float c2[3][8], e2[3][8];            /* boxes around these boxes, along the axes of the other
                                           * frame */
     float axis[3][8], axis2[3][8];       /* axes of cylinders, of length 1 */
     float mid[3][8], mid2[3][8];         /* middles of cylinders */
-    float half[8], radius[8], extent[8]; /* extent: the sum of the half sides */
+    float half[8], radius[8];            /* half lengths and radii of cylinders */
+    float extent[8];                     /* sums of the half sides of boxes */
     double origin[3];                    /* the node's origin in the first model's frame, for nodes
                                           * of both models */
     float size;                          /* length of the longest side of all boxes */
@@ -42,11 +43,12 @@ enum { EBPO_TURNED_BITS = 4, EBPO_TURNED_NODES = 1 << EBPO_TURNED_BITS };
 
 typedef struct ebpo_pair_walk ebpo_pair_walk;
 
-/* Compiled for several processors, with the same results. */
+/* The functions of a walk, compiled for several processors, with the same results. All return false
+ * without memory. */
 typedef struct ebpo_walk_kernels {
-    /* Processes at most this many pairs of the stack. Returns false without memory. */
+    /* Processes at most this many pairs of the stack. */
     bool (*run)(ebpo_pair_walk *walk, uint64_t pairs);
-    /* Pushes the children of both tops, or of one pair. Returns false without memory. */
+    /* Push the pairs of children of both top nodes, or of one pair of nodes. */
     bool (*start)(ebpo_pair_walk *walk);
     bool (*expand)(ebpo_pair_walk *walk, ebpo_node_pair pair);
 } ebpo_walk_kernels;
@@ -57,48 +59,49 @@ struct ebpo_pair_walk {
     const ebpo_accel_pair *pair;
     const ebpo_walk_kernels *kernels;
     const ebpo_pair_kernels *filter;
-    bool first;      /* the walk ends with the first intersecting pair; it visits siblings by
-                      * greatest overlap */
-    bool self;       /* both accels are the same one at one pose: each pair of faces comes once */
+    bool first;      /* end with the first intersecting pair, and visit siblings by greatest overlap
+                      */
+    bool self;       /* both accels are the same one at one pose: find each pair of faces once */
     bool neighbours; /* the faces are of one mesh: a common corner or edge of neighbours is no
                       * contact */
-    uint32_t begin, end; /* range of faces of the first accel */
+    uint32_t begin, end; /* only these faces of the first accel: local indices */
     ebpo_node_pair *stack;
     uint64_t top, capacity;
-    uint64_t group; /* for the first contact: start of the last group of the stack */
+    uint64_t group; /* if `first`: start of the last group of siblings on the stack */
     ebpo_found_pair *found_pairs;
     uint64_t found_count, found_capacity;
     uint32_t found_slot[2];                  /* slots of the last pair found */
-    uint64_t node_pairs, block_pairs, exact; /* node_pairs, block_pairs: visited pairs; exact: pairs
-                                              * of faces decided by the exact test */
+    uint64_t node_pairs, block_pairs, exact; /* numbers of visited pairs of nodes and of blocks, and
+                                              * of pairs of faces decided by the exact test */
     ebpo_turned_node turned[2][EBPO_TURNED_NODES];
     ebpo_posed_faces posed[2][EBPO_POSED_FACES];
 };
 
 void ebpo_pair_walk_free(ebpo_pair_walk *walk);
 
-/* For kernels: decides the pairs of two blocks that the filter has left. Returns false without
- * memory. */
+/* For kernels: decides the pairs of faces of two blocks that the filter has not excluded. Returns
+ * false without memory. */
 bool ebpo_pair_walk_decide(ebpo_pair_walk *walk, uint32_t block_a, uint32_t block_b,
                            const ebpo_block_pairs *pairs);
-/* For kernels: makes space for more pairs on the stack. */
+/* For kernels: makes space for `more` pairs on the stack. Returns false without memory. */
 bool ebpo_pair_walk_capacity(ebpo_pair_walk *walk, uint64_t more);
 
-/* Computes a face's posed coordinates. */
+/* Computes the posed corners of the face at a slot of the accel's blocks. */
 void ebpo_posed_triangle(const ebpo_accel *accel, const ebpo_posing *posing, uint32_t slot,
                          double out[3][3]);
 
 /* --- the nearest pair of faces ---
  *
- * All lengths are world lengths times the posings' unit. No dropped pair is nearer than `limit`.
+ * All lengths are world lengths times the posings' unit. A pair is dropped only if it is certainly
+ * not nearer than `limit`.
  * Bounds: docs/develop/collision.md, "Bounds of pairs of nodes". */
 
-/* A pair of children, each given as the node's number * 8 + lane. */
+/* A pair of children of nodes, each given as 8 * the node's index + the child's lane. */
 typedef struct ebpo_gap_visit {
     float key; /* squared lower bound; negative where nodes intersect: the nearer to 0, the less
                 * they overlap */
     uint32_t child[2];
-    uint32_t direction; /* number of the direction for which the key was computed */
+    uint32_t direction; /* direction_number of the direction for which the key was computed */
 } ebpo_gap_visit;
 
 /* A pair of faces, by slots, whose distance is at least `low`. */
@@ -110,8 +113,8 @@ typedef struct ebpo_gap_candidate {
 /* Eight children of a node, in the node's frame and in the other model's frame. */
 typedef struct ebpo_gap_node {
     _Alignas(32) float centre[2][3][8], half[2][3][8]; /* boxes */
-    float axis[2][3][8], middle[2][3][8];              /* middles and unit axes of cylinders */
-    float thick[8], radius[8];                         /* half-widths along the axis and radii */
+    float axis[2][3][8], middle[2][3][8];              /* unit axes and middles of cylinders */
+    float thick[8], radius[8];                         /* half lengths and radii of cylinders */
     float reach[8]; /* extents along the direction of the search, in the node's frame */
     uint32_t node, direction;
 } ebpo_gap_node;
@@ -123,8 +126,8 @@ struct ebpo_gap_search {
     const ebpo_accel *accel[2];
     ebpo_block_posing posing[2];
     ebpo_two_frames frames;
-    float limit;     /* pairs that are certainly farther apart do not matter */
-    float square;    /* the value that squared lower bounds are compared with */
+    float limit;  /* pairs that are certainly farther apart do not matter */
+    float square; /* square of the limit, rounded up: squared lower bounds are compared with it */
     float tolerance; /* an improvement smaller than this does not matter */
     float best; /* upper bound of the distance of the faces best_slot; INFINITY: no pair is known */
     uint32_t best_slot[2];
@@ -135,8 +138,8 @@ struct ebpo_gap_search {
     uint32_t direction_number;
 
     void *user;
-    bool (*judge)(ebpo_gap_search *search); /* decides all waiting pairs; returns false when enough
-                                             * is known */
+    bool (*judge)(ebpo_gap_search *search); /* decides all waiting pairs of faces; returns false to
+                                             * end the walk, because enough is known */
     bool (*go_on)(ebpo_gap_search *search); /* called from time to time; returns false to end the
                                              * walk */
     bool ended;                             /* the walk ended before all pairs were visited */
@@ -147,7 +150,7 @@ struct ebpo_gap_search {
     ebpo_gap_visit *stack;
     uint64_t count, capacity;
     bool is_heap;
-    ebpo_gap_candidate waiting[EBPO_GAP_CANDIDATES];
+    ebpo_gap_candidate waiting[EBPO_GAP_CANDIDATES]; /* [waits] pairs of faces to be decided */
     unsigned waits;
     uint64_t node_pairs, block_pairs;
 
@@ -155,28 +158,29 @@ struct ebpo_gap_search {
     ebpo_posed_faces faces[2][EBPO_POSED_FACES];
 };
 
-/* Returns NULL without memory. */
+/* Allocates a search. Returns NULL without memory. */
 ebpo_gap_search *ebpo_gap_new(void);
 void ebpo_gap_free(ebpo_gap_search *g);
-/* Sets all members except user, judge and go_on; the distance is unknown, the tolerance is 0.
- * `reach` is as for ebpo_block_unit. */
+/* Begins a search with no limit and the tolerance 0; sets all members except user, judge and go_on.
+ * `reach`: as for ebpo_block_unit. */
 void ebpo_gap_begin(ebpo_gap_search *g, const ebpo_accel *const accel[2],
                     const ebpo_posing posing[2], double reach);
-/* Sets the limit beyond which pairs do not matter. It is never raised. */
+/* Lowers the limit; a greater limit than the current one changes nothing. */
 void ebpo_gap_set_limit(ebpo_gap_search *g, float limit);
 /* Records a pair of faces and an upper bound of its distance. */
 void ebpo_gap_set_best(ebpo_gap_search *g, float best, uint32_t slot_a, uint32_t slot_b);
-/* Sets the direction, of any length, in the world; 0 changes nothing. */
+/* Sets the direction of the search, in the world, of any length; a direction of 0, 0, 0 changes
+ * nothing. */
 void ebpo_gap_set_direction(ebpo_gap_search *g, const float direction[3]);
 
-/* Makes space for a node's pairs. */
+/* Makes space for the pairs of children of two nodes. Returns false without memory. */
 bool ebpo_gap_capacity(ebpo_gap_search *g);
 /* Makes space for a block's pairs among the waiting ones. Returns false if judge returned false. */
 bool ebpo_gap_wait_capacity(ebpo_gap_search *g);
 
-/* Walks through all pairs, beginning with the tops. Afterwards, the nearest pair may be among the
- * waiting pairs. After an early end, the stack has the pairs that were not visited. Compiled twice,
- * with the same results. */
+/* Walks through all pairs, beginning with the top nodes. Afterwards, the nearest pair may be among
+ * the waiting pairs, which have not been decided. After an early end, the stack has the pairs of
+ * nodes that were not visited. Compiled twice, with the same results. */
 typedef struct ebpo_gap_kernels {
     void (*walk)(ebpo_gap_search *g);
 } ebpo_gap_kernels;

@@ -1,5 +1,5 @@
-/* Looks up the faces of pairs by their numbers in the file, at their poses, and computes the
- * intersections of crossing faces. */
+/* Looks up the posed faces of pairs by their indices in the file, and computes the intersections of
+ * crossing faces. */
 #ifndef EBPO_COLLIDE_PAIR_FACES_H
 #define EBPO_COLLIDE_PAIR_FACES_H
 
@@ -7,13 +7,13 @@
 #include "query/accel.h"
 #include "query/query_model.h"
 
-/* Returns the slot of each face in the blocks of a subtree or a whole model. The index is the
- * face's local number, which in a whole model is its number in the file. Returns NULL without
+/* Returns an array of the slots of faces in the blocks of a subtree or a whole model. It is indexed
+ * by a face's local index, which in a whole model is its index in the file. Returns NULL without
  * memory. The caller frees the array. */
 uint32_t *ebpo_face_slots(const ebpo_accel *subtree);
 
-/* Reads corners of single faces by their numbers in the file: faces of a whole model from its
- * blocks, faces of a model in parts through its cache of chunks. One thread. */
+/* Reads corners of single faces by their indices in the file: faces of a whole model from its
+ * blocks, faces of a model in parts through its cache of chunks. For one thread at a time. */
 
 typedef struct ebpo_faces_by_number {
     const ebpo_model *model;
@@ -23,11 +23,11 @@ typedef struct ebpo_faces_by_number {
 
 void ebpo_faces_by_number_begin(ebpo_faces_by_number *f, const ebpo_model *model,
                                 const uint32_t *slots);
-/* Returns the exact corners in the file. Fails with the errors of reading. */
+/* Computes the corners of a face, exactly as in the file. Fails with the errors of reading. */
 EBPO_MUST_USE ebpo_status ebpo_faces_by_number_get(ebpo_faces_by_number *f, uint64_t face,
                                                    double out[3][3], ebpo_error *error);
-/* For a model in parts: return a face's vertices, and the coordinates of a vertex, as in the file.
- */
+/* For a model in parts: set `out` to the vertex indices of a face, and to the coordinates of a
+ * vertex, as in the file. */
 EBPO_MUST_USE ebpo_status ebpo_faces_by_number_corners(ebpo_faces_by_number *f, uint64_t face,
                                                        uint32_t out[3], ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_faces_by_number_vertex(ebpo_faces_by_number *f, uint64_t vertex,
@@ -35,8 +35,7 @@ EBPO_MUST_USE ebpo_status ebpo_faces_by_number_vertex(ebpo_faces_by_number *f, u
 /* Releases the chunks that `f` holds; a zero struct is allowed. */
 void ebpo_faces_by_number_end(ebpo_faces_by_number *f);
 
-/* A pair with its faces, of the caller's A and B: with coordinates as in the files, and at their
- * poses. */
+/* The corners of a pair's faces, of the caller's A and B: as in the files, and posed. */
 typedef struct ebpo_posed_pair {
     double own[2][3][3], corner[2][3][3];
 } ebpo_posed_pair;
@@ -47,12 +46,13 @@ typedef struct ebpo_pair_faces {
     ebpo_faces_by_number side[2]; /* the caller's A and B */
 } ebpo_pair_faces;
 
-/* Must be ended, also after a failure; a zero struct is allowed. */
+/* Prepares the look-up of faces. Must be ended by ebpo_pair_faces_end, also after a failure, which
+ * also accepts a zero struct. */
 EBPO_MUST_USE ebpo_status ebpo_pair_faces_begin(ebpo_pair_faces *f, const ebpo_collision *collision,
                                                 ebpo_error *error);
 void ebpo_pair_faces_end(ebpo_pair_faces *f);
 
-/* Fails with the errors of reading. */
+/* Looks up the faces of a pair and poses them. Fails with the errors of reading. */
 EBPO_MUST_USE ebpo_status ebpo_pose_pair(ebpo_pair_faces *f, const ebpo_face_pair *pair,
                                          ebpo_posed_pair *out, ebpo_error *error);
 
@@ -60,7 +60,7 @@ EBPO_MUST_USE ebpo_status ebpo_pose_pair(ebpo_pair_faces *f, const ebpo_face_pai
  * pair. */
 uint64_t ebpo_contact_lines_max(const ebpo_collider *collider);
 
-/* Computes the contact of an EBPO_PAIR_CROSSING pair. */
+/* Computes the common segment of a pair of kind EBPO_PAIR_CROSSING, whose faces are `faces`. */
 void ebpo_contact_of(const ebpo_posed_pair *faces, const ebpo_face_pair *pair,
                      ebpo_contact_segment *out);
 

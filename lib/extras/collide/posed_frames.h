@@ -1,6 +1,7 @@
 /* Models at poses in floats, with proved error bounds: blocks of faces for the filter of pairs, and
  * the relative position of two models' frames (docs/develop/collision.md, "From blocks to the
- * filter" and "Going down two hierarchies"). Pure functions, any thread. */
+ * filter" and "Going down two hierarchies"). All functions are pure and can be called from any
+ * thread. */
 #ifndef EBPO_COLLIDE_POSED_FRAMES_H
 #define EBPO_COLLIDE_POSED_FRAMES_H
 
@@ -14,7 +15,7 @@ typedef struct ebpo_block_posing {
     ebpo_posing posing;
     double unit;        /* a power of two: floats are world coordinates times this unit */
     float matrix[3][3]; /* the posing's matrix times unit */
-    float size;         /* greatest length of a row of the matrix */
+    float size;         /* greatest length of a row of `matrix` */
     float doubt;        /* error of posed coordinates compared with the exact motion, times unit */
     bool fits;          /* the model fits in floats; if false, only blocks of doubles are used */
 } ebpo_block_posing;
@@ -23,7 +24,7 @@ typedef struct ebpo_block_posing {
  * by the unit, they are below 2^30. reach <= 2^1000. */
 double ebpo_block_unit(double reach);
 
-/* reach: as for ebpo_block_unit, the same for both models of a pair. */
+/* Prepares a posing. reach: as for ebpo_block_unit, the same for both models of a pair. */
 void ebpo_block_posing_make(ebpo_block_posing *out, const ebpo_posing *posing, double reach);
 
 /* Maximum number of vertices of a block: eight faces without a common vertex. */
@@ -34,35 +35,37 @@ typedef struct ebpo_posed_block {
     _Alignas(32) float x[3][EBPO_POSED_VERTICES]; /* entries from `vertices` on are 0 */
     double base[3];                               /* posed coordinates of the first vertex */
     unsigned vertices;
-    float
-        error; /* bound of the difference between x + base * unit and the exact value times unit */
+    float error; /* bound of the difference between x + base * unit and the exact posed coordinate
+                  * times unit */
     float reach; /* greatest |x| */
 } ebpo_posed_block;
 
-/* Returns the greatest |x| of rotated vertices whose 1-norms, relative to the first vertex, are at
- * most `most`. */
+/* Returns an upper bound of |x| of rotated vertices whose 1-norms, relative to the first vertex,
+ * are at most `most`. */
 static inline float ebpo_posed_block_extent(const ebpo_block_posing *p, float most)
 {
     return p->size * most * (1 + 0x1p-20f);
 }
+/* Returns ebpo_posed_block.error for a block with this reach. */
 static inline float ebpo_posed_block_error(const ebpo_block_posing *p, float reach)
 {
     return 6 * 0x1p-24f * reach + p->doubt;
 }
 
-/* vertex: [3][vertices], all x, all y, all z, as in blocks; 1 to 24 vertices. The first function
- * needs p->fits. */
+/* Compute a posed block from a block's vertices. vertex: [3][vertices], all x, all y, all z, as in
+ * blocks of floats (first function, which needs p->fits) or doubles; 1 to 24 vertices. */
 void ebpo_posed_block_make(ebpo_posed_block *out, const ebpo_block_posing *p, const float *vertex,
                            unsigned vertices);
 void ebpo_posed_block_make_wide(ebpo_posed_block *out, const ebpo_block_posing *p,
                                 const double *vertex, unsigned vertices);
 
-/* Computes the vertices relative to `origin`, a point of the world; returns their error. The faces
- * for ebpo_pair_kernels are picked from these vertices by the block's corners. */
+/* Computes the vertices relative to `origin`, a point of the world, times `unit`; returns the bound
+ * of their error. The faces for ebpo_pair_kernels have the corners of the block's faces among these
+ * vertices. */
 float ebpo_posed_block_place(const ebpo_posed_block *b, double unit, const double origin[3],
                              float out[3][EBPO_POSED_VERTICES]);
 
-/* Eight faces of a block for the kernels of pairs, relative to `base`. */
+/* Eight faces of a block for ebpo_pair_kernels, relative to `base`. */
 typedef struct ebpo_posed_faces {
     _Alignas(32) float x[9][8]; /* index: 3 * corner + axis */
     double base[3];             /* posed coordinates of the block's first vertex */
@@ -71,9 +74,10 @@ typedef struct ebpo_posed_faces {
     uint8_t lanes;
 } ebpo_posed_faces;
 
-/* Number of kept entries for each model. */
+/* Number of posed blocks of each model that a walk keeps. */
 enum { EBPO_POSED_FACES = 32 };
 
+/* Marks all kept blocks as empty. */
 static inline void ebpo_posed_faces_forget(ebpo_posed_faces faces[2][EBPO_POSED_FACES])
 {
     for (int i = 0; i < 2 * EBPO_POSED_FACES; i++)
@@ -81,11 +85,11 @@ static inline void ebpo_posed_faces_forget(ebpo_posed_faces faces[2][EBPO_POSED_
 }
 
 /* Two accels at their poses, each in its own frame, prepared for descending both hierarchies
- * together. Immutable; any thread.
+ * together. It is not changed afterwards, so any thread may use it.
  *
- * Both frames use one unit: the first frame's, or the second's if that is larger. For all pose
- * matrices, the bounds of each model are linear in the other model's frame; only cylinders depend
- * on lengths (docs/develop/collision.md, "Going down two hierarchies"). */
+ * Both frames use one unit of length: that of the frame with the larger unit. Boxes of one model
+ * are transformed to the other model's frame by linear maps, for all pose matrices; only cylinders
+ * need a map that keeps lengths (docs/develop/collision.md, "Going down two hierarchies"). */
 
 typedef struct ebpo_accel_pair {
     const ebpo_accel *accel[2];
@@ -97,22 +101,23 @@ typedef struct ebpo_accel_pair {
      * values of the entries, rounded up. */
     float into[2][3][3], size[2][3][3];
     float doubt;          /* error of posing and of these values, in the unit */
-    float cylinder_share; /* bounds of cylinders are reduced by this share of the nodes' sizes */
+    float cylinder_share; /* distances of cylinders are reduced by this share of the nodes' sizes */
     float sine_capacity;  /* margin that is added to the squared sine of the angle between two
                            * cylinders' axes */
     bool cylinders;       /* cylinders may be used */
     bool apart;           /* the boxes around all faces are disjoint */
 } ebpo_accel_pair;
 
-/* reach: no posed coordinate of both models is greater. The posings must live as long as the pair.
- */
+/* Prepares a pair. reach: bound of the posed coordinates of both models. The posings must live as
+ * long as the pair. */
 void ebpo_accel_pair_make(ebpo_accel_pair *out, const ebpo_accel *const accel[2],
                           const ebpo_block_posing *const posing[2], double reach);
 
-/* The relative position of two models' frames, for boxes and cylinders of one in the other's frame.
- */
+/* The relative position of two models' frames, for transforming boxes and cylinders of one model to
+ * the other's frame. */
 
-/* y = x * unit, with x in the accel's frame; the other model's y is turn y + shift. */
+/* A point x of the accel's frame has the coordinates y = x * unit. In the other model's frame they
+ * are turn * y + shift. turn_size: absolute values of `turn`, rounded up. */
 typedef struct ebpo_turned_frame {
     float unit, turn[3][3], turn_size[3][3], shift[3];
     float in_world[3][3]; /* matrix; its transpose maps a direction of the world to the frame */
@@ -121,13 +126,13 @@ typedef struct ebpo_turned_frame {
 /* Lengths are world lengths times the unit of ebpo_block_posing, the same for both models. */
 typedef struct ebpo_two_frames {
     ebpo_turned_frame frame[2];
-    /* Amount by which computed gaps of boxes may be too large, on each axis of either frame. It
-     * covers the rounding of floats (docs/develop/collision.md, "Bounds of pairs of nodes"), the
-     * error of poses compared with exact motions, and that of posed coordinates. */
+    /* Computed gaps of boxes may be too large by this, on each axis of either frame: because of the
+     * rounding of floats (docs/develop/collision.md, "Bounds of pairs of nodes"), the error of
+     * poses compared with exact motions, and the rounding of posed coordinates. */
     float slack;
 } ebpo_two_frames;
 
-/* The posings must have been made with the same reach. */
+/* Prepares both frames. The posings must have been made with the same reach. */
 void ebpo_two_frames_make(ebpo_two_frames *out, const ebpo_accel *const accel[2],
                           const ebpo_block_posing posing[2]);
 

@@ -1,6 +1,7 @@
-/* Models at poses: their extent, and the exact side of a point of the world relative to a posed
- * solid. Exact means: for posed coordinates. Proofs: docs/develop/booleans.md. Solids are not
- * changed: any thread may use them, each with a separate context. */
+/* Models at poses: their extent, and the winding number of a posed solid at a point of the world.
+ * It is exact for the posed coordinates, which are rounded to doubles. Proofs:
+ * docs/develop/booleans.md. Functions do not change a posed solid: any thread may use it, each with
+ * a separate context. */
 #ifndef EBPO_COLLIDE_POSED_SOLID_H
 #define EBPO_COLLIDE_POSED_SOLID_H
 
@@ -10,14 +11,15 @@
 #include "geometry/pose.h"
 #include "query/query_model.h"
 
-/* Returns bounds of the sizes of the model's vertex coordinates. */
+/* Sets `reach` to upper bounds of the absolute values of the vertices' coordinates on each axis. */
 void ebpo_model_extent(const ebpo_model *model, double reach[3]);
 
-/* Returns a bound of the sizes of the posed vertex coordinates. */
+/* Returns an upper bound of the absolute values of the posed vertices' coordinates. reach: of
+ * ebpo_model_extent. */
 double ebpo_posed_extent(const ebpo_posing *posing, const double reach[3]);
 
-/* Returns true for one file, or for two files with the same content: the same faces with the same
- * meaning. */
+/* Returns true if both models are of one file, or of two files with the same content: they have the
+ * same faces, in the same order. */
 bool ebpo_same_model(const ebpo_model *a, const ebpo_model *b);
 
 typedef struct ebpo_posed_solid {
@@ -28,8 +30,8 @@ typedef struct ebpo_posed_solid {
     double moved;  /* bound of the distance between a posed vertex and its exact motion */
 } ebpo_posed_solid;
 
-/* Also accepts surfaces; their winding numbers must not be queried. Fails with EBPO_E_ARGUMENT (the
- * pose) and EBPO_E_ABSENT (a model without its mesh). */
+/* Makes a posed solid, or a posed surface, whose winding numbers must not be queried. Fails with
+ * EBPO_E_ARGUMENT (the pose) and EBPO_E_ABSENT (a model without its mesh). */
 EBPO_MUST_USE ebpo_status ebpo_posed_solid_make(ebpo_posed_solid *out, ebpo_model *model,
                                                 const ebpo_pose *pose, ebpo_error *error);
 
@@ -37,7 +39,8 @@ EBPO_MUST_USE ebpo_status ebpo_posed_solid_make(ebpo_posed_solid *out, ebpo_mode
  * axis. */
 bool ebpo_posed_solid_near(const ebpo_posed_solid *s, const double w[3], double margin);
 
-/* Returns the greatest gap between two boxes on an axis: positive where they are apart. */
+/* Returns the greatest of the gaps between two boxes on the three axes; negative if they overlap on
+ * all axes. */
 static inline double ebpo_box_gap(const double a_low[3], const double a_high[3],
                                   const double b_low[3], const double b_high[3])
 {
@@ -48,28 +51,28 @@ static inline double ebpo_box_gap(const double a_low[3], const double a_high[3],
 }
 
 /* Computes the point p in the model's coordinates that the exact motion maps to w. *doubt bounds
- * the error of p and of rounded coordinates. If no face of the model is within *doubt of p, the
- * winding number of the posed model at w is that of the model at p. */
+ * the errors of p and of the rounding of posed coordinates: if no face of the model is within
+ * *doubt of p, the winding number of the posed model at w is that of the model at p. */
 void ebpo_unpose(const ebpo_posed_solid *s, const double w[3], double p[3], double *doubt);
 
-/* Computes a box in the model's coordinates for a box in the world. a and b are opposite corners of
- * the world box, in any order. The result contains all faces that, when posed, may have a point in
- * the world box. */
+/* Computes a box in the model's coordinates that intersects every face that, when posed, may have a
+ * point in a box of the world. a and b are opposite corners of the world box, in any order. */
 void ebpo_unpose_box(const ebpo_posed_solid *s, const double a[3], const double b[3], double low[3],
                      double high[3]);
 
-/* The sides of a solid around a point of the world. */
+/* Winding numbers of a posed solid around a point of the world. */
 typedef struct ebpo_posed_sides {
     bool on;            /* a posed face with an area contains the point */
     bool flat;          /* all such faces are in one plane */
     double plane[3][3]; /* if on: corners of one of them */
-    /* Winding numbers close to the point: `above` on the side that is greater in x (in y if the
-     * plane is parallel to the x axis, in z if it is also parallel to the y axis), `below` on the
-     * other side. They are equal unless `on`. If `on` and not `flat`, only `above` is valid: the
-     * winding number at some point near this one. */
+    /* Winding numbers next to the point, on both sides of the plane: `above` on the side of greater
+     * x (of greater y if the plane is parallel to the x axis, of greater z if it is also parallel
+     * to the y axis), `below` on the other side. They are equal unless `on`. If `on` and not
+     * `flat`, only `above` is valid: the winding number at some point next to this one. */
     int32_t above, below;
 } ebpo_posed_sides;
 
+/* Computes the winding numbers around the point w. Fails with the errors of reading. */
 EBPO_MUST_USE ebpo_status ebpo_posed_solid_sides(const ebpo_posed_solid *s, ebpo_context *context,
                                                  const double w[3], ebpo_posed_sides *out,
                                                  ebpo_error *error);

@@ -1,4 +1,4 @@
-/* The subtrees of a model at a pose and the convex envelopes of their faces, with gaps between
+/* The subtrees of a posed model, convex envelopes of their faces, and bounds of the distance of
  * envelopes. */
 #ifndef EBPO_COLLIDE_POSED_SUBTREES_H
 #define EBPO_COLLIDE_POSED_SUBTREES_H
@@ -12,12 +12,12 @@ typedef struct ebpo_convex {
     const double (*point)[3];
 } ebpo_convex;
 
-/* Returns a lower bound of the distance, with an error of 2^-48 of the greatest coordinate; 0 if no
- * bound was found. The bound is usually close to the distance. The search ends at a bound beyond
- * `enough`. The result is the same on every processor. */
+/* Returns a lower bound of the distance of two hulls, except for an error of 2^-48 of the greatest
+ * coordinate; 0 if no bound was found. Mostly the bound is close to the distance. The search ends
+ * when it finds a bound above `enough`. The result is the same on every processor. */
 double ebpo_convex_gap(const ebpo_convex *a, const ebpo_convex *b, double enough);
 
-/* Returns an upper bound of the distance of any two points, rounded up. */
+/* Returns an upper bound of the distance of a point of a from a point of b, rounded up. */
 double ebpo_convex_span(const ebpo_convex *a, const ebpo_convex *b);
 
 /* The subtrees of a model that are loaded on demand; a whole model is a single one. */
@@ -25,27 +25,29 @@ double ebpo_convex_span(const ebpo_convex *a, const ebpo_convex *b);
 typedef struct ebpo_posed_subtrees {
     const ebpo_model *model;
     ebpo_posing posing;
-    uint64_t count;
+    uint64_t count;           /* number of subtrees */
     uint32_t *rank;           /* [count] rank of each subtree in the order of the file's faces */
-    struct posed_hull **hull; /* [slots] envelopes that have been requested, by their octcodes */
-    uint64_t hulls, slots, bytes;
+    struct posed_hull **hull; /* [slots] hash table by octcodes of envelopes that were requested */
+    uint64_t hulls, slots;    /* number of envelopes, size of the table */
+    uint64_t bytes;           /* memory of the envelopes */
 } ebpo_posed_subtrees;
 
 /* A node of the part of the tree that is in memory. */
 typedef struct ebpo_posed_node {
-    uint32_t entry;
+    uint32_t entry; /* its entry in the model */
     ebpo_cell cell;
 } ebpo_posed_node;
 
-/* Must be freed, also after a failure. One thread at a time. */
+/* Prepares the subtrees of a posed model, for one thread at a time. Must be freed, also after a
+ * failure. */
 EBPO_MUST_USE ebpo_status ebpo_posed_subtrees_make(ebpo_posed_subtrees *out,
                                                    const ebpo_model *model,
                                                    const ebpo_posing *posing, ebpo_error *error);
 void ebpo_posed_subtrees_free(ebpo_posed_subtrees *s);
 
-/* Returns the posed envelope of a node in memory, or of a subtree as far as it is known without
- * loading the subtree. The envelope contains the part of every face in the cell, up to
- * ebpo_posed_slack. It lives as long as `s`. */
+/* Sets *out to the posed envelope of a node in memory, or of a subtree as far as it is known
+ * without loading the subtree. Except for errors up to ebpo_posed_slack, the envelope contains the
+ * part of every face that is in the cell. It lives as long as `s`. */
 EBPO_MUST_USE ebpo_status ebpo_posed_envelope(ebpo_posed_subtrees *s, ebpo_cell cell,
                                               ebpo_convex *out, ebpo_error *error);
 
@@ -58,7 +60,7 @@ ebpo_posed_node ebpo_posed_child(const ebpo_posed_subtrees *s, const ebpo_posed_
                                  unsigned octant);
 /* Computes the posed corners of a cell. */
 void ebpo_posed_cell(const ebpo_posed_subtrees *s, ebpo_cell cell, double out[8][3]);
-/* Bounds how far posing and the cutting of envelopes move corners of the envelope of such a cell.
+/* Bounds the errors that posing and cutting cause in the corners of the envelope of a cell.
  * `reach`: bound of posed coordinates. */
 double ebpo_posed_slack(const ebpo_posed_subtrees *s, ebpo_cell cell, double reach);
 /* Returns the length of the cell's diagonal in the world. */

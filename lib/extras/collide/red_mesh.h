@@ -7,8 +7,8 @@
 #include "io/publish.h"
 #include "geometry/pose.h"
 
-/* Source of a mesh: functions that return a vertex, and the corners of a face. They are called in
- * ascending order. */
+/* A mesh to be printed: functions that return a vertex, and the vertex indices of a face. They are
+ * called for each vertex, then for each face, in ascending order. */
 typedef struct ebpo_red_source {
     uint64_t vertices, faces;
     void *user;
@@ -26,8 +26,8 @@ typedef struct ebpo_red_mesh {
     const char *colour;        /* colour of the other faces: "r g b" */
 } ebpo_red_mesh;
 
-/* Prints the meshes in sequence. Fails with EBPO_E_LIMIT (more than 2^32 - 1 vertices), EBPO_E_IO,
- * EBPO_E_MEMORY and the errors of the sources. */
+/* Prints all meshes to one PLY file. Fails with EBPO_E_LIMIT (more than 2^32 - 1 vertices),
+ * EBPO_E_IO, EBPO_E_MEMORY and the errors of the sources. */
 EBPO_MUST_USE ebpo_status ebpo_red_meshes_print(const ebpo_red_mesh *meshes, int count,
                                                 ebpo_publish *target, ebpo_error *error);
 

@@ -4,7 +4,8 @@
 
 #include "extras/collide/collider.h"
 
-/* Fails with the errors of ebpo_collide_all. */
+/* Finds all pairs, as ebpo_collide_all does, or, if `self`, as ebpo_collide_self does. Fails with
+ * the errors of these functions. */
 EBPO_MUST_USE ebpo_status ebpo_gather_parts(const ebpo_collision *collision, bool self,
                                             ebpo_pairs_fn take, void *user, ebpo_error *error);
 

@@ -1,18 +1,18 @@
 /* Follows a ball along a straight piece of its path to the first face in contact, and checks that
  * the ball's centre crosses no face.
  *
- * Nodes of the tree over the faces are visited in the order of possible contact. The search ends
- * when the next node can only be in contact later than a known face. The distance from a box or a
- * face is convex along a line, so Newton's steps towards the ball's radius never go too far. Of the
- * nodes that are already in contact, the closest are visited first.
+ * Nodes of the tree over the faces are visited in the order of their earliest possible contact. The
+ * search ends when this is, for the next node, later than the first contact found. The distance
+ * from a box or a face is convex along a line, so Newton's steps towards the ball's radius never go
+ * too far. Of the nodes that are already in contact, the closest are visited first.
  *
- * The work of a haptic step is bounded. After an early end, the ball goes as far as the next node
- * allows. If the known contacts hold the ball in place, the ball stays; otherwise the next step
- * continues.
+ * The work of a haptic step is bounded. If the limit is reached, the piece ends where the next node
+ * may be in contact; if that is near the beginning, the next haptic step continues the search. If
+ * the contacts found so far hold the ball at its place, the search ends early.
  *
- * The planes of the contacts leave a cone of free directions. The point of the cone that is nearest
- * to the wanted path is the wanted point itself, or on a plane, or on the line of two planes, or
- * the apex. All of these are tried, since there are few planes. */
+ * The planes of the contacts bound a cone of allowed motions. The motion of the cone that is
+ * nearest to the wanted one is the wanted one itself, or on a plane, or on the line of two planes,
+ * or 0. All of these are tried, since there are few planes. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -26,14 +26,18 @@
 #include "extras/haptic/face_box.h"
 #include "geometry/vec3.h"
 
-typedef struct trial {
+/* The search for the allowed motion that is nearest to `want`. */
+typedef struct motion_search {
     const ebpo_held_planes *planes;
-    const double *want;
-    double length, best, slack;
-    double *out;
-} trial;
+    const double *want; /* [3] */
+    double length;      /* of `want` */
+    double best;        /* squared distance of `out` from `want` */
+    double slack;       /* tolerance with which `out` satisfies the planes */
+    double *out;        /* [3] */
+} motion_search;
 
-static void try_motion(trial *t, const double motion[3], double slack)
+/* Keeps the motion if all planes allow it, within `slack`, and it is nearer to `want`. */
+static void try_motion(motion_search *t, const double motion[3], double slack)
 {
     double lost[3];
     for (int i = 0; i < t->planes->count; i++)
@@ -48,7 +52,8 @@ static void try_motion(trial *t, const double motion[3], double slack)
     }
 }
 
-static void try_plane(trial *t, const double n[3], double slack)
+/* Tries the projection of `want` onto the plane with the normal n. */
+static void try_plane(motion_search *t, const double n[3], double slack)
 {
     double motion[3], into = ebpo_vec3_dot(t->want, n);
     for (int i = 0; i < 3; i++)
@@ -56,7 +61,8 @@ static void try_plane(trial *t, const double n[3], double slack)
     try_motion(t, motion, slack);
 }
 
-static void try_line(trial *t, const double m[3], const double n[3], double slack)
+/* Tries the projection of `want` onto the line of two planes. */
+static void try_line(motion_search *t, const double m[3], const double n[3], double slack)
 {
     double line[3], motion[3];
     ebpo_vec3_cross(m, n, line);
@@ -69,10 +75,10 @@ static void try_line(trial *t, const double m[3], const double n[3], double slac
     try_motion(t, motion, slack / sqrt(square));
 }
 
-double ebpo_hold_back(const ebpo_held_planes *planes, const double want[3], double out[3])
+double ebpo_project_motion(const ebpo_held_planes *planes, const double want[3], double out[3])
 {
     double length = sqrt(ebpo_vec3_dot(want, want)), slack = 0x1p-44 * length;
-    trial t = { planes, want, length, INFINITY, slack, out };
+    motion_search t = { planes, want, length, INFINITY, slack, out };
     for (int i = 0; i < 3; i++)
         out[i] = 0;
     try_motion(&t, want, slack);
@@ -106,11 +112,11 @@ enum {
     HELD_FACES = 48
 };
 
-static const double worth =
-    1.0 / 32; /* the shortest part of a path for which an early end is worthwhile */
+/* Least part of a piece after which the piece may end before its contact is known. */
+static const double least_part = 1.0 / 32;
 
-/* Returns the greatest number of waiting nodes: waiting nodes are disjoint parts of the tree, so
- * there are at most as many as leaves. */
+/* Returns the greatest number of waiting nodes: their subtrees are disjoint, so there are at most
+ * as many as leaves. */
 static uint64_t capacity_for(uint64_t faces) { return ebpo_face_box_leaves(faces) + 1; }
 
 uint64_t ebpo_ball_walk_bytes(uint64_t faces)
@@ -120,7 +126,7 @@ uint64_t ebpo_ball_walk_bytes(uint64_t faces)
 
 ebpo_status ebpo_ball_walk_new(ebpo_ball_walk *w, uint64_t faces, ebpo_error *error)
 {
-    *w = (ebpo_ball_walk){ .stage = EBPO_BALL_STANDS };
+    *w = (ebpo_ball_walk){ .stage = EBPO_BALL_IDLE };
     w->queue.item = ebpo_alloc(capacity_for(faces), sizeof *w->queue.item);
     if (!w->queue.item)
         return ebpo_fail_memory(error, ebpo_ball_walk_bytes(faces));
@@ -134,9 +140,9 @@ void ebpo_ball_walk_free(ebpo_ball_walk *w)
     w->queue.item = NULL;
 }
 
-/* Returns true if the ball does not come nearer to the content of `e`. The slacks cover rounding.
- */
-static bool goes_away(const ebpo_ball_walk *w, const ebpo_extent *e)
+/* Returns true if the ball does not come nearer to any point of `e`. The slacks of ebpo_ball_motion
+ * cover the rounding. */
+static bool moves_away(const ebpo_ball_walk *w, const ebpo_extent *e)
 {
     double least = 0;
     for (int i = 0; i < 3; i++)
@@ -144,10 +150,10 @@ static bool goes_away(const ebpo_ball_walk *w, const ebpo_extent *e)
     return least >= 0;
 }
 
-/* Returns a lower bound of the part of the path at which the ball touches the content of `e`. If
- * the ball may touch it now, returns minus the overlap. INFINITY: not before the known contact, or
- * not at all. */
-static double ball_walk_soonest(const ebpo_ball_walk *w, const ebpo_extent *e)
+/* Returns a lower bound of the part of the path at which the ball touches faces in `e`; a negative
+ * number, minus the overlap, if it may touch them at the beginning; INFINITY if it touches none
+ * before w->part. */
+static double earliest_contact(const ebpo_ball_walk *w, const ebpo_extent *e)
 {
     double part = 0;
     for (int step = 0; step < STEPS; step++) {
@@ -158,7 +164,7 @@ static double ball_walk_soonest(const ebpo_ball_walk *w, const ebpo_extent *e)
         }
         double distance = sqrt(ebpo_vec3_dot(off, off)), gap = distance - (w->reach + 2 * w->band);
         if (gap <= 0)
-            return part > 0 ? part : goes_away(w, e) ? INFINITY : gap;
+            return part > 0 ? part : moves_away(w, e) ? INFINITY : gap;
         double slope = ebpo_vec3_dot(off, w->motion) / distance;
         if (!(slope < 0))
             return INFINITY;
@@ -169,14 +175,15 @@ static double ball_walk_soonest(const ebpo_ball_walk *w, const ebpo_extent *e)
     return part;
 }
 
-static void wait_for(ebpo_ball_walk *w, uint64_t node)
+/* Adds a node to the queue if the ball may touch its faces before the contact found so far. */
+static void push_node(ebpo_ball_walk *w, uint64_t node)
 {
-    double key = ball_walk_soonest(w, &w->box->node[node]);
+    double key = earliest_contact(w, &w->box->node[node]);
     if (key < w->part)
         ebpo_near_push(&w->queue, key, node);
 }
 
-void ebpo_ball_set_out(ebpo_ball_walk *w)
+void ebpo_ball_begin(ebpo_ball_walk *w)
 {
     w->stage = EBPO_BALL_SEARCHES;
     w->part = 1;
@@ -184,7 +191,7 @@ void ebpo_ball_set_out(ebpo_ball_walk *w)
     w->cut = false;
     w->queue.count = 0;
     if (w->box && w->box->count > 0)
-        wait_for(w, 1);
+        push_node(w, 1);
 }
 
 static void inspect_leaf(ebpo_ball_walk *w, uint64_t leaf, ebpo_ball_work *work)
@@ -205,13 +212,13 @@ static void inspect_leaf(ebpo_ball_walk *w, uint64_t leaf, ebpo_ball_work *work)
     }
 }
 
-/* Ends the path before the first waiting node; all nodes that are not visited are farther along the
- * path. Returns false if hardly any path remains. */
+/* Ends the piece where the first waiting node may be in contact; all other waiting nodes may be in
+ * contact only later. Returns false, and changes nothing, if the piece would be too short. */
 static bool end_before_waiting(ebpo_ball_walk *w)
 {
     if (w->part <= 0)
         return true;
-    if (!(w->queue.item[0].key >= worth))
+    if (!(w->queue.item[0].key >= least_part))
         return false;
     w->part = w->queue.item[0].key;
     w->contacts.count = 0;
@@ -219,6 +226,7 @@ static bool end_before_waiting(ebpo_ball_walk *w)
     return true;
 }
 
+/* Searches for the first contact. Returns false if the next haptic step must continue. */
 static bool find_contact(ebpo_ball_walk *w, ebpo_ball_work *work)
 {
     uint32_t held = work->faces; /* number of faces visited before the contact */
@@ -239,8 +247,8 @@ static bool find_contact(ebpo_ball_walk *w, ebpo_ball_work *work)
             continue;
         }
         work->nodes += 2;
-        wait_for(w, 2 * node);
-        wait_for(w, 2 * node + 1);
+        push_node(w, 2 * node);
+        push_node(w, 2 * node + 1);
     }
     return true;
 }
@@ -255,8 +263,9 @@ static void begin_check(ebpo_ball_walk *w)
         w->stack[w->depth++] = 1;
 }
 
-/* Returns true if the segment may intersect `e`. The margin of `e` is more than the rounding of the
- * segment's entry and exit, and less than the ball's distance from faces. */
+/* Returns true if the segment of the centre may intersect `e`. The margin around `e` is greater
+ * than the rounding of the segment's entry and exit, and less than the ball's distance from faces.
+ */
 static bool may_cross(const ebpo_ball_walk *w, const ebpo_extent *e)
 {
     double enters = 0, leaves = 1, wider = 16 * w->band;
@@ -285,11 +294,12 @@ static bool crosses_leaf(const ebpo_ball_walk *w, uint64_t leaf, ebpo_ball_work 
     return false;
 }
 
-static ebpo_ball_end ball_walk_check(ebpo_ball_walk *w, ebpo_ball_work *work)
+/* Checks that the segment of the centre intersects no face. */
+static ebpo_ball_end check_segment(ebpo_ball_walk *w, ebpo_ball_work *work)
 {
     while (w->depth > 0) {
         if (work->faces + EBPO_FACE_BOX_LEAF > EBPO_BALL_FACES || work->nodes >= EBPO_BALL_NODES)
-            return EBPO_BALL_LATER;
+            return EBPO_BALL_UNFINISHED;
         uint64_t node = w->stack[--w->depth];
         work->nodes++;
         if (!may_cross(w, &w->box->node[node]))
@@ -298,21 +308,21 @@ static ebpo_ball_end ball_walk_check(ebpo_ball_walk *w, ebpo_ball_work *work)
             w->stack[w->depth++] = 2 * node + 1;
             w->stack[w->depth++] = 2 * node;
         } else if (crosses_leaf(w, node - w->box->leaves, work)) {
-            return EBPO_BALL_THROUGH;
+            return EBPO_BALL_CROSSED;
         }
     }
-    return EBPO_BALL_THERE;
+    return EBPO_BALL_ARRIVED;
 }
 
-ebpo_ball_end ebpo_ball_go_on(ebpo_ball_walk *w, ebpo_ball_work *work)
+ebpo_ball_end ebpo_ball_continue(ebpo_ball_walk *w, ebpo_ball_work *work)
 {
     if (w->stage == EBPO_BALL_SEARCHES) {
         if (!find_contact(w, work))
-            return EBPO_BALL_LATER;
+            return EBPO_BALL_UNFINISHED;
         begin_check(w);
     }
-    ebpo_ball_end end = ball_walk_check(w, work);
-    if (end != EBPO_BALL_LATER)
-        w->stage = EBPO_BALL_STANDS;
+    ebpo_ball_end end = check_segment(w, work);
+    if (end != EBPO_BALL_UNFINISHED)
+        w->stage = EBPO_BALL_IDLE;
     return end;
 }

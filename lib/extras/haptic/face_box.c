@@ -1,14 +1,14 @@
-/* The faces in a box around the proxy, with a tree of boxes over them: all data that a haptic step
- * reads.
+/* The faces in a box around the proxy, with a tree of boxes over them: the only geometry that a
+ * haptic step reads.
  *
  * The loading thread makes a box; a box never changes while a step uses it. Faces keep the order of
  * the file, which follows a space-filling curve, so the tree needs no sorting. Functions that steps
  * call allocate no memory; their callers limit their work.
  *
- * Distances are in doubles, correct to a few ulps. The side of a point is exact: a straight path
- * from a known point changes the winding number at each face whose interior it crosses. If the path
- * crosses an edge, or begins in a face's plane, a detour through another point is used; almost
- * every point works. */
+ * Distances are in doubles, correct to a few ulps. The side of a point is exact: along a straight
+ * path from a point whose side is known, the winding number changes at each face whose interior the
+ * path crosses. If the path crosses an edge, or begins in a face's plane, it is replaced by a
+ * detour through another point; almost every point works. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -35,7 +35,7 @@ uint64_t ebpo_face_box_bytes(uint64_t capacity)
            2 * ebpo_face_box_leaves(capacity) * sizeof(ebpo_extent);
 }
 
-/* All pages are written here, so that no haptic step is the first to use a page. */
+/* Writes to all pages, so that no haptic step waits for the operating system to provide a page. */
 ebpo_status ebpo_face_box_new(ebpo_face_box *out, uint64_t capacity, ebpo_error *error)
 {
     *out = (ebpo_face_box){ .capacity = capacity, .leaves = 1 };
@@ -70,7 +70,7 @@ typedef struct loading {
     bool fits;
 } loading;
 
-static bool face_box_take(void *user, const ebpo_triangles *triangles)
+static bool take_triangles(void *user, const ebpo_triangles *triangles)
 {
     loading *l = user;
     ebpo_face_box *box = l->box;
@@ -83,7 +83,7 @@ static bool face_box_take(void *user, const ebpo_triangles *triangles)
     return true;
 }
 
-static void face_box_widen(ebpo_extent *e, const double min[3], const double max[3])
+static void widen_extent(ebpo_extent *e, const double min[3], const double max[3])
 {
     for (int i = 0; i < 3; i++) {
         e->min[i] = fmin(e->min[i], min[i]);
@@ -93,20 +93,20 @@ static void face_box_widen(ebpo_extent *e, const double min[3], const double max
 
 static void make_tree(ebpo_face_box *box)
 {
-    static const ebpo_extent nothing = { { INFINITY, INFINITY, INFINITY },
-                                         { -INFINITY, -INFINITY, -INFINITY } };
+    static const ebpo_extent empty = { { INFINITY, INFINITY, INFINITY },
+                                       { -INFINITY, -INFINITY, -INFINITY } };
     box->leaves = ebpo_face_box_leaves(box->count);
     for (uint64_t leaf = 0; leaf < box->leaves; leaf++) {
         ebpo_extent *e = &box->node[box->leaves + leaf];
-        *e = nothing;
+        *e = empty;
         for (uint64_t f = leaf * EBPO_FACE_BOX_LEAF;
              f < box->count && f < (leaf + 1) * EBPO_FACE_BOX_LEAF; f++)
             for (int k = 0; k < 3; k++)
-                face_box_widen(e, box->corner[f][k], box->corner[f][k]);
+                widen_extent(e, box->corner[f][k], box->corner[f][k]);
     }
     for (uint64_t n = box->leaves - 1; n > 0; n--) {
         box->node[n] = box->node[2 * n];
-        face_box_widen(&box->node[n], box->node[2 * n + 1].min, box->node[2 * n + 1].max);
+        widen_extent(&box->node[n], box->node[2 * n + 1].min, box->node[2 * n + 1].max);
     }
 }
 
@@ -124,14 +124,14 @@ ebpo_status ebpo_face_box_load(ebpo_face_box *box, ebpo_context *context,
     }
     ebpo_vec3_copy(min, box->loaded.min);
     ebpo_vec3_copy(max, box->loaded.max);
-    ebpo_status status = ebpo_triangles_in_box(context, min, max, face_box_take, &l, error);
+    ebpo_status status = ebpo_triangles_in_box(context, min, max, take_triangles, &l, error);
     *fits = l.fits;
     if (status == EBPO_OK && l.fits)
         make_tree(box);
     return status;
 }
 
-static bool face_box_intersect(const ebpo_extent *a, const ebpo_extent *b)
+static bool extents_intersect(const ebpo_extent *a, const ebpo_extent *b)
 {
     for (int i = 0; i < 3; i++)
         if (!(a->min[i] <= b->max[i] && a->max[i] >= b->min[i]))
@@ -144,9 +144,9 @@ static bool face_intersects(const double face[3][3], const ebpo_extent *around)
     ebpo_extent e;
     ebpo_vec3_copy(face[0], e.min);
     ebpo_vec3_copy(face[0], e.max);
-    face_box_widen(&e, face[1], face[1]);
-    face_box_widen(&e, face[2], face[2]);
-    return face_box_intersect(&e, around);
+    widen_extent(&e, face[1], face[1]);
+    widen_extent(&e, face[2], face[2]);
+    return extents_intersect(&e, around);
 }
 
 bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uint32_t *found,
@@ -161,7 +161,7 @@ bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uin
         if (*visits == 0)
             return false;
         --*visits;
-        if (!face_box_intersect(&box->node[n], around))
+        if (!extents_intersect(&box->node[n], around))
             continue;
         if (n < box->leaves) {
             stack[depth++] = 2 * n + 1;
@@ -180,7 +180,7 @@ bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uin
 }
 
 /* Returns the squared distance of two boxes. */
-static double face_box_between(const ebpo_extent *a, const ebpo_extent *b)
+static double box_square_distance(const ebpo_extent *a, const ebpo_extent *b)
 {
     double square = 0;
     for (int i = 0; i < 3; i++) {
@@ -190,7 +190,8 @@ static double face_box_between(const ebpo_extent *a, const ebpo_extent *b)
     return square;
 }
 
-static double closest_of_leaf(const ebpo_face_box *box, uint64_t leaf, const ebpo_extent *around)
+/* Returns the least squared distance of the boxes of a leaf's faces from `around`. */
+static double min_square_of_leaf(const ebpo_face_box *box, uint64_t leaf, const ebpo_extent *around)
 {
     double least = INFINITY;
     uint64_t f = leaf * EBPO_FACE_BOX_LEAF, end = f + EBPO_FACE_BOX_LEAF;
@@ -198,15 +199,16 @@ static double closest_of_leaf(const ebpo_face_box *box, uint64_t leaf, const ebp
         ebpo_extent e;
         ebpo_vec3_copy(box->corner[f][0], e.min);
         ebpo_vec3_copy(box->corner[f][0], e.max);
-        face_box_widen(&e, box->corner[f][1], box->corner[f][1]);
-        face_box_widen(&e, box->corner[f][2], box->corner[f][2]);
-        least = fmin(least, face_box_between(&e, around));
+        widen_extent(&e, box->corner[f][1], box->corner[f][1]);
+        widen_extent(&e, box->corner[f][2], box->corner[f][2]);
+        least = fmin(least, box_square_distance(&e, around));
     }
     return least;
 }
 
-static double find_square(const ebpo_face_box *box, const ebpo_extent *around, uint32_t max_visits,
-                          uint64_t *visits)
+/* Returns a lower bound of the squared distance of `around` from the faces. */
+static double min_square_distance(const ebpo_face_box *box, const ebpo_extent *around,
+                                  uint32_t max_visits, uint64_t *visits)
 {
     struct {
         uint64_t node;
@@ -217,7 +219,7 @@ static double find_square(const ebpo_face_box *box, const ebpo_extent *around, u
     if (box->count == 0)
         return INFINITY;
     stack[depth].node = 1;
-    stack[depth++].lower = face_box_between(&box->node[1], around);
+    stack[depth++].lower = box_square_distance(&box->node[1], around);
     for (uint32_t n = 0; depth > 0; n++) {
         uint64_t node = stack[--depth].node;
         double lower = stack[depth].lower;
@@ -227,10 +229,10 @@ static double find_square(const ebpo_face_box *box, const ebpo_extent *around, u
         if (n >= max_visits) {
             least = lower;
         } else if (node >= box->leaves) {
-            least = fmin(least, closest_of_leaf(box, node - box->leaves, around));
+            least = fmin(least, min_square_of_leaf(box, node - box->leaves, around));
         } else {
-            double l = face_box_between(&box->node[2 * node], around);
-            double r = face_box_between(&box->node[2 * node + 1], around);
+            double l = box_square_distance(&box->node[2 * node], around);
+            double r = box_square_distance(&box->node[2 * node + 1], around);
             bool first = l <= r; /* the child that is visited first is pushed last */
             stack[depth].node = 2 * node + first;
             stack[depth++].lower = first ? r : l;
@@ -244,22 +246,20 @@ static double find_square(const ebpo_face_box *box, const ebpo_extent *around, u
 double ebpo_face_box_clearance(const ebpo_face_box *box, const ebpo_extent *around,
                                uint32_t max_visits, uint64_t *visits)
 {
-    return sqrt(find_square(box, around, max_visits, visits)) * (1 - 0x1p-48);
+    return sqrt(min_square_distance(box, around, max_visits, visits)) * (1 - 0x1p-48);
 }
 
 /* --- the nearest point of a face --- */
 
-/* Computes when a ball is in contact with a face, at any of the face's features. The distance from
- * a face, a convex set, is convex along a line. Where the distance decreases, its tangents are
- * below it. So Newton's steps towards a distance never go too far. */
-
-typedef struct nearest {
+/* The nearest point of a face's edges to a point p. */
+typedef struct nearest_edge_point {
     double square, offset[3]; /* vector from the nearest point to p */
     int edge;                 /* edge from corner `edge` to the next one */
     double part;              /* position on the edge */
-} nearest;
+} nearest_edge_point;
 
-static void try_edge(const double p[3], const double face[3][3], int k, nearest *best)
+/* Replaces *best by the nearest point of edge k if that is nearer. */
+static void try_edge(const double p[3], const double face[3][3], int k, nearest_edge_point *best)
 {
     const double *a = face[k], *b = face[(k + 1) % 3];
     double e[3], d[3], part = 0;
@@ -272,14 +272,15 @@ static void try_edge(const double p[3], const double face[3][3], int k, nearest 
         d[i] -= part * e[i];
     double square = ebpo_vec3_dot(d, d);
     if (square < best->square) {
-        *best = (nearest){ .square = square, .edge = k, .part = part };
+        *best = (nearest_edge_point){ .square = square, .edge = k, .part = part };
         for (int i = 0; i < 3; i++)
             best->offset[i] = d[i];
     }
 }
 
-/* Handles a point p that is above the interior of the face. */
-static bool near_inside(const double p[3], const double face[3][3], ebpo_face_near *out)
+/* Computes the result if the nearest point is in the interior of the face; otherwise returns false.
+ */
+static bool nearest_in_interior(const double p[3], const double face[3][3], ebpo_face_near *out)
 {
     double e[3], f[3], n[3], d[3], c[3];
     ebpo_vec3_subtract(face[1], face[0], e);
@@ -307,9 +308,9 @@ static bool near_inside(const double p[3], const double face[3][3], ebpo_face_ne
 
 void ebpo_face_nearest(const double p[3], const double face[3][3], ebpo_face_near *out)
 {
-    if (near_inside(p, face, out))
+    if (nearest_in_interior(p, face, out))
         return;
-    nearest best = { .square = INFINITY };
+    nearest_edge_point best = { .square = INFINITY };
     for (int k = 0; k < 3; k++)
         try_edge(p, face, k, &best);
     out->distance = sqrt(best.square);
@@ -323,6 +324,9 @@ void ebpo_face_nearest(const double p[3], const double face[3][3], ebpo_face_nea
 
 enum { STEPS = 24 };
 
+/* Along a line the distance from a face, which is a convex set, is a convex function. So it is
+ * above its tangents: a Newton step never passes the point at which the ball first touches the
+ * face's interior, an edge or a corner. */
 double ebpo_ball_intersects(const ebpo_ball_motion *w, const double face[3][3], double away[3])
 {
     double part = 0;
@@ -346,6 +350,8 @@ double ebpo_ball_intersects(const ebpo_ball_motion *w, const double face[3][3], 
     return part;
 }
 
+/* Returns the sign of the volume of the tetrahedron a, b, c, d, exactly; another number: that
+ * cannot be decided without allocating memory. */
 static int volume_sign(const double a[3], const double b[3], const double c[3], const double d[3])
 {
     double u[3], v[3], w[3], value = 0, sum = 0, last = 0;
@@ -359,14 +365,13 @@ static int volume_sign(const double a[3], const double b[3], const double c[3], 
         sum += (fabs(l) + fabs(r)) * fabs(w[i]);
         last += fabs(w[i]);
     }
-    /* the error bound of ebpo_orient3d; that function may allocate memory where expansions do not
-     * suffice */
+    /* this is the filter of ebpo_orient3d, which is not called, because it may allocate memory */
     double bound = 0x1p-50 * sum + 0x1p-960 * (1 + last);
     return value > bound ? 1 : value < -bound ? -1 : ebpo_orient3d_expansion(a, b, c, d);
 }
 
-/* Tests the segment and the face in the face's plane, seen along an axis. Returns false if a line
- * along an edge or along pq separates them. */
+/* Tests a segment in the face's plane, in the projection along an axis. Returns false if the line
+ * of an edge or of pq separates the segment and the face. */
 static bool intersects_in_plane(const double p[3], const double q[3], const double face[3][3],
                                 int axis)
 {
@@ -387,7 +392,7 @@ static bool intersects_in_plane(const double p[3], const double q[3], const doub
         if (ebpo_orient2d_expansion(corner[k], corner[(k + 1) % 3], a) == -orientation &&
             ebpo_orient2d_expansion(corner[k], corner[(k + 1) % 3], b) == -orientation)
             return false;
-    /* the view is a line: compare along this line, too */
+    /* no such line separates them if pq is on the line of an edge: compare their intervals */
     for (int i = 0; i < 2; i++)
         if (fmax(a[i], b[i]) < fmin(corner[0][i], fmin(corner[1][i], corner[2][i])) ||
             fmin(a[i], b[i]) > fmax(corner[0][i], fmax(corner[1][i], corner[2][i])))
@@ -395,9 +400,9 @@ static bool intersects_in_plane(const double p[3], const double q[3], const doub
     return true;
 }
 
-/* Compares along each axis along which the face is not seen as a line. A face without area is seen
- * as a line along every axis. */
-static bool intersects_flat(const double p[3], const double q[3], const double face[3][3])
+/* Tests a segment in the face's plane: in the projection along the first axis in which the face has
+ * area. Returns false if the face has no area. */
+static bool intersects_coplanar(const double p[3], const double q[3], const double face[3][3])
 {
     for (int axis = 0; axis < 3; axis++) {
         int u = (axis + 1) % 3, v = (axis + 2) % 3;
@@ -421,7 +426,7 @@ bool ebpo_segment_may_intersect(const double p[3], const double q[3], const doub
     if (at_p == at_q && (at_p == 1 || at_p == -1))
         return false;
     if (at_p == 0 && at_q == 0)
-        return intersects_flat(p, q, face);
+        return intersects_coplanar(p, q, face);
     bool left = false, right = false;
     for (int k = 0; k < 3; k++) {
         int sign = volume_sign(p, q, face[k], face[(k + 1) % 3]);
@@ -431,6 +436,12 @@ bool ebpo_segment_may_intersect(const double p[3], const double q[3], const doub
     return !(left && right);
 }
 
+enum { CROSSES_DEGENERATE = 2 };
+
+/* Returns the change of the winding number from p to q by this face: 1 from outside to inside, -1
+ * from inside to outside, 0 without a common point. CROSSES_DEGENERATE: the segment crosses an edge
+ * or a corner, begins or ends in the face's plane, or perhaps does not cross at all. Allocates no
+ * memory. */
 static int segment_crosses(const double p[3], const double q[3], const double face[3][3])
 {
     if (!ebpo_segment_may_intersect(p, q, face))
@@ -438,13 +449,13 @@ static int segment_crosses(const double p[3], const double q[3], const double fa
     int at_p = volume_sign(face[0], face[1], face[2], p);
     int at_q = volume_sign(face[0], face[1], face[2], q);
     if (at_p * at_q != -1)
-        return EBPO_CROSSES_BADLY;
+        return CROSSES_DEGENERATE;
     for (int k = 0; k < 3; k++) {
         int sign = volume_sign(p, q, face[k], face[(k + 1) % 3]);
         if (sign != 1 && sign != -1)
-            return EBPO_CROSSES_BADLY;
+            return CROSSES_DEGENERATE;
     }
-    return at_p; /* the path comes from the face's outer side */
+    return at_p; /* 1: p is on the outer side, so the path enters; -1: it leaves */
 }
 
 void ebpo_near_push(ebpo_near_queue *queue, double key, uint64_t node)
@@ -474,9 +485,9 @@ ebpo_near_node ebpo_near_pop(ebpo_near_queue *queue)
 
 /* --- the side of a point --- */
 
-enum { PIECES = 12 };
+enum { SIDE_PIECES = 12 };
 
-static void extent_of(const double p[3], const double q[3], ebpo_extent *out)
+static void extent_of_segment(const double p[3], const double q[3], ebpo_extent *out)
 {
     for (int i = 0; i < 3; i++) {
         out->min[i] = fmin(p[i], q[i]);
@@ -484,23 +495,28 @@ static void extent_of(const double p[3], const double q[3], ebpo_extent *out)
     }
 }
 
-typedef enum crossing { CROSSED, TOO_MANY, BADLY } crossing;
+typedef enum crossing {
+    CROSSED,
+    TOO_MANY,  /* more faces or nodes than the limits allow */
+    DEGENERATE /* the segment crosses an edge or a corner, or touches a face */
+} crossing;
 
+/* Moves the side along the segment to `to`; otherwise the side stays. */
 static crossing cross_faces(ebpo_side *side, const ebpo_face_box *box, const double to[3],
                             uint32_t *found, uint32_t most, uint32_t visits, uint64_t *work)
 {
     ebpo_extent around;
     uint32_t count;
     int32_t change = 0;
-    extent_of(side->at, to, &around);
+    extent_of_segment(side->at, to, &around);
     bool all = ebpo_face_box_find(box, &around, found, most, &visits, &count);
     *work += count;
     if (!all)
         return TOO_MANY;
     for (uint32_t i = 0; i < count; i++) {
         int sign = segment_crosses(side->at, to, (const double(*)[3])box->corner[found[i]]);
-        if (sign == EBPO_CROSSES_BADLY)
-            return BADLY;
+        if (sign == CROSSES_DEGENERATE)
+            return DEGENERATE;
         change += sign;
     }
     side->winding += change;
@@ -508,7 +524,8 @@ static crossing cross_faces(ebpo_side *side, const ebpo_face_box *box, const dou
     return CROSSED;
 }
 
-/* Chooses a point for a detour near the middle of the path, a different one each time. */
+/* Chooses a pseudorandom point near the middle of the path for a detour, a different one each time.
+ */
 static void choose_detour(ebpo_side *side, const double to[3], const ebpo_extent *within,
                           double via[3])
 {
@@ -516,22 +533,22 @@ static void choose_detour(ebpo_side *side, const double to[3], const ebpo_extent
     for (int i = 0; i < 3; i++)
         length = fmax(length, fabs(to[i] - side->at[i]));
     for (int i = 0; i < 3; i++) {
-        side->turns = side->turns * 1664525u + 1013904223u;
-        double off = (double)(side->turns >> 8) * 0x1p-24 - 0.5;
+        side->random = side->random * 1664525u + 1013904223u;
+        double off = (double)(side->random >> 8) * 0x1p-24 - 0.5;
         via[i] = 0.5 * (side->at[i] + to[i]) + 0.75 * off * length;
         via[i] = fmin(fmax(via[i], within->min[i]), within->max[i]);
     }
 }
 
-bool ebpo_side_go(ebpo_side *side, const ebpo_face_box *box, const double place[3], uint32_t *found,
-                  uint32_t most, uint32_t visits, uint64_t *work)
+bool ebpo_side_move(ebpo_side *side, const ebpo_face_box *box, const double place[3],
+                    uint32_t *found, uint32_t most, uint32_t visits, uint64_t *work)
 {
     double to[3];
     ebpo_vec3_copy(place, to);
     side->known = side->known && ebpo_extent_holds(&box->centres, side->at);
     if (!side->known || !ebpo_extent_holds(&box->centres, place))
         return false;
-    for (int piece = 0; piece < PIECES; piece++) {
+    for (int piece = 0; piece < SIDE_PIECES; piece++) {
         switch (cross_faces(side, box, to, found, most, visits, work)) {
         case CROSSED:
             if (to[0] == place[0] && to[1] == place[1] && to[2] == place[2])
@@ -542,18 +559,18 @@ bool ebpo_side_go(ebpo_side *side, const ebpo_face_box *box, const double place[
             for (int i = 0; i < 3; i++)
                 to[i] = side->at[i] + 0.25 * (to[i] - side->at[i]);
             break;
-        case BADLY: choose_detour(side, to, &box->centres, to); break;
+        case DEGENERATE: choose_detour(side, to, &box->centres, to); break;
         }
     }
     return false;
 }
 
-bool ebpo_side_on(const ebpo_face_box *box, const double place[3], uint32_t *found, uint32_t most,
-                  uint32_t visits)
+bool ebpo_is_on_face(const ebpo_face_box *box, const double place[3], uint32_t *found,
+                     uint32_t most, uint32_t visits)
 {
     ebpo_extent around;
     uint32_t count;
-    extent_of(place, place, &around);
+    extent_of_segment(place, place, &around);
     bool all = ebpo_face_box_find(box, &around, found, most, &visits, &count);
     for (uint32_t i = 0; i < count; i++)
         if (ebpo_segment_may_intersect(place, place, (const double(*)[3])box->corner[found[i]]))

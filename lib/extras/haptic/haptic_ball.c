@@ -35,10 +35,12 @@ uint32_t ebpo_haptic_stopped(const ebpo_haptic *t)
     return atomic_load_explicit(&t->stopped, memory_order_acquire) ? EBPO_HAPTIC_STOPPED : 0;
 }
 
-static bool has_no_piece(const ebpo_haptic *t) { return t->walk.stage == EBPO_BALL_STANDS; }
+static bool has_no_piece(const ebpo_haptic *t) { return t->walk.stage == EBPO_BALL_IDLE; }
 
-/* Applies Coulomb friction. Without friction the proxy has slid from `from`; with friction it
- * follows only as far as the tangential part of the spring exceeds the friction. */
+/* Applies Coulomb friction. Without friction the proxy has slid from `from` to its position. With
+ * friction it slides only by the part of this path by which the tangential force exceeds the
+ * friction; it stays if the friction is larger. Both forces are those of a spring, so lengths are
+ * compared. */
 static uint32_t apply_friction(ebpo_haptic *t, const double from[3], const double device[3],
                                ebpo_ball_work *work)
 {
@@ -46,21 +48,21 @@ static uint32_t apply_friction(ebpo_haptic *t, const double from[3], const doubl
     ebpo_vec3_subtract(t->proxy, from, slid);
     ebpo_vec3_subtract(device, t->proxy, depth);
     double length = sqrt(ebpo_vec3_dot(slid, slid));
-    double holds = t->options.friction * sqrt(ebpo_vec3_dot(depth, depth));
-    double part = length > holds ? 1 - holds / length : 0;
+    double friction = t->options.friction * sqrt(ebpo_vec3_dot(depth, depth));
+    double part = length > friction ? 1 - friction / length : 0;
     for (int i = 0; i < 3; i++)
         goal[i] = from[i] + part * slid[i] + (part > 0 ? depth[i] : 0);
     ebpo_vec3_copy(from, t->proxy);
     t->path_count = 1;
     if (part > 0)
-        return ebpo_haptic_go(t, goal, work);
-    if (length > 0 && memcmp(from, t->along_at, sizeof t->along_at) == 0)
-        t->planes = t->along; /* the proxy is back at `from` */
+        return ebpo_haptic_move_ball(t, goal, work);
+    if (length > 0 && memcmp(from, t->contact_position, sizeof t->contact_position) == 0)
+        t->holding_planes = t->contact_planes; /* the proxy is back at `from` */
     return 0;
 }
 
-/* Computes the vector from the device to the proxy. Where the proxy waits for the loading thread,
- * this is only the part that faces hold back. */
+/* Computes the vector from the device to the proxy. If the proxy waits for the loading thread or
+ * its path is incomplete, this is only the part of the vector that contacts cause. */
 static void find_depth(const ebpo_haptic *t, const double device[3], uint32_t flags, double out[3])
 {
     double want[3], motion[3];
@@ -68,27 +70,29 @@ static void find_depth(const ebpo_haptic *t, const double device[3], uint32_t fl
     if (!(flags & (EBPO_HAPTIC_WAITING | EBPO_HAPTIC_INCOMPLETE)))
         return;
     ebpo_vec3_subtract(device, t->proxy, want);
-    (void)ebpo_hold_back(&t->planes, want, motion);
+    (void)ebpo_project_motion(&t->holding_planes, want, motion);
     ebpo_vec3_subtract(motion, want, out);
 }
 
 /* Removes the part of the force that pulls towards faces, without increasing the force. The vector
- * from device to proxy is not exactly along the faces' normals: the proxy's remaining path,
- * rounding far from 0, and friction tilt this vector. So damping across the vector may pull towards
- * faces, and very high damping pulls with full force. The first contact may be the edge of a face
- * that is a tiny distance beside the ball, so the nearest face counts, too. If the spring itself
- * pulls to a face, this face is the other face of a narrow corner. */
+ * `depth` from device to proxy is not exactly along the faces' normals: the proxy's remaining path,
+ * rounding far from 0, and friction tilt it. So damping across this vector may pull towards faces,
+ * and very high damping pulls with full force. `near`: t->away is set. */
 static void keep_from_faces(const ebpo_haptic *t, bool near, const double depth[3], double force[3])
 {
-    ebpo_held_planes off = { .count = 0 };
+    ebpo_held_planes planes = { .count = 0 };
     double wanted[3];
+    /* the first contact may be the edge of a face that is a tiny distance beside the ball, so the
+     * nearest face counts, too */
     if (near && ebpo_vec3_dot(t->away, depth) >= 0)
-        ebpo_held_planes_add(&off, t->away);
-    for (int i = 0; i < t->planes.count; i++)
-        if (ebpo_vec3_dot(t->planes.normal[i], depth) >= 0)
-            ebpo_held_planes_add(&off, t->planes.normal[i]);
+        ebpo_held_planes_add(&planes, t->away);
+    /* if the spring itself pulls towards a face, this is the other face of a narrow corner: it does
+     * not count */
+    for (int i = 0; i < t->holding_planes.count; i++)
+        if (ebpo_vec3_dot(t->holding_planes.normal[i], depth) >= 0)
+            ebpo_held_planes_add(&planes, t->holding_planes.normal[i]);
     ebpo_vec3_copy(force, wanted);
-    (void)ebpo_hold_back(&off, wanted, force);
+    (void)ebpo_project_motion(&planes, wanted, force);
 }
 
 void ebpo_haptic_count(ebpo_haptic *t, uint32_t flags, uint64_t work)
@@ -121,13 +125,13 @@ void ebpo_haptic_step_ball(ebpo_haptic *t, const double device[3], ebpo_haptic_b
     ebpo_vec3_subtract(at, t->device, moved);
     ebpo_passive_moved(&t->passive, t->force, moved, 3);
     ebpo_vec3_copy(t->proxy, from);
-    ebpo_vec3_copy(t->along_at, along_at);
-    ebpo_held_planes along = t->along;
-    uint32_t flags = ebpo_haptic_go(t, at, &work);
+    ebpo_vec3_copy(t->contact_position, along_at);
+    ebpo_held_planes along = t->contact_planes;
+    uint32_t flags = ebpo_haptic_move_ball(t, at, &work);
     if (t->touching && (flags & EBPO_HAPTIC_CONTACT) && t->options.friction > 0 &&
         has_no_piece(t)) {
-        t->along = along;
-        ebpo_vec3_copy(along_at, t->along_at);
+        t->contact_planes = along;
+        ebpo_vec3_copy(along_at, t->contact_position);
         flags |= apply_friction(t, from, at, &work);
     }
     out->work = work.faces;
@@ -146,7 +150,7 @@ void ebpo_haptic_step_ball(ebpo_haptic *t, const double device[3], ebpo_haptic_b
     ebpo_vec3_copy(out->force, t->force);
     ebpo_vec3_copy(at, t->device);
     if ((flags & EBPO_HAPTIC_WAITING) && has_no_piece(t))
-        ebpo_haptic_try_other(t);
+        ebpo_haptic_try_previous_box(t);
     ebpo_haptic_count(t, out->flags, out->work);
     ebpo_haptic_report(t, at);
 }
@@ -158,7 +162,7 @@ ebpo_status ebpo_haptic_get_stats(const ebpo_haptic *t, ebpo_haptic_stats *out)
     s.too_many = atomic_load(&t->too_many);
     s.load_seconds = 1e-9 * (double)atomic_load(&t->load_ns);
     s.load_seconds_max = 1e-9 * (double)atomic_load(&t->load_ns_max);
-    s.faces = t->box[t->at].count;
+    s.faces = t->box[t->current_box].count;
     s.memory = EBPO_HAPTIC_BOXES * ebpo_face_box_bytes(t->options.faces);
     s.energy = t->passive.energy;
     s.longest_step = t->passive.longest_step;
@@ -208,8 +212,8 @@ static ebpo_status check_options(const ebpo_haptic_options *o, ebpo_error *error
     return EBPO_OK;
 }
 
-/* Computes values that depend on the model: its box, and the least distance of the ball from faces.
- */
+/* Computes values that depend on the model: its box, default lengths, tolerances, and the size of
+ * boxes. */
 static ebpo_status measure_model(ebpo_haptic *t, ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(t->model->file);
@@ -240,9 +244,9 @@ static ebpo_status measure_model(ebpo_haptic *t, ebpo_error *error)
     t->reach = wide + t->options.skin;
     t->band = fmax(0x1p-24 * t->options.skin, 0x1p-48 * most);
     t->margin = wide + (t->tool ? 4 * t->options.skin : t->options.search_radius);
-    t->stride = t->diagonal;
-    t->half = fmin(1, sqrt((double)t->options.faces / fmax(1, (double)info->face_count))) *
-              t->diagonal / 8;
+    t->max_piece = t->diagonal;
+    t->half_side = fmin(1, sqrt((double)t->options.faces / fmax(1, (double)info->face_count))) *
+                   t->diagonal / 8;
     return EBPO_OK;
 }
 
@@ -255,16 +259,18 @@ static ebpo_status make_parts(ebpo_haptic *t, ebpo_error *error)
         status = ebpo_face_box_new(&t->box[i], t->options.faces, error);
     if (status == EBPO_OK && t->options.kind == EBPO_HAPTIC_BALL)
         status = ebpo_ball_walk_new(&t->walk, t->options.faces, error);
-    t->seen = 1;
-    t->own = 3;
-    atomic_store(&t->between, 2);
-    t->own_known = 1;
-    atomic_store(&t->known_between, 2);
+    t->previous_box = 1;
+    t->loader_box = 3;
+    atomic_store(&t->waiting_box, 2);
+    t->loader_result = 1;
+    atomic_store(&t->waiting_result, 2);
     if (status == EBPO_OK && t->options.kind == EBPO_HAPTIC_PROBE)
         status = ebpo_held_levels_read(t->model->file, &t->levels, error);
     return status;
 }
 
+/* Checks that a ball or a tool may begin with a point at `place`: no face is within `reach` and
+ * half a skin, and the point is not inside the solid. */
 static ebpo_status check_point(ebpo_haptic *t, const double place[3], double reach,
                                ebpo_error *error)
 {
@@ -305,15 +311,15 @@ static ebpo_status check_place(ebpo_haptic *t, const double place[3], ebpo_error
     return status;
 }
 
-/* Returns true if a box contains the proxy. The previous box counts, too: it may be the last one
- * loaded. A haptic step discards a box that was made for another position; then the loader makes no
- * other box for this position. */
+/* Returns true if a box contains the proxy, and makes it the current one. If take_box rejected the
+ * newest box because it did not contain the proxy then, that box is now the previous one. It may
+ * contain the new position, and then the loader makes no further box. */
 static bool has_box(ebpo_haptic *t)
 {
-    if (ebpo_extent_holds(&t->box[t->at].centres, t->proxy) || ebpo_haptic_take_box(t))
+    if (ebpo_extent_holds(&t->box[t->current_box].centres, t->proxy) || ebpo_haptic_take_box(t))
         return true;
-    ebpo_haptic_try_other(t);
-    return ebpo_extent_holds(&t->box[t->at].centres, t->proxy);
+    ebpo_haptic_try_previous_box(t);
+    return ebpo_extent_holds(&t->box[t->current_box].centres, t->proxy);
 }
 
 /* Waits until a box contains the proxy. */
@@ -338,8 +344,8 @@ ebpo_status ebpo_haptic_reset(ebpo_haptic *t, const double place[3], ebpo_error 
     ebpo_status status = check_place(t, place, error);
     if (status != EBPO_OK)
         return status;
-    t->walk.stage = EBPO_BALL_STANDS; /* also after a failure: the session continues from its
-                                       * position */
+    t->walk.stage = EBPO_BALL_IDLE; /* also after a failure: the session continues from its
+                                     * position */
     ebpo_vec3_copy(place, t->proxy);
     ebpo_vec3_copy(place, t->device);
     ebpo_haptic_report(t, place);

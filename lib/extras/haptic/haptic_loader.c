@@ -17,7 +17,8 @@
 #include "extras/haptic/haptic_parts.h"
 #include "geometry/vec3.h"
 
-static ebpo_status known_query(ebpo_haptic *t, ebpo_known_place *out, ebpo_error *error)
+/* Queries distance and side at out->place, and sets the other members of *out. */
+static ebpo_status query_known_result(ebpo_haptic *t, ebpo_known_result *out, ebpo_error *error)
 {
     ebpo_distance_result near;
     ebpo_inside_result inside = { .where = EBPO_OUT };
@@ -30,49 +31,52 @@ static ebpo_status known_query(ebpo_haptic *t, ebpo_known_place *out, ebpo_error
     ebpo_vec3_copy(near.point, out->point);
     ebpo_vec3_copy(near.normal, out->normal);
     out->winding = inside.winding;
-    out->on = inside.where == EBPO_ON;
-    out->there = true;
+    out->on_face = inside.where == EBPO_ON;
+    out->known = true;
     return EBPO_OK;
 }
 
-/* Queries the distance and the side at the probe's position, in the loading thread. *moved: true if
- * the position has changed. */
+/* Queries distance and side at the probe's position, and passes them to the haptic step. *moved is
+ * false, and nothing happens, if the position is that of the last query. */
 static ebpo_status query_position(ebpo_haptic *t, bool *moved, ebpo_error *error)
 {
-    ebpo_known_place *known = &t->known[t->own_known];
+    ebpo_known_result *known = &t->known[t->loader_result];
     for (int i = 0; i < 3; i++)
         known->place[i] = atomic_load_explicit(&t->device_reported[i], memory_order_relaxed);
     *moved = known->place[0] != t->last_query[0] || known->place[1] != t->last_query[1] ||
              known->place[2] != t->last_query[2];
     if (!*moved)
         return EBPO_OK;
-    ebpo_status status = known_query(t, known, error);
+    ebpo_status status = query_known_result(t, known, error);
     if (status != EBPO_OK)
         return status;
     ebpo_vec3_copy(known->place, t->last_query);
-    unsigned got = atomic_exchange_explicit(&t->known_between, t->own_known | EBPO_HAPTIC_FRESH,
-                                            memory_order_acq_rel);
-    t->own_known = got & ~(unsigned)EBPO_HAPTIC_FRESH;
+    unsigned got =
+        atomic_exchange_explicit(&t->waiting_result, t->loader_result | EBPO_HAPTIC_FRESH,
+                                 memory_order_acq_rel);
+    t->loader_result = got & ~(unsigned)EBPO_HAPTIC_FRESH;
     return EBPO_OK;
 }
 
-const ebpo_known_place *ebpo_haptic_known(ebpo_haptic *t)
+const ebpo_known_result *ebpo_haptic_known(ebpo_haptic *t)
 {
-    if (atomic_load_explicit(&t->known_between, memory_order_relaxed) & EBPO_HAPTIC_FRESH) {
-        unsigned got = atomic_exchange_explicit(&t->known_between, t->result, memory_order_acq_rel);
-        t->result = got & ~(unsigned)EBPO_HAPTIC_FRESH;
+    if (atomic_load_explicit(&t->waiting_result, memory_order_relaxed) & EBPO_HAPTIC_FRESH) {
+        unsigned got =
+            atomic_exchange_explicit(&t->waiting_result, t->step_result, memory_order_acq_rel);
+        t->step_result = got & ~(unsigned)EBPO_HAPTIC_FRESH;
     }
-    return &t->known[t->result];
+    return &t->known[t->step_result];
 }
 
 /* --- boxes --- */
 
-/* ahead: seconds of prediction for a box. measured: seconds over which the speed is measured. As
- * shares of half a box's side: aside, the greatest distance of the proxy from the middle of a new
- * box; enough, the motion of the middle that requires another box. */
-static const double ahead = 0.05, measured = 0.02, aside = 0.6, enough = 0.25;
+static const double prediction_seconds = 0.05; /* a box is made for the position after this time */
+static const double speed_seconds = 0.02;      /* time over which the speed is measured */
+/* Lengths in units of half a box's side: the greatest distance of the proxy from the middle of a
+ * new box, and the motion of the middle after which another box is loaded. */
+static const double max_shift = 0.6, reload_shift = 0.25;
 
-static void wait_a_little(void)
+static void sleep_briefly(void)
 {
     const struct timespec half_a_millisecond = { 0, 500000 };
     nanosleep(&half_a_millisecond, NULL);
@@ -83,57 +87,62 @@ static void wait_a_little(void)
 static void predict_device(ebpo_haptic *t, double out[3])
 {
     uint64_t now = ebpo_clock();
-    double seconds = 1e-9 * (double)(now - t->when_before);
-    bool again = seconds >= measured;
+    double seconds = 1e-9 * (double)(now - t->speed_time);
+    bool measure = seconds >= speed_seconds;
     for (int i = 0; i < 3; i++) {
         double device = atomic_load_explicit(&t->device_reported[i], memory_order_relaxed);
-        if (again) {
-            t->speed[i] = (device - t->device_before[i]) / seconds;
-            t->device_before[i] = device;
+        if (measure) {
+            t->speed[i] = (device - t->speed_position[i]) / seconds;
+            t->speed_position[i] = device;
         }
-        out[i] = device + ahead * t->speed[i];
+        out[i] = device + prediction_seconds * t->speed[i];
     }
-    if (again)
-        t->when_before = now;
+    if (measure)
+        t->speed_time = now;
 }
 
-/* Computes the extent of a box around the proxy: the centres, shifted towards the predicted
- * position. */
+/* Computes the centres of a box around the proxy, shifted towards `goal`, the predicted position.
+ */
 static void place_box(const ebpo_haptic *t, const double goal[3], ebpo_extent *out)
 {
     for (int i = 0; i < 3; i++) {
         double proxy = atomic_load_explicit(&t->proxy_reported[i], memory_order_relaxed);
-        double shift = fmin(fmax(goal[i] - proxy, -aside * t->half), aside * t->half);
-        out->min[i] = proxy + shift - t->half;
-        out->max[i] = proxy + shift + t->half;
+        double shift =
+            fmin(fmax(goal[i] - proxy, -max_shift * t->half_side), max_shift * t->half_side);
+        out->min[i] = proxy + shift - t->half_side;
+        out->max[i] = proxy + shift + t->half_side;
     }
 }
 
-static bool far_from_last(const ebpo_haptic *t, const ebpo_extent *e)
+/* Returns true if the middle of `e` is so far from that of the newest box that `e` must be loaded.
+ */
+static bool is_far_from_newest(const ebpo_haptic *t, const ebpo_extent *e)
 {
     for (int i = 0; i < 3; i++)
-        if (!(fabs(e->min[i] + e->max[i] - t->last.min[i] - t->last.max[i]) <=
-              2 * enough * t->half))
+        if (!(fabs(e->min[i] + e->max[i] - t->newest_centres.min[i] - t->newest_centres.max[i]) <=
+              2 * reload_shift * t->half_side))
             return true;
     return false;
 }
 
-static void hand_over(ebpo_haptic *t, uint64_t began)
+/* Passes the loaded box to the haptic steps, and receives another one. */
+static void pass_box(ebpo_haptic *t, uint64_t began)
 {
     uint64_t ns = ebpo_clock() - began;
-    unsigned got =
-        atomic_exchange_explicit(&t->between, t->own | EBPO_HAPTIC_FRESH, memory_order_acq_rel);
-    t->own = got & ~(unsigned)EBPO_HAPTIC_FRESH;
+    unsigned got = atomic_exchange_explicit(&t->waiting_box, t->loader_box | EBPO_HAPTIC_FRESH,
+                                            memory_order_acq_rel);
+    t->loader_box = got & ~(unsigned)EBPO_HAPTIC_FRESH;
     atomic_fetch_add(&t->loads, 1);
     atomic_fetch_add(&t->load_ns, ns);
     if (ns > atomic_load(&t->load_ns_max))
         atomic_store(&t->load_ns_max, ns);
 }
 
+/* Loads a box around the proxy; tries smaller and smaller boxes until the faces fit. */
 static ebpo_status load_boxes(ebpo_haptic *t, const double goal[3], ebpo_error *error)
 {
     uint64_t began = ebpo_clock();
-    ebpo_face_box *box = &t->box[t->own];
+    ebpo_face_box *box = &t->box[t->loader_box];
     ebpo_extent centres;
     for (bool fits = false; !fits;) {
         place_box(t, goal, &centres);
@@ -143,20 +152,20 @@ static ebpo_status load_boxes(ebpo_haptic *t, const double goal[3], ebpo_error *
         if (fits)
             break;
         atomic_fetch_add(&t->too_many, 1);
-        t->half /= 2;
-        if (!(t->half > t->reach * 0x1p-10 + t->band))
+        t->half_side /= 2;
+        if (!(t->half_side > t->reach * 0x1p-10 + t->band))
             return ebpo_fail(
                 error, EBPO_E_LIMIT,
                 "more than %llu faces around one point; allow more "
                 "(ebpo_haptic_options.faces), or use a smaller radius or search radius",
                 (unsigned long long)t->options.faces);
     }
-    t->last = centres;
-    bool few = box->count < box->capacity / 4; /* read here: after the exchange, the haptic step
-                                                * owns the box */
-    hand_over(t, began);
-    if (few)
-        t->half = fmin(1.5 * t->half, t->diagonal);
+    t->newest_centres = centres;
+    bool can_grow = box->count < box->capacity / 4; /* read here: after the exchange, the haptic
+                                                     * step owns the box */
+    pass_box(t, began);
+    if (can_grow)
+        t->half_side = fmin(1.5 * t->half_side, t->diagonal);
     return EBPO_OK;
 }
 
@@ -171,12 +180,12 @@ static void *loader_run(void *user)
         predict_device(t, goal);
         place_box(t, goal, &centres);
         bool moved = false;
-        if (far_from_last(t, &centres))
+        if (is_far_from_newest(t, &centres))
             status = load_boxes(t, goal, &error);
         else if (t->options.kind == EBPO_HAPTIC_PROBE)
             status = query_position(t, &moved, &error);
         if (status == EBPO_OK && !moved)
-            wait_a_little();
+            sleep_briefly();
     }
     if (status != EBPO_OK) {
         pthread_mutex_lock(&t->mutex);
@@ -190,11 +199,11 @@ static void *loader_run(void *user)
 ebpo_status ebpo_haptic_loader_start(ebpo_haptic *t, ebpo_error *error)
 {
     for (int i = 0; i < 3; i++) {
-        t->last.min[i] = t->last.max[i] = NAN; /* NAN: no position is near */
+        t->newest_centres.min[i] = t->newest_centres.max[i] = NAN; /* NAN: no position is near */
         t->last_query[i] = NAN;
-        t->device_before[i] = atomic_load(&t->device_reported[i]);
+        t->speed_position[i] = atomic_load(&t->device_reported[i]);
     }
-    t->when_before = ebpo_clock();
+    t->speed_time = ebpo_clock();
     int failed = ebpo_thread_start(&t->thread, loader_run, t);
     t->has_thread = failed == 0;
     return failed ? ebpo_fail(error, EBPO_E_MEMORY, "cannot start the loading thread: %s",

@@ -1,4 +1,4 @@
-/* The object of a haptic session, with comments on which thread may use which part. */
+/* The object of a haptic session, in groups of members: who may use a group, and when. */
 #ifndef EBPO_HAPTIC_HAPTIC_PARTS_H
 #define EBPO_HAPTIC_HAPTIC_PARTS_H
 
@@ -12,10 +12,10 @@
 #include "extras/haptic/tool.h"
 
 enum {
-    /* Number of boxes: the current one of the step, its previous one, the middle one, the one being
-     * loaded. */
+    /* Number of boxes: the current and the previous one of haptic steps, one that waits to be taken
+     * by a step, and one that is being loaded. */
     EBPO_HAPTIC_BOXES = 4,
-    EBPO_HAPTIC_FRESH = 8, /* flag in addition to a box's number: no haptic step has seen the box */
+    EBPO_HAPTIC_FRESH = 8, /* flag, added to a box's index: no haptic step has taken the box */
 
     /* Maximum number of faces and nodes that are examined for the normal, and for the side of a
      * probe. */
@@ -25,70 +25,73 @@ enum {
     EBPO_HAPTIC_PIECES = EBPO_HAPTIC_PATH_MAX - 1
 };
 
-/* Results of the loading thread for a position of a probe. */
-typedef struct ebpo_known_place {
-    double place[3];
-    double distance; /* without a sign; infinite if the model has no faces */
-    double point[3], normal[3];
+/* Exact results of the loading thread for a position of a probe. */
+typedef struct ebpo_known_result {
+    double place[3];            /* the position */
+    double distance;            /* without a sign; infinite if the model has no faces */
+    double point[3], normal[3]; /* nearest point, and normal of its face */
     int32_t winding;
-    bool there, on;
-} ebpo_known_place;
+    bool known, on_face; /* the results have been set; the position is on a face */
+} ebpo_known_result;
 
 struct ebpo_haptic {
     /* --- constant members --- */
     ebpo_model *model;
     ebpo_haptic_options options;
-    ebpo_extent root; /* all faces are inside */
-    double diagonal;  /* diagonal of the root cell */
-    double reach, band, margin;
+    ebpo_extent root;   /* contains all faces */
+    double diagonal;    /* diagonal of the root cell */
+    double reach, band; /* as in ebpo_ball_motion: radius plus skin, and tolerance of contact */
+    double margin;      /* faces within this distance of the proxy are loaded */
     bool solid;
     ebpo_held_levels levels; /* for probes */
 
     /* --- used by the thread of haptic steps --- */
-    unsigned at, seen; /* numbers of the current and the previous box */
+    unsigned current_box, previous_box; /* indices of the current and the previous box */
     double proxy[3], device[3], force[3];
     bool touching;
-    ebpo_ball_walk walk;     /* the current piece of the path */
-    ebpo_held_planes along;  /* contacts of the ball when its centre is at along_at */
-    double along_at[3];      /* position of the centre for these contacts */
-    ebpo_held_planes planes; /* planes that hold the proxy after the last complete piece */
-    uint32_t cut;            /* flags that are returned at the end of the piece */
-    bool felt;               /* the whole path to the device's position is done */
+    ebpo_ball_walk walk; /* the current piece of the path */
+    ebpo_held_planes
+        contact_planes;         /* contacts of the ball when its centre is at contact_position */
+    double contact_position[3]; /* position of the centre for these contacts */
+    ebpo_held_planes holding_planes; /* planes that hold the proxy after the last complete piece */
+    uint32_t end_flags;              /* flags that are returned at the end of the piece */
+    bool has_complete_piece; /* a piece towards the current position of the device is complete */
     double path[EBPO_HAPTIC_PATH_MAX][3];
     uint32_t path_count;
-    double stride; /* maximum length of a piece of a tool's path */
+    double max_piece; /* maximum length of a piece of a tool's path */
     ebpo_passive passive;
     struct ebpo_tool *tool; /* or NULL */
     ebpo_haptic_stats stats;
-    uint32_t found[EBPO_HAPTIC_FACES];
+    uint32_t found[EBPO_HAPTIC_FACES]; /* workspace: faces around the proxy */
     ebpo_near_node nearest_queue[EBPO_HAPTIC_VISITS + 2];
-    double gap[EBPO_HAPTIC_FACES];
-    double away[3];              /* direction away from the nearest face, if one was found */
-    ebpo_context *proxy_context; /* for placing the proxy */
-    ebpo_side side;
-    unsigned result; /* number of the step's entry of known[] */
+    double gap[EBPO_HAPTIC_FACES]; /* their distances from the ball */
+    double away[3];                /* direction away from the nearest face, if one was found */
+    ebpo_context *proxy_context;   /* for placing the proxy */
+    ebpo_side side;                /* of a probe */
+    unsigned step_result;          /* index in known[] of the result that steps use */
 
     /* --- exchanged between the threads --- */
     ebpo_face_box box[EBPO_HAPTIC_BOXES];
-    atomic_uint between; /* number of the middle box, possibly with EBPO_HAPTIC_FRESH */
+    atomic_uint
+        waiting_box; /* index of the waiting box, plus EBPO_HAPTIC_FRESH until it is taken */
     _Atomic double proxy_reported[3]; /* The position of the proxy. Each component is atomic, so the
                                        * loader may read a mixture of two positions. Therefore the
                                        * step checks that a new box contains the proxy. */
     _Atomic double device_reported[3];
-    ebpo_known_place known[3];
-    atomic_uint known_between;  /* as `between`, for known[] */
+    ebpo_known_result known[3];
+    atomic_uint waiting_result; /* the same for known[] */
     _Atomic bool stop, stopped; /* stopped: by a failure; `failure` is set before */
     atomic_uint_fast64_t loads, too_many, load_ns, load_ns_max;
 
     /* --- used by the loading thread --- */
     ebpo_context *loading;
-    unsigned own; /* number of its box */
-    unsigned own_known;
-    double last_query[3]; /* position of the last query */
-    ebpo_extent last;
-    double half; /* half a box's side */
-    double device_before[3], speed[3];
-    uint64_t when_before;
+    unsigned loader_box;                /* index of the box that it may write */
+    unsigned loader_result;             /* index in known[] of the result that it may write */
+    double last_query[3];               /* position of the last query for a probe */
+    ebpo_extent newest_centres;         /* `centres` of the newest box */
+    double half_side;                   /* half of the side of `centres` of the next box */
+    double speed_position[3], speed[3]; /* position at speed_time, and speed before it */
+    uint64_t speed_time;                /* time of the last measurement, in ns */
     pthread_t thread;
     bool has_thread;
 
@@ -96,33 +99,38 @@ struct ebpo_haptic {
     ebpo_error failure;
 };
 
-/* haptic_step.c: moves the proxy towards the goal, as far as faces and the current box allow.
- * Returns bits of ebpo_haptic_flag. */
-uint32_t ebpo_haptic_go(ebpo_haptic *t, const double goal[3], ebpo_ball_work *work);
+/* haptic_step.c: moves the ball's proxy towards the goal, as far as faces, the current box and the
+ * limits of `work` allow. Returns bits of ebpo_haptic_flag. */
+uint32_t ebpo_haptic_move_ball(ebpo_haptic *t, const double goal[3], ebpo_ball_work *work);
 
-/* Returns the part of the straight path `motion` of the proxy for which all faces within `reach`
- * are known: up to the boundary of the current box, or the whole path where no face can be. */
+/* haptic_step.c: returns the part, 0 to 1, of the proxy's straight path `motion` for which all
+ * faces within `reach` are loaded: it ends at the boundary of the current box, except where no face
+ * of the model can be within `reach`. */
 double ebpo_haptic_known_part(const ebpo_haptic *t, const double motion[3], double reach);
 
-/* haptic_step.c: finds the nearest face, weights, depth and the smooth normal; sets t->away. */
+/* haptic_step.c: finds the nearest face, its weights, the depth and the smooth normal, and sets
+ * t->away. */
 void ebpo_haptic_find_nearest(ebpo_haptic *t, ebpo_haptic_ball_result *out);
 
-/* Returns the last result of the loading thread. */
-const ebpo_known_place *ebpo_haptic_known(ebpo_haptic *t);
+/* haptic_loader.c: returns the newest result for a probe. */
+const ebpo_known_result *ebpo_haptic_known(ebpo_haptic *t);
 
-/* haptic_loader.c */
+/* haptic_loader.c: start and stop the loading thread. */
 EBPO_MUST_USE ebpo_status ebpo_haptic_loader_start(ebpo_haptic *t, ebpo_error *error);
 void ebpo_haptic_loader_stop(ebpo_haptic *t);
 
-/* haptic_step.c: replaces the current box by a fresh one that contains the proxy. Returns true if
- * there was one. */
+/* haptic_step.c: takes the waiting box, if it is fresh, as the previous box; if it contains the
+ * proxy, makes it the current one and returns true. */
 bool ebpo_haptic_take_box(ebpo_haptic *t);
-/* Returns to the previous box if it contains the proxy: it may extend further. */
-void ebpo_haptic_try_other(ebpo_haptic *t);
+/* haptic_step.c: exchanges the current and the previous box if the previous one contains the proxy:
+ * it may reach further in the direction of the device. */
+void ebpo_haptic_try_previous_box(ebpo_haptic *t);
 
-/* haptic_ball.c: returns EBPO_HAPTIC_STOPPED, or 0. */
+/* haptic_ball.c: returns EBPO_HAPTIC_STOPPED if the loading thread has failed, or 0. */
 uint32_t ebpo_haptic_stopped(const ebpo_haptic *t);
+/* haptic_ball.c: passes the positions of proxy and device to the loading thread. */
 void ebpo_haptic_report(ebpo_haptic *t, const double device[3]);
+/* haptic_ball.c: adds a step with these flags and this work to the statistics. */
 void ebpo_haptic_count(ebpo_haptic *t, uint32_t flags, uint64_t work);
 
 #endif

@@ -1,10 +1,10 @@
 /* The haptic step of a probe: bounds of its distance to the surface, and its side.
  *
- * Bounds come from three sources, all certain: the faces of the current box, the exact result for a
+ * Certain bounds come from three sources: the faces of the current box, the exact result for a
  * recent position of the probe, and the first levels of the octree. The step returns the
- * intersection of these intervals. The side is the winding number, which exact arithmetic changes
- * at each face that the probe crosses. The side is EBPO_MAYBE if the work limit of the step is too
- * small to find it. */
+ * intersection of these intervals. The side follows from the winding number, which changes at each
+ * face that the probe crosses, by exact arithmetic. It is EBPO_MAYBE if the work limit of the step
+ * is too small to find it. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -27,7 +27,7 @@ static void narrow_bounds(bounds *b, double lo, double hi)
     b->hi = fmin(b->hi, hi);
 }
 
-/* Bounds the rounding error of the model's coordinates and of such a length. */
+/* Bounds the rounding error of a length between points of the model. */
 static double rounding_of(const ebpo_haptic *t, double length)
 {
     return t->levels.slack + EBPO_LENGTH_SLACK * length;
@@ -59,13 +59,14 @@ static bool bound_by_faces(ebpo_haptic *t, const double place[3], ebpo_haptic_pr
     return all && near.face != EBPO_NO_FACE;
 }
 
-/* Bounds the distance by a recent result and the path since then. */
+/* Bounds the distance by the newest exact result and the distance of its position from `place`.
+ * Returns true if it is the result for `place`. */
 static bool bound_by_known(ebpo_haptic *t, const double place[3], ebpo_haptic_probe_result *out,
                            bounds *b)
 {
-    const ebpo_known_place *known = ebpo_haptic_known(t);
+    const ebpo_known_result *known = ebpo_haptic_known(t);
     double motion[3];
-    if (!known->there)
+    if (!known->known)
         return false;
     ebpo_vec3_subtract(place, known->place, motion);
     double far = sqrt(ebpo_vec3_dot(motion, motion)),
@@ -76,16 +77,18 @@ static bool bound_by_known(ebpo_haptic *t, const double place[3], ebpo_haptic_pr
     return far == 0;
 }
 
-/* If the position of the recent result is in the box, restarts the search for the side there. */
+/* Finds the side at `place` by moving there from the last position with a known side; if there is
+ * none in the box, from the position of the newest exact result. Returns false if it is not found.
+ */
 static bool find_side(ebpo_haptic *t, const double place[3], ebpo_haptic_probe_result *out)
 {
-    const ebpo_known_place *known = &t->known[t->result];
-    const ebpo_face_box *box = &t->box[t->at];
-    for (int turn = 0; turn < 2; turn++) {
-        if (ebpo_side_go(&t->side, box, place, t->found, EBPO_HAPTIC_FACES, EBPO_HAPTIC_VISITS,
-                         &out->work))
+    const ebpo_known_result *known = &t->known[t->step_result];
+    const ebpo_face_box *box = &t->box[t->current_box];
+    for (int attempt = 0; attempt < 2; attempt++) {
+        if (ebpo_side_move(&t->side, box, place, t->found, EBPO_HAPTIC_FACES, EBPO_HAPTIC_VISITS,
+                           &out->work))
             return true;
-        if (t->side.known || !known->there || known->on)
+        if (t->side.known || !known->known || known->on_face)
             return false;
         ebpo_vec3_copy(known->place, t->side.at);
         t->side.winding = known->winding;
@@ -98,7 +101,7 @@ static int32_t classify_position(ebpo_haptic *t, const double place[3],
                                  ebpo_haptic_probe_result *out)
 {
     int32_t winding;
-    const ebpo_face_box *box = &t->box[t->at];
+    const ebpo_face_box *box = &t->box[t->current_box];
     if (!t->solid)
         return EBPO_OUT;
     if (ebpo_held_levels_winding(&t->levels, place, &winding)) {
@@ -106,7 +109,7 @@ static int32_t classify_position(ebpo_haptic *t, const double place[3],
         t->side.winding = winding;
         t->side.known = true;
     } else if (ebpo_extent_holds(&box->centres, place) &&
-               ebpo_side_on(box, place, t->found, EBPO_HAPTIC_FACES, EBPO_HAPTIC_VISITS)) {
+               ebpo_is_on_face(box, place, t->found, EBPO_HAPTIC_FACES, EBPO_HAPTIC_VISITS)) {
         return EBPO_ON;
     } else if (!find_side(t, place, out)) {
         return EBPO_MAYBE;
@@ -114,6 +117,8 @@ static int32_t classify_position(ebpo_haptic *t, const double place[3],
     return ebpo_rule_inside(t->model->info->rule, t->side.winding) ? EBPO_IN : EBPO_OUT;
 }
 
+/* Sets the interval of the signed distance. close: the nearest face or the exact distance is known,
+ * so the middle of the interval is accurate. */
 static void fill_bounds(ebpo_haptic_probe_result *out, const bounds *b, bool close)
 {
     double lo = fmax(0, fmin(b->lo, b->hi)), hi = b->hi;

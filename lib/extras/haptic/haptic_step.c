@@ -18,33 +18,34 @@
 
 static void swap_boxes(ebpo_haptic *t)
 {
-    unsigned before = t->at;
-    t->at = t->seen;
-    t->seen = before;
+    unsigned before = t->current_box;
+    t->current_box = t->previous_box;
+    t->previous_box = before;
 }
 
 bool ebpo_haptic_take_box(ebpo_haptic *t)
 {
-    if (!(atomic_load_explicit(&t->between, memory_order_relaxed) & EBPO_HAPTIC_FRESH))
+    if (!(atomic_load_explicit(&t->waiting_box, memory_order_relaxed) & EBPO_HAPTIC_FRESH))
         return false;
-    unsigned got = atomic_exchange_explicit(&t->between, t->seen, memory_order_acq_rel);
-    t->seen = got & ~(unsigned)EBPO_HAPTIC_FRESH;
-    if (!ebpo_extent_holds(&t->box[t->seen].centres, t->proxy))
+    unsigned got = atomic_exchange_explicit(&t->waiting_box, t->previous_box, memory_order_acq_rel);
+    t->previous_box = got & ~(unsigned)EBPO_HAPTIC_FRESH;
+    if (!ebpo_extent_holds(&t->box[t->previous_box].centres, t->proxy))
         return false; /* the box was made for another position */
     swap_boxes(t);
     t->stats.taken++;
     return true;
 }
 
-void ebpo_haptic_try_other(ebpo_haptic *t)
+void ebpo_haptic_try_previous_box(ebpo_haptic *t)
 {
-    if (ebpo_extent_holds(&t->box[t->seen].centres, t->proxy))
+    if (ebpo_extent_holds(&t->box[t->previous_box].centres, t->proxy))
         swap_boxes(t);
 }
 
 /* --- the nearest face --- */
 
-typedef struct around {
+/* The search for the faces around the proxy. */
+typedef struct face_search {
     ebpo_haptic *t;
     const ebpo_face_box *box;
     ebpo_near_queue queue;
@@ -53,11 +54,12 @@ typedef struct around {
     uint32_t visited_faces;
     uint32_t count; /* number of entries of t->found */
     ebpo_haptic_ball_result *out;
-} around;
+} face_search;
 
-/* Adds a normal, weighted by the face's area and by a factor that falls to 0 at the search radius.
- * The normal points to the proxy's side; that of a solid always points outwards. */
-static void add_normal(const around *a, const double face[3][3], double gap, double sum[3])
+/* Adds the normal of a face to `sum`, weighted by the face's area and by a factor that falls to 0
+ * at the search radius. The normal of a solid's face points outwards, that of a surface's face to
+ * the proxy's side. */
+static void add_normal(const face_search *a, const double face[3][3], double gap, double sum[3])
 {
     double e[3], f[3], n[3], d[3];
     double far = fmax(gap, 0) / a->search_radius, weight = (1 - far) * (1 - far);
@@ -71,7 +73,8 @@ static void add_normal(const around *a, const double face[3][3], double gap, dou
         sum[i] += weight * n[i];
 }
 
-static void add_face(around *a, uint64_t f)
+/* Adds a face within the search radius to t->found, and updates the nearest one. */
+static void add_face(face_search *a, uint64_t f)
 {
     const double(*face)[3] = (const double(*)[3])a->box->corner[f];
     ebpo_face_near near;
@@ -93,7 +96,8 @@ static void add_face(around *a, uint64_t f)
     }
 }
 
-static void wait_for(around *a, uint64_t node)
+/* Adds a node to the queue if faces in it may be within the search radius. */
+static void push_node(face_search *a, uint64_t node)
 {
     const ebpo_extent *e = &a->box->node[node];
     double off[3];
@@ -106,7 +110,7 @@ static void wait_for(around *a, uint64_t node)
 
 /* Finds the faces around the ball, the nearest first. When there are too many, the farthest are
  * omitted, and the normal uses only faces that are closer than every omitted face. */
-static void find_faces(around *a)
+static void find_faces(face_search *a)
 {
     for (uint32_t visits = 0; a->queue.count > 0; visits++) {
         if (visits >= EBPO_HAPTIC_VISITS ||
@@ -117,8 +121,8 @@ static void find_faces(around *a)
         }
         uint64_t node = ebpo_near_pop(&a->queue).node;
         if (node < a->box->leaves) {
-            wait_for(a, 2 * node);
-            wait_for(a, 2 * node + 1);
+            push_node(a, 2 * node);
+            push_node(a, 2 * node + 1);
             continue;
         }
         uint64_t f = (node - a->box->leaves) * EBPO_FACE_BOX_LEAF, end = f + EBPO_FACE_BOX_LEAF;
@@ -127,7 +131,8 @@ static void find_faces(around *a)
     }
 }
 
-static bool no_face_close(const ebpo_haptic *t)
+/* Returns true if all faces of the model are certainly outside the search radius. */
+static bool has_no_face_close(const ebpo_haptic *t)
 {
     double wide = t->options.radius + t->options.search_radius;
     for (int i = 0; i < 3; i++)
@@ -136,9 +141,9 @@ static bool no_face_close(const ebpo_haptic *t)
     return false;
 }
 
-/* Sets the normal to the direction away from the nearest face, when too many faces surround the
- * ball to find all. */
-static void report_normal(const around *a, double out[3])
+/* Computes the smooth normal: the normalised sum of the normals of the faces around the ball. If
+ * the sum is 0, the normal of a ball is the direction away from the nearest face. */
+static void report_normal(const face_search *a, double out[3])
 {
     double sum[3] = { 0 };
     for (uint32_t i = 0; i < a->count; i++)
@@ -155,18 +160,18 @@ static void report_normal(const around *a, double out[3])
 
 void ebpo_haptic_find_nearest(ebpo_haptic *t, ebpo_haptic_ball_result *out)
 {
-    around a = { .t = t,
-                 .box = &t->box[t->at],
-                 .queue = { t->nearest_queue, 0 },
-                 .search_radius = t->options.search_radius,
-                 .nearest = INFINITY,
-                 .out = out };
+    face_search a = { .t = t,
+                      .box = &t->box[t->current_box],
+                      .queue = { t->nearest_queue, 0 },
+                      .search_radius = t->options.search_radius,
+                      .nearest = INFINITY,
+                      .out = out };
     out->face = EBPO_NO_FACE;
     if (!ebpo_extent_holds(&a.box->centres, t->proxy)) {
-        if (!no_face_close(t))
+        if (!has_no_face_close(t))
             out->flags |= EBPO_HAPTIC_PARTIAL;
     } else if (a.box->count > 0) {
-        wait_for(&a, 1);
+        push_node(&a, 1);
         find_faces(&a);
     }
     out->work += a.visited_faces;
@@ -176,13 +181,14 @@ void ebpo_haptic_find_nearest(ebpo_haptic *t, ebpo_haptic_ball_result *out)
 
 /* --- the path --- */
 
-typedef struct step {
+/* The path of the proxy in one haptic step. */
+typedef struct path_step {
     ebpo_haptic *t;
-    const double *goal;
-    double motion[3], slack, least_slack;
-    uint32_t flags;
+    const double *goal;                   /* [3] */
+    double motion[3], slack, least_slack; /* of the current piece: as in ebpo_ball_motion */
+    uint32_t flags;                       /* bits of ebpo_haptic_flag, for the caller */
     ebpo_ball_work *work;
-} step;
+} path_step;
 
 static void box_of_path(const double p[3], const double motion[3], double wider, ebpo_extent *out)
 {
@@ -206,8 +212,8 @@ static void shorten_motion(double motion[3], double part)
         motion[i] *= part;
 }
 
-/* Returns the part of the path from a point inside `e` to the boundary of `e`; slightly less, so
- * that the rounded end is inside. */
+/* Returns the part, 0 to 1, of the path from the point p in `e` that is in `e`; slightly less, so
+ * that the rounded end is in `e`. */
 static double part_inside(const double p[3], const double motion[3], const ebpo_extent *e)
 {
     double part = 1;
@@ -223,7 +229,7 @@ static double part_inside(const double p[3], const double motion[3], const ebpo_
 
 double ebpo_haptic_known_part(const ebpo_haptic *t, const double motion[3], double reach)
 {
-    const ebpo_extent *centres = &t->box[t->at].centres;
+    const ebpo_extent *centres = &t->box[t->current_box].centres;
     ebpo_extent all;
     box_of_path(t->proxy, motion, reach, &all);
     if (are_apart(&all, &t->root))
@@ -231,16 +237,17 @@ double ebpo_haptic_known_part(const ebpo_haptic *t, const double motion[3], doub
     return ebpo_extent_holds(centres, t->proxy) ? part_inside(t->proxy, motion, centres) : 0;
 }
 
-/* Cuts the path to the part where all faces around it are known. Returns false if there is none. */
-static bool cut_to_known_part(step *s)
+/* Shortens the piece to the part around which all faces are loaded. Returns false if no box
+ * contains the proxy. */
+static bool cut_to_known_part(path_step *s)
 {
     ebpo_haptic *t = s->t;
     double part = ebpo_haptic_known_part(t, s->motion, t->reach + t->band);
     if (part < 1) {
-        t->cut = EBPO_HAPTIC_WAITING;
+        t->end_flags = EBPO_HAPTIC_WAITING;
         shorten_motion(s->motion, part);
     }
-    if (part <= 0 && !ebpo_extent_holds(&t->box[t->at].centres, t->proxy)) {
+    if (part <= 0 && !ebpo_extent_holds(&t->box[t->current_box].centres, t->proxy)) {
         s->flags |= EBPO_HAPTIC_WAITING;
         return false;
     }
@@ -253,29 +260,29 @@ static bool vectors_differ(const double a[3], const double b[3])
 }
 
 /* Begins the next piece. Returns false if the proxy stays. */
-static bool begin_piece(step *s)
+static bool begin_piece(path_step *s)
 {
     ebpo_haptic *t = s->t;
     ebpo_ball_walk *w = &t->walk;
     double want[3];
     (void)ebpo_haptic_take_box(t);
-    if (memcmp(t->along_at, t->proxy, sizeof t->along_at) != 0)
-        t->along.count = 0;
+    if (memcmp(t->contact_position, t->proxy, sizeof t->contact_position) != 0)
+        t->contact_planes.count = 0;
     ebpo_vec3_subtract(s->goal, t->proxy, want);
-    s->slack = ebpo_hold_back(&t->along, want, s->motion);
+    s->slack = ebpo_project_motion(&t->contact_planes, want, s->motion);
     if (vectors_differ(s->motion, want))
         s->flags |= EBPO_HAPTIC_CONTACT;
     s->least_slack = 0x1p-44 * sqrt(ebpo_vec3_dot(want, want));
     double whole = sqrt(ebpo_vec3_dot(s->motion, s->motion));
     if (whole <= 0x1p-12 * t->options.skin)
         return false;
-    t->cut = 0;
+    t->end_flags = 0;
     if (!cut_to_known_part(s))
         return false;
-    /* Slacks are those of the whole path, scaled to this part. Otherwise the slacks for a distant
-     * device would be those of a long piece. */
+    /* s->slack and s->least_slack belong to the whole path to the device: scale them to this piece
+     */
     double share = sqrt(ebpo_vec3_dot(s->motion, s->motion)) / whole;
-    const ebpo_face_box *box = &t->box[t->at];
+    const ebpo_face_box *box = &t->box[t->current_box];
     ebpo_vec3_copy(t->proxy, w->from);
     ebpo_vec3_copy(s->motion, w->motion);
     w->box = ebpo_extent_holds(&box->centres, t->proxy) ? box : NULL; /* NULL is possible: see
@@ -284,12 +291,12 @@ static bool begin_piece(step *s)
     w->band = t->band;
     w->slack = s->slack * share;
     w->least_slack = s->least_slack * share;
-    ebpo_ball_set_out(w);
+    ebpo_ball_begin(w);
     return true;
 }
 
-/* Makes space for more planes: drops planes along which the last path did not go. Three planes are
- * enough to hold the proxy. */
+/* Makes space for more planes: keeps only the planes along which the last piece went, and at most
+ * one less than the limit. Three planes are enough to hold the proxy. */
 static void reserve_space(ebpo_held_planes *along, const double motion[3])
 {
     double length = sqrt(ebpo_vec3_dot(motion, motion));
@@ -300,22 +307,23 @@ static void reserve_space(ebpo_held_planes *along, const double motion[3])
     along->count = kept < EBPO_PLANES_LIMIT ? kept : kept - 1;
 }
 
+/* Adds the contacts at the end of the piece to t->contact_planes; earlier contacts are dropped if
+ * the ball has moved. */
 static void add_planes(ebpo_haptic *t)
 {
     const ebpo_ball_walk *w = &t->walk;
     if (w->part > 0)
-        t->along.count = 0;
-    else if (t->along.count + w->contacts.count > EBPO_PLANES_LIMIT)
-        reserve_space(&t->along, w->motion);
+        t->contact_planes.count = 0;
+    else if (t->contact_planes.count + w->contacts.count > EBPO_PLANES_LIMIT)
+        reserve_space(&t->contact_planes, w->motion);
     for (int i = 0; i < w->contacts.count; i++)
-        ebpo_held_planes_add(&t->along, w->contacts.normal[i]);
-    ebpo_vec3_copy(t->proxy, t->along_at);
+        ebpo_held_planes_add(&t->contact_planes, w->contacts.normal[i]);
+    ebpo_vec3_copy(t->proxy, t->contact_position);
 }
 
-/* Ends the piece. The ball then slides along the contacts at the end of the piece, and along
- * earlier contacts only if the ball has not moved. Returns false if the ball has no contact and
- * stops for this haptic step. */
-static bool end_piece(step *s)
+/* Ends the piece: moves the proxy, and updates contacts and flags. Returns false if the ball has no
+ * contact at the end, so that no further piece along contacts follows. */
+static bool end_piece(path_step *s)
 {
     ebpo_haptic *t = s->t;
     const ebpo_ball_walk *w = &t->walk;
@@ -326,56 +334,59 @@ static bool end_piece(step *s)
     }
     if (touches)
         add_planes(t);
-    s->flags |= touches ? EBPO_HAPTIC_CONTACT : w->cut ? EBPO_HAPTIC_INCOMPLETE : t->cut;
-    t->planes = t->along;
-    t->felt = true;
+    s->flags |= touches ? EBPO_HAPTIC_CONTACT : w->cut ? EBPO_HAPTIC_INCOMPLETE : t->end_flags;
+    t->holding_planes = t->contact_planes;
+    t->has_complete_piece = true;
     return touches;
 }
 
-/* Returns flags of the previous contacts, which hold the proxy until more is known. */
-static uint32_t held_flags(const step *s)
+/* Returns EBPO_HAPTIC_CONTACT if the contacts of the last complete piece hold the proxy back, while
+ * no piece towards the current position of the device is complete; otherwise 0. */
+static uint32_t held_flags(const path_step *s)
 {
     const ebpo_haptic *t = s->t;
     double want[3], motion[3];
-    if (t->felt)
+    if (t->has_complete_piece)
         return 0;
     ebpo_vec3_subtract(s->goal, t->proxy, want);
-    (void)ebpo_hold_back(&t->planes, want, motion);
+    (void)ebpo_project_motion(&t->holding_planes, want, motion);
     return vectors_differ(motion, want) ? EBPO_HAPTIC_CONTACT : 0;
 }
 
-static uint32_t go_by_pieces(step *s)
+/* Follows pieces towards the goal. A piece that an earlier haptic step began leads to the device's
+ * position at that time, and is completed first. */
+static uint32_t follow_pieces(path_step *s)
 {
     ebpo_haptic *t = s->t;
-    bool resumed = t->walk.stage != EBPO_BALL_STANDS;
+    bool resumed = t->walk.stage != EBPO_BALL_IDLE;
     for (int piece = 0; piece < EBPO_HAPTIC_PIECES; piece++) {
-        if (t->walk.stage == EBPO_BALL_STANDS && !begin_piece(s))
+        if (t->walk.stage == EBPO_BALL_IDLE && !begin_piece(s))
             return s->flags;
-        ebpo_ball_end end = ebpo_ball_go_on(&t->walk, s->work);
-        if (end == EBPO_BALL_LATER)
+        ebpo_ball_end end = ebpo_ball_continue(&t->walk, s->work);
+        if (end == EBPO_BALL_UNFINISHED)
             return s->flags | EBPO_HAPTIC_INCOMPLETE | held_flags(s);
-        if (end == EBPO_BALL_THROUGH)
+        if (end == EBPO_BALL_CROSSED)
             return s->flags | EBPO_HAPTIC_INCOMPLETE;
         if (!end_piece(s)) {
             if (!resumed)
                 return s->flags;
-            s->flags = 0; /* flags of the path to the last device position */
-            t->felt = false;
+            s->flags = 0; /* these flags were of the path to the earlier position */
+            t->has_complete_piece = false;
         }
         resumed = false;
     }
     return s->flags | EBPO_HAPTIC_INCOMPLETE;
 }
 
-uint32_t ebpo_haptic_go(ebpo_haptic *t, const double goal[3], ebpo_ball_work *work)
+uint32_t ebpo_haptic_move_ball(ebpo_haptic *t, const double goal[3], ebpo_ball_work *work)
 {
-    step s = { .t = t, .goal = goal, .work = work };
+    path_step s = { .t = t, .goal = goal, .work = work };
     double left[3];
-    t->felt = false;
+    t->has_complete_piece = false;
     t->path_count = 0;
     ebpo_vec3_copy(t->proxy, t->path[t->path_count++]);
-    uint32_t flags = go_by_pieces(&s);
+    uint32_t flags = follow_pieces(&s);
     ebpo_vec3_subtract(goal, t->proxy, left);
-    bool there = sqrt(ebpo_vec3_dot(left, left)) <= 0x1p-12 * t->options.skin;
-    return there ? flags & ~(uint32_t)EBPO_HAPTIC_CONTACT : flags;
+    bool arrived = sqrt(ebpo_vec3_dot(left, left)) <= 0x1p-12 * t->options.skin;
+    return arrived ? flags & ~(uint32_t)EBPO_HAPTIC_CONTACT : flags;
 }

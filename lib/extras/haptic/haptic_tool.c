@@ -1,6 +1,6 @@
-/* A haptic step of a tool. Gauss' principle for a body without mass: of all motions that its
- * contacts allow, the tool makes the one nearest to the device's motion (Ortega, Redon, Coquillart
- * 2007).
+/* A haptic step of a tool. The motion follows Gauss' principle for a body without mass: of all
+ * motions that its contacts allow, the tool makes the one nearest to the device's motion (Ortega,
+ * Redon, Coquillart 2007).
  *
  * A piece of the path is decided in two passes. First, each point that may hit a face is followed
  * along the path, up to where the first point comes too close to a face. Then all these points are
@@ -16,23 +16,25 @@
 
 enum { CLUSTER_VISITS = 64, POINT_VISITS = 48, FACE_VISITS = 256, FACE_COST = 6 };
 
-/* Distances in units of the skin. Faces are examined within `search`. A point closer than `blocks`
- * ends the path. At the path's end, no point may be closer than `least`. Rotation adds less than
- * `bend` to straight paths (see limit_angle). */
-static const double search = 2.5, blocks = 0.75, least = 0.5, bend = 0.125;
+/* Distances in units of the skin. */
+static const double search = 2.5;   /* faces within this distance of a point's path are examined */
+static const double stop_at = 0.75; /* a piece ends where a point is this close to a face */
+static const double allowed = 0.5;  /* at the end of a piece, no point may be closer to a face */
+static const double bend = 0.125;   /* a rotating point may be this far from its straight path; see
+                                     * limit_angle */
 
 typedef struct tool_piece {
     ebpo_haptic *t;
     ebpo_tool *tool;
-    const ebpo_face_box *box; /* NULL: no faces are on the path */
-    double skin, turned;      /* skin, and angle of the whole path */
+    const ebpo_face_box *box; /* NULL: no box contains the proxy; then no face is near the path */
+    double skin, angle;       /* skin, and angle of rotation of the whole piece */
     uint64_t *work;
 } tool_piece;
 
-static tool_piece piece_of(ebpo_haptic *t, uint64_t *work)
+static tool_piece make_piece(ebpo_haptic *t, uint64_t *work)
 {
     ebpo_tool *tool = t->tool;
-    const ebpo_face_box *box = &t->box[t->at];
+    const ebpo_face_box *box = &t->box[t->current_box];
     bool known = ebpo_extent_holds(&box->centres, tool->proxy.place);
     return (tool_piece){ t,
                          tool,
@@ -50,8 +52,8 @@ static void box_of_segment(const double p[3], const double q[3], double wide, eb
     }
 }
 
-/* Returns a distance from `e` within which no face is. Sources: the faces of the box, the boundary
- * of the loaded region, and the model's box. */
+/* Returns a distance within which no face is around `e`. It follows from the faces of the box and
+ * the boundary of the loaded region, or from the model's box. */
 static double free_distance(const tool_piece *p, const ebpo_extent *e, uint32_t visits)
 {
     double out = 0, inside = INFINITY;
@@ -68,7 +70,7 @@ static double free_distance(const tool_piece *p, const ebpo_extent *e, uint32_t 
 /* Bounds the motion of a point, given its lever arm about the centre of rotation. */
 static double max_point_motion(const tool_piece *p, double lever)
 {
-    return sqrt(ebpo_vec3_dot(p->tool->motion, p->tool->motion)) + lever * p->turned;
+    return sqrt(ebpo_vec3_dot(p->tool->motion, p->tool->motion)) + lever * p->angle;
 }
 
 static double lever_of(const double p[3]) { return sqrt(ebpo_vec3_dot(p, p)); }
@@ -78,18 +80,19 @@ static double max_motion(const tool_piece *p, const ebpo_tool_cluster *c)
     return max_point_motion(p, lever_of(c->middle) + c->radius) * (1 + 0x1p-40);
 }
 
-/* Adds a close point with its faces. Returns false if the pool is full, or too many faces are
- * around the point. */
-static bool add_close(const tool_piece *p, uint32_t point)
+/* Adds a point to tool->close_points with the faces around its path, and shortens the path to where
+ * the point comes too close to one of them. Returns false if the pool is full or too many faces are
+ * around the path. */
+static bool add_close_point(const tool_piece *p, uint32_t point)
 {
     ebpo_tool *tool = p->tool;
-    double from[3], motion[3], to[3];
+    double from[3], lever[3], motion[3], to[3];
     ebpo_extent e;
     uint32_t count, visits = FACE_VISITS;
     ebpo_tool_at(&tool->proxy, (const double(*)[3])tool->from_matrix, tool->point[point], from);
-    ebpo_rigid_lever((const double(*)[3])tool->to_matrix, tool->point[point], motion);
+    ebpo_rigid_lever((const double(*)[3])tool->to_matrix, tool->point[point], lever);
     for (int i = 0; i < 3; i++)
-        to[i] = tool->proxy.place[i] + tool->motion[i] + motion[i];
+        to[i] = tool->proxy.place[i] + tool->motion[i] + lever[i];
     ebpo_vec3_subtract(to, from, motion);
     box_of_segment(from, to, search * p->skin, &e);
     if (tool->pool_count + EBPO_TOOL_NEAR > EBPO_TOOL_POOL)
@@ -99,51 +102,53 @@ static bool add_close(const tool_piece *p, uint32_t point)
     *p->work += FACE_VISITS - visits + FACE_COST * (uint64_t)count;
     if (!all)
         return false;
-    const ebpo_ball_motion w = { from, motion, blocks * p->skin, p->t->band, 0, 0 };
+    const ebpo_ball_motion w = { from, motion, stop_at * p->skin, p->t->band, 0, 0 };
     for (uint32_t i = 0; i < count; i++) {
         double away[3];
         double part = ebpo_ball_intersects(
             &w, (const double(*)[3])p->box->corner[tool->pool[tool->pool_count + i]], away);
         tool->part = fmin(tool->part, part);
     }
-    tool->close[tool->close_count++] =
-        (ebpo_tool_close){ point, (uint32_t)tool->pool_count, count };
+    tool->close_points[tool->close_count++] =
+        (ebpo_close_point){ point, (uint32_t)tool->pool_count, count };
     tool->pool_count += count;
     return true;
 }
 
-/* Examines the points of a cluster whose bounding box may hit faces. */
+/* Examines the points of a cluster whose bounding box may hit faces. Returns false if the piece
+ * must be given up. */
 static bool inspect_points(const tool_piece *p, uint32_t number)
 {
     ebpo_tool *tool = p->tool;
     ebpo_tool_cluster *c = &tool->cluster[number];
     double need = search * p->skin;
     double all = INFINITY;
-    c->free = 0; /* remains 0 if the path is given up */
+    c->safe_until = 0; /* remains 0 if the piece is given up */
     for (uint32_t i = c->first; i < c->first + c->count; i++) {
         double motion = max_point_motion(p, lever_of(tool->point[i])) * (1 + 0x1p-40);
-        if (tool->free[i] - c->gone - motion <= 0) {
+        if (tool->safe_until[i] - c->travelled - motion <= 0) {
             double at[3];
             ebpo_extent e;
             ebpo_tool_at(&tool->proxy, (const double(*)[3])tool->from_matrix, tool->point[i], at);
             box_of_segment(at, at, 0, &e);
-            tool->free[i] = c->gone + free_distance(p, &e, POINT_VISITS) - need;
+            tool->safe_until[i] = c->travelled + free_distance(p, &e, POINT_VISITS) - need;
         }
-        if (tool->free[i] - c->gone - motion <= 0 && !add_close(p, i))
+        if (tool->safe_until[i] - c->travelled - motion <= 0 && !add_close_point(p, i))
             return false;
-        all = fmin(all, tool->free[i]);
+        all = fmin(all, tool->safe_until[i]);
     }
-    c->free = all;
+    c->safe_until = all;
     return true;
 }
 
+/* Examines a cluster of points. Returns false if the piece must be given up. */
 static bool inspect_cluster(const tool_piece *p, uint32_t number)
 {
     ebpo_tool *tool = p->tool;
     ebpo_tool_cluster *c = &tool->cluster[number];
     double motion = max_motion(p, c);
     ++*p->work;
-    if (!p->box || c->free - c->gone - motion > 0)
+    if (!p->box || c->safe_until - c->travelled - motion > 0)
         return true;
     double at[3], from_all;
     ebpo_extent e;
@@ -152,13 +157,13 @@ static bool inspect_cluster(const tool_piece *p, uint32_t number)
     from_all = free_distance(p, &e, CLUSTER_VISITS) - search * p->skin;
     if (from_all - motion <= 0)
         return inspect_points(p, number);
-    c->free = c->gone + from_all;
+    c->safe_until = c->travelled + from_all;
     for (uint32_t i = c->first; i < c->first + c->count; i++)
-        tool->free[i] = fmax(tool->free[i], c->free);
+        tool->safe_until[i] = fmax(tool->safe_until[i], c->safe_until);
     return true;
 }
 
-static void add_contact(const tool_piece *p, const ebpo_tool_close *close, uint32_t face,
+static void add_contact(const tool_piece *p, const ebpo_close_point *close, uint32_t face,
                         const ebpo_face_near *near)
 {
     ebpo_tool *tool = p->tool;
@@ -176,10 +181,12 @@ static void add_contact(const tool_piece *p, const ebpo_tool_close *close, uint3
     ebpo_tool_contact_add(&tool->next, &c);
 }
 
-/* Adds the contacts of a point. Where faces share an edge, one face is below the point and pushes
- * it straight away; the other faces would hold it back obliquely. So a face counts if its nearest
- * point is in its interior, or if it is the nearest face. */
-static void add_contacts(const tool_piece *p, const ebpo_tool_close *close,
+/* Adds the contacts of a point. A face directly below the point pushes along its normal; its
+ * neighbours would push at an angle, from the shared edge. So a face counts only if the point of
+ * the face that is nearest to the tool's point is in the face's interior, or if no other face is
+ * nearer.
+ */
+static void add_contacts(const tool_piece *p, const ebpo_close_point *close,
                          const ebpo_face_near *near)
 {
     double nearest = INFINITY;
@@ -194,8 +201,9 @@ static void add_contacts(const tool_piece *p, const ebpo_tool_close *close,
     }
 }
 
-/* Checks the new position of the point. Returns false if it is not allowed. */
-static bool check_close(const tool_piece *p, const ebpo_tool_close *close)
+/* Checks the new position of a point, and adds the contacts there. Returns false if the point has
+ * crossed a face or is too close to one. */
+static bool check_close_point(const tool_piece *p, const ebpo_close_point *close)
 {
     ebpo_tool *tool = p->tool;
     ebpo_face_near near[EBPO_TOOL_NEAR];
@@ -207,7 +215,7 @@ static bool check_close(const tool_piece *p, const ebpo_tool_close *close)
     for (uint32_t i = 0; i < close->count; i++) {
         const double(*face)[3] = (const double(*)[3])p->box->corner[tool->pool[close->first + i]];
         ebpo_face_nearest(to, face, &near[i]);
-        if (tool->part > 0 && (near[i].distance < least * p->skin + p->t->band ||
+        if (tool->part > 0 && (near[i].distance < allowed * p->skin + p->t->band ||
                                ebpo_segment_may_intersect(from, to, face)))
             return false;
     }
@@ -218,28 +226,28 @@ static bool check_close(const tool_piece *p, const ebpo_tool_close *close)
 static void begin_check(ebpo_tool *tool)
 {
     tool->stage = EBPO_TOOL_CHECKS;
-    tool->at = 0;
+    tool->next_index = 0;
     tool->next.count = 0;
     tool->end = tool->proxy;
     if (tool->part > 0)
-        ebpo_rigid_go(&tool->proxy, tool->motion, tool->part, tool->arm, &tool->end);
+        ebpo_rigid_move(&tool->proxy, tool->motion, tool->part, tool->arm, &tool->end);
     ebpo_rigid_matrix(&tool->end, tool->end_matrix);
 }
 
-/* Moves the tool to the end of the piece and reduces the free distance of each point. */
+/* Moves the tool to the end of the piece, and adds the motion to that of each cluster. */
 static void end_piece(const tool_piece *p)
 {
     ebpo_tool *tool = p->tool;
     for (uint64_t i = 0; i < tool->cluster_count; i++)
-        tool->cluster[i].gone +=
+        tool->cluster[i].travelled +=
             tool->part * max_motion(p, &tool->cluster[i]) + 0x1p-8 * p->t->band;
     tool->contacts = tool->next;
     tool->proxy = tool->end;
-    tool->stage = EBPO_TOOL_STANDS;
+    tool->stage = EBPO_TOOL_IDLE;
 }
 
-/* Limits the angle: the path of a point differs from a straight one by at most lever * angle^2 / 8.
- */
+/* Shortens a motion whose angle or length is too great, and then sets a flag. The path of a point
+ * differs from a straight one by at most lever * angle^2 / 8. */
 static void limit_angle(ebpo_haptic *t, double motion[EBPO_SCREW], uint32_t *flags)
 {
     ebpo_tool *tool = t->tool;
@@ -248,8 +256,8 @@ static void limit_angle(ebpo_haptic *t, double motion[EBPO_SCREW], uint32_t *fla
     if (angle > most)
         part = most / angle;
     double length = ebpo_screw_length(motion);
-    if (part * length > t->stride)
-        part = t->stride / length;
+    if (part * length > t->max_piece)
+        part = t->max_piece / length;
     if (part >= 1)
         return;
     *flags |= EBPO_HAPTIC_INCOMPLETE;
@@ -257,8 +265,8 @@ static void limit_angle(ebpo_haptic *t, double motion[EBPO_SCREW], uint32_t *fla
         motion[k] *= part;
 }
 
-/* Begins a tool's next piece; `flags` are returned at its end. Returns false if the piece cannot
- * begin. */
+/* Begins a piece along `wanted`, shortened as necessary. Returns false, and sets a bit of *flags,
+ * if the piece cannot begin. */
 static bool begin_tool_motion(ebpo_haptic *t, const double wanted[EBPO_SCREW], uint32_t *flags)
 {
     ebpo_tool *tool = t->tool;
@@ -278,46 +286,49 @@ static bool begin_tool_motion(ebpo_haptic *t, const double wanted[EBPO_SCREW], u
     }
     ebpo_rigid_matrix(&tool->proxy, tool->from_matrix);
     ebpo_rigid end;
-    ebpo_rigid_go(&tool->proxy, tool->motion, 1, tool->arm, &end);
+    ebpo_rigid_move(&tool->proxy, tool->motion, 1, tool->arm, &end);
     ebpo_rigid_matrix(&end, tool->to_matrix);
     tool->stage = EBPO_TOOL_SEARCHES;
-    tool->at = tool->close_count = tool->pool_count = 0;
+    tool->next_index = tool->close_count = tool->pool_count = 0;
     tool->part = 1;
     return true;
 }
 
-/* Gives up a path with too many close faces; the next one is shorter. */
-static uint32_t give_up(tool_piece *p)
+/* Gives up the piece: too many faces are close, or its end is not allowed. The next piece is
+ * shorter. */
+static uint32_t give_up_piece(tool_piece *p)
 {
-    p->t->stride = fmax(0.25 * ebpo_screw_length(p->tool->motion), 0x1p-8 * p->skin);
-    p->tool->stage = EBPO_TOOL_STANDS;
+    p->t->max_piece = fmax(0.25 * ebpo_screw_length(p->tool->motion), 0x1p-8 * p->skin);
+    p->tool->stage = EBPO_TOOL_IDLE;
     return EBPO_HAPTIC_INCOMPLETE;
 }
 
-/* Continues the piece; returns bits of ebpo_haptic_flag. *arrived: the end is reached. */
+/* Continues the piece, within the work of a haptic step. Returns bits of ebpo_haptic_flag.
+ * *arrived: the tool has moved to the end of the piece. */
 static uint32_t continue_tool_motion(ebpo_haptic *t, uint64_t *work, bool *arrived)
 {
-    tool_piece p = piece_of(t, work);
+    tool_piece p = make_piece(t, work);
     ebpo_tool *tool = t->tool;
     *arrived = false;
-    for (; tool->stage == EBPO_TOOL_SEARCHES && tool->at < tool->cluster_count; tool->at++) {
+    for (; tool->stage == EBPO_TOOL_SEARCHES && tool->next_index < tool->cluster_count;
+         tool->next_index++) {
         if (*work > EBPO_TOOL_WORK)
             return EBPO_HAPTIC_INCOMPLETE;
-        if (!inspect_cluster(&p, (uint32_t)tool->at))
-            return give_up(&p);
+        if (!inspect_cluster(&p, (uint32_t)tool->next_index))
+            return give_up_piece(&p);
     }
     if (tool->stage == EBPO_TOOL_SEARCHES)
         begin_check(tool);
-    for (; tool->at < tool->close_count; tool->at++) {
+    for (; tool->next_index < tool->close_count; tool->next_index++) {
         if (*work > EBPO_TOOL_WORK)
             return EBPO_HAPTIC_INCOMPLETE;
-        if (!check_close(&p, &tool->close[tool->at]))
-            return give_up(&p);
+        if (!check_close_point(&p, &tool->close_points[tool->next_index]))
+            return give_up_piece(&p);
     }
     end_piece(&p);
     *arrived = true;
-    if (t->stride < t->diagonal && tool->pool_count < EBPO_TOOL_POOL / 4)
-        t->stride *= 2;
+    if (t->max_piece < t->diagonal && tool->pool_count < EBPO_TOOL_POOL / 4)
+        t->max_piece *= 2;
     return tool->part < 1 ? 0 : tool->flags;
 }
 
@@ -325,22 +336,23 @@ static uint32_t continue_tool_motion(ebpo_haptic *t, uint64_t *work, bool *arriv
 
 static double contact_tolerance(const ebpo_haptic *t) { return 0x1p-6 * t->options.skin; }
 
-/* Applies Coulomb friction: shortens the path along the contacts by the friction times the part
- * that the contacts hold back. */
+/* Applies Coulomb friction: shortens `motion`, the part of `want` that the contacts allow, by the
+ * coefficient of friction times the length of the part that they prevent. */
 static void apply_friction(const ebpo_haptic *t, const double want[EBPO_SCREW],
                            double motion[EBPO_SCREW])
 {
     double held[EBPO_SCREW];
     for (int k = 0; k < EBPO_SCREW; k++)
         held[k] = want[k] - motion[k];
-    double length = ebpo_screw_length(motion),
-           holds = t->options.friction * ebpo_screw_length(held);
-    double part = length > holds ? 1 - holds / length : 0;
+    double length = ebpo_screw_length(motion);
+    double friction = t->options.friction * ebpo_screw_length(held);
+    double part = length > friction ? 1 - friction / length : 0;
     for (int k = 0; k < EBPO_SCREW; k++)
         motion[k] *= part;
 }
 
-/* Begins the next piece. Returns false if the tool stays. */
+/* Computes the motion that the contacts allow, and begins a piece along it. Returns false if the
+ * tool stays. */
 static bool begin_path(ebpo_haptic *t, const ebpo_rigid *device, uint32_t *flags)
 {
     ebpo_tool *tool = t->tool;
@@ -354,6 +366,7 @@ static bool begin_path(ebpo_haptic *t, const ebpo_rigid *device, uint32_t *flags
     return begin_tool_motion(t, motion, flags);
 }
 
+/* Moves the tool towards the device in a few pieces. Returns bits of ebpo_haptic_flag. */
 static uint32_t move_proxy(ebpo_haptic *t, const ebpo_rigid *device, uint64_t *work)
 {
     ebpo_tool *tool = t->tool;
@@ -362,7 +375,7 @@ static uint32_t move_proxy(ebpo_haptic *t, const ebpo_rigid *device, uint64_t *w
     tool->path[0] = tool->proxy;
     for (int piece = 0; piece < EBPO_TOOL_PIECES; piece++) {
         bool arrived;
-        if (tool->stage == EBPO_TOOL_STANDS) {
+        if (tool->stage == EBPO_TOOL_IDLE) {
             if (*work > EBPO_TOOL_WORK)
                 return flags | EBPO_HAPTIC_INCOMPLETE;
             (void)ebpo_haptic_take_box(t);
@@ -380,8 +393,8 @@ static uint32_t move_proxy(ebpo_haptic *t, const ebpo_rigid *device, uint64_t *w
     return flags | EBPO_HAPTIC_INCOMPLETE;
 }
 
-/* Computes the part of the vector from device to proxy that contacts cause. Returns the number of
- * these contacts. */
+/* Computes the vector from device to proxy, or only the part of it that contacts cause. Returns the
+ * number of contacts that hold the tool. */
 static int find_depth(const ebpo_haptic *t, const ebpo_rigid *device, uint32_t flags,
                       double out[EBPO_SCREW])
 {
@@ -389,12 +402,16 @@ static int find_depth(const ebpo_haptic *t, const ebpo_rigid *device, uint32_t f
     double want[EBPO_SCREW], motion[EBPO_SCREW];
     ebpo_rigid_between(&tool->proxy, device, tool->arm, want);
     int holding = ebpo_tool_hold(&tool->contacts, want, contact_tolerance(t), false, motion);
-    bool part = flags & (EBPO_HAPTIC_WAITING | EBPO_HAPTIC_INCOMPLETE) || t->options.friction == 0;
+    /* with friction, a tool that has completed its path is held in all directions: the whole
+     * vector counts. Otherwise motions that the contacts allow do not count. */
+    bool held_only =
+        flags & (EBPO_HAPTIC_WAITING | EBPO_HAPTIC_INCOMPLETE) || t->options.friction == 0;
     for (int k = 0; k < EBPO_SCREW; k++)
-        out[k] = (part ? motion[k] : 0) - want[k];
+        out[k] = (held_only ? motion[k] : 0) - want[k];
     return holding;
 }
 
+/* Reports the number of contacts, and the face and the point of the nearest one. */
 static void report_contact(const ebpo_haptic *t, ebpo_haptic_tool_result *out)
 {
     const ebpo_tool_contacts *all = &t->tool->contacts;
@@ -458,8 +475,8 @@ void ebpo_haptic_step_tool(ebpo_haptic *t, const double place[3], const double t
     for (int k = 0; k < 4; k++)
         out->turn[k] = tool->proxy.turn[k];
     out->flags = flags | (bad_input ? EBPO_HAPTIC_BAD_INPUT : 0) | ebpo_haptic_stopped(t);
-    if ((flags & EBPO_HAPTIC_WAITING) && tool->stage == EBPO_TOOL_STANDS)
-        ebpo_haptic_try_other(t);
+    if ((flags & EBPO_HAPTIC_WAITING) && tool->stage == EBPO_TOOL_IDLE)
+        ebpo_haptic_try_previous_box(t);
     ebpo_haptic_count(t, out->flags, out->work);
     ebpo_haptic_report(t, device.place);
 }

@@ -19,8 +19,8 @@
 
 enum { DEEPEST = 6, LIMIT = 1 << 17 };
 
-static ebpo_status held_levels_keep(const ebpo_file *file, const ebpo_subtree_nodes *nodes,
-                                    ebpo_held_levels *out, ebpo_error *error)
+static ebpo_status keep_nodes(const ebpo_file *file, const ebpo_subtree_nodes *nodes,
+                              ebpo_held_levels *out, ebpo_error *error)
 {
     ebpo_box box = ebpo_root_box(ebpo_file_info(file));
     out->node = ebpo_alloc_zero(nodes->node_count, sizeof *out->node);
@@ -51,11 +51,11 @@ ebpo_status ebpo_held_levels_read(const ebpo_file *file, ebpo_held_levels *out, 
         ebpo_status status = ebpo_subtree_open(file, 1, &options, &tree, error);
         if (status == EBPO_OK)
             status = ebpo_subtree_get_nodes(tree, &nodes);
-        bool few = status == EBPO_OK && (nodes.node_count <= LIMIT || levels == 0);
-        if (few)
-            status = held_levels_keep(file, &nodes, out, error);
+        bool fits = status == EBPO_OK && (nodes.node_count <= LIMIT || levels == 0);
+        if (fits)
+            status = keep_nodes(file, &nodes, out, error);
         ebpo_subtree_close(tree);
-        if (few || status != EBPO_OK)
+        if (fits || status != EBPO_OK)
             return status;
     }
     return EBPO_OK;
@@ -67,7 +67,8 @@ void ebpo_held_levels_free(ebpo_held_levels *levels)
     *levels = (ebpo_held_levels){ 0 };
 }
 
-static double to_cell(const ebpo_held_node *n, const double p[3])
+/* Returns the distance of p from the cell of a node. */
+static double distance_to_cell(const ebpo_held_node *n, const double p[3])
 {
     double square = 0;
     for (int i = 0; i < 3; i++) {
@@ -77,7 +78,8 @@ static double to_cell(const ebpo_held_node *n, const double p[3])
     return sqrt(square);
 }
 
-static double to_far_corner(const ebpo_held_node *n, const double p[3])
+/* Returns the distance of p from the farthest corner of the cell of a node. */
+static double distance_to_far_corner(const ebpo_held_node *n, const double p[3])
 {
     double square = 0;
     for (int i = 0; i < 3; i++) {
@@ -87,43 +89,43 @@ static double to_far_corner(const ebpo_held_node *n, const double p[3])
     return sqrt(square);
 }
 
-typedef struct waiting {
+typedef struct waiting_node {
     uint32_t node;
     double lower;
-} waiting;
+} waiting_node;
 
-/* Pushes the children, the nearest on top. */
+/* Pushes the children whose distance is below `limit` onto the stack, the nearest on top. */
 static void add_children(const ebpo_held_levels *levels, const double p[3], uint32_t first,
-                         double enough, waiting *stack, int *depth)
+                         double limit, waiting_node *stack, int *depth)
 {
     int begin = *depth;
     for (uint32_t c = first; c < first + 8; c++) {
         if (!levels->node[c].has_faces)
             continue;
-        double lower = to_cell(&levels->node[c], p);
-        if (!(lower < enough))
+        double lower = distance_to_cell(&levels->node[c], p);
+        if (!(lower < limit))
             continue;
         int at = (*depth)++;
         for (; at > begin && stack[at - 1].lower < lower; at--)
             stack[at] = stack[at - 1];
-        stack[at] = (waiting){ c, lower };
+        stack[at] = (waiting_node){ c, lower };
     }
 }
 
 void ebpo_held_levels_bound(const ebpo_held_levels *levels, const double p[3], int visits,
                             double *lo, double *hi)
 {
-    waiting stack[8 * (DEEPEST + 1)]; /* each level adds at most seven waiting nodes */
+    waiting_node stack[8 * (DEEPEST + 1)]; /* each level adds at most seven waiting nodes */
     int depth = 0;
     double lower = INFINITY, upper = INFINITY;
     if (levels->node[0].has_faces)
-        stack[depth++] = (waiting){ 0, to_cell(&levels->node[0], p) };
+        stack[depth++] = (waiting_node){ 0, distance_to_cell(&levels->node[0], p) };
     while (depth > 0) {
-        waiting w = stack[--depth];
+        waiting_node w = stack[--depth];
         const ebpo_held_node *n = &levels->node[w.node];
         if (!(w.lower < lower))
             continue;
-        upper = fmin(upper, to_far_corner(n, p));
+        upper = fmin(upper, distance_to_far_corner(n, p));
         if (n->children == EBPO_NO_CHILDREN || visits-- <= 0)
             lower = w.lower;
         else
@@ -138,7 +140,7 @@ bool ebpo_held_levels_winding(const ebpo_held_levels *levels, const double p[3],
 {
     const ebpo_held_node *n = &levels->node[0];
     *winding = 0;
-    if (to_cell(n, p) > 0)
+    if (distance_to_cell(n, p) > 0)
         return true;
     while (n->children != EBPO_NO_CHILDREN) {
         uint32_t octant = 0;

@@ -5,13 +5,12 @@
 
 #include <ebpo/query.h>
 
-/* Relative rounding error of a length between two points: a few units in the last place. For
- * distant points this error is greater than `slack`. */
+/* Relative rounding error of a length between two points: a few units in the last place. */
 #define EBPO_LENGTH_SLACK 0x1p-48
 
 typedef struct ebpo_held_node {
     double low[3], high[3];
-    uint32_t children; /* number of the first of eight; EBPO_NO_CHILDREN */
+    uint32_t children; /* index of the first of eight children, or EBPO_NO_CHILDREN */
     int32_t winding;   /* winding number of a cell without faces */
     bool has_faces;    /* there are faces within `slack` of the cell */
 } ebpo_held_node;
@@ -22,18 +21,19 @@ typedef struct ebpo_held_levels {
     double slack; /* bound of the rounding of the model's coordinates */
 } ebpo_held_levels;
 
-/* Reads the first levels, as many as have at most 2^17 nodes together, 6 or fewer below the root.
- */
+/* Reads the root and as many levels below it as have at most 2^17 nodes in total, but not more than
+ * 6. */
 EBPO_MUST_USE ebpo_status ebpo_held_levels_read(const ebpo_file *file, ebpo_held_levels *out,
                                                 ebpo_error *error);
 void ebpo_held_levels_free(ebpo_held_levels *levels);
 
-/* Bounds the distance to the nearest face by *lo and *hi. Visits at most `visits` nodes. */
+/* Bounds the distance of p from the nearest face by *lo and *hi. Visits the children of at most
+ * `visits` nodes; with fewer visits the bounds are wider. */
 void ebpo_held_levels_bound(const ebpo_held_levels *levels, const double p[3], int visits,
                             double *lo, double *hi);
 
-/* Returns true if p is in a cell without faces, whose winding number is *winding, or outside all
- * cells (then 0). */
+/* Returns true and sets *winding if p is in a cell without faces, or outside the root cell, where
+ * the winding number is 0. */
 bool ebpo_held_levels_winding(const ebpo_held_levels *levels, const double p[3], int32_t *winding);
 
 #endif

@@ -3,9 +3,9 @@
  * Points are split at the middle of their longest side into clusters of few points. A rotation is
  * measured as a length: its angle times the tool's arm.
  *
- * Contacts constrain the motion of a tool. The tool makes the motion nearest to the wanted one that
- * brings no point closer to a face than allowed. Hildreth's method finds this motion for the
- * contacts that matter, which are added one at a time, the most violated first.
+ * Contacts constrain the motion of a tool: of the motions that bring no point closer to a face than
+ * allowed, the tool makes the one nearest to the wanted motion. Hildreth's method finds this motion
+ * for a few active contacts, which are added one at a time, the most violated contact first.
  *
  * Forces are passive: they are reduced where the device would receive more energy than it gave. */
 #include "core/strict_fp.h"
@@ -31,19 +31,20 @@ void ebpo_passive_moved(ebpo_passive *p, const double *force, const double *move
     p->longest_step = fmax(p->longest_step, sqrt(passive_product(moved, moved, n)));
 }
 
-/* Limits the force F so that the energy given in total, `given`, never exceeds A = stiffness s^2,
- * where s is the longest motion of the device in one haptic step. Let g = -given. A step of length
- * s' gives at most F s', and F s' - g must not exceed stiffness max(s, s')^2. This holds for all s'
- * in two cases. First, if F^2 <= 4 stiffness g. Second, if F <= 2 stiffness s and F s - g <= A,
- * because for s' >= s the right side then grows faster than the left side. A spring that was
- * pressed steadily to the depth d has F = stiffness d and g of at least stiffness d^2 / 2. Then one
- * of the two cases holds, and the force is not reduced. */
+/* Returns the greatest force F with which the energy that the device receives in total, p->energy,
+ * never exceeds A = stiffness s^2, where s is the longest motion of the device in one haptic step.
+ * Let g = -p->energy. In a step of length s' the device receives at most F s', and F s' - g must
+ * not exceed stiffness max(s, s')^2. This holds for all s' in two cases. First, if F^2 <= 4
+ * stiffness g. Second, if F <= 2 stiffness s and F s - g <= A, because for s' >= s the right side
+ * then grows faster than the left side. A spring that was pressed steadily to the depth d has F =
+ * stiffness d and g of at least stiffness d^2 / 2; then one of the two cases holds, and the force
+ * is not reduced. */
 static double max_force(const ebpo_passive *p)
 {
     double k = p->stiffness, g = -p->energy, s = p->longest_step;
     double by_step = s > 0 ? fmin(2 * k * s, k * s + g / s) : 0;
-    double by_store = g > 0 ? 2 * sqrt(k * g) : 0;
-    return fmax(fmax(by_step, by_store) * (1 - 0x1p-40), 0);
+    double by_energy = g > 0 ? 2 * sqrt(k * g) : 0;
+    return fmax(fmax(by_step, by_energy) * (1 - 0x1p-40), 0);
 }
 
 void ebpo_passive_push(const ebpo_passive *p, double damping, const double *depth,
@@ -52,7 +53,7 @@ void ebpo_passive_push(const ebpo_passive *p, double damping, const double *dept
     for (int i = 0; i < n; i++)
         force[i] = p->stiffness * depth[i] - damping * moved[i];
     double into = passive_product(force, depth, n), square = passive_product(depth, depth, n);
-    if (into < 0 && square > 0) /* the part that pulls towards the faces is removed */
+    if (into < 0 && square > 0) /* remove the part that pulls towards the faces */
         for (int i = 0; i < n; i++)
             force[i] -= into / square * depth[i];
     double length = sqrt(passive_product(force, force, n)), most = max_force(p);
@@ -64,14 +65,14 @@ void ebpo_passive_push(const ebpo_passive *p, double damping, const double *dept
 bool ebpo_rigid_read(const double place[3], const double turn[4], ebpo_rigid *out)
 {
     double most = 0, square = 0, unit[4];
-    bool fine = true;
+    bool valid = true;
     for (int i = 0; i < 3; i++)
-        fine &= fabs(place[i]) <= 0x1p200;
+        valid &= fabs(place[i]) <= 0x1p200;
     for (int i = 0; i < 4; i++) {
-        fine &= isfinite(turn[i]) != 0;
+        valid &= isfinite(turn[i]) != 0;
         most = fmax(most, fabs(turn[i]));
     }
-    if (!fine || !(most >= 0x1p-500))
+    if (!valid || !(most >= 0x1p-500))
         return false;
     for (int i = 0; i < 4; i++) {
         unit[i] = turn[i] / most;
@@ -105,8 +106,8 @@ void ebpo_rigid_between(const ebpo_rigid *a, const ebpo_rigid *b, double arm,
         out[3 + i] = sine > 0 ? arm * (side * angle / sine) * q[i] : 0;
 }
 
-void ebpo_rigid_go(const ebpo_rigid *from, const double motion[EBPO_SCREW], double part, double arm,
-                   ebpo_rigid *out)
+void ebpo_rigid_move(const ebpo_rigid *from, const double motion[EBPO_SCREW], double part,
+                     double arm, ebpo_rigid *out)
 {
     double by[4], q[4], place[3];
     double angle = part * sqrt(ebpo_vec3_dot(motion + 3, motion + 3)) / arm;
@@ -133,7 +134,8 @@ void ebpo_rigid_matrix(const ebpo_rigid *r, double out[3][3])
 
 /* --- contacts --- */
 
-enum { ACTIVE = 12, SWEEPS = 20 };
+/* Greatest numbers of active contacts, and of iterations after each new one. */
+enum { ACTIVE_MAX = 12, SWEEPS = 20 };
 
 static void swap_contacts(ebpo_tool_contacts *all, int i, int j)
 {
@@ -168,21 +170,25 @@ void ebpo_tool_contact_add(ebpo_tool_contacts *all, const ebpo_tool_contact *con
         swap_contacts(all, i, (i - 1) / 2);
 }
 
-typedef struct held {
+/* State of Hildreth's method. */
+typedef struct hold_state {
     const ebpo_tool_contacts *all;
-    int active[ACTIVE], count;
-    double force[ACTIVE], square[ACTIVE];
+    int active[ACTIVE_MAX], count; /* indices of the active contacts */
+    double force[ACTIVE_MAX];      /* multiplier of each active contact */
+    double square[ACTIVE_MAX];     /* grip . grip of each active contact */
     bool release;
-} held;
+} hold_state;
 
-static double violation_of(const held *h, const ebpo_tool_contact *c,
+/* Returns by how much the motion violates a contact. */
+static double violation_of(const hold_state *h, const ebpo_tool_contact *c,
                            const double motion[EBPO_SCREW])
 {
     double space = h->release ? c->space : fmax(c->space, 0);
     return -space - ebpo_screw_dot(c->grip, motion);
 }
 
-static void tool_hold_sweep(held *h, double close, double motion[EBPO_SCREW])
+/* Iterates over the active contacts until no multiplier changes much. */
+static void hold_sweep(hold_state *h, double tolerance, double motion[EBPO_SCREW])
 {
     for (int turn = 0; turn < SWEEPS; turn++) {
         double most = 0;
@@ -194,15 +200,17 @@ static void tool_hold_sweep(held *h, double close, double motion[EBPO_SCREW])
                 motion[k] += by * c->grip[k];
             most = fmax(most, fabs(by) * h->square[i]);
         }
-        if (most <= close / 8)
+        if (most <= tolerance / 8)
             return;
     }
 }
 
-static int max_offended(const held *h, double close, const double motion[EBPO_SCREW])
+/* Returns the contact that the motion violates most, by more than `tolerance`; -1: there is none,
+ * or it is active already. */
+static int most_violated(const hold_state *h, double tolerance, const double motion[EBPO_SCREW])
 {
     int found = -1;
-    double most = close;
+    double most = tolerance;
     for (int i = 0; i < h->all->count; i++) {
         double lack = violation_of(h, &h->all->at[i], motion);
         if (lack > most) {
@@ -212,26 +220,26 @@ static int max_offended(const held *h, double close, const double motion[EBPO_SC
     }
     for (int i = 0; i < h->count; i++)
         if (h->active[i] == found)
-            return -1; /* more sweeps would improve it; violations are found when points are checked
-                        */
+            return -1; /* more iterations could reduce the violation; the check of the points will
+                        * find it */
     return found;
 }
 
-int ebpo_tool_hold(const ebpo_tool_contacts *all, const double want[EBPO_SCREW], double close,
+int ebpo_tool_hold(const ebpo_tool_contacts *all, const double want[EBPO_SCREW], double tolerance,
                    bool release, double out[EBPO_SCREW])
 {
-    held h = { .all = all, .release = release };
+    hold_state h = { .all = all, .release = release };
     int holding = 0;
     for (int k = 0; k < EBPO_SCREW; k++)
         out[k] = want[k];
-    while (h.count < ACTIVE) {
-        int next = max_offended(&h, close, out);
+    while (h.count < ACTIVE_MAX) {
+        int next = most_violated(&h, tolerance, out);
         if (next < 0)
             break;
         h.active[h.count] = next;
         h.force[h.count] = 0;
         h.square[h.count++] = ebpo_screw_dot(all->at[next].grip, all->at[next].grip);
-        tool_hold_sweep(&h, close, out);
+        hold_sweep(&h, tolerance, out);
     }
     for (int i = 0; i < h.count; i++)
         holding += h.force[i] > 0;
@@ -240,31 +248,32 @@ int ebpo_tool_hold(const ebpo_tool_contacts *all, const double want[EBPO_SCREW],
 
 /* --- the tool --- */
 
-typedef struct placed {
+/* A point and its index in the caller's array. */
+typedef struct numbered_point {
     double p[3];
     uint32_t number;
-} placed;
+} numbered_point;
 
 static int along_x(const void *a, const void *b)
 {
-    const placed *x = a, *y = b;
+    const numbered_point *x = a, *y = b;
     return x->p[0] != y->p[0] ? (x->p[0] > y->p[0]) - (x->p[0] < y->p[0])
                               : (x->number > y->number) - (x->number < y->number);
 }
 static int along_y(const void *a, const void *b)
 {
-    const placed *x = a, *y = b;
+    const numbered_point *x = a, *y = b;
     return x->p[1] != y->p[1] ? (x->p[1] > y->p[1]) - (x->p[1] < y->p[1])
                               : (x->number > y->number) - (x->number < y->number);
 }
 static int along_z(const void *a, const void *b)
 {
-    const placed *x = a, *y = b;
+    const numbered_point *x = a, *y = b;
     return x->p[2] != y->p[2] ? (x->p[2] > y->p[2]) - (x->p[2] < y->p[2])
                               : (x->number > y->number) - (x->number < y->number);
 }
 
-static int longest_axis(const placed *p, uint64_t count)
+static int longest_axis(const numbered_point *p, uint64_t count)
 {
     double side[3];
     for (int k = 0; k < 3; k++) {
@@ -278,14 +287,14 @@ static int longest_axis(const placed *p, uint64_t count)
     return side[0] >= side[1] && side[0] >= side[2] ? 0 : side[1] >= side[2] ? 1 : 2;
 }
 
-static double far_from(const double p[3], const double q[3])
+static double point_distance(const double p[3], const double q[3])
 {
     double d[3];
     ebpo_vec3_subtract(p, q, d);
     return sqrt(ebpo_vec3_dot(d, d));
 }
 
-static void add_cluster(ebpo_tool *t, const placed *p, uint64_t first, uint64_t count)
+static void add_cluster(ebpo_tool *t, const numbered_point *p, uint64_t first, uint64_t count)
 {
     ebpo_tool_cluster *c = &t->cluster[t->cluster_count++];
     *c = (ebpo_tool_cluster){ .first = (uint32_t)first, .count = (uint32_t)count };
@@ -293,71 +302,73 @@ static void add_cluster(ebpo_tool *t, const placed *p, uint64_t first, uint64_t 
         for (int k = 0; k < 3; k++)
             c->middle[k] += p[first + i].p[k] / (double)count;
     for (uint64_t i = 0; i < count; i++)
-        c->radius = fmax(c->radius, far_from(p[first + i].p, c->middle));
+        c->radius = fmax(c->radius, point_distance(p[first + i].p, c->middle));
 }
 
-static void tool_new_part(ebpo_tool *t, placed *p, uint64_t first, uint64_t count)
+/* Sorts points into clusters. */
+static void split_points(ebpo_tool *t, numbered_point *p, uint64_t first, uint64_t count)
 {
-    static int (*const along[3])(const void *, const void *) = { along_x, along_y, along_z };
+    static int (*const compare[3])(const void *, const void *) = { along_x, along_y, along_z };
     if (count <= EBPO_TOOL_CLUSTER) {
         add_cluster(t, p, first, count);
         return;
     }
-    qsort(p + first, count, sizeof *p, along[longest_axis(p + first, count)]);
-    tool_new_part(t, p, first, count / 2);
-    tool_new_part(t, p, first + count / 2, count - count / 2);
+    qsort(p + first, count, sizeof *p, compare[longest_axis(p + first, count)]);
+    split_points(t, p, first, count / 2);
+    split_points(t, p, first + count / 2, count - count / 2);
 }
 
-static void tool_new_fill(ebpo_tool *t, const double (*points)[3], placed *p)
+static void fill_tool(ebpo_tool *t, const double (*points)[3], numbered_point *p)
 {
     const double zero[3] = { 0, 0, 0 };
     double square = 0;
     for (uint64_t i = 0; i < t->count; i++) {
         ebpo_vec3_copy(points[i], p[i].p);
         p[i].number = (uint32_t)i;
-        double far = far_from(points[i], zero);
+        double far = point_distance(points[i], zero);
         t->radius = fmax(t->radius, far);
         square += far * far / (double)t->count;
     }
-    tool_new_part(t, p, 0, t->count);
+    split_points(t, p, 0, t->count);
     for (uint64_t i = 0; i < t->count; i++) {
         ebpo_vec3_copy(p[i].p, t->point[i]);
         t->number[i] = p[i].number;
-        t->close[i] = (ebpo_tool_close){ 0 };
+        t->close_points[i] = (ebpo_close_point){ 0 };
     }
     for (uint64_t i = 0; i < EBPO_TOOL_POOL; i++)
-        t->pool[i] = 0;                     /* write each page here, so that no haptic step is the
-                                             * first to use it */
-    t->arm = square > 0 ? sqrt(square) : 1; /* otherwise the only point is in the middle, and
-                                             * rotation has no effect */
+        t->pool[i] = 0;                     /* so that no haptic step waits for the operating system
+                                             * to provide a page */
+    t->arm = square > 0 ? sqrt(square) : 1; /* 1: all points are at the centre, and rotation has no
+                                             * effect */
 }
 
 uint64_t ebpo_tool_bytes(const ebpo_tool *t)
 {
     return sizeof *t + EBPO_TOOL_POOL * sizeof *t->pool +
-           t->count * (sizeof *t->point + sizeof *t->number + sizeof *t->free + sizeof *t->close +
-                       sizeof *t->cluster);
+           t->count * (sizeof *t->point + sizeof *t->number + sizeof *t->safe_until +
+                       sizeof *t->close_points + sizeof *t->cluster);
 }
 
 ebpo_status ebpo_tool_new(const double (*points)[3], uint64_t count, ebpo_tool **out,
                           ebpo_error *error)
 {
     ebpo_tool *t = *out = ebpo_alloc_zero(1, sizeof *t);
-    placed *p = ebpo_alloc(count, sizeof *p);
+    numbered_point *p = ebpo_alloc(count, sizeof *p);
     if (t) {
         t->count = count;
         t->point = ebpo_alloc(count, sizeof *t->point);
         t->number = ebpo_alloc(count, sizeof *t->number);
-        t->free = ebpo_alloc(count, sizeof *t->free);
-        t->close = ebpo_alloc(count, sizeof *t->close);
+        t->safe_until = ebpo_alloc(count, sizeof *t->safe_until);
+        t->close_points = ebpo_alloc(count, sizeof *t->close_points);
         t->cluster = ebpo_alloc(count, sizeof *t->cluster);
         t->pool = ebpo_alloc(EBPO_TOOL_POOL, sizeof *t->pool);
     }
-    bool fine = t && p && t->point && t->number && t->free && t->close && t->cluster && t->pool;
-    if (fine)
-        tool_new_fill(t, points, p);
+    bool allocated = t && p && t->point && t->number && t->safe_until && t->close_points &&
+                     t->cluster && t->pool;
+    if (allocated)
+        fill_tool(t, points, p);
     free(p);
-    return fine ? EBPO_OK : ebpo_fail_memory(error, count * 128 + EBPO_TOOL_POOL * 4);
+    return allocated ? EBPO_OK : ebpo_fail_memory(error, count * 128 + EBPO_TOOL_POOL * 4);
 }
 
 void ebpo_tool_free(ebpo_tool *t)
@@ -366,8 +377,8 @@ void ebpo_tool_free(ebpo_tool *t)
         return;
     free(t->point);
     free(t->number);
-    free(t->free);
-    free(t->close);
+    free(t->safe_until);
+    free(t->close_points);
     free(t->cluster);
     free(t->pool);
     free(t);
@@ -376,13 +387,13 @@ void ebpo_tool_free(ebpo_tool *t)
 void ebpo_tool_put(ebpo_tool *t, const ebpo_rigid *at)
 {
     t->proxy = t->device = *at;
-    t->stage = EBPO_TOOL_STANDS;
+    t->stage = EBPO_TOOL_IDLE;
     t->contacts.count = 0;
     t->path_count = 0;
     for (int k = 0; k < EBPO_SCREW; k++)
         t->force[k] = 0;
     for (uint64_t i = 0; i < t->cluster_count; i++)
-        t->cluster[i].gone = t->cluster[i].free = 0;
+        t->cluster[i].travelled = t->cluster[i].safe_until = 0;
     for (uint64_t i = 0; i < t->count; i++)
-        t->free[i] = 0;
+        t->safe_until[i] = 0;
 }

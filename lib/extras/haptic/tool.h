@@ -1,6 +1,6 @@
 /* A tool: points that move together, its contacts, rigid motions, and passive forces. For each
- * point a distance is known within which there is no face. The point is examined only after it has
- * moved farther than this distance. */
+ * point a distance is known within which there is no face; a point is examined only after it may
+ * have moved by this distance. */
 #ifndef EBPO_HAPTIC_TOOL_H
 #define EBPO_HAPTIC_TOOL_H
 
@@ -11,15 +11,19 @@
 #include "extras/haptic/face_box.h"
 #include "geometry/vec3.h"
 
+/* A spring whose forces are passive: in total, the device receives no more energy than it gave,
+ * except for that of one step (see max_force in tool.c). */
 typedef struct ebpo_passive {
-    double stiffness, energy, longest_step;
+    double stiffness;
+    double energy;       /* energy that the device has received in total */
+    double longest_step; /* longest motion of the device in one haptic step */
 } ebpo_passive;
 
-/* Records that the device has moved against the force of the last haptic step. */
+/* Records that the device has moved by moved[n] under the force[n] of the last haptic step. */
 void ebpo_passive_moved(ebpo_passive *p, const double *force, const double *moved, int n);
 
-/* Computes the force of a spring along `depth`, the vector from device to proxy, less `damping`
- * times `moved`. The force never opposes `depth`. */
+/* Computes the force of the spring along `depth`, the vector from device to proxy, minus `damping`
+ * times `moved`, and limits it. The force never opposes `depth`. All vectors have n components. */
 void ebpo_passive_push(const ebpo_passive *p, double damping, const double *depth,
                        const double *moved, int n, double *force);
 
@@ -38,12 +42,13 @@ bool ebpo_rigid_read(const double place[3], const double turn[4], ebpo_rigid *ou
 void ebpo_rigid_between(const ebpo_rigid *a, const ebpo_rigid *b, double arm,
                         double out[EBPO_SCREW]);
 
-/* Moves by a part of the motion. */
-void ebpo_rigid_go(const ebpo_rigid *from, const double motion[EBPO_SCREW], double part, double arm,
-                   ebpo_rigid *out);
+/* Moves `from` by a part, 0 to 1, of the motion. */
+void ebpo_rigid_move(const ebpo_rigid *from, const double motion[EBPO_SCREW], double part,
+                     double arm, ebpo_rigid *out);
 
 void ebpo_rigid_matrix(const ebpo_rigid *r, double out[3][3]);
 
+/* Rotates p: `out` is the vector from the tool's centre to the point, in the world's axes. */
 static inline void ebpo_rigid_lever(const double matrix[3][3], const double p[3], double out[3])
 {
     for (int i = 0; i < 3; i++)
@@ -60,8 +65,8 @@ static inline double ebpo_screw_length(const double a[EBPO_SCREW])
     return sqrt(ebpo_screw_dot(a, a));
 }
 
-/* A tool's motion under its contacts: of the motions that take no point closer to a face than
- * allowed, the one nearest to the wanted motion. */
+/* Contacts of a tool, and the motion that they allow: of the motions that bring no point closer to
+ * a face than allowed, the one nearest to the wanted motion. */
 
 enum { EBPO_CONTACTS_MAX = 256 };
 
@@ -69,9 +74,9 @@ typedef struct ebpo_tool_contact {
     double grip[EBPO_SCREW]; /* grip . motion is how far the point moves away from the face */
     double space;            /* how far the point may come closer to the face; negative: it must
                               * move away */
-    double gap;
-    uint64_t point, face; /* numbers that callers get */
-    double normal[3];
+    double gap;              /* distance of the point from the face */
+    uint64_t point, face;    /* indices that callers get */
+    double normal[3];        /* unit vector from the face to the point */
 } ebpo_tool_contact;
 
 typedef struct ebpo_tool_contacts {
@@ -82,17 +87,18 @@ typedef struct ebpo_tool_contacts {
 /* Adds a contact; when the heap is full, it replaces the contact with the largest gap. */
 void ebpo_tool_contact_add(ebpo_tool_contacts *all, const ebpo_tool_contact *contact);
 
-/* Computes `out` with grip . out >= -space for all contacts, with an error of at most `close`, as
- * far as bounded work allows. Without `release`, no contact requires a motion away from its face.
- * Returns the number of contacts that hold the tool. */
-int ebpo_tool_hold(const ebpo_tool_contacts *all, const double want[EBPO_SCREW], double close,
+/* Computes the motion `out` nearest to `want` with grip . out >= -space for all contacts, with an
+ * error of at most `tolerance`, as far as bounded work allows. Without `release`, a negative space
+ * counts as 0, so that no contact requires a motion away from its face. Returns the number of
+ * contacts that hold the tool. */
+int ebpo_tool_hold(const ebpo_tool_contacts *all, const double want[EBPO_SCREW], double tolerance,
                    bool release, double out[EBPO_SCREW]);
 
 /* Limits of a tool. */
 
 enum {
-    EBPO_TOOL_POINTS = 10000,
-    EBPO_TOOL_CLUSTER = 8,
+    EBPO_TOOL_POINTS = 10000, /* points of a tool */
+    EBPO_TOOL_CLUSTER = 8,    /* points of a cluster */
     EBPO_TOOL_PIECES = 6,     /* pieces of path in each haptic step */
     EBPO_TOOL_POOL = 1 << 16, /* faces around all points in total */
     EBPO_TOOL_NEAR = 64,      /* faces around one point */
@@ -102,17 +108,17 @@ enum {
 typedef struct ebpo_tool_cluster {
     uint32_t first, count; /* points of the cluster */
     double middle[3], radius;
-    double gone; /* bound of the motion of each of its points, summed over all steps */
-    double free; /* until `gone` reaches this, no point hits a face */
+    double travelled;  /* bound of the motion of each of its points, summed over all pieces */
+    double safe_until; /* no point can hit a face before `travelled` exceeds this */
 } ebpo_tool_cluster;
 
 /* A point that may hit faces in a piece of path; its faces begin at pool[first]. */
-typedef struct ebpo_tool_close {
+typedef struct ebpo_close_point {
     uint32_t point, first, count;
-} ebpo_tool_close;
+} ebpo_close_point;
 
 typedef enum ebpo_tool_stage {
-    EBPO_TOOL_STANDS,
+    EBPO_TOOL_IDLE,
     EBPO_TOOL_SEARCHES,
     EBPO_TOOL_CHECKS
 } ebpo_tool_stage;
@@ -120,8 +126,8 @@ typedef enum ebpo_tool_stage {
 typedef struct ebpo_tool {
     uint64_t count, cluster_count;
     double (*point)[3]; /* in the tool's coordinates, cluster after cluster */
-    uint32_t *number;   /* [count] numbers that the caller gets */
-    double *free;       /* [count] as for clusters */
+    uint32_t *number;   /* [count] indices that the caller gets */
+    double *safe_until; /* [count] as `safe_until` of clusters, for one point */
     double radius, arm; /* greatest distance of the points from the centre; root of the mean square
                          * of these distances */
     ebpo_tool_cluster *cluster;
@@ -130,8 +136,7 @@ typedef struct ebpo_tool {
     ebpo_rigid path[EBPO_TOOL_PIECES + 1]; /* positions of the proxy in the last haptic step */
     uint32_t path_count;
     double force[EBPO_SCREW];
-    ebpo_tool_contacts contacts,
-        next; /* contacts at the proxy, and at the end of the checked path */
+    ebpo_tool_contacts contacts, next; /* contacts at the proxy, and at the end of the piece */
 
     /* The current piece of path; the next haptic step continues it. */
     ebpo_tool_stage stage;
@@ -139,10 +144,10 @@ typedef struct ebpo_tool {
     ebpo_rigid end;
     double from_matrix[3][3], to_matrix[3][3], end_matrix[3][3];
     uint32_t flags;
-    uint64_t at; /* number of the next cluster, or of the next close point */
-    ebpo_tool_close *close;
+    uint64_t next_index; /* index of the cluster or of the close point that is examined next */
+    ebpo_close_point *close_points; /* [close_count] */
     uint64_t close_count;
-    uint32_t *pool;
+    uint32_t *pool; /* [pool_count] faces around close points: positions in the box */
     uint64_t pool_count;
 } ebpo_tool;
 
@@ -151,9 +156,10 @@ EBPO_MUST_USE ebpo_status ebpo_tool_new(const double (*points)[3], uint64_t coun
 void ebpo_tool_free(ebpo_tool *tool);
 uint64_t ebpo_tool_bytes(const ebpo_tool *tool);
 
-/* Places the tool without a path: all known distances are discarded. */
+/* Places the tool at another position without a path, and discards all known distances. */
 void ebpo_tool_put(ebpo_tool *tool, const ebpo_rigid *at);
 
+/* Computes the position in the world of the tool's point p. matrix: the rotation of r. */
 static inline void ebpo_tool_at(const ebpo_rigid *r, const double matrix[3][3], const double p[3],
                                 double out[3])
 {

@@ -1,9 +1,9 @@
 /* Computes distances of given points and of the points of a lattice.
  *
- * A lattice is evaluated in groups of layers. Each group is evaluated in bricks, whose points are
- * close to each other. So subtrees are loaded few times, and the processor's caches keep the data.
- * Each thread has a separate query context, which is made when it is first used. Results do not
- * depend on the number of threads.
+ * A lattice is evaluated in slabs, which are groups of layers. Each slab is divided into bricks:
+ * the points of a brick are close to each other, so that subtrees are loaded few times and the
+ * processor's caches keep the data. Each thread has a separate query context, which is made when it
+ * is first used. Results do not depend on the number of threads.
  *
  * Source: docs/guide/maps.md. */
 #include "core/strict_fp.h"
@@ -20,7 +20,7 @@
 #include "query/load_ahead.h"
 #include "query/query_model.h"
 
-/* Reads the options, or the defaults for NULL. */
+/* Sets *out from the caller's options, or to the defaults for NULL, and checks it. */
 static ebpo_status take_map_options(ebpo_map_options *out, const ebpo_map_options *given,
                                     ebpo_error *error)
 {
@@ -40,7 +40,7 @@ ebpo_status ebpo_map_queries_make(ebpo_map_queries *out, ebpo_model *model,
     distance.unsigned_distance = options->unsigned_distance;
     *out = (ebpo_map_queries){ .model = model, .distance = distance };
     out->threads = ebpo_thread_count(options->threads);
-    /* a context of an unusable model fails here, before anything else is made */
+    /* a model that has no distances fails here, before other memory is allocated */
     ebpo_status status = ebpo_context_new(model, &out->context[0], error);
     return status == EBPO_OK ? ebpo_distance_many(out->context[0], NULL, 0, &distance, NULL, error)
                              : status;
@@ -71,6 +71,7 @@ typedef struct points_job {
     double *distances;
 } points_job;
 
+/* Returns the index in the input of the point that is evaluated as number i. */
 static uint64_t place_of(const points_job *j, uint64_t i) { return j->order ? j->order[i] : i; }
 
 static ebpo_status query_piece(void *context, uint64_t begin, uint64_t end, unsigned worker,
@@ -106,7 +107,7 @@ ebpo_status ebpo_map_points(ebpo_model *model, const double *points, uint64_t co
         return status;
     ebpo_box box = ebpo_model_box(model);
     uint64_t *order = model->whole ? NULL : ebpo_curve_order(&box, points, count);
-    job.order = order; /* without memory for it, points are in input order: slower, with the same
+    job.order = order; /* NULL without memory: evaluation in input order is slower, with the same
                         * results */
     status = ebpo_map_queries_make(&job.queries, model, &o, error);
     if (status == EBPO_OK)
@@ -119,15 +120,16 @@ ebpo_status ebpo_map_points(ebpo_model *model, const double *points, uint64_t co
 
 /* --- lattices --- */
 
+/* Points along a side of a brick; greatest number of values of a slab that has several layers. */
 enum { BRICK = 16, SLAB_VALUES = 8 << 20 };
 #define POINTS_MAX (UINT64_C(1) << 40)
 
 typedef struct slab_job {
     ebpo_map_queries queries;
     const ebpo_lattice *lattice;
-    uint64_t first, layers; /* first layer and number of layers of the group */
-    uint64_t bricks[3];
-    double *values; /* [layers][count[1]][count[0]] */
+    uint64_t first, layers; /* first layer and number of layers of the slab */
+    uint64_t bricks[3];     /* number of bricks along each axis */
+    double *values;         /* [layers][count[1]][count[0]] */
 } slab_job;
 
 static void point_of(const ebpo_lattice *l, uint64_t i, uint64_t j, uint64_t k, double out[3])
@@ -138,7 +140,7 @@ static void point_of(const ebpo_lattice *l, uint64_t i, uint64_t j, uint64_t k, 
 }
 
 typedef struct brick {
-    uint64_t low[3], high[3]; /* range of points of the group, high numbers excluded */
+    uint64_t low[3], high[3]; /* range of indices of points in the slab, `high` excluded */
 } brick;
 
 static brick brick_of(const slab_job *j, uint64_t number)
@@ -153,7 +155,7 @@ static brick brick_of(const slab_job *j, uint64_t number)
     return b;
 }
 
-static uint64_t lattice_fill(const slab_job *j, const brick *b, double (*points)[3])
+static uint64_t fill_points(const slab_job *j, const brick *b, double (*points)[3])
 {
     uint64_t count = 0;
     for (uint64_t z = b->low[2]; z < b->high[2]; z++)
@@ -163,7 +165,7 @@ static uint64_t lattice_fill(const slab_job *j, const brick *b, double (*points)
     return count;
 }
 
-static void lattice_keep(const slab_job *j, const brick *b, const ebpo_distance_result *results)
+static void keep_distances(const slab_job *j, const brick *b, const ebpo_distance_result *results)
 {
     const uint64_t *size = j->lattice->count;
     for (uint64_t z = b->low[2]; z < b->high[2]; z++)
@@ -182,18 +184,18 @@ static ebpo_status query_bricks(void *context, uint64_t begin, uint64_t end, uns
         points && results ? EBPO_OK : ebpo_fail_memory(error, EBPO_MAP_PIECE * sizeof *results);
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
         brick b = brick_of(j, i);
-        status = ebpo_map_query(&j->queries, worker, points[0], lattice_fill(j, &b, points),
-                                results, error);
+        status = ebpo_map_query(&j->queries, worker, points[0], fill_points(j, &b, points), results,
+                                error);
         if (status == EBPO_OK)
-            lattice_keep(j, &b, results);
+            keep_distances(j, &b, results);
     }
     free(points);
     free(results);
     return status;
 }
 
-/* Checks that corners, and the sums from which they are computed, are finite. Then all points are
- * finite: each coordinate is monotonous in i, j and k. */
+/* Checks the number of points, and that the lattice's corners are finite. Then all points are
+ * finite, because each coordinate is monotonous in i, j and k. */
 static ebpo_status check_lattice(const ebpo_lattice *l, ebpo_error *error)
 {
     uint64_t points = 0;
@@ -214,6 +216,7 @@ static ebpo_status check_lattice(const ebpo_lattice *l, ebpo_error *error)
     return EBPO_OK;
 }
 
+/* Returns the number of layers of a slab: a multiple of BRICK if possible, at least 1. */
 static uint64_t layers_of_slab(const ebpo_lattice *l)
 {
     uint64_t layers = SLAB_VALUES / (l->count[0] * l->count[1]);

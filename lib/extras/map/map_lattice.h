@@ -14,14 +14,14 @@ typedef struct ebpo_map_queries {
     ebpo_context *context[EBPO_MAP_THREADS];
 } ebpo_map_queries;
 
-/* Reads the caller's options. The result must be freed by ebpo_map_queries_free, also after a
- * failure. */
+/* Makes query contexts from checked options. The result must be freed by ebpo_map_queries_free,
+ * also after a failure. */
 EBPO_MUST_USE ebpo_status ebpo_map_queries_make(ebpo_map_queries *out, ebpo_model *model,
                                                 const ebpo_map_options *options, ebpo_error *error);
 void ebpo_map_queries_free(ebpo_map_queries *queries);
 
-/* Computes the distances of points[count][3], at most EBPO_MAP_PIECE of them, into results[count].
- */
+/* Computes the distances of points[count][3] into results[count]; count <= EBPO_MAP_PIECE. worker:
+ * the index of the calling thread, which selects its context. */
 EBPO_MUST_USE ebpo_status ebpo_map_query(ebpo_map_queries *queries, unsigned worker,
                                          const double *points, uint64_t count,
                                          ebpo_distance_result *results, ebpo_error *error);

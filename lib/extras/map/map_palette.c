@@ -35,7 +35,8 @@ static double srgb_of(double linear)
     return linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1 / 2.4) - 0.055;
 }
 
-static void of_oklab(double light, double a, double b, uint8_t rgb[3])
+/* Converts a colour from OKLab to sRGB. */
+static void rgb_of_oklab(double light, double a, double b, uint8_t rgb[3])
 {
     static const double to_cone[3][2] = { { 0.3963377774, 0.2158037573 },
                                           { -0.1055613458, -0.0638541728 },
@@ -60,18 +61,17 @@ static void palette_diverging(double share, uint8_t rgb[3])
                         sine[2] = { -0.9659258263, 0.7660444431 };
     double far = fabs(share), chroma = 0.12 * far * (2 - far), light = 0.93 - 0.48 * far;
     int outside = share > 0;
-    of_oklab(light, chroma * cosine[outside], chroma * sine[outside], rgb);
+    rgb_of_oklab(light, chroma * cosine[outside], chroma * sine[outside], rgb);
 }
 
-/* Computes a colour from red over green to blue; red to green and green to blue are each a third of
- * the circle of hues. */
+/* Computes a hue from red (near 0) over yellow, green and cyan to blue (at the range). */
 static void palette_thesis(double share, uint8_t rgb[3])
 {
-    double far = fabs(share), turn = 4 * far; /* red, yellow, green, cyan, blue */
-    double red = turn < 1 ? 1 : 2 - turn, blue = turn < 3 ? turn - 2 : 1,
-           green = turn < 1   ? turn
-                   : turn < 3 ? 1
-                              : 4 - turn;
+    double far = fabs(share), hue = 4 * far; /* 0 red, 1 yellow, 2 green, 3 cyan, 4 blue */
+    double red = hue < 1 ? 1 : 2 - hue, blue = hue < 3 ? hue - 2 : 1,
+           green = hue < 1   ? hue
+                   : hue < 3 ? 1
+                             : 4 - hue;
     rgb[0] = byte_of(far == 0 ? 0 : red);
     rgb[1] = byte_of(far == 0 ? 0 : green);
     rgb[2] = byte_of(far == 0 ? 0 : blue);
@@ -106,7 +106,8 @@ static bool has_name(const char *names, const char *name)
     return false;
 }
 
-static bool paint_replaced(const ebpo_attribute *a)
+/* Returns true for an attribute of vertices that the new ones replace. */
+static bool is_replaced(const ebpo_attribute *a)
 {
     static const char *const names[] = { "distance", "red", "green", "blue" };
     for (int i = 0; i < 4; i++)
@@ -115,8 +116,9 @@ static bool paint_replaced(const ebpo_attribute *a)
     return false;
 }
 
-static ebpo_attribute *paint_add(ebpo_mesh *mesh, const char *names, ebpo_attribute_type type,
-                                 uint32_t columns)
+/* Adds an attribute of all vertices; returns NULL without memory. */
+static ebpo_attribute *add_attribute(ebpo_mesh *mesh, const char *names, ebpo_attribute_type type,
+                                     uint32_t columns)
 {
     ebpo_attribute like = {
         .type = type, .list = EBPO_ATTRIBUTE_NO_LIST, .columns = columns, .rows = mesh->vertex_count
@@ -141,16 +143,16 @@ ebpo_status ebpo_map_paint(ebpo_mesh *mesh, const double *distances, ebpo_map_pa
     if (!mesh->attributes)
         mesh->attributes = ebpo_attributes_make(mesh->workspace);
     for (uint64_t i = mesh->attributes ? mesh->attributes->count : 0; i-- > 0;)
-        if (paint_replaced(&mesh->attributes->array[i]))
+        if (is_replaced(&mesh->attributes->array[i]))
             ebpo_attributes_remove(mesh->attributes, i);
     if (mesh->attributes && mesh->attributes->count > EBPO_ATTRIBUTE_ARRAYS - 2)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "the mesh has too many attributes to add more; omit some");
     ebpo_attribute *colour =
-        mesh->attributes ? paint_add(mesh, "red green blue", EBPO_ATTRIBUTE_UINT8, 3) : NULL;
-    uint8_t *rgb = colour ? colour->values : NULL; /* adding the next attribute moves the struct */
+        mesh->attributes ? add_attribute(mesh, "red green blue", EBPO_ATTRIBUTE_UINT8, 3) : NULL;
+    uint8_t *rgb = colour ? colour->values : NULL; /* adding another attribute moves *colour */
     ebpo_attribute *distance =
-        colour ? paint_add(mesh, "distance", EBPO_ATTRIBUTE_FLOAT64, 1) : NULL;
+        colour ? add_attribute(mesh, "distance", EBPO_ATTRIBUTE_FLOAT64, 1) : NULL;
     if (!distance)
         return ebpo_fail_memory(error, mesh->vertex_count * 11);
     memcpy(distance->values, distances, mesh->vertex_count * sizeof *distances);

@@ -1,11 +1,11 @@
 /* Computes guaranteed bounds of the greatest distance from a mesh's faces, including their
  * interior, to a model (a one-sided Hausdorff distance).
  *
- * Branch and bound over triangles, which are divided into four. When a point moves, its distance
- * changes by at most the length of the motion. So the distance of each point of a triangle is at
- * most the distance of a corner plus the greatest length from that corner. In each round the
- * triangles with the greatest bounds are divided together, so the result does not depend on
- * threads. */
+ * The method is branch and bound over triangles, which are divided into four. When a point moves,
+ * its distance changes by at most the length of the motion. So the distance of each point of a
+ * triangle is at most the distance of a corner plus the length of the longer edge at this corner.
+ * The triangles with the greatest bounds are divided together in a round, so the result does not
+ * depend on the number of threads. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -19,13 +19,13 @@
 #include "core/parallel.h"
 #include "extras/map/map_lattice.h"
 
-/* Number of faces evaluated together, and maximum number of triangles of a round. Beyond that
- * number, triangles are not divided and keep their bounds. */
+/* Number of faces that are searched together, and maximum number of triangles of a round; further
+ * triangles are not divided, and their bounds are final. */
 enum { FACES_AT_A_TIME = 1 << 17, TRIANGLES_MAX = 1 << 20 };
 
 typedef struct triangle {
-    double corner[3][3], away[3]; /* `away`: unsigned distances of the corners */
-    double upper;
+    double corner[3][3], away[3]; /* `away`: unsigned distances of the corners from the model */
+    double upper;                 /* upper bound of the distance of the triangle's points */
 } triangle;
 
 typedef struct triangles {
@@ -38,17 +38,18 @@ typedef struct search {
     const ebpo_mesh *mesh;
     const double *distances;
     ebpo_map_range_options o;
-    double slack; /* more than the effect of rounding on positions and lengths */
-    ebpo_map_range reach;
-    uint64_t allowed; /* maximum number of queries until the current faces are done */
-    triangles now, next;
-    uint64_t cut;                              /* number of triangles, the first ones of `now`, that
-                                                * this round divides */
-    double (*middle)[3][3], (*middle_away)[3]; /* [cut] middle of the edge after each corner, and
-                                                * its distance */
+    double slack;         /* more than the effect of rounding on positions and lengths */
+    ebpo_map_range range; /* bounds of the result so far */
+    uint64_t allowed;     /* maximum number of queries in total, until the current faces are done */
+    triangles current, next;                   /* triangles of this round and of the next one */
+    uint64_t divided;                          /* number of triangles that this round divides: the
+                                                * first ones of `current` */
+    double (*middle)[3][3], (*middle_away)[3]; /* [divided] middle of the edge from each corner to
+                                                * the next, and its distance from the model */
     uint64_t middle_capacity, away_capacity;
 } search;
 
+/* Returns an upper bound of the distance of two points. */
 static double distance_above(const double a[3], const double b[3])
 {
     double d[3] = { a[0] - b[0], a[1] - b[1], a[2] - b[2] };
@@ -60,7 +61,8 @@ static double distance_above(const double a[3], const double b[3])
     return most * sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) * (1 + 0x1p-48);
 }
 
-static void reach_bound(const search *s, triangle *t)
+/* Sets the upper bound of a triangle. */
+static void set_upper_bound(const search *s, triangle *t)
 {
     double edge[3];
     t->upper = INFINITY;
@@ -71,18 +73,20 @@ static void reach_bound(const search *s, triangle *t)
     t->upper += s->slack;
 }
 
+/* Returns true if a triangle with this upper bound can change the result beyond the tolerance. */
 static bool needs_division(const search *s, double upper)
 {
-    return upper > s->reach.lo * (1 + s->o.tolerance) && upper > s->reach.hi;
+    return upper > s->range.lo * (1 + s->o.tolerance) && upper > s->range.hi;
 }
 
-/* Keeps a triangle for the next round. If there are too many, its bound is final. */
+/* Adds a triangle to a list of triangles that must be divided, if it must. If there are too many
+ * triangles or queries, its bound becomes final. */
 static ebpo_status keep_triangle(search *s, triangles *list, const triangle *t, ebpo_error *error)
 {
     if (!needs_division(s, t->upper))
         return EBPO_OK;
-    if (list->count == TRIANGLES_MAX || s->reach.queries >= s->allowed) {
-        s->reach.hi = fmax(s->reach.hi, t->upper);
+    if (list->count == TRIANGLES_MAX || s->range.queries >= s->allowed) {
+        s->range.hi = fmax(s->range.hi, t->upper);
         return EBPO_OK;
     }
     if (!ebpo_grow(&list->item, &list->capacity, list->count + 1, sizeof *list->item))
@@ -91,12 +95,13 @@ static ebpo_status keep_triangle(search *s, triangles *list, const triangle *t, 
     return EBPO_OK;
 }
 
+/* Raises the lower bound of the result to a point's distance. */
 static void raise_lower_bound(search *s, double away, const double location[3])
 {
-    if (away <= s->reach.lo)
+    if (away <= s->range.lo)
         return;
-    s->reach.lo = away;
-    memcpy(s->reach.location, location, sizeof s->reach.location);
+    s->range.lo = away;
+    memcpy(s->range.location, location, sizeof s->range.location);
 }
 
 /* --- a round --- */
@@ -109,8 +114,8 @@ static ebpo_status query_middles(void *context, uint64_t begin, uint64_t end, un
     for (uint64_t i = begin; i < end; i++)
         for (int k = 0; k < 3; k++)
             for (int c = 0; c < 3; c++)
-                s->middle[i][k][c] =
-                    s->now.item[i].corner[k][c] / 2 + s->now.item[i].corner[(k + 1) % 3][c] / 2;
+                s->middle[i][k][c] = s->current.item[i].corner[k][c] / 2 +
+                                     s->current.item[i].corner[(k + 1) % 3][c] / 2;
     ebpo_status status =
         ebpo_map_query(&s->queries, worker, s->middle[begin][0], 3 * (end - begin), results, error);
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++)
@@ -119,9 +124,10 @@ static ebpo_status query_middles(void *context, uint64_t begin, uint64_t end, un
     return status;
 }
 
+/* Makes a quarter of triangle i: at corner `which`, or, for 3, between the middles of its edges. */
 static void child_of(const search *s, uint64_t i, int which, triangle *out)
 {
-    const triangle *t = &s->now.item[i];
+    const triangle *t = &s->current.item[i];
     for (int k = 0; k < 3; k++) {
         bool corner = which < 3 && k == which; /* otherwise it is the middle of an adjacent edge */
         int edge = which == 3 ? k : k == (which + 1) % 3 ? which : (which + 2) % 3;
@@ -130,59 +136,60 @@ static void child_of(const search *s, uint64_t i, int which, triangle *out)
     }
 }
 
-/* Moves triangles with bounds of at least half of the greatest one to the front: dividing other
- * triangles does not help yet. */
+/* Moves the triangles whose bounds are at least half of the greatest one to the front, and counts
+ * them in s->divided: dividing others does not help yet. */
 static void choose_triangles(search *s)
 {
     double most = 0;
-    uint64_t left = s->allowed > s->reach.queries ? s->allowed - s->reach.queries : 0;
-    s->cut = 0;
-    for (uint64_t i = 0; i < s->now.count; i++)
-        most = fmax(most, s->now.item[i].upper);
-    for (uint64_t i = 0; i < s->now.count && 3 * s->cut < left; i++)
-        if (s->now.item[i].upper >= most / 2) {
-            triangle t = s->now.item[i];
-            s->now.item[i] = s->now.item[s->cut];
-            s->now.item[s->cut++] = t;
+    uint64_t left = s->allowed > s->range.queries ? s->allowed - s->range.queries : 0;
+    s->divided = 0;
+    for (uint64_t i = 0; i < s->current.count; i++)
+        most = fmax(most, s->current.item[i].upper);
+    for (uint64_t i = 0; i < s->current.count && 3 * s->divided < left; i++)
+        if (s->current.item[i].upper >= most / 2) {
+            triangle t = s->current.item[i];
+            s->current.item[i] = s->current.item[s->divided];
+            s->current.item[s->divided++] = t;
         }
 }
 
-static ebpo_status reach_cut(search *s, ebpo_error *error)
+/* Replaces the triangles that this round divides by their quarters. */
+static ebpo_status divide_triangles(search *s, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    s->reach.queries += 3 * s->cut;
-    for (uint64_t i = 0; i < s->cut; i++)
+    s->range.queries += 3 * s->divided;
+    for (uint64_t i = 0; i < s->divided; i++)
         for (int k = 0; k < 3; k++)
             raise_lower_bound(s, s->middle_away[i][k] - s->slack, s->middle[i][k]);
     s->next.count = 0;
-    for (uint64_t i = 0; i < s->cut && status == EBPO_OK; i++)
+    for (uint64_t i = 0; i < s->divided && status == EBPO_OK; i++)
         for (int which = 0; which < 4 && status == EBPO_OK; which++) {
             triangle t;
             child_of(s, i, which, &t);
-            reach_bound(s, &t);
+            set_upper_bound(s, &t);
             status = keep_triangle(s, &s->next, &t, error);
         }
-    for (uint64_t i = s->cut; i < s->now.count && status == EBPO_OK; i++)
-        status = keep_triangle(s, &s->next, &s->now.item[i], error);
-    triangles old = s->now;
-    s->now = s->next;
+    for (uint64_t i = s->divided; i < s->current.count && status == EBPO_OK; i++)
+        status = keep_triangle(s, &s->next, &s->current.item[i], error);
+    triangles old = s->current;
+    s->current = s->next;
     s->next = old;
     return status;
 }
 
-static ebpo_status reach_refine(search *s, ebpo_error *error)
+static ebpo_status refine_triangles(search *s, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     ebpo_progress none = { NULL, NULL };
-    while (status == EBPO_OK && s->now.count) {
+    while (status == EBPO_OK && s->current.count) {
         choose_triangles(s);
-        if (!ebpo_grow(&s->middle, &s->middle_capacity, s->cut, sizeof *s->middle) ||
-            !ebpo_grow(&s->middle_away, &s->away_capacity, s->cut, sizeof *s->middle_away))
-            return ebpo_fail_memory(error, s->cut * sizeof *s->middle);
-        status = ebpo_parallel_for(s->queries.threads, NULL, s->cut, 256, query_middles, s, &none,
-                                   "", error);
+        if (!ebpo_grow(&s->middle, &s->middle_capacity, s->divided, sizeof *s->middle) ||
+            !ebpo_grow(&s->middle_away, &s->away_capacity, s->divided, sizeof *s->middle_away))
+            return ebpo_fail_memory(error, s->divided * sizeof *s->middle);
+        status = ebpo_parallel_for(s->queries.threads, NULL, s->divided, 256, query_middles, s,
+                                   &none, "", error);
         if (status == EBPO_OK)
-            status = reach_cut(s, error);
+            status = divide_triangles(s, error);
     }
     return status;
 }
@@ -199,11 +206,11 @@ static void corner_of(const ebpo_mesh *m, uint32_t vertex, double out[3])
 static ebpo_status inspect_faces(search *s, uint64_t begin, uint64_t end, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    double share = (double)end / (double)s->mesh->face_count; /* share of the faces that are done
-                                                               * after this piece */
+    /* share of the faces that are searched after this piece */
+    double share = (double)end / (double)s->mesh->face_count;
     s->allowed =
         end == s->mesh->face_count ? s->o.queries : (uint64_t)((double)s->o.queries * share);
-    s->now.count = 0;
+    s->current.count = 0;
     for (uint64_t f = begin; f < end && status == EBPO_OK; f++) {
         triangle t;
         for (int k = 0; k < 3; k++) {
@@ -211,10 +218,10 @@ static ebpo_status inspect_faces(search *s, uint64_t begin, uint64_t end, ebpo_e
             corner_of(s->mesh, v, t.corner[k]);
             t.away[k] = fabs(s->distances[v]);
         }
-        reach_bound(s, &t);
-        status = keep_triangle(s, &s->now, &t, error);
+        set_upper_bound(s, &t);
+        status = keep_triangle(s, &s->current, &t, error);
     }
-    return status == EBPO_OK ? reach_refine(s, error) : status;
+    return status == EBPO_OK ? refine_triangles(s, error) : status;
 }
 
 static ebpo_status search_all(search *s, ebpo_error *error)
@@ -230,12 +237,12 @@ static ebpo_status search_all(search *s, ebpo_error *error)
         if (status != EBPO_OK)
             return status;
     }
-    s->reach.hi = fmax(s->reach.hi, s->reach.lo * (1 + s->o.tolerance) + s->slack);
+    s->range.hi = fmax(s->range.hi, s->range.lo * (1 + s->o.tolerance) + s->slack);
     return EBPO_OK;
 }
 
-/* Evaluates the vertices, and sets the rounding margin. */
-static ebpo_status reach_begin(search *s, ebpo_error *error)
+/* Checks the faces, sets the lower bound from the distances of vertices, and sets s->slack. */
+static ebpo_status begin_search(search *s, ebpo_error *error)
 {
     const ebpo_mesh *m = s->mesh;
     double most = 0;
@@ -257,7 +264,8 @@ static ebpo_status reach_begin(search *s, ebpo_error *error)
     return EBPO_OK;
 }
 
-static ebpo_status reach_take(search *s, const ebpo_map_range_options *given, ebpo_error *error)
+static ebpo_status take_range_options(search *s, const ebpo_map_range_options *given,
+                                      ebpo_error *error)
 {
     s->o = (ebpo_map_range_options)EBPO_MAP_RANGE_OPTIONS_INIT;
     ebpo_status status = EBPO_TAKE(ebpo_map_range_options, &s->o, given, error);
@@ -277,9 +285,9 @@ ebpo_status ebpo_map_find_range(ebpo_model *model, const ebpo_mesh *mesh, const 
     search s = { .mesh = mesh, .distances = distances };
     ebpo_status status = EBPO_CHECK_SIZED(ebpo_map_range, out, error);
     if (status == EBPO_OK)
-        status = reach_take(&s, options, error);
+        status = take_range_options(&s, options, error);
     if (status == EBPO_OK)
-        status = reach_begin(&s, error);
+        status = begin_search(&s, error);
     if (status != EBPO_OK)
         return status;
     query_options.unsigned_distance = true;
@@ -288,9 +296,9 @@ ebpo_status ebpo_map_find_range(ebpo_model *model, const ebpo_mesh *mesh, const 
     if (status == EBPO_OK)
         status = search_all(&s, error);
     ebpo_map_queries_free(&s.queries);
-    free(s.now.item);
+    free(s.current.item);
     free(s.next.item);
     free(s.middle);
     free(s.middle_away);
-    return status == EBPO_OK ? EBPO_GIVE(ebpo_map_range, out, &s.reach) : status;
+    return status == EBPO_OK ? EBPO_GIVE(ebpo_map_range, out, &s.range) : status;
 }

@@ -1,10 +1,13 @@
-/* Writes statistics of distances, and files of the distances at a lattice's points.
+/* Computes statistics of distances, and writes files of the distances at a lattice's points.
  *
- * Sums are exact (mesh/sum.h), in three ranges of size so that neither values nor squares overflow:
- * statistics depend neither on the order of values nor on threads.
+ * Sums are exact (mesh/sum.h), so statistics depend neither on the order of values nor on the
+ * number of threads. Small, ordinary and large values have separate sums, so that neither values
+ * nor squares overflow.
  *
  * A lattice is written layer by layer, as NRRD (teem, "Definition of NRRD File Format") or as a
- * VTKHDF 1.0 image (VTK's documentation, "VTKHDF file format"). The file is replaced atomically. */
+ * VTKHDF 1.0 image (VTK's documentation, "VTKHDF file format"). Each format has a function that
+ * begins the file and one that writes layers; VTKHDF also has one that ends it. The file is
+ * replaced atomically. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -38,9 +41,9 @@ typedef struct map_sums {
 
 typedef struct map_file {
     const ebpo_lattice *lattice;
-    const char *shown;
-    const char *path; /* name of the file, for HDF5 only */
-    FILE *stream;     /* for NRRD only */
+    const char *shown; /* name of the file for messages */
+    const char *path;  /* name of the temporary file, for VTKHDF only */
+    FILE *stream;      /* for NRRD only */
     ebpo_h5_out out;
     ebpo_h5_id values;
 } map_file;
@@ -63,8 +66,7 @@ static map_sums *map_sums_new(void)
     return s;
 }
 
-/* Adds a value to the bin of its size. Each bin has a power of two as its unit, so that neither
- * sums nor squares overflow or underflow, and the result does not depend on the order. */
+/* Adds a value, or its square, to the bin for its size, in the unit of this bin. */
 static void add_to(ebpo_sum bins[MAP_BINS], double value, bool square)
 {
     double size = fabs(value);
@@ -73,7 +75,8 @@ static void add_to(ebpo_sum bins[MAP_BINS], double value, bool square)
     ebpo_sum_add(&bins[bin], square ? scaled * scaled : scaled);
 }
 
-/* Returns the sum divided by count, in units of 2^unit. */
+/* Returns the sum of all bins divided by `count`, in units of 2^unit. square: the bins have sums of
+ * squares. */
 static double mean_of(const ebpo_sum bins[MAP_BINS], bool square, uint64_t count, int unit)
 {
     double sum = 0;
@@ -102,7 +105,8 @@ static void map_sums_add(map_sums *s, const double *values, uint64_t count)
     }
 }
 
-static ebpo_map_stats describe_nothing(const ebpo_map_stats *s)
+/* Returns the statistics of no finite values. */
+static ebpo_map_stats stats_of_nothing(const ebpo_map_stats *s)
 {
     ebpo_map_stats out = *s;
     out.min = out.max = out.farthest = out.mean = out.mean_unsigned = out.rms =
@@ -110,9 +114,10 @@ static ebpo_map_stats describe_nothing(const ebpo_map_stats *s)
     return out;
 }
 
+/* Returns the statistics, except percentiles, of the values that have been added. */
 static ebpo_map_stats map_sums_stats(const map_sums *s)
 {
-    ebpo_map_stats out = s->stats.count ? s->stats : describe_nothing(&s->stats);
+    ebpo_map_stats out = s->stats.count ? s->stats : stats_of_nothing(&s->stats);
     for (int i = 0; i < EBPO_MAP_PERCENTILES; i++)
         out.percentile[i] = out.percentile_unsigned[i] = NAN;
     if (!out.count)
@@ -131,15 +136,16 @@ static ebpo_map_stats map_sums_stats(const map_sums *s)
 
 /* --- percentiles --- */
 
-static int describe_compare(const void *x, const void *y)
+static int compare_values(const void *x, const void *y)
 {
     const double a = *(const double *)x, b = *(const double *)y;
     return (a > b) - (a < b);
 }
 
-static void describe_pick(double *sorted, uint64_t count, double out[EBPO_MAP_PERCENTILES])
+/* Sorts values and computes their percentiles. */
+static void pick_percentiles(double *sorted, uint64_t count, double out[EBPO_MAP_PERCENTILES])
 {
-    qsort(sorted, count, sizeof *sorted, describe_compare);
+    qsort(sorted, count, sizeof *sorted, compare_values);
     for (int i = 0; i < EBPO_MAP_PERCENTILES; i++) {
         double rank = ceil(percents[i] / 100 * (double)count);
         out[i] = sorted[rank < 1 ? 0 : (uint64_t)rank - 1];
@@ -156,10 +162,10 @@ static ebpo_status add_percentiles(const double *values, uint64_t count, ebpo_ma
     for (uint64_t i = 0; i < count; i++)
         if (isfinite(values[i]))
             sorted[n++] = values[i];
-    describe_pick(sorted, n, out->percentile);
+    pick_percentiles(sorted, n, out->percentile);
     for (uint64_t i = 0; i < n; i++)
         sorted[i] = fabs(sorted[i]);
-    describe_pick(sorted, n, out->percentile_unsigned);
+    pick_percentiles(sorted, n, out->percentile_unsigned);
     free(sorted);
     return EBPO_OK;
 }
@@ -191,8 +197,7 @@ static void put_vector(FILE *to, const double v[3])
     fprintf(to, " (%.17g,%.17g,%.17g)", v[0], v[1], v[2]);
 }
 
-/* Begins an NRRD file. Each format has functions for the header, for the layers in order, and for
- * the end, which returns late failures. `discard` is called after a failure. */
+/* Writes the header of an NRRD file. */
 static ebpo_status map_nrrd_begin(map_file *f, ebpo_error *error)
 {
     const ebpo_lattice *l = f->lattice;
@@ -243,7 +248,8 @@ static double length_of(const double v[3])
     return most * sqrt(a * a + b * b + c * c);
 }
 
-/* Computes an image's axes, which are perpendicular unit vectors, and their spacing. */
+/* Computes the direction matrix of an image, whose columns are perpendicular unit vectors, and the
+ * spacing of points along them. */
 static ebpo_status find_axes(const ebpo_lattice *l, double spacing[3], double direction[9],
                              ebpo_error *error)
 {
@@ -262,13 +268,13 @@ static ebpo_status find_axes(const ebpo_lattice *l, double spacing[3], double di
             return ebpo_fail(error, EBPO_E_ARGUMENT,
                              "VTKHDF needs steps at right angles; write NRRD");
         for (int c = 0; c < 3; c++)
-            direction[3 * c + i] =
-                axis[i][c]; /* the axes are the columns of the direction matrix */
+            direction[3 * c + i] = axis[i][c];
     }
     return EBPO_OK;
 }
 
-static ebpo_status put_facts(map_file *f, ebpo_h5_id id, ebpo_error *error)
+/* Writes the attributes of an image. */
+static ebpo_status put_image_attributes(map_file *f, ebpo_h5_id id, ebpo_error *error)
 {
     static const int64_t version[2] = { 1, 0 };
     const ebpo_lattice *l = f->lattice;
@@ -291,12 +297,12 @@ static ebpo_status put_facts(map_file *f, ebpo_h5_id id, ebpo_error *error)
     return status;
 }
 
-static ebpo_status put_group(map_file *f, const char *path, bool facts, ebpo_error *error)
+static ebpo_status put_group(map_file *f, const char *path, bool with_attributes, ebpo_error *error)
 {
     ebpo_h5_id id = -1;
     ebpo_status status = ebpo_h5_make_plain_group(&f->out, path, &id, error);
-    if (status == EBPO_OK && facts)
-        status = put_facts(f, id, error);
+    if (status == EBPO_OK && with_attributes)
+        status = put_image_attributes(f, id, error);
     ebpo_h5_close_id(&f->out, id);
     return status;
 }

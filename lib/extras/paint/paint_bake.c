@@ -1,4 +1,4 @@
-/* Turns paint into colours of a mesh's vertices, and finds the faces that a stroke covers.
+/* Computes colours of a mesh's vertices from paint, and finds the faces that a stroke covers.
  *
  * A stroke covers the faces and vertices in the reaches of its points (paint_reach.h). The strokes
  * of a layer are applied in order. Then the layers are blended in order over the original colours
@@ -25,7 +25,7 @@
 #include "mesh/attributes.h"
 #include "query/query_model.h"
 
-/* Stores a byte: the inverse of ebpo_colour_byte. */
+/* Stores a colour value 0 to 255 in the column's type: the inverse of ebpo_colour_byte. */
 static void put_byte(const ebpo_colour_column *c, uint64_t row, uint8_t value)
 {
     uint8_t *to = c->of->values + row * ebpo_attribute_row_bytes(c->of) +
@@ -46,7 +46,7 @@ static void put_byte(const ebpo_colour_column *c, uint64_t row, uint8_t value)
     }
 }
 
-/* Adds three new properties of all vertices. */
+/* Adds columns red, green and blue of all vertices. */
 static ebpo_status add_colours(ebpo_mesh *mesh, const uint8_t *rgba, ebpo_error *error)
 {
     ebpo_attribute like = { .element = "vertex",
@@ -106,7 +106,7 @@ static ebpo_status add_point(ebpo_found_faces *found_faces, ebpo_reach *reach, e
     return EBPO_OK;
 }
 
-static void cover_give(const ebpo_found_faces *found_faces, ebpo_paint_face_fn take, void *user)
+static void pass_faces(const ebpo_found_faces *found_faces, ebpo_paint_face_fn take, void *user)
 {
     qsort(found_faces->face, found_faces->count, sizeof *found_faces->face, by_file_face);
     for (uint64_t i = 0; i < found_faces->count; i++) {
@@ -136,17 +136,17 @@ ebpo_status ebpo_paint_cover(const ebpo_paint *p, ebpo_context *context, uint64_
         return status;
     ebpo_reach_begin(&reach, context);
     for (uint32_t i = 0; i < p->stroke[stroke].count && status == EBPO_OK; i++) {
-        bool here;
-        status = ebpo_paint_reach(&reach, p, stroke, i, &here, error);
-        if (status == EBPO_OK && here)
+        bool complete;
+        status = ebpo_paint_reach(&reach, p, stroke, i, &complete, error);
+        if (status == EBPO_OK && complete)
             status = add_point(&found_faces, &reach, error);
-        absent += status == EBPO_OK && !here;
+        absent += status == EBPO_OK && !complete;
     }
     ebpo_reach_end(&reach);
     if (status == EBPO_OK && elsewhere)
         *elsewhere = absent;
     if (status == EBPO_OK)
-        cover_give(&found_faces, take, user);
+        pass_faces(&found_faces, take, user);
     ebpo_found_faces_free(&found_faces);
     return status;
 }
@@ -195,13 +195,14 @@ ebpo_status ebpo_paint_check_points(const ebpo_paint *p, ebpo_context *context,
 
 /* --- layers over colours --- */
 
-/* A vertex that a stroke covers. */
-typedef struct dyed {
+/* A vertex that a stroke covers, and its colour. */
+typedef struct coloured_vertex {
     double colour[3];   /* colour with the previous layers */
     double paint[3], a; /* colour and opacity of the current layer */
     uint32_t vertex;
-    uint32_t layer, stroke; /* numbers of the last layer and stroke that covered it, plus 1 */
-} dyed;
+    uint32_t layer, stroke; /* indices of the last layer and stroke that covered it, plus 1; 0: none
+                             */
+} coloured_vertex;
 
 typedef struct bake {
     const ebpo_paint *p;
@@ -210,11 +211,11 @@ typedef struct bake {
     uint8_t *rgba;
     ebpo_context *context;
     ebpo_reacher *reacher;
-    uint32_t
-        *numbers;   /* source indices of the mesh's faces, in ascending order; NULL: 0, 1, 2, ... */
-    uint32_t *slot; /* [vertex_count] index in `dyed`, plus 1; 0: none */
-    dyed *dyed;
-    uint64_t count, capacity, done;
+    uint32_t *numbers;         /* [row] source index of the mesh's face, ascending; NULL: the row */
+    uint32_t *slot;            /* [vertex_count] index in `vertices`, plus 1; 0: none */
+    coloured_vertex *vertices; /* [count] */
+    uint64_t count, capacity;  /* of `vertices` */
+    uint64_t done;             /* number of points that have been evaluated */
     ebpo_paint_baked baked;
 } bake;
 
@@ -226,8 +227,8 @@ static int by_value(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Reads the source indices of the mesh's faces, if the numbers have gaps or exceed the mesh's
- * number of faces. The mesh is in the source's order. */
+/* Sets b->numbers, if the paint uses indices of the source and the model has not all faces of the
+ * source. The faces of the mesh are in the order of the source. */
 static ebpo_status read_numbers(bake *b, ebpo_error *error)
 {
     const ebpo_file *file = b->context->model->file;
@@ -262,23 +263,25 @@ static uint64_t row_of(const bake *b, uint64_t face)
 
 /* --- colours --- */
 
-static ebpo_status find_dyed(bake *b, uint32_t vertex, dyed **out, ebpo_error *error)
+/* Finds or adds the entry of a vertex. */
+static ebpo_status find_vertex(bake *b, uint32_t vertex, coloured_vertex **out, ebpo_error *error)
 {
     if (!b->slot[vertex]) {
-        if (!ebpo_grow(&b->dyed, &b->capacity, b->count + 1, sizeof *b->dyed))
-            return ebpo_fail_memory(error, b->count * sizeof *b->dyed);
-        dyed *d = &b->dyed[b->count++];
-        *d = (dyed){ .vertex = vertex };
+        if (!ebpo_grow(&b->vertices, &b->capacity, b->count + 1, sizeof *b->vertices))
+            return ebpo_fail_memory(error, b->count * sizeof *b->vertices);
+        coloured_vertex *d = &b->vertices[b->count++];
+        *d = (coloured_vertex){ .vertex = vertex };
         for (int k = 0; k < 3; k++)
             d->colour[k] = b->rgba[4 * (uint64_t)vertex + (unsigned)k];
         b->slot[vertex] = (uint32_t)b->count;
     }
-    *out = &b->dyed[b->slot[vertex] - 1];
+    *out = &b->vertices[b->slot[vertex] - 1];
     return EBPO_OK;
 }
 
-/* Applies a stroke to a vertex; each stroke covers a vertex once. */
-static void bake_apply(dyed *d, const ebpo_stroke_held *s, uint32_t number)
+/* Applies a stroke to a vertex, unless this stroke was the last one that was applied to it. number:
+ * index of the stroke. */
+static void colour_vertex(coloured_vertex *d, const ebpo_stroke_held *s, uint32_t number)
 {
     double share = s->rgba[3] / 255.0;
     if (d->layer != s->layer + 1) {
@@ -295,29 +298,31 @@ static void bake_apply(dyed *d, const ebpo_stroke_held *s, uint32_t number)
     d->a = erases ? 0 : d->a * (1 - share) + share;
 }
 
-static ebpo_status dye_face(bake *b, const ebpo_reached_face *f, const ebpo_stroke_held *s,
-                            uint32_t number, bool *any, ebpo_error *error)
+/* Applies a stroke to the vertices of a face that are within a point's ball. *any: set to true if
+ * there are any. */
+static ebpo_status colour_face(bake *b, const ebpo_reached_face *f, const ebpo_stroke_held *s,
+                               uint32_t number, bool *any, ebpo_error *error)
 {
     uint64_t row = row_of(b, f->face);
     if (row >= b->mesh->face_count)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "the mesh is not the model's");
     for (int k = 0; k < 3; k++) {
-        dyed *d = NULL;
+        coloured_vertex *d = NULL;
         if (!f->within[k])
             continue;
         uint32_t vertex = b->mesh->faces[3 * row + (unsigned)k];
         if (vertex >= b->mesh->vertex_count)
             return ebpo_fail(error, EBPO_E_ARGUMENT, "the mesh is not the model's");
-        ebpo_status status = find_dyed(b, vertex, &d, error);
+        ebpo_status status = find_vertex(b, vertex, &d, error);
         if (status != EBPO_OK)
             return status;
-        bake_apply(d, s, number);
+        colour_vertex(d, s, number);
         *any = true;
     }
     return EBPO_OK;
 }
 
-static ebpo_status dye_stroke(bake *b, uint32_t number, ebpo_error *error)
+static ebpo_status apply_stroke(bake *b, uint32_t number, ebpo_error *error)
 {
     const ebpo_stroke_held *s = &b->p->stroke[number];
     ebpo_status status = EBPO_OK;
@@ -331,20 +336,20 @@ static ebpo_status dye_stroke(bake *b, uint32_t number, ebpo_error *error)
         if (status != EBPO_OK)
             return status;
         for (uint64_t k = 0; status == EBPO_OK && k < reached.count; k++)
-            status = dye_face(b, &reached.face[k], s, number, &any, error);
+            status = colour_face(b, &reached.face[k], s, number, &any, error);
         b->baked.points++;
-        b->baked.elsewhere += !reached.here;
-        b->baked.between += status == EBPO_OK && reached.here && !any;
+        b->baked.elsewhere += !reached.complete;
+        b->baked.between += status == EBPO_OK && reached.complete && !any;
     }
     return status;
 }
 
 /* Blends the current layer over the previous ones. */
-static void put_layer_over(bake *b, uint32_t layer)
+static void blend_layer(bake *b, uint32_t layer)
 {
     double opacity = (double)b->p->layer[layer].opacity / 255.0;
     for (uint64_t i = 0; i < b->count; i++) {
-        dyed *d = &b->dyed[i];
+        coloured_vertex *d = &b->vertices[i];
         if (d->layer != layer + 1)
             continue;
         for (int k = 0; k < 3; k++)
@@ -352,7 +357,7 @@ static void put_layer_over(bake *b, uint32_t layer)
     }
 }
 
-static ebpo_status dye_layers(bake *b, ebpo_error *error)
+static ebpo_status apply_layers(bake *b, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (uint32_t layer = 0; layer < b->p->layer_count && status == EBPO_OK; layer++) {
@@ -360,18 +365,18 @@ static ebpo_status dye_layers(bake *b, ebpo_error *error)
             continue;
         for (uint32_t i = 0; i < b->p->stroke_count && status == EBPO_OK; i++)
             if (b->p->stroke[i].layer == layer)
-                status = dye_stroke(b, i, error);
-        put_layer_over(b, layer);
+                status = apply_stroke(b, i, error);
+        blend_layer(b, layer);
     }
     return status;
 }
 
-static void give_colours(const bake *b)
+static void store_colours(const bake *b)
 {
     for (uint64_t i = 0; i < b->count; i++)
         for (int k = 0; k < 3; k++)
-            b->rgba[4 * (uint64_t)b->dyed[i].vertex + (unsigned)k] =
-                (uint8_t)floor(b->dyed[i].colour[k] + 0.5);
+            b->rgba[4 * (uint64_t)b->vertices[i].vertex + (unsigned)k] =
+                (uint8_t)floor(b->vertices[i].colour[k] + 0.5);
 }
 
 static ebpo_status check_mesh(const ebpo_context *context, const ebpo_mesh *mesh, ebpo_error *error)
@@ -409,15 +414,15 @@ ebpo_status ebpo_paint_bake(const ebpo_paint *p, ebpo_context *context, const eb
     if (status == EBPO_OK)
         status = ebpo_reacher_new(p, context, wanted.threads, &b.reacher, error);
     if (status == EBPO_OK)
-        status = dye_layers(&b, error);
+        status = apply_layers(&b, error);
     if (status == EBPO_OK)
-        give_colours(&b);
+        store_colours(&b);
     b.baked.vertices = b.count;
     if (status == EBPO_OK && baked)
         EBPO_GIVE(ebpo_paint_baked, baked, &b.baked);
     ebpo_reacher_free(b.reacher);
     free(b.numbers);
     free(b.slot);
-    free(b.dyed);
+    free(b.vertices);
     return status;
 }

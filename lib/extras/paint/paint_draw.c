@@ -26,60 +26,63 @@
 
 enum { DENSITY_MAX = 10000 };
 
-/* An unfinished stroke. */
-typedef struct run {
+/* A stroke that is not yet part of the paint: its first point in drawing.point, and their number.
+ */
+typedef struct stroke_range {
     uint64_t first, count;
-} run;
+} stroke_range;
 
 typedef struct drawing {
     ebpo_context *context;
     ebpo_paint_pen pen;
     ebpo_reach reach;
     ebpo_paint_point *point;
-    run *run;
-    uint64_t point_count, point_capacity, run_count, run_capacity, random, space;
-    bool down;    /* the pen was painting at the previous step */
-    double begun; /* time at which the stroke began */
+    stroke_range *run;
+    uint64_t point_count, point_capacity, run_count, run_capacity;
+    uint64_t random;    /* state of the pseudorandom numbers */
+    uint64_t space;     /* number of points that the paint has space for */
+    bool pen_down;      /* the pen was painting at the previous step */
+    double stroke_time; /* time at which the current stroke began */
     ebpo_paint_drawn drawn;
 } drawing;
 
 /* --- checking --- */
 
-static bool in_range(double v, double least, double most) { return v >= least && v <= most; }
+static bool is_in_range(double v, double least, double most) { return v >= least && v <= most; }
 
 static const char *pen_wrong(const ebpo_paint_pen *pen)
 {
-    if (!in_range(pen->radius, 1 / EBPO_PAINT_MAX, EBPO_PAINT_MAX))
+    if (!is_in_range(pen->radius, 1 / EBPO_PAINT_MAX, EBPO_PAINT_MAX))
         return "a pen's radius must be 2^-200 to 2^200";
-    if (!in_range(pen->spread, 0, EBPO_PAINT_MAX))
+    if (!is_in_range(pen->spread, 0, EBPO_PAINT_MAX))
         return "a pen's spread must be 0 to 2^200";
     if (pen->density < 1 || pen->density > DENSITY_MAX || (pen->spread == 0 && pen->density != 1))
         return "a pen's density must be 1 to 10,000, and 1 if the spread is 0";
-    if (!in_range(pen->size_least, 0x1p-15, 1) || !in_range(pen->size_full, 0x1p-15, 1))
+    if (!is_in_range(pen->size_least, 0x1p-15, 1) || !is_in_range(pen->size_full, 0x1p-15, 1))
         return "a pen's sizes must be 2^-15 to 1";
-    if (pen->step != 0 && !in_range(pen->step, 1 / EBPO_PAINT_MAX, DBL_MAX))
+    if (pen->step != 0 && !is_in_range(pen->step, 1 / EBPO_PAINT_MAX, DBL_MAX))
         return "a pen's step must be 0, or at least 2^-200";
     return pen->within >= 0 ? NULL : "a pen's distance from the surface must be at least 0";
 }
 
-static const char *device_wrong(const ebpo_paint_input *h)
+static const char *input_wrong(const ebpo_paint_input *h)
 {
     for (int k = 0; k < 3; k++)
         if (!(fabs(h->place[k]) <= EBPO_PAINT_MAX))
             return "a position of the pen is not finite, or beyond 2^200";
-    if (!in_range(h->pressure, 0, 1))
+    if (!is_in_range(h->pressure, 0, 1))
         return "the pen's pressure must be 0 to 1";
-    return in_range(h->time, 0, UINT32_MAX) ? NULL : "the pen's time must be 0 to 2^32 - 1";
+    return is_in_range(h->time, 0, UINT32_MAX) ? NULL : "the pen's time must be 0 to 2^32 - 1";
 }
 
-static ebpo_status draw_check(const drawing *l, const ebpo_paint *p, const ebpo_paint_input *input,
-                              uint64_t count, ebpo_error *error)
+static ebpo_status check_input(const drawing *l, const ebpo_paint *p, const ebpo_paint_input *input,
+                               uint64_t count, ebpo_error *error)
 {
     const char *wrong = pen_wrong(&l->pen);
     if (count == 0)
         wrong = "a stroke needs at least one position of the pen";
     for (uint64_t i = 0; i < count && !wrong; i++)
-        wrong = device_wrong(&input[i]);
+        wrong = input_wrong(&input[i]);
     ebpo_stroke_held stroke = { .radius = l->pen.radius,
                                 .time = l->pen.time,
                                 .layer =
@@ -116,7 +119,8 @@ static void set_point(ebpo_paint_point *q, const ebpo_distance_result *at,
     round_weights(near.weight, q->weight);
 }
 
-static ebpo_status draw_nearest(ebpo_context *context, const double place[3], double within,
+/* Finds the nearest point of the model within a distance. */
+static ebpo_status find_nearest(ebpo_context *context, const double place[3], double within,
                                 ebpo_distance_result *out, ebpo_error *error)
 {
     ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
@@ -125,20 +129,20 @@ static ebpo_status draw_nearest(ebpo_context *context, const double place[3], do
     return ebpo_distance(context, place, &options, out, error);
 }
 
-static bool draw_found(const ebpo_distance_result *at)
+static bool is_found(const ebpo_distance_result *at)
 {
     return at->face != EBPO_NO_FACE && isfinite(at->distance);
 }
 
-/* Finds the reach of a ball around a nearest point. Fails with EBPO_E_ABSENT if some of the faces
- * there are omitted from a subset. */
+/* Finds the reach of a ball around a point of the model. Fails with EBPO_E_ABSENT if a subset omits
+ * some of the faces there. */
 static ebpo_status reach_around(ebpo_reach *reach, const ebpo_distance_result *at, double radius,
                                 ebpo_error *error)
 {
     ebpo_reach_ball ball = { { at->point[0], at->point[1], at->point[2] }, radius, at->face };
-    bool here;
-    ebpo_status status = ebpo_reach_find(reach, &ball, &here, error);
-    return status != EBPO_OK || here
+    bool complete;
+    ebpo_status status = ebpo_reach_find(reach, &ball, &complete, error);
+    return status != EBPO_OK || complete
                ? status
                : ebpo_fail(error, EBPO_E_ABSENT,
                            "the subset lacks some faces around the pen; paint on the whole "
@@ -153,7 +157,7 @@ ebpo_status ebpo_paint_locate(const ebpo_paint *p, ebpo_context *context, const 
     ebpo_reach reach;
     ebpo_status status = ebpo_paint_check_context(p, context, error);
     if (status == EBPO_OK)
-        status = draw_nearest(context, place, INFINITY, &at, error);
+        status = find_nearest(context, place, INFINITY, &at, error);
     if (status != EBPO_OK)
         return status;
     ebpo_reach_begin(&reach, context);
@@ -181,12 +185,13 @@ static ebpo_status add_point(drawing *l, const ebpo_distance_result *at, const d
     set_point(q, at, corner);
     q->size = (uint16_t)fmax(1, floor(share * EBPO_PAINT_FULL + 0.5));
     q->pressure = (uint16_t)floor(input->pressure * UINT16_MAX + 0.5);
-    q->time = (uint32_t)(input->time - l->begun);
+    q->time = (uint32_t)(input->time - l->stroke_time);
     l->run[l->run_count - 1].count++;
     return EBPO_OK;
 }
 
-/* Makes two unit vectors perpendicular to the face's normal, or any two if it has none. */
+/* Makes two unit vectors that are perpendicular to each other and to the normal; a face without
+ * area has the normal 0, 0, 0, and any two are made. */
 static void make_frame(const double normal[3], double u[3], double v[3])
 {
     double n[3] = { 0, 0, 1 }, axis[3] = { 0, 0, 0 };
@@ -213,7 +218,7 @@ static void random_in_disc(uint64_t *state, double out[2])
     } while (out[0] * out[0] + out[1] * out[1] > 1);
 }
 
-/* Returns the face of the reach with this number, or NULL. */
+/* Returns the face of the reach with this index, or NULL. */
 static const ebpo_reach_face *face_of(const ebpo_reach *reach, uint64_t face)
 {
     for (uint64_t i = 0; i < reach->count; i++)
@@ -222,8 +227,9 @@ static const ebpo_reach_face *face_of(const ebpo_reach *reach, uint64_t face)
     return NULL;
 }
 
-static ebpo_status draw_scatter(drawing *l, const ebpo_distance_result *middle,
-                                const ebpo_paint_input *input, ebpo_error *error)
+/* Adds points of the reach that are scattered around `middle`; more points with more pressure. */
+static ebpo_status scatter_points(drawing *l, const ebpo_distance_result *middle,
+                                  const ebpo_paint_input *input, ebpo_error *error)
 {
     double u[3], v[3], place[3], disc[2], spread = l->pen.spread;
     unsigned wanted = (unsigned)fmax(1, floor(input->pressure * l->pen.density + 0.5));
@@ -234,10 +240,10 @@ static ebpo_status draw_scatter(drawing *l, const ebpo_distance_result *middle,
         random_in_disc(&l->random, disc);
         for (int k = 0; k < 3; k++)
             place[k] = middle->point[k] + spread * (disc[0] * u[k] + disc[1] * v[k]);
-        status = draw_nearest(l->context, place, spread, &at, error);
+        status = find_nearest(l->context, place, spread, &at, error);
         if (status != EBPO_OK)
             return status;
-        const ebpo_reach_face *f = draw_found(&at) ? face_of(&l->reach, at.face) : NULL;
+        const ebpo_reach_face *f = is_found(&at) ? face_of(&l->reach, at.face) : NULL;
         if (f && ebpo_ball_holds(middle->point, spread * spread, at.point))
             status = add_point(l, &at, f->corner, input, error);
         else
@@ -246,47 +252,50 @@ static ebpo_status draw_scatter(drawing *l, const ebpo_distance_result *middle,
     return status;
 }
 
-static ebpo_status put_down(drawing *l, const ebpo_paint_input *input, ebpo_error *error)
+/* Begins a stroke unless the pen is down. */
+static ebpo_status begin_stroke(drawing *l, const ebpo_paint_input *input, ebpo_error *error)
 {
-    if (l->down)
+    if (l->pen_down)
         return EBPO_OK;
     if (!ebpo_grow(&l->run, &l->run_capacity, l->run_count + 1, sizeof *l->run))
         return ebpo_fail_memory(error, l->run_count * sizeof *l->run);
-    l->run[l->run_count++] = (run){ l->point_count, 0 };
-    l->begun = input->time;
-    l->down = true;
+    l->run[l->run_count++] = (stroke_range){ l->point_count, 0 };
+    l->stroke_time = input->time;
+    l->pen_down = true;
     return EBPO_OK;
 }
 
+/* Makes the points of one step, or lifts the pen if it presses on no surface. */
 static ebpo_status make_step(drawing *l, const ebpo_paint_input *input, ebpo_error *error)
 {
     ebpo_distance_result at = { .face = EBPO_NO_FACE };
     ebpo_status status = EBPO_OK;
     if (input->pressure > 0)
-        status = draw_nearest(l->context, input->place, l->pen.within, &at, error);
+        status = find_nearest(l->context, input->place, l->pen.within, &at, error);
     if (status != EBPO_OK)
         return status;
-    if (!draw_found(&at)) {
-        l->down = false;
+    if (!is_found(&at)) {
+        l->pen_down = false;
         l->drawn.lifted++;
         return EBPO_OK;
     }
     l->drawn.steps++;
-    status = put_down(l, input, error);
+    status = begin_stroke(l, input, error);
     if (status == EBPO_OK)
         status = reach_around(&l->reach, &at, l->pen.spread, error);
     if (status != EBPO_OK)
         return status;
     return l->pen.spread > 0
-               ? draw_scatter(l, &at, input, error)
+               ? scatter_points(l, &at, input, error)
                : add_point(l, &at, (const double(*)[3])l->reach.face[l->reach.own].corner, input,
                            error);
 }
 
 /* --- the path --- */
 
-static void draw_between(const ebpo_paint_input *a, const ebpo_paint_input *b, double t,
-                         ebpo_paint_input *out)
+/* Interpolates between two positions of the pen, at the part t of the way. */
+static void interpolate_input(const ebpo_paint_input *a, const ebpo_paint_input *b, double t,
+                              ebpo_paint_input *out)
 {
     for (int k = 0; k < 3; k++)
         out->place[k] = a->place[k] + t * (b->place[k] - a->place[k]);
@@ -301,7 +310,7 @@ static double length_between(const ebpo_paint_input *a, const ebpo_paint_input *
     return sqrt(ebpo_vec3_dot(d, d));
 }
 
-/* Follows the path. Steps are at multiples of their length from the first position on. */
+/* Follows the path, and makes a step at each multiple of the step's length from its beginning. */
 static ebpo_status follow_path(drawing *l, const ebpo_paint_input *input, uint64_t count,
                                ebpo_error *error)
 {
@@ -319,8 +328,8 @@ static ebpo_status follow_path(drawing *l, const ebpo_paint_input *input, uint64
                 EBPO_PAINT_POINTS);
         for (uint64_t k = 1; at <= length && status == EBPO_OK; k++) {
             ebpo_paint_input pen;
-            draw_between(&input[i - 1], &input[i], at / length, &pen);
-            pen.time = fmax(pen.time, l->begun);
+            interpolate_input(&input[i - 1], &input[i], at / length, &pen);
+            pen.time = fmax(pen.time, l->stroke_time);
             status = make_step(l, &pen, error);
             at = ahead + (double)k * step;
         }
@@ -329,7 +338,7 @@ static ebpo_status follow_path(drawing *l, const ebpo_paint_input *input, uint64
     return status;
 }
 
-/* Adds all strokes, or none. */
+/* Adds all strokes to the paint; after a failure, none. */
 static ebpo_status keep_strokes(drawing *l, ebpo_paint *p, ebpo_error *error)
 {
     uint64_t before = p->stroke_count;
@@ -366,7 +375,7 @@ ebpo_status ebpo_paint_draw(ebpo_paint *p, ebpo_context *context, const ebpo_pai
     if (status == EBPO_OK && drawn)
         status = EBPO_CHECK_SIZED(ebpo_paint_drawn, drawn, error);
     if (status == EBPO_OK)
-        status = draw_check(&l, p, input, count, error);
+        status = check_input(&l, p, input, count, error);
     if (status == EBPO_OK)
         status = ebpo_paint_check_context(p, context, error);
     if (status != EBPO_OK)

@@ -1,6 +1,7 @@
 /* A paint as an object: its strokes, layers and notes, and the model that it belongs to.
  *
- * Strokes are kept in the order in which they were made, with consecutive points. Removing a layer
+ * Strokes are kept in the order in which they were made; the points of a stroke are consecutive.
+ * Removing a layer
  * removes its strokes and its notes. Texts are UTF-8 of limited size without control characters. A
  * paint belongs to the model with a given SHA-256 digest: for another model, queries fail.
  *
@@ -69,8 +70,9 @@ ebpo_status ebpo_paint_get_stroke(const ebpo_paint *p, uint64_t number, ebpo_pai
     return EBPO_GIVE(ebpo_paint_stroke, out, &own);
 }
 
-static ebpo_status strokes_check(const ebpo_paint *p, const ebpo_paint_stroke *stroke,
-                                 ebpo_stroke_held *out, ebpo_error *error)
+/* Checks a stroke, and sets *out to it. */
+static ebpo_status check_stroke(const ebpo_paint *p, const ebpo_paint_stroke *stroke,
+                                ebpo_stroke_held *out, ebpo_error *error)
 {
     *out = (ebpo_stroke_held){ .radius = stroke->radius,
                                .time = stroke->time,
@@ -98,7 +100,7 @@ ebpo_status ebpo_paint_add_stroke(ebpo_paint *p, const ebpo_paint_stroke *given,
     ebpo_paint_stroke stroke = EBPO_PAINT_STROKE_INIT;
     ebpo_status status = EBPO_TAKE(ebpo_paint_stroke, &stroke, given, error);
     if (status == EBPO_OK)
-        status = strokes_check(p, &stroke, &held, error);
+        status = check_stroke(p, &stroke, &held, error);
     if (status != EBPO_OK)
         return status;
     if (!ebpo_grow(&p->stroke, &p->stroke_capacity, p->stroke_count + 1, sizeof *p->stroke) ||
@@ -119,15 +121,15 @@ ebpo_status ebpo_paint_remove_stroke(ebpo_paint *p, uint64_t number, ebpo_error 
             error, EBPO_E_ARGUMENT,
             "there is no stroke %llu: strokes are numbered from 0, and the paint has %llu",
             (unsigned long long)number, (unsigned long long)p->stroke_count);
-    ebpo_stroke_held gone = p->stroke[number];
-    uint64_t end = gone.first + gone.count;
-    memmove(p->point + gone.first, p->point + end, (p->point_count - end) * sizeof *p->point);
-    p->point_count -= gone.count;
+    ebpo_stroke_held removed = p->stroke[number];
+    uint64_t end = removed.first + removed.count;
+    memmove(p->point + removed.first, p->point + end, (p->point_count - end) * sizeof *p->point);
+    p->point_count -= removed.count;
     p->stroke_count--;
     memmove(p->stroke + number, p->stroke + number + 1,
             (p->stroke_count - number) * sizeof *p->stroke);
     for (uint64_t i = number; i < p->stroke_count; i++)
-        p->stroke[i].first -= gone.count;
+        p->stroke[i].first -= removed.count;
     return EBPO_OK;
 }
 
@@ -150,14 +152,14 @@ static void free_texts(char *text[EBPO_PAINT_TEXTS])
 
 static bool copy_texts(const char *const from[EBPO_PAINT_TEXTS], char *to[EBPO_PAINT_TEXTS])
 {
-    bool fine = true;
+    bool ok = true;
     for (int i = 0; i < EBPO_PAINT_TEXTS; i++) {
         to[i] = strdup(from[i] ? from[i] : "");
-        fine = fine && to[i];
+        ok = ok && to[i];
     }
-    if (!fine)
+    if (!ok)
         free_texts(to);
-    return fine;
+    return ok;
 }
 
 bool ebpo_paint_texts_begin(char *text[EBPO_PAINT_TEXTS])
@@ -166,8 +168,8 @@ bool ebpo_paint_texts_begin(char *text[EBPO_PAINT_TEXTS])
     return copy_texts(none, text);
 }
 
-/* Checks texts before anything is changed, and copies them. A date equal to `known` is accepted
- * without a check, so that texts of other programs are kept. */
+/* Checks all texts, then copies them. A date equal to `known` is not checked, so that the date of
+ * another program can be kept. of: for messages, such as "a layer". */
 static ebpo_status take_texts(const char *const from[EBPO_PAINT_TEXTS],
                               const ebpo_paint_text_kind *kinds, const char *of, const char *known,
                               char *to[EBPO_PAINT_TEXTS], ebpo_error *error)
@@ -177,9 +179,9 @@ static ebpo_status take_texts(const char *const from[EBPO_PAINT_TEXTS],
     for (int i = 0; i < EBPO_PAINT_TEXTS; i++) {
         size_t length = from[i] ? strlen(from[i]) : 0;
         bytes += length + 1;
-        if (length > kinds[i].most)
+        if (length > kinds[i].max_bytes)
             return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: the %s is longer than %zu bytes", of,
-                             kinds[i].name, kinds[i].most);
+                             kinds[i].name, kinds[i].max_bytes);
         if (from[i] && !ebpo_text_ok(from[i]))
             return ebpo_fail(error, EBPO_E_ARGUMENT,
                              "%s: the %s is not UTF-8 without control characters; lines are "
@@ -203,6 +205,7 @@ static ebpo_status no_layer(const ebpo_paint *p, uint64_t number, ebpo_error *er
                      (unsigned long long)number, (unsigned long long)p->layer_count);
 }
 
+/* Checks a layer and copies it. known: as in take_texts. */
 static ebpo_status take_layer(const ebpo_paint_layer *given, const char *known,
                               ebpo_layer_held *out, ebpo_error *error)
 {
@@ -268,7 +271,7 @@ ebpo_status ebpo_paint_set_layer(ebpo_paint *p, uint64_t number, const ebpo_pain
     return EBPO_OK;
 }
 
-/* Removes the strokes of a layer with their points; keeps those of other layers. */
+/* Removes the strokes of a layer with their points, and renumbers the layers of other strokes. */
 static void drop_strokes(ebpo_paint *p, uint64_t layer)
 {
     uint64_t strokes = 0, points = 0;
@@ -286,6 +289,7 @@ static void drop_strokes(ebpo_paint *p, uint64_t layer)
     p->point_count = points;
 }
 
+/* Removes the notes of a layer, and renumbers the layers of other notes. */
 static void drop_notes(ebpo_paint *p, uint64_t layer)
 {
     uint64_t notes = 0;

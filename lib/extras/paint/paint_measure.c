@@ -1,9 +1,9 @@
 /* Measures the painted area, by stroke, by colour, by layer and in total.
  *
- * Faces are halved at their longest edge until the stroke of a part is certain, or the part is
- * small. In each layer the last stroke decides: if one of its balls contains the part, the part
- * belongs to this stroke. If a ball only intersects the part, the uncovered rest may belong to
- * earlier strokes. So lower and upper bounds are summed.
+ * Faces are halved at their longest edge into parts, until it is certain which stroke a part
+ * belongs to, or the part is small. In each layer the newest stroke decides: if one of its balls
+ * contains the part, the part belongs to this stroke. If a ball only intersects the part, the
+ * uncovered rest may belong to older strokes. So lower and upper bounds are summed.
  *
  * Faces are distributed to a fixed number of pieces of work. The sums of the pieces are added in
  * order, so results do not depend on the number of threads.
@@ -31,12 +31,12 @@ typedef struct area_ball {
     uint32_t layer, stroke;
 } area_ball;
 
-/* Keys of areas: strokes, colours, layers and the total, consecutively; area_key_count is their
- * number. */
+/* Order of the sums in area_cut.area: one for each stroke, one for each colour, one for each layer,
+ * and the total. area_key_count is their number. */
 typedef struct area_keys {
     const ebpo_paint *p;
     uint32_t *colour; /* [strokes] index of a stroke's colour */
-    uint64_t colours;
+    uint64_t colours; /* number of colours */
 } area_keys;
 
 static inline uint64_t area_key_count(const area_keys *k)
@@ -47,14 +47,15 @@ static inline uint64_t area_key_count(const area_keys *k)
 /* Data of one thread. */
 typedef struct area_cut {
     const area_keys *keys;
-    double fineness;
+    double fineness;       /* a part is small if its longest edge is at most radius / fineness */
     ebpo_paint_area *area; /* [keys] sums of areas */
     area_ball *ball;       /* a stack: for each part the balls that may intersect it */
     uint64_t ball_capacity;
-    uint64_t *seen; /* [colours] the last part for which each colour was added */
-    uint64_t part;
+    uint64_t *last_visit; /* [colours] value of `visit` when the colour was last added */
+    uint64_t visit;       /* number of layers of parts that have been added */
 } area_cut;
 
+/* Greatest number of halvings of a face. */
 enum { DEEPEST = 900 };
 
 typedef struct triangle {
@@ -65,13 +66,13 @@ typedef struct triangle {
 static bool area_cut_begin(area_cut *c, const area_keys *keys, double fineness)
 {
     *c = (area_cut){ .keys = keys, .fineness = fineness };
-    c->seen = ebpo_alloc_zero(keys->colours, sizeof *c->seen);
-    return c->seen != NULL;
+    c->last_visit = ebpo_alloc_zero(keys->colours, sizeof *c->last_visit);
+    return c->last_visit != NULL;
 }
 
 static void area_cut_end(area_cut *c)
 {
-    free(c->seen);
+    free(c->last_visit);
     free(c->ball);
 }
 
@@ -110,10 +111,11 @@ static bool area_cut_intersects(const area_ball *ball, const triangle *t)
 
 /* --- balls that intersect a part --- */
 
-/* Copies the balls of a layer at [from, end) that may contain a part of the triangle to `to`. Stops
- * after the first stroke with a ball that contains the whole triangle; of this stroke only that
- * ball is copied. Returns the number of copied balls. *sure: the layer is decided, because no ball
- * intersects the triangle, or the last stroke covers all of it. */
+/* Balls of a layer are ordered from the newest stroke to the oldest. Copies to position `to` those
+ * balls in [from, end) that intersect the triangle, up to the newest stroke with a ball that
+ * contains the triangle; of this stroke only that ball is copied. Returns the number of copied
+ * balls. *sure: no ball intersects the triangle, or the newest stroke that intersects it also
+ * contains it. */
 static uint64_t sift_layer(area_cut *c, const triangle *t, uint64_t from, uint64_t end, uint64_t to,
                            bool *sure)
 {
@@ -135,8 +137,8 @@ static uint64_t sift_layer(area_cut *c, const triangle *t, uint64_t from, uint64
     return kept;
 }
 
-/* Calls sift_layer for all layers at [from, from + count). The copied balls follow the given ones
- * on the stack. */
+/* Calls sift_layer for the balls [from, from + count) of each layer. The copied balls are on the
+ * stack after these balls. *sure: all layers are sure. */
 static uint64_t sift_layers(area_cut *c, const triangle *t, uint64_t from, uint64_t count,
                             bool *sure)
 {
@@ -162,16 +164,18 @@ static double least_radius(const area_cut *c, uint64_t from, uint64_t count)
 
 /* --- sums --- */
 
-static void area_cut_add(ebpo_paint_area *to, double area, bool certain, bool valued)
+/* Adds the area of a part that may be painted. certain: all of it is painted; at_centre: its centre
+ * is painted. */
+static void area_cut_add(ebpo_paint_area *to, double area, bool certain, bool at_centre)
 {
     to->lo += certain ? area : 0;
-    to->value += valued ? area : 0;
+    to->value += at_centre ? area : 0;
     to->hi += area;
 }
 
 /* The result of a layer for a small or decided triangle. */
 typedef struct verdict {
-    bool painted, unpainted; /* the triangle may be painted, unpainted */
+    bool painted, unpainted; /* a point of the triangle may be painted, may be unpainted */
     uint32_t at_centre;      /* stroke at the centre; UINT32_MAX: none */
     uint32_t colour;         /* the first possible colour */
     bool one_colour;         /* this colour is the only possible one */
@@ -182,7 +186,7 @@ static bool area_cut_paints(const area_cut *c, uint32_t stroke)
     return c->keys->p->stroke[stroke].kind == EBPO_PAINT_PAINTS;
 }
 
-/* Evaluates a layer's balls [from, end), stroke by stroke. */
+/* Evaluates a layer's balls [from, end), from the newest stroke to the oldest. */
 static verdict judge_layer(const area_cut *c, const triangle *t, const double centre[3],
                            uint64_t from, uint64_t end)
 {
@@ -200,8 +204,8 @@ static verdict judge_layer(const area_cut *c, const triangle *t, const double ce
             first = false;
         }
     }
-    if (end > from && area_cut_holds(&c->ball[end - 1], t)) { /* the last stroke covers the whole
-                                                               * triangle */
+    if (end > from && area_cut_holds(&c->ball[end - 1], t)) { /* the oldest of these strokes covers
+                                                               * the whole triangle */
         v.unpainted = false;
         for (uint64_t i = from; i < end; i++)
             v.unpainted = v.unpainted || !area_cut_paints(c, c->ball[i].stroke);
@@ -209,16 +213,17 @@ static verdict judge_layer(const area_cut *c, const triangle *t, const double ce
     return v;
 }
 
+/* Adds the result of a layer for a part to the sums of strokes, colours and layers. */
 static void add_layer(area_cut *c, const triangle *t, const verdict *v, uint64_t from, uint64_t end)
 {
     ebpo_paint_area *strokes = c->area, *colours = strokes + c->keys->p->stroke_count,
                     *layers = colours + c->keys->colours;
     bool certain = v->painted && !v->unpainted,
-         valued = v->at_centre != UINT32_MAX && area_cut_paints(c, v->at_centre);
+         at_centre = v->at_centre != UINT32_MAX && area_cut_paints(c, v->at_centre);
     if (!v->painted)
         return;
-    area_cut_add(&layers[c->ball[from].layer], t->area, certain, valued);
-    c->part++;
+    area_cut_add(&layers[c->ball[from].layer], t->area, certain, at_centre);
+    c->visit++;
     for (uint64_t i = from; i < end; i++) {
         uint32_t stroke = c->ball[i].stroke, colour = c->keys->colour[stroke];
         bool again = i > from && c->ball[i - 1].stroke == stroke;
@@ -227,18 +232,19 @@ static void add_layer(area_cut *c, const triangle *t, const verdict *v, uint64_t
         area_cut_add(&strokes[stroke], t->area,
                      certain && c->ball[from].stroke == stroke && c->ball[end - 1].stroke == stroke,
                      v->at_centre == stroke);
-        if (c->seen[colour] == c->part)
+        if (c->last_visit[colour] == c->visit)
             continue;
-        c->seen[colour] = c->part;
+        c->last_visit[colour] = c->visit;
         area_cut_add(&colours[colour], t->area, certain && v->one_colour,
-                     valued && c->keys->colour[v->at_centre] == colour);
+                     at_centre && c->keys->colour[v->at_centre] == colour);
     }
 }
 
+/* Adds a part to the sums. Its balls are at [from, from + count). */
 static void area_cut_account(area_cut *c, const triangle *t, uint64_t from, uint64_t count)
 {
     double centre[3];
-    bool may = false, certain = false, valued = false;
+    bool may = false, certain = false, at_centre = false;
     for (int i = 0; i < 3; i++)
         centre[i] = (t->p[0][i] + t->p[1][i] + t->p[2][i]) / 3;
     for (uint64_t i = from, end; i < from + count; i = end) {
@@ -247,11 +253,11 @@ static void area_cut_account(area_cut *c, const triangle *t, uint64_t from, uint
         verdict v = judge_layer(c, t, (const double *)centre, i, end);
         may = may || v.painted;
         certain = certain || (v.painted && !v.unpainted);
-        valued = valued || (v.at_centre != UINT32_MAX && area_cut_paints(c, v.at_centre));
+        at_centre = at_centre || (v.at_centre != UINT32_MAX && area_cut_paints(c, v.at_centre));
         add_layer(c, t, &v, i, end);
     }
     if (may)
-        area_cut_add(&c->area[area_key_count(c->keys) - 1], t->area, certain, valued);
+        area_cut_add(&c->area[area_key_count(c->keys) - 1], t->area, certain, at_centre);
 }
 
 /* --- cutting --- */
@@ -277,8 +283,8 @@ static bool find_middle(const double a[3], const double b[3], double middle[3])
     return memcmp(middle, a, 3 * sizeof *a) != 0 && memcmp(middle, b, 3 * sizeof *b) != 0;
 }
 
-/* Divides a triangle, whose balls are at [from, from + count). The stack behind them is used for
- * the balls of the parts. */
+/* Divides a triangle, whose balls are at [from, from + count), and adds its parts to the sums. The
+ * stack after these balls is used for the balls of the parts. Returns false without memory. */
 static bool divide_triangle(area_cut *c, const triangle *t, uint64_t from, uint64_t count,
                             int depth)
 {
@@ -306,8 +312,8 @@ static bool divide_triangle(area_cut *c, const triangle *t, uint64_t from, uint6
     return divide_triangle(c, &half, at, kept, depth + 1);
 }
 
-/* Adds a face. Its `count` balls are at cut->ball, ordered by layer, in each layer the last stroke
- * first. Returns false without memory. */
+/* Adds a face. Its `count` balls are the first ones of c->ball, ordered by layer, in each layer
+ * from the newest stroke to the oldest. Returns false without memory. */
 static bool area_cut_face(area_cut *c, const double corner[3][3], uint64_t count)
 {
     triangle t;
@@ -331,12 +337,13 @@ typedef struct measure {
     const ebpo_paint_options *options;
     ebpo_found_faces found_faces;
     hit *hit;
-    uint64_t hit_count, hit_capacity, elsewhere;
-    uint64_t *first; /* [found_faces.count + 1] first hit of each face */
+    uint64_t hit_count, hit_capacity;
+    uint64_t elsewhere; /* number of points whose reach is not completely in this file */
+    uint64_t *first;    /* [found_faces.count + 1] first hit of each face */
     area_keys keys;
     ebpo_paint_colour_area *colour; /* [keys.colours] */
-    uint64_t pieces;
-    ebpo_paint_area *sum; /* [pieces][keys] */
+    uint64_t pieces;                /* number of pieces of work */
+    ebpo_paint_area *sum;           /* [pieces][keys] */
 } measure;
 
 /* --- faces in the reaches --- */
@@ -368,22 +375,22 @@ static ebpo_status find_hits(measure *m, ebpo_context *context, ebpo_error *erro
     ebpo_reach_begin(&reach, context);
     for (uint32_t s = 0; s < p->stroke_count && status == EBPO_OK; s++)
         for (uint32_t i = 0; i < p->stroke[s].count && status == EBPO_OK; i++) {
-            bool here;
+            bool complete;
             uint64_t point = p->stroke[s].first + i;
             if (point % 256 == 0 &&
                 !ebpo_progress_step(&m->options->progress, "reach", point, p->point_count, error))
                 status = EBPO_E_CANCELLED;
             if (status == EBPO_OK)
-                status = ebpo_paint_reach(&reach, p, s, i, &here, error);
-            if (status == EBPO_OK && here)
+                status = ebpo_paint_reach(&reach, p, s, i, &complete, error);
+            if (status == EBPO_OK && complete)
                 status = add_point(m, &reach, s, (uint32_t)point, error);
-            m->elsewhere += status == EBPO_OK && !here;
+            m->elsewhere += status == EBPO_OK && !complete;
         }
     ebpo_reach_end(&reach);
     return status;
 }
 
-/* Orders by face, then layer, the last stroke first. */
+/* Orders by face, then layer, then from the newest stroke to the oldest. */
 static int by_face(const void *a, const void *b)
 {
     const hit *x = a, *y = b;
@@ -423,7 +430,8 @@ static ebpo_paint_colour_area colour_of(const ebpo_stroke_held *s)
     return (ebpo_paint_colour_area){ .layer = s->layer, .colour = ebpo_paint_pack(s->rgba) };
 }
 
-/* Finds the colours of strokes that paint (not of those that erase), each once for its layer. */
+/* Finds the colours of strokes that paint (not of those that erase), each colour once for each
+ * layer. */
 static ebpo_status find_colours(measure *m, ebpo_error *error)
 {
     const ebpo_paint *p = m->p;
@@ -474,15 +482,14 @@ static ebpo_status measure_pieces(void *context, uint64_t begin, uint64_t end, u
     area_cut cut;
     uint64_t faces = m->found_faces.count, keys = area_key_count(&m->keys);
     (void)worker;
-    bool fine = area_cut_begin(&cut, &m->keys, m->options->fineness);
-    for (uint64_t piece = begin; piece < end && fine; piece++) {
+    bool ok = area_cut_begin(&cut, &m->keys, m->options->fineness);
+    for (uint64_t piece = begin; piece < end && ok; piece++) {
         cut.area = m->sum + piece * keys;
-        for (uint64_t f = faces * piece / m->pieces; f < faces * (piece + 1) / m->pieces && fine;
-             f++)
-            fine = measure_face(m, &cut, f);
+        for (uint64_t f = faces * piece / m->pieces; f < faces * (piece + 1) / m->pieces && ok; f++)
+            ok = measure_face(m, &cut, f);
     }
     area_cut_end(&cut);
-    return fine ? EBPO_OK : ebpo_fail_memory(error, cut.ball_capacity * sizeof *cut.ball);
+    return ok ? EBPO_OK : ebpo_fail_memory(error, cut.ball_capacity * sizeof *cut.ball);
 }
 
 static ebpo_status measure_all(measure *m, ebpo_error *error)
@@ -516,7 +523,7 @@ static ebpo_paint_area *copy_areas(const ebpo_paint_area *from, uint64_t count)
     return to;
 }
 
-static ebpo_status measure_give(measure *m, ebpo_paint_areas *out, ebpo_error *error)
+static ebpo_status pass_areas(measure *m, ebpo_paint_areas *out, ebpo_error *error)
 {
     const ebpo_paint_area *strokes = m->sum, *colours = strokes + m->p->stroke_count,
                           *layers = colours + m->keys.colours;
@@ -575,7 +582,7 @@ ebpo_status ebpo_paint_measure(const ebpo_paint *p, ebpo_context *context,
     if (status == EBPO_OK)
         status = measure_all(&m, error);
     if (status == EBPO_OK)
-        status = measure_give(&m, out, error);
+        status = pass_areas(&m, out, error);
     ebpo_found_faces_free(&m.found_faces);
     free(m.hit);
     free(m.first);

@@ -65,7 +65,9 @@ static uint8_t *member_of(const ebpo_paint *p, const ebpo_paint_column *c, uint6
     return rows + row * (c->of_points ? sizeof *p->point : sizeof *p->stroke) + c->offset;
 }
 
-static void take_value(const uint8_t *from, unsigned bytes, uint8_t *to)
+/* Copies a number of 1, 2, 4 or 8 bytes, and swaps its bytes on a big-endian machine. So it
+ * converts from the file's order to that of memory and back. */
+static void convert_value(const uint8_t *from, unsigned bytes, uint8_t *to)
 {
     const uint16_t two = bytes == 2 ? ebpo_load16(from) : 0;
     const uint32_t four = bytes == 4 ? ebpo_load32(from) : 0;
@@ -81,19 +83,18 @@ static void take_value(const uint8_t *from, unsigned bytes, uint8_t *to)
 static unsigned values_of(const ebpo_paint_column *c) { return c->cols ? c->cols : 1; }
 
 /* Copies consecutive rows from the bytes of a file to members. */
-static void take_column(ebpo_paint *p, const ebpo_paint_column *c, const uint8_t *bytes)
+static void convert_column(ebpo_paint *p, const ebpo_paint_column *c, const uint8_t *bytes)
 {
     for (uint64_t row = 0; row < ebpo_paint_column_rows(p, c); row++)
         for (unsigned k = 0; k < values_of(c); k++, bytes += c->element)
-            take_value(bytes, c->element, member_of(p, c, row) + k * c->element);
+            convert_value(bytes, c->element, member_of(p, c, row) + k * c->element);
 }
 
-/* Writes members to the bytes of a column; swapping bytes is its own inverse. */
-void ebpo_paint_column_give(const ebpo_paint *p, const ebpo_paint_column *c, uint8_t *bytes)
+void ebpo_paint_column_write(const ebpo_paint *p, const ebpo_paint_column *c, uint8_t *bytes)
 {
     for (uint64_t row = 0; row < ebpo_paint_column_rows(p, c); row++)
         for (unsigned k = 0; k < values_of(c); k++, bytes += c->element)
-            take_value(member_of(p, c, row) + k * c->element, c->element, bytes);
+            convert_value(member_of(p, c, row) + k * c->element, c->element, bytes);
 }
 
 /* --- reading --- */
@@ -106,7 +107,7 @@ typedef struct reader {
     char text[EBPO_PAINT_TEXT_MAX + 1];
 } reader;
 
-static ebpo_status open_wrong(const reader *r, const char *path, const char *what,
+static ebpo_status fail_wrong(const reader *r, const char *path, const char *what,
                               ebpo_error *error)
 {
     return ebpo_fail_at(error, EBPO_E_FORMAT, r->input.shown, path, -1,
@@ -115,21 +116,22 @@ static ebpo_status open_wrong(const reader *r, const char *path, const char *wha
 
 /* --- attributes --- */
 
-static ebpo_status open_missing(const reader *r, const char *path, const char *name,
+static ebpo_status fail_missing(const reader *r, const char *path, const char *name,
                                 ebpo_error *error)
 {
     char what[80];
     snprintf(what, sizeof what, "attribute %s is missing", name);
-    return open_wrong(r, path, what, error);
+    return fail_wrong(r, path, what, error);
 }
 
-/* Reads a text of less than `size` bytes. */
+/* Reads a text of less than `size` bytes. If the attribute is missing and not `required`, *out does
+ * not change. */
 static ebpo_status get_text(reader *r, ebpo_head_object object, const char *path, const char *name,
                             bool required, char *out, size_t size, ebpo_error *error)
 {
     ebpo_status status = ebpo_head_get_text(&r->head, object, path, name, out, size, error);
     if (status == EBPO_E_ABSENT)
-        status = required ? open_missing(r, path, name, error) : EBPO_OK;
+        status = required ? fail_missing(r, path, name, error) : EBPO_OK;
     return status;
 }
 
@@ -139,14 +141,14 @@ static ebpo_status get_count(reader *r, ebpo_head_object object, const char *pat
     char what[96];
     ebpo_status status = ebpo_head_get_count(&r->head, object, path, name, out, error);
     if (status == EBPO_E_ABSENT)
-        return open_missing(r, path, name, error);
+        return fail_missing(r, path, name, error);
     if (status != EBPO_OK || *out <= most)
         return status;
     snprintf(what, sizeof what, "attribute %s is above %" PRIu64, name, most);
-    return open_wrong(r, path, what, error);
+    return fail_wrong(r, path, what, error);
 }
 
-/* Checks first that the file is a paint file. */
+/* Checks that the file is a paint file of a version that this library reads. */
 static ebpo_status check_paint_file(reader *r, ebpo_head_object root, ebpo_error *error)
 {
     char format[64];
@@ -162,7 +164,7 @@ static ebpo_status check_paint_file(reader *r, ebpo_head_object root, ebpo_error
     if (status == EBPO_OK)
         status = ebpo_head_get_int(&r->head, root, "/", "format_version_minor", &minor, error);
     if (status == EBPO_E_ABSENT)
-        return open_missing(r, "/", "format_version", error);
+        return fail_missing(r, "/", "format_version", error);
     if (status == EBPO_OK && major != EBPO_PAINT_FORMAT_MAJOR)
         return ebpo_fail_file(error, EBPO_E_VERSION, r->input.shown,
                               "the paint file has version %" PRId64
@@ -170,7 +172,7 @@ static ebpo_status check_paint_file(reader *r, ebpo_head_object root, ebpo_error
                               "version %d; use a newer program",
                               major, EBPO_PAINT_FORMAT_MAJOR);
     if (status == EBPO_OK && (minor < 0 || minor > EBPO_PAINT_MINOR_MAX))
-        return open_wrong(r, "/", "attribute format_version_minor is out of range", error);
+        return fail_wrong(r, "/", "attribute format_version_minor is out of range", error);
     return status;
 }
 
@@ -189,7 +191,7 @@ static ebpo_status read_names(reader *r, ebpo_head_object root, ebpo_error *erro
         status = get_text(r, root, "/", "model_sha256", true, p->model_sha256,
                           sizeof p->model_sha256, error);
     if (status == EBPO_OK && !is_digest(p->model_sha256))
-        return open_wrong(r, "/", "attribute model_sha256 is not 64 digits 0-9 a-f", error);
+        return fail_wrong(r, "/", "attribute model_sha256 is not 64 digits 0-9 a-f", error);
     if (status == EBPO_OK)
         status =
             get_text(r, root, "/", "model_name", false, p->model_name, sizeof p->model_name, error);
@@ -202,7 +204,7 @@ static ebpo_status read_names(reader *r, ebpo_head_object root, ebpo_error *erro
     p->source_numbers = strcmp(numbers, "source") == 0;
     return p->source_numbers || strcmp(numbers, "file") == 0
                ? EBPO_OK
-               : open_wrong(r, "/", "attribute face_numbers is neither 'source' nor 'file'", error);
+               : fail_wrong(r, "/", "attribute face_numbers is neither 'source' nor 'file'", error);
 }
 
 static ebpo_status read_texts(reader *r, ebpo_head_object group, const char *path,
@@ -211,12 +213,12 @@ static ebpo_status read_texts(reader *r, ebpo_head_object group, const char *pat
 {
     for (int i = 0; i < EBPO_PAINT_TEXTS; i++) {
         ebpo_status status =
-            get_text(r, group, path, kinds[i].name, true, r->text, kinds[i].most + 1, error);
+            get_text(r, group, path, kinds[i].name, true, r->text, kinds[i].max_bytes + 1, error);
         if (status != EBPO_OK)
             return status;
         r->text_bytes += strlen(r->text);
         if (r->text_bytes > r->input.source.size)
-            return open_wrong(r, path,
+            return fail_wrong(r, path,
                               "the texts have more bytes than the file: groups share "
                               "objects",
                               error);
@@ -260,7 +262,7 @@ static ebpo_status read_note_place(reader *r, ebpo_head_object group, const char
     if (status == EBPO_OK)
         status = ebpo_head_get_real(&r->head, group, path, "place", n->at.place, 3, error);
     if (status == EBPO_E_ABSENT)
-        return open_missing(r, path, "weights or place", error);
+        return fail_missing(r, path, "weights or place", error);
     if (status != EBPO_OK)
         return status;
     n->at.face = (uint32_t)face;
@@ -268,11 +270,11 @@ static ebpo_status read_note_place(reader *r, ebpo_head_object group, const char
     for (int i = 0; i < 2; i++) {
         if (!(weights[i] >= 0 && weights[i] <= EBPO_PAINT_WEIGHTS) ||
             (double)(uint32_t)weights[i] != weights[i])
-            return open_wrong(r, path, "attribute weights must be integers from 0 to 2^30", error);
+            return fail_wrong(r, path, "attribute weights must be integers from 0 to 2^30", error);
         n->at.weight[i] = (uint32_t)weights[i];
     }
     const char *what = ebpo_paint_point_wrong(&n->at);
-    return what ? open_wrong(r, path, what, error) : EBPO_OK;
+    return what ? fail_wrong(r, path, what, error) : EBPO_OK;
 }
 
 static ebpo_status read_note(reader *r, uint64_t number, ebpo_error *error)
@@ -287,13 +289,13 @@ static ebpo_status read_note(reader *r, uint64_t number, ebpo_error *error)
     if (status == EBPO_OK)
         status = get_count(r, group, path, "layer", EBPO_PAINT_LAYERS, &n->layer, error);
     if (status == EBPO_OK && n->layer >= r->p->layer_count)
-        return open_wrong(r, path, "attribute layer is the number of a layer that does not exist",
+        return fail_wrong(r, path, "attribute layer is the number of a layer that does not exist",
                           error);
     return status == EBPO_OK ? read_note_place(r, group, path, n, error) : status;
 }
 
-/* Allocates labels with empty texts. The counts grow as labels are read, so that a failure frees
- * the right ones. */
+/* Reads layers and notes. p->layer_count and p->note_count grow with each one, so that after a
+ * failure exactly those are freed whose texts have been allocated. */
 static ebpo_status read_labels(reader *r, uint64_t layers, uint64_t notes, ebpo_error *error)
 {
     ebpo_paint *p = r->p;
@@ -321,8 +323,8 @@ static ebpo_status read_labels(reader *r, uint64_t layers, uint64_t notes, ebpo_
 
 /* --- strokes and points --- */
 
-/* Finds the array's bytes. They are within the file, so the file's size bounds the memory that is
- * allocated for them. */
+/* Finds the offset and the number of bytes of a column's only chunk, and checks the array's shape.
+ * The chunk is within the file, so the file's size bounds the memory that is allocated for it. */
 static ebpo_status find_column(reader *r, const ebpo_paint_column *c, uint64_t rows,
                                ebpo_chunk_location *place, ebpo_error *error)
 {
@@ -339,12 +341,12 @@ static ebpo_status find_column(reader *r, const ebpo_paint_column *c, uint64_t r
         *place = chunks[0];
     free(chunks);
     if (!same)
-        return open_wrong(r, c->path,
+        return fail_wrong(r, c->path,
                           "the array does not have the type, shape and filter of the format",
                           error);
     return place->bytes == rows * ebpo_shape_row_bytes(&expected) + 4
                ? EBPO_OK
-               : open_wrong(r, c->path, "the size of the chunk does not match its rows", error);
+               : fail_wrong(r, c->path, "the size of the chunk does not match its rows", error);
 }
 
 static ebpo_status read_column(reader *r, const ebpo_paint_column *c, ebpo_error *error)
@@ -363,9 +365,9 @@ static ebpo_status read_column(reader *r, const ebpo_paint_column *c, ebpo_error
     size_t count = place.bytes - 4;
     if (status == EBPO_OK &&
         ebpo_sum_differs(ebpo_load32(bytes + count), ebpo_fletcher32(bytes, count)))
-        status = open_wrong(r, c->path, "the chunk is damaged: its checksum differs", error);
+        status = fail_wrong(r, c->path, "the chunk is damaged: its checksum differs", error);
     if (status == EBPO_OK)
-        take_column(r->p, c, bytes);
+        convert_column(r->p, c, bytes);
     free(bytes);
     return status;
 }
@@ -377,23 +379,23 @@ static ebpo_status check_strokes(reader *r, ebpo_error *error)
     for (uint64_t i = 0; i < p->stroke_count; i++) {
         const char *what = ebpo_paint_stroke_wrong(&p->stroke[i], p->layer_count);
         if (what)
-            return open_wrong(r, "/strokes", what, error);
+            return fail_wrong(r, "/strokes", what, error);
         p->stroke[i].first = sum;
         sum += p->stroke[i].count;
     }
     if (sum != p->point_count)
-        return open_wrong(r, "/strokes/points",
+        return fail_wrong(r, "/strokes/points",
                           "the sum of the strokes' point counts differs from the number of points",
                           error);
     for (uint64_t i = 0; i < p->point_count; i++) {
         const char *what = ebpo_paint_point_wrong(&p->point[i]);
         if (what)
-            return open_wrong(r, "/points", what, error);
+            return fail_wrong(r, "/points", what, error);
     }
     return EBPO_OK;
 }
 
-/* Reads strokes and points. All arrays are examined before memory is allocated for rows. */
+/* Reads strokes and points. All arrays are checked before memory is allocated for rows. */
 static ebpo_status read_strokes(reader *r, uint64_t strokes, uint64_t points, ebpo_error *error)
 {
     ebpo_paint *p = r->p;
@@ -441,7 +443,7 @@ static ebpo_status read_all(reader *r, ebpo_error *error)
     return status == EBPO_OK ? read_strokes(r, strokes, points, error) : status;
 }
 
-/* Stores which file, and which version of it, was read. */
+/* Stores which file, and which version of it, is read. */
 static ebpo_status keep_version(const reader *r, ebpo_error *error)
 {
     ebpo_paint_file *f = r->p->file;
@@ -449,7 +451,7 @@ static ebpo_status keep_version(const reader *r, ebpo_error *error)
     char *path = fd >= 0 ? realpath(r->input.shown, NULL) : NULL;
     if (fd >= 0 && !path && errno == ENOMEM)
         return ebpo_fail_memory(error, strlen(r->input.shown));
-    if (!path) /* no memory, or the file has been removed */
+    if (!path) /* the source is not a file, or the file has been removed */
         return EBPO_OK;
     f->path = path;
     f->fd = fcntl(fd, F_DUPFD_CLOEXEC, 3);
@@ -459,7 +461,7 @@ static ebpo_status keep_version(const reader *r, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Opens a source and takes ownership of it. */
+/* Reads a paint from a source, and takes ownership of the source. */
 static ebpo_status open_source(const ebpo_source *source, const char *name, ebpo_paint **out,
                                ebpo_error *error)
 {
@@ -502,8 +504,8 @@ ebpo_status ebpo_paint_open(const char *path, ebpo_paint **out, ebpo_error *erro
     return open_path(path, out, error);
 }
 
-/* Makes the paint of a file that does not exist. Stores the path, so that saving fails if another
- * program has made a file there meanwhile. */
+/* Makes a paint for a file that does not exist. Stores the path, so that saving fails if another
+ * program makes a file there in the meantime. */
 static ebpo_status make_new_paint(const char *path, const ebpo_file *model, ebpo_paint **out,
                                   ebpo_error *error)
 {

@@ -8,7 +8,7 @@
 
 typedef struct ebpo_paint_column {
     const char *path;
-    uint8_t element; /* bytes of an element, as in memory */
+    uint8_t element; /* bytes of an element, in the file and in memory */
     uint8_t cols;    /* number of columns; 0: the array has one dimension */
     bool of_points;  /* true: a column of points, false: of strokes */
     size_t offset;   /* offset of the member in its struct */
@@ -22,10 +22,11 @@ static inline uint64_t ebpo_paint_column_rows(const ebpo_paint *p, const ebpo_pa
     return c->of_points ? p->point_count : p->stroke_count;
 }
 
-/* Returns the shape of an array: all rows in one chunk; rows > 0. */
+/* Returns the shape of the array of a column with `rows` rows, above 0, in one chunk. */
 ebpo_shape ebpo_paint_column_shape(const ebpo_paint_column *column, uint64_t rows);
 
-void ebpo_paint_column_give(const ebpo_paint *paint, const ebpo_paint_column *column,
-                            uint8_t *bytes);
+/* Writes all rows of a column to bytes[rows][cols or 1] as they are stored in the file. */
+void ebpo_paint_column_write(const ebpo_paint *paint, const ebpo_paint_column *column,
+                             uint8_t *bytes);
 
 #endif

@@ -1,4 +1,4 @@
-/* The content of a paint. */
+/* The content of a paint, and functions that the files of lib/extras/paint share. */
 #ifndef EBPO_PAINT_PAINT_PARTS_H
 #define EBPO_PAINT_PAINT_PARTS_H
 
@@ -16,8 +16,8 @@ enum {
     EBPO_PAINT_FORMAT_MAJOR = 1,
     EBPO_PAINT_FORMAT_MINOR = 0,
     EBPO_PAINT_MINOR_MAX = 1 << 20,
-    EBPO_PAINT_WEIGHTS = 1 << 30, /* sum of all three weights */
-    EBPO_PAINT_FULL = 1 << 15     /* full size of a point */
+    EBPO_PAINT_WEIGHTS = 1 << 30, /* sum of all three weights of a point */
+    EBPO_PAINT_FULL = 1 << 15     /* size of a point whose radius is that of its stroke */
 };
 #define EBPO_PAINT_TIME_MAX (UINT64_C(1) << 53)
 
@@ -27,7 +27,7 @@ enum { EBPO_PAINT_TITLE, EBPO_PAINT_AUTHOR, EBPO_PAINT_DATE, EBPO_PAINT_BODY, EB
 /* A kind of text: the attribute's name, and its maximum number of bytes. */
 typedef struct ebpo_paint_text_kind {
     const char *name;
-    size_t most;
+    size_t max_bytes;
 } ebpo_paint_text_kind;
 extern const ebpo_paint_text_kind ebpo_paint_layer_texts[EBPO_PAINT_TEXTS];
 extern const ebpo_paint_text_kind ebpo_paint_note_texts[EBPO_PAINT_TEXTS];
@@ -59,13 +59,13 @@ typedef struct ebpo_paint_file {
     int fd;                /* keeps the file open, so that no later file gets the same inode; -1: no
                             * file */
     ebpo_file_version version;
-    ebpo_file_lock lock; /* held while the paint is open for changes */
+    ebpo_file_lock lock; /* held from ebpo_paint_open_to_change until the paint is saved or freed */
 } ebpo_paint_file;
 
 struct ebpo_paint {
     ebpo_paint_file *file;
     char generator[64], model_sha256[65], model_name[256], unit[32];
-    bool source_numbers;
+    bool source_numbers; /* faces have their indices in the source; otherwise in the file */
     ebpo_layer_held *layer;
     ebpo_note_held *note;
     ebpo_stroke_held *stroke;
@@ -86,7 +86,8 @@ static inline double ebpo_paint_radius(const ebpo_stroke_held *stroke,
     return stroke->radius * point->size * 0x1p-15;
 }
 
-/* Returns a text that says what is wrong with the point, or NULL. */
+/* Return a message about an invalid point or stroke; NULL: it is valid. layers: number of layers.
+ */
 const char *ebpo_paint_point_wrong(const ebpo_paint_point *point);
 const char *ebpo_paint_stroke_wrong(const ebpo_stroke_held *stroke, uint64_t layers);
 
@@ -96,8 +97,8 @@ bool ebpo_paint_texts_begin(char *text[EBPO_PAINT_TEXTS]);
 /* Returns an empty paint, without a file; NULL if memory is short. */
 ebpo_paint *ebpo_paint_begin(void);
 
-/* Returns EBPO_E_ARGUMENT when the context is of another model, or of one whose coordinates are too
- * large. */
+/* Checks that the context is of the paint's model (otherwise EBPO_E_ARGUMENT or EBPO_E_ABSENT), and
+ * that the model's coordinates are not too large (otherwise EBPO_E_UNSUPPORTED). */
 EBPO_MUST_USE ebpo_status ebpo_paint_check_context(const ebpo_paint *paint,
                                                    const ebpo_context *context, ebpo_error *error);
 

@@ -45,7 +45,7 @@ void ebpo_reach_end(ebpo_reach *r)
 
 /* --- faces around the ball --- */
 
-static bool reach_take(void *user, const ebpo_triangles *t)
+static bool take_triangles(void *user, const ebpo_triangles *t)
 {
     ebpo_reach *r = user;
     r->too_many = r->count + t->count > FACES_MAX;
@@ -66,8 +66,9 @@ static int by_number(const void *a, const void *b)
     return (x->file_face > y->file_face) - (x->file_face < y->file_face);
 }
 
-/* Gathers faces around a slightly larger ball, because the ball's bounds are rounded here. */
-static ebpo_status reach_gather(ebpo_reach *r, const ebpo_reach_ball *ball, ebpo_error *error)
+/* Gathers the faces around a slightly larger ball, because the bounds of the box are rounded, and
+ * sorts them in the order of the file. */
+static ebpo_status gather_faces(ebpo_reach *r, const ebpo_reach_ball *ball, ebpo_error *error)
 {
     double min[3], max[3], wide = fmax(ball->radius, r->tolerance) * (1 + 0x1p-40);
     for (int i = 0; i < 3; i++) {
@@ -76,7 +77,7 @@ static ebpo_status reach_gather(ebpo_reach *r, const ebpo_reach_ball *ball, ebpo
     }
     r->count = 0;
     r->too_many = r->short_of_memory = false;
-    ebpo_status status = ebpo_triangles_in_box(r->context, min, max, reach_take, r, error);
+    ebpo_status status = ebpo_triangles_in_box(r->context, min, max, take_triangles, r, error);
     if (status == EBPO_OK && r->too_many)
         status = ebpo_fail(error, EBPO_E_LIMIT,
                            "the ball of a point intersects more than %d faces; use a smaller "
@@ -84,7 +85,7 @@ static ebpo_status reach_gather(ebpo_reach *r, const ebpo_reach_ball *ball, ebpo
                            FACES_MAX);
     if (status == EBPO_OK && r->short_of_memory)
         status = ebpo_fail_memory(error, (r->count + EBPO_TRIANGLES_MAX) * sizeof *r->face);
-    if (status == EBPO_OK && r->count) /* a position that is far from all faces has no reach */
+    if (status == EBPO_OK && r->count) /* 0: the position is far from all faces */
         qsort(r->face, r->count, sizeof *r->face, by_number);
     return status;
 }
@@ -106,7 +107,7 @@ static bool same_position(const double a[3], const double b[3])
     return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
 }
 
-/* Makes an empty table for `count` keys. */
+/* Makes an empty hash table for `count` keys. Returns false without memory. */
 static bool clear_slots(ebpo_reach *r, uint64_t count)
 {
     r->slots = ebpo_hash_slots(2 * count);
@@ -116,6 +117,7 @@ static bool clear_slots(ebpo_reach *r, uint64_t count)
     return true;
 }
 
+/* Finds the different positions of the faces' corners. */
 static void find_positions(ebpo_reach *r, const ebpo_reach_ball *ball)
 {
     double square = ball->radius * ball->radius;
@@ -145,6 +147,7 @@ static bool comes_first(const double a[3], const double b[3])
     return true;
 }
 
+/* Returns true if the segment pq intersects the ball; the same for pq and qp. */
 static bool segment_within(const ebpo_reach_ball *ball, const double p[3], const double q[3])
 {
     const double *a = comes_first(p, q) ? p : q, *b = a == p ? q : p;
@@ -165,6 +168,7 @@ static bool segment_within(const ebpo_reach_ball *ball, const double p[3], const
 
 /* --- sets --- */
 
+/* Returns the representative of the set of member i, and shortens the path to it. */
 static uint32_t set_of(ebpo_reach *r, uint32_t i)
 {
     while (r->root[i] != i) {
@@ -174,7 +178,7 @@ static uint32_t set_of(ebpo_reach *r, uint32_t i)
     return i;
 }
 
-static void reach_join(ebpo_reach *r, uint64_t a, uint64_t b)
+static void join_sets(ebpo_reach *r, uint64_t a, uint64_t b)
 {
     uint32_t x = set_of(r, (uint32_t)a), y = set_of(r, (uint32_t)b);
     if (x < y)
@@ -183,16 +187,16 @@ static void reach_join(ebpo_reach *r, uint64_t a, uint64_t b)
         r->root[x] = y;
 }
 
-/* Joins faces at corners. In the sets, faces come first, then positions, then edges. */
+/* Joins the sets of faces that share a corner within the ball. */
 static void join_at_corners(ebpo_reach *r)
 {
     for (uint64_t i = 0; i < 3 * r->count; i++)
         if (r->face[i / 3].within[i % 3])
-            reach_join(r, i / 3, r->count + r->face[i / 3].at[i % 3]);
+            join_sets(r, i / 3, r->count + r->face[i / 3].at[i % 3]);
 }
 
-/* Joins faces at edges. If an end of an edge is within the ball, that corner has joined the faces
- * already. */
+/* Joins the sets of faces that share an edge that intersects the ball. If an end of the edge is
+ * within the ball, that corner has joined the faces already. */
 static void join_at_edges(ebpo_reach *r, const ebpo_reach_ball *ball)
 {
     uint64_t first = r->count + r->position_count, at;
@@ -212,7 +216,7 @@ static void join_at_edges(ebpo_reach *r, const ebpo_reach_ball *ball)
             r->edge[r->edge_count++] = e;
             r->slot[at] = (uint32_t)r->edge_count;
         }
-        reach_join(r, i / 3, first + r->slot[at] - 1);
+        join_sets(r, i / 3, first + r->slot[at] - 1);
     }
 }
 
@@ -228,6 +232,7 @@ static bool reserve_space(ebpo_reach *r)
     return clear_slots(r, corners);
 }
 
+/* Keeps only the faces in the set of the point's face. */
 static void keep_reach(ebpo_reach *r)
 {
     uint32_t set = set_of(r, (uint32_t)r->own);
@@ -261,23 +266,23 @@ static ebpo_status fail_place(const ebpo_reach *r, uint64_t face, ebpo_error *er
                           (unsigned long long)face);
 }
 
-/* Gathers the faces around the ball, and finds the given face among them. *on: the position is on
- * that face. */
-static ebpo_status find_face(ebpo_reach *r, const ebpo_reach_ball *ball, bool *here, bool *on,
+/* Gathers the faces around the ball, and finds the ball's face among them. *on: the centre is on
+ * that face. *complete: as in ebpo_reach_find. */
+static ebpo_status find_face(ebpo_reach *r, const ebpo_reach_ball *ball, bool *complete, bool *on,
                              ebpo_error *error)
 {
     const bool subset = r->context->model->info->pruned;
     ebpo_face_near near;
     ebpo_error cause = EBPO_ERROR_INIT;
-    *here = *on = false;
-    ebpo_status status = reach_gather(r, ball, &cause);
-    if (status == EBPO_E_ABSENT && subset) /* connectivity in the omitted part is unknown */
+    *complete = *on = false;
+    ebpo_status status = gather_faces(r, ball, &cause);
+    if (status == EBPO_E_ABSENT && subset) /* the connectivity of omitted faces is unknown */
         return EBPO_OK;
     if (status != EBPO_OK)
         return ebpo_fail_with(error, &cause);
-    bool found = find_own(r, ball->face);
-    *here = found || !subset;
-    if (!found)
+    bool found_reach = find_own(r, ball->face);
+    *complete = found_reach || !subset;
+    if (!found_reach)
         return EBPO_OK;
     ebpo_face_nearest(ball->place, (const double(*)[3])r->face[r->own].corner, &near);
     *on = near.distance <= r->tolerance;
@@ -288,21 +293,21 @@ ebpo_status ebpo_reach_check(ebpo_reach *r, const double place[3], uint64_t face
                              ebpo_error *error)
 {
     const ebpo_reach_ball ball = { { place[0], place[1], place[2] }, 0, face };
-    bool here, on;
-    ebpo_status status = find_face(r, &ball, &here, &on, error);
-    *fits = on || !here;
+    bool complete, on;
+    ebpo_status status = find_face(r, &ball, &complete, &on, error);
+    *fits = on || !complete;
     return status;
 }
 
-ebpo_status ebpo_reach_find(ebpo_reach *r, const ebpo_reach_ball *ball, bool *here,
+ebpo_status ebpo_reach_find(ebpo_reach *r, const ebpo_reach_ball *ball, bool *complete,
                             ebpo_error *error)
 {
     bool on;
-    ebpo_status status = find_face(r, ball, here, &on, error);
-    if (status != EBPO_OK || !*here)
+    ebpo_status status = find_face(r, ball, complete, &on, error);
+    if (status != EBPO_OK || !*complete)
         return status;
     if (!on) {
-        *here = false;
+        *complete = false;
         return fail_place(r, ball->face, error);
     }
     if (!reserve_space(r))
@@ -315,7 +320,7 @@ ebpo_status ebpo_reach_find(ebpo_reach *r, const ebpo_reach_ball *ball, bool *he
     return EBPO_OK;
 }
 
-static uint64_t found_faces_find(const ebpo_found_faces *found_faces, uint64_t file_face)
+static uint64_t find_slot(const ebpo_found_faces *found_faces, uint64_t file_face)
 {
     uint64_t at;
     EBPO_HASH_FIND(at, ebpo_hash_number(file_face), found_faces->slots - 1,
@@ -324,7 +329,7 @@ static uint64_t found_faces_find(const ebpo_found_faces *found_faces, uint64_t f
     return at;
 }
 
-/* Doubles the slots, and inserts all faces again. */
+/* Makes a larger hash table, and inserts all faces again. */
 static bool grow_slots(ebpo_found_faces *found_faces)
 {
     uint64_t slots = ebpo_hash_slots(4 * (found_faces->count + 1));
@@ -335,7 +340,7 @@ static bool grow_slots(ebpo_found_faces *found_faces)
     found_faces->slot = slot;
     found_faces->slots = slots;
     for (uint64_t i = 0; i < found_faces->count; i++)
-        slot[found_faces_find(found_faces, found_faces->face[i].file_face)] = (uint32_t)i + 1;
+        slot[find_slot(found_faces, found_faces->face[i].file_face)] = (uint32_t)i + 1;
     return true;
 }
 
@@ -344,7 +349,7 @@ ebpo_status ebpo_found_faces_add(ebpo_found_faces *found_faces, const ebpo_reach
 {
     if (2 * (found_faces->count + 1) > found_faces->slots && !grow_slots(found_faces))
         return ebpo_fail_memory(error, 4 * found_faces->count * sizeof *found_faces->slot);
-    uint64_t at = found_faces_find(found_faces, face->file_face);
+    uint64_t at = find_slot(found_faces, face->file_face);
     if (found_faces->slot[at] == 0) {
         if (found_faces->count == UINT32_MAX - 1)
             return ebpo_fail(error, EBPO_E_LIMIT, "strokes reach more than 2^32 - 2 faces");
@@ -369,32 +374,34 @@ void ebpo_found_faces_free(ebpo_found_faces *found_faces)
 
 /* --- many points --- */
 
-/* Number of points that are evaluated together, unless they already reach too many faces. */
-enum { TOGETHER = 1024, FACES_TOGETHER = 1 << 20, GRAIN = 8 };
+/* A batch has up to BATCH_POINTS points; it ends early when these reach more than BATCH_FACES
+ * faces. A thread takes GRAIN points at a time. */
+enum { BATCH_POINTS = 1024, BATCH_FACES = 1 << 20, GRAIN = 8 };
 
-/* Part of the budget that each thread needs. With less, a thread would load data that another
- * thread has just dropped. */
-enum { THREAD_CAPACITY = 1 << 20 };
+/* Bytes of the memory budget that each thread needs. With less, a thread would load data that
+ * another thread has just dropped. */
+enum { THREAD_BYTES = 1 << 20 };
 
-typedef struct found {
+/* The reach of a point of the batch. done: it has been found; complete: as in ebpo_reached. */
+typedef struct found_reach {
     ebpo_reached_face *face;
     uint64_t count, capacity;
-    bool done, here;
-} found;
+    bool done, complete;
+} found_reach;
 
 struct ebpo_reacher {
     const ebpo_paint *p;
     unsigned threads;
     ebpo_reach *reach; /* one reach for each worker */
-    found found[TOGETHER];
+    found_reach found[BATCH_POINTS];
     uint32_t stroke, first, count; /* the points of the current batch */
-    atomic_uint_least64_t faces;
+    atomic_uint_least64_t faces;   /* number of faces in the reaches of the batch */
 };
 
-static ebpo_status reached_keep(found *f, const ebpo_reach *reach, ebpo_error *error)
+static ebpo_status keep_reached(found_reach *f, const ebpo_reach *reach, ebpo_error *error)
 {
     f->count = 0;
-    if (!f->here)
+    if (!f->complete)
         return EBPO_OK;
     if (!ebpo_grow(&f->face, &f->capacity, reach->count, sizeof *f->face))
         return ebpo_fail_memory(error, reach->count * sizeof *f->face);
@@ -406,40 +413,42 @@ static ebpo_status reached_keep(found *f, const ebpo_reach *reach, ebpo_error *e
     return EBPO_OK;
 }
 
-/* Evaluates some points. If there are too many faces, further points are skipped; they are
- * requested again later. The first point is never skipped. */
-static ebpo_status find_some(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                             ebpo_error *error)
+/* Finds the reaches of the points [begin, end) of the batch. If there are too many faces, further
+ * points are skipped, and a later batch evaluates them. The first point is never skipped. */
+static ebpo_status find_batch_reaches(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                      ebpo_error *error)
 {
     ebpo_reacher *r = context;
     ebpo_reach *reach = &r->reach[worker];
     ebpo_status status = EBPO_OK;
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
-        found *f = &r->found[i];
-        if (i > 0 && atomic_load(&r->faces) > FACES_TOGETHER)
+        found_reach *f = &r->found[i];
+        if (i > 0 && atomic_load(&r->faces) > BATCH_FACES)
             break;
-        status = ebpo_paint_reach(reach, r->p, r->stroke, r->first + (uint32_t)i, &f->here, error);
+        status =
+            ebpo_paint_reach(reach, r->p, r->stroke, r->first + (uint32_t)i, &f->complete, error);
         if (status == EBPO_OK)
-            status = reached_keep(f, reach, error);
+            status = keep_reached(f, reach, error);
         atomic_fetch_add(&r->faces, f->count);
         f->done = status == EBPO_OK;
     }
-    ebpo_context_let_go(
-        reach->context); /* a waiting thread must not hold memory that others need */
+    /* a thread that waits for work must not hold memory that others need */
+    ebpo_context_let_go(reach->context);
     return status;
 }
 
-/* Begins a batch. Frees large reaches first, so that the memory of all reaches is bounded. */
+/* Begins a batch at point i of a stroke. Frees large reaches first, so that the memory of all
+ * reaches is bounded. */
 static void begin_batch(ebpo_reacher *r, uint32_t stroke, uint32_t i)
 {
     uint32_t left = r->p->stroke[stroke].count - i;
     r->stroke = stroke;
     r->first = i;
-    r->count = left < TOGETHER ? left : TOGETHER;
+    r->count = left < BATCH_POINTS ? left : BATCH_POINTS;
     atomic_store(&r->faces, 0);
-    for (uint32_t k = 0; k < TOGETHER; k++) {
-        found *f = &r->found[k];
-        if (f->capacity > FACES_TOGETHER / TOGETHER) {
+    for (uint32_t k = 0; k < BATCH_POINTS; k++) {
+        found_reach *f = &r->found[k];
+        if (f->capacity > BATCH_FACES / BATCH_POINTS) {
             free(f->face);
             f->face = NULL;
             f->capacity = 0;
@@ -455,13 +464,13 @@ ebpo_status ebpo_reacher_find(ebpo_reacher *r, uint32_t stroke, uint32_t i, ebpo
     bool among = stroke == r->stroke && i >= r->first && i - r->first < r->count;
     if (!among || !r->found[i - r->first].done) {
         begin_batch(r, stroke, i);
-        ebpo_status status =
-            ebpo_parallel_for(r->threads, NULL, r->count, GRAIN, find_some, r, NULL, "", error);
+        ebpo_status status = ebpo_parallel_for(r->threads, NULL, r->count, GRAIN,
+                                               find_batch_reaches, r, NULL, "", error);
         if (status != EBPO_OK)
             return status;
     }
-    const found *f = &r->found[i - r->first];
-    *out = (ebpo_reached){ f->face, f->count, f->here };
+    const found_reach *f = &r->found[i - r->first];
+    *out = (ebpo_reached){ f->face, f->count, f->complete };
     return EBPO_OK;
 }
 
@@ -473,8 +482,8 @@ ebpo_status ebpo_reacher_new(const ebpo_paint *p, ebpo_context *context, unsigne
         return ebpo_fail_memory(error, sizeof *r);
     r->p = p;
     uint64_t most = p->point_count / GRAIN + 1, memory = context->model->options.memory;
-    if (memory && memory / THREAD_CAPACITY < most)
-        most = memory / THREAD_CAPACITY + 1;
+    if (memory && memory / THREAD_BYTES < most)
+        most = memory / THREAD_BYTES + 1;
     r->threads = ebpo_thread_count(threads);
     r->threads = r->threads < most ? r->threads : (unsigned)most;
     ebpo_status status = EBPO_OK;
@@ -507,7 +516,7 @@ void ebpo_reacher_free(ebpo_reacher *r)
         if (t > 0)
             ebpo_context_free(own);
     }
-    for (uint32_t k = 0; k < TOGETHER; k++)
+    for (uint32_t k = 0; k < BATCH_POINTS; k++)
         free(r->found[k].face);
     free(r->reach);
     free(r);

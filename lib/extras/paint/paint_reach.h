@@ -11,7 +11,7 @@ typedef struct ebpo_reach_face {
     double corner[3][3];
     uint64_t face, file_face; /* as in ebpo_paint_face */
     uint32_t at[3];           /* indices of the face's corners among the positions */
-    bool within[3];           /* for each corner: it is within the ball */
+    bool within[3];           /* [corner] it is within the ball */
 } ebpo_reach_face;
 
 typedef struct ebpo_reach_position {
@@ -19,7 +19,7 @@ typedef struct ebpo_reach_position {
     bool within;
 } ebpo_reach_position;
 
-/* An edge that crosses the ball, between two positions outside the ball. */
+/* An edge that intersects the ball although both its ends are outside the ball. */
 typedef struct ebpo_reach_edge {
     uint32_t a, b; /* indices of the two positions, a < b */
 } ebpo_reach_edge;
@@ -28,19 +28,19 @@ typedef struct ebpo_reach_edge {
 typedef struct ebpo_reach {
     ebpo_context *context;
     double tolerance;      /* maximum distance of a point from its face */
-    ebpo_reach_face *face; /* [count] afterwards only the faces of the reach, in the order of the
-                            * file */
+    ebpo_reach_face *face; /* [count] faces around the ball; after ebpo_reach_find only those of the
+                            * reach, in the order of the file */
     uint64_t count, capacity;
-    uint64_t own; /* index of the point's face in `face` */
+    uint64_t own; /* index in `face` of the face that the point is on */
     ebpo_reach_position *position;
     ebpo_reach_edge *edge;
     uint64_t position_count, position_capacity, edge_count, edge_capacity;
-    uint32_t *slot; /* hash table of positions, later of edges; an entry is 0 (free) or the index
-                     * plus 1 */
-    uint32_t *root; /* sets of faces, positions and edges: each entry is the index of another member
-                     * of its set, or of itself */
+    uint32_t *slot; /* [slots] hash table of positions, later of edges; an entry is 0 (free) or the
+                     * index plus 1 */
+    uint32_t *root; /* union-find sets of faces, positions and edges, in this order: each entry is
+                     * the index of another member of the set, or of itself */
     uint64_t slots, slot_capacity, root_capacity;
-    bool short_of_memory, too_many;
+    bool short_of_memory, too_many; /* why gathering faces failed */
 } ebpo_reach;
 
 /* A ball around a point, with the point's face. */
@@ -52,18 +52,19 @@ typedef struct ebpo_reach_ball {
 void ebpo_reach_begin(ebpo_reach *reach, ebpo_context *context);
 void ebpo_reach_end(ebpo_reach *reach);
 
-/* Finds the reach of a ball. *here is false if a subset omits the face, or some of the faces around
- * it. Fails with EBPO_E_FORMAT if the position is not on that face, EBPO_E_LIMIT, EBPO_E_MEMORY,
- * and the errors of reading. */
+/* Finds the reach of a ball. *complete is false, without a result, if the model's file is a subset
+ * that omits the ball's face or some of the faces around it. Fails with EBPO_E_FORMAT if the
+ * position is not on the ball's face, EBPO_E_LIMIT, EBPO_E_MEMORY, and errors of reading. */
 EBPO_MUST_USE ebpo_status ebpo_reach_find(ebpo_reach *reach, const ebpo_reach_ball *ball,
-                                          bool *here, ebpo_error *error);
+                                          bool *complete, ebpo_error *error);
 
-/* Sets *fits to true if a position is on that face, or may be on it because a subset is pruned
- * there. */
+/* Sets *fits to true if a position is on the face, or if the model's file is a subset without this
+ * face or its surroundings, so that the position may be on it. */
 EBPO_MUST_USE ebpo_status ebpo_reach_check(ebpo_reach *reach, const double place[3], uint64_t face,
                                            bool *fits, ebpo_error *error);
 
-/* Returns true if a position is within the ball: format-spec/paint.md, section 4. */
+/* Returns true if q is within the ball with this centre and squared radius: format-spec/paint.md,
+ * section 4. */
 static inline bool ebpo_ball_holds(const double centre[3], double square, const double q[3])
 {
     double x = q[0] - centre[0], y = q[1] - centre[1], z = q[2] - centre[2];
@@ -75,7 +76,7 @@ static inline bool ebpo_ball_holds(const double centre[3], double square, const 
 typedef struct ebpo_found_face {
     double corner[3][3];
     uint64_t face, file_face;
-    bool covered[3];
+    bool covered[3]; /* [corner] a point's ball contains it */
 } ebpo_found_face;
 
 typedef struct ebpo_found_faces {
@@ -85,7 +86,8 @@ typedef struct ebpo_found_faces {
     uint64_t slots;
 } ebpo_found_faces;
 
-/* Finds or adds a face, and sets its index. Fails with EBPO_E_LIMIT, EBPO_E_MEMORY. */
+/* Adds a face unless it is present, and sets *number to its index. Fails with EBPO_E_LIMIT,
+ * EBPO_E_MEMORY. */
 EBPO_MUST_USE ebpo_status ebpo_found_faces_add(ebpo_found_faces *found_faces,
                                                const ebpo_reach_face *face, uint32_t *number,
                                                ebpo_error *error);
@@ -105,11 +107,11 @@ static inline ebpo_reach_ball ebpo_paint_ball(const ebpo_paint *p, uint64_t stro
 
 /* As ebpo_reach_find, for point `i` of a stroke. */
 EBPO_MUST_USE static inline ebpo_status ebpo_paint_reach(ebpo_reach *reach, const ebpo_paint *p,
-                                                         uint64_t stroke, uint32_t i, bool *here,
-                                                         ebpo_error *error)
+                                                         uint64_t stroke, uint32_t i,
+                                                         bool *complete, ebpo_error *error)
 {
     ebpo_reach_ball ball = ebpo_paint_ball(p, stroke, i);
-    return ebpo_reach_find(reach, &ball, here, error);
+    return ebpo_reach_find(reach, &ball, complete, error);
 }
 
 /* The reaches of many points, found on all cores and returned one by one. */
@@ -123,13 +125,14 @@ typedef struct ebpo_reached_face {
 typedef struct ebpo_reached {
     const ebpo_reached_face *face;
     uint64_t count;
-    bool here; /* false: a subset omits a part of the reach */
+    bool complete; /* false: a subset omits a part of the reach */
 } ebpo_reached;
 
 typedef struct ebpo_reacher ebpo_reacher;
 
-/* Makes a reacher. It uses the context, and makes further contexts of the same model. `threads` 0:
- * all cores, or fewer if the model's budget is small. After a failure *out is NULL. */
+/* Makes an object that finds reaches on several threads. It uses the context, and makes further
+ * contexts of the same model. `threads` 0: all cores, or fewer if the model's budget is small.
+ * After a failure *out is NULL. */
 EBPO_MUST_USE ebpo_status ebpo_reacher_new(const ebpo_paint *p, ebpo_context *context,
                                            unsigned threads, ebpo_reacher **out, ebpo_error *error);
 void ebpo_reacher_free(ebpo_reacher *r);

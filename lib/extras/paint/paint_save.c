@@ -124,7 +124,7 @@ static ebpo_status put_column(ebpo_h5_out *out, const ebpo_paint *p, const ebpo_
     uint8_t *bytes = ebpo_alloc(count + 4, 1);
     if (!bytes)
         return ebpo_fail_memory(error, count + 4);
-    ebpo_paint_column_give(p, c, bytes);
+    ebpo_paint_column_write(p, c, bytes);
     ebpo_store32(bytes + count, ebpo_fletcher32(bytes, count));
     ebpo_status status = ebpo_h5_make_array(out, c->path, &shape, &array, error);
     if (status == EBPO_OK)
@@ -155,7 +155,7 @@ static ebpo_status put_all(ebpo_h5_out *out, const ebpo_paint *p, ebpo_error *er
     return status;
 }
 
-/* Returns an estimate of the bytes of headers. */
+/* Returns an estimate of the bytes of all HDF5 headers of the file. */
 static uint64_t head_bytes(const ebpo_paint *p)
 {
     enum { GROUP = 700, ROOT = 8192 };
@@ -167,7 +167,8 @@ static uint64_t head_bytes(const ebpo_paint *p)
     return sum;
 }
 
-/* Stores, after saving, that the file at `path` is the paint's current version. */
+/* Stores, after saving, that the open file `fd` at `path` has the paint's current version. Takes
+ * ownership of both. */
 static void take_version(ebpo_paint_file *f, char *path, int fd)
 {
     if (f->fd >= 0)
@@ -178,7 +179,7 @@ static void take_version(ebpo_paint_file *f, char *path, int fd)
     f->version = ebpo_file_version_of(fd);
 }
 
-static ebpo_status paint_save_save(const ebpo_paint *p, const char *path, ebpo_error *error)
+static ebpo_status save_locked(const ebpo_paint *p, const char *path, ebpo_error *error)
 {
     enum { LINKS = 4 };
     ebpo_paint_file *f = p->file;
@@ -221,7 +222,7 @@ static ebpo_status paint_save_save(const ebpo_paint *p, const char *path, ebpo_e
 ebpo_status ebpo_paint_save(const ebpo_paint *p, const char *path, ebpo_error *error)
 {
     pthread_mutex_lock(&p->file->mutex);
-    ebpo_status status = paint_save_save(p, path, error);
+    ebpo_status status = save_locked(p, path, error);
     pthread_mutex_unlock(&p->file->mutex);
     return status;
 }
