@@ -14,8 +14,8 @@ static const arg_option help_option = {
     "help", 'h', ARG_FLAG, 0, NULL, "print this help and exit", 0, 0, NULL, NULL
 };
 
-/* Reports the error and evaluates to the result to return. */
-#define wrong(spec, ...) (command_usage((spec)->command, __VA_ARGS__), ARGS_WRONG)
+/* Prints a usage error; the value is ARGS_WRONG. */
+#define refuse_args(spec, ...) (command_usage((spec)->command, __VA_ARGS__), ARGS_WRONG)
 
 /* --- values --- */
 
@@ -25,8 +25,8 @@ static arg_result set_int(const arg_spec *spec, const arg_option *o, const char 
     errno = 0;
     long long v = strtoll(text, &end, 10);
     if (end == text || *end || errno || (double)v < o->low || (double)v > o->high)
-        return wrong(spec, "--%s: '%s' is not a whole number from %.0f to %.0f", o->name, text,
-                     o->low, o->high);
+        return refuse_args(spec, "--%s: '%s' is not a whole number from %.0f to %.0f", o->name,
+                           text, o->low, o->high);
     *out = v;
     return ARGS_RUN;
 }
@@ -36,8 +36,8 @@ static arg_result set_real(const arg_spec *spec, const arg_option *o, const char
     char *end;
     double v = strtod(text, &end);
     if (end == text || *end || !isfinite(v) || v < o->low || v > o->high)
-        return wrong(spec, "--%s: '%s' is not a number from %g to %g", o->name, text, o->low,
-                     o->high);
+        return refuse_args(spec, "--%s: '%s' is not a number from %g to %g", o->name, text, o->low,
+                           o->high);
     *out = v;
     return ARGS_RUN;
 }
@@ -60,10 +60,10 @@ static arg_result find_word(const arg_spec *spec, const arg_option *o, const cha
         }
     const char *now = renamed_word(o->name, text, length);
     if (now)
-        return wrong(spec, "--%s: '%.*s' is now '%s'", o->name, (int)length, text, now);
+        return refuse_args(spec, "--%s: '%.*s' is now '%s'", o->name, (int)length, text, now);
     char all[200];
     join_words(o->words, all, sizeof all);
-    return wrong(spec, "--%s: '%.*s' is not one of: %s", o->name, (int)length, text, all);
+    return refuse_args(spec, "--%s: '%.*s' is not one of: %s", o->name, (int)length, text, all);
 }
 
 static arg_result set_bits(const arg_spec *spec, const arg_option *o, const char *text,
@@ -86,7 +86,7 @@ static arg_result add_to_list(const arg_spec *spec, const arg_option *o, const c
                               arg_list *out)
 {
     if (out->count == ARG_LIST_MAX)
-        return wrong(spec, "--%s: given more than %d times", o->name, ARG_LIST_MAX);
+        return refuse_args(spec, "--%s: given more than %d times", o->name, ARG_LIST_MAX);
     out->item[out->count++] = text;
     return ARGS_RUN;
 }
@@ -106,7 +106,7 @@ static arg_result set_value(const arg_spec *spec, const arg_option *o, const cha
     case ARG_TEXT: break;
     }
     if (!*text)
-        return wrong(spec, "--%s: the value is empty", o->name);
+        return refuse_args(spec, "--%s: the value is empty", o->name);
     if (o->kind == ARG_LIST)
         return add_to_list(spec, o, text, field);
     *(const char **)field = text;
@@ -132,7 +132,7 @@ static const arg_option *find_letter(const arg_spec *spec, char letter)
 }
 
 /* Returns an option that shares a beginning of at least three letters, for "did you mean". */
-static const char *find_resembling(const arg_spec *spec, const char *name)
+static const char *find_similar(const arg_spec *spec, const char *name)
 {
     const char *best = NULL;
     size_t best_length = 2;
@@ -153,11 +153,11 @@ static arg_result fail_unknown(const arg_spec *spec, const char *shown, const ch
     size_t length = strcspn(name, "=");
     const char *now = renamed_option(spec->command, name, length);
     if (now)
-        return wrong(spec, "--%.*s is now %s", (int)length, name, now);
-    const char *near = find_resembling(spec, name);
+        return refuse_args(spec, "--%.*s is now %s", (int)length, name, now);
+    const char *near = find_similar(spec, name);
     if (near)
-        return wrong(spec, "unknown option '%s'; did you mean '--%s'?", shown, near);
-    return wrong(spec, "unknown option '%s'", shown);
+        return refuse_args(spec, "unknown option '%s'; did you mean '--%s'?", shown, near);
+    return refuse_args(spec, "unknown option '%s'", shown);
 }
 
 /* --- parsing --- */
@@ -178,12 +178,12 @@ static arg_result take_option(parser *p, const arg_option *o, const char *joined
         return ARGS_HELPED;
     }
     if (o->kind == ARG_FLAG)
-        return joined ? wrong(p->spec, "--%s takes no value", o->name)
+        return joined ? refuse_args(p->spec, "--%s takes no value", o->name)
                       : set_value(p->spec, o, NULL, p->values);
     if (!joined && p->at + 1 < p->argc)
         joined = p->argv[++p->at];
     if (!joined)
-        return wrong(p->spec, "--%s needs a value, %s", o->name, o->value);
+        return refuse_args(p->spec, "--%s needs a value, %s", o->name, o->value);
     if (o->kind == ARG_OPERAND && *joined) {
         p->output = joined;
         p->output_at = o->offset;
@@ -244,8 +244,8 @@ static arg_result check_ending(const arg_spec *spec, const char *path)
     const char *name = strrchr(path, '/'), *dot = strrchr(name ? name : path, '.');
     if (!spec->writes || !dot || !is_among(known, dot + 1) || is_among(spec->writes, dot + 1))
         return ARGS_RUN;
-    return wrong(spec, "'%s': the ending belongs to another format; the output is %s", path,
-                 spec->operands + strcspn(spec->operands, " ") + 1);
+    return refuse_args(spec, "'%s': the ending belongs to another format; the output is %s", path,
+                       spec->operands + strcspn(spec->operands, " ") + 1);
 }
 
 static arg_result check_operand(const arg_spec *spec, const char *text, int i)
@@ -253,7 +253,8 @@ static arg_result check_operand(const arg_spec *spec, const char *text, int i)
     if (strcmp(text, "-") == 0)
         return args_dash(spec, i) != ' '
                    ? ARGS_RUN
-                   : wrong(spec, "'-': a file name is needed here, as the file is not read or "
+                   : refuse_args(spec,
+                                 "'-': a file name is needed here, as the file is not read or "
                                  "written sequentially");
     return i == 1 ? check_ending(spec, text) : ARGS_RUN;
 }
@@ -265,8 +266,8 @@ static arg_result add_output(const parser *p, const char **operands, int *count)
     if (!p->output || *count < at)
         return ARGS_RUN;
     if (*count > at)
-        return wrong(p->spec, "'%s' and --output '%s': give the output once", operands[at],
-                     p->output);
+        return refuse_args(p->spec, "'%s' and --output '%s': give the output once", operands[at],
+                           p->output);
     arg_result result = check_operand(p->spec, p->output, at);
     operands[(*count)++] = p->output;
     return result;
@@ -289,7 +290,7 @@ arg_result args_parse(const arg_spec *spec, int argc, char **argv, void *values,
         else if (options && a[0] == '-' && a[1])
             result = take_letters(&p);
         else if (count == spec->most)
-            result = wrong(spec, "unexpected argument '%s'; expected: %s", a, spec->operands);
+            result = refuse_args(spec, "unexpected argument '%s'; expected: %s", a, spec->operands);
         else if ((result = check_operand(spec, a, count)) == ARGS_RUN)
             operands[count++] = a;
         if (result != ARGS_RUN)
@@ -299,7 +300,8 @@ arg_result args_parse(const arg_spec *spec, int argc, char **argv, void *values,
     if (added != ARGS_RUN)
         return added;
     if (count < spec->least)
-        return wrong(spec, "missing operand%s; expected: %s", count ? "" : "s", spec->operands);
+        return refuse_args(spec, "missing operand%s; expected: %s", count ? "" : "s",
+                           spec->operands);
     return ARGS_RUN;
 }
 
@@ -327,7 +329,7 @@ static void print_wrapped(const char *text, int indent)
     putchar('\n');
 }
 
-static void help_one(const arg_option *o)
+static void print_option(const arg_option *o)
 {
     char head[80];
     int length = o->letter ? snprintf(head, sizeof head, "-%c, --%s", o->letter, o->name)
@@ -352,8 +354,8 @@ void args_help(const arg_spec *spec)
         if (o->page)
             page = o->page;
         else
-            help_one(o);
-    help_one(&help_option);
+            print_option(o);
+    print_option(&help_option);
     if (page)
         printf("\nOptions for URLs: see 'ebpo help %s'.\n", page);
 }
@@ -362,5 +364,5 @@ void args_help_page(const arg_spec *spec, const char *page)
 {
     for (const arg_option *o = spec->options; o->name; o++)
         if (o->page && strcmp(o->page, page) == 0)
-            help_one(o);
+            print_option(o);
 }

@@ -44,7 +44,7 @@ typedef struct arg_spec {
     const char *operands; /* "IN.ply OUT.ebpo.h5" */
     int least, most;      /* number of operands */
     const char *summary;  /* one line */
-    const char *text;     /* more for --help, or NULL */
+    const char *text;     /* further text for --help, or NULL */
     const arg_option *options;
     /* Meaning of "-", one letter for each operand:
      *   i  standard input, by way of a file (standard_files.h)

@@ -5,25 +5,25 @@
 #include "cli/command.h"
 #include "cli/pose_args.h"
 
-enum { DEEPEST = 64 }; /* nested parentheses */
+enum { DEPTH_MAX = 64 }; /* nested parentheses */
 
-typedef struct parsing {
+typedef struct parser {
     const char *name, *text, *at;
     uint32_t operands;
     boolean_nodes *out;
     int depth;
-} parsing;
+} parser;
 
-static bool fail_here(const parsing *p, const char *what)
+static bool fail_here(const parser *p, const char *what)
 {
     command_usage(p->name, "expression '%s', column %d: %s", p->text, (int)(p->at - p->text) + 1,
                   what);
     return false;
 }
 
-static void skip_blanks(parsing *p) { p->at += strspn(p->at, " \t\r\n"); }
+static void skip_blanks(parser *p) { p->at += strspn(p->at, " \t\r\n"); }
 
-static bool add_node(parsing *p, int32_t operation, uint32_t left, uint32_t right, uint32_t *number)
+static bool add_node(parser *p, int32_t operation, uint32_t left, uint32_t right, uint32_t *number)
 {
     if (p->out->count == EBPO_BOOLEAN_NODES_MAX)
         return fail_here(p, "too many operations");
@@ -32,13 +32,13 @@ static bool add_node(parsing *p, int32_t operation, uint32_t left, uint32_t righ
     return true;
 }
 
-static bool read_sum(parsing *p, uint32_t *number);
+static bool read_sum(parser *p, uint32_t *number);
 
-static bool read_atom(parsing *p, uint32_t *number)
+static bool read_atom(parser *p, uint32_t *number)
 {
     skip_blanks(p);
     if (*p->at == '(') {
-        if (++p->depth > DEEPEST)
+        if (++p->depth > DEPTH_MAX)
             return fail_here(p, "too many nested parentheses");
         p->at++;
         if (!read_sum(p, number))
@@ -61,7 +61,7 @@ static bool read_atom(parsing *p, uint32_t *number)
     return true;
 }
 
-static bool read_product(parsing *p, uint32_t *number)
+static bool read_product(parser *p, uint32_t *number)
 {
     uint32_t right;
     if (!read_atom(p, number))
@@ -75,21 +75,24 @@ static bool read_product(parsing *p, uint32_t *number)
     return true;
 }
 
+enum { NO_OPERATOR = EBPO_BOOLEAN_OPERAND };
+
+/* Returns the operation of an operator of a sum; NO_OPERATOR for any other character. */
 static int32_t operation_of(char c)
 {
     return c == '|' || c == '+' ? EBPO_BOOLEAN_UNION
            : c == '-'           ? EBPO_BOOLEAN_DIFFERENCE
            : c == '^'           ? EBPO_BOOLEAN_SYMMETRIC_DIFFERENCE
-                                : EBPO_BOOLEAN_OPERAND;
+                                : NO_OPERATOR;
 }
 
-static bool read_sum(parsing *p, uint32_t *number)
+static bool read_sum(parser *p, uint32_t *number)
 {
     int32_t operation;
     uint32_t right;
     if (!read_product(p, number))
         return false;
-    while ((operation = operation_of(*p->at)) != EBPO_BOOLEAN_OPERAND) {
+    while ((operation = operation_of(*p->at)) != NO_OPERATOR) {
         p->at++;
         if (!read_product(p, &right) || !add_node(p, operation, *number, right, number))
             return false;
@@ -99,7 +102,7 @@ static bool read_sum(parsing *p, uint32_t *number)
 
 bool boolean_read(const char *name, const char *text, uint32_t operands, boolean_nodes *out)
 {
-    parsing p = { name, text, text, operands, out, 0 };
+    parser p = { name, text, text, operands, out, 0 };
     uint32_t root;
     out->count = 0;
     if (!read_sum(&p, &root))

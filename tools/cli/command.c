@@ -14,7 +14,7 @@ int command_failed(const char *name, const ebpo_error *error)
 {
     char why[128] = "";
     if (error->status == EBPO_E_MEMORY)
-        process_memory_why(why, sizeof why);
+        process_memory_reason(why, sizeof why);
     fprintf(stderr, "ebpo %s: %s%s\n", name,
             error->message[0] ? error->message : ebpo_status_name(error->status), why);
     if (error->status == EBPO_E_ARGUMENT)
@@ -36,7 +36,7 @@ int command_usage(const char *name, const char *format, ...)
 int command_no_memory(const char *name)
 {
     char why[128];
-    process_memory_why(why, sizeof why);
+    process_memory_reason(why, sizeof why);
     fprintf(stderr, "ebpo %s: not enough memory%s\n", name, why);
     return EXIT_FAILED;
 }
@@ -131,12 +131,12 @@ bool command_wants_hdf5(const char *name, const char *path)
     ebpo_error error = EBPO_ERROR_INIT;
     if (is_hdf5 != 0)
         return is_hdf5 > 0;
-    bool fine = ebpo_open(path, &file, &error) == EBPO_OK; /* otherwise the library reports the kind
-                                                            * of file */
-    if (!fine)
+    bool success = ebpo_open(path, &file, &error) == EBPO_OK; /* otherwise the library reports the
+                                                               * kind of file */
+    if (!success)
         fprintf(stderr, "ebpo %s: %s\n", name, error.message);
     ebpo_close(file);
-    return fine;
+    return success;
 }
 
 bool command_has_level(const char *name, const ebpo_info *info, int64_t level)

@@ -11,7 +11,7 @@
 #include "cli/words.h"
 
 /* A volume too small for a double keeps its sign. */
-static bool is_less_than_nothing(const ebpo_mesh_report *r)
+static bool has_negative_volume(const ebpo_mesh_report *r)
 {
     double box = (r->max[0] - r->min[0]) * (r->max[1] - r->min[1]) * (r->max[2] - r->min[2]);
     return r->volume == 0 && signbit(r->volume) && box < DBL_MIN;
@@ -19,7 +19,7 @@ static bool is_less_than_nothing(const ebpo_mesh_report *r)
 
 const char *facts_inside_out(const ebpo_info *info)
 {
-    if (!info->solid || !(info->report.volume < 0 || is_less_than_nothing(&info->report)))
+    if (!info->solid || !(info->report.volume < 0 || has_negative_volume(&info->report)))
         return NULL;
     return info->rule == EBPO_RULE_POSITIVE
                ? "turned inside out: normals point inwards, and points within have winding number "
@@ -63,7 +63,8 @@ static void print_model(FILE *out, const ebpo_info *info)
         char text[FINDINGS_VOLUME], extent[40];
         ebpo_solid_volume solid = facts_solid(info, NULL);
         findings_extent(extent, sizeof extent, solid.integral, 3, &info->report);
-        bool printed = findings_knows(&solid) && (isnormal(solid.integral) || extent[0] == '0');
+        bool printed =
+            findings_volume_known(&solid) && (isnormal(solid.integral) || extent[0] == '0');
         fprintf(out, "\n  solid     %s%s, by winding number, rule %s",
                 findings_volume(text, &solid, &info->report, info->unit),
                 printed ? "" : " (see ebpo measure)", words_rule(info->rule));

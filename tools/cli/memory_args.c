@@ -9,7 +9,7 @@
 #include "cli/command.h"
 #include "cli/words.h"
 
-bool memory_good(const char *command, const memory_values *v)
+bool memory_check(const char *command, const memory_values *v)
 {
     uint64_t bytes;
     if (!v->memory)
@@ -24,7 +24,8 @@ bool memory_good(const char *command, const memory_values *v)
     return bytes >= EBPO_WORKSPACE_MIN;
 }
 
-/* Returns freed memory to the system; in the heaps of threads it would count as resident. */
+/* Makes freed memory return to the system at once; memory that stays in the heaps of threads counts
+ * as resident. */
 static void return_memory(void)
 {
 #ifdef __GLIBC__
@@ -33,12 +34,12 @@ static void return_memory(void)
 #endif
 }
 
-ebpo_status memory_make(ebpo_workspace **out, const memory_values *v, ebpo_error *error)
+ebpo_status memory_new(ebpo_workspace **out, const memory_values *v, ebpo_error *error)
 {
     ebpo_workspace_options o = EBPO_WORKSPACE_OPTIONS_INIT;
     return_memory();
     o.temp_dir = v->temp_dir;
     if (v->memory)
-        (void)words_read_size(v->memory, &o.memory); /* memory_good has checked it */
+        (void)words_read_size(v->memory, &o.memory); /* memory_check has checked it */
     return ebpo_workspace_new(&o, out, error);
 }

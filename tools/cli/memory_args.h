@@ -10,11 +10,11 @@ typedef struct memory_values {
     const char *memory, *temp_dir;
 } memory_values;
 
-/* Returns false for invalid values, and prints the usage message. */
-bool memory_good(const char *command, const memory_values *v);
+/* Returns false for invalid values, after a usage message. */
+bool memory_check(const char *command, const memory_values *v);
 
 /* Creates the workspace of these values, which must be valid. */
-EBPO_MUST_USE ebpo_status memory_make(ebpo_workspace **out, const memory_values *v,
-                                      ebpo_error *error);
+EBPO_MUST_USE ebpo_status memory_new(ebpo_workspace **out, const memory_values *v,
+                                     ebpo_error *error);
 
 #endif

@@ -44,7 +44,7 @@ static const char *steps_text(char *out, size_t size, const ebpo_repair_record *
 
 /* ---- warnings ---- */
 
-static void name_finding(FILE *out, bool *any, const ebpo_finding *f, const char *what)
+static void print_count(FILE *out, bool *any, const ebpo_finding *f, const char *what)
 {
     if (f->count)
         fprintf(out, "%s %llu %s", *any ? "," : ":", (unsigned long long)f->count, what);
@@ -55,11 +55,11 @@ static void warn_of_surface(FILE *out, const ebpo_mesh_report *r)
 {
     bool any = false;
     fputs("warning: this is a surface, not a solid, so it has no inside", out);
-    name_finding(out, &any, &r->boundary_edges, "boundary edges");
-    name_finding(out, &any, &r->misoriented_edges, "misoriented edges");
-    name_finding(out, &any, &r->nonmanifold_edges, "edges shared by more than two faces");
+    print_count(out, &any, &r->boundary_edges, "boundary edges");
+    print_count(out, &any, &r->misoriented_edges, "misoriented edges");
+    print_count(out, &any, &r->nonmanifold_edges, "edges shared by more than two faces");
     if (!any)
-        name_finding(out, &any, &r->unbalanced_edges, "unbalanced edges");
+        print_count(out, &any, &r->unbalanced_edges, "unbalanced edges");
 }
 
 static const char *volume_text(char text[FINDINGS_VOLUME], const ebpo_repair_try *t, ebpo_rule rule)
@@ -69,7 +69,7 @@ static const char *volume_text(char text[FINDINGS_VOLUME], const ebpo_repair_try
 }
 
 /* Writes the solid that results from a repair. */
-static const char *left_text(char text[FINDINGS_VOLUME], const ebpo_repair_try *t, ebpo_rule rule)
+static const char *solid_text(char text[FINDINGS_VOLUME], const ebpo_repair_try *t, ebpo_rule rule)
 {
     char volume[FINDINGS_VOLUME];
     volume_text(volume, t, rule);
@@ -78,16 +78,16 @@ static const char *left_text(char text[FINDINGS_VOLUME], const ebpo_repair_try *
 }
 
 /* Prints the repair that was tried, or how to try repairs. */
-static void report_remedy(FILE *out, const mesh_input *p)
+static void print_remedy(FILE *out, const mesh_input *p)
 {
     char steps[64], left[FINDINGS_VOLUME];
-    if (p->tried && p->repairs.chosen >= 0) {
+    if (p->repairs_tried && p->repairs.chosen >= 0) {
         const ebpo_repair_try *best = &p->repairs.tries[p->repairs.chosen];
         fprintf(out, "; %s, which --repair does, leaves %s",
-                steps_text(steps, sizeof steps, &best->record), left_text(left, best, p->rule));
-    } else if (p->tried)
-        fputs("; no repair that is tried leaves a plausible solid: try --weld-distance where "
-              "corners nearly coincide, or use a mesh editor",
+                steps_text(steps, sizeof steps, &best->record), solid_text(left, best, p->rule));
+    } else if (p->repairs_tried)
+        fputs("; no automatic repair gives a solid; try --weld-distance if corners nearly "
+              "coincide, or a mesh editor",
               out);
     else
         fputs("; 'ebpo check' without options reports which repairs give a solid, --repair applies "
@@ -133,9 +133,9 @@ static void warn_of_repeated_positions(FILE *out, const char *command, const cha
 }
 
 /* Returns the result of dropping repeated faces alone, if this was tried. */
-static const ebpo_repair_try *dropping_alone(const mesh_input *p)
+static const ebpo_repair_try *find_drop_only(const mesh_input *p)
 {
-    for (uint64_t i = 0; p->tried && i < p->repairs.count; i++) {
+    for (uint64_t i = 0; p->repairs_tried && i < p->repairs.count; i++) {
         const ebpo_repair_record *r = &p->repairs.tries[i].record;
         if (r->drop_duplicates && !r->orient && !r->fill_holes)
             return &p->repairs.tries[i];
@@ -146,7 +146,7 @@ static const ebpo_repair_try *dropping_alone(const mesh_input *p)
 static void warn_of_repeated(FILE *out, const char *command, const char *path, const mesh_input *p)
 {
     const ebpo_finding *f = &p->prepared.report.repeated_faces;
-    const ebpo_repair_try *t = dropping_alone(p);
+    const ebpo_repair_try *t = find_drop_only(p);
     char text[80], steps[64], left[FINDINGS_VOLUME];
     fprintf(out, "ebpo %s: %s: warning: %s of the same three vertices as an earlier one (face %llu",
             command, path, words_plural(text, sizeof text, f->count, "face is", "faces are"),
@@ -154,7 +154,7 @@ static void warn_of_repeated(FILE *out, const char *command, const char *path, c
     fputs(f->count > 1 ? ", ...): " : "): ", out);
     if (!t) {
         fprintf(out, "--drop-duplicates drops such%s\n",
-                p->tried ? "" : "; 'ebpo check' without options reports the result");
+                p->repairs_tried ? "" : "; 'ebpo check' without options reports the result");
         return;
     }
     if (t->record.dropped_opposite)
@@ -165,14 +165,14 @@ static void warn_of_repeated(FILE *out, const char *command, const char *path, c
                 (unsigned long long)(f->count - t->record.dropped_opposite));
     fputs(steps_text(steps, sizeof steps, &t->record), out);
     if (t->report.balanced)
-        fprintf(out, " leaves %s\n", left_text(left, t, p->rule));
+        fprintf(out, " leaves %s\n", solid_text(left, t, p->rule));
     else
         fprintf(out, " alone leaves a surface, %llu edges of which do not balance\n",
                 (unsigned long long)t->report.unbalanced_edges.count);
 }
 
-static void warn_of_opened(FILE *out, const char *command, const char *path,
-                           const ebpo_repair_record *r)
+static void warn_of_dropped(FILE *out, const char *command, const char *path,
+                            const ebpo_repair_record *r)
 {
     fprintf(
         out,
@@ -184,9 +184,9 @@ static void warn_of_opened(FILE *out, const char *command, const char *path,
 void advice_warn(FILE *out, const char *command, const char *path, const mesh_input *p)
 {
     char text[1024];
-    if (p->counted && p->shells.inside_out && !(p->doubts & EBPO_DOUBT_INSIDE_OUT))
+    if (p->shells_counted && p->shells.inside_out && !(p->doubts & EBPO_DOUBT_INSIDE_OUT))
         warn_of_inside_out(out, command, path, &p->shells);
-    if (p->counted && p->shells.nested && !(p->doubts & EBPO_DOUBT_INSIDE_OUT))
+    if (p->shells_counted && p->shells.nested && !(p->doubts & EBPO_DOUBT_INSIDE_OUT))
         warn_of_nested(out, command, path, &p->shells);
     if (p->prepared.report.repeated_faces.count)
         warn_of_repeated(out, command, path, p);
@@ -194,7 +194,7 @@ void advice_warn(FILE *out, const char *command, const char *path, const mesh_in
         warn_of_repeated_positions(out, command, path, p);
     if (p->prepared.record.dropped_faces && p->prepared.before.balanced &&
         p->doubts & EBPO_DOUBT_OPEN)
-        warn_of_opened(out, command, path, &p->prepared.record);
+        warn_of_dropped(out, command, path, &p->prepared.record);
     if (!p->doubts)
         return;
     fprintf(out, "ebpo %s: %s: ", command, path);
@@ -203,8 +203,8 @@ void advice_warn(FILE *out, const char *command, const char *path, const mesh_in
     else
         fprintf(out, "WARNING: probably not the intended solid: %s",
                 advice_doubts(text, sizeof text, p));
-    if (p->doubts != EBPO_DOUBT_INSIDE_OUT || p->tried)
-        report_remedy(out, p);
+    if (p->doubts != EBPO_DOUBT_INSIDE_OUT || p->repairs_tried)
+        print_remedy(out, p);
     fputc('\n', out);
 }
 
@@ -243,7 +243,7 @@ void advice_print_shells(FILE *out, const mesh_input *p)
                 "  %s at the positions of an earlier one, %llu with the opposite orientation\n",
                 words_plural(text, sizeof text, p->repeated.count, "face", "faces"),
                 (unsigned long long)p->repeated_opposite);
-    if (!p->counted || !(s->inside_out || s->nested || s->cavities))
+    if (!p->shells_counted || !(s->inside_out || s->nested || s->cavities))
         return;
     fprintf(out, "  %s",
             words_plural(text, sizeof text, s->closed, "closed component", "closed components"));
@@ -259,7 +259,7 @@ void advice_print_shells(FILE *out, const mesh_input *p)
 
 void advice_print(FILE *out, const mesh_input *p)
 {
-    if (!p->tried)
+    if (!p->repairs_tried)
         return;
     fputs("  repairs tried, with their results:\n", out);
     for (uint64_t i = 0; i < p->repairs.count; i++)
@@ -317,7 +317,7 @@ static void json_repeated(json *j, const mesh_input *p)
 
 static void json_shells(json *j, const mesh_input *p)
 {
-    if (!p->counted) {
+    if (!p->shells_counted) {
         json_null(j, "shells");
         return;
     }
@@ -335,7 +335,7 @@ void advice_json(json *j, const mesh_input *p)
     json_doubts(j, p->doubts);
     json_repeated(j, p);
     json_shells(j, p);
-    if (!p->tried) {
+    if (!p->repairs_tried) {
         json_null(j, "repairs");
         return;
     }

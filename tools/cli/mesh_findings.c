@@ -12,7 +12,7 @@
 /* Findings in the order of printing. */
 static const struct finding_text {
     size_t offset;
-    const char *key, *one, *many, *element;
+    const char *key, *singular, *plural, *element;
 } findings[] = {
     { offsetof(ebpo_mesh_report, boundary_edges), "boundary_edges",
       "boundary edge (used by one face only)", "boundary edges (used by one face only)", "face" },
@@ -40,11 +40,11 @@ static const struct finding_text {
 };
 enum { FINDINGS = sizeof findings / sizeof *findings };
 
-const char *findings_many(const char *name)
+const char *findings_plural(const char *name)
 {
     for (int i = 0; i < FINDINGS; i++)
         if (strcmp(findings[i].key, name) == 0)
-            return findings[i].many;
+            return findings[i].plural;
     return name;
 }
 
@@ -53,16 +53,16 @@ static const ebpo_finding *finding_of(const ebpo_mesh_report *report, int i)
     return (const ebpo_finding *)(const void *)((const char *)report + findings[i].offset);
 }
 
-static int places_of(const ebpo_finding *f)
+static int location_count(const ebpo_finding *f)
 {
     return f->count < EBPO_FINDING_LOCATIONS ? (int)f->count : EBPO_FINDING_LOCATIONS;
 }
 
 static void print_locations(FILE *out, const ebpo_finding *f, const char *element)
 {
-    int shown = places_of(f);
-    const char *many = element[0] == 'v' ? "vertices" : "faces";
-    fprintf(out, ": %s", shown == 1 ? element : many);
+    int shown = location_count(f);
+    const char *plural = element[0] == 'v' ? "vertices" : "faces";
+    fprintf(out, ": %s", shown == 1 ? element : plural);
     for (int i = 0; i < shown; i++)
         fprintf(out, "%s %llu", i ? "," : "", (unsigned long long)f->locations[i]);
     fprintf(out, "%s\n", f->count > (uint64_t)shown ? ", ..." : "");
@@ -77,7 +77,7 @@ static void print_findings(FILE *out, const ebpo_mesh_report *report)
             continue;
         any = true;
         fprintf(out, "  %llu %s", (unsigned long long)f->count,
-                f->count == 1 ? findings[i].one : findings[i].many);
+                f->count == 1 ? findings[i].singular : findings[i].plural);
         print_locations(out, f, findings[i].element);
     }
     if (!any)
@@ -137,7 +137,7 @@ ebpo_solid_volume findings_solid(const ebpo_mesh_report *report, ebpo_rule rule,
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_solid_volume solid = EBPO_SOLID_VOLUME_INIT;
-    /* which fails only when the struct has another size */
+    /* Fails only if the struct has another size. */
     if (ebpo_solid_volume_of(report, rule, shells, info, &solid, &error) != EBPO_OK)
         solid.hi = INFINITY;
     return solid;
@@ -157,7 +157,8 @@ const char *findings_volume(char text[FINDINGS_VOLUME], const ebpo_solid_volume 
                             const ebpo_mesh_report *report, const char *unit)
 {
     char lo[40], hi[40], integral[40], cubed[TABLE_CELL];
-    bool known = findings_knows(solid), none = known && solid->lo == 0 && solid->integral != 0;
+    bool known = findings_volume_known(solid),
+         none = known && solid->lo == 0 && solid->integral != 0;
     findings_extent(integral, sizeof integral, solid->integral, 3, report);
     findings_extent(lo, sizeof lo, solid->lo, 3, report);
     table_unit(cubed, unit, 3);
@@ -268,7 +269,7 @@ static void json_finding(json *j, const char *key, const ebpo_finding *f)
     json_object(j, key);
     json_uint(j, "count", f->count);
     json_array(j, "locations");
-    for (int i = 0; i < places_of(f); i++)
+    for (int i = 0; i < location_count(f); i++)
         json_uint(j, NULL, f->locations[i]);
     json_end(j);
     json_end(j);
@@ -276,7 +277,7 @@ static void json_finding(json *j, const char *key, const ebpo_finding *f)
 
 void findings_volume_json(json *j, const ebpo_solid_volume *solid)
 {
-    json_real(j, "volume", findings_knows(solid) ? solid->lo : NAN);
+    json_real(j, "volume", findings_volume_known(solid) ? solid->lo : NAN);
     json_real(j, "volume_lo", solid->lo);
     json_real(j, "volume_hi", solid->hi);
     json_real(j, "winding_integral", solid->integral);

@@ -7,10 +7,14 @@
 
 #include "cli/json.h"
 
-/* Returns the bounds of the volume of the solid in a report, see ebpo_solid_volume_of. */
+/* Returns the bounds of the volume of the solid in a report; arguments as in ebpo_solid_volume_of.
+ */
 ebpo_solid_volume findings_solid(const ebpo_mesh_report *report, ebpo_rule rule,
                                  const ebpo_shells *shells, const ebpo_info *info);
-static inline bool findings_knows(const ebpo_solid_volume *solid) { return solid->lo >= solid->hi; }
+static inline bool findings_volume_known(const ebpo_solid_volume *solid)
+{
+    return solid->lo >= solid->hi;
+}
 /* Writes "volume" and the volume or its bounds. When the integral of the winding number differs
  * from the volume, also writes the integral; when no bounds are known, writes only the integral.
  * `unit`: as for table_unit. */
@@ -20,12 +24,12 @@ const char *findings_volume(char text[FINDINGS_VOLUME], const ebpo_solid_volume 
 /* Writes members volume (null: not known), volume_lo, volume_hi and winding_integral. */
 void findings_volume_json(json *j, const ebpo_solid_volume *solid);
 /* Prints the kind of the mesh, each finding with its first positions, and the omitted checks.
- * `crossings`: intersecting faces are checked later. */
+ * `crossings_follow`: intersecting faces are checked later. */
 void findings_print(FILE *out, const char *path, const ebpo_mesh *mesh,
                     const ebpo_mesh_report *report, const ebpo_solid_volume *solid,
                     bool crossings_follow);
 /* Returns the plural words for the finding that the report calls `name`. */
-const char *findings_many(const char *name);
+const char *findings_plural(const char *name);
 /* Prints the effects of repairs; nothing when none was requested. */
 void findings_print_repair(FILE *out, const ebpo_repair_record *record);
 /* Writes an area (power 2) or volume (3) of the mesh in the report with %.6g, or states that it
@@ -36,7 +40,7 @@ const char *findings_extent(char *text, size_t size, double x, int power,
 void findings_json(json *j, const char *key, const ebpo_mesh_report *report,
                    const ebpo_solid_volume *solid);
 void findings_json_repair(json *j, const char *key, const ebpo_repair_record *record);
-/* unread   data that was not read; empty: none */
+/* `unread`: words for data that was not read; "": none. */
 void findings_json_source(json *j, const char *key, const ebpo_mesh *mesh, const char *unread);
 
 #endif

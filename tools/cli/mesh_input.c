@@ -7,13 +7,13 @@
 #include "cli/command.h"
 #include "cli/mesh_findings.h"
 
-static bool steps_given(repairing requested)
+static bool steps_given(repair_request requested)
 {
     return requested.weld || requested.drop_duplicates || requested.orient || requested.flip ||
            requested.fill_holes;
 }
 
-int repair_check(const char *command, repairing requested)
+int repair_check(const char *command, repair_request requested)
 {
     if (requested.repair && steps_given(requested))
         return command_usage(command,
@@ -23,7 +23,7 @@ int repair_check(const char *command, repairing requested)
         return command_usage(command, "--weld-distance includes --weld; choose one");
     if (requested.orient && requested.flip)
         return command_usage(command, "--orient sets the orientation of faces; omit --flip");
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 /* Adds the effects of the first of two preparations. */
@@ -50,7 +50,7 @@ static void join_preparations(ebpo_prepared *first, const ebpo_prepared *second)
     a->collapsed_faces += b->collapsed_faces;
 }
 
-static ebpo_status do_chosen(mesh_input *p, ebpo_prepare_options *how, ebpo_error *error)
+static ebpo_status apply_chosen(mesh_input *p, ebpo_prepare_options *how, ebpo_error *error)
 {
     const ebpo_repair_record *steps = &p->repairs.tries[p->repairs.chosen].record;
     ebpo_prepared again = EBPO_PREPARED_INIT;
@@ -65,16 +65,17 @@ static ebpo_status do_chosen(mesh_input *p, ebpo_prepare_options *how, ebpo_erro
     return status;
 }
 
-static ebpo_status try_and_repair(mesh_input *p, repairing requested, ebpo_prepare_options *how,
-                                  ebpo_error *error)
+static ebpo_status try_and_repair(mesh_input *p, repair_request requested,
+                                  ebpo_prepare_options *how, ebpo_error *error)
 {
     if (steps_given(requested) || !(requested.repair || requested.advise))
         return EBPO_OK;
     ebpo_status status = ebpo_mesh_try_repairs(&p->mesh, &p->prepared.report, how->threads,
                                                how->progress, &p->repairs, error);
-    p->tried = status == EBPO_OK && p->repairs.count > 0;
-    return p->tried && requested.repair && p->repairs.chosen >= 0 ? do_chosen(p, how, error)
-                                                                  : status;
+    p->repairs_tried = status == EBPO_OK && p->repairs.count > 0;
+    return p->repairs_tried && requested.repair && p->repairs.chosen >= 0
+               ? apply_chosen(p, how, error)
+               : status;
 }
 
 /* Counts repeated faces. When no vertices coincide, the check has counted them before. */
@@ -96,7 +97,7 @@ static ebpo_status count_shells(mesh_input *p, const ebpo_prepare_options *how, 
     if (!r->balanced || (r->manifold && r->components < 2))
         return EBPO_OK;
     p->shells = (ebpo_shells)EBPO_SHELLS_INIT;
-    p->counted = true;
+    p->shells_counted = true;
     return ebpo_mesh_count_shells(&p->mesh, how->threads, how->progress, &p->shells, error);
 }
 
@@ -105,7 +106,7 @@ ebpo_solid_volume mesh_input_solid(const mesh_input *p, bool after)
     bool same_mesh = after || !p->prepared.was_repaired;
     ebpo_solid_volume solid =
         findings_solid(after ? &p->prepared.report : &p->prepared.before, p->rule,
-                       same_mesh && p->counted ? &p->shells : NULL, NULL);
+                       same_mesh && p->shells_counted ? &p->shells : NULL, NULL);
     /* a component that coincides with itself counts twice there */
     if (same_mesh && p->repeated_same) {
         solid.lo = 0;
@@ -114,7 +115,7 @@ ebpo_solid_volume mesh_input_solid(const mesh_input *p, bool after)
     return solid;
 }
 
-ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, repairing requested,
+ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, repair_request requested,
                                    mesh_reading more, ebpo_mesh_groups **groups,
                                    ebpo_workspace *workspace, unsigned threads,
                                    ebpo_progress progress, ebpo_error *error)
@@ -163,7 +164,7 @@ ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, repairing 
     return status;
 }
 
-ebpo_status mesh_input_read(mesh_input *out, const char *path, repairing requested,
+ebpo_status mesh_input_read(mesh_input *out, const char *path, repair_request requested,
                             mesh_reading more, ebpo_workspace *workspace, unsigned threads,
                             ebpo_progress progress, ebpo_error *error)
 {

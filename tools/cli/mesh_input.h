@@ -1,4 +1,4 @@
-/* Reads, repairs and checks the input mesh of a command, and defines the options. */
+/* Reads, repairs and checks the input mesh of a command; defines the options for repairs. */
 #ifndef EBPO_TOOLS_MESH_INPUT_H
 #define EBPO_TOOLS_MESH_INPUT_H
 
@@ -8,27 +8,26 @@
 
 #include "cli/args.h"
 
-typedef struct repairing {
+typedef struct repair_request {
     bool weld, drop_duplicates, orient, flip, fill_holes;
     bool repair; /* apply the shortest sequence of these that gives a plausible solid */
     double
         weld_distance; /* above 0: merges vertices within this distance before repairs are tried */
-    bool advise; /* not an option: when no repair is requested, search the repairs that `repair`
-                    would apply */
-} repairing;
+    bool advise; /* not an option: if no repair is requested, tries repairs without applying them */
+} repair_request;
 
 typedef struct mesh_input {
     ebpo_mesh mesh;         /* after repairs */
     ebpo_mesh as_read;      /* facts only; its array pointers only show which arrays existed */
     char unread[512];       /* result of ebpo_mesh_ignored; empty: everything was read */
     ebpo_prepared prepared; /* findings and repairs made */
-    bool tried;             /* repairs were tried; their results are in `repairs` */
+    bool repairs_tried;     /* repairs were tried; their results are in `repairs` */
     ebpo_repairs repairs;
     /* faces at the positions of an earlier face, in the repaired mesh; when vertices coincide, also
      * the counts with the opposite and with the same orientation */
     ebpo_finding repeated;
     uint64_t repeated_opposite, repeated_same;
-    bool counted; /* closed components were counted in `shells` */
+    bool shells_counted; /* closed components were counted in `shells` */
     ebpo_shells shells;
     uint32_t doubts; /* ebpo_doubt, of the repaired mesh */
     ebpo_rule rule;  /* rule of the solid; set by the caller, default nonzero */
@@ -36,24 +35,25 @@ typedef struct mesh_input {
 
 /* Returns EXIT_USAGE with a message when --repair is combined with options that it chooses itself.
  */
-int repair_check(const char *command, repairing requested);
+int repair_check(const char *command, repair_request requested);
 
-/* Data that is read beside positions and corners. */
+/* Data that is read in addition to the positions of vertices and the corners of faces. */
 typedef enum mesh_reading {
     READ_MESH,
     READ_ATTRIBUTES,
-    READ_TEXTURES /* and the bytes of the named images */
+    READ_TEXTURES /* attributes, and the bytes of the images that they name */
 } mesh_reading;
 
-/* On failure nothing is left to free; otherwise call ebpo_mesh_free(&out->mesh). */
-EBPO_MUST_USE ebpo_status mesh_input_read(mesh_input *out, const char *path, repairing requested,
-                                          mesh_reading more, ebpo_workspace *workspace,
-                                          unsigned threads, ebpo_progress progress,
-                                          ebpo_error *error);
+/* Reads, repairs and checks a mesh. After success call ebpo_mesh_free(&out->mesh); after a failure
+ * there is nothing to free. */
+EBPO_MUST_USE ebpo_status mesh_input_read(mesh_input *out, const char *path,
+                                          repair_request requested, mesh_reading more,
+                                          ebpo_workspace *workspace, unsigned threads,
+                                          ebpo_progress progress, ebpo_error *error);
 
 /* Also reads the groups of the file: see ebpo_mesh_read_groups. */
 EBPO_MUST_USE ebpo_status mesh_input_read_groups(mesh_input *out, const char *path,
-                                                 repairing requested, mesh_reading more,
+                                                 repair_request requested, mesh_reading more,
                                                  ebpo_mesh_groups **groups,
                                                  ebpo_workspace *workspace, unsigned threads,
                                                  ebpo_progress progress, ebpo_error *error);

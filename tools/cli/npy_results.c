@@ -9,24 +9,24 @@
 
 #include "cli/command.h"
 
-/* BEFORE: bytes of the magic, the version and the length; HEAD: bytes of the whole header. */
-enum { BEFORE = 10, HEAD = 192 };
+/* Bytes of the magic, the version and the length; bytes of the whole header. */
+enum { PREFIX_SIZE = 10, HEADER_SIZE = 192 };
 
-static void write_head(char head[HEAD], const char *dtype, uint64_t count)
+static void write_header(char head[HEADER_SIZE], const char *dtype, uint64_t count)
 {
-    memset(head, ' ', HEAD);
+    memset(head, ' ', HEADER_SIZE);
     memcpy(head, "\x93NUMPY\x01\x00", 8);
-    head[8] = (char)(HEAD - BEFORE);
+    head[8] = (char)(HEADER_SIZE - PREFIX_SIZE);
     head[9] = 0;
     int length =
-        snprintf(head + BEFORE, HEAD - BEFORE,
+        snprintf(head + PREFIX_SIZE, HEADER_SIZE - PREFIX_SIZE,
                  "{'descr': %s, 'fortran_order': False, 'shape': (%" PRIu64 ",), }", dtype, count);
-    head[BEFORE + length] = ' ';
-    head[HEAD - 1] = '\n';
+    head[PREFIX_SIZE + length] = ' ';
+    head[HEADER_SIZE - 1] = '\n';
 }
 
 /* Returns true when standard output is a file whose header can be rewritten. */
-static bool can_go_back(void)
+static bool can_rewrite_header(void)
 {
     struct stat st;
     int flags = fcntl(STDOUT_FILENO, F_GETFL);
@@ -36,8 +36,8 @@ static bool can_go_back(void)
 
 bool npy_begin(npy_results *npy, points *in)
 {
-    char head[HEAD];
-    npy->begin = can_go_back() ? lseek(STDOUT_FILENO, 0, SEEK_CUR) : -1;
+    char head[HEADER_SIZE];
+    npy->begin = can_rewrite_header() ? lseek(STDOUT_FILENO, 0, SEEK_CUR) : -1;
     if (npy->begin < 0 && !points_begin(in))
         return false;
     if (npy->begin < 0 && !in->rows_known) {
@@ -47,17 +47,17 @@ bool npy_begin(npy_results *npy, points *in)
                 npy->command);
         return false;
     }
-    write_head(head, npy->dtype, npy->begin < 0 ? in->rows_total : 0);
-    return command_write(npy->command, head, HEAD);
+    write_header(head, npy->dtype, npy->begin < 0 ? in->rows_total : 0);
+    return command_write(npy->command, head, HEADER_SIZE);
 }
 
 bool npy_end(npy_results *npy)
 {
-    char head[HEAD];
+    char head[HEADER_SIZE];
     off_t end = npy->begin < 0 ? -1 : lseek(STDOUT_FILENO, 0, SEEK_CUR);
     if (npy->begin < 0)
         return true;
-    write_head(head, npy->dtype, (uint64_t)(end - npy->begin - HEAD) / npy->bytes);
-    return pwrite(STDOUT_FILENO, head, HEAD, npy->begin) == HEAD ||
+    write_header(head, npy->dtype, (uint64_t)(end - npy->begin - HEADER_SIZE) / npy->bytes);
+    return pwrite(STDOUT_FILENO, head, HEADER_SIZE, npy->begin) == HEADER_SIZE ||
            command_not_written(npy->command);
 }

@@ -15,8 +15,8 @@ static bool ends_number(char c)
            c == '#' || c == '\n';
 }
 
-/* Moves *after behind a name such as #INF. Microsoft's C library writes 1.#INF, 1.#IND, 1.#QNAN and
- * 1.#SNAN for non-finite numbers. */
+/* Moves *after to the end of a name such as #INF. Microsoft's C library writes 1.#INF, 1.#IND,
+ * 1.#QNAN and 1.#SNAN for non-finite numbers. */
 static double pass_names(double v, const char **after)
 {
     const char *at = *after;

@@ -27,9 +27,9 @@ char *number_write_int(char *out, int64_t v);
 #ifdef __cplusplus
 extern "C" {
 #endif
-/* Parts done by the C++ library, when available (EBPO_HAVE_CHARCONV). Reading returns false when
- * strtod must decide. Writing uses the layout of printf's %e with the fewest digits, and returns
- * the end of the text. */
+/* Functions that use the C++ library, when it has <charconv> (EBPO_HAVE_CHARCONV).
+ * number_charconv_read returns false for text that only strtod can read. number_charconv_digits
+ * writes the layout of printf's %e with the fewest digits, and returns the end of the text. */
 bool number_charconv_read(const char *text, const char *end, const char **after, double *out);
 char *number_charconv_digits(char *out, double v);
 #ifdef __cplusplus

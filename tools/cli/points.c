@@ -43,8 +43,8 @@ bool points_open_shard(points *p, const char *by, const char *path, points_kind 
                    .tmax = tmax,
                    .layout = { points_raw_width(kind), 8, false },
                    .fd = STDIN_FILENO,
-                   .wake = -1,
-                   .together = POINTS_BATCH,
+                   .wake_fd = -1,
+                   .rows_per_block = POINTS_BATCH,
                    .rest_capacity = POINTS_LINE };
     if (!standard && points_is_dataset(path))
         return points_open_dataset(p, path, number, of);
@@ -73,7 +73,7 @@ void points_close(points *p)
 
 /* --- blocks --- */
 
-static bool block_capacity(points_block *b, size_t bytes)
+static bool alloc_block(points_block *b, size_t bytes)
 {
     if (b->capacity < bytes) {
         free(b->bytes);
@@ -109,32 +109,32 @@ static void take_lines(points *p, points_block *b)
         const char *last = last_line_end(b->bytes + scanned, b->count - scanned);
         whole = last ? (size_t)(last - b->bytes) + 1 : whole;
         scanned = b->count;
-        if (p->ended || b->count == POINTS_LINE ||
+        if (p->is_ended || b->count == POINTS_LINE ||
             (whole && (b->count >= POINTS_TEXT || !points_more_is_there(p))))
             break;
         size_t target = b->count < POINTS_TEXT ? POINTS_TEXT : POINTS_LINE;
         ssize_t got = points_read_some(p, b, b->bytes + b->count, target - b->count);
         b->count += got > 0 ? (size_t)got : 0;
     }
-    if (b->failed || (!p->ended && !whole)) {
+    if (b->failed || (!p->is_ended && !whole)) {
         size_t all = b->count;
         b->count = whole;
         if (!b->failed && all == POINTS_LINE)
-            points_fault(b, POINTS_BEHIND,
+            points_fault(b, POINTS_NEXT_LINE,
                          "is longer than %d bytes; this is not a text file of points (--raw reads "
                          "raw doubles)",
                          POINTS_LINE);
-    } else if (!p->ended) {
+    } else if (!p->is_ended) {
         keep_rest(p, b, whole);
     }
 }
 
-/* Detects a truncated copy and bytes behind the last row. */
+/* Detects a truncated input, and bytes after the last row. */
 static void check_rows(points *p, points_block *b, uint64_t more)
 {
     p->rows_taken += more;
     if (!b->failed &&
-        (p->rows_taken > p->rows_total || (p->ended && p->rows_taken < p->rows_total)))
+        (p->rows_taken > p->rows_total || (p->is_ended && p->rows_taken < p->rows_total)))
         points_fault(b, 0, "holds %s rows than the %" PRIu64 " of its shape; the input is %s",
                      p->rows_taken > p->rows_total ? "more" : "fewer", p->rows_total,
                      p->rows_taken > p->rows_total ? "something else" : "cut short");
@@ -143,43 +143,43 @@ static void check_rows(points *p, points_block *b, uint64_t more)
 /* Takes all complete rows. */
 static void take_numbers(points *p, points_block *b)
 {
-    size_t each = (size_t)(p->layout.per_row * p->layout.bytes), most = p->together * each;
-    while (!p->ended && b->count < most && (b->count < each || points_more_is_there(p))) {
+    size_t each = (size_t)(p->layout.per_row * p->layout.bytes), most = p->rows_per_block * each;
+    while (!p->is_ended && b->count < most && (b->count < each || points_more_is_there(p))) {
         ssize_t got = points_read_some(p, b, b->bytes + b->count, most - b->count);
         b->count += got > 0 ? (size_t)got : 0;
     }
     size_t left = b->count % each;
-    if (!p->ended)
+    if (!p->is_ended)
         keep_rest(p, b, b->count - left);
     else if (left && !b->failed)
         points_fault(b, 0,
                      "%zu bytes remain at the end, but each item takes %zu; the input is "
                      "truncated or in another format",
                      left, each);
-    b->count -= p->ended ? left : 0;
-    if (p->rows_reported)
+    b->count -= p->is_ended ? left : 0;
+    if (p->rows_stated)
         check_rows(p, b, b->count / each);
 }
 
 static void take_held(points *p, points_block *b)
 {
     uint64_t left = p->rows_total - p->held_at;
-    b->row_count = left < p->together ? left : p->together;
+    b->row_count = left < p->rows_per_block ? left : p->rows_per_block;
     b->rows = p->held + p->held_at * (uint64_t)points_width(p->kind);
     p->held_at += b->row_count;
 }
 
 static void begin_input(points *p, points_block *b)
 {
-    if (!p->begun && !p->failed)
-        p->ended |= !points_recognise(p, b);
-    p->begun = true;
+    if (!p->is_begun && !p->failed)
+        p->is_ended |= !points_recognise(p, b);
+    p->is_begun = true;
 }
 
 bool points_begin(points *p)
 {
     begin_input(p, &p->batch);
-    return !p->failed && points_pass(p, &p->batch);
+    return !p->failed && points_finish_block(p, &p->batch);
 }
 
 bool points_take(points *p, points_block *b)
@@ -197,10 +197,10 @@ bool points_take(points *p, points_block *b)
         take_held(p, b);
         return b->row_count > 0;
     }
-    size_t bytes =
-        p->raw ? p->together * (size_t)(p->layout.per_row * p->layout.bytes) : (size_t)POINTS_LINE;
-    if (!block_capacity(b, bytes > p->rest_count ? bytes : p->rest_count))
-        return p->ended = true;
+    size_t bytes = p->raw ? p->rows_per_block * (size_t)(p->layout.per_row * p->layout.bytes)
+                          : (size_t)POINTS_LINE;
+    if (!alloc_block(b, bytes > p->rest_count ? bytes : p->rest_count))
+        return p->is_ended = true;
     memcpy(b->bytes, p->rest, p->rest_count);
     b->count = p->rest_count;
     p->rest_count = 0;
@@ -210,13 +210,13 @@ bool points_take(points *p, points_block *b)
         take_lines(p, b);
     if (!p->raw && p->header && !p->fields && !b->failed)
         points_take_header(p, b);
-    p->ended |= b->failed;
+    p->is_ended |= b->failed;
     return b->count > 0 || b->failed;
 }
 
-/* --- in order --- */
+/* --- end of a block --- */
 
-/* Reports positions as lines, or as points from 1. */
+/* Prints the error of a block; the position is a line, or a point from 1. */
 static void report_fault(const points *p, const points_block *b)
 {
     static const char *const names[] = { "point", "ray", "box" };
@@ -232,7 +232,7 @@ static void report_fault(const points *p, const points_block *b)
     fprintf(stderr, "%s\n", b->fault);
 }
 
-bool points_pass(points *p, points_block *b)
+bool points_finish_block(points *p, points_block *b)
 {
     if (b->failed)
         report_fault(p, b);
@@ -248,7 +248,7 @@ uint64_t points_next(points *p, double *rows)
     uint64_t width = (uint64_t)points_width(p->kind);
     while (p->batch_at == b->row_count) {
         p->batch_at = 0;
-        if (!points_pass(p, b) || p->failed || !points_take(p, b)) {
+        if (!points_finish_block(p, b) || p->failed || !points_take(p, b)) {
             b->row_count = b->lines = 0;
             b->failed = false;
             return 0;

@@ -1,17 +1,18 @@
 /* Reads points, rays or boxes from standard input or a file, in blocks. Blocks are taken one after
- * the other. Several threads may parse blocks. points_pass is called for blocks in the order in
- * which they were taken, so that an error is reported after the results before it. */
+ * the other; several threads may parse blocks. Call points_finish_block in the order in which the
+ * blocks were taken, so that an error is reported after the results of the rows before it. */
 #ifndef EBPO_TOOLS_POINTS_H
 #define EBPO_TOOLS_POINTS_H
 
 #include "cli/points_input.h"
 
-/* `by`: the command. `path` NULL or "-": standard input. Returns false when it cannot be opened
- * (reported on stderr). Call points_close in any case. */
+/* Opens the input. `by`: name of the command, for messages. `path` NULL or "-": standard input.
+ * `raw`: the input is doubles. `tmax`: default for rays without tmax. Returns false when the input
+ * cannot be opened (reported on stderr). Call points_close in any case. */
 bool points_open(points *p, const char *by, const char *path, points_kind kind, bool raw,
                  double tmax);
-/* Does the same for points_cut(p, number, of), which must follow: of a dataset, only that part is
- * read. */
+/* As points_open; but of an HDF5 dataset it reads only part `number` of `of`. Call points_cut(p,
+ * number, of) next. */
 bool points_open_shard(points *p, const char *by, const char *path, points_kind kind, bool raw,
                        double tmax, uint64_t number, uint64_t of);
 void points_close(points *p);
@@ -23,11 +24,11 @@ bool points_begin(points *p);
  * at the end and after a fatal error. Initialize blocks with zeros. Only one thread at a time may
  * call this. */
 bool points_take(points *p, points_block *block);
-/* Called in order, after the results of the block were written. Returns false when an error cut the
- * block short, which has been reported on stderr. */
-bool points_pass(points *p, points_block *block);
+/* Counts the rows of a block whose results were written, and reports the error of the block, if
+ * any, on stderr. Call in the order in which blocks were taken. Returns false after an error. */
+bool points_finish_block(points *p, points_block *block);
 
-/* Takes, parses and passes blocks on one thread: fills rows[POINTS_BATCH][points_width]. Returns
+/* Takes, parses and finishes blocks on one thread: fills rows[POINTS_BATCH][points_width]. Returns
  * the number of rows; 0 at the end or after an error. */
 uint64_t points_next(points *p, double *rows);
 

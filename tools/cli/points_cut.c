@@ -25,7 +25,7 @@ static bool limit_bytes(points *p, uint64_t from, uint64_t to)
     p->limited = true;
     p->bytes_left = p->bytes_total = to - from;
     p->bytes_taken = 0;
-    p->ended = false;
+    p->is_ended = false;
     return lseek(p->fd, (off_t)from, SEEK_SET) >= 0 || fail_cut(p, strerror(errno));
 }
 
@@ -34,16 +34,16 @@ static bool limit_bytes(points *p, uint64_t from, uint64_t to)
 static bool cut_numbers(points *p, uint64_t begin, uint64_t size, uint64_t number, uint64_t of)
 {
     uint64_t each = (uint64_t)(p->layout.per_row * p->layout.bytes), rows = (size - begin) / each;
-    if (p->rows_reported && (size - begin) / each != p->rows_total)
+    if (p->rows_stated && (size - begin) / each != p->rows_total)
         return fail_cut(p, rows > p->rows_total
                                ? "holds more rows than its shape states; it is in another format"
                                : "holds fewer rows than its shape states; it is truncated");
     uint64_t first = points_share(rows, number, of), end = points_share(rows, number + 1, of);
     p->row = first;
-    p->rows_reported = false; /* which was checked here */
+    p->rows_stated = false; /* checked above; take_numbers need not check it */
     p->rows_known = true;
     p->rows_total = end - first;
-    /* the last part reports the bytes behind the last row */
+    /* the last part also reads the bytes after the last whole row, so that they are reported */
     return limit_bytes(p, begin + first * each, number + 1 < of ? begin + end * each : size);
 }
 
@@ -53,7 +53,7 @@ static bool cut_held(points *p, uint64_t number, uint64_t of)
     if (p->held_part)
         return true;
     p->row = p->held_at = points_share(rows, number, of);
-    p->rows_total = points_share(rows, number + 1, of);
+    p->rows_total = points_share(rows, number + 1, of); /* take_held stops before this row */
     return true;
 }
 
@@ -88,18 +88,18 @@ static bool take_names(points *p, uint64_t begin, uint64_t *out)
 {
     points_block b = { .bytes = malloc(POINTS_LINE + 1), .first = true };
     ssize_t got = b.bytes ? pread(p->fd, b.bytes, POINTS_LINE, (off_t)begin) : -1;
-    bool fine = got >= 0 || fail_cut(p, b.bytes ? strerror(errno) : "not enough memory");
+    bool success = got >= 0 || fail_cut(p, b.bytes ? strerror(errno) : "not enough memory");
     b.count = got > 0 ? (size_t)got : 0;
-    if (fine && b.count > 0) {
-        fine = points_take_header(p, &b);
-        if (!fine)
-            (void)points_pass(p, &b);
+    if (success && b.count > 0) {
+        success = points_take_header(p, &b);
+        if (!success)
+            (void)points_finish_block(p, &b);
         else if (!p->fields && got == POINTS_LINE)
-            fine = fail_cut(p, "holds no line of names in its first bytes");
+            success = fail_cut(p, "holds no line of names in its first bytes");
     }
     *out = begin + b.begin;
     points_block_free(&b);
-    return fine;
+    return success;
 }
 
 static bool cut_text(points *p, uint64_t begin, uint64_t size, uint64_t number, uint64_t of)
@@ -118,7 +118,7 @@ static bool cut_text(points *p, uint64_t begin, uint64_t size, uint64_t number, 
     return limit_bytes(p, from, number + 1 < of ? to : size);
 }
 
-/* --- all of them --- */
+/* --- all kinds of input --- */
 
 bool points_cut(points *p, uint64_t number, uint64_t of)
 {

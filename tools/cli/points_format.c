@@ -10,9 +10,9 @@
 
 #include "cli/points_format.h"
 
-enum { HEAD = 8 }; /* bytes of HDF5's signature */
+enum { SIGNATURE_SIZE = 8 }; /* bytes of HDF5's signature */
 
-static const char *const wanted[] = { "points", "rays", "boxes" };
+static const char *const kind_words[] = { "points", "rays", "boxes" };
 
 /* --- PLY --- */
 
@@ -22,7 +22,7 @@ static bool read_ply(points *p, points_block *b)
     if (p->kind != POINTS)
         return points_fault(b, 0,
                             "is a PLY file, which holds points; give %s as text or with --raw",
-                            wanted[p->kind]);
+                            kind_words[p->kind]);
     if (!points_fill_all(p, b))
         return false;
     if (ebpo_points_parse_ply(p->rest, p->rest_count, p->name, &p->held, &p->rows_total, &error) !=
@@ -40,7 +40,7 @@ static bool read_ply(points *p, points_block *b)
 
 /* Returns the value after 'name': in the header, which is a Python dictionary; NULL: no such name.
  */
-static const char *npy_value(const char *head, const char *name)
+static const char *find_npy_value(const char *head, const char *name)
 {
     const char *at = strstr(head, name);
     at = at ? strchr(at + strlen(name), ':') : NULL;
@@ -49,7 +49,7 @@ static const char *npy_value(const char *head, const char *name)
     return at;
 }
 
-static bool npy_type(points *p, const char *descr)
+static bool parse_npy_type(points *p, const char *descr)
 {
     if (strnlen(descr, 5) < 5)
         return false; /* the header ends within the value */
@@ -59,7 +59,7 @@ static bool npy_type(points *p, const char *descr)
 }
 
 /* Reads a count of at most 18 digits, which cannot overflow, and the blanks around it. */
-static bool npy_count(const char **at, uint64_t *count)
+static bool read_npy_count(const char **at, uint64_t *count)
 {
     enum { DIGITS_MAX = 18 };
     *at += strspn(*at, " ");
@@ -73,16 +73,16 @@ static bool npy_count(const char **at, uint64_t *count)
 }
 
 /* Reads "(N, 3)"; "(3,)" is one row. Allows blanks anywhere and a comma after the last number. */
-static bool npy_shape(points *p, const char *shape)
+static bool parse_npy_shape(points *p, const char *shape)
 {
     uint64_t rows = 1, columns = 0;
     const char *at = shape + 1;
-    if (*shape != '(' || !npy_count(&at, &columns) || *at++ != ',')
+    if (*shape != '(' || !read_npy_count(&at, &columns) || *at++ != ',')
         return false;
     at += strspn(at, " ");
     if (*at != ')') {
         rows = columns;
-        if (!npy_count(&at, &columns))
+        if (!read_npy_count(&at, &columns))
             return false;
         at += *at == ',';
         at += strspn(at, " ");
@@ -92,14 +92,15 @@ static bool npy_shape(points *p, const char *shape)
         return false;
     p->layout.per_row = (int)columns;
     p->rows_total = rows;
-    p->rows_known = p->rows_reported = true;
+    p->rows_known = p->rows_stated = true;
     return true;
 }
 
-static bool npy_head(points *p, points_block *b, const char *head)
+static bool parse_npy_header(points *p, points_block *b, const char *head)
 {
-    const char *descr = npy_value(head, "'descr'"), *order = npy_value(head, "'fortran_order'"),
-               *shape = npy_value(head, "'shape'");
+    const char *descr = find_npy_value(head, "'descr'"),
+               *order = find_npy_value(head, "'fortran_order'"),
+               *shape = find_npy_value(head, "'shape'");
     if (!descr || !order || !shape)
         return points_fault(b, 0, "has no valid NumPy header");
     if (*descr == '[')
@@ -108,14 +109,14 @@ static bool npy_head(points *p, points_block *b, const char *head)
                             "numpy.lib.recfunctions.structured_to_unstructured of it");
     if (*descr != '\'')
         return points_fault(b, 0, "has no valid NumPy header");
-    if (!npy_type(p, descr))
+    if (!parse_npy_type(p, descr))
         return points_fault(b, 0, "holds numbers of type %.*s; give float64 or float32 (astype)",
                             (int)strcspn(descr + 1, "'") + 2, descr);
     if (strncmp(order, "False", 5) != 0)
         return points_fault(b, 0, "is stored column by column; save numpy.ascontiguousarray of it");
-    if (!npy_shape(p, shape))
+    if (!parse_npy_shape(p, shape))
         return points_fault(b, 0, "has the shape %.*s; %s are rows of %s",
-                            (int)strcspn(shape, ")") + 1, shape, wanted[p->kind],
+                            (int)strcspn(shape, ")") + 1, shape, kind_words[p->kind],
                             p->kind == POINTS        ? "three"
                             : p->kind == POINTS_RAYS ? "six or seven"
                                                      : "six");
@@ -125,17 +126,17 @@ static bool npy_head(points *p, points_block *b, const char *head)
 /* Reads magic, version, length of the header, header, numbers. */
 static bool read_npy(points *p, points_block *b)
 {
-    enum { BEFORE = 12, LONGEST = 1 << 16 };
+    enum { PREFIX_SIZE = 12, HEADER_MAX = 1 << 16 };
     char head[4096];
-    while (p->rest_count < BEFORE && !p->ended && points_fill(p, b))
+    while (p->rest_count < PREFIX_SIZE && !p->is_ended && points_fill(p, b))
         ;
-    if (!b->failed && p->rest_count < BEFORE)
+    if (!b->failed && p->rest_count < PREFIX_SIZE)
         return points_fault(b, 0, "has no valid NumPy header");
     const uint8_t *u = (const uint8_t *)p->rest;
     size_t before = u[6] == 1 ? 10 : 12,
            length = u[6] == 1 ? (size_t)u[8] | (size_t)u[9] << 8
                               : (size_t)u[8] | (size_t)u[9] << 8 | (size_t)u[10] << 16;
-    while (p->rest_count < before + length && length < sizeof head && !p->ended &&
+    while (p->rest_count < before + length && length < sizeof head && !p->is_ended &&
            points_fill(p, b))
         ;
     if (b->failed)
@@ -151,7 +152,7 @@ static bool read_npy(points *p, points_block *b)
         *quote = '\''; /* Python writes ' or " */
     points_drop(p, before + length);
     p->raw = true;
-    return npy_head(p, b, head);
+    return parse_npy_header(p, b, head);
 }
 
 /* --- HDF5 datasets --- */
@@ -214,7 +215,7 @@ bool points_open_dataset(points *p, const char *path, uint64_t number, uint64_t 
     const char *colon = dataset_colon(path);
     char *file = strndup(path, (size_t)(colon - path));
     ebpo_error error = { .status = EBPO_E_MEMORY };
-    p->begun = p->rows_known = true;
+    p->is_begun = p->rows_known = true;
     p->failed = !file || read_part(p, file, colon + 1, number, of, &error) != EBPO_OK;
     free(file);
     if (p->failed)
@@ -237,7 +238,7 @@ static bool begins_as_ply(const points *p)
     if (!begins_with(p, "ply\n", 4) && !begins_with(p, "ply\r", 4) &&
         (p->raw || (!begins_with(p, "ply ", 4) && !begins_with(p, "ply\t", 4))))
         return false;
-    for (size_t i = 5; i < HEAD && p->raw; i++)
+    for (size_t i = 5; i < SIGNATURE_SIZE && p->raw; i++)
         if (i >= p->rest_count || p->rest[i] < 'a' || p->rest[i] > 'z')
             return false;
     return true;
@@ -269,7 +270,7 @@ static bool refuse_hdf5(points *p, points_block *b)
     if (read_dataset(p, p->name, "", 0, UINT64_MAX, &total, &error) == EBPO_E_ABSENT)
         return points_fault(
             b, 0, "is an HDF5 file and holds no %s; give the model first, then the query input",
-            wanted[p->kind]);
+            kind_words[p->kind]);
     fprintf(stderr, "ebpo %s: %s\n", p->command, error.message);
     p->failed = true;
     return false;
@@ -277,7 +278,7 @@ static bool refuse_hdf5(points *p, points_block *b)
 
 static bool recognise_format(points *p, points_block *b)
 {
-    if (begins_with(p, "\211HDF\r\n\032\n", HEAD))
+    if (begins_with(p, "\211HDF\r\n\032\n", SIGNATURE_SIZE))
         return refuse_hdf5(p, b);
     if (begins_with(p, "\223NUMPY", 6))
         return read_npy(p, b);
@@ -290,7 +291,7 @@ static bool recognise_format(points *p, points_block *b)
     if (begins_as_ply(p))
         return points_fault(b, 0,
                             "is a PLY file, which holds points; give %s as text or as raw doubles",
-                            wanted[p->kind]);
+                            kind_words[p->kind]);
     return p->raw || !is_foreign(p);
 }
 
@@ -299,7 +300,7 @@ bool points_recognise(points *p, points_block *b)
 {
     for (;;) {
         bool binary = p->rest_count && (uint8_t)p->rest[0] > 0x7f;
-        if (p->rest_count >= (p->raw || binary ? HEAD : 4) || p->ended || b->failed)
+        if (p->rest_count >= (p->raw || binary ? SIGNATURE_SIZE : 4) || p->is_ended || b->failed)
             break;
         points_fill(p, b);
     }

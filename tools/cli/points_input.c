@@ -38,9 +38,9 @@ void points_block_free(points_block *b)
 /* Waits for more input. Returns false when the wait was interrupted. */
 static bool wait_for_more(const points *p)
 {
-    struct pollfd both[] = { { .fd = p->wake, .events = POLLIN },
+    struct pollfd both[] = { { .fd = p->wake_fd, .events = POLLIN },
                              { .fd = p->fd, .events = POLLIN } };
-    while (p->wake >= 0 && poll(both, 2, -1) < 0 && errno == EINTR)
+    while (p->wake_fd >= 0 && poll(both, 2, -1) < 0 && errno == EINTR)
         ;
     return !(both[0].revents & POLLIN);
 }
@@ -51,7 +51,7 @@ ssize_t points_read_some(points *p, points_block *b, char *to, size_t most)
     if (p->limited && p->bytes_left < most)
         most = (size_t)p->bytes_left;
     if (most == 0 || !wait_for_more(p)) {
-        p->ended = true;
+        p->is_ended = true;
         return 0;
     }
     do
@@ -59,7 +59,7 @@ ssize_t points_read_some(points *p, points_block *b, char *to, size_t most)
     while (got < 0 && errno == EINTR);
     if (got < 0)
         points_fault(b, 0, "cannot be read: %s", strerror(errno));
-    p->ended |= got <= 0;
+    p->is_ended |= got <= 0;
     p->bytes_taken += got > 0 ? (uint64_t)got : 0;
     p->bytes_left -= p->limited && got > 0 ? (uint64_t)got : 0;
     return got;
@@ -74,7 +74,7 @@ bool points_fill(points *p, points_block *b)
 
 bool points_fill_all(points *p, points_block *b)
 {
-    while (!p->ended) {
+    while (!p->is_ended) {
         if (p->rest_count == p->rest_capacity) {
             char *wider = p->rest_capacity <= SIZE_MAX / 4
                               ? realloc(p->rest, 2 * p->rest_capacity + 1)

@@ -1,5 +1,5 @@
-/* Input bytes of blocks of points, and errors in a block. Internal to the files that read points.
- */
+/* Reads the bytes of blocks of points, and records errors of a block. Internal to the files that
+ * read points. */
 #ifndef EBPO_TOOLS_POINTS_INPUT_H
 #define EBPO_TOOLS_POINTS_INPUT_H
 
@@ -37,39 +37,39 @@ typedef struct points_block {
     uint64_t capacity_rows;
     uint64_t lines;    /* lines of text, including those before `begin` */
     bool first;        /* true for the first block of the input */
-    bool failed;       /* an error follows the last row of the block: */
-    uint64_t fault_at; /* line or row from 1 in this block, 0: the input as a whole */
-    char fault[200];
+    bool failed;       /* an error follows the last row of the block */
+    uint64_t fault_at; /* its line or row, from 1 in this block; 0: the input as a whole */
+    char fault[200];   /* its message */
 } points_block;
 
 typedef struct points {
     const char *command, *name; /* for messages */
     points_kind kind;
-    bool raw;      /* the input is doubles, or numbers as in `layout` */
-    bool header;   /* the first line of text names columns; may be set after points_open */
-    bool headless; /* the command accepts no header line */
-    double tmax;   /* default for rays without it */
+    bool raw;       /* the input is doubles, or numbers as in `layout` */
+    bool header;    /* the first line of text names columns; may be set after points_open */
+    bool no_header; /* the command accepts no header line */
+    double tmax;    /* default for rays without it */
     int fd;
-    int wake; /* when this becomes readable, waiting ends as at the end of the input; -1: none */
+    int wake_fd; /* when it becomes readable, waiting ends as at the end of the input; -1: none */
     uint64_t bytes_total, bytes_taken; /* bytes of a file; 0: unknown */
-    bool limited;                      /* only the following number of bytes may still be read */
+    bool limited;                      /* only `bytes_left` bytes may still be read */
     uint64_t bytes_left;
-    char *rest; /* [rest_capacity] bytes read and not yet taken */
+    char *rest; /* [rest_capacity] bytes that were read, but are in no block yet */
     size_t rest_count, rest_capacity;
-    bool begun, taken, ended;
-    _Atomic bool failed; /* reported on stderr; the command must end with EXIT_FAILED */
-    uint64_t line, row;  /* numbers of lines and rows passed */
-    uint64_t line_from;  /* lines are counted from this byte of the file */
-    uint64_t together;   /* rows of a block in binary input */
+    bool is_begun, taken, is_ended;
+    _Atomic bool failed;     /* reported on stderr; the command must end with EXIT_FAILED */
+    uint64_t line, row;      /* numbers of lines and rows passed */
+    uint64_t line_from;      /* lines are counted from this byte of the file */
+    uint64_t rows_per_block; /* rows of a block in binary input */
     points_layout layout;
-    bool rows_known;          /* the following total number of rows is known */
-    uint64_t rows_total;      /* the input may have fewer */
-    bool rows_reported;       /* the header of an array states the total number, which must match */
+    bool rows_known;          /* rows_total is known */
+    uint64_t rows_total;      /* rows to read: of the input, after points_cut of its part */
+    bool rows_stated;         /* the header of an array states rows_total, which must match */
     uint64_t rows_taken;      /* rows taken of such an array */
     bool from_zero;           /* messages call rows "vertex 0" */
-    double *held;             /* all rows of input that is read completely; or NULL */
-    uint64_t held_at;         /* number of rows taken */
-    bool held_part;           /* these rows are already the part that points_cut would take */
+    double *held;             /* all rows of an input that is read completely; or NULL */
+    uint64_t held_at;         /* number of rows taken from `held` */
+    bool held_part;           /* `held` is already the part that points_cut would take */
     int field[POINTS_WIDEST]; /* with a header: position of each number; -1: none */
     int fields;               /* fields in a line; 0: not known yet */
     char separator;           /* between fields; 0: blanks */
@@ -80,10 +80,10 @@ typedef struct points {
 /* Longest line of text; bytes read at a time; maximum number of columns in a header. */
 enum { POINTS_LINE = 1 << 18, POINTS_TEXT = 1 << 17, POINTS_FIELDS = 256 };
 
-/* Value of `fault_at` for the line after the block. */
-#define POINTS_BEHIND UINT64_MAX
+/* Value of `fault_at` for the line after the last line of the block. */
+#define POINTS_NEXT_LINE UINT64_MAX
 
-/* Records an error behind the last row of a block; `at` as in `fault_at`. Returns false. */
+/* Records an error after the last row of a block; `at` as in `fault_at`. Returns false. */
 __attribute__((format(printf, 3, 4))) bool points_fault(points_block *b, uint64_t at,
                                                         const char *format, ...);
 
@@ -91,13 +91,15 @@ __attribute__((format(printf, 3, 4))) bool points_fault(points_block *b, uint64_
  * at most 10^9. */
 uint64_t points_share(uint64_t total, uint64_t number, uint64_t of);
 
-/* Reads more bytes behind `rest`, once or to the end. On false the block holds the error. */
+/* Appends input bytes to `rest`: those of one read, or all up to the end of the input. Returns
+ * false after an error, which is then in the block. */
 bool points_fill(points *p, points_block *b);
 bool points_fill_all(points *p, points_block *b);
 /* Removes bytes from the beginning of `rest`. */
 void points_drop(points *p, size_t bytes);
 
-/* Reads once, up to `most` bytes. On -1 the block holds the error. */
+/* Reads once, at most `most` bytes. Returns the number of bytes; -1 after an error, which is then
+ * in the block. */
 ssize_t points_read_some(points *p, points_block *b, char *to, size_t most);
 /* Returns true when more can be read without waiting; always for files. */
 bool points_more_is_there(const points *p);

@@ -30,7 +30,7 @@ static bool check_row(const points *p, points_block *b, uint64_t at, const doubl
     return true;
 }
 
-static bool rows_capacity(const points *p, points_block *b, uint64_t rows)
+static bool alloc_rows(const points *p, points_block *b, uint64_t rows)
 {
     if (b->capacity_rows < rows) {
         free(b->space);
@@ -50,14 +50,15 @@ static double load_number(points_layout layout, const char *at)
     float f;
     for (int i = 0; i < layout.bytes; i++)
         bits |= (uint64_t)(uint8_t)at[layout.big_endian ? layout.bytes - 1 - i : i] << 8 * i;
-    uint32_t half = (uint32_t)bits;
-    memcpy(&f, &half, sizeof f);
+    uint32_t low = (uint32_t)bits;
+    memcpy(&f, &low, sizeof f);
     memcpy(&v, &bits, sizeof v);
     return layout.bytes == 4 ? (double)f : v;
 }
 
-/* Returns true when rows can be used without conversion. */
-static bool stands_as_rows(const points *p)
+/* Returns true when the input numbers have the layout of query rows, so that no conversion is
+ * needed. */
+static bool is_query_layout(const points *p)
 {
     return p->layout.bytes == 8 && p->layout.per_row == points_width(p->kind) &&
            p->layout.big_endian == (__BYTE_ORDER__ == __ORDER_BIG_ENDIAN__);
@@ -89,9 +90,9 @@ static void parse_numbers(const points *p, points_block *b)
 {
     uint64_t width = (uint64_t)points_width(p->kind), each = (uint64_t)p->layout.per_row,
              bytes = (uint64_t)p->layout.bytes, count = b->count / (each * bytes);
-    if (stands_as_rows(p))
+    if (is_query_layout(p))
         b->rows = (const double *)(const void *)b->bytes;
-    else if (!rows_capacity(p, b, count))
+    else if (!alloc_rows(p, b, count))
         return;
     for (uint64_t i = 0; i < count && b->rows == b->space; i++) {
         double *row = b->space + i * width;
@@ -116,24 +117,25 @@ static char *skip_blanks(char *s)
     return s;
 }
 
-/* Reports a wrong number of values. `at`: the text that is not a number; `more`: it follows the
- * maximum number of values. */
+/* Reports a wrong number of values. `at`: the text at which parsing stopped; `more`: it stopped
+ * because the row is full. */
 static bool wrong_count(const points *p, points_block *b, const char *at, bool more)
 {
     static const char *const expected[] = {
         "expected three numbers", "expected six or seven numbers: origin, direction and tmax",
         "expected six numbers: the lower and the upper corner"
     };
-    bool names = b->first && !b->row_count && !p->headless &&
+    bool names = b->first && !b->row_count && !p->no_header &&
                  (isalpha((uint8_t)*at) || *at == '"' || (at[0] == '/' && at[1] == '/'));
     return points_fault(b, b->lines, "%s%s%s", expected[p->kind], more ? ", but more follow" : "",
                         names ? "; --header reads the first line as names of columns"
-                        : more && !p->headless
+                        : more && !p->no_header
                             ? "; name the columns in a line before the first, and give --header"
                             : "");
 }
 
-static bool parse_blanks(const points *p, points_block *b, char *s, char *end, double *row,
+/* Parses numbers that are separated by blanks or commas. */
+static bool parse_values(const points *p, points_block *b, char *s, char *end, double *row,
                          int *count)
 {
     while (*s && *s != '#') {
@@ -182,7 +184,7 @@ static bool parse_line(const points *p, points_block *b, char *s, char *end)
     s = skip_blanks(s);
     if (!*s || *s == '#')
         return true;
-    if (!(p->fields ? parse_fields : parse_blanks)(p, b, s, end, row, &count))
+    if (!(p->fields ? parse_fields : parse_values)(p, b, s, end, row, &count))
         return false;
     if (count < points_raw_width(p->kind))
         return wrong_count(p, b, s, false);
@@ -197,7 +199,7 @@ static void parse_text(const points *p, points_block *b)
     char *s = b->bytes + b->begin, *all = b->bytes + b->count;
     const char *zero = memchr(s, 0, (size_t)(all - s));
     /* the shortest row: a digit and a separator for each number */
-    if (!rows_capacity(p, b, (uint64_t)(all - s) / (2 * (uint64_t)points_raw_width(p->kind)) + 1))
+    if (!alloc_rows(p, b, (uint64_t)(all - s) / (2 * (uint64_t)points_raw_width(p->kind)) + 1))
         return;
     while (s < all) {
         char *end = memchr(s, '\n', (size_t)(all - s));
@@ -216,15 +218,14 @@ static void parse_text(const points *p, points_block *b)
     }
 }
 
-/* Parses the block. An error found when taking the block follows all of its rows; errors found here
- * come before it. */
+/* Parses the block. If taking the block failed, that error belongs after its last row; an error
+ * found here replaces it. */
 void points_parse(const points *p, points_block *b)
 {
-    bool behind = b->failed && b->fault_at; /* the line after the last one */
     if (p->held)
         check_rows(p, b, b->row_count);
     else if (b->count > b->begin)
         (p->raw ? parse_numbers : parse_text)(p, b);
-    if (behind && b->fault_at == POINTS_BEHIND)
+    if (b->failed && b->fault_at == POINTS_NEXT_LINE) /* not replaced */
         b->fault_at = b->lines + 1;
 }

@@ -4,17 +4,17 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { LIMIT = 13 };
+enum { NUMBERS_MAX = 13 };
 
 /* Returns how many numbers there are, -1 for other text or more numbers. */
-static int read_numbers(const char *text, double number[LIMIT])
+static int read_numbers(const char *text, double number[NUMBERS_MAX])
 {
     static const char between[] = " \t,";
     int count = 0;
     for (text += strspn(text, between); *text; text += strspn(text, between)) {
         char *end;
         double x = strtod(text, &end);
-        if (end == text || count == LIMIT || !isfinite(x) || (*end && !strchr(between, *end)))
+        if (end == text || count == NUMBERS_MAX || !isfinite(x) || (*end && !strchr(between, *end)))
             return -1;
         number[count++] = x;
         text = end;
@@ -22,7 +22,7 @@ static int read_numbers(const char *text, double number[LIMIT])
     return count;
 }
 
-static void take_rows(ebpo_pose *pose, const double *number)
+static void set_rows(ebpo_pose *pose, const double *number)
 {
     for (int i = 0; i < 3; i++) {
         memcpy(pose->rotation[i], number + 4 * i, sizeof pose->rotation[i]);
@@ -32,12 +32,12 @@ static void take_rows(ebpo_pose *pose, const double *number)
 
 bool pose_read(const char *text, ebpo_pose *out)
 {
-    double number[LIMIT];
+    double number[NUMBERS_MAX];
     int count = read_numbers(text, number);
     if (count != 3 && count != 7 && count != 8 && count != 12 && count != 13)
         return false;
     if (count >= 12)
-        take_rows(out, number);
+        set_rows(out, number);
     else
         memcpy(out->translation, number, sizeof out->translation);
     if (count == 8 || count == 13)

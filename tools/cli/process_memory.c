@@ -11,12 +11,12 @@ enum { THREADS_MAX = 256 };
 
 /* Limit for this process, which runs one command. */
 static uint64_t limit_bytes;
-static bool limit_given;
-static rlim_t before_us = RLIM_INFINITY; /* limit inherited from the parent process */
+static bool limit_by_option;
+static rlim_t inherited_limit = RLIM_INFINITY; /* limit inherited from the parent process */
 
-/* Returns the memory that counts and is already in use: private writable memory, which under
- * sanitizers is most of the address space. */
-static uint64_t taken_already(void)
+/* Returns the bytes in use that count for the limit: private writable memory. Under sanitizers this
+ * is most of the address space. */
+static uint64_t used_bytes(void)
 {
     unsigned long long pages = 0;
     FILE *f = fopen("/proc/self/statm", "re");
@@ -30,7 +30,7 @@ static uint64_t taken_already(void)
 
 /* Returns the bytes of the stacks of threads. Stacks count completely, although little of each is
  * used. `threads`: number of threads; 0: one for each core. */
-static uint64_t bytes_of_stacks(int64_t threads)
+static uint64_t stack_bytes(int64_t threads)
 {
     struct rlimit stack;
     long cores = sysconf(_SC_NPROCESSORS_ONLN);
@@ -43,23 +43,23 @@ static uint64_t bytes_of_stacks(int64_t threads)
 
 /* Sets the limit, which never exceeds the limit inherited from the parent process. `bytes` 0: no
  * additional limit. */
-static void limit_to(uint64_t bytes, int64_t threads, bool given)
+static void set_limit(uint64_t bytes, int64_t threads, bool given)
 {
     struct rlimit limit;
-    uint64_t already = taken_already(), all = already + bytes_of_stacks(threads) + bytes;
+    uint64_t already = used_bytes(), all = already + stack_bytes(threads) + bytes;
     if (!already || all < bytes || getrlimit(RLIMIT_DATA, &limit) != 0)
         return;
     if (!given)
-        before_us = limit.rlim_cur;
-    bool ours = bytes && all <= before_us; /* RLIM_INFINITY is the greatest */
-    limit.rlim_cur = ours ? all : before_us;
+        inherited_limit = limit.rlim_cur;
+    bool ours = bytes && all <= inherited_limit; /* RLIM_INFINITY is the greatest */
+    limit.rlim_cur = ours ? all : inherited_limit;
     if (setrlimit(RLIMIT_DATA, &limit) != 0)
         return;
     limit_bytes = ours ? bytes : 0;
-    limit_given = given;
+    limit_by_option = given;
 }
 
-void process_memory_default(void) { limit_to(ebpo_free_memory(), 0, false); }
+void process_memory_default(void) { set_limit(ebpo_free_memory(), 0, false); }
 
 bool process_memory_take(const char *command, const char *size, int64_t threads)
 {
@@ -72,16 +72,16 @@ bool process_memory_take(const char *command, const char *size, int64_t threads)
                 command, size, command);
         return false;
     }
-    limit_to(bytes, threads, true);
+    set_limit(bytes, threads, true);
     return true;
 }
 
-void process_memory_why(char *out, size_t capacity)
+void process_memory_reason(char *out, size_t capacity)
 {
     char size[32];
     words_bytes(size, sizeof size, limit_bytes);
     snprintf(out, capacity, "%s%s%s", limit_bytes ? "; " : "", limit_bytes ? size : "",
-             !limit_bytes  ? ""
-             : limit_given ? " is what --memory allows"
-                           : " was free at the start");
+             !limit_bytes      ? ""
+             : limit_by_option ? " is what --memory allows"
+                               : " was free at the start");
 }

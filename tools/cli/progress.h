@@ -12,13 +12,13 @@ typedef struct progress_line {
     bool shown;         /* true if a line must be wiped */
     const char *stage;  /* stage of the last report */
     double begun, last; /* in seconds: start of the stage, last drawing of the line */
-    /* in the order of their first start */
+    /* stages in the order in which they first began */
     struct {
         const char *name;
         double seconds;
     } stages[PROGRESS_STAGES];
     int stage_count, current;
-    const int *plan; /* rows of stages.h to come, in their order; NULL: not known */
+    const int *plan; /* rows of all stages in their order (stages_plan); NULL: not known */
     int plan_count, at;
     /* number of faces of the mesh, 0 before it is read; NULL: rates count the work done */
     const uint64_t *faces;

@@ -22,7 +22,8 @@ static const struct {
 
 /* --- options without effect beside others --- */
 
-bool query_accepts(const char *name, const query_values *v, unsigned idle, const char *with)
+bool query_check_effect(const char *name, const query_values *v, unsigned ineffective,
+                        const char *with)
 {
     const struct {
         unsigned bit;
@@ -35,7 +36,7 @@ bool query_accepts(const char *name, const query_values *v, unsigned idle, const
                 { QUERY_NO_WARM, v->no_warm, "--no-warm" },
                 { QUERY_PREFETCH, v->prefetch, "--prefetch" } };
     for (size_t i = 0; i < sizeof all / sizeof *all; i++)
-        if (all[i].given && idle & all[i].bit) {
+        if (all[i].given && ineffective & all[i].bit) {
             command_usage(name, "%s has no effect with %s; omit one of them", all[i].option, with);
             return false;
         }
@@ -47,17 +48,18 @@ bool query_inside_fits(const char *name, const query_values *v)
     char with[40];
     snprintf(with, sizeof with, "--mode %s", inside_modes[v->inside_mode]);
     return inside_meanings[v->inside_mode].loading == EBPO_LOAD_CACHE ||
-           query_accepts(name, v, QUERY_PREFETCH, with);
+           query_check_effect(name, v, QUERY_PREFETCH, with);
 }
 
 bool query_distance_fits(const char *name, const query_values *v)
 {
+    /* Options without effect on other searches, and on distances to envelopes. */
     enum {
-        AROUND = QUERY_LEVEL | QUERY_DEADLINE | QUERY_NO_WARM | QUERY_PREFETCH,
-        ENVELOPE =
+        SEARCH_OPTIONS = QUERY_LEVEL | QUERY_DEADLINE | QUERY_NO_WARM | QUERY_PREFETCH,
+        FACE_OPTIONS =
             QUERY_DEADLINE | QUERY_MAX_DISTANCE | QUERY_UNSIGNED | QUERY_NO_WARM | QUERY_PREFETCH
     };
-    static const unsigned idle[] = { 0, AROUND, AROUND, ENVELOPE };
+    static const unsigned ineffective[] = { 0, SEARCH_OPTIONS, SEARCH_OPTIONS, FACE_OPTIONS };
     const char *lists = v->nearest ? "--nearest" : "--within";
     char with[40];
     snprintf(with, sizeof with, "--mode %s", distance_modes[v->distance_mode]);
@@ -66,11 +68,13 @@ bool query_distance_fits(const char *name, const query_values *v)
         return false;
     }
     if (query_lists(v))
-        return query_accepts(name, v, AROUND | QUERY_MAX_DISTANCE | QUERY_UNSIGNED, lists);
-    if (!query_accepts(name, v, idle[v->distance_mode], with))
+        return query_check_effect(name, v, SEARCH_OPTIONS | QUERY_MAX_DISTANCE | QUERY_UNSIGNED,
+                                  lists);
+    if (!query_check_effect(name, v, ineffective[v->distance_mode], with))
         return false;
     return v->level < 0 ||
-           query_accepts(name, v, QUERY_UNSIGNED | QUERY_NO_WARM | QUERY_PREFETCH, "--max-level");
+           query_check_effect(name, v, QUERY_UNSIGNED | QUERY_NO_WARM | QUERY_PREFETCH,
+                              "--max-level");
 }
 
 /* --- values --- */
@@ -132,7 +136,7 @@ int query_open_file(query_session *s, const char *name, const char *path,
         return command_failed(name, &error);
     const ebpo_info *info = ebpo_file_info(s->file);
     return command_has_level(name, info, level) && command_has_level(name, info, options->cut_level)
-               ? EXIT_FINE
+               ? EXIT_OK
                : EXIT_USAGE;
 }
 
@@ -140,7 +144,7 @@ int query_open_model(query_session *s, const char *name, const ebpo_model_option
 {
     ebpo_error error = EBPO_ERROR_INIT;
     return ebpo_model_new(s->file, options, &s->model, &error) == EBPO_OK
-               ? EXIT_FINE
+               ? EXIT_OK
                : command_failed(name, &error);
 }
 
@@ -149,9 +153,9 @@ int query_open(query_session *s, const char *name, const char *path,
 {
     ebpo_error error = EBPO_ERROR_INIT;
     int code = query_open_file(s, name, path, options, level, remote);
-    if (code == EXIT_FINE)
+    if (code == EXIT_OK)
         code = query_open_model(s, name, options);
-    return code != EXIT_FINE || ebpo_context_new(s->model, &s->context, &error) == EBPO_OK
+    return code != EXIT_OK || ebpo_context_new(s->model, &s->context, &error) == EBPO_OK
                ? code
                : command_failed(name, &error);
 }

@@ -27,7 +27,7 @@ extern const char *const inside_modes[];   /* fast, cache, nodes, ... */
 extern const char *const distance_modes[]; /* in the order of ebpo_distance_mode */
 extern const char *const ray_sides[];      /* for --sides, in the order of ebpo_ray_sides */
 
-/* Options as bits, to report options without effect. */
+/* Bits of options, for query_check_effect. */
 enum {
     QUERY_LEVEL = 1,
     QUERY_DEADLINE = 2,
@@ -43,9 +43,10 @@ static inline bool query_lists(const query_values *v)
     return v->nearest > 0 || isfinite(v->within);
 }
 
-/* Returns false when one of the options `idle` was given, which has no effect with `with`, such as
- * "--mode leaves"; reported on stderr (exit with EXIT_USAGE). */
-bool query_accepts(const char *name, const query_values *v, unsigned idle, const char *with);
+/* Checks that none of the options `ineffective` was given, which have no effect with `with`, such
+ * as "--mode leaves". Returns false after a report on stderr (exit with EXIT_USAGE). */
+bool query_check_effect(const char *name, const query_values *v, unsigned ineffective,
+                        const char *with);
 /* Returns false, with a report on stderr (exit with EXIT_USAGE), when an option has no effect with
  * the given --mode, or for distances with --max-level. */
 bool query_inside_fits(const char *name, const query_values *v);

@@ -10,13 +10,14 @@
 typedef struct remote_values {
     bool stats, unversioned;
     int64_t max_expansion; /* as in ebpo_open_options */
-    bool compat;           /* also layouts of other programs */
+    bool compat;           /* also opens files with the layouts of other programs */
     const char *cache, *cache_size, *user, *ca_file;
     unsigned cache_block; /* bytes; 0: default */
     double timeout, stall;
     int64_t retries, connections;
     arg_list headers;
-    bool (*stop)(void *user); /* not options: as in ebpo_http_options */
+    /* not options: as in ebpo_http_options */
+    bool (*stop)(void *user);
     void *stop_user;
 } remote_values;
 #define REMOTE_VALUES_INIT                                           \
@@ -43,8 +44,8 @@ typedef struct traffic {
 } traffic;
 traffic traffic_of(const ebpo_file *file);
 
-/* With --stats: prints a line or JSON on stderr, or a member "traffic" of a JSON object. Otherwise
- * nothing. */
+/* Print the traffic on stderr as a line or JSON, or as a member "traffic" of a JSON object. Without
+ * --stats they print nothing. */
 void remote_report(const traffic *t, const remote_values *values, bool as_json);
 void remote_json(json *j, const traffic *t, const remote_values *values);
 

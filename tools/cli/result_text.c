@@ -6,11 +6,13 @@
 
 #include "cli/command.h"
 
-enum { FIRST = 1 << 16 };
+enum { FIRST_CAPACITY = 1 << 16 };
 
 bool result_text_init(result_text *t)
 {
-    *t = (result_text){ .bytes = malloc(FIRST), .capacity = FIRST, .spill_at = RESULT_SPILL };
+    *t = (result_text){ .bytes = malloc(FIRST_CAPACITY),
+                        .capacity = FIRST_CAPACITY,
+                        .spill_at = RESULT_SPILL };
     return t->bytes != NULL;
 }
 
@@ -26,14 +28,14 @@ static void clear_counts(result_text *t)
     t->count = t->result = t->piece = t->row = t->cut_count = 0;
 }
 
-void result_text_lose(result_text *t)
+void result_text_discard(result_text *t)
 {
     t->failed = true;
     clear_counts(t);
 }
 
-/* Drops the text behind the last complete row. */
-static void cut_row(result_text *t)
+/* Drops the text after the last complete row. */
+static void drop_partial_row(result_text *t)
 {
     while (t->cut_count > 0 && t->cuts[t->cut_count - 1] > t->row)
         t->cut_count--;
@@ -43,10 +45,10 @@ static void cut_row(result_text *t)
 
 void result_text_retry(result_text *t)
 {
-    cut_row(t);
+    drop_partial_row(t);
     t->full = false;
-    t->again += t->gone;
-    t->gone = 0;
+    t->skipped_bytes += t->row_written;
+    t->row_written = 0;
 }
 
 char *result_text_grow(result_text *t)
@@ -54,14 +56,14 @@ char *result_text_grow(result_text *t)
     if (t->count >= t->spill_at && t->spill && !t->full)
         t->spill(t, t->user);
     if (t->full)
-        cut_row(t);
+        drop_partial_row(t);
     if (t->count + RESULT_MAX > t->capacity) {
         char *wider = realloc(t->bytes, 2 * t->capacity);
         if (wider) {
             t->bytes = wider;
             t->capacity *= 2;
         } else
-            result_text_lose(t);
+            result_text_discard(t);
     }
     return t->bytes + t->count;
 }
@@ -72,7 +74,7 @@ void result_text_cut(result_text *t, size_t at)
         size_t capacity = t->cut_capacity ? 2 * t->cut_capacity : 64;
         size_t *wider = realloc(t->cuts, capacity * sizeof *wider);
         if (!wider) {
-            result_text_lose(t);
+            result_text_discard(t);
             return;
         }
         t->cuts = wider;
@@ -81,23 +83,23 @@ void result_text_cut(result_text *t, size_t at)
     t->cuts[t->cut_count++] = t->piece = at;
 }
 
-bool result_text_leave(result_text *t, const char *command)
+bool result_text_write(result_text *t, const char *command)
 {
     struct stat st;
-    bool fine = !t->failed && !t->refused,
+    bool success = !t->failed && !t->write_failed,
          file = fstat(STDOUT_FILENO, &st) == 0 && S_ISREG(st.st_mode);
-    size_t at = t->again < t->count ? t->again : t->count;
-    t->again -= at;
-    for (size_t i = 0; fine && !file && i < t->cut_count; i++) {
+    size_t at = t->skipped_bytes < t->count ? t->skipped_bytes : t->count;
+    t->skipped_bytes -= at;
+    for (size_t i = 0; success && !file && i < t->cut_count; i++) {
         if (t->cuts[i] <= at)
             continue;
-        fine = command_write(command, t->bytes + at, t->cuts[i] - at);
+        success = command_write(command, t->bytes + at, t->cuts[i] - at);
         at = t->cuts[i];
     }
-    if (fine && at < t->count)
-        fine = command_write(command, t->bytes + at, t->count - at);
-    t->gone = (t->row ? 0 : t->gone) + t->count - t->row;
+    if (success && at < t->count)
+        success = command_write(command, t->bytes + at, t->count - at);
+    t->row_written = (t->row ? 0 : t->row_written) + t->count - t->row;
     clear_counts(t);
-    t->refused |= !fine;
-    return fine;
+    t->write_failed |= !success;
+    return success;
 }

@@ -15,13 +15,13 @@ struct result_text {
     size_t result, piece; /* end of the last result and of the last piece */
     size_t *cuts;         /* [cut_count] ends of pieces: groups of results of at most 4096 bytes */
     size_t cut_count, cut_capacity;
-    uint64_t rows; /* rows with complete results since it was last set to 0 */
-    size_t row;    /* end of the last complete row */
-    size_t gone;   /* bytes behind `row` that were already written */
-    size_t again;  /* first bytes of the text that were already written and are not repeated */
-    bool failed;   /* out of memory; the buffered text is lost */
-    bool refused;  /* writing failed, which has been reported */
-    bool full;     /* text behind the last complete row is lost until result_text_retry */
+    uint64_t rows;        /* rows with complete results since it was last set to 0 */
+    size_t row;           /* end of the last complete row */
+    size_t row_written;   /* bytes after `row` that were already written */
+    size_t skipped_bytes; /* first bytes of the text that were already written and are skipped */
+    bool failed;          /* out of memory; the buffered text is lost */
+    bool write_failed;    /* writing failed, which has been reported */
+    bool full;            /* text after the last complete row is lost until result_text_retry */
     /* Called when the text is too long to be kept: writes it, discards it, or sets `full`. */
     void (*spill)(result_text *t, void *user);
     void *user;
@@ -39,8 +39,8 @@ char *result_text_grow(result_text *t);
 /* A pipe takes RESULT_PIECE bytes atomically; RESULT_SPILL is the default size before spilling. */
 enum { RESULT_PIECE = 4096, RESULT_SPILL = 1 << 20 };
 
-/* Returns space for RESULT_MAX bytes; result_text_end sets how many are used. Never NULL: when
- * memory is short, the buffered text is lost and `failed` is set. */
+/* Returns where to write the next at most RESULT_MAX bytes; result_text_end sets how many were
+ * written. Never NULL: without memory, the buffered text is lost and `failed` is set. */
 static inline char *result_text_capacity(result_text *t)
 {
     return t->count < t->spill_at && t->count + RESULT_MAX <= t->capacity ? t->bytes + t->count
@@ -68,22 +68,22 @@ static inline void result_text_end_row(result_text *t)
         return;
     t->rows++;
     t->row = t->count;
-    t->gone = 0;
+    t->row_written = 0;
 }
 /* Returns true when further results would be lost. */
 static inline bool result_text_is_over(const result_text *t)
 {
-    return t->failed || t->refused || t->full;
+    return t->failed || t->write_failed || t->full;
 }
 
-/* Drops the text behind the last complete row. The caller must add the same bytes again; bytes that
+/* Drops the text after the last complete row. The caller must add the same bytes again; bytes that
  * were already written are not written twice. */
 void result_text_retry(result_text *t);
 /* Discards the text. Later text is discarded, too, at the time when it would be written. */
-void result_text_lose(result_text *t);
+void result_text_discard(result_text *t);
 
 /* Writes the text to standard output (to a pipe in pieces) and empties the buffer. Returns false
  * after an error, which is reported. `command` is for the message. */
-bool result_text_leave(result_text *t, const char *command);
+bool result_text_write(result_text *t, const char *command);
 
 #endif

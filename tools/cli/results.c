@@ -10,7 +10,7 @@
 
 const char *const where_words[] = { "OUT", "IN", "ON", "MAYBE" };
 
-/* --- pieces of a result: each is written at `at`; its end is returned --- */
+/* --- components of a result: each function writes at `at`, and returns the end of its text --- */
 
 static inline char *put_text(char *at, const char *text)
 {
@@ -73,10 +73,10 @@ void raw_double(FILE *out, double v)
     fwrite(b, 1, sizeof b, out);
 }
 
-/* --- attributes: behind their face --- */
+/* --- attributes: written after the face index --- */
 
-/* Writes the attributes of `face`, which may be none. This cannot fail, as the file of the queries
- * has the attributes of `sampler`. */
+/* Writes the attributes of `face`, which may be EBPO_NO_FACE. ebpo_sample cannot fail here, as the
+ * file of the queries has the attributes of `sampler`; if it does, no attributes are written. */
 static char *put_attributes(char *at, result_form form, const ebpo_sampler *sampler,
                             const double point[3], uint64_t face)
 {
@@ -200,7 +200,7 @@ static char *distance_raw(char *at, const ebpo_distance_result *r)
     return put_u64(at, r->face);
 }
 
-static char *put_limited(char *at, result_form form, const ebpo_distance_result *r)
+static char *put_interval(char *at, result_form form, const ebpo_distance_result *r)
 {
     if (form == RESULTS_RAW)
         return put_double(put_double(at, r->lo), r->hi);
@@ -223,14 +223,14 @@ static char *put_distance(char *at, result_form form, const ebpo_distance_result
     return form == RESULTS_JSON ? put_text(at, "}") : at;
 }
 
-void results_distance(result_text *t, result_form form, bool limited,
+void results_distance(result_text *t, result_form form, bool intervals,
                       const ebpo_distance_result *results, uint64_t count,
                       const ebpo_sampler *sampler, const uint64_t *model)
 {
     for (uint64_t i = 0; i < count; i++) {
         char *at = result_text_capacity(t);
-        at = limited ? put_limited(at, form, &results[i])
-                     : put_distance(at, form, &results[i], sampler, model ? &model[i] : NULL);
+        at = intervals ? put_interval(at, form, &results[i])
+                       : put_distance(at, form, &results[i], sampler, model ? &model[i] : NULL);
         end_row(t, form, at);
     }
 }
@@ -249,7 +249,7 @@ void results_near(result_text *t, result_form form, const ebpo_near_face *face, 
     at = put_distance(at, form, &r, sampler, NULL);
     bool line = form == RESULTS_TEXT || form == RESULTS_CSV;
     result_text_end(t, put_text(at, line ? "\n" : ""));
-    if (line) /* other lists are written when they are complete or too long */
+    if (line) /* JSON and raw lists stay buffered until they are complete or too long */
         result_text_close(t);
 }
 
@@ -323,7 +323,7 @@ void results_ray_any(result_text *t, result_form form, const bool *any, uint64_t
     }
 }
 
-/* Writes the text before and after a list. */
+/* Writes the text before a list of `count` items. */
 static void begin_list(result_text *t, result_form form, uint64_t count)
 {
     char *at = result_text_capacity(t);
@@ -332,12 +332,13 @@ static void begin_list(result_text *t, result_form form, uint64_t count)
                                               : number_write_uint(at, count));
 }
 
+/* Writes the text after a list. */
 static void end_list(result_text *t, result_form form)
 {
     end_row(t, form, put_text(result_text_capacity(t), form == RESULTS_JSON ? "]" : ""));
 }
 
-/* Returns space for the next item of a list, behind its separator. */
+/* Writes the separator before the next item of a list; returns where to write the item. */
 static char *next_item(result_text *t, result_form form, bool first)
 {
     char *at = result_text_capacity(t);

@@ -14,10 +14,10 @@ extern const char *const where_words[]; /* OUT, IN, ON, MAYBE */
 
 void results_inside(result_text *t, result_form form, const ebpo_inside_result *results,
                     uint64_t count);
-/* `limited`: writes lo and hi only. `sampler`, here and below: attributes to write after the face;
- * or NULL. `model`, here and below: [count] indices of models in the catalogue, UINT64_MAX for
- * none; or NULL. */
-void results_distance(result_text *t, result_form form, bool limited,
+/* `intervals`: writes lo and hi only. `sampler`, here and below: attributes to write after the
+ * face; or NULL. `model`, here and below: [count] indices of models in the catalogue, UINT64_MAX
+ * for none; or NULL. */
+void results_distance(result_text *t, result_form form, bool intervals,
                       const ebpo_distance_result *results, uint64_t count,
                       const ebpo_sampler *sampler, const uint64_t *model);
 /* Writes one of the nearest faces of a point, with the text before it; after the last face the text

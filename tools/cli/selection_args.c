@@ -7,7 +7,7 @@
 
 #include "cli/command.h"
 
-static const double max_planes = 1e9; /* same limit as ebpo_build */
+static const double max_planes = 1e9; /* limit of ebpo_build */
 
 /* Reads a number such as "500", or a share such as "1%". */
 static bool read_k_root(const char *text, double *k, bool *share)
@@ -25,7 +25,7 @@ static int check_k_root(const char *name, const char *text)
     double k;
     bool share;
     if (read_k_root(text, &k, &share))
-        return EXIT_FINE;
+        return EXIT_OK;
     return command_usage(name,
                          "--k-root: '%s' is not a number of planes from 1 to 1e9, such as 500, or "
                          "a share of the faces, such as 1%%",
@@ -65,7 +65,7 @@ static int check_effect(const char *name, const selection_options *o, bool given
     char names[200], message[300];
     uint32_t taking = of_trait(has, names, sizeof names);
     if (!given || o->chosen & taking)
-        return EXIT_FINE;
+        return EXIT_OK;
     snprintf(message, sizeof message, "%s for --select %s", options, names);
     return command_usage(name, "%s", message);
 }
@@ -74,19 +74,19 @@ int selection_check(const char *name, const selection_options *o)
 {
     int code = check_effect(name, o, o->percent >= 0 || o->k_root || o->normals >= 0,
                             "--percent, --k-root and --normals are", from_leaves);
-    if (code == EXIT_FINE)
+    if (code == EXIT_OK)
         code = check_effect(name, o, o->epsilon >= 0, "--epsilon is", from_root);
-    if (code == EXIT_FINE)
+    if (code == EXIT_OK)
         code = check_effect(name, o, o->normals >= 0, "--normals is", takes_normals);
-    if (code == EXIT_FINE)
+    if (code == EXIT_OK)
         code = check_effect(name, o, o->seed >= 0, "--seed is", takes_seed);
-    if (code != EXIT_FINE)
+    if (code != EXIT_OK)
         return code;
     if (o->percent >= 0 && o->k_root)
         return command_usage(name, "--percent and --k-root cannot be used together; give one");
     if (o->percent == 0)
         return command_usage(name, "--percent 0 leaves no planes; give more");
-    return o->k_root ? check_k_root(name, o->k_root) : EXIT_FINE;
+    return o->k_root ? check_k_root(name, o->k_root) : EXIT_OK;
 }
 
 ebpo_status selection_k_root(const char *text, uint64_t faces, double *out, ebpo_error *error)

@@ -18,9 +18,9 @@ static void give_up(int number)
         also();
     if (scratch)
         scratch();
-    /* SA_RESETHAND restored the default action, so that the parent sees the signal. Raises it
-     * before this handler returns: another thread may be about to open the output again by its
-     * name. */
+    /* SA_RESETHAND restored the default action, so that the parent process sees the signal. It is
+     * raised before this handler returns, as another thread may be about to open the output again
+     * by its name. */
     sigset_t only;
     sigemptyset(&only);
     sigaddset(&only, number);
@@ -41,7 +41,7 @@ void signals_install(void)
         action.sa_handler = give_up;
         action.sa_flags = (int)SA_RESETHAND;
         sigfillset(&action.sa_mask);
-        /* Keeps signals ignored that the parent process ignores (nohup). */
+        /* Signals that the parent process ignores (nohup) stay ignored. */
         if (sigaction(numbers[i], NULL, &before) == 0 && before.sa_handler != SIG_IGN)
             sigaction(numbers[i], &action, NULL);
     }

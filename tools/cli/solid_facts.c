@@ -42,7 +42,7 @@ ebpo_solid_volume facts_solid(const ebpo_info *info, const ebpo_shells *shells)
 ebpo_solid_volume facts_measured(const ebpo_info *info, const ebpo_mass *mass)
 {
     ebpo_solid_volume solid = facts_solid(info, NULL);
-    if (!findings_knows(&solid)) {
+    if (!findings_volume_known(&solid)) {
         solid.lo = mass->volume_lo;
         solid.hi = mass->volume_hi;
     }
@@ -51,14 +51,14 @@ ebpo_solid_volume facts_measured(const ebpo_info *info, const ebpo_mass *mass)
 
 const char *facts_whole(const ebpo_info *info, const ebpo_solid_volume *solid)
 {
-    return !info->solid ? "box" : findings_knows(solid) ? "solid" : "integral";
+    return !info->solid ? "box" : findings_volume_known(solid) ? "solid" : "integral";
 }
 
 double facts_share(const ebpo_info *info, const ebpo_solid_volume *solid, double volume)
 {
-    double whole = !info->solid            ? cell_volume(info, 0)
-                   : findings_knows(solid) ? solid->lo
-                                           : fabs(solid->integral);
+    double whole = !info->solid                   ? cell_volume(info, 0)
+                   : findings_volume_known(solid) ? solid->lo
+                                                  : fabs(solid->integral);
     double percent = 100 * volume / whole;
     return isfinite(percent) ? percent : NAN; /* without a meaningless sign */
 }
@@ -70,7 +70,7 @@ double facts_percent(const ebpo_info *info, const ebpo_solid_volume *solid, int 
 
 double facts_excess(const ebpo_info *info, const ebpo_solid_volume *solid, double volume)
 {
-    return info->solid && findings_knows(solid) && solid->lo > 0
+    return info->solid && findings_volume_known(solid) && solid->lo > 0
                ? 100 * (volume - solid->lo) / solid->lo
                : NAN;
 }
@@ -85,7 +85,7 @@ double facts_excess_ratio(const ebpo_info *info, const ebpo_solid_volume *solid,
 
 void facts_print_whole(FILE *out, const ebpo_info *info, const ebpo_solid_volume *solid)
 {
-    if (info->solid && !findings_knows(solid))
+    if (info->solid && !findings_volume_known(solid))
         fputs("% integral: of the integral of the winding number, as the solid's volume is not "
               "known\n",
               out);

@@ -9,16 +9,16 @@
  * leaves and black nodes of levels 0 .. level. Leaves count with the volume that the file states;
  * the planes that readers derive would cut off more. */
 double facts_volume(const ebpo_info *info, int level);
-/* Returns the same with leaves cut by planes derived from their faces, when the file has faces and
- * no planes of leaves; reads them. */
+/* Computes the same volume with leaves cut by planes that are derived from their faces. Reads the
+ * faces; the file must have faces, and no planes of leaves. */
 EBPO_MUST_USE ebpo_status facts_derived(ebpo_file *file, int level, unsigned threads,
                                         ebpo_progress progress, double *volume, ebpo_error *error);
 /* Returns the bounds of the volume of the solid. `shells`: as for ebpo_solid_volume_of. */
 ebpo_solid_volume facts_solid(const ebpo_info *info, const ebpo_shells *shells);
-/* Returns the same bounds with the measurements of the mesh. */
+/* Returns these bounds from the measurements of the mesh. */
 ebpo_solid_volume facts_measured(const ebpo_info *info, const ebpo_mass *mass);
-/* Returns the base of percentages: "solid"; "box", the root box, for a surface; "integral", of the
- * winding number, when the volume of the solid is not known. */
+/* Returns the word for the base of percentages: "solid"; "box" (the root box) for a surface;
+ * "integral" (of the winding number) if the volume of the solid is not known. */
 const char *facts_whole(const ebpo_info *info, const ebpo_solid_volume *solid);
 /* Prints the base, for the legend of a table. */
 void facts_print_whole(FILE *out, const ebpo_info *info, const ebpo_solid_volume *solid);
@@ -29,8 +29,8 @@ double facts_share(const ebpo_info *info, const ebpo_solid_volume *solid, double
 /* Returns the excess of `volume` over the volume of the solid in percent; NAN for a surface, and
  * for a solid with no volume or an unknown one. */
 double facts_excess(const ebpo_info *info, const ebpo_solid_volume *solid, double volume);
-/* Returns the excess of `volume` / excess of `limit`, the volume of the convex hulls; NAN when one
- * of the two volumes has no excess, or when the hulls equal the solid except for rounding. */
+/* Returns the excess of `volume` divided by the excess of `limit`, the volume of the convex hulls.
+ * NAN: one of the two volumes has no excess, or the hulls equal the solid except for rounding. */
 double facts_excess_ratio(const ebpo_info *info, const ebpo_solid_volume *solid, double volume,
                           double limit);
 

@@ -9,21 +9,22 @@ static const char *const thesis_names[THESIS_STAGES + 1] = {
     "leaf clipping", "storing and propagating", "total"
 };
 
-static unsigned thesis_of(stage_row row, const stage_facts *f)
+/* Returns the stages of the thesis that do the work of a row, as bits. */
+static unsigned thesis_bits(stage_row row, const stage_facts *f)
 {
-    bool here = row == STAGE_ENVELOPES && f->leaf_planes && !f->from_leaves;
-    return stage_names[row].thesis | (here ? THESIS_LEAF_PLANES | THESIS_CLIPPING : 0);
+    bool makes_leaf_planes = row == STAGE_ENVELOPES && f->leaf_planes && !f->from_leaves;
+    return stage_names[row].thesis | (makes_leaf_planes ? THESIS_LEAF_PLANES | THESIS_CLIPPING : 0);
 }
 
 int stages_plan(const stage_facts *f, int plan[STAGE_PLAN_MAX])
 {
     int n = 0;
     for (int r = 0; r < STAGE_OTHER; r++) {
-        bool omitted = (r == STAGE_REPAIR && !f->was_repaired) ||
-                       (r == STAGE_CORNERS && !f->solid) || r == STAGE_CELLS ||
-                       (r == STAGE_CHOOSING && !f->from_leaves) || /* cells are split off later */
+        bool omitted = (r == STAGE_REPAIR && !f->may_repair) || (r == STAGE_CORNERS && !f->solid) ||
+                       r == STAGE_CELLS || /* stages_split adds this row */
+                       (r == STAGE_CHOOSING && !f->from_leaves) ||
                        (r == STAGE_SELECTING && !f->selected);
-        if (r == STAGE_REPAIR && f->was_repaired) {
+        if (r == STAGE_REPAIR && f->may_repair) {
             plan[n++] = STAGE_ORDERING;
             plan[n++] = STAGE_CHECKING;
         }
@@ -74,15 +75,16 @@ static void print_thesis(FILE *out, unsigned thesis)
     fprintf(out, "%s\n", thesis ? "" : "-");
 }
 
-static unsigned of_thesis(const progress_line *line, const stage_facts *f,
-                          double seconds[STAGE_ROWS], bool began[STAGE_ROWS])
+/* Sums the seconds of each row. Returns the stages of the thesis that began, as bits. */
+static unsigned sum_by_row(const progress_line *line, const stage_facts *f,
+                           double seconds[STAGE_ROWS], bool began[STAGE_ROWS])
 {
     unsigned all = 0;
     for (int i = 0; i < line->stage_count; i++) {
         stage_row row = stages_row(line->stages[i].name);
         seconds[row] += line->stages[i].seconds;
         began[row] = true;
-        all |= thesis_of(row, f);
+        all |= thesis_bits(row, f);
     }
     return all;
 }
@@ -91,18 +93,18 @@ void stages_print(FILE *out, const progress_line *line, const stage_facts *f, do
 {
     double taken[STAGE_ROWS] = { 0 }, sum = 0;
     bool began[STAGE_ROWS] = { false };
-    unsigned done = of_thesis(line, f, taken, began);
+    unsigned done = sum_by_row(line, f, taken, began);
     fprintf(out, "  %-10s%9s%10s  %s\n", "stage", "seconds", "faces/s",
             "stages of the thesis (EBP-Octree 2017, 3.6.4)");
     for (int r = 0; r < STAGE_ROWS; r++) {
         if (!began[r])
             continue;
         print_row(out, stage_names[r].name, taken[r], f->faces);
-        print_thesis(out, thesis_of((stage_row)r, f));
-        sum += thesis_of((stage_row)r, f) ? taken[r] : 0;
+        print_thesis(out, thesis_bits((stage_row)r, f));
+        sum += thesis_bits((stage_row)r, f) ? taken[r] : 0;
     }
     print_row(out, "all", seconds, f->faces);
-    fprintf(out, "7 total: %.2f of it in 1 to 6\n", sum);
+    fprintf(out, "7 total (%.2f s of it in stages 1 to 6)\n", sum);
     if (!(done & THESIS_LEAF_PLANES))
         fprintf(out, "  not made: 3 leaf planes, 5 leaf clipping; readers derive them from the "
                      "faces of a leaf ('--profile full' stores them)\n");
@@ -130,7 +132,7 @@ static void thesis_stage(json *j, int number, const stage_facts *f, const bool b
     json_text(j, "name", thesis_names[number]);
     json_array(j, "in");
     for (int r = 0; r < STAGE_ROWS; r++)
-        if (began[r] && thesis_of((stage_row)r, f) & wanted) {
+        if (began[r] && thesis_bits((stage_row)r, f) & wanted) {
             json_text(j, NULL, stage_names[r].name);
             sum += taken[r];
         }
@@ -144,7 +146,7 @@ void stages_json(json *j, const progress_line *line, const stage_facts *f)
 {
     double taken[STAGE_ROWS] = { 0 };
     bool began[STAGE_ROWS] = { false };
-    of_thesis(line, f, taken, began);
+    sum_by_row(line, f, taken, began);
     json_array(j, "stages");
     for (int i = 0; i < line->stage_count; i++) {
         stage_row row = stages_row(line->stages[i].name);
@@ -152,7 +154,7 @@ void stages_json(json *j, const progress_line *line, const stage_facts *f)
         json_text(j, "stage", line->stages[i].name);
         json_text(j, "name", stage_names[row].name);
         json_real(j, "seconds", line->stages[i].seconds);
-        thesis_numbers(j, thesis_of(row, f));
+        thesis_numbers(j, thesis_bits(row, f));
         json_end(j);
     }
     json_end(j);

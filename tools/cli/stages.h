@@ -11,7 +11,10 @@
 #include "cli/stage_rows.h"
 
 typedef struct stage_facts {
-    bool was_repaired, solid, from_leaves, selected; /* from_leaves: selections of the theses */
+    bool may_repair; /* the options or the format of the input may cause repairs */
+    bool solid;
+    bool from_leaves; /* envelopes are selected from the leaves, as in the theses */
+    bool selected;    /* levels are selected by error or size after the build */
     bool leaf_planes; /* leaf planes are stored, not derived by readers */
     uint64_t faces;
     ebpo_build_times times;

@@ -13,7 +13,7 @@
 
 enum { PATH_MAX = 4096, PIECE = 1 << 16 };
 
-/* Also read by a signal handler. Files that do not exist have empty names. */
+/* Names of temporary files, which a signal handler also reads; "": the file does not exist. */
 static char folder[PATH_MAX], input[PATH_MAX], output[PATH_MAX];
 static int printed_to = -1; /* copy of standard output while it is redirected */
 
@@ -72,7 +72,7 @@ static int make_folder(const char *command)
 {
     const char *where = getenv("TMPDIR");
     if (*folder)
-        return EXIT_FINE;
+        return EXIT_OK;
     char made[PATH_MAX - 32];
     int length =
         snprintf(made, sizeof made, "%s/ebpo-XXXXXX", where && *where ? where : "/var/tmp");
@@ -80,7 +80,7 @@ static int make_folder(const char *command)
         return fail_stream(command, "no temporary folder; set TMPDIR to a writable folder");
     snprintf(folder, sizeof folder, "%s", made);
     signals_scratch(clean_up);
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 static int take_input(const char *command, const char **operand)
@@ -88,7 +88,7 @@ static int take_input(const char *command, const char **operand)
     if (*input)
         return command_usage(command, "standard input can be read only once");
     int code = make_folder(command);
-    if (code != EXIT_FINE)
+    if (code != EXIT_OK)
         return code;
     snprintf(input, sizeof input, "%.*s/standard-input", PATH_MAX - 32, folder);
     int to = open(input, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
@@ -96,7 +96,7 @@ static int take_input(const char *command, const char **operand)
     if (to >= 0 && close(to) != 0)
         fine = false;
     *operand = input;
-    return fine ? EXIT_FINE : fail_stream(command, "standard input, copied to a temporary file");
+    return fine ? EXIT_OK : fail_stream(command, "standard input, copied to a temporary file");
 }
 
 static int take_output(const char *command, const char **operand)
@@ -104,7 +104,7 @@ static int take_output(const char *command, const char **operand)
     if (isatty(STDOUT_FILENO))
         return command_usage(command, "standard output is a terminal; give a file name");
     int code = make_folder(command);
-    if (code != EXIT_FINE)
+    if (code != EXIT_OK)
         return code;
     snprintf(output, sizeof output, "%.*s/standard-output", PATH_MAX - 32, folder);
     fflush(stdout);
@@ -112,7 +112,7 @@ static int take_output(const char *command, const char **operand)
     if (printed_to < 0 || dup2(STDERR_FILENO, STDOUT_FILENO) < 0)
         return fail_stream(command, "standard output");
     *operand = output;
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 /* A pipe with a name, such as /dev/stdin or <(...) of a shell, can be read only once. */
@@ -124,8 +124,8 @@ static bool is_pipe(const char *path)
 
 int standard_files_begin(const arg_spec *spec, const char *operand[ARGS_OPERANDS_MAX])
 {
-    int code = EXIT_FINE;
-    for (int i = 0; i < ARGS_OPERANDS_MAX && operand[i] && code == EXIT_FINE; i++) {
+    int code = EXIT_OK;
+    for (int i = 0; i < ARGS_OPERANDS_MAX && operand[i] && code == EXIT_OK; i++) {
         char how = args_dash(spec, i);
         if ((how == 'i' || how == 'o') && is_pipe(operand[i])) {
             fprintf(stderr, "ebpo %s: %s: is a pipe or device; give '-' in its place, and %s\n",
@@ -140,7 +140,7 @@ int standard_files_begin(const arg_spec *spec, const char *operand[ARGS_OPERANDS
         else if (how == 'o')
             code = take_output(spec->command, &operand[i]);
     }
-    if (code != EXIT_FINE)
+    if (code != EXIT_OK)
         clean_up();
     return code;
 }
@@ -154,8 +154,8 @@ int standard_files_end(const arg_spec *spec, int code)
 {
     if (printed_to >= 0) {
         fflush(stdout);
-        int from = code == EXIT_FINE ? open(output, O_RDONLY | O_CLOEXEC) : -1;
-        if (code == EXIT_FINE && (from < 0 || !copy_stream(from, printed_to)))
+        int from = code == EXIT_OK ? open(output, O_RDONLY | O_CLOEXEC) : -1;
+        if (code == EXIT_OK && (from < 0 || !copy_stream(from, printed_to)))
             code = fail_stream(spec->command, "standard output");
         if (from >= 0)
             close(from);

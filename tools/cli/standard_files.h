@@ -10,15 +10,15 @@
  * that is impossible; then nothing may be opened. */
 bool standard_files_occupy(void);
 
-/* Replaces operands "-" by temporary files, as spec->dash says for each. When one is an output, the
- * command prints to standard error. Returns an exit code; EXIT_FINE also when there is nothing to
- * do. Errors were reported. */
+/* Replaces operands "-" by temporary files, as spec->dash says for each. If one of them is an
+ * output, the command prints to standard error. Returns an exit code, EXIT_OK also if no operand is
+ * "-". Errors have been reported. */
 int standard_files_begin(const arg_spec *spec, const char *operand[ARGS_OPERANDS_MAX]);
 
 /* Returns a path for messages: "standard-input" or "standard-output" for a temporary file. */
 const char *standard_files_shown(const char *path);
 
-/* Called after the command: copies its output if its exit code is EXIT_FINE. Returns the exit code.
+/* Called after the command: copies its output if its exit code is EXIT_OK. Returns the exit code.
  */
 int standard_files_end(const arg_spec *spec, int code);
 

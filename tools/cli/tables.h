@@ -1,5 +1,5 @@
-/* Shared parts of printed tables: words for types of nodes, empty cells, and numbers beyond the
- * range of a double. */
+/* Helpers of printed tables: words for types of nodes, empty cells, and numbers beyond the range of
+ * a double. */
 #ifndef EBPO_TOOLS_TABLES_H
 #define EBPO_TOOLS_TABLES_H
 
@@ -17,7 +17,7 @@ void table_legend(FILE *out);
 /* Prints x by the printf `format` with one conversion of a double; "-" when x is not finite. */
 const char *table_cell(char out[TABLE_CELL], const char *format, double x);
 
-/* Does the same, but when x is not finite returns words that can follow "volume". */
+/* As table_cell; but when x is not finite, returns words that can follow "volume". */
 const char *table_volume(char out[TABLE_CELL], const char *format, double x);
 
 /* Prints the meaning of "-" in columns of volumes, below a table that has some. */

@@ -8,7 +8,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { NAME, USE, SHA256, BYTES, DIGEST = 32 };
+enum { NAMES, USES, DIGESTS, IMAGES, DIGEST = 32 };
 
 typedef struct span {
     const char *s;
@@ -27,7 +27,7 @@ static span list_of(const textures *t, int which, uint64_t row)
                                        : (span){ "", 0 };
 }
 
-/* Returns the index of the array; -1: none of them. */
+/* Returns the index of the array of textures; -1: another attribute. */
 static int which_of(const ebpo_attribute_facts *a)
 {
     static const char *const names[TEXTURE_ARRAYS] = { "name", "use", "sha256", "bytes" };
@@ -44,7 +44,7 @@ bool textures_embedded(const ebpo_file *file)
     ebpo_attribute_facts facts = EBPO_ATTRIBUTE_FACTS_INIT;
     bool found = false;
     for (unsigned n = 0; !found && ebpo_file_attribute(file, n, &facts); n++)
-        found = which_of(&facts) == BYTES;
+        found = which_of(&facts) == IMAGES;
     return found;
 }
 
@@ -59,8 +59,8 @@ ebpo_status textures_read(textures *out, const ebpo_file *file, bool bytes, ebpo
             continue;
         out->count = a.rows;
         out->columns[i] = a.columns;
-        out->embedded = out->embedded || i == BYTES;
-        if (i != BYTES || bytes)
+        out->embedded = out->embedded || i == IMAGES;
+        if (i != IMAGES || bytes)
             status = ebpo_file_read_attribute(file, n, NULL, &out->list[i], error);
         else /* images may be large: only their presence is read */
             status = ebpo_file_attribute_ends(file, n, NULL, &out->list[i], error);
@@ -85,7 +85,7 @@ bool textures_same(const ebpo_file *a, const ebpo_file *b)
                 textures_read(&y, b, false, &error) != EBPO_OK;
     if (!same) {
         same = x.count == y.count && x.embedded == y.embedded;
-        for (int i = 0; i < BYTES && same; i++)
+        for (int i = 0; i < IMAGES && same; i++)
             same = x.list[i].count == y.list[i].count &&
                    (!x.list[i].count ||
                     memcmp(x.list[i].values, y.list[i].values, x.list[i].count) == 0);
@@ -100,8 +100,8 @@ bool textures_same(const ebpo_file *a, const ebpo_file *b)
 /* Returns the number of bytes of an image, also when the bytes were not read. */
 static uint64_t byte_count(const textures *t, uint64_t row)
 {
-    const uint64_t *ends = t->list[BYTES].ends;
-    return !ends ? t->columns[BYTES] : row ? ends[row] - ends[row - 1] : ends[0];
+    const uint64_t *ends = t->list[IMAGES].ends;
+    return !ends ? t->columns[IMAGES] : row ? ends[row] - ends[row - 1] : ends[0];
 }
 
 /* A row has a digest and no bytes when the image was not embedded or was an empty file. */
@@ -110,7 +110,7 @@ static bool is_kept(const textures *t, uint64_t row)
     static const char nothing[] =
         "\xe3\xb0\xc4\x42\x98\xfc\x1c\x14\x9a\xfb\xf4\xc8\x99\x6f\xb9\x24"
         "\x27\xae\x41\xe4\x64\x9b\x93\x4c\xa4\x95\x99\x1b\x78\x52\xb8\x55";
-    span digest = list_of(t, SHA256, row);
+    span digest = list_of(t, DIGESTS, row);
     return t->embedded && digest.n == DIGEST &&
            (byte_count(t, row) || memcmp(digest.s, nothing, DIGEST) == 0);
 }
@@ -128,7 +128,7 @@ static char *text_of(span s)
 /* Writes the digest in hexadecimal; "" when there is none. */
 static void digest_of(const textures *t, uint64_t row, char hex[2 * DIGEST + 1])
 {
-    span s = list_of(t, SHA256, row);
+    span s = list_of(t, DIGESTS, row);
     hex[0] = 0;
     for (int i = 0; s.n == DIGEST && i < DIGEST; i++)
         sprintf(hex + 2 * i, "%02x", (unsigned char)s.s[i]);
@@ -137,8 +137,8 @@ static void digest_of(const textures *t, uint64_t row, char hex[2 * DIGEST + 1])
 void textures_print(FILE *out, const textures *t)
 {
     for (uint64_t i = 0; i < t->count; i++) {
-        char hex[2 * DIGEST + 1], *name = text_of(list_of(t, NAME, i)),
-                                  *use = text_of(list_of(t, USE, i));
+        char hex[2 * DIGEST + 1], *name = text_of(list_of(t, NAMES, i)),
+                                  *use = text_of(list_of(t, USES, i));
         digest_of(t, i, hex);
         fprintf(out, "  %s %s, %s%s%s%s%s\n", i ? "          " : "textures  ", name ? name : "?",
                 hex[0] ? "sha256 " : "was not found", hex, use && *use ? ", " : "", use ? use : "",
@@ -154,8 +154,8 @@ void textures_json(json *j, const textures *t)
 {
     json_array(j, "textures");
     for (uint64_t i = 0; i < t->count; i++) {
-        char hex[2 * DIGEST + 1], *name = text_of(list_of(t, NAME, i)),
-                                  *use = text_of(list_of(t, USE, i));
+        char hex[2 * DIGEST + 1], *name = text_of(list_of(t, NAMES, i)),
+                                  *use = text_of(list_of(t, USES, i));
         digest_of(t, i, hex);
         json_object(j, NULL);
         json_text(j, "name", name ? name : "");
@@ -184,8 +184,8 @@ static ebpo_status fail_system(ebpo_error *error, const char *path)
     return fail_file(error, EBPO_E_IO, path, strerror(errno));
 }
 
-/* Returns true when no word between the slashes of the name leads upwards, as ".." does. */
-static bool leads_below(const char *name)
+/* Returns true when no word between the slashes of the name is "..". */
+static bool stays_below(const char *name)
 {
     size_t n = 0;
     if (*name && name[1] == ':')
@@ -199,8 +199,8 @@ static bool leads_below(const char *name)
     }
 }
 
-/* Removes repeated slashes, as materials double their backslashes, and words ".". */
-static void tidy_name(char *name)
+/* Removes repeated slashes (material files double their backslashes) and words ".". */
+static void normalize_name(char *name)
 {
     char *to = name;
     for (const char *c = name; *c; c++) {
@@ -228,8 +228,8 @@ static char *safe_name(span s)
         good = (unsigned char)*c >= ' ' && *c != 127;
     }
     if (good)
-        tidy_name(name);
-    if (good && leads_below(name))
+        normalize_name(name);
+    if (good && stays_below(name))
         return name;
     free(name);
     return NULL;
@@ -265,9 +265,9 @@ static bool write_all(int fd, span bytes)
     return true;
 }
 
-/* Returns less than 0 when unnamed files are not supported, or /proc is missing, which names them.
- */
-static int open_nameless(int folder)
+/* Opens a file without a name. Returns less than 0 when such files are not supported, or when /proc
+ * is missing, which link_file needs. */
+static int open_unnamed(int folder)
 {
 #ifdef EBPO_HAVE_O_TMPFILE
     if (access("/proc/self/fd", X_OK) == 0)
@@ -277,8 +277,8 @@ static int open_nameless(int folder)
     return -1;
 }
 
-/* Gives the complete file its name, so that the name never refers to a part of the image. */
-static bool give_name(int fd, int folder, const char *name)
+/* Gives the complete file its name, so that the name never refers to an incomplete image. */
+static bool link_file(int fd, int folder, const char *name)
 {
     char path[64];
     snprintf(path, sizeof path, "/proc/self/fd/%d", fd);
@@ -292,12 +292,12 @@ static bool write_file(int top, char *name, span bytes)
     int folder = open_folder(top, name, &last);
     if (folder < 0)
         return false;
-    int fd = open_nameless(folder);
+    int fd = open_unnamed(folder);
     bool named = fd < 0;
     if (named)
         fd = openat(folder, last, O_CREAT | O_EXCL | O_WRONLY | O_NOFOLLOW | O_CLOEXEC, 0666);
     bool good = fd >= 0 && write_all(fd, bytes) && (fsync(fd) == 0 || errno == EINVAL),
-         ours = named || (good && give_name(fd, folder, last));
+         ours = named || (good && link_file(fd, folder, last));
     good = good && ours;
     int why = errno;
     if (fd >= 0 && close(fd) != 0 && good) {
@@ -318,7 +318,7 @@ static ebpo_status check_names(const textures *t, ebpo_error *error)
         if (!is_kept(t, i))
             continue;
         kept++;
-        char *name = safe_name(list_of(t, NAME, i)), *shown = text_of(list_of(t, NAME, i));
+        char *name = safe_name(list_of(t, NAMES, i)), *shown = text_of(list_of(t, NAMES, i));
         ebpo_status status =
             name ? EBPO_OK
                  : fail_file(error, EBPO_E_FORMAT, shown ? shown : "?",
@@ -340,14 +340,14 @@ static bool spans_equal(span a, span b)
 }
 
 /* Returns true when an earlier row is the same image under the same name, spelled differently. */
-static bool is_again(const textures *t, uint64_t row)
+static bool is_repeated(const textures *t, uint64_t row)
 {
-    char *name = safe_name(list_of(t, NAME, row));
+    char *name = safe_name(list_of(t, NAMES, row));
     bool again = false;
     for (uint64_t i = 0; i < row && name && !again; i++) {
-        if (!is_kept(t, i) || !spans_equal(list_of(t, BYTES, i), list_of(t, BYTES, row)))
+        if (!is_kept(t, i) || !spans_equal(list_of(t, IMAGES, i), list_of(t, IMAGES, row)))
             continue;
-        char *before = safe_name(list_of(t, NAME, i));
+        char *before = safe_name(list_of(t, NAMES, i));
         again = before && strcmp(before, name) == 0;
         free(before);
     }
@@ -355,17 +355,17 @@ static bool is_again(const textures *t, uint64_t row)
     return again;
 }
 
-/* Counts the image if it is a new file. */
+/* Writes an image, and counts it in *written if it is a new file. */
 static ebpo_status write_one(const textures *t, uint64_t row, int top, uint64_t *written,
                              ebpo_error *error)
 {
-    char *name = safe_name(list_of(t, NAME, row)), *shown = text_of(list_of(t, NAME, row));
+    char *name = safe_name(list_of(t, NAMES, row)), *shown = text_of(list_of(t, NAMES, row));
     ebpo_status status = EBPO_OK;
     if (!name || !shown)
         status = fail_file(error, EBPO_E_MEMORY, "no memory", "an image's name");
-    else if (write_file(top, name, list_of(t, BYTES, row)))
+    else if (write_file(top, name, list_of(t, IMAGES, row)))
         ++*written;
-    else if (errno != EEXIST || !is_again(t, row))
+    else if (errno != EEXIST || !is_repeated(t, row))
         status = fail_system(error, shown);
     free(name);
     free(shown);

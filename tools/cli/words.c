@@ -224,6 +224,6 @@ bool words_read_levels(const char *text, word_levels *out)
     for (out->last = EBPO_LEVELS_MAX - 1; !(out->set >> out->last & 1); out->last--)
         ;
     uint32_t run = out->set >> out->first;
-    out->is_run = (run & (run + 1)) == 0;
+    out->is_contiguous = (run & (run + 1)) == 0;
     return true;
 }

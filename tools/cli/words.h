@@ -40,9 +40,8 @@ bool words_read_size(const char *text, uint64_t *out);
 typedef struct word_levels {
     uint32_t set; /* one bit for each level */
     int first, last;
-    bool to_end; /* the range is open ("3-"): levels below the deepest were not requested by number
-                  */
-    bool is_run; /* no level between the first and the last is missing */
+    bool to_end; /* the range is open ("3-"): no level below the deepest was named by its number */
+    bool is_contiguous; /* no level between the first and the last is missing */
 } word_levels;
 
 bool words_read_levels(const char *text, word_levels *out);

@@ -74,16 +74,16 @@ ebpo_status ebpo_two_models_face(const ebpo_two_models *two, int m, uint64_t fac
 
 /* --- faces that intersect a face --- */
 
-typedef struct cutting {
+typedef struct cut_search {
     const ebpo_two_models *two;
     ebpo_face_cuts *pieces;
     double low[3], high[3]; /* box of the face */
     int model;              /* model whose faces are visited */
     uint64_t own;           /* index of the cut face, which does not cut itself; EBPO_NO_FACE: the
                              * face is of the other model */
-} cutting;
+} cut_search;
 
-static bool near_box(const cutting *c, const double t[3][3])
+static bool near_box(const cut_search *c, const double t[3][3])
 {
     for (int k = 0; k < 3; k++)
         if (ebpo_max3(t[0][k], t[1][k], t[2][k]) < c->low[k] ||
@@ -93,9 +93,9 @@ static bool near_box(const cutting *c, const double t[3][3])
 }
 
 /* Adds the cuts of faces that intersect the box of the face. */
-static bool cut_by(void *user, const ebpo_triangles *triangles)
+static bool add_cuts(void *user, const ebpo_triangles *triangles)
 {
-    const cutting *c = user;
+    const cut_search *c = user;
     for (uint64_t i = 0; i < triangles->count; i++) {
         double t[3][3];
         if (triangles->file_faces[i] == c->own)
@@ -112,7 +112,7 @@ static bool cut_by(void *user, const ebpo_triangles *triangles)
 static ebpo_status cut_face(ebpo_two_models *two, ebpo_face_cuts *pieces, int m, uint64_t face,
                             const double t[3][3], ebpo_error *error)
 {
-    cutting c = { .two = two, .pieces = pieces };
+    cut_search c = { .two = two, .pieces = pieces };
     ebpo_status status = EBPO_OK;
     for (int k = 0; k < 3; k++) {
         c.low[k] = ebpo_min3(t[0][k], t[1][k], t[2][k]);
@@ -123,7 +123,7 @@ static ebpo_status cut_face(ebpo_two_models *two, ebpo_face_cuts *pieces, int m,
         ebpo_unpose_box(&two->model[i], c.low, c.high, low, high);
         c.model = i;
         c.own = i == m ? face : EBPO_NO_FACE;
-        status = ebpo_triangles_in_box(two->context[i], low, high, cut_by, &c, error);
+        status = ebpo_triangles_in_box(two->context[i], low, high, add_cuts, &c, error);
     }
     return status;
 }
@@ -291,15 +291,15 @@ static ebpo_status has_point(ebpo_two_models *two, int m, const mpq_t x[3], bool
     return status;
 }
 
-typedef struct common {
+typedef struct common_point_search {
     ebpo_two_models *two;
     bool *has;
-} common;
+} common_point_search;
 
 /* Tests a vertex of the pieces; ends the visits with EBPO_E_CANCELLED if both models contain it. */
-static ebpo_status query_both(void *user, const mpq_t x[3], ebpo_error *error)
+static ebpo_status test_vertex(void *user, const mpq_t x[3], ebpo_error *error)
 {
-    const common *c = user;
+    const common_point_search *c = user;
     bool in[2] = { false, false };
     ebpo_status status = has_point(c->two, 0, x, &in[0], error);
     if (status == EBPO_OK && in[0])
@@ -319,8 +319,8 @@ ebpo_status ebpo_face_has_common_point(ebpo_two_models *two, int m, uint64_t fac
         return status;
     ebpo_face_cuts_begin(&two->pieces, (const double(*)[3])t, true);
     status = cut_face(two, &two->pieces, m, face, (const double(*)[3])t, error);
-    common c = { two, has };
+    common_point_search c = { two, has };
     if (status == EBPO_OK)
-        status = ebpo_face_pieces_vertices(&two->pieces, query_both, &c, error);
+        status = ebpo_face_pieces_vertices(&two->pieces, test_vertex, &c, error);
     return *has ? EBPO_OK : status;
 }

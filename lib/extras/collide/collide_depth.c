@@ -2,11 +2,11 @@
  * a point of the surface inside the solid to the boundary of the solid.
  *
  * A branch-and-bound search visits the cells of the surface's octree, then faces and parts of
- * faces. Each of them is enclosed in a ball; the distance at the ball's centre bounds the depth of
- * its points. A heap gives the part that may be deepest. The search ends when no part can be deeper
- * than the best point plus the tolerance, or at the deadline; lo and hi then bound the depth. The
- * steps do not depend on what is in memory. Bounds: docs/develop/collision.md, "Depth". One thread.
- */
+ * faces. Each of them is enclosed in a ball; the distance of the ball's centre from the solid's
+ * boundary bounds the depth of its points. A heap returns the part that may be deepest. The search
+ * ends when no part can be deeper than the best point plus the tolerance, or at the deadline; lo
+ * and hi then bound the depth. The steps do not depend on what is in memory. A search runs in one
+ * thread. Bounds: docs/develop/collision.md, "Depth". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -49,26 +49,25 @@ typedef struct depth_search {
     /* Output: lo <= depth <= hi. */
     double lo, hi;
     /* Initially 0: */
-    double left, lost; /* left: greatest `most` of the dropped parts; lost: bound of how far
-                        * rounding moves points */
-    depth_part *part;  /* a heap, the greatest first */
+    double dropped_max;    /* greatest `most` of the dropped parts */
+    double position_error; /* bound of how far rounding moves points */
+    depth_part *part;      /* a heap, the greatest `most` first */
     uint64_t count, capacity, evaluations;
 } depth_search;
 
-/* A ball that contains a part of the surface: all points of the part are within `radius` of the
- * centre. At least one of the points is certainly within `far`; INFINITY if no such bound is known.
- */
+/* A ball that contains a part of the surface. */
 typedef struct depth_ball {
-    double radius, far;
-    /* Output: true if the part still matters, and a bound of its depth. */
-    bool open;
-    double most;
+    double radius; /* all points of the part are within this distance of the centre */
+    double far;    /* at least one point is certainly within this distance; INFINITY: unknown */
+    /* Output: */
+    bool open;   /* the part may have the deepest point */
+    double most; /* bound of its depth */
 } depth_ball;
 
 /* --- one point --- */
 
-/* Bounds the depth of the point in the solid by *lo .. *hi; the depth is negative outside.
- * rounding: how far the point may be from its exact position. */
+/* Bounds the depth of the point w in the solid by *lo .. *hi; the depth is negative outside.
+ * *rounding: how far w may be from its exact position. */
 static ebpo_status depth_at(depth_search *s, const double w[3], double *lo, double *hi,
                             double *rounding, ebpo_error *error)
 {
@@ -92,9 +91,9 @@ static ebpo_status depth_at(depth_search *s, const double w[3], double *lo, doub
     return EBPO_OK;
 }
 
-/* Bounds the depth of a triangle by one face: the face that was nearest to the last query point. No
- * point of the triangle inside the solid is deeper than its distance from that face. The distance
- * is convex, so its greatest value at the corners is a bound. */
+/* Bounds the depth of a triangle by its distance from one face: the face that was nearest to the
+ * last query point. No point of the triangle inside the solid is deeper than its distance from that
+ * face. The distance is convex, so its greatest value at the corners is a bound. */
 static double max_at_corners(const depth_search *s, const double corner[3][3])
 {
     double most = 0, p[3], doubt;
@@ -102,7 +101,7 @@ static double max_at_corners(const depth_search *s, const double corner[3][3])
         ebpo_distance_bounds d;
         ebpo_unpose(s->solid, corner[i], p, &doubt);
         ebpo_triangle_distance_bounds(p, (const double(*)[3])s->context->warm_triangle, &d);
-        most = fmax(most, (d.hi + 2 * doubt) * s->solid->posing.scale + s->lost);
+        most = fmax(most, (d.hi + 2 * doubt) * s->solid->posing.scale + s->position_error);
     }
     return most * (1 + 0x1p-50);
 }
@@ -128,21 +127,24 @@ static bool is_search_late(const depth_search *s)
     return s->late != UINT64_MAX && ebpo_clock() >= s->late;
 }
 
-/* Returns true if the part need not be divided. A doubt that only rounding causes is no reason to
- * divide: parts of faces that lie on other faces would be divided forever. */
-static bool is_enough(depth_search *s, double most, double rounding)
+/* Returns true if a part with the bound `most` need not be divided, and records its bound. If only
+ * rounding makes its depth uncertain, the part is not divided: parts of faces that are on other
+ * faces would be divided without end. */
+static bool is_settled(depth_search *s, double most, double rounding)
 {
-    if (most > s->lo + s->tolerance + 4 * (rounding + s->lost))
+    if (most > s->lo + s->tolerance + 4 * (rounding + s->position_error))
         return false;
-    s->left = fmax(s->left, most);
+    s->dropped_max = fmax(s->dropped_max, most);
     return true;
 }
 
+/* Returns a bound of the depth in a ball from the bound `hi` of the depth at its centre. */
 static double max_within(double hi, double radius)
 {
     return (hi + radius) * (hi + radius > 0 ? 1 + 0x1p-50 : 1);
 }
 
+/* Evaluates the depth at the centre of a ball, raises s->lo, and sets the output of the ball. */
 static ebpo_status query_ball(depth_search *s, const double middle[3], depth_ball *ball,
                               ebpo_error *error)
 {
@@ -153,14 +155,14 @@ static ebpo_status query_ball(depth_search *s, const double middle[3], depth_bal
     ebpo_status status = depth_at(s, middle, &lo, &hi, &rounding, error);
     if (status != EBPO_OK)
         return status;
-    s->lo = fmax(s->lo, (lo - ball->far) * (1 - 0x1p-50) - s->lost);
+    s->lo = fmax(s->lo, (lo - ball->far) * (1 - 0x1p-50) - s->position_error);
     ball->most = max_within(hi, ball->radius);
-    ball->open = !is_enough(s, ball->most, rounding);
+    ball->open = !is_settled(s, ball->most, rounding);
     return EBPO_OK;
 }
 
-/* Adds a part to the heap if the part may matter. All its points are within `radius` of the centre,
- * which is one of the points. */
+/* Adds a part to the heap if it may have the deepest point. All its points are within `radius` of
+ * the centre, which is one of them. */
 static ebpo_status offer_part(depth_search *s, depth_part *part, const double centre[3],
                               double radius, ebpo_error *error)
 {
@@ -170,19 +172,20 @@ static ebpo_status offer_part(depth_search *s, depth_part *part, const double ce
     ebpo_status status = depth_at(s, centre, &lo, &hi, &rounding, error);
     if (status != EBPO_OK)
         return status;
-    s->lo = fmax(s->lo, lo - s->lost);
+    s->lo = fmax(s->lo, lo - s->position_error);
     part->most = max_within(hi, radius);
     if (part->most > s->lo && s->context->warm)
         part->most = fmin(part->most, max_at_corners(s, (const double(*)[3])part->corner));
-    if (is_enough(s, part->most, rounding))
+    if (is_settled(s, part->most, rounding))
         return EBPO_OK;
-    if (!(radius > 4 * s->lost)) {
-        s->left = fmax(s->left, part->most);
+    if (!(radius > 4 * s->position_error)) {
+        s->dropped_max = fmax(s->dropped_max, part->most);
         return EBPO_OK;
     }
     return push_part(s, part) ? EBPO_OK : ebpo_fail_memory(error, s->capacity * sizeof *s->part);
 }
 
+/* Adds a posed triangle to the heap if it may have the deepest point. */
 static ebpo_status offer_triangle(depth_search *s, const double a[3], const double b[3],
                                   const double c[3], ebpo_error *error)
 {
@@ -195,10 +198,10 @@ static ebpo_status offer_triangle(depth_search *s, const double a[3], const doub
         memcpy(part.corner[i], corner[i], sizeof part.corner[i]);
         radius = fmax(radius, ebpo_vec3_scaled_distance(corner[i], centre));
     }
-    return offer_part(s, &part, centre, radius * (1 + 0x1p-50) + s->lost, error);
+    return offer_part(s, &part, centre, radius * (1 + 0x1p-50) + s->position_error, error);
 }
 
-/* Offers a face at its pose. */
+/* Adds a posed face to the heap if it may have the deepest point. */
 static ebpo_status offer_face(depth_search *s, const double corner[3][3], ebpo_error *error)
 {
     return offer_triangle(s, corner[0], corner[1], corner[2], error);
@@ -211,7 +214,7 @@ static void middle_of(const depth_part *p, int k, double out[3])
         out[i] = p->corner[k][i] + (p->corner[(k + 1) % 3][i] - p->corner[k][i]) / 2;
 }
 
-/* Splits the triangle in two at the middle of edge k. */
+/* Divides the triangle into two at the middle of edge k. */
 static ebpo_status halve_triangle(depth_search *s, const depth_part *p, int k, ebpo_error *error)
 {
     double middle[3];
@@ -222,8 +225,8 @@ static ebpo_status halve_triangle(depth_search *s, const depth_part *p, int k, e
                              : status;
 }
 
-/* Divides the triangle into four at the middles of its edges. A long triangle is halved instead:
- * its quarters would be long, too, and their number would grow without limit near another face. */
+/* Divides the triangle into four at the middles of its edges, or a long triangle into two: its
+ * quarters would be long, too, and their number would grow without limit near another face. */
 static ebpo_status divide_triangle(depth_search *s, const depth_part *p, ebpo_error *error)
 {
     double middle[3][3], length[3];
@@ -262,61 +265,64 @@ static ebpo_status divide_next(depth_search *s, ebpo_error *error)
  * once for each level that matters. Neither the cells nor the final interval depend on what is in
  * memory. */
 
-/* A cell whose content may be deep enough. */
+/* A cell that may contain the deepest point. */
 typedef struct open_cell {
     ebpo_cell cell;
-    double most;
+    double most; /* bound of the depth of its faces */
 } open_cell;
 
+/* A face that a leaf lists. */
 typedef struct listed_face {
-    uint64_t number; /* number in the file */
-    double corner[3][3];
+    uint64_t index;      /* index in the file */
+    double corner[3][3]; /* posed */
 } listed_face;
 
-typedef struct going_down {
+/* The search through the levels of the surface's octree. */
+typedef struct level_search {
     depth_search *s;
-    ebpo_posed_subtrees at; /* the pose of the surface */
+    ebpo_posed_subtrees at; /* model and pose of the surface */
     open_cell *open, *next; /* cells of the current level, and of the level below it */
     uint64_t open_count, open_capacity, next_count, next_capacity;
     listed_face *face; /* faces of leaves that wait for offer_faces */
     uint64_t face_count, face_capacity;
-} going_down;
+} level_search;
 
-/* Waiting faces are offered when there are at least this many. */
+/* Faces of leaves are evaluated when at least this many wait. */
 enum { FACES_AT_ONCE = 16384 };
 
 /* --- faces --- */
 
-static int by_number(const void *x, const void *y)
+static int by_index(const void *x, const void *y)
 {
     const listed_face *a = x, *b = y;
-    return (a->number > b->number) - (a->number < b->number);
+    return (a->index > b->index) - (a->index < b->index);
 }
 
-/* Offers the waiting faces; a face that several leaves list is offered once. */
-static ebpo_status offer_faces(going_down *g, ebpo_error *error)
+/* Evaluates the waiting faces; a face that several leaves list is evaluated once. */
+static ebpo_status offer_faces(level_search *g, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     if (g->face_count)
-        qsort(g->face, g->face_count, sizeof *g->face, by_number);
+        qsort(g->face, g->face_count, sizeof *g->face, by_index);
     for (uint64_t i = 0; i < g->face_count && status == EBPO_OK; i++)
-        if (i == 0 || g->face[i].number != g->face[i - 1].number)
+        if (i == 0 || g->face[i].index != g->face[i - 1].index)
             status = offer_face(g->s, (const double(*)[3])g->face[i].corner, error);
     g->face_count = 0;
     return status;
 }
 
-static bool add_face(going_down *g, const ebpo_accel *subtree, uint32_t slot)
+static bool add_face(level_search *g, const ebpo_accel *subtree, uint32_t slot)
 {
     if (!ebpo_grow(&g->face, &g->face_capacity, g->face_count + 1, sizeof *g->face))
         return false;
     listed_face *f = &g->face[g->face_count++];
-    f->number = ebpo_accel_file_face(subtree, ebpo_accel_slot_face(subtree, slot));
+    f->index = ebpo_accel_file_face(subtree, ebpo_accel_slot_face(subtree, slot));
     ebpo_posed_triangle(subtree, &g->at.posing, slot, f->corner);
     return true;
 }
 
-static ebpo_status add_leaf(going_down *g, const ebpo_node *leaf, ebpo_error *error)
+/* Adds the faces that a leaf lists to the waiting faces. */
+static ebpo_status add_leaf(level_search *g, const ebpo_node *leaf, ebpo_error *error)
 {
     const ebpo_accel *subtree = leaf->subtree;
     const ebpo_listed_block *list =
@@ -334,15 +340,17 @@ static ebpo_status add_leaf(going_down *g, const ebpo_node *leaf, ebpo_error *er
 
 /* --- cells --- */
 
-static ebpo_status offer_cell(going_down *g, ebpo_cell cell, ebpo_error *error)
+/* Adds a cell to the next level if it may contain the deepest point. */
+static ebpo_status offer_cell(level_search *g, ebpo_cell cell, ebpo_error *error)
 {
     depth_search *s = g->s;
     double corner[8][3], middle[3], diagonal = ebpo_posed_diagonal(&g->at, cell);
-    depth_ball ball = { .radius = diagonal / 2 * (1 + 0x1p-17) + 2 * s->lost, .far = INFINITY };
+    depth_ball ball = { .radius = diagonal / 2 * (1 + 0x1p-17) + 2 * s->position_error,
+                        .far = INFINITY };
     ebpo_posed_cell(&g->at, cell, corner);
     for (int k = 0; k < 3; k++)
         middle[k] = corner[0][k] / 2 + corner[7][k] / 2;
-    if (!g->at.model->info->pruned) /* a face has a point in the cell or near it */
+    if (!g->at.model->info->pruned) /* the cell contains a point of a face, or is near one */
         ball.far = ball.radius + EBPO_NEAR_SHARE * diagonal;
     open_cell open = { .cell = cell };
     ebpo_status status = query_ball(s, middle, &ball, error);
@@ -356,7 +364,7 @@ static ebpo_status offer_cell(going_down *g, ebpo_cell cell, ebpo_error *error)
 }
 
 /* Finds the node of a cell; loads subtrees on the path. */
-static ebpo_status find_node(going_down *g, ebpo_cell cell, ebpo_node *out, ebpo_error *error)
+static ebpo_status find_node(level_search *g, ebpo_cell cell, ebpo_node *out, ebpo_error *error)
 {
     ebpo_context *context = g->s->from;
     *out = ebpo_model_root(context->model);
@@ -370,11 +378,11 @@ static ebpo_status find_node(going_down *g, ebpo_cell cell, ebpo_node *out, ebpo
     }
 }
 
-static ebpo_status divide_cell(going_down *g, ebpo_cell cell, ebpo_error *error)
+static ebpo_status divide_cell(level_search *g, ebpo_cell cell, ebpo_error *error)
 {
     ebpo_node node;
     ebpo_status status = find_node(g, cell, &node, error);
-    if (status != EBPO_OK || node.pruned) /* the content of a pruned node is not in this file */
+    if (status != EBPO_OK || node.pruned) /* the faces of a pruned node are not in this file */
         return status;
     if (node.type != EBPO_GRAY)
         return add_leaf(g, &node, error);
@@ -388,14 +396,14 @@ static ebpo_status divide_cell(going_down *g, ebpo_cell cell, ebpo_error *error)
 
 /* --- levels --- */
 
-static ebpo_status divide_level(going_down *g, ebpo_error *error)
+static ebpo_status divide_level(level_search *g, ebpo_error *error)
 {
     depth_search *s = g->s;
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < g->open_count && status == EBPO_OK; i++) {
         const open_cell *c = &g->open[i];
         if (!(c->most > s->lo + s->tolerance) || is_search_late(s))
-            s->left = fmax(s->left, c->most);
+            s->dropped_max = fmax(s->dropped_max, c->most);
         else if (i % 64 == 0 && !ebpo_progress_step(s->progress, "depth", 0, 0, error))
             return EBPO_E_CANCELLED;
         else
@@ -404,7 +412,7 @@ static ebpo_status divide_level(going_down *g, ebpo_error *error)
     return status == EBPO_OK ? offer_faces(g, error) : status;
 }
 
-static void swap_levels(going_down *g)
+static void swap_levels(level_search *g)
 {
     open_cell *open = g->open;
     uint64_t capacity = g->open_capacity;
@@ -416,10 +424,11 @@ static void swap_levels(going_down *g)
     g->next_capacity = capacity;
 }
 
-/* Visits the cells and offers all faces that may matter to the heap. Fails as run_depth_search. */
+/* Visits the cells, and adds all faces that may have the deepest point to the heap. Fails with the
+ * errors of run_depth_search. */
 static ebpo_status offer_cells(depth_search *s, ebpo_error *error)
 {
-    going_down g = { .s = s, .at = { .model = s->from->model, .posing = *s->posing } };
+    level_search g = { .s = s, .at = { .model = s->from->model, .posing = *s->posing } };
     ebpo_node root = ebpo_model_root(g.at.model);
     ebpo_status status = ebpo_node_is_uniform(&root) ? EBPO_OK : offer_cell(&g, root.cell, error);
     for (swap_levels(&g); status == EBPO_OK && g.open_count > 0; swap_levels(&g))
@@ -441,13 +450,14 @@ static ebpo_status search_parts(depth_search *s, ebpo_error *error)
     return status;
 }
 
-/* Fails with EBPO_E_MEMORY, EBPO_E_CANCELLED and the errors of ebpo_distance. */
+/* Runs a search whose input has been set. Fails with EBPO_E_MEMORY, EBPO_E_CANCELLED and the errors
+ * of ebpo_distance. */
 static ebpo_status run_depth_search(depth_search *s, ebpo_error *error)
 {
-    s->lost = 0x1p-46 * s->reach;
+    s->position_error = 0x1p-46 * s->reach;
     s->lo = 0;
     ebpo_status status = search_parts(s, error);
-    s->hi = fmax(s->lo, s->left);
+    s->hi = fmax(s->lo, s->dropped_max);
     if (s->count > 0)
         s->hi = fmax(s->hi, s->part[0].most);
     free(s->part);
@@ -457,7 +467,8 @@ static ebpo_status run_depth_search(depth_search *s, ebpo_error *error)
 
 /* --- the query --- */
 
-/* Computes how deep the surface of one model is in the other, the caller's model `solid` (0: A). */
+/* Computes how deep the surface of one model is in the other model, which is the caller's A (solid:
+ * 0) or B (solid: 1). */
 static ebpo_status depth_in(const ebpo_collision *q, int solid, double tolerance, ebpo_certain *out,
                             ebpo_error *error)
 {

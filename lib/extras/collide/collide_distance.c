@@ -1,4 +1,4 @@
-/* Computes the distance of two models at poses, and a pair of faces at that distance.
+/* Computes the distance of two posed models, and a pair of faces at that distance.
  *
  * The kernels of gap_walk_kernels.c walk through pairs of nodes in floats and drop pairs that are
  * certainly farther apart than the limit. The remaining pairs wait and are decided here: in doubles
@@ -6,7 +6,8 @@
  * several pairs at the same distance, the first in file order is returned, so the result is the
  * same with every processor and number of threads.
  *
- * Models in parts are searched in pairs of subtrees, the smallest gap of envelopes first. A subtree
+ * Models in parts are searched in pairs of subtrees, in the order of the gaps of their envelopes. A
+ * subtree
  * is loaded only if its envelope is nearer than the best pair so far. A collider keeps its last
  * pair, from which the next search begins. Bounds: docs/develop/collision.md. */
 #include "core/strict_fp.h"
@@ -29,16 +30,17 @@
 
 /* Two faces, with coordinates as in their files (`own`) and at their poses (`corner`). */
 typedef struct ebpo_face_two {
-    uint64_t file[2], source[2]; /* face numbers in the file and in the source */
+    uint64_t file[2], source[2]; /* face indices in the file and in the source */
     double own[2][3][3], corner[2][3][3];
     ebpo_pair_distance_bounds bounds;
 } ebpo_face_two;
 
-/* Search for the nearest pair of faces of two accels, or of several pairs of accels in sequence. */
+/* Search for the nearest pair of faces of two hierarchies, or of several pairs of hierarchies one
+ * after the other. */
 typedef struct nearest_pair {
     /* Input: */
     double tolerance; /* 0: exact */
-    double at_least;  /* compare the distance with this value; NAN: do not compare */
+    double at_least;  /* only compare the distance with this value; NAN: compute the distance */
     uint64_t late;    /* deadline, a time of ebpo_clock; UINT64_MAX: none */
     const ebpo_progress *progress;
     /* Output: lo <= distance <= hi, equal if the result is exact. */
@@ -46,11 +48,11 @@ typedef struct nearest_pair {
     bool found;
     bool intersects; /* the faces of `best` intersect; another intersecting pair may precede it in
                       * file order */
-    int is_at_least; /* 1: yes, 0: no, -1: no comparison wanted, or undecided */
+    int is_at_least; /* the distance is at least `at_least`: 1: yes, 0: no, -1: not compared, or
+                      * undecided */
     ebpo_face_two best;
-    bool ended; /* the search ended early: all pairs that were not visited are at least this far
-                 * apart */
-    double left;
+    bool ended;        /* the search ended before all pairs were visited */
+    double unvisited;  /* then: the other pairs are at least this far apart */
     ebpo_error *error; /* error of `status` during the search */
     ebpo_status status;
 } nearest_pair;
@@ -60,6 +62,7 @@ typedef const double (*corners)[3];
 
 /* --- one pair --- */
 
+/* Computes the posed corners and the bounds of the distance of two faces. */
 static void pose_faces(const ebpo_posing *const posing[2], ebpo_face_two *out)
 {
     for (int i = 0; i < 6; i++)
@@ -67,6 +70,7 @@ static void pose_faces(const ebpo_posing *const posing[2], ebpo_face_two *out)
     ebpo_triangles_distance_bounds(CORNERS(out, 0), CORNERS(out, 1), &out->bounds);
 }
 
+/* Looks up two faces by their slots, and computes the bounds of their distance. */
 static void inspect_slots(const ebpo_gap_search *g, const uint32_t slot[2], ebpo_face_two *out)
 {
     const ebpo_posing *posing[2] = { &g->posing[0].posing, &g->posing[1].posing };
@@ -79,7 +83,7 @@ static void inspect_slots(const ebpo_gap_search *g, const uint32_t slot[2], ebpo
     pose_faces(posing, out);
 }
 
-/* Orders pairs of equal distance by the order in the files. */
+/* Returns true if a pair precedes another one in the order of the files. */
 static bool is_earlier(const ebpo_face_two *f, const ebpo_face_two *than)
 {
     return f->file[0] != than->file[0] ? f->file[0] < than->file[0] : f->file[1] < than->file[1];
@@ -107,8 +111,8 @@ static float to_unit(const ebpo_gap_search *g, double distance)
     return (float)(distance * g->posing[0].unit * (1 + 0x1p-22)) + 0x1p-100f;
 }
 
-/* Compares the distance of two disjoint faces with `at_least`. Returns false if that decides the
- * comparison. */
+/* Compares the distance of two disjoint faces with n->at_least. Returns false if it is less, which
+ * decides the comparison. */
 static bool compare_with_at_least(nearest_pair *n, const ebpo_face_two *f)
 {
     if (!(f->bounds.lo < n->at_least) ||
@@ -121,9 +125,9 @@ static bool compare_with_at_least(nearest_pair *n, const ebpo_face_two *f)
     return false;
 }
 
-/* With a tolerance, keeps only the least bounds. When a gap is tiny compared with its faces, the
- * bounds are too wide, because doubles hardly give the direction of the gap; then the exact
- * distance is rounded. */
+/* Considers a pair in a search with a tolerance: keeps only the least bounds. If the gap is tiny
+ * compared with the faces, its direction is inaccurate in doubles and the bounds are wider than the
+ * tolerance; then they are computed from the exact distance. */
 static void take_within_tolerance(nearest_pair *n, const ebpo_face_two *given)
 {
     ebpo_face_two f = *given;
@@ -139,7 +143,7 @@ static void take_within_tolerance(nearest_pair *n, const ebpo_face_two *given)
     n->found = true;
 }
 
-/* Returns false when enough is known. */
+/* Updates the result by a pair of faces. Returns false if the search can end. */
 static bool consider_faces(nearest_pair *n, const ebpo_face_two *f)
 {
     if (!(f->bounds.lo > 0) &&
@@ -159,7 +163,8 @@ static bool consider_faces(nearest_pair *n, const ebpo_face_two *f)
     return true;
 }
 
-static bool take_faces(ebpo_gap_search *g, nearest_pair *n, const uint32_t slot[2])
+/* Decides a waiting pair of faces. Returns false if the search can end. */
+static bool decide_faces(ebpo_gap_search *g, nearest_pair *n, const uint32_t slot[2])
 {
     ebpo_face_two f;
     inspect_slots(g, slot, &f);
@@ -167,7 +172,8 @@ static bool take_faces(ebpo_gap_search *g, nearest_pair *n, const uint32_t slot[
     return consider_faces(n, &f);
 }
 
-static bool go_on(ebpo_gap_search *g)
+/* Reports progress and checks the deadline. Returns false to end the search. */
+static bool continue_search(ebpo_gap_search *g)
 {
     nearest_pair *n = g->user;
     if (!ebpo_progress_step(n->progress, "distance", 0, 0, n->error))
@@ -176,8 +182,8 @@ static bool go_on(ebpo_gap_search *g)
     return !g->ended;
 }
 
-/* Returns the least bound of the waiting pairs from `first` on. Does not use fmin: gcc 12 for ARM
- * fails to compile such loops. */
+/* Returns the least lower bound of the waiting pairs from index `first` on. The loop does not use
+ * fmin, because gcc 12 for ARM fails to compile it. */
 static double least_waiting(const ebpo_gap_search *g, unsigned first)
 {
     double least = INFINITY;
@@ -187,16 +193,17 @@ static double least_waiting(const ebpo_gap_search *g, unsigned first)
     return fmax(least / g->posing[0].unit * (1 - 0x1p-20), 0);
 }
 
-/* Decides the waiting pairs. Many pairs may be at nearly the same distance where models have flat
- * parts. */
-static bool judge_waiting(ebpo_gap_search *g)
+/* Decides the waiting pairs, and calls continue_search now and then, because many pairs may wait
+ * where models have flat parts. Returns false if the search can end. */
+static bool decide_waiting(ebpo_gap_search *g)
 {
     nearest_pair *n = g->user;
     bool more = true;
     unsigned evaluated = 0, i = 0;
     for (; i < g->waits && more; i++)
         if (!(g->waiting[i].low > g->limit))
-            more = take_faces(g, n, g->waiting[i].slot) && (++evaluated % 16 || go_on(g));
+            more =
+                decide_faces(g, n, g->waiting[i].slot) && (++evaluated % 16 || continue_search(g));
     if (!more)
         n->lo = fmin(n->lo, least_waiting(g, i));
     g->waits = 0;
@@ -205,8 +212,8 @@ static bool judge_waiting(ebpo_gap_search *g)
 
 /* --- the result --- */
 
-/* Returns a lower bound for the pairs that have not been visited. */
-static double left_over(const ebpo_gap_search *g)
+/* Returns a lower bound of the distance of the pairs that have not been visited. */
+static double least_unvisited(const ebpo_gap_search *g)
 {
     double least = INFINITY;
     for (uint64_t i = 0; i < g->count; i++)
@@ -215,15 +222,17 @@ static double left_over(const ebpo_gap_search *g)
     return sqrt(fmax(least, 0)) / g->posing[0].unit * (1 - 0x1p-18);
 }
 
-static void end_exact(nearest_pair *n)
+/* Sets the exact distance of the best pair, rounded once. */
+static void set_exact_distance(nearest_pair *n)
 {
     n->lo = n->hi = ebpo_triangles_distance(CORNERS(&n->best, 0), CORNERS(&n->best, 1));
 }
 
-static void end_open(nearest_pair *n)
+/* Sets bounds of the distance, with a tolerance or after an early end. */
+static void set_distance_bounds(nearest_pair *n)
 {
     n->hi = n->found ? n->best.bounds.hi : INFINITY;
-    n->lo = fmin(fmin(n->lo, n->hi), n->left);
+    n->lo = fmin(fmin(n->lo, n->hi), n->unvisited);
     if (n->tolerance > 0)
         n->lo = fmin(n->lo, n->hi - n->tolerance);
     else if (n->found)
@@ -244,32 +253,33 @@ static void nearest_pair_end(nearest_pair *n)
         if (n->is_at_least == 1)
             n->hi = INFINITY;
         else
-            end_open(n);
+            set_distance_bounds(n);
     } else if (!n->ended && n->tolerance == 0 && n->found)
-        end_exact(n);
+        set_exact_distance(n);
     else
-        end_open(n);
+        set_distance_bounds(n);
 }
 
 /* Records that unvisited pairs are at least this far apart. */
-static void nearest_pair_leave(nearest_pair *n, double left)
+static void record_unvisited(nearest_pair *n, double left)
 {
     n->ended = true;
-    n->left = fmin(n->left, left);
+    n->unvisited = fmin(n->unvisited, left);
 }
 
 /* --- the search --- */
 
-/* Begins a search; the input has been set. */
+/* Begins a search whose input has been set. */
 static void nearest_pair_begin(nearest_pair *n)
 {
-    n->lo = n->left = INFINITY;
+    n->lo = n->unvisited = INFINITY;
     n->found = n->intersects = n->ended = false;
     n->status = EBPO_OK;
     n->is_at_least = -1;
 }
 
-/* Starts with a pair of faces from an earlier query; own, file and source are set. */
+/* Considers a pair of faces from an earlier query first; its members own, file and source are set.
+ */
 static void nearest_pair_start(nearest_pair *n, const ebpo_posing posing[2],
                                const ebpo_face_two *pair)
 {
@@ -312,47 +322,48 @@ static void begin_search(const nearest_pair *n, ebpo_gap_search *g)
     }
 }
 
-/* Decides the waiting pairs, and also the known pair if it is undecided and its bound is less than
- * `before`. */
-static void judge_rest(ebpo_gap_search *g, nearest_pair *n, float before)
+/* Decides the pairs that still wait. With a tolerance, also decides the pair of g->best if its
+ * bound is less than `before`, the bound at the beginning of the walk. */
+static void decide_rest(ebpo_gap_search *g, nearest_pair *n, float before)
 {
-    if (nearest_pair_is_done(n) || !judge_waiting(g) || n->intersects || !isnan(n->at_least))
+    if (nearest_pair_is_done(n) || !decide_waiting(g) || n->intersects || !isnan(n->at_least))
         return;
     if (n->tolerance > 0 && g->best < before)
-        take_faces(g, n, g->best_slot);
+        decide_faces(g, n, g->best_slot);
 }
 
-/* Continues with two more accels, with which `g` has begun. Fails with EBPO_E_MEMORY,
- * EBPO_E_CANCELLED. */
+/* Continues the search in two more hierarchies, for which ebpo_gap_begin has been called. Fails
+ * with EBPO_E_MEMORY, EBPO_E_CANCELLED. */
 static ebpo_status nearest_pair_search(nearest_pair *n, ebpo_gap_search *g, ebpo_error *error)
 {
     g->user = n;
-    g->judge = judge_waiting;
-    g->go_on = go_on;
+    g->judge = decide_waiting;
+    g->go_on = continue_search;
     n->error = error;
     begin_search(n, g);
     float before = g->best;
     ebpo_gap_kernels_best()->walk(g);
     if (g->no_memory)
         return ebpo_fail_memory(error, g->capacity * sizeof *g->stack);
-    judge_rest(g, n, before);
+    decide_rest(g, n, before);
     if (g->ended)
-        nearest_pair_leave(n, left_over(g));
+        record_unvisited(n, least_unvisited(g));
     return n->status;
 }
 
 static const char stage[] = "distance";
 
-typedef struct searching {
+/* The search in pairs of subtrees. */
+typedef struct node_search {
     ebpo_subtree_search subtrees;
     nearest_pair *n;
     double hi; /* upper bound of the distance, from the cells */
-} searching;
+} node_search;
 
 /* --- two accels --- */
 
-/* Continues `n` in two more accels of the query's models. `may_intersect`: first searches for a
- * contact, as bounds are weak where faces intersect. */
+/* Continues the search in two more hierarchies of the query's models. `may_intersect`: first search
+ * for a contact, because lower bounds exclude few pairs where models intersect. */
 static ebpo_status distance_of_accels(const ebpo_collision *q, const ebpo_accel *const accel[2],
                                       bool may_intersect, nearest_pair *n, ebpo_error *error)
 {
@@ -378,7 +389,8 @@ static ebpo_status distance_of_accels(const ebpo_collision *q, const ebpo_accel 
 
 /* --- pairs of nodes --- */
 
-static ebpo_status inspect_pair(searching *s, const ebpo_node_gap *pair, ebpo_error *error)
+/* Searches a pair of subtrees. */
+static ebpo_status inspect_pair(node_search *s, const ebpo_node_gap *pair, ebpo_error *error)
 {
     const ebpo_accel *accel[2];
     bool there;
@@ -388,7 +400,9 @@ static ebpo_status inspect_pair(searching *s, const ebpo_node_gap *pair, ebpo_er
                : status;
 }
 
-static ebpo_status add_node_pair(searching *s, const ebpo_posed_node node[2], double gap,
+/* Adds a pair of nodes to the heap, unless it is too far apart. gap: lower bound of the distance of
+ * their parents. */
+static ebpo_status add_node_pair(node_search *s, const ebpo_posed_node node[2], double gap,
                                  ebpo_error *error)
 {
     ebpo_node_gaps *nodes = &s->subtrees.nodes;
@@ -406,7 +420,8 @@ static ebpo_status add_node_pair(searching *s, const ebpo_posed_node node[2], do
     return ebpo_node_gaps_push(nodes, &pair, error);
 }
 
-static ebpo_status divide_pair(searching *s, const ebpo_node_gap *pair, int side, ebpo_error *error)
+static ebpo_status divide_pair(node_search *s, const ebpo_node_gap *pair, int side,
+                               ebpo_error *error)
 {
     ebpo_posed_node part[2] = { pair->node[0], pair->node[1] };
     ebpo_status status = EBPO_OK;
@@ -417,9 +432,8 @@ static ebpo_status divide_pair(searching *s, const ebpo_node_gap *pair, int side
     return status;
 }
 
-/* Visits pairs of nodes in the order of their gaps. The search ends at the first pair that is too
- * far apart. */
-static ebpo_status search_subtrees(searching *s, ebpo_error *error)
+/* Visits pairs of nodes in the order of their gaps, until a pair is too far apart. */
+static ebpo_status search_subtrees(node_search *s, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     ebpo_node_gaps *nodes = &s->subtrees.nodes;
@@ -430,22 +444,22 @@ static ebpo_status search_subtrees(searching *s, ebpo_error *error)
         if (pair.gap > nearest_pair_limit(s->n))
             return EBPO_OK;
         if (ebpo_collision_is_late(q))
-            nearest_pair_leave(s->n, pair.gap);
+            record_unvisited(s->n, pair.gap);
         else
             status = side < 0 ? inspect_pair(s, &pair, error) : divide_pair(s, &pair, side, error);
         if (nearest_pair_is_done(s->n)) /* the other pairs are not visited */
-            nearest_pair_leave(s->n, pair.gap);
+            record_unvisited(s->n, pair.gap);
         if (!ebpo_progress_step(&q->options.progress, stage, 0, 0, error))
             return EBPO_E_CANCELLED;
     }
     return status;
 }
 
-/* Continues `n` in all pairs of subtrees whose envelopes are not farther apart than the best
- * distance, the nearest first. Gives the same result as whole models. */
+/* Searches all pairs of subtrees whose envelopes are not farther apart than the best distance, in
+ * the order of their gaps. The result is the same as for whole models. */
 static ebpo_status distance_of_parts(const ebpo_collision *q, nearest_pair *n, ebpo_error *error)
 {
-    searching s = { .n = n, .hi = INFINITY };
+    node_search s = { .n = n, .hi = INFINITY };
     ebpo_status status = ebpo_subtree_search_begin(&s.subtrees, q, error);
     if (status == EBPO_OK) {
         ebpo_posed_node root[2] = { ebpo_posed_root(&s.subtrees.nodes.side[0]),
@@ -469,8 +483,8 @@ static ebpo_status check_options(const ebpo_clearance_options *o, ebpo_error *er
     return EBPO_OK;
 }
 
-/* Computes a common point of two faces, or their nearest points. */
-static void clash_point(const ebpo_face_two *f, ebpo_pair_kind kind, double point[2][3])
+/* Sets both points to a common point if the faces cross; otherwise changes nothing. */
+static void set_common_point(const ebpo_face_two *f, ebpo_pair_kind kind, double point[2][3])
 {
     ebpo_contact_end end[2];
     if (kind != EBPO_PAIR_CROSSING)
@@ -491,7 +505,7 @@ static void report_pair(const ebpo_collision *q, const nearest_pair *n, ebpo_cle
     if (n->intersects) {
         kind =
             ebpo_triangle_pair((const double(*)[3])f->corner[0], (const double(*)[3])f->corner[1]);
-        clash_point(f, kind, point);
+        set_common_point(f, kind, point);
     }
     out->pair =
         (ebpo_face_pair){ f->source[a], f->source[b], f->file[a], f->file[b], (int32_t)kind, 0 };
@@ -503,7 +517,8 @@ static void report_pair(const ebpo_collision *q, const nearest_pair *n, ebpo_cle
 
 /* --- from one query to the next --- */
 
-static ebpo_face_two in_order(const ebpo_collision *q, const ebpo_face_two *f)
+/* Exchanges the two faces if the query has the caller's models in the other order. */
+static ebpo_face_two in_query_order(const ebpo_collision *q, const ebpo_face_two *f)
 {
     ebpo_face_two out = *f;
     for (int i = 0; i < 2 && q->turned; i++) {
@@ -514,6 +529,7 @@ static ebpo_face_two in_order(const ebpo_collision *q, const ebpo_face_two *f)
     return out;
 }
 
+/* Stores the nearest pair in the collider, for the next query. */
 static ebpo_status keep_nearest(const ebpo_collision *q, const nearest_pair *n, ebpo_error *error)
 {
     ebpo_collider *c = q->collider;
@@ -521,17 +537,18 @@ static ebpo_status keep_nearest(const ebpo_collision *q, const nearest_pair *n, 
         c->nearest = ebpo_alloc_zero(1, sizeof *c->nearest);
     if (!c->nearest)
         return ebpo_fail_memory(error, sizeof *c->nearest);
-    *c->nearest = in_order(q, &n->best);
+    *c->nearest = in_query_order(q, &n->best);
     return EBPO_OK;
 }
 
+/* Considers the nearest pair of the last query first. */
 static void start_search(const ebpo_collision *q, nearest_pair *n)
 {
     const ebpo_posing posing[2] = { q->posing[0].posing, q->posing[1].posing };
-    ebpo_face_two known = in_order(q, q->collider->nearest);
+    ebpo_face_two known = in_query_order(q, q->collider->nearest);
     nearest_pair_start(n, posing, &known);
     if (nearest_pair_is_done(n))
-        nearest_pair_leave(n, 0);
+        record_unvisited(n, 0);
 }
 
 /* --- the search of a query --- */

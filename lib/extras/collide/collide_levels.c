@@ -1,11 +1,11 @@
-/* Bounds the distance of two models at poses from the levels of their octrees, without their faces.
- * Also finds if both solids certainly have a common point.
+/* Bounds the distance of two posed models by the levels of their octrees, without their faces, and
+ * reports if both solids certainly have a common point.
  *
- * Pairs of nodes are visited in the order of the gaps between their envelopes, the smallest first
- * (subtree_search.h). A gap is a lower bound of the distance. Two nodes with faces give an upper
+ * Pairs of nodes are visited in the order of the gaps of their envelopes, the least first
+ * (subtree_search.h). A gap is a lower bound of the distance; two nodes with faces give an upper
  * bound. A black cell belongs entirely to its solid. So both solids have a common point in two
  * cases: a black cell contains a whole cell with faces of the other model, or it contains a point
- * of a black cell of the other model. One thread. */
+ * of a black cell of the other model. A search runs in one thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -15,11 +15,11 @@
 #include "core/parallel.h"
 #include "extras/collide/subtree_search.h"
 
-/* Zero at first. */
+/* The search through the levels. Zero at the beginning. */
 typedef struct level_search {
     const ebpo_collision *collision;
     ebpo_node_gaps nodes;
-    /* output */
+    /* Output: */
     double lo, hi;       /* bounds of the distance of faces */
     uint64_t open_pairs; /* pairs whose faces may intersect */
     bool intersects;     /* the solids or faces certainly have a common point */
@@ -28,12 +28,13 @@ typedef struct level_search {
 
 static const char stage[] = "pairs of nodes";
 
-/* Margin inside a black cell along its cell faces that is not used, as a share of the cell's side.
- */
+/* Width of the margin inside a black cell whose points are not counted as inside, as a share of the
+ * cell's side. */
 static const double cell_face_share = 0x1p-14;
 
 /* --- nodes --- */
 
+/* Content of a node: nothing, faces, or only the interior of the solid. */
 typedef enum content { NOTHING, FACES, SOLID } content;
 
 static content content_of(const level_search *g, int side, const ebpo_posed_node *node)
@@ -54,7 +55,8 @@ static bool has_children(const level_search *g, const ebpo_posed_node *node)
 
 /* --- a common point of both solids --- */
 
-/* Returns true if a posed point is certainly within a posed cell. */
+/* Returns true if the posed point p is certainly within a posed cell. reach: bound of posed
+ * coordinates. */
 static bool is_within(const double corner[8][3], const double p[3], double reach)
 {
     for (int k = 0; k < 3; k++) {
@@ -74,7 +76,7 @@ static bool is_within(const double corner[8][3], const double p[3], double reach
     return true;
 }
 
-/* Widens a cell by the margin within which faces of its node may be outside the cell. */
+/* Widens a cell about its middle by a share of its size. */
 static void widen_cell(double corner[8][3], double share)
 {
     double middle[3];
@@ -85,9 +87,9 @@ static void widen_cell(double corner[8][3], double share)
             corner[c][i] = middle[i] + (corner[c][i] - middle[i]) * (1 + share);
 }
 
-/* Returns true if `solid`, the cell of a black node, certainly has a common point with the content
- * of the other node. That is so if `solid` contains the whole region in which the other node has a
- * face, or (`black`: the other node is black, too) one of several points of the other cell. */
+/* Returns true if `solid`, the cell of a black node, certainly has a common point with the other
+ * node's model: if it contains the whole region in which the other node has a face, or, if the
+ * other node is also `black`, a corner or the middle of the other cell. */
 static bool shares_point(const level_search *g, double solid[8][3], double other[8][3], bool black)
 {
     int within = 0;
@@ -118,6 +120,8 @@ static bool certainly_intersect(const level_search *g, const ebpo_posed_node nod
 
 /* --- pairs --- */
 
+/* Adds a pair of nodes to the heap unless it cannot change the result. gap: lower bound of the
+ * distance of their parents. */
 static ebpo_status add_node_pair(level_search *g, const ebpo_posed_node node[2], double gap,
                                  ebpo_error *error)
 {
@@ -142,8 +146,8 @@ static bool has_faces(const level_search *g, const ebpo_node_gap *pair)
     return content_of(g, 0, &pair->node[0]) == FACES && content_of(g, 1, &pair->node[1]) == FACES;
 }
 
-/* Ends a pair that is not divided. */
-static void close_pair(level_search *g, const ebpo_node_gap *pair)
+/* Adds a pair that is not divided any further to the result. */
+static void finish_pair(level_search *g, const ebpo_node_gap *pair)
 {
     bool faces = has_faces(g, pair);
     if (faces)
@@ -169,14 +173,15 @@ static ebpo_status divide_pair(level_search *g, const ebpo_node_gap *pair, ebpo_
 
 /* --- the search --- */
 
-/* Ends all waiting pairs undecided; only their least gap is known. */
-static void close_all(level_search *g)
+/* Adds all waiting pairs, undecided, to the result. */
+static void finish_all_pairs(level_search *g)
 {
     for (uint64_t i = 0; i < g->nodes.count; i++)
-        close_pair(g, &g->nodes.heap[i]);
+        finish_pair(g, &g->nodes.heap[i]);
     g->nodes.count = 0;
 }
 
+/* Returns true if the search uses more than the collider's memory. */
 static bool is_full(const level_search *g)
 {
     return g->nodes.count * sizeof *g->nodes.heap + g->nodes.side[0].bytes +
@@ -184,8 +189,8 @@ static bool is_full(const level_search *g)
            g->collision->collider->options.memory;
 }
 
-/* Visits pairs in the order of their gaps. Skips pairs with a gap above `lo`, which is the least
- * gap of the pairs that are not divided, and pairs without faces once a common point is certain. */
+/* Visits pairs in the order of their gaps. Skips pairs with a gap above g->lo, the least gap of the
+ * pairs that are not divided further, and, once a common point is certain, pairs without faces. */
 static ebpo_status search_levels(level_search *g, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
@@ -196,12 +201,12 @@ static ebpo_status search_levels(level_search *g, ebpo_error *error)
         if ((!faces && g->intersects) || pair.gap > g->lo)
             continue;
         if (ebpo_collision_is_late(g->collision) || is_full(g)) {
-            close_pair(g, &pair);
-            close_all(g);
+            finish_pair(g, &pair);
+            finish_all_pairs(g);
         } else if (has_children(g, &pair.node[0]) || has_children(g, &pair.node[1])) {
             status = divide_pair(g, &pair, error);
         } else {
-            close_pair(g, &pair);
+            finish_pair(g, &pair);
         }
         if (!ebpo_progress_step(&g->collision->options.progress, stage, 0, 0, error))
             return EBPO_E_CANCELLED;
@@ -226,6 +231,7 @@ static void level_search_free(level_search *g) { ebpo_node_gaps_free(&g->nodes);
 
 /* --- the query --- */
 
+/* Returns the deepest level of a model that the search uses. */
 static int32_t last_level(const ebpo_model *m, int level)
 {
     int last = m->whole ? m->info->level_count - 1 : m->top->cut_level;

@@ -1,11 +1,11 @@
 /* Finds the pairs of faces of two models that intersect: the first contact, or all pairs in a fixed
  * order.
  *
- * All pairs: the walk through both hierarchies (pair_walk_kernels.c) is expanded to enough pairs of
- * nodes, which are distributed to threads. The results are sorted by the numbers of the first face,
- * then of the second, so the order does not depend on the number of threads. When the collider's
- * memory is too small for all pairs, runs of the first model's faces are searched one after the
- * other. Models in parts are searched by subtree_walk.h. */
+ * To find all pairs, the walk through both hierarchies (pair_walk_kernels.c) is expanded to enough
+ * pairs of nodes, which are distributed to threads. The results are sorted by the indices of the
+ * first face, then of the second, so the order does not depend on the number of threads. If the
+ * collider's memory is too small for all pairs, runs of consecutive faces of the first model are
+ * searched one after the other. Models in parts are searched by subtree_walk.h. */
 #include "core/strict_fp.h"
 
 #include <stdatomic.h>
@@ -20,27 +20,27 @@
 #include "extras/collide/hierarchy_walk.h"
 #include "extras/collide/subtree_walk.h"
 
-/* Search for all intersecting pairs of faces of two accels, for a run of the first accel's faces.
- * Zero at first. */
-typedef struct gathering {
+/* Search for all intersecting pairs of faces of two hierarchies, for a run of faces of the first.
+ * Zero at the beginning. */
+typedef struct pair_gathering {
     const ebpo_collision *collision;
-    bool self;
+    bool self;            /* both are the same hierarchy, at one pose */
     ebpo_node_pair *part; /* pairs of nodes from which threads continue */
     uint64_t parts, part_capacity;
-    ebpo_pair_walk *walk; /* one walk for each thread */
+    ebpo_pair_walk *walk; /* [threads] */
     unsigned threads;
-    uint64_t most; /* maximum number of pairs */
-    _Atomic uint64_t found;
-    _Atomic bool full; /* there are more than `most` pairs */
-    ebpo_found_pair *found_pairs;
+    uint64_t most;                /* maximum number of pairs */
+    _Atomic uint64_t found;       /* number of pairs found by all threads */
+    _Atomic bool full;            /* there are more than `most` pairs */
+    ebpo_found_pair *found_pairs; /* [found_count] the sorted result */
     uint64_t found_count, found_capacity;
-} gathering;
+} pair_gathering;
 
 /* --- sorting --- */
 
-/* Radix sort, beginning with the least significant digit. The size of digits is chosen so that
- * counting digits takes no longer than moving the pairs. */
-enum { LEAST_BITS = 4, MAX_BITS = 11 };
+/* Radix sort, beginning with the least significant digit. A digit has MIN_BITS to MAX_BITS bits, so
+ * that counting digits takes no longer than moving the pairs. */
+enum { MIN_BITS = 4, MAX_BITS = 11 };
 
 static inline uint32_t digit_of(const ebpo_found_pair *m, bool by_a, unsigned shift, unsigned bits)
 {
@@ -62,14 +62,14 @@ static void sort_by_digit(const ebpo_found_pair *from, ebpo_found_pair *to, uint
 
 static unsigned bits_for(uint64_t count)
 {
-    unsigned bits = LEAST_BITS;
+    unsigned bits = MIN_BITS;
     while (bits < MAX_BITS && count >> bits > 1)
         bits++;
     return bits;
 }
 
-/* Sorts pairs. `spare` has space for as many; the result is in `pairs`. Face numbers are
- * below max_a and max_b. */
+/* Sorts pairs by a, then by b, which are below max_a and max_b. `spare` is workspace for as many
+ * pairs; the result is in `pairs`. */
 static void sort_found_pairs(ebpo_found_pair *pairs, ebpo_found_pair *spare, uint64_t count,
                              uint32_t max_a, uint32_t max_b)
 {
@@ -90,7 +90,8 @@ static void sort_found_pairs(ebpo_found_pair *pairs, ebpo_found_pair *spare, uin
 
 /* --- the first contact --- */
 
-/* Searches for the first contact. *found is -1 when the deadline has passed. */
+/* Searches for the first contact. *found: 1 if there is one, 0 if there is none, -1 if the deadline
+ * has passed. */
 static ebpo_status search_first(const ebpo_collision *q, ebpo_pair_walk *w, const char *stage,
                                 int32_t *found, ebpo_error *error)
 {
@@ -152,8 +153,8 @@ ebpo_status ebpo_collide_first(ebpo_collider *c, const ebpo_collide_options *opt
 
 static const char stage[] = "pairs of faces";
 
-/* Enough parts for any number of threads. The results do not depend on the number of parts, only
- * the balance of work does. */
+/* Least number of parts, and number of pieces of work. They affect only how evenly the threads are
+ * used, not the result. */
 enum { PARTS = 512, PARTS_EACH = 64 };
 
 static ebpo_status no_memory(const ebpo_pair_walk *w, ebpo_error *error)
@@ -161,7 +162,8 @@ static ebpo_status no_memory(const ebpo_pair_walk *w, ebpo_error *error)
     return ebpo_fail_memory(error, (w->capacity + 64) * sizeof *w->stack);
 }
 
-static bool hold_node_pairs(gathering *g, const ebpo_node_pair *pairs, uint64_t count)
+/* Stores pairs of nodes as the parts. Returns false without memory. */
+static bool store_parts(pair_gathering *g, const ebpo_node_pair *pairs, uint64_t count)
 {
     if (!ebpo_grow(&g->part, &g->part_capacity, count, sizeof *g->part))
         return false;
@@ -171,26 +173,28 @@ static bool hold_node_pairs(gathering *g, const ebpo_node_pair *pairs, uint64_t 
     return true;
 }
 
-/* Divides all pairs of nodes repeatedly, until there are enough parts or only pairs of blocks. */
-static bool make_parts(gathering *g, ebpo_pair_walk *w)
+/* Divides all pairs of nodes repeatedly, until there are enough parts or only pairs of blocks.
+ * Returns false without memory. */
+static bool make_parts(pair_gathering *g, ebpo_pair_walk *w)
 {
-    bool fine = w->kernels->start(w) && hold_node_pairs(g, w->stack, w->top);
-    for (bool more = true; fine && more && g->parts && g->parts < PARTS;) {
+    bool ok = w->kernels->start(w) && store_parts(g, w->stack, w->top);
+    for (bool more = true; ok && more && g->parts && g->parts < PARTS;) {
         uint64_t divided = w->node_pairs;
         w->top = 0;
-        for (uint64_t i = 0; i < g->parts && fine; i++)
-            fine = w->kernels->expand(w, g->part[i]);
+        for (uint64_t i = 0; i < g->parts && ok; i++)
+            ok = w->kernels->expand(w, g->part[i]);
         more = w->node_pairs > divided;
-        fine = fine && hold_node_pairs(g, w->stack, w->top);
+        ok = ok && store_parts(g, w->stack, w->top);
     }
     w->top = 0;
-    return fine;
+    return ok;
 }
 
+/* Searches the parts [begin, end). */
 static ebpo_status run_parts(void *user, uint64_t begin, uint64_t end, unsigned worker,
                              ebpo_error *error)
 {
-    gathering *g = user;
+    pair_gathering *g = user;
     ebpo_pair_walk *w = &g->walk[worker];
     if (!ebpo_pair_walk_capacity(w, end - begin))
         return no_memory(w, error);
@@ -209,9 +213,9 @@ static ebpo_status run_parts(void *user, uint64_t begin, uint64_t end, unsigned 
     return EBPO_OK;
 }
 
-/* Takes the collider's walks if they are free. They are in use when the callback that receives
- * pairs makes another query. */
-static bool take_walks(gathering *g)
+/* Takes the walks that the collider keeps, or makes new ones. The collider's are in use if the
+ * callback that receives pairs makes another query. Returns false without memory. */
+static bool take_walks(pair_gathering *g)
 {
     ebpo_collider *c = g->collision->collider;
     if (c->walks) {
@@ -225,7 +229,7 @@ static bool take_walks(gathering *g)
     return g->walk != NULL;
 }
 
-static ebpo_status prepare_walks(gathering *g, const ebpo_accel_pair *pair, uint32_t begin,
+static ebpo_status prepare_walks(pair_gathering *g, const ebpo_accel_pair *pair, uint32_t begin,
                                  uint32_t end, ebpo_error *error)
 {
     if (!g->walk && !take_walks(g))
@@ -242,8 +246,8 @@ static ebpo_status prepare_walks(gathering *g, const ebpo_accel_pair *pair, uint
     return EBPO_OK;
 }
 
-/* Joins the threads' results. */
-static ebpo_status put_together(gathering *g, const ebpo_accel_pair *pair, ebpo_error *error)
+/* Joins the results of all threads, and sorts them. */
+static ebpo_status join_results(pair_gathering *g, const ebpo_accel_pair *pair, ebpo_error *error)
 {
     uint64_t count = 0;
     for (unsigned i = 0; i < g->threads; i++)
@@ -264,9 +268,9 @@ static ebpo_status put_together(gathering *g, const ebpo_accel_pair *pair, ebpo_
     return EBPO_OK;
 }
 
-/* Gathers pairs of faces `begin` to `end` of the pair's first accel. Fills `found_pairs`, sorted;
- * or sets `full` if there are too many. */
-static ebpo_status gather_pairs(gathering *g, const ebpo_accel_pair *pair, uint32_t begin,
+/* Finds the pairs of the faces [begin, end) of the first hierarchy. Sets g->found_pairs; or g->full
+ * if there are too many pairs. */
+static ebpo_status gather_pairs(pair_gathering *g, const ebpo_accel_pair *pair, uint32_t begin,
                                 uint32_t end, ebpo_error *error)
 {
     ebpo_status status = prepare_walks(g, pair, begin, end, error);
@@ -281,11 +285,11 @@ static ebpo_status gather_pairs(gathering *g, const ebpo_accel_pair *pair, uint3
         ebpo_collider_count(g->collision->collider, &g->walk[i]);
     if (status != EBPO_OK || g->full)
         return status;
-    return put_together(g, pair, error);
+    return join_results(g, pair, error);
 }
 
 /* Returns the walks to the collider for the next query, which reuses their memory. */
-static void give_walks_back(gathering *g)
+static void return_walks(pair_gathering *g)
 {
     ebpo_collider *c = g->collision->collider;
     for (unsigned i = 0; g->walk && i < g->threads; i++)
@@ -298,31 +302,32 @@ static void give_walks_back(gathering *g)
     c->walk_count = g->threads;
 }
 
-static void gathering_free(gathering *g)
+static void gathering_free(pair_gathering *g)
 {
-    give_walks_back(g);
+    return_walks(g);
     free(g->part);
     free(g->found_pairs);
 }
 
 /* --- all pairs --- */
 
-/* State of passing pairs to the caller. */
-typedef struct giving {
+/* The caller's function that receives pairs. */
+typedef struct pair_receiver {
     const ebpo_collision *collision;
     const ebpo_accel_pair *pair;
     ebpo_pairs_fn take;
     void *user;
-    bool enough;
-} giving;
+    bool enough; /* the function has returned false: the caller needs no more pairs */
+} pair_receiver;
 
-enum { GIVEN_AT_ONCE = 1024 };
+enum { PASSED_AT_ONCE = 1024 };
 
-static void give_pairs(giving *v, const ebpo_found_pair *found_pairs, uint64_t count)
+/* Passes pairs to the caller. */
+static void pass_pairs(pair_receiver *v, const ebpo_found_pair *found_pairs, uint64_t count)
 {
-    ebpo_face_pair out[GIVEN_AT_ONCE];
-    for (uint64_t at = 0; at < count && !v->enough; at += GIVEN_AT_ONCE) {
-        uint64_t n = count - at < GIVEN_AT_ONCE ? count - at : GIVEN_AT_ONCE;
+    ebpo_face_pair out[PASSED_AT_ONCE];
+    for (uint64_t at = 0; at < count && !v->enough; at += PASSED_AT_ONCE) {
+        uint64_t n = count - at < PASSED_AT_ONCE ? count - at : PASSED_AT_ONCE;
         for (uint64_t i = 0; i < n; i++)
             out[i] = ebpo_collision_pair(v->collision, v->pair->accel[0], v->pair->accel[1],
                                          &found_pairs[at + i]);
@@ -330,9 +335,10 @@ static void give_pairs(giving *v, const ebpo_found_pair *found_pairs, uint64_t c
     }
 }
 
-/* Searches runs of faces of the first model. A run is halved until its pairs fit in memory; after a
- * run that fits, the next one is twice as long. A single face may use more memory. */
-static ebpo_status in_runs(giving *v, gathering *g, ebpo_error *error)
+/* Searches runs of consecutive faces of the first model. A run is halved until its pairs fit in
+ * memory; after a run that fits, the next one is twice as long. The pairs of a single face may need
+ * more memory. */
+static ebpo_status search_in_runs(pair_receiver *v, pair_gathering *g, ebpo_error *error)
 {
     uint32_t faces = v->pair->accel[0]->face_count, run = faces;
     uint64_t most = v->collision->collider->options.memory / (2 * sizeof(ebpo_found_pair)) + 1;
@@ -347,7 +353,7 @@ static ebpo_status in_runs(giving *v, gathering *g, ebpo_error *error)
             run = run / 2;
             continue;
         }
-        give_pairs(v, g->found_pairs, g->found_count);
+        pass_pairs(v, g->found_pairs, g->found_count);
         begin = end;
         run = run < faces / 2 ? 2 * run : faces;
     }
@@ -367,9 +373,9 @@ static ebpo_status all_pairs(const ebpo_collision *q, bool self, ebpo_pairs_fn t
     ebpo_accel_pair_make(&pair, accel, posing, q->reach);
     if (pair.apart)
         return EBPO_OK;
-    giving v = { q, &pair, take, user, false };
-    gathering g = { .collision = q, .self = self };
-    ebpo_status status = in_runs(&v, &g, error);
+    pair_receiver v = { q, &pair, take, user, false };
+    pair_gathering g = { .collision = q, .self = self };
+    ebpo_status status = search_in_runs(&v, &g, error);
     gathering_free(&g);
     return status;
 }
@@ -388,7 +394,7 @@ ebpo_status ebpo_collide_self(ebpo_collider *c, const ebpo_collide_options *opti
 {
     EBPO_DEFAULT_FP;
     ebpo_collision q;
-    ebpo_collide_options here = EBPO_COLLIDE_OPTIONS_INIT;
+    ebpo_collide_options own = EBPO_COLLIDE_OPTIONS_INIT;
     if (c->model[0] != c->model[1])
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "one model with itself: expected a collider of "
@@ -396,9 +402,9 @@ ebpo_status ebpo_collide_self(ebpo_collider *c, const ebpo_collide_options *opti
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status != EBPO_OK)
         return status;
-    here.deadline_ns = q.options.deadline_ns;
-    here.progress = q.options.progress;
-    return ebpo_collide_self_posed(c, &here, take, user, error);
+    own.deadline_ns = q.options.deadline_ns;
+    own.progress = q.options.progress;
+    return ebpo_collide_self_posed(c, &own, take, user, error);
 }
 
 ebpo_status ebpo_collide_self_posed(ebpo_collider *c, const ebpo_collide_options *options,

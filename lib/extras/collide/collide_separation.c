@@ -1,12 +1,12 @@
 /* Computes how far one model has to move along a direction until both models have no common point:
  * the last time of contact.
  *
- * A heap holds pairs of nodes, first the pair that may separate last. The nodes' extents along the
- * direction and along two axes perpendicular to it bound the time of their last contact. Pairs of
- * faces are bounded in doubles (ebpo_sweep_max) and decided exactly (ebpo_sweep_last). Models in
- * parts are searched in pairs of subtrees: a subtree is loaded only if its envelope may separate
- * later than the last contact found. Bounds: docs/develop/collision.md, "Separation distance along
- * a direction". One thread. */
+ * A heap holds pairs of nodes, the pair that may separate last first. The extents of the nodes
+ * along the direction and along two axes perpendicular to it bound the time of their last contact.
+ * The last contact of two faces is bounded in doubles (ebpo_sweep_max) and computed exactly
+ * (ebpo_sweep_last). Models in parts are searched in pairs of subtrees: a subtree is loaded only if
+ * its envelope may separate later than the last contact found. A search runs in one thread. Bounds:
+ * docs/develop/collision.md, "Separation distance along a direction". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -22,41 +22,40 @@
 #include "extras/collide/subtree_search.h"
 #include "geometry/vec3.h"
 
-/* A pair of children of nodes, each as the node's number * 8 + lane. */
+/* A pair of children of nodes, each given as 8 * the node's index + the child's lane. */
 typedef struct separation_pair {
     double most; /* upper bound of the last time at which they have a common point */
     uint32_t a, b;
 } separation_pair;
 
-/* One model relative to the direction: the axes of its posed frame, as components along three
- * perpendicular axes. The first of these is the direction. */
+/* The map from a hierarchy's frame to components along the three axes of separation_search. */
 typedef struct separation_side {
     const ebpo_accel *accel;
     const ebpo_posing *posing;
-    double row[3][3], base[3];
+    double row[3][3], base[3]; /* [axis] a point x has the component row . x + base */
 } separation_side;
 
 typedef struct separation_search {
     /* Input: */
     const ebpo_collision *collision;
-    double direction[3]; /* direction in which the query's first model moves; the greatest component
-                          * is 1/2 .. 1 */
-    /* Output: the last contact, in units of that direction, and its pair. Contacts before time 0 do
-     * not count. */
+    double direction[3]; /* direction in which the query's first model moves; the absolute value of
+                          * its greatest component is 1/2 to 1 */
+    /* Output: the time of the last contact, in units of `direction`, and its pair of faces.
+     * Contacts before time 0 do not count. */
     ebpo_sweep_time last;
     ebpo_face_pair pair; /* faces of the caller's A and B */
     double hi;           /* upper bound of the times of dropped pairs; negative: none was dropped */
     /* Initially 0: */
     separation_side side[2];
-    double axis[3][3]; /* three perpendicular axes; the first is the direction */
-    double step, lost; /* step: component of the direction along the first axis; lost: bound of how
-                        * far rounding moves extents */
-    double sure;       /* `last` is certainly not earlier than this */
-    separation_pair *pairs; /* a heap, the greatest first */
+    double axis[3][3];      /* three perpendicular axes; the first is the direction */
+    double step;            /* length of `direction` */
+    double extent_error;    /* bound of how far rounding moves extents */
+    double earliest;        /* `last` is certainly not earlier than this */
+    separation_pair *pairs; /* a heap, the greatest `most` first */
     uint64_t count, capacity, evaluations;
 } separation_search;
 
-/* Extents along the axes of a convex set, or of a set that it contains. */
+/* Extents along the three axes. */
 typedef struct separation_extent {
     double low[3], high[3];
 } separation_extent;
@@ -80,6 +79,7 @@ static bool push_pair(separation_search *s, const separation_pair *pair)
 
 /* --- extents along the three axes --- */
 
+/* Returns the extents of a child of a node. ref: 8 * the node's index + the child's lane. */
 static separation_extent extent_of(const separation_search *s, int which, uint32_t ref)
 {
     const separation_side *side = &s->side[which];
@@ -107,13 +107,14 @@ static double separation_max(const separation_search *s, const separation_extent
                              const separation_extent *b)
 {
     for (int i = 1; i < 3; i++)
-        if (b->low[i] - a->high[i] > s->lost || a->low[i] - b->high[i] > s->lost)
+        if (b->low[i] - a->high[i] > s->extent_error || a->low[i] - b->high[i] > s->extent_error)
             return -1;
-    double along = b->high[0] - a->low[0] + s->lost;
+    double along = b->high[0] - a->low[0] + s->extent_error;
     return along < 0 ? -1 : along / s->step * (1 + 0x1p-40);
 }
 
-/* Makes two axes perpendicular to the direction and to each other. */
+/* Sets axis[0] to the direction d with length 1, and two unit vectors perpendicular to it and to
+ * each other. */
 static void make_axes(const double d[3], double axis[3][3])
 {
     double length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
@@ -152,7 +153,7 @@ static void make_side(separation_search *s, int which, const ebpo_accel *accel)
 
 /* --- faces --- */
 
-/* Returns true if x precedes y in the order of the query's models. */
+/* Returns true if the pair x precedes s->pair in the order of the query's models. */
 static bool comes_first(const separation_search *s, const ebpo_found_pair *x)
 {
     uint64_t a = ebpo_accel_file_face(s->side[0].accel, x->a),
@@ -162,13 +163,14 @@ static bool comes_first(const separation_search *s, const ebpo_found_pair *x)
     return a != has[turned] ? a < has[turned] : b < has[!turned];
 }
 
+/* Computes the last contact of two faces, and keeps it if it is later than s->last. */
 static void inspect_faces(separation_search *s, const double a[3][3], const double b[3][3],
                           const ebpo_found_pair *pair)
 {
     double most = ebpo_sweep_max(a, b, s->direction, INFINITY);
     ebpo_sweep_time t;
     s->evaluations++;
-    if (most < s->sure)
+    if (most < s->earliest)
         return;
     ebpo_sweep_time_init(&t);
     ebpo_sweep_last(a, b, s->direction, &t);
@@ -179,7 +181,7 @@ static void inspect_faces(separation_search *s, const double a[3][3], const doub
         s->last.unit = t.unit;
         s->last.ever = true;
         s->pair = ebpo_collision_pair(s->collision, s->side[0].accel, s->side[1].accel, pair);
-        s->sure = fmax(0, nextafter(ebpo_sweep_time_round(&s->last), 0));
+        s->earliest = fmax(0, nextafter(ebpo_sweep_time_round(&s->last), 0));
     }
     ebpo_sweep_time_clear(&t);
 }
@@ -215,19 +217,20 @@ static double size_of(const separation_extent *e)
     return e->high[0] - e->low[0] + (e->high[1] - e->low[1]) + (e->high[2] - e->low[2]);
 }
 
-/* Adds pairs of each child of one node with `other`, a child of the other model's node. */
+/* Adds the pairs of each child of a node of model `which` with `other`, a child of a node of the
+ * other model, to the heap. */
 static ebpo_status offer_children(separation_search *s, int which, uint32_t node, uint32_t other,
                                   ebpo_error *error)
 {
-    separation_extent seen[2];
-    seen[!which] = extent_of(s, !which, other);
+    separation_extent extent[2];
+    extent[!which] = extent_of(s, !which, other);
     for (uint32_t i = 0; i < s->side[which].accel->bound[node].count; i++) {
         uint32_t ref[2];
         ref[which] = node * 8 + i;
         ref[!which] = other;
-        seen[which] = extent_of(s, which, ref[which]);
-        separation_pair pair = { separation_max(s, &seen[0], &seen[1]), ref[0], ref[1] };
-        if (pair.most < s->sure)
+        extent[which] = extent_of(s, which, ref[which]);
+        separation_pair pair = { separation_max(s, &extent[0], &extent[1]), ref[0], ref[1] };
+        if (pair.most < s->earliest)
             continue;
         if (!push_pair(s, &pair))
             return ebpo_fail_memory(error, s->capacity * sizeof *s->pairs);
@@ -235,7 +238,8 @@ static ebpo_status offer_children(separation_search *s, int which, uint32_t node
     return EBPO_OK;
 }
 
-/* Divides a pair of nodes, the larger node if both can be divided. */
+/* Divides the larger node of a pair, or the one that can be divided; a pair of blocks is decided.
+ */
 static ebpo_status divide_pair(separation_search *s, const separation_pair *pair, ebpo_error *error)
 {
     uint32_t child[2] = { child_of(s, 0, pair->a), child_of(s, 1, pair->b) };
@@ -249,18 +253,19 @@ static ebpo_status divide_pair(separation_search *s, const separation_pair *pair
     return offer_children(s, which, child[which], which ? pair->a : pair->b, error);
 }
 
-/* Begins a search; called once. The caller clears `last`. */
+/* Begins a search. The caller must clear s->last by ebpo_sweep_time_clear. */
 static void separation_search_begin(separation_search *s)
 {
     ebpo_sweep_time_init(&s->last);
     make_axes(s->direction, s->axis);
     s->step = ebpo_vec3_dot(s->axis[0], s->direction);
-    s->lost = 0x1p-40 * s->collision->reach;
+    s->extent_error = 0x1p-40 * s->collision->reach;
     s->hi = -1;
     s->pair = (ebpo_face_pair){ EBPO_NO_FACE, EBPO_NO_FACE,    EBPO_NO_FACE,
                                 EBPO_NO_FACE, EBPO_PAIR_APART, 0 };
 }
 
+/* Adds the pairs of children of both top nodes to the heap. */
 static ebpo_status offer_tops(separation_search *s, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
@@ -270,7 +275,7 @@ static ebpo_status offer_tops(separation_search *s, ebpo_error *error)
     return status;
 }
 
-/* Continues with two accels of the query's models. Fails with EBPO_E_MEMORY, EBPO_E_CANCELLED. */
+/* Searches two hierarchies of the query's models. Fails with EBPO_E_MEMORY, EBPO_E_CANCELLED. */
 static ebpo_status separation_search_run(separation_search *s, const ebpo_accel *const accel[2],
                                          ebpo_error *error)
 {
@@ -280,7 +285,7 @@ static ebpo_status separation_search_run(separation_search *s, const ebpo_accel 
     for (int w = 0; w < 2; w++)
         make_side(s, w, accel[w]);
     ebpo_status status = offer_tops(s, error);
-    while (status == EBPO_OK && s->count > 0 && s->pairs[0].most >= s->sure) {
+    while (status == EBPO_OK && s->count > 0 && s->pairs[0].most >= s->earliest) {
         if (ebpo_collision_is_late(s->collision))
             break;
         if (s->evaluations % 64 == 0 &&
@@ -291,7 +296,7 @@ static ebpo_status separation_search_run(separation_search *s, const ebpo_accel 
         separation_pair pair = heap_take(s->pairs, s->count--);
         status = divide_pair(s, &pair, error);
     }
-    if (s->count > 0 && s->pairs[0].most >= s->sure)
+    if (s->count > 0 && s->pairs[0].most >= s->earliest)
         s->hi = fmax(s->hi, s->pairs[0].most);
     free(s->pairs);
     s->pairs = NULL;
@@ -301,17 +306,18 @@ static ebpo_status separation_search_run(separation_search *s, const ebpo_accel 
 
 /* --- pairs of subtrees --- */
 
-/* State of a search in pairs of subtrees. A subtree lists the faces that have a point in its cell.
- * If moved faces have a last common point, the point is in such a cell of each model. So both
- * subtrees' envelopes contain the point and do not separate earlier. */
+/* The search in pairs of subtrees. A subtree lists the faces that have a point in its cell. The
+ * last common point of two moving faces is therefore in a cell of each model whose subtree lists
+ * the face. The envelopes of both subtrees contain the point, and do not separate earlier. */
 
-typedef struct searching {
-    ebpo_subtree_search
-        subtrees; /* `gap` of a pair: minus the time until which the envelopes may intersect */
+typedef struct node_search {
+    ebpo_subtree_search subtrees; /* here ebpo_node_gap.gap is minus the time until which the
+                                   * envelopes may intersect */
     separation_search *search;
-} searching;
+} node_search;
 
-static ebpo_status cell_extent(searching *s, int which, ebpo_cell cell, separation_extent *out,
+/* Computes the extents of the envelope of a node. */
+static ebpo_status cell_extent(node_search *s, int which, ebpo_cell cell, separation_extent *out,
                                ebpo_error *error)
 {
     ebpo_posed_subtrees *side = &s->subtrees.nodes.side[which];
@@ -332,7 +338,7 @@ static ebpo_status cell_extent(searching *s, int which, ebpo_cell cell, separati
     return status;
 }
 
-static ebpo_status add_node_pair(searching *s, const ebpo_posed_node node[2], ebpo_error *error)
+static ebpo_status add_node_pair(node_search *s, const ebpo_posed_node node[2], ebpo_error *error)
 {
     separation_extent extent[2];
     for (int i = 0; i < 2; i++) {
@@ -344,11 +350,11 @@ static ebpo_status add_node_pair(searching *s, const ebpo_posed_node node[2], eb
     }
     ebpo_node_gap pair = { { node[0], node[1] },
                            -separation_max(s->search, &extent[0], &extent[1]) };
-    return -pair.gap < s->search->sure ? EBPO_OK
-                                       : ebpo_node_gaps_push(&s->subtrees.nodes, &pair, error);
+    return -pair.gap < s->search->earliest ? EBPO_OK
+                                           : ebpo_node_gaps_push(&s->subtrees.nodes, &pair, error);
 }
 
-static ebpo_status divide_node_pair(searching *s, const ebpo_node_gap *pair, int side,
+static ebpo_status divide_node_pair(node_search *s, const ebpo_node_gap *pair, int side,
                                     ebpo_error *error)
 {
     ebpo_posed_node part[2] = { pair->node[0], pair->node[1] };
@@ -360,7 +366,7 @@ static ebpo_status divide_node_pair(searching *s, const ebpo_node_gap *pair, int
     return status;
 }
 
-static ebpo_status inspect_pair(searching *s, const ebpo_node_gap *pair, ebpo_error *error)
+static ebpo_status inspect_pair(node_search *s, const ebpo_node_gap *pair, ebpo_error *error)
 {
     const ebpo_accel *accel[2];
     bool there;
@@ -371,7 +377,7 @@ static ebpo_status inspect_pair(searching *s, const ebpo_node_gap *pair, ebpo_er
     return status == EBPO_OK && there ? separation_search_run(s->search, accel, error) : status;
 }
 
-static ebpo_status search_node_pairs(searching *s, ebpo_error *error)
+static ebpo_status search_node_pairs(node_search *s, ebpo_error *error)
 {
     const ebpo_collision *q = s->subtrees.collision;
     ebpo_node_gaps *nodes = &s->subtrees.nodes;
@@ -380,7 +386,7 @@ static ebpo_status search_node_pairs(searching *s, ebpo_error *error)
     ebpo_status status = add_node_pair(s, root, error);
     while (status == EBPO_OK && nodes->count > 0) {
         ebpo_node_gap pair = ebpo_node_gaps_pop(nodes);
-        if (-pair.gap < s->search->sure)
+        if (-pair.gap < s->search->earliest)
             return EBPO_OK;
         if (ebpo_collision_is_late(q)) {
             s->search->hi = fmax(s->search->hi, -pair.gap);
@@ -393,11 +399,11 @@ static ebpo_status search_node_pairs(searching *s, ebpo_error *error)
     return status;
 }
 
-/* Continues in all pairs of subtrees whose envelopes may separate as late as the last contact
- * found, the latest first. Gives the same result as whole models. */
+/* Searches all pairs of subtrees whose envelopes may separate later than the last contact found,
+ * the latest first. The result is the same as for whole models. */
 static ebpo_status separation_of_parts(separation_search *search, ebpo_error *error)
 {
-    searching s = { .search = search };
+    node_search s = { .search = search };
     ebpo_status status = ebpo_subtree_search_begin(&s.subtrees, search->collision, error);
     if (status == EBPO_OK)
         status = search_node_pairs(&s, error);
@@ -407,7 +413,8 @@ static ebpo_status separation_of_parts(separation_search *search, ebpo_error *er
 
 /* --- the query --- */
 
-/* Sets the direction of the query's first model, times a power of two, and returns the exponent. */
+/* Sets s->direction to the direction in which the query's first model moves, times 2^-exponent, and
+ * returns the exponent. */
 static int set_direction(separation_search *s, const double direction[3])
 {
     int exponent;

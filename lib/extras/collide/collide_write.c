@@ -124,20 +124,21 @@ static const struct {
 
 enum { ROWS = 512 };
 
-typedef struct writing {
+/* An HDF5 file while it is written. */
+typedef struct pairs_file {
     const ebpo_collision *collision;
-    ebpo_pair_faces places;
+    ebpo_pair_faces places; /* for looking up faces */
     ebpo_h5_out out;
     ebpo_h5_table table[TABLES];
     int64_t faces[ROWS][2], file_faces[ROWS][2], contact_faces[ROWS][2];
     uint8_t kind[ROWS], on[ROWS][4];
     double points[ROWS][6];
-    uint64_t pairs, contacts; /* rows waiting to be written */
+    uint64_t pairs, contacts; /* numbers of rows that wait to be written */
     ebpo_error *error;
     ebpo_status status;
-} writing;
+} pairs_file;
 
-static ebpo_status make_tables(writing *w, ebpo_error *error)
+static ebpo_status make_tables(pairs_file *w, ebpo_error *error)
 {
     static const char *const groups[] = { "/pairs", "/contacts" };
     ebpo_status status = EBPO_OK;
@@ -152,7 +153,8 @@ static ebpo_status make_tables(writing *w, ebpo_error *error)
     return status;
 }
 
-static bool flush_rows(writing *w)
+/* Writes the waiting rows. Returns false after a failure (w->status). */
+static bool flush_rows(pairs_file *w)
 {
     const void *const data[TABLES] = { w->faces,  w->file_faces,    w->kind,
                                        w->points, w->contact_faces, w->on };
@@ -163,7 +165,8 @@ static bool flush_rows(writing *w)
     return w->status == EBPO_OK;
 }
 
-static bool note_contact(writing *w, const ebpo_face_pair *pair)
+/* Adds a row for the contact of a crossing pair. Returns false after a failure (w->status). */
+static bool add_contact_row(pairs_file *w, const ebpo_face_pair *pair)
 {
     ebpo_posed_pair faces;
     ebpo_contact_segment s;
@@ -184,7 +187,7 @@ static bool note_contact(writing *w, const ebpo_face_pair *pair)
 
 static bool take_rows(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
-    writing *w = user;
+    pairs_file *w = user;
     for (uint64_t i = 0; i < count; i++) {
         uint64_t n = w->pairs++;
         w->faces[n][0] = (int64_t)pairs[i].face_a;
@@ -192,7 +195,7 @@ static bool take_rows(void *user, const ebpo_face_pair *pairs, uint64_t count)
         w->file_faces[n][0] = (int64_t)pairs[i].file_face_a;
         w->file_faces[n][1] = (int64_t)pairs[i].file_face_b;
         w->kind[n] = (uint8_t)pairs[i].kind;
-        if (pairs[i].kind == EBPO_PAIR_CROSSING && !note_contact(w, &pairs[i]))
+        if (pairs[i].kind == EBPO_PAIR_CROSSING && !add_contact_row(w, &pairs[i]))
             return false;
         if (w->pairs == ROWS && !flush_rows(w))
             return false;
@@ -200,7 +203,7 @@ static bool take_rows(void *user, const ebpo_face_pair *pairs, uint64_t count)
     return true;
 }
 
-static ebpo_status write_tables(writing *w, const char *path, ebpo_publish *target)
+static ebpo_status write_tables(pairs_file *w, const char *path, ebpo_publish *target)
 {
     const ebpo_collision *q = w->collision;
     ebpo_status status = ebpo_h5_create_plain(&w->out, ebpo_publish_path(target), path, w->error);
@@ -223,7 +226,7 @@ static ebpo_status write_tables(writing *w, const char *path, ebpo_publish *targ
 static ebpo_status write_hdf5(const ebpo_collision *q, const char *path, ebpo_publish *target,
                               ebpo_error *error)
 {
-    writing *w = ebpo_alloc_zero(1, sizeof *w);
+    pairs_file *w = ebpo_alloc_zero(1, sizeof *w);
     if (!w)
         return ebpo_fail_memory(error, sizeof *w);
     w->collision = q;
@@ -241,22 +244,23 @@ static ebpo_status write_hdf5(const ebpo_collision *q, const char *path, ebpo_pu
 
 /* --- PLY --- */
 
-/* Source of a mesh for PLY. A model in parts is read chunk by chunk; the mesh of a whole model is
- * read once more. */
-typedef struct painted {
-    ebpo_mesh mesh;
-    ebpo_faces_by_number parts;
+/* A mesh that is written as PLY. A model in parts is read chunk by chunk; the mesh of a whole model
+ * is read from the file again. */
+typedef struct shown_mesh {
+    ebpo_mesh mesh;             /* of a whole model */
+    ebpo_faces_by_number parts; /* for a model in parts */
     ebpo_red_source source;
     uint64_t *intersecting; /* a bit for each intersecting face */
-} painted;
+} shown_mesh;
 
-typedef struct painting {
-    painted side[2]; /* meshes of the caller's A and B */
-} painting;
+typedef struct shown_meshes {
+    shown_mesh side[2]; /* meshes of the caller's A and B */
+} shown_meshes;
 
-static bool take_found(void *user, const ebpo_face_pair *pairs, uint64_t count)
+/* Marks the faces of pairs as intersecting. */
+static bool mark_faces(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
-    const painting *p = user;
+    const shown_meshes *p = user;
     uint64_t *a = p->side[0].intersecting, *b = p->side[1].intersecting;
     for (uint64_t i = 0; i < count; i++) {
         a[pairs[i].file_face_a / 64] |= UINT64_C(1) << pairs[i].file_face_a % 64;
@@ -275,7 +279,7 @@ static ebpo_status part_face(void *user, uint64_t number, uint32_t out[3], ebpo_
     return ebpo_faces_by_number_corners(user, number, out, error);
 }
 
-static ebpo_status begin_painted(painted *p, const ebpo_model *model, ebpo_error *error)
+static ebpo_status begin_shown_mesh(shown_mesh *p, const ebpo_model *model, ebpo_error *error)
 {
     const ebpo_info *info = model->info;
     p->intersecting = ebpo_alloc_zero(info->face_count / 64 + 1, 8);
@@ -292,7 +296,7 @@ static ebpo_status begin_painted(painted *p, const ebpo_model *model, ebpo_error
     return EBPO_OK;
 }
 
-static void end_painted(painted *p)
+static void end_shown_mesh(shown_mesh *p)
 {
     ebpo_faces_by_number_end(&p->parts);
     ebpo_mesh_free(&p->mesh);
@@ -302,13 +306,13 @@ static void end_painted(painted *p)
 static ebpo_status write_ply(const ebpo_collision *q, ebpo_publish *target, ebpo_error *error)
 {
     static const char *const colour[2] = { "200 200 200", "150 150 160" };
-    painting p = { 0 };
+    shown_meshes p = { 0 };
     ebpo_red_mesh red[2];
     ebpo_status status = EBPO_OK;
     for (int m = 0; m < 2 && status == EBPO_OK; m++)
-        status = begin_painted(&p.side[m], q->collider->model[m], error);
+        status = begin_shown_mesh(&p.side[m], q->collider->model[m], error);
     if (status == EBPO_OK)
-        status = ebpo_collide_all(q->collider, &q->options, take_found, &p, error);
+        status = ebpo_collide_all(q->collider, &q->options, mark_faces, &p, error);
     uint64_t before = ebpo_collision_bytes_read(q);
     for (int m = 0; m < 2; m++)
         red[m] = (ebpo_red_mesh){ p.side[m].source, &q->posing[(int)q->turned ^ m].posing,
@@ -317,7 +321,7 @@ static ebpo_status write_ply(const ebpo_collision *q, ebpo_publish *target, ebpo
         status = ebpo_red_meshes_print(red, 2, target, error);
     q->collider->bytes_read += ebpo_collision_bytes_read(q) - before;
     for (int m = 0; m < 2; m++)
-        end_painted(&p.side[m]);
+        end_shown_mesh(&p.side[m]);
     return status;
 }
 

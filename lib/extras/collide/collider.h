@@ -24,7 +24,7 @@ struct ebpo_collider {
                             * finds all pairs; or NULL */
     unsigned walk_count;
     uint64_t node_pairs, block_pairs, exact;             /* as in ebpo_collider_stats */
-    uint64_t subtree_pairs, subtrees, loads, bytes_read; /* the same for models in parts */
+    uint64_t subtree_pairs, subtrees, loads, bytes_read; /* members of it for models in parts */
     struct ebpo_gap_search *gap;   /* state of distance queries, after the first one */
     struct ebpo_face_two *nearest; /* the last nearest pair, of the caller's A and B; or NULL */
     ebpo_context *context[2]; /* contexts of depth queries, after the first one of that model */

@@ -176,12 +176,12 @@ static void compute_piercing(const piercing *p, double out[3])
 typedef struct edge {
     const double (*face)[3], (*plane)[3];
     int from, to;
-    bool ends_there; /* corner `to` is in the plane */
+    bool ends_in_plane; /* corner `to` is in the plane */
 } edge;
 
 static ebpo_feature feature_of(const edge *e)
 {
-    if (e->ends_there)
+    if (e->ends_in_plane)
         return (ebpo_feature)(EBPO_NEAR_CORNER0 + e->to);
     int next = e->from == 2 ? 0 : e->from + 1;
     return (ebpo_feature)(EBPO_NEAR_EDGE0 + (e->to == next ? e->from : e->to));
@@ -190,7 +190,7 @@ static ebpo_feature feature_of(const edge *e)
 /* Computes the point where an edge intersects the other face's plane. */
 static void end_of(const edge *e, double out[3])
 {
-    if (e->ends_there) {
+    if (e->ends_in_plane) {
         memcpy(out, e->face[e->to], 3 * sizeof *out);
         return;
     }
@@ -202,8 +202,8 @@ static void end_of(const edge *e, double out[3])
  * whose ends are less by coordinates. */
 static const edge *choose_edge(const edge *a, const edge *b)
 {
-    if (a->ends_there || b->ends_there)
-        return a->ends_there ? a : b;
+    if (a->ends_in_plane || b->ends_in_plane)
+        return a->ends_in_plane ? a : b;
     piercing p = piercing_of(a->face, a->from, a->to, a->plane),
              q = piercing_of(b->face, b->from, b->to, b->plane);
     int order = ebpo_corner_order(p.end[0], q.end[0]);

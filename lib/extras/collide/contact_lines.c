@@ -33,7 +33,7 @@ typedef struct segment {
     bool reported;
 } segment;
 
-typedef struct lines {
+typedef struct line_search {
     ebpo_pair_faces places; /* for looking up faces */
     uint64_t most;          /* maximum number of segments */
     segment *segment;       /* [count] */
@@ -47,7 +47,7 @@ typedef struct lines {
     bool full, no_memory; /* there are more than `most` segments; memory is short */
     ebpo_error *error;    /* error of `status` */
     ebpo_status status;
-} lines;
+} line_search;
 
 /* --- gathering --- */
 
@@ -74,7 +74,7 @@ static void unit_normal(const double t[3][3], double out[3])
 
 /* Sets `out` to the key of the feature `on` (an ebpo_feature) of a face of the caller's model m.
  * `t` has the face's corners as in the file. Returns false without memory. */
-static bool set_feature(lines *l, int m, uint64_t face, const double t[3][3], unsigned on,
+static bool set_feature(line_search *l, int m, uint64_t face, const double t[3][3], unsigned on,
                         uint32_t out[2])
 {
     if (on > 5) {
@@ -96,7 +96,7 @@ static bool set_feature(lines *l, int m, uint64_t face, const double t[3][3], un
 
 /* Adds the segment of a crossing pair, with the keys of its ends. Returns false without memory;
  * sets l->status after other failures. */
-static bool add_segment(lines *l, const ebpo_face_pair *pair)
+static bool add_segment(line_search *l, const ebpo_face_pair *pair)
 {
     ebpo_posed_pair faces;
     if (!ebpo_grow(&l->segment, &l->capacity, l->count + 1, sizeof *l->segment) ||
@@ -125,7 +125,7 @@ static bool add_segment(lines *l, const ebpo_face_pair *pair)
 
 static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
-    lines *l = user;
+    line_search *l = user;
     for (uint64_t i = 0; i < count; i++) {
         if (pairs[i].kind != EBPO_PAIR_CROSSING)
             continue;
@@ -157,7 +157,7 @@ static int by_features(const void *x, const void *y)
 }
 
 /* Joins segments where exactly one ends and exactly one begins. */
-static void join_segments(lines *l)
+static void join_segments(line_search *l)
 {
     uint64_t n = 2 * l->count;
     if (n > 0)
@@ -176,7 +176,7 @@ static void join_segments(lines *l)
 
 /* --- output --- */
 
-static bool add_point(lines *l, const double at[3])
+static bool add_point(line_search *l, const double at[3])
 {
     /* a copy, because `at` may point into the array that grows */
     const double x[3] = { at[0], at[1], at[2] };
@@ -188,7 +188,7 @@ static bool add_point(lines *l, const double at[3])
 
 /* Adds the first point of a segment, its faces and normals. The segment's second point is the first
  * one of the next segment. */
-static bool add_to_line(lines *l, segment *s)
+static bool add_to_line(line_search *l, segment *s)
 {
     uint64_t n = l->line.count;
     if (!ebpo_grow(&l->faces, &l->faces_capacity, 2 * (n + 1), sizeof *l->faces) ||
@@ -203,7 +203,7 @@ static bool add_to_line(lines *l, segment *s)
 }
 
 /* Makes the line that contains segment i, the first segment that is not yet reported. */
-static bool make_line(lines *l, uint32_t i)
+static bool make_line(line_search *l, uint32_t i)
 {
     uint32_t first = i, last = NONE;
     while (l->segment[first].before != NONE && l->segment[first].before != i)
@@ -225,7 +225,7 @@ static bool make_line(lines *l, uint32_t i)
     return true;
 }
 
-static ebpo_status give_lines(lines *l, ebpo_polylines_fn take, void *user, ebpo_error *error)
+static ebpo_status pass_lines(line_search *l, ebpo_polylines_fn take, void *user, ebpo_error *error)
 {
     for (uint64_t i = 0; i < l->count; i++) {
         if (l->segment[i].reported)
@@ -238,7 +238,7 @@ static ebpo_status give_lines(lines *l, ebpo_polylines_fn take, void *user, ebpo
     return EBPO_OK;
 }
 
-static ebpo_status fail_lines(const lines *l, ebpo_error *error)
+static ebpo_status fail_lines(const line_search *l, ebpo_error *error)
 {
     if (l->no_memory)
         return ebpo_fail_memory(error, l->capacity * sizeof *l->segment);
@@ -248,7 +248,7 @@ static ebpo_status fail_lines(const lines *l, ebpo_error *error)
                      (unsigned long long)l->most);
 }
 
-static void free_lines(lines *l)
+static void free_lines(line_search *l)
 {
     ebpo_pair_faces_end(&l->places);
     for (int i = 0; i < 2; i++)
@@ -273,7 +273,7 @@ ebpo_status ebpo_collide_polylines(ebpo_collider *c, const ebpo_collide_options 
 {
     EBPO_DEFAULT_FP;
     ebpo_collision q;
-    lines l = { .error = error, .most = ebpo_contact_lines_max(c) };
+    line_search l = { .error = error, .most = ebpo_contact_lines_max(c) };
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status == EBPO_OK)
         status = ebpo_pair_faces_begin(&l.places, &q, error);
@@ -285,7 +285,7 @@ ebpo_status ebpo_collide_polylines(ebpo_collider *c, const ebpo_collide_options 
         status = fail_lines(&l, error);
     if (status == EBPO_OK) {
         join_segments(&l);
-        status = give_lines(&l, take, user, error);
+        status = pass_lines(&l, take, user, error);
     }
     free_lines(&l);
     return status;

@@ -100,14 +100,14 @@ void ebpo_corner_ids_free(ebpo_corner_ids *ids)
     *ids = (ebpo_corner_ids){ 0 };
 }
 
-typedef struct joining {
+typedef struct corner_joining {
     ebpo_corner_ids corners;
     uint32_t *user; /* [corner] a face that has it */
     uint64_t users; /* capacity of `user` */
-} joining;
+} corner_joining;
 
 /* Joins a face with the faces that have one of its corners. Returns false without memory. */
-static bool join_face(joining *j, uint32_t *patch, uint32_t face, const double t[3][3])
+static bool join_face(corner_joining *j, uint32_t *patch, uint32_t face, const double t[3][3])
 {
     for (int i = 0; i < 3; i++) {
         uint32_t id;
@@ -126,25 +126,25 @@ static bool join_face(joining *j, uint32_t *patch, uint32_t face, const double t
 ebpo_status ebpo_face_patches(const ebpo_accel *subtree, const uint32_t *slots,
                               const uint64_t *omitted, uint32_t **out, ebpo_error *error)
 {
-    joining j = { 0 };
+    corner_joining j = { 0 };
     uint32_t count = subtree->face_count - subtree->shared_count;
     uint32_t *patch = ebpo_alloc(count, sizeof *patch);
-    bool fine = patch != NULL;
-    for (uint32_t f = 0; f < count && fine; f++)
+    bool ok = patch != NULL;
+    for (uint32_t f = 0; f < count && ok; f++)
         patch[f] = f;
-    for (uint32_t f = 0; f < count && fine; f++) {
+    for (uint32_t f = 0; f < count && ok; f++) {
         double t[3][3];
         uint64_t number = subtree->first_face + f;
         if (omitted[number / 64] >> number % 64 & 1)
             continue;
         ebpo_accel_triangle(subtree, slots[subtree->shared_count + f], t);
-        fine = join_face(&j, patch, f, (const double(*)[3])t);
+        ok = join_face(&j, patch, f, (const double(*)[3])t);
     }
-    for (uint32_t f = 0; f < count && fine; f++)
+    for (uint32_t f = 0; f < count && ok; f++)
         patch[f] = first_joined(patch, f);
     ebpo_corner_ids_free(&j.corners);
     free(j.user);
-    if (!fine) {
+    if (!ok) {
         free(patch);
         return ebpo_fail_memory(error, count * sizeof *patch);
     }
@@ -160,16 +160,16 @@ ebpo_status ebpo_face_patches(const ebpo_accel *subtree, const uint32_t *slots,
 
 #define NO_CORNER UINT32_MAX
 
-typedef struct edges {
+typedef struct edge_lists {
     const ebpo_accel *whole;
     uint32_t (*corner)[3]; /* corners of each face; NO_CORNER: the face has no area */
     uint64_t *end;  /* end of each corner's list, which begins at the end of the previous list */
     uint64_t *edge; /* other corner << 32 | face */
     uint32_t *patch;
-} edges;
+} edge_lists;
 
 /* Sets the corners of all faces, and makes each face a patch. Returns false without memory. */
-static bool number_corners(edges *e, ebpo_corner_ids *ids, const uint32_t *slots,
+static bool number_corners(edge_lists *e, ebpo_corner_ids *ids, const uint32_t *slots,
                            const ebpo_posing *posing)
 {
     for (uint32_t f = 0; f < e->whole->face_count; f++) {
@@ -188,7 +188,7 @@ static bool number_corners(edges *e, ebpo_corner_ids *ids, const uint32_t *slots
 /* Sets *lesser and *other to the corners of edge i of face f. Returns false if the face has no
  * area.
  */
-static bool edge_of(const edges *e, uint32_t f, int i, uint32_t *lesser, uint32_t *other)
+static bool edge_of(const edge_lists *e, uint32_t f, int i, uint32_t *lesser, uint32_t *other)
 {
     uint32_t a = e->corner[f][i], b = e->corner[f][i == 2 ? 0 : i + 1];
     *lesser = a < b ? a : b;
@@ -197,7 +197,7 @@ static bool edge_of(const edges *e, uint32_t f, int i, uint32_t *lesser, uint32_
 }
 
 /* Counts the entries, then fills the lists from their ends. */
-static void list_edges(edges *e, uint64_t corners)
+static void list_edges(edge_lists *e, uint64_t corners)
 {
     uint32_t at, other;
     for (uint32_t f = 0; f < e->whole->face_count; f++)
@@ -218,7 +218,7 @@ static int compare_edges(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-static void join_list(edges *e, uint64_t *list, uint64_t count)
+static void join_list(edge_lists *e, uint64_t *list, uint64_t count)
 {
     if (count > 1)
         qsort(list, count, sizeof *list, compare_edges);
@@ -230,7 +230,7 @@ static void join_list(edges *e, uint64_t *list, uint64_t count)
     }
 }
 
-static bool join_edges(edges *e, uint64_t corners)
+static bool join_edges(edge_lists *e, uint64_t corners)
 {
     uint64_t faces = e->whole->face_count;
     e->end = ebpo_alloc_zero(corners + 1, sizeof *e->end);
@@ -251,17 +251,17 @@ ebpo_status ebpo_edge_patches(const ebpo_accel *whole, const uint32_t *slots,
                               const ebpo_posing *posing, uint32_t **out, ebpo_error *error)
 {
     ebpo_corner_ids ids = { 0 };
-    edges e = { .whole = whole };
+    edge_lists e = { .whole = whole };
     e.corner = ebpo_alloc(whole->face_count, sizeof *e.corner);
     e.patch = ebpo_alloc(whole->face_count, sizeof *e.patch);
-    bool fine = e.corner && e.patch && number_corners(&e, &ids, slots, posing);
+    bool ok = e.corner && e.patch && number_corners(&e, &ids, slots, posing);
     uint64_t corners = ids.count;
     ebpo_corner_ids_free(&ids);
-    fine = fine && join_edges(&e, corners);
+    ok = ok && join_edges(&e, corners);
     free(e.corner);
     free(e.end);
     free(e.edge);
-    if (!fine) {
+    if (!ok) {
         free(e.patch);
         return ebpo_fail_memory(error, whole->face_count * (uint64_t)60);
     }

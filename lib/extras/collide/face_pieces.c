@@ -1,11 +1,12 @@
-/* Finds the pieces of a face that other faces cut, and an exact point of each piece.
+/* Finds the pieces into which other faces cut a face, and an exact point of each piece.
  *
- * The face is seen along the axis on which its normal has the largest component; p and q are the
- * two other coordinates, GMP fractions. Other faces cut it in segments, the cuts. Values of p at
- * which a cut begins, ends or crosses another cut are events. Between neighbouring events (a strip)
- * the cuts have one order in q, so they divide the strip into parts. Parts of neighbouring strips
- * that share an open interval belong to one piece. Faces in the same plane count by their winding.
- * See docs/develop/collision.md, "Relation of two models". One thread. */
+ * The face is projected along the axis on which its normal has the largest component; p and q are
+ * the two other coordinates, which are GMP fractions. Other faces cut it along segments, the cuts.
+ * Values of p at which a cut begins, ends or crosses another cut are events. Between neighbouring
+ * events (in a strip) the cuts have one order in q, so they divide the strip into parts. Two parts
+ * of neighbouring strips belong to one piece if their borders share an open interval that is no
+ * cut. For each point, the faces in the same plane that contain it are counted by their
+ * orientation. See docs/develop/collision.md, "Relation of two models". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -17,8 +18,9 @@
 #include "extras/collide/face_pieces.h"
 #include "geometry/predicates.h"
 
-/* --- arrays of fractions: made once, then reused --- */
+/* --- arrays of fractions: initialised once, then reused --- */
 
+/* Makes space for one more cut, whose fractions are initialised. Returns false without memory. */
 static bool capacity_for_cut(ebpo_face_cuts *f)
 {
     if (!ebpo_grow(&f->cut, &f->cut_capacity, f->cuts + 1, sizeof *f->cut))
@@ -30,7 +32,7 @@ static bool capacity_for_cut(ebpo_face_cuts *f)
     return true;
 }
 
-/* Adds a value of p, or a point (p, q). Sets a flag in `f` if memory is short. */
+/* Adds a value of p to the events. Sets f->no_memory if memory is short. */
 static void add_event(ebpo_face_cuts *f, const mpq_t p)
 {
     if (!ebpo_grow(&f->event, &f->event_capacity, f->events + 1, sizeof *f->event)) {
@@ -42,6 +44,8 @@ static void add_event(ebpo_face_cuts *f, const mpq_t p)
     mpq_set(f->event[f->events++], p);
 }
 
+/* Adds the point (p, q) to the vertices, if all cuts are wanted. Sets f->no_memory if memory is
+ * short. */
 static void add_vertex(ebpo_face_cuts *f, const mpq_t p, const mpq_t q)
 {
     if (!f->all_cuts)
@@ -58,8 +62,8 @@ static void add_vertex(ebpo_face_cuts *f, const mpq_t p, const mpq_t q)
 
 /* --- the face --- */
 
-/* Chooses an axis on which the normal is not 0 and, as far as doubles show, longest. */
-static void choose_view(ebpo_face_cuts *f)
+/* Chooses the axis of the projection: one on which the normal is not 0 and, in doubles, longest. */
+static void choose_projection(ebpo_face_cuts *f)
 {
     double most = -1;
     f->axis = -1;
@@ -80,6 +84,7 @@ static void choose_view(ebpo_face_cuts *f)
     }
 }
 
+/* Sets out to a - b. */
 static void difference_of(mpq_t out, mpq_t scratch, double a, double b)
 {
     mpq_set_d(out, a);
@@ -87,6 +92,7 @@ static void difference_of(mpq_t out, mpq_t scratch, double a, double b)
     mpq_sub(out, out, scratch);
 }
 
+/* Sets the face's plane. */
 static void set_plane(ebpo_face_cuts *f)
 {
     mpq_t *s = f->scratch;
@@ -107,7 +113,8 @@ static void set_plane(ebpo_face_cuts *f)
     }
 }
 
-/* Orients the cut whose ends are in cut[cuts], and adds it. */
+/* Orients the cut whose ends are in f->cut[f->cuts], and adds it; a cut of length 0 adds only an
+ * event and a vertex. */
 static void finish_cut(ebpo_face_cuts *f)
 {
     ebpo_face_cut *c = &f->cut[f->cuts];
@@ -139,6 +146,7 @@ static void set_end(ebpo_face_cuts *f, int end, const double x[3])
     mpq_set_d(f->cut[f->cuts].q[end], x[f->v]);
 }
 
+/* Adds the edges of t, a face in the same plane, as cuts. */
 static void cut_along_edges(ebpo_face_cuts *f, const double t[3][3])
 {
     for (int i = 0; i < 3; i++) {
@@ -165,32 +173,35 @@ void ebpo_face_cuts_begin(ebpo_face_cuts *f, const double corner[3][3], bool all
     f->cuts = f->events = f->vertices = f->flats = 0;
     f->no_memory = f->has_target = false;
     f->all_cuts = all_cuts;
-    choose_view(f);
+    choose_projection(f);
     set_plane(f);
     cut_along_edges(f, corner);
 }
 
 /* --- other faces --- */
 
-static int side_in_view(const ebpo_face_cuts *f, int i, const double x[3])
+/* Returns the side of edge i on which the projection of x is: 1: inside, -1: outside, 0: on its
+ * line. */
+static int side_of_projection(const ebpo_face_cuts *f, int i, const double x[3])
 {
     const double *a = f->corner[i], *b = f->corner[(i + 1) % 3];
     return f->turn * ebpo_orient2d((double[]){ a[f->u], a[f->v] }, (double[]){ b[f->u], b[f->v] },
                                    (double[]){ x[f->u], x[f->v] });
 }
 
-/* Returns true if all corners of t are beyond an edge of the face, or on the edge. */
+/* Returns true if there is an edge of the face on whose outer side, or line, all corners of t are.
+ */
 static bool beyond_an_edge(const ebpo_face_cuts *f, const double t[3][3])
 {
     for (int i = 0; i < 3; i++)
-        if (side_in_view(f, i, t[0]) <= 0 && side_in_view(f, i, t[1]) <= 0 &&
-            side_in_view(f, i, t[2]) <= 0)
+        if (side_of_projection(f, i, t[0]) <= 0 && side_of_projection(f, i, t[1]) <= 0 &&
+            side_of_projection(f, i, t[2]) <= 0)
             return true;
     return false;
 }
 
-/* Sets a cut's end to the point where the edge from a to b pierces the plane; a and b are on
- * different sides of the plane. */
+/* Sets an end of the new cut to the point where the edge from a to b pierces the plane; a and b are
+ * on different sides of the plane. */
 static void set_piercing(ebpo_face_cuts *f, int end, const double a[3], const double b[3])
 {
     mpq_t *s = f->scratch;
@@ -214,6 +225,7 @@ static void set_piercing(ebpo_face_cuts *f, int end, const double a[3], const do
     }
 }
 
+/* Adds the cut of a face t that intersects the plane. side: sides of its corners. */
 static void cut_across(ebpo_face_cuts *f, const double t[3][3], const int side[3])
 {
     int ends = 0;
@@ -231,6 +243,7 @@ static void cut_across(ebpo_face_cuts *f, const double t[3][3], const int side[3
     finish_cut(f);
 }
 
+/* Adds a face in the same plane. */
 static void add_flat(ebpo_face_cuts *f, const double t[3][3], int model)
 {
     if (!ebpo_grow(&f->flat, &f->flat_capacity, f->flats + 1, sizeof *f->flat)) {
@@ -266,7 +279,8 @@ void ebpo_face_cuts_add(ebpo_face_cuts *f, const double t[3][3], int model)
         f->no_memory = true;
 }
 
-/* Returns the side of the line from a to b on which (p, q) is: positive: left, negative: right. */
+/* Returns the side of the projected line from a to b on which (p, q) is: positive: left, negative:
+ * right, 0: on the line. */
 static int side_of_edge(ebpo_face_cuts *f, const double a[3], const double b[3], const mpq_t p,
                         const mpq_t q)
 {
@@ -334,7 +348,8 @@ void ebpo_face_cuts_free(ebpo_face_cuts *f)
 
 /* --- events --- */
 
-static void at_p(const ebpo_face_cut *c, const mpq_t p, mpq_t out)
+/* Computes the q of a cut at p. */
+static void value_of_cut(const ebpo_face_cut *c, const mpq_t p, mpq_t out)
 {
     mpq_sub(out, p, c->p[0]);
     mpq_mul(out, out, c->slope);
@@ -348,7 +363,7 @@ static bool cut_reaches(const ebpo_face_cut *c, const mpq_t p)
     return mpq_cmp(c->p[0], p) <= 0 && mpq_cmp(c->p[1], p) >= 0;
 }
 
-/* Adds the crossing of two cuts that are not vertical. */
+/* Adds the crossing of two cuts that are not parallel to the q axis. */
 static void cross_two(ebpo_face_cuts *f, const ebpo_face_cut *a, const ebpo_face_cut *b)
 {
     mpq_t *s = f->scratch;
@@ -364,21 +379,23 @@ static void cross_two(ebpo_face_cuts *f, const ebpo_face_cut *a, const ebpo_face
     if (!cut_reaches(a, s[1]) || !cut_reaches(b, s[1]))
         return;
     add_event(f, s[1]);
-    at_p(a, s[1], s[2]);
+    value_of_cut(a, s[1], s[2]);
     add_vertex(f, s[1], s[2]);
 }
 
-/* Adds the crossing of a cut with a vertical one, whose p is already an event. */
+/* Adds the crossing of a cut with one that is parallel to the q axis, whose p is already an event.
+ */
 static void cross_upright(ebpo_face_cuts *f, const ebpo_face_cut *upright, const ebpo_face_cut *c)
 {
     if (!f->all_cuts || is_upright(c) || !cut_reaches(c, upright->p[0]))
         return;
-    at_p(c, upright->p[0], f->scratch[2]);
+    value_of_cut(c, upright->p[0], f->scratch[2]);
     add_vertex(f, upright->p[0], f->scratch[2]);
 }
 
 static int by_value(const void *x, const void *y) { return mpq_cmp((mpq_srcptr)x, (mpq_srcptr)y); }
 
+/* Completes the events by crossings of cuts, and sorts them. */
 static void find_events(ebpo_face_cuts *f)
 {
     for (uint64_t i = 0; i < f->cuts && !f->no_memory; i++)
@@ -405,8 +422,7 @@ static void find_events(ebpo_face_cuts *f)
 
 /* --- strips --- */
 
-/* Computes a fraction between `low` and `high`. The fraction has few bits if a double is between
- * them. */
+/* Sets `out` to a fraction between `low` and `high`: a double, which has few bits, if possible. */
 static void fraction_between(const mpq_t low, const mpq_t high, mpq_t out)
 {
     double middle = mpq_get_d(low) / 2 + mpq_get_d(high) / 2;
@@ -417,6 +433,7 @@ static void fraction_between(const mpq_t low, const mpq_t high, mpq_t out)
     mpq_div_2exp(out, out, 1);
 }
 
+/* Positions in a strip. */
 enum { LEFT, MIDDLE, RIGHT };
 
 static mpq_t *value_at(const ebpo_face_cuts *f, uint32_t cut, int where)
@@ -440,8 +457,8 @@ static bool capacity_for_values(ebpo_face_cuts *f)
     return true;
 }
 
-/* Collects the cuts that go through the strip between two events, within the face, in the order of
- * q in the middle of the strip. */
+/* Sets f->order to the cuts that cross the strip within the face, in the order of q in the middle
+ * of the strip, and returns their number. p: values of p at the three positions. */
 static uint64_t cuts_of_strip(ebpo_face_cuts *f, const mpq_t p[3])
 {
     uint64_t n = 0, kept = 0;
@@ -450,7 +467,7 @@ static uint64_t cuts_of_strip(ebpo_face_cuts *f, const mpq_t p[3])
         const ebpo_face_cut *c = &f->cut[i];
         if (is_upright(c) || mpq_cmp(c->p[0], p[LEFT]) > 0 || mpq_cmp(c->p[1], p[RIGHT]) < 0)
             continue;
-        at_p(c, p[MIDDLE], *value_at(f, i, MIDDLE));
+        value_of_cut(c, p[MIDDLE], *value_at(f, i, MIDDLE));
         uint64_t at = n++;
         for (;
              at > 0 && mpq_cmp(*value_at(f, f->order[at - 1], MIDDLE), *value_at(f, i, MIDDLE)) > 0;
@@ -463,18 +480,19 @@ static uint64_t cuts_of_strip(ebpo_face_cuts *f, const mpq_t p[3])
             low = low < 0 ? (int)i : low;
             high = (int)i;
         }
-    /* an edge of the face may follow an equal cut; there is no part between them */
+    /* cuts before the first edge of the face, and after the last one, are outside or equal to it */
     for (uint64_t i = (uint64_t)(low < 0 ? 0 : low); low >= 0 && i <= (uint64_t)high; i++) {
         f->order[kept++] = f->order[i];
-        at_p(&f->cut[f->order[kept - 1]], p[LEFT], *value_at(f, f->order[kept - 1], LEFT));
-        at_p(&f->cut[f->order[kept - 1]], p[RIGHT], *value_at(f, f->order[kept - 1], RIGHT));
+        value_of_cut(&f->cut[f->order[kept - 1]], p[LEFT], *value_at(f, f->order[kept - 1], LEFT));
+        value_of_cut(&f->cut[f->order[kept - 1]], p[RIGHT],
+                     *value_at(f, f->order[kept - 1], RIGHT));
     }
     return kept;
 }
 
-/* Returns true if a part of the previous strip shares an open interval of the border between the
- * strips with this part. */
-static bool goes_on(const ebpo_face_cuts *f, int before, const mpq_t low, const mpq_t high)
+/* Returns true if a part of the previous strip, whose ends are end[before], and this part, from
+ * `low` to `high`, share an open interval of the border between the strips. */
+static bool continues_piece(const ebpo_face_cuts *f, int before, const mpq_t low, const mpq_t high)
 {
     for (uint64_t i = 0; i < f->ends[before]; i++) {
         const ebpo_piece_end *e = &f->end[before][i];
@@ -484,6 +502,7 @@ static bool goes_on(const ebpo_face_cuts *f, int before, const mpq_t low, const 
     return false;
 }
 
+/* Returns true if there is a cut parallel to the q axis at p. */
 static bool upright_at(const ebpo_face_cuts *f, const mpq_t p)
 {
     for (uint64_t i = 0; i < f->cuts; i++)
@@ -492,7 +511,7 @@ static bool upright_at(const ebpo_face_cuts *f, const mpq_t p)
     return false;
 }
 
-/* Computes the point x of the plane that has the coordinates p, q. */
+/* Computes the point x of the plane whose projection is (p, q). */
 static void point_at(ebpo_face_cuts *f, const mpq_t p, const mpq_t q, mpq_t x[3])
 {
     mpq_set(x[f->u], p);
@@ -504,6 +523,7 @@ static void point_at(ebpo_face_cuts *f, const mpq_t p, const mpq_t q, mpq_t x[3]
     mpq_div(x[f->axis], x[f->axis], f->normal[f->axis]);
 }
 
+/* Returns true if (p, q) is in the interior of a face in the same plane. */
 static bool is_in_flat(ebpo_face_cuts *f, const ebpo_flat_face *t, const mpq_t p, const mpq_t q)
 {
     int turn = t->same_direction ? f->turn : -f->turn;
@@ -513,6 +533,7 @@ static bool is_in_flat(ebpo_face_cuts *f, const ebpo_flat_face *t, const mpq_t p
     return true;
 }
 
+/* Calls `visit` for the point (p, q) of a piece. x: workspace. */
 static ebpo_status visit_at(ebpo_face_cuts *f, const mpq_t p, const mpq_t q, mpq_t x[3],
                             bool at_target, ebpo_piece_fn visit, void *user, ebpo_error *error)
 {
@@ -530,7 +551,8 @@ typedef struct strip_scratch {
     mpq_t p[3], q, x[3];
 } strip_scratch;
 
-/* Returns true if the target is on the border of the part between two cuts. */
+/* Returns true if the target is on the left or right border of the part between the cuts low and
+ * high. */
 static bool is_at_target(const ebpo_face_cuts *f, const mpq_t p[3], uint32_t low, uint32_t high)
 {
     for (int where = LEFT; f->has_target && where <= RIGHT; where += RIGHT)
@@ -541,11 +563,13 @@ static bool is_at_target(const ebpo_face_cuts *f, const mpq_t p[3], uint32_t low
     return false;
 }
 
+/* Visits a point of each part of a strip that begins a new piece. now: index of f->end for this
+ * strip. */
 static ebpo_status visit_strip(ebpo_face_cuts *f, strip_scratch *s, int now, ebpo_piece_fn visit,
                                void *user, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    bool cell_face = upright_at(f, s->p[LEFT]);
+    bool border_has_cut = upright_at(f, s->p[LEFT]);
     uint64_t n = cuts_of_strip(f, (const mpq_t *)s->p);
     f->ends[now] = 0;
     for (uint64_t i = 0; i + 1 < n && status == EBPO_OK; i++) {
@@ -555,8 +579,8 @@ static ebpo_status visit_strip(ebpo_face_cuts *f, strip_scratch *s, int now, ebp
         ebpo_piece_end *e = &f->end[now][f->ends[now]++];
         mpq_set(e->low, *value_at(f, low, RIGHT));
         mpq_set(e->high, *value_at(f, high, RIGHT));
-        if (!cell_face && !f->all_cuts &&
-            goes_on(f, !now, *value_at(f, low, LEFT), *value_at(f, high, LEFT)))
+        if (!border_has_cut && !f->all_cuts &&
+            continues_piece(f, !now, *value_at(f, low, LEFT), *value_at(f, high, LEFT)))
             continue;
         fraction_between(*value_at(f, low, MIDDLE), *value_at(f, high, MIDDLE), s->q);
         status = visit_at(f, s->p[MIDDLE], s->q, s->x,

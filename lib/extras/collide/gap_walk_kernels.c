@@ -1,12 +1,12 @@
 /* Walks through pairs of nodes of two hierarchies for the distance of two models, eight children at
  * a time, in floats. This file is compiled for several instruction sets with the same results.
  *
- * The distance of two nodes has three lower bounds: the gaps of their boxes, of their bounding
- * cylinders, and along the direction of the best pair. The walk is depth-first until a limit is
- * known; then a heap gives the smallest bound first. Pairs of blocks give pairs of faces, with
- * bounds that follow from a nearest pair of points. No dropped pair is nearer than the limit;
- * collide_distance.c decides the remaining pairs. Bounds: docs/develop/collision.md, "Bounds of
- * pairs of nodes" and "Distance of two faces". */
+ * The distance of two nodes has three lower bounds: the gap of their boxes, the gap of their
+ * bounding cylinders, and the gap along the direction of the best pair of faces. The walk is
+ * depth-first until a limit is known; then a heap returns the least bound first. In a pair of
+ * blocks the distance of each pair of faces is bounded by near points of both. A pair is dropped
+ * only if it is certainly not nearer than the limit; collide_distance.c decides the others. Bounds:
+ * docs/develop/collision.md, "Bounds of pairs of nodes" and "Distance of two faces". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -17,6 +17,7 @@
 
 /* --- pairs of faces --- */
 
+/* Eight points or vectors. */
 typedef struct place8 {
     f8 x[3];
 } place8;
@@ -45,6 +46,7 @@ EBPO_EIGHT place8 place_along8(const place8 *a, f8 t, const place8 *b)
         out.x[k] = f8_add(a->x[k], f8_mul(t, b->x[k]));
     return out;
 }
+/* Returns a d - b c. */
 EBPO_EIGHT f8 minor_of8(f8 a, f8 b, f8 c, f8 d) { return f8_sub(f8_mul(a, d), f8_mul(b, c)); }
 EBPO_EIGHT place8 place_cross8(const place8 *a, const place8 *b)
 {
@@ -55,7 +57,7 @@ EBPO_EIGHT place8 place_cross8(const place8 *a, const place8 *b)
 /* Limits t to 0 .. 1; NaN becomes 0. */
 EBPO_EIGHT f8 within_unit8(f8 t) { return f8_min(f8_max(t, f8_all(0)), f8_all(1)); }
 
-/* The best pair of points so far: the vector from A's to B's. */
+/* The nearest pair of points so far: the vector from A's point to B's, and its squared length. */
 typedef struct nearest8 {
     f8 square;
     place8 direction;
@@ -87,6 +89,7 @@ EBPO_EIGHT edges8 edges_of8(const triangle8 *t)
     return out;
 }
 
+/* Compares with the nearest points of edge i of a, from p, and edge j of b, from q. */
 EBPO_EIGHT void offer_edges8(nearest8 *n, const place8 *p, const edges8 *a, int i, const place8 *q,
                              const edges8 *b, int j)
 {
@@ -102,8 +105,8 @@ EBPO_EIGHT void offer_edges8(nearest8 *n, const place8 *p, const edges8 *a, int 
     offer_nearest8(n, &direction, place_dot8(&direction, &direction));
 }
 
-/* Offers corners that are above the interior of the face. sign: 1 when the corners are A's, else
- * -1. */
+/* Compares with the corners that are above the interior of a face, and their nearest points on it.
+ * sign: 1 if the corners are A's, otherwise -1. */
 EBPO_EIGHT void offer_corners8(nearest8 *n, const triangle8 *face, const edges8 *of,
                                const triangle8 *corners, float sign)
 {
@@ -126,8 +129,8 @@ EBPO_EIGHT void offer_corners8(nearest8 *n, const triangle8 *face, const edges8 
     }
 }
 
-/* Bounds eight distances. No coordinate is greater than `size` or differs by more than `error` from
- * its exact value. */
+/* Bounds eight distances, and computes the vectors between near points. No coordinate is greater
+ * than `size`, or differs by more than `error` from its exact value. */
 EBPO_EIGHT void bounds_of_pairs8(const triangle8 *a, const triangle8 *b, float size, float error,
                                  f8 *low, f8 *high, place8 *direction)
 {
@@ -155,7 +158,7 @@ EBPO_EIGHT void bounds_of_pairs8(const triangle8 *a, const triangle8 *b, float s
 
 /* --- nodes --- */
 
-/* Decodes centres and half sides, and the boxes around them in the other frame. */
+/* Decodes centres and half sides of boxes, and computes boxes around them in the other frame. */
 EBPO_EIGHT void node_boxes(ebpo_gap_node *out, const ebpo_bound *b, const ebpo_turned_frame *f)
 {
     f8 centre[3], half[3];
@@ -173,8 +176,8 @@ EBPO_EIGHT void node_boxes(ebpo_gap_node *out, const ebpo_bound *b, const ebpo_t
     }
 }
 
-/* Decodes bounding cylinders. A cylinder without an axis is decoded as extremely thick, so that it
- * gives no bound. */
+/* Decodes bounding cylinders. A cylinder without an axis gets an extreme length, so that it gives
+ * no bound. */
 EBPO_EIGHT void node_cylinders(ebpo_gap_node *out, const ebpo_bound_cylinder *b,
                                const ebpo_turned_frame *f, float slack)
 {
@@ -200,6 +203,7 @@ EBPO_EIGHT void node_cylinders(ebpo_gap_node *out, const ebpo_bound_cylinder *b,
                                  f8_all(4 * slack)));
 }
 
+/* Returns an upper bound of the sine of an angle with this cosine. */
 EBPO_EIGHT f8 sine_of8(f8 cosine)
 {
     return f8_sqrt(f8_max(f8_sub(f8_all(1 + 0x1p-18f), f8_mul(cosine, cosine)), f8_all(0)));
@@ -222,7 +226,8 @@ EBPO_EIGHT void node_reach(ebpo_gap_node *out, const float along[3])
     f8_store(out->reach, f8_min(boxes, cylinders));
 }
 
-static const ebpo_gap_node *take_node(ebpo_gap_search *g, int side, uint32_t node)
+/* Returns the decoded children of a node; decodes them unless they are kept. */
+static const ebpo_gap_node *decoded_node(ebpo_gap_search *g, int side, uint32_t node)
 {
     ebpo_gap_node *out = &g->node[side][node % EBPO_GAP_NODES];
     const ebpo_accel *s = g->accel[side];
@@ -241,8 +246,8 @@ static const ebpo_gap_node *take_node(ebpo_gap_search *g, int side, uint32_t nod
 
 /* --- pairs of nodes --- */
 
-/* Returns the sums of the squared gaps between eight boxes and the box in lane j of the other node,
- * along the axes of frame f (0: the frame of the eight). *most: the greatest gaps. */
+/* Returns the sums of the squared gaps of eight boxes of p and the box in lane j of q, along the
+ * axes of frame f (0: that of p). *most: raised to the greatest gap. */
 EBPO_EIGHT f8 box_gaps8(const ebpo_gap_node *p, const ebpo_gap_node *q, int j, int f, f8 slack,
                         f8 *most)
 {
@@ -259,7 +264,7 @@ EBPO_EIGHT f8 box_gaps8(const ebpo_gap_node *p, const ebpo_gap_node *q, int j, i
     return sum;
 }
 
-/* Returns the greater of the gaps along both cylinders' axes. */
+/* Returns the greater of the gaps of two cylinders along their axes, 0 or more. */
 EBPO_EIGHT f8 cylinder_gaps8(const ebpo_gap_node *p, const ebpo_gap_node *q, int j)
 {
     f8 dot = f8_all(0), by_p = dot, by_q = dot, box_p = dot, box_q = dot, size_p = dot,
@@ -291,8 +296,8 @@ EBPO_EIGHT f8 cylinder_gaps8(const ebpo_gap_node *p, const ebpo_gap_node *q, int
     return f8_max3(far_p, far_q, none);
 }
 
-/* Returns squared lower bounds of the distances between eight children and child j; negative where
- * boxes intersect. */
+/* Returns the keys of eight children of p with child j of q: squared lower bounds of their
+ * distances; 0 or negative if boxes intersect. */
 EBPO_EIGHT f8 gap_keys8(const ebpo_gap_search *g, const ebpo_gap_node *p, const ebpo_gap_node *q,
                         int j)
 {
@@ -310,7 +315,7 @@ EBPO_EIGHT f8 gap_keys8(const ebpo_gap_search *g, const ebpo_gap_node *p, const 
 
 /* --- pairs to be visited --- */
 
-/* Prefetches the pair that is visited next if no nearer one is found. */
+/* Prefetches the memory of the pair that is visited next, unless a nearer one is found. */
 EBPO_EIGHT void fetch_next(const ebpo_gap_search *g)
 {
     if (g->count == 0)
@@ -320,7 +325,8 @@ EBPO_EIGHT void fetch_next(const ebpo_gap_search *g)
         fetch_below(g->accel[i], below_child(g->accel[i], v->child[i]), true);
 }
 
-/* Pushes a pair while there is no heap: the least key added since `base` stays on top. */
+/* Adds a pair. While there is no heap, the pairs from index `base` on stay sorted, the least key on
+ * top. */
 EBPO_EIGHT void push_visit(ebpo_gap_search *g, uint64_t base, ebpo_gap_visit v)
 {
     uint64_t at = g->count++;
@@ -333,7 +339,7 @@ EBPO_EIGHT void push_visit(ebpo_gap_search *g, uint64_t base, ebpo_gap_visit v)
     g->stack[at] = v;
 }
 
-/* Puts v at `at` or below it. */
+/* Stores v in the heap at index `at` or below it. */
 static void sift_down(ebpo_gap_search *g, uint64_t at, ebpo_gap_visit v)
 {
     for (uint64_t next; (next = 2 * at + 1) < g->count; at = next) {
@@ -345,8 +351,8 @@ static void sift_down(ebpo_gap_search *g, uint64_t at, ebpo_gap_visit v)
     g->stack[at] = v;
 }
 
-/* Makes the heap: from now on the least key comes first. So no visited pair has a bound beyond the
- * final distance. */
+/* Makes a heap of the stack: from now on the least key comes first, so that no pair is visited
+ * whose bound is above the final distance. */
 static void make_heap(ebpo_gap_search *g)
 {
     uint64_t kept = 0;
@@ -369,7 +375,8 @@ EBPO_EIGHT ebpo_gap_visit pop_visit(ebpo_gap_search *g)
     return out;
 }
 
-/* Pushes eight children of `p`, on one side, with child j of q, on the other. */
+/* Pushes the pairs of each child of p, a node of model `side`, with child j of q. base: as for
+ * push_visit. */
 EBPO_EIGHT void push_eight(ebpo_gap_search *g, uint64_t base, int side, const ebpo_gap_node *p,
                            const ebpo_gap_node *q, int j)
 {
@@ -387,29 +394,32 @@ EBPO_EIGHT void push_eight(ebpo_gap_search *g, uint64_t base, int side, const eb
     }
 }
 
+/* Pushes the pairs of children of two nodes. */
 static void push_both(ebpo_gap_search *g, uint32_t node_a, uint32_t node_b)
 {
-    const ebpo_gap_node *p = take_node(g, 0, node_a), *q = take_node(g, 1, node_b);
+    const ebpo_gap_node *p = decoded_node(g, 0, node_a), *q = decoded_node(g, 1, node_b);
     uint64_t base = g->count;
     for (int j = 0; j < g->accel[1]->bound[node_b].count; j++)
         push_eight(g, base, 0, p, q, j);
 }
 
-/* Pushes the children of `node`, on one side, with an undivided child of the other. */
+/* Pushes the pairs of each child of `node`, of model `side`, with `other`, a child of the other
+ * model. */
 static void push_side(ebpo_gap_search *g, int side, uint32_t node, uint32_t other)
 {
-    const ebpo_gap_node *p = take_node(g, side, node), *q = take_node(g, 1 - side, other / 8);
+    const ebpo_gap_node *p = decoded_node(g, side, node), *q = decoded_node(g, 1 - side, other / 8);
     push_eight(g, g->count, side, p, q, (int)(other % 8));
 }
 
 /* --- pairs of blocks --- */
 
+/* Pairs of faces of two blocks, by their lanes; eight more valid entries follow the last pair. */
 typedef struct near_lanes {
     int32_t lane[2][72];
     unsigned count;
 } near_lanes;
 
-/* Finds pairs of faces that are within the limit, both by boxes and along the direction. */
+/* Finds the pairs of faces that may be within the limit, by their boxes and along the direction. */
 EBPO_EIGHT void near_by_boxes(const ebpo_gap_search *g, const ebpo_posed_faces *a,
                               const ebpo_posed_faces *b, const float shift[3], float error,
                               near_lanes *out)
@@ -470,9 +480,10 @@ EBPO_EIGHT triangle8 load_faces8(const ebpo_posed_faces *f, const int32_t *lane,
     return out;
 }
 
-/* Takes a pair nearer than all previous ones. The direction of the search becomes that of this
- * pair. */
-EBPO_EIGHT void take_nearer(ebpo_gap_search *g, f8 high, const place8 *direction, unsigned used,
+/* If one of eight pairs is nearer than the best pair so far, makes the nearest one the best pair,
+ * and its direction that of the search. used: a bit for each valid pair. at: index of the first of
+ * the eight pairs. */
+EBPO_EIGHT void update_best(ebpo_gap_search *g, f8 high, const place8 *direction, unsigned used,
                             const uint32_t block[2], const near_lanes *near, unsigned at)
 {
     unsigned nearer = used & f8_bits(f8_less(high, f8_all(g->best)));
@@ -494,10 +505,10 @@ EBPO_EIGHT void take_nearer(ebpo_gap_search *g, f8 high, const place8 *direction
                                                 directions[2][best] });
 }
 
-/* Adds the pairs that may be near enough to the waiting pairs. Returns true if one of the added
- * pairs may intersect. */
-EBPO_EIGHT bool let_wait(ebpo_gap_search *g, f8 low, unsigned used, const uint32_t block[2],
-                         const near_lanes *near, unsigned at)
+/* Adds those of eight pairs that may be within the limit to the waiting pairs. Returns true if one
+ * of them may intersect. */
+EBPO_EIGHT bool add_candidates(ebpo_gap_search *g, f8 low, unsigned used, const uint32_t block[2],
+                               const near_lanes *near, unsigned at)
 {
     float lows[8];
     bool intersects = false;
@@ -516,8 +527,8 @@ EBPO_EIGHT bool let_wait(ebpo_gap_search *g, f8 low, unsigned used, const uint32
     return intersects;
 }
 
-/* Returns false when enough is known. */
-static bool block_pair(ebpo_gap_search *g, const uint32_t block[2])
+/* Visits the pairs of faces of two blocks. Returns false to end the walk. */
+static bool visit_blocks(ebpo_gap_search *g, const uint32_t block[2])
 {
     const ebpo_posed_faces *a = posed_faces_of(g->faces[0], g->accel[0], &g->posing[0], block[0]),
                            *b = posed_faces_of(g->faces[1], g->accel[1], &g->posing[1], block[1]);
@@ -541,34 +552,37 @@ static bool block_pair(ebpo_gap_search *g, const uint32_t block[2])
         f8 low, high;
         place8 direction;
         bounds_of_pairs8(&p, &q, size, error, &low, &high, &direction);
-        take_nearer(g, high, &direction, used, block, &near, at);
-        intersects |= let_wait(g, low, used, block, &near, at);
+        update_best(g, high, &direction, used, block, &near, at);
+        intersects |= add_candidates(g, low, used, block, &near, at);
     }
     return !intersects || g->judge(g);
 }
 
 /* --- the walk --- */
 
-/* Tests a pair again if its key was computed for an earlier direction. Returns true if it is too
- * far apart. */
-static bool far_along(ebpo_gap_search *g, const ebpo_gap_visit *v)
+/* Tests a pair again whose key was computed for an earlier direction. Returns true if it is too far
+ * apart along the current one. */
+static bool is_far_along(ebpo_gap_search *g, const ebpo_gap_visit *v)
 {
     if (v->direction == g->direction_number)
         return false;
     float gap = g->along_shift - 8 * g->frames.slack;
     for (int s = 0; s < 2; s++)
-        gap -= take_node(g, s, v->child[s] / 8)->reach[v->child[s] % 8];
+        gap -= decoded_node(g, s, v->child[s] / 8)->reach[v->child[s] % 8];
     return gap > 0 && gap * gap > g->square;
 }
 
-/* Returns the sum of a box's half sides. Of two boxes, the one with the larger sum is divided. */
+/* Returns the sum of the half sides of a child's box. Of two children, the one with the larger sum
+ * is divided. */
 static float child_size(ebpo_gap_search *g, int side, uint32_t child)
 {
-    const ebpo_gap_node *n = take_node(g, side, child / 8);
+    const ebpo_gap_node *n = decoded_node(g, side, child / 8);
     return (n->half[0][0][child % 8] + n->half[0][1][child % 8]) + n->half[0][2][child % 8];
 }
 
-/* Pushes the pairs of children; returns false when enough is known. */
+/* Divides a pair and pushes the new pairs, or visits a pair of blocks. Returns false to end the
+ * walk.
+ */
 static bool visit_pair(ebpo_gap_search *g, const ebpo_gap_visit *v)
 {
     uint32_t child[2];
@@ -578,8 +592,8 @@ static bool visit_pair(ebpo_gap_search *g, const ebpo_gap_visit *v)
         block[s] = child[s] & EBPO_IS_BLOCK;
     }
     if (block[0] && block[1])
-        return block_pair(g, (const uint32_t[2]){ child[0] & ~EBPO_IS_BLOCK,
-                                                  child[1] & ~EBPO_IS_BLOCK });
+        return visit_blocks(g, (const uint32_t[2]){ child[0] & ~EBPO_IS_BLOCK,
+                                                    child[1] & ~EBPO_IS_BLOCK });
     g->node_pairs++;
     if (!ebpo_gap_capacity(g) || (g->node_pairs % 256 == 0 && !g->go_on(g)))
         return false;
@@ -606,9 +620,9 @@ static void walk_gaps(ebpo_gap_search *g)
             return;
         ebpo_gap_visit v = pop_visit(g);
         fetch_next(g);
-        if (far_along(g, &v) || visit_pair(g, &v))
+        if (is_far_along(g, &v) || visit_pair(g, &v))
             continue;
-        g->stack[g->count++] = v; /* the pair was visited only in part, or not at all */
+        g->stack[g->count++] = v; /* the pair has not been visited completely */
         g->ended = true;
         return;
     }

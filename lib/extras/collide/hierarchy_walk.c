@@ -1,9 +1,9 @@
-/* States of the two walks through the hierarchies of two models, and functions that the kernels of
- * these walks call. pair_walk_kernels.c searches for faces that intersect, gap_walk_kernels.c for
- * the nearest ones. Each state has a stack of pairs of nodes, and keeps the last nodes and blocks
- * that it has transformed. One thread each.
+/* Functions that the kernels of the two walks through hierarchies call: pair_walk_kernels.c
+ * searches for faces that intersect, gap_walk_kernels.c for the nearest ones. A walk has a stack of
+ * pairs of nodes, and keeps the last nodes and blocks that it has transformed. Each walk is for one
+ * thread.
  *
- * Pairs of faces that the float filter cannot decide are decided here exactly. When both models are
+ * Pairs of faces that the float filter cannot decide are decided here exactly. If both models are
  * one mesh, the corner or edge that neighbouring faces share is no contact. */
 #include "core/strict_fp.h"
 
@@ -17,8 +17,6 @@
 #include "extras/collide/hierarchy_walk.h"
 #include "geometry/triangle_pair.h"
 #include "geometry/predicates.h"
-
-/* --- neighbours in one mesh --- */
 
 void ebpo_pair_walk_free(ebpo_pair_walk *w)
 {
@@ -44,6 +42,8 @@ void ebpo_posed_triangle(const ebpo_accel *accel, const ebpo_posing *posing, uin
         ebpo_posing_apply(posing, t[i], out[i]);
 }
 
+/* --- neighbours in one mesh --- */
+
 /* Makes the edge opposite corner i, in the form of a face without area. */
 static void edge_opposite(const double a[3][3], int i, double out[3][3])
 {
@@ -52,6 +52,7 @@ static void edge_opposite(const double a[3][3], int i, double out[3][3])
     memcpy(out[2], out[1], sizeof out[2]);
 }
 
+/* Returns true if the edge of a opposite corner i has a common point with b. */
 static bool edge_intersects(const double a[3][3], int i, const double b[3][3])
 {
     double edge[3][3];
@@ -79,9 +80,9 @@ static ebpo_pair_kind one_edge(const double a[3][3], const double b[3][3])
     return ebpo_triangle_pair(a, b) == EBPO_PAIR_COPLANAR ? EBPO_PAIR_COPLANAR : EBPO_PAIR_APART;
 }
 
-/* As ebpo_triangle_pair, but returns EBPO_PAIR_APART if the only common points are a corner, or the
- * edge between corners, that both faces have (equal coordinates). The result does not change when
- * the faces are swapped. */
+/* As ebpo_triangle_pair, but returns EBPO_PAIR_APART if the only common points are a corner or an
+ * edge that both faces have, with equal coordinates. The result does not change when the faces are
+ * swapped. */
 static ebpo_pair_kind neighbour_kind(const double a[3][3], const double b[3][3])
 {
     int shared = 0, in_a = 0, in_b = 0;
@@ -97,6 +98,7 @@ static ebpo_pair_kind neighbour_kind(const double a[3][3], const double b[3][3])
     return shared == 1 ? one_corner(a, in_a, b, in_b) : one_edge(a, b);
 }
 
+/* Decides a pair of faces exactly. */
 static ebpo_pair_kind exact_kind(ebpo_pair_walk *w, uint32_t slot_a, uint32_t slot_b)
 {
     const ebpo_accel_pair *p = w->pair;
@@ -153,7 +155,7 @@ void ebpo_gap_begin(ebpo_gap_search *g, const ebpo_accel *const accel[2],
     g->limit = g->square = g->best = INFINITY;
     g->tolerance = 0;
     g->direction_number = 0;
-    for (int k = 0; k < 3; k++) /* use the direction between the centres instead */
+    for (int k = 0; k < 3; k++) /* used if the direction between the centres below has no length */
         g->direction[k] = k == 0;
     ebpo_gap_set_direction(g, g->direction);
     double centre[2][3];
@@ -197,7 +199,8 @@ static float float_dot(const float a[3], const float b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Makes the direction slightly shorter than 1, so that computed gaps along it are not too great. */
+/* Makes the direction slightly shorter than 1, so that gaps that are computed along it are not too
+ * great. */
 void ebpo_gap_set_direction(ebpo_gap_search *g, const float direction[3])
 {
     float length = sqrtf(float_dot(direction, direction));

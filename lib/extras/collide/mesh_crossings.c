@@ -1,4 +1,4 @@
-/* Finds faces of one mesh that intersect and are not just neighbours.
+/* Finds the faces of one mesh that intersect in more than a common corner or edge.
  *
  * The mesh is written to a temporary file, which is opened as a model with a memory budget, so the
  * mesh may be larger than memory. The search needs only the faces, so the model is built as a
@@ -32,8 +32,8 @@ typedef struct crossings {
     ebpo_collider *collider;
     ebpo_publish target; /* the PLY file, if the caller wants one */
     ebpo_crossings_summary sum;
-    uint64_t *intersecting; /* a bit for each face, by its number in the source */
-    bool enough;
+    uint64_t *intersecting; /* a bit for each face, by its index in the source */
+    bool enough;            /* the caller needs no more crossings */
 } crossings;
 
 /* --- the model --- */
@@ -50,7 +50,8 @@ static ebpo_status build_model(crossings *c, ebpo_mesh *mesh, const ebpo_mesh_re
     return ebpo_build(mesh, &surface, NULL, &how, &c->tree, error);
 }
 
-/* Frees the levels. After writing, the search needs only the file, and the mesh for positions. */
+/* Frees the levels. After the file is written, the search needs only the file, and the mesh for
+ * positions. */
 static void drop_levels(ebpo_tree *tree)
 {
     for (int i = 0; i < tree->info.level_count; i++)
@@ -77,21 +78,23 @@ static ebpo_status store_model(crossings *c, const char *folder, ebpo_error *err
     return status;
 }
 
-/* The workspace has half of the allowed memory. Of the other half, the model has half and waiting
- * pairs have an eighth. */
-enum { LEAST_MODEL = 1 << 20 }; /* for tests with small workspaces; others have more */
+/* Least memory budget of the model; only tests have workspaces so small that it applies. */
+enum { LEAST_MODEL = 1 << 20 };
 
+/* Makes the model and its collider. memory: all allowed memory. The workspace uses half of it, the
+ * model a quarter, waiting pairs 1/16. */
 static ebpo_status make_collider(crossings *c, uint64_t memory, ebpo_error *error)
 {
-    ebpo_model_options holding = EBPO_MODEL_OPTIONS_INIT;
-    ebpo_collider_options with = EBPO_COLLIDER_OPTIONS_INIT;
-    holding.memory = memory / 4 > LEAST_MODEL ? memory / 4 : LEAST_MODEL;
-    holding.threads = with.threads = c->options.threads;
-    holding.progress = c->options.progress;
-    with.memory = memory / 16;
-    ebpo_status status = ebpo_model_new(c->file, &holding, &c->model, error);
-    return status == EBPO_OK ? ebpo_collider_new(c->model, c->model, &with, &c->collider, error)
-                             : status;
+    ebpo_model_options model_options = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_collider_options collider_options = EBPO_COLLIDER_OPTIONS_INIT;
+    model_options.memory = memory / 4 > LEAST_MODEL ? memory / 4 : LEAST_MODEL;
+    model_options.threads = collider_options.threads = c->options.threads;
+    model_options.progress = c->options.progress;
+    collider_options.memory = memory / 16;
+    ebpo_status status = ebpo_model_new(c->file, &model_options, &c->model, error);
+    return status == EBPO_OK
+               ? ebpo_collider_new(c->model, c->model, &collider_options, &c->collider, error)
+               : status;
 }
 
 /* --- pairs --- */
@@ -106,6 +109,7 @@ static void corners_of(const crossings *c, uint64_t file_face, double out[3][3])
     }
 }
 
+/* Computes a point of both faces of an intersecting pair. */
 static void common_point(const double a[3][3], const double b[3][3], int32_t kind, double out[3])
 {
     ebpo_contact_end end[2];
@@ -120,6 +124,7 @@ static void common_point(const double a[3][3], const double b[3][3], int32_t kin
     memcpy(out, nearest.point[0], sizeof nearest.point[0]);
 }
 
+/* Marks a face as intersecting, and counts it once. */
 static void note_face(crossings *c, uint64_t face)
 {
     uint64_t bit = UINT64_C(1) << face % 64;
@@ -159,7 +164,8 @@ static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
 
 /* --- the call --- */
 
-static ebpo_status paint_crossings(crossings *c, ebpo_workspace *workspace, ebpo_error *error)
+/* Writes the PLY file. */
+static ebpo_status write_red_mesh(crossings *c, ebpo_workspace *workspace, ebpo_error *error)
 {
     ebpo_read_options how = EBPO_READ_OPTIONS_INIT;
     ebpo_mesh mesh;
@@ -192,7 +198,7 @@ static ebpo_status search_crossings(crossings *c, ebpo_mesh *mesh, const ebpo_me
         status = make_collider(c, ebpo_workspace_memory(workspace), error);
     if (status == EBPO_OK)
         status = ebpo_collide_self(c->collider, &how, take_pairs, c, error);
-    return status == EBPO_OK && c->options.ply ? paint_crossings(c, workspace, error) : status;
+    return status == EBPO_OK && c->options.ply ? write_red_mesh(c, workspace, error) : status;
 }
 
 static void close_all(crossings *c)

@@ -1,12 +1,13 @@
 /* Computes the distance of two triangles: bounds in doubles, and exact comparisons.
  *
- * Bounds come from a pair of near points, which need not be the nearest. The distance of these
- * points is an upper bound. The planes through them, perpendicular to the line between them, give a
- * lower bound. All coordinates are relative to A's first corner, so the position of the faces does
- * not matter. Where bounds do not decide, the squared distance is computed as a fraction of
- * integers. It is the least value over corners with faces, and over edges whose inner points are
- * nearest. See docs/develop/collision.md, "Distance of two faces". Pure functions, any thread; the
- * results are the same with every compiler and its flags. */
+ * Bounds follow from a pair of near points, which need not be the nearest ones. The distance of
+ * these points is an upper bound. The gap of the faces along the line between them is a lower
+ * bound. All coordinates are relative to A's first corner, so that rounding does not depend on the
+ * position of the faces. Where bounds do not decide, the squared distance is computed as a fraction
+ * of integers: the least of the squared distances of a corner from the other face, and of two edges
+ * whose inner points are nearest. See docs/develop/collision.md, "Distance of two faces". All
+ * functions are pure and can be called from any thread; results do not depend on compilers and
+ * their flags. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -23,16 +24,17 @@ static const double max_reach = 0x1p200, least_reach = 0x1p-200;
 
 static double within_unit(double t) { return t > 0 ? (t < 1 ? t : 1) : 0; }
 
-/* The best pair of points so far, relative to A's first corner. */
+/* The nearest pair of points so far. Coordinates are relative to A's first corner. */
 typedef struct search {
-    double face[2][3][3];
-    double reach; /* bound of the corners' 1-norms */
-    double square, point[2][3];
-    int feature[2];
+    double face[2][3][3];       /* corners of A and B */
+    double reach;               /* bound of the corners' 1-norms */
+    double square, point[2][3]; /* squared distance, and points of A and B */
+    int feature[2];             /* features that contain them, as in ebpo_pair_distance_bounds */
     double space; /* distance of the points from the ends of their features, as a fraction of
                      `reach` */
 } search;
 
+/* Keeps the points p and q if they are nearer. first: p is of A (0) or B (1). */
 static void offer_points(search *s, int first, const double p[3], const double q[3], int on_p,
                          int on_q, double space)
 {
@@ -57,15 +59,17 @@ static void point_along(const double from[3], const double edge[3], double t, do
         out[k] = from[k] + t * edge[k];
 }
 
+/* Returns the feature of the point at the part t of edge i. */
 static int on_edge(int i, double t) { return t == 0 ? i : t == 1 ? (i + 1) % 3 : 3 + i; }
 
-/* Returns the length from the point to the nearer end of the edge; INFINITY at an end, as ends are
- * exact. */
+/* Returns the distance from the point at the part t of an edge, whose squared length is `square`,
+ * to the nearer end; INFINITY at an end, because ends are exact. */
 static double capacity_on_edge(double t, double square)
 {
     return t == 0 || t == 1 ? INFINITY : fmin(t, 1 - t) * sqrt(square);
 }
 
+/* Compares with the nearest points of edge i of A and edge j of B. */
 static void offer_edges(search *s, int i, int j)
 {
     const double *p = s->face[0][i], *q = s->face[1][j];
@@ -89,8 +93,8 @@ static void offer_edges(search *s, int i, int j)
 
 /* --- corners with planes --- */
 
-/* Offers a corner that is above the interior of the other face. Other corners do not matter: edges
- * cover them. */
+/* Compares with corner i of face `of` and its nearest point on the other face, if that is in the
+ * other face's interior; otherwise the pairs of edges include this pair. */
 static void offer_corner(search *s, int of, int i)
 {
     double(*plane)[3] = s->face[!of];
@@ -117,7 +121,9 @@ static void offer_corner(search *s, int of, int i)
 
 /* --- bounds --- */
 
-static bool see_from_corner(const double a[3][3], const double b[3][3], search *s)
+/* Begins a search: makes coordinates relative to A's first corner. Returns false if they are too
+ * large or too small. */
+static bool make_relative(const double a[3][3], const double b[3][3], search *s)
 {
     s->reach = 0;
     s->square = INFINITY;
@@ -135,7 +141,7 @@ static bool see_from_corner(const double a[3][3], const double b[3][3], search *
     return s->reach < max_reach && s->reach > least_reach;
 }
 
-/* Returns the gap between the faces along n, less a bound of the rounding. n is not 0. */
+/* Returns a lower bound of the gap of the faces along n, which is not 0. */
 static double gap_along(const search *s, const double n[3])
 {
     double least = INFINITY, most = -INFINITY, d[3];
@@ -151,6 +157,7 @@ static double gap_along(const search *s, const double n[3])
 
 /* --- features --- */
 
+/* Returns true if a corner belongs to a feature. */
 static bool is_on(int corner, int feature)
 {
     return feature == 6 || corner == feature ||
@@ -177,8 +184,7 @@ static bool features_certain(const search *s, const double n[3])
     return true;
 }
 
-/* Returns true if the corners of two features are equal; corners are compared in a canonical order.
- */
+/* Returns true if two features have the same corners, in any order. */
 static bool same_feature(const double a[3][3], int on_a, const double b[3][3], int on_b)
 {
     int count = on_a < 3 ? 1 : on_a < 6 ? 2 : 3, most = on_b < 3 ? 1 : on_b < 6 ? 2 : 3;
@@ -195,8 +201,9 @@ static bool same_feature(const double a[3][3], int on_a, const double b[3][3], i
     return true;
 }
 
-/* Returns true if both faces are perpendicular to the same axis and one is above the other. Their
- * distance is then that of the two planes. */
+/* Returns true if both faces are perpendicular to the same axis and their projections along it
+ * intersect. Their distance is then that of the two planes, whose coordinates are level[0] and
+ * level[1]. */
 static bool level_faces(const double a[3][3], const double b[3][3], double level[2])
 {
     for (int k = 0; k < 3; k++) {
@@ -239,7 +246,7 @@ void ebpo_triangles_distance_bounds(const double a[3][3], const double b[3][3],
     *out = (ebpo_pair_distance_bounds){ .hi = INFINITY };
     memcpy(out->point[0], a[0], sizeof out->point[0]);
     memcpy(out->point[1], b[0], sizeof out->point[1]);
-    if (!see_from_corner(a, b, &s))
+    if (!make_relative(a, b, &s))
         return;
     for (int i = 0; i < 9; i++)
         offer_edges(&s, i / 3, i % 3);
@@ -262,8 +269,9 @@ void ebpo_triangles_distance_bounds(const double a[3][3], const double b[3][3],
 
 /* --- exact distances: fractions of integers --- */
 
+/* A squared distance square / denominator, in units of 2^(2 unit). */
 typedef struct fraction {
-    mpz_t square, denominator; /* in units */
+    mpz_t square, denominator;
 } fraction;
 
 static void fraction_init(fraction *f) { mpz_inits(f->square, f->denominator, NULL); }
@@ -281,8 +289,8 @@ static int fraction_compare(const fraction *f, const fraction *g)
     return order;
 }
 
-/* Takes the lesser fraction. A denominator of 0 means: none so far. */
-static void take_lesser(fraction *best, const fraction *other)
+/* Sets *best to the lesser of both fractions. best->denominator is 0 if there is none so far. */
+static void keep_lesser(fraction *best, const fraction *other)
 {
     if (mpz_sgn(best->denominator) != 0 && fraction_compare(other, best) >= 0)
         return;
@@ -292,8 +300,10 @@ static void take_lesser(fraction *best, const fraction *other)
 
 /* --- edges --- */
 
+/* Two edges, in integers, and temporary values. */
 typedef struct edges {
-    ebpo_vectorz from[2], along[2], between, normal, part;
+    ebpo_vectorz from[2], along[2]; /* first end, and vector to the other end, of each edge */
+    ebpo_vectorz between, normal, part;
     mpz_t length2, share;
 } edges;
 
@@ -347,7 +357,7 @@ static bool edges_square(edges *e, fraction *out)
     return true;
 }
 
-/* Returns true if the edges are certainly farther than `hi`. */
+/* Returns true if the edges are certainly farther apart than `hi`. */
 static bool edges_far(const double a[3][3], int i, const double b[3][3], int j, double hi)
 {
     double p[3][3], q[3][3];
@@ -360,8 +370,9 @@ static bool edges_far(const double a[3][3], int i, const double b[3][3], int j, 
     return bounds.lo > hi;
 }
 
-static void take_edges(fraction *best, const double a[3][3], const double b[3][3], double hi,
-                       int unit)
+/* Updates *best by all pairs of edges that may be nearer than `hi`. */
+static void update_by_edges(fraction *best, const double a[3][3], const double b[3][3], double hi,
+                            int unit)
 {
     edges e;
     fraction f;
@@ -374,7 +385,7 @@ static void take_edges(fraction *best, const double a[3][3], const double b[3][3
                 continue;
             set_edge(&e, 1, b[j], b[j == 2 ? 0 : j + 1], unit);
             if (edges_square(&e, &f))
-                take_lesser(best, &f);
+                keep_lesser(best, &f);
         }
     }
     fraction_clear(&f);
@@ -383,8 +394,9 @@ static void take_edges(fraction *best, const double a[3][3], const double b[3][3
 
 /* --- faces --- */
 
-static void take_corners(fraction *best, const double corner[3][3], const double face[3][3],
-                         double hi, int unit)
+/* Updates *best by the corners of one face with the other face. */
+static void update_by_corners(fraction *best, const double corner[3][3], const double face[3][3],
+                              double hi, int unit)
 {
     fraction f;
     fraction_init(&f);
@@ -394,7 +406,7 @@ static void take_corners(fraction *best, const double corner[3][3], const double
         if (bounds.lo > hi)
             continue;
         ebpo_triangle_square_gmp(corner[i], face, unit, f.square, f.denominator);
-        take_lesser(best, &f);
+        keep_lesser(best, &f);
     }
     fraction_clear(&f);
 }
@@ -411,12 +423,13 @@ static void squared_distance(const double a[3][3], const double b[3][3], int uni
         mpz_set_ui(out->denominator, 1);
         return;
     }
-    ebpo_pair_distance_bounds bounds; /* a pair that is farther is not the nearest one */
+    ebpo_pair_distance_bounds
+        bounds; /* features farther apart than bounds.hi are not the nearest */
     ebpo_triangles_distance_bounds(a, b, &bounds);
     mpz_set_ui(out->denominator, 0);
-    take_corners(out, a, b, bounds.hi, unit);
-    take_corners(out, b, a, bounds.hi, unit);
-    take_edges(out, a, b, bounds.hi, unit);
+    update_by_corners(out, a, b, bounds.hi, unit);
+    update_by_corners(out, b, a, bounds.hi, unit);
+    update_by_edges(out, a, b, bounds.hi, unit);
 }
 
 double ebpo_triangles_distance(const double a[3][3], const double b[3][3])

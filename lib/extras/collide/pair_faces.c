@@ -1,10 +1,10 @@
-/* Looks up the faces of pairs by their numbers in the file, and computes the intersections of
+/* Looks up the posed faces of pairs by their indices in the file, and computes the intersections of
  * crossing faces.
  *
- * A whole model is in memory: its slots give the position of each face in the blocks. Faces of a
- * model in parts are read through the cache of chunks. ebpo_posing_apply poses a pair, as in all
- * exact tests. ebpo_collide_contacts returns the segments of all crossing pairs in the order of
- * pairs. One thread. */
+ * The faces of a whole model are in memory: its slots give the position of each face in the blocks.
+ * Faces of a model in parts are read through the cache of chunks. ebpo_posing_apply poses the
+ * corners, as in all exact tests. ebpo_collide_contacts returns the segments of all crossing pairs
+ * in the order of pairs. */
 #include "core/strict_fp.h"
 
 #include <string.h>
@@ -156,17 +156,18 @@ void ebpo_contact_of(const ebpo_posed_pair *faces, const ebpo_face_pair *pair,
 
 enum { SEGMENTS_AT_ONCE = 512 };
 
-typedef struct reporting {
+/* The caller's function that receives segments. */
+typedef struct segment_receiver {
     ebpo_pair_faces faces;
     ebpo_segments_fn take;
     void *user;
     ebpo_error *error; /* error of `status` */
     ebpo_status status;
-} reporting;
+} segment_receiver;
 
-static bool give_segments(void *user, const ebpo_face_pair *pairs, uint64_t count)
+static bool pass_segments(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
-    reporting *t = user;
+    segment_receiver *t = user;
     ebpo_contact_segment out[SEGMENTS_AT_ONCE];
     uint64_t n = 0;
     for (uint64_t i = 0; i < count; i++) {
@@ -191,12 +192,12 @@ ebpo_status ebpo_collide_contacts(ebpo_collider *c, const ebpo_collide_options *
 {
     EBPO_DEFAULT_FP;
     ebpo_collision q;
-    reporting t = { .take = take, .user = user, .error = error };
+    segment_receiver t = { .take = take, .user = user, .error = error };
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status == EBPO_OK)
         status = ebpo_pair_faces_begin(&t.faces, &q, error);
     if (status == EBPO_OK)
-        status = ebpo_collide_all(c, options, give_segments, &t, error);
+        status = ebpo_collide_all(c, options, pass_segments, &t, error);
     ebpo_pair_faces_end(&t.faces);
     return status == EBPO_OK ? t.status : status;
 }

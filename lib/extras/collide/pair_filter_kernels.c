@@ -1,9 +1,10 @@
 /* Filters pairs of faces, eight at a time in floats: finds pairs that are certainly apart and pairs
  * that certainly cross. This file is compiled for several instruction sets with the same results.
  *
- * Boxes are compared first, then the sides of both planes, then the intervals on the common line of
- * the planes, each with a proved error bound. All other pairs are undecided; the caller decides
- * them exactly. Letters are those of docs/develop/collision.md. */
+ * Boxes are compared first, then the sides of the planes of both faces on which the corners are,
+ * then the intervals on the common line of the planes, each with a proved error bound. All other
+ * pairs are undecided; the caller decides them exactly. Letters are those of
+ * docs/develop/collision.md. */
 #include "core/strict_fp.h"
 
 #include "core/simd.h"
@@ -38,7 +39,7 @@ EBPO_EIGHT vector8 vector8_cross(vector8 a, vector8 b)
                         minor_of8(a.x[0], a.x[1], b.x[0], b.x[1]) } };
 }
 
-/* Returns a value not less than the length. */
+/* Returns the 1-norm, which is at least the length. */
 EBPO_EIGHT f8 vector8_size(vector8 a)
 {
     return f8_add(f8_add(f8_abs(a.x[0]), f8_abs(a.x[1])), f8_abs(a.x[2]));
@@ -66,6 +67,7 @@ EBPO_EIGHT box8 box_of8(const face8 *f)
     return b;
 }
 
+/* Returns a bit for each pair of boxes that are certainly apart. e: error of coordinates. */
 EBPO_EIGHT unsigned boxes_apart8(const box8 *a, const box8 *b, f8 e)
 {
     f8 far = f8_all(-1);
@@ -77,13 +79,14 @@ EBPO_EIGHT unsigned boxes_apart8(const box8 *a, const box8 *b, f8 e)
 
 /* --- sides of planes --- */
 
+/* Sides of a plane on which the three corners of the other face are. */
 typedef struct sides8 {
-    f8 above[3]; /* masks, set only where certain */
-    unsigned same, certain;
+    f8 above[3];            /* masks: the corner is above; valid only where `certain` is set */
+    unsigned same, certain; /* bits: all corners are certainly on one side; all sides are certain */
 } sides8;
 
-/* Finds the sides of corners on a plane. d: corners of the other face minus the plane's first
- * corner; bound: error of determinants. */
+/* Finds the sides. e1, e2: edges of the plane's face from its first corner; d: corners of the other
+ * face minus that corner; bound: error of determinants. */
 EBPO_EIGHT sides8 sides_of8(vector8 e1, vector8 e2, const vector8 d[3], f8 bound)
 {
     vector8 n = vector8_cross(e1, e2);
@@ -103,10 +106,10 @@ EBPO_EIGHT sides8 sides_of8(vector8 e1, vector8 e2, const vector8 d[3], f8 bound
 
 /* --- the common line --- */
 
-/* Masks for a face. They show which corner is alone on its side of the other plane (corner 2 if
- * neither 0 nor 1), and if that corner is above the plane. */
+/* Masks for a face: which of its corners is alone on its side of the other plane. */
 typedef struct alone8 {
-    f8 is0, is1, above;
+    f8 is0, is1; /* it is corner 0, corner 1; otherwise corner 2 */
+    f8 above;    /* it is above the plane */
 } alone8;
 
 EBPO_EIGHT alone8 alone_of8(const f8 above[3])
@@ -128,10 +131,10 @@ EBPO_EIGHT vector8 turned_corner8(const face8 *f, const alone8 *alone, int first
                         vector8_pick(alone->is1, c[(first + 1) % 3], c[(first + 2) % 3]));
 }
 
-/* Decides pairs whose signs are certain: their intervals on the common line are apart, or overlap.
- */
-EBPO_EIGHT ebpo_pair_masks on_line8(const face8 *a, const face8 *b, const sides8 *side_a,
-                                    const sides8 *side_b, f8 bound)
+/* Decides pairs, for which all sides must be certain, by their intervals on the common line: apart
+ * or crossing. bound: error of determinants. */
+EBPO_EIGHT ebpo_pair_masks decide_on_line8(const face8 *a, const face8 *b, const sides8 *side_a,
+                                           const sides8 *side_b, f8 bound)
 {
     alone8 alone_a = alone_of8(side_a->above), alone_b = alone_of8(side_b->above);
     vector8 p = turned_corner8(a, &alone_a, 0), a1 = turned_corner8(a, &alone_a, 1),
@@ -158,18 +161,21 @@ EBPO_EIGHT f8 error_bound8(f8 e, f8 m, f8 n1, f8 n2)
     return f8_mul(m, f8_add(inputs, rounding));
 }
 
-/* Bounds the error for a plane with edges of length l and corners at a distance of d. */
+/* Bounds the error of determinants for a plane whose face has edges of length l, and corners at a
+ * distance of d from it. */
 EBPO_EIGHT f8 plane_bound8(f8 e, f8 l, f8 d)
 {
     return error_bound8(e, l, f8_add(f8_add(d, d), l), f8_mul(l, d));
 }
 
+/* Returns an upper bound of the lengths of two edges. */
 EBPO_EIGHT f8 edges_size8(vector8 e1, vector8 e2, f8 e)
 {
     return f8_add(f8_max(vector8_size(e1), vector8_size(e2)), f8_mul(e, f8_all(4)));
 }
 
-/* Decides faces without comparing boxes. `out`: pairs that are already known to be apart. */
+/* Decides faces by planes and intervals. e: error of coordinates; out.apart: pairs that are already
+ * known to be apart. */
 EBPO_EIGHT ebpo_pair_masks decide_faces8(const face8 *a, const face8 *b, f8 e, ebpo_pair_masks out)
 {
     vector8 e1 = vector8_less(a->corner[1], a->corner[0]),
@@ -191,7 +197,7 @@ EBPO_EIGHT ebpo_pair_masks decide_faces8(const face8 *a, const face8 *b, f8 e, e
         return out;
     f8 w = f8_add(f8_add(d, la), lb), la2 = f8_add(la, la),
        bound = error_bound8(e, w, f8_add(w, f8_add(la2, la2)), f8_mul(la2, w));
-    ebpo_pair_masks line = on_line8(a, b, &side_a, &side_b, bound);
+    ebpo_pair_masks line = decide_on_line8(a, b, &side_a, &side_b, bound);
     out.apart |= (uint8_t)(line.apart & certain);
     out.crossing = (uint8_t)(line.crossing & certain);
     return out;
@@ -233,19 +239,21 @@ static ebpo_pair_masks filter_eight(const float *a, const float *b, float error)
 
 /* --- blocks --- */
 
+/* Pairs of lanes of two blocks. */
 typedef struct lane_pairs {
     int32_t a[72], b[72];
     int count;
 } lane_pairs;
 
-/* Lists pairs whose boxes are not apart; the entry after the last one is a valid pair, too. */
+/* Lists the pairs whose boxes are not certainly apart. The eight entries after the last one are
+ * valid lanes, too, so that pairs can be loaded eight at a time. */
 EBPO_EIGHT void pairs_by_boxes(const face8 *a, unsigned lanes_a, const face8 *b, unsigned lanes_b,
                                f8 e, lane_pairs *out)
 {
     box8 box_a = box_of8(a), box_b = box_of8(b), box;
     float low[3][8], high[3][8];
-    uint64_t near = 0; /* a bit for each pair: the processor predicts one loop over these better
-                        * than eight */
+    uint64_t near = 0; /* a bit for each pair: the processor predicts one loop over these bits
+                        * better than eight loops */
     for (int k = 0; k < 3; k++) {
         f8_store(low[k], box_b.low[k]);
         f8_store(high[k], box_b.high[k]);

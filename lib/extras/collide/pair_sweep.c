@@ -1,11 +1,13 @@
 /* Computes the last time at which two triangles have a common point, when one of them moves along a
  * direction.
  *
- * Seen along the direction, both faces are convex polygons with heights. The difference of heights
- * is concave where the polygons overlap, so it is greatest over a corner of one polygon or where
- * edges cross. The exact time is a fraction of integers (GMP). A bound in doubles comes from
- * separating axes: normals, and cross products of edges with each other and with the direction. See
- * docs/develop/collision.md, "Separation distance along a direction". Pure functions, any thread.
+ * Projected along the direction, both faces are convex polygons; each of their points has a height,
+ * its coordinate along the direction. The difference of heights is concave where the polygons
+ * overlap, so it is greatest at a corner of one polygon or where edges cross. The exact time is a
+ * fraction of integers (GMP). A bound in doubles follows from separating axes: normals, and cross
+ * products of edges with each other and with the direction. See docs/develop/collision.md,
+ * "Separation distance along a direction". All functions are pure and can be called from any
+ * thread.
  */
 #include "core/strict_fp.h"
 
@@ -56,11 +58,12 @@ double ebpo_sweep_time_round(const ebpo_sweep_time *t)
 
 /* --- in integers --- */
 
+/* A moving face [0] and the other face [1], in integers. */
 typedef struct sweep {
-    ebpo_vectorz d, corner[2][3]; /* direction; corners of the moving face, and of the other face */
-    ebpo_vectorz u, v, w, n, m;
-    mpz_t top, bottom, share;
-    ebpo_sweep_time *best;
+    ebpo_vectorz d, corner[2][3]; /* direction, corners */
+    ebpo_vectorz u, v, w, n, m;   /* temporary values */
+    mpz_t top, bottom, share;     /* a time top / bottom; a share of an edge, times `bottom` */
+    ebpo_sweep_time *best;        /* the last time so far */
 } sweep;
 
 static void sweep_init(sweep *s)
@@ -91,9 +94,9 @@ static void triple_product(sweep *s, mpz_t out, const ebpo_vectorz *x, const ebp
     ebpo_vectorz_dot(out, x, &s->m);
 }
 
-/* Takes top / bottom as a time of contact. `other`: the computation used the face that does not
- * move, so the sign of the time is reversed. */
-static void take_time(sweep *s, bool other)
+/* Keeps top / bottom if it is later than the last time so far. `other`: the time was computed as if
+ * the other face moved, so its sign is reversed. */
+static void keep_later_time(sweep *s, bool other)
 {
     if (mpz_sgn(s->bottom) < 0) {
         mpz_neg(s->top, s->top);
@@ -135,7 +138,7 @@ static bool find_normal(sweep *s, int of)
     return mpz_sgn(s->share) != 0;
 }
 
-/* Returns true if the corner, seen along the direction, is in face `of`. */
+/* Returns true if the projection of the corner is in that of face `of`. */
 static bool is_over(sweep *s, const ebpo_vectorz *corner, int of)
 {
     int signs[3] = { 0, 0, 0 };
@@ -148,8 +151,8 @@ static bool is_over(sweep *s, const ebpo_vectorz *corner, int of)
     return signs[0] == 0 || signs[2] == 0;
 }
 
-/* Takes the times of the other face's corners over face `of`, which is not parallel to the
- * direction. */
+/* Considers the times at which corners of face `of` are in the other face, which is not parallel to
+ * the direction. */
 static void corners_and_face(sweep *s, int of)
 {
     (void)find_normal(s, !of);
@@ -159,12 +162,12 @@ static void corners_and_face(sweep *s, int of)
         ebpo_vectorz_subtract(&s->w, &s->corner[!of][0], &s->corner[of][i]);
         ebpo_vectorz_dot(s->top, &s->n, &s->w);
         ebpo_vectorz_dot(s->bottom, &s->n, &s->d);
-        take_time(s, of == 1);
+        keep_later_time(s, of == 1);
     }
 }
 
-/* Takes the time of edges that cross, seen along the direction: w = t d + x u - y v, by Cramer's
- * rule. */
+/* Considers the time at which edge i of the moving face intersects edge j of the other one, if
+ * their projections cross: w = t d + x u - y v, by Cramer's rule. */
 static void two_edges(sweep *s, int i, int j)
 {
     const ebpo_vectorz *p = &s->corner[0][i], *q = &s->corner[1][j];
@@ -181,10 +184,11 @@ static void two_edges(sweep *s, int i, int j)
     if (!is_share(s))
         return;
     triple_product(s, s->top, &s->w, &s->u, &s->v);
-    take_time(s, false);
+    keep_later_time(s, false);
 }
 
-/* Takes the time of a corner of face `of` over an edge of the other: w = t d - x v. */
+/* Considers the time at which corner i of face `of` is on edge j of the other face: w = t d - x v.
+ */
 static void corner_and_edge(sweep *s, int of, int i, int j)
 {
     const ebpo_vectorz *p = &s->corner[of][i], *q = &s->corner[!of][j];
@@ -199,10 +203,10 @@ static void corner_and_edge(sweep *s, int of, int i, int j)
     if (!is_share(s))
         return;
     triple_product(s, s->top, &s->n, &s->w, &s->v);
-    take_time(s, of == 1);
+    keep_later_time(s, of == 1);
 }
 
-/* Takes the time of two corners, one over the other: w = t d. */
+/* Considers the time at which two corners with the same projection are equal: w = t d. */
 static void two_corners(sweep *s, int i, int j)
 {
     ebpo_vectorz_subtract(&s->w, &s->corner[1][j], &s->corner[0][i]);
@@ -212,7 +216,7 @@ static void two_corners(sweep *s, int i, int j)
             return;
     ebpo_vectorz_dot(s->top, &s->w, &s->d);
     ebpo_vectorz_dot(s->bottom, &s->d, &s->d);
-    take_time(s, false);
+    keep_later_time(s, false);
 }
 
 static void inspect_faces(sweep *s)
@@ -256,15 +260,17 @@ void ebpo_sweep_last(const double a[3][3], const double b[3][3], const double di
 
 /* --- bounds --- */
 
-/* Interval of times. Each separating direction n restricts it in turn: n . d t is between the
- * differences of the extents. */
-typedef struct bounding {
-    double x[3][3], y[3][3], reach; /* corners relative to the first corner */
-    const double *d;
-    double most; /* negative: there is no time */
-} bounding;
+/* The interval 0 .. most of times of contact. Each separating direction n restricts it in turn: n .
+ * d t is between the differences of the extents of both faces along n. */
+typedef struct time_bounds {
+    double x[3][3], y[3][3]; /* corners of both faces, relative to the first corner */
+    double reach;            /* bound of their 1-norms */
+    const double *d;         /* [3] direction of the motion */
+    double most;             /* negative: there is no time */
+} time_bounds;
 
-static void bound_by(bounding *b, const double n[3])
+/* Restricts the interval by the direction n. */
+static void bound_by(time_bounds *b, const double n[3])
 {
     double size = fabs(n[0]) + fabs(n[1]) + fabs(n[2]);
     if (!(size > 0x1p-600 && size < 0x1p600) || b->most < 0)
@@ -287,7 +293,7 @@ static void bound_by(bounding *b, const double n[3])
         b->most = fmin(b->most, greatest / c_lo * (1 + 0x1p-50));
 }
 
-static void bound_by_cross(bounding *b, const double x[3], const double y[3])
+static void bound_by_cross(time_bounds *b, const double x[3], const double y[3])
 {
     double n[3];
     ebpo_vec3_cross(x, y, n);
@@ -297,7 +303,7 @@ static void bound_by_cross(bounding *b, const double x[3], const double y[3])
 double ebpo_sweep_max(const double a[3][3], const double b[3][3], const double direction[3],
                       double limit)
 {
-    bounding w = { .d = direction, .most = limit };
+    time_bounds w = { .d = direction, .most = limit };
     double edge[2][3][3];
     for (int i = 0; i < 3; i++) {
         double x = 0, y = 0;

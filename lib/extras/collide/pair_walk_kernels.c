@@ -1,11 +1,11 @@
-/* Walks through two hierarchies to the pairs of faces that intersect, eight children at a time, in
- * floats. This file is compiled for several instruction sets with the same results.
+/* Walks through two hierarchies to find the pairs of faces that intersect, eight children at a
+ * time, in floats. This file is compiled for several instruction sets with the same results.
  *
  * Boxes and bounding cylinders of one model's nodes are transformed into the other model's frame
  * and compared along the axes of both frames. Bounds are rounded outwards, so no pair is lost. The
- * larger of two nodes is divided first. Two blocks go to the filter of pairs
- * (pair_filter_kernels.c); ebpo_pair_walk_decide decides the pairs that the filter leaves
- * undecided. See docs/develop/collision.md, "Going down two hierarchies". */
+ * larger of two nodes is divided first. The faces of two blocks are compared by the filter of pairs
+ * (pair_filter_kernels.c); ebpo_pair_walk_decide decides the pairs that the filter does not
+ * exclude. See docs/develop/collision.md, "Going down two hierarchies". */
 #include "core/strict_fp.h"
 
 #include "core/simd.h"
@@ -25,8 +25,9 @@ EBPO_EIGHT void store_vector8(float out[3][8], const f8 x[3])
         f8_store(out[k], x[k]);
 }
 
-EBPO_EIGHT void turn_boxes(const ebpo_accel_pair *p, int side, const ebpo_bound *b,
-                           ebpo_turned_node *out, f8 c[3])
+/* Decodes boxes, and computes boxes around them in the other frame. c: their middles. */
+EBPO_EIGHT void transform_boxes(const ebpo_accel_pair *p, int side, const ebpo_bound *b,
+                                ebpo_turned_node *out, f8 c[3])
 {
     f8 e[3], c2[3], e2[3];
     float longest = 0;
@@ -47,8 +48,9 @@ EBPO_EIGHT void turn_boxes(const ebpo_accel_pair *p, int side, const ebpo_bound 
 }
 
 /* Decodes and rotates bounding cylinders. A cylinder without an axis gives no bound. */
-EBPO_EIGHT void turn_cylinders(const ebpo_accel_pair *p, int side, const ebpo_bound_cylinder *s,
-                               ebpo_turned_node *out, const f8 c[3])
+EBPO_EIGHT void transform_cylinders(const ebpo_accel_pair *p, int side,
+                                    const ebpo_bound_cylinder *s, ebpo_turned_node *out,
+                                    const f8 c[3])
 {
     f8 a[3], a2[3], mid[3], mid2[3], inverse, some, unit = f8_all(p->unit[side]);
     decode_axes8(s, a, &inverse, &some);
@@ -68,15 +70,15 @@ EBPO_EIGHT void turn_cylinders(const ebpo_accel_pair *p, int side, const ebpo_bo
     store_vector8(out->mid2, mid2);
 }
 
-static void turn_node(const ebpo_accel_pair *p, int side, uint32_t node, ebpo_turned_node *out)
+static void transform_node(const ebpo_accel_pair *p, int side, uint32_t node, ebpo_turned_node *out)
 {
     const ebpo_bound *b = &p->accel[side]->bound[node];
     f8 c[3];
     double origin[3];
-    turn_boxes(p, side, b, out, c);
+    transform_boxes(p, side, b, out, c);
     out->cylinders = false;
     if (p->cylinders)
-        turn_cylinders(p, side, &p->accel[side]->cylinder[node], out, c);
+        transform_cylinders(p, side, &p->accel[side]->cylinder[node], out, c);
     for (int k = 0; k < 3; k++)
         origin[k] = (double)b->origin[k] * (double)p->unit[side];
     for (int i = 0; i < 3; i++)
@@ -87,26 +89,30 @@ static void turn_node(const ebpo_accel_pair *p, int side, uint32_t node, ebpo_tu
     out->lanes = (uint8_t)((1u << b->count) - 1);
 }
 
+/* Returns the children of a node in both frames; transforms them unless they are kept. */
 EBPO_EIGHT const ebpo_turned_node *turned_node(ebpo_pair_walk *w, int side, uint32_t node)
 {
     ebpo_turned_node *out =
         &w->turned[side][node * UINT32_C(0x9e3779b1) >> (32 - EBPO_TURNED_BITS)];
     if (__builtin_expect(out->node != node, 0))
-        turn_node(w->pair, side, node, out);
+        transform_node(w->pair, side, node, out);
     return out;
 }
 
 /* --- eight children against one --- */
 
-/* Eight children of P and eight of Q. `in_p`: Q's origin less P's, in P's frame; `in_q`: P's origin
- * less Q's, in Q's frame. */
+/* Two nodes P and Q, whose children are compared. */
 typedef struct two_nodes {
     const ebpo_turned_node *p, *q;
-    float in_p[3], in_q[3];
-    float slack, cylinder_slack, sine;
-    bool cylinders;
+    float in_p[3], in_q[3]; /* Q's origin minus P's, in P's frame; P's minus Q's, in Q's frame */
+    float slack,
+        cylinder_slack; /* computed gaps of boxes, of cylinders, may be too large by this */
+    float sine;         /* 1 plus the margin of the squared sine */
+    bool cylinders;     /* a child has a cylinder */
 } two_nodes;
 
+/* Prepares the comparison of a node of the first model and one of the second; P is of model p_side.
+ */
 EBPO_EIGHT two_nodes two_nodes_of(const ebpo_accel_pair *pair, const ebpo_turned_node *a,
                                   const ebpo_turned_node *b, int p_side)
 {
@@ -131,7 +137,8 @@ EBPO_EIGHT two_nodes two_nodes_of(const ebpo_accel_pair *pair, const ebpo_turned
     return t;
 }
 
-/* Returns the greatest gap along the six axes of both boxes; negative where they overlap. */
+/* Returns the greatest gaps of the boxes of P and box j of Q along their six axes; negative where
+ * they overlap. */
 EBPO_EIGHT f8 box_gaps(const two_nodes *t, int j)
 {
     const ebpo_turned_node *p = t->p, *q = t->q;
@@ -149,7 +156,8 @@ EBPO_EIGHT f8 box_gaps(const two_nodes *t, int j)
     return gap;
 }
 
-/* Returns the greatest gap along the axes of both cylinders; all coordinates are in P's frame. */
+/* Returns the greatest gaps of the cylinders of P and cylinder j of Q along their axes, computed in
+ * P's frame. */
 EBPO_EIGHT f8 cylinder_gaps(const two_nodes *t, int j)
 {
     const ebpo_turned_node *p = t->p, *q = t->q;
@@ -184,8 +192,8 @@ EBPO_EIGHT f8 cylinder_gaps(const two_nodes *t, int j)
     return f8_max(gap, f8_sub(f8_max(by_cylinder, by_box), q_half));
 }
 
-/* Returns a bit for each child of P that may intersect child j of Q. A child with NaN counts as
- * intersecting. */
+/* Returns a bit for each child of P that may intersect child j of Q, also if its gap is NaN. If
+ * `first`, sets the keys of the pairs. */
 EBPO_EIGHT unsigned near_children_of(const two_nodes *t, int j, bool first, float key[8])
 {
     f8 gap = box_gaps(t, j);
@@ -204,17 +212,18 @@ EBPO_EIGHT unsigned near_children_of(const two_nodes *t, int j, bool first, floa
 
 /* --- pairs of nodes --- */
 
-/* For the first contact, the pairs into which one pair of nodes was divided are a group at the top
- * of the stack. The deepest overlap of a group is searched only when it is needed, because most
- * groups are left early. Below each group is a mark with the start of the previous group. */
+/* Begins a group. In a search for the first contact, the pairs into which one pair of nodes is
+ * divided are a group on the stack. The pair of a group with the deepest overlap is searched only
+ * when it is needed, because most groups are left early. Below each group is an entry with the
+ * start of the previous group. */
 EBPO_EIGHT void open_group(ebpo_pair_walk *w)
 {
     w->stack[w->top++] = (ebpo_node_pair){ 0, (uint32_t)w->group, 0 };
     w->group = w->top;
 }
 
-/* Pops the pair with the deepest overlap; of equals, the last one. Returns false if there is none.
- */
+/* Pops the pair with the deepest overlap of the last group; of several, the last one. Returns false
+ * if the stack is empty. */
 EBPO_EIGHT bool pop_deepest(ebpo_pair_walk *w, ebpo_node_pair *out)
 {
     ebpo_node_pair *s = w->stack;
@@ -239,10 +248,10 @@ EBPO_EIGHT void push_pair(ebpo_pair_walk *w, uint32_t a, uint32_t b, float key)
     w->stack[w->top++] = (ebpo_node_pair){ a, b, key };
 }
 
-/* Pairs the children of A's node with those children of B's node that are in `of_b`. First collects
- * a bit for each pair: the processor predicts one loop over these bits better than a loop for each
- * child. */
-EBPO_EIGHT void both_down(ebpo_pair_walk *w, const ebpo_turned_node *p, const ebpo_turned_node *q,
+/* Pushes the pairs of the children of p, of the first model, with the children of q that are in
+ * `of_b`, a bit for each. First collects a bit for each pair: the processor predicts one loop over
+ * these bits better than a loop for each child. */
+EBPO_EIGHT void push_both(ebpo_pair_walk *w, const ebpo_turned_node *p, const ebpo_turned_node *q,
                           unsigned of_b, bool first)
 {
     const ebpo_accel *a = w->pair->accel[0], *b = w->pair->accel[1];
@@ -267,33 +276,37 @@ EBPO_EIGHT void both_down(ebpo_pair_walk *w, const ebpo_turned_node *p, const eb
     }
 }
 
-/* Returns the children of a node on one side that may intersect the child on the other side. */
-EBPO_EIGHT unsigned near_one(const ebpo_pair_walk *w, int side, const ebpo_turned_node *p,
-                             const ebpo_turned_node *q, uint32_t one, bool first, float key[8])
+/* Returns the children of p, a node of model `side`, that may intersect `one`, a child of q. */
+EBPO_EIGHT unsigned near_children_of_side(const ebpo_pair_walk *w, int side,
+                                          const ebpo_turned_node *p, const ebpo_turned_node *q,
+                                          uint32_t one, bool first, float key[8])
 {
     two_nodes t = two_nodes_of(w->pair, side == 0 ? p : q, side == 0 ? q : p, side);
     return near_children_of(&t, (int)(one & 7), first, key);
 }
 
-/* Pairs the children on side `down` with the undivided child of q on the other side. */
-EBPO_EIGHT void one_down(ebpo_pair_walk *w, ebpo_node_pair r, int down, uint32_t node,
-                         const ebpo_turned_node *q, bool first)
+/* Pushes the pairs of the children of `node`, of model `down`, with the child in r of the other
+ * model, which is a child of q. */
+EBPO_EIGHT void push_one_side(ebpo_pair_walk *w, ebpo_node_pair r, int down, uint32_t node,
+                              const ebpo_turned_node *q, bool first)
 {
     const ebpo_accel *s = w->pair->accel[down];
     uint32_t stays = down == 0 ? r.b : r.a;
     float key[8] = { 0 };
-    for (unsigned near = near_one(w, down, turned_node(w, down, node), q, stays, first, key); near;
-         near &= near - 1) {
+    for (unsigned near =
+             near_children_of_side(w, down, turned_node(w, down, node), q, stays, first, key);
+         near; near &= near - 1) {
         uint32_t i = (uint32_t)__builtin_ctz(near), ref = node << 3 | i;
         fetch_below(s, s->bound[node].child[i], w->pair->cylinders);
         push_pair(w, down == 0 ? ref : stays, down == 0 ? stays : ref, key[i]);
     }
 }
 
-/* A child this many times longer than the other one is divided first. */
+/* If a child is this many times longer than the other one, only the longer one is divided. */
 #define LONGER 4.0f
 
-/* Returns which of two children is divided: 0, 1, or 2 for both. */
+/* Returns which of two children is divided: 0, 1, or 2 for both. a, b: the nodes or blocks below
+ * them. */
 EBPO_EIGHT int side_to_divide(uint32_t a, uint32_t b, float size_a, float size_b)
 {
     if (a & EBPO_IS_BLOCK)
@@ -303,6 +316,7 @@ EBPO_EIGHT int side_to_divide(uint32_t a, uint32_t b, float size_a, float size_b
     return size_a > LONGER * size_b ? 0 : size_b > LONGER * size_a ? 1 : 2;
 }
 
+/* Divides a pair of children, below which are a and b. Returns false without memory. */
 EBPO_EIGHT bool divide_pair(ebpo_pair_walk *w, ebpo_node_pair r, uint32_t a, uint32_t b, bool first)
 {
     w->node_pairs++;
@@ -313,14 +327,14 @@ EBPO_EIGHT bool divide_pair(ebpo_pair_walk *w, ebpo_node_pair r, uint32_t a, uin
     const ebpo_turned_node *of_a = turned_node(w, 0, r.a >> 3), *of_b = turned_node(w, 1, r.b >> 3);
     int side = side_to_divide(a, b, of_a->extent[r.a & 7], of_b->extent[r.b & 7]);
     if (side != 2) {
-        one_down(w, r, side, side == 0 ? a : b, side == 0 ? of_b : of_a, first);
+        push_one_side(w, r, side, side == 0 ? a : b, side == 0 ? of_b : of_a, first);
         return true;
     }
     const ebpo_turned_node *q = turned_node(w, 1, b); /* may overwrite of_b */
     float key[8];
-    unsigned near = near_one(w, 1, q, of_a, r.a, false, key);
+    unsigned near = near_children_of_side(w, 1, q, of_a, r.a, false, key);
     if (near)
-        both_down(w, turned_node(w, 0, a), q, near, first);
+        push_both(w, turned_node(w, 0, a), q, near, first);
     return true;
 }
 
@@ -331,8 +345,8 @@ static const ebpo_posed_faces *posed_faces(ebpo_pair_walk *w, int side, uint32_t
     return posed_faces_of(w->posed[side], w->pair->accel[side], w->pair->posing[side], block);
 }
 
-/* Moves the second model's faces: makes them relative to the first one's base. The error is
- * explained at ebpo_posed_block_place. */
+/* Makes the faces of a block relative to `origin`, as ebpo_posed_block_place does; returns the
+ * bound of their error. */
 EBPO_EIGHT float place_faces(const ebpo_posed_faces *b, double unit, const double origin[3],
                              float out[9][8])
 {
@@ -346,6 +360,7 @@ EBPO_EIGHT float place_faces(const ebpo_posed_faces *b, double unit, const doubl
     return b->error + 0x1.2p-24f * b->reach + 2.5f * 0x1p-24f * most;
 }
 
+/* Finds the pairs of intersecting faces of two blocks. Returns false without memory. */
 static bool blocks_intersect(ebpo_pair_walk *w, uint32_t block_a, uint32_t block_b)
 {
     const ebpo_posed_faces *a = posed_faces(w, 0, block_a), *b = posed_faces(w, 1, block_b);
@@ -360,6 +375,7 @@ static bool blocks_intersect(ebpo_pair_walk *w, uint32_t block_a, uint32_t block
 
 /* --- the stack --- */
 
+/* Processes pairs of the stack: see ebpo_walk_kernels.run. */
 EBPO_EIGHT bool run_any(ebpo_pair_walk *w, uint64_t pairs, bool first)
 {
     const ebpo_accel *sa = w->pair->accel[0], *sb = w->pair->accel[1];
@@ -370,10 +386,10 @@ EBPO_EIGHT bool run_any(ebpo_pair_walk *w, uint64_t pairs, bool first)
         else if (!pop_deepest(w, &r))
             break;
         uint32_t a = below_child(sa, r.a), b = below_child(sb, r.b);
-        bool fine = a & b & EBPO_IS_BLOCK
-                        ? blocks_intersect(w, a & ~EBPO_IS_BLOCK, b & ~EBPO_IS_BLOCK)
-                        : divide_pair(w, r, a, b, first);
-        if (!fine)
+        bool ok = a & b & EBPO_IS_BLOCK
+                      ? blocks_intersect(w, a & ~EBPO_IS_BLOCK, b & ~EBPO_IS_BLOCK)
+                      : divide_pair(w, r, a, b, first);
+        if (!ok)
             return false;
         if (first && w->found_count)
             w->top = 0;
@@ -390,7 +406,7 @@ static bool walk_start(ebpo_pair_walk *w)
 {
     if (!ebpo_pair_walk_capacity(w, 64))
         return false;
-    both_down(w, turned_node(w, 0, w->pair->accel[0]->root_bound),
+    push_both(w, turned_node(w, 0, w->pair->accel[0]->root_bound),
               turned_node(w, 1, w->pair->accel[1]->root_bound), 255, w->first);
     return true;
 }

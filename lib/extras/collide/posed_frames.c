@@ -1,11 +1,12 @@
-/* Poses models in floats, with proved error bounds: makes the vertices of blocks for the filter of
- * pairs, and the relative position of the frames of two models.
+/* Poses models in floats, with proved error bounds: computes the vertices of blocks for the filter
+ * of pairs, and the relative position of the frames of two models.
  *
- * A unit, a power of two, brings posed coordinates into the range of floats. Blocks are rotated in
- * floats and placed relative to their first vertex, whose posed coordinates are doubles. Matrices
- * between frames come with the absolute values of their entries, from which the kernels bound their
- * errors. Where two frames are too different for floats, no pair is dropped. See
- * docs/develop/collision.md, "From blocks to the filter". Pure functions, any thread. */
+ * Coordinates are multiplied by a unit, a power of two, which brings them into the range of floats.
+ * Blocks are rotated in floats relative to their first vertex, whose posed coordinates are doubles.
+ * With each matrix between frames, the absolute values of its entries are stored, from which the
+ * kernels compute sizes of boxes. If two frames are too different for floats, no pair is dropped.
+ * See docs/develop/collision.md, "From blocks to the filter". All functions are pure and can be
+ * called from any thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -106,7 +107,7 @@ static void invert_matrix(const double m[3][3], double out[3][3])
         out[i / 3][i % 3] /= det;
 }
 
-static void turn_vector(const double m[3][3], const double x[3], double out[3])
+static void rotate_vector(const double m[3][3], const double x[3], double out[3])
 {
     for (int i = 0; i < 3; i++)
         out[i] = m[i][0] * x[0] + m[i][1] * x[1] + m[i][2] * x[2];
@@ -120,9 +121,9 @@ static void to_floats(const double m[3][3], float out[3][3], float size[3][3])
     }
 }
 
-/* Makes the walk visit every pair of nodes: the frames are too different or too extreme for floats.
- */
-static void inspect_all(ebpo_accel_pair *out)
+/* Prepares a pair whose frames are too different or too extreme for floats: the walk visits every
+ * pair of nodes. */
+static void visit_all_pairs(ebpo_accel_pair *out)
 {
     out->unit[0] = out->unit[1] = 1;
     for (int i = 0; i < 9; i++)
@@ -134,8 +135,8 @@ static void inspect_all(ebpo_accel_pair *out)
     out->cylinders = out->apart = false;
 }
 
-/* Returns true if the boxes of both models are certainly apart. Compares along the axes of the
- * first model's frame; a comparison of spheres would not be better. */
+/* Returns true if the boxes of both models are certainly apart along an axis of the first model's
+ * frame. */
 static bool turned_boxes_apart(const ebpo_accel_pair *p)
 {
     double first = p->accel[0]->largest_coordinate * (double)p->unit[0],
@@ -150,7 +151,8 @@ static bool turned_boxes_apart(const ebpo_accel_pair *p)
     return false;
 }
 
-/* Chooses the unit of both frames. per_world: length in each frame of a world length of 1. */
+/* Chooses the factors of lengths in both frames. per_world: [model] length in its frame of a length
+ * of 1 in the world. */
 static void choose_units(ebpo_accel_pair *out, const double per_world[2])
 {
     double ratio = per_world[0] / per_world[1];
@@ -162,7 +164,7 @@ static void choose_units(ebpo_accel_pair *out, const double per_world[2])
 void ebpo_accel_pair_make(ebpo_accel_pair *out, const ebpo_accel *const accel[2],
                           const ebpo_block_posing *const posing[2], double reach)
 {
-    double per_world[2], rotation[2][3][3], back[3][3], middle[3], seen[3];
+    double per_world[2], rotation[2][3][3], back[3][3], middle[3], rotated[3];
     for (int i = 0; i < 2; i++) {
         out->accel[i] = accel[i];
         out->posing[i] = posing[i];
@@ -174,22 +176,22 @@ void ebpo_accel_pair_make(ebpo_accel_pair *out, const ebpo_accel *const accel[2]
            ratio = unit / ((double)out->unit[1] * per_world[1]);
     if (!(unit > 0x1p-900 && unit < 0x1p900 && ratio > 0x1p-900 && ratio < 0x1p900 &&
           reach * unit < 0x1p100)) {
-        inspect_all(out);
+        visit_all_pairs(out);
         return;
     }
     invert_matrix((const double(*)[3])rotation[0], back);
     for (int k = 0; k < 3; k++) {
         double column[3] = { rotation[1][0][k], rotation[1][1][k], rotation[1][2][k] };
-        turn_vector((const double(*)[3])back, column, seen);
+        rotate_vector((const double(*)[3])back, column, rotated);
         for (int i = 0; i < 3; i++)
-            out->turn[i][k] = seen[i] * ratio;
+            out->turn[i][k] = rotated[i] * ratio;
     }
     ebpo_posing_apply(&posing[1]->posing, accel[1]->centre, middle);
     for (int i = 0; i < 3; i++)
         middle[i] -= posing[0]->posing.translation[i];
-    turn_vector((const double(*)[3])back, middle, seen);
+    rotate_vector((const double(*)[3])back, middle, rotated);
     for (int i = 0; i < 3; i++)
-        out->place[i] = seen[i] * unit - accel[0]->centre[i] * (posing[0]->posing.scale * unit);
+        out->place[i] = rotated[i] * unit - accel[0]->centre[i] * (posing[0]->posing.scale * unit);
     to_floats((const double(*)[3])out->turn, out->into[0], out->size[0]);
     invert_matrix((const double(*)[3])out->turn, back);
     to_floats((const double(*)[3])back, out->into[1], out->size[1]);
@@ -205,10 +207,10 @@ static double greatest_coordinate(const double x[3])
     return fmax(fabs(x[0]), fmax(fabs(x[1]), fabs(x[2])));
 }
 
-/* Computes the position of frame `from` in frame `to`. offset: centre of `from` minus centre of
- * `to`, in the world. */
-static void turn_into(ebpo_turned_frame *out, double from[3][3], double to[3][3],
-                      const double offset[3])
+/* Computes the position of one frame in another one. from, to: their rotations; offset: centre of
+ * `from` minus centre of `to`, in the world, times the unit. */
+static void set_turned_frame(ebpo_turned_frame *out, double from[3][3], double to[3][3],
+                             const double offset[3])
 {
     for (int i = 0; i < 3; i++) {
         double shift = 0;
@@ -247,6 +249,6 @@ void ebpo_two_frames_make(ebpo_two_frames *out, const ebpo_accel *const accel[2]
     }
     double all = size + 1.7321 * greatest_coordinate(offset[0]);
     for (int s = 0; s < 2; s++)
-        turn_into(&out->frame[s], rotation[s], rotation[1 - s], offset[s]);
+        set_turned_frame(&out->frame[s], rotation[s], rotation[1 - s], offset[s]);
     out->slack = (float)((0x1p-19 * all + 2 * error_bound * all + 2 * lost) * (1 + 0x1p-20));
 }

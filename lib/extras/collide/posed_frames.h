@@ -117,7 +117,7 @@ void ebpo_accel_pair_make(ebpo_accel_pair *out, const ebpo_accel *const accel[2]
  * the other's frame. */
 
 /* A point x of the accel's frame has the coordinates y = x * unit. In the other model's frame they
- * are turn * y + shift. turn_size: absolute values of `turn`, rounded up. */
+ * are turn * y + shift. turn_size: absolute values of `turn`. */
 typedef struct ebpo_turned_frame {
     float unit, turn[3][3], turn_size[3][3], shift[3];
     float in_world[3][3]; /* matrix; its transpose maps a direction of the world to the frame */

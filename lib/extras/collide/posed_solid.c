@@ -1,13 +1,15 @@
-/* Classifies points of the world by the sides of posed solids, exactly for posed coordinates.
+/* Computes the winding number of a posed solid at a point of the world, exactly for posed
+ * coordinates.
  *
  * The point is transformed into the model's coordinates with an error bound. If no face is near,
  * the result is the winding number there. Otherwise the faces near the point are posed, and they
- * decide. Axis-parallel segments lead from a point farther away, whose winding number is known, to
- * the query point; their crossings with faces are counted exactly. A point with fractions as
- * coordinates is reached from the nearest double in three such segments.
+ * decide: a segment parallel to an axis leads from a point farther away, whose winding number is
+ * known, to the query point, and its crossings with faces are counted exactly. A point whose
+ * coordinates are fractions is reached from the point with the nearest doubles in three such
+ * segments.
  *
- * Solids are not changed: any thread may use them, each with a separate context. Proofs:
- * docs/develop/booleans.md and docs/develop/collision.md, "Relation of two models". */
+ * Functions do not change a posed solid: any thread may use it, each with a separate context.
+ * Proofs: docs/develop/booleans.md and docs/develop/collision.md, "Relation of two models". */
 #include "core/strict_fp.h"
 
 #include <ebpo/collide.h>
@@ -61,9 +63,10 @@ bool ebpo_same_model(const ebpo_model *a, const ebpo_model *b)
 
 /* --- points in the coordinates of the model --- */
 
-/* Factor that covers the rounding of a bound's own computation. */
-static const double more = 1 + 0x1p-40;
+/* Factor for bounds: more than the rounding of their computation. */
+static const double margin_factor = 1 + 0x1p-40;
 
+/* Sets the box of all posed vertices. */
 static void bound_box(ebpo_posed_solid *s)
 {
     const ebpo_info *info = s->model->info;
@@ -94,7 +97,8 @@ ebpo_status ebpo_posed_solid_make(ebpo_posed_solid *out, ebpo_model *model, cons
     if (status != EBPO_OK)
         return status;
     /* reach is at most 2^1000: no sum overflows; 1.7321 is more than the root of 3 */
-    out->moved = 1.7321 * ebpo_posing_error(&out->posing, (reach[0] + reach[1] + reach[2]) * more);
+    out->moved =
+        1.7321 * ebpo_posing_error(&out->posing, (reach[0] + reach[1] + reach[2]) * margin_factor);
     bound_box(out);
     if (!(out->moved / out->posing.scale <= 0x1p990))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
@@ -124,7 +128,7 @@ void ebpo_unpose(const ebpo_posed_solid *s, const double w[3], double p[3], doub
         p[k] = ((s->rotation[0][k] * y[0] + s->rotation[1][k] * y[1]) + s->rotation[2][k] * y[2]) /
                scale;
     double far = s->moved + length * (2 * s->posing.error_bound + 8 * 0x1p-53) + 0x1p-1060;
-    *doubt = far / scale * more + 0x1p-1060;
+    *doubt = far / scale * margin_factor + 0x1p-1060;
 }
 
 void ebpo_unpose_box(const ebpo_posed_solid *s, const double a[3], const double b[3], double low[3],
@@ -165,13 +169,14 @@ static ebpo_status is_clear_of_faces(ebpo_context *context, const double p[3], d
 
 /* --- sides of a point --- */
 
+/* The segment that leads to the point w, or begins there. */
 typedef struct side_segment {
     const ebpo_posed_solid *solid;
-    const double *w;
-    int axis;              /* axis of the segment */
-    double low[3], to;     /* the segment goes from `low` to coordinate `to` */
-    int32_t crossed, jump; /* crossed: winding number at the end minus that at the beginning; jump:
-                            * winding number above the point minus that below */
+    const double *w;   /* [3] the query point */
+    int axis;          /* the segment is parallel to this axis */
+    double low[3], to; /* its lower end, and the coordinate of its upper end on the axis */
+    int32_t crossed;   /* winding number at the upper end minus that at the lower end */
+    int32_t jump;      /* winding number above w minus that below it */
     ebpo_posed_sides *out;
 } side_segment;
 
@@ -185,6 +190,7 @@ static int side_axis(const double t[3][3])
     return -1;
 }
 
+/* Returns true if both faces are in one plane. */
 static bool in_plane(const double plane[3][3], const double t[3][3])
 {
     return ebpo_orient3d(plane[0], plane[1], plane[2], t[0]) == 0 &&
@@ -192,12 +198,12 @@ static bool in_plane(const double plane[3][3], const double t[3][3])
            ebpo_orient3d(plane[0], plane[1], plane[2], t[2]) == 0;
 }
 
-/* Handles a face that contains w. */
-static void take_face_at_point(side_segment *l, const double t[3][3])
+/* Updates the result by a face that contains w. */
+static void add_face_at_point(side_segment *l, const double t[3][3])
 {
     int axis = side_axis(t);
     if (axis < 0)
-        return; /* this point gives no bound */
+        return; /* a face without area bounds nothing */
     if (!l->out->on)
         memcpy(l->out->plane, t, sizeof l->out->plane);
     else if (!in_plane((const double(*)[3])l->out->plane, t))
@@ -217,19 +223,21 @@ static bool take_near_triangles(void *user, const ebpo_triangles *triangles)
             ebpo_posing_apply(&l->solid->posing, triangles->corners[i][c], t[c]);
         l->crossed += ebpo_axis_crossing(l->low, l->to, l->axis, t[0], t[1], t[2]);
         if (ebpo_point_on_triangle(l->w, t[0], t[1], t[2]))
-            take_face_at_point(l, (const double(*)[3])t);
+            add_face_at_point(l, (const double(*)[3])t);
     }
     return true;
 }
 
 /* --- a point that is certainly far enough from faces --- */
 
+/* A point with a known winding number. */
 typedef struct anchor {
     double at[3];
-    int axis;        /* axis along which the anchor is displaced from w */
+    int axis;        /* axis along which it is displaced from w */
     int32_t winding; /* winding number at the anchor */
 } anchor;
 
+/* Sets *found, and the winding number, if a->at is certainly far enough from faces. */
 static ebpo_status try_anchor(const ebpo_posed_solid *s, ebpo_context *context, anchor *a,
                               bool *found, ebpo_error *error)
 {
@@ -264,6 +272,7 @@ static ebpo_status find_anchor(const ebpo_posed_solid *s, ebpo_context *context,
         }
 }
 
+/* Computes the sides of w by a segment from an anchor. doubt: of ebpo_unpose. */
 static ebpo_status decide_by_faces(const ebpo_posed_solid *s, ebpo_context *context,
                                    const double w[3], double doubt, ebpo_posed_sides *out,
                                    ebpo_error *error)
@@ -309,16 +318,18 @@ ebpo_status ebpo_posed_solid_sides(const ebpo_posed_solid *s, ebpo_context *cont
 
 /* --- winding numbers at points with fractions --- */
 
-/* A path from w to x; coordinates in units of 2^unit / denominator. */
+/* A path from w, a point of doubles, to x. Integers are coordinates in units of 2^unit /
+ * denominator. */
 typedef struct path {
     const ebpo_posed_solid *solid;
-    const mpq_t *x;
+    const mpq_t *x; /* [3] */
     double w[3];
-    mpz_t denominator, number[4]; /* number: temporary values */
-    ebpo_vectorz at[4];           /* at[0] is w; at[1] to at[3] replace one coordinate after the
-                                   * other by that of x */
-    ebpo_vectorz corner[3];
-    int32_t crossed;
+    mpz_t denominator;
+    mpz_t number[4];        /* temporary values */
+    ebpo_vectorz at[4];     /* at[0] is w; at[1] to at[3] replace one coordinate after the
+                             * other by that of x */
+    ebpo_vectorz corner[3]; /* of the current face */
+    int32_t crossed;        /* winding number at x minus that at w */
 } path;
 
 static void make_path(path *p)
@@ -345,7 +356,7 @@ static void clear_path(path *p)
         ebpo_vectorz_clear(&p->corner[i]);
 }
 
-/* Converts the corners to integers. unit: 0 or less. */
+/* Converts the corners of the face t and the points of the path to integers. unit: 0 or less. */
 static void set_points(path *p, const double t[3][3], int unit)
 {
     for (int i = 0; i < 3; i++)
@@ -364,9 +375,9 @@ static void set_points(path *p, const double t[3][3], int unit)
     }
 }
 
-/* Returns the orientation of a, b, c, seen in the direction opposite to the axis. */
-static int turn_of(path *p, int axis, const ebpo_vectorz *a, const ebpo_vectorz *b,
-                   const ebpo_vectorz *c)
+/* Returns the orientation of a, b, c in the projection along the axis. */
+static int orientation_of(path *p, int axis, const ebpo_vectorz *a, const ebpo_vectorz *b,
+                          const ebpo_vectorz *c)
 {
     int u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
     mpz_sub(p->number[0], b->x[u], a->x[u]);
@@ -378,13 +389,13 @@ static int turn_of(path *p, int axis, const ebpo_vectorz *a, const ebpo_vectorz 
     return mpz_sgn(p->number[0]);
 }
 
-/* As in geometry/triangle_predicates.c: returns the side of the shifted point relative to a line or
- * the plane. */
+/* Returns the side of the line of edge i, in the projection along the axis, on which the point `at`
+ * is after the infinitesimal shift of geometry/triangle_predicates.c. */
 static int side_of_line(path *p, int axis, int i, const ebpo_vectorz *at)
 {
     const ebpo_vectorz *a = &p->corner[i], *b = &p->corner[i == 2 ? 0 : i + 1];
     int u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
-    int sign = turn_of(p, axis, a, b, at);
+    int sign = orientation_of(p, axis, a, b, at);
     if (sign != 0)
         return sign;
     int by_u = mpz_cmp(a->x[v], b->x[v]), by_v = mpz_cmp(b->x[u], a->x[u]);
@@ -393,25 +404,26 @@ static int side_of_line(path *p, int axis, int i, const ebpo_vectorz *at)
     return (sign > 0) - (sign < 0);
 }
 
+/* Returns the side of the face's plane on which the shifted point `at` is. */
 static int side_of_plane(path *p, const ebpo_vectorz *at)
 {
     const ebpo_vectorz *a = &p->corner[0];
     mpz_t sum;
     mpz_init(sum);
     for (int k = 0; k < 3; k++) {
-        (void)turn_of(p, k, a, &p->corner[1], &p->corner[2]);
+        (void)orientation_of(p, k, a, &p->corner[1], &p->corner[2]);
         mpz_sub(p->number[1], at->x[k], a->x[k]);
         mpz_addmul(sum, p->number[0], p->number[1]);
     }
     int sign = mpz_sgn(sum);
     mpz_clear(sum);
     for (int k = 0; k < 3 && sign == 0; k++)
-        sign = turn_of(p, k, a, &p->corner[1], &p->corner[2]);
+        sign = orientation_of(p, k, a, &p->corner[1], &p->corner[2]);
     return sign;
 }
 
-/* Counts the crossing of a face by the segment along the axis from one point to another above it.
- */
+/* Returns the change of the winding number by the face along a segment parallel to the axis, from
+ * one point to another one above it. */
 static int count_crossing(path *p, int axis, const ebpo_vectorz *from, const ebpo_vectorz *to)
 {
     int turn = side_of_line(p, axis, 0, from);
@@ -449,20 +461,20 @@ ebpo_status ebpo_exact_winding(const ebpo_posed_solid *s, ebpo_context *context,
     path p = { .solid = s, .x = x };
     double low[3], high[3], corner[2][3];
     ebpo_posed_sides sides;
-    bool there = true;
+    bool is_exact = true;
     mpq_t w;
     mpq_init(w);
     for (int k = 0; k < 3; k++) {
         p.w[k] = mpq_get_d(x[k]);
         mpq_set_d(w, p.w[k]);
-        there &= mpq_equal(w, x[k]) != 0;
+        is_exact &= mpq_equal(w, x[k]) != 0;
         corner[0][k] = nextafter(p.w[k], -INFINITY);
         corner[1][k] = nextafter(p.w[k], INFINITY);
     }
     mpq_clear(w);
     ebpo_status status = ebpo_posed_solid_sides(s, context, p.w, &sides, error);
     *winding = sides.above;
-    if (status != EBPO_OK || there)
+    if (status != EBPO_OK || is_exact)
         return status;
     make_path(&p);
     ebpo_unpose_box(s, corner[0], corner[1], low, high);

@@ -1,10 +1,11 @@
-/* Subtrees of a model at a pose, with convex envelopes of their faces, and gaps between envelopes.
- * A model in parts has the subtrees that are loaded on demand; a whole model is a single subtree.
+/* Subtrees of a posed model, convex envelopes of their faces, and bounds of the distance of
+ * envelopes. A model in parts has the subtrees that are loaded on demand; a whole model is a single
+ * subtree.
  *
- * An envelope begins as the cell's polytope. The planes in memory of the node and of its last
- * ancestors cut it; then it is posed. A hash table keeps envelopes by octcode. Gaps are lower
- * bounds of the distance of two convex sets, found by the iteration of Gilbert (1966): every
- * direction gives a bound, so the iteration may stop at any time. */
+ * An envelope begins as the cell. The planes of the node and of its nearest ancestors, which are in
+ * memory, cut it; then it is posed. A hash table keeps envelopes by octcode. Gaps are lower bounds
+ * of the distance of two convex sets, found by the iteration of Gilbert (1966): every direction
+ * gives a bound, so the iteration may stop at any time. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -30,7 +31,8 @@ static void middle_of(const ebpo_convex *c, double out[3])
     }
 }
 
-/* Returns the point that is farthest along a direction, or (sign -1) opposite to it. */
+/* Returns the point that is farthest along the direction n, or, if sign is -1, in the opposite
+ * direction. */
 static const double *farthest_point(const ebpo_convex *c, const double n[3], double sign)
 {
     int best = 0;
@@ -45,13 +47,13 @@ static const double *farthest_point(const ebpo_convex *c, const double n[3], dou
     return c->point[best];
 }
 
-/* Maximum number of directions that are tried; sets nearly in contact would take more. */
+/* Maximum number of iterations; sets that are nearly in contact would need more. */
 enum { DIRECTIONS = 32 };
 
-/* `v` is a difference of a point of B and a point of A, and near the origin. Each step finds the
- * difference that is least along v. Then v moves on the line towards that difference, to the point
- * nearest to the origin (Gilbert 1966). Any v gives a lower bound of the distance: along v, no
- * difference is less than the least one. */
+/* The distance is that of the origin from the convex set of all differences of a point of b and a
+ * point of a. `v` is such a difference. Each step finds the difference w that is least along v,
+ * which gives a lower bound of the distance. Then v becomes the point nearest to the origin on the
+ * segment from v to w (Gilbert 1966). */
 double ebpo_convex_gap(const ebpo_convex *a, const ebpo_convex *b, double enough)
 {
     double v[3], w[3], from[3], best = 0;
@@ -93,41 +95,45 @@ double ebpo_convex_span(const ebpo_convex *a, const ebpo_convex *b)
     return most * (1 + 0x1p-40);
 }
 
+/* The posed envelope of a cell. */
 typedef struct posed_hull {
     ebpo_octcode code;
     int count;
     double point[][3];
 } posed_hull;
 
-/* Number of levels whose planes cut an envelope. This limits how far rounding in doubles moves
- * corners from level to level. */
+/* Number of levels whose planes cut an envelope. It limits the rounding errors of corners, which
+ * grow from level to level. */
 enum { LEVELS_OF_PLANES = 8 };
-/* Error of a cut as a share of the cell's side: 255 planes a level, each with an error of 1e-10 of
- * its cell, and the error of the levels above. */
+/* Bound of the error of an envelope, as a share of the cell's side: that of 255 planes of each
+ * level, each with an error of 1e-10 of its cell. */
 static const double cut_share = 0x1p-15;
 
 /* --- order of subtrees --- */
 
-typedef struct place {
+/* A subtree, and its position in the order of the file. */
+typedef struct subtree_position {
     uint64_t code; /* octcode of its first cell at the deepest level */
     uint32_t number;
-} place;
+} subtree_position;
 
 static int by_code(const void *x, const void *y)
 {
-    const place *p = x, *q = y;
+    const subtree_position *p = x, *q = y;
     return (p->code > q->code) - (p->code < q->code);
 }
 
+/* Sets the ranks of all subtrees. */
 static ebpo_status order_subtrees(ebpo_posed_subtrees *s, ebpo_error *error)
 {
     const ebpo_top *top = s->model->top;
-    place *at = ebpo_alloc(s->count, sizeof *at);
+    subtree_position *at = ebpo_alloc(s->count, sizeof *at);
     if (!at)
         return ebpo_fail_memory(error, s->count * sizeof *at);
     for (uint64_t i = 0; i < s->count; i++) {
         ebpo_octcode code = ebpo_octcode_of_cell(top->below[i].cell);
-        at[i] = (place){ ebpo_octcode_first_descendant(code, EBPO_MAX_LEVEL), (uint32_t)i };
+        at[i] =
+            (subtree_position){ ebpo_octcode_first_descendant(code, EBPO_MAX_LEVEL), (uint32_t)i };
     }
     if (s->count)
         qsort(at, s->count, sizeof *at, by_code);
@@ -188,12 +194,12 @@ ebpo_posed_node ebpo_posed_child(const ebpo_posed_subtrees *s, const ebpo_posed_
 void ebpo_posed_cell(const ebpo_posed_subtrees *s, ebpo_cell cell, double out[8][3])
 {
     ebpo_box box = ebpo_model_box(s->model);
-    double cell_face[2][3];
-    ebpo_cell_bounds(&box, cell, cell_face[0], cell_face[1]);
+    double bounds[2][3];
+    ebpo_cell_bounds(&box, cell, bounds[0], bounds[1]);
     for (unsigned corner = 0; corner < 8; corner++) {
         double x[3];
         for (unsigned k = 0; k < 3; k++)
-            x[k] = cell_face[corner >> k & 1][k];
+            x[k] = bounds[corner >> k & 1][k];
         ebpo_posing_apply(&s->posing, x, out[corner]);
     }
 }
@@ -225,7 +231,7 @@ static void cut_node(const ebpo_posed_subtrees *s, const ebpo_posed_node *node,
     ebpo_planes_cut(envelope, codes, count);
 }
 
-/* Cuts the envelope, in the coordinates of the cell. */
+/* Computes the envelope in the coordinates of the cell. */
 static void cut_envelope(const ebpo_posed_subtrees *s, ebpo_cell cell, ebpo_polytope *out)
 {
     ebpo_posed_node node = ebpo_posed_root(s);
@@ -241,8 +247,8 @@ static void cut_envelope(const ebpo_posed_subtrees *s, ebpo_cell cell, ebpo_poly
         node = ebpo_posed_child(s, &node, octant);
         if (matters) {
             ebpo_polytope_copy(&above, out);
-            (void)ebpo_polytope_child(&above, octant, out); /* otherwise `out` is a box around the
-                                                             * content */
+            (void)ebpo_polytope_child(&above, octant, out); /* if this fails, `out` is a box around
+                                                             * the content */
         }
     }
 }
@@ -267,6 +273,7 @@ static posed_hull *make_hull(const ebpo_posed_subtrees *s, ebpo_cell cell)
     return out;
 }
 
+/* Returns the entry of an octcode in the table, or the free entry where it can be added. */
 static posed_hull **find_hull(posed_hull **hull, uint64_t slots, ebpo_octcode code)
 {
     uint64_t at;
@@ -274,7 +281,7 @@ static posed_hull **find_hull(posed_hull **hull, uint64_t slots, ebpo_octcode co
     return &hull[at];
 }
 
-/* Makes space for one more entry. */
+/* Makes space for one more entry. Returns false without memory. */
 static bool widen_table(ebpo_posed_subtrees *s)
 {
     if (4 * (s->hulls + 1) <= 3 * s->slots)

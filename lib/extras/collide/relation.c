@@ -1,15 +1,16 @@
-/* Finds the relation of two models at poses: disjoint, touching, intersecting, one inside the
- * other, or equal.
+/* Finds the relation of two posed models: disjoint, touching, intersecting, one inside the other,
+ * or equal.
  *
- * The boundaries of two models divide space into parts. The relation depends on which kinds of part
- * exist: in both models, in the first only, in the second only. Each part is bounded by pieces of
- * faces, so the parts are found around these pieces (around_face.h).
+ * The boundaries of two models divide space into parts. The relation depends on which kinds of
+ * parts exist: parts inside both models, only inside the first, only inside the second. Each part
+ * is bounded by pieces of faces, so the parts are found around these pieces (around_face.h).
  *
- * A crossing pair nearly always decides. Otherwise all faces that intersect the other model are
- * examined, then one face of each patch without contact, because such a patch is entirely on one
- * side. A patch is skipped if a face on its side would not change the result; if the side is known,
- * the patch's subtree is not loaded. If the deadline passes, the relation is open. See
- * docs/develop/collision.md, "Relation of two models". One thread. */
+ * A crossing pair of faces nearly always decides. Otherwise all faces that intersect the other
+ * model are examined, then one face of each patch without contact, because such a patch is entirely
+ * on one side of the other model. A patch is skipped if a face on its side would not change the
+ * result; if the side is known, the patch's subtree is not loaded. If the deadline passes, the
+ * relation is open. A search runs in one thread. See docs/develop/collision.md, "Relation of two
+ * models". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -31,18 +32,16 @@
 
 /* --- patches without contact --- */
 
-/* Patches without contact, in the subtrees of one of the query's models; a whole model is its only
+/* The patches without contact of the query's model m, subtree by subtree; a whole model is its only
  * subtree. */
 typedef struct separate_patches {
     const ebpo_collision *collision;
     ebpo_two_models *two;
     int m;
-    uint64_t subtrees;
-    /* The owned faces of the last examined subtree: index of the first in the file, and their
-     * number. `patch` has for each face the first face of its patch (face_patches.h), minus
-     * `first`. */
-    uint64_t first, count;
-    uint32_t *patch;
+    uint64_t subtrees;     /* number of subtrees */
+    uint64_t first, count; /* owned faces of the current subtree: index of the first one in the
+                            * file, and their number */
+    uint32_t *patch;       /* [count] first owned face of the patch of each (face_patches.h) */
 } separate_patches;
 
 static void separate_patches_begin(separate_patches *u, const ebpo_collision *collision,
@@ -64,8 +63,8 @@ static ebpo_status find_patches(separate_patches *u, const ebpo_accel *subtree,
     return ebpo_face_patches(subtree, slots, intersecting, &u->patch, error);
 }
 
-/* Loads the subtree, finds its patches and releases it. intersecting: a bit for each face of the
- * model. */
+/* Loads a subtree, finds its patches, and releases it. intersecting: a bit for each face of the
+ * model: it intersects the other model. */
 static ebpo_status separate_patches_find(separate_patches *u, uint64_t number,
                                          const uint64_t *intersecting, ebpo_error *error)
 {
@@ -94,7 +93,8 @@ static bool note_any(void *user, const ebpo_triangles *triangles)
     return !*any;
 }
 
-/* Finds if all of a ball around a point of the world is inside, or outside, the solid. */
+/* Sets *in to 1 if a ball around a point of the world is entirely inside the other model, to 0 if
+ * it is entirely outside; otherwise *in stays unchanged. */
 static ebpo_status side_of_ball(const separate_patches *u, const double middle[3], double radius,
                                 int *in, ebpo_error *error)
 {
@@ -117,9 +117,10 @@ static ebpo_status side_of_ball(const separate_patches *u, const double middle[3
     return status;
 }
 
-/* Finds the side of all faces of a subtree that intersect no face of the other model. The cell
- * contains a point of each owned face, and so does the ball around the cell. If no face of the
- * other model is near the ball, the ball is on one side, and so is each of these faces. */
+/* Finds on which side of the other model the faces of a subtree are that intersect no face of the
+ * other model: *in is 1 (inside), 0 (outside) or -1 (unknown). The ball around the subtree's cell
+ * contains a point of each owned face. If no face of the other model is near the ball, the ball is
+ * on one side, and so is each of these faces. */
 static ebpo_status separate_patches_side(const separate_patches *u, uint64_t number, int *in,
                                          ebpo_error *error)
 {
@@ -145,38 +146,40 @@ static ebpo_status separate_patches_side(const separate_patches *u, uint64_t num
 
 static const char stage[] = "relation";
 
-/* State of the search; models in the query's order. */
-typedef struct relating {
+/* State of the search. Models are in the query's order. */
+typedef struct relation_search {
     const ebpo_collision *collision;
     ebpo_pair_faces places;
     ebpo_two_models two;
     ebpo_relation_result *out;
-    uint64_t *intersecting[2], *seen[2]; /* intersecting: a bit for each face that intersects the
-                                          * other model; seen: for each examined face */
-    bool both, only[2];   /* both: there are inner points of both models; only: there are inner
-                           * points of this model that are not in the other */
-    bool examined;        /* a face with an area has been examined */
-    bool touch, doubtful; /* touch: a common point exists; doubtful: undecided pairs exist */
-    unsigned last[2];     /* `in` of the last examined piece */
-    uint64_t inspected;
-    bool open;
-    ebpo_error *error; /* error of `status`, within callbacks */
+    uint64_t *intersecting[2]; /* [model] a bit for each face: it intersects the other model */
+    uint64_t *seen[2];         /* [model] a bit for each face: it has been examined */
+    bool both;                 /* a point is inside both models */
+    bool only[2];              /* [model] a point is inside this model but not in the other */
+    bool examined;             /* the face that was visited last has an area */
+    bool touch;                /* a common point exists */
+    bool doubtful;      /* a piece of the face that was visited last is not part of its model */
+    unsigned last[2];   /* `in` of the piece that was visited last */
+    uint64_t inspected; /* number of examined faces */
+    bool open;          /* the deadline has passed */
+    ebpo_error *error;  /* error of `status`, within callbacks */
     ebpo_status status;
-} relating;
+} relation_search;
 
-static bool is_mixed(const relating *r) { return r->two.solid[0] != r->two.solid[1]; }
+/* Returns true for a solid and a surface. */
+static bool is_mixed(const relation_search *r) { return r->two.solid[0] != r->two.solid[1]; }
 
-static bool are_surfaces(const relating *r) { return !r->two.solid[0] && !r->two.solid[1]; }
+static bool are_surfaces(const relation_search *r) { return !r->two.solid[0] && !r->two.solid[1]; }
 
 /* Returns true if no further face can change the relation. */
-static bool is_decided(const relating *r)
+static bool is_decided(const relation_search *r)
 {
     if (is_mixed(r))
         return r->both && r->only[r->two.solid[0]];
     return r->both && (are_surfaces(r) ? r->only[0] || r->only[1] : r->only[0] && r->only[1]);
 }
 
-static uint64_t face_count(const relating *r, int m)
+static uint64_t face_count(const relation_search *r, int m)
 {
     return r->collision->model[m]->info->face_count;
 }
@@ -187,23 +190,25 @@ static void set_bit(uint64_t *bits, uint64_t i) { bits[i / 64] |= UINT64_C(1) <<
 
 /* --- examining faces --- */
 
-typedef struct facing {
-    relating *r;
+/* A face of model m, whose pieces are visited. */
+typedef struct visited_face {
+    relation_search *r;
     int m;
-} facing;
+} visited_face;
 
-/* Two solids: each side of the piece is a part of space. */
-static void note_solids(relating *r, const ebpo_around *a)
+/* Records the kinds of the parts of space on both sides of a piece, for two solids. */
+static void note_solids(relation_search *r, const ebpo_around *a)
 {
     r->both |= (a->in[0] & a->in[1]) != 0;
     r->only[0] |= (a->in[0] & ~a->in[1]) != 0;
     r->only[1] |= (a->in[1] & ~a->in[0]) != 0;
 }
 
+/* Records what is around a piece. Returns false if the relation is decided. */
 static bool note_piece(void *user, const ebpo_around *a)
 {
-    const facing *f = user;
-    relating *r = f->r;
+    const visited_face *f = user;
+    relation_search *r = f->r;
     unsigned other = a->in[!f->m];
     r->examined = true;
     memcpy(r->last, a->in, sizeof r->last);
@@ -216,11 +221,11 @@ static bool note_piece(void *user, const ebpo_around *a)
     return !is_decided(r);
 }
 
-/* Examines a face once. Returns false when enough is known, or after a failure (`status`). For a
- * solid and a surface, the surface's faces decide. */
-static bool inspect_pair_one(relating *r, int m, uint64_t face)
+/* Examines a face, unless it has been examined. Returns false if the search can end, or after a
+ * failure (r->status). For a solid and a surface, only faces of the surface are examined. */
+static bool inspect_face(relation_search *r, int m, uint64_t face)
 {
-    facing f = { r, m };
+    visited_face f = { r, m };
     if ((is_mixed(r) && r->two.solid[m]) || has_bit(r->seen[m], face))
         return true;
     set_bit(r->seen[m], face);
@@ -232,16 +237,18 @@ static bool inspect_pair_one(relating *r, int m, uint64_t face)
     return r->status == EBPO_OK && !r->open && !is_decided(r);
 }
 
-static bool inspect_pair(relating *r, const ebpo_face_pair *pair)
+/* Examines both faces of a pair, as inspect_face does. */
+static bool inspect_pair(relation_search *r, const ebpo_face_pair *pair)
 {
     const uint64_t face[2] = { pair->file_face_a, pair->file_face_b };
     bool turned = r->collision->turned;
-    return inspect_pair_one(r, 0, face[turned]) && inspect_pair_one(r, 1, face[!turned]);
+    return inspect_face(r, 0, face[turned]) && inspect_face(r, 1, face[!turned]);
 }
 
 /* --- contacts --- */
 
-static bool all_have_area(relating *r, const ebpo_face_pair *pair)
+/* Returns true if both faces of a pair have an area; false also after a failure (r->status). */
+static bool all_have_area(relation_search *r, const ebpo_face_pair *pair)
 {
     ebpo_posed_pair faces;
     r->status = ebpo_pose_pair(&r->places, pair, &faces, r->error);
@@ -253,17 +260,19 @@ static bool all_have_area(relating *r, const ebpo_face_pair *pair)
     return r->status == EBPO_OK;
 }
 
-/* Records a pair of two surfaces. Returns false after a failure (`status`). */
-static bool note_pair(relating *r, const ebpo_face_pair *pair)
+/* Records an intersecting pair of faces of two surfaces. Returns false after a failure (r->status).
+ */
+static bool note_pair(relation_search *r, const ebpo_face_pair *pair)
 {
     r->both |= pair->kind != EBPO_PAIR_TOUCHING;
     r->touch = r->touch || r->both || all_have_area(r, pair);
     return r->status == EBPO_OK;
 }
 
+/* Marks the faces of intersecting pairs, and examines those that cross. */
 static bool take_contacts(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
-    relating *r = user;
+    relation_search *r = user;
     bool turned = r->collision->turned, more = true;
     for (uint64_t i = 0; i < count && more; i++) {
         set_bit(r->intersecting[turned], pairs[i].file_face_a);
@@ -276,8 +285,8 @@ static bool take_contacts(void *user, const ebpo_face_pair *pairs, uint64_t coun
     return more;
 }
 
-/* Returns options with the remaining time. */
-static ebpo_collide_options options_left(const relating *r)
+/* Returns the query's options with the time that remains until the deadline. */
+static ebpo_collide_options options_left(const relation_search *r)
 {
     ebpo_collide_options options = r->collision->options;
     uint64_t now = ebpo_clock();
@@ -286,7 +295,8 @@ static ebpo_collide_options options_left(const relating *r)
     return options;
 }
 
-static ebpo_status take_pairs(relating *r, ebpo_pairs_fn take, ebpo_error *error)
+/* Passes all intersecting pairs to `take`. If the deadline passes, sets r->open. */
+static ebpo_status take_pairs(relation_search *r, ebpo_pairs_fn take, ebpo_error *error)
 {
     const ebpo_collision *q = r->collision;
     ebpo_collide_options options = options_left(r);
@@ -299,41 +309,43 @@ static ebpo_status take_pairs(relating *r, ebpo_pairs_fn take, ebpo_error *error
     return status == EBPO_OK ? r->status : status;
 }
 
-static bool goes_on(const relating *r)
+/* Returns true if the search must continue. */
+static bool must_continue(const relation_search *r)
 {
     return r->status == EBPO_OK && !r->open && !is_decided(r);
 }
 
-static void inspect_found(relating *r)
+/* Examines all faces that intersect the other model. */
+static void inspect_intersecting(relation_search *r)
 {
     for (int m = 0; m < 2; m++) {
         uint64_t count = face_count(r, m);
-        for (uint64_t f = 0; f < count && goes_on(r); f++)
+        for (uint64_t f = 0; f < count && must_continue(r); f++)
             if (has_bit(r->intersecting[m], f))
-                (void)inspect_pair_one(r, m, f);
+                (void)inspect_face(r, m, f);
     }
 }
 
 /* --- faces without contact --- */
 
-/* Returns true if another face on this side (`in`: inside) of the other model adds no information.
- * Patches without contact are on one side as a whole. */
-static bool side_adds_nothing(const relating *r, int m, bool in)
+/* Returns true if a patch without contact of model m, inside (`in`) or outside the other model,
+ * adds no information. */
+static bool side_adds_nothing(const relation_search *r, int m, bool in)
 {
     if (is_mixed(r))
         return in ? r->both : r->only[m];
     return in ? r->both && r->only[!m] : r->only[m];
 }
 
-/* Examines owned faces of a subtree that intersect no face of the other model, as long as their
- * patch may add information. */
-static void inspect_untouched_faces(relating *r, const separate_patches *u, uint64_t *done)
+/* Examines the owned faces of a subtree that intersect no face of the other model, except those of
+ * patches that add no information. done: a bit for each such patch. */
+static void inspect_untouched_faces(relation_search *r, const separate_patches *u, uint64_t *done)
 {
-    for (uint64_t i = 0; i < u->count && goes_on(r); i++) {
+    for (uint64_t i = 0; i < u->count && must_continue(r); i++) {
         if (has_bit(r->intersecting[u->m], u->first + i) || has_bit(done, u->patch[i]))
             continue;
         r->examined = false;
-        (void)inspect_pair_one(r, u->m, u->first + i);
+        (void)inspect_face(r, u->m, u->first + i);
         if (r->examined && side_adds_nothing(r, u->m, r->last[!u->m] != 0))
             set_bit(done, u->patch[i]);
     }
@@ -346,7 +358,7 @@ static ebpo_status fail_bits(uint64_t count, ebpo_error *error)
     return ebpo_fail_memory(error, count / 8);
 }
 
-static void inspect_subtree(relating *r, separate_patches *u, uint64_t number)
+static void inspect_subtree(relation_search *r, separate_patches *u, uint64_t number)
 {
     r->status = separate_patches_find(u, number, r->intersecting[u->m], r->error);
     if (r->status != EBPO_OK)
@@ -359,9 +371,9 @@ static void inspect_subtree(relating *r, separate_patches *u, uint64_t number)
     free(done);
 }
 
-/* Returns true if all faces of the subtree are on a known side and add no information: the subtree
- * need not be loaded. */
-static bool is_settled(relating *r, const separate_patches *u, uint64_t number)
+/* Returns true if all faces without contact of a subtree are on a known side and add no
+ * information, so that the subtree need not be loaded. */
+static bool is_settled(relation_search *r, const separate_patches *u, uint64_t number)
 {
     int in = -1;
     if (side_adds_nothing(r, u->m, true) || side_adds_nothing(r, u->m, false))
@@ -369,13 +381,14 @@ static bool is_settled(relating *r, const separate_patches *u, uint64_t number)
     return in >= 0 && side_adds_nothing(r, u->m, in);
 }
 
-static void inspect_patches(relating *r, int m)
+/* Examines the faces without contact of model m. */
+static void inspect_patches(relation_search *r, int m)
 {
     separate_patches u;
     if (is_mixed(r) && r->two.solid[m])
         return;
     separate_patches_begin(&u, r->collision, &r->two, m);
-    for (uint64_t i = 0; i < u.subtrees && goes_on(r); i++) {
+    for (uint64_t i = 0; i < u.subtrees && must_continue(r); i++) {
         if (!is_settled(r, &u, i) && r->status == EBPO_OK)
             inspect_subtree(r, &u, i);
         r->open |= ebpo_collision_is_late(r->collision);
@@ -385,40 +398,42 @@ static void inspect_patches(relating *r, int m)
 
 /* --- common points of models without common inner points --- */
 
+/* Sets r->doubtful if a piece is not part of the face's model. */
 static bool note_doubtful_piece(void *user, const ebpo_around *a)
 {
-    const facing *f = user;
+    const visited_face *f = user;
     f->r->examined = true;
     f->r->doubtful |= a->in[f->m] == 0;
     return !f->r->doubtful;
 }
 
-/* Returns true if every piece of the face belongs to the face's model. Then every point of a
- * contact also belongs to the model. */
-static bool is_sound(relating *r, int m, uint64_t face)
+/* Returns true if every piece of a face belongs to the face's model. Then a common point of this
+ * face and another one also belongs to the model. */
+static bool belongs_to_model(relation_search *r, int m, uint64_t face)
 {
-    facing f = { r, m };
+    visited_face f = { r, m };
     r->examined = r->doubtful = false;
     if (r->status == EBPO_OK)
         r->status = ebpo_visit_around_face(&r->two, m, face, note_doubtful_piece, &f, r->error);
     return r->status == EBPO_OK && r->examined && !r->doubtful;
 }
 
-static bool take_sound(void *user, const ebpo_face_pair *pairs, uint64_t count)
+static bool find_touching_faces(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
-    relating *r = user;
+    relation_search *r = user;
     bool turned = r->collision->turned;
     for (uint64_t i = 0; i < count && !r->touch && r->status == EBPO_OK && !r->open; i++) {
         const uint64_t face[2] = { pairs[i].file_face_a, pairs[i].file_face_b };
-        r->touch = is_sound(r, 0, face[turned]) && is_sound(r, 1, face[!turned]);
+        r->touch = belongs_to_model(r, 0, face[turned]) && belongs_to_model(r, 1, face[!turned]);
         r->open |= ebpo_collision_is_late(r->collision);
     }
     return !r->touch && r->status == EBPO_OK && !r->open;
 }
 
-static ebpo_status find_haptic(relating *r, ebpo_error *error)
+/* Sets r->touch if both models, with their boundaries, have a common point. */
+static ebpo_status find_common_point(relation_search *r, ebpo_error *error)
 {
-    ebpo_status status = take_pairs(r, take_sound, error);
+    ebpo_status status = take_pairs(r, find_touching_faces, error);
     uint64_t count = face_count(r, 0);
     for (uint64_t f = 0; f < count && status == EBPO_OK && !r->touch && !r->open; f++) {
         if (has_bit(r->intersecting[0], f))
@@ -430,7 +445,8 @@ static ebpo_status find_haptic(relating *r, ebpo_error *error)
 
 /* --- the relation --- */
 
-static bool has_separate_area(relating *r, int m)
+/* Returns true if a face of model m that does not intersect the other model has an area. */
+static bool has_separate_area(relation_search *r, int m)
 {
     bool has = false;
     for (uint64_t f = 0; f < face_count(r, m) && r->status == EBPO_OK && !has; f++) {
@@ -448,20 +464,20 @@ static bool is_same(const ebpo_collision *q)
            memcmp(&q->options.pose_a, &q->options.pose_b, sizeof q->options.pose_a) == 0;
 }
 
-/* Finds if two identical models have any point. */
-static void find_any(relating *r)
+/* Sets the result for two identical models: r->both if the model has a point. */
+static void find_any(relation_search *r)
 {
     uint64_t count = face_count(r, 0);
     r->out->contact = count > 0;
     if (are_surfaces(r))
         r->both = r->touch = has_separate_area(r, 0);
-    for (uint64_t f = 0; f < count && goes_on(r) && !r->both; f++)
-        (void)inspect_pair_one(r, 0, f);
+    for (uint64_t f = 0; f < count && must_continue(r) && !r->both; f++)
+        (void)inspect_face(r, 0, f);
 }
 
 /* Finds an intersecting pair, and examines its faces: if they cross, this pair nearly always
  * decides. */
-static ebpo_status inspect_first(relating *r, ebpo_error *error)
+static ebpo_status inspect_first(relation_search *r, ebpo_error *error)
 {
     const ebpo_collision *q = r->collision;
     ebpo_collide_options options = options_left(r);
@@ -474,32 +490,34 @@ static ebpo_status inspect_first(relating *r, ebpo_error *error)
     return r->status;
 }
 
-static ebpo_status inspect_contacts(relating *r, ebpo_error *error)
+/* Examines the faces that intersect the other model. */
+static ebpo_status inspect_contacts(relation_search *r, ebpo_error *error)
 {
     ebpo_status status = take_pairs(r, take_contacts, error);
-    for (int m = 0; m < 2 && r->both && are_surfaces(r) && goes_on(r); m++)
+    for (int m = 0; m < 2 && r->both && are_surfaces(r) && must_continue(r); m++)
         r->only[m] = has_separate_area(r, m);
     if (status == EBPO_OK && (r->both || !are_surfaces(r)))
-        inspect_found(r);
+        inspect_intersecting(r);
     return status == EBPO_OK ? r->status : status;
 }
 
-static ebpo_status gather_facts(relating *r, ebpo_error *error)
+/* Examines faces until the relation is decided. */
+static ebpo_status examine_models(relation_search *r, ebpo_error *error)
 {
     ebpo_status status = inspect_first(r, error);
-    if (status == EBPO_OK && r->out->contact == 1 && goes_on(r))
+    if (status == EBPO_OK && r->out->contact == 1 && must_continue(r))
         status = inspect_contacts(r, error);
     for (int m = 0; m < 2 && status == EBPO_OK && !are_surfaces(r); m++) {
         inspect_patches(r, m);
         status = r->status;
     }
     if (status == EBPO_OK && !r->open && !r->both && !are_surfaces(r) && r->out->contact == 1)
-        status = find_haptic(r, error);
+        status = find_common_point(r, error);
     return status;
 }
 
 /* Returns the relation of the query's first model to its second. */
-static ebpo_relation relation_of(const relating *r)
+static ebpo_relation relation_of(const relation_search *r)
 {
     if (r->open)
         return EBPO_RELATION_OPEN;
@@ -518,7 +536,8 @@ static ebpo_relation relation_of(const relating *r)
     return r->only[0] ? EBPO_B_INSIDE_A : r->only[1] ? EBPO_A_INSIDE_B : EBPO_EQUAL;
 }
 
-static ebpo_relation turned_relation(ebpo_relation r)
+/* Returns the relation with the models exchanged. */
+static ebpo_relation swap_relation(ebpo_relation r)
 {
     return r == EBPO_A_INSIDE_B ? EBPO_B_INSIDE_A : r == EBPO_B_INSIDE_A ? EBPO_A_INSIDE_B : r;
 }
@@ -529,7 +548,7 @@ static bool are_boxes_apart(const ebpo_two_models *two)
     return ebpo_box_gap(a, a + 3, b, b + 3) > 0;
 }
 
-static ebpo_status find_relation(relating *r, ebpo_error *error)
+static ebpo_status find_relation(relation_search *r, ebpo_error *error)
 {
     const ebpo_collision *q = r->collision;
     ebpo_status status = ebpo_two_models_begin(&r->two, &r->places, error);
@@ -546,21 +565,21 @@ static ebpo_status find_relation(relating *r, ebpo_error *error)
             return fail_bits(count, error);
     }
     if (!is_same(q))
-        return gather_facts(r, error);
+        return examine_models(r, error);
     find_any(r);
     return r->status;
 }
 
-/* Adds the loads and the bytes read, by nested queries and by this one, to the collider's counts.
- */
-static void count_loads(const relating *r, uint64_t bytes_before, uint64_t read_before)
+/* Adds the loads of this query to the collider's counts, and sets the bytes read: those of nested
+ * queries are included in the difference. */
+static void count_loads(const relation_search *r, uint64_t bytes_before, uint64_t read_before)
 {
     ebpo_collider *c = r->collision->collider;
     c->loads += ebpo_two_models_loads(&r->two);
     c->bytes_read = bytes_before + ebpo_collision_bytes_read(r->collision) - read_before;
 }
 
-static void end_relating(relating *r)
+static void end_search(relation_search *r)
 {
     ebpo_two_models_end(&r->two);
     ebpo_pair_faces_end(&r->places);
@@ -577,7 +596,7 @@ ebpo_status ebpo_collide_relation(ebpo_collider *c, const ebpo_collide_options *
     ebpo_collision q;
     *out = (ebpo_relation_result){ EBPO_RELATION_OPEN, -1 };
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
-    relating r = { .collision = &q, .out = out, .error = error };
+    relation_search r = { .collision = &q, .out = out, .error = error };
     if (status == EBPO_OK)
         status = ebpo_pair_faces_begin(&r.places, &q, error);
     if (status != EBPO_OK)
@@ -585,8 +604,8 @@ ebpo_status ebpo_collide_relation(ebpo_collider *c, const ebpo_collide_options *
     uint64_t bytes_before = c->bytes_read, before = ebpo_collision_bytes_read(&q);
     status = find_relation(&r, error);
     ebpo_relation relation = relation_of(&r);
-    out->relation = (int32_t)(q.turned ? turned_relation(relation) : relation);
+    out->relation = (int32_t)(q.turned ? swap_relation(relation) : relation);
     count_loads(&r, bytes_before, before);
-    end_relating(&r);
+    end_search(&r);
     return status;
 }

@@ -1,10 +1,9 @@
-/* Visits pairs of nodes of two posed trees, the smallest gap first, down to subtrees that are
- * loaded on demand. The gap of two envelopes bounds the distance of the nodes' contents.
+/* Visits pairs of nodes of two posed trees, the least gap first, down to subtrees that are loaded
+ * on demand. The gap of two envelopes is a lower bound of the distance of the nodes' faces.
  *
- * Queries of depth, levels, distances and separation distances use this search. Each query compares
- * results in its own way and decides when to stop. The larger of two nodes is divided first.
- * Several pairs of nodes of a whole model and a model in parts may need the same subtree: it is
- * visited once. One thread. */
+ * Queries of levels, distances and separation distances use this search; each decides when to stop.
+ * The larger of two nodes is divided first. Several pairs of nodes of a whole model and a model in
+ * parts may need the same subtree: it is visited once. A search runs in one thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -37,6 +36,7 @@ int ebpo_node_larger(const ebpo_node_gaps *g, const ebpo_posed_node node[2])
            ebpo_posed_diagonal(&g->side[1], node[1].cell);
 }
 
+/* Returns a bound of the errors of both envelopes. */
 static double slack_of(const ebpo_node_gaps *g, const ebpo_posed_node node[2])
 {
     return ebpo_posed_slack(&g->side[0], node[0].cell, g->reach) +
@@ -127,7 +127,7 @@ int ebpo_subtree_search_side(const ebpo_subtree_search *s, const ebpo_posed_node
 
 /* Returns true if a pair of subtrees has been visited. With a whole model and a model in parts,
  * several pairs of nodes need the same pair of subtrees. */
-static bool was_seen(const ebpo_subtree_search *s, const uint32_t number[2])
+static bool was_visited(const ebpo_subtree_search *s, const uint32_t number[2])
 {
     for (int i = 0; i < 2; i++)
         if (s->collision->model[!i]->whole && s->seen[i][number[i]])
@@ -145,9 +145,9 @@ ebpo_status ebpo_subtree_search_load(ebpo_subtree_search *s, const ebpo_posed_no
         const ebpo_model *m = s->collision->model[i];
         number[i] = m->whole ? 0 : ebpo_entry_value(node[i].entry);
         if (!m->whole && m->top->below[number[i]].pruned)
-            return EBPO_OK; /* the content of a pruned node is not in this file */
+            return EBPO_OK; /* the faces of a pruned node are not in this file */
     }
-    if (was_seen(s, number))
+    if (was_visited(s, number))
         return EBPO_OK;
     c->subtree_pairs++;
     for (int i = 0; i < 2; i++) {

@@ -4,12 +4,11 @@
  * Two faces with a common point are listed by the subtrees whose cells contain that point. So only
  * pairs of subtrees whose envelopes may touch need to be searched. These pairs are found before a
  * subtree is loaded, and sorted so that a loaded subtree is soon reused. Several threads search
- * pairs of subtrees. A face that several subtrees list is found more than once. So pairs of faces
- * wait, are sorted and made unique. They are returned in order, each one as soon as no earlier pair
- * can come.
+ * pairs of subtrees. A pair of faces is found more than once if several subtrees list a face. So
+ * the pairs found are stored, sorted and made unique before they are returned.
  *
- * When more pairs wait than the collider's memory holds, the pairs of the first model's later faces
- * are dropped; another round finds them again. */
+ * If the collider's memory is too small for all pairs, the pairs of the later faces of the first
+ * model are dropped; another round finds them again. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -27,9 +26,9 @@
 
 /* Two subtrees that may have intersecting faces. */
 typedef struct subtree_pair {
-    uint32_t a, b;
-    uint32_t rank_a, rank_b; /* ranks in the order of the files' faces */
-    double apart;            /* distance of their middles divided by the sum of their sizes */
+    uint32_t a, b;           /* indices of the subtrees */
+    uint32_t rank_a, rank_b; /* ranks of the subtrees in the order of the files' faces */
+    double apart;            /* distance of their middles divided by the sum of their diagonals */
 } subtree_pair;
 
 typedef struct subtree_pairs {
@@ -38,42 +37,44 @@ typedef struct subtree_pairs {
     uint64_t subtrees[2]; /* number of different subtrees of each model */
 } subtree_pairs;
 
-/* Two intersecting faces, with their numbers; [0] is the face of the query's first model. */
+/* Two intersecting faces by their indices; [0] is the face of the query's first model. */
 typedef struct stored_pair {
     uint32_t file[2], source[2];
     int32_t kind;
 } stored_pair;
 
-/* Search of one thread. Zero at first. Its contexts hold the last two subtrees. */
+/* Search of one thread. Zero at the beginning. */
 typedef struct subtree_walk {
     const ebpo_collision *collision;
-    bool self;
-    ebpo_context *context[2]; /* for models in parts */
+    bool self;                /* both models are one, at one pose */
+    ebpo_context *context[2]; /* for models in parts; they hold the last two subtrees */
     ebpo_pair_walk walk;
-    stored_pair *stored; /* pairs of faces of the last pair of subtrees, unordered; no face with
-                          * itself */
+    stored_pair *stored; /* [count] pairs of faces of the last pair of subtrees, in no order */
     uint64_t count, capacity;
-    uint64_t first_end; /* all faces that the first subtree lists have indices below this */
+    uint64_t first_end; /* all faces that the first of these subtrees lists have indices below this
+                         */
     bool late;          /* the deadline passed before all pairs were found */
 } subtree_walk;
 
-typedef struct finding {
+/* The search for pairs of subtrees. */
+typedef struct subtree_pair_search {
     subtree_pairs *out;
     ebpo_posed_subtrees *side[2];
     double reach;
     bool self;
     ebpo_error *error;
-} finding;
+} subtree_pair_search;
 
 /* --- pairs of nodes --- */
 
-static double slack_of(const finding *f, const ebpo_posed_node node[2])
+static double slack_of(const subtree_pair_search *f, const ebpo_posed_node node[2])
 {
     return ebpo_posed_slack(f->side[0], node[0].cell, f->reach) +
            ebpo_posed_slack(f->side[1], node[1].cell, f->reach);
 }
 
-static bool cells_apart(const finding *f, const ebpo_posed_node node[2])
+/* Returns true if the cells of two nodes are certainly apart. */
+static bool cells_apart(const subtree_pair_search *f, const ebpo_posed_node node[2])
 {
     double corner[2][8][3], slack = slack_of(f, node);
     ebpo_convex convex[2];
@@ -84,7 +85,8 @@ static bool cells_apart(const finding *f, const ebpo_posed_node node[2])
     return ebpo_convex_gap(&convex[0], &convex[1], slack) > slack;
 }
 
-static double apart_of(const finding *f, const ebpo_posed_node node[2])
+/* Returns subtree_pair.apart of two nodes. */
+static double apart_of(const subtree_pair_search *f, const ebpo_posed_node node[2])
 {
     double corner[2][8][3], d[3];
     for (int i = 0; i < 2; i++)
@@ -100,13 +102,14 @@ static bool is_pruned(const ebpo_posed_subtrees *s, uint32_t number)
     return !s->model->whole && s->model->top->below[number].pruned;
 }
 
-static ebpo_status add_subtree_pair(const finding *f, const ebpo_posed_node node[2])
+/* Adds a pair of subtrees, unless their envelopes are certainly apart. */
+static ebpo_status add_subtree_pair(const subtree_pair_search *f, const ebpo_posed_node node[2])
 {
     uint32_t a = ebpo_entry_value(node[0].entry), b = ebpo_entry_value(node[1].entry);
     ebpo_convex convex[2];
     double slack = slack_of(f, node);
     if (is_pruned(f->side[0], a) || is_pruned(f->side[1], b))
-        return EBPO_OK; /* the content of a pruned node is not in this file */
+        return EBPO_OK; /* the faces of a pruned node are not in this file */
     subtree_pair pair = { a, b, f->side[0]->rank[a], f->side[1]->rank[b], apart_of(f, node) };
     if (f->self && pair.rank_a > pair.rank_b)
         return EBPO_OK;
@@ -124,7 +127,8 @@ static ebpo_status add_subtree_pair(const finding *f, const ebpo_posed_node node
 
 /* --- the descent --- */
 
-static ebpo_status descend_pair(const finding *f, const ebpo_posed_node node[2])
+/* Finds the pairs of subtrees below two nodes. */
+static ebpo_status descend_pair(const subtree_pair_search *f, const ebpo_posed_node node[2])
 {
     bool below[2];
     for (int i = 0; i < 2; i++) {
@@ -150,7 +154,7 @@ static ebpo_status descend_pair(const finding *f, const ebpo_posed_node node[2])
 
 /* --- order of pairs --- */
 
-static int by_places(const void *x, const void *y)
+static int by_rank(const void *x, const void *y)
 {
     const subtree_pair *p = x, *q = y;
     if (p->rank_a != q->rank_a)
@@ -167,10 +171,12 @@ static void reverse_pairs(subtree_pair *pair, uint64_t count)
     }
 }
 
+/* Sorts by the first subtree; for each first subtree by the second, alternately forwards and
+ * backwards. Counts the first subtrees. */
 static void sort_back_and_forth(subtree_pairs *p)
 {
     if (p->count)
-        qsort(p->pair, p->count, sizeof *p->pair, by_places);
+        qsort(p->pair, p->count, sizeof *p->pair, by_rank);
     for (uint64_t begin = 0, end; begin < p->count; begin = end) {
         for (end = begin + 1; end < p->count && p->pair[end].a == p->pair[begin].a;)
             end++;
@@ -179,7 +185,8 @@ static void sort_back_and_forth(subtree_pairs *p)
     }
 }
 
-static ebpo_status count_seconds(subtree_pairs *p, uint64_t most, ebpo_error *error)
+/* Counts the different second subtrees, which have indices below `most`. */
+static ebpo_status count_second_subtrees(subtree_pairs *p, uint64_t most, ebpo_error *error)
 {
     bool *seen = ebpo_alloc_zero(most, sizeof *seen);
     if (!seen)
@@ -194,23 +201,22 @@ static ebpo_status count_seconds(subtree_pairs *p, uint64_t most, ebpo_error *er
 
 /* Finds the pairs of subtrees that may have intersecting faces. Two intersecting faces have a
  * common point, which is in a cell of each model whose subtree lists the face. So one of the pairs
- * lists both faces. The pairs are sorted by the position of the first subtree. For each first
- * subtree they are sorted by the position of the second, alternately forwards and backwards, so
- * that loaded subtrees are reused soon. `self`: both are one model at one pose; each pair comes
- * once, with the first subtree's position not behind the second's. The caller frees the pairs
- * (`pair`), also after a failure. */
+ * lists both faces. The pairs are sorted by the rank of the first subtree, and for each first
+ * subtree by the rank of the second, alternately forwards and backwards, so that loaded subtrees
+ * are reused soon. `self`: both are one model at one pose; each pair is found once, with rank_a <=
+ * rank_b. The caller frees out->pair, also after a failure. */
 static ebpo_status find_subtree_pairs(subtree_pairs *out, ebpo_posed_subtrees *a,
                                       ebpo_posed_subtrees *b, double reach, bool self,
                                       ebpo_error *error)
 {
-    finding f = { out, { a, b }, reach, self, error };
+    subtree_pair_search f = { out, { a, b }, reach, self, error };
     ebpo_posed_node root[2] = { ebpo_posed_subtree_root(a), ebpo_posed_subtree_root(b) };
     *out = (subtree_pairs){ .count = 0 };
     ebpo_status status = descend_pair(&f, root);
     if (status != EBPO_OK)
         return status;
     sort_back_and_forth(out);
-    return count_seconds(out, b->count, error);
+    return count_second_subtrees(out, b->count, error);
 }
 
 static int by_nearness(const void *x, const void *y)
@@ -218,7 +224,7 @@ static int by_nearness(const void *x, const void *y)
     const subtree_pair *p = x, *q = y;
     if (p->apart != q->apart)
         return p->apart < q->apart ? -1 : 1;
-    return by_places(x, y);
+    return by_rank(x, y);
 }
 
 /* Sorts by `apart`, the least first. */
@@ -251,7 +257,7 @@ static uint64_t subtree_walk_loads(const subtree_walk *w)
     return loads;
 }
 
-/* Releases the memory of the walk's subtrees for other users. */
+/* Releases the subtrees that the walk holds, so that others can use their memory. */
 static void subtree_walk_let_go(subtree_walk *w)
 {
     for (int i = 0; i < 2; i++)
@@ -292,6 +298,8 @@ static ebpo_status load_subtree(subtree_walk *w, int side, uint32_t number, cons
     return status;
 }
 
+/* Stores the pairs of faces that the walk has found; with `self`, the lesser index first, and no
+ * face with itself. */
 static ebpo_status store_pairs(subtree_walk *w, const ebpo_accel *const accel[2], ebpo_error *error)
 {
     const ebpo_pair_walk *found = &w->walk;
@@ -318,7 +326,9 @@ static ebpo_status no_memory(const ebpo_pair_walk *w, ebpo_error *error)
     return ebpo_fail_memory(error, (w->capacity + 64) * sizeof *w->stack);
 }
 
-static ebpo_status walk_down(subtree_walk *w, const ebpo_accel *const accel[2], ebpo_error *error)
+/* Finds the pairs of intersecting faces of two hierarchies. */
+static ebpo_status walk_hierarchies(subtree_walk *w, const ebpo_accel *const accel[2],
+                                    ebpo_error *error)
 {
     const ebpo_collision *q = w->collision;
     const ebpo_block_posing *posing[2] = { &q->posing[0], &q->posing[1] };
@@ -342,7 +352,7 @@ static ebpo_status walk_down(subtree_walk *w, const ebpo_accel *const accel[2], 
     return store_pairs(w, accel, error);
 }
 
-/* Finds the intersecting faces of a pair of subtrees. */
+/* Loads a pair of subtrees, and finds their pairs of intersecting faces. */
 static ebpo_status subtree_walk_pair(subtree_walk *w, const subtree_pair *pair, ebpo_error *error)
 {
     const ebpo_accel *accel[2];
@@ -357,14 +367,14 @@ static ebpo_status subtree_walk_pair(subtree_walk *w, const subtree_pair *pair, 
     w->first_end = accel[0]->first_face + (accel[0]->face_count - accel[0]->shared_count);
     if (accel[0]->bound_count == 0 || accel[1]->bound_count == 0)
         return EBPO_OK;
-    return walk_down(w, accel, error);
+    return walk_hierarchies(w, accel, error);
 }
 
 /* --- state of all threads --- */
 
 static const char stage[] = "pairs of subtrees";
 
-/* Number of consecutive pairs that one thread takes; they have the first subtree in common. */
+/* Number of consecutive pairs that one thread takes; mostly they have the same first subtree. */
 enum { PAIRS_IN_A_ROW = 4 };
 
 typedef struct gathering_parts {
@@ -372,16 +382,16 @@ typedef struct gathering_parts {
     bool self;
     ebpo_posed_subtrees subtrees[2];
     subtree_pairs pairs;
-    uint64_t *end; /* for each subtree of the first model: an upper limit of its faces' indices; 0:
-                    * unknown */
-    subtree_walk *walk; /* one for each thread */
+    uint64_t *end;      /* [subtree of the first model] its faces have indices below this; 0:
+                         * unknown */
+    subtree_walk *walk; /* [threads] */
     unsigned threads;
-    uint64_t read_before;
+    uint64_t read_before; /* bytes that had been read before the search */
     pthread_mutex_t lock; /* protects the members below */
     uint64_t from, to;    /* range of faces of the first model in this round */
-    stored_pair *stored;
+    stored_pair *stored;  /* [count] pairs of faces that wait to be passed to the caller */
     uint64_t count, capacity;
-    uint64_t most; /* maximum number of waiting pairs */
+    uint64_t most; /* maximum of `count` */
 } gathering_parts;
 
 static void count_walk(const gathering_parts *g, subtree_walk *w)
@@ -392,7 +402,8 @@ static void count_walk(const gathering_parts *g, subtree_walk *w)
 
 /* --- waiting pairs --- */
 
-static void sort_once(gathering_parts *g)
+/* Sorts the waiting pairs, and removes duplicates. */
+static void sort_unique(gathering_parts *g)
 {
     uint64_t kept = 0;
     if (g->count)
@@ -403,10 +414,11 @@ static void sort_once(gathering_parts *g)
     g->count = kept;
 }
 
-/* Drops pairs until half of the maximum waits; the pairs of a single face always stay. */
-static void reserve_space(gathering_parts *g)
+/* Drops the last pairs, so that at most half of the maximum number waits, but never all pairs of
+ * the first face. Ends this round's range of faces before the dropped pairs. */
+static void drop_last_pairs(gathering_parts *g)
 {
-    sort_once(g);
+    sort_unique(g);
     uint64_t half = g->most / 2;
     if (g->count <= half)
         return;
@@ -420,13 +432,14 @@ static void reserve_space(gathering_parts *g)
         g->most = 2 * g->count;
 }
 
-static ebpo_status hold_pairs(gathering_parts *g, const subtree_walk *w, ebpo_error *error)
+/* Adds the pairs of a walk that are in this round's range to the waiting pairs. */
+static ebpo_status add_waiting_pairs(gathering_parts *g, const subtree_walk *w, ebpo_error *error)
 {
     for (uint64_t i = 0; i < w->count; i++) {
         if (w->stored[i].file[0] < g->from || w->stored[i].file[0] >= g->to)
             continue;
         if (g->count >= g->most)
-            reserve_space(g);
+            drop_last_pairs(g);
         if (w->stored[i].file[0] >= g->to)
             continue;
         if (!ebpo_grow(&g->stored, &g->capacity, g->count + 1, sizeof *g->stored))
@@ -438,7 +451,7 @@ static ebpo_status hold_pairs(gathering_parts *g, const subtree_walk *w, ebpo_er
 
 /* --- searching --- */
 
-/* Returns true if all faces that the pair's first subtree lists are done. */
+/* Returns true if earlier rounds have found all pairs of the faces of the pair's first subtree. */
 static bool is_done(gathering_parts *g, const subtree_pair *pair)
 {
     (void)pthread_mutex_lock(&g->lock);
@@ -452,7 +465,7 @@ static ebpo_status keep_pairs(gathering_parts *g, const subtree_pair *pair, cons
 {
     (void)pthread_mutex_lock(&g->lock);
     g->end[pair->a] = w->first_end;
-    ebpo_status status = hold_pairs(g, w, error);
+    ebpo_status status = add_waiting_pairs(g, w, error);
     (void)pthread_mutex_unlock(&g->lock);
     return status;
 }
@@ -477,8 +490,8 @@ static ebpo_status run_pairs(void *user, uint64_t begin, uint64_t end, unsigned 
     return EBPO_OK;
 }
 
-/* Runs all threads. Each thread holds several subtrees; if the budget is too small for all threads,
- * one thread continues. */
+/* Runs all threads. Each thread holds two subtrees; if the memory budget is too small for all
+ * threads, one thread searches from the beginning. */
 static ebpo_status run_all(gathering_parts *g, ebpo_error *error)
 {
     const ebpo_progress *progress = &g->collision->options.progress;
@@ -503,17 +516,17 @@ static ebpo_status run_all(gathering_parts *g, ebpo_error *error)
                              error);
 }
 
-enum { GIVEN_AT_ONCE = 1024 };
+enum { PASSED_AT_ONCE = 1024 };
 
-/* Passes waiting pairs to the caller. Returns false when the caller wants no more. */
-static bool give_waiting(const gathering_parts *g, ebpo_pairs_fn take, void *user)
+/* Passes the waiting pairs to the caller. Returns false if the caller needs no more pairs. */
+static bool pass_waiting(const gathering_parts *g, ebpo_pairs_fn take, void *user)
 {
-    ebpo_face_pair out[GIVEN_AT_ONCE];
+    ebpo_face_pair out[PASSED_AT_ONCE];
     for (unsigned i = 0; i < g->threads; i++) /* the callback that receives the pairs may need the
                                                * memory */
         subtree_walk_let_go(&g->walk[i]);
-    for (uint64_t at = 0; at < g->count; at += GIVEN_AT_ONCE) {
-        uint64_t n = g->count - at < GIVEN_AT_ONCE ? g->count - at : GIVEN_AT_ONCE;
+    for (uint64_t at = 0; at < g->count; at += PASSED_AT_ONCE) {
+        uint64_t n = g->count - at < PASSED_AT_ONCE ? g->count - at : PASSED_AT_ONCE;
         for (uint64_t i = 0; i < n; i++)
             out[i] = face_pair_of(g->collision, &g->stored[at + i]);
         if (!take(user, out, n))
@@ -522,7 +535,9 @@ static bool give_waiting(const gathering_parts *g, ebpo_pairs_fn take, void *use
     return true;
 }
 
-static ebpo_status in_passes(gathering_parts *g, ebpo_pairs_fn take, void *user, ebpo_error *error)
+/* Searches in rounds, each of which finds all pairs of a range of faces of the first model. */
+static ebpo_status search_in_rounds(gathering_parts *g, ebpo_pairs_fn take, void *user,
+                                    ebpo_error *error)
 {
     uint64_t most = g->collision->collider->options.memory / (2 * sizeof *g->stored) + 2;
     for (g->from = 0; g->from < UINT64_MAX; g->from = g->to) {
@@ -532,8 +547,8 @@ static ebpo_status in_passes(gathering_parts *g, ebpo_pairs_fn take, void *user,
         ebpo_status status = run_all(g, error);
         if (status != EBPO_OK)
             return status;
-        sort_once(g);
-        if (!give_waiting(g, take, user))
+        sort_unique(g);
+        if (!pass_waiting(g, take, user))
             return EBPO_OK;
     }
     return EBPO_OK;
@@ -590,12 +605,13 @@ ebpo_status ebpo_gather_parts(const ebpo_collision *q, bool self, ebpo_pairs_fn 
     ebpo_status status =
         begin_gathering(&g, ebpo_thread_count(q->collider->options.threads), error);
     if (status == EBPO_OK)
-        status = in_passes(&g, take, user, error);
+        status = search_in_rounds(&g, take, user, error);
     end_gathering(&g);
     return status;
 }
 
-/* Finds the least pair of intersecting faces in the first two subtrees that have such a pair. */
+/* Finds the first pair of intersecting faces, in the order of the files, of the first pair of
+ * subtrees that has one. */
 static ebpo_status search_first_parts(gathering_parts *g, ebpo_face_pair *out, int32_t *found,
                                       ebpo_error *error)
 {

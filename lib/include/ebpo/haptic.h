@@ -20,10 +20,10 @@
  *     }
  *
  * The *proxy* is a ball (or a point, or a tool) that follows the haptic device. Where the device
- * passes through a face, the proxy stays on the side from which it came. Every step of the proxy's
- * centre is a segment that, by exact arithmetic, intersects no face. So the proxy passes through no
- * face, at any speed, and however thin the solid is. Faces count from both sides, so surfaces work
- * like solids.
+ * passes through a face, the proxy stays on the side from which it came. The proxy's centre moves
+ * along segments, each of which, by exact arithmetic, intersects no face. So the proxy passes
+ * through no face, at any speed, and however thin the solid is. Faces count from both sides, so
+ * surfaces work like solids.
  *
  * A *haptic step* is one cycle of the force computation. It uses only data in memory: a limited
  * number of faces in a box around the device. It takes no lock, allocates no memory and reads no
@@ -58,9 +58,10 @@ typedef struct ebpo_haptic_options {
     size_t struct_size;
 
     /*
-     * Radius of the ball in the model's unit, at least 0. 0: a point. A box must hold all faces
-     * within the radius plus `search_radius` (see `faces`). A step tests at most 512 of these, in
-     * the order in which the ball may touch them; the next steps continue with the others.
+     * Radius of the ball in the model's unit, at least 0. 0: a point. `faces` must be large enough
+     * for all faces within the radius plus `search_radius` of the device. A step tests at most 512
+     * of these, in the order in which the ball may touch them; the next steps continue with the
+     * others.
      */
     double radius;
 
@@ -121,8 +122,8 @@ typedef struct ebpo_haptic_options {
  *
  * model   must outlive the object. Contexts may use the model at the same time. Its budget limits
  *         loading (ebpo_model_options.memory)
- * position   three finite doubles. Ball and tool: outside the solid, with no face within the radius
- *            and 1.5 skins (tool: of any point). Probe: anywhere
+ * position   three finite doubles, outside the solid. Ball: no face may be within the radius plus
+ *            1.5 skins of the position. Tool: the same for each of its points. Probe: anywhere
  *
  * EBPO_E_ARGUMENT: an option or the position is not valid. EBPO_E_UNSUPPORTED: coordinates are
  * beyond 2^200. EBPO_E_ABSENT: the file has no mesh, or is a subset without the surroundings of the
@@ -151,14 +152,15 @@ typedef enum ebpo_haptic_flag {
     EBPO_HAPTIC_WAITING = 2,
 
     /*
-     * The work limit of the step was reached before the end of the path; the next step continues.
-     * Until then, a ball in contact stays in contact with the same faces.
+     * The path of the proxy is incomplete: the work limit of the step was reached before its end.
+     * The next step continues; until then, a ball in contact stays in contact with the same faces.
      */
     EBPO_HAPTIC_INCOMPLETE = 4,
 
     /*
-     * Some faces within `search_radius` were not tested (the farthest ones) or not loaded. Nearest
-     * face, distance and normal are those of the tested faces.
+     * The nearest face, its distance and the normal follow from only a part of the faces within
+     * `search_radius`: the farthest ones were not tested, or some were not loaded. The path of the
+     * proxy is not affected.
      */
     EBPO_HAPTIC_PARTIAL = 8,
 
@@ -193,9 +195,9 @@ typedef struct ebpo_haptic_ball_result {
     double normal[3];
 
     /*
-     * In contact: distance between proxy and device; with EBPO_HAPTIC_WAITING or
-     * EBPO_HAPTIC_INCOMPLETE, only the part of this vector that faces prevent. Else minus the
-     * distance from the ball to the nearest face; or minus `search_radius` if no face is within
+     * In contact: length of the vector from proxy to device; with EBPO_HAPTIC_WAITING or
+     * EBPO_HAPTIC_INCOMPLETE, only of the part of this vector that faces prevent. Otherwise minus
+     * the distance from the ball to the nearest face; or minus `search_radius` if no face is within
      * `search_radius`. With EBPO_HAPTIC_PARTIAL, a face that was not tested may be nearer.
      */
     double depth;
@@ -221,10 +223,10 @@ typedef struct ebpo_haptic_ball_result {
  * EBPO_HAPTIC_INCOMPLETE: then the proxy's path depends on the times at which boxes were loaded.
  *
  * The force is stiffness times the vector from device to proxy, minus damping times the device
- * velocity. The force never points towards faces that the spring pushes away from, except for 1e-7
- * of its length. The force is reduced if needed, so that for any motion the total energy given to
- * the device is at most the energy taken from the device, plus stiffness times the square of the
- * longest step of the device.
+ * velocity. If the spring pushes the device away from a face, the total force has no component
+ * towards that face above 1e-7 of its length. The force is reduced if needed, so that for any
+ * motion the total energy given to the device is at most the energy taken from the device, plus
+ * stiffness times the square of the longest step of the device.
  *
  * Threads: one per object.
  */
@@ -235,6 +237,15 @@ EBPO_API void ebpo_haptic_step_ball(ebpo_haptic *haptic, const double device[3],
 enum { EBPO_HAPTIC_PATH_MAX = 17 };
 
 /*
+ * Gets the path of the proxy in the last step: the segments from path[0] to path[n - 1], which
+ * intersect no face. Returns n, which is 1 if the proxy did not move, and 0 before the first step.
+ *
+ * Threads: one per object.
+ */
+EBPO_API uint32_t ebpo_haptic_ball_path(const ebpo_haptic *haptic,
+                                        double path[EBPO_HAPTIC_PATH_MAX][3]);
+
+/*
  * Gets the path of a tool's proxy in the last step, as ebpo_haptic_ball_path does for a ball. Each
  * item is a position and a quaternion x, y, z, w. Between two items, each point of the tool moved
  * along a segment.
@@ -243,15 +254,6 @@ enum { EBPO_HAPTIC_PATH_MAX = 17 };
  */
 EBPO_API uint32_t ebpo_haptic_tool_path(const ebpo_haptic *haptic,
                                         double path[EBPO_HAPTIC_PATH_MAX][7]);
-
-/*
- * Gets the path of the proxy in the last step: the segments from path[0] to path[n - 1], which
- * intersect no face. Returns n, which is 1 if the proxy did not move, and 0 before the first step.
- *
- * Threads: one per object.
- */
-EBPO_API uint32_t ebpo_haptic_ball_path(const ebpo_haptic *haptic,
-                                        double path[EBPO_HAPTIC_PATH_MAX][3]);
 
 /* Result of a probe at a position. */
 typedef struct ebpo_haptic_probe_result {
@@ -293,10 +295,12 @@ typedef struct ebpo_haptic_probe_result {
  * `position` to the model, from data in memory. The bounds combine
  *   - the near faces, and the sides of these faces on which the probe is, which are tracked by
  *   exact arithmetic: within `search_radius` of a face the result is exact except for rounding;
- *   - the first levels of the octree, at most 2^17 nodes: leaves and gray nodes, and black nodes;
+ *   - the first levels of the octree, at most 2^17 nodes: leaves and gray nodes bound the distance;
+ *   other nodes give the side;
  *   - the exact result for a previous position of the probe, from the loading thread: since then
- *   the distance has changed by at most the length of the path. Time, locks, memory and reading are
- *   as in ebpo_haptic_step_ball.
+ *   the distance has changed by at most the length of the path.
+ *
+ * Time, locks, memory and reading are as in ebpo_haptic_step_ball.
  *
  * Threads: one per object.
  */
@@ -365,8 +369,8 @@ EBPO_API void ebpo_haptic_step_tool(ebpo_haptic *haptic, const double position[3
                                     const double turn[4], ebpo_haptic_tool_result *out);
 
 /*
- * Moves the object to another position without collisions (a tool without rotation), and waits
- * until the surroundings are loaded. Not for use in a step.
+ * Places the object at another position, without collisions on the way, and waits until the
+ * surroundings are loaded. A tool gets the rotation 0, 0, 0, 1. Not for use in a haptic step.
  *
  * Errors are those of ebpo_haptic_new. After a failure the position is unchanged.
  *

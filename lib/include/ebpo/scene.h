@@ -10,8 +10,8 @@
  *   In time     ebpo_scene_pose, ebpo_scene_motion, ebpo_scene_instance_box, ebpo_scene_box
  *   Collisions  ebpo_scene_pairs (boxes), ebpo_scene_find_clashes (faces),
  *               ebpo_scene_collide (two instances)
- *   All times   ebpo_scene_approach, ebpo_scene_least_distances
  *   As a file   ebpo_scene_report_new
+ *   Over time   ebpo_scene_approach, ebpo_scene_least_distances
  *   Subsets     ebpo_scene_plan, ebpo_scene_pack
  *
  *     ebpo_scene *scene = NULL;
@@ -47,8 +47,8 @@ typedef struct ebpo_scene_options {
     size_t struct_size;
 
     /*
-     * Limits in bytes for the scene file, and for all pose files that it names together. 0: 64 MiB
-     * and 256 MiB.
+     * Limits in bytes: for the scene file, and for the sum of all pose files that it names. 0: 64
+     * MiB and 256 MiB.
      */
     uint64_t max_bytes, max_pose_bytes;
 
@@ -146,7 +146,7 @@ typedef struct ebpo_scene_instance {
     /* Index of the route, and of the layer (ebpo_scene_get_layer). EBPO_SCENE_NONE: none. */
     uint64_t route, layer;
 
-    /* Pairs of two fixed instances are not tested. An instance with a route is not fixed. */
+    /* Pairs of two fixed instances are not tested. Must be false with a route. */
     bool fixed;
 
     uint8_t reserved[7];
@@ -313,8 +313,9 @@ EBPO_API ebpo_status ebpo_scene_get_camera(const ebpo_scene *scene, uint64_t cam
 
 /*
  * Returns true if a pair is to be tested: the scene does not ignore the pair, and the instances are
- * different and not both fixed. *clearance is then the greatest distance that the scene requires
- * between the instances, in the world's unit; 0: none. Returns false also for indices out of range.
+ * different and not both fixed. *clearance is then the largest clearance (minimum distance) that
+ * the scene requires for the pair, in the world's unit; 0: none. Returns false also for indices out
+ * of range.
  *
  * Threads: any.
  */
@@ -410,8 +411,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_instance_box(const ebpo_scene *sce
 
 /*
  * Computes a box that contains all instances at all times in from .. to. Without instances, `min`
- * is INFINITY and `max` is -INFINITY. The scene of EBP 2017, 5.6.1, is another box: four times the
- * extents, about the mean of the centres of mass.
+ * is INFINITY and `max` is -INFINITY. EBP 2017, 5.6.1, uses a different box: four times the
+ * extents, centred at the mean of the centres of mass.
  *
  * Errors are those of ebpo_scene_motion. EBPO_E_ARGUMENT: also if the model of an instance was
  * added after the last ebpo_scene_load.
@@ -435,7 +436,7 @@ typedef bool (*ebpo_scene_pairs_fn)(void *user, const ebpo_scene_pair *pairs, ui
 /*
  * Broad phase: finds the pairs that ebpo_scene_pair_rule allows and whose boxes
  * (ebpo_scene_instance_box) are at most their clearance apart on each axis, in ascending order of
- * a, then b. The instances of any other pair are farther apart at all times in from .. to.
+ * a, then b. The instances of any other allowed pair are farther apart at all times in from .. to.
  *
  * EBPO_E_ARGUMENT: not loaded, or not from <= to, both finite. EBPO_E_LIMIT: more than 2^23 pairs.
  *
@@ -506,8 +507,8 @@ typedef struct ebpo_scene_clash {
 
     /*
      * Depth of a in b, and of b in a (ebpo_collide_depth), with the tolerance
-     * ebpo_scene_clash_options.depth. 0 to INFINITY: not requested, or the other instance is a
-     * surface.
+     * ebpo_scene_clash_options.depth. The bounds 0 and INFINITY: not requested, or the other
+     * instance is a surface.
      */
     ebpo_certain depth[2];
 } ebpo_scene_clash;
@@ -548,8 +549,8 @@ typedef struct ebpo_scene_clash_options {
 /*
  * Narrow phase: finds the pairs of ebpo_scene_pairs whose faces intersect at a time, or are nearer
  * than the clearance. Decisions are exact on posed coordinates (collide.h). Clashes are in
- * ascending order of a, then b. An instance inside another without near faces is reported only with
- * options.relate. Models are those of ebpo_scene_model.
+ * ascending order of a, then b. If one instance is inside the other and no faces are near, the pair
+ * is reported only with options.relate. Makes the models that it needs, as ebpo_scene_model does.
  *
  * tested   number of tested pairs; may be NULL
  *
@@ -566,7 +567,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_find_clashes(ebpo_scene *scene, do
 
 /*
  * Finds all pairs of intersecting faces of two instances at a time, as ebpo_collide_all does for
- * their models. Other errors are those of ebpo_scene_find_clashes.
+ * their models. Errors are those of ebpo_scene_find_clashes.
  *
  * Threads: one per scene.
  */
@@ -577,7 +578,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_collide(ebpo_scene *scene, uint64_
 
 /* ---- as a file ---- */
 
-/* A report on several times, which is being written to a file. */
+/* A report of the clashes at several points in time; it is being written to a file. */
 typedef struct ebpo_scene_report ebpo_scene_report;
 
 /* One time of a report. */
@@ -702,10 +703,10 @@ typedef struct ebpo_scene_approach_options {
 
 /*
  * Finds when instances first come within their clearance of each other; no time is missed. For each
- * pair of ebpo_scene_pairs (from, to) the distance is evaluated at a time. This distance and
- * ebpo_scene_motion give the next time at which the instances can be near. There is one result per
- * pair, in ascending order of a, then b. An instance that is inside another from the beginning,
- * without near faces, counts as apart.
+ * pair of ebpo_scene_pairs (from, to), the distance is evaluated at one time. From this distance
+ * and ebpo_scene_motion follows the earliest later time at which the pair can be near, which is
+ * evaluated next. There is one result per pair, in ascending order of a, then b. An instance that
+ * is inside another from the beginning, without near faces, counts as apart.
  *
  * Errors are those of ebpo_scene_find_clashes. EBPO_E_ARGUMENT: also if the tolerance is not above
  * 0.
@@ -742,8 +743,8 @@ typedef bool (*ebpo_scene_least_fn)(void *user, const ebpo_scene_least *list, ui
 
 /*
  * Computes for each pair of ebpo_scene_pairs (from, to) the minimum distance over all times in from
- * .. to, and a time of it. Results are in ascending order of a, then b. Options and errors are
- * those of ebpo_scene_approach.
+ * .. to, and a time at which it occurs. Results are in ascending order of a, then b. Options and
+ * errors are those of ebpo_scene_approach.
  *
  * Threads: one per scene.
  */
@@ -751,10 +752,11 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_least_distances(
     ebpo_scene *scene, double from, double to, const ebpo_scene_approach_options *options,
     ebpo_scene_least_fn take, void *user, ebpo_error *error);
 
-/* ---- subsets of the models of a scene ---- */
+/* ---- subsets ---- */
 
 typedef enum ebpo_scene_purpose {
-    /* ebpo_scene_find_clashes and ebpo_scene_approach, with source indices of faces. */
+    /* ebpo_scene_find_clashes and ebpo_scene_approach; results have the face indices of the source.
+     */
     EBPO_SCENE_FOR_COLLIDE = 0,
 
     /* Images from the scene's cameras, with cells no larger than a pixel. */
@@ -777,9 +779,9 @@ typedef struct ebpo_plan_options {
     ebpo_progress progress;
 
     /*
-     * Data within the clearance plus this distance of another instance is included; in the world's
-     * unit. With a larger margin, ebpo_scene_approach needs fewer evaluations. 0: for each pair,
-     * 1/32 of the longest side of the smaller box.
+     * Data is included if its distance from another instance is at most the clearance plus this
+     * margin, in the world's unit. With a larger margin, ebpo_scene_approach needs fewer
+     * evaluations. 0: for each pair, 1/32 of the longest side of the smaller box.
      */
     double margin;
 
@@ -819,8 +821,8 @@ typedef struct ebpo_scene_need {
     int32_t last_level, level_count;
 
     /*
-     * ebpo_part bits: needed parts that the file has. Without EBPO_PART_MESH, the model is not
-     * queried.
+     * ebpo_part bits: needed parts that the file has. For purposes other than VIEW: without
+     * EBPO_PART_MESH, no query needs the faces of this model.
      */
     uint32_t parts;
 
@@ -875,7 +877,7 @@ typedef struct ebpo_pack_options {
         sizeof(ebpo_pack_options), { NULL, NULL }, 0, 0, EBPO_SCENE_FOR_COLLIDE, 0 \
     }
 
-/* A model of a packed scene. Models of the same file share it. */
+/* A model of a packed scene. Models of the same source file share one new file. */
 typedef struct ebpo_scene_packed {
     size_t struct_size;
 
@@ -908,9 +910,9 @@ typedef struct ebpo_scene_packed {
 typedef bool (*ebpo_scene_packs_fn)(void *user, const ebpo_scene_packed *models, uint64_t count);
 
 /*
- * Writes the result of ebpo_scene_plan to a new folder, which appears atomically. It contains
- * subsets of the models' files, pose files, and packed.scene.json, which is the scene with these
- * files, their digests and the digests of the source files. `take` may be NULL.
+ * Writes the data that ebpo_scene_plan finds to a new folder, which appears atomically. The folder
+ * contains subsets of the models' files, pose files, and packed.scene.json, which is the scene with
+ * these files, their digests and the digests of the source files. `take` may be NULL.
  *
  * Queries of the purpose at times in from .. to have the same results in the new scene.
  * ebpo_scene_approach may evaluate other times, and intervals of distances beyond the clearance may

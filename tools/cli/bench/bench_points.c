@@ -26,7 +26,7 @@ static int reserve_space(bench_points *out, uint64_t count)
     if (!rows)
         return command_no_memory("bench");
     out->rows = rows;
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 static void fill_uniform(bench_points *out, const bench_scene *scene, uint64_t seed)
@@ -55,7 +55,7 @@ static int fill_from_mesh(bench_points *out, ebpo_file *file, const bench_scene 
     else
         good = bench_walk(&mesh, report->mean_edge, sqrt(square), seed, out->count, out->rows);
     ebpo_mesh_free(&mesh);
-    return good ? EXIT_FINE : command_no_memory("bench");
+    return good ? EXIT_OK : command_no_memory("bench");
 }
 
 static int fill_rows(bench_points *out, ebpo_file *file, generator what, uint64_t seed)
@@ -75,7 +75,7 @@ static int fill_rows(bench_points *out, ebpo_file *file, generator what, uint64_
         else
             fill_uniform(out, &scene, seed);
     }
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 static int generate_rows(bench_points *out, const char *model, const remote_values *remote,
@@ -84,11 +84,11 @@ static int generate_rows(bench_points *out, const char *model, const remote_valu
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
     int code = reserve_space(out, out->count);
-    if (code == EXIT_FINE && remote_open(&file, model, remote, &error) != EBPO_OK)
+    if (code == EXIT_OK && remote_open(&file, model, remote, &error) != EBPO_OK)
         code = command_failed("bench", &error);
-    if (code == EXIT_FINE)
+    if (code == EXIT_OK)
         code = fill_rows(out, file, what, seed);
-    if (code == EXIT_FINE && out->kind == POINTS_RAYS)
+    if (code == EXIT_OK && out->kind == POINTS_RAYS)
         for (uint64_t i = 0; i < out->count; i++)
             out->rows[7 * i + 6] = fmin(out->rows[7 * i + 6], tmax);
     ebpo_close(file);
@@ -101,7 +101,7 @@ static int read_all(bench_points *out, points *in, uint64_t most)
     while (got && out->count < most) {
         if (capacity < out->count + POINTS_BATCH) {
             capacity = 2 * capacity + POINTS_BATCH;
-            if (reserve_space(out, capacity) != EXIT_FINE)
+            if (reserve_space(out, capacity) != EXIT_OK)
                 return EXIT_FAILED;
         }
         got = points_next(in, out->rows + out->count * (uint64_t)points_width(out->kind));
@@ -113,7 +113,7 @@ static int read_all(bench_points *out, points *in, uint64_t most)
         out->count = most;
     if (out->count == 0)
         fprintf(stderr, "ebpo bench: %s: holds no points\n", in->name);
-    return out->count ? EXIT_FINE : EXIT_FAILED;
+    return out->count ? EXIT_OK : EXIT_FAILED;
 }
 
 static generator generator_of(const char *what)
@@ -143,7 +143,7 @@ int bench_points_make(bench_points *out, points_kind kind, const char *model,
     out->count = 0;
     int code = EXIT_FAILED;
     bool opened = points_open(&in, "bench", what, kind, raw, tmax);
-    in.headless = true;
+    in.no_header = true;
     if (opened)
         code = read_all(out, &in, count ? count : UINT64_MAX);
     points_close(&in);
@@ -164,7 +164,7 @@ int bench_save(FILE *stream, char *const *data, const size_t *size, const char *
         good = false;
     int code = !good ? command_no_memory("bench")
                : ebpo_write_file(path, *data, *size, &error) == EBPO_OK
-                   ? EXIT_FINE
+                   ? EXIT_OK
                    : command_failed("bench", &error);
     free(*data);
     return code;

@@ -5,7 +5,7 @@
 
 #include "cli/bench/bench_walk.h"
 
-enum { WIDTH = 7 };
+enum { RAY_WIDTH = 7 };
 
 static double scene_diagonal(const bench_scene *s)
 {
@@ -40,7 +40,7 @@ static void random_direction(uint64_t *random, double out[3])
 
 void bench_rays_uniform(const bench_scene *s, uint64_t seed, uint64_t count, double *rows)
 {
-    for (double *row = rows; row < rows + WIDTH * count; row += WIDTH) {
+    for (double *row = rows; row < rows + RAY_WIDTH * count; row += RAY_WIDTH) {
         random_point(s, &seed, row);
         random_direction(&seed, row + 3);
         row[6] = INFINITY;
@@ -51,7 +51,7 @@ void bench_rays_segments(const bench_scene *s, uint64_t seed, uint64_t count, do
 {
     double length = scene_diagonal(s) / 20;
     bench_rays_uniform(s, seed, count, rows);
-    for (double *row = rows; row < rows + WIDTH * count; row += WIDTH) {
+    for (double *row = rows; row < rows + RAY_WIDTH * count; row += RAY_WIDTH) {
         for (int k = 3; k < 6; k++)
             row[k] *= length;
         row[6] = 1;
@@ -59,7 +59,7 @@ void bench_rays_segments(const bench_scene *s, uint64_t seed, uint64_t count, do
 }
 
 /* Computes two unit vectors perpendicular to `along`. */
-static void make_across(const double along[3], double right[3], double up[3])
+static void make_basis(const double along[3], double right[3], double up[3])
 {
     int axis = 0;
     for (int k = 1; k < 3; k++)
@@ -78,9 +78,9 @@ void bench_rays_camera(const bench_scene *s, uint64_t seed, uint64_t count, doub
     double along[3], right[3], up[3], size = scene_diagonal(s);
     uint64_t side = (uint64_t)ceil(sqrt((double)count));
     random_direction(&seed, along);
-    make_across(along, right, up);
+    make_basis(along, right, up);
     for (uint64_t i = 0; i < count; i++) {
-        double *row = rows + WIDTH * i, x = ((double)(i % side) + 0.5) / (double)side - 0.5,
+        double *row = rows + RAY_WIDTH * i, x = ((double)(i % side) + 0.5) / (double)side - 0.5,
                y = ((double)(i / side) + 0.5) / (double)side - 0.5;
         for (int k = 0; k < 3; k++) {
             row[k] = (s->low[k] + s->high[k]) / 2 - 1.5 * size * along[k];
@@ -98,7 +98,7 @@ static void corner_of(const ebpo_mesh *mesh, uint64_t face, int i, double out[3]
                              : mesh->xyz64[3 * vertex + (uint64_t)k];
 }
 
-static void to_target(double row[7], const double target[3])
+static void aim_at(double row[7], const double target[3])
 {
     for (int k = 0; k < 3; k++) {
         row[k] = (float)row[k];
@@ -110,7 +110,7 @@ void bench_rays_degenerate(const bench_scene *s, const ebpo_mesh *mesh, uint64_t
                            uint64_t count, double *rows)
 {
     for (uint64_t i = 0; i < count; i++) {
-        double *row = rows + WIDTH * i, a[3], b[3];
+        double *row = rows + RAY_WIDTH * i, a[3], b[3];
         uint64_t face = bench_random(&seed) % mesh->face_count;
         corner_of(mesh, face, 0, a);
         corner_of(mesh, face, 1, b);
@@ -121,7 +121,7 @@ void bench_rays_degenerate(const bench_scene *s, const ebpo_mesh *mesh, uint64_t
             for (int k = 0; k < 3; k++)
                 a[k] = (a[k] + b[k]) / 2;
         if (i % 4 < 2)
-            to_target(row, a);
+            aim_at(row, a);
         else
             memcpy(row, a, sizeof a);
         if (i % 4 == 3) {

@@ -45,13 +45,13 @@ uint64_t bench_clock_cost(void)
 
 /* --- queries --- */
 
-static const ebpo_ray_hit nothing = { .t = INFINITY, .face = EBPO_NO_FACE };
+static const ebpo_ray_hit no_hit = { .t = INFINITY, .face = EBPO_NO_FACE };
 
-static ebpo_ray_hit result_any(bool any) { return any ? (ebpo_ray_hit){ .t = 0 } : nothing; }
+static ebpo_ray_hit any_result(bool any) { return any ? (ebpo_ray_hit){ .t = 0 } : no_hit; }
 
-static ebpo_ray_hit result_all(const ebpo_ray_hit *hits, uint64_t count)
+static ebpo_ray_hit all_result(const ebpo_ray_hit *hits, uint64_t count)
 {
-    return count ? (ebpo_ray_hit){ .t = (double)count, .face = hits[0].face } : nothing;
+    return count ? (ebpo_ray_hit){ .t = (double)count, .face = hits[0].face } : no_hit;
 }
 
 static ebpo_status query_ray(bench_query query, const double *row, ebpo_context *context,
@@ -63,14 +63,14 @@ static ebpo_status query_ray(bench_query query, const double *row, ebpo_context 
     ebpo_status status;
     if (query == BENCH_RAY_ALL) {
         status = ebpo_ray_all(context, row, row + 3, row[6], &hits, &count, error);
-        *out = result_all(hits, count);
+        *out = all_result(hits, count);
     } else if (query == BENCH_RAY_ANY) {
         status = ebpo_ray_any(context, row, row + 3, row[6], &hit, error);
-        *out = result_any(hit);
+        *out = any_result(hit);
     } else {
         status = ebpo_ray_first(context, row, row + 3, row[6], out, &hit, error);
         if (!hit)
-            *out = nothing;
+            *out = no_hit;
     }
     return status;
 }
@@ -84,7 +84,7 @@ static ebpo_status query_any_many(const bench_job *job, ebpo_context *context,
     ebpo_status status =
         ebpo_ray_any_many(context, (const void *)job->rows, job->count, how, any, error);
     for (uint64_t i = 0; i < job->count && status == EBPO_OK; i++)
-        out[i] = result_any(any[i]);
+        out[i] = any_result(any[i]);
     free(any);
     return status;
 }
@@ -103,7 +103,7 @@ static ebpo_status query_many_rays(const bench_job *job, ebpo_context *context, 
         return query_any_many(job, context, &how, out, error);
     ebpo_status status = ebpo_ray_all_many(context, rays, job->count, &how, &hits, &begin, error);
     for (uint64_t i = 0; i < job->count && status == EBPO_OK; i++)
-        out[i] = result_all(hits + begin[i], begin[i + 1] - begin[i]);
+        out[i] = all_result(hits + begin[i], begin[i + 1] - begin[i]);
     return status;
 }
 
@@ -136,8 +136,8 @@ static uint64_t time_quantile(const uint64_t *sorted, uint64_t count, unsigned t
     return sorted[below ? below - 1 : 0];
 }
 
-ebpo_status bench_singly(const bench_job *job, ebpo_context *context, uint64_t clock_cost,
-                         bench_metrics *out, ebpo_error *error)
+ebpo_status bench_each(const bench_job *job, ebpo_context *context, uint64_t clock_cost,
+                       bench_metrics *out, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     double sum = 0;

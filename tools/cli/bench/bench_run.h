@@ -50,8 +50,8 @@ uint64_t bench_clock_cost(void);
 EBPO_MUST_USE ebpo_status bench_run_query(const bench_job *job, ebpo_context *context,
                                           uint64_t number, ebpo_error *error);
 /* Runs and times each query separately: all results except `batch`. Sorts job->ns. */
-EBPO_MUST_USE ebpo_status bench_singly(const bench_job *job, ebpo_context *context,
-                                       uint64_t clock_cost, bench_metrics *out, ebpo_error *error);
+EBPO_MUST_USE ebpo_status bench_each(const bench_job *job, ebpo_context *context,
+                                     uint64_t clock_cost, bench_metrics *out, ebpo_error *error);
 /* Runs all queries in a batch by the functions for many points or rays, on one thread, into
  * `result_values`, which has the size of job->result_values. */
 EBPO_MUST_USE ebpo_status bench_batch(const bench_job *job, ebpo_context *context,
@@ -60,8 +60,8 @@ EBPO_MUST_USE ebpo_status bench_batch(const bench_job *job, ebpo_context *contex
 /* Asks the system to drop a file from the page cache. Returns the share of pages still in memory;
  * -1 when not known. */
 double bench_drop_file(const char *path);
-/* Returns the peak memory of this process (Linux), since the last reset if the system allows one; 0
- * when not known. */
+/* Returns the peak memory of this process (Linux), since the last bench_reset_peak if the system
+ * allows a reset; 0 when not known. */
 uint64_t bench_peak_memory(void);
 void bench_reset_peak(void);
 

@@ -8,8 +8,8 @@ enum { HOPS_MAX = 100, SWING_STEPS = 1000 };
 
 typedef struct walker {
     const ebpo_mesh *mesh;
-    uint64_t *first;  /* [vertex_count + 1] offsets into `around` */
-    uint32_t *around; /* faces around each vertex */
+    uint64_t *face_begin;   /* [vertex_count + 1] offsets into `around` */
+    uint32_t *vertex_faces; /* faces around each vertex */
     uint64_t random;
     uint64_t face;
     double corner[3][3], n[3]; /* corners of the face; unit normal */
@@ -75,16 +75,16 @@ static bool index_vertices(walker *w)
 {
     const ebpo_mesh *m = w->mesh;
     uint64_t corners = 3 * m->face_count;
-    w->first = calloc(m->vertex_count + 2, sizeof *w->first);
-    w->around = malloc(corners * sizeof *w->around);
-    if (!w->first || !w->around)
+    w->face_begin = calloc(m->vertex_count + 2, sizeof *w->face_begin);
+    w->vertex_faces = malloc(corners * sizeof *w->vertex_faces);
+    if (!w->face_begin || !w->vertex_faces)
         return false;
     for (uint64_t i = 0; i < corners; i++)
-        w->first[m->faces[i] + 2]++;
+        w->face_begin[m->faces[i] + 2]++;
     for (uint64_t v = 2; v < m->vertex_count + 2; v++)
-        w->first[v] += w->first[v - 1];
+        w->face_begin[v] += w->face_begin[v - 1];
     for (uint64_t i = 0; i < corners; i++)
-        w->around[w->first[m->faces[i] + 1]++] = (uint32_t)(i / 3);
+        w->vertex_faces[w->face_begin[m->faces[i] + 1]++] = (uint32_t)(i / 3);
     return true;
 }
 
@@ -111,8 +111,8 @@ static int edge_corner(const ebpo_mesh *m, uint64_t face, uint32_t a, uint32_t b
 static uint64_t find_neighbour(const walker *w, uint32_t a, uint32_t b, uint32_t *third)
 {
     for (int any = 0; any < 2; any++)
-        for (uint64_t i = w->first[a]; i < w->first[a + 1]; i++) {
-            uint64_t face = w->around[i];
+        for (uint64_t i = w->face_begin[a]; i < w->face_begin[a + 1]; i++) {
+            uint64_t face = w->vertex_faces[i];
             int at = face == w->face ? -1 : edge_corner(w->mesh, face, b, a, any);
             if (at >= 0) {
                 *third = w->mesh->faces[3 * face + (unsigned)(at + 2) % 3];
@@ -138,7 +138,7 @@ static bool enter_face(walker *w, uint64_t face)
 }
 
 /* Moves to the middle of the face, along its first edge. */
-static void stand_on_face(walker *w)
+static void place_on_face(walker *w)
 {
     for (int k = 0; k < 3; k++)
         w->p[k] = w->corner[0][k] / 3 + w->corner[1][k] / 3 + w->corner[2][k] / 3;
@@ -147,18 +147,18 @@ static void stand_on_face(walker *w)
 }
 
 /* Moves to a random face with an area; returns false when a thousand have none. */
-static bool land_anywhere(walker *w)
+static bool place_randomly(walker *w)
 {
     for (int i = 0; i < 1000; i++)
         if (enter_face(w, bench_random(&w->random) % w->mesh->face_count)) {
-            stand_on_face(w);
+            place_on_face(w);
             return true;
         }
     return false;
 }
 
-/* Returns the distance to the edge i of the face; infinite when it is behind. `inward`: unit normal
- * of the edge in the plane. */
+/* Returns the distance to the edge i of the face in the direction of the walk; infinity when the
+ * walk leads away from the edge. *inward: unit normal of the edge in the plane. */
 static double edge_distance(const walker *w, int i, double inward[3])
 {
     double edge[3], from[3];
@@ -173,7 +173,7 @@ static double edge_distance(const walker *w, int i, double inward[3])
 
 /* Crosses the edge i as if the two faces were in one plane; turns back at the end of the surface.
  */
-static bool pass_edge(walker *w, int i)
+static bool cross_edge(walker *w, int i)
 {
     const uint32_t *f = w->mesh->faces + 3 * w->face;
     uint32_t third = 0;
@@ -187,16 +187,16 @@ static bool pass_edge(walker *w, int i)
     double origin[3] = { w->corner[i][0], w->corner[i][1], w->corner[i][2] };
     subtract_vectors(w->corner[(i + 1) % 3], origin, edge);
     if (!normalise_vector(edge) || !enter_face(w, next))
-        return land_anywhere(w);
+        return place_randomly(w);
     read_vertex(w->mesh, third, inward);
     subtract_vectors(inward, origin, inward);
     add_scaled(inward, -dot_product(inward, edge), edge);
     if (!normalise_vector(inward))
-        return land_anywhere(w);
+        return place_randomly(w);
     double along = dot_product(w->d, edge), across = sqrt(fmax(0, 1 - along * along));
     for (int k = 0; k < 3; k++)
         w->d[k] = along * edge[k] + across * inward[k];
-    return normalise_vector(w->d) || land_anywhere(w);
+    return normalise_vector(w->d) || place_randomly(w);
 }
 
 static bool advance_walker(walker *w, double left)
@@ -216,10 +216,10 @@ static bool advance_walker(walker *w, double left)
         left -= now;
         if (!(left > 0) || isinf(distance))
             return true;
-        if (!pass_edge(w, nearest))
+        if (!cross_edge(w, nearest))
             return false;
     }
-    stand_on_face(w); /* cycles around a vertex */
+    place_on_face(w); /* cycles around a vertex */
     return true;
 }
 
@@ -231,10 +231,10 @@ static void turn_walker(walker *w)
     add_scaled(w->d, w->turn, left);
     add_scaled(w->d, -dot_product(w->d, w->n), w->n);
     if (!normalise_vector(w->d))
-        stand_on_face(w);
+        place_on_face(w);
     subtract_vectors(w->p, w->corner[0], off);
     add_scaled(w->p, -dot_product(off, w->n),
-               w->n); /* back onto the face: rounding errors add up */
+               w->n); /* corrects the sum of rounding errors, which leads off the face */
     for (int k = 0; k < 3; k++)
         w->side[k] = 0.95 * w->side[k] + 0.05 * w->n[k];
     if (!normalise_vector(w->side))
@@ -254,7 +254,7 @@ bool bench_walk(const ebpo_mesh *mesh, double mean_edge, double diagonal, uint64
     walker w = { .mesh = mesh, .random = seed };
     double step = mean_edge > 0 ? mean_edge / 10 : diagonal / 1000;
     bool good = index_vertices(&w);
-    if (good && (good = land_anywhere(&w)))
+    if (good && (good = place_randomly(&w)))
         memcpy(w.side, w.n, sizeof w.side);
     for (uint64_t i = 0; i < count && good; i++) {
         double swing = 0.01 * diagonal * wave_height((double)(i % SWING_STEPS) / SWING_STEPS);
@@ -263,7 +263,7 @@ bool bench_walk(const ebpo_mesh *mesh, double mean_edge, double diagonal, uint64
         good = advance_walker(&w, step);
         turn_walker(&w);
     }
-    free(w.first);
-    free(w.around);
+    free(w.face_begin);
+    free(w.vertex_faces);
     return good;
 }

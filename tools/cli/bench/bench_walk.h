@@ -10,9 +10,9 @@ double bench_random_unit(uint64_t *state);
 
 /* Fills out[count][3]. The walk crosses edges straight (as on the unfolded surface), turns slowly,
  * and swings within 1 % of `diagonal` to both sides of the surface; a step is a tenth of
- * `mean_edge`. At an edge without neighbour it turns back; at faces without area it continues
- * elsewhere. The points are the same on all machines: only + - * / and square roots. Returns false
- * when memory is short. */
+ * `mean_edge`. At an edge without neighbour it turns back; at faces without area it continues on a
+ * random face. The points are the same on all machines, as only + - * / and square roots are used.
+ * Returns false when memory is short. */
 bool bench_walk(const ebpo_mesh *mesh, double mean_edge, double diagonal, uint64_t seed,
                 uint64_t count, double *out);
 

@@ -4,12 +4,12 @@
 
 #include "cli/words.h"
 
-enum { PLACES = 10 };
+enum { PAIRS_SHOWN = 10 };
 
 typedef struct crossing_list {
     json *j; /* NULL: words */
     progress_line *line;
-    ebpo_crossing first[PLACES];
+    ebpo_crossing first[PAIRS_SHOWN];
     int count;
 } crossing_list;
 
@@ -35,7 +35,7 @@ static bool take_crossing(void *user, const ebpo_crossing *crossings, uint64_t c
     for (uint64_t i = 0; i < count; i++)
         if (p->j)
             crossing_json(p->j, &crossings[i]);
-        else if (p->count < PLACES)
+        else if (p->count < PAIRS_SHOWN)
             p->first[p->count++] = crossings[i];
     return true;
 }
@@ -71,8 +71,8 @@ static void print_words(const crossing_list *p, const ebpo_crossings_summary *s)
         printf("    ... (--json prints all)\n");
 }
 
-/* Leaves the outermost object open. After a failure the object holds the pairs found so far, and no
- * count. */
+/* Ends the list of pairs; the outermost object stays open. After a failure the object contains the
+ * pairs found so far, and no count. */
 static void end_json(json *j, const ebpo_crossings_summary *s, bool found)
 {
     json_end(j);

@@ -9,7 +9,7 @@
 
 /* --- names as HTML text --- */
 
-/* Rows of a page of clashes can be filtered by the groups of their parts, without scripts. */
+/* Rows of a page of clashes can be filtered by the groups of their instances, without scripts. */
 
 /* Writes text between tags. */
 static void html_put_text(FILE *f, const char *text)
@@ -83,7 +83,7 @@ static bool reserve_space(clash_list *list, uint64_t more)
     return true;
 }
 
-static void note_again(clash *c, double time, const ebpo_scene_clash *m)
+static void add_frame(clash *c, double time, const ebpo_scene_clash *m)
 {
     c->frames++;
     c->last = time;
@@ -108,7 +108,7 @@ ebpo_status clash_add(clash_list *list, double time, const ebpo_scene_clash *fou
         while (at < known && compare_pairs(&list->clash[at], &one) < 0)
             at++;
         if (at < known && compare_pairs(&list->clash[at], &one) == 0)
-            note_again(&list->clash[at], time, &found_clashes[i]);
+            add_frame(&list->clash[at], time, &found_clashes[i]);
         else
             list->clash[list->count++] = one;
     }
@@ -131,7 +131,7 @@ void clash_free(clash_list *list)
     *list = (clash_list){ 0 };
 }
 
-/* Returns the nth group of both parts; EBPO_SCENE_NONE after the last. */
+/* Returns the nth group of the two instances; EBPO_SCENE_NONE after the last group. */
 static uint64_t group_of(const clash *c, const ebpo_scene *scene, uint64_t nth)
 {
     uint64_t of_a = 0;
@@ -141,7 +141,7 @@ static uint64_t group_of(const clash *c, const ebpo_scene *scene, uint64_t nth)
                       : ebpo_scene_group_of(scene, c->worst.b, nth - of_a);
 }
 
-static bool is_first(const clash *c, const ebpo_scene *scene, uint64_t nth)
+static bool is_first_group(const clash *c, const ebpo_scene *scene, uint64_t nth)
 {
     uint64_t group = group_of(c, scene, nth);
     for (uint64_t i = 0; i < nth; i++)
@@ -154,7 +154,7 @@ static void count_clashes(const clash_list *list, const ebpo_scene *scene, uint6
 {
     for (uint64_t i = 0; i < list->count; i++)
         for (uint64_t n = 0; group_of(&list->clash[i], scene, n) != EBPO_SCENE_NONE; n++)
-            sums[group_of(&list->clash[i], scene, n)] += is_first(&list->clash[i], scene, n);
+            sums[group_of(&list->clash[i], scene, n)] += is_first_group(&list->clash[i], scene, n);
 }
 
 static void put_button(FILE *f, uint64_t number, uint64_t clashes, const char *name)
@@ -165,8 +165,8 @@ static void put_button(FILE *f, uint64_t number, uint64_t clashes, const char *n
     fprintf(f, " (%llu)</label>\n", (unsigned long long)clashes);
 }
 
-static void put_choice(FILE *f, const uint64_t *sums, uint64_t groups, const clash_list *list,
-                       const ebpo_scene *scene)
+static void put_buttons(FILE *f, const uint64_t *sums, uint64_t groups, const clash_list *list,
+                        const ebpo_scene *scene)
 {
     fputs("<style>", f);
     for (uint64_t i = 0; i < groups; i++)
@@ -182,9 +182,9 @@ static void put_choice(FILE *f, const uint64_t *sums, uint64_t groups, const cla
             put_button(f, i, sums[i], ebpo_scene_get_group(scene, i));
 }
 
-/* Writes a button for each group with clashes, before a table of class `c` that follows at once;
- * nothing when there is none. Returns false when memory is short. */
-static bool clash_put_choice(FILE *f, const clash_list *list, const ebpo_scene *scene)
+/* Writes a button for each group with clashes, if there is any; a table of class `c` must follow
+ * directly. Returns false when memory is short. */
+static bool put_filter(FILE *f, const clash_list *list, const ebpo_scene *scene)
 {
     ebpo_scene_counts c = EBPO_SCENE_COUNTS_INIT;
     (void)ebpo_scene_get_counts(scene, &c);
@@ -195,17 +195,17 @@ static bool clash_put_choice(FILE *f, const clash_list *list, const ebpo_scene *
     for (uint64_t i = 0; i < c.groups; i++)
         any += sums[i] > 0;
     if (any)
-        put_choice(f, sums, c.groups, list, scene);
+        put_buttons(f, sums, c.groups, list, scene);
     free(sums);
     return true;
 }
 
 /* Writes the classes of a row, which follow its name in <tr>. */
-static void clash_put_classes(FILE *f, const clash *c, const ebpo_scene *scene)
+static void put_classes(FILE *f, const clash *c, const ebpo_scene *scene)
 {
     bool any = false;
     for (uint64_t n = 0; group_of(c, scene, n) != EBPO_SCENE_NONE; n++) {
-        if (!is_first(c, scene, n))
+        if (!is_first_group(c, scene, n))
             continue;
         fprintf(f, "%sg%llu", any ? " " : " class=\"", (unsigned long long)group_of(c, scene, n));
         any = true;
@@ -239,7 +239,7 @@ enum { KINDS = sizeof meanings / sizeof *meanings };
 
 /* --- the head --- */
 
-static void put_checksums(FILE *f, const clash_list *list)
+static void put_kinds(FILE *f, const clash_list *list)
 {
     uint64_t sums[KINDS] = { 0 };
     for (uint64_t i = 0; i < list->count; i++)
@@ -275,7 +275,7 @@ static void put_head(FILE *f, const clash_list *list, const char *title, double 
 
 /* --- rows --- */
 
-static void put_part(FILE *f, const ebpo_scene *scene, const char *letter, uint64_t instance)
+static void put_instance(FILE *f, const ebpo_scene *scene, const char *letter, uint64_t instance)
 {
     ebpo_scene_instance at = EBPO_SCENE_INSTANCE_INIT;
     ebpo_scene_model_facts model = EBPO_SCENE_MODEL_FACTS_INIT;
@@ -323,13 +323,13 @@ static void put_row(FILE *f, const ebpo_scene *scene, const clash *c, uint64_t n
 {
     const ebpo_scene_clash *m = &c->worst;
     fputs("<tr", f);
-    clash_put_classes(f, c, scene);
+    put_classes(f, c, scene);
     fprintf(f, "><td class=n>%llu<td>", (unsigned long long)number);
     if (c->picture)
         fprintf(f, "<img alt=\"clash %llu\" src=\"%s\">", (unsigned long long)number, c->picture);
     fputs("<td>", f);
-    put_part(f, scene, "A", m->a);
-    put_part(f, scene, "B", m->b);
+    put_instance(f, scene, "A", m->a);
+    put_instance(f, scene, "B", m->b);
     fprintf(f, "<td><span class=\"k %s\">%s</span><div class=q>%s</div><td class=n>",
             clash_kind_word(m->kind), clash_kind_word(m->kind), meanings[m->kind]);
     put_measure(f, m);
@@ -346,9 +346,9 @@ static bool put_page(FILE *f, const clash_list *list, const ebpo_scene *scene, c
                      double from, double to, uint64_t frames)
 {
     put_head(f, list, title, from, to, frames);
-    put_checksums(f, list);
+    put_kinds(f, list);
     fputs("<h2>The worst first</h2>\n", f);
-    bool fine = clash_put_choice(f, list, scene);
+    bool fine = put_filter(f, list, scene);
     fprintf(f,
             "<table class=c><tr class=h><th>#<th>Picture<th>Parts<th>Kind<th>How much"
             "<th>Where%s\n",

@@ -24,8 +24,8 @@ static ebpo_status no_memory(ebpo_error *error)
     return error->status = EBPO_E_MEMORY;
 }
 
-/* Places the camera where a box just fits. */
-static void inspect_scene(camera *view, const double min[3], const double max[3], int height)
+/* Sets the camera so that the box just fits into the picture. */
+static void aim_camera(camera *view, const double min[3], const double max[3], int height)
 {
     double corner[24];
     uint32_t face[3] = { 0, 1, 2 };
@@ -60,8 +60,8 @@ static double longest_side(const double min[3], const double max[3])
     return fmax(max[0] - min[0], fmax(max[1] - min[1], max[2] - min[2]));
 }
 
-/* Chooses the region: the smaller instance and the contact; when the contact is small on it, the
- * contact and its surroundings. */
+/* Chooses the region to draw: the smaller instance and the contact. If the contact is small
+ * compared with this instance, the region is the contact and its surroundings. */
 static ebpo_status find_region(const ebpo_scene *scene, const clash *c, double middle[3],
                                double *reach, ebpo_error *error)
 {
@@ -90,8 +90,8 @@ static ebpo_status find_region(const ebpo_scene *scene, const clash *c, double m
     return EBPO_OK;
 }
 
-static ebpo_status paint_two(ebpo_scene *scene, const clash *c, unsigned threads, painted_mesh *out,
-                             ebpo_error *error)
+static ebpo_status paint_pair(ebpo_scene *scene, const clash *c, unsigned threads,
+                              painted_mesh *out, ebpo_error *error)
 {
     const ebpo_scene_clash *m = &c->worst;
     bool intersects = m->touching + m->coplanar + m->crossing > 0;
@@ -137,21 +137,21 @@ ebpo_status clash_draw(ebpo_scene *scene, clash *c, unsigned threads, ebpo_error
     double middle[3], min[3], max[3], reach;
     ebpo_status status = find_region(scene, c, middle, &reach, error);
     if (status == EBPO_OK)
-        status = paint_two(scene, c, threads, &p, error);
+        status = paint_pair(scene, c, threads, &p, error);
     if (status == EBPO_OK) {
-        painted_crop(&p, middle, 1.5 * reach); /* nothing is in the way, or behind the eye */
+        painted_crop(&p, middle, 1.5 * reach); /* removes faces between the eye and the region */
         for (int k = 0; k < 3; k++) {
             min[k] = middle[k] - reach;
             max[k] = middle[k] + reach;
         }
-        inspect_scene(&view, min, max, HEIGHT);
+        aim_camera(&view, min, max, HEIGHT);
         status = draw_clash(&p, &view, c, threads, error);
     }
     painted_free(&p);
     return status;
 }
 
-/* --- a strip --- */
+/* --- several times side by side --- */
 
 struct clash_strip {
     ebpo_scene *scene;
@@ -209,10 +209,11 @@ void clash_strip_free(clash_strip *s)
     free(s);
 }
 
-/* Sets red[i] to the bytes that mark the red faces of instance i; NULL stays where no face
- * intersects. */
-static ebpo_status find_red(clash_strip *s, double time, const ebpo_scene_clash *found_clashes,
-                            uint64_t count, uint8_t **red, ebpo_error *error)
+/* Sets red[i] to the bytes that mark the red faces of instance i. red[i] stays NULL if no face of
+ * the instance intersects another one. */
+static ebpo_status find_red_faces(clash_strip *s, double time,
+                                  const ebpo_scene_clash *found_clashes, uint64_t count,
+                                  uint8_t **red, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
@@ -227,8 +228,8 @@ static ebpo_status find_red(clash_strip *s, double time, const ebpo_scene_clash 
     return status;
 }
 
-static ebpo_status paint_all(const clash_strip *s, double time, uint8_t *const *red,
-                             painted_mesh *out, ebpo_error *error)
+static ebpo_status paint_instances(const clash_strip *s, double time, uint8_t *const *red,
+                                   painted_mesh *out, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < s->instances && status == EBPO_OK; i++) {
@@ -249,7 +250,7 @@ static ebpo_status draw_tile(clash_strip *s, const painted_mesh *p, double time,
     camera view;
     int caption = picture_has_captions() ? CAPTION : 0;
     int x = s->done % s->columns * WIDTH, y = s->done / s->columns * HEIGHT;
-    inspect_scene(&view, s->min, s->max, HEIGHT - caption);
+    aim_camera(&view, s->min, s->max, HEIGHT - caption);
     s->done++;
     ebpo_status status =
         draw_model(&s->picture, x, y, HEIGHT - caption, &view, p, s->threads, error);
@@ -266,9 +267,9 @@ ebpo_status clash_strip_add(clash_strip *s, double time, const ebpo_scene_clash 
     painted_mesh p = { 0 };
     uint8_t **red = calloc(s->instances + 1, sizeof *red);
     ebpo_status status =
-        red ? find_red(s, time, found_clashes, count, red, error) : no_memory(error);
+        red ? find_red_faces(s, time, found_clashes, count, red, error) : no_memory(error);
     if (status == EBPO_OK)
-        status = paint_all(s, time, red, &p, error);
+        status = paint_instances(s, time, red, &p, error);
     if (status == EBPO_OK && s->done < s->tiles)
         status = draw_tile(s, &p, time, count, error);
     for (uint64_t i = 0; red && i < s->instances; i++)

@@ -30,7 +30,7 @@ static const char *const query_words[] = {
 };
 enum { REPEAT_MAX = 99 };
 /* Outcomes of a distance or ray query. INTERVAL: the level or the deadline did not suffice. */
-enum { NOTHING, FOUND, INTERVAL };
+enum { RESULT_NONE, RESULT_FOUND, RESULT_INTERVAL };
 
 #include "cli/options/bench.inc"
 
@@ -75,10 +75,10 @@ static int cold_start(const bench_job *job, const char *path, const ebpo_model_o
     uint64_t begin = tool_clock();
     int code = query_open(&s, "bench", path, holding, job->inside.level, remote);
     r->cold_open_seconds = (double)(tool_clock() - begin) * 1e-9;
-    if (code == EXIT_FINE && bench_run_query(job, s.context, 0, &error) != EBPO_OK)
+    if (code == EXIT_OK && bench_run_query(job, s.context, 0, &error) != EBPO_OK)
         code = command_failed("bench", &error);
     r->cold_seconds = (double)(tool_clock() - begin) * 1e-9;
-    if (code == EXIT_FINE) {
+    if (code == EXIT_OK) {
         ebpo_model_get_stats(s.model, &stats);
         r->cold_bytes = stats.bytes_read;
         r->cold_reads = stats.reads;
@@ -135,7 +135,7 @@ static bool options_fit(const values *v)
     }
     if (v->query == BENCH_DISTANCE)
         return query_distance_fits("bench", &v->q);
-    return query_accepts("bench", &v->q, idle, with) && query_inside_fits("bench", &v->q);
+    return query_check_effect("bench", &v->q, idle, with) && query_inside_fits("bench", &v->q);
 }
 
 /* Compares bits: NAN means not found. */
@@ -167,7 +167,7 @@ static bool same_result(bench_query query, const void *one, const void *other, u
 static int compare_results(const bench_job *job, const void *batch)
 {
     if (job->inside.deadline_ns)
-        return EXIT_FINE;
+        return EXIT_OK;
     for (uint64_t i = 0; i < job->count; i++)
         if (!same_result(job->query, job->result_values, batch, i)) {
             fprintf(stderr,
@@ -176,7 +176,7 @@ static int compare_results(const bench_job *job, const void *batch)
                     i);
             return EXIT_FAILED;
         }
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 static int measure_rounds(const bench_job *job, query_session *s, int repeat, void *batch,
@@ -185,7 +185,7 @@ static int measure_rounds(const bench_job *job, query_session *s, int repeat, vo
     bench_metrics f[REPEAT_MAX] = { { 0 } };
     ebpo_error error = EBPO_ERROR_INIT;
     for (int i = 0; i < repeat; i++) {
-        ebpo_status status = bench_singly(job, s->context, r->clock_ns, &f[i], &error);
+        ebpo_status status = bench_each(job, s->context, r->clock_ns, &f[i], &error);
         if (status == EBPO_OK && i == 0)
             ebpo_model_get_stats(s->model, &r->model);
         if (status == EBPO_OK)
@@ -209,11 +209,11 @@ static void count_results(const bench_job *job, results *r)
         if (job->query == BENCH_INSIDE)
             r->counts[inside[i].where & 3]++;
         else if (job->query == BENCH_DISTANCE)
-            r->counts[isnan(distance[i].distance)   ? INTERVAL
-                      : isinf(distance[i].distance) ? NOTHING
-                                                    : FOUND]++;
+            r->counts[isnan(distance[i].distance)   ? RESULT_INTERVAL
+                      : isinf(distance[i].distance) ? RESULT_NONE
+                                                    : RESULT_FOUND]++;
         else
-            r->counts[hit[i].face != EBPO_NO_FACE ? FOUND : NOTHING]++;
+            r->counts[hit[i].face != EBPO_NO_FACE ? RESULT_FOUND : RESULT_NONE]++;
 }
 
 static int save_results(const bench_job *job, const char *path)
@@ -235,14 +235,14 @@ static int save_results(const bench_job *job, const char *path)
 }
 
 /* Checks outputs before measuring. */
-static int outputs_are_free(const values *v)
+static int check_outputs(const values *v)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     const char *const paths[] = { v->save_points, v->save_results };
     for (int i = 0; i < 2; i++)
         if (paths[i] && ebpo_check_output(paths[i], &error) != EBPO_OK)
             return command_failed("bench", &error);
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 /* --- output --- */
@@ -256,7 +256,7 @@ static int result_kinds(const values *v)
     return v->query == BENCH_INSIDE ? 4 : v->query == BENCH_DISTANCE ? 3 : 2;
 }
 
-static void print_results_of(const values *v, const results *r)
+static void print_counts(const values *v, const results *r)
 {
     int count = result_kinds(v);
     printf("\n%-12s", "results");
@@ -294,7 +294,7 @@ static void print_results(const values *v, const char *path, uint64_t count, con
            "one thread\n",
            r->clock_ns);
     print_opening(r);
-    print_results_of(v, r);
+    print_counts(v, r);
     printf("\n%-18s %15s %15s\n", "model", "after single", "at the end");
     stats_table(stdout, &r->model, &r->model_end);
     printf("%-18s %15s %15s\n", "process_peak", "",
@@ -385,30 +385,30 @@ static int bench_model(bench_job *job, const values *v, const bench_points *p, c
     bench_reset_peak();
     int code = cold_start(job, path, holding, &v->q.remote, &r);
     uint64_t begin = tool_clock();
-    if (code == EXIT_FINE)
+    if (code == EXIT_OK)
         code = query_open(&s, "bench", path, holding, job->inside.level, &v->q.remote);
     r.open_seconds = (double)(tool_clock() - begin) * 1e-9;
-    if (code == EXIT_FINE)
+    if (code == EXIT_OK)
         code = measure_rounds(job, &s, (int)v->repeat, batch, &r);
     if (s.file)
         r.traffic = traffic_of(s.file);
     query_close(&s);
-    if (code == EXIT_FINE && v->save_points)
+    if (code == EXIT_OK && v->save_points)
         code = bench_points_save(p, v->save_points);
-    if (code == EXIT_FINE && v->save_results)
+    if (code == EXIT_OK && v->save_results)
         code = save_results(job, v->save_results);
-    if (code != EXIT_FINE)
+    if (code != EXIT_OK)
         return code;
     count_results(job, &r);
     (v->q.json ? print_json : print_results)(v, remote_shown(path), job->count, &r);
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 static int prepare_points(const values *v, const char *path, bench_points *p)
 {
     points_kind kind = v->query >= BENCH_RAY ? POINTS_RAYS : POINTS;
     *p = (bench_points){ .rows = NULL };
-    if (!command_wants_hdf5("bench", path) || outputs_are_free(v) != EXIT_FINE)
+    if (!command_wants_hdf5("bench", path) || check_outputs(v) != EXIT_OK)
         return EXIT_FAILED;
     return bench_points_make(p, kind, path, &v->q.remote, v->points, v->q.raw, (uint64_t)v->count,
                              (uint64_t)v->seed, v->q.tmax);
@@ -439,10 +439,10 @@ static int run_bench(void *given, const char **operand)
     void *batch = calloc(p.count + 1, bytes);
     job.result_values = calloc(p.count + 1, bytes);
     job.ns = calloc(p.count + 1, sizeof *job.ns);
-    if (code == EXIT_FINE && (!batch || !job.result_values || !job.ns)) {
+    if (code == EXIT_OK && (!batch || !job.result_values || !job.ns)) {
         code = command_no_memory("bench");
     }
-    if (code == EXIT_FINE)
+    if (code == EXIT_OK)
         code = bench_model(&job, v, &p, operand[0], &holding, batch);
     free(batch);
     free(job.result_values);

@@ -80,13 +80,13 @@ typedef struct cell_result {
 
 static bool is_exact(const cell_result *a) { return a->exact.volume.kind == EBPO_VALUE_EXACT; }
 
-static int32_t metric_of(const cell_result *a)
+static int32_t volume_kind(const cell_result *a)
 {
     return is_exact(a) ? (int32_t)EBPO_VALUE_EXACT : a->cells.kind;
 }
 
 /* Writes why the volume is not exact. */
-static void report_why(const cell_result *a, char *out, size_t capacity)
+static void explain_bound(const cell_result *a, char *out, size_t capacity)
 {
     const ebpo_exact_volume *e = &a->exact;
     uint32_t i = e->operand[0], k = e->operand[1];
@@ -112,13 +112,13 @@ static void report_why(const cell_result *a, char *out, size_t capacity)
     }
 }
 
-static const char *const metric_words[] = { "exact", "interval", "bound" };
+static const char *const volume_kinds[] = { "exact", "interval", "bound" };
 
 static void print_volume(const cell_result *a)
 {
     const ebpo_boolean_volume *b = &a->cells;
     char why[1024], exact[32], lo[32], hi[32], cell[TABLE_CELL];
-    report_why(a, why, sizeof why);
+    explain_bound(a, why, sizeof why);
     if (is_exact(a))
         printf("volume    %s, exact but for one rounding\n",
                table_in_range(a->exact.scaled, a->exact.exponent)
@@ -144,13 +144,13 @@ static void volume_to_json(json *j, const cell_result *a)
 {
     const ebpo_boolean_volume *b = &a->cells;
     char why[1024];
-    report_why(a, why, sizeof why);
+    explain_bound(a, why, sizeof why);
     for (int i = 0; i < 2; i++)
         if (is_exact(a))
             table_json(j, i ? "volume_hi" : "volume_lo", a->exact.scaled, a->exact.exponent);
         else
             json_real(j, i ? "volume_hi" : "volume_lo", i ? b->hi : b->lo);
-    json_text(j, "volume_kind", metric_words[metric_of(a)]);
+    json_text(j, "volume_kind", volume_kinds[volume_kind(a)]);
     if (is_exact(a))
         json_null(j, "not_exact");
     else
@@ -207,8 +207,8 @@ static void print_cells(const cell_result *a)
 
 /* --- points --- */
 
-static ebpo_status result_points(const values *v, ebpo_boolean *b, const double *rows,
-                                 uint64_t count, ebpo_boolean_result *results, ebpo_error *error)
+static ebpo_status compute_points(const values *v, ebpo_boolean *b, const double *rows,
+                                  uint64_t count, ebpo_boolean_result *results, ebpo_error *error)
 {
     ebpo_boundary_options how = EBPO_BOUNDARY_OPTIONS_INIT;
     how.tolerance = v->tolerance;
@@ -234,16 +234,16 @@ static int query_points(const values *v, ebpo_boolean *b)
     ebpo_boolean_result *results = malloc(sizeof *results * POINTS_BATCH);
     bool opened =
         points_open(&in, "boolean", v->inside ? v->inside : v->distance, POINTS, false, INFINITY);
-    int code = !rows || !results ? command_no_memory("boolean") : opened ? EXIT_FINE : EXIT_FAILED;
+    int code = !rows || !results ? command_no_memory("boolean") : opened ? EXIT_OK : EXIT_FAILED;
     uint64_t count = 0;
     in.header = v->query.header;
-    while (code == EXIT_FINE && (count = points_next(&in, rows)) > 0) {
-        if (result_points(v, b, rows, count, results, &error) != EBPO_OK)
+    while (code == EXIT_OK && (count = points_next(&in, rows)) > 0) {
+        if (compute_points(v, b, rows, count, results, &error) != EBPO_OK)
             code = command_failed("boolean", &error);
         if (!command_flush("boolean"))
             code = EXIT_FAILED;
     }
-    if (code == EXIT_FINE && in.failed)
+    if (code == EXIT_OK && in.failed)
         code = EXIT_FAILED;
     points_close(&in);
     free(results);
@@ -298,8 +298,8 @@ static ebpo_status write_cells(const ebpo_boolean_cells *cells, cell_result *a,
     return status;
 }
 
-static ebpo_status result_cells(cell_result *a, ebpo_boolean *b, ebpo_progress progress,
-                                ebpo_error *error)
+static ebpo_status compute_cells(cell_result *a, ebpo_boolean *b, ebpo_progress progress,
+                                 ebpo_error *error)
 {
     ebpo_boolean_cells *cells = NULL;
     ebpo_volume_options measuring = EBPO_VOLUME_OPTIONS_INIT;
@@ -335,12 +335,12 @@ static int make_cells(const values *v, const char **models, ebpo_boolean *b)
                       .cells = EBPO_BOOLEAN_VOLUME_INIT,
                       .volume = v->volume || !v->out };
     ebpo_progress progress = progress_start(&line, "boolean", v->query.json);
-    ebpo_status status = result_cells(&a, b, progress, &error);
+    ebpo_status status = compute_cells(&a, b, progress, &error);
     progress_wipe(&line);
     if (status != EBPO_OK)
         return command_failed("boolean", &error);
     print_cells(&a);
-    return command_flush("boolean") ? EXIT_FINE : EXIT_FAILED;
+    return command_flush("boolean") ? EXIT_OK : EXIT_FAILED;
 }
 
 /* --- all of it --- */
@@ -365,12 +365,12 @@ static int check_values(const values *v, const char **models, uint32_t count)
     for (uint32_t i = 0; v->out && i < count; i++)
         if (command_overwrites("boolean", models[i], v->out))
             return EXIT_USAGE;
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
-static int result_expression(const values *v, const boolean_nodes *nodes,
-                             const query_session *sessions, const ebpo_pose *poses,
-                             const char **models, uint32_t count)
+static int evaluate_expression(const values *v, const boolean_nodes *nodes,
+                               const query_session *sessions, const ebpo_pose *poses,
+                               const char **models, uint32_t count)
 {
     ebpo_boolean_operand operands[MODELS];
     ebpo_boolean *b;
@@ -408,10 +408,10 @@ static int run_boolean(void *given, const char **operand)
         !query_options_from("boolean", &v->query, &holding, &inside, &distance))
         return EXIT_USAGE;
     int code = check_values(v, models, count);
-    for (uint32_t i = 0; i < count && code == EXIT_FINE; i++)
+    for (uint32_t i = 0; i < count && code == EXIT_OK; i++)
         code = query_open(&sessions[i], "boolean", models[i], &holding, -1, &v->query.remote);
-    if (code == EXIT_FINE)
-        code = result_expression(v, &nodes, sessions, poses, models, count);
+    if (code == EXIT_OK)
+        code = evaluate_expression(v, &nodes, sessions, poses, models, count);
     for (uint32_t i = 0; i < count; i++)
         query_close(&sessions[i]);
     return code;

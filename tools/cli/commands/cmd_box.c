@@ -7,8 +7,8 @@
 
 #include "cli/options/box.inc"
 
-static ebpo_status result_boxes(const query_job *job, query_worker *w, const double *rows,
-                                uint64_t count, ebpo_error *error)
+static ebpo_status compute_boxes(const query_job *job, query_worker *w, const double *rows,
+                                 uint64_t count, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < count && status == EBPO_OK && !result_text_is_over(w->text); i++) {
@@ -43,8 +43,8 @@ static int run_box(void *given, const char **operand)
     query_job job = { .command = "box",
                       .values = v,
                       .kind = POINTS_BOXES,
-                      .parts_share = 0.25, /* docs/measured/queries.md */
-                      .result = result_boxes,
+                      .subtree_overhead = 0.25, /* docs/measured/queries.md */
+                      .result = compute_boxes,
                       .columns = box_columns,
                       .dtype = box_dtype };
     return query_run(&job, operand[0], operand[1]);

@@ -31,21 +31,21 @@ static const values standard = { .out = NULL };
 /* Contents of a header, or why it could not be read. */
 typedef struct entry {
     bool known;
-    char *why;
-    char *path;  /* as in the catalogue */
-    char *shown; /* below the folder, as in messages */
+    char *reason;
+    char *path;       /* as in the catalogue */
+    char *shown_path; /* relative to the folder, for messages */
     ebpo_catalogue_entry reported;
 } entry;
 
 typedef struct catalogue {
     const values *v;
     const char *folder;
-    char *from; /* prefix of paths in the catalogue: "" or "north/" */
+    char *path_prefix; /* prefix of paths in the catalogue: "" or "north/" */
     char *out;
     folder_files files;
     entry *entry; /* [files.count] */
     progress_line *progress;
-    pthread_mutex_t lock; /* protects the line and the two below */
+    pthread_mutex_t lock; /* protects `progress`, `taken` and `done` */
     size_t taken, done;
     atomic_bool no_memory;
     /* totals of all models */
@@ -73,15 +73,15 @@ static bool is_utf8(const char *text)
     return true;
 }
 
-static void leave_out(catalogue *c, entry *e, const char *why)
+static void omit_entry(catalogue *c, entry *e, const char *reason)
 {
     e->known = false;
-    e->why = strdup(why);
-    if (!e->why)
+    e->reason = strdup(reason);
+    if (!e->reason)
         c->no_memory = true;
 }
 
-static void inspect_file_one(catalogue *c, size_t number)
+static void read_entry(catalogue *c, size_t number)
 {
     entry *e = &c->entry[number];
     const char *path = c->files.path[number];
@@ -92,33 +92,33 @@ static void inspect_file_one(catalogue *c, size_t number)
     how.max_expansion = c->v->max_expansion;
     if (asprintf(&name, "%s/%s", c->folder, path) < 0)
         name = NULL;
-    if (asprintf(&e->path, "%s%s", c->from, path) < 0)
+    if (asprintf(&e->path, "%s%s", c->path_prefix, path) < 0)
         e->path = NULL;
-    e->shown = folder_files_shown(path);
-    if (!name || !e->path || !e->shown) {
+    e->shown_path = folder_files_shown(path);
+    if (!name || !e->path || !e->shown_path) {
         c->no_memory = true;
     } else if (!is_utf8(e->path)) {
-        leave_out(c, e, "its name is not UTF-8; give it another one");
+        omit_entry(c, e, "its name is not UTF-8; give it another one");
     } else if (remote_open(&file, name, &how, &error) == EBPO_OK) {
         ebpo_catalogue_entry_of(file, e->path, &e->reported);
         e->known = true;
         if (!has_box(&e->reported))
-            leave_out(c, e, "has no box, as it has no faces");
+            omit_entry(c, e, "has no box, as it has no faces");
     } else {
-        leave_out(c, e, error.message[0] ? error.message : ebpo_status_name(error.status));
+        omit_entry(c, e, error.message[0] ? error.message : ebpo_status_name(error.status));
     }
     ebpo_close(file);
     free(name);
 }
 
-static void *inspect_files(void *user)
+static void *read_entries(void *user)
 {
     catalogue *c = user;
     pthread_mutex_lock(&c->lock);
     while (c->taken < c->files.count) {
         size_t number = c->taken++;
         pthread_mutex_unlock(&c->lock);
-        inspect_file_one(c, number);
+        read_entry(c, number);
         pthread_mutex_lock(&c->lock);
         progress_report(c->progress, "heads", ++c->done, c->files.count);
     }
@@ -133,7 +133,7 @@ static size_t threads_for(const catalogue *c)
     return wanted < c->files.count ? wanted : c->files.count;
 }
 
-static bool inspect_all(catalogue *c)
+static bool read_all(catalogue *c)
 {
     pthread_t thread[THREADS_MAX];
     size_t wanted = threads_for(c), started = 0;
@@ -141,9 +141,9 @@ static bool inspect_all(catalogue *c)
     if (!c->entry)
         return false;
     pthread_mutex_init(&c->lock, NULL);
-    while (started + 1 < wanted && command_thread(&thread[started], inspect_files, c) == 0)
+    while (started + 1 < wanted && command_thread(&thread[started], read_entries, c) == 0)
         started++;
-    inspect_files(c);
+    read_entries(c);
     while (started > 0)
         pthread_join(thread[--started], NULL);
     pthread_mutex_destroy(&c->lock);
@@ -151,7 +151,7 @@ static bool inspect_all(catalogue *c)
     return !c->no_memory;
 }
 
-static void add_up(catalogue *c)
+static void sum_models(catalogue *c)
 {
     for (int k = 0; k < 3; k++) {
         c->min[k] = DBL_MAX;
@@ -217,8 +217,8 @@ static int find_relative_path(catalogue *c)
     bool reached = b || errno == ENOMEM;
     if (!reached)
         fprintf(stderr, "ebpo catalogue: %s: %s\n", a ? c->folder : c->out, strerror(errno));
-    c->from = b ? relative_path(a, b) : NULL;
-    int code = c->from ? EXIT_FINE : reached ? command_no_memory("catalogue") : EXIT_FAILED;
+    c->path_prefix = b ? relative_path(a, b) : NULL;
+    int code = c->path_prefix ? EXIT_OK : reached ? command_no_memory("catalogue") : EXIT_FAILED;
     free(a);
     free(b);
     return code;
@@ -251,7 +251,7 @@ static int write_all(const catalogue *c)
     ebpo_catalogue_free(made);
     free(entries);
     free(folder);
-    return status == EBPO_OK ? EXIT_FINE : command_failed("catalogue", &error);
+    return status == EBPO_OK ? EXIT_OK : command_failed("catalogue", &error);
 }
 
 /* --- output --- */
@@ -267,9 +267,9 @@ static void report_omitted(const catalogue *c)
         const entry *e = &c->entry[i];
         if (e->known)
             continue;
-        bool named = strstr(e->why, e->shown) != NULL;
-        fprintf(stderr, "ebpo catalogue: omitted: %s%s%s\n", named ? "" : e->shown,
-                named ? "" : ": ", e->why);
+        bool named = strstr(e->reason, e->shown_path) != NULL;
+        fprintf(stderr, "ebpo catalogue: omitted: %s%s%s\n", named ? "" : e->shown_path,
+                named ? "" : ": ", e->reason);
     }
 }
 
@@ -291,7 +291,7 @@ static void print_json(const catalogue *c)
         if (!c->entry[i].known) {
             json_object(&j, NULL);
             json_text(&j, "path", c->files.path[i]);
-            json_text(&j, "why", c->entry[i].why);
+            json_text(&j, "why", c->entry[i].reason);
             json_end(&j);
         }
     json_end(&j);
@@ -340,11 +340,11 @@ static int make_catalogue(catalogue *c)
     if (ebpo_check_output(c->out, &error) != EBPO_OK)
         return command_failed("catalogue", &error);
     int code = find_relative_path(c);
-    if (code != EXIT_FINE || overwrites_model(c, &code))
+    if (code != EXIT_OK || overwrites_model(c, &code))
         return code;
-    if (!inspect_all(c))
+    if (!read_all(c))
         return command_no_memory("catalogue");
-    add_up(c);
+    sum_models(c);
     report_omitted(c);
     if (!c->models) {
         fprintf(stderr,
@@ -354,13 +354,13 @@ static int make_catalogue(catalogue *c)
         return EXIT_FAILED;
     }
     code = write_all(c);
-    if (code != EXIT_FINE)
+    if (code != EXIT_OK)
         return code;
     if (c->v->json)
         print_json(c);
     else if (!c->v->quiet)
         print_words(c);
-    return count_omitted(c) ? EXIT_DIFFERS : EXIT_FINE;
+    return count_omitted(c) ? EXIT_DIFFERS : EXIT_OK;
 }
 
 static int run_catalogue(void *given, const char **operand)
@@ -381,12 +381,12 @@ static int run_catalogue(void *given, const char **operand)
         c.out = NULL;
     int code = c.out ? make_catalogue(&c) : command_no_memory("catalogue");
     for (size_t i = 0; c.entry && i < c.files.count; i++) {
-        free(c.entry[i].why);
+        free(c.entry[i].reason);
         free(c.entry[i].path);
-        free(c.entry[i].shown);
+        free(c.entry[i].shown_path);
     }
     free(c.entry);
-    free(c.from);
+    free(c.path_prefix);
     free(c.out);
     free(folder);
     folder_files_free(&c.files);

@@ -23,22 +23,22 @@
 
 /* --- positions of findings --- */
 
-typedef struct reporting {
+typedef struct finding_printer {
     json *j; /* NULL: words, if `words` */
     bool words;
     progress_line *line;
     uint64_t count[EBPO_FINDING_KINDS];
-} reporting;
+} finding_printer;
 
 /* Returns false when `to` is neither "all" nor the name of a PLY file. */
-static bool check_findings_good(const char *to)
+static bool is_findings_target(const char *to)
 {
     size_t length = strlen(to);
     return strcmp(to, "all") == 0 || (length > 4 && strcasecmp(to + length - 4, ".ply") == 0);
 }
 
-/* Returns the PLY that `to` names; NULL: "all". */
-static const char *check_findings_ply(const char *to) { return strcmp(to, "all") == 0 ? NULL : to; }
+/* Returns the path of the PLY file that `to` names; NULL: `to` is "all". */
+static const char *findings_ply_path(const char *to) { return strcmp(to, "all") == 0 ? NULL : to; }
 
 static void finding_json(json *j, const ebpo_mesh_finding *p)
 {
@@ -83,7 +83,7 @@ static void finding_words(const ebpo_mesh_finding *p)
 
 static bool take_finding(void *user, const ebpo_mesh_finding *p)
 {
-    reporting *t = user;
+    finding_printer *t = user;
     bool first = t->count[p->kind]++ == 0;
     if (!t->j && !t->words)
         return true;
@@ -92,7 +92,7 @@ static bool take_finding(void *user, const ebpo_mesh_finding *p)
         finding_json(t->j, p);
     } else {
         if (first)
-            printf("  %s:\n", findings_many(ebpo_finding_name(p->kind)));
+            printf("  %s:\n", findings_plural(ebpo_finding_name(p->kind)));
         finding_words(p);
     }
     return true;
@@ -106,21 +106,21 @@ static void print_legend(const char *path, const uint64_t count[EBPO_FINDING_KIN
         ebpo_finding_colour(kind, rgb);
         if (count[kind])
             printf("    %3u %3u %3u  %llu %s\n", rgb[0], rgb[1], rgb[2],
-                   (unsigned long long)count[kind], findings_many(ebpo_finding_name(kind)));
+                   (unsigned long long)count[kind], findings_plural(ebpo_finding_name(kind)));
     }
 }
 
-/* Prints all positions, or writes the picture and prints its legend. `j`: into its open object
- * instead; NULL: words, unless `quiet`. */
+/* Prints all positions, or writes the coloured PLY file and prints its legend. `j`: writes JSON
+ * into the open object instead; NULL: words, unless `quiet`. */
 static ebpo_status check_findings(const ebpo_mesh *mesh, const char *to, unsigned threads,
                                   ebpo_progress progress, json *j, bool quiet, progress_line *line,
                                   ebpo_error *error)
 {
     ebpo_findings_options how = EBPO_FINDINGS_OPTIONS_INIT;
-    reporting t = { .j = j, .line = line };
+    finding_printer t = { .j = j, .line = line };
     how.threads = threads;
     how.progress = progress;
-    how.ply = check_findings_ply(to);
+    how.ply = findings_ply_path(to);
     t.words = !quiet && !how.ply;
     if (j)
         json_array(j, "locations");
@@ -136,7 +136,7 @@ static ebpo_status check_findings(const ebpo_mesh *mesh, const char *to, unsigne
 /* --- the command --- */
 
 typedef struct values {
-    repairing repair_record;
+    repair_request repairs_wanted;
     bool require_solid, crossings, json, quiet;
     const char *out, *findings;
     int64_t threads;
@@ -145,7 +145,7 @@ typedef struct values {
 
 #include "cli/options/check.inc"
 
-/* Leaves the outermost object open. */
+/* Prints the reports as JSON; the outermost object stays open. */
 static void print_json(json *j, const mesh_input *p, const char *path)
 {
     ebpo_solid_volume before = mesh_input_solid(p, false), after = mesh_input_solid(p, true);
@@ -225,9 +225,9 @@ static ebpo_status check_mesh(const values *v, const char *path, mesh_input *p,
 {
     progress_line line;
     ebpo_progress progress = progress_start(&line, "check", v->quiet);
-    repairing repair_record = v->repair_record;
-    repair_record.advise = true;
-    ebpo_status status = mesh_input_read(p, path, repair_record, READ_MESH, workspace,
+    repair_request repairs_wanted = v->repairs_wanted;
+    repairs_wanted.advise = true;
+    ebpo_status status = mesh_input_read(p, path, repairs_wanted, READ_MESH, workspace,
                                          (unsigned)v->threads, progress, error);
     progress_wipe(&line);
     if (status != EBPO_OK)
@@ -242,16 +242,16 @@ static const values standard = { 0 };
 static int run_check(void *given, const char **operand)
 {
     values *v = given;
-    if (!memory_good("check", &v->memory) || repair_check("check", v->repair_record) != EXIT_FINE)
+    if (!memory_check("check", &v->memory) || repair_check("check", v->repairs_wanted) != EXIT_OK)
         return EXIT_USAGE;
     if (v->crossings && !EBPO_HAVE_EXTRAS)
         return command_usage("check", "this program was built without --crossings "
                                       "(-Dextras=disabled); build it with -Dextras=enabled");
     if (v->out && !v->crossings)
         return command_usage("check", "--output needs --crossings; give both");
-    if (v->findings && !check_findings_good(v->findings))
+    if (v->findings && !is_findings_target(v->findings))
         return command_usage("check", "--findings takes 'all', or a file whose name ends in .ply");
-    const char *picture = v->findings ? check_findings_ply(v->findings) : NULL;
+    const char *picture = v->findings ? findings_ply_path(v->findings) : NULL;
     if (picture && command_overwrites("check", operand[0], picture))
         return EXIT_USAGE;
     if (picture && v->out && command_overwrites("check", v->out, picture))
@@ -265,13 +265,13 @@ static int run_check(void *given, const char **operand)
     if (status == EBPO_OK && picture)
         status = ebpo_check_output(picture, &error);
     if (status == EBPO_OK)
-        status = memory_make(&workspace, &v->memory, &error);
+        status = memory_new(&workspace, &v->memory, &error);
     if (status == EBPO_OK)
         status = check_mesh(v, operand[0], &p, workspace, &error);
     ebpo_workspace_free(workspace);
     if (status != EBPO_OK)
         return command_failed("check", &error);
-    return v->require_solid && p.doubts ? EXIT_NOT_SOLID : EXIT_FINE;
+    return v->require_solid && p.doubts ? EXIT_NOT_SOLID : EXIT_OK;
 }
 
 const command command_check = { &spec, sizeof standard, &standard, run_check };

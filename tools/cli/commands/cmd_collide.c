@@ -21,15 +21,15 @@
 
 /* --- distance, depth and relation --- */
 
-/* Options as given; not given: a tolerance of 0, an at_least below 0. */
-typedef struct collide_far {
+/* Options as given. If not given, `tolerance` is 0, and `at_least` is below 0. */
+typedef struct measure_values {
     bool distance, depth;
     double tolerance, at_least;
     const char *separation; /* X Y Z, or NULL */
-    double direction[3];    /* set by collide_far_fits */
-} collide_far;
+    double direction[3];    /* set by measures_fit */
+} measure_values;
 
-#define COLLIDE_FAR_INIT                           \
+#define MEASURE_VALUES_INIT                        \
     {                                              \
         false, false, 0.0, -1.0, NULL, { 0, 0, 0 } \
     }
@@ -41,9 +41,9 @@ static const char *const collide_relations[] = { "DISJOINT",   "TOUCHING",   "IN
                                                  "A_INSIDE_B", "B_INSIDE_A", "EQUAL",
                                                  "not known" };
 
-/* Finds the relation of models whose faces do not intersect: *relation is the name of an
- * ebpo_relation; NULL: they are DISJOINT, or faces intersect after all. */
-static ebpo_status collide_unmet(ebpo_collider *c, const ebpo_collide_options *how,
+/* Finds the relation of two models of which no intersecting faces are known. *relation is the name
+ * of an ebpo_relation; NULL: the models are DISJOINT, or faces intersect. */
+static ebpo_status find_relation(ebpo_collider *c, const ebpo_collide_options *how,
                                  const char **relation, ebpo_error *error)
 {
     ebpo_relation_result r;
@@ -58,9 +58,9 @@ static ebpo_status collide_unmet(ebpo_collider *c, const ebpo_collide_options *h
     return EBPO_OK;
 }
 
-/* Prints the relation at the end of the line: " NAME", or as a member of JSON. NULL: prints
+/* Prints the relation at the end of the line as " NAME", or as a member of JSON. NULL: prints
  * nothing. */
-static void collide_print_unmet(bool as_json, const char *relation)
+static void print_relation(bool as_json, const char *relation)
 {
     bool open = relation == collide_relations[EBPO_RELATION_OPEN];
     if (relation && as_json)
@@ -85,18 +85,17 @@ static bool read_direction(const char *text, double out[3])
     return text[strspn(text, " \t")] == '\0';
 }
 
-static bool collide_far_requested(const collide_far *f)
+static bool measures_requested(const measure_values *f)
 {
     return f->distance || f->depth || f->separation;
 }
 
-/* Returns false, with a message on standard error, for options that cannot be combined. others:
- * --all or --self. */
-static bool collide_far_fits(collide_far *f, bool others)
+/* Returns false, with a message on standard error, for options that cannot be combined. `others`:
+ * --all or --self was given. */
+static bool measures_fit(measure_values *f, bool others)
 {
     const char *wrong = NULL;
-    if ((collide_far_requested(f) && others) ||
-        f->distance + f->depth + (f->separation != NULL) > 1 ||
+    if ((measures_requested(f) && others) || f->distance + f->depth + (f->separation != NULL) > 1 ||
         (!f->distance && !f->depth && f->tolerance > 0))
         wrong =
             "--distance, --depth and --separation take neither --all nor --self nor each other, "
@@ -148,7 +147,7 @@ static void print_clearance_pair(bool as_json, const ebpo_clearance *c)
 /* Ends the line, with the relation of models that overlap as sets of points. */
 static void print_end(bool as_json, const char *relation)
 {
-    collide_print_unmet(as_json, relation);
+    print_relation(as_json, relation);
     puts(as_json ? "}" : "");
 }
 
@@ -169,7 +168,7 @@ static void print_at_least(bool as_json, const ebpo_clearance *c, const char *re
     print_end(as_json, relation);
 }
 
-static ebpo_status query_distance(const collide_far *f, bool as_json, ebpo_collider *c,
+static ebpo_status query_distance(const measure_values *f, bool as_json, ebpo_collider *c,
                                   const ebpo_collide_options *how, ebpo_error *error)
 {
     ebpo_clearance_options wanted = EBPO_CLEARANCE_OPTIONS_INIT;
@@ -179,11 +178,11 @@ static ebpo_status query_distance(const collide_far *f, bool as_json, ebpo_colli
     ebpo_status status = ebpo_collide_distance(c, how, &wanted, &got, error);
     if (status != EBPO_OK)
         return status;
-    /* when faces intersect, or nothing is known of them, the line already reports it */
+    /* otherwise the line already reports that faces intersect, or that nothing is known */
     bool apart = got.distance.lo > 0 || (got.at_least >= 0 && got.distance.hi > 0);
     const char *relation = NULL;
     if (apart)
-        status = collide_unmet(c, how, &relation, error);
+        status = find_relation(c, how, &relation, error);
     if (status != EBPO_OK)
         return status;
     if (f->at_least >= 0)
@@ -207,7 +206,7 @@ static void print_depth(bool as_json, const char *name, bool solid, const ebpo_c
     printf("%s", as_json ? "}" : "");
 }
 
-static ebpo_status query_depth(const collide_far *f, bool as_json, ebpo_collider *c,
+static ebpo_status query_depth(const measure_values *f, bool as_json, ebpo_collider *c,
                                const ebpo_collide_options *how, ebpo_error *error)
 {
     ebpo_certain depth[2] = { { 0, 0, 0, 0 }, { 0, 0, 0, 0 } };
@@ -230,7 +229,7 @@ static ebpo_status query_depth(const collide_far *f, bool as_json, ebpo_collider
 
 /* --- separation distance along a direction --- */
 
-static ebpo_status query_separation(const collide_far *f, bool as_json, ebpo_collider *c,
+static ebpo_status query_separation(const measure_values *f, bool as_json, ebpo_collider *c,
                                     const ebpo_collide_options *how, ebpo_error *error)
 {
     static const char *const metrics[] = { "exact", "interval", "bound" };
@@ -251,8 +250,8 @@ static ebpo_status query_separation(const collide_far *f, bool as_json, ebpo_col
     return EBPO_OK;
 }
 
-static ebpo_status collide_far_query(const collide_far *f, bool as_json, ebpo_collider *c,
-                                     const ebpo_collide_options *how, ebpo_error *error)
+static ebpo_status query_measures(const measure_values *f, bool as_json, ebpo_collider *c,
+                                  const ebpo_collide_options *how, ebpo_error *error)
 {
     return f->separation ? query_separation(f, as_json, c, how, error)
            : f->distance ? query_distance(f, as_json, c, how, error)
@@ -266,7 +265,7 @@ typedef struct collide_values {
     const char *pose_a, *pose_b, *out;
     bool first, self, relation, quiet;
     uint64_t printed; /* pairs */
-    collide_far far;
+    measure_values measures;
 } collide_values;
 
 #include "cli/options/collide.inc"
@@ -304,7 +303,7 @@ static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
     return command_flush("collide");
 }
 
-/* -1 .. 1 */
+/* Words for the values -1, 0 and 1. */
 static const char *const truths[] = { "null", "false", "true" };
 
 /* Prints the line for models whose faces do not intersect. For all pairs, JSON has an object for
@@ -314,11 +313,11 @@ static ebpo_status print_none(const collide_values *v, ebpo_collider *c,
 {
     const char *relation;
     bool as_json = v->query.json;
-    ebpo_status status = collide_unmet(c, how, &relation, error);
+    ebpo_status status = find_relation(c, how, &relation, error);
     if (status != EBPO_OK || (as_json && v->query.all && !relation))
         return status;
     printf(as_json ? "{\"kind\": \"APART\"" : "none");
-    collide_print_unmet(as_json, relation);
+    print_relation(as_json, relation);
     puts(as_json ? "}" : "");
     return EBPO_OK;
 }
@@ -357,7 +356,7 @@ static ebpo_status query_relation(const collide_values *v, ebpo_collider *c,
     return EBPO_OK;
 }
 
-/* -1 .. 1 */
+/* Words for the values -1, 0 and 1. */
 static const char *const words[] = { "possible", "apart", "meeting" };
 
 static void print_levels(bool as_json, const ebpo_level_result *r)
@@ -409,7 +408,7 @@ static ebpo_status write_pairs(const collide_values *v, ebpo_collider *c,
     if (v->quiet)
         return status;
     if (status == EBPO_OK)
-        status = collide_unmet(c, how, &relation, error);
+        status = find_relation(c, how, &relation, error);
     if (status == EBPO_OK)
         fprintf(stderr, "%s: %s%s%s\n", v->out,
                 ply ? "both models, with intersecting faces in red"
@@ -429,8 +428,8 @@ static ebpo_status query_all(collide_values *v, ebpo_collider *c, const ebpo_col
         status = query_relation(v, c, how, error);
     if (status == EBPO_OK && v->out)
         status = write_pairs(v, c, how, error);
-    if (status == EBPO_OK && collide_far_requested(&v->far))
-        return collide_far_query(&v->far, v->query.json, c, how, error);
+    if (status == EBPO_OK && measures_requested(&v->measures))
+        return query_measures(&v->measures, v->query.json, c, how, error);
     if (status == EBPO_OK && (v->query.all || v->self))
         return query_pairs(v, c, how, error);
     bool other = v->relation || v->out;
@@ -488,7 +487,7 @@ static int query_collider(collide_values *v, ebpo_model *a, ebpo_model *b,
     ebpo_collider_free(c);
     if (status != EBPO_OK)
         return command_failed("collide", &error);
-    return command_flush("collide") ? EXIT_FINE : EXIT_FAILED;
+    return command_flush("collide") ? EXIT_OK : EXIT_FAILED;
 }
 
 /* --memory applies to both models together: both are loaded completely if they fit, else both in
@@ -528,24 +527,24 @@ static void default_memory(const query_session *a, const query_session *b,
         model_memory_report_least("collide", "both models", least, half);
 }
 
-static int open_both(query_session *a, query_session *b, const collide_values *v,
-                     const char **operand, ebpo_model_options *holding)
+static int open_models(query_session *a, query_session *b, const collide_values *v,
+                       const char **operand, ebpo_model_options *holding)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     const char *path[2] = { operand[0], operand[1] };
     bool one = v->self || strcmp(path[0], path[1]) == 0; /* then it is loaded once */
     int level = (int)v->query.level;
     int code = query_open_file(a, "collide", path[0], holding, level, &v->query.remote);
-    if (code == EXIT_FINE && !one)
+    if (code == EXIT_OK && !one)
         code = query_open_file(b, "collide", path[1], holding, level, &v->query.remote);
-    if (code == EXIT_FINE && !v->query.memory && holding->cut_level < 0)
+    if (code == EXIT_OK && !v->query.memory && holding->cut_level < 0)
         default_memory(a, one ? NULL : b, path, holding);
-    if (code == EXIT_FINE && !one && holding->memory &&
+    if (code == EXIT_OK && !one && holding->memory &&
         share_memory(a, b, holding, &error) != EBPO_OK)
         return command_failed("collide", &error);
-    if (code == EXIT_FINE)
+    if (code == EXIT_OK)
         code = query_open_model(a, "collide", holding);
-    if (code == EXIT_FINE && !one)
+    if (code == EXIT_OK && !one)
         code = query_open_model(b, "collide", holding);
     return code;
 }
@@ -560,19 +559,19 @@ static int run_collide(void *given, const char **operand)
     query_session a = QUERY_SESSION_INIT, b = QUERY_SESSION_INIT;
     if (v->self == (operand[1] != NULL))
         return command_usage("collide", "expected two models, or one model and --self");
-    if (!collide_far_fits(&v->far, v->query.all || v->self))
+    if (!measures_fit(&v->measures, v->query.all || v->self))
         return EXIT_USAGE;
     if (v->self && (v->query.all || v->pose_a || v->pose_b || v->relation || v->out))
         return command_usage("collide",
                              "--self takes neither --all nor poses, --relation or --output");
-    if (v->first && (v->self || v->query.all || collide_far_requested(&v->far)))
+    if (v->first && (v->self || v->query.all || measures_requested(&v->measures)))
         return command_usage("collide", "--first takes neither --all, --self, --distance, --depth "
                                         "nor --separation");
     if (v->out && !words_end_with(v->out, ".h5") && !words_end_with(v->out, ".ply"))
         return command_usage("collide", "--output %s: expected a name that ends in .h5 or .ply",
                              v->out);
     if (v->query.level >= 0 && (v->first || v->self || v->query.all ||
-                                collide_far_requested(&v->far) || v->relation || v->out))
+                                measures_requested(&v->measures) || v->relation || v->out))
         return command_usage("collide", "--max-level allows no other query");
     if (!read_pose("pose-a", v->pose_a, &how.pose_a) ||
         !read_pose("pose-b", v->pose_b, &how.pose_b) ||
@@ -581,8 +580,8 @@ static int run_collide(void *given, const char **operand)
     how.deadline_ns = distance.deadline_ns;
     how.level = distance.level;
     setvbuf(stdout, NULL, _IOFBF, 1 << 18);
-    int code = open_both(&a, &b, v, operand, &holding);
-    if (code == EXIT_FINE)
+    int code = open_models(&a, &b, v, operand, &holding);
+    if (code == EXIT_OK)
         code = query_collider(v, a.model, b.model ? b.model : a.model, &how);
     query_close(&b);
     query_close(&a);
@@ -590,6 +589,7 @@ static int run_collide(void *given, const char **operand)
     return code;
 }
 
-static const collide_values standard = { .query = QUERY_VALUES_INIT, .far = COLLIDE_FAR_INIT };
+static const collide_values standard = { .query = QUERY_VALUES_INIT,
+                                         .measures = MEASURE_VALUES_INIT };
 
 const command command_collide = { &spec, sizeof standard, &standard, run_collide };

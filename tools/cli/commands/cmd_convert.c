@@ -10,7 +10,7 @@
 
 #include "cli/command.h"
 #include "cli/commands/commands.h"
-#include "cli/commands/convert_parts.h"
+#include "cli/commands/convert_pieces.h"
 #include "cli/commands/subset_run.h"
 #include "cli/file_facts.h"
 #include "cli/memory_args.h"
@@ -33,7 +33,8 @@ typedef struct convert_reported {
     const char *in, *out; /* `in` as in messages */
     bool piped;           /* the mesh came from standard input */
     bool json, quiet, timings;
-    bool repaired, chosen; /* --repair was given; the parts were chosen by size */
+    bool repair_requested; /* --repair was given */
+    bool chosen;           /* the parts were chosen by size */
     bool by_groups;        /* warnings are reported for each group, not here */
 } convert_reported;
 
@@ -58,7 +59,7 @@ static void convert_report_mesh(const convert_reported *t, const mesh_input *p)
         advice_warn(stderr, "convert", t->in, p);
 }
 
-/* --- five lines --- */
+/* --- the summary: five lines --- */
 
 static void print_what(const char *out, const ebpo_info *info)
 {
@@ -89,7 +90,7 @@ static void print_size(const ebpo_info *info, bool chosen, double seconds)
     if (info->source_size)
         printf(", %.0f %% of the source",
                100 * (double)info->file_bytes / (double)info->source_size);
-    subset_print_need(info, chosen);
+    subset_print_target(info, chosen);
     printf(", in %.1f s\n", seconds);
 }
 
@@ -97,7 +98,7 @@ static void print_levels(const ebpo_info *info, const ebpo_solid_volume *solid)
 {
     char first[TABLE_CELL], last[TABLE_CELL];
     int deepest = info->level_count - 1;
-    bool known = findings_knows(solid);
+    bool known = findings_volume_known(solid);
     printf("  levels    0 to %d", deepest);
     if (isfinite(facts_percent(info, solid, 0)) && info->parts & EBPO_PART_PLANES)
         printf(": envelopes of %s%s%s %% of the %s",
@@ -131,9 +132,9 @@ static void print_name(const char *name)
 static void print_next(const convert_reported *t, const ebpo_info *info, const mesh_input *p)
 {
     fputs("  next      ", stdout);
-    if (p->doubts && t->repaired) {
-        puts("--weld-distance where corners nearly coincide, or a mesh editor: no repair that is "
-             "tried leaves a plausible solid");
+    if (p->doubts && t->repair_requested) {
+        puts("no automatic repair gives a solid; try --weld-distance if corners nearly coincide, "
+             "or a mesh editor");
         return;
     }
     fputs(p->doubts ? "ebpo check" : "ebpo verify", stdout);
@@ -156,7 +157,7 @@ static void print_json(const convert_reported *t, const mesh_input *p, const ebp
     ebpo_solid_volume before = mesh_input_solid(p, false);
     json_begin(&j, stdout);
     json_object(&j, NULL);
-    facts_json(&j, t->out, info, stored, p->counted ? &p->shells : NULL);
+    facts_json(&j, t->out, info, stored, p->shells_counted ? &p->shells : NULL);
     json_object(&j, "input");
     findings_json_source(&j, "mesh", &p->as_read, p->unread);
     findings_json(&j, "report", &p->prepared.before, &before);
@@ -183,7 +184,7 @@ static ebpo_status convert_report_file(const convert_reported *t, const mesh_inp
         print_json(t, p, ebpo_file_info(file), &stored, line, stages, seconds);
     } else if (status == EBPO_OK) {
         const ebpo_info *info = ebpo_file_info(file);
-        ebpo_solid_volume solid = facts_solid(info, p->counted ? &p->shells : NULL);
+        ebpo_solid_volume solid = facts_solid(info, p->shells_counted ? &p->shells : NULL);
         if (t->timings)
             stages_print(stdout, line, stages, seconds);
         print_what(t->out, info);
@@ -206,7 +207,7 @@ typedef struct values {
     const char *k_root, *target_size, *subtree_faces, *parts;
     memory_values memory;
     int codec, face_coding, rule, profile;
-    repairing repair_record;
+    repair_request repairs_wanted;
     bool require_solid, split_components, split_groups, embed_textures, timings, json, quiet;
     const char *unit, *crs, *date;
 } values;
@@ -217,7 +218,8 @@ typedef struct values {
 
 #include "cli/options/convert.inc"
 
-/* Returns the parts of --parts, with the parts that these need; 0: the list is not valid. */
+/* Returns the parts of --parts. A list with minus signs also omits the parts that need an omitted
+ * one; any other list that lacks a needed part is not valid: 0. */
 static uint32_t listed_parts(const char *text)
 {
     uint32_t parts = 0;
@@ -235,7 +237,7 @@ static int check_parts(const values *v)
 {
     uint32_t parts;
     if (!v->parts)
-        return EXIT_FINE;
+        return EXIT_OK;
     if (v->profile >= 0)
         return command_usage("convert", "--parts and --profile cannot be used together");
     if (!subset_read_parts(v->parts, DEFAULT_PARTS, &parts))
@@ -246,7 +248,7 @@ static int check_parts(const values *v)
     if (v->embed_textures && !(parts & EBPO_PART_ATTRIBUTES && parts & EBPO_PART_MESH))
         return command_usage("convert", "--embed-textures needs the parts mesh and attributes: "
                                         "textures are among the attributes");
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 static int check_values(const values *v, const char *in, const char *out)
@@ -254,18 +256,18 @@ static int check_values(const values *v, const char *in, const char *out)
     selection_options chosen = { 1u << v->select, v->percent, v->epsilon,
                                  v->k_root,       v->normals, v->seed };
     int code = selection_check("convert", &chosen);
-    if (code != EXIT_FINE)
+    if (code != EXIT_OK)
         return code;
-    if (!memory_good("convert", &v->memory) ||
-        repair_check("convert", v->repair_record) != EXIT_FINE)
+    if (!memory_check("convert", &v->memory) ||
+        repair_check("convert", v->repairs_wanted) != EXIT_OK)
         return EXIT_USAGE;
     if (v->zstd_level && v->codec != EBPO_CODEC_ZSTD)
         return command_usage("convert", "--zstd-level does not apply to --codec deflate or none");
-    if (check_parts(v) != EXIT_FINE)
+    if (check_parts(v) != EXIT_OK)
         return EXIT_USAGE;
     if (v->split_components && v->split_groups)
         return command_usage("convert", "--split-components and --split-groups: choose one");
-    if (v->split_groups && (v->repair_record.fill_holes || v->repair_record.repair))
+    if (v->split_groups && (v->repairs_wanted.fill_holes || v->repairs_wanted.repair))
         return command_usage("convert",
                              "--fill-holes and --repair cannot be used with --split-groups: "
                              "faces that they add are in no group");
@@ -275,15 +277,15 @@ static int check_values(const values *v, const char *in, const char *out)
     if (!subtree_faces_read("convert", v->subtree_faces, &subtree_faces) ||
         command_overwrites("convert", in, out))
         return EXIT_USAGE;
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 static bool selects_levels(const values *v) { return v->max_error > 0 || v->target_size; }
 
-static int check_need(const values *v, ebpo_subset_options *need)
+static int check_target(const values *v, ebpo_subset_options *target)
 {
-    int code = subset_need("convert", v->max_error, v->target_size, need);
-    if (code == EXIT_FINE && selects_levels(v) && v->parts &&
+    int code = subset_read_target("convert", v->max_error, v->target_size, target);
+    if (code == EXIT_OK && selects_levels(v) && v->parts &&
         !(listed_parts(v->parts) & EBPO_PART_MESH))
         return command_usage("convert", "--max-error and --target-size measure against the mesh, "
                                         "which --parts omits; use --profile lod instead");
@@ -316,16 +318,17 @@ static convert_reported reported_of(const values *v, const char *in, const char 
                                .json = v->json,
                                .quiet = v->quiet,
                                .timings = v->timings,
-                               .repaired = v->repair_record.repair,
+                               .repair_requested = v->repairs_wanted.repair,
                                .chosen = chooses_parts(v),
                                .by_groups = v->split_groups };
 }
 
 /* --- work --- */
 
-/* Reports before a long build that checking the error afterwards would need too much memory. */
-static ebpo_status capacity_to_select(const values *v, uint64_t faces, const char *in,
-                                      const ebpo_workspace *workspace, ebpo_error *error)
+/* Fails before a long build if there is too little memory to measure the error bound of the
+ * envelopes after it. */
+static ebpo_status check_selection_memory(const values *v, uint64_t faces, const char *in,
+                                          const ebpo_workspace *workspace, ebpo_error *error)
 {
     ebpo_workspace_stats metrics = EBPO_WORKSPACE_STATS_INIT;
     uint64_t needed = ebpo_subset_memory(faces, (uint32_t)v->leaf_faces);
@@ -343,9 +346,9 @@ static ebpo_status capacity_to_select(const values *v, uint64_t faces, const cha
     return EBPO_E_LIMIT;
 }
 
-/* `need`: the requested error or size. */
+/* Builds the tree and writes the file. `target`: the requested error bound or file size. */
 static ebpo_status build_and_write(const values *v, mesh_input *p, const char *out,
-                                   const ebpo_subset_options *need, ebpo_progress progress,
+                                   const ebpo_subset_options *target, ebpo_progress progress,
                                    ebpo_build_times *times, ebpo_error *error)
 {
     ebpo_build_options build = EBPO_BUILD_OPTIONS_INIT;
@@ -381,8 +384,8 @@ static ebpo_status build_and_write(const values *v, mesh_input *p, const char *o
     write.face_coding = (ebpo_face_coding)v->face_coding;
     write.progress = progress;
     (void)subtree_faces_read("convert", v->subtree_faces, &write.subtree_faces);
-    if (need->max_error > 0 || need->target_bytes) {
-        ebpo_subset_options subset = *need;
+    if (target->max_error > 0 || target->target_bytes) {
+        ebpo_subset_options subset = *target;
         subset.codec = write.codec;
         subset.codec_level = write.codec_level;
         subset.threads = write.threads;
@@ -401,59 +404,60 @@ static ebpo_status build_and_write(const values *v, mesh_input *p, const char *o
     return status;
 }
 
-/* Options for the files of all components. */
-typedef struct part_build {
+/* Options for the files of all pieces of a mesh that is split. */
+typedef struct piece_build {
     const values *v;
-    const ebpo_subset_options *need;
+    const ebpo_subset_options *target;
     const char *in;
     const ebpo_workspace *workspace;
-} part_build;
+} piece_build;
 
-static ebpo_status part_fits(void *user, uint64_t faces, ebpo_error *error)
+static ebpo_status piece_fits(void *user, uint64_t faces, ebpo_error *error)
 {
-    const part_build *b = user;
-    return selects_levels(b->v) ? capacity_to_select(b->v, faces, b->in, b->workspace, error)
+    const piece_build *b = user;
+    return selects_levels(b->v) ? check_selection_memory(b->v, faces, b->in, b->workspace, error)
                                 : EBPO_OK;
 }
 
-static ebpo_status build_part(void *user, mesh_input *part, const char *path,
-                              ebpo_progress progress, ebpo_error *error)
+static ebpo_status build_piece(void *user, mesh_input *part, const char *path,
+                               ebpo_progress progress, ebpo_error *error)
 {
-    const part_build *b = user;
+    const piece_build *b = user;
     ebpo_build_times times = EBPO_BUILD_TIMES_INIT;
-    return build_and_write(b->v, part, path, b->need, progress, &times, error);
+    return build_and_write(b->v, part, path, b->target, progress, &times, error);
 }
 
 static bool splits_mesh(const values *v) { return v->split_components || v->split_groups; }
 
-static ebpo_status build_parts(part_build *build, mesh_input *p, const char *folder,
-                               const ebpo_mesh_groups *groups, progress_line *line,
-                               ebpo_progress progress, double begun, ebpo_error *error)
+static ebpo_status build_pieces(piece_build *build, mesh_input *p, const char *folder,
+                                const ebpo_mesh_groups *groups, progress_line *line,
+                                ebpo_progress progress, double begun, ebpo_error *error)
 {
     const values *v = build->v;
-    parts_run run = { .build = build_part,
-                      .fits = part_fits,
-                      .user = build,
-                      .groups = groups,
-                      .folder = folder,
-                      .unit = v->unit,
-                      .json = v->json,
-                      .quiet = v->quiet,
-                      .threads = (unsigned)v->threads,
-                      .line = line,
-                      .progress = progress };
-    return parts_write(&run, p, begun, error);
+    pieces_run run = { .build = build_piece,
+                       .fits = piece_fits,
+                       .user = build,
+                       .groups = groups,
+                       .folder = folder,
+                       .unit = v->unit,
+                       .json = v->json,
+                       .quiet = v->quiet,
+                       .threads = (unsigned)v->threads,
+                       .line = line,
+                       .progress = progress };
+    return pieces_write(&run, p, begun, error);
 }
 
-/* Sets the stages known before the mesh is read; the others follow. */
+/* Returns the facts that the options decide, to plan the stages; `faces` and `times` are set after
+ * the build. */
 static stage_facts plan_stages(const values *v, const char *in)
 {
     const char *dot = strrchr(in, '.');
-    return (stage_facts){ .was_repaired =
-                              v->repair_record.weld || v->repair_record.weld_distance > 0 ||
-                              v->repair_record.drop_duplicates || v->repair_record.orient ||
-                              v->repair_record.flip || v->repair_record.fill_holes ||
-                              v->repair_record.repair || (dot && strcasecmp(dot, ".stl") == 0),
+    return (stage_facts){ .may_repair =
+                              v->repairs_wanted.weld || v->repairs_wanted.weld_distance > 0 ||
+                              v->repairs_wanted.drop_duplicates || v->repairs_wanted.orient ||
+                              v->repairs_wanted.flip || v->repairs_wanted.fill_holes ||
+                              v->repairs_wanted.repair || (dot && strcasecmp(dot, ".stl") == 0),
                           .solid = true,
                           .from_leaves =
                               ebpo_selection_describe((ebpo_selection)v->select)->from_leaves,
@@ -470,7 +474,7 @@ static const values standard = { .max_level = -1,
                                  .normals = -1,
                                  .seed = -1 };
 
-/* Returns the error for a mesh that must not be built. */
+/* Fails if the mesh must not be built. */
 static ebpo_status refuse_mesh(const values *v, const mesh_input *p, const char *in,
                                const ebpo_workspace *workspace, ebpo_error *error)
 {
@@ -481,22 +485,23 @@ static ebpo_status refuse_mesh(const values *v, const mesh_input *p, const char 
         return error->status = EBPO_E_NOT_SOLID;
     }
     return selects_levels(v) && !splits_mesh(v)
-               ? capacity_to_select(v, p->mesh.face_count, in, workspace, error)
+               ? check_selection_memory(v, p->mesh.face_count, in, workspace, error)
                : EBPO_OK;
 }
 
 static ebpo_status no_groups(const char *in, ebpo_error *error)
 {
     error->status = EBPO_E_FORMAT;
-    snprintf(error->message, sizeof error->message,
-             "%s: names no groups, which are lines g or o of an OBJ file; --split-components makes "
-             "parts of what shares no vertices",
-             in);
+    snprintf(
+        error->message, sizeof error->message,
+        "%s: names no groups, which are lines g or o of an OBJ file; use --split-components to "
+        "split it into components that share no vertices",
+        in);
     return error->status;
 }
 
 static ebpo_status convert_mesh(const values *v, const char *in, const char *out,
-                                const ebpo_subset_options *need, ebpo_workspace *workspace,
+                                const ebpo_subset_options *target, ebpo_workspace *workspace,
                                 ebpo_error *error)
 {
     progress_line line;
@@ -508,7 +513,7 @@ static ebpo_status convert_mesh(const values *v, const char *in, const char *out
     if (!splits_mesh(v))
         progress_plan(&line, plan, stages_plan(&stages, plan), &p.as_read.face_count);
     double begun = progress_now();
-    ebpo_status status = mesh_input_read_groups(&p, in, v->repair_record, reading_of(v),
+    ebpo_status status = mesh_input_read_groups(&p, in, v->repairs_wanted, reading_of(v),
                                                 v->split_groups ? &groups : NULL, workspace,
                                                 (unsigned)v->threads, progress, error);
     progress_wipe(&line);
@@ -521,15 +526,15 @@ static ebpo_status convert_mesh(const values *v, const char *in, const char *out
     if (status == EBPO_OK && v->split_groups && !groups)
         status = no_groups(in, error);
     if (status == EBPO_OK && splits_mesh(v)) {
-        part_build build = { v, need, in, workspace };
-        status = build_parts(&build, &p, out, groups, &line, progress, begun, error);
+        piece_build build = { v, target, in, workspace };
+        status = build_pieces(&build, &p, out, groups, &line, progress, begun, error);
         ebpo_mesh_groups_free(groups);
         progress_wipe(&line);
         return status;
     }
     ebpo_mesh_groups_free(groups);
     if (status == EBPO_OK)
-        status = build_and_write(v, &p, out, need, progress, &stages.times, error);
+        status = build_and_write(v, &p, out, target, progress, &stages.times, error);
     else
         ebpo_mesh_free(&p.mesh);
     progress_wipe(&line);
@@ -544,26 +549,26 @@ static ebpo_status convert_mesh(const values *v, const char *in, const char *out
 static int run_convert(void *given, const char **operand)
 {
     const ebpo_build_options defaults = EBPO_BUILD_OPTIONS_INIT;
-    ebpo_subset_options need = EBPO_SUBSET_OPTIONS_INIT;
+    ebpo_subset_options target = EBPO_SUBSET_OPTIONS_INIT;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_workspace *workspace = NULL;
     values *v = given;
     if (v->leaf_faces < 0)
         v->leaf_faces = defaults.leaf_faces;
     int code = check_values(v, operand[0], operand[1]);
-    if (code == EXIT_FINE)
-        code = check_need(v, &need);
-    if (code != EXIT_FINE)
+    if (code == EXIT_OK)
+        code = check_target(v, &target);
+    if (code != EXIT_OK)
         return code;
-    ebpo_status status = splits_mesh(v) ? parts_begin(operand[1], v->split_groups, &error)
+    ebpo_status status = splits_mesh(v) ? pieces_begin(operand[1], v->split_groups, &error)
                                         : ebpo_check_output(operand[1], &error);
     if (status == EBPO_OK)
-        status = memory_make(&workspace, &v->memory, &error);
+        status = memory_new(&workspace, &v->memory, &error);
     if (status == EBPO_OK)
-        status = convert_mesh(v, operand[0], operand[1], &need, workspace, &error);
+        status = convert_mesh(v, operand[0], operand[1], &target, workspace, &error);
     ebpo_workspace_free(workspace);
-    parts_end();
-    return status == EBPO_OK ? EXIT_FINE : command_failed("convert", &error);
+    pieces_end();
+    return status == EBPO_OK ? EXIT_OK : command_failed("convert", &error);
 }
 
 const command command_convert = { &spec, sizeof standard, &standard, run_convert };

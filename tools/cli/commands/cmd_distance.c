@@ -10,7 +10,7 @@
 #include "cli/options/distance.inc"
 
 /* Returns true when the options allow an interval as the result. */
-static bool is_limited(const ebpo_distance_options *o)
+static bool gives_interval(const ebpo_distance_options *o)
 {
     return o->mode == EBPO_DISTANCE_EXACT && (o->level >= 0 || o->deadline_ns);
 }
@@ -30,8 +30,8 @@ static bool list_face(void *user, const ebpo_near_face *face)
     return !result_text_is_over(l->text);
 }
 
-static ebpo_status result_lists(const query_job *job, query_worker *w, const double *rows,
-                                uint64_t count, ebpo_error *error)
+static ebpo_status compute_lists(const query_job *job, query_worker *w, const double *rows,
+                                 uint64_t count, ebpo_error *error)
 {
     ebpo_within_options o = EBPO_WITHIN_OPTIONS_INIT;
     ebpo_status status = EBPO_OK;
@@ -46,21 +46,22 @@ static ebpo_status result_lists(const query_job *job, query_worker *w, const dou
     return status;
 }
 
-/* Returns the indices of models in a catalogue, which follow the results. */
+/* Returns the indices of models in a catalogue; they are stored in w->results after the `count`
+ * distances. */
 static uint64_t *models_of(const query_worker *w, uint64_t count)
 {
     return (uint64_t *)(void *)((ebpo_distance_result *)w->results + count);
 }
 
-static ebpo_status result_distances(const query_job *job, query_worker *w, const double *rows,
-                                    uint64_t count, ebpo_error *error)
+static ebpo_status compute_distances(const query_job *job, query_worker *w, const double *rows,
+                                     uint64_t count, ebpo_error *error)
 {
     ebpo_catalogue_query_options how = query_catalogue_options(job);
     if (job->catalogue)
         return ebpo_catalogue_distance(job->catalogue, job->models, rows, count, &how, w->results,
                                        models_of(w, count), error);
     if (count && query_lists(job->values))
-        return result_lists(job, w, rows, count, error);
+        return compute_lists(job, w, rows, count, error);
     return ebpo_distance_many(w->context, rows, count, &job->distance, w->results, error);
 }
 
@@ -69,7 +70,7 @@ static void print_distances(const query_job *job, query_worker *w, const double 
 {
     (void)rows;
     if (!query_lists(job->values))
-        results_distance(w->text, job->form, !job->catalogue && is_limited(&job->distance),
+        results_distance(w->text, job->form, !job->catalogue && gives_interval(&job->distance),
                          w->results, count, job->sampler,
                          job->catalogue ? models_of(w, count) : NULL);
 }
@@ -77,7 +78,7 @@ static void print_distances(const query_job *job, query_worker *w, const double 
 static const char *distance_columns(const query_job *job)
 {
     return job->catalogue ? "distance,x,y,z,nx,ny,nz,face,model"
-           : is_limited(&job->distance) && !query_lists(job->values)
+           : gives_interval(&job->distance) && !query_lists(job->values)
                ? "lo,hi"
                : "distance,x,y,z,nx,ny,nz,face";
 }
@@ -91,8 +92,8 @@ static const char *distance_dtype(const query_job *job, unsigned *bytes)
         return "[('distance', '<f8'), ('point', '<f8', (3,)), ('normal', '<f8', (3,)), ('face', "
                "'<u8'), ('model', '<u8')]";
     }
-    *bytes = is_limited(&job->distance) ? 16 : 64;
-    return is_limited(&job->distance)
+    *bytes = gives_interval(&job->distance) ? 16 : 64;
+    return gives_interval(&job->distance)
                ? "[('lo', '<f8'), ('hi', '<f8')]"
                : "[('distance', '<f8'), ('point', '<f8', (3,)), ('normal', '<f8', (3,)), ('face', "
                  "'<u8')]";
@@ -104,19 +105,20 @@ static int run_distance(void *given, const char **operand)
 {
     query_values *v = given;
     if (!query_distance_fits("distance", v) ||
-        (v->level >= 0 && !query_accepts("distance", v, QUERY_MAX_DISTANCE, "--max-level")))
+        (v->level >= 0 && !query_check_effect("distance", v, QUERY_MAX_DISTANCE, "--max-level")))
         return EXIT_USAGE;
     if (v->attribute && v->distance_mode == EBPO_DISTANCE_ENVELOPE)
         return command_usage("distance", "--attribute has no effect with --mode envelope; omit "
                                          "one of them");
-    if (v->attribute && !query_accepts("distance", v, QUERY_LEVEL | QUERY_DEADLINE, "--attribute"))
+    if (v->attribute &&
+        !query_check_effect("distance", v, QUERY_LEVEL | QUERY_DEADLINE, "--attribute"))
         return EXIT_USAGE;
     query_job job = { .command = "distance",
                       .values = v,
                       .kind = POINTS,
                       .result_bytes = sizeof(ebpo_distance_result),
-                      .parts_share = 0.65, /* docs/measured/queries.md */
-                      .result = result_distances,
+                      .subtree_overhead = 0.65, /* docs/measured/queries.md */
+                      .result = compute_distances,
                       .print = print_distances,
                       .columns = distance_columns,
                       .dtype = distance_dtype };

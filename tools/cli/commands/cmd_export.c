@@ -38,7 +38,7 @@ static int choose_format(values *v, const char *out)
         if (strcasecmp(dot + 1, format_words[i]) == 0)
             v->format = i;
     return v->format >= 0
-               ? EXIT_FINE
+               ? EXIT_OK
                : command_usage("export",
                                "the output's extension does not say which format; give --format");
 }
@@ -55,16 +55,16 @@ static int choose_levels(values *v, ebpo_export_options *o)
     if (v->level >= 0)
         o->first_level = o->last_level = (int)v->level;
     if (!v->levels)
-        return EXIT_FINE;
+        return EXIT_OK;
     if (!words_read_levels(v->levels, &levels))
         return command_usage("export", "--levels: '%s' is not " WORDS_LEVELS_EXPECTED, v->levels);
-    if (!levels.is_run)
+    if (!levels.is_contiguous)
         return command_usage("export", "--levels: '%s' omits levels; give a first and a last one",
                              v->levels);
     o->first_level = levels.first;
     o->last_level = levels.last;
     v->to_deepest = levels.to_end;
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 static int check_names(const char *in, const char *out, const char *second)
@@ -73,7 +73,7 @@ static int check_names(const char *in, const char *out, const char *second)
     for (int i = 0; i < 2; i++)
         if (*names[i] && command_overwrites("export", in, names[i]))
             return EXIT_USAGE;
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 /* --- output --- */
@@ -181,7 +181,7 @@ static int write_out(const values *v, const char *in, const char *out, const cha
             remote_report(&t, &v->remote, false);
     }
     ebpo_close(file);
-    return status == EBPO_OK ? EXIT_FINE : command_failed("export", &error);
+    return status == EBPO_OK ? EXIT_OK : command_failed("export", &error);
 }
 
 static const values standard = { .format = -1, .level = -1, .remote = REMOTE_VALUES_INIT };
@@ -192,18 +192,18 @@ static int run_export(void *given, const char **operand)
     char second[4096];
     ebpo_export_options o;
     int code = choose_format(v, operand[1]);
-    if (code == EXIT_FINE)
+    if (code == EXIT_OK)
         code = choose_levels(v, &o);
-    if (code == EXIT_FINE && !process_memory_take("export", v->memory, v->threads))
+    if (code == EXIT_OK && !process_memory_take("export", v->memory, v->threads))
         code = EXIT_USAGE;
-    if (code != EXIT_FINE)
+    if (code != EXIT_OK)
         return code;
     if (!ebpo_export_second_file((ebpo_export_format)v->format, operand[1], second, sizeof second))
         return command_usage(
             "export",
             "the output's name is too long, or contains a ':', which XDMF does not allow");
     code = check_names(operand[0], operand[1], second);
-    if (code != EXIT_FINE)
+    if (code != EXIT_OK)
         return code;
     if (!command_wants_hdf5("export", operand[0]))
         return EXIT_FAILED;

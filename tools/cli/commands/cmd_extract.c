@@ -18,7 +18,7 @@
 /* The mesh to write. */
 typedef struct extracted {
     ebpo_mesh mesh;
-    ebpo_subtree *lender; /* owner of the mesh, unless NULL */
+    ebpo_subtree *mesh_owner; /* owner of the mesh, unless NULL */
     double volume;
 } extracted;
 
@@ -43,7 +43,7 @@ static int check_values(const values *v, const char *in, const char *out)
         return command_usage("extract", "--textures: '-': a folder's name is needed here");
     if (requested == 0 && v->textures && !out)
         return v->json ? command_usage("extract", "--json cannot be used with --textures alone")
-                       : EXIT_FINE;
+                       : EXIT_OK;
     if (requested == 0)
         return command_usage("extract", "specify --level N, --mesh or --subtree OCTCODE");
     if (!out)
@@ -55,10 +55,10 @@ static int check_values(const values *v, const char *in, const char *out)
                              "--no-cell-faces belongs to --level; the model has no cell faces");
     if (command_overwrites("extract", in, out))
         return EXIT_USAGE;
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
-/* Gray nodes without children in a whole subtree are pruned. */
+/* Warns of pruned nodes: gray nodes without children in a complete subtree. */
 static void warn_of_pruned(const ebpo_subtree *subtree, const char *path)
 {
     ebpo_subtree_nodes nodes = EBPO_SUBTREE_NODES_INIT;
@@ -86,11 +86,12 @@ static ebpo_status take_subtree(const ebpo_file *file, const values *v, const ch
     ebpo_workspace_get_stats(workspace, &allowed);
     how.parts = EBPO_PART_MESH;
     how.memory = allowed.memory;
-    ebpo_status status = ebpo_subtree_open(file, (uint64_t)v->subtree, &how, &out->lender, error);
+    ebpo_status status =
+        ebpo_subtree_open(file, (uint64_t)v->subtree, &how, &out->mesh_owner, error);
     if (status == EBPO_OK)
-        status = ebpo_subtree_get_faces(out->lender, &faces, error);
+        status = ebpo_subtree_get_faces(out->mesh_owner, &faces, error);
     if (status == EBPO_OK)
-        warn_of_pruned(out->lender, path);
+        warn_of_pruned(out->mesh_owner, path);
     out->mesh.vertex_count = faces.vertex_count;
     out->mesh.face_count = faces.face_count;
     out->mesh.xyz32 = (float *)faces.xyz32;
@@ -195,9 +196,9 @@ static int run_extract(void *given, const char **operand)
 {
     values *v = given;
     int code = check_values(v, operand[0], operand[1]);
-    if (code != EXIT_FINE)
+    if (code != EXIT_OK)
         return code;
-    if (!memory_good("extract", &v->memory))
+    if (!memory_check("extract", &v->memory))
         return EXIT_USAGE;
     if (!command_wants_hdf5("extract", operand[0]))
         return EXIT_FAILED;
@@ -207,7 +208,7 @@ static int run_extract(void *given, const char **operand)
     ebpo_file *file = NULL;
     extracted out = { .volume = 0 };
     ebpo_workspace *workspace = NULL;
-    ebpo_status status = memory_make(&workspace, &v->memory, &error);
+    ebpo_status status = memory_new(&workspace, &v->memory, &error);
     if (status == EBPO_OK)
         status = remote_open(&file, operand[0], &v->remote, &error);
     if (status == EBPO_OK && v->textures)
@@ -226,12 +227,12 @@ static int run_extract(void *given, const char **operand)
         if (!v->json)
             remote_report(&t, &v->remote, false);
     }
-    if (!out.lender)
+    if (!out.mesh_owner)
         ebpo_mesh_free(&out.mesh);
-    ebpo_subtree_close(out.lender);
+    ebpo_subtree_close(out.mesh_owner);
     ebpo_close(file);
     ebpo_workspace_free(workspace);
-    return status == EBPO_OK ? EXIT_FINE : command_failed("extract", &error);
+    return status == EBPO_OK ? EXIT_OK : command_failed("extract", &error);
 }
 
 const command command_extract = { &spec, sizeof standard, &standard, run_extract };

@@ -52,6 +52,8 @@ typedef struct ticker {
     double last;
 } ticker;
 
+/* Prints the number of fetched bytes. Called ten times a second during transfers; returns false, so
+ * that it never stops them. */
 static bool show_bytes(void *user)
 {
     ticker *t = user;
@@ -85,7 +87,8 @@ static void wipe_ticker(ticker *t)
 
 /* --- work --- */
 
-/* Reports the data in the folder when the file was opened; returns true when it is usable. */
+/* Reports the data that was in the folder when the file was opened. Returns true when this data is
+ * usable. */
 static bool report_resuming(const subset_values *v, ebpo_file *file, const char *url,
                             const char *part)
 {
@@ -129,7 +132,7 @@ static int fetch_subset(subset_values *v, const char *url, const char *out, cons
     bool held = status == EBPO_OK && part && report_resuming(v, file, url, part);
     atomic_store(&t.file, file);
     if (status == EBPO_OK)
-        status = subset_settle(v, ebpo_file_info(file), remote_shown(url), subset, &error);
+        status = subset_set_parts(v, ebpo_file_info(file), remote_shown(url), subset, &error);
     if (status == EBPO_OK)
         status = ebpo_subset(file, out, subset, &error);
     bool usage = status == EBPO_E_ARGUMENT;
@@ -141,30 +144,30 @@ static int fetch_subset(subset_values *v, const char *url, const char *out, cons
             remote_report(&seen, &v->remote, false);
     }
     ebpo_close(file);
-    if (part && status == EBPO_E_FORMAT &&
-        access(part, F_OK) == 0) { /* otherwise the kept blocks would be damaged the next time as
-                                    * well */
+    /* The blocks may be damaged; if kept, the next run would fail in the same way. */
+    if (part && status == EBPO_E_FORMAT && access(part, F_OK) == 0) {
         remove_part(part);
         int code = command_failed("fetch", &error);
         fprintf(stderr, "ebpo fetch: the fetched data was removed, as it may have been damaged "
                         "in transit; run the same command to start again\n");
         return code;
     }
-    if (part && (status == EBPO_OK ||
-                 (usage && !held))) /* an error in an option never removes existing data */
+    /* After an error in an option, only the data that this run fetched is removed. */
+    if (part && (status == EBPO_OK || (usage && !held)))
         remove_part(part);
-    if (part && status != EBPO_OK && !usage && access(part, F_OK) == 0 &&
-        rmdir(part) != 0) { /* an empty folder is removed */
+    /* rmdir removes an empty folder, and fails if there is data. */
+    if (part && status != EBPO_OK && !usage && access(part, F_OK) == 0 && rmdir(part) != 0) {
         int code = command_failed("fetch", &error);
         fprintf(stderr,
                 "ebpo fetch: the fetched data is kept in %s; run the same command to resume\n",
                 part);
         return code;
     }
-    return status == EBPO_OK ? EXIT_FINE : command_failed("fetch", &error);
+    return status == EBPO_OK ? EXIT_OK : command_failed("fetch", &error);
 }
 
-/* Checks before fetching: returns false when the output could not be put in its place. */
+/* Checks, before data is fetched, that the output can be written. Returns false after a report on
+ * stderr. */
 static bool out_fits(const char *out, const char *part)
 {
     struct stat s;
@@ -173,7 +176,9 @@ static bool out_fits(const char *out, const char *part)
         return false;
     }
     if (part && lstat(part, &s) == 0 && !S_ISDIR(s.st_mode)) {
-        fprintf(stderr, "ebpo fetch: %s: prevents the folder for fetched data; move it away\n",
+        fprintf(stderr,
+                "ebpo fetch: %s: is not a folder, but fetched data is kept in a folder of this "
+                "name; move it away\n",
                 part);
         return false;
     }
@@ -187,7 +192,7 @@ static int run_fetch(void *given, const char **operand)
     subset_values *v = given;
     ebpo_subset_options subset;
     int code = subset_options("fetch", v, operand[0], operand[1], &subset);
-    if (code != EXIT_FINE)
+    if (code != EXIT_OK)
         return code;
     if (!command_wants_hdf5("fetch", operand[0]))
         return EXIT_FAILED;

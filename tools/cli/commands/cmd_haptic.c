@@ -26,19 +26,19 @@
 
 /* --- haptic steps at a steady rate --- */
 
-/* In microseconds: bin 0 is less than 1, bin n from 2^(n - 1) to 2^n, the last one also all above.
- */
+/* Number of bins of times: bin 0 is less than 1 microsecond, bin n from 2^(n - 1) to 2^n
+ * microseconds; the last bin also has all longer times. */
 enum { HAPTIC_BINS = 16 };
 
 typedef struct haptic_times {
-    uint64_t step_count, late;            /* not finished a period after their due times */
-    double p50, p99, p99_9, p99_99, most; /* seconds from the start to the end of a step */
-    double wake_p99_9, wake_max;          /* seconds from the due time of a step to its start */
-    double cpu_p99_9, cpu_max;            /* processor time from the start to the end of a step */
-    uint64_t over_ms; /* steps that took more than a millisecond from start to end */
+    uint64_t step_count, late;                /* not finished a period after their due times */
+    double p50, p99, p99_9, p99_99, max_time; /* seconds from the start to the end of a step */
+    double wake_p99_9, wake_max;              /* seconds from the due time of a step to its start */
+    double cpu_p99_9, cpu_max; /* processor time from the start to the end of a step */
+    uint64_t over_ms;          /* steps that took more than a millisecond from start to end */
     uint64_t bins[HAPTIC_BINS];
-    uint64_t page_faults;             /* page faults of the thread of steps */
-    double between_mean, between_max; /* widths of the bounds of a probe */
+    uint64_t page_faults;         /* page faults of the thread of steps */
+    double width_mean, width_max; /* widths of the bounds of a probe */
 } haptic_times;
 
 typedef struct haptic_play {
@@ -52,7 +52,7 @@ typedef struct haptic_play {
 
 /* Requests real-time scheduling for this thread and locked memory for the process. Returns a text
  * on what was granted. Threads created afterwards inherit the scheduling. */
-static const char *haptic_play_first(void)
+static const char *request_real_time(void)
 {
     bool kept = mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
 #ifdef EBPO_HAVE_SCHED_SETSCHEDULER
@@ -68,7 +68,7 @@ static const char *haptic_play_first(void)
 }
 
 /* Returns to normal scheduling. */
-static void haptic_play_behind(void)
+static void end_real_time(void)
 {
 #ifdef EBPO_HAVE_SCHED_SETSCHEDULER
     (void)sched_setscheduler(0, SCHED_OTHER, &(struct sched_param){ 0 });
@@ -82,7 +82,7 @@ static int compare_times(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Returns the least time that a share of `part` of all times does not exceed. */
+/* Returns the quantile `part` (0 .. 1) of ascending times. */
 static double time_quantile(const float *sorted, uint64_t count, double part)
 {
     uint64_t rank = (uint64_t)ceil(part * (double)count);
@@ -95,11 +95,11 @@ static void sort_times(float *times, uint64_t count)
 }
 
 /* Times of each step. */
-typedef struct spans {
+typedef struct step_times {
     float *took, *wake, *cpu;
-} spans;
+} step_times;
 
-static void sum_up(const spans *s, uint64_t count, haptic_times *out)
+static void compute_times(const step_times *s, uint64_t count, haptic_times *out)
 {
     for (uint64_t i = 0; i < count; i++) {
         int bin = s->took[i] < 1e-6F ? 0 : 1 + (int)log2(1e6 * (double)s->took[i]);
@@ -113,7 +113,7 @@ static void sum_up(const spans *s, uint64_t count, haptic_times *out)
     out->p99 = time_quantile(s->took, count, 0.99);
     out->p99_9 = time_quantile(s->took, count, 0.999);
     out->p99_99 = time_quantile(s->took, count, 0.9999);
-    out->most = s->took[count - 1];
+    out->max_time = s->took[count - 1];
     out->wake_p99_9 = time_quantile(s->wake, count, 0.999);
     out->wake_max = s->wake[count - 1];
     out->cpu_p99_9 = time_quantile(s->cpu, count, 0.999);
@@ -138,12 +138,12 @@ static uint64_t thread_clock(void)
     return (uint64_t)t.tv_sec * UINT64_C(1000000000) + (uint64_t)t.tv_nsec;
 }
 
-static void move_ball(ebpo_haptic *haptic, const haptic_pose *pose, haptic_result *a)
+static void step_ball(ebpo_haptic *haptic, const haptic_pose *pose, haptic_result *a)
 {
     ebpo_haptic_ball_result r;
-    ebpo_haptic_step_ball(haptic, pose->place, &r);
-    memcpy(a->proxy.place, r.proxy, sizeof r.proxy);
-    memcpy(a->proxy.turn, pose->turn, sizeof pose->turn);
+    ebpo_haptic_step_ball(haptic, pose->position, &r);
+    memcpy(a->proxy.position, r.proxy, sizeof r.proxy);
+    memcpy(a->proxy.rotation, pose->rotation, sizeof pose->rotation);
     memcpy(a->force, r.force, sizeof r.force);
     memcpy(a->normal, r.normal, sizeof r.normal);
     a->depth = r.depth;
@@ -151,12 +151,12 @@ static void move_ball(ebpo_haptic *haptic, const haptic_pose *pose, haptic_resul
     a->flags = r.flags;
 }
 
-static void turn_tool(ebpo_haptic *haptic, const haptic_pose *pose, haptic_result *a)
+static void step_tool(ebpo_haptic *haptic, const haptic_pose *pose, haptic_result *a)
 {
     ebpo_haptic_tool_result r;
-    ebpo_haptic_step_tool(haptic, pose->place, pose->turn, &r);
-    memcpy(a->proxy.place, r.proxy, sizeof r.proxy);
-    memcpy(a->proxy.turn, r.turn, sizeof r.turn);
+    ebpo_haptic_step_tool(haptic, pose->position, pose->rotation, &r);
+    memcpy(a->proxy.position, r.proxy, sizeof r.proxy);
+    memcpy(a->proxy.rotation, r.turn, sizeof r.turn);
     memcpy(a->force, r.force, sizeof r.force);
     memcpy(a->torque, r.torque, sizeof r.torque);
     memcpy(a->normal, r.normal, sizeof r.normal);
@@ -165,10 +165,10 @@ static void turn_tool(ebpo_haptic *haptic, const haptic_pose *pose, haptic_resul
     a->flags = r.flags;
 }
 
-static void sense_distance(const haptic_play *p, const haptic_pose *pose, haptic_result *a)
+static void step_probe(const haptic_play *p, const haptic_pose *pose, haptic_result *a)
 {
     ebpo_haptic_probe_result r;
-    ebpo_haptic_step_probe(p->haptic, pose->place, &r);
+    ebpo_haptic_step_probe(p->haptic, pose->position, &r);
     a->proxy = *pose;
     memcpy(a->normal, r.normal, sizeof r.normal);
     a->depth = r.distance;
@@ -192,19 +192,20 @@ static bool play_step(const haptic_play *p, uint64_t i, haptic_times *out)
     if (p->record)
         p->record[i] = pose;
     switch (p->kind) {
-    case EBPO_HAPTIC_BALL: move_ball(p->haptic, &pose, &result); break;
-    case EBPO_HAPTIC_PROBE: sense_distance(p, &pose, &result); break;
-    case EBPO_HAPTIC_TOOL: turn_tool(p->haptic, &pose, &result); break;
+    case EBPO_HAPTIC_BALL: step_ball(p->haptic, &pose, &result); break;
+    case EBPO_HAPTIC_PROBE: step_probe(p, &pose, &result); break;
+    case EBPO_HAPTIC_TOOL: step_tool(p->haptic, &pose, &result); break;
     }
     p->device->write(p->device->self, &result);
-    out->between_mean += result.hi - result.lo; /* a sum, until the end */
-    out->between_max = fmax(out->between_max, result.hi - result.lo);
+    out->width_mean += result.hi - result.lo; /* a sum, until the end */
+    out->width_max = fmax(out->width_max, result.hi - result.lo);
     return true;
 }
 
-/* Plays late steps, too, and the steps after them at their due times. Returns the number of steps.
- */
-static uint64_t play_all(const haptic_play *p, uint64_t count, const spans *s, haptic_times *out)
+/* Plays all steps. A late step is not omitted, and the due times of later steps do not change.
+ * Returns the number of steps. */
+static uint64_t play_all(const haptic_play *p, uint64_t count, const step_times *s,
+                         haptic_times *out)
 {
     const double period = 1e9 / p->rate;
     uint64_t begin = tool_clock() + (uint64_t)(2 * period), faults = page_faults(), i = 0;
@@ -227,8 +228,8 @@ static uint64_t play_all(const haptic_play *p, uint64_t count, const spans *s, h
 /* Returns the maximum number of steps. */
 static uint64_t haptic_play_steps(const haptic_play *p)
 {
-    uint64_t most = p->haptic ? p->device->step_count(p->device->self) : 0;
-    return most ? most : (uint64_t)ceil(p->rate * p->seconds);
+    uint64_t max_time = p->haptic ? p->device->step_count(p->device->self) : 0;
+    return max_time ? max_time : (uint64_t)ceil(p->rate * p->seconds);
 }
 
 /* Returns false when there is no memory for the times. */
@@ -241,11 +242,11 @@ static bool haptic_play_run(const haptic_play *p, haptic_times *out)
     if (!all)
         return false;
     memset(all, 0, 3 * count * sizeof *all);
-    const spans s = { all, all + count, all + 2 * count };
+    const step_times s = { all, all + count, all + 2 * count };
     out->step_count = play_all(p, count, &s, out);
-    out->between_mean /= fmax(1, (double)out->step_count);
+    out->width_mean /= fmax(1, (double)out->step_count);
     if (out->step_count > 0)
-        sum_up(&s, out->step_count, out);
+        compute_times(&s, out->step_count, out);
     free(all);
     return true;
 }
@@ -289,7 +290,7 @@ static void print_times(const char *name, const haptic_times *t)
     printf("  %-8s %10llu %6llu %7llu %9.2f %9.2f %9.2f %9.2f %9.2f %11.2f %9.2f %10.2f %9.2f\n",
            name, (unsigned long long)t->step_count, (unsigned long long)t->late,
            (unsigned long long)t->over_ms, 1e6 * t->p50, 1e6 * t->p99, 1e6 * t->p99_9,
-           1e6 * t->p99_99, 1e6 * t->most, 1e6 * t->wake_p99_9, 1e6 * t->wake_max,
+           1e6 * t->p99_99, 1e6 * t->max_time, 1e6 * t->wake_p99_9, 1e6 * t->wake_max,
            1e6 * t->cpu_p99_9, 1e6 * t->cpu_max);
 }
 
@@ -319,8 +320,8 @@ static void print_report(const job *j)
            (unsigned long long)s->incomplete, (unsigned long long)s->partial,
            (unsigned long long)s->work_max, (unsigned long long)j->times.page_faults);
     if (j->kind == EBPO_HAPTIC_PROBE)
-        printf("  distances known to %g on average, %g at most\n", j->times.between_mean,
-               j->times.between_max);
+        printf("  distances known to %g on average, %g at most\n", j->times.width_mean,
+               j->times.width_max);
     printf("  boxes loaded %llu, taken %llu, too full %llu; %.3f s, the longest %.3f s; %llu "
            "bytes\n",
            (unsigned long long)s->loads, (unsigned long long)s->taken,
@@ -342,7 +343,7 @@ static void json_times(json *out, const char *key, const haptic_times *t)
     json_real(out, "p99", t->p99);
     json_real(out, "p99_9", t->p99_9);
     json_real(out, "p99_99", t->p99_99);
-    json_real(out, "max", t->most);
+    json_real(out, "max", t->max_time);
     json_real(out, "wake_p99_9", t->wake_p99_9);
     json_real(out, "wake_max", t->wake_max);
     json_real(out, "cpu_p99_9", t->cpu_p99_9);
@@ -369,8 +370,8 @@ static void json_report(const job *j)
     json_times(&out, "haptic", &j->times);
     json_times(&out, "empty", &j->empty);
     if (j->kind == EBPO_HAPTIC_PROBE) {
-        json_real(&out, "between_mean", j->times.between_mean);
-        json_real(&out, "between_max", j->times.between_max);
+        json_real(&out, "between_mean", j->times.width_mean);
+        json_real(&out, "between_max", j->times.width_max);
     }
     json_uint(&out, "contacts", s->contacts);
     json_uint(&out, "waiting", s->waiting);
@@ -449,11 +450,11 @@ static bool read_tool(job *j)
 
 static double tool_radius(const job *j)
 {
-    double most = j->v->radius;
+    double max_time = j->v->radius;
     for (uint64_t i = 0; i < j->point_count; i++)
-        most =
-            fmax(most, hypot(hypot(j->points[3 * i], j->points[3 * i + 1]), j->points[3 * i + 2]));
-    return most;
+        max_time = fmax(max_time,
+                        hypot(hypot(j->points[3 * i], j->points[3 * i + 1]), j->points[3 * i + 2]));
+    return max_time;
 }
 
 static ebpo_status open_model(job *j, uint64_t memory, ebpo_error *error)
@@ -466,8 +467,8 @@ static ebpo_status open_model(job *j, uint64_t memory, ebpo_error *error)
     if (status == EBPO_OK)
         status = ebpo_model_new(j->file, &opening, &j->model, error);
     if (status == EBPO_OK && !j->v->path && !j->v->device)
-        status = haptic_own_open(&j->device, j->model, ebpo_file_info(j->file), j->v->rate,
-                                 tool_radius(j), error);
+        status = haptic_builtin_open(&j->device, j->model, ebpo_file_info(j->file), j->v->rate,
+                                     tool_radius(j), error);
     return status;
 }
 
@@ -501,18 +502,18 @@ static ebpo_status no_memory(ebpo_error *error, const char *what)
     return EBPO_E_MEMORY;
 }
 
-/* Plays an empty loop of a tenth of the length, to measure the delay of the machine itself. Called
+/* Plays an empty loop for a tenth of the time, to measure the delay of the machine itself. Call
  * before a device starts. */
-static ebpo_status play_nothing(job *j, ebpo_error *error)
+static ebpo_status play_empty(job *j, ebpo_error *error)
 {
     const values *v = j->v;
     uint64_t step_count = v->path ? j->device.step_count(j->device.self) : 0;
     const haptic_play empty = { .rate = v->rate,
                                 .seconds = step_count ? (double)step_count / v->rate / 10
                                                       : v->seconds / 10 };
-    haptic_play_first();
+    request_real_time();
     bool fine = haptic_play_run(&empty, &j->empty);
-    haptic_play_behind(); /* and so does the loading thread, which is created now */
+    end_real_time(); /* the loading thread, which is created next, has normal scheduling as well */
     return fine ? EBPO_OK : no_memory(error, "the times of steps");
 }
 
@@ -528,7 +529,7 @@ static ebpo_status play_device(job *j, ebpo_error *error)
             return no_memory(error, "the record");
         all.record = j->record;
     }
-    j->scheduling = haptic_play_first();
+    j->scheduling = request_real_time();
     if (!haptic_play_run(&all, &j->times))
         return no_memory(error, "the times of steps");
     ebpo_haptic_get_stats(j->haptic, &j->stats);
@@ -547,7 +548,7 @@ static ebpo_status write_record(const job *j, ebpo_error *error)
     for (uint64_t i = 0; i < j->times.step_count; i++) {
         const haptic_pose *p = &j->record[i];
         for (int k = 0; k < 7; k++) {
-            at = number_write(at, k < 3 ? p->place[k] : p->turn[k - 3]);
+            at = number_write(at, k < 3 ? p->position[k] : p->rotation[k - 3]);
             *at++ = k < 6 ? ' ' : '\n';
         }
     }
@@ -564,11 +565,11 @@ static int run_job(job *j, uint64_t memory)
     if (status == EBPO_OK)
         status = open_model(j, memory, &error);
     if (status == EBPO_OK)
-        status = play_nothing(j, &error);
+        status = play_empty(j, &error);
     if (status == EBPO_OK && !j->device.begin(j->device.self, j->v->seconds, &start))
         return EXIT_FAILED;
     if (status == EBPO_OK)
-        status = open_device(j, start.place, &error);
+        status = open_device(j, start.position, &error);
     if (status == EBPO_OK)
         status = play_device(j, &error);
     if (status == EBPO_OK && j->v->record)
@@ -579,10 +580,10 @@ static int run_job(job *j, uint64_t memory)
         json_report(j);
     else
         print_report(j);
-    return j->stopped.status == EBPO_OK ? EXIT_FINE : command_failed("haptic", &j->stopped);
+    return j->stopped.status == EBPO_OK ? EXIT_OK : command_failed("haptic", &j->stopped);
 }
 
-/* Returns 0 when they are valid. */
+/* Returns EXIT_OK when the values are valid. */
 static int check_values(const values *v, uint64_t *memory)
 {
     if (v->memory && !words_read_size(v->memory, memory))
@@ -612,9 +613,9 @@ static bool overwrites_input(const values *v, const char *model)
     return false;
 }
 
-static int run_haptic(void *energy, const char **operand)
+static int run_haptic(void *given, const char **operand)
 {
-    const values *v = energy;
+    const values *v = given;
     job j = { .v = v,
               .name = operand[0],
               .kind = v->tool    ? EBPO_HAPTIC_TOOL

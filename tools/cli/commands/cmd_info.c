@@ -97,7 +97,7 @@ static int run_info(void *given, const char **operand)
     }
     textures_free(&images);
     ebpo_close(file);
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 const command command_info = { &spec, sizeof standard, &standard, run_info };

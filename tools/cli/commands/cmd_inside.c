@@ -8,8 +8,8 @@
 
 #include "cli/options/inside.inc"
 
-static ebpo_status result_inside(const query_job *job, query_worker *w, const double *rows,
-                                 uint64_t count, ebpo_error *error)
+static ebpo_status compute_inside(const query_job *job, query_worker *w, const double *rows,
+                                  uint64_t count, ebpo_error *error)
 {
     ebpo_catalogue_query_options how = query_catalogue_options(job);
     return job->catalogue
@@ -48,8 +48,8 @@ static int run_inside(void *given, const char **operand)
                       .values = v,
                       .kind = POINTS,
                       .result_bytes = sizeof(ebpo_inside_result),
-                      .parts_share = 0.05, /* docs/measured/queries.md */
-                      .result = result_inside,
+                      .subtree_overhead = 0.05, /* docs/measured/queries.md */
+                      .result = compute_inside,
                       .print = print_inside,
                       .columns = inside_columns,
                       .dtype = inside_dtype };

@@ -32,7 +32,7 @@ typedef struct printer {
     json j;
 } printer;
 
-/* Share of the last level's volume; a flat surface has none. */
+/* Returns a volume divided by the volume of the last level, which is 0 for a flat surface. */
 static double volume_share(const printer *p, double volume)
 {
     double last = facts_volume(p->info, p->info->level_count - 1);
@@ -128,8 +128,8 @@ static ebpo_status report_nodes(printer *p, ebpo_stream *stream, ebpo_error *err
 
 /* --- all levels --- */
 
-/* Flushes each level for a reader of the output; stops reading when the output is closed (*arrived
- * false). */
+/* Prints all levels, and flushes the output after each. Stops when the output was closed: *arrived
+ * is then false. */
 static ebpo_status report_levels(printer *p, ebpo_stream *stream, int last, bool *arrived,
                                  ebpo_error *error)
 {
@@ -232,7 +232,7 @@ static int run_levels(void *given, const char **operand)
         return EXIT_USAGE;
     if (!arrived)
         return EXIT_FAILED;
-    return status == EBPO_OK ? EXIT_FINE : command_failed("levels", &error);
+    return status == EBPO_OK ? EXIT_OK : command_failed("levels", &error);
 }
 
 const command command_levels = { &spec, sizeof standard, &standard, run_levels };

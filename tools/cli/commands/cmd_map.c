@@ -21,7 +21,7 @@
 
 /* --- the points of a plane or grid --- */
 
-enum { LONGER_EDGE = 1000, GRID_MAX = 1 << 20 };
+enum { LONGER_EDGE_POINTS = 1000, GRID_MAX = 1 << 20 };
 
 /* Reads `count` finite numbers separated by commas, and nothing else. */
 static bool read_reals(const char *text, int count, double *out)
@@ -73,7 +73,7 @@ static int find_box(const map_job *j, double low[3], double high[3])
         if (!isfinite(high[c] - low[c])) /* results would be NaN */
             return command_usage("map", "the edges of the box are beyond the range of a double");
     }
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 /* --- planes --- */
@@ -85,7 +85,7 @@ typedef struct rectangle {
 } rectangle;
 
 /* Reads "z=0.5" or "z=50%": the coordinate, in the bounding box of the model. */
-static bool read_place(const map_job *j, const char *text, int *axis, double *at)
+static bool read_plane(const map_job *j, const char *text, int *axis, double *at)
 {
     const ebpo_info *info = ebpo_file_info(j->file);
     char *end;
@@ -109,15 +109,15 @@ static int find_rectangle(const map_job *j, rectangle *r)
     double all[9], low[3], high[3], at;
     int axis;
     *r = (rectangle){ 0 };
-    if (read_place(j, j->v->plane, &axis, &at)) {
+    if (read_plane(j, j->v->plane, &axis, &at)) {
         int code = find_box(j, low, high), right = axis == 0, up = axis == 2 ? 1 : 2;
-        if (code != EXIT_FINE)
+        if (code != EXIT_OK)
             return code;
         memcpy(r->corner, low, sizeof r->corner);
         r->corner[axis] = at;
         r->edge[0][right] = high[right] - low[right];
         r->edge[1][up] = high[up] - low[up];
-        return EXIT_FINE;
+        return EXIT_OK;
     }
     if (!read_reals(j->v->plane, 9, all))
         return refuse_value(
@@ -134,7 +134,7 @@ static int find_rectangle(const map_job *j, rectangle *r)
         dot += r->edge[0][c] / a * (r->edge[1][c] / b);
     if (!(a > 0) || !(b > 0) || !isfinite(a) || !isfinite(b) || fabs(dot) > 1e-9)
         return refuse_value("--plane", j->v->plane, "two edges with a length, at right angles");
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 static void find_points(const map_job *j, double a, double b, uint64_t count[3])
@@ -143,7 +143,7 @@ static void find_points(const map_job *j, double a, double b, uint64_t count[3])
     double shares[2] = { a / longer, b / longer };
     count[2] = 1;
     for (int i = 0; i < 2; i++) {
-        double n = round(LONGER_EDGE * shares[i]);
+        double n = round(LONGER_EDGE_POINTS * shares[i]);
         count[i] = n < 2 ? 2 : (uint64_t)n;
     }
     if (j->width) {
@@ -156,7 +156,7 @@ static int lattice_of_plane(map_job *j)
 {
     rectangle r;
     int code = find_rectangle(j, &r);
-    if (code != EXIT_FINE)
+    if (code != EXIT_OK)
         return code;
     ebpo_lattice *l = &j->lattice;
     double a = length_of(r.edge[0]), b = length_of(r.edge[1]), step = 0;
@@ -171,7 +171,7 @@ static int lattice_of_plane(map_job *j)
         l->step[2][c] =
             step * (r.edge[0][d] / a * (r.edge[1][e] / b) - r.edge[0][e] / a * (r.edge[1][d] / b));
     }
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 static int lattice_of_grid(map_job *j)
@@ -187,11 +187,11 @@ static int lattice_of_grid(map_job *j)
     if (!good)
         return refuse_value("--grid", j->v->grid, "three whole numbers, each from 1 to 1048576");
     int code = find_box(j, low, high);
-    if (code != EXIT_FINE)
+    if (code != EXIT_OK)
         return code;
     if (ebpo_lattice_of_box(low, high, count, &j->lattice, &error) != EBPO_OK)
         return command_failed("map", &error);
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 /* Reads --plane, --grid, --box, --margin and --size. Returns an exit code; errors were reported. */
@@ -205,7 +205,7 @@ static int map_find_lattice(map_job *j)
 
 #if EBPO_HAVE_PNG
 
-enum { LEGEND = 120, BAR = 24, EDGE = 16, LINE = 18 };
+enum { LEGEND_WIDTH = 120, BAR_WIDTH = 24, EDGE_WIDTH = 16, LINE_HEIGHT = 18 };
 static const uint8_t white[3] = { 255, 255, 255 }, ink[3] = { 40, 44, 52 };
 
 static ebpo_status no_picture_memory(ebpo_error *error)
@@ -227,22 +227,24 @@ static void put_pixel(picture *p, int x, int y, const uint8_t rgb[3])
 static ebpo_status draw_legend(const map_job *j, picture *p, int x, bool has_signs,
                                ebpo_error *error)
 {
-    int top = EDGE, bottom = p->height - EDGE;
+    int top = EDGE_WIDTH, bottom = p->height - EDGE_WIDTH;
     ebpo_status status = EBPO_OK;
     for (int y = top; y < bottom; y++) {
         double share = (double)(bottom - 1 - y) / fmax(1, bottom - 1 - top);
         double distance = (has_signs ? 2 * share - 1 : share) * j->range;
         uint8_t rgb[3];
         ebpo_map_colour((ebpo_map_palette)j->v->palette, distance, j->range, rgb);
-        for (int i = 0; i < BAR; i++)
-            put_pixel(p, x + EDGE + i, y, rgb);
+        for (int i = 0; i < BAR_WIDTH; i++)
+            put_pixel(p, x + EDGE_WIDTH + i, y, rgb);
     }
-    for (int i = 0; i < 3 && bottom - top >= 3 * LINE && status == EBPO_OK; i++) {
+    for (int i = 0; i < 3 && bottom - top >= 3 * LINE_HEIGHT && status == EBPO_OK; i++) {
         char text[32];
         double share = i / 2.0;
         snprintf(text, sizeof text, "%.4g", (has_signs ? 2 * share - 1 : share) * j->range);
-        int y = bottom - LINE - (int)(share * (bottom - top - LINE));
-        status = picture_caption(p, x + EDGE + BAR, y, LEGEND - EDGE - BAR, LINE, ink, text, error);
+        int y = bottom - LINE_HEIGHT - (int)(share * (bottom - top - LINE_HEIGHT));
+        status =
+            picture_caption(p, x + EDGE_WIDTH + BAR_WIDTH, y, LEGEND_WIDTH - EDGE_WIDTH - BAR_WIDTH,
+                            LINE_HEIGHT, ink, text, error);
     }
     return status;
 }
@@ -269,7 +271,7 @@ static ebpo_status map_draw_plane(const map_job *j, const double *values, const 
 {
     int width = (int)j->lattice.count[0], height = (int)j->lattice.count[1];
     picture p = { 0 };
-    if (!picture_make(&p, width + LEGEND, height, white))
+    if (!picture_make(&p, width + LEGEND_WIDTH, height, white))
         return no_picture_memory(error);
     for (int y = 0; y < height; y++)
         for (int x = 0; x < width; x++) {
@@ -292,7 +294,7 @@ static ebpo_status map_draw_mesh(const map_job *j, const ebpo_mesh *mesh, const 
     camera view;
     ebpo_colours colours = { 0 };
     unsigned threads = j->options.threads ? j->options.threads : command_cores();
-    if (!picture_make(&p, j->width + LEGEND, j->height, white))
+    if (!picture_make(&p, j->width + LEGEND_WIDTH, j->height, white))
         return no_picture_memory(error);
     ebpo_status status = ebpo_mesh_colours(mesh, &colours, error);
     raster_style style = { .colour = { 0.6, 0.6, 0.6 }, .vertex_colours = colours.vertex };
@@ -361,7 +363,7 @@ static ebpo_status keep_layer(void *user, const double *values, uint64_t first, 
     return EBPO_OK;
 }
 
-/* Computes the values of a plane, which its picture needs, too. */
+/* Computes the values of a plane, for the output and its picture. */
 static ebpo_status map_plane(map_job *j, ebpo_error *error)
 {
     uint64_t count = j->lattice.count[0] * j->lattice.count[1];
@@ -398,8 +400,8 @@ static ebpo_status map_plane_or_grid(map_job *j, ebpo_error *error)
 
 /* --- vertices --- */
 
-static ebpo_status read_other(const map_job *j, ebpo_progress progress, ebpo_mesh *out,
-                              ebpo_error *error)
+static ebpo_status read_source(const map_job *j, ebpo_progress progress, ebpo_mesh *out,
+                               ebpo_error *error)
 {
     if (command_is_hdf5("map", j->v->from) == 0) {
         ebpo_mesh_read_options o = EBPO_MESH_READ_OPTIONS_INIT;
@@ -457,13 +459,13 @@ static ebpo_status map_vertices(map_job *j, ebpo_progress progress, ebpo_error *
 {
     ebpo_mesh m = { 0 };
     ebpo_mesh_report report;
-    ebpo_status status = read_other(j, progress, &m, error);
+    ebpo_status status = read_source(j, progress, &m, error);
     if (status != EBPO_OK)
         return status;
     double *points = points_of(&m), *distances = malloc((m.vertex_count + 1) * sizeof *distances);
     if (!points || !distances)
         status = no_memory(error);
-    if (status == EBPO_OK) /* so that every index can be drawn */
+    if (status == EBPO_OK) /* ensures that every face can be drawn */
         status = ebpo_mesh_check(&m, j->options.threads, progress, &report, error);
     if (status == EBPO_OK)
         status = ebpo_map_points(j->model, points, m.vertex_count, &j->options, distances, error);
@@ -493,7 +495,7 @@ static const map_values standard = { .margin = MAP_MARGIN,
 
 /* --- options --- */
 
-static bool ends_so(const char *out, const char *const *endings)
+static bool has_ending(const char *out, const char *const *endings)
 {
     for (; *endings; endings++)
         if (words_end_with(out, *endings))
@@ -510,7 +512,7 @@ static int check_output(const map_values *v)
     if (v->grid && !v->out)
         return command_usage("map", "--grid needs --output: a name that ends with .vtkhdf, .h5 or "
                                     ".nrrd");
-    if (v->out && !ends_so(v->out, v->grid ? of_grid : v->plane ? of_plane : of_vertices))
+    if (v->out && !has_ending(v->out, v->grid ? of_grid : v->plane ? of_plane : of_vertices))
         return command_usage("map", "--output '%s': expected a name that ends with %s", v->out,
                              v->grid    ? ".vtkhdf, .h5 or .nrrd"
                              : v->plane ? ".vtkhdf, .h5, .nrrd or .png"
@@ -518,14 +520,14 @@ static int check_output(const map_values *v)
     if (v->picture && v->grid)
         return command_usage("map", "--picture shows a plane or vertices; give --plane as well "
                                     "in a second run");
-    if (v->picture && !ends_so(v->picture, png))
+    if (v->picture && !has_ending(v->picture, png))
         return command_usage("map", "--picture '%s': expected a name that ends with .png",
                              v->picture);
-    bool coloured = v->picture || (v->out && (v->from || ends_so(v->out, png)));
+    bool coloured = v->picture || (v->out && (v->from || has_ending(v->out, png)));
     if (!coloured && (v->range != standard.range || v->palette != standard.palette))
         return command_usage("map", "--range and --palette belong to pictures and to the PLY of "
                                     "--from");
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 static int check_values(const map_values *v)
@@ -554,7 +556,7 @@ static int check_outputs(const char *path, const map_values *v)
             return EXIT_USAGE;
     if (v->out && v->picture && command_same_file(v->out, v->picture))
         return command_usage("map", "--output and --picture name one file");
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 /* --- output --- */
@@ -677,8 +679,8 @@ static int run_job(map_job *j, uint64_t memory)
     ebpo_status status = remote_open(&j->file, j->path, &v->remote, &error);
     if (status != EBPO_OK)
         return command_failed("map", &error);
-    int code = v->from ? EXIT_FINE : map_find_lattice(j);
-    if (code != EXIT_FINE)
+    int code = v->from ? EXIT_OK : map_find_lattice(j);
+    if (code != EXIT_OK)
         return code;
     status = open_model(j, memory, v->memory != NULL, progress, &error);
     if (status == EBPO_OK)
@@ -686,7 +688,7 @@ static int run_job(map_job *j, uint64_t memory)
     progress_wipe(&line);
     if (status == EBPO_OK)
         report_map(j);
-    return status == EBPO_OK ? EXIT_FINE : command_failed("map", &error);
+    return status == EBPO_OK ? EXIT_OK : command_failed("map", &error);
 }
 
 static int run_map(void *given, const char **operand)
@@ -700,15 +702,15 @@ static int run_map(void *given, const char **operand)
                   .range = v->range };
     uint64_t memory = 0;
     int code = check_values(v);
-    if (code == EXIT_FINE && v->memory && !words_read_size(v->memory, &memory))
+    if (code == EXIT_OK && v->memory && !words_read_size(v->memory, &memory))
         code = command_usage("map", "--memory '%s': expected " WORDS_SIZE_EXPECTED, v->memory);
-    if (code == EXIT_FINE && v->size && !map_read_size(v->size, &j.width, &j.height))
+    if (code == EXIT_OK && v->size && !map_read_size(v->size, &j.width, &j.height))
         code = EXIT_USAGE;
-    if (code == EXIT_FINE)
+    if (code == EXIT_OK)
         code = check_outputs(operand[0], v);
-    if (code == EXIT_FINE && !command_wants_hdf5("map", operand[0]))
+    if (code == EXIT_OK && !command_wants_hdf5("map", operand[0]))
         code = EXIT_FAILED;
-    if (code != EXIT_FINE)
+    if (code != EXIT_OK)
         return code;
     if (v->from && !v->size) {
         j.width = 1200;

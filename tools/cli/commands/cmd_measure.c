@@ -30,7 +30,7 @@ typedef struct values {
 /* Requested measurements of levels; [level_count], or NULL. */
 typedef struct measures {
     ebpo_solid_volume solid;
-    const double *derived; /* with limit: always */
+    const double *derived; /* not NULL if `limit` is not NULL */
     const ebpo_error_bound *error_bound;
     const ebpo_limit *limit;
 } measures;
@@ -308,7 +308,7 @@ static int measure_file(const char *path, const values *v)
         remote_report(&t, &v->remote, false);
     }
     ebpo_close(file);
-    return status == EBPO_OK ? EXIT_FINE : command_failed("measure", &error);
+    return status == EBPO_OK ? EXIT_OK : command_failed("measure", &error);
 }
 
 static const values standard = { .tolerance = 0.05,

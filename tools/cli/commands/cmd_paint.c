@@ -50,7 +50,7 @@ static int read_numbers(const char *text, double *out, int most)
 }
 
 /* Reads three numbers separated by commas. Returns false for other text. */
-static bool paint_read_place(const char *text, double out[3])
+static bool paint_read_position(const char *text, double out[3])
 {
     return read_numbers(text, out, 3) == 3;
 }
@@ -62,8 +62,8 @@ static bool fail_line(const paint_values *v, uint64_t line, const char *what)
 }
 
 /* Reads the numbers of a line as a position of the pen; `number`: index of the position. */
-static const char *take_row(const paint_values *v, const double *row, int count, uint64_t number,
-                            ebpo_paint_input *out)
+static const char *set_input(const paint_values *v, const double *row, int count, uint64_t number,
+                             ebpo_paint_input *out)
 {
     if (count < 3)
         return "expected three to five numbers: x y z [pressure [ms]]";
@@ -97,7 +97,7 @@ static bool read_lines(const paint_values *v, FILE *in, ebpo_paint_input **input
             *input = more ? more : *input;
         }
         if (!wrong)
-            wrong = take_row(v, row, found, *count, &(*input)[*count]);
+            wrong = set_input(v, row, found, *count, &(*input)[*count]);
         *count += !wrong;
     }
     free(line);
@@ -128,7 +128,7 @@ static bool paint_read_path(const paint_values *v, ebpo_paint_input **input, uin
     return fine;
 }
 
-/* --- changes and baking --- */
+/* --- changes --- */
 
 static ebpo_status fail_paint(ebpo_error *error, ebpo_status status, const char *what)
 {
@@ -198,7 +198,7 @@ static ebpo_status set_layer(paint_job *j, ebpo_error *error)
 }
 
 /* Returns the text with U+2028 as line separators. The caller frees it. */
-static char *as_lines(const char *text)
+static char *separate_lines(const char *text)
 {
     char *out = malloc(3 * strlen(text) + 1), *to = out;
     for (; out && *text; text++) {
@@ -218,13 +218,13 @@ static ebpo_status add_note(paint_job *j, ebpo_error *error)
 {
     ebpo_paint_note note = EBPO_PAINT_NOTE_INIT;
     double place[3] = { 0, 0, 0 };
-    (void)paint_read_place(j->v->at, place); /* already checked */
+    (void)paint_read_position(j->v->at, place); /* already checked */
     ebpo_status status = paint_layer(j, &note.layer, error);
     if (status == EBPO_OK)
         status = ebpo_paint_locate(j->paint, j->context, place, &note.at, error);
     if (status != EBPO_OK)
         return status;
-    char *body = as_lines(j->v->note);
+    char *body = separate_lines(j->v->note);
     if (!body)
         return fail_paint(error, EBPO_E_MEMORY, "not enough memory for the note");
     note.title = j->v->title;
@@ -284,8 +284,8 @@ static ebpo_status undo_strokes(paint_job *j, ebpo_error *error)
     return status;
 }
 
-/* Applies the requested change; creates the paint before if it does not exist. Returns an exit
- * code; errors were reported. */
+/* Applies the requested change, after creating the paint if it does not exist. Returns an exit
+ * code; errors have been reported. */
 static ebpo_status paint_change(paint_job *j, const ebpo_paint_input *input, uint64_t count,
                                 ebpo_error *error)
 {
@@ -316,7 +316,7 @@ static ebpo_status paint_change(paint_job *j, const ebpo_paint_input *input, uin
 /* --- baking --- */
 
 /* Returns [vertex_count][4], the colours of the model, or the base. NULL: no memory. */
-static uint8_t *own_colours(paint_job *j, const ebpo_mesh *mesh, ebpo_error *error)
+static uint8_t *base_colours(paint_job *j, const ebpo_mesh *mesh, ebpo_error *error)
 {
     ebpo_colours colours;
     uint32_t base = 0xe6e6e6ff;
@@ -372,7 +372,7 @@ static ebpo_status paint_bake(paint_job *j, ebpo_error *error)
         status = ebpo_file_read_source_mesh(j->file, &read, &mesh, NULL, error);
     if (status != EBPO_OK)
         return status;
-    uint8_t *rgba = own_colours(j, &mesh, error);
+    uint8_t *rgba = base_colours(j, &mesh, error);
     status = rgba ? ebpo_paint_bake(j->paint, j->context, &mesh, &options, rgba, &j->baked, error)
                   : EBPO_E_MEMORY;
     if (status == EBPO_OK)
@@ -402,7 +402,7 @@ static const paint_values defaults = { .layer = -1,
 
 /* --- options --- */
 
-static bool says_of_layer(const paint_values *v)
+static bool gives_layer_facts(const paint_values *v)
 {
     return v->description || v->opacity >= 0 || v->show || v->hide;
 }
@@ -411,7 +411,7 @@ static bool says_of_layer(const paint_values *v)
 static bool sets_layer(const paint_values *v)
 {
     return !v->new_layer && !v->path && !v->note &&
-           (says_of_layer(v) || v->title || v->author || v->date || v->colour);
+           (gives_layer_facts(v) || v->title || v->author || v->date || v->colour);
 }
 
 static int count_removals(const paint_values *v)
@@ -437,7 +437,7 @@ static int check_pen(const paint_values *v)
         return command_usage("paint", "--density belongs to --spread");
     if (v->erase && v->colour)
         return command_usage("paint", "--erase has no colour");
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 static int check_texts(const paint_values *v)
@@ -449,7 +449,7 @@ static int check_texts(const paint_values *v)
                              v->colour);
     if (v->base && (!paint_read_colour(v->base, &colour) || strlen(v->base) != 6))
         return command_usage("paint", "--base '%s': expected RRGGBB in hexadecimal", v->base);
-    if (v->at && !paint_read_place(v->at, place))
+    if (v->at && !paint_read_position(v->at, place))
         return command_usage("paint", "--at '%s': expected X,Y,Z", v->at);
     if (v->date && !ebpo_is_date(v->date))
         return command_usage("paint", "--date '%s': expected " WORDS_DATE_EXPECTED, v->date);
@@ -460,7 +460,7 @@ static int check_texts(const paint_values *v)
         return command_usage(
             "paint", "--bake '%s': expected a name that ends with .ply, .glb, .gltf or .obj",
             v->bake);
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 static int check_values(const paint_values *v)
@@ -471,7 +471,7 @@ static int check_values(const paint_values *v)
         return command_usage("paint",
                              "only one action at a time: add or change, --undo or one --remove, "
                              "--bake, --area");
-    if ((v->path || v->note) && !v->new_layer && says_of_layer(v))
+    if ((v->path || v->note) && !v->new_layer && gives_layer_facts(v))
         return command_usage("paint", "--description, --opacity, --show and --hide belong to a "
                                       "layer: use them with --new-layer or in a separate run");
     if (v->new_layer && (v->layer >= 0 || v->title || v->note))
@@ -495,7 +495,7 @@ static int check_values(const paint_values *v)
     if (v->layer >= 0 && !v->path && !v->note && !sets_layer(v))
         return command_usage("paint", "--layer N: nothing to do; --remove-layer removes a layer");
     int code = check_pen(v);
-    return code == EXIT_FINE ? check_texts(v) : code;
+    return code == EXIT_OK ? check_texts(v) : code;
 }
 
 static bool needs_model(const paint_values *v) { return v->path || v->note || v->bake || v->area; }
@@ -510,13 +510,13 @@ static int check_outputs(const paint_job *j)
         return EXIT_USAGE;
     if (j->v->out && j->v->path && command_overwrites("paint", j->v->path, j->v->out))
         return EXIT_USAGE;
-    return j->v->bake && command_overwrites("paint", paint, j->v->bake) ? EXIT_USAGE : EXIT_FINE;
+    return j->v->bake && command_overwrites("paint", paint, j->v->bake) ? EXIT_USAGE : EXIT_OK;
 }
 
 /* --- running --- */
 
 /* Seconds to wait for other commands that change the same paint. */
-static const double WAIT = 600;
+static const double LOCK_SECONDS = 600;
 
 /* Opens the paint; waits for other commands before changing it. Creates it when a layer is added.
  */
@@ -537,8 +537,8 @@ static ebpo_status open_paint(paint_job *j, ebpo_error *error)
         return error->status;
     }
     if (in_place)
-        return ebpo_paint_open_to_change(j->paint_path, make ? j->file : NULL, WAIT, &j->progress,
-                                         &j->paint, error);
+        return ebpo_paint_open_to_change(j->paint_path, make ? j->file : NULL, LOCK_SECONDS,
+                                         &j->progress, &j->paint, error);
     return absent ? ebpo_paint_new(j->file, &j->paint, error)
                   : ebpo_paint_open(j->paint_path, &j->paint, error);
 }
@@ -564,8 +564,8 @@ static ebpo_status measure_areas(paint_job *j, ebpo_error *error)
     return ebpo_paint_measure(j->paint, j->context, &o, &j->areas, error);
 }
 
-static ebpo_status do_paint_work(paint_job *j, const ebpo_paint_input *input, uint64_t count,
-                                 uint64_t memory, ebpo_error *error)
+static ebpo_status run_steps(paint_job *j, const ebpo_paint_input *input, uint64_t count,
+                             uint64_t memory, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     ebpo_paint_info info = EBPO_PAINT_INFO_INIT;
@@ -603,12 +603,12 @@ static int run_job(paint_job *j, const ebpo_paint_input *input, uint64_t count, 
         int code = command_failed("paint", &error);
         return status == EBPO_E_ARGUMENT ? EXIT_DIFFERS : code;
     }
-    status = do_paint_work(j, input, count, memory, &error);
+    status = run_steps(j, input, count, memory, &error);
     progress_wipe(&line);
     if (status != EBPO_OK)
         return command_failed("paint", &error);
     paint_report(j);
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 static int run_paint(void *given, const char **operand)
@@ -623,17 +623,17 @@ static int run_paint(void *given, const char **operand)
     ebpo_paint_input *input = NULL;
     uint64_t memory = 0, count = 0;
     int code = check_values(v);
-    if (code == EXIT_FINE && v->memory && !words_read_size(v->memory, &memory))
+    if (code == EXIT_OK && v->memory && !words_read_size(v->memory, &memory))
         code = command_usage("paint", "--memory '%s': expected " WORDS_SIZE_EXPECTED, v->memory);
-    if (code == EXIT_FINE && needs_model(v) && !j.model_path)
+    if (code == EXIT_OK && needs_model(v) && !j.model_path)
         code = command_usage("paint", "the model is needed: ebpo paint PAINT FILE");
-    if (code == EXIT_FINE)
+    if (code == EXIT_OK)
         code = check_outputs(&j);
-    if (code == EXIT_FINE && j.model_path && !command_wants_hdf5("paint", j.model_path))
+    if (code == EXIT_OK && j.model_path && !command_wants_hdf5("paint", j.model_path))
         code = EXIT_FAILED;
-    if (code == EXIT_FINE && v->path && !paint_read_path(v, &input, &count))
+    if (code == EXIT_OK && v->path && !paint_read_path(v, &input, &count))
         code = EXIT_FAILED;
-    if (code == EXIT_FINE)
+    if (code == EXIT_OK)
         code = run_job(&j, input, count, memory);
     ebpo_paint_areas_free(&j.areas);
     ebpo_context_free(j.context);

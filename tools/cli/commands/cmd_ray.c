@@ -12,8 +12,8 @@
 /* Rows are rays. */
 _Static_assert(sizeof(ebpo_ray) == POINTS_WIDEST * sizeof(double), "as points_parse fills them");
 
-static ebpo_status result_all(const query_job *job, query_worker *w, const ebpo_ray *rays,
-                              uint64_t count, const ebpo_ray_options *how, ebpo_error *error)
+static ebpo_status compute_all_hits(const query_job *job, query_worker *w, const ebpo_ray *rays,
+                                    uint64_t count, const ebpo_ray_options *how, ebpo_error *error)
 {
     const ebpo_ray_hit *hits;
     const uint64_t *begin;
@@ -24,14 +24,15 @@ static ebpo_status result_all(const query_job *job, query_worker *w, const ebpo_
     return status;
 }
 
-/* Returns the indices of models in a catalogue, which follow the results. */
+/* Returns the indices of models in a catalogue; they are stored in w->results after the `count`
+ * hits. */
 static uint64_t *models_of(const query_worker *w, uint64_t count)
 {
     return (uint64_t *)(void *)((ebpo_ray_hit *)w->results + count);
 }
 
-static ebpo_status result_rays(const query_job *job, query_worker *w, const double *rows,
-                               uint64_t count, ebpo_error *error)
+static ebpo_status compute_rays(const query_job *job, query_worker *w, const double *rows,
+                                uint64_t count, ebpo_error *error)
 {
     const ebpo_ray *rays = (const ebpo_ray *)(const void *)rows;
     ebpo_ray_options how = EBPO_RAY_OPTIONS_INIT;
@@ -43,7 +44,7 @@ static ebpo_status result_rays(const query_job *job, query_worker *w, const doub
                                   models_of(w, count), error);
     }
     if (job->values->all)
-        return result_all(job, w, rays, count, &how, error);
+        return compute_all_hits(job, w, rays, count, &how, error);
     if (job->values->any)
         return ebpo_ray_any_many(w->context, rays, count, &how, w->results, error);
     return ebpo_ray_first_many(w->context, rays, count, &how, w->results, error);
@@ -92,8 +93,8 @@ static int run_ray(void *given, const char **operand)
                       .values = v,
                       .kind = POINTS_RAYS,
                       .result_bytes = sizeof(ebpo_ray_hit),
-                      .parts_share = 0.6, /* docs/measured/queries.md */
-                      .result = result_rays,
+                      .subtree_overhead = 0.6, /* docs/measured/queries.md */
+                      .result = compute_rays,
                       .print = print_rays,
                       .columns = ray_columns,
                       .dtype = ray_dtype };

@@ -22,11 +22,16 @@
 
 /* --- readable parts of the file --- */
 
-typedef enum fate { NONE, KEPT, REBUILT, LOST } fate; /* NONE: the file has no such part */
+typedef enum part_state {
+    NONE,
+    KEPT,
+    REBUILT,
+    LOST
+} part_state; /* NONE: the file has no such part */
 
-typedef enum piece { MESH, MAPS, ATTRIBUTES, LEVELS, SUMS, PIECES } piece;
+typedef enum file_part { MESH, MAPS, ATTRIBUTES, LEVELS, CHECKSUMS, FILE_PARTS } file_part;
 
-typedef struct patient {
+typedef struct recovery {
     const struct values *v; /* values of the options */
     const char *path;
     unsigned threads;
@@ -35,14 +40,14 @@ typedef struct patient {
     const ebpo_info *info;
     ebpo_workspace *workspace;
     ebpo_progress progress;
-    fate fate[PIECES];
-    char why[PIECES][sizeof((ebpo_error *)NULL)->message]; /* errors; "": none */
-    bool same;                                             /* the new content equals that of the
-                                                            * file */
-} patient;
+    part_state part_state[FILE_PARTS];
+    char why[FILE_PARTS][sizeof((ebpo_error *)NULL)->message]; /* errors; "": none */
+    bool content_equal;                                        /* the new content equals that of the
+                                                                * file */
+} recovery;
 
 /* Returns the options for reading parts. */
-static ebpo_read_options patient_reading(const patient *p)
+static ebpo_read_options part_options(const recovery *p)
 {
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
     read.threads = p->threads;
@@ -58,11 +63,11 @@ static bool is_damage(ebpo_status status)
 }
 
 /* Records the result of reading a part. */
-static ebpo_status take_down(patient *p, piece which, ebpo_status status,
-                             const ebpo_error *reported, ebpo_error *error)
+static ebpo_status record_result(recovery *p, file_part which, ebpo_status status,
+                                 const ebpo_error *reported, ebpo_error *error)
 {
     if (status == EBPO_OK || is_damage(status)) {
-        p->fate[which] = status == EBPO_OK ? KEPT : LOST;
+        p->part_state[which] = status == EBPO_OK ? KEPT : LOST;
         if (status != EBPO_OK && !p->why[which][0])
             snprintf(p->why[which], sizeof p->why[which], "%s", reported->message);
         return EBPO_OK;
@@ -71,84 +76,84 @@ static ebpo_status take_down(patient *p, piece which, ebpo_status status,
     return status;
 }
 
-static ebpo_status inspect_mesh(patient *p, ebpo_error *error)
+static ebpo_status inspect_mesh(recovery *p, ebpo_error *error)
 {
     ebpo_error reported = EBPO_ERROR_INIT;
-    ebpo_read_options read = patient_reading(p);
+    ebpo_read_options read = part_options(p);
     ebpo_mesh mesh = { 0 };
     ebpo_maps maps = { 0 };
     if (!(p->info->parts & EBPO_PART_MESH))
         return EBPO_OK;
     ebpo_status status = ebpo_file_read_mesh(p->file, &read, &mesh, &reported);
     ebpo_mesh_free(&mesh);
-    status = take_down(p, MESH, status, &reported, error);
+    status = record_result(p, MESH, status, &reported, error);
     if (status != EBPO_OK || !(p->info->parts & EBPO_PART_MAPS))
         return status;
     status = ebpo_file_read_maps(p->file, &read, &maps, &reported);
     ebpo_maps_free(&maps);
-    return take_down(p, MAPS, status, &reported, error);
+    return record_result(p, MAPS, status, &reported, error);
 }
 
 /* The shared header is read with all attributes. */
-static ebpo_status inspect_header(patient *p, ebpo_error *error)
+static ebpo_status inspect_header(recovery *p, ebpo_error *error)
 {
     ebpo_error reported = EBPO_ERROR_INIT;
-    ebpo_read_options read = patient_reading(p);
+    ebpo_read_options read = part_options(p);
     ebpo_mesh mesh = { 0 };
-    if (p->fate[MESH] != KEPT)
+    if (p->part_state[MESH] != KEPT)
         return EBPO_OK;
     read.attributes = true;
     ebpo_status status = ebpo_file_read_mesh(p->file, &read, &mesh, &reported);
     ebpo_mesh_free(&mesh);
-    return take_down(p, ATTRIBUTES, status, &reported, error);
+    return record_result(p, ATTRIBUTES, status, &reported, error);
 }
 
-static ebpo_status inspect_attributes(patient *p, ebpo_error *error)
+static ebpo_status inspect_attributes(recovery *p, ebpo_error *error)
 {
     ebpo_error reported = EBPO_ERROR_INIT;
-    ebpo_read_options read = patient_reading(p);
+    ebpo_read_options read = part_options(p);
     ebpo_status status = EBPO_OK;
     if (!(p->info->parts & EBPO_PART_ATTRIBUTES))
         return EBPO_OK;
-    p->fate[ATTRIBUTES] = KEPT;
+    p->part_state[ATTRIBUTES] = KEPT;
     status = inspect_header(p, error);
-    for (unsigned n = 0; status == EBPO_OK && p->fate[ATTRIBUTES] == KEPT; n++) {
+    for (unsigned n = 0; status == EBPO_OK && p->part_state[ATTRIBUTES] == KEPT; n++) {
         ebpo_attribute_values got;
         status = ebpo_file_read_attribute(p->file, n, &read, &got, &reported);
         ebpo_attribute_values_free(&got);
         if (status == EBPO_E_ABSENT) /* there are no more attributes */
             return EBPO_OK;
-        status = take_down(p, ATTRIBUTES, status, &reported, error);
+        status = record_result(p, ATTRIBUTES, status, &reported, error);
     }
     return status;
 }
 
-static ebpo_status inspect_levels(patient *p, ebpo_error *error)
+static ebpo_status inspect_levels(recovery *p, ebpo_error *error)
 {
     ebpo_error reported = EBPO_ERROR_INIT;
-    ebpo_read_options read = patient_reading(p);
+    ebpo_read_options read = part_options(p);
     ebpo_status status = EBPO_OK;
-    p->fate[LEVELS] = KEPT;
+    p->part_state[LEVELS] = KEPT;
     for (int l = 0; l < p->info->level_count && status == EBPO_OK; l++) {
         ebpo_level level;
         status = ebpo_file_read_level(p->file, l, &read, &level, &reported);
         bool good = status == EBPO_OK;
         if (good)
             ebpo_level_free(&level);
-        status = good ? EBPO_OK : take_down(p, LEVELS, status, &reported, error);
+        status = good ? EBPO_OK : record_result(p, LEVELS, status, &reported, error);
     }
     return status;
 }
 
-static void forget_fates(patient *p)
+static void reset_states(recovery *p)
 {
-    memset(p->fate, 0, sizeof p->fate);
+    memset(p->part_state, 0, sizeof p->part_state);
     memset(p->why, 0, sizeof p->why);
 }
 
-static ebpo_status inspect_all(patient *p, ebpo_error *error)
+static ebpo_status inspect_all(recovery *p, ebpo_error *error)
 {
-    forget_fates(p);
+    reset_states(p);
     ebpo_status status = inspect_mesh(p, error);
     if (status == EBPO_OK)
         status = inspect_attributes(p, error);
@@ -156,16 +161,17 @@ static ebpo_status inspect_all(patient *p, ebpo_error *error)
 }
 
 /* Opens the file without its list of chunk ends, if its content then matches the header. */
-static ebpo_status open_unlisted(const patient *p, ebpo_file **out, ebpo_error *error)
+static ebpo_status open_unlisted(const recovery *p, ebpo_file **out, ebpo_error *error)
 {
-    ebpo_read_options read = patient_reading(p);
+    ebpo_read_options read = part_options(p);
     ebpo_status status = unlisted_open(p->path, p->max_expansion, out, error);
     return status == EBPO_OK ? ebpo_file_check_content(*out, &read, error) : status;
 }
 
-/* Nothing can be read without the list of chunk ends. When only this list is damaged, the content
- * without it matches the header. This proves that all content is intact, so all of it is kept. */
-static ebpo_status patient_inspect(patient *p, ebpo_error *error)
+/* Finds the readable parts. Without the list of chunk ends nothing can be read. If only this list
+ * is damaged, the content that is read without the list matches the checksum in the header. This
+ * proves that all content is intact, so all of it is kept. */
+static ebpo_status inspect_file(recovery *p, ebpo_error *error)
 {
     ebpo_stored_sizes stored = EBPO_STORED_SIZES_INIT;
     ebpo_error reported = EBPO_ERROR_INIT;
@@ -175,8 +181,8 @@ static ebpo_status patient_inspect(patient *p, ebpo_error *error)
         status = ebpo_file_locate(p->file, &stored, error);
     if (status != EBPO_OK || !stored.checksum_bytes)
         return status;
-    p->fate[SUMS] = KEPT;
-    if (p->fate[MESH] != LOST)
+    p->part_state[CHECKSUMS] = KEPT;
+    if (p->part_state[MESH] != LOST)
         return EBPO_OK;
     status = open_unlisted(p, &unlisted, &reported);
     if (status != EBPO_OK) {
@@ -190,8 +196,8 @@ static ebpo_status patient_inspect(patient *p, ebpo_error *error)
     p->file = unlisted;
     p->info = ebpo_file_info(unlisted);
     status = inspect_all(p, error);
-    p->fate[SUMS] = REBUILT;
-    memcpy(p->why[SUMS], why, sizeof why);
+    p->part_state[CHECKSUMS] = REBUILT;
+    memcpy(p->why[CHECKSUMS], why, sizeof why);
     return status;
 }
 
@@ -206,20 +212,21 @@ typedef struct values {
 
 #include "cli/options/recover.inc"
 
-static const char *const fate_words[] = { "none", "kept", "rebuilt", "lost" };
-static const char *const piece_words[] = { "mesh", "maps", "attributes", "levels", "checksums" };
+static const char *const state_words[] = { "none", "kept", "rebuilt", "lost" };
+static const char *const file_part_words[] = { "mesh", "maps", "attributes", "levels",
+                                               "checksums" };
 
 /* --- the mesh to build from --- */
 
-typedef struct remade {
+typedef struct rebuilt_mesh {
     ebpo_mesh mesh;
     ebpo_mesh_report report;
     ebpo_repair_record record;
     /* source index of each vertex or face of the mesh; NULL: equal to its index */
     uint32_t *vertex_source, *face_source;
-} remade;
+} rebuilt_mesh;
 
-static int in_order(const void *a, const void *b)
+static int compare_indices(const void *a, const void *b)
 {
     uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
     return (x > y) - (x < y);
@@ -232,17 +239,17 @@ static uint32_t *sorted_numbers(const uint32_t *map, uint64_t count)
     if (!out)
         return NULL;
     memcpy(out, map, count * sizeof *out);
-    qsort(out, count, sizeof *out, in_order);
+    qsort(out, count, sizeof *out, compare_indices);
     return out;
 }
 
 /* Welding and dropping leave gaps in the source indices, which the mesh alone does not show. */
-static ebpo_status numbers_of(const patient *p, remade *r, ebpo_error *error)
+static ebpo_status set_source_indices(const recovery *p, rebuilt_mesh *r, ebpo_error *error)
 {
     const ebpo_repair_record *m = &p->info->repair_record;
     ebpo_maps maps;
-    ebpo_read_options read = patient_reading(p);
-    if (p->fate[MAPS] != KEPT || (!m->welded_vertices && !m->dropped_faces))
+    ebpo_read_options read = part_options(p);
+    if (p->part_state[MAPS] != KEPT || (!m->welded_vertices && !m->dropped_faces))
         return EBPO_OK;
     ebpo_status status = ebpo_file_read_maps(p->file, &read, &maps, error);
     if (status != EBPO_OK)
@@ -256,14 +263,14 @@ static ebpo_status numbers_of(const patient *p, remade *r, ebpo_error *error)
     return error->status = EBPO_E_MEMORY;
 }
 
-static ebpo_status from_file(patient *p, remade *r, ebpo_error *error)
+static ebpo_status read_file_mesh(recovery *p, rebuilt_mesh *r, ebpo_error *error)
 {
-    ebpo_read_options read = patient_reading(p);
+    ebpo_read_options read = part_options(p);
     ebpo_prepare_options prepare = EBPO_PREPARE_OPTIONS_INIT;
     ebpo_prepared prepared = EBPO_PREPARED_INIT;
     bool ordered;
-    read.attributes = p->fate[ATTRIBUTES] == KEPT;
-    ebpo_status status = p->fate[MAPS] == KEPT
+    read.attributes = p->part_state[ATTRIBUTES] == KEPT;
+    ebpo_status status = p->part_state[MAPS] == KEPT
                              ? ebpo_file_read_source_mesh(p->file, &read, &r->mesh, &ordered, error)
                              : ebpo_file_read_mesh(p->file, &read, &r->mesh, error);
     if (status != EBPO_OK)
@@ -278,18 +285,18 @@ static ebpo_status from_file(patient *p, remade *r, ebpo_error *error)
     memcpy(r->mesh.source_sha256, p->info->source_sha256, sizeof r->mesh.source_sha256);
     memcpy(r->mesh.source_format, p->info->source_format, sizeof r->mesh.source_format);
     r->mesh.source_size = p->info->source_size;
-    return status == EBPO_OK ? numbers_of(p, r, error) : status;
+    return status == EBPO_OK ? set_source_indices(p, r, error) : status;
 }
 
-static ebpo_status from_source(patient *p, remade *r, ebpo_error *error)
+static ebpo_status read_source_mesh(recovery *p, rebuilt_mesh *r, ebpo_error *error)
 {
     const ebpo_repair_record *m = &p->info->repair_record;
-    repairing steps = { .weld = m->weld && !(m->weld_distance > 0),
-                        .weld_distance = m->weld_distance,
-                        .drop_duplicates = m->dropped_faces > 0,
-                        .orient = m->orient,
-                        .flip = !m->orient && m->flipped_faces,
-                        .fill_holes = m->fill_holes };
+    repair_request steps = { .weld = m->weld && !(m->weld_distance > 0),
+                             .weld_distance = m->weld_distance,
+                             .drop_duplicates = m->dropped_faces > 0,
+                             .orient = m->orient,
+                             .flip = !m->orient && m->flipped_faces,
+                             .fill_holes = m->fill_holes };
     mesh_input in;
     mesh_reading more = !(p->info->parts & EBPO_PART_ATTRIBUTES) ? READ_MESH
                         : textures_embedded(p->file)             ? READ_TEXTURES
@@ -310,13 +317,13 @@ static ebpo_status from_source(patient *p, remade *r, ebpo_error *error)
         return error->status = EBPO_E_ABSENT;
     }
     for (int i = 0; i < LEVELS; i++)
-        p->fate[i] = p->fate[i] == LOST ? REBUILT : p->fate[i];
+        p->part_state[i] = p->part_state[i] == LOST ? REBUILT : p->part_state[i];
     return EBPO_OK;
 }
 
 /* --- building --- */
 
-static ebpo_build_options building_options(const patient *p)
+static ebpo_build_options building_options(const recovery *p)
 {
     ebpo_build_options o = EBPO_BUILD_OPTIONS_INIT;
     const ebpo_info *info = p->info;
@@ -329,9 +336,9 @@ static ebpo_build_options building_options(const patient *p)
     o.normals = (ebpo_normal_distance)info->normals;
     o.seed = info->seed;
     o.parts = info->parts;
-    if (p->fate[MAPS] == LOST)
+    if (p->part_state[MAPS] == LOST)
         o.parts &= ~(uint32_t)EBPO_PART_MAPS;
-    if (p->fate[ATTRIBUTES] == LOST)
+    if (p->part_state[ATTRIBUTES] == LOST)
         o.parts &= ~(uint32_t)(EBPO_PART_ATTRIBUTES | EBPO_PART_COLOURS);
     o.rule = info->rule;
     o.require_solid = info->solid;
@@ -343,8 +350,8 @@ static ebpo_build_options building_options(const patient *p)
     return o;
 }
 
-/* Consumes the mesh. */
-static ebpo_status make_file(const patient *p, remade *r, ebpo_error *error)
+/* Builds and writes the new file; frees the mesh. */
+static ebpo_status make_file(const recovery *p, rebuilt_mesh *r, ebpo_error *error)
 {
     ebpo_build_options build = building_options(p);
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
@@ -365,19 +372,19 @@ static ebpo_status make_file(const patient *p, remade *r, ebpo_error *error)
     return status;
 }
 
-static ebpo_status compare_content(patient *p, ebpo_error *error)
+static ebpo_status compare_content(recovery *p, ebpo_error *error)
 {
     ebpo_file *made;
     ebpo_status status = remote_open_own(p->v->out, &made, error);
     if (status != EBPO_OK)
         return status;
-    p->same = memcmp(ebpo_file_info(made)->content_sha256, p->info->content_sha256,
-                     sizeof p->info->content_sha256) == 0;
+    p->content_equal = memcmp(ebpo_file_info(made)->content_sha256, p->info->content_sha256,
+                              sizeof p->info->content_sha256) == 0;
     /* a part that was read without fault is kept only if the new one equals it */
-    if (p->fate[LEVELS] == LOST || !p->same)
-        p->fate[LEVELS] = REBUILT;
+    if (p->part_state[LEVELS] == LOST || !p->content_equal)
+        p->part_state[LEVELS] = REBUILT;
     if (p->v->source && !textures_same(p->file, made)) {
-        p->fate[ATTRIBUTES] = LOST;
+        p->part_state[ATTRIBUTES] = LOST;
         snprintf(p->why[ATTRIBUTES], sizeof p->why[ATTRIBUTES],
                  "images named by %.200s have changed", p->v->source);
     }
@@ -385,15 +392,15 @@ static ebpo_status compare_content(patient *p, ebpo_error *error)
     return EBPO_OK;
 }
 
-static ebpo_status refuse_repair(const patient *p, const char *why, ebpo_error *error)
+static ebpo_status refuse_repair(const recovery *p, const char *why, ebpo_error *error)
 {
     snprintf(error->message, sizeof error->message, "%s", why);
     (void)p;
     return error->status = EBPO_E_ABSENT;
 }
 
-/* The list of chunk ends may be damaged: then nothing can be attributed to the file. */
-static ebpo_status refuse_mesh(const patient *p, ebpo_error *error)
+/* Fails because the file has no readable mesh. */
+static ebpo_status refuse_mesh(const recovery *p, ebpo_error *error)
 {
     char why[sizeof error->message];
     snprintf(why, sizeof why,
@@ -403,27 +410,27 @@ static ebpo_status refuse_mesh(const patient *p, ebpo_error *error)
     return refuse_repair(p, why, error);
 }
 
-static ebpo_status repair_file(patient *p, ebpo_error *error)
+static ebpo_status repair_file(recovery *p, ebpo_error *error)
 {
-    remade r = { .vertex_source = NULL };
+    rebuilt_mesh r = { .vertex_source = NULL };
     if (p->info->pruned)
         return refuse_repair(
             p,
             "the file is a subset: omitted parts cannot be rebuilt; make another subset of the "
             "original",
             error);
-    ebpo_status status = patient_inspect(p, error);
+    ebpo_status status = inspect_file(p, error);
     if (status != EBPO_OK)
         return status;
-    if (!p->v->source && p->fate[MESH] == LOST)
+    if (!p->v->source && p->part_state[MESH] == LOST)
         return refuse_mesh(p, error);
-    if (!p->v->source && p->fate[MESH] != KEPT)
+    if (!p->v->source && p->part_state[MESH] != KEPT)
         return refuse_repair(
             p,
             "the file has no mesh to rebuild from; give the mesh that the file was made from "
             "with --source",
             error);
-    status = p->v->source ? from_source(p, &r, error) : from_file(p, &r, error);
+    status = p->v->source ? read_source_mesh(p, &r, error) : read_file_mesh(p, &r, error);
     if (status == EBPO_OK)
         status = make_file(p, &r, error);
     else
@@ -435,44 +442,46 @@ static ebpo_status repair_file(patient *p, ebpo_error *error)
 
 /* --- output --- */
 
-static void print_words(const patient *p, const char *in)
+static void print_words(const recovery *p, const char *in)
 {
     char hex[65];
-    for (int i = 0; i < PIECES; i++)
-        if (p->fate[i] != NONE)
-            printf("  %-11s %s%s%s\n", piece_words[i], fate_words[p->fate[i]],
+    for (int i = 0; i < FILE_PARTS; i++)
+        if (p->part_state[i] != NONE)
+            printf("  %-11s %s%s%s\n", file_part_words[i], state_words[p->part_state[i]],
                    p->why[i][0] ? ": " : "", p->why[i]);
     words_hex(p->info->content_sha256, hex);
-    printf("%s: %s of %s, SHA-256 %s\n", p->v->out, p->same ? "the content" : "not the content", in,
-           hex);
+    printf("%s: %s of %s, SHA-256 %s\n", p->v->out,
+           p->content_equal ? "the content" : "not the content", in, hex);
 }
 
-static void print_json(const patient *p, const char *in)
+static void print_json(const recovery *p, const char *in)
 {
     json j;
     json_begin(&j, stdout);
     json_object(&j, NULL);
     json_text(&j, "file", in);
     json_text(&j, "output", p->v->out);
-    json_bool(&j, "same_content", p->same);
+    json_bool(&j, "same_content", p->content_equal);
     json_object(&j, "parts");
-    for (int i = 0; i < PIECES; i++)
-        json_text(&j, piece_words[i], fate_words[p->fate[i]]);
+    for (int i = 0; i < FILE_PARTS; i++)
+        json_text(&j, file_part_words[i], state_words[p->part_state[i]]);
     json_end(&j);
     json_object(&j, "damage");
-    for (int i = 0; i < PIECES; i++)
+    for (int i = 0; i < FILE_PARTS; i++)
         if (p->why[i][0])
-            json_text(&j, piece_words[i], p->why[i]);
+            json_text(&j, file_part_words[i], p->why[i]);
         else
-            json_null(&j, piece_words[i]);
+            json_null(&j, file_part_words[i]);
     json_end(&j);
     json_finish(&j);
 }
 
-/* Lost maps always change the content. */
-static int code_of(const patient *p)
+/* Returns the exit code. Without the maps of the file the content always differs, which is no
+ * error.
+ */
+static int exit_code_of(const recovery *p)
 {
-    return p->same || p->fate[MAPS] == LOST ? EXIT_FINE : EXIT_DIFFERS;
+    return p->content_equal || p->part_state[MAPS] == LOST ? EXIT_OK : EXIT_DIFFERS;
 }
 
 static const values standard = { 0 };
@@ -481,23 +490,23 @@ static int run_recover(void *given, const char **operand)
 {
     const values *v = given;
     progress_line line;
-    patient p = { .v = v,
-                  .path = operand[0],
-                  .threads = (unsigned)v->threads,
-                  .max_expansion = (uint64_t)v->max_expansion };
+    recovery p = { .v = v,
+                   .path = operand[0],
+                   .threads = (unsigned)v->threads,
+                   .max_expansion = (uint64_t)v->max_expansion };
     ebpo_open_options how = EBPO_OPEN_OPTIONS_INIT;
     how.max_expansion = (uint64_t)v->max_expansion;
     ebpo_error error = EBPO_ERROR_INIT;
     if (!v->out)
         return command_usage("recover", "give the new file with --output");
-    if (!memory_good("recover", &v->memory) || command_overwrites("recover", operand[0], v->out))
+    if (!memory_check("recover", &v->memory) || command_overwrites("recover", operand[0], v->out))
         return EXIT_USAGE;
     if (!command_wants_hdf5("recover", operand[0]))
         return EXIT_FAILED;
     p.progress = progress_start(&line, "recover", v->quiet);
     ebpo_status status = ebpo_check_output(v->out, &error);
     if (status == EBPO_OK)
-        status = memory_make(&p.workspace, &v->memory, &error);
+        status = memory_new(&p.workspace, &v->memory, &error);
     if (status == EBPO_OK)
         status = ebpo_open_with(operand[0], &how, &p.file, &error);
     if (status == EBPO_OK) {
@@ -511,7 +520,7 @@ static int run_recover(void *given, const char **operand)
         print_words(&p, operand[0]);
     ebpo_close(p.file);
     ebpo_workspace_free(p.workspace);
-    return status == EBPO_OK ? code_of(&p) : command_failed("recover", &error);
+    return status == EBPO_OK ? exit_code_of(&p) : command_failed("recover", &error);
 }
 
 const command command_recover = { &spec, sizeof standard, &standard, run_recover };

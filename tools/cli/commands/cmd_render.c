@@ -41,7 +41,7 @@ static const char *const up_words[] = { "x", "y", "z", NULL };
 
 typedef struct tile {
     int level; /* or MESH */
-    bool if_there;
+    bool optional;
     uint64_t face_count;
     ebpo_mesh mesh;
     ebpo_colours colours; /* colours of the model, if any */
@@ -68,16 +68,17 @@ static int usage_error(const char *what, const char *value, const char *expected
     return command_usage("render", "%s: '%s' is not %s", what, value, expected);
 }
 
-static bool add_tile(job *j, int level, bool if_there)
+static bool add_tile(job *j, int level, bool optional)
 {
     if (j->tile_count < TILES_MAX) {
         j->tiles[j->tile_count].level = level;
-        j->tiles[j->tile_count].if_there = if_there;
+        j->tiles[j->tile_count].optional = optional;
     }
     return j->tile_count++ < TILES_MAX;
 }
 
-/* Levels of "3-" that the file does not have are omitted. */
+/* Adds the levels of a word such as "3", "0-5" or "3-". Levels of "3-" that the file does not have
+ * are omitted later. */
 static bool add_levels(job *j, const char *text)
 {
     word_levels levels;
@@ -126,7 +127,7 @@ static int parse_values(job *j)
             "at most 24 of 'mesh' and levels, such as 0-3,mesh; the deepest possible is 20");
     if (!v->levels)
         j->tiles[j->tile_count++].level = v->level >= 0 ? (int)v->level : MESH;
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 /* --- loading --- */
@@ -146,7 +147,7 @@ static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress pro
         return read_well == EBPO_OK ? ebpo_mesh_colours(&t->mesh, &t->colours, error) : read_well;
     }
     ebpo_lod_options lod =
-        /* also cell faces: they close the envelopes, and inner ones are invisible */
+        /* with cell faces, which close the envelopes; those inside the model are invisible */
         EBPO_LOD_OPTIONS_INIT;
     lod.threads = threads;
     lod.progress = progress;
@@ -162,17 +163,17 @@ static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress pro
     if (status == EBPO_OK)
         snprintf(t->caption, sizeof t->caption, "level %d: %.1f %%%s", t->level,
                  facts_percent(info, &solid, t->level),
-                 !info->solid             ? " of box"
-                 : findings_knows(&solid) ? ""
-                                          : " of winding integral");
+                 !info->solid                    ? " of box"
+                 : findings_volume_known(&solid) ? ""
+                                                 : " of winding integral");
     return status;
 }
 
-static void leave_out_tiles(job *j, int level_count)
+static void omit_missing_tiles(job *j, int level_count)
 {
     int count = 0;
     for (int i = 0; i < j->tile_count; i++)
-        if (!j->tiles[i].if_there || j->tiles[i].level < level_count)
+        if (!j->tiles[i].optional || j->tiles[i].level < level_count)
             j->tiles[count++] = j->tiles[i];
     j->tile_count = count;
 }
@@ -182,7 +183,7 @@ static ebpo_status load_file(job *j, ebpo_progress progress, ebpo_error *error)
     ebpo_file *file = NULL;
     ebpo_status status = remote_open(&file, j->in, &j->v.remote, error);
     if (status == EBPO_OK)
-        leave_out_tiles(j, ebpo_file_info(file)->level_count);
+        omit_missing_tiles(j, ebpo_file_info(file)->level_count);
     for (int i = 0; i < j->tile_count && status == EBPO_OK; i++)
         status = load_tile(j, &j->tiles[i], file, progress, error);
     if (status == EBPO_OK) {
@@ -351,7 +352,7 @@ static void report_json(const job *j)
 static int run_job(job *j)
 {
     int code = parse_values(j);
-    if (code != EXIT_FINE)
+    if (code != EXIT_OK)
         return code;
     if (command_overwrites("render", j->in, j->out))
         return EXIT_USAGE;
@@ -365,7 +366,7 @@ static int run_job(job *j)
     progress_wipe(&line);
     if (status == EBPO_OK && j->v.json)
         report_json(j);
-    return status == EBPO_OK ? EXIT_FINE : command_failed("render", &error);
+    return status == EBPO_OK ? EXIT_OK : command_failed("render", &error);
 }
 
 #endif

@@ -27,7 +27,7 @@ typedef struct values {
 
 static int check_values(const values *v, ebpo_write_options *write)
 {
-    if (!memory_good("repack", &v->memory) ||
+    if (!memory_check("repack", &v->memory) ||
         !subtree_faces_read("repack", v->subtree_faces, &write->subtree_faces))
         return EXIT_USAGE;
     if (v->zstd_level && v->codec > EBPO_CODEC_ZSTD)
@@ -35,11 +35,11 @@ static int check_values(const values *v, ebpo_write_options *write)
     write->threads = (unsigned)v->threads;
     write->face_coding = (ebpo_face_coding)v->face_coding;
     write->codec_level = (int)v->zstd_level;
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 /* Chooses the codec when the codec of the file is kept. */
-static ebpo_status settle_codec(const values *v, const ebpo_info *info, ebpo_write_options *write,
+static ebpo_status choose_codec(const values *v, const ebpo_info *info, ebpo_write_options *write,
                                 ebpo_error *error)
 {
     write->codec = v->codec >= 0 ? (ebpo_codec)v->codec : info->codec;
@@ -107,7 +107,7 @@ static int run_repack(void *given, const char **operand)
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
     int code = check_values(v, &write);
-    if (code != EXIT_FINE)
+    if (code != EXIT_OK)
         return code;
     if (!command_wants_hdf5("repack", operand[0]))
         return EXIT_FAILED;
@@ -117,11 +117,11 @@ static int run_repack(void *given, const char **operand)
     ebpo_file *file = NULL;
     write.progress = progress_start(&line, "repack", v->quiet);
     read.threads = write.threads;
-    ebpo_status status = memory_make(&read.workspace, &v->memory, &error), written = EBPO_OK;
+    ebpo_status status = memory_new(&read.workspace, &v->memory, &error), written = EBPO_OK;
     if (status == EBPO_OK)
         status = remote_open(&file, operand[0], &v->remote, &error);
     if (status == EBPO_OK)
-        status = settle_codec(v, ebpo_file_info(file), &write, &error);
+        status = choose_codec(v, ebpo_file_info(file), &write, &error);
     if (status == EBPO_OK)
         status = written = ebpo_file_repack(file, operand[1], &read, &write, &error);
     progress_wipe(&line);
@@ -129,8 +129,8 @@ static int run_repack(void *given, const char **operand)
         status = report_sizes(v, operand[1], file, progress_now() - begun, &error);
     ebpo_close(file);
     ebpo_workspace_free(read.workspace);
-    code = status == EBPO_OK ? EXIT_FINE : command_failed("repack", &error);
-    /* when the error is about the output, this build cannot write the output at all */
+    code = status == EBPO_OK ? EXIT_OK : command_failed("repack", &error);
+    /* an error about the output means that this build cannot write it at all */
     bool differs = written == EBPO_E_UNSUPPORTED && strcmp(error.file, operand[1]) != 0;
     return differs ? EXIT_DIFFERS : code;
 }

@@ -63,7 +63,7 @@ static int read_settings(comparison *c, const report_values *v)
 {
     const char *list = v->percent ? v->percent : v->k_root;
     char word[sizeof c->setting->k_root];
-    int code = EXIT_FINE;
+    int code = EXIT_OK;
     selection_options all = { v->select, v->percent ? 1 : -1, v->epsilon, NULL, v->normals, -1 };
     if (!list) { /* the seed also applies to points */
         c->setting[c->settings++].percent = 40;
@@ -71,7 +71,7 @@ static int read_settings(comparison *c, const report_values *v)
     }
     if (v->percent && v->k_root)
         return command_usage("report", "--percent and --k-root cannot be used together; give one");
-    for (const char *at = list; *at && code == EXIT_FINE;) {
+    for (const char *at = list; *at && code == EXIT_OK;) {
         if (c->settings == SETTINGS_MAX || !next_word(&at, word, sizeof word))
             return refuse_value(v->percent ? "--percent" : "--k-root", list,
                                 "at most 12 numbers with commas between them");
@@ -87,8 +87,8 @@ static int read_settings(comparison *c, const report_values *v)
 static int read_options(comparison *c, report_values *v, bool mesh)
 {
     char rest;
-    word_levels levels = { .last = EBPO_LEVELS_MAX - 1, .is_run = true };
-    if (v->levels && (!words_read_levels(v->levels, &levels) || !levels.is_run))
+    word_levels levels = { .last = EBPO_LEVELS_MAX - 1, .is_contiguous = true };
+    if (v->levels && (!words_read_levels(v->levels, &levels) || !levels.is_contiguous))
         return refuse_value("--levels", v->levels,
                             "one level or a first and a last one, such as 0-6 or 3-");
     c->first = levels.first;
@@ -113,12 +113,12 @@ static int read_options(comparison *c, report_values *v, bool mesh)
         return command_usage("report",
                              "--unlimited is for --select kmedoids, offset or random; add one");
     int code = read_settings(c, v);
-    if (code != EXIT_FINE)
+    if (code != EXIT_OK)
         return code;
     v->normals = v->normals >= 0 ? v->normals : (int)standard.normals;
     v->leaf_faces = v->leaf_faces >= 0 ? v->leaf_faces : standard.leaf_faces;
     v->epsilon = v->epsilon >= 0 ? v->epsilon : standard.epsilon;
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 /* --- output --- */
@@ -157,7 +157,7 @@ static ebpo_status write_all(const comparison *c, ebpo_error *error)
     return status;
 }
 
-static void drop_built(const comparison *c)
+static void remove_built(const comparison *c)
 {
     for (int i = 0; i < c->count && !c->v->keep; i++)
         if (strncmp(c->methods[i].path, c->folder, strlen(c->folder)) == 0)
@@ -187,7 +187,7 @@ static ebpo_status measure_methods(comparison *c, ebpo_error *error)
         for (int i = 0; i < c->count && status == EBPO_OK; i++)
             status = report_round(c, &c->methods[i], round, error);
     for (int i = 0; i < c->count; i++)
-        report_settle(c, &c->methods[i]);
+        report_medians(c, &c->methods[i]);
     if (c->v->no_pictures)
         c->without_pictures = "--no-pictures was given";
     else if (status == EBPO_OK)
@@ -201,7 +201,7 @@ static int make_report(comparison *c, const char *const *operand, const char *pl
     double begun = progress_now();
     ebpo_error error = EBPO_ERROR_INIT;
     int code = report_find_methods(c, operand);
-    if (code != EXIT_FINE)
+    if (code != EXIT_OK)
         return code;
     ebpo_status status = measure_methods(c, &error);
     c->seconds = progress_now() - begun;
@@ -210,7 +210,7 @@ static int make_report(comparison *c, const char *const *operand, const char *pl
     progress_wipe(line);
     if (status != EBPO_OK)
         return command_failed("report", &error);
-    drop_built(c);
+    remove_built(c);
     if (!output_commit(place, c->folder))
         return EXIT_FAILED;
     c->folder[0] = 0;
@@ -220,11 +220,11 @@ static int make_report(comparison *c, const char *const *operand, const char *pl
         report_to_json(stdout, c, false);
     else if (!c->v->quiet)
         print_summary(c, place);
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 /* Writes report-bunny for "dir/bunny.ply". */
-static void default_place(const char *operand, char *out, size_t capacity)
+static void default_folder(const char *operand, char *out, size_t capacity)
 {
     char stem[201];
     report_stem(operand, stem, sizeof stem);
@@ -251,12 +251,12 @@ static int run_report(void *given, const char **operand)
         return EXIT_USAGE;
     int is_hdf5 = command_is_hdf5("report", operand[0]);
     int code = is_hdf5 < 0 ? EXIT_FAILED : read_options(&c, v, !is_hdf5);
-    if (code != EXIT_FINE)
+    if (code != EXIT_OK)
         return code;
-    default_place(operand[0], named_after_input, sizeof named_after_input);
+    default_folder(operand[0], named_after_input, sizeof named_after_input);
     const char *place = v->out ? v->out : named_after_input;
     code = output_begin(place, operand, c.folder, sizeof c.folder);
-    if (code != EXIT_FINE)
+    if (code != EXIT_OK)
         return code;
     progress_line line;
     c.progress = progress_start(&line, "report", v->quiet);
@@ -267,7 +267,7 @@ static int run_report(void *given, const char **operand)
         code = command_no_memory("report");
     }
     progress_wipe(&line);
-    output_drop(c.folder);
+    output_remove(c.folder);
     comparison_free(&c);
     return code;
 }

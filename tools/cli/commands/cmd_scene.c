@@ -16,13 +16,13 @@
 /* --- contents, boxes and pairs --- */
 
 /* Total bytes of model files, each counted once. */
-typedef struct sums {
+typedef struct scene_sums {
     uint64_t bytes, faces, posed_faces;
-} sums;
+} scene_sums;
 
-static sums add_up(const ebpo_scene *scene, uint64_t models)
+static scene_sums sum_models(const ebpo_scene *scene, uint64_t models)
 {
-    sums s = { 0 };
+    scene_sums s = { 0 };
     for (uint64_t i = 0; i < models; i++) {
         ebpo_scene_model_facts m = EBPO_SCENE_MODEL_FACTS_INIT;
         const ebpo_file *file = ebpo_scene_file(scene, i);
@@ -41,7 +41,7 @@ static void info_json(const char *path, const ebpo_scene *scene, const ebpo_scen
                       double box[2][3])
 {
     json j;
-    sums s = add_up(scene, c->models);
+    scene_sums s = sum_models(scene, c->models);
     json_begin(&j, stdout);
     json_object(&j, NULL);
     json_text(&j, "scene", path);
@@ -81,7 +81,7 @@ static void info_json(const char *path, const ebpo_scene *scene, const ebpo_scen
 static void info_words(const char *path, const ebpo_scene *scene, const ebpo_scene_counts *c,
                        double box[2][3])
 {
-    sums s = add_up(scene, c->models);
+    scene_sums s = sum_models(scene, c->models);
     printf("%s: %llu instances of %llu models\n", path, (unsigned long long)c->instances,
            (unsigned long long)c->models);
     printf("fixed      %llu\nlayers     %llu\ngroups     %llu\nroutes     %llu, %llu poses\n",
@@ -118,7 +118,7 @@ static ebpo_status scene_info(const scene_values *v, const char *path, ebpo_scen
     return status;
 }
 
-/* Everything was checked while opening. */
+/* Reports that the scene is valid: everything was checked when it was opened. */
 static ebpo_status scene_check(const scene_values *v, const char *path, ebpo_scene *scene,
                                ebpo_error *error)
 {
@@ -367,9 +367,10 @@ static const char *const purpose_words[] = { "collide", "view", "inside", "solid
 
 #include "cli/options/scene.inc"
 
-/* Sets the times. There is one time, unless a span is given, or `spans` makes the whole span the
- * default. */
-static bool settle_times(scene_values *v, bool spans, const ebpo_scene *scene)
+/* Sets v->from and v->to. Without --from, --to and --step, both are the value of --time, or the
+ * first time of the scene; if `spans` and --time was not given, they are the first and last time of
+ * the scene. Returns false for options that cannot be combined. */
+static bool set_times(scene_values *v, bool spans, const ebpo_scene *scene)
 {
     ebpo_scene_counts c = EBPO_SCENE_COUNTS_INIT;
     (void)ebpo_scene_get_counts(scene, &c);
@@ -388,7 +389,7 @@ static bool settle_times(scene_values *v, bool spans, const ebpo_scene *scene)
 enum { FRAMES_MAX = 10000000 };
 
 /* Returns NULL, or an error in the options of a report. */
-static const char *wrong_report(const scene_values *v)
+static const char *check_report(const scene_values *v)
 {
     if (v->json && v->csv)
         return "--json and --csv cannot be used together";
@@ -406,21 +407,21 @@ static const struct {
     const char *name;
     ebpo_status (*run)(const scene_values *v, const char *path, ebpo_scene *scene,
                        ebpo_error *error);
-} deeds[] = {
+} subcommands[] = {
     { "info", scene_info },   { "check", scene_check },   { "boxes", scene_boxes },
     { "pairs", scene_pairs }, { "report", scene_report }, { "approach", scene_approach },
     { "plan", scene_plan },   { "pack", scene_pack },
 };
-enum { DEEDS = sizeof deeds / sizeof *deeds };
+enum { SUBCOMMANDS = sizeof subcommands / sizeof *subcommands };
 
-static bool is_for_all(int deed)
+static bool needs_span(int subcommand)
 {
-    return deeds[deed].run == scene_approach || deeds[deed].run == scene_plan ||
-           deeds[deed].run == scene_pack;
+    return subcommands[subcommand].run == scene_approach ||
+           subcommands[subcommand].run == scene_plan || subcommands[subcommand].run == scene_pack;
 }
 
 /* Returns NULL, or an error in the options of a plan: the options of a report give its purpose. */
-static const char *settle_purpose(scene_values *v)
+static const char *set_purpose(scene_values *v)
 {
     if (!v->solids && !(v->depth > 0))
         return NULL;
@@ -431,20 +432,20 @@ static const char *settle_purpose(scene_values *v)
 }
 
 /* Returns NULL, or an error in the options of this command. */
-static const char *wrong_options(int deed, scene_values *v, ebpo_load_options *load)
+static const char *check_options(int subcommand, scene_values *v, ebpo_load_options *load)
 {
     uint64_t target;
-    if (deeds[deed].run == scene_approach && !(v->tolerance > 0))
+    if (subcommands[subcommand].run == scene_approach && !(v->tolerance > 0))
         return "approach needs --tolerance";
-    if (deeds[deed].run == scene_pack && !v->out)
+    if (subcommands[subcommand].run == scene_pack && !v->out)
         return "pack needs -o DIR";
     if (v->target_size && (!words_read_size(v->target_size, &target) || !target))
         return "--target-size expects " WORDS_SIZE_EXPECTED;
     if (v->memory && !words_read_size(v->memory, &load->memory))
         return "--memory expects " WORDS_SIZE_EXPECTED;
-    if (deeds[deed].run == scene_plan || deeds[deed].run == scene_pack)
-        return settle_purpose(v);
-    return deeds[deed].run == scene_report ? wrong_report(v) : NULL;
+    if (subcommands[subcommand].run == scene_plan || subcommands[subcommand].run == scene_pack)
+        return set_purpose(v);
+    return subcommands[subcommand].run == scene_report ? check_report(v) : NULL;
 }
 
 static int run_scene(void *given, const char **operand)
@@ -452,10 +453,10 @@ static int run_scene(void *given, const char **operand)
     scene_values *v = given;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_scene *scene = NULL;
-    int deed = 0;
-    while (deed < DEEDS && strcmp(operand[0], deeds[deed].name) != 0)
-        deed++;
-    if (deed == DEEDS)
+    int subcommand = 0;
+    while (subcommand < SUBCOMMANDS && strcmp(operand[0], subcommands[subcommand].name) != 0)
+        subcommand++;
+    if (subcommand == SUBCOMMANDS)
         return command_usage(
             "scene", "'%s' is not one of info, check, boxes, pairs, report, approach, plan, pack",
             operand[0]);
@@ -466,10 +467,10 @@ static int run_scene(void *given, const char **operand)
     how.remote = v->remote;
     const char *wrong = NULL;
     ebpo_status status = ebpo_scene_open(operand[1], &how, &scene, &error);
-    if (status == EBPO_OK && !settle_times(v, is_for_all(deed), scene))
+    if (status == EBPO_OK && !set_times(v, needs_span(subcommand), scene))
         wrong = "--time cannot be used with --from or --to; --from must not be after --to";
     else if (status == EBPO_OK)
-        wrong = wrong_options(deed, v, &load);
+        wrong = check_options(subcommand, v, &load);
     if (wrong) {
         ebpo_scene_free(scene);
         return command_usage("scene", "%s", wrong);
@@ -480,9 +481,9 @@ static int run_scene(void *given, const char **operand)
         status = ebpo_scene_load(scene, &load, &error);
     progress_wipe(&line);
     if (status == EBPO_OK)
-        status = deeds[deed].run(v, operand[1], scene, &error);
+        status = subcommands[subcommand].run(v, operand[1], scene, &error);
     ebpo_scene_free(scene);
-    return status == EBPO_OK ? EXIT_FINE : command_failed("scene", &error);
+    return status == EBPO_OK ? EXIT_OK : command_failed("scene", &error);
 }
 
 static const scene_values standard = SCENE_VALUES_INIT;

@@ -17,7 +17,7 @@ static int run_subset(void *given, const char **operand)
     subset_values *v = given;
     ebpo_subset_options subset;
     int code = subset_options("subset", v, operand[0], operand[1], &subset);
-    if (code != EXIT_FINE)
+    if (code != EXIT_OK)
         return code;
     if (!command_wants_hdf5("subset", operand[0]))
         return EXIT_FAILED;
@@ -28,7 +28,8 @@ static int run_subset(void *given, const char **operand)
     subset.progress = progress_start(&line, "subset", v->quiet);
     ebpo_status status = remote_open(&file, operand[0], &v->remote, &error);
     if (status == EBPO_OK)
-        status = subset_settle(v, ebpo_file_info(file), remote_shown(operand[0]), &subset, &error);
+        status =
+            subset_set_parts(v, ebpo_file_info(file), remote_shown(operand[0]), &subset, &error);
     if (status == EBPO_OK)
         status = ebpo_subset(file, operand[1], &subset, &error);
     progress_wipe(&line);
@@ -40,7 +41,7 @@ static int run_subset(void *given, const char **operand)
             remote_report(&t, &v->remote, false);
     }
     ebpo_close(file);
-    return status == EBPO_OK ? EXIT_FINE : command_failed("subset", &error);
+    return status == EBPO_OK ? EXIT_OK : command_failed("subset", &error);
 }
 
 const command command_subset = { &spec, sizeof standard, &standard, run_subset };

@@ -41,14 +41,14 @@ static const ebpo_verify_count *count_of(const ebpo_verify_report *report, int i
 }
 
 /* Data of the source that could not be compared, as the file does not have the data. */
-typedef struct unseen {
+typedef struct not_compared {
     char words[900]; /* "": nothing */
-} unseen;
+} not_compared;
 
-static unseen unseen_of(const ebpo_file *file, const ebpo_mesh *source)
+static not_compared list_not_compared(const ebpo_file *file, const ebpo_mesh *source)
 {
     uint64_t parts = ebpo_file_info(file)->parts;
-    unseen u = { "" };
+    not_compared u = { "" };
     const char *lost = ebpo_mesh_attributes_lost(source), *unread = ebpo_mesh_ignored(source);
     bool has = ebpo_mesh_has_attributes(source);
     if (has && !(parts & EBPO_PART_ATTRIBUTES))
@@ -64,7 +64,7 @@ static unseen unseen_of(const ebpo_file *file, const ebpo_mesh *source)
 }
 
 static void print_words(const ebpo_verify_report *report, const char *path, const char *against,
-                        const unseen *u)
+                        const not_compared *u)
 {
     printf("%-12s %14s %11s\n", "kind", "checks", "violations");
     for (int i = 0; i < KINDS; i++) {
@@ -96,7 +96,7 @@ static void print_violations(const ebpo_verify_report *report, const char *path)
     }
 }
 
-static void print_json(const ebpo_verify_report *report, const char *path, const unseen *u,
+static void print_json(const ebpo_verify_report *report, const char *path, const not_compared *u,
                        const traffic *t, const remote_values *remote)
 {
     json j;
@@ -126,13 +126,13 @@ static void print_json(const ebpo_verify_report *report, const char *path, const
 }
 
 static ebpo_status verify_model(const values *v, const char *path, ebpo_progress progress,
-                                ebpo_verify_report *report, unseen *u, traffic *t,
+                                ebpo_verify_report *report, not_compared *u, traffic *t,
                                 ebpo_error *error)
 {
     ebpo_mesh source = { 0 };
     ebpo_file *file = NULL;
     ebpo_workspace *workspace = NULL;
-    ebpo_status status = memory_make(&workspace, &v->memory, error);
+    ebpo_status status = memory_new(&workspace, &v->memory, error);
     ebpo_mesh_read_options read = EBPO_MESH_READ_OPTIONS_INIT;
     read.progress = progress;
     read.workspace = workspace;
@@ -155,7 +155,7 @@ static ebpo_status verify_model(const values *v, const char *path, ebpo_progress
     if (status == EBPO_OK)
         *t = traffic_of(file);
     if (status == EBPO_OK && v->against)
-        *u = unseen_of(file, &source);
+        *u = list_not_compared(file, &source);
     ebpo_mesh_free(&source);
     ebpo_close(file);
     ebpo_workspace_free(workspace);
@@ -167,7 +167,7 @@ static const values standard = { .remote = REMOTE_VALUES_INIT };
 static int run_verify(void *given, const char **operand)
 {
     values *v = given;
-    if (!memory_good("verify", &v->memory))
+    if (!memory_check("verify", &v->memory))
         return EXIT_USAGE;
     if (!command_wants_hdf5("verify", operand[0]))
         return EXIT_FAILED;
@@ -175,7 +175,7 @@ static int run_verify(void *given, const char **operand)
     ebpo_progress progress = progress_start(&line, "verify", v->quiet);
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_verify_report report = EBPO_VERIFY_REPORT_INIT;
-    unseen u = { "" };
+    not_compared u = { "" };
     traffic t;
     ebpo_status status = verify_model(v, operand[0], progress, &report, &u, &t, &error);
     progress_wipe(&line);
@@ -189,7 +189,7 @@ static int run_verify(void *given, const char **operand)
     print_violations(&report, remote_shown(operand[0]));
     if (!v->json)
         remote_report(&t, &v->remote, false);
-    return report.violations ? EXIT_FAILED : EXIT_FINE;
+    return report.violations ? EXIT_FAILED : EXIT_OK;
 }
 
 const command command_verify = { &spec, sizeof standard, &standard, run_verify };

@@ -49,7 +49,7 @@ static int check_values(const values *v)
         return command_usage(
             "view",
             "--up and --seen-only need --look X,Y,Z: without it the observer looks all around");
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 static bool read_triple(const char *name, const char *text, double out[3])
@@ -281,7 +281,7 @@ static int run_view(void *given, const char **operand)
     ebpo_view_options wanted = EBPO_VIEW_OPTIONS_INIT;
     printer p = { .v = v, .begin = progress_now() };
     int code = check_values(v);
-    if (code != EXIT_FINE)
+    if (code != EXIT_OK)
         return code;
     if (!read_options(v, &wanted, &observer))
         return EXIT_USAGE;
@@ -299,7 +299,7 @@ static int run_view(void *given, const char **operand)
         return EXIT_USAGE;
     if (!arrived)
         return EXIT_FAILED;
-    return status == EBPO_OK ? EXIT_FINE : command_failed("view", &error);
+    return status == EBPO_OK ? EXIT_OK : command_failed("view", &error);
 }
 
 const command command_view = { &spec, sizeof standard, &standard, run_view };

@@ -10,7 +10,7 @@
 
 #include "cli/words.h"
 
-static bool is_of_model(const char *name)
+static bool is_model_name(const char *name)
 {
     return (words_end_with(name, ".h5") || words_end_with(name, ".hdf5")) &&
            !words_end_with(name, ".paint.h5");
@@ -53,8 +53,8 @@ char *folder_files_shown(const char *path)
     return text;
 }
 
-/* Reports folder/below/name, without empty parts; the reason is in errno. Returns false on
- * `no_memory`. */
+/* Reports that folder/below/name could not be read; `below` and `name` may be empty. The reason is
+ * in errno. Returns false on `no_memory`. */
 static bool report_unread(folder_files *f, const char *folder, const char *below, const char *name)
 {
     const char *why = strerror(errno);
@@ -82,9 +82,9 @@ static bool inspect_entry(folder_files *f, DIR *dir, const char *folder, const c
     if (!known && errno == ENOENT)
         return true; /* it was removed meanwhile */
     bool enter = known && S_ISDIR(st.st_mode);
-    if (!known && !is_of_model(name)) /* it may be a folder */
+    if (!known && !is_model_name(name)) /* it may be a folder */
         return report_unread(f, folder, below, name);
-    if (!enter && !is_of_model(name))
+    if (!enter && !is_model_name(name))
         return true;
     /* a dangling link is reported when it is opened; a link to a folder is skipped */
     if (!enter && fstatat(dirfd(dir), name, &st, 0) == 0 && S_ISDIR(st.st_mode))
@@ -123,7 +123,7 @@ static bool search_folder(folder_files *f, const char *folder, const char *below
     return fine;
 }
 
-static int by_bytes(const void *a, const void *b)
+static int compare_bytes(const void *a, const void *b)
 {
     return strcmp(*(char *const *)a, *(char *const *)b);
 }
@@ -133,7 +133,7 @@ bool folder_files_find(folder_files *files, const char *command, const char *fol
     *files = (folder_files){ .command = command };
     bool fine = search_folder(files, folder, "");
     if (files->count)
-        qsort(files->path, files->count, sizeof *files->path, by_bytes);
+        qsort(files->path, files->count, sizeof *files->path, compare_bytes);
     return fine;
 }
 

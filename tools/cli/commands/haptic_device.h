@@ -10,7 +10,7 @@
 
 /* Unit quaternions x, y, z, w; 0 0 0 1: not rotated. */
 typedef struct haptic_pose {
-    double place[3], turn[4];
+    double position[3], rotation[4];
 } haptic_pose;
 
 /* Feedback. A probe uses distance, lo, hi and where; other tools use the other members. */
@@ -41,14 +41,14 @@ typedef struct haptic_device {
  * false after an error, reported on stderr. Call `end` in any case. */
 bool haptic_path_open(haptic_device *out, const char *path);
 
-/* haptic_udp.c: opens 'udp:PORT' or 'udp:ADDRESS:PORT', a name that haptic_udp_named has checked.
- */
+/* haptic_udp.c: haptic_udp_named returns true for valid names 'udp:PORT' and 'udp:ADDRESS:PORT'.
+ * haptic_udp_open opens a device with such a name. */
 bool haptic_udp_named(const char *name);
 bool haptic_udp_open(haptic_device *out, const char *name);
 
 /* haptic_path_builtin.c: opens a built-in device that moves around the model, into its surface and
  * out again. */
-ebpo_status haptic_own_open(haptic_device *out, ebpo_model *model, const ebpo_info *info,
-                            double rate, double clear, ebpo_error *error);
+ebpo_status haptic_builtin_open(haptic_device *out, ebpo_model *model, const ebpo_info *info,
+                                double rate, double clear, ebpo_error *error);
 
 #endif

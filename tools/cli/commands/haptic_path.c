@@ -55,9 +55,9 @@ static bool add_pose(path *p, const double v[7], int count)
         p->capacity = more;
     }
     haptic_pose *t = &p->pose[p->count++];
-    memcpy(t->place, v, sizeof t->place);
-    memcpy(t->turn, count == 7 ? v + 3 : (const double[4]){ 0, 0, 0, 1 }, sizeof t->turn);
-    return make_unit(t->turn);
+    memcpy(t->position, v, sizeof t->position);
+    memcpy(t->rotation, count == 7 ? v + 3 : (const double[4]){ 0, 0, 0, 1 }, sizeof t->rotation);
+    return make_unit(t->rotation);
 }
 
 static bool read_lines(path *p, FILE *in, const char *name)

@@ -1,24 +1,27 @@
-/* A built-in device: moves around the longest axis of the model in 8 seconds, slowly up and down,
- * and meanwhile into its surface and out of it. Rays find the surface in advance. */
+/* A built-in device: moves around the longest axis of the model in 8 seconds, slowly up and down
+ * along the axis, and meanwhile into the surface and out of it. Rays find the surface in advance.
+ */
 #include <math.h>
 #include <stdlib.h>
 
 #include "cli/commands/haptic_device.h"
 
-enum { ROUND = 64, HIGH = 17 };
+enum { ANGLES = 64, HEIGHTS = 17 };
 
 static const double pi = 3.141592653589793;
 
-typedef struct own {
-    double rate, clear; /* radius of the tool, as a share of the model */
+typedef struct builtin_path {
+    double rate, clearance; /* radius of the tool, as a share of the model */
     double origin[3], size[3];
     int up;
-    double hit[HIGH][ROUND]; /* distances from the axis, in sizes of the box; 0.1 without a hit */
-} own;
+    double hit[HEIGHTS]
+              [ANGLES]; /* distances from the axis, in sizes of the box; 0.1 without a hit */
+} builtin_path;
 
 /* Computes a point in box coordinates from an angle, a height from -0.5 and a distance from the
  * axis. */
-static void place_at(const own *o, double angle, double height, double radius, double out[3])
+static void box_point(const builtin_path *o, double angle, double height, double radius,
+                      double out[3])
 {
     int u = (o->up + 1) % 3, v = (o->up + 2) % 3;
     out[u] = o->origin[u] + o->size[u] * (0.5 + radius * cos(angle));
@@ -26,16 +29,16 @@ static void place_at(const own *o, double angle, double height, double radius, d
     out[o->up] = o->origin[o->up] + o->size[o->up] * (0.5 + height);
 }
 
-static ebpo_status measure_radii(own *o, ebpo_context *context, ebpo_error *error)
+static ebpo_status measure_radii(builtin_path *o, ebpo_context *context, ebpo_error *error)
 {
-    for (int h = 0; h < HIGH; h++)
-        for (int a = 0; a < ROUND; a++) {
-            double angle = 2 * pi * a / ROUND, height = 0.9 * ((double)h / (HIGH - 1) - 0.5);
+    for (int h = 0; h < HEIGHTS; h++)
+        for (int a = 0; a < ANGLES; a++) {
+            double angle = 2 * pi * a / ANGLES, height = 0.9 * ((double)h / (HEIGHTS - 1) - 0.5);
             double from[3], direction[3];
             ebpo_ray_hit hit;
             bool is_hit;
-            place_at(o, angle, height, 0.8, from);
-            place_at(o, angle, height, 0, direction);
+            box_point(o, angle, height, 0.8, from);
+            box_point(o, angle, height, 0, direction);
             for (int k = 0; k < 3; k++)
                 direction[k] -= from[k];
             ebpo_status status = ebpo_ray_first(context, from, direction, 1, &hit, &is_hit, error);
@@ -46,32 +49,32 @@ static ebpo_status measure_radii(own *o, ebpo_context *context, ebpo_error *erro
     return EBPO_OK;
 }
 
-static double surface_distance(const own *o, double angle, double height)
+static double surface_distance(const builtin_path *o, double angle, double height)
 {
-    double a = angle / (2 * pi) * ROUND, h = (height / 0.9 + 0.5) * (HIGH - 1);
-    int i = (int)floor(a), j = (int)fmin(fmax(floor(h), 0), HIGH - 2);
+    double a = angle / (2 * pi) * ANGLES, h = (height / 0.9 + 0.5) * (HEIGHTS - 1);
+    int i = (int)floor(a), j = (int)fmin(fmax(floor(h), 0), HEIGHTS - 2);
     double s = a - i, t = h - j;
-    int i0 = ((i % ROUND) + ROUND) % ROUND, i1 = (i0 + 1) % ROUND;
+    int i0 = ((i % ANGLES) + ANGLES) % ANGLES, i1 = (i0 + 1) % ANGLES;
     return (1 - t) * ((1 - s) * o->hit[j][i0] + s * o->hit[j][i1]) +
            t * ((1 - s) * o->hit[j + 1][i0] + s * o->hit[j + 1][i1]);
 }
 
 static bool pose_at(void *self, uint64_t step_seconds, haptic_pose *out)
 {
-    const own *o = self;
+    const builtin_path *o = self;
     double seconds = (double)step_seconds / o->rate, angle = 2 * pi * seconds / 8;
     double height = 0.4 * sin(0.31 * angle), nod = 0.06 * cos(3.7 * angle);
-    double begun = fmax(0, 1 - seconds); /* from outside the model */
-    double radius = surface_distance(o, angle, height) + o->clear + nod - 0.01;
-    place_at(o, angle, height, radius + begun * (0.9 + o->clear - radius), out->place);
+    double approach = fmax(0, 1 - seconds); /* from outside the model */
+    double radius = surface_distance(o, angle, height) + o->clearance + nod - 0.01;
+    box_point(o, angle, height, radius + approach * (0.9 + o->clearance - radius), out->position);
     for (int k = 0; k < 4; k++)
-        out->turn[k] = 0;
-    out->turn[o->up] = sin(0.3 * sin(angle)); /* back and forth */
-    out->turn[3] = cos(0.3 * sin(angle));
+        out->rotation[k] = 0;
+    out->rotation[o->up] = sin(0.3 * sin(angle)); /* back and forth */
+    out->rotation[3] = cos(0.3 * sin(angle));
     return true;
 }
 
-static bool begin_own(void *self, double seconds, haptic_pose *first)
+static bool begin_builtin(void *self, double seconds, haptic_pose *first)
 {
     (void)seconds;
     return pose_at(self, 0, first);
@@ -89,18 +92,18 @@ static uint64_t count_steps(void *self)
     return 0;
 }
 
-ebpo_status haptic_own_open(haptic_device *out, ebpo_model *model, const ebpo_info *info,
-                            double rate, double clear, ebpo_error *error)
+ebpo_status haptic_builtin_open(haptic_device *out, ebpo_model *model, const ebpo_info *info,
+                                double rate, double clearance, ebpo_error *error)
 {
-    own *o = calloc(1, sizeof *o);
+    builtin_path *o = calloc(1, sizeof *o);
     ebpo_context *context = NULL;
-    *out = (haptic_device){ begin_own, pose_at, write_result, count_steps, free, o };
+    *out = (haptic_device){ begin_builtin, pose_at, write_result, count_steps, free, o };
     ebpo_status status = ebpo_context_new(model, &context, error);
     if (status != EBPO_OK || !o)
         return status != EBPO_OK ? status : EBPO_E_MEMORY;
     double shortest = fmin(info->box_size[0], fmin(info->box_size[1], info->box_size[2]));
     o->rate = rate;
-    o->clear = clear / shortest;
+    o->clearance = clearance / shortest;
     for (int k = 0; k < 3; k++) {
         o->origin[k] = info->box_origin[k];
         o->size[k] = info->box_size[k];

@@ -17,12 +17,12 @@
 
 enum {
     VERSION = 1,
-    PLACE = 1, /* kinds */
-    FEEL = 2,
+    POSITION = 1, /* kinds */
+    FEEDBACK = 2,
     END = 3,
-    PLACE_BYTES = 80,
-    FEEL_BYTES = 192,
-    PACKETS = 32 /* maximum taken in a step */
+    POSITION_BYTES = 80,
+    FEEDBACK_BYTES = 192,
+    PACKETS_MAX = 32 /* maximum taken in a step */
 };
 
 typedef struct udp {
@@ -74,24 +74,24 @@ static bool read_pose(const uint8_t *p, haptic_pose *out)
 {
     double square = 0;
     for (int k = 0; k < 3; k++) {
-        out->place[k] = get_real(p + 24 + 8 * k);
-        if (!(fabs(out->place[k]) <= 0x1p200))
+        out->position[k] = get_real(p + 24 + 8 * k);
+        if (!(fabs(out->position[k]) <= 0x1p200))
             return false;
     }
     for (int k = 0; k < 4; k++) {
-        out->turn[k] = get_real(p + 48 + 8 * k);
-        square += out->turn[k] * out->turn[k];
+        out->rotation[k] = get_real(p + 48 + 8 * k);
+        square += out->rotation[k] * out->rotation[k];
     }
     for (int k = 0; k < 4; k++)
-        out->turn[k] /= sqrt(square);
+        out->rotation[k] /= sqrt(square);
     return square >= 0.25 && square <= 4;
 }
 
-/* Returns false when the packet is not from the device, or is old. */
+/* Takes a packet. Returns false when it is not from the device, or is older than another one. */
 static bool take_packet(udp *u, const uint8_t *p, ssize_t size, const struct sockaddr_in *from)
 {
     haptic_pose pose;
-    if (size != PLACE_BYTES || memcmp(p, "EBPT", 4) != 0 || get_bytes(p + 4, 2) != VERSION)
+    if (size != POSITION_BYTES || memcmp(p, "EBPT", 4) != 0 || get_bytes(p + 4, 2) != VERSION)
         return false;
     uint64_t kind = get_bytes(p + 6, 2), sequence = get_bytes(p + 8, 8);
     if (u->known && (from->sin_port != u->device.sin_port ||
@@ -99,7 +99,7 @@ static bool take_packet(udp *u, const uint8_t *p, ssize_t size, const struct soc
         return false;
     if (kind == END && u->known)
         u->ended = true;
-    else if (kind == PLACE && read_pose(p, &pose))
+    else if (kind == POSITION && read_pose(p, &pose))
         u->pose = pose;
     else
         return false;
@@ -112,8 +112,8 @@ static bool take_packet(udp *u, const uint8_t *p, ssize_t size, const struct soc
 
 static void take_all(udp *u)
 {
-    uint8_t bytes[PLACE_BYTES + 1];
-    for (int i = 0; i < PACKETS; i++) {
+    uint8_t bytes[POSITION_BYTES + 1];
+    for (int i = 0; i < PACKETS_MAX; i++) {
         struct sockaddr_in from;
         socklen_t length = sizeof from;
         ssize_t size = recvfrom(u->socket, bytes, sizeof bytes, MSG_DONTWAIT | MSG_TRUNC,
@@ -154,7 +154,7 @@ static bool begin_udp(void *self, double seconds, haptic_pose *first)
     return u->known;
 }
 
-static bool read_place(void *self, uint64_t step_seconds, haptic_pose *out)
+static bool read_position(void *self, uint64_t step_seconds, haptic_pose *out)
 {
     udp *u = self;
     (void)step_seconds;
@@ -166,16 +166,16 @@ static bool read_place(void *self, uint64_t step_seconds, haptic_pose *out)
 static void write_result(void *self, const haptic_result *a)
 {
     udp *u = self;
-    uint8_t bytes[FEEL_BYTES], *at = bytes;
+    uint8_t bytes[FEEDBACK_BYTES], *at = bytes;
     memcpy(at, "EBPT", 4);
     at = put_bytes(at + 4, VERSION, 2);
-    at = put_bytes(at, FEEL, 2);
+    at = put_bytes(at, FEEDBACK, 2);
     at = put_bytes(at, u->sequence, 8);
     at = put_bytes(at, u->tag, 8);
     at = put_reals(at, a->force, 3);
     at = put_reals(at, a->torque, 3);
-    at = put_reals(at, a->proxy.place, 3);
-    at = put_reals(at, a->proxy.turn, 4);
+    at = put_reals(at, a->proxy.position, 3);
+    at = put_reals(at, a->proxy.rotation, 4);
     at = put_reals(at, &a->depth, 1);
     at = put_reals(at, &a->lo, 1);
     at = put_reals(at, &a->hi, 1);
@@ -233,7 +233,7 @@ bool haptic_udp_open(haptic_device *out, const char *name)
 {
     struct sockaddr_in at;
     udp *u = calloc(1, sizeof *u);
-    *out = (haptic_device){ begin_udp, read_place, write_result, count_steps, end_udp, u };
+    *out = (haptic_device){ begin_udp, read_position, write_result, count_steps, end_udp, u };
     if (!u)
         return false;
     u->socket = -1;

@@ -115,17 +115,17 @@ static int print_help(int argc, char **argv)
     }
     if (argc < 3) {
         print_usage(stdout);
-        return EXIT_FINE;
+        return EXIT_OK;
     }
     if (strcmp(argv[2], "remote") == 0) {
         print_remote();
-        return EXIT_FINE;
+        return EXIT_OK;
     }
     const command *c = find_command(argv[2]);
     if (!c)
         return unknown_command(argv[2]);
     args_help(c->spec);
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 typedef struct command_call {
@@ -163,8 +163,8 @@ static int run_parsed(const command *c, int argc, char **argv)
         return command_no_memory(c->spec->command);
     memcpy(values, c->standard, c->size);
     arg_result parsed = args_parse(c->spec, argc, argv, values, operand);
-    int code = parsed == ARGS_WRONG ? EXIT_USAGE : EXIT_FINE;
-    if (parsed == ARGS_RUN && (code = standard_files_begin(c->spec, operand)) == EXIT_FINE)
+    int code = parsed == ARGS_WRONG ? EXIT_USAGE : EXIT_OK;
+    if (parsed == ARGS_RUN && (code = standard_files_begin(c->spec, operand)) == EXIT_OK)
         code =
             standard_files_end(c->spec, run_with_stack(&(command_call){ c, values, operand, 0 }));
     free(values);
@@ -190,14 +190,14 @@ int main(int argc, char **argv)
 {
     if (!standard_files_occupy())
         return EXIT_FAILED;
-    /* undoes changes by a preloaded library: numbers are parsed and printed here, too */
+    /* undoes changes by a preloaded library, as the command itself parses and prints numbers */
     fesetenv(FE_DFL_ENV);
     signals_install();
     words_init();
     process_memory_default();
     int code = dispatch_command(argc, argv);
     const command *c = argc > 1 ? find_command(argv[1]) : NULL;
-    if (!command_flush(c ? c->spec->command : NULL) && code == EXIT_FINE)
+    if (!command_flush(c ? c->spec->command : NULL) && code == EXIT_OK)
         code = EXIT_FAILED;
     return code;
 }

@@ -31,7 +31,7 @@ typedef struct paint_job {
     uint64_t colours_of_own; /* by --bake: the model has colours of vertices */
 } paint_job;
 
-/* Prints the list, and the results. */
+/* Prints the layers and notes of the paint, and the results of the command. */
 void paint_report(const paint_job *job);
 
 #endif

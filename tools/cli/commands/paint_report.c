@@ -47,7 +47,7 @@ static void print_lines(const char *text)
     }
 }
 
-static void print_by(const char *author, const char *date)
+static void print_author(const char *author, const char *date)
 {
     if (*author || *date)
         printf("             %s%s%s\n", author, *author && *date ? ", " : "", date);
@@ -66,7 +66,7 @@ static void print_layer(const ebpo_paint *p, uint64_t number, const counts *c)
     if (l.opacity < 255)
         printf(", opacity %u", l.opacity);
     puts(l.visible ? "" : ", hidden");
-    print_by(l.author, l.date);
+    print_author(l.author, l.date);
     print_lines(l.description);
 }
 
@@ -78,7 +78,7 @@ static void print_note(const ebpo_paint *p, uint64_t number)
            (unsigned long long)n.layer, n.at.face);
     words_print_reals(n.at.place, 3, " ");
     putchar('\n');
-    print_by(n.author, n.date);
+    print_author(n.author, n.date);
     print_lines(n.body);
 }
 
@@ -132,7 +132,7 @@ static void print_areas(const paint_job *j, const ebpo_paint_info *info)
     }
 }
 
-static void print_done(const paint_job *j)
+static void print_changes(const paint_job *j)
 {
     const ebpo_paint_drawn *l = &j->drawn;
     const ebpo_paint_baked *b = &j->baked;
@@ -166,7 +166,7 @@ static void print_all(const paint_job *j, const ebpo_paint_info *info, const cou
            *info->unit ? ", unit " : "", info->unit);
     if (!j->changed && !j->v->bake && !j->v->area)
         print_list(j, info, c);
-    print_done(j);
+    print_changes(j);
     if (j->v->area)
         print_areas(j, info);
 }
@@ -308,7 +308,7 @@ static void json_areas(const paint_job *j, const ebpo_paint_info *info, json *ou
     json_end(out);
 }
 
-static void json_done(const paint_job *j, json *out)
+static void json_changes(const paint_job *j, json *out)
 {
     if (j->v->path) {
         json_object(out, "drawn");
@@ -348,7 +348,7 @@ static void json_all(const paint_job *j, const ebpo_paint_info *info, const coun
     json_notes(j, info, &out);
     if (j->v->strokes || j->v->points)
         json_strokes(j, info, &out);
-    json_done(j, &out);
+    json_changes(j, &out);
     if (j->v->area)
         json_areas(j, info, &out);
     json_finish(&out);

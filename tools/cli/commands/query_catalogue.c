@@ -62,7 +62,7 @@ int query_catalogue_open(query_job *job, const char *path, const ebpo_model_opti
     ebpo_status status = ebpo_catalogue_open(path, &how, &job->catalogue, &error);
     if (status == EBPO_OK)
         status = ebpo_catalogue_models_new(&o, &job->models, &error);
-    return status == EBPO_OK ? EXIT_FINE : command_failed(job->command, &error);
+    return status == EBPO_OK ? EXIT_OK : command_failed(job->command, &error);
 }
 
 void query_catalogue_close(query_job *job)
@@ -135,5 +135,5 @@ int query_catalogue_facts(json *j, const char *command, const char *path)
     json_end(j);
     json_end(j);
     ebpo_catalogue_free(c);
-    return EXIT_FINE;
+    return EXIT_OK;
 }

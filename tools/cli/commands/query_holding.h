@@ -20,32 +20,32 @@ typedef struct query_holding {
                                                 * model */
     ebpo_context **context[QUERY_THREADS_MAX]; /* existing contexts; protected by `books` */
     unsigned contexts;
-    pthread_mutex_t books;
-    bool elsewhere; /* the job holds its own data, and these functions do nothing */
+    pthread_mutex_t counts_lock;
+    bool external; /* the job holds its own data, such as a catalogue; these functions do nothing */
     /* policy */
-    bool automatic;      /* no memory limit was given */
-    atomic_bool waiting; /* the whole model may still be loaded */
-    bool whole_later;    /* the whole model was loaded, for these two costs: */
+    bool automatic;           /* no memory limit was given */
+    atomic_bool may_load_all; /* the whole model may still be loaded */
+    bool loaded_all;          /* the whole model was loaded, for these two costs: */
     uint64_t queries_before, loads_before;
     /* cost of parts beyond loading each part once; estimated cost of loading everything */
     double extra_seconds, whole_seconds;
-    double parts_share;   /* extra share of the time of a query in parts, compared with the whole
-                           * model */
-    ebpo_model_plan plan; /* for half of the free memory */
-    uint64_t free_memory; /* bytes, before the model was made */
-    uint64_t subtrees;    /* number of subtrees at first; 0: in one piece */
-    uint64_t queries;     /* number of queries and their time, including loads; protected by
-                           * `books` */
-    double query_seconds; /* sum of all threads */
+    double subtree_overhead; /* extra share of the time of a query in parts, compared with the whole
+                              * model */
+    ebpo_model_plan plan;    /* for half of the free memory */
+    uint64_t free_memory;    /* bytes, before the model was made */
+    uint64_t subtrees;       /* number of subtrees at first; 0: in one piece */
+    uint64_t queries;        /* number of queries and their time, including loads; protected by
+                              * `books` */
+    double query_seconds;    /* sum of all threads */
 } query_holding;
 
-/* Opens the model; `parts_share`: as the member. Returns an exit code; errors were reported. Call
- * query_holding_close in any case. */
+/* Opens the model; `subtree_overhead`: as the member. Returns an exit code; errors were reported.
+ * Call query_holding_close in any case. */
 int query_holding_open(query_holding *h, const char *command, const char *path,
                        const query_values *values, const ebpo_model_options *options,
-                       double parts_share);
-/* For a job that holds its own data. */
-void query_holding_elsewhere(query_holding *h, const char *command);
+                       double subtree_overhead);
+/* Initializes `h` for a job that holds its own data. */
+void query_holding_external(query_holding *h, const char *command);
 void query_holding_close(query_holding *h);
 
 /* Call before a thread queries: *context (NULL at first) then belongs to the model as it is
@@ -53,13 +53,14 @@ void query_holding_close(query_holding *h);
  * with the number of queries done and their time. */
 EBPO_MUST_USE ebpo_status query_holding_enter(query_holding *h, ebpo_context **context,
                                               double total, ebpo_error *error);
-/* Does the same with exclusive access to the model. Returns false when this failed. */
+/* As query_holding_enter, but with exclusive access to the model, and without its decisions.
+ * Returns false after a failure. */
 bool query_holding_enter_alone(query_holding *h, ebpo_context **context);
 void query_holding_leave(query_holding *h, uint64_t queries, double seconds);
-void query_holding_forget(query_holding *h, ebpo_context **context);
+void query_holding_drop_context(query_holding *h, ebpo_context **context);
 
-/* Prints the decisions for --stats, a line of words on stderr or a member of JSON. Prints nothing
- * when a limit was given. */
+/* Print, for --stats, how the model was held: a line of words on stderr, or a member of JSON. They
+ * print nothing when a limit was given. */
 void query_holding_report(const query_holding *h);
 void query_holding_json(const query_holding *h, json *j);
 

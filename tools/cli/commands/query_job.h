@@ -1,4 +1,4 @@
-/* Defines the jobs of query commands: how blocks are evaluated, and how results are printed. */
+/* Defines the job of a query command: how it evaluates blocks and prints results. */
 #ifndef EBPO_TOOLS_QUERY_JOB_H
 #define EBPO_TOOLS_QUERY_JOB_H
 
@@ -21,8 +21,8 @@ struct query_job {
     const char *command;
     const query_values *values;
     points_kind kind;
-    size_t result_bytes; /* size of the result of one row */
-    double parts_share;  /* see query_holding_open */
+    size_t result_bytes;     /* size of the result of one row */
+    double subtree_overhead; /* see query_holding_open */
     /* Evaluates rows[count][points_width(kind)], while the model is held: results of one size go to
      * `results`; lists are printed until the text is over. Called with no rows first, so that an
      * unsupported query is reported before the command waits for input. */
@@ -30,11 +30,12 @@ struct query_job {
                           uint64_t count, ebpo_error *error);
     /* Prints the results of these rows, without the model; NULL: all results are lists. */
     void (*print)(const query_job *job, query_worker *worker, const double *rows, uint64_t count);
-    const char *(*columns)(const query_job *job); /* Returns the names of the columns of a result
-                                                   * line. */
+    /* Returns the names of the columns of a result line. */
+    const char *(*columns)(const query_job *job);
     /* Returns the NumPy type of a result for --raw; NULL: lists have none. */
     const char *(*dtype)(const query_job *job, unsigned *bytes);
-    ebpo_inside_options inside; /* these are set by query_run */
+    /* query_run sets the following members. */
+    ebpo_inside_options inside;
     ebpo_distance_options distance;
     result_form form;
     const ebpo_sampler *sampler; /* sampler for --attribute; NULL: none */

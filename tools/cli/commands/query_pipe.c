@@ -9,11 +9,11 @@
 #include "cli/command.h"
 #include "cli/points_parse.h"
 
-/* Blocks in progress for each thread: while the oldest one is pending, others are evaluated. Fewer
- * for large blocks. */
-enum { BLOCKS_EACH = 4, LARGE_EACH = 2, FIRST_PIECE = 16 };
+/* Number of blocks in progress for each thread, and this number for large blocks: while the oldest
+ * block is pending, others are evaluated. FIRST_ROWS: rows of the first piece of a block. */
+enum { BLOCKS_EACH = 4, LARGE_EACH = 2, FIRST_ROWS = 16 };
 /* Bytes of results that a block keeps, for each of its rows. */
-enum { KEPT_EACH = 128 };
+enum { KEPT_BYTES = 128 };
 
 /* A block of queries, and its results. */
 typedef struct slot {
@@ -21,17 +21,17 @@ typedef struct slot {
     points_block block;
     result_text text;
     uint64_t number;
-    bool holds; /* its thread holds the model */
+    bool holds_model; /* its thread holds the model */
     bool done;
     ebpo_status status;
     ebpo_error error;
 } slot;
 
-typedef struct crew {
+typedef struct pipe_thread {
     struct pipe_line *pipe;
     query_worker worker;
     pthread_t thread;
-} crew;
+} pipe_thread;
 
 /* Two locks: the lock of the model (query_holding.h), which is held while rows are evaluated, and
  * `lock`. No thread waits for `moved` while it holds the model, and none takes another lock while
@@ -41,22 +41,22 @@ typedef struct pipe_line {
     const query_job *job;
     query_holding *holding;
     points *in;
-    int waker; /* writing a byte here ends the wait of the reading thread; -1: unsupported */
+    int wake_pipe; /* writing a byte here ends the wait of the reading thread; -1: unsupported */
     progress_line *progress;
     unsigned threads; /* maximum */
     uint64_t slots;
-    slot *slot;           /* [slots] block i is in slot i % slots */
-    crew *crew;           /* [threads] the first `working` threads have started */
-    atomic_uint working;  /* changed by the thread that takes blocks */
-    pthread_mutex_t lock; /* protects all members below */
-    pthread_cond_t moved; /* signals that any of these has changed */
-    bool taking;          /* a thread is taking a block; only one at a time */
-    uint64_t taken;       /* blocks */
-    uint64_t left;        /* blocks whose results have been written */
-    bool leaving;         /* a thread is writing block `left`; only one at a time */
+    slot *slot;               /* [slots] block i is in slot i % slots */
+    pipe_thread *pipe_thread; /* [threads] the first `working` threads have started */
+    atomic_uint started;      /* changed by the thread that takes blocks */
+    pthread_mutex_t lock;     /* protects all members below */
+    pthread_cond_t changed;   /* signals that any of these has changed */
+    bool taking;              /* a thread is taking a block; only one at a time */
+    uint64_t taken;           /* number of blocks that were taken */
+    uint64_t written;         /* number of blocks whose results have been written */
+    bool writing;             /* a thread is writing block `left`; only one at a time */
     bool stopped;
     /* used only by the thread that writes blocks */
-    uint64_t rows_left, bytes_left;
+    uint64_t rows_written, bytes_written;
     int code;
 } pipe_line;
 
@@ -65,9 +65,9 @@ typedef struct pipe_line {
 static void stop_pipe(pipe_line *p)
 {
     p->stopped = true;
-    if (p->waker >= 0)
-        (void)!write(p->waker, "", 1);
-    pthread_cond_broadcast(&p->moved);
+    if (p->wake_pipe >= 0)
+        (void)!write(p->wake_pipe, "", 1);
+    pthread_cond_broadcast(&p->changed);
 }
 
 /* Returns true when all earlier blocks have been written; waits for that unless the thread holds
@@ -76,80 +76,81 @@ static bool has_turn(slot *s)
 {
     pipe_line *p = s->pipe;
     pthread_mutex_lock(&p->lock);
-    while (!s->holds && p->left != s->number && !p->stopped)
-        pthread_cond_wait(&p->moved, &p->lock);
-    bool turn = p->left == s->number;
+    while (!s->holds_model && p->written != s->number && !p->stopped)
+        pthread_cond_wait(&p->changed, &p->lock);
+    bool turn = p->written == s->number;
     if (p->stopped)
-        result_text_lose(&s->text);
+        result_text_discard(&s->text);
     pthread_mutex_unlock(&p->lock);
     return turn;
 }
 
-/* Long results are written when it is the turn of the block. Before, evaluation stops at a row, and
+/* Writes long results if it is the turn of the block. Otherwise evaluation stops at a row, and
  * continues after the model was released. */
 static void spill_results(result_text *t, void *user)
 {
     slot *s = user;
     if (has_turn(s))
-        (void)result_text_leave(t, s->pipe->job->command);
+        (void)result_text_write(t, s->pipe->job->command);
     else
         t->full = !t->failed;
 }
 
-/* The size of a file is known, so the number of queries can be estimated. */
+/* Reports the number of queries. If the size of the input is known, estimates their total. */
 static void report_progress(pipe_line *p, const slot *s)
 {
     uint64_t total = p->in->rows_known ? p->in->rows_total : 0;
-    p->rows_left += s->block.row_count;
-    p->bytes_left += s->block.count;
-    if (!total && p->in->bytes_total && p->bytes_left)
-        total =
-            (uint64_t)((double)p->rows_left * ((double)p->in->bytes_total / (double)p->bytes_left));
-    progress_report(p->progress, "queries", p->rows_left, total);
+    p->rows_written += s->block.row_count;
+    p->bytes_written += s->block.count;
+    if (!total && p->in->bytes_total && p->bytes_written)
+        total = (uint64_t)((double)p->rows_written *
+                           ((double)p->in->bytes_total / (double)p->bytes_written));
+    progress_report(p->progress, "queries", p->rows_written, total);
 }
 
-/* Writes the results, then reports an error behind them. Returns false when nothing may follow. */
-static bool leave_block(pipe_line *p, slot *s)
+/* Writes the results of a block, then reports the error after them, if any. Returns false when no
+ * further results may be written. */
+static bool write_block(pipe_line *p, slot *s)
 {
-    bool left = result_text_leave(&s->text, p->job->command);
-    if (!left || s->status != EBPO_OK || s->block.failed)
+    bool written = result_text_write(&s->text, p->job->command);
+    if (!written || s->status != EBPO_OK || s->block.failed)
         progress_wipe(p->progress);
-    if (!left)
+    if (!written)
         p->code = s->text.failed ? command_no_memory(p->job->command) : EXIT_FAILED;
     else if (s->status != EBPO_OK)
         p->code = command_failed(p->job->command, &s->error);
-    else if (!points_pass(p->in, &s->block))
+    else if (!points_finish_block(p->in, &s->block))
         p->code = EXIT_FAILED;
     else
         report_progress(p, s);
-    return p->code == EXIT_FINE;
+    return p->code == EXIT_OK;
 }
 
-/* The thread that finishes the oldest block writes it, and all finished blocks behind it. */
+/* Marks a block as done. If it is the oldest one, writes it and all finished blocks after it. */
 static void finish_block(pipe_line *p, slot *s)
 {
     pthread_mutex_lock(&p->lock);
     s->done = true;
     for (;;) {
-        slot *oldest = &p->slot[p->left % p->slots];
-        if (p->leaving || p->stopped || !oldest->done || oldest->number != p->left)
+        slot *oldest = &p->slot[p->written % p->slots];
+        if (p->writing || p->stopped || !oldest->done || oldest->number != p->written)
             break;
-        p->leaving = true;
+        p->writing = true;
         pthread_mutex_unlock(&p->lock);
-        bool go_on = leave_block(p, oldest);
+        bool go_on = write_block(p, oldest);
         pthread_mutex_lock(&p->lock);
-        p->leaving = oldest->done = false;
-        p->left++;
+        p->writing = oldest->done = false;
+        p->written++;
         if (!go_on)
             stop_pipe(p);
-        pthread_cond_broadcast(&p->moved);
+        pthread_cond_broadcast(&p->changed);
     }
     pthread_mutex_unlock(&p->lock);
 }
 
 /* --- one block --- */
 
-static bool results_capacity(query_worker *w, size_t each, uint64_t rows)
+static bool alloc_results(query_worker *w, size_t each, uint64_t rows)
 {
     if (each && w->row_capacity < rows) {
         free(w->results);
@@ -160,39 +161,39 @@ static bool results_capacity(query_worker *w, size_t each, uint64_t rows)
 }
 
 /* Estimates the number of queries; 0: not known. */
-static double total_of(const points *in, const points_block *b)
+static double estimate_total(const points *in, const points_block *b)
 {
     if (in->rows_known)
         return (double)in->rows_total;
     return (double)in->bytes_total * (double)b->row_count / (double)(b->count ? b->count : 1);
 }
 
-/* Evaluates the rows behind text->rows, with the current model. */
-static void result_rest(pipe_line *p, query_worker *w, slot *s, const double *rows, uint64_t count)
+/* Evaluates the rows from text->rows on, with the current model. */
+static void compute_rest(pipe_line *p, query_worker *w, slot *s, const double *rows, uint64_t count)
 {
     uint64_t done = s->text.rows, width = (uint64_t)points_width(p->job->kind);
     double begin = progress_now();
-    s->holds = true;
+    s->holds_model = true;
     s->status = p->job->result(p->job, w, rows + done * width, count - done, &s->error);
-    s->holds = false;
+    s->holds_model = false;
     query_holding_leave(p->holding, count - done, progress_now() - begin);
 }
 
-/* Evaluates rows of a block, or the first ones of them: text->rows. When other threads hold memory
- * that these need, they are evaluated while no other thread holds the model. Returns false when
- * nothing may follow. */
-static bool result_piece(pipe_line *p, query_worker *w, slot *s, const double *rows, uint64_t count,
+/* Evaluates rows of a block, or only the first text->rows of them. If other threads hold memory
+ * that these rows need, they are evaluated while no other thread holds the model. Returns false
+ * when no further rows may be evaluated. */
+static bool compute_rows(pipe_line *p, query_worker *w, slot *s, const double *rows, uint64_t count,
                          double total)
 {
     s->text.rows = 0;
     s->status = query_holding_enter(p->holding, &w->context, total, &s->error);
     if (s->status != EBPO_OK)
         return false;
-    result_rest(p, w, s, rows, count);
-    if (s->status == EBPO_E_LIMIT && p->working > 1 &&
+    compute_rest(p, w, s, rows, count);
+    if (s->status == EBPO_E_LIMIT && p->started > 1 &&
         query_holding_enter_alone(p->holding, &w->context)) {
         result_text_retry(&s->text);
-        result_rest(p, w, s, rows, count);
+        compute_rest(p, w, s, rows, count);
     }
     if (s->status != EBPO_OK)
         return count > 1 && s->text.rows == 0; /* rows before the failing one are evaluated */
@@ -207,26 +208,26 @@ static bool result_piece(pipe_line *p, query_worker *w, slot *s, const double *r
 
 /* The first queries come in small pieces, each as large as all before it: after each piece the
  * whole model may be loaded. Queries that fail together are evaluated one by one. */
-static void result_block(pipe_line *p, query_worker *w, slot *s)
+static void compute_block(pipe_line *p, query_worker *w, slot *s)
 {
     const points_block *b = &s->block;
     uint64_t width = (uint64_t)points_width(p->job->kind), most = b->row_count;
-    double total = total_of(p->in, b);
+    double total = estimate_total(p->in, b);
     ebpo_error none = EBPO_ERROR_INIT;
     s->error = none;
     s->status = EBPO_OK;
     w->text = &s->text;
-    if (!results_capacity(w, p->job->result_bytes, b->row_count)) {
-        result_text_lose(&s->text);
+    if (!alloc_results(w, p->job->result_bytes, b->row_count)) {
+        result_text_discard(&s->text);
         return;
     }
     for (uint64_t at = 0; at < b->row_count; at += s->text.rows) {
-        bool first = s->number == 0 && p->holding->waiting;
-        uint64_t piece = !first ? most : at ? at : FIRST_PIECE;
+        bool first = s->number == 0 && p->holding->may_load_all;
+        uint64_t piece = !first ? most : at ? at : FIRST_ROWS;
         most = s->status == EBPO_OK ? most : 1;
         piece = piece < most ? piece : most;
         piece = piece < b->row_count - at ? piece : b->row_count - at;
-        if (!result_piece(p, w, s, b->rows + at * width, piece, total))
+        if (!compute_rows(p, w, s, b->rows + at * width, piece, total))
             break;
     }
 }
@@ -235,12 +236,12 @@ static void result_block(pipe_line *p, query_worker *w, slot *s)
 
 static void *work_on_blocks(void *user);
 
-/* Starts another thread when there is enough to do. */
-static void call_another(pipe_line *p)
+/* Starts another thread, up to `threads` in all. */
+static void start_thread(pipe_line *p)
 {
-    crew *next = &p->crew[p->working];
-    if (p->working < p->threads && command_thread(&next->thread, work_on_blocks, next) == 0)
-        p->working++;
+    pipe_thread *next = &p->pipe_thread[p->started];
+    if (p->started < p->threads && command_thread(&next->thread, work_on_blocks, next) == 0)
+        p->started++;
 }
 
 /* Waits until this thread may take a block and a slot is free. Returns false when nothing more is
@@ -248,8 +249,8 @@ static void call_another(pipe_line *p)
 static bool begin_to_take(pipe_line *p)
 {
     pthread_mutex_lock(&p->lock);
-    while (!p->stopped && (p->taking || p->taken - p->left >= p->slots))
-        pthread_cond_wait(&p->moved, &p->lock);
+    while (!p->stopped && (p->taking || p->taken - p->written >= p->slots))
+        pthread_cond_wait(&p->changed, &p->lock);
     bool may = !p->stopped;
     p->taking |= may;
     pthread_mutex_unlock(&p->lock);
@@ -261,11 +262,11 @@ static void end_taking(pipe_line *p, bool took)
     pthread_mutex_lock(&p->lock);
     p->taking = false;
     p->taken += took;
-    pthread_cond_broadcast(&p->moved);
+    pthread_cond_broadcast(&p->changed);
     pthread_mutex_unlock(&p->lock);
 }
 
-/* Returns NULL at the end. */
+/* Takes the next block of the input. Returns NULL at the end. */
 static slot *take_block(pipe_line *p)
 {
     if (!begin_to_take(p))
@@ -275,7 +276,7 @@ static slot *take_block(pipe_line *p)
     if (took) {
         s->number = p->taken;
         if (s->number > 0 || s->block.count > POINTS_BATCH * 8)
-            call_another(p);
+            start_thread(p);
     }
     end_taking(p, took);
     return took ? s : NULL;
@@ -283,11 +284,11 @@ static slot *take_block(pipe_line *p)
 
 static void *work_on_blocks(void *user)
 {
-    crew *c = user;
+    pipe_thread *c = user;
     pipe_line *p = c->pipe;
     for (slot *s = take_block(p); s; s = take_block(p)) {
         points_parse(p->in, &s->block);
-        result_block(p, &c->worker, s);
+        compute_block(p, &c->worker, s);
         finish_block(p, s);
     }
     return NULL;
@@ -296,60 +297,62 @@ static void *work_on_blocks(void *user)
 /* --- run --- */
 
 /* Makes the pipe that interrupts a wait for input. */
-static void make_waker(pipe_line *p)
+static void make_wake_pipe(pipe_line *p)
 {
     int ends[2];
     if (pipe(ends) != 0)
         return; /* the thread stops at the next input */
     for (int i = 0; i < 2; i++)
         (void)fcntl(ends[i], F_SETFD, FD_CLOEXEC);
-    p->in->wake = ends[0];
-    p->waker = ends[1];
+    p->in->wake_fd = ends[0];
+    p->wake_pipe = ends[1];
 }
 
 static bool make_slots(pipe_line *p)
 {
     p->slot = calloc(p->slots, sizeof *p->slot);
-    p->crew = calloc(p->threads, sizeof *p->crew);
-    if (!p->slot || !p->crew)
+    p->pipe_thread = calloc(p->threads, sizeof *p->pipe_thread);
+    if (!p->slot || !p->pipe_thread)
         return false;
     for (uint64_t i = 0; i < p->slots; i++) {
         if (!result_text_init(&p->slot[i].text))
             return false;
         p->slot[i].pipe = p;
-        if (p->in->together > POINTS_BATCH)
-            p->slot[i].text.spill_at = KEPT_EACH * p->in->together;
+        if (p->in->rows_per_block > POINTS_BATCH)
+            p->slot[i].text.spill_at = KEPT_BYTES * p->in->rows_per_block;
         p->slot[i].text.spill = spill_results;
         p->slot[i].text.user = &p->slot[i];
     }
     for (unsigned i = 0; i < p->threads; i++)
-        p->crew[i].pipe = p;
+        p->pipe_thread[i].pipe = p;
     if (p->threads > 1)
-        make_waker(p);
+        make_wake_pipe(p);
     return true;
 }
 
 static void free_slots(pipe_line *p)
 {
-    for (unsigned i = 0; p->crew && i < p->threads; i++) {
-        query_holding_forget(p->holding, &p->crew[i].worker.context);
-        free(p->crew[i].worker.results);
+    for (unsigned i = 0; p->pipe_thread && i < p->threads; i++) {
+        query_holding_drop_context(p->holding, &p->pipe_thread[i].worker.context);
+        free(p->pipe_thread[i].worker.results);
     }
     for (uint64_t i = 0; p->slot && i < p->slots; i++) {
         points_block_free(&p->slot[i].block);
         result_text_free(&p->slot[i].text);
     }
-    if (p->waker >= 0) {
-        close(p->waker);
-        close(p->in->wake);
+    if (p->wake_pipe >= 0) {
+        close(p->wake_pipe);
+        close(p->in->wake_fd);
     }
-    p->in->wake = -1;
+    p->in->wake_fd = -1;
     free(p->slot);
-    free(p->crew);
+    free(p->pipe_thread);
 }
 
-/* Reports unsupported queries, and writes the line of column names. */
-static int query_nothing(pipe_line *p, query_worker *w)
+/* Runs the query on no rows, which reports unsupported queries, and writes the line of column
+ * names.
+ */
+static int query_no_rows(pipe_line *p, query_worker *w)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     w->text = &p->slot[0].text;
@@ -363,35 +366,37 @@ static int query_nothing(pipe_line *p, query_worker *w)
     if (p->job->values->header && !p->job->continues && p->job->form != RESULTS_JSON &&
         p->job->form != RESULTS_RAW)
         results_header(w->text, p->job->form, p->job->columns(p->job), p->job->values->attribute);
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 int query_pipe_run(const query_job *job, query_holding *holding, points *in, unsigned threads,
                    progress_line *progress)
 {
-    pipe_line p = { .job = job, .holding = holding, .in = in, .waker = -1, .progress = progress };
+    pipe_line p = {
+        .job = job, .holding = holding, .in = in, .wake_pipe = -1, .progress = progress
+    };
     p.threads = threads;
-    p.slots = threads > 1
-                  ? (uint64_t)threads * (in->together > POINTS_BATCH ? LARGE_EACH : BLOCKS_EACH)
-                  : 1;
+    p.slots = threads > 1 ? (uint64_t)threads *
+                                (in->rows_per_block > POINTS_BATCH ? LARGE_EACH : BLOCKS_EACH)
+                          : 1;
     pthread_mutex_init(&p.lock, NULL);
-    pthread_cond_init(&p.moved, NULL);
-    p.code = make_slots(&p) ? EXIT_FINE : command_no_memory(job->command);
-    if (p.code == EXIT_FINE)
-        p.code = query_nothing(&p, &p.crew[0].worker);
-    if (p.code == EXIT_FINE) {
-        p.working = 1;
-        work_on_blocks(&p.crew[0]);
+    pthread_cond_init(&p.changed, NULL);
+    p.code = make_slots(&p) ? EXIT_OK : command_no_memory(job->command);
+    if (p.code == EXIT_OK)
+        p.code = query_no_rows(&p, &p.pipe_thread[0].worker);
+    if (p.code == EXIT_OK) {
+        p.started = 1;
+        work_on_blocks(&p.pipe_thread[0]);
         /* threads are started by earlier ones, which have ended here */
-        for (unsigned i = 1; i < p.working; i++)
-            pthread_join(p.crew[i].thread, NULL);
-        if (p.code == EXIT_FINE && !result_text_leave(&p.slot[0].text, job->command))
+        for (unsigned i = 1; i < p.started; i++)
+            pthread_join(p.pipe_thread[i].thread, NULL);
+        if (p.code == EXIT_OK && !result_text_write(&p.slot[0].text, job->command))
             p.code = EXIT_FAILED; /* only the line of column names was written, without results */
-        if (p.code == EXIT_FINE && in->failed)
+        if (p.code == EXIT_OK && in->failed)
             p.code = EXIT_FAILED;
     }
     free_slots(&p);
     pthread_mutex_destroy(&p.lock);
-    pthread_cond_destroy(&p.moved);
+    pthread_cond_destroy(&p.changed);
     return p.code;
 }

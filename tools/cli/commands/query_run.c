@@ -53,7 +53,7 @@ static int open_sampler(query_job *job, const query_holding *holding, ebpo_sampl
                                          out, &error) != EBPO_OK)
         return command_failed(job->command, &error);
     job->sampler = *out;
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 static int query_all(query_job *job, query_holding *holding, points *in,
@@ -117,8 +117,8 @@ static uint64_t bytes_together(const query_values *v, const query_holding *holdi
     if (v->together)
         return (uint64_t)v->together < most ? (uint64_t)v->together : most;
     bool parts =
-        v->out && !holding->waiting &&
-        (holding->elsewhere ||
+        v->out && !holding->may_load_all &&
+        (holding->external ||
          (ebpo_model_get_stats(holding->session.model, &stats) == EBPO_OK && !stats.resident));
     return parts ? TOGETHER_IN_PARTS : POINTS_BATCH;
 }
@@ -128,9 +128,9 @@ static int open_model(query_job *job, const char *model, const ebpo_model_option
 {
     if (!query_catalogue_named(model))
         return query_holding_open(holding, job->command, model, job->values, options,
-                                  job->parts_share);
-    query_holding_elsewhere(holding, job->command);
-    job->result_bytes += sizeof(uint64_t); /* index of the model, behind all results */
+                                  job->subtree_overhead);
+    query_holding_external(holding, job->command);
+    job->result_bytes += sizeof(uint64_t); /* the indices of models are stored after all results */
     return query_catalogue_open(job, model, options);
 }
 
@@ -141,12 +141,12 @@ static int run_query(query_job *job, const char *model, points *in,
     query_holding holding;
     ebpo_sampler *sampler = NULL;
     int code = open_model(job, model, options, &holding);
-    if (code == EXIT_FINE)
+    if (code == EXIT_OK)
         code = open_sampler(job, &holding, &sampler);
-    if (code == EXIT_FINE)
+    if (code == EXIT_OK)
         code = query_shard_begin(shard);
-    if (code == EXIT_FINE) {
-        in->together = bytes_together(job->values, &holding);
+    if (code == EXIT_OK) {
+        in->rows_per_block = bytes_together(job->values, &holding);
         code = query_all(job, &holding, in, options);
         code = query_shard_end(shard, job, code);
     }

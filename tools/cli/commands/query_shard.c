@@ -64,7 +64,7 @@ bool query_shard_fits(query_shard *s, const query_job *job, const char *model,
 {
     const query_values *v = job->values;
     *s = (query_shard){
-        .command = job->command, .v = v, .model = model, .points = points_path, .kept = -1
+        .command = job->command, .v = v, .model = model, .points = points_path, .saved_stdout = -1
     };
     if (v->shard && !read_shard(s, v->shard))
         return false;
@@ -133,7 +133,7 @@ static int report_model(json *j, const query_shard *s)
     json_uint(j, "bytes", ebpo_file_info(file)->file_bytes);
     json_end(j);
     ebpo_close(file);
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 /* Memory and threads do not change results, and are not included. Returns an exit code. */
@@ -161,9 +161,9 @@ static int report_facts(const query_shard *s, const query_job *job, const struct
     json_object(&j, "question");
     report_query(&j, job);
     json_finish(&j);
-    if (fclose(out) != 0 && code == EXIT_FINE)
+    if (fclose(out) != 0 && code == EXIT_OK)
         code = command_no_memory(s->command);
-    if (code == EXIT_FINE)
+    if (code == EXIT_OK)
         *facts = text;
     else
         free(text);
@@ -199,7 +199,7 @@ static char *note_text(const char *facts, const struct stat *results)
                : text;
 }
 
-static bool file_is(const char *path, const char *text)
+static bool file_equals(const char *path, const char *text)
 {
     size_t size = strlen(text);
     char *there = malloc(size + 1);
@@ -213,7 +213,7 @@ static bool file_is(const char *path, const char *text)
 
 /* Returns false when a file that is not a note, such as an input, has the name of the note. The
  * file is kept, and is reported before the work begins. */
-static bool note_is_free(const query_shard *s)
+static bool check_note(const query_shard *s)
 {
     static const char begins[] = "{\n  \"format\": \"ebpo-shard\",\n";
     struct stat st;
@@ -234,12 +234,12 @@ static bool note_is_free(const query_shard *s)
 }
 
 /* Returns true when the results of these inputs exist. */
-static bool is_there(const query_shard *s)
+static bool results_exist(const query_shard *s)
 {
     struct stat st, note;
     bool out = stat(s->v->out, &st) == 0 && S_ISREG(st.st_mode);
     char *text = out ? note_text(s->facts, &st) : NULL;
-    bool same = text && file_is(s->note, text);
+    bool same = text && file_equals(s->note, text);
     free(text);
     if (same)
         fprintf(stderr,
@@ -256,19 +256,19 @@ static bool is_there(const query_shard *s)
 
 bool query_shard_done(query_shard *s, const query_job *job, int *code)
 {
-    *code = EXIT_FINE;
+    *code = EXIT_OK;
     if (!s->of)
         return false;
     *code = inspect_inputs(s, job, &s->facts);
-    if (*code == EXIT_FINE && asprintf(&s->note, "%s.shard", s->v->out) < 0) {
+    if (*code == EXIT_OK && asprintf(&s->note, "%s.shard", s->v->out) < 0) {
         s->note = NULL;
         *code = command_no_memory(s->command);
     }
-    if (*code == EXIT_FINE && overwrites_input(s, s->note))
+    if (*code == EXIT_OK && overwrites_input(s, s->note))
         *code = EXIT_USAGE;
-    if (*code == EXIT_FINE && !note_is_free(s))
+    if (*code == EXIT_OK && !check_note(s))
         *code = EXIT_FAILED;
-    return *code != EXIT_FINE || (!s->v->force && is_there(s));
+    return *code != EXIT_OK || (!s->v->force && results_exist(s));
 }
 
 /* --- results --- */
@@ -278,13 +278,13 @@ int query_shard_begin(query_shard *s)
     ebpo_error error = EBPO_ERROR_INIT;
     int to;
     if (!s->v->out)
-        return EXIT_FINE;
+        return EXIT_OK;
     if (ebpo_output_begin(s->v->out, &s->out, &to, &error) != EBPO_OK)
         return command_failed(s->command, &error);
     fflush(stdout);
-    s->kept = fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3);
-    if (s->kept >= 0 && dup2(to, STDOUT_FILENO) >= 0)
-        return EXIT_FINE;
+    s->saved_stdout = fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3);
+    if (s->saved_stdout >= 0 && dup2(to, STDOUT_FILENO) >= 0)
+        return EXIT_OK;
     fprintf(stderr, "ebpo %s: standard output: %s\n", s->command, strerror(errno));
     return EXIT_FAILED;
 }
@@ -294,7 +294,7 @@ static int check_unchanged(const query_shard *s, const query_job *job)
 {
     char *now = NULL;
     int code = inspect_inputs(s, job, &now);
-    if (code == EXIT_FINE && strcmp(now, s->facts) != 0) {
+    if (code == EXIT_OK && strcmp(now, s->facts) != 0) {
         fprintf(stderr,
                 "ebpo %s: the model or the points were changed while they were read; nothing was "
                 "written, start again\n",
@@ -319,7 +319,7 @@ static int write_note(const query_shard *s, const struct stat *results)
         return command_no_memory(s->command);
     ebpo_status status = ebpo_write_file(s->note, text, strlen(text), &error);
     free(text);
-    return status == EBPO_OK ? EXIT_FINE : command_failed(s->command, &error);
+    return status == EBPO_OK ? EXIT_OK : command_failed(s->command, &error);
 }
 
 /* Removes the old note first, and writes the new note last: if the process is killed at any time,
@@ -338,23 +338,23 @@ static int put_in_place(query_shard *s, int results)
     if (status != EBPO_OK)
         return command_failed(s->command, &error);
     if (!s->of)
-        return EXIT_FINE;
+        return EXIT_OK;
     return fstat(results, &st) == 0 ? write_note(s, &st) : fail_results(s);
 }
 
 int query_shard_end(query_shard *s, const query_job *job, int code)
 {
-    if (s->kept < 0)
+    if (s->saved_stdout < 0)
         return code;
-    int results = code == EXIT_FINE ? fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3) : -1;
-    if (code == EXIT_FINE && results < 0)
+    int results = code == EXIT_OK ? fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3) : -1;
+    if (code == EXIT_OK && results < 0)
         code = fail_results(s);
-    dup2(s->kept, STDOUT_FILENO);
-    close(s->kept);
-    s->kept = -1;
-    if (code == EXIT_FINE && s->of)
+    dup2(s->saved_stdout, STDOUT_FILENO);
+    close(s->saved_stdout);
+    s->saved_stdout = -1;
+    if (code == EXIT_OK && s->of)
         code = check_unchanged(s, job);
-    if (code == EXIT_FINE)
+    if (code == EXIT_OK)
         code = put_in_place(s, results);
     if (results >= 0)
         close(results);
@@ -363,10 +363,10 @@ int query_shard_end(query_shard *s, const query_job *job, int code)
 
 void query_shard_free(query_shard *s)
 {
-    if (s->kept >= 0)
-        close(s->kept);
+    if (s->saved_stdout >= 0)
+        close(s->saved_stdout);
     ebpo_output_abandon(s->out);
     free(s->facts);
     free(s->note);
-    *s = (query_shard){ .kept = -1 };
+    *s = (query_shard){ .saved_stdout = -1 };
 }

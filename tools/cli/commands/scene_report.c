@@ -105,7 +105,7 @@ static void csv_text(const char *text)
     putchar('"');
 }
 
-/* Unknown values stay empty. */
+/* Writes a number, or nothing if it is not known. */
 static void csv_real(double x)
 {
     char text[32];
@@ -175,7 +175,7 @@ static void scene_row_words(const scene_values *v, const ebpo_scene *scene, doub
     putchar('\n');
 }
 
-/* Contacts in a scene, time after time. */
+/* State of a report: contacts in a scene at each of several times. */
 
 typedef struct report {
     const scene_values *v;

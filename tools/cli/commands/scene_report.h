@@ -1,5 +1,4 @@
-/* `ebpo scene report`: finds contacts, time after time; `ebpo scene approach`: finds when instances
- * first come near each other. */
+/* `ebpo scene report`: finds contacts at each of several times. */
 #ifndef EBPO_TOOLS_SCENE_REPORT_H
 #define EBPO_TOOLS_SCENE_REPORT_H
 

@@ -5,7 +5,7 @@
 #include <ebpo/scene.h>
 
 typedef struct scene_values {
-    double time, from, to;                 /* NAN: not given; then from and to are settled */
+    double time, from, to; /* NAN: not given; the command then sets `from` and `to` */
     double step, tolerance, margin, depth; /* 0: not given */
     const char *out, *target_size, *memory;
     int purpose; /* an ebpo_scene_purpose */

@@ -16,7 +16,7 @@ const char *const profile_words[] = { "full", "lod", "collision", NULL }; /* by 
 static bool read_levels(const char *text, int *last)
 {
     word_levels levels;
-    if (!words_read_levels(text, &levels) || levels.first != 0 || !levels.is_run)
+    if (!words_read_levels(text, &levels) || levels.first != 0 || !levels.is_contiguous)
         return false;
     *last = levels.to_end ? -1 : levels.last; /* -1: all */
     return true;
@@ -79,18 +79,18 @@ bool subset_read_parts(const char *text, uint32_t base, uint32_t *parts)
     return true;
 }
 
-int subset_need(const char *name, double max_error, const char *target_size,
-                ebpo_subset_options *out)
+int subset_read_target(const char *name, double max_error, const char *target_size,
+                       ebpo_subset_options *out)
 {
     if (target_size && (!words_read_size(target_size, &out->target_bytes) || !out->target_bytes))
         return command_usage(name, "--target-size: '%s' is not " WORDS_SIZE_EXPECTED, target_size);
     if (target_size && max_error > 0)
         return command_usage(name, "--max-error and --target-size cannot be used together");
     out->max_error = max_error;
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
-void subset_print_need(const ebpo_info *info, bool chosen)
+void subset_print_target(const ebpo_info *info, bool chosen)
 {
     if (chosen)
         printf(", profile %s", profile_words[info->parts & EBPO_PART_MAPS   ? EBPO_PROFILE_FULL
@@ -129,7 +129,7 @@ int subset_options(const char *name, const subset_values *v, const char *in, con
     out->threads = (unsigned)v->threads;
     out->face_coding = (ebpo_face_coding)v->face_coding;
     out->choose_parts = v->target_size && !v->parts && v->profile < 0 && !v->levels;
-    return subset_need(name, v->max_error, v->target_size, out);
+    return subset_read_target(name, v->max_error, v->target_size, out);
 }
 
 static ebpo_status refuse_values(ebpo_error *error, const char *shown, const char *what)
@@ -139,8 +139,8 @@ static ebpo_status refuse_values(ebpo_error *error, const char *shown, const cha
     return EBPO_E_ARGUMENT;
 }
 
-ebpo_status subset_settle(const subset_values *v, const ebpo_info *info, const char *shown,
-                          ebpo_subset_options *out, ebpo_error *error)
+ebpo_status subset_set_parts(const subset_values *v, const ebpo_info *info, const char *shown,
+                             ebpo_subset_options *out, ebpo_error *error)
 {
     char what[200];
     if (out->last_level >= info->level_count && !info->pruned) {
@@ -186,7 +186,7 @@ static void print_summary(const subset_values *v, const char *out_path, const eb
            words_bytes(whole, sizeof whole, from->file_bytes));
     if (info->parts & EBPO_PART_MESH && info->face_count < from->face_count)
         printf(", %" PRIu64 " of %" PRIu64 " faces", info->face_count, from->face_count);
-    subset_print_need(info, v->target_size && !v->parts && v->profile < 0 && !v->levels);
+    subset_print_target(info, v->target_size && !v->parts && v->profile < 0 && !v->levels);
     if (t->remote)
         printf(", %s in %" PRIu64 " requests", words_bytes(got, sizeof got, t->http.bytes),
                t->http.requests);

@@ -33,23 +33,23 @@ bool subset_read_parts(const char *text, uint32_t base, uint32_t *parts);
     "a minus sign before each"
 
 /* Sets *out from --max-error and --target-size; returns the exit code. */
-int subset_need(const char *name, double max_error, const char *target_size,
-                ebpo_subset_options *out);
+int subset_read_target(const char *name, double max_error, const char *target_size,
+                       ebpo_subset_options *out);
 
 /* Prints ", ..." for summaries: the maximum error and, if it was `chosen`, the profile; or nothing.
  */
-void subset_print_need(const ebpo_info *info, bool chosen);
+void subset_print_target(const ebpo_info *info, bool chosen);
 
-/* Checks options before the file is open; returns the exit code, EXIT_FINE to continue. `out` gets
+/* Checks options before the file is open; returns the exit code, EXIT_OK to continue. `out` gets
  * all values that do not depend on the file. */
 int subset_options(const char *name, const subset_values *v, const char *in, const char *out_path,
                    ebpo_subset_options *out);
 
-/* Sets the rest, which depends on the file. EBPO_E_ARGUMENT: a part requested by name is not in the
- * file. */
-EBPO_MUST_USE ebpo_status subset_settle(const subset_values *v, const ebpo_info *info,
-                                        const char *shown, ebpo_subset_options *out,
-                                        ebpo_error *error);
+/* Sets the members of *out that depend on the file: parts and codec. EBPO_E_ARGUMENT: a level or a
+ * part that was requested by name is not in the file, or an option does not apply to the file. */
+EBPO_MUST_USE ebpo_status subset_set_parts(const subset_values *v, const ebpo_info *info,
+                                           const char *shown, ebpo_subset_options *out,
+                                           ebpo_error *error);
 
 /* Reports the file on the disk, as a reader sees it. `t`: traffic of the input. */
 EBPO_MUST_USE ebpo_status subset_report(const subset_values *v, const char *out_path,

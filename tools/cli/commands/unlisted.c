@@ -8,11 +8,11 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-typedef struct longer {
+typedef struct longer_source {
     int fd;
     uint64_t size; /* size of the file; the source has one more byte */
     const char *path;
-} longer;
+} longer_source;
 
 static ebpo_status fail_path(const char *path, ebpo_error *error)
 {
@@ -23,7 +23,7 @@ static ebpo_status fail_path(const char *path, ebpo_error *error)
 static ebpo_status read_longer(void *user, uint64_t offset, uint64_t size, void *data,
                                ebpo_error *error)
 {
-    const longer *l = user;
+    const longer_source *l = user;
     uint64_t end = offset + size < l->size ? offset + size : l->size;
     uint8_t *to = data;
     memset(to, 0, size);
@@ -43,7 +43,7 @@ static ebpo_status read_longer(void *user, uint64_t offset, uint64_t size, void 
 
 static void close_longer(void *user)
 {
-    longer *l = user;
+    longer_source *l = user;
     close(l->fd);
     free(l);
 }
@@ -56,14 +56,15 @@ ebpo_status unlisted_open(const char *path, uint64_t max_expansion, ebpo_file **
     struct stat st;
     *out = NULL;
     int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
-    longer *l = fd >= 0 && fstat(fd, &st) == 0 && S_ISREG(st.st_mode) ? malloc(sizeof *l) : NULL;
+    longer_source *l =
+        fd >= 0 && fstat(fd, &st) == 0 && S_ISREG(st.st_mode) ? malloc(sizeof *l) : NULL;
     if (!l) {
         ebpo_status status = fail_path(path, error);
         if (fd >= 0)
             close(fd);
         return status;
     }
-    *l = (longer){ fd, (uint64_t)st.st_size, path };
+    *l = (longer_source){ fd, (uint64_t)st.st_size, path };
     source.user = l;
     source.size = l->size + 1;
     source.read = read_longer;

@@ -1,4 +1,4 @@
-/* Opens a file without the lists of its chunks, to examine a file with a damaged list. */
+/* Opens a file without its lists of chunks, to examine a file with a damaged list. */
 #ifndef EBPO_CMD_UNLISTED_H
 #define EBPO_CMD_UNLISTED_H
 

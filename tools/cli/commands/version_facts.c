@@ -57,7 +57,8 @@ static void print_installation(const installation *i)
            EBPO_HAVE_QHULL ? " qhull" : "");
 }
 
-/* Printed separately: it is also reported when only the version is requested. */
+/* Warns that the running library is not the one installed with the program; called also without
+ * --verbose. */
 static int warn_of_other(const installation *i)
 {
     bool other = i->own[0] && i->library[0] && !command_same_file(i->own, i->library);
@@ -71,7 +72,7 @@ static int warn_of_other(const installation *i)
     if (differs)
         fprintf(stderr, "ebpo: this program was made for version %d.%d.%d of the library, not %s\n",
                 EBPO_VERSION_MAJOR, EBPO_VERSION_MINOR, EBPO_VERSION_PATCH, ebpo_version());
-    return other || differs ? EXIT_FAILED : EXIT_FINE;
+    return other || differs ? EXIT_FAILED : EXIT_OK;
 }
 
 int version_report(const char *argument)

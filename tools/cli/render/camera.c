@@ -47,8 +47,8 @@ static void centre_model(camera *c, const ebpo_mesh *mesh)
         c->target[k] = low[k] / 2 + high[k] / 2;
 }
 
-/* Computes the distance at which every vertex is visible, and the offset of the picture from its
- * middle. */
+/* Computes the distance at which every vertex is visible, and the offset that centres the model in
+ * the picture. */
 static void measure_view(camera *c, const ebpo_mesh *mesh, double aspect, double *shift_x,
                          double *shift_y)
 {

@@ -13,10 +13,10 @@
 #include <string.h>
 
 #if defined __SANITIZE_ADDRESS__
-/* fontconfig keeps some of its patterns to the end, and other code must not free them. */
-#define SHOWN __attribute__((visibility("default")))
-SHOWN const char *__lsan_default_suppressions(void);
-SHOWN const char *__lsan_default_options(void);
+/* fontconfig keeps some patterns until the end of the process; leak checks must not report them. */
+#define EXPORTED __attribute__((visibility("default")))
+EXPORTED const char *__lsan_default_suppressions(void);
+EXPORTED const char *__lsan_default_options(void);
 const char *__lsan_default_suppressions(void) { return "leak:libfontconfig"; }
 const char *__lsan_default_options(void) { return "print_suppressions=0"; }
 #endif
@@ -70,7 +70,7 @@ bool picture_has_captions(void)
 }
 
 /* *good: false when memory was short. */
-static cairo_surface_t *text_coverage(int width, int height, const char *text, bool *good)
+static cairo_surface_t *text_coverage(int width, int height, const char *text, bool *success)
 {
     cairo_surface_t *surface = lib.image_surface_create(CAIRO_FORMAT_A8, width, height);
     cairo_t *cairo = lib.create(surface);
@@ -79,14 +79,14 @@ static cairo_surface_t *text_coverage(int width, int height, const char *text, b
     lib.select_font_face(cairo, "sans-serif", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
     lib.set_font_size(cairo, size);
     lib.text_extents(cairo, text, &extents);
-    if (extents.x_advance > 0.96 * width) { /* as large as it fits */
+    if (extents.x_advance > 0.96 * width) { /* reduces the size so that the text fits */
         lib.set_font_size(cairo, size * 0.96 * width / extents.x_advance);
         lib.text_extents(cairo, text, &extents);
     }
     /* on whole pixels, and all captions on one baseline, independent of their letters */
     lib.move_to(cairo, floor((width - extents.x_advance) / 2), floor(0.72 * height));
     lib.show_text(cairo, text);
-    *good = lib.status(cairo) == CAIRO_STATUS_SUCCESS;
+    *success = lib.status(cairo) == CAIRO_STATUS_SUCCESS;
     lib.destroy(cairo);
     lib.surface_flush(surface);
     return surface;
@@ -101,7 +101,7 @@ static ebpo_status no_memory(const char *what, ebpo_error *error)
 ebpo_status picture_caption(picture *p, int x, int y, int width, int height,
                             const uint8_t colour[3], const char *text, ebpo_error *error)
 {
-    bool good = false;
+    bool success = false;
     load_cairo();
     if (loaded == MISSING)
         return EBPO_OK;
@@ -109,9 +109,9 @@ ebpo_status picture_caption(picture *p, int x, int y, int width, int height,
         return no_memory("libcairo, which draws captions, cannot be loaded: memory is short, or "
                          "the library damaged",
                          error);
-    cairo_surface_t *surface = text_coverage(width, height, text, &good);
-    const unsigned char *row = good ? lib.image_surface_get_data(surface) : NULL;
-    good = row != NULL;
+    cairo_surface_t *surface = text_coverage(width, height, text, &success);
+    const unsigned char *row = success ? lib.image_surface_get_data(surface) : NULL;
+    success = row != NULL;
     for (int j = 0; row && j < height; j++, row += lib.image_surface_get_stride(surface))
         for (int i = 0; i < width; i++) {
             uint8_t *rgb = p->rgb + 3 * ((size_t)(y + j) * (size_t)p->width + (size_t)(x + i));
@@ -119,7 +119,7 @@ ebpo_status picture_caption(picture *p, int x, int y, int width, int height,
                 rgb[k] = (uint8_t)((rgb[k] * (255 - row[i]) + colour[k] * row[i] + 127) / 255);
         }
     lib.surface_destroy(surface);
-    return good ? EBPO_OK : no_memory("out of memory for a picture's captions", error);
+    return success ? EBPO_OK : no_memory("out of memory for a picture's captions", error);
 }
 
 #else

@@ -5,14 +5,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-typedef struct maker {
+typedef struct mesh_builder {
     ebpo_mesh mesh; /* counted first, then filled */
     bool filling;
-} maker;
+} mesh_builder;
 
 static bool add_node(void *user, const ebpo_view_node *v)
 {
-    maker *m = user;
+    mesh_builder *m = user;
     const ebpo_stream_node *n = &v->node;
     uint32_t first = (uint32_t)m->mesh.vertex_count;
     if (m->filling && n->vertex_count)
@@ -34,7 +34,7 @@ static bool add_node(void *user, const ebpo_view_node *v)
 
 ebpo_status cut_mesh_write(ebpo_view_stream *stream, const char *path, ebpo_error *error)
 {
-    maker m = { .filling = false };
+    mesh_builder m = { .filling = false };
     ebpo_view_stream_cut(stream, add_node, &m);
     uint64_t vertices = m.mesh.vertex_count, faces = m.mesh.face_count;
     if (vertices > UINT32_MAX - 1 || faces > UINT32_MAX - 1) {

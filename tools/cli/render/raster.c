@@ -11,24 +11,24 @@
 #include "cli/command.h"
 
 enum { OCCLUSION_STEPS = 10, THREADS_MAX = 64 };
-#define EDGE UINT32_C(0x80000000)
+#define OUTLINE_BIT UINT32_C(0x80000000)
 
 typedef struct sample {
-    float inverse; /* 1 / depth; 0: background */
-    uint32_t what; /* triangle, top bit: on an outline */
+    float inverse;     /* 1 / depth; 0: background */
+    uint32_t triangle; /* index of the triangle; OUTLINE_BIT: on an outline */
 } sample;
 
 /* A vertex in camera axes (x right, y up, z depth) and on the screen. */
-typedef struct seen {
+typedef struct projected {
     double x, y, inverse;
-} seen;
+} projected;
 
 typedef struct raster {
     const camera *view;
     const ebpo_mesh *mesh;
     const raster_style *style;
-    int width, height, side; /* in samples; side: samples across a pixel */
-    double focal, per_focal; /* samples per unit of x / depth, and its reciprocal */
+    int width, height, side;     /* in samples; side: samples across a pixel */
+    double focal, inverse_focal; /* samples per unit of x / depth, and its reciprocal */
     sample *samples;
     float (*normal)[3]; /* normal of each triangle, in camera axes, towards the eye */
     double spiral[OCCLUSION_STEPS][2], turn[256][2]; /* sample positions for occlusion: a spiral in
@@ -60,11 +60,11 @@ static void to_camera(const raster *r, uint64_t i, double out[3])
     out[2] = dot_product(v, r->view->back);
 }
 
-static seen project_point(const raster *r, const double v[3])
+static projected project_point(const raster *r, const double v[3])
 {
     double inverse = 1 / (r->view->distance - v[2]);
-    return (seen){ r->width / 2.0 + r->focal * v[0] * inverse,
-                   r->height / 2.0 - r->focal * v[1] * inverse, inverse };
+    return (projected){ r->width / 2.0 + r->focal * v[0] * inverse,
+                        r->height / 2.0 - r->focal * v[1] * inverse, inverse };
 }
 
 static bool unit_normal(double (*c)[3], double out[3])
@@ -111,14 +111,14 @@ typedef struct sides {
     double a[3], b[3], c[3];
 } sides;
 
-static bool make_sides(const seen p[3], sides *out)
+static bool make_sides(const projected p[3], sides *out)
 {
     double area = (p[1].x - p[0].x) * (p[2].y - p[0].y) - (p[1].y - p[0].y) * (p[2].x - p[0].x);
     if (!(fabs(area) > 1e-12))
         return false;
     double sign = area > 0 ? 1 : -1;
     for (int i = 0; i < 3; i++) {
-        const seen *s = &p[i], *t = &p[(i + 1) % 3];
+        const projected *s = &p[i], *t = &p[(i + 1) % 3];
         double dx = t->x - s->x, dy = t->y - s->y, length = sqrt(dx * dx + dy * dy);
         out->a[i] = -dy * sign / length;
         out->b[i] = dx * sign / length;
@@ -129,7 +129,7 @@ static bool make_sides(const seen p[3], sides *out)
 
 static int clamp_index(double v, int most) { return v < 0 ? 0 : v > most ? most : (int)v; }
 
-static void fill_triangle(raster *r, const seen p[3], uint32_t what, unsigned outlines)
+static void fill_triangle(raster *r, const projected p[3], uint32_t triangle, unsigned outlines)
 {
     sides s;
     if (!make_sides(p, &s))
@@ -159,12 +159,12 @@ static void fill_triangle(raster *r, const seen p[3], uint32_t what, unsigned ou
                 continue;
             bool on_line = (outlines & 1 && d[0] < line) || (outlines & 2 && d[1] < line) ||
                            (outlines & 4 && d[2] < line);
-            *at = (sample){ inverse, what | (on_line ? EDGE : 0) };
+            *at = (sample){ inverse, triangle | (on_line ? OUTLINE_BIT : 0) };
         }
 }
 
 /* Returns the normal of the style for a face, in camera axes. */
-static void light_from(const raster *r, uint64_t face, double n[3])
+static void style_normal(const raster *r, uint64_t face, double n[3])
 {
     const float *given = r->style->normals ? r->style->normals + 3 * face : NULL;
     if (!given || (given[0] == 0 && given[1] == 0 && given[2] == 0))
@@ -189,10 +189,10 @@ static void draw_face(raster *r, uint64_t face)
     if (front && r->style->paint && r->style->paint[face] & RASTER_HOLLOW)
         return;
     unsigned outlines = r->style->edges ? outline_sides(r, face, n) : 0;
-    light_from(r, face, n);
+    style_normal(r, face, n);
     for (int k = 0; k < 3; k++)
         r->normal[face][k] = (float)(front ? n[k] : -n[k]);
-    seen p[3] = { project_point(r, c[0]), project_point(r, c[1]), project_point(r, c[2]) };
+    projected p[3] = { project_point(r, c[0]), project_point(r, c[1]), project_point(r, c[2]) };
     fill_triangle(r, p, (uint32_t)face, outlines);
 }
 
@@ -200,7 +200,7 @@ static void draw_face(raster *r, uint64_t face)
 
 static void sample_position(const raster *r, int x, int y, double inverse, double out[3])
 {
-    double depth = 1 / inverse, scale = depth * r->per_focal;
+    double depth = 1 / inverse, scale = depth * r->inverse_focal;
     out[0] = (x + 0.5 - r->width / 2.0) * scale;
     out[1] = -(y + 0.5 - r->height / 2.0) * scale;
     out[2] = r->view->distance - depth;
@@ -238,8 +238,8 @@ static double sky_hidden(const raster *r, int x, int y, const sample *at, const 
     return hidden > 1 ? 1 : hidden;
 }
 
-/* Computes the weights of a face's corners at a point of its plane, in camera axes. */
-static void corner_shares(const raster *r, uint32_t face, const double p[3], double out[3])
+/* Computes the weights of a face's corners at a point `p` of its plane, in camera axes. */
+static void corner_weights(const raster *r, uint32_t face, const double p[3], double out[3])
 {
     double c[3][3], from[3][3], n[3], part[3], sum = 0;
     for (int i = 0; i < 3; i++) {
@@ -262,7 +262,7 @@ static void colour_at(const raster *r, int x, int y, const sample *at, double ou
 {
     static const double other[3] = { 0.30, 0.48, 0.66 }, red[3] = { 0.85, 0.04, 0.03 };
     const raster_style *style = r->style;
-    uint32_t face = at->what & ~EDGE;
+    uint32_t face = at->triangle & ~OUTLINE_BIT;
     int paint = style->paint ? style->paint[face] : RASTER_PLAIN;
     memcpy(out,
            paint & RASTER_RED     ? red
@@ -276,7 +276,7 @@ static void colour_at(const raster *r, int x, int y, const sample *at, double ou
     double p[3], shares[3];
     const uint32_t *corner = r->mesh->faces + 3 * (uint64_t)face;
     sample_position(r, x, y, (double)at->inverse, p);
-    corner_shares(r, face, p, shares);
+    corner_weights(r, face, p, shares);
     for (unsigned k = 0; k < 3; k++) {
         out[k] = 0;
         for (int i = 0; i < 3; i++)
@@ -284,14 +284,14 @@ static void colour_at(const raster *r, int x, int y, const sample *at, double ou
     }
 }
 
-/* Computes linear light: key light from the upper left, a weak fill from the right, the sky above,
- * a gloss. */
+/* Computes the linear light of a sample: a key light from the upper left, a weak fill light from
+ * the right, the sky above, and a gloss. */
 static void light_sample(const raster *r, int x, int y, const sample *at, double hidden,
                          double out[3])
 {
     double colour[3];
     colour_at(r, x, y, at, colour);
-    const float *n = r->normal[at->what & ~EDGE];
+    const float *n = r->normal[at->triangle & ~OUTLINE_BIT];
     static const double key[3] = { -0.46, 0.62, 0.635 }, fill[3] = { 0.86, 0.10, 0.50 },
                         half[3] = { -0.254, 0.343, 0.904 };
     double m[3] = { (double)n[0], (double)n[1], (double)n[2] };
@@ -319,9 +319,10 @@ static double to_linear(int v)
 static void make_tables(raster *r)
 {
     for (int i = 0; i < OCCLUSION_STEPS; i++) {
-        double share = (i + 0.5) / OCCLUSION_STEPS, angle = i * 2.399963; /* the golden angle */
-        r->spiral[i][0] = share * cos(angle);
-        r->spiral[i][1] = share * sin(angle);
+        double thread_rows = (i + 0.5) / OCCLUSION_STEPS,
+               angle = i * 2.399963; /* the golden angle */
+        r->spiral[i][0] = thread_rows * cos(angle);
+        r->spiral[i][1] = thread_rows * sin(angle);
     }
     for (int i = 0; i < 256; i++) {
         r->turn[i][0] = cos(i * M_PI / 128);
@@ -345,9 +346,9 @@ static void resolve_pixel(const raster *r, int x, int y, double reach, uint8_t *
             const sample *at = &r->samples[(size_t)j * (size_t)r->width + (size_t)i];
             double c[3] = { r->linear[rgb[0]], r->linear[rgb[1]], r->linear[rgb[2]] };
             if (at->inverse > 0) {
-                uint32_t face = at->what & ~EDGE;
+                uint32_t face = at->triangle & ~OUTLINE_BIT;
                 light_sample(r, i, j, at, sky_hidden(r, i, j, at, r->normal[face], reach), c);
-                for (int k = 0; k < 3 && at->what & EDGE; k++)
+                for (int k = 0; k < 3 && at->triangle & OUTLINE_BIT; k++)
                     c[k] = 0.45 * c[k] + 0.55 * ink[k];
             }
             for (int k = 0; k < 3; k++)
@@ -357,18 +358,18 @@ static void resolve_pixel(const raster *r, int x, int y, double reach, uint8_t *
         rgb[k] = to_srgb(sum[k] / (r->side * r->side));
 }
 
-/* Share of one thread in the second step: every threads-th row. */
-typedef struct share {
+/* Rows of one thread in the second step: rows number, number + threads, ... */
+typedef struct thread_rows {
     const raster *r;
     picture *out;
     int x, y, width, height;
     unsigned number, threads;
     pthread_t thread;
-} share;
+} thread_rows;
 
 static void *resolve_rows(void *argument)
 {
-    const share *s = argument;
+    const thread_rows *s = argument;
     double reach = 0.10 * s->r->view->distance * s->r->view->tangent;
     for (int j = (int)s->number; j < s->height; j += (int)s->threads)
         for (int i = 0; i < s->width; i++)
@@ -381,17 +382,17 @@ static void *resolve_rows(void *argument)
 static void resolve_picture(const raster *r, picture *out, int x, int y, int width, int height,
                             unsigned threads)
 {
-    share shares[THREADS_MAX];
+    thread_rows shares[THREADS_MAX];
     unsigned count = threads < 1 ? 1 : threads < THREADS_MAX ? threads : THREADS_MAX, started = 1;
     for (unsigned i = 0; i < count; i++)
-        shares[i] = (share){ .r = r,
-                             .out = out,
-                             .x = x,
-                             .y = y,
-                             .width = width,
-                             .height = height,
-                             .number = i,
-                             .threads = count };
+        shares[i] = (thread_rows){ .r = r,
+                                   .out = out,
+                                   .x = x,
+                                   .y = y,
+                                   .width = width,
+                                   .height = height,
+                                   .number = i,
+                                   .threads = count };
     while (started < count &&
            command_thread(&shares[started].thread, resolve_rows, &shares[started]) == 0)
         started++;
@@ -406,7 +407,7 @@ ebpo_status raster_draw(picture *out, int x, int y, int width, int height, const
                         const ebpo_mesh *mesh, const raster_style *style, unsigned threads,
                         ebpo_error *error)
 {
-    if (mesh->face_count >= EDGE) {
+    if (mesh->face_count >= OUTLINE_BIT) {
         snprintf(error->message, sizeof error->message,
                  "more than 2147483647 faces cannot be drawn; choose a coarser level");
         return error->status = EBPO_E_LIMIT;
@@ -419,7 +420,7 @@ ebpo_status raster_draw(picture *out, int x, int y, int width, int height, const
                  .height = side * height,
                  .side = side };
     r.focal = r.height / 2.0 / view->tangent;
-    r.per_focal = 1 / r.focal;
+    r.inverse_focal = 1 / r.focal;
     r.samples = calloc((size_t)r.width * (size_t)r.height, sizeof *r.samples);
     r.normal = malloc((mesh->face_count ? mesh->face_count : 1) * sizeof *r.normal);
     ebpo_status status = EBPO_OK;

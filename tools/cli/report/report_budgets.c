@@ -6,7 +6,7 @@
 #include "cli/bench/bench_run.h"
 #include "cli/report/report_data.h"
 
-/* maximum number of points, as loads take time */
+/* Maximum number of points; loading subtrees takes time. */
 enum { BUDGET_POINTS = 500 };
 
 static ebpo_status query_within_budget(const comparison *c, ebpo_model *model, int cut, double *f,
@@ -43,8 +43,9 @@ static ebpo_status query_within_budget(const comparison *c, ebpo_model *model, i
     return status;
 }
 
-/* Measures one budget. When the error says that the budget is too small, there are no results. */
-static ebpo_status one_budget(comparison *c, method *m, ebpo_file *file, int i, ebpo_error *error)
+/* Measures one budget. A budget that is too small gives no results, and is not an error. */
+static ebpo_status measure_budget(comparison *c, method *m, ebpo_file *file, int i,
+                                  ebpo_error *error)
 {
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
@@ -99,7 +100,7 @@ ebpo_status report_budgets(comparison *c, method *m, ebpo_file *file, ebpo_error
     for (int i = 0; i < BUDGETS; i++) {
         if (c->progress.report)
             c->progress.report(c->progress.user, "memory budgets", (uint64_t)i, BUDGETS);
-        status = one_budget(c, m, file, i, error);
+        status = measure_budget(c, m, file, i, error);
         if (status == EBPO_OK)
             continue;
         if (status == EBPO_E_IO || status == EBPO_E_CANCELLED)
@@ -108,7 +109,7 @@ ebpo_status report_budgets(comparison *c, method *m, ebpo_file *file, ebpo_error
             m->budget[i][k] = NAN;
         method_note(m, "memory budgets", error->message);
         *error = (ebpo_error)EBPO_ERROR_INIT;
-        return EBPO_OK; /* the smaller budgets that follow are too small as well */
+        return EBPO_OK; /* the budgets that follow are even smaller */
     }
     return EBPO_OK;
 }

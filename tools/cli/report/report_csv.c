@@ -16,7 +16,7 @@ static void print_metric(FILE *out, const char *name, int level, const char *par
     fprintf(out, ",%s\n", q->unit);
 }
 
-static void one_method(FILE *out, const comparison *c, const method *m)
+static void print_method(FILE *out, const comparison *c, const method *m)
 {
     char parameter[64];
     for (int k = 0; k < WHOLE_METRICS; k++)
@@ -47,5 +47,5 @@ void report_csv(FILE *out, const comparison *c)
 {
     fputs("method,level,parameter,quantity,value,unit\n", out);
     for (int i = 0; i < c->count; i++)
-        one_method(out, c, &c->methods[i]);
+        print_method(out, c, &c->methods[i]);
 }

@@ -81,10 +81,10 @@ const metric_name level_metrics[LEVEL_METRICS] = {
                        NO_INSIDE },
     [OF_DISTANCE_NS] = { "distance_ns", "ns", true, "a distance query to this level, the same way",
                          NULL },
-    [OF_HAVE_SECONDS] = { "have_seconds", "s", true,
-                          "to open the file and read levels 0 to this one, after the file was "
-                          "dropped from the page cache",
-                          NULL },
+    [OF_READING_SECONDS] = { "have_seconds", "s", true,
+                             "to open the file and read levels 0 to this one, after the file was "
+                             "dropped from the page cache",
+                             NULL },
     [OF_READ_BYTES] = { "read_bytes", "B", false, "bytes requested from the file for that", NULL },
     [OF_READS] = { "reads", "reads", false, "read calls for that", NULL },
     [OF_LINE_BYTES] = { "line_bytes", "B", false,
@@ -209,7 +209,7 @@ void method_begin(method *m, const char *name, const char *path)
     fill_nan(&m->budget[0][0], BUDGETS * BUDGET_METRICS);
     for (int i = 0; i < ROUNDS; i++) {
         round_times *r = &m->round[i];
-        fill_nan(r->have, EBPO_LEVELS_MAX);
+        fill_nan(r->reading, EBPO_LEVELS_MAX);
         fill_nan(r->inside, EBPO_LEVELS_MAX);
         fill_nan(r->distance, EBPO_LEVELS_MAX);
         fill_nan(&r->due[0][0], DEADLINES * DEADLINE_METRICS);
@@ -228,7 +228,7 @@ void method_note(method *m, const char *what, const char *why)
         memcpy(m->note[m->note_count++], text, sizeof text);
 }
 
-ebpo_status method_without(method *m, const char *what, ebpo_status status, ebpo_error *error)
+ebpo_status method_note_missing(method *m, const char *what, ebpo_status status, ebpo_error *error)
 {
     if (status != EBPO_E_ABSENT && status != EBPO_E_UNSUPPORTED && status != EBPO_E_NOT_SOLID)
         return status;

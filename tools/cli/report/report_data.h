@@ -48,7 +48,7 @@ typedef enum level_metric {
     OF_WIDTH_P99,
     OF_INSIDE_NS,
     OF_DISTANCE_NS,
-    OF_HAVE_SECONDS,
+    OF_READING_SECONDS,
     OF_READ_BYTES,
     OF_READS,
     OF_LINE_BYTES,
@@ -95,7 +95,7 @@ typedef enum budget_metric {
     BUDGET_METRICS
 } budget_metric;
 
-/* Values of a file that was cut to a need: a requested error or size. */
+/* Values of a subset that was made for a need, which is a requested error or size. */
 typedef enum need_metric {
     OF_NEED_BYTES,
     OF_NEED_FAR_LO,
@@ -127,10 +127,10 @@ typedef struct need_result {
     double metric[NEED_METRICS];
 } need_result;
 
-/* Times of one round; methods take turns, so that other load of the machine affects all alike. The
- * results are medians of the rounds. */
+/* Times of one round. Methods take turns within a round, so that other load of the machine affects
+ * all methods alike. The results are medians of the rounds. */
 typedef struct round_times {
-    double have[EBPO_LEVELS_MAX], inside[EBPO_LEVELS_MAX], distance[EBPO_LEVELS_MAX];
+    double reading[EBPO_LEVELS_MAX], inside[EBPO_LEVELS_MAX], distance[EBPO_LEVELS_MAX];
     double open, exact_inside, exact_distance;
     double due[DEADLINES][DEADLINE_METRICS];
 } round_times;
@@ -140,8 +140,8 @@ typedef struct method {
     char name[64], path[4096];
     ebpo_info info;
     ebpo_solid_volume solid; /* bounds of the volume of the solid */
-    /* when volumes are beyond the range of a double: share of the root cell inside the solid, the
-     * base of excess; else 0 */
+    /* if volumes are beyond the range of a double: the share of the root cell that is inside the
+     * solid, from which the excess is computed; else 0 */
     double solid_share;
     ebpo_stored_sizes stored;
     int levels; /* number of levels in the file */
@@ -211,14 +211,15 @@ void comparison_free(comparison *c);
  */
 void report_stem(const char *path, char *out, size_t capacity);
 
-/* Notes once why a build or a file has no results of a kind; other failures stay errors. */
-ebpo_status method_without(method *m, const char *what, ebpo_status status, ebpo_error *error);
+/* Adds a note, once, why a build or a file has no results of a kind, and returns EBPO_OK. For
+ * failures that are no such reason, returns `status`. */
+ebpo_status method_note_missing(method *m, const char *what, ebpo_status status, ebpo_error *error);
 
 /* Sorts the values, and returns the quantile `share` (0 .. 1): the least value that at most 1 -
  * share of the values exceed; NAN if there is none. */
 double quantile_of(double *values, uint64_t count, double share);
 
-/* The steps in order; each fills values of one method. */
+/* The steps of a report in their order. Each sets values of one method. */
 EBPO_MUST_USE ebpo_status report_make_points(comparison *c, ebpo_error *error);
 EBPO_MUST_USE ebpo_status report_gather(comparison *c, method *m, ebpo_error *error);
 EBPO_MUST_USE ebpo_status report_thesis(comparison *c, method *m, ebpo_file *file,
@@ -228,8 +229,8 @@ EBPO_MUST_USE ebpo_status report_limited(comparison *c, method *m, ebpo_model *m
                                          ebpo_error *error);
 EBPO_MUST_USE ebpo_status report_deadlines(comparison *c, method *m, ebpo_model *model, int round,
                                            ebpo_error *error);
-/* Called after the last round. */
-void report_settle(const comparison *c, method *m);
+/* Computes the medians of the rounds. */
+void report_medians(const comparison *c, method *m);
 /* Counts bytes and round trips for each level over a network. */
 EBPO_MUST_USE ebpo_status report_lines(comparison *c, method *m, ebpo_error *error);
 /* Measures distances while only a part of the model is in memory. Needs memory_bytes. */

@@ -69,5 +69,5 @@ ebpo_status report_deadlines(comparison *c, method *m, ebpo_model *model, int ro
     free(t.width);
     free(t.took);
     ebpo_context_free(context);
-    return method_without(m, "deadlines", status, error);
+    return method_note_missing(m, "deadlines", status, error);
 }

@@ -7,7 +7,7 @@
 #include "cli/mesh_findings.h"
 #include "cli/report/report_data.h"
 
-static void from_head(const comparison *c, method *m)
+static void set_header_values(const comparison *c, method *m)
 {
     const ebpo_info *info = &m->info;
     double planes = 0;
@@ -62,12 +62,13 @@ static ebpo_status solid_in_root(const comparison *c, method *m, ebpo_file *file
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
     ebpo_mesh mesh = { 0 };
     if (!m->info.solid || !is_out_of_range(&m->info) || m->info.report.components > 1 ||
-        !findings_knows(&m->solid))
+        !findings_volume_known(&m->solid))
         return EBPO_OK;
     read.threads = (unsigned)c->v->threads;
     ebpo_status status = ebpo_file_read_mesh(file, &read, &mesh, error);
     if (status != EBPO_OK)
-        return method_without(m, "excess, with volumes beyond a double's range", status, error);
+        return method_note_missing(m, "excess, with volumes beyond a double's range", status,
+                                   error);
     m->solid_share = share_of_root(&m->info, &mesh);
     ebpo_mesh_free(&mesh);
     return EBPO_OK;
@@ -94,7 +95,7 @@ static ebpo_status solid_volume(const comparison *c, method *m, const ebpo_file 
 {
     ebpo_mass mass = EBPO_MASS_INIT;
     m->solid = facts_solid(&m->info, NULL);
-    if (findings_knows(&m->solid) || !(m->info.parts & EBPO_PART_MESH) || m->info.pruned)
+    if (findings_volume_known(&m->solid) || !(m->info.parts & EBPO_PART_MESH) || m->info.pruned)
         return EBPO_OK;
     ebpo_status status = ebpo_measure(file, (unsigned)c->v->threads, &mass, error);
     if (status == EBPO_OK)
@@ -154,7 +155,7 @@ static ebpo_status gather_limits(comparison *c, method *m, ebpo_file *file, ebpo
         double *f = m->level[i];
         ebpo_status status = ebpo_limit_level(file, i, &options, &limit, error);
         if (status != EBPO_OK)
-            return method_without(m, "limit", status, error);
+            return method_note_missing(m, "limit", status, error);
         f[OF_LIMIT_VOLUME] = limit.volume;
         f[OF_LIMIT_EXCESS] = facts_excess(&m->info, &m->solid, limit.volume);
         f[OF_EXCESS_TO_LIMIT] = facts_excess_ratio(&m->info, &m->solid, f[OF_VOLUME], limit.volume);
@@ -187,7 +188,7 @@ static ebpo_status gather_error_bounds(comparison *c, method *m, ebpo_file *file
         options.samples = i < c->first ? 0 : samples;
         ebpo_status status = ebpo_level_error_bound(model, file, i, &options, &far, error);
         if (status != EBPO_OK)
-            return method_without(m, "Hausdorff distance", status, error);
+            return method_note_missing(m, "Hausdorff distance", status, error);
         options.at_most = far.hi;
         if (i < c->first)
             continue;
@@ -199,7 +200,7 @@ static ebpo_status gather_error_bounds(comparison *c, method *m, ebpo_file *file
     return EBPO_OK;
 }
 
-/* --- all of it --- */
+/* --- all values --- */
 
 static ebpo_status with_model(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
 {
@@ -223,7 +224,7 @@ ebpo_status report_gather(comparison *c, method *m, ebpo_error *error)
 {
     ebpo_file *file = NULL;
     ebpo_status status = remote_open(&file, m->path, &c->v->remote, error);
-    from_head(c, m);
+    set_header_values(c, m);
     if (status == EBPO_OK)
         status = gather_volumes(c, m, file, error);
     if (status == EBPO_OK)

@@ -117,7 +117,7 @@ ebpo_status report_make_points(comparison *c, ebpo_error *error)
 
 /* --- queries --- */
 
-typedef struct limited_queries {
+typedef struct level_queries {
     comparison *c;
     method *m;
     ebpo_context *context;
@@ -126,10 +126,10 @@ typedef struct limited_queries {
     double *width;
     round_times *round;
     bool first; /* round: later ones only measure times */
-} limited_queries;
+} level_queries;
 
 /* Measures nanoseconds per point; results are in a->distance or a->inside. */
-static ebpo_status time_queries(limited_queries *a, bool distance, const double *points, int level,
+static ebpo_status time_queries(level_queries *a, bool distance, const double *points, int level,
                                 double *ns, ebpo_error *error)
 {
     ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
@@ -147,7 +147,7 @@ static ebpo_status time_queries(limited_queries *a, bool distance, const double 
     return status;
 }
 
-static double share_of_maybe(const limited_queries *a)
+static double share_of_maybe(const level_queries *a)
 {
     uint64_t count = 0;
     for (uint64_t i = 0; i < a->c->points; i++)
@@ -155,7 +155,7 @@ static double share_of_maybe(const limited_queries *a)
     return (double)count / (double)a->c->points;
 }
 
-static ebpo_status inside_at(limited_queries *a, int level, ebpo_error *error)
+static ebpo_status measure_inside(level_queries *a, int level, ebpo_error *error)
 {
     double *f = a->m->level[level], ignored;
     ebpo_status status =
@@ -170,7 +170,7 @@ static ebpo_status inside_at(limited_queries *a, int level, ebpo_error *error)
     return status;
 }
 
-static ebpo_status distance_at(limited_queries *a, int level, ebpo_error *error)
+static ebpo_status measure_distance(level_queries *a, int level, ebpo_error *error)
 {
     double *f = a->m->level[level], sum = 0;
     ebpo_status status =
@@ -188,7 +188,7 @@ static ebpo_status distance_at(limited_queries *a, int level, ebpo_error *error)
 }
 
 /* Measures exact queries, which need the mesh. */
-static ebpo_status time_exact(limited_queries *a, ebpo_error *error)
+static ebpo_status time_exact(level_queries *a, ebpo_error *error)
 {
     ebpo_status status = a->m->info.solid ? time_queries(a, false, a->c->uniform, EBPO_LEVEL_ALL,
                                                          &a->round->exact_inside, error)
@@ -199,10 +199,10 @@ static ebpo_status time_exact(limited_queries *a, ebpo_error *error)
     if (status == EBPO_OK)
         return EBPO_OK;
     a->round->exact_inside = a->round->exact_distance = NAN;
-    return method_without(a->m, "exact results", status, error);
+    return method_note_missing(a->m, "exact results", status, error);
 }
 
-static ebpo_status query_all(limited_queries *a, ebpo_error *error)
+static ebpo_status query_all(level_queries *a, ebpo_error *error)
 {
     const comparison *c = a->c;
     ebpo_status status = EBPO_OK;
@@ -212,9 +212,9 @@ static ebpo_status query_all(limited_queries *a, ebpo_error *error)
             c->progress.report(c->progress.user, "queries", (uint64_t)(i - c->first),
                                (uint64_t)(last - c->first + 1));
         if (a->m->info.solid)
-            status = inside_at(a, i, error);
+            status = measure_inside(a, i, error);
         if (status == EBPO_OK)
-            status = distance_at(a, i, error);
+            status = measure_distance(a, i, error);
     }
     return status == EBPO_OK ? time_exact(a, error) : status;
 }
@@ -222,7 +222,7 @@ static ebpo_status query_all(limited_queries *a, ebpo_error *error)
 ebpo_status report_limited(comparison *c, method *m, ebpo_model *model, int round,
                            ebpo_error *error)
 {
-    limited_queries a = { .c = c, .m = m, .round = &m->round[round], .first = round == 0 };
+    level_queries a = { .c = c, .m = m, .round = &m->round[round], .first = round == 0 };
     ebpo_status status = ebpo_context_new(model, &a.context, error);
     a.inside = malloc(c->points * sizeof *a.inside);
     a.distance = malloc(c->points * sizeof *a.distance);

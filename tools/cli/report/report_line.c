@@ -10,27 +10,27 @@
 #include "cli/report/report_data.h"
 
 /* as in the library for URLs: bytes fetched when opening, and the size of later blocks */
-enum { HEAD_BYTES = 128 << 10, PIECE = 4096 };
+enum { HEAD_BYTES = 128 << 10, BLOCK_BYTES = 4096 };
 
 /* One thread reads, so there is no lock. */
-typedef struct line {
+typedef struct simulated_line {
     int file;
     uint64_t size, bytes;
-    uint64_t trips;    /* completed */
-    uint32_t *arrives; /* for each block: the round trip that brings it; 0: not requested */
-} line;
+    uint64_t trips;         /* completed */
+    uint32_t *arrival_trip; /* for each block: the round trip that brings it; 0: not requested */
+} simulated_line;
 
 /* Requests the missing blocks of a range; they come with the next round trip. Returns the last
  * round trip that brings any block of the range. */
-static uint64_t query_for(line *l, uint64_t offset, uint64_t size)
+static uint64_t request_blocks(simulated_line *l, uint64_t offset, uint64_t size)
 {
     uint64_t last = 0;
-    for (uint64_t i = offset / PIECE; size && i <= (offset + size - 1) / PIECE; i++) {
-        if (!l->arrives[i]) {
-            l->arrives[i] = (uint32_t)l->trips + 1;
-            l->bytes += (i + 1) * PIECE < l->size ? PIECE : l->size - i * PIECE;
+    for (uint64_t i = offset / BLOCK_BYTES; size && i <= (offset + size - 1) / BLOCK_BYTES; i++) {
+        if (!l->arrival_trip[i]) {
+            l->arrival_trip[i] = (uint32_t)l->trips + 1;
+            l->bytes += (i + 1) * BLOCK_BYTES < l->size ? BLOCK_BYTES : l->size - i * BLOCK_BYTES;
         }
-        last = l->arrives[i] > last ? l->arrives[i] : last;
+        last = l->arrival_trip[i] > last ? l->arrival_trip[i] : last;
     }
     return last;
 }
@@ -38,8 +38,8 @@ static uint64_t query_for(line *l, uint64_t offset, uint64_t size)
 static ebpo_status read_range(void *user, uint64_t offset, uint64_t size, void *data,
                               ebpo_error *error)
 {
-    line *l = user;
-    uint64_t arrival = query_for(l, offset, size), done = 0;
+    simulated_line *l = user;
+    uint64_t arrival = request_blocks(l, offset, size), done = 0;
     l->trips = arrival > l->trips ? arrival : l->trips;
     while (done < size) {
         ssize_t got = pread(l->file, (char *)data + done, size - done, (off_t)(offset + done));
@@ -55,10 +55,10 @@ static ebpo_status read_range(void *user, uint64_t offset, uint64_t size, void *
 static void hint_ranges(void *user, const ebpo_range *ranges, size_t count)
 {
     for (size_t i = 0; i < count; i++)
-        (void)query_for(user, ranges[i].offset, ranges[i].size);
+        (void)request_blocks(user, ranges[i].offset, ranges[i].size);
 }
 
-static ebpo_status have_level(line *l, const char *path, int level, ebpo_error *error)
+static ebpo_status load_level(simulated_line *l, const char *path, int level, ebpo_error *error)
 {
     ebpo_stream_options wanted = EBPO_STREAM_OPTIONS_INIT;
     ebpo_source source = EBPO_SOURCE_INIT;
@@ -73,8 +73,8 @@ static ebpo_status have_level(line *l, const char *path, int level, ebpo_error *
     source.prefetch = hint_ranges;
     source.prefetched = l->size < HEAD_BYTES ? l->size : HEAD_BYTES;
     l->trips = l->bytes = 0;
-    memset(l->arrives, 0, (l->size / PIECE + 1) * sizeof *l->arrives);
-    l->trips = query_for(l, 0, source.prefetched);
+    memset(l->arrival_trip, 0, (l->size / BLOCK_BYTES + 1) * sizeof *l->arrival_trip);
+    l->trips = request_blocks(l, 0, source.prefetched);
     ebpo_status status = ebpo_open_source(&source, path, &file, error);
     if (status == EBPO_OK) {
         ebpo_file_prefetch_levels(file, 0, level);
@@ -90,7 +90,7 @@ static ebpo_status have_level(line *l, const char *path, int level, ebpo_error *
 ebpo_status report_lines(comparison *c, method *m, ebpo_error *error)
 {
     struct stat st;
-    line l = { .file = -1 };
+    simulated_line l = { .file = -1 };
     ebpo_status status = EBPO_OK;
     if (ebpo_is_url(m->path)) {
         method_note(m, "lines", "the file came over one; compare files on disk");
@@ -102,19 +102,19 @@ ebpo_status report_lines(comparison *c, method *m, ebpo_error *error)
         status = error->status = EBPO_E_IO;
     } else {
         l.size = (uint64_t)st.st_size;
-        l.arrives = malloc((l.size / PIECE + 1) * sizeof *l.arrives);
-        if (!l.arrives) {
+        l.arrival_trip = malloc((l.size / BLOCK_BYTES + 1) * sizeof *l.arrival_trip);
+        if (!l.arrival_trip) {
             snprintf(error->message, sizeof error->message,
                      "not enough memory for simulated lines");
             status = error->status = EBPO_E_MEMORY;
         }
     }
     for (int i = c->first; i <= method_last(c, m) && status == EBPO_OK; i++) {
-        status = have_level(&l, m->path, i, error);
+        status = load_level(&l, m->path, i, error);
         m->level[i][OF_LINE_BYTES] = (double)l.bytes;
         m->level[i][OF_LINE_TRIPS] = (double)l.trips;
     }
-    free(l.arrives);
+    free(l.arrival_trip);
     if (l.file >= 0)
         close(l.file);
     return status;

@@ -29,7 +29,7 @@ static bool same_model(const ebpo_info *a, const ebpo_info *b)
            memcmp(&a->report.volume, &b->report.volume, sizeof a->report.volume) == 0;
 }
 
-static int learn_file(comparison *c, method *m)
+static int read_facts(comparison *c, method *m)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
@@ -45,7 +45,7 @@ static int learn_file(comparison *c, method *m)
     if (status != EBPO_OK)
         return command_failed("report", &error);
     if (m == c->methods || same_model(&c->methods->info, &m->info))
-        return EXIT_FINE;
+        return EXIT_OK;
     fprintf(stderr,
             "ebpo report: %s and %s are made of different meshes; a report compares files of one "
             "model\n",
@@ -54,7 +54,7 @@ static int learn_file(comparison *c, method *m)
 }
 
 /* Derives the name of a method from a file name with any characters. */
-static void usable_stem(const char *path, char *name, size_t capacity)
+static void write_method_name(const char *path, char *name, size_t capacity)
 {
     report_stem(path, name, capacity);
     for (char *c = name; *c; c++)
@@ -68,7 +68,7 @@ static int add_file(comparison *c, const char *path)
     if (c->count < c->v->names.count)
         snprintf(name, sizeof name, "%s", c->v->names.item[c->count]);
     else
-        usable_stem(path, name, sizeof name);
+        write_method_name(path, name, sizeof name);
     if (strlen(path) >= sizeof c->methods->path)
         return refuse_method("the name is too long", path);
     if (strpbrk(name, "/,\"\n"))
@@ -81,15 +81,15 @@ static int add_file(comparison *c, const char *path)
                                  name);
     method *m = &c->methods[c->count++];
     method_begin(m, name, path);
-    return learn_file(c, m);
+    return read_facts(c, m);
 }
 
 /* --- from a mesh --- */
 
-typedef struct built {
+typedef struct build_result {
     double seconds, unlimited_seconds;
     ebpo_thesis_levels *levels; /* NULL: not computed */
-} built;
+} build_result;
 
 static void build_options(const comparison *c, int selection, const plane_setting *setting,
                           ebpo_build_options *o)
@@ -111,7 +111,8 @@ static void build_options(const comparison *c, int selection, const plane_settin
 
 /* Computes the levels without the limits of files, from the mesh, which it consumes. */
 static ebpo_status compute_unlimited(const comparison *c, mesh_input *p,
-                                     const ebpo_build_options *build, built *out, ebpo_error *error)
+                                     const ebpo_build_options *build, build_result *out,
+                                     ebpo_error *error)
 {
     ebpo_coalescing coalesce =
         c->v->coalesce >= 0 ? (ebpo_coalescing)c->v->coalesce : EBPO_COALESCE_DISTINCT;
@@ -132,13 +133,13 @@ static ebpo_status compute_unlimited(const comparison *c, mesh_input *p,
 /* The builder consumes the mesh, so it is read for each method. */
 static ebpo_status build_one(comparison *c, const char *mesh, int selection,
                              const plane_setting *setting, const char *path, bool unlimited,
-                             built *out, ebpo_error *error)
+                             build_result *out, ebpo_error *error)
 {
     ebpo_build_options build;
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
     ebpo_tree tree;
     mesh_input p;
-    ebpo_status status = mesh_input_read(&p, mesh, (repairing){ 0 }, READ_MESH, NULL,
+    ebpo_status status = mesh_input_read(&p, mesh, (repair_request){ 0 }, READ_MESH, NULL,
                                          (unsigned)c->v->threads, c->progress, error);
     if (status != EBPO_OK)
         return status;
@@ -173,7 +174,7 @@ static int build_method(comparison *c, const char *mesh, int selection,
 {
     char path[sizeof c->folder + 64];
     ebpo_error error = EBPO_ERROR_INIT;
-    built out = { 0 };
+    build_result out = { 0 };
     bool unlimited =
         c->v->unlimited && ebpo_selection_describe((ebpo_selection)selection)->from_leaves;
     snprintf(path, sizeof path, "%s/%s%s.ebpo.h5", c->folder, selection_words[selection],
@@ -181,7 +182,7 @@ static int build_method(comparison *c, const char *mesh, int selection,
     if (build_one(c, mesh, selection, setting, path, false, &out, &error) != EBPO_OK)
         return command_failed("report", &error);
     int code = add_file(c, path);
-    if (code != EXIT_FINE)
+    if (code != EXIT_OK)
         return code;
     method *m = &c->methods[c->count - 1];
     m->whole[OF_BUILD_SECONDS] = out.seconds;
@@ -189,7 +190,7 @@ static int build_method(comparison *c, const char *mesh, int selection,
         unlimited ? build_one(c, mesh, selection, setting, path, true, &out, &error) : EBPO_OK;
     m->unlimited = out.levels;
     m->unlimited_seconds = out.unlimited_seconds;
-    return status == EBPO_OK ? EXIT_FINE : command_failed("report", &error);
+    return status == EBPO_OK ? EXIT_OK : command_failed("report", &error);
 }
 
 static int settings_of(const comparison *c, int selection)
@@ -200,14 +201,14 @@ static int settings_of(const comparison *c, int selection)
 static int build_all(comparison *c, const char *mesh)
 {
     static const plane_setting none = { .percent = 40 };
-    int code = EXIT_FINE, count = 0;
+    int code = EXIT_OK, count = 0;
     for (int i = 0; selection_words[i]; i++)
         count += c->v->select >> i & 1 ? settings_of(c, i) : 0;
     if (count > METHODS_MAX)
         return refuse_method(
             "more than 12 methods; give fewer selections, or fewer numbers of planes", mesh);
     for (int i = 0; selection_words[i]; i++)
-        for (int k = 0; c->v->select >> i & 1 && k < settings_of(c, i) && code == EXIT_FINE; k++)
+        for (int k = 0; c->v->select >> i & 1 && k < settings_of(c, i) && code == EXIT_OK; k++)
             code = build_method(c, mesh, i,
                                 ebpo_selection_describe((ebpo_selection)i)->from_leaves
                                     ? &c->setting[k]
@@ -234,17 +235,17 @@ static int find_files(comparison *c, const char *const *operand)
         if (!is_hdf5)
             return build_all(c, operand[i]);
         int code = add_file(c, operand[i]);
-        if (code != EXIT_FINE)
+        if (code != EXIT_OK)
             return code;
     }
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
 int report_find_methods(comparison *c, const char *const *operand)
 {
     int code = find_files(c, operand);
     const ebpo_mesh_report *r = &c->methods->info.report;
-    if (code != EXIT_FINE)
+    if (code != EXIT_OK)
         return code;
     if (c->count > 1 && c->methods->info.source_name[0])
         report_stem(c->methods->info.source_name, c->model, sizeof c->model);
@@ -256,5 +257,5 @@ int report_find_methods(comparison *c, const char *const *operand)
                 c->first, comparison_last(c));
         return EXIT_USAGE;
     }
-    return EXIT_FINE;
+    return EXIT_OK;
 }

@@ -1,4 +1,5 @@
-/* Cuts files to a need, which is an error or a size, and compares the result with the request. */
+/* Makes subsets for a need, which is an error or a size, and compares the result with the request.
+ */
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -24,7 +25,7 @@ static ebpo_status cut_subset(const comparison *c, ebpo_file *file, const need_r
     return ebpo_subset(file, path, &options, error);
 }
 
-static ebpo_status measure_reach(const comparison *c, ebpo_model *model, const char *path,
+static ebpo_status measure_error(const comparison *c, ebpo_model *model, const char *path,
                                  need_result *n, ebpo_error *error)
 {
     ebpo_error_bound_options options = EBPO_ERROR_BOUND_OPTIONS_INIT;
@@ -32,7 +33,7 @@ static ebpo_status measure_reach(const comparison *c, ebpo_model *model, const c
     ebpo_error_bound far = EBPO_ERROR_BOUND_INIT;
     ebpo_file *file = NULL;
     options.samples = 0;
-    options.tolerance = 0.01; /* otherwise a bound that is kept would seem exceeded */
+    options.tolerance = 0.01; /* a larger tolerance could show an error above the requested one */
     options.threads = (unsigned)c->v->threads;
     options.progress = c->progress;
     ebpo_status status = ebpo_open(path, &file, error);
@@ -51,8 +52,8 @@ static ebpo_status measure_reach(const comparison *c, ebpo_model *model, const c
 
 /* Computes the error of the whole file. Leaves cannot be refined: no subset is closer than the last
  * level of the file, which --levels may have omitted. 0: not known. */
-static ebpo_status own_reach(const comparison *c, method *m, ebpo_file *file, ebpo_model *model,
-                             double *reach, ebpo_error *error)
+static ebpo_status file_error(const comparison *c, method *m, ebpo_file *file, ebpo_model *model,
+                              double *reach, ebpo_error *error)
 {
     ebpo_error_bound_options options = EBPO_ERROR_BOUND_OPTIONS_INIT;
     options.queries = REPORT_QUERIES;
@@ -69,11 +70,11 @@ static ebpo_status own_reach(const comparison *c, method *m, ebpo_file *file, eb
         options.at_most = far.hi;
     }
     *reach = status == EBPO_OK ? far.hi : 0;
-    return method_without(m, "Hausdorff distance", status, error);
+    return method_note_missing(m, "Hausdorff distance", status, error);
 }
 
-static ebpo_status one_need(comparison *c, method *m, ebpo_file *file, ebpo_model *model,
-                            need_kind kind, double requested, double own, ebpo_error *error)
+static ebpo_status measure_need(comparison *c, method *m, ebpo_file *file, ebpo_model *model,
+                                need_kind kind, double requested, double own, ebpo_error *error)
 {
     char path[sizeof c->folder + 16];
     need_result *n = &m->need[m->need_count];
@@ -83,7 +84,7 @@ static ebpo_status one_need(comparison *c, method *m, ebpo_file *file, ebpo_mode
     ebpo_status status = cut_subset(c, file, n, path, error);
     n->metric[OF_NEED_SECONDS] = 1e-9 * (double)(tool_clock() - begin);
     if (status == EBPO_OK)
-        status = measure_reach(c, model, path, n, error);
+        status = measure_error(c, model, path, n, error);
     unlink(path);
     n->metric[OF_NEED_RATIO] = kind == NEED_ERROR ? n->metric[OF_NEED_FAR_HI] / fmax(requested, own)
                                                   : n->metric[OF_NEED_BYTES] / requested;
@@ -92,19 +93,19 @@ static ebpo_status one_need(comparison *c, method *m, ebpo_file *file, ebpo_mode
     return status;
 }
 
-/* A need that cannot be met is noted and omitted. */
+/* Measures all needs. A need that cannot be met is omitted, with a note. */
 ebpo_status report_needs(comparison *c, method *m, ebpo_file *file, ebpo_model *model,
                          ebpo_error *error)
 {
     double own;
-    ebpo_status status = own_reach(c, m, file, model, &own, error);
+    ebpo_status status = file_error(c, m, file, model, &own, error);
     for (unsigned i = 0; i < NEEDS && status == EBPO_OK; i++) {
         bool by_error = i < NEEDS / 2;
         double requested =
             by_error ? errors[i] / 100 * c->diagonal
                      : floor(sizes[i - NEEDS / 2] / 100 * (double)c->methods[0].info.file_bytes);
-        status =
-            one_need(c, m, file, model, by_error ? NEED_ERROR : NEED_SIZE, requested, own, error);
+        status = measure_need(c, m, file, model, by_error ? NEED_ERROR : NEED_SIZE, requested, own,
+                              error);
         if (status == EBPO_E_MEMORY || status == EBPO_E_IO || status == EBPO_E_CANCELLED)
             return status;
         if (status != EBPO_OK)

@@ -13,7 +13,7 @@
 #include "cli/signals.h"
 #include "cli/words.h"
 
-static char being_made[4096]; /* for the signal handler */
+static char temporary_folder[4096]; /* for the signal handler */
 
 static int fail_output(int code, const char *path, const char *what)
 {
@@ -52,7 +52,7 @@ static bool is_selection_file(const char *name)
 }
 
 /* Returns true for the file names of a report; other files belong to the user. */
-static bool is_ours(const char *folder, const char *name)
+static bool is_report_file(const char *folder, const char *name)
 {
     char path[8192];
     struct stat st;
@@ -90,7 +90,7 @@ static int check_folder(const char *place, DIR *folder, const char *const *opera
                      name);
             return fail_output(EXIT_USAGE, place, text);
         }
-        if (!is_ours(place, name)) {
+        if (!is_report_file(place, name)) {
             snprintf(text, sizeof text,
                      "is a folder with other files than a report, '%.255s'; give another one "
                      "with -o",
@@ -102,14 +102,14 @@ static int check_folder(const char *place, DIR *folder, const char *const *opera
         return fail_output(
             EXIT_FAILED, place,
             "is a folder without report.json, so it may be no report; give another one with -o");
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
-static int place_is_free(const char *place, const char *const *operand)
+static int check_place(const char *place, const char *const *operand)
 {
     struct stat st;
     if (lstat(place, &st) != 0)
-        return errno == ENOENT ? EXIT_FINE : fail_output(EXIT_FAILED, place, strerror(errno));
+        return errno == ENOENT ? EXIT_OK : fail_output(EXIT_FAILED, place, strerror(errno));
     DIR *folder = S_ISDIR(st.st_mode) ? opendir(place) : NULL;
     if (!folder)
         return fail_output(EXIT_FAILED, place,
@@ -127,7 +127,7 @@ static bool remove_folder(const char *folder, bool ours_only)
     if (!d)
         return false;
     for (struct dirent *entry; (entry = readdir(d));)
-        if (!is_dot(entry->d_name) && (!ours_only || is_ours(folder, entry->d_name))) {
+        if (!is_dot(entry->d_name) && (!ours_only || is_report_file(folder, entry->d_name))) {
             snprintf(path, sizeof path, "%s/%s", folder, entry->d_name);
             unlink(path);
         }
@@ -138,32 +138,32 @@ static bool remove_folder(const char *folder, bool ours_only)
 /* Called in a signal handler: only async-signal-safe calls. Names are known in advance. */
 static void abandon_file(const char *stem, const char *ending)
 {
-    size_t length = strlen(being_made);
-    being_made[length] = '/';
-    strcpy(being_made + length + 1, stem);
-    strcat(being_made, ending);
-    unlink(being_made);
-    being_made[length] = 0;
+    size_t length = strlen(temporary_folder);
+    temporary_folder[length] = '/';
+    strcpy(temporary_folder + length + 1, stem);
+    strcat(temporary_folder, ending);
+    unlink(temporary_folder);
+    temporary_folder[length] = 0;
 }
 
 static void abandon_files(void)
 {
-    if (!being_made[0])
+    if (!temporary_folder[0])
         return;
     for (int i = 0; fixed_names[i]; i++)
         abandon_file(fixed_names[i], "");
     for (int i = 0; selection_words[i]; i++)
         abandon_file(selection_words[i], MODEL_ENDING);
     abandon_file("need", MODEL_ENDING); /* a trial of report_needs.c */
-    rmdir(being_made);
+    rmdir(temporary_folder);
 }
 
 /* When memory for listing the folder is short, removes the files of a report by name. */
-void output_drop(const char *folder)
+void output_remove(const char *folder)
 {
     if (folder[0] && !remove_folder(folder, false))
         abandon_files();
-    being_made[0] = 0;
+    temporary_folder[0] = 0;
 }
 
 /* Uses a hidden name, as an existing report may be in the way, which the library would refuse. */
@@ -181,15 +181,15 @@ static bool make_folder(const char *place, size_t length, char *folder, size_t c
                                 ? error.message + strlen(hidden) + 2 /* and ": " */
                                 : error.message;
         return fail_output(EXIT_FAILED, access(hidden, F_OK) == 0 ? hidden : place, cause) ==
-               EXIT_FINE;
+               EXIT_OK;
     }
-    bool fits = strlen(making) < capacity && strlen(making) < sizeof being_made - 300;
+    bool fits = strlen(making) < capacity && strlen(making) < sizeof temporary_folder - 300;
     if (fits)
         memcpy(folder, making, strlen(making) + 1);
     else
         rmdir(making);
     free(making);
-    return fits || fail_output(EXIT_USAGE, place, "the name is too long") == EXIT_FINE;
+    return fits || fail_output(EXIT_USAGE, place, "the name is too long") == EXIT_OK;
 }
 
 int output_begin(const char *place, const char *const *operand, char *folder, size_t capacity)
@@ -198,21 +198,21 @@ int output_begin(const char *place, const char *const *operand, char *folder, si
     while (length > 1 && place[length - 1] == '/')
         length--;
     folder[0] = 0;
-    if (length + 80 > capacity || length + 400 > sizeof being_made)
+    if (length + 80 > capacity || length + 400 > sizeof temporary_folder)
         return fail_output(EXIT_USAGE, place, "the name is too long");
-    int code = place_is_free(place, operand);
-    if (code != EXIT_FINE)
+    int code = check_place(place, operand);
+    if (code != EXIT_OK)
         return code;
     if (!make_folder(place, length, folder, capacity))
         return EXIT_FAILED;
     chmod(folder, 0755);
-    memcpy(being_made, folder, strlen(folder) + 1);
+    memcpy(temporary_folder, folder, strlen(folder) + 1);
     signals_also(abandon_files);
-    return EXIT_FINE;
+    return EXIT_OK;
 }
 
-/* Reports other files that were added to the replaced report meanwhile. */
-static bool report_rest(const char *older)
+/* Reports files of the user that were added to the replaced report meanwhile. */
+static bool report_other_files(const char *older)
 {
     if (!remove_folder(older, true))
         fprintf(stderr, "ebpo report: warning: other files of the replaced report are now in %s\n",
@@ -232,8 +232,8 @@ bool output_commit(const char *place, const char *folder)
     errno = 0;
 #ifdef EBPO_HAVE_RENAMEAT2
     if (renameat2(AT_FDCWD, folder, AT_FDCWD, target, RENAME_EXCHANGE) == 0) {
-        being_made[0] = 0;
-        return report_rest(folder);
+        temporary_folder[0] = 0;
+        return report_other_files(folder);
     }
 #endif
     snprintf(older, sizeof older, "%s.old", folder);
@@ -244,6 +244,6 @@ bool output_commit(const char *place, const char *folder)
             fprintf(stderr, "ebpo report: the replaced report is now %s\n", older);
         return false;
     }
-    being_made[0] = 0;
-    return !moved || report_rest(older);
+    temporary_folder[0] = 0;
+    return !moved || report_other_files(older);
 }

@@ -15,6 +15,6 @@ int output_begin(const char *place, const char *const *operand, char *folder, si
  * reported on stderr. */
 bool output_commit(const char *place, const char *folder);
 /* Removes the folder and its contents, if it exists. */
-void output_drop(const char *folder);
+void output_remove(const char *folder);
 
 #endif

@@ -29,8 +29,8 @@ static ebpo_status no_memory(ebpo_error *error)
     return error->status = EBPO_E_MEMORY;
 }
 
-/* The same picture on black and on white gives the coverage of each pixel. */
-static void make_see_through(const picture *black, const picture *white, uint8_t *rgba)
+/* Computes a picture with opacity from the same picture on black and on white. */
+static void make_transparent(const picture *black, const picture *white, uint8_t *rgba)
 {
     for (size_t i = 0; i < (size_t)black->width * (size_t)black->height; i++) {
         int opacity = 255;
@@ -62,7 +62,7 @@ static ebpo_status draw_picture(const comparison *c, const ebpo_mesh *mesh, cons
                      ? raster_draw(&on[i], 0, 0, width, height, view, mesh, style, threads, error)
                      : no_memory(error);
     if (status == EBPO_OK) {
-        make_see_through(&on[0], &on[1], rgba);
+        make_transparent(&on[0], &on[1], rgba);
         status = picture_encode_png(rgba, width, height, 4, "picture", &png, &size, error);
     }
     if (status == EBPO_OK && !(*uri = picture_data_uri(png, size)))
@@ -135,14 +135,14 @@ static ebpo_status draw_level(const comparison *c, ebpo_file *file, int level, c
     return status;
 }
 
-static ebpo_status one_method(comparison *c, method *m, ebpo_file *file, const camera *view,
-                              ebpo_error *error)
+static ebpo_status draw_method(comparison *c, method *m, ebpo_file *file, const camera *view,
+                               ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (int i = c->first;
          i <= method_last(c, m) && i < c->first + LEVELS_DRAWN && status == EBPO_OK; i++)
         status = draw_level(c, file, i, view, &m->picture[i], error);
-    return method_without(m, "pictures", status, error);
+    return method_note_missing(m, "pictures", status, error);
 }
 
 static ebpo_status draw_portrait(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
@@ -160,7 +160,7 @@ static ebpo_status draw_portrait(comparison *c, method *m, ebpo_file *file, ebpo
                               &c->portrait, error);
     }
     ebpo_mesh_free(&mesh);
-    return method_without(m, "picture of the model", status, error);
+    return method_note_missing(m, "picture of the model", status, error);
 }
 
 ebpo_status report_pictures(comparison *c, ebpo_error *error)
@@ -177,7 +177,7 @@ ebpo_status report_pictures(comparison *c, ebpo_error *error)
     for (int i = 0; i < c->count && status == EBPO_OK; i++) {
         if (c->progress.report)
             c->progress.report(c->progress.user, "pictures", (uint64_t)i, (uint64_t)c->count);
-        status = one_method(c, &c->methods[i], file[i], &view, error);
+        status = draw_method(c, &c->methods[i], file[i], &view, error);
     }
     for (int i = 0; i < c->count; i++)
         ebpo_close(file[i]);

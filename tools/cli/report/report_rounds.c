@@ -7,7 +7,7 @@
 
 /* --- reading a level --- */
 
-static ebpo_status have_level(const comparison *c, const method *m, int level, double *seconds,
+static ebpo_status read_level(const comparison *c, const method *m, int level, double *seconds,
                               traffic *t, ebpo_error *error)
 {
     ebpo_stream_options wanted = EBPO_STREAM_OPTIONS_INIT;
@@ -34,11 +34,11 @@ static ebpo_status have_level(const comparison *c, const method *m, int level, d
     return status;
 }
 
-static ebpo_status time_having(comparison *c, method *m, int round, ebpo_error *error)
+static ebpo_status time_reading(comparison *c, method *m, int round, ebpo_error *error)
 {
     traffic t = { 0 };
     for (int i = c->first; i <= method_last(c, m); i++) {
-        ebpo_status status = have_level(c, m, i, &m->round[round].have[i], &t, error);
+        ebpo_status status = read_level(c, m, i, &m->round[round].reading[i], &t, error);
         if (status != EBPO_OK)
             return status;
         m->level[i][OF_READ_BYTES] = (double)t.bytes;
@@ -55,7 +55,7 @@ ebpo_status report_round(comparison *c, method *m, int round, ebpo_error *error)
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
     ebpo_file *file = NULL;
     ebpo_model *model = NULL;
-    ebpo_status status = time_having(c, m, round, error);
+    ebpo_status status = time_reading(c, m, round, error);
     options.threads = (unsigned)c->v->threads;
     if (status == EBPO_OK)
         status = remote_open(&file, m->path, &c->v->remote, error);
@@ -84,10 +84,10 @@ static double median_of_rounds(double a, double b, double c)
     return isnan(a) || isnan(b) || isnan(c) ? NAN : quantile_of(v, ROUNDS, 0.5);
 }
 
-void report_settle(const comparison *c, method *m)
+void report_medians(const comparison *c, method *m)
 {
     for (int i = c->first; i <= method_last(c, m); i++) {
-        m->level[i][OF_HAVE_SECONDS] = MEDIAN(have[i]);
+        m->level[i][OF_READING_SECONDS] = MEDIAN(reading[i]);
         m->level[i][OF_INSIDE_NS] = MEDIAN(inside[i]);
         m->level[i][OF_DISTANCE_NS] = MEDIAN(distance[i]);
     }

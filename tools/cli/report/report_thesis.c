@@ -13,16 +13,16 @@
 
 enum { NORMAL_SPAN = 1023 }; /* -511 .. 511 */
 
-typedef struct sent {
+typedef struct cost_state {
     ebpo_mesh mesh;
     uint8_t *normals, *faces, *vertices; /* bits: occurred before */
     /* [vertex_count] number of the last leaf with the vertex, from 1 */
     uint64_t *leaf_of;
     uint64_t leaves;
-} sent;
+} cost_state;
 
 /* Sets bit i; returns true when it was not set before. */
-static bool first_time(uint8_t *bits, uint64_t i)
+static bool mark_first(uint8_t *bits, uint64_t i)
 {
     bool before = bits[i >> 3] >> (i & 7) & 1;
     bits[i >> 3] |= (uint8_t)(1u << (i & 7));
@@ -31,7 +31,7 @@ static bool first_time(uint8_t *bits, uint64_t i)
 
 /* Returns the bytes of the planes of a cell. All cells have one shape, so equal integers are equal
  * directions at every level. */
-static double plane_costs(sent *s, const uint32_t *codes, uint64_t count)
+static double plane_bytes(cost_state *s, const uint32_t *codes, uint64_t count)
 {
     double sum = 0;
     for (uint64_t i = 0; i < count; i++) {
@@ -40,39 +40,39 @@ static double plane_costs(sent *s, const uint32_t *codes, uint64_t count)
             continue;
         uint64_t key =
             ((uint64_t)(n[0] + 511) * NORMAL_SPAN + (uint64_t)(n[1] + 511)) * 2 + (n[2] < 0);
-        sum += 4 + (first_time(s->normals, key) ? 16 : 4);
+        sum += 4 + (mark_first(s->normals, key) ? 16 : 4);
     }
     return sum;
 }
 
-static double face_costs(sent *s, uint64_t face)
+static double face_bytes(cost_state *s, uint64_t face)
 {
-    double sum = first_time(s->faces, face) ? 12 : 4;
+    double sum = mark_first(s->faces, face) ? 12 : 4;
     for (int k = 0; k < 3; k++) {
         uint32_t v = s->mesh.faces[3 * face + (unsigned)k];
         if (s->leaf_of[v] == s->leaves)
             continue; /* belongs to another face of this leaf */
         s->leaf_of[v] = s->leaves;
-        sum += first_time(s->vertices, v) ? 12 : 4;
+        sum += mark_first(s->vertices, v) ? 12 : 4;
     }
     return sum;
 }
 
-static double leaf_costs(sent *s, const ebpo_level *l)
+static double leaf_bytes(cost_state *s, const ebpo_level *l)
 {
     double sum = (double)l->leaf_count;
     uint64_t ref = 0;
     for (uint64_t i = 0; i < l->leaf_count; i++) {
         s->leaves++;
         for (uint32_t k = 0; k < l->leaf_new[i]; k++)
-            sum += face_costs(s, l->leaf_first[i] + k);
+            sum += face_bytes(s, l->leaf_first[i] + k);
         for (uint32_t k = 0; k < l->leaf_ref_count[i]; k++)
-            sum += face_costs(s, l->leaf_refs[ref++]);
+            sum += face_bytes(s, l->leaf_refs[ref++]);
     }
     return sum;
 }
 
-static bool begin_counting(sent *s)
+static bool begin_counting(cost_state *s)
 {
     s->normals = calloc((size_t)NORMAL_SPAN * NORMAL_SPAN * 2 / 8 + 1, 1);
     s->faces = calloc(s->mesh.face_count / 8 + 1, 1);
@@ -81,7 +81,8 @@ static bool begin_counting(sent *s)
     return s->normals && s->faces && s->vertices && s->leaf_of;
 }
 
-static ebpo_status add_up(comparison *c, method *m, ebpo_file *file, sent *s, ebpo_error *error)
+static ebpo_status sum_costs(comparison *c, method *m, ebpo_file *file, cost_state *s,
+                             ebpo_error *error)
 {
     double sum = 0;
     for (int i = 0; i <= method_last(c, m); i++) {
@@ -90,8 +91,8 @@ static ebpo_status add_up(comparison *c, method *m, ebpo_file *file, sent *s, eb
         ebpo_status status = ebpo_file_read_level(file, i, &read, &l, error);
         if (status != EBPO_OK)
             return status;
-        double cost = plane_costs(s, l.planes, l.plane_count) +
-                      plane_costs(s, l.leaf_planes, l.leaf_plane_count) + leaf_costs(s, &l);
+        double cost = plane_bytes(s, l.planes, l.plane_count) +
+                      plane_bytes(s, l.leaf_planes, l.leaf_plane_count) + leaf_bytes(s, &l);
         ebpo_level_free(&l);
         sum += cost;
         if (i < c->first)
@@ -104,7 +105,7 @@ static ebpo_status add_up(comparison *c, method *m, ebpo_file *file, sent *s, eb
 
 ebpo_status report_thesis(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
 {
-    sent s = { .leaves = 0 };
+    cost_state s = { .leaves = 0 };
     if (m->info.pruned) {
         method_note(m, "theses' cost model", "is that of a whole tree; this file is a subset");
         return EBPO_OK;
@@ -117,11 +118,11 @@ ebpo_status report_thesis(comparison *c, method *m, ebpo_file *file, ebpo_error 
         status = error->status = EBPO_E_MEMORY;
     }
     if (status == EBPO_OK)
-        status = add_up(c, m, file, &s, error);
+        status = sum_costs(c, m, file, &s, error);
     free(s.normals);
     free(s.faces);
     free(s.vertices);
     free(s.leaf_of);
     ebpo_mesh_free(&s.mesh);
-    return method_without(m, "theses' cost model", status, error);
+    return method_note_missing(m, "theses' cost model", status, error);
 }

@@ -50,7 +50,7 @@ static void print_unlimited(json *j, const method *m)
     json_end(j);
 }
 
-static void one_method(json *j, const comparison *c, const method *m)
+static void print_method(json *j, const comparison *c, const method *m)
 {
     json_object(j, NULL);
     json_text(j, "name", m->name);
@@ -161,7 +161,7 @@ void report_to_json(FILE *out, const comparison *c, bool in_page)
     json_end(&j);
     json_array(&j, "methods");
     for (int i = 0; i < c->count; i++)
-        one_method(&j, c, &c->methods[i]);
+        print_method(&j, c, &c->methods[i]);
     json_end(&j);
     json_finish(&j);
 }

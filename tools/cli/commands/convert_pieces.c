@@ -1,5 +1,6 @@
-/* Implements ebpo convert --split-components and --split-groups: a folder with one model for each
- * part, and a scene of them. */
+/* Implements ebpo convert --split-components and --split-groups. The pieces of the mesh are its
+ * components or groups. The output is a folder with one model for each piece, and a scene of these
+ * models. */
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,7 +11,7 @@
 #include <ebpo/groups.h>
 
 #include "cli/command.h"
-#include "cli/commands/convert_parts.h"
+#include "cli/commands/convert_pieces.h"
 #include "cli/json.h"
 #include "cli/mesh_advice.h"
 #include "cli/mesh_findings.h"
@@ -19,11 +20,11 @@
 #include "cli/signals.h"
 #include "cli/words.h"
 
-/* --- names of parts --- */
+/* --- names of pieces --- */
 
-enum { PART_NAME_SIZE = 96, PART_SHOWN_SIZE = 256 };
+enum { NAME_SIZE = 96, SHOWN_SIZE = 256 };
 
-enum { OWN_IN_FILE = 40, SPELT_MAX = 220 };
+enum { OWN_NAME_MAX = 40, SPELT_MAX = 220 };
 
 static bool is_safe(char c)
 {
@@ -33,27 +34,27 @@ static bool is_safe(char c)
 
 /* Writes "KIND-NUMBER-NAME", with letters, digits, '-' and '_' only. The number has `digits` digits
  * and makes the name unique. `own`: the NAME; NULL: none. */
-static void part_file_name(char out[PART_NAME_SIZE], const char *kind, int digits, uint64_t number,
-                           const char *own)
+static void piece_file_name(char out[NAME_SIZE], const char *kind, int digits, uint64_t number,
+                            const char *own_name)
 {
-    size_t size = (size_t)snprintf(out, PART_NAME_SIZE, "%s-%0*llu", kind, digits,
-                                   (unsigned long long)number);
-    if (!own || !*own || size + OWN_IN_FILE + 2 > PART_NAME_SIZE)
+    size_t size =
+        (size_t)snprintf(out, NAME_SIZE, "%s-%0*llu", kind, digits, (unsigned long long)number);
+    if (!own_name || !*own_name || size + OWN_NAME_MAX + 2 > NAME_SIZE)
         return;
     out[size++] = '-';
-    for (int i = 0; own[i] && i < OWN_IN_FILE; i++)
-        out[size++] = is_safe(own[i]) ? own[i] : '_';
+    for (int i = 0; own_name[i] && i < OWN_NAME_MAX; i++)
+        out[size++] = is_safe(own_name[i]) ? own_name[i] : '_';
     out[size] = 0;
 }
 
 /* Returns true for words that select many instances. */
-static bool is_selector(const char *own)
+static bool is_selector(const char *own_name)
 {
-    return strcmp(own, "*") == 0 || strncmp(own, "layer:", 6) == 0 ||
-           strncmp(own, "group:", 6) == 0;
+    return strcmp(own_name, "*") == 0 || strncmp(own_name, "layer:", 6) == 0 ||
+           strncmp(own_name, "group:", 6) == 0;
 }
 
-/* Returns the bytes of the character there; 0: not allowed in a scene. */
+/* Returns the number of bytes of the character at `s`; 0: not allowed in a scene. */
 static int plain_length(const char *s)
 {
     unsigned char c = (unsigned char)*s;
@@ -62,12 +63,12 @@ static int plain_length(const char *s)
 
 /* Returns true when a scene can have this name: 1 to 255 bytes of UTF-8 without control characters
  * and no selector. */
-static bool part_name_fits(const char *own)
+static bool is_scene_name(const char *own_name)
 {
-    size_t size = strnlen(own, PART_SHOWN_SIZE);
-    if (size == 0 || size >= PART_SHOWN_SIZE || is_selector(own))
+    size_t size = strnlen(own_name, SHOWN_SIZE);
+    if (size == 0 || size >= SHOWN_SIZE || is_selector(own_name))
         return false;
-    for (const char *s = own; *s;) {
+    for (const char *s = own_name; *s;) {
         int length = plain_length(s);
         if (length == 0)
             return false;
@@ -77,17 +78,18 @@ static bool part_name_fits(const char *own)
 }
 
 /* For qsort of pointers to names. */
-static int part_compare_names(const void *a, const void *b)
+static int compare_names(const void *a, const void *b)
 {
     return strcmp(*(const char *const *)a, *(const char *const *)b);
 }
 
-/* Writes each byte that is not allowed as \xNN, as far as it fits. */
-static size_t spell_name(char *out, const char *own)
+/* Writes the name, with each byte that is not allowed as \xNN; truncated if it is too long. Returns
+ * the length. */
+static size_t spell_name(char *out, const char *own_name)
 {
     size_t size = 0;
-    bool first = is_selector(own);
-    for (const char *s = own; *s && size + 4 <= SPELT_MAX; first = false) {
+    bool first = is_selector(own_name);
+    for (const char *s = own_name; *s && size + 4 <= SPELT_MAX; first = false) {
         int length = first ? 0 : plain_length(s);
         if (length)
             memcpy(out + size, s, (size_t)length);
@@ -99,106 +101,105 @@ static size_t spell_name(char *out, const char *own)
     return size;
 }
 
-/* Writes the name of the group when a scene can have this name, else a derived name with a number.
- * `taken`: sorted names that are used unchanged. */
-static void part_shown_name(char out[PART_SHOWN_SIZE], const char *own, uint64_t number,
-                            const char *const *taken, uint64_t taken_count)
+/* Writes the name of a group in the scene: the group's own name if a scene can have it, else a
+ * derived name with a number. `taken`: sorted names that are used unchanged. */
+static void write_shown_name(char out[SHOWN_SIZE], const char *own_name, uint64_t number,
+                             const char *const *taken, uint64_t taken_count)
 {
-    if (part_name_fits(own)) {
-        snprintf(out, PART_SHOWN_SIZE, "%s", own);
+    if (is_scene_name(own_name)) {
+        snprintf(out, SHOWN_SIZE, "%s", own_name);
         return;
     }
-    size_t size = spell_name(out, own);
-    size +=
-        (size_t)snprintf(out + size, PART_SHOWN_SIZE - size, " #%llu", (unsigned long long)number);
-    while (size + 1 < PART_SHOWN_SIZE &&
-           bsearch(&out, taken, taken_count, sizeof *taken, part_compare_names)) {
+    size_t size = spell_name(out, own_name);
+    size += (size_t)snprintf(out + size, SHOWN_SIZE - size, " #%llu", (unsigned long long)number);
+    while (size + 1 < SHOWN_SIZE &&
+           bsearch(&out, taken, taken_count, sizeof *taken, compare_names)) {
         out[size++] = '#';
         out[size] = 0;
     }
 }
 
-/* Words for a kind of parts. */
-typedef struct part_kind {
-    const char *one, *many, *scene, *building, *too_many;
-} part_kind;
+/* Words for a kind of pieces. */
+typedef struct piece_kind {
+    const char *singular, *plural, *scene, *building, *too_many;
+} piece_kind;
 
-static const part_kind components = { "component", "components", "components.scene.json",
-                                      "building components",
-                                      "; merge vertices at the same position with --weld" },
-                       groups = { "group", "groups", "groups.scene.json", "building groups", "" };
+static const piece_kind components = { "component", "components", "components.scene.json",
+                                       "building components",
+                                       "; merge vertices at the same position with --weld" },
+                        groups = { "group", "groups", "groups.scene.json", "building groups", "" };
 
-enum { PARTS_MAX = 100000, ENDING_SIZE = 16 };
+enum { PIECES_MAX = 100000, ENDING_SIZE = 16 };
 
-/* Facts of a part, as it is on the disk. */
-typedef struct part {
-    char name[PART_NAME_SIZE], file[PART_NAME_SIZE + ENDING_SIZE];
+/* Facts of a piece, as in its file. */
+typedef struct piece {
+    char name[NAME_SIZE], file[NAME_SIZE + ENDING_SIZE];
     char *shown; /* in the scene: the name of the group; NULL: `name` */
     ebpo_component facts;
     bool solid;
     int levels;
     uint64_t bytes;
     char digest[65];
-} part;
+} piece;
 
-typedef struct writing {
-    const parts_run *run;
-    const part_kind *kind;
+typedef struct piece_writer {
+    const pieces_run *run;
+    const piece_kind *kind;
     mesh_input *whole;
     ebpo_components *components;
-    part *parts;
+    piece *pieces;
     uint64_t count, faces_done;
-} writing;
+} piece_writer;
 
 /* ---- the folder ---- */
 
-/* Also removed by a signal handler. */
-static char *making;
+/* The temporary folder, which a signal handler may also remove. */
+static char *making_folder;
 static int making_fd = -1;
-static part *volatile made;
+static piece *volatile made_pieces;
 static volatile uint64_t made_count;
 static const char *scene_name; /* scene that is being made */
 
-/* Uses only async-signal-safe calls. The folder stays once it has its final name. */
-static void remove_all(void)
+/* Removes the temporary folder, unless it has its final name. Uses only async-signal-safe calls. */
+static void remove_folder(void)
 {
-    if (!making || access(making, F_OK) != 0)
+    if (!making_folder || access(making_folder, F_OK) != 0)
         return;
     for (uint64_t i = 0; i < made_count; i++)
-        unlinkat(making_fd, made[i].file, 0);
+        unlinkat(making_fd, made_pieces[i].file, 0);
     unlinkat(making_fd, scene_name, 0);
-    rmdir(making);
+    rmdir(making_folder);
 }
 
-ebpo_status parts_begin(const char *folder, bool of_groups, ebpo_error *error)
+ebpo_status pieces_begin(const char *folder, bool of_groups, ebpo_error *error)
 {
     scene_name = (of_groups ? &groups : &components)->scene;
-    ebpo_status status = ebpo_folder_begin(folder, &making, error);
+    ebpo_status status = ebpo_folder_begin(folder, &making_folder, error);
     if (status != EBPO_OK)
         return status;
-    making_fd = open(making, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    signals_also(remove_all);
+    making_fd = open(making_folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    signals_also(remove_folder);
     return EBPO_OK;
 }
 
-void parts_end(void)
+void pieces_end(void)
 {
-    remove_all();
+    remove_folder();
     signals_also(NULL);
     if (making_fd >= 0)
         close(making_fd);
-    free(making);
-    making = NULL;
+    free(making_folder);
+    making_folder = NULL;
     making_fd = -1;
-    free(made);
-    made = NULL;
+    free(made_pieces);
+    made_pieces = NULL;
     made_count = 0;
 }
 
-static void free_names(const writing *w)
+static void free_names(const piece_writer *w)
 {
     for (uint64_t i = 0; i < w->count; i++)
-        free(w->parts[i].shown);
+        free(w->pieces[i].shown);
 }
 
 static ebpo_status no_memory(ebpo_error *error)
@@ -210,101 +211,102 @@ static ebpo_status no_memory(ebpo_error *error)
 
 static char *path_of(const char *name)
 {
-    size_t size = strlen(making) + strlen(name) + 2;
+    size_t size = strlen(making_folder) + strlen(name) + 2;
     char *path = malloc(size);
     if (path)
-        snprintf(path, size, "%s/%s", making, name);
+        snprintf(path, size, "%s/%s", making_folder, name);
     return path;
 }
 
-/* ---- parts ---- */
+/* ---- pieces ---- */
 
-static ebpo_status too_many(const writing *w, ebpo_error *error)
+static ebpo_status too_many(const piece_writer *w, ebpo_error *error)
 {
     error->status = EBPO_E_LIMIT;
     snprintf(error->message, sizeof error->message, "%s: has %llu %s, and at most %d are written%s",
              w->whole->as_read.source_name,
-             (unsigned long long)ebpo_components_count(w->components), w->kind->many, PARTS_MAX,
+             (unsigned long long)ebpo_components_count(w->components), w->kind->plural, PIECES_MAX,
              w->kind->too_many);
     return EBPO_E_LIMIT;
 }
 
 /* Numbers have as many digits as the last one, so that names sort. */
-static ebpo_status name_part(const writing *w, uint64_t i, int digits, ebpo_error *error)
+static ebpo_status name_piece(const piece_writer *w, uint64_t i, int digits, ebpo_error *error)
 {
-    part *p = &w->parts[i];
+    piece *p = &w->pieces[i];
     ebpo_mesh_group group = EBPO_MESH_GROUP_INIT;
     ebpo_status status = EBPO_OK;
     if (w->run->groups)
         status = ebpo_mesh_groups_get(w->run->groups, i, &group, error);
-    part_file_name(p->name, w->kind->one, digits, i, group.name);
+    piece_file_name(p->name, w->kind->singular, digits, i, group.name);
     snprintf(p->file, sizeof p->file, "%s.ebpo.h5", p->name);
     p->facts = (ebpo_component)EBPO_COMPONENT_INIT;
     return status == EBPO_OK ? ebpo_components_get(w->components, i, &p->facts, error) : status;
 }
 
 /* Sets the names of groups in the scene. */
-static ebpo_status show_names(const writing *w, ebpo_error *error)
+static ebpo_status show_names(const piece_writer *w, ebpo_error *error)
 {
-    const char **own = calloc(w->count, sizeof *own), **taken = calloc(w->count, sizeof *taken);
+    const char **own_name = calloc(w->count, sizeof *own_name),
+               **taken = calloc(w->count, sizeof *taken);
     uint64_t count = 0;
-    ebpo_status status = own && taken ? EBPO_OK : no_memory(error);
+    ebpo_status status = own_name && taken ? EBPO_OK : no_memory(error);
     for (uint64_t i = 0; i < w->count && status == EBPO_OK; i++) {
         ebpo_mesh_group group = EBPO_MESH_GROUP_INIT;
         status = ebpo_mesh_groups_get(w->run->groups, i, &group, error);
-        own[i] = group.name;
-        if (status == EBPO_OK && part_name_fits(own[i]))
-            taken[count++] = own[i];
+        own_name[i] = group.name;
+        if (status == EBPO_OK && is_scene_name(own_name[i]))
+            taken[count++] = own_name[i];
     }
     if (status == EBPO_OK)
-        qsort(taken, count, sizeof *taken, part_compare_names);
+        qsort(taken, count, sizeof *taken, compare_names);
     for (uint64_t i = 0; i < w->count && status == EBPO_OK; i++) {
-        char name[PART_SHOWN_SIZE];
-        part_shown_name(name, own[i], i, taken, count);
-        w->parts[i].shown = strdup(name);
-        status = w->parts[i].shown ? EBPO_OK : no_memory(error);
+        char name[SHOWN_SIZE];
+        write_shown_name(name, own_name[i], i, taken, count);
+        w->pieces[i].shown = strdup(name);
+        status = w->pieces[i].shown ? EBPO_OK : no_memory(error);
     }
-    free(own);
+    free(own_name);
     free(taken);
     return status;
 }
 
-static ebpo_status name_parts(writing *w, ebpo_error *error)
+static ebpo_status name_pieces(piece_writer *w, ebpo_error *error)
 {
     uint64_t count = ebpo_components_count(w->components), most = 0;
-    if (count > PARTS_MAX)
+    if (count > PIECES_MAX)
         return too_many(w, error);
-    w->parts = calloc(count, sizeof *w->parts);
-    if (!w->parts)
+    w->pieces = calloc(count, sizeof *w->pieces);
+    if (!w->pieces)
         return no_memory(error);
     int digits = snprintf(NULL, 0, "%llu", (unsigned long long)count - 1);
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
-        status = name_part(w, i, digits, error);
-        most = w->parts[i].facts.face_count > most ? w->parts[i].facts.face_count : most;
+        status = name_piece(w, i, digits, error);
+        most = w->pieces[i].facts.face_count > most ? w->pieces[i].facts.face_count : most;
     }
     w->count = count;
-    made = w->parts;
+    made_pieces = w->pieces;
     made_count = count;
     if (status == EBPO_OK && w->run->groups)
         status = show_names(w, error);
     return status == EBPO_OK ? w->run->fits(w->run->user, most, error) : status;
 }
 
-static const char *shown_name(const part *p) { return p->shown ? p->shown : p->name; }
+static const char *shown_name(const piece *p) { return p->shown ? p->shown : p->name; }
 
 /* ---- files ---- */
 
-static bool report_part(void *user, const char *stage, uint64_t done, uint64_t total)
+static bool report_piece(void *user, const char *stage, uint64_t done, uint64_t total)
 {
-    const writing *w = user;
+    const piece_writer *w = user;
     const ebpo_progress *outer = &w->run->progress;
     (void)stage, (void)done, (void)total;
     return !outer->report ||
            outer->report(outer->user, w->kind->building, w->faces_done, w->whole->mesh.face_count);
 }
 
-static ebpo_status inspect_part(part *p, const char *path, ebpo_error *error)
+static ebpo_status inspect_piece(piece *p, const char *path, ebpo_error *error)
 {
     ebpo_file *file = NULL;
     ebpo_status status = remote_open_own(path, &file, error);
@@ -320,10 +322,11 @@ static ebpo_status inspect_part(part *p, const char *path, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Takes the mesh of a part and checks it. Repairs were made on the whole mesh before. */
-static ebpo_status take_mesh(const writing *w, uint64_t number, mesh_input *out, ebpo_error *error)
+/* Gets the mesh of a piece, and checks it. The whole mesh was repaired before. */
+static ebpo_status take_mesh(const piece_writer *w, uint64_t number, mesh_input *out,
+                             ebpo_error *error)
 {
-    ebpo_progress progress = { report_part, (void *)(uintptr_t)w };
+    ebpo_progress progress = { report_piece, (void *)(uintptr_t)w };
     *out = *w->whole;
     ebpo_status status = ebpo_components_mesh(w->components, number, &out->mesh, error);
     if (status == EBPO_OK)
@@ -337,31 +340,30 @@ static ebpo_status take_mesh(const writing *w, uint64_t number, mesh_input *out,
     return status;
 }
 
-static ebpo_status write_part(writing *w, uint64_t number, ebpo_error *error)
+static ebpo_status write_piece(piece_writer *w, uint64_t number, ebpo_error *error)
 {
-    ebpo_progress progress = { report_part, w };
-    mesh_input one;
-    char *path = path_of(w->parts[number].file);
+    ebpo_progress progress = { report_piece, w };
+    mesh_input piece_mesh;
+    char *path = path_of(w->pieces[number].file);
     if (!path)
         return no_memory(error);
-    ebpo_status status = take_mesh(w, number, &one, error);
-    if (status == EBPO_OK && w->run->groups) { /* the report of the whole mesh does not describe
-                                                * them */
+    ebpo_status status = take_mesh(w, number, &piece_mesh, error);
+    if (status == EBPO_OK && w->run->groups) { /* the whole mesh was reported, not its groups */
         progress_wipe(w->run->line);
-        advice_warn(stderr, "convert", shown_name(&w->parts[number]), &one);
+        advice_warn(stderr, "convert", shown_name(&w->pieces[number]), &piece_mesh);
     }
     if (status == EBPO_OK)
-        status = w->run->build(w->run->user, &one, path, progress, error);
+        status = w->run->build(w->run->user, &piece_mesh, path, progress, error);
     if (status == EBPO_OK)
-        status = inspect_part(&w->parts[number], path, error);
-    w->faces_done += w->parts[number].facts.face_count;
+        status = inspect_piece(&w->pieces[number], path, error);
+    w->faces_done += w->pieces[number].facts.face_count;
     free(path);
     return status;
 }
 
 /* ---- the scene ---- */
 
-static void print_scene(const writing *w, FILE *out)
+static void print_scene(const piece_writer *w, FILE *out)
 {
     json j;
     json_begin(&j, out);
@@ -371,23 +373,23 @@ static void print_scene(const writing *w, FILE *out)
         json_text(&j, "unit", w->run->unit);
     json_object(&j, "models");
     for (uint64_t i = 0; i < w->count; i++) {
-        json_object(&j, w->parts[i].name);
-        json_text(&j, "file", w->parts[i].file);
-        json_text(&j, "content_sha256", w->parts[i].digest);
+        json_object(&j, w->pieces[i].name);
+        json_text(&j, "file", w->pieces[i].file);
+        json_text(&j, "content_sha256", w->pieces[i].digest);
         json_end(&j);
     }
     json_end(&j);
     json_array(&j, "instances");
     for (uint64_t i = 0; i < w->count; i++) {
         json_object(&j, NULL);
-        json_text(&j, "name", shown_name(&w->parts[i]));
-        json_text(&j, "model", w->parts[i].name);
+        json_text(&j, "name", shown_name(&w->pieces[i]));
+        json_text(&j, "model", w->pieces[i].name);
         json_end(&j);
     }
     json_finish(&j);
 }
 
-static ebpo_status write_scene(const writing *w, ebpo_error *error)
+static ebpo_status write_scene(const piece_writer *w, ebpo_error *error)
 {
     char *text = NULL, *path = path_of(scene_name);
     size_t size = 0;
@@ -407,12 +409,12 @@ static ebpo_status write_scene(const writing *w, ebpo_error *error)
 
 /* ---- output ---- */
 
-static void print_words(const writing *w, double seconds)
+static void print_words(const piece_writer *w, double seconds)
 {
     char bytes[32];
     uint64_t sum = 0;
     for (uint64_t i = 0; i < w->count; i++) {
-        const part *p = &w->parts[i];
+        const piece *p = &w->pieces[i];
         sum += p->bytes;
         printf("%s: ", p->name);
         if (p->shown)
@@ -426,19 +428,19 @@ static void print_words(const writing *w, double seconds)
                p->levels - 1, words_bytes(bytes, sizeof bytes, p->bytes));
     }
     printf("%s: %llu %s, %s, in %.1f s\n", w->run->folder, (unsigned long long)w->count,
-           w->kind->many, words_bytes(bytes, sizeof bytes, sum), seconds);
+           w->kind->plural, words_bytes(bytes, sizeof bytes, sum), seconds);
 }
 
-static void print_json(const writing *w, double seconds)
+static void print_json(const piece_writer *w, double seconds)
 {
     json j;
     json_begin(&j, stdout);
     json_object(&j, NULL);
     json_text(&j, "folder", w->run->folder);
     json_text(&j, "scene", scene_name);
-    json_array(&j, w->kind->many);
+    json_array(&j, w->kind->plural);
     for (uint64_t i = 0; i < w->count; i++) {
-        const part *p = &w->parts[i];
+        const piece *p = &w->pieces[i];
         json_object(&j, NULL);
         json_text(&j, "name", p->name);
         if (p->shown)
@@ -467,17 +469,17 @@ static void print_json(const writing *w, double seconds)
 /* ---- all of it ---- */
 
 /* Reports groups without faces, which have no model. */
-static ebpo_status report_empty(const writing *w, ebpo_error *error)
+static ebpo_status report_empty(const piece_writer *w, ebpo_error *error)
 {
     uint64_t count = ebpo_mesh_groups_count(w->run->groups);
     if (count <= w->count)
         return EBPO_OK;
     ebpo_mesh_group group = EBPO_MESH_GROUP_INIT;
-    char first[PART_SHOWN_SIZE];
+    char first[SHOWN_SIZE];
     ebpo_status status = ebpo_mesh_groups_get(w->run->groups, w->count, &group, error);
     if (status != EBPO_OK)
         return status;
-    part_shown_name(first, group.name, w->count, NULL, 0);
+    write_shown_name(first, group.name, w->count, NULL, 0);
     progress_wipe(w->run->line);
     fprintf(stderr,
             "ebpo convert: %s: note: %llu of %llu groups have no faces, and no model: '%s'%s\n",
@@ -486,42 +488,42 @@ static ebpo_status report_empty(const writing *w, ebpo_error *error)
     return EBPO_OK;
 }
 
-static ebpo_status find_parts(writing *w, ebpo_error *error)
+static ebpo_status find_pieces(piece_writer *w, ebpo_error *error)
 {
-    const parts_run *run = w->run;
+    const pieces_run *run = w->run;
     return run->groups
                ? ebpo_components_of_groups(&w->whole->mesh, run->groups, &w->components, error)
                : ebpo_components_new(&w->whole->mesh, run->threads, run->progress, &w->components,
                                      error);
 }
 
-static ebpo_status write_all(writing *w, ebpo_error *error)
+static ebpo_status write_all(piece_writer *w, ebpo_error *error)
 {
-    const parts_run *run = w->run;
-    ebpo_status status = find_parts(w, error);
+    const pieces_run *run = w->run;
+    ebpo_status status = find_pieces(w, error);
     if (status == EBPO_OK)
-        status = name_parts(w, error);
+        status = name_pieces(w, error);
     if (status == EBPO_OK)
         status = report_empty(w, error);
     for (uint64_t i = 0; i < w->count && status == EBPO_OK; i++)
-        status = write_part(w, i, error);
+        status = write_piece(w, i, error);
     if (status == EBPO_OK)
         status = write_scene(w, error);
     if (status == EBPO_OK)
-        status = ebpo_folder_publish(making, run->folder, error);
+        status = ebpo_folder_publish(making_folder, run->folder, error);
     return status;
 }
 
-ebpo_status parts_write(const parts_run *run, mesh_input *whole, double begun, ebpo_error *error)
+ebpo_status pieces_write(const pieces_run *run, mesh_input *whole, double begun, ebpo_error *error)
 {
-    writing w = { .run = run, .kind = run->groups ? &groups : &components, .whole = whole };
+    piece_writer w = { .run = run, .kind = run->groups ? &groups : &components, .whole = whole };
     ebpo_status status = write_all(&w, error);
     ebpo_components_free(w.components);
     ebpo_mesh_free(&whole->mesh);
     if (status == EBPO_OK) {
         made_count = 0; /* the folder is complete, and is kept */
-        free(making);
-        making = NULL;
+        free(making_folder);
+        making_folder = NULL;
         progress_wipe(run->line);
         if (run->json)
             print_json(&w, progress_now() - begun);
