@@ -180,11 +180,11 @@ static bool first_facets(hull *h, const int c[4])
 
 /* Lists the edges of the visible facets as from << 16 | to in `edges`, and as to << 16 | from in
  * `reversed`. Returns their number. Pads `edges` to a multiple of four with invalid edges. */
-static int edges_of(const hull *h, const uint16_t *visible, int seen, uint32_t *edges,
+static int edges_of(const hull *h, const uint16_t *visible, int visible_count, uint32_t *edges,
                     uint32_t *reversed)
 {
     int listed = 0;
-    for (int i = 0; i < seen; i++) {
+    for (int i = 0; i < visible_count; i++) {
         const uint16_t *corner = h->corner[visible[i]];
         for (int e = 0; e < 3; e++) {
             uint32_t from = corner[e], to = corner[e == 2 ? 0 : e + 1];
@@ -227,25 +227,26 @@ static bool add_point(hull *h, int point)
     uint16_t visible[VISIBLE];
     uint32_t edges[3 * VISIBLE], reversed[3 * VISIBLE];
     const ebpo_sweep_planes planes = { h->nx, h->ny, h->nz, h->d, (h->count + 3) / 4 };
-    int seen = h->sweep->seen(&planes, h->p[point], h->tolerance, flat, visible, VISIBLE), made = 0,
-        count = h->count;
-    if (seen == 0)
+    int visible_count =
+            h->sweep->find_visible(&planes, h->p[point], h->tolerance, flat, visible, VISIBLE),
+        made = 0, count = h->count;
+    if (visible_count == 0)
         return true;
-    if (seen > VISIBLE)
+    if (visible_count > VISIBLE)
         return false;
-    int listed = edges_of(h, visible, seen, edges, reversed);
+    int listed = edges_of(h, visible, visible_count, edges, reversed);
     for (int i = 0; i < listed; i++) {
         if (has_edge(edges, (listed + 3) / 4, reversed[i]))
             continue;
-        if (made >= seen && count == h->capacity)
+        if (made >= visible_count && count == h->capacity)
             return false;
-        int index = made < seen ? visible[made] : count;
+        int index = made < visible_count ? visible[made] : count;
         if (!make_facet(h, index, (int)(edges[i] >> 16), (int)(edges[i] & 0xffff), point))
             continue;
-        count += made++ >= seen;
+        count += made++ >= visible_count;
     }
-    if (made < seen)
-        close_gaps(h, visible, made, seen, count);
+    if (made < visible_count)
+        close_gaps(h, visible, made, visible_count, count);
     else
         set_count(h, count);
     return true;

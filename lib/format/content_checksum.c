@@ -16,7 +16,8 @@
 #include "format/schema.h"
 #include "hdf5_read/coding.h"
 
-/* Faces of a chunk in a file without subtrees; number of chunks with subtrees that contain them. */
+/* Number of faces in a chunk of a file without subtrees, and number of chunks that contain as many
+ * faces in a file with subtrees. */
 enum { PLAIN_FACE_ROWS = 4096, SKIPPED = PLAIN_FACE_ROWS / EBPO_FACE_BLOCK };
 
 bool ebpo_content_has(const ebpo_info *info, ebpo_array_id id)

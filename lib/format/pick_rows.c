@@ -409,9 +409,9 @@ void ebpo_faces_hint(ebpo_chunks *chunks, const uint32_t *faces, uint64_t count,
     ebpo_hints e = EBPO_HINTS_INIT(chunks->file);
     bool *has = ebpo_input_prefetches(&chunks->file->in) ? chunks_of(array, faces, count) : NULL;
     for (uint64_t i = 0; has && i < number; i++) {
-        uint64_t first = chunks->seen ? chunks->seen[i] : 0,
-                 end = chunks->seen && i + 1 < number ? chunks->seen[i + 1]
-                                                      : chunks->file->info.vertex_count;
+        uint64_t first = chunks->vertices_before ? chunks->vertices_before[i] : 0,
+                 end = chunks->vertices_before && i + 1 < number ? chunks->vertices_before[i + 1]
+                                                                 : chunks->file->info.vertex_count;
         if (!has[i])
             continue;
         ebpo_chunks_hint(chunks, &e, EBPO_A_FACES, 0, i * rows, rows);
