@@ -32,7 +32,7 @@ uint32_t ebpo_array_list_number(ebpo_array_id id, int level)
                                        : TABLE_NUMBERS + (uint32_t)(id - EBPO_A_SUBTREE_INDEX);
 }
 
-static ebpo_array_id place_array(uint32_t number, int *level)
+static ebpo_array_id find_array(uint32_t number, int *level)
 {
     *level = 0;
     if (number < MESH_NUMBERS) {
@@ -361,7 +361,7 @@ static ebpo_status list_chunk(listing *l, uint32_t number, ebpo_chunk_location c
                               ebpo_error *error)
 {
     int level;
-    ebpo_array_id id = place_array(number, &level);
+    ebpo_array_id id = find_array(number, &level);
     if (id == EBPO_ARRAYS || (id == EBPO_A_ATTRIBUTE && level >= l->file->attributes.arrays))
         return EBPO_OK; /* a gap, an unknown part, or an unlisted array */
     ebpo_array_in *a = id < EBPO_LEVEL_ARRAYS   ? &l->file->level_array[level][id]
@@ -407,7 +407,7 @@ static ebpo_status end_array(listing *l, const ebpo_array_in *a, ebpo_error *err
                : list_fails(l->file, "the list has fewer chunks than", a->path, error);
 }
 
-static ebpo_status list_chunks(ebpo_file *file, const uint64_t *places, uint64_t count,
+static ebpo_status list_chunks(ebpo_file *file, const uint64_t *rows, uint64_t count,
                                ebpo_error *error)
 {
     listing *l = ebpo_alloc_zero(1, sizeof *l);
@@ -418,13 +418,13 @@ static ebpo_status list_chunks(ebpo_file *file, const uint64_t *places, uint64_t
     if (l)
         l->file = file;
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
-        if (ebpo_list_row_value(places[i]) > file->end - at)
+        if (ebpo_list_row_value(rows[i]) > file->end - at)
             status =
                 list_fails(file, "a chunk is beyond the end of the file in", "the list", error);
         else
-            status = list_chunk(l, ebpo_list_row_number(places[i]),
-                                (ebpo_chunk_location){ at, ebpo_list_row_value(places[i]) }, error);
-        at += ebpo_list_row_value(places[i]);
+            status = list_chunk(l, ebpo_list_row_number(rows[i]),
+                                (ebpo_chunk_location){ at, ebpo_list_row_value(rows[i]) }, error);
+        at += ebpo_list_row_value(rows[i]);
     }
     for (int i = 0; i < ebpo_all_arrays(file) && status == EBPO_OK; i++)
         status = end_array(l, ebpo_array_number(file, i), error);
@@ -447,11 +447,11 @@ static void discard_offsets(ebpo_file *file)
 static ebpo_status locate_by_list(ebpo_file *file, ebpo_error *error)
 {
     const ebpo_array_in *a = &file->root_array[EBPO_A_CHUNK_DIRECTORY];
-    uint64_t *places;
-    ebpo_status status = ebpo_long_chunk_read(file, a, &places, error);
+    uint64_t *rows;
+    ebpo_status status = ebpo_long_chunk_read(file, a, &rows, error);
     if (status == EBPO_OK)
-        status = list_chunks(file, places, a->shape.rows, error);
-    free(places);
+        status = list_chunks(file, rows, a->shape.rows, error);
+    free(rows);
     if (status != EBPO_OK)
         discard_offsets(file);
     return status == EBPO_OK ? ebpo_stored_check(file, error) : status;

@@ -228,8 +228,8 @@ void ebpo_hint_top(const ebpo_file *file)
     if (!ebpo_input_prefetches(&file->in) || !file->has_directory || atomic_load(&file->located) ||
         !is_top(info))
         return;
-    const ebpo_chunk_location *places = file->root_array[EBPO_A_CHUNK_DIRECTORY].chunks;
-    ebpo_range range[4] = { { places->address, places->bytes } };
+    const ebpo_chunk_location *directory = file->root_array[EBPO_A_CHUNK_DIRECTORY].chunks;
+    ebpo_range range[4] = { { directory->address, directory->bytes } };
     size_t count = 1;
     if (wants_checksums(file))
         range[count++] = where_checksums(file);

@@ -114,13 +114,13 @@ static void check_row(recount *c)
 static void count_faces(recount *c, uint64_t count)
 {
     const ebpo_mesh *mesh = &c->view->tree->mesh;
-    uint64_t seen = c->vertices;
+    uint64_t used = c->vertices;
     EBPO_FOR_ITEMS(c->view->workspace, i, 3 * c->faces, 3 * (c->faces + count))
-        seen += mesh->faces[i] == seen; /* a vertex of first use has the next index */
+        used += mesh->faces[i] == used; /* a vertex of first use has the next index */
     c->row[c->within ? FACES : FACES_BEFORE] += count;
-    c->row[c->within ? VERTICES : VERTICES_BEFORE] += seen - c->vertices;
+    c->row[c->within ? VERTICES : VERTICES_BEFORE] += used - c->vertices;
     c->faces += count;
-    c->vertices = seen;
+    c->vertices = used;
 }
 
 static void count_leaf(recount *c, const ebpo_reference_node *leaf, uint64_t *row)
