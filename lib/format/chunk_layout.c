@@ -533,14 +533,14 @@ static bool is_of_faces(ebpo_array_id id)
 static bool is_chosen(const choice *c, const ebpo_array_out *a)
 {
     bool of_level = a->id < EBPO_LEVEL_ARRAYS,
-         here = of_level && a->level >= c->first_level && a->level <= c->last_level,
+         in_range = of_level && a->level >= c->first_level && a->level <= c->last_level,
          index = of_level && ebpo_schema_is_index(a->id);
     switch (c->kind) {
-    case WHOLE: return here;
+    case WHOLE: return in_range;
     case TOP_INDEXES:
-        return (here && index) || a->id == EBPO_A_SUBTREE_INDEX || a->id == EBPO_A_FACES_INDEX;
-    case NODES: return here && !index && !is_of_faces(a->id);
-    case LISTS: return here && is_of_faces(a->id);
+        return (in_range && index) || a->id == EBPO_A_SUBTREE_INDEX || a->id == EBPO_A_FACES_INDEX;
+    case NODES: return in_range && !index && !is_of_faces(a->id);
+    case LISTS: return in_range && is_of_faces(a->id);
     /* query results contain source face indices, which are read together with the faces */
     case MESH:
         return a->id == EBPO_A_VERTICES || a->id == EBPO_A_FACES || a->id == EBPO_A_FACE_SOURCE;

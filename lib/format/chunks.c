@@ -549,13 +549,13 @@ ebpo_status ebpo_chunks_integers(ebpo_chunks *chunks, ebpo_array_id id, int leve
         status = ebpo_held_chunk_move(chunks, &view, row, error);
         if (status != EBPO_OK)
             break;
-        uint64_t here = view.end - row < rows ? view.end - row : rows;
+        uint64_t step = view.end - row < rows ? view.end - row : rows;
         widen_integers(&array->shape,
                        view.rows + (row - view.begin) * ebpo_shape_row_bytes(&array->shape),
-                       here * cols, out, size);
-        out += here * cols * size;
-        row += here;
-        rows -= here;
+                       step * cols, out, size);
+        out += step * cols * size;
+        row += step;
+        rows -= step;
     }
     ebpo_held_chunk_release(chunks, &view);
     return status;

@@ -147,9 +147,9 @@ static void digest_values(ebpo_content *content, int number, ebpo_workspace *wor
     ebpo_sha256 state;
     ebpo_sha256_begin(&state);
     EBPO_FOR_PIECES(workspace, at, count, PIECE / size) {
-        uint64_t here = count - at < PIECE / size ? count - at : PIECE / size;
-        ebpo_integers_encode(values + at * size, size, here, size, file);
-        ebpo_sha256_add(&state, file, here * size);
+        uint64_t step = count - at < PIECE / size ? count - at : PIECE / size;
+        ebpo_integers_encode(values + at * size, size, step, size, file);
+        ebpo_sha256_add(&state, file, step * size);
     }
     ebpo_sha256_end(&state, digest);
     ebpo_attribute_path(number, path);

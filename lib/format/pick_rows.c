@@ -483,9 +483,9 @@ static ebpo_status sort_rows(const gathering *g, uint64_t count, uint64_t *begin
         begin[g->rows[i] / chunk_rows]++;
     }
     for (uint64_t c = 0; c <= chunks; c++) {
-        uint64_t here = begin[c];
+        uint64_t in_chunk = begin[c];
         begin[c] = sum;
-        sum += here;
+        sum += in_chunk;
     }
     for (uint64_t i = 0; i < count; i++)
         order[begin[g->rows[i] / chunk_rows]++] = (uint32_t)i;

@@ -87,9 +87,9 @@ static void sort_numbers(uint32_t *numbers, uint32_t *other, uint64_t count)
             continue;
         uint64_t sum = 0;
         for (int k = 0; k < 256; k++) {
-            uint64_t here = begin[byte][k];
+            uint64_t in_bin = begin[byte][k];
             begin[byte][k] = sum;
-            sum += here;
+            sum += in_bin;
         }
         for (uint64_t i = 0; i < count; i++)
             to[begin[byte][from[i] >> 8 * byte & 255]++] = from[i];
@@ -159,11 +159,11 @@ static ebpo_status gather_rows(ebpo_chunks *chunks, ebpo_array_id id, size_t row
         memcpy(to, view.rows + (single[i] - view.begin) * row_bytes, row_bytes);
     while (rows && status == EBPO_OK &&
            (status = ebpo_held_chunk_move(chunks, &view, first, error)) == EBPO_OK) {
-        uint64_t here = view.end - first < rows ? view.end - first : rows;
-        memcpy(to, view.rows + (first - view.begin) * row_bytes, here * row_bytes);
-        to += here * row_bytes;
-        first += here;
-        rows -= here;
+        uint64_t step = view.end - first < rows ? view.end - first : rows;
+        memcpy(to, view.rows + (first - view.begin) * row_bytes, step * row_bytes);
+        to += step * row_bytes;
+        first += step;
+        rows -= step;
     }
     ebpo_held_chunk_release(chunks, &view);
     return status;

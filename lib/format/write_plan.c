@@ -124,13 +124,13 @@ static uint64_t sample_bytes(ebpo_chunk_coder *coder, const uint8_t *values, siz
 static bool columns_are_less(ebpo_chunk_coder *coder, const uint8_t *values, size_t size,
                              bool floats, uint64_t rows, uint32_t cols)
 {
-    uint64_t row_bytes = size * cols, here = SAMPLE_BYTES / row_bytes, plain = 0, columns = 0;
-    if (here > rows)
-        here = rows;
+    uint64_t row_bytes = size * cols, sampled = SAMPLE_BYTES / row_bytes, plain = 0, columns = 0;
+    if (sampled > rows)
+        sampled = rows;
     for (uint64_t i = 0; i < SAMPLES; i++) {
-        const uint8_t *at = values + (rows - here) / SAMPLES * i * row_bytes;
-        plain += sample_bytes(coder, at, size, floats, here, cols, false);
-        columns += sample_bytes(coder, at, size, floats, here, cols, true);
+        const uint8_t *at = values + (rows - sampled) / SAMPLES * i * row_bytes;
+        plain += sample_bytes(coder, at, size, floats, sampled, cols, false);
+        columns += sample_bytes(coder, at, size, floats, sampled, cols, true);
     }
     return columns < plain;
 }

@@ -184,8 +184,8 @@ static void compare_attributes(ebpo_tally *tally, const ebpo_mesh *source, const
     const ebpo_attributes *a = source->attributes, *b = stored->attributes;
     uint64_t k = 0;
     for (uint64_t i = 0; a && b && i < a->count; i++) {
-        bool here = k < b->count && same_head(&a->array[i], &b->array[k]);
-        if (here)
+        bool match = k < b->count && same_head(&a->array[i], &b->array[k]);
+        if (match)
             compare_rows(tally, &a->array[i], &b->array[k++], source_numbers(&a->array[i], maps),
                          stored->workspace);
         else if (ebpo_attribute_is_of_mesh(&a->array[i]))
