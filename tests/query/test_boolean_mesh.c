@@ -11,9 +11,11 @@
 #include <ebpo/boolean.h>
 
 #include "check_main.h"
+#include "geometry/predicates.h"
+#include "mesh/attributes.h"
 #include "query_support.h"
 
-enum { OPERANDS = 3, NODES = 9 };
+enum { OPERANDS = 3, NODES = 9, SCENES = 200 };
 
 typedef struct scene {
     query_model model[OPERANDS];
@@ -290,7 +292,7 @@ static uint64_t check_points(scene *s, const ebpo_mesh *mesh, double displacemen
 START_TEST(random_scenes)
 {
     uint64_t tested = 0, results = 0, cut = 0;
-    for (uint64_t seed = 0; seed < ebpo_test_scaled(1000); seed++) {
+    for (uint64_t seed = 0; seed < ebpo_test_scaled(SCENES); seed++) {
         scene s;
         ebpo_mesh mesh;
         make_scene(&s, seed);
@@ -307,9 +309,54 @@ START_TEST(random_scenes)
         ebpo_mesh_free(&mesh);
         free_scene(&s);
     }
-    ck_assert_uint_ge(2 * results, ebpo_test_scaled(1000));
-    ck_assert_uint_ge(2 * cut, ebpo_test_scaled(1000));
-    ck_assert_uint_ge(tested, 20 * ebpo_test_scaled(1000));
+    ck_assert_uint_ge(2 * results, ebpo_test_scaled(SCENES));
+    ck_assert_uint_ge(2 * cut, ebpo_test_scaled(SCENES));
+    ck_assert_uint_ge(tested, 20 * ebpo_test_scaled(SCENES));
+}
+END_TEST
+
+/* A cube minus its moved copy: each face of the mesh is in the plane of the face from which it
+ * comes. */
+START_TEST(origins)
+{
+    const double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 };
+    ebpo_boolean_mesh_options options = EBPO_BOOLEAN_MESH_OPTIONS_INIT;
+    ebpo_mesh mesh;
+    scene s = { .nodes = 0 };
+    add_operand(&s, ebpo_test_box(low, high, 2), moved_pose(0, 0, 0), 0);
+    add_operand(&s, ebpo_test_box(low, high, 3), moved_pose(0.5, 0.25, 0.125), 0);
+    s.node[s.nodes++] = (ebpo_boolean_node){ EBPO_BOOLEAN_OPERAND, 0, 0, 0 };
+    s.node[s.nodes++] = (ebpo_boolean_node){ EBPO_BOOLEAN_OPERAND, 1, 0, 0 };
+    s.node[s.nodes++] = (ebpo_boolean_node){ EBPO_BOOLEAN_DIFFERENCE, 0, 1, 0 };
+    ebpo_boolean *boolean = make_boolean(&s, 1);
+    options.origins = true;
+    ASSERT_OK(ebpo_boolean_mesh(boolean, &options, &mesh, NULL, error));
+    ck_assert_uint_eq(mesh.attributes->count, 2);
+    const uint8_t *operand = mesh.attributes->array[0].values;
+    const uint32_t *face = (const void *)mesh.attributes->array[1].values;
+    uint64_t of_second = 0;
+    for (uint64_t i = 0; i < mesh.face_count; i++) {
+        const query_model *m = &s.model[operand[i]];
+        double plane[3][3], x[3];
+        uint64_t file_face = 0;
+        while (query_reported(m, (uint32_t)file_face) != face[i])
+            file_face++;
+        for (int k = 0; k < 3; k++) {
+            ebpo_test_point(&m->mesh, m->mesh.faces[3 * file_face + (unsigned)k], plane[k]);
+            for (int c = 0; c < 3; c++)
+                plane[k][c] += s.pose[operand[i]].translation[c];
+        }
+        for (int k = 0; k < 3; k++) {
+            ebpo_test_point(&mesh, mesh.faces[3 * i + (unsigned)k], x);
+            ck_assert_int_eq(ebpo_orient3d(plane[0], plane[1], plane[2], x), 0);
+        }
+        of_second += operand[i];
+    }
+    ck_assert_uint_gt(of_second, 0);
+    ck_assert_uint_lt(of_second, mesh.face_count);
+    ebpo_mesh_free(&mesh);
+    ebpo_boolean_free(boolean);
+    free_scene(&s);
 }
 END_TEST
 
@@ -340,6 +387,7 @@ TEST_SUITE(boolean_mesh)
     TCase *tests = tcase_create("boolean_mesh");
     tcase_set_timeout(tests, 0);
     tcase_add_test(tests, random_scenes);
+    tcase_add_test(tests, origins);
     tcase_add_test(tests, equal_for_any_threads);
     suite_add_tcase(suite, tests);
     return suite;

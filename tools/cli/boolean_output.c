@@ -41,6 +41,7 @@ ebpo_status boolean_write_result(boolean_output *o, ebpo_boolean *b, ebpo_progre
     ebpo_boolean_mesh_options how = EBPO_BOOLEAN_MESH_OPTIONS_INIT;
     how.progress = progress;
     how.doubles = o->doubles;
+    how.origins = true;
     o->report = (ebpo_boolean_mesh_report)EBPO_BOOLEAN_MESH_REPORT_INIT;
     ebpo_status status = ebpo_boolean_mesh(b, &how, &mesh, &o->report, error);
     if (status != EBPO_OK)

@@ -12,6 +12,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
+#include "extras/boolean/boolean_origins.h"
 #include "extras/boolean/cut_mesh.h"
 
 typedef struct output {
@@ -20,6 +21,7 @@ typedef struct output {
     bool doubles;
     uint32_t *number;       /* for each vertex of the cut mesh: its number, or EBPO_NO_CORNER */
     ebpo_corner_ids vertex; /* rounded vertices */
+    uint32_t *origin;       /* for each face: the face of an operand from which it comes */
     ebpo_boolean_mesh_report *report;
     ebpo_mesh *mesh;
 } output;
@@ -69,6 +71,7 @@ static bool list_triangles(output *o)
         to[0] = o->number[cut->triangle[t][0]];
         to[1] = o->number[cut->triangle[t][o->sign[t] > 0 ? 1 : 2]];
         to[2] = o->number[cut->triangle[t][o->sign[t] > 0 ? 2 : 1]];
+        o->origin[o->mesh->face_count] = cut->face[t];
         o->mesh->face_count += to[0] != to[1] && to[1] != to[2] && to[2] != to[0];
     }
     return true;
@@ -102,22 +105,27 @@ static bool copy_vertices(output *o)
     return mesh->xyz32 != NULL;
 }
 
-static ebpo_status fill_mesh(output *o, bool doubles, ebpo_error *error)
+static ebpo_status fill_mesh(output *o, const ebpo_boolean_mesh_options *options, ebpo_error *error)
 {
     const ebpo_cut_mesh *cut = o->cut;
     uint64_t vertices = ebpo_cut_mesh_vertices(cut), faces = 0;
     for (uint64_t t = 0; t < cut->count; t++)
         faces += o->sign[t] != 0;
-    o->doubles = doubles || !cut->faces->floats || exceeds_floats(o);
+    o->doubles = options->doubles || !cut->faces->floats || exceeds_floats(o);
     o->number = ebpo_alloc(vertices, sizeof *o->number);
     o->mesh->faces = ebpo_alloc(faces, 3 * sizeof *o->mesh->faces);
-    bool fine = o->number && o->mesh->faces;
+    o->origin = ebpo_alloc(faces, sizeof *o->origin);
+    bool fine = o->number && o->mesh->faces && o->origin;
     for (uint64_t v = 0; v < vertices && fine; v++)
         o->number[v] = EBPO_NO_CORNER;
     fine = fine && list_triangles(o) && copy_vertices(o);
+    ebpo_status status = fine ? EBPO_OK : ebpo_fail_memory(error, 4 * vertices + 16 * faces);
+    if (status == EBPO_OK && options->origins)
+        status = ebpo_boolean_origins(cut->faces, o->origin, o->mesh, error);
     free(o->number);
+    free(o->origin);
     ebpo_corner_ids_free(&o->vertex);
-    return fine ? EBPO_OK : ebpo_fail_memory(error, 4 * vertices + 12 * faces);
+    return status;
 }
 
 static ebpo_status make_mesh(ebpo_face_list *faces, const ebpo_boolean_mesh_options *options,
@@ -130,7 +138,7 @@ static ebpo_status make_mesh(ebpo_face_list *faces, const ebpo_boolean_mesh_opti
         status = ebpo_cut_mesh_classify(&cut, &options->progress, &sign, &report->patches, error);
     if (status == EBPO_OK) {
         output o = { .cut = &cut, .sign = sign, .report = report, .mesh = mesh };
-        status = fill_mesh(&o, options->doubles, error);
+        status = fill_mesh(&o, options, error);
         report->faces_cut = cut.faces_cut;
     }
     free(sign);

@@ -17,26 +17,6 @@
 
 /* --- faces --- */
 
-static bool are_equal(const ebpo_boolean *b, uint32_t i, uint32_t k)
-{
-    return ebpo_same_model(b->solid[i].model, b->solid[k].model) &&
-           memcmp(&b->pose[i], &b->pose[k], sizeof b->pose[i]) == 0;
-}
-
-static void find_equal(ebpo_face_list *faces)
-{
-    const ebpo_boolean *b = faces->boolean;
-    uint64_t used = ebpo_expression_operands(&b->expression);
-    for (uint32_t i = 0; i < b->count; i++) {
-        uint32_t k = 0;
-        if (!(used >> i & 1))
-            continue;
-        while (k < i && !(faces->same[k] && are_equal(b, k, i)))
-            k++;
-        faces->same[k] |= UINT64_C(1) << i;
-    }
-}
-
 static ebpo_status count_faces(ebpo_face_list *faces, ebpo_error *error)
 {
     const ebpo_boolean *b = faces->boolean;
@@ -104,7 +84,7 @@ ebpo_status ebpo_face_list_read(ebpo_face_list *out, const ebpo_boolean *b,
                                 const ebpo_progress *progress, ebpo_error *error)
 {
     *out = (ebpo_face_list){ .boolean = b, .floats = true };
-    find_equal(out);
+    ebpo_boolean_find_equal(b, out->same);
     if (!ebpo_progress_stage(progress, "read faces", error))
         return EBPO_E_CANCELLED;
     ebpo_status status = count_faces(out, error);

@@ -14,7 +14,7 @@ typedef struct ebpo_face_list {
     uint32_t (*face)[3];    /* corners of each face; EBPO_NO_CORNER first: the face has no area */
     uint32_t count;
     uint32_t first[EBPO_BOOLEAN_OPERANDS_MAX + 1]; /* first face of each operand */
-    /* for each listed operand: the operands that are equal to it, a bit for each; 0: not listed */
+    /* see ebpo_boolean_find_equal; 0: the operand is not listed */
     uint64_t same[EBPO_BOOLEAN_OPERANDS_MAX];
     bool floats; /* the coordinates of all files are floats */
     /* Pairs of intersecting faces: the partners of face i are partner[begin[i]] to partner[begin[i

@@ -278,12 +278,18 @@ typedef struct ebpo_boolean_mesh_options {
      */
     bool doubles;
 
-    uint8_t reserved[7];
+    /*
+     * True: faces of the mesh have the attributes `operand` (uint8, from 0) and `operand_face`
+     * (uint32): the face of the operand from which the face comes, by its index in the source.
+     */
+    bool origins;
+
+    uint8_t reserved[6];
 } ebpo_boolean_mesh_options;
 
-#define EBPO_BOOLEAN_MESH_OPTIONS_INIT                                  \
-    {                                                                   \
-        sizeof(ebpo_boolean_mesh_options), { NULL, NULL }, false, { 0 } \
+#define EBPO_BOOLEAN_MESH_OPTIONS_INIT                                         \
+    {                                                                          \
+        sizeof(ebpo_boolean_mesh_options), { NULL, NULL }, false, false, { 0 } \
     }
 
 typedef struct ebpo_boolean_mesh_report {
