@@ -32,7 +32,7 @@ static ebpo_status query_known_result(ebpo_haptic *t, ebpo_known_result *out, eb
     ebpo_vec3_copy(near.normal, out->normal);
     out->winding = inside.winding;
     out->on_face = inside.where == EBPO_ON;
-    out->known = true;
+    out->valid = true;
     return EBPO_OK;
 }
 

@@ -31,7 +31,7 @@ typedef struct ebpo_known_result {
     double distance;            /* without a sign; infinite if the model has no faces */
     double point[3], normal[3]; /* nearest point, and normal of its face */
     int32_t winding;
-    bool known, on_face; /* the results have been set; the position is on a face */
+    bool valid, on_face; /* the results have been set; the position is on a face */
 } ebpo_known_result;
 
 struct ebpo_haptic {
