@@ -105,7 +105,7 @@ static void value(uint8_t what, const char *text)
 #endif
     case 4: (void)subtree_faces_read("fuzz", text, &n); break;
     case 5: (void)query_read_time("fuzz", text, &n); break;
-    case 6: (void)memory_good("fuzz", &(memory_values){ text, NULL }); break;
+    case 6: (void)memory_check("fuzz", &(memory_values){ text, NULL }); break;
     case 7: {
         selection_options o = { 1, -1, -1, text, -1, -1 };
         if (selection_check("fuzz", &o) == 0 &&

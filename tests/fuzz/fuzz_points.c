@@ -35,7 +35,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     points_kind kind = (points_kind)(data[0] % 3);
     if (points_open(&p, "fuzz", NULL, kind, data[0] & 4, INFINITY)) {
         p.header = data[0] & 8;
-        p.headless = data[0] & 16;
+        p.no_header = data[0] & 16;
         while ((count = points_next(&p, rows)) > 0) {
             fuzz_must(count <= POINTS_BATCH);
             for (uint64_t i = 0; i < count * (uint64_t)points_width(kind); i++)

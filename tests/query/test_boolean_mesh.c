@@ -67,7 +67,7 @@ static oracle *pose_operand(scene *s, const ebpo_mesh *mesh, const ebpo_pose *po
 {
     ebpo_mesh posed = { .vertex_count = mesh->vertex_count, .face_count = mesh->face_count };
     posed.faces = mesh->faces;
-    posed.xyz64 = query_capacity(3 * mesh->vertex_count, sizeof(double));
+    posed.xyz64 = query_alloc(3 * mesh->vertex_count, sizeof(double));
     for (uint64_t v = 0; v < mesh->vertex_count; v++) {
         double x[3];
         ebpo_test_point(mesh, v, x);
@@ -193,7 +193,7 @@ static int order_edges(const void *a, const void *b)
 static uint64_t count_open_edges(const ebpo_mesh *mesh)
 {
     uint64_t count = 3 * mesh->face_count, open = 0;
-    edge *list = query_capacity(count, sizeof *list);
+    edge *list = query_alloc(count, sizeof *list);
     for (uint64_t i = 0; i < count; i++) {
         uint32_t a = mesh->faces[i], b = mesh->faces[i % 3 == 2 ? i - 2 : i + 1];
         ck_assert_uint_ne(a, b);

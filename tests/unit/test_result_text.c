@@ -29,7 +29,7 @@ static void spill(result_text *t, void *user)
 {
     (void)user;
     if (turn)
-        ck_assert(result_text_leave(t, "test"));
+        ck_assert(result_text_write(t, "test"));
     else
         t->full = true;
 }
@@ -58,7 +58,7 @@ static size_t print_all(result_text *t, char *to)
 {
     for (uint64_t row = 0; row < ROWS; row++)
         print_row(t, row, UINT32_MAX);
-    ck_assert(result_text_leave(t, "test"));
+    ck_assert(result_text_write(t, "test"));
     memcpy(to, out, out_count);
     size_t count = out_count;
     out_count = 0;
@@ -91,7 +91,7 @@ START_TEST(test_failed_rows_are_printed_once)
             else if (row % 16 == 0)
                 turn = turn || round % 3 == 0;
         }
-        ck_assert(result_text_leave(&t, "test"));
+        ck_assert(result_text_write(&t, "test"));
         ck_assert_uint_eq(out_count, count);
         ck_assert(memcmp(out, right, count) == 0);
     }
