@@ -546,12 +546,12 @@ START_TEST(test_haptic_place_uses_previous_box)
             quiet = 0;
         pause_a_little();
     }
-    unsigned last = c.haptic->at;
-    c.haptic->at = c.haptic->seen;
-    c.haptic->seen = last;
-    c.haptic->box[c.haptic->at].centres.min[0] = INFINITY;
+    unsigned last = c.haptic->box_now;
+    c.haptic->box_now = c.haptic->box_before;
+    c.haptic->box_before = last;
+    c.haptic->box[c.haptic->box_now].centres.min[0] = INFINITY;
     ASSERT_OK(ebpo_haptic_reset(c.haptic, beside, error));
-    ck_assert_uint_eq(c.haptic->at, last);
+    ck_assert_uint_eq(c.haptic->box_now, last);
     cube_end(&c);
 }
 END_TEST

@@ -28,7 +28,8 @@ typedef struct level_search {
 
 static const char stage[] = "pairs of nodes";
 
-/* Margin inside a black cell along its cell faces that is not used, as a share of the cell's side.
+/* Points of a black cell count as inside it only beyond this distance from the cell's boundary, as
+ * a share of the cell's side.
  */
 static const double cell_face_share = 0x1p-14;
 

@@ -219,14 +219,14 @@ static double size_of(const separation_extent *e)
 static ebpo_status offer_children(separation_search *s, int which, uint32_t node, uint32_t other,
                                   ebpo_error *error)
 {
-    separation_extent seen[2];
-    seen[!which] = extent_of(s, !which, other);
+    separation_extent extent[2];
+    extent[!which] = extent_of(s, !which, other);
     for (uint32_t i = 0; i < s->side[which].accel->bound[node].count; i++) {
         uint32_t ref[2];
         ref[which] = node * 8 + i;
         ref[!which] = other;
-        seen[which] = extent_of(s, which, ref[which]);
-        separation_pair pair = { separation_max(s, &seen[0], &seen[1]), ref[0], ref[1] };
+        extent[which] = extent_of(s, which, ref[which]);
+        separation_pair pair = { separation_max(s, &extent[0], &extent[1]), ref[0], ref[1] };
         if (pair.most < s->sure)
             continue;
         if (!push_pair(s, &pair))
@@ -363,12 +363,12 @@ static ebpo_status divide_node_pair(searching *s, const ebpo_node_gap *pair, int
 static ebpo_status inspect_pair(searching *s, const ebpo_node_gap *pair, ebpo_error *error)
 {
     const ebpo_accel *accel[2];
-    bool there;
+    bool any;
     int side = ebpo_subtree_search_side(&s->subtrees, pair->node);
     if (side >= 0)
         return divide_node_pair(s, pair, side, error);
-    ebpo_status status = ebpo_subtree_search_load(&s->subtrees, pair->node, accel, &there, error);
-    return status == EBPO_OK && there ? separation_search_run(s->search, accel, error) : status;
+    ebpo_status status = ebpo_subtree_search_load(&s->subtrees, pair->node, accel, &any, error);
+    return status == EBPO_OK && any ? separation_search_run(s->search, accel, error) : status;
 }
 
 static ebpo_status search_node_pairs(searching *s, ebpo_error *error)

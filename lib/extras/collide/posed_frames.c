@@ -127,7 +127,7 @@ static void inspect_all(ebpo_accel_pair *out)
     out->unit[0] = out->unit[1] = 1;
     for (int i = 0; i < 9; i++)
         out->turn[i / 3][i % 3] = i % 4 == 0;
-    out->place[0] = out->place[1] = out->place[2] = 0;
+    out->origin[0] = out->origin[1] = out->origin[2] = 0;
     to_floats((const double(*)[3])out->turn, out->into[0], out->size[0]);
     to_floats((const double(*)[3])out->turn, out->into[1], out->size[1]);
     out->doubt = INFINITY;
@@ -144,7 +144,7 @@ static bool turned_boxes_apart(const ebpo_accel_pair *p)
         double size = first + (double)p->doubt;
         for (int k = 0; k < 3; k++)
             size += fabs(p->turn[i][k]) * second;
-        if (fabs(p->place[i]) > size * (1 + 0x1p-40))
+        if (fabs(p->origin[i]) > size * (1 + 0x1p-40))
             return true;
     }
     return false;
@@ -162,7 +162,7 @@ static void choose_units(ebpo_accel_pair *out, const double per_world[2])
 void ebpo_accel_pair_make(ebpo_accel_pair *out, const ebpo_accel *const accel[2],
                           const ebpo_block_posing *const posing[2], double reach)
 {
-    double per_world[2], rotation[2][3][3], back[3][3], middle[3], seen[3];
+    double per_world[2], rotation[2][3][3], back[3][3], middle[3], turned[3];
     for (int i = 0; i < 2; i++) {
         out->accel[i] = accel[i];
         out->posing[i] = posing[i];
@@ -180,23 +180,23 @@ void ebpo_accel_pair_make(ebpo_accel_pair *out, const ebpo_accel *const accel[2]
     invert_matrix((const double(*)[3])rotation[0], back);
     for (int k = 0; k < 3; k++) {
         double column[3] = { rotation[1][0][k], rotation[1][1][k], rotation[1][2][k] };
-        turn_vector((const double(*)[3])back, column, seen);
+        turn_vector((const double(*)[3])back, column, turned);
         for (int i = 0; i < 3; i++)
-            out->turn[i][k] = seen[i] * ratio;
+            out->turn[i][k] = turned[i] * ratio;
     }
     ebpo_posing_apply(&posing[1]->posing, accel[1]->centre, middle);
     for (int i = 0; i < 3; i++)
         middle[i] -= posing[0]->posing.translation[i];
-    turn_vector((const double(*)[3])back, middle, seen);
+    turn_vector((const double(*)[3])back, middle, turned);
     for (int i = 0; i < 3; i++)
-        out->place[i] = seen[i] * unit - accel[0]->centre[i] * (posing[0]->posing.scale * unit);
+        out->origin[i] = turned[i] * unit - accel[0]->centre[i] * (posing[0]->posing.scale * unit);
     to_floats((const double(*)[3])out->turn, out->into[0], out->size[0]);
     invert_matrix((const double(*)[3])out->turn, back);
     to_floats((const double(*)[3])back, out->into[1], out->size[1]);
     double error_bound = posing[0]->posing.error_bound + posing[1]->posing.error_bound;
     out->doubt = (float)(0x1p-44 * reach * unit) + 0x1p-100f;
     out->cylinder_share = (float)(0x1p-17 + 8 * error_bound);
-    out->sine_capacity = (float)(0x1p-17 + 16 * error_bound);
+    out->sine_margin = (float)(0x1p-17 + 16 * error_bound);
     out->apart = turned_boxes_apart(out);
 }
 

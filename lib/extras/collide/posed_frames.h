@@ -92,13 +92,13 @@ typedef struct ebpo_accel_pair {
     const ebpo_block_posing *posing[2];
     float unit[2];     /* factor of lengths in each frame */
     double turn[3][3]; /* rotates a vector of the second frame into the first */
-    double place[3];   /* origin of the second frame in the first */
+    double origin[3];  /* origin of the second frame in the first */
     /* In floats: into[i] rotates a vector of the other frame into frame i; size has the absolute
      * values of the entries, rounded up. */
     float into[2][3][3], size[2][3][3];
     float doubt;          /* error of posing and of these values, in the unit */
     float cylinder_share; /* bounds of cylinders are reduced by this share of the nodes' sizes */
-    float sine_capacity;  /* margin that is added to the squared sine of the angle between two
+    float sine_margin;    /* margin that is added to the squared sine of the angle between two
                            * cylinders' axes */
     bool cylinders;       /* cylinders may be used */
     bool apart;           /* the boxes around all faces are disjoint */

@@ -449,20 +449,20 @@ ebpo_status ebpo_exact_winding(const ebpo_posed_solid *s, ebpo_context *context,
     path p = { .solid = s, .x = x };
     double low[3], high[3], corner[2][3];
     ebpo_posed_sides sides;
-    bool there = true;
+    bool exact = true;
     mpq_t w;
     mpq_init(w);
     for (int k = 0; k < 3; k++) {
         p.w[k] = mpq_get_d(x[k]);
         mpq_set_d(w, p.w[k]);
-        there &= mpq_equal(w, x[k]) != 0;
+        exact &= mpq_equal(w, x[k]) != 0;
         corner[0][k] = nextafter(p.w[k], -INFINITY);
         corner[1][k] = nextafter(p.w[k], INFINITY);
     }
     mpq_clear(w);
     ebpo_status status = ebpo_posed_solid_sides(s, context, p.w, &sides, error);
     *winding = sides.above;
-    if (status != EBPO_OK || there)
+    if (status != EBPO_OK || exact)
         return status;
     make_path(&p);
     ebpo_unpose_box(s, corner[0], corner[1], low, high);

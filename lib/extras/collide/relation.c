@@ -151,8 +151,9 @@ typedef struct relating {
     ebpo_pair_faces places;
     ebpo_two_models two;
     ebpo_relation_result *out;
-    uint64_t *intersecting[2], *seen[2]; /* intersecting: a bit for each face that intersects the
-                                          * other model; seen: for each examined face */
+    uint64_t *intersecting[2], *visited[2]; /* intersecting: a bit for each face that intersects
+                                             * the other model; visited: for each face that
+                                             * inspect_face has had */
     bool both, only[2];   /* both: there are inner points of both models; only: there are inner
                            * points of this model that are not in the other */
     bool examined;        /* a face with an area has been examined */
@@ -218,12 +219,12 @@ static bool note_piece(void *user, const ebpo_around *a)
 
 /* Examines a face once. Returns false when enough is known, or after a failure (`status`). For a
  * solid and a surface, the surface's faces decide. */
-static bool inspect_pair_one(relating *r, int m, uint64_t face)
+static bool inspect_face(relating *r, int m, uint64_t face)
 {
     facing f = { r, m };
-    if ((is_mixed(r) && r->two.solid[m]) || has_bit(r->seen[m], face))
+    if ((is_mixed(r) && r->two.solid[m]) || has_bit(r->visited[m], face))
         return true;
-    set_bit(r->seen[m], face);
+    set_bit(r->visited[m], face);
     r->status = ebpo_visit_around_face(&r->two, m, face, note_piece, &f, r->error);
     if (r->status == EBPO_OK && ++r->inspected % 64 == 0 &&
         !ebpo_progress_step(&r->collision->options.progress, stage, 0, 0, r->error))
@@ -236,7 +237,7 @@ static bool inspect_pair(relating *r, const ebpo_face_pair *pair)
 {
     const uint64_t face[2] = { pair->file_face_a, pair->file_face_b };
     bool turned = r->collision->turned;
-    return inspect_pair_one(r, 0, face[turned]) && inspect_pair_one(r, 1, face[!turned]);
+    return inspect_face(r, 0, face[turned]) && inspect_face(r, 1, face[!turned]);
 }
 
 /* --- contacts --- */
@@ -290,7 +291,7 @@ static ebpo_status take_pairs(relating *r, ebpo_pairs_fn take, ebpo_error *error
 {
     const ebpo_collision *q = r->collision;
     ebpo_collide_options options = options_left(r);
-    ebpo_two_models_let_go(&r->two);
+    ebpo_two_models_release(&r->two);
     ebpo_status status = ebpo_collide_all(q->collider, &options, take, r, error);
     if (status == EBPO_E_CANCELLED && ebpo_collision_is_late(q)) {
         r->open = true;
@@ -310,7 +311,7 @@ static void inspect_found(relating *r)
         uint64_t count = face_count(r, m);
         for (uint64_t f = 0; f < count && goes_on(r); f++)
             if (has_bit(r->intersecting[m], f))
-                (void)inspect_pair_one(r, m, f);
+                (void)inspect_face(r, m, f);
     }
 }
 
@@ -333,7 +334,7 @@ static void inspect_untouched_faces(relating *r, const separate_patches *u, uint
         if (has_bit(r->intersecting[u->m], u->first + i) || has_bit(done, u->patch[i]))
             continue;
         r->examined = false;
-        (void)inspect_pair_one(r, u->m, u->first + i);
+        (void)inspect_face(r, u->m, u->first + i);
         if (r->examined && side_adds_nothing(r, u->m, r->last[!u->m] != 0))
             set_bit(done, u->patch[i]);
     }
@@ -456,7 +457,7 @@ static void find_any(relating *r)
     if (are_surfaces(r))
         r->both = r->touch = has_separate_area(r, 0);
     for (uint64_t f = 0; f < count && goes_on(r) && !r->both; f++)
-        (void)inspect_pair_one(r, 0, f);
+        (void)inspect_face(r, 0, f);
 }
 
 /* Finds an intersecting pair, and examines its faces: if they cross, this pair nearly always
@@ -541,8 +542,8 @@ static ebpo_status find_relation(relating *r, ebpo_error *error)
     for (int m = 0; m < 2; m++) {
         uint64_t count = face_count(r, m);
         r->intersecting[m] = make_bits(count);
-        r->seen[m] = make_bits(count);
-        if (!r->intersecting[m] || !r->seen[m])
+        r->visited[m] = make_bits(count);
+        if (!r->intersecting[m] || !r->visited[m])
             return fail_bits(count, error);
     }
     if (!is_same(q))
@@ -566,7 +567,7 @@ static void end_relating(relating *r)
     ebpo_pair_faces_end(&r->places);
     for (int m = 0; m < 2; m++) {
         free(r->intersecting[m]);
-        free(r->seen[m]);
+        free(r->visited[m]);
     }
 }
 

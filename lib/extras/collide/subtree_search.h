@@ -47,7 +47,7 @@ typedef struct ebpo_subtree_search {
     const ebpo_collision *collision;
     ebpo_node_gaps nodes;
     ebpo_context *context[2]; /* for models in parts */
-    bool *seen[2];            /* visited subtrees */
+    bool *visited[2];         /* visited subtrees */
     uint64_t read_before;
 } ebpo_subtree_search;
 
@@ -62,10 +62,10 @@ void ebpo_subtree_search_end(ebpo_subtree_search *s);
 int ebpo_subtree_search_side(const ebpo_subtree_search *s, const ebpo_posed_node node[2]);
 
 /* Returns the accels of two undivided nodes, loaded if necessary; they are valid until the next
- * call. *there is false if there is nothing to visit, or if the pair was visited before. */
+ * call. *any is false if there is nothing to visit, or if the pair was visited before. */
 EBPO_MUST_USE ebpo_status ebpo_subtree_search_load(ebpo_subtree_search *s,
                                                    const ebpo_posed_node node[2],
-                                                   const ebpo_accel *accel[2], bool *there,
+                                                   const ebpo_accel *accel[2], bool *any,
                                                    ebpo_error *error);
 
 #endif

@@ -150,7 +150,7 @@ static ebpo_status descend_pair(const finding *f, const ebpo_posed_node node[2])
 
 /* --- order of pairs --- */
 
-static int by_places(const void *x, const void *y)
+static int by_ranks(const void *x, const void *y)
 {
     const subtree_pair *p = x, *q = y;
     if (p->rank_a != q->rank_a)
@@ -170,7 +170,7 @@ static void reverse_pairs(subtree_pair *pair, uint64_t count)
 static void sort_back_and_forth(subtree_pairs *p)
 {
     if (p->count)
-        qsort(p->pair, p->count, sizeof *p->pair, by_places);
+        qsort(p->pair, p->count, sizeof *p->pair, by_ranks);
     for (uint64_t begin = 0, end; begin < p->count; begin = end) {
         for (end = begin + 1; end < p->count && p->pair[end].a == p->pair[begin].a;)
             end++;
@@ -181,14 +181,14 @@ static void sort_back_and_forth(subtree_pairs *p)
 
 static ebpo_status count_seconds(subtree_pairs *p, uint64_t most, ebpo_error *error)
 {
-    bool *seen = ebpo_alloc_zero(most, sizeof *seen);
-    if (!seen)
+    bool *counted = ebpo_alloc_zero(most, sizeof *counted);
+    if (!counted)
         return ebpo_fail_memory(error, most);
     for (uint64_t i = 0; i < p->count; i++) {
-        p->subtrees[1] += !seen[p->pair[i].b];
-        seen[p->pair[i].b] = true;
+        p->subtrees[1] += !counted[p->pair[i].b];
+        counted[p->pair[i].b] = true;
     }
-    free(seen);
+    free(counted);
     return EBPO_OK;
 }
 
@@ -218,7 +218,7 @@ static int by_nearness(const void *x, const void *y)
     const subtree_pair *p = x, *q = y;
     if (p->apart != q->apart)
         return p->apart < q->apart ? -1 : 1;
-    return by_places(x, y);
+    return by_ranks(x, y);
 }
 
 /* Sorts by `apart`, the least first. */
@@ -252,7 +252,7 @@ static uint64_t subtree_walk_loads(const subtree_walk *w)
 }
 
 /* Releases the memory of the walk's subtrees for other users. */
-static void subtree_walk_let_go(subtree_walk *w)
+static void subtree_walk_release(subtree_walk *w)
 {
     for (int i = 0; i < 2; i++)
         ebpo_context_let_go(w->context[i]);
@@ -511,7 +511,7 @@ static bool give_waiting(const gathering_parts *g, ebpo_pairs_fn take, void *use
     ebpo_face_pair out[GIVEN_AT_ONCE];
     for (unsigned i = 0; i < g->threads; i++) /* the callback that receives the pairs may need the
                                                * memory */
-        subtree_walk_let_go(&g->walk[i]);
+        subtree_walk_release(&g->walk[i]);
     for (uint64_t at = 0; at < g->count; at += GIVEN_AT_ONCE) {
         uint64_t n = g->count - at < GIVEN_AT_ONCE ? g->count - at : GIVEN_AT_ONCE;
         for (uint64_t i = 0; i < n; i++)

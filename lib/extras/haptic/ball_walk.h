@@ -16,8 +16,9 @@ typedef struct ebpo_held_planes {
 /* Adds a plane, unless it is present or there is no space. */
 void ebpo_held_planes_add(ebpo_held_planes *planes, const double normal[3]);
 
-/* Projects the path `want` onto the cone n . x >= 0 for all planes; `out` is 0 if rounding finds no
- * such path. Returns how far below 0 n . out may be. */
+/* Projects the path `want` onto the cone n . x >= 0 for all planes; `out` is the zero vector if
+ * rounding prevents finding such a path. Returns a bound b >= 0 with n . out >= -b for all planes.
+ */
 double ebpo_hold_back(const ebpo_held_planes *planes, const double want[3], double out[3]);
 
 /* Limits of the work in a haptic step. The work continues in the next step, so any number of faces

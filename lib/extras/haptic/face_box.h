@@ -88,7 +88,8 @@ bool ebpo_segment_may_intersect(const double p[3], const double q[3], const doub
 
 /* Returns the change of the winding number from p to q by this face: 1 from outside to inside, -1
  * from inside to outside, 0 without a common point. EBPO_CROSSES_BADLY: the segment crosses an edge
- * or a corner, begins or ends in the face's plane, or may not cross at all. Allocates no memory. */
+ * or a corner, begins or ends in the face's plane, or it cannot be decided whether they have a
+ * common point. Allocates no memory. */
 enum { EBPO_CROSSES_BADLY = 2 };
 
 /* A heap of nodes of the tree over a box's faces, the least key first. The caller owns the array.

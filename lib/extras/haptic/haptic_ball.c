@@ -158,7 +158,7 @@ ebpo_status ebpo_haptic_get_stats(const ebpo_haptic *t, ebpo_haptic_stats *out)
     s.too_many = atomic_load(&t->too_many);
     s.load_seconds = 1e-9 * (double)atomic_load(&t->load_ns);
     s.load_seconds_max = 1e-9 * (double)atomic_load(&t->load_ns_max);
-    s.faces = t->box[t->at].count;
+    s.faces = t->box[t->box_now].count;
     s.memory = EBPO_HAPTIC_BOXES * ebpo_face_box_bytes(t->options.faces);
     s.energy = t->passive.energy;
     s.longest_step = t->passive.longest_step;
@@ -255,11 +255,11 @@ static ebpo_status make_parts(ebpo_haptic *t, ebpo_error *error)
         status = ebpo_face_box_new(&t->box[i], t->options.faces, error);
     if (status == EBPO_OK && t->options.kind == EBPO_HAPTIC_BALL)
         status = ebpo_ball_walk_new(&t->walk, t->options.faces, error);
-    t->seen = 1;
+    t->box_before = 1;
     t->own = 3;
-    atomic_store(&t->between, 2);
+    atomic_store(&t->box_middle, 2);
     t->own_known = 1;
-    atomic_store(&t->known_between, 2);
+    atomic_store(&t->known_middle, 2);
     if (status == EBPO_OK && t->options.kind == EBPO_HAPTIC_PROBE)
         status = ebpo_held_levels_read(t->model->file, &t->levels, error);
     return status;
@@ -310,10 +310,10 @@ static ebpo_status check_place(ebpo_haptic *t, const double place[3], ebpo_error
  * other box for this position. */
 static bool has_box(ebpo_haptic *t)
 {
-    if (ebpo_extent_holds(&t->box[t->at].centres, t->proxy) || ebpo_haptic_take_box(t))
+    if (ebpo_extent_holds(&t->box[t->box_now].centres, t->proxy) || ebpo_haptic_take_box(t))
         return true;
     ebpo_haptic_try_other(t);
-    return ebpo_extent_holds(&t->box[t->at].centres, t->proxy);
+    return ebpo_extent_holds(&t->box[t->box_now].centres, t->proxy);
 }
 
 /* Waits until a box contains the proxy. */

@@ -50,7 +50,7 @@ static ebpo_status query_position(ebpo_haptic *t, bool *moved, ebpo_error *error
     if (status != EBPO_OK)
         return status;
     ebpo_vec3_copy(known->place, t->last_query);
-    unsigned got = atomic_exchange_explicit(&t->known_between, t->own_known | EBPO_HAPTIC_FRESH,
+    unsigned got = atomic_exchange_explicit(&t->known_middle, t->own_known | EBPO_HAPTIC_FRESH,
                                             memory_order_acq_rel);
     t->own_known = got & ~(unsigned)EBPO_HAPTIC_FRESH;
     return EBPO_OK;
@@ -58,8 +58,8 @@ static ebpo_status query_position(ebpo_haptic *t, bool *moved, ebpo_error *error
 
 const ebpo_known_place *ebpo_haptic_known(ebpo_haptic *t)
 {
-    if (atomic_load_explicit(&t->known_between, memory_order_relaxed) & EBPO_HAPTIC_FRESH) {
-        unsigned got = atomic_exchange_explicit(&t->known_between, t->result, memory_order_acq_rel);
+    if (atomic_load_explicit(&t->known_middle, memory_order_relaxed) & EBPO_HAPTIC_FRESH) {
+        unsigned got = atomic_exchange_explicit(&t->known_middle, t->result, memory_order_acq_rel);
         t->result = got & ~(unsigned)EBPO_HAPTIC_FRESH;
     }
     return &t->known[t->result];
@@ -122,7 +122,7 @@ static void hand_over(ebpo_haptic *t, uint64_t began)
 {
     uint64_t ns = ebpo_clock() - began;
     unsigned got =
-        atomic_exchange_explicit(&t->between, t->own | EBPO_HAPTIC_FRESH, memory_order_acq_rel);
+        atomic_exchange_explicit(&t->box_middle, t->own | EBPO_HAPTIC_FRESH, memory_order_acq_rel);
     t->own = got & ~(unsigned)EBPO_HAPTIC_FRESH;
     atomic_fetch_add(&t->loads, 1);
     atomic_fetch_add(&t->load_ns, ns);

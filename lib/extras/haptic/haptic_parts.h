@@ -45,7 +45,7 @@ struct ebpo_haptic {
     ebpo_held_levels levels; /* for probes */
 
     /* --- used by the thread of haptic steps --- */
-    unsigned at, seen; /* numbers of the current and the previous box */
+    unsigned box_now, box_before; /* numbers of the current and the previous box */
     double proxy[3], device[3], force[3];
     bool touching;
     ebpo_ball_walk walk;     /* the current piece of the path */
@@ -53,7 +53,7 @@ struct ebpo_haptic {
     double along_at[3];      /* position of the centre for these contacts */
     ebpo_held_planes planes; /* planes that hold the proxy after the last complete piece */
     uint32_t cut;            /* flags that are returned at the end of the piece */
-    bool felt;               /* the whole path to the device's position is done */
+    bool arrived;            /* the whole path to the device's position is done */
     double path[EBPO_HAPTIC_PATH_MAX][3];
     uint32_t path_count;
     double stride; /* maximum length of a piece of a tool's path */
@@ -70,13 +70,13 @@ struct ebpo_haptic {
 
     /* --- exchanged between the threads --- */
     ebpo_face_box box[EBPO_HAPTIC_BOXES];
-    atomic_uint between; /* number of the middle box, possibly with EBPO_HAPTIC_FRESH */
+    atomic_uint box_middle; /* number of the middle box, possibly with EBPO_HAPTIC_FRESH */
     _Atomic double proxy_reported[3]; /* The position of the proxy. Each component is atomic, so the
                                        * loader may read a mixture of two positions. Therefore the
                                        * step checks that a new box contains the proxy. */
     _Atomic double device_reported[3];
     ebpo_known_place known[3];
-    atomic_uint known_between;  /* as `between`, for known[] */
+    atomic_uint known_middle;   /* as `box_middle`, for known[] */
     _Atomic bool stop, stopped; /* stopped: by a failure; `failure` is set before */
     atomic_uint_fast64_t loads, too_many, load_ns, load_ns_max;
 

@@ -80,7 +80,7 @@ static bool bound_by_known(ebpo_haptic *t, const double place[3], ebpo_haptic_pr
 static bool find_side(ebpo_haptic *t, const double place[3], ebpo_haptic_probe_result *out)
 {
     const ebpo_known_place *known = &t->known[t->result];
-    const ebpo_face_box *box = &t->box[t->at];
+    const ebpo_face_box *box = &t->box[t->box_now];
     for (int turn = 0; turn < 2; turn++) {
         if (ebpo_side_go(&t->side, box, place, t->found, EBPO_HAPTIC_FACES, EBPO_HAPTIC_VISITS,
                          &out->work))
@@ -98,7 +98,7 @@ static int32_t classify_position(ebpo_haptic *t, const double place[3],
                                  ebpo_haptic_probe_result *out)
 {
     int32_t winding;
-    const ebpo_face_box *box = &t->box[t->at];
+    const ebpo_face_box *box = &t->box[t->box_now];
     if (!t->solid)
         return EBPO_OUT;
     if (ebpo_held_levels_winding(&t->levels, place, &winding)) {

@@ -18,18 +18,18 @@
 
 static void swap_boxes(ebpo_haptic *t)
 {
-    unsigned before = t->at;
-    t->at = t->seen;
-    t->seen = before;
+    unsigned before = t->box_now;
+    t->box_now = t->box_before;
+    t->box_before = before;
 }
 
 bool ebpo_haptic_take_box(ebpo_haptic *t)
 {
-    if (!(atomic_load_explicit(&t->between, memory_order_relaxed) & EBPO_HAPTIC_FRESH))
+    if (!(atomic_load_explicit(&t->box_middle, memory_order_relaxed) & EBPO_HAPTIC_FRESH))
         return false;
-    unsigned got = atomic_exchange_explicit(&t->between, t->seen, memory_order_acq_rel);
-    t->seen = got & ~(unsigned)EBPO_HAPTIC_FRESH;
-    if (!ebpo_extent_holds(&t->box[t->seen].centres, t->proxy))
+    unsigned got = atomic_exchange_explicit(&t->box_middle, t->box_before, memory_order_acq_rel);
+    t->box_before = got & ~(unsigned)EBPO_HAPTIC_FRESH;
+    if (!ebpo_extent_holds(&t->box[t->box_before].centres, t->proxy))
         return false; /* the box was made for another position */
     swap_boxes(t);
     t->stats.taken++;
@@ -38,7 +38,7 @@ bool ebpo_haptic_take_box(ebpo_haptic *t)
 
 void ebpo_haptic_try_other(ebpo_haptic *t)
 {
-    if (ebpo_extent_holds(&t->box[t->seen].centres, t->proxy))
+    if (ebpo_extent_holds(&t->box[t->box_before].centres, t->proxy))
         swap_boxes(t);
 }
 
@@ -156,7 +156,7 @@ static void report_normal(const around *a, double out[3])
 void ebpo_haptic_find_nearest(ebpo_haptic *t, ebpo_haptic_ball_result *out)
 {
     around a = { .t = t,
-                 .box = &t->box[t->at],
+                 .box = &t->box[t->box_now],
                  .queue = { t->nearest_queue, 0 },
                  .search_radius = t->options.search_radius,
                  .nearest = INFINITY,
@@ -223,7 +223,7 @@ static double part_inside(const double p[3], const double motion[3], const ebpo_
 
 double ebpo_haptic_known_part(const ebpo_haptic *t, const double motion[3], double reach)
 {
-    const ebpo_extent *centres = &t->box[t->at].centres;
+    const ebpo_extent *centres = &t->box[t->box_now].centres;
     ebpo_extent all;
     box_of_path(t->proxy, motion, reach, &all);
     if (are_apart(&all, &t->root))
@@ -240,7 +240,7 @@ static bool cut_to_known_part(step *s)
         t->cut = EBPO_HAPTIC_WAITING;
         shorten_motion(s->motion, part);
     }
-    if (part <= 0 && !ebpo_extent_holds(&t->box[t->at].centres, t->proxy)) {
+    if (part <= 0 && !ebpo_extent_holds(&t->box[t->box_now].centres, t->proxy)) {
         s->flags |= EBPO_HAPTIC_WAITING;
         return false;
     }
@@ -275,7 +275,7 @@ static bool begin_piece(step *s)
     /* Slacks are those of the whole path, scaled to this part. Otherwise the slacks for a distant
      * device would be those of a long piece. */
     double share = sqrt(ebpo_vec3_dot(s->motion, s->motion)) / whole;
-    const ebpo_face_box *box = &t->box[t->at];
+    const ebpo_face_box *box = &t->box[t->box_now];
     ebpo_vec3_copy(t->proxy, w->from);
     ebpo_vec3_copy(s->motion, w->motion);
     w->box = ebpo_extent_holds(&box->centres, t->proxy) ? box : NULL; /* NULL is possible: see
@@ -328,7 +328,7 @@ static bool end_piece(step *s)
         add_planes(t);
     s->flags |= touches ? EBPO_HAPTIC_CONTACT : w->cut ? EBPO_HAPTIC_INCOMPLETE : t->cut;
     t->planes = t->along;
-    t->felt = true;
+    t->arrived = true;
     return touches;
 }
 
@@ -337,7 +337,7 @@ static uint32_t held_flags(const step *s)
 {
     const ebpo_haptic *t = s->t;
     double want[3], motion[3];
-    if (t->felt)
+    if (t->arrived)
         return 0;
     ebpo_vec3_subtract(s->goal, t->proxy, want);
     (void)ebpo_hold_back(&t->planes, want, motion);
@@ -360,7 +360,7 @@ static uint32_t go_by_pieces(step *s)
             if (!resumed)
                 return s->flags;
             s->flags = 0; /* flags of the path to the last device position */
-            t->felt = false;
+            t->arrived = false;
         }
         resumed = false;
     }
@@ -371,7 +371,7 @@ uint32_t ebpo_haptic_go(ebpo_haptic *t, const double goal[3], ebpo_ball_work *wo
 {
     step s = { .t = t, .goal = goal, .work = work };
     double left[3];
-    t->felt = false;
+    t->arrived = false;
     t->path_count = 0;
     ebpo_vec3_copy(t->proxy, t->path[t->path_count++]);
     uint32_t flags = go_by_pieces(&s);

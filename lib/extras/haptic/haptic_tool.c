@@ -32,7 +32,7 @@ typedef struct tool_piece {
 static tool_piece piece_of(ebpo_haptic *t, uint64_t *work)
 {
     ebpo_tool *tool = t->tool;
-    const ebpo_face_box *box = &t->box[t->at];
+    const ebpo_face_box *box = &t->box[t->box_now];
     bool known = ebpo_extent_holds(&box->centres, tool->proxy.place);
     return (tool_piece){ t,
                          tool,

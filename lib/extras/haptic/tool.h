@@ -18,7 +18,7 @@ typedef struct ebpo_passive {
 /* Records that the device has moved against the force of the last haptic step. */
 void ebpo_passive_moved(ebpo_passive *p, const double *force, const double *moved, int n);
 
-/* Computes the force of a spring along `depth`, the vector from device to proxy, less `damping`
+/* Computes the force of a spring along `depth`, the vector from device to proxy, minus `damping`
  * times `moved`. The force never opposes `depth`. */
 void ebpo_passive_push(const ebpo_passive *p, double damping, const double *depth,
                        const double *moved, int n, double *force);

@@ -136,11 +136,11 @@ ebpo_status ebpo_paint_cover(const ebpo_paint *p, ebpo_context *context, uint64_
         return status;
     ebpo_reach_begin(&reach, context);
     for (uint32_t i = 0; i < p->stroke[stroke].count && status == EBPO_OK; i++) {
-        bool here;
-        status = ebpo_paint_reach(&reach, p, stroke, i, &here, error);
-        if (status == EBPO_OK && here)
+        bool complete;
+        status = ebpo_paint_reach(&reach, p, stroke, i, &complete, error);
+        if (status == EBPO_OK && complete)
             status = add_point(&found_faces, &reach, error);
-        absent += status == EBPO_OK && !here;
+        absent += status == EBPO_OK && !complete;
     }
     ebpo_reach_end(&reach);
     if (status == EBPO_OK && elsewhere)
@@ -333,8 +333,8 @@ static ebpo_status dye_stroke(bake *b, uint32_t number, ebpo_error *error)
         for (uint64_t k = 0; status == EBPO_OK && k < reached.count; k++)
             status = dye_face(b, &reached.face[k], s, number, &any, error);
         b->baked.points++;
-        b->baked.elsewhere += !reached.here;
-        b->baked.between += status == EBPO_OK && reached.here && !any;
+        b->baked.elsewhere += !reached.complete;
+        b->baked.between += status == EBPO_OK && reached.complete && !any;
     }
     return status;
 }

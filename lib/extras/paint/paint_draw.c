@@ -136,9 +136,9 @@ static ebpo_status reach_around(ebpo_reach *reach, const ebpo_distance_result *a
                                 ebpo_error *error)
 {
     ebpo_reach_ball ball = { { at->point[0], at->point[1], at->point[2] }, radius, at->face };
-    bool here;
-    ebpo_status status = ebpo_reach_find(reach, &ball, &here, error);
-    return status != EBPO_OK || here
+    bool complete;
+    ebpo_status status = ebpo_reach_find(reach, &ball, &complete, error);
+    return status != EBPO_OK || complete
                ? status
                : ebpo_fail(error, EBPO_E_ABSENT,
                            "the subset lacks some faces around the pen; paint on the whole "

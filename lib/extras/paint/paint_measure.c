@@ -51,7 +51,7 @@ typedef struct area_cut {
     ebpo_paint_area *area; /* [keys] sums of areas */
     area_ball *ball;       /* a stack: for each part the balls that may intersect it */
     uint64_t ball_capacity;
-    uint64_t *seen; /* [colours] the last part for which each colour was added */
+    uint64_t *last_part; /* [colours] the last part for which each colour was added */
     uint64_t part;
 } area_cut;
 
@@ -65,13 +65,13 @@ typedef struct triangle {
 static bool area_cut_begin(area_cut *c, const area_keys *keys, double fineness)
 {
     *c = (area_cut){ .keys = keys, .fineness = fineness };
-    c->seen = ebpo_alloc_zero(keys->colours, sizeof *c->seen);
-    return c->seen != NULL;
+    c->last_part = ebpo_alloc_zero(keys->colours, sizeof *c->last_part);
+    return c->last_part != NULL;
 }
 
 static void area_cut_end(area_cut *c)
 {
-    free(c->seen);
+    free(c->last_part);
     free(c->ball);
 }
 
@@ -227,9 +227,9 @@ static void add_layer(area_cut *c, const triangle *t, const verdict *v, uint64_t
         area_cut_add(&strokes[stroke], t->area,
                      certain && c->ball[from].stroke == stroke && c->ball[end - 1].stroke == stroke,
                      v->at_centre == stroke);
-        if (c->seen[colour] == c->part)
+        if (c->last_part[colour] == c->part)
             continue;
-        c->seen[colour] = c->part;
+        c->last_part[colour] = c->part;
         area_cut_add(&colours[colour], t->area, certain && v->one_colour,
                      valued && c->keys->colour[v->at_centre] == colour);
     }
@@ -368,16 +368,16 @@ static ebpo_status find_hits(measure *m, ebpo_context *context, ebpo_error *erro
     ebpo_reach_begin(&reach, context);
     for (uint32_t s = 0; s < p->stroke_count && status == EBPO_OK; s++)
         for (uint32_t i = 0; i < p->stroke[s].count && status == EBPO_OK; i++) {
-            bool here;
+            bool complete;
             uint64_t point = p->stroke[s].first + i;
             if (point % 256 == 0 &&
                 !ebpo_progress_step(&m->options->progress, "reach", point, p->point_count, error))
                 status = EBPO_E_CANCELLED;
             if (status == EBPO_OK)
-                status = ebpo_paint_reach(&reach, p, s, i, &here, error);
-            if (status == EBPO_OK && here)
+                status = ebpo_paint_reach(&reach, p, s, i, &complete, error);
+            if (status == EBPO_OK && complete)
                 status = add_point(m, &reach, s, (uint32_t)point, error);
-            m->elsewhere += status == EBPO_OK && !here;
+            m->elsewhere += status == EBPO_OK && !complete;
         }
     ebpo_reach_end(&reach);
     return status;

@@ -263,20 +263,20 @@ static ebpo_status fail_place(const ebpo_reach *r, uint64_t face, ebpo_error *er
 
 /* Gathers the faces around the ball, and finds the given face among them. *on: the position is on
  * that face. */
-static ebpo_status find_face(ebpo_reach *r, const ebpo_reach_ball *ball, bool *here, bool *on,
+static ebpo_status find_face(ebpo_reach *r, const ebpo_reach_ball *ball, bool *complete, bool *on,
                              ebpo_error *error)
 {
     const bool subset = r->context->model->info->pruned;
     ebpo_face_near near;
     ebpo_error cause = EBPO_ERROR_INIT;
-    *here = *on = false;
+    *complete = *on = false;
     ebpo_status status = reach_gather(r, ball, &cause);
     if (status == EBPO_E_ABSENT && subset) /* connectivity in the omitted part is unknown */
         return EBPO_OK;
     if (status != EBPO_OK)
         return ebpo_fail_with(error, &cause);
     bool found = find_own(r, ball->face);
-    *here = found || !subset;
+    *complete = found || !subset;
     if (!found)
         return EBPO_OK;
     ebpo_face_nearest(ball->place, (const double(*)[3])r->face[r->own].corner, &near);
@@ -288,21 +288,21 @@ ebpo_status ebpo_reach_check(ebpo_reach *r, const double place[3], uint64_t face
                              ebpo_error *error)
 {
     const ebpo_reach_ball ball = { { place[0], place[1], place[2] }, 0, face };
-    bool here, on;
-    ebpo_status status = find_face(r, &ball, &here, &on, error);
-    *fits = on || !here;
+    bool complete, on;
+    ebpo_status status = find_face(r, &ball, &complete, &on, error);
+    *fits = on || !complete;
     return status;
 }
 
-ebpo_status ebpo_reach_find(ebpo_reach *r, const ebpo_reach_ball *ball, bool *here,
+ebpo_status ebpo_reach_find(ebpo_reach *r, const ebpo_reach_ball *ball, bool *complete,
                             ebpo_error *error)
 {
     bool on;
-    ebpo_status status = find_face(r, ball, here, &on, error);
-    if (status != EBPO_OK || !*here)
+    ebpo_status status = find_face(r, ball, complete, &on, error);
+    if (status != EBPO_OK || !*complete)
         return status;
     if (!on) {
-        *here = false;
+        *complete = false;
         return fail_place(r, ball->face, error);
     }
     if (!reserve_space(r))
@@ -379,7 +379,7 @@ enum { THREAD_CAPACITY = 1 << 20 };
 typedef struct found {
     ebpo_reached_face *face;
     uint64_t count, capacity;
-    bool done, here;
+    bool done, complete;
 } found;
 
 struct ebpo_reacher {
@@ -394,7 +394,7 @@ struct ebpo_reacher {
 static ebpo_status reached_keep(found *f, const ebpo_reach *reach, ebpo_error *error)
 {
     f->count = 0;
-    if (!f->here)
+    if (!f->complete)
         return EBPO_OK;
     if (!ebpo_grow(&f->face, &f->capacity, reach->count, sizeof *f->face))
         return ebpo_fail_memory(error, reach->count * sizeof *f->face);
@@ -418,7 +418,8 @@ static ebpo_status find_some(void *context, uint64_t begin, uint64_t end, unsign
         found *f = &r->found[i];
         if (i > 0 && atomic_load(&r->faces) > FACES_TOGETHER)
             break;
-        status = ebpo_paint_reach(reach, r->p, r->stroke, r->first + (uint32_t)i, &f->here, error);
+        status =
+            ebpo_paint_reach(reach, r->p, r->stroke, r->first + (uint32_t)i, &f->complete, error);
         if (status == EBPO_OK)
             status = reached_keep(f, reach, error);
         atomic_fetch_add(&r->faces, f->count);
@@ -461,7 +462,7 @@ ebpo_status ebpo_reacher_find(ebpo_reacher *r, uint32_t stroke, uint32_t i, ebpo
             return status;
     }
     const found *f = &r->found[i - r->first];
-    *out = (ebpo_reached){ f->face, f->count, f->here };
+    *out = (ebpo_reached){ f->face, f->count, f->complete };
     return EBPO_OK;
 }
 

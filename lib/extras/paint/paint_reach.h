@@ -52,11 +52,11 @@ typedef struct ebpo_reach_ball {
 void ebpo_reach_begin(ebpo_reach *reach, ebpo_context *context);
 void ebpo_reach_end(ebpo_reach *reach);
 
-/* Finds the reach of a ball. *here is false if a subset omits the face, or some of the faces around
- * it. Fails with EBPO_E_FORMAT if the position is not on that face, EBPO_E_LIMIT, EBPO_E_MEMORY,
- * and the errors of reading. */
+/* Finds the reach of a ball. *complete is false if a subset omits the face, or some of the faces
+ * around it. Fails with EBPO_E_FORMAT if the position is not on that face, EBPO_E_LIMIT,
+ * EBPO_E_MEMORY, and the errors of reading. */
 EBPO_MUST_USE ebpo_status ebpo_reach_find(ebpo_reach *reach, const ebpo_reach_ball *ball,
-                                          bool *here, ebpo_error *error);
+                                          bool *complete, ebpo_error *error);
 
 /* Sets *fits to true if a position is on that face, or may be on it because a subset is pruned
  * there. */
@@ -105,11 +105,11 @@ static inline ebpo_reach_ball ebpo_paint_ball(const ebpo_paint *p, uint64_t stro
 
 /* As ebpo_reach_find, for point `i` of a stroke. */
 EBPO_MUST_USE static inline ebpo_status ebpo_paint_reach(ebpo_reach *reach, const ebpo_paint *p,
-                                                         uint64_t stroke, uint32_t i, bool *here,
-                                                         ebpo_error *error)
+                                                         uint64_t stroke, uint32_t i,
+                                                         bool *complete, ebpo_error *error)
 {
     ebpo_reach_ball ball = ebpo_paint_ball(p, stroke, i);
-    return ebpo_reach_find(reach, &ball, here, error);
+    return ebpo_reach_find(reach, &ball, complete, error);
 }
 
 /* The reaches of many points, found on all cores and returned one by one. */
@@ -123,7 +123,7 @@ typedef struct ebpo_reached_face {
 typedef struct ebpo_reached {
     const ebpo_reached_face *face;
     uint64_t count;
-    bool here; /* false: a subset omits a part of the reach */
+    bool complete; /* false: a subset omits a part of the reach */
 } ebpo_reached;
 
 typedef struct ebpo_reacher ebpo_reacher;

@@ -231,7 +231,7 @@ static ebpo_status least_distance_halve(part_search *s, const part *p, double mi
  * their pair does not jump. */
 static double next_jump(const part_search *s, double from, double to)
 {
-    return s->evaluations.rides
+    return s->evaluations.same_route
                ? to
                : ebpo_scene_pair_next(s->evaluations.scene, s->evaluations.pair, from, to);
 }

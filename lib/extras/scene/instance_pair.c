@@ -64,8 +64,8 @@ static void pose_box(const ebpo_posing *p, const ebpo_scene_model_entry *m, pose
     }
 }
 
-ebpo_status ebpo_scene_seen_from(const ebpo_scene *scene, uint64_t of, uint64_t other, double time,
-                                 ebpo_scene_seen *out, ebpo_error *error)
+ebpo_status ebpo_scene_relative_to(const ebpo_scene *scene, uint64_t of, uint64_t other,
+                                   double time, ebpo_scene_relative *out, ebpo_error *error)
 {
     const ebpo_scene_model_entry *m = omitted_model_of(scene, of);
     ebpo_posing from, at;
@@ -151,15 +151,15 @@ static ebpo_status omitted_of(const ebpo_scene *scene, uint64_t of, uint64_t oth
 {
     const ebpo_scene_model_entry *m = omitted_model_of(scene, of);
     ebpo_scene_space held, all;
-    ebpo_scene_seen seen;
+    ebpo_scene_relative relative;
     *gap = INFINITY;
     if (!held_box(scene, of, &held))
         return EBPO_OK;
     memcpy(all.min, m->min, sizeof all.min);
     memcpy(all.max, m->max, sizeof all.max);
-    ebpo_status status = ebpo_scene_seen_from(scene, of, other, time, &seen, error);
+    ebpo_status status = ebpo_scene_relative_to(scene, of, other, time, &relative, error);
     if (status == EBPO_OK)
-        *gap = gap_around(&all, &held, &seen.box) * seen.unit;
+        *gap = gap_around(&all, &held, &relative.box) * relative.unit;
     return status;
 }
 
@@ -235,9 +235,10 @@ static double motion_on_one_route(const ebpo_scene *scene, const ebpo_scene_pair
 }
 
 /* Sets *out to a bound of the change of the pair's distance between two times; INFINITY over a
- * jump. rides: result of follows_one_route. */
-static ebpo_status pair_motion(const ebpo_scene *scene, const ebpo_scene_pair *pair, bool rides,
-                               double from, double to, double *out, ebpo_error *error)
+ * jump. same_route: result of follows_one_route. */
+static ebpo_status pair_motion(const ebpo_scene *scene, const ebpo_scene_pair *pair,
+                               bool same_route, double from, double to, double *out,
+                               ebpo_error *error)
 {
     double a, b;
     ebpo_status status = ebpo_scene_motion(scene, pair->a, from, to, &a, error);
@@ -246,7 +247,7 @@ static ebpo_status pair_motion(const ebpo_scene *scene, const ebpo_scene_pair *p
     if (status != EBPO_OK)
         return status;
     *out = (a + b) * (1 + 0x1p-50);
-    if (rides && from < to)
+    if (same_route && from < to)
         *out = fmin(*out, motion_on_one_route(scene, pair, from, to));
     return EBPO_OK;
 }
@@ -415,14 +416,14 @@ ebpo_status ebpo_scene_evaluations_begin(ebpo_scene_evaluations *l, const ebpo_s
     *l = (ebpo_scene_evaluations){ .scene = scene, .pair = pair, .tolerance = tolerance / 4 };
     /* a smaller tolerance would take long, and the additional digits change with every pose */
     l->tolerance = fmax(l->tolerance, pair_rounding(scene, pair) / 16);
-    l->rides = follows_one_route(scene, pair);
+    l->same_route = follows_one_route(scene, pair);
     return ebpo_scene_collider(scene, pair, 1, &l->collider, error);
 }
 
 ebpo_status ebpo_scene_evaluations_motion(const ebpo_scene_evaluations *l, double from, double to,
                                           double *out, ebpo_error *error)
 {
-    return pair_motion(l->scene, l->pair, l->rides, from, to, out, error);
+    return pair_motion(l->scene, l->pair, l->same_route, from, to, out, error);
 }
 
 bool ebpo_scene_is_within(double hi, double lo, double tolerance)

@@ -12,17 +12,17 @@ typedef struct ebpo_scene_space {
 } ebpo_scene_space;
 
 /* One instance in another's coordinates. */
-typedef struct ebpo_scene_seen {
+typedef struct ebpo_scene_relative {
     ebpo_scene_space box;
     double rounding; /* widening of the box for rounding */
     double unit;     /* least length in the world of a length of 1 in these coordinates */
-} ebpo_scene_seen;
+} ebpo_scene_relative;
 
 /* Returns a box in the coordinates of the instance `of` that contains the box of `other` at a time.
- * Fails with EBPO_E_ARGUMENT (a pose). */
-EBPO_MUST_USE ebpo_status ebpo_scene_seen_from(const ebpo_scene *scene, uint64_t of, uint64_t other,
-                                               double time, ebpo_scene_seen *out,
-                                               ebpo_error *error);
+ * Fails with EBPO_E_ARGUMENT if a pose is out of range. */
+EBPO_MUST_USE ebpo_status ebpo_scene_relative_to(const ebpo_scene *scene, uint64_t of,
+                                                 uint64_t other, double time,
+                                                 ebpo_scene_relative *out, ebpo_error *error);
 
 /* Returns the distance of two boxes, rounded down. */
 double ebpo_scene_space_gap(const ebpo_scene_space *a, const ebpo_scene_space *b);
@@ -96,7 +96,7 @@ typedef struct ebpo_scene_evaluations {
     const ebpo_scene_pair *pair;
     ebpo_collider *collider; /* from ebpo_scene_collider; must be freed */
     double tolerance;        /* tolerance of one evaluation */
-    bool rides;              /* both follow one route */
+    bool same_route;         /* both follow one route */
     double gap;              /* result of ebpo_scene_omitted at the last evaluation */
     uint64_t lacking;        /* instance whose file omits faces, from the same call */
 } ebpo_scene_evaluations;

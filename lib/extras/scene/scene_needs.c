@@ -64,7 +64,7 @@ static ebpo_status reach_of_other(const nearing *n, const ebpo_scene_route *rout
 
 /* Bounds the motion of the other instance relative to this one, in the world's unit. There must be
  * no key between the times. */
-static ebpo_status motion_seen(const nearing *n, double from, double to, double *out)
+static ebpo_status relative_motion(const nearing *n, double from, double to, double *out)
 {
     const ebpo_scene_route *route = route_of(n->scene, n->of);
     double reach = 0, own = 0;
@@ -82,11 +82,11 @@ static ebpo_status motion_seen(const nearing *n, double from, double to, double 
 static ebpo_status near_box(const nearing *n, double from, double to, double motion,
                             ebpo_scene_space *out, bool *any)
 {
-    ebpo_scene_seen at, later;
+    ebpo_scene_relative at, later;
     ebpo_status status =
-        ebpo_scene_seen_from(n->scene, n->of, n->other, from, &at, n->needs->error);
+        ebpo_scene_relative_to(n->scene, n->of, n->other, from, &at, n->needs->error);
     if (status == EBPO_OK)
-        status = ebpo_scene_seen_from(n->scene, n->of, n->other, to, &later, n->needs->error);
+        status = ebpo_scene_relative_to(n->scene, n->of, n->other, to, &later, n->needs->error);
     if (status != EBPO_OK)
         return status;
     /* more than the effect of rounding between these times, even if all other terms are 0 */
@@ -127,7 +127,7 @@ static ebpo_status come_near(const nearing *n, double from, double to, int halvi
     double motion, middle = from + (to - from) / 2;
     ebpo_scene_space box;
     bool any = false;
-    ebpo_status status = motion_seen(n, from, to, &motion);
+    ebpo_status status = relative_motion(n, from, to, &motion);
     if (status == EBPO_OK)
         status = near_box(n, from, to, motion, &box, &any);
     if (status != EBPO_OK || !any || is_within(&box, n->need))

@@ -210,7 +210,7 @@ typedef struct packing {
     ebpo_scene_needs needs;
     ebpo_pack_options how;
     const char *folder;
-    char *making; /* name of the folder until it is complete */
+    char *temporary; /* name of the folder until it is complete */
     ebpo_scene_packed *files;
     ebpo_error *error;
 } packing;
@@ -252,10 +252,10 @@ static void remove_folder(const ebpo_scene *scene, const char *folder)
 
 static ebpo_status publish_folder(packing *p)
 {
-    ebpo_status status = ebpo_folder_publish(p->making, p->folder, p->error);
+    ebpo_status status = ebpo_folder_publish(p->temporary, p->folder, p->error);
     if (status == EBPO_OK) {
-        free(p->making);
-        p->making = NULL;
+        free(p->temporary);
+        p->temporary = NULL;
     }
     return status;
 }
@@ -291,9 +291,9 @@ static ebpo_status write_file(packing *p, uint64_t number, uint64_t target)
     ebpo_subset_options o = ebpo_scene_need_options(&p->needs, number);
     char name[40];
     scene_packed_name(number, name);
-    char *path = path_in(p->making, name);
+    char *path = path_in(p->temporary, name);
     if (!path)
-        return ebpo_fail_memory(p->error, strlen(p->making));
+        return ebpo_fail_memory(p->error, strlen(p->temporary));
     uint64_t before = bytes_read(file);
     o.target_bytes = target;
     o.threads = p->how.threads;
@@ -395,23 +395,23 @@ ebpo_status ebpo_scene_pack(ebpo_scene *scene, const char *folder, double from, 
     ebpo_scene_packed *list = NULL;
     ebpo_status status = pack_check(&p, options);
     if (status == EBPO_OK)
-        status = ebpo_folder_begin(folder, &p.making, error);
+        status = ebpo_folder_begin(folder, &p.temporary, error);
     if (status == EBPO_OK)
         status = scene_plan_needs(&p.needs);
     if (status == EBPO_OK)
         status = write_files(&p);
     if (status == EBPO_OK)
-        status = scene_write_packed(scene, p.files, p.making, error);
+        status = scene_write_packed(scene, p.files, p.temporary, error);
     if (status == EBPO_OK)
         status = list_packed(&p, &list);
     if (status == EBPO_OK)
         status = publish_folder(&p);
     if (status == EBPO_OK && scene->models_count && take)
         (void)take(user, list, scene->models_count);
-    if (p.making)
-        remove_folder(scene, p.making);
+    if (p.temporary)
+        remove_folder(scene, p.temporary);
     free(list);
-    free(p.making);
+    free(p.temporary);
     free(p.files);
     free(p.needs.files);
     return status;

@@ -221,10 +221,10 @@ typedef struct ebpo_haptic_ball_result {
  * EBPO_HAPTIC_INCOMPLETE: then the proxy's path depends on the times at which boxes were loaded.
  *
  * The force is stiffness times the vector from device to proxy, minus damping times the device
- * velocity. The force never points towards faces that the spring pushes away from, except for 1e-7
- * of its length. The force is reduced if needed, so that for any motion the total energy given to
- * the device is at most the energy taken from the device, plus stiffness times the square of the
- * longest step of the device.
+ * velocity. Damping never turns the force towards a face that the spring pushes the device away
+ * from: the part of the force towards this face is at most 1e-7 of the force's length. The force is
+ * reduced if needed, so that for any motion the total energy given to the device is at most the
+ * energy taken from the device, plus stiffness times the square of the longest step of the device.
  *
  * Threads: one per object.
  */
