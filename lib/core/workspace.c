@@ -3,8 +3,8 @@
  * a pool, and those below a page come from malloc. Each extent is a holder of its workspace, so the
  * workspace and the extent may be freed in any order. Pages of a file count towards the budget only
  * while resident: loops release them between pieces of work (ebpo_release_pages), and written data
- * stays in the file. Any thread may allocate and free. docs/develop/design.md describes how a build
- * keeps to a budget. */
+ * stays in the file. Any thread may allocate and free. docs/develop/building.md describes how a
+ * build keeps to a budget. */
 #include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>

@@ -630,20 +630,20 @@ uint32_t ebpo_mesh_group_of(const ebpo_mesh_groups *groups, uint64_t face)
 /* --- named groups in place of components; a vertex may be in several groups --- */
 
 /* Lists each group's vertices once, in the order of its faces; only counts them if `of` is NULL.
- * `seen`: [vertex_count] last group that used the vertex. */
-static void list_vertices(ebpo_components *c, uint32_t *seen)
+ * `last_group`: [vertex_count] last group that used the vertex. */
+static void list_vertices(ebpo_components *c, uint32_t *last_group)
 {
     const ebpo_mesh *mesh = c->mesh;
     uint64_t count = 0;
-    ebpo_array_fill(mesh->workspace, seen, 0xff, mesh->vertex_count * sizeof *seen);
+    ebpo_array_fill(mesh->workspace, last_group, 0xff, mesh->vertex_count * sizeof *last_group);
     for (uint64_t n = 0; n < c->count; n++) {
         c->vertices.begin[n] = count;
         EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, i, c->faces.begin[n], c->faces.begin[n + 1])
             for (uint64_t k = 0; k < 3; k++) {
                 uint32_t v = mesh->faces[3 * (uint64_t)c->faces.of[i] + k];
-                if (seen[v] == (uint32_t)n)
+                if (last_group[v] == (uint32_t)n)
                     continue;
-                seen[v] = (uint32_t)n;
+                last_group[v] = (uint32_t)n;
                 if (c->vertices.of)
                     c->vertices.of[count] = v;
                 count++;
@@ -662,15 +662,15 @@ static ebpo_status gather_vertices(ebpo_components *c, ebpo_error *error)
 {
     ebpo_workspace *workspace = c->mesh->workspace;
     ebpo_number_groups *v = &c->vertices;
-    uint32_t *seen = ebpo_array_alloc(workspace, c->mesh->vertex_count, sizeof *seen);
+    uint32_t *last_group = ebpo_array_alloc(workspace, c->mesh->vertex_count, sizeof *last_group);
     v->begin = ebpo_array_alloc(workspace, c->count + 1, sizeof *v->begin);
-    if (seen && v->begin) {
-        list_vertices(c, seen);
+    if (last_group && v->begin) {
+        list_vertices(c, last_group);
         v->of = ebpo_array_alloc(workspace, v->begin[c->count], sizeof *v->of);
     }
     if (v->of)
-        list_vertices(c, seen);
-    ebpo_array_free(workspace, seen);
+        list_vertices(c, last_group);
+    ebpo_array_free(workspace, last_group);
     if (!v->of)
         return ebpo_workspace_fail(workspace, c->mesh->vertex_count * sizeof *v->of, error);
     for (uint64_t n = 0; n < c->count; n++)

@@ -87,7 +87,7 @@ EBPO_MUST_USE ebpo_status ebpo_import_position(ebpo_import_build *b, const doubl
 /* Adds a vertex of a binary file, which holds floats. */
 EBPO_MUST_USE ebpo_status ebpo_import_vertex(ebpo_import_build *b, const float xyz[3]);
 
-/* Adds a row to a table, with as many values as the sort has columns. Returns the errors of
+/* Adds a row to the table `sort`, with one value for each of its columns. Returns the errors of
  * ebpo_import_position. */
 EBPO_MUST_USE ebpo_status ebpo_import_row(ebpo_import_build *b, ebpo_import_sort sort,
                                           const float *values);

@@ -22,26 +22,26 @@
 
 /* --- the PLY with the places of findings in colour --- */
 
-typedef struct places_picture {
+typedef struct findings_picture {
     const ebpo_mesh *mesh;
     uint8_t *face; /* kind of finding shown at each vertex or face, by index in the current mesh */
     ebpo_publish target;
-} places_picture;
+} findings_picture;
 
 #define PICTURE_INIT                  \
     {                                 \
         NULL, NULL, EBPO_PUBLISH_INIT \
     }
 
-static ebpo_status begin_picture(places_picture *picture, const ebpo_mesh *mesh, const char *path,
+static ebpo_status begin_picture(findings_picture *picture, const ebpo_mesh *mesh, const char *path,
                                  ebpo_error *error);
 /* Notes a place in the picture. `faces`: indices in the current mesh. */
-static void note_in_picture(places_picture *picture, const ebpo_found *found, const uint64_t *faces,
-                            uint64_t count);
+static void note_in_picture(findings_picture *picture, const ebpo_found *found,
+                            const uint64_t *faces, uint64_t count);
 /* Writes the picture. `report` is for the legend. */
-static ebpo_status write_picture(places_picture *picture, const ebpo_mesh_report *report,
+static ebpo_status write_picture(findings_picture *picture, const ebpo_mesh_report *report,
                                  ebpo_error *error);
-static void end_picture(places_picture *picture);
+static void end_picture(findings_picture *picture);
 
 static const struct finding_kind {
     const char *name;
@@ -84,7 +84,7 @@ typedef struct finding_search {
     ebpo_stars stars;
     uint64_t *faces; /* faces around the current place */
     uint64_t face_count, face_capacity;
-    places_picture picture;
+    findings_picture picture;
 } finding_search;
 
 /* A place with its sort key: its kind, then the index in the report. */
@@ -357,7 +357,7 @@ ebpo_status ebpo_mesh_findings(const ebpo_mesh *mesh, const ebpo_findings_option
 
 enum { NOTHING = UINT8_MAX, VERTEX_BYTES = 3 * 8, FACE_BYTES = 1 + 3 * 4 + 3 };
 
-static ebpo_status begin_picture(places_picture *picture, const ebpo_mesh *mesh, const char *path,
+static ebpo_status begin_picture(findings_picture *picture, const ebpo_mesh *mesh, const char *path,
                                  ebpo_error *error)
 {
     picture->mesh = mesh;
@@ -368,8 +368,8 @@ static ebpo_status begin_picture(places_picture *picture, const ebpo_mesh *mesh,
     return ebpo_publish_begin(&picture->target, path, error);
 }
 
-static void note_in_picture(places_picture *picture, const ebpo_found *found, const uint64_t *faces,
-                            uint64_t count)
+static void note_in_picture(findings_picture *picture, const ebpo_found *found,
+                            const uint64_t *faces, uint64_t count)
 {
     uint8_t kind = (uint8_t)found->kind;
     for (uint64_t i = 0; i < count; i++)
@@ -395,7 +395,7 @@ static uint64_t count_of(const ebpo_mesh_report *r, int kind)
     return counts[kind];
 }
 
-static void print_header(const places_picture *p, FILE *f, const ebpo_mesh_report *report)
+static void print_header(const findings_picture *p, FILE *f, const ebpo_mesh_report *report)
 {
     fputs("ply\nformat binary_little_endian 1.0\n", f);
     for (int kind = 0; kind < EBPO_FINDING_KINDS; kind++) {
@@ -438,7 +438,7 @@ static uint32_t *in_source_order(const ebpo_mesh *mesh, const uint32_t *source, 
     return order;
 }
 
-static bool put_vertex(const places_picture *p, FILE *f, uint64_t v)
+static bool put_vertex(const findings_picture *p, FILE *f, uint64_t v)
 {
     uint8_t row[VERTEX_BYTES];
     double x[3];
@@ -452,7 +452,7 @@ static bool put_vertex(const places_picture *p, FILE *f, uint64_t v)
 }
 
 /* Writes a face. `rank`: rank of each vertex in written order; NULL: its index. */
-static bool put_face(const places_picture *p, FILE *f, uint64_t face, const uint32_t *rank)
+static bool put_face(const findings_picture *p, FILE *f, uint64_t face, const uint32_t *rank)
 {
     uint8_t row[FACE_BYTES] = { 3 };
     for (int k = 0; k < 3; k++) {
@@ -483,7 +483,7 @@ static ebpo_status order_all(const ebpo_mesh *mesh, written *w, ebpo_error *erro
     return EBPO_OK;
 }
 
-static bool put_all(const places_picture *p, FILE *f, const written *w)
+static bool put_all(const findings_picture *p, FILE *f, const written *w)
 {
     const ebpo_mesh *mesh = p->mesh;
     bool good = true;
@@ -494,7 +494,7 @@ static bool put_all(const places_picture *p, FILE *f, const written *w)
     return good;
 }
 
-static ebpo_status write_picture(places_picture *picture, const ebpo_mesh_report *report,
+static ebpo_status write_picture(findings_picture *picture, const ebpo_mesh_report *report,
                                  ebpo_error *error)
 {
     const ebpo_mesh *mesh = picture->mesh;
@@ -514,7 +514,7 @@ static ebpo_status write_picture(places_picture *picture, const ebpo_mesh_report
     return status == EBPO_OK ? ebpo_publish_commit(&picture->target, error) : status;
 }
 
-static void end_picture(places_picture *picture)
+static void end_picture(findings_picture *picture)
 {
     if (picture->mesh)
         ebpo_array_free(picture->mesh->workspace, picture->face);

@@ -220,9 +220,9 @@ typedef struct casting {
 /* State of one thread. */
 typedef struct caster {
     const casting *all;
-    tally *of;     /* [host_count] */
-    int32_t *seen; /* [host_count] hosts that the shell's rays cross */
-    uint64_t seen_count;
+    tally *of;        /* [host_count] */
+    int32_t *crossed; /* [host_count] hosts that the shell's rays cross */
+    uint64_t crossed_count;
     uint32_t shell;
     int sample;
     ebpo_point_box at; /* the current sample, as a box of zero extent */
@@ -242,7 +242,7 @@ static tally *tally_of(caster *w, int32_t host)
     tally *t = &w->of[host];
     if (t->shell != w->shell + 1) {
         *t = (tally){ .shell = w->shell + 1 };
-        w->seen[w->seen_count++] = host;
+        w->crossed[w->crossed_count++] = host;
     }
     return t;
 }
@@ -270,12 +270,12 @@ static uint32_t count_hosts(const caster *w, int32_t *around)
 {
     uint32_t count = 0;
     *around = 0;
-    for (uint64_t i = 0; i < w->seen_count; i++) {
+    for (uint64_t i = 0; i < w->crossed_count; i++) {
         bool within = true;
         for (int d = 0; d <= w->sample; d++)
-            within &= w->of[w->seen[i]].winding[d] != 0;
+            within &= w->of[w->crossed[i]].winding[d] != 0;
         count += within;
-        *around += within ? w->of[w->seen[i]].winding[0] : 0;
+        *around += within ? w->of[w->crossed[i]].winding[0] : 0;
     }
     return count;
 }
@@ -292,7 +292,7 @@ static ebpo_status cast_rays(void *context, uint64_t begin, uint64_t end, unsign
         uint32_t hosts = 1;
         int32_t around = 0;
         w->shell = (uint32_t)i;
-        w->seen_count = 0;
+        w->crossed_count = 0;
         for (w->sample = 0; hosts && w->sample < EBPO_SHELL_SAMPLES; w->sample++) {
             const double *at = all->n->shells[i].sample[w->sample];
             memcpy(w->at.min, at, sizeof w->at.min);
@@ -341,8 +341,8 @@ static ebpo_status make_casters(casting *all, ebpo_error *error)
         caster *w = &all->caster[t];
         w->all = all;
         w->of = ebpo_array_alloc(workspace, all->host_count, sizeof *w->of);
-        w->seen = ebpo_array_alloc(workspace, all->host_count, sizeof *w->seen);
-        if (!w->of || !w->seen)
+        w->crossed = ebpo_array_alloc(workspace, all->host_count, sizeof *w->crossed);
+        if (!w->of || !w->crossed)
             return ebpo_workspace_fail(workspace, all->host_count * sizeof *w->of, error);
         memset(w->of, 0, all->host_count * sizeof *w->of);
     }
@@ -354,7 +354,7 @@ static void free_casting(casting *all)
     ebpo_workspace *workspace = all->n->components->mesh->workspace;
     for (unsigned t = 0; all->caster && t < all->n->threads; t++) {
         ebpo_array_free(workspace, all->caster[t].of);
-        ebpo_array_free(workspace, all->caster[t].seen);
+        ebpo_array_free(workspace, all->caster[t].crossed);
     }
     free(all->caster);
     ebpo_box_tree_free(&all->faces);
