@@ -21,15 +21,15 @@
 #include "geometry/predicates.h"
 #include "geometry/level_nodes.h"
 
-ebpo_status ebpo_two_models_begin(ebpo_two_models *two, ebpo_pair_faces *tables, ebpo_error *error)
+ebpo_status ebpo_two_models_begin(ebpo_two_models *two, ebpo_pair_faces *places, ebpo_error *error)
 {
-    const ebpo_collision *q = tables->collision;
+    const ebpo_collision *q = places->collision;
     ebpo_status status = EBPO_OK;
     *two = (ebpo_two_models){ 0 };
     for (int i = 0; i < 2 && status == EBPO_OK; i++) {
         int caller = (int)q->turned ^ i;
         const ebpo_pose *pose = caller ? &q->options.pose_b : &q->options.pose_a;
-        two->faces[i] = &tables->side[caller];
+        two->faces[i] = &places->side[caller];
         two->solid[i] = q->model[i]->info->solid;
         two->rule[i] = q->model[i]->info->rule;
         status = ebpo_posed_solid_make(&two->model[i], q->model[i], pose, error);
@@ -47,7 +47,7 @@ void ebpo_two_models_end(ebpo_two_models *two)
     ebpo_face_cuts_free(&two->others);
 }
 
-void ebpo_two_models_release(ebpo_two_models *two)
+void ebpo_two_models_let_go(ebpo_two_models *two)
 {
     for (int i = 0; i < 2; i++)
         ebpo_context_let_go(two->context[i]);

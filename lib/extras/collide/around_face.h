@@ -23,7 +23,7 @@ typedef struct ebpo_two_models {
 EBPO_MUST_USE ebpo_status ebpo_two_models_begin(ebpo_two_models *two, ebpo_pair_faces *places,
                                                 ebpo_error *error);
 /* Releases the memory of subtrees until the next query. */
-void ebpo_two_models_release(ebpo_two_models *two);
+void ebpo_two_models_let_go(ebpo_two_models *two);
 /* Returns the number of subtrees that `two` has loaded. */
 uint64_t ebpo_two_models_loads(const ebpo_two_models *two);
 void ebpo_two_models_end(ebpo_two_models *two);

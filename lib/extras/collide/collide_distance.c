@@ -393,9 +393,9 @@ static ebpo_status distance_of_accels(const ebpo_collision *q, const ebpo_accel 
 static ebpo_status inspect_pair(node_search *s, const ebpo_node_gap *pair, ebpo_error *error)
 {
     const ebpo_accel *accel[2];
-    bool any;
-    ebpo_status status = ebpo_subtree_search_load(&s->subtrees, pair->node, accel, &any, error);
-    return status == EBPO_OK && any
+    bool there;
+    ebpo_status status = ebpo_subtree_search_load(&s->subtrees, pair->node, accel, &there, error);
+    return status == EBPO_OK && there
                ? distance_of_accels(s->subtrees.collision, accel, pair->gap == 0, s->n, error)
                : status;
 }

@@ -20,39 +20,39 @@
 /* Eight points or vectors. */
 typedef struct place8 {
     f8 x[3];
-} vec8;
+} place8;
 
 typedef struct triangle8 {
-    vec8 corner[3];
+    place8 corner[3];
 } triangle8;
 
-EBPO_EIGHT f8 vec_dot8(const vec8 *a, const vec8 *b)
+EBPO_EIGHT f8 place_dot8(const place8 *a, const place8 *b)
 {
     return f8_add(f8_add(f8_mul(a->x[0], b->x[0]), f8_mul(a->x[1], b->x[1])),
                   f8_mul(a->x[2], b->x[2]));
 }
-EBPO_EIGHT vec8 vec_minus8(const vec8 *a, const vec8 *b)
+EBPO_EIGHT place8 place_minus8(const place8 *a, const place8 *b)
 {
-    vec8 out;
+    place8 out;
     for (int k = 0; k < 3; k++)
         out.x[k] = f8_sub(a->x[k], b->x[k]);
     return out;
 }
 /* Returns a + t b. */
-EBPO_EIGHT vec8 vec_along8(const vec8 *a, f8 t, const vec8 *b)
+EBPO_EIGHT place8 place_along8(const place8 *a, f8 t, const place8 *b)
 {
-    vec8 out;
+    place8 out;
     for (int k = 0; k < 3; k++)
         out.x[k] = f8_add(a->x[k], f8_mul(t, b->x[k]));
     return out;
 }
 /* Returns a d - b c. */
 EBPO_EIGHT f8 minor_of8(f8 a, f8 b, f8 c, f8 d) { return f8_sub(f8_mul(a, d), f8_mul(b, c)); }
-EBPO_EIGHT vec8 vec_cross8(const vec8 *a, const vec8 *b)
+EBPO_EIGHT place8 place_cross8(const place8 *a, const place8 *b)
 {
-    return (vec8){ { minor_of8(a->x[1], a->x[2], b->x[1], b->x[2]),
-                     minor_of8(a->x[2], a->x[0], b->x[2], b->x[0]),
-                     minor_of8(a->x[0], a->x[1], b->x[0], b->x[1]) } };
+    return (place8){ { minor_of8(a->x[1], a->x[2], b->x[1], b->x[2]),
+                       minor_of8(a->x[2], a->x[0], b->x[2], b->x[0]),
+                       minor_of8(a->x[0], a->x[1], b->x[0], b->x[1]) } };
 }
 /* Limits t to 0 .. 1; NaN becomes 0. */
 EBPO_EIGHT f8 within_unit8(f8 t) { return f8_min(f8_max(t, f8_all(0)), f8_all(1)); }
@@ -60,10 +60,10 @@ EBPO_EIGHT f8 within_unit8(f8 t) { return f8_min(f8_max(t, f8_all(0)), f8_all(1)
 /* The nearest pair of points so far: the vector from A's point to B's, and its squared length. */
 typedef struct nearest8 {
     f8 square;
-    vec8 direction;
+    place8 direction;
 } nearest8;
 
-EBPO_EIGHT void offer_nearest8(nearest8 *n, const vec8 *direction, f8 square)
+EBPO_EIGHT void offer_nearest8(nearest8 *n, const place8 *direction, f8 square)
 {
     f8 better = f8_less(square, n->square);
     n->square = f8_pick(better, square, n->square);
@@ -73,7 +73,7 @@ EBPO_EIGHT void offer_nearest8(nearest8 *n, const vec8 *direction, f8 square)
 
 /* Edges with their squared lengths and the reciprocals. */
 typedef struct edges8 {
-    vec8 edge[3];
+    place8 edge[3];
     f8 square[3], inverse[3];
 } edges8;
 
@@ -82,8 +82,8 @@ EBPO_EIGHT edges8 edges_of8(const triangle8 *t)
     edges8 out;
 #pragma GCC unroll 3
     for (int i = 0; i < 3; i++) {
-        out.edge[i] = vec_minus8(&t->corner[i == 2 ? 0 : i + 1], &t->corner[i]);
-        out.square[i] = vec_dot8(&out.edge[i], &out.edge[i]);
+        out.edge[i] = place_minus8(&t->corner[i == 2 ? 0 : i + 1], &t->corner[i]);
+        out.square[i] = place_dot8(&out.edge[i], &out.edge[i]);
         out.inverse[i] = f8_div(f8_all(1), out.square[i]);
     }
     return out;
@@ -93,16 +93,16 @@ EBPO_EIGHT edges8 edges_of8(const triangle8 *t)
 EBPO_EIGHT void offer_edges8(nearest8 *n, const place8 *p, const edges8 *a, int i, const place8 *q,
                              const edges8 *b, int j)
 {
-    const vec8 *e = &a->edge[i], *f = &b->edge[j];
-    vec8 w = vec_minus8(q, p);
-    f8 ef = vec_dot8(e, f), ew = vec_dot8(e, &w), fw = vec_dot8(f, &w);
+    const place8 *e = &a->edge[i], *f = &b->edge[j];
+    place8 w = place_minus8(q, p);
+    f8 ef = place_dot8(e, f), ew = place_dot8(e, &w), fw = place_dot8(f, &w);
     f8 area = minor_of8(a->square[i], ef, ef, b->square[j]);
     f8 s = within_unit8(f8_div(minor_of8(ew, fw, ef, b->square[j]), area));
     f8 t = within_unit8(f8_mul(f8_sub(f8_mul(s, ef), fw), b->inverse[j]));
     s = within_unit8(f8_mul(f8_add(f8_mul(t, ef), ew), a->inverse[i]));
-    vec8 direction = vec_along8(&w, t, f);
-    direction = vec_along8(&direction, f8_sub(f8_all(0), s), e);
-    offer_nearest8(n, &direction, vec_dot8(&direction, &direction));
+    place8 direction = place_along8(&w, t, f);
+    direction = place_along8(&direction, f8_sub(f8_all(0), s), e);
+    offer_nearest8(n, &direction, place_dot8(&direction, &direction));
 }
 
 /* Compares with the corners that are above the interior of a face, and their nearest points on it.
@@ -110,19 +110,19 @@ EBPO_EIGHT void offer_edges8(nearest8 *n, const place8 *p, const edges8 *a, int 
 EBPO_EIGHT void offer_corners8(nearest8 *n, const triangle8 *face, const edges8 *of,
                                const triangle8 *corners, float sign)
 {
-    const vec8 *e = &of->edge[0];
-    vec8 f = vec_minus8(&face->corner[2], &face->corner[0]), normal = vec_cross8(e, &f),
-         to_e = vec_cross8(&f, &normal), to_f = vec_cross8(&normal, e);
-    f8 inverse = f8_div(f8_all(1), vec_dot8(&normal, &normal)), zero = f8_all(0);
+    const place8 *e = &of->edge[0];
+    place8 f = place_minus8(&face->corner[2], &face->corner[0]), normal = place_cross8(e, &f),
+           to_e = place_cross8(&f, &normal), to_f = place_cross8(&normal, e);
+    f8 inverse = f8_div(f8_all(1), place_dot8(&normal, &normal)), zero = f8_all(0);
 #pragma GCC unroll 3
     for (int i = 0; i < 3; i++) {
-        vec8 d = vec_minus8(&corners->corner[i], &face->corner[0]);
-        f8 s = f8_mul(vec_dot8(&d, &to_e), inverse), t = f8_mul(vec_dot8(&d, &to_f), inverse);
+        place8 d = place_minus8(&corners->corner[i], &face->corner[0]);
+        f8 s = f8_mul(place_dot8(&d, &to_e), inverse), t = f8_mul(place_dot8(&d, &to_f), inverse);
         f8 over = f8_and(f8_and(f8_at_most(zero, s), f8_at_most(zero, t)),
                          f8_at_most(f8_add(s, t), f8_all(1)));
-        vec8 up = vec_along8(&d, f8_sub(zero, s), e);
-        up = vec_along8(&up, f8_sub(zero, t), &f);
-        f8 square = f8_pick(over, vec_dot8(&up, &up), f8_all(INFINITY));
+        place8 up = place_along8(&d, f8_sub(zero, s), e);
+        up = place_along8(&up, f8_sub(zero, t), &f);
+        f8 square = f8_pick(over, place_dot8(&up, &up), f8_all(INFINITY));
         for (int k = 0; k < 3; k++)
             up.x[k] = f8_mul(up.x[k], f8_all(-sign));
         offer_nearest8(n, &up, square);
@@ -132,7 +132,7 @@ EBPO_EIGHT void offer_corners8(nearest8 *n, const triangle8 *face, const edges8 
 /* Bounds eight distances, and computes the vectors between near points. No coordinate is greater
  * than `size`, or differs by more than `error` from its exact value. */
 EBPO_EIGHT void bounds_of_pairs8(const triangle8 *a, const triangle8 *b, float size, float error,
-                                 f8 *low, f8 *high, vec8 *direction)
+                                 f8 *low, f8 *high, place8 *direction)
 {
     edges8 of_a = edges_of8(a), of_b = edges_of8(b);
     nearest8 n = { f8_all(INFINITY), { { f8_all(0), f8_all(0), f8_all(0) } } };
@@ -143,10 +143,12 @@ EBPO_EIGHT void bounds_of_pairs8(const triangle8 *a, const triangle8 *b, float s
             offer_edges8(&n, &a->corner[i], &of_a, i, &b->corner[j], &of_b, j);
     offer_corners8(&n, a, &of_a, b, -1);
     offer_corners8(&n, b, &of_b, a, 1);
-    f8 most = f8_max3(vec_dot8(&n.direction, &a->corner[0]), vec_dot8(&n.direction, &a->corner[1]),
-                      vec_dot8(&n.direction, &a->corner[2])),
-       least = f8_min3(vec_dot8(&n.direction, &b->corner[0]), vec_dot8(&n.direction, &b->corner[1]),
-                       vec_dot8(&n.direction, &b->corner[2]));
+    f8 most =
+           f8_max3(place_dot8(&n.direction, &a->corner[0]), place_dot8(&n.direction, &a->corner[1]),
+                   place_dot8(&n.direction, &a->corner[2])),
+       least =
+           f8_min3(place_dot8(&n.direction, &b->corner[0]), place_dot8(&n.direction, &b->corner[1]),
+                   place_dot8(&n.direction, &b->corner[2]));
     f8 length = f8_sqrt(n.square), lost = f8_all(40 * 0x1p-24f * size + 4 * error + 0x1p-60f);
     f8 gap = f8_div(f8_mul(f8_sub(least, most), f8_all(1 - 0x1p-20f)), length);
     *low = f8_pick(f8_less(f8_all(0x1p-110f), n.square), f8_sub(gap, lost), f8_all(-1));
@@ -548,7 +550,7 @@ static bool visit_blocks(ebpo_gap_search *g, const uint32_t block[2])
                   q = load_faces8(b, near.lane[1] + at, shift);
         unsigned used = near.count - at < 8 ? (1u << (near.count - at)) - 1 : 255;
         f8 low, high;
-        vec8 direction;
+        place8 direction;
         bounds_of_pairs8(&p, &q, size, error, &low, &high, &direction);
         update_best(g, high, &direction, used, block, &near, at);
         intersects |= add_candidates(g, low, used, block, &near, at);

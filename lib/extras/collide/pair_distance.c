@@ -36,7 +36,7 @@ typedef struct search {
 
 /* Keeps the points p and q if they are nearer. first: p is of A (0) or B (1). */
 static void offer_points(search *s, int first, const double p[3], const double q[3], int on_p,
-                         int on_q, double end_distance)
+                         int on_q, double space)
 {
     double d[3];
     ebpo_vec3_subtract(p, q, d);
@@ -48,7 +48,7 @@ static void offer_points(search *s, int first, const double p[3], const double q
     memcpy(s->point[!first], q, sizeof s->point[0]);
     s->feature[first] = on_p;
     s->feature[!first] = on_q;
-    s->end_distance = end_distance;
+    s->space = space;
 }
 
 /* --- edges with edges --- */
@@ -86,9 +86,9 @@ static void offer_edges(search *s, int i, int j)
     point_along(p, e, on_e, x);
     point_along(q, f, on_f, y);
     bool edges = on_e > 0 && on_e < 1 && on_f > 0 && on_f < 1;
-    double end_distance = fmin(distance_to_end(on_e, ee), distance_to_end(on_f, ff));
+    double space = fmin(capacity_on_edge(on_e, ee), capacity_on_edge(on_f, ff));
     offer_points(s, 0, x, y, on_edge(i, on_e), on_edge(j, on_f),
-                 edges && !(area > 0x1p-20 * ee * ff) ? 0 : end_distance);
+                 edges && !(area > 0x1p-20 * ee * ff) ? 0 : space);
 }
 
 /* --- corners with planes --- */
@@ -127,7 +127,7 @@ static bool make_relative(const double a[3][3], const double b[3][3], search *s)
 {
     s->reach = 0;
     s->square = INFINITY;
-    s->end_distance = 0;
+    s->space = 0;
     memset(s->point, 0, sizeof s->point);
     memset(s->feature, 0, sizeof s->feature);
     for (int i = 0; i < 3; i++) {
@@ -166,12 +166,12 @@ static bool is_on(int corner, int feature)
 
 /* Returns true if the features of the points are certainly nearest. This holds if, along n, A's
  * other corners are strictly behind A's point and B's other corners are ahead of B's point, by more
- * than the error of n and of the points: docs/develop/collision.md, "Distance of two faces".
+ * than the error of n and of the points: docs/develop/collision.md, "Which features are nearest".
  */
 static bool features_certain(const search *s, const double n[3])
 {
     const double enough = 0x1p-24;
-    if (!(s->end_distance > enough * s->reach))
+    if (!(s->space > enough * s->reach))
         return false;
     for (int of = 0; of < 2; of++)
         for (int i = 0; i < 3; i++) {

@@ -84,7 +84,7 @@ static void transform_node(const ebpo_accel_pair *p, int side, uint32_t node, eb
     for (int i = 0; i < 3; i++)
         out->origin[i] = side == 0 ? origin[i]
                                    : p->turn[i][0] * origin[0] + p->turn[i][1] * origin[1] +
-                                         p->turn[i][2] * origin[2] + p->origin[i];
+                                         p->turn[i][2] * origin[2] + p->place[i];
     out->node = node;
     out->lanes = (uint8_t)((1u << b->count) - 1);
 }
@@ -132,7 +132,7 @@ EBPO_EIGHT two_nodes two_nodes_of(const ebpo_accel_pair *pair, const ebpo_turned
     float size = a->size + b->size + far;
     t.slack = 0x1p-18f * size + pair->doubt;
     t.cylinder_slack = pair->cylinder_share * size + pair->doubt;
-    t.sine = 1 + pair->sine_margin;
+    t.sine = 1 + pair->sine_capacity;
     t.cylinders = a->cylinders | b->cylinders;
     return t;
 }

@@ -128,7 +128,7 @@ static void visit_all_pairs(ebpo_accel_pair *out)
     out->unit[0] = out->unit[1] = 1;
     for (int i = 0; i < 9; i++)
         out->turn[i / 3][i % 3] = i % 4 == 0;
-    out->origin[0] = out->origin[1] = out->origin[2] = 0;
+    out->place[0] = out->place[1] = out->place[2] = 0;
     to_floats((const double(*)[3])out->turn, out->into[0], out->size[0]);
     to_floats((const double(*)[3])out->turn, out->into[1], out->size[1]);
     out->doubt = INFINITY;
@@ -145,7 +145,7 @@ static bool turned_boxes_apart(const ebpo_accel_pair *p)
         double size = first + (double)p->doubt;
         for (int k = 0; k < 3; k++)
             size += fabs(p->turn[i][k]) * second;
-        if (fabs(p->origin[i]) > size * (1 + 0x1p-40))
+        if (fabs(p->place[i]) > size * (1 + 0x1p-40))
             return true;
     }
     return false;
@@ -198,7 +198,7 @@ void ebpo_accel_pair_make(ebpo_accel_pair *out, const ebpo_accel *const accel[2]
     double error_bound = posing[0]->posing.error_bound + posing[1]->posing.error_bound;
     out->doubt = (float)(0x1p-44 * reach * unit) + 0x1p-100f;
     out->cylinder_share = (float)(0x1p-17 + 8 * error_bound);
-    out->sine_margin = (float)(0x1p-17 + 16 * error_bound);
+    out->sine_capacity = (float)(0x1p-17 + 16 * error_bound);
     out->apart = turned_boxes_apart(out);
 }
 

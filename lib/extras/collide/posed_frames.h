@@ -96,7 +96,7 @@ typedef struct ebpo_accel_pair {
     const ebpo_block_posing *posing[2];
     float unit[2];     /* factor of lengths in each frame */
     double turn[3][3]; /* rotates a vector of the second frame into the first */
-    double origin[3];  /* origin of the second frame in the first */
+    double place[3];   /* origin of the second frame in the first */
     /* In floats: into[i] rotates a vector of the other frame into frame i; size has the absolute
      * values of the entries, rounded up. */
     float into[2][3][3], size[2][3][3];

@@ -228,7 +228,7 @@ static bool inspect_face(relation_search *r, int m, uint64_t face)
     visited_face f = { r, m };
     if ((is_mixed(r) && r->two.solid[m]) || has_bit(r->seen[m], face))
         return true;
-    set_bit(r->visited[m], face);
+    set_bit(r->seen[m], face);
     r->status = ebpo_visit_around_face(&r->two, m, face, note_piece, &f, r->error);
     if (r->status == EBPO_OK && ++r->inspected % 64 == 0 &&
         !ebpo_progress_step(&r->collision->options.progress, stage, 0, 0, r->error))
@@ -300,7 +300,7 @@ static ebpo_status take_pairs(relation_search *r, ebpo_pairs_fn take, ebpo_error
 {
     const ebpo_collision *q = r->collision;
     ebpo_collide_options options = options_left(r);
-    ebpo_two_models_release(&r->two);
+    ebpo_two_models_let_go(&r->two);
     ebpo_status status = ebpo_collide_all(q->collider, &options, take, r, error);
     if (status == EBPO_E_CANCELLED && ebpo_collision_is_late(q)) {
         r->open = true;
@@ -560,8 +560,8 @@ static ebpo_status find_relation(relation_search *r, ebpo_error *error)
     for (int m = 0; m < 2; m++) {
         uint64_t count = face_count(r, m);
         r->intersecting[m] = make_bits(count);
-        r->visited[m] = make_bits(count);
-        if (!r->intersecting[m] || !r->visited[m])
+        r->seen[m] = make_bits(count);
+        if (!r->intersecting[m] || !r->seen[m])
             return fail_bits(count, error);
     }
     if (!is_same(q))
@@ -585,7 +585,7 @@ static void end_search(relation_search *r)
     ebpo_pair_faces_end(&r->places);
     for (int m = 0; m < 2; m++) {
         free(r->intersecting[m]);
-        free(r->visited[m]);
+        free(r->seen[m]);
     }
 }
 

@@ -89,8 +89,8 @@ ebpo_status ebpo_subtree_search_begin(ebpo_subtree_search *s, const ebpo_collisi
     s->read_before = ebpo_collision_bytes_read(q);
     ebpo_status status = ebpo_node_gaps_begin(&s->nodes, q, error);
     for (int i = 0; i < 2 && status == EBPO_OK; i++) {
-        s->visited[i] = ebpo_alloc_zero(s->nodes.side[i].count + 1, sizeof *s->visited[i]);
-        if (!s->visited[i])
+        s->seen[i] = ebpo_alloc_zero(s->nodes.side[i].count + 1, sizeof *s->seen[i]);
+        if (!s->seen[i])
             return ebpo_fail_memory(error, s->nodes.side[i].count);
         if (!q->model[i]->whole)
             status = ebpo_context_new(q->model[i], &s->context[i], error);
@@ -105,7 +105,7 @@ void ebpo_subtree_search_end(ebpo_subtree_search *s)
     for (int i = 0; i < 2; i++) {
         c->loads += s->context[i] ? s->context[i]->loaded : 0;
         ebpo_context_free(s->context[i]);
-        free(s->visited[i]);
+        free(s->seen[i]);
     }
     ebpo_node_gaps_free(&s->nodes);
 }
@@ -130,17 +130,17 @@ int ebpo_subtree_search_side(const ebpo_subtree_search *s, const ebpo_posed_node
 static bool was_visited(const ebpo_subtree_search *s, const uint32_t number[2])
 {
     for (int i = 0; i < 2; i++)
-        if (s->collision->model[!i]->whole && s->visited[i][number[i]])
+        if (s->collision->model[!i]->whole && s->seen[i][number[i]])
             return true;
     return false;
 }
 
 ebpo_status ebpo_subtree_search_load(ebpo_subtree_search *s, const ebpo_posed_node node[2],
-                                     const ebpo_accel *accel[2], bool *any, ebpo_error *error)
+                                     const ebpo_accel *accel[2], bool *there, ebpo_error *error)
 {
     ebpo_collider *c = s->collision->collider;
     uint32_t number[2];
-    *any = false;
+    *there = false;
     for (int i = 0; i < 2; i++) {
         const ebpo_model *m = s->collision->model[i];
         number[i] = m->whole ? 0 : ebpo_entry_value(node[i].entry);
@@ -156,10 +156,10 @@ ebpo_status ebpo_subtree_search_load(ebpo_subtree_search *s, const ebpo_posed_no
             loaded ? EBPO_OK : ebpo_context_subtree(s->context[i], number[i], &loaded, error);
         if (status != EBPO_OK)
             return status;
-        c->subtrees += !s->visited[i][number[i]];
-        s->visited[i][number[i]] = true;
+        c->subtrees += !s->seen[i][number[i]];
+        s->seen[i][number[i]] = true;
         accel[i] = loaded;
     }
-    *any = true;
+    *there = true;
     return EBPO_OK;
 }

@@ -71,7 +71,7 @@ int ebpo_subtree_search_side(const ebpo_subtree_search *s, const ebpo_posed_node
  * before. */
 EBPO_MUST_USE ebpo_status ebpo_subtree_search_load(ebpo_subtree_search *s,
                                                    const ebpo_posed_node node[2],
-                                                   const ebpo_accel *accel[2], bool *any,
+                                                   const ebpo_accel *accel[2], bool *there,
                                                    ebpo_error *error);
 
 #endif

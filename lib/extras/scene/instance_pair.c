@@ -162,7 +162,7 @@ static ebpo_status omitted_of(const ebpo_scene *scene, uint64_t of, uint64_t oth
     memcpy(all.max, m->max, sizeof all.max);
     ebpo_status status = ebpo_scene_make_relative_box(scene, of, other, time, &seen, error);
     if (status == EBPO_OK)
-        *gap = gap_around(&all, &held, &relative.box) * relative.unit;
+        *gap = gap_around(&all, &held, &seen.box) * seen.unit;
     return status;
 }
 
