@@ -427,8 +427,7 @@ static ebpo_status inspect_new(searching *g, const ebpo_ranked *r, ebpo_error *e
     ebpo_ranked all = { r->node, deep_bound(g, r), OWNED };
     if (all.lower > ebpo_nearest_limit(g->n))
         return EBPO_OK;
-    return all.lower > r->lower ? ebpo_queue_push(g->c, &all, error)
-                                : search_below(g, r, error);
+    return all.lower > r->lower ? ebpo_queue_push(g->c, &all, error) : search_below(g, r, error);
 }
 
 static ebpo_status inspect_subtree(searching *g, const ebpo_ranked *r, ebpo_error *error)

@@ -117,7 +117,7 @@ cpu_family = 'wasm32'
 cpu = 'wasm32'
 endian = 'little'
 [built-in options]
-c_args = [${words%, }]
+c_args = [${words}'-DEBPO_NO_MESH_READERS']
 EOF
     [ -f "$folder/lib/build.ninja" ] ||
         meson setup "$folder/lib" "$root" --cross-file "$folder/emscripten.ini" --buildtype=plain \
