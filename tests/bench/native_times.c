@@ -110,8 +110,8 @@ static void print_times(const char *path, inputs *in, int rounds, bool portable)
         model->kernels = ebpo_query_kernels_base();
     require(fseek(in->file, 2 * sizeof(double), SEEK_SET) == 0, "inputs");
     time_rounds(context, in, rounds);
-    printf("{\"first hit\":%g,\"nearest\":%g,\"inside\":%g}", times[0][middle],
-           times[1][middle], times[2][middle]);
+    printf("{\"first hit\":%g,\"nearest\":%g,\"inside\":%g}", times[0][middle], times[1][middle],
+           times[2][middle]);
     ebpo_context_free(context);
     ebpo_model_free(model);
     ebpo_close(file);
