@@ -74,7 +74,8 @@ test("intersections of three's Raycaster are those of its meshes", { skip: !exis
   assert.ok(hits > 50 && others <= hits / 50, `${hits} hits, ${others} with another face`);
   const part = await open(new Blob([readFileSync(file)])), object = new THREE.Object3D();
   if (!part.stats.resident) { // the first ray fetches what it needs
-    const done = new Promise((ready) => { object.raycast = raycastOf(part, { ready }); }), raycaster = new THREE.Raycaster(centre.clone().addScaledVector(new THREE.Vector3(1, 2, 3), longest), new THREE.Vector3(-1, -2, -3).normalize());
+    const done = new Promise((ready) => { object.raycast = raycastOf(part, { ready }); });
+    const raycaster = new THREE.Raycaster(centre.clone().addScaledVector(new THREE.Vector3(1, 2, 3), longest), new THREE.Vector3(-1, -2, -3).normalize());
     assert.equal(raycaster.intersectObject(object).length, 0);
     await done;
     assert.ok(raycaster.intersectObject(object).length > 0);

@@ -15,7 +15,8 @@ jobs=${EBPO_JOBS:-$(nproc)}
 export NODE_PATH=/usr/share/nodejs
 # The module contains no path of the build; Meson's paths are relative.
 relative=$(realpath --relative-to="$folder/lib" "$root")
-flags="-O3 -msimd128 -ffunction-sections -fdata-sections -Wno-ignored-optimization-argument" # in one line: gmp.h has them
+# The flags are in one line, as gmp.h contains them.
+flags="-O3 -msimd128 -ffunction-sections -fdata-sections -Wno-ignored-optimization-argument"
 flags="$flags -ffile-prefix-map=$folder=. -ffile-prefix-map=$root=. -ffile-prefix-map=$relative=."
 
 # Downloads and unpacks the source packages.
