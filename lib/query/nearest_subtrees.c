@@ -238,8 +238,9 @@ static bool is_there(const ebpo_context *c, uint32_t below)
 /* Before a subtree of a remote file is entered, sends prefetch hints for it and for further
  * subtrees that the search probably needs, so that one round trip fetches all of them. The result
  * is between the subtree's bound and the limit; the subtrees up to 3/16 of the way are requested.
- * With a quarter or more, further round trips are saved, but each costs more bytes:
- * docs/measured/web.md. Far points, whose bounds are keys, get no hints. */
+ * 60 points anywhere in the box of 4.3 million faces: 11.5 round trips and 999 kB without these
+ * hints, 6.9 and 1,040 kB with 3/16, 6.0 and 1,103 kB with 1/2. Far points, whose bounds are keys,
+ * get no hints. */
 static void hint_subtrees(searching *g, uint32_t below, double lower)
 {
     ebpo_context *c = g->c;

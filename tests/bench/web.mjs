@@ -195,7 +195,8 @@ function makePage({ info, counts, first, queries: { many, one, theirs }, native,
   const missed = goals.filter((x) => !x.met), row = (...x) => `| ${x.join(' | ')} |\n`;
   return `# The npm package
 
-- On ${short(info.faces)} faces, the first distance by URL takes ${short(first.url)} ms; three-mesh-bvh first builds its tree in ${short(first.built)} ms.
+- On ${short(info.faces)} faces, the first distance by URL takes ${short(first.url)} ms; three-mesh-bvh first builds
+  its tree in ${short(first.built)} ms.
 - One query a call takes ${Object.keys(one).map((name) => `${short(one[name])} us (${name})`).join(', ')}; three-mesh-bvh takes
   ${Object.keys(one).map((name) => short(theirs[name])).join(', ')} us.
 - ${missed.length ? `Missed goals: ${missed.length} of ${goals.length}.` : `All ${goals.length} goals are met.`}
@@ -206,10 +207,11 @@ ${row('what', 'goal', 'measured', '')}|---|---|---|---|
 ${[...missed, ...goals.filter((x) => x.met)].map((x) => row(x.what, x.goal, x.value, x.met ? 'met' : 'missed')).join('')}
 ## Measurement
 
-Made by \`node tests/bench/web.mjs ${args}\` with the model
-\`ebpo-generate --base igea.ply --subdivide 2 igea4.ply\`${memory ? ' and the large model of [remote files](remote.md)' : ''}; node
-${process.version}, ${cpus()[0].model.trim()}, ${availableParallelism()} cores; load average ${loadavg()[0].toFixed(1)}. Server and client are on this
-machine; real round trips take longer.
+    node tests/bench/web.mjs ${args}
+
+node ${process.version}, ${cpus()[0].model.trim()}, ${availableParallelism()} cores, load average ${loadavg()[0].toFixed(1)}.
+Model: \`ebpo-generate --base igea.ply --subdivide 2 igea4.ply\`${memory ? '; large model: that of [remote files](remote.md)' : ''}.
+Server and client are on this machine; real round trips take longer.
 
 ${row('until the first result', 'ms')}|---|---|
 ${Object.entries(FIRST).map(([name, what]) => row(what, short(first[name]))).join('')}
