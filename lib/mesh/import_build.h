@@ -175,6 +175,14 @@ static inline const char *ebpo_import_name(const ebpo_import_format *format)
     return strchr(format->called, ' ') + 1;
 }
 
+/* The reader of a row. Libraries without readers of meshes, such as the npm package, are built with
+ * EBPO_NO_MESH_READERS: they recognise files of these formats, for messages. */
+#ifdef EBPO_NO_MESH_READERS
+#define EBPO_IMPORT_READER(reader) (false ? (reader) : NULL)
+#else
+#define EBPO_IMPORT_READER(reader) (reader)
+#endif
+
 /* The rows; each is defined in the file of its reader. */
 extern const ebpo_import_format ebpo_import_ply, ebpo_import_obj, ebpo_import_stl, ebpo_import_off;
 

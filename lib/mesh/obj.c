@@ -784,4 +784,4 @@ const ebpo_import_format ebpo_import_obj = { .called = "an OBJ",
                                              .ending = ".obj",
                                              .recognise = begins_as_obj,
                                              .has_no_signature = true,
-                                             .build = build_obj };
+                                             .build = EBPO_IMPORT_READER(build_obj) };

@@ -523,6 +523,7 @@ static ebpo_status build_off(ebpo_import_build *b, const ebpo_import_job *job)
     return status == EBPO_OK ? note_unread(&r) : status;
 }
 
-const ebpo_import_format ebpo_import_off = {
-    .called = "an OFF", .ending = ".off", .recognise = has_off_word, .build = build_off
-};
+const ebpo_import_format ebpo_import_off = { .called = "an OFF",
+                                             .ending = ".off",
+                                             .recognise = has_off_word,
+                                             .build = EBPO_IMPORT_READER(build_off) };

@@ -277,7 +277,7 @@ const ebpo_import_format ebpo_import_ply = { .called = "a PLY",
                                              .ending = ".ply",
                                              .recognise = ebpo_ply_recognise,
                                              .beginning_decides = true,
-                                             .read = read_ply };
+                                             .read = EBPO_IMPORT_READER(read_ply) };
 
 ebpo_status ebpo_points_parse_ply(const void *data, uint64_t size, const char *name, double **xyz,
                                   uint64_t *count, ebpo_error *error)

@@ -591,6 +591,7 @@ static ebpo_status build_stl(ebpo_import_build *b, const ebpo_import_job *job)
     return status;
 }
 
-const ebpo_import_format ebpo_import_stl = {
-    .called = "an STL", .ending = ".stl", .recognise = has_stl_signature, .build = build_stl
-};
+const ebpo_import_format ebpo_import_stl = { .called = "an STL",
+                                             .ending = ".stl",
+                                             .recognise = has_stl_signature,
+                                             .build = EBPO_IMPORT_READER(build_stl) };

@@ -17,6 +17,7 @@
 #include "core/error.h"
 #include "format/reader.h"
 #include "geometry/cells.h"
+#include "query/load_ahead.h"
 #include "query/nearest.h"
 
 /* Returns true if `a` comes before `b` in the queue. */
@@ -179,6 +180,7 @@ typedef struct searching {
     ebpo_nearest *n;
     ebpo_ranking ranking;
     unsigned new_loads; /* number of loaded subtrees that had no bounds */
+    double hinted;      /* prefetch hints have been sent for new subtrees up to this bound */
 } searching;
 
 static ebpo_status add_node(searching *g, const ebpo_ranked *r, ebpo_error *error)
@@ -233,11 +235,37 @@ static bool is_there(const ebpo_context *c, uint32_t below)
            ebpo_cache_has(c->model->cache, ebpo_context_key(c, below));
 }
 
-static ebpo_status search_below(searching *g, ebpo_node node, ebpo_error *error)
+/* Before a subtree of a remote file is entered, sends prefetch hints for it and for further
+ * subtrees that the search probably needs, so that one round trip fetches all of them. The result
+ * is between the subtree's bound and the limit; the subtrees up to 3/16 of the way are requested.
+ * 60 points anywhere in the box of 4.3 million faces: 11.5 round trips and 999 kB without these
+ * hints, 6.9 and 1,040 kB with 3/16, 6.0 and 1,103 kB with 1/2. Far points, whose bounds are keys,
+ * get no hints. */
+static void hint_subtrees(searching *g, uint32_t below, double lower)
 {
+    ebpo_context *c = g->c;
+    double limit = g->n->found ? lower + (g->n->limit - lower) * 0.1875 : lower;
+    if (g->ranking.far || limit <= g->hinted || !ebpo_input_prefetches(&c->model->file->in) ||
+        is_there(c, below))
+        return;
+    uint64_t near[EBPO_CACHE_AHEAD];
+    uint32_t hinted[EBPO_CACHE_AHEAD + 1] = { below };
+    unsigned found = ebpo_subtrees_near(c->model, g->n->p, limit, near), count = 1;
+    for (unsigned i = 0; i < found; i++)
+        if (near[i] != below && !is_searched(c, (uint32_t)near[i]) &&
+            !ebpo_skeletons_find(c->model->skeletons, (uint32_t)near[i]))
+            hinted[count++] = (uint32_t)near[i];
+    g->hinted = found < EBPO_CACHE_AHEAD ? limit : lower;
+    ebpo_context_hint(c, hinted, count);
+}
+
+static ebpo_status search_below(searching *g, const ebpo_ranked *r, ebpo_error *error)
+{
+    ebpo_node node = r->node;
     uint32_t below = ebpo_entry_value(node.entry);
     if (is_searched(g->c, below))
         return EBPO_OK;
+    hint_subtrees(g, below, r->lower);
     g->c->marks[below] = 2 * g->c->query_number + 1;
     g->c->searched++;
     const ebpo_skeletons *skeletons = g->c->model->skeletons;
@@ -400,8 +428,7 @@ static ebpo_status inspect_new(searching *g, const ebpo_ranked *r, ebpo_error *e
     ebpo_ranked all = { r->node, deep_bound(g, r), OWNED };
     if (all.lower > ebpo_nearest_limit(g->n))
         return EBPO_OK;
-    return all.lower > r->lower ? ebpo_queue_push(g->c, &all, error)
-                                : search_below(g, r->node, error);
+    return all.lower > r->lower ? ebpo_queue_push(g->c, &all, error) : search_below(g, r, error);
 }
 
 static ebpo_status inspect_subtree(searching *g, const ebpo_ranked *r, ebpo_error *error)
@@ -409,7 +436,7 @@ static ebpo_status inspect_subtree(searching *g, const ebpo_ranked *r, ebpo_erro
     uint32_t below = ebpo_entry_value(r->node.entry);
     const ebpo_skeleton *k = ebpo_skeletons_find(g->c->model->skeletons, below);
     if (ebpo_context_has_pinned(g->c, below))
-        return search_below(g, r->node, error);
+        return search_below(g, r, error);
     if (!k)
         return inspect_new(g, r, error);
     ebpo_skeleton_bounds bounds = skeleton_bounds(g, k);
@@ -435,7 +462,7 @@ static ebpo_status inspect_shared(searching *g, const ebpo_ranked *r, ebpo_error
     if (is_searched(g->c, below) ||
         (!is_there(g->c, below) && consider_owners(g, k, r, &status, error)))
         return status;
-    return search_below(g, r->node, error);
+    return search_below(g, r, error);
 }
 
 static ebpo_status search_parts(searching *g, ebpo_error *error)
@@ -455,7 +482,7 @@ static ebpo_status search_parts(searching *g, ebpo_error *error)
             break;
         }
         status = !ebpo_node_is_subtree_root(&next.node) ? add_children(g, &next, error)
-                 : next.what == OWNED                   ? search_below(g, next.node, error)
+                 : next.what == OWNED                   ? search_below(g, &next, error)
                  : next.what == SHARED                  ? inspect_shared(g, &next, error)
                                                         : inspect_subtree(g, &next, error);
     }
@@ -465,7 +492,7 @@ static ebpo_status search_parts(searching *g, ebpo_error *error)
 
 ebpo_status ebpo_nearest_first(ebpo_context *c, ebpo_nearest *n, ebpo_error *error)
 {
-    searching g = { c, n, ebpo_ranking_of(c->model, n->p, &n->far), 0 };
+    searching g = { c, n, ebpo_ranking_of(c->model, n->p, &n->far), 0, -1 };
     if (!c->model->whole)
         return search_parts(&g, error);
     ebpo_nearest_search(n, c, c->model->whole);

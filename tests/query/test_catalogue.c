@@ -10,6 +10,7 @@
 
 #include "check_main.h"
 #include "npy_numbers.h"
+#include "pending_source.h"
 #include "query_support.h"
 
 enum { MODELS = 32, POINTS = 1440, RAYS = 800 };
@@ -430,6 +431,80 @@ START_TEST(test_catalogue_uses_callers_open_function)
 }
 END_TEST
 
+/* --- files whose bytes arrive asynchronously --- */
+
+static pending_source pending[MODELS];
+
+static ebpo_status open_pending(void *user, const char *path, ebpo_file **out, ebpo_error *error)
+{
+    int i = 0;
+    ebpo_source source = EBPO_SOURCE_INIT;
+    (void)user;
+    while (strcmp(path, entry[i].path))
+        i++;
+    ebpo_status status = ebpo_async_source(pending[i].async, &source, error);
+    source.prefetched = 4096;
+    return status == EBPO_OK ? ebpo_open_source(&source, path, out, error) : status;
+}
+
+/* Supplies what all files need after EBPO_E_PENDING; returns true if the call is to be repeated. */
+static bool supply_all(ebpo_status status)
+{
+    uint64_t supplied = 0;
+    for (int i = 0; i < MODELS; i++) {
+        const ebpo_range *range;
+        size_t count = 0;
+        ASSERT_OK(ebpo_async_needed(pending[i].async, &range, &count, error));
+        for (size_t k = 0; k < count; k++)
+            ASSERT_OK(ebpo_async_supply(pending[i].async, range[k].offset, range[k].size,
+                                        pending[i].data + range[k].offset, NULL, error));
+        supplied += count;
+    }
+    ck_assert(status != EBPO_E_PENDING || supplied);
+    return status == EBPO_E_PENDING;
+}
+
+START_TEST(test_catalogue_of_pending_files)
+{
+    ebpo_catalogue_options how = EBPO_CATALOGUE_OPTIONS_INIT;
+    ebpo_catalogue_models_options few = EBPO_CATALOGUE_MODELS_OPTIONS_INIT;
+    ebpo_inside_result *where = query_capacity(POINTS, sizeof *where);
+    ebpo_distance_result *near = query_capacity(POINTS, sizeof *near);
+    ebpo_ray_hit *hit = query_capacity(RAYS, sizeof *hit);
+    uint64_t *number = query_capacity(POINTS, sizeof *number), rounds = 0;
+    ebpo_catalogue_query_options o = on_threads(_i ? 2 : 1);
+    ebpo_error reported;
+    open_catalogue a;
+    for (int i = 0; i < MODELS; i++)
+        pending_begin(&pending[i], model[i].path, 0);
+    how.open_file = open_pending;
+    few.memory = _i ? little_memory() : 0;
+    ASSERT_OK(ebpo_catalogue_new(entry, MODELS, &how, &a.catalogue, error));
+    ASSERT_OK(ebpo_catalogue_models_new(&few, &a.models, error));
+    while (supply_all(
+        ebpo_catalogue_inside(a.catalogue, a.models, points, POINTS, &o, where, &reported)))
+        rounds++;
+    ck_assert_uint_gt(rounds, 1);
+    judge_inside(where);
+    while (supply_all(ebpo_catalogue_distance(a.catalogue, a.models, points, POINTS, &o, near,
+                                              number, &reported)))
+        rounds++;
+    judge_distance(near, number, INFINITY, where);
+    while (supply_all(
+        ebpo_catalogue_ray(a.catalogue, a.models, rays, RAYS, &o, hit, number, &reported)))
+        rounds++;
+    judge_rays(hit, number);
+    ck_assert_uint_lt(rounds, 500);
+    end_queries(&a);
+    for (int i = 0; i < MODELS; i++)
+        pending_end(&pending[i]);
+    free(where);
+    free(near);
+    free(hit);
+    free(number);
+}
+END_TEST
+
 static bool stop_at_once(void *user, const char *stage, uint64_t done, uint64_t total)
 {
     (void)stage;
@@ -496,6 +571,7 @@ TEST_SUITE(catalogue)
     tcase_add_test(alone, test_catalogue_parts_match_whole_model);
     tcase_add_test(alone, test_catalogue_of_caps_has_no_surface);
     tcase_add_test(alone, test_catalogue_query_validation_and_cancel);
+    tcase_add_loop_test(alone, test_catalogue_of_pending_files, 0, 2);
     tcase_add_test(threads, test_catalogue_closes_and_reopens_models);
     tcase_add_test(threads, test_catalogue_uses_callers_open_function);
     return suite;

@@ -66,6 +66,24 @@ START_TEST(test_remote_query_round_trips)
 }
 END_TEST
 
+/* A query that needs many subtrees requests several of them together. */
+START_TEST(test_remote_deep_query_round_trips)
+{
+    enum { WAVES = 16 }; /* 23 when each subtree is requested alone */
+    static const double p[3] = { 2.1, 0.1, 0.05 };
+    two_layouts l;
+    counted_source c;
+    two_layouts_build(&l, ebpo_test_torus(2, 0.7, 400, 240), 9, ALL, EBPO_CODEC_ZSTD, 400);
+    ebpo_file *far = counted_open(&c, l.packed, true);
+    result a = run_query(far, &c, p, false), b = run_query(l.without, NULL, p, false);
+    counted_close(&c, far);
+    ck_assert_msg(a.waves <= WAVES, "%d waves", (int)a.waves);
+    ck_assert_msg(c.requested < c.size / 3, "%d of %d bytes", (int)c.requested, (int)c.size);
+    ck_assert(a.distance == b.distance);
+    two_layouts_close(&l);
+}
+END_TEST
+
 static void set_top_bytes(const char *path, uint64_t bytes)
 {
     hid_t h5 = H5Fopen(path, H5F_ACC_RDWR, H5P_DEFAULT),
@@ -270,6 +288,7 @@ TEST_SUITE(round_trips)
     tcase_set_timeout(tests, 900);
     tcase_add_checked_fixture(tests, scratch_enter, scratch_leave);
     tcase_add_test(tests, test_remote_query_round_trips);
+    tcase_add_test(tests, test_remote_deep_query_round_trips);
     tcase_add_test(tests, test_false_top_bytes_changes_no_result);
     tcase_add_test(tests, test_remote_radius_query_round_trips);
     tcase_add_test(tests, test_remote_box_query_round_trips);

@@ -84,6 +84,25 @@ test('synchronous queries throw while bytes are missing', { skip: !large }, asyn
   model.dispose();
 });
 
+test('one point or ray a call gives the results of batches', async () => {
+  const model = await open(large ? largeBytes : small), { origin, size } = model.info, inputs = [];
+  for (let i = 0; i < 200; i++)
+    inputs.push([0.37, 0.59, 0.73, 0.41, 0.67, 0.83].map((x, k) => k < 3 ? origin[k] + size[k] * (1.2 * (i * x % 1) - 0.1) : i * x % 1 - 0.487));
+  const points = inputs.map((x) => x.slice(0, 3)), each = (query, list, n) => list.map((x, i) => n ? query.call(model, [...x, ...list[(i + 1) % 200]]) : query.call(model, x));
+  const first = (result) => Object.fromEntries(Object.entries(result).map(([name, x]) => [name, x.slice(0, x.length / 2)]));
+  for (const options of [{}, { level: 2 }, { unsigned: true, maxDistance: size[0] / 20 }])
+    for (const query of [model.distanceSync, model.insideSync])
+      assert.deepEqual(each((x) => query.call(model, x, options), points), each((x) => query.call(model, x, options), points, 2).map(first));
+  for (const options of [{}, { sides: 'front', tMax: size[0] }, { sides: 'back' }])
+    assert.deepEqual(each((x) => model.raysSync(x, options), inputs), each((x) => model.raysSync(x, options), inputs, 2).map(first));
+  assert.throws(() => model.insideSync([0, 0, NaN]), EbpoArgumentError);
+  assert.throws(() => model.distanceSync([0, 0, 0], { maxDistance: -1 }), EbpoArgumentError);
+  assert.throws(() => model.raysSync([0, 0, 0, 0, 0, 0]), EbpoArgumentError);
+  assert.throws(() => model.raysSync([0, 0, 0, 0, 0, 1], { sides: 'left' }), EbpoArgumentError);
+  model.dispose();
+  assert.throws(() => model.insideSync([0, 0, 0]), EbpoError);
+});
+
 test('invalid arguments are errors', async () => {
   const model = await open(small);
   await assert.rejects(model.inside([0, 0]), EbpoArgumentError);

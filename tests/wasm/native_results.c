@@ -260,7 +260,9 @@ static void write_level(const ebpo_file *file)
 static void write_mesh(const ebpo_file *file)
 {
     ebpo_mesh mesh = { 0 };
-    require(ebpo_file_read_mesh(file, NULL, &mesh, &error) == EBPO_OK, "mesh");
+    bool source_order;
+    require(ebpo_file_read_source_mesh(file, NULL, &mesh, &source_order, &error) == EBPO_OK,
+            "mesh");
     uint64_t size = mesh.xyz32 ? sizeof *mesh.xyz32 : sizeof *mesh.xyz64;
     write_section(mesh.xyz32 ? (void *)mesh.xyz32 : (void *)mesh.xyz64,
                   mesh.vertex_count * 3 * size);

@@ -15,8 +15,9 @@ jobs=${EBPO_JOBS:-$(nproc)}
 export NODE_PATH=/usr/share/nodejs
 # The module contains no path of the build; Meson's paths are relative.
 relative=$(realpath --relative-to="$folder/lib" "$root")
-flags="-O3 -msimd128 -ffunction-sections -fdata-sections -Wno-ignored-optimization-argument
-    -ffile-prefix-map=$folder=. -ffile-prefix-map=$root=. -ffile-prefix-map=$relative=."
+# The flags are in one line, as gmp.h contains them.
+flags="-O3 -msimd128 -ffunction-sections -fdata-sections -Wno-ignored-optimization-argument"
+flags="$flags -ffile-prefix-map=$folder=. -ffile-prefix-map=$root=. -ffile-prefix-map=$relative=."
 
 # Downloads and unpacks the source packages.
 fetch_sources() {
@@ -117,7 +118,7 @@ cpu_family = 'wasm32'
 cpu = 'wasm32'
 endian = 'little'
 [built-in options]
-c_args = [${words%, }]
+c_args = [${words}'-DEBPO_NO_MESH_READERS']
 EOF
     [ -f "$folder/lib/build.ninja" ] ||
         meson setup "$folder/lib" "$root" --cross-file "$folder/emscripten.ini" --buildtype=plain \

@@ -30,6 +30,9 @@
  *   Also begin an operation before each repetition; two operations then run. After
  *   ebpo_async_needed, end the older one if the repetition has completed items, so that bytes that
  *   only earlier repetitions used may be removed. Otherwise end the newer one.
+ * - ebpo_ray_all_many keeps no completed results: its hits are one array in the order of the rays,
+ *   whose positions depend on all earlier rays. Each call evaluates all rays; pass few at a time.
+ * - Catalogues open such files by ebpo_catalogue_options.open_file. Scenes open files by path.
  * - Haptic rendering does not support such files, as its thread loads data in the background.
  *
  * The number of repetitions is limited, for any memory budget: bytes that were supplied or read

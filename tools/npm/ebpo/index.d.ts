@@ -88,6 +88,7 @@ export interface Triangles { face: Uint32Array; corners: Float64Array }
 export interface Mass {
   area: number; volume: number; centroid: Float64Array; inertia: Float64Array; volumeLo: number; volumeHi: number; integral: number;
 }
+/** Faces are in the order of the face indices of queries. */
 export interface Mesh { vertices: Float32Array | Float64Array; faces: Uint32Array }
 
 /** Nodes of a level, in the order of their octcodes; members as in ebpo_stream_node (ebpo/stream.h). `colour`:

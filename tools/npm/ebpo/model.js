@@ -2,6 +2,7 @@
 // methods that end in Sync throw an EbpoPendingError instead.
 import { Heap } from './heap.js';
 import { EbpoArgumentError, EbpoError, EbpoReadError, errorOf } from './errors.js';
+import { OneQuery } from './one.js';
 
 const PENDING = -11;
 const BATCH = 16384; // points of one call
@@ -45,6 +46,7 @@ export class Model {
   #flights = new Set(); // ranges that are being fetched
   #idle = []; // query objects that are not in use
   #used = new Set(); // query objects in use
+  #one; // for queries of one point or ray
   #roundTrips = 0;
   #disposed = false;
   #info;
@@ -219,6 +221,12 @@ export class Model {
     return (query) => this.#heap.call(name, query, ...args);
   }
 
+  #oneQuery() {
+    this.#alive();
+    this.#one ??= new OneQuery(this.#heap, this.#take());
+    return this.#one;
+  }
+
   // ---- queries ----
 
   /** Returns queries of batches of values, which are {name, values, columns, args, read, completed, most}. */
@@ -258,6 +266,8 @@ export class Model {
   }
 
   insideSync(points, options = {}) {
+    if (points.length === 3)
+      return this.#oneQuery().inside(points, options.level ?? -1);
     return join(this.#manyNow(this.#inside(points, options)));
   }
 
@@ -272,6 +282,8 @@ export class Model {
   }
 
   distanceSync(points, options = {}) {
+    if (points.length === 3)
+      return this.#oneQuery().distance(points, options.level ?? -1, options.maxDistance ?? Infinity, options.unsigned ? 1 : 0);
     return join(this.#manyNow(this.#distance(points, options)));
   }
 
@@ -303,6 +315,9 @@ export class Model {
   }
 
   raysSync(rays, options = {}) {
+    const sides = options.sides ?? 'both';
+    if (rays.length === 6 && sides in SIDES)
+      return this.#oneQuery().ray(rays, options.tMax ?? Infinity, SIDES[sides]);
     return join(this.#manyNow(this.#rays('ebpo_js_ray_first', rays, options)));
   }
 

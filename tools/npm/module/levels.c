@@ -149,14 +149,16 @@ int EBPO_JS(ebpo_js_level)(ebpo_js_object *object, int level, int cell_faces)
 /* ---- mesh ---- */
 
 /* Array 0: vertices [3], floats; array 1: vertices [3], doubles; one of the two is empty. Array 2:
- * triangles [3], uint32. */
+ * triangles [3], uint32, by the face indices of queries. */
 int EBPO_JS(ebpo_js_mesh)(ebpo_js_object *object)
 {
     ebpo_read_options options = EBPO_READ_OPTIONS_INIT;
     ebpo_mesh mesh = { 0 };
+    bool source_order;
     options.threads = 1;
     ebpo_js_clear(object);
-    ebpo_status status = ebpo_file_read_mesh(object->file, &options, &mesh, &object->error);
+    ebpo_status status =
+        ebpo_file_read_source_mesh(object->file, &options, &mesh, &source_order, &object->error);
     if (status == EBPO_OK && mesh.xyz32)
         status = ebpo_js_put(object, 0, mesh.xyz32, (size_t)mesh.vertex_count * 12);
     if (status == EBPO_OK && mesh.xyz64)

@@ -10,7 +10,7 @@
 /* Functions that JavaScript calls by this name. */
 #define EBPO_JS(name) __attribute__((export_name(#name), used)) name
 
-enum { EBPO_JS_ARRAYS = 16 };
+enum { EBPO_JS_ARRAYS = 16, EBPO_JS_NUMBERS = 10 };
 
 /* A growing array. */
 typedef struct ebpo_js_array {
@@ -27,6 +27,7 @@ typedef struct ebpo_js_object {
     ebpo_stream *stream;
     bool within_level; /* the stream has begun a level whose nodes are not all read */
     ebpo_js_array array[EBPO_JS_ARRAYS];
+    double number[EBPO_JS_NUMBERS]; /* result of a query of one point or ray */
     ebpo_error error;
 } ebpo_js_object;
 

@@ -2,6 +2,7 @@
  * results are one array for each member of the library's result structs. Indices of faces have 32
  * bits; UINT32_MAX is EBPO_NO_FACE. A call after EBPO_E_PENDING has the same arguments and keeps
  * completed items. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -190,6 +191,63 @@ int EBPO_JS(ebpo_js_ray_any)(ebpo_js_object *object, const double *lines, uint32
     if (!options.done || !rays || !any)
         return EBPO_E_MEMORY;
     return ebpo_ray_any_many(object->context, rays, count, &options, any, &object->error);
+}
+
+/* ---- one point or ray a call: results are numbers of the object ---- */
+
+/* Returns the numbers of an object, which JavaScript reads. */
+const double *EBPO_JS(ebpo_js_numbers)(const ebpo_js_object *object) { return object->number; }
+
+/* Numbers: ebpo_where, winding number. */
+int EBPO_JS(ebpo_js_inside_one)(ebpo_js_object *object, double x, double y, double z, int level)
+{
+    ebpo_inside_options options = EBPO_INSIDE_OPTIONS_INIT;
+    ebpo_inside_result result = { .where = EBPO_OUT };
+    options.level = level;
+    ebpo_status status = ebpo_inside(object->context, (double[]){ x, y, z },
+                                     level < 0 ? NULL : &options, &result, &object->error);
+    object->number[0] = result.where;
+    object->number[1] = result.winding;
+    return status;
+}
+
+/* Numbers: distance, its bounds, point [3], normal [3], face. */
+int EBPO_JS(ebpo_js_distance_one)(ebpo_js_object *object, double x, double y, double z, int level,
+                                  double max_distance, int is_unsigned)
+{
+    ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
+    ebpo_distance_result result = { .face = EBPO_NO_FACE };
+    options.level = level;
+    options.max_distance = max_distance;
+    options.unsigned_distance = is_unsigned;
+    ebpo_status status =
+        ebpo_distance(object->context, (double[]){ x, y, z }, &options, &result, &object->error);
+    object->number[0] = result.distance;
+    object->number[1] = result.lo;
+    object->number[2] = result.hi;
+    memcpy(object->number + 3, result.point, sizeof result.point);
+    memcpy(object->number + 6, result.normal, sizeof result.normal);
+    object->number[9] = face_index(result.face);
+    return status;
+}
+
+/* Numbers: t, face, side of the first hit. */
+int EBPO_JS(ebpo_js_ray_one)(ebpo_js_object *object, double x, double y, double z, double dx,
+                             double dy, double dz, double t_max, int sides)
+{
+    ebpo_ray ray = { .origin = { x, y, z }, .direction = { dx, dy, dz }, .t_max = t_max };
+    ebpo_ray_options options = ray_options(sides);
+    ebpo_ray_hit hit = { .t = INFINITY, .face = EBPO_NO_FACE };
+    bool found;
+    ebpo_status status =
+        sides == EBPO_RAY_BOTH
+            ? ebpo_ray_first(object->context, ray.origin, ray.direction, t_max, &hit, &found,
+                             &object->error)
+            : ebpo_ray_first_many(object->context, &ray, 1, &options, &hit, &object->error);
+    object->number[0] = hit.t;
+    object->number[1] = face_index(hit.face);
+    object->number[2] = hit.side;
+    return status;
 }
 
 /* ---- boxes ---- */
