@@ -37,6 +37,7 @@ hits = m.ray(P, [0, 0, 1], sides="front")
 box: float = float(hits.t[0]) + int(hits.face[0])
 converted: ebpo.Model = ebpo.convert((P, np.zeros((2, 3), int)), "a.ebpo.h5", weld=True, unit="mm")
 c = ebpo.Catalogue.of(["a.ebpo.h5"], http={"retries": 3})
+cut: npt.NDArray[np.uint32] = ebpo.boolean("A - B", [m, m], poses=[None, np.eye(4)]).faces
 relation: ebpo.Relation = ebpo.Collider(m, m).relation(pose_b=ebpo.pose(translation=[1, 0, 0]))
 with ebpo.open("a.ebpo.h5") as opened:
     opened.level(2).volume.sum()

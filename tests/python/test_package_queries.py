@@ -128,6 +128,23 @@ class Queries(Case):
         np.testing.assert_array_equal(corners, mesh.vertices[mesh.faces[faces]])
         self.assertTrue(0 < len(faces) < len(mesh.faces))
 
+    def test_booleans(self):
+        m, poses = model("scan"), [None, ebpo.pose(translation=[.4, .1, 0])]
+        volume = {}
+        for operator in "|&-^":
+            mesh = ebpo.boolean(f"A {operator} B", [m, m], poses=poses, doubles=True)
+            a, b, c = np.moveaxis(mesh.vertices[mesh.faces], 1, 0)
+            volume[operator] = np.einsum("ij,ij->", a, np.cross(b, c)) / 6
+            self.assertLess(mesh.displacement, 1e-15)
+        self.assertGreater(volume["&"], 0)
+        self.assertAlmostEqual(volume["|"] + volume["&"], 2 * m.volume, 9)
+        self.assertAlmostEqual(volume["|"] - volume["&"], volume["^"], 9)
+        self.assertAlmostEqual(m.volume - volume["&"], volume["-"], 9)
+        self.assertEqual(len(ebpo.boolean("A - (A | B & B)", [m, m], poses=poses).faces), 0)
+        for wrong in "", "A B", "A -", "(A", "A - C", "a":
+            with self.assertRaises(ValueError):
+                ebpo.boolean(wrong, [m, m])
+
     def test_errors(self):
         m, bad = model("scan"), P[:9000].copy()
         bad[8000, 1] = np.nan

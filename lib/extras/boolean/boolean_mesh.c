@@ -115,7 +115,9 @@ static ebpo_status fill_mesh(output *o, const ebpo_boolean_mesh_options *options
     o->number = ebpo_alloc(vertices, sizeof *o->number);
     o->mesh->faces = ebpo_alloc(faces, 3 * sizeof *o->mesh->faces);
     o->origin = ebpo_alloc(faces, sizeof *o->origin);
-    bool fine = o->number && o->mesh->faces && o->origin;
+    bool fine =
+        o->number && o->mesh->faces && o->origin &&
+        ebpo_corner_ids_reserve(&o->vertex, faces / 2); /* a closed mesh has about so many */
     for (uint64_t v = 0; v < vertices && fine; v++)
         o->number[v] = EBPO_NO_CORNER;
     fine = fine && list_triangles(o) && copy_vertices(o);

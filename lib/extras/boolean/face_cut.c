@@ -49,7 +49,7 @@ void ebpo_face_cutter_free(ebpo_face_cutter *cutter)
     free(cutter->coplanar);
     free(cutter->kept);
     free(cutter->cover);
-    free(cutter->within);
+    free(cutter->box);
 }
 
 void ebpo_face_pieces_free(ebpo_face_pieces *pieces)
@@ -257,43 +257,93 @@ static bool triangulate_face(ebpo_face_cutter *c)
 
 /* --- covers --- */
 
-/* Marks the points in another face of the plane. Returns true if it has the opposite normal. */
-static bool mark_within(ebpo_face_cutter *c, uint32_t other)
+/* Box of the rounded coordinates that are seen. */
+typedef struct ebpo_triangle_box {
+    double low[2], high[2];
+    uint32_t triangle;
+} ebpo_triangle_box;
+
+static void bound_points(int axis, const ebpo_exact_point *const p[3], ebpo_triangle_box *out)
 {
-    const ebpo_point_set *set = &c->arrangement.set;
-    int u = c->axis == 2 ? 0 : c->axis + 1, v = c->axis == 0 ? 2 : c->axis - 1;
-    set_corners(c, 1, other);
-    const ebpo_exact_point *q = c->corner[1];
-    int orientation = ebpo_exact_turn(c->axis, &q[0], &q[1], &q[2]);
-    double low[2] = { ebpo_min3(q[0].at[u], q[1].at[u], q[2].at[u]),
-                      ebpo_min3(q[0].at[v], q[1].at[v], q[2].at[v]) };
-    double high[2] = { ebpo_max3(q[0].at[u], q[1].at[u], q[2].at[u]),
-                       ebpo_max3(q[0].at[v], q[1].at[v], q[2].at[v]) };
-    for (uint64_t i = 0; i < set->count; i++) {
-        const ebpo_exact_point *p = &set->point[i];
-        c->within[i] =
-            p->at[u] >= low[0] && p->at[u] <= high[0] && p->at[v] >= low[1] && p->at[v] <= high[1];
-        for (int k = 0; k < 3 && c->within[i]; k++)
-            c->within[i] = ebpo_exact_turn(c->axis, &q[k], &q[next_index(k)], p) * orientation >= 0;
+    const int seen[2] = { axis == 2 ? 0 : axis + 1, axis == 0 ? 2 : axis - 1 };
+    for (int k = 0; k < 2; k++) {
+        out->low[k] = ebpo_min3(p[0]->at[seen[k]], p[1]->at[seen[k]], p[2]->at[seen[k]]);
+        out->high[k] = ebpo_max3(p[0]->at[seen[k]], p[1]->at[seen[k]], p[2]->at[seen[k]]);
     }
-    return orientation != c->orientation;
 }
 
-/* A triangle does not cross edges of the other face, so it is in that face if its corners are. */
+static int order_boxes(const void *a, const void *b)
+{
+    const ebpo_triangle_box *x = a, *y = b;
+    if (x->low[0] != y->low[0])
+        return x->low[0] < y->low[0] ? -1 : 1;
+    return (x->triangle > y->triangle) - (x->triangle < y->triangle);
+}
+
+static bool bound_triangles(ebpo_face_cutter *c)
+{
+    const ebpo_exact_point *point = c->arrangement.set.point;
+    uint64_t count = c->triangulation.count;
+    if (!ebpo_grow(&c->box, &c->box_capacity, count, sizeof *c->box))
+        return false;
+    for (uint64_t i = 0; i < count; i++) {
+        const uint32_t *corner = c->triangulation.triangle[i].corner;
+        const ebpo_exact_point *p[3] = { &point[corner[0]], &point[corner[1]], &point[corner[2]] };
+        bound_points(c->axis, p, &c->box[i]);
+        c->box[i].triangle = (uint32_t)i;
+    }
+    qsort(c->box, count, sizeof *c->box, order_boxes);
+    return true;
+}
+
+/* Returns true if the other face, whose orientation is given, contains the triangle. A triangle
+ * does not cross edges of the other face, so it is in that face if its corners are. */
+static bool is_covered(const ebpo_face_cutter *c, uint32_t triangle, int orientation)
+{
+    const uint32_t *corner = c->triangulation.triangle[triangle].corner;
+    const ebpo_exact_point *q = c->corner[1];
+    for (int i = 0; i < 9; i++)
+        if (ebpo_exact_turn(c->axis, &q[i / 3], &q[next_index(i / 3)],
+                            &c->arrangement.set.point[corner[i % 3]]) *
+                orientation <
+            0)
+            return false;
+    return true;
+}
+
+/* Returns the first box whose least coordinate is at least `low`. */
+static uint64_t find_box(const ebpo_face_cutter *c, double low)
+{
+    uint64_t begin = 0, end = c->triangulation.count;
+    while (begin < end) {
+        uint64_t middle = begin + (end - begin) / 2;
+        if (c->box[middle].low[0] < low)
+            begin = middle + 1;
+        else
+            end = middle;
+    }
+    return begin;
+}
+
+/* Notes the triangles in another face of the plane. */
 static bool note_covers(ebpo_face_cutter *c, uint32_t other)
 {
-    if (!ebpo_grow(&c->within, &c->within_capacity, c->arrangement.set.count, sizeof *c->within))
-        return false;
-    bool opposite = mark_within(c, other);
-    for (uint32_t i = 0; i < c->triangulation.count; i++) {
-        const uint32_t *corner = c->triangulation.triangle[i].corner;
-        if (!c->within[corner[0]] || !c->within[corner[1]] || !c->within[corner[2]])
+    set_corners(c, 1, other);
+    const ebpo_exact_point *q = c->corner[1], *const of[3] = { &q[0], &q[1], &q[2] };
+    int orientation = ebpo_exact_turn(c->axis, &q[0], &q[1], &q[2]);
+    ebpo_triangle_box face;
+    bound_points(c->axis, of, &face);
+    for (uint64_t i = find_box(c, face.low[0]);
+         i < c->triangulation.count && c->box[i].low[0] <= face.high[0]; i++) {
+        const ebpo_triangle_box *box = &c->box[i];
+        if (box->high[0] > face.high[0] || box->low[1] < face.low[1] ||
+            box->high[1] > face.high[1] || !is_covered(c, box->triangle, orientation))
             continue;
         if (other < c->face)
-            c->kept[i] = 0;
+            c->kept[box->triangle] = 0;
         if (!ebpo_grow(&c->cover, &c->cover_capacity, c->covers + 1, sizeof *c->cover))
             return false;
-        c->cover[c->covers++] = (ebpo_cover){ i, other, opposite };
+        c->cover[c->covers++] = (ebpo_cover){ box->triangle, other, orientation != c->orientation };
     }
     return true;
 }
@@ -311,6 +361,8 @@ static bool find_covers(ebpo_face_cutter *c)
     uint32_t count = 0, covers = 0;
     for (uint64_t i = 0; i < c->triangulation.count; i++)
         c->kept[i] = 1;
+    if (c->coplanar_count && !bound_triangles(c))
+        return false;
     for (uint64_t i = 0; i < c->coplanar_count; i++)
         if (!note_covers(c, c->coplanar[i]))
             return false;

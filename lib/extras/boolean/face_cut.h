@@ -45,8 +45,8 @@ typedef struct ebpo_face_cutter {
     uint64_t kept_capacity;
     ebpo_cover *cover;
     uint64_t covers, cover_capacity;
-    bool *within; /* for each point: it is in the coplanar face */
-    uint64_t within_capacity;
+    struct ebpo_triangle_box *box; /* of the triangles, sorted by their least coordinate */
+    uint64_t box_capacity;
 } ebpo_face_cutter;
 
 /* unit: all coordinates of the faces with partners are multiples of 2^unit. */

@@ -70,7 +70,9 @@ static ebpo_status read_operand(ebpo_face_list *faces, uint32_t operand, ebpo_er
     if (status != EBPO_OK)
         return status;
     uint32_t *number = ebpo_alloc(mesh.vertex_count, sizeof *number);
-    if (number && number_vertices(faces, &mesh, &solid->posing, number))
+    if (number &&
+        ebpo_corner_ids_reserve(&faces->corners, faces->corners.count + mesh.vertex_count) &&
+        number_vertices(faces, &mesh, &solid->posing, number))
         list_faces(faces, operand, &mesh, number);
     else
         status = ebpo_fail_memory(error, mesh.vertex_count * (sizeof *number + 40));

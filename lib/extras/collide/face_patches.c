@@ -14,6 +14,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/hash.h"
 #include "extras/collide/face_patches.h"
 #include "extras/collide/hierarchy_walk.h"
 #include "geometry/predicates.h"
@@ -63,9 +64,8 @@ static uint32_t *find_corner(const ebpo_corner_ids *ids, const double x[3])
     return &ids->table[i];
 }
 
-static bool enlarge_table(ebpo_corner_ids *ids)
+static bool enlarge_table(ebpo_corner_ids *ids, uint64_t size)
 {
-    uint64_t size = ids->table_size ? 2 * ids->table_size : 1024;
     uint32_t *table = ebpo_alloc_zero(size, sizeof *table);
     if (!table)
         return false;
@@ -80,7 +80,9 @@ static bool enlarge_table(ebpo_corner_ids *ids)
 bool ebpo_corner_id(ebpo_corner_ids *ids, const double x[3], uint32_t *id)
 {
     const double corner[3] = { x[0] + 0.0, x[1] + 0.0, x[2] + 0.0 }; /* turns -0 into 0 */
-    if ((2 * ids->count >= ids->table_size && !enlarge_table(ids)) || ids->count >= UINT32_MAX - 1)
+    if ((2 * ids->count >= ids->table_size &&
+         !enlarge_table(ids, ids->table_size ? 2 * ids->table_size : 1024)) ||
+        ids->count >= UINT32_MAX - 1)
         return false;
     uint32_t *at = find_corner(ids, corner);
     if (*at == 0) {
@@ -91,6 +93,12 @@ bool ebpo_corner_id(ebpo_corner_ids *ids, const double x[3], uint32_t *id)
     }
     *id = *at - 1;
     return true;
+}
+
+bool ebpo_corner_ids_reserve(ebpo_corner_ids *ids, uint64_t count)
+{
+    uint64_t size = ebpo_hash_slots(2 * count);
+    return size <= ids->table_size || enlarge_table(ids, size);
 }
 
 void ebpo_corner_ids_free(ebpo_corner_ids *ids)

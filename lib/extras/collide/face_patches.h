@@ -20,6 +20,9 @@ typedef struct ebpo_corner_ids {
 /* Finds or adds the corner x, and sets *id to its index. Returns false without memory or with 2^32
  * - 2 corners. */
 bool ebpo_corner_id(ebpo_corner_ids *ids, const double x[3], uint32_t *id);
+/* Makes the table large enough for `count` corners; this only saves time. Returns false without
+ * memory. */
+bool ebpo_corner_ids_reserve(ebpo_corner_ids *ids, uint64_t count);
 void ebpo_corner_ids_free(ebpo_corner_ids *ids);
 
 /* Finds the patches of a subtree's owned faces, which are connected by corners with equal

@@ -13,6 +13,7 @@ from ._declared import (ClashKind, NodeType, PaintKind, PairKind, Part, Relation
 from ._library import lib as _lib
 from .asynchronous import AsyncModel, open_async
 from .queries import bar
+from .boolean import boolean
 from .catalogue import Catalogue
 from .collide import Collider, pose
 from .build import convert
@@ -42,7 +43,7 @@ def library() -> str:
 __all__ = [
     "open", "Model", "open_async", "AsyncModel", "Info", "Located", "Nearest", "Bounds", "Hits", "AllHits", "Where",
     "Mesh", "Maps", "Level", "Subtree", "Attributes", "Mass", "NodeType", "Part", "Rule", "half_spaces",
-    "Catalogue", "Collider", "pose", "Relation", "PairKind", "Scene", "open_scene", "ClashKind",
+    "Catalogue", "Collider", "pose", "boolean", "Relation", "PairKind", "Scene", "open_scene", "ClashKind",
     "Haptic", "HapticResult", "ProbeResult", "Paint", "Stroke", "Areas", "PaintKind",
     "convert", "bar", "library",
     "Error", "ArgumentError", "IOFailure", "FormatError", "VersionError", "UnsupportedError", "NotSolidError",
