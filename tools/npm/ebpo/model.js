@@ -61,8 +61,8 @@ export class Model {
       throw errorOf(-1, 'not enough memory to open the file', '', -1);
   }
 
-  /** Opens the file and makes the model. */
-  async load({ memory = 0, level = -1, whole = false, signal } = {}) {
+  /** Opens the file. `whole`: reads all of it first. */
+  async openFile({ whole, signal }) {
     const { size, name } = this.#source;
     if (whole) {
       const ranges = [];
@@ -71,6 +71,11 @@ export class Model {
       await this.#fetch(ranges, signal);
     }
     await this.#repeat(() => this.#heap.lend(name ?? 'model', (text) => this.#heap.call('ebpo_js_open', this.#object, text, +whole)), this.#object, signal);
+  }
+
+  /** Opens the file and makes the model. */
+  async load({ memory = 0, level = -1, whole = false, signal } = {}) {
+    await this.openFile({ whole, signal });
     await this.#repeat(() => this.#heap.call('ebpo_js_load', this.#object, memory, level), this.#object, signal);
     return this;
   }
@@ -389,6 +394,14 @@ export class Model {
     return this.#run({ call: this.#of('ebpo_js_mesh'), read }, signal);
   }
 
+  /** Faces by their indices: corners [9 each], and indices in the source if the file has them. */
+  async faces(numbers, { signal } = {}) {
+    const faces = new Uint8Array(Uint32Array.from(numbers).buffer);
+    await this.#repeat(() => this.#heap.lend(faces, (at) => this.#heap.call('ebpo_js_faces', this.#object, at, faces.length / 4)), this.#object, signal);
+    const source = this.#heap.result(this.#object, 1, Uint32Array);
+    return { corners: this.#heap.result(this.#object, 0, Float64Array), source: source.length ? source : undefined };
+  }
+
   async level(level, { cellFaces = true, signal } = {}) {
     const read = (array) => ({ level, vertices: array(0, Float64Array), triangles: array(1, Uint32Array), corners: array(2, Uint8Array),
       normals: array(3, Float32Array), octcode: array(4, BigUint64Array), type: array(5, Uint8Array), winding: array(6, Int32Array),
@@ -425,6 +438,8 @@ export class Model {
   dispose() {
     if (!this.#disposed && !this.#heap.failed) {
       [...this.#idle, ...this.#used].forEach((query) => this.#heap.call('ebpo_js_query_free', query));
+      if (this.#heap.exports.ebpo_js_unload) // not in the module for drawing
+        this.#heap.call('ebpo_js_unload', this.#object);
       this.#heap.call('ebpo_js_free', this.#object);
     }
     this.#disposed = true;
@@ -441,12 +456,12 @@ if (Symbol.dispose)
   Model.prototype[Symbol.dispose] = Model.prototype.dispose;
 
 /** Opens a model with a compiled module. */
-export async function openWith(loading, sourcing, options = {}) {
+export async function openWith(loading, sourcing, options = {}, Kind = Model) {
   const { signal, heap: limit, beside } = options;
   const [module, source] = await Promise.all([loading, sourcing]);
   signal?.throwIfAborted();
   const whole = options.whole ?? !!source.inMemory;
-  const model = new Model(beside ? Model.parts(beside).heap : new Heap(module, limit), source, { ...options, whole });
+  const model = new Kind(beside ? Model.parts(beside).heap : new Heap(module, limit), source, { ...options, whole });
   try {
     return await model.load({ ...options, whole });
   } catch (error) {

@@ -25,6 +25,7 @@ typedef struct ebpo_js_object {
     ebpo_model *model;
     ebpo_context *context;
     ebpo_stream *stream;
+    struct ebpo_chunks *chunks; /* of a view */
     bool within_level; /* the stream has begun a level whose nodes are not all read */
     ebpo_js_array array[EBPO_JS_ARRAYS];
     ebpo_error error;
