@@ -340,11 +340,11 @@ export class Model {
     return this.#joinAll(this.#manyNow(this.#rays('ebpo_js_ray_all', rays, options)));
   }
 
-  #box(name, min, max) {
+  #box(name, min, max, ...args) {
     const box = Float64Array.of(...min, ...max);
     if (box.length !== 6)
       throw new EbpoArgumentError('expected three numbers for each corner of the box', { status: 'EBPO_E_ARGUMENT' });
-    return { call: (query) => this.#heap.lend(box, (at) => this.#heap.call(name, query, at)),
+    return { call: (query) => this.#heap.lend(box, (at) => this.#heap.call(name, query, at, ...args)),
       read: (array) => name === 'ebpo_js_box_faces' ? array(0, Uint32Array) : { face: array(0, Uint32Array), corners: array(1, Float64Array) } };
   }
 
@@ -356,8 +356,8 @@ export class Model {
     return this.#runNow(this.#box('ebpo_js_box_faces', min, max));
   }
 
-  async boxTriangles(min, max, { signal } = {}) {
-    return this.#run(this.#box('ebpo_js_box_triangles', min, max), signal);
+  async boxTriangles(min, max, { most = Infinity, signal } = {}) {
+    return this.#run(this.#box('ebpo_js_box_triangles', min, max, most), signal);
   }
 
   // ---- the file ----

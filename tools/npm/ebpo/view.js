@@ -6,28 +6,27 @@ import { sourceOf } from './source.js';
 
 const PARTS = ['planes', 'mesh', 'maps', 'leaf-planes', 'attributes', 'colours'];
 
-/** Loads the module in advance. */
-export const loadView = () => loadModule(new URL('./ebpo-view.wasm', import.meta.url));
+/** Returns a promise of the compiled module, which is loaded once. */
+export const viewModule = () => loadModule(new URL('./ebpo-view.wasm', import.meta.url));
 
 /** Opens a file for drawing, as open() of the package does. `memory`: size of the cache of decoded data in bytes. */
-export const openView = (from, options = {}) => openWith(loadView(), sourceOf(from, options, options.signal), options, View);
+export const openView = (from, options = {}) => openWith(viewModule(), sourceOf(from, options, options.signal), options, View);
 
 /** Names of the file's parts. */
 export const partsOf = ({ parts }) => PARTS.filter((name, bit) => parts >> bit & 1);
 
 /** A file opened for drawing. */
 export class View extends Model {
+  #Corners; // class of arrays of coordinates
+
   /** Use openView(). */
   async load({ memory = 64 << 20, whole = false, signal } = {}) {
     await this.openFile({ whole, signal });
-    this.#call('ebpo_js_view', memory);
-    this.coloured = Boolean(this.#call('ebpo_js_coloured'));
-    return this;
-  }
-
-  #call(name, ...args) {
     const { heap, object } = Model.parts(this);
-    return heap.call(name, object, ...args);
+    await Model.repeat([this], () => heap.call('ebpo_js_view', object, memory), object, signal);
+    this.coloured = Boolean(heap.call('ebpo_js_coloured', object));
+    this.#Corners = this.info.doubles ? Float64Array : Float32Array;
+    return this;
   }
 
   /** Evaluates a call with numbers as its first arguments, and returns its result arrays. */
@@ -50,7 +49,7 @@ export class View extends Model {
     for (let i = 0; i < facts.length; i += 13) {
       const [level, part, group, groups] = facts.subarray(i, i + 4), [c, p, lc, lp, cl] = facts.subarray(i + 8, i + 13);
       out.push({ level, part, group, first: [...facts.subarray(i + 4, i + 8)], types: next(types, 0, groups), planeCounts: next(counts, 1, c), planes: next(planes, 2, p),
-        leafPlaneCounts: next(leafCounts, 3, lc), leafPlanes: next(leafPlanes, 4, lp), colours: cl ? next(colours, 5, cl) : undefined });
+        leafPlaneCounts: next(leafCounts, 3, lc), leafPlanes: next(leafPlanes, 4, lp), grayColours: cl ? next(colours, 5, cl) : undefined });
     }
     return out;
   }
@@ -62,7 +61,7 @@ export class View extends Model {
    */
   async leafFaces(leaves, { signal } = {}) {
     const array = await this.#read('ebpo_js_leaf_faces', leaves.flatMap(({ level, group, octant, subtree }) => [level, group, octant, subtree]), 4, [], signal);
-    const counts = array(0, Uint32Array), numbers = array(1, Uint32Array), corners = array(2, this.info.doubles ? Float64Array : Float32Array), colours = array(3, Uint8Array);
+    const counts = array(0, Uint32Array), numbers = array(1, Uint32Array), corners = array(2, this.#Corners), colours = array(3, Uint8Array);
     let at = 0;
     return Array.from(counts, (count) => {
       const from = at, to = at += count;
