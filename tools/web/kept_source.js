@@ -16,7 +16,7 @@ export class KeptSource {
   }
 
   #range(from, to) {
-    const { source } = this, begin = Math.max(from, Math.min(to, source.coming)), found = begin > from ? [{ from, to: begin, data: source.read(from, begin - from) }] : [];
+    const { source } = this, begin = Math.max(from, Math.min(to, source.coming ?? 0)), found = begin > from ? [{ from, to: begin, data: source.read(from, begin - from) }] : [];
     for (let at = begin; at < to;) {
       const next = this.pieces.find((piece) => piece.to > at), own = next && next.from <= at ? next : this.#fetch(at, Math.min(to, next?.from ?? Infinity));
       found.push(own);

@@ -1,5 +1,5 @@
 // Evaluates queries of the page in the worker by the package "ebpo": points, positions on faces for painting and measuring, and sections of the real faces.
-import { open } from './node_modules/ebpo/index.js'; // workers have no import maps
+import { open } from './node_modules/ebpo/index.js';
 import { errorOf } from './model_file.js';
 
 const ONE_WEIGHT = 2 ** 30;     // format-spec/paint.md

@@ -7,6 +7,7 @@ import { Cut } from './cut.js';
 import { fetchAfter, takeFirst } from './first_response.js';
 import { addLevels, growForView } from './grow.js';
 import { openModel } from './model_file.js';
+import { viewModule } from './node_modules/ebpo/view.js'; // workers have no import maps
 import { UrlSource, sourceOf } from './source.js';
 import { Tree } from './tree.js';
 
@@ -20,7 +21,7 @@ const SUBTREE_BYTES_A_VIEW = 1.5 * 1024 * 1024; // the same limit for files with
 // The open files by their member `file`: { number, current (an OpenFile), view, want, sections, silent }.
 const slots = new Map();
 const slotOf = (number = 0) => slots.get(number) ?? slots.set(number, { number, sections: 0, silent: true }).get(number);
-let module; // the compiled module for drawing, or a promise of it; undefined: model_file.js loads it
+let module, moduleCame; // a promise of the compiled module for drawing, which the page loads; undefined: model_file.js loads it
 
 const post = (slot, message, transfer = []) => self.postMessage({ file: slot.number, ...message }, transfer);
 
@@ -216,7 +217,10 @@ function end(slot) {
 async function handle(data, slot) {
   const { current } = slot, ready = current?.tree?.root;
   if (data.type === 'module') {
-    ({ module } = data);
+    if (data.loaded)
+      moduleCame(data.module ?? viewModule());
+    else
+      module = new Promise((done) => (moduleCame = done));
   } else if (data.type === 'first') {
     takeFirst(data);
   } else if (data.type === 'open') {
