@@ -644,7 +644,7 @@ async function embeds(browser, address) {
   const page = await show(browser, `http://127.0.0.1:${server.address().port}/`);
   await page.waitForFunction(() => window.done && window.heard?.some(([name]) => name === 'idle'), undefined, { timeout: 60000 });
   const [faces, low, high] = await page.evaluate(() => window.loaded);
-  assert.deepEqual([faces, low, high], [info.face_count, info.box_origin, info.box_origin.map((x, k) => x + info.box_size[k])]);
+  assert.deepEqual([faces, low, high], [info.faces, info.origin, info.origin.map((x, k) => x + info.size[k])]);
   const { where, distance } = await page.evaluate(() => window.probe());
   assert.deepEqual([where, distance], ['in', 0.5]);
   await page.waitForFunction(() => window.shares()[2] < 2_000_000);

@@ -23,7 +23,7 @@ export class View extends Model {
   async load({ memory = 64 << 20, whole = false, signal } = {}) {
     await this.openFile({ whole, signal });
     const { heap, object } = Model.parts(this);
-    await Model.repeat([this], () => heap.call('ebpo_js_view', object, memory), object, signal);
+    heap.call('ebpo_js_view', object, memory);
     this.coloured = Boolean(heap.call('ebpo_js_coloured', object));
     this.#Corners = this.info.doubles ? Float64Array : Float32Array;
     return this;

@@ -17,10 +17,17 @@ enum {
     DRAWN = EBPO_NEEDS_ALWAYS | EBPO_NEEDS_PLANES | EBPO_NEEDS_LEAF_PLANES | EBPO_NEEDS_COLOURS
 };
 
-/* Reads decoded chunks through a cache of this size in bytes. */
-int EBPO_JS(ebpo_js_view)(ebpo_js_object *object, double memory)
+/* Sets the size of the cache of decoded chunks in bytes. Whole levels do not use the cache. */
+void EBPO_JS(ebpo_js_view)(ebpo_js_object *object, double memory)
 {
-    return ebpo_chunks_make(&object->chunks, object->file, (uint64_t)memory, &object->error);
+    object->chunk_memory = (uint64_t)memory;
+}
+
+ebpo_status ebpo_js_need_chunks(ebpo_js_object *object)
+{
+    return object->chunks ? EBPO_OK
+                          : ebpo_chunks_make(&object->chunks, object->file, object->chunk_memory,
+                                             &object->error);
 }
 
 /* ---- bytes of levels ---- */
@@ -71,9 +78,7 @@ static ebpo_status find_run(ebpo_js_object *object, const wanted_part *wanted, e
     uint64_t part = (uint64_t)wanted->part, first = part * EBPO_INDEX_ROWS,
              all = groups_of_level(info, level);
     ebpo_subtree_row row;
-    *run = (ebpo_run){ .group = 0, .groups = all };
-    if (wanted->part < 0)
-        return EBPO_OK;
+    *run = (ebpo_run){ 0 };
     if (!ebpo_subtree_table_has(object->file, level)) {
         run->group = first;
         run->groups = all - first < EBPO_INDEX_ROWS ? all - first : EBPO_INDEX_ROWS;
@@ -113,11 +118,28 @@ static ebpo_status put_part(ebpo_js_object *object, const wanted_part *wanted, c
     return ok ? EBPO_OK : EBPO_E_MEMORY;
 }
 
-/* Reads one part. A damaged file may have parts without groups. */
+static ebpo_status read_whole(ebpo_js_object *object, const wanted_part *wanted)
+{
+    ebpo_read_options options = EBPO_READ_OPTIONS_INIT;
+    ebpo_level level = { 0 };
+    options.threads = 1;
+    options.omitted_parts = EBPO_PART_MESH | EBPO_PART_MAPS;
+    ebpo_status status = ebpo_file_read_level(object->file, (int)wanted->level, &options, &level,
+                                              &object->error);
+    ebpo_run run = { .groups = level.group_count };
+    if (status == EBPO_OK)
+        status = put_part(object, wanted, &run, &level);
+    ebpo_level_free(&level);
+    return status;
+}
+
+/* Reads one part. */
 static ebpo_status read_part(ebpo_js_object *object, const wanted_part *wanted)
 {
     ebpo_level level = { 0 };
     ebpo_run run;
+    if (wanted->part < 0)
+        return read_whole(object, wanted);
     ebpo_status status = find_run(object, wanted, &run);
     if (status == EBPO_OK)
         status = ebpo_pick_level(object->chunks, (int)wanted->level, &run, 1, DRAWN, &level,
@@ -133,7 +155,7 @@ static ebpo_status read_part(ebpo_js_object *object, const wanted_part *wanted)
 static void hint_parts(ebpo_js_object *object, ebpo_hints *hints, const wanted_part *wanted,
                        uint32_t count)
 {
-    uint32_t without = EBPO_NEEDS_MESH | EBPO_NEEDS_MAPS | EBPO_NEEDS_SOLID;
+    uint32_t without = EBPO_NEEDS_MESH | EBPO_NEEDS_MAPS;
     for (uint32_t i = 0; i < count; i++) {
         int level = (int)wanted[i].level;
         if (wanted[i].part < 0)
@@ -173,16 +195,22 @@ int EBPO_JS(ebpo_js_nodes)(ebpo_js_object *object, const wanted_part *wanted, ui
     const ebpo_info *info = ebpo_file_info(object->file);
     ebpo_status status = EBPO_OK;
     uint64_t *subtrees = malloc(count * sizeof *subtrees);
-    uint32_t rows = 0;
+    uint32_t rows = 0, parts = 0;
     ebpo_js_clear(object);
     if (!subtrees && count)
         return object->error.status = EBPO_E_MEMORY;
     for (uint32_t i = 0; i < count; i++)
+        parts += wanted[i].part >= 0;
+    if (parts)
+        status = ebpo_js_need_chunks(object);
+    for (uint32_t i = 0; i < count && status == EBPO_OK; i++)
         if (wanted[i].part >= 0 && wanted[i].level > info->subtree_level && info->subtree_level)
             subtrees[rows++] = (uint64_t)wanted[i].part;
     if (rows)
         ebpo_subtree_table_hint(object->chunks, subtrees, rows);
     free(subtrees);
+    if (status != EBPO_OK)
+        return status;
     count = affordable(object, wanted, count, bytes);
     ebpo_hints hints = EBPO_HINTS_INIT(object->file);
     hint_parts(object, &hints, wanted, count);

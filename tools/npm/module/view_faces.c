@@ -298,8 +298,12 @@ int EBPO_JS(ebpo_js_leaf_faces)(ebpo_js_object *object, const wanted_leaf *wante
     uint64_t *subtrees = malloc((count + 1) * sizeof *subtrees);
     uint32_t rows = 0;
     ebpo_js_clear(object);
-    if (!subtrees)
-        return object->error.status = EBPO_E_MEMORY;
+    ebpo_status status =
+        subtrees ? ebpo_js_need_chunks(object) : (object->error.status = EBPO_E_MEMORY);
+    if (status != EBPO_OK) {
+        free(subtrees);
+        return status;
+    }
     for (uint32_t i = 0; i < count; i++)
         if (wanted[i].subtree >= 0 && (!rows || subtrees[rows - 1] != (uint64_t)wanted[i].subtree))
             subtrees[rows++] = (uint64_t)wanted[i].subtree;
@@ -310,6 +314,6 @@ int EBPO_JS(ebpo_js_leaf_faces)(ebpo_js_object *object, const wanted_leaf *wante
         ebpo_subtrees_hint(object->chunks, &hints, subtrees[i], 1, LISTS, 0, true);
     ebpo_hint_all(&hints);
     free(subtrees);
-    ebpo_status status = find_faces(object, wanted, count);
+    status = find_faces(object, wanted, count);
     return status == EBPO_OK ? put_corners(object) : status;
 }
