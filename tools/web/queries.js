@@ -1,10 +1,12 @@
 // Evaluates queries of the page in the worker by the package "ebpo": points, positions on faces for painting and measuring, and sections of the real faces.
 import { open } from './node_modules/ebpo/index.js';
+import { EbpoError } from './error.js';
 import { errorOf } from './model_file.js';
 
 const ONE_WEIGHT = 2 ** 30;     // format-spec/paint.md
 const TILES = 4;                // a section is computed in so many rows and columns, with progress between them
 const FACES_MOST = 4_000_000;   // in a section
+const OFF = 2 ** -30;           // distance of a computed position from its face, in diagonals, is less than this
 const WHERE = ['out', 'in', 'on', 'maybe'];
 
 /** The queries of an open model (model_file.js). The large module of the package is loaded with the first query. */
@@ -77,12 +79,17 @@ const unit = (x) => Math.round(Math.min(1, Math.max(0, x)) * ONE_WEIGHT);
  * `mesh`.
  */
 export function positionsOf(queries, points) {
+  const near = OFF * Math.hypot(...queries.info.box_size);
   return queries.with(async (model) => {
-    const { distance, point, face } = await model.distance(points.flat(), { unsigned: true }), { corners, source } = await model.faces(face);
-    return points.map((_, i) => {
-      const own = corners.subarray(9 * i, 9 * i + 9), place = [...point.subarray(3 * i, 3 * i + 3)];
-      return { face: (source ?? face)[i], weights: weightsOf(place, own), place, normal: normalOf(own), distance: distance[i] };
-    });
+    const { distance, point, face: faces } = await model.distance(points.flat(), { unsigned: true }), out = [];
+    for (const [i, face] of faces.entries()) {
+      const place = [...point.subarray(3 * i, 3 * i + 3)], around = await model.boxTriangles(place.map((x) => x - near), place.map((x) => x + near)), k = around.face.indexOf(face);
+      if (k < 0)
+        throw new EbpoError('ABSENT', `${queries.file.source.name}: the file has no face at this point`);
+      const own = around.corners.subarray(9 * k, 9 * k + 9);
+      out.push({ face, weights: weightsOf(place, own), place, normal: normalOf(own), distance: distance[i] });
+    }
+    return out;
   });
 }
 

@@ -4,7 +4,7 @@ import { normalOf } from './queries.js';
 const FACES_MOST = 100_000;   // around a point; with more faces the whole ball is coloured
 const OFF = 2 ** -20;         // greatest distance of a position from its face, in diagonals
 
-// Returns the faces that intersect the box around a ball: { numbers, corners: [nine numbers each] }; 'elsewhere' when the file is a subset without some of them,
+// Returns the faces that intersect the box around a ball, with the numbers that paint files use: { numbers, corners: [nine numbers each] }; 'elsewhere' when the file is a subset without some of them,
 // 'many' when they are too many.
 async function facesAround(queries, point, radius) {
   try {
@@ -16,9 +16,6 @@ async function facesAround(queries, point, radius) {
     return 'elsewhere';
   }
 }
-
-// Returns the numbers that paint files use.
-const namesOf = (queries, numbers) => queries.with(async (model) => [...(await model.faces(numbers)).source ?? numbers]);
 
 /**
  * Returns the point of a triangle (nine numbers from `at` on) that is nearest to p: [distance, x, y, z]. Computes in doubles.
@@ -106,7 +103,7 @@ export async function reachOf(queries, points) {
     const crowded = around === 'many';
     if (crowded) // a smaller ball suffices to find the face
       around = await facesAround(queries, place, tolerance);
-    const names = around.numbers?.length ? await namesOf(queries, around.numbers) : [], own = names.indexOf(face);
+    const own = around.numbers?.indexOf(face) ?? -1;
     if (own < 0 || !(nearestOnTriangle(place, around.corners[own], 0)[0] <= tolerance)) {
       out.push({ here: subset && own < 0 ? 'elsewhere' : 'no' });
       continue;

@@ -394,14 +394,6 @@ export class Model {
     return this.#run({ call: this.#of('ebpo_js_mesh'), read }, signal);
   }
 
-  /** Faces by their indices: corners [9 each], and indices in the source if the file has them. */
-  async faces(numbers, { signal } = {}) {
-    const faces = new Uint8Array(Uint32Array.from(numbers).buffer);
-    await this.#repeat(() => this.#heap.lend(faces, (at) => this.#heap.call('ebpo_js_faces', this.#object, at, faces.length / 4)), this.#object, signal);
-    const source = this.#heap.result(this.#object, 1, Uint32Array);
-    return { corners: this.#heap.result(this.#object, 0, Float64Array), source: source.length ? source : undefined };
-  }
-
   async level(level, { cellFaces = true, signal } = {}) {
     const read = (array) => ({ level, vertices: array(0, Float64Array), triangles: array(1, Uint32Array), corners: array(2, Uint8Array),
       normals: array(3, Float32Array), octcode: array(4, BigUint64Array), type: array(5, Uint8Array), winding: array(6, Int32Array),

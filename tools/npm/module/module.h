@@ -25,7 +25,7 @@ typedef struct ebpo_js_object {
     ebpo_model *model;
     ebpo_context *context;
     ebpo_stream *stream;
-    struct ebpo_chunks *chunks; /* of a view, and for faces by their indices */
+    struct ebpo_chunks *chunks; /* of a view */
     uint64_t chunk_memory;
     bool within_level; /* the stream has begun a level whose nodes are not all read */
     ebpo_js_array array[EBPO_JS_ARRAYS];
