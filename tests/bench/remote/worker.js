@@ -8,22 +8,17 @@ self.onmessage = async ({ data }) => {
 };
 
 async function ours({ url, to, whole }) {
-  const { openEbpo, loadZstd } = await import('/viewer/reader/index.js');
-  const { ZSTDDecoder } = await import('/viewer/node_modules/zstddec/dist/zstddec.mjs');
-  const zstd = await loadZstd(ZSTDDecoder);
+  const { openModel } = await import('/viewer/model_file.js');
+  const { viewModule } = await import('/viewer/node_modules/ebpo/view.js'), module = await viewModule();
   const begin = performance.now();
-  const file = await openEbpo(url, { zstd });
-  let first, values = 0;
-  const add = (levels) => levels.forEach((level) => (values += level.planes?.length ?? 0));
-  if (whole) {
-    add(await file.levels(0, file.info.level_count - 1));
-    values += (await file.mesh()).faces.length;
-  } else {
-    add(await file.levels(0, 0));
-    first = performance.now() - begin;
-    if (to > 0)
-      add(await file.levels(1, to));
-  }
+  const file = await openModel(url, { module }), count = (parts) => parts.reduce((sum, { planes }) => sum + planes.length, 0);
+  const levels = (from, last) => file.nodes(Array.from({ length: last - from + 1 }, (_, i) => ({ level: from + i, part: -1 })));
+  let values = count(await levels(0, 0));
+  const first = performance.now() - begin, last = whole ? file.info.level_count - 1 : to;
+  if (last > 0)
+    values += count(await levels(1, last));
+  if (whole)
+    values += (await file.view.mesh()).faces.length;
   return { first, ms: performance.now() - begin, values };
 }
 
