@@ -30,7 +30,10 @@ PATH=$PATH:/usr/sbin
 command -v nginx >/dev/null || missing nginx
 command -v node >/dev/null || missing node
 [ -d "$viewer/node_modules/three" ] || missing "tools/web/node_modules"
-[ -f "$viewer/node_modules/ebpo/ebpo.wasm" ] || missing "tools/web/node_modules/ebpo"
+[ -f "$viewer/ebpo/ebpo-view.wasm" ] || {
+    echo "serve.sh: the npm package of the viewer is missing; run sh $here/tools/npm/build.sh build-npm" >&2
+    exit 1
+}
 if ! ls "$folder"/*.ebpo.h5 >/dev/null 2>&1; then
     echo "serve.sh: $folder: no .ebpo.h5 file is there; choose a folder with --folder, or run" \
         "sh $here/samples/quickstart.sh for a sample" >&2

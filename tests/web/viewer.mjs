@@ -12,13 +12,13 @@ import { pathToFileURL } from 'node:url';
 const [ebpo, generate, root] = process.argv.slice(2), viewer = join(root, 'tools/web');
 const chromium = ['/usr/bin/chromium', '/usr/bin/chromium-browser'].find(existsSync);
 const nginx = ['/usr/sbin/nginx', '/usr/bin/nginx'].some(existsSync);
-if (!chromium || !nginx || !existsSync(join(viewer, 'node_modules/playwright-core')) || !existsSync(join(viewer, 'node_modules/ebpo'))) {
-  console.log('skipped: chromium, nginx, tools/web/node_modules or its package ebpo is missing; run tools/install-deps.sh --tests, and tools/npm/build.sh FOLDER');
+if (!chromium || !nginx || !existsSync(join(viewer, 'node_modules/playwright-core')) ) {
+  console.log('skipped: chromium, nginx or tools/web/node_modules is missing; run tools/install-deps.sh --tests');
   process.exit(77);
 }
 const load = (path) => import(pathToFileURL(join(viewer, path)));
 const { chromium: playwright } = await load('node_modules/playwright-core/index.mjs');
-const { open } = await load('node_modules/ebpo/index.js');
+const { open } = await load('ebpo/index.js');
 const { cutFaces, measureOf } = await load('queries.js'), { plates } = await load('test/plates.js'), { readPaint } = await load('paint/paint_file.js');
 
 const work = mkdtempSync(join(tmpdir(), 'ebpo-viewer-')), models = join(work, 'models'), log = join(work, 'access.log'), model = join(models, 'ring.ebpo.h5');
@@ -599,7 +599,7 @@ async function paints(browser, address) {
 
 // Uses the package in a page of another origin: the element, and the three.js object in a separate scene.
 async function embeds(browser, address) {
-  const folder = join(work, 'project'), own = join(folder, 'node_modules/ebpo-viewer'), { build } = await load('node_modules/esbuild/lib/main.js');
+  const folder = join(work, 'project'), own = join(folder, 'ebpo-viewer'), { build } = await load('node_modules/esbuild/lib/main.js');
   run('node', [join(viewer, 'package.mjs'), own]);
   symlinkSync(join(viewer, 'node_modules/three'), join(folder, 'node_modules/three'));
   writeFileSync(join(folder, 'main.js'), `import 'ebpo-viewer'; import { EbpoGroup } from 'ebpo-viewer/three'; import * as THREE from 'three';

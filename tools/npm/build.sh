@@ -1,6 +1,6 @@
 #!/bin/sh
 # Builds the npm package "ebpo": the library as WebAssembly, with its JavaScript interface.
-#   tools/npm/build.sh FOLDER   writes the package to FOLDER/package
+#   tools/npm/build.sh FOLDER   writes the package to FOLDER/package, and a copy for the viewer to tools/web/ebpo
 # Needs Debian's emscripten, dpkg-dev, meson and nodejs. The libraries that are linked (zstd, zlib, GMP, nettle)
 # are built from Debian's source packages, which apt downloads and checks. Equal sources give equal bytes.
 set -eu
@@ -156,6 +156,8 @@ build_package() {
     version=$(sed -n "s/^  version: '\(.*\)',$/\1/p" "$root/meson.build")
     cp "$here"/ebpo/*.js "$here"/ebpo/*.d.ts "$here/ebpo/README.md" "$root/LICENSE" "$folder/package"
     sed "s/@VERSION@/$version/" "$here/ebpo/package.json.in" >"$folder/package/package.json"
+    rm -rf "$root/tools/web/ebpo"
+    cp -r "$folder/package" "$root/tools/web/ebpo"
 }
 
 mkdir -p "$deps/include"

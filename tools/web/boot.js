@@ -7,7 +7,7 @@
   const HEAD_BYTES = 1 << 17;     // the worker can begin with so many bytes
   const PATIENCE_MS = 1500;       // longest time for which app.js waits for HEAD_BYTES
   const FIELD_OF_VIEW = 38;       // vertical, in degrees
-  const WASM = 'node_modules/ebpo/ebpo-view.wasm';
+  const WASM = 'ebpo/ebpo-view.wasm';
 
   const query = new URLSearchParams(location.search), messages = [];
   const number = (name) => (/^\d+$/.test(query.get(name) ?? '') ? Number(query.get(name)) : undefined);

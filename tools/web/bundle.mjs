@@ -29,7 +29,7 @@ function replace(page, from, to) {
 let page = read('index.html');
 page = replace(page, '<link rel="stylesheet" href="style.css">', `<style>${await small('style.css', 'css')}</style>`);
 page = replace(page, '<script src="boot.js"></script>', `<script>${await small('boot.js', 'js')}</script>`);
-page = replace(page, 'node_modules/ebpo/ebpo-view.wasm', 'ebpo-view.wasm');
+page = replace(page, 'ebpo/ebpo-view.wasm', 'ebpo-view.wasm');
 page = replace(page, /<script type="importmap">[^]*?<\/script>\n/.exec(page)[0], '');
 
 const common = { outdir: folder, bundle: true, minify: true, format: 'esm', target: TARGET, legalComments: 'eof', write: false, logLevel: 'warning' };

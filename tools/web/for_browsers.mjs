@@ -11,4 +11,4 @@ export const withoutNode = { name: 'without-node', setup: ({ onResolve, onLoad }
 } };
 
 /** Returns the modules that worker.js loads from its folder: [name, bytes] each. */
-export const wasmFiles = () => ['ebpo-view.wasm', 'ebpo.wasm'].map((name) => [name, readFileSync(join(here, 'node_modules/ebpo', name))]);
+export const wasmFiles = () => ['ebpo-view.wasm', 'ebpo.wasm'].map((name) => [name, readFileSync(join(here, 'ebpo', name))]);

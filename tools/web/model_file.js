@@ -1,6 +1,6 @@
 // An open model: its header, and the data for drawing, by the small module of the package "ebpo".
-import { View, partsOf, viewModule } from './node_modules/ebpo/view.js';
-import { openWith } from './node_modules/ebpo/model.js';
+import { View, partsOf, viewModule } from './ebpo/view.js';
+import { openWith } from './ebpo/model.js';
 import { EbpoError } from './error.js';
 import { KeptSource } from './kept_source.js';
 import { sourceOf } from './source.js';

@@ -1,5 +1,5 @@
 // Evaluates queries of the page in the worker by the package "ebpo": points, positions on faces for painting and measuring, and sections of the real faces.
-import { open } from './node_modules/ebpo/index.js';
+import { open } from './ebpo/index.js';
 import { EbpoError } from './error.js';
 import { errorOf } from './model_file.js';
 

@@ -7,7 +7,7 @@ import { Cut } from './cut.js';
 import { fetchAfter, takeFirst } from './first_response.js';
 import { addLevels, growForView } from './grow.js';
 import { openModel } from './model_file.js';
-import { viewModule } from './node_modules/ebpo/view.js'; // workers have no import maps
+import { viewModule } from './ebpo/view.js'; // workers have no import maps
 import { UrlSource, sourceOf } from './source.js';
 import { Tree } from './tree.js';
 

@@ -8,17 +8,21 @@ self.onmessage = async ({ data }) => {
 };
 
 async function ours({ url, to, whole }) {
-  const { openModel } = await import('/viewer/model_file.js');
-  const { viewModule } = await import('/viewer/node_modules/ebpo/view.js'), module = await viewModule();
-  const begin = performance.now();
-  const file = await openModel(url, { module }), count = (parts) => parts.reduce((sum, { planes }) => sum + planes.length, 0);
-  const levels = (from, last) => file.nodes(Array.from({ length: last - from + 1 }, (_, i) => ({ level: from + i, part: -1 })));
-  let values = count(await levels(0, 0));
-  const first = performance.now() - begin, last = whole ? file.info.level_count - 1 : to;
-  if (last > 0)
-    values += count(await levels(1, last));
-  if (whole)
-    values += (await file.view.mesh()).faces.length;
+  const { openView, viewModule } = await import('/viewer/ebpo/view.js'), { open } = await import('/viewer/ebpo/index.js');
+  await viewModule();
+  const begin = performance.now(), count = (parts) => parts.reduce((sum, { planes }) => sum + planes.length, 0);
+  if (whole) {
+    const model = await open(url);
+    let values = (await model.mesh()).faces.length;
+    for await (const level of model.levels())
+      values += count([level]);
+    return { ms: performance.now() - begin, values };
+  }
+  const view = await openView(url), levels = (from) => view.nodes(Array.from({ length: to - from + 1 }, (_, i) => ({ level: from + i, part: -1 })));
+  let values = count(await view.nodes([{ level: 0, part: -1 }]));
+  const first = performance.now() - begin;
+  if (to > 0)
+    values += count(await levels(1));
   return { first, ms: performance.now() - begin, values };
 }
 

@@ -4,7 +4,7 @@ import { execFileSync } from 'node:child_process';
 import { readFileSync } from 'node:fs';
 import test from 'node:test';
 import { Queries, cutFaces, measureOf, positionsOf, sectionOf, weightsOf } from '../queries.js';
-import { open } from '../node_modules/ebpo/index.js';
+import { open } from '../ebpo/index.js';
 import { openModel } from '../model_file.js';
 
 // Returns a box as twelve faces, counter-clockwise as seen from outside.

@@ -6,7 +6,7 @@ import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { test } from 'node:test';
-import { open } from '../node_modules/ebpo/index.js';
+import { open } from '../ebpo/index.js';
 import { openModel } from '../model_file.js';
 import { readPaint } from '../paint/paint_file.js';
 import { Queries } from '../queries.js';

@@ -5,7 +5,7 @@ import { copyFileSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from '
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { test } from 'node:test';
-import { open } from '../node_modules/ebpo/index.js';
+import { open } from '../ebpo/index.js';
 import { sharesOf, weightOf } from '../together/budget.js';
 import { boundsOf } from '../together/bounds.js';
 import { parseStrict } from '../together/strict_json.js';
