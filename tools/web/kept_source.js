@@ -6,8 +6,8 @@ export class KeptSource {
   /** `source`: an open source (source.js), whose first bytes are not kept here. */
   constructor(source, { most = KEPT_BYTES } = {}) {
     Object.assign(this, { source, most, size: source.size, name: source.name, version: '' });
-    this.pieces = []; // { from, to, data: a promise of the bytes }, without overlap, by `from`
-    this.bytes = 0;
+    this.pieces = []; // { from, to, data: a promise of the bytes, used: its last use }, without overlap, by `from`
+    this.bytes = this.uses = 0;
   }
 
   /** Resolves to the bytes of ranges [{ offset, size }], which are fetched at the same time. */
@@ -27,11 +27,11 @@ export class KeptSource {
 
   #fetch(from, to) {
     const last = !this.pieces.some((piece) => piece.from >= to) && this.size - to <= END_BYTES, end = last ? this.size : to;
-    const piece = { from, to: end, data: this.source.read(from, end - from) };
+    const piece = { from, to: end, data: this.source.read(from, end - from), used: ++this.uses };
     this.pieces.splice(this.pieces.findLastIndex((p) => p.from < from) + 1, 0, piece);
     this.bytes += end - from;
     piece.data.catch(() => this.#forget(piece)); // the next reader tries again
-    for (const old of [...this.pieces].sort((a, b) => (a.at ?? 0) - (b.at ?? 0))) {
+    for (const old of [...this.pieces].sort((a, b) => a.used - b.used)) {
       if (this.bytes <= this.most || old === piece)
         break;
       this.#forget(old);
@@ -47,10 +47,8 @@ export class KeptSource {
   }
 
   async #joined(found, from, to) {
-    const at = performance.now(), parts = await Promise.all(found.map((piece) => {
-      piece.at = at;
-      return piece.data;
-    }));
+    found.forEach((piece) => (piece.used = ++this.uses));
+    const parts = await Promise.all(found.map(({ data }) => data));
     if (parts.length === 1)
       return parts[0].subarray(from - found[0].from, to - found[0].from);
     const all = new Uint8Array(to - from);

@@ -30,12 +30,12 @@ export function errorOf(error, name) {
 
 /**
  * Opens an address, a File or Blob, bytes, or a source. Options: those of UrlSource, and `module`, the compiled module or a promise of it; `cacheBytes`, the size
- * of the cache of decoded chunks.
+ * of the cache of decoded chunks; `headBytes`, the number of bytes of the first response to wait for.
  */
-export async function openModel(what, { module = viewModule(), cacheBytes = 64 << 20, ...options } = {}) {
-  const source = sourceOf(what, { ahead: HEAD_BYTES, ...options });
+export async function openModel(what, { module = viewModule(), cacheBytes = 64 << 20, headBytes = HEAD_BYTES, ...options } = {}) {
+  const source = sourceOf(what, { ahead: headBytes, ...options });
   try {
-    await source.open(HEAD_BYTES);
+    await source.open(headBytes);
     const kept = new KeptSource(source);
     return new ModelFile(source, kept, await openWith(module, kept, { memory: cacheBytes }, View));
   } catch (error) {

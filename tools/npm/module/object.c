@@ -1,6 +1,7 @@
 /* Objects of the WebAssembly modules: opening, bytes, results and information. */
 #include <float.h>
 #include <inttypes.h>
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -184,7 +185,8 @@ static ebpo_status put_string(ebpo_js_object *object, const char *name, const ch
 
 static ebpo_status put_number(ebpo_js_object *object, const char *name, double value)
 {
-    return put_text(object, "\"%s\":%.17g,", name, value);
+    return isfinite(value) ? put_text(object, "\"%s\":%.17g,", name, value)
+                           : put_text(object, "\"%s\":null,", name);
 }
 
 static ebpo_status put_vector(ebpo_js_object *object, const char *name, const double x[3])
@@ -200,16 +202,17 @@ static ebpo_status put_hash(ebpo_js_object *object, const char *name, const uint
     return put_string(object, name, text);
 }
 
-static ebpo_status put_level(ebpo_js_object *object, const ebpo_level_summary *level, bool last)
+static bool put_level(ebpo_js_object *object, const ebpo_level_summary *level)
 {
     return put_text(object,
                     "{\"gray\":%" PRIu64 ",\"leaves\":%" PRIu64 ",\"white\":%" PRIu64
                     ",\"black\":%" PRIu64 ",\"planes\":%" PRIu64 ",\"leafPlanes\":%" PRIu64
-                    ",\"faces\":%" PRIu64 ",\"pruned\":%" PRIu64
-                    ",\"grayVolume\":%.17g,\"leafVolume\":%.17g}%s",
+                    ",\"faces\":%" PRIu64 ",",
                     level->gray_count, level->leaf_count, level->white_count, level->black_count,
-                    level->plane_count, level->leaf_plane_count, level->new_count,
-                    level->pruned_count, level->gray_volume, level->leaf_volume, last ? "" : ",");
+                    level->plane_count, level->leaf_plane_count, level->new_count) == EBPO_OK &&
+           put_number(object, "grayVolume", level->gray_volume) == EBPO_OK &&
+           put_number(object, "leafVolume", level->leaf_volume) == EBPO_OK &&
+           put_text(object, "\"pruned\":%" PRIu64 "}", level->pruned_count) == EBPO_OK;
 }
 
 static const char *const rule_words[] = { "nonzero", "evenodd", "positive" };
@@ -246,6 +249,6 @@ int EBPO_JS(ebpo_js_info)(ebpo_js_object *object)
               put_number(object, "fileBytes", (double)info->file_bytes) == EBPO_OK &&
               put_text(object, "\"levels\":[") == EBPO_OK;
     for (int k = 0; k < info->level_count && ok; k++)
-        ok = put_level(object, &info->level[k], k + 1 == info->level_count) == EBPO_OK;
+        ok = put_text(object, k ? "," : "") == EBPO_OK && put_level(object, &info->level[k]);
     return ok && put_text(object, "]}") == EBPO_OK ? EBPO_OK : EBPO_E_MEMORY;
 }
