@@ -599,7 +599,7 @@ async function paints(browser, address) {
 
 // Uses the package in a page of another origin: the element, and the three.js object in a separate scene.
 async function embeds(browser, address) {
-  const folder = join(work, 'project'), own = join(folder, 'ebpo-viewer'), { build } = await load('node_modules/esbuild/lib/main.js');
+  const folder = join(work, 'project'), own = join(folder, 'node_modules/ebpo-viewer'), { build } = await load('node_modules/esbuild/lib/main.js');
   run('node', [join(viewer, 'package.mjs'), own]);
   symlinkSync(join(viewer, 'node_modules/three'), join(folder, 'node_modules/three'));
   writeFileSync(join(folder, 'main.js'), `import 'ebpo-viewer'; import { EbpoGroup } from 'ebpo-viewer/three'; import * as THREE from 'three';
@@ -635,7 +635,8 @@ async function embeds(browser, address) {
     { time: 2, pose: { translation: [0, 0, 4] } }] } }, instances: [{ name: 'a', model: 'red' }, { name: 'b', model: 'red', route: 'up' }] };
   const server = createHttp((request, response) => {
     const file = { '/': ['text/html', html], '/main.js': ['text/javascript', main.text], '/pair.scene.json': ['application/json', JSON.stringify(scene)],
-      '/worker.js': ['text/javascript', readFileSync(join(own, 'worker.js'))] }[request.url] ?? ['image/x-icon', ''];
+      '/worker.js': ['text/javascript', readFileSync(join(own, 'worker.js'))], ...Object.fromEntries(['ebpo-view.wasm', 'ebpo.wasm'].map((name) =>
+        [`/${name}`, ['application/wasm', readFileSync(join(own, name))]])) }[request.url] ?? ['image/x-icon', ''];
     response.writeHead(200, { 'content-type': file[0] });
     response.end(file[1]);
   });

@@ -46,6 +46,8 @@ export async function openModel(what, { module = viewModule(), cacheBytes = 64 <
 class ModelFile {
   constructor(source, kept, view) {
     Object.assign(this, { source, kept, view, info: infoOf(view.info), coloured: view.coloured });
+    this.sums = view.sums && this.#named(view.sums); // rejects if data returned early do not agree with the file's list of checksums
+    this.sums?.catch(() => {});
     this.levelBytes = this.info.levels.map(() => NaN); // bytes of the file for levels 0 to i, when they are known
   }
 
@@ -64,6 +66,8 @@ class ModelFile {
 
   /** Finds out the sizes of the levels. */
   async locate() {
+    this.sums = view.sums && this.#named(view.sums); // rejects if data returned early do not agree with the file's list of checksums
+    this.sums?.catch(() => {});
     this.levelBytes = [...await this.#named(this.view.levelBytes())];
   }
 

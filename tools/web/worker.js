@@ -58,6 +58,7 @@ class OpenFile {
     this.cut = new Cut(this.tree, { small: source.size < SMALL_FILE });
     post(this.slot, { type: 'opened', opening: this.number, name: source.name, size: source.size, info, scene: this.cut.scene, coloured: this.file.coloured || info.parts.has('colours'),
       bytesTo: this.file.levelBytes, traffic: this.file.traffic, ms: performance.now() - this.began });
+    this.file.sums?.catch((error) => this.ended || post(this.slot, { type: 'failed', opening: this.number, error: describe(error), late: true }));
     await this.load(Math.min(FIRST_LEVELS, info.level_count) - 1);
     this.root();
     await this.file.locate();

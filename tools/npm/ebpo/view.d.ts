@@ -19,6 +19,8 @@ export class View {
   readonly info: Info;
   /** True if faces or vertices have colours. */
   readonly coloured: boolean;
+  /** Rejects if the data returned before the list of chunk checksums arrived do not agree with it; undefined: no list. */
+  readonly sums?: Promise<void>;
   nodes(wanted: { level: number; part: number }[], options?: QueryOptions & { bytes?: number }): Promise<NodePart[]>;
   leafFaces(leaves: LeafAddress[], options?: QueryOptions): Promise<LeafFaces[]>;
   levelBytes(options?: QueryOptions): Promise<Float64Array>;

@@ -18,19 +18,35 @@ export const partsOf = ({ parts }) => PARTS.filter((name, bit) => parts >> bit &
 /** A file opened for drawing. */
 export class View extends Model {
   #Corners; // class of arrays of coordinates
+  #early;   // calls before the list of chunk checksums was read; undefined when it is read
+  /** Resolves when all data returned so far are compared with the list of chunk checksums, which may arrive late. */
+  sums;
 
   /** Use openView(). */
   async load({ memory = 64 << 20, whole = false, signal } = {}) {
     await this.openFile({ whole, signal });
     const { heap, object } = Model.parts(this);
-    heap.call('ebpo_js_view', object, memory);
+    if (heap.call('ebpo_js_view', object, memory))
+      this.#early = [];
     this.coloured = Boolean(heap.call('ebpo_js_coloured', object));
     this.#Corners = this.info.doubles ? Float64Array : Float32Array;
+    this.sums = this.#early && this.#readSums(signal);
+    this.sums?.catch(() => {}); // who awaits it reports the error
     return this;
+  }
+
+  async #readSums(signal) {
+    const { heap, object } = Model.parts(this);
+    await Model.repeat([this], () => heap.call('ebpo_js_sums', object), object, signal);
+    const early = this.#early;
+    this.#early = undefined;
+    for (const call of early)
+      await this.#read(...call); // compares the chunks
   }
 
   /** Evaluates a call with numbers as its first arguments, and returns its result arrays. */
   async #read(name, numbers, columns, args, signal) {
+    this.#early?.push([name, numbers, columns, args, signal]);
     const { heap, object } = Model.parts(this), values = Float64Array.from(numbers);
     await Model.repeat([this], () => heap.lend(values, (at) => heap.call(name, object, at, values.length / columns, ...args)), object, signal);
     return (n, Type) => heap.result(object, n, Type);

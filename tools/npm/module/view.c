@@ -6,6 +6,7 @@
 
 #include <ebpo/file.h>
 
+#include "format/chunk_directory.h"
 #include "format/file_in.h"
 #include "format/pick_rows.h"
 #include "format/schema.h"
@@ -17,10 +18,30 @@ enum {
     DRAWN = EBPO_NEEDS_ALWAYS | EBPO_NEEDS_PLANES | EBPO_NEEDS_LEAF_PLANES | EBPO_NEEDS_COLOURS
 };
 
-/* Sets the size of the cache of decoded chunks in bytes. Whole levels do not use the cache. */
-void EBPO_JS(ebpo_js_view)(ebpo_js_object *object, double memory)
+/* Begins drawing. `memory`: size of the cache of decoded chunks in bytes; whole levels do not use
+ * the cache. Chunks are not compared with the list of chunk checksums until ebpo_js_sums has read
+ * it, because the list may arrive late. Returns 1 if the file has such a list. */
+int EBPO_JS(ebpo_js_view)(ebpo_js_object *object, double memory)
 {
+    ebpo_file *own = ebpo_reader_own(object->file);
+    bool has_checksums = own->has_checksums;
     object->chunk_memory = (uint64_t)memory;
+    own->has_checksums = false;
+    return has_checksums;
+}
+
+/* Reads the list of chunk checksums. Then empties the cache, so that repeated calls compare all
+ * chunks. */
+int EBPO_JS(ebpo_js_sums)(ebpo_js_object *object)
+{
+    ebpo_file *own = ebpo_reader_own(object->file);
+    own->has_checksums = true;
+    ebpo_status status = ebpo_chunk_checksums_read(own, &object->error);
+    if (status == EBPO_E_PENDING)
+        own->has_checksums = false;
+    ebpo_chunks_free(object->chunks);
+    object->chunks = NULL;
+    return status;
 }
 
 ebpo_status ebpo_js_need_chunks(ebpo_js_object *object)

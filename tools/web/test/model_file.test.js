@@ -62,8 +62,9 @@ test('damaged files are errors, or give the data of the undamaged file', async (
   const read = async (bytes) => {
     const file = await openModel(bytes), tree = new Tree(file.info);
     await addLevels(file, tree, everyLevel(file));
-    const leaves = nodesOf(tree).filter((node) => node.type === LEAF);
-    return JSON.stringify([facts(tree), file.info.parts.has('mesh') ? (await file.leafFaces(leaves)).map(({ corners }) => [...corners]) : []]);
+    const leaves = nodesOf(tree).filter((node) => node.type === LEAF), faces = file.info.parts.has('mesh') ? await file.leafFaces(leaves) : [];
+    await file.sums;
+    return JSON.stringify([facts(tree), faces.map(({ corners }) => [...corners])]);
   };
   const check = (error) => assert.ok(error instanceof EbpoError && ['FORMAT', 'VERSION', 'UNSUPPORTED', 'LIMIT'].includes(error.code), error.stack);
   for (const path of filesOf('failed'))

@@ -10,7 +10,7 @@ const here = join(import.meta.dirname ?? new URL('.', import.meta.url).pathname,
 const esbuild = existsSync(join(here, 'node_modules/esbuild')) && spawnSync('npm', ['--version']).status === 0 ? await import('esbuild') : undefined;
 
 test('the package is packed, bundled for browsers, and has types for its exports', { skip: esbuild ? false : 'esbuild or npm is not installed' }, async (t) => {
-  const work = mkdtempSync(join(tmpdir(), 'ebpo-package-')), project = join(work, 'project'), own = join(project, 'ebpo-viewer');
+  const work = mkdtempSync(join(tmpdir(), 'ebpo-package-')), project = join(work, 'project'), own = join(project, 'node_modules/ebpo-viewer');
   t.after(() => rmSync(work, { recursive: true, force: true }));
   execFileSync(process.execPath, [join(here, 'package.mjs'), join(work, 'package')]);
   execFileSync('npm', ['pack', '--silent', '--offline', '--pack-destination', work], { cwd: join(work, 'package'), stdio: ['ignore', 'pipe', 'inherit'] });

@@ -41,6 +41,7 @@ async function readAll(url, options) {
     (node.type === LEAF ? leaves.push(node) : tree.children(node)?.forEach(walk));
   })(tree.root);
   await file.leafFaces(leaves);
+  await file.sums;
   return file;
 }
 
