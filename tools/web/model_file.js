@@ -66,8 +66,6 @@ class ModelFile {
 
   /** Finds out the sizes of the levels. */
   async locate() {
-    this.sums = view.sums && this.#named(view.sums); // rejects if data returned early do not agree with the file's list of checksums
-    this.sums?.catch(() => {});
     this.levelBytes = [...await this.#named(this.view.levelBytes())];
   }
 
