@@ -1,5 +1,5 @@
 // Reads files, chooses nodes and builds tiles outside the page's thread.
-// The page sends 'module', 'first', 'open', 'close', 'end', 'view', 'probe', 'positions', 'reach' and 'section'. It receives 'opened', 'located', 'tiles', 'loaded',
+// The page sends 'module', 'first', 'open', 'close', 'end', 'view', 'probe', 'positions', 'reach', 'hit' and 'section'. It receives 'opened', 'located', 'tiles', 'loaded',
 // 'probed', 'positions', 'section', 'idle' and 'failed'. Several files may be open: the member `file` of each message, 0 by default, names the file.
 import { Queries, positionsOf, sectionOf } from './queries.js';
 import { reachOf } from './reach.js';
@@ -179,6 +179,8 @@ class OpenFile {
   }
 }
 
+const RESULTS = { positions: positionsOf, reach: reachOf, hit: async (queries, [ray]) => [await queries.hit(ray)] };
+
 // Evaluates longer queries one after the other. A newer section query cancels an older one.
 async function runQuery(data, slot, mine) {
   if (data.type === 'section') {
@@ -189,7 +191,7 @@ async function runQuery(data, slot, mine) {
   }
   const emit = (news) => mine.ended || post(slot, { type: 'positions', opening: mine.number, id: data.id, ...news });
   try {
-    emit({ positions: await (data.type === 'reach' ? reachOf : positionsOf)(mine.queries, data.points) });
+    emit({ positions: await RESULTS[data.type](mine.queries, data.points) });
   } catch (error) {
     emit({ error: describe(error) });
   }
@@ -241,7 +243,7 @@ async function handle(data, slot) {
     Object.assign(slot, { view: data.view, want: data.want });
     if (ready)
       await current.pump();
-  } else if (['probe', 'positions', 'reach', 'section'].includes(data.type) && data.opening === current?.number) {
+  } else if (['probe', 'positions', 'reach', 'hit', 'section'].includes(data.type) && data.opening === current?.number) {
     await current.rooted; // queries may arrive before the first levels are loaded
     if (current.ended)
       return;

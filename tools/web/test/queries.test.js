@@ -67,5 +67,11 @@ test('sections of files agree with those of all faces; positions are on the sour
       assert.ok(own >= 0 && p.every((x, k) => Math.abs(x - place[k]) < 1e-6 * info.box_size[k]), `${path}: face ${face}`);
       assert.ok(Math.abs(distance - results[i].distance) < 1e-12);
     });
+
+    const ray = [...info.box_origin.map((o, k) => o - 0.1 * info.box_size[k]), ...info.box_size.map((s, k) => s * [1, 0.97, 1.02][k])], hit = await queries.hit(ray);
+    const found = JSON.parse(execFileSync(tool, ['ray', '--json', path], { input: `${ray.join(' ')}\n`, encoding: 'utf8' }));
+    assert.deepEqual(hit, found ? [0, 1, 2].map((k) => ray[k] + found.t * ray[3 + k]) : undefined);
+    const [exact, coarse] = await Promise.all([queries.exact(points[0]), queries.coarse(points[0], 2)]);
+    assert.ok(exact.distance === results[0].distance && coarse.lo <= exact.distance && exact.distance <= coarse.hi, path);
   }
 });
