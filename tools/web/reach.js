@@ -4,7 +4,7 @@ import { normalOf } from './queries.js';
 const FACES_MOST = 100_000;   // around a point; with more faces the whole ball is coloured
 const OFF = 2 ** -20;         // greatest distance of a position from its face, in diagonals
 
-// Returns the faces that intersect the box around a ball, with the numbers that paint files use: { numbers, corners: [nine numbers each] }; 'elsewhere' when the file is a subset without some of them,
+// Returns the faces that intersect the box around a ball, with the numbers of paint files: { numbers, corners: [nine numbers each] }; 'elsewhere' when the file is a subset without some of them,
 // 'many' when they are too many.
 async function facesAround(queries, point, radius) {
   try {

@@ -1,5 +1,5 @@
-/* Stands in for the readers of meshes, which the modules do not contain: recognises only the usual
- * beginnings of mesh files, for the message on a file of another type. */
+/* Stands in for the readers of meshes, which the modules do not contain: recognises only the
+ * common beginnings of mesh files, for the message on a file of another type. */
 #include <string.h>
 
 #include "mesh/import.h"

@@ -190,7 +190,7 @@ static void hint_parts(ebpo_js_object *object, ebpo_hints *hints, const wanted_p
 
 /* Returns how many of the first parts take at most `bytes` bytes of the file, roughly; at least a
  * few. Parts that are not subtrees are few. */
-static uint32_t affordable(ebpo_js_object *object, const wanted_part *wanted, uint32_t count,
+static uint32_t affordable_parts(ebpo_js_object *object, const wanted_part *wanted, uint32_t count,
                            double bytes)
 {
     enum { LEAST = 16 };
@@ -232,7 +232,7 @@ int EBPO_JS(ebpo_js_nodes)(ebpo_js_object *object, const wanted_part *wanted, ui
     free(subtrees);
     if (status != EBPO_OK)
         return status;
-    count = affordable(object, wanted, count, bytes);
+    count = affordable_parts(object, wanted, count, bytes);
     ebpo_hints hints = EBPO_HINTS_INIT(object->file);
     hint_parts(object, &hints, wanted, count);
     ebpo_hint_all(&hints);

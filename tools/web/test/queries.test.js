@@ -61,7 +61,8 @@ test('sections of files agree with those of all faces; positions are on the sour
     assert.ok(Math.abs(last.length - wanted.length) <= 1e-9 * wanted.length && Math.abs(last.area - wanted.area) <= 1e-9 * wanted.area, `${last.area} ${wanted.area}`);
 
     const points = [[0.1, 0.2, 0.3], [0.9, 0.9, 0.1], [0.5, 0.5, 0.5]].map((s) => s.map((x, k) => info.box_origin[k] + x * info.box_size[k])), places = await positionsOf(queries, points);
-    const { face: named, corners } = await model.boxTriangles(info.box_origin, info.box_origin.map((x, k) => x + info.box_size[k])), results = points.map((p) => JSON.parse(execFileSync(tool, ['distance', '--json', '--unsigned', path], { input: `${p.join(' ')}\n`, encoding: 'utf8' })));
+    const { face: named, corners } = await model.boxTriangles(info.box_origin, info.box_origin.map((x, k) => x + info.box_size[k]));
+    const results = points.map((p) => JSON.parse(execFileSync(tool, ['distance', '--json', '--unsigned', path], { input: `${p.join(' ')}\n`, encoding: 'utf8' })));
     places.forEach(({ face, weights, place, distance }, i) => {
       const own = named.indexOf(face), p = [0, 1, 2].map((k) => [2 ** 30 - weights[0] - weights[1], ...weights].reduce((sum, w, c) => sum + w / 2 ** 30 * corners[9 * own + 3 * c + k], 0));
       assert.ok(own >= 0 && p.every((x, k) => Math.abs(x - place[k]) < 1e-6 * info.box_size[k]), `${path}: face ${face}`);
