@@ -198,7 +198,7 @@ static uint32_t affordable_parts(ebpo_js_object *object, const wanted_part *want
     while (most < count) {
         uint32_t more = 2 * most < count ? 2 * most : count;
         ebpo_hints hints = EBPO_HINTS_INIT(object->file);
-        hints.summed = true;
+        hints.counts_bytes = true;
         hint_parts(object, &hints, wanted, more);
         if ((double)ebpo_hints_bytes(&hints) > bytes)
             break;
