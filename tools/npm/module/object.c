@@ -222,32 +222,33 @@ int EBPO_JS(ebpo_js_info)(ebpo_js_object *object)
 {
     const ebpo_info *info = ebpo_file_info(object->file);
     ebpo_js_clear(object);
-    bool ok = put_text(object, "{") == EBPO_OK &&
-              put_string(object, "generator", info->generator) == EBPO_OK &&
-              put_string(object, "sourceName", info->source_name) == EBPO_OK &&
-              put_string(object, "sourceFormat", info->source_format) == EBPO_OK &&
-              put_string(object, "unit", info->unit) == EBPO_OK &&
-              put_string(object, "crs", info->crs) == EBPO_OK &&
-              put_string(object, "date", info->date) == EBPO_OK &&
-              put_string(object, "rule", rule_words[info->rule]) == EBPO_OK &&
-              put_hash(object, "contentSha256", info->content_sha256) == EBPO_OK &&
-              (!info->pruned || put_hash(object, "subsetOf", info->subset_of) == EBPO_OK) &&
-              put_text(object, "\"version\":[%d,%d],\"solid\":%s,\"pruned\":%s,"
-                       "\"hasMesh\":%s,\"doubles\":%s,",
-                       info->version_major, info->version_minor, info->solid ? "true" : "false",
-                       info->pruned ? "true" : "false",
-                       info->parts & EBPO_PART_MESH ? "true" : "false",
-                       info->double_coordinates ? "true" : "false") == EBPO_OK &&
-              put_vector(object, "origin", info->box_origin) == EBPO_OK &&
-              put_vector(object, "size", info->box_size) == EBPO_OK &&
-              put_number(object, "vertices", (double)info->vertex_count) == EBPO_OK &&
-              put_number(object, "faces", (double)info->face_count) == EBPO_OK &&
-              put_number(object, "sourceFaces", (double)info->source_face_count) == EBPO_OK &&
-              put_number(object, "addedFaces", (double)info->repair_record.added_faces) == EBPO_OK &&
-              put_number(object, "parts", info->parts) == EBPO_OK &&
-              put_number(object, "subtreeLevel", info->subtree_level) == EBPO_OK &&
-              put_number(object, "fileBytes", (double)info->file_bytes) == EBPO_OK &&
-              put_text(object, "\"levels\":[") == EBPO_OK;
+    bool ok =
+        put_text(object, "{") == EBPO_OK &&
+        put_string(object, "generator", info->generator) == EBPO_OK &&
+        put_string(object, "sourceName", info->source_name) == EBPO_OK &&
+        put_string(object, "sourceFormat", info->source_format) == EBPO_OK &&
+        put_string(object, "unit", info->unit) == EBPO_OK &&
+        put_string(object, "crs", info->crs) == EBPO_OK &&
+        put_string(object, "date", info->date) == EBPO_OK &&
+        put_string(object, "rule", rule_words[info->rule]) == EBPO_OK &&
+        put_hash(object, "contentSha256", info->content_sha256) == EBPO_OK &&
+        (!info->pruned || put_hash(object, "subsetOf", info->subset_of) == EBPO_OK) &&
+        put_text(object,
+                 "\"version\":[%d,%d],\"solid\":%s,\"pruned\":%s,"
+                 "\"hasMesh\":%s,\"doubles\":%s,",
+                 info->version_major, info->version_minor, info->solid ? "true" : "false",
+                 info->pruned ? "true" : "false", info->parts & EBPO_PART_MESH ? "true" : "false",
+                 info->double_coordinates ? "true" : "false") == EBPO_OK &&
+        put_vector(object, "origin", info->box_origin) == EBPO_OK &&
+        put_vector(object, "size", info->box_size) == EBPO_OK &&
+        put_number(object, "vertices", (double)info->vertex_count) == EBPO_OK &&
+        put_number(object, "faces", (double)info->face_count) == EBPO_OK &&
+        put_number(object, "sourceFaces", (double)info->source_face_count) == EBPO_OK &&
+        put_number(object, "addedFaces", (double)info->repair_record.added_faces) == EBPO_OK &&
+        put_number(object, "parts", info->parts) == EBPO_OK &&
+        put_number(object, "subtreeLevel", info->subtree_level) == EBPO_OK &&
+        put_number(object, "fileBytes", (double)info->file_bytes) == EBPO_OK &&
+        put_text(object, "\"levels\":[") == EBPO_OK;
     for (int k = 0; k < info->level_count && ok; k++)
         ok = put_text(object, k ? "," : "") == EBPO_OK && put_level(object, &info->level[k]);
     return ok && put_text(object, "]}") == EBPO_OK ? EBPO_OK : EBPO_E_MEMORY;

@@ -223,8 +223,9 @@ static bool take_triangles(void *user, const ebpo_triangles *triangles)
     uint32_t *faces = ebpo_js_extend(object, 0, triangles->count, sizeof *faces);
     for (uint64_t i = 0; i < triangles->count && faces; i++)
         faces[i] = face_index(triangles->faces[i]);
-    return faces && ebpo_js_put(object, 1, triangles->corners,
-                                (size_t)triangles->count * sizeof *triangles->corners) == EBPO_OK &&
+    return faces &&
+           ebpo_js_put(object, 1, triangles->corners,
+                       (size_t)triangles->count * sizeof *triangles->corners) == EBPO_OK &&
            (double)object->array[0].bytes / sizeof *faces <= taking->most;
 }
 

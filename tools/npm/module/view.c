@@ -145,8 +145,8 @@ static ebpo_status read_whole(ebpo_js_object *object, const wanted_part *wanted)
     ebpo_level level = { 0 };
     options.threads = 1;
     options.omitted_parts = EBPO_PART_MESH | EBPO_PART_MAPS;
-    ebpo_status status = ebpo_file_read_level(object->file, (int)wanted->level, &options, &level,
-                                              &object->error);
+    ebpo_status status =
+        ebpo_file_read_level(object->file, (int)wanted->level, &options, &level, &object->error);
     ebpo_run run = { .groups = level.group_count };
     if (status == EBPO_OK)
         status = put_part(object, wanted, &run, &level);
@@ -191,7 +191,7 @@ static void hint_parts(ebpo_js_object *object, ebpo_hints *hints, const wanted_p
 /* Returns how many of the first parts take at most `bytes` bytes of the file, roughly; at least a
  * few. Parts that are not subtrees are few. */
 static uint32_t affordable_parts(ebpo_js_object *object, const wanted_part *wanted, uint32_t count,
-                           double bytes)
+                                 double bytes)
 {
     enum { LEAST = 16 };
     uint32_t most = count < LEAST ? count : LEAST;

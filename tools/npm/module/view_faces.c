@@ -62,8 +62,8 @@ static void make_runs(leaf_reading *r)
 
 /* Calls visit(leaf, its index in the level's lists) for each leaf. Returns false if a node is not a
  * leaf. */
-static bool visit_leaves(const leaf_reading *r, int level, void (*visit)(void *, uint32_t, uint64_t),
-                         void *user)
+static bool visit_leaves(const leaf_reading *r, int level,
+                         void (*visit)(void *, uint32_t, uint64_t), void *user)
 {
     uint64_t at = 0, before = 0; /* group, and leaves before it, in the lists */
     uint32_t i = 0;
