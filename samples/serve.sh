@@ -30,6 +30,10 @@ PATH=$PATH:/usr/sbin
 command -v nginx >/dev/null || missing nginx
 command -v node >/dev/null || missing node
 [ -d "$viewer/node_modules/three" ] || missing "tools/web/node_modules"
+[ -f "$viewer/ebpo/ebpo-view.wasm" ] || {
+    echo "serve.sh: the npm package of the viewer is missing; run sh $here/tools/npm/build.sh build-npm" >&2
+    exit 1
+}
 if ! ls "$folder"/*.ebpo.h5 >/dev/null 2>&1; then
     echo "serve.sh: $folder: no .ebpo.h5 file is there; choose a folder with --folder, or run" \
         "sh $here/samples/quickstart.sh for a sample" >&2
@@ -70,9 +74,12 @@ http {
     access_log ${log:-off};
     client_body_temp_path $work/tmp/a; proxy_temp_path $work/tmp/b;
     fastcgi_temp_path $work/tmp/c; uwsgi_temp_path $work/tmp/d; scgi_temp_path $work/tmp/e;
-    types { text/html html; text/css css; text/javascript js mjs; application/json json; image/svg+xml svg; }
+    types {
+        text/html html; text/css css; text/javascript js mjs; application/json json;
+        image/svg+xml svg; application/wasm wasm;
+    }
     sendfile on; tcp_nopush on;
-    gzip on; gzip_types text/css text/javascript application/json; gzip_static on;
+    gzip on; gzip_types text/css text/javascript application/json application/wasm; gzip_static on;
     server {
         listen 127.0.0.1:$port;
         root $work/www;

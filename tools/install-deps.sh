@@ -6,7 +6,7 @@
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 # Debian's nodejs comes without npm; others' brings it and conflicts with Debian's.
-viewer="nginx-light nodejs"
+viewer="nginx-light nodejs emscripten"
 command -v npm >/dev/null || viewer="$viewer npm"
 modules=no
 # meson finds the library folder of Debian with dpkg-dev.

@@ -296,7 +296,8 @@ static ebpo_status pick_level(descent *d)
             runs[count++] = (ebpo_run){ .group = group, .groups = 1 };
     }
     ebpo_status status =
-        ebpo_pick_level(d->c->chunks, d->level, runs, count, d->c->parts, &d->from, d->c->error);
+        ebpo_pick_level(d->c->chunks, d->level, runs, count,
+                        d->c->parts | EBPO_NEEDS_SOLID | EBPO_NEEDS_ALWAYS, &d->from, d->c->error);
     /* A gray node's group of children has the node's rank in the source, which follows from the
      * runs. */
     uint64_t next = 0;

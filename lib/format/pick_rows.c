@@ -364,10 +364,9 @@ static ebpo_status pick_types(const picking *p)
 }
 
 ebpo_status ebpo_pick_level(ebpo_chunks *chunks, int level, ebpo_run *runs, uint64_t run_count,
-                            uint32_t parts, ebpo_level *out, ebpo_error *error)
+                            uint32_t needs, ebpo_level *out, ebpo_error *error)
 {
     picking p = { chunks, level, runs, run_count, out, error };
-    uint32_t needs = parts | EBPO_NEEDS_SOLID | EBPO_NEEDS_ALWAYS;
     memset(out, 0, sizeof *out);
     ebpo_status status = pick_types(&p);
     if (status == EBPO_OK) {

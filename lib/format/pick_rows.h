@@ -28,10 +28,11 @@ EBPO_MUST_USE ebpo_status ebpo_runs_read(ebpo_chunks *chunks, int level, const e
 
 /* Reads all nodes of ascending runs that do not overlap, as one level. Fills in the ranks and
  * counts of the runs. The level's group_count is the sum over the runs, and its volumes are 0. The
- * level has the arrays that are always present and those of `parts`. Its face lists, and
- * leaf_first, contain the file's indices. The caller frees it with ebpo_level_free. */
+ * level has the types, and the arrays that any of `needs` requires (EBPO_NEEDS_..., schema.h). Its
+ * face lists, and leaf_first, contain the file's indices. The caller frees it with ebpo_level_free.
+ */
 EBPO_MUST_USE ebpo_status ebpo_pick_level(ebpo_chunks *chunks, int level, ebpo_run *runs,
-                                          uint64_t run_count, uint32_t parts, ebpo_level *out,
+                                          uint64_t run_count, uint32_t needs, ebpo_level *out,
                                           ebpo_error *error);
 
 /* Reads rows, in any order, of an array of the mesh or the maps. A row is three corners for faces,

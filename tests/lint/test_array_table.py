@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """test_array_table.py SOURCE: what is said of arrays in other languages says the same as the
 library's table, row by row:
-the specification's sections 6 and 9, its reader in Python, the viewer's reader."""
+the specification's sections 6 and 9, and its reader in Python."""
 import pathlib
 import re
 import sys
@@ -37,12 +37,6 @@ def of_specification(text):
     return rows
 
 
-def of_viewer(text):
-    return [(name, [int(n) for n in sizes.split(",")], signed == "true")
-            for name, sizes, signed in re.findall(r"^  '?([\w/]+)'?: \[\d+, \[([\d, ]+)\], "
-                                                  r"(true|false),", text, re.M)]
-
-
 def compare(where, rows, wanted):
     problems = [f"{where}: no row for {row[0]}, which is a row of array_table.inc" for row in wanted
                 if row[0] not in [r[0] for r in rows]]
@@ -56,7 +50,7 @@ def compare(where, rows, wanted):
 
 
 def check_codings(root, text):
-    """Each array's coding: in the specification's section 9, and in both other readers."""
+    """Each array's coding: in the specification's section 9, and in its reader."""
     wanted = {}
     for _, inside in re.findall(r"^(LEVEL_ARRAY|ROOT_ARRAY)\((.*?)\)\n", re.sub(r"\n +", " ", text),
                                 re.M):
@@ -70,32 +64,27 @@ def check_codings(root, text):
             for name in re.findall(r"`([\w/]+)`", names.split(";")[0]) if coding != "gates"}
     others = [] if "| `gates` | `/mesh/faces`;" in section else \
         ["format-spec/README.md, section 9: gates is not a coding of /mesh/faces"]
-    viewer = re.search(r"^const CODINGS = .*?^};", (root / "tools/web/reader/facts.js").read_text(),
-                       re.M | re.S).group(0)
     python = re.search(r"^CODINGS = .*?\}$", (root / "format-spec/read_ebpo.py").read_text(),
                        re.M | re.S).group(0)
     found = {"format-spec/README.md, section 9": said,
-             "tools/web/reader/facts.js":
-             dict(re.findall(r"'?([\w/]+)'?: \['([\w-]+)'", viewer)),
              "format-spec/read_ebpo.py":
              {name if name.startswith("leaf") else "/" + name: coding
               for name, coding in re.findall(r'"([\w/]+)": \("([\w-]+)"', python)}}
     others += [f"{place}: gates is not known" for place, form in
-               (("tools/web/reader/facts.js", "gates ? ['gates']"),
-                ("format-spec/read_ebpo.py", '("gates",) if gates'))
+               (("format-spec/read_ebpo.py", '("gates",) if gates'),)
                if form not in (root / place).read_text()]
     return others + [f"{place}: codings are {codings}; array_table.inc says {wanted}"
                      for place, codings in found.items() if codings != wanted]
 
 
 def check_parts(root):
-    """Each part has a word in files, in the tools and in the viewer's reader, and a need in the
+    """Each part has a word in files, in the tools and in the npm package, and a need in the
     table."""
     parts = re.findall(r"^    EBPO_PART_(\w+) = \d+",
                        (root / "lib/include/ebpo/file.h").read_text(), re.M)
     places = {"lib/format/schema.h": "EBPO_NEEDS_{0} = EBPO_PART_{0},",
               "lib/format/head_facts.c": ", EBPO_PART_{0}, ",
-              "tools/cli/words.c": '"{1}"', "tools/web/reader/facts.js": "'{1}'",
+              "tools/cli/words.c": '"{1}"', "tools/npm/ebpo/view.js": "'{1}'",
               "format-spec/README.md": "| `{1}` |"}
     return [f"{place}: part {part} is not named" for part in parts for place, form in places.items()
             if form.format(part, part.lower().replace("_", "-")) not in (root / place).read_text()]
@@ -108,8 +97,6 @@ def main():
         sys.exit(f"only {len(rows)} rows found in array_table.inc: this test no longer reads it")
     problems = compare("format-spec/README.md, section 6",
                        of_specification((root / "format-spec/README.md").read_text()), rows)
-    problems += compare("tools/web/reader/facts.js",
-                        of_viewer((root / "tools/web/reader/facts.js").read_text()), rows)
     reader = (root / "format-spec/read_ebpo.py").read_text()
     problems += [f"format-spec/read_ebpo.py: {name} is not read" for name in held
                  if f'"{name}"' not in reader]

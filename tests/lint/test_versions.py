@@ -28,7 +28,6 @@ repeated = {
     "CHANGELOG.md": only(r"^## (\d+\.\d+\.\d+)", "CHANGELOG.md"),
     "README.md": only(r"^The library is (\d+\.\d+\.\d+)", "README.md"),
     "tools/web/package.json": json.loads(text("tools/web/package.json"))["version"],
-    "tools/web/reader/package.json": json.loads(text("tools/web/reader/package.json"))["version"],
     "tools/web/package-lock.json": lock["version"],
     "tools/web/package-lock.json, packages": lock["packages"][""]["version"],
 }

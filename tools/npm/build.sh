@@ -1,6 +1,6 @@
 #!/bin/sh
 # Builds the npm package "ebpo": the library as WebAssembly, with its JavaScript interface.
-#   tools/npm/build.sh FOLDER   writes the package to FOLDER/package
+#   tools/npm/build.sh FOLDER   writes the package to FOLDER/package, and a copy for the viewer to tools/web/ebpo
 # Needs Debian's emscripten, dpkg-dev, meson and nodejs. The libraries that are linked (zstd, zlib, GMP, nettle)
 # are built from Debian's source packages, which apt downloads and checks. Equal sources give equal bytes.
 set -eu
@@ -141,7 +141,7 @@ link_module() { # file, C files...
     shift
     # shellcheck disable=SC2086
     (cd "$here/module" && emcc $flags -std=gnu11 -ffp-contract=off -Wall -Wextra \
-        -I"$root/lib/include" -I"$deps/include" "$@" \
+        -I"$root/lib/include" -I"$root/lib" -I"$deps/include" "$@" \
         -L"$deps/lib" -lebpo -lzstd -lz -lgmp -lnettle --no-entry -sSTANDALONE_WASM \
         -sIMPORTED_MEMORY -sALLOW_MEMORY_GROWTH -sMAXIMUM_MEMORY=4GB -sINITIAL_MEMORY=8MB \
         -sTOTAL_STACK=2MB -sABORTING_MALLOC=0 -sWASM_BIGINT \
@@ -151,11 +151,14 @@ link_module() { # file, C files...
 build_package() {
     rm -rf "$folder/package"
     mkdir -p "$folder/package"
-    link_module ebpo.wasm object.c queries.c levels.c check.c no_encoders.c
-    link_module ebpo-collide.wasm object.c queries.c levels.c check.c no_encoders.c collide.c
+    link_module ebpo.wasm object.c model.c queries.c levels.c check.c no_encoders.c
+    link_module ebpo-view.wasm object.c view.c view_faces.c no_encoders.c
+    link_module ebpo-collide.wasm object.c model.c queries.c levels.c check.c no_encoders.c collide.c
     version=$(sed -n "s/^  version: '\(.*\)',$/\1/p" "$root/meson.build")
     cp "$here"/ebpo/*.js "$here"/ebpo/*.d.ts "$here/ebpo/README.md" "$root/LICENSE" "$folder/package"
     sed "s/@VERSION@/$version/" "$here/ebpo/package.json.in" >"$folder/package/package.json"
+    rm -rf "$root/tools/web/ebpo"
+    cp -r "$folder/package" "$root/tools/web/ebpo"
 }
 
 mkdir -p "$deps/include"

@@ -8,7 +8,7 @@ import { applyShown } from './shading.js';
 import { Scene } from './scene.js';
 import { LEVEL_COLOURS, MESH_COLOUR, TYPE_COLOURS } from './shade.js';
 import { address, changed, fileOfEntry, pushStep, setHomeView, setPicture, viewParameters } from './share.js';
-import { $, count, emit, on, state, toModel } from './state.js';
+import { $, count, emit, on, rayThrough, state, toModel } from './state.js';
 
 const MORE_MS = 5000; // the tools are loaded so long after the first picture, or earlier when all data has arrived
 const TRIANGLES_MOST = 2_000_000; // approximate limit
@@ -395,7 +395,8 @@ $('canvas').addEventListener('pointerup', (e) => {
   const point = scene.pick(e.clientX, e.clientY);
   if (!point)
     return;
-  const query = (p) => (state.together ? state.together.clicked(p) : probeAt(p, scene.pickPrecision(point) / state.scene.scale));
+  const eye = scene.pickedFrom, ray = (p) => eye && rayThrough(toModel(eye), p);
+  const query = (p) => (state.together ? state.together.clicked(p) : probeAt(p, scene.pickPrecision(point) / state.scene.scale, ray(p)));
   (state.clicked ?? query)(toModel(point)); // an active tool receives the point
 });
 

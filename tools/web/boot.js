@@ -7,6 +7,7 @@
   const HEAD_BYTES = 1 << 17;     // the worker can begin with so many bytes
   const PATIENCE_MS = 1500;       // longest time for which app.js waits for HEAD_BYTES
   const FIELD_OF_VIEW = 38;       // vertical, in degrees
+  const WASM = 'ebpo/ebpo-view.wasm';
 
   const query = new URLSearchParams(location.search), messages = [];
   const number = (name) => (/^\d+$/.test(query.get(name) ?? '') ? Number(query.get(name)) : undefined);
@@ -17,6 +18,10 @@
   }
   const worker = new Worker('worker.js', { type: 'module' });
   worker.onmessage = ({ data }) => messages.push(data);
+  // Loads the module for drawing in parallel with the worker's script. If this fails, the worker loads it.
+  worker.postMessage({ type: 'module' });
+  fetch(WASM).then((response) => (response.ok ? response.arrayBuffer() : undefined)).then((bytes) => bytes && WebAssembly.compile(bytes)).catch(() => {})
+    .then((module) => worker.postMessage({ type: 'module', loaded: true, module }));
   const boot = window.ebpoBoot = { worker, messages, query, level: number('level'), detail: number('detail'), fieldOfView: FIELD_OF_VIEW, opening: 0, over() {},
     contextOptions: { antialias: true, powerPreference: 'high-performance', preserveDrawingBuffer: true } };
   // A name may contain a literal %.

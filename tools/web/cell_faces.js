@@ -1,5 +1,5 @@
 // Computes the visible parts of polygons on cell faces: two touching envelopes hide each other's polygons.
-import { BLACK, WHITE } from './reader/index.js';
+import { BLACK, WHITE } from './tree.js';
 
 const ON = 1e-9;           // in cells
 const THIN = 1 / 128;      // in cells: pieces with a smaller mean width are omitted

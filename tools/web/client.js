@@ -154,11 +154,14 @@ export class Client {
     return this.timer !== undefined;
   }
 
-  /** Queries a point of the model: { where, distance, nearest, lo, hi, exact, depth, ... }. A newer query cancels an older one, which rejects with AbortError. */
-  probe(point) {
+  /**
+   * Queries a point of the model: { point, where, distance, nearest, lo, hi, exact, depth, ... }. A newer query cancels an older one, which rejects with AbortError.
+   * `ray`: origin and direction, six numbers; the first point of the faces on it replaces `point`.
+   */
+  probe(point, ray) {
     this.requested?.fail(new DOMException('a newer query cancelled this one', 'AbortError'));
     const promise = new Promise((done, fail) => (this.requested = { done, fail }));
-    this.worker.post({ type: 'probe', opening: this.opening, point });
+    this.worker.post({ type: 'probe', opening: this.opening, point, ray });
     return promise;
   }
 
@@ -167,6 +170,13 @@ export class Client {
     const id = ++this.queries, promise = new Promise((done, fail) => this.waiting.set(id, { done, fail }));
     this.worker.post({ type: 'positions', opening: this.opening, id, points });
     return promise;
+  }
+
+  /** Returns the first point of the faces on a ray (origin and direction, six numbers), or undefined. */
+  async hit(ray) {
+    const id = ++this.queries, promise = new Promise((done, fail) => this.waiting.set(id, { done, fail }));
+    this.worker.post({ type: 'hit', opening: this.opening, id, points: [ray] });
+    return (await promise)[0];
   }
 
   /** Repeats pending requests. The next look() sends the current view again. */

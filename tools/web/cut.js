@@ -5,7 +5,7 @@
 import { Field } from './field.js';
 import { Hidden } from './hidden.js';
 import { MeshStore } from './mesh.js';
-import { BLACK, GRAY, LEAF, WHITE } from './reader/index.js';
+import { BLACK, GRAY, LEAF, WHITE } from './tree.js';
 import { TileMaker, planeVector } from './tile.js';
 import { CellFaces } from './cell_faces.js';
 
@@ -350,10 +350,10 @@ export class Cut {
     return out;
   }
 
-  /** Adds a leaf's faces. `faces`: nine numbers each, in the model's coordinates; its members `numbers` and `colours` have the face numbers and the colours. */
-  addMesh(leaf, faces) {
+  /** Adds a leaf's faces: numbers, corners (nine numbers each, in the model's coordinates) and colours. */
+  addMesh(leaf, { numbers, corners, colours }) {
     const { center, scale } = this.scene;
-    this.mesh.add(leaf, Float32Array.from(faces, (x, i) => (x - center[i % 3]) * scale), faces.numbers, faces.colours);
+    this.mesh.add(leaf, Float32Array.from(corners, (x, i) => (x - center[i % 3]) * scale), numbers, colours);
   }
 
   // Frees memory: removes the descendants of nodes that were not refined for PRUNE_PASSES passes. Frees polytopes and faces outside the cut when there are too many.

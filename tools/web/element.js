@@ -3,7 +3,7 @@
 import { boxOf, cameraOf, cameraText, clipOf, cutOf, pointsOf } from './address.js';
 import { Client } from './client.js';
 import { Scene } from './scene.js';
-import { fromPicture, toPicture } from './state.js';
+import { fromPicture, rayThrough, toPicture } from './state.js';
 import { ofParts, poseFrom, wanted } from './together/addresses.js';
 import { Several } from './together/several.js';
 
@@ -86,9 +86,9 @@ export class EbpoViewerElement extends HTMLElement {
     canvas.addEventListener('pointerdown', (e) => (down = e.button === 0 ? [e.clientX, e.clientY] : undefined));
     canvas.addEventListener('pointerup', (e) => {
       const at = down && Math.hypot(e.clientX - down[0], e.clientY - down[1]) <= 4 && this.info ? this.#scene.pick(e.clientX, e.clientY) : undefined;
-      const { point, instance } = (at && (this.#several ? this.#several.pickedAt(at) : { point: fromPicture(at, this.#client.scene) })) ?? {};
+      const eye = this.#scene.pickedFrom, { point, instance } = (at && (this.#several ? this.#several.pickedAt(at) : { point: fromPicture(at, this.#client.scene) })) ?? {};
       if (point)
-        this.query(point, instance).catch(() => {});
+        this.#query(point, instance, eye && !this.#several ? rayThrough(fromPicture(eye, this.#client.scene), point) : undefined).catch(() => {});
     });
     canvas.addEventListener('keydown', (e) => {
       if (!STEER[e.key] || e.ctrlKey || e.metaKey || e.altKey)
@@ -319,16 +319,20 @@ export class EbpoViewerElement extends HTMLElement {
   async query(point, instance) {
     if (!this.info)
       throw new Error('no model is open; wait for the event load');
+    return this.#query(point, instance);
+  }
+
+  async #query(point, instance, ray) {
     const several = this.#several, inScene = several?.inPicture ?? ((p) => toPicture(p, this.#client.scene));
     this.#scene.showProbe(inScene(point));
-    const result = several ? await several.query(point, instance) : await this.#queryOne(point), { where, nearest } = result;
-    this.#scene.showProbe(inScene(point), nearest && inScene(nearest), where === 'in' ? '#4cc38a' : where === 'out' ? '#ff6b6b' : '#ffb020');
+    const result = several ? await several.query(point, instance) : await this.#queryOne(point, ray), { where, nearest } = result;
+    this.#scene.showProbe(inScene(result.point), nearest && inScene(nearest), where === 'in' ? '#4cc38a' : where === 'out' ? '#ff6b6b' : '#ffb020');
     this.#dispatch('point', result);
     return result;
   }
 
-  async #queryOne(point) {
-    const { where, distance, nearest, lo, hi, exact } = await this.#client.probe(point);
+  async #queryOne(asked, ray) {
+    const { point, where, distance, nearest, lo, hi, exact } = await this.#client.probe(asked, ray);
     return { point, where, distance, nearest, lo, hi, exact };
   }
 }

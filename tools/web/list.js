@@ -2,7 +2,7 @@
 // cannot be read, with a message. The exit code is 1 when no file remains.
 import { promises as fs } from 'node:fs';
 import { basename } from 'node:path';
-import { openEbpo } from './reader/index.js';
+import { openModel } from './model_file.js';
 
 // Returns the list's entry of a model. Reads ranges, so that large files are not read completely.
 async function headOf(path) {
@@ -10,7 +10,7 @@ async function headOf(path) {
   const read = async (offset, length) => (await handle.read(new Uint8Array(length), 0, length, offset)).buffer;
   const source = { name: path, size, requests: 0, bytes: 0, read, open: (bytes) => read(0, Math.min(bytes, size)) };
   try {
-    const { info } = await openEbpo(source);
+    const { info } = await openModel(source);
     return { name: basename(path, '.ebpo.h5'), file: basename(path), faces: info.face_count, bytes: size };
   } finally {
     await handle.close();

@@ -135,6 +135,12 @@ export class EbpoModel extends Object3D {
     return { where, distance, nearest: nearest && new Vector3(...nearest), lo, hi, exact };
   }
 
+  /** Returns the first point (Vector3) of the faces on a THREE.Ray, in this object's coordinates; undefined: none. */
+  async hit({ origin, direction }) {
+    const point = await this.client.hit([...origin.toArray(), ...direction.toArray()]);
+    return point && new Vector3(...point);
+  }
+
   /** Terminates the worker and frees the memory of the graphics card. */
   dispose() {
     this.client.end();

@@ -15,13 +15,13 @@ export function probeWith(scene, worker) {
 }
 
 /**
- * Queries a point of the model. Without a point, clears the last query. `precision`: for a point that was clicked on the surface, the accuracy of the click in
- * the model's units.
+ * Queries a point of the model. Without a point, clears the last query. For a point that was clicked on the surface, `precision` is the accuracy of the click in
+ * the model's units, and `ray` the ray of the click.
  */
-export function probeAt(point, precision = 0) {
+export function probeAt(point, precision = 0, ray = undefined) {
   state.probe = point && { point, precision, pending: true };
   if (point)
-    queries.postMessage({ type: 'probe', opening: state.opening, point });
+    queries.postMessage({ type: 'probe', opening: state.opening, point, ray });
   probeShown();
   emit('point');
 }

@@ -1,9 +1,64 @@
-// Evaluates longer queries of the page in the worker: positions on faces for painting and measuring, and sections of the real faces.
-import { GRAY, LEAF, growForQuery, nearestFace } from './reader/index.js';
+// Evaluates queries of the page in the worker by the package "ebpo": points, positions on faces for painting and measuring, and sections of the real faces.
+import { open } from './ebpo/index.js';
+import { EbpoError } from './error.js';
+import { errorOf } from './model_file.js';
 
 const ONE_WEIGHT = 2 ** 30;     // format-spec/paint.md
-const LEAVES_AT_ONCE = 1024, NODES_AT_ONCE = 256;
+const TILES = 4;                // a section is computed in so many rows and columns, with progress between them
 const FACES_MOST = 4_000_000;   // in a section
+const OFF = 2 ** -30;           // distance of a computed position from its face, in diagonals, is less than this
+const WHERE = ['out', 'in', 'on', 'maybe'];
+
+/** The queries of an open model (model_file.js). The large module of the package is loaded with the first query. */
+export class Queries {
+  #opening;
+
+  constructor(file) {
+    this.file = file;
+    this.info = file.info;
+  }
+
+  /** Calls use(model) with the package's model. */
+  async with(use) {
+    this.#opening ??= open(this.file.kept).catch((error) => {
+      this.#opening = undefined; // the next query tries again
+      throw error;
+    });
+    try {
+      return await use(await this.#opening);
+    } catch (error) {
+      throw errorOf(error, this.file.source.name);
+    }
+  }
+
+  /** Returns what levels 0 to `level` say of a point: { where, lo, hi }, bounds of the distance. `where` is undefined for surfaces. */
+  coarse(point, level) {
+    return this.with(async (model) => {
+      const { lo, hi } = await model.distance(point, { level, unsigned: true });
+      return { where: this.info.solid ? WHERE[(await model.inside(point, { level })).where[0]] : undefined, lo: lo[0], hi: hi[0] };
+    });
+  }
+
+  /** Returns { where, distance, nearest, face } of a point, computed exactly. `where` is undefined for surfaces. */
+  exact(point) {
+    return this.with(async (model) => {
+      const { distance, point: nearest, face } = await model.distance(point, { unsigned: true });
+      return { where: this.info.solid ? WHERE[(await model.inside(point)).where[0]] : undefined, distance: distance[0], nearest: [...nearest], face: face[0] };
+    });
+  }
+
+  /** Returns the first point of the faces on a ray, or undefined. `ray`: origin and direction, six numbers. */
+  hit(ray) {
+    return this.with(async (model) => {
+      const { t } = await model.rays(ray);
+      return Number.isFinite(t[0]) ? [0, 1, 2].map((k) => ray[k] + t[0] * ray[3 + k]) : undefined;
+    });
+  }
+
+  close() {
+    this.#opening?.then((model) => model.dispose(), () => {});
+  }
+}
 
 const sub = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]], dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -20,18 +75,28 @@ export function weightsOf(p, corners) {
 const unit = (x) => Math.round(Math.min(1, Math.max(0, x)) * ONE_WEIGHT);
 
 /**
- * Returns the nearest positions on the faces: [{ face, weights, place, normal, distance }]. `face` is the number that paint files use. Computes in double
- * precision. The file must have the part `mesh`.
+ * Returns the nearest positions on the faces: [{ face, weights, place, normal, distance }]. `face` is the number that paint files use. The file must have the part
+ * `mesh`.
  */
-export async function positionsOf(file, tree, points) {
-  const found = [];
-  for (const p of points)
-    found.push(await nearestFace(tree, p, (leaves) => file.leafFaces(leaves), (nodes) => growForQuery(file, tree, nodes)));
-  const own = found.map((f) => f.face), numbers = file.info.parts.has('maps') ? await file.sourceFaces(own) : own;
-  return found.map(({ point, corners, distance }, i) => {
-    const n = cross(sub(corners.subarray(3, 6), corners.subarray(0, 3)), sub(corners.subarray(6, 9), corners.subarray(0, 3))), size = Math.hypot(...n);
-    return { face: numbers[i], weights: weightsOf(point, corners), place: point, normal: n.map((x) => (size > 0 ? x / size : 0)), distance };
+export function positionsOf(queries, points) {
+  const near = OFF * Math.hypot(...queries.info.box_size);
+  return queries.with(async (model) => {
+    const { distance, point, face: faces } = await model.distance(points.flat(), { unsigned: true }), out = [];
+    for (const [i, face] of faces.entries()) {
+      const place = [...point.subarray(3 * i, 3 * i + 3)], around = await model.boxTriangles(place.map((x) => x - near), place.map((x) => x + near)), k = around.face.indexOf(face);
+      if (k < 0)
+        throw new EbpoError('ABSENT', `${queries.file.source.name}: the file has no face at this point`);
+      const own = around.corners.subarray(9 * k, 9 * k + 9);
+      out.push({ face, weights: weightsOf(place, own), place, normal: normalOf(own), distance: distance[i] });
+    }
+    return out;
   });
+}
+
+/** Returns the unit normal of a triangle; 0 without an area. */
+export function normalOf(corners) {
+  const a = corners.subarray(0, 3), n = cross(sub(corners.subarray(3, 6), a), sub(corners.subarray(6, 9), a)), size = Math.hypot(...n);
+  return n.map((x) => (size > 0 ? x / size : 0));
 }
 
 /**
@@ -77,37 +142,35 @@ export function measureOf(segments) {
  * the end with { segments, area, length, faces, partial } or { fault }. `area` is present only for solids. `partial`: the file is a subset and lacks part of
  * the section.
  */
-export async function sectionOf(file, tree, axis, at, emit, ended) {
-  const { info } = file;
+export async function sectionOf(queries, axis, at, emit, ended) {
+  const { info } = queries, seen = new Set(), segments = [], u = (axis + 1) % 3, v = (axis + 2) % 3;
   if (!info.parts.has('mesh')) {
     emit({ fault: 'the file has no faces; convert it with its mesh' });
     return;
   }
-  const leaves = [];
+  const bound = (k, i) => info.box_origin[k] + i / TILES * info.box_size[k];
   let partial = false;
-  for (let nodes = [tree.root]; nodes.length && !ended();) {
-    const here = nodes.filter((node) => (node.type === GRAY || node.type === LEAF) && tree.cellFace(node, axis, 0) <= at && tree.cellFace(node, axis, 1) >= at);
-    leaves.push(...here.filter((node) => node.type === LEAF));
-    const gray = here.filter((node) => node.type === GRAY && !tree.isPruned(node)), missing = gray.filter((node) => !tree.children(node));
-    partial ||= gray.length < here.filter((node) => node.type === GRAY).length;
-    for (let i = 0; i < missing.length && !ended(); i += NODES_AT_ONCE) { // children are created at once, because the cache may drop these chunks when the next ones arrive
-      await growForQuery(file, tree, missing.slice(i, i + NODES_AT_ONCE));
-      missing.slice(i, i + NODES_AT_ONCE).forEach((node) => tree.children(node));
-    }
-    partial ||= gray.some((node) => !tree.children(node) && tree.isPruned(node));
-    nodes = gray.flatMap((node) => tree.children(node) ?? (tree.isPruned(node) ? [] : [node]));
-  }
-  const seen = new Set(), segments = [];
-  for (let i = 0; i < leaves.length && !ended(); i += LEAVES_AT_ONCE) {
-    for (const faces of await file.leafFaces(leaves.slice(i, i + LEAVES_AT_ONCE))) {
-      const fresh = faces.numbers.reduce((list, number, k) => (seen.has(number) ? list : (seen.add(number), list.push(k), list)), []);
-      cutFaces(fresh.length === faces.numbers.length ? faces : Float64Array.from(fresh.flatMap((k) => [...faces.subarray(9 * k, 9 * k + 9)])), axis, at, segments);
-    }
+  for (let tile = 0; tile < TILES * TILES && !ended(); tile++) {
+    const low = [at, at, at], high = [at, at, at], i = tile % TILES, j = Math.floor(tile / TILES);
+    [low[u], high[u], low[v], high[v]] = [bound(u, i), bound(u, i + 1), bound(v, j), bound(v, j + 1)];
+    const { face, corners } = await queries.with((model) => model.boxTriangles(low, high, { most: FACES_MOST })).catch((error) => {
+      if (error.code !== 'ABSENT')
+        throw error;
+      partial = true;
+      return { face: [], corners: [] };
+    });
+    const fresh = [];
+    face.forEach((number, k) => {
+      if (!seen.has(number))
+        fresh.push(...corners.subarray(9 * k, 9 * k + 9));
+      seen.add(number);
+    });
+    cutFaces(fresh, axis, at, segments);
     if (seen.size > FACES_MOST) {
       emit({ fault: `the section intersects more than ${FACES_MOST / 1e6} million faces; cut a part of the model out with ebpo subset` });
       return;
     }
-    emit({ looked: Math.min(leaves.length, i + LEAVES_AT_ONCE), of: leaves.length });
+    emit({ looked: tile + 1, of: TILES * TILES });
   }
   if (!ended()) {
     const { area, length } = segments.length ? measureOf(segments) : { area: 0, length: 0 };

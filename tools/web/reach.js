@@ -1,52 +1,56 @@
 // Computes in the worker which faces a point of paint covers (format-spec/paint.md, section 4): the faces that are connected with the point's face inside the ball.
-import { GRAY, LEAF, cellNear, growForQuery, nearestOnTriangle } from './reader/index.js';
+import { normalOf } from './queries.js';
 
 const FACES_MOST = 100_000;   // around a point; with more faces the whole ball is coloured
-const LEAVES_MOST = 20_000, LEAVES_AT_ONCE = 1024; // a ball may be as large as the model; the limit avoids fetching the whole model
 const OFF = 2 ** -20;         // greatest distance of a position from its face, in diagonals
 
-// Returns the leaves whose cells are within a distance of a point; 'elsewhere' when the file is a subset without some of them, 'many' when they are too many.
-async function leavesAround(file, tree, point, distance) {
-  const leaves = [], meets = (node) => (node.type === GRAY || node.type === LEAF) && cellNear(tree, node, point) <= distance;
-  for (let nodes = [tree.root].filter(meets); nodes.length;) {
-    leaves.push(...nodes.filter((node) => node.type === LEAF));
-    if (Math.max(leaves.length, nodes.length) > LEAVES_MOST)
-      return 'many';
-    const gray = nodes.filter((node) => node.type === GRAY), missing = gray.filter((node) => !tree.children(node));
-    if (missing.some((node) => tree.isPruned(node)))
-      return 'elsewhere';
-    if (missing.length)
-      await growForQuery(file, tree, missing);
-    if (gray.some((node) => !tree.children(node)))
-      return 'elsewhere';
-    nodes = gray.flatMap((node) => tree.children(node)).filter(meets);
+// Returns the faces that intersect the box around a ball, with the numbers of paint files: { numbers, corners: [nine numbers each] }; 'elsewhere' when the file is a subset without some of them,
+// 'many' when they are too many.
+async function facesAround(queries, point, radius) {
+  try {
+    const { face, corners } = await queries.with((model) => model.boxTriangles(point.map((x) => x - radius), point.map((x) => x + radius), { most: FACES_MOST }));
+    return face.length > FACES_MOST ? 'many' : { numbers: [...face], corners: Array.from(face, (_, i) => corners.subarray(9 * i, 9 * i + 9)) };
+  } catch (error) {
+    if (error.code !== 'ABSENT')
+      throw error;
+    return 'elsewhere';
   }
-  return leaves;
 }
 
-// Returns all faces that may intersect a ball, each once: { numbers, corners: [nine numbers each] }; or 'elsewhere' or 'many', as leavesAround() does.
-async function facesAround(file, tree, point, radius) {
-  const corners = new Map(), leaves = await leavesAround(file, tree, point, radius);
-  if (!Array.isArray(leaves))
-    return leaves;
-  for (let i = 0; i < leaves.length; i += LEAVES_AT_ONCE)
-    for (const faces of await file.leafFaces(leaves.slice(i, i + LEAVES_AT_ONCE))) {
-      faces.numbers.forEach((number, k) => {
-        const nine = faces.subarray(9 * k, 9 * k + 9);
-        if (!corners.has(number) && boxMeets(nine, point, radius))
-          corners.set(number, nine);
-      });
-      if (corners.size > FACES_MOST)
-        return 'many';
-    }
-  return { numbers: [...corners.keys()], corners: [...corners.values()] };
-}
-
-function boxMeets(f, point, radius) {
-  for (let k = 0; k < 3; k++)
-    if (Math.min(f[k], f[k + 3], f[k + 6]) > point[k] + radius || Math.max(f[k], f[k + 3], f[k + 6]) < point[k] - radius)
-      return false;
-  return true;
+/**
+ * Returns the point of a triangle (nine numbers from `at` on) that is nearest to p: [distance, x, y, z]. Computes in doubles.
+ * Source: Ericson, "Real-Time Collision Detection", 5.1.5.
+ */
+function nearestOnTriangle(p, f, at) {
+  const sub = (i, j) => [f[at + i] - f[at + j], f[at + i + 1] - f[at + j + 1], f[at + i + 2] - f[at + j + 2]];
+  const dot = (u, v) => u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
+  const from = (i) => [p[0] - f[at + i], p[1] - f[at + i + 1], p[2] - f[at + i + 2]];
+  const result = (i, u, s, v, t) => {
+    const q = [0, 1, 2].map((k) => f[at + i + k] + s * u[k] + (v ? t * v[k] : 0));
+    return [Math.hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]), ...q];
+  };
+  const ab = sub(3, 0), ac = sub(6, 0), ap = from(0), d1 = dot(ab, ap), d2 = dot(ac, ap);
+  if (d1 <= 0 && d2 <= 0)
+    return result(0, ab, 0);
+  const bp = from(3), d3 = dot(ab, bp), d4 = dot(ac, bp);
+  if (d3 >= 0 && d4 <= d3)
+    return result(3, ab, 0);
+  const vc = d1 * d4 - d3 * d2;
+  if (vc <= 0 && d1 >= 0 && d3 <= 0)
+    return result(0, ab, d1 - d3 > 0 ? d1 / (d1 - d3) : 0);
+  const cp = from(6), d5 = dot(ab, cp), d6 = dot(ac, cp);
+  if (d6 >= 0 && d5 <= d6)
+    return result(6, ac, 0);
+  const vb = d5 * d2 - d1 * d6;
+  if (vb <= 0 && d2 >= 0 && d6 <= 0)
+    return result(0, ac, d2 - d6 > 0 ? d2 / (d2 - d6) : 0);
+  const va = d3 * d6 - d5 * d4;
+  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0)
+    return result(3, sub(6, 3), (d4 - d3) / (d4 - d3 + (d5 - d6)));
+  const sum = va + vb + vc;
+  if (!(sum > 0)) // almost no area: use the nearest edge
+    return [0, 3, 6].map((i) => result(i, ab, 0)).reduce((a, b) => (b[0] < a[0] ? b : a));
+  return result(0, ab, vb / sum, ac, vc / sum);
 }
 
 const holds = (centre, square, q) => {
@@ -92,14 +96,14 @@ export function connectedFaces(faces, own, centre, radius) {
  * `faces` (nine numbers each): the covered faces, when the ball also intersects faces that are not covered. `faces` is undefined when all faces in the ball are
  * covered, when there are too many faces, and for a radius of 0.
  */
-export async function reachOf(file, tree, points) {
-  const { info } = file, tolerance = OFF * Math.hypot(...info.box_size), subset = Boolean(info.subset_of), bySource = info.parts.has('maps'), out = [];
+export async function reachOf(queries, points) {
+  const { info } = queries, tolerance = OFF * Math.hypot(...info.box_size), subset = Boolean(info.subset_of), out = [];
   for (const { face, place, radius } of points) {
-    let around = await facesAround(file, tree, place, Math.max(radius, tolerance));
+    let around = await facesAround(queries, place, Math.max(radius, tolerance));
     const crowded = around === 'many';
     if (crowded) // a smaller ball suffices to find the face
-      around = await facesAround(file, tree, place, tolerance);
-    const names = !around.numbers?.length ? [] : bySource ? await file.sourceFaces(Uint32Array.from(around.numbers)) : around.numbers, own = names.indexOf(face);
+      around = await facesAround(queries, place, tolerance);
+    const own = around.numbers?.indexOf(face) ?? -1;
     if (own < 0 || !(nearestOnTriangle(place, around.corners[own], 0)[0] <= tolerance)) {
       out.push({ here: subset && own < 0 ? 'elsewhere' : 'no' });
       continue;
@@ -110,10 +114,4 @@ export async function reachOf(file, tree, points) {
     out.push({ here: 'yes', normal: normalOf(around.corners[own]), faces: alone ? Float64Array.from(reach.flatMap((i) => [...around.corners[i]])) : undefined });
   }
   return out;
-}
-
-function normalOf(f) {
-  const u = [0, 1, 2].map((k) => f[3 + k] - f[k]), v = [0, 1, 2].map((k) => f[6 + k] - f[k]), n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
-  const size = Math.hypot(...n);
-  return n.map((x) => (size > 0 ? x / size : 0));
 }

@@ -228,6 +228,14 @@ export class Scene {
     return found?.point;
   }
 
+  /**
+   * Returns the eye if the last picked point is where its ray meets the drawn surface first, in scene coordinates; undefined with a visible box. From the eye, the
+   * worker finds the point of the real faces.
+   */
+  get pickedFrom() {
+    return this.cut ? undefined : this.camera.position.toArray();
+  }
+
   /** Returns the accuracy of the last picked point, as a length of the scene: half a pixel for a point on the drawn surface, and 0 on a section. */
   pickPrecision(point) {
     return this.pickedCut ? 0 : Math.max(0.5 / this.pixelsAt(point), PICK_ROUNDING);

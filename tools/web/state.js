@@ -23,6 +23,9 @@ export const toPicture = (p, { center, scale, up }) => upright(p.map((x, k) => (
 export const toModel = (p) => fromPicture(p, state.scene);
 export const toScene = (p) => toPicture(p, state.scene);
 
+/** Returns the ray from one point through another, for the worker: origin and direction. */
+export const rayThrough = (origin, point) => [...origin, ...point.map((x, k) => x - origin[k])];
+
 // --- events: frame, opened, closed, cut, theme, point, view (the camera has moved), and messages from the worker for modules that are loaded later ---
 
 const listeners = new Map();

@@ -1,26 +1,27 @@
 // Reads files, chooses nodes and builds tiles outside the page's thread.
-// The page sends 'open', 'close', 'end', 'view', 'probe', 'positions', 'reach' and 'section'. It receives 'opened', 'located', 'tiles', 'loaded',
+// The page sends 'module', 'first', 'open', 'close', 'end', 'view', 'probe', 'positions', 'reach', 'hit' and 'section'. It receives 'opened', 'located', 'tiles', 'loaded',
 // 'probed', 'positions', 'section', 'idle' and 'failed'. Several files may be open: the member `file` of each message, 0 by default, names the file.
-import { ZSTDDecoder } from './node_modules/zstddec/dist/zstddec.mjs'; // workers have no import maps
-import { positionsOf, sectionOf } from './queries.js';
+import { Queries, positionsOf, sectionOf } from './queries.js';
 import { reachOf } from './reach.js';
 import { Cut } from './cut.js';
 import { fetchAfter, takeFirst } from './first_response.js';
-import { GRAY, Tree, UrlSource, distanceInterval, growForQuery, growForView, inside, insideLeaf, loadZstd, nearestFace, openEbpo, sourceOf } from './reader/index.js';
+import { addLevels, growForView } from './grow.js';
+import { openModel } from './model_file.js';
+import { viewModule } from './ebpo/view.js'; // workers have no import maps
+import { UrlSource, sourceOf } from './source.js';
+import { Tree } from './tree.js';
 
 const LINE_MS = 250;                      // interval between reports of progress to the page
 const TIMEOUT_MS = 20000;                 // longest time without a byte
 const FIRST_LEVELS = 5;                   // normally contained in the response to the first request
-const SMALL_MESH = 8 * 1024 * 1024;       // limit for small meshes, in stored bytes
+const SMALL_FILE = 8 * 1024 * 1024;       // files of fewer bytes are small
 const MESH_BYTES_A_VIEW = 16 * 1024 * 1024; // for larger meshes: limit of fetched bytes until the camera moves
 const SUBTREE_BYTES_A_VIEW = 1.5 * 1024 * 1024; // the same limit for files with subtrees, where few fetched bytes are unused
-
-const PLACES_A_TREE = 5000;
 
 // The open files by their member `file`: { number, current (an OpenFile), view, want, sections, silent }.
 const slots = new Map();
 const slotOf = (number = 0) => slots.get(number) ?? slots.set(number, { number, sections: 0, silent: true }).get(number);
-let zstd; // a promise of the decoder
+let module, moduleCame; // a promise of the compiled module for drawing, which the page loads; undefined: model_file.js loads it
 
 const post = (slot, message, transfer = []) => self.postMessage({ file: slot.number, ...message }, transfer);
 
@@ -38,31 +39,31 @@ class OpenFile {
     this.rooted = new Promise((done) => (this.root = done)); // resolves when queries can be evaluated
   }
 
+  close() {
+    this.source?.close?.();
+    this.queries?.close();
+    this.file?.close();
+  }
+
   get ended() {
     return this.slot.current !== this;
   }
 
   async open(what, ahead, cacheBytes) {
-    zstd ??= loadZstd(ZSTDDecoder); // is loaded while the header is being fetched
     this.source = typeof what === 'string' ? new UrlSource(what, { ahead, timeout: TIMEOUT_MS, patient: true, fetch: fetchAfter(() => post(this.slot, { type: 'forget' })) }) : sourceOf(what);
-    this.file = await openEbpo(this.source, { zstd, ...(cacheBytes && { cacheBytes }) });
+    this.file = await openModel(this.source, { ...(module && { module }), ...(cacheBytes && { cacheBytes }) });
     const { info, source } = this.file;
     this.tree = new Tree(info);
-    const meshBytes = ['/mesh/vertices', '/mesh/faces'].reduce((sum, path) => sum + (this.file.arrays.has(path) ? this.file.arrays.get(path).bytes ?? Infinity : 0), 0);
-    this.cut = new Cut(this.tree, { small: Math.min(meshBytes, source.size) < SMALL_MESH });
-    post(this.slot, { type: 'opened', opening: this.number, name: source.name, size: source.size, info, scene: this.cut.scene, coloured: this.file.colours !== undefined || info.parts.has('colours'),
-      bytesTo: this.#bytesTo(), traffic: this.file.traffic, ms: performance.now() - this.began });
+    this.queries = new Queries(this.file);
+    this.cut = new Cut(this.tree, { small: source.size < SMALL_FILE });
+    post(this.slot, { type: 'opened', opening: this.number, name: source.name, size: source.size, info, scene: this.cut.scene, coloured: this.file.coloured || info.parts.has('colours'),
+      bytesTo: this.file.levelBytes, traffic: this.file.traffic, ms: performance.now() - this.began });
+    this.file.sums?.catch((error) => this.ended || post(this.slot, { type: 'failed', opening: this.number, error: describe(error), late: true }));
     await this.load(Math.min(FIRST_LEVELS, info.level_count) - 1);
     this.root();
-    if (!this.file.located) {
-      await this.file.locate();
-      if (!this.ended)
-        post(this.slot, { type: 'located', opening: this.number, bytesTo: this.#bytesTo(), traffic: this.file.traffic });
-    }
-  }
-
-  #bytesTo() {
-    return this.file.info.levels.map((_, i) => this.file.bytesToLevel(i));
+    await this.file.locate();
+    if (!this.ended)
+      post(this.slot, { type: 'located', opening: this.number, bytesTo: this.file.levelBytes, traffic: this.file.traffic });
   }
 
   /** Loads levels up to `last` into the tree. Concurrent calls for the same level share the work. */
@@ -74,8 +75,7 @@ class OpenFile {
   }
 
   async #loadNext(last) {
-    for (const level of await this.file.levels(this.tree.depth + 1, last))
-      this.tree.add(level);
+    await addLevels(this.file, this.tree, Array.from({ length: last - this.tree.depth }, (_, i) => this.tree.depth + 1 + i));
     if (!this.ended)
       this.#loaded();
   }
@@ -157,57 +157,44 @@ class OpenFile {
     post(this.slot, { type: 'tiles', opening: this.number, set, removed, stats, traffic: this.file.traffic, ms: performance.now() - this.began, want: this.slot.want.number }, transfer);
   }
 
-  /** Classifies a point: first by the loaded levels, then exactly by the faces of the relevant leaves. */
-  async probe(point) {
-    const number = ++this.probes, { tree, file } = this, solid = tree.info.solid;
+  /**
+   * Queries a point: first by the loaded levels, then exactly. `ray`: origin and direction of a click, whose first point on the faces replaces `point`.
+   */
+  async probe(point, ray) {
+    const number = ++this.probes, { tree, file, queries } = this, { solid, parts } = file.info, mesh = parts.has('mesh');
     const reply = (more) => this.ended || number !== this.probes || post(this.slot, { type: 'probed', opening: this.number, point, solid, traffic: file.traffic, ...more });
-    const coarse = { depth: tree.depth, where: solid ? inside(tree, point).where : undefined, ...distanceInterval(tree, point) };
-    reply({ ...coarse, exact: false, done: !file.info.parts.has('mesh') });
-    if (!file.info.parts.has('mesh'))
+    if (ray && mesh)
+      point = await queries.hit(ray) ?? point;
+    const coarse = { depth: tree.depth, ...await queries.coarse(point, tree.depth), point };
+    reply({ ...coarse, exact: false, done: !mesh });
+    if (!mesh)
       return;
-    const lean = tree.lean(), deeper = (nodes) => growForQuery(file, lean, nodes);
-    let where;
-    if (solid) {
-      let found = inside(lean, point);
-      while (found.where === 'maybe' && lean.children(found.node) === undefined && found.node.type === GRAY && !lean.isPruned(found.node)) {
-        await deeper([found.node]);
-        found = inside(lean, point);
-      }
-      if (found.where === 'maybe' && lean.isPruned(found.node)) { // the file is a subset without data here
-        reply({ ...coarse, exact: false, done: true });
-        return;
-      }
-      where = found.where === 'maybe' ? insideLeaf(lean, found.node, point, (await file.leafFaces([found.node]))[0]).where : found.where;
-    }
-    let near;
     try {
-      near = await nearestFace(lean, point, (leaves) => file.leafFaces(leaves), deeper);
+      reply({ ...coarse, ...await queries.exact(point), exact: true, done: true });
     } catch (error) {
-      if (error.code !== 'ABSENT')
+      if (error.code !== 'ABSENT') // the file is a subset without data here
         throw error;
-      reply({ ...coarse, where: where ?? coarse.where, exact: false, done: true });
-      return;
+      reply({ ...coarse, exact: false, done: true });
     }
-    reply({ ...coarse, where, distance: near.distance, nearest: near.point, exact: true, done: true });
   }
 }
+
+const RESULTS = { positions: positionsOf, reach: reachOf, hit: async (queries, [ray]) => [await queries.hit(ray)] };
 
 // Evaluates longer queries one after the other. A newer section query cancels an older one.
 async function runQuery(data, slot, mine) {
   if (data.type === 'section') {
     const number = ++slot.sections, over = () => mine.ended || number !== slot.sections;
     const emit = (news) => over() || post(slot, { type: 'section', opening: mine.number, axis: data.axis, at: data.at, traffic: mine.file.traffic, ...news });
-    await sectionOf(mine.file, mine.tree.lean(), data.axis, data.at, emit, over);
+    await sectionOf(mine.queries, data.axis, data.at, emit, over);
     return;
   }
   const emit = (news) => mine.ended || post(slot, { type: 'positions', opening: mine.number, id: data.id, ...news });
   try {
-    emit({ positions: await (data.type === 'reach' ? reachOf : positionsOf)(mine.file, mine.queryTree ??= mine.tree.lean(), data.points) });
+    emit({ positions: await RESULTS[data.type](mine.queries, data.points) });
   } catch (error) {
     emit({ error: describe(error) });
   }
-  if ((mine.queried = (mine.queried ?? 0) + data.points.length) > PLACES_A_TREE)
-    mine.queryTree = mine.queried = undefined; // frees the nodes that these queries loaded
 }
 
 // Reports progress to the page, and reports once when all requests have ended.
@@ -226,13 +213,18 @@ const retry = ({ current }) => current?.source?.retry?.();
 self.addEventListener('online', () => slots.forEach(retry));
 
 function end(slot) {
-  slot.current?.source?.close?.();
+  slot.current?.close();
   slot.current = undefined;
 }
 
 async function handle(data, slot) {
   const { current } = slot, ready = current?.tree?.root;
-  if (data.type === 'first') {
+  if (data.type === 'module') {
+    if (data.loaded)
+      moduleCame(data.module ?? viewModule());
+    else
+      module = new Promise((done) => (moduleCame = done));
+  } else if (data.type === 'first') {
     takeFirst(data);
   } else if (data.type === 'open') {
     end(slot);
@@ -251,11 +243,11 @@ async function handle(data, slot) {
     Object.assign(slot, { view: data.view, want: data.want });
     if (ready)
       await current.pump();
-  } else if (['probe', 'positions', 'reach', 'section'].includes(data.type) && data.opening === current?.number) {
+  } else if (['probe', 'positions', 'reach', 'hit', 'section'].includes(data.type) && data.opening === current?.number) {
     await current.rooted; // queries may arrive before the first levels are loaded
     if (current.ended)
       return;
-    await (data.type === 'probe' ? current.probe(data.point) : runQuery(data, slot, current));
+    await (data.type === 'probe' ? current.probe(data.point, data.ray) : runQuery(data, slot, current));
   }
 }
 

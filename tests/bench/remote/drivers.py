@@ -1,4 +1,4 @@
-"""Readers of levels and whole files: the command, the viewer's reader, and HDF5's own readers."""
+"""Readers of levels and whole files: the command, the npm package, and HDF5's own readers."""
 import json
 import os
 import pathlib
@@ -47,7 +47,7 @@ class Readers:
 
     def all(self):
         return {"ebpo (C)": self.ours, "HDF5 ros3": self.ros3,
-                "viewer's reader": lambda *a: self.browser("ours", *a),
+                "npm package": lambda *a: self.browser("ours", *a),
                 "h5wasm, lazy file": lambda *a: self.browser("h5wasm", *a)}
 
 

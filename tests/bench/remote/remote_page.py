@@ -193,7 +193,7 @@ def local_table(page, found):
 
 def driver_tables(page, found):
     page.text("## HDF5's own readers", "",
-              "Whole files: `ebpo fetch`, all datasets by ros3 and h5wasm; the viewer's reader "
+              "Whole files: `ebpo fetch`, all datasets by ros3 and h5wasm; the npm package "
               "reads levels and mesh, no maps. Only the command reads files above 100 MB whole.")
     page.table(["file", "bytes", "reader", "levels 0 to 4: requests", "bytes",
                 "levels 0 to 5: requests", "bytes", "whole: requests", "bytes", "MB a request"],

@@ -8,22 +8,21 @@ self.onmessage = async ({ data }) => {
 };
 
 async function ours({ url, to, whole }) {
-  const { openEbpo, loadZstd } = await import('/viewer/reader/index.js');
-  const { ZSTDDecoder } = await import('/viewer/node_modules/zstddec/dist/zstddec.mjs');
-  const zstd = await loadZstd(ZSTDDecoder);
-  const begin = performance.now();
-  const file = await openEbpo(url, { zstd });
-  let first, values = 0;
-  const add = (levels) => levels.forEach((level) => (values += level.planes?.length ?? 0));
+  const { openView, viewModule } = await import('/viewer/ebpo/view.js'), { open } = await import('/viewer/ebpo/index.js');
+  await viewModule();
+  const begin = performance.now(), count = (parts) => parts.reduce((sum, { planes }) => sum + planes.length, 0);
   if (whole) {
-    add(await file.levels(0, file.info.level_count - 1));
-    values += (await file.mesh()).faces.length;
-  } else {
-    add(await file.levels(0, 0));
-    first = performance.now() - begin;
-    if (to > 0)
-      add(await file.levels(1, to));
+    const model = await open(url);
+    let values = (await model.mesh()).faces.length;
+    for await (const level of model.levels())
+      values += count([level]);
+    return { ms: performance.now() - begin, values };
   }
+  const view = await openView(url), levels = (from) => view.nodes(Array.from({ length: to - from + 1 }, (_, i) => ({ level: from + i, part: -1 })));
+  let values = count(await view.nodes([{ level: 0, part: -1 }]));
+  const first = performance.now() - begin;
+  if (to > 0)
+    values += count(await levels(1));
   return { first, ms: performance.now() - begin, values };
 }
 

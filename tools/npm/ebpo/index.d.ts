@@ -42,9 +42,15 @@ export interface Info {
   contentSha256: string;
   version: [number, number];
   solid: boolean; pruned: boolean; hasMesh: boolean;
+  /** True if coordinates are doubles. */
+  doubles: boolean;
+  /** contentSha256 of the original of a subset. */
+  subsetOf?: string;
+  /** Level of the subtrees' roots; 0: none. */
+  subtreeLevel: number;
   /** Root cell. */
   origin: [number, number, number]; size: [number, number, number];
-  vertices: number; faces: number; sourceFaces: number; parts: number; fileBytes: number;
+  vertices: number; faces: number; sourceFaces: number; addedFaces: number; parts: number; fileBytes: number;
   levels: LevelInfo[];
 }
 
@@ -131,7 +137,8 @@ export class Model {
   raysAllSync(rays: Numbers, options?: RayOptions): AllHits;
   boxFaces(min: Numbers, max: Numbers, options?: QueryOptions): Promise<Uint32Array>;
   boxFacesSync(min: Numbers, max: Numbers): Uint32Array;
-  boxTriangles(min: Numbers, max: Numbers, options?: QueryOptions): Promise<Triangles>;
+  /** Stops when there are more than `most` triangles. */
+  boxTriangles(min: Numbers, max: Numbers, options?: QueryOptions & { most?: number }): Promise<Triangles>;
   measure(options?: QueryOptions): Promise<Mass>;
   mesh(options?: QueryOptions): Promise<Mesh>;
   /** Streams the levels, coarse to fine. */

@@ -63,8 +63,8 @@ export class Model {
       throw errorOf(-1, 'not enough memory to open the file', '', -1);
   }
 
-  /** Opens the file and makes the model. */
-  async load({ memory = 0, level = -1, whole = false, signal } = {}) {
+  /** Opens the file. `whole`: reads all of it first. */
+  async openFile({ whole, signal }) {
     const { size, name } = this.#source;
     if (whole) {
       const ranges = [];
@@ -73,6 +73,11 @@ export class Model {
       await this.#fetch(ranges, signal);
     }
     await this.#repeat(() => this.#heap.lend(name ?? 'model', (text) => this.#heap.call('ebpo_js_open', this.#object, text, +whole)), this.#object, signal);
+  }
+
+  /** Opens the file and makes the model. */
+  async load({ memory = 0, level = -1, whole = false, signal } = {}) {
+    await this.openFile({ whole, signal });
     await this.#repeat(() => this.#heap.call('ebpo_js_load', this.#object, memory, level), this.#object, signal);
     return this;
   }
@@ -350,11 +355,11 @@ export class Model {
     return this.#joinAll(this.#manyNow(this.#rays('ebpo_js_ray_all', rays, options)));
   }
 
-  #box(name, min, max) {
+  #box(name, min, max, ...args) {
     const box = Float64Array.of(...min, ...max);
     if (box.length !== 6)
       throw new EbpoArgumentError('expected three numbers for each corner of the box', { status: 'EBPO_E_ARGUMENT' });
-    return { call: (query) => this.#heap.lend(box, (at) => this.#heap.call(name, query, at)),
+    return { call: (query) => this.#heap.lend(box, (at) => this.#heap.call(name, query, at, ...args)),
       read: (array) => name === 'ebpo_js_box_faces' ? array(0, Uint32Array) : { face: array(0, Uint32Array), corners: array(1, Float64Array) } };
   }
 
@@ -366,8 +371,8 @@ export class Model {
     return this.#runNow(this.#box('ebpo_js_box_faces', min, max));
   }
 
-  async boxTriangles(min, max, { signal } = {}) {
-    return this.#run(this.#box('ebpo_js_box_triangles', min, max), signal);
+  async boxTriangles(min, max, { most = Infinity, signal } = {}) {
+    return this.#run(this.#box('ebpo_js_box_triangles', min, max, most), signal);
   }
 
   // ---- the file ----
@@ -440,6 +445,8 @@ export class Model {
   dispose() {
     if (!this.#disposed && !this.#heap.failed) {
       [...this.#idle, ...this.#used].forEach((query) => this.#heap.call('ebpo_js_query_free', query));
+      if (this.#heap.exports.ebpo_js_unload) // not in the module for drawing
+        this.#heap.call('ebpo_js_unload', this.#object);
       this.#heap.call('ebpo_js_free', this.#object);
     }
     this.#disposed = true;
@@ -456,12 +463,12 @@ if (Symbol.dispose)
   Model.prototype[Symbol.dispose] = Model.prototype.dispose;
 
 /** Opens a model with a compiled module. */
-export async function openWith(loading, sourcing, options = {}) {
+export async function openWith(loading, sourcing, options = {}, Kind = Model) {
   const { signal, heap: limit, beside } = options;
   const [module, source] = await Promise.all([loading, sourcing]);
   signal?.throwIfAborted();
   const whole = options.whole ?? !!source.inMemory;
-  const model = new Model(beside ? Model.parts(beside).heap : new Heap(module, limit), source, { ...options, whole });
+  const model = new Kind(beside ? Model.parts(beside).heap : new Heap(module, limit), source, { ...options, whole });
   try {
     return await model.load({ ...options, whole });
   } catch (error) {

@@ -25,6 +25,8 @@ typedef struct ebpo_js_object {
     ebpo_model *model;
     ebpo_context *context;
     ebpo_stream *stream;
+    struct ebpo_chunks *chunks; /* of a view */
+    uint64_t chunk_memory;
     bool within_level; /* the stream has begun a level whose nodes are not all read */
     ebpo_js_array array[EBPO_JS_ARRAYS];
     double number[EBPO_JS_NUMBERS]; /* result of a query of one point or ray */
@@ -33,6 +35,9 @@ typedef struct ebpo_js_object {
 
 /* Empties all result arrays. */
 void ebpo_js_clear(ebpo_js_object *object);
+
+/* Makes `chunks`, unless it exists. */
+EBPO_MUST_USE ebpo_status ebpo_js_need_chunks(ebpo_js_object *object);
 
 void ebpo_js_free_arrays(ebpo_js_object *object);
 

@@ -1,11 +1,13 @@
-/* Objects of the WebAssembly module: opening, bytes, results and the queries of a whole file. */
+/* Objects of the WebAssembly modules: opening, bytes, results and information. */
 #include <float.h>
 #include <inttypes.h>
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "format/chunks.h"
 #include "module.h"
 
 /* ---- results ---- */
@@ -96,10 +98,10 @@ ebpo_js_object *EBPO_JS(ebpo_js_new)(double size, const char *name, const char *
     return NULL;
 }
 
-/* Frees a model, after its queries and streams. */
+/* Frees an object, after its model, queries and streams. */
 void EBPO_JS(ebpo_js_free)(ebpo_js_object *object)
 {
-    ebpo_model_free(object->model);
+    ebpo_chunks_free(object->chunks);
     ebpo_close(object->file);
     ebpo_async_free(object->async);
     ebpo_js_free_arrays(object);
@@ -156,46 +158,6 @@ int EBPO_JS(ebpo_js_open)(ebpo_js_object *object, const char *name, int whole)
     return status;
 }
 
-int EBPO_JS(ebpo_js_load)(ebpo_js_object *object, double memory, int cut_level)
-{
-    ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
-    options.memory = (uint64_t)memory;
-    options.cut_level = cut_level;
-    options.threads = 1;
-    return ebpo_model_new(object->file, &options, &object->model, &object->error);
-}
-
-/* ---- queries ---- */
-
-/* Returns an object for queries of a model, one at a time; NULL: not enough memory. Streams and
- * information of the file need no model. */
-ebpo_js_object *EBPO_JS(ebpo_js_query)(const ebpo_js_object *model)
-{
-    ebpo_js_object *object = calloc(1, sizeof *object);
-    if (!object)
-        return NULL;
-    object->error = (ebpo_error)EBPO_ERROR_INIT;
-    object->file = model->file;
-    object->model = model->model;
-    object->async = model->async;
-    if (!model->model ||
-        ebpo_context_new(model->model, &object->context, &object->error) == EBPO_OK)
-        return object;
-    free(object);
-    return NULL;
-}
-
-/* Begins another query. */
-void EBPO_JS(ebpo_js_start)(ebpo_js_object *object) { ebpo_js_clear(object); }
-
-void EBPO_JS(ebpo_js_query_free)(ebpo_js_object *object)
-{
-    ebpo_stream_free(object->stream);
-    ebpo_context_free(object->context);
-    ebpo_js_free_arrays(object);
-    free(object);
-}
-
 /* ---- information ---- */
 
 /* Appends formatted text to array 0. */
@@ -223,7 +185,8 @@ static ebpo_status put_string(ebpo_js_object *object, const char *name, const ch
 
 static ebpo_status put_number(ebpo_js_object *object, const char *name, double value)
 {
-    return put_text(object, "\"%s\":%.17g,", name, value);
+    return isfinite(value) ? put_text(object, "\"%s\":%.17g,", name, value)
+                           : put_text(object, "\"%s\":null,", name);
 }
 
 static ebpo_status put_vector(ebpo_js_object *object, const char *name, const double x[3])
@@ -239,16 +202,17 @@ static ebpo_status put_hash(ebpo_js_object *object, const char *name, const uint
     return put_string(object, name, text);
 }
 
-static ebpo_status put_level(ebpo_js_object *object, const ebpo_level_summary *level, bool last)
+static bool put_level(ebpo_js_object *object, const ebpo_level_summary *level)
 {
     return put_text(object,
                     "{\"gray\":%" PRIu64 ",\"leaves\":%" PRIu64 ",\"white\":%" PRIu64
                     ",\"black\":%" PRIu64 ",\"planes\":%" PRIu64 ",\"leafPlanes\":%" PRIu64
-                    ",\"faces\":%" PRIu64 ",\"pruned\":%" PRIu64
-                    ",\"grayVolume\":%.17g,\"leafVolume\":%.17g}%s",
+                    ",\"faces\":%" PRIu64 ",",
                     level->gray_count, level->leaf_count, level->white_count, level->black_count,
-                    level->plane_count, level->leaf_plane_count, level->new_count,
-                    level->pruned_count, level->gray_volume, level->leaf_volume, last ? "" : ",");
+                    level->plane_count, level->leaf_plane_count, level->new_count) == EBPO_OK &&
+           put_number(object, "grayVolume", level->gray_volume) == EBPO_OK &&
+           put_number(object, "leafVolume", level->leaf_volume) == EBPO_OK &&
+           put_text(object, "\"pruned\":%" PRIu64 "}", level->pruned_count) == EBPO_OK;
 }
 
 static const char *const rule_words[] = { "nonzero", "evenodd", "positive" };
@@ -258,67 +222,34 @@ int EBPO_JS(ebpo_js_info)(ebpo_js_object *object)
 {
     const ebpo_info *info = ebpo_file_info(object->file);
     ebpo_js_clear(object);
-    bool ok = put_text(object, "{") == EBPO_OK &&
-              put_string(object, "generator", info->generator) == EBPO_OK &&
-              put_string(object, "sourceName", info->source_name) == EBPO_OK &&
-              put_string(object, "sourceFormat", info->source_format) == EBPO_OK &&
-              put_string(object, "unit", info->unit) == EBPO_OK &&
-              put_string(object, "crs", info->crs) == EBPO_OK &&
-              put_string(object, "date", info->date) == EBPO_OK &&
-              put_string(object, "rule", rule_words[info->rule]) == EBPO_OK &&
-              put_hash(object, "contentSha256", info->content_sha256) == EBPO_OK &&
-              put_text(object, "\"version\":[%d,%d],\"solid\":%s,\"pruned\":%s,\"hasMesh\":%s,",
-                       info->version_major, info->version_minor, info->solid ? "true" : "false",
-                       info->pruned ? "true" : "false",
-                       info->parts & EBPO_PART_MESH ? "true" : "false") == EBPO_OK &&
-              put_vector(object, "origin", info->box_origin) == EBPO_OK &&
-              put_vector(object, "size", info->box_size) == EBPO_OK &&
-              put_number(object, "vertices", (double)info->vertex_count) == EBPO_OK &&
-              put_number(object, "faces", (double)info->face_count) == EBPO_OK &&
-              put_number(object, "sourceFaces", (double)info->source_face_count) == EBPO_OK &&
-              put_number(object, "parts", info->parts) == EBPO_OK &&
-              put_number(object, "fileBytes", (double)info->file_bytes) == EBPO_OK &&
-              put_text(object, "\"levels\":[") == EBPO_OK;
+    bool ok =
+        put_text(object, "{") == EBPO_OK &&
+        put_string(object, "generator", info->generator) == EBPO_OK &&
+        put_string(object, "sourceName", info->source_name) == EBPO_OK &&
+        put_string(object, "sourceFormat", info->source_format) == EBPO_OK &&
+        put_string(object, "unit", info->unit) == EBPO_OK &&
+        put_string(object, "crs", info->crs) == EBPO_OK &&
+        put_string(object, "date", info->date) == EBPO_OK &&
+        put_string(object, "rule", rule_words[info->rule]) == EBPO_OK &&
+        put_hash(object, "contentSha256", info->content_sha256) == EBPO_OK &&
+        (!info->pruned || put_hash(object, "subsetOf", info->subset_of) == EBPO_OK) &&
+        put_text(object,
+                 "\"version\":[%d,%d],\"solid\":%s,\"pruned\":%s,"
+                 "\"hasMesh\":%s,\"doubles\":%s,",
+                 info->version_major, info->version_minor, info->solid ? "true" : "false",
+                 info->pruned ? "true" : "false", info->parts & EBPO_PART_MESH ? "true" : "false",
+                 info->double_coordinates ? "true" : "false") == EBPO_OK &&
+        put_vector(object, "origin", info->box_origin) == EBPO_OK &&
+        put_vector(object, "size", info->box_size) == EBPO_OK &&
+        put_number(object, "vertices", (double)info->vertex_count) == EBPO_OK &&
+        put_number(object, "faces", (double)info->face_count) == EBPO_OK &&
+        put_number(object, "sourceFaces", (double)info->source_face_count) == EBPO_OK &&
+        put_number(object, "addedFaces", (double)info->repair_record.added_faces) == EBPO_OK &&
+        put_number(object, "parts", info->parts) == EBPO_OK &&
+        put_number(object, "subtreeLevel", info->subtree_level) == EBPO_OK &&
+        put_number(object, "fileBytes", (double)info->file_bytes) == EBPO_OK &&
+        put_text(object, "\"levels\":[") == EBPO_OK;
     for (int k = 0; k < info->level_count && ok; k++)
-        ok = put_level(object, &info->level[k], k + 1 == info->level_count) == EBPO_OK;
+        ok = put_text(object, k ? "," : "") == EBPO_OK && put_level(object, &info->level[k]);
     return ok && put_text(object, "]}") == EBPO_OK ? EBPO_OK : EBPO_E_MEMORY;
-}
-
-/* Puts statistics into array 0: memory, its peak and budget, whether everything is in memory, cut
- * level, hits, loads, evicted, bytes read, reads, supplied bytes in memory. */
-int EBPO_JS(ebpo_js_stats)(ebpo_js_object *object)
-{
-    ebpo_model_stats s = EBPO_MODEL_STATS_INIT;
-    ebpo_js_clear(object);
-    if (object->model)
-        ebpo_model_get_stats(object->model, &s);
-    double values[] = { (double)s.memory,
-                        (double)s.memory_peak,
-                        (double)s.budget,
-                        s.resident,
-                        s.cut_level,
-                        (double)s.hits,
-                        (double)s.loads,
-                        (double)s.evicted,
-                        (double)s.bytes_read,
-                        (double)s.reads,
-                        (double)ebpo_async_bytes(object->async) };
-    return ebpo_js_put(object, 0, values, sizeof values);
-}
-
-/* Puts into array 0: area, volume, centroid, inertia, bounds of the volume, integral. */
-int EBPO_JS(ebpo_js_measure)(ebpo_js_object *object)
-{
-    ebpo_mass m = EBPO_MASS_INIT;
-    ebpo_js_clear(object);
-    ebpo_status status = ebpo_measure(object->file, 1, &m, &object->error);
-    if (status != EBPO_OK)
-        return status;
-    double values[17] = { m.area, m.volume };
-    memcpy(values + 2, m.centroid, sizeof m.centroid);
-    memcpy(values + 5, m.inertia, sizeof m.inertia);
-    values[14] = m.volume_lo;
-    values[15] = m.volume_hi;
-    values[16] = m.integral;
-    return ebpo_js_put(object, 0, values, sizeof values);
 }

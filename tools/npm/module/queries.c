@@ -268,22 +268,33 @@ int EBPO_JS(ebpo_js_box_faces)(ebpo_js_object *object, const double *box)
     return EBPO_OK;
 }
 
+/* Takes triangles until there are more than a limit. */
+typedef struct triangle_taking {
+    ebpo_js_object *object;
+    double most;
+} triangle_taking;
+
 static bool take_triangles(void *user, const ebpo_triangles *triangles)
 {
-    ebpo_js_object *object = user;
+    triangle_taking *taking = user;
+    ebpo_js_object *object = taking->object;
     uint32_t *faces = ebpo_js_extend(object, 0, triangles->count, sizeof *faces);
     for (uint64_t i = 0; i < triangles->count && faces; i++)
         faces[i] = face_index(triangles->faces[i]);
-    return faces && ebpo_js_put(object, 1, triangles->corners,
-                                (size_t)triangles->count * sizeof *triangles->corners) == EBPO_OK;
+    return faces &&
+           ebpo_js_put(object, 1, triangles->corners,
+                       (size_t)triangles->count * sizeof *triangles->corners) == EBPO_OK &&
+           (double)object->array[0].bytes / sizeof *faces <= taking->most;
 }
 
-/* As ebpo_js_box_faces, with the corners of the triangles [3][3] in array 1. */
-int EBPO_JS(ebpo_js_box_triangles)(ebpo_js_object *object, const double *box)
+/* As ebpo_js_box_faces, with the corners of the triangles [3][3] in array 1. Stops when there are
+ * more than `most`. */
+int EBPO_JS(ebpo_js_box_triangles)(ebpo_js_object *object, const double *box, double most)
 {
+    triangle_taking taking = { object, most };
     ebpo_js_clear(object);
     object->error.status = EBPO_OK;
     ebpo_status status = ebpo_triangles_in_box(object->context, box, box + 3, take_triangles,
-                                               object, &object->error);
+                                               &taking, &object->error);
     return object->error.status == EBPO_E_MEMORY ? EBPO_E_MEMORY : status;
 }

@@ -3,10 +3,8 @@
 //     notes: [{ title, author, date, body, layer, face, weights, place }],
 //     strokes: [{ layer, erases, colour: [r, g, b, a], radius, time, points: [{ face, weights, place, size, pressure, time }] }] }
 // `colour` of a layer is 0xRRGGBBAA; weights are in units of 2^-30, sizes of 2^-15.
-import { fletcher32 } from '../reader/chunk.js';
-import { EbpoError, formatError } from '../reader/error.js';
-import { Facts } from '../reader/facts.js';
-import { Hdf5 } from '../reader/hdf5.js';
+import { EbpoError, formatError } from '../error.js';
+import { Facts, Hdf5, fletcher32 } from './read_h5.js';
 import { H5Writer, doubles, i64, text, u64 } from './write_h5.js';
 
 const FORMAT = 'EBP-Octree paint 1';
@@ -51,7 +49,7 @@ export function cleanText(value, most) {
 class PaintReader {
   constructor(bytes) {
     this.bytes = bytes;
-    this.hdf5 = new Hdf5(bytes, bytes.length);
+    this.hdf5 = new Hdf5(bytes);
   }
 
   group(path, address) {
@@ -69,9 +67,9 @@ class PaintReader {
       throw formatError(path, 'the array is missing, or has the wrong type or shape');
     if (!o.layout.chunked || !same(o.layout.chunk, shape) || o.layout.elementSize !== size || o.filters.length !== 1 || o.filters[0].id !== 3)
       throw formatError(path, 'the array is not one chunk with a checksum');
-    const whole = rows * (columns || 1) * size, [{ at, bytes }] = this.hdf5.chunks(o, path, 1, whole, whole + 4);
-    const stored = this.bytes.slice(at, at + bytes);
-    if (bytes !== whole + 4 || new DataView(stored.buffer).getUint32(whole, true) !== fletcher32(stored.subarray(0, whole)))
+    const whole = rows * (columns || 1) * size, at = this.hdf5.chunk(o, path, whole + 4);
+    const stored = this.bytes.slice(at, at + whole + 4);
+    if (new DataView(stored.buffer).getUint32(whole, true) !== fletcher32(stored.subarray(0, whole)))
       throw formatError(path, 'the chunk is damaged: its checksum differs');
     return new Type(stored.buffer, 0, whole / size);
   }

@@ -1,7 +1,6 @@
 // Writes the subset of HDF5 that a paint file needs: groups with links and attributes, and arrays of integers in one chunk with a checksum.
 // format-spec/paint.md, section 7. Blocks are consecutive; a block is written before the blocks that refer to it.
-import { fletcher32 } from '../reader/chunk.js';
-import { lookup3 } from '../reader/hdf5.js';
+import { fletcher32, lookup3 } from './read_h5.js';
 
 const NONE = 2n ** 64n - 1n;
 const utf8 = new TextEncoder();

@@ -7,7 +7,7 @@ import { join } from 'node:path';
 import test from 'node:test';
 import { MOST, cleanText, readPaint, writePaint } from '../paint/paint_file.js';
 import { H5Writer, i64, text, u64 } from '../paint/write_h5.js';
-import { lookup3 } from '../reader/hdf5.js';
+import { lookup3 } from '../paint/read_h5.js';
 
 const SHA = '0123456789abcdef'.repeat(4);
 const point = (i) => ({ face: 7 * i, weights: [i % 3 * 1000, 2 ** 29], place: [i / 3, -i, 1e-3 * i], size: 1 + (i * 977) % 32768, pressure: i % 65536, time: 8 * i });

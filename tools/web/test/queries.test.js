@@ -3,8 +3,9 @@ import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { readFileSync } from 'node:fs';
 import test from 'node:test';
-import { cutFaces, measureOf, positionsOf, sectionOf, weightsOf } from '../queries.js';
-import { Tree, openEbpo } from '../reader/index.js';
+import { Queries, cutFaces, measureOf, positionsOf, sectionOf, weightsOf } from '../queries.js';
+import { open } from '../ebpo/index.js';
+import { openModel } from '../model_file.js';
 
 // Returns a box as twelve faces, counter-clockwise as seen from outside.
 function box(low, high) {
@@ -42,16 +43,15 @@ test('weights reproduce the point', () => {
 const paths = (process.env.EBPO_FILES ?? '').split(' ').filter((path) => /\/ring(_subtrees|_blocks|_without_mesh|_box)?\.ebpo\.h5$/.test(path)), tool = process.env.EBPO_TOOL;
 test('sections of files agree with those of all faces; positions are on the source\'s faces', { skip: paths.length && tool ? false : 'EBPO_TOOL and EBPO_FILES are not set' }, async () => {
   for (const path of paths) {
-    const file = await openEbpo(readFileSync(path), { name: path }), { info } = file, tree = new Tree(info), reports = [];
-    tree.add((await file.levels(0, 0))[0]);
+    const file = await openModel(readFileSync(path), { name: path }), { info } = file, queries = new Queries(file), reports = [];
     const axis = 1, at = info.box_origin[1] + 0.4375 * info.box_size[1];
-    await sectionOf(file, tree.lean(), axis, at, (news) => reports.push(news), () => false);
+    await sectionOf(queries, axis, at, (news) => reports.push(news), () => false);
     const last = reports.at(-1);
     if (!info.parts.has('mesh')) {
       assert.match(last.fault, /no faces/);
       continue;
     }
-    const { vertices, faces } = await file.mesh(), all = Float64Array.from([...faces].flatMap((v) => [...vertices.subarray(3 * v, 3 * v + 3)])), plain = [];
+    const model = await open(readFileSync(path)), { vertices, faces } = await model.mesh(), all = Float64Array.from([...faces].flatMap((v) => [...vertices.subarray(3 * v, 3 * v + 3)])), plain = [];
     cutFaces(all, axis, at, plain);
     const wanted = measureOf(plain);
     assert.equal(last.partial, info.parts.has('pruned'), path);
@@ -60,12 +60,19 @@ test('sections of files agree with those of all faces; positions are on the sour
     assert.equal(last.faces, plain.length / 4);
     assert.ok(Math.abs(last.length - wanted.length) <= 1e-9 * wanted.length && Math.abs(last.area - wanted.area) <= 1e-9 * wanted.area, `${last.area} ${wanted.area}`);
 
-    const points = [[0.1, 0.2, 0.3], [0.9, 0.9, 0.1], [0.5, 0.5, 0.5]].map((s) => s.map((x, k) => info.box_origin[k] + x * info.box_size[k])), places = await positionsOf(file, tree.lean(), points);
-    const { faceSource } = await file.maps(), results = points.map((p) => JSON.parse(execFileSync(tool, ['distance', '--json', '--unsigned', path], { input: `${p.join(' ')}\n`, encoding: 'utf8' })));
+    const points = [[0.1, 0.2, 0.3], [0.9, 0.9, 0.1], [0.5, 0.5, 0.5]].map((s) => s.map((x, k) => info.box_origin[k] + x * info.box_size[k])), places = await positionsOf(queries, points);
+    const { face: named, corners } = await model.boxTriangles(info.box_origin, info.box_origin.map((x, k) => x + info.box_size[k]));
+    const results = points.map((p) => JSON.parse(execFileSync(tool, ['distance', '--json', '--unsigned', path], { input: `${p.join(' ')}\n`, encoding: 'utf8' })));
     places.forEach(({ face, weights, place, distance }, i) => {
-      const own = faceSource.indexOf(face), p = [0, 1, 2].map((k) => [2 ** 30 - weights[0] - weights[1], ...weights].reduce((sum, w, c) => sum + w / 2 ** 30 * all[9 * own + 3 * c + k], 0));
+      const own = named.indexOf(face), p = [0, 1, 2].map((k) => [2 ** 30 - weights[0] - weights[1], ...weights].reduce((sum, w, c) => sum + w / 2 ** 30 * corners[9 * own + 3 * c + k], 0));
       assert.ok(own >= 0 && p.every((x, k) => Math.abs(x - place[k]) < 1e-6 * info.box_size[k]), `${path}: face ${face}`);
       assert.ok(Math.abs(distance - results[i].distance) < 1e-12);
     });
+
+    const ray = [...info.box_origin.map((o, k) => o - 0.1 * info.box_size[k]), ...info.box_size.map((s, k) => s * [1, 0.97, 1.02][k])], hit = await queries.hit(ray);
+    const found = JSON.parse(execFileSync(tool, ['ray', '--json', path], { input: `${ray.join(' ')}\n`, encoding: 'utf8' }));
+    assert.deepEqual(hit, found ? [0, 1, 2].map((k) => ray[k] + found.t * ray[3 + k]) : undefined);
+    const [exact, coarse] = await Promise.all([queries.exact(points[0]), queries.coarse(points[0], 2)]);
+    assert.ok(exact.distance === results[0].distance && coarse.lo <= exact.distance && exact.distance <= coarse.hi, path);
   }
 });

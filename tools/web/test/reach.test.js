@@ -6,9 +6,13 @@ import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { test } from 'node:test';
-import { Tree, openEbpo } from '../reader/index.js';
+import { open } from '../ebpo/index.js';
+import { openModel } from '../model_file.js';
 import { readPaint } from '../paint/paint_file.js';
+import { Queries } from '../queries.js';
 import { connectedFaces, reachOf } from '../reach.js';
+import { addLevels } from '../grow.js';
+import { LEAF, Tree } from '../tree.js';
 import { plates } from './plates.js';
 
 // A generator of reproducible pseudorandom numbers.
@@ -49,10 +53,7 @@ test('covered faces agree with ebpo paint', { skip: process.env.EBPO_TOOL ? fals
   t.after(() => rmSync(folder, { recursive: true, force: true }));
   plates(at('plates.ply'));
   ebpo('convert', '-q', at('plates.ply'), at('plates.ebpo.h5'));
-  const file = await openEbpo(readFileSync(at('plates.ebpo.h5'))), whole = new Tree(file.info);
-  for (const level of await file.levels(0, file.info.levels.length - 1))
-    whole.add(level);
-  const tree = whole.lean();
+  const queries = new Queries(await openModel(readFileSync(at('plates.ebpo.h5'))));
   const painted = async (place, radius) => {
     rmSync(at('p.paint.h5'), { force: true });
     writeFileSync(at('way'), `${place.join(' ')}\n`);
@@ -60,16 +61,21 @@ test('covered faces agree with ebpo paint', { skip: process.env.EBPO_TOOL ? fals
     ebpo('paint', at('p.paint.h5'), at('plates.ebpo.h5'), '--base', '000000', '--bake', at('baked.ply'));
     const text = readFileSync(at('baked.ply'), 'latin1'), count = Number(/element vertex (\d+)/.exec(text)[1]);
     ebpo('convert', '-q', at('baked.ply'), at('baked.ebpo.h5'));
-    const baked = await openEbpo(readFileSync(at('baked.ebpo.h5'))), faces = await baked.facesByNumber(Uint32Array.from({ length: baked.info.face_count }, (_, i) => i)), red = new Set();
-    for (let c = 0; c < faces.length / 3; c++)
-      if (faces.colours[3 * c] > 0)
-        red.add([...faces.subarray(3 * c, 3 * c + 3)].join());
+    const baked = await openModel(readFileSync(at('baked.ebpo.h5'))), tree = new Tree(baked.info), leaves = [], red = new Set();
+    await addLevels(baked, tree, baked.info.levels.map((_, level) => level));
+    (function walk(node) {
+      (node.type === LEAF ? leaves.push(node) : tree.children(node)?.forEach(walk));
+    })(tree.root);
+    for (const { corners, colours } of await baked.leafFaces(leaves))
+      for (let c = 0; c < corners.length / 3; c++)
+        if (colours[3 * c] > 0)
+          red.add([...corners.subarray(3 * c, 3 * c + 3)].join());
     assert.ok(count > 0 && red.size > 0);
     const [point] = readPaint(Uint8Array.from(readFileSync(at('p.paint.h5')))).strokes[0].points;
     return { point, red };
   };
   for (const [place, radius, differs] of [[[-0.1, 0.5, 0.05], 0.3, true], [[0.6, 0.51, 0.05], 0.3, true], [[0.6, 0.51, 0.05], 0.04, false], [[0.05, 0.95, 0], 0.25, true]]) {
-    const { point, red } = await painted(place, radius), [found] = await reachOf(file, tree, [{ face: point.face, place: point.place, radius }]);
+    const { point, red } = await painted(place, radius), [found] = await reachOf(queries, [{ face: point.face, place: point.place, radius }]);
     assert.equal(found.here, 'yes');
     assert.equal(found.faces !== undefined, differs, `at ${place} with ${radius}`);
     if (!differs)
@@ -81,19 +87,19 @@ test('covered faces agree with ebpo paint', { skip: process.env.EBPO_TOOL ? fals
     assert.deepEqual([...mine].sort(), [...red].sort(), `at ${place} with ${radius}`);
   }
   // A point on an edge is on its named face, although another face is as near. A point is not on a distant face.
-  const all = await file.facesByNumber(Uint32Array.from({ length: file.info.face_count }, (_, i) => i)),
-    numbers = await file.sourceFaces(Uint32Array.from({ length: file.info.face_count }, (_, i) => i));
+  const { origin, size } = (await open(readFileSync(at('plates.ebpo.h5')))).info;
+  const { face: numbers, corners: all } = await queries.with((model) => model.boxTriangles(origin, origin.map((x, k) => x + size[k])));
   const place = [0, 1, 2].map((k) => (all[k] + all[3 + k]) / 2), holders = [...numbers].filter((_, f) => [0, 3, 6].filter((c) => [0, 3].some((d) => [0, 1,
     2].every((k) => all[9 * f + c + k] === all[d + k]))).length === 2);
   assert.equal(holders.length, 2);
-  const [one, other, wrong] = await reachOf(file, tree, [...holders, numbers.find((n) => !holders.includes(n))].map((face) => ({ face, place, radius: 0 })));
-  assert.deepEqual([one.here, other.here, wrong.here, (await reachOf(file, tree, [{ face: holders[0], place: [5, 5, 5], radius: 0 }]))[0].here], ['yes', 'yes', 'no', 'no']);
+  const [one, other, wrong] = await reachOf(queries, [...holders, numbers.find((n) => !holders.includes(n))].map((face) => ({ face, place, radius: 0 })));
+  assert.deepEqual([one.here, other.here, wrong.here, (await reachOf(queries, [{ face: holders[0], place: [5, 5, 5], radius: 0 }]))[0].here], ['yes', 'yes', 'no', 'no']);
 });
 
-test('a ball as large as the model does not fetch the whole model', async () => {
-  let looked = 0;
-  const node = { type: 3 }, endless = { root: node, cellFace: (_, k, upper) => upper, children: () => (looked++, Array(8).fill(node)), isPruned: () => false };
-  const file = { info: { box_size: [1, 1, 1], parts: new Set() }, leafFaces: () => assert.fail('faces are fetched') };
-  assert.deepEqual(await reachOf(file, endless, [{ face: 0, place: [0.5, 0.5, 0.5], radius: 1e300 }]), [{ here: 'no' }]);
-  assert.ok(looked < 100_000, `${looked} nodes`);
+test('the faces around a point are limited', async () => {
+  let most;
+  const model = { boxTriangles: (low, high, options) => ({ face: new Uint32Array((most = options.most) + 1), corners: new Float64Array(0) }) };
+  const queries = { info: { box_size: [1, 1, 1] }, with: async (use) => use(model) };
+  assert.deepEqual(await reachOf(queries, [{ face: 0, place: [0.5, 0.5, 0.5], radius: 1e300 }]), [{ here: 'no' }]);
+  assert.ok(most <= 100_000);
 });

@@ -5,7 +5,7 @@ import { copyFileSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from '
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { test } from 'node:test';
-import { openEbpo } from '../reader/index.js';
+import { open } from '../ebpo/index.js';
 import { sharesOf, weightOf } from '../together/budget.js';
 import { boundsOf } from '../together/bounds.js';
 import { parseStrict } from '../together/strict_json.js';
@@ -152,7 +152,7 @@ test('poses of instances agree with ebpo scene', { skip: process.env.EBPO_TOOL ?
   writeFileSync(join(folder, 'steps.csv'), CSV);
   scene.models = { wall: { file: 'ring.ebpo.h5' }, arm: { file: 'ring.ebpo.h5' } };
   writeFileSync(join(folder, 's.scene.json'), JSON.stringify(scene));
-  const { vertices } = await (await openEbpo(readFileSync(model))).mesh();
+  const { vertices } = await (await open(readFileSync(model))).mesh();
   const mine = await read(scene);
   for (const time of [0, 0.7, 1.9, 4.2]) {
     const { boxes } = JSON.parse(execFileSync(process.env.EBPO_TOOL, ['scene', 'boxes', '--json', '--from', String(time), '--to', String(time), join(folder, 's.scene.json')], { encoding: 'utf8' }));

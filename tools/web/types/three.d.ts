@@ -1,5 +1,5 @@
 // Types of "ebpo-viewer/three".
-import type { Box3, Camera, Group, Material, MeshStandardMaterial, MeshStandardMaterialParameters, Object3D, Object3DEventMap, Vector3, WebGLRenderer } from 'three';
+import type { Box3, Camera, Group, Material, MeshStandardMaterial, MeshStandardMaterialParameters, Object3D, Object3DEventMap, Ray, Vector3, WebGLRenderer } from 'three';
 import type { EbpoInfo } from './element.js';
 
 export interface EbpoModelOptions {
@@ -44,6 +44,8 @@ export declare class EbpoModel extends Object3D<EbpoModelEventMap> {
   load(what: string | URL | Blob): Promise<EbpoInfo>;
   /** Call it before each frame. A number as `renderer` is the picture's height in pixels of the page. */
   update(camera: Camera, renderer: WebGLRenderer | number): void;
+  /** The first point of the faces on a ray. */
+  hit(ray: Ray): Promise<Vector3 | undefined>;
   probe(point: Vector3): Promise<{ where?: 'in' | 'out' | 'on' | 'maybe'; distance?: number; nearest?: Vector3; lo: number; hi: number; exact: boolean }>;
   dispose(): void;
 }

@@ -1,4 +1,4 @@
-// A range of nodes of one level: types, planes and winding numbers. Ranks are stored for every 16th group and counted from there.
+// A range of nodes of one level: types, planes and colours. Ranks are stored for every 16th group and counted from there.
 const STEP = 16; // counts of at most 8 * 16 nodes fit in a byte
 
 // For each byte with four types: the numbers of white, black, leaf and gray nodes, in one byte each.
@@ -28,9 +28,8 @@ export class Segment {
    * Creates a segment whose first group is `group`. The arrays are ranges of the arrays in format-spec, section 6, from there on. `first`: ranks of the first white, black, leaf
    * and gray node. Arrays that were not read are undefined.
    */
-  constructor({ level, group = 0, first = [0, 0, 0, 0], types, planeCounts, planes, leafPlaneCounts, leafPlanes, leafWinding, blackWinding, whiteWinding, grayColours }) {
+  constructor({ level, group = 0, first = [0, 0, 0, 0], types, planeCounts, planes, leafPlaneCounts, leafPlanes, grayColours }) {
     Object.assign(this, { level, group, first, types, planeCounts, planes, leafPlaneCounts, leafPlanes, grayColours });
-    this.windings = [whiteWinding, blackWinding, leafWinding];
     this.before = new Uint32Array(4 * Math.ceil(types.length / STEP));
     for (let g = 0, sum = 0, at = 0; g < types.length; g++) {
       if (g % STEP === 0) {
@@ -44,7 +43,7 @@ export class Segment {
     this.planeBegin = begins(planeCounts);
     this.leafPlaneBegin = begins(leafPlaneCounts);
     this.byteLength = 2 * types.length + this.before.length * 4
-      + [planeCounts, planes, leafPlaneCounts, leafPlanes, grayColours, this.planeBegin, this.leafPlaneBegin, ...this.windings].reduce((sum, a) => sum + (a?.byteLength ?? 0), 0);
+      + [planeCounts, planes, leafPlaneCounts, leafPlanes, grayColours, this.planeBegin, this.leafPlaneBegin].reduce((sum, a) => sum + (a?.byteLength ?? 0), 0);
   }
 
   /** Returns the ranks (white, black, leaf, gray) at the beginning of a group. */
@@ -71,10 +70,5 @@ export class Segment {
   /** Returns red + 256 green + 65,536 blue of a gray node, or undefined without a colour. */
   colour(rank) {
     return this.grayColours?.[rank - this.first[3]];
-  }
-
-  /** Returns the stored winding number of a white, black or leaf node, or undefined when none is stored. */
-  winding(type, rank) {
-    return this.windings[type]?.[rank - this.first[type]];
   }
 }

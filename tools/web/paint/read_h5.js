@@ -1,8 +1,8 @@
-// Reads the subset of HDF5's file format that EBP-Octree files use: superblock 3, version 2 object headers with all links and
-// attributes in them, arrays of fixed size in chunks with the single-chunk or the fixed-array index. Other features are rejected with an error that names the feature.
+// Reads the subset of HDF5's file format that paint files use (format-spec/paint.md, section 7): superblock 3, version 2 object headers with all links and
+// attributes in them, arrays of fixed size in one chunk. Other features are rejected with an error that names the feature.
 // Every block's checksum is compared, and every count and address is checked before it is used.
 // Source: The HDF Group, "HDF5 File Format Specification Version 3.0".
-import { EbpoError, formatError } from './error.js';
+import { EbpoError, formatError } from '../error.js';
 
 const UNDEFINED = 0xffffffffffffffffn;
 const SIGNATURE = [0x89, 0x48, 0x44, 0x46, 0x0d, 0x0a, 0x1a, 0x0a];
@@ -10,15 +10,6 @@ const MESSAGES_MOST = 8192, BLOCKS_MOST = 256; // limits of one object header: f
 
 const NIL = 0x00, DATASPACE = 0x01, LINK_INFO = 0x02, DATATYPE = 0x03, FILL_OLD = 0x04, FILL = 0x05, LINK = 0x06, LAYOUT = 0x08, GROUP_INFO = 0x0a,
   EXTERNAL = 0x07, PIPELINE = 0x0b, ATTRIBUTE = 0x0c, CONTINUATION = 0x10, ATTRIBUTE_INFO = 0x15;
-
-/** Thrown when bytes `at` to `end` are needed and not loaded. */
-export class NeedBytes extends Error {
-  constructor(at, end) {
-    super('more of the metadata is needed');
-    this.at = at;
-    this.end = end;
-  }
-}
 
 function rotate(x, k) {
   return (x << k) | (x >>> (32 - k));
@@ -111,28 +102,17 @@ class Cursor {
   }
 }
 
-/** The metadata of a file of `size` bytes. The first `head.length` bytes are loaded, and optionally a `piece` { at, data } elsewhere. */
+/** The metadata of a file in memory. */
 export class Hdf5 {
-  constructor(head, size) {
-    this.head = head;
-    this.size = size;
+  constructor(bytes) {
+    this.head = bytes;
+    this.size = bytes.length;
     this.root = this.#superblock();
   }
 
   #need(at, length, where) {
     if (at + length > this.size)
       throw formatError(where, 'it is beyond the end of the file');
-    if (at + length <= this.head.length)
-      return { bytes: this.head, at };
-    const { piece } = this;
-    if (piece && at >= piece.at && at + length <= piece.at + piece.data.length)
-      return { bytes: piece.data, at: at - piece.at };
-    throw new NeedBytes(at, at + length);
-  }
-
-  #cursor(at, length, where) {
-    const { bytes, at: from } = this.#need(at, length, where);
-    return new Cursor(bytes, from, from + length, where);
   }
 
   #superblock() {
@@ -157,9 +137,9 @@ export class Hdf5 {
   }
 
   #checksum(at, length, where) {
-    const { bytes, at: from } = this.#need(at, length + 4, where);
-    const stored = new DataView(bytes.buffer, bytes.byteOffset + from + length, 4).getUint32(0, true);
-    if (stored !== lookup3(bytes, from, length))
+    this.#need(at, length + 4, where);
+    const stored = new DataView(this.head.buffer, this.head.byteOffset + at + length, 4).getUint32(0, true);
+    if (stored !== lookup3(this.head, at, length))
       throw formatError(where, 'its description is damaged: the checksum differs');
   }
 
@@ -253,68 +233,17 @@ export class Hdf5 {
     attributes.set(name, shared ? { type: { class: 'other' } } : { type: datatype(type), space: dataspace(space), data: c.bytes.subarray(c.at, c.end) });
   }
 
-  /**
-   * Returns the offsets of an array's chunks: [{ at, bytes }], in order. `count` chunks are expected, each of at most `most` bytes; `whole` is a
-   * chunk's size before filters.
-   */
-  chunks(array, where, count, whole, most) {
-    const { layout: l, filters } = array;
-    if (count > 1 && count > this.size / 4)
-      throw formatError(where, 'the array has more chunks than the file can hold');
-    const found = l.index === 1 ? this.#singleChunk(l, where, count, filters, whole) : this.#fixedArray(l, where, count, filters, whole);
-    let total = 0;
-    found.forEach(({ at, bytes, mask }, i) => {
-      const chunk = `${where}: chunk ${i}`;
-      if (at === undefined || bytes === 0)
-        throw formatError(chunk, 'the chunk is missing');
-      if (mask)
-        throw formatError(chunk, 'the chunk was stored without its filters');
-      if (bytes > most)
-        throw formatError(chunk, 'the chunk is larger than the format allows');
-      if (at + bytes > this.end)
-        throw formatError(chunk, 'the chunk is beyond the end of the file');
-      total += bytes;
-    });
-    if (total > this.end)
-      throw formatError(where, "the array's chunks are larger than the file");
-    return found;
-  }
-
-  #singleChunk(l, where, count, filters, whole) {
-    if (count !== 1 || (filters.length > 0) !== (l.single !== undefined))
+  /** Returns the offset of the chunk of an array that has one chunk of `bytes` bytes. */
+  chunk({ layout: l, filters }, where, bytes) {
+    if (l.index !== 1 || (filters.length > 0) !== (l.single !== undefined))
       throw formatError(where, "the array's index contradicts its shape");
-    return [{ at: l.address, bytes: l.single?.bytes ?? whole, mask: l.single?.mask ?? 0 }];
-  }
-
-  #fixedArray(l, where, count, filters, whole) {
-    if (l.address === undefined)
-      throw formatError(where, 'the array was never written');
-    let c = this.#cursor(l.address, 28, where);
-    c.must(c.u32() === 0x44484146 && c.u8() === 0, "there is no chunk index where one is expected"); // "FAHD"
-    this.#checksum(l.address, 24, where);
-    const client = c.u8(), entry = c.u8(), pageBits = c.u8(), entries = c.uint(8), data = c.address();
-    const filtered = filters.length > 0, sizeBytes = filtered ? entry - 12 : 0;
-    c.must(client === (filtered ? 1 : 0) && (filtered ? sizeBytes >= 1 && sizeBytes <= 8 : entry === 8), "the array's index contradicts its filters");
-    c.must(entries === count && pageBits === l.pageBits && pageBits >= 1 && pageBits <= 20 && data !== undefined, "the array's index contradicts its shape");
-    c = this.#cursor(data, 14, where);
-    c.must(c.u32() === 0x42444146 && c.u8() === 0 && c.u8() === client && c.address() === l.address, "there is no chunk index where one is expected"); // "FADB"
-    const perPage = 2 ** pageBits, pages = count > perPage ? Math.ceil(count / perPage) : 0, prefix = 14 + Math.ceil(pages / 8);
-    this.#checksum(data, pages ? prefix : prefix + count * entry, where);
-    const out = [];
-    let at = data + prefix + (pages ? 4 : 0);
-    for (let page = 0; page < (pages || 1); page++) {
-      const here = pages ? Math.min(perPage, count - page * perPage) : count;
-      if (pages) {
-        if (!(this.#cursor(data + 14 + (page >> 3), 1, where).u8() >> (7 - page % 8) & 1))
-          throw formatError(where, 'the array was never written');
-        this.#checksum(at, here * entry, where);
-      }
-      c = this.#cursor(at, here * entry, where);
-      for (let i = 0; i < here; i++)
-        out.push({ at: c.address(), bytes: filtered ? c.uint(sizeBytes) : whole, mask: filtered ? c.u32() : 0 });
-      at += here * entry + 4;
-    }
-    return out;
+    if (l.address === undefined || (l.single?.bytes ?? bytes) !== bytes)
+      throw formatError(where, 'the chunk is missing or has another size');
+    if (l.single?.mask)
+      throw formatError(where, 'the chunk was stored without its filters');
+    if (l.address + bytes > this.end)
+      throw formatError(where, 'the chunk is beyond the end of the file');
+    return l.address;
   }
 }
 
@@ -375,10 +304,6 @@ function layout(c) {
   const index = c.u8(), out = { chunked: true, chunk: chunk.slice(0, -1), elementSize: chunk[rank - 1], index };
   if (index === 1 && flags & 2)
     out.single = { bytes: c.uint(8), mask: c.u32() };
-  else if (index === 3)
-    out.pageBits = c.u8();
-  else if (index > 3)
-    return { ...out, grows: true };
   else
     c.must(index === 1, "the array's chunks have an unknown index");
   out.address = c.address();
@@ -395,5 +320,90 @@ export function text(bytes) {
     return /[\u0000-\u001f\u007f-\u009f]/.test(out) ? undefined : out;
   } catch {
     return undefined;
+  }
+}
+
+/** Returns HDF5's fletcher32 checksum: big-endian 16-bit words, sums modulo 65535. */
+export function fletcher32(data) {
+  let low = 0, high = 0;
+  const words = data.length >> 1;
+  for (let i = 0; i < words;) {
+    for (const stop = Math.min(words, i + 360); i < stop; i++) {
+      low += data[2 * i] << 8 | data[2 * i + 1];
+      high += low;
+    }
+    low = (low & 0xffff) + (low >>> 16);
+    high = (high & 0xffff) + Math.floor(high / 65536);
+  }
+  if (data.length & 1) {
+    low += data[data.length - 1] << 8;
+    high += low;
+    low = (low & 0xffff) + (low >>> 16);
+    high = (high & 0xffff) + (high >>> 16);
+  }
+  low = (low & 0xffff) + (low >>> 16);
+  high = (high & 0xffff) + (high >>> 16);
+  return ((high << 16) | low) >>> 0;
+}
+
+/** Reads attributes of one object by type. */
+export class Facts {
+  constructor(attributes, where) {
+    this.attributes = attributes;
+    this.where = where;
+  }
+
+  notAllowed(name) {
+    return formatError(this.where, `attribute ${name} has a value that the format does not allow`);
+  }
+
+  fail(name, what) {
+    return formatError(this.where, `attribute ${name}: ${what}`);
+  }
+
+  #get(name, count, fits, what) {
+    const a = this.attributes.get(name);
+    if (!a)
+      throw formatError(this.where, `attribute ${name} is missing`);
+    const points = a.space ? a.space.dims.reduce((product, d) => product * d, 1) : 0;
+    if (!fits(a.type))
+      throw this.fail(name, `it is not ${what}`);
+    if (points !== count || !a.space.fixed || a.data.length < count * a.type.size)
+      throw this.fail(name, 'it is damaged or has the wrong number of values');
+    return new DataView(a.data.buffer, a.data.byteOffset, count * a.type.size);
+  }
+
+  has(name) {
+    return this.attributes.has(name);
+  }
+
+  text(name, most = 4096) {
+    const view = this.#get(name, 1, (t) => t.class === 'text' && t.size >= 1 && t.size <= 65536, 'a fixed-length UTF-8 text of an allowed length');
+    const bytes = new Uint8Array(view.buffer, view.byteOffset, view.byteLength), end = bytes.indexOf(0);
+    const value = text(end < 0 ? bytes : bytes.subarray(0, end));
+    if (value === undefined || (end < 0 ? bytes.length : end) > most)
+      throw this.fail(name, 'it is not a fixed-length UTF-8 text of an allowed length');
+    return value;
+  }
+
+  count(name, most = Number.MAX_SAFE_INTEGER) {
+    const view = this.#get(name, 1, (t) => t.class === 'integer' && t.size === 8 && !t.signed && t.little, 'a u64');
+    const value = view.getBigUint64(0, true);
+    if (value > BigInt(most))
+      throw this.notAllowed(name);
+    return Number(value);
+  }
+
+  int(name, least = 0, most = 2 ** 20) {
+    const view = this.#get(name, 1, (t) => t.class === 'integer' && t.size === 8 && t.signed && t.little, 'an i64');
+    const value = view.getBigInt64(0, true);
+    if (value < BigInt(least) || value > BigInt(most))
+      throw this.notAllowed(name);
+    return Number(value);
+  }
+
+  reals(name, count) {
+    const view = this.#get(name, count, (t) => t.class === 'double', 'of doubles');
+    return Array.from({ length: count }, (_, i) => view.getFloat64(8 * i, true));
   }
 }

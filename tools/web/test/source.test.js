@@ -1,12 +1,17 @@
-// Tests URLs on correct and misbehaving servers: the reader returns correct bytes, or a clear error within its time limit.
+// Tests URLs on correct and misbehaving servers: correct bytes, or a clear error within the time limit; and the kept bytes.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { createServer } from 'node:http';
 import test from 'node:test';
-import { EbpoError, UrlSource, openEbpo } from '../index.js';
+import { EbpoError } from '../error.js';
+import { addLevels } from '../grow.js';
+import { KeptSource } from '../kept_source.js';
+import { openModel } from '../model_file.js';
+import { UrlSource } from '../source.js';
+import { LEAF, Tree } from '../tree.js';
 
-const bytes = readFileSync(new URL('../../../../format-spec/vectors/passed/06_four_levels_leaf_planes.ebpo.h5', import.meta.url));
-const part = bytes.length >> 1; // a header that is read in pieces
+const bytes = readFileSync(new URL('../../../format-spec/vectors/passed/06_four_levels_leaf_planes.ebpo.h5', import.meta.url));
+const part = bytes.length >> 1;
 
 // Starts a server for ranges whose responses `odd` may change. Returns the result of `use(address)`.
 async function serve(odd, use) {
@@ -30,10 +35,13 @@ async function serve(odd, use) {
 }
 
 async function readAll(url, options) {
-  const file = await openEbpo(url, { headBytes: part, timeout: 2000, ...options });
-  await file.levels(0, file.info.level_count - 1, { faces: true });
-  await file.mesh();
-  await file.verifyContent();
+  const file = await openModel(url, { headBytes: part, timeout: 2000, ...options }), tree = new Tree(file.info), leaves = [];
+  await addLevels(file, tree, file.info.levels.map((_, level) => level));
+  (function walk(node) {
+    (node.type === LEAF ? leaves.push(node) : tree.children(node)?.forEach(walk));
+  })(tree.root);
+  await file.leafFaces(leaves);
+  await file.sums;
   return file;
 }
 
@@ -101,7 +109,7 @@ test('a page instead of the file', () => fails((reply) => {
   whole(reply);
   reply.body = Buffer.from('<!doctype html><title>Not found</title> and so on, and so on');
   delete reply.headers['Content-Length'];
-}, 'FORMAT', /not a whole HDF5 file/));
+}, 'FORMAT', /an HTML page/));
 test('a login page with its content type', () => fails((reply) => {
   whole(reply);
   reply.body = Buffer.from('<!doctype html><title>Sign in</title>');
@@ -238,51 +246,35 @@ test('files and bytes are read', async () => {
   await readAll(new Blob([bytes]));
   await readAll(bytes);
   await readAll(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length));
-  await assert.rejects(openEbpo(7), { code: 'ARGUMENT' });
+  await assert.rejects(openModel(7), { code: 'ARGUMENT' });
 });
-
-// The chunk index is stored after the first levels. It is fetched in one request when it is needed. A wrong position in the header is tolerated.
-const indexed = readFileSync(new URL('../../../../format-spec/vectors/passed/11_two_chunks_of_faces.ebpo.h5', import.meta.url));
-async function openIndexed(change) {
-  const whole = await openEbpo(indexed), { chunk_index_offset: at, chunk_index_bytes: size } = whole.info, requested = [];
-  const source = { name: 'a', size: indexed.length, requests: 0, bytes: 0, open: async (n) => indexed.subarray(0, n), read: async (from, n) => {
-    requested.push([from, n]);
-    return indexed.subarray(from, from + n);
-  } };
-  assert.ok(at > 0 && size > 0 && whole.located);
-  const file = await openEbpo(source, { headBytes: at });
-  assert.equal(file.located, false);
-  change?.(file.info);
-  await file.levels(0, file.info.level_count - 1);
-  assert.deepEqual((await file.mesh()).faces, (await whole.mesh()).faces);
-  assert.equal(file.located, true);
-  return { requested, at, size };
-}
-test('the chunk index needs one request', async () => {
-  const { requested, at, size } = await openIndexed();
-  assert.equal(requested.filter(([from, n]) => from < at + size && from + n > at).length, 1);
-  assert.deepEqual(requested.find(([from]) => from === at), [at, size]);
-});
-for (const [what, offset, bytes] of [['nowhere', 0, 0], ['somewhere else', 100, 500], ['beyond the end', 1 << 30, 100], ['too short', undefined, 8]])
-  test(`the chunk index, stated to be ${what}`, () => openIndexed((info) => {
-    info.chunk_index_offset = offset ?? info.chunk_index_offset;
-    info.chunk_index_bytes = bytes;
-  }));
 
 test('only one of several concurrent requests uses the cache, which would serialize them', () => serve(undefined, async (url) => {
-  const modes = [], file = await openEbpo(url, { headBytes: part, fetch: (address, init) => {
+  const modes = [], source = new UrlSource(url, { fetch: (address, init) => {
     modes.push(init.cache);
     return fetch(address, init);
   } });
+  await source.open(part);
+  await new Promise((done) => setTimeout(done, 100)); // the first response has ended
   modes.length = 0;
-  const { source } = file, read = (i) => source.read(part + 10 * i, 10);
+  const read = (i) => source.read(part + 10 * i, 10);
   await Promise.all([0, 1, 2].map(read));
   await read(3);
   assert.deepEqual(modes, ['default', 'no-store', 'no-store', 'default']);
 }));
-test('bytes of the first response are not requested again, and are counted as coming', () => serve(undefined, async (url, requested) => {
-  const ahead = bytes.length - 100, file = await openEbpo(url, { headBytes: part, ahead });
-  assert.equal(file.source.coming, ahead);
-  assert.deepEqual(Buffer.from(await file.source.read(part, ahead - part)), bytes.subarray(part, ahead));
-  assert.deepEqual(requested, [[0, ahead - 1]]);
+test('kept bytes are not requested again, and the end of the file is read with its last range', () => serve(undefined, async (url, requested) => {
+  const source = new UrlSource(url, { ahead: 100 });
+  await source.open(100);
+  const kept = new KeptSource(source), read = (...ranges) => kept.read(ranges.map(([offset, size]) => ({ offset, size })));
+  const same = (parts, ...ranges) => ranges.forEach(([at, size], i) => assert.deepEqual(Buffer.from(parts[i]), bytes.subarray(at, at + size)));
+  same(await read([200, 50], [90, 20], [0, 10]), [200, 50], [90, 20], [0, 10]);
+  same(await read([150, 200], [210, 5]), [150, 200], [210, 5]);
+  assert.deepEqual(requested, [[0, 99], [200, bytes.length - 1], [100, 109], [150, 199]]);
+  assert.equal(kept.bytes, bytes.length - 200 + 10 + 50);
 }));
+test('few bytes are kept', async () => {
+  const source = { name: 'a', size: 1 << 20, read: async (offset, size) => new Uint8Array(size).fill(offset / 1000) }, kept = new KeptSource(source, { most: 5000 });
+  for (let i = 0; i < 20; i++)
+    assert.equal((await kept.read([{ offset: 1000 * i, size: 1000 }]))[0][999], i);
+  assert.ok(kept.bytes <= 5000 && kept.pieces.length === 5);
+});

@@ -1,8 +1,11 @@
 // Builds the octree of nodes with children from levels as they arrive: format-spec/README.md, section 7.
-import { BLACK, GRAY, LEAF } from './decode.js';
 import { cube, envelope } from './envelope.js';
-import { INDEX_ROWS } from './facts.js';
 import { Segment } from './segment.js';
+
+/** Types of nodes. */
+export const WHITE = 0, BLACK = 1, LEAF = 2, GRAY = 3;
+
+export const BLOCK_GROUPS = 4096; // groups of a part in levels without subtrees
 
 const PARTS_BYTES = 48 * 1024 * 1024; // limit of cached segments, in addition to those of existing nodes
 
@@ -37,16 +40,16 @@ export class Tree {
     return Math.max(this.levels.length - 1, this.partDepth);
   }
 
-  /** Adds a whole level from file.levels(). */
+  /** Adds a whole level. */
   add(level) {
-    this.levels[level.level] = level instanceof Segment ? level : new Segment(level);
+    this.levels[level.level] = new Segment(level);
     if (level.level === 0)
       this.root = new Node(undefined, 0, level.types[0] & 3, 0, this.levels[0]);
   }
 
-  /** Adds a part of a level (parts.js). */
-  addPart(part, segment) {
-    const key = segment.level * 2 ** 40 + part;
+  /** Adds a part of a level. */
+  addPart(nodes) {
+    const { part } = nodes, segment = new Segment(nodes), key = segment.level * 2 ** 40 + part;
     if (this.parts.has(key))
       return;
     this.parts.set(key, segment);
@@ -64,18 +67,10 @@ export class Tree {
     return this.parts.has(level * 2 ** 40 + part);
   }
 
-  /** Returns a tree for queries, which read parts without planes. It shares the whole levels, also those that are added later. */
-  lean() {
-    const tree = new Tree(this.info);
-    tree.levels = this.levels;
-    tree.root = new Node(undefined, 0, this.root.type, 0, this.levels[0]);
-    return tree;
-  }
-
   /** Returns the part of the next level that contains a gray node's children. */
   partOf(node) {
     const { subtree_level: C } = this.info;
-    return C === undefined || node.level < C ? Math.floor(node.rank / INDEX_ROWS) : node.level === C ? node.rank : node.subtree;
+    return C === undefined || node.level < C ? Math.floor(node.rank / BLOCK_GROUPS) : node.level === C ? node.rank : node.subtree;
   }
 
   #segmentBelow(node) {
@@ -128,10 +123,6 @@ export class Tree {
     return gray?.segment.colour(gray.rank);
   }
 
-  winding(node) {
-    return node.type === GRAY ? 0 : node.segment.winding(node.type, node.rank) ?? (node.type === BLACK ? 1 : 0);
-  }
-
   /**
    * Returns the envelope in cell coordinates: the cell cut by the planes of the node and of all its ancestors. A leaf without stored planes has its parent's
    * envelope, cut by its cell. The node stores the result.
@@ -139,15 +130,5 @@ export class Tree {
   polytope(node) {
     node.polytope ??= node.type === BLACK ? cube() : envelope(node.parent && this.polytope(node.parent), node.octant, this.planes(node));
     return node.polytope;
-  }
-
-  /** Returns the exact coordinate of a cell face on an axis; `side`: 0 for the lower face, 1 for the upper face. */
-  cellFace(node, axis, side) {
-    const { box_origin: origin, box_size: size } = this.info;
-    return origin[axis] + (node.at[axis] + side) * (size[axis] / 2 ** node.level);
-  }
-
-  size(node, axis) {
-    return this.info.box_size[axis] / 2 ** node.level;
   }
 }

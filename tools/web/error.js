@@ -1,4 +1,4 @@
-// Errors of the reader. The message is one sentence: where, what is wrong, and what to do next. Programs use `code`.
+// Errors of files and servers. The message is one sentence: where, what is wrong, and what to do next. Programs use `code`.
 
 export class EbpoError extends Error {
   /**

@@ -1,0 +1,35 @@
+import type { Info, OpenOptions, QueryOptions, Source } from './index.js';
+
+/** Nodes of a part of a level. `first`: ranks of the first white, black, leaf and gray node in the level. Arrays as in
+ * ebpo_level (ebpo/file.h): types of each group, planes of each gray node and leaf, colours of each gray node. */
+export interface NodePart {
+  level: number; part: number; group: number; first: number[]; types: Uint16Array;
+  planeCounts: Uint8Array; planes: Uint32Array; leafPlaneCounts: Uint8Array; leafPlanes: Uint32Array; grayColours?: Uint32Array;
+}
+
+/** A leaf: the number of its siblings' group in the level, its octant, and its subtree, or -1. */
+export interface LeafAddress { level: number; group: number; octant: number; subtree: number }
+
+/** Faces of a leaf: numbers in the file, corners (9 numbers each), colours (red, green and blue of each corner). */
+export interface LeafFaces { numbers: Uint32Array; corners: Float32Array | Float64Array; colours?: Uint8Array }
+
+/** A file opened for drawing; of Model's methods it has only info and dispose(). */
+export class View {
+  private constructor();
+  readonly info: Info;
+  /** True if faces or vertices have colours. */
+  readonly coloured: boolean;
+  /** Rejects if the data returned before the list of chunk checksums arrived do not agree with it; undefined: no list. */
+  readonly sums?: Promise<void>;
+  nodes(wanted: { level: number; part: number }[], options?: QueryOptions & { bytes?: number }): Promise<NodePart[]>;
+  leafFaces(leaves: LeafAddress[], options?: QueryOptions): Promise<LeafFaces[]>;
+  levelBytes(options?: QueryOptions): Promise<Float64Array>;
+  dispose(): void;
+}
+
+/** Opens a file for drawing. `memory`: size of the cache of decoded data in bytes. */
+export function openView(from: string | URL | Blob | ArrayBuffer | ArrayBufferView | Source, options?: OpenOptions): Promise<View>;
+/** Returns the compiled module, which is loaded once. */
+export function viewModule(): Promise<WebAssembly.Module>;
+/** Names of the file's parts. */
+export function partsOf(info: Info): string[];

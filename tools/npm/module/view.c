@@ -1,0 +1,244 @@
+/* Nodes for drawing, for the WebAssembly module of viewers. A part of a level is the nodes
+ * of one subtree; in levels without subtrees, up to EBPO_INDEX_ROWS groups of siblings. All chunks
+ * that a call needs are requested together, as far as their positions are known. */
+#include <stdlib.h>
+#include <string.h>
+
+#include <ebpo/file.h>
+
+#include "format/chunk_directory.h"
+#include "format/file_in.h"
+#include "format/pick_rows.h"
+#include "format/schema.h"
+#include "format/subtree_index.h"
+#include "geometry/level_nodes.h"
+#include "module.h"
+
+enum {
+    DRAWN = EBPO_NEEDS_ALWAYS | EBPO_NEEDS_PLANES | EBPO_NEEDS_LEAF_PLANES | EBPO_NEEDS_COLOURS
+};
+
+/* Begins drawing. `memory`: size of the cache of decoded chunks in bytes; whole levels do not use
+ * the cache. Chunks are not compared with the list of chunk checksums until ebpo_js_sums has read
+ * it, because the list may arrive late. Returns 1 if the file has such a list. */
+int EBPO_JS(ebpo_js_view)(ebpo_js_object *object, double memory)
+{
+    ebpo_file *own = ebpo_reader_own(object->file);
+    bool has_checksums = own->has_checksums;
+    object->chunk_memory = (uint64_t)memory;
+    own->has_checksums = false;
+    return has_checksums;
+}
+
+/* Reads the list of chunk checksums. Then empties the cache, so that repeated calls compare all
+ * chunks. */
+int EBPO_JS(ebpo_js_sums)(ebpo_js_object *object)
+{
+    ebpo_file *own = ebpo_reader_own(object->file);
+    own->has_checksums = true;
+    ebpo_status status = ebpo_chunk_checksums_read(own, &object->error);
+    if (status == EBPO_E_PENDING)
+        own->has_checksums = false;
+    ebpo_chunks_free(object->chunks);
+    object->chunks = NULL;
+    return status;
+}
+
+ebpo_status ebpo_js_need_chunks(ebpo_js_object *object)
+{
+    return object->chunks ? EBPO_OK
+                          : ebpo_chunks_make(&object->chunks, object->file, object->chunk_memory,
+                                             &object->error);
+}
+
+/* ---- bytes of levels ---- */
+
+/* Array 0: bytes of the file for levels 0 to i, doubles. Reads the chunk directory. */
+int EBPO_JS(ebpo_js_level_bytes)(ebpo_js_object *object)
+{
+    const ebpo_info *info = ebpo_file_info(object->file);
+    ebpo_stored_sizes sizes = EBPO_STORED_SIZES_INIT;
+    ebpo_js_clear(object);
+    ebpo_status status = ebpo_file_locate(object->file, &sizes, &object->error);
+    double sum = (double)info->head_bytes;
+    for (int i = 0; i < info->level_count && status == EBPO_OK; i++) {
+        sum += (double)sizes.level_bytes[i];
+        status = ebpo_js_put(object, 0, &sum, sizeof sum);
+    }
+    return status;
+}
+
+/* ---- parts of levels ---- */
+
+/* Result arrays of ebpo_js_nodes. */
+enum {
+    PART_FACTS,  /* double [13] of each part: level, part, group, groups; by type, white to gray:
+                    rank of the first node; items of PART_COUNTS, PART_PLANES, PART_LEAF_COUNTS,
+                    PART_LEAF_PLANES and PART_COLOURS */
+    PART_TYPES,  /* uint16 of each group */
+    PART_COUNTS, /* uint8 of each gray node: number of planes */
+    PART_PLANES, /* uint32: codes */
+    PART_LEAF_COUNTS,
+    PART_LEAF_PLANES,
+    PART_COLOURS /* uint32 of each gray node; none in files without colours */
+};
+
+typedef struct wanted_part {
+    double level, part; /* part -1: the whole level */
+} wanted_part;
+
+static uint64_t groups_of_level(const ebpo_info *info, int level)
+{
+    return level ? info->level[level - 1].gray_count : 1;
+}
+
+static ebpo_status find_run(ebpo_js_object *object, const wanted_part *wanted, ebpo_run *run)
+{
+    const ebpo_info *info = ebpo_file_info(object->file);
+    int level = (int)wanted->level;
+    uint64_t part = (uint64_t)wanted->part, first = part * EBPO_INDEX_ROWS,
+             all = groups_of_level(info, level);
+    ebpo_subtree_row row;
+    *run = (ebpo_run){ 0 };
+    if (!ebpo_subtree_table_has(object->file, level)) {
+        run->group = first;
+        run->groups = all - first < EBPO_INDEX_ROWS ? all - first : EBPO_INDEX_ROWS;
+        return EBPO_OK;
+    }
+    ebpo_status status = ebpo_subtree_table_row(object->chunks, part, &row, &object->error);
+    if (status == EBPO_OK) {
+        run->group = ebpo_subtree_groups(info, &row, level, false);
+        run->groups = ebpo_subtree_groups(info, &row, level, true) - run->group;
+    }
+    return status;
+}
+
+/* Appends the items of an array, and their number to the facts. NULL: none. */
+static bool put_items(ebpo_js_object *object, unsigned n, const void *data, uint64_t count,
+                      size_t size)
+{
+    double items = data ? (double)count : 0;
+    return ebpo_js_put(object, n, data, data ? (size_t)count * size : 0) == EBPO_OK &&
+           ebpo_js_put(object, PART_FACTS, &items, sizeof items) == EBPO_OK;
+}
+
+/* Puts one part, which is all of `level`. */
+static ebpo_status put_part(ebpo_js_object *object, const wanted_part *wanted, const ebpo_run *run,
+                            const ebpo_level *l)
+{
+    double facts[8] = { wanted->level, wanted->part, (double)run->group, (double)run->groups };
+    for (int type = 0; type < 4; type++)
+        facts[4 + type] = (double)run->rank[type];
+    bool ok = ebpo_js_put(object, PART_FACTS, facts, sizeof facts) == EBPO_OK &&
+              ebpo_js_put(object, PART_TYPES, l->types, (size_t)run->groups * 2) == EBPO_OK &&
+              put_items(object, PART_COUNTS, l->plane_counts, l->gray_count, 1) &&
+              put_items(object, PART_PLANES, l->planes, l->plane_count, 4) &&
+              put_items(object, PART_LEAF_COUNTS, l->leaf_plane_counts, l->leaf_count, 1) &&
+              put_items(object, PART_LEAF_PLANES, l->leaf_planes, l->leaf_plane_count, 4) &&
+              put_items(object, PART_COLOURS, l->gray_colours, l->gray_count, 4);
+    return ok ? EBPO_OK : EBPO_E_MEMORY;
+}
+
+static ebpo_status read_whole(ebpo_js_object *object, const wanted_part *wanted)
+{
+    ebpo_read_options options = EBPO_READ_OPTIONS_INIT;
+    ebpo_level level = { 0 };
+    options.threads = 1;
+    options.omitted_parts = EBPO_PART_MESH | EBPO_PART_MAPS;
+    ebpo_status status =
+        ebpo_file_read_level(object->file, (int)wanted->level, &options, &level, &object->error);
+    ebpo_run run = { .groups = level.group_count };
+    if (status == EBPO_OK)
+        status = put_part(object, wanted, &run, &level);
+    ebpo_level_free(&level);
+    return status;
+}
+
+/* Reads one part. */
+static ebpo_status read_part(ebpo_js_object *object, const wanted_part *wanted)
+{
+    ebpo_level level = { 0 };
+    ebpo_run run;
+    if (wanted->part < 0)
+        return read_whole(object, wanted);
+    ebpo_status status = find_run(object, wanted, &run);
+    if (status == EBPO_OK)
+        status = ebpo_pick_level(object->chunks, (int)wanted->level, &run, 1, DRAWN, &level,
+                                 &object->error);
+    if (status == EBPO_OK)
+        status = put_part(object, wanted, &run, &level);
+    ebpo_level_free(&level);
+    return status;
+}
+
+/* Collects the chunks of parts that are not in memory. A subtree is collected down to its deepest
+ * wanted level, once. */
+static void hint_parts(ebpo_js_object *object, ebpo_hints *hints, const wanted_part *wanted,
+                       uint32_t count)
+{
+    uint32_t without = EBPO_NEEDS_MESH | EBPO_NEEDS_MAPS;
+    for (uint32_t i = 0; i < count; i++) {
+        int level = (int)wanted[i].level;
+        if (wanted[i].part < 0)
+            ebpo_hint_level(hints, level, without);
+        else if (ebpo_subtree_table_has(object->file, level) &&
+                 (i + 1 == count || wanted[i + 1].part != wanted[i].part))
+            ebpo_subtrees_hint(object->chunks, hints, (uint64_t)wanted[i].part, 1, DRAWN, level,
+                               false);
+    }
+}
+
+/* Returns how many of the first parts take at most `bytes` bytes of the file, roughly; at least a
+ * few. Parts that are not subtrees are few. */
+static uint32_t affordable_parts(ebpo_js_object *object, const wanted_part *wanted, uint32_t count,
+                                 double bytes)
+{
+    enum { LEAST = 16 };
+    uint32_t most = count < LEAST ? count : LEAST;
+    while (most < count) {
+        uint32_t more = 2 * most < count ? 2 * most : count;
+        ebpo_hints hints = EBPO_HINTS_INIT(object->file);
+        hints.counts_bytes = true;
+        hint_parts(object, &hints, wanted, more);
+        if ((double)ebpo_hints_bytes(&hints) > bytes)
+            break;
+        most = more;
+    }
+    return most;
+}
+
+/* Reads parts of levels: `wanted` is [count] level and part, or -1 for the whole level; the levels
+ * of a subtree are adjacent and ascend. Only the first parts that take about `bytes` bytes of the
+ * file are read. */
+int EBPO_JS(ebpo_js_nodes)(ebpo_js_object *object, const wanted_part *wanted, uint32_t count,
+                           double bytes)
+{
+    const ebpo_info *info = ebpo_file_info(object->file);
+    ebpo_status status = EBPO_OK;
+    uint64_t *subtrees = malloc(count * sizeof *subtrees);
+    uint32_t rows = 0, parts = 0;
+    ebpo_js_clear(object);
+    if (!subtrees && count)
+        return object->error.status = EBPO_E_MEMORY;
+    for (uint32_t i = 0; i < count; i++)
+        parts += wanted[i].part >= 0;
+    if (parts)
+        status = ebpo_js_need_chunks(object);
+    for (uint32_t i = 0; i < count && status == EBPO_OK; i++)
+        if (wanted[i].part >= 0 && wanted[i].level > info->subtree_level && info->subtree_level)
+            subtrees[rows++] = (uint64_t)wanted[i].part;
+    if (rows)
+        ebpo_subtree_table_hint(object->chunks, subtrees, rows);
+    free(subtrees);
+    if (status != EBPO_OK)
+        return status;
+    count = affordable_parts(object, wanted, count, bytes);
+    ebpo_hints hints = EBPO_HINTS_INIT(object->file);
+    hint_parts(object, &hints, wanted, count);
+    ebpo_hint_all(&hints);
+    for (uint32_t i = 0; i < count && (status == EBPO_OK || status == EBPO_E_PENDING); i++) {
+        ebpo_status one = read_part(object, &wanted[i]);
+        status = one == EBPO_OK ? status : one; /* after EBPO_E_PENDING, collects further ranges */
+    }
+    return status;
+}

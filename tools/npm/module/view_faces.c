@@ -1,0 +1,319 @@
+/* Faces of leaves for drawing, for the WebAssembly module of viewers: corners, and colours from the
+ * file's attributes. */
+#include <stdlib.h>
+#include <string.h>
+
+#include <ebpo/file.h>
+
+#include "format/file_in.h"
+#include "format/pick_rows.h"
+#include "format/schema.h"
+#include "format/subtree_index.h"
+#include "geometry/level_nodes.h"
+#include "mesh/attributes.h"
+#include "module.h"
+
+enum { LISTS = EBPO_NEEDS_ALWAYS | EBPO_NEEDS_MESH };
+
+/* A leaf: its level, group and octant, and its subtree, or -1. */
+typedef struct wanted_leaf {
+    double level, group, octant, subtree;
+} wanted_leaf;
+
+/* Result arrays of ebpo_js_leaf_faces. */
+enum {
+    FACE_COUNTS,  /* uint32 of each leaf */
+    FACE_NUMBERS, /* uint32: faces of the leaves, one leaf after the other, ascending */
+    FACE_CORNERS, /* double or float [9] of each face */
+    FACE_COLOURS, /* uint8 [3][3] of each face: red, green and blue of the corners */
+    FACE_ROWS     /* uint32: vertices of the faces */
+};
+
+enum { GAP_GROUPS = 32 }; /* groups between two leaves that are read rather than counted again */
+
+static int compare_leaves(const void *a, const void *b)
+{
+    const wanted_leaf *x = *(const wanted_leaf *const *)a, *y = *(const wanted_leaf *const *)b;
+    double d = x->level != y->level ? x->level - y->level : x->group - y->group;
+    return (d > 0) - (d < 0);
+}
+
+/* The leaves of one level, in the order of their groups, and the groups that are read for them. */
+typedef struct leaf_reading {
+    const wanted_leaf **leaf;
+    uint32_t count;
+    ebpo_run *run; /* [count] */
+    uint32_t run_count;
+    ebpo_level level;
+} leaf_reading;
+
+static void make_runs(leaf_reading *r)
+{
+    r->run_count = 0;
+    for (uint32_t i = 0; i < r->count; i++) {
+        uint64_t group = (uint64_t)r->leaf[i]->group;
+        ebpo_run *last = r->run_count ? &r->run[r->run_count - 1] : NULL;
+        if (last && group <= last->group + last->groups + GAP_GROUPS)
+            last->groups = group + 1 - last->group;
+        else
+            r->run[r->run_count++] = (ebpo_run){ .group = group, .groups = 1 };
+    }
+}
+
+/* Calls visit(leaf, its index in the level's lists) for each leaf. Returns false if a node is not a
+ * leaf. */
+static bool visit_leaves(const leaf_reading *r, int level,
+                         void (*visit)(void *, uint32_t, uint64_t), void *user)
+{
+    uint64_t at = 0, before = 0; /* group, and leaves before it, in the lists */
+    uint32_t i = 0;
+    unsigned octants = level ? 8 : 1;
+    for (uint32_t k = 0; k < r->run_count; k++)
+        for (uint64_t g = 0; g < r->run[k].groups; g++, at++) {
+            uint16_t types = r->level.types[at];
+            for (; i < r->count && (uint64_t)r->leaf[i]->group == r->run[k].group + g; i++) {
+                unsigned octant = (unsigned)r->leaf[i]->octant & 7;
+                if (ebpo_group_type(types, octant) != EBPO_LEAF)
+                    return false;
+                visit(user, i, before + ebpo_group_count(types, EBPO_LEAF, octant));
+            }
+            before += ebpo_group_count(types, EBPO_LEAF, octants);
+        }
+    return true;
+}
+
+/* Lists of faces of leaves in the order of the request. */
+typedef struct face_lists {
+    const wanted_leaf *wanted;
+    leaf_reading *reading;
+    uint64_t *ref_begin;              /* [leaves of the level] */
+    uint32_t *first, *fresh, *counts; /* [leaves of the request]; `counts` are references */
+    uint32_t **refs;
+} face_lists;
+
+static void take_list(void *user, uint32_t i, uint64_t at)
+{
+    face_lists *f = user;
+    const ebpo_level *level = &f->reading->level;
+    size_t leaf = (size_t)(f->reading->leaf[i] - f->wanted);
+    f->first[leaf] = (uint32_t)level->leaf_first[at];
+    f->fresh[leaf] = level->leaf_new[at];
+    f->counts[leaf] = level->leaf_ref_count[at];
+    f->refs[leaf] = malloc((level->leaf_ref_count[at] + 1) * sizeof **f->refs);
+    if (f->refs[leaf] && level->leaf_ref_count[at])
+        memcpy(f->refs[leaf], level->leaf_refs + f->ref_begin[at],
+               level->leaf_ref_count[at] * sizeof **f->refs);
+}
+
+/* Reads the lists of the leaves of one level. */
+static ebpo_status read_lists(ebpo_js_object *object, face_lists *f)
+{
+    leaf_reading *r = f->reading;
+    int number = (int)r->leaf[0]->level;
+    make_runs(r);
+    ebpo_status status = ebpo_pick_level(object->chunks, number, r->run, r->run_count, LISTS,
+                                         &r->level, &object->error);
+    if (status != EBPO_OK)
+        return status;
+    f->ref_begin = malloc((size_t)(r->level.leaf_count + 1) * sizeof *f->ref_begin);
+    if (!f->ref_begin) {
+        ebpo_level_free(&r->level);
+        return object->error.status = EBPO_E_MEMORY;
+    }
+    f->ref_begin[0] = 0;
+    for (uint64_t i = 0; i < r->level.leaf_count; i++)
+        f->ref_begin[i + 1] = f->ref_begin[i] + r->level.leaf_ref_count[i];
+    if (!visit_leaves(r, number, take_list, f))
+        status = object->error.status = EBPO_E_ARGUMENT;
+    free(f->ref_begin);
+    ebpo_level_free(&r->level);
+    return status;
+}
+
+/* Puts the numbers of the leaves' faces. */
+static ebpo_status put_lists(ebpo_js_object *object, const face_lists *f, uint32_t count)
+{
+    bool ok = true;
+    for (uint32_t i = 0; i < count && ok; i++) {
+        uint32_t faces = f->counts[i] + f->fresh[i];
+        uint32_t *to = f->refs[i] && ebpo_js_put(object, FACE_COUNTS, &faces, 4) == EBPO_OK
+                           ? ebpo_js_extend(object, FACE_NUMBERS, faces, sizeof *to)
+                           : NULL;
+        ok = to != NULL;
+        for (uint32_t k = 0; k < faces && ok; k++)
+            to[k] = k < f->counts[i] ? f->refs[i][k] : f->first[i] + (k - f->counts[i]);
+    }
+    return ok ? EBPO_OK : EBPO_E_MEMORY;
+}
+
+static ebpo_status find_faces(ebpo_js_object *object, const wanted_leaf *wanted, uint32_t count)
+{
+    const wanted_leaf **leaf = malloc((count + 1) * sizeof *leaf);
+    leaf_reading r = { .run = malloc((count + 1) * sizeof *r.run) };
+    face_lists f = { .wanted = wanted,
+                     .reading = &r,
+                     .first = calloc(3 * (size_t)count + 1, sizeof *f.first),
+                     .refs = calloc((size_t)count + 1, sizeof *f.refs) };
+    ebpo_status status = EBPO_OK;
+    if (!leaf || !r.run || !f.first || !f.refs)
+        status = object->error.status = EBPO_E_MEMORY;
+    f.fresh = f.first + count;
+    f.counts = f.fresh + count;
+    for (uint32_t i = 0; i < count && status == EBPO_OK; i++)
+        leaf[i] = &wanted[i];
+    if (status == EBPO_OK)
+        qsort(leaf, count, sizeof *leaf, compare_leaves);
+    for (uint32_t i = 0; i < count && (status == EBPO_OK || status == EBPO_E_PENDING);) {
+        r.leaf = leaf + i;
+        for (r.count = 0; i < count && leaf[i]->level == r.leaf[0]->level; i++)
+            r.count++;
+        ebpo_status one = read_lists(object, &f);
+        status = one == EBPO_OK ? status : one;
+    }
+    if (status == EBPO_OK)
+        status = put_lists(object, &f, count);
+    for (uint32_t i = 0; i < count && f.refs; i++)
+        free(f.refs[i]);
+    free(f.refs);
+    free(f.first);
+    free(r.run);
+    free(leaf);
+    return status;
+}
+
+/* ---- colours of faces ---- */
+
+/* The columns of a file's colours. */
+typedef struct colour_source {
+    ebpo_attributes *arrays; /* those without colours have no element */
+    ebpo_colour_column column[EBPO_COLOUR_CHANNELS];
+    const char *element; /* NULL: the file has no colours */
+} colour_source;
+
+/* Returns true if the file states that all values of the columns are equal. */
+static bool is_constant(const ebpo_file *file, const ebpo_attributes *arrays,
+                        const ebpo_colour_column *column)
+{
+    for (int k = 0; k < 3; k++) {
+        const ebpo_attribute_in *in = &file->attributes.head[column[k].of - arrays->array];
+        if (!in->has_range || in->range[0] != in->range[1])
+            return false;
+    }
+    return true;
+}
+
+/* Finds the colours: those of vertices, unless only faces have colours or all vertices have the
+ * same colour. Returns false if there is not enough memory. */
+static bool find_colours(const ebpo_file *file, colour_source *out)
+{
+    uint8_t none;
+    ebpo_colour_column of_faces[EBPO_COLOUR_CHANNELS];
+    out->arrays = ebpo_attributes_make(NULL);
+    out->element = NULL;
+    for (uint64_t n = 0; out->arrays && n < file->attributes.count; n++) {
+        ebpo_attribute *a = ebpo_attributes_add(out->arrays, &file->attributes.head[n].head);
+        if (!a)
+            return false;
+        a->values = &none; /* arrays without values are not searched */
+    }
+    if (!out->arrays)
+        return false;
+    if (ebpo_colour_columns(out->arrays, "vertex", out->column))
+        out->element = "vertex";
+    if (ebpo_colour_columns(out->arrays, "face", of_faces) &&
+        (!out->element || is_constant(file, out->arrays, out->column))) {
+        out->element = "face";
+        memcpy(out->column, of_faces, sizeof of_faces);
+    }
+    for (uint64_t n = 0; n < out->arrays->count; n++) {
+        ebpo_attribute *a = &out->arrays->array[n];
+        a->values = NULL;
+        if (!out->element ||
+            (out->column[0].of != a && out->column[1].of != a && out->column[2].of != a))
+            *a->element = 0;
+    }
+    return true;
+}
+
+/* Returns 1 if faces or vertices have colours. */
+int EBPO_JS(ebpo_js_coloured)(ebpo_js_object *object)
+{
+    colour_source colours;
+    bool coloured = find_colours(object->file, &colours) && colours.element;
+    ebpo_attributes_free(colours.arrays);
+    return coloured;
+}
+
+/* Puts the colours of the corners of faces. `vertices` are [count][3]. */
+static ebpo_status put_colours(ebpo_js_object *object, const uint32_t *faces,
+                               const uint32_t *vertices, uint32_t count)
+{
+    colour_source colours;
+    ebpo_status status = find_colours(object->file, &colours) ? EBPO_OK : EBPO_E_MEMORY;
+    bool by_face = status == EBPO_OK && colours.element && *colours.element == 'f';
+    uint64_t rows = by_face ? count : 3 * (uint64_t)count;
+    uint8_t *to = NULL;
+    if (status == EBPO_OK && colours.element && count) {
+        status = ebpo_pick_attributes(object->chunks, colours.arrays, colours.element,
+                                      by_face ? faces : vertices, rows, 1, &object->error);
+        to = status == EBPO_OK ? ebpo_js_extend(object, FACE_COLOURS, count, 9) : NULL;
+        status = status == EBPO_OK && !to ? EBPO_E_MEMORY : status;
+    }
+    for (uint64_t i = 0; to && i < 3 * (uint64_t)count; i++)
+        for (int k = 0; k < 3; k++)
+            to[3 * i + (unsigned)k] = ebpo_colour_byte(&colours.column[k], by_face ? i / 3 : i);
+    ebpo_attributes_free(colours.arrays);
+    return status;
+}
+
+/* ---- corners ---- */
+
+/* Puts the corners of the faces of FACE_NUMBERS, and their colours. */
+static ebpo_status put_corners(ebpo_js_object *object)
+{
+    const ebpo_info *info = ebpo_file_info(object->file);
+    uint64_t count = object->array[FACE_NUMBERS].bytes / 4;
+    uint32_t *vertices = ebpo_js_fixed(object, FACE_ROWS, count, 12);
+    void *corners =
+        ebpo_js_fixed(object, FACE_CORNERS, 3 * count, info->double_coordinates ? 24 : 12);
+    const uint32_t *faces = (const uint32_t *)object->array[FACE_NUMBERS].data;
+    if (!vertices || !corners)
+        return EBPO_E_MEMORY;
+    if (!count)
+        return EBPO_OK;
+    ebpo_faces_hint(object->chunks, faces, count, 0);
+    ebpo_status status =
+        ebpo_pick_rows(object->chunks, EBPO_A_FACES, faces, count, 1, vertices, &object->error);
+    if (status != EBPO_OK)
+        return status;
+    status = ebpo_pick_rows(object->chunks, EBPO_A_VERTICES, vertices, 3 * count, 1, corners,
+                            &object->error);
+    ebpo_status coloured = put_colours(object, faces, vertices, (uint32_t)count);
+    return status == EBPO_OK ? coloured : status;
+}
+
+/* Reads the faces of leaves: `wanted` is [count] level, group, octant, and subtree or -1. */
+int EBPO_JS(ebpo_js_leaf_faces)(ebpo_js_object *object, const wanted_leaf *wanted, uint32_t count)
+{
+    uint64_t *subtrees = malloc((count + 1) * sizeof *subtrees);
+    uint32_t rows = 0;
+    ebpo_js_clear(object);
+    ebpo_status status =
+        subtrees ? ebpo_js_need_chunks(object) : (object->error.status = EBPO_E_MEMORY);
+    if (status != EBPO_OK) {
+        free(subtrees);
+        return status;
+    }
+    for (uint32_t i = 0; i < count; i++)
+        if (wanted[i].subtree >= 0 && (!rows || subtrees[rows - 1] != (uint64_t)wanted[i].subtree))
+            subtrees[rows++] = (uint64_t)wanted[i].subtree;
+    if (rows)
+        ebpo_subtree_table_hint(object->chunks, subtrees, rows);
+    ebpo_hints hints = EBPO_HINTS_INIT(object->file);
+    for (uint32_t i = 0; i < rows; i++)
+        ebpo_subtrees_hint(object->chunks, &hints, subtrees[i], 1, LISTS, 0, true);
+    ebpo_hint_all(&hints);
+    free(subtrees);
+    status = find_faces(object, wanted, count);
+    return status == EBPO_OK ? put_corners(object) : status;
+}

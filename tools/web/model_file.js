@@ -1,0 +1,87 @@
+// An open model: its header, and the data for drawing, by the small module of the package "ebpo".
+import { View, partsOf, viewModule } from './ebpo/view.js';
+import { openWith } from './ebpo/model.js';
+import { EbpoError } from './error.js';
+import { KeptSource } from './kept_source.js';
+import { sourceOf } from './source.js';
+
+const HEAD_BYTES = 128 * 1024;
+
+// Returns the header by the names of the format.
+function infoOf(info) {
+  const parts = new Set(partsOf(info));
+  if (info.pruned)
+    parts.add('pruned');
+  return { kind: info.solid ? 'solid' : 'surface', solid: info.solid, parts, box_origin: info.origin, box_size: info.size, vertex_count: info.vertices, face_count: info.faces,
+    source_face_count: info.sourceFaces, mend_added_faces: info.addedFaces, winding_rule: info.rule, unit: info.unit || undefined, crs: info.crs || undefined, date: info.date || undefined,
+    generator: info.generator, source_name: info.sourceName, source_format: info.sourceFormat, content_sha256: info.contentSha256, subset_of: info.subsetOf,
+    subtree_level: info.subtreeLevel || undefined, level_count: info.levels.length,
+    levels: info.levels.map((l) => ({ gray: l.gray, leaf: l.leaves, white: l.white, black: l.black, planes: l.planes, leaf_planes: l.leafPlanes, faces_new: l.faces, pruned: l.pruned,
+      gray_volume: l.grayVolume, leaf_volume: l.leafVolume })) };
+}
+
+/** Returns an error of the package as an error of the viewer, with the file's name. */
+export function errorOf(error, name) {
+  if (error instanceof EbpoError || !error.status)
+    return error;
+  const code = error.status.replace('EBPO_E_', ''), where = [name, error.path].filter((text) => text && !error.message.includes(text));
+  return new EbpoError(code === 'IO' ? 'NETWORK' : code, [...where, error.message].join(': '), { cause: error });
+}
+
+/**
+ * Opens an address, a File or Blob, bytes, or a source. Options: those of UrlSource, and `module`, the compiled module or a promise of it; `cacheBytes`, the size
+ * of the cache of decoded chunks; `headBytes`, the number of bytes of the first response to wait for.
+ */
+export async function openModel(what, { module = viewModule(), cacheBytes = 64 << 20, headBytes = HEAD_BYTES, ...options } = {}) {
+  const source = sourceOf(what, { ahead: headBytes, ...options });
+  try {
+    await source.open(headBytes);
+    const kept = new KeptSource(source);
+    return new ModelFile(source, kept, await openWith(module, kept, { memory: cacheBytes }, View));
+  } catch (error) {
+    throw errorOf(error, source.name);
+  }
+}
+
+class ModelFile {
+  constructor(source, kept, view) {
+    Object.assign(this, { source, kept, view, info: infoOf(view.info), coloured: view.coloured });
+    this.sums = view.sums && this.#named(view.sums); // rejects if data returned early do not agree with the file's list of checksums
+    this.sums?.catch(() => {});
+    this.levelBytes = this.info.levels.map(() => NaN); // bytes of the file for levels 0 to i, when they are known
+  }
+
+  /** Returns the requests made and bytes received so far. */
+  get traffic() {
+    return { requests: this.source.requests, bytes: this.source.bytes };
+  }
+
+  async #named(work) {
+    try {
+      return await work;
+    } catch (error) {
+      throw errorOf(error, this.source.name);
+    }
+  }
+
+  /** Finds out the sizes of the levels. */
+  async locate() {
+    this.levelBytes = [...await this.#named(this.view.levelBytes())];
+  }
+
+  /** Reads nodes, as View.nodes(). */
+  nodes(wanted, options) {
+    return this.#named(this.view.nodes(wanted, options));
+  }
+
+  /** Reads the faces of leaves (nodes of tree.js), as View.leafFaces(). */
+  async leafFaces(leaves) {
+    if (!this.info.parts.has('mesh'))
+      throw new EbpoError('ABSENT', `${this.source.name}: the file has no mesh; convert the model again with its mesh`);
+    return this.#named(this.view.leafFaces(leaves.map(({ level, parent, octant, subtree = -1 }) => ({ level, group: parent?.rank ?? 0, octant, subtree }))));
+  }
+
+  close() {
+    this.view.dispose();
+  }
+}
