@@ -468,10 +468,10 @@ START_TEST(test_catalogue_of_pending_files)
 {
     ebpo_catalogue_options how = EBPO_CATALOGUE_OPTIONS_INIT;
     ebpo_catalogue_models_options few = EBPO_CATALOGUE_MODELS_OPTIONS_INIT;
-    ebpo_inside_result *where = query_capacity(POINTS, sizeof *where);
-    ebpo_distance_result *near = query_capacity(POINTS, sizeof *near);
-    ebpo_ray_hit *hit = query_capacity(RAYS, sizeof *hit);
-    uint64_t *number = query_capacity(POINTS, sizeof *number), rounds = 0;
+    ebpo_inside_result *where = query_alloc(POINTS, sizeof *where);
+    ebpo_distance_result *near = query_alloc(POINTS, sizeof *near);
+    ebpo_ray_hit *hit = query_alloc(RAYS, sizeof *hit);
+    uint64_t *number = query_alloc(POINTS, sizeof *number), rounds = 0;
     ebpo_catalogue_query_options o = on_threads(_i ? 2 : 1);
     ebpo_error reported;
     open_catalogue a;
