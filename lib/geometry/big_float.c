@@ -119,7 +119,8 @@ ebpo_big ebpo_big_root(const ebpo_big *a)
         mpn_rshift(square, square, 2 * LIMBS, 1);
         out.exponent++;
     }
-    mpn_sqrtrem(out.limb, NULL, square, 2 * LIMBS); /* square is in [1/4, 1), the root in [1/2, 1) */
+    mpn_sqrtrem(out.limb, NULL, square,
+                2 * LIMBS); /* square is in [1/4, 1), the root in [1/2, 1) */
     out.exponent /= 2;
     return out;
 }

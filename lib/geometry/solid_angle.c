@@ -1,17 +1,17 @@
 /* Half angles of triangles.
  *
- * Error in doubles, with u = 2^-53 and M = |A||B||C|. Each component of A, B, C has a relative error
- * of at most u. The determinant is a sum of 6 products whose absolute values sum up to at most
- * sqrt(3) M, each with 3 rounded factors, 2 products and at most 3 sums: 8 u sqrt(3) M < 14 u M, to
- * first order. A dot product has an error of at most 5 u times the product of the lengths, a length
- * at most 4 u of itself; so each of the four terms of the real part has at most 13 u M, and the
- * three sums add 3 * 4 u M: 64 u M. Both together are below 80 u M < 2^-46 M = E, with a factor of
- * 1.6 for terms of second order and the rounding of M. The argument of a number of absolute value
- * H > 2 E, computed within 2^-48, therefore differs by at most asin(E / H) < 1.1 E / H; the code
- * uses 2 E / H + 2^-48.
+ * Error in doubles, with u = 2^-53 and M = |A||B||C|. Each component of A, B, C has a relative
+ * error of at most u. The determinant is a sum of 6 products whose absolute values sum up to at
+ * most sqrt(3) M, each with 3 rounded factors, 2 products and at most 3 sums: 8 u sqrt(3) M < 14 u
+ * M, to first order. A dot product has an error of at most 5 u times the product of the lengths, a
+ * length at most 4 u of itself; so each of the four terms of the real part has at most 13 u M, and
+ * the three sums add 3 * 4 u M: 64 u M. Both together are below 80 u M < 2^-46 M = E, with a factor
+ * of 1.6 for terms of second order and the rounding of M. The argument of a number of absolute
+ * value H > 2 E, computed within 2^-48, therefore differs by at most asin(E / H) < 1.1 E / H; the
+ * code uses 2 E / H + 2^-48.
  *
- * Near the negative real axis the sign of the imaginary part decides between pi and -pi. Where it is
- * uncertain, the exact orientation of the shifted point decides, and the bounds are cut at pi.
+ * Near the negative real axis the sign of the imaginary part decides between pi and -pi. Where it
+ * is uncertain, the exact orientation of the shifted point decides, and the bounds are cut at pi.
  *
  * In 512 bits, A, B and C have relative errors of at most 2^-510, and the same terms give at most
  * 80 * 2^-509 M; the code uses 2^-500 M.
@@ -54,7 +54,8 @@ double ebpo_argument(double y, double x)
     return y < 0 ? -out : out;
 }
 
-/* Returns the sign of the half angle's sine for the shifted point; 0 for a triangle without area. */
+/* Returns the sign of the half angle's sine for the shifted point; 0 for a triangle without area.
+ */
 static int shifted_sign(const double p[3], const double a[3], const double b[3], const double c[3])
 {
     int sign = ebpo_orient3d(a, b, c, p);
@@ -69,8 +70,7 @@ static ebpo_bounded cut_at_pi(double angle, double error, int sign)
     double low = fabs(angle) - error;
     if (sign == 0) /* no area */
         return (ebpo_bounded){ 0, 0 };
-    return (ebpo_bounded){ sign * (low + EBPO_PI_HIGH) / 2,
-                           (EBPO_PI_HIGH - low) / 2 + 0x1p-50 };
+    return (ebpo_bounded){ sign * (low + EBPO_PI_HIGH) / 2, (EBPO_PI_HIGH - low) / 2 + 0x1p-50 };
 }
 
 ebpo_bounded ebpo_half_angle(const double p[3], const double a[3], const double b[3],
@@ -85,8 +85,8 @@ ebpo_bounded ebpo_half_angle(const double p[3], const double a[3], const double 
     double la = ebpo_vec3_length(A), lb = ebpo_vec3_length(B), lc = ebpo_vec3_length(C);
     double all = la * lb * lc, margin = 0x1p-46 * all;
     double sine = ebpo_vec3_dot(A, n);
-    double cosine = all + ebpo_vec3_dot(A, B) * lc + ebpo_vec3_dot(B, C) * la +
-                    ebpo_vec3_dot(C, A) * lb;
+    double cosine =
+        all + ebpo_vec3_dot(A, B) * lc + ebpo_vec3_dot(B, C) * la + ebpo_vec3_dot(C, A) * lb;
     double length = sqrt(sine * sine + cosine * cosine);
     /* in this range no product overflows, and underflow is far below the margin */
     bool good = la > 0x1p-100 && lb > 0x1p-100 && lc > 0x1p-100 && la < 0x1p100 && lb < 0x1p100 &&
@@ -151,13 +151,12 @@ static bool finish_exact(ebpo_exact_angle *out, int sign, const ebpo_big *all)
     const ebpo_big *x = &out->turn.real, *y = &out->turn.imaginary;
     if ((x->sign == 0 && y->sign == 0) || all->sign == 0)
         return false;
-    int64_t unit = x->sign == 0 || (y->sign != 0 && y->exponent > x->exponent) ? y->exponent
-                                                                               : x->exponent;
+    int64_t unit =
+        x->sign == 0 || (y->sign != 0 && y->exponent > x->exponent) ? y->exponent : x->exponent;
     out->error = ldexp(ebpo_big_double(all, unit), -498);
     if (!(out->error <= 0x1p-300))
         return false;
-    double real = ebpo_big_double(x, unit),
-           angle = ebpo_argument(ebpo_big_double(y, unit), real);
+    double real = ebpo_big_double(x, unit), angle = ebpo_argument(ebpo_big_double(y, unit), real);
     out->angle = real < 0 ? sign * fabs(angle) : angle;
     return true;
 }
@@ -171,13 +170,12 @@ static bool angle_on_edge(const double p[3], const double a[3], const double b[3
     int first = a[1] == b[1] && a[2] == b[2]; /* the first axis that is not parallel to the edge */
     big_vector d = { { ebpo_big_of(first == 0), ebpo_big_of(first == 1), ebpo_big_of(0) } };
     ebpo_big across = ebpo_big_multiply(&square, &h.x[first]),
-             part = ebpo_big_multiply(&e.x[first], &along),
-             sine = big_determinant(&e, &d, &h), reach = big_length(&h);
+             part = ebpo_big_multiply(&e.x[first], &along), sine = big_determinant(&e, &d, &h),
+             reach = big_length(&h);
     ebpo_big all = ebpo_big_multiply(&square, &reach);
     out->turn.real = ebpo_big_subtract(&part, &across);
-    out->turn.imaginary = ebpo_normal_sign(first, a, b, c) == 0
-                              ? ebpo_big_of(0)
-                              : ebpo_big_multiply(&length, &sine);
+    out->turn.imaginary =
+        ebpo_normal_sign(first, a, b, c) == 0 ? ebpo_big_of(0) : ebpo_big_multiply(&length, &sine);
     return finish_exact(out, shifted_sign(p, a, b, c), &all);
 }
 

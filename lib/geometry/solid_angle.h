@@ -22,7 +22,7 @@ typedef struct ebpo_bounded {
 } ebpo_bounded;
 
 /* Bounds of pi. */
-#define EBPO_PI_LOW 0x1.921fb54442d18p+1
+#define EBPO_PI_LOW  0x1.921fb54442d18p+1
 #define EBPO_PI_HIGH 0x1.921fb54442d19p+1
 
 /* Returns the argument of x + i y in [-pi, pi], within 2^-49; 0 for 0. Infinite or NaN arguments
@@ -40,8 +40,8 @@ typedef struct ebpo_exact_angle {
     double angle;          /* the half angle, within 2^-47 */
 } ebpo_exact_angle;
 
-/* Computes the half angle. Returns false when p is a corner, or so close to an edge that 512 bits do
- * not suffice. */
+/* Computes the half angle. Returns false when p is a corner, or so close to an edge that 512 bits
+ * do not suffice. */
 bool ebpo_half_angle_exact(const double p[3], const double a[3], const double b[3],
                            const double c[3], ebpo_exact_angle *out);
 

@@ -62,12 +62,11 @@ static bool add_edge(const ebpo_mesh *mesh, edge_list *list, uint32_t from, uint
     if (!ebpo_array_grow(mesh->workspace, &list->edge, &list->capacity, list->count + 1,
                          sizeof *list->edge))
         return false;
-    list->edge[list->count++] = (border_edge){
-        .key = ebpo_mesh_source_vertex(mesh, from) << 32 | ebpo_mesh_source_vertex(mesh, to),
-        .from = from,
-        .to = to,
-        .weight = (uint32_t)weight
-    };
+    list->edge[list->count++] = (border_edge){ .key = ebpo_mesh_source_vertex(mesh, from) << 32 |
+                                                      ebpo_mesh_source_vertex(mesh, to),
+                                               .from = from,
+                                               .to = to,
+                                               .weight = (uint32_t)weight };
     return true;
 }
 

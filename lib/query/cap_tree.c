@@ -3,8 +3,8 @@
  * Bounds. Let the triangles of a node, of area a (with weights) and vector area V, be in a ball of
  * centre c and radius R. With r = |x - p|, the solid angle is the integral of f . dA,
  * f(x) = (x - p) / r^3, where |f| = 1 / r^2 and the derivative of f has the norm 2 / r^3. For all p
- * within s of a point q, with d = |c - q| and g = d - R - s > 0, the half angle therefore is at most
- * a / (2 g^2), and differs from V . f(c) / 2 at q by at most a (R + s) / g^3. Triangles may
+ * within s of a point q, with d = |c - q| and g = d - R - s > 0, the half angle therefore is at
+ * most a / (2 g^2), and differs from V . f(c) / 2 at q by at most a (R + s) / g^3. Triangles may
  * also be bounded by pi each.
  *
  * Rounding. Each quantity is computed with a relative error below 2^-45, except V, whose error
@@ -192,8 +192,7 @@ ebpo_status ebpo_cap_tree_make(ebpo_cap_tree *out, double (*position)[3], const 
     if (positions > INT32_MAX)
         status = ebpo_fail(error, EBPO_E_LIMIT, "%llu border edges, but 2^31 is the limit",
                            (unsigned long long)positions);
-    else if (!g.order ||
-             !(out->node = ebpo_alloc(triangles + loop_count - 1, sizeof *out->node)))
+    else if (!g.order || !(out->node = ebpo_alloc(triangles + loop_count - 1, sizeof *out->node)))
         status = ebpo_fail_memory(error, (triangles + loop_count) * sizeof *out->node);
     if (status == EBPO_OK) {
         for (uint64_t i = 0; i < loop_count; i++)
@@ -235,7 +234,7 @@ static ebpo_bounded bound_node(const ebpo_cap_node *n, const double p[3], double
     }
     error = error * ENLARGE + 0x1p-250;
     return error < n->most && fabs(middle) <= 2 * n->most ? (ebpo_bounded){ middle, error }
-                                                           : unknown;
+                                                          : unknown;
 }
 
 /* Returns the bounds of the triangle that belongs to a stretch alone. */
@@ -245,9 +244,9 @@ static ebpo_bounded bound_triangle(const ebpo_cap_tree *t, const ebpo_cap_node *
     double weight = n->weight;
     if (radius > 0)
         return (ebpo_bounded){ 0, weight * EBPO_PI_HIGH };
-    ebpo_bounded b = ebpo_half_angle(p, t->position[n->from],
-                                     t->position[ebpo_cap_middle(n->from, n->to)],
-                                     t->position[n->to]);
+    ebpo_bounded b =
+        ebpo_half_angle(p, t->position[n->from], t->position[ebpo_cap_middle(n->from, n->to)],
+                        t->position[n->to]);
     return (ebpo_bounded){ weight * b.middle, weight * b.error };
 }
 

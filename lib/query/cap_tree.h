@@ -5,10 +5,10 @@
  *
  *   w_S(p) = k(p) + w_D(p),
  *
- * where D are the caps turned in the direction of the loops: the discs. w_D is a sum of solid angles
- * over few triangles. It is bounded by a tree and refined only as far as a decision needs it. At a
- * point on a cap k and w_D jump; both belong to the point shifted as in ebpo_axis_crossing, and
- * w_S has no jump there. */
+ * where D are the caps turned in the direction of the loops: the discs. w_D is a sum of solid
+ * angles over few triangles. It is bounded by a tree and refined only as far as a decision needs
+ * it. At a point on a cap k and w_D jump; both belong to the point shifted as in
+ * ebpo_axis_crossing, and w_S has no jump there. */
 #ifndef EBPO_QUERY_CAP_TREE_H
 #define EBPO_QUERY_CAP_TREE_H
 

@@ -55,8 +55,8 @@ int ebpo_cap_rule_result(const ebpo_cap_rule *rule, double low, double high)
 
 /* --- bounds --- */
 
-/* Converts the sum of half angles to w_S. The error is enlarged by 2^-50 of the middle, which covers
- * the rounding of the interval's ends and of the boundaries with which they are compared. */
+/* Converts the sum of half angles to w_S. The error is enlarged by 2^-50 of the middle, which
+ * covers the rounding of the interval's ends and of the boundaries with which they are compared. */
 static ebpo_bounded add_winding(ebpo_bounded angles, int32_t winding)
 {
     double middle = winding + angles.middle * INVERSE_TURN;
@@ -115,8 +115,8 @@ static bool sum_exactly(const ebpo_cap_tree *t, const double p[3], exact_sum *s)
         if (n->weight == 0)
             continue;
         if (!ebpo_half_angle_exact(p, t->position[n->from],
-                                   t->position[ebpo_cap_middle(n->from, n->to)],
-                                   t->position[n->to], &angle))
+                                   t->position[ebpo_cap_middle(n->from, n->to)], t->position[n->to],
+                                   &angle))
             return false;
         multiply_power(s, &angle, n->weight);
     }
@@ -157,7 +157,8 @@ static int sign_at_boundary(const exact_sum *s, int side, double threshold)
     if (turn.real.sign <= 0)
         return 0;
     double sine = ebpo_big_double(&turn.imaginary, turn.real.exponent);
-    double quarters = 4 * threshold, error = s->error + (quarters == floor(quarters) ? 0 : 0x1p-400);
+    double quarters = 4 * threshold,
+           error = s->error + (quarters == floor(quarters) ? 0 : 0x1p-400);
     if (!(fabs(sine) > 4 * error))
         return 0;
     return sine > 0 ? 1 : -1;

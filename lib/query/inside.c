@@ -24,6 +24,7 @@
 #include "geometry/cursor.h"
 #include "geometry/level_nodes.h"
 #include "geometry/predicates.h"
+#include "query/holes.h"
 #include "query/load_ahead.h"
 #include "query/query_model.h"
 #include "query/query_node.h"
@@ -703,6 +704,19 @@ static ebpo_status inside_walk(ebpo_context *context, const double p[3],
                                                               : walk_down(&a, out, error);
 }
 
+/* Classifies points in a surface with holes. */
+static ebpo_status inside_holes(const ebpo_context *context, const double *points, uint64_t count,
+                                const ebpo_inside_options *o, ebpo_inside_result *out,
+                                ebpo_error *error)
+{
+    if (o->level >= 0 || o->deadline_ns)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "the inside of a surface supports neither level nor deadline; omit these");
+    for (uint64_t i = 0; i < count; i++)
+        ebpo_holes_inside(context->model, points + 3 * i, &out[i]);
+    return EBPO_OK;
+}
+
 ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64_t count,
                              const ebpo_inside_options *options, ebpo_inside_result *out,
                              ebpo_error *error)
@@ -716,12 +730,14 @@ ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64
         status = ebpo_check_query_level(o->level, error);
     if (status == EBPO_OK && o->envelopes > EBPO_ENVELOPES_SKIP)
         status = ebpo_fail_value(error);
-    if (status == EBPO_OK)
+    if (status == EBPO_OK && !m->holes)
         status = ebpo_check_solid(m, error);
     if (status == EBPO_OK)
         status = ebpo_check_points(points, count, error);
     if (status == EBPO_OK && o->level < 0)
         status = ebpo_check_mesh(m, error);
+    if (status == EBPO_OK && m->holes)
+        return inside_holes(context, points, count, o, out, error);
     if (status == EBPO_OK && m->whole && o->level < 0 && !o->deadline_ns &&
         o->envelopes != EBPO_ENVELOPES_USE)
         return inside_whole(context, points, count, out, error);
@@ -775,10 +791,12 @@ ebpo_status ebpo_give_sign(ebpo_context *c, const double p[3], const ebpo_distan
 {
     ebpo_inside_result where;
     ebpo_inside_options plain = EBPO_INSIDE_OPTIONS_INIT;
-    if (!c->model->info->solid || o->unsigned_distance || out->face == EBPO_NO_FACE)
+    const ebpo_model *m = c->model;
+    if ((!m->info->solid && !m->holes) || o->unsigned_distance || out->face == EBPO_NO_FACE)
         return EBPO_OK;
-    ebpo_status status = c->model->whole ? inside_whole(c, p, 1, &where, error)
-                                         : inside_walk(c, p, &plain, &where, error);
+    ebpo_status status = m->holes   ? inside_holes(c, p, 1, &plain, &where, error)
+                         : m->whole ? inside_whole(c, p, 1, &where, error)
+                                    : inside_walk(c, p, &plain, &where, error);
     if (status == EBPO_OK && where.where == EBPO_IN)
         out->distance = -out->distance;
     return status;

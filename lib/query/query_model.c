@@ -16,6 +16,7 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/hash.h"
+#include "query/holes.h"
 #include "query/model_parts.h"
 #include "query/query_model.h"
 
@@ -62,6 +63,10 @@ ebpo_status ebpo_check_solid(const ebpo_model *model, ebpo_error *error)
 {
     if (model->info->solid)
         return EBPO_OK;
+    if (model->options.holes)
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "the inside of a surface needs the model complete and all in memory; give "
+                         "a file that is not a subset, and more memory (--memory 0)");
     return ebpo_fail(error, EBPO_E_NOT_SOLID,
                      "the model is a surface: it has no inside; run 'ebpo check' on its source "
                      "to see the repairs that make a solid, and 'ebpo convert --repair' to apply "
@@ -239,6 +244,13 @@ static ebpo_status open_whole(ebpo_model *m, ebpo_error *error)
     ebpo_slice slice;
     ebpo_quota space = { .most = m->options.memory };
     ebpo_status status = ebpo_slice_read_all(&slice, m->file, m->options.threads, error);
+    bool surface = !m->info->solid && !m->info->pruned && m->info->parts & EBPO_PART_MESH;
+    if (status == EBPO_OK && m->options.holes && surface) {
+        status = ebpo_holes_make(&m->holes, &slice.mesh, m->info, m->options.threshold,
+                                 m->options.threads, error);
+        if (status != EBPO_OK)
+            ebpo_slice_free(&slice);
+    }
     if (status == EBPO_OK)
         status = ebpo_accel_make_within(&m->whole, &slice, m->info, space.most ? &space : NULL,
                                         true, m->options.threads, error);
@@ -339,6 +351,17 @@ static ebpo_status open_parts(ebpo_model *m, ebpo_error *error)
     return status == EBPO_OK ? open_top(m, plan.cut_level, error) : status;
 }
 
+/* Checks the options for surfaces. */
+static ebpo_status check_holes(const ebpo_model_options *o, ebpo_error *error)
+{
+    if (!o->holes || (o->threshold >= 0x1p-10 && o->threshold <= 1 - 0x1p-10))
+        return EBPO_OK;
+    return ebpo_fail(error, EBPO_E_ARGUMENT,
+                     "threshold %g of the winding number is out of range; give a number from "
+                     "1/1024 to 1023/1024",
+                     o->threshold);
+}
+
 ebpo_status ebpo_model_new(const ebpo_file *file, const ebpo_model_options *options,
                            ebpo_model **out, ebpo_error *error)
 {
@@ -346,6 +369,8 @@ ebpo_status ebpo_model_new(const ebpo_file *file, const ebpo_model_options *opti
     ebpo_model_options wanted = EBPO_MODEL_OPTIONS_INIT;
     *out = NULL;
     ebpo_status status = EBPO_TAKE(ebpo_model_options, &wanted, options, error);
+    if (status == EBPO_OK)
+        status = check_holes(&wanted, error);
     if (status != EBPO_OK)
         return status;
     ebpo_model *m = ebpo_alloc_zero(1, sizeof *m);
@@ -393,6 +418,7 @@ void ebpo_model_free(ebpo_model *m)
     ebpo_top_free(m->deep);
     give_back_shared(m);
     ebpo_accel_free(m->whole);
+    ebpo_holes_free(m->holes);
     free(m);
 }
 
@@ -411,7 +437,8 @@ static void gather_stats(const ebpo_model *m, ebpo_model_stats *out)
     for (int k = 0; k < 5; k++)
         out->leaves_of_kind[k] = m->leaves_of_kind[k];
     if (m->whole) {
-        out->memory = out->memory_peak = ebpo_accel_bytes(m->whole);
+        out->memory = out->memory_peak = ebpo_accel_bytes(m->whole) + ebpo_holes_bytes(m->holes);
+        out->ties = m->holes ? m->holes->ties : 0;
         return;
     }
     ebpo_cache_stats subtrees, chunks;

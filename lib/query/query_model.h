@@ -17,6 +17,8 @@
 #include "query/model_parts.h"
 #include "query/query_kernels.h"
 
+typedef struct ebpo_holes ebpo_holes; /* query/holes.h */
+
 struct ebpo_model {
     const ebpo_file *file;
     const ebpo_info *info;
@@ -27,6 +29,7 @@ struct ebpo_model {
     ebpo_query_kernels kernels;
     ebpo_accel *whole;   /* the whole model in memory, or NULL; then: */
     bool results_inside; /* `whole` is a solid with its mesh */
+    ebpo_holes *holes;   /* options.holes, and `whole` is a surface; or NULL */
     ebpo_top *top;       /* levels 0 .. cut level */
     ebpo_chunks *chunks;
     ebpo_cache *cache;         /* subtrees by their index in top->below */

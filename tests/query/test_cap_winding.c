@@ -237,8 +237,9 @@ static void check_contains(judge *j, ebpo_bounded b, const char *what)
 {
     mpf_set_d(j->t, b.middle);
     mpf_sub(j->t, j->angle, j->t);
-    ck_assert_msg(fabs(mpf_get_d(j->t)) <= b.error + 1e-100, "%s: %.17g is not within %.17g of %.17g", what,
-                  mpf_get_d(j->angle), b.error, b.middle);
+    ck_assert_msg(fabs(mpf_get_d(j->t)) <= b.error + 1e-100,
+                  "%s: %.17g is not within %.17g of %.17g", what, mpf_get_d(j->angle), b.error,
+                  b.middle);
 }
 
 /* Checks decision and bounds at a point. */

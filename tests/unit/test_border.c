@@ -244,8 +244,8 @@ END_TEST
 static const struct {
     const char *name;
     uint64_t loops, edges;
-} scans[] = { { "bunny", 5, 223 }, { "dragon_vrip", 0, 4270 }, { "motorbike", 0, 0 },
-              { "blade", 0, 240 }, { "office_chair", 0, 0 },   { "conrod", 0, 0 },
+} scans[] = { { "bunny", 5, 223 },  { "dragon_vrip", 0, 4270 }, { "motorbike", 0, 0 },
+              { "blade", 0, 240 },  { "office_chair", 0, 0 },   { "conrod", 0, 0 },
               { "buildings", 0, 0 } };
 
 START_TEST(test_models_with_caps_balance)

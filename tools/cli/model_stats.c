@@ -28,6 +28,7 @@ static const struct sum {
     { "distance_subtrees", "subtrees", offsetof(ebpo_model_stats, distance_subtrees), SUM_UINT },
     { "distance_loads", "subtrees", offsetof(ebpo_model_stats, distance_loads), SUM_UINT },
     { "skeleton_bytes", "bytes", offsetof(ebpo_model_stats, skeleton_bytes), SUM_UINT },
+    { "ties", "", offsetof(ebpo_model_stats, ties), SUM_UINT },
 };
 enum { SUMS = sizeof sums / sizeof *sums };
 
