@@ -51,6 +51,11 @@ void ebpo_cap_tree_free(ebpo_cap_tree *tree);
 ebpo_bounded ebpo_cap_tree_bound(const ebpo_cap_tree *tree, const double p[3], double radius,
                                  double tolerance);
 
+/* Converts bounds of the half angles' sum to bounds of w_S = winding + w_D. The error is enlarged
+ * by 2^-50 of the middle, which covers the rounding of the interval's ends and of the boundaries
+ * with which they are compared. */
+ebpo_bounded ebpo_cap_winding_of(ebpo_bounded angles, int32_t winding);
+
 /* Bounds w_S = winding + w_D at p, with an error of at most `width` / 2 if doubles suffice. */
 ebpo_bounded ebpo_cap_winding(const ebpo_cap_tree *tree, const double p[3], int32_t winding,
                               double width);

@@ -55,9 +55,7 @@ int ebpo_cap_rule_result(const ebpo_cap_rule *rule, double low, double high)
 
 /* --- bounds --- */
 
-/* Converts the sum of half angles to w_S. The error is enlarged by 2^-50 of the middle, which
- * covers the rounding of the interval's ends and of the boundaries with which they are compared. */
-static ebpo_bounded add_winding(ebpo_bounded angles, int32_t winding)
+ebpo_bounded ebpo_cap_winding_of(ebpo_bounded angles, int32_t winding)
 {
     double middle = winding + angles.middle * INVERSE_TURN;
     return (ebpo_bounded){ middle, (angles.error + 0x1p-50 * fabs(angles.middle)) * INVERSE_TURN *
@@ -79,7 +77,7 @@ ebpo_bounded ebpo_cap_winding(const ebpo_cap_tree *tree, const double p[3], int3
 {
     ebpo_bounded w = { winding, INFINITY };
     for (double t = FIRST_TOLERANCE; t >= 0 && !(w.error <= width / 2); t = next_tolerance(t))
-        w = add_winding(ebpo_cap_tree_bound(tree, p, 0, t), winding);
+        w = ebpo_cap_winding_of(ebpo_cap_tree_bound(tree, p, 0, t), winding);
     return w;
 }
 
@@ -171,7 +169,7 @@ static ebpo_cap_decision decide_exactly(const ebpo_cap_tree *tree, const double 
     exact_sum s;
     if (!sum_exactly(tree, p, &s))
         return (ebpo_cap_decision){ false, true, ebpo_cap_winding(tree, p, winding, 0) };
-    ebpo_bounded w = add_winding(s.angle, winding);
+    ebpo_bounded w = ebpo_cap_winding_of(s.angle, winding);
     int result = ebpo_cap_rule_result(rule, w.middle - w.error, w.middle + w.error), side;
     if (result >= 0)
         return (ebpo_cap_decision){ result, false, w };
@@ -187,7 +185,7 @@ ebpo_cap_decision ebpo_cap_decide(const ebpo_cap_tree *tree, const double p[3], 
                                   const ebpo_cap_rule *rule)
 {
     for (double t = FIRST_TOLERANCE; t >= 0; t = next_tolerance(t)) {
-        ebpo_bounded w = add_winding(ebpo_cap_tree_bound(tree, p, 0, t), winding);
+        ebpo_bounded w = ebpo_cap_winding_of(ebpo_cap_tree_bound(tree, p, 0, t), winding);
         int result = ebpo_cap_rule_result(rule, w.middle - w.error, w.middle + w.error);
         if (result >= 0)
             return (ebpo_cap_decision){ result, false, w };

@@ -57,15 +57,20 @@ ebpo_status ebpo_holes_make(ebpo_holes **out, const ebpo_mesh *mesh, const ebpo_
 
 void ebpo_holes_free(ebpo_holes *holes)
 {
-    if (holes)
-        ebpo_cap_tree_free(&holes->caps);
+    if (!holes)
+        return;
+    ebpo_cap_tree_free(&holes->caps);
+    free(holes->cell);
+    free(holes->leaf);
+    free(holes->leaf_winding);
     free(holes);
 }
 
 uint64_t ebpo_holes_bytes(const ebpo_holes *holes)
 {
     return holes ? sizeof *holes + holes->caps.position_count * sizeof *holes->caps.position +
-                       holes->caps.node_count * sizeof *holes->caps.node
+                       holes->caps.node_count * sizeof *holes->caps.node + holes->cell_count +
+                       5 * holes->leaf_count
                  : 0;
 }
 
@@ -75,10 +80,11 @@ typedef struct segment {
     const double *p;
     double from[3], to;
     int axis;
-    double low[3], high[3];      /* its box */
+    double low[3], high[3];          /* its box */
     float near_low[3], near_high[3]; /* the same in the frame of the blocks */
-    int32_t sum;                 /* crossings from its beginning to its end */
+    int32_t sum;                     /* crossings from its beginning to its end */
     bool on_face;
+    bool goes_on; /* also when p is on a face */
 } segment;
 
 /* Sets the segment from p to the nearest side of the box, or from there to p. Returns the sign with
@@ -107,13 +113,13 @@ static int choose_segment(segment *g, const ebpo_holes *h, const double p[3])
 
 static void cross_block(segment *g, const ebpo_accel *s, uint32_t block)
 {
-    for (uint32_t lane = 0; lane < EBPO_BLOCK && !g->on_face; lane++) {
+    for (uint32_t lane = 0; lane < EBPO_BLOCK && (!g->on_face || g->goes_on); lane++) {
         uint32_t slot = block * EBPO_BLOCK + lane;
         double t[3][3];
         if (ebpo_accel_slot_face(s, slot) == EBPO_NO_SLOT)
             return;
         ebpo_accel_triangle(s, slot, t);
-        g->on_face = ebpo_point_on_triangle(g->p, t[0], t[1], t[2]);
+        g->on_face = g->on_face || ebpo_point_on_triangle(g->p, t[0], t[1], t[2]);
         g->sum += ebpo_axis_crossing(g->from, g->to, g->axis, t[0], t[1], t[2]);
     }
 }
@@ -135,8 +141,8 @@ static void cross_child(segment *g, const ebpo_accel *s, uint32_t child)
         apart = f8_or(apart, f8_or(f8_less(f8_all(g->near_high[k]), from),
                                    f8_less(to, f8_all(g->near_low[k]))));
     }
-    for (unsigned lanes = ~f8_bits(apart) & ((1u << b->count) - 1); lanes && !g->on_face;
-         lanes &= lanes - 1)
+    for (unsigned lanes = ~f8_bits(apart) & ((1u << b->count) - 1);
+         lanes && (!g->on_face || g->goes_on); lanes &= lanes - 1)
         cross_child(g, s, b->child[__builtin_ctz(lanes)]);
 }
 
@@ -162,21 +168,20 @@ static void cross_caps(segment *g, const ebpo_cap_tree *t, uint64_t at)
         return;
     }
     uint64_t m = ebpo_cap_middle(n->from, n->to), first = ebpo_cap_count(n->from, m);
-    g->sum -= (int32_t)n->weight * ebpo_axis_crossing(g->from, g->to, g->axis,
-                                                      t->position[n->from], t->position[m],
-                                                      t->position[n->to]);
+    g->sum -= (int32_t)n->weight * ebpo_axis_crossing(g->from, g->to, g->axis, t->position[n->from],
+                                                      t->position[m], t->position[n->to]);
     if (first)
         cross_caps(g, t, at + 1);
     if (ebpo_cap_count(m, n->to))
         cross_caps(g, t, at + 1 + first);
 }
 
-/* Finds the winding number of mesh and caps at p, shifted. Returns false if p is on a face. */
-static bool winding_with_caps(const ebpo_model *m, const double p[3], int32_t *winding)
+bool ebpo_holes_crossings(const ebpo_model *m, const double p[3], bool on_faces_too,
+                          int32_t *winding)
 {
     const ebpo_holes *h = m->holes;
     const ebpo_accel *s = m->whole;
-    segment g = { .sum = 0 };
+    segment g = { .goes_on = on_faces_too };
     *winding = 0;
     for (int k = 0; k < 3; k++)
         if (!(p[k] >= h->low[k] && p[k] <= h->high[k]))
@@ -188,34 +193,40 @@ static bool winding_with_caps(const ebpo_model *m, const double p[3], int32_t *w
     }
     if (s->bound_count)
         cross_child(&g, s, s->top);
-    if (g.on_face)
+    if (g.on_face && !on_faces_too)
         return false;
     if (h->caps.node_count)
         cross_caps(&g, &h->caps, 0);
     *winding = side * g.sum;
-    return true;
+    return !g.on_face;
 }
 
 /* --- results --- */
 
-void ebpo_holes_inside(const ebpo_model *model, const double p[3], ebpo_inside_result *out)
+ebpo_status ebpo_holes_inside(ebpo_context *context, const double p[3], ebpo_inside_result *out,
+                              ebpo_error *error)
 {
+    const ebpo_model *m = context->model;
     int32_t winding;
-    *out = (ebpo_inside_result){ EBPO_ON, 0, 0 };
-    if (!winding_with_caps(model, p, &winding))
-        return;
-    ebpo_cap_decision d =
-        ebpo_cap_decide(&model->holes->caps, p, winding, &model->holes->rule);
-    model->holes->ties += d.tie;
-    out->where = d.inside ? EBPO_IN : EBPO_OUT;
-    out->winding = d.inside;
+    bool done;
+    ebpo_status status = ebpo_holes_by_cell(context, p, out, &done, error);
+    if (status == EBPO_OK && !done) {
+        *out = (ebpo_inside_result){ EBPO_ON, 0, 0 };
+        if (ebpo_holes_crossings(m, p, false, &winding)) {
+            ebpo_cap_decision d = ebpo_cap_decide(&m->holes->caps, p, winding, &m->holes->rule);
+            out->where = d.inside ? EBPO_IN : EBPO_OUT;
+            if (d.tie)
+                m->holes->ties++;
+        }
+    }
+    out->winding = out->where == EBPO_IN;
+    return status;
 }
 
-bool ebpo_holes_winding(const ebpo_model *model, const double p[3], double width,
-                        ebpo_bounded *out)
+bool ebpo_holes_winding(const ebpo_model *model, const double p[3], double width, ebpo_bounded *out)
 {
     int32_t winding;
-    if (!winding_with_caps(model, p, &winding))
+    if (!ebpo_holes_crossings(model, p, false, &winding))
         return false;
     *out = ebpo_cap_winding(&model->holes->caps, p, winding, width);
     return true;

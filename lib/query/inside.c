@@ -262,6 +262,19 @@ static ebpo_status inside_leaf(ebpo_context *context, const ebpo_accel *s, uint3
     return result_in_leaf(context, s, &s->leaf[number], &i, p, out, error);
 }
 
+ebpo_status ebpo_inside_leaf_from(ebpo_context *context, uint32_t leaf, int32_t winding, int level,
+                                  const ebpo_position *place, const double p[3],
+                                  ebpo_inside_result *out, ebpo_error *error)
+{
+    const ebpo_accel *s = context->model->whole;
+    const ebpo_accel_leaf from = { .list = s->leaf[leaf].list,
+                                   .winding = winding,
+                                   .cell_face = EBPO_NO_CELL_FACE };
+    in_leaf i;
+    find_in_leaf(context->model->locator.level, level, place, &i);
+    return result_by_faces(context, s, &from, false, &i, p, out, error);
+}
+
 /* Classifies a point in a white or black node. */
 static void inside_uniform(const ebpo_context *context, uint32_t entry, ebpo_inside_result *out)
 {
@@ -705,16 +718,17 @@ static ebpo_status inside_walk(ebpo_context *context, const double p[3],
 }
 
 /* Classifies points in a surface with holes. */
-static ebpo_status inside_holes(const ebpo_context *context, const double *points, uint64_t count,
+static ebpo_status inside_holes(ebpo_context *context, const double *points, uint64_t count,
                                 const ebpo_inside_options *o, ebpo_inside_result *out,
                                 ebpo_error *error)
 {
     if (o->level >= 0 || o->deadline_ns)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "the inside of a surface supports neither level nor deadline; omit these");
-    for (uint64_t i = 0; i < count; i++)
-        ebpo_holes_inside(context->model, points + 3 * i, &out[i]);
-    return EBPO_OK;
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
+        status = ebpo_holes_inside(context, points + 3 * i, &out[i], error);
+    return status;
 }
 
 ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64_t count,

@@ -256,6 +256,8 @@ static ebpo_status open_whole(ebpo_model *m, ebpo_error *error)
                                         true, m->options.threads, error);
     if (m->whole)
         ebpo_model_count_leaves(m, m->whole, 1);
+    if (m->whole && m->holes)
+        ebpo_holes_attach(m->holes, m->whole);
     return status;
 }
 

@@ -47,8 +47,8 @@ static double winding_by_sum(const ebpo_mesh *mesh, const double p[3], double *e
         if (ebpo_zero_area(t[0], t[1], t[2]))
             continue;
         sum += atan2l(sine, cosine);
-        rounding += 0x1p-56L * length[0] * length[1] * length[2] /
-                    sqrtl(sine * sine + cosine * cosine);
+        rounding +=
+            0x1p-56L * length[0] * length[1] * length[2] / sqrtl(sine * sine + cosine * cosine);
     }
     *error = 1e-14 + (double)rounding; /* infinite or NaN: not known */
     return (double)(sum / (2 * acosl(-1)));
@@ -139,7 +139,8 @@ static void choose_point(uint64_t *state, const holed *h, double p[3])
         return;
     /* on a vertex, on an edge, near a face */
     uint64_t f = ebpo_test_random(state) % h->mesh.face_count;
-    double t[3][3], s = (double)(ebpo_test_random(state) % 3) / 2, shift = ebpo_test_random_unit(state);
+    double t[3][3], s = (double)(ebpo_test_random(state) % 3) / 2,
+                    shift = ebpo_test_random_unit(state);
     for (int i = 0; i < 3; i++)
         ebpo_mesh_position(&h->mesh, h->mesh.faces[3 * f + (uint64_t)i], t[i]);
     for (int k = 0; k < 3; k++) {
@@ -334,7 +335,8 @@ TEST_SUITE(holes)
         TCase *real = tcase_create("scans");
         tcase_set_timeout(real, 600);
         tcase_add_checked_fixture(real, scratch_enter, scratch_leave);
-        tcase_add_loop_test(real, test_scans_match_sums_over_faces, 0, sizeof scans / sizeof *scans);
+        tcase_add_loop_test(real, test_scans_match_sums_over_faces, 0,
+                            sizeof scans / sizeof *scans);
         suite_add_tcase(suite, real);
     }
     return suite;

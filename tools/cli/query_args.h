@@ -19,7 +19,7 @@ typedef struct query_values {
 #define QUERY_VALUES_INIT                                                         \
     {                                                                             \
         .cut_level = -1, .level = -1, .max_distance = INFINITY, .tmax = INFINITY, \
-        .within = INFINITY, .threshold = 0.5, .remote = REMOTE_VALUES_INIT                          \
+        .within = INFINITY, .threshold = 0.5, .remote = REMOTE_VALUES_INIT        \
     }
 
 /* Words for --mode, NULL-terminated; EBP 2017, section 4.3. */
