@@ -5,8 +5,8 @@
  * a white node, w is then within the bounds, which may give one result. In a leaf, where faces
  * change the integer k, let |w_D| be below t and below 1 - t for the threshold t: then the rule for
  * w equals the rule for k, and k is found from the lowest corner and the leaf's faces, as in a
- * solid. Points of other cells are decided one by one. The first query of a cell finds this; threads
- * that do so at the same time find the same. */
+ * solid. Points of other cells are decided one by one. The first query of a cell finds this;
+ * threads that do so at the same time find the same. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -59,8 +59,8 @@ static bool find_node(const ebpo_model *m, const double p[3], found_node *out)
     out->number = table->grid ? ebpo_grid_cell(table, fine, at) : 0;
     uint32_t gray = out->d.entry;
     while (ebpo_descent_step(&out->d, table, fine, at)) {
-        out->number = grid + 8 * (uint64_t)ebpo_entry_value(gray) +
-                      ebpo_octant_at(at, fine - out->d.level);
+        out->number =
+            grid + 8 * (uint64_t)ebpo_entry_value(gray) + ebpo_octant_at(at, fine - out->d.level);
         gray = out->d.entry;
     }
     return true;

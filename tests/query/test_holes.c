@@ -200,6 +200,25 @@ START_TEST(test_surfaces_match_sums_over_faces)
 }
 END_TEST
 
+/* Most cells are far from the border: one hole, and loops apart from one another. */
+START_TEST(test_few_holes_match_sums_over_faces)
+{
+    const double centre[3] = { 1, 2, 3 };
+    const ebpo_rule rule = (ebpo_rule)_i;
+    uint64_t points = ebpo_test_scaled(4000);
+    tally all = { { 0 } };
+    ebpo_mesh mesh = ebpo_test_sphere(centre, 2, 3);
+    mesh.face_count -= 3;
+    check_model(mesh, rule, 0.5, points, 21, &all);
+    mesh = ebpo_test_torus(3, 1, 48, 24);
+    mesh.face_count -= 40;
+    memmove(mesh.faces + 300, mesh.faces + 309, 3 * (mesh.face_count - 103) * sizeof *mesh.faces);
+    mesh.face_count -= 3;
+    check_model(mesh, rule, 0.375, points, 22, &all);
+    ck_assert_uint_gt(all.of[EBPO_IN], 0);
+}
+END_TEST
+
 START_TEST(test_ties_are_counted)
 {
     ebpo_mesh mesh = ebpo_test_sheet(4, 1);
@@ -327,6 +346,7 @@ TEST_SUITE(holes)
     tcase_set_timeout(shapes, 300);
     tcase_add_checked_fixture(shapes, scratch_enter, scratch_leave);
     tcase_add_loop_test(shapes, test_surfaces_match_sums_over_faces, 0, 9);
+    tcase_add_loop_test(shapes, test_few_holes_match_sums_over_faces, 0, EBPO_RULE_POSITIVE + 1);
     tcase_add_test(shapes, test_ties_are_counted);
     tcase_add_test(shapes, test_surface_without_option_is_refused);
     tcase_add_test(shapes, test_solid_ignores_option);

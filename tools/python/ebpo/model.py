@@ -97,7 +97,8 @@ class AllHits(NamedTuple):
 
 def open(source: Any, *, memory: int | str | None = None, cut_level: int | None = None,
          prefetch: bool = False, threads: int | None = None,
-         storage_options: dict | None = None, max_expansion: int | None = None, **http: Any) -> Model:
+         storage_options: dict | None = None, max_expansion: int | None = None,
+         holes: bool = False, threshold: float = 0.5, **http: Any) -> Model:
     """Open a file. Reads only its header; other data is read when a query needs it.
 
     source: one of these:
@@ -118,6 +119,9 @@ def open(source: Any, *, memory: int | str | None = None, cut_level: int | None 
     storage_options: options of fsspec for the URL.
     max_expansion: largest ratio of the decoded arrays to the file size. None: 256; 64 MiB are always
         allowed. A file beyond the limit is refused (LimitError): it may be made to exhaust memory.
+    holes: a surface, such as a scan with holes, has an inside and signed distances, by its generalized
+        winding number. The model has to fit into memory.
+    threshold: the winding number above which a point of a surface is inside.
     http: members of ebpo_http_options in ebpo/http.h: headers={"Name": "value"}, user="name:password",
         cache_folder=..., retries=...
 
@@ -128,7 +132,8 @@ def open(source: Any, *, memory: int | str | None = None, cut_level: int | None 
     12
     """
     options = {"memory": memory, "cut_level": cut_level, "prefetch": prefetch, "threads": threads,
-               "storage_options": storage_options, "max_expansion": max_expansion, **http}
+               "storage_options": storage_options, "max_expansion": max_expansion, "holes": holes,
+               "threshold": threshold, **http}
     return Model(source, options)
 
 
@@ -154,11 +159,12 @@ class Model:
     def __init__(self, source: Any, options: dict) -> None:
         http = {name: value for name, value in options.items()
                 if name not in ("memory", "cut_level", "prefetch", "threads", "storage_options",
-                                 "max_expansion")}
+                                 "max_expansion", "holes", "threshold")}
         self._source, self._options = source, options
         self._threads = options["threads"] or 0
         self._model_options = made(c.ebpo_model_options, memory=size_in_bytes(options["memory"]),
-                                   prefetch=options["prefetch"], threads=self._threads)
+                                   prefetch=options["prefetch"], threads=self._threads,
+                                   holes=options["holes"], threshold=options["threshold"])
         if options["cut_level"] is not None:
             self._model_options.cut_level = options["cut_level"]
         self._file: Handle | None = opened(source, http, options["storage_options"],
@@ -409,6 +415,25 @@ class Model:
         array([1, 0], dtype=int32)
         """
         return self.locate(points, threads=threads, progress=progress).winding
+
+    def winding_bounds(self, points: Any, *, width: float = 1e-9) -> Any:
+        """Return bounds of the winding numbers of points: (n, 2), nan on faces.
+
+        width: greatest difference of the bounds, as far as double precision allows it. Only surfaces opened
+            with `holes` have winding numbers that are not integers.
+
+        Raises the errors of `locate`.
+
+        >>> cube.winding_bounds([.5, .5, .5])
+        array([1., 1.])
+        """
+        rows = Rows(points)
+        out = np.empty((rows.count, 2))
+        for begin in range(0, max(1, rows.count), 65536):
+            block = rows[begin:begin + 65536]
+            with self._context() as context:
+                call("ebpo_winding", context, block.ctypes.data, len(block), width, out[begin:].ctypes.data)
+        return out[0] if rows.single else out
 
     # ---- distance ----
 
