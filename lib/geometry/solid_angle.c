@@ -180,7 +180,7 @@ static bool angle_on_edge(const double p[3], const double a[3], const double b[3
 }
 
 /* Returns true if p is on the line through a and b, between them. */
-static bool between(const double p[3], const double a[3], const double b[3])
+static bool is_between(const double p[3], const double a[3], const double b[3])
 {
     for (int k = 0; k < 3; k++)
         if ((p[k] < a[k] && p[k] < b[k]) || (p[k] > a[k] && p[k] > b[k]))
@@ -206,7 +206,7 @@ bool ebpo_half_angle_exact(const double p[3], const double a[3], const double b[
         if (same_point(p, corner[i]))
             return false;
     for (int i = 0; i < 3 && sign == 0; i++)
-        if (between(p, corner[i], corner[(i + 1) % 3]))
+        if (is_between(p, corner[i], corner[(i + 1) % 3]))
             return angle_on_edge(p, corner[i], corner[(i + 1) % 3], corner[(i + 2) % 3], out);
     big_vector v[3];
     ebpo_big length[3], all;

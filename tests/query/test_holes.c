@@ -200,6 +200,22 @@ START_TEST(test_surfaces_match_sums_over_faces)
 }
 END_TEST
 
+/* Makes a sphere of radius 2 without the faces in a slice: caps cross large cells without faces. */
+static ebpo_mesh without_slice(uint32_t subdivisions)
+{
+    const double centre[3] = { 1, 2, 3 };
+    ebpo_mesh m = ebpo_test_sphere(centre, 2, subdivisions);
+    uint64_t kept = 0;
+    for (uint64_t f = 0; f < m.face_count; f++) {
+        double t[3];
+        ebpo_mesh_position(&m, m.faces[3 * f], t);
+        if (t[2] < 3 || t[2] > 4)
+            memmove(m.faces + 3 * kept++, m.faces + 3 * f, 3 * sizeof *m.faces);
+    }
+    m.face_count = kept;
+    return m;
+}
+
 /* Most cells are far from the border: one hole, and loops apart from one another. */
 START_TEST(test_few_holes_match_sums_over_faces)
 {
@@ -215,6 +231,7 @@ START_TEST(test_few_holes_match_sums_over_faces)
     memmove(mesh.faces + 300, mesh.faces + 309, 3 * (mesh.face_count - 103) * sizeof *mesh.faces);
     mesh.face_count -= 3;
     check_model(mesh, rule, 0.375, points, 22, &all);
+    check_model(without_slice(3), rule, 0.125, points, 23, &all);
     ck_assert_uint_gt(all.of[EBPO_IN], 0);
 }
 END_TEST
