@@ -3,9 +3,10 @@
  * Bounds. Let the triangles of a node, of area a (with weights) and vector area V, be in a ball of
  * centre c and radius R. With r = |x - p|, the solid angle is the integral of f . dA,
  * f(x) = (x - p) / r^3, where |f| = 1 / r^2 and the derivative of f has the norm 2 / r^3. For all p
- * within s of a point q, with d = |c - q| and g = d - R - s > 0, the half angle therefore is at
- * most a / (2 g^2), and differs from V . f(c) / 2 at q by at most a (R + s) / g^3. Triangles may
- * also be bounded by pi each.
+ * of a box with the centre q and half the diagonal s, whose distance from the ball is g > 0, the
+ * half angle therefore is at most a / (2 g^2), and differs from V . f(c) / 2 at q by at most
+ * a (R + s) / g^3: the differences x - p form a convex set, in which the norm is at least g.
+ * Triangles may also be bounded by pi each.
  *
  * Rounding. Each quantity is computed with a relative error below 2^-45, except V, whose error
  * `slack` bounds; radii, areas and errors are enlarged by a factor of 1 + 2^-40. Distances are used
@@ -216,13 +217,25 @@ void ebpo_cap_tree_free(ebpo_cap_tree *tree)
 
 /* --- bounds --- */
 
-static ebpo_bounded bound_node(const ebpo_cap_node *n, const double p[3], double radius)
+/* A box of points; or, if the radius is 0, one point. */
+typedef struct point_box {
+    const double *p;
+    double half[3], radius;
+} point_box;
+
+static ebpo_bounded bound_node(const ebpo_cap_node *n, const point_box *q)
 {
     const ebpo_bounded unknown = { 0, n->most };
-    double x[3];
-    ebpo_vec3_subtract(n->centre, p, x);
-    double d2 = ebpo_vec3_dot(x, x), d = sqrt(d2), ball = (n->radius + radius) * ENLARGE,
-           gap = d * (1 - 0x1p-40) - ball;
+    double x[3], apart[3];
+    ebpo_vec3_subtract(n->centre, q->p, x);
+    double d2 = ebpo_vec3_dot(x, x), d = sqrt(d2), ball = (n->radius + q->radius) * ENLARGE,
+           least = d;
+    if (q->radius > 0) {
+        for (int k = 0; k < 3; k++)
+            apart[k] = fmax(fabs(x[k]) * (1 - 0x1p-50) - q->half[k], 0);
+        least = ebpo_vec3_length(apart);
+    }
+    double gap = least * (1 - 0x1p-40) - n->radius * ENLARGE;
     if (!(gap > 0x1p-300) || !(d < 0x1p300))
         return unknown;
     double inverse = 1 / (gap * gap), simple = n->area * inverse / 2,
@@ -239,13 +252,13 @@ static ebpo_bounded bound_node(const ebpo_cap_node *n, const double p[3], double
 
 /* Returns the bounds of the triangle that belongs to a stretch alone. */
 static ebpo_bounded bound_triangle(const ebpo_cap_tree *t, const ebpo_cap_node *n,
-                                   const double p[3], double radius)
+                                   const point_box *q)
 {
     double weight = n->weight;
-    if (radius > 0)
+    if (q->radius > 0)
         return (ebpo_bounded){ 0, weight * EBPO_PI_HIGH };
     ebpo_bounded b =
-        ebpo_half_angle(p, t->position[n->from], t->position[ebpo_cap_middle(n->from, n->to)],
+        ebpo_half_angle(q->p, t->position[n->from], t->position[ebpo_cap_middle(n->from, n->to)],
                         t->position[n->to]);
     return (ebpo_bounded){ weight * b.middle, weight * b.error };
 }
@@ -257,27 +270,33 @@ static inline void add_bounded(ebpo_bounded *sum, ebpo_bounded term)
     sum->error += term.error + 0x1p-52 * (fabs(sum->middle) + fabs(term.middle) + sum->error);
 }
 
-ebpo_bounded ebpo_cap_tree_bound(const ebpo_cap_tree *tree, const double p[3], double radius,
+ebpo_bounded ebpo_cap_tree_bound(const ebpo_cap_tree *tree, const double p[3], const double half[3],
                                  double tolerance)
 {
     enum { STACK = 160 }; /* two for each level: at most 32 of groups and 32 of stretches */
     uint32_t stack[STACK], count = 0;
     ebpo_bounded sum = { 0, 0 };
+    point_box q = { .p = p };
+    if (half) {
+        for (int k = 0; k < 3; k++)
+            q.half[k] = half[k] * ENLARGE;
+        q.radius = ebpo_vec3_length(q.half) * ENLARGE + 0x1p-500;
+    }
     if (tree->node_count > 0)
         stack[count++] = 0;
     while (count > 0) {
         uint32_t at = stack[--count];
         const ebpo_cap_node *n = &tree->node[at];
-        ebpo_bounded b = bound_node(n, p, radius);
+        ebpo_bounded b = bound_node(n, &q);
         bool alone = n->weight && n->to - n->from == 2;
-        if (b.error <= tolerance || (alone && radius > 0)) {
+        if (b.error <= tolerance || (alone && half)) {
             add_bounded(&sum, b);
         } else if (n->weight == 0) {
             stack[count++] = n->to;
             stack[count++] = n->from;
         } else {
             uint64_t m = ebpo_cap_middle(n->from, n->to), first = ebpo_cap_count(n->from, m);
-            add_bounded(&sum, bound_triangle(tree, n, p, radius));
+            add_bounded(&sum, bound_triangle(tree, n, &q));
             if (ebpo_cap_count(m, n->to))
                 stack[count++] = (uint32_t)(at + 1 + first);
             if (first)

@@ -45,10 +45,10 @@ EBPO_MUST_USE ebpo_status ebpo_cap_tree_make(ebpo_cap_tree *out, double (*positi
                                              uint64_t loop_count, ebpo_error *error);
 void ebpo_cap_tree_free(ebpo_cap_tree *tree);
 
-/* Bounds the sum of the half angles, that is 2 pi w_D, at all points within `radius` of p. Nodes
- * whose bounds have an error above `tolerance` are refined; if radius is 0, down to single
- * triangles. */
-ebpo_bounded ebpo_cap_tree_bound(const ebpo_cap_tree *tree, const double p[3], double radius,
+/* Bounds the sum of the half angles, that is 2 pi w_D, at all points of a box around p with these
+ * half sides; NULL: at p. Nodes whose bounds have an error above `tolerance` are refined; at a
+ * single point, down to single triangles. */
+ebpo_bounded ebpo_cap_tree_bound(const ebpo_cap_tree *tree, const double p[3], const double half[3],
                                  double tolerance);
 
 /* Converts bounds of the half angles' sum to bounds of w_S = winding + w_D. The error is enlarged

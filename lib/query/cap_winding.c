@@ -77,7 +77,7 @@ ebpo_bounded ebpo_cap_winding(const ebpo_cap_tree *tree, const double p[3], int3
 {
     ebpo_bounded w = { winding, INFINITY };
     for (double t = FIRST_TOLERANCE; t >= 0 && !(w.error <= width / 2); t = next_tolerance(t))
-        w = ebpo_cap_winding_of(ebpo_cap_tree_bound(tree, p, 0, t), winding);
+        w = ebpo_cap_winding_of(ebpo_cap_tree_bound(tree, p, NULL, t), winding);
     return w;
 }
 
@@ -185,7 +185,7 @@ ebpo_cap_decision ebpo_cap_decide(const ebpo_cap_tree *tree, const double p[3], 
                                   const ebpo_cap_rule *rule)
 {
     for (double t = FIRST_TOLERANCE; t >= 0; t = next_tolerance(t)) {
-        ebpo_bounded w = ebpo_cap_winding_of(ebpo_cap_tree_bound(tree, p, 0, t), winding);
+        ebpo_bounded w = ebpo_cap_winding_of(ebpo_cap_tree_bound(tree, p, NULL, t), winding);
         int result = ebpo_cap_rule_result(rule, w.middle - w.error, w.middle + w.error);
         if (result >= 0)
             return (ebpo_cap_decision){ result, false, w };

@@ -55,6 +55,26 @@ ebpo_status ebpo_holes_make(ebpo_holes **out, const ebpo_mesh *mesh, const ebpo_
     return EBPO_OK;
 }
 
+void ebpo_holes_attach(ebpo_holes *h, const ebpo_accel *whole, const ebpo_locator *locator)
+{
+    h->whole = whole;
+    h->locator = *locator;
+    uint64_t grid = whole->nodes.grid ? UINT64_C(1) << 3 * whole->nodes.grid_bits : 1;
+    h->cell_count = grid + 8 * (uint64_t)whole->nodes.group_count;
+    h->leaf_count = whole->leaf_count;
+    h->cell = ebpo_alloc_zero(h->cell_count, sizeof *h->cell);
+    h->leaf = ebpo_alloc_zero(h->leaf_count + 1, sizeof *h->leaf);
+    h->leaf_winding = ebpo_alloc_zero(h->leaf_count + 1, sizeof *h->leaf_winding);
+    if (h->cell && h->leaf && h->leaf_winding)
+        return;
+    free(h->cell);
+    free(h->leaf);
+    free(h->leaf_winding);
+    h->cell = h->leaf = NULL;
+    h->leaf_winding = NULL;
+    h->cell_count = h->leaf_count = 0;
+}
+
 void ebpo_holes_free(ebpo_holes *holes)
 {
     if (!holes)
@@ -176,11 +196,10 @@ static void cross_caps(segment *g, const ebpo_cap_tree *t, uint64_t at)
         cross_caps(g, t, at + 1 + first);
 }
 
-bool ebpo_holes_crossings(const ebpo_model *m, const double p[3], bool on_faces_too,
+bool ebpo_holes_crossings(const ebpo_holes *h, const double p[3], bool on_faces_too,
                           int32_t *winding)
 {
-    const ebpo_holes *h = m->holes;
-    const ebpo_accel *s = m->whole;
+    const ebpo_accel *s = h->whole;
     segment g = { .goes_on = on_faces_too };
     *winding = 0;
     for (int k = 0; k < 3; k++)
@@ -203,31 +222,22 @@ bool ebpo_holes_crossings(const ebpo_model *m, const double p[3], bool on_faces_
 
 /* --- results --- */
 
-ebpo_status ebpo_holes_inside(ebpo_context *context, const double p[3], ebpo_inside_result *out,
-                              ebpo_error *error)
+ebpo_where ebpo_holes_where(ebpo_holes *h, const double p[3])
 {
-    const ebpo_model *m = context->model;
     int32_t winding;
-    bool done;
-    ebpo_status status = ebpo_holes_by_cell(context, p, out, &done, error);
-    if (status == EBPO_OK && !done) {
-        *out = (ebpo_inside_result){ EBPO_ON, 0, 0 };
-        if (ebpo_holes_crossings(m, p, false, &winding)) {
-            ebpo_cap_decision d = ebpo_cap_decide(&m->holes->caps, p, winding, &m->holes->rule);
-            out->where = d.inside ? EBPO_IN : EBPO_OUT;
-            if (d.tie)
-                m->holes->ties++;
-        }
-    }
-    out->winding = out->where == EBPO_IN;
-    return status;
+    if (!ebpo_holes_crossings(h, p, false, &winding))
+        return EBPO_ON;
+    ebpo_cap_decision d = ebpo_cap_decide(&h->caps, p, winding, &h->rule);
+    if (d.tie)
+        h->ties++;
+    return d.inside ? EBPO_IN : EBPO_OUT;
 }
 
-bool ebpo_holes_winding(const ebpo_model *model, const double p[3], double width, ebpo_bounded *out)
+bool ebpo_holes_winding(const ebpo_holes *h, const double p[3], double width, ebpo_bounded *out)
 {
     int32_t winding;
-    if (!ebpo_holes_crossings(model, p, false, &winding))
+    if (!ebpo_holes_crossings(h, p, false, &winding))
         return false;
-    *out = ebpo_cap_winding(&model->holes->caps, p, winding, width);
+    *out = ebpo_cap_winding(&h->caps, p, winding, width);
     return true;
 }

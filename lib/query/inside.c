@@ -262,19 +262,6 @@ static ebpo_status inside_leaf(ebpo_context *context, const ebpo_accel *s, uint3
     return result_in_leaf(context, s, &s->leaf[number], &i, p, out, error);
 }
 
-ebpo_status ebpo_inside_leaf_from(ebpo_context *context, uint32_t leaf, int32_t winding, int level,
-                                  const ebpo_position *place, const double p[3],
-                                  ebpo_inside_result *out, ebpo_error *error)
-{
-    const ebpo_accel *s = context->model->whole;
-    const ebpo_accel_leaf from = { .list = s->leaf[leaf].list,
-                                   .winding = winding,
-                                   .cell_face = EBPO_NO_CELL_FACE };
-    in_leaf i;
-    find_in_leaf(context->model->locator.level, level, place, &i);
-    return result_by_faces(context, s, &from, false, &i, p, out, error);
-}
-
 /* Classifies a point in a white or black node. */
 static void inside_uniform(const ebpo_context *context, uint32_t entry, ebpo_inside_result *out)
 {
@@ -717,17 +704,41 @@ static ebpo_status inside_walk(ebpo_context *context, const double p[3],
                                                               : walk_down(&a, out, error);
 }
 
-/* Classifies points in a surface with holes. */
+/* --- surfaces with holes --- */
+
+/* Classifies p in a leaf far from the border by the leaf's faces. */
+static ebpo_status inside_far_leaf(ebpo_context *context, const ebpo_holes_cell *cell,
+                                   const double p[3], ebpo_inside_result *out, ebpo_error *error)
+{
+    const ebpo_accel *s = context->model->whole;
+    const ebpo_accel_leaf leaf = { .list = s->leaf[cell->leaf].list,
+                                   .winding = cell->winding,
+                                   .cell_face = EBPO_NO_CELL_FACE };
+    in_leaf i;
+    find_in_leaf(context->model->locator.level, cell->level, &cell->position, &i);
+    return result_by_faces(context, s, &leaf, false, &i, p, out, error);
+}
+
 static ebpo_status inside_holes(ebpo_context *context, const double *points, uint64_t count,
                                 const ebpo_inside_options *o, ebpo_inside_result *out,
                                 ebpo_error *error)
 {
+    ebpo_holes *h = context->model->holes;
     if (o->level >= 0 || o->deadline_ns)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "the inside of a surface supports neither level nor deadline; omit these");
     ebpo_status status = EBPO_OK;
-    for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
-        status = ebpo_holes_inside(context, points + 3 * i, &out[i], error);
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
+        const double *p = points + 3 * i;
+        ebpo_holes_cell cell;
+        ebpo_holes_find_cell(h, p, &cell);
+        out[i] = (ebpo_inside_result){ cell.decision == EBPO_CELL_IN ? EBPO_IN : EBPO_OUT, 0, 0 };
+        if (cell.decision == EBPO_CELL_NEAR)
+            out[i].where = ebpo_holes_where(h, p);
+        else if (cell.decision == EBPO_CELL_FAR)
+            status = inside_far_leaf(context, &cell, p, &out[i], error);
+        out[i].winding = out[i].where == EBPO_IN;
+    }
     return status;
 }
 

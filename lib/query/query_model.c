@@ -257,7 +257,7 @@ static ebpo_status open_whole(ebpo_model *m, ebpo_error *error)
     if (m->whole)
         ebpo_model_count_leaves(m, m->whole, 1);
     if (m->whole && m->holes)
-        ebpo_holes_attach(m->holes, m->whole);
+        ebpo_holes_attach(m->holes, m->whole, &m->locator);
     return status;
 }
 

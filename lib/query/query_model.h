@@ -14,10 +14,9 @@
 #include "geometry/polytope.h"
 #include "geometry/level_nodes.h"
 #include "query/accel.h"
+#include "query/holes.h"
 #include "query/model_parts.h"
 #include "query/query_kernels.h"
-
-typedef struct ebpo_holes ebpo_holes; /* query/holes.h */
 
 struct ebpo_model {
     const ebpo_file *file;
@@ -156,13 +155,6 @@ ebpo_status ebpo_fail_value(ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_check_mesh(const ebpo_model *model, ebpo_error *error);
 /* Returns EBPO_E_NOT_SOLID for a surface. */
 EBPO_MUST_USE ebpo_status ebpo_check_solid(const ebpo_model *model, ebpo_error *error);
-
-/* Classifies p in a leaf of the whole model by the leaf's faces, with the winding number at the
- * lowest corner of its cell; `place` is the shifted position of p. */
-EBPO_MUST_USE ebpo_status ebpo_inside_leaf_from(ebpo_context *context, uint32_t leaf,
-                                                int32_t winding, int level,
-                                                const ebpo_position *place, const double p[3],
-                                                ebpo_inside_result *out, ebpo_error *error);
 
 /* Makes the distance of a result negative inside a solid, unless the options request no sign. */
 EBPO_MUST_USE ebpo_status ebpo_give_sign(ebpo_context *context, const double p[3],

@@ -6,7 +6,7 @@
 
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "query/holes.h"
+#include "query/query_model.h"
 
 ebpo_status ebpo_winding(ebpo_context *context, const double *points, uint64_t count, double width,
                          ebpo_winding_bounds *out, ebpo_error *error)
@@ -21,7 +21,7 @@ ebpo_status ebpo_winding(ebpo_context *context, const double *points, uint64_t c
         ebpo_bounded w = { 0, 0 };
         bool apart = true;
         if (m->holes) {
-            apart = ebpo_holes_winding(m, points + 3 * i, width, &w);
+            apart = ebpo_holes_winding(m->holes, points + 3 * i, width, &w);
         } else {
             ebpo_inside_result r;
             status = ebpo_inside(context, points + 3 * i, NULL, &r, error);

@@ -422,8 +422,8 @@ START_TEST(test_centre_of_three_cube_faces_is_a_tie)
 }
 END_TEST
 
-/* Bounds for a ball of points contain the values at its points, at every tolerance. */
-START_TEST(test_bounds_of_balls_contain_their_points)
+/* Bounds for a box of points contain the values at its points, at every tolerance. */
+START_TEST(test_bounds_of_boxes_contain_their_points)
 {
     uint64_t state = 5;
     judge j;
@@ -432,10 +432,11 @@ START_TEST(test_bounds_of_balls_contain_their_points)
         holed h;
         holed_make(&h, i % 2 ? integer_soup(&state) : half_sphere());
         for (int c = 0; c < 40; c++) {
-            double q[3], p[3], radius = ldexp(ebpo_test_random_unit(&state), (int)(c % 6) - 4);
+            double q[3], p[3], half[3], size = ldexp(1, (int)(c % 6) - 4);
             for (int k = 0; k < 3; k++) {
                 q[k] = 12 * ebpo_test_random_unit(&state) - 4;
-                p[k] = q[k] + radius * (2 * ebpo_test_random_unit(&state) - 1) / 1.8;
+                half[k] = size * ebpo_test_random_unit(&state);
+                p[k] = q[k] + half[k] * (2 * ebpo_test_random_unit(&state) - 1);
             }
             if (!judge_winding(&j, &h.mesh, p))
                 continue;
@@ -444,8 +445,8 @@ START_TEST(test_bounds_of_balls_contain_their_points)
             mpf_mul(j.angle, j.angle, j.pi);
             mpf_mul_ui(j.angle, j.angle, 2);
             for (double tolerance = 4; tolerance > 1e-9; tolerance /= 16) {
-                check_contains(&j, ebpo_cap_tree_bound(&h.tree, q, radius, tolerance), "ball");
-                check_contains(&j, ebpo_cap_tree_bound(&h.tree, p, 0, tolerance), "point");
+                check_contains(&j, ebpo_cap_tree_bound(&h.tree, q, half, tolerance), "box");
+                check_contains(&j, ebpo_cap_tree_bound(&h.tree, p, NULL, tolerance), "point");
             }
         }
         holed_free(&h);
@@ -462,7 +463,7 @@ TEST_SUITE(cap_winding)
     tcase_add_test(all, test_centre_of_three_cube_faces_is_a_tie);
     tcase_add_test(all, test_small_models_agree_with_sums_in_400_bits);
     tcase_add_test(all, test_soups_agree_with_sums_in_400_bits);
-    tcase_add_test(all, test_bounds_of_balls_contain_their_points);
+    tcase_add_test(all, test_bounds_of_boxes_contain_their_points);
     suite_add_tcase(suite, all);
     return suite;
 }

@@ -349,7 +349,7 @@ START_TEST(test_scans_match_sums_over_faces)
     tally all = { { 0 } };
     snprintf(path, sizeof path, "%s/%s.ply", getenv("EBPO_MODELS"), scans[_i]);
     model_must(ebpo_mesh_read(path, NULL, &mesh, &error), "reading", &error);
-    uint64_t points = ebpo_test_scaled(mesh.face_count > 100000 ? 60 : 1000);
+    uint64_t points = ebpo_test_scaled(mesh.face_count > 100000 ? 40 : 400);
     check_model(mesh, EBPO_RULE_NONZERO, 0.5, points, (uint64_t)_i + 5, &all);
     printf("%s: %llu in, %llu out, %llu on\n", scans[_i], (unsigned long long)all.of[EBPO_IN],
            (unsigned long long)all.of[EBPO_OUT], (unsigned long long)all.of[EBPO_ON]);
