@@ -130,7 +130,7 @@ def halve(pieces, vertices, axis, middle, folder):
 
 def write(mesh, vertices, path):
     used, local = np.unique(mesh, return_inverse=True)
-    return ebpo.convert((np.array(vertices[used]), local.reshape(-1, 3)), path).info
+    return ebpo.convert((np.array(vertices[used]), local.reshape(-1, 3)), path, overwrite=True).info
 
 
 def write_part(pieces, vertices, code, folder):

@@ -2,7 +2,7 @@
 # Builds the project and runs its tests, and stops at the first failure. Warnings are errors.
 #   tests/run.sh         what CI runs
 #   tests/run.sh quick   gcc alone and few inputs: while you work
-#   tests/run.sh full    every check in every build, with all inputs: before a release
+#   tests/run.sh full    every check in every build, with more inputs: before a release
 #   tests/run.sh [quick|full] BUILD...   only these builds of the tier
 # Builds: gcc; clang; sanitize (gcc with address and undefined); undefined (clang); thread; memory (the fuzz
 # targets and their corpora); posix (without what Linux has beyond POSIX). plan() says what each tier leaves out.
@@ -21,13 +21,15 @@ esac
 # tests/meson.build says what the suites are.
 plan() { # build
     case $tier-$1 in
-    quick-*) echo "0.02 full costly once viewer calls" ;;
+    quick-*) echo "0.02 full costly once viewer wasm calls" ;;
     full-gcc) echo "1" ;;
-    full-clang | full-sanitize | full-undefined) echo "0.2" ;;
-    default-gcc) echo "0.05 full viewer" ;;
-    default-clang) echo "0.1 full once costly viewer calls" ;;
+    full-clang | full-undefined) echo "0.03 wasm" ;;
+    full-sanitize) echo "0.02 wasm" ;;
+    default-gcc) echo "0.05 full viewer wasm" ;;
+    default-clang) echo "0.1 full once costly viewer wasm calls" ;;
     default-sanitize | default-undefined) echo "0.02 full once costly slow viewer calls" ;;
-    full-thread | *-memory) echo "1" ;; # one suite
+    *-memory) echo "1" ;; # one suite
+    full-thread) echo "0.3" ;;
     *-thread) echo "0.1" ;;
     *-posix) echo "0.1" ;;           # the tests that are named here
     esac

@@ -1,7 +1,8 @@
 #!/bin/sh
 # Installs the Debian packages that building needs; with --tests also what the tests need, with
 # --demo what the quick start needs, with --bench the peers of the benchmarks and profilers, with
-# --viewer what serves the web viewer, with --paraview ParaView (1 GB).
+# --viewer what serves the web viewer, with --npm what builds the npm package, with --paraview
+# ParaView (1 GB).
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 # Debian's nodejs comes without npm; others' brings it and conflicts with Debian's.
@@ -16,16 +17,17 @@ for option in "$@"; do
     case $option in
     --tests)
         packages="$packages abigail-tools check git hdf5-tools python3 python3-h5py python3-numpy \
-            clang clang-format libclang-rt-14-dev mandoc chromium patchelf python3-pip python3-dask \
+            clang clang-format libclang-rt-14-dev mandoc chromium python3-pip python3-dask \
             python3-distributed python3-yaml libopenmpi-dev openmpi-bin ruby zsh fish $viewer"
         [ $modules = yes ] || modules=tests ;;
     --demo) packages="$packages hdf5-tools glmark2-data python3-h5py" ;;
     --bench)
         packages="$packages libembree-dev libcgal-dev libfcl-dev libjpeg62-turbo-dev python3 \
             linux-perf valgrind" ;;
+    --npm) packages="$packages emscripten nodejs" ;;
     --paraview) packages="$packages paraview python3-paraview xvfb xauth" ;;
     --viewer) packages="$packages $viewer" modules=yes ;;
-    *) echo "usage: install-deps.sh [--tests] [--demo] [--bench] [--viewer] [--paraview]" \
+    *) echo "usage: install-deps.sh [--tests] [--demo] [--bench] [--viewer] [--npm] [--paraview]" \
         >&2; exit 2 ;;
     esac
 done

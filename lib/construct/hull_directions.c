@@ -208,9 +208,9 @@ static bool has_edge(const uint32_t *edges, int fours, uint32_t edge)
 }
 
 /* Removes the visible facets that no new facet has replaced: those with the numbers index[from] ..
- * index[to - 1], in ascending order. `count`: number of facets before. Moves the last facet to the
- * number of each removed facet. The greatest number comes first, so that the last facet is never
- * one that is still to be removed. */
+ * index[to - 1], in ascending order. `count`: number of facets before. For each removed facet, the
+ * greatest index first, the last facet of the hull takes its index. So the facet that moves is
+ * never one that must still be removed. */
 static void close_gaps(hull *h, const uint16_t *index, int from, int to, int count)
 {
     for (int i = to - 1; i >= from; i--)

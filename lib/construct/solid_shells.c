@@ -264,7 +264,7 @@ static void add_beyond(const ebpo_solid_shells *s, ebpo_shells *made)
             int more = ebpo_component_times(s, component, (ebpo_rule)rule) - 1;
             sum += more * n->components->list[component].volume;
         }
-        made->beyond[rule] = ldexp(sum, power);
+        made->volume_difference[rule] = ldexp(sum, power);
     }
 }
 

@@ -31,6 +31,7 @@ const char *ebpo_status_name(ebpo_status status)
     case EBPO_E_LIMIT: return "EBPO_E_LIMIT";
     case EBPO_E_CANCELLED: return "EBPO_E_CANCELLED";
     case EBPO_E_ABSENT: return "EBPO_E_ABSENT";
+    case EBPO_E_PENDING: return "EBPO_E_PENDING";
     }
     return "unknown status";
 }
@@ -108,7 +109,11 @@ ebpo_status ebpo_fail_memory(ebpo_error *error, uint64_t bytes)
 
 ebpo_status ebpo_fail_errno(ebpo_error *error, const char *path, const char *what)
 {
-    return ebpo_fail_file(error, EBPO_E_IO, path, "%s: %s", what, strerror(errno));
+    int number = errno;
+    ebpo_fail_file(error, EBPO_E_IO, path, "%s: %s", what, strerror(number));
+    if (error)
+        error->system_error = number;
+    return EBPO_E_IO;
 }
 
 /* No version of a struct is smaller than its size field and one member, or larger than two pages.

@@ -9,6 +9,8 @@
 
 #if defined(__SSE2__)
 #include <immintrin.h>
+#elif defined(__wasm_simd128__)
+#include <wasm_simd128.h>
 #endif
 
 #define EBPO_EIGHT static inline __attribute__((always_inline))
@@ -183,6 +185,40 @@ EBPO_EIGHT f8 f8_from_shorts(const int16_t *x)
     return (f8){ { _mm_cvtepi32_ps(_mm_srai_epi32(_mm_unpacklo_epi16(words, words), 16)),
                    _mm_cvtepi32_ps(_mm_srai_epi32(_mm_unpackhi_epi16(words, words), 16)) } };
 }
+#elif defined(__wasm_simd128__)
+/* The pseudo-minimum of WebAssembly returns its first operand unless the second one is less. */
+EBPO_EIGHT f8 f8_min(f8 a, f8 b)
+{
+    EBPO_BOTH(wasm_f32x4_pmin((v128_t)b.half[h], (v128_t)a.half[h]));
+}
+EBPO_EIGHT f8 f8_max(f8 a, f8 b)
+{
+    EBPO_BOTH(wasm_f32x4_pmax((v128_t)b.half[h], (v128_t)a.half[h]));
+}
+EBPO_EIGHT f8 f8_sqrt(f8 a) { EBPO_BOTH(wasm_f32x4_sqrt((v128_t)a.half[h])); }
+EBPO_EIGHT f8 f8_about_inverse(f8 a) { return f8_div(f8_all(1), a); }
+EBPO_EIGHT unsigned f8_bits(f8 mask)
+{
+    return (unsigned)(wasm_i32x4_bitmask((v128_t)mask.half[0]) |
+                      wasm_i32x4_bitmask((v128_t)mask.half[1]) << 4);
+}
+#define EBPO_SPREAD(a, lane) \
+    EBPO_BOTH(__builtin_shufflevector((a).half[h], (a).half[h], lane, lane, lane, lane))
+EBPO_EIGHT f8 f8_spread0(f8 a) { EBPO_SPREAD(a, 0); }
+EBPO_EIGHT f8 f8_spread1(f8 a) { EBPO_SPREAD(a, 1); }
+EBPO_EIGHT f8 f8_spread2(f8 a) { EBPO_SPREAD(a, 2); }
+EBPO_EIGHT f8 f8_spread3(f8 a) { EBPO_SPREAD(a, 3); }
+#undef EBPO_SPREAD
+EBPO_EIGHT f8 f8_from_bytes(const uint8_t *x)
+{
+    v128_t words = wasm_u16x8_load8x8(x);
+    return (f8){ { (f4)wasm_f32x4_convert_i32x4(wasm_u32x4_extend_low_u16x8(words)),
+                   (f4)wasm_f32x4_convert_i32x4(wasm_u32x4_extend_high_u16x8(words)) } };
+}
+EBPO_EIGHT f8 f8_from_shorts(const int16_t *x)
+{
+    EBPO_BOTH(wasm_f32x4_convert_i32x4(wasm_i32x4_load16x4(x + 4 * h)));
+}
 #else
 #include <math.h>
 EBPO_EIGHT f8 f8_min(f8 a, f8 b) { return f8_pick(f8_less(a, b), a, b); }
@@ -277,6 +313,15 @@ static inline unsigned v4l_mask(v4l m)
         __m128d pd[2];
     } x = { .l = m };
     return (unsigned)(_mm_movemask_pd(x.pd[0]) | _mm_movemask_pd(x.pd[1]) << 2);
+}
+#elif defined(__wasm_simd128__)
+static inline unsigned v4l_mask(v4l m)
+{
+    union {
+        v4l l;
+        v128_t half[2];
+    } x = { .l = m };
+    return (unsigned)(wasm_i64x2_bitmask(x.half[0]) | wasm_i64x2_bitmask(x.half[1]) << 2);
 }
 #else
 static inline unsigned v4l_mask(v4l m)

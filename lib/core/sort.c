@@ -88,8 +88,9 @@ static ebpo_status deal_to_groups(void *context, uint64_t begin, uint64_t end, u
 {
     sorting *t = context;
     const ebpo_sort *s = t->s;
-    /* for each group: number of records in this range, then the begin of these records in `here`,
-     * and after the copying their end */
+    /* For each group: number of records in this range, then the begin of these records in `here`,
+     * and after the copying their end. The number of groups can be slightly above GROUPS_MAX,
+     * because form_groups rounds the size of groups down. */
     uint64_t cursor[GROUPS_MAX * 2], at = 0;
     (void)worker;
     memset(cursor, 0, (size_t)t->groups * sizeof *cursor);

@@ -28,7 +28,9 @@ _Static_assert(FLT_RADIX == 2 && DBL_MANT_DIG == 53 && DBL_MAX_EXP == 1024,
 /* clang's unsafe-math flags define no macro, but these pragmas override them. They do not override
  * -ffp-contract=fast, which is not detectable here either: tests/lint/flags/fp_flags.py detects it.
  */
+#if !defined(__wasm__) /* which clang 14 does not support there */
 #pragma float_control(precise, on)
+#endif
 #pragma STDC FP_CONTRACT OFF
 #elif defined(__GNUC__)
 #pragma GCC optimize("fp-contract=off", "no-tree-slp-vectorize")

@@ -1,6 +1,7 @@
 /* Checks that text is valid UTF-8 (RFC 3629) without control characters. Checks dates and times of
- * ISO 8601. Provides streams into memory: with fopencookie they always report a lack of memory.
- * Where the C library has no fopencookie, they use open_memstream, which does not always report it.
+ * ISO 8601. Provides streams into memory: if memory is lacking, those of fopencookie always report
+ * it. Where the C library has no fopencookie, they use open_memstream, which does not always report
+ * it.
  */
 #include <stdlib.h>
 #include <string.h>
@@ -114,8 +115,7 @@ bool ebpo_is_date(const char *text)
 /* --- streams into memory --- */
 
 #ifdef EBPO_HAVE_FOPENCOOKIE
-/* Appends data that was written to the stream to its text. This is the `write` function of
- * fopencookie. */
+/* Appends bytes that stdio writes to s->text. This is the `write` function of fopencookie. */
 static ssize_t keep_text(void *cookie, const char *data, size_t bytes)
 {
     ebpo_text_stream *s = cookie;

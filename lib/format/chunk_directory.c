@@ -23,7 +23,7 @@ _Static_assert(EBPO_A_TYPES == 0 && EBPO_A_PLANES == 2 && EBPO_A_LEAF_REFS == 9 
                    EBPO_A_SUBTREE_SHARED - EBPO_A_SUBTREE_INDEX == 2,
                "the format fixes these array numbers: append new rows of array_table.inc");
 
-uint32_t ebpo_place_number(ebpo_array_id id, int level)
+uint32_t ebpo_array_list_number(ebpo_array_id id, int level)
 {
     if (id == EBPO_A_ATTRIBUTE)
         return ATTRIBUTE_NUMBERS + (uint32_t)level;
@@ -45,8 +45,8 @@ static ebpo_array_id place_array(uint32_t number, int *level)
         *level = (int)(number - ATTRIBUTE_NUMBERS);
         return EBPO_A_ATTRIBUTE;
     }
-    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_A_PLACES; id++)
-        if (ebpo_place_number((ebpo_array_id)id, 0) == number)
+    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_A_CHUNK_DIRECTORY; id++)
+        if (ebpo_array_list_number((ebpo_array_id)id, 0) == number)
             return (ebpo_array_id)id;
     return EBPO_ARRAYS;
 }
@@ -191,10 +191,10 @@ ebpo_status ebpo_stored_check(const ebpo_file *file, ebpo_error *error)
 {
     ebpo_stored_sizes sizes = reader_sizes(file);
     uint64_t stored = sizes.mesh_vertex_bytes + sizes.mesh_face_bytes + sizes.map_bytes +
-                      sizes.subtree_bytes + sizes.attribute_bytes + sizes.sum_bytes;
+                      sizes.subtree_bytes + sizes.attribute_bytes + sizes.checksum_bytes;
     for (int level = 0; level < file->info.level_count; level++)
         stored += sizes.level_bytes[level];
-    if (stored > file->info.file_bytes)
+    if (stored > file->end)
         return ebpo_fail_file(
             error, EBPO_E_FORMAT, file->in.shown,
             "the arrays' chunks take more space than the file has; get a fresh copy of the file");
@@ -232,12 +232,12 @@ ebpo_status ebpo_stored_check_expansion(const ebpo_file *file, uint64_t most, eb
 static ebpo_status find_rows(const ebpo_file *file, ebpo_array_in *a, const uint64_t *list,
                              uint64_t rows, uint64_t *row, ebpo_error *error)
 {
-    uint32_t number = ebpo_place_number(a->id, a->level);
+    uint32_t number = ebpo_array_list_number(a->id, a->level);
     uint64_t chunks = ebpo_shape_chunks(&a->shape);
-    while (*row < rows && ebpo_place_number_of(list[*row]) < number)
+    while (*row < rows && ebpo_list_row_number(list[*row]) < number)
         ++*row;
     a->first_sum = *row;
-    while (*row < rows && ebpo_place_number_of(list[*row]) == number)
+    while (*row < rows && ebpo_list_row_number(list[*row]) == number)
         ++*row;
     return *row - a->first_sum == chunks
                ? EBPO_OK
@@ -250,7 +250,7 @@ static ebpo_status find_all(ebpo_file *file, const uint64_t *list, uint64_t rows
     ebpo_status status = EBPO_OK;
     uint64_t row = 0;
     for (uint64_t i = 1; i < rows; i++)
-        if (ebpo_place_number_of(list[i]) < ebpo_place_number_of(list[i - 1]))
+        if (ebpo_list_row_number(list[i]) < ebpo_list_row_number(list[i - 1]))
             return long_chunk_fail(file, EBPO_A_CHUNK_CHECKSUMS, "the list is not in the order of",
                                    "arrays' numbers", error);
     for (int i = 0; i < ebpo_all_arrays(file) && status == EBPO_OK; i++)
@@ -354,7 +354,7 @@ static uint64_t *seen_of(listing *l, ebpo_array_id id, int level)
 static ebpo_status list_fails(const ebpo_file *file, const char *what, const char *path,
                               ebpo_error *error)
 {
-    return long_chunk_fail(file, EBPO_A_PLACES, what, path, error);
+    return long_chunk_fail(file, EBPO_A_CHUNK_DIRECTORY, what, path, error);
 }
 
 static ebpo_status list_chunk(listing *l, uint32_t number, ebpo_chunk_location chunk,
@@ -392,7 +392,7 @@ static ebpo_status begin_array(ebpo_file *file, ebpo_array_in *a, uint64_t *chun
     if (!a->present || a->chunks)
         return EBPO_OK;
     *chunks += ebpo_shape_chunks(&a->shape);
-    if (*chunks > file->root_array[EBPO_A_PLACES].shape.rows)
+    if (*chunks > file->root_array[EBPO_A_CHUNK_DIRECTORY].shape.rows)
         return list_fails(file, "the list has fewer chunks than", a->path, error);
     a->stored_bytes = 0;
     a->chunks = ebpo_alloc_zero(ebpo_shape_chunks(&a->shape), sizeof *a->chunks);
@@ -418,13 +418,13 @@ static ebpo_status list_chunks(ebpo_file *file, const uint64_t *places, uint64_t
     if (l)
         l->file = file;
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
-        if (ebpo_place_bytes_of(places[i]) > file->info.file_bytes - at)
+        if (ebpo_list_row_value(places[i]) > file->end - at)
             status =
                 list_fails(file, "a chunk is beyond the end of the file in", "the list", error);
         else
-            status = list_chunk(l, ebpo_place_number_of(places[i]),
-                                (ebpo_chunk_location){ at, ebpo_place_bytes_of(places[i]) }, error);
-        at += ebpo_place_bytes_of(places[i]);
+            status = list_chunk(l, ebpo_list_row_number(places[i]),
+                                (ebpo_chunk_location){ at, ebpo_list_row_value(places[i]) }, error);
+        at += ebpo_list_row_value(places[i]);
     }
     for (int i = 0; i < ebpo_all_arrays(file) && status == EBPO_OK; i++)
         status = end_array(l, ebpo_array_number(file, i), error);
@@ -446,7 +446,7 @@ static void forget_places(ebpo_file *file)
 
 static ebpo_status locate_by_list(ebpo_file *file, ebpo_error *error)
 {
-    const ebpo_array_in *a = &file->root_array[EBPO_A_PLACES];
+    const ebpo_array_in *a = &file->root_array[EBPO_A_CHUNK_DIRECTORY];
     uint64_t *places;
     ebpo_status status = ebpo_long_chunk_read(file, a, &places, error);
     if (status == EBPO_OK)
@@ -464,7 +464,7 @@ static ebpo_status locate_all(ebpo_file *file, ebpo_error *error)
     ebpo_status status = EBPO_OK;
     pthread_mutex_lock(&file->lock);
     if (!atomic_load(&file->located)) {
-        status = file->has_places ? locate_by_list(file, error) : locate_by_index(file, error);
+        status = file->has_directory ? locate_by_list(file, error) : locate_by_index(file, error);
         if (status == EBPO_OK)
             atomic_store(&file->located, true);
     }

@@ -11,7 +11,7 @@
 #include "hdf5_read/chunk.h"
 
 /* A common index for all arrays that a file can have, in the order of their numbers in the format
- * (ebpo_place_number). */
+ * (ebpo_array_list_number). */
 enum {
     EBPO_ARRAYS_OF_LEVELS = EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS,
     EBPO_ARRAYS_OF_FORMAT = EBPO_ARRAYS_OF_LEVELS + EBPO_ARRAYS - EBPO_LEVEL_ARRAYS
@@ -37,18 +37,19 @@ static inline ebpo_array_in *ebpo_array_number(ebpo_file *file, int i)
  * --- */
 
 /* Array number of a list row that describes bytes between chunks. */
-#define EBPO_PLACE_GAP UINT32_MAX
+#define EBPO_ROW_NO_ARRAY UINT32_MAX
 
 /* Returns the number that the list uses for an array. */
-uint32_t ebpo_place_number(ebpo_array_id id, int level);
+uint32_t ebpo_array_list_number(ebpo_array_id id, int level);
 
-/* Encode a row of the list (array number and stored bytes of a chunk), and decode it. */
-static inline uint64_t ebpo_place(uint32_t number, uint64_t bytes)
+/* Encode and decode a row of a list of chunks: the array's number, and the stored bytes or the
+ * checksum of the chunk. */
+static inline uint64_t ebpo_list_row(uint32_t number, uint64_t value)
 {
-    return (uint64_t)number << 32 | (uint32_t)bytes;
+    return (uint64_t)number << 32 | (uint32_t)value;
 }
-static inline uint32_t ebpo_place_number_of(uint64_t place) { return (uint32_t)(place >> 32); }
-static inline uint32_t ebpo_place_bytes_of(uint64_t place) { return (uint32_t)place; }
+static inline uint32_t ebpo_list_row_number(uint64_t row) { return (uint32_t)(row >> 32); }
+static inline uint32_t ebpo_list_row_value(uint64_t row) { return (uint32_t)row; }
 
 /* --- lists of u64 in a single chunk, however long --- */
 
@@ -88,7 +89,7 @@ EBPO_MUST_USE ebpo_status ebpo_stored_check_expansion(const ebpo_file *file, uin
 
 /* Returns the list entry of a chunk: its last four bytes, which are its checksum in every pipeline
  * that has one. `bytes`: stored size, at least four. */
-static inline uint32_t ebpo_chunk_sum(const uint8_t *stored, size_t bytes)
+static inline uint32_t ebpo_chunk_checksum(const uint8_t *stored, size_t bytes)
 {
     return ebpo_load32(stored + bytes - 4);
 }
@@ -101,7 +102,7 @@ EBPO_MUST_USE ebpo_status ebpo_chunk_checksums_read(const ebpo_file *file, ebpo_
 static inline bool ebpo_chunk_fits(const ebpo_file *file, const ebpo_array_in *array,
                                    uint64_t chunk, const uint8_t *stored, size_t bytes)
 {
-    return !file->checksums || (bytes >= 4 && ebpo_chunk_sum(stored, bytes) ==
+    return !file->checksums || (bytes >= 4 && ebpo_chunk_checksum(stored, bytes) ==
                                                   file->checksums[array->first_sum + chunk]);
 }
 

@@ -76,13 +76,14 @@ typedef struct ebpo_attributes_in {
 
 struct ebpo_file {
     ebpo_input in;
+    uint64_t end; /* of the HDF5 file; the stored file may have more bytes */
     ebpo_info info;
     ebpo_array_in level_array[EBPO_LEVELS_MAX][EBPO_LEVEL_ARRAYS];
     ebpo_array_in root_array[EBPO_ARRAYS]; /* from EBPO_A_VERTICES on */
     ebpo_attributes_in attributes;
     pthread_mutex_t lock;
     atomic_bool located; /* the chunks of all arrays are located */
-    bool has_places;     /* the file has a list of chunk offsets */
+    bool has_directory;  /* the file has a list of chunk offsets */
     bool has_checksums;  /* the file has a list of chunk checksums: chunk_directory.h */
     atomic_bool summed;  /* the list of chunk checksums has been read */
     uint32_t *checksums; /* NULL until then */

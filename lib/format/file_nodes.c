@@ -207,9 +207,9 @@ static ebpo_status read_types(ebpo_chunks *chunks, int level, uint64_t group, eb
                                       sizeof out->types, error);
     if (status != EBPO_OK)
         return status;
-    if (level && out->types == 0 && !chunks->file->info.pruned)
+    if (level && !ebpo_group_lists_faces(out->types) && (out->types || !chunks->file->info.pruned))
         return ebpo_chunks_fail(chunks, level, EBPO_A_TYPES,
-                                "a group is 0: all children of a gray node are white", error);
+                                "a gray node has no child that is gray or a leaf", error);
     ebpo_groups_count(&out->types, 1, counts);
     if (level == 0)
         counts[EBPO_WHITE] =

@@ -82,7 +82,7 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, ebpo_array_id id
     if (rows == 0 || (spec->if_needed && ebpo_head_find_kind(head, a->path) == EBPO_HEAD_ABSENT))
         return EBPO_OK;
     /* offsets of several chunks are read later from the index of remote files, or from the list */
-    uint64_t most = ebpo_input_is_remote(&file->in) || file->has_places ? 1 : UINT64_MAX;
+    uint64_t most = ebpo_input_is_remote(&file->in) || file->has_directory ? 1 : UINT64_MAX;
     char coding[EBPO_HEAD_CODING_BYTES];
     ebpo_status status =
         ebpo_head_read_array(head, a->path, most, ebpo_reader_rows_of_chunk(file, id), &a->shape,
@@ -102,9 +102,9 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, ebpo_array_id id
                                error);
     uint32_t block = block_rows(&file->info, id);
     if (block && a->shape.chunk_rows != (rows < block ? rows : block))
-        return ebpo_check_fail(&check, -1, a->path,
-                               "the array's chunks do not have the size that the format requires",
-                               error);
+        return ebpo_fail_at(error, EBPO_E_UNSUPPORTED, file->in.shown, a->path, -1,
+                            "the array's chunks do not have the size that the format "
+                            "requires, " EBPO_HEAD_FOREIGN);
     bool wide = file->info.double_coordinates;
     if (id == EBPO_A_VERTICES && a->shape.element_size != (wide ? 8 : 4))
         return ebpo_check_fail(&check, -1, a->path, "the array's type contradicts coordinate_type",
@@ -216,7 +216,7 @@ static ebpo_status open_arrays(ebpo_file *file, ebpo_head *head, ebpo_error *err
     info->file_bytes = file->in.source.size;
     ebpo_status status = open_group(head, "/subtrees", info->subtree_level != 0, error);
     if (status == EBPO_OK && info->subtree_level)
-        status = open_list(file, head, EBPO_A_PLACES, &file->has_places, error);
+        status = open_list(file, head, EBPO_A_CHUNK_DIRECTORY, &file->has_directory, error);
     if (status == EBPO_OK)
         status = open_checksums(file, head, error);
     if (status == EBPO_OK)
@@ -230,7 +230,7 @@ static ebpo_status open_arrays(ebpo_file *file, ebpo_head *head, ebpo_error *err
             if (level == 0 && id == EBPO_A_TYPES && a->chunks)
                 info->head_bytes = a->chunks[0].address; /* the first array in the file */
         }
-    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_A_PLACES && status == EBPO_OK; id++)
+    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_A_CHUNK_DIRECTORY && status == EBPO_OK; id++)
         status = open_array(file, head, (ebpo_array_id)id, 0, error);
     if (status == EBPO_OK)
         status = ebpo_attributes_open(file, head, error);
@@ -255,6 +255,7 @@ static void discard_bad_index(ebpo_info *info, uint64_t size)
 static ebpo_status read_head(ebpo_file *file, ebpo_head *head, ebpo_error *error)
 {
     ebpo_head_object root;
+    file->end = head->end;
     ebpo_status status = ebpo_head_open_group(head, "/", &root, error);
     if (status == EBPO_OK)
         status = ebpo_facts_get(head, root, &file->info, error);

@@ -104,7 +104,7 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, int number, ebpo
     char coding[EBPO_HEAD_CODING_BYTES];
     *a = (ebpo_array_in){ .id = EBPO_A_ATTRIBUTE, .level = number };
     ebpo_attribute_path(number, a->path);
-    uint64_t most = ebpo_input_is_remote(&file->in) || file->has_places ? 1 : UINT64_MAX;
+    uint64_t most = ebpo_input_is_remote(&file->in) || file->has_directory ? 1 : UINT64_MAX;
     ebpo_status status =
         ebpo_head_read_array(head, a->path, most, ebpo_reader_rows_of_chunk(file, EBPO_A_ATTRIBUTE),
                              &a->shape, coding, &a->chunks, &a->stored_bytes, error);

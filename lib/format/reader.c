@@ -225,10 +225,10 @@ void ebpo_hint_top(const ebpo_file *file)
     ebpo_file *own = ebpo_reader_own(file);
     uint64_t index_end = info->chunk_index_offset + info->chunk_index_bytes, from,
              top = info->top_bytes < info->file_bytes ? info->top_bytes : info->file_bytes;
-    if (!ebpo_input_prefetches(&file->in) || !file->has_places || atomic_load(&file->located) ||
+    if (!ebpo_input_prefetches(&file->in) || !file->has_directory || atomic_load(&file->located) ||
         !is_top(info))
         return;
-    const ebpo_chunk_location *places = file->root_array[EBPO_A_PLACES].chunks;
+    const ebpo_chunk_location *places = file->root_array[EBPO_A_CHUNK_DIRECTORY].chunks;
     ebpo_range range[4] = { { places->address, places->bytes } };
     size_t count = 1;
     if (wants_checksums(file))

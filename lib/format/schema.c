@@ -67,15 +67,15 @@ const ebpo_array_spec ebpo_schema[EBPO_ARRAYS] = {
                       .bytes = offsetof(ebpo_stored_sizes, subtree_bytes),   \
                       .coding = "plain",                                     \
                       .about = about_ },
-#define SUM_ARRAY(ID, path, stored, per_, about_)                      \
-    [EBPO_A_##ID] = { .name = path,                                    \
-                      .per = EBPO_PER_##per_,                          \
-                      .needs = EBPO_NEEDS_ALWAYS,                      \
-                      .sizes = stored,                                 \
-                      .since = 1,                                      \
-                      .if_needed = true,                               \
-                      .bytes = offsetof(ebpo_stored_sizes, sum_bytes), \
-                      .coding = "plain",                               \
+#define SUM_ARRAY(ID, path, stored, per_, about_)                           \
+    [EBPO_A_##ID] = { .name = path,                                         \
+                      .per = EBPO_PER_##per_,                               \
+                      .needs = EBPO_NEEDS_ALWAYS,                           \
+                      .sizes = stored,                                      \
+                      .since = 1,                                           \
+                      .if_needed = true,                                    \
+                      .bytes = offsetof(ebpo_stored_sizes, checksum_bytes), \
+                      .coding = "plain",                                    \
                       .about = about_ },
 #include "format/array_table.inc"
     [EBPO_A_ATTRIBUTE] = { .name = "/attributes",
@@ -140,7 +140,7 @@ void ebpo_schema_path(ebpo_array_id id, int level, char path[EBPO_PATH_BYTES])
 const char *ebpo_schema_former(ebpo_array_id id)
 {
     return id == EBPO_A_SUBTREE_SHARED    ? "/subtrees/outer"
-           : id == EBPO_A_PLACES          ? "/subtrees/places"
+           : id == EBPO_A_CHUNK_DIRECTORY ? "/subtrees/places"
            : id == EBPO_A_CHUNK_CHECKSUMS ? "/chunk_sums"
                                           : NULL;
 }
@@ -382,19 +382,24 @@ static ebpo_status check_types(const ebpo_check *check, const ebpo_info *info, i
                                error);
     if (level == 0 && arrays->types[0] > 3)
         return ebpo_check_fail(check, level, "types", "the root has siblings", error);
-    uint64_t empty = 0;
+    uint64_t empty = 0, closed = 0;
     EBPO_FOR_ITEMS(check->workspace, i, 0, groups) {
         for (unsigned octant = 0; octant < ebpo_group_octants(level); octant++)
             counts[ebpo_group_type(arrays->types[i], octant)]++;
     }
-    for (uint64_t i = 0; i < groups; i++)
+    for (uint64_t i = 0; i < groups; i++) {
         empty += arrays->types[i] == 0;
+        closed += arrays->types[i] != 0 && !ebpo_group_lists_faces(arrays->types[i]);
+    }
+    if (level && closed)
+        return ebpo_check_fail(check, level, "types",
+                               "a gray node has no child that is gray or a leaf", error);
     if (level && empty != info->level[level - 1].pruned_count)
         return ebpo_check_fail(
             check, level, "types",
             info->pruned ? "there is not exactly one empty group for each pruned node of the "
                            "level above"
-                         : "a group is 0: all children of a gray node are white",
+                         : "a gray node has no child that is gray or a leaf",
             error);
     const ebpo_level_summary *s = &info->level[level];
     if (counts[EBPO_WHITE] != s->white_count || counts[EBPO_BLACK] != s->black_count ||

@@ -195,7 +195,7 @@ static inline bool ebpo_schema_is_index(int id)
  * chunk, which neither list contains. */
 static inline bool ebpo_schema_is_list(ebpo_array_id id)
 {
-    return id == EBPO_A_PLACES || id == EBPO_A_CHUNK_CHECKSUMS;
+    return id == EBPO_A_CHUNK_DIRECTORY || id == EBPO_A_CHUNK_CHECKSUMS;
 }
 
 static inline bool ebpo_schema_is_held(int id) { return ebpo_schema[id].held_size != 0; }

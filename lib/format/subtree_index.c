@@ -191,15 +191,22 @@ uint64_t ebpo_subtree_groups(const ebpo_info *info, const ebpo_subtree_row *row,
  * because a chunk of rows is added up. Typically two threads read at once. */
 enum {
     KEPT = 4,                     /* number of rows in the cache */
-    FACES_KNOWN = 64,             /* number of remembered subtrees whose faces were checked */
+    FACES_KNOWN_MAX = 1 << 20,    /* subtrees from this number on are not remembered */
     BY_NUMBER = EBPO_SUBTREE_COLS /* in place of a column: find a row by the subtree's index */
 };
 
 struct ebpo_kept_rows {
     ebpo_subtree_row row[KEPT];
     unsigned count, next;
-    uint64_t faces_known[FACES_KNOWN]; /* numbers of subtrees, plus 1 */
+    uint8_t faces_known[]; /* a bit for each subtree: its faces were checked */
 };
+
+/* Returns the number of subtrees for which it is remembered that their faces were checked. */
+static uint64_t remembered_subtrees(const ebpo_info *info)
+{
+    uint64_t subtrees = info->level[info->subtree_level].gray_count;
+    return subtrees < FACES_KNOWN_MAX ? subtrees : FACES_KNOWN_MAX;
+}
 
 static bool row_holds(const ebpo_subtree_row *row, unsigned column, uint64_t item)
 {
@@ -230,8 +237,9 @@ static ebpo_status keep_row(ebpo_chunks *chunks, const ebpo_subtree_row *row, eb
         return status;
     pthread_mutex_lock(&chunks->lock);
     if (!chunks->rows)
-        chunks->rows = ebpo_alloc_zero(1, sizeof *chunks->rows); /* without memory, rows are not
-                                                                  * cached */
+        chunks->rows =
+            ebpo_alloc_zero(1, sizeof *chunks->rows + remembered_subtrees(&chunks->file->info) / 8 +
+                                   1); /* without memory, rows are not cached */
     if (chunks->rows) {
         chunks->rows->row[chunks->rows->next] = *row;
         chunks->rows->next = (chunks->rows->next + 1) % KEPT;
@@ -244,7 +252,8 @@ static ebpo_status keep_row(ebpo_chunks *chunks, const ebpo_subtree_row *row, eb
 bool ebpo_subtree_faces_known(ebpo_chunks *chunks, uint64_t subtree)
 {
     pthread_mutex_lock(&chunks->lock);
-    bool known = chunks->rows && chunks->rows->faces_known[subtree % FACES_KNOWN] == subtree + 1;
+    bool known = chunks->rows && subtree < remembered_subtrees(&chunks->file->info) &&
+                 chunks->rows->faces_known[subtree / 8] >> subtree % 8 & 1;
     pthread_mutex_unlock(&chunks->lock);
     return known;
 }
@@ -252,8 +261,8 @@ bool ebpo_subtree_faces_known(ebpo_chunks *chunks, uint64_t subtree)
 void ebpo_subtree_faces_note(ebpo_chunks *chunks, uint64_t subtree)
 {
     pthread_mutex_lock(&chunks->lock);
-    if (chunks->rows)
-        chunks->rows->faces_known[subtree % FACES_KNOWN] = subtree + 1;
+    if (chunks->rows && subtree < remembered_subtrees(&chunks->file->info))
+        chunks->rows->faces_known[subtree / 8] |= (uint8_t)(1u << subtree % 8);
     pthread_mutex_unlock(&chunks->lock);
 }
 

@@ -1,5 +1,5 @@
 /* Writes a file: ebpo_tree_write. ebpo_file_repack reads a file and writes it again with other
- * options. Source: format-spec/hdf5-messages.md and subtrees.md.
+ * options. Specification: format-spec/hdf5-messages.md and subtrees.md.
  *
  * The headers (groups, array headers, attributes) come first in the file. To determine their size,
  * the same file is first written in memory, with tiny chunks. Then several threads encode and
@@ -36,13 +36,13 @@
 /* The lists that have a row for each chunk. */
 typedef enum header_list {
     LIST_CHECKSUMS, /* /chunk_checksums: chunk checksums, in the order of arrays */
-    LIST_SIZES,     /* /subtrees/chunk_directory: stored sizes in file order; their sums are chunk
-                       offsets */
+    LIST_SIZES,     /* /subtrees/chunk_directory: stored sizes in file order; their running sums are
+                       chunk offsets */
     LISTS
 } header_list;
 
 typedef struct file_headers {
-    ebpo_plan *plan; /* lay_out and headers_begin_index set the handles of its arrays */
+    ebpo_plan *plan; /* write_headers and headers_begin_index set the handles of its arrays */
     ebpo_h5_out out;
     ebpo_h5_id root;
     ebpo_array_out list[LISTS]; /* a list without rows is not written */
@@ -85,8 +85,8 @@ static void plan_list(file_headers *h, header_list list, ebpo_array_id id, uint6
                                  .pipeline = h->plan->array[0].shape.pipeline };
 }
 
-/* Initialises the headers. The caller keeps the plan. At the end, the caller calls headers_close
- * and then ebpo_h5_finish or ebpo_h5_discard. */
+/* Initialises the headers. They refer to the plan, which the caller frees after headers_close. At
+ * the end, the caller calls headers_close and then ebpo_h5_finish or ebpo_h5_discard. */
 static void headers_plan(file_headers *h, ebpo_plan *plan, uint64_t chunks,
                          const ebpo_write_options *options)
 {
@@ -96,7 +96,7 @@ static void headers_plan(file_headers *h, ebpo_plan *plan, uint64_t chunks,
     };
     h->out = (ebpo_h5_out)EBPO_H5_OUT_INIT;
     plan_list(h, LIST_CHECKSUMS, EBPO_A_CHUNK_CHECKSUMS, has_checksums ? chunks : 0);
-    plan_list(h, LIST_SIZES, EBPO_A_PLACES,
+    plan_list(h, LIST_SIZES, EBPO_A_CHUNK_DIRECTORY,
               plan->info.subtree_level ? chunks + has_index(plan) + has_checksums : 0);
 }
 
@@ -185,8 +185,8 @@ static ebpo_status make_array(file_headers *h, ebpo_array_out *a, const first_ch
  * enlarges the block instead of using its free space. So the first chunk is written early, before
  * the attributes of the first array. The chunk is then stored after the block. The block cannot
  * grow any more, so all later headers use its free space. */
-static ebpo_status lay_out(file_headers *h, const char *path, const char *shown,
-                           uint64_t head_bytes, first_chunk first, ebpo_error *error)
+static ebpo_status write_headers(file_headers *h, const char *path, const char *shown,
+                                 uint64_t head_bytes, first_chunk first, ebpo_error *error)
 {
     ebpo_plan *plan = h->plan;
     h->out.codec_level = h->codec_level;
@@ -244,7 +244,7 @@ static void headers_close(file_headers *h)
 static ebpo_status headers_lay_out(file_headers *h, const char *path, const char *shown,
                                    first_chunk first, ebpo_error *error)
 {
-    return lay_out(h, path, shown, h->head_bytes, first, error);
+    return write_headers(h, path, shown, h->head_bytes, first, error);
 }
 
 /* Measures headers and HDF5's chunk indexes by writing the same file in memory, with chunks of one
@@ -254,7 +254,7 @@ static ebpo_status headers_measure(file_headers *h, const char *shown, ebpo_erro
     ebpo_plan *plan = h->plan;
     uint64_t capacity = (256 << 10) + (4 << 10) * (uint64_t)plan->count + 32 * h->chunks,
              headers = 0, all = 0;
-    ebpo_status status = lay_out(h, NULL, shown, capacity, (first_chunk){ "", 1 }, error);
+    ebpo_status status = write_headers(h, NULL, shown, capacity, (first_chunk){ "", 1 }, error);
     if (status == EBPO_OK)
         status = ebpo_h5_head_used(&h->out, capacity, &headers, error);
     for (unsigned i = 0; i < plan->count && status == EBPO_OK; i++) {
@@ -296,8 +296,8 @@ static ebpo_status headers_begin_index(file_headers *h, ebpo_error *error)
 
 /* --- chunks --- */
 
-/* Number of chunks that are in memory together, which is called a window. They have up to 8 MiB
- * before compression, and the compressed chunks have space for as much. */
+/* Maximum number of chunks of a window. A window is the chunks that are in memory together: all
+ * together at most 8 MiB before compression, and at most 8 MiB compressed. */
 enum { WINDOW = 128 };
 
 /* A chunk of the window. */
@@ -322,12 +322,13 @@ typedef struct writer {
     ebpo_array_digest *digest; /* [arrays of the plan] */
     ebpo_content content[EBPO_DIGESTS];
     uint64_t chunk_bytes, chunks_done; /* stored bytes and number of the chunks so far */
-    uint64_t *checksum_row;   /* [chunks] rows of the list of chunk checksums, if it is written */
-    uint64_t *first_checksum; /* [arrays of the plan] index of the array's first chunk there */
-    uint64_t *size_row;       /* rows of the list of chunk sizes, if it is written */
-    uint64_t size_rows;       /* number of these rows so far */
-    uint64_t top_bytes;       /* end of the chunks with which a reader locates a subtree */
-    uint64_t index_at;        /* offset of HDF5's chunk indexes; 0: none, or not yet written */
+    uint64_t *checksum_row; /* [chunks] rows of the list of chunk checksums, if it is written */
+    uint64_t
+        *first_checksum; /* [arrays of the plan] index of the array's first row in checksum_row */
+    uint64_t *size_row;  /* rows of the list of chunk sizes, if it is written */
+    uint64_t size_rows;  /* number of these rows so far */
+    uint64_t top_bytes;  /* end of the chunks with which a reader locates a subtree */
+    uint64_t index_at;   /* offset of HDF5's chunk indexes; 0: none, or not yet written */
 } writer;
 
 /* Encodes the rows of chunks begin .. end - 1 of the window. Pads the last chunk of an array with
@@ -432,22 +433,22 @@ static void add_size_row(writer *w, uint32_t number, uint64_t bytes)
 {
     if (!w->head.list[LIST_SIZES].shape.rows)
         return;
-    w->size_row[w->size_rows++] = ebpo_place(number, bytes);
+    w->size_row[w->size_rows++] = ebpo_list_row(number, bytes);
 }
 
-/* Adds a chunk to the lists, and its size to the sizes so far. Called in file order, before the
- * chunk is written. */
+/* Adds a chunk to the lists, and its size to the total (chunk_bytes). Called in file order, before
+ * the chunk is written. */
 static void list_chunk(writer *w, const slot *s)
 {
     if (w->index_at == 0 && ebpo_shape_chunks(&s->array->shape) > 1) {
         w->index_at = w->head.head_bytes + w->chunk_bytes;
-        add_size_row(w, EBPO_PLACE_GAP, w->head.index_bytes);
+        add_size_row(w, EBPO_ROW_NO_ARRAY, w->head.index_bytes);
     }
-    uint32_t number = ebpo_place_number(s->array->id, s->array->level);
+    uint32_t number = ebpo_array_list_number(s->array->id, s->array->level);
     add_size_row(w, number, s->stored_bytes);
     if (w->head.list[LIST_CHECKSUMS].shape.rows)
         w->checksum_row[w->first_checksum[s->array - w->plan.array] + s->chunk] =
-            ebpo_place(number, ebpo_chunk_sum(s->stored, s->stored_bytes));
+            ebpo_list_row(number, ebpo_chunk_checksum(s->stored, s->stored_bytes));
     w->chunk_bytes += s->stored_bytes;
     if (w->chunks_done + 1 == w->order.top)
         w->top_bytes =
@@ -515,7 +516,7 @@ static ebpo_status write_lists(writer *w, ebpo_error *error)
     ebpo_status status =
         write_list(w, LIST_CHECKSUMS, values[LIST_CHECKSUMS], &bytes[LIST_CHECKSUMS], error);
     if (status == EBPO_OK && bytes[LIST_CHECKSUMS])
-        add_size_row(w, ebpo_place_number(EBPO_A_CHUNK_CHECKSUMS, 0), bytes[LIST_CHECKSUMS]);
+        add_size_row(w, ebpo_array_list_number(EBPO_A_CHUNK_CHECKSUMS, 0), bytes[LIST_CHECKSUMS]);
     if (status == EBPO_OK)
         status = write_list(w, LIST_SIZES, values[LIST_SIZES], &bytes[LIST_SIZES], error);
     if (status == EBPO_OK)
@@ -584,7 +585,7 @@ static ebpo_status put_digests(writer *w, ebpo_error *error)
                : status;
 }
 
-/* Writes the whole file. Does not check where libhdf5 places its metadata. Another version of
+/* Writes the whole file. Does not fail if libhdf5 places its metadata elsewhere. Another version of
  * libhdf5 may place metadata differently: readers accept such a file, but tests that compare bytes
  * fail. */
 static ebpo_status write_file(writer *w, const char *path, const char *shown, ebpo_error *error)
@@ -719,8 +720,8 @@ static ebpo_status check_written(const ebpo_file *from, const ebpo_publish *out,
                ? status
                : ebpo_fail_file(error, EBPO_E_UNSUPPORTED, from->in.shown,
                                 "repacking would change the content checksum, although the "
-                                "stored one is correct; another program has stored the arrays in "
-                                "ways that this one does not write. Nothing was written");
+                                "stored checksum is correct; another program has stored the "
+                                "arrays in ways that ebpo does not write. Nothing was written");
 }
 
 ebpo_status ebpo_file_repack(const ebpo_file *file, const char *path, const ebpo_read_options *read,

@@ -675,7 +675,7 @@ ebpo_status ebpo_plan_make(ebpo_plan *plan, const ebpo_tree *tree,
     for (int level = 0; level < plan->info.level_count; level++)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
             add_array(plan, (ebpo_array_id)id, level);
-    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_A_PLACES; id++)
+    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_A_CHUNK_DIRECTORY; id++)
         add_array(plan, (ebpo_array_id)id, 0);
     attributes_add_arrays(plan, pipeline_of(plan->info.codec));
 done:

@@ -43,6 +43,9 @@ static inline unsigned ebpo_group_count(uint16_t types, ebpo_node_type type, uns
 /* Counts nodes of each type in groups of eight, 16 bits each, little-endian, at any address. */
 void ebpo_groups_count(const void *types, uint64_t groups, uint64_t counts[4]);
 
+/* Returns true if one of the eight nodes is gray or a leaf, which have bit 1 of their type set. */
+static inline bool ebpo_group_lists_faces(uint16_t types) { return types & 0xaaaa; }
+
 /* Same as ebpo_groups_count for groups of one level. Level 0 has only its root. */
 static inline void ebpo_groups_count_at(int level, const uint16_t *types, uint64_t groups,
                                         uint64_t counts[4])

@@ -52,9 +52,9 @@ static int projection_axis(const double corner[3][3])
     return -1;
 }
 
-/* Compares the other projection with an edge of the first one. Returns 2 if the other projection is
- * strictly on the outer side of the edge's line, 1 if it is on the outer side or on the line,
- * otherwise 0. */
+/* Compares the projection `other` with the edge from - to of another projection. `outer`: the sign
+ * of ebpo_orient2d on the outer side of this edge. Returns 2 if `other` is strictly on the outer
+ * side of the edge's line, 1 if it is on the outer side or on the line, otherwise 0. */
 static int separated_by_edge(const double from[2], const double to[2], int outer,
                              const projection *other)
 {
@@ -165,7 +165,7 @@ static bool segment_intersects_triangle(const ends *s, const double t[3][3], int
     return left || (around[0] <= 0 && around[1] <= 0 && around[2] <= 0);
 }
 
-/* Classifies a pair if a face has no area or both faces are in one plane. */
+/* Classifies a pair in which a face has no area or both faces are in one plane. */
 static ebpo_pair_kind classify_flat(const double a[3][3], const double b[3][3])
 {
     int axis_a = projection_axis(a), axis_b = projection_axis(b);
@@ -219,8 +219,8 @@ static bool on_both_sides(const int side[3])
     return above && (side[0] < 0 || side[1] < 0 || side[2] < 0);
 }
 
-/* Returns the only corner on the positive side of the plane. If there is none or more than one:
- * the only corner on the negative side; otherwise the only corner in the plane. */
+/* Returns the first that exists of: the only corner on the positive side of the plane, the only
+ * corner on the negative side, the only corner in the plane. */
 static int corner_alone(const int side[3])
 {
     static const int order[] = { 1, -1, 0 };
@@ -235,7 +235,7 @@ static int corner_alone(const int side[3])
 
 /* Reorders the corners cyclically so that the one that is alone comes first. Returns true if this
  * corner is below another one: the other face's plane must then be flipped. */
-static bool turn_corners(const int side[3], int corner[3])
+static bool reorder_corners(const int side[3], int corner[3])
 {
     corner[0] = corner_alone(side);
     corner[1] = corner[0] == 2 ? 0 : corner[0] + 1;
@@ -265,8 +265,8 @@ bool ebpo_turn_pair(const double a[3][3], const double b[3][3], ebpo_turned_pair
         return false;
     }
     /* side_a is relative to B's plane, so the corners of A determine if B's plane is flipped */
-    out->flipped_b = turn_corners(out->side_a, out->a);
-    out->flipped_a = turn_corners(out->side_b, out->b);
+    out->flipped_b = reorder_corners(out->side_a, out->a);
+    out->flipped_a = reorder_corners(out->side_b, out->b);
     if (out->flipped_b)
         swap_corners(&out->b[1], &out->b[2]);
     if (out->flipped_a)

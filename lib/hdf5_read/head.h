@@ -13,7 +13,7 @@
 
 typedef struct ebpo_head {
     const char *shown; /* the input's name */
-    uint64_t file_bytes;
+    uint64_t end;      /* of the HDF5 file; the stored file may have more bytes */
     struct ebpo_head_state *state;
 } ebpo_head;
 #define EBPO_HEAD_INIT \

@@ -38,6 +38,7 @@ typedef struct ebpo_head_chunks {
     bool filtered;
     /* number of chunks; bytes of a chunk before its filters, and the most bytes after them */
     uint64_t count, whole, bound;
+    uint64_t end;               /* of the file */
     ebpo_chunk_location *place; /* out: `count` offsets and sizes */
     uint64_t stored;            /* out: bytes of all chunks */
     uint64_t at;                /* out: the invalid chunk; UINT64_MAX: none in particular */
@@ -98,8 +99,8 @@ static const char *read_layout(ebpo_head_cursor c, ebpo_head_layout *l, bool *fo
 }
 
 /* Stores the offset of the next chunk. */
-static const char *take_place(ebpo_head_chunks *t, uint64_t i, uint64_t file_bytes,
-                              uint64_t address, uint64_t bytes, uint32_t mask)
+static const char *take_place(ebpo_head_chunks *t, uint64_t i, uint64_t address, uint64_t bytes,
+                              uint32_t mask)
 {
     t->at = i;
     if (address == EBPO_NO_ADDRESS || bytes == 0)
@@ -108,15 +109,15 @@ static const char *take_place(ebpo_head_chunks *t, uint64_t i, uint64_t file_byt
         return "the chunk was stored without its filters";
     if (bytes > t->bound)
         return "the chunk is larger than its filters allow";
-    if (address > file_bytes || bytes > file_bytes - address)
+    if (address > t->end || bytes > t->end - address)
         return "the chunk is beyond the end of the file";
     t->place[i] = (ebpo_chunk_location){ address, (uint32_t)bytes };
     t->stored += bytes;
     t->at = UINT64_MAX;
-    return t->stored > file_bytes ? "the array's chunks do not fit the file" : NULL;
+    return t->stored > t->end ? "the array's chunks do not fit the file" : NULL;
 }
 
-static const char *read_single(ebpo_head_chunks *t, uint64_t file_bytes)
+static const char *read_single(ebpo_head_chunks *t)
 {
     const ebpo_head_layout *l = t->layout;
     if (t->count != 1)
@@ -127,11 +128,10 @@ static const char *read_single(ebpo_head_chunks *t, uint64_t file_bytes)
     }
     if (t->filtered != l->single_filtered)
         return contradicts;
-    return take_place(t, 0, file_bytes, l->address, t->filtered ? l->single_bytes : t->whole,
-                      l->single_mask);
+    return take_place(t, 0, l->address, t->filtered ? l->single_bytes : t->whole, l->single_mask);
 }
 
-static const char *read_implicit(ebpo_head_chunks *t, uint64_t file_bytes)
+static const char *read_implicit(ebpo_head_chunks *t)
 {
     const ebpo_head_layout *l = t->layout;
     const char *wrong = t->filtered ? contradicts : NULL;
@@ -140,7 +140,7 @@ static const char *read_implicit(ebpo_head_chunks *t, uint64_t file_bytes)
         if (l->address != EBPO_NO_ADDRESS && (__builtin_mul_overflow(i, t->whole, &begin) ||
                                               __builtin_add_overflow(begin, l->address, &begin)))
             begin = EBPO_NO_ADDRESS;
-        wrong = take_place(t, i, file_bytes, begin, t->whole, 0);
+        wrong = take_place(t, i, begin, t->whole, 0);
     }
     return wrong;
 }
@@ -183,7 +183,7 @@ static const char *read_fixed_header(ebpo_head_state *s, const ebpo_head_chunks 
 static const char *read_entries(ebpo_head_state *s, ebpo_head_chunks *t, const fixed_array *f,
                                 uint64_t at, uint64_t before, uint64_t first, uint64_t count)
 {
-    uint64_t size = before + count * f->entry + 4, file_bytes = s->bytes.input->source.size;
+    uint64_t size = before + count * f->entry + 4;
     const uint8_t *block = ebpo_head_bytes_at(&s->bytes, at, size);
     if (!block)
         return beyond;
@@ -196,7 +196,7 @@ static const char *read_entries(ebpo_head_state *s, ebpo_head_chunks *t, const f
         uint64_t address = ebpo_cursor_u64(&c);
         uint64_t bytes = t->filtered ? ebpo_cursor_uint(&c, f->size_bytes) : t->whole;
         uint32_t mask = t->filtered ? ebpo_cursor_u32(&c) : 0;
-        wrong = take_place(t, first + i, file_bytes, address, bytes, mask);
+        wrong = take_place(t, first + i, address, bytes, mask);
     }
     return wrong;
 }
@@ -255,12 +255,11 @@ static const char *read_fixed(ebpo_head_state *s, ebpo_head_chunks *t)
 /* Reads the table in one pass. Returns an error text, or NULL. */
 static const char *read_chunk_table(ebpo_head_state *s, ebpo_head_chunks *t)
 {
-    uint64_t file_bytes = s->bytes.input->source.size;
     t->stored = 0;
     t->at = UINT64_MAX;
     switch (t->layout->index) {
-    case EBPO_INDEX_SINGLE: return read_single(t, file_bytes);
-    case EBPO_INDEX_IMPLICIT: return read_implicit(t, file_bytes);
+    case EBPO_INDEX_SINGLE: return read_single(t);
+    case EBPO_INDEX_IMPLICIT: return read_implicit(t);
     case EBPO_INDEX_FIXED: return read_fixed(s, t);
     }
     return no_index;
@@ -389,9 +388,10 @@ static ebpo_status find_chunks(ebpo_head *head, const char *path, const ebpo_sha
     ebpo_head_chunks t = { .layout = layout,
                            .filtered = shape->pipeline != EBPO_PIPELINE_BARE,
                            .count = ebpo_shape_chunks(shape),
-                           .whole = shape->chunk_rows * ebpo_shape_row_bytes(shape) };
+                           .whole = shape->chunk_rows * ebpo_shape_row_bytes(shape),
+                           .end = head->end };
     t.bound = ebpo_chunk_bound((size_t)t.whole);
-    if (t.count > 1 && t.count > head->file_bytes / CHUNK_MIN)
+    if (t.count > 1 && t.count > head->end / CHUNK_MIN)
         return ebpo_fail_at(error, EBPO_E_FORMAT, head->shown, path, -1,
                             "the array has more chunks than the file can hold");
     t.place = *places = ebpo_alloc(t.count, sizeof **places);

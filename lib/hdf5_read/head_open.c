@@ -34,11 +34,13 @@ static bool has_signature(ebpo_head_state *s)
     return first && memcmp(first, signature, sizeof signature) == 0;
 }
 
-/* Reads the superblock, which locates the root group. Returns false if it is refused, with the
- * reason in s->refusal, or if it is damaged or not HDF5, without a reason. */
-static bool read_superblock(ebpo_head_state *s)
+/* Reads the superblock, which locates the root group and states the end of the file. Returns false
+ * if it is refused, with the reason in the refusal, or if it is damaged or not HDF5, without a
+ * reason. */
+static bool read_superblock(ebpo_head *head)
 {
     enum { BYTES = EBPO_HEAD_SUPERBLOCK_BYTES, OPEN_FOR_WRITING = 1 };
+    ebpo_head_state *s = head->state;
     const uint8_t *block = ebpo_head_bytes_at(&s->bytes, 0, BYTES);
     s->refusal = (ebpo_head_refusal){ NULL, false };
     if (!block)
@@ -58,6 +60,7 @@ static bool read_superblock(ebpo_head_state *s)
     unsigned sizes = ebpo_cursor_u16(&c), flags = ebpo_cursor_u8(&c);
     uint64_t base = ebpo_cursor_u64(&c), extension = ebpo_cursor_u64(&c), end = ebpo_cursor_u64(&c);
     s->root = ebpo_cursor_u64(&c);
+    head->end = end;
     if (!checksum_ok || end == EBPO_NO_ADDRESS || end > s->bytes.input->source.size)
         return false;
     if (version == 3 && flags & OPEN_FOR_WRITING)
@@ -73,12 +76,12 @@ static bool read_superblock(ebpo_head_state *s)
 
 ebpo_status ebpo_head_open(ebpo_head *head, ebpo_input *input, ebpo_error *error)
 {
-    *head = (ebpo_head){ input->shown, input->source.size, NULL };
+    *head = (ebpo_head){ input->shown, 0, NULL };
     ebpo_head_state *s = head->state = ebpo_alloc_zero(1, sizeof *s);
     if (!s)
         return ebpo_fail_memory(error, sizeof *s);
     ebpo_status status = ebpo_head_bytes_open(&s->bytes, input, error);
-    if (status != EBPO_OK || read_superblock(s))
+    if (status != EBPO_OK || read_superblock(head))
         return status;
     static const char unknown[] =
         "not a whole HDF5 file; was it cut off in copying, or is it something else?";
@@ -109,7 +112,8 @@ ebpo_status ebpo_head_close(ebpo_head *head, ebpo_status status, ebpo_error *err
 void ebpo_head_keep_ranges(ebpo_head *head)
 {
     head->state->keeps = true;
-    for (int i = 0; i < EBPO_HEAD_SLOTS; i++) /* the headers are read again when needed */
+    for (int i = 0; i < EBPO_HEAD_SLOTS;
+         i++) /* headers are read again, so that their ranges are kept too */
         head->state->slot[i].used = 0;
 }
 
@@ -121,7 +125,7 @@ ebpo_status ebpo_head_take_ranges(ebpo_head *head, ebpo_range **ranges, uint64_t
     *count = s->kept_count;
     s->kept = NULL;
     s->kept_count = s->kept_capacity = 0;
-    return s->kept_short ? ebpo_fail_memory(error, *count * sizeof **ranges) : EBPO_OK;
+    return s->kept_no_memory ? ebpo_fail_memory(error, *count * sizeof **ranges) : EBPO_OK;
 }
 
 /* Returns true if a link message has this name. Sets *address to its target, or EBPO_NO_ADDRESS for

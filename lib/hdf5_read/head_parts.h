@@ -141,7 +141,7 @@ typedef struct ebpo_head_state {
     ebpo_head_refusal refusal;              /* the last refusal */
     ebpo_range *kept;                       /* see ebpo_head_keep_ranges */
     uint64_t kept_count, kept_capacity;
-    bool keeps, kept_short; /* kept_short: no memory to keep a range */
+    bool keeps, kept_no_memory; /* kept_no_memory: no memory to keep a range */
 } ebpo_head_state;
 
 /* Records a range of the file that is in use, if ebpo_head_keep_ranges was called. */
@@ -152,7 +152,7 @@ static inline void ebpo_head_note_range(ebpo_head_state *s, uint64_t at, uint64_
     if (ebpo_grow(&s->kept, &s->kept_capacity, s->kept_count + 1, sizeof *s->kept))
         s->kept[s->kept_count++] = (ebpo_range){ at, size };
     else
-        s->kept_short = true;
+        s->kept_no_memory = true;
 }
 
 /* Records the reason of a refusal. Returns false, which the caller can return.

@@ -78,9 +78,11 @@ static ebpo_status open_regular(const char *path, int *fd, uint64_t *size, ebpo_
         return fail_to_open(path, error);
     if (fstat(*fd, &facts) < 0)
         status = ebpo_fail_errno(error, path, "cannot be examined");
-    else if (!S_ISREG(facts.st_mode))
+    else if (!S_ISREG(facts.st_mode)) {
         status = ebpo_fail_file(error, EBPO_E_IO, path, "not a regular file");
-    else
+        if (error && S_ISDIR(facts.st_mode))
+            error->system_error = EISDIR;
+    } else
         *size = (uint64_t)facts.st_size;
     if (status != EBPO_OK)
         close(*fd);
@@ -124,7 +126,7 @@ bool ebpo_input_can_advise(const ebpo_input *input)
 
 void ebpo_input_advise(ebpo_input *input, const ebpo_range *ranges, size_t count)
 {
-    enum { LARGE = 1 << 20 };
+    enum { LARGE = 1 << 20 }; /* within larger ranges, the system reads ahead by itself */
 #ifdef POSIX_FADV_WILLNEED
     const path_source *s = input->source.user;
     for (size_t i = 0; i < count && ebpo_input_can_advise(input); i++)
@@ -197,10 +199,12 @@ ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, uint64_t size, v
                             "; get a fresh copy of the file",
                             offset, offset + size - 1, input->source.size);
     uint64_t begin = offset > bytes_prefetched(input) ? offset : bytes_prefetched(input);
-    atomic_fetch_add_explicit(&input->bytes, offset + size > begin ? offset + size - begin : 0,
-                              memory_order_relaxed);
-    atomic_fetch_add_explicit(&input->reads, 1, memory_order_relaxed);
     ebpo_status status = input->source.read(input->source.user, offset, size, data, &cause);
+    if (status != EBPO_E_PENDING) { /* a pending read is repeated, and counted then */
+        atomic_fetch_add_explicit(&input->bytes, offset + size > begin ? offset + size - begin : 0,
+                                  memory_order_relaxed);
+        atomic_fetch_add_explicit(&input->reads, 1, memory_order_relaxed);
+    }
     if (status == EBPO_OK)
         return EBPO_OK;
     if (*cause.message) {

@@ -5,6 +5,7 @@
  * five redirects are followed, never from https to http, and the caller's credentials are not sent
  * to another server. The lock belongs to the caller (http_transfer.h). */
 #include <curl/curl.h>
+#include <errno.h>
 #include <inttypes.h>
 #include <pthread.h>
 #include <stdlib.h>
@@ -663,9 +664,11 @@ static void end_attempt(ebpo_transfers *t, ebpo_slot *s, CURLcode code)
     t->stats.requests += (uint64_t)(redirects > 0 ? redirects : 0);
     bool usable = s->has_verdict && !s->stopped &&
                   (s->verdict == EBPO_HTTP_PART || s->verdict == EBPO_HTTP_WHOLE);
-    if (s->has_verdict && s->verdict == EBPO_HTTP_REFUSED)
+    if (s->has_verdict && s->verdict == EBPO_HTTP_REFUSED) {
         finish_request(t, r, s->status, s->why);
-    else if (usable && keep_arrived(s, code))
+        if (s->response.code == 404 || s->response.code == 410)
+            r->error.system_error = ENOENT;
+    } else if (usable && keep_arrived(s, code))
         finish_request(t, r, EBPO_OK, NULL);
     else if (code == CURLE_OK || s->stalled || is_temporary(code) ||
              (s->has_verdict && s->verdict == EBPO_HTTP_LATER))

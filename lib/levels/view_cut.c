@@ -1,12 +1,13 @@
-/* Manages the cut of a view: the delivered nodes of the tree, and the order of refinement.
+/* Manages the cut of a view, and the order of refinement. The cut consists of the delivered nodes
+ * without delivered children.
  *
  * - A viewpoint is a prepared observer. It gives the distance of a cell, the cell's size in pixels,
  *   the cell's visibility in the frustum, and the priority key of a node. Comparisons allow for
  *   rounding: a barely visible cell counts as visible.
  * - The partial tree holds the delivered groups (eight siblings each). A group is linked to its
  *   parent after all nodes of the group have been delivered.
- * - The frontier holds the gray nodes of the cut in a binary heap, with the next one to refine on
- *   top. Nodes are ordered by turn (visible, not visible, never refined), then by key, then by
+ * - The frontier holds the gray nodes of the cut in a binary heap, whose first node is refined
+ *   next. Nodes are ordered by turn (visible, not visible, never refined), then by key, then by
  *   octcode. So no two nodes are equal, and the order is deterministic. */
 #include "core/strict_fp.h"
 
@@ -101,14 +102,14 @@ ebpo_status ebpo_viewpoint_make(ebpo_viewpoint *out, const ebpo_box *box,
     (void)frexp(fmax(box->size[0], fmax(box->size[1], box->size[2])), &exponent);
     out->given = true;
     out->unit = ldexp(1, exponent);
-    double root2 = 0, tangent = tan(observer->fov * (3.14159265358979323846 / 360));
+    double root_diagonal2 = 0, tangent = tan(observer->fov * (3.14159265358979323846 / 360));
     for (int k = 0; k < 3; k++) {
         double side = box->size[k] / out->unit;
-        root2 += side * side;
+        root_diagonal2 += side * side;
         out->eye[k] = observer->eye[k];
     }
     for (int i = 0; i < EBPO_LEVELS_MAX; i++)
-        out->diagonal2[i] = root2 * ebpo_half_power(2 * i);
+        out->diagonal2[i] = root_diagonal2 * ebpo_half_power(2 * i);
     out->focal = (double)observer->height / (2 * tangent);
     return make_frustum(out, observer, tangent, error);
 }
@@ -345,8 +346,9 @@ void ebpo_frontier_restore(ebpo_frontier *f)
         sink_down(f, i);
 }
 
-/* Finds the blocks in a hash table. When the table has EBPO_FRONTIER_BLOCKS blocks, nodes of other
- * blocks are skipped. */
+/* Collects in a hash table the blocks that contain children of the frontier's nodes, and for each
+ * block its node that is refined first. When the table has EBPO_FRONTIER_BLOCKS blocks, nodes of
+ * other blocks are skipped. */
 unsigned ebpo_frontier_blocks(const ebpo_frontier *f, uint64_t span,
                               uint64_t best[EBPO_FRONTIER_BLOCKS])
 {

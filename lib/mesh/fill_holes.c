@@ -37,6 +37,9 @@ typedef struct scratch {
     uint8_t taken[EBPO_OPTIMAL_CHAIN * EBPO_OPTIMAL_CHAIN];
 } scratch;
 
+/* Approximate memory for each vertex of a loop, named in messages when memory is short. */
+enum { LOOP_BYTES = 132 };
+
 typedef struct filling {
     ebpo_mesh *mesh;
     unsigned threads;
@@ -45,7 +48,7 @@ typedef struct filling {
     ebpo_boundary boundary;
     ebpo_loops loops;
     uint64_t *before; /* [loops.count] number of triangles of the loops that precede each loop in
-                       * the source */
+                       * the order of ebpo_loops_rank */
     uint64_t added;
 } filling;
 
@@ -120,7 +123,7 @@ static void mark_taken(const filling *f, scratch *s, const uint32_t *loop, uint3
     }
 }
 
-/* Fills a loop. Its triangles follow the triangles of the loops that precede it in the source. */
+/* Fills a loop. Its triangles follow the triangles of the loops that precede it (f->before). */
 static bool fill_loop(filling *f, scratch *s, uint64_t number)
 {
     const uint32_t *loop = f->loops.vertex + f->loops.first[number];
@@ -157,13 +160,15 @@ static ebpo_status fill_loops(void *context, uint64_t begin, uint64_t end, unsig
     for (uint64_t i = begin; i < end; i++)
         if (!fill_loop(f, &f->scratch[worker], i))
             return ebpo_workspace_fail(f->mesh->workspace,
-                                       (f->loops.first[i + 1] - f->loops.first[i]) * 132, error);
+                                       (f->loops.first[i + 1] - f->loops.first[i]) * LOOP_BYTES,
+                                       error);
     return EBPO_OK;
 }
 
 /* --- all loops --- */
 
-/* Reserves space after the mesh's faces, which do not change. */
+/* Reserves space after the mesh's faces, which do not change. Also sets the source indices of the
+ * added faces, which follow those of all faces of the source, dropped ones included. */
 static ebpo_status reserve_space(filling *f, ebpo_error *error)
 {
     ebpo_mesh *mesh = f->mesh;

@@ -185,7 +185,7 @@ static void describe_source(ebpo_ply_parser *p)
     p->mesh->source_size = p->size;
 }
 
-/* Notes in the attributes which content of the file was not read. */
+/* Records in mesh->attributes what was not read of the file. */
 static ebpo_status note_unread(ebpo_ply_parser *p)
 {
     bool more = p->header.encoding == EBPO_PLY_ASCII && ebpo_ply_ascii_more(p);

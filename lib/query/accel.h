@@ -149,7 +149,7 @@ typedef struct ebpo_bound {
     uint32_t child[8]; /* number of a node, or of a block with EBPO_IS_BLOCK */
     /* Squared limit of a search. Above it, bounding cylinders are worth testing; below it, the node
      * is large compared with the search. */
-    float slab_limit2;
+    float cylinder_limit2;
     uint32_t parent; /* number of a node; 0 for the top */
     uint8_t count;   /* number of children, which are in the first lanes */
     uint8_t spare[15];
@@ -175,25 +175,25 @@ static inline ebpo_bound_sides ebpo_bound_side(const ebpo_bound *b, int lane, in
  *   x . x - (x . a)^2 <= (aside_step * radius)^2.
  * Values have 16 bits: with 8 bits, the error of the axis would be as large as the thickness of
  * curved sheets, and a fifth more blocks would be visited. */
-typedef struct ebpo_bound_slab {
+typedef struct ebpo_bound_cylinder {
     _Alignas(64) int16_t axis[3][8];
     int16_t from[8], to[8], radius[8];
     float along_step, aside_step;
     uint8_t spare[24];
-} ebpo_bound_slab;
+} ebpo_bound_cylinder;
 
 /* A child's bounding cylinder, decoded. */
-typedef struct ebpo_child_slab {
+typedef struct ebpo_child_cylinder {
     double axis[3], from, to, radius;
-} ebpo_child_slab;
-static inline ebpo_child_slab ebpo_bound_slab_of(const ebpo_bound_slab *b, int lane)
+} ebpo_child_cylinder;
+static inline ebpo_child_cylinder ebpo_bound_cylinder_of(const ebpo_bound_cylinder *b, int lane)
 {
     double along = (double)b->along_step, aside = (double)b->aside_step;
-    return (ebpo_child_slab){ { b->axis[0][lane] * 0x1p-15, b->axis[1][lane] * 0x1p-15,
-                                b->axis[2][lane] * 0x1p-15 },
-                              along * b->from[lane],
-                              along * b->to[lane],
-                              aside * b->radius[lane] };
+    return (ebpo_child_cylinder){ { b->axis[0][lane] * 0x1p-15, b->axis[1][lane] * 0x1p-15,
+                                    b->axis[2][lane] * 0x1p-15 },
+                                  along * b->from[lane],
+                                  along * b->to[lane],
+                                  aside * b->radius[lane] };
 }
 
 typedef struct ebpo_accel {
@@ -216,11 +216,11 @@ typedef struct ebpo_accel {
     double centre[3], scale;
     float turn_error_constant; /* part of an error bound for blocks of floats; see
                                 * query/inside_kernels.c */
-    double reach; /* upper bound of the coordinates of decoded boxes, in the frame; at least 1 */
+    double largest_coordinate; /* upper bound for decoded boxes, in the frame; at least 1 */
     ebpo_bound *bound;
-    ebpo_bound_slab *slab; /* [bound_count] */
+    ebpo_bound_cylinder *cylinder; /* [bound_count] */
     uint32_t bound_count;
-    uint32_t top; /* the root of the hierarchy */
+    uint32_t root_bound; /* index of the hierarchy's root in `bound` */
     uint32_t shared_count;
     uint32_t *shared;      /* file indices of the shared faces, which are owned by other subtrees */
     uint64_t first_face;   /* index of the owned faces: first_face + local - shared_count */

@@ -172,7 +172,7 @@ static uint64_t kept_bytes(const sizes *t, const found *f)
 {
     return sizeof(ebpo_accel) + sizeof(ebpo_leaf_kinds) + t->maps + t->shared + t->nodes + t->list +
            t->planes + t->rows + (f->units + 1) * EBPO_MESHLET_UNIT +
-           (f->bounds + 1) * (sizeof(ebpo_bound) + sizeof(ebpo_bound_slab));
+           (f->bounds + 1) * (sizeof(ebpo_bound) + sizeof(ebpo_bound_cylinder));
 }
 
 /* Returns the maximum memory while an accel is made. Arrays of a layout have grown by half. Beside
@@ -247,7 +247,7 @@ void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uin
             size->leaves * (sizeof(ebpo_accel_leaf) + 64) +
             (size->refs + size->new_faces) * sizeof(ebpo_listed_block) +
             blocks * (EBPO_MESHLET_WIDE + EBPO_MESHLET_UNIT) + faces * 48 * wide +
-            bounds * (sizeof(ebpo_bound) + sizeof(ebpo_bound_slab)) + faces * 8;
+            bounds * (sizeof(ebpo_bound) + sizeof(ebpo_bound_cylinder)) + faces * 8;
     *peak = *keep + size->groups * 128 + size->leaves * 64 + faces * (12 + 36 * wide + 24) +
             (blocks + bounds) * 72 + 65536;
 }
@@ -530,8 +530,8 @@ static uint64_t count_bytes(const ebpo_accel *s)
            (s->kinds ? sizeof *s->kinds : 0) +
            (s->kinds && s->root.cell.level ? rows_max(s) * sizeof(ebpo_kind_row) : 0) +
            (s->units + 1) * EBPO_MESHLET_UNIT +
-           s->bound_count * (sizeof *s->bound + sizeof *s->slab) + (uint64_t)s->shared_count * 4 +
-           (s->face_source ? (uint64_t)s->face_count * 4 : 0) +
+           s->bound_count * (sizeof *s->bound + sizeof *s->cylinder) +
+           (uint64_t)s->shared_count * 4 + (s->face_source ? (uint64_t)s->face_count * 4 : 0) +
            (s->gray_first ? (s->gray_count + s->gray_first[s->gray_count]) * 4 : 0);
 }
 
@@ -626,7 +626,7 @@ void ebpo_accel_free(ebpo_accel *s)
     ebpo_leaf_kinds_free(s->kinds);
     free(s->meshlets);
     free(s->bound);
-    free(s->slab);
+    free(s->cylinder);
     free(s->shared);
     free(s->face_source);
     free(s->gray_planes);

@@ -65,20 +65,20 @@ typedef struct ebpo_block_extent {
 
 /* Frame of a bounding cylinder: an origin in two parts, in the model's unit; the scale of the
  * subtree's frame; the axis, and 1 less its squared length. */
-typedef struct ebpo_slab_view {
+typedef struct ebpo_cylinder_view {
     float high[3], low[3], scale, axis[3], rest;
-} ebpo_slab_view;
+} ebpo_cylinder_view;
 
-typedef struct ebpo_slab_extent {
+typedef struct ebpo_cylinder_extent {
     float from, to, aside2; /* extent along the axis, in the subtree's frame; square of the greatest
                              * distance from the axis */
-} ebpo_slab_extent;
+} ebpo_cylinder_extent;
 
 typedef struct ebpo_block_measures {
     void (*extent)(const ebpo_accel *s, uint32_t block, ebpo_block_extent *out);
     /* Measures all vertices of `count` blocks, given by their numbers. */
-    void (*slab)(const ebpo_accel *s, const uint32_t *block, uint32_t count,
-                 const ebpo_slab_view *view, ebpo_slab_extent *out);
+    void (*cylinder)(const ebpo_accel *s, const uint32_t *block, uint32_t count,
+                     const ebpo_cylinder_view *view, ebpo_cylinder_extent *out);
 } ebpo_block_measures;
 
 EBPO_KERNELS(ebpo_block_measures, ebpo_block_measures)

@@ -26,10 +26,10 @@ enum { SLAB_BLOCKS_MAX = 1024 };
 static const double box_slack = 0x1p-19;
 /* Enlargement of bounding cylinders, relative to the node's size: patches are thinner than their
  * distance from the origin. */
-static const double slab_slack = 0x1p-19;
+static const double cylinder_slack = 0x1p-19;
 /* Share of a node's size, squared. If a node is large compared with a search, its cylinders exclude
  * hardly any child. */
-static const double slab_share = 0.01;
+static const double cylinder_share = 0.01;
 /* Enlargement for a model without extent. */
 static const double least_slack = 0x1p-60;
 enum { AXIS_UNIT = 1 << 15, SHORT_MAX = 32766 };
@@ -220,7 +220,7 @@ static void set_boxes(ebpo_bound *b, const extent *all, const extent child[8])
     double size = 0;
     for (int k = 0; k < 3; k++)
         size = larger_of(size, all->high[k] - all->low[k]);
-    b->slab_limit2 = (float)(size * size * slab_share);
+    b->cylinder_limit2 = (float)(size * size * cylinder_share);
 }
 
 /* Returns the largest absolute coordinate of the node's boxes. */
@@ -235,14 +235,14 @@ static double reach_of(const ebpo_bound *b)
 
 /* --- bounding cylinders --- */
 
-typedef struct slab {
+typedef struct cylinder {
     double middle[3], axis[3];
     double from, to, radius2;
-} slab;
+} cylinder;
 
 /* Chooses the axis, rounded towards zero: the decoded axis is never longer than 1, which the bound
  * needs. */
-static void choose_axis(const extent *e, ebpo_bound_slab *b, int lane, slab *out)
+static void choose_axis(const extent *e, ebpo_bound_cylinder *b, int lane, cylinder *out)
 {
     double length = sqrt(e->normal[0] * e->normal[0] + e->normal[1] * e->normal[1] +
                          e->normal[2] * e->normal[2]);
@@ -253,11 +253,11 @@ static void choose_axis(const extent *e, ebpo_bound_slab *b, int lane, slab *out
     }
 }
 
-typedef struct slab_pairs {
+typedef struct cylinder_pairs {
     pair middle[3], axis[3], from, to, most;
-} slab_pairs;
+} cylinder_pairs;
 
-static inline void add_to_slab(const vertices *v, slab_pairs *p)
+static inline void add_to_cylinder(const vertices *v, cylinder_pairs *p)
 {
     for (unsigned i = 0; i < v->pairs; i++) {
         pair along = { 0, 0 }, square = { 0, 0 };
@@ -274,9 +274,9 @@ static inline void add_to_slab(const vertices *v, slab_pairs *p)
 
 /* Extends a cylinder by all vertices of a run of blocks. The middle of the box need not be between
  * the vertices: for a tilted patch it is off the patch's plane. */
-static void add_run_wide(const job *j, uint32_t begin, uint32_t end, slab *out)
+static void add_run_wide(const job *j, uint32_t begin, uint32_t end, cylinder *out)
 {
-    slab_pairs p = { .from = { INFINITY, INFINITY }, .to = { -INFINITY, -INFINITY } };
+    cylinder_pairs p = { .from = { INFINITY, INFINITY }, .to = { -INFINITY, -INFINITY } };
     for (int k = 0; k < 3; k++) {
         p.middle[k] = (pair){ out->middle[k], out->middle[k] };
         p.axis[k] = (pair){ out->axis[k], out->axis[k] };
@@ -284,7 +284,7 @@ static void add_run_wide(const job *j, uint32_t begin, uint32_t end, slab *out)
     for (uint32_t i = begin; i < end; i++) {
         vertices v;
         load_vertices(j->s, j->layout->block_number[i], &v);
-        add_to_slab(&v, &p);
+        add_to_cylinder(&v, &p);
     }
     out->from = least_of(p.from);
     out->to = max_of(p.to);
@@ -293,11 +293,11 @@ static void add_run_wide(const job *j, uint32_t begin, uint32_t end, slab *out)
 
 /* As add_run_wide, in single precision, relative to two floats near the middle; adds the distance
  * of these from the middle. */
-static void add_run_narrow(const job *j, uint32_t begin, uint32_t end, slab *out)
+static void add_run_narrow(const job *j, uint32_t begin, uint32_t end, cylinder *out)
 {
     const ebpo_accel *s = j->s;
-    ebpo_slab_view view = { .scale = (float)s->scale };
-    ebpo_slab_extent e;
+    ebpo_cylinder_view view = { .scale = (float)s->scale };
+    ebpo_cylinder_extent e;
     double square = 0, along = 0, off2 = 0;
     for (int k = 0; k < 3; k++) {
         double middle = s->centre[k] + out->middle[k] / s->scale;
@@ -311,7 +311,7 @@ static void add_run_narrow(const job *j, uint32_t begin, uint32_t end, slab *out
         off2 += off * off;
     }
     view.rest = (float)(1 - square);
-    j->measures->slab(s, j->layout->block_number + begin, end - begin, &view, &e);
+    j->measures->cylinder(s, j->layout->block_number + begin, end - begin, &view, &e);
     double aside = sqrt((double)e.aside2) + sqrt(off2);
     out->from = (double)e.from + along;
     out->to = (double)e.to + along;
@@ -319,7 +319,7 @@ static void add_run_narrow(const job *j, uint32_t begin, uint32_t end, slab *out
 }
 
 /* Sets a cylinder without axis, as wide as the box: it bounds no better than the box. */
-static void no_slab(ebpo_bound_slab *b, int lane, const double half[3], slab *out)
+static void no_cylinder(ebpo_bound_cylinder *b, int lane, const double half[3], cylinder *out)
 {
     for (int k = 0; k < 3; k++) {
         b->axis[k][lane] = 0;
@@ -327,10 +327,10 @@ static void no_slab(ebpo_bound_slab *b, int lane, const double half[3], slab *ou
     }
 }
 
-static slab measure_slab(const job *j, uint64_t n, int lane, const extent *e)
+static cylinder measure_cylinder(const job *j, uint64_t n, int lane, const extent *e)
 {
     const ebpo_bound *b = &j->s->bound[n];
-    slab out = { { 0, 0, 0 }, { 0, 0, 0 }, 0, 0, 0 };
+    cylinder out = { { 0, 0, 0 }, { 0, 0, 0 }, 0, 0, 0 };
     double half[3];
     for (int k = 0; k < 3; k++) {
         ebpo_bound_sides side = ebpo_bound_side(b, lane, k);
@@ -343,10 +343,10 @@ static slab measure_slab(const job *j, uint64_t n, int lane, const extent *e)
         last = j->layout->last_block[child];
     }
     if (last - first > SLAB_BLOCKS_MAX) {
-        no_slab(&j->s->slab[n], lane, half, &out);
+        no_cylinder(&j->s->cylinder[n], lane, half, &out);
         return out;
     }
-    choose_axis(e, &j->s->slab[n], lane, &out);
+    choose_axis(e, &j->s->cylinder[n], lane, &out);
     if (j->s->wide)
         add_run_wide(j, first, last, &out);
     else
@@ -363,7 +363,7 @@ static double size_of(const ebpo_bound *b)
 /* Returns false for faces so far from their leaf that squares overflow (possible in untrusted
  * files). Cylinders of such faces exclude nothing, as no multiples of an infinite or NaN step
  * exist. */
-static bool is_known(int count, const slab child[8], const double radius[8])
+static bool is_known(int count, const cylinder child[8], const double radius[8])
 {
     for (int lane = 0; lane < count; lane++)
         if (!(fabs(child[lane].from) < FLT_MAX / 4 && fabs(child[lane].to) < FLT_MAX / 4 &&
@@ -372,9 +372,9 @@ static bool is_known(int count, const slab child[8], const double radius[8])
     return true;
 }
 
-static void set_slabs(ebpo_bound_slab *b, int count, double size, const slab child[8])
+static void set_cylinders(ebpo_bound_cylinder *b, int count, double size, const cylinder child[8])
 {
-    double slack = size * slab_slack, along = 0, aside = 0, radius[8];
+    double slack = size * cylinder_slack, along = 0, aside = 0, radius[8];
     for (int lane = 0; lane < count; lane++) {
         along = larger_of(along, larger_of(child[lane].to, -child[lane].from) + slack);
         /* the error of the square is less than 2^-49 of size * size */
@@ -415,9 +415,9 @@ static ebpo_status bound_nodes(void *context, uint64_t begin, uint64_t end, unsi
     for (uint64_t n = begin; n < end; n++) {
         ebpo_bound *b = &j->s->bound[n];
         extent part[8];
-        slab slabs[8];
+        cylinder cylinders[8];
         memset(b, 0, sizeof *b);
-        memset(&j->s->slab[n], 0, sizeof j->s->slab[n]);
+        memset(&j->s->cylinder[n], 0, sizeof j->s->cylinder[n]);
         for (int lane = 0; lane < 8; lane++) {
             uint32_t child = j->layout->child[n][lane];
             b->child[lane] = child_number(j, child);
@@ -428,8 +428,8 @@ static ebpo_status bound_nodes(void *context, uint64_t begin, uint64_t end, unsi
         }
         set_boxes(b, &j->of_node[n], part);
         for (int lane = 0; lane < b->count; lane++)
-            slabs[lane] = measure_slab(j, n, lane, &part[lane]);
-        set_slabs(&j->s->slab[n], b->count, size_of(b), slabs);
+            cylinders[lane] = measure_cylinder(j, n, lane, &part[lane]);
+        set_cylinders(&j->s->cylinder[n], b->count, size_of(b), cylinders);
     }
     return EBPO_OK;
 }
@@ -438,19 +438,19 @@ static ebpo_status reserve_space(job *j, ebpo_error *error)
 {
     uint64_t count = j->layout->bound_count;
     ebpo_accel *s = j->s;
-    if (count >= PTRDIFF_MAX / (sizeof *s->bound + sizeof *s->slab))
-        return ebpo_fail_memory(error, count * (sizeof *s->bound + sizeof *s->slab));
+    if (count >= PTRDIFF_MAX / (sizeof *s->bound + sizeof *s->cylinder))
+        return ebpo_fail_memory(error, count * (sizeof *s->bound + sizeof *s->cylinder));
     size_t bounds = (size_t)(count + 1) * sizeof *s->bound,
-           slabs = (size_t)(count + 1) * sizeof *s->slab;
+           cylinders = (size_t)(count + 1) * sizeof *s->cylinder;
     s->bound = aligned_alloc(64, bounds);
-    s->slab = aligned_alloc(64, slabs);
+    s->cylinder = aligned_alloc(64, cylinders);
     j->of_block = ebpo_alloc(j->layout->block_count, sizeof *j->of_block);
     ebpo_prefer_huge_pages(s->bound, bounds);
-    ebpo_prefer_huge_pages(s->slab, slabs);
+    ebpo_prefer_huge_pages(s->cylinder, cylinders);
     j->of_node = ebpo_alloc(count, sizeof *j->of_node);
-    if (s->bound && s->slab && j->of_block && j->of_node)
+    if (s->bound && s->cylinder && j->of_block && j->of_node)
         return EBPO_OK;
-    return ebpo_fail_memory(error, count * (sizeof *s->bound + sizeof *s->slab));
+    return ebpo_fail_memory(error, count * (sizeof *s->bound + sizeof *s->cylinder));
 }
 
 static void link_parents(ebpo_accel *s)
@@ -480,13 +480,13 @@ ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_layout *layout, uns
 {
     job j = { .s = s, .layout = layout, .measures = ebpo_block_measures_best() };
     s->bound_count = (uint32_t)layout->bound_count;
-    s->top = layout->top;
-    s->reach = 1;
+    s->root_bound = layout->top;
+    s->largest_coordinate = 1;
     ebpo_status status = reserve_space(&j, error);
     if (status == EBPO_OK)
         status = fill_levels(&j, threads, error);
     if (status == EBPO_OK && s->bound_count)
-        s->reach = larger_of(1, reach_of(&s->bound[s->top]));
+        s->largest_coordinate = larger_of(1, reach_of(&s->bound[s->root_bound]));
     free(j.of_block);
     free(j.of_node);
     return status;

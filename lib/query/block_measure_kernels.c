@@ -56,11 +56,11 @@ static void measure_extent(const ebpo_accel *s, uint32_t block, ebpo_block_exten
     measure_normals(&b, out->normal);
 }
 
-typedef struct slab_sums {
+typedef struct cylinder_sums {
     f8 from, to, aside2;
-} slab_sums;
+} cylinder_sums;
 
-EBPO_EIGHT void measure_eight(const ebpo_slab_view *view, const f8 x[3], slab_sums *sum)
+EBPO_EIGHT void measure_eight(const ebpo_cylinder_view *view, const f8 x[3], cylinder_sums *sum)
 {
     f8 d[3], along, aside2;
     for (int k = 0; k < 3; k++)
@@ -78,10 +78,10 @@ EBPO_EIGHT void measure_eight(const ebpo_slab_view *view, const f8 x[3], slab_su
     sum->aside2 = f8_max(aside2, sum->aside2);
 }
 
-static void measure_slab(const ebpo_accel *s, const uint32_t *block, uint32_t count,
-                         const ebpo_slab_view *view, ebpo_slab_extent *out)
+static void measure_cylinder(const ebpo_accel *s, const uint32_t *block, uint32_t count,
+                             const ebpo_cylinder_view *view, ebpo_cylinder_extent *out)
 {
-    slab_sums sum = { f8_all(INFINITY), f8_all(-INFINITY), f8_all(0) };
+    cylinder_sums sum = { f8_all(INFINITY), f8_all(-INFINITY), f8_all(0) };
     for (uint32_t i = 0; i < count; i++) {
         const ebpo_meshlet *m = ebpo_accel_meshlet(s, block[i]);
         const float *v = ebpo_meshlet_floats(m);
@@ -97,4 +97,4 @@ static void measure_slab(const ebpo_accel *s, const uint32_t *block, uint32_t co
     out->aside2 = max_of(sum.aside2);
 }
 
-const ebpo_block_measures EBPO_KERNEL(ebpo_block_measures) = { measure_extent, measure_slab };
+const ebpo_block_measures EBPO_KERNEL(ebpo_block_measures) = { measure_extent, measure_cylinder };

@@ -432,16 +432,23 @@ ebpo_status ebpo_distance_many(ebpo_context *context, const double *points, uint
     /* in a subset, bounds decide if omitted parts matter */
     context->planes = o->level >= 0 || o->deadline_ns || o->mode != EBPO_DISTANCE_EXACT ||
                       context->model->info->pruned;
-    ebpo_batch batch = { .count = 0 };
+    ebpo_batch batch = { .context = context,
+                         .points = points,
+                         .count = count,
+                         .done = o->done,
+                         .as_given = o->deadline_ns || o->level >= 0,
+                         .searches_around = true };
     uint64_t searched = context->searched, loaded = context->loaded;
     if (status == EBPO_OK)
-        ebpo_batch_begin(&batch, context, points, o->deadline_ns || o->level >= 0 ? 0 : count,
-                         true);
-    for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
-        uint64_t k = batch.count ? ebpo_batch_next(&batch, i) : i;
+        ebpo_batch_begin(&batch);
+    for (uint64_t i = 0; i < batch.count && status == EBPO_OK; i++) {
+        uint64_t k = ebpo_batch_next(&batch, i);
+        if (o->done && o->done[k])
+            continue;
         status = distance_of_point(context, points + 3 * k, o, &out[k], error);
+        status = ebpo_batch_note(&batch, i, k, status, error);
     }
-    ebpo_batch_end(&batch);
+    status = ebpo_batch_end(&batch, status, error);
     count_work(context, status == EBPO_OK ? count : 0, searched, loaded);
     return status;
 }

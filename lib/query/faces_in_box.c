@@ -66,7 +66,8 @@ static void try_block(box_walk *w, const ebpo_accel *s, uint32_t block)
     }
 }
 
-/* Adds the slots of the faces below a child of a node of the hierarchy. low, high: the query's box
+/* Adds the slots of the faces that intersect the box and are below a child of a node of the
+ * hierarchy. low, high: the query's box
  * in the subtree's frame. The hierarchy's boxes were enlarged by more than the rounding error of
  * floats here. */
 static void gather_child(box_walk *w, const ebpo_accel *s, const float low[3], const float high[3],
@@ -106,7 +107,7 @@ static ebpo_status gather_accel(box_walk *w, const ebpo_accel *s, ebpo_error *er
         low[k] = (float)((w->min[k] - s->centre[k]) * s->scale);
         high[k] = (float)((w->max[k] - s->centre[k]) * s->scale);
     }
-    gather_child(w, s, low, high, s->top);
+    gather_child(w, s, low, high, s->root_bound);
     if (w->no_memory)
         return ebpo_fail_memory(error, (w->count + 1) * sizeof *w->slot);
     if (w->count)
@@ -198,10 +199,10 @@ static bool intersects_cell(const ebpo_box *box, const ebpo_node *node, const do
     return ebpo_triangle_intersects_box(triangle, low, high);
 }
 
-/* Finds the first accel, depth first, whose cell the triangle intersects. *entry: entry of its
- * root. Returns false if there is none. An accel lists the faces that intersect its cell, and some
- * that are only near its cell (format-spec, section 7). Each face is taken in this first accel, so
- * no list of visited faces is needed. */
+/* Finds the first accel, depth first, whose cell the triangle intersects. *entry: index
+ * of the accel's root in the tree (ebpo_node). Returns false if there is none. An accel lists the
+ * faces that intersect its cell, and some that are only near its cell (format-spec, section 7).
+ * Each face is taken in this first accel, so no list of visited faces is needed. */
 static bool find_first(const box_walk *w, const ebpo_box *box, ebpo_node node,
                        const double triangle[3][3], uint32_t *entry)
 {
@@ -274,7 +275,7 @@ static ebpo_status finish_faces(gathering *g, const uint64_t **faces, uint64_t *
     if (g->count)
         qsort(g->list, g->count, sizeof *g->list, compare_pairs);
     for (uint64_t i = 0; i < g->count; i++)
-        /* a face that several subtrees list may be in the list twice */
+        /* a face that several subtrees list occurs several times in g->list */
         if (i == 0 || g->list[i].file_face != g->list[i - 1].file_face)
             c->faces[(*count)++] = g->list[i].source_face;
     *faces = c->faces;

@@ -211,7 +211,7 @@ bool ebpo_holes_crossings(const ebpo_holes *h, const double p[3], bool on_faces_
         g.near_high[k] = (float)((g.high[k] - s->centre[k]) * s->scale);
     }
     if (s->bound_count)
-        cross_child(&g, s, s->top);
+        cross_child(&g, s, s->root_bound);
     if (g.on_face && !on_faces_too)
         return false;
     if (h->caps.node_count)

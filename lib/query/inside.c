@@ -399,21 +399,23 @@ static ebpo_status inside_together(ebpo_context *context, const ebpo_accel *s, c
 
 /* Classifies points with the whole tree in memory. */
 static ebpo_status inside_whole(ebpo_context *context, const double *points, uint64_t count,
-                                ebpo_inside_result *out, ebpo_error *error)
+                                bool *done, ebpo_inside_result *out, ebpo_error *error)
 {
     const ebpo_accel *s = context->model->whole;
     ebpo_status status = EBPO_OK;
     if (count == 1) {
         ebpo_position place;
         if (ebpo_locator_find(&context->model->locator, points, &place))
-            return inside_subtree(context, s, &place, points, out, error);
-        give_out(out);
-        return EBPO_OK;
+            status = inside_subtree(context, s, &place, points, out, error);
+        else
+            give_out(out);
     }
-    for (uint64_t i = 0; i < count && status == EBPO_OK; i += TOGETHER)
+    for (uint64_t i = 0; count > 1 && i < count && status == EBPO_OK; i += TOGETHER)
         status = inside_together(context, s, points + 3 * i,
                                  count - i < TOGETHER ? (unsigned)(count - i) : TOGETHER, out + i,
                                  error);
+    if (status == EBPO_OK && done)
+        memset(done, true, count);
     return status;
 }
 
@@ -739,6 +741,8 @@ static ebpo_status inside_holes(ebpo_context *context, const double *points, uin
             status = inside_far_leaf(context, &cell, p, &out[i], error);
         out[i].winding = out[i].where == EBPO_IN;
     }
+    if (status == EBPO_OK && o->done)
+        memset(o->done, true, count);
     return status;
 }
 
@@ -765,22 +769,27 @@ ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64
         return inside_holes(context, points, count, o, out, error);
     if (status == EBPO_OK && m->whole && o->level < 0 && !o->deadline_ns &&
         o->envelopes != EBPO_ENVELOPES_USE)
-        return inside_whole(context, points, count, out, error);
+        return inside_whole(context, points, count, o->done, out, error);
     context->planes =
         o->level >= 0 || o->deadline_ns || o->envelopes == EBPO_ENVELOPES_USE || m->info->pruned;
-    ebpo_batch batch = { .count = 0 };
+    ebpo_batch batch = { .context = context,
+                         .points = points,
+                         .count = count,
+                         .done = o->done,
+                         .as_given = o->deadline_ns || o->level >= 0 };
     if (status == EBPO_OK)
-        ebpo_batch_begin(&batch, context, points, o->deadline_ns || o->level >= 0 ? 0 : count,
-                         false);
-    for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
-        uint64_t k = batch.count ? ebpo_batch_next(&batch, i) : i;
+        ebpo_batch_begin(&batch);
+    for (uint64_t i = 0; i < batch.count && status == EBPO_OK; i++) {
+        uint64_t k = ebpo_batch_next(&batch, i);
+        if (o->done && o->done[k])
+            continue;
         status = inside_walk(context, points + 3 * k, o, &out[k], error);
         if (status == EBPO_OK && ebpo_model_prefetches(m) &&
             (o->level < 0 || o->level > m->top->cut_level))
             ebpo_context_prefetch(context, points + 3 * k, 0);
+        status = ebpo_batch_note(&batch, i, k, status, error);
     }
-    ebpo_batch_end(&batch);
-    return status;
+    return ebpo_batch_end(&batch, status, error);
 }
 
 /* Returns true if the query has no special options and everything is in memory: only the point must
@@ -820,7 +829,7 @@ ebpo_status ebpo_give_sign(ebpo_context *c, const double p[3], const ebpo_distan
     if ((!m->info->solid && !m->holes) || o->unsigned_distance || out->face == EBPO_NO_FACE)
         return EBPO_OK;
     ebpo_status status = m->holes   ? inside_holes(c, p, 1, &plain, &where, error)
-                         : m->whole ? inside_whole(c, p, 1, &where, error)
+                         : m->whole ? inside_whole(c, p, 1, NULL, &where, error)
                                     : inside_walk(c, p, &plain, &where, error);
     if (status == EBPO_OK && where.where == EBPO_IN)
         out->distance = -out->distance;

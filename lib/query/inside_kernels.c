@@ -1,10 +1,11 @@
 /* Kernels of point in solid: process the faces that a leaf lists, eight at a time.
  *
- * sum_crossings sums the crossings of a segment along an axis with the faces. It uses single
- * precision, or double precision in accels of doubles. Faces that are not certain in this precision
- * are decided exactly by inside.c.
+ * sum_crossings sums, for a segment parallel to an axis, its crossings with the faces. It uses
+ * single precision, or double precision in accels of doubles. Faces that are not certain in this
+ * precision are decided exactly by inside.c.
  *
- * find_reached_cell_faces finds the cell faces that the leaf's faces reach, and computes the box of
+ * find_reached_cell_faces finds the cell faces that the leaf's faces reach: a face reaches a cell
+ * face if its extent on the axis goes up to the cell face or beyond. It also computes the box of
  * each block in the leaf's list. It is called once for each leaf, during one of the first queries
  * in this leaf. Its comparisons are exact.
  *
@@ -23,8 +24,8 @@
 
 /* --- crossings --- */
 
-/* Positions of eight faces relative to the segment's line, as masks with a bit for each face. Faces
- * without a bit certainly have no point on the line. */
+/* Positions of eight faces relative to the segment's line, as masks with a bit for each face. A
+ * face whose bit is 0 in all three masks certainly has no point on the line. */
 typedef struct turns {
     unsigned left;  /* the corners certainly turn left around the line */
     unsigned right; /* the corners certainly turn right around the line */
@@ -40,8 +41,8 @@ EBPO_EIGHT turns combine_turns(unsigned some_left, unsigned some_right, unsigned
 }
 
 /* Rounding: let R be the greatest |coordinate| of the model's box and M the greatest side of the
- * box. Two floats represent `from` to 2^-48 R. So the error of a difference e of coordinates is
- * 2^-23 |e| plus 2^-47 R. No |e| is above M. So the error of a cross product is 2^-45 R M plus
+ * box. Two floats represent `from` to 2^-48 R. So the error of a difference d of coordinates is
+ * 2^-23 |d| plus 2^-47 R. No |d| is above M. So the error of a cross product is 2^-45 R M plus
  * 2^-21 of the sum of the absolute values of its two products.
  *
  * The code uses larger bounds: 2^-43 R M (`turn_error_constant` of ebpo_accel) plus
@@ -124,10 +125,10 @@ static turns turns_of_doubles(const ebpo_face_block *b, unsigned lanes, int u, i
     return combine_turns(some[0], some[1], all[0], all[1], lanes);
 }
 
-/* Compares the point where the segment's line intersects a face's plane with the coordinate `at` on
- * the segment's axis. Returns 1 if the point's coordinate is greater than `at`, -1 if it is less, 0
- * if this is not certain. weight, size: for each edge, the cross product of its corners and its
- * size (see cross_product). k: the corners' coordinates on the axis. `turn`: 1 if the face's
+/* The segment's line intersects the plane of a face in a point. Compares this point's coordinate on
+ * the segment's axis with `at`: returns 1 if it is greater, -1 if it is less, 0 if this is not
+ * certain. weight[i]: the cross product of the corners of edge i; size[i]: its *size (see
+ * cross_product). k: the corners' coordinates on the axis. `turn`: 1 if the face's
  * corners turn left around the line, -1 if they turn right. */
 static int compare_plane(const double weight[3], const double size[3], const double k[3], double at,
                          int turn)

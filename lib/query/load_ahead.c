@@ -15,6 +15,7 @@
 #include <string.h>
 
 #include "core/alloc.h"
+#include "core/error.h"
 #include "format/reader.h"
 #include "format/subtree_index.h"
 #include "geometry/cells.h"
@@ -168,11 +169,15 @@ void ebpo_context_hint(const ebpo_context *c, const uint32_t *below, uint64_t co
 
 /* --- batches --- */
 
+#define EBPO_NO_SUBTREE UINT64_MAX
+
 /* Limits of a prefetch hint for homes (home_of). The data of two hints is being fetched at any
  * time. */
 enum {
     SUBTREES_A_TIME = 128, /* maximum number of subtrees: some megabytes of data */
-    POINTS_A_TIME = 4096   /* maximum number of points whose homes are in the hint */
+    POINTS_A_TIME = 4096,  /* maximum number of points whose homes are in the hint */
+    /* maximum number of points after a pending one, in a batch without hints */
+    PENDING_A_TIME = 256
 };
 
 /* A point and its position on the curve. */
@@ -236,32 +241,43 @@ static bool are_scattered(const ebpo_box *box, const double *points, uint64_t co
     return count >= 32 && sum > mean_least * (double)count;
 }
 
-void ebpo_batch_begin(ebpo_batch *b, ebpo_context *context, const double *points, uint64_t count,
-                      bool searches_around)
+/* Sets the order of evaluation along the curve, without completed points. */
+static void set_order(ebpo_batch *b, const ebpo_box *box)
 {
-    const ebpo_model *m = context->model;
+    uint64_t kept = 0;
+    b->order = ebpo_curve_order(box, b->points, b->count);
+    for (uint64_t i = 0; b->order && i < b->count; i++)
+        if (!b->done || !b->done[b->order[i]])
+            b->order[kept++] = b->order[i];
+    b->count = b->order ? kept : b->count;
+}
+
+void ebpo_batch_begin(ebpo_batch *b)
+{
+    const ebpo_model *m = b->context->model;
     ebpo_box box = ebpo_model_box(m);
-    *b = (ebpo_batch){
-        .context = context, .points = points, .count = count, .searches_around = searches_around
-    };
-    if (m->whole && searches_around && are_scattered(&box, points, count))
-        b->order = ebpo_curve_order(&box, points, count);
-    if (m->whole || count < 2 || m->options.loading != EBPO_LOAD_CACHE)
+    b->pending_home = EBPO_NO_SUBTREE;
+    if (b->as_given)
         return;
-    b->order = ebpo_curve_order(&box, points, count);
+    if (m->whole && b->searches_around && are_scattered(&box, b->points, b->count))
+        set_order(b, &box);
+    if (m->whole || b->count < 2 || m->options.loading != EBPO_LOAD_CACHE)
+        return;
+    set_order(b, &box);
     b->sends_hints = ebpo_input_prefetches(&m->file->in) && m->info->subtree_level &&
                      m->info->parts & EBPO_PART_MESH;
 }
 
-void ebpo_batch_end(ebpo_batch *b)
+ebpo_status ebpo_batch_end(ebpo_batch *b, ebpo_status status, ebpo_error *error)
 {
     free(b->order);
     free(b->below);
+    if (!b->pending || (status != EBPO_OK && status != EBPO_E_PENDING))
+        return status;
+    return ebpo_fail_with(error, &b->why_pending); /* later points may have changed *error */
 }
 
 /* --- prefetch hints --- */
-
-#define EBPO_NO_SUBTREE UINT64_MAX
 
 /* Returns the *home* of a point: the subtree where the query of the point begins, as an index of
  * top->below. EBPO_NO_SUBTREE: the query needs no subtree, as the top decides. */
@@ -317,7 +333,8 @@ static void hint_next(ebpo_batch *b)
 /* Sends one hint for the other subtrees that the next points need, so that queries do not request
  * these subtrees one by one. Finds the nearest face in each point's home. The distance of this face
  * is an upper bound: subtrees beyond it are not needed. If a home cannot be loaded, the loop ends,
- * because the next home could again wait for a time-out. The query returns the error. */
+ * because the next home could again wait for a time-out. The query returns the error. Homes whose
+ * bytes are pending do not end the loop. */
 static void search_around(ebpo_batch *b, uint64_t end)
 {
     ebpo_context *c = b->context;
@@ -326,10 +343,13 @@ static void search_around(ebpo_batch *b, uint64_t end)
         uint64_t home = home_of(b, p), near[EBPO_CACHE_AHEAD];
         ebpo_accel *accel;
         ebpo_nearest n;
-        if (home == EBPO_NO_SUBTREE || c->model->top->below[home].pruned)
+        if (home == EBPO_NO_SUBTREE || c->model->top->below[home].pruned || home == b->pending_home)
             continue;
-        fails = ebpo_context_subtree(c, (uint32_t)home, &accel, NULL) != EBPO_OK;
-        if (fails)
+        ebpo_status status = ebpo_context_subtree(c, (uint32_t)home, &accel, NULL);
+        fails = status != EBPO_OK && status != EBPO_E_PENDING;
+        if (status == EBPO_E_PENDING)
+            b->pending_home = home;
+        if (status != EBPO_OK)
             continue;
         ebpo_nearest_begin(&n, c->model, p, INFINITY);
         ebpo_nearest_search(&n, c, accel);
@@ -353,4 +373,28 @@ uint64_t ebpo_batch_next(ebpo_batch *b, uint64_t i)
             search_around(b, end);
     }
     return b->order ? b->order[i] : i;
+}
+
+/* Returns the turn at which a batch with pending points ends. With hints, this is the first turn
+ * that would send another hint. */
+static uint64_t end_of_pass(const ebpo_batch *b)
+{
+    if (!b->sends_hints)
+        return b->first_pending + PENDING_A_TIME;
+    return b->searches_around ? b->searched : b->hinted == b->count ? b->count : b->hinted - 1;
+}
+
+ebpo_status ebpo_batch_note(ebpo_batch *b, uint64_t i, uint64_t point, ebpo_status status,
+                            const ebpo_error *error)
+{
+    if (status == EBPO_OK && b->done)
+        b->done[point] = true;
+    if (status == EBPO_E_PENDING && !b->pending) {
+        b->pending = true;
+        b->first_pending = i;
+        b->why_pending = error ? *error : (ebpo_error){ .status = status, .offset = -1 };
+    }
+    if (!b->pending || (status != EBPO_OK && status != EBPO_E_PENDING))
+        return status;
+    return i + 1 < b->count && i + 1 < end_of_pass(b) ? EBPO_OK : EBPO_E_PENDING;
 }

@@ -370,7 +370,7 @@ static double known_volume(const ebpo_mesh_report *report, ebpo_rule rule,
         return NAN;
     if (report->components == 1)
         return ebpo_rule_inside(rule, signbit(integral) ? -1 : 1) ? fabs(integral) : 0;
-    return shells->apart ? integral + shells->beyond[rule] : NAN;
+    return shells->apart ? integral + shells->volume_difference[rule] : NAN;
 }
 
 ebpo_status ebpo_solid_volume_of(const ebpo_mesh_report *report, ebpo_rule rule,

@@ -289,8 +289,8 @@ static unsigned far_children(const far_search *g, uint32_t node, double lower[8]
     ebpo_far_boxes(&n->far, &g->frame, b, lower);
     for (int lane = 0; lane < b->count; lane++) {
         if (lower[lane] <= n->key_limit)
-            lower[lane] =
-                fmax(lower[lane], ebpo_far_slab(&n->far, &g->frame, b, &g->s->slab[node], lane));
+            lower[lane] = fmax(lower[lane], ebpo_far_cylinder(&n->far, &g->frame, b,
+                                                              &g->s->cylinder[node], lane));
         left |= (unsigned)(lower[lane] <= n->key_limit) << lane;
     }
     return left;
@@ -367,12 +367,13 @@ void ebpo_nearest_search(ebpo_nearest *n, const ebpo_context *context, const ebp
     if (s->bound_count == 0)
         return;
     if (n->far.far) {
-        far_search far = { n, s, ebpo_far_frame_of(&n->far, s->centre, s->scale, s->reach) };
-        search_by_keys(&far, s->top);
+        far_search far = { n, s,
+                           ebpo_far_frame_of(&n->far, s->centre, s->scale, s->largest_coordinate) };
+        search_by_keys(&far, s->root_bound);
     } else if (make_probe(s, n->p, &g.probe))
         search_near(n, context->model->kernels.nearest, &g);
     else
-        search_far(n, s, s->top);
+        search_far(n, s, s->root_bound);
 }
 
 void ebpo_nearest_end(const ebpo_nearest *n, double max_distance, ebpo_distance_result *out)

@@ -41,17 +41,18 @@ EBPO_EIGHT f8 near_by_boxes(const ebpo_bound *b, const ebpo_probe *probe, near_b
 }
 
 /* Returns squared lower bounds of the distances, from bounding cylinders. */
-EBPO_EIGHT f8 near_by_slabs(const ebpo_bound_slab *slab, const near_boxes *boxes)
+EBPO_EIGHT f8 near_by_cylinders(const ebpo_bound_cylinder *cylinder, const near_boxes *boxes)
 {
     f8 zero = f8_all(0), twice[3], part[3];
     for (int k = 0; k < 3; k++) {
         twice[k] = f8_sub(boxes->low[k], boxes->minus_high[k]);
-        part[k] = f8_mul(twice[k], f8_mul(f8_from_shorts(slab->axis[k]), f8_all(0x1p-16f)));
+        part[k] = f8_mul(twice[k], f8_mul(f8_from_shorts(cylinder->axis[k]), f8_all(0x1p-16f)));
     }
     /* position of the middle relative to the point */
-    f8 along = f8_add(f8_add(part[0], part[1]), part[2]), step = f8_all(slab->along_step),
-       from = f8_mul(f8_from_shorts(slab->from), step), to = f8_mul(f8_from_shorts(slab->to), step),
-       radius = f8_mul(f8_from_shorts(slab->radius), f8_all(slab->aside_step));
+    f8 along = f8_add(f8_add(part[0], part[1]), part[2]), step = f8_all(cylinder->along_step),
+       from = f8_mul(f8_from_shorts(cylinder->from), step),
+       to = f8_mul(f8_from_shorts(cylinder->to), step),
+       radius = f8_mul(f8_from_shorts(cylinder->radius), f8_all(cylinder->aside_step));
     f8 over = f8_max3(f8_add(along, from), f8_sub(f8_sub(zero, along), to), zero);
     /* Less than the true value by a margin, so that the root of a small difference of large squares
      * is a lower bound. */
@@ -67,8 +68,8 @@ EBPO_EIGHT unsigned near_children(const ebpo_near_search *g, uint32_t node, floa
     const ebpo_bound *b = &g->s->bound[node];
     near_boxes boxes;
     f8 bound = near_by_boxes(b, &g->probe, &boxes);
-    if (g->limit2 > b->slab_limit2)
-        bound = f8_max(bound, near_by_slabs(&g->s->slab[node], &boxes));
+    if (g->limit2 > b->cylinder_limit2)
+        bound = f8_max(bound, near_by_cylinders(&g->s->cylinder[node], &boxes));
     f8_store(lower2, bound);
     return f8_bits(f8_at_most(bound, f8_all(g->limit2))) & ((1u << b->count) - 1);
 }
@@ -227,7 +228,7 @@ EBPO_EIGHT void near_fetch(const ebpo_accel *s, uint32_t child)
 {
     ebpo_visit_fetch(s, child);
     if (!(child & EBPO_IS_BLOCK))
-        ebpo_visit_fetch_slab(s, child);
+        ebpo_visit_fetch_cylinder(s, child);
 }
 
 /* Prefetches the data of the next visit during the current one: far from the surface, a visit takes
@@ -239,7 +240,7 @@ EBPO_EIGHT void near_fetch_next(const ebpo_near_search *g, uint32_t top)
 }
 
 /* A search is small compared with a node if its squared limit is at most this multiple of the
- * node's slab_limit2. */
+ * node's cylinder_limit2. */
 #define NEAR_SMALL 25.0f
 
 /* Pushes a node's children, farthest first; returns the new top. */
@@ -283,11 +284,11 @@ EBPO_EIGHT uint32_t near_begin(ebpo_near_search *g, bool wide)
     const ebpo_bound *bound = g->s->bound;
     uint32_t node = g->first_node;
     if (g->first_block == EBPO_NO_BLOCK)
-        return g->s->top;
+        return g->s->root_bound;
     near_block(g, g->first_block, node, wide);
     if (g->late) /* at the deadline, the nodes not visited must be on the stack */
-        return g->s->top;
-    while (node != g->s->top && g->limit2 > bound[node].slab_limit2 * NEAR_SMALL)
+        return g->s->root_bound;
+    while (node != g->s->root_bound && g->limit2 > bound[node].cylinder_limit2 * NEAR_SMALL)
         node = bound[node].parent;
     return node;
 }
@@ -329,7 +330,7 @@ EBPO_EIGHT void near_walk_in(ebpo_near_search *g, bool wide)
     g->stack[0] = ebpo_visit_make(0, node);
     g->from[0] = node;
     g->top = 0;
-    while (near_walk_down(g, top, wide) && node != g->s->top) {
+    while (near_walk_down(g, top, wide) && node != g->s->root_bound) {
         uint32_t child = node;
         node = g->s->bound[node].parent;
         top = near_other_children(g, node, child);

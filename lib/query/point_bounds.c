@@ -312,10 +312,10 @@ void ebpo_far_boxes(const ebpo_far *f, const ebpo_far_frame *g, const ebpo_bound
 /* |p - x|^2 >= |p - m|^2 - 2 (p - m) . (x - m) for the middle m of the box.
  * By Cauchy and Schwarz (p - m) . (x - m) <= ((p - m) . a) ((x - m) . a) + N(p - m) N(x - m).
  * N is that of bounds.md. */
-double ebpo_far_slab(const ebpo_far *f, const ebpo_far_frame *g, const ebpo_bound *b,
-                     const ebpo_bound_slab *slab, int lane)
+double ebpo_far_cylinder(const ebpo_far *f, const ebpo_far_frame *g, const ebpo_bound *b,
+                         const ebpo_bound_cylinder *cylinder, int lane)
 {
-    ebpo_child_slab s = ebpo_bound_slab_of(slab, lane);
+    ebpo_child_cylinder s = ebpo_bound_cylinder_of(cylinder, lane);
     double y[3], along = 0, square = 0;
     for (int k = 0; k < 3; k++) {
         ebpo_bound_sides side = ebpo_bound_side(b, lane, k);

@@ -69,8 +69,8 @@ ebpo_far_frame ebpo_far_frame_of(const ebpo_far *far, const double centre[3], do
  */
 void ebpo_far_boxes(const ebpo_far *far, const ebpo_far_frame *frame, const ebpo_bound *b,
                     double lower[8]);
-double ebpo_far_slab(const ebpo_far *far, const ebpo_far_frame *frame, const ebpo_bound *b,
-                     const ebpo_bound_slab *slab, int lane);
+double ebpo_far_cylinder(const ebpo_far *far, const ebpo_far_frame *frame, const ebpo_bound *b,
+                         const ebpo_bound_cylinder *cylinder, int lane);
 
 /* Bounds of a face's key. */
 typedef struct ebpo_far_keys {

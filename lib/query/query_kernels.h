@@ -48,9 +48,9 @@ static inline void ebpo_visit_fetch(const ebpo_accel *s, uint32_t child)
         __builtin_prefetch(at + 64 * i);
 }
 
-static inline void ebpo_visit_fetch_slab(const ebpo_accel *s, uint32_t node)
+static inline void ebpo_visit_fetch_cylinder(const ebpo_accel *s, uint32_t node)
 {
-    const char *at = (const char *)&s->slab[node];
+    const char *at = (const char *)&s->cylinder[node];
     __builtin_prefetch(at);
     __builtin_prefetch(at + 64);
 }

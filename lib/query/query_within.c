@@ -190,12 +190,12 @@ static void search_child(const searching *g, uint32_t child)
 static void near_band_search(near_band *band, const ebpo_accel *s)
 {
     searching g = { band, s, 0 };
-    double size = s->reach / s->scale * 0x1p-46;
+    double size = s->largest_coordinate / s->scale * 0x1p-46;
     for (int k = 0; k < 3; k++) /* each side adds a few rounding errors of numbers of this size */
         size += fabs(band->p[k]) * 0x1p-46 + fabs(s->centre[k]) * 0x1p-46;
     g.error = size;
     if (s->bound_count)
-        search_child(&g, s->top);
+        search_child(&g, s->root_bound);
 }
 
 /* --- the stream --- */

@@ -297,7 +297,7 @@ EBPO_EIGHT void ray_walk_in(ebpo_ray_search *r, bool wide, bool sorted)
     uint32_t top = 1;
     ray_set_boxes(r);
     ray_set_faces(r);
-    stack[0] = ebpo_visit_make(0, s->top);
+    stack[0] = ebpo_visit_make(0, s->root_bound);
     while (top && !r->done) {
         ebpo_visit v = stack[--top];
         uint32_t child = (uint32_t)v;

@@ -152,7 +152,7 @@ static bool move_origin(ebpo_ray_search *r, double *most)
 {
     const ebpo_accel *s = r->s;
     double t;
-    if (!enters_cube(r, s->reach, &t))
+    if (!enters_cube(r, s->largest_coordinate, &t))
         return false;
     r->moved = t;
     *most = 0;
@@ -174,7 +174,7 @@ static void set_error(ebpo_ray_search *r, double most)
 {
     const double *c = r->s->centre;
     double unit = (fabs(c[0]) + fabs(c[1]) + fabs(c[2])) * r->s->scale;
-    r->error = 0x1p-45 * (most + unit) + 0x1p-55 * r->s->reach + 0x1p-53;
+    r->error = 0x1p-45 * (most + unit) + 0x1p-55 * r->s->largest_coordinate + 0x1p-53;
     r->blur = most < 0x1p30 ? (float)(r->error * 0x1p23 + 0x1p-30) : INFINITY;
     if (most < 0x1p80)
         return;
@@ -214,7 +214,8 @@ static void ray_search_accel(ebpo_ray_search *r, const ebpo_ray_kernels *kernels
     if (s->bound_count == 0)
         return;
     double most = to_frame(r);
-    if (!(most <= near_enough * s->reach) && most < 0x1p46 * s->reach && !move_origin(r, &most))
+    if (!(most <= near_enough * s->largest_coordinate) && most < 0x1p46 * s->largest_coordinate &&
+        !move_origin(r, &most))
         return;
     set_error(r, most);
     r->surely = frame_t(r, r->ray->t_max, -1);
@@ -516,7 +517,8 @@ typedef struct batch {
     uint64_t *held;         /* [threads] number of hits in each context, if all hits are wanted */
     double *entry;          /* [count][3] entry points, in the order of work; NULL: the order of
                              * work is that of the rays */
-    uint64_t *order;        /* [count] order of work */
+    uint64_t work;          /* number of rays to compute */
+    uint64_t *order;        /* [work] order of work */
     /* results, [count] each; one of the following three is used */
     ebpo_ray_hit *first;
     bool *any;
@@ -552,15 +554,21 @@ static ebpo_status result_piece(void *user, uint64_t begin, uint64_t end, unsign
 {
     batch *b = user;
     ebpo_status status = EBPO_OK;
-    ebpo_batch along = { .count = 0 };
-    if (b->order)
-        ebpo_batch_begin(&along, b->context[worker], b->entry + 3 * begin, end - begin, false);
+    ebpo_batch along = { .context = b->context[worker],
+                         .points = b->order ? b->entry + 3 * begin : NULL,
+                         .count = end - begin,
+                         .as_given = !b->order };
+    ebpo_batch_begin(&along);
     for (uint64_t i = 0; i < end - begin && status == EBPO_OK; i++) {
-        uint64_t k = begin + (b->order ? ebpo_batch_next(&along, i) : i);
-        status = result_ray(b, b->order ? b->order[k] : k, worker, error);
+        uint64_t k = begin + ebpo_batch_next(&along, i), ray = b->order ? b->order[k] : k;
+        if (b->options.done && b->options.done[ray])
+            continue;
+        status = result_ray(b, ray, worker, error);
+        if (status == EBPO_OK && b->options.done)
+            b->options.done[ray] = true;
+        status = ebpo_batch_note(&along, i, k, status, error);
     }
-    ebpo_batch_end(&along);
-    return status;
+    return ebpo_batch_end(&along, status, error);
 }
 
 /* --- the order of work --- */
@@ -581,18 +589,26 @@ static void entry_of(const ebpo_box *box, const ebpo_ray *ray, double out[3])
     }
 }
 
-/* Chooses the order of work. Without memory for it, the rays are processed in the given order. */
+/* Chooses the order of work, without completed rays. Without memory for it, the rays are processed
+ * in the given order. */
 static void put_in_order(batch *b, const ebpo_model *m)
 {
     ebpo_box box = ebpo_model_box(m);
+    uint64_t kept = 0;
     double *entry = ebpo_alloc(b->count, 3 * sizeof *entry);
     b->entry = ebpo_alloc(b->count, 3 * sizeof *entry);
     for (uint64_t i = 0; entry && i < b->count; i++)
         entry_of(&box, &b->rays[i], entry + 3 * i);
     if (entry && b->entry)
         b->order = ebpo_curve_order(&box, entry, b->count);
-    for (uint64_t i = 0; b->order && i < b->count; i++)
-        memcpy(b->entry + 3 * i, entry + 3 * b->order[i], 3 * sizeof *entry);
+    for (uint64_t i = 0; b->order && i < b->count; i++) {
+        uint64_t ray = b->order[i];
+        if (b->options.done && b->options.done[ray])
+            continue;
+        memcpy(b->entry + 3 * kept, entry + 3 * ray, 3 * sizeof *entry);
+        b->order[kept++] = ray;
+    }
+    b->work = b->order ? kept : b->count;
     free(entry);
 }
 
@@ -653,19 +669,22 @@ static ebpo_status result_all(batch *b, ebpo_context *context, const ebpo_ray_op
         status = ebpo_check_ray_rows(b->rays, b->count, error);
     if (status == EBPO_OK)
         status = ebpo_check_mesh(m, error);
+    if (status == EBPO_OK && b->wants == EBPO_WANTS_ALL && b->options.done)
+        status = ebpo_fail(error, EBPO_E_ARGUMENT, "ebpo_ray_all_many: `done` must be NULL");
     if (status != EBPO_OK || b->count == 0)
         return status;
+    b->work = b->count;
     bool shared = m->whole || m->options.loading == EBPO_LOAD_CACHE;
     if (!m->whole && shared && b->count > 1)
         put_in_order(b, m);
-    uint64_t piece = b->order ? PIECE_ALONG_CURVE : PIECE, pieces = (b->count - 1) / piece + 1;
+    uint64_t piece = b->order ? PIECE_ALONG_CURVE : PIECE, pieces = (b->work + piece - 1) / piece;
     b->threads = shared ? ebpo_thread_count(b->options.threads) : 1;
     if (b->threads > pieces)
         b->threads = (unsigned)pieces;
-    status = make_contexts(b, context, error);
+    status = pieces ? make_contexts(b, context, error) : EBPO_OK;
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(b->threads, NULL, b->count, piece, result_piece, b, NULL, NULL,
-                                   error);
+        status =
+            ebpo_parallel_for(b->threads, NULL, b->work, piece, result_piece, b, NULL, NULL, error);
     return status;
 }
 

@@ -22,7 +22,7 @@ typedef struct kept_node {
     /* `child` is one of: EBPO_IS_BLOCK; the number of a node of the skeleton; a number in the
      * subtree's hierarchy, which is replaced when the skeleton grows. */
     ebpo_bound bound;
-    ebpo_bound_slab slab;
+    ebpo_bound_cylinder cylinder;
 } kept_node;
 
 /* Maximum numbers of nodes in a part, and of parts: powers of two. */
@@ -63,7 +63,7 @@ static void keep_child(ebpo_skeleton *k, const ebpo_accel *s, uint32_t *place)
     uint32_t number = k->count++;
     kept_node *n = node_at(k, number);
     n->bound = s->bound[*place];
-    n->slab = s->slab[*place];
+    n->cylinder = s->cylinder[*place];
     __atomic_store_n(place, IS_KEPT | number, __ATOMIC_RELEASE);
 }
 
@@ -88,7 +88,7 @@ static bool is_shared(const ebpo_accel *s, uint32_t child)
 
 static void note_kinds(ebpo_skeleton *k, const ebpo_accel *s)
 {
-    const ebpo_bound *top = &s->bound[s->top];
+    const ebpo_bound *top = &s->bound[s->root_bound];
     for (int lane = 0; lane < top->count; lane++)
         if (is_shared(s, top->child[lane]))
             k->shared |= (uint8_t)(1u << lane);
@@ -144,7 +144,7 @@ ebpo_skeleton *ebpo_skeleton_make(const ebpo_accel *s, unsigned nodes)
     k->scale = s->scale;
     k->part[0] = first;
     k->first = most;
-    uint32_t top = s->top;
+    uint32_t top = s->root_bound;
     keep_child(k, s, &top);
     note_kinds(k, s);
     keep_shared(k, s);
@@ -169,18 +169,18 @@ static const double certainly = 1 - 0x1p-40;
 
 /* Returns a squared lower bound by |p - x|^2 >= (N(p) - radius)^2 + (along - [from, to])^2, as in
  * the kernels. `to` is the position of p relative to the middle of the box. */
-static double by_slab(const ebpo_child_slab *slab, const double to[3])
+static double by_cylinder(const ebpo_child_cylinder *cylinder, const double to[3])
 {
     double along = 0, square = 0;
     for (int k = 0; k < 3; k++) {
-        along += to[k] * slab->axis[k];
+        along += to[k] * cylinder->axis[k];
         square += to[k] * to[k];
     }
-    double over = fmax(fmax(slab->from - along, along - slab->to), 0);
+    double over = fmax(fmax(cylinder->from - along, along - cylinder->to), 0);
     /* less than the true value, so that the root of a small difference of large squares is a lower
      * bound */
     double aside2 = fmax(square * (1 - 0x1p-48) - along * along, 0);
-    double aside = fmax(sqrt(aside2) - slab->radius, 0);
+    double aside = fmax(sqrt(aside2) - cylinder->radius, 0);
     return aside * aside + over * over;
 }
 
@@ -200,15 +200,15 @@ static void by_boxes(const ebpo_bound *b, const double p[3], double lower2[8])
         }
 }
 
-static double by_child_slab(const kept_node *n, int lane, const double p[3])
+static double by_child_cylinder(const kept_node *n, int lane, const double p[3])
 {
     double to[3];
     for (int k = 0; k < 3; k++) {
         ebpo_bound_sides side = ebpo_bound_side(&n->bound, lane, k);
         to[k] = p[k] - (side.low + side.high) / 2;
     }
-    ebpo_child_slab slab = ebpo_bound_slab_of(&n->slab, lane);
-    return by_slab(&slab, to);
+    ebpo_child_cylinder cylinder = ebpo_bound_cylinder_of(&n->cylinder, lane);
+    return by_cylinder(&cylinder, to);
 }
 
 /* The nearest child whose node is not in the skeleton. */
@@ -236,7 +236,7 @@ static void search_below(const ebpo_skeleton *k, uint32_t number, unsigned lanes
             break;
         if (!(reported >> lane & 1)) {
             reported |= 1u << lane;
-            lower2[lane] = fmax(fmax(lower2[lane], parent), by_child_slab(n, lane, p));
+            lower2[lane] = fmax(fmax(lower2[lane], parent), by_child_cylinder(n, lane, p));
             continue;
         }
         lanes &= ~(1u << lane);
@@ -304,13 +304,13 @@ static void search_below_far(far_search *g, uint32_t number, unsigned lanes)
         if (!(lanes >> lane & 1) || lower[lane] >= g->best)
             continue;
         uint32_t child = child_of(n, lane);
-        double slab = ebpo_far_slab(g->far, &g->frame, &n->bound, &n->slab, lane);
-        if (fmax(lower[lane], slab) >= g->best)
+        double cylinder = ebpo_far_cylinder(g->far, &g->frame, &n->bound, &n->cylinder, lane);
+        if (fmax(lower[lane], cylinder) >= g->best)
             continue;
         if (is_kept(child))
             search_below_far(g, child & ~IS_KEPT, 255);
         else
-            g->best = fmax(lower[lane], slab);
+            g->best = fmax(lower[lane], cylinder);
     }
 }
 
@@ -382,7 +382,7 @@ static unsigned boxes_of(const ebpo_skeleton *k, uint32_t number, unsigned lanes
     const kept_node *n = node_at(k, number);
     by_boxes(&n->bound, p, lower2);
     for (int lane = 0; lane < n->bound.count; lane++) {
-        if (!(lanes >> lane & 1) || lower2[lane] > limit2 || by_child_slab(n, lane, p) > limit2)
+        if (!(lanes >> lane & 1) || lower2[lane] > limit2 || by_child_cylinder(n, lane, p) > limit2)
             continue;
         uint32_t child = child_of(n, lane);
         if (is_kept(child))

@@ -293,7 +293,7 @@ static ebpo_status index_all(places_comparison *c, ebpo_error *error)
 
 static ebpo_status read_list(places_comparison *c, ebpo_error *error)
 {
-    const ebpo_array_in *a = &c->file->root_array[EBPO_A_PLACES];
+    const ebpo_array_in *a = &c->file->root_array[EBPO_A_CHUNK_DIRECTORY];
     const char *why = "";
     uint8_t *stored = ebpo_alloc(a->chunks[0].bytes, 1);
     c->rows = a->shape.rows;
@@ -357,7 +357,7 @@ ebpo_status ebpo_check_places(ebpo_tally *tally, const ebpo_file *file,
 {
     ebpo_error own = EBPO_ERROR_INIT;
     (void)options;
-    if (!file->has_places)
+    if (!file->has_directory)
         return EBPO_OK;
     places_comparison *c = ebpo_alloc_zero(1, sizeof *c);
     if (!c)

@@ -56,7 +56,7 @@ static bool is_among(const uint32_t *faces, uint64_t count, uint32_t face)
 }
 
 /* Checks that a listed face touches the leaf's cell widened by 1/256. Distance queries with a
- * level depend on this. */
+ * limited level depend on this. */
 static void check_near(ebpo_tally *tally, const ebpo_reference_tree *view,
                        const ebpo_reference_node *leaf, uint32_t face)
 {
@@ -132,8 +132,9 @@ void ebpo_check_terminal_lists(ebpo_tally *tally, const ebpo_reference_tree *vie
                                              : "the face touches a black cell");
 }
 
-/* If the limit of a `gathering` is greater than this, bits are used instead of a list. */
-enum { LIMIT_OF_LISTS = 1 << 16 };
+/* Greatest limit of a `gathering` (below) that uses a list of faces. With greater limits, it uses
+ * bits. */
+enum { LIST_LIMIT_MAX = 1 << 16 };
 
 /* The different faces that the leaves below a node list. Faces are gathered only until there are
  * more than `limit`. They are kept in a list of at most about twice `limit` entries, which may
@@ -227,7 +228,7 @@ bool ebpo_lists_more_faces(const ebpo_reference_tree *view, const ebpo_reference
     uint64_t faces = view->tree->mesh.face_count;
     if (limit >= faces)
         return false;
-    if (limit > LIMIT_OF_LISTS) {
+    if (limit > LIST_LIMIT_MAX) {
         g.seen = ebpo_array_zero(view->workspace, faces / 8 + 1, 1);
         g.short_of_memory = !g.seen;
     }

@@ -2,10 +2,11 @@
  * leaf in the order of the faces, and counts all items again.
  *
  * Every column of every row is recomputed except the numbers of shared chunks:
- * /subtrees/shared_chunks is a hint. Only the sums of these numbers must match its rows.
+ * /subtrees/shared_chunks is a hint. Only the sum of these numbers must equal the number of its
+ * rows.
  *
  * This check is independent of the writer and the reader of the library, which proceed level by
- * level: they have only the reading of arrays in common. */
+ * level. It shares with them only the code that reads arrays. */
 #include "verify/verify_parts.h"
 
 #include <inttypes.h>
@@ -40,14 +41,16 @@ enum {
     MAX_COLS = FIRST_LEVEL + OF_A_LEVEL * EBPO_LEVELS_MAX
 };
 enum { SUBTREES_A_TIME = 128 };
-static const char *const names[] = { "faces before the subtree",
-                                     "faces",
-                                     "vertices before the subtree",
-                                     "vertices",
-                                     "blocks of faces",
-                                     "blocks of vertices" };
-static const char *const level_names[] = { "gray nodes",  "leaves",     "black nodes",   "planes",
-                                           "leaf planes", "references", "the faces' end" };
+static const char *const names[] = { "faces before the subtree",    "faces",
+                                     "vertices before the subtree", "vertices",
+                                     "chunks of shared faces",      "chunks of shared vertices" };
+static const char *const level_names[] = { "gray nodes",
+                                           "leaves",
+                                           "black nodes",
+                                           "planes",
+                                           "leaf planes",
+                                           "references",
+                                           "growth of the end of the new faces" };
 
 typedef struct recount {
     ebpo_tally *tally;
@@ -61,9 +64,9 @@ typedef struct recount {
     /* numbers of subtrees, faces and vertices so far */
     uint64_t subtree, faces, vertices;
     uint64_t shared_done, end[EBPO_LEVELS_MAX]; /* end of the new faces, by level */
-    /* columns: sums over all subtrees before the current one, counts of the current one */
-    uint64_t sum[MAX_COLS], row[MAX_COLS];
-    bool within; /* the visit is within a subtree */
+    uint64_t sum[MAX_COLS]; /* of each column, over all subtrees before the current one */
+    uint64_t row[MAX_COLS]; /* counts of the current subtree */
+    bool within;            /* the visit is within a subtree */
 } recount;
 
 /* Returns the name of a column. *level: the level to which it belongs, or -1. */
@@ -83,7 +86,8 @@ static void check_row(recount *c)
     ebpo_tally *tally = c->tally;
     const uint32_t *stated = c->counts + c->subtree * c->cols;
     int level;
-    c->row[SHARED_FACES] = stated[SHARED_FACES]; /* a hint, as what the list names */
+    c->row[SHARED_FACES] =
+        stated[SHARED_FACES]; /* not checked: a hint, like the chunks that the list names */
     c->row[SHARED_VERTICES] = stated[SHARED_VERTICES];
     c->shared_done += c->row[SHARED_FACES] + c->row[SHARED_VERTICES];
     for (unsigned k = 0; k < c->cols; k++) {
@@ -91,7 +95,7 @@ static void check_row(recount *c)
         if (c->subtree % c->rows_of_chunk == 0)
             CHECK(c->index[c->subtree / c->rows_of_chunk * c->cols + k] == c->sum[k],
                   "/subtrees/index, before subtree %" PRIu64 ", column %u (%s): states %" PRIu64
-                  ", and /subtrees/counts should add up to %" PRIu64,
+                  ", but the rows of /subtrees/counts before add up to %" PRIu64,
                   c->subtree, k, name, c->index[c->subtree / c->rows_of_chunk * c->cols + k],
                   c->sum[k]);
         CHECK(stated[k] == c->row[k],
@@ -112,7 +116,7 @@ static void count_faces(recount *c, uint64_t count)
     const ebpo_mesh *mesh = &c->view->tree->mesh;
     uint64_t seen = c->vertices;
     EBPO_FOR_ITEMS(c->view->workspace, i, 3 * c->faces, 3 * (c->faces + count))
-        seen += mesh->faces[i] == seen;
+        seen += mesh->faces[i] == seen; /* a vertex of first use has the next index */
     c->row[c->within ? FACES : FACES_BEFORE] += count;
     c->row[c->within ? VERTICES : VERTICES_BEFORE] += seen - c->vertices;
     c->faces += count;

@@ -139,10 +139,9 @@ static void check_worth(const walk *w, ebpo_tally *tally, const ebpo_reference_n
         return;
     tally->checks[EBPO_VERIFY_STRUCTURE]++;
     if (touching <= limit && !ebpo_lists_more_faces(w->view, node, limit))
-        ebpo_tally_violation(
-            tally, EBPO_VERIFY_STRUCTURE,
-            &(ebpo_verify_place){ node->code, EBPO_NO_FACE, EBPO_NO_PLANE },
-            "the node is gray, but its leaves list no more faces than one leaf may");
+        ebpo_tally_violation(tally, EBPO_VERIFY_STRUCTURE,
+                             &(ebpo_verify_place){ node->code, EBPO_NO_FACE, EBPO_NO_PLANE },
+                             "the node is gray, but its leaves list at most leaf_faces faces");
 }
 
 /* Checks the corners of a gray node, after its children have been visited. */

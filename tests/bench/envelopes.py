@@ -102,13 +102,11 @@ machine.
 
 The limit is the convex hull of the solid in each cell (`ebpo measure --hulls`, computed by qhull): no convex envelopes
 of the same cells are smaller. `inherit` is the default selection of planes ([design](../develop/design.md)). The other
-rows are the methods of the theses: k-medoids, offset and random selection with 40 % of the planes (EBP-Octree), and the
-BP-Octree with K = 1 %, computed in memory with N = 50 by the thesis' criterion and with any number of planes in a node
-(`report --unlimited --coalesce sum`). [theses.md](theses.md) has the volumes of the theses.
+rows are the methods of the [theses](theses.md): k-medoids, offset and random selection with 40 % of the planes
+(EBP-Octree), and the BP-Octree with K = 1 % and N = 50 (`report --unlimited --coalesce sum`).
 
 The files are divided down to the deepest level (`--leaf-faces 0`) and store leaf planes. `ebpo verify` reports 0
-violations for each.
-The limit is that of their cells; the leaves of `BP, K = 1 %` are larger.
+violations. The leaves of `BP, K = 1 %` are larger than the cells of the limit.
 
 The tables list by level the excess over the volume of the solid, divided by that of the limit. The row *limit* is the
 volume of the limit in percent of the solid.

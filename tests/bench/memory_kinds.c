@@ -37,7 +37,7 @@ int main(int argc, char **argv)
     const ebpo_accel *s = model->whole;
     report("faces", s->units * EBPO_MESHLET_UNIT);
     report("boxes", s->bound_count * sizeof *s->bound);
-    report("slabs", s->bound_count * sizeof *s->slab);
+    report("cylinders", s->bound_count * sizeof *s->cylinder);
     report("leaves", s->leaf_count * sizeof *s->leaf);
     report("leaves' blocks", s->list_count * sizeof *s->list);
     report("numbers in the source", s->face_source ? s->face_count * sizeof *s->face_source : 0);

@@ -11,8 +11,20 @@ def decades(values):
     return low, max(high, low + 1)
 
 
-def shown(power):
-    return f"{10**power:,g}" if -3 <= power <= 4 else f"10<tspan dy='-5' font-size='9'>{power}</tspan>"
+def shown(power, times=1):
+    if -3 <= power <= 4:
+        return f"{times * 10.0**power:,g}"
+    return (f"{times}\u00b7" if times > 1 else "") + f"10<tspan dy='-5' font-size='9'>{power}</tspan>"
+
+
+def ticks(low, high, length, least):
+    """Yields position, label and colour of the ticks: decades, and 2 and 5 times them, with labels when a decade
+    has at least `least` points."""
+    step = length / (high - low)
+    for power in range(low, high + 1):
+        yield (power - low) * step, shown(power), "#ccc"
+        for times in (2, 5) if power < high else ():
+            yield (power - low + math.log10(times)) * step, shown(power, times) if step >= least else "", "#eee"
 
 
 def plot(path, title, x_title, y_title, lines):
@@ -29,14 +41,14 @@ def plot(path, title, x_title, y_title, lines):
     out = [f"<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 {WIDTH} {tall}' font-family='sans-serif' "
            f"font-size='12'><rect width='{WIDTH}' height='{tall}' fill='white'/>"
            f"<text x='{LEFT}' y='20' font-size='14'>{html.escape(title)}</text>"]
-    for power in range(x_low, x_high + 1):
-        x, _ = at(10**power, 10**y_low)
-        out.append(f"<line x1='{x:.1f}' x2='{x:.1f}' y1='{TOP}' y2='{TOP + height}' stroke='#ddd'/>"
-                   f"<text x='{x:.1f}' y='{TOP + height + 16}' text-anchor='middle'>{shown(power)}</text>")
-    for power in range(y_low, y_high + 1):
-        _, y = at(10**x_low, 10**power)
-        out.append(f"<line x1='{LEFT}' x2='{LEFT + width}' y1='{y:.1f}' y2='{y:.1f}' stroke='#ddd'/>"
-                   f"<text x='{LEFT - 6}' y='{y + 4:.1f}' text-anchor='end'>{shown(power)}</text>")
+    for along, label, colour in ticks(x_low, x_high, width, 130):
+        x = LEFT + along
+        out.append(f"<line x1='{x:.1f}' x2='{x:.1f}' y1='{TOP}' y2='{TOP + height}' stroke='{colour}'/>"
+                   f"<text x='{x:.1f}' y='{TOP + height + 16}' text-anchor='middle'>{label}</text>")
+    for along, label, colour in ticks(y_low, y_high, height, 60):
+        y = TOP + height - along
+        out.append(f"<line x1='{LEFT}' x2='{LEFT + width}' y1='{y:.1f}' y2='{y:.1f}' stroke='{colour}'/>"
+                   f"<text x='{LEFT - 6}' y='{y + 4:.1f}' text-anchor='end'>{label}</text>")
     out.append(f"<text x='{LEFT + width / 2}' y='{HEIGHT - 10}' text-anchor='middle'>{x_title}</text>"
                f"<text transform='translate(14 {TOP + height / 2}) rotate(-90)' text-anchor='middle'>{y_title}</text>")
     for i, (name, points) in enumerate(lines):

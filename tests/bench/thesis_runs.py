@@ -13,8 +13,16 @@ EBP = ("--unlimited", "--leaf-faces", 0, "--points", 1)
 CUT = 4
 MODES = ("cache", "nodes", "subtree", "cache-plain", "nodes-plain", "subtree-plain")
 MEMORY = 32 << 20
-SHOWN_LEVELS = (0, 2, 4, 5, 7, 10)
-POINTS, FEW_POINTS = 100_000, 1_000
+SHOWN_LEVELS = (0, 4, 5, 7, 10)
+POINTS, SOME_POINTS, FEW_POINTS = 100_000, 10_000, 1_000
+LEVEL_WORDS = ("--cut-level", CUT, "--memory", MEMORY)
+LEVEL_QUERIES = {"inside": ("--mode", "cache"), "distance": ("--query", "distance", "--mode", "envelope")}
+CROSSING_STEPS = 40
+# Name, the fixed model, the one that moves, and its size: its diagonal divided by the other's.
+SCENARIOS = (("lucy_lucy", "lucy_x256", "lucy_x256", 1), ("lucy_armadillo", "lucy_x256", "armadillo", 0.5),
+             ("lucy16_lucy16", "lucy_x16", "lucy_x16", 1),
+             ("armadillo_armadillo", "armadillo_x4", "armadillo_x4", 1),
+             ("lucy16_armadillo", "lucy_x16", "armadillo_x4", 0.5))
 
 
 class Runs:
@@ -91,6 +99,12 @@ class Runs:
                                        "cold_open_seconds", "cold_first_result_seconds", "model")
                 if k in stated}
 
+    def crossing(self, a, b, size, query, budget):
+        """For each step of a crossing: microseconds, pairs, loaded subtrees and bytes."""
+        printed = self.call(self.build / "tests/bench/peers/crossing_ebpo", self.file(a), self.file(b),
+                            CROSSING_STEPS, query, size, budget)["printed"]
+        return [[float(x) for x in line.split()] for line in printed.splitlines()[1:]]
+
 
 # --- steps ---
 
@@ -132,13 +146,22 @@ def sent(name):
 
 
 def leaves(name):
-    """Number of leaves by criteria 1 and 2 of BP, and by ours."""
+    """Number of leaves by criteria 1 and 2 of BP, and by ours; and, for each level, the nodes with
+    faces and the lengths of their lists."""
     def step(runs):
         out = {}
-        for rule, number in (("distinct", 50), ("sum", 50), ("mean", 20)):
+        for rule, number in (("sum", 50), ("mean", 20)):
             stated = runs.report(runs.model(name), "--select", "offset", "--unlimited", "--coalesce",
                                  rule, "--leaf-faces", number, "--max-level", 9, "--points", 1)
             out[rule] = stated["methods"][0]["unlimited"]["levels"]
+        out["distinct"] = {number: [{k: l[k] for k in ("gray", "leaf")} for l in runs.convert(
+            f"{name}_leaves", runs.model(name), "--leaf-faces", number)["levels"]]
+            for number in (50, 49, 16)}
+        deepest = [runs.convert(f"{name}_leaves", runs.model(name), "--leaf-faces", 0, "--max-level",
+                                level)["levels"][-1] for level in range(1, 8)]
+        out["nodes"] = [l["leaf"] for l in deepest]
+        out["entries"] = [l["faces_new"] + l["faces_again"] for l in deepest]
+        os.remove(runs.file(f"{name}_leaves"))
         return out
     return step
 
@@ -195,23 +218,43 @@ def modes(points):
     return step
 
 
-def levels(points):
-    """EBP tables 23, 24, 26 and 28: to a level."""
-    def step(runs):
-        words = ["--points", points, "--count", POINTS, "--cut-level", CUT, "--memory", MEMORY]
-        deepest = len(runs.result("large")["levels"]) - 1
-        out = {"inside": [], "distance": []}
-        for level in range(deepest + 1):
-            if points == "uniform" and level not in SHOWN_LEVELS:  # each takes minutes
-                out["inside"].append(None)
-                out["distance"].append(None)
-                continue
-            out["inside"].append(runs.bench("lucy_x256", *words, "--mode", "cache", "--max-level",
-                                            level)["ns"]["mean"])
-            out["distance"].append(runs.bench("lucy_x256", *words, "--query", "distance", "--mode",
-                                              "envelope", "--max-level", level)["ns"]["mean"])
-        return out
-    return step
+def levels_path(runs):
+    """EBP tables 24, 26 and 28: to a level, wall-clock ns."""
+    words = ["--points", "path", "--count", POINTS, *LEVEL_WORDS]
+    deepest = len(runs.result("large")["levels"]) - 1
+    return {query: [runs.bench("lucy_x256", *words, *mode, "--max-level", level)["ns"]["mean"]
+                    for level in range(deepest + 1)] for query, mode in LEVEL_QUERIES.items()}
+
+
+def levels_uniform(runs):
+    """EBP tables 23, 26 and 28: to a level, processor time in ns, without opening: an upper bound, as it is
+    that of single calls and of one batch. Below the cut level, points are fewer, as each loads a subtree."""
+    def processor(count, *mode):
+        return runs.call(runs.ebpo, "bench", "--json", "--points", "uniform", "--count", count, *LEVEL_WORDS,
+                         *mode, runs.file("lucy_x256"))["cpu"]
+    out = {}
+    for query, mode in LEVEL_QUERIES.items():
+        opening = min(processor(1, *mode) for _ in range(3))
+        out[query] = [None] * (max(SHOWN_LEVELS) + 1)
+        for level in SHOWN_LEVELS:
+            count = POINTS if level <= CUT else SOME_POINTS
+            took = processor(count, *mode, "--max-level", level) - opening
+            out[query][level] = 1e9 * took / count
+    return out
+
+
+def collisions(runs):
+    """EBP tables 30, 31 and 33: one model moves through another, in memory and with a budget."""
+    for name, base, times in (("armadillo_x4", "armadillo", 1), ("lucy_x16", "lucy100k", 2)):
+        runs.mesh(name, runs.generate, "--base", runs.models / f"{base}.ply", "--subdivide", times)
+    for name in ("armadillo", "armadillo_x4", "lucy_x16"):
+        runs.convert(name, runs.model(name))
+    out = {}
+    for name, a, b, size in SCENARIOS:
+        out[name] = {"first": runs.crossing(a, b, size, "first", 0), "all": runs.crossing(a, b, size, "all", 0)}
+        if "lucy_x256" in (a, b):
+            out[name]["budget"] = runs.crossing(a, b, size, "all", 256 << 20)
+    return out
 
 
 def memory_by_level(runs):
@@ -230,17 +273,21 @@ STEPS = {
     "bunny_bp": ("BP tables 3.3, 3.9, 4.1, 4.3", as_bp("bunny_closed", "1%")),
     "bunny_sent": ("BP table 4.4", sent("bunny_closed")),
     "bunny_leaves": ("BP table 3.1", leaves("bunny_closed")),
+    **{f"bunny_bp_{k}": (f"BP tables 3.4 to 3.8, K = {k} %", as_bp("bunny_closed", f"{k}%", "0-2"))
+       for k in ("0.05", "0.1", "0.5", "5")},
     "dragon": ("our default on the dragon", repaired),
+    "dragon100k_bp_1": ("BP tables 4.1, 4.3 on a dragon of 100,000 faces", as_bp("dragon100k", "1%", "0-2")),
     "dragon_bp_0.1": ("BP tables 3.5, 3.6, K = 0.1 %", as_bp("dragon_solid", "0.1%", "0-2")),
     "lucy_methods": ("EBP tables 2 to 14 on 99,970 faces", methods("lucy100k", PERCENTS)),
     "grow16": ("a mesh of 1.6 million faces", grown("lucy_x16", 2)),
     "grow256": ("a mesh of 25.6 million faces", grown("lucy_x256", 4)),
     "large": ("our default on 25.6 million faces", large),
     "memory": ("EBP tables 1, 5 to 7, 11, 16, 17, 19", memory_by_level),
+    "collisions": ("EBP tables 29 to 33", collisions),
     "modes_path": ("EBP tables 22, 25, 27, 28", modes("path")),
-    "levels_path": ("EBP tables 24, 26, 28", levels("path")),
+    "levels_path": ("EBP tables 24, 26, 28", levels_path),
     "modes_uniform": ("EBP tables 21, 25, 27, 28", modes("uniform")),
-    "levels_uniform": ("EBP tables 23, 26, 28", levels("uniform")),
+    "levels_uniform": ("EBP tables 23, 26, 28", levels_uniform),
     "large_kmedoids_40": ("EBP tables 4, 10, 14 to 20", large_selection("kmedoids", 40)),
     "dragon_bp_1": ("BP tables 3.3, 3.5, 3.9, 4.1, 4.3", as_bp("dragon_solid", "1%", "0-2")),
     "lucy16_methods_40": ("EBP tables 12 to 14, 40 %, 1.6 million faces",
@@ -253,3 +300,8 @@ STEPS = {
      for percent in (10, 20, 30, 50) for select in ("kmedoids", "offset", "random")} | {
     f"dragon_bp_{k}": (f"BP tables 3.5 and 3.6, K = {k} %", as_bp("dragon_solid", f"{k}%", "0-2"))
     for k in ("0.01", "0.05", "0.5", "5")}
+
+# Expected minutes of one core for steps that are often omitted.
+MINUTES = {"levels_uniform": 3, "lucy16_methods_40": 7, "bunny_bp_5": 10, "dragon_bp_0.5": 30, "dragon_bp_1": 30,
+           "dragon_bp_5": 30}
+LARGE_MINUTES = "11 to 16"

@@ -35,10 +35,10 @@ static void query_array(ebpo_head *head, const char *path, ebpo_head_rows rows)
         return;
     for (uint64_t i = 0; i < ebpo_shape_chunks(&shape); i++) {
         sum += places[i].bytes;
-        fuzz_must(places[i].bytes > 0 && places[i].address <= head->file_bytes &&
-                  places[i].bytes <= head->file_bytes - places[i].address);
+        fuzz_must(places[i].bytes > 0 && places[i].address <= head->end &&
+                  places[i].bytes <= head->end - places[i].address);
     }
-    fuzz_must(sum == stored && stored <= head->file_bytes);
+    fuzz_must(sum == stored && stored <= head->end);
     free(places);
 }
 

@@ -4,8 +4,8 @@
 Every writing command of commands.py is killed (SIGKILL) after random times, from zero to somewhat more than the
 duration of a run. Then each output must be the old one or the new one, complete. Beside it there may be at most one
 temporary file, and a lock file, or an incomplete folder. The next run removes them (fetch resumes from them). Each
-command is killed 200 times, or N times; if EBPO_TEST_SCALE is less than 1, every third command twice. Then two
-programs write one output, and two programs use one cache folder.
+command is killed 200 times, or N times; with EBPO_TEST_SCALE below 1 twice, and below 0.2 only every third command.
+Then two programs write one output, and two programs use one cache folder.
 """
 import collections
 import glob
@@ -209,7 +209,7 @@ def main():
     kills = kills[0] if kills else KILLS if SCALE >= 1 else 2
     draw = random.Random(1)
     names = [n for n, c in COMMANDS.items() if c.outputs and (not c.need or c.need in features)]
-    names = wanted or (names if SCALE >= 1 else names[::3])
+    names = wanted or (names if SCALE >= 0.2 else names[::3])
     with tempfile.TemporaryDirectory(dir=os.environ.get("TMPDIR", "/var/tmp")) as root:
         inputs = os.path.join(root, "inputs")
         url = ranges_server.serve(make_inputs(TOOL, GENERATE, inputs, 5000))

@@ -166,7 +166,7 @@ class Many(Case):
         ebpo.convert("scan.ply", "other.ebpo.h5")
         one = Catalogue.of(["other.ebpo.h5"])
         one.inside(P[:9])
-        ebpo.convert("open_box.ply", "other.ebpo.h5")
+        ebpo.convert("open_box.ply", "other.ebpo.h5", overwrite=True)
         process_models().clear()
         with self.assertRaisesRegex(ebpo.FormatError, "has changed"):
             one.inside(P)
@@ -215,7 +215,7 @@ class Holdings(Case):
 
     def test_exceptions_of_opening(self):
         """An exception of the function that opens files is raised by the query unchanged."""
-        catalogue = Catalogue.of(spheres()[:2], storage_options={"no": "file system"})
+        catalogue = Catalogue.of(spheres()[:2], http={"storage_options": {"no": "file system"}})
         catalogue.entries = [entry._replace(path="nowhere://x/y") for entry in catalogue.entries]
         with self.assertRaises((ValueError, ImportError)):  # raised by fsspec, or because it is not installed
             catalogue.inside(P)
@@ -290,7 +290,7 @@ class Sizes(Case):
         for size in (3e-162, 1e155, 1e300):
             names, p = [f"sized{i}.ebpo.h5" for i in range(9)], points(200, seed=3, reach=3) * size
             for name, at in zip(names, points(9, seed=4, reach=2)):
-                ebpo.convert(((vertices * .3 + at) * size, faces), name)
+                ebpo.convert(((vertices * .3 + at) * size, faces), name, overwrite=True)
             results = [ebpo.open(name).distance(p, signed=False).distance for name in names]
             found = Catalogue.of(names).distance(p)
             np.testing.assert_array_equal(np.abs(found["distance"]), np.min(results, axis=0))

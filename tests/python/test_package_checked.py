@@ -191,7 +191,7 @@ class Package(Case):
         layer = paint.add_layer(title="x")
         paint.draw(m, [[.2, .5, 1, 1], [.8, .5, 1, 1]], layer=layer, radius=.1)
         collider, shifted = ebpo.Collider(m, m), ebpo.pose(translation=[.5, .25, .25])
-        for module, name, query in ((ebpo.model, "copied", lambda: m.triangles_in_box([0, 0, 0], [1, 1, 1])),
+        for module, name, query in ((ebpo.point_queries, "copied", lambda: m.triangles_in_box([0, 0, 0], [1, 1, 1])),
                                   (ebpo.collide, "copied", lambda: collider.pairs(pose_b=shifted)),
                                   (ebpo.collide, "copied", lambda: collider.contacts(pose_b=shifted)),
                                   (ebpo.collide, "copied", lambda: collider.polylines(pose_b=shifted)),

@@ -2,6 +2,7 @@
 """Tests parts of files as arrays, several models, conversion, other packages; docstrings and guide."""
 import ast
 import doctest
+import errno
 import gc
 import importlib
 import json
@@ -28,7 +29,7 @@ class Parts(Case):
             sides = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
             faces = [[8 * n + a, 8 * n + b, 8 * n + c] for n in range(len(boxes)) for s in sides
                      for a, b, c in (s[:3], (s[0], *s[2:]))]
-            return ebpo.convert((np.array(vertices, float), np.array(faces)), "boxes.ebpo.h5", rule=rule).measure()
+            return ebpo.convert((np.array(vertices, float), np.array(faces)), "boxes.ebpo.h5", rule=rule, overwrite=True).measure()
         for rule, volume in ("nonzero", 1000), ("positive", 1000), ("evenodd", 936):
             mass = measured([(0, 10), (3, 7)], rule)
             self.assertAlmostEqual(mass.volume, volume)
@@ -154,7 +155,7 @@ class Parts(Case):
                                         ("coloured", {"unit": "mm", "codec": "deflate"},
                                          ["--unit", "mm", "--codec", "deflate"])):
             subprocess.run([COMMAND, "convert", "-q", *switches, f"{name}.ply", "by_command.ebpo.h5"], check=True)
-            ebpo.convert(f"{name}.ply", "by_python.ebpo.h5", **options)
+            ebpo.convert(f"{name}.ply", "by_python.ebpo.h5", overwrite=True, **options)
             self.assertEqual(pathlib.Path("by_python.ebpo.h5").read_bytes(),
                              pathlib.Path("by_command.ebpo.h5").read_bytes(), name)
         mesh = model("scan").mesh(order="source")
@@ -180,13 +181,19 @@ class Parts(Case):
             ebpo.convert("open_box.ply", "never.ebpo.h5", require_solid=True)
         with self.assertRaises(TypeError):
             ebpo.convert("scan.ply", "never.ebpo.h5", nonsense=1)
+        with self.assertRaises(FileExistsError) as caught:
+            ebpo.convert("scan.ply", "arrays.ebpo.h5")
+        self.assertEqual((caught.exception.errno, caught.exception.filename), (errno.EEXIST, "arrays.ebpo.h5"))
+        self.assertEqual(made.mesh().faces.shape, ebpo.open("arrays.ebpo.h5").mesh().faces.shape, "not replaced")
+        with self.assertWarnsRegex(UserWarning, "furlong"):
+            self.assertEqual(ebpo.convert("scan.ply", "unit.ebpo.h5", unit="furlong").info.unit, "furlong")
         with self.assertRaises(TypeError):  # selections are not supported here
             ebpo.convert("scan.ply", "never.ebpo.h5", percent=5)
         for wrong in ({"rule": "none"}, {"codec": "none at all"}, {"parts": "mess"}, {"parts": ["-maps", "-mess"]},
                       {"parts": "-maps,mesh"}, {"parts": "maps,envelopes"}, {"parts": "mesh,colours"}, {"parts": ""}):
             with self.assertRaisesRegex(ValueError, "not '"):
                 ebpo.convert("scan.ply", "never.ebpo.h5", **wrong)
-        self.assertEqual(ebpo.convert("scan.ply", "dated.ebpo.h5", date="2026-03-01").info.date, "2026-03-01")
+        self.assertEqual(ebpo.convert("scan.ply", "dated.ebpo.h5", date="2026-03-01", overwrite=True).info.date, "2026-03-01")
         for wrong in ("2026-02-30", "1.3.2026"):
             with self.assertRaisesRegex(ValueError, "^date: "):
                 ebpo.convert("scan.ply", "never.ebpo.h5", date=wrong)
@@ -268,7 +275,6 @@ class Parts(Case):
         mesh, source = m.to_trimesh(), m.mesh(order="source")
         self.same((mesh.vertices, mesh.faces), source)
         self.assertIs(mesh.process, False)
-        self.same(ebpo.from_trimesh(mesh, "from.ebpo.h5").mesh(order="source"), source)
         np.testing.assert_array_equal(m.to_pyvista().faces.reshape(-1, 4)[:, 1:], source.faces)
         self.assertEqual(len(m.to_pyvista(2).faces), 4 * len(taken["octcode"]))
         like, P = m.as_trimesh(), points(300)
@@ -310,7 +316,7 @@ class Text(Case):
         mesh = np.array([[x, y, z] for z in (0., 1.) for y in (0., 1.) for x in (0., 1.)]), np.array(
             [[0, 2, 1], [1, 2, 3], [4, 5, 6], [5, 7, 6], [0, 1, 4], [1, 5, 4], [2, 6, 3], [3, 6, 7],
              [0, 4, 2], [2, 4, 6], [1, 3, 5], [3, 7, 5]])
-        cube, ran = ebpo.convert(mesh, "cube.ebpo.h5"), 0
+        cube, ran = ebpo.convert(mesh, "cube.ebpo.h5", overwrite=True), 0
         for name in ["", *MODULES]:
             if not EXTRAS and name in ("collide", "painting", "scenes", "touching"):
                 continue

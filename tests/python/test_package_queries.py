@@ -153,7 +153,7 @@ class Queries(Case):
             m.ray(bad, [0, 0, 1.])
         with self.assertRaises(ValueError):
             m.ray(P, np.zeros(3))
-        for wrong in (P[:, :2], P[0, :2], [[1, 2, 3, 4]], np.zeros((2, 3, 3))):
+        for wrong in (P[:, :2], P[0, :2], [[1, 2, 3, 4]], np.zeros((2, 3, 2))):
             with self.assertRaisesRegex(ValueError, "shape"):
                 m.inside(wrong)
         with self.assertRaises(TypeError):

@@ -207,7 +207,7 @@ class Sources(Case):
         with self.assertRaisesRegex(ebpo.IOFailure, "changed"):
             web.read_range(len(data) - 10, 10)
         Server.etag, Server.fail = '"1"', [404]
-        with self.assertRaisesRegex(ebpo.IOFailure, "status 404"):
+        with self.assertRaisesRegex(FileNotFoundError, "status 404"):
             sources.Web(url)
 
     def test_patience(self):

@@ -87,7 +87,8 @@ static double size_of(const ebpo_bound *b)
 
 /* Computes the corner relative to the middle of the child's box: its coordinate along the axis, and
  * its squared distance from the axis. */
-static void seen_from_middle(exact *e, const ebpo_bound *b, const ebpo_bound_slab *slab, int lane)
+static void seen_from_middle(exact *e, const ebpo_bound *b, const ebpo_bound_cylinder *cylinder,
+                             int lane)
 {
     mpq_set_ui(e->along, 0, 1);
     mpq_set_ui(e->square, 0, 1);
@@ -97,7 +98,7 @@ static void seen_from_middle(exact *e, const ebpo_bound *b, const ebpo_bound_sla
         mpq_sub(e->middle[k], e->x[k], e->middle[k]);
         mpq_mul(e->part, e->middle[k], e->middle[k]);
         mpq_add(e->square, e->square, e->part);
-        mpq_set_d(e->part, slab->axis[k][lane] * 0x1p-15);
+        mpq_set_d(e->part, cylinder->axis[k][lane] * 0x1p-15);
         mpq_mul(e->part, e->part, e->middle[k]);
         mpq_add(e->along, e->along, e->part);
     }
@@ -106,16 +107,17 @@ static void seen_from_middle(exact *e, const ebpo_bound *b, const ebpo_bound_sla
 }
 
 /* Returns true when the corner is in the bounding cylinder with the margin for single precision, 15
- * u of the size of the node: docs/develop/bounds.md, "Points against slabs". */
-static bool in_slab(exact *e, const ebpo_bound *b, const ebpo_bound_slab *slab, int lane)
+ * u of the size of the node: docs/develop/bounds.md, "Points against cylinders". */
+static bool in_cylinder(exact *e, const ebpo_bound *b, const ebpo_bound_cylinder *cylinder,
+                        int lane)
 {
     double needed = size_of(b) * 0x1p-24 * 15;
-    seen_from_middle(e, b, slab, lane);
-    set_sum(e->bound, slab->along_step, slab->from[lane], needed, 1);
+    seen_from_middle(e, b, cylinder, lane);
+    set_sum(e->bound, cylinder->along_step, cylinder->from[lane], needed, 1);
     bool in = mpq_cmp(e->bound, e->along) <= 0;
-    set_sum(e->bound, slab->along_step, slab->to[lane], -needed, 1);
+    set_sum(e->bound, cylinder->along_step, cylinder->to[lane], -needed, 1);
     in = in && mpq_cmp(e->along, e->bound) <= 0;
-    set_sum(e->bound, slab->aside_step, slab->radius[lane], -needed, 1);
+    set_sum(e->bound, cylinder->aside_step, cylinder->radius[lane], -needed, 1);
     in = in && mpq_sgn(e->bound) >= 0;
     mpq_mul(e->bound, e->bound, e->bound);
     e->least = fmin(e->least, mpq_get_d(e->along));
@@ -126,15 +128,16 @@ static bool in_slab(exact *e, const ebpo_bound *b, const ebpo_bound_slab *slab, 
 
 /* Returns true when the bounding cylinder is no wider than rounding requires. Call after all
  * corners of the child. */
-static bool is_tight(const exact *e, const ebpo_bound *b, const ebpo_bound_slab *slab, int lane)
+static bool is_tight(const exact *e, const ebpo_bound *b, const ebpo_bound_cylinder *cylinder,
+                     int lane)
 {
-    bool has_axis = slab->axis[0][lane] || slab->axis[1][lane] || slab->axis[2][lane];
-    double loose = size_of(b) * 0x1p-18, step = (double)slab->along_step,
-           aside_step = (double)slab->aside_step;
-    return !has_axis ||
-           (step * slab->from[lane] >= e->least - loose - 2 * step &&
-            step * slab->to[lane] <= e->most + loose + 2 * step &&
-            aside_step * slab->radius[lane] <= sqrt(fmax(e->aside2, 0)) + loose + 2 * aside_step);
+    bool has_axis = cylinder->axis[0][lane] || cylinder->axis[1][lane] || cylinder->axis[2][lane];
+    double loose = size_of(b) * 0x1p-18, step = (double)cylinder->along_step,
+           aside_step = (double)cylinder->aside_step;
+    return !has_axis || (step * cylinder->from[lane] >= e->least - loose - 2 * step &&
+                         step * cylinder->to[lane] <= e->most + loose + 2 * step &&
+                         aside_step * cylinder->radius[lane] <=
+                             sqrt(fmax(e->aside2, 0)) + loose + 2 * aside_step);
 }
 
 /* Checks every face below `child` against the bounds of child `lane` in node `n`. */
@@ -153,18 +156,18 @@ static void check_below(exact *e, const ebpo_accel *s, uint32_t n, int lane, uin
         ebpo_accel_triangle(s, slot, t);
         for (int corner = 0; corner < 3; corner++) {
             set_corner(e, s, t[corner]);
-            e->wrong +=
-                !in_box(e, &s->bound[n], lane) || !in_slab(e, &s->bound[n], &s->slab[n], lane);
+            e->wrong += !in_box(e, &s->bound[n], lane) ||
+                        !in_cylinder(e, &s->bound[n], &s->cylinder[n], lane);
         }
     }
 }
 
 /* No axis has a squared length greater than 1, as the proof for bounding cylinders requires. */
-static bool axis_is_short(const ebpo_bound_slab *slab, int lane)
+static bool axis_is_short(const ebpo_bound_cylinder *cylinder, int lane)
 {
     int64_t square = 0;
     for (int k = 0; k < 3; k++)
-        square += (int64_t)slab->axis[k][lane] * slab->axis[k][lane];
+        square += (int64_t)cylinder->axis[k][lane] * cylinder->axis[k][lane];
     return square <= INT64_C(1) << 30;
 }
 
@@ -179,12 +182,12 @@ START_TEST(test_boxes_and_cylinders_contain_faces)
     exact_init(&e);
     for (uint32_t n = 0; n < s->bound_count; n++)
         for (int lane = 0; lane < s->bound[n].count; lane++) {
-            e.wrong += !axis_is_short(&s->slab[n], lane);
+            e.wrong += !axis_is_short(&s->cylinder[n], lane);
             e.least = INFINITY;
             e.most = -INFINITY;
             e.aside2 = 0;
             check_below(&e, s, n, lane, s->bound[n].child[lane]);
-            e.wrong += !is_tight(&e, &s->bound[n], &s->slab[n], lane);
+            e.wrong += !is_tight(&e, &s->bound[n], &s->cylinder[n], lane);
         }
     ck_assert_uint_eq(e.wrong, 0);
     exact_free(&e);
@@ -194,17 +197,17 @@ END_TEST
 
 /* --- inputs of bounding cylinders --- */
 
-static void same_measures(const ebpo_accel *s, uint32_t block, const ebpo_slab_view *view)
+static void same_measures(const ebpo_accel *s, uint32_t block, const ebpo_cylinder_view *view)
 {
     const ebpo_block_measures *base = &ebpo_block_measures_base, *best = ebpo_block_measures_best();
     ebpo_block_extent one, other;
-    ebpo_slab_extent one_slab, other_slab;
+    ebpo_cylinder_extent one_cylinder, other_cylinder;
     base->extent(s, block, &one);
     best->extent(s, block, &other);
-    base->slab(s, &block, 1, view, &one_slab);
-    best->slab(s, &block, 1, view, &other_slab);
+    base->cylinder(s, &block, 1, view, &one_cylinder);
+    best->cylinder(s, &block, 1, view, &other_cylinder);
     ck_assert_mem_eq(&one, &other, sizeof one);
-    ck_assert_mem_eq(&one_slab, &other_slab, sizeof one_slab);
+    ck_assert_mem_eq(&one_cylinder, &other_cylinder, sizeof one_cylinder);
 }
 
 START_TEST(test_block_bounds_same_on_any_cpu)
@@ -213,7 +216,7 @@ START_TEST(test_block_bounds_same_on_any_cpu)
     query_model_make(&m, query_solid_name(_i), query_solid_make(_i),
                      &query_variants[_i % query_variant_count]);
     const ebpo_accel *s = m.model->whole;
-    ebpo_slab_view view = { .scale = (float)s->scale, .axis = { 0.5f, -0.75f, 0.25f } };
+    ebpo_cylinder_view view = { .scale = (float)s->scale, .axis = { 0.5f, -0.75f, 0.25f } };
     view.rest = 0.125f;
     for (int k = 0; k < 3; k++)
         view.high[k] = (float)s->centre[k];

@@ -40,6 +40,36 @@ START_TEST(test_query_million_points)
 }
 END_TEST
 
+/* Two boxes have a side at x = 0 in common, and the thin box ends at x = 1. In a cell around both
+ * planes the winding numbers of the two outer parts differ, so the planes alone do not decide. */
+START_TEST(test_planes_do_not_decide_between_two_outsides)
+{
+    static const double boxes[3][2][3] = { { { 0, 0, 0 }, { 8, 8, 8 } },
+                                           { { 0, 0, 0 }, { 1, 8, 8 } },
+                                           { { -3, 0, 0 }, { -2, 1, 1 } } };
+    static const query_variant variant = { "cells of 2.75", 0, 2, EBPO_RULE_NONZERO, 0 };
+    enum { POINTS = 100, TURNS = 3 }; /* a leaf is classified after 128 queries */
+    ebpo_mesh mesh = ebpo_test_box(boxes[0][0], boxes[0][1], 1);
+    for (int i = 1; i < 3; i++) {
+        ebpo_mesh box = ebpo_test_box(boxes[i][0], boxes[i][1], 1);
+        ebpo_test_append(&mesh, &box);
+        ebpo_mesh_free(&box);
+    }
+    query_model m;
+    query_model_make(&m, "two outsides", mesh, &variant);
+    for (int i = 0; i < TURNS * POINTS; i++) {
+        double p[3] = { -0.2 + 2.6 * (i % POINTS) / POINTS, 3, 3.5 };
+        int winding = p[0] < 0 ? 0 : p[0] < 1 ? 2 : 1;
+        ebpo_inside_result inside;
+        ebpo_error error = EBPO_ERROR_INIT;
+        ck_assert_int_eq(ebpo_inside(m.context, p, NULL, &inside, &error), EBPO_OK);
+        ck_assert_msg(inside.where == EBPO_ON || inside.winding == winding,
+                      "x = %g: winding number %d instead of %d", p[0], inside.winding, winding);
+    }
+    query_model_free(&m);
+}
+END_TEST
+
 /* --- errors --- */
 
 START_TEST(test_non_finite_points_refused_by_index)
@@ -119,6 +149,7 @@ TEST_SUITE(query)
     tcase_add_loop_test(points, test_difficult_points_match_brute_force, 0,
                         query_solid_count() * query_variant_count);
     tcase_add_test(points, test_query_million_points);
+    tcase_add_test(points, test_planes_do_not_decide_between_two_outsides);
     tcase_add_test(refusals, test_non_finite_points_refused_by_index);
     tcase_add_test(refusals, test_zero_points_are_accepted);
     tcase_add_loop_test(refusals, test_surface_has_distance_but_no_inside, 0, 5);

@@ -36,7 +36,7 @@ static slots slots_of(const ebpo_accel *s)
 {
     slots all = { 0, NULL };
     if (s->bound_count)
-        add_slots(&all, s, s->top);
+        add_slots(&all, s, s->root_bound);
     return all;
 }
 

@@ -135,6 +135,48 @@ static bytes load(void)
     return b;
 }
 
+/* Opens a file of an asynchronous source, which first lacks all bytes. */
+static ebpo_status open_async(ebpo_async *async, const bytes *b, ebpo_error *error)
+{
+    ebpo_source source = EBPO_SOURCE_INIT;
+    ebpo_file *file = NULL;
+    const ebpo_range *range;
+    size_t count;
+    ebpo_status status = EBPO_E_PENDING;
+    while (status == EBPO_E_PENDING) {
+        status = ebpo_async_needed(async, &range, &count, error);
+        for (size_t i = 0; i < count && status == EBPO_OK; i++)
+            status = ebpo_async_supply(async, range[i].offset, range[i].size,
+                                       b->data + range[i].offset, NULL, error);
+        if (status == EBPO_OK)
+            status = ebpo_async_source(async, &source, error);
+        if (status == EBPO_OK)
+            status = ebpo_open_source(&source, "async", &file, error);
+        if (status == EBPO_OK)
+            status = ebpo_file_locate(file, NULL, error);
+        ebpo_close(file);
+        file = NULL;
+    }
+    return status;
+}
+
+static ebpo_status call_open_async(every_call_env *e)
+{
+    bytes b = load();
+    ebpo_async *async = NULL;
+    ebpo_status status = ebpo_async_new(b.size, "async", "", 0, &async, e->error);
+    uint64_t operation = status == EBPO_OK ? ebpo_async_begin(async) : 0;
+    if (status == EBPO_OK)
+        status = open_async(async, &b, e->error);
+    if (async)
+        ebpo_async_end(async, operation);
+    if (status == EBPO_OK && ebpo_async_bytes(async) == 0)
+        status = EBPO_E_ARGUMENT;
+    ebpo_async_free(async);
+    free(b.data);
+    return status;
+}
+
 static ebpo_status call_open_memory(every_call_env *e)
 {
     ebpo_file *file;
@@ -372,6 +414,7 @@ const every_call every_call_files[] = {
     { "filters", call_filters },
     { "open", call_open },
     { "open_memory", call_open_memory },
+    { "open_async", call_open_async },
     { "open_with", call_open_with },
     { "open_compat", call_open_compat },
     { "open_source", call_open_source },

@@ -97,7 +97,7 @@ static unsigned check_accel(const ebpo_accel *s, const ebpo_mesh *mesh, bool in_
     r.seen = calloc(s->face_count + 1, 1);
     ck_assert_ptr_nonnull(r.seen);
     if (s->bound_count)
-        check_below(&r, s->top);
+        check_below(&r, s->root_bound);
     for (uint32_t i = 0; i < s->face_count; i++)
         ck_assert_uint_eq(r.seen[i], 1);
     free(r.seen);
@@ -188,12 +188,12 @@ END_TEST
 /* --- faces so far from their leaf that their squares overflow --- */
 
 /* Checks that each vertex of a child is in its bounding cylinder, as defined in accel.h. */
-static void check_slab(const ebpo_accel *s, const ebpo_bound *b, const ebpo_bound_slab *slab,
-                       int lane, uint32_t child)
+static void check_cylinder(const ebpo_accel *s, const ebpo_bound *b,
+                           const ebpo_bound_cylinder *cylinder, int lane, uint32_t child)
 {
     if (!(child & EBPO_IS_BLOCK)) {
         for (int i = 0; i < s->bound[child].count; i++)
-            check_slab(s, b, slab, lane, s->bound[child].child[i]);
+            check_cylinder(s, b, cylinder, lane, s->bound[child].child[i]);
         return;
     }
     uint32_t block = child & ~EBPO_IS_BLOCK;
@@ -201,27 +201,28 @@ static void check_slab(const ebpo_accel *s, const ebpo_bound *b, const ebpo_boun
         double t[3][3];
         ebpo_accel_triangle(s, block * EBPO_BLOCK + slot, t);
         for (int i = 0; i < 3; i++) {
-            double along = 0, square = 0, aside = (double)slab->aside_step * slab->radius[lane];
+            double along = 0, square = 0,
+                   aside = (double)cylinder->aside_step * cylinder->radius[lane];
             for (int k = 0; k < 3; k++) {
                 ebpo_bound_sides side = ebpo_bound_side(b, lane, k);
                 double x = (t[i][k] - s->centre[k]) * s->scale - (side.low + side.high) / 2;
-                along += x * (slab->axis[k][lane] * 0x1p-15);
+                along += x * (cylinder->axis[k][lane] * 0x1p-15);
                 square += x * x;
             }
-            ck_assert_double_le((double)slab->along_step * slab->from[lane], along);
-            ck_assert_double_ge((double)slab->along_step * slab->to[lane], along);
+            ck_assert_double_le((double)cylinder->along_step * cylinder->from[lane], along);
+            ck_assert_double_ge((double)cylinder->along_step * cylinder->to[lane], along);
             ck_assert_double_le(square - along * along, aside * aside);
         }
     }
 }
 
-static void check_slabs(const ebpo_accel *s)
+static void check_cylinders(const ebpo_accel *s)
 {
     for (uint64_t n = 0; n < s->bound_count; n++) {
-        const ebpo_bound_slab *slab = &s->slab[n];
-        ck_assert(isfinite(slab->along_step) && isfinite(slab->aside_step));
+        const ebpo_bound_cylinder *cylinder = &s->cylinder[n];
+        ck_assert(isfinite(cylinder->along_step) && isfinite(cylinder->aside_step));
         for (int lane = 0; lane < s->bound[n].count; lane++)
-            check_slab(s, &s->bound[n], slab, lane, s->bound[n].child[lane]);
+            check_cylinder(s, &s->bound[n], cylinder, lane, s->bound[n].child[lane]);
     }
 }
 
@@ -245,7 +246,7 @@ START_TEST(test_cylinders_contain_faces_with_overflow)
     ebpo_slice slice = one_leaf(&mesh);
     ebpo_accel *s = NULL;
     ASSERT_OK(ebpo_accel_make(&s, &slice, info, false, 1, error));
-    check_slabs(s);
+    check_cylinders(s);
     ebpo_accel_free(s);
     ebpo_mesh_free(&mesh);
     free(info);

@@ -261,7 +261,7 @@ START_TEST(test_files_have_no_gaps)
             ebpo_stored_sizes stored = EBPO_STORED_SIZES_INIT;
             ck_assert_int_eq(ebpo_file_locate(file, &stored, NULL), EBPO_OK);
             uint64_t sum = info->head_bytes + info->chunk_index_bytes + stored.mesh_vertex_bytes +
-                           stored.mesh_face_bytes + stored.map_bytes + stored.sum_bytes;
+                           stored.mesh_face_bytes + stored.map_bytes + stored.checksum_bytes;
             for (int level = 0; level < info->level_count; level++)
                 sum += stored.level_bytes[level];
             ck_assert_msg(sum == info->file_bytes, "seed %u, codec %d: %d bytes, the file has %d",

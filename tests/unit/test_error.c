@@ -1,4 +1,5 @@
 /* Tests the members of an error besides its message. */
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -26,6 +27,7 @@ START_TEST(test_error_of_missing_file)
     ck_assert_str_eq(error.file, "/no/such/file.ebpo.h5");
     ck_assert_str_eq(error.object, "");
     ck_assert_int_eq(error.offset, -1);
+    ck_assert_int_eq(error.system_error, ENOENT);
     assert_begins(&error);
 }
 END_TEST
@@ -82,12 +84,13 @@ START_TEST(test_error_replaces_earlier_error)
 {
     static const query_variant standard = { "default", 4, 4, EBPO_RULE_NONZERO, 0 };
     query_model m;
-    ebpo_error error = { EBPO_E_IO, "old", "old", "old", 5, { 0 } };
+    ebpo_error error = { EBPO_E_IO, "old", "old", "old", 5, ENOENT, { 0 } };
     query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 1), &standard);
     ck_assert_int_eq(ebpo_lod_level(m.file, 99, NULL, NULL, NULL, &error), EBPO_E_ARGUMENT);
     ck_assert_str_eq(error.file, "");
     ck_assert_str_eq(error.object, "");
     ck_assert_int_eq(error.offset, -1);
+    ck_assert_int_eq(error.system_error, 0);
     query_model_free(&m);
 }
 END_TEST

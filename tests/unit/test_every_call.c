@@ -16,6 +16,7 @@
 #include "ebpo_config.h"
 #include "every_call.h"
 #include "faults.h"
+#include "pending_source.h"
 #include "scratch.h"
 #include "solids.h"
 #include "web.h"
@@ -258,6 +259,10 @@ static bool call_with_failure(const every_call *c, every_call_env *e, unsigned k
                   kinds, number);
     ck_assert_msg(status != EBPO_E_FORMAT, "%s: %#x, %llu: reported as damage: %s", c->name, kinds,
                   number, error.message);
+    ck_assert_msg(status == EBPO_OK || status == EBPO_E_MEMORY || status == EBPO_E_IO ||
+                      kinds != MEMORY,
+                  "%s: %llu: without memory the status is %s: %s", c->name, number,
+                  ebpo_status_name(status), error.message);
     expect_workspace_empty(e, c->name);
     ck_assert_msg(open_files() <= files, "%s: %#x, %llu: a file stays open", c->name, kinds,
                   number);
@@ -303,6 +308,29 @@ START_TEST(test_call_handles_partial_reads_and_writes)
     finish(&e);
     survive(_i, false, FAULT_CLOSE);
     survive(_i, false, FAULT_ALLOCATE);
+}
+END_TEST
+
+/* Each call is repeated while bytes of its file are pending, and leaves nothing in the workspace.
+ */
+START_TEST(test_call_resumes)
+{
+    enum { HEAD = 1024 };
+    const every_call *c = call_number(_i);
+    every_call_env e;
+    pending_source p;
+    ebpo_status status;
+    begin(&e, true);
+    ebpo_close(e.file);
+    pending_begin(&p, scratch(EVERY_CALL_MODEL), 0);
+    e.file = pending_open(&p, HEAD);
+    do {
+        status = c->call(&e);
+        expect_workspace_empty(&e, c->name);
+    } while (pending_again(&p, status));
+    ck_assert_msg(status == EBPO_OK, "%s: %s", c->name, error.message);
+    finish(&e);
+    pending_end(&p);
 }
 END_TEST
 
@@ -382,6 +410,7 @@ Suite *test_suite(void)
     tcase_set_timeout(all, SECONDS);
     tcase_add_unchecked_fixture(all, write_large, remove_all);
     tcase_add_loop_test(all, test_call_releases_workspace, 0, 2 * call_count());
+    tcase_add_loop_test(all, test_call_resumes, 0, call_count());
     suite_add_tcase(suite, all);
     tcase_set_timeout(failing, SECONDS);
     tcase_add_unchecked_fixture(failing, write_small, remove_all);

@@ -4,6 +4,7 @@
  *
  *     test_http FAULTY_SERVER */
 #include <dirent.h>
+#include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
 #include <stdatomic.h>
@@ -261,8 +262,10 @@ START_TEST(test_http_final_status_is_not_retried)
     ck_assert_uint_eq(stats_of(&s).retries, 0);
     ck_assert_int_eq(read_one(&s, 200000, 10, &error), EBPO_OK); /* a failure is not permanent */
     s.close(s.user);
-    for (int i = 0; i < 3; i++)
+    for (int i = 0; i < 3; i++) {
         ck_assert_int_eq(ebpo_source_of_url(web_url(faults[i]), &o, &s, &error), EBPO_E_IO);
+        ck_assert_int_eq(error.system_error, i == 0 ? ENOENT : 0);
+    }
 }
 END_TEST
 

@@ -553,7 +553,7 @@ START_TEST(test_volume_with_unknown_rule_is_refused)
     ebpo_solid_volume v = EBPO_SOLID_VOLUME_INIT;
     ebpo_error error = EBPO_ERROR_INIT;
     shells.apart = 1;
-    shells.beyond[EBPO_RULE_POSITIVE] = 2;
+    shells.volume_difference[EBPO_RULE_POSITIVE] = 2;
     ck_assert(ebpo_solid_volume_of(&report, EBPO_RULE_POSITIVE, &shells, NULL, &v, NULL) == 0);
     ck_assert(v.lo == 3 && v.hi == 3);
     for (int i = 0; i < 3; i++) {

@@ -1,4 +1,5 @@
 /* Counts the sequential round trips of queries to a remote file. */
+#include <hdf5.h>
 #include <stdlib.h>
 
 #include <ebpo/query.h>
@@ -60,6 +61,36 @@ START_TEST(test_remote_query_round_trips)
         counted_close(&c, far);
         ck_assert_msg(a.waves <= WAVES, "%d waves", (int)a.waves);
         ck_assert(a.distance == b.distance && a.where == b.where);
+    }
+    two_layouts_close(&l);
+}
+END_TEST
+
+static void set_top_bytes(const char *path, uint64_t bytes)
+{
+    hid_t h5 = H5Fopen(path, H5F_ACC_RDWR, H5P_DEFAULT),
+          attribute = H5Aopen(h5, "top_bytes", H5P_DEFAULT);
+    ck_assert(H5Awrite(attribute, H5T_NATIVE_UINT64, &bytes) >= 0);
+    H5Aclose(attribute);
+    ck_assert(H5Fclose(h5) >= 0);
+}
+
+/* top_bytes is a hint: false values change no result, and impossible ones cost no bytes. */
+START_TEST(test_false_top_bytes_changes_no_result)
+{
+    static const uint64_t false_bytes[] = { 0, 1, 1 << 16, INT64_MAX, UINT64_MAX };
+    static const double p[3] = { 2.71, 0, 0.01 };
+    two_layouts l;
+    counted_source c;
+    two_layouts_build(&l, ebpo_test_torus(2, 0.7, 400, 240), 9, ALL, EBPO_CODEC_ZSTD, 400);
+    result right = run_query(l.without, NULL, p, true);
+    for (size_t i = 0; i < sizeof false_bytes / sizeof *false_bytes; i++) {
+        set_top_bytes(l.packed, false_bytes[i]);
+        ebpo_file *far = counted_open(&c, l.packed, true);
+        result found = run_query(far, &c, p, true);
+        counted_close(&c, far);
+        ck_assert(found.distance == right.distance && found.where == right.where);
+        ck_assert_msg(c.requested < c.size / 2, "%d of %d bytes", (int)c.requested, (int)c.size);
     }
     two_layouts_close(&l);
 }
@@ -239,6 +270,7 @@ TEST_SUITE(round_trips)
     tcase_set_timeout(tests, 900);
     tcase_add_checked_fixture(tests, scratch_enter, scratch_leave);
     tcase_add_test(tests, test_remote_query_round_trips);
+    tcase_add_test(tests, test_false_top_bytes_changes_no_result);
     tcase_add_test(tests, test_remote_radius_query_round_trips);
     tcase_add_test(tests, test_remote_box_query_round_trips);
     tcase_add_loop_test(tests, test_remote_view_round_trips, 0, 3);

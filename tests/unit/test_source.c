@@ -285,7 +285,7 @@ START_TEST(test_open_and_array_read_counts)
     ck_assert_int_eq(ebpo_file_locate(file, &sizes, NULL), EBPO_OK);
     ck_assert_uint_eq(later - bytes, size - info->head_bytes - info->chunk_index_bytes -
                                          sizes.subtree_bytes +
-                                         file->root_array[EBPO_A_PLACES].stored_bytes);
+                                         file->root_array[EBPO_A_CHUNK_DIRECTORY].stored_bytes);
     uint64_t arrays = 0, chunks = 0;
     for (int i = 0; i < EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS; i++) {
         const ebpo_array_in *a =
@@ -487,7 +487,7 @@ START_TEST(test_chunk_tables_match_libhdf5)
     if (_i == 2)
         rewrite_without_filters();
     ck_assert_int_eq(ebpo_open(name, &file, NULL), EBPO_OK);
-    ck_assert(file->info.subtree_level && file->has_places == (_i == 0));
+    ck_assert(file->info.subtree_level && file->has_directory == (_i == 0));
     ck_assert_int_eq(ebpo_file_locate(file, NULL, NULL), EBPO_OK);
     hid_t fid = H5Fopen(name, H5F_ACC_RDONLY, H5P_DEFAULT);
     for (int i = 0; i < EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS; i++) {

@@ -262,7 +262,7 @@ START_TEST(test_stream_reads_only_requested_level)
             ;
         after = ebpo_test_file_stats(file).bytes_read;
         /* the list of chunk checksums is read with the first chunk */
-        ck_assert_uint_le(after - before, stored.level_bytes[i] + (i ? 0 : stored.sum_bytes));
+        ck_assert_uint_le(after - before, stored.level_bytes[i] + (i ? 0 : stored.checksum_bytes));
     }
     ebpo_stream_free(stream);
     ebpo_close(file);

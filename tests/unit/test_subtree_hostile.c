@@ -209,7 +209,7 @@ START_TEST(test_wrong_subtree_counts_are_harmless)
     ck_assert(refused > 0);
     if (files[_i].parts & EBPO_PART_MESH)
         change_all(&t, EBPO_A_SUBTREE_SHARED, steps(3), &refused);
-    change_all(&t, EBPO_A_PLACES, steps(3), &refused);
+    change_all(&t, EBPO_A_CHUNK_DIRECTORY, steps(3), &refused);
     truth_free(&t);
 }
 END_TEST

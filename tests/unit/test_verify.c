@@ -425,8 +425,7 @@ START_TEST(test_verify_detects_wrong_node_sizes)
 {
     build("sphere", 8, EBPO_RULE_NONZERO);
     tree.info.leaf_faces = 2;
-    expect_caught(EBPO_VERIFY_STRUCTURE,
-                  "more faces than allowed for a leaf above the maximum level");
+    expect_caught(EBPO_VERIFY_STRUCTURE, "more faces than leaf_faces");
     build("sphere", 8, EBPO_RULE_NONZERO);
     tree.info.leaf_faces = 64;
     expect_caught(EBPO_VERIFY_STRUCTURE, "the node is gray");

@@ -115,12 +115,12 @@ START_TEST(test_verify_subtree_offsets_against_index)
     changeable c;
     write_model(ebpo_test_torus(2, 0.7, 60, 40), ~0u, 8);
     changeable_load(&c, path);
-    uint64_t count = changeable_count(&c, EBPO_A_PLACES);
+    uint64_t count = changeable_count(&c, EBPO_A_CHUNK_DIRECTORY);
     for (uint64_t i = 0; i < count; i += steps(23)) {
-        uint64_t place = changeable_get(&c, EBPO_A_PLACES, i);
-        expect_named(&c, EBPO_A_PLACES, i, place + 1);
-        expect_named(&c, EBPO_A_PLACES, i, place ^ UINT64_C(1) << 32);
-        expect_named(&c, EBPO_A_PLACES, i, (place & UINT32_MAX) | UINT64_C(4097) << 32);
+        uint64_t place = changeable_get(&c, EBPO_A_CHUNK_DIRECTORY, i);
+        expect_named(&c, EBPO_A_CHUNK_DIRECTORY, i, place + 1);
+        expect_named(&c, EBPO_A_CHUNK_DIRECTORY, i, place ^ UINT64_C(1) << 32);
+        expect_named(&c, EBPO_A_CHUNK_DIRECTORY, i, (place & UINT32_MAX) | UINT64_C(4097) << 32);
     }
     changeable_free(&c);
 }
@@ -150,16 +150,16 @@ START_TEST(test_verify_detects_swapped_chunks)
     unsigned found = 0;
     write_model(ebpo_test_torus(2, 0.7, 60, 40), ~0u, 8);
     changeable_load(&c, path);
-    for (uint64_t i = 1; i < changeable_count(&c, EBPO_A_PLACES); i++) {
-        uint64_t a = changeable_get(&c, EBPO_A_PLACES, i - 1),
-                 b = changeable_get(&c, EBPO_A_PLACES, i);
+    for (uint64_t i = 1; i < changeable_count(&c, EBPO_A_CHUNK_DIRECTORY); i++) {
+        uint64_t a = changeable_get(&c, EBPO_A_CHUNK_DIRECTORY, i - 1),
+                 b = changeable_get(&c, EBPO_A_CHUNK_DIRECTORY, i);
         if (a == b || (uint32_t)a != (uint32_t)b)
             continue;
         if (found++ >= ebpo_test_scaled(40))
             break;
-        changeable_put(&c, EBPO_A_PLACES, i - 1, b);
-        expect_named(&c, EBPO_A_PLACES, i, a);
-        changeable_put(&c, EBPO_A_PLACES, i - 1, a);
+        changeable_put(&c, EBPO_A_CHUNK_DIRECTORY, i - 1, b);
+        expect_named(&c, EBPO_A_CHUNK_DIRECTORY, i, a);
+        changeable_put(&c, EBPO_A_CHUNK_DIRECTORY, i - 1, a);
     }
     ck_assert_uint_gt(found, 0);
     changeable_free(&c);

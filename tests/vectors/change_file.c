@@ -144,27 +144,24 @@ void drop_attribute(const char *object, const char *name)
 void drop(const char *path) { need(H5Ldelete(changed, path, H5P_DEFAULT) >= 0, path); }
 
 /* Sets one value of an array, counted row by row. */
-void poke(const char *path, unsigned at, int64_t value)
+/* Multiplies an array's value by `factor`, and adds `by`. The other values are unchanged, also
+ * those above 2^63. */
+static void change_value(const char *path, unsigned at, int64_t factor, int64_t by)
 {
     int64_t *values = calloc(1 << 20, sizeof *values);
-    hid_t id = H5Dopen2(changed, path, H5P_DEFAULT);
-    need(H5Dread(id, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0, path);
-    values[at] = value;
-    need(H5Dwrite(id, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0, path);
+    hid_t id = H5Dopen2(changed, path, H5P_DEFAULT), stored = H5Dget_type(id);
+    hid_t type = H5Tget_sign(stored) == H5T_SGN_NONE ? H5T_NATIVE_UINT64 : H5T_NATIVE_INT64;
+    need(H5Dread(id, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0, path);
+    values[at] = factor * values[at] + by;
+    need(H5Dwrite(id, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0, path);
+    H5Tclose(stored);
     H5Dclose(id);
     free(values);
 }
 
-void add_to(const char *path, unsigned at, int64_t by)
-{
-    int64_t *values = calloc(1 << 20, sizeof *values);
-    hid_t id = H5Dopen2(changed, path, H5P_DEFAULT);
-    need(H5Dread(id, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0, path);
-    values[at] += by;
-    need(H5Dwrite(id, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0, path);
-    H5Dclose(id);
-    free(values);
-}
+void poke(const char *path, unsigned at, int64_t value) { change_value(path, at, 0, value); }
+
+void add_to(const char *path, unsigned at, int64_t by) { change_value(path, at, 1, by); }
 
 /* Copies a text attribute of one array to another. */
 static void copy_text(hid_t from, hid_t to, const char *name)
@@ -232,11 +229,11 @@ void replace(const char *path, new_array a)
 
 void refilter(const char *path, void (*filters)(hid_t))
 {
-    int64_t values[64];
+    int64_t values[256];
     hsize_t dims[2] = { 0, 0 };
     hid_t id = H5Dopen2(changed, path, H5P_DEFAULT), space = H5Dget_space(id),
           type = H5Dget_type(id);
-    need(H5Sget_simple_extent_npoints(space) <= 64, path);
+    need(H5Sget_simple_extent_npoints(space) <= 256, path);
     H5Sget_simple_extent_dims(space, dims, NULL);
     need(H5Dread(id, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0, path);
     replace(path, (new_array){ .type = type,

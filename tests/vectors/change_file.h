@@ -54,7 +54,7 @@ void add_real(const char *object, const char *name, double value);
 void set_six(const char *name, const double values[6]);
 /* Adds an array at a new path, without attributes. */
 void add_array(const char *path, new_array a);
-/* Writes the same values with other filters: of at most 64 elements. */
+/* Writes the same values with other filters: of at most 256 elements. */
 void refilter(const char *path, void (*filters)(hid_t));
 void checksum(hid_t dcpl); /* filters: fletcher32 */
 void scale_offset(hid_t dcpl);

@@ -9,6 +9,7 @@
 #include <zstd.h>
 
 #include "change_file.h"
+#include "core/checksum.h"
 #include "vector_read.h"
 
 static const char *folder;
@@ -29,6 +30,7 @@ static const char *folder;
 #define INDEXED   "29_types_and_gray_index"
 #define COLOURED  "39_attributes"
 #define PAINTED   "42_colours_of_vertices"
+#define UNUSED    "24_unused_vertex"
 #define GATES     "47_gates_unfiltered"
 #define TEXTURED  "51_textures"
 #define WELDED    "58_welded_within_a_distance"
@@ -65,6 +67,7 @@ static void v_subset_of(void) { drop_attribute("/", "subset_of"); }
 static void v_subset_level(void) { set_int("/", "subset_levels", 0); }
 static void v_pruned_more(void) { set_count("/levels/01", "pruned", 99); }
 static void v_pruned_less(void) { drop_attribute("/levels/01", "pruned"); }
+static void v_pruned_type(void) { set_text("/levels/01", "pruned", "0"); }
 static void v_pruned_whole(void) { add_count("/levels/01", "pruned", 1); }
 static void v_attribute_missing(void) { drop_attribute("/", "epsilon"); }
 static void v_attribute_type(void)
@@ -303,10 +306,10 @@ static void v_types_index(void) { poke("/levels/07/types_index", 5, 1); }
 static void v_gray_index(void) { poke("/levels/06/gray_index", 1, 3); }
 static void v_leaf_index(void) { poke("/levels/06/leaf_index", 4, 7); }
 
-/* A group whose leaves become white: all other data is adapted. */
-static void v_zero_group(void)
+/* The leaves of the last group get another type, 0 (white) or 1 (black); other data is adapted. */
+static void replace_leaves(int64_t other)
 {
-    int64_t types[64], winding[512], leaves = 0, white = 0, rank = 0;
+    int64_t types[64], winding[512], leaves = 0, rank = 0;
     hid_t id = H5Dopen2(changed, "/levels/02/types", H5P_DEFAULT), space = H5Dget_space(id);
     int64_t groups = H5Sget_simple_extent_npoints(space), gone = 0;
     need(groups <= 64 && H5Dread(id, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, types) >= 0,
@@ -324,14 +327,19 @@ static void v_zero_group(void)
             else if (type == 2)
                 winding[leaves++] = winding[rank];
             rank += type == 2;
-            white += type == 0;
         }
-    poke("/levels/02/types", (unsigned)groups - 1, 0);
+    int64_t last = types[groups - 1], leaf_bits = last >> 1 & 0x5555;
+    need((last & leaf_bits) == 0, "no gray node in the last group");
+    poke("/levels/02/types", (unsigned)groups - 1, (last & ~(leaf_bits << 1)) | leaf_bits * other);
+    const char *count = other ? "black" : "white";
     set_count("/levels/02", "leaf", leaves);
-    set_count("/levels/02", "white", white + gone);
+    set_count("/levels/02", count, (int64_t)count_of("/levels/02", count) + gone);
     replace("/levels/02/leaf_winding", (new_array){ H5T_STD_I8LE, (hsize_t)leaves, 0,
                                                     (hsize_t)leaves, false, false, zstd, winding });
 }
+
+static void v_zero_group(void) { replace_leaves(0); }
+static void v_closed_group(void) { replace_leaves(1); }
 
 static void v_root_siblings(void) { poke("/levels/00/types", 0, 3 | 2 << 2); }
 static void v_types(void) { poke("/levels/01/types", 0, 2); }
@@ -481,6 +489,19 @@ static void move_items(unsigned column)
     add_to("/subtrees/counts", column, 1);
     add_to("/subtrees/counts", cols + column, -1);
 }
+/* Chunks of 512 rows, where 1,024 are stated; of 48, which is no power of two. */
+static void v_rows_of_vertices(void)
+{
+    hsize_t rows = count_of("/", "vertex_count");
+    replace("/mesh/vertices",
+            (new_array){ H5T_STD_U32LE, rows, 3, 512, false, false, checksum, NULL });
+}
+static void v_rows_of_level(void)
+{
+    hsize_t leaves = count_of("/levels/04", "leaf");
+    replace("/levels/04/leaf_skip",
+            (new_array){ H5T_STD_U32LE, leaves, 0, 48, false, false, checksum, NULL });
+}
 static void v_subtree_gray(void) { move_items(GRAY_COLUMN); }
 static void v_subtree_end(void) { move_items(END_COLUMN); }
 /* A byte more for the first chunk, and one less for the second. */
@@ -532,6 +553,13 @@ static void v_plane(void) { add_to("/levels/00/planes", 0, -(INT64_C(700) << 20)
 static void v_vertex_beyond(void) { poke("/mesh/vertices", 11, (int64_t)0x40000000u << 1); }
 /* The third vertex moves from x = 1 to x = 0.5. */
 static void v_vertex_moved(void) { add_to("/mesh/vertices", 6, -(INT64_C(1) << 24)); }
+/* The last corner names the unused vertex, which gets the position of the vertex before it. */
+static void v_open_edges(void)
+{
+    poke("/mesh/faces", 11, 0);
+    for (unsigned k = 0; k < 3; k++)
+        poke("/mesh/vertices", 12 + k, 0);
+}
 static void v_mean(void) { add_to("/levels/01/gray_colours", 0, 1); }
 static void v_volume(void) { set_real("/levels/00", "gray_volume", NAN); }
 
@@ -542,6 +570,8 @@ typedef enum late_change {
     FLIP_HEAD,
     SWAP_CHUNK,
     MOVE_CHUNKS,
+    SWAP_INDEX,
+    SHORTEN,
     NOT_HDF5,
     USER_BLOCK
 } late_change;
@@ -589,6 +619,7 @@ static const failed_vector failed[] = {
     { "chunk_directory_missing", SUBTREES, v_places, NONE, "R4.10" },
     { "shared_chunks_missing", CHUNKS, v_outer, NONE, "RC.3" },
     { "pruned_in_a_whole_file", DEEP, v_pruned_whole, NONE, "R6.6" },
+    { "pruned_of_wrong_type", LEAVES, v_pruned_type, NONE, "R4.22" },
     { "attribute_missing", LEAVES, v_attribute_missing, NONE, "R5.1" },
     { "attribute_of_wrong_type", LEAVES, v_attribute_type, NONE, "R4.22" },
     { "text_of_variable_length", LEAVES, v_variable, NONE, "R4.23" },
@@ -667,9 +698,11 @@ static const failed_vector failed[] = {
     { "part_list_with_two_spaces", LEAVES, v_two_spaces, NONE, "R5.9" },
     { "unit_with_c1_character", LEAVES, v_c1, NONE, "R2.1" },
     { "group_of_zeros", NO_MESH, v_zero_group, NONE, "R6.11" },
+    { "group_without_leaf_or_gray_node", NO_MESH, v_closed_group, NONE, "R6.11" },
     { "two_pipelines", LEAVES, v_two_pipelines, NONE, "R4.14" },
     { "filter_mask", LEAVES, v_filter_mask, NONE, "R4.15" },
     { "chunk_missing", ONE, v_missing_chunk, NONE, "R4.12" },
+    { "chunk_behind_the_end", ONE, NULL, SHORTEN, "R4.12" },
     { "types_index_wrong", INDEXED, v_types_index, NONE, "R6.17" },
     { "gray_index_wrong", INDEXED, v_gray_index, NONE, "R6.17" },
     { "leaf_index_wrong", LISTS, v_leaf_index, NONE, "R6.17" },
@@ -708,6 +741,8 @@ static const failed_vector failed[] = {
     { "subtree_index_not_0", CHUNKS, v_subtree_index, NONE, "RC.1" },
     { "subtree_index_wrong", MANY, v_subtree_sum, NONE, "RC.2" },
     { "subtree_counts_wrong", CHUNKS, v_subtree_counts, NONE, "RC.2" },
+    { "subtree_chunks_of_vertices", CHUNKS, v_rows_of_vertices, NONE, "R4.11" },
+    { "subtree_chunks_of_a_level", CHUNKS, v_rows_of_level, NONE, "R4.11" },
     { "subtree_row_of_other_nodes", MANY, v_subtree_gray, NONE, "RC.4" },
     { "subtree_row_of_another_end", CHUNKS, v_subtree_end, NONE, "RC.4" },
     { "chunk_directory_contradicts_a_header", CHUNKS, v_places_header, NONE, "RC.8" },
@@ -720,6 +755,8 @@ static const failed_vector failed[] = {
     { "unverified_face_far_from_its_leaf", LEAVES, v_vertex_moved, NONE, "R7.5" },
     { "unverified_plane_cuts_the_solid", LEAVES, v_plane, NONE, "R8.2" },
     { "unverified_winding_number", LEAVES, v_winding, NONE, "R10.1" },
+    { "unverified_edges_do_not_balance", UNUSED, v_open_edges, NONE, "R10.2" },
+    { "unverified_chunk_index", CHUNKS, NULL, SWAP_INDEX, "RC.9" },
     { "unverified_colour", PAINTED, v_mean, NONE, "RE.3" },
 };
 
@@ -741,6 +778,45 @@ static void move_chunks(const char *path, uint8_t *data)
     memcpy(data + other, kept, bytes);
 }
 
+/* Writes HDF5's checksum behind `size` bytes. */
+static void state_checksum(uint8_t *block, size_t size)
+{
+    uint32_t checksum_of_block = ebpo_lookup3(block, size);
+    for (unsigned i = 0; i < 4; i++)
+        block[size + i] = (uint8_t)(checksum_of_block >> 8 * i);
+}
+
+/* Exchanges the offsets of the two chunks of /mesh/vertices in HDF5's index, not in the chunk
+ * directory. The chunks have equal size. */
+static void swap_index(const char *path, uint8_t *data, size_t size)
+{
+    enum { PREFIX = 14 };
+    hsize_t bytes = 0, at[2] = { 1024, 0 };
+    unsigned mask;
+    haddr_t second;
+    uint8_t kept[8];
+    changed = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
+    haddr_t first = chunk_address("/mesh/vertices", &bytes);
+    hid_t id = H5Dopen2(changed, "/mesh/vertices", H5P_DEFAULT);
+    need(H5Dget_chunk_info_by_coord(id, at, &mask, &second, &bytes) >= 0, "the second chunk");
+    H5Dclose(id);
+    H5Fclose(changed);
+    for (size_t i = 0; i + PREFIX + sizeof first < size; i++) {
+        uint8_t *entry = data + i + PREFIX;
+        size_t step = 8;
+        if (memcmp(data + i, "FADB", 4) != 0 || memcmp(entry, &first, sizeof first) != 0)
+            continue;
+        while (memcmp(entry + step, &second, sizeof second) != 0)
+            step++;
+        memcpy(kept, entry, 8);
+        memcpy(entry, entry + step, 8);
+        memcpy(entry + step, kept, 8);
+        state_checksum(data + i, PREFIX + 2 * step);
+        return;
+    }
+    die(path, "no chunk index of /mesh/vertices");
+}
+
 static void change_bytes(const char *path, late_change late)
 {
     size_t size;
@@ -756,6 +832,11 @@ static void change_bytes(const char *path, late_change late)
     case FLIP_HEAD: data[60] ^= 16; break;
     case SWAP_CHUNK: memcpy(data + faces, data + types, other_size); break;
     case MOVE_CHUNKS: move_chunks(path, data); break;
+    case SWAP_INDEX: swap_index(path, data, size); break;
+    case SHORTEN: /* the last chunk is behind the end that the superblock states */
+        data[28] -= 4;
+        state_checksum(data, 44);
+        break;
     case USER_BLOCK:
         data = realloc(data, size + USER_BLOCK_BYTES);
         need(data != NULL, "memory");

@@ -688,7 +688,7 @@ static void without_the_word_colours(void)
 }
 
 /* Adding attributes to a file enlarges it: the lists about chunks state the current size. */
-static void state_size(const char *name)
+static void state_size(const char *name, void (*put)(void))
 {
     char path[512];
     size_t size;
@@ -697,10 +697,44 @@ static void state_size(const char *name)
     snprintf(path, sizeof path, "%s/passed/%s.ebpo.h5", folder, name);
     free(slurp(path, &size));
     file_size = size;
-    change_objects(path, put_size);
+    change_objects(path, put);
     if (vector_read(path, &back, &error) != EBPO_OK)
         die(name, error.message);
     ebpo_tree_free(&back);
+}
+
+static herr_t remove_filters(hid_t object, const char *name, const H5O_info_t *info, void *user)
+{
+    char path[64];
+    (void)object;
+    (void)user;
+    snprintf(path, sizeof path, "/%s", name);
+    if (info->type == H5O_TYPE_DATASET)
+        refilter(path, NULL);
+    return 0;
+}
+
+/* All arrays are bare, the list of checksums is wrong, and hints have impossible values. */
+static void with_bare_lists(void)
+{
+    set_text("/", "optional_parts", "planes maps leaf-planes");
+    drop("/attributes");
+    need(H5Ovisit2(changed, H5_INDEX_NAME, H5_ITER_INC, remove_filters, NULL, H5O_INFO_BASIC) >= 0,
+         "H5Ovisit");
+    poke("/chunk_checksums", 0, 1);
+    add_count("/chunk_checksums", "file_bytes", 0);
+    add_count("/chunk_checksums", "offset", 0);
+    set_count("/", "top_bytes", INT64_MAX);
+    set_count("/", "chunk_index_offset", 100);
+    set_count("/", "chunk_index_bytes", INT64_MAX);
+}
+
+/* The list states that it is valid. */
+static void put_place(void)
+{
+    hsize_t bytes;
+    set_count("/chunk_checksums", "file_bytes", (int64_t)file_size);
+    set_count("/chunk_checksums", "offset", (int64_t)chunk_address("/chunk_checksums", &bytes));
 }
 
 static void make_sums(void)
@@ -716,9 +750,11 @@ static void make_sums(void)
     write_file("55_chunk_checksums_of_subtrees", &tree, &options);
     derive("56_chunk_checksums_of_a_part_not_listed", "55_chunk_checksums_of_subtrees",
            without_the_word_colours);
-    state_size("56_chunk_checksums_of_a_part_not_listed");
+    state_size("56_chunk_checksums_of_a_part_not_listed", put_size);
     derive("57_chunk_checksums_without_offset", "55_chunk_checksums_of_subtrees", stale_checksums);
     derive("63_chunk_checksums_of_others", "54_chunk_checksums", checksums_of_others);
+    derive("64_lists_of_a_bare_file", "55_chunk_checksums_of_subtrees", with_bare_lists);
+    state_size("64_lists_of_a_bare_file", put_place);
 }
 
 /* --- subtrees and gates, in files that are large enough --- */

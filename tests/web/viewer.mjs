@@ -903,7 +903,8 @@ async function graphics(browser, address) {
   await extension.evaluate((it) => it.restoreContext());
   await page.waitForSelector('#error', { state: 'hidden' });
   await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
-  assert.ok(Math.abs((await look(page)).share - before) < 0.01);
+  const after = (await look(page)).share;
+  assert.ok(Math.abs(after - before) < 0.01, `the model covers ${before} of the page, and afterwards ${after}`);
   await page.close();
   complaints.length = quiet;
 }

@@ -136,7 +136,7 @@ static uint64_t other_bytes(const ebpo_info *info, const ebpo_stored_sizes *stor
 {
     uint64_t sum = info->head_bytes + info->chunk_index_bytes + level_bytes(info, stored) +
                    stored->mesh_vertex_bytes + stored->mesh_face_bytes + stored->map_bytes +
-                   stored->subtree_bytes + stored->attribute_bytes + stored->sum_bytes;
+                   stored->subtree_bytes + stored->attribute_bytes + stored->checksum_bytes;
     return info->file_bytes > sum ? info->file_bytes - sum : 0;
 }
 
@@ -179,7 +179,7 @@ void facts_print(FILE *out, const char *path, const ebpo_info *info,
     print_bytes(out, "maps", info, stored->map_bytes);
     print_bytes(out, "subtrees", info, stored->subtree_bytes);
     print_bytes(out, "attributes", info, stored->attribute_bytes);
-    print_bytes(out, "checksums", info, stored->sum_bytes);
+    print_bytes(out, "checksums", info, stored->checksum_bytes);
     print_bytes(out, "other", info, other_bytes(info, stored));
     print_bytes(out, "file", info, info->file_bytes);
 }
@@ -391,7 +391,7 @@ static void json_storage(json *j, const ebpo_info *info, const ebpo_stored_sizes
     json_uint(j, "maps", stored->map_bytes);
     json_uint(j, "subtrees", stored->subtree_bytes);
     json_uint(j, "attributes", stored->attribute_bytes);
-    json_uint(j, "chunk_checksums", stored->sum_bytes);
+    json_uint(j, "chunk_checksums", stored->checksum_bytes);
     json_uint(j, "other", other_bytes(info, stored));
     json_end(j);
     if (!info->subtree_level)

@@ -41,7 +41,8 @@ export class Scene {
     this.#warmUp();
     this.#makeProbe();
     for (const [event, gone] of [['webglcontextlost', true], ['webglcontextrestored', false]])
-      canvas.addEventListener(event, () => { // three.js uploads everything again at the next frame
+      canvas.addEventListener(event, () => { // three.js uploads everything again at the next frame, but has forgotten the clear colour
+        this.renderer.setClearColor(0, 0);
         lost(gone);
         this.redraw();
       });

@@ -265,8 +265,8 @@ static ebpo_status offer_tops(separation_search *s, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     const ebpo_accel *b = s->side[1].accel;
-    for (uint32_t j = 0; j < b->bound[b->top].count && status == EBPO_OK; j++)
-        status = offer_children(s, 0, s->side[0].accel->top, b->top * 8 + j, error);
+    for (uint32_t j = 0; j < b->bound[b->root_bound].count && status == EBPO_OK; j++)
+        status = offer_children(s, 0, s->side[0].accel->root_bound, b->root_bound * 8 + j, error);
     return status;
 }
 

@@ -175,8 +175,8 @@ EBPO_EIGHT void node_boxes(ebpo_gap_node *out, const ebpo_bound *b, const ebpo_t
 
 /* Decodes bounding cylinders. A cylinder without an axis is decoded as extremely thick, so that it
  * gives no bound. */
-EBPO_EIGHT void node_slabs(ebpo_gap_node *out, const ebpo_bound_slab *b, const ebpo_turned_frame *f,
-                           float slack)
+EBPO_EIGHT void node_cylinders(ebpo_gap_node *out, const ebpo_bound_cylinder *b,
+                               const ebpo_turned_frame *f, float slack)
 {
     f8 axis[3], middle[3], inverse, is;
     decode_axes8(b, axis, &inverse, &is);
@@ -208,18 +208,18 @@ EBPO_EIGHT f8 sine_of8(f8 cosine)
 /* Computes how far the children extend along the search's direction. */
 EBPO_EIGHT void node_reach(ebpo_gap_node *out, const float along[3])
 {
-    f8 boxes = f8_all(0), slabs = f8_all(0), cosine = f8_all(0);
+    f8 boxes = f8_all(0), cylinders = f8_all(0), cosine = f8_all(0);
 #pragma GCC unroll 3
     for (int k = 0; k < 3; k++) {
         f8 a = f8_all(along[k]);
         boxes = f8_add(boxes, f8_add(f8_mul(f8_load(out->centre[0][k]), a),
                                      f8_mul(f8_load(out->half[0][k]), f8_abs(a))));
-        slabs = f8_add(slabs, f8_mul(f8_load(out->middle[0][k]), a));
+        cylinders = f8_add(cylinders, f8_mul(f8_load(out->middle[0][k]), a));
         cosine = f8_add(cosine, f8_mul(f8_load(out->axis[0][k]), a));
     }
-    slabs = f8_add(slabs, f8_add(f8_mul(f8_abs(cosine), f8_load(out->thick)),
-                                 f8_mul(sine_of8(cosine), f8_load(out->radius))));
-    f8_store(out->reach, f8_min(boxes, slabs));
+    cylinders = f8_add(cylinders, f8_add(f8_mul(f8_abs(cosine), f8_load(out->thick)),
+                                         f8_mul(sine_of8(cosine), f8_load(out->radius))));
+    f8_store(out->reach, f8_min(boxes, cylinders));
 }
 
 static const ebpo_gap_node *take_node(ebpo_gap_search *g, int side, uint32_t node)
@@ -228,7 +228,7 @@ static const ebpo_gap_node *take_node(ebpo_gap_search *g, int side, uint32_t nod
     const ebpo_accel *s = g->accel[side];
     if (out->node != node) {
         node_boxes(out, &s->bound[node], &g->frames.frame[side]);
-        node_slabs(out, &s->slab[node], &g->frames.frame[side], g->frames.slack);
+        node_cylinders(out, &s->cylinder[node], &g->frames.frame[side], g->frames.slack);
         out->node = node;
         out->direction = 0;
     }
@@ -260,7 +260,7 @@ EBPO_EIGHT f8 box_gaps8(const ebpo_gap_node *p, const ebpo_gap_node *q, int j, i
 }
 
 /* Returns the greater of the gaps along both cylinders' axes. */
-EBPO_EIGHT f8 slab_gaps8(const ebpo_gap_node *p, const ebpo_gap_node *q, int j)
+EBPO_EIGHT f8 cylinder_gaps8(const ebpo_gap_node *p, const ebpo_gap_node *q, int j)
 {
     f8 dot = f8_all(0), by_p = dot, by_q = dot, box_p = dot, box_q = dot, size_p = dot,
        size_q = dot;
@@ -302,7 +302,7 @@ EBPO_EIGHT f8 gap_keys8(const ebpo_gap_search *g, const ebpo_gap_node *p, const 
     gap = f8_max(gap, zero);
     square = f8_max(square, f8_mul(gap, gap));
     if (f8_bits(f8_at_most(square, f8_all(g->square)))) {
-        gap = slab_gaps8(p, q, j);
+        gap = cylinder_gaps8(p, q, j);
         square = f8_max(square, f8_mul(gap, gap));
     }
     return f8_pick(f8_less(zero, square), square, f8_min(most, zero));
@@ -598,7 +598,7 @@ static void walk_gaps(ebpo_gap_search *g)
 {
     if (!ebpo_gap_capacity(g))
         return;
-    push_both(g, g->accel[0]->top, g->accel[1]->top);
+    push_both(g, g->accel[0]->root_bound, g->accel[1]->root_bound);
     while (g->count > 0) {
         if (!g->is_heap && g->limit < INFINITY)
             make_heap(g);

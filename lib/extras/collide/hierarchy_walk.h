@@ -35,7 +35,7 @@ typedef struct ebpo_turned_node {
     float size;                          /* length of the longest side of all boxes */
     uint32_t node;                       /* EBPO_NO_CHILD: the entry is empty */
     uint8_t lanes;
-    bool slabs; /* at least one child has a cylinder */
+    bool cylinders; /* at least one child has a cylinder */
 } ebpo_turned_node;
 
 enum { EBPO_TURNED_BITS = 4, EBPO_TURNED_NODES = 1 << EBPO_TURNED_BITS };

@@ -47,8 +47,8 @@ EBPO_EIGHT void turn_boxes(const ebpo_accel_pair *p, int side, const ebpo_bound 
 }
 
 /* Decodes and rotates bounding cylinders. A cylinder without an axis gives no bound. */
-EBPO_EIGHT void turn_slabs(const ebpo_accel_pair *p, int side, const ebpo_bound_slab *s,
-                           ebpo_turned_node *out, const f8 c[3])
+EBPO_EIGHT void turn_cylinders(const ebpo_accel_pair *p, int side, const ebpo_bound_cylinder *s,
+                               ebpo_turned_node *out, const f8 c[3])
 {
     f8 a[3], a2[3], mid[3], mid2[3], inverse, some, unit = f8_all(p->unit[side]);
     decode_axes8(s, a, &inverse, &some);
@@ -59,7 +59,7 @@ EBPO_EIGHT void turn_slabs(const ebpo_accel_pair *p, int side, const ebpo_bound_
         mid[k] = f8_add(c[k], f8_mul(a[k], f8_add(from, to)));
     turn_vector8(p->into[1 - side], a, a2);
     turn_vector8(p->into[1 - side], mid, mid2);
-    out->slabs = f8_bits(some) != 0;
+    out->cylinders = f8_bits(some) != 0;
     f8_store(out->half, f8_pick(some, f8_sub(to, from), f8_all(0x1p100f)));
     f8_store(out->radius, f8_mul(f8_mul(f8_from_shorts(s->radius), f8_all(s->aside_step)), unit));
     store_vector8(out->axis, a);
@@ -74,9 +74,9 @@ static void turn_node(const ebpo_accel_pair *p, int side, uint32_t node, ebpo_tu
     f8 c[3];
     double origin[3];
     turn_boxes(p, side, b, out, c);
-    out->slabs = false;
-    if (p->slabs)
-        turn_slabs(p, side, &p->accel[side]->slab[node], out, c);
+    out->cylinders = false;
+    if (p->cylinders)
+        turn_cylinders(p, side, &p->accel[side]->cylinder[node], out, c);
     for (int k = 0; k < 3; k++)
         origin[k] = (double)b->origin[k] * (double)p->unit[side];
     for (int i = 0; i < 3; i++)
@@ -103,8 +103,8 @@ EBPO_EIGHT const ebpo_turned_node *turned_node(ebpo_pair_walk *w, int side, uint
 typedef struct two_nodes {
     const ebpo_turned_node *p, *q;
     float in_p[3], in_q[3];
-    float slack, slab_slack, sine;
-    bool slabs;
+    float slack, cylinder_slack, sine;
+    bool cylinders;
 } two_nodes;
 
 EBPO_EIGHT two_nodes two_nodes_of(const ebpo_accel_pair *pair, const ebpo_turned_node *a,
@@ -125,9 +125,9 @@ EBPO_EIGHT two_nodes two_nodes_of(const ebpo_accel_pair *pair, const ebpo_turned
     memcpy(t.in_q, p_side == 0 ? in_b : in_a, sizeof t.in_q);
     float size = a->size + b->size + far;
     t.slack = 0x1p-18f * size + pair->doubt;
-    t.slab_slack = pair->slab_share * size + pair->doubt;
+    t.cylinder_slack = pair->cylinder_share * size + pair->doubt;
     t.sine = 1 + pair->sine_capacity;
-    t.slabs = a->slabs | b->slabs;
+    t.cylinders = a->cylinders | b->cylinders;
     return t;
 }
 
@@ -150,7 +150,7 @@ EBPO_EIGHT f8 box_gaps(const two_nodes *t, int j)
 }
 
 /* Returns the greatest gap along the axes of both cylinders; all coordinates are in P's frame. */
-EBPO_EIGHT f8 slab_gaps(const two_nodes *t, int j)
+EBPO_EIGHT f8 cylinder_gaps(const two_nodes *t, int j)
 {
     const ebpo_turned_node *p = t->p, *q = t->q;
     f8 axis[3], axis2[3], other[3], from_mid[3], from_box[3], own_box[3], e[3], zero = f8_all(0);
@@ -169,19 +169,19 @@ EBPO_EIGHT f8 slab_gaps(const two_nodes *t, int j)
        sine = f8_sqrt(f8_max(f8_sub(f8_all(t->sine), f8_mul(cosine, cosine)), zero));
     f8 p_half = f8_load(p->half), p_radius = f8_load(p->radius), q_half = f8_all(q->half[j]),
        q_radius = f8_all(q->radius[j]);
-    f8 by_slab = f8_sub(f8_abs(vector_dot8(axis, from_mid)),
-                        f8_add(f8_mul(cosine, q_half), f8_mul(sine, q_radius))),
+    f8 by_cylinder = f8_sub(f8_abs(vector_dot8(axis, from_mid)),
+                            f8_add(f8_mul(cosine, q_half), f8_mul(sine, q_radius))),
        by_box = f8_sub(f8_abs(vector_dot8(axis, from_box)), vector_dot8(axis2, e));
-    f8 gap = f8_sub(f8_max(by_slab, by_box), p_half);
+    f8 gap = f8_sub(f8_max(by_cylinder, by_box), p_half);
 #pragma GCC unroll 3
     for (int k = 0; k < 3; k++) {
         e[k] = f8_load(p->e[k]);
         axis[k] = f8_abs(other[k]);
     }
-    by_slab = f8_sub(f8_abs(vector_dot8(other, from_mid)),
-                     f8_add(f8_mul(cosine, p_half), f8_mul(sine, p_radius)));
+    by_cylinder = f8_sub(f8_abs(vector_dot8(other, from_mid)),
+                         f8_add(f8_mul(cosine, p_half), f8_mul(sine, p_radius)));
     by_box = f8_sub(f8_abs(vector_dot8(other, own_box)), vector_dot8(axis, e));
-    return f8_max(gap, f8_sub(f8_max(by_slab, by_box), q_half));
+    return f8_max(gap, f8_sub(f8_max(by_cylinder, by_box), q_half));
 }
 
 /* Returns a bit for each child of P that may intersect child j of Q. A child with NaN counts as
@@ -190,10 +190,10 @@ EBPO_EIGHT unsigned near_children_of(const two_nodes *t, int j, bool first, floa
 {
     f8 gap = box_gaps(t, j);
     unsigned near = t->p->lanes & ~f8_bits(f8_less(f8_all(t->slack), gap));
-    if (near && t->slabs) {
-        f8 slab = slab_gaps(t, j);
-        near &= ~f8_bits(f8_less(f8_all(t->slab_slack), slab));
-        gap = f8_max(gap, slab);
+    if (near && t->cylinders) {
+        f8 cylinder = cylinder_gaps(t, j);
+        near &= ~f8_bits(f8_less(f8_all(t->cylinder_slack), cylinder));
+        gap = f8_max(gap, cylinder);
     }
     if (first && near) {
         f8 sizes = f8_add(f8_load(t->p->extent), f8_all(t->q->extent[j]));
@@ -257,12 +257,12 @@ EBPO_EIGHT void both_down(ebpo_pair_walk *w, const ebpo_turned_node *p, const eb
         if (same)
             with_j &= (2u << j) - 1;
         if (with_j)
-            fetch_below(b, b->bound[node_b].child[j], t.slabs);
+            fetch_below(b, b->bound[node_b].child[j], t.cylinders);
         near |= (uint64_t)with_j << 8 * j;
     }
     for (; near; near &= near - 1) {
         uint32_t bit = (uint32_t)__builtin_ctzll(near), i = bit & 7;
-        fetch_below(a, a->bound[node_a].child[i], t.slabs);
+        fetch_below(a, a->bound[node_a].child[i], t.cylinders);
         push_pair(w, node_a << 3 | i, node_b << 3 | bit >> 3, first ? key[bit] : 0);
     }
 }
@@ -285,7 +285,7 @@ EBPO_EIGHT void one_down(ebpo_pair_walk *w, ebpo_node_pair r, int down, uint32_t
     for (unsigned near = near_one(w, down, turned_node(w, down, node), q, stays, first, key); near;
          near &= near - 1) {
         uint32_t i = (uint32_t)__builtin_ctz(near), ref = node << 3 | i;
-        fetch_below(s, s->bound[node].child[i], w->pair->slabs);
+        fetch_below(s, s->bound[node].child[i], w->pair->cylinders);
         push_pair(w, down == 0 ? ref : stays, down == 0 ? stays : ref, key[i]);
     }
 }
@@ -390,8 +390,8 @@ static bool walk_start(ebpo_pair_walk *w)
 {
     if (!ebpo_pair_walk_capacity(w, 64))
         return false;
-    both_down(w, turned_node(w, 0, w->pair->accel[0]->top),
-              turned_node(w, 1, w->pair->accel[1]->top), 255, w->first);
+    both_down(w, turned_node(w, 0, w->pair->accel[0]->root_bound),
+              turned_node(w, 1, w->pair->accel[1]->root_bound), 255, w->first);
     return true;
 }
 

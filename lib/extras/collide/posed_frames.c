@@ -131,15 +131,15 @@ static void inspect_all(ebpo_accel_pair *out)
     to_floats((const double(*)[3])out->turn, out->into[0], out->size[0]);
     to_floats((const double(*)[3])out->turn, out->into[1], out->size[1]);
     out->doubt = INFINITY;
-    out->slabs = out->apart = false;
+    out->cylinders = out->apart = false;
 }
 
 /* Returns true if the boxes of both models are certainly apart. Compares along the axes of the
  * first model's frame; a comparison of spheres would not be better. */
 static bool turned_boxes_apart(const ebpo_accel_pair *p)
 {
-    double first = p->accel[0]->reach * (double)p->unit[0],
-           second = p->accel[1]->reach * (double)p->unit[1];
+    double first = p->accel[0]->largest_coordinate * (double)p->unit[0],
+           second = p->accel[1]->largest_coordinate * (double)p->unit[1];
     for (int i = 0; i < 3; i++) {
         double size = first + (double)p->doubt;
         for (int k = 0; k < 3; k++)
@@ -154,7 +154,7 @@ static bool turned_boxes_apart(const ebpo_accel_pair *p)
 static void choose_units(ebpo_accel_pair *out, const double per_world[2])
 {
     double ratio = per_world[0] / per_world[1];
-    out->slabs = ratio > 0x1p-60 && ratio < 0x1p60;
+    out->cylinders = ratio > 0x1p-60 && ratio < 0x1p60;
     out->unit[0] = ratio > 1 ? (float)fmax(1 / ratio, 0x1p-60) : 1;
     out->unit[1] = ratio > 1 ? 1 : (float)fmax(ratio, 0x1p-60);
 }
@@ -195,7 +195,7 @@ void ebpo_accel_pair_make(ebpo_accel_pair *out, const ebpo_accel *const accel[2]
     to_floats((const double(*)[3])back, out->into[1], out->size[1]);
     double error_bound = posing[0]->posing.error_bound + posing[1]->posing.error_bound;
     out->doubt = (float)(0x1p-44 * reach * unit) + 0x1p-100f;
-    out->slab_share = (float)(0x1p-17 + 8 * error_bound);
+    out->cylinder_share = (float)(0x1p-17 + 8 * error_bound);
     out->sine_capacity = (float)(0x1p-17 + 16 * error_bound);
     out->apart = turned_boxes_apart(out);
 }
@@ -232,7 +232,7 @@ void ebpo_two_frames_make(ebpo_two_frames *out, const ebpo_accel *const accel[2]
     double unit = posing[0].unit;
     for (int s = 0; s < 2; s++) {
         const ebpo_posing *p = &posing[s].posing;
-        double length = accel[s]->reach / accel[s]->scale,
+        double length = accel[s]->largest_coordinate / accel[s]->scale,
                far = greatest_coordinate(accel[s]->centre) + length;
         ebpo_posing_rotation(p, rotation[s]);
         ebpo_posing_apply(p, accel[s]->centre, centre[s]);

@@ -96,12 +96,12 @@ typedef struct ebpo_accel_pair {
     /* In floats: into[i] rotates a vector of the other frame into frame i; size has the absolute
      * values of the entries, rounded up. */
     float into[2][3][3], size[2][3][3];
-    float doubt;         /* error of posing and of these values, in the unit */
-    float slab_share;    /* bounds of cylinders are reduced by this share of the nodes' sizes */
-    float sine_capacity; /* margin that is added to the squared sine of the angle between two
-                          * cylinders' axes */
-    bool slabs;          /* cylinders may be used */
-    bool apart;          /* the boxes around all faces are disjoint */
+    float doubt;          /* error of posing and of these values, in the unit */
+    float cylinder_share; /* bounds of cylinders are reduced by this share of the nodes' sizes */
+    float sine_capacity;  /* margin that is added to the squared sine of the angle between two
+                           * cylinders' axes */
+    bool cylinders;       /* cylinders may be used */
+    bool apart;           /* the boxes around all faces are disjoint */
 } ebpo_accel_pair;
 
 /* reach: no posed coordinate of both models is greater. The posings must live as long as the pair.

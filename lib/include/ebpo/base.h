@@ -148,7 +148,8 @@ typedef enum ebpo_status {
     EBPO_E_NOT_SOLID = -7,   /* a solid is required, and the mesh is not balanced */
     EBPO_E_LIMIT = -8,       /* a count or size exceeds a stated limit */
     EBPO_E_CANCELLED = -9,   /* a callback requested to stop */
-    EBPO_E_ABSENT = -10      /* the file does not contain the required data */
+    EBPO_E_ABSENT = -10,     /* the file does not contain the required data */
+    EBPO_E_PENDING = -11     /* bytes of the file are not available yet (async.h) */
 } ebpo_status;
 
 /*
@@ -173,12 +174,18 @@ typedef struct ebpo_error {
     /* Byte offset of the error in the file; -1 if unknown. */
     int64_t offset;
 
-    uint64_t reserved[4];
+    /*
+     * errno of the system call that failed, such as ENOENT; 0 if none, or not recorded. ENOENT is
+     * also set when a web server has no such file.
+     */
+    int64_t system_error;
+
+    uint64_t reserved[3];
 } ebpo_error;
 
-#define EBPO_ERROR_INIT                \
-    {                                  \
-        EBPO_OK, "", "", "", -1, { 0 } \
+#define EBPO_ERROR_INIT                   \
+    {                                     \
+        EBPO_OK, "", "", "", -1, 0, { 0 } \
     }
 
 /*

@@ -13,6 +13,7 @@
  *   build.h       building a tree from a mesh
  *   file.h        files: writing, opening, reading
  *   http.h        files on web servers
+ *   async.h       files whose bytes arrive asynchronously
  *   query.h       point in solid, distance, rays, boxes, mass
  *   catalogue.h   queries of many models, or of the parts of one, together
  *   pair.h        relation of two faces
@@ -51,6 +52,7 @@
 #include <ebpo/build.h>
 #include <ebpo/file.h>
 #include <ebpo/http.h>
+#include <ebpo/async.h>
 #include <ebpo/query.h>
 #include <ebpo/catalogue.h>
 #include <ebpo/pair.h>

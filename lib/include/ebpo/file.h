@@ -103,7 +103,7 @@ typedef struct ebpo_level {
     /* [group_count] type of octant i in bits 2i, 2i + 1; octant: bit 0 x, bit 1 y, bit 2 z */
     uint16_t *types;
 
-    /* [gray_count] number of planes that the node adds to its parent's envelope */
+    /* [gray_count] number of planes that bound this envelope besides those of all ancestors */
     uint8_t *plane_counts;
 
     /* [plane_count] codes (ebpo_plane_decode), in the order of the nodes */
@@ -168,9 +168,9 @@ typedef struct ebpo_level {
     double leaf_volume;
 
     /*
-     * Number of pruned gray nodes. The children of a pruned node have a group in the next level.
-     * The word of this group in `types` is 0, so it counts as eight white nodes. On the last level,
-     * all gray nodes are pruned, and their children have no groups.
+     * Number of pruned gray nodes. The next level still has a group for each pruned node. The word
+     * of this group in `types` is 0, so the group counts as eight white nodes. On the last level,
+     * all gray nodes are pruned and have no groups.
      */
     uint64_t pruned_count;
 
@@ -266,8 +266,8 @@ typedef struct ebpo_info {
     int selection;
 
     /*
-     * As in ebpo_build_options (build.h). One of the two is set if `selection` is one of the
-     * selections of the theses; else both are 0.
+     * As in ebpo_build_options (build.h). One of the two is set if `selection` is
+     * EBPO_SELECT_KMEDOIDS, EBPO_SELECT_OFFSET or EBPO_SELECT_RANDOM; else both are 0.
      */
     double percent, k_root;
 
@@ -289,8 +289,9 @@ typedef struct ebpo_info {
     uint8_t content_sha256[32];
 
     /*
-     * Location of HDF5's chunk indexes, which are behind the first levels in the file. Only arrays
-     * with several chunks have a chunk index. Used for prefetching. 0: none, or not recorded.
+     * Location of HDF5's chunk indexes, which are stored after the data of the first levels. Only
+     * arrays with several chunks have a chunk index. Used for prefetching. 0: none, or not
+     * recorded.
      */
     uint64_t chunk_index_offset, chunk_index_bytes;
 
@@ -308,7 +309,7 @@ typedef struct ebpo_info {
 
     /*
      * True for a subset: children of some gray nodes were omitted (ebpo_subset). The next members,
-     * up to kept_error, are the conditions of the request.
+     * up to kept_error, are the options with which the subset was made.
      */
     bool pruned;
 
@@ -380,7 +381,7 @@ EBPO_API void ebpo_tree_free(ebpo_tree *tree);
 /*
  * Chunk checksums. Each chunk ends with a checksum; this list has a copy of the checksums of all
  * chunks (format-spec/checksums.md). With the list, readers detect a chunk that was
- * replaced by another chunk or by another version of the chunk.
+ * replaced by another chunk or by another version of the same chunk.
  */
 typedef enum ebpo_chunk_checksums {
     EBPO_CHECKSUMS_DEFAULT = 0, /* written */
@@ -406,13 +407,12 @@ typedef struct ebpo_write_options {
     ebpo_progress progress;
 
     /*
-     * Selects the level whose gray nodes are the roots of subtrees (format-spec/README.md, section
-     * 9). This is the deepest level with at least this mean number of faces per gray node. If no
-     * level has this mean, it is level 1. The data of a subtree is contiguous, so that one read
-     * loads it.
+     * Selects the level whose gray nodes are the roots of subtrees (format-spec/subtrees.md): the
+     * deepest level whose gray nodes have, on average, at least this number of faces; level 1 if
+     * there is none. The data of a subtree is contiguous, so that one read loads it.
      *
-     * 0 (default): selects as 1,024 does, with two differences. The file has no subtrees if no
-     * level has this mean, or if the mesh has fewer than 131,072 faces.
+     * 0 (default): as 1,024, but the file has no subtrees if no level reaches this number, or if
+     * the mesh has fewer than 131,072 faces.
      *
      * EBPO_NO_SUBTREES: no subtrees, as in format 1.0. Trees of fewer than three levels never have
      * subtrees.
@@ -467,7 +467,8 @@ typedef struct ebpo_source {
 
     /*
      * Fills `data` with `size` bytes from `offset` on, or fails. The range is within the source.
-     * Called by any thread that uses the file.
+     * EBPO_E_PENDING: the bytes are not available yet (async.h). Called by any thread that uses the
+     * file.
      */
     ebpo_status (*read)(void *user, uint64_t offset, uint64_t size, void *data, ebpo_error *error);
 
@@ -516,7 +517,7 @@ typedef struct ebpo_file ebpo_file;
  *
  * EBPO_E_IO. EBPO_E_FORMAT: not an .ebpo.h5 file, or damaged. EBPO_E_VERSION: the file has another
  * major version, or a part that this library does not know. EBPO_E_UNSUPPORTED: another program,
- * such as h5repack, wrote a layout that this library does not write. EBPO_E_LIMIT: the decoded
+ * such as h5repack, wrote a layout that only ebpo_open_compat reads. EBPO_E_LIMIT: the decoded
  * arrays are too large for the file size (ebpo_open_options).
  *
  * Threads: any.
@@ -597,9 +598,9 @@ typedef struct ebpo_compat_options {
  * the format. A file at a URL is first fetched completely to TMPDIR.
  *
  * The copy is then opened like any other file, and its content checksum is compared. This checksum
- * does not include attributes, such as the root's box, and the headers of these files have no
- * checksums: use ebpo_verify to find errors in attributes. Sizes in ebpo_info are those of the
- * copy.
+ * does not include HDF5 attributes, such as the root's box, and the headers of files of other
+ * programs have no checksums: use ebpo_verify to find errors in attributes. Sizes in ebpo_info are
+ * those of the copy.
  *
  * Errors are those of ebpo_open. EBPO_E_FORMAT: libhdf5 rejected the file or crashed, or the
  * content does not match its checksum. EBPO_E_IO: the process or the temporary file could not be
@@ -624,7 +625,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_memory(const void *data, uint64_t s
 
 /*
  * Opens a file from any source. The source is closed with the file, and also if opening fails
- * (except if its struct_size is not set).
+ * (except if source->struct_size is not set).
  *
  * Threads: any.
  */
@@ -750,7 +751,7 @@ typedef struct ebpo_stored_sizes {
     uint64_t attribute_bytes;
 
     /* List of chunk checksums. */
-    uint64_t sum_bytes;
+    uint64_t checksum_bytes;
 } ebpo_stored_sizes;
 
 #define EBPO_STORED_SIZES_INIT EBPO_SIZED(ebpo_stored_sizes)
@@ -783,7 +784,7 @@ typedef struct ebpo_read_options {
     /* 0: all cores */
     unsigned threads;
 
-    /* Owns the results; free it after them. NULL: results are allocated with malloc. */
+    /* Owns the results; free the workspace after them. NULL: results are allocated with malloc. */
     ebpo_workspace *workspace;
 
     /*
@@ -887,7 +888,7 @@ typedef struct ebpo_attribute_values {
  * Reads the n-th array of attributes, in the order of the file's vertices or faces. Freed by
  * ebpo_attribute_values_free.
  *
- * EBPO_E_ABSENT: the file has fewer.
+ * EBPO_E_ABSENT: the file has no n-th array.
  *
  * Threads: any.
  */
@@ -901,7 +902,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_attribute(const ebpo_file *fil
  * ebpo_file_read_attribute. `ends` is NULL for an array without lists or with lists of equal
  * length. Freed by ebpo_attribute_values_free.
  *
- * EBPO_E_ABSENT: the file has fewer.
+ * EBPO_E_ABSENT: the file has no n-th array.
  *
  * Threads: any.
  */

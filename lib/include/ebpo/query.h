@@ -352,6 +352,11 @@ EBPO_API void ebpo_context_free(ebpo_context *context);
  * EBPO_E_ARGUMENT with the index of the point. A query of many points gives the same results as
  * single queries. On failure results are unspecified. All queries can return the errors of reading,
  * and EBPO_E_LIMIT (ebpo_model_new).
+ *
+ * Options member `done`, for files whose bytes arrive asynchronously (async.h): [count] flags of
+ * the items of a batch, or NULL. Clear them before the first call. The call computes items whose
+ * flag is false, and sets the flags of those that it completes, also if it returns EBPO_E_PENDING.
+ * Keep flags and results for the repeated call.
  */
 
 /* Value of `level` for exact results. */
@@ -383,11 +388,14 @@ typedef struct ebpo_inside_options {
      * started.
      */
     uint64_t deadline_ns;
+
+    /* Flags of completed points; see above. */
+    bool *done;
 } ebpo_inside_options;
 
-#define EBPO_INSIDE_OPTIONS_INIT                                            \
-    {                                                                       \
-        sizeof(ebpo_inside_options), EBPO_LEVEL_ALL, EBPO_ENVELOPES_AUTO, 0 \
+#define EBPO_INSIDE_OPTIONS_INIT                                                  \
+    {                                                                             \
+        sizeof(ebpo_inside_options), EBPO_LEVEL_ALL, EBPO_ENVELOPES_AUTO, 0, NULL \
     }
 
 typedef enum ebpo_where {
@@ -508,15 +516,15 @@ typedef struct ebpo_distance_options {
     bool warm;
 
     uint8_t reserved[6];
+
+    /* As in ebpo_inside_options. */
+    bool *done;
 } ebpo_distance_options;
 
 #define EBPO_DISTANCE_OPTIONS_INIT                                                              \
     {                                                                                           \
         sizeof(ebpo_distance_options), EBPO_LEVEL_ALL, EBPO_DISTANCE_EXACT, 0, __builtin_inf(), \
-            false, true,                                                                        \
-        {                                                                                       \
-            0                                                                                   \
-        }                                                                                       \
+            false, true, { 0 }, NULL                                                            \
     }
 
 /* Index of no face. */
@@ -714,11 +722,14 @@ typedef struct ebpo_ray_options {
      * than EBPO_LOAD_CACHE.
      */
     unsigned threads;
+
+    /* Flags of completed rays, as in ebpo_inside_options. NULL for ebpo_ray_all_many. */
+    bool *done;
 } ebpo_ray_options;
 
-#define EBPO_RAY_OPTIONS_INIT                      \
-    {                                              \
-        sizeof(ebpo_ray_options), EBPO_RAY_BOTH, 0 \
+#define EBPO_RAY_OPTIONS_INIT                            \
+    {                                                    \
+        sizeof(ebpo_ray_options), EBPO_RAY_BOTH, 0, NULL \
     }
 
 /* Ray origin + t direction, as in ebpo_ray_first. */

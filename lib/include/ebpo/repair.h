@@ -27,7 +27,7 @@ typedef enum ebpo_doubt {
     /* Holes were filled although more than half of all edges were boundary edges. */
     EBPO_DOUBT_MOSTLY_OPEN = 1 << 2,
 
-    /* Filled holes at least doubled the area. */
+    /* The faces that fill holes at least doubled the area. */
     EBPO_DOUBT_MOSTLY_FILLED = 1 << 3,
 
     /*
@@ -44,7 +44,7 @@ typedef enum ebpo_doubt {
 /*
  * Returns the doubts about the current mesh.
  *
- * area     area of the mesh before repairs. 0: unknown; the added area is then not tested
+ * area     area of the mesh before repairs. 0: unknown; EBPO_DOUBT_MOSTLY_FILLED is then not set
  * report   report on the current mesh
  * record   repairs that were made; NULL: none
  *
@@ -76,13 +76,16 @@ typedef struct ebpo_repair_try {
 typedef struct ebpo_repairs {
     size_t struct_size;
 
-    /* In the order in which they were tried: fewer steps first. */
+    /* Number of tries. */
     uint64_t count;
+
+    /* In the order in which they were tried: fewer steps first. */
     ebpo_repair_try tries[EBPO_REPAIR_TRIES];
 
     /*
      * Index of the try without doubts, which is the last try. -1: every try has doubts, or there
-     * are no doubts about the unrepaired mesh.
+     * are no doubts about the unrepaired mesh, even if the step that drops repeated faces was
+     * tried.
      */
     int64_t chosen;
 } ebpo_repairs;
@@ -108,7 +111,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_try_repairs(const ebpo_mesh *mesh,
 
 /*
  * Number of shells by kind. Shells are defined at ebpo_mesh_orient; they may share vertices or
- * edges. A component is here a shell, or a set of other faces that are connected by vertices.
+ * edges. Here a component is a shell, or a set of other faces that are connected by vertices.
  */
 typedef struct ebpo_shells {
     size_t struct_size;
@@ -143,7 +146,7 @@ typedef struct ebpo_shells {
      * Valid only if `apart` is 1; else 0. A difference is also 0 if each component outside all
      * solids is oriented outwards and each component inside a solid is oriented inwards.
      */
-    double beyond[3];
+    double volume_difference[3];
 } ebpo_shells;
 
 #define EBPO_SHELLS_INIT EBPO_SIZED(ebpo_shells)

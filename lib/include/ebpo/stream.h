@@ -39,8 +39,8 @@ typedef struct ebpo_stream_options {
  * parent's envelope in the leaf's cell.
  *
  * The vertices of an envelope's polygons are rounded, and negligible cuts are omitted. So the
- * polygons usually enclose slightly more than the envelope. `planes` is guaranteed to contain the
- * envelope; the polygons are not.
+ * polygons usually enclose slightly more than the envelope. The half-spaces in `planes` are
+ * guaranteed to contain the envelope; the polygons are not.
  */
 typedef struct ebpo_stream_node {
     /* A leading 1, then three bits for each level. */
@@ -63,7 +63,8 @@ typedef struct ebpo_stream_node {
     /*
      * [plane_count] coefficients a, b, c, d of the half-space a x + b y + c z <= d, in the model's
      * unit, with a unit normal. They are rounded outward: points of the cell that are in the
-     * half-space of the code satisfy this inequality, also if the left side is computed in doubles.
+     * half-space of the plane code satisfy this inequality, also if the left side is computed in
+     * doubles.
      */
     const double (*planes)[4];
 

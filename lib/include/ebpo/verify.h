@@ -21,7 +21,10 @@ typedef struct ebpo_verify_count {
 typedef struct ebpo_verify_report {
     size_t struct_size;
 
-    /* Header, shapes and counts of arrays, index arrays, order. */
+    /*
+     * Header, shapes and counts of arrays, index arrays, order. Also that cells are divided where
+     * they have more than leaf_faces faces, and only there, which no rule of the format requires.
+     */
     ebpo_verify_count structure;
 
     /* Content checksum. */

@@ -173,7 +173,7 @@ static ebpo_status patient_inspect(patient *p, ebpo_error *error)
     ebpo_status status = inspect_all(p, error);
     if (status == EBPO_OK)
         status = ebpo_file_locate(p->file, &stored, error);
-    if (status != EBPO_OK || !stored.sum_bytes)
+    if (status != EBPO_OK || !stored.checksum_bytes)
         return status;
     p->fate[SUMS] = KEPT;
     if (p->fate[MESH] != LOST)

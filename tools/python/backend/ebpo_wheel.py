@@ -1,17 +1,18 @@
 """Builds the wheel of the Python package: a backend of PEP 517 for pip and build.
 
     pip wheel tools/python --no-deps -w dist
-    pip wheel tools/python --no-deps -w dist --config-settings setup-args=-Dhttp=enabled
     python3 tools/python/backend/ebpo_wheel.py BUILD_FOLDER DIST    # packs an existing build
 
-It needs meson, ninja, a C compiler, binutils and patchelf, and downloads nothing. The library is built without
-libhdf5, libcurl, assimp and qhull. The libraries that it still needs (zstd, zlib, GMP, nettle, jansson) and
-their licences go into the wheel. These libraries get unique names, so that no other package's copy is used
-instead. The wheel contains no code for one version of Python, so one wheel serves all versions. Its tag
-states the required version of glibc. Equal inputs give equal bytes.
+The wheel contains the package, the library, the command `ebpo`, HDF5's plugin for zstd, and all licences. HDF5,
+zstd, zlib, GMP, nettle and jansson are linked statically, with hidden symbols, so that other copies of them in the
+same process (h5py) are not affected. static_libraries.sh builds them, which takes minutes. EBPO_LIBRARIES names a
+folder that keeps them for later builds.
 
-meson-python is not used, because it installs the whole project: also the command, the headers and the
-manuals. Up to its version 0.12 it has no option for this.
+pip installs meson, ninja and the compiler (ziglang), which links against glibc 2.28. The variable CC selects
+another compiler. The wheel contains no code for one version of Python, so one wheel serves all versions. Its tag states
+the required version of glibc. Equal inputs give equal bytes.
+
+meson-python is not used, because it has no way to build the static libraries first.
 """
 import base64
 import hashlib
@@ -19,7 +20,6 @@ import os
 import pathlib
 import platform
 import re
-import shutil
 import subprocess
 import sys
 import sysconfig
@@ -27,16 +27,30 @@ import tempfile
 import zipfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
-SETUP = ["--buildtype=release", "-Dtests=disabled", "-Dhttp=disabled", "-Dassimp=disabled", "-Dqhull=disabled",
-         "-Drender=disabled", "-Dcaptions=disabled", "-Dpython_dir=none",
-         "-Dhdf5=disabled"]
-# Libraries of every Linux with glibc (PEP 600).
-SYSTEM = re.compile(r"^(ld-linux|libc|libm|libpthread|libdl|librt|libgcc_s|libstdc\+\+)[-.]")
+GLIBC = "2.28"
+SETUP = ["--buildtype=release", "--prefix=/ebpo", "--prefer-static", "-Dtests=disabled", "-Dhttp=disabled",
+         "-Dassimp=disabled", "-Dqhull=disabled", "-Drender=disabled", "-Dcaptions=disabled", "-Dchart_js=none",
+         "-Dpython_dir=none"]
 DATE = (1980, 1, 1, 0, 0, 0)
+COMPILER = """#!/bin/sh
+target={machine}-linux-gnu
+for word; do [ "$word" = -E ] && exec {zig} cc -target $target "$@"; done
+exec {zig} cc -target $target.{glibc} "$@"
+"""
+# The command in the folder of programs. It does not import the package, so that it starts at once.
+COMMAND = b"""#!python
+import importlib.util
+import os
+import sys
+
+folder = importlib.util.find_spec("ebpo").submodule_search_locations[0]
+os.execv(os.path.join(folder, "bin", "ebpo"), ["ebpo", *sys.argv[1:]])
+"""
 
 
-def run(*command):
-    done = subprocess.run([str(word) for word in command], stdout=subprocess.PIPE, text=True)
+def run(*command, **environment):
+    done = subprocess.run([str(word) for word in command], stdout=subprocess.PIPE, text=True,
+                          env=dict(os.environ, **environment))
     if done.returncode:
         sys.stderr.write(done.stdout)  # ninja prints the compiler's messages here
         sys.exit(f"ebpo_wheel.py: {' '.join(map(str, command))} failed; its messages are above")
@@ -47,82 +61,85 @@ def version():
     return re.search(r"version: '([^']+)'", (ROOT / "meson.build").read_text())[1]
 
 
+def machine():
+    return sysconfig.get_platform().rpartition("-")[2].replace("-", "_")
+
+
 def package_in(folder):
     return sorted(path for path in folder.iterdir() if path.suffix in (".py", ".typed"))
 
 
-def build(folder, setup_args):
-    """Build only the library and the package."""
-    print(run("meson", "setup", folder, ROOT, *SETUP, *setup_args), flush=True)
-    library = f"lib/libebpo.so.{version()}"
-    modules = [f"tools/python/ebpo/{path.name}" for path in package_in(ROOT / "tools/python/ebpo")]
-    run("ninja", "-C", folder, library, "tools/python/ebpo/_declared.py", *modules)
+def zig():
+    import ziglang
+    return pathlib.Path(ziglang.__file__).parent
 
 
-def needed(library, system):
-    """Return the libraries that a library needs and the system may lack, with their paths."""
-    where = dict(re.findall(r"^\s*(\S+) => (/\S+)", run("ldd", library), flags=re.M))
-    names = [name for name in run("patchelf", "--print-needed", library).split() if not system.match(name)]
-    return {name: pathlib.Path(where[name]) for name in names}
+def compilers(folder):
+    """Return the variables CC and CXX. Without CC, write a program to the folder that runs Zig's compiler.
+
+    The project needs no C++ compiler; it uses one only to read numbers in texts faster.
+    """
+    if os.environ.get("CC"):
+        return {}
+    compiler = folder / "zig-cc"
+    compiler.write_text(COMPILER.format(machine=machine(), zig=zig() / "zig", glibc=GLIBC))
+    compiler.chmod(0o755)
+    return {"CC": str(compiler), "CXX": "false"}
 
 
-def bundle(library, folder, system):
-    """Copy a library and all libraries that it needs to a folder, and make them find each other there."""
-    names, waiting = {}, [(copied(library, folder / "libebpo.so.0"), needed(library, system))]
-    while waiting:
-        file, needs = waiting.pop()
-        for name, path in needs.items():
-            if name not in names:
-                digest = hashlib.sha256(path.read_bytes()).hexdigest()[:8]
-                names[name] = name.replace(".so", f"-{digest}.so", 1)
-                copy = copied(path, folder / names[name])
-                run("patchelf", "--set-soname", names[name], copy)
-                waiting.append((copy, needed(path, system)))
-            run("patchelf", "--replace-needed", name, names[name], file)
-        run("patchelf", "--set-rpath", "$ORIGIN", file)
-    return names
+def build(folder, libraries, setup_args):
+    """Build the static libraries, then the library, the command, the plugin and the package."""
+    folder.mkdir()
+    named = compilers(folder.parent)
+    run("sh", pathlib.Path(__file__).with_name("static_libraries.sh"), libraries, **named)
+    named["PKG_CONFIG_LIBDIR"] = str(libraries / "lib/pkgconfig")
+    # The names of source files in the library must not depend on the folders.
+    named["CFLAGS"] = f"-ffile-prefix-map={os.path.relpath(ROOT, folder)}/= {os.environ.get('CFLAGS', '')}"
+    print(run("meson", "setup", folder, ROOT, *SETUP, *setup_args, **named), flush=True)
+    run("ninja", "-C", folder)
 
 
-def copied(path, copy):
-    """Copy a library without debug symbols. Runs before patchelf, because strip breaks patched files."""
-    shutil.copy(path, copy)
-    copy.chmod(0o755)
-    run("strip", "--strip-unneeded", copy)
-    return copy
-
-
-def licences(names):
-    """Yield (name, text) of the licence of each library in the wheel, from Debian's copyright files."""
-    for name in names:
-        printed = subprocess.run(["dpkg-query", "-S", f"*/{name}"], capture_output=True, text=True).stdout
-        package = printed.partition(":")[0].strip()
-        path = pathlib.Path("/usr/share/doc") / package / "copyright"
-        if package and path.is_file():
-            yield f"licenses/{package}.txt", path.read_bytes()
+def installed(folder, target):
+    """Install the programs of a build below a folder. Yield the name in the wheel and the path of each file."""
+    run("meson", "install", "-C", folder, "--no-rebuild", "--strip", "--quiet", "--tags", "runtime", "--destdir", target)
+    prefix = next(target.rglob("bin/ebpo")).parents[1]
+    for path in sorted([prefix / "bin/ebpo", *prefix.rglob("*.so*")]):
+        if not path.is_symlink():
+            soname = re.sub(r"(\.so\.\d+)[.\d]*$", r"\1", path.name)
+            yield (path.parent / soname).relative_to(prefix).as_posix(), path
 
 
 def glibc(file):
     """Return the versions of glibc that a library needs, from its table of needed versions."""
-    printed = run("env", "LC_ALL=C", "readelf", "--wide", "--version-info", file).partition("Version needs section")[2]
+    printed = run("readelf", "--wide", "--version-info", file, LC_ALL="C").partition("Version needs section")[2]
     names = re.findall(r"Name: GLIBC_(\S+)", printed)
     relative = [(2, 36)] if "ABI_DT_RELR" in names else []  # packed relocations need glibc 2.36
     return relative + [tuple(map(int, name.split(".")[:2])) for name in names if name[0].isdigit()]
 
 
 def tag(files):
-    """Return py3-none-PLATFORM for the glibc that the libraries need, at least that of manylinux2014."""
-    machine = sysconfig.get_platform().rpartition("-")[2].replace("-", "_")
+    """Return py3-none-PLATFORM for the glibc that the files need, at least that of manylinux2014."""
     if platform.libc_ver()[0] != "glibc":
-        return f"py3-none-linux_{machine}"
+        return f"py3-none-linux_{machine()}"
     versions = [(2, 17)] + [version for file in files for version in glibc(file)]
-    return "py3-none-manylinux_%d_%d_%s" % (*max(versions), machine)
+    return "py3-none-manylinux_%d_%d_%s" % (*max(versions), machine())
+
+
+def licences(libraries):
+    """Yield (name, text) of the licences of all code in the wheel."""
+    yield "licenses/ebpo.txt", (ROOT / "LICENSE").read_bytes()
+    if libraries:
+        for path in sorted((libraries / "licences").iterdir()):
+            yield f"licenses/{path.name}", path.read_bytes()
+        if not os.environ.get("CC"):  # parts of Zig's runtime are in the programs
+            yield "licenses/zig.txt", (zig() / "LICENSE").read_bytes()
 
 
 METADATA = """Metadata-Version: 2.1
 Name: ebpo
 Version: {version}
 Summary: EBP-Octree in HDF5: exact queries on triangle meshes of any size
-License: MIT
+License: MIT; licenses of the linked libraries are in the folder licenses
 Requires-Python: >=3.9
 Requires-Dist: numpy
 Provides-Extra: trimesh
@@ -159,25 +176,22 @@ def write(path, entries):
         add(f"{about}/RECORD", "\n".join([*record, f"{about}/RECORD,,", ""]).encode())
 
 
-def pack(folder, dist, system=SYSTEM):
-    """Pack a build folder into a wheel, without libraries whose names match `system`."""
+def pack(folder, dist, libraries=None):
+    """Pack a build folder into a wheel. libraries: the folder of the static libraries in it."""
     folder, dist = pathlib.Path(folder), pathlib.Path(dist)
     dist.mkdir(parents=True, exist_ok=True)
-    about = f"ebpo-{version()}.dist-info"
-    with tempfile.TemporaryDirectory() as name:
-        libraries = pathlib.Path(name)
-        names = bundle(folder / f"lib/libebpo.so.{version()}", libraries, system)
-        files = sorted(libraries.iterdir())
-        tagged = tag(files)
-        modules = package_in(folder / "tools/python/ebpo")
-        entries = [(f"ebpo/{path.name}", path.read_bytes(), path.parent == libraries) for path in [*modules, *files]]
+    name = f"ebpo-{version()}"
+    entries = [(f"ebpo/{path.name}", path.read_bytes(), False) for path in package_in(folder / "tools/python/ebpo")]
+    with tempfile.TemporaryDirectory() as target:
+        programs = list(installed(folder, pathlib.Path(target)))
+        tagged = tag([path for _, path in programs])
+        entries += [(f"ebpo/{place}", path.read_bytes(), True) for place, path in programs]
+    entries.append((f"{name}.data/scripts/ebpo", COMMAND, True))
     head = f"Wheel-Version: 1.0\nGenerator: ebpo_wheel {version()}\nRoot-Is-Purelib: false\nTag: {tagged}\n"
-    for name, data in [("licenses/ebpo.txt", (ROOT / "LICENSE").read_bytes()), *sorted(set(licences(names))),
-                       ("METADATA", metadata()), ("WHEEL", head.encode())]:
-        entries.append((f"{about}/{name}", data, False))
-    path = dist / f"ebpo-{version()}-{tagged}.whl"
-    write(path, entries)
-    return path.name
+    for place, data in [*licences(libraries), ("METADATA", metadata()), ("WHEEL", head.encode())]:
+        entries.append((f"{name}.dist-info/{place}", data, False))
+    write(dist / f"{name}-{tagged}.whl", entries)
+    return f"{name}-{tagged}.whl"
 
 
 # ---- functions that pip calls ----
@@ -186,6 +200,10 @@ def pack(folder, dist, system=SYSTEM):
 def setup_args(config_settings):
     given = (config_settings or {}).get("setup-args", [])
     return [given] if isinstance(given, str) else list(given)
+
+
+def get_requires_for_build_wheel(config_settings=None):
+    return ["meson>=1.5", "ninja"] + ([] if os.environ.get("CC") else ["ziglang"])
 
 
 def prepare_metadata_for_build_wheel(metadata_directory, config_settings=None):
@@ -197,9 +215,11 @@ def prepare_metadata_for_build_wheel(metadata_directory, config_settings=None):
 
 
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
-    with tempfile.TemporaryDirectory(prefix="ebpo-wheel-") as folder:
-        build(folder, setup_args(config_settings))
-        return pack(folder, wheel_directory)
+    with tempfile.TemporaryDirectory(prefix="ebpo-wheel-") as name:
+        folder = pathlib.Path(name)
+        libraries = pathlib.Path(os.environ.get("EBPO_LIBRARIES") or folder / "libraries").absolute()
+        build(folder / "build", libraries, setup_args(config_settings))
+        return pack(folder / "build", wheel_directory, libraries)
 
 
 def build_sdist(sdist_directory, config_settings=None):
@@ -209,7 +229,8 @@ def build_sdist(sdist_directory, config_settings=None):
 def main():
     if len(sys.argv) != 3:
         sys.exit(__doc__)
-    name = pack(sys.argv[1], sys.argv[2])
+    libraries = os.environ.get("EBPO_LIBRARIES")
+    name = pack(sys.argv[1], sys.argv[2], libraries and pathlib.Path(libraries))
     print(f"{sys.argv[2]}/{name}: {os.path.getsize(pathlib.Path(sys.argv[2]) / name)} bytes")
 
 

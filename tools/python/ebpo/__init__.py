@@ -11,14 +11,16 @@ from __future__ import annotations
 
 from ._declared import (ClashKind, NodeType, PaintKind, PairKind, Part, Relation, Rule, Where)
 from ._library import lib as _lib
-from .adapters import from_trimesh
+from .asynchronous import AsyncModel, open_async
 from .queries import bar
 from .catalogue import Catalogue
 from .collide import Collider, pose
 from .build import convert
-from .errors import (AbsentError, ArgumentError, Cancelled, Error, FormatError, IOFailure, LimitError, NoMemory,
-                     NotSolidError, UnsupportedError, VersionError)
-from .model import AllHits, Bounds, Hits, Located, Model, Nearest, open
+from .errors import (AbsentError, ArgumentError, Cancelled, Error, ExistingFileError, FileAccessError, FolderError,
+                     FormatError, IOFailure, LimitError, MissingFileError, NoMemory, NotSolidError, Pending,
+                     UnsupportedError, VersionError)
+from .model import Model, open
+from .results import AllHits, Bounds, Hits, Located, Nearest
 from .paint import Areas, Paint, Stroke
 from .parts import Attributes, Info, Level, Maps, Mass, Mesh, Subtree, half_spaces
 from .scene import Scene, open_scene
@@ -38,11 +40,12 @@ def library() -> str:
 
 
 __all__ = [
-    "open", "Model", "Info", "Located", "Nearest", "Bounds", "Hits", "AllHits", "Where",
+    "open", "Model", "open_async", "AsyncModel", "Info", "Located", "Nearest", "Bounds", "Hits", "AllHits", "Where",
     "Mesh", "Maps", "Level", "Subtree", "Attributes", "Mass", "NodeType", "Part", "Rule", "half_spaces",
     "Catalogue", "Collider", "pose", "Relation", "PairKind", "Scene", "open_scene", "ClashKind",
     "Haptic", "HapticResult", "ProbeResult", "Paint", "Stroke", "Areas", "PaintKind",
-    "convert", "from_trimesh", "bar", "library",
+    "convert", "bar", "library",
     "Error", "ArgumentError", "IOFailure", "FormatError", "VersionError", "UnsupportedError", "NotSolidError",
-    "LimitError", "Cancelled", "AbsentError", "NoMemory",
+    "LimitError", "Cancelled", "AbsentError", "NoMemory", "Pending", "MissingFileError", "FileAccessError",
+    "FolderError", "ExistingFileError",
 ]

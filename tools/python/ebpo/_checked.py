@@ -26,6 +26,7 @@ from .errors import ArgumentError
 
 INTEGERS = {getattr(ctypes, name) for name in
             ("c_int8", "c_uint8", "c_int16", "c_uint16", "c_int32", "c_uint32", "c_int64", "c_uint64")}
+FUNCTION = ctypes.CFUNCTYPE(None).__mro__[1]  # the base of all types of functions
 REALS = {ctypes.c_float, ctypes.c_double}
 
 
@@ -158,11 +159,16 @@ def converter(kind: Any) -> Callable | None:
     return None
 
 
+def members_of(kind: Any) -> list[tuple[str, Any]]:
+    """Return the names and types of a struct's members."""
+    return [(member[0], member[1]) for member in kind._fields_]
+
+
 def is_own(kind: Any) -> bool:
     """Return True for types of members that only this package sets: pointers, functions, structs with such members."""
     if issubclass(kind, ctypes.Structure):
-        return any(is_own(member) for _, member in kind._fields_)
-    return kind is ctypes.c_void_p or issubclass(kind, ctypes._CFuncPtr)
+        return any(is_own(member) for _, member in members_of(kind))
+    return kind is ctypes.c_void_p or issubclass(kind, FUNCTION)
 
 
 class Structure(ctypes.Structure):
@@ -172,7 +178,7 @@ class Structure(ctypes.Structure):
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
-        cls._checks = {name: converter(kind) for name, kind in cls._fields_}
+        cls._checks = {name: converter(kind) for name, kind in members_of(cls)}
 
     def __setattr__(self, name: str, value: Any) -> None:
         if name not in self._checks:
@@ -183,7 +189,8 @@ class Structure(ctypes.Structure):
 
 def checked(entry: Any, kinds: list, names: list) -> Any:
     """Return a wrapper of a C function that checks integers, reals, bools and texts."""
-    checks = [(i, converter(kind), name) for i, (kind, name) in enumerate(zip(kinds, names)) if converter(kind)]
+    found = [(i, converter(kind), name) for i, (kind, name) in enumerate(zip(kinds, names))]
+    checks = [(i, check, name) for i, check, name in found if check]
     if not checks:
         return entry
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from . import _declared as c
 from ._checked import checked, index_of, is_own, within
-from .errors import BY_STATUS, Error, UnsupportedError
+from .errors import BY_ERRNO, BY_STATUS, Error, IOFailure, UnsupportedError
 
 HERE = pathlib.Path(__file__).resolve().parent
 
@@ -25,7 +25,7 @@ def candidates():
     if os.environ.get("EBPO_LIBRARY"):
         yield os.environ["EBPO_LIBRARY"]
         return
-    yield from map(str, sorted(HERE.glob("libebpo.so*")))  # the library in a wheel
+    yield from map(str, sorted(HERE.glob("lib/libebpo.so*")))  # the library in a wheel
     several = sysconfig.get_config_var("MULTIARCH") or "."  # Debian has a folder for each machine type
     for folder in (HERE.parents[2], HERE.parents[2] / "lib", HERE.parents[2] / several):  # prefix, build, Debian
         yield from map(str, sorted(folder.glob("libebpo.so.?")))
@@ -126,10 +126,15 @@ def text(raw):
 
 def error_of(error):
     """Return the Python exception of an ebpo_error."""
-    kind = BY_STATUS.get(error.status, Error)
+    kind, number = BY_STATUS.get(error.status, Error), error.system_error
+    if kind is IOFailure:
+        kind = BY_ERRNO.get(number, IOFailure)
     name = text(lib.ebpo_status_name(error.status))
-    return kind(text(error.message), name, text(error.file), text(error.object),
-                None if error.offset < 0 else error.offset)
+    raised = kind(text(error.message), name, text(error.file), text(error.object),
+                  None if error.offset < 0 else error.offset)
+    if isinstance(raised, IOFailure) and number:
+        raised.errno = number
+    return raised
 
 
 def call(name, *arguments):
@@ -184,6 +189,10 @@ class Handle:
     def end_now(self):
         """Free the object before the last reference is dropped. The object must not be used afterwards."""
         self._end()
+
+    def forget(self):
+        """Never free the object. It belongs to the process that this one was forked from."""
+        self._end.detach()
 
     @classmethod
     def made(cls, function, *arguments, free, keep=()):
@@ -240,6 +249,8 @@ class Reporter(Callback):
     """A progress callback of Python, or None, as a struct of the library."""
 
     def __init__(self, progress):
+        from .queries import reporter
+        progress = reporter(progress)
         super().__init__(c.ebpo_progress_fn, lambda _user, stage, done, total:
                          progress(text(stage), done, total) is not False)
         self.given = c.ebpo_progress(self.given if progress else c.ebpo_progress_fn(), None)

@@ -1,28 +1,44 @@
-"""Adapters for trimesh and PyVista. They are imported when they are needed."""
+"""Adapters for trimesh, Open3D and PyVista. They are imported when they are needed."""
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .model import Model
+from .parts import Mass, Mesh
+from .signatures import ArrayLike, Bools, Doubles, Int64s, Uint32s, Vertices
+
+if TYPE_CHECKING:
+    import pyvista  # type: ignore[import-not-found, import-untyped, unused-ignore]
+    import trimesh  # type: ignore[import-not-found, import-untyped, unused-ignore]
 
 
-def to_trimesh(model: Model, **options: Any) -> Any:
-    """Return the mesh as a trimesh.Trimesh; options are those of trimesh. Unprocessed by default."""
+def arrays_of(mesh: Any) -> tuple[Any, Any]:
+    """Return the vertices and faces of a pair of arrays, or of a mesh of trimesh, Open3D or PyVista.
+
+    Polygons of PyVista become triangles. Raises TypeError for other objects.
+    """
+    if hasattr(mesh, "points") and hasattr(mesh, "triangulate"):  # PyVista
+        faces = np.asarray(mesh.triangulate().faces)
+        return np.asarray(mesh.points), faces.reshape(-1, 4)[:, 1:]
+    for name in ("faces", "triangles"):  # trimesh, Open3D
+        if hasattr(mesh, "vertices") and hasattr(mesh, name):
+            return np.asarray(mesh.vertices), np.asarray(getattr(mesh, name))
+    if isinstance(mesh, (tuple, list)) and len(mesh) == 2:
+        return np.asarray(mesh[0]), np.asarray(mesh[1])
+    raise TypeError(f"{type(mesh).__name__} is neither a path, (vertices, faces) nor a mesh of trimesh, Open3D or PyVista")
+
+
+def to_trimesh(model: Model, process: bool) -> trimesh.Trimesh:
+    """Return the mesh as a trimesh.Trimesh."""
     import trimesh
     mesh = model.mesh(order="source" if "maps" in model.info.parts else "file")
     return trimesh.Trimesh(vertices=np.array(mesh.vertices), faces=np.array(mesh.faces, dtype=np.int64),
-                           **{"process": False, **options})
+                           process=process)
 
 
-def from_trimesh(mesh: Any, output: Any, **options: Any) -> Model:
-    """Convert a trimesh.Trimesh, or another object with vertices and faces, as `convert` does."""
-    from .build import convert
-    return convert((mesh.vertices, mesh.faces), output, **options)
-
-
-def to_pyvista(model: Model, level: int | None = None) -> Any:
+def to_pyvista(model: Model, level: int | None = None) -> pyvista.PolyData:
     """Return the mesh as a pyvista.PolyData, or a level's envelopes with octcode, type and volume of cells."""
     import pyvista
     if level is None:
@@ -35,7 +51,7 @@ def to_pyvista(model: Model, level: int | None = None) -> Any:
     return data
 
 
-def faces_of_vtk(faces: np.ndarray) -> np.ndarray:
+def faces_of_vtk(faces: Uint32s) -> Int64s:
     """Return VTK's flat array of faces: for each face a 3 and its three indices."""
     out = np.empty((len(faces), 4), np.int64)
     out[:, 0], out[:, 1:] = 3, faces
@@ -63,38 +79,61 @@ class TrimeshLike:
 
     def __init__(self, model: Model) -> None:
         self.model = model
-        self._mesh: Any = None
-        self._mass: Any = None
+        self._mesh: Mesh | None = None
+        self._mass: Mass | None = None
         self.ray = TrimeshRays(model)
         self.nearest = TrimeshNearest(model)
 
-    def contains(self, points: Any) -> np.ndarray:
+    def contains(self, points: ArrayLike) -> Bools:
         """Return True for points inside: (n,) bool."""
         return self.model.inside(points)
 
-    def signed_distance(self, points: Any) -> np.ndarray:
+    def signed_distance(self, points: ArrayLike) -> Doubles:
         """Return distances: (n,) float64, positive inside as in trimesh."""
         return self.nearest.signed_distance(points)
 
-    def _read(self) -> Any:
+    def _read(self) -> Mesh:
         if self._mesh is None:
             self._mesh = self.model.mesh(order="source" if "maps" in self.model.info.parts else "file")
         return self._mesh
 
-    def _measured(self) -> Any:
+    def _measured(self) -> Mass:
         if self._mass is None:
             self._mass = self.model.measure()
         return self._mass
 
-    vertices = property(lambda self: self._read().vertices)
-    faces = property(lambda self: self._read().faces)
-    bounds = property(lambda self: np.array([self._read().vertices.min(axis=0), self._read().vertices.max(axis=0)],
-                                            dtype=np.float64))
-    extents = property(lambda self: np.diff(self.bounds, axis=0)[0])
-    area = property(lambda self: self._measured().area)
-    volume = property(lambda self: self._measured().volume)
-    center_mass = property(lambda self: self._measured().centroid)
-    is_watertight = property(lambda self: bool(self.model.info.solid))
+    @property
+    def vertices(self) -> Vertices:
+        return self._read().vertices
+
+    @property
+    def faces(self) -> Uint32s:
+        return self._read().faces
+
+    @property
+    def bounds(self) -> Doubles:
+        return self.model.bounds
+
+    @property
+    def extents(self) -> Doubles:
+        low, high = self.bounds
+        return np.asarray(high - low)
+
+    @property
+    def area(self) -> float:
+        return self._measured().area
+
+    @property
+    def volume(self) -> float:
+        return self._measured().volume
+
+    @property
+    def center_mass(self) -> Doubles:
+        return self._measured().centroid
+
+    @property
+    def is_watertight(self) -> bool:
+        return bool(self.model.info.solid)
 
 
 class TrimeshNearest:
@@ -103,14 +142,14 @@ class TrimeshNearest:
     def __init__(self, model: Model) -> None:
         self._model = model
 
-    def on_surface(self, points: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def on_surface(self, points: ArrayLike) -> tuple[Doubles, Doubles, Int64s]:
         """Return the nearest points (n, 3), distances (n,), which are not negative, and faces (n,)."""
         distance, point, _, face = self._model.distance(points, signed=False)
         return point, distance, face
 
-    def signed_distance(self, points: Any) -> np.ndarray:
+    def signed_distance(self, points: ArrayLike) -> Doubles:
         """Return distances: (n,) float64, positive inside."""
-        return -self._model.distance(points).distance + 0.0
+        return np.asarray(-self._model.distance(points).distance + 0.0)
 
 
 class TrimeshRays:
@@ -119,22 +158,22 @@ class TrimeshRays:
     def __init__(self, model: Model) -> None:
         self._model = model
 
-    def intersects_any(self, ray_origins: Any, ray_directions: Any) -> np.ndarray:
+    def intersects_any(self, ray_origins: ArrayLike, ray_directions: ArrayLike) -> Bools:
         """Return True for rays that hit a face: (n,) bool."""
         return self._model.ray_any(ray_origins, ray_directions)
 
-    def intersects_first(self, ray_origins: Any, ray_directions: Any) -> np.ndarray:
+    def intersects_first(self, ray_origins: ArrayLike, ray_directions: ArrayLike) -> Int64s:
         """Return the first face of each ray: (n,) int64, -1: none."""
         return self._model.ray(ray_origins, ray_directions).face
 
-    def intersects_id(self, ray_origins: Any, ray_directions: Any, return_locations: bool = False,
-                      multiple_hits: bool = True) -> tuple:
+    def intersects_id(self, ray_origins: ArrayLike, ray_directions: ArrayLike, return_locations: bool = False,
+                      multiple_hits: bool = True) -> tuple[Any, ...]:
         """Return the faces (k,) and rays (k,) of hits and, with return_locations, the points (k, 3)."""
         locations, rays, faces = self.intersects_location(ray_origins, ray_directions, multiple_hits)
         return (faces, rays, locations) if return_locations else (faces, rays)
 
-    def intersects_location(self, ray_origins: Any, ray_directions: Any, multiple_hits: bool = True
-                            ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def intersects_location(self, ray_origins: ArrayLike, ray_directions: ArrayLike, multiple_hits: bool = True
+                            ) -> tuple[Doubles, Int64s, Int64s]:
         """Return the points (k, 3), rays (k,) and faces (k,) of hits."""
         if multiple_hits:
             hits = self._model.ray_all(ray_origins, ray_directions)
@@ -147,6 +186,6 @@ class TrimeshRays:
         with np.errstate(invalid="ignore"):  # an infinite t gives the point nan
             return o + t[:, None] * np.asarray(ray_directions, dtype=np.float64)[rays], rays, faces
 
-    def contains_points(self, points: Any) -> np.ndarray:
+    def contains_points(self, points: ArrayLike) -> Bools:
         """Return True for points inside: (n,) bool."""
         return self._model.inside(points)

@@ -4,18 +4,22 @@ from __future__ import annotations
 import ctypes
 import os
 import warnings
-from typing import Any, Callable
+from typing import Any, Iterable
 
 import numpy as np
 
 from . import _declared as c
 from ._checked import doubles, integers, path
 from ._library import Handle, Reporter, Struct, call, lib, made, size_in_bytes
+from .errors import ExistingFileError
 from .model import Model
 from .model import open as open_model
+from .signatures import AnyMesh, CodecName, Path, Progress, RuleName, Size
 
-PREPARE = ("weld", "orient", "fill_holes", "flip", "drop_duplicates", "weld_distance")
-BUILD = ("max_level", "leaf_faces", "epsilon", "require_solid", "seed", "unit", "crs", "date")
+# Units of length. Others are stored too, with a warning.
+UNITS = {"m", "dm", "cm", "mm", "um", "\u00b5m", "nm", "km", "in", "inch", "ft", "foot", "yd", "mi", "metre", "meter",
+         "centimetre", "centimeter", "millimetre", "millimeter", "kilometre", "kilometer", "micrometre", "micrometer",
+         "US survey foot"}
 PARTS = {"mesh": c.EBPO_PART_MESH, "maps": c.EBPO_PART_MAPS, "attributes": c.EBPO_PART_ATTRIBUTES,
          "envelopes": c.EBPO_PART_PLANES, "leaf-planes": c.EBPO_PART_LEAF_PLANES, "colours": c.EBPO_PART_COLOURS}
 DEFAULT_PARTS = sum(PARTS.values()) & ~c.EBPO_PART_LEAF_PLANES
@@ -24,44 +28,53 @@ CODECS = {"zstd": c.EBPO_CODEC_ZSTD, "deflate": c.EBPO_CODEC_DEFLATE, "none": c.
 RULES = {rule.name.lower(): int(rule) for rule in c.Rule}
 
 
-def convert(mesh: Any, output: Any, *, parts: Any = None, rule: str = "nonzero", codec: str = "zstd",
-            codec_level: int = 0, memory: int | str | None = None, temp_dir: Any = None,
-            threads: int | None = None, progress: Callable | None = None, **options: Any) -> Model:
-    """Convert a mesh to an .ebpo.h5 file, which is replaced atomically, and open it.
+def convert(mesh: AnyMesh, output: Path, *, overwrite: bool = False, parts: str | Iterable[str] | None = None,
+            weld: bool = False, weld_distance: float | None = None, orient: bool = False, fill_holes: bool = False,
+            flip: bool = False, drop_duplicates: bool = False, require_solid: bool = False,
+            rule: RuleName = "nonzero", max_level: int | None = None, leaf_faces: int | None = None,
+            epsilon: float | None = None, seed: int | None = None, unit: str | None = None, crs: str | None = None,
+            date: str | None = None, codec: CodecName = "zstd", codec_level: int = 0, memory: Size | None = None,
+            temp_dir: Path | None = None, threads: int | None = None, progress: Progress | None = None) -> Model:
+    """Convert a mesh to an .ebpo.h5 file, which is written atomically, and open it.
 
-    mesh: the path of a PLY, OBJ, STL or OFF, or (vertices, faces). vertices: (v, 3); float32 is stored as
-        float32, other types as float64. faces: (f, 3) integers.
+    mesh: the path of a PLY, OBJ, STL or OFF; (vertices, faces); or a mesh of trimesh, Open3D or PyVista, of which
+        vertices and faces are used. vertices: (v, 3); float32 is stored as float32, other types as float64.
+        faces: (f, 3) integers.
+    overwrite: replace an existing file. False: raise ExistingFileError, which is a FileExistsError.
     parts: as `ebpo convert --parts`: the parts to store, such as
         "mesh,maps,attributes,envelopes,leaf-planes,colours", or parts to omit with minus signs, such as
         "-maps,-colours"; or a list of such names. None: all except leaf-planes.
+    weld, weld_distance, orient, fill_holes, flip, drop_duplicates: repair the mesh, as the command
+        `ebpo convert` does with these options.
     rule: "nonzero", "evenodd" or "positive": the winding numbers that are inside.
+    max_level, leaf_faces, epsilon, seed: as in ebpo_build_options, ebpo/build.h. None: the default of the command;
+        files are then equal to those of the command byte for byte.
+    unit, crs, date: recorded in the file, such as "mm", "EPSG:25832" and "2026-03-01".
     codec: "zstd", "deflate" or "none".
     memory: budget in bytes for the process; the rest is stored in temporary files in temp_dir. None: half
         of the machine's memory.
-    options: weld, orient, fill_holes, flip, drop_duplicates, weld_distance: repair the mesh; max_level, leaf_faces,
-        epsilon, require_solid, seed, unit, crs, date as in ebpo_build_options, ebpo/build.h. Defaults are
-        those of the command `ebpo convert`; the files are then equal byte for byte.
 
-    Warns of data that is lost while reading, such as digits that a PLY's floats do not keep.
+    Warns of data that is lost while reading, such as digits that a PLY's floats do not keep, and of an unknown unit.
 
     Raises NotSolidError with require_solid, UnsupportedError when the library was built without libhdf5,
-    FormatError, IOFailure.
+    FormatError, IOFailure (a missing mesh: MissingFileError, which is a FileNotFoundError).
 
     >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
     >>> m = convert((corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]), "corner.ebpo.h5")
     >>> m.info.solid, m.info.face_count
     (True, 4)
     """
-    unknown = set(options) - {*PREPARE, *BUILD}
-    if unknown:
-        raise TypeError(f"convert() has no option {', '.join(sorted(unknown))}")
-    if options.get("date") and not lib.ebpo_is_date(options["date"]):
-        raise ValueError(f"date: {options['date']!r} is not a valid date in ISO 8601, such as 2026-11-26")
+    if date and not lib.ebpo_is_date(date):
+        raise ValueError(f"date: {date!r} is not a valid date in ISO 8601, such as 2026-11-26")
     for what, given, known in (("rule", rule, RULES), ("codec", codec, CODECS)):
         if given not in known:
             raise ValueError(f"{what}: expected one of {', '.join(map(repr, known))}, not {given!r}")
     stored = parts_of(parts)
     call("ebpo_register_filters")  # fails before the work when the library has no libhdf5
+    if not overwrite and os.path.lexists(output):
+        name = os.fsdecode(output)
+        raise ExistingFileError(f"{name}: the file exists; replace it with overwrite=True, or give another name",
+                                "EBPO_E_IO", name)
     call("ebpo_check_output", path(output, "output"))
     space = made(c.ebpo_workspace_options, memory=size_in_bytes(memory),
                  temp_dir=None if temp_dir is None else path(temp_dir, "temp_dir"))
@@ -69,20 +82,29 @@ def convert(mesh: Any, output: Any, *, parts: Any = None, rule: str = "nonzero",
     with Reporter(progress) as reported:
         common = {"threads": threads or 0, "progress": reported}
         read = read_mesh(mesh, workspace, bool(stored & c.EBPO_PART_ATTRIBUTES), common)
-        prepare = made(c.ebpo_prepare_options, **common, **{n: options[n] for n in PREPARE if n in options})
+        prepare = made(c.ebpo_prepare_options, weld=weld, orient=orient, fill_holes=fill_holes, flip=flip,
+                       drop_duplicates=drop_duplicates, **given_of(weld_distance=weld_distance), **common)
         prepared = made(c.ebpo_prepared)
         call("ebpo_mesh_prepare", read, ctypes.byref(prepare), ctypes.byref(prepared))
-        build = made(c.ebpo_build_options, parts=stored, rule=RULES[rule], **common,
-                     **{n: options[n] for n in BUILD if options.get(n) is not None})
+        build = made(c.ebpo_build_options, parts=stored, rule=RULES[rule], require_solid=require_solid,
+                     **given_of(max_level=max_level, leaf_faces=leaf_faces, epsilon=epsilon, seed=seed, unit=unit,
+                                crs=crs, date=date), **common)
         tree = Struct(c.ebpo_tree, "ebpo_tree_free", workspace)
         call("ebpo_build", read, ctypes.byref(prepared.report), ctypes.byref(prepared.record),
              ctypes.byref(build), tree)
         write = made(c.ebpo_write_options, codec=CODECS[codec], codec_level=codec_level, **common)
         call("ebpo_tree_write", tree, path(output, "output"), ctypes.byref(write))
+    if unit and unit not in UNITS:
+        warnings.warn(f"unit: {unit!r} is not a known unit of length, such as 'mm'; it is stored as it is", stacklevel=2)
     return open_model(output)
 
 
-def parts_of(parts: Any) -> int:
+def given_of(**values: Any) -> dict[str, Any]:
+    """Return the values that are not None."""
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def parts_of(parts: str | Iterable[str] | None) -> int:
     """Return the bits of parts, which have the names of `ebpo convert --parts`. Raises ValueError for another list."""
     if parts is None:
         return DEFAULT_PARTS
@@ -103,7 +125,7 @@ def parts_of(parts: Any) -> int:
     return sum(PARTS[name] for name in names)
 
 
-def read_mesh(mesh: Any, workspace: Handle, attributes: bool, common: dict) -> Struct:
+def read_mesh(mesh: AnyMesh, workspace: Handle, attributes: bool, common: dict[str, Any]) -> Struct:
     """Return an ebpo_mesh of a file, or of arrays."""
     if isinstance(mesh, (str, bytes, os.PathLike)):
         options = made(c.ebpo_mesh_read_options, attributes=attributes, workspace=workspace.pointer, **common)
@@ -113,7 +135,8 @@ def read_mesh(mesh: Any, workspace: Handle, attributes: bool, common: dict) -> S
         if ignored:
             warnings.warn(f"{os.fsdecode(mesh)}: not read: {ignored.decode()}", stacklevel=3)
         return read
-    vertices, faces = map(np.asarray, mesh)
+    from .adapters import arrays_of
+    vertices, faces = arrays_of(mesh)
     if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
         raise ValueError(f"vertices are (v, 3) and faces (f, 3), not {vertices.shape} and {faces.shape}")
     faces = integers(faces, np.uint32, "faces")

@@ -8,22 +8,25 @@ import pathlib
 import re
 import threading
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, Callable, Iterator, NamedTuple
+from typing import Any, Callable, Iterable, Iterator, NamedTuple, Sequence
 
 import numpy as np
 
 from . import _declared as c
 from ._checked import path as path_bytes
-from ._checked import real
 from ._library import Handle, Reporter, call, lib, made
 from ._declared import Where
 from .queries import Rows, thread_count
+from .ray_queries import rays_of
+from .signatures import ArrayLike, Bools, HttpOptions, Int32s, NanPolicy, RuleName, Size
+from .signatures import Rows as Structured
 from .errors import ArgumentError, Error
+from .forks import renew_after_fork
 from .open_models import CLOSE_FILE, OPEN_FILE, opened_by, opener, process_models, raised_by
 
 BLOCK = 1 << 22  # rows of one library call, which sorts them; two copies of their results are in memory
 LONG = 1 << 14  # calls of more rows run in a thread that an interrupt can stop
-RULES = ("nonzero", "evenodd", "positive")
+RULES: tuple[RuleName, ...] = ("nonzero", "evenodd", "positive")
 
 NEAREST = np.dtype([("distance", "f8"), ("point", "f8", 3), ("normal", "f8", 3), ("face", "i8"), ("model", "i8")])
 HIT = np.dtype([("t", "f8"), ("face", "i8"), ("side", "i4"), ("model", "i4")])
@@ -66,22 +69,28 @@ class Catalogue:
     array([2, 0], dtype=int32)
     """
 
-    def __init__(self, entries: list[Entry], *, parts: bool = False, rule: str = "nonzero", **options: Any) -> None:
+    def __init__(self, entries: Sequence[Entry], *, parts: bool = False, rule: RuleName = "nonzero",
+                 http: HttpOptions | None = None) -> None:
         if not entries:
             raise ValueError("a catalogue needs at least one model")
         if rule not in RULES:
             raise ValueError(f"rule is 'nonzero', 'evenodd' or 'positive', not {rule!r}")
-        self.entries, self.parts, self.rule, self.options = list(entries), parts, rule, options
+        self.entries, self.parts, self.rule = list(entries), parts, rule
+        self.options: dict[str, Any] = dict(http or {})
+        renew_after_fork(self)
 
     # ---- files ----
 
     @classmethod
-    def of(cls, paths: Any, *, parts: bool = False, rule: str = "nonzero", **options: Any) -> Catalogue:
+    def of(cls, paths: Iterable[str | os.PathLike[str]], *, parts: bool = False, rule: RuleName = "nonzero",
+           http: HttpOptions | None = None) -> Catalogue:
         """Return a catalogue of paths and URLs, in this order. Opens each file for its box and digest.
 
-        options: options for URLs, as for `ebpo.open`.
+        http: options for URLs, as for `ebpo.open`: {"headers": {"Name": "value"}}.
         """
-        def entry(path: Any) -> Entry:
+        options: dict[str, Any] = dict(http or {})
+
+        def entry(path: str | os.PathLike[str]) -> Entry:
             name = os.fspath(path)
             name = name if "://" in name else os.path.join(os.getcwd(), name)
             file, entry, kept = opened_by(name, options), c.ebpo_catalogue_entry(), path_bytes(name)
@@ -89,10 +98,10 @@ class Catalogue:
             return entry_of(entry)
 
         with ThreadPoolExecutor(8) as pool:
-            return cls(list(pool.map(entry, paths)), parts=parts, rule=rule, **options)
+            return cls(list(pool.map(entry, paths)), parts=parts, rule=rule, http=http)
 
     @classmethod
-    def open(cls, path: Any, **options: Any) -> Catalogue:
+    def open(cls, path: str | os.PathLike[str], *, http: HttpOptions | None = None) -> Catalogue:
         """Open a file that `ebpo catalogue` or `save` has written. Raises FormatError, VersionError, IOFailure."""
         name = path_bytes(pathlib.Path(path).absolute())
         read = Handle.made("ebpo_catalogue_open", name, None, free="ebpo_catalogue_free")
@@ -100,9 +109,9 @@ class Catalogue:
         lib.ebpo_catalogue_get_facts(read, ctypes.byref(facts))
         entries = [entry_of(c.ebpo_catalogue_entry.from_address(lib.ebpo_catalogue_get_entry(read, i)))
                    for i in range(facts.count)]
-        return cls(entries, parts=facts.parts, rule=RULES[facts.rule], **options)
+        return cls(entries, parts=facts.parts, rule=RULES[facts.rule], http=http)
 
-    def save(self, path: Any) -> None:
+    def save(self, path: str | os.PathLike[str]) -> None:
         """Save the catalogue as a file, which is replaced atomically. Paths in its folder and below become relative."""
         call("ebpo_catalogue_save", self._made, path_bytes(pathlib.Path(path).absolute()))
 
@@ -117,8 +126,17 @@ class Catalogue:
         return Handle.made("ebpo_catalogue_new", ctypes.addressof(structs), len(self), ctypes.byref(options),
                            free="ebpo_catalogue_free")
 
-    def __getstate__(self) -> dict:
+    def _renew(self) -> None:
+        made = self.__dict__.pop("_made", None)
+        if made is not None:
+            made.forget()
+
+    def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in self.__dict__.items() if name != "_made"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        renew_after_fork(self)
 
     def __dask_tokenize__(self) -> tuple:
         """Return the data that determine results, equal in every process."""
@@ -132,7 +150,7 @@ class Catalogue:
 
     # ---- queries ----
 
-    def _query(self, function: str, count: int, rows: Callable, result: Any, memory: int | str | None,
+    def _query(self, function: str, count: int, rows: Callable[[int, int], np.ndarray], result: Any, memory: Size | None,
                threads: int | None, **options: Any) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
         """Run a library function on blocks rows(begin, end); yield each slice with results and model indices."""
         models, limit = process_models(memory).models, min(count, BLOCK)
@@ -153,7 +171,8 @@ class Catalogue:
                 raise numbered(raised_by(error), begin) from None
             yield slice(begin, end), results[:end - begin], numbers[:end - begin]
 
-    def locate(self, points: Any, *, memory: int | str | None = None, threads: int | None = None) -> np.ndarray:
+    def locate(self, points: ArrayLike, *, nan: NanPolicy = "raise", memory: Size | None = None,
+               threads: int | None = None) -> Structured:
         """Classify points. Returns a structured array (n,): `where` as in `Model.locate`, and `winding`, the sum.
 
         For parts, the result is exactly that of the whole model, also on caps. For other models, `where` is IN
@@ -163,30 +182,33 @@ class Catalogue:
 
         Raises NotSolidError if a model is a surface.
         """
-        rows = Rows(points)
+        rows = Rows(points, nan=nan)
         out = np.empty(rows.count, LOCATED)
         for where, results, _ in self._query("ebpo_catalogue_inside", rows.count, lambda a, b: rows[a:b],
                                              c.ebpo_inside_result, memory, threads):
             for name in LOCATED.names or ():
                 out[name][where] = results[name]
-        return out[0] if rows.single else out
+        return rows.result(out, (Where.MAYBE, 0))
 
-    def inside(self, points: Any, *, boundary: bool = True, memory: int | str | None = None,
-               threads: int | None = None) -> Any:
+    def inside(self, points: ArrayLike, *, boundary: bool = True, nan: NanPolicy = "raise", memory: Size | None = None,
+               threads: int | None = None) -> Bools:
         """Return True for points inside: (n,) bool. boundary: the result on faces. Raises the errors of `locate`."""
-        where = self.locate(points, memory=memory, threads=threads)["where"]
-        return where != Where.OUT if boundary else where == Where.IN
+        where = self.locate(points, nan=nan, memory=memory, threads=threads)["where"]
+        inside: Bools = (where == Where.IN) | ((where == Where.ON) & boundary)
+        return inside
 
-    def winding(self, points: Any, *, memory: int | str | None = None, threads: int | None = None) -> Any:
+    def winding(self, points: ArrayLike, *, nan: NanPolicy = "raise", memory: Size | None = None,
+                threads: int | None = None) -> Int32s:
         """Return the sums of winding numbers: (n,) int32. Raises the errors of `locate`."""
-        return self.locate(points, memory=memory, threads=threads)["winding"].copy()
+        winding: Int32s = self.locate(points, nan=nan, memory=memory, threads=threads)["winding"].copy()
+        return winding
 
     def _need_surface(self) -> None:
         if all(entry.surface is None for entry in self.entries):
             raise ValueError("the catalogue contains only caps and no surface")
 
-    def distance(self, points: Any, *, max_distance: float = float("inf"), signed: bool = True,
-                 memory: int | str | None = None, threads: int | None = None) -> np.ndarray:
+    def distance(self, points: ArrayLike, *, max_distance: float = float("inf"), signed: bool = True,
+                 nan: NanPolicy = "raise", memory: Size | None = None, threads: int | None = None) -> Structured:
         """Return the nearest face of any model: a structured array (n,).
 
         Its fields are those of `Model.distance`, and `model`, the index of the model.
@@ -195,7 +217,7 @@ class Catalogue:
         at the same rounded distance the first is used.
         """
         self._need_surface()
-        rows = Rows(points)
+        rows = Rows(points, nan=nan)
         out = np.empty(rows.count, NEAREST)
         for where, results, models in self._query("ebpo_catalogue_distance", rows.count, lambda a, b: rows[a:b],
                                                   c.ebpo_distance_result, memory, threads,
@@ -203,31 +225,20 @@ class Catalogue:
             for name in ("distance", "point", "normal"):
                 out[name][where] = results[name]
             out["face"][where], out["model"][where] = results["face"].view(np.int64), models.view(np.int64)
-        return out[0] if rows.single else out
+        return rows.result(out, (np.nan, np.nan, np.nan, -1, -1))
 
-    def ray(self, origins: Any, directions: Any, *, t_max: float = float("inf"), memory: int | str | None = None,
-            threads: int | None = None) -> np.ndarray:
-        """Return the first face that each ray hits: a structured array (n,), the fields of `Model.ray`, and `model`."""
+    def ray(self, origins: ArrayLike, directions: ArrayLike, *, t_max: ArrayLike = float("inf"),
+            nan: NanPolicy = "raise", memory: Size | None = None, threads: int | None = None) -> Structured:
+        """Return the first face that each ray hits: a structured array (...), the fields of `Model.ray`, and `model`."""
         self._need_surface()
-        o, d = Rows(origins, "origins"), Rows(directions, "directions")
-        count = d.count if o.single else o.count
-        if o.count != d.count and not (o.single or d.single):
-            raise ValueError(f"{o.count} origins and {d.count} directions")
-        limit = real(t_max, "t_max")
-
-        def rays(begin: int, end: int) -> np.ndarray:
-            rows = np.empty((end - begin, 7))
-            rows[:, 0:3] = o[0:1] if o.single else o[begin:end]
-            rows[:, 3:6] = d[0:1] if d.single else d[begin:end]
-            rows[:, 6] = limit
-            return rows
-
-        out = np.empty(count, HIT)
-        for where, results, models in self._query("ebpo_catalogue_ray", count, rays, c.ebpo_ray_hit, memory, threads):
+        rays = rays_of(origins, directions, t_max, nan)
+        out = np.empty(rays.count, HIT)
+        for where, results, models in self._query("ebpo_catalogue_ray", rays.count, rays.block, c.ebpo_ray_hit, memory,
+                                                  threads):
             for name in ("t", "side"):
                 out[name][where] = results[name]
             out["face"][where], out["model"][where] = results["face"].view(np.int64), models.view(np.int64)
-        return out[0] if o.single and d.single else out
+        return rays.result(out, (np.nan, -1, 0, -1))
 
 
 def interruptible(work: Callable[[Any], None], rows: int) -> None:
@@ -235,7 +246,8 @@ def interruptible(work: Callable[[Any], None], rows: int) -> None:
     if rows < LONG or threading.current_thread() is not threading.main_thread():
         work(c.ebpo_progress())
         return
-    stopped, ended, once, failed = threading.Event(), threading.Event(), threading.Lock(), []
+    stopped, ended, once = threading.Event(), threading.Event(), threading.Lock()
+    failed: list[BaseException] = []
 
     def body() -> None:
         if not once.acquire(blocking=False):  # after an interrupt of start() the thread may be started twice

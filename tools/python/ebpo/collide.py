@@ -4,13 +4,19 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import threading
-from typing import Any, Callable, Iterator, NamedTuple
+from typing import TYPE_CHECKING, Any, Iterator, NamedTuple, Union
 
 import numpy as np
 
 from . import _declared as c
 from ._checked import doubles, nanoseconds
 from ._library import Callback, Handle, Reporter, call, copied, made, size_in_bytes
+from .forks import renew_after_fork
+from .signatures import ArrayLike, Doubles, Int32s, Int64s, Progress, Size
+
+if TYPE_CHECKING:
+    from .model import Model
+    Pose = Union[c.ebpo_pose, ArrayLike]
 
 PAIR = np.dtype(c.ebpo_face_pair)
 SEGMENT = np.dtype(c.ebpo_contact_segment)
@@ -22,9 +28,9 @@ class Pairs(NamedTuple):
     face_a, face_b: (k,) int64, face indices of the sources. kind: (k,) int32, a PairKind.
     """
 
-    face_a: np.ndarray
-    face_b: np.ndarray
-    kind: np.ndarray
+    face_a: Int64s
+    face_b: Int64s
+    kind: Int32s
 
 
 class Contacts(NamedTuple):
@@ -33,9 +39,9 @@ class Contacts(NamedTuple):
     points: (k, 2, 3) float64, both ends of each segment. face_a, face_b: (k,) int64.
     """
 
-    points: np.ndarray
-    face_a: np.ndarray
-    face_b: np.ndarray
+    points: Doubles
+    face_a: Int64s
+    face_b: Int64s
 
 
 class Clearance(NamedTuple):
@@ -49,8 +55,8 @@ class Clearance(NamedTuple):
     hi: float
     face_a: int
     face_b: int
-    point_a: np.ndarray
-    point_b: np.ndarray
+    point_a: Doubles
+    point_b: Doubles
 
 
 class Separation(NamedTuple):
@@ -70,7 +76,8 @@ def number(face: int) -> int:
     return -1 if face == c.EBPO_NO_FACE else face
 
 
-def pose(rotation: Any = None, translation: Any = None, scale: float = 1.0, quaternion: Any = None) -> Any:
+def pose(rotation: ArrayLike | None = None, translation: ArrayLike | None = None, scale: float = 1.0,
+         quaternion: ArrayLike | None = None) -> c.ebpo_pose:
     """Return a pose of a model: x becomes rotation (scale x) + translation.
 
     rotation: (3, 3).
@@ -134,6 +141,10 @@ class Gathered(Callback):
         return np.concatenate(self.parts)
 
 
+def _again(a: Model, b: Model, threads: int | None, memory: Size | None) -> Collider:
+    return Collider(a, b, threads=threads, memory=memory)
+
+
 class Collider:
     """Two models at poses, or one model twice. Decisions are exact for the posed coordinates.
 
@@ -152,16 +163,35 @@ class Collider:
     2.0
     """
 
-    def __init__(self, a: Any, b: Any, *, threads: int | None = None, memory: int | str | None = None) -> None:
+    def __init__(self, a: Model, b: Model, *, threads: int | None = None, memory: Size | None = None) -> None:
+        self._arguments = a, b, threads, memory
+        self._lock = threading.Lock()
+        self._made: Handle | None = self._make()
+        renew_after_fork(self)
+
+    def _make(self) -> Handle:
+        a, b, threads, memory = self._arguments
         options = made(c.ebpo_collider_options, threads=threads or 0, memory=size_in_bytes(memory))
         models = a.model, b.model
-        self._handle = Handle.made("ebpo_collider_new", *models, ctypes.byref(options),
-                                   free="ebpo_collider_free", keep=models)
-        self._lock = threading.Lock()
+        return Handle.made("ebpo_collider_new", *models, ctypes.byref(options), free="ebpo_collider_free", keep=models)
+
+    def _renew(self) -> None:
+        if self._made is not None:
+            self._made.forget()
+        self._made, self._lock = None, threading.Lock()
+
+    @property
+    def _handle(self) -> Handle:
+        if self._made is None:
+            self._made = self._make()
+        return self._made
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _again, self._arguments
 
     @contextlib.contextmanager
-    def _options(self, poses: tuple, deadline: float | None = None, progress: Callable | None = None,
-                 level: int | None = None) -> Iterator[Any]:
+    def _options(self, poses: tuple[Pose | None, Pose | None], deadline: float | None = None,
+                 progress: Progress | None = None, level: int | None = None) -> Iterator[Any]:
         with self._lock, Reporter(progress) as reported:
             options = made(c.ebpo_collide_options, pose_a=pose_of(poses[0]), pose_b=pose_of(poses[1]),
                            deadline_ns=nanoseconds(deadline or 0), progress=reported)
@@ -169,7 +199,7 @@ class Collider:
                 options.level = level
             yield ctypes.byref(options)
 
-    def first(self, pose_a: Any = None, pose_b: Any = None) -> tuple[int, int, c.PairKind] | None:
+    def first(self, pose_a: Pose | None = None, pose_b: Pose | None = None) -> tuple[int, int, c.PairKind] | None:
         """Return one pair of intersecting faces: face of a, face of b, kind.
 
         Returns None when no faces intersect. A solid may nevertheless be inside the other.
@@ -182,25 +212,25 @@ class Collider:
             call("ebpo_collide_first", self._handle, options, ctypes.byref(pair), ctypes.byref(found))
         return (pair.face_a, pair.face_b, c.PairKind(pair.kind)) if found.value == 1 else None
 
-    def relation(self, pose_a: Any = None, pose_b: Any = None, *, deadline: float | None = None) -> c.Relation:
+    def relation(self, pose_a: Pose | None = None, pose_b: Pose | None = None, *, deadline: float | None = None) -> c.Relation:
         """Return the exact Relation of the models. deadline: time limit in seconds; then the result may be OPEN."""
         result = c.ebpo_relation_result()
         with self._options((pose_a, pose_b), deadline) as options:
             call("ebpo_collide_relation", self._handle, options, ctypes.byref(result))
         return c.Relation(result.relation)
 
-    def _pairs(self, function: str, poses: tuple, progress: Callable | None) -> Pairs:
+    def _pairs(self, function: str, poses: tuple[Pose | None, Pose | None], progress: Progress | None) -> Pairs:
         found = Gathered(c.ebpo_pairs_fn, PAIR)
         with self._options(poses, None, progress) as options, found as taking:
             call(function, self._handle, options, taking, None)
         pairs = found.array
         return Pairs(pairs["face_a"].astype(np.int64), pairs["face_b"].astype(np.int64), pairs["kind"].copy())
 
-    def pairs(self, pose_a: Any = None, pose_b: Any = None, *, progress: Callable | None = None) -> Pairs:
+    def pairs(self, pose_a: Pose | None = None, pose_b: Pose | None = None, *, progress: Progress | None = None) -> Pairs:
         """Return every pair of intersecting faces, once."""
         return self._pairs("ebpo_collide_all", (pose_a, pose_b), progress)
 
-    def self_pairs(self, *, progress: Callable | None = None) -> Pairs:
+    def self_pairs(self, *, progress: Progress | None = None) -> Pairs:
         """Return the pairs of faces of one model that intersect and are not just neighbours.
 
         The collider must consist of the same model twice.
@@ -210,7 +240,7 @@ class Collider:
         """
         return self._pairs("ebpo_collide_self", (None, None), progress)
 
-    def contacts(self, pose_a: Any = None, pose_b: Any = None, *, progress: Callable | None = None) -> Contacts:
+    def contacts(self, pose_a: Pose | None = None, pose_b: Pose | None = None, *, progress: Progress | None = None) -> Contacts:
         """Return the intersections: a segment for each pair of crossing faces."""
         found = Gathered(c.ebpo_segments_fn, SEGMENT)
         with self._options((pose_a, pose_b), None, progress) as options, found as taking:
@@ -219,7 +249,7 @@ class Collider:
         return Contacts(all_of_them["point"].copy(), all_of_them["face_a"].astype(np.int64),
                         all_of_them["face_b"].astype(np.int64))
 
-    def polylines(self, pose_a: Any = None, pose_b: Any = None) -> list[np.ndarray]:
+    def polylines(self, pose_a: Pose | None = None, pose_b: Pose | None = None) -> list[Doubles]:
         """Return the intersection lines: (k, 3) points each; in a closed line the last point equals the first.
 
         >>> len(Collider(cube, cube).polylines(pose_b=pose(translation=[.5, .25, .25])))
@@ -236,7 +266,7 @@ class Collider:
             call("ebpo_collide_polylines", self._handle, options, taking, None)
         return lines
 
-    def distance(self, pose_a: Any = None, pose_b: Any = None, *, tolerance: float = 0.0,
+    def distance(self, pose_a: Pose | None = None, pose_b: Pose | None = None, *, tolerance: float = 0.0,
                  deadline: float | None = None) -> Clearance:
         """Return the least distance between the faces. It is 0 if any intersect, and not negative inside a solid.
 
@@ -249,7 +279,8 @@ class Collider:
         return Clearance(out.distance.lo, out.distance.hi, number(out.pair.face_a), number(out.pair.face_b),
                          np.array(out.point_a), np.array(out.point_b))
 
-    def depth(self, tolerance: float, pose_a: Any = None, pose_b: Any = None) -> tuple[tuple, tuple]:
+    def depth(self, tolerance: float, pose_a: Pose | None = None, pose_b: Pose | None = None
+              ) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return the depth of a's surface in b, and of b's surface in a: (lo, hi) each, at most `tolerance` apart.
 
         >>> (lo, hi), _ = Collider(cube, cube).depth(.01, pose_b=pose(translation=[.75, 0, 0]))
@@ -261,7 +292,8 @@ class Collider:
             call("ebpo_collide_depth", self._handle, options, tolerance, ctypes.byref(a_in_b), ctypes.byref(b_in_a))
         return (a_in_b.lo, a_in_b.hi), (b_in_a.lo, b_in_a.hi)
 
-    def separation(self, direction: Any, pose_a: Any = None, pose_b: Any = None) -> Separation:
+    def separation(self, direction: ArrayLike, pose_a: Pose | None = None,
+                   pose_b: Pose | None = None) -> Separation:
         """Return the separation distance of a from b along a direction, in multiples of the direction's length.
 
         >>> Collider(cube, cube).separation([1, 0, 0], pose_b=pose(translation=[-.25, 0, 0])).hi

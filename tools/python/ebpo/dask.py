@@ -19,7 +19,7 @@ import json
 import os
 import pathlib
 import shutil
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Iterable, Literal, NamedTuple, Union
 
 import numpy as np
 
@@ -28,6 +28,15 @@ from .catalogue import Catalogue
 from .errors import ArgumentError
 from .open_models import process_models
 from .point_files import HDF5, PointFile, h5py_of, load_npy, published, save_array, shape_of_npy
+from .signatures import ArrayLike, HttpOptions, NanPolicy, Size
+
+if TYPE_CHECKING:
+    from dask.array import Array as DaskArray
+    from distributed import Client
+    PointSet = Union[DaskArray, str, "os.PathLike[str]", ArrayLike]
+    Models = Union[Catalogue, str, "os.PathLike[str]", Iterable[Union[str, "os.PathLike[str]"]]]
+
+Query = Literal["inside", "winding", "locate", "distance", "ray"]
 
 CHUNK = 1 << 18  # points of one task
 DTYPES = {"inside": np.dtype(bool), "winding": np.dtype("i4"), "locate": cat.LOCATED, "distance": cat.NEAREST,
@@ -37,36 +46,36 @@ DTYPES = {"inside": np.dtype(bool), "winding": np.dtype("i4"), "locate": cat.LOC
 class Nearest(NamedTuple):
     """dask arrays of `Catalogue.distance`: distance (n,), point (n, 3), normal (n, 3), face (n,), model (n,)."""
 
-    distance: Any
-    point: Any
-    normal: Any
-    face: Any
-    model: Any
+    distance: DaskArray
+    point: DaskArray
+    normal: DaskArray
+    face: DaskArray
+    model: DaskArray
 
 
 class Hits(NamedTuple):
     """dask arrays of `Catalogue.ray`: t, face, side, model, each (n,)."""
 
-    t: Any
-    face: Any
-    side: Any
-    model: Any
+    t: DaskArray
+    face: DaskArray
+    side: DaskArray
+    model: DaskArray
 
 
-def catalogue(model: Any, **options: Any) -> Catalogue:
+def catalogue(model: Models, http: HttpOptions | None = None) -> Catalogue:
     """Return a catalogue of a Catalogue, its path (.json), a path or URL of a model, or a list of paths and URLs."""
     if isinstance(model, Catalogue):
         return model
     if isinstance(model, (str, os.PathLike)):
         if os.fspath(model).endswith(".json"):
-            return Catalogue.open(model, **options)
-        return Catalogue.of([model], **options)
+            return Catalogue.open(os.fspath(model), http=http)
+        return Catalogue.of([model], http=http)
     if isinstance(model, (list, tuple)):
-        return Catalogue.of(model, **options)
+        return Catalogue.of(model, http=http)
     raise TypeError(f"{type(model).__name__}: expected a path, a URL, a list of paths and URLs, or a Catalogue")
 
 
-def points(source: Any, dataset: str | None = None, *, chunk: int = CHUNK, columns: int = 3) -> Any:
+def points(source: PointSet, dataset: str | None = None, *, chunk: int = CHUNK, columns: int = 3) -> DaskArray:
     """Return a dask array (n, columns) of the points in a file. Workers read `chunk` rows at a time.
 
     source: the path of a .npy, an HDF5 file (with h5py; `dataset`, or the only suitable one), or raw
@@ -121,8 +130,10 @@ def query_block(block: np.ndarray, what: str, models: Catalogue, means: Means, o
         raise
 
 
-def query(what: str, model: Any, rows: Any, *, dataset: str | None = None, chunk: int = CHUNK,
-          memory: int | str | None = None, threads: int = 1, http: dict | None = None, **options: Any) -> Any:
+def query(what: Query, model: Models, rows: PointSet, *, boundary: bool | None = None, signed: bool | None = None,
+          max_distance: float | None = None, t_max: float | None = None, nan: NanPolicy | None = None,
+          dataset: str | None = None, chunk: int = CHUNK, memory: Size | None = None, threads: int = 1,
+          http: HttpOptions | None = None) -> DaskArray:
     """Return a dask array (n,) of results: bool, int32, or structured (`catalogue.LOCATED`, NEAREST, HIT).
 
     what: "inside", "winding", "locate", "distance" or "ray".
@@ -131,7 +142,7 @@ def query(what: str, model: Any, rows: Any, *, dataset: str | None = None, chunk
     memory: budget in bytes for all models of a worker process, from then on; initially 1 GiB.
     threads: number of threads for each chunk, in addition to the threads of Dask's workers.
     http: options for URLs, such as headers.
-    options: those of the method of Catalogue, such as boundary=False, max_distance, signed, t_max.
+    boundary ... nan: arguments of the method of Catalogue. None: its default.
 
     Errors state the number of a point among all `rows`. When Dask does not know the sizes of chunks, the
     number is that within the chunk.
@@ -139,43 +150,56 @@ def query(what: str, model: Any, rows: Any, *, dataset: str | None = None, chunk
     import dask.array as da
     if what not in DTYPES:
         raise ValueError(f"what={what!r}: only {', '.join(DTYPES)} can be queried")
-    models = catalogue(model, **(http or {}))
+    models = catalogue(model, http)
+    options = {name: value for name, value in [("boundary", boundary), ("max_distance", max_distance), ("nan", nan),
+                                               ("signed", signed), ("t_max", t_max)] if value is not None}
     given = points(rows, dataset, chunk=chunk, columns=6 if what == "ray" else 3)
     columns = 6 if what == "ray" else 3
     if given.ndim != 2 or given.shape[1] != columns:
         raise ValueError(f"{what} takes the shape (n, {columns}), not {given.shape}")
-    return da.map_blocks(query_block, given, what, models, Means(memory, threads), tuple(sorted(options.items())),
+    return da.map_blocks(query_block, given, what, models, Means(memory, threads), tuple(options.items()),
                          dtype=DTYPES[what], drop_axis=1, name=f"ebpo-{what}", meta=np.zeros(0, DTYPES[what]))
 
 
-def inside(model: Any, rows: Any, **options: Any) -> Any:
-    """Return True for points inside: a dask array (n,) of bool. Options: those of `query`, and boundary."""
-    return query("inside", model, rows, **options)
+def inside(model: Models, rows: PointSet, *, boundary: bool = True, nan: NanPolicy = "raise",
+           dataset: str | None = None, chunk: int = CHUNK, memory: Size | None = None, threads: int = 1,
+           http: HttpOptions | None = None) -> DaskArray:
+    """Return True for points inside: a dask array (n,) of bool. Arguments are those of `query`."""
+    return query("inside", model, rows, boundary=boundary, nan=nan, dataset=dataset, chunk=chunk, memory=memory,
+                 threads=threads, http=http)
 
 
-def winding(model: Any, rows: Any, **options: Any) -> Any:
-    """Return winding numbers, summed over models: a dask array (n,) of int32. Options are those of `query`."""
-    return query("winding", model, rows, **options)
+def winding(model: Models, rows: PointSet, *, nan: NanPolicy = "raise", dataset: str | None = None, chunk: int = CHUNK,
+            memory: Size | None = None, threads: int = 1, http: HttpOptions | None = None) -> DaskArray:
+    """Return winding numbers, summed over models: a dask array (n,) of int32. Arguments are those of `query`."""
+    return query("winding", model, rows, nan=nan, dataset=dataset, chunk=chunk, memory=memory, threads=threads,
+                 http=http)
 
 
-def distance(model: Any, rows: Any, **options: Any) -> Nearest:
-    """Return nearest faces. Options: those of `query`, max_distance, signed. For files use `query("distance", ...)`."""
-    return Nearest(*members(query("distance", model, rows, **options)))
+def distance(model: Models, rows: PointSet, *, max_distance: float = float("inf"), signed: bool = True,
+             nan: NanPolicy = "raise", dataset: str | None = None, chunk: int = CHUNK, memory: Size | None = None,
+             threads: int = 1, http: HttpOptions | None = None) -> Nearest:
+    """Return nearest faces. Arguments are those of `query`. For files use `query("distance", ...)`."""
+    return Nearest(*members(query("distance", model, rows, max_distance=max_distance, signed=signed, nan=nan,
+                                  dataset=dataset, chunk=chunk, memory=memory, threads=threads, http=http)))
 
 
-def ray(model: Any, origins: Any, directions: Any, **options: Any) -> Hits:
-    """Return the first hits of rays. Options: those of `query`, and t_max.
+def ray(model: Models, origins: DaskArray | ArrayLike, directions: DaskArray | ArrayLike, *,
+        t_max: float = float("inf"), nan: NanPolicy = "raise", chunk: int = CHUNK, memory: Size | None = None,
+        threads: int = 1, http: HttpOptions | None = None) -> Hits:
+    """Return the first hits of rays. Arguments are those of `query`.
 
     origins: dask or numpy (n, 3). directions: the same, or (3,).
     """
     import dask.array as da
-    o = points(origins, chunk=options.get("chunk", CHUNK))
+    o = points(origins, chunk=chunk)
     if isinstance(directions, da.Array) or np.ndim(directions) == 2:
         d = points(directions).rechunk((o.chunks[0], 3))
     else:
         d = da.broadcast_to(da.from_array(np.asarray(directions, np.float64)), o.shape, chunks=o.chunks)
     rays = da.concatenate([o, d], axis=1).rechunk({1: 6})
-    return Hits(*members(query("ray", model, rays, **options)))
+    return Hits(*members(query("ray", model, rays, t_max=t_max, nan=nan, chunk=chunk, memory=memory, threads=threads,
+                               http=http)))
 
 
 def members(rows: Any) -> list:
@@ -189,7 +213,7 @@ def member(block: np.ndarray, name: str) -> np.ndarray:
     return np.ascontiguousarray(block[name])
 
 
-def stats(client: Any = None) -> Any:
+def stats(client: Client | None = None) -> dict[str, Any]:
     """Return `open_models.OpenModels.stats` of this process, or a dict with those of each worker of the client."""
     return process_models().stats() if client is None else client.run(worker_stats)
 
@@ -200,7 +224,8 @@ def worker_stats() -> dict:
 
 # ---- files of results ----
 
-def to_file(results: Any, path: Any, *, dataset: str = "results", **compute: Any) -> None:
+def to_file(results: DaskArray, path: str | os.PathLike[str], *, dataset: str = "results",
+            scheduler: str | Client | None = None) -> None:
     """Compute a dask array into a file: .npy, HDF5 (.h5, with h5py), or, for another name, a folder.
 
     Workers write their chunks to the folder PATH.parts, which they must share with this process. Each chunk
@@ -210,7 +235,7 @@ def to_file(results: Any, path: Any, *, dataset: str = "results", **compute: Any
     of the chunks 000000.npy and so on.
 
     results: one array, which may be structured, as `query` returns it.
-    compute: options of dask.compute, such as scheduler="threads".
+    scheduler: as for dask.compute, such as "threads" or a Client.
 
     Raises FileExistsError when the file exists.
     """
@@ -226,7 +251,7 @@ def to_file(results: Any, path: Any, *, dataset: str = "results", **compute: Any
     blocks = results.to_delayed().ravel()
     names = [folder / f"{i:06d}.npy" for i in range(len(blocks))]
     dask.compute(*[dask.delayed(save_part)(str(name), block) for name, block in zip(names, blocks)
-                   if not name.exists()], **compute)
+                   if not name.exists()], scheduler=scheduler)
     missing = [name for name in names if not name.exists()]
     if missing:
         raise FileNotFoundError(f"{missing[0]}: not found, but workers wrote it; all workers must share the folder")
@@ -236,7 +261,7 @@ def to_file(results: Any, path: Any, *, dataset: str = "results", **compute: Any
         shutil.rmtree(folder)
 
 
-def begin_parts(folder: pathlib.Path, results: Any) -> None:
+def begin_parts(folder: pathlib.Path, results: DaskArray) -> None:
     query = {"query": results.name, "chunks": results.numblocks[0], "dtype": repr(results.dtype)}
     folder.mkdir(parents=True, exist_ok=True)
     stated = folder / "query.json"

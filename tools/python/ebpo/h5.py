@@ -10,7 +10,7 @@ needs a plugin. One of these is sufficient:
     HDF5_PLUGIN_PATH=/usr/local/lib/hdf5/plugin python3 ...     # the plugin that this project installs
 
     import ebpo.h5
-    ebpo.h5.enable()                    # uses whichever of the two exists
+    ebpo.h5.enable()                    # uses whichever of the two exists, or the plugin in the wheel
 
 `ebpo --version --verbose` prints the folder of the project's plugin. Then `h5py` reads the file:
 
@@ -31,7 +31,10 @@ ZSTD = 32015
 
 
 def plugin_folder() -> str | None:
-    """Return the folder of the project's zstd plugin, which the `ebpo` in PATH prints, or None."""
+    """Return the folder of the project's zstd plugin: that in the wheel, or that which `ebpo` prints; or None."""
+    bundled = os.path.join(os.path.dirname(os.path.abspath(__file__)), "lib", "hdf5", "plugin")
+    if os.path.isdir(bundled):
+        return bundled
     try:
         printed = subprocess.run(["ebpo", "--version", "--verbose"], capture_output=True, text=True)
     except OSError:

@@ -2,13 +2,19 @@
 from __future__ import annotations
 
 import ctypes
-from typing import Any, NamedTuple
+import os
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from . import _declared as c
 from ._checked import doubles
-from ._library import Handle, call, lib, of_members
+from ._library import Handle, call, lib, made
+from .forks import renew_after_fork
+from .signatures import ArrayLike, Doubles
+
+if TYPE_CHECKING:
+    from .model import Model
 
 _STOPPED = c.EBPO_HAPTIC_STOPPED
 
@@ -16,11 +22,11 @@ _STOPPED = c.EBPO_HAPTIC_STOPPED
 class HapticResult(NamedTuple):
     """Result of a haptic step of a ball or a tool; see ebpo/haptic.h. face: -1: no face is near."""
 
-    proxy: np.ndarray
-    force: np.ndarray
-    torque: np.ndarray
-    turn: np.ndarray
-    normal: np.ndarray
+    proxy: Doubles
+    force: Doubles
+    torque: Doubles
+    turn: Doubles
+    normal: Doubles
     depth: float
     face: int
     flags: int
@@ -40,7 +46,7 @@ class ProbeResult(NamedTuple):
     distance: float
     lo: float
     hi: float
-    normal: np.ndarray
+    normal: Doubles
     face: int
     where: int
     flags: int
@@ -66,7 +72,7 @@ class Haptic:
     """A haptic object at `position`. One thread at a time.
 
     The object is a ball of `radius`; with `points` (n, 3) a tool; with `probe` a probe, which faces do not
-    stop. Other options are members of ebpo_haptic_options.
+    stop. ebpo_haptic_options in ebpo/haptic.h describes the other arguments.
 
     A separate thread loads faces. While a result has EBPO_HAPTIC_WAITING (2) in `flags`, the proxy waits
     for faces. If a result is `stopped`, no further faces will be loaded.
@@ -79,8 +85,13 @@ class Haptic:
     (True, False)
     """
 
-    def __init__(self, model: Any, position: Any, *, points: Any = None, probe: bool = False, **options: Any) -> None:
-        wanted = of_members(c.ebpo_haptic_options, options, points=None, point_count=0, kind=0)
+    def __init__(self, model: Model, position: ArrayLike, *, radius: float = 0.0, points: ArrayLike | None = None,
+                 probe: bool = False, skin: float = 0.0, search_radius: float = 0.0, stiffness: float = 400.0,
+                 damping: float = 0.4, friction: float = 0.0, step_seconds: float = 0.001,
+                 faces: int = 16384) -> None:
+        self._process = os.getpid()
+        wanted = made(c.ebpo_haptic_options, radius=radius, skin=skin, search_radius=search_radius, stiffness=stiffness,
+                      damping=damping, friction=friction, step_seconds=step_seconds, faces=faces)
         if points is not None:
             rows = doubles(points, "points")
             if rows.ndim != 2 or rows.shape[1] != 3:
@@ -88,30 +99,40 @@ class Haptic:
             wanted.points, wanted.point_count, wanted.kind = rows.ctypes.data, len(rows), 2
         elif probe:
             wanted.kind = 1
-        self._handle = Handle.made("ebpo_haptic_new", model.model, ctypes.byref(wanted), _vector(position, 3),
-                                   free="ebpo_haptic_free", keep=(model.model,))
+        self._made = Handle.made("ebpo_haptic_new", model.model, ctypes.byref(wanted), _vector(position, 3),
+                                 free="ebpo_haptic_free", keep=(model.model,))
+        renew_after_fork(self)
 
-    def step(self, device: Any) -> HapticResult:
+    def _renew(self) -> None:
+        self._made.forget()
+
+    @property
+    def _handle(self) -> Handle:
+        if self._process != os.getpid():
+            raise RuntimeError("this Haptic was made before the process was forked; make a new one in this process")
+        return self._made
+
+    def step(self, device: ArrayLike) -> HapticResult:
         """Compute a haptic step of a ball with the device at a position (3,)."""
         r = c.ebpo_haptic_ball_result()
         lib.ebpo_haptic_step_ball(self._handle, _vector(device, 3), ctypes.byref(r))
         return HapticResult(np.array(r.proxy), np.array(r.force), np.zeros(3), np.array([0, 0, 0, 1.0]),
                             np.array(r.normal), r.depth, _number(r.face), r.flags)
 
-    def step_tool(self, position: Any, quaternion: Any) -> HapticResult:
+    def step_tool(self, position: ArrayLike, quaternion: ArrayLike) -> HapticResult:
         """Compute a haptic step of a tool at a pose. quaternion: x, y, z, w."""
         r = c.ebpo_haptic_tool_result()
         lib.ebpo_haptic_step_tool(self._handle, _vector(position, 3), _vector(quaternion, 4), ctypes.byref(r))
         return HapticResult(np.array(r.proxy), np.array(r.force), np.array(r.torque), np.array(r.turn),
                             np.array(r.normal), r.depth, _number(r.face), r.flags)
 
-    def step_probe(self, position: Any) -> ProbeResult:
+    def step_probe(self, position: ArrayLike) -> ProbeResult:
         """Compute a haptic step of a probe at a position (3,)."""
         r = c.ebpo_haptic_probe_result()
         lib.ebpo_haptic_step_probe(self._handle, _vector(position, 3), ctypes.byref(r))
         return ProbeResult(r.distance, r.lo, r.hi, np.array(r.normal), _number(r.face), r.where, r.flags)
 
-    def reset(self, position: Any) -> None:
+    def reset(self, position: ArrayLike) -> None:
         """Move the device and the proxy to another position, without contact."""
         call("ebpo_haptic_reset", self._handle, _vector(position, 3))
 

@@ -6,14 +6,17 @@ import os
 from typing import Any
 
 from . import _declared as c
+from ._checked import members_of
 from ._library import Handle, lib, made, size_in_bytes, text
 from .errors import BY_STATUS, Error
+from .forks import renew_after_fork
+from .signatures import Size
 from .sources import opened, shown
 
 BUDGET = 1 << 30
-CODES = {kind: code for code, kind in BY_STATUS.items()}
+CODES: dict[type, int] = {kind: code for code, kind in BY_STATUS.items()}
 IO, CANCELLED = -3, -9
-ENTRY: dict = {name: kind for name, kind in c.ebpo_catalogue_options._fields_}
+ENTRY: dict = dict(members_of(c.ebpo_catalogue_options))
 
 _files: dict[int, Handle] = {}  # files that the library has open, by their addresses
 _options: list[dict] = []  # options of catalogues; the number of an opener is its index here plus 1
@@ -51,6 +54,8 @@ def _open_file(number: int, path: bytes, out: int, error: int) -> int:
     except BaseException as raised:
         struct = c.ebpo_error.from_address(error) if error else made(c.ebpo_error)
         code = CODES.get(type(raised), CANCELLED if isinstance(raised, KeyboardInterrupt) else IO)
+        if isinstance(raised, OSError):
+            struct.system_error = raised.errno or 0
         said = str(raised) if type(raised) in CODES else f"{type(raised).__name__}: {raised}"
         struct.status, struct.message = code, shown(said)[:479]
         if isinstance(raised, Error):
@@ -78,17 +83,28 @@ class OpenModels:
     memory: budget in bytes for all models together.
     """
 
-    def __init__(self, memory: int | str | None = None) -> None:
+    def __init__(self, memory: Size | None = None) -> None:
         self._memory = size_in_bytes(memory) or BUDGET
+        self._make()
+        renew_after_fork(self)
+
+    def _make(self) -> None:
         options = made(c.ebpo_catalogue_models_options, memory=self._memory)
         self.models = Handle.made("ebpo_catalogue_models_new", ctypes.byref(options), free="ebpo_catalogue_models_free")
+
+    def _renew(self) -> None:
+        self.models.forget()
+        for file in _files.values():
+            file.forget()
+        _files.clear()
+        self._make()
 
     @property
     def memory(self) -> int:
         return self._memory
 
     @memory.setter
-    def memory(self, size: int | str) -> None:
+    def memory(self, size: Size) -> None:
         self._memory = size_in_bytes(size) or BUDGET
         lib.ebpo_catalogue_models_set_memory(self.models, self._memory)
 
@@ -109,10 +125,10 @@ class OpenModels:
 
 
 _process_models = OpenModels()
-_process_models.models._end.detach()  # never freed: threads may still run queries when the process ends
+_process_models.models.forget()  # never freed: threads may still run queries when the process ends
 
 
-def process_models(memory: int | str | None = None) -> OpenModels:
+def process_models(memory: Size | None = None) -> OpenModels:
     """Return the open models of this process. memory: their budget from now on; None: unchanged."""
     if memory is not None:
         _process_models.memory = memory

@@ -4,15 +4,16 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import os
-from typing import Any, Callable, Iterator, NamedTuple
+from typing import Any, Iterator, NamedTuple
 
 import numpy as np
 
 from . import _declared as c
 from ._checked import doubles
 from ._checked import path as path_in_c
-from ._library import Callback, Handle, Reporter, call, copied, lib, made, of_members, text
+from ._library import Callback, Handle, Reporter, call, copied, lib, made, text
 from .model import Model
+from .signatures import AnyArray, ArrayLike, Path, Progress, Rows
 
 POINT = np.dtype(c.ebpo_paint_point)
 FACE = np.dtype(c.ebpo_paint_face)
@@ -31,11 +32,15 @@ class Stroke(NamedTuple):
     """
 
     layer: int
-    kind: Any
+    kind: c.PaintKind
     colour: int
     radius: float
     time: int
-    points: np.ndarray
+    points: Rows
+
+    def __repr__(self) -> str:
+        return (f"<ebpo.Stroke: {len(self.points)} points of radius {self.radius:g}, {self.kind.name.lower()}, layer "
+                f"{self.layer}, colour {self.colour:#010x}>")
 
 
 class Areas(NamedTuple):
@@ -44,9 +49,9 @@ class Areas(NamedTuple):
     all: the area of all layers together, (). layers, strokes: structured arrays, one item each.
     """
 
-    all: np.ndarray
-    layers: np.ndarray
-    strokes: np.ndarray
+    all: Rows
+    layers: Rows
+    strokes: Rows
 
 
 class Paint:
@@ -77,7 +82,7 @@ class Paint:
         return self._held
 
     @classmethod
-    def open(cls, source: Any) -> Paint:
+    def open(cls, source: Path | memoryview | AnyArray) -> Paint:
         """Open paint from a path, or from the bytes of a file. Raises FormatError, VersionError, IOFailure."""
         if isinstance(source, (str, os.PathLike)):
             return cls(_handle=Handle.made("ebpo_paint_open", path_in_c(source), free="ebpo_paint_free"))
@@ -87,7 +92,7 @@ class Paint:
 
     @classmethod
     @contextlib.contextmanager
-    def change(cls, path: Any, model: Model | None = None, *, wait: float = 60) -> Iterator[Paint]:
+    def change(cls, path: Path, model: Model | None = None, *, wait: float = 60) -> Iterator[Paint]:
         """Open a file for a change in a `with` statement; save it at the end, unless an exception was raised.
 
         Other `change` calls for the file, in any process or thread, wait up to `wait` seconds, then raise
@@ -102,7 +107,7 @@ class Paint:
         >>> len(Paint.open("cube.paint.h5").layers)
         2
         """
-        path = os.path.abspath(path)  # the working directory may change before the end
+        path = os.path.abspath(os.fsdecode(path))  # the working directory may change before the end
         paint = cls(_handle=Handle.made("ebpo_paint_open_to_change", path_in_c(path),
                                         None if model is None else model.file, wait, None, free="ebpo_paint_free"))
         try:
@@ -115,7 +120,7 @@ class Paint:
             raise
         paint.save(path)
 
-    def save(self, path: Any) -> None:
+    def save(self, path: Path) -> None:
         """Save the paint to a file, which is replaced atomically.
 
         Raises UnsupportedError when the library was built without libhdf5.
@@ -149,15 +154,18 @@ class Paint:
     # ---- layers, notes, strokes ----
 
     @property
-    def layers(self) -> list[dict]:
+    def layers(self) -> list[dict[str, Any]]:
         """The layers: title, author, date, description, colour (0xRRGGBBAA), opacity (0 to 255), visible (0, 1)."""
         return [facts(self._got("ebpo_paint_get_layer", c.ebpo_paint_layer, i)) for i in range(self.info["layer_count"])]
 
-    def add_layer(self, **members: Any) -> int:
-        """Add a layer above all others. Returns its index."""
+    def add_layer(self, *, title: str | None = None, author: str | None = None, date: str | None = None,
+                  description: str | None = None, colour: int | None = None, opacity: int = 255,
+                  visible: bool = True) -> int:
+        """Add a layer above all others. Returns its index. The arguments are described by `layers`."""
+        layer = made(c.ebpo_paint_layer, title=title, author=author, date=date, description=description,
+                     opacity=opacity, visible=visible, **({} if colour is None else {"colour": colour}))
         number = ctypes.c_uint64()
-        call("ebpo_paint_add_layer", self._handle, ctypes.byref(of_members(c.ebpo_paint_layer, members)),
-             ctypes.byref(number))
+        call("ebpo_paint_add_layer", self._handle, ctypes.byref(layer), ctypes.byref(number))
         return number.value
 
     def remove_layer(self, number: int) -> None:
@@ -165,13 +173,14 @@ class Paint:
         call("ebpo_paint_remove_layer", self._handle, number)
 
     @property
-    def notes(self) -> list[dict]:
+    def notes(self) -> list[dict[str, Any]]:
         """The notes: title, author, date, body, layer, and `at`, structured as ebpo_paint_point."""
         return [facts(self._got("ebpo_paint_get_note", c.ebpo_paint_note, i)) for i in range(self.info["note_count"])]
 
-    def add_note(self, model: Model, place: Any, *, layer: int = 0, **texts: Any) -> None:
-        """Add a note at the point of the surface nearest to `place`. texts: title, author, date, body."""
-        note = of_members(c.ebpo_paint_note, {**texts, "layer": layer})
+    def add_note(self, model: Model, place: ArrayLike, *, layer: int = 0, title: str | None = None,
+                 author: str | None = None, date: str | None = None, body: str | None = None) -> None:
+        """Add a note at the point of the surface nearest to `place`, (3,)."""
+        note = made(c.ebpo_paint_note, title=title, author=author, date=date, body=body, layer=layer)
         at = doubles(place, "a place")
         if at.shape != (3,):
             raise ValueError("place: expected three numbers")
@@ -197,11 +206,15 @@ class Paint:
         """Remove a stroke. Removing the last stroke is an undo."""
         call("ebpo_paint_remove_stroke", self._handle, number)
 
-    def draw(self, model: Model, input: Any, *, progress: Callable | None = None, **pen: Any) -> dict[str, int]:
+    def draw(self, model: Model, input: ArrayLike, *, radius: float, layer: int = 0,
+             kind: c.PaintKind = c.PaintKind.PAINTS, colour: int | None = None, spread: float = 0.0, density: int = 1,
+             size_least: float | None = None, size_full: float | None = None, step: float = 0.0,
+             within: float = float("inf"), seed: int | None = None, time: int = 0,
+             progress: Progress | None = None) -> dict[str, int]:
         """Add strokes along the path of a haptic device.
 
         input: (n, 4), positions and pressures of 0 to 1, or (n, 5), with times in milliseconds.
-        pen: members of ebpo_paint_pen: radius (required), layer, colour, spread, density, seed, ...
+        radius ... time: members of ebpo_paint_pen in ebpo/paint.h. None: the default there.
 
         Returns the members of ebpo_paint_drawn: strokes, points, steps, lifted, strayed.
         """
@@ -211,15 +224,18 @@ class Paint:
         stroke = np.zeros((len(rows), 5))
         stroke[:, :rows.shape[1]] = rows
         drawn = made(c.ebpo_paint_drawn)
+        wished = {"colour": colour, "size_least": size_least, "size_full": size_full, "seed": seed}
         with Reporter(progress) as reported, model._context() as context:
-            given = of_members(c.ebpo_paint_pen, pen, progress=reported)
+            given = made(c.ebpo_paint_pen, radius=radius, layer=layer, kind=kind, spread=spread, density=density,
+                         step=step, within=within, time=time, progress=reported,
+                         **{name: value for name, value in wished.items() if value is not None})
             call("ebpo_paint_draw", self._handle, context, stroke.ctypes.data, len(stroke), ctypes.byref(given),
                  ctypes.byref(drawn))
         return facts(drawn)
 
     # ---- results ----
 
-    def cover(self, model: Model, stroke: int) -> np.ndarray:
+    def cover(self, model: Model, stroke: int) -> Rows:
         """Return the faces that a stroke covers, structured as ebpo_paint_face, in the order of the file."""
         found = bytearray()
 
@@ -231,7 +247,7 @@ class Paint:
             call("ebpo_paint_cover", self._handle, context, stroke, taking, None, None)
         return np.frombuffer(bytes(found), FACE)
 
-    def measure(self, model: Model, *, fineness: int = 256, progress: Callable | None = None) -> Areas:
+    def measure(self, model: Model, *, fineness: int = 256, progress: Progress | None = None) -> Areas:
         """Return the painted areas; see ebpo_paint_measure."""
         areas = made(c.ebpo_paint_areas)
         with Reporter(progress) as reported, model._context() as context:

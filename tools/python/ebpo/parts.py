@@ -8,8 +8,9 @@ from typing import Any, Iterator, NamedTuple
 import numpy as np
 
 from . import _declared as c
-from ._checked import integers
+from ._checked import integers, members_of
 from ._library import Handle, Struct, array, call, copied, lib, made, text
+from .signatures import ArrayLike, Doubles, Int8s, Int32s, Int64s, Uint8s, Uint32s, Uint64s, Vertices
 
 
 class Mesh(NamedTuple):
@@ -19,8 +20,8 @@ class Mesh(NamedTuple):
     faces: (f, 3) uint32, vertex indices, counter-clockwise seen from outside.
     """
 
-    vertices: np.ndarray
-    faces: np.ndarray
+    vertices: Vertices
+    faces: Uint32s
 
 
 class Maps(NamedTuple):
@@ -31,8 +32,8 @@ class Maps(NamedTuple):
     Faces that fill holes have indices from `info.source_face_count` on.
     """
 
-    vertex: np.ndarray
-    face: np.ndarray
+    vertex: Uint32s
+    face: Uint32s
 
 
 class Level(NamedTuple):
@@ -48,14 +49,14 @@ class Level(NamedTuple):
     colour: (n, 3) uint8, sRGB, or None when the file has no colours of nodes.
     """
 
-    vertices: np.ndarray
-    faces: np.ndarray
-    node: np.ndarray
-    octcode: np.ndarray
-    type: np.ndarray
-    winding: np.ndarray
-    volume: np.ndarray
-    colour: np.ndarray | None
+    vertices: Vertices
+    faces: Uint32s
+    node: Int64s
+    octcode: Uint64s
+    type: Int8s
+    winding: Int32s
+    volume: Doubles
+    colour: Uint8s | None
 
 
 class Mass(NamedTuple):
@@ -74,8 +75,8 @@ class Mass(NamedTuple):
 
     area: float
     volume: float
-    centroid: np.ndarray
-    inertia: np.ndarray
+    centroid: Doubles
+    inertia: Doubles
     volume_bounds: tuple[float, float]
     integral: float
 
@@ -114,7 +115,7 @@ class Info:
                 return bytes(value).hex()
             return np.array(np.ctypeslib.as_array(value))
         if isinstance(value, ctypes.Structure):
-            return {n: Info._plain(getattr(value, n), n) for n, _ in value._fields_}
+            return {n: Info._plain(getattr(value, n), n) for n, _ in members_of(value)}
         return value
 
     def __getattr__(self, name: str) -> Any:
@@ -191,7 +192,14 @@ def read_level(file: Handle, level: int, cell_faces: bool, threads: int, progres
 TYPES = [np.int8, np.uint8, np.int16, np.uint16, np.int32, np.uint32, np.float32, np.float64]
 
 
-class Attributes(Mapping):
+class AttributeNameError(KeyError):
+    """The file has no attribute of this name. The message lists the attributes."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+class Attributes(Mapping[str, Any]):
     """The attributes of the source: values of vertices, faces and other elements, except positions and corners.
 
     A mapping from "element:name", such as "vertex:red", to arrays. An array is read when it is accessed.
@@ -222,9 +230,13 @@ class Attributes(Mapping):
     def _find(self, name: str) -> tuple[int, int]:
         found = [key for key in self._columns if key == name or key.partition(":")[2] == name]
         if not found:
-            raise KeyError(name)
+            known = ", ".join(self._columns) or "none"
+            raise AttributeNameError(f"the file has no attribute {name!r}; its attributes: {known}")
         found.sort(key=lambda key: (not key.startswith("vertex:"), not key.startswith("face:")))
         return self._columns[name if name in self._columns else found[0]]
+
+    def __repr__(self) -> str:
+        return f"<ebpo.Attributes: {', '.join(self._columns) or 'none'}>"
 
     def facts(self, name: str) -> dict[str, Any]:
         """Return element, names, type, row count and range of the array with an attribute. Reads no values."""
@@ -331,15 +343,16 @@ class Subtree:
         self.list_first = self._array(faces.list_first, (self.node_count + 1,), np.uint32)
         self.list = self._array(faces.list, (int(self.list_first[-1]),), np.uint32)
 
-    def faces_of(self, node: int) -> np.ndarray:
+    def faces_of(self, node: int) -> Uint32s:
         """Return the faces of a leaf, as indices of rows of `faces`."""
-        return self.list[self.list_first[node]:self.list_first[node + 1]]
+        faces: Uint32s = self.list[self.list_first[node]:self.list_first[node + 1]]
+        return faces
 
     def __repr__(self) -> str:
         return f"<ebpo.Subtree {int(self.octcode[0]):o}: {self.node_count} nodes>"
 
 
-def half_spaces(codes: Any) -> tuple[np.ndarray, np.ndarray]:
+def half_spaces(codes: ArrayLike) -> tuple[Int32s, Int32s]:
     """Return the half-spaces of plane codes, in coordinates xi from 0 to 1 in the node's cell.
 
     codes: (k,) uint32.

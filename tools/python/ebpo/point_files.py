@@ -57,7 +57,7 @@ class PointFile(NamedTuple):
 
     path: str
     dataset: str
-    count: int
+    count: int  # type: ignore[assignment]
     columns: int
     stamp: tuple[int, int]
 

@@ -10,6 +10,7 @@ from typing import Any, Callable, Iterator
 import numpy as np
 
 from ._checked import doubles, integer_as
+from .signatures import Bar, NanPolicy, Progress
 
 # Rows of a block. Results of a block stay in the core's cache until they are stored. A block is
 # long enough to make the cost of Python's global lock, which is taken after each block, negligible.
@@ -46,24 +47,44 @@ class Rows:
     """Points, or other rows of three columns, as contiguous doubles block by block.
 
     Contiguous doubles are not copied. The input needs a shape and slices.
+
+    shape: the shape of the input without its last axis.
+    valid: the rows that contain no NaN; None: all. Only these rows are counted and accessible.
     """
 
-    def __init__(self, values: Any, what: str = "points") -> None:
+    def __init__(self, values: Any, what: str = "points", nan: NanPolicy = "raise") -> None:
         if not hasattr(values, "shape") or not hasattr(values, "dtype"):
             values = np.asarray(values)
         shape = tuple(values.shape)
         if shape == (0,):
             values = np.zeros((0, 3))
-        self.single = shape == (3,)
-        if self.single:
-            values = np.asarray(values)[None, :]
-        elif tuple(values.shape)[1:] != (3,):
-            raise ValueError(f"{what} have the shape (n, 3), or (3,) for a single one, not {shape}")
+        elif not shape or shape[-1] != 3:
+            raise ValueError(f"{what} have the shape (..., 3), such as (n, 3), or (3,) for a single one, not {shape}")
+        if nan not in ("raise", "propagate"):
+            raise ValueError(f"nan is 'raise' or 'propagate', not {nan!r}")
+        self.shape, self.single = tuple(values.shape)[:-1], shape == (3,)
         if np.dtype(values.dtype).kind not in "fiuO":
             raise TypeError(f"{what}: expected real numbers, got {values.dtype}")
         if holds_codes(values):
             raise TypeError(f"{what}: expected real numbers, got {CODES}")
+        if len(self.shape) != 1:
+            values = np.asarray(values).reshape(-1, 3)
         self.values, self.what, self.count = values, what, int(values.shape[0])
+        self.valid: Any = None
+        if nan == "propagate":
+            begins = range(0, self.count, BLOCK)
+            missing = [np.isnan(self[begin:min(self.count, begin + BLOCK)]).any(axis=1) for begin in begins]
+            if any(some.any() for some in missing):
+                self.select(~np.concatenate(missing))
+
+    def select(self, valid: np.ndarray) -> None:
+        """Restrict the rows to those where `valid` is True."""
+        self.values = np.asarray(self.values)[valid]
+        self.count, self.valid = len(self.values), valid
+
+    def result(self, values: np.ndarray, missing: Any) -> Any:
+        """Return results of the rows in the shape of the input. Rows that contain NaN have the result `missing`."""
+        return shaped(values, self.shape, self.valid, missing)
 
     def __getitem__(self, part: slice) -> np.ndarray:
         return doubles(self.values[part], self.what)
@@ -76,16 +97,26 @@ class Rows:
         bad = ~np.isfinite(self[begin:end]).all(axis=1)
         if bad.any():
             number = begin + int(bad.argmax())
+            number = number if self.valid is None else int(np.flatnonzero(self.valid)[number])
             from .errors import ArgumentError
             raise ArgumentError(f"{self.what}: number {number} has a coordinate that is not a finite number",
                                 "EBPO_E_ARGUMENT")
 
 
+def shaped(values: np.ndarray, shape: tuple[int, ...], valid: np.ndarray | None, missing: Any) -> Any:
+    """Return one result for each item of `shape`. A single result is a scalar, unless it has columns."""
+    if valid is not None:
+        every = np.full((len(valid), *values.shape[1:]), np.array(missing, values.dtype))
+        every[valid] = values
+        values = every
+    return values[0] if shape == () else values.reshape(*shape, *values.shape[1:])
+
+
 class StageProgress:
     """Progress over all threads. The thread that started the queries reports it."""
 
-    def __init__(self, progress: Callable | None, stage: str, total: int) -> None:
-        self.progress, self.stage, self.total = progress, stage, total
+    def __init__(self, progress: Progress | None, stage: str, total: int) -> None:
+        self.progress, self.stage, self.total = reporter(progress), stage, total
 
     def __call__(self, done: int) -> None:
         if self.progress is not None and self.progress(self.stage, done, self.total) is False:
@@ -98,7 +129,7 @@ def block_of(count: int, threads: int) -> int:
     return max(64, min(BLOCK, -(-count // (8 * threads))))
 
 
-def share(count: int, threads: int | None, worker: Callable[[], Any], progress: Callable | None = None,
+def share(count: int, threads: int | None, worker: Callable[[], Any], progress: Progress | None = None,
           stage: str = "queries") -> None:
     """Process rows 0 to count - 1 block by block.
 
@@ -151,10 +182,16 @@ def share(count: int, threads: int | None, worker: Callable[[], Any], progress: 
         report_total(count)
 
 
-def bar(make: Callable[..., Any], **options: Any) -> Callable[[str, int, int], bool]:
-    """Return a progress callback for bars like those of tqdm: `progress=ebpo.bar(tqdm.tqdm)`.
+def reporter(progress: Progress | None) -> Callable[[str, int, int], object] | None:
+    """Return the progress callback of a callback or of a class of bars."""
+    return bar(progress) if isinstance(progress, type) else progress
 
-    make(total=, desc=, **options) gives a bar with update(n) and close(); each stage has its own.
+
+def bar(make: Callable[..., Bar]) -> Callable[[str, int, int], bool]:
+    """Return a progress callback for bars like those of tqdm. `progress=tqdm.tqdm` does this by itself.
+
+    make(total=, desc=) gives a bar with update(n) and close(); each stage has its own. For options of the bar:
+    `progress=ebpo.bar(functools.partial(tqdm.tqdm, leave=False))`.
 
     >>> class Line:
     ...     def __init__(self, total, desc): print(desc, total)
@@ -181,7 +218,7 @@ def bar(make: Callable[..., Any], **options: Any) -> Callable[[str, int, int], b
         if not now:
             if total and done >= total:
                 return True  # a later report after the bar is closed
-            now.update(stage=stage, done=0, bar=make(total=total or None, desc=stage, **options))
+            now.update(stage=stage, done=0, bar=make(total=total or None, desc=stage))
         if done > now["done"]:
             now["bar"].update(done - now["done"])
             now["done"] = done

@@ -11,41 +11,75 @@ from . import _declared as c
 from ._checked import path as path_in_c
 from ._library import Handle, Reporter, call, lib, made, size_in_bytes, text
 from .collide import PAIR, Gathered, Pairs, matrix_of
+from .forks import renew_after_fork
+from .signatures import Doubles, Path, Progress, Rows, Size
 
 CLASH = np.dtype(c.ebpo_scene_clash)
 CLOSE = np.dtype(c.ebpo_scene_pair)
 
 
-def open_scene(path: Any, *, memory: int | str | None = None, allow_outside: bool = False, remote: bool = False,
-               progress: Callable | None = None) -> Scene:
+def open_scene(path: Path, *, memory: Size | None = None, allow_outside: bool = False, remote: bool = False,
+               progress: Progress | None = None) -> Scene:
     """Open a scene file (format-spec/scene.md), and the headers of its models' files.
 
     memory: budget in bytes for all queried models together. None: no limit.
     allow_outside: files of the scene may be anywhere, not only in the scene's folder or below it.
     remote: the scene may name models on web servers.
     """
-    options = made(c.ebpo_scene_options, outside=allow_outside, remote=remote)
-    handle = Handle.made("ebpo_scene_open", path_in_c(path), ctypes.byref(options), free="ebpo_scene_free")
-    with Reporter(progress) as reported:
-        load = made(c.ebpo_load_options, memory=size_in_bytes(memory), progress=reported)
-        call("ebpo_scene_load", handle, ctypes.byref(load))
-    return Scene(handle)
+    def opened(report: Progress | None) -> Handle:
+        options = made(c.ebpo_scene_options, outside=allow_outside, remote=remote)
+        handle = Handle.made("ebpo_scene_open", path_in_c(path), ctypes.byref(options), free="ebpo_scene_free")
+        with Reporter(report) as reported:
+            load = made(c.ebpo_load_options, memory=size_in_bytes(memory), progress=reported)
+            call("ebpo_scene_load", handle, ctypes.byref(load))
+        return handle
+
+    return Scene(opened, progress)
 
 
 class Scene:
     """An open scene. Made by `open_scene`. One thread queries at a time; other threads wait.
 
+    In a process that os.fork made, the scene is opened again.
+
     models, instances: lists of names. The index of an instance is its index in the list.
     begin, end: the first time and the last time of all routes, in the scene's seconds.
     """
 
-    def __init__(self, handle: Handle) -> None:
-        self._handle, self._lock = handle, threading.Lock()
+    def __init__(self, opened: Callable[[Progress | None], Handle], progress: Progress | None = None) -> None:
+        self._opened, self._lock, self._closed = opened, threading.Lock(), False
+        self._made: Handle | None = opened(progress)
+        renew_after_fork(self)
+        handle = self._made
         counts = made(c.ebpo_scene_counts)
         lib.ebpo_scene_get_counts(handle, ctypes.byref(counts))
         self.begin, self.end = counts.begin, counts.end
         self.models = list(self._names(c.ebpo_scene_model_facts, "ebpo_scene_get_model", counts.models))
         self.instances = list(self._names(c.ebpo_scene_instance, "ebpo_scene_get_instance", counts.instances))
+
+    def _renew(self) -> None:
+        if self._made is not None:
+            self._made.forget()
+        self._made, self._lock = None, threading.Lock()
+
+    @property
+    def _handle(self) -> Handle:
+        if self._closed:
+            raise ValueError("the scene has been closed")
+        if self._made is None:
+            self._made = self._opened(None)
+        return self._made
+
+    def close(self) -> None:
+        """Free the data of the scene and of its models. The end of the last reference also frees it."""
+        with self._lock:
+            self._made, self._closed = None, True
+
+    def __enter__(self) -> Scene:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     def _names(self, kind: Any, function: str, count: int) -> Iterator[str]:
         for number in range(count):
@@ -53,17 +87,17 @@ class Scene:
             getattr(lib, function)(self._handle, number, ctypes.byref(facts))
             yield text(facts.name)
 
-    def _number(self, instance: Any) -> Any:
+    def _number(self, instance: int | str) -> int:
         return self.instances.index(instance) if isinstance(instance, str) else instance
 
-    def pose(self, instance: Any, time: float = 0.0) -> np.ndarray:
+    def pose(self, instance: int | str, time: float = 0.0) -> Doubles:
         """Return the pose of an instance at a time: a (4, 4) matrix. instance: an index or a name."""
         out = c.ebpo_pose()
         with self._lock:
             call("ebpo_scene_pose", self._handle, self._number(instance), time, ctypes.byref(out))
         return matrix_of(out)
 
-    def box(self, begin: float | None = None, end: float | None = None) -> np.ndarray:
+    def box(self, begin: float | None = None, end: float | None = None) -> Doubles:
         """Return a box (2, 3) that contains all instances from time begin to time end. Default: all times."""
         out = np.empty((2, 3))
         with self._lock:
@@ -73,7 +107,7 @@ class Scene:
     def _times(self, begin: float | None, end: float | None) -> tuple[float, float]:
         return self.begin if begin is None else begin, self.end if end is None else end
 
-    def pairs(self, begin: float | None = None, end: float | None = None) -> np.ndarray:
+    def pairs(self, begin: float | None = None, end: float | None = None) -> Rows:
         """Return the pairs whose boxes come closer than their clearance at any time from begin to end.
 
         Returns a structured array of a, b and clearance, ascending. No other pair comes that close.
@@ -84,7 +118,7 @@ class Scene:
         return found.array
 
     def clashes(self, time: float = 0.0, *, count: bool = False, locations: bool = False, relate: bool = False,
-             depth: float = 0.0, threads: int | None = None, progress: Callable | None = None) -> np.ndarray:
+             depth: float = 0.0, threads: int | None = None, progress: Progress | None = None) -> Rows:
         """Return pairs of instances that intersect at a time, or are closer than their clearance.
 
         count: count all pairs of intersecting faces, and intersection lines.
@@ -102,7 +136,7 @@ class Scene:
             call("ebpo_scene_find_clashes", self._handle, time, ctypes.byref(options), taking, None, None)
         return found.array
 
-    def collide(self, a: Any, b: Any, time: float = 0.0, *, threads: int | None = None) -> Pairs:
+    def collide(self, a: int | str, b: int | str, time: float = 0.0, *, threads: int | None = None) -> Pairs:
         """Return every pair of faces of two instances that intersect at a time."""
         found = Gathered(c.ebpo_pairs_fn, PAIR)
         with self._lock, found as taking:

@@ -5,19 +5,21 @@ import ctypes
 import functools
 import io
 import os
+import stat
 import threading
-from typing import Any
+import weakref
+from typing import Any, Mapping
 
 import numpy as np
 
 from . import _declared as c
-from ._checked import path, text, within
-from ._library import Handle, call, made, of_members, size_in_bytes
+from ._checked import members_of, path, text, within
+from ._library import Handle, call, error_of, made, of_members, size_in_bytes
 from .errors import ArgumentError, Error, IOFailure, UnsupportedError
 from .ranges import CONNECTIONS, Ranges, read_whole
 from .web import Patience, Web
 
-FUNCTIONS: dict = {name: kind for name, kind in c.ebpo_source._fields_}
+FUNCTIONS: dict = dict(members_of(c.ebpo_source))
 RANGE = np.dtype(c.ebpo_range)
 IO, CANCELLED = -3, -9
 
@@ -43,12 +45,32 @@ class Seekable:
         return data
 
 
+class Positioned:
+    """A file that the operating system reads. The position of the file object is neither used nor changed."""
+
+    def __init__(self, file: Any) -> None:
+        self.file, self.size = file, os.fstat(file.fileno()).st_size
+
+    @staticmethod
+    def fits(file: Any) -> bool:
+        """Return True for unmodified bytes of a regular file. Other files, such as GzipFile, may have a fileno() too."""
+        raw = getattr(file, "raw", None) if type(file) in (io.BufferedReader, io.BufferedRandom) else file
+        return hasattr(os, "pread") and type(raw) is io.FileIO and stat.S_ISREG(os.fstat(raw.fileno()).st_mode)
+
+    def read_range(self, offset: int, size: int) -> bytes:
+        parts = []
+        while size and (data := os.pread(self.file.fileno(), size, offset)):
+            parts.append(data)
+            offset, size = offset + len(data), size - len(data)
+        return b"".join(parts)
+
+
 class Stored:
     """A path of an fsspec file system, read by ranges."""
 
-    def __init__(self, url: str, storage_options: dict | None = None) -> None:
+    def __init__(self, url: str, storage_options: Mapping[str, Any] | None = None) -> None:
         try:
-            import fsspec
+            import fsspec  # type: ignore[import-not-found, import-untyped, unused-ignore]
         except ImportError:
             raise ImportError(f"{url}: this kind of URL needs fsspec, which is not installed") from None
         self.fs, self.path = fsspec.core.url_to_fs(url, **(storage_options or {}))
@@ -168,14 +190,46 @@ def by_url(url: str, http: dict, max_expansion: int) -> Handle:
     return by_ranges(far(web, web.size, web.shown, connections=connections), web.shown, max_expansion)
 
 
+class ByUrl:
+    """A URL whose ranges are fetched together."""
+
+    def __init__(self, url: str, http: dict) -> None:
+        struct, self.keep = http_options(http)
+        self.source = made(c.ebpo_source)
+        if has_http():
+            call("ebpo_source_of_url", url, ctypes.byref(struct), ctypes.byref(self.source))
+        else:
+            web = Web(url, **{name: value for name, value in http.items() if name != "connections"})
+            self.keep = [Source(far(web, web.size, web.shown))]
+            self.source = self.keep[0].struct
+        self.size = self.source.size
+        self._end = weakref.finalize(self, self.source.close, self.source.user)
+
+    def fetch(self, ranges: list[tuple[int, int]]) -> list[np.ndarray]:
+        """Return the bytes of ranges, which are requested at the same time."""
+        hints, out = np.array(ranges, RANGE), []
+        self.source.prefetch(self.source.user, hints.ctypes.data, len(hints))
+        for offset, size in ranges:
+            data, error = np.empty(size, np.uint8), made(c.ebpo_error)
+            status = self.source.read(self.source.user, offset, size, data.ctypes.data, ctypes.addressof(error))
+            if status:
+                error.status = status
+                raise error_of(error)
+            out.append(data)
+        return out
+
+
 def by_ranges(ranges: Any, name: str, max_expansion: int = 0) -> Handle:
     """Open a Ranges, or an object with `size` and `read_range` on this machine."""
     source = Source(ranges)
     return by_name(shown(name), max_expansion, keep=(source,), source=source.struct)
 
 
-def opened(source: Any, http: dict, storage_options: dict | None, max_expansion: int = 0) -> Handle:
+def opened(source: Any, http: dict[str, Any], storage_options: Mapping[str, Any] | None,
+           max_expansion: int = 0) -> Handle:
     """Return an open ebpo_file of any source that `ebpo.open` supports."""
+    if hasattr(source, "async_source"):
+        return by_name(shown(source.name), max_expansion, keep=(source,), source=source.async_source())
     if isinstance(source, (str, os.PathLike)):
         name = os.fspath(source)
         if isinstance(name, str) and name.startswith(("http://", "https://")) and storage_options is None:
@@ -219,6 +273,8 @@ def of_file(file: Any, name: str) -> Any:
     """Return a reader of a file object: a Seekable on this machine, else a Ranges."""
     if Uncached.fits(file):
         return far(Uncached(file), file.size, name)
+    if Positioned.fits(file):
+        return Positioned(file)
     seekable = Seekable(file)
     if isinstance(file, io.BytesIO) or is_of_system(file):
         return seekable

@@ -25,7 +25,7 @@ from typing import Any
 
 from ._checked import integer_as, real, refused
 from ._library import size_in_bytes
-from .errors import IOFailure, UnsupportedError
+from .errors import IOFailure, MissingFileError, UnsupportedError
 from .ranges import HEAD
 
 SILENT = 20.0  # seconds without a byte or a connection, after which the request is sent again
@@ -185,7 +185,8 @@ class Patience:
         """Wait before the next attempt. Raises IOFailure when another attempt is useless or not allowed."""
         code, reason = getattr(error, "code", None), getattr(error, "reason", error)
         if code is not None and code not in self.AGAIN:
-            raise self.failure(f"the server returned status {code}") from error
+            raise self.failure(f"the server returned status {code}",
+                               MissingFileError if code in (404, 410) else IOFailure) from error
         if isinstance(reason, ssl.SSLCertVerificationError):
             raise self.failure(f"the server's certificate is not trusted: {reason.verify_message}") from error
         pause = min(self.LONGEST, self.FIRST * 2**min(self.failures, 16)) * random.uniform(0.5, 1)
@@ -200,8 +201,8 @@ class Patience:
                                ) from error
         threading.Event().wait(pause)
 
-    def failure(self, message: str) -> IOFailure:
-        return IOFailure(f"{self.what}: {message}", "EBPO_E_IO", self.what)
+    def failure(self, message: str, kind: type[IOFailure] = IOFailure) -> IOFailure:
+        return kind(f"{self.what}: {message}", "EBPO_E_IO", self.what)
 
     @staticmethod
     def retry_after(error: Exception) -> float:

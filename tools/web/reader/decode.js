@@ -26,9 +26,11 @@ function checkTypes(info, level) {
   const counts = countTypes(level.types, level.level), s = level.summary;
   if (counts[WHITE] !== s.white || counts[BLACK] !== s.black || counts[LEAF] !== s.leaf || counts[GRAY] !== s.gray)
     throw formatError(levelPath(level.level, 'types'), 'the types do not add up to the counts in the header');
+  if (level.level && level.types.some((t) => t !== 0 && (t & 0xaaaa) === 0))
+    throw formatError(levelPath(level.level, 'types'), 'a gray node has no child that is gray or a leaf');
   if (level.level && level.types.reduce((sum, t) => sum + (t === 0), 0) !== info.levels[level.level - 1].pruned)
     throw formatError(levelPath(level.level, 'types'), info.parts.has('pruned') ? 'there is not exactly one empty group for each pruned node of the level above'
-      : 'a group is 0: all children of a gray node are white');
+      : 'a gray node has no child that is gray or a leaf');
 }
 
 /** Checks winding numbers of black and white nodes against the rule. */

@@ -152,6 +152,7 @@ export class Hdf5 {
     c.must(sizes[0] === 8 && sizes[1] === 8 && base === 0 && extension === undefined, 'the HDF5 layout differs from that of EBP-Octree files');
     if (end === undefined || end > this.size || root === undefined)
       throw foreign();
+    this.end = end; // of the HDF5 file: the stored file may have more bytes
     return root;
   }
 
@@ -270,11 +271,11 @@ export class Hdf5 {
         throw formatError(chunk, 'the chunk was stored without its filters');
       if (bytes > most)
         throw formatError(chunk, 'the chunk is larger than the format allows');
-      if (at + bytes > this.size)
+      if (at + bytes > this.end)
         throw formatError(chunk, 'the chunk is beyond the end of the file');
       total += bytes;
     });
-    if (total > this.size)
+    if (total > this.end)
       throw formatError(where, "the array's chunks are larger than the file");
     return found;
   }

@@ -1,0 +1,165 @@
+// Tests the interface of the package: sources, errors, cancelling, limits, workers and pairs.
+import assert from 'node:assert/strict';
+import { readFileSync, statSync } from 'node:fs';
+import { createServer } from 'node:http';
+import { join } from 'node:path';
+import test from 'node:test';
+
+const { EBPO_PACKAGE: folder, EBPO_VECTORS: vectors, EBPO_FILES: files = '' } = process.env;
+const library = await import(join(folder, 'index.js'));
+const { open, EbpoArgumentError, EbpoError, EbpoFormatError, EbpoLimitError, EbpoPendingError, EbpoReadError } = library;
+const small = readFileSync(join(vectors, 'passed/06_four_levels_leaf_planes.ebpo.h5'));
+const large = files.split(' ').filter(Boolean).sort((a, b) => statSync(b).size - statSync(a).size)[0], largeBytes = large && readFileSync(large);
+
+/** Serves bytes; `change` may alter status, headers and body of a response. */
+async function serve(bytes, change = (x) => x) {
+  const seen = [];
+  const server = createServer(({ headers }, response) => {
+    const [, first, last] = /bytes=(\d+)-(\d+)/.exec(headers.range), end = Math.min(+last, bytes.length - 1);
+    seen.push([+first, end]);
+    const { status, headers: sent, body } = change({ status: 206, body: bytes.subarray(+first, end + 1),
+      headers: { 'content-range': `bytes ${first}-${end}/${bytes.length}`, etag: '"1"' } }, seen.length);
+    response.writeHead(status, sent).end(body);
+  });
+  await new Promise((done) => server.listen(0, '127.0.0.1', done));
+  return { url: `http://127.0.0.1:${server.address().port}/m.ebpo.h5`, seen, close: () => server.close() };
+}
+
+async function withServer(bytes, change, use) {
+  const server = await serve(bytes, change);
+  try {
+    await use(server);
+  } finally {
+    server.close();
+  }
+}
+
+test('a URL, a Blob, an ArrayBuffer, a typed array and a source give equal results', () => withServer(small, undefined, async ({ url }) => {
+  const source = { size: small.length, read: async (ranges) => ranges.map(({ offset, size }) => Uint8Array.from(small.subarray(offset, offset + size))) };
+  const buffer = Uint8Array.from(small).buffer, results = [];
+  for (const from of [url, new URL(url), new Blob([small]), buffer, small, source])
+    for (const whole of [true, false]) {
+      const model = await open(from, { whole });
+      results.push(JSON.stringify([model.info, await model.distance([0.1, 0.1, 0.1]), await model.measure(), await model.mesh()]));
+      model.dispose();
+    }
+  assert.equal(new Set(results).size, 1);
+}));
+
+test('servers that break the rules are errors', async () => {
+  const cases = [
+    [(r) => ({ ...r, status: 200 }), /does not support range requests/],
+    [(r) => ({ ...r, status: 404 }), /status 404/],
+    [(r) => ({ ...r, headers: { etag: '"1"' } }), /Content-Range/],
+    [(r) => ({ ...r, headers: { ...r.headers, 'content-range': `bytes 1-${r.body.length}/${small.length}` } }), /sent bytes 1 to/],
+    [(r) => ({ ...r, headers: { 'content-range': r.headers['content-range'] } }), /neither ETag nor Last-Modified/],
+  ];
+  for (const [change, message] of cases)
+    await withServer(small, change, ({ url }) => assert.rejects(open(url), (error) => error instanceof EbpoReadError && message.test(error.message)));
+  await withServer(small, (r) => ({ ...r, headers: { 'content-range': r.headers['content-range'] } }), async ({ url }) =>
+    (await open(url, { unversioned: true })).dispose());
+});
+
+test('a request that fails once is repeated', () => withServer(small, (r, n) => n === 1 ? { ...r, status: 503 } : r, async ({ url }) => {
+  (await open(url)).dispose();
+}));
+
+test('a file that changes is an error', { skip: !large }, () => withServer(largeBytes, (r, n) => n > 2 ? { ...r, headers: { ...r.headers, etag: '"2"' } } : r,
+  ({ url }) => assert.rejects(open(url).then((model) => model.check()), (error) => error instanceof EbpoReadError && /has changed/.test(error.message))));
+
+test('a query by URL needs few bytes, and all its ranges are requested together', { skip: !large }, () => withServer(largeBytes, undefined, async ({ url, seen }) => {
+  const model = await open(url), { origin, size } = model.info;
+  await model.inside(origin.map((x, i) => x + size[i] / 3));
+  const bytes = seen.reduce((sum, [first, last]) => sum + last - first + 1, 0);
+  assert.ok(bytes < largeBytes.length, `${bytes} of ${largeBytes.length} bytes`);
+  model.dispose();
+}));
+
+test('synchronous queries throw while bytes are missing', { skip: !large }, async () => {
+  const model = await open(new Blob([largeBytes])), { origin, size } = model.info, point = origin.map((x, i) => x + size[i] * 0.4);
+  if (!model.stats.resident)
+    assert.throws(() => model.raysSync([...origin, ...size]), EbpoPendingError);
+  const expected = await model.distance(point);
+  assert.deepEqual(model.distanceSync(point), expected);
+  model.dispose();
+});
+
+test('invalid arguments are errors', async () => {
+  const model = await open(small);
+  await assert.rejects(model.inside([0, 0]), EbpoArgumentError);
+  await assert.rejects(model.inside([0, 0, NaN]), EbpoArgumentError);
+  await assert.rejects(model.rays([0, 0, 0, 0, 0, 0]), EbpoArgumentError);
+  await assert.rejects(model.rays([0, 0, 0, 0, 0, 1], { sides: 'left' }), EbpoArgumentError);
+  await assert.rejects(model.boxFaces([1, 1, 1], [0, 0, 0]), EbpoArgumentError);
+  await assert.rejects(model.level(99), EbpoError);
+  await assert.rejects(open(42), EbpoArgumentError);
+  await assert.rejects(open(new Uint8Array(5000)), EbpoFormatError);
+  assert.equal((await model.distance([0, 0, 0])).face.length, 1); // the model is still usable
+  assert.equal((await model.inside([])).where.length, 0);
+  model.dispose();
+  await assert.rejects(model.inside([0, 0, 0]), EbpoError);
+  model.dispose();
+});
+
+test('signals cancel opening and queries', { skip: !large }, async () => {
+  await assert.rejects(open(small, { signal: AbortSignal.abort() }), { name: 'AbortError' });
+  const controller = new AbortController(), slow = { size: largeBytes.length,
+    read: (ranges, signal) => new Promise((resolve, reject) => { signal.addEventListener('abort', () => reject(signal.reason)); }) };
+  setTimeout(() => controller.abort(), 20);
+  await assert.rejects(open(slow, { signal: controller.signal }), { name: 'AbortError' });
+  const model = await open(largeBytes), points = new Float64Array(3e6), during = new AbortController();
+  setTimeout(() => during.abort(), 20);
+  await assert.rejects(model.distance(points, { signal: during.signal }), { name: 'AbortError' });
+  assert.equal((await model.distance([0, 0, 0])).distance.length, 1);
+  model.dispose();
+});
+
+test('queries at the same time give the results of queries one by one', { skip: !large }, async () => {
+  const model = await open(new Blob([largeBytes])), { origin, size } = model.info;
+  const points = Array.from({ length: 30 }, (_, i) => origin.map((x, k) => x + size[k] * ((i * (k + 3) * 0.137) % 1)));
+  const together = await Promise.all(points.flatMap((p) => [model.distance(p), model.rays([...p, 1, 0.3, 0.2])]));
+  for (let i = 0; i < points.length; i++) {
+    assert.deepEqual(await model.distance(points[i]), together[2 * i]);
+    assert.deepEqual(await model.rays([...points[i], 1, 0.3, 0.2]), together[2 * i + 1]);
+  }
+  model.dispose();
+});
+
+test('a budget limits memory, and a heap that is too small is an error', { skip: !large }, async () => {
+  const model = await open(largeBytes), points = new Float64Array(3000).map((_, i) => model.info.origin[i % 3] + model.info.size[i % 3] * ((i * 0.618) % 1));
+  const expected = await model.distance(points), { memory } = model.stats;
+  const part = await open(new Blob([largeBytes]), { memory: Math.ceil(memory / 2) });
+  assert.deepEqual(await part.distance(points), expected);
+  assert.ok(part.stats.memoryPeak <= Math.ceil(memory / 2));
+  part.dispose();
+  model.dispose();
+  for (let heap = 9 << 20; heap < memory; heap *= 1.3)
+    await assert.rejects(open(largeBytes, { heap }), (error) => error instanceof EbpoLimitError && error.status === 'EBPO_E_MEMORY', `heap of ${heap} bytes`);
+});
+
+test('a worker gives equal results and errors', async () => {
+  const { openInWorker } = await import(join(folder, 'worker.js'));
+  const model = await open(small), worker = await openInWorker(small);
+  assert.deepEqual(worker.info, model.info);
+  assert.deepEqual(await worker.distance([0.1, 0.2, 0.3]), await model.distance([0.1, 0.2, 0.3]));
+  const levels = [];
+  for await (const level of worker.levels())
+    levels.push(level.planes.length);
+  assert.equal(levels.length, model.info.levels.length);
+  await assert.rejects(worker.inside([NaN, 0, 0]), EbpoArgumentError);
+  worker.dispose();
+  model.dispose();
+  await assert.rejects(openInWorker(new Uint8Array(5000)), EbpoFormatError);
+});
+
+test('pairs of models', async () => {
+  const { open: openBoth, pair } = await import(join(folder, 'collide.js'));
+  const a = await openBoth(small), b = await openBoth(small, { beside: a }), both = await pair(a, b), poseB = { translation: [3, 0, 0] };
+  assert.equal(await both.relation(), 'equal');
+  assert.equal(await both.relation({ poseB }), 'disjoint');
+  assert.equal(await both.first({ poseB }), null);
+  assert.equal((await both.distance({ poseB })).lo, 2);
+  assert.ok((await both.all({ poseB: { translation: [0.1, 0.1, 0.1] } })).kind.length > 0);
+  both.dispose();
+  await assert.rejects(async () => pair(a, await openBoth(small)), EbpoArgumentError);
+});

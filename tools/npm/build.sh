@@ -1,0 +1,164 @@
+#!/bin/sh
+# Builds the npm package "ebpo": the library as WebAssembly, with its JavaScript interface.
+#   tools/npm/build.sh FOLDER   writes the package to FOLDER/package
+# Needs Debian's emscripten, dpkg-dev, meson and nodejs. The libraries that are linked (zstd, zlib, GMP, nettle)
+# are built from Debian's source packages, which apt downloads and checks. Equal sources give equal bytes.
+set -eu
+[ $# = 1 ] || { echo "usage: tools/npm/build.sh FOLDER" >&2; exit 2; }
+mkdir -p "$1"
+folder=$(cd "$1" && pwd)
+here=$(cd "$(dirname "$0")" && pwd)
+root=$(cd "$here/../.." && pwd)
+sources=$folder/sources deps=$folder/deps
+jobs=${EBPO_JOBS:-$(nproc)}
+# Debian's emcc runs scripts that use Debian's modules for node.
+export NODE_PATH=/usr/share/nodejs
+# The module contains no path of the build; Meson's paths are relative.
+relative=$(realpath --relative-to="$folder/lib" "$root")
+flags="-O3 -msimd128 -ffunction-sections -fdata-sections -Wno-ignored-optimization-argument
+    -ffile-prefix-map=$folder=. -ffile-prefix-map=$root=. -ffile-prefix-map=$relative=."
+
+# Downloads and unpacks the source packages.
+fetch_sources() {
+    sh "$root/tools/packaging/debian_sources.sh" "$sources/files" libzstd zlib gmp nettle
+    for package in "$sources"/files/*.dsc; do
+        name=$(basename "$package" | sed 's/_.*//')
+        rm -rf "${sources:?}/$name"
+        dpkg-source --no-check -x "$package" "$sources/$name" >/dev/null
+    done
+    rm -f "$sources"/*.orig.tar.*
+}
+
+# Makes deps/lib/libNAME.a of C files. Flags are in $options.
+compile_library() { # name, files...
+    name=$1
+    shift
+    rm -rf "$deps/obj/$name"
+    mkdir -p "$deps/obj/$name" "$deps/lib"
+    # shellcheck disable=SC2086
+    (cd "$deps/obj/$name" && printf '%s\n' "$@" |
+        xargs -P "$jobs" -n 1 sh -c 'emcc '"$flags $options"' -c "$0" -o "$(basename "$0" .c).o"')
+    rm -f "$deps/lib/lib$name.a"
+    emar rcsD "$deps/lib/lib$name.a" "$deps/obj/$name"/*.o
+}
+
+# Writes a file for pkg-config.
+describe_library() { # name, version
+    mkdir -p "$deps/pkgconfig"
+    printf 'Name: %s\nDescription: for WebAssembly\nVersion: %s\nCflags: -I%s\nLibs: -L%s -l%s\n' "$1" "$2" \
+        "$deps/include" "$deps/lib" "${1#lib}" >"$deps/pkgconfig/$1.pc"
+}
+
+build_zstd() {
+    zstd=$sources/libzstd/lib
+    options="-DZSTD_DISABLE_ASM -DZSTD_LEGACY_SUPPORT=0 -DZSTD_STRIP_ERROR_STRINGS"
+    compile_library zstd "$zstd"/common/[!pt]*.c "$zstd"/decompress/*.c
+    cp "$zstd"/*.h "$deps/include"
+    describe_library libzstd 1.5.4
+}
+
+build_zlib() {
+    options=
+    compile_library z "$sources"/zlib/inffast.c "$sources"/zlib/inflate.c "$sources"/zlib/inftrees.c \
+        "$sources"/zlib/adler32.c "$sources"/zlib/crc32.c "$sources"/zlib/zutil.c "$sources"/zlib/uncompr.c
+    cp "$sources"/zlib/zlib.h "$sources"/zlib/zconf.h "$deps/include"
+    describe_library zlib 1.2.13
+    sed -i 's/-lzlib/-lz/' "$deps/pkgconfig/zlib.pc"
+}
+
+build_nettle() {
+    mkdir -p "$deps/include/nettle"
+    cp "$sources"/nettle/sha2.h "$sources"/nettle/nettle-types.h "$deps/include/nettle"
+    options=
+    compile_library nettle "$sources"/nettle/sha256.c "$sources"/nettle/sha256-compress.c \
+        "$sources"/nettle/write-be32.c
+    describe_library nettle 3.8.1
+}
+
+build_gmp() {
+    mkdir -p "$deps/gmp" "$sources/gmp/doc"
+    printf 'all:\n' >"$sources/gmp/doc/Makefile.in" # which Debian omits with the manual
+    # Integers and rationals alone, without the functions for output and random numbers.
+    common="assert errno extract-dbl invalid memory mp_bpl mp_clz_tab mp_dv_tab mp_minv_tab mp_get_fns mp_set_fns
+        primesieve tal-reent"
+    (
+        cd "$deps/gmp"
+        CC=emcc AR=emar RANLIB=emranlib NM=emnm CC_FOR_BUILD=cc CFLAGS="$flags" "$sources/gmp/configure" \
+            --host=none --disable-assembly --disable-shared --disable-cxx >configure.log 2>&1
+        {
+            make gmp.h fac_table.h fib_table.h mp_bases.h trialdivtab.h mpn/fib_table.c mpn/mp_bases.c \
+                mpn/jacobitab.h mpn/perfsqr.h sieve_table.h
+            for part in mpn mpz mpq; do make -j"$jobs" -C $part; done
+            # shellcheck disable=SC2046
+            make -j"$jobs" $(printf '%s.lo ' $common)
+        } >make.log 2>&1
+        rm -f "$deps/lib/libgmp.a"
+        emar rcsD "$deps/lib/libgmp.a" ./*.o mpn/*.o mpz/*.o mpq/*.o
+    ) || { tail -n 5 "$deps/gmp"/*.log >&2; exit 1; }
+    cp "$deps/gmp/gmp.h" "$deps/include"
+    describe_library gmp 6.2.1
+}
+
+build_library() {
+    describe_library jansson 2.14 # which meson.build requires; the folders below do not use it
+    words=$(printf "'%s', " $flags "-I$deps/include")
+    cat >"$folder/emscripten.ini" <<EOF
+[binaries]
+c = 'emcc'
+ar = 'emar'
+strip = 'emstrip'
+pkgconfig = 'pkg-config'
+[properties]
+needs_exe_wrapper = true
+pkg_config_libdir = '$deps/pkgconfig'
+[host_machine]
+system = 'emscripten'
+cpu_family = 'wasm32'
+cpu = 'wasm32'
+endian = 'little'
+[built-in options]
+c_args = [${words%, }]
+EOF
+    [ -f "$folder/lib/build.ninja" ] ||
+        meson setup "$folder/lib" "$root" --cross-file "$folder/emscripten.ini" --buildtype=plain \
+            -Dhdf5=disabled -Dhttp=disabled -Dassimp=disabled -Drender=disabled -Dcaptions=disabled \
+            -Dqhull=disabled -Dtests=disabled -Dchart_js=none >"$folder/meson.log"
+    # The folders of lib that the modules use, and all kernels.
+    objects=$(ninja -C "$folder/lib" -t targets all | sed -n 's/: c_COMPILER$//p' | grep -E \
+        '/(core|geometry|io|hdf5_read|hdf5_write|mesh|format|construct|levels|query|extras_collide)_[^/]*\.o$')
+    # shellcheck disable=SC2086
+    ninja -C "$folder/lib" -j"$jobs" $objects >"$folder/ninja.log" ||
+        { tail -n 20 "$folder/ninja.log" >&2; exit 1; }
+    rm -f "$deps/lib/libebpo.a"
+    # shellcheck disable=SC2086
+    (cd "$folder/lib" && emar rcsD "$deps/lib/libebpo.a" $objects)
+}
+
+# Links a module of the package: FILE.wasm of C files in module/.
+link_module() { # file, C files...
+    output=$folder/package/$1
+    shift
+    # shellcheck disable=SC2086
+    (cd "$here/module" && emcc $flags -std=gnu11 -ffp-contract=off -Wall -Wextra \
+        -I"$root/lib/include" -I"$deps/include" "$@" \
+        -L"$deps/lib" -lebpo -lzstd -lz -lgmp -lnettle --no-entry -sSTANDALONE_WASM \
+        -sIMPORTED_MEMORY -sALLOW_MEMORY_GROWTH -sMAXIMUM_MEMORY=4GB -sINITIAL_MEMORY=8MB \
+        -sTOTAL_STACK=2MB -sABORTING_MALLOC=0 -sWASM_BIGINT \
+        -sEXPORTED_FUNCTIONS=_malloc,_free -o "$output")
+}
+
+build_package() {
+    rm -rf "$folder/package"
+    mkdir -p "$folder/package"
+    link_module ebpo.wasm object.c queries.c levels.c check.c no_encoders.c
+    link_module ebpo-collide.wasm object.c queries.c levels.c check.c no_encoders.c collide.c
+    version=$(sed -n "s/^  version: '\(.*\)',$/\1/p" "$root/meson.build")
+    cp "$here"/ebpo/*.js "$here"/ebpo/*.d.ts "$here/ebpo/README.md" "$root/LICENSE" "$folder/package"
+    sed "s/@VERSION@/$version/" "$here/ebpo/package.json.in" >"$folder/package/package.json"
+}
+
+mkdir -p "$deps/include"
+[ -f "$sources/.done" ] || { fetch_sources && touch "$sources/.done"; }
+[ -f "$deps/.done" ] || { build_zstd && build_zlib && build_nettle && build_gmp && touch "$deps/.done"; }
+build_library
+build_package

@@ -1,0 +1,125 @@
+/* Pairs of models for the WebAssembly module with collide. Both models are in one instance. */
+#include <stdlib.h>
+#include <string.h>
+
+#include <ebpo/collide.h>
+
+#include "module.h"
+
+typedef struct ebpo_js_pair {
+    ebpo_js_object object; /* for results and errors */
+    ebpo_collider *collider;
+} ebpo_js_pair;
+
+/* Makes a pair of two models, or of one model twice. A repeated call after EBPO_E_PENDING continues
+ * with the same pair. */
+ebpo_js_pair *EBPO_JS(ebpo_js_pair_new)(void)
+{
+    ebpo_js_pair *pair = calloc(1, sizeof *pair);
+    if (pair)
+        pair->object.error = (ebpo_error)EBPO_ERROR_INIT;
+    return pair;
+}
+
+int EBPO_JS(ebpo_js_pair_make)(ebpo_js_pair *pair, ebpo_js_object *a, ebpo_js_object *b)
+{
+    ebpo_collider_options options = EBPO_COLLIDER_OPTIONS_INIT;
+    options.threads = 1;
+    return ebpo_collider_new(a->model, b->model, &options, &pair->collider, &pair->object.error);
+}
+
+void EBPO_JS(ebpo_js_pair_free)(ebpo_js_pair *pair)
+{
+    ebpo_collider_free(pair->collider);
+    ebpo_js_free_arrays(&pair->object);
+    free(pair);
+}
+
+/* Poses are 13 doubles: rotation, translation, scale. */
+static ebpo_pose read_pose(const double *x)
+{
+    ebpo_pose pose;
+    memcpy(pose.rotation, x, sizeof pose.rotation);
+    memcpy(pose.translation, x + 9, sizeof pose.translation);
+    pose.scale = x[12];
+    return pose;
+}
+
+static ebpo_collide_options read_options(const double *poses)
+{
+    ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
+    options.pose_a = read_pose(poses);
+    options.pose_b = read_pose(poses + 13);
+    return options;
+}
+
+static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
+{
+    ebpo_js_object *object = user;
+    uint32_t(*faces)[2] = ebpo_js_extend(object, 0, count, sizeof *faces);
+    uint8_t *kinds = ebpo_js_extend(object, 1, count, sizeof *kinds);
+    for (uint64_t i = 0; i < count && faces && kinds; i++) {
+        faces[i][0] = (uint32_t)pairs[i].face_a;
+        faces[i][1] = (uint32_t)pairs[i].face_b;
+        kinds[i] = (uint8_t)pairs[i].kind;
+    }
+    return faces && kinds;
+}
+
+/* Array 0: faces [2], uint32. Array 1: ebpo_pair_kind, uint8. Empty: the models do not touch. */
+int EBPO_JS(ebpo_js_pair_first)(ebpo_js_pair *pair, const double *poses)
+{
+    ebpo_collide_options options = read_options(poses);
+    ebpo_face_pair found;
+    int32_t count = 0;
+    ebpo_js_clear(&pair->object);
+    ebpo_status status =
+        ebpo_collide_first(pair->collider, &options, &found, &count, &pair->object.error);
+    if (status == EBPO_OK && count == 1 && !take_pairs(&pair->object, &found, 1))
+        status = EBPO_E_MEMORY;
+    return status;
+}
+
+int EBPO_JS(ebpo_js_pair_all)(ebpo_js_pair *pair, const double *poses)
+{
+    ebpo_collide_options options = read_options(poses);
+    ebpo_js_clear(&pair->object);
+    pair->object.error.status = EBPO_OK;
+    ebpo_status status =
+        ebpo_collide_all(pair->collider, &options, take_pairs, &pair->object, &pair->object.error);
+    return pair->object.error.status == EBPO_E_MEMORY ? EBPO_E_MEMORY : status;
+}
+
+/* Array 0: ebpo_relation and contact, int32. */
+int EBPO_JS(ebpo_js_pair_relation)(ebpo_js_pair *pair, const double *poses)
+{
+    ebpo_collide_options options = read_options(poses);
+    ebpo_relation_result result;
+    ebpo_js_clear(&pair->object);
+    ebpo_status status =
+        ebpo_collide_relation(pair->collider, &options, &result, &pair->object.error);
+    int32_t out[2] = { result.relation, result.contact };
+    return status == EBPO_OK ? ebpo_js_put(&pair->object, 0, out, sizeof out) : status;
+}
+
+/* Array 0: bounds of the distance, and the nearest points, doubles. Array 1: faces [2], uint32. */
+int EBPO_JS(ebpo_js_pair_distance)(ebpo_js_pair *pair, const double *poses, double tolerance)
+{
+    ebpo_collide_options options = read_options(poses);
+    ebpo_clearance_options clearance = EBPO_CLEARANCE_OPTIONS_INIT;
+    ebpo_clearance result;
+    clearance.tolerance = tolerance;
+    ebpo_js_clear(&pair->object);
+    ebpo_status status =
+        ebpo_collide_distance(pair->collider, &options, &clearance, &result, &pair->object.error);
+    if (status != EBPO_OK)
+        return status;
+    double out[8] = { result.distance.lo, result.distance.hi };
+    memcpy(out + 2, result.point_a, sizeof result.point_a);
+    memcpy(out + 5, result.point_b, sizeof result.point_b);
+    uint32_t faces[2] = { (uint32_t)result.pair.face_a, (uint32_t)result.pair.face_b };
+    if (result.pair.face_a == EBPO_NO_FACE)
+        faces[0] = faces[1] = UINT32_MAX;
+    status = ebpo_js_put(&pair->object, 0, out, sizeof out);
+    return status == EBPO_OK ? ebpo_js_put(&pair->object, 1, faces, sizeof faces) : status;
+}

@@ -1,0 +1,50 @@
+/* Interface of the WebAssembly module for tools/npm/ebpo: one object for each opened file. The
+ * results of a call are arrays of the object, which the next call of the object replaces. Sizes and
+ * offsets are doubles, because JavaScript has no 64-bit integers without conversions. */
+#ifndef EBPO_MODULE_H
+#define EBPO_MODULE_H
+
+#include <ebpo/async.h>
+#include <ebpo/ebpo.h>
+
+/* Functions that JavaScript calls by this name. */
+#define EBPO_JS(name) __attribute__((export_name(#name), used)) name
+
+enum { EBPO_JS_ARRAYS = 16 };
+
+/* A growing array. */
+typedef struct ebpo_js_array {
+    uint8_t *data;
+    size_t bytes, capacity;
+} ebpo_js_array;
+
+/* A model; or a query or stream, which borrows `async`, `file` and `model` of a model. */
+typedef struct ebpo_js_object {
+    ebpo_async *async;
+    ebpo_file *file;
+    ebpo_model *model;
+    ebpo_context *context;
+    ebpo_stream *stream;
+    bool within_level; /* the stream has begun a level whose nodes are not all read */
+    ebpo_js_array array[EBPO_JS_ARRAYS];
+    ebpo_error error;
+} ebpo_js_object;
+
+/* Empties all result arrays. */
+void ebpo_js_clear(ebpo_js_object *object);
+
+void ebpo_js_free_arrays(ebpo_js_object *object);
+
+/* Appends bytes to result array n. Returns EBPO_E_MEMORY with an error if they do not fit. */
+EBPO_MUST_USE ebpo_status ebpo_js_put(ebpo_js_object *object, unsigned n, const void *data,
+                                      size_t bytes);
+
+/* Appends uninitialized bytes to result array n. Returns NULL, with an error, if they do not fit.
+ */
+void *ebpo_js_extend(ebpo_js_object *object, unsigned n, uint64_t count, size_t size);
+
+/* Returns result array n with `count` items, zeroed unless it had that size already. Returns NULL,
+ * with an error, if they do not fit. */
+void *ebpo_js_fixed(ebpo_js_object *object, unsigned n, uint64_t count, size_t size);
+
+#endif

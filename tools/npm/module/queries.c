@@ -1,0 +1,231 @@
+/* Queries of many points, rays and boxes for the WebAssembly module. Inputs are arrays of doubles;
+ * results are one array for each member of the library's result structs. Indices of faces have 32
+ * bits; UINT32_MAX is EBPO_NO_FACE. A call after EBPO_E_PENDING has the same arguments and keeps
+ * completed items. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "module.h"
+
+static uint32_t face_index(uint64_t face)
+{
+    return face == EBPO_NO_FACE ? UINT32_MAX : (uint32_t)face;
+}
+
+/* Array of the flags of completed items. */
+enum { DONE = 15 };
+
+static bool *done_flags(ebpo_js_object *object, uint32_t count)
+{
+    return ebpo_js_fixed(object, DONE, count, sizeof(bool));
+}
+
+/* Returns the number of completed items of a query. */
+double EBPO_JS(ebpo_js_completed)(const ebpo_js_object *object)
+{
+    size_t completed = 0;
+    for (size_t i = 0; i < object->array[DONE].bytes; i++)
+        completed += object->array[DONE].data[i];
+    return (double)completed;
+}
+
+/* Array 0: ebpo_where, int8. Array 1: winding numbers, int32. */
+int EBPO_JS(ebpo_js_inside)(ebpo_js_object *object, const double *points, uint32_t count, int level)
+{
+    ebpo_inside_options options = EBPO_INSIDE_OPTIONS_INIT;
+    options.level = level;
+    options.done = done_flags(object, count);
+    ebpo_inside_result *results = ebpo_js_fixed(object, 2, count, sizeof *results);
+    int8_t *where = ebpo_js_fixed(object, 0, count, sizeof *where);
+    int32_t *winding = ebpo_js_fixed(object, 1, count, sizeof *winding);
+    if (!options.done || !results || !where || !winding)
+        return EBPO_E_MEMORY;
+    ebpo_status status =
+        ebpo_inside_many(object->context, points, count, &options, results, &object->error);
+    for (uint32_t i = 0; i < count && status == EBPO_OK; i++) {
+        where[i] = (int8_t)results[i].where;
+        winding[i] = results[i].winding;
+    }
+    return status;
+}
+
+/* Arrays 0 and 1: distances and upper bounds, 2 and 3: points and normals [3], doubles. Array 4:
+ * faces. Array 5: lower bounds. */
+int EBPO_JS(ebpo_js_distance)(ebpo_js_object *object, const double *points, uint32_t count,
+                              int level, double max_distance, int is_unsigned)
+{
+    ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
+    options.level = level;
+    options.max_distance = max_distance;
+    options.unsigned_distance = is_unsigned;
+    options.done = done_flags(object, count);
+    ebpo_distance_result *results = ebpo_js_fixed(object, 6, count, sizeof *results);
+    double *distance = ebpo_js_fixed(object, 0, count, sizeof *distance);
+    double *hi = ebpo_js_fixed(object, 1, count, sizeof *hi);
+    double(*point)[3] = ebpo_js_fixed(object, 2, count, sizeof *point);
+    double(*normal)[3] = ebpo_js_fixed(object, 3, count, sizeof *normal);
+    uint32_t *face = ebpo_js_fixed(object, 4, count, sizeof *face);
+    double *lo = ebpo_js_fixed(object, 5, count, sizeof *lo);
+    if (!options.done || !results || !distance || !hi || !point || !normal || !face || !lo)
+        return EBPO_E_MEMORY;
+    ebpo_status status =
+        ebpo_distance_many(object->context, points, count, &options, results, &object->error);
+    for (uint32_t i = 0; i < count && status == EBPO_OK; i++) {
+        const ebpo_distance_result *r = &results[i];
+        distance[i] = r->distance;
+        hi[i] = r->hi;
+        lo[i] = r->lo;
+        memcpy(point[i], r->point, sizeof r->point);
+        memcpy(normal[i], r->normal, sizeof r->normal);
+        face[i] = face_index(r->face);
+    }
+    return status;
+}
+
+static bool take_near_face(void *user, const ebpo_near_face *near)
+{
+    ebpo_js_object *object = user;
+    uint32_t face = face_index(near->face);
+    return ebpo_js_put(object, 0, &near->distance, sizeof near->distance) == EBPO_OK &&
+           ebpo_js_put(object, 2, near->point, sizeof near->point) == EBPO_OK &&
+           ebpo_js_put(object, 3, near->normal, sizeof near->normal) == EBPO_OK &&
+           ebpo_js_put(object, 4, &face, sizeof face) == EBPO_OK;
+}
+
+/* The faces nearest to a point, in arrays as ebpo_js_distance. `most` 0: all. */
+int EBPO_JS(ebpo_js_within)(ebpo_js_object *object, const double *point, double radius, double most)
+{
+    ebpo_within_options options = EBPO_WITHIN_OPTIONS_INIT;
+    options.radius = radius;
+    options.most = (uint64_t)most;
+    ebpo_js_clear(object);
+    object->error.status = EBPO_OK;
+    ebpo_status status = ebpo_distance_within(object->context, point, &options, take_near_face,
+                                              object, &object->error);
+    return object->error.status == EBPO_E_MEMORY ? EBPO_E_MEMORY : status;
+}
+
+/* ---- rays ---- */
+
+/* Puts rays of doubles [count][6] (origin and direction) into array 6. */
+static ebpo_ray *make_rays(ebpo_js_object *object, const double *lines, uint32_t count,
+                           double t_max)
+{
+    ebpo_ray *rays = ebpo_js_fixed(object, 6, count, sizeof *rays);
+    for (uint32_t i = 0; i < count && rays; i++) {
+        memcpy(rays[i].origin, lines + 6 * (size_t)i, sizeof rays[i].origin);
+        memcpy(rays[i].direction, lines + 6 * (size_t)i + 3, sizeof rays[i].direction);
+        rays[i].t_max = t_max;
+    }
+    return rays;
+}
+
+/* Puts t into array 0, faces into array 1, sides into array 2. */
+static ebpo_status put_hits(ebpo_js_object *object, const ebpo_ray_hit *hits, uint64_t count)
+{
+    double *t = ebpo_js_fixed(object, 0, count, sizeof *t);
+    uint32_t *face = ebpo_js_fixed(object, 1, count, sizeof *face);
+    int8_t *side = ebpo_js_fixed(object, 2, count, sizeof *side);
+    if (!t || !face || !side)
+        return EBPO_E_MEMORY;
+    for (uint64_t i = 0; i < count; i++) {
+        t[i] = hits[i].t;
+        face[i] = face_index(hits[i].face);
+        side[i] = (int8_t)hits[i].side;
+    }
+    return EBPO_OK;
+}
+
+static ebpo_ray_options ray_options(int sides)
+{
+    ebpo_ray_options options = EBPO_RAY_OPTIONS_INIT;
+    options.sides = (ebpo_ray_sides)sides;
+    options.threads = 1;
+    return options;
+}
+
+int EBPO_JS(ebpo_js_ray_first)(ebpo_js_object *object, const double *lines, uint32_t count,
+                               double t_max, int sides)
+{
+    ebpo_ray_options options = ray_options(sides);
+    options.done = done_flags(object, count);
+    ebpo_ray *rays = make_rays(object, lines, count, t_max);
+    ebpo_ray_hit *hits = ebpo_js_fixed(object, 7, count, sizeof *hits);
+    if (!options.done || !rays || !hits)
+        return EBPO_E_MEMORY;
+    ebpo_status status =
+        ebpo_ray_first_many(object->context, rays, count, &options, hits, &object->error);
+    return status == EBPO_OK ? put_hits(object, hits, count) : status;
+}
+
+/* As ebpo_js_ray_first, all hits. Array 3: index of the first hit of each ray, and the count. */
+int EBPO_JS(ebpo_js_ray_all)(ebpo_js_object *object, const double *lines, uint32_t count,
+                             double t_max, int sides)
+{
+    const ebpo_ray_hit *hits = NULL;
+    const uint64_t *begin = NULL;
+    ebpo_ray_options options = ray_options(sides);
+    ebpo_js_clear(object);
+    ebpo_ray *rays = make_rays(object, lines, count, t_max);
+    uint32_t *first = ebpo_js_extend(object, 3, (uint64_t)count + 1, sizeof *first);
+    if (!rays || !first)
+        return EBPO_E_MEMORY;
+    ebpo_status status =
+        ebpo_ray_all_many(object->context, rays, count, &options, &hits, &begin, &object->error);
+    if (status != EBPO_OK)
+        return status;
+    for (uint32_t i = 0; i <= count; i++)
+        first[i] = (uint32_t)begin[i];
+    return put_hits(object, hits, begin[count]);
+}
+
+/* Array 0: 1 for each ray that hits, else 0. */
+int EBPO_JS(ebpo_js_ray_any)(ebpo_js_object *object, const double *lines, uint32_t count,
+                             double t_max, int sides)
+{
+    ebpo_ray_options options = ray_options(sides);
+    options.done = done_flags(object, count);
+    ebpo_ray *rays = make_rays(object, lines, count, t_max);
+    bool *any = ebpo_js_fixed(object, 0, count, sizeof *any);
+    if (!options.done || !rays || !any)
+        return EBPO_E_MEMORY;
+    return ebpo_ray_any_many(object->context, rays, count, &options, any, &object->error);
+}
+
+/* ---- boxes ---- */
+
+/* Array 0: the faces that intersect the box; `box` is min, then max. */
+int EBPO_JS(ebpo_js_box_faces)(ebpo_js_object *object, const double *box)
+{
+    const uint64_t *faces = NULL;
+    uint64_t count = 0;
+    ebpo_js_clear(object);
+    ebpo_status status =
+        ebpo_faces_in_box(object->context, box, box + 3, &faces, &count, &object->error);
+    uint32_t *out = status == EBPO_OK ? ebpo_js_extend(object, 0, count, sizeof *out) : NULL;
+    if (!out)
+        return status == EBPO_OK ? EBPO_E_MEMORY : status;
+    for (uint64_t i = 0; i < count; i++)
+        out[i] = face_index(faces[i]);
+    return EBPO_OK;
+}
+
+static bool take_triangles(void *user, const ebpo_triangles *triangles)
+{
+    ebpo_js_object *object = user;
+    uint32_t *faces = ebpo_js_extend(object, 0, triangles->count, sizeof *faces);
+    for (uint64_t i = 0; i < triangles->count && faces; i++)
+        faces[i] = face_index(triangles->faces[i]);
+    return faces && ebpo_js_put(object, 1, triangles->corners,
+                                (size_t)triangles->count * sizeof *triangles->corners) == EBPO_OK;
+}
+
+/* As ebpo_js_box_faces, with the corners of the triangles [3][3] in array 1. */
+int EBPO_JS(ebpo_js_box_triangles)(ebpo_js_object *object, const double *box)
+{
+    ebpo_js_clear(object);
+    object->error.status = EBPO_OK;
+    ebpo_status status = ebpo_triangles_in_box(object->context, box, box + 3, take_triangles,
+                                               object, &object->error);
+    return object->error.status == EBPO_E_MEMORY ? EBPO_E_MEMORY : status;
+}

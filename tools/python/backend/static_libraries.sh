@@ -1,0 +1,88 @@
+#!/bin/sh
+# Builds the libraries that the wheel's library contains, as static libraries from Debian's source packages:
+#
+#     CC=COMPILER sh static_libraries.sh PREFIX
+#
+# Writes PREFIX/lib, PREFIX/include and PREFIX/licences. Packages in $EBPO_SOURCES (a folder with .dsc files) are
+# used; without this variable debian_sources.sh downloads them.
+# The symbols are hidden, so that other copies of these libraries in the same process are not affected.
+set -eu
+here=$(cd "$(dirname "$0")" && pwd)
+prefix=$1
+mkdir -p "$prefix/lib" "$prefix/licences"
+prefix=$(cd "$prefix" && pwd)
+work=$(mktemp -d "${TMPDIR:-/tmp}/ebpo-libraries-XXXXXX")
+trap 'rm -rf "$work"' EXIT
+trap 'exit 1' HUP INT TERM
+exec 3>&1 >"$prefix/log.txt" 2>&1
+failed() { echo "static_libraries.sh: $1 failed; the messages are in $prefix/log.txt" >&3 && exit 1; }
+
+names="zlib libzstd gmp nettle jansson hdf5"
+sources=${EBPO_SOURCES:-$work}
+if [ -z "${EBPO_SOURCES:-}" ]; then
+    # shellcheck disable=SC2086 # a list of names
+    sh "$here/../../packaging/debian_sources.sh" "$work" $names || failed "the download of $names"
+fi
+
+export CC CFLAGS="-O2 -fPIC -fvisibility=hidden -ffile-prefix-map=$work=. ${CFLAGS:-}" AR="${AR:-ar}"
+export RANLIB="${RANLIB:-ranlib}" PKG_CONFIG_LIBDIR="$prefix/lib/pkgconfig" CPPFLAGS="-I$prefix/include"
+export LDFLAGS="-L$prefix/lib" LC_ALL=C
+jobs=$(nproc)
+machine=$(uname -m)-pc-linux-gnu # without it GMP uses instructions that only this processor has
+common="--prefix=$prefix --libdir=$prefix/lib --disable-shared --enable-static --with-pic --build=$machine
+    --host=$machine"
+hdf5="--disable-hl --disable-fortran --disable-cxx --disable-tests --disable-tools --disable-parallel
+    --enable-build-mode=production --disable-embedded-libinfo --without-szlib --with-zlib=$prefix"
+
+# shellcheck disable=SC2086 # lists of options
+build() {
+    case $1 in
+    zlib) ./configure --static --prefix="$prefix" && make -j"$jobs" libz.a && make install ;;
+    libzstd)
+        make -j"$jobs" -C lib libzstd.a ZSTD_LEGACY_SUPPORT=0 &&
+            make -C lib install-static install-includes install-pc PREFIX="$prefix" LIBDIR="$prefix/lib"
+        ;;
+    gmp) # Debian's source has no manual
+        mkdir -p doc && printf 'all install:\n' >doc/Makefile.in &&
+            ./configure $common && make -j"$jobs" && make install
+        ;;
+    nettle)
+        ./configure $common --disable-public-key --disable-documentation --disable-openssl --enable-fat &&
+            make -j"$jobs" libnettle.a nettle.pc && make install-static install-headers install-pkgconfig
+        ;;
+    jansson) # its configure script is not in the source
+        cd src && : >jansson_private_config.h &&
+            sed 's/@json_inline@/inline/; s/@json_[a-z_]*@/1/' jansson_config.h.in >jansson_config.h &&
+            for file in *.c; do
+                $CC $CFLAGS -I. -DINITIAL_HASHTABLE_ORDER=3 -DUSE_URANDOM -DHAVE_ATOMIC_BUILTINS $(printf ' -DHAVE_%s' \
+                    STDINT_H UNISTD_H FCNTL_H SYS_TIME_H GETPID GETTIMEOFDAY OPEN CLOSE READ LOCALE_H) -c "$file" ||
+                    return 1
+            done && "$AR" rcs "$prefix/lib/libjansson.a" ./*.o && cp jansson.h jansson_config.h "$prefix/include" &&
+            describe jansson "" "$2"
+        ;;
+    hdf5)
+        CFLAGS="$CFLAGS -w -Wno-implicit-int" ./configure $common $hdf5 && make -j"$jobs" -C src &&
+            make -C src install && describe hdf5 "-lz -lm -ldl" "$2" &&
+            mv "$prefix/lib/pkgconfig/hdf5.pc" "$prefix/lib/pkgconfig/hdf5-serial.pc"
+        ;;
+    esac
+}
+
+# Writes the file NAME.pc of a library that has none.
+describe() {
+    printf 'Name: %s\nDescription: %s\nVersion: %s\nLibs: -L%s -l%s %s\nCflags: -I%s\n' "$1" "$1" "$3" \
+        "$prefix/lib" "$1" "$2" "$prefix/include" >"$prefix/lib/pkgconfig/$1.pc"
+}
+
+for name in $names; do
+    [ -f "$prefix/licences/$name.txt" ] && continue
+    echo "building $name" >&3
+    for found in "$sources/$name"_*.dsc; do
+        (cd "$work" && dpkg-source --no-check -x "$found" "$name") || failed "unpacking $found"
+    done
+    version=$(sed -n 's/^Version: \([0-9.]*\).*/\1/p' "$found")
+    (cd "$work/$name" && build "$name" "$version") || failed "$name"
+    (cd "$work/$name" && for file in debian/copyright COPYING* LICENSE*; do
+        [ ! -f "$file" ] || printf '%s:\n\n%s\n\n' "${file##*/}" "$(cat "$file")"
+    done) >"$prefix/licences/$name.txt"
+done
