@@ -538,7 +538,8 @@ static bool is_chosen(const choice *c, const ebpo_array_out *a)
     switch (c->kind) {
     case WHOLE: return here;
     case TOP_INDEXES:
-        return (here && index) || a->id == EBPO_A_SUBTREE_INDEX || a->id == EBPO_A_FACES_INDEX;
+        return (here && index) || a->id == EBPO_A_SUBTREE_INDEX || a->id == EBPO_A_FACES_INDEX ||
+               a->id == EBPO_A_BORDER_LOOPS || a->id == EBPO_A_BORDER_POINTS;
     case NODES: return here && !index && !is_of_faces(a->id);
     case LISTS: return here && is_of_faces(a->id);
     /* query results contain source face indices, which are read together with the faces */

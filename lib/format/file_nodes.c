@@ -136,7 +136,7 @@ ebpo_status ebpo_chunks_winding(ebpo_chunks *chunks, const ebpo_node *node, int3
     ebpo_status status = ebpo_chunks_check_node(chunks, node, error);
     if (status != EBPO_OK)
         return status;
-    if (!info->solid)
+    if (!info->solid && !(info->parts & EBPO_PART_BORDER))
         return ebpo_fail_file(error, EBPO_E_NOT_SOLID, chunks->file->in.shown,
                               "the model is a surface and has no winding numbers; repair the "
                               "mesh and build again");

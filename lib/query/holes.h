@@ -1,69 +1,64 @@
-/* Inside of a mesh with holes, by its generalized winding number. */
+/* Inside of a surface with its border, by its generalized winding number. */
 #ifndef EBPO_QUERY_HOLES_H
 #define EBPO_QUERY_HOLES_H
 
+#include <stdatomic.h>
+
 #include <ebpo/query.h>
 
+#include "geometry/cap_tree.h"
 #include "geometry/cells.h"
 #include "query/accel.h"
-#include "query/cap_tree.h"
 
-/* The border of a surface that is all in memory, and the rule. Any thread. */
+/* The caps of a surface, and the rule. Any thread. */
 typedef struct ebpo_holes {
     ebpo_cap_tree caps;
     ebpo_cap_rule rule;
-    double low[3], high[3]; /* the faces are between these corners */
-    _Atomic uint64_t ties;  /* number of decisions that were ties */
-    /* set by ebpo_holes_attach */
-    const ebpo_accel *whole;
-    ebpo_locator locator;
-    /* What is known of the octree's cells, found by the first query of each (hole_cells.c): cells
-     * of the grid of `whole`, then children of groups; and leaves. NULL: unused. */
-    _Atomic uint8_t *cell, *leaf;
-    _Atomic int32_t *leaf_winding; /* of mesh and caps at the lowest corner, shifted */
-    uint64_t cell_count, leaf_count;
+    _Atomic uint64_t ties; /* number of decisions that were ties */
 } ebpo_holes;
 
-/* Finds the border of a mesh, whose faces are in the box of `info`. */
-EBPO_MUST_USE ebpo_status ebpo_holes_make(ebpo_holes **out, const ebpo_mesh *mesh,
-                                          const ebpo_info *info, double threshold, unsigned threads,
+/* Reads the border of a file with EBPO_PART_BORDER. */
+EBPO_MUST_USE ebpo_status ebpo_holes_read(ebpo_holes **out, const ebpo_file *file, double threshold,
                                           ebpo_error *error);
-/* Prepares queries; `whole` and `locator` are the model's. Without memory, queries are slow. */
-void ebpo_holes_attach(ebpo_holes *holes, const ebpo_accel *whole, const ebpo_locator *locator);
 void ebpo_holes_free(ebpo_holes *holes); /* accepts NULL */
 uint64_t ebpo_holes_bytes(const ebpo_holes *holes);
+/* Returns an upper bound of the bytes that a model uses for its border, also while it is read. */
+static inline uint64_t ebpo_holes_estimate(const ebpo_info *info)
+{
+    return info->parts & EBPO_PART_BORDER ? 4096 + 224 * info->border_points : 0;
+}
 
-/* Finds the winding number of mesh and caps at a finite point, shifted. Returns false if p is on a
- * face; the number is then set only if `on_faces_too`. */
-bool ebpo_holes_crossings(const ebpo_holes *holes, const double p[3], bool on_faces_too,
-                          int32_t *winding);
+/* Decides what is constant in the cells of a table's nodes, and marks these nodes. Uniform entries
+ * get a number of ebpo_marked_entry in place of the winding number at their lowest corner. A leaf
+ * that is marked EBPO_NEAR_BORDER is decided point by point; in other leaves the rule for the
+ * integer winding number decides, as in a solid. `leaf` may be NULL if the table has no leaves.
+ * Returns EBPO_E_LIMIT for winding numbers beyond 2^26. */
+EBPO_MUST_USE ebpo_status ebpo_holes_mark(const ebpo_holes *holes, const ebpo_box *box,
+                                          ebpo_cell root, ebpo_node_table *table,
+                                          ebpo_accel_leaf *leaf, ebpo_error *error);
 
-/* Classifies a finite point. */
-ebpo_where ebpo_holes_where(ebpo_holes *holes, const double p[3]);
-/* Bounds the winding number of a finite point with an error of at most width / 2, if doubles
- * suffice. Returns false on a face. */
-bool ebpo_holes_winding(const ebpo_holes *holes, const double p[3], double width,
-                        ebpo_bounded *out);
+/* Results for all points of a white node of a surface. */
+typedef enum ebpo_uniform_mark {
+    EBPO_MARK_OUT = 0,
+    EBPO_MARK_IN = 1,
+    EBPO_MARK_NEAR = 2 /* decided point by point */
+} ebpo_uniform_mark;
 
-/* What a point's cell decides. */
-typedef enum ebpo_cell_decision {
-    EBPO_CELL_UNKNOWN, /* not examined yet */
-    EBPO_CELL_OUT,
-    EBPO_CELL_IN,
-    EBPO_CELL_FAR, /* a leaf far from the border: as in a solid */
-    EBPO_CELL_NEAR /* nothing */
-} ebpo_cell_decision;
+static inline int32_t ebpo_marked_entry(int32_t winding, ebpo_uniform_mark mark)
+{
+    return winding * 4 + (int32_t)mark;
+}
+static inline ebpo_uniform_mark ebpo_entry_mark(int32_t marked)
+{
+    return (ebpo_uniform_mark)((uint32_t)marked & 3);
+}
+static inline int32_t ebpo_unmarked_winding(int32_t marked) { return (marked - (marked & 3)) / 4; }
 
-typedef struct ebpo_holes_cell {
-    ebpo_cell_decision decision;
-    /* EBPO_CELL_FAR: the leaf, its level, the winding number at its lowest corner, and the shifted
-     * position of the point */
-    uint32_t leaf;
-    int level;
-    int32_t winding;
-    ebpo_position position;
-} ebpo_holes_cell;
+/* Returns the crossings of caps on the way from the lowest corner of a cell to a point in it, both
+ * shifted: along x, then y, then z. */
+int32_t ebpo_holes_crossings(const ebpo_holes *holes, const double low[3], const double p[3]);
 
-void ebpo_holes_find_cell(ebpo_holes *holes, const double p[3], ebpo_holes_cell *out);
+/* Classifies a point that is on no face; `winding` is that of surface and caps. */
+ebpo_where ebpo_holes_where(ebpo_holes *holes, const double p[3], int32_t winding);
 
 #endif

@@ -63,10 +63,6 @@ ebpo_status ebpo_check_solid(const ebpo_model *model, ebpo_error *error)
 {
     if (model->info->solid)
         return EBPO_OK;
-    if (model->options.holes)
-        return ebpo_fail(error, EBPO_E_LIMIT,
-                         "the inside of a surface needs the model complete and all in memory; give "
-                         "a file that is not a subset, and more memory (--memory 0)");
     return ebpo_fail(error, EBPO_E_NOT_SOLID,
                      "the model is a surface: it has no inside; run 'ebpo check' on its source "
                      "to see the repairs that make a solid, and 'ebpo convert --repair' to apply "
@@ -191,6 +187,13 @@ void ebpo_model_count_kind(ebpo_model *m, const ebpo_accel_leaf *leaf)
         ebpo_leaf_kind_of(leaf) == EBPO_LEAF_GENERAL && leaf->cell_face != EBPO_NO_CELL_FACE;
 }
 
+/* Marks the nodes of a surface with its border. */
+static ebpo_status mark_accel(const ebpo_model *m, ebpo_accel *s, ebpo_error *error)
+{
+    return m->holes ? ebpo_holes_mark(m->holes, &s->box, s->root.cell, &s->nodes, s->leaf, error)
+                    : EBPO_OK;
+}
+
 static ebpo_status load_subtree(void *user, uint64_t key, uint64_t most, void **item,
                                 uint64_t *bytes, ebpo_error *error)
 {
@@ -202,6 +205,11 @@ static ebpo_status load_subtree(void *user, uint64_t key, uint64_t most, void **
                                                 ebpo_subtree_needs(key & 1), &space, error);
     if (status == EBPO_OK)
         status = ebpo_accel_make_within(&subtree, &slice, m->info, &space, key & 1, 1, error);
+    if (status == EBPO_OK && mark_accel(m, subtree, error) != EBPO_OK) {
+        ebpo_accel_free(subtree);
+        subtree = NULL;
+        status = EBPO_E_LIMIT;
+    }
     if (status == EBPO_OK) {
         ebpo_model_count_leaves(m, subtree, 1);
         ebpo_skeletons_keep(m->skeletons, key >> 1, subtree);
@@ -244,21 +252,12 @@ static ebpo_status open_whole(ebpo_model *m, ebpo_error *error)
     ebpo_slice slice;
     ebpo_quota space = { .most = m->options.memory };
     ebpo_status status = ebpo_slice_read_all(&slice, m->file, m->options.threads, error);
-    bool surface = !m->info->solid && !m->info->pruned && m->info->parts & EBPO_PART_MESH;
-    if (status == EBPO_OK && m->options.holes && surface) {
-        status = ebpo_holes_make(&m->holes, &slice.mesh, m->info, m->options.threshold,
-                                 m->options.threads, error);
-        if (status != EBPO_OK)
-            ebpo_slice_free(&slice);
-    }
     if (status == EBPO_OK)
         status = ebpo_accel_make_within(&m->whole, &slice, m->info, space.most ? &space : NULL,
                                         true, m->options.threads, error);
     if (m->whole)
         ebpo_model_count_leaves(m, m->whole, 1);
-    if (m->whole && m->holes)
-        ebpo_holes_attach(m->holes, m->whole, &m->locator);
-    return status;
+    return status == EBPO_OK ? mark_accel(m, m->whole, error) : status;
 }
 
 /* Makes caches under the model's own budget; 0: no limit. */
@@ -309,6 +308,12 @@ static ebpo_status open_top(ebpo_model *m, int cut_level, ebpo_error *error)
 {
     ebpo_cache_source source = { m, estimate_subtree, load_subtree, release_subtree };
     ebpo_status status = ebpo_top_read(&m->top, m->file, cut_level, m->options.threads, error);
+    if (status == EBPO_OK && m->holes) {
+        ebpo_box box = ebpo_root_box(m->info);
+        m->top->bytes += ebpo_holes_bytes(m->holes);
+        status = ebpo_holes_mark(m->holes, &box, (ebpo_cell){ 0, { 0, 0, 0 } }, &m->top->nodes,
+                                 NULL, error);
+    }
     if (status == EBPO_OK)
         status = m->options.budget ? make_shared(m, &source, error) : make_own(m, &source, error);
     uint64_t skeletons = status == EBPO_OK ? skeleton_capacity(m) : 0;
@@ -353,10 +358,9 @@ static ebpo_status open_parts(ebpo_model *m, ebpo_error *error)
     return status == EBPO_OK ? open_top(m, plan.cut_level, error) : status;
 }
 
-/* Checks the options for surfaces. */
-static ebpo_status check_holes(const ebpo_model_options *o, ebpo_error *error)
+static ebpo_status check_threshold(const ebpo_model_options *o, ebpo_error *error)
 {
-    if (!o->holes || (o->threshold >= 0x1p-10 && o->threshold <= 1 - 0x1p-10))
+    if (o->threshold >= 0x1p-10 && o->threshold <= 1 - 0x1p-10)
         return EBPO_OK;
     return ebpo_fail(error, EBPO_E_ARGUMENT,
                      "threshold %g of the winding number is out of range; give a number from "
@@ -372,7 +376,7 @@ ebpo_status ebpo_model_new(const ebpo_file *file, const ebpo_model_options *opti
     *out = NULL;
     ebpo_status status = EBPO_TAKE(ebpo_model_options, &wanted, options, error);
     if (status == EBPO_OK)
-        status = check_holes(&wanted, error);
+        status = check_threshold(&wanted, error);
     if (status != EBPO_OK)
         return status;
     ebpo_model *m = ebpo_alloc_zero(1, sizeof *m);
@@ -386,12 +390,15 @@ ebpo_status ebpo_model_new(const ebpo_file *file, const ebpo_model_options *opti
     m->options = wanted;
     m->kernels = ebpo_query_kernels_best();
     m->default_memory = ebpo_default_memory(file, &m->options);
-    status = open_parts(m, error);
+    if (m->info->parts & EBPO_PART_BORDER)
+        status = ebpo_holes_read(&m->holes, file, wanted.threshold, error);
+    if (status == EBPO_OK)
+        status = open_parts(m, error);
     if (status != EBPO_OK) {
         ebpo_model_free(m);
         return status;
     }
-    m->results_inside = m->whole && m->info->solid && m->info->parts & EBPO_PART_MESH;
+    m->results_inside = m->whole && (m->info->solid || m->holes) && m->info->parts & EBPO_PART_MESH;
     m->open_seconds = (double)(ebpo_clock() - begin) * 1e-9;
     *out = m;
     return EBPO_OK;
@@ -438,9 +445,9 @@ static void gather_stats(const ebpo_model *m, ebpo_model_stats *out)
     out->leaves_one_cell_face = m->leaves_one_cell_face;
     for (int k = 0; k < 5; k++)
         out->leaves_of_kind[k] = m->leaves_of_kind[k];
+    out->ties = m->holes ? m->holes->ties : 0;
     if (m->whole) {
         out->memory = out->memory_peak = ebpo_accel_bytes(m->whole) + ebpo_holes_bytes(m->holes);
-        out->ties = m->holes ? m->holes->ties : 0;
         return;
     }
     ebpo_cache_stats subtrees, chunks;

@@ -20,14 +20,14 @@ ebpo_status ebpo_winding(ebpo_context *context, const double *points, uint64_t c
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
         ebpo_bounded w = { 0, 0 };
         bool apart = true;
-        if (m->holes) {
-            apart = ebpo_holes_winding(m->holes, points + 3 * i, width, &w);
-        } else {
-            ebpo_inside_result r;
-            status = ebpo_inside(context, points + 3 * i, NULL, &r, error);
-            apart = status == EBPO_OK && r.where != EBPO_ON;
-            w.middle = apart ? r.winding : 0;
-        }
+        ebpo_inside_result r;
+        context->undecided = m->holes != NULL;
+        status = ebpo_inside(context, points + 3 * i, NULL, &r, error);
+        context->undecided = false;
+        apart = status == EBPO_OK && r.where != EBPO_ON;
+        w.middle = apart ? r.winding : 0;
+        if (apart && m->holes)
+            w = ebpo_cap_winding(&m->holes->caps, points + 3 * i, r.winding, width);
         out[i] = apart ? (ebpo_winding_bounds){ w.middle - w.error, w.middle + w.error } : none;
     }
     return status;

@@ -16,7 +16,7 @@
 #include "geometry/predicates.h"
 #include "mesh/border.h"
 #include "mesh/mesh_parts.h"
-#include "query/cap_tree.h"
+#include "geometry/cap_tree.h"
 #include "solids.h"
 
 /* ---- the judge ---- */

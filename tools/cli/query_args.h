@@ -13,7 +13,7 @@ typedef struct query_values {
     int64_t cut_level, threads, level, nearest, together;
     double max_distance, tmax, within, threshold;
     int inside_mode, distance_mode, ray_sides; /* indices into the word lists below */
-    bool prefetch, raw, json, unsigned_distance, no_warm, all, any, header, csv, npy, force, holes;
+    bool prefetch, raw, json, unsigned_distance, no_warm, all, any, header, csv, npy, force;
     remote_values remote;
 } query_values;
 #define QUERY_VALUES_INIT                                                         \

@@ -99,24 +99,19 @@ typedef struct ebpo_model_options {
     ebpo_budget *budget;
 
     /*
-     * Surfaces have an inside, and signed distances, by the generalized winding number w: the sum
-     * of the solid angles of all faces, divided by 4 pi. The file's winding rule defines the
-     * inside: nonzero: |w| > threshold; positive: w > threshold; evenodd: |w - e| > threshold,
-     * where e is the nearest even integer. Decisions are exact. Where w equals the boundary of the
-     * rule, or 512 bits do not decide, a point is outside, and ebpo_model_stats.ties counts it. The
-     * model has to be complete, and all in memory; otherwise ebpo_inside and ebpo_winding return
-     * EBPO_E_LIMIT, and distances have no signs. No effect for solids.
+     * For surfaces with EBPO_PART_BORDER, from 1/1024 to 1023/1024. They have an inside, and signed
+     * distances, by the generalized winding number w: the sum of the solid angles of all faces,
+     * divided by 4 pi. The file's winding rule defines the inside: nonzero: |w| > threshold;
+     * positive: w > threshold; evenodd: |w - e| > threshold, where e is the nearest even integer.
+     * Decisions are exact. Where w equals the boundary of the rule, or 512 bits do not decide, a
+     * point is outside, and ebpo_model_stats.ties counts it.
      */
-    bool holes;
-
-    /* From 1/1024 to 1023/1024; used with `holes`. */
     double threshold;
 } ebpo_model_options;
 
-#define EBPO_MODEL_OPTIONS_INIT                                                                    \
-    {                                                                                              \
-        sizeof(ebpo_model_options), 0, -1, EBPO_LOAD_CACHE, false, 0, { NULL, NULL }, NULL, false, \
-            0.5                                                                                    \
+#define EBPO_MODEL_OPTIONS_INIT                                                                 \
+    {                                                                                           \
+        sizeof(ebpo_model_options), 0, -1, EBPO_LOAD_CACHE, false, 0, { NULL, NULL }, NULL, 0.5 \
     }
 
 /* The part of a file that is in memory, prepared for fast queries. Threads may share a model. */
@@ -269,7 +264,7 @@ typedef struct ebpo_model_stats {
      */
     uint64_t skeleton_bytes;
 
-    /* Decisions of points in a surface (ebpo_model_options.holes) that were ties. */
+    /* Decisions of points in a surface (ebpo_model_options.threshold) that were ties. */
     uint64_t ties;
 } ebpo_model_stats;
 
@@ -410,10 +405,9 @@ typedef struct ebpo_inside_result {
     int32_t where;
 
     /*
-     * Winding number; for a surface (ebpo_model_options.holes), 1 inside and 0 outside. 0 for
-     * EBPO_ON and EBPO_MAYBE. With a level or deadline, 0 also if an envelope
-     * decided that the point is outside. The true winding number may then differ from 0 with rules
-     * other than EBPO_RULE_NONZERO.
+     * Winding number; for a surface, 1 inside and 0 outside. 0 for EBPO_ON and EBPO_MAYBE. With a
+     * level or deadline, 0 also if an envelope decided that the point is outside. The true winding
+     * number may then differ from 0 with rules other than EBPO_RULE_NONZERO.
      */
     int32_t winding;
 
@@ -428,8 +422,9 @@ typedef struct ebpo_inside_result {
  * Classifies a point as inside, outside or on the surface (BP 2008, section 5.2.1; EBP 2017,
  * section 4.2).
  *
- * EBPO_E_NOT_SOLID: the model is a surface, and ebpo_model_options.holes is false. EBPO_E_ABSENT:
- * the file has no mesh and no level is given, or a subset lacks the required data.
+ * EBPO_E_NOT_SOLID: the model is a surface without EBPO_PART_BORDER. EBPO_E_ARGUMENT: a surface,
+ * and a level or deadline. EBPO_E_ABSENT: the file has no mesh and no level is given, or a subset
+ * lacks the required data.
  *
  * Threads: one per context.
  */
@@ -453,10 +448,10 @@ typedef struct ebpo_winding_bounds {
 } ebpo_winding_bounds;
 
 /*
- * Bounds the winding numbers of points[count][3], into out[count]. For a surface
- * (ebpo_model_options.holes), hi - lo is at most `width`, at least 0, where double precision allows
- * it: down to about 1e-14 for small meshes, and far more near an edge of the border. For a solid,
- * both bounds are the integer winding number.
+ * Bounds the winding numbers of points[count][3], into out[count]. For a surface with
+ * EBPO_PART_BORDER, hi - lo is at most `width`, at least 0, where double precision allows it: down
+ * to about 1e-14 for small meshes, and far more near an edge of the border. For a solid, both
+ * bounds are the integer winding number.
  *
  * EBPO_E_NOT_SOLID, EBPO_E_ABSENT as for ebpo_inside.
  *
@@ -505,7 +500,7 @@ typedef struct ebpo_distance_options {
 
     /*
      * True: the sign is not computed, which is faster. Surfaces have a sign only with
-     * ebpo_model_options.holes.
+     * EBPO_PART_BORDER.
      */
     bool unsigned_distance;
 

@@ -123,7 +123,7 @@ static int run_repack(void *given, const char **operand)
     if (status == EBPO_OK)
         status = settle_codec(v, ebpo_file_info(file), &write, &error);
     if (status == EBPO_OK)
-        status = written = ebpo_file_repack(file, operand[1], &read, &write, &error);
+        status = written = ebpo_file_add_border(file, operand[1], &read, &write, &error);
     progress_wipe(&line);
     if (status == EBPO_OK)
         status = report_sizes(v, operand[1], file, progress_now() - begun, &error);

@@ -52,9 +52,7 @@ static void decide_memory(query_holding *h)
 
 static bool nothing_wished(const query_values *v, const ebpo_model_options *o)
 {
-    /* the inside of a surface needs all of the model, which is the default of the library */
-    return !v->holes && !v->memory && o->cut_level < 0 && o->loading == EBPO_LOAD_CACHE &&
-           !v->prefetch;
+    return !v->memory && o->cut_level < 0 && o->loading == EBPO_LOAD_CACHE && !v->prefetch;
 }
 
 static void init_lock(query_holding *h)

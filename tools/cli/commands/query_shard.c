@@ -106,7 +106,6 @@ static void report_query(json *j, const query_job *job)
     json_real(j, "tmax", v->tmax);
     json_bool(j, "all", v->all);
     json_bool(j, "any", v->any);
-    json_bool(j, "holes", v->holes);
     json_real(j, "threshold", v->threshold);
 }
 

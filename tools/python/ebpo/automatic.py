@@ -30,7 +30,7 @@ class Automatic:
         self.file, self.options, self.waiting = file, options, False
         self.lock = threading.Lock()  # protects the counts
         self.queries, self.seconds, self.subtrees, self.next = 0, 0.0, 0, FIRST
-        wished = options.memory or options.cut_level >= 0 or options.prefetch or options.holes
+        wished = options.memory or options.cut_level >= 0 or options.prefetch
         info = c.ebpo_info.from_address(lib.ebpo_file_info(file))
         if not wished and info.parts & c.EBPO_PART_MESH:
             self._decide(info)

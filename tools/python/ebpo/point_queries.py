@@ -142,8 +142,8 @@ class PointQueries(RayQueries):
     def winding_bounds(self, points: ArrayLike, *, width: float = 1e-9) -> Doubles:
         """Return bounds of the winding numbers of points: (n, 2), nan on faces.
 
-        width: greatest difference of the bounds, as far as double precision allows it. Only surfaces opened
-            with `holes` have winding numbers that are not integers.
+        width: greatest difference of the bounds, as far as double precision allows it. Only surfaces
+            have winding numbers that are not integers.
 
         Raises the errors of `locate`.
 

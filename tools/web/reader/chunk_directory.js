@@ -9,6 +9,7 @@ export function arrayNumber(path, level, order) {
 }
 
 const ROOT_NUMBERS = { '/mesh/vertices': 4096, '/mesh/faces': 4097, '/mesh/faces_index': 4098, '/maps/vertex_source': 4099, '/maps/face_source': 4100,
+  '/border/loops': 4101, '/border/points': 4102,
   '/subtrees/index': 4112, '/subtrees/counts': 4113, '/subtrees/shared_chunks': 4114,
   '/subtrees/chunk_directory': 4115, '/chunk_checksums': 4116 }; // the chunk directory does not list itself, nor do the chunk checksums
 

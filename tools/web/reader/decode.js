@@ -37,7 +37,7 @@ function checkTypes(info, level) {
 export function checkWindings(info, level, black, white) {
   if (black?.some((w) => !isInside(info.winding_rule, w)))
     throw formatError(levelPath(level, 'black_winding'), 'a black node is outside by the winding rule');
-  if (white?.some((w) => isInside(info.winding_rule, w)))
+  if (info.solid && white?.some((w) => isInside(info.winding_rule, w)))
     throw formatError(levelPath(level, 'white_winding'), 'a white node is inside by the winding rule');
 }
 

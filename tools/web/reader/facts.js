@@ -5,7 +5,7 @@ import { text } from './hdf5.js';
 
 export const LEVELS_MAX = 21, INDEX_ROWS = 4096;
 const MESH_MAX = 2 ** 32 - 2, NODES_MAX = 2 ** 40;
-const KNOWN_PARTS = ['levels', 'mesh', 'planes', 'maps', 'leaf-planes', 'attributes', 'colours', 'subtrees', 'gates', 'pruned'];
+const KNOWN_PARTS = ['levels', 'mesh', 'planes', 'maps', 'leaf-planes', 'attributes', 'colours', 'border', 'subtrees', 'gates', 'pruned'];
 
 const WORDS = { kind: ['surface', 'solid'], winding_rule: ['nonzero', 'evenodd', 'positive'], coordinate_type: ['float32', 'float64'] };
 const TEXTS = { source_name: 255, source_format: 15, unit: 31, crs: 255, date: 31 }; // most bytes
@@ -130,6 +130,20 @@ function readSelection(facts) {
     throw facts.fail('selection_percent', 'it has a value that the format does not allow');
 }
 
+// Reads the counts of the border of a surface (format-spec/border.md).
+function readBorder(facts, out) {
+  if (!out.parts.has('border'))
+    return;
+  out.border_loops = facts.count('border_loops');
+  out.border_points = facts.count('border_points', 2 ** 31 - 1);
+  out.border_longest = facts.count('border_longest', out.border_points);
+  [out.border_area] = facts.reals('border_area', 1);
+  if (out.solid || !out.parts.has('mesh') || 3 * out.border_loops > out.border_points)
+    throw facts.notAllowed('border_loops');
+  if (!(Number.isFinite(out.border_area) && out.border_area >= 0))
+    throw facts.notAllowed('border_area');
+}
+
 /** Returns the root's attributes as an object with the attributes' names, and `parts`, a Set of words. */
 export function readFacts(attributes) {
   const facts = new Facts(attributes, '/'), out = {};
@@ -176,7 +190,8 @@ export function readFacts(attributes) {
     out[name] = facts.reals(name, 1)[0];
   for (const name of TRIPLES)
     out[name] = facts.reals(name, 3);
-  for (const name of [...DIGESTS, ...(out.parts.has('colours') ? ['colours_sha256'] : [])]) {
+  const separate = ['colours', 'border'].filter((part) => out.parts.has(part)).map((part) => `${part}_sha256`);
+  for (const name of [...DIGESTS, ...separate]) {
     out[name] = facts.text(name);
     if (!/^[0-9a-f]{64}$/.test(out[name]))
       throw facts.notAllowed(name);
@@ -184,6 +199,7 @@ export function readFacts(attributes) {
   if (out.level_count < 1 || out.level_count > LEVELS_MAX)
     throw formatError('/', `level_count is not 1 to ${LEVELS_MAX}`);
   out.solid = out.kind === 'solid';
+  readBorder(facts, out);
   out.subtree_level = out.parts.has('subtrees') ? facts.int('subtree_level', 1, out.level_count - 2) : undefined;
   if (out.parts.has('pruned')) {
     out.subset_of = facts.text('subset_of');
@@ -312,9 +328,9 @@ const LEVEL_ARRAYS = {
   types: [0, [2], false, (info, s, groups) => groups],
   plane_counts: [0, [1], false, (info, s) => has(info, 'planes', s.gray)],
   planes: [0, [4], false, (info, s) => has(info, 'planes', s.planes)],
-  leaf_winding: [0, [1, 2, 4], true, (info, s) => (info.solid ? s.leaf : 0)],
+  leaf_winding: [0, [1, 2, 4], true, (info, s) => (info.solid ? s.leaf : has(info, 'border', s.leaf))],
   black_winding: [0, [1, 2, 4], true, (info, s) => (info.solid ? s.black : 0), true],
-  white_winding: [0, [1, 2, 4], true, (info, s) => (info.solid ? s.white : 0), true],
+  white_winding: [0, [1, 2, 4], true, (info, s) => (info.solid ? s.white : has(info, 'border', s.white)), true],
   leaf_skip: [0, [4], false, (info, s) => has(info, 'mesh', s.leaf)],
   leaf_new: [0, [1, 2, 4], false, (info, s) => has(info, 'mesh', s.leaf)],
   leaf_ref_count: [0, [1, 2, 4], false, (info, s) => has(info, 'mesh', s.leaf)],
@@ -328,7 +344,7 @@ const LEVEL_ARRAYS = {
 };
 const CODINGS = { // the coding of other arrays is plain
   leaf_skip: ['skips', 'delta'], leaf_refs: ['gap'], '/mesh/vertices': ['delta'], '/mesh/faces': ['high-water'], '/maps/vertex_source': ['delta'],
-  '/maps/face_source': ['delta'],
+  '/maps/face_source': ['delta'], '/border/points': ['delta'],
 };
 const faceChunks = (info) => {
   const rows = info.subtree_level === undefined ? chunkRows(info.face_count, 3, 4) : FIXED_ROWS['/mesh/faces'];
@@ -340,6 +356,8 @@ const ROOT_ARRAYS = {
   '/mesh/faces_index': [1, [8], false, (info) => has(info, 'mesh', faceChunks(info))],
   '/maps/vertex_source': [0, [4], false, (info) => has(info, 'maps', info.vertex_count)],
   '/maps/face_source': [0, [4], false, (info) => has(info, 'maps', info.face_count)],
+  '/border/loops': [2, [4], false, (info) => has(info, 'border', info.border_loops)],
+  '/border/points': [3, [4, 8], false, (info) => has(info, 'border', info.border_points)],
 };
 
 /** Throws unless an array's attribute names the coding that the format requires. Older files have `delta` for leaf_skip. */

@@ -479,11 +479,12 @@ export class EbpoFile {
     }
   }
 
-  /** Compares content_sha256 and colours_sha256 (format-spec/checksums.md). Reads the whole file. Pages can use it only over https and from localhost. */
+  /** Compares content_sha256, colours_sha256 and border_sha256 (format-spec/checksums.md). Reads the whole file. Pages can use it only over https and from localhost. */
   async verifyContent() {
-    const of = (path) => (path.endsWith('/gray_colours') ? 'colours_sha256' : 'content_sha256');
+    const isBorder = (path) => path.startsWith('/border/') || (!this.info.solid && path.endsWith('_winding'));
+    const of = (path) => (isBorder(path) ? 'border_sha256' : path.endsWith('/gray_colours') ? 'colours_sha256' : 'content_sha256');
     const paths = [...this.arrays.keys()].filter((p) => !isList(p) && !/^\/(subtrees|attributes)\//.test(p)).sort();
-    for (const name of ['content_sha256', 'colours_sha256'].filter((n) => this.info[n])) {
+    for (const name of ['content_sha256', 'colours_sha256', 'border_sha256'].filter((n) => this.info[n])) {
       if (await this.#checksum(paths.filter((p) => of(p) === name)) !== this.info[name])
         throw named(this.source, formatError('', `the content does not match ${name}: the file was changed`, 'get a fresh copy'));
     }
@@ -508,7 +509,7 @@ export class EbpoFile {
       return bytes;
     if (path === '/mesh/faces_index')
       return this.info.face_count > 4096 ? new Uint8Array(new BigUint64Array(bytes.buffer).filter((_, i) => i % 2 === 0).buffer) : undefined;
-    return path === '/mesh/vertices' || path.startsWith('/maps/') ? recode(bytes, array, rows) : bytes;
+    return path === '/mesh/vertices' || path === '/border/points' || path.startsWith('/maps/') ? recode(bytes, array, rows) : bytes;
   }
 }
 
@@ -568,7 +569,7 @@ function describe(hdf5, wanted, linked, address, info) {
     throw formatError(path, "the array's length contradicts the counts in the header");
   if ((o.space.dims[1] ?? 0) !== (gates ? GATES_COLS : cols) || !(gates ? [1] : wanted.sizes).includes(elementSize) || o.type.signed !== wanted.signed)
     throw formatError(path, 'the array has the wrong type or the wrong number of columns');
-  if (path === '/mesh/vertices' && elementSize !== (info.coordinate_type === 'float64' ? 8 : 4))
+  if ((path === '/mesh/vertices' || path === '/border/points') && elementSize !== (info.coordinate_type === 'float64' ? 8 : 4))
     throw formatError(path, "the array's type contradicts coordinate_type");
   checkCoding(o.attributes, path, gates);
   const storedRow = elementSize * Math.max(gates ? GATES_COLS : cols, 1), whole = fit * storedRow;

@@ -17,7 +17,7 @@
 #include <math.h>
 
 #include "geometry/cap_triangles.h"
-#include "query/cap_tree.h"
+#include "geometry/cap_tree.h"
 
 static const double INVERSE_TURN = 1 / (2 * EBPO_PI_LOW);
 

@@ -22,7 +22,7 @@
 #include "core/error.h"
 #include "geometry/cap_triangles.h"
 #include "geometry/vec3.h"
-#include "query/cap_tree.h"
+#include "geometry/cap_tree.h"
 
 static const double ENLARGE = 1 + 0x1p-40;
 
@@ -205,6 +205,33 @@ ebpo_status ebpo_cap_tree_make(ebpo_cap_tree *out, double (*position)[3], const 
         ebpo_cap_tree_free(out);
     }
     free(g.order);
+    return status;
+}
+
+ebpo_status ebpo_cap_tree_of_loops(ebpo_cap_tree *out, const ebpo_border_loops *loops,
+                                   ebpo_error *error)
+{
+    uint64_t count = loops->loop_count;
+    *out = (ebpo_cap_tree){ .node = NULL };
+    if (count == 0)
+        return EBPO_OK;
+    double(*position)[3] = ebpo_alloc(loops->point_count, sizeof *position);
+    uint64_t *first = ebpo_alloc_zero(count + 1, sizeof *first);
+    uint32_t *weight = ebpo_alloc(count, sizeof *weight);
+    ebpo_status status = EBPO_OK;
+    if (position && first && weight) {
+        memcpy(position, loops->point, loops->point_count * sizeof *position);
+        for (uint64_t i = 0; i < count; i++) {
+            first[i + 1] = first[i] + loops->loop[2 * i];
+            weight[i] = loops->loop[2 * i + 1];
+        }
+        status = ebpo_cap_tree_make(out, position, first, weight, count, error);
+    } else {
+        free(position);
+        status = ebpo_fail_memory(error, loops->point_count * sizeof *position);
+    }
+    free(first);
+    free(weight);
     return status;
 }
 

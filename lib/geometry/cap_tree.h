@@ -9,8 +9,8 @@
  * angles over few triangles. It is bounded by a tree and refined only as far as a decision needs
  * it. At a point on a cap k and w_D jump; both belong to the point shifted as in
  * ebpo_axis_crossing, and w_S has no jump there. */
-#ifndef EBPO_QUERY_CAP_TREE_H
-#define EBPO_QUERY_CAP_TREE_H
+#ifndef EBPO_GEOMETRY_CAP_TREE_H
+#define EBPO_GEOMETRY_CAP_TREE_H
 
 #include <ebpo/file.h>
 
@@ -43,7 +43,15 @@ typedef struct ebpo_cap_tree {
 EBPO_MUST_USE ebpo_status ebpo_cap_tree_make(ebpo_cap_tree *out, double (*position)[3],
                                              const uint64_t *first, const uint32_t *weight,
                                              uint64_t loop_count, ebpo_error *error);
+/* Makes the tree of the loops of a file or tree. */
+EBPO_MUST_USE ebpo_status ebpo_cap_tree_of_loops(ebpo_cap_tree *out, const ebpo_border_loops *loops,
+                                                 ebpo_error *error);
 void ebpo_cap_tree_free(ebpo_cap_tree *tree);
+
+/* Returns the crossings of the caps, which turn against the discs, as ebpo_axis_crossing does. */
+int32_t ebpo_cap_crossings(const ebpo_cap_tree *tree, const double from[3], double to, int axis);
+/* Returns false if certainly no cap touches the box. */
+bool ebpo_caps_near(const ebpo_cap_tree *tree, const double low[3], const double high[3]);
 
 /* Bounds the sum of the half angles, that is 2 pi w_D, at all points of a box around p with these
  * half sides; NULL: at p. Nodes whose bounds have an error above `tolerance` are refined; at a
