@@ -157,8 +157,8 @@ static ebpo_status make_windings(ebpo_tree *tree, const ebpo_cap_tree *caps, ebp
     }
     int32_t delta[8];
     if (status == EBPO_OK) {
-        visit_node(w, (ebpo_cell){ 0, { 0, 0, 0 } },
-                   ebpo_group_type(tree->level[0].types[0], 0), 0, delta);
+        visit_node(w, (ebpo_cell){ 0, { 0, 0, 0 } }, ebpo_group_type(tree->level[0].types[0], 0), 0,
+                   delta);
         for (int i = 0; i < 8; i++)
             w->agree = w->agree && delta[i] == 0;
         if (!w->agree)
@@ -170,7 +170,8 @@ static ebpo_status make_windings(ebpo_tree *tree, const ebpo_cap_tree *caps, ebp
 }
 
 /* Sets the counts and the area of the caps. */
-static void measure_border(ebpo_info *info, const ebpo_cap_tree *caps, const ebpo_border_loops *loops)
+static void measure_border(ebpo_info *info, const ebpo_cap_tree *caps,
+                           const ebpo_border_loops *loops)
 {
     info->border_loops = loops->loop_count;
     info->border_points = loops->point_count;

@@ -1,6 +1,6 @@
-/* Reads, checks and encodes the border of a surface: closed loops of points with weights. The points
- * are stored like the vertices of the mesh, but not as indices of vertices: subsets number vertices
- * anew, and a reader needs all loops at once. Source: format-spec/border.md. */
+/* Reads, checks and encodes the border of a surface: closed loops of points with weights. The
+ * points are stored like the vertices of the mesh, but not as indices of vertices: subsets number
+ * vertices anew, and a reader needs all loops at once. Source: format-spec/border.md. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -52,8 +52,7 @@ ebpo_status ebpo_check_border(const ebpo_check *check, const ebpo_info *info,
 }
 
 static ebpo_status take_points(void *context, const ebpo_array_in *array, uint64_t chunk,
-                               uint64_t row, uint64_t rows, const uint8_t *bytes,
-                               ebpo_error *error)
+                               uint64_t row, uint64_t rows, const uint8_t *bytes, ebpo_error *error)
 {
     const ebpo_border_loops *loops = context;
     double *out = loops->point + 3 * row;
@@ -91,7 +90,8 @@ ebpo_status ebpo_border_read(const ebpo_file *file, ebpo_border_loops *out, ebpo
     read.threads = 1;
     ebpo_hint_root(&hints, EBPO_NEEDS_BORDER);
     ebpo_hint_all(&hints);
-    *out = (ebpo_border_loops){ .loop_count = info->border_loops, .point_count = info->border_points };
+    *out =
+        (ebpo_border_loops){ .loop_count = info->border_loops, .point_count = info->border_points };
     ebpo_status status = EBPO_OK;
     if (out->loop_count) { /* an array of no rows is not in the file */
         out->loop = ebpo_alloc(out->loop_count, 2 * sizeof *out->loop);

@@ -148,7 +148,7 @@ ebpo_status ebpo_chunks_winding(ebpo_chunks *chunks, const ebpo_node *node, int3
         return EBPO_OK; /* the default value; leaves always have the array */
     status = ebpo_chunks_integers(chunks, id, node->cell.level, node->rank, 1, winding,
                                   sizeof *winding, error);
-    if (status == EBPO_OK && node->type != EBPO_LEAF &&
+    if (status == EBPO_OK && info->solid && node->type != EBPO_LEAF &&
         ebpo_rule_inside(info->rule, *winding) != (node->type == EBPO_BLACK))
         status = ebpo_chunks_fail(chunks, node->cell.level, id,
                                   "a node's winding number contradicts its type", error);

@@ -36,9 +36,9 @@ static int32_t cross_discs(const cap_segment *g, uint64_t at)
     if (n->weight == 0)
         return cross_discs(g, n->from) + cross_discs(g, n->to);
     uint64_t m = ebpo_cap_middle(n->from, n->to), first = ebpo_cap_count(n->from, m);
-    int32_t sum = (int32_t)n->weight * ebpo_axis_crossing(g->from, g->to, g->axis,
-                                                          t->position[n->from], t->position[m],
-                                                          t->position[n->to]);
+    int32_t sum =
+        (int32_t)n->weight * ebpo_axis_crossing(g->from, g->to, g->axis, t->position[n->from],
+                                                t->position[m], t->position[n->to]);
     if (first)
         sum += cross_discs(g, at + 1);
     if (ebpo_cap_count(m, n->to))

@@ -784,8 +784,11 @@ ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64
         status = ebpo_check_query_level(o->level, error);
     if (status == EBPO_OK && o->envelopes > EBPO_ENVELOPES_SKIP)
         status = ebpo_fail_value(error);
-    if (status == EBPO_OK && !m->holes)
-        status = ebpo_check_solid(m, error);
+    if (status == EBPO_OK && !m->info->solid && !m->holes)
+        status = ebpo_fail_file(error, EBPO_E_NOT_SOLID, m->file->in.shown,
+                                "the model is a surface, stored without its border: it has no "
+                                "inside; 'ebpo repack' adds the border, or run 'ebpo check' on its "
+                                "source to see the repairs that make a solid");
     if (status == EBPO_OK)
         status = ebpo_check_points(points, count, error);
     if (status == EBPO_OK && o->level < 0)

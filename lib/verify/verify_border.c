@@ -120,7 +120,8 @@ static void list_caps(cap_list *c, uint64_t first, uint64_t last, uint32_t weigh
 
 #define CHECK(...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, __VA_ARGS__)
 
-/* Lists all caps. The loops are checked before, so their weights are at most the number of faces. */
+/* Lists all caps. The loops are checked before, so their weights are at most the number of faces.
+ */
 static ebpo_status list_all_caps(cap_list *c, ebpo_error *error)
 {
     uint64_t first = 0;

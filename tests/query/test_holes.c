@@ -1,6 +1,7 @@
 /* Inside and signed distance of surfaces with holes, from files, against sums of solid angles over
  * all faces: in long double, which decides except near the boundary of the rule. Decisions at the
- * boundary are tested in test_cap_winding.c. */
+ * boundary are tested in test_cap_winding.c. Models in memory, in parts, and read node by node give
+ * the same results. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -56,40 +57,56 @@ static double winding_by_sum(const ebpo_mesh *mesh, const double p[3], double *e
 
 /* ---- models ---- */
 
+/* The same file in memory, with subtrees below level 1, and read node by node. */
+enum { WHOLE, PARTS, NODES, WAYS };
+
 typedef struct holed {
     ebpo_mesh mesh; /* of the source */
     ebpo_file *file;
-    ebpo_model *model;
-    ebpo_context *context;
+    ebpo_model *way[WAYS], *model; /* `model`: in memory */
+    ebpo_context *context_of[WAYS], *context;
 } holed;
 
 static ebpo_model_options options_of(double threshold)
 {
     ebpo_model_options o = EBPO_MODEL_OPTIONS_INIT;
-    o.holes = true;
     o.threshold = threshold;
     return o;
+}
+
+static void holed_open(holed *h, double threshold)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    for (int i = 0; i < WAYS; i++) {
+        ebpo_model_options options = options_of(threshold);
+        options.cut_level = i == PARTS ? 1 : i == NODES ? 0 : -1;
+        options.loading = i == NODES ? EBPO_LOAD_NODES : EBPO_LOAD_CACHE;
+        model_must(ebpo_model_new(h->file, &options, &h->way[i], &error), "opening", &error);
+        model_must(ebpo_context_new(h->way[i], &h->context_of[i], &error), "opening", &error);
+    }
+    h->model = h->way[WHOLE];
+    h->context = h->context_of[WHOLE];
 }
 
 static void holed_make(holed *h, ebpo_mesh mesh, ebpo_rule rule, double threshold)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_build_options build = EBPO_BUILD_OPTIONS_INIT;
-    ebpo_model_options options = options_of(threshold);
     build.rule = rule;
     build.leaf_faces = 8;
     model_must(ebpo_mesh_copy(&mesh, &h->mesh, &error), "copying", &error);
     ebpo_tree tree = model_build(mesh, &build);
     model_write(&tree, scratch("holed.ebpo.h5"), NULL);
     h->file = model_open(scratch("holed.ebpo.h5"));
-    model_must(ebpo_model_new(h->file, &options, &h->model, &error), "opening", &error);
-    model_must(ebpo_context_new(h->model, &h->context, &error), "opening", &error);
+    holed_open(h, threshold);
 }
 
 static void holed_free(holed *h)
 {
-    ebpo_context_free(h->context);
-    ebpo_model_free(h->model);
+    for (int i = 0; i < WAYS; i++) {
+        ebpo_context_free(h->context_of[i]);
+        ebpo_model_free(h->way[i]);
+    }
     ebpo_close(h->file);
     ebpo_mesh_free(&h->mesh);
 }
@@ -116,6 +133,13 @@ static int check_point(const holed *h, const double p[3], ebpo_rule rule, double
     ck_assert_msg(expected == -1 || r.where == expected, "(%a %a %a): %d, expected %d by w = %.17g",
                   p[0], p[1], p[2], (int)r.where, expected, w);
     ck_assert_int_eq(r.winding, r.where == EBPO_IN);
+    for (int i = 1; i < WAYS; i++) {
+        ebpo_inside_result other;
+        model_must(ebpo_inside(h->context_of[i], p, NULL, &other, &error), "inside", &error);
+        ck_assert_msg(other.where == r.where && other.winding == r.winding,
+                      "(%a %a %a): %d, but %d if loaded in another way", p[0], p[1], p[2],
+                      (int)r.where, (int)other.where);
+    }
     model_must(ebpo_winding(h->context, p, 1, 1e-6, &b, &error), "winding", &error);
     if (expected == EBPO_ON) {
         ck_assert(isnan(b.lo) && isnan(b.hi));
@@ -282,13 +306,24 @@ START_TEST(test_ties_are_counted)
 }
 END_TEST
 
-START_TEST(test_surface_without_option_is_refused)
+/* Makes the file of a mesh with or without the border. */
+static void write_model(const char *path, ebpo_mesh mesh, bool border)
+{
+    ebpo_build_options build = EBPO_BUILD_OPTIONS_INIT;
+    build.leaf_faces = 8;
+    if (!border)
+        build.parts &= ~(uint32_t)EBPO_PART_BORDER;
+    ebpo_tree tree = model_build(mesh, &build);
+    model_write(&tree, path, NULL);
+}
+
+START_TEST(test_invalid_queries_are_refused)
 {
     holed h;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_model *model = NULL;
     ebpo_context *context = NULL;
-    ebpo_model_options parts = options_of(0.5), bad = options_of(0);
+    ebpo_model_options bad = options_of(0);
     ebpo_inside_options limited = EBPO_INSIDE_OPTIONS_INIT;
     ebpo_inside_result r;
     ebpo_winding_bounds w;
@@ -298,26 +333,86 @@ START_TEST(test_surface_without_option_is_refused)
     ck_assert_int_eq(ebpo_inside(h.context, p, &limited, &r, &error), EBPO_E_ARGUMENT);
     ck_assert_int_eq(ebpo_winding(h.context, p, 1, -1, &w, &error), EBPO_E_ARGUMENT);
     ck_assert_int_eq(ebpo_model_new(h.file, &bad, &model, &error), EBPO_E_ARGUMENT);
+    holed_free(&h);
 
-    model_must(ebpo_model_new(h.file, NULL, &model, &error), "opening", &error);
+    write_model(scratch("without.ebpo.h5"), ebpo_test_make("open_box"), false);
+    ebpo_file *file = model_open(scratch("without.ebpo.h5"));
+    model_must(ebpo_model_new(file, NULL, &model, &error), "opening", &error);
     model_must(ebpo_context_new(model, &context, &error), "opening", &error);
     ck_assert_int_eq(ebpo_inside(context, p, NULL, &r, &error), EBPO_E_NOT_SOLID);
     ck_assert_int_eq(ebpo_winding(context, p, 1, 0, &w, &error), EBPO_E_NOT_SOLID);
     ebpo_context_free(context);
     ebpo_model_free(model);
+    ebpo_close(file);
+}
+END_TEST
 
-    parts.cut_level = 1;
-    model_must(ebpo_model_new(h.file, &parts, &model, &error), "opening", &error);
-    model_must(ebpo_context_new(model, &context, &error), "opening", &error);
-    ck_assert_int_eq(ebpo_inside(context, p, NULL, &r, &error), EBPO_E_LIMIT);
-    ebpo_context_free(context);
-    ebpo_model_free(model);
+static void check_same_files(const char *one, const char *other)
+{
+    FILE *a = fopen(one, "rb"), *b = fopen(other, "rb");
+    int x, y;
+    ck_assert(a && b);
+    do {
+        x = getc(a);
+        y = getc(b);
+        ck_assert_int_eq(x, y);
+    } while (x != EOF);
+    fclose(a);
+    fclose(b);
+}
+
+START_TEST(test_border_is_added_to_file)
+{
+    uint64_t state = 4, seed = 4;
+    ebpo_error error = EBPO_ERROR_INIT;
+    write_model(scratch("without.ebpo.h5"), holed_torus(&state, 20, 5), false);
+    write_model(scratch("with.ebpo.h5"), holed_torus(&seed, 20, 5), true);
+    ebpo_file *file = model_open(scratch("without.ebpo.h5"));
+    model_must(ebpo_file_add_border(file, scratch("added.ebpo.h5"), NULL, NULL, &error), "adding",
+               &error);
+    ebpo_close(file);
+    check_same_files(scratch("added.ebpo.h5"), scratch("with.ebpo.h5"));
+}
+END_TEST
+
+/* A subset keeps the border: its results are those of the whole file, or it refuses. */
+START_TEST(test_subset_keeps_border)
+{
+    uint64_t state = 5;
+    holed h, part = { .model = NULL };
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_subset_options cut = EBPO_SUBSET_OPTIONS_INIT;
+    uint64_t same = 0;
+    holed_make(&h, holed_torus(&state, 10, 2), EBPO_RULE_NONZERO, 0.5);
+    cut.boxed = true;
+    for (int k = 0; k < 3; k++) {
+        cut.min[k] = 0;
+        cut.max[k] = 3;
+    }
+    model_must(ebpo_subset(h.file, scratch("part.ebpo.h5"), &cut, &error), "cutting", &error);
+    part.file = model_open(scratch("part.ebpo.h5"));
+    holed_open(&part, 0.5);
+    for (uint64_t i = 0; i < ebpo_test_scaled(2000); i++) {
+        double p[3];
+        ebpo_inside_result whole, r;
+        choose_point(&state, &h, p);
+        model_must(ebpo_inside(h.context, p, NULL, &whole, &error), "inside", &error);
+        for (int way = 0; way < WAYS; way++) {
+            ebpo_status status = ebpo_inside(part.context_of[way], p, NULL, &r, &error);
+            ck_assert_msg(status == EBPO_E_ABSENT || (status == EBPO_OK && r.where == whole.where),
+                          "(%a %a %a), way %d: status %d, %d instead of %d", p[0], p[1], p[2], way,
+                          (int)status, (int)r.where, (int)whole.where);
+            same += status == EBPO_OK;
+        }
+    }
+    ck_assert_uint_gt(same, 0);
+    holed_free(&part);
     holed_free(&h);
 }
 END_TEST
 
-/* A solid gives the same results with the option, and integer bounds. */
-START_TEST(test_solid_ignores_option)
+/* A solid has integer bounds. */
+START_TEST(test_solid_has_integer_bounds)
 {
     holed h;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -365,8 +460,10 @@ TEST_SUITE(holes)
     tcase_add_loop_test(shapes, test_surfaces_match_sums_over_faces, 0, 9);
     tcase_add_loop_test(shapes, test_few_holes_match_sums_over_faces, 0, EBPO_RULE_POSITIVE + 1);
     tcase_add_test(shapes, test_ties_are_counted);
-    tcase_add_test(shapes, test_surface_without_option_is_refused);
-    tcase_add_test(shapes, test_solid_ignores_option);
+    tcase_add_test(shapes, test_invalid_queries_are_refused);
+    tcase_add_test(shapes, test_border_is_added_to_file);
+    tcase_add_test(shapes, test_subset_keeps_border);
+    tcase_add_test(shapes, test_solid_has_integer_bounds);
     suite_add_tcase(suite, shapes);
     if (getenv("EBPO_MODELS")) {
         TCase *real = tcase_create("scans");
