@@ -337,7 +337,8 @@ LEVEL_NAMES = ["types", "plane_counts", "planes", "leaf_winding", "black_winding
                "leaf_skip", "leaf_new", "leaf_ref_count", "leaf_refs", "types_index", "gray_index",
                "leaf_index", "leaf_plane_counts", "leaf_planes", "gray_colours"]
 ROOT_PATHS = {4096: "/mesh/vertices", 4097: "/mesh/faces", 4098: "/mesh/faces_index",
-              4099: "/maps/vertex_source", 4100: "/maps/face_source", 4101: "/border/loops", 4102: "/border/points", 4112: "/subtrees/index",
+              4099: "/maps/vertex_source", 4100: "/maps/face_source", 4101: "/border/loops", 4102: "/border/points",
+              4112: "/subtrees/index",
               4113: "/subtrees/counts", 4114: "/subtrees/shared_chunks"}
 
 
