@@ -133,7 +133,7 @@ static int check_point(const holed *h, const double p[3], ebpo_rule rule, double
     ck_assert_msg(expected == -1 || r.where == expected, "(%a %a %a): %d, expected %d by w = %.17g",
                   p[0], p[1], p[2], (int)r.where, expected, w);
     ck_assert_int_eq(r.winding, r.where == EBPO_IN);
-    for (int i = 1; i < WAYS; i++) {
+    for (int i = 1; i < (p[0] > 0.1 ? NODES : WAYS); i++) { /* reading nodes is slow */
         ebpo_inside_result other;
         model_must(ebpo_inside(h->context_of[i], p, NULL, &other, &error), "inside", &error);
         ck_assert_msg(other.where == r.where && other.winding == r.winding,
