@@ -63,33 +63,32 @@ uint64_t ebpo_holes_bytes(const ebpo_holes *holes)
 
 typedef struct marking {
     const ebpo_holes *holes;
-    const ebpo_box *box;
-    ebpo_node_table *table;
-    ebpo_accel_leaf *leaf;
+    const ebpo_marked_table *m;
     bool fits; /* winding numbers are small enough */
+    uint64_t capacity;
 } marking;
 
 /* Bounds w_D in a cell. Returns false if a cap may touch the cell. */
-static bool bound_in_cell(const marking *m, ebpo_cell cell, double tolerance, ebpo_bounded *out)
+static bool bound_in_cell(const marking *w, ebpo_cell cell, double tolerance, ebpo_bounded *out)
 {
     double low[3], high[3], centre[3], half[3];
-    ebpo_cell_bounds(m->box, cell, low, high);
+    ebpo_cell_bounds(w->m->box, cell, low, high);
     for (int k = 0; k < 3; k++) {
         centre[k] = low[k] / 2 + high[k] / 2;
         half[k] = fmax(high[k] - centre[k], centre[k] - low[k]);
     }
-    *out = ebpo_cap_tree_bound(&m->holes->caps, centre, half, tolerance);
+    *out = ebpo_cap_tree_bound(&w->holes->caps, centre, half, tolerance);
     /* a triangle without a bound has an error of pi or more */
     return out->error < 3;
 }
 
 /* Returns true if the rule for k decides in the cell. Refines the bounds down to `least`. */
-static bool is_far(const marking *m, ebpo_cell cell, double least)
+static bool is_far(const marking *w, ebpo_cell cell, double least)
 {
-    const double t = fmin(m->holes->rule.threshold, 1 - m->holes->rule.threshold);
+    const double t = fmin(w->holes->rule.threshold, 1 - w->holes->rule.threshold);
     ebpo_bounded b;
     for (double tolerance = FIRST_TOLERANCE; tolerance >= least; tolerance /= 8) {
-        if (!bound_in_cell(m, cell, tolerance, &b))
+        if (!bound_in_cell(w, cell, tolerance, &b))
             return false;
         b = ebpo_cap_winding_of(b, 0);
         if (fabs(b.middle) + b.error < t - 0x1p-40)
@@ -100,57 +99,99 @@ static bool is_far(const marking *m, ebpo_cell cell, double least)
     return false;
 }
 
-static ebpo_uniform_mark find_mark(const marking *m, ebpo_cell cell, int32_t winding)
+static bool caps_touch(const marking *w, ebpo_cell cell)
+{
+    double low[3], high[3];
+    ebpo_cell_bounds(w->m->box, cell, low, high);
+    return ebpo_caps_near(&w->holes->caps, low, high);
+}
+
+/* Returns the mark of a cell without faces. `winding`: at its lowest corner. */
+static ebpo_uniform_mark find_mark(const marking *w, ebpo_cell cell, int32_t winding)
 {
     ebpo_bounded b;
-    for (double t = FIRST_TOLERANCE; t >= LAST_TOLERANCE && bound_in_cell(m, cell, t, &b); t /= 8) {
+    for (double t = FIRST_TOLERANCE; t >= LAST_TOLERANCE && bound_in_cell(w, cell, t, &b); t /= 8) {
         b = ebpo_cap_winding_of(b, winding);
-        int result = ebpo_cap_rule_result(&m->holes->rule, b.middle - b.error, b.middle + b.error);
+        int result = ebpo_cap_rule_result(&w->holes->rule, b.middle - b.error, b.middle + b.error);
         if (result >= 0)
             return result ? EBPO_MARK_IN : EBPO_MARK_OUT;
     }
-    return EBPO_MARK_NEAR;
+    return caps_touch(w, cell) ? EBPO_MARK_NEAR : EBPO_MARK_APART;
 }
 
-static void mark_uniform(marking *m, uint32_t *entry, ebpo_cell cell, bool far)
+static uint32_t mark_cell(marking *w, ebpo_cell cell, int32_t winding, bool far);
+
+/* Splits a cell without faces. Returns the index of its parts, or -1 if there is no space. */
+static int64_t split_cell(marking *w, ebpo_cell cell, int32_t winding)
 {
-    int32_t winding = ebpo_entry_winding(*entry);
-    ebpo_uniform_mark mark = !far ? find_mark(m, cell, winding)
-                             : ebpo_rule_inside((ebpo_rule)m->holes->rule.rule, winding)
-                                 ? EBPO_MARK_IN
-                                 : EBPO_MARK_OUT;
-    m->fits = m->fits && abs(winding) < 1 << 26 &&
-              ebpo_entry_uniform(ebpo_marked_entry(winding, mark), entry);
+    ebpo_node_table *t = w->m->table;
+    uint32_t index = t->split_count;
+    double low[3], corner[3], high[3];
+    if (cell.level >= w->m->deepest || index >= w->m->splits ||
+        !ebpo_grow(&t->split, &w->capacity, index + 1, sizeof *t->split))
+        return -1;
+    t->split_count++;
+    ebpo_cell_bounds(w->m->box, cell, low, high);
+    for (unsigned octant = 0; octant < 8; octant++) {
+        ebpo_cell child = ebpo_cell_child(cell, octant);
+        ebpo_cell_bounds(w->m->box, child, corner, high);
+        uint32_t entry =
+            mark_cell(w, child, winding + ebpo_holes_crossings(w->holes, low, corner), false);
+        t->split[index][octant] = entry;
+    }
+    return index;
+}
+
+/* Returns the entry of a cell without faces. */
+static uint32_t mark_cell(marking *w, ebpo_cell cell, int32_t winding, bool far)
+{
+    bool in = ebpo_rule_inside((ebpo_rule)w->holes->rule.rule, winding);
+    ebpo_uniform_mark mark = !far ? find_mark(w, cell, winding) : in ? EBPO_MARK_IN : EBPO_MARK_OUT;
+    int64_t parts = mark >= EBPO_MARK_APART ? split_cell(w, cell, winding) : -1;
+    uint32_t entry = 0;
+    w->fits = w->fits && abs(winding) < 1 << 25 &&
+              ebpo_entry_uniform(parts >= 0 ? ebpo_marked_entry((int32_t)parts, EBPO_MARK_SPLIT)
+                                            : ebpo_marked_entry(winding, mark),
+                                 &entry);
+    return entry;
+}
+
+static void mark_leaf(marking *w, ebpo_accel_leaf *leaf, ebpo_cell cell)
+{
+    if (is_far(w, cell, LAST_TOLERANCE))
+        return;
+    leaf->kind = EBPO_LEAF_GENERAL;
+    leaf->cell_face = EBPO_NEAR_BORDER;
+    leaf->queries = caps_touch(w, cell); /* not counted for this kind */
 }
 
 /* Marks a node and the nodes below it. Recursive, one call for each level. */
-static void mark_node(marking *m, uint32_t *entry, ebpo_cell cell, bool far)
+static void mark_node(marking *w, uint32_t *entry, ebpo_cell cell, bool far)
 {
+    ebpo_node_table *t = w->m->table;
+    uint32_t value = ebpo_entry_value(*entry);
     switch (ebpo_entry_kind_of(*entry)) {
-    case EBPO_ENTRY_UNIFORM: mark_uniform(m, entry, cell, far); break;
+    case EBPO_ENTRY_UNIFORM: *entry = mark_cell(w, cell, ebpo_entry_winding(*entry), far); break;
     case EBPO_ENTRY_LEAF:
-        if (m->leaf && !far && !is_far(m, cell, LAST_TOLERANCE)) {
-            ebpo_accel_leaf *leaf = &m->leaf[ebpo_entry_value(*entry)];
-            leaf->kind = EBPO_LEAF_GENERAL;
-            leaf->cell_face = EBPO_NEAR_BORDER;
-        }
+        if (w->m->leaf && !far)
+            mark_leaf(w, &w->m->leaf[value], cell);
         break;
     case EBPO_ENTRY_GRAY:
-        far = far || is_far(m, cell, FIRST_TOLERANCE);
+        far = far || is_far(w, cell, FIRST_TOLERANCE);
         for (unsigned octant = 0; octant < 8; octant++)
-            mark_node(m, &m->table->group[ebpo_entry_value(*entry)][octant],
-                      ebpo_cell_child(cell, octant), far);
+            mark_node(w, &t->group[value][octant], ebpo_cell_child(cell, octant), far);
         break;
     case EBPO_ENTRY_SUBTREE_ROOT: break;
     }
 }
 
-ebpo_status ebpo_holes_mark(const ebpo_holes *holes, const ebpo_box *box, ebpo_cell root,
-                            ebpo_node_table *table, ebpo_accel_leaf *leaf, ebpo_error *error)
+ebpo_status ebpo_holes_mark(const ebpo_holes *holes, const ebpo_marked_table *marked,
+                            ebpo_error *error)
 {
-    marking m = { holes, box, table, leaf, true };
-    mark_node(&m, &table->root, root, false);
-    if (table->grid) {
+    marking w = { holes, marked, true, 0 };
+    ebpo_node_table *table = marked->table;
+    mark_node(&w, &table->root, marked->root, false);
+    if (table->grid) { /* it has copies of entries */
         free(table->grid);
         free(table->grid_depth);
         table->grid = NULL;
@@ -158,8 +199,8 @@ ebpo_status ebpo_holes_mark(const ebpo_holes *holes, const ebpo_box *box, ebpo_c
         table->grid_bits = 0;
         ebpo_node_table_make_grid(table);
     }
-    return m.fits ? EBPO_OK
-                  : ebpo_fail(error, EBPO_E_LIMIT, "the winding number of a node is beyond 2^26");
+    return w.fits ? EBPO_OK
+                  : ebpo_fail(error, EBPO_E_LIMIT, "the winding number of a node is beyond 2^25");
 }
 
 /* --- points --- */

@@ -31,28 +31,38 @@ static inline uint64_t ebpo_holes_estimate(const ebpo_info *info)
 /* Decides what is constant in the cells of a table's nodes, and marks these nodes. Uniform entries
  * get a number of ebpo_marked_entry in place of the winding number at their lowest corner. A leaf
  * that is marked EBPO_NEAR_BORDER is decided point by point; in other leaves the rule for the
- * integer winding number decides, as in a solid. `leaf` may be NULL if the table has no leaves.
- * Returns EBPO_E_LIMIT for winding numbers beyond 2^26. */
-EBPO_MUST_USE ebpo_status ebpo_holes_mark(const ebpo_holes *holes, const ebpo_box *box,
-                                          ebpo_cell root, ebpo_node_table *table,
-                                          ebpo_accel_leaf *leaf, ebpo_error *error);
+ * integer winding number decides, as in a solid. Uniform nodes that are not decided are split into
+ * at most `splits` groups of eight cells, down to level `deepest`. Returns EBPO_E_LIMIT for winding
+ * numbers beyond 2^25. */
+typedef struct ebpo_marked_table {
+    const ebpo_box *box;
+    ebpo_cell root;
+    ebpo_node_table *table;
+    ebpo_accel_leaf *leaf; /* NULL: the table has no leaves */
+    int deepest;
+    uint32_t splits;
+} ebpo_marked_table;
+EBPO_MUST_USE ebpo_status ebpo_holes_mark(const ebpo_holes *holes, const ebpo_marked_table *marked,
+                                          ebpo_error *error);
 
-/* Results for all points of a white node of a surface. */
+/* Results for all points of a cell without faces. */
 typedef enum ebpo_uniform_mark {
     EBPO_MARK_OUT = 0,
     EBPO_MARK_IN = 1,
-    EBPO_MARK_NEAR = 2 /* decided point by point */
+    EBPO_MARK_APART = 2, /* decided point by point; no cap touches the cell */
+    EBPO_MARK_NEAR = 3,  /* decided point by point */
+    EBPO_MARK_SPLIT = 4  /* has parts; the value is their index in ebpo_node_table.split */
 } ebpo_uniform_mark;
 
-static inline int32_t ebpo_marked_entry(int32_t winding, ebpo_uniform_mark mark)
+static inline int32_t ebpo_marked_entry(int32_t value, ebpo_uniform_mark mark)
 {
-    return winding * 4 + (int32_t)mark;
+    return value * 8 + (int32_t)mark;
 }
 static inline ebpo_uniform_mark ebpo_entry_mark(int32_t marked)
 {
-    return (ebpo_uniform_mark)((uint32_t)marked & 3);
+    return (ebpo_uniform_mark)((uint32_t)marked & 7);
 }
-static inline int32_t ebpo_unmarked_winding(int32_t marked) { return (marked - (marked & 3)) / 4; }
+static inline int32_t ebpo_marked_value(int32_t marked) { return (marked - (marked & 7)) / 8; }
 
 /* Returns the crossings of caps on the way from the lowest corner of a cell to a point in it, both
  * shifted: along x, then y, then z. */

@@ -266,8 +266,10 @@ static ebpo_status result_by_faces(ebpo_context *context, const ebpo_accel *s,
                    : from_corner(kernels, s, leaf, bounded && !near, i, p, context->open, &winding);
     if (!off)
         *out = (ebpo_inside_result){ EBPO_ON, 0, 0 };
-    else if (near)
+    else if (near && leaf->queries)
         decide_near(context, i->leaf, winding, p, out);
+    else if (near)
+        decide_capped(context, p, winding, out);
     else
         give_winding(context, winding, out);
     return EBPO_OK;
@@ -297,26 +299,40 @@ static ebpo_status inside_leaf(ebpo_context *context, const ebpo_accel *s, uint3
 }
 
 /* Classifies a point in a white node of a surface. */
-static __attribute__((noinline)) void inside_marked(const ebpo_context *context, uint32_t entry,
-                                                    ebpo_cell cell, const double p[3],
-                                                    ebpo_inside_result *out)
+static __attribute__((noinline)) void inside_marked(const ebpo_context *context,
+                                                    const ebpo_node_table *table, uint32_t entry,
+                                                    const ebpo_position *place, int level,
+                                                    const double p[3], ebpo_inside_result *out)
 {
-    int32_t marked = ebpo_entry_winding(entry), winding = ebpo_unmarked_winding(marked);
-    ebpo_uniform_mark mark = ebpo_entry_mark(marked);
-    bool in = mark == EBPO_MARK_IN;
-    if (mark == EBPO_MARK_NEAR)
-        decide_near(context, cell, winding, p, out);
-    else
+    int fine = context->model->locator.level;
+    int32_t marked = ebpo_entry_winding(entry);
+    while (ebpo_entry_mark(marked) == EBPO_MARK_SPLIT)
+        marked = ebpo_entry_winding(
+            table->split[ebpo_marked_value(marked)][ebpo_octant_at(place->at, fine - ++level)]);
+    int32_t winding = ebpo_marked_value(marked);
+    bool in = ebpo_entry_mark(marked) == EBPO_MARK_IN;
+    switch (ebpo_entry_mark(marked)) {
+    case EBPO_MARK_APART: decide_capped(context, p, winding, out); break;
+    case EBPO_MARK_NEAR:
+        decide_near(context,
+                    ebpo_cell_ancestor((ebpo_cell){ fine,
+                                                    { place->at[0], place->at[1], place->at[2] } },
+                                       level),
+                    winding, p, out);
+        break;
+    default:
         *out =
             (ebpo_inside_result){ in ? EBPO_IN : EBPO_OUT, context->undecided ? winding : in, 0 };
+    }
 }
 
-/* Classifies a point in a white or black node. */
-static inline void inside_uniform(const ebpo_context *context, uint32_t entry, ebpo_cell cell,
+/* Classifies a point in a white or black node of a table. */
+static inline void inside_uniform(const ebpo_context *context, const ebpo_node_table *table,
+                                  uint32_t entry, const ebpo_position *place, int level,
                                   const double p[3], ebpo_inside_result *out)
 {
     if (context->model->holes)
-        inside_marked(context, entry, cell, p, out);
+        inside_marked(context, table, entry, place, level, p, out);
     else
         give_winding(context, ebpo_entry_winding(entry), out);
 }
@@ -328,8 +344,7 @@ static ebpo_status inside_subtree(ebpo_context *context, const ebpo_accel *s,
 {
     ebpo_descent d = ebpo_descend(&s->nodes, context->model->locator.level, place->at);
     if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_UNIFORM) {
-        inside_uniform(context, d.entry,
-                       ebpo_descent_cell(&d, context->model->locator.level, place->at), p, out);
+        inside_uniform(context, &s->nodes, d.entry, place, d.level, p, out);
         return EBPO_OK;
     }
     if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_SUBTREE_ROOT)
@@ -435,7 +450,7 @@ static ebpo_status inside_together(ebpo_context *context, const ebpo_accel *s, c
         if (!l[i].within) {
             inside_nowhere(context, points + 3 * i, &out[i]);
         } else if (ebpo_entry_kind_of(l[i].d.entry) == EBPO_ENTRY_UNIFORM) {
-            inside_uniform(context, l[i].d.entry, ebpo_descent_cell(&l[i].d, fine, l[i].place.at),
+            inside_uniform(context, &s->nodes, l[i].d.entry, &l[i].place, l[i].d.level,
                            points + 3 * i, &out[i]);
         } else if (ebpo_entry_kind_of(l[i].d.entry) == EBPO_ENTRY_SUBTREE_ROOT) {
             ebpo_status status = inside_pruned(context, points + 3 * i, &out[i], error);
@@ -521,12 +536,20 @@ static bool stops_here(const inside_query *a, const ebpo_node *node)
     return is_late(a);
 }
 
+/* Returns the table of nodes that are in no subtree. */
+static const ebpo_node_table *top_nodes(const ebpo_model *m)
+{
+    return m->whole ? &m->whole->nodes : &m->top->nodes;
+}
+
 /* Decides the point at a node of the top or of a subtree, without visiting the node's children.
  * Returns false if that is not possible. */
 static inline bool decide_at(const inside_query *a, const ebpo_node *node, ebpo_inside_result *out)
 {
     if (ebpo_node_is_uniform(node))
-        inside_uniform(a->context, node->entry, node->cell, a->p, out);
+        inside_uniform(a->context,
+                       node->subtree ? &node->subtree->nodes : top_nodes(a->context->model),
+                       node->entry, &a->place, node->cell.level, a->p, out);
     else if (outside_envelope(a, node))
         give_out(out);
     else if (stops_here(a, node))
@@ -573,8 +596,10 @@ static ebpo_status leaf_from_file(inside_query *a, const ebpo_node *leaf, ebpo_i
     if (status == EBPO_OK)
         status = ebpo_accel_make(&subtree, &slice, m->info, false, 1, error);
     if (status == EBPO_OK && m->holes)
-        status = ebpo_holes_mark(m->holes, &subtree->box, leaf->cell, &subtree->nodes,
-                                 subtree->leaf, error);
+        status = ebpo_holes_mark(m->holes,
+                                 &(ebpo_marked_table){ &subtree->box, leaf->cell, &subtree->nodes,
+                                                       subtree->leaf, 0, 0 },
+                                 error);
     if (status == EBPO_OK) {
         ebpo_model_count_leaves(m, subtree, 1);
         status = inside_leaf(a->context, subtree, ebpo_entry_value(subtree->nodes.root),
@@ -671,9 +696,9 @@ static ebpo_status walk_nodes(inside_query *a, ebpo_inside_result *out, ebpo_err
     return walk_file(a, &node, out, error);
 }
 
-/* Returns the subtree that the context holds if its cell contains p, else NULL. *entry, *cell: the
+/* Returns the subtree that the context holds if its cell contains p, else NULL. *entry, *level: the
  * node of the levels above, when it decides. */
-static const ebpo_accel *held_around(const inside_query *a, uint32_t *entry, ebpo_cell *cell)
+static const ebpo_accel *held_around(const inside_query *a, uint32_t *entry, int *level)
 {
     const ebpo_context *c = a->context;
     int fine = c->model->info->level_count - 1;
@@ -682,7 +707,7 @@ static const ebpo_accel *held_around(const inside_query *a, uint32_t *entry, ebp
         return c->model->whole;
     ebpo_descent d = ebpo_descend(&c->model->top->nodes, fine, a->place.at);
     *entry = d.entry;
-    *cell = ebpo_descent_cell(&d, fine, a->place.at);
+    *level = d.level;
     bool below = ebpo_entry_kind_of(*entry) == EBPO_ENTRY_SUBTREE_ROOT;
     return below && ebpo_context_has_pinned(c, ebpo_entry_value(*entry)) ? c->pinned : NULL;
 }
@@ -694,11 +719,11 @@ static bool result_in_memory(inside_query *a, ebpo_inside_result *out, ebpo_stat
 {
     const ebpo_model *m = a->context->model;
     uint32_t entry;
-    ebpo_cell cell;
-    const ebpo_accel *held = held_around(a, &entry, &cell);
+    int level;
+    const ebpo_accel *held = held_around(a, &entry, &level);
     *status = EBPO_OK;
     if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_UNIFORM) {
-        inside_uniform(a->context, entry, cell, a->p, out);
+        inside_uniform(a->context, top_nodes(m), entry, &a->place, level, a->p, out);
         return true;
     }
     if (!held)
@@ -711,9 +736,9 @@ static bool result_in_memory(inside_query *a, ebpo_inside_result *out, ebpo_stat
     ebpo_descent d = ebpo_descend(&held->nodes, fine, a->place.at);
     if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_SUBTREE_ROOT)
         return false; /* pruned: an envelope may decide */
-    cell = ebpo_descent_cell(&d, fine, a->place.at);
+    ebpo_cell cell = ebpo_descent_cell(&d, fine, a->place.at);
     if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_UNIFORM)
-        inside_uniform(a->context, d.entry, cell, a->p, out);
+        inside_uniform(a->context, &held->nodes, d.entry, &a->place, d.level, a->p, out);
     else if (is_late(a))
         give_maybe(a, cell, out);
     else

@@ -187,11 +187,19 @@ void ebpo_model_count_kind(ebpo_model *m, const ebpo_accel_leaf *leaf)
         ebpo_leaf_kind_of(leaf) == EBPO_LEAF_GENERAL && leaf->cell_face != EBPO_NO_CELL_FACE;
 }
 
-/* Marks the nodes of a surface with its border. */
+/* Marks the nodes of a surface with its border. Only whole models have parts of nodes, as all of
+ * their nodes are used for many queries. */
 static ebpo_status mark_accel(const ebpo_model *m, ebpo_accel *s, ebpo_error *error)
 {
-    return m->holes ? ebpo_holes_mark(m->holes, &s->box, s->root.cell, &s->nodes, s->leaf, error)
-                    : EBPO_OK;
+    if (!m->holes)
+        return EBPO_OK;
+    uint32_t splits = s == m->whole ? s->nodes.group_count / 64 + 4096 : 0;
+    ebpo_marked_table marked = {
+        &s->box, s->root.cell, &s->nodes, s->leaf, m->locator.level, splits
+    };
+    ebpo_status status = ebpo_holes_mark(m->holes, &marked, error);
+    s->bytes += s->nodes.split_count * sizeof *s->nodes.split;
+    return status;
 }
 
 static ebpo_status load_subtree(void *user, uint64_t key, uint64_t most, void **item,
@@ -311,8 +319,9 @@ static ebpo_status open_top(ebpo_model *m, int cut_level, ebpo_error *error)
     if (status == EBPO_OK && m->holes) {
         ebpo_box box = ebpo_root_box(m->info);
         m->top->bytes += ebpo_holes_bytes(m->holes);
-        status = ebpo_holes_mark(m->holes, &box, (ebpo_cell){ 0, { 0, 0, 0 } }, &m->top->nodes,
-                                 NULL, error);
+        ebpo_marked_table marked = { &box, { 0, { 0, 0, 0 } }, &m->top->nodes,
+                                     NULL, m->locator.level,   0 };
+        status = ebpo_holes_mark(m->holes, &marked, error);
     }
     if (status == EBPO_OK)
         status = m->options.budget ? make_shared(m, &source, error) : make_own(m, &source, error);
