@@ -155,12 +155,14 @@ class Queries(Case):
                 m.inside(wrong)
         with self.assertRaises(TypeError):
             m.inside(P.astype(complex))
+        model("open_box")
+        bare = ebpo.convert("open_box.ply", "bare.ebpo.h5", parts="mesh,maps")  # without its border
         with self.assertRaises(ebpo.NotSolidError) as caught:
-            model("open_box").inside(P[:2])
+            bare.inside(P[:2])
         self.assertIsInstance(caught.exception, ValueError)
         self.assertEqual(caught.exception.status, "EBPO_E_NOT_SOLID")
         with self.assertRaises(ebpo.NotSolidError):
-            model("open_box").inside([])
+            bare.inside([])
         with self.assertRaises(ebpo.LimitError):
             model("scan", memory=1000).inside(P)
         for size in ("12 parsecs", -1):
