@@ -88,8 +88,12 @@ ebpo_status ebpo_border_read(const ebpo_file *file, ebpo_border_loops *out, ebpo
     ebpo_check check = ebpo_reader_check(file, NULL);
     ebpo_hints hints = EBPO_HINTS_INIT(file);
     read.threads = 1;
-    ebpo_hint_root(&hints, EBPO_NEEDS_BORDER);
-    ebpo_hint_all(&hints);
+    if (info->subtree_level) { /* what queries need first, in one range of the file */
+        ebpo_hint_top(file);
+    } else {
+        ebpo_hint_root(&hints, EBPO_NEEDS_BORDER);
+        ebpo_hint_all(&hints);
+    }
     *out =
         (ebpo_border_loops){ .loop_count = info->border_loops, .point_count = info->border_points };
     ebpo_status status = EBPO_OK;
