@@ -74,12 +74,12 @@ ebpo_status ebpo_build_corner_windings(ebpo_builder *b, ebpo_error *error);
 void ebpo_child_windings(const ebpo_builder *b, const ebpo_branch *s, uint32_t child,
                          int32_t offset[8]);
 /* Computes the corner differences of a cell from the piece's faces that touch the cell. The faces
- * are list[places[i]]; if `places` is NULL, the first `count` of the list. Long lists are processed
- * EBPO_CORNER_FACES at a time, so `buffer` has space for the lesser of EBPO_CORNER_FACES and
- * `count` triangles. */
+ * are list[entries[i]]; if `entries` is NULL, the first `count` of the list. Long lists are
+ * processed EBPO_CORNER_FACES at a time, so `buffer` has space for the lesser of EBPO_CORNER_FACES
+ * and `count` triangles. */
 enum { EBPO_CORNER_FACES = 1 << 14 };
 void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell cell,
-                         const uint32_t *places, uint64_t count, ebpo_triangle *buffer,
+                         const uint32_t *entries, uint64_t count, ebpo_triangle *buffer,
                          int32_t delta[8]);
 /* Computes a gray node's corner differences from those of its children. Returns false when the
  * crossings along two paths between corners disagree; then the mesh does not balance. */

@@ -21,7 +21,7 @@
 /* --- the corners of a tree's nodes --- */
 
 void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell cell,
-                         const uint32_t *places, uint64_t count, ebpo_triangle *buffer,
+                         const uint32_t *entries, uint64_t count, ebpo_triangle *buffer,
                          int32_t delta[8])
 {
     memset(delta, 0, 8 * sizeof *delta);
@@ -30,7 +30,7 @@ void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell 
         uint64_t part = count - first < EBPO_CORNER_FACES ? count - first : EBPO_CORNER_FACES;
         int32_t own[8];
         for (uint64_t i = 0; i < part; i++)
-            ebpo_branch_triangle(b, s, places ? places[first + i] : (uint32_t)(first + i),
+            ebpo_branch_triangle(b, s, entries ? entries[first + i] : (uint32_t)(first + i),
                                  &buffer[i]);
         ebpo_corner_windings(&b->box, cell, buffer, part, own);
         for (int i = 0; i < 8; i++)

@@ -26,9 +26,9 @@ static const double flat = 1e-9;
 _Static_assert((int)EBPO_HULL_FACETS <= (int)EBPO_SWEEP_PLANES, "sweeps have space for the facets");
 
 enum {
-    SPACE = EBPO_HULL_FACETS,
-    EXTREMES = 14, /* number of directions of extreme points: axes and diagonals, both ways */
-    VISIBLE = 192  /* maximum number of facets that one point replaces */
+    FACETS_MAX = EBPO_HULL_FACETS,
+    EXTREMES = 14,    /* number of directions of extreme points: axes and diagonals, both ways */
+    VISIBLE_MAX = 192 /* maximum number of facets that one point replaces */
 };
 
 /* The hull so far. */
@@ -37,10 +37,10 @@ typedef struct hull {
     const double (*p)[3];
     /* planes n . x = d of the facets, padded to a multiple of four with planes that no point is
      * above */
-    double nx[SPACE + 4], ny[SPACE + 4], nz[SPACE + 4], d[SPACE + 4];
-    double length[SPACE]; /* twice the area of each facet */
-    double tolerance;     /* points at most this far outside the hull are omitted */
-    uint16_t corner[SPACE][3];
+    double nx[FACETS_MAX + 4], ny[FACETS_MAX + 4], nz[FACETS_MAX + 4], d[FACETS_MAX + 4];
+    double length[FACETS_MAX]; /* twice the area of each facet */
+    double tolerance;          /* points at most this far outside the hull are omitted */
+    uint16_t corner[FACETS_MAX][3];
     int count, capacity; /* number of facets, and its limit */
 } hull;
 
@@ -180,11 +180,11 @@ static bool first_facets(hull *h, const int c[4])
 
 /* Lists the edges of the visible facets as from << 16 | to in `edges`, and as to << 16 | from in
  * `reversed`. Returns their number. Pads `edges` to a multiple of four with invalid edges. */
-static int edges_of(const hull *h, const uint16_t *visible, int seen, uint32_t *edges,
+static int edges_of(const hull *h, const uint16_t *visible, int visible_count, uint32_t *edges,
                     uint32_t *reversed)
 {
     int listed = 0;
-    for (int i = 0; i < seen; i++) {
+    for (int i = 0; i < visible_count; i++) {
         const uint16_t *corner = h->corner[visible[i]];
         for (int e = 0; e < 3; e++) {
             uint32_t from = corner[e], to = corner[e == 2 ? 0 : e + 1];
@@ -219,33 +219,34 @@ static void close_gaps(hull *h, const uint16_t *index, int from, int to, int cou
     set_count(h, count);
 }
 
-/* Adds a point to the hull. Returns false if the point would replace more than VISIBLE facets or if
- * the capacity is reached. The hull may then have overlapping facets, so no more points can be
- * added, but its facets still give directions. */
+/* Adds a point to the hull. Returns false if the point would replace more than VISIBLE_MAX facets
+ * or if the capacity is reached. The hull may then have overlapping facets, so no more points can
+ * be added, but its facets still give directions. */
 static bool add_point(hull *h, int point)
 {
-    uint16_t visible[VISIBLE];
-    uint32_t edges[3 * VISIBLE], reversed[3 * VISIBLE];
+    uint16_t visible[VISIBLE_MAX];
+    uint32_t edges[3 * VISIBLE_MAX], reversed[3 * VISIBLE_MAX];
     const ebpo_sweep_planes planes = { h->nx, h->ny, h->nz, h->d, (h->count + 3) / 4 };
-    int seen = h->sweep->seen(&planes, h->p[point], h->tolerance, flat, visible, VISIBLE), made = 0,
-        count = h->count;
-    if (seen == 0)
+    int visible_count =
+            h->sweep->find_visible(&planes, h->p[point], h->tolerance, flat, visible, VISIBLE_MAX),
+        made = 0, count = h->count;
+    if (visible_count == 0)
         return true;
-    if (seen > VISIBLE)
+    if (visible_count > VISIBLE_MAX)
         return false;
-    int listed = edges_of(h, visible, seen, edges, reversed);
+    int listed = edges_of(h, visible, visible_count, edges, reversed);
     for (int i = 0; i < listed; i++) {
         if (has_edge(edges, (listed + 3) / 4, reversed[i]))
             continue;
-        if (made >= seen && count == h->capacity)
+        if (made >= visible_count && count == h->capacity)
             return false;
-        int index = made < seen ? visible[made] : count;
+        int index = made < visible_count ? visible[made] : count;
         if (!make_facet(h, index, (int)(edges[i] >> 16), (int)(edges[i] & 0xffff), point))
             continue;
-        count += made++ >= seen;
+        count += made++ >= visible_count;
     }
-    if (made < seen)
-        close_gaps(h, visible, made, seen, count);
+    if (made < visible_count)
+        close_gaps(h, visible, made, visible_count, count);
     else
         set_count(h, count);
     return true;
@@ -270,7 +271,7 @@ int ebpo_hull_facets(const double (*points)[3], int count, double tolerance,
     h.sweep = ebpo_sweep_best();
     h.p = points;
     h.count = 0;
-    h.capacity = capacity < SPACE ? capacity : SPACE;
+    h.capacity = capacity < FACETS_MAX ? capacity : FACETS_MAX;
     h.tolerance = tolerance;
     if (count < 4 || capacity < 4 || count > EBPO_HULL_POINTS)
         return 0;

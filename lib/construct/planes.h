@@ -39,8 +39,8 @@ typedef struct ebpo_candidate {
 typedef struct ebpo_choice {
     const ebpo_candidate *candidates; /* [count] no two have the same normal */
     int count;                        /* number of candidates */
-    /* random: [count] the candidates in the node's order, that of its faces or of its children;
-     * NULL: the order of the array */
+    /* for the random selection: [count] indices of the candidates, in the order of the node's faces
+     * or children; NULL: in the order of the array */
     const int *order;
     int most; /* maximum number of codes */
     /* greedy selection: volume that no candidate can remove, in cells (0: not known) */

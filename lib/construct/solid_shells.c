@@ -252,7 +252,7 @@ static void count_one(const ebpo_nesting *n, const ebpo_shell *one, ebpo_shells 
 }
 
 /* Sets, for each rule, the volume of the solid minus the integral of the winding number. */
-static void add_beyond(const ebpo_solid_shells *s, ebpo_shells *made)
+static void set_volume_differences(const ebpo_solid_shells *s, ebpo_shells *made)
 {
     ebpo_mesh_frame frame = ebpo_mesh_frame_of(s->mesh);
     const ebpo_nesting *n = &s->nesting;
@@ -275,7 +275,7 @@ void ebpo_solid_shells_count(const ebpo_solid_shells *s, ebpo_shells *out)
     for (uint64_t i = 0; i < s->nesting.count; i++)
         count_one(&s->nesting, &s->nesting.shells[i], out);
     if (s->apart)
-        add_beyond(s, out);
+        set_volume_differences(s, out);
 }
 
 ebpo_status ebpo_mesh_count_shells(const ebpo_mesh *mesh, unsigned threads, ebpo_progress progress,

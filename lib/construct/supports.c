@@ -170,16 +170,16 @@ static bool is_point(const ebpo_supports *s, unsigned i, const double x[3])
 static bool known_point(ebpo_supports *s, const double x[3], double slack)
 {
     uint64_t bits[3], at;
-    if (s->count >= s->place_count / 2)
+    if (s->count >= s->table_size / 2)
         return false;
     memcpy(bits, x, sizeof bits);
-    EBPO_HASH_FIND(at, ebpo_hash_three(bits), s->place_count - 1,
-                   !s->place[at] || is_point(s, s->place[at] - 1u, x));
-    if (!s->place[at]) {
-        s->place[at] = (uint16_t)(s->count + 1);
+    EBPO_HASH_FIND(at, ebpo_hash_three(bits), s->table_size - 1,
+                   !s->table[at] || is_point(s, s->table[at] - 1u, x));
+    if (!s->table[at]) {
+        s->table[at] = (uint16_t)(s->count + 1);
         return false;
     }
-    unsigned i = s->place[at] - 1u, lane = i % 4;
+    unsigned i = s->table[at] - 1u, lane = i % 4;
     double(*p)[4] = s->point[i / 4];
     p[3][lane] = slack > p[3][lane] ? slack : p[3][lane];
     for (unsigned copy = lane ? 4 : (unsigned)(s->count - i); copy < 4; copy++)
@@ -248,10 +248,10 @@ static bool add_crossings(ebpo_supports *s, const ebpo_branch *branch, const ebp
 static bool clear_table(ebpo_supports *s, uint64_t points)
 {
     uint64_t size = ebpo_hash_slots(2 * points < TABLE_MAX ? 2 * points : TABLE_MAX);
-    s->place_count = size;
-    if (!ebpo_array_grow_late(s->workspace, &s->place, &s->place_capacity, size, sizeof *s->place))
+    s->table_size = size;
+    if (!ebpo_array_grow_late(s->workspace, &s->table, &s->table_capacity, size, sizeof *s->table))
         return false;
-    memset(s->place, 0, size * sizeof *s->place);
+    memset(s->table, 0, size * sizeof *s->table);
     return true;
 }
 
@@ -373,10 +373,10 @@ void ebpo_supports_free(ebpo_supports *s)
 {
     ebpo_array_free(s->workspace, s->point);
     ebpo_array_free(s->workspace, s->box);
-    ebpo_array_free(s->workspace, s->place);
+    ebpo_array_free(s->workspace, s->table);
     s->point = NULL;
-    s->place = NULL;
+    s->table = NULL;
     s->box = NULL;
     s->box_capacity = 0;
-    s->capacity = s->count = s->place_capacity = s->place_count = 0;
+    s->capacity = s->count = s->table_capacity = s->table_size = 0;
 }

@@ -25,9 +25,9 @@ typedef struct ebpo_supports {
     double (*point)[4][4];
     uint64_t count, capacity; /* number of points; number of fours */
     const ebpo_sweep *sweep;
-    uint16_t *place; /* hash table: 1 + index of the point, as most points occur several times */
-    uint64_t place_capacity;
-    uint64_t place_count; /* size of the table, a power of two */
+    uint16_t *table; /* hash table: 1 + index of the point, as most points occur several times */
+    uint64_t table_capacity;
+    uint64_t table_size; /* size of the table, a power of two */
     /* for each stretch of points: least and greatest coordinates, greatest slack */
     double (*box)[7];
     uint64_t box_capacity;

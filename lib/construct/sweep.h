@@ -32,8 +32,8 @@ typedef struct ebpo_sweep {
     /* Finds all planes that p is above by more than `above`, but none if p is above no plane by
      * more than `beyond`. Writes the indices of the first `capacity` planes and returns the number
      * of all planes found. */
-    int (*seen)(const ebpo_sweep_planes *planes, const double p[3], double beyond, double above,
-                uint16_t *list, int capacity);
+    int (*find_visible)(const ebpo_sweep_planes *planes, const double p[3], double beyond,
+                        double above, uint16_t *list, int capacity);
     /* Raises *best to the greatest value among the points; ends when *best has reached `enough`.
      * Returns the index of the first point of the stretch with this value; UINT64_MAX when no value
      * is greater. */

@@ -22,10 +22,10 @@ static int list_bits(unsigned bits, int first, uint16_t *list, int capacity, int
     return count;
 }
 
-static int planes_seen(const ebpo_sweep_planes *planes, const double p[3], double beyond,
-                       double above, uint16_t *list, int capacity)
+static int find_visible_planes(const ebpo_sweep_planes *planes, const double p[3], double beyond,
+                               double above, uint16_t *list, int capacity)
 {
-    uint8_t sees[EBPO_SWEEP_PLANES / 4 + 1];
+    uint8_t visible[EBPO_SWEEP_PLANES / 4 + 1];
     v4d x = v4d_all(p[0]), y = v4d_all(p[1]), z = v4d_all(p[2]), far = v4d_all(beyond),
         near = v4d_all(above);
     v4l any = { 0, 0, 0, 0 };
@@ -33,12 +33,12 @@ static int planes_seen(const ebpo_sweep_planes *planes, const double p[3], doubl
         v4d height = load_four(planes->nx + 4 * i) * x + load_four(planes->ny + 4 * i) * y +
                      load_four(planes->nz + 4 * i) * z - load_four(planes->d + 4 * i);
         any |= height > far;
-        sees[i] = (uint8_t)v4l_mask(height > near);
+        visible[i] = (uint8_t)v4l_mask(height > near);
     }
     int count = 0;
     if (v4l_mask(any))
         for (int i = 0; i < planes->fours; i++)
-            count = list_bits(sees[i], 4 * i, list, capacity, count);
+            count = list_bits(visible[i], 4 * i, list, capacity, count);
     return count;
 }
 
@@ -80,4 +80,4 @@ static uint64_t highest_value(const ebpo_sweep_points *points, const double n[3]
     return stretch;
 }
 
-const ebpo_sweep EBPO_KERNEL(ebpo_sweep) = { planes_seen, highest_value };
+const ebpo_sweep EBPO_KERNEL(ebpo_sweep) = { find_visible_planes, highest_value };

@@ -540,33 +540,33 @@ ebpo_status ebpo_cache_get(ebpo_cache *c, uint64_t key, void **item, bool *hit, 
     ebpo_status status = EBPO_OK;
     *item = NULL;
     pthread_mutex_lock(&c->pool->lock);
-    bool there = take_ready(c, key, item);
-    if (!there) {
+    bool present = take_ready(c, key, item);
+    if (!present) {
         double begin = ebpo_seconds();
         status = wait_or_load(c, key, item, error);
         c->stats.load_seconds += ebpo_seconds() - begin;
     }
     pthread_mutex_unlock(&c->pool->lock);
     if (hit)
-        *hit = there;
+        *hit = present;
     return status;
 }
 
 bool ebpo_cache_try(ebpo_cache *c, uint64_t key, void **item)
 {
     pthread_mutex_lock(&c->pool->lock);
-    bool there = take_ready(c, key, item);
+    bool present = take_ready(c, key, item);
     pthread_mutex_unlock(&c->pool->lock);
-    return there;
+    return present;
 }
 
 bool ebpo_cache_has(ebpo_cache *c, uint64_t key)
 {
     pthread_mutex_lock(&c->pool->lock);
     cache_slot *s = find_slot(&c->pool->slots, c, key);
-    bool there = s && s->state == READY;
+    bool present = s && s->state == READY;
     pthread_mutex_unlock(&c->pool->lock);
-    return there;
+    return present;
 }
 
 void ebpo_cache_unpin(ebpo_cache *c, uint64_t key)

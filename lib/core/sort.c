@@ -47,10 +47,10 @@ static ebpo_status make_records(void *context, uint64_t begin, uint64_t end, uns
     sorting *t = context;
     const ebpo_sort *s = t->s;
     (void)worker;
-    uint8_t *here = t->made + begin * s->record;
-    ebpo_status status = s->make(s->context, begin, end, here, error);
-    for (uint64_t i = begin; i < end && status == EBPO_OK; i++, here += s->record)
-        __atomic_fetch_add(&t->in_bin[key_of(here) >> s->shift], 1, __ATOMIC_RELAXED);
+    uint8_t *made = t->made + begin * s->record;
+    ebpo_status status = s->make(s->context, begin, end, made, error);
+    for (uint64_t i = begin; i < end && status == EBPO_OK; i++, made += s->record)
+        __atomic_fetch_add(&t->in_bin[key_of(made) >> s->shift], 1, __ATOMIC_RELAXED);
     return status;
 }
 
@@ -80,22 +80,22 @@ static bool form_groups(sorting *t)
     return t->next != NULL;
 }
 
-/* Distributes the records [begin, end) to the groups. First copies the records to `here`, ordered
- * by group; `here` fits in the core's cache. Then copies the records of each group to `dealt` with
- * one memcpy. A thread thus writes to `dealt` at one position at a time. */
+/* Distributes the records [begin, end) to the groups. First copies the records to `grouped`,
+ * ordered by group; `grouped` fits in the core's cache. Then copies the records of each group to
+ * `dealt` with one memcpy. A thread thus writes to `dealt` at one position at a time. */
 static ebpo_status deal_to_groups(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                   ebpo_error *error)
 {
     sorting *t = context;
     const ebpo_sort *s = t->s;
-    /* For each group: number of records in this range, then the begin of these records in `here`,
-     * and after the copying their end. The number of groups can be slightly above GROUPS_MAX,
-     * because form_groups rounds the size of groups down. */
+    /* For each group: number of records in this range, then the begin of these records in
+     * `grouped`, and after the copying their end. The number of groups can be slightly above
+     * GROUPS_MAX, because form_groups rounds the size of groups down. */
     uint64_t cursor[GROUPS_MAX * 2], at = 0;
     (void)worker;
     memset(cursor, 0, (size_t)t->groups * sizeof *cursor);
-    uint8_t *here = ebpo_alloc(end - begin, s->record);
-    if (!here)
+    uint8_t *grouped = ebpo_alloc(end - begin, s->record);
+    if (!grouped)
         return ebpo_fail_memory(error, (end - begin) * s->record);
     const uint8_t *from = t->made + begin * s->record;
     for (uint64_t i = begin; i < end; i++, from += s->record)
@@ -107,17 +107,19 @@ static ebpo_status deal_to_groups(void *context, uint64_t begin, uint64_t end, u
     }
     from = t->made + begin * s->record;
     for (uint64_t i = begin; i < end; i++, from += s->record)
-        memcpy(here + cursor[t->group_of[key_of(from) >> s->shift]]++ * s->record, from, s->record);
+        memcpy(grouped + cursor[t->group_of[key_of(from) >> s->shift]]++ * s->record, from,
+               s->record);
     for (uint64_t g = 0, first = 0, runs = 0; g < t->groups; first = cursor[g++]) {
         uint64_t count = cursor[g] - first;
         if (count == 0)
             continue;
         uint64_t place = __atomic_fetch_add(&t->next[g], count, __ATOMIC_RELAXED);
-        memcpy(t->dealt + place * s->record, here + first * s->record, (size_t)count * s->record);
+        memcpy(t->dealt + place * s->record, grouped + first * s->record,
+               (size_t)count * s->record);
         if (++runs % RELEASE_EVERY == 0)
             ebpo_release_pages(s->workspace);
     }
-    free(here);
+    free(grouped);
     return EBPO_OK;
 }
 

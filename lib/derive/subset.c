@@ -115,7 +115,7 @@ ebpo_status ebpo_subset_count_reads(const ebpo_file *file, const ebpo_subset_opt
         return status;
     if (c.last_level < 0 || c.last_level > deepest || c.needs & EBPO_NEEDS_MESH)
         c.last_level = deepest;
-    c.expected.summed = true;
+    c.expected.counts_bytes = true;
     bool divided = options->boxed && info->subtree_level && c.last_level > info->subtree_level;
     out->of_subtrees = info->subtree_level ? info->level[info->subtree_level].gray_count : 0;
     if (!divided && c.last_level > info->subtree_level)

@@ -33,7 +33,7 @@ uint32_t ebpo_array_list_number(ebpo_array_id id, int level)
                                        : TABLE_NUMBERS + (uint32_t)(id - EBPO_A_SUBTREE_INDEX);
 }
 
-static ebpo_array_id place_array(uint32_t number, int *level)
+static ebpo_array_id find_array(uint32_t number, int *level)
 {
     *level = 0;
     if (number < MESH_NUMBERS) {
@@ -237,10 +237,10 @@ static ebpo_status find_rows(const ebpo_file *file, ebpo_array_in *a, const uint
     uint64_t chunks = ebpo_shape_chunks(&a->shape);
     while (*row < rows && ebpo_list_row_number(list[*row]) < number)
         ++*row;
-    a->first_sum = *row;
+    a->first_checksum = *row;
     while (*row < rows && ebpo_list_row_number(list[*row]) == number)
         ++*row;
-    return *row - a->first_sum == chunks
+    return *row - a->first_checksum == chunks
                ? EBPO_OK
                : long_chunk_fail(file, EBPO_A_CHUNK_CHECKSUMS,
                                  "the list has more or fewer chunks than", a->path, error);
@@ -283,13 +283,13 @@ ebpo_status ebpo_chunk_checksums_read(const ebpo_file *file, ebpo_error *error)
 {
     ebpo_file *own = ebpo_reader_own(file);
     ebpo_status status = EBPO_OK;
-    if (!file->has_checksums || atomic_load(&file->summed))
+    if (!file->has_checksums || atomic_load(&file->checksums_read))
         return EBPO_OK;
     pthread_mutex_lock(&own->lock);
-    if (!atomic_load(&own->summed)) {
+    if (!atomic_load(&own->checksums_read)) {
         status = read_checksums(own, error);
         if (status == EBPO_OK)
-            atomic_store(&own->summed, true);
+            atomic_store(&own->checksums_read, true);
     }
     pthread_mutex_unlock(&own->lock);
     return status;
@@ -341,15 +341,15 @@ static ebpo_status locate_by_index(ebpo_file *file, ebpo_error *error)
 /* Number of chunks of each array in the rows read so far. */
 typedef struct listing {
     ebpo_file *file;
-    uint64_t seen[EBPO_LEVELS_MAX][EBPO_LEVEL_ARRAYS], seen_root[EBPO_ARRAYS];
-    uint64_t seen_attribute[1 + 2 * EBPO_ATTRIBUTE_ARRAYS];
+    uint64_t of_level[EBPO_LEVELS_MAX][EBPO_LEVEL_ARRAYS], of_root[EBPO_ARRAYS];
+    uint64_t of_attribute[1 + 2 * EBPO_ATTRIBUTE_ARRAYS];
 } listing;
 
-static uint64_t *seen_of(listing *l, ebpo_array_id id, int level)
+static uint64_t *listed_count(listing *l, ebpo_array_id id, int level)
 {
-    return id < EBPO_LEVEL_ARRAYS   ? &l->seen[level][id]
-           : id == EBPO_A_ATTRIBUTE ? &l->seen_attribute[level]
-                                    : &l->seen_root[id];
+    return id < EBPO_LEVEL_ARRAYS   ? &l->of_level[level][id]
+           : id == EBPO_A_ATTRIBUTE ? &l->of_attribute[level]
+                                    : &l->of_root[id];
 }
 
 static ebpo_status list_fails(const ebpo_file *file, const char *what, const char *path,
@@ -362,16 +362,16 @@ static ebpo_status list_chunk(listing *l, uint32_t number, ebpo_chunk_location c
                               ebpo_error *error)
 {
     int level;
-    ebpo_array_id id = place_array(number, &level);
+    ebpo_array_id id = find_array(number, &level);
     if (id == EBPO_ARRAYS || (id == EBPO_A_ATTRIBUTE && level >= l->file->attributes.arrays))
         return EBPO_OK; /* a gap, an unknown part, or an unlisted array */
     ebpo_array_in *a = id < EBPO_LEVEL_ARRAYS   ? &l->file->level_array[level][id]
                        : id == EBPO_A_ATTRIBUTE ? &l->file->attributes.array[level]
                                                 : &l->file->root_array[id];
-    uint64_t *seen = seen_of(l, id, level);
+    uint64_t *listed = listed_count(l, id, level);
     if (!a->present)
-        return EBPO_OK; /* not called for */
-    if (*seen == ebpo_shape_chunks(&a->shape))
+        return EBPO_OK; /* the header requires no such array: its rows are ignored */
+    if (*listed == ebpo_shape_chunks(&a->shape))
         return list_fails(l->file, "the list has more chunks than", a->path, error);
     if (chunk.bytes == 0 || chunk.bytes > ebpo_reader_chunk_bound(a))
         return list_fails(l->file, "the list has an impossible chunk size for", a->path, error);
@@ -379,10 +379,10 @@ static ebpo_status list_chunk(listing *l, uint32_t number, ebpo_chunk_location c
         (a->chunks[0].address != chunk.address || a->chunks[0].bytes != chunk.bytes))
         return list_fails(l->file, "the list contradicts the header of", a->path, error);
     if (ebpo_shape_chunks(&a->shape) > 1) {
-        a->chunks[*seen] = chunk;
+        a->chunks[*listed] = chunk;
         a->stored_bytes += chunk.bytes;
     }
-    ++*seen;
+    ++*listed;
     return EBPO_OK;
 }
 
@@ -402,13 +402,13 @@ static ebpo_status begin_array(ebpo_file *file, ebpo_array_in *a, uint64_t *chun
 
 static ebpo_status end_array(listing *l, const ebpo_array_in *a, ebpo_error *error)
 {
-    uint64_t seen = *seen_of(l, a->id, a->level);
-    return !a->present || ebpo_schema_is_list(a->id) || seen == ebpo_shape_chunks(&a->shape)
+    uint64_t listed = *listed_count(l, a->id, a->level);
+    return !a->present || ebpo_schema_is_list(a->id) || listed == ebpo_shape_chunks(&a->shape)
                ? EBPO_OK
                : list_fails(l->file, "the list has fewer chunks than", a->path, error);
 }
 
-static ebpo_status list_chunks(ebpo_file *file, const uint64_t *places, uint64_t count,
+static ebpo_status list_chunks(ebpo_file *file, const uint64_t *rows, uint64_t count,
                                ebpo_error *error)
 {
     listing *l = ebpo_alloc_zero(1, sizeof *l);
@@ -419,13 +419,13 @@ static ebpo_status list_chunks(ebpo_file *file, const uint64_t *places, uint64_t
     if (l)
         l->file = file;
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
-        if (ebpo_list_row_value(places[i]) > file->end - at)
+        if (ebpo_list_row_value(rows[i]) > file->end - at)
             status =
                 list_fails(file, "a chunk is beyond the end of the file in", "the list", error);
         else
-            status = list_chunk(l, ebpo_list_row_number(places[i]),
-                                (ebpo_chunk_location){ at, ebpo_list_row_value(places[i]) }, error);
-        at += ebpo_list_row_value(places[i]);
+            status = list_chunk(l, ebpo_list_row_number(rows[i]),
+                                (ebpo_chunk_location){ at, ebpo_list_row_value(rows[i]) }, error);
+        at += ebpo_list_row_value(rows[i]);
     }
     for (int i = 0; i < ebpo_all_arrays(file) && status == EBPO_OK; i++)
         status = end_array(l, ebpo_array_number(file, i), error);
@@ -434,7 +434,7 @@ static ebpo_status list_chunks(ebpo_file *file, const uint64_t *places, uint64_t
 }
 
 /* Discards the chunk offsets of a list that was only partly valid. */
-static void forget_places(ebpo_file *file)
+static void discard_offsets(ebpo_file *file)
 {
     for (int i = 0; i < ebpo_all_arrays(file); i++) {
         ebpo_array_in *a = ebpo_array_number(file, i);
@@ -448,13 +448,13 @@ static void forget_places(ebpo_file *file)
 static ebpo_status locate_by_list(ebpo_file *file, ebpo_error *error)
 {
     const ebpo_array_in *a = &file->root_array[EBPO_A_CHUNK_DIRECTORY];
-    uint64_t *places;
-    ebpo_status status = ebpo_long_chunk_read(file, a, &places, error);
+    uint64_t *rows;
+    ebpo_status status = ebpo_long_chunk_read(file, a, &rows, error);
     if (status == EBPO_OK)
-        status = list_chunks(file, places, a->shape.rows, error);
-    free(places);
+        status = list_chunks(file, rows, a->shape.rows, error);
+    free(rows);
     if (status != EBPO_OK)
-        forget_places(file);
+        discard_offsets(file);
     return status == EBPO_OK ? ebpo_stored_check(file, error) : status;
 }
 

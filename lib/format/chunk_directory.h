@@ -103,7 +103,7 @@ static inline bool ebpo_chunk_fits(const ebpo_file *file, const ebpo_array_in *a
                                    uint64_t chunk, const uint8_t *stored, size_t bytes)
 {
     return !file->checksums || (bytes >= 4 && ebpo_chunk_checksum(stored, bytes) ==
-                                                  file->checksums[array->first_sum + chunk]);
+                                                  file->checksums[array->first_checksum + chunk]);
 }
 
 #endif

@@ -353,26 +353,26 @@ static void count_faces(const counting *c)
     }
 }
 
-/* Adds the number of vertices that faces [*face, end) use first to *seen, the number of vertices
+/* Adds the number of vertices that faces [*face, end) use first to *used, the number of vertices
  * that earlier faces use. */
-static void count_first_uses(const ebpo_mesh *mesh, uint64_t *face, uint64_t end, uint64_t *seen)
+static void count_first_uses(const ebpo_mesh *mesh, uint64_t *face, uint64_t end, uint64_t *used)
 {
     EBPO_FOR_ITEMS(mesh->workspace, i, *face * 3, end * 3)
-        *seen += mesh->faces[i] == *seen;
+        *used += mesh->faces[i] == *used;
     *face = end;
 }
 
 static void count_vertices(const counting *c)
 {
-    uint64_t face = 0, seen = 0;
+    uint64_t face = 0, used = 0;
     for (uint64_t i = 0; i < c->sums->subtrees; i++) {
-        uint64_t *from = row_of(c, i), *to = row_of(c, i + 1), begin = seen;
+        uint64_t *from = row_of(c, i), *to = row_of(c, i + 1), begin = used;
         count_first_uses(&c->tree->mesh, &face, to[EBPO_S_FACES_BEFORE] + from[EBPO_S_FACES],
-                         &seen);
-        to[EBPO_S_VERTICES_BEFORE] = from[EBPO_S_VERTICES_BEFORE] + seen - begin;
-        begin = seen;
-        count_first_uses(&c->tree->mesh, &face, to[EBPO_S_FACES_BEFORE] + to[EBPO_S_FACES], &seen);
-        to[EBPO_S_VERTICES] = from[EBPO_S_VERTICES] + seen - begin;
+                         &used);
+        to[EBPO_S_VERTICES_BEFORE] = from[EBPO_S_VERTICES_BEFORE] + used - begin;
+        begin = used;
+        count_first_uses(&c->tree->mesh, &face, to[EBPO_S_FACES_BEFORE] + to[EBPO_S_FACES], &used);
+        to[EBPO_S_VERTICES] = from[EBPO_S_VERTICES] + used - begin;
     }
 }
 
@@ -533,15 +533,16 @@ static bool is_of_faces(ebpo_array_id id)
 static bool is_chosen(const choice *c, const ebpo_array_out *a)
 {
     bool of_level = a->id < EBPO_LEVEL_ARRAYS,
-         here = of_level && a->level >= c->first_level && a->level <= c->last_level,
+         in_range = of_level && a->level >= c->first_level && a->level <= c->last_level,
          index = of_level && ebpo_schema_is_index(a->id);
     switch (c->kind) {
-    case WHOLE: return here;
+    case WHOLE: return in_range;
     case TOP_INDEXES:
-        return (here && index) || a->id == EBPO_A_SUBTREE_INDEX || a->id == EBPO_A_FACES_INDEX ||
-               a->id == EBPO_A_BORDER_LOOPS || a->id == EBPO_A_BORDER_POINTS;
-    case NODES: return here && !index && !is_of_faces(a->id);
-    case LISTS: return here && is_of_faces(a->id);
+        return (in_range && index) || a->id == EBPO_A_SUBTREE_INDEX ||
+               a->id == EBPO_A_FACES_INDEX || a->id == EBPO_A_BORDER_LOOPS ||
+               a->id == EBPO_A_BORDER_POINTS;
+    case NODES: return in_range && !index && !is_of_faces(a->id);
+    case LISTS: return in_range && is_of_faces(a->id);
     /* query results contain source face indices, which are read together with the faces */
     case MESH:
         return a->id == EBPO_A_VERTICES || a->id == EBPO_A_FACES || a->id == EBPO_A_FACE_SOURCE;

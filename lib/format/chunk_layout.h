@@ -60,7 +60,7 @@ typedef struct ebpo_plan {
     ebpo_array_out *array;
     unsigned count;
     uint64_t *index[EBPO_LEVELS_MAX][EBPO_INDEXES];
-    uint64_t *faces_index;             /* vertices seen before each chunk of faces */
+    uint64_t *faces_index;             /* number of vertices that the faces before each chunk use */
     ebpo_subtree_sums subtrees;        /* empty if info.subtree_level is 0 */
     const ebpo_attributes *attributes; /* NULL: no attributes */
     ebpo_attribute_plan *attribute;    /* [attributes->count] */

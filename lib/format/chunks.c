@@ -63,14 +63,15 @@ static ebpo_status decode_faces(const ebpo_chunks *c, uint64_t chunk, uint64_t r
                                 const uint8_t *raw, uint32_t *corners, ebpo_error *error)
 {
     const ebpo_array_in *array = &c->file->root_array[EBPO_A_FACES];
-    uint64_t vertices = c->file->info.vertex_count, seen = c->seen ? c->seen[chunk] : 0;
-    if (seen > vertices || (chunk == 0 && seen))
+    uint64_t vertices = c->file->info.vertex_count,
+             used = c->vertices_before ? c->vertices_before[chunk] : 0;
+    if (used > vertices || (chunk == 0 && used))
         return ebpo_chunks_fail(c, -1, EBPO_A_FACES_INDEX,
                                 "the index has more vertices than the mesh", error);
-    if (!ebpo_corners_decode(raw, rows, &seen, corners) || seen > vertices)
+    if (!ebpo_corners_decode(raw, rows, &used, corners) || used > vertices)
         return ebpo_chunks_fail(c, -1, EBPO_A_FACES, "a face names a vertex that does not exist",
                                 error);
-    if (chunk + 1 < ebpo_shape_chunks(&array->shape) && seen != c->seen[chunk + 1])
+    if (chunk + 1 < ebpo_shape_chunks(&array->shape) && used != c->vertices_before[chunk + 1])
         return ebpo_chunks_fail(c, -1, EBPO_A_FACES_INDEX, "the index contradicts the faces",
                                 error);
     return EBPO_OK;
@@ -349,7 +350,7 @@ ebpo_status ebpo_chunks_fetch(ebpo_chunks *c, const ebpo_chunk_keys *keys, unsig
 
 /* Reads the number of vertices that the faces before each chunk of faces use. In a counted cache,
  * this is done when the first chunk of faces is read. */
-static ebpo_status read_seen(ebpo_chunks *c, ebpo_error *error)
+static ebpo_status read_vertices_before(ebpo_chunks *c, ebpo_error *error)
 {
     const ebpo_array_in *index = ebpo_reader_array(c->file, EBPO_A_FACES_INDEX, 0);
     uint64_t cost = 0;
@@ -358,8 +359,8 @@ static ebpo_status read_seen(ebpo_chunks *c, ebpo_error *error)
         cost += cost_of(c, index, i);
     if (c->counted && !fits_budget(c, cost))
         return refuse_load(c, index, error);
-    return ebpo_reader_make(c->file, EBPO_A_FACES_INDEX, 0, &read, sizeof *c->seen, &c->seen,
-                            error);
+    return ebpo_reader_make(c->file, EBPO_A_FACES_INDEX, 0, &read, sizeof *c->vertices_before,
+                            &c->vertices_before, error);
 }
 
 void ebpo_chunks_limit(ebpo_chunks *chunks, uint64_t bytes)
@@ -376,8 +377,9 @@ static ebpo_status load_chunk(void *user, uint64_t key, uint64_t most, void **it
     (void)most;
     ebpo_chunks *c = user;
     const ebpo_array_in *array = array_of(c, key);
-    ebpo_status allowed =
-        c->counted && array->id == EBPO_A_FACES && !c->seen ? read_seen(c, error) : EBPO_OK;
+    ebpo_status allowed = c->counted && array->id == EBPO_A_FACES && !c->vertices_before
+                              ? read_vertices_before(c, error)
+                              : EBPO_OK;
     if (allowed == EBPO_OK && c->counted)
         allowed = admit_load(c, array, key, error);
     if (allowed != EBPO_OK)
@@ -425,7 +427,7 @@ static ebpo_status make_chunks(ebpo_chunks **out, const ebpo_file *file, uint64_
     c->limit = UINT64_MAX;
     pthread_mutex_init(&c->lock, NULL);
     ebpo_cache_source source = { c, estimate_chunk, load_chunk, release_chunk };
-    ebpo_status status = counted ? EBPO_OK : read_seen(c, error);
+    ebpo_status status = counted ? EBPO_OK : read_vertices_before(c, error);
     if (status == EBPO_OK)
         status = pool ? ebpo_cache_make_in(&c->cache, &source, "chunk", pool, error)
                       : ebpo_cache_make(&c->cache, &source, "chunk", budget, error);
@@ -459,7 +461,7 @@ void ebpo_chunks_free(ebpo_chunks *chunks)
     if (!chunks)
         return;
     ebpo_cache_free(chunks->cache);
-    ebpo_array_free(NULL, chunks->seen);
+    ebpo_array_free(NULL, chunks->vertices_before);
     free(chunks->ahead);
     free(chunks->rows);
     pthread_mutex_destroy(&chunks->lock);
@@ -547,13 +549,13 @@ ebpo_status ebpo_chunks_integers(ebpo_chunks *chunks, ebpo_array_id id, int leve
         status = ebpo_held_chunk_move(chunks, &view, row, error);
         if (status != EBPO_OK)
             break;
-        uint64_t here = view.end - row < rows ? view.end - row : rows;
+        uint64_t step = view.end - row < rows ? view.end - row : rows;
         widen_integers(&array->shape,
                        view.rows + (row - view.begin) * ebpo_shape_row_bytes(&array->shape),
-                       here * cols, out, size);
-        out += here * cols * size;
-        row += here;
-        rows -= here;
+                       step * cols, out, size);
+        out += step * cols * size;
+        row += step;
+        rows -= step;
     }
     ebpo_held_chunk_release(chunks, &view);
     return status;

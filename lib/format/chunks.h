@@ -38,7 +38,7 @@ struct ebpo_chunks {
     ebpo_cache *cache;
     /* [chunks of /mesh/faces] number of vertices that the faces before each chunk use;
      * NULL: a single chunk, or no mesh */
-    uint64_t *seen;
+    uint64_t *vertices_before;
     pthread_mutex_t lock;        /* for `rows` */
     struct ebpo_kept_rows *rows; /* recently used rows of the table of subtrees, or NULL */
     /* State of counted chunks (ebpo_chunks_make_counted), which one thread uses at a time. */

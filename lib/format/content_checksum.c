@@ -16,7 +16,8 @@
 #include "format/schema.h"
 #include "hdf5_read/coding.h"
 
-/* Faces of a chunk in a file without subtrees; number of chunks with subtrees that contain them. */
+/* Number of faces in a chunk of a file without subtrees, and number of chunks that contain as many
+ * faces in a file with subtrees. */
 enum { PLAIN_FACE_ROWS = 4096, SKIPPED = PLAIN_FACE_ROWS / EBPO_FACE_BLOCK };
 
 bool ebpo_content_has(const ebpo_info *info, ebpo_array_id id)
@@ -147,9 +148,9 @@ static void digest_values(ebpo_content *content, int number, ebpo_workspace *wor
     ebpo_sha256 state;
     ebpo_sha256_begin(&state);
     EBPO_FOR_PIECES(workspace, at, count, PIECE / size) {
-        uint64_t here = count - at < PIECE / size ? count - at : PIECE / size;
-        ebpo_integers_encode(values + at * size, size, here, size, file);
-        ebpo_sha256_add(&state, file, here * size);
+        uint64_t step = count - at < PIECE / size ? count - at : PIECE / size;
+        ebpo_integers_encode(values + at * size, size, step, size, file);
+        ebpo_sha256_add(&state, file, step * size);
     }
     ebpo_sha256_end(&state, digest);
     ebpo_attribute_path(number, path);

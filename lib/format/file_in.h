@@ -47,8 +47,8 @@ typedef struct ebpo_array_in {
     /* [ebpo_shape_chunks(&shape)] location of each chunk; NULL when the array is absent. Valid
      * after ebpo_reader_locate, or always for a single chunk */
     ebpo_chunk_location *chunks;
-    uint64_t first_sum; /* index of the array's first chunk in the list of chunk checksums */
-    const char *coding; /* for attributes; ebpo_schema has the codings of other arrays */
+    uint64_t first_checksum; /* index of the array's first chunk in the list of chunk checksums */
+    const char *coding;      /* for attributes; ebpo_schema has the codings of other arrays */
 } ebpo_array_in;
 
 /* Returns the maximum size of a stored chunk. */
@@ -82,11 +82,11 @@ struct ebpo_file {
     ebpo_array_in root_array[EBPO_ARRAYS]; /* from EBPO_A_VERTICES on */
     ebpo_attributes_in attributes;
     pthread_mutex_t lock;
-    atomic_bool located; /* the chunks of all arrays are located */
-    bool has_directory;  /* the file has a list of chunk offsets */
-    bool has_checksums;  /* the file has a list of chunk checksums: chunk_directory.h */
-    atomic_bool summed;  /* the list of chunk checksums has been read */
-    uint32_t *checksums; /* NULL until then */
+    atomic_bool located;        /* the chunks of all arrays are located */
+    bool has_directory;         /* the file has a list of chunk offsets */
+    bool has_checksums;         /* the file has a list of chunk checksums: chunk_directory.h */
+    atomic_bool checksums_read; /* the list of chunk checksums has been read */
+    uint32_t *checksums;        /* NULL until then */
     ebpo_idle_readers idle;
 };
 

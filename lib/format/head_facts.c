@@ -675,18 +675,18 @@ static ebpo_status get_version(ebpo_head *in, ebpo_head_object root, ebpo_info *
     return status;
 }
 
-/* Marks a known part as present in *seen. A part may be in either of the two lists. */
-static ebpo_status take_part(ebpo_head *in, const char *word, bool required, unsigned *seen,
+/* Marks a known part as present in *found. A part may be in either of the two lists. */
+static ebpo_status take_part(ebpo_head *in, const char *word, bool required, unsigned *found,
                              ebpo_error *error)
 {
     for (int i = 0; i < part_word_count; i++) {
         if (strcmp(word, part_words[i].word) != 0)
             continue;
-        if (*seen >> i & 1)
+        if (*found >> i & 1)
             return ebpo_fail_file(error, EBPO_E_FORMAT, in->shown,
                                   "part \"%s\" is listed twice; get a fresh copy of the file",
                                   word);
-        *seen |= 1u << i;
+        *found |= 1u << i;
         return EBPO_OK;
     }
     if (!required)
@@ -699,7 +699,7 @@ static ebpo_status take_part(ebpo_head *in, const char *word, bool required, uns
 static ebpo_status get_parts(ebpo_head *in, ebpo_head_object root, ebpo_info *info,
                              ebpo_error *error)
 {
-    unsigned seen = 0;
+    unsigned found = 0;
     for (int required = 1; required >= 0; required--) {
         const char *name = required ? "required_parts" : "optional_parts";
         char words[1024], *rest = words;
@@ -714,20 +714,20 @@ static ebpo_status get_parts(ebpo_head *in, ebpo_head_object root, ebpo_info *in
             rest = space ? space + 1 : NULL;
             if (space)
                 *space = 0;
-            status = *word ? take_part(in, word, required, &seen, error)
+            status = *word ? take_part(in, word, required, &found, error)
                            : wrong_value(in, "/", name, error);
         }
         if (status != EBPO_OK)
             return status;
     }
     for (int i = 0; i < part_word_count; i++)
-        if (seen >> i & 1)
+        if (found >> i & 1)
             info->parts |= part_words[i].part;
     info->pruned = info->parts & WORD_PRUNED;
     info->subtree_level = info->parts & WORD_SUBTREES ? 1 : 0; /* get_subtrees reads the level */
     info->gates = info->parts & WORD_GATES;
     info->parts &= ~(uint32_t)(WORD_PRUNED | WORD_SUBTREES | WORD_GATES);
-    return seen & 1 ? EBPO_OK : wrong_value(in, "/", "required_parts", error);
+    return found & 1 ? EBPO_OK : wrong_value(in, "/", "required_parts", error);
 }
 
 static ebpo_status get_subtrees(ebpo_head *in, ebpo_head_object root, ebpo_info *info,

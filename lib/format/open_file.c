@@ -350,7 +350,7 @@ static ebpo_status open_source(ebpo_file **out, const ebpo_source *source, const
     pthread_mutex_init(&file->lock, NULL);
     ebpo_idle_readers_make(&file->idle);
     atomic_init(&file->located, true);
-    atomic_init(&file->summed, false);
+    atomic_init(&file->checksums_read, false);
     ebpo_status status = ebpo_input_open(&file->in, source, name, error);
     if (status == EBPO_OK) {
         status = ebpo_head_open(&head, &file->in, error);

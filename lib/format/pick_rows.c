@@ -409,9 +409,9 @@ void ebpo_faces_hint(ebpo_chunks *chunks, const uint32_t *faces, uint64_t count,
     ebpo_hints e = EBPO_HINTS_INIT(chunks->file);
     bool *has = ebpo_input_prefetches(&chunks->file->in) ? chunks_of(array, faces, count) : NULL;
     for (uint64_t i = 0; has && i < number; i++) {
-        uint64_t first = chunks->seen ? chunks->seen[i] : 0,
-                 end = chunks->seen && i + 1 < number ? chunks->seen[i + 1]
-                                                      : chunks->file->info.vertex_count;
+        uint64_t first = chunks->vertices_before ? chunks->vertices_before[i] : 0,
+                 end = chunks->vertices_before && i + 1 < number ? chunks->vertices_before[i + 1]
+                                                                 : chunks->file->info.vertex_count;
         if (!has[i])
             continue;
         ebpo_chunks_hint(chunks, &e, EBPO_A_FACES, 0, i * rows, rows);
@@ -483,9 +483,9 @@ static ebpo_status sort_rows(const gathering *g, uint64_t count, uint64_t *begin
         begin[g->rows[i] / chunk_rows]++;
     }
     for (uint64_t c = 0; c <= chunks; c++) {
-        uint64_t here = begin[c];
+        uint64_t in_chunk = begin[c];
         begin[c] = sum;
-        sum += here;
+        sum += in_chunk;
     }
     for (uint64_t i = 0; i < count; i++)
         order[begin[g->rows[i] / chunk_rows]++] = (uint32_t)i;

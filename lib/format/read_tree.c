@@ -205,9 +205,9 @@ ebpo_status ebpo_file_read_level(const ebpo_file *file, int level, const ebpo_re
         status = check_indexes(file, level, out, read.omitted_parts, error);
     if (status == EBPO_OK) {
         ebpo_check check = ebpo_reader_check(file, out->workspace);
-        ebpo_info seen = *info;
-        seen.parts &= ~(uint32_t)read.omitted_parts;
-        status = ebpo_check_level(&check, &seen, level, out, error);
+        ebpo_info read_info = *info;
+        read_info.parts &= ~(uint32_t)read.omitted_parts;
+        status = ebpo_check_level(&check, &read_info, level, out, error);
     }
     if (status != EBPO_OK)
         ebpo_level_free(out);
@@ -263,15 +263,15 @@ static ebpo_status take_faces(void *context, const ebpo_array_in *array, uint64_
     mesh_job *j = context;
     ebpo_check check = ebpo_reader_check(j->file, j->mesh->workspace);
     uint64_t last = ebpo_shape_chunks(&array->shape) - 1;
-    uint64_t seen = j->faces_index ? j->faces_index[chunk] : 0;
-    if (seen > j->mesh->vertex_count || (chunk == 0 && seen))
+    uint64_t used = j->faces_index ? j->faces_index[chunk] : 0;
+    if (used > j->mesh->vertex_count || (chunk == 0 && used))
         return ebpo_check_fail(&check, -1, "/mesh/faces_index",
                                "the index has more vertices than the mesh", error);
-    if (!ebpo_corners_decode(bytes, rows, &seen, j->mesh->faces + 3 * row) ||
-        seen > j->mesh->vertex_count)
+    if (!ebpo_corners_decode(bytes, rows, &used, j->mesh->faces + 3 * row) ||
+        used > j->mesh->vertex_count)
         return ebpo_check_fail(&check, -1, "/mesh/faces",
                                "a face names a vertex that does not exist", error);
-    if (chunk < last && seen != j->faces_index[chunk + 1])
+    if (chunk < last && used != j->faces_index[chunk + 1])
         return ebpo_check_fail(&check, -1, "/mesh/faces_index", "the index contradicts the faces",
                                error);
     return EBPO_OK;
@@ -468,10 +468,10 @@ ebpo_status ebpo_file_read_tree(const ebpo_file *file, const ebpo_read_options *
 }
 
 /* Computes the position of each item in the order of source indices. The indices are distinct
- * and below `limit`. The caller frees *place. A header may state a limit far above the number of
+ * and below `limit`. The caller frees *position. A header may state a limit far above the number of
  * items, so the function uses one bit per possible index; memory pages without items stay empty. */
 static ebpo_status sort_by_source(ebpo_workspace *workspace, const uint32_t *source, uint64_t count,
-                                  uint64_t limit, uint32_t **place, ebpo_error *error)
+                                  uint64_t limit, uint32_t **position, ebpo_error *error)
 {
     enum { WORDS = 8 /* words of 64 bits for each entry of `before` */ };
     uint64_t words = (limit <= UINT32_MAX ? limit : UINT64_C(1) << 32) / 64 + 1;
@@ -499,13 +499,13 @@ static ebpo_status sort_by_source(ebpo_workspace *workspace, const uint32_t *sou
     free(bits);
     free(before);
     if (status == EBPO_OK)
-        *place = out;
+        *position = out;
     else
         ebpo_array_free(workspace, out);
     return status;
 }
 
-static ebpo_status reorder_vertices(ebpo_mesh *mesh, const uint32_t *place, ebpo_error *error)
+static ebpo_status reorder_vertices(ebpo_mesh *mesh, const uint32_t *position, ebpo_error *error)
 {
     size_t size = mesh->xyz32 ? 3 * sizeof *mesh->xyz32 : 3 * sizeof *mesh->xyz64;
     const uint8_t *old = mesh->xyz32 ? (const uint8_t *)mesh->xyz32 : (const uint8_t *)mesh->xyz64;
@@ -513,7 +513,7 @@ static ebpo_status reorder_vertices(ebpo_mesh *mesh, const uint32_t *place, ebpo
     if (!sorted)
         return ebpo_workspace_fail(mesh->workspace, mesh->vertex_count * size, error);
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, i, 0, mesh->vertex_count)
-        memcpy(sorted + place[i] * size, old + i * size, size);
+        memcpy(sorted + position[i] * size, old + i * size, size);
     if (mesh->xyz32) {
         ebpo_array_free(mesh->workspace, mesh->xyz32);
         mesh->xyz32 = (float *)(void *)sorted;
@@ -537,9 +537,9 @@ static ebpo_status reorder_faces(ebpo_mesh *mesh, const uint32_t *vertex_place,
     return EBPO_OK;
 }
 
-/* Moves row i of the attributes of an element to row place[i]. */
-static ebpo_status reorder_attributes(ebpo_mesh *mesh, const char *element, const uint32_t *place,
-                                      uint64_t count, ebpo_error *error)
+/* Moves row i of the attributes of an element to row position[i]. */
+static ebpo_status reorder_attributes(ebpo_mesh *mesh, const char *element,
+                                      const uint32_t *position, uint64_t count, ebpo_error *error)
 {
     if (!mesh->attributes)
         return EBPO_OK;
@@ -547,7 +547,7 @@ static ebpo_status reorder_attributes(ebpo_mesh *mesh, const char *element, cons
     if (!rows)
         return ebpo_workspace_fail(mesh->workspace, count * sizeof *rows, error);
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, i, 0, count)
-        rows[place[i]] = (uint32_t)i;
+        rows[position[i]] = (uint32_t)i;
     ebpo_status status = ebpo_attributes_pick(mesh->attributes, element, rows, count, error);
     ebpo_array_free(mesh->workspace, rows);
     return status;

@@ -102,8 +102,8 @@ static void add_range(ebpo_hints *e, uint64_t offset, uint64_t size)
 
 bool ebpo_hints_wanted(const ebpo_hints *e)
 {
-    return e->summed || ebpo_input_prefetches(&e->file->in) ||
-           (e->near && ebpo_input_can_advise(&e->file->in));
+    return e->counts_bytes || ebpo_input_prefetches(&e->file->in) ||
+           (e->local && ebpo_input_can_advise(&e->file->in));
 }
 
 void ebpo_hint_chunks(ebpo_hints *e, const ebpo_array_in *array, uint64_t begin, uint64_t end)
@@ -191,7 +191,7 @@ uint64_t ebpo_hints_bytes(ebpo_hints *e)
  */
 static bool wants_checksums(const ebpo_file *file)
 {
-    return file->has_checksums && !atomic_load(&file->summed);
+    return file->has_checksums && !atomic_load(&file->checksums_read);
 }
 
 static ebpo_range where_checksums(const ebpo_file *file)
@@ -228,8 +228,8 @@ void ebpo_hint_top(const ebpo_file *file)
     if (!ebpo_input_prefetches(&file->in) || !file->has_directory || atomic_load(&file->located) ||
         !is_top(info))
         return;
-    const ebpo_chunk_location *places = file->root_array[EBPO_A_CHUNK_DIRECTORY].chunks;
-    ebpo_range range[4] = { { places->address, places->bytes } };
+    const ebpo_chunk_location *directory = file->root_array[EBPO_A_CHUNK_DIRECTORY].chunks;
+    ebpo_range range[4] = { { directory->address, directory->bytes } };
     size_t count = 1;
     if (wants_checksums(file))
         range[count++] = where_checksums(file);

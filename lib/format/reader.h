@@ -15,8 +15,8 @@ typedef struct ebpo_hints {
     ebpo_range *range;
     uint64_t count, capacity;
     bool failed; /* chunk offsets could not be read */
-    bool near;   /* also collect chunks of local files: the operating system receives the hints */
-    bool summed; /* collect chunks of any file, for ebpo_hints_bytes */
+    bool local;  /* also collect chunks of local files: the operating system receives the hints */
+    bool counts_bytes; /* collect chunks of any file, for ebpo_hints_bytes */
 } ebpo_hints;
 #define EBPO_HINTS_INIT(file)                 \
     {                                         \

@@ -546,7 +546,7 @@ typedef struct walk {
     /* next item of each level: in depth-first order, the items of a level have ascending octcodes
      */
     uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX];
-    uint64_t seen; /* number of new faces of the leaves before */
+    uint64_t faces_before; /* number of new faces of the leaves before */
 } walk;
 
 static ebpo_status walk_group(walk *w, int level, ebpo_error *error)
@@ -561,10 +561,10 @@ static ebpo_status walk_group(walk *w, int level, ebpo_error *error)
                 return status;
         } else if (type == EBPO_LEAF) {
             uint64_t i = w->leaf[level]++;
-            if (arrays->leaf_first[i] != w->seen)
+            if (arrays->leaf_first[i] != w->faces_before)
                 return ebpo_check_fail(w->check, level, "leaf_skip",
                                        "the leaves' new faces are not in depth-first order", error);
-            w->seen += arrays->leaf_new[i];
+            w->faces_before += arrays->leaf_new[i];
         }
     }
     return EBPO_OK;
@@ -574,7 +574,7 @@ ebpo_status ebpo_check_order(const ebpo_check *check, const ebpo_tree *tree, ebp
 {
     walk w = { .check = check, .tree = tree };
     ebpo_status status = walk_group(&w, 0, error);
-    if (status == EBPO_OK && w.seen != tree->info.face_count)
+    if (status == EBPO_OK && w.faces_before != tree->info.face_count)
         return ebpo_check_fail(check, 0, "leaf_new", "not every face is new in exactly one leaf",
                                error);
     return status;
@@ -584,20 +584,20 @@ ebpo_status ebpo_check_map(const ebpo_check *check, const char *array, const uin
                            uint64_t count, uint64_t limit, ebpo_error *error)
 {
     limit = limit <= UINT32_MAX ? limit : UINT64_C(1) << 32; /* a map has indices of 32 bits */
-    uint64_t *seen = ebpo_alloc_zero(limit / 64 + 1, sizeof *seen);
-    if (!seen)
+    uint64_t *used = ebpo_alloc_zero(limit / 64 + 1, sizeof *used);
+    if (!used)
         return ebpo_fail_memory(error, limit / 8);
     ebpo_status status = EBPO_OK;
     EBPO_FOR_ITEMS(check->workspace, i, 0, count) {
         uint64_t bit = UINT64_C(1) << map[i] % 64;
-        if (map[i] >= limit || seen[map[i] / 64] & bit) {
+        if (map[i] >= limit || used[map[i] / 64] & bit) {
             status = ebpo_check_fail(check, -1, array,
                                      "a source index is out of range or used twice", error);
             break;
         }
-        seen[map[i] / 64] |= bit;
+        used[map[i] / 64] |= bit;
     }
-    free(seen);
+    free(used);
     return status;
 }
 

@@ -87,9 +87,9 @@ static void sort_numbers(uint32_t *numbers, uint32_t *other, uint64_t count)
             continue;
         uint64_t sum = 0;
         for (int k = 0; k < 256; k++) {
-            uint64_t here = begin[byte][k];
+            uint64_t in_bin = begin[byte][k];
             begin[byte][k] = sum;
-            sum += here;
+            sum += in_bin;
         }
         for (uint64_t i = 0; i < count; i++)
             to[begin[byte][from[i] >> 8 * byte & 255]++] = from[i];
@@ -112,14 +112,14 @@ static ebpo_status compact_sort(ebpo_compact *compact, ebpo_error *error)
     sort_numbers(compact->sorted, other, compact->count);
     free(other);
     for (uint64_t i = 0; i < compact->count; i++)
-        compact->slot[slot_of(compact, compact->sorted[i])].place = (uint32_t)i;
+        compact->slot[slot_of(compact, compact->sorted[i])].position = (uint32_t)i;
     return EBPO_OK;
 }
 
 /* Returns the position, in sorted order, of a number that was added. */
 static uint32_t compact_find(const ebpo_compact *compact, uint32_t number)
 {
-    return compact->slot[slot_of(compact, number)].place;
+    return compact->slot[slot_of(compact, number)].position;
 }
 
 /* --- faces --- */
@@ -159,11 +159,11 @@ static ebpo_status gather_rows(ebpo_chunks *chunks, ebpo_array_id id, size_t row
         memcpy(to, view.rows + (single[i] - view.begin) * row_bytes, row_bytes);
     while (rows && status == EBPO_OK &&
            (status = ebpo_held_chunk_move(chunks, &view, first, error)) == EBPO_OK) {
-        uint64_t here = view.end - first < rows ? view.end - first : rows;
-        memcpy(to, view.rows + (first - view.begin) * row_bytes, here * row_bytes);
-        to += here * row_bytes;
-        first += here;
-        rows -= here;
+        uint64_t step = view.end - first < rows ? view.end - first : rows;
+        memcpy(to, view.rows + (first - view.begin) * row_bytes, step * row_bytes);
+        to += step * row_bytes;
+        first += step;
+        rows -= step;
     }
     ebpo_held_chunk_release(chunks, &view);
     return status;
@@ -239,7 +239,9 @@ static ebpo_status new_vertices(ebpo_slice *slice, ebpo_chunks *chunks, uint64_t
         return status;
     const uint32_t *corners = (const uint32_t *)(const void *)view.rows,
                    *own = slice->mesh.faces + 3 * (uint64_t)slice->shared_count;
-    uint64_t seen = chunks->seen ? chunks->seen[view.begin / view.array->shape.chunk_rows] : 0;
+    uint64_t used = chunks->vertices_before
+                        ? chunks->vertices_before[view.begin / view.array->shape.chunk_rows]
+                        : 0;
     /* one past the largest vertex of the faces before the owned faces, and of the owned faces;
      * vertex indices are below 2^32 - 2 */
     uint32_t before = 0, within = 0;
@@ -248,7 +250,7 @@ static ebpo_status new_vertices(ebpo_slice *slice, ebpo_chunks *chunks, uint64_t
     for (uint64_t i = 0; i < 3 * slice->face_count; i++)
         within = own[i] + 1 > within ? own[i] + 1 : within;
     ebpo_held_chunk_release(chunks, &view);
-    *begin = before > seen ? before : seen;
+    *begin = before > used ? before : used;
     *end = within > *begin ? within : *begin;
     return EBPO_OK;
 }
@@ -444,7 +446,7 @@ static void hint_subtrees(ebpo_chunks *chunks, const extent *x, const range *r)
 {
     uint64_t first = r->run.rank[EBPO_GRAY], count = r->run.count[EBPO_GRAY];
     ebpo_hints e = EBPO_HINTS_INIT(chunks->file);
-    e.near = true;
+    e.local = true;
     if (!ebpo_subtree_table_has(chunks->file, r->level + 1) || !goes_on(x, r) ||
         r->level != chunks->file->info.subtree_level || !ebpo_hints_wanted(&e))
         return;

@@ -91,7 +91,7 @@ static inline uint64_t ebpo_slice_file_face(const ebpo_slice *slice, uint32_t lo
 typedef struct ebpo_compact {
     /* hash table with open addressing, at most half full; number UINT32_MAX: free */
     struct {
-        uint32_t number, place; /* the index, and its position in `sorted` */
+        uint32_t number, position; /* the index, and its position in `sorted` */
     } * slot;
     uint64_t mask;
     uint32_t *sorted; /* [count] */

@@ -409,12 +409,12 @@ ebpo_status ebpo_ranks_count_file(ebpo_chunks *chunks, int level, uint64_t group
     ebpo_status status = EBPO_OK;
     memset(counts, 0, 4 * sizeof *counts);
     while (groups && (status = ebpo_held_chunk_move(chunks, &view, group, error)) == EBPO_OK) {
-        uint64_t here = view.end - group < groups ? view.end - group : groups, part[4];
-        ebpo_groups_count(view.rows + 2 * (group - view.begin), here, part);
+        uint64_t step = view.end - group < groups ? view.end - group : groups, part[4];
+        ebpo_groups_count(view.rows + 2 * (group - view.begin), step, part);
         for (int k = 0; k < 4; k++)
             counts[k] += part[k];
-        group += here;
-        groups -= here;
+        group += step;
+        groups -= step;
     }
     ebpo_held_chunk_release(chunks, &view);
     return status;
@@ -455,13 +455,13 @@ ebpo_status ebpo_chunks_sum(ebpo_chunks *chunks, ebpo_array_id id, int level, ui
     unsigned size = view.array->shape.element_size;
     *sum = 0;
     while (rows && (status = ebpo_held_chunk_move(chunks, &view, row, error)) == EBPO_OK) {
-        uint64_t here = view.end - row < rows ? view.end - row : rows;
-        if (!sum_rows(view.rows + (row - view.begin) * size, size, here, sum)) {
+        uint64_t step = view.end - row < rows ? view.end - row : rows;
+        if (!sum_rows(view.rows + (row - view.begin) * size, size, step, sum)) {
             status = ebpo_chunks_fail(chunks, level, id, "the values are too large", error);
             break;
         }
-        row += here;
-        rows -= here;
+        row += step;
+        rows -= step;
     }
     ebpo_held_chunk_release(chunks, &view);
     return status;

@@ -30,7 +30,8 @@ EBPO_MUST_USE ebpo_status ebpo_subtree_table_find(ebpo_chunks *chunks, unsigned 
                                                   uint64_t item, ebpo_subtree_row *out,
                                                   ebpo_error *error);
 
-/* Remember that the faces of a subtree were checked (subtree_faces.h); some are forgotten. */
+/* ebpo_subtree_faces_note remembers that the faces of a subtree were checked (subtree_faces.h).
+ * ebpo_subtree_faces_known returns true if this is remembered, which it is not for all subtrees. */
 bool ebpo_subtree_faces_known(ebpo_chunks *chunks, uint64_t subtree);
 void ebpo_subtree_faces_note(ebpo_chunks *chunks, uint64_t subtree);
 

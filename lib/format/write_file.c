@@ -3,7 +3,7 @@
  *
  * The headers (groups, array headers, attributes) come first in the file. To determine their size,
  * the same file is first written in memory, with tiny chunks. Then several threads encode and
- * compress WINDOW chunks (a window) at a time. The chunks are appended in the order of
+ * compress WINDOW_CHUNKS chunks, a window, at a time. The chunks are appended in the order of
  * chunk_layout.c: first the chunks with which a reader locates a subtree, then all others.
  *
  * All chunk indexes of HDF5 form one metadata block. It is stored immediately before the first
@@ -34,19 +34,19 @@
 /* --- headers --- */
 
 /* The lists that have a row for each chunk. */
-typedef enum header_list {
-    LIST_CHECKSUMS, /* /chunk_checksums: chunk checksums, in the order of arrays */
-    LIST_SIZES,     /* /subtrees/chunk_directory: stored sizes in file order; their running sums are
-                       chunk offsets */
-    LISTS
-} header_list;
+typedef enum chunk_list {
+    CHUNK_CHECKSUMS, /* /chunk_checksums: chunk checksums, in the order of arrays */
+    /* /subtrees/chunk_directory: stored sizes in file order, with chunk offsets as running sums */
+    CHUNK_SIZES,
+    CHUNK_LIST_COUNT
+} chunk_list;
 
 typedef struct file_headers {
     ebpo_plan *plan; /* write_headers and headers_begin_index set the handles of its arrays */
     ebpo_h5_out out;
     ebpo_h5_id root;
-    ebpo_array_out list[LISTS]; /* a list without rows is not written */
-    uint64_t chunks;            /* number of chunks of the plan's arrays */
+    ebpo_array_out list[CHUNK_LIST_COUNT]; /* a list without rows is not written */
+    uint64_t chunks;                       /* number of chunks of the plan's arrays */
     int codec_level;
     uint64_t head_bytes;  /* size of the headers */
     uint64_t index_bytes; /* size of HDF5's chunk indexes; 0 if no array has several chunks */
@@ -73,7 +73,7 @@ static bool has_index(const ebpo_plan *plan)
 }
 
 /* Describes the array of a list with this number of rows. */
-static void plan_list(file_headers *h, header_list list, ebpo_array_id id, uint64_t rows)
+static void plan_list(file_headers *h, chunk_list list, ebpo_array_id id, uint64_t rows)
 {
     ebpo_array_out *a = &h->list[list];
     *a = (ebpo_array_out){ .id = id, .handle = -1 };
@@ -95,8 +95,8 @@ static void headers_plan(file_headers *h, ebpo_plan *plan, uint64_t chunks,
         .plan = plan, .root = -1, .chunks = chunks, .codec_level = options->codec_level
     };
     h->out = (ebpo_h5_out)EBPO_H5_OUT_INIT;
-    plan_list(h, LIST_CHECKSUMS, EBPO_A_CHUNK_CHECKSUMS, has_checksums ? chunks : 0);
-    plan_list(h, LIST_SIZES, EBPO_A_CHUNK_DIRECTORY,
+    plan_list(h, CHUNK_CHECKSUMS, EBPO_A_CHUNK_CHECKSUMS, has_checksums ? chunks : 0);
+    plan_list(h, CHUNK_SIZES, EBPO_A_CHUNK_DIRECTORY,
               plan->info.subtree_level ? chunks + has_index(plan) + has_checksums : 0);
 }
 
@@ -149,7 +149,7 @@ static ebpo_status make_root_group(file_headers *h, const char *path, uint32_t n
 
 /* Writes the offset of a list's chunk and the file's size as attributes of the list. Readers use
  * the list only if both values match the file. */
-static ebpo_status headers_put_validity(file_headers *h, header_list list, uint64_t file_bytes,
+static ebpo_status headers_put_validity(file_headers *h, chunk_list list, uint64_t file_bytes,
                                         uint64_t offset, ebpo_error *error)
 {
     ebpo_h5_id id = h->list[list].handle;
@@ -192,7 +192,7 @@ static ebpo_status write_headers(file_headers *h, const char *path, const char *
     h->out.codec_level = h->codec_level;
     ebpo_status status =
         ebpo_h5_create(&h->out, path, shown, head_bytes,
-                       3 + (h->list[LIST_CHECKSUMS].shape.rows != 0) +
+                       3 + (h->list[CHUNK_CHECKSUMS].shape.rows != 0) +
                            (plan->info.subtree_level != 0) + (plan->attributes != NULL) +
                            (plan->info.parts & EBPO_PART_BORDER ? 1 : 0),
                        error);
@@ -218,7 +218,7 @@ static ebpo_status write_headers(file_headers *h, const char *path, const char *
         status = ebpo_attributes_put_group(&h->out, plan, error);
     for (unsigned i = 0; i < plan->count && status == EBPO_OK; i++)
         status = make_array(h, &plan->array[i], i == 0 ? &first : NULL, error);
-    for (header_list l = 0; l < LISTS && status == EBPO_OK; l++) {
+    for (chunk_list l = 0; l < CHUNK_LIST_COUNT && status == EBPO_OK; l++) {
         if (h->list[l].shape.rows == 0)
             continue;
         status = make_array(h, &h->list[l], NULL, error);
@@ -235,7 +235,7 @@ static void headers_close(file_headers *h)
         ebpo_h5_close_id(&h->out, h->plan->array[i].handle);
         h->plan->array[i].handle = -1;
     }
-    for (header_list l = 0; l < LISTS; l++) {
+    for (chunk_list l = 0; l < CHUNK_LIST_COUNT; l++) {
         ebpo_h5_close_id(&h->out, h->list[l].handle);
         h->list[l].handle = -1;
     }
@@ -292,7 +292,7 @@ static ebpo_status headers_begin_index(file_headers *h, ebpo_error *error)
     for (unsigned i = 0; i < h->plan->count && status == EBPO_OK; i++)
         status =
             ebpo_h5_open_array(&h->out, h->plan->array[i].path, &h->plan->array[i].handle, error);
-    for (header_list l = 0; l < LISTS && status == EBPO_OK; l++)
+    for (chunk_list l = 0; l < CHUNK_LIST_COUNT && status == EBPO_OK; l++)
         if (h->list[l].shape.rows)
             status = ebpo_h5_open_array(&h->out, h->list[l].path, &h->list[l].handle, error);
     return status;
@@ -302,16 +302,16 @@ static ebpo_status headers_begin_index(file_headers *h, ebpo_error *error)
 
 /* Maximum number of chunks of a window. A window is the chunks that are in memory together: all
  * together at most 8 MiB before compression, and at most 8 MiB compressed. */
-enum { WINDOW = 128 };
+enum { WINDOW_CHUNKS = 128 };
 
 /* A chunk of the window. */
-typedef struct slot {
+typedef struct window_chunk {
     const ebpo_array_out *array;
     uint64_t chunk;
     uint8_t *raw, *stored;
     size_t raw_bytes, stored_bytes;
     ebpo_status status;
-} slot;
+} window_chunk;
 
 /* State of writing one file. */
 typedef struct writer {
@@ -319,8 +319,8 @@ typedef struct writer {
     const ebpo_write_options *options;
     unsigned threads;
     file_headers head;
-    slot slots[WINDOW];
-    unsigned used;            /* number of slots in use */
+    window_chunk window[WINDOW_CHUNKS];
+    unsigned used;            /* number of chunks in the window */
     ebpo_chunk_coder *coders; /* [threads] */
     ebpo_chunk_order order;
     ebpo_array_digest *digest; /* [arrays of the plan] */
@@ -337,14 +337,14 @@ typedef struct writer {
 
 /* Encodes the rows of chunks begin .. end - 1 of the window. Pads the last chunk of an array with
  * zeros. */
-static ebpo_status fill_slot(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                             ebpo_error *error)
+static ebpo_status encode_chunks(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                 ebpo_error *error)
 {
     writer *w = context;
     (void)worker;
     (void)error;
     for (uint64_t i = begin; i < end; i++) {
-        slot *s = &w->slots[i];
+        window_chunk *s = &w->window[i];
         const ebpo_shape *shape = &s->array->shape;
         uint64_t row = s->chunk * shape->chunk_rows, rows = shape->rows - row < shape->chunk_rows
                                                                 ? shape->rows - row
@@ -359,10 +359,10 @@ static ebpo_status fill_slot(void *context, uint64_t begin, uint64_t end, unsign
 
 /* Adds the chunks of the window to the digests of their arrays. Adds each digest that is then
  * complete to the content checksums. */
-static void digest_slots(writer *w)
+static void digest_window(writer *w)
 {
     for (unsigned i = 0; i < w->used; i++) {
-        const slot *s = &w->slots[i];
+        const window_chunk *s = &w->window[i];
         const ebpo_shape *shape = &s->array->shape;
         uint64_t row = s->chunk * shape->chunk_rows, left = shape->rows - row;
         ebpo_array_digest *state = &w->digest[s->array - w->plan.array];
@@ -382,7 +382,7 @@ static void digest_slots(writer *w)
 }
 
 /* Compresses faces as gates. The last chunk's padding is zeros, not gates. */
-static ebpo_status compress_gates(slot *s, ebpo_chunk_coder *coder, int level)
+static ebpo_status compress_gates(window_chunk *s, ebpo_chunk_coder *coder, int level)
 {
     ebpo_shape stored = ebpo_stored_shape(&s->array->shape, true);
     uint64_t left = stored.rows - s->chunk * stored.chunk_rows,
@@ -394,7 +394,7 @@ static ebpo_status compress_gates(slot *s, ebpo_chunk_coder *coder, int level)
                                      EBPO_GATES_ENDS, s->stored, &s->stored_bytes);
 }
 
-static ebpo_status compress_chunk(slot *s, ebpo_chunk_coder *coder, int level)
+static ebpo_status compress_chunk(window_chunk *s, ebpo_chunk_coder *coder, int level)
 {
     const ebpo_shape *shape = &s->array->shape;
     return s->array->gates ? compress_gates(s, coder, level)
@@ -402,17 +402,17 @@ static ebpo_status compress_chunk(slot *s, ebpo_chunk_coder *coder, int level)
                                                s->raw, s->raw_bytes, s->stored, &s->stored_bytes);
 }
 
-/* Item 0 adds the whole window to the digests. Item i > 0 compresses slot i - 1. */
-static ebpo_status compress_slot(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                                 ebpo_error *error)
+/* Item 0 adds the whole window to the digests. Item i > 0 compresses chunk i - 1 of the window. */
+static ebpo_status compress_chunks(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                   ebpo_error *error)
 {
     writer *w = context;
     for (uint64_t i = begin; i < end; i++) {
         if (i == 0) {
-            digest_slots(w);
+            digest_window(w);
             continue;
         }
-        slot *s = &w->slots[i - 1];
+        window_chunk *s = &w->window[i - 1];
         ebpo_status status = compress_chunk(s, &w->coders[worker], w->options->codec_level);
         if (status != EBPO_OK)
             return ebpo_fail_at(error, status, w->head.out.shown, s->array->path, -1,
@@ -426,24 +426,24 @@ static ebpo_status encode_window(writer *w, ebpo_error *error)
 {
     unsigned threads = w->used > 4 ? w->threads : 1;
     ebpo_status status = ebpo_parallel_for(threads, w->plan.tree->mesh.workspace, w->used, 1,
-                                           fill_slot, w, NULL, "write", error);
+                                           encode_chunks, w, NULL, "write", error);
     if (status == EBPO_OK)
         status = ebpo_parallel_for(threads, w->plan.tree->mesh.workspace, w->used + 1u, 1,
-                                   compress_slot, w, NULL, "write", error);
+                                   compress_chunks, w, NULL, "write", error);
     return status;
 }
 
 /* Adds a row to the list of chunk sizes. */
 static void add_size_row(writer *w, uint32_t number, uint64_t bytes)
 {
-    if (!w->head.list[LIST_SIZES].shape.rows)
+    if (!w->head.list[CHUNK_SIZES].shape.rows)
         return;
     w->size_row[w->size_rows++] = ebpo_list_row(number, bytes);
 }
 
 /* Adds a chunk to the lists, and its size to the total (chunk_bytes). Called in file order, before
  * the chunk is written. */
-static void list_chunk(writer *w, const slot *s)
+static void list_chunk(writer *w, const window_chunk *s)
 {
     if (w->index_at == 0 && ebpo_shape_chunks(&s->array->shape) > 1) {
         w->index_at = w->head.head_bytes + w->chunk_bytes;
@@ -451,7 +451,7 @@ static void list_chunk(writer *w, const slot *s)
     }
     uint32_t number = ebpo_array_list_number(s->array->id, s->array->level);
     add_size_row(w, number, s->stored_bytes);
-    if (w->head.list[LIST_CHECKSUMS].shape.rows)
+    if (w->head.list[CHUNK_CHECKSUMS].shape.rows)
         w->checksum_row[w->first_checksum[s->array - w->plan.array] + s->chunk] =
             ebpo_list_row(number, ebpo_chunk_checksum(s->stored, s->stored_bytes));
     w->chunk_bytes += s->stored_bytes;
@@ -465,7 +465,7 @@ static ebpo_status flush_window(writer *w, ebpo_error *error)
 {
     ebpo_status status = encode_window(w, error);
     for (unsigned i = 0; i < w->used && status == EBPO_OK; i++) {
-        const slot *s = &w->slots[i];
+        const window_chunk *s = &w->window[i];
         list_chunk(w, s);
         if (w->chunks_done++ == 0)
             continue; /* the first chunk was written with the headers */
@@ -484,16 +484,16 @@ static ebpo_status write_chunks(writer *w, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < w->order.count && status == EBPO_OK; i++) {
-        w->slots[w->used].array = &w->plan.array[w->order.chunk[i].array];
-        w->slots[w->used++].chunk = w->order.chunk[i].chunk;
-        if (w->used == WINDOW)
+        w->window[w->used].array = &w->plan.array[w->order.chunk[i].array];
+        w->window[w->used++].chunk = w->order.chunk[i].chunk;
+        if (w->used == WINDOW_CHUNKS)
             status = flush_window(w, error);
     }
     return status == EBPO_OK && w->used ? flush_window(w, error) : status;
 }
 
 /* Writes a list as one chunk. *bytes: stored size; 0 for a list without rows. */
-static ebpo_status write_list(writer *w, header_list list, const uint64_t *values, size_t *bytes,
+static ebpo_status write_list(writer *w, chunk_list list, const uint64_t *values, size_t *bytes,
                               ebpo_error *error)
 {
     const ebpo_array_out *a = &w->head.list[list];
@@ -515,19 +515,19 @@ static ebpo_status write_list(writer *w, header_list list, const uint64_t *value
  * ignore the lists. */
 static ebpo_status write_lists(writer *w, ebpo_error *error)
 {
-    size_t bytes[LISTS];
+    size_t bytes[CHUNK_LIST_COUNT];
     uint64_t offset = w->head.head_bytes + w->chunk_bytes + w->head.index_bytes, size = 0;
-    const uint64_t *values[LISTS] = { w->checksum_row, w->size_row };
+    const uint64_t *values[CHUNK_LIST_COUNT] = { w->checksum_row, w->size_row };
     ebpo_status status =
-        write_list(w, LIST_CHECKSUMS, values[LIST_CHECKSUMS], &bytes[LIST_CHECKSUMS], error);
-    if (status == EBPO_OK && bytes[LIST_CHECKSUMS])
-        add_size_row(w, ebpo_array_list_number(EBPO_A_CHUNK_CHECKSUMS, 0), bytes[LIST_CHECKSUMS]);
+        write_list(w, CHUNK_CHECKSUMS, values[CHUNK_CHECKSUMS], &bytes[CHUNK_CHECKSUMS], error);
+    if (status == EBPO_OK && bytes[CHUNK_CHECKSUMS])
+        add_size_row(w, ebpo_array_list_number(EBPO_A_CHUNK_CHECKSUMS, 0), bytes[CHUNK_CHECKSUMS]);
     if (status == EBPO_OK)
-        status = write_list(w, LIST_SIZES, values[LIST_SIZES], &bytes[LIST_SIZES], error);
+        status = write_list(w, CHUNK_SIZES, values[CHUNK_SIZES], &bytes[CHUNK_SIZES], error);
     if (status == EBPO_OK)
         status = ebpo_h5_size(&w->head.out, &size, error);
-    bool valid = status == EBPO_OK && size == offset + bytes[LIST_CHECKSUMS] + bytes[LIST_SIZES];
-    for (header_list l = 0; l < LISTS && status == EBPO_OK; l++) {
+    bool valid = status == EBPO_OK && size == offset + bytes[CHUNK_CHECKSUMS] + bytes[CHUNK_SIZES];
+    for (chunk_list l = 0; l < CHUNK_LIST_COUNT && status == EBPO_OK; l++) {
         if (w->head.list[l].shape.rows)
             status = headers_put_validity(&w->head, l, valid ? size : 0, valid ? offset : 0, error);
         offset += bytes[l];
@@ -538,22 +538,22 @@ static ebpo_status write_lists(writer *w, ebpo_error *error)
 static ebpo_status make_window(writer *w, ebpo_error *error)
 {
     size_t bound = ebpo_chunk_bound(EBPO_CHUNK_BYTES_MAX),
-           slot_bytes = EBPO_CHUNK_BYTES_MAX + bound;
-    uint64_t wanted = w->order.count < WINDOW ? w->order.count : WINDOW;
+           buffer_bytes = EBPO_CHUNK_BYTES_MAX + bound;
+    uint64_t wanted = w->order.count < WINDOW_CHUNKS ? w->order.count : WINDOW_CHUNKS;
     w->threads = ebpo_thread_count(w->options->threads);
     w->coders = ebpo_alloc_zero(w->threads, sizeof *w->coders);
-    uint8_t *buffers = ebpo_alloc(wanted, slot_bytes);
-    w->slots[0].raw = buffers;
+    uint8_t *buffers = ebpo_alloc(wanted, buffer_bytes);
+    w->window[0].raw = buffers;
     w->digest = ebpo_alloc(w->plan.count, sizeof *w->digest);
-    w->size_row = ebpo_alloc(w->head.list[LIST_SIZES].shape.rows, sizeof *w->size_row);
-    w->checksum_row = ebpo_alloc(w->head.list[LIST_CHECKSUMS].shape.rows, sizeof *w->checksum_row);
+    w->size_row = ebpo_alloc(w->head.list[CHUNK_SIZES].shape.rows, sizeof *w->size_row);
+    w->checksum_row = ebpo_alloc(w->head.list[CHUNK_CHECKSUMS].shape.rows, sizeof *w->checksum_row);
     w->first_checksum = ebpo_alloc(w->plan.count, sizeof *w->first_checksum);
     if (!w->coders || !buffers || !w->digest || !w->size_row || !w->checksum_row ||
         !w->first_checksum)
-        return ebpo_fail_memory(error, wanted * slot_bytes);
+        return ebpo_fail_memory(error, wanted * buffer_bytes);
     for (unsigned i = 0; i < wanted; i++) {
-        w->slots[i].raw = buffers + i * slot_bytes;
-        w->slots[i].stored = w->slots[i].raw + EBPO_CHUNK_BYTES_MAX;
+        w->window[i].raw = buffers + i * buffer_bytes;
+        w->window[i].stored = w->window[i].raw + EBPO_CHUNK_BYTES_MAX;
     }
     uint64_t before = 0;
     for (unsigned i = 0; i < w->plan.count; i++) {
@@ -566,11 +566,11 @@ static ebpo_status make_window(writer *w, ebpo_error *error)
 /* Encodes the first chunk, which is written with the headers. */
 static ebpo_status encode_first(writer *w, uint8_t *stored, size_t *bytes, ebpo_error *error)
 {
-    slot *s = &w->slots[0];
+    window_chunk *s = &w->window[0];
     s->array = &w->plan.array[0];
     s->chunk = 0;
-    (void)fill_slot(w, 0, 1, 0, NULL);
-    ebpo_status status = compress_slot(w, 1, 2, 0, error);
+    (void)encode_chunks(w, 0, 1, 0, NULL);
+    ebpo_status status = compress_chunks(w, 1, 2, 0, error);
     *bytes = s->stored_bytes;
     memcpy(stored, s->stored, s->stored_bytes);
     return status;
@@ -675,7 +675,7 @@ static ebpo_status write_tree(const ebpo_tree *tree, const char *path, const cha
     for (unsigned i = 0; w->coders && i < w->threads; i++)
         ebpo_chunk_coder_clear(&w->coders[i]);
     free(w->coders);
-    free(w->slots[0].raw);
+    free(w->window[0].raw);
     free(w->digest);
     free(w->size_row);
     free(w->checksum_row);

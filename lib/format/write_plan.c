@@ -125,13 +125,13 @@ static uint64_t sample_bytes(ebpo_chunk_coder *coder, const uint8_t *values, siz
 static bool columns_are_less(ebpo_chunk_coder *coder, const uint8_t *values, size_t size,
                              bool floats, uint64_t rows, uint32_t cols)
 {
-    uint64_t row_bytes = size * cols, here = SAMPLE_BYTES / row_bytes, plain = 0, columns = 0;
-    if (here > rows)
-        here = rows;
+    uint64_t row_bytes = size * cols, sampled = SAMPLE_BYTES / row_bytes, plain = 0, columns = 0;
+    if (sampled > rows)
+        sampled = rows;
     for (uint64_t i = 0; i < SAMPLES; i++) {
-        const uint8_t *at = values + (rows - here) / SAMPLES * i * row_bytes;
-        plain += sample_bytes(coder, at, size, floats, here, cols, false);
-        columns += sample_bytes(coder, at, size, floats, here, cols, true);
+        const uint8_t *at = values + (rows - sampled) / SAMPLES * i * row_bytes;
+        plain += sample_bytes(coder, at, size, floats, sampled, cols, false);
+        columns += sample_bytes(coder, at, size, floats, sampled, cols, true);
     }
     return columns < plain;
 }
@@ -373,7 +373,7 @@ void ebpo_plan_encode(const ebpo_plan *plan, const ebpo_array_out *array, uint64
 {
     const ebpo_tree *tree = plan->tree;
     const ebpo_level *level = &tree->level[array->level];
-    uint64_t seen;
+    uint64_t used;
     switch (array->id) {
     case EBPO_A_LEAF_SKIP: encode_skips(level, &array->shape, row, rows, file); break;
     case EBPO_A_LEAF_REFS:
@@ -386,9 +386,9 @@ void ebpo_plan_encode(const ebpo_plan *plan, const ebpo_array_out *array, uint64
             ebpo_points64_encode(tree->mesh.xyz64 + 3 * row, rows, file);
         break;
     case EBPO_A_FACES:
-        seen = plan->faces_index[row / array->shape.chunk_rows];
+        used = plan->faces_index[row / array->shape.chunk_rows];
         /* cannot fail, as index_faces has checked the faces */
-        (void)ebpo_corners_encode(tree->mesh.faces + 3 * row, rows, &seen, file);
+        (void)ebpo_corners_encode(tree->mesh.faces + 3 * row, rows, &used, file);
         break;
     case EBPO_A_BORDER_POINTS:
         ebpo_border_encode(&tree->border, plan->info.double_coordinates, row, rows, file);
@@ -555,15 +555,15 @@ static ebpo_status index_faces(ebpo_plan *plan, const ebpo_check *check, ebpo_er
     plan->faces_index = ebpo_alloc(mesh->face_count / rows + 1, sizeof *plan->faces_index);
     if (!plan->faces_index)
         return ebpo_fail_memory(error, mesh->face_count / rows * 8);
-    uint64_t seen = 0;
+    uint64_t used = 0;
     EBPO_FOR_ITEMS(mesh->workspace, i, 0, mesh->face_count * 3) {
         if (i % (3 * (uint64_t)rows) == 0)
-            plan->faces_index[i / (3 * (uint64_t)rows)] = seen;
-        if (mesh->faces[i] > seen || mesh->faces[i] >= mesh->vertex_count)
+            plan->faces_index[i / (3 * (uint64_t)rows)] = used;
+        if (mesh->faces[i] > used || mesh->faces[i] >= mesh->vertex_count)
             return ebpo_check_fail(
                 check, -1, "/mesh/faces",
                 "the vertices are not in the order of their first use by the faces", error);
-        seen += mesh->faces[i] == seen;
+        used += mesh->faces[i] == used;
     }
     return EBPO_OK;
 }

@@ -26,54 +26,57 @@
 /* --- points that are far from the triangle compared with its size --- */
 
 /* A number with an error bound. A number 0 with the bound 0 is exactly 0. */
-typedef struct near {
+typedef struct bounded_number {
     double x, error;
-} near;
+} bounded_number;
 
 /* `more` covers the rounding of the bounds themselves, and `lost` the underflow of denormal
  * results. */
 static const double more = 1 + 0x1p-40, rounding = 0x1p-52, lost = 0x1p-1060;
 
-static near near_multiply(near a, near b)
+static bounded_number bounded_multiply(bounded_number a, bounded_number b)
 {
-    near out = { a.x * b.x, 0 };
+    bounded_number out = { a.x * b.x, 0 };
     if ((a.x == 0 && a.error == 0) || (b.x == 0 && b.error == 0))
-        return (near){ 0, 0 };
+        return (bounded_number){ 0, 0 };
     out.error =
         (fabs(a.x) * b.error + fabs(b.x) * a.error + a.error * b.error + fabs(out.x) * rounding) *
             more +
         lost;
     return out;
 }
-static near near_add(near a, near b)
+static bounded_number bounded_add(bounded_number a, bounded_number b)
 {
-    near out = { a.x + b.x, (a.error + b.error) * more };
+    bounded_number out = { a.x + b.x, (a.error + b.error) * more };
     out.error += fabs(out.x) * rounding;
     return out;
 }
-static near near_negate(near a) { return (near){ -a.x, a.error }; }
+static bounded_number bounded_negate(bounded_number a) { return (bounded_number){ -a.x, a.error }; }
 
-static near near_dot(const near a[3], const near b[3])
+static bounded_number bounded_dot(const bounded_number a[3], const bounded_number b[3])
 {
-    return near_add(near_add(near_multiply(a[0], b[0]), near_multiply(a[1], b[1])),
-                    near_multiply(a[2], b[2]));
+    return bounded_add(bounded_add(bounded_multiply(a[0], b[0]), bounded_multiply(a[1], b[1])),
+                       bounded_multiply(a[2], b[2]));
 }
-static void near_cross(const near a[3], const near b[3], near out[3])
+static void bounded_cross(const bounded_number a[3], const bounded_number b[3],
+                          bounded_number out[3])
 {
     for (int k = 0; k < 3; k++) {
         int u = (k + 1) % 3, v = (k + 2) % 3;
-        out[k] = near_add(near_multiply(a[u], b[v]), near_negate(near_multiply(a[v], b[u])));
+        out[k] =
+            bounded_add(bounded_multiply(a[u], b[v]), bounded_negate(bounded_multiply(a[v], b[u])));
     }
 }
-static int near_sign(near a) { return a.x > a.error ? 1 : a.x < -a.error ? -1 : 0; }
-static bool near_is_zero(near a) { return a.x == 0 && a.error == 0; }
+static int bounded_sign(bounded_number a) { return a.x > a.error ? 1 : a.x < -a.error ? -1 : 0; }
+static bool bounded_is_zero(bounded_number a) { return a.x == 0 && a.error == 0; }
 
 /* Returns to - from, times 2^-exponent. */
-static near near_difference(double to, double from, int exponent)
+static bounded_number bounded_difference(double to, double from, int exponent)
 {
     double d = to - from;
-    near out = { isfinite(d) ? ldexp(d, -exponent) : ldexp(to, -exponent) - ldexp(from, -exponent),
-                 0 };
+    bounded_number out = { isfinite(d) ? ldexp(d, -exponent)
+                                       : ldexp(to, -exponent) - ldexp(from, -exponent),
+                           0 };
     if (d != 0)
         out.error = fabs(out.x) * rounding + lost;
     return out;
@@ -94,8 +97,8 @@ static int exponent_of(const double (*a)[3], int count, const double b[3])
 }
 
 typedef struct far_triangle {
-    near corner[3][3], edge[3][3]; /* in separate units; corners are relative to p */
-    near along[3], back[3];        /* corner k . edge k; corner k + 1 . edge k */
+    bounded_number corner[3][3], edge[3][3]; /* in separate units; corners are relative to p */
+    bounded_number along[3], back[3];        /* corner k . edge k; corner k + 1 . edge k */
     int exponent, edge_exponent;
 } far_triangle;
 
@@ -109,41 +112,41 @@ static bool relate_far(const double p[3], const double triangle[3][3], far_trian
     for (int i = 0; i < 3; i++) {
         bool any = false;
         for (int k = 0; k < 3; k++) {
-            t->corner[i][k] = near_difference(triangle[i][k], p[k], t->exponent);
+            t->corner[i][k] = bounded_difference(triangle[i][k], p[k], t->exponent);
             t->edge[i][k] =
-                near_difference(triangle[(i + 1) % 3][k], triangle[i][k], t->edge_exponent);
-            any = any || !near_is_zero(t->edge[i][k]);
+                bounded_difference(triangle[(i + 1) % 3][k], triangle[i][k], t->edge_exponent);
+            any = any || !bounded_is_zero(t->edge[i][k]);
         }
         apart = apart && any;
     }
     for (int i = 0; i < 3; i++) {
-        t->along[i] = near_dot(t->corner[i], t->edge[i]);
-        t->back[i] = near_dot(t->corner[(i + 1) % 3], t->edge[i]);
+        t->along[i] = bounded_dot(t->corner[i], t->edge[i]);
+        t->back[i] = bounded_dot(t->corner[(i + 1) % 3], t->edge[i]);
     }
     return apart;
 }
 
 static ebpo_feature far_feature_of(const far_triangle *t)
 {
-    near normal[3], outward[3];
+    bounded_number normal[3], outward[3];
     bool inside = true;
-    near_cross(t->edge[0], t->edge[1], normal);
+    bounded_cross(t->edge[0], t->edge[1], normal);
     for (int i = 0; i < 3; i++) {
-        const near *along = &t->along[i], *before = &t->back[(i + 2) % 3];
+        const bounded_number *along = &t->along[i], *before = &t->back[(i + 2) % 3];
         /* behind the corner along both of its edges, or exactly beside it */
-        if ((near_sign(*along) > 0 || near_is_zero(*along)) &&
-            (near_sign(*before) < 0 || near_is_zero(*before)))
+        if ((bounded_sign(*along) > 0 || bounded_is_zero(*along)) &&
+            (bounded_sign(*before) < 0 || bounded_is_zero(*before)))
             return (ebpo_feature)(EBPO_NEAR_CORNER0 + i);
-        near_cross(t->edge[i], normal, outward);
-        int side = near_sign(near_dot(outward, t->corner[i]));
-        if (side < 0 && near_sign(*along) < 0 && near_sign(t->back[i]) > 0)
+        bounded_cross(t->edge[i], normal, outward);
+        int side = bounded_sign(bounded_dot(outward, t->corner[i]));
+        if (side < 0 && bounded_sign(*along) < 0 && bounded_sign(t->back[i]) > 0)
             return (ebpo_feature)(EBPO_NEAR_EDGE0 + i);
         inside = inside && side > 0;
     }
     return inside ? EBPO_NEAR_INTERIOR : EBPO_NEAR_UNKNOWN;
 }
 
-static double near_length(const near a[3])
+static double bounded_length(const bounded_number a[3])
 {
     return sqrt(a[0].x * a[0].x + a[1].x * a[1].x + a[2].x * a[2].x);
 }
@@ -154,11 +157,11 @@ static void bound_far(const far_triangle *t, ebpo_feature feature, ebpo_distance
 {
     double least = INFINITY, size = 0;
     for (int i = 0; i < 3; i++) {
-        least = fmin(least, near_length(t->corner[i]));
-        size = fmax(size, near_length(t->edge[i]));
+        least = fmin(least, bounded_length(t->corner[i]));
+        size = fmax(size, bounded_length(t->edge[i]));
     }
     if (feature <= EBPO_NEAR_CORNER2) {
-        least = near_length(t->corner[feature]);
+        least = bounded_length(t->corner[feature]);
         size = 0;
     }
     double low = least * (1 - 0x1p-48) -
@@ -192,14 +195,15 @@ static bool compare_far_corners(const double p[3], const double a[3], const doub
     const double both[2][3] = { { a[0], a[1], a[2] }, { b[0], b[1], b[2] } };
     int apart = exponent_of((const double(*)[3])both, 1, b),
         away = exponent_of((const double(*)[3])both, 2, p);
-    near step[3], middle[3];
+    bounded_number step[3], middle[3];
     for (int k = 0; k < 3; k++) {
-        step[k] = near_difference(a[k], b[k], apart);
-        middle[k] = near_add(near_difference(a[k], p[k], away), near_difference(b[k], p[k], away));
+        step[k] = bounded_difference(a[k], b[k], apart);
+        middle[k] =
+            bounded_add(bounded_difference(a[k], p[k], away), bounded_difference(b[k], p[k], away));
     }
-    near d = near_dot(step, middle);
-    *sign = near_sign(d);
-    return *sign || near_is_zero(d);
+    bounded_number d = bounded_dot(step, middle);
+    *sign = bounded_sign(d);
+    return *sign || bounded_is_zero(d);
 }
 
 /* Replaces corners that do not belong to a feature by copies of those that do. */
@@ -441,7 +445,8 @@ typedef struct nearest {
     int unit;
     ebpo_vectorz p, corner[3], edge[3], normal; /* corners relative to p */
     mpz_t square, denominator;                  /* squared distance in squared units */
-    ebpo_vectorz offset;                        /* nearest point less p, times offset_denominator */
+    ebpo_vectorz offset;                        /* nearest point minus p, times offset_denominator
+                                                 */
     mpz_t offset_denominator;
     ebpo_feature feature;
     mpz_t t, u;
@@ -501,8 +506,8 @@ static bool try_interior(nearest *n)
     return true;
 }
 
-/* Takes a corner or edge when it is nearer than the current feature; of equally near ones, takes
- * the corner. */
+/* Takes a corner or edge when it is nearer than the current feature; of equally bounded_number
+ * ones, takes the corner. */
 static void offer_feature(nearest *n, bool first, const mpz_t square, const mpz_t denominator,
                           ebpo_feature feature, bool *taken)
 {

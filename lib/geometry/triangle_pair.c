@@ -250,8 +250,8 @@ static void swap_corners(int *x, int *y)
     *y = z;
 }
 
-bool ebpo_turn_pair(const double a[3][3], const double b[3][3], ebpo_turned_pair *out,
-                    ebpo_pair_kind *kind)
+bool ebpo_prepare_pair(const double a[3][3], const double b[3][3], ebpo_prepared_pair *out,
+                       ebpo_pair_kind *kind)
 {
     *kind = EBPO_PAIR_APART;
     sides_of_plane(a, b, out->side_b);
@@ -274,7 +274,7 @@ bool ebpo_turn_pair(const double a[3][3], const double b[3][3], ebpo_turned_pair
     return true;
 }
 
-int ebpo_compare_ends(const double a[3][3], const double b[3][3], const ebpo_turned_pair *t,
+int ebpo_compare_ends(const double a[3][3], const double b[3][3], const ebpo_prepared_pair *t,
                       int corner_a, int corner_b)
 {
     return ebpo_orient3d(a[t->a[0]], a[t->a[corner_a]], b[t->b[0]], b[t->b[corner_b]]);
@@ -282,11 +282,11 @@ int ebpo_compare_ends(const double a[3][3], const double b[3][3], const ebpo_tur
 
 ebpo_pair_kind ebpo_triangle_pair(const double a[3][3], const double b[3][3])
 {
-    ebpo_turned_pair t;
+    ebpo_prepared_pair t;
     ebpo_pair_kind kind;
     if (boxes_apart(a, b))
         return EBPO_PAIR_APART;
-    if (!ebpo_turn_pair(a, b, &t, &kind))
+    if (!ebpo_prepare_pair(a, b, &t, &kind))
         return kind;
     int lower = ebpo_compare_ends(a, b, &t, 1, 1);
     if (lower > 0)

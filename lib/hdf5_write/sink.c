@@ -27,10 +27,10 @@ typedef struct sink_file {
     haddr_t end_of_addresses;
 } sink_file;
 
-/* The driver's data in a file access property list. */
-typedef struct sink_choice {
+/* The driver's data in a file access property list: the sink of the file. */
+typedef struct sink_settings {
     ebpo_h5_sink *sink;
-} sink_choice;
+} sink_settings;
 
 void ebpo_h5_sink_fail(ebpo_h5_sink *sink, const ebpo_error *error)
 {
@@ -109,16 +109,16 @@ static H5FD_t *sink_open(const char *name, unsigned flags, hid_t fapl, haddr_t a
     /* flags (create, truncate) are ignored: the sink is empty when it is made. libhdf5 may open it
      * again later, and it must not be truncated then. */
     (void)flags;
-    const sink_choice *choice = H5Pget_driver_info(fapl);
-    if (!choice)
+    const sink_settings *settings = H5Pget_driver_info(fapl);
+    if (!settings)
         return NULL;
     sink_file *file = calloc(1, sizeof *file);
     if (!file) {
         errno = ENOMEM;
-        fail_errno(choice->sink, "could not be opened for writing");
+        fail_errno(settings->sink, "could not be opened for writing");
         return NULL;
     }
-    file->sink = choice->sink;
+    file->sink = settings->sink;
     return &file->libhdf5;
 }
 
@@ -161,8 +161,8 @@ static size_t read_file(ebpo_h5_sink *sink, uint64_t at, size_t size, uint8_t *t
 {
     size_t done = 0;
     while (done < size) {
-        size_t piece = size - done < CALL_BYTES_MAX ? size - done : CALL_BYTES_MAX;
-        ssize_t got = pread(sink->fd, to + done, piece, (off_t)(at + done));
+        size_t call_bytes = size - done < CALL_BYTES_MAX ? size - done : CALL_BYTES_MAX;
+        ssize_t got = pread(sink->fd, to + done, call_bytes, (off_t)(at + done));
         if (got < 0 && errno == EINTR)
             continue;
         if (got < 0)
@@ -180,14 +180,14 @@ static herr_t sink_read(H5FD_t *file, H5FD_mem_t type, hid_t dxpl, haddr_t addre
     (void)type;
     (void)dxpl;
     ebpo_h5_sink *sink = ((sink_file *)file)->sink;
-    size_t there = 0;
+    size_t available = 0;
     if (sink->fd >= 0)
-        there = read_file(sink, address, size, buffer);
+        available = read_file(sink, address, size, buffer);
     else if (address < sink->size)
-        there = sink->size - address < size ? (size_t)(sink->size - address) : size;
-    if (sink->fd < 0 && there)
-        memcpy(buffer, sink->memory + address, there);
-    memset((uint8_t *)buffer + there, 0, size - there); /* bytes beyond the end are zeros */
+        available = sink->size - address < size ? (size_t)(sink->size - address) : size;
+    if (sink->fd < 0 && available)
+        memcpy(buffer, sink->memory + address, available);
+    memset((uint8_t *)buffer + available, 0, size - available); /* bytes beyond the end are zeros */
     return 0;
 }
 
@@ -195,8 +195,8 @@ static void write_file(ebpo_h5_sink *sink, uint64_t at, size_t size, const uint8
 {
     size_t done = 0;
     while (done < size) {
-        size_t piece = size - done < CALL_BYTES_MAX ? size - done : CALL_BYTES_MAX;
-        ssize_t put = pwrite(sink->fd, data + done, piece, (off_t)(at + done));
+        size_t call_bytes = size - done < CALL_BYTES_MAX ? size - done : CALL_BYTES_MAX;
+        ssize_t put = pwrite(sink->fd, data + done, call_bytes, (off_t)(at + done));
         if (put < 0 && errno == EINTR)
             continue;
         if (put == 0)
@@ -265,8 +265,8 @@ static const H5FD_class_t sink_class = {
     .name = "ebpo sink",
     .maxaddr = (haddr_t)INT64_MAX,
     .fc_degree = H5F_CLOSE_STRONG,
-    /* libhdf5 copies a sink_choice as bytes, because this class has no function to copy it */
-    .fapl_size = sizeof(sink_choice),
+    /* libhdf5 copies a sink_settings as bytes, because this class has no function to copy it */
+    .fapl_size = sizeof(sink_settings),
     .open = sink_open,
     .close = sink_close,
     .query = sink_query,
@@ -285,8 +285,8 @@ static const H5FD_class_t sink_class = {
  * it calls the driver's `close`. */
 bool ebpo_h5_sink_use(ebpo_h5_sink *sink, hid_t fapl)
 {
-    sink_choice choice = { sink };
+    sink_settings settings = { sink };
     if (sink->id < 0)
         sink->id = H5FDregister(&sink_class);
-    return sink->id >= 0 && H5Pset_driver(fapl, sink->id, &choice) >= 0;
+    return sink->id >= 0 && H5Pset_driver(fapl, sink->id, &settings) >= 0;
 }

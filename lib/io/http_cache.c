@@ -347,10 +347,10 @@ typedef enum range_state {
 
 struct ebpo_cached_range {
     uint64_t begin, end;
-    uint64_t wanted; /* hinted bytes that are not read yet */
-    uint64_t plan;   /* number of the last prefetch hint that included the range */
-    uint64_t used;   /* time of the last read, by p->clock */
-    bool fresh;      /* made for the current prefetch hint */
+    uint64_t wanted;    /* hinted bytes that are not read yet */
+    uint64_t last_hint; /* number of the last prefetch hint that included the range */
+    uint64_t used;      /* time of the last read, by p->clock */
+    bool fresh;         /* made for the current prefetch hint */
     range_state state;
     unsigned users; /* threads that need the range to stay in the list */
     bool demanded;  /* a reader waits for the range, and receives the error of its request */
@@ -406,7 +406,7 @@ static bool insert_range(ebpo_range_cache *p, uint64_t i, uint64_t begin, uint64
     }
     range->begin = begin;
     range->end = end;
-    range->plan = p->plan;
+    range->last_hint = p->hint_count;
     range->fresh = p->hinting;
     memmove(p->range + i + 1, p->range + i, (p->count - i) * sizeof *p->range);
     p->range[i] = range;
@@ -504,8 +504,8 @@ static bool forget_one(ebpo_range_cache *p)
             continue;
         if (range->wanted == 0 && (read == p->count || range->used < p->range[read]->used))
             read = i;
-        if (range->wanted && range->plan + STALE_AFTER < p->plan &&
-            (stale == p->count || range->plan < p->range[stale]->plan))
+        if (range->wanted && range->last_hint + STALE_AFTER < p->hint_count &&
+            (stale == p->count || range->last_hint < p->range[stale]->last_hint))
             stale = i;
     }
     uint64_t which = read < p->count ? read : stale;
@@ -604,7 +604,7 @@ static void add_wanted(ebpo_range_cache *p, const ebpo_range *hinted)
         ebpo_cached_range *range = p->range[i];
         uint64_t from = range->begin > begin ? range->begin : begin,
                  to = range->end < end ? range->end : end;
-        range->plan = p->plan;
+        range->last_hint = p->hint_count;
         if (range->fresh)
             range->wanted += to - from;
     }
@@ -623,7 +623,7 @@ static void note_ranges(ebpo_range_cache *p, const ebpo_range *sorted, size_t co
             break;
     }
     p->hinting = false;
-    p->plan += p->count > before;
+    p->hint_count += p->count > before;
     uint64_t first = find_range(p, sorted[0].offset),
              end = sorted[count - 1].offset + sorted[count - 1].size;
     for (uint64_t i = first; i < p->count && p->range[i]->begin < end; i++)

@@ -53,7 +53,7 @@ typedef struct ebpo_range_cache {
     ebpo_cached_range **range; /* [count] by offset, without overlaps */
     uint64_t count, capacity;
     /* bytes of fetched and requested ranges; number of prefetch hints with new ranges */
-    uint64_t held, plan;
+    uint64_t held, hint_count;
     uint64_t clock; /* counts reads */
     bool hinting;
     uint64_t disk_hits, disk_bytes;

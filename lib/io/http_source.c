@@ -122,11 +122,11 @@ static ebpo_status source_read(void *user, uint64_t offset, uint64_t size, void 
     http_source *s = user;
     uint8_t *to = data;
     if (offset < s->head_bytes) {
-        uint64_t here = s->head_bytes - offset < size ? s->head_bytes - offset : size;
-        memcpy(to, s->head + offset, (size_t)here);
-        to += here;
-        offset += here;
-        size -= here;
+        uint64_t step = s->head_bytes - offset < size ? s->head_bytes - offset : size;
+        memcpy(to, s->head + offset, (size_t)step);
+        to += step;
+        offset += step;
+        size -= step;
     }
     return size ? ebpo_range_cache_read(&s->cache, offset, size, to, error) : EBPO_OK;
 }

@@ -77,8 +77,8 @@ static bool take_over_facts(int fd, const char *path, int mode)
 {
     struct stat was;
     int from = open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY);
-    bool there = from >= 0 ? fstat(from, &was) == 0 : lstat(path, &was) == 0;
-    if (there && S_ISREG(was.st_mode)) {
+    bool exists = from >= 0 ? fstat(from, &was) == 0 : lstat(path, &was) == 0;
+    if (exists && S_ISREG(was.st_mode)) {
         mode = (int)take_owner(fd, &was);
         if (from >= 0)
             /* before the mode, because an access control list may change the mode */
@@ -187,7 +187,7 @@ static ebpo_file_version version_of(const struct stat *st)
 ebpo_file_version ebpo_file_version_of(int fd)
 {
     struct stat st;
-    return fstat(fd, &st) == 0 ? version_of(&st) : (ebpo_file_version){ .there = false };
+    return fstat(fd, &st) == 0 ? version_of(&st) : (ebpo_file_version){ .exists = false };
 }
 
 void ebpo_publish_expect(ebpo_publish *publish, const ebpo_file_version *expected, bool locked)
@@ -199,14 +199,14 @@ void ebpo_publish_expect(ebpo_publish *publish, const ebpo_file_version *expecte
 
 void ebpo_publish_expect_input(ebpo_publish *publish, const ebpo_input *input)
 {
-    struct stat there, read;
+    struct stat now, read;
     char *from = realpath(input->shown, NULL);
     int fd = ebpo_input_descriptor(input);
     bool named = from && strcmp(from, publish->target) == 0,
-         is_there = lstat(publish->target, &there) == 0, known = fd >= 0 && fstat(fd, &read) == 0,
-         same = is_there && known && there.st_dev == read.st_dev && there.st_ino == read.st_ino;
-    if ((named || same) && (known || is_there)) {
-        ebpo_file_version version = version_of(known ? &read : &there);
+         exists = lstat(publish->target, &now) == 0, known = fd >= 0 && fstat(fd, &read) == 0,
+         same = exists && known && now.st_dev == read.st_dev && now.st_ino == read.st_ino;
+    if ((named || same) && (known || exists)) {
+        ebpo_file_version version = version_of(known ? &read : &now);
         ebpo_publish_expect(publish, &version, false);
     }
     free(from);
@@ -291,7 +291,7 @@ static bool is_expected(const ebpo_publish *publish)
     if (!publish->expects || lstat(publish->target, &st) != 0)
         return true;
     ebpo_file_version now = version_of(&st);
-    return e->there && e->device == now.device && e->inode == now.inode && e->size == now.size &&
+    return e->exists && e->device == now.device && e->inode == now.inode && e->size == now.size &&
            e->modified.tv_sec == now.modified.tv_sec && e->modified.tv_nsec == now.modified.tv_nsec;
 }
 

@@ -21,7 +21,7 @@
 
 /* Identifies the version of a file at a path. */
 typedef struct ebpo_file_version {
-    bool there; /* false: no file; the rest is unused */
+    bool exists; /* false: no file; the rest is unused */
     dev_t device;
     ino_t inode;
     off_t size;

@@ -348,11 +348,11 @@ ebpo_status ebpo_components_get(const ebpo_components *c, uint64_t number, ebpo_
     ebpo_status status = EBPO_CHECK_SIZED(ebpo_component, out, error);
     if (status != EBPO_OK)
         return status;
-    bool there = c && number < c->count;
-    EBPO_GIVE(ebpo_component, out, there ? &c->facts[number] : &nothing);
-    return there ? EBPO_OK
-                 : ebpo_fail(error, EBPO_E_ARGUMENT, "there is no component %llu",
-                             (unsigned long long)number);
+    bool exists = c && number < c->count;
+    EBPO_GIVE(ebpo_component, out, exists ? &c->facts[number] : &nothing);
+    return exists ? EBPO_OK
+                  : ebpo_fail(error, EBPO_E_ARGUMENT, "there is no component %llu",
+                              (unsigned long long)number);
 }
 
 /* Copies a component as a separate mesh that keeps source indices. */
@@ -607,11 +607,11 @@ ebpo_status ebpo_mesh_groups_get(const ebpo_mesh_groups *groups, uint64_t number
     ebpo_status status = EBPO_CHECK_SIZED(ebpo_mesh_group, out, error);
     if (status != EBPO_OK)
         return status;
-    bool there = number < ebpo_mesh_groups_count(groups);
-    EBPO_GIVE(ebpo_mesh_group, out, there ? &groups->list[number] : &nothing);
-    return there ? EBPO_OK
-                 : ebpo_fail(error, EBPO_E_ARGUMENT, "there is no group %llu",
-                             (unsigned long long)number);
+    bool exists = number < ebpo_mesh_groups_count(groups);
+    EBPO_GIVE(ebpo_mesh_group, out, exists ? &groups->list[number] : &nothing);
+    return exists ? EBPO_OK
+                  : ebpo_fail(error, EBPO_E_ARGUMENT, "there is no group %llu",
+                              (unsigned long long)number);
 }
 
 uint32_t ebpo_mesh_group_of(const ebpo_mesh_groups *groups, uint64_t face)

@@ -532,8 +532,8 @@ static void note_repeated(const ebpo_check *check, uint32_t v)
  * repetitions. */
 static void take_position(const ebpo_check *check, curve_run *r, uint32_t *lowest)
 {
-    double here[3], p[3];
-    ebpo_mesh_position(r->mesh, r->at, here);
+    double first[3], p[3];
+    ebpo_mesh_position(r->mesh, r->at, first);
     do {
         uint32_t v = (uint32_t)r->at++, later = v;
         if (*lowest == EBPO_NO_INDEX) {
@@ -545,7 +545,7 @@ static void take_position(const ebpo_check *check, curve_run *r, uint32_t *lowes
         }
         if (r->at < r->end)
             ebpo_mesh_position(r->mesh, r->at, p);
-    } while (r->at < r->end && p[0] == here[0] && p[1] == here[1] && p[2] == here[2]);
+    } while (r->at < r->end && p[0] == first[0] && p[1] == first[1] && p[2] == first[2]);
 }
 
 /* Compares positions in an arranged mesh. The used vertices are one run and the unused ones

@@ -164,7 +164,7 @@ ebpo_status ebpo_ply_add_strip(ebpo_ply_parser *p, uint64_t row)
 
 enum { GRAIN = 1 << 15, WORD = 64 };
 
-typedef struct leaving {
+typedef struct vertex_removal {
     ebpo_ply_parser *p;
     bool found; /* a coordinate is not finite */
     /* a face uses such a vertex: nothing is removed, and the mesh check will report it with the
@@ -174,7 +174,7 @@ typedef struct leaving {
     uint32_t *from; /* [kept] old indices of the kept vertices */
     uint32_t *to;   /* [vertices] new indices */
     uint64_t kept;
-} leaving;
+} vertex_removal;
 
 static bool is_finite(const ebpo_mesh *mesh, uint64_t v)
 {
@@ -187,7 +187,7 @@ static bool is_finite(const ebpo_mesh *mesh, uint64_t v)
 static ebpo_status find_non_finite(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                    ebpo_error *error)
 {
-    leaving *l = context;
+    vertex_removal *l = context;
     (void)worker, (void)error;
     bool finite = true;
     for (uint64_t v = begin; v < end; v++)
@@ -197,7 +197,7 @@ static ebpo_status find_non_finite(void *context, uint64_t begin, uint64_t end, 
     return EBPO_OK;
 }
 
-static ebpo_status choose_kept(leaving *l)
+static ebpo_status choose_kept(vertex_removal *l)
 {
     ebpo_mesh *mesh = l->p->mesh;
     ebpo_workspace *workspace = mesh->workspace;
@@ -222,7 +222,7 @@ static ebpo_status choose_kept(leaving *l)
     return EBPO_OK;
 }
 
-static void move_vertices(const leaving *l)
+static void move_vertices(const vertex_removal *l)
 {
     ebpo_mesh *mesh = l->p->mesh;
     size_t size = 3 * (mesh->xyz32 ? sizeof *mesh->xyz32 : sizeof *mesh->xyz64);
@@ -239,7 +239,7 @@ static void move_vertices(const leaving *l)
 
 /* Drops elements of other names, because they may refer to vertices by indices that have changed.
  */
-static void move_attributes(const leaving *l)
+static void move_attributes(const vertex_removal *l)
 {
     ebpo_attributes *attributes = l->p->mesh->attributes;
     uint64_t count = attributes ? attributes->count : 0;
@@ -254,7 +254,7 @@ static void move_attributes(const leaving *l)
                                          "vertex indices that have changed");
 }
 
-static ebpo_status note_removed(const leaving *l, uint64_t left)
+static ebpo_status note_removed(const vertex_removal *l, uint64_t left)
 {
     ebpo_status status = ebpo_mesh_need_attributes(l->p->mesh, l->p->error);
     if (status == EBPO_OK)
@@ -264,9 +264,9 @@ static ebpo_status note_removed(const leaving *l, uint64_t left)
     return status;
 }
 
-ebpo_status ebpo_ply_leave_unused(ebpo_ply_parser *p)
+ebpo_status ebpo_ply_remove_unused(ebpo_ply_parser *p)
 {
-    leaving l = { .p = p };
+    vertex_removal l = { .p = p };
     ebpo_mesh *mesh = p->mesh;
     uint64_t count = mesh->vertex_count;
     ebpo_status status = ebpo_parallel_for(p->threads, mesh->workspace, count, GRAIN,

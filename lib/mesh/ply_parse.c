@@ -15,7 +15,8 @@
 #include "mesh/ply.h"
 #include "mesh/ply_parts.h"
 
-#define MAX_VERTICES (UINT64_C(0xfffffffe))
+/* maximum number of vertices, and of faces */
+#define COUNT_MAX (UINT64_C(0xfffffffe))
 
 bool ebpo_ply_recognise(const uint8_t *data, uint64_t size)
 {
@@ -69,7 +70,7 @@ static ebpo_status check_counts(const ebpo_ply_parser *p)
     const ebpo_ply_header *h = &p->header;
     uint64_t vertices = h->element[h->vertex].count,
              faces = h->face >= 0 ? h->element[h->face].count : 0;
-    if (vertices > MAX_VERTICES || faces > MAX_VERTICES)
+    if (vertices > COUNT_MAX || faces > COUNT_MAX)
         return ebpo_fail_file(p->error, EBPO_E_LIMIT, p->name,
                               "%" PRIu64 " vertices and %" PRIu64
                               " faces, but the limit is 2^32 - 2 of each; split the model",
@@ -250,7 +251,7 @@ ebpo_status ebpo_ply_parse_all(ebpo_mesh *out, const uint8_t *data, uint64_t siz
     if (status == EBPO_OK)
         status = note_unread(&p);
     if (status == EBPO_OK)
-        status = ebpo_ply_leave_unused(&p);
+        status = ebpo_ply_remove_unused(&p);
     if (status == EBPO_OK) {
         trim_faces(&p);
         describe_source(&p);

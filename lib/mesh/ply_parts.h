@@ -213,6 +213,6 @@ ebpo_status ebpo_ply_add_strip(ebpo_ply_parser *p, uint64_t row);
 
 /* Removes vertices that no face uses and whose coordinates are not finite, and notes their number.
  * Call it after all rows are read. EBPO_E_MEMORY, EBPO_E_IO. */
-EBPO_MUST_USE ebpo_status ebpo_ply_leave_unused(ebpo_ply_parser *p);
+EBPO_MUST_USE ebpo_status ebpo_ply_remove_unused(ebpo_ply_parser *p);
 
 #endif

@@ -15,7 +15,8 @@
 /* --- leaves --- */
 
 /* Kinds of leaves: extended octree (Brunet and Navazo 1990: face, edge nodes), SP-octree (Cano and
- * Torres 2002: convex, concave). In all kinds but the general one the planes' signs decide. */
+ * Torres 2002: convex, concave). In all kinds but the general one, the signs of the leaf's planes
+ * at a point decide if the point is inside. */
 typedef enum ebpo_leaf_kind {
     EBPO_LEAF_GENERAL = 0,
     EBPO_LEAF_ONE_PLANE = 1,
@@ -66,7 +67,7 @@ typedef struct ebpo_accel_leaf {
     /* 2 axis + side (1: upper) of a cell face that no face intersects, or EBPO_NO_CELL_FACE, or
      * EBPO_NEAR_BORDER */
     uint8_t cell_face;
-    int8_t cell_face_step; /* winding number on that cell face less the one at the lowest corner */
+    int8_t cell_face_step; /* winding number on that cell face minus that at the lowest corner */
 } ebpo_accel_leaf;
 
 /* Returns true if the free cell face and the boxes of the list may be read. If false, the leaf is
@@ -149,8 +150,9 @@ typedef struct ebpo_bound {
     float step[3];
     uint8_t low[3][8], high[3][8];
     uint32_t child[8]; /* number of a node, or of a block with EBPO_IS_BLOCK */
-    /* Squared limit of a search. Above it, bounding cylinders are worth testing; below it, the node
-     * is large compared with the search. */
+    /* Bounding cylinders are tested only by searches whose squared limit is above this value. For
+     * others, the node is large compared with the search, and cylinders exclude hardly any child.
+     */
     float cylinder_limit2;
     uint32_t parent; /* number of a node; 0 for the top */
     uint8_t count;   /* number of children, which are in the first lanes */
@@ -225,7 +227,7 @@ typedef struct ebpo_accel {
     uint32_t root_bound; /* index of the hierarchy's root in `bound` */
     uint32_t shared_count;
     uint32_t *shared;      /* file indices of the shared faces, which are owned by other subtrees */
-    uint64_t first_face;   /* index of the owned faces: first_face + local - shared_count */
+    uint64_t first_face;   /* file index of an owned face: first_face + local - shared_count */
     uint32_t *face_source; /* [local] or NULL */
     /* codes of gray nodes' planes, in the order of group numbers; only for subtrees loaded on
      * demand */
@@ -273,9 +275,10 @@ static inline uint64_t ebpo_accel_bytes(const ebpo_accel *whole)
  * it is made (slice included). */
 void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
                          uint64_t *peak);
-/* As ebpo_accel_estimate, but closer, for ordinary models. The functions estimate a whole model,
- * and a subtree (with its planes counted, or without planes). ebpo_slice_read_within and
- * ebpo_accel_make_within refuse larger models. */
+/* As ebpo_accel_estimate, but with closer bounds, which hold for ordinary models only
+ * (accel_make.c). ebpo_slice_read_within and ebpo_accel_make_within refuse models that exceed them.
+ * The first function is for a whole model. The second is for a subtree, which may be counted with
+ * or without planes. */
 void ebpo_accel_estimate_whole(const ebpo_info *info, uint64_t *keep, uint64_t *peak);
 void ebpo_accel_estimate_subtree(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
                                  uint64_t *peak);

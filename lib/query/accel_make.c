@@ -180,13 +180,14 @@ static uint64_t kept_bytes(const sizes *t, const found *f)
            (f->bounds + 1) * (sizeof(ebpo_bound) + sizeof(ebpo_bound_cylinder));
 }
 
-/* Returns the maximum memory while an accel is made. Arrays of a layout have grown by half. Beside
- * all memory that is kept later there are first the mesh and the data of blocks, then extents, then
- * the nodes. The layout of a refused model fits, too. A layout takes 12 bytes for each block and 60
- * for each bound; there are at most as many blocks as faces, and 7 bounds for 13 blocks. (The first
- * run that a join wraps has at least five members, the others have four, three, two, two ..) With 8
+/* Returns the maximum memory while an accel is made. Beside all memory that is kept later, there
+ * are first the mesh and the data of blocks, then extents, then the nodes. Arrays of a layout may
+ * be half empty, as they grow by half of their size. The memory for decoding a whole model with one
+ * thread is added. The layout of a refused model fits into this maximum, too: it takes 12 bytes for
+ * each block and 60 for each bound, has at most as many blocks as faces, and 7 bounds for 13
+ * blocks. (join_parts wraps at least five members first, then four, three, two, two ..) With 8
  * bytes a face to number the faces, this is below the 56 bytes a face of ordinary records, bounds
- * and layout. The memory for decoding a whole model with one thread is added. */
+ * and layout. */
 static uint64_t peak_bytes(const sizes *t, const found *f)
 {
     enum { LAYOUT_BLOCK = 16, LAYOUT_BOUND = 60, FOUND = 25, EXTENT = 72 };

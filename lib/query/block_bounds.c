@@ -360,9 +360,9 @@ static double size_of(const ebpo_bound *b)
     return 255 * (double)fmaxf(b->step[0], fmaxf(b->step[1], b->step[2]));
 }
 
-/* Returns false for faces so far from their leaf that squares overflow (possible in untrusted
- * files). Cylinders of such faces exclude nothing, as no multiples of an infinite or NaN step
- * exist. */
+/* Returns false if some faces are so far from their leaf that squares overflow (possible in
+ * untrusted files). A step of 16-bit values would then be infinite or NaN, so the node gets
+ * cylinders that exclude nothing. */
 static bool is_known(int count, const cylinder child[8], const double radius[8])
 {
     for (int lane = 0; lane < count; lane++)

@@ -17,13 +17,13 @@ EBPO_EIGHT float max_of(f8 x) { return -f8_least(f8_sub(f8_all(0), x)); }
 /* Loads vertices at .. at + 7 on an axis; repeats the first one if there are fewer. */
 EBPO_EIGHT f8 load_vertices(const float *x, unsigned at, unsigned count)
 {
-    f8 there = f8_less(f8_load(lane_number), f8_all((float)count - (float)at));
-    return f8_pick(there, f8_load(x + at), f8_all(x[0]));
+    f8 used = f8_less(f8_load(lane_number), f8_all((float)count - (float)at));
+    return f8_pick(used, f8_load(x + at), f8_all(x[0]));
 }
 
 static void measure_normals(const ebpo_face_block *b, float normal[3])
 {
-    f8 x[3][3], there = f8_less(f8_load(lane_number), f8_all((float)b->m->faces));
+    f8 x[3][3], used = f8_less(f8_load(lane_number), f8_all((float)b->m->faces));
     for (int k = 0; k < 3; k++) {
         ebpo_face_block_floats(b, k, x[k]);
         x[k][1] = f8_sub(x[k][1], x[k][0]);
@@ -32,7 +32,7 @@ static void measure_normals(const ebpo_face_block *b, float normal[3])
     for (int k = 0; k < 3; k++) {
         int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
         float part[8];
-        f8_store(part, f8_and(f8_sub(f8_mul(x[u][1], x[v][2]), f8_mul(x[v][1], x[u][2])), there));
+        f8_store(part, f8_and(f8_sub(f8_mul(x[u][1], x[v][2]), f8_mul(x[v][1], x[u][2])), used));
         normal[k] = ((part[0] + part[4]) + (part[1] + part[5])) +
                     ((part[2] + part[6]) + (part[3] + part[7]));
     }
@@ -46,9 +46,9 @@ static void measure_extent(const ebpo_accel *s, uint32_t block, ebpo_block_exten
     for (int k = 0; k < 3; k++, x += count) {
         f8 low = f8_all(x[0]), high = low;
         for (unsigned i = 0; i < count; i += 8) {
-            f8 here = load_vertices(x, i, count);
-            low = f8_min(here, low);
-            high = f8_max(here, high);
+            f8 vertices = load_vertices(x, i, count);
+            low = f8_min(vertices, low);
+            high = f8_max(vertices, high);
         }
         out->low[k] = f8_least(low);
         out->high[k] = max_of(high);

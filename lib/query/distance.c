@@ -279,8 +279,8 @@ static ebpo_status exact_distance(ebpo_context *c, const double p[3],
     if (status != EBPO_OK)
         return status;
     if (n.late && n.passed_over <= n.limit) {
-        /* With a very short deadline nothing may have been found; but there is a face in the root
-         * cell. */
+        /* With a very short deadline nothing may have been found. The root cell has a face, so its
+         * farthest point is an upper bound. */
         ebpo_box box = ebpo_model_box(c->model);
         double hi = fmin(n.upper, ebpo_cell_far(&box, (ebpo_cell){ 0, { 0, 0, 0 } }, p)),
                lo = fmin(fmin(n.passed_over, n.found ? n.bounds.lo : n.upper), hi);

@@ -199,10 +199,11 @@ static bool intersects_cell(const ebpo_box *box, const ebpo_node *node, const do
     return ebpo_triangle_intersects_box(triangle, low, high);
 }
 
-/* Finds the first accel, depth first, whose cell the triangle intersects. *entry: index
- * of the accel's root in the tree (ebpo_node). Returns false if there is none. An accel lists the
- * faces that intersect its cell, and some that are only near its cell (format-spec, section 7).
- * Each face is taken in this first accel, so no list of visited faces is needed. */
+/* Finds, depth first below `node`, the first accel (decoded subtree) whose cell intersects both the
+ * box of the query and the triangle. Returns false if there is none. *entry: index of the accel's
+ * root in the tree (ebpo_node). Several accels can list one face: those with a cell that the face
+ * intersects, and some with a cell that the face is only near (format-spec, section 7). The query
+ * takes the face from this first accel only, so it needs no list of visited faces. */
 static bool find_first(const box_walk *w, const ebpo_box *box, ebpo_node node,
                        const double triangle[3][3], uint32_t *entry)
 {

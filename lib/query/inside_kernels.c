@@ -82,9 +82,11 @@ EBPO_EIGHT turns turns_of_floats(const ebpo_face_block *b, unsigned lanes, int u
 }
 
 /* Rounding: the error of a difference of two doubles is 2^-53 of the difference. The error of a
- * cross product of two differences is 2^-50 of the sum of the absolute values of its two products.
- * UNDERFLOW_ERROR is added for underflow. Overflow makes bounds infinite or NaN, and then nothing
- * is certain. */
+ * cross product of two differences is at most CROSS_ERROR times the sum of the absolute values of
+ * its two products. The error of a plane's height, a sum of three such cross products with a factor
+ * each (compare_plane), is at most HEIGHT_ERROR times the sum of the absolute values of all its
+ * products. UNDERFLOW_ERROR is added for underflow. Overflow makes bounds infinite or NaN, and then
+ * nothing is certain. */
 #define CROSS_ERROR     0x1p-50
 #define HEIGHT_ERROR    0x1p-47
 #define UNDERFLOW_ERROR 0x1p-960
@@ -311,11 +313,11 @@ static spans span_doubles(const ebpo_face_block *b, const faces_of_cell *w, int 
  * than the rounding error here and in queries (2^-20 of a sixteenth). */
 static inline uint64_t find_sixteenth(float x, double low, double inverse, double direction)
 {
-    double cells = ((double)x - low) * inverse * EBPO_LISTED_CELLS + direction * 0x1p-8;
-    cells = direction < 0 ? cells : 16 - cells;
+    double sixteenths = ((double)x - low) * inverse * EBPO_LISTED_CELLS + direction * 0x1p-8;
+    sixteenths = direction < 0 ? sixteenths : 16 - sixteenths;
     /* two separate comparisons, so that the code is branch-free */
-    cells = cells > 0 ? cells : 0;
-    return (uint64_t)(int32_t)(cells < 15 ? cells : 15);
+    sixteenths = sixteenths > 0 ? sixteenths : 0;
+    return (uint64_t)(int32_t)(sixteenths < 15 ? sixteenths : 15);
 }
 
 /* Returns a box around the faces in `near` (a bit for each lane), encoded as in an

@@ -5,8 +5,8 @@
  *   first moments   det s / 24
  *   second moments  det (s s' + a a' + b b' + c c') / 120
  * All values are in double-double arithmetic, on coordinates scaled by a power of two to about 1.
- * They are summed in blocks of faces that do not depend on threads. A face counts as often as its
- * component bounds the solid, where that is known (construct/solid_shells.h), else once. Source of
+ * They are summed in blocks of faces that do not depend on threads. A face counts with the
+ * multiplicity of its component (construct/solid_shells.h) if this is known, else once. Source of
  * the moments: Tonon 2004, "Explicit exact formulas for the 3-D tetrahedron inertia tensor in terms
  * of its vertex coordinates". */
 #include "core/strict_fp.h"

@@ -212,19 +212,19 @@ static ebpo_status add_children(searching *g, const ebpo_ranked *r, ebpo_error *
 
 static bool is_searched(const ebpo_context *c, uint32_t below)
 {
-    return c->seen[below] == 2 * c->query_number + 1;
+    return c->marks[below] == 2 * c->query_number + 1;
 }
 
 static ebpo_status begin_query(ebpo_context *c, ebpo_error *error)
 {
     uint64_t count = c->model->top->below_count;
     c->queue_count = 0;
-    if (c->seen && ++c->query_number < UINT32_MAX / 2)
+    if (c->marks && ++c->query_number < UINT32_MAX / 2)
         return EBPO_OK;
-    free(c->seen);
+    free(c->marks);
     c->query_number = 1;
-    c->seen = ebpo_alloc_zero(count, sizeof *c->seen);
-    return c->seen ? EBPO_OK : ebpo_fail_memory(error, count * sizeof *c->seen);
+    c->marks = ebpo_alloc_zero(count, sizeof *c->marks);
+    return c->marks ? EBPO_OK : ebpo_fail_memory(error, count * sizeof *c->marks);
 }
 
 static bool is_there(const ebpo_context *c, uint32_t below)
@@ -238,7 +238,7 @@ static ebpo_status search_below(searching *g, ebpo_node node, ebpo_error *error)
     uint32_t below = ebpo_entry_value(node.entry);
     if (is_searched(g->c, below))
         return EBPO_OK;
-    g->c->seen[below] = 2 * g->c->query_number + 1;
+    g->c->marks[below] = 2 * g->c->query_number + 1;
     g->c->searched++;
     const ebpo_skeletons *skeletons = g->c->model->skeletons;
     bool is_new = !ebpo_skeletons_find(skeletons, below);
@@ -259,14 +259,15 @@ static ebpo_status search_below(searching *g, ebpo_node node, ebpo_error *error)
 
 /* --- bounds from skeletons ---
  *
- * A face is listed by every subtree whose cell it intersects, and owned by one of them. Without
- * this rule a face across a cell face would be searched on both sides. A subtree is visited by its
- * cell, for the parts of its faces within the cell. For its owned faces the subtree is searched.
- * For its shared faces that may matter, the subtrees that may own them are searched, by bounds that
- * hold wherever their faces are; if one of those owners has no skeleton, the subtree itself is
- * searched. So the nearest face is found: its nearest point is in a visited cell, and the subtree
- * of that cell or the face's owner is searched. All bounds that lead to this search are at most the
- * face's distance. The queue may return the subtree and the owner in any order. */
+ * A face is listed by every subtree whose cell it intersects, and owned by one of them. Searching
+ * it in its owner only avoids that a face across a cell face is searched on both sides. The queue
+ * returns a subtree by a bound for its cell, which covers the parts of its faces within the cell.
+ * The subtree is then searched for its owned faces. For its shared faces that may matter, the
+ * subtrees that may own them are searched instead, by bounds that hold wherever the owners' faces
+ * are. If one of these owners has no skeleton, the subtree itself is searched. So the nearest face
+ * is found: its nearest point is in a visited cell, and the subtree of that cell or the face's
+ * owner is searched. All bounds that lead to this search are at most the face's distance. The queue
+ * may return the subtree and the owner in any order. */
 
 static ebpo_skeleton_bounds skeleton_bounds(const searching *g, const ebpo_skeleton *k)
 {
@@ -286,9 +287,9 @@ static ebpo_node node_below(const ebpo_model *m, uint32_t below)
 static ebpo_status consider_own(searching *g, uint32_t below, double lower, ebpo_error *error)
 {
     ebpo_context *c = g->c;
-    if (c->seen[below] >= 2 * c->query_number)
+    if (c->marks[below] >= 2 * c->query_number)
         return EBPO_OK;
-    c->seen[below] = 2 * c->query_number;
+    c->marks[below] = 2 * c->query_number;
     const ebpo_skeleton *k = ebpo_skeletons_find(c->model->skeletons, below);
     double owned = skeleton_bounds(g, k).owned;
     ebpo_ranked r = { node_below(c->model, below), fmax(lower, owned), OWNED };

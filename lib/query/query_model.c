@@ -512,7 +512,7 @@ void ebpo_context_free(ebpo_context *c)
     free(c->hit_begin);
     free(c->unsorted_hits);
     free(c->queue);
-    free(c->seen);
+    free(c->marks);
     free(c->faces);
     kept_envelopes_free(c->envelopes);
     free(c->cutting);

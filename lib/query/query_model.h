@@ -72,7 +72,7 @@ struct ebpo_context {
     uint64_t face_capacity;
     ebpo_ranked *queue; /* nodes to be searched: nearest_subtrees.c */
     uint64_t queue_count, queue_capacity;
-    uint32_t *seen; /* marks of subtrees, and the number of the query: nearest_subtrees.c */
+    uint32_t *marks; /* marks of subtrees, and the number of the query: nearest_subtrees.c */
     uint32_t query_number;
     uint64_t searched, loaded;      /* subtrees visited by distance queries; subtrees loaded by all
                                      * queries */

@@ -124,9 +124,9 @@ static ebpo_status add_pruned(reading *r, const ebpo_level *level, const ebpo_no
 }
 
 static ebpo_status add_node(reading *r, const ebpo_level *level, ebpo_node_type type,
-                            ebpo_cell cell, ranks *seen, uint32_t *entry)
+                            ebpo_cell cell, ranks *next, uint32_t *entry)
 {
-    uint64_t rank = seen->of[type]++;
+    uint64_t rank = next->of[type]++;
     if (type == EBPO_WHITE)
         return uniform_entry(r, level->white_winding, rank, 0, entry);
     if (type == EBPO_BLACK)
@@ -136,10 +136,10 @@ static ebpo_status add_node(reading *r, const ebpo_level *level, ebpo_node_type 
                        .pruned = type == EBPO_GRAY && is_pruned_group(r, cell.level, rank),
                        .rank = rank };
     if (node.pruned)
-        return add_pruned(r, level, &node, &seen->planes, entry);
+        return add_pruned(r, level, &node, &next->planes, entry);
     if (type == EBPO_GRAY && cell.level < r->top->cut_level)
-        return add_gray(r, level, rank, &seen->planes, entry);
-    return add_below(r, level, &node, &seen->planes, entry);
+        return add_gray(r, level, rank, &next->planes, entry);
+    return add_below(r, level, &node, &next->planes, entry);
 }
 
 static ebpo_status add_level(reading *r, int number, const ebpo_level *level, uint64_t first_group)
@@ -148,7 +148,7 @@ static ebpo_status add_level(reading *r, int number, const ebpo_level *level, ui
     ebpo_cell *gray = ebpo_alloc(level->gray_count, sizeof *gray);
     if (!gray)
         return no_memory(r);
-    ranks seen = { { 0 }, 0 };
+    ranks next = { { 0 }, 0 };
     ebpo_status status = EBPO_OK;
     for (uint64_t g = 0; g < level->group_count && status == EBPO_OK; g++)
         for (unsigned octant = 0; octant < ebpo_group_octants(number) && status == EBPO_OK;
@@ -159,7 +159,7 @@ static ebpo_status add_level(reading *r, int number, const ebpo_level *level, ui
             uint32_t entry = 0;
             if (type == EBPO_GRAY)
                 gray[grays++] = cell;
-            status = add_node(r, level, type, cell, &seen, &entry);
+            status = add_node(r, level, type, cell, &next, &entry);
             if (number)
                 r->top->nodes.group[first_group + g][octant] = entry;
             else

@@ -95,9 +95,9 @@ EBPO_EIGHT unsigned ray_children(const ebpo_ray_search *r, const ebpo_bound *b, 
 /* --- faces --- */
 
 /* Eight faces in the ray's coordinates: x and y with the ray as the origin, z along it. */
-typedef struct seen {
+typedef struct projected {
     f8 x[3], y[3], z[3];
-} seen;
+} projected;
 
 /* Reads the corners on one axis, relative to the origin. */
 EBPO_EIGHT void ray_axis(const ebpo_ray_search *r, const ebpo_face_block *b, int axis, bool wide,
@@ -121,9 +121,9 @@ EBPO_EIGHT void ray_axis(const ebpo_ray_search *r, const ebpo_face_block *b, int
     }
 }
 
-EBPO_EIGHT seen ray_view(const ebpo_ray_search *r, const ebpo_face_block *b, bool wide)
+EBPO_EIGHT projected ray_view(const ebpo_ray_search *r, const ebpo_face_block *b, bool wide)
 {
-    seen out;
+    projected out;
     ray_axis(r, b, r->axis[2], wide, out.z);
     ray_axis(r, b, r->axis[0], wide, out.x);
     ray_axis(r, b, r->axis[1], wide, out.y);
@@ -145,7 +145,7 @@ EBPO_EIGHT f8 signed_area(f8 ax, f8 ay, f8 bx, f8 by)
     return f8_sub(f8_mul(ax, by), f8_mul(ay, bx));
 }
 
-EBPO_EIGHT edges ray_edges(const seen *a, f8 size_z)
+EBPO_EIGHT edges ray_edges(const projected *a, f8 size_z)
 {
     edges e;
     f8 size = f8_all(0);
@@ -172,7 +172,7 @@ typedef struct ray_lanes {
 EBPO_EIGHT void ray_faces(const ebpo_ray_search *r, uint32_t block, ray_lanes *out, bool wide)
 {
     ebpo_face_block faces = ebpo_face_block_open(r->s, block);
-    seen a = ray_view(r, &faces, wide);
+    projected a = ray_view(r, &faces, wide);
     f8 zero = f8_all(0), least_z = f8_min3(a.z[0], a.z[1], a.z[2]),
        max_z = f8_max3(a.z[0], a.z[1], a.z[2]);
     f8 size_z = f8_add(f8_max(f8_abs(least_z), f8_abs(max_z)), f8_all(r->blur));

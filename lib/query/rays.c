@@ -323,7 +323,7 @@ static const char *ray_fault_of(const ebpo_segment *ray)
     return ray->t_max >= 0 ? NULL : "needs a t_max of 0 or more";
 }
 
-/* Returns the error of a ray as the end of a sentence; NULL: none. */
+/* Returns the end of an error message for an invalid ray; NULL: the ray is valid. */
 static inline const char *ray_fault(const ebpo_segment *ray)
 {
     const double *o = ray->origin, *d = ray->direction;

@@ -287,7 +287,7 @@ ebpo_status ebpo_verify(const ebpo_file *file, const ebpo_verify_options *option
                 "verify: the source has been arranged (ebpo_mesh_arrange); pass it as it was read");
     }
     ebpo_tally tally = { 0 };
-    status = ebpo_check_places(&tally, file, options, error);
+    status = ebpo_check_chunk_offsets(&tally, file, options, error);
     /* checksums are not meaningful if chunks are not at the listed offsets */
     if (status == EBPO_OK && tally.violations[EBPO_VERIFY_STRUCTURE] == 0)
         status = ebpo_check_checksums(&tally, file, error);

@@ -34,7 +34,7 @@ typedef struct gates_reader {
     const uint8_t *low, *more, *end;
     pair open[OPEN_MAX + 1]; /* newest last */
     size_t count;
-    uint64_t seen;
+    uint64_t used;
 } gates_reader;
 
 static void open_edge(gates_reader *t, uint64_t a, uint64_t b)
@@ -74,10 +74,10 @@ static bool read_vertex(gates_reader *t, uint64_t *vertex)
             return false;
         number = 224 + 256 * (number - 224) + *t->more++;
     }
-    if (number > t->seen)
+    if (number > t->used)
         return false;
-    *vertex = t->seen - number;
-    t->seen += number == 0;
+    *vertex = t->used - number;
+    t->used += number == 0;
     return true;
 }
 
@@ -106,7 +106,7 @@ static bool read_across(gates_reader *t, unsigned gate, unsigned third, uint64_t
     if (kind != 0 && kind != 3 && (kind >= 4 ? kind - 4 >= t->count : at == t->count))
         return false;
     if (kind == 0)
-        c = t->seen++;
+        c = t->used++;
     else if (kind == 3 && !read_vertex(t, &c))
         return false;
     else if (kind != 3)
@@ -127,16 +127,16 @@ static bool read_across(gates_reader *t, unsigned gate, unsigned third, uint64_t
     return true;
 }
 
-static bool read_gates(const uint8_t *in, uint32_t rows, uint64_t *seen, uint32_t *faces)
+static bool read_gates(const uint8_t *in, uint32_t rows, uint64_t *used, uint32_t *faces)
 {
     for (size_t i = 0; i < 3 * (size_t)rows; i++) {
         uint64_t code = 0;
         for (size_t k = 0; k < 4; k++)
             code += (uint64_t)in[1 + k * 3 * rows + i] << 8 * k;
-        if (code > *seen)
+        if (code > *used)
             return false;
-        faces[i] = (uint32_t)(*seen - code);
-        *seen += code == 0;
+        faces[i] = (uint32_t)(*used - code);
+        *used += code == 0;
     }
     for (size_t i = 12 * (size_t)rows + 1; i < 13 * (size_t)rows; i++)
         if (in[i])
@@ -144,12 +144,12 @@ static bool read_gates(const uint8_t *in, uint32_t rows, uint64_t *seen, uint32_
     return true;
 }
 
-bool ebpo_plain_gates_read(const uint8_t *in, uint32_t rows, uint64_t *seen, uint32_t *faces)
+bool ebpo_plain_gates_read(const uint8_t *in, uint32_t rows, uint64_t *used, uint32_t *faces)
 {
     gates_reader t;
     size_t thirds = 0, numbers = 0;
     if (in[0] == 1)
-        return read_gates(in, rows, seen, faces);
+        return read_gates(in, rows, used, faces);
     for (uint32_t i = 0; i < rows; i++)
         thirds += in[i] != 0;
     for (size_t i = 0; i < thirds; i++)
@@ -159,7 +159,7 @@ bool ebpo_plain_gates_read(const uint8_t *in, uint32_t rows, uint64_t *seen, uin
     t.more = t.low + 3 * (rows - thirds) + numbers;
     t.end = in + 13 * (size_t)rows;
     t.count = 0;
-    t.seen = *seen;
+    t.used = *used;
     for (uint32_t i = 0; i < rows; i++) {
         uint64_t face[3];
         bool ok = true;
@@ -179,7 +179,7 @@ bool ebpo_plain_gates_read(const uint8_t *in, uint32_t rows, uint64_t *seen, uin
     for (; t.more < t.end; t.more++)
         if (*t.more)
             return false;
-    *seen = t.seen;
+    *used = t.used;
     return true;
 }
 
@@ -188,10 +188,10 @@ bool ebpo_plain_gates_read(const uint8_t *in, uint32_t rows, uint64_t *seen, uin
 enum { CORNERS_MAX = EBPO_CHUNK_BYTES_MAX / 4 };
 
 static void compare_gates_chunk(ebpo_tally *tally, const uint8_t *streams, uint32_t *faces,
-                                const ebpo_tree *tree, uint64_t row, uint64_t rows, uint64_t *seen)
+                                const ebpo_tree *tree, uint64_t row, uint64_t rows, uint64_t *used)
 {
     const uint32_t *corners = tree->mesh.faces + 3 * row;
-    bool same = ebpo_plain_gates_read(streams, (uint32_t)rows, seen, faces);
+    bool same = ebpo_plain_gates_read(streams, (uint32_t)rows, used, faces);
     for (uint64_t i = 0; i < 3 * rows && same; i++)
         same = faces[i] == corners[i];
     (void)ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, same,
@@ -205,12 +205,12 @@ static ebpo_status compare_gates(ebpo_tally *tally, const ebpo_file *file, const
 {
     const ebpo_array_in *array = ebpo_reader_array(file, EBPO_A_FACES, 0);
     ebpo_status status = EBPO_OK;
-    uint64_t seen = 0, rows = array->shape.chunk_rows;
+    uint64_t used = 0, rows = array->shape.chunk_rows;
     for (uint64_t row = 0; row < array->shape.rows && status == EBPO_OK; row += rows) {
         uint64_t left = array->shape.rows - row;
         status = ebpo_reader_gates(file, row / rows, &r->reader, r->raw, error);
         if (status == EBPO_OK)
-            compare_gates_chunk(tally, r->raw, faces, tree, row, left < rows ? left : rows, &seen);
+            compare_gates_chunk(tally, r->raw, faces, tree, row, left < rows ? left : rows, &used);
     }
     return status;
 }
@@ -244,19 +244,19 @@ typedef struct indexed {
 
 enum { LIMIT = EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS };
 
-typedef struct places_comparison {
+typedef struct offset_comparison {
     ebpo_tally *tally;
     const ebpo_file *file;
     ebpo_head head;
     indexed array[LIMIT];
     unsigned arrays;
     uint64_t *list, rows;
-} places_comparison;
+} offset_comparison;
 
 /* Reads HDF5's index of an array that is present. `number`: the array's number in the
  * specification, which has 64 numbers for each level, then those of the mesh, the maps and the
  * table. */
-static ebpo_status index_array(places_comparison *c, const ebpo_array_in *array, uint32_t number,
+static ebpo_status index_array(offset_comparison *c, const ebpo_array_in *array, uint32_t number,
                                ebpo_error *error)
 {
     ebpo_shape shape;
@@ -272,7 +272,7 @@ static ebpo_status index_array(places_comparison *c, const ebpo_array_in *array,
     return status;
 }
 
-static ebpo_status index_all(places_comparison *c, ebpo_error *error)
+static ebpo_status index_all(offset_comparison *c, ebpo_error *error)
 {
     static const struct {
         ebpo_array_id id;
@@ -292,7 +292,7 @@ static ebpo_status index_all(places_comparison *c, ebpo_error *error)
     return status;
 }
 
-static ebpo_status read_list(places_comparison *c, ebpo_error *error)
+static ebpo_status read_list(offset_comparison *c, ebpo_error *error)
 {
     const ebpo_array_in *a = &c->file->root_array[EBPO_A_CHUNK_DIRECTORY];
     const char *why = "";
@@ -312,7 +312,7 @@ static ebpo_status read_list(places_comparison *c, ebpo_error *error)
     return status;
 }
 
-static indexed *find_indexed(places_comparison *c, uint32_t number)
+static indexed *find_indexed(offset_comparison *c, uint32_t number)
 {
     for (unsigned i = 0; i < c->arrays; i++)
         if (c->array[i].number == number)
@@ -320,12 +320,12 @@ static indexed *find_indexed(places_comparison *c, uint32_t number)
     return NULL;
 }
 
-static void compare_row(places_comparison *c, uint64_t row, uint64_t at, uint32_t bytes)
+static void compare_row(offset_comparison *c, uint64_t row, uint64_t at, uint32_t bytes)
 {
     ebpo_tally *tally = c->tally;
     uint32_t number = (uint32_t)(c->list[row] >> 32);
     indexed *of = find_indexed(c, number);
-    if (!of) /* a gap, or an array that is not called for */
+    if (!of) /* a gap, or an array that the header does not require */
         return;
     if (!CHECK(of->listed < of->count,
                "/subtrees/chunk_directory, row %" PRIu64 ": %s has only %" PRIu64 " chunks", row,
@@ -338,7 +338,7 @@ static void compare_row(places_comparison *c, uint64_t row, uint64_t at, uint32_
           row, bytes, at, of->listed - 1, of->array->path, chunk->bytes, chunk->address);
 }
 
-static void compare_directory(places_comparison *c)
+static void compare_directory(offset_comparison *c)
 {
     ebpo_tally *tally = c->tally;
     uint64_t at = c->array[0].chunks[0].address;
@@ -353,14 +353,14 @@ static void compare_directory(places_comparison *c)
               c->array[i].listed, c->array[i].count, c->array[i].array->path);
 }
 
-ebpo_status ebpo_check_places(ebpo_tally *tally, const ebpo_file *file,
-                              const ebpo_verify_options *options, ebpo_error *error)
+ebpo_status ebpo_check_chunk_offsets(ebpo_tally *tally, const ebpo_file *file,
+                                     const ebpo_verify_options *options, ebpo_error *error)
 {
     ebpo_error own = EBPO_ERROR_INIT;
     (void)options;
     if (!file->has_directory)
         return EBPO_OK;
-    places_comparison *c = ebpo_alloc_zero(1, sizeof *c);
+    offset_comparison *c = ebpo_alloc_zero(1, sizeof *c);
     if (!c)
         return ebpo_fail_memory(error, sizeof *c);
     c->tally = tally;

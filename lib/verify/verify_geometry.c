@@ -90,14 +90,14 @@ static void exact_clip(polygon *out, polygon *in, int axis, int cell_face)
     out->count = 0;
     for (int i = 0; i < in->count; i++) {
         int j = i + 1 < in->count ? i + 1 : 0;
-        bool here = exact_within(in->at[i][axis], cell_face),
-             there = exact_within(in->at[j][axis], cell_face);
-        if (here) {
+        bool first_within = exact_within(in->at[i][axis], cell_face),
+             second_within = exact_within(in->at[j][axis], cell_face);
+        if (first_within) {
             for (int k = 0; k < 3; k++)
                 mpq_set(out->at[out->count][k], in->at[i][k]);
             out->count++;
         }
-        if (here != there)
+        if (first_within != second_within)
             append_crossing(out, in->at[i], in->at[j], axis, cell_face);
     }
 }

@@ -344,19 +344,19 @@ void ebpo_check_links(ebpo_tally *tally, const ebpo_reference_node *node,
             int point = shared_point(octant, corner);
             if (!(children[octant].known >> corner & 1))
                 continue;
-            int64_t here = children[octant].at[corner];
+            int64_t winding = children[octant].at[corner];
             tally->checks[EBPO_VERIFY_LABELS] += known[point];
-            if (known[point] && value[point] != here) {
+            if (known[point] && value[point] != winding) {
                 ebpo_verify_place place = { ebpo_octcode_child(node->code, octant), EBPO_NO_FACE,
                                             EBPO_NO_PLANE };
                 ebpo_tally_violation(tally, EBPO_VERIFY_LABELS, &place,
                                      "winding number %" PRId64
                                      " at corner %u, but a neighbour has %" PRId64
                                      " for the same point",
-                                     here, corner, value[point]);
+                                     winding, corner, value[point]);
             }
             if (!known[point])
-                value[point] = here;
+                value[point] = winding;
             known[point] = true;
         }
     for (unsigned i = 0; i < 8; i++)

@@ -141,7 +141,7 @@ enum { LIST_LIMIT_MAX = 1 << 16 };
  * contain repetitions. If the limit is large, one bit for each face of the mesh is used instead. */
 typedef struct gathering {
     uint32_t *faces;
-    uint8_t *seen; /* bits; NULL if `faces` is used */
+    uint8_t *listed; /* bits; NULL if `faces` is used */
     uint64_t count, capacity, limit;
     bool more; /* there are more different faces than `limit` */
     bool short_of_memory;
@@ -168,8 +168,8 @@ static void keep_different(gathering *g)
 static void mark_face(gathering *g, uint64_t face)
 {
     uint8_t bit = (uint8_t)(1u << (face & 7));
-    g->count += !(g->seen[face >> 3] & bit);
-    g->seen[face >> 3] |= bit;
+    g->count += !(g->listed[face >> 3] & bit);
+    g->listed[face >> 3] |= bit;
     g->more |= g->count > g->limit;
 }
 
@@ -190,7 +190,7 @@ static void gather_list(gathering *g, const face_list *list)
         g->more = true;
         return;
     }
-    if (g->seen) {
+    if (g->listed) {
         mark_list(g, list);
         return;
     }
@@ -229,14 +229,14 @@ bool ebpo_lists_more_faces(const ebpo_reference_tree *view, const ebpo_reference
     if (limit >= faces)
         return false;
     if (limit > LIST_LIMIT_MAX) {
-        g.seen = ebpo_array_zero(view->workspace, faces / 8 + 1, 1);
-        g.short_of_memory = !g.seen;
+        g.listed = ebpo_array_zero(view->workspace, faces / 8 + 1, 1);
+        g.short_of_memory = !g.listed;
     }
     gather_below(&g, view, node);
-    if (!g.seen)
+    if (!g.listed)
         keep_different(&g);
     free(g.faces);
-    ebpo_array_free(view->workspace, g.seen);
+    ebpo_array_free(view->workspace, g.listed);
     /* A lack of memory does not make the file invalid. */
     return g.more || g.short_of_memory;
 }

@@ -19,11 +19,11 @@ EBPO_MUST_USE ebpo_status ebpo_verify_tree(ebpo_tally *tally, const ebpo_tree *t
 /* --- verify_chunks.c: reference implementation of a reader of the coding `gates`
  * (format-spec/gates.md) --- */
 
-/* Decodes a chunk of `rows` faces of 13 bytes each; rows > 0. On entry, *seen is the number of
+/* Decodes a chunk of `rows` faces of 13 bytes each; rows > 0. On entry, *used is the number of
  * vertices that the faces before the chunk use; on return, it includes the chunk's faces. Returns
  * false if the specification requires that a reader rejects the chunk; `faces` is then undefined.
  */
-bool ebpo_plain_gates_read(const uint8_t *in, uint32_t rows, uint64_t *seen, uint32_t *faces);
+bool ebpo_plain_gates_read(const uint8_t *in, uint32_t rows, uint64_t *used, uint32_t *faces);
 
 /* --- verify_source.c: comparison of the file's mesh with its source --- */
 
@@ -47,8 +47,9 @@ EBPO_MUST_USE ebpo_status ebpo_check_subtrees(ebpo_tally *tally, const ebpo_file
 
 /* Compares the list of chunk offsets with HDF5's indexes. Does nothing for files without the list,
  * or if another program has rewritten the file. */
-EBPO_MUST_USE ebpo_status ebpo_check_places(ebpo_tally *tally, const ebpo_file *file,
-                                            const ebpo_verify_options *options, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_check_chunk_offsets(ebpo_tally *tally, const ebpo_file *file,
+                                                   const ebpo_verify_options *options,
+                                                   ebpo_error *error);
 
 /* Checks each row of the list of chunk checksums (section 20), and that each chunk has a row. Does
  * nothing for remote files and files without the list, or if another program has rewritten the

@@ -184,8 +184,8 @@ static void compare_attributes(ebpo_tally *tally, const ebpo_mesh *source, const
     const ebpo_attributes *a = source->attributes, *b = stored->attributes;
     uint64_t k = 0;
     for (uint64_t i = 0; a && b && i < a->count; i++) {
-        bool here = k < b->count && same_head(&a->array[i], &b->array[k]);
-        if (here)
+        bool match = k < b->count && same_head(&a->array[i], &b->array[k]);
+        if (match)
             compare_rows(tally, &a->array[i], &b->array[k++], source_numbers(&a->array[i], maps),
                          stored->workspace);
         else if (ebpo_attribute_is_of_mesh(&a->array[i]))
@@ -250,29 +250,29 @@ static ebpo_status compare_as_sets(ebpo_tally *tally, const ebpo_mesh *a, const 
 
 /* Computes for each face index of the source the current index of the face, or EBPO_NO_INDEX. *out
  * is NULL if the indices are the same. *numbers: number of face indices of the source. */
-static ebpo_status list_places(const ebpo_mesh *whole, uint32_t **out, uint64_t *numbers,
-                               ebpo_error *error)
+static ebpo_status list_positions(const ebpo_mesh *whole, uint32_t **out, uint64_t *numbers,
+                                  ebpo_error *error)
 {
     const struct ebpo_arrangement *order = whole->arrangement;
     *numbers = whole->face_count + (order ? order->dropped_faces : 0);
     if (!order)
         return EBPO_OK;
-    uint32_t *places = *out = ebpo_array_alloc(whole->workspace, *numbers, sizeof *places);
-    if (!places)
-        return ebpo_workspace_fail(whole->workspace, *numbers * sizeof *places, error);
-    ebpo_array_fill(whole->workspace, places, 0xff, *numbers * sizeof *places);
+    uint32_t *positions = *out = ebpo_array_alloc(whole->workspace, *numbers, sizeof *positions);
+    if (!positions)
+        return ebpo_workspace_fail(whole->workspace, *numbers * sizeof *positions, error);
+    ebpo_array_fill(whole->workspace, positions, 0xff, *numbers * sizeof *positions);
     EBPO_FOR_ITEMS_SCATTERED(whole->workspace, i, 0, whole->face_count)
-        places[order->face_source[i]] = (uint32_t)i;
+        positions[order->face_source[i]] = (uint32_t)i;
     return EBPO_OK;
 }
 
-static bool same_corners(const ebpo_mesh *whole, const uint32_t *places, uint64_t numbers,
+static bool same_corners(const ebpo_mesh *whole, const uint32_t *positions, uint64_t numbers,
                          const ebpo_mesh *part, const ebpo_maps *maps, uint64_t i)
 {
     uint64_t number = maps->face_source[i];
-    if (number >= numbers || (places && places[number] == EBPO_NO_INDEX))
+    if (number >= numbers || (positions && positions[number] == EBPO_NO_INDEX))
         return false;
-    const uint32_t *corners = whole->faces + 3 * (places ? places[number] : number);
+    const uint32_t *corners = whole->faces + 3 * (positions ? positions[number] : number);
     for (uint64_t c = 0; c < 3; c++)
         if (corners[c] != maps->vertex_source[part->faces[3 * i + c]])
             return false;
@@ -286,13 +286,13 @@ static ebpo_status compare_some(ebpo_tally *tally, const ebpo_file *file, const 
 {
     ebpo_mesh part = { 0 };
     ebpo_maps maps = { .vertex_source = NULL };
-    uint32_t *places = NULL;
+    uint32_t *positions = NULL;
     uint64_t numbers = 0;
     ebpo_status status = ebpo_file_read_mesh(file, read, &part, error);
     if (status == EBPO_OK)
         status = ebpo_file_read_maps(file, read, &maps, error);
     if (status == EBPO_OK)
-        status = list_places(whole, &places, &numbers, error);
+        status = list_positions(whole, &positions, &numbers, error);
     if (status == EBPO_OK && CHECK(!whole->xyz32 == !part.xyz32,
                                    "the source and the file have different kinds of coordinates")) {
         tally->checks[EBPO_VERIFY_SOURCE] += part.vertex_count + part.face_count;
@@ -306,14 +306,14 @@ static ebpo_status compare_some(ebpo_tally *tally, const ebpo_file *file, const 
                                      " of the source has another position in the file",
                                      maps.vertex_source[i]);
         EBPO_FOR_ITEMS_SCATTERED(part.workspace, i, 0, part.face_count)
-            if (!same_corners(whole, places, numbers, &part, &maps, i))
+            if (!same_corners(whole, positions, numbers, &part, &maps, i))
                 ebpo_tally_violation(
                     tally, EBPO_VERIFY_SOURCE,
                     &(ebpo_verify_place){ 0, maps.face_source[i], EBPO_NO_PLANE },
                     "the face (by its source index) has other corners in the file");
         compare_attributes(tally, whole, &part, &maps);
     }
-    ebpo_array_free(whole->workspace, places);
+    ebpo_array_free(whole->workspace, positions);
     ebpo_maps_free(&maps);
     ebpo_mesh_free(&part);
     return status;

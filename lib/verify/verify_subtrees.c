@@ -21,7 +21,7 @@
 #define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
 
 /* Columns of the table, numbered as in the specification. The columns of the levels begin at
- * FIRST_LEVEL. GRAY to END are relative to the first column of a level. */
+ * FIRST_LEVEL. GRAY to END_GROWTH are relative to the first column of a level. */
 enum {
     FACES_BEFORE, /* faces between the previous subtree and this one */
     FACES,
@@ -36,7 +36,7 @@ enum {
     PLANES,
     LEAF_PLANES,
     REFERENCES,
-    END,
+    END_GROWTH,
     OF_A_LEVEL,
     MAX_COLS = FIRST_LEVEL + OF_A_LEVEL * EBPO_LEVELS_MAX
 };
@@ -114,13 +114,13 @@ static void check_row(recount *c)
 static void count_faces(recount *c, uint64_t count)
 {
     const ebpo_mesh *mesh = &c->view->tree->mesh;
-    uint64_t seen = c->vertices;
+    uint64_t used = c->vertices;
     EBPO_FOR_ITEMS(c->view->workspace, i, 3 * c->faces, 3 * (c->faces + count))
-        seen += mesh->faces[i] == seen; /* a vertex of first use has the next index */
+        used += mesh->faces[i] == used; /* a vertex of first use has the next index */
     c->row[c->within ? FACES : FACES_BEFORE] += count;
-    c->row[c->within ? VERTICES : VERTICES_BEFORE] += seen - c->vertices;
+    c->row[c->within ? VERTICES : VERTICES_BEFORE] += used - c->vertices;
     c->faces += count;
-    c->vertices = seen;
+    c->vertices = used;
 }
 
 static void count_leaf(recount *c, const ebpo_reference_node *leaf, uint64_t *row)
@@ -138,7 +138,7 @@ static void count_leaf(recount *c, const ebpo_reference_node *leaf, uint64_t *ro
         (void)ebpo_reference_refs(c->view, leaf, &references);
         uint64_t end = level->leaf_first[leaf->rank] + level->leaf_new[leaf->rank];
         row[REFERENCES] += references;
-        row[END] += end - c->end[leaf->cell.level];
+        row[END_GROWTH] += end - c->end[leaf->cell.level];
         c->end[leaf->cell.level] = end;
     }
     /* ebpo_check_structure checks that the leaves' new faces are consecutive */

@@ -20,8 +20,9 @@ if "-o" in arguments:
 ebpo, models = arguments[0], pathlib.Path(arguments[1])
 NAMES = (arguments[2:] or ["dragon100k", "bunny_closed", "armadillo", "fertility", "cheese_g133",
                            "cad_adis16480"])
+# The models with a table by level.
+BY_LEVEL = arguments[2:] or ["dragon100k", "bunny_closed", "cad_adis16480"]
 WAYS = {"inherit": [], "kmedoids": ["--select", "kmedoids"],
-        "kmedoids, angle": ["--select", "kmedoids", "--normals", "angle"],
         "offset": ["--select", "offset"], "random": ["--select", "random"]}
 # As BP 2008: N = 50 by its criterion 1, any number of planes in a node.
 BP = ["--select", "kmedoids", "--k-root", "1%", "--unlimited", "--coalesce", "sum", "--leaf-faces", 50,
@@ -81,7 +82,7 @@ def table(name, folder):
                     f"{SIZES[name]['inherit'] / SIZES[name]['kmedoids']:.2f} "
                     f"({'met' if SIZES[name]['inherit'] < SIZES[name]['kmedoids'] else 'missed'}, "
                     f"below 1)"))
-    return f"\n## {name}: {info['faces']:,} faces\n\n{head}{ratios}"
+    return f"\n## {name}: {info['faces']:,} faces\n\n{head}{ratios}" if name in BY_LEVEL else ""
 
 
 HEAD = """# Envelope volumes compared with the limit
@@ -109,7 +110,7 @@ The files are divided down to the deepest level (`--leaf-faces 0`) and store lea
 violations. The leaves of `BP, K = 1 %` are larger than the cells of the limit.
 
 The tables list by level the excess over the volume of the solid, divided by that of the limit. The row *limit* is the
-volume of the limit in percent of the solid.
+volume of the limit in percent of the solid. With the names of models, the script makes their tables.
 """
 tables = ""
 with tempfile.TemporaryDirectory() as folder:

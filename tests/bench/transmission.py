@@ -9,7 +9,6 @@ Needs h5py and the zstd command. No result depends on the machine.
 import argparse
 import json
 import pathlib
-import struct
 import subprocess
 import tempfile
 
@@ -39,45 +38,13 @@ def polyhedra(group):
     return found
 
 
-def cell_of(octcode, info):
-    level = (octcode.bit_length() - 1) // 3
-    at = [sum((octcode >> 3 * i + k & 1) << i for i in range(level)) for k in range(3)]
-    size = [s / 2**level for s in info["box_size"]]
-    low = [o + a * s for o, a, s in zip(info["box_origin"], at, size)]
-    return low + [a + s for a, s in zip(low, size)], numpy.linalg.norm(size)
-
-
-def touched(tool, file, boxes):
-    """Return for each box whether a face intersects it, exactly."""
-    results, at, found = run(tool, "box", "--raw", file,
-                             data=numpy.array(boxes, "<f8").tobytes()), 0, []
-    for _ in boxes:
-        count, = struct.unpack_from("<Q", results, at)
-        found.append(count > 0)
-        at += 8 + 8 * count
-    return found
-
-
-def farthest(tool, file, group, info, size):
-    """Return the greatest distance of the level's envelopes from the solid, in percent of `size`.
-
-    Returns an upper bound, and the greatest distance of a vertex.
-    """
-    nodes = [(code, shape) for code, kind, shape in zip(group["octcode"][...].tolist(),
-                                                        group["type"][...],
-                                                        polyhedra(group)) if kind != BLACK]
-    cells = [cell_of(code, info) for code, _ in nodes]
-    certain = 0.0
-    for (_, shape), (_, diagonal), intersects in zip(nodes, cells, touched(tool, file, [box for box, _ in cells])):
-        # When a face intersects the cell, the convex envelope contains one of its points. Otherwise
-        # a face is within 1/256 of the cell's size.
-        difference = shape[:, None, :] - shape[None, :, :]
-        certain = max(certain, numpy.sqrt((difference**2).sum(2).max()) if intersects
-                      else diagonal * (1 + 1 / 256))
-    corners = numpy.concatenate([shape for _, shape in nodes]).astype("<f8")
+def farthest(tool, file, group, size):
+    """Return the greatest distance of a vertex of the level's envelopes from the solid, in percent of `size`."""
+    corners = numpy.concatenate([shape for kind, shape in zip(group["type"][...], polyhedra(group))
+                                 if kind != BLACK]).astype("<f8")
     results = numpy.frombuffer(run(tool, "distance", "--raw", file, data=corners.tobytes()),
                                "<f8").reshape(-1, 8)
-    return 100 * certain / size, 100 * max(results[:, 0].max(), 0) / size
+    return 100 * max(results[:, 0].max(), 0) / size
 
 
 def study(tool, model, folder, leaf_planes):
@@ -86,7 +53,7 @@ def study(tool, model, folder, leaf_planes):
     bare = folder / (model.stem + ".bare.ebpo.h5")
     extra = ["--profile", "full"] if leaf_planes else []
     run(tool, "convert", "-q", *extra, model, file)
-    run(tool, "convert", "-q", *extra, "--parts", "-mesh", model, bare)
+    run(tool, "convert", "-q", "--parts", "envelopes,leaf-planes" if leaf_planes else "-mesh", model, bare)
     info = json.loads(run(tool, "info", "--json", file))
     levels = json.loads(run(tool, "levels", "--json", file))["levels"]
     derived = [v["derived_volume"]
@@ -103,8 +70,7 @@ def study(tool, model, folder, leaf_planes):
     run(tool, "export", "-q", "--levels", f"0-{last}", bare, folder / "x.xdmf")
     with h5py.File(folder / "x.xdmf.h5", "r") as shapes:
         for r in rows[:last + 1]:
-            r["certain"], r["seen"] = farthest(tool, file, shapes[f"level_{r['level']:02d}"], info,
-                                               size)
+            r["seen"] = farthest(tool, file, shapes[f"level_{r['level']:02d}"], size)
     packed = len(run("zstd", "-19", "-q", "-c", model))
     return {"name": model.stem, "leaf_planes": leaf_planes, "info": info, "rows": rows,
             "last": last, "ply": model.stat().st_size, "packed": packed}
@@ -134,19 +100,18 @@ def firsts(m):
 
 def level_cells(m, i):
     if i >= len(m["rows"]):
-        return [""] * 4
+        return [""] * 3
     r = m["rows"][i]
-    far = [f"{r['seen']:.3f}", f"{r['certain']:.2f}"] if "seen" in r else ["", ""]
-    return [f"{r['bytes']:,}", f"{r['excess']:.2f}", *far]
+    return [f"{r['bytes']:,}", f"{r['excess']:.2f}", f"{r['seen']:.3f}" if "seen" in r else ""]
 
 
 def level_table(plain, planes):
-    columns = ["bytes", "excess, %", "vertex distance, %", "error bound, %"]
+    columns = ["bytes", "excess, %", "vertex distance, %"]
     rows = [["level", *columns, *(f"leaf planes: {c}" if c == "bytes" else c for c in columns)]]
     rows += [[i, *level_cells(plain, i), *level_cells(planes, i)]
              for i in range(len(plain["rows"]))]
     sizes = [f"{m['info']['bytes']['file']:,}" for m in (plain, planes)]
-    rows.append(["file", sizes[0], "", "", "", sizes[1], "", "", ""])
+    rows.append(["file", sizes[0], "", "", sizes[1], "", ""])
     return f"**{plain['name']}**\n\n" + table(*rows)
 
 
@@ -176,8 +141,6 @@ results do not depend on the machine.
 - *Excess*: volume of the envelopes minus volume of the solid, in percent of the solid. The envelopes contain the solid.
 - *Vertex distance*: maximum distance of an envelope vertex from the solid (`ebpo distance`), in percent of the box
   diagonal. The one-sided Hausdorff distance is at least this value.
-- *Error bound*: an upper bound of that Hausdorff distance. It is the maximum diameter of an envelope in whose cell a
-  face is; for nodes that a face is only near, it is the cell diagonal times 257/256.
 
 The values are for a reader without the mesh. For such a reader, the envelope of a leaf is the parent's envelope,
 cut to the leaf's cell. With `convert --profile full`, each leaf has stored planes. With the mesh, `ebpo measure
@@ -191,8 +154,8 @@ The table has the bytes, their share of the compressed PLY, and the level.
 
 LEVELS = """## By level
 
-*file*: the whole file with the mesh, its source order and checksums. Vertex distances and error bounds end at the
-level that reaches the last goal. [theses.md](theses.md) compares the bytes with those of the BP-Octree, by one cost model.
+*file*: the whole file with the mesh, its source order and checksums. Vertex distances end at the level that reaches the
+last goal. [theses.md](theses.md) compares the bytes with those of the BP-Octree, by one cost model.
 """
 
 

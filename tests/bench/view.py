@@ -98,7 +98,7 @@ def main():
                 f"{whole['nodes']:,}", f"{whole['bytes_read']:,}", f"{levels:,}")
     print("\nLargest visible node in pixels after a number of bytes, and the number of nodes:\n")
     head("view", "bytes", *ORDERS)
-    for name, view in views().items():
+    for name, view in list(views().items())[:2]:
         for size in ("512KiB", "1MiB", "2MiB"):
             lasts = [run("view", FILE, *view, "--order", order, "--bytes", size)["last"]
                      for order in ORDERS]

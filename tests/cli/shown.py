@@ -1,9 +1,14 @@
 #!/usr/bin/env python3
-"""shown.py COMMANDS [--update]: checks that tests cover each behaviour of each command.
+"""shown.py COMMANDS [--table]: checks that tests cover each behaviour of each command.
 
-COMMANDS is tools/cli/options. The script makes a table of the lines of *.tests, command by behaviour,
-and compares it with docs/develop/command-line.md (--update writes the page). It fails for a cell
-without a test and for an outdated page.
+COMMANDS is tools/cli/options. The script fails for a command and a behaviour without a line in *.tests.
+--table prints the files that test each behaviour:
+
+  text      runs the command and compares its text
+  --json    compares its JSON, or checks it against the schema
+  errors    expects a message and an exit code other than 0
+  progress  checks the progress line on a terminal
+  pipes     output that cannot be written or is only partly read, or standard input
 """
 import os
 import re
@@ -14,28 +19,9 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path.insert(0, HERE)
 import run
 
-PAGE = os.path.join(HERE, "../../docs/develop/command-line.md")
 COLUMNS = ("text", "--json", "errors", "progress", "pipes")
-# Cells that need no test, with the reason.
-NONE = {
-    "text": {}, "--json": {}, "errors": {}, "pipes": {},
-    "progress": {command: "no progress line: the command is short, has a given duration, or "
-                 "prints results continuously" for command in ("info", "levels", "view", "bench", "haptic")},
-}
-TEXT = """# Test coverage of each command
-
-This page lists the files of `tests/cli` that test each command. `python3 tests/cli/shown.py tools/cli/options
---update` generates it; the test `cli_shown` fails for an outdated page or an empty cell.
-
-| column | a test |
-|---|---|
-| text | runs the command and compares its text |
-| `--json` | compares its JSON, or checks it against the schema |
-| errors | expects a message and an exit code other than 0 |
-| progress | checks the progress line on a terminal |
-| pipes | output that cannot be written or is only partly read, or standard input |
-
-"""
+# Commands without a progress line: short, of a given duration, or printing results continuously.
+NO_PROGRESS = ("info", "levels", "view", "bench", "haptic")
 
 
 def tests():
@@ -80,34 +66,19 @@ def table(commands):
 
 
 def cell(cells, command, c):
-    if cells[command, c]:
-        return ", ".join(sorted(cells[command, c]))
-    return "" if command not in NONE[c] else "-"
-
-
-def page(cells, commands):
-    lines = ["| command | " + " | ".join(f"`{c}`" if c[0] == "-" else c for c in COLUMNS) + " |",
-             "|---" * (len(COLUMNS) + 1) + "|"]
-    lines += [f"| `{command}` | " + " | ".join(cell(cells, command, c) for c in COLUMNS) + " |"
-              for command in commands]
-    reasons = sorted({reason for by in NONE.values() for reason in by.values()})
-    return TEXT + "\n".join(lines) + "\n\n" + "\n".join(f"\\- {reason}" for reason in reasons) + "\n"
+    if c == "progress" and command in NO_PROGRESS:
+        return "-"
+    return ", ".join(sorted(cells[command, c]))
 
 
 def main():
     commands = sorted(name[:-8] for name in os.listdir(sys.argv[1])
                       if name.endswith(".options") and name != "shared.options")
     cells = table(commands)
-    text = page(cells, commands)
+    if "--table" in sys.argv:
+        print("\n".join(f"{command} {c}: {cell(cells, command, c)}" for command in commands for c in COLUMNS))
     bad = [f"{command}: no test of {c}" for command in commands for c in COLUMNS
            if not cell(cells, command, c)]
-    if "--update" in sys.argv:
-        with open(PAGE, "w", encoding="utf-8") as file:
-            file.write(text)
-    else:
-        with open(PAGE, encoding="utf-8") as file:
-            if file.read() != text:
-                bad.append("docs/develop/command-line.md is outdated; run with --update")
     print("\n".join(bad + [f"{len(commands) * len(COLUMNS)} cells, {len(bad)} wrong"]))
     return 1 if bad or len(commands) < 20 else 0
 

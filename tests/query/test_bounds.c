@@ -107,7 +107,7 @@ static void seen_from_middle(exact *e, const ebpo_bound *b, const ebpo_bound_cyl
 }
 
 /* Returns true when the corner is in the bounding cylinder with the margin for single precision, 15
- * u of the size of the node: docs/develop/bounds.md, "Points against cylinders". */
+ * u of the size of the node: docs/develop/bounds.md, "Points against bounding cylinders". */
 static bool in_cylinder(exact *e, const ebpo_bound *b, const ebpo_bound_cylinder *cylinder,
                         int lane)
 {

@@ -73,7 +73,7 @@ static void seal_sum(changeable *c, const ebpo_array_in *a, uint64_t chunk, uint
     const ebpo_array_in *list = array_of(c, EBPO_A_CHUNK_CHECKSUMS);
     if (!c->file->has_checksums || ebpo_schema_is_list(a->id))
         return;
-    ebpo_store32(c->data + list->chunks[0].address + 8 * (a->first_sum + chunk), sum);
+    ebpo_store32(c->data + list->chunks[0].address + 8 * (a->first_checksum + chunk), sum);
     (void)seal(c, list->chunks[0]);
 }
 

@@ -136,6 +136,15 @@ static ebpo_status query_boolean_cells(ebpo_boolean *boolean, ebpo_error *error)
     return status;
 }
 
+static ebpo_status make_boolean_mesh(ebpo_boolean *boolean, ebpo_error *error)
+{
+    ebpo_boolean_mesh_report report = EBPO_BOOLEAN_MESH_REPORT_INIT;
+    ebpo_mesh mesh = { 0 };
+    ebpo_status status = ebpo_boolean_mesh(boolean, NULL, &mesh, &report, error);
+    ebpo_mesh_free(&mesh);
+    return status;
+}
+
 static ebpo_status query_boolean(ebpo_model *model, ebpo_error *error)
 {
     const ebpo_boolean_operand operands[2] = { { model, EBPO_POSE_INIT },
@@ -162,6 +171,8 @@ static ebpo_status query_boolean(ebpo_model *model, ebpo_error *error)
         status = ebpo_boolean_exact_volume(boolean, NULL, &exact, error);
     if (status == EBPO_OK)
         status = query_boolean_cells(boolean, error);
+    if (status == EBPO_OK)
+        status = make_boolean_mesh(boolean, error);
     ebpo_boolean_free(boolean);
     return status;
 }

@@ -5,7 +5,14 @@
 #include <ebpo/ebpo.h>
 #include <pthread.h>
 
-enum { EXIT_FINE = 0, EXIT_FAILED = 1, EXIT_USAGE = 2, EXIT_NOT_SOLID = 3, EXIT_DIFFERS = 4 };
+enum {
+    EXIT_FINE = 0,
+    EXIT_FAILED = 1,
+    EXIT_USAGE = 2,
+    EXIT_NOT_SOLID = 3,
+    EXIT_DIFFERS = 4,
+    EXIT_EMPTY = 5
+};
 
 /* Prints "ebpo convert: message" and returns the exit code of the status. */
 int command_failed(const char *name, const ebpo_error *error);

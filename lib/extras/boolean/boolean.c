@@ -145,6 +145,28 @@ void ebpo_expression_box(const ebpo_expression *e, const double (*box)[6], doubl
     memcpy(out, of[e->count - 1], sizeof of[0]);
 }
 
+/* --- equal operands --- */
+
+static bool equal_operands(const ebpo_boolean *b, uint32_t i, uint32_t k)
+{
+    return ebpo_same_model(b->solid[i].model, b->solid[k].model) &&
+           memcmp(&b->pose[i], &b->pose[k], sizeof b->pose[i]) == 0;
+}
+
+void ebpo_boolean_find_equal(const ebpo_boolean *b, uint64_t same[EBPO_BOOLEAN_OPERANDS_MAX])
+{
+    uint64_t used = ebpo_expression_operands(&b->expression);
+    memset(same, 0, EBPO_BOOLEAN_OPERANDS_MAX * sizeof *same);
+    for (uint32_t i = 0; i < b->count; i++) {
+        uint32_t k = 0;
+        if (!(used >> i & 1))
+            continue;
+        while (k < i && !(same[k] && equal_operands(b, k, i)))
+            k++;
+        same[k] |= UINT64_C(1) << i;
+    }
+}
+
 /* --- creation --- */
 
 ebpo_status ebpo_fail_operand(const ebpo_model *model, uint32_t number, const ebpo_error *cause,

@@ -49,6 +49,10 @@ EBPO_MUST_USE ebpo_status ebpo_boolean_query(const ebpo_boolean *b, unsigned wor
                                              const double w[3], ebpo_boolean_result *out,
                                              ebpo_error *error);
 
+/* Groups equal operands (same content, same pose) that the expression uses. same[i] has a bit for
+ * each operand that is equal to operand i, if i is the first of them; otherwise it is 0. */
+void ebpo_boolean_find_equal(const ebpo_boolean *b, uint64_t same[EBPO_BOOLEAN_OPERANDS_MAX]);
+
 /* Fails with the error of a call about an operand. The message begins with "FILE: operand 1: ...";
  * operands are numbered from 1. */
 ebpo_status ebpo_fail_operand(const ebpo_model *model, uint32_t number, const ebpo_error *cause,

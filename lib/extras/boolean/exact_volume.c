@@ -161,36 +161,13 @@ typedef struct measuring {
     const ebpo_boolean *b;
     ebpo_volume_options options;
     ebpo_exact_volume *out;
-    uint64_t first;                           /* first operands of each group of equal ones, a bit
-                                               * for each */
-    uint64_t same[EBPO_BOOLEAN_OPERANDS_MAX]; /* for each of these: the operands that are equal to
-                                               * it, a bit for each */
+    uint64_t same[EBPO_BOOLEAN_OPERANDS_MAX]; /* see ebpo_boolean_find_equal */
     volume_sum *sum;                          /* [threads] */
 } measuring;
 
-static bool is_first(const measuring *m, uint32_t i) { return m->first >> i & 1; }
+static bool is_first(const measuring *m, uint32_t i) { return m->same[i] != 0; }
 
 /* --- operands of the expression --- */
-
-static bool equal_operands(const ebpo_boolean *b, uint32_t i, uint32_t k)
-{
-    return ebpo_same_model(b->solid[i].model, b->solid[k].model) &&
-           memcmp(&b->pose[i], &b->pose[k], sizeof b->pose[i]) == 0;
-}
-
-static void find_equal(measuring *m)
-{
-    uint64_t used = ebpo_expression_operands(&m->b->expression);
-    for (uint32_t i = 0; i < m->b->count; i++) {
-        uint32_t k = 0;
-        if (!(used >> i & 1))
-            continue;
-        while (k < i && !(is_first(m, k) && equal_operands(m->b, k, i)))
-            k++;
-        m->first |= UINT64_C(1) << k;
-        m->same[k] |= UINT64_C(1) << i;
-    }
-}
 
 /* Bounds the volume by the box of the result. An empty box means an empty result. */
 static void bound_by_box(measuring *m)
@@ -521,7 +498,7 @@ ebpo_status ebpo_boolean_exact_volume(ebpo_boolean *boolean, const ebpo_volume_o
         status = EBPO_CHECK_SIZED(ebpo_exact_volume, out, error);
     if (status != EBPO_OK)
         return status;
-    find_equal(&m);
+    ebpo_boolean_find_equal(m.b, m.same);
     bound_by_box(&m);
     if (found.volume.hi > 0) {
         check_models(&m);

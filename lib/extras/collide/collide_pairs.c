@@ -388,7 +388,7 @@ ebpo_status ebpo_collide_self(ebpo_collider *c, const ebpo_collide_options *opti
 {
     EBPO_DEFAULT_FP;
     ebpo_collision q;
-    ebpo_collide_options here = EBPO_COLLIDE_OPTIONS_INIT;
+    ebpo_collide_options unposed = EBPO_COLLIDE_OPTIONS_INIT;
     if (c->model[0] != c->model[1])
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "one model with itself: expected a collider of "
@@ -396,9 +396,9 @@ ebpo_status ebpo_collide_self(ebpo_collider *c, const ebpo_collide_options *opti
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status != EBPO_OK)
         return status;
-    here.deadline_ns = q.options.deadline_ns;
-    here.progress = q.options.progress;
-    return ebpo_collide_self_posed(c, &here, take, user, error);
+    unposed.deadline_ns = q.options.deadline_ns;
+    unposed.progress = q.options.progress;
+    return ebpo_collide_self_posed(c, &unposed, take, user, error);
 }
 
 ebpo_status ebpo_collide_self_posed(ebpo_collider *c, const ebpo_collide_options *options,

@@ -219,9 +219,9 @@ static void set_end(const edge *a, const edge *b, int order, ebpo_contact_end *o
 
 void ebpo_triangle_contact(const double a[3][3], const double b[3][3], ebpo_contact_end out[2])
 {
-    ebpo_turned_pair t;
+    ebpo_prepared_pair t;
     ebpo_pair_kind kind;
-    if (!ebpo_turn_pair(a, b, &t, &kind))
+    if (!ebpo_prepare_pair(a, b, &t, &kind))
         return;
     bool reversed = t.flipped_a != t.flipped_b;
     edge of_a[2], of_b[2]; /* edges to corners 1 and 2 */

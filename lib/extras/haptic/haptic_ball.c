@@ -355,9 +355,9 @@ ebpo_status ebpo_haptic_reset(ebpo_haptic *t, const double place[3], ebpo_error 
     }
     t->side.known = false;
     if (t->tool) {
-        ebpo_rigid there = { .turn = { 0, 0, 0, 1 } };
-        ebpo_vec3_copy(place, there.place);
-        ebpo_tool_put(t->tool, &there);
+        ebpo_rigid initial = { .turn = { 0, 0, 0, 1 } };
+        ebpo_vec3_copy(place, initial.place);
+        ebpo_tool_put(t->tool, &initial);
     }
     t->touching = false;
     for (int i = 0; i < 3; i++)

@@ -31,7 +31,7 @@ static ebpo_status known_query(ebpo_haptic *t, ebpo_known_place *out, ebpo_error
     ebpo_vec3_copy(near.normal, out->normal);
     out->winding = inside.winding;
     out->on = inside.where == EBPO_ON;
-    out->there = true;
+    out->valid = true;
     return EBPO_OK;
 }
 

@@ -31,7 +31,7 @@ typedef struct ebpo_known_place {
     double distance; /* without a sign; infinite if the model has no faces */
     double point[3], normal[3];
     int32_t winding;
-    bool there, on;
+    bool valid, on;
 } ebpo_known_place;
 
 struct ebpo_haptic {

@@ -65,7 +65,7 @@ static bool bound_by_known(ebpo_haptic *t, const double place[3], ebpo_haptic_pr
 {
     const ebpo_known_place *known = ebpo_haptic_known(t);
     double motion[3];
-    if (!known->there)
+    if (!known->valid)
         return false;
     ebpo_vec3_subtract(place, known->place, motion);
     double far = sqrt(ebpo_vec3_dot(motion, motion)),
@@ -85,7 +85,7 @@ static bool find_side(ebpo_haptic *t, const double place[3], ebpo_haptic_probe_r
         if (ebpo_side_go(&t->side, box, place, t->found, EBPO_HAPTIC_FACES, EBPO_HAPTIC_VISITS,
                          &out->work))
             return true;
-        if (t->side.known || !known->there || known->on)
+        if (t->side.known || !known->valid || known->on)
             return false;
         ebpo_vec3_copy(known->place, t->side.at);
         t->side.winding = known->winding;

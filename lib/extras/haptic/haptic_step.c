@@ -376,6 +376,6 @@ uint32_t ebpo_haptic_go(ebpo_haptic *t, const double goal[3], ebpo_ball_work *wo
     ebpo_vec3_copy(t->proxy, t->path[t->path_count++]);
     uint32_t flags = go_by_pieces(&s);
     ebpo_vec3_subtract(goal, t->proxy, left);
-    bool there = sqrt(ebpo_vec3_dot(left, left)) <= 0x1p-12 * t->options.skin;
-    return there ? flags & ~(uint32_t)EBPO_HAPTIC_CONTACT : flags;
+    bool reached = sqrt(ebpo_vec3_dot(left, left)) <= 0x1p-12 * t->options.skin;
+    return reached ? flags & ~(uint32_t)EBPO_HAPTIC_CONTACT : flags;
 }

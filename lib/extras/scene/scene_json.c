@@ -312,14 +312,14 @@ static ebpo_status read_csv(ebpo_json_reader *r, const json_t *value)
     ebpo_status status = ebpo_json_get_text(r, value, "csv", true, &path);
     if (status != EBPO_OK)
         return status;
-    ebpo_scene_options here = *r->options;
-    here.remote = false;
-    const char *refused = ebpo_scene_path_refused(path, &here, false);
+    ebpo_scene_options local = *r->options;
+    local.remote = false;
+    const char *refused = ebpo_scene_path_refused(path, &local, false);
     if (refused)
         return ebpo_json_bad_at(r, "csv", refused);
     char *joined = ebpo_scene_join_path(r->scene->folder, path);
     status = joined ? EBPO_OK : ebpo_fail_memory(r->error, strlen(path));
-    if (status == EBPO_OK && !here.outside)
+    if (status == EBPO_OK && !local.outside)
         status = ebpo_scene_stays_within(r->scene->folder, joined, r->error);
     if (status == EBPO_OK)
         status = read_csv_file(last_route(r), joined, &r->pose_bytes, r->error);

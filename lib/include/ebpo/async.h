@@ -27,9 +27,9 @@
  * - Outputs are unspecified, and callbacks may have received some results. The repeated call starts
  *   again and passes all results. Streams continue with the item that was not returned.
  * - Batches of points and rays keep their completed results if options.done is given (query.h).
- *   Begin an operation before each repetition, too. If the repetition has completed some items, end
- *   the older operation after ebpo_async_needed: bytes that the repetition did not use need not
- *   stay. If not, end the newer one.
+ *   Also begin an operation before each repetition; two operations then run. After
+ *   ebpo_async_needed, end the older one if the repetition has completed items, so that bytes that
+ *   only earlier repetitions used may be removed. Otherwise end the newer one.
  * - Haptic rendering does not support such files, as its thread loads data in the background.
  *
  * The number of repetitions is limited, for any memory budget: bytes that were supplied or read
@@ -97,9 +97,9 @@ EBPO_API uint64_t ebpo_async_begin(ebpo_async *async);
 EBPO_API void ebpo_async_end(ebpo_async *async, uint64_t operation);
 
 /*
- * Gets the ranges that calls have needed or announced by prefetch hints since the last
- * ebpo_async_needed, without available bytes: in ascending order, and at most 4 MiB each. Ranges
- * with small gaps between them are merged.
+ * Gets the ranges of missing bytes that calls have needed, or prefetch hints have named, since the
+ * last ebpo_async_needed. Ranges are in ascending order and at most 4 MiB each; ranges with small
+ * gaps between them are merged.
  *
  * ranges   [count] lent until the next call of ebpo_async_needed with this object
  * count    0: all bytes have arrived in the meantime (several threads); repeat the call at once

@@ -5,11 +5,12 @@
  *   Point in solid  ebpo_boolean_inside, ebpo_boolean_inside_many
  *   Distance        ebpo_boolean_distance
  *   Exact volume    ebpo_boolean_exact_volume
+ *   Mesh            ebpo_boolean_mesh
  *   Cells           ebpo_boolean_cells_new, ebpo_boolean_cells_volume, ebpo_boolean_cells_mesh
  *
- * The *result* is the solid that an expression of solids describes. No mesh of the result is
- * computed: a query of the result is evaluated by queries of the models. Decisions equal those of
- * arithmetic without rounding on posed coordinates (pose.h).
+ * The *result* is the solid that an expression of solids describes. Queries of the result are
+ * evaluated by queries of the models, without its mesh. Decisions equal those of arithmetic without
+ * rounding on posed coordinates (pose.h).
  *
  * The result is *regularised*: an operand is the closure of the points that are inside by its rule,
  * and the result is the closure of its own interior. So the union of two boxes with a common side
@@ -263,6 +264,82 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_exact_volume(ebpo_boolean *boole
                                                              const ebpo_volume_options *options,
                                                              ebpo_exact_volume *out,
                                                              ebpo_error *error);
+
+/* ---- mesh ---- */
+
+typedef struct ebpo_boolean_mesh_options {
+    size_t struct_size;
+
+    ebpo_progress progress;
+
+    /*
+     * True: coordinates of the mesh are doubles. False: floats if those of all operands are and the
+     * result is in their range; else doubles.
+     */
+    bool doubles;
+
+    /*
+     * True: faces of the mesh have the attributes `operand` (uint8, from 0) and `operand_face`
+     * (uint32): the face of the operand from which the face comes, by its index in the source.
+     */
+    bool origins;
+
+    uint8_t reserved[6];
+} ebpo_boolean_mesh_options;
+
+#define EBPO_BOOLEAN_MESH_OPTIONS_INIT                                         \
+    {                                                                          \
+        sizeof(ebpo_boolean_mesh_options), { NULL, NULL }, false, false, { 0 } \
+    }
+
+typedef struct ebpo_boolean_mesh_report {
+    size_t struct_size;
+
+    /* Number of faces of the operands that were cut. */
+    uint64_t faces_cut;
+
+    /* Number of vertices of the result that no operand has. */
+    uint64_t new_vertices;
+
+    /* Number of parts of the operands' surfaces that were classified, each by one point. */
+    uint64_t patches;
+
+    /*
+     * Greatest distance between a vertex of the mesh and the exact vertex of the result, in the
+     * world's unit, up to rounding.
+     */
+    double displacement;
+} ebpo_boolean_mesh_report;
+
+#define EBPO_BOOLEAN_MESH_REPORT_INIT EBPO_SIZED(ebpo_boolean_mesh_report)
+
+/*
+ * Makes the mesh of the result. Faces of operands are cut exactly along their intersections with
+ * all others, also in a common plane and within one operand. The parts that bound the result are
+ * kept, where needed with the reverse orientation. Faces that are not cut keep their corners, at
+ * their poses. Other vertices are the exact ones, rounded to the nearest coordinate. The mesh is
+ * closed: each edge is used equally often in both directions. Rounding may create small
+ * intersections of faces (ebpo_mesh_crossings). Vertices that become equal by rounding are merged,
+ * and faces that lose a corner in this way are omitted. Winding numbers of the mesh are 1 in the
+ * result and 0 elsewhere, except near rounded vertices. The mesh is the same for any number of
+ * threads.
+ *
+ * Takes about 150 bytes for each face of the operands, and some 500 for each new vertex.
+ *
+ * out     freed by ebpo_mesh_free; without faces if the result is empty
+ * report  may be NULL
+ *
+ * EBPO_E_ARGUMENT: operands have different units. EBPO_E_ABSENT: an operand is a subset.
+ * EBPO_E_LIMIT: more than 2^31 - 1 faces, or 2^31 vertices. EBPO_E_FORMAT: an operand is not
+ * closed, although its file states so. Also the errors of reading. On failure `out` is cleared.
+ *
+ * Threads: one per expression.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_mesh(ebpo_boolean *boolean,
+                                                     const ebpo_boolean_mesh_options *options,
+                                                     ebpo_mesh *out,
+                                                     ebpo_boolean_mesh_report *report,
+                                                     ebpo_error *error);
 
 /* ---- cells ---- */
 

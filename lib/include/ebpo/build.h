@@ -28,9 +28,10 @@ extern "C" {
 typedef enum ebpo_selection {
     /*
      * From the root down. Candidates are the directions of the hull of the solid in the cell. A
-     * node starts with its parent's envelope. Planes are added greedily by the volume that they
-     * remove, if this is at least epsilon. Then planes are added that cut off needles: here, long,
-     * thin portions of the envelope with little volume.
+     * node starts with its parent's envelope. The plane that removes the greatest volume is added,
+     * again and again, while this volume is at least a share of the cell (`epsilon` of
+     * ebpo_build_options). Then planes are added that cut off needles: here, long, thin portions of
+     * the envelope with little volume.
      */
     EBPO_SELECT_INHERIT = 0,
 
@@ -41,7 +42,7 @@ typedef enum ebpo_selection {
      */
     EBPO_SELECT_KMEDOIDS = 1, /* medoids of clusters of normals */
     EBPO_SELECT_OFFSET = 2,   /* planes that had to move least from their faces */
-    EBPO_SELECT_RANDOM = 3,   /* consecutive planes, from a random plane on */
+    EBPO_SELECT_RANDOM = 3,   /* consecutive candidates, from a random one on */
 
     /* Number of selections. */
     EBPO_SELECTION_COUNT
@@ -236,9 +237,10 @@ typedef struct ebpo_thesis_levels {
 #define EBPO_THESIS_LEVELS_INIT EBPO_SIZED(ebpo_thesis_levels)
 
 /*
- * Computes the levels of a mesh as the theses do, for comparison; nothing can be stored. Without
- * the limits of files: a node may have more than 255 planes, and candidates with equal normals all
- * count. The selection must be one of the theses. The mesh is empty afterwards, also on failure.
+ * Computes the levels of a mesh as the theses do, for comparison; nothing can be stored. The limits
+ * of files do not apply: a node may have more than 255 planes, and candidates with equal normals
+ * all count. The selection must be one of the theses. The mesh is empty afterwards, also on
+ * failure.
  *
  * report    as for ebpo_build
  * options   as for ebpo_build; parts are ignored

@@ -404,8 +404,8 @@ typedef struct ebpo_clearance {
  * Computes the minimum distance between the faces of A and B; INFINITY if a model has no faces. For
  * a solid inside another, the result is the distance of their surfaces. With `at_least` the search
  * ends when this is decided. If the result is 1, `distance` is at_least .. INFINITY, without a
- * pair. If it is 0, the returned pair is nearer. After the deadline, `distance` has the bounds
- * known so far.
+ * pair. If it is 0, the returned pair is nearer than at_least. After the deadline, `distance` has
+ * the bounds known so far.
  *
  * For models in parts, subtrees whose envelopes are not farther apart than the best result are
  * loaded, nearest first. Exact distances and their pairs do not depend on the parts. Bounds of

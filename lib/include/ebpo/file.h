@@ -841,7 +841,8 @@ typedef struct ebpo_read_options {
  */
 
 /*
- * Reads a level and checks its counts, ranges, order and index arrays. Freed by ebpo_level_free.
+ * Reads a level. Checks its counts, the ranges and the order of its values, and its index arrays
+ * (running sums of counts, for random access). Freed by ebpo_level_free.
  *
  * Threads: any.
  */

@@ -193,8 +193,8 @@ typedef struct ebpo_haptic_ball_result {
     double normal[3];
 
     /*
-     * In contact: distance between proxy and device; with EBPO_HAPTIC_WAITING or
-     * EBPO_HAPTIC_INCOMPLETE, only the part of this vector that faces prevent. Else minus the
+     * In contact: length of the vector from proxy to device; with EBPO_HAPTIC_WAITING or
+     * EBPO_HAPTIC_INCOMPLETE, of the part of this vector that faces prevent. Else minus the
      * distance from the ball to the nearest face; or minus `search_radius` if no face is within
      * `search_radius`. With EBPO_HAPTIC_PARTIAL, a face that was not tested may be nearer.
      */

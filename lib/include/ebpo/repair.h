@@ -83,9 +83,9 @@ typedef struct ebpo_repairs {
     ebpo_repair_try tries[EBPO_REPAIR_TRIES];
 
     /*
-     * Index of the try without doubts, which is the last try. -1: every try has doubts, or there
-     * are no doubts about the unrepaired mesh, even if the step that drops repeated faces was
-     * tried.
+     * Index of the try without doubts, which is the last try. -1: every try has doubts, or the
+     * unrepaired mesh has none and needs no repair (dropping repeated faces may be tried then,
+     * too).
      */
     int64_t chosen;
 } ebpo_repairs;
@@ -143,8 +143,8 @@ typedef struct ebpo_shells {
     /*
      * Differences of volumes, indexed by ebpo_rule: volume of the solid under this rule, minus the
      * signed volume of the mesh (the integral of the winding number). In cubic units of the source.
-     * Valid only if `apart` is 1; else 0. A difference is also 0 if each component outside all
-     * solids is oriented outwards and each component inside a solid is oriented inwards.
+     * Valid only if `apart` is 1; else 0. All differences are also 0 if every winding number is 0
+     * or 1, as in bodies that are oriented outwards and whose cavities are oriented inwards.
      */
     double volume_difference[3];
 } ebpo_shells;

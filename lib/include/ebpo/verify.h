@@ -22,8 +22,9 @@ typedef struct ebpo_verify_report {
     size_t struct_size;
 
     /*
-     * Header, shapes and counts of arrays, index arrays, order. Also that cells are divided where
-     * they have more than leaf_faces faces, and only there, which no rule of the format requires.
+     * Header; shapes and counts of arrays; order of values; index arrays (running sums of counts).
+     * Also checks that exactly the cells with more than leaf_faces faces are divided, although no
+     * rule of the format requires this.
      */
     ebpo_verify_count structure;
 

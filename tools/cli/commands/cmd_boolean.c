@@ -1,4 +1,4 @@
-/* ebpo boolean: evaluates queries on unions, intersections and differences of models at poses. */
+/* ebpo boolean: unions, intersections and differences of models at poses: queries, and meshes. */
 #include <inttypes.h>
 #include <math.h>
 #include <stddef.h>
@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "cli/boolean_args.h"
+#include "cli/boolean_output.h"
 #include "cli/command.h"
 #include "cli/json.h"
 #include "cli/points.h"
@@ -26,7 +27,7 @@ typedef struct values {
     arg_list poses;
     int64_t level;
     double tolerance;
-    bool volume, inner;
+    bool volume, inner, cells, doubles;
 } values;
 
 #include "cli/options/boolean.inc"
@@ -69,14 +70,18 @@ static void print_distance(const values *v, const ebpo_boundary_distance *d)
 typedef struct cell_result {
     const values *v;
     const char **models; /* in the order of the command line */
+    boolean_output output;
     ebpo_exact_volume exact;
     ebpo_boolean_volume cells;
     /* the volume is exact, but no cells can be made; `why_no_cells` is the reason */
     bool no_cells;
     char why_no_cells[1024];
-    bool volume; /* requested */
-    uint64_t faces_written;
+    bool volume;            /* requested */
+    uint64_t faces_written; /* of cells */
 } cell_result;
+
+/* Returns true if the exact result is requested. */
+static bool writes_result(const values *v) { return v->out && !v->cells; }
 
 static bool is_exact(const cell_result *a) { return a->exact.volume.kind == EBPO_VALUE_EXACT; }
 
@@ -187,7 +192,9 @@ static void print_cells(const cell_result *a)
 {
     json j;
     if (!a->v->query.json) {
-        if (a->v->out)
+        if (writes_result(a->v))
+            boolean_print_result(&a->output);
+        else if (a->v->out)
             print_written(a);
         if (a->volume)
             print_volume(a);
@@ -195,7 +202,9 @@ static void print_cells(const cell_result *a)
     }
     json_begin(&j, stdout);
     json_object(&j, NULL);
-    if (a->v->out) {
+    if (writes_result(a->v)) {
+        boolean_result_to_json(&a->output, &j);
+    } else if (a->v->out) {
         json_text(&j, "output", a->v->out);
         json_text(&j, "side", a->v->inner ? "inner" : "outer");
         json_uint(&j, "faces", a->faces_written);
@@ -253,27 +262,6 @@ static int query_points(const values *v, ebpo_boolean *b)
 
 /* --- cells --- */
 
-static ebpo_status convert_cells(ebpo_mesh *mesh, const values *v, ebpo_progress progress,
-                                 ebpo_error *error)
-{
-    ebpo_prepared prepared = EBPO_PREPARED_INIT;
-    ebpo_prepare_options preparing = EBPO_PREPARE_OPTIONS_INIT;
-    ebpo_build_options building = EBPO_BUILD_OPTIONS_INIT;
-    ebpo_write_options writing = EBPO_WRITE_OPTIONS_INIT;
-    ebpo_tree tree;
-    preparing.threads = building.threads = writing.threads = (unsigned)v->query.threads;
-    preparing.progress = building.progress = writing.progress = progress;
-    building.require_solid = true;
-    ebpo_status status = ebpo_mesh_prepare(mesh, &preparing, &prepared, error);
-    if (status == EBPO_OK)
-        status = ebpo_build(mesh, &prepared.report, NULL, &building, &tree, error);
-    if (status != EBPO_OK)
-        return status;
-    status = ebpo_tree_write(&tree, v->out, &writing, error);
-    ebpo_tree_free(&tree);
-    return status;
-}
-
 static ebpo_status write_cells(const ebpo_boolean_cells *cells, cell_result *a,
                                ebpo_progress progress, ebpo_error *error)
 {
@@ -289,10 +277,8 @@ static ebpo_status write_cells(const ebpo_boolean_cells *cells, cell_result *a,
         snprintf(error->message, sizeof error->message,
                  "%s: there are no %s cells at level %" PRId64 "; give a higher level", v->out,
                  v->inner ? "inner" : "such", v->level);
-    } else if (words_end_with(v->out, ".ply")) {
-        status = ebpo_mesh_write_ply(&mesh, v->out, error);
     } else {
-        status = convert_cells(&mesh, v, progress, error);
+        status = boolean_write_mesh(&a->output, &mesh, progress, error);
     }
     ebpo_mesh_free(&mesh);
     return status;
@@ -307,30 +293,38 @@ static ebpo_status result_cells(cell_result *a, ebpo_boolean *b, ebpo_progress p
     how.level = (int)a->v->level;
     how.progress = measuring.progress = progress;
     ebpo_status status = EBPO_OK;
+    if (writes_result(a->v))
+        status = boolean_write_result(&a->output, b, progress, error);
+    if (status != EBPO_OK || (writes_result(a->v) && !a->volume))
+        return status;
     if (a->volume)
         status = ebpo_boolean_exact_volume(b, &measuring, &a->exact, error);
     bool exact = status == EBPO_OK && is_exact(a);
     if (status == EBPO_OK)
         status = ebpo_boolean_cells_new(b, &how, &cells, error);
-    if (status == EBPO_E_LIMIT && exact && !a->v->out) {
+    if (status == EBPO_E_LIMIT && exact && !a->v->cells) {
         a->no_cells = true;
         snprintf(a->why_no_cells, sizeof a->why_no_cells, "%s", error->message);
         return EBPO_OK;
     }
     if (status == EBPO_OK)
         status = ebpo_boolean_cells_volume(cells, &a->cells);
-    if (status == EBPO_OK && a->v->out)
+    if (status == EBPO_OK && a->v->cells)
         status = write_cells(cells, a, progress, error);
     ebpo_boolean_cells_free(cells);
     return status;
 }
 
-static int make_cells(const values *v, const char **models, ebpo_boolean *b)
+static int make_cells(const values *v, const char **models, const char *unit, ebpo_boolean *b)
 {
     progress_line line;
     ebpo_error error = EBPO_ERROR_INIT;
     cell_result a = { .v = v,
                       .models = models,
+                      .output = { .path = v->out,
+                                  .unit = unit,
+                                  .threads = (unsigned)v->query.threads,
+                                  .doubles = v->doubles },
                       .exact = EBPO_EXACT_VOLUME_INIT,
                       .cells = EBPO_BOOLEAN_VOLUME_INIT,
                       .volume = v->volume || !v->out };
@@ -340,7 +334,10 @@ static int make_cells(const values *v, const char **models, ebpo_boolean *b)
     if (status != EBPO_OK)
         return command_failed("boolean", &error);
     print_cells(&a);
-    return command_flush("boolean") ? EXIT_FINE : EXIT_FAILED;
+    bool empty = writes_result(v) && a.output.faces == 0;
+    if (empty)
+        fprintf(stderr, "ebpo boolean: %s: warning: the result is empty\n", v->out);
+    return !command_flush("boolean") ? EXIT_FAILED : empty ? EXIT_EMPTY : EXIT_FINE;
 }
 
 /* --- all of it --- */
@@ -352,11 +349,15 @@ static int check_values(const values *v, const char **models, uint32_t count)
         return command_usage("boolean", "--inside and --distance cannot be used together");
     if (has_point_queries && (v->volume || v->out || v->inner))
         return command_usage("boolean",
-                             "%s queries points; --volume, --output and --inner need cells; run "
-                             "them separately",
+                             "%s queries points; --volume and --output do not; run them "
+                             "separately",
                              v->inside ? "--inside" : "--distance");
-    if (v->inner && !v->out)
-        return command_usage("boolean", "--inner needs --output");
+    if (v->cells && !v->out)
+        return command_usage("boolean", "--cells needs --output");
+    if (v->inner && !v->cells)
+        return command_usage("boolean", "--inner needs --output and --cells");
+    if (v->doubles && !writes_result(v))
+        return command_usage("boolean", "--double needs --output, and excludes --cells");
     if (v->out && !words_end_with(v->out, ".ply") && !words_end_with(v->out, ".ebpo.h5"))
         return command_usage("boolean",
                              "--output '%s': expected a name that ends with .ply or "
@@ -366,6 +367,17 @@ static int check_values(const values *v, const char **models, uint32_t count)
         if (command_overwrites("boolean", models[i], v->out))
             return EXIT_USAGE;
     return EXIT_FINE;
+}
+
+/* Returns the unit of the first model that has one, or NULL. */
+static const char *unit_of(const query_session *sessions, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        const ebpo_info *info = ebpo_file_info(sessions[i].file);
+        if (info->unit[0])
+            return info->unit;
+    }
+    return NULL;
 }
 
 static int result_expression(const values *v, const boolean_nodes *nodes,
@@ -381,7 +393,8 @@ static int result_expression(const values *v, const boolean_nodes *nodes,
         operands[i] = (ebpo_boolean_operand){ sessions[i].model, poses[i] };
     if (ebpo_boolean_new(operands, count, nodes->node, nodes->count, &how, &b, &error) != EBPO_OK)
         return command_failed("boolean", &error);
-    int code = v->inside || v->distance ? query_points(v, b) : make_cells(v, models, b);
+    int code = v->inside || v->distance ? query_points(v, b)
+                                        : make_cells(v, models, unit_of(sessions, count), b);
     ebpo_boolean_free(b);
     return code;
 }

@@ -1,0 +1,334 @@
+/* Finds the triangles that bound the result of the expression.
+ *
+ * Patches are triangles that are connected by edges of exactly two triangles. Around such an edge
+ * there are two sectors, which both triangles separate; so along a patch all operands have the same
+ * winding numbers in front, and the same behind. They are computed at one inner point of the patch,
+ * exactly. The patch bounds the result if the expression differs on its two sides. This rule covers
+ * coplanar faces, operands that touch, and operands that intersect themselves.
+ *
+ * The boundary of a set has no boundary, so at each edge the selected triangles have as many
+ * directions one way as the other. This is checked before the result is used. */
+#include "core/strict_fp.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/parallel.h"
+#include "extras/boolean/cut_mesh.h"
+#include "geometry/predicates.h"
+
+static const char stage[] = "classify";
+
+/* --- edges --- */
+
+/* Each edge is listed at its vertex with the lower number: the other vertex << 32 | triangle << 1 |
+ * 1 if the triangle has the edge from the higher to the lower number. */
+typedef struct edge_lists {
+    uint64_t *begin; /* [vertices + 1] */
+    uint64_t *edge;
+} edge_lists;
+
+static uint32_t other_vertex(uint64_t edge) { return (uint32_t)(edge >> 32); }
+
+static uint32_t triangle_of(uint64_t edge) { return (uint32_t)edge >> 1; }
+
+static int order_edges(const void *a, const void *b)
+{
+    uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
+    return (x > y) - (x < y);
+}
+
+/* Lists are short: most have some three edges. */
+static void sort_list(uint64_t *list, uint64_t count)
+{
+    if (count > 32) {
+        qsort(list, count, sizeof *list, order_edges);
+        return;
+    }
+    for (uint64_t i = 1; i < count; i++) {
+        uint64_t edge = list[i], at = i;
+        for (; at > 0 && list[at - 1] > edge; at--)
+            list[at] = list[at - 1];
+        list[at] = edge;
+    }
+}
+
+static ebpo_status list_edges(edge_lists *e, const ebpo_cut_mesh *cut, ebpo_error *error)
+{
+    uint64_t vertices = ebpo_cut_mesh_vertices(cut);
+    e->begin = ebpo_alloc_zero(vertices + 2, sizeof *e->begin);
+    e->edge = ebpo_alloc(3 * cut->count, sizeof *e->edge);
+    if (!e->begin || !e->edge)
+        return ebpo_fail_memory(error, 8 * vertices + 24 * cut->count);
+    uint64_t *end = e->begin + 1; /* while filling: end[i + 1] is the end of list i */
+    for (uint64_t t = 0; t < cut->count; t++)
+        for (int i = 0; i < 3; i++) {
+            uint32_t a = cut->triangle[t][i], b = cut->triangle[t][i == 2 ? 0 : i + 1];
+            end[(a < b ? a : b) + 1]++;
+        }
+    for (uint64_t v = 0; v < vertices; v++)
+        end[v + 1] += end[v];
+    for (uint64_t t = 0; t < cut->count; t++)
+        for (int i = 0; i < 3; i++) {
+            uint32_t a = cut->triangle[t][i], b = cut->triangle[t][i == 2 ? 0 : i + 1];
+            e->edge[end[a < b ? a : b]++] = (uint64_t)(a < b ? b : a) << 32 | t << 1 | (a > b);
+        }
+    for (uint64_t v = 0; v < vertices; v++)
+        sort_list(e->edge + e->begin[v], e->begin[v + 1] - e->begin[v]);
+    return EBPO_OK;
+}
+
+static void free_edges(edge_lists *e)
+{
+    free(e->begin);
+    free(e->edge);
+}
+
+/* --- patches --- */
+
+/* A disjoint-set forest: the parent of each triangle << 1 | 1 if its orientation in the patch is
+ * opposite to that of its parent. Roots are the first triangles of the patches. */
+
+static uint32_t find_root(uint32_t *parent, uint32_t triangle)
+{
+    uint32_t flips = 0;
+    while (parent[triangle] >> 1 != triangle) {
+        uint32_t up = parent[triangle], above = parent[up >> 1];
+        parent[triangle] = (above & ~UINT32_C(1)) | ((up ^ above) & 1);
+        flips ^= parent[triangle] & 1;
+        triangle = parent[triangle] >> 1;
+    }
+    return triangle << 1 | flips;
+}
+
+static void join_triangles(uint32_t *parent, uint64_t first, uint64_t second)
+{
+    /* two triangles with the same direction of their edge have opposite orientations */
+    uint32_t flipped = ((first ^ second) & 1) == 0;
+    uint32_t a = find_root(parent, triangle_of(first)), b = find_root(parent, triangle_of(second));
+    flipped ^= (a ^ b) & 1;
+    if (a >> 1 < b >> 1)
+        parent[b >> 1] = (a & ~UINT32_C(1)) | flipped;
+    else if (b >> 1 < a >> 1)
+        parent[a >> 1] = (b & ~UINT32_C(1)) | flipped;
+}
+
+static void join_patches(const ebpo_cut_mesh *cut, const edge_lists *e, uint32_t *parent)
+{
+    for (uint32_t t = 0; t < cut->count; t++)
+        parent[t] = t << 1;
+    for (uint64_t i = 0, next, all = 3 * cut->count, v = 0; i < all; i = next) {
+        while (e->begin[v + 1] <= i)
+            v++;
+        for (next = i + 1;
+             next < e->begin[v + 1] && other_vertex(e->edge[next]) == other_vertex(e->edge[i]);)
+            next++;
+        if (next - i == 2)
+            join_triangles(parent, e->edge[i], e->edge[i + 1]);
+    }
+}
+
+/* --- winding numbers --- */
+
+typedef struct classifying {
+    const ebpo_cut_mesh *cut;
+    const uint32_t *triangle; /* a triangle of each patch */
+    int8_t *sign;             /* sign of this triangle */
+} classifying;
+
+static void add_vertex(const ebpo_cut_mesh *cut, uint32_t vertex, int k, mpq_t sum, mpq_t x)
+{
+    uint64_t corners = cut->faces->corners.count;
+    if (vertex < corners) {
+        mpq_set_d(x, cut->faces->corners.at[vertex][k]);
+    } else {
+        const ebpo_exact_point *p = &cut->set.point[vertex - corners];
+        mpq_set_num(x, p->x[k]);
+        mpq_set_den(x, p->x[3]);
+        mpq_canonicalize(x);
+        if (cut->unit < 0)
+            mpq_div_2exp(x, x, (mp_bitcnt_t)-cut->unit);
+        else
+            mpq_mul_2exp(x, x, (mp_bitcnt_t)cut->unit);
+    }
+    mpq_add(sum, sum, x);
+}
+
+/* Computes the mean of the triangle's corners. */
+static void find_middle(const ebpo_cut_mesh *cut, uint32_t triangle, mpq_t out[3])
+{
+    mpq_t x;
+    mpq_init(x);
+    for (int k = 0; k < 3; k++) {
+        mpq_init(out[k]);
+        for (int i = 0; i < 3; i++)
+            add_vertex(cut, cut->triangle[triangle][i], k, out[k], x);
+        mpq_set_ui(x, 3, 1);
+        mpq_div(out[k], out[k], x);
+    }
+    mpq_clear(x);
+}
+
+/* Computes the changes of the operands' winding numbers from the front of a triangle to its back.
+ */
+static void find_changes(const ebpo_cut_mesh *cut, uint32_t triangle,
+                         int32_t change[EBPO_BOOLEAN_OPERANDS_MAX])
+{
+    uint64_t low = 0, high = cut->covers;
+    memset(change, 0, EBPO_BOOLEAN_OPERANDS_MAX * sizeof *change);
+    change[ebpo_face_list_operand(cut->faces, cut->face[triangle])]++;
+    while (low < high) {
+        uint64_t middle = low + (high - low) / 2;
+        if (cut->cover[middle].triangle < triangle)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    for (; low < cut->covers && cut->cover[low].triangle == triangle; low++)
+        change[ebpo_face_list_operand(cut->faces, cut->cover[low].face)] +=
+            cut->cover[low].opposite ? -1 : 1;
+}
+
+static int value_of(const ebpo_boolean *b, uint64_t in)
+{
+    return ebpo_expression_value(&b->expression, UINT64_MAX, in) == EBPO_MAY_IN;
+}
+
+static ebpo_status classify_triangle(const ebpo_cut_mesh *cut, uint32_t triangle, unsigned worker,
+                                     int8_t *sign, ebpo_error *error)
+{
+    const ebpo_face_list *faces = cut->faces;
+    const ebpo_boolean *b = faces->boolean;
+    uint32_t face = cut->face[triangle];
+    int32_t change[EBPO_BOOLEAN_OPERANDS_MAX], shifted = 0;
+    uint64_t in_front = 0, behind = 0;
+    mpq_t middle[3];
+    ebpo_status status = EBPO_OK;
+    /* winding numbers are those at the middle, shifted by an infinitesimal */
+    for (int k = 0; k < 3 && shifted == 0; k++)
+        shifted = ebpo_normal_sign(k, ebpo_face_list_corner(faces, face, 0),
+                                   ebpo_face_list_corner(faces, face, 1),
+                                   ebpo_face_list_corner(faces, face, 2));
+    find_changes(cut, triangle, change);
+    find_middle(cut, triangle, middle);
+    for (uint32_t i = 0; i < b->count && status == EBPO_OK; i++) {
+        ebpo_error cause = EBPO_ERROR_INIT;
+        int32_t front = 0;
+        if (!faces->same[i])
+            continue;
+        if (ebpo_exact_winding(&b->solid[i], ebpo_boolean_context(b, worker, i),
+                               (const mpq_t *)middle, &front, &cause) != EBPO_OK)
+            status = ebpo_fail_operand(b->solid[i].model, i, &cause, error);
+        front -= shifted < 0 ? change[i] : 0;
+        ebpo_rule rule = b->solid[i].model->info->rule;
+        in_front |= ebpo_rule_inside(rule, front) ? faces->same[i] : 0;
+        behind |= ebpo_rule_inside(rule, front + change[i]) ? faces->same[i] : 0;
+    }
+    *sign = (int8_t)(value_of(b, behind) - value_of(b, in_front));
+    mpq_clears(middle[0], middle[1], middle[2], NULL);
+    return status;
+}
+
+static ebpo_status classify_some(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                 ebpo_error *error)
+{
+    const classifying *c = context;
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = begin; i < end && status == EBPO_OK; i++)
+        status = classify_triangle(c->cut, c->triangle[i], worker, &c->sign[i], error);
+    return status;
+}
+
+/* --- all patches --- */
+
+/* Chooses a triangle of each patch: if possible a whole face, at which queries are fastest. Sets
+ * patch[t] to the number of the patch of triangle t. Returns the number of patches. */
+static uint32_t choose_triangles(const ebpo_cut_mesh *cut, uint32_t *parent, uint32_t *patch,
+                                 uint32_t *chosen)
+{
+    uint32_t count = 0;
+    const uint64_t *begin = cut->faces->begin;
+    for (uint32_t t = 0; t < cut->count; t++) {
+        uint32_t root = find_root(parent, t) >> 1, face = cut->face[t];
+        if (root == t) {
+            patch[t] = count;
+            chosen[count++] = t;
+            continue;
+        }
+        patch[t] = patch[root];
+        uint32_t best = cut->face[chosen[patch[t]]];
+        if (begin[best + 1] > begin[best] && begin[face + 1] == begin[face])
+            chosen[patch[t]] = t;
+    }
+    return count;
+}
+
+static ebpo_status classify_patches(const ebpo_cut_mesh *cut, uint32_t *parent,
+                                    const ebpo_progress *progress, int8_t *sign, uint64_t *patches,
+                                    ebpo_error *error)
+{
+    uint32_t *patch = ebpo_alloc(cut->count, sizeof *patch);
+    uint32_t *chosen = ebpo_alloc(cut->count, sizeof *chosen);
+    int8_t *of_patch = ebpo_alloc(cut->count, sizeof *of_patch);
+    ebpo_status status = EBPO_OK;
+    if (patch && chosen && of_patch) {
+        classifying c = { cut, chosen, of_patch };
+        uint32_t count = choose_triangles(cut, parent, patch, chosen);
+        status = ebpo_parallel_for(count < 2 ? 1 : cut->faces->boolean->threads, NULL, count, 1,
+                                   classify_some, &c, progress, stage, error);
+        for (uint32_t t = 0; t < cut->count && status == EBPO_OK; t++) {
+            uint32_t flips = (find_root(parent, t) ^ find_root(parent, chosen[patch[t]])) & 1;
+            sign[t] = (int8_t)(flips ? -of_patch[patch[t]] : of_patch[patch[t]]);
+        }
+        *patches = count;
+    } else {
+        status = ebpo_fail_memory(error, 9 * cut->count);
+    }
+    free(patch);
+    free(chosen);
+    free(of_patch);
+    return status;
+}
+
+/* Returns true if the selected triangles have each edge equally often in both directions. */
+static bool is_closed(const ebpo_cut_mesh *cut, const edge_lists *e, const int8_t *sign)
+{
+    int64_t balance = 0;
+    for (uint64_t i = 0, all = 3 * cut->count, v = 0; i < all; i++) {
+        while (e->begin[v + 1] <= i)
+            v++;
+        int8_t s = sign[triangle_of(e->edge[i])];
+        balance += e->edge[i] & 1 ? -s : s;
+        bool ends =
+            i + 1 == e->begin[v + 1] || other_vertex(e->edge[i + 1]) != other_vertex(e->edge[i]);
+        if (ends && balance != 0)
+            return false;
+    }
+    return true;
+}
+
+ebpo_status ebpo_cut_mesh_classify(const ebpo_cut_mesh *cut, const ebpo_progress *progress,
+                                   int8_t **sign, uint64_t *patches, ebpo_error *error)
+{
+    edge_lists e = { 0 };
+    uint32_t *parent = ebpo_alloc(cut->count, sizeof *parent);
+    *sign = ebpo_alloc_zero(cut->count, sizeof **sign);
+    ebpo_status status =
+        parent && *sign ? EBPO_OK : ebpo_fail_memory(error, cut->count * (sizeof *parent + 1));
+    if (status == EBPO_OK && !ebpo_progress_stage(progress, "join faces", error))
+        status = EBPO_E_CANCELLED;
+    if (status == EBPO_OK)
+        status = list_edges(&e, cut, error);
+    if (status == EBPO_OK) {
+        join_patches(cut, &e, parent);
+        status = classify_patches(cut, parent, progress, *sign, patches, error);
+    }
+    if (status == EBPO_OK && !is_closed(cut, &e, *sign))
+        status = ebpo_fail(error, EBPO_E_FORMAT,
+                           "the result is not closed; check that the operands are (ebpo verify)");
+    free_edges(&e);
+    free(parent);
+    return status;
+}

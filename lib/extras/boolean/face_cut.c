@@ -1,0 +1,373 @@
+/* Cuts one face along its intersections with other faces.
+ *
+ * Two faces in different planes intersect in a segment or a point on the common line of the planes.
+ * Each face has an interval on this line; the exact ends of both intervals are compared. In one
+ * plane, the edges of the other face are clipped to the face. All segments and the edges of the
+ * face are divided where they intersect, and the face is triangulated with the parts as edges.
+ *
+ * Both faces of a pair get the same points, so the triangles on both sides of a cut, and on both
+ * sides of a common edge of two faces, have equal vertices. If several faces cover a triangle in
+ * one plane, only the first of them keeps it and notes the others. */
+#include "core/strict_fp.h"
+
+#include "extras/boolean/face_cut.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "geometry/predicates.h"
+#include "geometry/vec3.h"
+
+void ebpo_face_cutter_init(ebpo_face_cutter *cutter, const ebpo_face_list *faces, int unit)
+{
+    *cutter = (ebpo_face_cutter){ .faces = faces, .unit = unit };
+    ebpo_arrangement_2d_init(&cutter->arrangement);
+    for (int i = 0; i < 2; i++) {
+        ebpo_exact_plane_init(&cutter->plane[i]);
+        for (int k = 0; k < 3; k++)
+            ebpo_exact_point_init(&cutter->corner[i][k]);
+        for (int k = 0; k < 2; k++)
+            ebpo_exact_point_init(&cutter->end[i][k]);
+    }
+    ebpo_exact_point_init(&cutter->meeting);
+}
+
+void ebpo_face_cutter_free(ebpo_face_cutter *cutter)
+{
+    ebpo_arrangement_2d_free(&cutter->arrangement);
+    ebpo_triangulation_free(&cutter->triangulation);
+    for (int i = 0; i < 2; i++) {
+        ebpo_exact_plane_clear(&cutter->plane[i]);
+        for (int k = 0; k < 3; k++)
+            ebpo_exact_point_clear(&cutter->corner[i][k]);
+        for (int k = 0; k < 2; k++)
+            ebpo_exact_point_clear(&cutter->end[i][k]);
+    }
+    ebpo_exact_point_clear(&cutter->meeting);
+    free(cutter->coplanar);
+    free(cutter->kept);
+    free(cutter->cover);
+    free(cutter->within);
+}
+
+void ebpo_face_pieces_free(ebpo_face_pieces *pieces)
+{
+    for (uint32_t i = 0; i < pieces->points; i++)
+        ebpo_exact_point_clear(&pieces->point[i]);
+    free(pieces->point);
+    free(pieces->triangle);
+    free(pieces->cover);
+    *pieces = (ebpo_face_pieces){ 0 };
+}
+
+static inline int next_index(int i) { return i == 2 ? 0 : i + 1; }
+
+static void copy_point(ebpo_exact_point *out, const ebpo_exact_point *p)
+{
+    for (int k = 0; k < 4; k++)
+        mpz_set(out->x[k], p->x[k]);
+    memcpy(out->at, p->at, sizeof out->at);
+    out->exact = p->exact;
+}
+
+/* Adds a copy of a point to the arrangement. */
+static bool add_point(ebpo_face_cutter *c, const ebpo_exact_point *p, uint32_t *number)
+{
+    copy_point(&c->meeting, p);
+    return ebpo_point_set_add(&c->arrangement.set, &c->meeting, number);
+}
+
+static void set_corners(ebpo_face_cutter *c, int which, uint32_t face)
+{
+    for (int i = 0; i < 3; i++)
+        ebpo_exact_point_set(&c->corner[which][i], ebpo_face_list_corner(c->faces, face, i),
+                             c->unit);
+}
+
+/* --- faces in different planes --- */
+
+/* Computes the ends of the part of a face in the other face's plane, in order. `side`: sides of its
+ * corners, not all 0. Returns false if there is no such part. */
+static bool find_ends(ebpo_face_cutter *c, int which, const int side[3])
+{
+    ebpo_exact_point *end = c->end[which], *corner = c->corner[which];
+    int n = 0;
+    for (int i = 0; i < 3; i++)
+        if (side[i] == 0)
+            copy_point(&end[n++], &corner[i]);
+    for (int i = 0; i < 3 && n < 2; i++)
+        if (side[i] * side[next_index(i)] < 0)
+            ebpo_exact_meet(&end[n++], &c->plane[!which], &corner[i], &corner[next_index(i)],
+                            c->unit);
+    if (n == 1)
+        copy_point(&end[1], &end[0]);
+    else if (n == 2 && ebpo_exact_order(&end[0], &end[1]) > 0)
+        ebpo_exact_point_swap(&end[0], &end[1]);
+    return n > 0;
+}
+
+static bool cut_through(ebpo_face_cutter *c, const int side[3], const int other_side[3])
+{
+    uint32_t from, to;
+    ebpo_exact_plane_through(&c->plane[1], c->corner[1]);
+    if (!find_ends(c, 0, side) || !find_ends(c, 1, other_side))
+        return true;
+    const ebpo_exact_point *first = &c->end[ebpo_exact_order(&c->end[0][0], &c->end[1][0]) < 0][0];
+    const ebpo_exact_point *last = &c->end[ebpo_exact_order(&c->end[0][1], &c->end[1][1]) > 0][1];
+    if (ebpo_exact_order(first, last) > 0)
+        return true;
+    return add_point(c, first, &from) && add_point(c, last, &to) &&
+           ebpo_arrangement_2d_add(&c->arrangement, from, to);
+}
+
+/* --- faces in one plane --- */
+
+/* Adds a point of an edge, and notes the first and last such point in the order along the edge. */
+static bool note_edge_point(ebpo_face_cutter *c, const ebpo_exact_point *p, uint32_t range[2],
+                            int *count)
+{
+    uint32_t number;
+    if (!add_point(c, p, &number))
+        return false;
+    const ebpo_exact_point *point = c->arrangement.set.point;
+    if (*count == 0 || ebpo_exact_order(&point[number], &point[range[0]]) < 0)
+        range[0] = number;
+    if (*count == 0 || ebpo_exact_order(&point[number], &point[range[1]]) > 0)
+        range[1] = number;
+    ++*count;
+    return true;
+}
+
+/* Adds the part of the edge from p to q in the face. */
+static bool clip_edge(ebpo_face_cutter *c, const ebpo_exact_point *p, const ebpo_exact_point *q)
+{
+    int of_p[3], of_q[3], count = 0;
+    bool fine = true, p_in = true, q_in = true;
+    uint32_t range[2] = { 0, 0 };
+    for (int i = 0; i < 3; i++) {
+        const ebpo_exact_point *a = &c->corner[0][i], *b = &c->corner[0][next_index(i)];
+        of_p[i] = ebpo_exact_turn(c->axis, a, b, p) * c->orientation;
+        of_q[i] = ebpo_exact_turn(c->axis, a, b, q) * c->orientation;
+        p_in = p_in && of_p[i] >= 0;
+        q_in = q_in && of_q[i] >= 0;
+        if (of_p[i] < 0 && of_q[i] < 0)
+            return true;
+    }
+    if (p_in)
+        fine = note_edge_point(c, p, range, &count);
+    if (q_in)
+        fine = fine && note_edge_point(c, q, range, &count);
+    for (int i = 0; i < 3 && fine; i++) {
+        const ebpo_exact_point *a = &c->corner[0][i], *b = &c->corner[0][next_index(i)];
+        int of_a = ebpo_exact_turn(c->axis, p, q, a), of_b = ebpo_exact_turn(c->axis, p, q, b);
+        bool before = ebpo_exact_order(p, a) < 0, after = ebpo_exact_order(a, q) < 0;
+        if (of_a == 0 && before == after)
+            fine = note_edge_point(c, a, range, &count);
+        if (of_a * of_b < 0 && of_p[i] * of_q[i] < 0) {
+            ebpo_exact_plane_along(&c->arrangement.line, c->axis, a, b);
+            ebpo_exact_meet(&c->end[0][0], &c->arrangement.line, p, q, c->unit);
+            fine = fine && note_edge_point(c, &c->end[0][0], range, &count);
+        }
+    }
+    return fine && (count == 0 || ebpo_arrangement_2d_add(&c->arrangement, range[0], range[1]));
+}
+
+static bool cut_in_plane(ebpo_face_cutter *c, uint32_t other)
+{
+    if (!ebpo_grow(&c->coplanar, &c->coplanar_capacity, c->coplanar_count + 1, sizeof *c->coplanar))
+        return false;
+    c->coplanar[c->coplanar_count++] = other;
+    for (int i = 0; i < 3; i++)
+        if (!clip_edge(c, &c->corner[1][i], &c->corner[1][next_index(i)]))
+            return false;
+    return true;
+}
+
+/* --- all partners --- */
+
+static bool cut_by_face(ebpo_face_cutter *c, uint32_t other)
+{
+    int side[3], other_side[3];
+    const double *p[3], *q[3];
+    for (int i = 0; i < 3; i++) {
+        p[i] = ebpo_face_list_corner(c->faces, c->face, i);
+        q[i] = ebpo_face_list_corner(c->faces, other, i);
+    }
+    for (int i = 0; i < 3; i++) {
+        side[i] = ebpo_orient3d(q[0], q[1], q[2], p[i]);
+        other_side[i] = ebpo_orient3d(p[0], p[1], p[2], q[i]);
+    }
+    set_corners(c, 1, other);
+    if (side[0] == 0 && side[1] == 0 && side[2] == 0)
+        return cut_in_plane(c, other);
+    return cut_through(c, side, other_side);
+}
+
+/* Chooses the axis along which the face appears largest. */
+static void choose_axis(ebpo_face_cutter *c)
+{
+    const double *p[3];
+    double edge[2][3], normal[3], most = -1;
+    for (int i = 0; i < 3; i++)
+        p[i] = ebpo_face_list_corner(c->faces, c->face, i);
+    ebpo_vec3_subtract(p[1], p[0], edge[0]);
+    ebpo_vec3_subtract(p[2], p[0], edge[1]);
+    ebpo_vec3_cross(edge[0], edge[1], normal);
+    for (int k = 0; k < 3; k++) {
+        int sign = ebpo_normal_sign(k, p[0], p[1], p[2]);
+        if (sign == 0 || fabs(normal[k]) <= most)
+            continue;
+        most = fabs(normal[k]);
+        c->axis = k;
+        c->orientation = sign;
+    }
+}
+
+static bool begin_face(ebpo_face_cutter *c, uint32_t face)
+{
+    uint32_t number[3];
+    c->face = face;
+    c->coplanar_count = c->covers = 0;
+    choose_axis(c);
+    ebpo_arrangement_2d_begin(&c->arrangement, c->axis, c->unit);
+    set_corners(c, 0, face);
+    ebpo_exact_plane_through(&c->plane[0], c->corner[0]);
+    for (int i = 0; i < 3; i++)
+        if (!add_point(c, &c->corner[0][i], &number[i]))
+            return false;
+    for (int i = 0; i < 3; i++)
+        if (!ebpo_arrangement_2d_add(&c->arrangement, number[i], number[next_index(i)]))
+            return false;
+    return true;
+}
+
+static bool triangulate_face(ebpo_face_cutter *c)
+{
+    ebpo_arrangement_2d *a = &c->arrangement;
+    if (!ebpo_arrangement_2d_divide(a) ||
+        !ebpo_triangulate_points(&c->triangulation, c->axis, a->set.point, (uint32_t)a->set.count))
+        return false;
+    for (uint64_t i = 0; i < a->edges; i++)
+        if (!ebpo_triangulation_insert(&c->triangulation, a->edge[i].from, a->edge[i].to))
+            return false;
+    return ebpo_grow(&c->kept, &c->kept_capacity, c->triangulation.count, sizeof *c->kept);
+}
+
+/* --- covers --- */
+
+/* Marks the points in another face of the plane. Returns true if it has the opposite normal. */
+static bool mark_within(ebpo_face_cutter *c, uint32_t other)
+{
+    const ebpo_point_set *set = &c->arrangement.set;
+    int u = c->axis == 2 ? 0 : c->axis + 1, v = c->axis == 0 ? 2 : c->axis - 1;
+    set_corners(c, 1, other);
+    const ebpo_exact_point *q = c->corner[1];
+    int orientation = ebpo_exact_turn(c->axis, &q[0], &q[1], &q[2]);
+    double low[2] = { ebpo_min3(q[0].at[u], q[1].at[u], q[2].at[u]),
+                      ebpo_min3(q[0].at[v], q[1].at[v], q[2].at[v]) };
+    double high[2] = { ebpo_max3(q[0].at[u], q[1].at[u], q[2].at[u]),
+                       ebpo_max3(q[0].at[v], q[1].at[v], q[2].at[v]) };
+    for (uint64_t i = 0; i < set->count; i++) {
+        const ebpo_exact_point *p = &set->point[i];
+        c->within[i] =
+            p->at[u] >= low[0] && p->at[u] <= high[0] && p->at[v] >= low[1] && p->at[v] <= high[1];
+        for (int k = 0; k < 3 && c->within[i]; k++)
+            c->within[i] = ebpo_exact_turn(c->axis, &q[k], &q[next_index(k)], p) * orientation >= 0;
+    }
+    return orientation != c->orientation;
+}
+
+/* A triangle does not cross edges of the other face, so it is in that face if its corners are. */
+static bool note_covers(ebpo_face_cutter *c, uint32_t other)
+{
+    if (!ebpo_grow(&c->within, &c->within_capacity, c->arrangement.set.count, sizeof *c->within))
+        return false;
+    bool opposite = mark_within(c, other);
+    for (uint32_t i = 0; i < c->triangulation.count; i++) {
+        const uint32_t *corner = c->triangulation.triangle[i].corner;
+        if (!c->within[corner[0]] || !c->within[corner[1]] || !c->within[corner[2]])
+            continue;
+        if (other < c->face)
+            c->kept[i] = 0;
+        if (!ebpo_grow(&c->cover, &c->cover_capacity, c->covers + 1, sizeof *c->cover))
+            return false;
+        c->cover[c->covers++] = (ebpo_cover){ i, other, opposite };
+    }
+    return true;
+}
+
+static int order_covers(const void *a, const void *b)
+{
+    const ebpo_cover *x = a, *y = b;
+    if (x->triangle != y->triangle)
+        return x->triangle < y->triangle ? -1 : 1;
+    return (x->face > y->face) - (x->face < y->face);
+}
+
+static bool find_covers(ebpo_face_cutter *c)
+{
+    uint32_t count = 0, covers = 0;
+    for (uint64_t i = 0; i < c->triangulation.count; i++)
+        c->kept[i] = 1;
+    for (uint64_t i = 0; i < c->coplanar_count; i++)
+        if (!note_covers(c, c->coplanar[i]))
+            return false;
+    for (uint64_t i = 0; i < c->triangulation.count; i++)
+        if (c->kept[i])
+            c->kept[i] = ++count;
+    for (uint64_t i = 0; i < c->covers; i++)
+        if (c->kept[c->cover[i].triangle]) {
+            c->cover[covers] = c->cover[i];
+            c->cover[covers++].triangle = c->kept[c->cover[i].triangle] - 1;
+        }
+    c->covers = covers;
+    if (covers)
+        qsort(c->cover, covers, sizeof *c->cover, order_covers);
+    return true;
+}
+
+static bool copy_pieces(ebpo_face_cutter *c, ebpo_face_pieces *out)
+{
+    ebpo_point_set *set = &c->arrangement.set;
+    out->point = ebpo_alloc(set->count, sizeof *out->point);
+    out->triangle = ebpo_alloc(c->triangulation.count, sizeof *out->triangle);
+    out->cover = ebpo_alloc(c->covers, sizeof *out->cover);
+    if (!out->point || !out->triangle || !out->cover)
+        return false;
+    for (uint64_t i = 0; i < set->count; i++) { /* the pieces take over the points */
+        ebpo_exact_point_init(&out->point[i]);
+        ebpo_exact_point_swap(&out->point[i], &set->point[i]);
+    }
+    out->points = (uint32_t)set->count;
+    for (uint64_t i = 0; i < c->triangulation.count; i++) {
+        const uint32_t *from = c->triangulation.triangle[i].corner;
+        uint32_t *to = out->triangle[out->triangles];
+        if (!c->kept[i])
+            continue;
+        memcpy(to, from, 3 * sizeof *to);
+        if (c->orientation < 0) {
+            to[1] = from[2];
+            to[2] = from[1];
+        }
+        out->triangles++;
+    }
+    if (c->covers)
+        memcpy(out->cover, c->cover, c->covers * sizeof *out->cover);
+    out->covers = (uint32_t)c->covers;
+    return true;
+}
+
+bool ebpo_face_cut(ebpo_face_cutter *cutter, uint32_t face, ebpo_face_pieces *out)
+{
+    const ebpo_face_list *faces = cutter->faces;
+    *out = (ebpo_face_pieces){ 0 };
+    bool fine = begin_face(cutter, face);
+    for (uint64_t i = faces->begin[face]; i < faces->begin[face + 1] && fine; i++)
+        fine = cut_by_face(cutter, faces->partner[i]);
+    fine = fine && triangulate_face(cutter) && find_covers(cutter) && copy_pieces(cutter, out);
+    if (!fine)
+        ebpo_face_pieces_free(out);
+    return fine;
+}

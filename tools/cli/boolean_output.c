@@ -1,0 +1,81 @@
+#include "cli/boolean_output.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+
+#include "cli/words.h"
+
+static ebpo_status convert_mesh(const boolean_output *o, ebpo_mesh *mesh, ebpo_progress progress,
+                                ebpo_error *error)
+{
+    ebpo_prepared prepared = EBPO_PREPARED_INIT;
+    ebpo_prepare_options preparing = EBPO_PREPARE_OPTIONS_INIT;
+    ebpo_build_options building = EBPO_BUILD_OPTIONS_INIT;
+    ebpo_write_options writing = EBPO_WRITE_OPTIONS_INIT;
+    ebpo_tree tree;
+    preparing.threads = building.threads = writing.threads = o->threads;
+    preparing.progress = building.progress = writing.progress = progress;
+    building.require_solid = true;
+    building.unit = o->unit;
+    ebpo_status status = ebpo_mesh_prepare(mesh, &preparing, &prepared, error);
+    if (status == EBPO_OK)
+        status = ebpo_build(mesh, &prepared.report, NULL, &building, &tree, error);
+    if (status != EBPO_OK)
+        return status;
+    status = ebpo_tree_write(&tree, o->path, &writing, error);
+    ebpo_tree_free(&tree);
+    return status;
+}
+
+ebpo_status boolean_write_mesh(const boolean_output *o, ebpo_mesh *mesh, ebpo_progress progress,
+                               ebpo_error *error)
+{
+    return words_end_with(o->path, ".ply") ? ebpo_mesh_write_ply(mesh, o->path, error)
+                                           : convert_mesh(o, mesh, progress, error);
+}
+
+ebpo_status boolean_write_result(boolean_output *o, ebpo_boolean *b, ebpo_progress progress,
+                                 ebpo_error *error)
+{
+    ebpo_mesh mesh;
+    ebpo_boolean_mesh_options how = EBPO_BOOLEAN_MESH_OPTIONS_INIT;
+    how.progress = progress;
+    how.doubles = o->doubles;
+    how.origins = true;
+    o->report = (ebpo_boolean_mesh_report)EBPO_BOOLEAN_MESH_REPORT_INIT;
+    ebpo_status status = ebpo_boolean_mesh(b, &how, &mesh, &o->report, error);
+    if (status != EBPO_OK)
+        return status;
+    o->vertices = mesh.vertex_count;
+    o->faces = mesh.face_count;
+    if (mesh.face_count == 0 && !words_end_with(o->path, ".ply")) {
+        error->status = status = EBPO_E_ABSENT;
+        snprintf(error->message, sizeof error->message,
+                 "%s: the result is empty, and only a .ply file can be", o->path);
+    } else {
+        status = boolean_write_mesh(o, &mesh, progress, error);
+    }
+    ebpo_mesh_free(&mesh);
+    return status;
+}
+
+void boolean_print_result(const boolean_output *o)
+{
+    char faces[40], cut[40], fresh[40], real[32];
+    words_plural(faces, sizeof faces, o->faces, "face", "faces");
+    words_plural(cut, sizeof cut, o->report.faces_cut, "face", "faces");
+    words_plural(fresh, sizeof fresh, o->report.new_vertices, "new vertex", "new vertices");
+    printf("%s: %s, closed; %s cut, %s, displaced at most %s\n", o->path, faces, cut, fresh,
+           words_real(o->report.displacement, real));
+}
+
+void boolean_result_to_json(const boolean_output *o, json *j)
+{
+    json_text(j, "output", o->path);
+    json_uint(j, "vertices", o->vertices);
+    json_uint(j, "faces", o->faces);
+    json_uint(j, "faces_cut", o->report.faces_cut);
+    json_uint(j, "new_vertices", o->report.new_vertices);
+    json_uint(j, "patches", o->report.patches);
+    json_real(j, "displacement", o->report.displacement);
+}
