@@ -175,7 +175,8 @@ def leaf_refs(level, first):
 def arrays(file):
     """README.md, sections 6 and 9: {path: dataset}, of those that the head calls for; what else stands there is ignored."""
     listed_parts = parts_of(file)
-    mesh, planes, leaf_planes, colours = (part in listed_parts for part in ("mesh", "planes", "leaf-planes", "colours"))
+    mesh, planes, leaf_planes, colours, border = (part in listed_parts for part in
+                                                  ("mesh", "planes", "leaf-planes", "colours", "border"))
     out, groups, attrs = {}, 1, file.attrs
     for number in range(one(attrs["level_count"])):
         path = f"/levels/{number:02d}"
@@ -183,7 +184,8 @@ def arrays(file):
         s = {name: one(value) for name, value in level.attrs.items()}
         solid = text(attrs["kind"]) == "solid"
         rows = {"types": groups, "plane_counts": planes * s["gray"], "planes": planes * s["planes"],
-                "leaf_winding": solid * s["leaf"], "black_winding": solid * s["black"], "white_winding": solid * s["white"],
+                "leaf_winding": (solid or border) * s["leaf"], "black_winding": solid * s["black"],
+                "white_winding": (solid or border) * s["white"],
                 "leaf_skip": mesh * s["leaf"], "leaf_new": mesh * s["leaf"], "leaf_ref_count": mesh * s["leaf"],
                 "leaf_refs": mesh * s["faces_referenced"], "types_index": groups > 4096, "gray_index": planes and s["gray"] > 4096,
                 "leaf_index": (mesh or leaf_planes) and s["leaf"] > 4096,
@@ -195,6 +197,7 @@ def arrays(file):
     several = one(attrs["face_count"]) > (2048 if "subtrees" in listed_parts else 4096)
     names = ["/mesh/vertices", "/mesh/faces"] + ["/mesh/faces_index"] * several if mesh else []
     names += ["/maps/vertex_source", "/maps/face_source"] if "maps" in listed_parts else []
+    names += ["/border/loops", "/border/points"] if border and one(attrs["border_loops"]) else []
     if "subtrees" in listed_parts:
         names += ["/subtrees/index", "/subtrees/counts", "/subtrees/chunk_directory"]
         names += ["/subtrees/shared_chunks"] * ("shared_chunks" in file["/subtrees"])
@@ -209,7 +212,8 @@ def level_arrays(file, number):
 
 
 CODINGS = {"leaf_skip": ("skips", "delta"), "leaf_refs": ("gap",), "mesh/vertices": ("delta",), "mesh/faces": ("high-water",),
-           "maps/vertex_source": ("delta",), "maps/face_source": ("delta",)}
+           "maps/vertex_source": ("delta",), "maps/face_source": ("delta",),
+           "border/points": ("delta",)}
 
 
 def check_codings(file):
@@ -234,7 +238,7 @@ def as_without_subtrees(name, dataset):
     values = high_water(dataset) if name == "/mesh/faces" else dataset[...]
     if name == "/mesh/faces_index":
         return values[::2] if len(values) > 2 else None
-    if name == "/mesh/vertices" or name.startswith("/maps/"):
+    if name in ("/mesh/vertices", "/border/points") or name.startswith("/maps/"):
         code, full = values.dtype, full_rows(dataset)
         plain = delta(dataset)
         for row in range(dataset.chunks[0], len(values), dataset.chunks[0]):
@@ -244,11 +248,17 @@ def as_without_subtrees(name, dataset):
     return values
 
 
-def content_sha256(file, of_colours=False):
-    """checksums.md, section 1. `of_colours`: colours_sha256."""
+def checksum_of(file, path):
+    """The attribute that counts an array."""
+    border = path.startswith("/border/") or (text(file.attrs["kind"]) == "surface" and path.endswith("_winding"))
+    return "border_sha256" if border else "colours_sha256" if path.endswith("/gray_colours") else "content_sha256"
+
+
+def content_sha256(file, attribute="content_sha256"):
+    """checksums.md, section 1; colours.md; border.md."""
     total, subtrees = hashlib.sha256(), "subtrees" in parts_of(file)
     for name, dataset in sorted(arrays(file).items()):
-        if name.startswith("/subtrees/") or name.endswith("/gray_colours") != of_colours:
+        if name.startswith("/subtrees/") or checksum_of(file, name) != attribute:
             continue
         plain = high_water if name == "/mesh/faces" else np.asarray
         values = as_without_subtrees(name, dataset) if subtrees else plain(dataset)
@@ -327,7 +337,8 @@ LEVEL_NAMES = ["types", "plane_counts", "planes", "leaf_winding", "black_winding
                "leaf_skip", "leaf_new", "leaf_ref_count", "leaf_refs", "types_index", "gray_index",
                "leaf_index", "leaf_plane_counts", "leaf_planes", "gray_colours"]
 ROOT_PATHS = {4096: "/mesh/vertices", 4097: "/mesh/faces", 4098: "/mesh/faces_index",
-              4099: "/maps/vertex_source", 4100: "/maps/face_source", 4112: "/subtrees/index",
+              4099: "/maps/vertex_source", 4100: "/maps/face_source", 4101: "/border/loops", 4102: "/border/points",
+              4112: "/subtrees/index",
               4113: "/subtrees/counts", 4114: "/subtrees/shared_chunks"}
 
 
@@ -596,6 +607,36 @@ def read_level(file, number, parts):
     return out
 
 
+def check_border(file):
+    """border.md: the loops, and in a whole file that they are the border."""
+    attrs, parts = file.attrs, parts_of(file)
+    assert "mesh" in parts and text(attrs["kind"]) == "surface", "a border without mesh, or of a solid"
+    loops, count = one(attrs["border_loops"]), one(attrs["border_points"])
+    assert 3 * loops <= count < 1 << 31, "counts of the border"
+    rows = file["/border/loops"][...].astype("i8") if loops else np.zeros((0, 2), "i8")
+    points = vertices(file["/border/points"]).astype("f8") + 0.0 if loops else np.zeros((0, 3))
+    assert (rows[:, 0] >= 3).all() and (rows[:, 1] >= 1).all(), "a loop"
+    assert rows[:, 0].sum() == count and rows[:, 0].max(initial=0) == one(attrs["border_longest"]), "loops and counts"
+    assert np.isfinite(points).all(), "a coordinate"
+    if "pruned" in parts:
+        return
+    chain = {}
+
+    def add(a, b, weight):
+        chain[a, b] = chain.get((a, b), 0) + weight
+        chain[b, a] = chain.get((b, a), 0) - weight
+
+    corners = vertices(file["/mesh/vertices"]).astype("f8")[faces(file["/mesh/faces"])].reshape(-1, 3, 3) + 0.0
+    for face in corners.tolist():
+        for k in range(3):
+            add(tuple(face[k]), tuple(face[(k + 1) % 3]), 1)
+    for (n, weight), end in zip(rows.tolist(), np.cumsum(rows[:, 0]).tolist()):
+        loop = [tuple(p) for p in points[end - n:end].tolist()]
+        for a, b in zip(loop, loop[1:] + loop[:1]):
+            add(a, b, -weight)
+    assert not any(chain.values()), "the loops are not the border"
+
+
 def check_pruned(file, subset):
     """Subsets: an empty group for each pruned node, and on the last level all gray nodes pruned."""
     count = one(file.attrs["level_count"])
@@ -736,12 +777,14 @@ def read(path):
         check_weld(file)
         check_frames(file)
         assert content_sha256(file) == text(file.attrs["content_sha256"]), "content_sha256 differs"
-        if "colours" in parts:
-            assert content_sha256(file, of_colours=True) == text(file.attrs["colours_sha256"]), "colours_sha256 differs"
+        for part in {"colours", "border"} & parts:
+            assert content_sha256(file, f"{part}_sha256") == text(file.attrs[f"{part}_sha256"]), f"{part}_sha256 differs"
         check_pruned(file, "pruned" in parts)
         check_codings(file)
         check_sums(file)
         check_colours(file)
+        if "border" in parts:
+            check_border(file)
         if "subtrees" in parts:
             check_subtrees(file)
         out = {name: text(file.attrs[name]) for name in ("kind", "winding_rule", "coordinate_type")}

@@ -154,7 +154,7 @@ static void fill_info(ebpo_info *info, const ebpo_builder *b, const ebpo_mesh *m
     if (repair_record)
         info->repair_record = *repair_record;
     info->report = *report;
-    info->parts = o->parts;
+    info->parts = o->parts & ~(uint32_t)EBPO_PART_BORDER; /* added by ebpo_build_border */
     if (!ebpo_attributes_hold(mesh->attributes) || !(o->parts & EBPO_PART_MESH))
         info->parts &= ~(uint32_t)EBPO_PART_ATTRIBUTES;
     if (!ebpo_attributes_coloured(mesh->attributes) || !(o->parts & EBPO_PART_MESH))
@@ -298,7 +298,10 @@ static ebpo_status run_stages(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, 
         out->info.parts &= ~(uint32_t)EBPO_PART_COLOURS;
     if (status == EBPO_OK && out->info.parts & EBPO_PART_COLOURS)
         status = ebpo_build_gray_colours(b, out, error);
-    return status;
+    bool border = !b->solid && b->options->parts & EBPO_PART_BORDER;
+    if (status == EBPO_OK && border && !ebpo_progress_stage(&b->options->progress, "border", error))
+        status = EBPO_E_CANCELLED;
+    return status == EBPO_OK && border ? ebpo_build_border(out, b->threads, error) : status;
 }
 
 static ebpo_status build_mesh(ebpo_mesh *mesh, const ebpo_mesh_report *report,
@@ -320,7 +323,9 @@ static ebpo_status build_mesh(ebpo_mesh *mesh, const ebpo_mesh_report *report,
     ebpo_status status = EBPO_TAKE(ebpo_build_options, &wanted, options, error);
     /* a build makes only these parts */
     wanted.parts &= EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES |
-                    EBPO_PART_ATTRIBUTES | EBPO_PART_COLOURS;
+                    EBPO_PART_ATTRIBUTES | EBPO_PART_COLOURS | EBPO_PART_BORDER;
+    if (!(wanted.parts & EBPO_PART_MESH))
+        wanted.parts &= ~(uint32_t)EBPO_PART_BORDER;
     if (status == EBPO_OK && wanted.times)
         status = EBPO_CHECK_SIZED(ebpo_build_times, wanted.times, error);
     if (status == EBPO_OK) {

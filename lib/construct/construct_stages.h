@@ -59,6 +59,12 @@ ebpo_status ebpo_build_mesh(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, eb
 EBPO_MUST_USE ebpo_status ebpo_build_gray_colours(const ebpo_builder *b, ebpo_tree *out,
                                                   ebpo_error *error);
 
+/* --- border_windings.c (format-spec/border.md) --- */
+
+/* Adds the part EBPO_PART_BORDER to a surface with levels and mesh. Returns EBPO_E_MEMORY,
+ * EBPO_E_IO, EBPO_E_LIMIT. */
+EBPO_MUST_USE ebpo_status ebpo_build_border(ebpo_tree *tree, unsigned threads, ebpo_error *error);
+
 /* --- corner_windings.c --- */
 
 /* Computes the winding numbers of all pieces, before the pieces are partitioned. */

@@ -20,6 +20,7 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "derive/subset_parts.h"
+#include "format/border_loops.h"
 #include "format/file_nodes.h"
 #include "format/reader.h"
 #include "format/subtree_index.h"
@@ -104,7 +105,7 @@ ebpo_status ebpo_subset_count_reads(const ebpo_file *file, const ebpo_subset_opt
                    .box = ebpo_root_box(info),
                    .expected = EBPO_HINTS_INIT(file),
                    .needs = (info->parts & options->parts) | EBPO_NEEDS_ALWAYS |
-                            (info->solid ? EBPO_NEEDS_SOLID : 0),
+                            (info->solid ? (uint32_t)EBPO_NEEDS_SOLID : 0),
                    .last_level = options->last_level,
                    .out = out,
                    .error = error };
@@ -134,11 +135,11 @@ uint32_t ebpo_profile_parts(ebpo_profile profile)
 {
     switch (profile) {
     case EBPO_PROFILE_LOD: return EBPO_PART_PLANES | EBPO_PART_LEAF_PLANES | EBPO_PART_COLOURS;
-    case EBPO_PROFILE_COLLISION: return EBPO_PART_PLANES | EBPO_PART_MESH;
+    case EBPO_PROFILE_COLLISION: return EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_BORDER;
     case EBPO_PROFILE_FULL: break;
     }
     return EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES |
-           EBPO_PART_ATTRIBUTES | EBPO_PART_COLOURS;
+           EBPO_PART_ATTRIBUTES | EBPO_PART_COLOURS | EBPO_PART_BORDER;
 }
 
 /* Checks that the box intersects the root cell and the box of an earlier subset, outside which the
@@ -199,7 +200,7 @@ static ebpo_status resolve_options(ebpo_cutting *c)
     c->last_level = o->last_level < 0 || o->last_level > deepest ? deepest : o->last_level;
     c->parts = c->from->parts & o->parts;
     if (!(c->parts & EBPO_PART_MESH))
-        c->parts &= ~(uint32_t)(EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES);
+        c->parts &= ~(uint32_t)(EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES | EBPO_PART_BORDER);
     c->box = ebpo_root_box(c->from);
     *info = *c->from;
     if (!c->from->pruned)
@@ -260,6 +261,8 @@ static ebpo_status subset_tree_within(ebpo_tree *out, const ebpo_file *file,
         status = ebpo_cut_levels(&c);
     if (status == EBPO_OK && c.parts & EBPO_PART_MESH)
         status = ebpo_cut_faces(&c);
+    if (status == EBPO_OK && c.parts & EBPO_PART_BORDER)
+        status = ebpo_border_read(file, &out->border, error);
     ebpo_chunks_free(c.chunks);
     if (status != EBPO_OK) {
         ebpo_tree_free(out);

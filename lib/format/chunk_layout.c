@@ -538,7 +538,9 @@ static bool is_chosen(const choice *c, const ebpo_array_out *a)
     switch (c->kind) {
     case WHOLE: return in_range;
     case TOP_INDEXES:
-        return (in_range && index) || a->id == EBPO_A_SUBTREE_INDEX || a->id == EBPO_A_FACES_INDEX;
+        return (in_range && index) || a->id == EBPO_A_SUBTREE_INDEX ||
+               a->id == EBPO_A_FACES_INDEX || a->id == EBPO_A_BORDER_LOOPS ||
+               a->id == EBPO_A_BORDER_POINTS;
     case NODES: return in_range && !index && !is_of_faces(a->id);
     case LISTS: return in_range && is_of_faces(a->id);
     /* query results contain source face indices, which are read together with the faces */

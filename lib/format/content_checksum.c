@@ -84,7 +84,8 @@ void ebpo_array_digest_add(ebpo_array_digest *digest, const ebpo_info *info, ebp
     size_t row_bytes = ebpo_shape_row_bytes(shape);
     uint32_t full = ebpo_full_chunk_rows(shape->rows, shape->cols, shape->element_size);
     uint8_t joined[3 * sizeof(uint64_t)];
-    bool deltas = id == EBPO_A_VERTICES || id == EBPO_A_VERTEX_SOURCE || id == EBPO_A_FACE_SOURCE;
+    bool deltas = id == EBPO_A_VERTICES || id == EBPO_A_BORDER_POINTS ||
+                  id == EBPO_A_VERTEX_SOURCE || id == EBPO_A_FACE_SOURCE;
     if (info->subtree_level && id == EBPO_A_FACES_INDEX) {
         add_faces_index(digest, row, rows, row_bytes, bytes);
     } else if (info->subtree_level && deltas) {

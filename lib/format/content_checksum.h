@@ -21,12 +21,16 @@ typedef struct ebpo_content_entry {
  * checksum does not depend on the layout. */
 bool ebpo_content_has(const ebpo_info *info, ebpo_array_id id);
 
-/* The two checksums. Colours have a separate one, so the content checksum is the same with and
- * without colours. */
-enum { EBPO_DIGEST_CONTENT, EBPO_DIGEST_COLOURS, EBPO_DIGESTS };
-static inline int ebpo_content_of(ebpo_array_id id)
+/* The three checksums. Colours and the border of a surface, with its winding numbers, have separate
+ * ones, so the content checksum is the same with and without these parts. */
+enum { EBPO_DIGEST_CONTENT, EBPO_DIGEST_COLOURS, EBPO_DIGEST_BORDER, EBPO_DIGESTS };
+static inline int ebpo_content_of(ebpo_array_id id, bool solid)
 {
-    return id == EBPO_A_GRAY_COLOURS ? EBPO_DIGEST_COLOURS : EBPO_DIGEST_CONTENT;
+    bool border = id == EBPO_A_BORDER_LOOPS || id == EBPO_A_BORDER_POINTS ||
+                  (!solid && (id == EBPO_A_LEAF_WINDING || id == EBPO_A_WHITE_WINDING));
+    return border                      ? EBPO_DIGEST_BORDER
+           : id == EBPO_A_GRAY_COLOURS ? EBPO_DIGEST_COLOURS
+                                       : EBPO_DIGEST_CONTENT;
 }
 
 /* Digest of one array, computed chunk by chunk. In a file with subtrees, chunks have fewer rows

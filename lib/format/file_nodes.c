@@ -136,7 +136,7 @@ ebpo_status ebpo_chunks_winding(ebpo_chunks *chunks, const ebpo_node *node, int3
     ebpo_status status = ebpo_chunks_check_node(chunks, node, error);
     if (status != EBPO_OK)
         return status;
-    if (!info->solid)
+    if (!info->solid && !(info->parts & EBPO_PART_BORDER))
         return ebpo_fail_file(error, EBPO_E_NOT_SOLID, chunks->file->in.shown,
                               "the model is a surface and has no winding numbers; repair the "
                               "mesh and build again");
@@ -148,7 +148,7 @@ ebpo_status ebpo_chunks_winding(ebpo_chunks *chunks, const ebpo_node *node, int3
         return EBPO_OK; /* the default value; leaves always have the array */
     status = ebpo_chunks_integers(chunks, id, node->cell.level, node->rank, 1, winding,
                                   sizeof *winding, error);
-    if (status == EBPO_OK && node->type != EBPO_LEAF &&
+    if (status == EBPO_OK && info->solid && node->type != EBPO_LEAF &&
         ebpo_rule_inside(info->rule, *winding) != (node->type == EBPO_BLACK))
         status = ebpo_chunks_fail(chunks, node->cell.level, id,
                                   "a node's winding number contradicts its type", error);

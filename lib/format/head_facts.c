@@ -146,6 +146,7 @@ static const part_word part_words[] = {
     { "leaf-planes", EBPO_PART_LEAF_PLANES, false },
     { "attributes", EBPO_PART_ATTRIBUTES, false },
     { "colours", EBPO_PART_COLOURS, false },
+    { "border", EBPO_PART_BORDER, false },
     { "subtrees", WORD_SUBTREES, true },
     { "gates", WORD_GATES, true },
     { "pruned", WORD_PRUNED, true },
@@ -177,6 +178,16 @@ static const fact weld_facts[WELD_FACTS] = {
 static const fact subtree_level_fact = { "subtree_level", FACT_NUMBER, FACT_AT(subtree_level) },
                   colours_fact = { "colours_sha256", FACT_DIGEST, FACT_AT(colours_sha256) },
                   top_bytes_fact = { "top_bytes", FACT_HINT, FACT_AT(top_bytes) };
+
+/* Attributes of surfaces with their border; the last one is the checksum. */
+static const fact border_facts[] = {
+    { "border_loops", FACT_COUNT, FACT_AT(border_loops) },
+    { "border_points", FACT_COUNT, FACT_AT(border_points) },
+    { "border_longest", FACT_COUNT, FACT_AT(border_longest) },
+    { "border_area", FACT_REAL, FACT_AT(border_area) },
+    { "border_sha256", FACT_DIGEST, FACT_AT(border_sha256) },
+};
+static const int border_fact_count = sizeof border_facts / sizeof border_facts[0];
 
 /* --- names and settings of selections of planes; construct/selections.c has the functions --- */
 
@@ -221,6 +232,20 @@ static const char *check_mesh_counts(const ebpo_info *info)
         return "there are attributes but no mesh";
     if (info->gates && !(info->parts & EBPO_PART_MESH))
         return "there is a coding of faces but no mesh";
+    return NULL;
+}
+
+static const char *check_border(const ebpo_info *info)
+{
+    if (!(info->parts & EBPO_PART_BORDER))
+        return NULL;
+    if (info->solid || !(info->parts & EBPO_PART_MESH))
+        return "there is a border, but the model is a solid or has no mesh";
+    if (info->border_points > INT32_MAX || info->border_loops > info->border_points / 3 ||
+        info->border_longest > info->border_points)
+        return "the counts of the border are impossible";
+    if (!(info->border_area >= 0 && isfinite(info->border_area)))
+        return "border_area is negative or not a number";
     return NULL;
 }
 
@@ -295,6 +320,8 @@ ebpo_status ebpo_facts_check(const ebpo_info *info, const char *shown, ebpo_stat
         wrong = check_weld(&info->repair_record);
     if (!wrong)
         wrong = check_box(info);
+    if (!wrong)
+        wrong = check_border(info);
     uint64_t faces = 0;
     int level = -1;
     while (!wrong && ++level < info->level_count) {
@@ -442,6 +469,9 @@ ebpo_status ebpo_facts_put(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *i
         status = put_fact(out, root, &weld_facts[i], info, error);
     if (status == EBPO_OK && info->parts & EBPO_PART_COLOURS)
         status = put_fact(out, root, &colours_fact, info, error);
+    for (int i = 0; i < border_fact_count && status == EBPO_OK && info->parts & EBPO_PART_BORDER;
+         i++)
+        status = put_fact(out, root, &border_facts[i], info, error);
     if (status == EBPO_OK && info->subtree_level)
         status = put_subtrees(out, root, info, error);
     if (status == EBPO_OK && info->pruned)
@@ -459,6 +489,12 @@ ebpo_status ebpo_facts_put_colours_digest(ebpo_h5_out *out, ebpo_h5_id root,
                                           const uint8_t digest[32], ebpo_error *error)
 {
     return put_digest(out, root, colours_fact.name, digest, error);
+}
+
+ebpo_status ebpo_facts_put_border_digest(ebpo_h5_out *out, ebpo_h5_id root,
+                                         const uint8_t digest[32], ebpo_error *error)
+{
+    return put_digest(out, root, border_facts[border_fact_count - 1].name, digest, error);
 }
 
 ebpo_status ebpo_facts_put_index(ebpo_h5_out *out, ebpo_h5_id root, uint64_t offset, uint64_t bytes,
@@ -812,6 +848,9 @@ ebpo_status ebpo_facts_get(ebpo_head *in, ebpo_head_object root, ebpo_info *info
         status = get_weld(in, root, info, error);
     if (status == EBPO_OK && info->parts & EBPO_PART_COLOURS)
         status = get_fact(in, root, "/", &colours_fact, info, error);
+    for (int i = 0; i < border_fact_count && status == EBPO_OK && info->parts & EBPO_PART_BORDER;
+         i++)
+        status = get_fact(in, root, "/", &border_facts[i], info, error);
     if (status == EBPO_OK && info->subtree_level)
         status = get_subtrees(in, root, info, error);
     return status == EBPO_OK && info->pruned ? get_subset(in, root, info, error) : status;

@@ -106,7 +106,8 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, ebpo_array_id id
                             "the array's chunks do not have the size that the format "
                             "requires, " EBPO_HEAD_FOREIGN);
     bool wide = file->info.double_coordinates;
-    if (id == EBPO_A_VERTICES && a->shape.element_size != (wide ? 8 : 4))
+    if ((id == EBPO_A_VERTICES || id == EBPO_A_BORDER_POINTS) &&
+        a->shape.element_size != (wide ? 8 : 4))
         return ebpo_check_fail(&check, -1, a->path, "the array's type contradicts coordinate_type",
                                error);
     a->present = true;
@@ -223,6 +224,8 @@ static ebpo_status open_arrays(ebpo_file *file, ebpo_head *head, ebpo_error *err
         status = open_group(head, "/mesh", info->parts & EBPO_PART_MESH, error);
     if (status == EBPO_OK)
         status = open_group(head, "/maps", info->parts & EBPO_PART_MAPS, error);
+    if (status == EBPO_OK)
+        status = open_group(head, "/border", info->parts & EBPO_PART_BORDER, error);
     for (int level = 0; level < info->level_count; level++)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS && status == EBPO_OK; id++) {
             const ebpo_array_in *a = &file->level_array[level][id];

@@ -225,7 +225,7 @@ static ebpo_status check_windings(const reading *r, ebpo_array_id id, bool insid
 {
     const int32_t *winding = ebpo_level_array(r->out, id);
     uint64_t count = winding ? ebpo_level_rows(r->out, id) : 0;
-    for (uint64_t i = 0; i < count; i++)
+    for (uint64_t i = 0; i < count && r->chunks->file->info.solid; i++)
         if (ebpo_rule_inside(r->chunks->file->info.rule, winding[i]) != inside)
             return runs_wrong(r, id,
                               inside ? "a black node is outside by the winding rule"

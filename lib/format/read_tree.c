@@ -14,6 +14,7 @@
 #include "core/parallel.h"
 #include "core/checksum.h"
 #include "format/content_checksum.h"
+#include "format/border_loops.h"
 #include "format/read_attributes.h"
 #include "format/reader.h"
 #include "format/write_plan.h"
@@ -224,6 +225,7 @@ void ebpo_tree_free(ebpo_tree *tree)
     ebpo_mesh_free(&tree->mesh);
     ebpo_array_free(tree->workspace, tree->vertex_source);
     ebpo_array_free(tree->workspace, tree->face_source);
+    ebpo_border_loops_free(&tree->border);
     memset(tree, 0, sizeof *tree);
 }
 
@@ -435,6 +437,8 @@ static ebpo_status read_parts(const ebpo_file *file, ebpo_tree *out, const ebpo_
         status = ebpo_file_read_mesh(file, read, &out->mesh, error);
     if (status == EBPO_OK && file->info.parts & EBPO_PART_MAPS)
         status = ebpo_file_read_maps(file, read, &maps, error);
+    if (status == EBPO_OK && file->info.parts & EBPO_PART_BORDER)
+        status = ebpo_border_read(file, &out->border, error);
     out->vertex_source = maps.vertex_source;
     out->face_source = maps.face_source;
     return status;
@@ -648,7 +652,7 @@ static ebpo_status compare_digest(content_job *j, int which, const uint8_t state
     ebpo_content content = { .entries = NULL };
     uint8_t digest[32];
     for (unsigned i = 0; i < j->count; i++)
-        if (ebpo_content_of(j->array[i]->id) == which)
+        if (ebpo_content_of(j->array[i]->id, j->file->info.solid) == which)
             ebpo_content_put(&content, j->array[i]->path, j->digest[i]);
     ebpo_status status = ebpo_content_end(&content, digest, error);
     ebpo_content_free(&content);
@@ -692,5 +696,8 @@ ebpo_status ebpo_file_check_content(const ebpo_file *file, const ebpo_read_optio
     if (status == EBPO_OK && file->info.parts & EBPO_PART_COLOURS)
         status = compare_digest(&j, EBPO_DIGEST_COLOURS, file->info.colours_sha256,
                                 "colours_sha256", error);
+    if (status == EBPO_OK && file->info.parts & EBPO_PART_BORDER)
+        status = compare_digest(&j, EBPO_DIGEST_BORDER, file->info.border_sha256, "border_sha256",
+                                error);
     return status == EBPO_OK ? ebpo_attributes_check(file, &read, error) : status;
 }

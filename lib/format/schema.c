@@ -169,6 +169,8 @@ void ebpo_schema_columns(const ebpo_info *info, ebpo_array_id id, char names[EBP
         [EBPO_A_VERTICES] = "x y z",
         [EBPO_A_FACES] = "first second third",
         [EBPO_A_FACES_INDEX] = "vertices",
+        [EBPO_A_BORDER_LOOPS] = "points weight",
+        [EBPO_A_BORDER_POINTS] = "x y z",
     };
     if (id == EBPO_A_SUBTREE_INDEX || id == EBPO_A_SUBTREE_COUNTS)
         subtree_columns(info, names);
@@ -252,6 +254,8 @@ uint64_t ebpo_schema_rows(const ebpo_info *info, ebpo_array_id id, int level)
     case EBPO_PER_VERTEX: return info->vertex_count;
     case EBPO_PER_FACE: return info->face_count;
     case EBPO_PER_FACE_CHUNK: return face_chunks(info);
+    case EBPO_PER_BORDER_LOOP: return info->border_loops;
+    case EBPO_PER_BORDER_POINT: return info->border_points;
     case EBPO_PER_SUBTREE_CHUNK: return subtree_chunks(info);
     case EBPO_PER_SUBTREE: return subtree_rows(info);
     case EBPO_PER_SHARED_BLOCK:
@@ -463,7 +467,7 @@ static ebpo_status check_windings(const ebpo_check *check, const ebpo_info *info
             if (!ebpo_rule_inside(info->rule, arrays->black_winding[i]))
                 return ebpo_check_fail(check, level, "black_winding",
                                        "a black node is outside by the winding rule", error);
-    if (arrays->white_winding)
+    if (arrays->white_winding && info->solid)
         EBPO_FOR_ITEMS(check->workspace, i, 0, arrays->white_count)
             if (ebpo_rule_inside(info->rule, arrays->white_winding[i]))
                 return ebpo_check_fail(check, level, "white_winding",

@@ -193,7 +193,8 @@ static ebpo_status write_headers(file_headers *h, const char *path, const char *
     ebpo_status status =
         ebpo_h5_create(&h->out, path, shown, head_bytes,
                        3 + (h->list[CHUNK_CHECKSUMS].shape.rows != 0) +
-                           (plan->info.subtree_level != 0) + (plan->attributes != NULL),
+                           (plan->info.subtree_level != 0) + (plan->attributes != NULL) +
+                           (plan->info.parts & EBPO_PART_BORDER ? 1 : 0),
                        error);
     if (status == EBPO_OK)
         status = ebpo_h5_root(&h->out, &h->root, error);
@@ -207,6 +208,9 @@ static ebpo_status write_headers(file_headers *h, const char *path, const char *
     if (status == EBPO_OK)
         status = make_root_group(h, "/maps", EBPO_NEEDS_MAPS,
                                  "numbers of the vertices and faces in the source", error);
+    if (status == EBPO_OK)
+        status = make_root_group(h, "/border", EBPO_NEEDS_BORDER,
+                                 "the border of a surface, as closed loops", error);
     if (status == EBPO_OK)
         status = make_root_group(h, "/subtrees", EBPO_NEEDS_SUBTREES,
                                  "where the rows of each subtree begin in every array", error);
@@ -372,7 +376,8 @@ static void digest_window(writer *w)
         if (left > shape->chunk_rows)
             continue;
         ebpo_array_digest_end(state, digest);
-        ebpo_content_put(&w->content[ebpo_content_of(s->array->id)], s->array->path, digest);
+        ebpo_content_put(&w->content[ebpo_content_of(s->array->id, w->plan.info.solid)],
+                         s->array->path, digest);
     }
 }
 
@@ -577,12 +582,17 @@ static ebpo_status put_digests(writer *w, ebpo_error *error)
     ebpo_status status = ebpo_content_end(&w->content[EBPO_DIGEST_CONTENT], digest, error);
     if (status == EBPO_OK)
         status = ebpo_facts_put_digest(&w->head.out, w->head.root, digest, error);
-    if (status != EBPO_OK || !(w->plan.info.parts & EBPO_PART_COLOURS))
-        return status;
-    status = ebpo_content_end(&w->content[EBPO_DIGEST_COLOURS], digest, error);
-    return status == EBPO_OK
-               ? ebpo_facts_put_colours_digest(&w->head.out, w->head.root, digest, error)
-               : status;
+    if (status == EBPO_OK && w->plan.info.parts & EBPO_PART_COLOURS) {
+        status = ebpo_content_end(&w->content[EBPO_DIGEST_COLOURS], digest, error);
+        if (status == EBPO_OK)
+            status = ebpo_facts_put_colours_digest(&w->head.out, w->head.root, digest, error);
+    }
+    if (status == EBPO_OK && w->plan.info.parts & EBPO_PART_BORDER) {
+        status = ebpo_content_end(&w->content[EBPO_DIGEST_BORDER], digest, error);
+        if (status == EBPO_OK)
+            status = ebpo_facts_put_border_digest(&w->head.out, w->head.root, digest, error);
+    }
+    return status;
 }
 
 /* Writes the whole file. Does not fail if libhdf5 places its metadata elsewhere. Another version of
@@ -724,10 +734,10 @@ static ebpo_status check_written(const ebpo_file *from, const ebpo_publish *out,
                                 "arrays in ways that ebpo does not write. Nothing was written");
 }
 
-ebpo_status ebpo_file_repack(const ebpo_file *file, const char *path, const ebpo_read_options *read,
-                             const ebpo_write_options *write, ebpo_error *error)
+ebpo_status ebpo_repack_with(const ebpo_file *file, const char *path, const ebpo_read_options *read,
+                             const ebpo_write_options *write, ebpo_change_tree_fn *change,
+                             ebpo_error *error)
 {
-    EBPO_DEFAULT_FP;
     ebpo_write_options wanted = EBPO_WRITE_OPTIONS_INIT;
     ebpo_publish out = EBPO_PUBLISH_INIT;
     ebpo_tree tree = { 0 };
@@ -740,6 +750,8 @@ ebpo_status ebpo_file_repack(const ebpo_file *file, const char *path, const ebpo
         ebpo_publish_expect_input(&out, &file->in);
         status = ebpo_file_read_tree(file, read, &tree, error);
     }
+    if (status == EBPO_OK && change)
+        status = change(&tree, wanted.threads, error);
     if (status == EBPO_OK)
         status = ebpo_tree_write_into(&tree, ebpo_publish_path(&out), path, &wanted, error);
     ebpo_tree_free(&tree);
@@ -749,4 +761,11 @@ ebpo_status ebpo_file_repack(const ebpo_file *file, const char *path, const ebpo
         status = ebpo_publish_commit(&out, error);
     ebpo_publish_abort(&out);
     return status;
+}
+
+ebpo_status ebpo_file_repack(const ebpo_file *file, const char *path, const ebpo_read_options *read,
+                             const ebpo_write_options *write, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    return ebpo_repack_with(file, path, read, write, NULL, error);
 }

@@ -11,4 +11,12 @@ EBPO_MUST_USE ebpo_status ebpo_tree_write_into(const ebpo_tree *tree, const char
                                                const char *shown, const ebpo_write_options *options,
                                                ebpo_error *error);
 
+/* Does what ebpo_file_repack does, after `change` has added parts with separate checksums to the
+ * tree. NULL: no change. */
+typedef ebpo_status ebpo_change_tree_fn(ebpo_tree *tree, unsigned threads, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_repack_with(const ebpo_file *file, const char *path,
+                                           const ebpo_read_options *read,
+                                           const ebpo_write_options *write,
+                                           ebpo_change_tree_fn *change, ebpo_error *error);
+
 #endif

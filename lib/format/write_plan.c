@@ -15,6 +15,7 @@
 #include "core/checksum.h"
 #include "core/text.h"
 #include "ebpo_config.h"
+#include "format/border_loops.h"
 #include "format/content_checksum.h"
 #include "format/chunk_layout.h"
 #include "format/head_facts.h"
@@ -389,6 +390,9 @@ void ebpo_plan_encode(const ebpo_plan *plan, const ebpo_array_out *array, uint64
         /* cannot fail, as index_faces has checked the faces */
         (void)ebpo_corners_encode(tree->mesh.faces + 3 * row, rows, &used, file);
         break;
+    case EBPO_A_BORDER_POINTS:
+        ebpo_border_encode(&tree->border, plan->info.double_coordinates, row, rows, file);
+        break;
     case EBPO_A_VERTEX_SOURCE: ebpo_numbers_encode(tree->vertex_source + row, rows, file); break;
     case EBPO_A_ATTRIBUTE: attributes_encode(plan, array, row, rows, file); break;
     case EBPO_A_FACE_SOURCE: ebpo_numbers_encode(tree->face_source + row, rows, file); break;
@@ -469,7 +473,7 @@ static ebpo_status resolve_facts(ebpo_plan *plan, const ebpo_write_options *opti
     info->gates = false;
     info->parts &= options->parts;
     if (!(info->parts & EBPO_PART_MESH))
-        info->parts &= ~(uint32_t)(EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES);
+        info->parts &= ~(uint32_t)(EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES | EBPO_PART_BORDER);
     plan->attributes = info->parts & EBPO_PART_ATTRIBUTES ? tree->mesh.attributes : NULL;
     if (!plan->attributes)
         info->parts &= ~(uint32_t)EBPO_PART_ATTRIBUTES;
@@ -512,6 +516,8 @@ static ebpo_status check_tree(ebpo_plan *plan, const ebpo_check *check, ebpo_err
         status = ebpo_check_order(check, tree, error);
     if (status == EBPO_OK && info->parts & EBPO_PART_MESH)
         status = ebpo_check_finite(check, &tree->mesh, error);
+    if (status == EBPO_OK && info->parts & EBPO_PART_BORDER)
+        status = ebpo_check_border(check, info, &tree->border, error);
     if (status == EBPO_OK && info->parts & EBPO_PART_MAPS)
         status = ebpo_check_map(check, "/maps/vertex_source", tree->vertex_source,
                                 info->vertex_count, info->source_vertex_count, error);
@@ -586,7 +592,7 @@ static uint8_t narrow_signed(const ebpo_level *level, const int32_t *values, uin
 static uint8_t stored_size(const ebpo_plan *plan, const ebpo_array_out *a, const void *values)
 {
     const ebpo_array_spec *spec = &ebpo_schema[a->id];
-    if (a->id == EBPO_A_VERTICES)
+    if (a->id == EBPO_A_VERTICES || a->id == EBPO_A_BORDER_POINTS)
         return plan->info.double_coordinates ? 8 : 4;
     if (!(spec->sizes & (spec->sizes - 1)))
         return spec->sizes;
@@ -600,7 +606,9 @@ static uint8_t stored_size(const ebpo_plan *plan, const ebpo_array_out *a, const
 static void find_values(const ebpo_plan *plan, ebpo_array_out *a)
 {
     const ebpo_array_spec *spec = &ebpo_schema[a->id];
-    if (a->id == EBPO_A_FACES_INDEX)
+    if (a->id == EBPO_A_BORDER_LOOPS)
+        a->values = plan->tree->border.loop;
+    else if (a->id == EBPO_A_FACES_INDEX)
         a->values = plan->faces_index;
     else if (a->id == EBPO_A_SUBTREE_INDEX)
         a->values = plan->subtrees.index;

@@ -298,5 +298,6 @@ void ebpo_node_table_free(ebpo_node_table *table)
     free(table->group);
     free(table->grid);
     free(table->grid_depth);
+    free(table->split);
     memset(table, 0, sizeof *table);
 }

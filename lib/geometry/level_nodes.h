@@ -227,6 +227,9 @@ typedef struct ebpo_node_table {
     int grid_bits;
     uint32_t *grid;      /* [z][y][x] entry of the node that is or contains the cell */
     uint8_t *grid_depth; /* [z][y][x] depth of that node below the root */
+    /* entries of parts of uniform nodes, octant by octant, for results of points: query/holes.h */
+    uint32_t (*split)[8];
+    uint32_t split_count;
 } ebpo_node_table;
 
 /* Returns the bits of the grid of a table of this many groups; 0: none. */

@@ -66,6 +66,11 @@ typedef struct sizes {
     uint64_t reserve;
 } sizes;
 
+static bool has_windings(const ebpo_info *info)
+{
+    return info->solid || info->parts & EBPO_PART_BORDER;
+}
+
 static uint64_t grid_bytes(uint64_t groups)
 {
     int bits = ebpo_node_grid_bits(groups);
@@ -91,7 +96,7 @@ static sizes sizes_of(const counts *c, const ebpo_info *info)
                  c->leaves * sizeof(ebpo_accel_leaf),
         .list = list_max(c->refs, c->leaves, c->faces) * sizeof(ebpo_listed_block),
         .planes = c->keeps_planes ? 4 * (c->groups + 1 + c->planes) : 0,
-        .rows = c->below && info->solid ? c->leaves * sizeof(ebpo_kind_row) : 0,
+        .rows = c->below && has_windings(info) ? c->leaves * sizeof(ebpo_kind_row) : 0,
         .slots = 4 * c->faces,
         .reserve = c->below ? 1 << 14 : 3 << 16,
     };
@@ -347,7 +352,7 @@ static void fill_leaf(walk *w, const ebpo_level *level, int depth, uint64_t rank
     leaf->list = (uint32_t)w->s->list_count;
     w->s->list_count += l.count;
     w->refs[depth] += refs;
-    leaf->kind = w->s->solid ? EBPO_LEAF_UNKNOWN : EBPO_LEAF_GENERAL;
+    leaf->kind = w->s->has_windings ? EBPO_LEAF_UNKNOWN : EBPO_LEAF_GENERAL;
     leaf->winding = level->leaf_winding ? level->leaf_winding[rank] : 0;
 }
 
@@ -560,7 +565,7 @@ static ebpo_status make_stages(ebpo_accel *s, ebpo_slice *slice, const ebpo_info
     if (status == EBPO_OK)
         status = accel_fill_nodes(s, slice, &layout, error);
     ebpo_layout_free(&layout);
-    if (status == EBPO_OK && s->solid) {
+    if (status == EBPO_OK && s->has_windings) {
         s->kinds = ebpo_leaf_kinds_make(rows_max(s));
         status = s->kinds ? EBPO_OK : ebpo_fail_memory(error, sizeof *s->kinds);
     }
@@ -588,7 +593,7 @@ ebpo_status ebpo_accel_make_within(ebpo_accel **out, ebpo_slice *slice, const eb
     s->box = ebpo_root_box(info);
     s->root = slice->root;
     s->deepest = slice->root.cell.level + slice->level_count - 1;
-    s->solid = info->solid;
+    s->has_windings = has_windings(info);
     s->rule = (uint8_t)info->rule;
     s->has_planes = with_planes;
     s->wide = accel_needs_doubles(info);

@@ -24,6 +24,7 @@
 #include "geometry/cursor.h"
 #include "geometry/level_nodes.h"
 #include "geometry/predicates.h"
+#include "query/holes.h"
 #include "query/load_ahead.h"
 #include "query/query_model.h"
 #include "query/query_node.h"
@@ -207,14 +208,45 @@ static inline ebpo_leaf_kind kind_of(const ebpo_context *context, const ebpo_acc
 static inline void give_winding(const ebpo_context *context, int32_t winding,
                                 ebpo_inside_result *out)
 {
-    *out = (ebpo_inside_result){ ebpo_rule_inside(context->model->info->rule, winding) ? EBPO_IN
-                                                                                       : EBPO_OUT,
-                                 winding, 0 };
+    bool in = ebpo_rule_inside(context->model->info->rule, winding);
+    bool rounded = context->model->holes && !context->undecided;
+    *out = (ebpo_inside_result){ in ? EBPO_IN : EBPO_OUT, rounded ? in : winding, 0 };
+}
+
+/* Decides a point of a surface by the winding number of surface and caps. */
+static void decide_capped(const ebpo_context *context, const double p[3], int32_t winding,
+                          ebpo_inside_result *out)
+{
+    ebpo_where where =
+        context->undecided ? EBPO_OUT : ebpo_holes_where(context->model->holes, p, winding);
+    *out =
+        (ebpo_inside_result){ (int32_t)where, context->undecided ? winding : where == EBPO_IN, 0 };
 }
 
 static inline void give_out(ebpo_inside_result *out)
 {
     *out = (ebpo_inside_result){ EBPO_OUT, 0, 0 };
+}
+
+/* Classifies a point outside of the root cell. */
+static inline void inside_nowhere(const ebpo_context *context, const double p[3],
+                                  ebpo_inside_result *out)
+{
+    if (context->model->holes)
+        decide_capped(context, p, 0, out);
+    else
+        give_out(out);
+}
+
+/* Decides a point of a cell near the border by the winding number at the cell's lowest corner, plus
+ * the crossings of faces on the way from there to the point. */
+static void decide_near(const ebpo_context *context, ebpo_cell cell, int32_t winding,
+                        const double p[3], ebpo_inside_result *out)
+{
+    const ebpo_box box = ebpo_model_box(context->model);
+    double low[3], high[3];
+    ebpo_cell_bounds(&box, cell, low, high);
+    decide_capped(context, p, winding + ebpo_holes_crossings(context->model->holes, low, p), out);
 }
 
 /* Counts crossings of faces. */
@@ -225,16 +257,21 @@ static ebpo_status result_by_faces(ebpo_context *context, const ebpo_accel *s,
     const ebpo_inside_kernels *kernels = context->model->kernels.inside;
     uint64_t most = (uint64_t)s->list_longest * EBPO_BLOCK;
     int32_t winding;
+    bool near = leaf->cell_face == EBPO_NEAR_BORDER;
     if (most > context->open_capacity &&
         !ebpo_grow(&context->open, &context->open_capacity, most, sizeof *context->open))
         return ebpo_fail_memory(error, most * sizeof *context->open);
-    bool off = bounded && leaf->cell_face != EBPO_NO_CELL_FACE
+    bool off = bounded && leaf->cell_face < EBPO_NO_CELL_FACE
                    ? from_cell_face(kernels, s, leaf, i, p, context->open, &winding)
-                   : from_corner(kernels, s, leaf, bounded, i, p, context->open, &winding);
-    if (off)
-        give_winding(context, winding, out);
-    else
+                   : from_corner(kernels, s, leaf, bounded && !near, i, p, context->open, &winding);
+    if (!off)
         *out = (ebpo_inside_result){ EBPO_ON, 0, 0 };
+    else if (near && leaf->queries)
+        decide_near(context, i->leaf, winding, p, out);
+    else if (near)
+        decide_capped(context, p, winding, out);
+    else
+        give_winding(context, winding, out);
     return EBPO_OK;
 }
 
@@ -261,10 +298,43 @@ static ebpo_status inside_leaf(ebpo_context *context, const ebpo_accel *s, uint3
     return result_in_leaf(context, s, &s->leaf[number], &i, p, out, error);
 }
 
-/* Classifies a point in a white or black node. */
-static void inside_uniform(const ebpo_context *context, uint32_t entry, ebpo_inside_result *out)
+/* Classifies a point in a white node of a surface. */
+static __attribute__((noinline)) void inside_marked(const ebpo_context *context,
+                                                    const ebpo_node_table *table, uint32_t entry,
+                                                    const ebpo_position *place, int level,
+                                                    const double p[3], ebpo_inside_result *out)
 {
-    give_winding(context, ebpo_entry_winding(entry), out);
+    int fine = context->model->locator.level;
+    int32_t marked = ebpo_entry_winding(entry);
+    while (ebpo_entry_mark(marked) == EBPO_MARK_SPLIT)
+        marked = ebpo_entry_winding(
+            table->split[ebpo_marked_value(marked)][ebpo_octant_at(place->at, fine - ++level)]);
+    int32_t winding = ebpo_marked_value(marked);
+    bool in = ebpo_entry_mark(marked) == EBPO_MARK_IN;
+    switch (ebpo_entry_mark(marked)) {
+    case EBPO_MARK_APART: decide_capped(context, p, winding, out); break;
+    case EBPO_MARK_NEAR:
+        decide_near(context,
+                    ebpo_cell_ancestor((ebpo_cell){ fine,
+                                                    { place->at[0], place->at[1], place->at[2] } },
+                                       level),
+                    winding, p, out);
+        break;
+    default:
+        *out =
+            (ebpo_inside_result){ in ? EBPO_IN : EBPO_OUT, context->undecided ? winding : in, 0 };
+    }
+}
+
+/* Classifies a point in a white or black node of a table. */
+static inline void inside_uniform(const ebpo_context *context, const ebpo_node_table *table,
+                                  uint32_t entry, const ebpo_position *place, int level,
+                                  const double p[3], ebpo_inside_result *out)
+{
+    if (context->model->holes)
+        inside_marked(context, table, entry, place, level, p, out);
+    else
+        give_winding(context, ebpo_entry_winding(entry), out);
 }
 
 /* Classifies p in a subtree whose root's cell contains p; `place` is its shifted position. */
@@ -274,7 +344,7 @@ static ebpo_status inside_subtree(ebpo_context *context, const ebpo_accel *s,
 {
     ebpo_descent d = ebpo_descend(&s->nodes, context->model->locator.level, place->at);
     if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_UNIFORM) {
-        inside_uniform(context, d.entry, out);
+        inside_uniform(context, &s->nodes, d.entry, place, d.level, p, out);
         return EBPO_OK;
     }
     if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_SUBTREE_ROOT)
@@ -335,7 +405,7 @@ static void prefetch_blocks(const ebpo_accel *s, const waiting *w, const double 
     ebpo_axis_segment g = { .reach = EBPO_REACH_ALL };
     if (ebpo_leaf_has_planes(kind))
         return;
-    if (ebpo_leaf_is_bounded(kind) && leaf->cell_face != EBPO_NO_CELL_FACE)
+    if (ebpo_leaf_is_bounded(kind) && leaf->cell_face < EBPO_NO_CELL_FACE)
         g = cell_face_segment(&s->box, leaf->cell_face, &w->in, p);
     const ebpo_listed_block *list = s->list + leaf->list;
     for (int b = 0; b < 8; b++) {
@@ -378,9 +448,10 @@ static ebpo_status inside_together(ebpo_context *context, const ebpo_accel *s, c
     descend_together(s, fine, count, l);
     for (unsigned i = 0; i < count; i++) {
         if (!l[i].within) {
-            give_out(&out[i]);
+            inside_nowhere(context, points + 3 * i, &out[i]);
         } else if (ebpo_entry_kind_of(l[i].d.entry) == EBPO_ENTRY_UNIFORM) {
-            inside_uniform(context, l[i].d.entry, &out[i]);
+            inside_uniform(context, &s->nodes, l[i].d.entry, &l[i].place, l[i].d.level,
+                           points + 3 * i, &out[i]);
         } else if (ebpo_entry_kind_of(l[i].d.entry) == EBPO_ENTRY_SUBTREE_ROOT) {
             ebpo_status status = inside_pruned(context, points + 3 * i, &out[i], error);
             if (status != EBPO_OK)
@@ -407,7 +478,7 @@ static ebpo_status inside_whole(ebpo_context *context, const double *points, uin
         if (ebpo_locator_find(&context->model->locator, points, &place))
             status = inside_subtree(context, s, &place, points, out, error);
         else
-            give_out(out);
+            inside_nowhere(context, points, out);
     }
     for (uint64_t i = 0; count > 1 && i < count && status == EBPO_OK; i += TOGETHER)
         status = inside_together(context, s, points + 3 * i,
@@ -426,7 +497,7 @@ static bool uses_envelopes(const ebpo_context *c, const ebpo_inside_options *o)
      * rules other than nonzero the result would be incomplete. */
     bool whole_result =
         c->model->info->rule == EBPO_RULE_NONZERO || o->level >= 0 || o->deadline_ns;
-    if (o->envelopes == EBPO_ENVELOPES_SKIP || !whole_result)
+    if (o->envelopes == EBPO_ENVELOPES_SKIP || !whole_result || c->model->holes)
         return false;
     return o->envelopes == EBPO_ENVELOPES_USE || !c->model->whole || o->level >= 0 ||
            o->deadline_ns;
@@ -465,12 +536,20 @@ static bool stops_here(const inside_query *a, const ebpo_node *node)
     return is_late(a);
 }
 
+/* Returns the table of nodes that are in no subtree. */
+static const ebpo_node_table *top_nodes(const ebpo_model *m)
+{
+    return m->whole ? &m->whole->nodes : &m->top->nodes;
+}
+
 /* Decides the point at a node of the top or of a subtree, without visiting the node's children.
  * Returns false if that is not possible. */
 static inline bool decide_at(const inside_query *a, const ebpo_node *node, ebpo_inside_result *out)
 {
     if (ebpo_node_is_uniform(node))
-        inside_uniform(a->context, node->entry, out);
+        inside_uniform(a->context,
+                       node->subtree ? &node->subtree->nodes : top_nodes(a->context->model),
+                       node->entry, &a->place, node->cell.level, a->p, out);
     else if (outside_envelope(a, node))
         give_out(out);
     else if (stops_here(a, node))
@@ -516,6 +595,11 @@ static ebpo_status leaf_from_file(inside_query *a, const ebpo_node *leaf, ebpo_i
         status = ebpo_slice_read(&slice, m->chunks, leaf, error);
     if (status == EBPO_OK)
         status = ebpo_accel_make(&subtree, &slice, m->info, false, 1, error);
+    if (status == EBPO_OK && m->holes)
+        status = ebpo_holes_mark(m->holes,
+                                 &(ebpo_marked_table){ &subtree->box, leaf->cell, &subtree->nodes,
+                                                       subtree->leaf, 0, 0 },
+                                 error);
     if (status == EBPO_OK) {
         ebpo_model_count_leaves(m, subtree, 1);
         status = inside_leaf(a->context, subtree, ebpo_entry_value(subtree->nodes.root),
@@ -531,7 +615,9 @@ static ebpo_status uniform_from_file(inside_query *a, const ebpo_node *node,
 {
     int32_t winding;
     ebpo_status status = ebpo_chunks_winding(a->context->model->chunks, node, &winding, error);
-    if (status == EBPO_OK)
+    if (status == EBPO_OK && a->context->model->holes)
+        decide_near(a->context, node->cell, winding, a->p, out);
+    else if (status == EBPO_OK)
         give_winding(a->context, winding, out);
     return status;
 }
@@ -610,16 +696,18 @@ static ebpo_status walk_nodes(inside_query *a, ebpo_inside_result *out, ebpo_err
     return walk_file(a, &node, out, error);
 }
 
-/* Returns the subtree that the context holds if its cell contains p, else NULL. *entry: the result
- * of the levels above, when they decide. */
-static const ebpo_accel *held_around(const inside_query *a, uint32_t *entry)
+/* Returns the subtree that the context holds if its cell contains p, else NULL. *entry, *level: the
+ * node of the levels above, when it decides. */
+static const ebpo_accel *held_around(const inside_query *a, uint32_t *entry, int *level)
 {
     const ebpo_context *c = a->context;
+    int fine = c->model->info->level_count - 1;
     *entry = ebpo_entry(EBPO_ENTRY_SUBTREE_ROOT, 0);
     if (c->model->whole)
         return c->model->whole;
-    *entry =
-        ebpo_descend(&c->model->top->nodes, c->model->info->level_count - 1, a->place.at).entry;
+    ebpo_descent d = ebpo_descend(&c->model->top->nodes, fine, a->place.at);
+    *entry = d.entry;
+    *level = d.level;
     bool below = ebpo_entry_kind_of(*entry) == EBPO_ENTRY_SUBTREE_ROOT;
     return below && ebpo_context_has_pinned(c, ebpo_entry_value(*entry)) ? c->pinned : NULL;
 }
@@ -631,10 +719,11 @@ static bool result_in_memory(inside_query *a, ebpo_inside_result *out, ebpo_stat
 {
     const ebpo_model *m = a->context->model;
     uint32_t entry;
-    const ebpo_accel *held = held_around(a, &entry);
+    int level;
+    const ebpo_accel *held = held_around(a, &entry, &level);
     *status = EBPO_OK;
     if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_UNIFORM) {
-        inside_uniform(a->context, entry, out);
+        inside_uniform(a->context, top_nodes(m), entry, &a->place, level, a->p, out);
         return true;
     }
     if (!held)
@@ -649,7 +738,7 @@ static bool result_in_memory(inside_query *a, ebpo_inside_result *out, ebpo_stat
         return false; /* pruned: an envelope may decide */
     ebpo_cell cell = ebpo_descent_cell(&d, fine, a->place.at);
     if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_UNIFORM)
-        inside_uniform(a->context, d.entry, out);
+        inside_uniform(a->context, &held->nodes, d.entry, &a->place, d.level, a->p, out);
     else if (is_late(a))
         give_maybe(a, cell, out);
     else
@@ -664,6 +753,8 @@ static ebpo_status inside_pruned(ebpo_context *context, const double p[3], ebpo_
                                  ebpo_error *error)
 {
     const ebpo_model *m = context->model;
+    if (m->holes) /* envelopes do not contain the inside of a surface */
+        return ebpo_fail_pruned(m, (ebpo_cell){ 0, { 0, 0, 0 } }, error);
     ebpo_inside_options options = EBPO_INSIDE_OPTIONS_INIT;
     inside_query a = {
         .context = context, .options = &options, .box = ebpo_model_box(m), .envelopes = true, .p = p
@@ -693,7 +784,7 @@ static ebpo_status inside_walk(ebpo_context *context, const double p[3],
     if (options->deadline_ns)
         a.deadline = ebpo_clock() + options->deadline_ns;
     if (!ebpo_locator_find(&m->locator, p, &a.place)) {
-        give_out(out);
+        inside_nowhere(context, p, out);
         return EBPO_OK;
     }
     ebpo_status status;
@@ -718,17 +809,24 @@ ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64
         status = ebpo_check_query_level(o->level, error);
     if (status == EBPO_OK && o->envelopes > EBPO_ENVELOPES_SKIP)
         status = ebpo_fail_value(error);
-    if (status == EBPO_OK)
-        status = ebpo_check_solid(m, error);
+    if (status == EBPO_OK && !m->info->solid && !m->holes)
+        status = ebpo_fail_file(error, EBPO_E_NOT_SOLID, m->file->in.shown,
+                                "the model is a surface, stored without its border: it has no "
+                                "inside; 'ebpo repack' adds the border, or run 'ebpo check' on its "
+                                "source to see the repairs that make a solid");
     if (status == EBPO_OK)
         status = ebpo_check_points(points, count, error);
     if (status == EBPO_OK && o->level < 0)
         status = ebpo_check_mesh(m, error);
+    if (status == EBPO_OK && m->holes && (o->level >= 0 || o->deadline_ns))
+        status = ebpo_fail(error, EBPO_E_ARGUMENT,
+                           "the inside of a surface supports neither level nor deadline; omit "
+                           "these");
     if (status == EBPO_OK && m->whole && o->level < 0 && !o->deadline_ns &&
         o->envelopes != EBPO_ENVELOPES_USE)
         return inside_whole(context, points, count, o->done, out, error);
-    context->planes =
-        o->level >= 0 || o->deadline_ns || o->envelopes == EBPO_ENVELOPES_USE || m->info->pruned;
+    context->planes = o->level >= 0 || o->deadline_ns ||
+                      (!m->holes && (o->envelopes == EBPO_ENVELOPES_USE || m->info->pruned));
     ebpo_batch batch = { .context = context,
                          .points = points,
                          .count = count,
@@ -765,8 +863,10 @@ static ebpo_status inside_plain(ebpo_context *context, const double point[3],
     ebpo_position place;
     if (ebpo_locator_find(&context->model->locator, point, &place))
         return inside_subtree(context, context->model->whole, &place, point, out, error);
-    give_out(out);
-    return ebpo_check_points(point, 1, error);
+    ebpo_status status = ebpo_check_points(point, 1, error);
+    if (status == EBPO_OK)
+        inside_nowhere(context, point, out);
+    return status;
 }
 
 ebpo_status ebpo_inside(ebpo_context *context, const double point[3],
@@ -782,10 +882,11 @@ ebpo_status ebpo_give_sign(ebpo_context *c, const double p[3], const ebpo_distan
 {
     ebpo_inside_result where;
     ebpo_inside_options plain = EBPO_INSIDE_OPTIONS_INIT;
-    if (!c->model->info->solid || o->unsigned_distance || out->face == EBPO_NO_FACE)
+    const ebpo_model *m = c->model;
+    if ((!m->info->solid && !m->holes) || o->unsigned_distance || out->face == EBPO_NO_FACE)
         return EBPO_OK;
-    ebpo_status status = c->model->whole ? inside_whole(c, p, 1, NULL, &where, error)
-                                         : inside_walk(c, p, &plain, &where, error);
+    ebpo_status status = m->whole ? inside_whole(c, p, 1, NULL, &where, error)
+                                  : inside_walk(c, p, &plain, &where, error);
     if (status == EBPO_OK && where.where == EBPO_IN)
         out->distance = -out->distance;
     return status;

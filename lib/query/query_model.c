@@ -16,6 +16,7 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/hash.h"
+#include "query/holes.h"
 #include "query/model_parts.h"
 #include "query/query_model.h"
 
@@ -186,6 +187,21 @@ void ebpo_model_count_kind(ebpo_model *m, const ebpo_accel_leaf *leaf)
         ebpo_leaf_kind_of(leaf) == EBPO_LEAF_GENERAL && leaf->cell_face != EBPO_NO_CELL_FACE;
 }
 
+/* Marks the nodes of a surface with its border. Only whole models have parts of nodes, as all of
+ * their nodes are used for many queries. */
+static ebpo_status mark_accel(const ebpo_model *m, ebpo_accel *s, ebpo_error *error)
+{
+    if (!m->holes)
+        return EBPO_OK;
+    uint32_t splits = s == m->whole ? s->nodes.group_count / 64 + 4096 : 0;
+    ebpo_marked_table marked = {
+        &s->box, s->root.cell, &s->nodes, s->leaf, m->locator.level, splits
+    };
+    ebpo_status status = ebpo_holes_mark(m->holes, &marked, error);
+    s->bytes += s->nodes.split_count * sizeof *s->nodes.split;
+    return status;
+}
+
 static ebpo_status load_subtree(void *user, uint64_t key, uint64_t most, void **item,
                                 uint64_t *bytes, ebpo_error *error)
 {
@@ -197,6 +213,11 @@ static ebpo_status load_subtree(void *user, uint64_t key, uint64_t most, void **
                                                 ebpo_subtree_needs(key & 1), &space, error);
     if (status == EBPO_OK)
         status = ebpo_accel_make_within(&subtree, &slice, m->info, &space, key & 1, 1, error);
+    if (status == EBPO_OK && mark_accel(m, subtree, error) != EBPO_OK) {
+        ebpo_accel_free(subtree);
+        subtree = NULL;
+        status = EBPO_E_LIMIT;
+    }
     if (status == EBPO_OK) {
         ebpo_model_count_leaves(m, subtree, 1);
         ebpo_skeletons_keep(m->skeletons, key >> 1, subtree);
@@ -244,7 +265,7 @@ static ebpo_status open_whole(ebpo_model *m, ebpo_error *error)
                                         true, m->options.threads, error);
     if (m->whole)
         ebpo_model_count_leaves(m, m->whole, 1);
-    return status;
+    return status == EBPO_OK ? mark_accel(m, m->whole, error) : status;
 }
 
 /* Makes caches under the model's own budget; 0: no limit. */
@@ -295,6 +316,13 @@ static ebpo_status open_top(ebpo_model *m, int cut_level, ebpo_error *error)
 {
     ebpo_cache_source source = { m, estimate_subtree, load_subtree, release_subtree };
     ebpo_status status = ebpo_top_read(&m->top, m->file, cut_level, m->options.threads, error);
+    if (status == EBPO_OK && m->holes) {
+        ebpo_box box = ebpo_root_box(m->info);
+        m->top->bytes += ebpo_holes_bytes(m->holes);
+        ebpo_marked_table marked = { &box, { 0, { 0, 0, 0 } }, &m->top->nodes,
+                                     NULL, m->locator.level,   0 };
+        status = ebpo_holes_mark(m->holes, &marked, error);
+    }
     if (status == EBPO_OK)
         status = m->options.budget ? make_shared(m, &source, error) : make_own(m, &source, error);
     uint64_t skeletons = status == EBPO_OK ? skeleton_capacity(m) : 0;
@@ -339,6 +367,16 @@ static ebpo_status open_parts(ebpo_model *m, ebpo_error *error)
     return status == EBPO_OK ? open_top(m, plan.cut_level, error) : status;
 }
 
+static ebpo_status check_threshold(const ebpo_model_options *o, ebpo_error *error)
+{
+    if (o->threshold >= 0x1p-10 && o->threshold <= 1 - 0x1p-10)
+        return EBPO_OK;
+    return ebpo_fail(error, EBPO_E_ARGUMENT,
+                     "threshold %g of the winding number is out of range; give a number from "
+                     "1/1024 to 1023/1024",
+                     o->threshold);
+}
+
 ebpo_status ebpo_model_new(const ebpo_file *file, const ebpo_model_options *options,
                            ebpo_model **out, ebpo_error *error)
 {
@@ -346,6 +384,8 @@ ebpo_status ebpo_model_new(const ebpo_file *file, const ebpo_model_options *opti
     ebpo_model_options wanted = EBPO_MODEL_OPTIONS_INIT;
     *out = NULL;
     ebpo_status status = EBPO_TAKE(ebpo_model_options, &wanted, options, error);
+    if (status == EBPO_OK)
+        status = check_threshold(&wanted, error);
     if (status != EBPO_OK)
         return status;
     ebpo_model *m = ebpo_alloc_zero(1, sizeof *m);
@@ -359,12 +399,15 @@ ebpo_status ebpo_model_new(const ebpo_file *file, const ebpo_model_options *opti
     m->options = wanted;
     m->kernels = ebpo_query_kernels_best();
     m->default_memory = ebpo_default_memory(file, &m->options);
-    status = open_parts(m, error);
+    if (m->info->parts & EBPO_PART_BORDER)
+        status = ebpo_holes_read(&m->holes, file, wanted.threshold, error);
+    if (status == EBPO_OK)
+        status = open_parts(m, error);
     if (status != EBPO_OK) {
         ebpo_model_free(m);
         return status;
     }
-    m->results_inside = m->whole && m->info->solid && m->info->parts & EBPO_PART_MESH;
+    m->results_inside = m->whole && (m->info->solid || m->holes) && m->info->parts & EBPO_PART_MESH;
     m->open_seconds = (double)(ebpo_clock() - begin) * 1e-9;
     *out = m;
     return EBPO_OK;
@@ -393,6 +436,7 @@ void ebpo_model_free(ebpo_model *m)
     ebpo_top_free(m->deep);
     give_back_shared(m);
     ebpo_accel_free(m->whole);
+    ebpo_holes_free(m->holes);
     free(m);
 }
 
@@ -410,8 +454,9 @@ static void gather_stats(const ebpo_model *m, ebpo_model_stats *out)
     out->leaves_one_cell_face = m->leaves_one_cell_face;
     for (int k = 0; k < 5; k++)
         out->leaves_of_kind[k] = m->leaves_of_kind[k];
+    out->ties = m->holes ? m->holes->ties : 0;
     if (m->whole) {
-        out->memory = out->memory_peak = ebpo_accel_bytes(m->whole);
+        out->memory = out->memory_peak = ebpo_accel_bytes(m->whole) + ebpo_holes_bytes(m->holes);
         return;
     }
     ebpo_cache_stats subtrees, chunks;

@@ -14,6 +14,7 @@
 #include "geometry/polytope.h"
 #include "geometry/level_nodes.h"
 #include "query/accel.h"
+#include "query/holes.h"
 #include "query/model_parts.h"
 #include "query/query_kernels.h"
 
@@ -26,7 +27,8 @@ struct ebpo_model {
     bool default_memory;                     /* no budget was given, but the file is remote */
     ebpo_query_kernels kernels;
     ebpo_accel *whole;   /* the whole model in memory, or NULL; then: */
-    bool results_inside; /* `whole` is a solid with its mesh */
+    bool results_inside; /* `whole` has its mesh and an inside */
+    ebpo_holes *holes;   /* for a surface with its border; or NULL */
     ebpo_top *top;       /* levels 0 .. cut level */
     ebpo_chunks *chunks;
     ebpo_cache *cache;         /* subtrees by their index in top->below */
@@ -55,7 +57,9 @@ struct ebpo_context {
     ebpo_model *model;
     ebpo_accel *pinned; /* the last used subtree, when it came from the cache */
     uint64_t pinned_key;
-    bool planes;    /* the query needs envelopes below the cut level */
+    bool planes; /* the query needs envelopes below the cut level */
+    /* results are not decided: their winding number is that of surface and caps */
+    bool undecided;
     uint32_t *open; /* slots that a filter left undecided */
     uint64_t open_capacity;
     ebpo_ray_hit *hits;
@@ -109,7 +113,7 @@ static inline uint64_t ebpo_subtree_key(uint64_t below, bool planes) { return be
 /* Returns the parts of the file that a subtree needs, with or without planes. */
 static inline uint32_t ebpo_subtree_needs(bool planes)
 {
-    return EBPO_NEEDS_ALWAYS | EBPO_NEEDS_MESH | EBPO_NEEDS_MAPS | EBPO_NEEDS_SOLID |
+    return EBPO_NEEDS_ALWAYS | EBPO_NEEDS_MESH | EBPO_NEEDS_MAPS | EBPO_NEEDS_SOLID_OR_BORDER |
            (planes ? (uint32_t)EBPO_NEEDS_PLANES : 0);
 }
 

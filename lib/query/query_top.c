@@ -3,6 +3,7 @@
  * A model under a budget always has only the top in memory; queries go down through the top to the
  * subtrees. The same table, with envelopes alone, holds the levels right below the cut for deep
  * bounds (nearest_subtrees.c). Immutable once it is read; any thread may use it. */
+#include "query/holes.h"
 #include "query/model_parts.h"
 
 #include <stdlib.h>
@@ -280,7 +281,7 @@ static uint64_t estimate_levels(const ebpo_info *info, int cut_level, size_t nod
 
 uint64_t ebpo_top_estimate(const ebpo_info *info, int cut_level)
 {
-    return estimate_levels(info, cut_level, sizeof(ebpo_node));
+    return estimate_levels(info, cut_level, sizeof(ebpo_node)) + ebpo_holes_estimate(info);
 }
 
 uint64_t ebpo_top_envelopes_estimate(const ebpo_info *info, int cut_level)

@@ -171,6 +171,8 @@ static ebpo_status verify_tree_of(ebpo_tally *tally, const ebpo_file *file, cons
 {
     if (!ebpo_check_shape(tally, tree))
         return EBPO_OK;
+    if (tree->info.parts & EBPO_PART_BORDER && !ebpo_check_border_loops(tally, tree))
+        return EBPO_OK;
     ebpo_reference_tree view;
     ebpo_status status = ebpo_reference_make(&view, tree, options->workspace, error);
     if (status != EBPO_OK)

@@ -279,7 +279,8 @@ static ebpo_status index_all(offset_comparison *c, ebpo_error *error)
         uint32_t number;
     } roots[] = { { EBPO_A_VERTICES, 4096 },       { EBPO_A_FACES, 4097 },
                   { EBPO_A_FACES_INDEX, 4098 },    { EBPO_A_VERTEX_SOURCE, 4099 },
-                  { EBPO_A_FACE_SOURCE, 4100 },    { EBPO_A_SUBTREE_INDEX, 4112 },
+                  { EBPO_A_FACE_SOURCE, 4100 },    { EBPO_A_BORDER_LOOPS, 4101 },
+                  { EBPO_A_BORDER_POINTS, 4102 },  { EBPO_A_SUBTREE_INDEX, 4112 },
                   { EBPO_A_SUBTREE_COUNTS, 4113 }, { EBPO_A_SUBTREE_SHARED, 4114 } };
     ebpo_status status = EBPO_OK;
     for (int level = 0; level < c->file->info.level_count && status == EBPO_OK; level++)
@@ -537,6 +538,8 @@ static uint32_t number_of(const ebpo_array_in *a)
     case EBPO_A_FACES_INDEX: return 4098;
     case EBPO_A_VERTEX_SOURCE: return 4099;
     case EBPO_A_FACE_SOURCE: return 4100;
+    case EBPO_A_BORDER_LOOPS: return 4101;
+    case EBPO_A_BORDER_POINTS: return 4102;
     case EBPO_A_SUBTREE_INDEX: return 4112;
     case EBPO_A_SUBTREE_COUNTS: return 4113;
     case EBPO_A_SUBTREE_SHARED: return 4114;

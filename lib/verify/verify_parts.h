@@ -6,6 +6,7 @@
 #include <stdint.h>
 
 #include "verify/tally.h"
+#include "verify/verify_labels.h"
 #include "verify/verify_tree.h"
 
 /* --- verify.c --- */
@@ -66,6 +67,17 @@ EBPO_MUST_USE ebpo_status ebpo_count_spare(const ebpo_file *file, const ebpo_pro
  * tree. Does nothing if the file does not have the coding `gates`. */
 EBPO_MUST_USE ebpo_status ebpo_check_gates(ebpo_tally *tally, const ebpo_file *file,
                                            const ebpo_tree *tree, ebpo_error *error);
+
+/* --- verify_border.c: the border of a surface (format-spec/border.md) --- */
+
+/* Checks that the loops agree with the header, and that they are the border of the faces. Returns
+ * false if they do not. */
+bool ebpo_check_border_loops(ebpo_tally *tally, const ebpo_tree *tree);
+/* Checks the area of the caps, and subtracts from the stored numbers of all points the winding
+ * number of the caps. Requires ebpo_check_border_loops. */
+EBPO_MUST_USE ebpo_status ebpo_check_border_rays(ebpo_tally *tally, ebpo_ray_points *points,
+                                                 const ebpo_reference_tree *view, unsigned threads,
+                                                 const ebpo_progress *progress, ebpo_error *error);
 
 /* --- verify_lists.c: face lists of leaves --- */
 

@@ -432,7 +432,7 @@ static bool counted_shape(ebpo_tally *tally, const ebpo_level *level, int l, con
 static bool windings_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
 {
     const ebpo_level *level = &tree->level[l];
-    if (tree->info.solid)
+    if (tree->info.solid || tree->info.parts & EBPO_PART_BORDER)
         return CHECK(level->leaf_winding || level->leaf_count == 0,
                      "level %d: winding numbers of leaves are missing", l);
     return CHECK(!level->leaf_winding && !level->black_winding && !level->white_winding,

@@ -179,12 +179,16 @@ static ebpo_status walk_terminal(const walk *w, worker *self, const ebpo_referen
         ebpo_check_face_contained(&self->tally, &self->planes, node, &frame, &face, faces[i]);
     }
     *corners = (ebpo_node_windings){ { 0 }, 0 };
-    if (!view->tree->info.solid || node->type == EBPO_GRAY)
+    bool solid = view->tree->info.solid;
+    if ((!solid && !w->rays) || node->type == EBPO_GRAY)
         return EBPO_OK;
-    ebpo_check_terminal_label(&self->tally, view, node);
+    if (solid)
+        ebpo_check_terminal_label(&self->tally, view, node);
     if (w->rays && !ebpo_label_note(&self->points, view, node, &frame, &w->plan))
         return ebpo_workspace_fail(w->options->workspace,
                                    self->points.count * sizeof *self->points.point, error);
+    if (!solid)
+        return EBPO_OK;
     ebpo_terminal_windings(corners, view, node, &frame, faces, count);
     if (self->planes.count)
         ebpo_check_corners_contained(&self->tally, &self->planes, node,
@@ -392,7 +396,9 @@ static ebpo_status walk_prepare(walk *w, ebpo_error *error)
                        : share > SUBTREE_FACES_MAX ? SUBTREE_FACES_MAX
                                                    : share;
     /* rays need all faces, which a subset lacks */
-    w->rays = faces > 0 && w->view->tree->info.solid && !w->view->tree->info.pruned;
+    const ebpo_info *info = &w->view->tree->info;
+    bool labelled = info->solid || info->parts & EBPO_PART_BORDER;
+    w->rays = faces > 0 && labelled && !info->pruned;
     for (unsigned i = 0; i < w->threads; i++)
         w->workers[i].points.workspace = w->options->workspace;
     if (w->rays)
@@ -412,8 +418,13 @@ static ebpo_status follow_rays(walk *w, ebpo_error *error)
         ebpo_array_free(own->workspace, own->point);
         *own = (ebpo_ray_points){ .workspace = all->workspace };
     }
-    ebpo_status status = ebpo_rays_follow(all, &w->view->tree->mesh, &w->view->box, w->threads,
-                                          &w->options->progress, error);
+    ebpo_status status = EBPO_OK;
+    if (w->view->tree->info.parts & EBPO_PART_BORDER)
+        status = ebpo_check_border_rays(&w->workers[0].tally, all, w->view, w->threads,
+                                        &w->options->progress, error);
+    if (status == EBPO_OK)
+        status = ebpo_rays_follow(all, &w->view->tree->mesh, &w->view->box, w->threads,
+                                  &w->options->progress, error);
     if (status == EBPO_OK)
         ebpo_check_rays(&w->workers[0].tally, all);
     return status;

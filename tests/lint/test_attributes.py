@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""test_attributes.py SOURCE: the specification's table of root attributes has each one that the
+"""test_attributes.py SOURCE: the specification's tables of root attributes have each one that the
 library writes, with its type, whether it is required, and how long a text may be."""
 import pathlib
 import re
@@ -15,7 +15,7 @@ SOME = ("selection_percent", "selection_k_root", "selection_seed", "subtree_leve
 
 root = pathlib.Path(sys.argv[1])
 section = re.search(r"^## 5\. .*?^## 6\. ", (root / "format-spec/README.md").read_text(),
-                    re.M | re.S).group(0)
+                    re.M | re.S).group(0) + (root / "format-spec/border.md").read_text()
 said = {}
 for row in re.findall(r"^\| (`.*) \|$", section, re.M):
     cells = [cell.strip() for cell in row.split("|")]

@@ -160,7 +160,7 @@ class Many(Case):
         surface = Catalogue.of(["open_box.ebpo.h5"])
         with self.assertRaisesRegex(ebpo.NotSolidError, "open_box"):
             surface.winding(P)
-        self.same([surface.distance(P)["distance"]], [model("open_box").distance(P).distance])
+        self.same([surface.distance(P)["distance"]], [model("open_box").distance(P, signed=False).distance])
         self.assertEqual(len(self.catalogue.distance(np.zeros((0, 3)))), 0)
         self.assertEqual(len(self.catalogue.ray(np.zeros((0, 3)), [0, 0, 1])), 0)
         ebpo.convert("scan.ply", "other.ebpo.h5")

@@ -108,7 +108,7 @@ START_TEST(test_zero_points_are_accepted)
 }
 END_TEST
 
-START_TEST(test_surface_has_distance_but_no_inside)
+START_TEST(test_surface_has_distance_with_sign)
 {
     static const char *const names[] = { "open_box", "flipped_face_cube", "mobius", "band",
                                          "sheet" };
@@ -120,20 +120,25 @@ START_TEST(test_surface_has_distance_but_no_inside)
     double *points = query_alloc(count, 3 * sizeof *points);
     query_truth *truth = query_alloc(count, sizeof *truth);
     ebpo_distance_result *distance = query_alloc(count, sizeof *distance);
-    ebpo_inside_result inside;
+    ebpo_inside_result *inside = query_alloc(count, sizeof *inside);
     ebpo_error error = EBPO_ERROR_INIT;
     query_make_points(&m, count, 3, points);
     query_find_truths(&m, points, count, truth);
-    ck_assert_int_eq(ebpo_inside(m.context, points, NULL, &inside, &error), EBPO_E_NOT_SOLID);
-    ck_assert_int_ne(error.message[0], 0);
+    ck_assert_int_eq(ebpo_inside_many(m.context, points, count, NULL, inside, &error), EBPO_OK);
     for (int is_unsigned = 0; is_unsigned < 2; is_unsigned++) {
         ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
         options.unsigned_distance = is_unsigned;
         ck_assert_int_eq(ebpo_distance_many(m.context, points, count, &options, distance, &error),
                          EBPO_OK);
+        for (uint64_t i = 0; i < count; i++) {
+            bool negative = !is_unsigned && inside[i].where == EBPO_IN;
+            ck_assert_int_eq(signbit(distance[i].distance) != 0, negative);
+            distance[i].distance = fabs(distance[i].distance);
+        }
         ck_assert_uint_eq(query_wrong_distance(&m, points, truth, count, is_unsigned, distance), 0);
     }
     free(points);
+    free(inside);
     free(truth);
     free(distance);
     query_model_free(&m);
@@ -152,7 +157,7 @@ TEST_SUITE(query)
     tcase_add_test(points, test_planes_do_not_decide_between_two_outsides);
     tcase_add_test(refusals, test_non_finite_points_refused_by_index);
     tcase_add_test(refusals, test_zero_points_are_accepted);
-    tcase_add_loop_test(refusals, test_surface_has_distance_but_no_inside, 0, 5);
+    tcase_add_loop_test(refusals, test_surface_has_distance_with_sign, 0, 5);
     suite_add_tcase(suite, points);
     suite_add_tcase(suite, refusals);
     return suite;

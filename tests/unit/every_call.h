@@ -34,7 +34,8 @@ ebpo_status every_call_two_models(ebpo_model *model, bool whole, ebpo_error *err
 
 /* Inputs of the calls, below the scratch folder. */
 #define EVERY_CALL_MODEL     "model.ebpo.h5"
-#define EVERY_CALL_ROWS      "rows.h5" /* rows of coordinates, at EVERY_CALL_ROWS_PATH */
+#define EVERY_CALL_SURFACE   "surface.ebpo.h5" /* with holes, without its border */
+#define EVERY_CALL_ROWS      "rows.h5"         /* rows of coordinates, at EVERY_CALL_ROWS_PATH */
 #define EVERY_CALL_ROWS_PATH "/VTKHDF/Points"
 #define EVERY_CALL_PLY       "torus.ply"
 #define EVERY_CALL_SPLIT     "split.ply"    /* without shared vertices */

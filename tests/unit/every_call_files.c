@@ -381,6 +381,46 @@ static ebpo_status call_repack(every_call_env *e)
     return ebpo_file_repack(e->file, scratch("part.ebpo.h5"), &read, &write, e->error);
 }
 
+/* Queries a surface with its border. */
+static ebpo_status query_surface(const ebpo_file *file, ebpo_error *error)
+{
+    ebpo_model *model = NULL;
+    ebpo_context *context = NULL;
+    double points[EVERY_CALL_POINTS][3];
+    ebpo_inside_result results[EVERY_CALL_POINTS];
+    ebpo_winding_bounds bounds[EVERY_CALL_POINTS];
+    every_call_points(points);
+    ebpo_status status = ebpo_model_new(file, NULL, &model, error);
+    if (status == EBPO_OK)
+        status = ebpo_context_new(model, &context, error);
+    if (status == EBPO_OK)
+        status = ebpo_inside_many(context, points[0], EVERY_CALL_POINTS, NULL, results, error);
+    if (status == EBPO_OK)
+        status = ebpo_winding(context, points[0], EVERY_CALL_POINTS, 1e-6, bounds, error);
+    ebpo_context_free(context);
+    ebpo_model_free(model);
+    return status;
+}
+
+static ebpo_status call_add_border(every_call_env *e)
+{
+    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
+    ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
+    ebpo_file *file = NULL, *whole = NULL;
+    read.threads = write.threads = 1;
+    read.workspace = e->workspace;
+    ebpo_status status = ebpo_open(scratch(EVERY_CALL_SURFACE), &file, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_file_add_border(file, scratch("part.ebpo.h5"), &read, &write, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_open(scratch("part.ebpo.h5"), &whole, e->error);
+    if (status == EBPO_OK)
+        status = query_surface(whole, e->error);
+    ebpo_close(whole);
+    ebpo_close(file);
+    return status;
+}
+
 static ebpo_status export_to(every_call_env *e, const char *name, ebpo_export_format format)
 {
     ebpo_export_report report = { .struct_size = sizeof report };
@@ -431,6 +471,7 @@ const every_call every_call_files[] = {
     { "subset", call_subset },
     { "subset_coarse", call_subset_coarse },
     { "repack", call_repack },
+    { "add_border", call_add_border },
     { "export_xdmf", call_xdmf },
     { "export_vtkhdf", call_vtk },
     { "export_gltf", call_gltf },

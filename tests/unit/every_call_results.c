@@ -95,6 +95,13 @@ static ebpo_status query_rays(ebpo_context *context, ebpo_error *error)
     return status;
 }
 
+static ebpo_status query_winding(ebpo_context *context, ebpo_error *error)
+{
+    static const double points[2][3] = { { 0.1, 0.2, 0.3 }, { 9, 9, 9 } };
+    ebpo_winding_bounds bounds[2];
+    return ebpo_winding(context, points[0], 2, 1e-6, bounds, error);
+}
+
 static ebpo_status query_all(ebpo_model *model, ebpo_error *error)
 {
     ebpo_context *context;
@@ -106,6 +113,8 @@ static ebpo_status query_all(ebpo_model *model, ebpo_error *error)
         status = query_many(context, error);
     if (status == EBPO_OK)
         status = query_rays(context, error);
+    if (status == EBPO_OK)
+        status = query_winding(context, error);
     if (status == EBPO_OK)
         status = ebpo_model_get_stats(model, &stats);
 #if EBPO_HAVE_EXTRAS

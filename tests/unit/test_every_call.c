@@ -110,6 +110,21 @@ static void write_rows(void)
     ebpo_close(file);
 }
 
+static void write_surface(uint32_t n)
+{
+    ebpo_mesh mesh = ebpo_test_torus(3, 1, n, n);
+    ebpo_prepared prepared = EBPO_PREPARED_INIT;
+    ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
+    ebpo_tree tree;
+    mesh.face_count -= 5;
+    options.leaf_faces = 8;
+    options.parts &= ~(uint32_t)EBPO_PART_BORDER;
+    fine(ebpo_mesh_prepare(&mesh, NULL, &prepared, &error));
+    fine(ebpo_build(&mesh, &prepared.report, NULL, &options, &tree, &error));
+    fine(ebpo_tree_write(&tree, scratch(EVERY_CALL_SURFACE), NULL, &error));
+    ebpo_tree_free(&tree);
+}
+
 static void write_model(uint32_t n)
 {
     ebpo_mesh mesh = ebpo_test_torus(3, 1, n, n);
@@ -123,6 +138,7 @@ static void write_model(uint32_t n)
     fine(ebpo_build(&mesh, &prepared.report, NULL, &options, &tree, &error));
     fine(ebpo_tree_write(&tree, scratch(EVERY_CALL_MODEL), NULL, &error));
     ebpo_tree_free(&tree);
+    write_surface(n);
     write_rows();
 }
 

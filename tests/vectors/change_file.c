@@ -263,18 +263,35 @@ haddr_t chunk_address(const char *path, hsize_t *size)
 /* --- checksums of the current arrays --- */
 
 typedef struct paths {
-    bool of_colours;
+    const char *attribute; /* of the checksum */
     char *path[512];
     unsigned count;
 } paths;
+
+static bool ends_with(const char *name, const char *end)
+{
+    size_t length = strlen(name), of_end = strlen(end);
+    return length > of_end && strcmp(name + length - of_end, end) == 0;
+}
+
+/* Returns the name of the checksum that counts an array. */
+static const char *checksum_of(const char *name)
+{
+    char kind[16];
+    get_text("/", "kind", kind, sizeof kind);
+    bool border = strncmp(name, "border/", 7) == 0 ||
+                  (strcmp(kind, "surface") == 0 && ends_with(name, "_winding"));
+    return border                            ? "border_sha256"
+           : ends_with(name, "gray_colours") ? "colours_sha256"
+                                             : "content_sha256";
+}
 
 static herr_t take_array(hid_t object, const char *name, const H5O_info_t *info, void *user)
 {
     paths *all = user;
     char path[64];
     (void)object;
-    bool colours = strlen(name) > 12 && strcmp(name + strlen(name) - 12, "gray_colours") == 0;
-    if (colours != all->of_colours)
+    if (strcmp(checksum_of(name), all->attribute) != 0)
         return 0;
     if (info->type != H5O_TYPE_DATASET || strncmp(name, "x-", 2) == 0 ||
         strcmp(name, "chunk_checksums") == 0 || strncmp(name, "attributes/", 11) == 0)
@@ -314,9 +331,9 @@ static void digest_of_array(const char *path, uint8_t digest[32])
     H5Dclose(id);
 }
 
-static void state_checksum(const char *name, bool of_colours)
+static void state_checksum(const char *name)
 {
-    paths all = { .of_colours = of_colours };
+    paths all = { .attribute = name };
     uint8_t digest[32];
     char hex[65];
     ebpo_sha256 total;
@@ -342,8 +359,9 @@ void state_content(void)
 {
     if (H5Lexists(changed, "subtrees", H5P_DEFAULT) > 0)
         return;
-    state_checksum("content_sha256", false);
-    state_checksum("colours_sha256", true);
+    state_checksum("content_sha256");
+    state_checksum("colours_sha256");
+    state_checksum("border_sha256");
 }
 
 uint8_t *slurp(const char *path, size_t *size)

@@ -36,6 +36,7 @@ static const char *folder;
 #define WELDED    "58_welded_within_a_distance"
 #define SUMMED    "55_chunk_checksums_of_subtrees"
 #define SURFACE   "07_surface"
+#define BORDER    "65_border"
 #define CLOSE     "26_subset_error"
 #define MANY      "16_many_subtrees"
 
@@ -561,6 +562,15 @@ static void v_open_edges(void)
         poke("/mesh/vertices", 12 + k, 0);
 }
 static void v_mean(void) { add_to("/levels/01/gray_colours", 0, 1); }
+static void v_border_solid(void) { set_text("/", "kind", "solid"); }
+static void v_border_counts(void) { set_count("/", "border_loops", 7); }
+static void v_border_longest(void) { set_count("/", "border_longest", 4); }
+static void v_border_weight(void) { poke("/border/loops", 1, 0); }
+static void v_border_nan(void) { poke("/border/points", 0, INT64_C(0xfffffffe)); }
+static void v_border_changed(void) { poke("/border/loops", 1, 3); }
+static void v_border_moved(void) { add_to("/border/points", 6, INT64_C(1) << 21); }
+static void v_border_winding(void) { add_to("/levels/01/leaf_winding", 0, 1); }
+static void v_border_area(void) { set_real("/", "border_area", 17); }
 static void v_volume(void) { set_real("/levels/00", "gray_volume", NAN); }
 
 typedef enum late_change {
@@ -721,6 +731,15 @@ static const failed_vector failed[] = {
     { "colours_array_missing", PAINTED, v_colours_missing, NONE, "R4.10" },
     { "colours_without_checksum", PAINTED, v_colours_digest, NONE, "R5.1" },
     { "colours_changed", PAINTED, v_colours_changed, NONE, "RE.2" },
+    { "border_of_a_solid", BORDER, v_border_solid, NONE, "RK.1" },
+    { "border_counts", BORDER, v_border_counts, NONE, "RK.2" },
+    { "border_longest", BORDER, v_border_longest, NONE, "RK.3" },
+    { "border_weight_zero", BORDER, v_border_weight, NONE, "RK.3" },
+    { "border_nan", BORDER, v_border_nan, NONE, "RK.4" },
+    { "border_changed", BORDER, v_border_changed, NONE, "RK.5" },
+    { "unverified_border_moved", BORDER, v_border_moved, NONE, "RK.6" },
+    { "unverified_border_winding", BORDER, v_border_winding, NONE, "RK.7" },
+    { "unverified_border_area", BORDER, v_border_area, NONE, "RK.8" },
     { "attributes_without_mesh", COLOURED, v_attributes_no_mesh, NONE, "R5.18" },
     { "chunk_in_place_of_another", SUMMED, NULL, MOVE_CHUNKS, "RF.4" },
     { "chunk_checksums_of_fewer_chunks", SUMMED, v_checksums_fewer, NONE, "RF.3" },
@@ -865,7 +884,7 @@ static void make_vector(const failed_vector *v)
     if (v->change)
         change_objects(path, v->change);
     if (v->change && v->change != v_content && v->change != v_digest_text &&
-        v->change != v_colours_changed)
+        v->change != v_colours_changed && v->change != v_border_changed)
         change_objects(path, state_content);
     if (v->late != NONE)
         change_bytes(path, v->late);

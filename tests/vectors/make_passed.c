@@ -65,7 +65,7 @@ static void build_mesh(ebpo_tree *tree, ebpo_mesh mesh, how h)
     prepare.weld_distance = h.weld_distance;
     options.max_level = h.max_level;
     options.leaf_faces = h.leaf_faces;
-    options.parts |= h.more_parts;
+    options.parts = (options.parts & ~(uint32_t)EBPO_PART_BORDER) | h.more_parts;
     options.rule = h.rule;
     options.unit = "m";
     if (ebpo_mesh_prepare(&mesh, &prepare, &prepared, &error) != EBPO_OK ||
@@ -805,6 +805,42 @@ static ebpo_mesh fan(uint32_t faces)
     return mesh;
 }
 
+/* --- borders of surfaces --- */
+
+/* A tetrahedron without a face, and a face twice, whose border has weight 2. */
+static ebpo_mesh open_faces(void)
+{
+    ebpo_mesh mesh = ebpo_test_tetrahedron(1);
+    mesh.face_count = 3;
+    uint32_t a = ebpo_test_append_vertex(&mesh, 2, 0, 0.5),
+             b = ebpo_test_append_vertex(&mesh, 3, 0, 0),
+             c = ebpo_test_append_vertex(&mesh, 2, 1, 0);
+    ebpo_test_append_face(&mesh, a, b, c);
+    ebpo_test_append_face(&mesh, a, b, c);
+    return mesh;
+}
+
+static void make_borders(void)
+{
+    ebpo_tree tree;
+    ebpo_subset_options box = EBPO_SUBSET_OPTIONS_INIT;
+    how with = { 2, 1, EBPO_PART_BORDER, 0, 0, 0, 0 };
+    build_float(&tree, open_faces(), with);
+    write_vector("65_border", &tree, EBPO_CODEC_NONE, ~0u);
+    build_mesh(&tree, open_faces(), with);
+    write_vector("66_border_doubles", &tree, EBPO_CODEC_ZSTD, ~0u);
+    ebpo_mesh torus = ebpo_test_torus(1, 0.375, 80, 32);
+    torus.face_count -= 70;
+    with = (how){ 5, 6, EBPO_PART_BORDER, 0, 0, 0, 0 };
+    build_float(&tree, torus, with);
+    write_laid_out("67_border_with_subtrees", &tree, EBPO_CODEC_ZSTD, ~0u, 10);
+    box.boxed = true;
+    for (int k = 0; k < 3; k++)
+        box.max[k] = 0.6;
+    subset(&tree, "67_border_with_subtrees", &box);
+    write_vector("68_border_of_a_subset", &tree, EBPO_CODEC_ZSTD, ~0u);
+}
+
 static void make_long(void)
 {
     ebpo_tree tree;
@@ -841,4 +877,5 @@ void make_passed(const char *to)
     make_sums();
     make_welded();
     make_long();
+    make_borders();
 }

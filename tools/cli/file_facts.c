@@ -52,6 +52,17 @@ static void print_source(FILE *out, const ebpo_info *info)
             (unsigned long long)info->source_face_count);
 }
 
+static void print_border(FILE *out, const ebpo_info *info)
+{
+    char edges[40], loops[40];
+    fprintf(out,
+            "\n  border    %s in %s, the longest of %llu; caps of area %.4g, %.3g %% of the mesh",
+            words_plural(edges, sizeof edges, info->border_points, "edge", "edges"),
+            words_plural(loops, sizeof loops, info->border_loops, "loop", "loops"),
+            (unsigned long long)info->border_longest, info->border_area,
+            100 * info->border_area / info->report.area);
+}
+
 static void print_model(FILE *out, const ebpo_info *info)
 {
     fprintf(out, "  mesh      %llu vertices, %llu faces, %s coordinates",
@@ -69,6 +80,8 @@ static void print_model(FILE *out, const ebpo_info *info)
                 findings_volume(text, &solid, &info->report, info->unit),
                 printed ? "" : " (see ebpo measure)", words_rule(info->rule));
     }
+    if (info->parts & EBPO_PART_BORDER)
+        print_border(out, info);
     if (facts_inside_out(info))
         fprintf(out, "\n  warning   %s", facts_inside_out(info));
     fprintf(out, "\n  box       %.6g %.6g %.6g, size %.6g %.6g %.6g%s%s\n", info->box_origin[0],
@@ -137,7 +150,8 @@ static uint64_t other_bytes(const ebpo_info *info, const ebpo_stored_sizes *stor
 {
     uint64_t sum = info->head_bytes + info->chunk_index_bytes + level_bytes(info, stored) +
                    stored->mesh_vertex_bytes + stored->mesh_face_bytes + stored->map_bytes +
-                   stored->subtree_bytes + stored->attribute_bytes + stored->checksum_bytes;
+                   stored->subtree_bytes + stored->attribute_bytes + stored->border_bytes +
+                   stored->checksum_bytes;
     return info->file_bytes > sum ? info->file_bytes - sum : 0;
 }
 
@@ -180,6 +194,7 @@ void facts_print(FILE *out, const char *path, const ebpo_info *info,
     print_bytes(out, "maps", info, stored->map_bytes);
     print_bytes(out, "subtrees", info, stored->subtree_bytes);
     print_bytes(out, "attributes", info, stored->attribute_bytes);
+    print_bytes(out, "border", info, stored->border_bytes);
     print_bytes(out, "checksums", info, stored->checksum_bytes);
     print_bytes(out, "other", info, other_bytes(info, stored));
     print_bytes(out, "file", info, info->file_bytes);
@@ -368,6 +383,18 @@ static void json_subset(json *j, const ebpo_info *info)
     json_end(j);
 }
 
+static void json_border(json *j, const ebpo_info *info)
+{
+    if (!(info->parts & EBPO_PART_BORDER))
+        return;
+    json_object(j, "border");
+    json_uint(j, "loops", info->border_loops);
+    json_uint(j, "edges", info->border_points);
+    json_uint(j, "longest", info->border_longest);
+    json_real(j, "cap_area", info->border_area);
+    json_end(j);
+}
+
 static void json_storage(json *j, const ebpo_info *info, const ebpo_stored_sizes *stored)
 {
     char hex[65];
@@ -380,6 +407,7 @@ static void json_storage(json *j, const ebpo_info *info, const ebpo_stored_sizes
     json_text(j, "codec", words_codec(info->codec));
     if (info->parts & EBPO_PART_MESH)
         json_text(j, "face_coding", info->gates ? "gates" : "high-water");
+    json_border(j, info);
     json_subset(j, info);
     json_text(j, "content_sha256", hex);
     json_object(j, "bytes");
@@ -392,6 +420,7 @@ static void json_storage(json *j, const ebpo_info *info, const ebpo_stored_sizes
     json_uint(j, "maps", stored->map_bytes);
     json_uint(j, "subtrees", stored->subtree_bytes);
     json_uint(j, "attributes", stored->attribute_bytes);
+    json_uint(j, "border", stored->border_bytes);
     json_uint(j, "chunk_checksums", stored->checksum_bytes);
     json_uint(j, "other", other_bytes(info, stored));
     json_end(j);

@@ -54,7 +54,7 @@ static void print_count(FILE *out, bool *any, const ebpo_finding *f, const char 
 static void warn_of_surface(FILE *out, const ebpo_mesh_report *r)
 {
     bool any = false;
-    fputs("warning: this is a surface, not a solid, so it has no inside", out);
+    fputs("warning: this is a surface, not a solid; solid angles decide what is inside", out);
     print_count(out, &any, &r->boundary_edges, "boundary edges");
     print_count(out, &any, &r->misoriented_edges, "misoriented edges");
     print_count(out, &any, &r->nonmanifold_edges, "edges shared by more than two faces");

@@ -112,7 +112,7 @@ static void print_reading(FILE *out, const ebpo_mesh *mesh)
 static const char *kind_of_mesh(const ebpo_mesh_report *report)
 {
     if (!report->balanced)
-        return "a surface: its edges do not balance, so there is no inside";
+        return "a surface: its edges do not balance";
     return report->manifold ? "a solid, closed 2-manifold"
                             : "a solid: its edges balance, though it is not a 2-manifold";
 }

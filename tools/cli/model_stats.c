@@ -28,6 +28,7 @@ static const struct stat_field {
     { "distance_subtrees", "subtrees", offsetof(ebpo_model_stats, distance_subtrees), STAT_UINT },
     { "distance_loads", "subtrees", offsetof(ebpo_model_stats, distance_loads), STAT_UINT },
     { "skeleton_bytes", "bytes", offsetof(ebpo_model_stats, skeleton_bytes), STAT_UINT },
+    { "ties", "", offsetof(ebpo_model_stats, ties), STAT_UINT },
 };
 enum { STAT_COUNT = sizeof stat_fields / sizeof *stat_fields };
 

@@ -111,6 +111,7 @@ bool query_options_from(const char *name, const query_values *v, ebpo_model_opti
     model->loading = inside_meanings[v->inside_mode].loading;
     model->prefetch = v->prefetch;
     model->threads = (unsigned)v->threads;
+    model->threshold = v->threshold;
     inside->level = distance->level = (int)v->level;
     inside->envelopes = inside_meanings[v->inside_mode].envelopes;
     distance->mode = (ebpo_distance_mode)v->distance_mode;

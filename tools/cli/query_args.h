@@ -11,7 +11,7 @@
 typedef struct query_values {
     const char *memory, *deadline, *attribute, *out, *shard;
     int64_t cut_level, threads, level, nearest, together;
-    double max_distance, tmax, within;
+    double max_distance, tmax, within, threshold;
     int inside_mode, distance_mode, ray_sides; /* indices into the word lists below */
     bool prefetch, raw, json, unsigned_distance, no_warm, all, any, header, csv, npy, force;
     remote_values remote;
@@ -19,7 +19,7 @@ typedef struct query_values {
 #define QUERY_VALUES_INIT                                                         \
     {                                                                             \
         .cut_level = -1, .level = -1, .max_distance = INFINITY, .tmax = INFINITY, \
-        .within = INFINITY, .remote = REMOTE_VALUES_INIT                          \
+        .within = INFINITY, .threshold = 0.5, .remote = REMOTE_VALUES_INIT        \
     }
 
 /* Words for --mode, NULL-terminated; EBP 2017, section 4.3. */

@@ -169,7 +169,7 @@ typedef struct ebpo_build_options {
     {                                                                                           \
         sizeof(ebpo_build_options), -1, 16, 0.003,                                              \
             EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES |         \
-                EBPO_PART_COLOURS,                                                              \
+                EBPO_PART_COLOURS | EBPO_PART_BORDER,                                           \
             EBPO_RULE_NONZERO, false, 0, EBPO_SELECT_INHERIT, 40, 0, EBPO_NORMALS_SPHERICAL, 1, \
             NULL, NULL, NULL, { NULL, NULL }, NULL                                              \
     }
@@ -191,6 +191,19 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_build(ebpo_mesh *mesh, const ebpo_mesh_r
                                               const ebpo_repair_record *repair_record,
                                               const ebpo_build_options *options, ebpo_tree *out,
                                               ebpo_error *error);
+
+/*
+ * Does what ebpo_file_repack does, and adds the part EBPO_PART_BORDER to a surface with a mesh that
+ * does not have it, unless it is a subset.
+ *
+ * EBPO_E_LIMIT: the border has 2^31 edges or more. Other errors are those of ebpo_file_repack.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_add_border(const ebpo_file *file, const char *path,
+                                                        const ebpo_read_options *read,
+                                                        const ebpo_write_options *write,
+                                                        ebpo_error *error);
 
 /* Criterion by which leaves with few faces become one leaf (BP 2008, 3.3.1). */
 typedef enum ebpo_coalescing {

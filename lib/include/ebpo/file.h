@@ -59,7 +59,8 @@ typedef enum ebpo_part {
     EBPO_PART_MAPS = 4,        /* source indices of vertices and faces */
     EBPO_PART_LEAF_PLANES = 8, /* stored envelope planes of leaves */
     EBPO_PART_ATTRIBUTES = 16, /* other data of the source for vertices and faces */
-    EBPO_PART_COLOURS = 32     /* mean colours of the faces of gray nodes */
+    EBPO_PART_COLOURS = 32,    /* mean colours of the faces of gray nodes */
+    EBPO_PART_BORDER = 64      /* of a surface: its border and winding numbers, for its inside */
 } ebpo_part;
 
 typedef enum ebpo_codec {
@@ -113,14 +114,18 @@ typedef struct ebpo_level {
 
     /*
      * [leaf_count] winding number at the leaf's lowest corner, after the corner was shifted by
-     * infinitely small positive numbers (format-spec/README.md, section 5); solids only
+     * infinitely small positive numbers (format-spec/README.md, section 10); solids, and surfaces
+     * with EBPO_PART_BORDER
      */
     int32_t *leaf_winding;
 
     /* [black_count] winding number of the cell. NULL: all 1 */
     int32_t *black_winding;
 
-    /* [white_count] winding number of the cell. NULL: all 0 */
+    /*
+     * [white_count] winding number of the cell; for surfaces with EBPO_PART_BORDER, that at its
+     * lowest corner, shifted. NULL: all 0
+     */
     int32_t *white_winding;
 
     /* [leaf_count] index of the leaf's first new face */
@@ -344,7 +349,26 @@ typedef struct ebpo_info {
 
     /* True if the corners of faces are stored with coding `gates`. */
     bool gates;
+
+    /*
+     * The border of a surface, with EBPO_PART_BORDER: number of loops, of points in all loops, of
+     * points in the longest loop; area of the triangles that close the loops; checksum.
+     */
+    uint64_t border_loops, border_points, border_longest;
+    double border_area;
+    uint8_t border_sha256[32];
 } ebpo_info;
+
+/* Closed loops: the border of a surface (format-spec/border.md). */
+typedef struct ebpo_border_loops {
+    uint64_t loop_count, point_count;
+
+    /* [loop_count][2] number of points of each loop, at least 3; its weight, at least 1 */
+    uint32_t *loop;
+
+    /* [point_count][3] coordinates, loop after loop */
+    double *point;
+} ebpo_border_loops;
 
 /*
  * A whole model in memory: ebpo_build makes it and ebpo_tree_write writes it. Faces are in the
@@ -367,6 +391,9 @@ typedef struct ebpo_tree {
 
     /* Owns vertex_source and face_source. NULL: they were allocated with malloc. */
     ebpo_workspace *workspace;
+
+    /* With EBPO_PART_BORDER; the arrays were allocated with malloc. */
+    ebpo_border_loops border;
 } ebpo_tree;
 
 /*
@@ -752,6 +779,8 @@ typedef struct ebpo_stored_sizes {
 
     /* List of chunk checksums. */
     uint64_t checksum_bytes;
+
+    uint64_t border_bytes;
 } ebpo_stored_sizes;
 
 #define EBPO_STORED_SIZES_INIT EBPO_SIZED(ebpo_stored_sizes)

@@ -3,7 +3,7 @@
  *
  *   Models           ebpo_model_new, ebpo_context_new (one per thread), ebpo_model_memory
  *   Shared budget    ebpo_budget_new
- *   Point in solid   ebpo_inside, ebpo_inside_many
+ *   Point in solid   ebpo_inside, ebpo_inside_many, ebpo_winding
  *   Distance         ebpo_distance, ebpo_distance_many, ebpo_distance_within
  *   Rays             ebpo_ray_first, ebpo_ray_any, ebpo_ray_all; ebpo_ray_first_many and so on
  *   Attributes       ebpo_sampler_new, ebpo_sample (at points on faces)
@@ -97,11 +97,21 @@ typedef struct ebpo_model_options {
      * of the budget; else it is loaded in parts.
      */
     ebpo_budget *budget;
+
+    /*
+     * For surfaces with EBPO_PART_BORDER, from 1/1024 to 1023/1024. They have an inside, and signed
+     * distances, by the generalized winding number w: the sum of the solid angles of all faces,
+     * divided by 4 pi. The file's winding rule defines the inside: nonzero: |w| > threshold;
+     * positive: w > threshold; evenodd: |w - e| > threshold, where e is the nearest even integer.
+     * Decisions are exact. Where w equals the boundary of the rule, or 512 bits do not decide, a
+     * point is outside, and ebpo_model_stats.ties counts it.
+     */
+    double threshold;
 } ebpo_model_options;
 
-#define EBPO_MODEL_OPTIONS_INIT                                                            \
-    {                                                                                      \
-        sizeof(ebpo_model_options), 0, -1, EBPO_LOAD_CACHE, false, 0, { NULL, NULL }, NULL \
+#define EBPO_MODEL_OPTIONS_INIT                                                                 \
+    {                                                                                           \
+        sizeof(ebpo_model_options), 0, -1, EBPO_LOAD_CACHE, false, 0, { NULL, NULL }, NULL, 0.5 \
     }
 
 /* The part of a file that is in memory, prepared for fast queries. Threads may share a model. */
@@ -253,6 +263,9 @@ typedef struct ebpo_model_stats {
      * memory. Skeletons avoid unnecessary loads.
      */
     uint64_t skeleton_bytes;
+
+    /* Decisions of points in a surface (ebpo_model_options.threshold) that were ties. */
+    uint64_t ties;
 } ebpo_model_stats;
 
 #define EBPO_MODEL_STATS_INIT EBPO_SIZED(ebpo_model_stats)
@@ -392,9 +405,9 @@ typedef struct ebpo_inside_result {
     int32_t where;
 
     /*
-     * Winding number. 0 for EBPO_ON and EBPO_MAYBE. With a level or deadline, 0 also if an envelope
-     * decided that the point is outside. The true winding number may then differ from 0 with rules
-     * other than EBPO_RULE_NONZERO.
+     * Winding number; for a surface, 1 inside and 0 outside. 0 for EBPO_ON and EBPO_MAYBE. With a
+     * level or deadline, 0 also if an envelope decided that the point is outside. The true winding
+     * number may then differ from 0 with rules other than EBPO_RULE_NONZERO.
      */
     int32_t winding;
 
@@ -409,8 +422,9 @@ typedef struct ebpo_inside_result {
  * Classifies a point as inside, outside or on the surface (BP 2008, section 5.2.1; EBP 2017,
  * section 4.2).
  *
- * EBPO_E_NOT_SOLID: the model is a surface. EBPO_E_ABSENT: the file has no mesh and no level is
- * given, or a subset lacks the required data.
+ * EBPO_E_NOT_SOLID: the model is a surface without EBPO_PART_BORDER. EBPO_E_ARGUMENT: a surface,
+ * and a level or deadline. EBPO_E_ABSENT: the file has no mesh and no level is given, or a subset
+ * lacks the required data.
  *
  * Threads: one per context.
  */
@@ -427,6 +441,25 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_inside_many(ebpo_context *context, const
                                                     uint64_t count,
                                                     const ebpo_inside_options *options,
                                                     ebpo_inside_result *out, ebpo_error *error);
+
+/* Bounds of a winding number; NAN on a face. */
+typedef struct ebpo_winding_bounds {
+    double lo, hi;
+} ebpo_winding_bounds;
+
+/*
+ * Bounds the winding numbers of points[count][3], into out[count]. For a surface with
+ * EBPO_PART_BORDER, hi - lo is at most `width`, at least 0, where double precision allows it: down
+ * to about 1e-14 for small meshes, and far more near an edge of the border. For a solid, both
+ * bounds are the integer winding number.
+ *
+ * EBPO_E_NOT_SOLID, EBPO_E_ABSENT as for ebpo_inside.
+ *
+ * Threads: one per context.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_winding(ebpo_context *context, const double *points,
+                                                uint64_t count, double width,
+                                                ebpo_winding_bounds *out, ebpo_error *error);
 
 /* ---- distance ---- */
 
@@ -465,7 +498,10 @@ typedef struct ebpo_distance_options {
     /* Faces farther away are ignored; in the model's unit, at least 0. INFINITY: no limit. */
     double max_distance;
 
-    /* True: the sign is not computed, which is faster. Surfaces have no sign. */
+    /*
+     * True: the sign is not computed, which is faster. Surfaces have a sign only with
+     * EBPO_PART_BORDER.
+     */
     bool unsigned_distance;
 
     /*

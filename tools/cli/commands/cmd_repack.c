@@ -58,6 +58,8 @@ static void print_words(const ebpo_info *info, const char *out, const ebpo_info 
     printf("%s: the same content, SHA-256 %s; %s before, %s now", out, hex,
            words_bytes(before, sizeof before, from->file_bytes),
            words_bytes(after, sizeof after, info->file_bytes));
+    if (info->parts & ~from->parts & EBPO_PART_BORDER)
+        fputs(", with the border of the surface", stdout);
     if (info->subtree_level)
         printf(", %" PRIu64 " subtrees below level %d", info->level[info->subtree_level].gray_count,
                info->subtree_level);
@@ -123,7 +125,7 @@ static int run_repack(void *given, const char **operand)
     if (status == EBPO_OK)
         status = choose_codec(v, ebpo_file_info(file), &write, &error);
     if (status == EBPO_OK)
-        status = written = ebpo_file_repack(file, operand[1], &read, &write, &error);
+        status = written = ebpo_file_add_border(file, operand[1], &read, &write, &error);
     progress_wipe(&line);
     if (status == EBPO_OK)
         status = report_sizes(v, operand[1], file, progress_now() - begun, &error);

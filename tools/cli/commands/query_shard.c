@@ -106,6 +106,7 @@ static void report_query(json *j, const query_job *job)
     json_real(j, "tmax", v->tmax);
     json_bool(j, "all", v->all);
     json_bool(j, "any", v->any);
+    json_real(j, "threshold", v->threshold);
 }
 
 static void report_file(json *j, const char *key, const struct stat *st)

@@ -52,7 +52,8 @@ static uint32_t part_named(const char *word, size_t length)
                   { "planes", EBPO_PART_PLANES },
                   { "leaf-planes", EBPO_PART_LEAF_PLANES },
                   { "attributes", EBPO_PART_ATTRIBUTES },
-                  { "colours", EBPO_PART_COLOURS } };
+                  { "colours", EBPO_PART_COLOURS },
+                  { "border", EBPO_PART_BORDER } };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         if (strlen(names[i].word) == length && memcmp(names[i].word, word, length) == 0)
             return names[i].part;

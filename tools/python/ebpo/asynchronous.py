@@ -184,7 +184,7 @@ async def open_async(source: str | AsyncByteRanges, *, memory: Size | None = Non
         size, fetch, name = source.size, source.fetch, type(source).__name__
     model = AsyncModel(Arriving(size_in_bytes(size), name, size_in_bytes(buffer)), fetch, source)
     options = {"memory": memory, "cut_level": cut_level, "prefetch": False, "threads": None,
-               "storage_options": None, "max_expansion": None}
+               "storage_options": None, "max_expansion": None, "threshold": 0.5}
     try:
         await model._open(options)
     except BaseException:

@@ -40,7 +40,7 @@ def open(source: Source, *, memory: Size | None = None, cut_level: int | None = 
          whole_limit: Size | None = None, unversioned: bool | None = None, netrc: bool | None = None,
          ca_file: Path | None = None, proxy: str | None = None, user_agent: str | None = None,
          cache_folder: Path | None = None, cache_bytes: Size | None = None,
-         cache_block: int | None = None) -> Model:
+         cache_block: int | None = None, threshold: float = 0.5) -> Model:
     """Open a file. Reads only its header; other data is read when a query needs it.
 
     source: one of these:
@@ -60,6 +60,8 @@ def open(source: Source, *, memory: Size | None = None, cut_level: int | None = 
     threads: number of threads for queries and for reading. None: all cores.
     max_expansion: largest ratio of the decoded arrays to the file size. None: 256; 64 MiB are always
         allowed. A file beyond the limit is refused (LimitError): it may be made to exhaust memory.
+    threshold: the generalized winding number above which a point of a surface, such as a scan with holes,
+        is inside.
     storage_options: options of fsspec for the URL.
     headers: {"Name": "value"}, sent with every request. user: "name:password".
     time_limit ... cache_block: members of ebpo_http_options in ebpo/http.h. None: the default there.
@@ -75,7 +77,8 @@ def open(source: Source, *, memory: Size | None = None, cut_level: int | None = 
             "unversioned": unversioned, "netrc": netrc, "ca_file": ca_file, "proxy": proxy, "user_agent": user_agent,
             "cache_folder": cache_folder, "cache_bytes": cache_bytes, "cache_block": cache_block}
     options = {"memory": memory, "cut_level": cut_level, "prefetch": prefetch, "threads": threads,
-               "storage_options": storage_options, "max_expansion": max_expansion}
+               "storage_options": storage_options, "max_expansion": max_expansion,
+               "threshold": threshold}
     return Model(source, {**options, **{name: value for name, value in http.items() if value is not None}})
 
 
@@ -105,11 +108,12 @@ class Model(PointQueries):
     def __init__(self, source: Source, options: dict[str, Any]) -> None:
         http = {name: value for name, value in options.items()
                 if name not in ("memory", "cut_level", "prefetch", "threads", "storage_options",
-                                 "max_expansion")}
+                                 "max_expansion", "threshold")}
         self._source, self._options = source, options
         self._threads = options["threads"] or 0
         self._model_options = made(c.ebpo_model_options, memory=size_in_bytes(options["memory"]),
-                                   prefetch=options["prefetch"], threads=self._threads)
+                                   prefetch=options["prefetch"], threads=self._threads,
+                                   threshold=options["threshold"])
         if options["cut_level"] is not None:
             self._model_options.cut_level = options["cut_level"]
         self._wished_options = bytes(self._model_options)

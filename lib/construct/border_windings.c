@@ -1,0 +1,254 @@
+/* Finds the border of a surface, and the winding numbers of the surface with its caps.
+ *
+ * The caps (geometry/cap_triangles.h) close the border, so the winding number of surface and caps
+ * is an integer. The number of a white node or a leaf is that of its lowest corner, shifted as in
+ * corner_windings.c. The nodes are visited depth first. Each visit returns the differences of the
+ * numbers at the cell's corners from that at the lowest one: the crossings of the leaf's faces and
+ * of caps along the edges of the cell. The lowest corner of a child is a corner of an earlier
+ * sibling, so its number is known before the child is visited. Source: format-spec/border.md. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <ebpo/build.h>
+
+#include "construct/construct_stages.h"
+#include "construct/planes.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/workspace.h"
+#include "format/border_loops.h"
+#include "format/write_file.h"
+#include "geometry/cap_tree.h"
+#include "geometry/level_nodes.h"
+#include "geometry/vec3.h"
+#include "mesh/border.h"
+#include "mesh/mesh_parts.h"
+
+enum { BUFFER_FACES = 256 };
+
+typedef struct winding_walk {
+    ebpo_tree *tree;
+    ebpo_box box;
+    const ebpo_cap_tree *caps;
+    /* next item of each level: depth first, the items of a level have ascending octcodes */
+    uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX], white[EBPO_LEVELS_MAX],
+        ref[EBPO_LEVELS_MAX];
+    bool agree; /* all paths to a corner give the same number */
+    ebpo_triangle buffer[BUFFER_FACES];
+} winding_walk;
+
+/* For each corner of a cell, the axis of an edge from an earlier corner, and that corner. */
+static const struct {
+    int axis, before;
+} edge_to[8] = { { 0, 0 }, { 0, 0 }, { 1, 0 }, { 1, 1 }, { 2, 0 }, { 2, 1 }, { 2, 2 }, { 2, 3 } };
+
+/* Adds the crossings of caps along the edges of a cell to the differences of its corners. */
+static void add_cap_crossings(const winding_walk *w, ebpo_cell cell, int32_t delta[8])
+{
+    double low[3], high[3];
+    int32_t caps[8] = { 0 };
+    ebpo_cell_bounds(&w->box, cell, low, high);
+    if (!ebpo_caps_near(w->caps, low, high))
+        return;
+    for (int i = 1; i < 8; i++) {
+        int axis = edge_to[i].axis, before = edge_to[i].before;
+        const double from[3] = { before & 1 ? high[0] : low[0], before & 2 ? high[1] : low[1],
+                                 before & 4 ? high[2] : low[2] };
+        caps[i] = caps[before] + ebpo_cap_crossings(w->caps, from, high[axis], axis);
+        delta[i] += caps[i];
+    }
+}
+
+static void add_faces(winding_walk *w, ebpo_cell cell, const uint32_t *faces, uint64_t first,
+                      uint64_t count, int32_t delta[8])
+{
+    const ebpo_mesh *mesh = &w->tree->mesh;
+    int32_t part[8];
+    for (uint64_t at = 0; at < count; at += BUFFER_FACES) {
+        uint64_t some = count - at < BUFFER_FACES ? count - at : BUFFER_FACES;
+        for (uint64_t i = 0; i < some; i++) {
+            uint64_t face = faces ? faces[at + i] : first + at + i;
+            for (int k = 0; k < 3; k++)
+                ebpo_mesh_position(mesh, mesh->faces[3 * face + (uint64_t)k],
+                                   w->buffer[i].corner[k]);
+        }
+        ebpo_corner_windings(&w->box, cell, w->buffer, some, part);
+        for (int i = 0; i < 8; i++)
+            delta[i] += part[i];
+    }
+}
+
+/* Sets the number of a leaf, and the differences of its corners. */
+static void visit_leaf(winding_walk *w, ebpo_cell cell, int32_t winding, int32_t delta[8])
+{
+    ebpo_level *level = &w->tree->level[cell.level];
+    uint64_t i = w->leaf[cell.level]++, refs = level->leaf_ref_count[i];
+    level->leaf_winding[i] = winding;
+    add_faces(w, cell, NULL, level->leaf_first[i], level->leaf_new[i], delta);
+    if (refs)
+        add_faces(w, cell, level->leaf_refs + w->ref[cell.level], 0, refs, delta);
+    w->ref[cell.level] += refs;
+    add_cap_crossings(w, cell, delta);
+}
+
+static void visit_node(winding_walk *w, ebpo_cell cell, ebpo_node_type type, int32_t winding,
+                       int32_t delta[8]);
+
+/* Visits the children of a gray node. */
+static void visit_gray(winding_walk *w, ebpo_cell cell, int32_t winding, int32_t delta[8])
+{
+    const ebpo_level *below = &w->tree->level[cell.level + 1];
+    uint16_t types = below->types[w->group[cell.level + 1]++];
+    int32_t offset[8] = { 0 }, of_child[8][8];
+    for (int o = 0; o < 8; o++) {
+        bool known = o == 0;
+        for (int axis = 0; axis < 3; axis++) {
+            if (!(o >> axis & 1))
+                continue;
+            int before = o & ~(1 << axis);
+            int32_t sum = offset[before] + of_child[before][1 << axis];
+            w->agree = w->agree && (!known || sum == offset[o]);
+            offset[o] = sum;
+            known = true;
+        }
+        visit_node(w, ebpo_cell_child(cell, (unsigned)o), ebpo_group_type(types, (unsigned)o),
+                   winding + offset[o], of_child[o]);
+    }
+    for (int o = 0; o < 8; o++)
+        delta[o] = offset[o] + of_child[o][o];
+}
+
+static void visit_node(winding_walk *w, ebpo_cell cell, ebpo_node_type type, int32_t winding,
+                       int32_t delta[8])
+{
+    memset(delta, 0, 8 * sizeof *delta);
+    if (type == EBPO_GRAY) {
+        visit_gray(w, cell, winding, delta);
+    } else if (type == EBPO_LEAF) {
+        visit_leaf(w, cell, winding, delta);
+    } else {
+        w->tree->level[cell.level].white_winding[w->white[cell.level]++] = winding;
+        add_cap_crossings(w, cell, delta);
+    }
+}
+
+static ebpo_status make_windings(ebpo_tree *tree, const ebpo_cap_tree *caps, ebpo_error *error)
+{
+    winding_walk *w = ebpo_alloc_zero(1, sizeof *w);
+    if (!w)
+        return ebpo_fail_memory(error, sizeof *w);
+    *w = (winding_walk){
+        .tree = tree, .box = ebpo_root_box(&tree->info), .caps = caps, .agree = true
+    };
+    ebpo_status status = EBPO_OK;
+    for (int i = 0; i < tree->info.level_count && status == EBPO_OK; i++) {
+        ebpo_level *l = &tree->level[i];
+        if (l->leaf_count)
+            l->leaf_winding = ebpo_array_alloc(l->workspace, l->leaf_count, sizeof(int32_t));
+        if (l->white_count)
+            l->white_winding = ebpo_array_alloc(l->workspace, l->white_count, sizeof(int32_t));
+        if ((l->leaf_count && !l->leaf_winding) || (l->white_count && !l->white_winding))
+            status = ebpo_workspace_fail(l->workspace,
+                                         (l->leaf_count + l->white_count) * sizeof(int32_t), error);
+    }
+    int32_t delta[8];
+    if (status == EBPO_OK) {
+        visit_node(w, (ebpo_cell){ 0, { 0, 0, 0 } }, ebpo_group_type(tree->level[0].types[0], 0), 0,
+                   delta);
+        for (int i = 0; i < 8; i++)
+            w->agree = w->agree && delta[i] == 0;
+        if (!w->agree)
+            status = ebpo_fail(error, EBPO_E_NOT_SOLID,
+                               "winding numbers disagree: the caps do not close the mesh");
+    }
+    free(w);
+    return status;
+}
+
+/* Sets the counts and the area of the caps. */
+static void measure_border(ebpo_info *info, const ebpo_cap_tree *caps,
+                           const ebpo_border_loops *loops)
+{
+    info->border_loops = loops->loop_count;
+    info->border_points = loops->point_count;
+    info->border_longest = 0;
+    info->border_area = 0;
+    for (uint64_t i = 0; i < loops->loop_count; i++)
+        if (loops->loop[2 * i] > info->border_longest)
+            info->border_longest = loops->loop[2 * i];
+    for (uint64_t i = 0; i < caps->node_count; i++) {
+        const ebpo_cap_node *n = &caps->node[i];
+        double u[3], v[3], cross[3];
+        uint64_t m = n->from + (n->to - n->from) / 2;
+        if (n->weight == 0)
+            continue;
+        ebpo_vec3_subtract(caps->position[m], caps->position[n->from], u);
+        ebpo_vec3_subtract(caps->position[n->to], caps->position[n->from], v);
+        ebpo_vec3_cross(u, v, cross);
+        info->border_area += n->weight * ebpo_vec3_length(cross) / 2;
+    }
+}
+
+static ebpo_status find_loops(ebpo_border_loops *out, const ebpo_mesh *mesh, unsigned threads,
+                              ebpo_error *error)
+{
+    ebpo_border border;
+    ebpo_status status = ebpo_border_find(&border, mesh, threads, error);
+    if (status != EBPO_OK)
+        return status;
+    *out = (ebpo_border_loops){ .loop_count = border.loop_count };
+    out->point_count = border.loop_count ? border.first[border.loop_count] : 0;
+    out->loop = ebpo_alloc(out->loop_count + 1, 2 * sizeof *out->loop);
+    out->point = ebpo_alloc(out->point_count + 1, 3 * sizeof *out->point);
+    if (out->point_count > INT32_MAX)
+        status = ebpo_fail(error, EBPO_E_LIMIT, "%llu border edges, but 2^31 - 1 is the limit",
+                           (unsigned long long)out->point_count);
+    else if (!out->loop || !out->point)
+        status = ebpo_fail_memory(error, out->point_count * 3 * sizeof *out->point);
+    for (uint64_t i = 0; i < out->loop_count && status == EBPO_OK; i++) {
+        out->loop[2 * i] = (uint32_t)(border.first[i + 1] - border.first[i]);
+        out->loop[2 * i + 1] = border.weight[i];
+    }
+    for (uint64_t i = 0; i < out->point_count && status == EBPO_OK; i++)
+        ebpo_mesh_position(mesh, border.vertex[i], out->point + 3 * i);
+    ebpo_border_free(&border);
+    return status;
+}
+
+ebpo_status ebpo_build_border(ebpo_tree *tree, unsigned threads, ebpo_error *error)
+{
+    ebpo_cap_tree caps = { .node = NULL };
+    ebpo_status status = find_loops(&tree->border, &tree->mesh, threads, error);
+    if (status == EBPO_OK)
+        status = ebpo_cap_tree_of_loops(&caps, &tree->border, error);
+    if (status == EBPO_OK)
+        status = make_windings(tree, &caps, error);
+    if (status == EBPO_OK) {
+        measure_border(&tree->info, &caps, &tree->border);
+        tree->info.parts |= EBPO_PART_BORDER;
+    }
+    ebpo_cap_tree_free(&caps);
+    return status;
+}
+
+/* --- files --- */
+
+static ebpo_status add_border(ebpo_tree *tree, unsigned threads, ebpo_error *error)
+{
+    const ebpo_info *info = &tree->info;
+    bool possible = !info->solid && !info->pruned && info->parts & EBPO_PART_MESH;
+    return possible && !(info->parts & EBPO_PART_BORDER) ? ebpo_build_border(tree, threads, error)
+                                                         : EBPO_OK;
+}
+
+ebpo_status ebpo_file_add_border(const ebpo_file *file, const char *path,
+                                 const ebpo_read_options *read, const ebpo_write_options *write,
+                                 ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    return ebpo_repack_with(file, path, read, write, add_border, error);
+}

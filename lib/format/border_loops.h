@@ -1,0 +1,21 @@
+/* The part `border` of a file: closed loops. */
+#ifndef EBPO_FORMAT_BORDER_LOOPS_H
+#define EBPO_FORMAT_BORDER_LOOPS_H
+
+#include "format/file_in.h"
+
+/* Reads and checks the loops of a file with EBPO_PART_BORDER. `out` is cleared on failure. */
+EBPO_MUST_USE ebpo_status ebpo_border_read(const ebpo_file *file, ebpo_border_loops *out,
+                                           ebpo_error *error);
+
+/* Checks the loops against the counts of the header. */
+EBPO_MUST_USE ebpo_status ebpo_check_border(const ebpo_check *check, const ebpo_info *info,
+                                            const ebpo_border_loops *loops, ebpo_error *error);
+
+/* Encodes rows [row, row + rows) of /border/points. */
+void ebpo_border_encode(const ebpo_border_loops *loops, bool doubles, uint64_t row, uint64_t rows,
+                        uint8_t *file);
+
+void ebpo_border_loops_free(ebpo_border_loops *loops);
+
+#endif

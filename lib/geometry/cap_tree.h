@@ -1,0 +1,91 @@
+/* Winding numbers of the discs that close the border of a mesh.
+ *
+ * The mesh S with holes and the caps C of its border (mesh/border.h) together have an integer
+ * winding number k. The caps turn against their loops, so the winding number of S is
+ *
+ *   w_S(p) = k(p) + w_D(p),
+ *
+ * where D are the caps turned in the direction of the loops: the discs. w_D is a sum of solid
+ * angles over few triangles. It is bounded by a tree and refined only as far as a decision needs
+ * it. At a point on a cap k and w_D jump; both belong to the point shifted as in
+ * ebpo_axis_crossing, and w_S has no jump there. */
+#ifndef EBPO_GEOMETRY_CAP_TREE_H
+#define EBPO_GEOMETRY_CAP_TREE_H
+
+#include <ebpo/file.h>
+
+#include "geometry/solid_angle.h"
+
+/* A node of the tree: a stretch of a loop (geometry/cap_triangles.h) with all its triangles, or a
+ * group of two nodes. The first node is the root. */
+typedef struct ebpo_cap_node {
+    double centre[3], radius; /* a ball around the triangles */
+    double area;              /* upper bound of the sum of weight * area */
+    double vector[3];         /* sum of weight * area * normal */
+    double slack;             /* bound of the rounding error of `vector` */
+    double most;              /* pi times the sum of weights: bound of the half angles' sum */
+    uint32_t from, to; /* a stretch: positions in ebpo_cap_tree.position; a group: its two nodes */
+    uint32_t weight;   /* 0: a group */
+    uint32_t spare;
+} ebpo_cap_node;
+
+typedef struct ebpo_cap_tree {
+    double (*position)[3]; /* [position_count] vertices of all loops */
+    uint64_t position_count;
+    ebpo_cap_node *node; /* NULL: no loops */
+    uint64_t node_count;
+    uint64_t triangle_count;
+} ebpo_cap_tree;
+
+/* Makes the tree of loops: loop i has the positions first[i] .. first[i + 1] - 1, at least three,
+ * and weight[i] >= 1. `position`, an array of malloc, is taken over, also on failure. EBPO_E_LIMIT:
+ * more than 2^31 positions. */
+EBPO_MUST_USE ebpo_status ebpo_cap_tree_make(ebpo_cap_tree *out, double (*position)[3],
+                                             const uint64_t *first, const uint32_t *weight,
+                                             uint64_t loop_count, ebpo_error *error);
+/* Makes the tree of the loops of a file or tree. */
+EBPO_MUST_USE ebpo_status ebpo_cap_tree_of_loops(ebpo_cap_tree *out, const ebpo_border_loops *loops,
+                                                 ebpo_error *error);
+void ebpo_cap_tree_free(ebpo_cap_tree *tree);
+
+/* Returns the crossings of the caps, which turn against the discs, as ebpo_axis_crossing does. */
+int32_t ebpo_cap_crossings(const ebpo_cap_tree *tree, const double from[3], double to, int axis);
+/* Returns false if certainly no cap touches the box. */
+bool ebpo_caps_near(const ebpo_cap_tree *tree, const double low[3], const double high[3]);
+
+/* Bounds the sum of the half angles, that is 2 pi w_D, at all points of a box around p with these
+ * half sides; NULL: at p. Nodes whose bounds have an error above `tolerance` are refined; at a
+ * single point, down to single triangles. */
+ebpo_bounded ebpo_cap_tree_bound(const ebpo_cap_tree *tree, const double p[3], const double half[3],
+                                 double tolerance);
+
+/* Converts bounds of the half angles' sum to bounds of w_S = winding + w_D. The error is enlarged
+ * by 2^-50 of the middle, which covers the rounding of the interval's ends and of the boundaries
+ * with which they are compared. */
+ebpo_bounded ebpo_cap_winding_of(ebpo_bounded angles, int32_t winding);
+
+/* Bounds w_S = winding + w_D at p, with an error of at most `width` / 2 if doubles suffice. */
+ebpo_bounded ebpo_cap_winding(const ebpo_cap_tree *tree, const double p[3], int32_t winding,
+                              double width);
+
+/* What is inside, by the winding number w and a threshold t in (0, 1): nonzero: |w| > t; positive:
+ * w > t; evenodd: |w - e| > t, where e is the even integer nearest to w. */
+typedef struct ebpo_cap_rule {
+    uint8_t rule; /* ebpo_rule */
+    double threshold;
+} ebpo_cap_rule;
+
+typedef struct ebpo_cap_decision {
+    bool inside;
+    bool tie; /* w equals the boundary of the rule, or 512 bits do not decide: counted as outside */
+    ebpo_bounded winding; /* bounds of w_S as far as they were needed */
+} ebpo_cap_decision;
+
+/* Decides by w_S = winding + w_D at p; exact. `winding` is that of the shifted point. */
+ebpo_cap_decision ebpo_cap_decide(const ebpo_cap_tree *tree, const double p[3], int32_t winding,
+                                  const ebpo_cap_rule *rule);
+
+/* Returns 1 or 0 if the rule gives this result for all w in the interval, else -1. */
+int ebpo_cap_rule_result(const ebpo_cap_rule *rule, double low, double high);
+
+#endif

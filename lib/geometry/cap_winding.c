@@ -1,0 +1,194 @@
+/* Decisions by winding numbers of meshes with holes.
+ *
+ * Bounds in doubles are refined until the rule gives one result for the whole interval. Where they
+ * do not suffice, because the winding number equals the boundary s of the rule or nearly so, the
+ * sign of w - s is found without any arctangent. Half angles are arguments of complex numbers
+ * (geometry/solid_angle.h), so the product z of these numbers, each to the power of its weight, has
+ * the argument 2 pi (w - k) up to whole turns, and since w is close to s,
+ *
+ *   sign(w - s) = sign(Im(z exp(-2 pi i s))).
+ *
+ * The product is computed in 512 bits; its relative error is the sum of those of its factors. The
+ * argument of z exp(-2 pi i s) is then known within twice that error. exp(2 pi i t) is a product of
+ * exp(2 pi i / 2^j) over the bits of t; these follow from one another by square roots (half
+ * angles). Below 2^-64 of a turn they have lost fewer than 100 bits. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+
+#include "geometry/cap_triangles.h"
+#include "geometry/cap_tree.h"
+
+static const double INVERSE_TURN = 1 / (2 * EBPO_PI_LOW);
+
+/* --- rules --- */
+
+static bool rule_holds(const ebpo_cap_rule *r, double w)
+{
+    if (r->rule == EBPO_RULE_POSITIVE)
+        return w > r->threshold;
+    if (r->rule == EBPO_RULE_NONZERO)
+        return fabs(w) > r->threshold;
+    return fabs(w - 2 * nearbyint(w / 2)) > r->threshold;
+}
+
+/* Returns the boundary of the rule that is nearest to w, as an even integer plus `*side` times the
+ * threshold. */
+static double nearest_boundary(const ebpo_cap_rule *r, double w, int *side)
+{
+    double even = r->rule == EBPO_RULE_EVENODD ? 2 * nearbyint(w / 2) : 0;
+    *side = r->rule != EBPO_RULE_POSITIVE && w < even ? -1 : 1;
+    return even + *side * r->threshold;
+}
+
+int ebpo_cap_rule_result(const ebpo_cap_rule *rule, double low, double high)
+{
+    double t = rule->threshold, middle = low / 2 + high / 2,
+           even = rule->rule == EBPO_RULE_EVENODD ? 2 * nearbyint(middle / 2) : 0;
+    bool apart = low > even + t || high < even + t;
+    if (rule->rule != EBPO_RULE_POSITIVE)
+        apart = apart && (low > even - t || high < even - t);
+    if (rule->rule == EBPO_RULE_EVENODD) /* the boundaries around the next even integers */
+        apart = apart && low > even - 2 + t && high < even + 2 - t;
+    return apart ? rule_holds(rule, middle) : -1;
+}
+
+/* --- bounds --- */
+
+ebpo_bounded ebpo_cap_winding_of(ebpo_bounded angles, int32_t winding)
+{
+    double middle = winding + angles.middle * INVERSE_TURN;
+    return (ebpo_bounded){ middle, (angles.error + 0x1p-50 * fabs(angles.middle)) * INVERSE_TURN *
+                                           (1 + 0x1p-40) +
+                                       0x1p-50 * fabs(middle) };
+}
+
+/* Returns the next tolerance of a pass; negative after the last one, in which all triangles are
+ * summed. */
+static double next_tolerance(double tolerance)
+{
+    return tolerance == 0 ? -1 : tolerance < 0x1p-40 ? 0 : tolerance * 0x1p-4;
+}
+
+enum { FIRST_TOLERANCE = 1 };
+
+ebpo_bounded ebpo_cap_winding(const ebpo_cap_tree *tree, const double p[3], int32_t winding,
+                              double width)
+{
+    ebpo_bounded w = { winding, INFINITY };
+    for (double t = FIRST_TOLERANCE; t >= 0 && !(w.error <= width / 2); t = next_tolerance(t))
+        w = ebpo_cap_winding_of(ebpo_cap_tree_bound(tree, p, NULL, t), winding);
+    return w;
+}
+
+/* --- 512 bits --- */
+
+typedef struct exact_sum {
+    ebpo_big_complex turn;
+    double error;       /* relative error of `turn` */
+    ebpo_bounded angle; /* sum of the half angles */
+} exact_sum;
+
+static void multiply_power(exact_sum *s, const ebpo_exact_angle *a, uint32_t weight)
+{
+    ebpo_big_complex power = a->turn;
+    for (uint32_t left = weight; left > 0; left >>= 1) {
+        if (left & 1)
+            s->turn = ebpo_big_complex_multiply(&s->turn, &power);
+        if (left > 1)
+            power = ebpo_big_complex_multiply(&power, &power);
+    }
+    s->error += (a->error + 0x1p-500) * weight;
+    s->angle.middle += weight * a->angle;
+    s->angle.error += weight * 0x1p-47 + 0x1p-52 * fabs(s->angle.middle);
+}
+
+/* Sums the half angles of all triangles. Returns false if one is not known: p is a corner of it. */
+static bool sum_exactly(const ebpo_cap_tree *t, const double p[3], exact_sum *s)
+{
+    *s = (exact_sum){ .turn = { ebpo_big_of(1), ebpo_big_of(0) } };
+    for (uint64_t i = 0; i < t->node_count; i++) {
+        const ebpo_cap_node *n = &t->node[i];
+        ebpo_exact_angle angle;
+        if (n->weight == 0)
+            continue;
+        if (!ebpo_half_angle_exact(p, t->position[n->from],
+                                   t->position[ebpo_cap_middle(n->from, n->to)], t->position[n->to],
+                                   &angle))
+            return false;
+        multiply_power(s, &angle, n->weight);
+    }
+    return true;
+}
+
+/* Returns exp(2 pi i t) for t in [2^-11, 1). */
+static ebpo_big_complex turn_of(double t)
+{
+    const ebpo_big one = ebpo_big_of(1);
+    ebpo_big_complex out = { one, ebpo_big_of(0) }, root = { ebpo_big_of(-1), ebpo_big_of(0) };
+    for (int j = 1; t > 0; j++) {
+        if (j == 2) {
+            root = (ebpo_big_complex){ ebpo_big_of(0), one };
+        } else if (j > 2) {
+            ebpo_big plus = ebpo_big_add(&one, &root.real),
+                     minus = ebpo_big_subtract(&one, &root.real);
+            plus = ebpo_big_scale(&plus, -1);
+            minus = ebpo_big_scale(&minus, -1);
+            root = (ebpo_big_complex){ ebpo_big_root(&plus), ebpo_big_root(&minus) };
+        }
+        t *= 2;
+        if (t >= 1) {
+            out = ebpo_big_complex_multiply(&out, &root);
+            t -= 1;
+        }
+    }
+    return out;
+}
+
+/* Returns the sign of w_S - s, where w_S is near s, and s is an even integer plus side * threshold;
+ * 0 if 512 bits do not decide. */
+static int sign_at_boundary(const exact_sum *s, int side, double threshold)
+{
+    ebpo_big_complex turn = turn_of(threshold);
+    turn.imaginary.sign *= -side;
+    turn = ebpo_big_complex_multiply(&s->turn, &turn);
+    if (turn.real.sign <= 0)
+        return 0;
+    double sine = ebpo_big_double(&turn.imaginary, turn.real.exponent);
+    double quarters = 4 * threshold,
+           error = s->error + (quarters == floor(quarters) ? 0 : 0x1p-400);
+    if (!(fabs(sine) > 4 * error))
+        return 0;
+    return sine > 0 ? 1 : -1;
+}
+
+/* Decides in 512 bits. */
+static ebpo_cap_decision decide_exactly(const ebpo_cap_tree *tree, const double p[3],
+                                        int32_t winding, const ebpo_cap_rule *rule)
+{
+    exact_sum s;
+    if (!sum_exactly(tree, p, &s))
+        return (ebpo_cap_decision){ false, true, ebpo_cap_winding(tree, p, winding, 0) };
+    ebpo_bounded w = ebpo_cap_winding_of(s.angle, winding);
+    int result = ebpo_cap_rule_result(rule, w.middle - w.error, w.middle + w.error), side;
+    if (result >= 0)
+        return (ebpo_cap_decision){ result, false, w };
+    double boundary = nearest_boundary(rule, w.middle, &side);
+    int sign = sign_at_boundary(&s, side, rule->threshold);
+    bool inside = sign && rule_holds(rule, boundary + sign * 0x1p-20);
+    return (ebpo_cap_decision){ inside, sign == 0, w };
+}
+
+/* --- decisions --- */
+
+ebpo_cap_decision ebpo_cap_decide(const ebpo_cap_tree *tree, const double p[3], int32_t winding,
+                                  const ebpo_cap_rule *rule)
+{
+    for (double t = FIRST_TOLERANCE; t >= 0; t = next_tolerance(t)) {
+        ebpo_bounded w = ebpo_cap_winding_of(ebpo_cap_tree_bound(tree, p, NULL, t), winding);
+        int result = ebpo_cap_rule_result(rule, w.middle - w.error, w.middle + w.error);
+        if (result >= 0)
+            return (ebpo_cap_decision){ result, false, w };
+    }
+    return decide_exactly(tree, p, winding, rule);
+}

@@ -1,0 +1,48 @@
+/* Solid angles of triangles, with error bounds.
+ *
+ * The half angle of the triangle (a, b, c) at p is half of its signed solid angle, in [-pi, pi]:
+ * positive when p is on the side from which the triangle turns clockwise. The half angles of a
+ * closed surface with outward faces sum up to 2 pi at points inside. The half angle is the argument
+ * of the complex number (van Oosterom and Strackee 1983), with A = a - p, B = b - p, C = c - p,
+ *
+ *   |A||B||C| + (A.B)|C| + (B.C)|A| + (C.A)|B|  +  i A.(B x C).
+ *
+ * At a point on the triangle the half angle jumps. There, p is shifted as in ebpo_axis_crossing, so
+ * half angles and crossings belong to the same point. */
+#ifndef EBPO_GEOMETRY_SOLID_ANGLE_H
+#define EBPO_GEOMETRY_SOLID_ANGLE_H
+
+#include <stdbool.h>
+
+#include "geometry/big_float.h"
+
+/* The value is in [middle - error, middle + error]. */
+typedef struct ebpo_bounded {
+    double middle, error;
+} ebpo_bounded;
+
+/* Bounds of pi. */
+#define EBPO_PI_LOW  0x1.921fb54442d18p+1
+#define EBPO_PI_HIGH 0x1.921fb54442d19p+1
+
+/* Returns the argument of x + i y in [-pi, pi], within 2^-49; 0 for 0. Infinite or NaN arguments
+ * give any value. */
+double ebpo_argument(double y, double x);
+
+/* Returns the half angle. The error is pi when p is too close to an edge to decide in doubles. */
+ebpo_bounded ebpo_half_angle(const double p[3], const double a[3], const double b[3],
+                             const double c[3]);
+
+/* The same in 512 bits. */
+typedef struct ebpo_exact_angle {
+    ebpo_big_complex turn; /* its argument is the half angle; not 0 */
+    double error;          /* relative error of `turn`, at most 2^-300 */
+    double angle;          /* the half angle, within 2^-47 */
+} ebpo_exact_angle;
+
+/* Computes the half angle. Returns false when p is a corner, or so close to an edge that 512 bits
+ * do not suffice. */
+bool ebpo_half_angle_exact(const double p[3], const double a[3], const double b[3],
+                           const double c[3], ebpo_exact_angle *out);
+
+#endif

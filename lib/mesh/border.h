@@ -1,0 +1,33 @@
+/* The border of a mesh: its boundary as a chain, as closed directed loops with weights. */
+#ifndef EBPO_MESH_BORDER_H
+#define EBPO_MESH_BORDER_H
+
+#include <ebpo/mesh.h>
+
+/* Simple closed loops (no repeated vertex, at least three edges). Loop i consists of
+ * vertex[first[i] .. first[i + 1]). The sum of weight times loop, over all loops, has each edge as
+ * often as the faces use it in this direction, minus their uses in the opposite direction. */
+typedef struct ebpo_border {
+    uint64_t loop_count;
+    uint64_t edge_count; /* unbalanced edges of the mesh */
+    uint64_t *first;     /* [loop_count + 1] */
+    uint32_t *vertex;    /* indices in the current mesh */
+    uint32_t *weight;    /* [loop_count] at least 1 */
+    uint64_t loop_capacity, weight_capacity, vertex_capacity;
+    ebpo_workspace *workspace; /* the mesh's; owns all arrays */
+} ebpo_border;
+
+/* Finds the border of any mesh. A balanced mesh has no loops. The result depends only on the mesh
+ * in the source's order. `out` is cleared on failure. */
+EBPO_MUST_USE ebpo_status ebpo_border_find(ebpo_border *out, const ebpo_mesh *mesh,
+                                           unsigned threads, ebpo_error *error);
+void ebpo_border_free(ebpo_border *border);
+
+/* Returns the number of cap triangles of all loops (geometry/cap_triangles.h); a triangle of a loop
+ * of weight w counts once. */
+static inline uint64_t ebpo_border_cap_count(const ebpo_border *border)
+{
+    return border->loop_count ? border->first[border->loop_count] - 2 * border->loop_count : 0;
+}
+
+#endif

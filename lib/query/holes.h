@@ -1,0 +1,74 @@
+/* Inside of a surface with its border, by its generalized winding number. */
+#ifndef EBPO_QUERY_HOLES_H
+#define EBPO_QUERY_HOLES_H
+
+#include <stdatomic.h>
+
+#include <ebpo/query.h>
+
+#include "geometry/cap_tree.h"
+#include "geometry/cells.h"
+#include "query/accel.h"
+
+/* The caps of a surface, and the rule. Any thread. */
+typedef struct ebpo_holes {
+    ebpo_cap_tree caps;
+    ebpo_cap_rule rule;
+    _Atomic uint64_t ties; /* number of decisions that were ties */
+} ebpo_holes;
+
+/* Reads the border of a file with EBPO_PART_BORDER. */
+EBPO_MUST_USE ebpo_status ebpo_holes_read(ebpo_holes **out, const ebpo_file *file, double threshold,
+                                          ebpo_error *error);
+void ebpo_holes_free(ebpo_holes *holes); /* accepts NULL */
+uint64_t ebpo_holes_bytes(const ebpo_holes *holes);
+/* Returns an upper bound of the bytes that a model uses for its border, also while it is read. */
+static inline uint64_t ebpo_holes_estimate(const ebpo_info *info)
+{
+    return info->parts & EBPO_PART_BORDER ? 4096 + 224 * info->border_points : 0;
+}
+
+/* Decides what is constant in the cells of a table's nodes, and marks these nodes. Uniform entries
+ * get a number of ebpo_marked_entry in place of the winding number at their lowest corner. A leaf
+ * that is marked EBPO_NEAR_BORDER is decided point by point; in other leaves the rule for the
+ * integer winding number decides, as in a solid. Uniform nodes that are not decided are split into
+ * at most `splits` groups of eight cells, down to level `deepest`. Returns EBPO_E_LIMIT for winding
+ * numbers beyond 2^25. */
+typedef struct ebpo_marked_table {
+    const ebpo_box *box;
+    ebpo_cell root;
+    ebpo_node_table *table;
+    ebpo_accel_leaf *leaf; /* NULL: the table has no leaves */
+    int deepest;
+    uint32_t splits;
+} ebpo_marked_table;
+EBPO_MUST_USE ebpo_status ebpo_holes_mark(const ebpo_holes *holes, const ebpo_marked_table *marked,
+                                          ebpo_error *error);
+
+/* Results for all points of a cell without faces. */
+typedef enum ebpo_uniform_mark {
+    EBPO_MARK_OUT = 0,
+    EBPO_MARK_IN = 1,
+    EBPO_MARK_APART = 2, /* decided point by point; no cap touches the cell */
+    EBPO_MARK_NEAR = 3,  /* decided point by point */
+    EBPO_MARK_SPLIT = 4  /* has parts; the value is their index in ebpo_node_table.split */
+} ebpo_uniform_mark;
+
+static inline int32_t ebpo_marked_entry(int32_t value, ebpo_uniform_mark mark)
+{
+    return value * 8 + (int32_t)mark;
+}
+static inline ebpo_uniform_mark ebpo_entry_mark(int32_t marked)
+{
+    return (ebpo_uniform_mark)((uint32_t)marked & 7);
+}
+static inline int32_t ebpo_marked_value(int32_t marked) { return (marked - (marked & 7)) / 8; }
+
+/* Returns the crossings of caps on the way from the lowest corner of a cell to a point in it, both
+ * shifted: along x, then y, then z. */
+int32_t ebpo_holes_crossings(const ebpo_holes *holes, const double low[3], const double p[3]);
+
+/* Classifies a point that is on no face; `winding` is that of surface and caps. */
+ebpo_where ebpo_holes_where(ebpo_holes *holes, const double p[3], int32_t winding);
+
+#endif

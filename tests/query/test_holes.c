@@ -1,0 +1,477 @@
+/* Inside and signed distance of surfaces with holes, from files, against sums of solid angles over
+ * all faces: in long double, which decides except near the boundary of the rule. Decisions at the
+ * boundary are tested in test_cap_winding.c. Models in memory, in parts, and read node by node give
+ * the same results. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <ebpo/ebpo.h>
+
+#include "check_main.h"
+#include "geometry/predicates.h"
+#include "mesh/mesh_parts.h"
+#include "model_file.h"
+#include "scratch.h"
+#include "solids.h"
+
+/* ---- the judge ---- */
+
+/* Returns the winding number of p by its definition; NAN on a face. *error: bound of its rounding
+ * error, which is large next to edges. */
+static double winding_by_sum(const ebpo_mesh *mesh, const double p[3], double *error)
+{
+    long double sum = 0, rounding = 0;
+    for (uint64_t f = 0; f < mesh->face_count; f++) {
+        double t[3][3];
+        long double v[3][3], length[3], dot[3];
+        for (int i = 0; i < 3; i++) {
+            ebpo_mesh_position(mesh, mesh->faces[3 * f + (uint64_t)i], t[i]);
+            for (int k = 0; k < 3; k++)
+                v[i][k] = (long double)t[i][k] - p[k];
+            length[i] = sqrtl(v[i][0] * v[i][0] + v[i][1] * v[i][1] + v[i][2] * v[i][2]);
+        }
+        if (ebpo_point_on_triangle(p, t[0], t[1], t[2]))
+            return NAN;
+        for (int i = 0; i < 3; i++) {
+            int u = (i + 1) % 3;
+            dot[i] = v[i][0] * v[u][0] + v[i][1] * v[u][1] + v[i][2] * v[u][2];
+        }
+        long double sine = v[0][0] * (v[1][1] * v[2][2] - v[1][2] * v[2][1]) +
+                           v[0][1] * (v[1][2] * v[2][0] - v[1][0] * v[2][2]) +
+                           v[0][2] * (v[1][0] * v[2][1] - v[1][1] * v[2][0]);
+        long double cosine = length[0] * length[1] * length[2] + dot[0] * length[2] +
+                             dot[1] * length[0] + dot[2] * length[1];
+        if (ebpo_zero_area(t[0], t[1], t[2]))
+            continue;
+        sum += atan2l(sine, cosine);
+        rounding +=
+            0x1p-56L * length[0] * length[1] * length[2] / sqrtl(sine * sine + cosine * cosine);
+    }
+    *error = 1e-14 + (double)rounding; /* infinite or NaN: not known */
+    return (double)(sum / (2 * acosl(-1)));
+}
+
+/* ---- models ---- */
+
+/* The same file in memory, with subtrees below level 1, and read node by node. */
+enum { WHOLE, PARTS, NODES, WAYS };
+
+typedef struct holed {
+    ebpo_mesh mesh; /* of the source */
+    ebpo_file *file;
+    ebpo_model *way[WAYS], *model; /* `model`: in memory */
+    ebpo_context *context_of[WAYS], *context;
+} holed;
+
+static ebpo_model_options options_of(double threshold)
+{
+    ebpo_model_options o = EBPO_MODEL_OPTIONS_INIT;
+    o.threshold = threshold;
+    return o;
+}
+
+static void holed_open(holed *h, double threshold)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    for (int i = 0; i < WAYS; i++) {
+        ebpo_model_options options = options_of(threshold);
+        options.cut_level = i == PARTS ? 1 : i == NODES ? 0 : -1;
+        options.loading = i == NODES ? EBPO_LOAD_NODES : EBPO_LOAD_CACHE;
+        model_must(ebpo_model_new(h->file, &options, &h->way[i], &error), "opening", &error);
+        model_must(ebpo_context_new(h->way[i], &h->context_of[i], &error), "opening", &error);
+    }
+    h->model = h->way[WHOLE];
+    h->context = h->context_of[WHOLE];
+}
+
+static void holed_make(holed *h, ebpo_mesh mesh, ebpo_rule rule, double threshold)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_build_options build = EBPO_BUILD_OPTIONS_INIT;
+    build.rule = rule;
+    build.leaf_faces = 8;
+    model_must(ebpo_mesh_copy(&mesh, &h->mesh, &error), "copying", &error);
+    ebpo_tree tree = model_build(mesh, &build);
+    model_write(&tree, scratch("holed.ebpo.h5"), NULL);
+    h->file = model_open(scratch("holed.ebpo.h5"));
+    holed_open(h, threshold);
+}
+
+static void holed_free(holed *h)
+{
+    for (int i = 0; i < WAYS; i++) {
+        ebpo_context_free(h->context_of[i]);
+        ebpo_model_free(h->way[i]);
+    }
+    ebpo_close(h->file);
+    ebpo_mesh_free(&h->mesh);
+}
+
+static int expected_where(double w, double error, ebpo_rule rule, double threshold)
+{
+    double x = rule == EBPO_RULE_POSITIVE  ? w
+               : rule == EBPO_RULE_NONZERO ? fabs(w)
+                                           : fabs(w - 2 * nearbyint(w / 2));
+    return isnan(w) ? EBPO_ON : !(fabs(x - threshold) > error) ? -1 : x > threshold;
+}
+
+/* Compares all queries at a point. Returns the result. */
+static int check_point(const holed *h, const double p[3], ebpo_rule rule, double threshold)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_inside_result r;
+    ebpo_winding_bounds b;
+    ebpo_distance_result d;
+    ebpo_distance_options exact = EBPO_DISTANCE_OPTIONS_INIT;
+    double error_of_w = 0, w = winding_by_sum(&h->mesh, p, &error_of_w);
+    int expected = expected_where(w, error_of_w, rule, threshold);
+    model_must(ebpo_inside(h->context, p, NULL, &r, &error), "inside", &error);
+    ck_assert_msg(expected == -1 || r.where == expected, "(%a %a %a): %d, expected %d by w = %.17g",
+                  p[0], p[1], p[2], (int)r.where, expected, w);
+    ck_assert_int_eq(r.winding, r.where == EBPO_IN);
+    for (int i = 1; i < (p[0] > 0.1 ? NODES : WAYS); i++) { /* reading nodes is slow */
+        ebpo_inside_result other;
+        model_must(ebpo_inside(h->context_of[i], p, NULL, &other, &error), "inside", &error);
+        ck_assert_msg(other.where == r.where && other.winding == r.winding,
+                      "(%a %a %a): %d, but %d if loaded in another way", p[0], p[1], p[2],
+                      (int)r.where, (int)other.where);
+    }
+    model_must(ebpo_winding(h->context, p, 1, 1e-6, &b, &error), "winding", &error);
+    if (expected == EBPO_ON) {
+        ck_assert(isnan(b.lo) && isnan(b.hi));
+    } else {
+        ck_assert_msg(!(b.lo > w + error_of_w) && !(w > b.hi + error_of_w),
+                      "(%a %a %a): w %.17g, bounds %.17g %.17g", p[0], p[1], p[2], w, b.lo, b.hi);
+    }
+    model_must(ebpo_distance(h->context, p, &exact, &d, &error), "distance", &error);
+    ck_assert_int_eq(signbit(d.distance) != 0, r.where == EBPO_IN);
+    return r.where;
+}
+
+static void choose_point(uint64_t *state, const holed *h, double p[3])
+{
+    const ebpo_info *info = ebpo_file_info(h->file);
+    uint64_t kind = ebpo_test_random(state) % 4;
+    for (int k = 0; k < 3; k++)
+        p[k] = info->report.min[k] + (1.2 * ebpo_test_random_unit(state) - 0.1) *
+                                         (info->report.max[k] - info->report.min[k]);
+    if (kind < 2)
+        return;
+    /* on a vertex, on an edge, near a face */
+    uint64_t f = ebpo_test_random(state) % h->mesh.face_count;
+    double t[3][3], s = (double)(ebpo_test_random(state) % 3) / 2,
+                    shift = ebpo_test_random_unit(state);
+    for (int i = 0; i < 3; i++)
+        ebpo_mesh_position(&h->mesh, h->mesh.faces[3 * f + (uint64_t)i], t[i]);
+    for (int k = 0; k < 3; k++) {
+        p[k] = t[0][k] + s * (t[1][k] - t[0][k]);
+        if (kind == 3)
+            p[k] += shift * 0.1 * (t[2][(k + 1) % 3] - t[1][k]);
+    }
+}
+
+typedef struct tally {
+    uint64_t of[4];
+} tally;
+
+static void check_model(ebpo_mesh mesh, ebpo_rule rule, double threshold, uint64_t points,
+                        uint64_t seed, tally *all)
+{
+    holed h;
+    holed_make(&h, mesh, rule, threshold);
+    for (uint64_t i = 0; i < points; i++) {
+        double p[3];
+        choose_point(&seed, &h, p);
+        all->of[check_point(&h, p, rule, threshold)]++;
+    }
+    holed_free(&h);
+}
+
+/* Makes a torus with many holes, some of whose faces are turned. */
+static ebpo_mesh holed_torus(uint64_t *state, unsigned percent, unsigned turned)
+{
+    ebpo_mesh m = ebpo_test_torus(3, 1, 24, 12);
+    uint64_t kept = 0;
+    for (uint64_t f = 0; f < m.face_count; f++)
+        if (ebpo_test_random(state) % 100 >= percent)
+            memmove(m.faces + 3 * kept++, m.faces + 3 * f, 3 * sizeof *m.faces);
+    m.face_count = kept;
+    for (uint64_t f = 0; f < m.face_count; f++)
+        if (ebpo_test_random(state) % 100 < turned)
+            ebpo_test_turn_face(&m, f);
+    return m;
+}
+
+START_TEST(test_surfaces_match_sums_over_faces)
+{
+    static const double thresholds[] = { 0.5, 0.25, 0.7 };
+    const ebpo_rule rule = (ebpo_rule)(_i % 3);
+    const double threshold = thresholds[_i / 3 % 3];
+    uint64_t state = (uint64_t)_i, points = ebpo_test_scaled(2000);
+    tally all = { { 0 } };
+    check_model(holed_torus(&state, 10, 0), rule, threshold, points, state, &all);
+    check_model(holed_torus(&state, 30, 5), rule, threshold, points, state, &all);
+    check_model(ebpo_test_make("mobius"), rule, threshold, points, state, &all);
+    check_model(ebpo_test_make("open_box"), rule, threshold, points, state, &all);
+    check_model(ebpo_test_make("flipped_face_cube"), rule, threshold, points, state, &all);
+    ck_assert_uint_gt(all.of[EBPO_IN], 0);
+    ck_assert_uint_gt(all.of[EBPO_OUT], 0);
+    ck_assert_uint_gt(all.of[EBPO_ON], 0);
+}
+END_TEST
+
+/* Makes a sphere of radius 2 without the faces in a slice: caps cross large cells without faces. */
+static ebpo_mesh without_slice(uint32_t subdivisions)
+{
+    const double centre[3] = { 1, 2, 3 };
+    ebpo_mesh m = ebpo_test_sphere(centre, 2, subdivisions);
+    uint64_t kept = 0;
+    for (uint64_t f = 0; f < m.face_count; f++) {
+        double t[3];
+        ebpo_mesh_position(&m, m.faces[3 * f], t);
+        if (t[2] < 3 || t[2] > 4)
+            memmove(m.faces + 3 * kept++, m.faces + 3 * f, 3 * sizeof *m.faces);
+    }
+    m.face_count = kept;
+    return m;
+}
+
+/* Most cells are far from the border: one hole, and loops apart from one another. */
+START_TEST(test_few_holes_match_sums_over_faces)
+{
+    const double centre[3] = { 1, 2, 3 };
+    const ebpo_rule rule = (ebpo_rule)_i;
+    uint64_t points = ebpo_test_scaled(4000);
+    tally all = { { 0 } };
+    ebpo_mesh mesh = ebpo_test_sphere(centre, 2, 3);
+    mesh.face_count -= 3;
+    check_model(mesh, rule, 0.5, points, 21, &all);
+    mesh = ebpo_test_torus(3, 1, 48, 24);
+    mesh.face_count -= 40;
+    memmove(mesh.faces + 300, mesh.faces + 309, 3 * (mesh.face_count - 103) * sizeof *mesh.faces);
+    mesh.face_count -= 3;
+    check_model(mesh, rule, 0.375, points, 22, &all);
+    check_model(without_slice(3), rule, 0.125, points, 23, &all);
+    ck_assert_uint_gt(all.of[EBPO_IN], 0);
+}
+END_TEST
+
+START_TEST(test_ties_are_counted)
+{
+    ebpo_mesh mesh = ebpo_test_sheet(4, 1);
+    const double p[3] = { 2, 2, 0 }, q[3] = { 5, 5, 0 }, far[3] = { 50, 2, 1 };
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_inside_result r;
+    ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
+    double corner[3] = { 4, 4, 4 };
+    uint32_t apex = ebpo_test_append_vertex(&mesh, corner[0], corner[1], corner[2]);
+    ebpo_test_append_face(&mesh, 0, 1, apex);
+    holed h;
+    holed_make(&h, mesh, EBPO_RULE_NONZERO, 0.5);
+    model_must(ebpo_inside(h.context, p, NULL, &r, &error), "inside", &error);
+    ck_assert_int_eq(r.where, EBPO_ON);
+    model_must(ebpo_inside(h.context, q, NULL, &r, &error), "inside", &error);
+    ck_assert_int_eq(r.where, EBPO_OUT);
+    model_must(ebpo_inside(h.context, far, NULL, &r, &error), "inside", &error);
+    ck_assert_int_eq(r.where, EBPO_OUT);
+    ebpo_model_get_stats(h.model, &stats);
+    ck_assert_uint_eq(stats.ties, 0);
+    holed_free(&h);
+
+    /* a cube without three faces around one corner: 1/2 at the centre */
+    const double low[3] = { 0, 0, 0 }, high[3] = { 2, 2, 2 }, centre[3] = { 1, 1, 1 };
+    mesh = ebpo_test_box(low, high, 1);
+    uint64_t kept = 0;
+    for (uint64_t f = 0; f < mesh.face_count; f++) {
+        double t[3][3];
+        bool keep = false;
+        for (int i = 0; i < 3; i++)
+            ebpo_mesh_position(&mesh, mesh.faces[3 * f + (uint64_t)i], t[i]);
+        for (int k = 0; k < 3; k++)
+            keep = keep || (t[0][k] == 0 && t[1][k] == 0 && t[2][k] == 0);
+        if (keep)
+            memmove(mesh.faces + 3 * kept++, mesh.faces + 3 * f, 3 * sizeof *mesh.faces);
+    }
+    mesh.face_count = kept;
+    holed_make(&h, mesh, EBPO_RULE_NONZERO, 0.5);
+    model_must(ebpo_inside(h.context, centre, NULL, &r, &error), "inside", &error);
+    ck_assert_int_eq(r.where, EBPO_OUT);
+    ebpo_model_get_stats(h.model, &stats);
+    ck_assert_uint_eq(stats.ties, 1);
+    holed_free(&h);
+}
+END_TEST
+
+/* Makes the file of a mesh with or without the border. */
+static void write_model(const char *path, ebpo_mesh mesh, bool border)
+{
+    ebpo_build_options build = EBPO_BUILD_OPTIONS_INIT;
+    build.leaf_faces = 8;
+    if (!border)
+        build.parts &= ~(uint32_t)EBPO_PART_BORDER;
+    ebpo_tree tree = model_build(mesh, &build);
+    model_write(&tree, path, NULL);
+}
+
+START_TEST(test_invalid_queries_are_refused)
+{
+    holed h;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_model *model = NULL;
+    ebpo_context *context = NULL;
+    ebpo_model_options bad = options_of(0);
+    ebpo_inside_options limited = EBPO_INSIDE_OPTIONS_INIT;
+    ebpo_inside_result r;
+    ebpo_winding_bounds w;
+    const double p[3] = { 0, 0, 0 };
+    holed_make(&h, ebpo_test_make("open_box"), EBPO_RULE_NONZERO, 0.5);
+    limited.level = 1;
+    ck_assert_int_eq(ebpo_inside(h.context, p, &limited, &r, &error), EBPO_E_ARGUMENT);
+    ck_assert_int_eq(ebpo_winding(h.context, p, 1, -1, &w, &error), EBPO_E_ARGUMENT);
+    ck_assert_int_eq(ebpo_model_new(h.file, &bad, &model, &error), EBPO_E_ARGUMENT);
+    holed_free(&h);
+
+    write_model(scratch("without.ebpo.h5"), ebpo_test_make("open_box"), false);
+    ebpo_file *file = model_open(scratch("without.ebpo.h5"));
+    model_must(ebpo_model_new(file, NULL, &model, &error), "opening", &error);
+    model_must(ebpo_context_new(model, &context, &error), "opening", &error);
+    ck_assert_int_eq(ebpo_inside(context, p, NULL, &r, &error), EBPO_E_NOT_SOLID);
+    ck_assert_int_eq(ebpo_winding(context, p, 1, 0, &w, &error), EBPO_E_NOT_SOLID);
+    ebpo_context_free(context);
+    ebpo_model_free(model);
+    ebpo_close(file);
+}
+END_TEST
+
+static void check_same_files(const char *one, const char *other)
+{
+    FILE *a = fopen(one, "rb"), *b = fopen(other, "rb");
+    int x, y;
+    ck_assert(a && b);
+    do {
+        x = getc(a);
+        y = getc(b);
+        ck_assert_int_eq(x, y);
+    } while (x != EOF);
+    fclose(a);
+    fclose(b);
+}
+
+START_TEST(test_border_is_added_to_file)
+{
+    uint64_t state = 4, seed = 4;
+    ebpo_error error = EBPO_ERROR_INIT;
+    write_model(scratch("without.ebpo.h5"), holed_torus(&state, 20, 5), false);
+    write_model(scratch("with.ebpo.h5"), holed_torus(&seed, 20, 5), true);
+    ebpo_file *file = model_open(scratch("without.ebpo.h5"));
+    model_must(ebpo_file_add_border(file, scratch("added.ebpo.h5"), NULL, NULL, &error), "adding",
+               &error);
+    ebpo_close(file);
+    check_same_files(scratch("added.ebpo.h5"), scratch("with.ebpo.h5"));
+}
+END_TEST
+
+/* A subset keeps the border: its results are those of the whole file, or it refuses. */
+START_TEST(test_subset_keeps_border)
+{
+    uint64_t state = 5;
+    holed h, part = { .model = NULL };
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_subset_options cut = EBPO_SUBSET_OPTIONS_INIT;
+    uint64_t same = 0;
+    holed_make(&h, holed_torus(&state, 10, 2), EBPO_RULE_NONZERO, 0.5);
+    cut.boxed = true;
+    for (int k = 0; k < 3; k++) {
+        cut.min[k] = 0;
+        cut.max[k] = 3;
+    }
+    model_must(ebpo_subset(h.file, scratch("part.ebpo.h5"), &cut, &error), "cutting", &error);
+    part.file = model_open(scratch("part.ebpo.h5"));
+    holed_open(&part, 0.5);
+    for (uint64_t i = 0; i < ebpo_test_scaled(2000); i++) {
+        double p[3];
+        ebpo_inside_result whole, r;
+        choose_point(&state, &h, p);
+        model_must(ebpo_inside(h.context, p, NULL, &whole, &error), "inside", &error);
+        for (int way = 0; way < WAYS; way++) {
+            ebpo_status status = ebpo_inside(part.context_of[way], p, NULL, &r, &error);
+            ck_assert_msg(status == EBPO_E_ABSENT || (status == EBPO_OK && r.where == whole.where),
+                          "(%a %a %a), way %d: status %d, %d instead of %d", p[0], p[1], p[2], way,
+                          (int)status, (int)r.where, (int)whole.where);
+            same += status == EBPO_OK;
+        }
+    }
+    ck_assert_uint_gt(same, 0);
+    holed_free(&part);
+    holed_free(&h);
+}
+END_TEST
+
+/* A solid has integer bounds. */
+START_TEST(test_solid_has_integer_bounds)
+{
+    holed h;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_winding_bounds w;
+    ebpo_inside_result r;
+    uint64_t state = 9;
+    holed_make(&h, ebpo_test_make("overlapping_cubes"), EBPO_RULE_NONZERO, 0.5);
+    for (int i = 0; i < 500; i++) {
+        double p[3];
+        choose_point(&state, &h, p);
+        model_must(ebpo_inside(h.context, p, NULL, &r, &error), "inside", &error);
+        model_must(ebpo_winding(h.context, p, 1, 0, &w, &error), "winding", &error);
+        if (r.where == EBPO_ON)
+            ck_assert(isnan(w.lo));
+        else
+            ck_assert(w.lo == r.winding && w.hi == r.winding);
+    }
+    holed_free(&h);
+}
+END_TEST
+
+static const char *const scans[] = { "bunny", "blade", "office_chair", "dragon_vrip", "motorbike" };
+
+START_TEST(test_scans_match_sums_over_faces)
+{
+    char path[1024];
+    ebpo_mesh mesh;
+    ebpo_error error = EBPO_ERROR_INIT;
+    tally all = { { 0 } };
+    snprintf(path, sizeof path, "%s/%s.ply", getenv("EBPO_MODELS"), scans[_i]);
+    model_must(ebpo_mesh_read(path, NULL, &mesh, &error), "reading", &error);
+    uint64_t points = ebpo_test_scaled(mesh.face_count > 100000 ? 40 : 400);
+    check_model(mesh, EBPO_RULE_NONZERO, 0.5, points, (uint64_t)_i + 5, &all);
+    printf("%s: %llu in, %llu out, %llu on\n", scans[_i], (unsigned long long)all.of[EBPO_IN],
+           (unsigned long long)all.of[EBPO_OUT], (unsigned long long)all.of[EBPO_ON]);
+}
+END_TEST
+
+TEST_SUITE(holes)
+{
+    Suite *suite = suite_create("holes");
+    TCase *shapes = tcase_create("shapes");
+    tcase_set_timeout(shapes, 300);
+    tcase_add_checked_fixture(shapes, scratch_enter, scratch_leave);
+    tcase_add_loop_test(shapes, test_surfaces_match_sums_over_faces, 0, 9);
+    tcase_add_loop_test(shapes, test_few_holes_match_sums_over_faces, 0, EBPO_RULE_POSITIVE + 1);
+    tcase_add_test(shapes, test_ties_are_counted);
+    tcase_add_test(shapes, test_invalid_queries_are_refused);
+    tcase_add_test(shapes, test_border_is_added_to_file);
+    tcase_add_test(shapes, test_subset_keeps_border);
+    tcase_add_test(shapes, test_solid_has_integer_bounds);
+    suite_add_tcase(suite, shapes);
+    if (getenv("EBPO_MODELS")) {
+        TCase *real = tcase_create("scans");
+        tcase_set_timeout(real, 600);
+        tcase_add_checked_fixture(real, scratch_enter, scratch_leave);
+        tcase_add_loop_test(real, test_scans_match_sums_over_faces, 0,
+                            sizeof scans / sizeof *scans);
+        suite_add_tcase(suite, real);
+    }
+    return suite;
+}
