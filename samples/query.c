@@ -9,12 +9,13 @@
 
 static const char *const words[] = { "OUT", "IN", "ON", "MAYBE" };
 
-static bool print_results(ebpo_context *context, bool solid, const double point[3],
-                          ebpo_error *error)
+static bool print_results(ebpo_context *context, const double point[3], ebpo_error *error)
 {
-    ebpo_inside_result where = { EBPO_MAYBE, 0, 0 }; /* a surface has distances, but no inside */
+    ebpo_inside_result where;
     ebpo_distance_result nearest;
-    if ((solid && ebpo_inside(context, point, NULL, &where, error) != EBPO_OK) ||
+    ebpo_status status = ebpo_inside(context, point, NULL, &where, error);
+    bool solid = status != EBPO_E_NOT_SOLID; /* a surface without a border has only distances */
+    if ((solid && status != EBPO_OK) ||
         ebpo_distance(context, point, NULL, &nearest, error) != EBPO_OK)
         return false;
     printf("%s, %.17g from face %" PRIu64 " at %.17g %.17g %.17g\n",
@@ -42,7 +43,7 @@ int main(int argc, char **argv)
             continue;
         good = count == 3 && line[end] == 0;
         if (good)
-            good = print_results(context, ebpo_file_info(file)->solid, p, &error);
+            good = print_results(context, p, &error);
         else
             snprintf(error.message, sizeof error.message, "line %ld: expected three numbers",
                      number);

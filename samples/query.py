@@ -32,9 +32,10 @@ def parse(line, number):
 
 def print_results(model, points):
     words = [place.name for place in ebpo.Where]
-    where = ["surface"] * len(points)
-    if model.info.solid:
+    try:
         where = [words[place] for place in model.locate(points).where]
+    except ebpo.NotSolidError: # a surface without a border has only distances
+        where = ["surface"] * len(points)
     nearest = model.distance(points)
     for word, *values in zip(where, nearest.distance.tolist(), nearest.face.tolist(), nearest.point.tolist()):
         print(f"{word}, {values[0]!r} from face {values[1]} at", *map(repr, values[2]))

@@ -35,12 +35,13 @@ if [ -n "$numpy" ]; then
     done
 fi
 
-# A surface has only distances. An invalid line ends both programs, after the results of the lines
-# before it.
-"$ebpo" convert -q "$work/open_box.ply" "$work/box.ebpo.h5" >"$work/out" 2>&1 ||
+# A surface has an inside if its border is stored, otherwise only distances. An invalid line ends both
+# programs, after the results of the lines before it.
+"$ebpo" convert -q "$work/open_box.ply" "$work/holes.ebpo.h5" >"$work/out" 2>&1 &&
+    "$ebpo" convert -q --parts=-border "$work/open_box.ply" "$work/box.ebpo.h5" >>"$work/out" 2>&1 ||
     fail "convert open_box"
 printf '0.5 0.25 0.5\n\n \t\n3 0.25\t0.5\r\n1 2\n7 7 7\n' >"$work/points"
-for model in cube box; do
+for model in cube holes box; do
     "$query" "$work/$model.ebpo.h5" <"$work/points" >"$work/out" 2>"$work/err" &&
         fail "query accepts a bad line of $model"
     [ "$(cat "$work/err")" = "query: line 5: expected three numbers" ] ||

@@ -165,7 +165,9 @@ static ebpo_mesh soup(uint32_t faces, double size)
 
 START_TEST(test_models_beyond_estimate_load_in_parts)
 {
-    static const query_variant coarse = { "coarse", 36, 12, EBPO_RULE_NONZERO, 0 };
+    /* Without the border of 600,000 edges, whose caps do not load in parts. */
+    static const query_variant coarse = { "coarse", 36, 12, EBPO_RULE_NONZERO,
+                                          EBPO_PART_PLANES | EBPO_PART_MESH };
     query_model m;
     query_model_make(&m, "soup", soup(200000, 1e-5), &coarse);
     taken all = open_within(&m, 0), t = open_within(&m, all.whole);

@@ -4,7 +4,7 @@ import { loadModule } from './heap.js';
 import { Model, openWith } from './model.js';
 import { sourceOf } from './source.js';
 
-const PARTS = ['planes', 'mesh', 'maps', 'leaf-planes', 'attributes', 'colours'];
+const PARTS = ['planes', 'mesh', 'maps', 'leaf-planes', 'attributes', 'colours', 'border'];
 
 /** Returns a promise of the compiled module, which is loaded once. */
 export const viewModule = () => loadModule(new URL('./ebpo-view.wasm', import.meta.url));
