@@ -147,6 +147,9 @@ static ebpo_status make_windings(ebpo_tree *tree, const ebpo_cap_tree *caps, ebp
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < tree->info.level_count && status == EBPO_OK; i++) {
         ebpo_level *l = &tree->level[i];
+        ebpo_array_free(l->workspace, l->leaf_winding);
+        ebpo_array_free(l->workspace, l->white_winding);
+        l->leaf_winding = l->white_winding = NULL;
         if (l->leaf_count)
             l->leaf_winding = ebpo_array_alloc(l->workspace, l->leaf_count, sizeof(int32_t));
         if (l->white_count)
