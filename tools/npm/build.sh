@@ -124,6 +124,7 @@ EOF
         meson setup "$folder/lib" "$root" --cross-file "$folder/emscripten.ini" --buildtype=plain \
             -Dhdf5=disabled -Dhttp=disabled -Dassimp=disabled -Drender=disabled -Dcaptions=disabled \
             -Dqhull=disabled -Dtests=disabled -Dchart_js=none >"$folder/meson.log"
+    ninja -C "$folder/lib" build.ninja >/dev/null # lists files that are new since the last build
     # The folders of lib that the modules use, and all kernels.
     objects=$(ninja -C "$folder/lib" -t targets all | sed -n 's/: c_COMPILER$//p' | grep -E \
         '/(core|geometry|io|hdf5_read|hdf5_write|mesh|format|construct|levels|query|extras_collide)_[^/]*\.o$')
