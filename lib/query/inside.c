@@ -257,7 +257,8 @@ static ebpo_status result_by_faces(ebpo_context *context, const ebpo_accel *s,
     const ebpo_inside_kernels *kernels = context->model->kernels.inside;
     uint64_t most = (uint64_t)s->list_longest * EBPO_BLOCK;
     int32_t winding;
-    bool near = leaf->cell_face == EBPO_NEAR_BORDER;
+    /* another thread may be writing the cell face of a leaf that is not bounded yet */
+    bool near = bounded && leaf->cell_face == EBPO_NEAR_BORDER;
     if (most > context->open_capacity &&
         !ebpo_grow(&context->open, &context->open_capacity, most, sizeof *context->open))
         return ebpo_fail_memory(error, most * sizeof *context->open);
