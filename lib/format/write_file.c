@@ -310,7 +310,6 @@ typedef struct window_chunk {
     uint64_t chunk;
     uint8_t *raw, *stored;
     size_t raw_bytes, stored_bytes;
-    ebpo_status status;
 } window_chunk;
 
 /* State of writing one file. */

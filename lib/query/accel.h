@@ -32,8 +32,9 @@ typedef enum ebpo_leaf_kind {
 /* Finding a free cell face takes as long as one query, finding the kind as long as dozens of
  * queries. Each is done after this number of queries. */
 enum { EBPO_LEAF_CELL_FACE_QUERIES = 1, EBPO_LEAF_KIND_QUERIES = 128 };
-/* EBPO_NEAR_BORDER: in a surface, points of the leaf are decided one by one (holes.h). */
-enum { EBPO_NO_CELL_FACE = 6, EBPO_NEAR_BORDER = 7, EBPO_KIND_PLANES_MAX = 16 };
+/* Values of `cell_face` without a free cell face. In a surface, points of leaves near the border
+ * are decided one by one (holes.h). EBPO_NEAR_CAPS: also, a cap of the border touches the leaf. */
+enum { EBPO_NO_CELL_FACE = 6, EBPO_NEAR_BORDER = 7, EBPO_NEAR_CAPS = 8, EBPO_KIND_PLANES_MAX = 16 };
 
 /* A block in a leaf's list. Bits 0 to 28 are the block's number. Bit 29 is set in the last entry of
  * the leaf. Bits 32 to 39 are the lanes that the leaf lists, as other faces may share the block.
@@ -64,8 +65,8 @@ typedef struct ebpo_accel_leaf {
     uint32_t rows;           /* for kinds other than general: EBPO_KIND_ROW */
     _Atomic uint8_t kind;    /* ebpo_leaf_kind; for surfaces always EBPO_LEAF_GENERAL */
     _Atomic uint8_t queries; /* approximate number of queries until the kind is known */
-    /* 2 axis + side (1: upper) of a cell face that no face intersects, or EBPO_NO_CELL_FACE, or
-     * EBPO_NEAR_BORDER */
+    /* 2 axis + side (1: upper) of a cell face that no face intersects, or EBPO_NO_CELL_FACE,
+     * EBPO_NEAR_BORDER or EBPO_NEAR_CAPS */
     uint8_t cell_face;
     int8_t cell_face_step; /* winding number on that cell face minus that at the lowest corner */
 } ebpo_accel_leaf;

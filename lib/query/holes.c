@@ -161,8 +161,7 @@ static void mark_leaf(marking *w, ebpo_accel_leaf *leaf, ebpo_cell cell)
     if (is_far(w, cell, LAST_TOLERANCE))
         return;
     leaf->kind = EBPO_LEAF_GENERAL;
-    leaf->cell_face = EBPO_NEAR_BORDER;
-    leaf->queries = caps_touch(w, cell); /* not counted for this kind */
+    leaf->cell_face = caps_touch(w, cell) ? EBPO_NEAR_CAPS : EBPO_NEAR_BORDER;
 }
 
 /* Marks a node and the nodes below it. Recursive, one call for each level. */

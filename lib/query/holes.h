@@ -30,10 +30,10 @@ static inline uint64_t ebpo_holes_estimate(const ebpo_info *info)
 
 /* Decides what is constant in the cells of a table's nodes, and marks these nodes. Uniform entries
  * get a number of ebpo_marked_entry in place of the winding number at their lowest corner. A leaf
- * that is marked EBPO_NEAR_BORDER is decided point by point; in other leaves the rule for the
- * integer winding number decides, as in a solid. Uniform nodes that are not decided are split into
- * at most `splits` groups of eight cells, down to level `deepest`. Returns EBPO_E_LIMIT for winding
- * numbers beyond 2^25. */
+ * with cell_face EBPO_NEAR_BORDER or EBPO_NEAR_CAPS is decided point by point; in other leaves the
+ * rule for the integer winding number decides, as in a solid. Uniform nodes that are not decided
+ * are split into at most `splits` groups of eight cells, down to level `deepest`. Returns
+ * EBPO_E_LIMIT for winding numbers beyond 2^25. */
 typedef struct ebpo_marked_table {
     const ebpo_box *box;
     ebpo_cell root;

@@ -258,7 +258,7 @@ static ebpo_status result_by_faces(ebpo_context *context, const ebpo_accel *s,
     uint64_t most = (uint64_t)s->list_longest * EBPO_BLOCK;
     int32_t winding;
     /* another thread may be writing the cell face of a leaf that is not bounded yet */
-    bool near = bounded && leaf->cell_face == EBPO_NEAR_BORDER;
+    bool near = bounded && leaf->cell_face >= EBPO_NEAR_BORDER;
     if (most > context->open_capacity &&
         !ebpo_grow(&context->open, &context->open_capacity, most, sizeof *context->open))
         return ebpo_fail_memory(error, most * sizeof *context->open);
@@ -267,7 +267,7 @@ static ebpo_status result_by_faces(ebpo_context *context, const ebpo_accel *s,
                    : from_corner(kernels, s, leaf, bounded && !near, i, p, context->open, &winding);
     if (!off)
         *out = (ebpo_inside_result){ EBPO_ON, 0, 0 };
-    else if (near && leaf->queries)
+    else if (near && leaf->cell_face == EBPO_NEAR_CAPS)
         decide_near(context, i->leaf, winding, p, out);
     else if (near)
         decide_capped(context, p, winding, out);

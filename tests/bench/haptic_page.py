@@ -127,7 +127,7 @@ one step handles; the next step continues.
         t, n = r["haptic"], r["nothing"]
         print(f"| {name}, {r['rate']:g} Hz | {t['missed']} | {us(t['wake_p99_9'])} | {us(t['wake_max'])} | "
               f"{us(n['wake_p99_9'])} | {r['contacts']:,} | {r['waiting']:,} | "
-              f"{r['incomplete']:,} | {r['load_seconds_max']:.2f} |")
+              f"{r['path_unfinished']:,} | {r['load_seconds_max']:.2f} |")
     probe = rows[2][2]
     print(f"""
 The bounds of the probe differ by {probe["between_mean"]:.3g} on average and {probe["between_max"]:.3g} at most, in a root cell of

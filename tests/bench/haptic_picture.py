@@ -57,7 +57,7 @@ def main(program, ply, picture):
         at = middle + size * at
         for _ in range(200):
             result = haptic.step(at)
-            if not result.flags & 6:  # neither EBPO_HAPTIC_WAITING nor EBPO_HAPTIC_INCOMPLETE
+            if not result.flags & 6:  # neither EBPO_HAPTIC_WAITING nor EBPO_HAPTIC_PATH_UNFINISHED
                 break
             time.sleep(0.001)
         devices.append(at)

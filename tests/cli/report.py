@@ -48,7 +48,7 @@ def from_json(reported):
         places = [("", "", m)] + [(str(l["level"]), "", l)
                                   for l in m["levels"]] + [("", f"{d['microseconds']}us", d)
                                                            for d in m["deadlines"]]
-        places += [("", "=".join([k, repr_c(n[k])]), n) for n in m["needs"]
+        places += [("", "=".join([k, repr_c(n[k])]), n) for n in m["targets"]
                    for k in ("max_error", "target_bytes") if k in n]
         places += [("", f"memory/{b['part']}", b) for b in m["budgets"]]
         for level, parameter, statistics in places:
@@ -290,13 +290,13 @@ def scaled(ply, factor):
     return (made + "".join(" ".join(map(str, f)) + "\n" for f in faces)).encode()
 
 
-def needs(reported):
+def targets(reported):
     for m in reported["methods"]:
-        for n in m["needs"]:
+        for n in m["targets"]:
             if "target_bytes" in n:
-                assert n["need_bytes"] <= n["target_bytes"], n
-            elif n["need_hausdorff_lo"] is not None:
-                assert (n["need_hausdorff_lo"] <= max(n["max_error"],
+                assert n["subset_bytes"] <= n["target_bytes"], n
+            elif n["subset_hausdorff_lo"] is not None:
+                assert (n["subset_hausdorff_lo"] <= max(n["max_error"],
                                                       m["levels"][-1]["hausdorff_hi"]) * (1 + 1e-9)), n
 
 
@@ -316,7 +316,7 @@ def default(inputs):
     against_info(reported, folder)
     queries(reported, folder)
     shapes(reported, folder)
-    needs(reported)
+    targets(reported)
     lines_and_budgets(reported)
     assert ([m["name"] for m in reported["methods"]] == ["inherit", "kmedoids", "offset", "random"]
             and all(m["build_seconds"] > 0 for m in reported["methods"]))
@@ -359,10 +359,10 @@ def files(inputs):
     assert [l["level"] for l in reported["methods"][0]["levels"]] == [1, 2]
     page_holds(folder_of(inputs, "some"), reported, 2)
     # The error bound of the whole file is that of its last level, measured or not.
-    ratios = [[n["need_ratio"] for n in j["methods"][0]["needs"]] for j in (whole, reported)]
+    ratios = [[n["subset_ratio"] for n in j["methods"][0]["targets"]] for j in (whole, reported)]
     last = whole["methods"][0]["levels"][-1]["hausdorff_hi"]
     assert (ratios[0] == ratios[1] and any(n.get("max_error", last) < last
-                                           for n in reported["methods"][0]["needs"])), (ratios, last)
+                                           for n in reported["methods"][0]["targets"])), (ratios, last)
 
 
 def surface(inputs):

@@ -64,7 +64,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     fuzz_must(ebpo_scene_get_counts(scene, &counts) == EBPO_OK && counts.begin <= counts.end);
     for (uint64_t i = 0; i < counts.models; i++) {
         ebpo_scene_model_facts facts = EBPO_SCENE_MODEL_FACTS_INIT;
-        fuzz_must(ebpo_scene_get_model(scene, i, &facts) == EBPO_OK);
+        fuzz_must(ebpo_scene_get_model_facts(scene, i, &facts) == EBPO_OK);
         fuzz_must(facts.name && facts.path && !facts.loaded);
     }
     for (uint64_t i = 0; i < counts.instances; i++)

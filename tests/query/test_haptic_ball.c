@@ -78,7 +78,7 @@ static double apart(const double a[3], const double b[3])
 static void judge_face(judged *j, const ebpo_haptic_ball_result *r)
 {
     oracle_nearest near;
-    if (r->flags & EBPO_HAPTIC_PARTIAL)
+    if (r->flags & EBPO_HAPTIC_FACES_OMITTED)
         return;
     oracle_find_nearest(j->m->judge, r->proxy, &near);
     double gap = near.distance - j->options.radius;
@@ -107,7 +107,7 @@ static void judge_step(judged *j, const double device[3], bool closely)
     check_path(j, r.proxy);
     if (closely)
         judge_face(j, &r);
-    if (!(r.flags & (EBPO_HAPTIC_CONTACT | EBPO_HAPTIC_WAITING | EBPO_HAPTIC_INCOMPLETE)))
+    if (!(r.flags & (EBPO_HAPTIC_CONTACT | EBPO_HAPTIC_WAITING | EBPO_HAPTIC_PATH_UNFINISHED)))
         ck_assert_msg(apart(r.proxy, device) <= j->skin, "%s: nothing holds the proxy", j->m->name);
     for (int i = 0; i < 3; i++) {
         j->proxy[i] = r.proxy[i];
@@ -245,9 +245,10 @@ static void cube_move(cube_device *c, double x, double y, double z, int steps)
         do {
             ck_assert_msg(patience-- > 0, "flags %u", c->r.flags);
             step_seconds(c->haptic, at, &c->r);
-            if (c->r.flags & (EBPO_HAPTIC_WAITING | EBPO_HAPTIC_PARTIAL))
+            if (c->r.flags & (EBPO_HAPTIC_WAITING | EBPO_HAPTIC_FACES_OMITTED))
                 pause_a_little();
-        } while (c->r.flags & (EBPO_HAPTIC_WAITING | EBPO_HAPTIC_INCOMPLETE | EBPO_HAPTIC_PARTIAL));
+        } while (c->r.flags &
+                 (EBPO_HAPTIC_WAITING | EBPO_HAPTIC_PATH_UNFINISHED | EBPO_HAPTIC_FACES_OMITTED));
     }
 }
 
@@ -321,7 +322,7 @@ START_TEST(test_haptic_distant_device_keeps_ball)
         for (int i = 0, there = 0; there < 100; i++) {
             ck_assert_msg(i < 20000, "the ball stays at %g, flags %u", r.proxy[0], r.flags);
             step_seconds(haptic, devices[h], &r);
-            if (r.flags & (EBPO_HAPTIC_WAITING | EBPO_HAPTIC_PARTIAL))
+            if (r.flags & (EBPO_HAPTIC_WAITING | EBPO_HAPTIC_FACES_OMITTED))
                 pause_a_little();
             there += r.proxy[0] > 1;
             double least = fmin(off_box(r.proxy, floor_low, floor_high),

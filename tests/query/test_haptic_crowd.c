@@ -130,7 +130,7 @@ static void ball_move(ball *b, const double device[3], uint32_t most)
             continue;
         }
         ck_assert_msg(++b->step_count <= most, "%s: not at rest after %u steps", b->m.name, most);
-        if (!(b->r.flags & EBPO_HAPTIC_INCOMPLETE))
+        if (!(b->r.flags & EBPO_HAPTIC_PATH_UNFINISHED))
             return;
     }
 }
@@ -164,7 +164,7 @@ static void judge_rest(const ball *b, const double device[3], uint64_t *state)
         return;
     }
     ck_assert_msg(gap <= skin * (1 + 1e-3), "%s: held %g from the faces", b->m.name, gap);
-    if (!(b->r.flags & EBPO_HAPTIC_PARTIAL))
+    if (!(b->r.flags & EBPO_HAPTIC_FACES_OMITTED))
         ck_assert_double_le(fabs(apart(b->r.proxy, b->r.point) - (radius + gap)), skin / 16);
     for (int i = 0; i < 3; i++)
         back[i] = b->r.proxy[i] - device[i];

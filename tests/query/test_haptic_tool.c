@@ -321,7 +321,7 @@ static void settle(judged *j, const pose *device, ebpo_haptic_tool_result *r)
 {
     for (int patience = 5000; patience > 0; patience--) {
         *r = judge_step(j, device, false);
-        if (patience < 4990 && !(r->flags & (EBPO_HAPTIC_WAITING | EBPO_HAPTIC_INCOMPLETE)))
+        if (patience < 4990 && !(r->flags & (EBPO_HAPTIC_WAITING | EBPO_HAPTIC_PATH_UNFINISHED)))
             return;
         if (r->flags & EBPO_HAPTIC_WAITING)
             pause_a_little();
@@ -464,7 +464,7 @@ START_TEST(test_haptic_step_time_with_many_points)
         ebpo_haptic_step_tool(haptic, device, turn, &r);
         in_step = false;
         ck_assert_uint_le(r.work, 12000);
-        rests = !(r.flags & (EBPO_HAPTIC_WAITING | EBPO_HAPTIC_INCOMPLETE));
+        rests = !(r.flags & (EBPO_HAPTIC_WAITING | EBPO_HAPTIC_PATH_UNFINISHED));
         if (i % 8 == 0)
             pause_a_little();
     }

@@ -466,7 +466,7 @@ static ebpo_status inspect_scene(const ebpo_scene *scene)
     ebpo_scene_camera camera = EBPO_SCENE_CAMERA_INIT;
     double clearance;
     bool fine = ebpo_scene_get_counts(scene, &counts) == EBPO_OK && counts.instances == 2 &&
-                ebpo_scene_get_model(scene, 0, &model) == EBPO_OK && model.loaded &&
+                ebpo_scene_get_model_facts(scene, 0, &model) == EBPO_OK && model.loaded &&
                 ebpo_scene_get_instance(scene, 1, &instance) == EBPO_OK &&
                 ebpo_scene_get_camera(scene, 0, &camera) == EBPO_OK &&
                 !ebpo_scene_get_layer(scene, 0) && !ebpo_scene_get_group(scene, 0) &&

@@ -102,7 +102,7 @@ function shapeColumns(report, method) {
 const queryColumns = (report) => [
   figure('maybe_uniform', 100), figure('maybe_near', 100), figure('inside_ns', 1e-9),
   ...lengths(report, 'width_mean', 'width_median', 'width_p99'), figure('distance_ns', 1e-9),
-  figure('have_seconds'), figure('read_bytes'), figure('reads'), figure('level_memory_bytes'),
+  figure('reading_seconds'), figure('read_bytes'), figure('reads'), figure('level_memory_bytes'),
 ];
 
 function rowsAgree(table, rows, columns, what) {
@@ -132,8 +132,8 @@ function tablesAgree(report, { tables, ofMethods }) {
   rowsAgree(tables.budgets, methods[0].budgets.map((_, i) => methods.map((m) => m.budgets[i])), perMethod(report, budget), 'budgets');
   rowsAgree(tables.transmission, levelRows, perMethod(report, SENT), 'transmission');
   if (methods.length === 1) {
-    const need = [figure('need_bytes'), ...lengths(report, 'need_hausdorff_lo', 'need_hausdorff_hi'), figure('need_ratio')];
-    rowsAgree(tables.needs, methods[0].needs, need, 'needs');
+    const target = [figure('subset_bytes'), ...lengths(report, 'subset_hausdorff_lo', 'subset_hausdorff_hi'), figure('subset_ratio')];
+    rowsAgree(tables.targets, methods[0].targets, target, 'targets');
   }
   assert.equal(ofMethods.length, 2 * methods.length);
   methods.forEach((m, i) => {
@@ -145,7 +145,7 @@ function tablesAgree(report, { tables, ofMethods }) {
 // --- plots ---
 
 const far = (report, name) => lengths(report, name)[0];
-const level = figure('level'), soFar = figure('cumulative_bytes'), have = figure('have_seconds');
+const level = figure('level'), soFar = figure('cumulative_bytes'), have = figure('reading_seconds');
 const plotAxes = (report) => {
   const solid = report.methods.some((m) => m.levels.some((l) => l.excess !== null));
   const known = figure(solid ? 'excess' : 'envelope_volume'), alone = figure(solid ? 'levels_excess' : 'levels_volume');

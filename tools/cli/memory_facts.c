@@ -7,13 +7,14 @@
 static void print_parts(FILE *out, const ebpo_model_plan *p)
 {
     char top[40], chunks[40], skeletons[40], subtree[40];
-    fprintf(out, "          levels 0 to %d stay, %s; %" PRIu64 " subtrees below, %s the average\n",
+    fprintf(out,
+            "          levels 0 to %d stay loaded, %s; %" PRIu64 " subtrees below, %s on average\n",
             p->cut_level, words_bytes(top, sizeof top, p->top), p->subtrees,
             words_bytes(subtree, sizeof subtree, p->subtree_bytes));
     if (p->subtrees_held < p->subtrees)
         fprintf(out,
-                "          %" PRIu64 " of these at a time; up to %s for chunks, %s for what "
-                "stays of others\n",
+                "          %" PRIu64 " of these at a time; up to %s for chunks, %s for the "
+                "skeletons of others\n",
                 p->subtrees_held, words_bytes(chunks, sizeof chunks, p->chunks),
                 words_bytes(skeletons, sizeof skeletons, p->skeletons));
 }
@@ -26,7 +27,7 @@ void memory_facts(FILE *out, const ebpo_model_plan *p)
             p->resident ? "everything" : "not everything");
     if (!p->resident)
         print_parts(out, p);
-    fprintf(out, "          everything takes up to %s, the least that does is about %s\n",
+    fprintf(out, "          the whole model takes up to %s; the least budget is about %s\n",
             words_bytes(whole, sizeof whole, p->whole), words_bytes(least, sizeof least, p->least));
 }
 

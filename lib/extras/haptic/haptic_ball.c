@@ -67,7 +67,7 @@ static void find_depth(const ebpo_haptic *t, const double device[3], uint32_t fl
 {
     double want[3], motion[3];
     ebpo_vec3_subtract(t->proxy, device, out);
-    if (!(flags & (EBPO_HAPTIC_WAITING | EBPO_HAPTIC_INCOMPLETE)))
+    if (!(flags & (EBPO_HAPTIC_WAITING | EBPO_HAPTIC_PATH_UNFINISHED)))
         return;
     ebpo_vec3_subtract(device, t->proxy, want);
     (void)ebpo_project_motion(&t->holding_planes, want, motion);
@@ -101,8 +101,8 @@ void ebpo_haptic_count(ebpo_haptic *t, uint32_t flags, uint64_t work)
     s->step_count++;
     s->contacts += (flags & EBPO_HAPTIC_CONTACT) != 0;
     s->waiting += (flags & EBPO_HAPTIC_WAITING) != 0;
-    s->incomplete += (flags & EBPO_HAPTIC_INCOMPLETE) != 0;
-    s->partial += (flags & EBPO_HAPTIC_PARTIAL) != 0;
+    s->path_unfinished += (flags & EBPO_HAPTIC_PATH_UNFINISHED) != 0;
+    s->faces_omitted += (flags & EBPO_HAPTIC_FACES_OMITTED) != 0;
     s->stopped += (flags & EBPO_HAPTIC_STOPPED) != 0;
     s->work_max = work > s->work_max ? work : s->work_max;
     s->energy_max = fmax(s->energy_max, t->passive.energy);

@@ -46,7 +46,7 @@ static bool bound_by_faces(ebpo_haptic *t, const double place[3], ebpo_haptic_pr
     ebpo_vec3_copy(near.normal, out->normal);
     ebpo_vec3_copy(near.point, out->point);
     ebpo_vec3_copy(near.weight, out->weight);
-    bool all = !(near.flags & EBPO_HAPTIC_PARTIAL);
+    bool all = !(near.flags & EBPO_HAPTIC_FACES_OMITTED);
     double distance = INFINITY, search_radius = t->options.search_radius;
     if (near.face != EBPO_NO_FACE) {
         double motion[3];

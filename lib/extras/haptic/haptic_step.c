@@ -115,7 +115,7 @@ static void find_faces(face_search *a)
     for (uint32_t visits = 0; a->queue.count > 0; visits++) {
         if (visits >= EBPO_HAPTIC_VISITS ||
             a->visited_faces + EBPO_FACE_BOX_LEAF > EBPO_HAPTIC_FACES) {
-            a->out->flags |= EBPO_HAPTIC_PARTIAL;
+            a->out->flags |= EBPO_HAPTIC_FACES_OMITTED;
             a->search_radius = fmin(a->search_radius, a->queue.item[0].key - a->t->options.radius);
             return;
         }
@@ -169,7 +169,7 @@ void ebpo_haptic_find_nearest(ebpo_haptic *t, ebpo_haptic_ball_result *out)
     out->face = EBPO_NO_FACE;
     if (!ebpo_extent_holds(&a.box->centres, t->proxy)) {
         if (!has_no_face_close(t))
-            out->flags |= EBPO_HAPTIC_PARTIAL;
+            out->flags |= EBPO_HAPTIC_FACES_OMITTED;
     } else if (a.box->count > 0) {
         push_node(&a, 1);
         find_faces(&a);
@@ -334,7 +334,7 @@ static bool end_piece(path_step *s)
     }
     if (touches)
         add_planes(t);
-    s->flags |= touches ? EBPO_HAPTIC_CONTACT : w->cut ? EBPO_HAPTIC_INCOMPLETE : t->end_flags;
+    s->flags |= touches ? EBPO_HAPTIC_CONTACT : w->cut ? EBPO_HAPTIC_PATH_UNFINISHED : t->end_flags;
     t->holding_planes = t->contact_planes;
     t->has_complete_piece = true;
     return touches;
@@ -364,9 +364,9 @@ static uint32_t follow_pieces(path_step *s)
             return s->flags;
         ebpo_ball_end end = ebpo_ball_continue(&t->walk, s->work);
         if (end == EBPO_BALL_UNFINISHED)
-            return s->flags | EBPO_HAPTIC_INCOMPLETE | held_flags(s);
+            return s->flags | EBPO_HAPTIC_PATH_UNFINISHED | held_flags(s);
         if (end == EBPO_BALL_CROSSED)
-            return s->flags | EBPO_HAPTIC_INCOMPLETE;
+            return s->flags | EBPO_HAPTIC_PATH_UNFINISHED;
         if (!end_piece(s)) {
             if (!resumed)
                 return s->flags;
@@ -375,7 +375,7 @@ static uint32_t follow_pieces(path_step *s)
         }
         resumed = false;
     }
-    return s->flags | EBPO_HAPTIC_INCOMPLETE;
+    return s->flags | EBPO_HAPTIC_PATH_UNFINISHED;
 }
 
 uint32_t ebpo_haptic_move_ball(ebpo_haptic *t, const double goal[3], ebpo_ball_work *work)

@@ -260,7 +260,7 @@ static void limit_angle(ebpo_haptic *t, double motion[EBPO_SCREW], uint32_t *fla
         part = t->max_piece / length;
     if (part >= 1)
         return;
-    *flags |= EBPO_HAPTIC_INCOMPLETE;
+    *flags |= EBPO_HAPTIC_PATH_UNFINISHED;
     for (int k = 0; k < EBPO_SCREW; k++)
         motion[k] *= part;
 }
@@ -300,7 +300,7 @@ static uint32_t give_up_piece(tool_piece *p)
 {
     p->t->max_piece = fmax(0.25 * ebpo_screw_length(p->tool->motion), 0x1p-8 * p->skin);
     p->tool->stage = EBPO_TOOL_IDLE;
-    return EBPO_HAPTIC_INCOMPLETE;
+    return EBPO_HAPTIC_PATH_UNFINISHED;
 }
 
 /* Continues the piece, within the work of a haptic step. Returns bits of ebpo_haptic_flag.
@@ -313,7 +313,7 @@ static uint32_t continue_tool_motion(ebpo_haptic *t, uint64_t *work, bool *arriv
     for (; tool->stage == EBPO_TOOL_SEARCHES && tool->next_index < tool->cluster_count;
          tool->next_index++) {
         if (*work > EBPO_TOOL_WORK)
-            return EBPO_HAPTIC_INCOMPLETE;
+            return EBPO_HAPTIC_PATH_UNFINISHED;
         if (!inspect_cluster(&p, (uint32_t)tool->next_index))
             return give_up_piece(&p);
     }
@@ -321,7 +321,7 @@ static uint32_t continue_tool_motion(ebpo_haptic *t, uint64_t *work, bool *arriv
         begin_check(tool);
     for (; tool->next_index < tool->close_count; tool->next_index++) {
         if (*work > EBPO_TOOL_WORK)
-            return EBPO_HAPTIC_INCOMPLETE;
+            return EBPO_HAPTIC_PATH_UNFINISHED;
         if (!check_close_point(&p, &tool->close_points[tool->next_index]))
             return give_up_piece(&p);
     }
@@ -377,7 +377,7 @@ static uint32_t move_proxy(ebpo_haptic *t, const ebpo_rigid *device, uint64_t *w
         bool arrived;
         if (tool->stage == EBPO_TOOL_IDLE) {
             if (*work > EBPO_TOOL_WORK)
-                return flags | EBPO_HAPTIC_INCOMPLETE;
+                return flags | EBPO_HAPTIC_PATH_UNFINISHED;
             (void)ebpo_haptic_take_box(t);
             *work += 4 * (uint64_t)tool->contacts.count; /* work of the contacts */
             if (!begin_path(t, device, &flags))
@@ -390,7 +390,7 @@ static uint32_t move_proxy(ebpo_haptic *t, const ebpo_rigid *device, uint64_t *w
         if (!arrived || (flags & EBPO_HAPTIC_WAITING))
             return flags;
     }
-    return flags | EBPO_HAPTIC_INCOMPLETE;
+    return flags | EBPO_HAPTIC_PATH_UNFINISHED;
 }
 
 /* Computes the vector from device to proxy, or only the part of it that contacts cause. Returns the
@@ -405,7 +405,7 @@ static int find_depth(const ebpo_haptic *t, const ebpo_rigid *device, uint32_t f
     /* with friction, a tool that has completed its path is held in all directions: the whole
      * vector counts. Otherwise motions that the contacts allow do not count. */
     bool held_only =
-        flags & (EBPO_HAPTIC_WAITING | EBPO_HAPTIC_INCOMPLETE) || t->options.friction == 0;
+        flags & (EBPO_HAPTIC_WAITING | EBPO_HAPTIC_PATH_UNFINISHED) || t->options.friction == 0;
     for (int k = 0; k < EBPO_SCREW; k++)
         out[k] = (held_only ? motion[k] : 0) - want[k];
     return holding;

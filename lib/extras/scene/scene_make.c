@@ -472,8 +472,8 @@ ebpo_status ebpo_scene_get_counts(const ebpo_scene *scene, ebpo_scene_counts *ou
     return EBPO_GIVE(ebpo_scene_counts, out, &c);
 }
 
-ebpo_status ebpo_scene_get_model(const ebpo_scene *scene, uint64_t model,
-                                 ebpo_scene_model_facts *out)
+ebpo_status ebpo_scene_get_model_facts(const ebpo_scene *scene, uint64_t model,
+                                       ebpo_scene_model_facts *out)
 {
     if (model >= scene->models_count)
         return EBPO_E_ARGUMENT;

@@ -155,14 +155,14 @@ typedef enum ebpo_haptic_flag {
      * The path of the proxy is incomplete: the work limit of the step was reached before its end.
      * The next step continues; until then, a ball in contact stays in contact with the same faces.
      */
-    EBPO_HAPTIC_INCOMPLETE = 4,
+    EBPO_HAPTIC_PATH_UNFINISHED = 4,
 
     /*
      * The nearest face, its distance and the normal follow from only a part of the faces within
      * `search_radius`: the farthest ones were not tested, or some were not loaded. The path of the
      * proxy is not affected.
      */
-    EBPO_HAPTIC_PARTIAL = 8,
+    EBPO_HAPTIC_FACES_OMITTED = 8,
 
     /* The device position was not finite; the previous one was used. */
     EBPO_HAPTIC_BAD_INPUT = 16,
@@ -196,9 +196,10 @@ typedef struct ebpo_haptic_ball_result {
 
     /*
      * In contact: length of the vector from proxy to device; with EBPO_HAPTIC_WAITING or
-     * EBPO_HAPTIC_INCOMPLETE, only of the part of this vector that faces prevent. Otherwise minus
-     * the distance from the ball to the nearest face; or minus `search_radius` if no face is within
-     * `search_radius`. With EBPO_HAPTIC_PARTIAL, a face that was not tested may be nearer.
+     * EBPO_HAPTIC_PATH_UNFINISHED, only of the part of this vector that faces prevent. Otherwise
+     * minus the distance from the ball to the nearest face; or minus `search_radius` if no face is
+     * within `search_radius`. With EBPO_HAPTIC_FACES_OMITTED, a face that was not tested may be
+     * nearer.
      */
     double depth;
 
@@ -220,7 +221,8 @@ typedef struct ebpo_haptic_ball_result {
 /*
  * Computes one haptic step with the device at `device`. Takes bounded time, without locks,
  * allocation or reading. Results are reproducible, except after EBPO_HAPTIC_WAITING or
- * EBPO_HAPTIC_INCOMPLETE: then the proxy's path depends on the times at which boxes were loaded.
+ * EBPO_HAPTIC_PATH_UNFINISHED: then the proxy's path depends on the times at which boxes were
+ * loaded.
  *
  * The force is stiffness times the vector from device to proxy, minus damping times the device
  * velocity. If the spring pushes the device away from a face, the total force has no component
@@ -357,7 +359,7 @@ typedef struct ebpo_haptic_tool_result {
  *
  * Time is bounded as in ebpo_haptic_step_ball. Points that cannot have come near a face since their
  * last test take almost no time. If many points are near and the work exceeds a step, the next
- * steps continue it (EBPO_HAPTIC_INCOMPLETE), and the tool does not move until then.
+ * steps continue it (EBPO_HAPTIC_PATH_UNFINISHED), and the tool does not move until then.
  *
  * Methods: Ortega, Redon and Coquillart 2007 (six degrees of freedom, motion by Gauss' principle);
  * McNeely, Puterbaugh and Troy 1999 (points for a tool); Barbic and James 2008 (clusters of points,
@@ -396,7 +398,7 @@ typedef struct ebpo_haptic_stats {
     uint64_t step_count;
 
     /* Number of steps with each of these flags. */
-    uint64_t contacts, waiting, incomplete, partial;
+    uint64_t contacts, waiting, path_unfinished, faces_omitted;
 
     /*
      * Number of boxes loaded, of boxes used by steps, and of boxes cancelled because of too many

@@ -3,7 +3,7 @@
  *
  *   Making      ebpo_scene_open (a file: format-spec/scene.md), ebpo_scene_new,
  *               ebpo_scene_add_model, ebpo_scene_add_instance
- *   Contents    ebpo_scene_get_counts, ebpo_scene_get_model, ebpo_scene_get_instance,
+ *   Contents    ebpo_scene_get_counts, ebpo_scene_get_model_facts, ebpo_scene_get_instance,
  *               ebpo_scene_get_layer, ebpo_scene_get_group, ebpo_scene_group_of,
  *               ebpo_scene_get_camera, ebpo_scene_get_stats, ebpo_scene_pair_rule
  *   Models      ebpo_scene_load, ebpo_scene_file, ebpo_scene_model
@@ -227,8 +227,8 @@ typedef struct ebpo_scene_model_facts {
  *
  * Threads: any.
  */
-EBPO_API ebpo_status ebpo_scene_get_model(const ebpo_scene *scene, uint64_t model,
-                                          ebpo_scene_model_facts *out);
+EBPO_API ebpo_status ebpo_scene_get_model_facts(const ebpo_scene *scene, uint64_t model,
+                                                ebpo_scene_model_facts *out);
 
 typedef struct ebpo_scene_stats {
     size_t struct_size;

@@ -280,7 +280,7 @@ static void put_instance(FILE *f, const ebpo_scene *scene, const char *letter, u
     ebpo_scene_instance at = EBPO_SCENE_INSTANCE_INIT;
     ebpo_scene_model_facts model = EBPO_SCENE_MODEL_FACTS_INIT;
     (void)ebpo_scene_get_instance(scene, instance, &at);
-    (void)ebpo_scene_get_model(scene, at.model, &model);
+    (void)ebpo_scene_get_model_facts(scene, at.model, &model);
     const char *layer = ebpo_scene_get_layer(scene, at.layer);
     fprintf(f, "%s <b>", letter);
     html_put_text(f, at.name);

@@ -171,7 +171,7 @@ static uint64_t faces_of(const ebpo_scene *scene, uint64_t models)
     uint64_t sum = 0;
     for (uint64_t i = 0; i < models; i++) {
         ebpo_scene_model_facts m = EBPO_SCENE_MODEL_FACTS_INIT;
-        (void)ebpo_scene_get_model(scene, i, &m);
+        (void)ebpo_scene_get_model_facts(scene, i, &m);
         sum += m.instances * ebpo_file_info(ebpo_scene_file(scene, i))->face_count;
     }
     return sum;

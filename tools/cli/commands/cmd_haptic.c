@@ -313,11 +313,10 @@ static void print_report(const job *j)
            "max");
     print_times("haptic", &j->times);
     print_times("empty", &j->empty);
-    printf("  contact %llu, waiting %llu, incomplete %llu, partial %llu; faces at most %llu; page "
-           "faults "
-           "%llu\n",
+    printf("  contact %llu, waiting %llu, path unfinished %llu, faces omitted %llu; faces tested "
+           "in a step: at most %llu; page faults %llu\n",
            (unsigned long long)s->contacts, (unsigned long long)s->waiting,
-           (unsigned long long)s->incomplete, (unsigned long long)s->partial,
+           (unsigned long long)s->path_unfinished, (unsigned long long)s->faces_omitted,
            (unsigned long long)s->work_max, (unsigned long long)j->times.page_faults);
     if (j->kind == EBPO_HAPTIC_PROBE)
         printf("  distances known to %g on average, %g at most\n", j->times.width_mean,
@@ -375,8 +374,8 @@ static void json_report(const job *j)
     }
     json_uint(&out, "contacts", s->contacts);
     json_uint(&out, "waiting", s->waiting);
-    json_uint(&out, "incomplete", s->incomplete);
-    json_uint(&out, "partial", s->partial);
+    json_uint(&out, "path_unfinished", s->path_unfinished);
+    json_uint(&out, "faces_omitted", s->faces_omitted);
     json_uint(&out, "faces_max", s->work_max);
     json_uint(&out, "loads", s->loads);
     json_uint(&out, "taken", s->taken);

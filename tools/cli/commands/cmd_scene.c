@@ -26,7 +26,7 @@ static scene_sums sum_models(const ebpo_scene *scene, uint64_t models)
     for (uint64_t i = 0; i < models; i++) {
         ebpo_scene_model_facts m = EBPO_SCENE_MODEL_FACTS_INIT;
         const ebpo_file *file = ebpo_scene_file(scene, i);
-        (void)ebpo_scene_get_model(scene, i, &m);
+        (void)ebpo_scene_get_model_facts(scene, i, &m);
         bool first = true;
         for (uint64_t k = 0; k < i && first; k++)
             first = ebpo_scene_file(scene, k) != file;
@@ -64,7 +64,7 @@ static void info_json(const char *path, const ebpo_scene *scene, const ebpo_scen
     json_array(&j, "models");
     for (uint64_t i = 0; i < c->models; i++) {
         ebpo_scene_model_facts m = EBPO_SCENE_MODEL_FACTS_INIT;
-        (void)ebpo_scene_get_model(scene, i, &m);
+        (void)ebpo_scene_get_model_facts(scene, i, &m);
         json_object(&j, NULL);
         json_text(&j, "name", m.name);
         json_text(&j, "file", m.path);
@@ -100,7 +100,7 @@ static void info_words(const char *path, const ebpo_scene *scene, const ebpo_sce
     for (uint64_t i = 0; i < c->models; i++) {
         ebpo_scene_model_facts m = EBPO_SCENE_MODEL_FACTS_INIT;
         const ebpo_info *info = ebpo_file_info(ebpo_scene_file(scene, i));
-        (void)ebpo_scene_get_model(scene, i, &m);
+        (void)ebpo_scene_get_model_facts(scene, i, &m);
         printf("%9llu %11llu %12llu  %s\n", (unsigned long long)m.instances,
                (unsigned long long)info->face_count, (unsigned long long)info->file_bytes, m.name);
     }

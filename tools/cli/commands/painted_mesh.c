@@ -128,7 +128,7 @@ ebpo_status painted_add_box(painted_mesh *p, const ebpo_scene *scene, uint64_t i
     if (status != EBPO_OK)
         return status;
     (void)ebpo_scene_get_instance(scene, instance, &at);
-    (void)ebpo_scene_get_model(scene, at.model, &m);
+    (void)ebpo_scene_get_model_facts(scene, at.model, &m);
     if (!reserve_space(p, 8, 12))
         return no_memory(error);
     for (int i = 0; i < 8; i++) {

@@ -16,7 +16,7 @@ typedef struct plan {
 static const char *name_of(const ebpo_scene *scene, uint64_t model)
 {
     ebpo_scene_model_facts m = EBPO_SCENE_MODEL_FACTS_INIT;
-    (void)ebpo_scene_get_model(scene, model, &m);
+    (void)ebpo_scene_get_model_facts(scene, model, &m);
     return m.name;
 }
 

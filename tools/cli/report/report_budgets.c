@@ -27,17 +27,17 @@ static ebpo_status query_within_budget(const comparison *c, ebpo_model *model, i
         width[i] = result.hi - result.lo;
     }
     if (status == EBPO_OK)
-        f[OF_BUDGET_WIDTH] = cut >= 0 ? quantile_of(width, count, 0.5) : 0;
+        f[METRIC_BUDGET_WIDTH] = cut >= 0 ? quantile_of(width, count, 0.5) : 0;
     ebpo_model_get_stats(model, &before);
     uint64_t begin = tool_clock();
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
         ebpo_distance_result result;
         status = ebpo_distance(context, c->uniform + 3 * i, &options, &result, error);
     }
-    f[OF_BUDGET_NS] = (double)(tool_clock() - begin) / (double)count;
+    f[METRIC_BUDGET_NS] = (double)(tool_clock() - begin) / (double)count;
     ebpo_model_get_stats(model, &after);
-    f[OF_BUDGET_LOADS] = (double)(after.loads - before.loads) / (double)count;
-    f[OF_BUDGET_READ] = (double)(after.bytes_read - before.bytes_read) / (double)count;
+    f[METRIC_BUDGET_LOADS] = (double)(after.loads - before.loads) / (double)count;
+    f[METRIC_BUDGET_READ] = (double)(after.bytes_read - before.bytes_read) / (double)count;
     ebpo_context_free(context);
     free(width);
     return status;
@@ -51,13 +51,13 @@ static ebpo_status measure_budget(comparison *c, method *m, ebpo_file *file, int
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
     ebpo_model *model = NULL;
     double *f = m->budget[i];
-    options.memory = budget_parts[i] == 1 ? 0 : (uint64_t)f[OF_BUDGET_BYTES];
+    options.memory = budget_parts[i] == 1 ? 0 : (uint64_t)f[METRIC_BUDGET_BYTES];
     options.threads = (unsigned)c->v->threads;
     ebpo_status status = ebpo_model_new(file, &options, &model, error);
     if (status == EBPO_OK) {
         ebpo_model_get_stats(model, &stats);
         if (!stats.resident)
-            f[OF_BUDGET_LEVEL] = stats.cut_level;
+            f[METRIC_BUDGET_LEVEL] = stats.cut_level;
         status = query_within_budget(c, model, stats.resident ? -1 : stats.cut_level, f, error);
     }
     ebpo_model_free(model);
@@ -76,7 +76,7 @@ static ebpo_status level_memory(comparison *c, method *m, ebpo_file *file, ebpo_
         ebpo_status status = ebpo_model_new(file, &options, &model, error);
         if (status == EBPO_OK) {
             ebpo_model_get_stats(model, &stats);
-            m->level[i][OF_LEVEL_MEMORY] = (double)stats.memory;
+            m->level[i][METRIC_LEVEL_MEMORY] = (double)stats.memory;
         }
         ebpo_model_free(model);
         if (status == EBPO_E_IO || status == EBPO_E_CANCELLED)
@@ -96,7 +96,7 @@ ebpo_status report_budgets(comparison *c, method *m, ebpo_file *file, ebpo_error
     if (status != EBPO_OK)
         return status;
     for (int i = 0; i < BUDGETS; i++)
-        m->budget[i][OF_BUDGET_BYTES] = ceil(m->whole[OF_MEMORY_BYTES] / budget_parts[i]);
+        m->budget[i][METRIC_BUDGET_BYTES] = ceil(m->whole[METRIC_MEMORY_BYTES] / budget_parts[i]);
     for (int i = 0; i < BUDGETS; i++) {
         if (c->progress.report)
             c->progress.report(c->progress.user, "memory budgets", (uint64_t)i, BUDGETS);
@@ -105,7 +105,7 @@ ebpo_status report_budgets(comparison *c, method *m, ebpo_file *file, ebpo_error
             continue;
         if (status == EBPO_E_IO || status == EBPO_E_CANCELLED)
             return status;
-        for (int k = OF_BUDGET_BYTES + 1; k < BUDGET_METRICS; k++)
+        for (int k = METRIC_BUDGET_BYTES + 1; k < BUDGET_METRICS; k++)
             m->budget[i][k] = NAN;
         method_note(m, "memory budgets", error->message);
         *error = (ebpo_error)EBPO_ERROR_INIT;

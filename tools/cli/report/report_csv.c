@@ -34,12 +34,12 @@ static void print_method(FILE *out, const comparison *c, const method *m)
         for (int k = 0; k < BUDGET_METRICS; k++)
             print_metric(out, m->name, -1, parameter, &budget_metrics[k], m->budget[i][k]);
     }
-    for (int i = 0; i < m->need_count; i++) {
+    for (int i = 0; i < m->target_count; i++) {
         snprintf(parameter, sizeof parameter, "%s=%.17g",
-                 m->need[i].kind == NEED_ERROR ? "max_error" : "target_bytes",
-                 m->need[i].requested);
-        for (int k = 0; k < NEED_METRICS; k++)
-            print_metric(out, m->name, -1, parameter, &need_metrics[k], m->need[i].metric[k]);
+                 m->targets[i].kind == TARGET_ERROR ? "max_error" : "target_bytes",
+                 m->targets[i].requested);
+        for (int k = 0; k < TARGET_METRICS; k++)
+            print_metric(out, m->name, -1, parameter, &target_metrics[k], m->targets[i].metric[k]);
     }
 }
 

@@ -19,164 +19,177 @@ const unsigned budget_parts[BUDGETS] = { 1, 2, 4, 8, 16 };
 #define NOT_TIMED    "this query is not available for the method, see below"
 
 const metric_name level_metrics[LEVEL_METRICS] = {
-    [OF_BYTES] = { "bytes", "B", false, "of the level in the file", NULL },
-    [OF_CUMULATIVE_BYTES] = { "cumulative_bytes", "B", false,
-                              "of the header and of levels 0 to this one", NULL },
-    [OF_GRAY] = { "gray", "nodes", false, "gray nodes of the level", NULL },
-    [OF_LEAVES] = { "leaf", "nodes", false, "leaves of the level", NULL },
-    [OF_PLANES] = { "planes", "planes", false, "stored for the level's gray nodes", NULL },
-    [OF_LEAF_PLANES] = { "leaf_planes", "planes", false, "stored for the level's leaves", NULL },
-    [OF_VOLUME] = { "envelope_volume", "model^3", false,
-                    "of the envelopes that represent the model at this level; leaves by their "
-                    "stored planes, else by planes derived from their faces",
-                    OUT_OF_RANGE },
-    [OF_EXCESS] = { "excess", "%", false,
-                    "volume of the envelopes beyond the volume of the solid, in percent of it",
-                    NO_VOLUME },
-    [OF_LEVELS_VOLUME] = { "levels_volume", "model^3", false,
-                           "the same from levels 0 to this one alone, without the mesh: leaves "
-                           "without stored planes have their parent's envelope",
-                           OUT_OF_RANGE },
-    [OF_LEVELS_EXCESS] = { "levels_excess", "%", false, "its excess", NO_VOLUME },
-    [OF_LIMIT_VOLUME] = { "limit_volume", "model^3", false,
-                          "of the convex hulls of the solid in each cell: no convex envelope is "
-                          "smaller",
-                          NO_MESH },
-    [OF_LIMIT_EXCESS] = { "limit_excess", "%", false, "its excess",
-                          "the file has no mesh or no volume, or this build no qhull" },
-    [OF_EXCESS_TO_LIMIT] = { "excess_to_limit", "1", false, "excess / limit_excess",
-                             "the limit is the solid itself, or there is none, or no volume within "
-                             "the range of a double" },
-    [OF_FAR_LO] = { "hausdorff_lo", "model", false,
-                    "lower bound of the one-sided Hausdorff distance from the envelopes to the "
-                    "model",
-                    NO_MESH },
-    [OF_FAR_HI] = { "hausdorff_hi", "model", false, "its upper bound", NO_MESH },
-    [OF_FAR_MEAN] = { "distance_mean", "model", false,
-                      "mean distance from the level's surface to the model, sampled",
-                      "no sample lies on the level's surface, or the file has no mesh" },
-    [OF_FAR_RMS] = { "distance_rms", "model", false, "root of its mean square",
-                     "no sample lies on the level's surface, or the file has no mesh" },
-    [OF_MAYBE_UNIFORM] = { "maybe_uniform", "1", false,
-                           "share of points, uniform in the bounding box of the model, that a "
-                           "point-in-solid query to this level leaves undecided",
-                           NO_INSIDE },
-    [OF_MAYBE_NEAR] = { "maybe_near", "1", false,
-                        "the same for points within 1 % of the diagonal from the surface",
-                        "a surface has no inside, and a file without a mesh has no points near "
-                        "it" },
-    [OF_WIDTH_MEAN] = { "width_mean", "model", false,
-                        "of the interval that contains the distance, known to this level; "
-                        "uniform points",
-                        NULL },
-    [OF_WIDTH_MEDIAN] = { "width_median", "model", false,
-                          "half of the points have a narrower "
-                          "interval",
-                          NULL },
-    [OF_WIDTH_P99] = { "width_p99", "model", false, "99 % of the points have a narrower interval",
-                       NULL },
-    [OF_INSIDE_NS] = { "inside_ns", "ns", true,
-                       "a point-in-solid query to this level, uniform points, in a batch, one "
-                       "thread",
-                       NO_INSIDE },
-    [OF_DISTANCE_NS] = { "distance_ns", "ns", true, "a distance query to this level, the same way",
-                         NULL },
-    [OF_READING_SECONDS] = { "have_seconds", "s", true,
-                             "to open the file and read levels 0 to this one, after the file was "
-                             "dropped from the page cache",
+    [METRIC_BYTES] = { "bytes", "B", false, "of the level in the file", NULL },
+    [METRIC_CUMULATIVE_BYTES] = { "cumulative_bytes", "B", false,
+                                  "of the header and of levels 0 to this one", NULL },
+    [METRIC_GRAY] = { "gray", "nodes", false, "gray nodes of the level", NULL },
+    [METRIC_LEAVES] = { "leaf", "nodes", false, "leaves of the level", NULL },
+    [METRIC_PLANES] = { "planes", "planes", false, "stored for the level's gray nodes", NULL },
+    [METRIC_LEAF_PLANES] = { "leaf_planes", "planes", false, "stored for the level's leaves",
                              NULL },
-    [OF_READ_BYTES] = { "read_bytes", "B", false, "bytes requested from the file for that", NULL },
-    [OF_READS] = { "reads", "reads", false, "read calls for that", NULL },
-    [OF_LINE_BYTES] = { "line_bytes", "B", false,
-                        "bytes sent by a server for that: the first 128 KiB of the file, and "
-                        "further data in blocks of 4 KiB",
-                        NOT_TIMED },
-    [OF_LINE_TRIPS] = { "line_trips", "trips", false,
-                        "round trips to the server, including the first 128 KiB; ranges with a "
-                        "common prefetch hint need one round trip",
-                        NOT_TIMED },
-    [OF_LEVEL_MEMORY] = { "level_memory_bytes", "B", false,
-                          "memory of a model that keeps levels 0 to this one and loads lower "
-                          "levels on demand; before anything is loaded",
-                          NOT_TIMED },
-    [OF_THESIS_BYTES] = { "thesis_bytes", "B", false,
-                          "cost of the level in the cost model of the theses", NO_MESH },
-    [OF_THESIS_CUMULATIVE] = { "thesis_cumulative_bytes", "B", false,
-                               "cost of levels 0 to this one", NO_MESH },
+    [METRIC_VOLUME] = { "envelope_volume", "model^3", false,
+                        "of the envelopes that represent the model at this level; leaves by their "
+                        "stored planes, else by planes derived from their faces",
+                        OUT_OF_RANGE },
+    [METRIC_EXCESS] = { "excess", "%", false,
+                        "volume of the envelopes beyond the volume of the solid, in percent of it",
+                        NO_VOLUME },
+    [METRIC_LEVELS_VOLUME] = { "levels_volume", "model^3", false,
+                               "the same from levels 0 to this one alone, without the mesh: leaves "
+                               "without stored planes have their parent's envelope",
+                               OUT_OF_RANGE },
+    [METRIC_LEVELS_EXCESS] = { "levels_excess", "%", false, "its excess", NO_VOLUME },
+    [METRIC_LIMIT_VOLUME] = { "limit_volume", "model^3", false,
+                              "of the convex hulls of the solid in each cell: no convex envelope "
+                              "is "
+                              "smaller",
+                              NO_MESH },
+    [METRIC_LIMIT_EXCESS] = { "limit_excess", "%", false, "its excess",
+                              "the file has no mesh or no volume, or this build no qhull" },
+    [METRIC_EXCESS_TO_LIMIT] = { "excess_to_limit", "1", false, "excess / limit_excess",
+                                 "the limit is the solid itself, or there is none, or no volume "
+                                 "within "
+                                 "the range of a double" },
+    [METRIC_FAR_LO] = { "hausdorff_lo", "model", false,
+                        "lower bound of the one-sided Hausdorff distance from the envelopes to the "
+                        "model",
+                        NO_MESH },
+    [METRIC_FAR_HI] = { "hausdorff_hi", "model", false, "its upper bound", NO_MESH },
+    [METRIC_FAR_MEAN] = { "distance_mean", "model", false,
+                          "mean distance from the level's surface to the model, sampled",
+                          "no sample lies on the level's surface, or the file has no mesh" },
+    [METRIC_FAR_RMS] = { "distance_rms", "model", false, "root of its mean square",
+                         "no sample lies on the level's surface, or the file has no mesh" },
+    [METRIC_MAYBE_UNIFORM] = { "maybe_uniform", "1", false,
+                               "share of points, uniform in the bounding box of the model, that a "
+                               "point-in-solid query to this level leaves undecided",
+                               NO_INSIDE },
+    [METRIC_MAYBE_NEAR] = { "maybe_near", "1", false,
+                            "the same for points within 1 % of the diagonal from the surface",
+                            "a surface has no inside, and a file without a mesh has no points near "
+                            "it" },
+    [METRIC_WIDTH_MEAN] = { "width_mean", "model", false,
+                            "of the interval that contains the distance, known to this level; "
+                            "uniform points",
+                            NULL },
+    [METRIC_WIDTH_MEDIAN] = { "width_median", "model", false,
+                              "half of the points have a narrower "
+                              "interval",
+                              NULL },
+    [METRIC_WIDTH_P99] = { "width_p99", "model", false,
+                           "99 % of the points have a narrower interval", NULL },
+    [METRIC_INSIDE_NS] = { "inside_ns", "ns", true,
+                           "a point-in-solid query to this level, uniform points, in a batch, one "
+                           "thread",
+                           NO_INSIDE },
+    [METRIC_DISTANCE_NS] = { "distance_ns", "ns", true,
+                             "a distance query to this level, the same way", NULL },
+    [METRIC_READING_SECONDS] = { "reading_seconds", "s", true,
+                                 "to open the file and read levels 0 to this one, after the file "
+                                 "was "
+                                 "dropped from the page cache",
+                                 NULL },
+    [METRIC_READ_BYTES] = { "read_bytes", "B", false, "bytes requested from the file for that",
+                            NULL },
+    [METRIC_READS] = { "reads", "reads", false, "read calls for that", NULL },
+    [METRIC_LINE_BYTES] = { "line_bytes", "B", false,
+                            "bytes sent by a server for that: the first 128 KiB of the file, and "
+                            "further data in blocks of 4 KiB",
+                            NOT_TIMED },
+    [METRIC_LINE_TRIPS] = { "line_trips", "trips", false,
+                            "round trips to the server, including the first 128 KiB; ranges with a "
+                            "common prefetch hint need one round trip",
+                            NOT_TIMED },
+    [METRIC_LEVEL_MEMORY] = { "level_memory_bytes", "B", false,
+                              "memory of a model that keeps levels 0 to this one and loads lower "
+                              "levels on demand; before anything is loaded",
+                              NOT_TIMED },
+    [METRIC_THESIS_BYTES] = { "thesis_bytes", "B", false,
+                              "cost of the level in the cost model of the theses", NO_MESH },
+    [METRIC_THESIS_CUMULATIVE] = { "thesis_cumulative_bytes", "B", false,
+                                   "cost of levels 0 to this one", NO_MESH },
 };
 
 const metric_name whole_metrics[WHOLE_METRICS] = {
-    [OF_FILE_BYTES] = { "file_bytes", "B", false,
-                        "of the file, including the mesh if the file has it", NULL },
-    [OF_HEAD_BYTES] = { "head_bytes", "B", false, "before level 0", NULL },
-    [OF_ALL_PLANES] = { "all_planes", "planes", false, "stored in the file", NULL },
-    [OF_BUILD_SECONDS] = { "build_seconds", "s", true,
-                           "to build the tree from the checked mesh; not known for existing files",
-                           "not known for existing files" },
-    [OF_OPEN_SECONDS] = { "open_seconds", "s", true,
-                          "to load the whole model into memory, ready for queries", NULL },
-    [OF_MEMORY_BYTES] = { "memory_bytes", "B", false, "memory of the whole model", NOT_TIMED },
-    [OF_EXACT_INSIDE_NS] = { "exact_inside_ns", "ns", true,
-                             "an exact point-in-solid query, uniform points, in a batch, one "
-                             "thread",
-                             "a surface has no inside, and a file without a mesh has no exact "
-                             "results" },
-    [OF_EXACT_DISTANCE_NS] = { "exact_distance_ns", "ns", true,
-                               "an exact distance query, the same way", NO_MESH },
+    [METRIC_FILE_BYTES] = { "file_bytes", "B", false,
+                            "of the file, including the mesh if the file has it", NULL },
+    [METRIC_HEAD_BYTES] = { "head_bytes", "B", false, "before level 0", NULL },
+    [METRIC_ALL_PLANES] = { "all_planes", "planes", false, "stored in the file", NULL },
+    [METRIC_BUILD_SECONDS] = { "build_seconds", "s", true,
+                               "to build the tree from the checked mesh; not known for existing "
+                               "files",
+                               "not known for existing files" },
+    [METRIC_OPEN_SECONDS] = { "open_seconds", "s", true,
+                              "to load the whole model into memory, ready for queries", NULL },
+    [METRIC_MEMORY_BYTES] = { "memory_bytes", "B", false, "memory of the whole model", NOT_TIMED },
+    [METRIC_EXACT_INSIDE_NS] = { "exact_inside_ns", "ns", true,
+                                 "an exact point-in-solid query, uniform points, in a batch, one "
+                                 "thread",
+                                 "a surface has no inside, and a file without a mesh has no exact "
+                                 "results" },
+    [METRIC_EXACT_DISTANCE_NS] = { "exact_distance_ns", "ns", true,
+                                   "an exact distance query, the same way", NO_MESH },
 };
 
 const metric_name deadline_metrics[DEADLINE_METRICS] = {
-    [OF_DUE_EXACT] = { "deadline_exact", "1", true,
-                       "share of distances that are exact at the deadline; uniform points, one "
-                       "at a time",
-                       NOT_TIMED },
-    [OF_DUE_WIDTH_MEDIAN] = { "deadline_width_median", "model", true,
-                              "width of the certain interval at the deadline: half of the points "
-                              "have a narrower interval",
-                              NOT_TIMED },
-    [OF_DUE_WIDTH_P99] = { "deadline_width_p99", "model", true,
-                           "99 % of the points have a narrower interval", NOT_TIMED },
-    [OF_DUE_TOOK_MEDIAN] = { "deadline_took_median", "ns", true,
-                             "time of the query: half took less", NOT_TIMED },
-    [OF_DUE_TOOK_P99] = { "deadline_took_p99", "ns", true, "99 % took less", NOT_TIMED },
-    [OF_DUE_TOOK_MAX] = { "deadline_took_max", "ns", true, "the longest", NOT_TIMED },
-    [OF_DUE_LATE] = { "deadline_late", "1", true,
-                      "share of queries that took longer than the deadline", NOT_TIMED },
+    [METRIC_DEADLINE_EXACT] = { "deadline_exact", "1", true,
+                                "share of distances that are exact at the deadline; uniform "
+                                "points, one "
+                                "at a time",
+                                NOT_TIMED },
+    [METRIC_DEADLINE_WIDTH_MEDIAN] = { "deadline_width_median", "model", true,
+                                       "width of the certain interval at the deadline: half of the "
+                                       "points "
+                                       "have a narrower interval",
+                                       NOT_TIMED },
+    [METRIC_DEADLINE_WIDTH_P99] = { "deadline_width_p99", "model", true,
+                                    "99 % of the points have a narrower interval", NOT_TIMED },
+    [METRIC_DEADLINE_TOOK_MEDIAN] = { "deadline_took_median", "ns", true,
+                                      "time of the query: half took less", NOT_TIMED },
+    [METRIC_DEADLINE_TOOK_P99] = { "deadline_took_p99", "ns", true, "99 % took less", NOT_TIMED },
+    [METRIC_DEADLINE_TOOK_MAX] = { "deadline_took_max", "ns", true, "the longest", NOT_TIMED },
+    [METRIC_DEADLINE_LATE] = { "deadline_late", "1", true,
+                               "share of queries that took longer than the deadline", NOT_TIMED },
 };
 
 const metric_name budget_metrics[BUDGET_METRICS] = {
-    [OF_BUDGET_BYTES] = { "budget_bytes", "B", false, "the budget for all memory of a model",
-                          NOT_TIMED },
-    [OF_BUDGET_LEVEL] = { "budget_level", "level", false,
-                          "the deepest level that stays in memory; all levels when everything "
-                          "fits",
-                          "everything is in memory, or the budget is too small, see below" },
-    [OF_BUDGET_WIDTH] = { "budget_width_median", "model", false,
-                          "interval of a distance from the data in memory: half of the points "
-                          "have a narrower interval; 0 when everything fits",
-                          NOT_TIMED },
-    [OF_BUDGET_NS] = { "budget_distance_ns", "ns", true,
-                       "an exact distance query, uniform points, one at a time, including loads",
-                       NOT_TIMED },
-    [OF_BUDGET_LOADS] = { "budget_loads", "loads", false, "subtrees loaded for a distance, mean",
-                          NOT_TIMED },
-    [OF_BUDGET_READ] = { "budget_read_bytes", "B", false, "read for a distance, mean", NOT_TIMED },
+    [METRIC_BUDGET_BYTES] = { "budget_bytes", "B", false, "the budget for all memory of a model",
+                              NOT_TIMED },
+    [METRIC_BUDGET_LEVEL] = { "budget_level", "level", false,
+                              "the deepest level that stays in memory; all levels when everything "
+                              "fits",
+                              "everything is in memory, or the budget is too small, see below" },
+    [METRIC_BUDGET_WIDTH] = { "budget_width_median", "model", false,
+                              "interval of a distance from the data in memory: half of the points "
+                              "have a narrower interval; 0 when everything fits",
+                              NOT_TIMED },
+    [METRIC_BUDGET_NS] = { "budget_distance_ns", "ns", true,
+                           "an exact distance query, uniform points, one at a time, including "
+                           "loads",
+                           NOT_TIMED },
+    [METRIC_BUDGET_LOADS] = { "budget_loads", "loads", false,
+                              "subtrees loaded for a distance, mean", NOT_TIMED },
+    [METRIC_BUDGET_READ] = { "budget_read_bytes", "B", false, "read for a distance, mean",
+                             NOT_TIMED },
 };
 
-const metric_name need_metrics[NEED_METRICS] = {
-    [OF_NEED_BYTES] = { "need_bytes", "B", false, "of the file that was cut to the need", NULL },
-    [OF_NEED_FAR_LO] = { "need_hausdorff_lo", "model", false,
-                         "lower bound of the error of its envelopes", NO_MESH },
-    [OF_NEED_FAR_HI] = { "need_hausdorff_hi", "model", false,
-                         "upper bound of the error of its "
-                         "envelopes",
-                         NO_MESH },
-    [OF_NEED_RATIO] = { "need_ratio", "1", false,
-                        "need_hausdorff_hi / the requested error, or / the error of the whole "
-                        "file if larger (leaves cannot be refined); need_bytes / the size: 1 or "
-                        "less satisfies the request",
-                        NO_MESH },
-    [OF_NEED_SECONDS] = { "need_seconds", "s", true, "to make the file", NULL },
+const metric_name target_metrics[TARGET_METRICS] = {
+    [METRIC_SUBSET_BYTES] = { "subset_bytes", "B", false,
+                              "of the file that was made for the target", NULL },
+    [METRIC_SUBSET_FAR_LO] = { "subset_hausdorff_lo", "model", false,
+                               "lower bound of the error of its envelopes", NO_MESH },
+    [METRIC_SUBSET_FAR_HI] = { "subset_hausdorff_hi", "model", false,
+                               "upper bound of the error of its "
+                               "envelopes",
+                               NO_MESH },
+    [METRIC_SUBSET_RATIO] = { "subset_ratio", "1", false,
+                              "subset_hausdorff_hi / the requested error, or / the error of the "
+                              "whole "
+                              "file if larger (leaves cannot be refined); subset_bytes / the size: "
+                              "1 or "
+                              "less satisfies the request",
+                              NO_MESH },
+    [METRIC_SUBSET_SECONDS] = { "subset_seconds", "s", true, "to make the file", NULL },
 };
 
 int method_last(const comparison *c, const method *m)

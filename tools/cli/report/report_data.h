@@ -16,7 +16,7 @@ enum {
     SETTINGS_MAX = METHODS_MAX,
     DEADLINES = 8,
     BUDGETS = 5,
-    NEEDS = 8,
+    TARGETS = 8,
     ROUNDS = 3,
     REPORT_QUERIES =
         200000 /* limits the bounds of a level's error: flat and huge models would take too long */
@@ -24,86 +24,86 @@ enum {
 
 /* Values of each level; the table level_metrics describes them. */
 typedef enum level_metric {
-    OF_BYTES,
-    OF_CUMULATIVE_BYTES,
-    OF_GRAY,
-    OF_LEAVES,
-    OF_PLANES,
-    OF_LEAF_PLANES,
-    OF_VOLUME,
-    OF_EXCESS,
-    OF_LEVELS_VOLUME,
-    OF_LEVELS_EXCESS,
-    OF_LIMIT_VOLUME,
-    OF_LIMIT_EXCESS,
-    OF_EXCESS_TO_LIMIT,
-    OF_FAR_LO,
-    OF_FAR_HI,
-    OF_FAR_MEAN,
-    OF_FAR_RMS,
-    OF_MAYBE_UNIFORM,
-    OF_MAYBE_NEAR,
-    OF_WIDTH_MEAN,
-    OF_WIDTH_MEDIAN,
-    OF_WIDTH_P99,
-    OF_INSIDE_NS,
-    OF_DISTANCE_NS,
-    OF_READING_SECONDS,
-    OF_READ_BYTES,
-    OF_READS,
-    OF_LINE_BYTES,
-    OF_LINE_TRIPS,
-    OF_LEVEL_MEMORY,
-    OF_THESIS_BYTES,
-    OF_THESIS_CUMULATIVE,
+    METRIC_BYTES,
+    METRIC_CUMULATIVE_BYTES,
+    METRIC_GRAY,
+    METRIC_LEAVES,
+    METRIC_PLANES,
+    METRIC_LEAF_PLANES,
+    METRIC_VOLUME,
+    METRIC_EXCESS,
+    METRIC_LEVELS_VOLUME,
+    METRIC_LEVELS_EXCESS,
+    METRIC_LIMIT_VOLUME,
+    METRIC_LIMIT_EXCESS,
+    METRIC_EXCESS_TO_LIMIT,
+    METRIC_FAR_LO,
+    METRIC_FAR_HI,
+    METRIC_FAR_MEAN,
+    METRIC_FAR_RMS,
+    METRIC_MAYBE_UNIFORM,
+    METRIC_MAYBE_NEAR,
+    METRIC_WIDTH_MEAN,
+    METRIC_WIDTH_MEDIAN,
+    METRIC_WIDTH_P99,
+    METRIC_INSIDE_NS,
+    METRIC_DISTANCE_NS,
+    METRIC_READING_SECONDS,
+    METRIC_READ_BYTES,
+    METRIC_READS,
+    METRIC_LINE_BYTES,
+    METRIC_LINE_TRIPS,
+    METRIC_LEVEL_MEMORY,
+    METRIC_THESIS_BYTES,
+    METRIC_THESIS_CUMULATIVE,
     LEVEL_METRICS
 } level_metric;
 
 /* Values of a whole method. */
 typedef enum whole_metric {
-    OF_FILE_BYTES,
-    OF_HEAD_BYTES,
-    OF_ALL_PLANES,
-    OF_BUILD_SECONDS,
-    OF_OPEN_SECONDS,
-    OF_MEMORY_BYTES,
-    OF_EXACT_INSIDE_NS,
-    OF_EXACT_DISTANCE_NS,
+    METRIC_FILE_BYTES,
+    METRIC_HEAD_BYTES,
+    METRIC_ALL_PLANES,
+    METRIC_BUILD_SECONDS,
+    METRIC_OPEN_SECONDS,
+    METRIC_MEMORY_BYTES,
+    METRIC_EXACT_INSIDE_NS,
+    METRIC_EXACT_DISTANCE_NS,
     WHOLE_METRICS
 } whole_metric;
 
 /* Values of distance queries with a deadline. */
 typedef enum deadline_metric {
-    OF_DUE_EXACT,
-    OF_DUE_WIDTH_MEDIAN,
-    OF_DUE_WIDTH_P99,
-    OF_DUE_TOOK_MEDIAN,
-    OF_DUE_TOOK_P99,
-    OF_DUE_TOOK_MAX,
-    OF_DUE_LATE,
+    METRIC_DEADLINE_EXACT,
+    METRIC_DEADLINE_WIDTH_MEDIAN,
+    METRIC_DEADLINE_WIDTH_P99,
+    METRIC_DEADLINE_TOOK_MEDIAN,
+    METRIC_DEADLINE_TOOK_P99,
+    METRIC_DEADLINE_TOOK_MAX,
+    METRIC_DEADLINE_LATE,
     DEADLINE_METRICS
 } deadline_metric;
 
 /* Values of a memory budget. */
 typedef enum budget_metric {
-    OF_BUDGET_BYTES,
-    OF_BUDGET_LEVEL,
-    OF_BUDGET_WIDTH,
-    OF_BUDGET_NS,
-    OF_BUDGET_LOADS,
-    OF_BUDGET_READ,
+    METRIC_BUDGET_BYTES,
+    METRIC_BUDGET_LEVEL,
+    METRIC_BUDGET_WIDTH,
+    METRIC_BUDGET_NS,
+    METRIC_BUDGET_LOADS,
+    METRIC_BUDGET_READ,
     BUDGET_METRICS
 } budget_metric;
 
-/* Values of a subset that was made for a need, which is a requested error or size. */
-typedef enum need_metric {
-    OF_NEED_BYTES,
-    OF_NEED_FAR_LO,
-    OF_NEED_FAR_HI,
-    OF_NEED_RATIO,
-    OF_NEED_SECONDS,
-    NEED_METRICS
-} need_metric;
+/* Values of a subset that was made for a target, which is a requested error or size. */
+typedef enum target_metric {
+    METRIC_SUBSET_BYTES,
+    METRIC_SUBSET_FAR_LO,
+    METRIC_SUBSET_FAR_HI,
+    METRIC_SUBSET_RATIO,
+    METRIC_SUBSET_SECONDS,
+    TARGET_METRICS
+} target_metric;
 
 typedef struct metric_name {
     /* unit "1": a share or a ratio; "model": the model's unit of length, "model^3" its cube */
@@ -114,18 +114,19 @@ typedef struct metric_name {
     const char *absent;
 } metric_name;
 extern const metric_name level_metrics[LEVEL_METRICS], whole_metrics[WHOLE_METRICS],
-    deadline_metrics[DEADLINE_METRICS], budget_metrics[BUDGET_METRICS], need_metrics[NEED_METRICS];
+    deadline_metrics[DEADLINE_METRICS], budget_metrics[BUDGET_METRICS],
+    target_metrics[TARGET_METRICS];
 
 extern const unsigned deadlines_us[DEADLINES];
 extern const unsigned budget_parts[BUDGETS]; /* budgets are memory_bytes divided by these */
 
-typedef enum need_kind { NEED_ERROR, NEED_SIZE } need_kind;
+typedef enum target_kind { TARGET_ERROR, TARGET_SIZE } target_kind;
 
-typedef struct need_result {
-    need_kind kind;
+typedef struct target_result {
+    target_kind kind;
     double requested; /* model's unit, or bytes */
-    double metric[NEED_METRICS];
-} need_result;
+    double metric[TARGET_METRICS];
+} target_result;
 
 /* Times of one round. Methods take turns within a round, so that other load of the machine affects
  * all methods alike. The results are medians of the rounds. */
@@ -148,8 +149,8 @@ typedef struct method {
     double whole[WHOLE_METRICS], level[EBPO_LEVELS_MAX][LEVEL_METRICS],
         due[DEADLINES][DEADLINE_METRICS], budget[BUDGETS][BUDGET_METRICS];
     round_times round[ROUNDS];
-    need_result need[NEEDS];
-    int need_count, note_count;
+    target_result targets[TARGETS];
+    int target_count, note_count;
     ebpo_thesis_levels *unlimited; /* --unlimited; NULL: not computed */
     double unlimited_seconds;
     char note[METHOD_NOTES][320];
@@ -165,7 +166,7 @@ typedef struct report_values {
     const char *view, *memory;
     arg_list names;
     int coalesce;
-    bool no_pictures, need, keep, json, quiet, unlimited;
+    bool no_pictures, targets, keep, json, quiet, unlimited;
     remote_values remote;
 } report_values;
 
@@ -236,8 +237,8 @@ EBPO_MUST_USE ebpo_status report_lines(comparison *c, method *m, ebpo_error *err
 /* Measures distances while only a part of the model is in memory. Needs memory_bytes. */
 EBPO_MUST_USE ebpo_status report_budgets(comparison *c, method *m, ebpo_file *file,
                                          ebpo_error *error);
-EBPO_MUST_USE ebpo_status report_needs(comparison *c, method *m, ebpo_file *file, ebpo_model *model,
-                                       ebpo_error *error);
+EBPO_MUST_USE ebpo_status report_targets(comparison *c, method *m, ebpo_file *file,
+                                         ebpo_model *model, ebpo_error *error);
 EBPO_MUST_USE ebpo_status report_pictures(comparison *c, ebpo_error *error);
 
 /* Opens files of the operands, or builds them from one mesh with each selection. Returns an exit

@@ -37,13 +37,13 @@ static ebpo_status query_in_time(const comparison *c, ebpo_context *context, uns
 static void note_timing(const comparison *c, timing *t, double *f)
 {
     double count = (double)c->points;
-    f[OF_DUE_EXACT] = (double)t->exact / count;
-    f[OF_DUE_LATE] = (double)t->late / count;
-    f[OF_DUE_WIDTH_MEDIAN] = quantile_of(t->width, c->points, 0.5);
-    f[OF_DUE_WIDTH_P99] = quantile_of(t->width, c->points, 0.99);
-    f[OF_DUE_TOOK_MEDIAN] = quantile_of(t->took, c->points, 0.5);
-    f[OF_DUE_TOOK_P99] = quantile_of(t->took, c->points, 0.99);
-    f[OF_DUE_TOOK_MAX] = t->took[c->points - 1]; /* they are sorted here */
+    f[METRIC_DEADLINE_EXACT] = (double)t->exact / count;
+    f[METRIC_DEADLINE_LATE] = (double)t->late / count;
+    f[METRIC_DEADLINE_WIDTH_MEDIAN] = quantile_of(t->width, c->points, 0.5);
+    f[METRIC_DEADLINE_WIDTH_P99] = quantile_of(t->width, c->points, 0.99);
+    f[METRIC_DEADLINE_TOOK_MEDIAN] = quantile_of(t->took, c->points, 0.5);
+    f[METRIC_DEADLINE_TOOK_P99] = quantile_of(t->took, c->points, 0.99);
+    f[METRIC_DEADLINE_TOOK_MAX] = t->took[c->points - 1]; /* they are sorted here */
 }
 
 ebpo_status report_deadlines(comparison *c, method *m, ebpo_model *model, int round,

@@ -1,5 +1,5 @@
 /* Gathers the results of one method except times: values of the header, volumes, hulls and error
- * bounds, then needs and the costs of the theses. */
+ * bounds, then targets and the costs of the theses. */
 #include <stdio.h>
 #include <string.h>
 
@@ -13,18 +13,18 @@ static void set_header_values(const comparison *c, method *m)
     double planes = 0;
     for (int i = 0; i < info->level_count; i++)
         planes += (double)(info->level[i].plane_count + info->level[i].leaf_plane_count);
-    m->whole[OF_FILE_BYTES] = (double)info->file_bytes;
-    m->whole[OF_HEAD_BYTES] = (double)info->head_bytes;
-    m->whole[OF_ALL_PLANES] = planes;
+    m->whole[METRIC_FILE_BYTES] = (double)info->file_bytes;
+    m->whole[METRIC_HEAD_BYTES] = (double)info->head_bytes;
+    m->whole[METRIC_ALL_PLANES] = planes;
     for (int i = c->first; i <= method_last(c, m); i++) {
         const ebpo_level_summary *s = &info->level[i];
         double *f = m->level[i];
-        f[OF_BYTES] = (double)m->stored.level_bytes[i];
-        f[OF_CUMULATIVE_BYTES] = (double)facts_cumulative(info, &m->stored, i);
-        f[OF_GRAY] = (double)s->gray_count;
-        f[OF_LEAVES] = (double)s->leaf_count;
-        f[OF_PLANES] = (double)s->plane_count;
-        f[OF_LEAF_PLANES] = (double)s->leaf_plane_count;
+        f[METRIC_BYTES] = (double)m->stored.level_bytes[i];
+        f[METRIC_CUMULATIVE_BYTES] = (double)facts_cumulative(info, &m->stored, i);
+        f[METRIC_GRAY] = (double)s->gray_count;
+        f[METRIC_LEAVES] = (double)s->leaf_count;
+        f[METRIC_PLANES] = (double)s->plane_count;
+        f[METRIC_LEAF_PLANES] = (double)s->leaf_plane_count;
     }
 }
 
@@ -83,7 +83,7 @@ static ebpo_status excess_in_root(const comparison *c, method *m, ebpo_file *fil
     options.progress = c->progress;
     ebpo_status status = ebpo_lod_level(file, level, &options, &polygons, NULL, error);
     if (status == EBPO_OK)
-        m->level[level][OF_EXCESS] =
+        m->level[level][METRIC_EXCESS] =
             100 * (share_of_root(&m->info, &polygons) - m->solid_share) / m->solid_share;
     ebpo_mesh_free(&polygons);
     return status;
@@ -111,8 +111,9 @@ static ebpo_status gather_volumes(comparison *c, method *m, ebpo_file *file, ebp
         status = solid_in_root(c, m, file, error);
     for (int i = c->first; i <= method_last(c, m) && status == EBPO_OK; i++) {
         double *f = m->level[i];
-        status = facts_derived(file, i, (unsigned)c->v->threads, c->progress, &f[OF_VOLUME], error);
-        f[OF_EXCESS] = facts_excess(&m->info, &m->solid, f[OF_VOLUME]);
+        status =
+            facts_derived(file, i, (unsigned)c->v->threads, c->progress, &f[METRIC_VOLUME], error);
+        f[METRIC_EXCESS] = facts_excess(&m->info, &m->solid, f[METRIC_VOLUME]);
         if (status == EBPO_OK && m->solid_share > 0)
             status = excess_in_root(c, m, file, i, error);
     }
@@ -131,11 +132,11 @@ static ebpo_status levels_alone(comparison *c, method *m, ebpo_file *file, ebpo_
         ebpo_stream_level reported;
         status = ebpo_stream_next_level(stream, &reported, &more, error);
         if (status == EBPO_OK && i >= c->first) {
-            m->level[i][OF_LEVELS_VOLUME] = reported.volume;
+            m->level[i][METRIC_LEVELS_VOLUME] = reported.volume;
             /* a file with leaf planes has all these data in its levels */
-            m->level[i][OF_LEVELS_EXCESS] =
+            m->level[i][METRIC_LEVELS_EXCESS] =
                 !(m->solid_share > 0) ? facts_excess(&m->info, &m->solid, reported.volume)
-                : m->info.parts & EBPO_PART_LEAF_PLANES ? m->level[i][OF_EXCESS]
+                : m->info.parts & EBPO_PART_LEAF_PLANES ? m->level[i][METRIC_EXCESS]
                                                         : NAN;
         }
     }
@@ -156,17 +157,19 @@ static ebpo_status gather_limits(comparison *c, method *m, ebpo_file *file, ebpo
         ebpo_status status = ebpo_limit_level(file, i, &options, &limit, error);
         if (status != EBPO_OK)
             return method_note_missing(m, "limit", status, error);
-        f[OF_LIMIT_VOLUME] = limit.volume;
-        f[OF_LIMIT_EXCESS] = facts_excess(&m->info, &m->solid, limit.volume);
-        f[OF_EXCESS_TO_LIMIT] = facts_excess_ratio(&m->info, &m->solid, f[OF_VOLUME], limit.volume);
+        f[METRIC_LIMIT_VOLUME] = limit.volume;
+        f[METRIC_LIMIT_EXCESS] = facts_excess(&m->info, &m->solid, limit.volume);
+        f[METRIC_EXCESS_TO_LIMIT] =
+            facts_excess_ratio(&m->info, &m->solid, f[METRIC_VOLUME], limit.volume);
         if (!(m->solid_share > 0))
             continue;
         options.in_root_cells = 1;
         status = ebpo_limit_level(file, i, &options, &limit, error);
         if (status != EBPO_OK)
             return status;
-        f[OF_LIMIT_EXCESS] = 100 * (limit.volume - m->solid_share) / m->solid_share;
-        f[OF_EXCESS_TO_LIMIT] = f[OF_LIMIT_EXCESS] > 1e-7 ? f[OF_EXCESS] / f[OF_LIMIT_EXCESS] : NAN;
+        f[METRIC_LIMIT_EXCESS] = 100 * (limit.volume - m->solid_share) / m->solid_share;
+        f[METRIC_EXCESS_TO_LIMIT] =
+            f[METRIC_LIMIT_EXCESS] > 1e-7 ? f[METRIC_EXCESS] / f[METRIC_LIMIT_EXCESS] : NAN;
     }
     return EBPO_OK;
 }
@@ -192,10 +195,10 @@ static ebpo_status gather_error_bounds(comparison *c, method *m, ebpo_file *file
         options.at_most = far.hi;
         if (i < c->first)
             continue;
-        f[OF_FAR_LO] = far.lo;
-        f[OF_FAR_HI] = far.hi;
-        f[OF_FAR_MEAN] = far.mean;
-        f[OF_FAR_RMS] = far.rms;
+        f[METRIC_FAR_LO] = far.lo;
+        f[METRIC_FAR_HI] = far.hi;
+        f[METRIC_FAR_MEAN] = far.mean;
+        f[METRIC_FAR_RMS] = far.rms;
     }
     return EBPO_OK;
 }
@@ -212,10 +215,10 @@ static ebpo_status with_model(comparison *c, method *m, ebpo_file *file, ebpo_er
     if (status != EBPO_OK)
         return status;
     ebpo_model_get_stats(model, &stats);
-    m->whole[OF_MEMORY_BYTES] = (double)stats.memory;
+    m->whole[METRIC_MEMORY_BYTES] = (double)stats.memory;
     status = gather_error_bounds(c, m, file, model, error);
-    if (status == EBPO_OK && c->v->need)
-        status = report_needs(c, m, file, model, error);
+    if (status == EBPO_OK && c->v->targets)
+        status = report_targets(c, m, file, model, error);
     ebpo_model_free(model);
     return status == EBPO_OK ? report_budgets(c, m, file, error) : status;
 }

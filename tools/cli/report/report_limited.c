@@ -162,11 +162,11 @@ static ebpo_status measure_inside(level_queries *a, int level, ebpo_error *error
         time_queries(a, false, a->c->uniform, level, &a->round->inside[level], error);
     if (status != EBPO_OK || !a->first)
         return status;
-    f[OF_MAYBE_UNIFORM] = share_of_maybe(a);
+    f[METRIC_MAYBE_UNIFORM] = share_of_maybe(a);
     if (!a->c->near)
         return EBPO_OK;
     status = time_queries(a, false, a->c->near, level, &ignored, error);
-    f[OF_MAYBE_NEAR] = share_of_maybe(a);
+    f[METRIC_MAYBE_NEAR] = share_of_maybe(a);
     return status;
 }
 
@@ -181,9 +181,9 @@ static ebpo_status measure_distance(level_queries *a, int level, ebpo_error *err
         a->width[i] = a->distance[i].hi - a->distance[i].lo;
         sum += a->width[i] / (double)a->c->points;
     }
-    f[OF_WIDTH_MEAN] = sum;
-    f[OF_WIDTH_MEDIAN] = quantile_of(a->width, a->c->points, 0.5);
-    f[OF_WIDTH_P99] = quantile_of(a->width, a->c->points, 0.99);
+    f[METRIC_WIDTH_MEAN] = sum;
+    f[METRIC_WIDTH_MEDIAN] = quantile_of(a->width, a->c->points, 0.5);
+    f[METRIC_WIDTH_P99] = quantile_of(a->width, a->c->points, 0.99);
     return EBPO_OK;
 }
 

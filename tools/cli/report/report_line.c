@@ -111,8 +111,8 @@ ebpo_status report_lines(comparison *c, method *m, ebpo_error *error)
     }
     for (int i = c->first; i <= method_last(c, m) && status == EBPO_OK; i++) {
         status = load_level(&l, m->path, i, error);
-        m->level[i][OF_LINE_BYTES] = (double)l.bytes;
-        m->level[i][OF_LINE_TRIPS] = (double)l.trips;
+        m->level[i][METRIC_LINE_BYTES] = (double)l.bytes;
+        m->level[i][METRIC_LINE_TRIPS] = (double)l.trips;
     }
     free(l.arrival_trip);
     if (l.file >= 0)

@@ -185,7 +185,7 @@ static int build_method(comparison *c, const char *mesh, int selection,
     if (code != EXIT_OK)
         return code;
     method *m = &c->methods[c->count - 1];
-    m->whole[OF_BUILD_SECONDS] = out.seconds;
+    m->whole[METRIC_BUILD_SECONDS] = out.seconds;
     ebpo_status status =
         unlimited ? build_one(c, mesh, selection, setting, path, true, &out, &error) : EBPO_OK;
     m->unlimited = out.levels;

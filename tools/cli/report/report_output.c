@@ -154,7 +154,7 @@ static void abandon_files(void)
         abandon_file(fixed_names[i], "");
     for (int i = 0; selection_words[i]; i++)
         abandon_file(selection_words[i], MODEL_ENDING);
-    abandon_file("need", MODEL_ENDING); /* a trial of report_needs.c */
+    abandon_file("target", MODEL_ENDING); /* a trial of report_targets.c */
     rmdir(temporary_folder);
 }
 

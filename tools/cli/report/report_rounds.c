@@ -41,8 +41,8 @@ static ebpo_status time_reading(comparison *c, method *m, int round, ebpo_error 
         ebpo_status status = read_level(c, m, i, &m->round[round].reading[i], &t, error);
         if (status != EBPO_OK)
             return status;
-        m->level[i][OF_READ_BYTES] = (double)t.bytes;
-        m->level[i][OF_READS] = (double)t.reads;
+        m->level[i][METRIC_READ_BYTES] = (double)t.bytes;
+        m->level[i][METRIC_READS] = (double)t.reads;
     }
     return EBPO_OK;
 }
@@ -87,13 +87,13 @@ static double median_of_rounds(double a, double b, double c)
 void report_medians(const comparison *c, method *m)
 {
     for (int i = c->first; i <= method_last(c, m); i++) {
-        m->level[i][OF_READING_SECONDS] = MEDIAN(reading[i]);
-        m->level[i][OF_INSIDE_NS] = MEDIAN(inside[i]);
-        m->level[i][OF_DISTANCE_NS] = MEDIAN(distance[i]);
+        m->level[i][METRIC_READING_SECONDS] = MEDIAN(reading[i]);
+        m->level[i][METRIC_INSIDE_NS] = MEDIAN(inside[i]);
+        m->level[i][METRIC_DISTANCE_NS] = MEDIAN(distance[i]);
     }
-    m->whole[OF_OPEN_SECONDS] = MEDIAN(open);
-    m->whole[OF_EXACT_INSIDE_NS] = MEDIAN(exact_inside);
-    m->whole[OF_EXACT_DISTANCE_NS] = MEDIAN(exact_distance);
+    m->whole[METRIC_OPEN_SECONDS] = MEDIAN(open);
+    m->whole[METRIC_EXACT_INSIDE_NS] = MEDIAN(exact_inside);
+    m->whole[METRIC_EXACT_DISTANCE_NS] = MEDIAN(exact_distance);
     for (int i = 0; i < DEADLINES; i++)
         for (int k = 0; k < DEADLINE_METRICS; k++)
             m->due[i][k] = MEDIAN(due[i][k]);

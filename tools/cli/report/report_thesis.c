@@ -97,8 +97,8 @@ static ebpo_status sum_costs(comparison *c, method *m, ebpo_file *file, cost_sta
         sum += cost;
         if (i < c->first)
             continue;
-        m->level[i][OF_THESIS_BYTES] = cost;
-        m->level[i][OF_THESIS_CUMULATIVE] = sum;
+        m->level[i][METRIC_THESIS_BYTES] = cost;
+        m->level[i][METRIC_THESIS_CUMULATIVE] = sum;
     }
     return EBPO_OK;
 }

@@ -91,12 +91,12 @@ static void print_method(json *j, const comparison *c, const method *m)
         json_end(j);
     }
     json_end(j);
-    json_array(j, "needs");
-    for (int i = 0; i < m->need_count; i++) {
+    json_array(j, "targets");
+    for (int i = 0; i < m->target_count; i++) {
         json_object(j, NULL);
-        json_real(j, m->need[i].kind == NEED_ERROR ? "max_error" : "target_bytes",
-                  m->need[i].requested);
-        print_metrics(j, need_metrics, m->need[i].metric, NEED_METRICS);
+        json_real(j, m->targets[i].kind == TARGET_ERROR ? "max_error" : "target_bytes",
+                  m->targets[i].requested);
+        print_metrics(j, target_metrics, m->targets[i].metric, TARGET_METRICS);
         json_end(j);
     }
     json_end(j);
@@ -157,7 +157,7 @@ void report_to_json(FILE *out, const comparison *c, bool in_page)
     print_names(&j, "level", level_metrics, LEVEL_METRICS);
     print_names(&j, "deadline", deadline_metrics, DEADLINE_METRICS);
     print_names(&j, "budget", budget_metrics, BUDGET_METRICS);
-    print_names(&j, "need", need_metrics, NEED_METRICS);
+    print_names(&j, "target", target_metrics, TARGET_METRICS);
     json_end(&j);
     json_array(&j, "methods");
     for (int i = 0; i < c->count; i++)

@@ -54,7 +54,7 @@ class Scene:
         counts = made(c.ebpo_scene_counts)
         lib.ebpo_scene_get_counts(handle, ctypes.byref(counts))
         self.begin, self.end = counts.begin, counts.end
-        self.models = list(self._names(c.ebpo_scene_model_facts, "ebpo_scene_get_model", counts.models))
+        self.models = list(self._names(c.ebpo_scene_model_facts, "ebpo_scene_get_model_facts", counts.models))
         self.instances = list(self._names(c.ebpo_scene_instance, "ebpo_scene_get_instance", counts.instances))
 
     def _renew(self) -> None:

@@ -1,5 +1,5 @@
 'use strict';
-// The report's data and what is derived from it.
+// Parses the data of the report, and computes values from it.
 
 const byId = (id) => document.getElementById(id);
 const report = JSON.parse(byId('report').textContent); // as in report.json
@@ -9,28 +9,28 @@ const { model, methods } = report;
 const levels = Array.from({ length: report.levels.last - report.levels.first + 1 }, (_, i) => report.levels.first + i);
 const solid = methods.some((m) => m.levels.some((l) => l.excess !== null));
 
-// undefined: this method has no such level.
+// Returns a level of a method, or undefined if the method has no such level.
 const levelOf = (method, level) => method.levels.find((l) => l.level === level);
 
-// A length in percent of the diagonal of the model's box.
+// Converts a length to percent of the diagonal of the model's box.
 const ofDiagonal = (v) => (model.diagonal > 0 ? times(100 / model.diagonal, v) : null);
 
-// The least figure of levels (of different methods), null if none has it.
+// Returns the least value among levels of different methods; null if none has a value.
 function leastOf(some, of) {
-  const figures = some.filter(Boolean).map(of).filter((v) => v !== null);
-  return figures.length ? Math.min(...figures) : null;
+  const values = some.filter(Boolean).map(of).filter((v) => v !== null);
+  return values.length ? Math.min(...values) : null;
 }
 
-// In the middle of the levels that are measured.
+// The middle one of the measured levels.
 const MIDDLE = levels[Math.floor(levels.length / 2)];
 
-// EBP 2017, chart 18: what the envelopes of all levels fill, in percent of the solid.
+// Returns the sum of the volumes of all levels, in percent of the solid (EBP 2017, chart 18).
 function sumOfLevels(method) {
   const all = method.levels.map((l) => l.excess);
   return all.includes(null) ? null : all.reduce((sum, excess) => sum + 100 + excess, 0);
 }
 
-// Simulated: round trips one after the other, and all bytes at the line's rate.
+// Simulated connections: sequential round trips, and all bytes at a constant rate.
 const LINES = [
   { name: '10 Mbit/s, 100 ms', trip: 0.1, rate: 1.25e6 }, { name: '100 Mbit/s, 20 ms', trip: 0.02, rate: 1.25e7 },
 ];

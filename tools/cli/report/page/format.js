@@ -1,5 +1,5 @@
 'use strict';
-// Figures as people read them: three digits and a unit. null stands for what could not be had.
+// Formats values with three digits and a unit. null: the value is not available.
 
 const NONE = '–';
 
@@ -12,7 +12,7 @@ function threeDigits(v) {
   return size >= 99.95 ? v.toFixed(0) : String(Number(v.toPrecision(3)));
 }
 
-// The first unit that is not too large; `units` from the largest to the smallest.
+// Formats v in the largest unit that gives at least 1; `units` are sorted from the largest to the smallest.
 function inUnits(v, units) {
   const [name, factor] = units.find(([, f]) => v >= 0.9995 * f) ?? units.at(-1);
   return `${threeDigits(v / factor)} ${name}`;

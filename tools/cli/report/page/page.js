@@ -1,7 +1,7 @@
 'use strict';
-// The page's head, its pictures and its end; then all of it is shown.
+// Makes the page's header, its pictures and its notes; then shows all sections.
 
-// --- the head ---
+// --- header ---
 
 function fact(name, text, more) {
   const value = element('dd', {}, text, ...(more ? [' ', element('small', {}, more)] : []));
@@ -28,7 +28,7 @@ function runFacts() {
   const { processor, cores } = report.machine;
   return [
     fact('levels', `${levels[0]} to ${levels.at(-1)}`),
-    fact('points asked', format.count(report.points), `seed ${report.seed}`),
+    fact('query points', format.count(report.points), `seed ${report.seed}`),
     fact('machine', processor || 'unknown', `${cores} core${cores === 1 ? '' : 's'}`),
   ];
 }
@@ -59,7 +59,7 @@ function tile(method, pictures, level) {
   return figure;
 }
 
-// Some levels, a row for each method.
+// Makes a grid of pictures of some levels, with a row for each method.
 function strip(some, columns) {
   const made = element('div', { className: 'strip' }, element('div', { className: 'level' }), ...some.map(levelName));
   made.style.setProperty('--columns', columns);
@@ -81,7 +81,7 @@ function showPictures() {
   byId('pictures').hidden = shown.length === 0;
 }
 
-// --- the end ---
+// --- notes ---
 
 function showNotes() {
   const ofMethods = methods.flatMap((m) => m.notes.map((note) => `${m.name}: ${note}`));
@@ -94,7 +94,7 @@ function showNotes() {
   document.querySelector('footer').append('Made by ', element('code', {}, 'ebpo report'), made);
 }
 
-// Sections without a plot, and the limit's table without a solid.
+// Hides sections without a plot, and the table of the limit if no method has a solid.
 function hideEmpty() {
   byId('against-limit').hidden = !solid;
   for (const section of document.querySelectorAll('section:has([data-plot])'))

@@ -1,28 +1,28 @@
 'use strict';
-// Which figures each plot shows. An axis has `of`, which finds its figure in a level or a deadline; `dotted`, a second
-// one; `limit`, that of the limit, a line of its own.
+// Defines the values that each plot shows. The functions of an axis get a level or a deadline: `of` returns the value,
+// `dotted` a second value, and `limit` the value of the limit, which gets a separate line.
 
 const { percent: PERCENT, bytes: BYTE, seconds: TIME } = format;
 
 const LEVEL = { name: 'level', as: format.level, of: (l) => l.level };
-const BYTES_SO_FAR = { name: 'bytes so far', as: BYTE, of: (l) => l.cumulative_bytes };
-const LEVEL_TIME = { name: 'time to have the level', as: TIME, of: (l) => l.have_seconds };
-const INSIDE_TIME = { name: 'time of a question', as: TIME, of: (l) => fromNs(l.inside_ns) };
-const DISTANCE_TIME = { name: 'time of a question', as: TIME, of: (l) => fromNs(l.distance_ns) };
-const [SLOW_TIME, FAST_TIME] = LINES.map((line) => ({ name: `time to have the level, ${line.name}`, as: TIME, of: lineTime(line) }));
+const BYTES_SO_FAR = { name: 'bytes up to the level', as: BYTE, of: (l) => l.cumulative_bytes };
+const LEVEL_TIME = { name: 'time to read the level', as: TIME, of: (l) => l.reading_seconds };
+const INSIDE_TIME = { name: 'time of a query', as: TIME, of: (l) => fromNs(l.inside_ns) };
+const DISTANCE_TIME = { name: 'time of a query', as: TIME, of: (l) => fromNs(l.distance_ns) };
+const [SLOW_TIME, FAST_TIME] = LINES.map((line) => ({ name: `time to download the level, ${line.name}`, as: TIME, of: lineTime(line) }));
 const LEVEL_MEMORY = { name: 'memory of levels 0 to this one', as: BYTE, of: (l) => l.level_memory_bytes };
 const BUDGET = { name: 'memory', as: BYTE, of: (b) => b.budget_bytes };
-const BUILD = { name: 'time of the build', as: TIME, of: (m) => m.build_seconds };
+const BUILD = { name: 'build time', as: TIME, of: (m) => m.build_seconds };
 const DEADLINE = { name: 'deadline', as: TIME, of: (d) => 1e-6 * d.microseconds };
 
-const excess = (of) => ({ name: 'excess of volume, % of the solid', as: PERCENT, of, limit: (l) => l.limit_excess });
+const excess = (of) => ({ name: 'excess volume, % of the solid', as: PERCENT, of, limit: (l) => l.limit_excess });
 const volume = (of) => ({ name: 'volume of the envelopes', as: format.number, of });
-// A surface has no volume to exceed: the envelopes' own.
+// Surfaces have no volume, so plots show the volume of the envelopes.
 const ALL_KNOWN = solid ? excess((l) => l.excess) : volume((l) => l.envelope_volume);
 const LEVELS_ALONE = solid ? excess((l) => l.levels_excess) : volume((l) => l.levels_volume);
-const RATIO = { name: 'times the limit’s excess', as: format.times, of: (l) => l.excess_to_limit, limit: () => 1 };
+const RATIO = { name: 'excess / excess of the limit', as: format.times, of: (l) => l.excess_to_limit, limit: () => 1 };
 const FARTHEST = {
-  name: 'farthest point, % of the diagonal', as: PERCENT, of: (l) => ofDiagonal(l.hausdorff_hi),
+  name: 'greatest distance, % of the diagonal', as: PERCENT, of: (l) => ofDiagonal(l.hausdorff_hi),
 };
 const MEAN = { name: 'mean distance, % of the diagonal', as: PERCENT, of: (l) => ofDiagonal(l.distance_mean) };
 const MAYBE_NEAR = {
@@ -31,19 +31,19 @@ const MAYBE_NEAR = {
 const MAYBE_UNIFORM = { name: 'MAYBE, % of uniform points', as: PERCENT, of: (l) => percent(l.maybe_uniform) };
 const WIDTH = { name: '% of the diagonal', as: PERCENT, of: (l) => ofDiagonal(l.width_median) };
 const CERTAIN = { name: '% of the diagonal', as: PERCENT, of: (d) => ofDiagonal(d.deadline_width_p99) };
-const EXACT = { name: 'time of a question', as: TIME, of: (b) => fromNs(b.budget_distance_ns) };
+const EXACT = { name: 'time of a query', as: TIME, of: (b) => fromNs(b.budget_distance_ns) };
 const excessAt = (level) => ({
-  name: `excess of volume at level ${level}, %`, as: PERCENT, of: (m) => levelOf(m, level)?.excess ?? null,
+  name: `excess volume at level ${level}, %`, as: PERCENT, of: (m) => levelOf(m, level)?.excess ?? null,
 });
 const TAKEN = {
   name: 'time taken', as: TIME, of: (d) => fromNs(d.deadline_took_p99), dotted: (d) => fromNs(d.deadline_took_median),
 };
 const SENT_SO_FAR = {
-  name: 'bytes so far', as: BYTE, of: (l) => l.cumulative_bytes, dotted: (l) => l.thesis_cumulative_bytes,
+  name: 'bytes up to the level', as: BYTE, of: (l) => l.cumulative_bytes, dotted: (l) => l.thesis_cumulative_bytes,
 };
 const SENT = { name: 'bytes of the level', as: BYTE, of: (l) => l.bytes, dotted: (l) => l.thesis_bytes };
 
-// By the data-plot of the page's figures.
+// Axes of each plot; keys are the data-plot attributes of the page's figures.
 const axesOf = {
   'volume-by-level': [LEVEL, ALL_KNOWN],
   'ratio-by-level': [LEVEL, RATIO],
@@ -78,8 +78,9 @@ function methodSeries(x, of, dotted) {
   return methods.map((m, method) => ({ name: m.name, method, dotted, points: points(m) }));
 }
 
-// The limit is a fact of the cells; with methods that end in other leaves, the least. It has no bytes and no time of
-// its own: it stands where the leanest method stands. Times are noisy; a deeper level is not there sooner.
+// Returns the series of the limit, which depends on the cells only. If methods have different leaves, the least limit is
+// used. The limit has no bytes and no time, so it is drawn at the method with the least value. Times are noisy, so a deeper
+// level never gets a smaller x than the level above.
 function limitSeries(x, limit) {
   let at = 0;
   const points = levels.map((level) => {
@@ -89,12 +90,12 @@ function limitSeries(x, limit) {
   return { name: 'limit', points };
 }
 
-// Time taken equals the time that was promised.
-function promise() {
-  return { name: 'promised', points: methods[0].deadlines.map((d) => ({ x: DEADLINE.of(d), y: DEADLINE.of(d) })) };
+// Returns the line on which the time taken equals the deadline.
+function deadlineSeries() {
+  return { name: 'deadline', points: methods[0].deadlines.map((d) => ({ x: DEADLINE.of(d), y: DEADLINE.of(d) })) };
 }
 
-// A line for each selection, through its numbers of planes.
+// Returns a line for each selection, with a point for each number of planes.
 function buildSeries(y) {
   const families = [...new Set(methods.map((m) => m.selection))];
   const numberOf = (m) => (m.percent ? `${m.percent} %` : m.k_root ? `K = ${format.number(m.k_root)}` : undefined);
@@ -112,11 +113,11 @@ function seriesOf(x, y) {
     ...methodSeries(x, y.of, false),
     ...(y.dotted ? methodSeries(x, y.dotted, true) : []),
     ...(y.limit ? [limitSeries(x, y.limit)] : []),
-    ...(y === TAKEN ? [promise()] : []),
+    ...(y === TAKEN ? [deadlineSeries()] : []),
   ];
 }
 
-// After the tables, which hide sections that have nothing to say.
+// Draws the plots of visible sections. The tables hide sections without data, so they are shown first.
 function showPlots() {
   preparePlots();
   for (const figure of document.querySelectorAll('section:not([hidden]) [data-plot]')) {

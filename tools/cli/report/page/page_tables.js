@@ -1,17 +1,17 @@
 'use strict';
-// Which figures each table shows. Columns' functions get a level, a deadline, a need or a method. A row that is not
-// there (a method has fewer levels, or not this need) has no figures.
+// Defines the values that each table shows. The functions of columns get a level, a deadline, a target or a method. A row
+// that a method does not have (it has fewer levels, or not this target) has no values.
 
-// `of`: a quantity's name, or a function; `why`: why it may be absent, else the quantity itself knows.
-const figureOf = (of) => (typeof of === 'string' ? (row) => row[of] ?? null : (row) => of(row) ?? null);
+// `of`: a quantity's name, or a function; `why`: why the value may be absent, by default the quantity's own reason.
+const valueOf = (of) => (typeof of === 'string' ? (row) => row[of] ?? null : (row) => of(row) ?? null);
 const absences = new Map(report.quantities.map((q) => [q.name, q.absent]));
 
 function reason(of, why) {
-  return (row) => (row ? why ?? absences.get(of) ?? 'see the notes of the method' : 'the method has no such level or need');
+  return (row) => (row ? why ?? absences.get(of) ?? 'see the notes of the method' : 'the method has no such level or target');
 }
 
 const columnAs = (as) => (title, of, best, why) => ({
-  title, as, best, value: (row) => (row ? figureOf(of)(row) : null), why: reason(of, why),
+  title, as, best, value: (row) => (row ? valueOf(of)(row) : null), why: reason(of, why),
 });
 const bytes = columnAs(format.bytes), number = columnAs(format.number), count = columnAs(format.count);
 const seconds = columnAs(format.seconds), share = columnAs((v) => format.percent(percent(v)));
@@ -19,9 +19,9 @@ const nanoseconds = columnAs((v) => format.seconds(fromNs(v)));
 const percents = columnAs((v) => format.number(percent(v)));
 const lengths = columnAs((v) => format.number(ofDiagonal(v)));
 const levelNumber = columnAs(format.level);
-const perQuestion = columnAs(format.number);
+const perQuery = columnAs(format.number);
 
-// A guaranteed bound; one that is more than 5 % above the lower one is marked.
+// Makes a column of guaranteed bounds. A bound that is more than 5 % above the lower one gets a *.
 function upperBound(title, lo, hi) {
   const wide = (l) => l[hi] > 1.0501 * l[lo];
   return {
@@ -43,15 +43,15 @@ function bytesUntil(method, goal) {
 function showGlance() {
   const columns = [
     bytes('file', 'file_bytes'), count('levels', 'levels_in_file'), count('planes', 'all_planes'),
-    ...[10, 3, 1].map((goal) => bytes(`≤ ${goal} %`, (m) => bytesUntil(m, goal), null, 'no level that was measured comes so close')),
-    seconds('build', 'build_seconds'), seconds('into memory', 'open_seconds'),
+    ...[10, 3, 1].map((goal) => bytes(`≤ ${goal} %`, (m) => bytesUntil(m, goal), null, 'no measured level has so small an excess')),
+    seconds('build', 'build_seconds'), seconds('load', 'open_seconds'),
     bytes('memory', 'memory_bytes'), nanoseconds('point in solid, exact', 'exact_inside_ns'),
     nanoseconds('distance, exact', 'exact_distance_ns'),
   ];
   showTable('glance', 'method', [{ columns }], methods.map((m) => ({ title: m.name, of: m })));
 }
 
-// A group of columns for each method; a row holds something for each.
+// Makes a group of columns for each method. A row has an item for each method.
 function byMethod(columns) {
   const ofMethod = (c, i) => ({
     ...c, value: (row) => c.value(row[i]), why: (row) => c.why(row[i]), best: (row) => methods.length > 1 && row[i] && c.best?.(row[i]),
@@ -63,47 +63,47 @@ const levelRows = () => levels.map((level) => ({ title: `${level}`, of: methods.
 
 function showLimit() {
   const isLeast = (of) => (l) => of(l) !== null && of(l) <= least(l.level, of);
-  const excess = (l) => l.excess, soFar = (l) => l.cumulative_bytes;
+  const excess = (l) => l.excess, upToLevel = (l) => l.cumulative_bytes;
   const limit = number('%', (row) => leastOf(row, (l) => l.limit_excess), null, absences.get('limit_excess'));
   showTable('limit', 'level', [{ title: 'limit', columns: [limit] }, ...byMethod([
     number('%', excess, isLeast(excess), absences.get('excess')), number('× limit', 'excess_to_limit'),
-    bytes('bytes', soFar, isLeast(soFar)),
+    bytes('bytes', upToLevel, isLeast(upToLevel)),
   ])], levelRows());
 }
 
 function showDeadlines() {
   const row = (d, i) => ({ title: `${d.microseconds} µs`, of: methods.map((m) => m.deadlines[i]) });
-  showTable('deadlines', 'within', byMethod([
+  showTable('deadlines', 'deadline', byMethod([
     share('exact', 'deadline_exact'), lengths('width, %', 'deadline_width_p99'),
     nanoseconds('took', 'deadline_took_p99'), share('late', 'deadline_late'),
   ]), methods[0].deadlines.map(row));
 }
 
-function needTitle(need) {
-  return need.target_bytes === undefined ?
-    `error ≤ ${format.percent(ofDiagonal(need.max_error))}` : `size ≤ ${format.bytes(need.target_bytes)}`;
+function targetTitle(target) {
+  return target.target_bytes === undefined ?
+    `error ≤ ${format.percent(ofDiagonal(target.max_error))}` : `size ≤ ${format.bytes(target.target_bytes)}`;
 }
 
-// Rows are the needs of the method that has most of them.
-function showNeeds() {
-  const most = methods.reduce((a, b) => (b.needs.length > a.needs.length ? b : a)).needs;
+// Rows are the targets of the method that has most targets.
+function showTargets() {
+  const most = methods.reduce((a, b) => (b.targets.length > a.targets.length ? b : a)).targets;
   const same = (n) => (o) => n.max_error === o.max_error && n.target_bytes === o.target_bytes;
-  byId('needs').hidden = most.length === 0;
-  showTable('needs', 'asked for', byMethod([
-    bytes('bytes', 'need_bytes'), lengths('reaches ≥', 'need_hausdorff_lo'),
-    upperBound('≤', 'need_hausdorff_lo', 'need_hausdorff_hi'), number('kept', 'need_ratio'),
-  ]), most.map((n) => ({ title: needTitle(n), of: methods.map((m) => m.needs.find(same(n))) })));
+  byId('targets').hidden = most.length === 0;
+  showTable('targets', 'target', byMethod([
+    bytes('bytes', 'subset_bytes'), lengths('error ≥', 'subset_hausdorff_lo'),
+    upperBound('≤', 'subset_hausdorff_lo', 'subset_hausdorff_hi'), number('ratio', 'subset_ratio'),
+  ]), most.map((n) => ({ title: targetTitle(n), of: methods.map((m) => m.targets.find(same(n))) })));
 }
 
 function showTransmission() {
   byId('transmission').hidden = !methods.some((m) => m.levels.some((l) => l.thesis_bytes !== null));
   showTable('transmission', 'level', byMethod([
-    bytes('theirs', 'thesis_bytes'), bytes('so far', 'thesis_cumulative_bytes'),
-    bytes('ours', 'bytes'), bytes('so far', 'cumulative_bytes'),
+    bytes('cost model', 'thesis_bytes'), bytes('up to level', 'thesis_cumulative_bytes'),
+    bytes('this file', 'bytes'), bytes('up to level', 'cumulative_bytes'),
   ]), levelRows());
 }
 
-// The theses' own trade: what a build costs, and what comes of it.
+// Shows build times and the excess volumes of the results.
 function showBuild() {
   const built = methods.filter((m) => m.build_seconds !== null);
   const some = [...new Set([levels[0], MIDDLE, levels.at(-1)])];
@@ -119,7 +119,7 @@ function showBuild() {
 function showLines() {
   const times = LINES.map((line) => seconds(line.name, (l) => lineTime(line)(l), null, absences.get('line_trips')));
   byId('lines').hidden = !methods.some((m) => m.levels.some((l) => l.line_trips !== null));
-  showTable('lines', 'level', byMethod([bytes('sent', 'line_bytes'), count('trips', 'line_trips'), ...times]), levelRows());
+  showTable('lines', 'level', byMethod([bytes('sent', 'line_bytes'), count('round trips', 'line_trips'), ...times]), levelRows());
 }
 
 function showBudgets() {
@@ -127,24 +127,24 @@ function showBudgets() {
   byId('memory').hidden = !methods.some((m) => m.levels.some((l) => l.level_memory_bytes !== null)
     || m.budgets.some((b) => b.budget_distance_ns !== null));
   showTable('budgets', 'memory', byMethod([
-    bytes('budget', 'budget_bytes'), levelNumber('to level', 'budget_level'), lengths('width, %', 'budget_width_median'),
-    nanoseconds('exact', 'budget_distance_ns'), perQuestion('loads', 'budget_loads'), bytes('read', 'budget_read_bytes'),
+    bytes('budget', 'budget_bytes'), levelNumber('deepest level', 'budget_level'), lengths('width, %', 'budget_width_median'),
+    nanoseconds('exact', 'budget_distance_ns'), perQuery('loads', 'budget_loads'), bytes('read', 'budget_read_bytes'),
   ]), methods[0].budgets.map(row));
 }
 
 // --- one method's levels ---
 
 const IN_THE_FILE = [
-  bytes('bytes', 'bytes'), bytes('so far', 'cumulative_bytes'), count('gray', 'gray'),
+  bytes('bytes', 'bytes'), bytes('up to level', 'cumulative_bytes'), count('gray', 'gray'),
   count('leaves', 'leaf'), count('planes', 'planes'), count('of leaves', 'leaf_planes'),
 ];
 const VOLUME = [
   number('envelopes', 'envelope_volume'), number('excess, %', 'excess'),
-  number('levels alone, %', 'levels_excess'), number('limit’s, %', 'limit_excess'),
+  number('levels alone, %', 'levels_excess'), number('limit, %', 'limit_excess'),
   number('× limit', 'excess_to_limit'),
 ];
 const DISTANCE_TO_MODEL = [
-  lengths('farthest ≥', 'hausdorff_lo'), upperBound('≤', 'hausdorff_lo', 'hausdorff_hi'),
+  lengths('maximum ≥', 'hausdorff_lo'), upperBound('≤', 'hausdorff_lo', 'hausdorff_hi'),
   lengths('mean', 'distance_mean'), lengths('rms', 'distance_rms'),
 ];
 const INSIDE = [
@@ -155,12 +155,12 @@ const DISTANCE = [
   lengths('mean', 'width_mean'), lengths('median', 'width_median'),
   lengths('99 %', 'width_p99'), nanoseconds('time', 'distance_ns'),
 ];
-const TO_HAVE = [
-  seconds('time', 'have_seconds'), bytes('read', 'read_bytes'), count('reads', 'reads'),
+const READING = [
+  seconds('time', 'reading_seconds'), bytes('read', 'read_bytes'), count('reads', 'reads'),
   bytes('memory', 'level_memory_bytes'),
 ];
 
-// With leaf planes in the file, the levels alone are all that is known.
+// With leaf planes in the file, the volume of the levels alone equals the volume.
 function shapeTable(method, rows) {
   return table('level', [
     { title: 'in the file', columns: IN_THE_FILE },
@@ -169,18 +169,18 @@ function shapeTable(method, rows) {
   ], rows);
 }
 
-function answerTable(rows) {
+function queryTable(rows) {
   return table('level', [
-    { title: 'point in solid, to the level', columns: INSIDE },
-    { title: 'distance, to the level: width of the interval, %', columns: DISTANCE },
-    { title: 'to have the level', columns: TO_HAVE },
+    { title: 'point in solid down to the level', columns: INSIDE },
+    { title: 'distance down to the level: width of the interval, %', columns: DISTANCE },
+    { title: 'reading the level', columns: READING },
   ], rows);
 }
 
 function showMethods() {
   for (const m of methods) {
     const rows = m.levels.map((l) => ({ title: `${l.level}`, of: l }));
-    byId('tables').append(element('h3', {}, m.name), shapeTable(m, rows), answerTable(rows));
+    byId('tables').append(element('h3', {}, m.name), shapeTable(m, rows), queryTable(rows));
   }
 }
 
@@ -191,7 +191,7 @@ function showTables() {
   showDeadlines();
   showBudgets();
   showLines();
-  showNeeds();
+  showTargets();
   showTransmission();
   showMethods();
 }

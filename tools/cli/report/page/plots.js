@@ -1,28 +1,28 @@
 'use strict';
 // Plots of series, drawn by Chart.js: logarithmic axes, levels as whole numbers, colours from the style sheet.
-// An axis is { name, as: a function of format }; a series { name, method, points: [{ x, y, level }], dotted }, and one
-// without method is a reference, such as the limit.
+// An axis is { name, as: a function of format }. A series is { name, method, points: [{ x, y, level }], dotted }; a series
+// without `method` is a reference, such as the limit.
 
 const METHOD_COLOURS = 8;
 const SHAPES = ['circle', 'rect', 'triangle', 'rectRot'];
 const charts = new Map(); // by the figure's data-plot
 
-// A colour of the style sheet as it is now: light, dark or for paper.
+// Returns a colour of the current style sheet (light, dark or print).
 const styleColour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 const methodColour = (method) => styleColour(method === undefined ? 'reference' : `m${method % METHOD_COLOURS}`);
 
 // --- axes ---
 
-// The next of 1, 2, 5 times a power of ten, below or above.
+// Rounds v down or up to 1, 2 or 5 times a power of ten.
 function rounded(v, up) {
   const decade = 10 ** Math.floor(Math.log10(v)), steps = [1, 2, 5, 10].map((s) => s * decade);
   return up ? steps.find((s) => s >= 0.9999 * v) : steps.findLast((s) => s <= 1.0001 * v);
 }
 
-// What has a place on an axis: levels are counted, all else is logarithmic.
+// Returns true if an axis can show v. Axes of levels are linear, all others are logarithmic.
 const fits = (axis, v) => Number.isFinite(v) && (axis.as === format.level ? v >= 0 : v > 0);
 
-// Less than a factor of five is divided evenly, or there would be hardly a number at it.
+// Makes the scale of an axis. A range of less than a factor of five is linear; a logarithmic axis would have too few labels.
 function scaleOf(values, axis) {
   const low = Math.min(...values), high = Math.max(...values);
   if (axis.as === format.level)
@@ -34,13 +34,13 @@ function scaleOf(values, axis) {
   return { type: 'logarithmic', min, max, ticks: { autoSkip: false } };
 }
 
-// On a logarithmic axis, 1, 2 and 5 have labels where there is space, else only powers of ten.
+// Returns true if v has a label. On a logarithmic axis, 1, 2 and 5 have labels if there is space, else only powers of ten.
 function isLabelled(scale, v) {
   if (scale.type !== 'logarithmic')
     return true;
-  const room = (scale.isHorizontal() ? scale.width / 150 : scale.height / 60) / Math.log10(scale.max / scale.min);
+  const space = (scale.isHorizontal() ? scale.width / 150 : scale.height / 60) / Math.log10(scale.max / scale.min);
   const digit = Math.round(v / 10 ** Math.floor(Math.log10(v * 1.0001)));
-  return digit === 1 || (room > 1 && (digit === 2 || digit === 5));
+  return digit === 1 || (space > 1 && (digit === 2 || digit === 5));
 }
 
 function scaleOptions(values, axis) {
@@ -68,8 +68,8 @@ function dataset({ name, method, points, dotted }) {
   };
 }
 
-// Which point of the first series is which level, or which number of planes any point has; left out where numbers would
-// stand on each other.
+// Draws the level beside each point of the first series, or the number of planes beside every point. Omits labels that would
+// overlap.
 const levelNumbers = {
   id: 'levelNumbers',
   afterDatasetsDraw(chart) {
@@ -127,7 +127,7 @@ function options(x, y, datasets) {
   };
 }
 
-// Fills the figure; false when there is nothing to draw, and then it is left as it was.
+// Draws a plot in the figure. Returns false, and leaves the figure unchanged, if there is nothing to draw.
 function plot(figure, x, y, series) {
   const onAxes = series.map((s) => ({ ...s, points: s.points.filter((p) => fits(x, p.x) && fits(y, p.y)) }));
   const datasets = onAxes.filter((s) => s.points.length).map(dataset);
@@ -146,7 +146,7 @@ function plot(figure, x, y, series) {
   return true;
 }
 
-// Before the first plot. Colours change with the system's, and for paper.
+// Must be called before the first plot. Redraws all plots when the system's colour scheme changes, and for printing.
 function preparePlots() {
   Chart.defaults.font.family = getComputedStyle(document.body).fontFamily;
   for (const query of ['(prefers-color-scheme: dark)', 'print'])

@@ -1,5 +1,5 @@
 'use strict';
-// Tables: groups of columns, each figure of a row by the column's function.
+// Makes tables of groups of columns. The function of a column returns the value of a row.
 
 // element('td', { className: 'best' }, 'text or elements', ...)
 function element(tag, properties, ...children) {
@@ -8,11 +8,11 @@ function element(tag, properties, ...children) {
   return made;
 }
 
-// Why there are dashes on the page.
+// Reasons for the dashes on the page.
 const reasons = new Set();
 
-// A column is { title, value: (row) => figure, as: a function of format, best: (row) => boolean, why: (row) => the reason
-// of a dash }; best may be missing.
+// Makes a cell. A column is { title, value: (row) => value, as: a function of format, best: (row) => boolean,
+// why: (row) => the reason for a dash }; best may be missing.
 function cell(column, row, first) {
   const text = column.as(column.value(row)), td = element('td', {}, text);
   td.classList.toggle('first', first);
@@ -40,7 +40,8 @@ function headings(name, groups) {
   return row;
 }
 
-// `name` heads the first column, which holds rows' titles: rows are { title, of }, and columns see `of`.
+// Makes a table. `name` is the heading of the first column, which contains the titles of the rows. Rows are { title, of };
+// the functions of columns get `of`.
 function table(name, groups, rows) {
   const head = element('thead'), body = element('tbody');
   if (groups.some((g) => g.title))

@@ -1,4 +1,5 @@
-/* Makes subsets for a need, which is an error or a size, and compares the result with the request.
+/* Makes subsets for a target, which is an error or a size, and compares the result with the
+ * request.
  */
 #include <stdio.h>
 #include <string.h>
@@ -11,14 +12,14 @@ static const double errors[] = { 10, 3, 1, 0.3 }; /* percent of the diagonal */
 static const double sizes[] = { 3, 5, 10, 50 };   /* percent of the first file */
 
 /* Cuts the part for a viewer: envelopes without mesh. */
-static ebpo_status cut_subset(const comparison *c, ebpo_file *file, const need_result *n,
+static ebpo_status cut_subset(const comparison *c, ebpo_file *file, const target_result *n,
                               const char *path, ebpo_error *error)
 {
     ebpo_subset_options options = EBPO_SUBSET_OPTIONS_INIT;
     options.parts = ebpo_profile_parts(EBPO_PROFILE_LOD);
     options.threads = (unsigned)c->v->threads;
     options.progress = c->progress;
-    if (n->kind == NEED_ERROR)
+    if (n->kind == TARGET_ERROR)
         options.max_error = n->requested;
     else
         options.target_bytes = (uint64_t)n->requested;
@@ -26,7 +27,7 @@ static ebpo_status cut_subset(const comparison *c, ebpo_file *file, const need_r
 }
 
 static ebpo_status measure_error(const comparison *c, ebpo_model *model, const char *path,
-                                 need_result *n, ebpo_error *error)
+                                 target_result *n, ebpo_error *error)
 {
     ebpo_error_bound_options options = EBPO_ERROR_BOUND_OPTIONS_INIT;
     options.queries = REPORT_QUERIES;
@@ -39,27 +40,27 @@ static ebpo_status measure_error(const comparison *c, ebpo_model *model, const c
     ebpo_status status = ebpo_open(path, &file, error);
     if (status == EBPO_OK) {
         const ebpo_info *info = ebpo_file_info(file);
-        n->metric[OF_NEED_BYTES] = (double)info->file_bytes;
+        n->metric[METRIC_SUBSET_BYTES] = (double)info->file_bytes;
         status = ebpo_level_error_bound(model, file, info->level_count - 1, &options, &far, error);
     }
     if (status == EBPO_OK) {
-        n->metric[OF_NEED_FAR_LO] = far.lo;
-        n->metric[OF_NEED_FAR_HI] = far.hi;
+        n->metric[METRIC_SUBSET_FAR_LO] = far.lo;
+        n->metric[METRIC_SUBSET_FAR_HI] = far.hi;
     }
     ebpo_close(file);
     return status;
 }
 
 /* Computes the error of the whole file. Leaves cannot be refined: no subset is closer than the last
- * level of the file, which --levels may have omitted. 0: not known. */
-static ebpo_status file_error(const comparison *c, method *m, ebpo_file *file, ebpo_model *model,
-                              double *reach, ebpo_error *error)
+ * level of the file, which --levels may have omitted. *out: 0 if it is not known. */
+static ebpo_status find_file_error(const comparison *c, method *m, ebpo_file *file,
+                                   ebpo_model *model, double *out, ebpo_error *error)
 {
     ebpo_error_bound_options options = EBPO_ERROR_BOUND_OPTIONS_INIT;
     options.queries = REPORT_QUERIES;
     ebpo_error_bound far = EBPO_ERROR_BOUND_INIT;
-    *reach = m->level[m->levels - 1][OF_FAR_HI];
-    if (!isnan(*reach))
+    *out = m->level[m->levels - 1][METRIC_FAR_HI];
+    if (!isnan(*out))
         return EBPO_OK;
     options.samples = 0;
     options.threads = (unsigned)c->v->threads;
@@ -69,43 +70,45 @@ static ebpo_status file_error(const comparison *c, method *m, ebpo_file *file, e
         status = ebpo_level_error_bound(model, file, i, &options, &far, error);
         options.at_most = far.hi;
     }
-    *reach = status == EBPO_OK ? far.hi : 0;
+    *out = status == EBPO_OK ? far.hi : 0;
     return method_note_missing(m, "Hausdorff distance", status, error);
 }
 
-static ebpo_status measure_need(comparison *c, method *m, ebpo_file *file, ebpo_model *model,
-                                need_kind kind, double requested, double own, ebpo_error *error)
+static ebpo_status measure_target(comparison *c, method *m, ebpo_file *file, ebpo_model *model,
+                                  target_kind kind, double requested, double file_error,
+                                  ebpo_error *error)
 {
     char path[sizeof c->folder + 16];
-    need_result *n = &m->need[m->need_count];
-    *n = (need_result){ kind, requested, { NAN, NAN, NAN, NAN, NAN } };
-    snprintf(path, sizeof path, "%s/need.ebpo.h5", c->folder);
+    target_result *n = &m->targets[m->target_count];
+    *n = (target_result){ kind, requested, { NAN, NAN, NAN, NAN, NAN } };
+    snprintf(path, sizeof path, "%s/target.ebpo.h5", c->folder);
     uint64_t begin = tool_clock();
     ebpo_status status = cut_subset(c, file, n, path, error);
-    n->metric[OF_NEED_SECONDS] = 1e-9 * (double)(tool_clock() - begin);
+    n->metric[METRIC_SUBSET_SECONDS] = 1e-9 * (double)(tool_clock() - begin);
     if (status == EBPO_OK)
         status = measure_error(c, model, path, n, error);
     unlink(path);
-    n->metric[OF_NEED_RATIO] = kind == NEED_ERROR ? n->metric[OF_NEED_FAR_HI] / fmax(requested, own)
-                                                  : n->metric[OF_NEED_BYTES] / requested;
+    n->metric[METRIC_SUBSET_RATIO] =
+        kind == TARGET_ERROR ? n->metric[METRIC_SUBSET_FAR_HI] / fmax(requested, file_error)
+                             : n->metric[METRIC_SUBSET_BYTES] / requested;
     if (status == EBPO_OK || status == EBPO_E_ABSENT)
-        m->need_count++;
+        m->target_count++;
     return status;
 }
 
-/* Measures all needs. A need that cannot be met is omitted, with a note. */
-ebpo_status report_needs(comparison *c, method *m, ebpo_file *file, ebpo_model *model,
-                         ebpo_error *error)
+/* Measures all targets. A target that cannot be met is omitted, with a note. */
+ebpo_status report_targets(comparison *c, method *m, ebpo_file *file, ebpo_model *model,
+                           ebpo_error *error)
 {
-    double own;
-    ebpo_status status = file_error(c, m, file, model, &own, error);
-    for (unsigned i = 0; i < NEEDS && status == EBPO_OK; i++) {
-        bool by_error = i < NEEDS / 2;
+    double file_error;
+    ebpo_status status = find_file_error(c, m, file, model, &file_error, error);
+    for (unsigned i = 0; i < TARGETS && status == EBPO_OK; i++) {
+        bool by_error = i < TARGETS / 2;
         double requested =
             by_error ? errors[i] / 100 * c->diagonal
-                     : floor(sizes[i - NEEDS / 2] / 100 * (double)c->methods[0].info.file_bytes);
-        status = measure_need(c, m, file, model, by_error ? NEED_ERROR : NEED_SIZE, requested, own,
-                              error);
+                     : floor(sizes[i - TARGETS / 2] / 100 * (double)c->methods[0].info.file_bytes);
+        status = measure_target(c, m, file, model, by_error ? TARGET_ERROR : TARGET_SIZE, requested,
+                                file_error, error);
         if (status == EBPO_E_MEMORY || status == EBPO_E_IO || status == EBPO_E_CANCELLED)
             return status;
         if (status != EBPO_OK)
