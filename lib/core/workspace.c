@@ -9,7 +9,6 @@
 #include <fcntl.h>
 #include <pthread.h>
 #include <stdatomic.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
@@ -475,13 +474,18 @@ typedef struct residency {
 
 static residency read_residency(const ebpo_workspace *w)
 {
-    char text[128];
-    unsigned long long size, pages, of_files;
+    char text[128], *at = text;
+    uint64_t numbers[3]; /* pages: size, resident, resident of files */
     ssize_t got = w->statm >= 0 ? pread(w->statm, text, sizeof text - 1, 0) : -1;
     text[got > 0 ? got : 0] = 0;
-    if (sscanf(text, "%llu %llu %llu", &size, &pages, &of_files) != 3)
-        return (residency){ UINT64_MAX, UINT64_MAX }; /* not known: always release */
-    return (residency){ pages * w->page, of_files * w->page };
+    for (int i = 0; i < 3; i++) {
+        char *end;
+        numbers[i] = strtoull(at, &end, 10);
+        if (end == at)
+            return (residency){ UINT64_MAX, UINT64_MAX }; /* not known: always release */
+        at = end;
+    }
+    return (residency){ numbers[1] * w->page, numbers[2] * w->page };
 }
 
 static void release_extent(const extent *b)

@@ -1,5 +1,6 @@
 // Tests the interface of the package: sources, errors, cancelling, limits, workers and pairs.
 import assert from 'node:assert/strict';
+import { createHash } from 'node:crypto';
 import { readFileSync, statSync } from 'node:fs';
 import { createServer } from 'node:http';
 import { join } from 'node:path';
@@ -7,7 +8,7 @@ import test from 'node:test';
 
 const { EBPO_PACKAGE: folder, EBPO_VECTORS: vectors, EBPO_FILES: files = '' } = process.env;
 const library = await import(join(folder, 'index.js'));
-const { open, EbpoArgumentError, EbpoError, EbpoFormatError, EbpoLimitError, EbpoPendingError, EbpoReadError } = library;
+const { open, EbpoAbsentError, EbpoArgumentError, EbpoError, EbpoFormatError, EbpoLimitError, EbpoPendingError, EbpoReadError } = library;
 const small = readFileSync(join(vectors, 'passed/06_four_levels_leaf_planes.ebpo.h5'));
 const large = files.split(' ').filter(Boolean).sort((a, b) => statSync(b).size - statSync(a).size)[0], largeBytes = large && readFileSync(large);
 
@@ -165,10 +166,90 @@ test('a worker gives equal results and errors', async () => {
   for await (const level of worker.levels())
     levels.push(level.planes.length);
   assert.equal(levels.length, model.info.levels.length);
+  assert.deepEqual(await worker.subtree(1n, { levels: 1 }), await model.subtree(1n, { levels: 1 }));
   await assert.rejects(worker.inside([NaN, 0, 0]), EbpoArgumentError);
   worker.dispose();
   model.dispose();
   await assert.rejects(openInWorker(new Uint8Array(5000)), EbpoFormatError);
+});
+
+const vector = (name) => open(readFileSync(join(vectors, `passed/${name}.ebpo.h5`)));
+
+test('attributes are in the order of the mesh, and by name', async () => {
+  const model = await vector('39_attributes'), { info } = model, { vertex, face } = await model.maps();
+  assert.ok(info.attributes.length > 3);
+  for (const { element, names, list } of info.attributes)
+    for (const name of names.split(' ')) {
+      const sorted = await model.attribute(`${element}:${name}`), plain = await model.attribute(`${element}:${name}`, { order: 'file' }), sources = { vertex, face }[element];
+      const rows = ({ values, ends, columns }) => ends ? [...ends].map((end, i) => [...values.subarray(ends[i - 1] ?? 0, end)])
+        : Array.from({ length: values.length / columns }, (_, i) => [...values.subarray(columns * i, columns * i + columns)]);
+      const order = sources && [...sources.keys()].sort((a, b) => sources[a] - sources[b]);
+      assert.deepEqual(rows(sorted), order ? order.map((i) => rows(plain)[i]) : rows(plain), name);
+      assert.ok(list || sorted.columns === 1);
+    }
+  const [inFile, inSource] = [await model.mesh({ order: 'file' }), await model.mesh()];
+  face.forEach((source, i) => assert.deepEqual([...inFile.faces.subarray(3 * i, 3 * i + 3)].map((v) => vertex[v]), [...inSource.faces.subarray(3 * source, 3 * source + 3)]));
+  const corners = await model.corners([2, 0]);
+  assert.deepEqual([...corners], [2, 0].flatMap((f) => [...inFile.faces.subarray(3 * f, 3 * f + 3)].flatMap((v) => [...inFile.vertices.subarray(3 * v, 3 * v + 3)])));
+  await assert.rejects(model.corners([info.faces]), EbpoArgumentError);
+  await assert.rejects(model.attribute('taste'), (error) => error instanceof EbpoAbsentError && /vertex:/.test(error.message));
+  await assert.rejects(model.mesh({ order: 'size' }), EbpoArgumentError);
+  await assert.rejects(model.sample('taste', [0, 0, 0], [0]), EbpoAbsentError);
+  await assert.rejects(model.sample('taste', [0, 0, 0], []), EbpoArgumentError);
+  const plain = info.attributes.find(({ element, list }) => element === 'face' && !list), name = plain.names.split(' ')[0], { values } = await model.attribute(`face:${name}`);
+  const samples = await model.sample(`face:${name}`, [0, 0, 0, 0, 0, 0], [1, library.NO_FACE]);
+  assert.deepEqual([...samples], [values[1], NaN]);
+  model.dispose();
+});
+
+test('textures have names, uses, digests and bytes', async () => {
+  const model = await vector('51_textures'), all = await model.textures(), expected = JSON.parse(readFileSync(join(vectors, 'passed/51_textures.attributes.json'), 'utf8'));
+  assert.ok(all.length > 0 && expected.arrays.some(({ element }) => element === 'ebpo:texture'));
+  for (const { name, sha256, bytes } of all)
+    assert.ok(name && (!bytes?.length || createHash('sha256').update(bytes).digest('hex') === sha256), name);
+  assert.ok(all.some(({ bytes }) => bytes?.length));
+  assert.deepEqual((await model.textures({ bytes: false })).map(({ bytes, ...others }) => others), all.map(({ bytes, ...others }) => others));
+  model.dispose();
+  const none = await open(small);
+  assert.deepEqual(await none.textures(), []);
+  none.dispose();
+});
+
+test('a view follows its observer, and stops at its limits', { skip: !large }, () => withServer(largeBytes, undefined, async ({ url }) => {
+  const model = await open(url), { origin, size } = model.info, eye = origin.map((x, k) => x + 1.2 * size[k]), observer = { eye, direction: eye.map((x, k) => origin[k] + size[k] / 2 - x) };
+  const view = model.view({ priority: 'pixels', observer, nodes: 200, polygons: true }), nodes = await view.next({ most: 100 });
+  assert.ok(nodes.count <= 100 && nodes.octcode[0] === 1n && nodes.level[0] === 0 && nodes.vertexCount.some((x) => x > 3));
+  for await (const more of view)
+    assert.equal(more.count, more.octcode.length);
+  assert.equal(view.end, 'nodes');
+  assert.ok(view.stats.nodes > 150 && view.stats.nodes <= 200);
+  assert.equal(view.cut().octcode.length, Object.values(view.stats.cut).reduce((a, b) => a + b));
+  view.change({ nodes: 400, observer: { eye: origin, direction: size } });
+  assert.ok((await view.next()).count > 0);
+  assert.throws(() => view.change({ planes: false }), EbpoArgumentError);
+  assert.throws(() => view.change({ priority: 'size' }), EbpoArgumentError);
+  assert.throws(() => model.view({ priority: 'pixels' }), EbpoArgumentError);
+  assert.throws(() => model.view({ observer: { eye: [0, 0] } }), EbpoArgumentError);
+  view.dispose();
+  view.dispose();
+  await assert.rejects(view.next(), EbpoArgumentError);
+  const other = model.view();
+  model.dispose();
+  await assert.rejects(other.next(), EbpoError);
+  assert.throws(() => other.cut(), EbpoError);
+  other.dispose();
+}));
+
+test('subtrees are those of octcodes', { skip: !large }, async () => {
+  const model = await open(largeBytes), { origin, size } = model.info, point = (await model.distance(origin.map((x, k) => x + size[k] / 2))).point, code = model.octcode(point, 3);
+  const subtree = await model.subtree(code), all = await model.subtree(1, { levels: 3 });
+  assert.ok(subtree.octcode[0] === code && subtree.faces.length > 0 && subtree.number.length === subtree.faces.length / 3);
+  assert.ok(all.octcode.includes(code) && all.faces === undefined);
+  assert.equal(model.octcode(origin.map((x) => x - 1), 3), 0n);
+  await assert.rejects(model.subtree(0), EbpoArgumentError);
+  const bounds = await model.windingBounds([...point, ...origin.map((x) => x - 1)]);
+  assert.deepEqual([bounds.lo[1], bounds.hi[1]], [0, 0]);
+  model.dispose();
 });
 
 test('pairs of models', async () => {
@@ -178,7 +259,9 @@ test('pairs of models', async () => {
   assert.equal(await both.relation({ poseB }), 'disjoint');
   assert.equal(await both.first({ poseB }), null);
   assert.equal((await both.distance({ poseB })).lo, 2);
-  assert.ok((await both.all({ poseB: { translation: [0.1, 0.1, 0.1] } })).kind.length > 0);
+  const moved = { poseB: { translation: [0.1, 0.1, 0.1] } }, { kind, faces, number } = await both.all(moved), { segments } = await both.contacts(moved), { face } = await a.maps();
+  assert.ok(kind.length > 0 && segments.length > 0 && segments.length % 6 === 0);
+  assert.deepEqual([...faces], [...number].map((f) => face[f]));
   both.dispose();
   await assert.rejects(async () => pair(a, await openBoth(small)), EbpoArgumentError);
 });

@@ -7,6 +7,7 @@
  * the file has no mesh. */
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include <ebpo/ebpo.h>
 
@@ -270,6 +271,131 @@ static void write_mesh(const ebpo_file *file)
     ebpo_mesh_free(&mesh);
 }
 
+/* Values and ends of all arrays of attributes, in the order of the file; the maps. */
+static void write_attributes(const ebpo_file *file)
+{
+    section s[2];
+    ebpo_attribute_facts facts = EBPO_ATTRIBUTE_FACTS_INIT;
+    const ebpo_info *info = ebpo_file_info(file);
+    begin_sections(s, 2);
+    for (unsigned n = 0; ebpo_file_attribute(file, n, &facts); n++) {
+        static const size_t sizes[] = { 1, 1, 2, 2, 4, 4, 4, 8 };
+        ebpo_attribute_values v = { 0 };
+        require(ebpo_file_read_attribute(file, n, NULL, &v, &error) == EBPO_OK, "attribute");
+        fwrite(v.values, sizes[facts.type], v.count, s[0].stream);
+        for (uint64_t i = 0; v.ends && i < facts.rows; i++) {
+            double end = (double)v.ends[i];
+            PUT(s[1], end);
+        }
+        ebpo_attribute_values_free(&v);
+    }
+    end_sections(s, 2);
+    if (info->parts & EBPO_PART_MAPS) {
+        ebpo_maps maps = { 0 };
+        require(ebpo_file_read_maps(file, NULL, &maps, &error) == EBPO_OK, "maps");
+        write_section(maps.vertex_source, info->vertex_count * 4);
+        write_section(maps.face_source, info->face_count * 4);
+        ebpo_maps_free(&maps);
+    }
+}
+
+/* The first attribute of vertices or faces that is no list, at the nearest points of `points`. */
+static void write_samples(const ebpo_file *file, ebpo_context *context, const double *points,
+                          uint64_t n)
+{
+    ebpo_attribute_facts facts = EBPO_ATTRIBUTE_FACTS_INIT;
+    for (unsigned i = 0; ebpo_file_attribute(file, i, &facts); i++) {
+        ebpo_sampler *sampler = NULL;
+        char name[400];
+        bool is_face = strcmp(facts.element, "face") == 0;
+        if ((!is_face && strcmp(facts.element, "vertex") != 0) || facts.list)
+            continue;
+        snprintf(name, sizeof name, "%s:%.*s", facts.element, (int)strcspn(facts.names, " "),
+                 facts.names);
+        ebpo_distance_result *r = allocate(n * sizeof *r);
+        double *at = allocate(n * 24), *values = allocate(n * 8);
+        uint64_t *faces = allocate(n * 8);
+        require(ebpo_distance_many(context, points, n, NULL, r, &error) == EBPO_OK, "distance");
+        for (uint64_t k = 0; k < n; k++) {
+            memcpy(at + 3 * k, r[k].point, sizeof r[k].point);
+            faces[k] = r[k].face;
+        }
+        require(ebpo_sampler_new(file, name, 1, &sampler, &error) == EBPO_OK, name);
+        require(ebpo_sample(sampler, at, faces, n, values, &error) == EBPO_OK, "samples");
+        write_section(values, n * sizeof *values);
+        ebpo_sampler_free(sampler);
+        free(r);
+        free(at);
+        free(values);
+        free(faces);
+        return;
+    }
+}
+
+/* Nodes by their size for an observer, and their faces. */
+static void write_view(const ebpo_file *file)
+{
+    section s[7];
+    const ebpo_info *info = ebpo_file_info(file);
+    ebpo_view_options options = EBPO_VIEW_OPTIONS_INIT;
+    ebpo_observer observer = EBPO_OBSERVER_INIT;
+    ebpo_view_stream *view = NULL;
+    ebpo_view_node node;
+    ebpo_view_end end = EBPO_VIEW_NODE;
+    for (int k = 0; k < 3; k++) {
+        observer.eye[k] = info->box_origin[k] + (k + 1) * info->box_size[k];
+        observer.direction[k] = -1;
+    }
+    options.priority = EBPO_PRIORITY_PIXELS;
+    options.observer = &observer;
+    options.pixels = 20;
+    options.faces = info->parts & EBPO_PART_MESH && !info->pruned;
+    require(ebpo_view_stream_new(file, &options, &view, &error) == EBPO_OK, "view");
+    begin_sections(s, 7);
+    for (;;) {
+        ebpo_view_faces faces = EBPO_VIEW_FACES_INIT;
+        ebpo_status status = ebpo_view_stream_next(view, &node, &end, &error);
+        require(status == EBPO_OK || (status == EBPO_E_ABSENT && info->pruned), "view");
+        if (status != EBPO_OK || end != EBPO_VIEW_NODE)
+            break;
+        uint8_t flags[2] = { node.complete, node.seen };
+        PUT(s[0], node.node.octcode);
+        fwrite(node.node.planes, sizeof *node.node.planes, node.node.plane_count, s[1].stream);
+        PUT(s[2], flags);
+        PUT(s[3], node.distance);
+        PUT(s[4], node.pixels);
+        require(ebpo_view_stream_get_faces(view, &faces) == EBPO_OK, "faces of a view");
+        fwrite(faces.corners, sizeof *faces.corners, faces.face_count, s[5].stream);
+        fwrite(faces.numbers, sizeof *faces.numbers, faces.face_count, s[6].stream);
+    }
+    end_sections(s, 7);
+    ebpo_view_stream_free(view);
+}
+
+/* The subtree of the root. */
+static void write_subtree(const ebpo_file *file)
+{
+    const ebpo_info *info = ebpo_file_info(file);
+    ebpo_subtree_nodes nodes = EBPO_SUBTREE_NODES_INIT;
+    ebpo_subtree_faces faces = EBPO_SUBTREE_FACES_INIT;
+    ebpo_subtree *subtree = NULL;
+    if (info->pruned)
+        return;
+    require(ebpo_subtree_open(file, 1, NULL, &subtree, &error) == EBPO_OK, "subtree");
+    require(ebpo_subtree_get_nodes(subtree, &nodes) == EBPO_OK, "nodes of a subtree");
+    write_section(nodes.octcodes, nodes.node_count * sizeof *nodes.octcodes);
+    write_section(nodes.types, nodes.node_count * sizeof *nodes.types);
+    write_section(nodes.planes, nodes.plane_first
+                                    ? nodes.plane_first[nodes.node_count] * sizeof *nodes.planes
+                                    : 0);
+    if (ebpo_subtree_get_faces(subtree, &faces, &error) == EBPO_OK) {
+        write_section(faces.faces, faces.face_count * 12);
+        write_section(faces.numbers, faces.face_count * 4);
+        write_section(faces.list, faces.list_first[nodes.node_count] * sizeof *faces.list);
+    }
+    ebpo_subtree_close(subtree);
+}
+
 static double *read_inputs(const char *path, uint64_t *n)
 {
     double count;
@@ -298,6 +424,9 @@ int main(int argc, char **argv)
     require(ebpo_open(argv[1], &file, &error) == EBPO_OK, argv[1]);
     write_levels(file);
     write_level(file);
+    write_attributes(file);
+    write_view(file);
+    write_subtree(file);
     if (ebpo_file_info(file)->parts & EBPO_PART_MESH && !ebpo_file_info(file)->pruned) {
         require(ebpo_model_new(file, NULL, &model, &error) == EBPO_OK, "model");
         require(ebpo_context_new(model, &context, &error) == EBPO_OK, "context");
@@ -308,6 +437,7 @@ int main(int argc, char **argv)
         write_nearest(context, inputs, n);
         write_rays(context, inputs + 3 * n, n);
         write_boxes(context, inputs + 9 * n, n);
+        write_samples(file, context, inputs, n);
     }
     ebpo_context_free(context);
     ebpo_model_free(model);

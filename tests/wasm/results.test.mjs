@@ -8,7 +8,7 @@ import { basename, join } from 'node:path';
 import test from 'node:test';
 
 const { EBPO_PACKAGE: folder, EBPO_NATIVE: native, EBPO_FILES: files = '', EBPO_TEST_SCALE: scale = '0.05' } = process.env;
-const { open } = await import(join(folder, 'index.js'));
+const { open } = await import(join(folder, 'index.js')), { partsOf } = await import(join(folder, 'view.js'));
 const count = Math.max(200, Math.round(1e5 * scale));
 
 /** Returns a generator of numbers in 0 .. 1, the same in each run. */
@@ -72,6 +72,42 @@ async function levelSections(model) {
     .concat(['vertices', 'triangles', 'normals'].map((name) => [`level: ${name}`, joined([last[name]])]));
 }
 
+async function partSections(model) {
+  const { info } = model, out = [], add = (kind, result, names) => names.forEach((name) => out.push([`${kind}: ${name}`, joined([result[name]])]));
+  const arrays = [];
+  for (const { element, names, columns, list } of info.attributes) {
+    const each = await Promise.all(names.split(' ').map((name) => model.attribute(`${element}:${name}`, { order: 'file' })));
+    arrays.push(list || each.length === 1 ? each[0] // columns side by side
+      : { values: each[0].values.constructor.from({ length: each[0].values.length * columns }, (_, i) => each[i % columns].values[Math.floor(i / columns)]) });
+  }
+  out.push(['attributes', joined(arrays.map(({ values }) => values))], ['attributes: ends', joined(arrays.flatMap(({ ends }) => ends ?? []))]);
+  if (partsOf(info).includes('maps'))
+    add('maps', await model.maps(), ['vertex', 'face']);
+  out.push(...await viewSections(model));
+  if (!info.pruned) {
+    const subtree = await model.subtree();
+    add('subtree', subtree, ['octcode', 'type', 'planes', ...(subtree.faces ? ['faces', 'number', 'list'] : [])]);
+  }
+  return out;
+}
+
+/** Nodes by their size for an observer, and their faces, in small parts. */
+async function viewSections(model) {
+  const { info } = model, eye = info.origin.map((x, k) => x + (k + 1) * info.size[k]), faces = info.hasMesh && !info.pruned, parts = [];
+  const view = model.view({ priority: 'pixels', observer: { eye, direction: [-1, -1, -1] }, pixels: 20, faces });
+  try {
+    for (let nodes; (nodes = await view.next({ most: 100 }));)
+      parts.push(nodes);
+    assert.equal(view.end, 'done');
+  } catch (error) {
+    assert.ok(error.status === 'EBPO_E_ABSENT' && info.pruned, error.message);
+  }
+  view.dispose();
+  const each = (name, of = (x) => x[name] ?? new Uint8Array(0)) => [`view: ${name}`, joined(parts.map(of))];
+  return [each('octcode'), each('planes'), each('flags', ({ complete, seen }) => complete.length ? Uint8Array.from({ length: 2 * complete.length }, (_, i) => [complete, seen][i % 2][i >> 1])
+    : complete), each('distance'), each('pixels'), each('faceCorners'), each('faceNumber')];
+}
+
 async function querySections(model, mesh, { points, rays, boxes }, n) {
   const out = [], add = (kind, result, names) => names.forEach((name) => out.push([`${kind}: ${name}`, joined([result[name]])]));
   add('mesh', mesh, ['vertices', 'faces']);
@@ -93,6 +129,11 @@ async function querySections(model, mesh, { points, rays, boxes }, n) {
       corners.push((await model.boxTriangles(box.subarray(0, 3), box.subarray(3))).corners);
   }
   out.push(['boxes: counts', joined([Uint32Array.from(faces, (x) => x.length)])], ['boxes: faces', joined(faces)], ['boxes: corners', joined(corners)]);
+  const sampled = model.info.attributes.find(({ element, list }) => !list && (element === 'vertex' || element === 'face'));
+  if (sampled) {
+    const { point, face } = await model.distance(points);
+    out.push(['samples', joined([await model.sample(`${sampled.element}:${sampled.names.split(' ')[0]}`, point, face)])]);
+  }
   return out;
 }
 
@@ -101,7 +142,7 @@ async function compare(file, n, options = {}) {
   const model = await open(readFileSync(file), options), { info } = model;
   const mesh = info.hasMesh && !info.pruned ? await model.mesh() : null;
   const inputs = makeInputs({ info, mesh }, n), expected = nativeSections(file, inputs, n);
-  const found = await levelSections(model);
+  const found = [...await levelSections(model), ...await partSections(model)];
   if (mesh)
     found.push(...await querySections(model, mesh, inputs, n));
   model.dispose();

@@ -152,9 +152,12 @@ link_module() { # file, C files...
 build_package() {
     rm -rf "$folder/package"
     mkdir -p "$folder/package"
-    link_module ebpo.wasm object.c model.c queries.c levels.c check.c no_encoders.c
+    core="object.c model.c queries.c levels.c view_stream.c subtrees.c attributes.c check.c no_encoders.c"
+    # shellcheck disable=SC2086
+    link_module ebpo.wasm $core
     link_module ebpo-view.wasm object.c view.c view_faces.c no_encoders.c
-    link_module ebpo-collide.wasm object.c model.c queries.c levels.c check.c no_encoders.c collide.c
+    # shellcheck disable=SC2086
+    link_module ebpo-collide.wasm $core collide.c
     version=$(sed -n "s/^  version: '\(.*\)',$/\1/p" "$root/meson.build")
     cp "$here"/ebpo/*.js "$here"/ebpo/*.d.ts "$here/ebpo/README.md" "$root/LICENSE" "$folder/package"
     sed "s/@VERSION@/$version/" "$here/ebpo/package.json.in" >"$folder/package/package.json"

@@ -12,7 +12,10 @@ export const RELATIONS: readonly string[];
 export class Pair {
   private constructor();
   first(options?: PairOptions): Promise<{ a: number; b: number; kind: number } | null>;
-  all(options?: PairOptions): Promise<{ faces: Uint32Array; kind: Uint8Array }>;
+  /** All pairs of intersecting faces: source indices [n][2], kinds [n], and file indices [n][2] for Model.corners(). */
+  all(options?: PairOptions): Promise<{ faces: Uint32Array; kind: Uint8Array; number: Uint32Array }>;
+  /** Segments in which faces cross: both ends [n][2][3], and source indices of the faces [n][2]. */
+  contacts(options?: PairOptions): Promise<{ segments: Float64Array; faces: Uint32Array }>;
   relation(options?: PairOptions): Promise<string>;
   distance(options?: PairOptions & { tolerance?: number }): Promise<
     { lo: number; hi: number; pointA: Float64Array; pointB: Float64Array; a: number; b: number }>;

@@ -66,10 +66,16 @@ export class Pair {
     return faces.length ? { a: faces[0], b: faces[1], kind: this.#array(1, Uint8Array)[0] } : null;
   }
 
-  /** All pairs of intersecting faces: faces [n][2] and kinds [n]. */
+  /** All pairs of intersecting faces: source indices [n][2], kinds [n] and file indices [n][2]. */
   async all(options) {
     await this.#query('ebpo_js_pair_all', options);
-    return { faces: this.#array(0, Uint32Array), kind: this.#array(1, Uint8Array) };
+    return { faces: this.#array(0, Uint32Array), kind: this.#array(1, Uint8Array), number: this.#array(2, Uint32Array) };
+  }
+
+  /** Segments in which faces cross: both ends [n][2][3], and the faces [n][2]. */
+  async contacts(options) {
+    await this.#query('ebpo_js_pair_contacts', options);
+    return { segments: this.#array(0, Float64Array), faces: this.#array(1, Uint32Array) };
   }
 
   /** One of RELATIONS. */

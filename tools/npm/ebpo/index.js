@@ -5,6 +5,7 @@ import { sourceOf } from './source.js';
 
 export * from './errors.js';
 export { Model } from './model.js';
+export { ViewStream } from './view_stream.js';
 export { blobSource, memorySource, urlSource } from './source.js';
 
 export const OUT = 0, IN = 1, ON = 2, MAYBE = 3;

@@ -3,12 +3,15 @@
 import { Heap } from './heap.js';
 import { EbpoArgumentError, EbpoError, EbpoReadError, errorOf } from './errors.js';
 import { OneQuery } from './one.js';
+import { columnOf, findAttribute, partsOf, pickRows, queryAttribute, querySubtree, sortedRows, textureArrays, texturesOf } from './parts.js';
+import { nodeArrays, ViewStream } from './view_stream.js';
 
 const PENDING = -11;
 const BATCH = 16384; // points of one call
 const TURN = 50; // milliseconds after which a long query lets other events run
 const SIDES = { both: 0, front: 1, back: 2 };
 const LARGE = 4 << 20; // bytes of one request when the whole file is read
+const NO_FACE = 0xffffffff;
 const KEPT = 4; // query objects that are kept for later queries
 
 /** Lets the event loop run. */
@@ -44,6 +47,7 @@ export class Model {
   #source;
   #version;
   #flights = new Set(); // ranges that are being fetched
+  #samplers = new Map(); // query objects with the samplers of attributes
   #idle = []; // query objects that are not in use
   #used = new Set(); // query objects in use
   #one; // for queries of one point or ray
@@ -276,6 +280,12 @@ export class Model {
     return join(this.#manyNow(this.#inside(points, options)));
   }
 
+  async windingBounds(points, { width = 1e-9, signal } = {}) {
+    const read = (array) => ({ bounds: array(0, Float64Array) });
+    const { bounds } = join(await this.#many({ name: 'ebpo_js_winding', values: doubles(points, 3, 'point'), columns: 3, args: [width], completed: false, read }, signal));
+    return { lo: bounds.filter((_, i) => i % 2 === 0), hi: bounds.filter((_, i) => i % 2 === 1) };
+  }
+
   #distance(points, { level = -1, maxDistance = Infinity, unsigned = false } = {}) {
     return { name: 'ebpo_js_distance', values: doubles(points, 3, 'point'), columns: 3, args: [level, maxDistance, +unsigned],
       read: (array) => ({ distance: array(0, Float64Array), point: array(2, Float64Array), normal: array(3, Float64Array),
@@ -404,9 +414,85 @@ export class Model {
     await this.#run({ call: this.#of('ebpo_js_check'), read: () => {} }, signal);
   }
 
-  async mesh({ signal } = {}) {
+  async mesh({ order = 'source', signal } = {}) {
     const read = (array) => ({ vertices: array(0, Float32Array).length ? array(0, Float32Array) : array(1, Float64Array), faces: array(2, Uint32Array) });
-    return this.#run({ call: this.#of('ebpo_js_mesh'), read }, signal);
+    return this.#run({ call: this.#of('ebpo_js_mesh', +this.#isSource(order)), read }, signal);
+  }
+
+  #isSource(order) {
+    if (order !== 'source' && order !== 'file')
+      throw new EbpoArgumentError(`order is source or file, not ${order}`, { status: 'EBPO_E_ARGUMENT' });
+    return order === 'source';
+  }
+
+  async maps({ signal } = {}) {
+    return this.#run({ call: this.#of('ebpo_js_maps'), read: (array) => ({ vertex: array(0, Uint32Array), face: array(1, Uint32Array) }) }, signal);
+  }
+
+  async corners(numbers, { signal } = {}) {
+    const values = Float64Array.from(numbers), Type = this.info.doubles ? Float64Array : Float32Array;
+    return this.#run({ call: (query) => this.#heap.lend(values, (at) => this.#heap.call('ebpo_js_corners', query, at, values.length)), read: (array) => array(0, Type) }, signal);
+  }
+
+  async attribute(name, { order = 'source', signal } = {}) {
+    const { info } = this, { index, column } = findAttribute(info, name), { element, list } = info.attributes[index];
+    const sorted = this.#isSource(order) && partsOf(info).includes('maps') && (element === 'vertex' || element === 'face');
+    const values = columnOf(await this.#run(queryAttribute(this.#heap, info, index), signal), column, list);
+    return sorted ? pickRows(values, sortedRows((await this.maps({ signal }))[element])) : values;
+  }
+
+  async textures({ bytes = true, signal } = {}) {
+    const { info } = this, arrays = textureArrays(info), values = {};
+    for (const [name, n] of Object.entries(arrays))
+      if (bytes || name !== 'bytes')
+        values[name] = await this.#run(queryAttribute(this.#heap, info, n), signal);
+    return texturesOf(info.attributes[arrays.name]?.rows ?? 0, values);
+  }
+
+  async sample(names, points, faces, { signal } = {}) {
+    const values = doubles(points, 3, 'point'), numbers = Float64Array.from(faces, (face) => face === NO_FACE ? -1 : face);
+    if (values.length !== 3 * numbers.length)
+      throw new EbpoArgumentError(`expected a face for each of ${values.length / 3} points, got ${numbers.length} faces`, { status: 'EBPO_E_ARGUMENT' });
+    const heap = this.#heap, known = this.#samplers.get(names), sampler = known ?? this.#take();
+    try {
+      await this.#repeat(() => heap.lend(names, (text) => heap.call('ebpo_js_sampler', sampler, text)), sampler, signal);
+    } catch (error) {
+      if (!known)
+        this.#give(sampler);
+      throw error;
+    }
+    if (!this.#samplers.has(names))
+      this.#samplers.set(names, sampler);
+    this.#check(heap.lend(values, (at) => heap.lend(numbers, (of) => heap.call('ebpo_js_sample', sampler, at, of, numbers.length))), sampler);
+    return heap.result(sampler, 0, Float64Array);
+  }
+
+  async subtree(octcode = 1n, options = {}) {
+    return this.#run(querySubtree(this.#heap, this.info, octcode, options), options.signal);
+  }
+
+  octcode([x, y, z], level) {
+    this.#alive();
+    return BigInt.asUintN(64, this.#heap.call('ebpo_js_octcode', this.#object, x, y, z, level));
+  }
+
+  view(options = {}) {
+    return new ViewStream({
+      begin: () => this.#take(),
+      end: (query) => this.#drop(query),
+      array: (query) => this.#results(query),
+      call: (query, name, ...args) => { this.#alive(); this.#check(this.#heap.call(name, query, ...args), query); },
+      lend: (numbers, use) => this.#heap.lend(numbers, use),
+      repeat: (call, query, signal) => { this.#alive(); return this.#repeat(() => this.#heap.call(call[0], query, ...call.slice(1)), query, signal); },
+    }, options);
+  }
+
+  /** Frees a query object. */
+  #drop(query) {
+    if (!this.#disposed && !this.#heap.failed) {
+      this.#used.delete(query);
+      this.#heap.call('ebpo_js_query_free', query);
+    }
   }
 
   async level(level, { cellFaces = true, signal } = {}) {
@@ -427,17 +513,10 @@ export class Model {
         const facts = array(13, Float64Array);
         if (!facts.length)
           return;
-        yield { level: facts[0], bytes: facts[2], volume: facts[3], octcode: array(0, BigUint64Array), type: array(1, Uint8Array),
-          winding: array(2, Int32Array), cell: array(3, Float64Array), nodeVolume: array(4, Float64Array), colour: array(5, Uint32Array),
-          planeCount: array(6, Uint32Array), planes: array(7, Float64Array),
-          ...(polygons ? { vertexCount: array(8, Uint32Array), vertices: array(9, Float64Array), polygonCount: array(10, Uint32Array),
-            polygonFirst: array(11, Uint32Array), corners: array(12, Uint32Array) } : {}) };
+        yield { level: facts[0], bytes: facts[2], volume: facts[3], ...nodeArrays(array, polygons) };
       }
     } finally {
-      if (!this.#disposed && !heap.failed) {
-        this.#used.delete(query);
-        heap.call('ebpo_js_query_free', query);
-      }
+      this.#drop(query);
     }
   }
 

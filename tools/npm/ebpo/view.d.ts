@@ -10,7 +10,7 @@ export interface NodePart {
 /** A leaf: the number of its siblings' group in the level, its octant, and its subtree, or -1. */
 export interface LeafAddress { level: number; group: number; octant: number; subtree: number }
 
-/** Faces of a leaf: numbers in the file, corners (9 numbers each), colours (red, green and blue of each corner). */
+/** Faces of a leaf: file indices (Model.maps() gives the source indices of queries), corners (9 numbers each), colours (red, green and blue of each corner). */
 export interface LeafFaces { numbers: Uint32Array; corners: Float32Array | Float64Array; colours?: Uint8Array }
 
 /** A file opened for drawing; of Model's methods it has only info and dispose(). */

@@ -4,16 +4,13 @@ import { loadModule } from './heap.js';
 import { Model, openWith } from './model.js';
 import { sourceOf } from './source.js';
 
-const PARTS = ['planes', 'mesh', 'maps', 'leaf-planes', 'attributes', 'colours', 'border'];
+export { partsOf } from './parts.js';
 
 /** Returns a promise of the compiled module, which is loaded once. */
 export const viewModule = () => loadModule(new URL('./ebpo-view.wasm', import.meta.url));
 
 /** Opens a file for drawing, as open() of the package does. `memory`: size of the cache of decoded data in bytes. */
 export const openView = (from, options = {}) => openWith(viewModule(), sourceOf(from, options, options.signal), options, View);
-
-/** Names of the file's parts. */
-export const partsOf = ({ parts }) => PARTS.filter((name, bit) => parts >> bit & 1);
 
 /** A file opened for drawing. */
 export class View extends Model {

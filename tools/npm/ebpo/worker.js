@@ -2,7 +2,8 @@
 // of Model. Node uses worker_threads.
 import { EbpoArgumentError, STATUS, EbpoError } from './errors.js';
 
-const METHODS = ['inside', 'distance', 'nearest', 'rays', 'raysAny', 'raysAll', 'boxFaces', 'boxTriangles', 'measure', 'mesh', 'level', 'check'];
+const METHODS = ['inside', 'distance', 'nearest', 'rays', 'raysAny', 'raysAll', 'boxFaces', 'boxTriangles', 'measure', 'mesh', 'level', 'check',
+  'windingBounds', 'maps', 'corners', 'attribute', 'textures', 'sample', 'subtree'];
 
 async function startWorker() {
   if (typeof Worker !== 'undefined')

@@ -58,15 +58,19 @@ static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
     ebpo_js_object *object = user;
     uint32_t(*faces)[2] = ebpo_js_extend(object, 0, count, sizeof *faces);
     uint8_t *kinds = ebpo_js_extend(object, 1, count, sizeof *kinds);
-    for (uint64_t i = 0; i < count && faces && kinds; i++) {
+    uint32_t(*numbers)[2] = ebpo_js_extend(object, 2, count, sizeof *numbers);
+    for (uint64_t i = 0; i < count && faces && kinds && numbers; i++) {
         faces[i][0] = (uint32_t)pairs[i].face_a;
         faces[i][1] = (uint32_t)pairs[i].face_b;
+        numbers[i][0] = (uint32_t)pairs[i].file_face_a;
+        numbers[i][1] = (uint32_t)pairs[i].file_face_b;
         kinds[i] = (uint8_t)pairs[i].kind;
     }
-    return faces && kinds;
+    return faces && kinds && numbers;
 }
 
-/* Array 0: faces [2], uint32. Array 1: ebpo_pair_kind, uint8. Empty: the models do not touch. */
+/* Array 0: faces [2], uint32. Array 1: ebpo_pair_kind, uint8. Array 2: indices of the faces in the
+ * files [2], uint32. Empty: the models do not touch. */
 int EBPO_JS(ebpo_js_pair_first)(ebpo_js_pair *pair, const double *poses)
 {
     ebpo_collide_options options = read_options(poses);
@@ -87,6 +91,30 @@ int EBPO_JS(ebpo_js_pair_all)(ebpo_js_pair *pair, const double *poses)
     pair->object.error.status = EBPO_OK;
     ebpo_status status =
         ebpo_collide_all(pair->collider, &options, take_pairs, &pair->object, &pair->object.error);
+    return pair->object.error.status == EBPO_E_MEMORY ? EBPO_E_MEMORY : status;
+}
+
+static bool take_segments(void *user, const ebpo_contact_segment *segments, uint64_t count)
+{
+    ebpo_js_object *object = user;
+    double(*points)[6] = ebpo_js_extend(object, 0, count, sizeof *points);
+    uint32_t(*faces)[2] = ebpo_js_extend(object, 1, count, sizeof *faces);
+    for (uint64_t i = 0; i < count && points && faces; i++) {
+        memcpy(points[i], segments[i].point, sizeof points[i]);
+        faces[i][0] = (uint32_t)segments[i].face_a;
+        faces[i][1] = (uint32_t)segments[i].face_b;
+    }
+    return points && faces;
+}
+
+/* Array 0: segments [2][3], doubles. Array 1: faces [2], uint32. */
+int EBPO_JS(ebpo_js_pair_contacts)(ebpo_js_pair *pair, const double *poses)
+{
+    ebpo_collide_options options = read_options(poses);
+    ebpo_js_clear(&pair->object);
+    pair->object.error.status = EBPO_OK;
+    ebpo_status status = ebpo_collide_contacts(pair->collider, &options, take_segments,
+                                               &pair->object, &pair->object.error);
     return pair->object.error.status == EBPO_E_MEMORY ? EBPO_E_MEMORY : status;
 }
 

@@ -16,7 +16,7 @@ int EBPO_JS(ebpo_js_stream)(ebpo_js_object *object, int planes, int polygons)
     return ebpo_stream_new(object->file, &options, &object->stream, &object->error);
 }
 
-/* Result arrays of a level of the stream. */
+/* Result arrays of a level of the stream; all but the last one are of nodes. */
 enum stream_array {
     NODE_CODES,    /* uint64 */
     NODE_TYPES,    /* uint8 */
@@ -29,9 +29,9 @@ enum stream_array {
     VERTEX_COUNTS, /* uint32 */
     VERTICES,      /* double [3] */
     POLYGON_COUNTS,
-    POLYGON_FIRST, /* uint32 [polygon_count + 1] of each node with polygons */
-    CORNERS,       /* uint32: vertices of the node */
-    LEVEL_FACTS    /* double [4]: level, number of nodes, bytes, volume */
+    POLYGON_FIRST,                    /* uint32 [polygon_count + 1] of each node with polygons */
+    CORNERS,                          /* uint32: vertices of the node */
+    LEVEL_FACTS = EBPO_JS_NODE_ARRAYS /* double [4]: level, number of nodes, bytes, volume */
 };
 
 static bool put_polygons(ebpo_js_object *object, const ebpo_stream_node *n)
@@ -49,7 +49,7 @@ static bool put_polygons(ebpo_js_object *object, const ebpo_stream_node *n)
                EBPO_OK;
 }
 
-static bool put_node(ebpo_js_object *object, const ebpo_stream_node *n)
+bool ebpo_js_put_node(ebpo_js_object *object, const ebpo_stream_node *n)
 {
     uint8_t type = (uint8_t)n->type;
     uint32_t colour = n->coloured ? n->colour : UINT32_MAX;
@@ -87,7 +87,7 @@ int EBPO_JS(ebpo_js_next_level)(ebpo_js_object *object)
         status = ebpo_stream_next_node(object->stream, &node, &more, &object->error);
         if (status == EBPO_OK && !more)
             break;
-        if (status == EBPO_OK && !put_node(object, &node))
+        if (status == EBPO_OK && !ebpo_js_put_node(object, &node))
             status = EBPO_E_MEMORY;
     }
     if (status != EBPO_E_PENDING)
@@ -149,16 +149,18 @@ int EBPO_JS(ebpo_js_level)(ebpo_js_object *object, int level, int cell_faces)
 /* ---- mesh ---- */
 
 /* Array 0: vertices [3], floats; array 1: vertices [3], doubles; one of the two is empty. Array 2:
- * triangles [3], uint32, by the face indices of queries. */
-int EBPO_JS(ebpo_js_mesh)(ebpo_js_object *object)
+ * triangles [3], uint32. `in_source_order`: rows are in the order of the source, if the file has
+ * maps; else in the order of the file. */
+int EBPO_JS(ebpo_js_mesh)(ebpo_js_object *object, int in_source_order)
 {
     ebpo_read_options options = EBPO_READ_OPTIONS_INIT;
     ebpo_mesh mesh = { 0 };
-    bool source_order;
     options.threads = 1;
     ebpo_js_clear(object);
     ebpo_status status =
-        ebpo_file_read_source_mesh(object->file, &options, &mesh, &source_order, &object->error);
+        in_source_order
+            ? ebpo_file_read_source_mesh(object->file, &options, &mesh, NULL, &object->error)
+            : ebpo_file_read_mesh(object->file, &options, &mesh, &object->error);
     if (status == EBPO_OK && mesh.xyz32)
         status = ebpo_js_put(object, 0, mesh.xyz32, (size_t)mesh.vertex_count * 12);
     if (status == EBPO_OK && mesh.xyz64)

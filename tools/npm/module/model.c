@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "format/chunks.h"
 #include "module.h"
 
 int EBPO_JS(ebpo_js_load)(ebpo_js_object *object, double memory, int cut_level)
@@ -40,11 +41,19 @@ ebpo_js_object *EBPO_JS(ebpo_js_query)(const ebpo_js_object *model)
 }
 
 /* Begins another query. */
-void EBPO_JS(ebpo_js_start)(ebpo_js_object *object) { ebpo_js_clear(object); }
+void EBPO_JS(ebpo_js_start)(ebpo_js_object *object)
+{
+    ebpo_js_clear(object);
+    ebpo_chunks_free(object->chunks);
+    object->chunks = NULL;
+}
 
 void EBPO_JS(ebpo_js_query_free)(ebpo_js_object *object)
 {
     ebpo_stream_free(object->stream);
+    ebpo_view_stream_free(object->view);
+    ebpo_sampler_free(object->sampler);
+    ebpo_chunks_free(object->chunks);
     ebpo_context_free(object->context);
     ebpo_js_free_arrays(object);
     free(object);

@@ -10,7 +10,7 @@
 /* Functions that JavaScript calls by this name. */
 #define EBPO_JS(name) __attribute__((export_name(#name), used)) name
 
-enum { EBPO_JS_ARRAYS = 16, EBPO_JS_NUMBERS = 10 };
+enum { EBPO_JS_ARRAYS = 24, EBPO_JS_NODE_ARRAYS = 13, EBPO_JS_NUMBERS = 10 };
 
 /* A growing array. */
 typedef struct ebpo_js_array {
@@ -18,13 +18,15 @@ typedef struct ebpo_js_array {
     size_t bytes, capacity;
 } ebpo_js_array;
 
-/* A model; or a query or stream, which borrows `async`, `file` and `model` of a model. */
+/* A model; or a query, stream, view or sampler, which borrows `async`, `file` and `model` of a model. */
 typedef struct ebpo_js_object {
     ebpo_async *async;
     ebpo_file *file;
     ebpo_model *model;
     ebpo_context *context;
     ebpo_stream *stream;
+    ebpo_view_stream *view;
+    ebpo_sampler *sampler;
     struct ebpo_chunks *chunks; /* of a view */
     uint64_t chunk_memory;
     bool within_level; /* the stream has begun a level whose nodes are not all read */
@@ -52,5 +54,9 @@ void *ebpo_js_extend(ebpo_js_object *object, unsigned n, uint64_t count, size_t 
 /* Returns result array n with `count` items, zeroed unless it had that size already. Returns NULL,
  * with an error, if they do not fit. */
 void *ebpo_js_fixed(ebpo_js_object *object, unsigned n, uint64_t count, size_t size);
+
+/* Appends a node to result arrays 0 to EBPO_JS_NODE_ARRAYS - 1. Returns false, with an error, if it
+ * does not fit. */
+bool ebpo_js_put_node(ebpo_js_object *object, const ebpo_stream_node *n);
 
 #endif

@@ -142,6 +142,13 @@ int EBPO_JS(ebpo_js_supply)(ebpo_js_object *object, double offset, double size, 
                              &object->error);
 }
 
+ebpo_status ebpo_js_need_chunks(ebpo_js_object *object)
+{
+    return object->chunks ? EBPO_OK
+                          : ebpo_chunks_make(&object->chunks, object->file, object->chunk_memory,
+                                             &object->error);
+}
+
 /* ---- opening ---- */
 
 /* Opens the file. `whole`: all bytes are supplied already, so nothing is fetched in advance. */
@@ -215,6 +222,28 @@ static bool put_level(ebpo_js_object *object, const ebpo_level_summary *level)
            put_text(object, "\"pruned\":%" PRIu64 "}", level->pruned_count) == EBPO_OK;
 }
 
+static ebpo_status put_attribute(ebpo_js_object *object, const ebpo_attribute_facts *a, bool first)
+{
+    bool ok = put_text(object, first ? "{" : ",{") == EBPO_OK &&
+              put_string(object, "element", a->element) == EBPO_OK &&
+              put_string(object, "names", a->names) == EBPO_OK &&
+              put_string(object, "type", ebpo_attribute_type_text(a->type)) == EBPO_OK &&
+              put_number(object, "rows", (double)a->rows) == EBPO_OK &&
+              put_number(object, "columns", (double)a->columns) == EBPO_OK &&
+              (!a->has_range || !isfinite(a->range[0]) || !isfinite(a->range[1]) ||
+               put_text(object, "\"range\":[%.17g,%.17g],", a->range[0], a->range[1]) == EBPO_OK);
+    return ok ? put_text(object, "\"list\":%s}", a->list ? "true" : "false") : EBPO_E_MEMORY;
+}
+
+static ebpo_status put_attributes(ebpo_js_object *object)
+{
+    ebpo_attribute_facts facts = EBPO_ATTRIBUTE_FACTS_INIT;
+    ebpo_status status = put_text(object, "\"attributes\":[");
+    for (unsigned n = 0; status == EBPO_OK && ebpo_file_attribute(object->file, n, &facts); n++)
+        status = put_attribute(object, &facts, n == 0);
+    return status == EBPO_OK ? put_text(object, "],") : status;
+}
+
 static const char *const rule_words[] = { "nonzero", "evenodd", "positive" };
 
 /* Puts the file's information into array 0, as JSON in UTF-8. */
@@ -248,7 +277,7 @@ int EBPO_JS(ebpo_js_info)(ebpo_js_object *object)
         put_number(object, "parts", info->parts) == EBPO_OK &&
         put_number(object, "subtreeLevel", info->subtree_level) == EBPO_OK &&
         put_number(object, "fileBytes", (double)info->file_bytes) == EBPO_OK &&
-        put_text(object, "\"levels\":[") == EBPO_OK;
+        put_attributes(object) == EBPO_OK && put_text(object, "\"levels\":[") == EBPO_OK;
     for (int k = 0; k < info->level_count && ok; k++)
         ok = put_text(object, k ? "," : "") == EBPO_OK && put_level(object, &info->level[k]);
     return ok && put_text(object, "]}") == EBPO_OK ? EBPO_OK : EBPO_E_MEMORY;

@@ -50,6 +50,15 @@ int EBPO_JS(ebpo_js_inside)(ebpo_js_object *object, const double *points, uint32
     return status;
 }
 
+/* Array 0: lower and upper bound of each winding number, doubles. */
+int EBPO_JS(ebpo_js_winding)(ebpo_js_object *object, const double *points, uint32_t count,
+                             double width)
+{
+    ebpo_winding_bounds *bounds = ebpo_js_fixed(object, 0, count, sizeof *bounds);
+    return bounds ? ebpo_winding(object->context, points, count, width, bounds, &object->error)
+                  : EBPO_E_MEMORY;
+}
+
 /* Arrays 0 and 1: distances and upper bounds, 2 and 3: points and normals [3], doubles. Array 4:
  * faces. Array 5: lower bounds. */
 int EBPO_JS(ebpo_js_distance)(ebpo_js_object *object, const double *points, uint32_t count,

@@ -44,13 +44,6 @@ int EBPO_JS(ebpo_js_sums)(ebpo_js_object *object)
     return status;
 }
 
-ebpo_status ebpo_js_need_chunks(ebpo_js_object *object)
-{
-    return object->chunks ? EBPO_OK
-                          : ebpo_chunks_make(&object->chunks, object->file, object->chunk_memory,
-                                             &object->error);
-}
-
 /* ---- bytes of levels ---- */
 
 /* Array 0: bytes of the file for levels 0 to i, doubles. Reads the chunk directory. */
