@@ -782,6 +782,30 @@ async function occludes(browser, address) {
   await page.close();
 }
 
+// Two models intersect: the page shows the faces that the command prints.
+async function contacts(browser, address) {
+  const page = await show(browser, `${address}?model=models/ring.ebpo.h5&model=models/red.ebpo.h5&pose=0,0,0&pose=0.5,0,0`);
+  await settled(page);
+  const red = () => page.evaluate(async () => { // pixels of the colours of contacts
+    await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+    const gl = document.getElementById('canvas').getContext('webgl2'), { drawingBufferWidth: w, drawingBufferHeight: h } = gl, pixels = new Uint8Array(4 * w * h);
+    gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+    return pixels.reduce((n, x, i) => n + (i % 4 === 0 && x > 150 && pixels[i + 1] < 0.75 * x && pixels[i + 2] < 0.6 * x), 0);
+  });
+  await page.click('summary:has-text("Contacts")');
+  await page.locator('#own').uncheck(); // the cube has the colour red
+  const before = await red(), all = run(ebpo, ['collide', '-q', '--all', '--pose-b', '0.5 0 0', model, join(models, 'red.ebpo.h5')]).trim().split('\n').filter((line) => /^\d/.test(line));
+  assert.ok(all.length > 100, all[0]);
+  await page.click('#contactsFind');
+  await page.waitForFunction(() => /intersect, in/.test(document.getElementById('contactsText').textContent), undefined, { timeout: 60000 });
+  assert.equal(await page.textContent('#contactsText'), `${all.length.toLocaleString('en')} pairs of faces intersect, in 1 of 1 pairs of models whose boxes overlap.`);
+  const shown = await red();
+  assert.ok(shown > before + 500, `${before} and ${shown} pixels`);
+  await page.click('#contactsClear');
+  assert.equal(await red(), before);
+  await page.close();
+}
+
 // Shows two models and then a scene. Tests the drawn triangles, clicks, distances between models, hidden models, the time and the address.
 async function together(browser, address) {
   const query = '?model=models/ring.ebpo.h5&model=models/red.ebpo.h5&pose=0,0,0&pose=2,0,0', at = (x, y) => ({ position: { x, y } });
@@ -995,6 +1019,7 @@ async function main() {
   await step('saved views are exchanged as files', () => viewsAsFiles(browser, address));
   await step('paint is visible only on connected faces', () => paintsByReach(browser, address));
   await step('several models and scenes are shown together', () => together(browser, address));
+  await step('intersecting faces of two models are shown', () => contacts(browser, address));
   await step('links contain the theme and the switches', () => sharesSwitches(browser, address));
   await step('points need neither a mouse nor the panel', () => pointsWithoutMouse(browser, address));
   await step('a missing or lost graphics context is explained', () => graphics(browser, address));

@@ -6,6 +6,7 @@
 //   ebpo.wasm            loaded for queries
 //   more.js, more.css    loaded after the first picture
 //   together.js          loaded for several models
+//   pairs_worker.js      with ebpo-collide.wasm, loaded for pairs of models
 //   icon.svg
 // Each file is also written compressed, with .gz after its name, for servers that send compressed files (nginx: gzip_static).
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
@@ -36,10 +37,10 @@ const common = { outdir: folder, bundle: true, minify: true, format: 'esm', targ
 // Modules that are loaded later import shared modules from app.js. A second copy would have separate state and a second three.js.
 const fromApp = { name: 'from-app', setup: ({ onResolve }) => onResolve({ filter: /\/(state|scene|shade)\.js$/ }, () => ({ path: './app.js', external: true })) };
 const built = await Promise.all([
-  build({ ...common, entryPoints: ['app.js', 'worker.js'].map((name) => join(here, name)), external: ['./together.js'], plugins: [withoutNode] }),
+  build({ ...common, entryPoints: ['app.js', 'worker.js', 'together/pairs_worker.js'].map((name) => join(here, name)), external: ['./together.js'], plugins: [withoutNode] }),
   build({ ...common, entryPoints: ['more.js', 'together.js', 'more.css'].map((name) => join(here, name)), plugins: [fromApp, withoutNode] }),
 ]);
-const files = new Map([['index.html', Buffer.from(page)], ['icon.svg', Buffer.from(read('icon.svg'))], ...wasmFiles(),
+const files = new Map([['index.html', Buffer.from(page)], ['icon.svg', Buffer.from(read('icon.svg'))], ...wasmFiles({ pairs: true }),
   ...built.flatMap(({ outputFiles }) => outputFiles).map((f) => [f.path.slice(f.path.lastIndexOf('/') + 1), Buffer.from(f.contents)])]);
 mkdirSync(folder, { recursive: true });
 for (const [name, bytes] of files) {

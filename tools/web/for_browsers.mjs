@@ -10,5 +10,5 @@ export const withoutNode = { name: 'without-node', setup: ({ onResolve, onLoad }
   onLoad({ filter: /./, namespace: 'empty' }, () => ({ contents: '' }));
 } };
 
-/** Returns the modules that worker.js loads from its folder: [name, bytes] each. */
-export const wasmFiles = () => ['ebpo-view.wasm', 'ebpo.wasm'].map((name) => [name, readFileSync(join(here, 'ebpo', name))]);
+/** Returns the modules that worker.js loads from its folder, and with `pairs` that of pairs_worker.js: [name, bytes] each. */
+export const wasmFiles = ({ pairs = false } = {}) => ['ebpo-view.wasm', 'ebpo.wasm', ...(pairs ? ['ebpo-collide.wasm'] : [])].map((name) => [name, readFileSync(join(here, 'ebpo', name))]);

@@ -1,5 +1,6 @@
 // The page with several models or a scene: instances, poses, colours, time and clicks. Levels, paint and notes of single models are not supported here.
 import { Assembly, COLOURS } from './assembly.js';
+import { Contacts } from './contacts.js';
 import { boxText, cameraOf, cameraText, boxOf, pointsOf, pointsText, withQuery } from '../address.js';
 import { addCompass } from '../compass.js';
 import { busy, bytes, showError, showLine, showPointCard } from '../line.js';
@@ -112,6 +113,8 @@ class Together {
     section('Selected instance', CHOSEN, { open: true });
     addSectionBox({ cutChanged: () => this.#cut() });
     addDistances({ scene, placeOf: (point) => this.#placeOf(point), changed: () => this.changed() });
+    if (assembly.instances.length > 1)
+      this.contacts = new Contacts({ assembly, scene, lookAt: (instance) => this.#lookAt(instance) });
     addShading(scene, scene.pipeline = new Pipeline(kit), () => this.changed());
     addSharing({ address: () => this.address(), elementOf: (query) => this.#elementOf(query) });
     addCompass({ scene, changed: () => this.changed(), up: assembly.up });
@@ -218,6 +221,7 @@ class Together {
 
   #setTime(time) {
     this.assembly.setTime(time);
+    this.contacts?.clear();
     this.#showTime();
     this.#marks();
     this.changed();
