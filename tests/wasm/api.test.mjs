@@ -14,8 +14,9 @@ const large = files.split(' ').filter(Boolean).sort((a, b) => statSync(b).size -
 
 /** Serves bytes; `change` may alter status, headers and body of a response. */
 async function serve(bytes, change = (x) => x) {
-  const seen = [];
+  const seen = [], secrets = [];
   const server = createServer(({ headers }, response) => {
+    secrets.push(headers.secret);
     const [, first, last] = /bytes=(\d+)-(\d+)/.exec(headers.range), end = Math.min(+last, bytes.length - 1);
     seen.push([+first, end]);
     const { status, headers: sent, body } = change({ status: 206, body: bytes.subarray(+first, end + 1),
@@ -23,7 +24,7 @@ async function serve(bytes, change = (x) => x) {
     response.writeHead(status, sent).end(body);
   });
   await new Promise((done) => server.listen(0, '127.0.0.1', done));
-  return { url: `http://127.0.0.1:${server.address().port}/m.ebpo.h5`, seen, close: () => server.close() };
+  return { url: `http://127.0.0.1:${server.address().port}/m.ebpo.h5`, seen, secrets, close: () => server.close() };
 }
 
 async function withServer(bytes, change, use) {
@@ -63,6 +64,24 @@ test('servers that break the rules are errors', async () => {
 
 test('a request that fails once is repeated', () => withServer(small, (r, n) => n === 1 ? { ...r, status: 503 } : r, async ({ url }) => {
   (await open(url)).dispose();
+}));
+
+test('redirects are followed, without headers to other origins', () => withServer(small, undefined, async ({ url, secrets }) => {
+  const seen = [], server = createServer(({ headers, url: path }, response) => {
+    seen.push([path, headers.secret]);
+    response.writeHead(302, { location: path === '/a' ? '/b' : path === '/b' ? url : '/loop' }).end();
+  });
+  await new Promise((done) => server.listen(0, '127.0.0.1', done));
+  const address = `http://127.0.0.1:${server.address().port}`;
+  try {
+    const model = await open(`${address}/a`, { headers: { secret: 'x' } });
+    assert.equal(model.info.faces, (await open(small)).info.faces);
+    model.dispose();
+    assert.deepEqual([[...new Set(seen.map(String))], [...new Set(secrets)]], [['/a,x', '/b,x'], [undefined]]);
+    await assert.rejects(open(`${address}/loop`), (error) => error instanceof EbpoReadError && /redirects/.test(error.message));
+  } finally {
+    server.close();
+  }
 }));
 
 test('a file that changes is an error', { skip: !large }, () => withServer(largeBytes, (r, n) => n > 2 ? { ...r, headers: { ...r.headers, etag: '"2"' } } : r,

@@ -52,14 +52,16 @@ describe_library() { # name, version
 
 build_zstd() {
     zstd=$sources/libzstd/lib
-    options="-DZSTD_DISABLE_ASM -DZSTD_LEGACY_SUPPORT=0 -DZSTD_STRIP_ERROR_STRINGS"
+    options="-DZSTD_DISABLE_ASM -DZSTD_LEGACY_SUPPORT=0"
     compile_library zstd "$zstd"/common/[!pt]*.c "$zstd"/decompress/*.c
+    options="$options -Os -DHUF_FORCE_DECOMPRESS_X1 -DZSTD_FORCE_DECOMPRESS_SEQUENCES_SHORT -DZSTD_NO_INLINE"
+    compile_library zstd-small "$zstd"/common/[!pt]*.c "$zstd"/decompress/*.c
     cp "$zstd"/*.h "$deps/include"
     describe_library libzstd 1.5.4
 }
 
 build_zlib() {
-    options=
+    options=-Os # few files use deflate
     compile_library z "$sources"/zlib/inffast.c "$sources"/zlib/inflate.c "$sources"/zlib/inftrees.c \
         "$sources"/zlib/adler32.c "$sources"/zlib/crc32.c "$sources"/zlib/zutil.c "$sources"/zlib/uncompr.c
     cp "$sources"/zlib/zlib.h "$sources"/zlib/zconf.h "$deps/include"
@@ -100,9 +102,12 @@ build_gmp() {
     describe_library gmp 6.2.1
 }
 
-build_library() {
-    describe_library jansson 2.14 # which meson.build requires; the folders below do not use it
-    words=$(printf "'%s', " $flags "-I$deps/include")
+# Makes deps/lib/libebpoSUFFIX.a of folders of lib.
+build_library() { # suffix, folders as a regular expression, more flags
+    build=$folder/lib$1
+    describe_library jansson 2.14 # which meson.build requires; the folders do not use it
+    # shellcheck disable=SC2086
+    words=$(printf "'%s', " $flags $3 "-I$deps/include")
     cat >"$folder/emscripten.ini" <<EOF
 [binaries]
 c = 'emcc'
@@ -120,30 +125,29 @@ endian = 'little'
 [built-in options]
 c_args = [${words}'-DEBPO_NO_MESH_READERS']
 EOF
-    [ -f "$folder/lib/build.ninja" ] ||
-        meson setup "$folder/lib" "$root" --cross-file "$folder/emscripten.ini" --buildtype=plain \
+    [ -f "$build/build.ninja" ] ||
+        meson setup "$build" "$root" --cross-file "$folder/emscripten.ini" --buildtype=plain \
             -Dhdf5=disabled -Dhttp=disabled -Dassimp=disabled -Drender=disabled -Dcaptions=disabled \
             -Dqhull=disabled -Dtests=disabled -Dchart_js=none >"$folder/meson.log"
-    ninja -C "$folder/lib" build.ninja >/dev/null # lists files that are new since the last build
-    # The folders of lib that the modules use, and all kernels.
-    objects=$(ninja -C "$folder/lib" -t targets all | sed -n 's/: c_COMPILER$//p' | grep -E \
-        '/(core|geometry|io|hdf5_read|hdf5_write|mesh|format|construct|levels|query|extras_collide)_[^/]*\.o$')
+    ninja -C "$build" build.ninja >/dev/null # lists files that are new since the last build
+    objects=$(ninja -C "$build" -t targets all | sed -n 's/: c_COMPILER$//p' | grep -E "/($2)_[^/]*\.o\$")
     # shellcheck disable=SC2086
-    ninja -C "$folder/lib" -j"$jobs" $objects >"$folder/ninja.log" ||
+    ninja -C "$build" -j"$jobs" $objects >"$folder/ninja.log" ||
         { tail -n 20 "$folder/ninja.log" >&2; exit 1; }
-    rm -f "$deps/lib/libebpo.a"
+    rm -f "$deps/lib/libebpo$1.a"
     # shellcheck disable=SC2086
-    (cd "$folder/lib" && emar rcsD "$deps/lib/libebpo.a" $objects)
+    (cd "$build" && emar rcsD "$deps/lib/libebpo$1.a" $objects)
 }
 
-# Links a module of the package: FILE.wasm of C files in module/.
-link_module() { # file, C files...
+# Links a module of the package, FILE.wasm, of C files in module/ and the libraries with a suffix.
+link_module() { # file, suffix, C files...
     output=$folder/package/$1
-    shift
+    libraries="${2:+-Os} -lebpo$2 -lzstd$2"
+    shift 2
     # shellcheck disable=SC2086
     (cd "$here/module" && emcc $flags -std=gnu11 -ffp-contract=off -Wall -Wextra \
         -I"$root/lib/include" -I"$root/lib" -I"$deps/include" "$@" \
-        -L"$deps/lib" -lebpo -lzstd -lz -lgmp -lnettle --no-entry -sSTANDALONE_WASM \
+        -L"$deps/lib" $libraries -lz -lgmp -lnettle --no-entry -sSTANDALONE_WASM \
         -sIMPORTED_MEMORY -sALLOW_MEMORY_GROWTH -sMAXIMUM_MEMORY=4GB -sINITIAL_MEMORY=8MB \
         -sTOTAL_STACK=2MB -sABORTING_MALLOC=0 -sWASM_BIGINT \
         -sEXPORTED_FUNCTIONS=_malloc,_free -o "$output")
@@ -154,10 +158,10 @@ build_package() {
     mkdir -p "$folder/package"
     core="object.c model.c queries.c levels.c view_stream.c subtrees.c attributes.c check.c no_encoders.c"
     # shellcheck disable=SC2086
-    link_module ebpo.wasm $core
-    link_module ebpo-view.wasm object.c view.c view_faces.c no_encoders.c
+    link_module ebpo.wasm "" $core
+    link_module ebpo-view.wasm -small object.c view.c view_faces.c no_encoders.c
     # shellcheck disable=SC2086
-    link_module ebpo-collide.wasm $core collide.c
+    link_module ebpo-collide.wasm "" $core collide.c
     version=$(sed -n "s/^  version: '\(.*\)',$/\1/p" "$root/meson.build")
     cp "$here"/ebpo/*.js "$here"/ebpo/*.d.ts "$here/ebpo/README.md" "$root/LICENSE" "$folder/package"
     sed "s/@VERSION@/$version/" "$here/ebpo/package.json.in" >"$folder/package/package.json"
@@ -167,6 +171,8 @@ build_package() {
 
 mkdir -p "$deps/include"
 [ -f "$sources/.done" ] || { fetch_sources && touch "$sources/.done"; }
-[ -f "$deps/.done" ] || { build_zstd && build_zlib && build_nettle && build_gmp && touch "$deps/.done"; }
-build_library
+[ -f "$deps/.complete" ] || { build_zstd && build_zlib && build_nettle && build_gmp && touch "$deps/.complete"; }
+folders='core|geometry|io|hdf5_read|hdf5_write|mesh|format'
+build_library "" "$folders|construct|levels|query|extras_collide" "" # with all kernels
+build_library -small "$folders" -Os # for the viewers' module, whose size delays the first picture
 build_package

@@ -2,6 +2,7 @@
 // not known), and `read(ranges, signal)`, which resolves to one Uint8Array for each {offset, size}. All ranges of a call
 // are needed together, so a source fetches them at the same time.
 import { EbpoArgumentError, EbpoReadError } from './errors.js';
+import { IN_NODE, nodeFetch } from './node_http.js';
 
 const HEAD = 131072;
 const RETRIES = 3;
@@ -34,7 +35,7 @@ function contentRange(response) {
 }
 
 /** Requests one range, with retries, and checks status and size. */
-async function request(url, { offset, size }, { headers, fetch: get = globalThis.fetch }, signal) {
+async function request(url, { offset, size }, { headers, fetch: get = IN_NODE ? nodeFetch : globalThis.fetch }, signal) {
   for (let tries = 0; ; tries++) {
     let problem, cause;
     try {
@@ -57,7 +58,8 @@ async function request(url, { offset, size }, { headers, fetch: get = globalThis
         problem = `the server responded with status ${response.status}`;
       }
     } catch (error) {
-      if (error instanceof EbpoReadError || signal?.aborted)
+      signal?.throwIfAborted();
+      if (error instanceof EbpoReadError)
         throw error;
       [problem, cause] = [error.message, error];
     }

@@ -105,7 +105,8 @@ class Together {
     const { requested, assembly, scene, page } = this, faces = assembly.instances.reduce((sum, i) => sum + (assembly.models[i.model].info?.face_count ?? 0), 0);
     document.title = `${requested.title} – EBP-Octree viewer`;
     $('name').textContent = requested.title;
-    $('facts').textContent = `${count(assembly.models.length)} models · ${count(assembly.instances.length)} instances · ${count(faces)} faces`;
+    const { length } = assembly.models;
+    $('facts').textContent = `${count(length)} model${length === 1 ? '' : 's'} · ${count(assembly.instances.length)} instances · ${count(faces)} faces`;
     for (const id of ['panel', 'bar', 'tools'])
       $(id).hidden = id === 'panel' && innerWidth <= 760;
     markOn(scene);
