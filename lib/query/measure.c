@@ -6,7 +6,8 @@
  *   second moments  det (s s' + a a' + b b' + c c') / 120
  * All values are in double-double arithmetic, on coordinates scaled by a power of two to about 1.
  * They are summed in blocks of faces that do not depend on threads. A face counts with the
- * multiplicity of its component (construct/solid_shells.h) if this is known, else once. Source of
+ * multiplicity of its component (construct/solid_shells.h) if this is known, else once. The caps of
+ * a surface with its border are faces too (measure_caps.h). Source of
  * the moments: Tonon 2004, "Explicit exact formulas for the 3-D tetrahedron inertia tensor in terms
  * of its vertex coordinates". */
 #include "core/strict_fp.h"
@@ -22,10 +23,13 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
+#include "format/border_loops.h"
 #include "format/reader.h"
+#include "geometry/cap_triangles.h"
 #include "geometry/expansion.h"
 #include "geometry/level_nodes.h"
 #include "mesh/mesh_parts.h"
+#include "query/measure_caps.h"
 
 enum { BLOCK_FACES = 16384 };
 
@@ -43,8 +47,8 @@ typedef struct moments {
     ebpo_pair area2, volume6, first24[3], second120[6]; /* order of second moments: xx, yy, zz, yz,
                                                          * zx, xy */
     ebpo_pair integral6;                                /* with each face counted once */
-    /* the sum of absolute values of the terms of volume6 */
-    double absolute6;
+    /* the sum of absolute values of the terms of volume6; the same before cancellation */
+    double absolute6, terms6;
 } moments;
 
 typedef struct pass {
@@ -107,6 +111,7 @@ static void merge_moments(moments *sum, const moments *m)
     for (int k = 0; k < 6; k++)
         add_pair(&sum->second120[k], m->second120[k]);
     sum->absolute6 += m->absolute6;
+    sum->terms6 += m->terms6;
 }
 
 static double pair_length(const ebpo_pair n[3])
@@ -118,8 +123,8 @@ static double pair_length(const ebpo_pair n[3])
     return largest * sqrt(x * x + y * y + z * z);
 }
 
-/* Computes n = (b - a) x (c - a). */
-static void normal_of(const double corner[3][3], ebpo_pair n[3])
+/* Computes n = (b - a) x (c - a); `terms`: sums of the absolute values of its products. */
+static void normal_of(const double corner[3][3], ebpo_pair n[3], double terms[3])
 {
     ebpo_pair f[3], g[3];
     for (int k = 0; k < 3; k++) {
@@ -129,6 +134,7 @@ static void normal_of(const double corner[3][3], ebpo_pair n[3])
     for (int k = 0; k < 3; k++) {
         int u = (k + 1) % 3, v = (k + 2) % 3;
         n[k] = ebpo_pair_subtract(ebpo_pair_multiply(f[u], g[v]), ebpo_pair_multiply(f[v], g[u]));
+        terms[k] = fabs(f[u].head * g[v].head) + fabs(f[v].head * g[u].head);
     }
 }
 
@@ -141,11 +147,12 @@ static ebpo_pair mixed_product(ebpo_pair r[3][3], const ebpo_pair s[3], int u, i
     return sum;
 }
 
-static void add_face(moments *m, const double corner[3][3], const double middle[3], int times)
+/* Adds the tetrahedron of a triangle with the doubled normal n. It counts `weight` times in the
+ * integral, and `times` as often in the volume. */
+static void add_tetrahedron(moments *m, const double corner[3][3], const double middle[3],
+                            const ebpo_pair n[3], const double terms[3], double weight, int times)
 {
-    ebpo_pair n[3], r[3][3], s[3], det = { 0, 0 };
-    normal_of(corner, n);
-    add_pair(&m->area2, ebpo_pair_of(pair_length(n)));
+    ebpo_pair r[3][3], s[3], det = { 0, 0 };
     for (int k = 0; k < 3; k++) {
         for (int i = 0; i < 3; i++)
             r[i][k] = ebpo_two_difference(corner[i][k], middle[k]);
@@ -153,7 +160,9 @@ static void add_face(moments *m, const double corner[3][3], const double middle[
         ebpo_pair product = ebpo_pair_multiply(r[0][k], n[k]);
         add_pair(&det, product);
         m->absolute6 += fabs(product.head);
+        m->terms6 += fabs(weight * r[0][k].head) * terms[k];
     }
+    det = ebpo_pair_multiply(det, ebpo_pair_of(weight));
     add_pair(&m->integral6, det);
     det = (ebpo_pair){ times * det.head, times * det.tail };
     add_pair(&m->volume6, det);
@@ -163,6 +172,15 @@ static void add_face(moments *m, const double corner[3][3], const double middle[
         add_pair(&m->second120[3 + k],
                  ebpo_pair_multiply(det, mixed_product(r, s, (k + 1) % 3, (k + 2) % 3)));
     }
+}
+
+static void add_face(moments *m, const double corner[3][3], const double middle[3], int times)
+{
+    ebpo_pair n[3];
+    double terms[3];
+    normal_of(corner, n, terms);
+    add_pair(&m->area2, ebpo_pair_of(pair_length(n)));
+    add_tetrahedron(m, corner, middle, n, terms, 1, times);
 }
 
 static int times_of(const pass *p, uint64_t face)
@@ -190,6 +208,59 @@ static ebpo_status measure_blocks(void *context, uint64_t begin, uint64_t end, u
     return EBPO_OK;
 }
 
+/* --- caps --- */
+
+/* Sums over the caps of a border. */
+typedef struct cap_sums {
+    double volume; /* sum of weights times bounds of the volumes of the loops' hulls */
+    double moment; /* the same, times the distance of the farthest point of the hull's box */
+} cap_sums;
+
+static void scale_point(const frame *f, const double p[3], double out[3])
+{
+    for (int k = 0; k < 3; k++)
+        out[k] = p[k] * f->factor[0] * f->factor[1];
+}
+
+/* Adds the caps, which turn against the discs (geometry/cap_triangles.h). */
+static void add_caps(moments *m, const frame *f, const ebpo_border_loops *loops)
+{
+    const double *point = loops->point;
+    for (uint64_t i = 0; i < loops->loop_count; i++) {
+        uint64_t n = loops->loop[2 * i];
+        for (uint64_t t = 0; t < n - 2; t++) {
+            uint64_t at[3];
+            double corner[3][3], terms[3];
+            ebpo_pair normal[3];
+            ebpo_cap_triangle(0, n - 1, t, at);
+            for (int k = 0; k < 3; k++)
+                scale_point(f, point + 3 * at[2 - k], corner[k]);
+            normal_of((const double(*)[3])corner, normal, terms);
+            add_tetrahedron(m, (const double(*)[3])corner, f->middle, normal, terms,
+                            loops->loop[2 * i + 1], 1);
+        }
+        point += 3 * n;
+    }
+}
+
+/* Computes the sums, relative to a scaled centroid. */
+static void sum_hulls(cap_sums *out, const frame *f, const ebpo_border_loops *loops,
+                      const double centroid[3])
+{
+    const double *point = loops->point;
+    *out = (cap_sums){ 0, 0 };
+    for (uint64_t i = 0; i < loops->loop_count; i++) {
+        double farthest,
+            volume = ebpo_loop_hull(point, loops->loop[2 * i], f->factor, centroid, &farthest) *
+                     loops->loop[2 * i + 1];
+        out->volume += volume;
+        out->moment += volume * farthest;
+        point += 3 * (uint64_t)loops->loop[2 * i];
+    }
+    out->volume *= 1 + 0x1p-20; /* rounding, of fewer than 2^30 sums */
+    out->moment *= 1 + 0x1p-20;
+}
+
 /* --- from moments to mass --- */
 
 /* Computes the inertia from central second moments: the trace less the matrix. */
@@ -203,6 +274,57 @@ static void inertia_of(ebpo_mass *out, const ebpo_pair central[6], int exponent)
     for (int u = 0; u < 3; u++)
         for (int v = 0; v < 3; v++)
             out->inertia[u][v] = ldexp(out->scaled_inertia[u][v], 5 * exponent);
+}
+
+/* Returns a bound of the rounding error of integral6. Each operation on pairs has an error of at
+ * most 2^-103 times the absolute values of its operands, or of its product. A term of the sum comes
+ * from at most 8 of them, and passes at most 4 additions for each triangle and block. All partial
+ * sums are at most `terms6`, but for a factor below 2. */
+static double integral_error(const moments *m, uint64_t triangles)
+{
+    return (4 * (double)triangles + 64) * 0x1p-102 * m->terms6 + 0x1p-900;
+}
+
+/* Sets the members that depend on the border.
+ *
+ * Rounding: the corners of a triangle are at most 2 from the middle on each axis, so the absolute
+ * value of a coordinate of their sum is at most 6, and the error of first24 at most 12 times that
+ * of the integral. For V = integral6, M = first24 and c = M / (4 V), an error e of V and f of M
+ * change c by at most (f + 4 |c| e) / (4 (|V| - e)).
+ *
+ * Other caps: let k' be the winding numbers with other caps C', for which the closed surface of the
+ * cap C'_i of each loop and of our cap, reversed, has winding numbers -1, 0 and 1 only, times the
+ * loop's weight w_i, and for which C'_i is in the convex hull H_i of the loop, as our cap is. Then
+ * |k' - k| is at most the sum of w_i over the hulls that contain the point, so the integral changes
+ * by at most h = sum of w_i |H_i|. With the centroid c as the origin, the first moment of k is 0,
+ * and that of k' is at most the sum of w_i |H_i| r_i, where r_i is the distance of the farthest
+ * point of H_i. So the centroid moves by at most this sum over |V| - h. */
+static void set_border(ebpo_mass *out, const moments *m, const frame *f,
+                       const ebpo_border_loops *loops, uint64_t triangles)
+{
+    double error6 = integral_error(m, triangles), volume6 = fabs(m->integral6.head),
+           centre[3] = { f->middle[0], f->middle[1], f->middle[2] }, largest = 0;
+    cap_sums caps;
+    for (int k = 0; k < 3; k++) {
+        double c = volume6 > 0 ? m->first24[k].head / (4 * m->integral6.head) : 0;
+        centre[k] += c;
+        largest = fmax(largest, fabs(c));
+    }
+    sum_hulls(&caps, f, loops, centre);
+    double left = volume6 * (1 - 0x1p-40) - error6, hulls6 = 6 * caps.volume;
+    double moved = left > 0 ? (3 + largest) * error6 / left + 0x1p-48 * (1 + largest) : INFINITY;
+    for (int k = 0; k < 3; k++)
+        moved += 0x1p-50 * fabs(f->middle[k]);
+    out->integral_error =
+        ldexp(error6 / 6 * (1 + 0x1p-40) + 0x1p-51 * volume6 / 6, 3 * f->exponent);
+    out->centroid_error = ldexp(moved, f->exponent);
+    out->caps_integral = ldexp(caps.volume, 3 * f->exponent);
+    out->caps_centroid =
+        caps.volume == 0 ? 0
+        : left > hulls6
+            ? ldexp((6 * caps.moment + hulls6 * moved) / (left - hulls6) * (1 + 0x1p-40),
+                    f->exponent)
+            : INFINITY;
 }
 
 static void mass_of(ebpo_mass *out, const moments *m, const frame *f, bool solid)
@@ -248,6 +370,14 @@ static ebpo_status count_components(pass *p, const ebpo_solid_shells *s, ebpo_ru
     return EBPO_OK;
 }
 
+/* Returns true if winding numbers of a surface with caps are 0 and 1, or 0 and -1, unless faces or
+ * caps intersect: one component without edges of more than two faces or of opposed ones. */
+static bool is_one_sheet(const ebpo_info *info)
+{
+    const ebpo_mesh_report *r = &info->report;
+    return r->components == 1 && r->nonmanifold_edges.count == 0 && r->misoriented_edges.count == 0;
+}
+
 /* Finds if the volume is known; then sets the multiplicity of faces. */
 static ebpo_status decide_volume(pass *p, const ebpo_info *info, unsigned threads,
                                  ebpo_solid_shells *s, ebpo_solid_volume *volume, ebpo_error *error)
@@ -277,7 +407,7 @@ static void count_inwards(moments *m, ebpo_rule rule)
         *sum[i] = (ebpo_pair){ times * sum[i]->head, times * sum[i]->tail };
 }
 
-static void set_volume(ebpo_mass *mass, const ebpo_solid_volume *known)
+static void set_volume(ebpo_mass *mass, const ebpo_solid_volume *known, bool bordered)
 {
     if (known->lo != known->hi) {
         mass->scaled_volume = mass->volume = NAN;
@@ -286,7 +416,9 @@ static void set_volume(ebpo_mass *mass, const ebpo_solid_volume *known)
         return;
     }
     mass->volume = ldexp(mass->scaled_volume, 3 * (int)mass->exponent);
-    mass->volume_lo = mass->volume_hi = mass->volume;
+    double error = bordered ? mass->integral_error + mass->caps_integral : 0;
+    mass->volume_lo = fmax(0, mass->volume - error);
+    mass->volume_hi = mass->volume + error;
 }
 
 ebpo_status ebpo_measure(const ebpo_file *file, unsigned threads, ebpo_mass *out, ebpo_error *error)
@@ -299,7 +431,9 @@ ebpo_status ebpo_measure(const ebpo_file *file, unsigned threads, ebpo_mass *out
     ebpo_mass mass = EBPO_MASS_INIT;
     ebpo_solid_shells shells = { .mesh = &mesh };
     ebpo_solid_volume volume = EBPO_SOLID_VOLUME_INIT;
+    ebpo_border_loops loops = { .loop_count = 0 };
     const ebpo_info *info = ebpo_file_info(file);
+    bool bordered = info->parts & EBPO_PART_BORDER;
     ebpo_status status = EBPO_CHECK_SIZED(ebpo_mass, out, error);
     if (status != EBPO_OK)
         return status;
@@ -312,8 +446,12 @@ ebpo_status ebpo_measure(const ebpo_file *file, unsigned threads, ebpo_mass *out
     status = ebpo_file_read_mesh(file, &read, &mesh, error);
     if (status == EBPO_OK)
         status = decide_volume(&p, info, threads, &shells, &volume, error);
+    if (status == EBPO_OK && bordered)
+        status = ebpo_border_read(file, &loops, error);
     if (status != EBPO_OK)
         goto done;
+    if (bordered && !is_one_sheet(info))
+        volume.hi = INFINITY;
     block_count = mesh.face_count / BLOCK_FACES + (mesh.face_count % BLOCK_FACES != 0);
     p.blocks = ebpo_alloc(block_count, sizeof *p.blocks);
     if (!p.blocks) {
@@ -327,14 +465,19 @@ ebpo_status ebpo_measure(const ebpo_file *file, unsigned threads, ebpo_mass *out
         goto done;
     for (uint64_t b = 0; b < block_count; b++)
         merge_moments(&sum, &p.blocks[b]);
+    if (bordered)
+        add_caps(&sum, &p.frame, &loops);
     if (!p.component && volume.lo == volume.hi && sum.volume6.head < 0)
         count_inwards(&sum, info->rule);
-    mass_of(&mass, &sum, &p.frame, info->solid);
-    set_volume(&mass, &volume);
+    mass_of(&mass, &sum, &p.frame, info->solid || bordered);
+    if (bordered)
+        set_border(&mass, &sum, &p.frame, &loops, mesh.face_count + loops.point_count);
+    set_volume(&mass, &volume, bordered);
     EBPO_GIVE(ebpo_mass, out, &mass);
 done:
     free(p.blocks);
     free(p.times);
+    ebpo_border_loops_free(&loops);
     ebpo_solid_shells_free(&shells);
     ebpo_mesh_free(&mesh);
     return status;

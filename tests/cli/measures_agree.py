@@ -18,6 +18,8 @@ if mass["kind"] == "solid":
     inertia = mass["inertia"]
     assert all(inertia[k][l] == inertia[l][k] for k in range(3) for l in range(3))
     assert all(inertia[k][k] <= inertia[k - 1][k - 1] + inertia[k - 2][k - 2] for k in range(3))
+elif "border" in info:
+    assert mass["volume_lo"] <= mass["volume"] <= mass["volume_hi"] and mass["caps"]["integral"] >= 0
 else:
     assert "volume" not in mass and "inertia" not in mass
 print("fine")

@@ -515,6 +515,82 @@ START_TEST(test_volume_of_inverted_solids)
 }
 END_TEST
 
+/* A surface whose holes are single triangles has the mass of the closed mesh: its caps are these
+ * triangles, and flat, so that no volume depends on them. */
+START_TEST(test_mass_of_surface_with_caps)
+{
+    const double centre[3] = { .125, -.5, 3 };
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_mass m = EBPO_MASS_INIT;
+    ebpo_mesh mesh = ebpo_test_sphere(centre, 1, 3);
+    ebpo_mass expected = reference_of(&mesh);
+    for (uint64_t i = 0; i < 5; i++) { /* 200 apart: they share no vertices */
+        uint64_t last = --mesh.face_count, at = 200 * i;
+        memmove(mesh.faces + 3 * at, mesh.faces + 3 * last, 3 * sizeof *mesh.faces);
+    }
+    ebpo_file *file = file_of(&mesh, EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_BORDER);
+    ck_assert_uint_eq(ebpo_file_info(file)->border_points, 15);
+    ck_assert_msg(ebpo_measure(file, 0, &m, &error) == EBPO_OK, "%s", error.message);
+    expected.area = reference_of(&mesh).area;
+    assert_masses_near(&m, &expected, 1);
+    ck_assert(m.integral_error > 0 && m.integral_error < 1e-14);
+    ck_assert(fabs(m.integral - expected.volume) <= m.integral_error + 1e-16);
+    ck_assert(m.centroid_error > 0 && m.centroid_error < 1e-13);
+    for (int k = 0; k < 3; k++)
+        ck_assert(fabs(m.centroid[k] - expected.centroid[k]) <= m.centroid_error + 1e-15);
+    ck_assert(m.caps_integral > 0 && m.caps_integral < 1e-12 && m.caps_centroid < 1e-12);
+    ck_assert(m.volume_lo < m.volume && m.volume < m.volume_hi);
+    ebpo_close(file);
+    ebpo_mesh_free(&mesh);
+}
+END_TEST
+
+/* A cylinder whose open end is a wave: its volume with any fan at the end is within the bound of
+ * what depends on caps, and this bound is at most that of the wave's box. */
+START_TEST(test_mass_depends_on_caps)
+{
+    enum { SIDES = 24 };
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_mass m = EBPO_MASS_INIT;
+    ebpo_mesh mesh = { .xyz64 = calloc(1, 1), .faces = calloc(1, 1) };
+    for (uint32_t i = 0; i < 2 * SIDES; i++) {
+        double x, y;
+        ebpo_test_circle(i % SIDES, SIDES, &x, &y);
+        ebpo_test_append_vertex(&mesh, x, y, i < SIDES ? 0 : 2 + .25 * (i % 3) + .1 * x * y);
+    }
+    for (uint32_t i = 0; i < SIDES; i++) {
+        uint32_t j = (i + 1) % SIDES;
+        ebpo_test_append_face(&mesh, i, j, SIDES + j);
+        ebpo_test_append_face(&mesh, i, SIDES + j, SIDES + i);
+        if (i > 0 && j > 0)
+            ebpo_test_append_face(&mesh, 0, j, i);
+    }
+    ebpo_file *file = file_of(&mesh, EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_BORDER);
+    ck_assert_msg(ebpo_measure(file, 0, &m, &error) == EBPO_OK, "%s", error.message);
+    ck_assert(m.caps_integral > 0 && m.caps_integral < 4 * .75);
+    double least = INFINITY, most = 0, moved = 0;
+    for (uint32_t first = 0; first < SIDES; first++) {
+        ebpo_mesh closed = copy_of(&mesh);
+        for (uint32_t i = 1; i + 1 < SIDES; i++)
+            ebpo_test_append_face(&closed, SIDES + first, SIDES + (first + i) % SIDES,
+                                  SIDES + (first + i + 1) % SIDES);
+        ebpo_mass other = reference_of(&closed);
+        ck_assert(fabs(other.volume - m.integral) <= m.caps_integral);
+        ck_assert(m.volume_lo <= other.volume && other.volume <= m.volume_hi);
+        double d[3];
+        for (int k = 0; k < 3; k++)
+            d[k] = other.centroid[k] - m.centroid[k];
+        moved = fmax(moved, sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]));
+        least = fmin(least, other.volume);
+        most = fmax(most, other.volume);
+        ebpo_mesh_free(&closed);
+    }
+    ck_assert(most - least > .01 && moved > 0 && moved <= m.caps_centroid);
+    ebpo_close(file);
+    ebpo_mesh_free(&mesh);
+}
+END_TEST
+
 START_TEST(test_surface_mass_has_area_only)
 {
     ebpo_mesh mesh = ebpo_test_sheet(3, 4);
@@ -602,6 +678,8 @@ TEST_SUITE(measure)
     tcase_add_test(tests, test_mass_of_nested_shells);
     tcase_add_test(tests, test_volume_of_inverted_solids);
     tcase_add_test(tests, test_mass_follows_inside_rule);
+    tcase_add_test(tests, test_mass_of_surface_with_caps);
+    tcase_add_test(tests, test_mass_depends_on_caps);
     tcase_add_test(tests, test_surface_mass_has_area_only);
     tcase_add_test(tests, test_zero_volume_solid_has_no_centroid);
     tcase_add_test(tests, test_mass_same_for_any_threads);

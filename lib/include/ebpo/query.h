@@ -955,8 +955,11 @@ typedef struct ebpo_mass {
     double area;
 
     /*
-     * Volume of the solid (ebpo_solid_volume_of); NAN if unknown, 0 for a surface. If the volume is
-     * 0, the following members are 0.
+     * Volume of the solid (ebpo_solid_volume_of); NAN if unknown, 0 for a surface without
+     * EBPO_PART_BORDER. If the volume is 0, the following members are 0. A surface with
+     * EBPO_PART_BORDER is measured with its caps (format-spec/border.md). Its volume is known if it
+     * is one component without edges of more than two faces or of opposed faces; intersections are
+     * not tested.
      */
     double volume;
 
@@ -975,7 +978,10 @@ typedef struct ebpo_mass {
     double scaled_area, scaled_volume, scaled_inertia[3][3];
     int64_t exponent;
 
-    /* Bounds of the volume; equal to `volume` if it is known. */
+    /*
+     * Bounds of the volume; for a solid equal to `volume` if it is known, for a surface this value
+     * with the errors below on both sides; 0 and INFINITY if it is not known.
+     */
     double volume_lo, volume_hi;
 
     /*
@@ -983,6 +989,20 @@ typedef struct ebpo_mass {
      * unit.
      */
     double integral, scaled_integral;
+
+    /*
+     * The following members are of a surface with EBPO_PART_BORDER, in the model's unit; else 0.
+     *
+     * Bounds of the rounding errors of `integral`, and of `centroid` on each axis.
+     */
+    double integral_error, centroid_error;
+
+    /*
+     * How far `integral` and the centroid of the winding number may be from those with other caps
+     * (INFINITY: no bound). The other caps are in the convex hulls of their loops. With our cap of
+     * the same loop they bound winding numbers -1, 0 and 1 only, times the loop's weight.
+     */
+    double caps_integral, caps_centroid;
 } ebpo_mass;
 
 #define EBPO_MASS_INIT EBPO_SIZED(ebpo_mass)

@@ -123,6 +123,24 @@ static void print_volume(const ebpo_info *info, const ebpo_mass *mass)
                  "2-manifold");
 }
 
+/* Returns true if the file has an inside, so also a volume. */
+static bool has_inside(const ebpo_info *info)
+{
+    return info->solid || info->parts & EBPO_PART_BORDER;
+}
+
+/* Prints how much depends on the caps of a surface. */
+static void print_caps(const ebpo_info *info, const ebpo_mass *mass)
+{
+    char unit[TABLE_CELL], share[TABLE_CELL];
+    double percent = 100 * mass->caps_integral / fabs(mass->integral);
+    printf(
+        "  caps      the integral is exact to %.2g; by the choice of caps in the hulls of their\n"
+        "            loops it changes by at most %.6g%s (%s %%), the centroid by %.6g%s\n",
+        mass->integral_error, mass->caps_integral, table_unit(unit, info->unit, 3),
+        table_cell(share, "%.3g", percent), mass->caps_centroid, info->unit[0] ? " " : "");
+}
+
 static void print_mass(const char *path, const ebpo_info *info, const ebpo_mass *mass,
                        const measures *m)
 {
@@ -133,17 +151,21 @@ static void print_mass(const char *path, const ebpo_info *info, const ebpo_mass 
     char cell[TABLE_CELL], unit[TABLE_CELL];
     printf("  area      %s%s\n", table_scaled(cell, 16, mass->scaled_area, 2 * mass->exponent),
            table_unit(unit, info->unit, 2));
-    if (info->solid) {
+    if (has_inside(info)) {
         const double *c = mass->centroid;
         print_volume(info, mass);
+        if (!info->solid)
+            print_caps(info, mass);
         printf("  centroid  %.16g %.16g %.16g%s\n", c[0], c[1], c[2],
                table_unit(unit, info->unit, 1));
         print_inertia(info, mass);
     }
     if (!info->unit[0])
         puts("  (in the model's unit, which the file does not name, squared, cubed and so on)");
-    if (info->solid)
-        puts("  (intersecting faces of one component were not checked: ebpo check --crossings)");
+    if (has_inside(info))
+        printf(
+            "  (intersecting faces of one component were not checked: ebpo check --crossings%s)\n",
+            info->solid ? "" : "; holes are closed by caps");
     putchar('\n');
     print_levels(info, m);
     print_legend(info, m);
@@ -184,7 +206,7 @@ static void json_mass(json *j, const char *path, const ebpo_info *info, const eb
     json_bool(j, "inside_out", facts_inside_out(info) != NULL);
     json_text(j, "unit", info->unit);
     table_json(j, "area", mass->scaled_area, 2 * mass->exponent);
-    if (info->solid) {
+    if (has_inside(info)) {
         if (isnan(mass->scaled_volume))
             json_null(j, "volume");
         else
@@ -200,6 +222,14 @@ static void json_mass(json *j, const char *path, const ebpo_info *info, const eb
                 table_json(j, NULL, mass->scaled_inertia[k][i], 5 * mass->exponent);
             json_end(j);
         }
+        json_end(j);
+    }
+    if (info->parts & EBPO_PART_BORDER) {
+        json_object(j, "caps");
+        json_real(j, "integral_error", mass->integral_error);
+        json_real(j, "centroid_error", mass->centroid_error);
+        json_real(j, "integral", mass->caps_integral);
+        json_real(j, "centroid", mass->caps_centroid);
         json_end(j);
     }
     json_array(j, "levels");

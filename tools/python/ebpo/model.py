@@ -364,7 +364,8 @@ class Model(PointQueries):
         mass = made(c.ebpo_mass)
         call("ebpo_measure", self.file, threads or self._threads, ctypes.byref(mass))
         return Mass(mass.area, mass.volume, np.array(mass.centroid), np.array(np.ctypeslib.as_array(mass.inertia)),
-                    (mass.volume_lo, mass.volume_hi), mass.integral)
+                    (mass.volume_lo, mass.volume_hi), mass.integral, mass.integral_error, mass.centroid_error,
+                    mass.caps_integral, mass.caps_centroid)
 
     # ---- parts ----
 
