@@ -249,7 +249,8 @@ ebpo_status ebpo_catalogue_inside(const ebpo_catalogue *c, ebpo_catalogue_models
     ebpo_status status = ebpo_catalogue_take_options(&own, options, error);
     if (status == EBPO_OK && c->surface)
         status = ebpo_fail_file(error, EBPO_E_NOT_SOLID, c->surface->path,
-                                "is a surface: it has no inside");
+                                "is a surface: catalogues combine the winding numbers of solids "
+                                "only; query its file, or repair its source");
     if (status == EBPO_OK)
         status = ebpo_check_points(points, count, error);
     return status == EBPO_OK ? ebpo_catalogue_query_rows(&j, count, error) : status;

@@ -8,7 +8,8 @@
  *
  * A query that may use envelopes, stops at a level or has a deadline goes from node to node and
  * loads subtrees on the way; with EBPO_LOAD_NODES it reads only the nodes on the way. Envelopes
- * decide pruned nodes, or the query fails with EBPO_E_ABSENT.
+ * decide pruned nodes, or the query fails with EBPO_E_ABSENT. Envelopes of a surface do not contain
+ * its inside, so only its white nodes decide.
  *
  * Sources: EBP 2017, 4.2; format-spec, section 10. */
 #include "core/strict_fp.h"
@@ -819,15 +820,11 @@ ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64
         status = ebpo_check_points(points, count, error);
     if (status == EBPO_OK && o->level < 0)
         status = ebpo_check_mesh(m, error);
-    if (status == EBPO_OK && m->holes && (o->level >= 0 || o->deadline_ns))
-        status = ebpo_fail(error, EBPO_E_ARGUMENT,
-                           "the inside of a surface supports neither level nor deadline; omit "
-                           "these");
     if (status == EBPO_OK && m->whole && o->level < 0 && !o->deadline_ns &&
         o->envelopes != EBPO_ENVELOPES_USE)
         return inside_whole(context, points, count, o->done, out, error);
-    context->planes = o->level >= 0 || o->deadline_ns ||
-                      (!m->holes && (o->envelopes == EBPO_ENVELOPES_USE || m->info->pruned));
+    context->planes = !m->holes && (o->level >= 0 || o->deadline_ns ||
+                                    o->envelopes == EBPO_ENVELOPES_USE || m->info->pruned);
     ebpo_batch batch = { .context = context,
                          .points = points,
                          .count = count,

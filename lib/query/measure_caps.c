@@ -39,7 +39,7 @@ static double box_volume(const double *point, uint64_t count, const double facto
 }
 
 /* Scales a vector to the length 1; returns false if it is too short. */
-static bool normalize(double v[3])
+static bool scale_to_unit(double v[3])
 {
     double length = ebpo_vec3_length(v);
     for (int k = 0; k < 3; k++)
@@ -61,7 +61,7 @@ static bool find_axes(const double *point, uint64_t count, const double factor[2
         ebpo_vec3_copy(p, q);
     }
     ebpo_vec3_copy(area, axis[0]);
-    if (!normalize(axis[0]))
+    if (!scale_to_unit(axis[0]))
         return false;
     for (uint64_t i = 1; i < count; i++) {
         relative_point(point, i, factor, p);
@@ -74,10 +74,10 @@ static bool find_axes(const double *point, uint64_t count, const double factor[2
             ebpo_vec3_copy(p, axis[1]);
         }
     }
-    if (!normalize(axis[1]))
+    if (!scale_to_unit(axis[1]))
         return false;
     ebpo_vec3_cross(axis[0], axis[1], axis[2]);
-    return fabs(ebpo_vec3_dot(axis[0], axis[1])) < 0x1p-46 && normalize(axis[2]);
+    return fabs(ebpo_vec3_dot(axis[0], axis[1])) < 0x1p-46 && scale_to_unit(axis[2]);
 }
 
 double ebpo_loop_hull(const double *point, uint64_t count, const double factor[2],

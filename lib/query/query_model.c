@@ -63,10 +63,13 @@ ebpo_status ebpo_check_solid(const ebpo_model *model, ebpo_error *error)
 {
     if (model->info->solid)
         return EBPO_OK;
-    return ebpo_fail(error, EBPO_E_NOT_SOLID,
-                     "the model is a surface: it has no inside; run 'ebpo check' on its source "
-                     "to see the repairs that make a solid, and 'ebpo convert --repair' to apply "
-                     "them");
+    return ebpo_fail(
+        error, EBPO_E_NOT_SOLID,
+        "the model is a surface: %s; run 'ebpo check' on its source to see the repairs "
+        "that make a solid, and 'ebpo convert --repair' to apply them",
+        model->holes ? "its inside has no boundary faces in its holes, which this "
+                       "function needs (points, distances, measures and maps do not)"
+                     : "it has no inside");
 }
 
 /* --- envelopes that a context keeps --- */

@@ -324,13 +324,10 @@ START_TEST(test_invalid_queries_are_refused)
     ebpo_model *model = NULL;
     ebpo_context *context = NULL;
     ebpo_model_options bad = options_of(0);
-    ebpo_inside_options limited = EBPO_INSIDE_OPTIONS_INIT;
     ebpo_inside_result r;
     ebpo_winding_bounds w;
     const double p[3] = { 0, 0, 0 };
     holed_make(&h, ebpo_test_make("open_box"), EBPO_RULE_NONZERO, 0.5);
-    limited.level = 1;
-    ck_assert_int_eq(ebpo_inside(h.context, p, &limited, &r, &error), EBPO_E_ARGUMENT);
     ck_assert_int_eq(ebpo_winding(h.context, p, 1, -1, &w, &error), EBPO_E_ARGUMENT);
     ck_assert_int_eq(ebpo_model_new(h.file, &bad, &model, &error), EBPO_E_ARGUMENT);
     holed_free(&h);
@@ -372,6 +369,45 @@ START_TEST(test_border_is_added_to_file)
                &error);
     ebpo_close(file);
     check_same_files(scratch("added.ebpo.h5"), scratch("with.ebpo.h5"));
+}
+END_TEST
+
+/* Results at a level or with a deadline are those of the whole file, or "maybe": near a face, and
+ * less often at deeper levels. */
+START_TEST(test_levels_agree_or_are_undecided)
+{
+    uint64_t state = 6, maybe[EBPO_LEVELS_MAX][WAYS] = { { 0 } };
+    holed h;
+    ebpo_error error = EBPO_ERROR_INIT;
+    holed_make(&h, holed_torus(&state, 40, 6), EBPO_RULE_NONZERO, 0.5);
+    int deepest = ebpo_file_info(h.file)->level_count - 1;
+    for (uint64_t i = 0; i < ebpo_test_scaled(4000); i++) {
+        double p[3];
+        ebpo_inside_result whole, r;
+        ebpo_distance_result near = { 0 };
+        choose_point(&state, &h, p);
+        model_must(ebpo_inside(h.context, p, NULL, &whole, &error), "inside", &error);
+        model_must(ebpo_distance(h.context, p, NULL, &near, &error), "distance", &error);
+        for (int level = -1; level <= deepest; level++)
+            for (int way = 0; way < WAYS; way++) {
+                ebpo_inside_options o = EBPO_INSIDE_OPTIONS_INIT;
+                o.level = level;
+                o.deadline_ns = level < 0 ? 1 : 0;
+                o.envelopes = (ebpo_envelopes)(i % 3);
+                model_must(ebpo_inside(h.context_of[way], p, &o, &r, &error), "level", &error);
+                if (r.where == EBPO_MAYBE)
+                    ck_assert(fabs(near.distance) <= r.doubt && r.winding == 0);
+                else
+                    ck_assert_msg(r.where == whole.where && r.winding == whole.winding,
+                                  "(%a %a %a), level %d, way %d: %d instead of %d", p[0], p[1],
+                                  p[2], level, way, (int)r.where, (int)whole.where);
+                if (level >= 0)
+                    maybe[level][way] += r.where == EBPO_MAYBE;
+            }
+    }
+    for (int way = 0; way < WAYS; way++)
+        ck_assert_uint_gt(maybe[0][way], maybe[deepest][way]);
+    holed_free(&h);
 }
 END_TEST
 
@@ -462,6 +498,7 @@ TEST_SUITE(holes)
     tcase_add_test(shapes, test_ties_are_counted);
     tcase_add_test(shapes, test_invalid_queries_are_refused);
     tcase_add_test(shapes, test_border_is_added_to_file);
+    tcase_add_test(shapes, test_levels_agree_or_are_undecided);
     tcase_add_test(shapes, test_subset_keeps_border);
     tcase_add_test(shapes, test_solid_has_integer_bounds);
     suite_add_tcase(suite, shapes);

@@ -142,8 +142,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_first(ebpo_collider *collider,
 
 /*
  * Relation of two point sets at their poses. The set of a solid is the closure of the points that
- * are inside by its rule. The set of a surface is its faces. Faces without area are ignored. The
- * first relation of this list that is true applies.
+ * are inside by its rule. The set of a surface is its faces, also with EBPO_PART_BORDER: its inside
+ * has no boundary faces in its holes. Faces without area are ignored. The first relation of this
+ * list that is true applies.
  */
 typedef enum ebpo_relation {
     EBPO_DISJOINT = 0,     /* no common point */

@@ -30,7 +30,9 @@ typedef struct ebpo_map_options {
      */
     double max_distance;
 
-    /* True: distances have no signs. Distances from surfaces never have signs. */
+    /*
+     * True: distances have no signs. Distances from surfaces have signs with EBPO_PART_BORDER only.
+     */
     bool unsigned_distance;
 
     uint8_t reserved[3];

@@ -370,8 +370,9 @@ typedef struct ebpo_inside_options {
     size_t struct_size;
 
     /*
-     * The query uses only levels 0 to `level`, and returns a certain result or EBPO_MAYBE.
-     * EBPO_LEVEL_ALL: exact results.
+     * The query uses only levels 0 to `level`, and returns a certain result or EBPO_MAYBE. The
+     * latter is the result in all cells of gray nodes and leaves if the model is a surface, whose
+     * envelopes do not contain its inside. EBPO_LEVEL_ALL: exact results.
      */
     int level;
 
@@ -422,9 +423,8 @@ typedef struct ebpo_inside_result {
  * Classifies a point as inside, outside or on the surface (BP 2008, section 5.2.1; EBP 2017,
  * section 4.2).
  *
- * EBPO_E_NOT_SOLID: the model is a surface without EBPO_PART_BORDER. EBPO_E_ARGUMENT: a surface,
- * and a level or deadline. EBPO_E_ABSENT: the file has no mesh and no level is given, or a subset
- * lacks the required data.
+ * EBPO_E_NOT_SOLID: the model is a surface without EBPO_PART_BORDER. EBPO_E_ABSENT: the file has no
+ * mesh and no level is given, or a subset lacks the required data.
  *
  * Threads: one per context.
  */
