@@ -15,8 +15,9 @@
 
 #include "core/alloc.h"
 #include "extras/collide/hierarchy_walk.h"
-#include "geometry/triangle_pair.h"
 #include "geometry/predicates.h"
+#include "geometry/triangle_pair.h"
+#include "geometry/vec3.h"
 
 void ebpo_pair_walk_free(ebpo_pair_walk *w)
 {
@@ -60,23 +61,65 @@ static bool edge_intersects(const double a[3][3], int i, const double b[3][3])
     return ebpo_triangle_pair((const double(*)[3])edge, b) != EBPO_PAIR_APART;
 }
 
+/* Returns true if n . (p - corner) certainly has the sign of `side`. A difference has a relative
+ * error of at most 2^-53, so the sum has one of 2^-50 of its terms, apart from underflow. */
+static bool is_on_side(const double n[3], const double corner[3], const double p[3], double side)
+{
+    double sum = 0, size = 0;
+    for (int k = 0; k < 3; k++) {
+        double term = n[k] * (p[k] - corner[k]) * side;
+        sum += term;
+        size += fabs(term);
+    }
+    return sum > 0x1p-50 * size + 0x1p-1000;
+}
+
+/* Returns true if the faces certainly have only the corner i of a, which is corner k of b, in
+ * common: a plane through it separates them. The plane is between the two edges that form the least
+ * angle; its normal may be rounded. */
+static bool separate_at_corner(const double a[3][3], int i, const double b[3][3], int k)
+{
+    const double *p[4] = { a[(i + 1) % 3], a[(i + 2) % 3], b[(k + 1) % 3], b[(k + 2) % 3] };
+    double unit[4][3], n[3], most = -INFINITY;
+    int first = 0, second = 2;
+    for (int e = 0; e < 4; e++) {
+        ebpo_vec3_subtract(p[e], a[i], unit[e]);
+        double inverse = 1 / ebpo_vec3_length(unit[e]);
+        for (int c = 0; c < 3; c++)
+            unit[e][c] *= inverse;
+    }
+    for (int e = 0; e < 4; e++) {
+        double cosine = ebpo_vec3_dot(unit[e / 2], unit[2 + e % 2]);
+        if (cosine > most) {
+            most = cosine;
+            first = e / 2;
+            second = 2 + e % 2;
+        }
+    }
+    ebpo_vec3_subtract(unit[first], unit[second], n);
+    return is_on_side(n, a[i], p[0], 1) && is_on_side(n, a[i], p[1], 1) &&
+           is_on_side(n, a[i], p[2], -1) && is_on_side(n, a[i], p[3], -1);
+}
+
 /* Decides two faces with one common corner, i of a and k of b. Two convex sets have another common
  * point only if a ray from the common corner reaches the opposite edge of one face while it is
  * still in the other face. */
 static ebpo_pair_kind one_corner(const double a[3][3], int i, const double b[3][3], int k)
 {
+    if (separate_at_corner(a, i, b, k))
+        return EBPO_PAIR_APART;
     ebpo_pair_kind kind = ebpo_triangle_pair(a, b);
     if (kind == EBPO_PAIR_TOUCHING && !edge_intersects(a, i, b) && !edge_intersects(b, k, a))
         return EBPO_PAIR_APART;
     return kind;
 }
 
-/* Decides two faces with a common edge. Faces in different planes have no other common point. */
-static ebpo_pair_kind one_edge(const double a[3][3], const double b[3][3])
+/* Decides two faces with a common edge. Faces in different planes have no other common point.
+ * opposite: the corner of b that is not on the edge; -1: a face has corners at one point. */
+static ebpo_pair_kind one_edge(const double a[3][3], const double b[3][3], int opposite)
 {
-    for (int k = 0; k < 3; k++)
-        if (ebpo_orient3d(a[0], a[1], a[2], b[k]) != 0)
-            return EBPO_PAIR_APART;
+    if (opposite >= 0 && ebpo_orient3d(a[0], a[1], a[2], b[opposite]) != 0)
+        return EBPO_PAIR_APART;
     return ebpo_triangle_pair(a, b) == EBPO_PAIR_COPLANAR ? EBPO_PAIR_COPLANAR : EBPO_PAIR_APART;
 }
 
@@ -85,29 +128,36 @@ static ebpo_pair_kind one_edge(const double a[3][3], const double b[3][3])
  * swapped. */
 static ebpo_pair_kind neighbour_kind(const double a[3][3], const double b[3][3])
 {
-    int shared = 0, in_a = 0, in_b = 0;
+    static const int others[8] = { -1, -1, -1, 2, -1, 1, 0, -1 }; /* of two corners */
+    int shared = 0, in_a = 0, in_b = 0, of_b = 0;
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++)
-            if (ebpo_corner_order(a[i], b[k]) == 0) {
+            if (a[i][0] == b[k][0] && a[i][1] == b[k][1] && a[i][2] == b[k][2]) {
                 shared++;
                 in_a = i;
                 in_b = k;
+                of_b |= 1 << k;
             }
     if (shared == 0)
         return ebpo_triangle_pair(a, b);
-    return shared == 1 ? one_corner(a, in_a, b, in_b) : one_edge(a, b);
+    return shared == 1 ? one_corner(a, in_a, b, in_b) : one_edge(a, b, others[of_b]);
 }
 
-/* Decides a pair of faces exactly. */
-static ebpo_pair_kind exact_kind(ebpo_pair_walk *w, uint32_t slot_a, uint32_t slot_b)
+/* Faces of two blocks at their poses, computed when they are needed. */
+typedef struct posed_blocks {
+    double corner[2][EBPO_BLOCK][3][3];
+    unsigned known[2]; /* bits of the lanes */
+} posed_blocks;
+
+static const double (*posed_corners(posed_blocks *posed, const ebpo_pair_walk *w, int side,
+                                    uint32_t block, uint32_t lane))[3]
 {
-    const ebpo_accel_pair *p = w->pair;
-    double a[3][3], b[3][3];
-    ebpo_posed_triangle(p->accel[0], &p->posing[0]->posing, slot_a, a);
-    ebpo_posed_triangle(p->accel[1], &p->posing[1]->posing, slot_b, b);
-    w->exact++;
-    return w->neighbours ? neighbour_kind((const double(*)[3])a, (const double(*)[3])b)
-                         : ebpo_triangle_pair((const double(*)[3])a, (const double(*)[3])b);
+    double(*corner)[3] = posed->corner[side][lane];
+    if (!(posed->known[side] >> lane & 1))
+        ebpo_posed_triangle(w->pair->accel[side], &w->pair->posing[side]->posing,
+                            block * EBPO_BLOCK + lane, corner);
+    posed->known[side] |= 1u << lane;
+    return (const double(*)[3])corner;
 }
 
 bool ebpo_pair_walk_decide(ebpo_pair_walk *w, uint32_t block_a, uint32_t block_b,
@@ -116,6 +166,8 @@ bool ebpo_pair_walk_decide(ebpo_pair_walk *w, uint32_t block_a, uint32_t block_b
     const ebpo_accel *const *s = w->pair->accel;
     uint32_t face_a = ebpo_accel_meshlet(s[0], block_a)->face,
              face_b = ebpo_accel_meshlet(s[1], block_b)->face;
+    posed_blocks posed;
+    posed.known[0] = posed.known[1] = 0;
     if (!ebpo_grow(&w->found_pairs, &w->found_capacity, w->found_count + pairs->count,
                    sizeof *w->found_pairs))
         return false;
@@ -124,9 +176,13 @@ bool ebpo_pair_walk_decide(ebpo_pair_walk *w, uint32_t block_a, uint32_t block_b
         ebpo_found_pair found = { face_a + lane_a, face_b + lane_b, EBPO_PAIR_CROSSING };
         if (found.a < w->begin || found.a >= w->end || (w->self && found.a >= found.b))
             continue;
-        if (w->neighbours || !(pairs->pair[i] & EBPO_CERTAINLY_CROSSING))
-            found.kind = (int32_t)exact_kind(w, block_a * EBPO_BLOCK + lane_a,
-                                             block_b * EBPO_BLOCK + lane_b);
+        if (w->neighbours || !(pairs->pair[i] & EBPO_CERTAINLY_CROSSING)) {
+            const double(*a)[3] = posed_corners(&posed, w, 0, block_a, lane_a),
+                        (*b)[3] = posed_corners(&posed, w, 1, block_b, lane_b);
+            found.kind =
+                (int32_t)(w->neighbours ? neighbour_kind(a, b) : ebpo_triangle_pair(a, b));
+            w->exact++;
+        }
         if (found.kind == EBPO_PAIR_APART)
             continue;
         w->found_slot[0] = block_a * EBPO_BLOCK + lane_a;
