@@ -360,6 +360,72 @@ START_TEST(origins)
 }
 END_TEST
 
+/* Returns true if the mesh has a vertex with exactly these bits. */
+static bool has_vertex(const ebpo_mesh *mesh, const double at[3])
+{
+    for (uint64_t v = 0; v < mesh->vertex_count; v++)
+        if (memcmp(mesh->xyz64 + 3 * v, at, 3 * sizeof *at) == 0)
+            return true;
+    return false;
+}
+
+/* A cube whose zeros are negative, minus a cube that cuts off a corner, or beside it: the vertices
+ * that remain have their signs of zero, on cut and on other faces. */
+START_TEST(signs_of_zero)
+{
+    const double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 };
+    for (int beside = 0; beside < 2; beside++) {
+        scene s = { .nodes = 0 };
+        ebpo_mesh mesh, cube = ebpo_test_box(low, high, 3);
+        for (uint64_t i = 0; i < 3 * cube.vertex_count; i++)
+            cube.xyz64[i] = cube.xyz64[i] == 0 ? -0.0 : cube.xyz64[i];
+        add_operand(&s, cube, moved_pose(0, 0, 0), 0);
+        add_operand(&s, ebpo_test_box(low, high, 1),
+                    moved_pose(beside ? 5 : 0.75, beside ? 0 : -0.5, beside ? 0 : -0.5), 0);
+        s.node[s.nodes++] = (ebpo_boolean_node){ EBPO_BOOLEAN_OPERAND, 0, 0, 0 };
+        s.node[s.nodes++] = (ebpo_boolean_node){ EBPO_BOOLEAN_OPERAND, 1, 0, 0 };
+        s.node[s.nodes++] = (ebpo_boolean_node){ EBPO_BOOLEAN_DIFFERENCE, 0, 1, 0 };
+        make_mesh(&s, 1, &mesh);
+        const ebpo_mesh *a = &s.model[0].mesh;
+        uint64_t negative = 0;
+        for (uint64_t v = 0; v < a->vertex_count; v++) {
+            double at[3];
+            ebpo_test_point(a, v, at);
+            negative += signbit(at[0]) != 0;
+            if (beside || at[0] < 0.7)
+                ck_assert(has_vertex(&mesh, at));
+        }
+        ck_assert_uint_eq(negative, 16);
+        ebpo_mesh_free(&mesh);
+        free_scene(&s);
+    }
+}
+END_TEST
+
+/* An empty result has arrays of the same types as another one. */
+START_TEST(empty_result)
+{
+    const double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 };
+    ebpo_boolean_mesh_options options = EBPO_BOOLEAN_MESH_OPTIONS_INIT;
+    ebpo_mesh mesh;
+    scene s = { .nodes = 0 };
+    add_operand(&s, ebpo_test_box(low, high, 2), moved_pose(0, 0, 0), 0);
+    s.node[s.nodes++] = (ebpo_boolean_node){ EBPO_BOOLEAN_OPERAND, 0, 0, 0 };
+    s.node[s.nodes++] = (ebpo_boolean_node){ EBPO_BOOLEAN_DIFFERENCE, 0, 0, 0 };
+    ebpo_boolean *boolean = make_boolean(&s, 1);
+    options.origins = true;
+    ASSERT_OK(ebpo_boolean_mesh(boolean, &options, &mesh, NULL, error));
+    ck_assert_uint_eq(mesh.face_count, 0);
+    ck_assert_uint_eq(mesh.vertex_count, 0);
+    ck_assert_ptr_nonnull(mesh.xyz64);
+    ck_assert_ptr_null(mesh.xyz32);
+    ck_assert_uint_eq(mesh.attributes->count, 2);
+    ebpo_mesh_free(&mesh);
+    ebpo_boolean_free(boolean);
+    free_scene(&s);
+}
+END_TEST
+
 START_TEST(equal_for_any_threads)
 {
     for (uint64_t seed = 1; seed < 1 + KINDS; seed++) {
@@ -388,6 +454,8 @@ TEST_SUITE(boolean_mesh)
     tcase_set_timeout(tests, 0);
     tcase_add_test(tests, random_scenes);
     tcase_add_test(tests, origins);
+    tcase_add_test(tests, signs_of_zero);
+    tcase_add_test(tests, empty_result);
     tcase_add_test(tests, equal_for_any_threads);
     suite_add_tcase(suite, tests);
     return suite;

@@ -2,9 +2,10 @@
  *
  * Patches are triangles that are connected by edges of exactly two triangles. Around such an edge
  * there are two sectors, which both triangles separate; so along a patch all operands have the same
- * winding numbers in front, and the same behind. They are computed at one inner point of the patch,
- * exactly. The patch bounds the result if the expression differs on its two sides. This rule covers
- * coplanar faces, operands that touch, and operands that intersect themselves.
+ * winding numbers in front, and the same behind. So have the listed faces of a component of whole
+ * faces. They are computed at one inner point of the patch, exactly. The patch bounds the result if
+ * the expression differs on its two sides. This rule covers coplanar faces, operands that touch,
+ * and operands that intersect themselves.
  *
  * The boundary of a set has no boundary, so at each edge the selected triangles have as many
  * directions one way as the other. This is checked before the result is used. */
@@ -103,11 +104,10 @@ static uint32_t find_root(uint32_t *parent, uint32_t triangle)
     return triangle << 1 | flips;
 }
 
-static void join_triangles(uint32_t *parent, uint64_t first, uint64_t second)
+/* flipped: 1 if the triangles have opposite orientations. */
+static void join_triangles(uint32_t *parent, uint32_t first, uint32_t second, uint32_t flipped)
 {
-    /* two triangles with the same direction of their edge have opposite orientations */
-    uint32_t flipped = ((first ^ second) & 1) == 0;
-    uint32_t a = find_root(parent, triangle_of(first)), b = find_root(parent, triangle_of(second));
+    uint32_t a = find_root(parent, first), b = find_root(parent, second);
     flipped ^= (a ^ b) & 1;
     if (a >> 1 < b >> 1)
         parent[b >> 1] = (a & ~UINT32_C(1)) | flipped;
@@ -125,9 +125,44 @@ static void join_patches(const ebpo_cut_mesh *cut, const edge_lists *e, uint32_t
         for (next = i + 1;
              next < e->begin[v + 1] && other_vertex(e->edge[next]) == other_vertex(e->edge[i]);)
             next++;
-        if (next - i == 2)
-            join_triangles(parent, e->edge[i], e->edge[i + 1]);
+        if (next - i == 2) /* two triangles with one direction have opposite orientations */
+            join_triangles(parent, triangle_of(e->edge[i]), triangle_of(e->edge[i + 1]),
+                           ((e->edge[i] ^ e->edge[i + 1]) & 1) == 0);
     }
+}
+
+/* Returns the component of the whole face of a triangle; EBPO_NO_COMPONENT: the face is not whole.
+ */
+static uint32_t component_of(const ebpo_cut_mesh *cut, uint32_t triangle, uint32_t *operand)
+{
+    uint32_t face = cut->face[triangle];
+    *operand = ebpo_face_list_operand(cut->faces, face);
+    return ebpo_face_list_component(cut->faces, *operand, face);
+}
+
+/* Joins the listed faces of each component. */
+static ebpo_status join_components(const ebpo_cut_mesh *cut, uint32_t *parent, ebpo_error *error)
+{
+    uint64_t begin[EBPO_BOOLEAN_OPERANDS_MAX], count = 0;
+    for (uint32_t i = 0; i < cut->faces->boolean->count; i++) {
+        begin[i] = count;
+        count += cut->faces->whole[i].components;
+    }
+    uint32_t *first = ebpo_alloc_zero(count, sizeof *first); /* a triangle + 1; 0: none */
+    if (!first)
+        return ebpo_fail_memory(error, count * sizeof *first);
+    for (uint32_t t = 0; t < cut->count; t++) {
+        uint32_t operand, component = component_of(cut, t, &operand);
+        if (component == EBPO_NO_COMPONENT)
+            continue;
+        uint32_t *of = &first[begin[operand] + component];
+        if (*of)
+            join_triangles(parent, *of - 1, t, 0);
+        else
+            *of = t + 1;
+    }
+    free(first);
+    return EBPO_OK;
 }
 
 /* --- winding numbers --- */
@@ -292,18 +327,23 @@ static ebpo_status classify_patches(const ebpo_cut_mesh *cut, uint32_t *parent,
     return status;
 }
 
-/* Returns true if the selected triangles have each edge equally often in both directions. */
+/* Returns true if the selected triangles have each edge equally often in both directions. An edge
+ * of a single whole face has another whole face of its component, which is not listed. */
 static bool is_closed(const ebpo_cut_mesh *cut, const edge_lists *e, const int8_t *sign)
 {
-    int64_t balance = 0;
-    for (uint64_t i = 0, all = 3 * cut->count, v = 0; i < all; i++) {
+    for (uint64_t i = 0, next, all = 3 * cut->count, v = 0; i < all; i = next) {
+        int64_t balance = 0;
+        uint32_t operand;
         while (e->begin[v + 1] <= i)
             v++;
-        int8_t s = sign[triangle_of(e->edge[i])];
-        balance += e->edge[i] & 1 ? -s : s;
-        bool ends =
-            i + 1 == e->begin[v + 1] || other_vertex(e->edge[i + 1]) != other_vertex(e->edge[i]);
-        if (ends && balance != 0)
+        for (next = i;
+             next < e->begin[v + 1] && other_vertex(e->edge[next]) == other_vertex(e->edge[i]);
+             next++) {
+            int8_t s = sign[triangle_of(e->edge[next])];
+            balance += e->edge[next] & 1 ? -s : s;
+        }
+        if (balance != 0 && (next - i > 1 || component_of(cut, triangle_of(e->edge[i]), &operand) ==
+                                                 EBPO_NO_COMPONENT))
             return false;
     }
     return true;
@@ -317,14 +357,16 @@ ebpo_status ebpo_cut_mesh_classify(const ebpo_cut_mesh *cut, const ebpo_progress
     *sign = ebpo_alloc_zero(cut->count, sizeof **sign);
     ebpo_status status =
         parent && *sign ? EBPO_OK : ebpo_fail_memory(error, cut->count * (sizeof *parent + 1));
-    if (status == EBPO_OK && !ebpo_progress_stage(progress, "join faces", error))
+    if (status == EBPO_OK && !ebpo_progress_stage(progress, "join patches", error))
         status = EBPO_E_CANCELLED;
     if (status == EBPO_OK)
         status = list_edges(&e, cut, error);
     if (status == EBPO_OK) {
         join_patches(cut, &e, parent);
-        status = classify_patches(cut, parent, progress, *sign, patches, error);
+        status = join_components(cut, parent, error);
     }
+    if (status == EBPO_OK)
+        status = classify_patches(cut, parent, progress, *sign, patches, error);
     if (status == EBPO_OK && !is_closed(cut, &e, *sign))
         status = ebpo_fail(error, EBPO_E_FORMAT,
                            "the result is not closed; check that the operands are (ebpo verify)");

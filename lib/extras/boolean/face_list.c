@@ -1,101 +1,174 @@
-/* Reads the faces of all operands and finds the pairs that intersect.
+/* Lists the faces that are cut, and the faces beside them.
  *
- * Faces without area are not listed in pairs: they bound nothing, and the points of their edges are
+ * Pairs of intersecting faces are found first, in the hierarchies of the models. Then each operand
+ * is read once, which shows what to list of it. So the list grows with the cut, not with the
+ * models.
+ *
+ * Faces without area have no partners: they bound nothing, and the points of their edges are
  * corners of faces with an area, which touch the faces beside them and are found as pairs. */
 #include "core/strict_fp.h"
 
 #include "extras/boolean/face_list.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/parallel.h"
+#include "core/workspace.h"
 #include "extras/collide/collider.h"
 #include "geometry/predicates.h"
+#include "mesh/mesh_parts.h"
 
-/* --- faces --- */
+/* --- pairs --- */
 
-static ebpo_status count_faces(ebpo_face_list *faces, ebpo_error *error)
+typedef struct pair_search {
+    ebpo_face_list *faces;
+    uint8_t operand[2];
+    bool full;
+} pair_search;
+
+static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
+{
+    pair_search *s = user;
+    ebpo_face_list *f = s->faces;
+    s->full = !ebpo_grow(&f->pair, &f->pair_capacity, f->pairs + count, sizeof *f->pair);
+    for (uint64_t i = 0; i < count && !s->full; i++)
+        f->pair[f->pairs++] = (ebpo_operand_pair){
+            { (uint32_t)pairs[i].file_face_a, (uint32_t)pairs[i].file_face_b },
+            { s->operand[0], s->operand[1] },
+        };
+    return !s->full;
+}
+
+static ebpo_status search_operands(ebpo_face_list *faces, uint32_t i, uint32_t k,
+                                   const ebpo_progress *progress, ebpo_error *error)
 {
     const ebpo_boolean *b = faces->boolean;
-    uint64_t count = 0;
-    for (uint32_t i = 0; i < b->count; i++) {
-        faces->first[i] = (uint32_t)count;
-        count += faces->same[i] ? b->solid[i].model->info->face_count : 0;
-        if (count > INT32_MAX)
-            return ebpo_fail(error, EBPO_E_LIMIT,
-                             "the operands have more than 2^31 - 1 faces; cut smaller models");
-    }
-    faces->count = faces->first[b->count] = (uint32_t)count;
-    faces->face = ebpo_alloc(count, sizeof *faces->face);
-    return faces->face ? EBPO_OK : ebpo_fail_memory(error, count * sizeof *faces->face);
-}
-
-static bool number_vertices(ebpo_face_list *faces, const ebpo_mesh *mesh, const ebpo_posing *posing,
-                            uint32_t *number)
-{
-    for (uint64_t v = 0; v < mesh->vertex_count; v++) {
-        double x[3], posed[3];
-        for (unsigned k = 0; k < 3; k++)
-            x[k] = mesh->xyz64 ? mesh->xyz64[3 * v + k] : (double)mesh->xyz32[3 * v + k];
-        ebpo_posing_apply(posing, x, posed);
-        if (!ebpo_corner_id(&faces->corners, posed, &number[v]))
-            return false;
-    }
-    return true;
-}
-
-static void list_faces(ebpo_face_list *faces, uint32_t operand, const ebpo_mesh *mesh,
-                       const uint32_t *number)
-{
-    for (uint64_t f = 0; f < mesh->face_count; f++) {
-        uint32_t *corner = faces->face[faces->first[operand] + f];
-        for (unsigned i = 0; i < 3; i++)
-            corner[i] = number[mesh->faces[3 * f + i]];
-        const double(*at)[3] = (const double(*)[3])faces->corners.at;
-        if (ebpo_zero_area(at[corner[0]], at[corner[1]], at[corner[2]]))
-            corner[0] = EBPO_NO_CORNER;
-    }
-}
-
-static ebpo_status read_operand(ebpo_face_list *faces, uint32_t operand, ebpo_error *error)
-{
-    const ebpo_posed_solid *solid = &faces->boolean->solid[operand];
-    ebpo_read_options how = EBPO_READ_OPTIONS_INIT;
-    ebpo_mesh mesh;
-    how.threads = faces->boolean->threads;
-    ebpo_status status = ebpo_file_read_mesh(solid->model->file, &how, &mesh, error);
+    const double *x = b->solid[i].box, *y = b->solid[k].box;
+    pair_search s = { .faces = faces, .operand = { (uint8_t)i, (uint8_t)k } };
+    ebpo_collider *collider;
+    ebpo_collider_options how = EBPO_COLLIDER_OPTIONS_INIT;
+    ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
+    if (ebpo_box_gap(x, x + 3, y, y + 3) > 0)
+        return EBPO_OK;
+    how.threads = b->threads;
+    options.pose_a = b->pose[i];
+    options.pose_b = b->pose[k];
+    options.progress = *progress;
+    ebpo_status status =
+        ebpo_collider_new(b->solid[i].model, b->solid[k].model, &how, &collider, error);
     if (status != EBPO_OK)
         return status;
-    uint32_t *number = ebpo_alloc(mesh.vertex_count, sizeof *number);
-    if (number &&
-        ebpo_corner_ids_reserve(&faces->corners, faces->corners.count + mesh.vertex_count) &&
-        number_vertices(faces, &mesh, &solid->posing, number))
-        list_faces(faces, operand, &mesh, number);
-    else
-        status = ebpo_fail_memory(error, mesh.vertex_count * (sizeof *number + 40));
-    faces->floats = faces->floats && mesh.xyz32;
-    free(number);
-    ebpo_mesh_free(&mesh);
+    status = i == k ? ebpo_collide_self_posed(collider, &options, take_pairs, &s, error)
+                    : ebpo_collide_all(collider, &options, take_pairs, &s, error);
+    ebpo_collider_free(collider);
+    return s.full ? ebpo_fail_memory(error, faces->pairs * sizeof *faces->pair) : status;
+}
+
+static ebpo_status find_pairs(ebpo_face_list *faces, const ebpo_progress *progress,
+                              ebpo_error *error)
+{
+    uint32_t count = faces->boolean->count;
+    ebpo_status status = EBPO_OK;
+    for (uint32_t i = 0; i < count && status == EBPO_OK; i++)
+        for (uint32_t k = i; k < count && status == EBPO_OK; k++)
+            if (faces->same[i] && faces->same[k])
+                status = search_operands(faces, i, k, progress, error);
     return status;
 }
 
-ebpo_status ebpo_face_list_read(ebpo_face_list *out, const ebpo_boolean *b,
-                                const ebpo_progress *progress, ebpo_error *error)
+/* --- listing --- */
+
+/* Numbers a corner, and notes its signs of zero. */
+static bool number_corner(ebpo_face_list *faces, const double x[3], uint32_t *number)
 {
-    *out = (ebpo_face_list){ .boolean = b, .floats = true };
-    ebpo_boolean_find_equal(b, out->same);
-    if (!ebpo_progress_stage(progress, "read faces", error))
-        return EBPO_E_CANCELLED;
-    ebpo_status status = count_faces(out, error);
-    for (uint32_t i = 0; i < b->count && status == EBPO_OK; i++) {
-        ebpo_error cause = EBPO_ERROR_INIT;
-        if (out->same[i] && read_operand(out, i, &cause) != EBPO_OK)
-            status = ebpo_fail_operand(b->solid[i].model, i, &cause, error);
+    uint64_t known = faces->corners.count;
+    if (!ebpo_corner_id(&faces->corners, x, number) ||
+        !ebpo_grow(&faces->minus, &faces->minus_capacity, faces->corners.count,
+                   sizeof *faces->minus))
+        return false;
+    if (*number < known)
+        return true;
+    faces->minus[*number] = 0;
+    for (int k = 0; k < 3; k++)
+        faces->minus[*number] |= (uint8_t)((x[k] == 0 && signbit(x[k]) ? 1u : 0u) << k);
+    return true;
+}
+
+static bool list_face(ebpo_face_list *faces, const ebpo_mesh *mesh, uint64_t f)
+{
+    double p[3][3];
+    if (!ebpo_grow(&faces->face, &faces->face_capacity, (uint64_t)faces->count + 1,
+                   sizeof *faces->face) ||
+        !ebpo_grow(&faces->number, &faces->number_capacity, (uint64_t)faces->count + 1,
+                   sizeof *faces->number) ||
+        faces->count >= INT32_MAX)
+        return false;
+    uint32_t *corner = faces->face[faces->count];
+    faces->number[faces->count++] = (uint32_t)f;
+    for (int i = 0; i < 3; i++) {
+        ebpo_mesh_position(mesh, mesh->faces[3 * f + (unsigned)i], p[i]);
+        if (!number_corner(faces, p[i], &corner[i]))
+            return false;
     }
-    out->given_corners = out->corners.count;
+    if (ebpo_zero_area(p[0], p[1], p[2]))
+        corner[0] = EBPO_NO_CORNER;
+    return true;
+}
+
+/* Makes a bit for each face of the operand that is in a pair. */
+static uint64_t *mark_paired(const ebpo_face_list *faces, uint32_t operand, uint64_t count)
+{
+    uint64_t *paired = ebpo_alloc_zero(count / 64 + 1, sizeof *paired);
+    for (uint64_t i = 0; i < 2 * faces->pairs && paired; i++)
+        if (faces->pair[i / 2].operand[i % 2] == operand)
+            ebpo_set_bit(paired, faces->pair[i / 2].face[i % 2]);
+    return paired;
+}
+
+static ebpo_status list_faces(ebpo_face_list *faces, uint32_t operand, const ebpo_mesh *mesh,
+                              const ebpo_progress *progress, ebpo_error *error)
+{
+    const ebpo_boolean *b = faces->boolean;
+    ebpo_whole_faces *whole = &faces->whole[operand];
+    ebpo_error cause = EBPO_ERROR_INIT;
+    uint64_t *paired = mark_paired(faces, operand, mesh->face_count);
+    ebpo_status status =
+        paired ? ebpo_whole_faces_find(whole, mesh, paired, b->threads, progress, &cause)
+               : ebpo_fail_memory(&cause, mesh->face_count / 8);
+    free(paired);
+    bool fine = true;
+    EBPO_FOR_ITEMS(mesh->workspace, f, 0, status == EBPO_OK ? mesh->face_count : 0)
+        fine = fine && (!ebpo_has_bit(whole->listed, f) || list_face(faces, mesh, f));
+    if (!fine)
+        status = ebpo_fail_memory(&cause, (uint64_t)faces->count * sizeof *faces->face);
+    return status == EBPO_OK ? EBPO_OK
+                             : ebpo_fail_operand(b->solid[operand].model, operand, &cause, error);
+}
+
+static ebpo_status read_operands(ebpo_face_list *faces, const ebpo_progress *progress,
+                                 ebpo_error *error)
+{
+    const ebpo_boolean *b = faces->boolean;
+    ebpo_status status = EBPO_OK;
+    for (uint32_t i = 0; i < b->count && status == EBPO_OK; i++) {
+        ebpo_mesh mesh;
+        faces->first[i] = faces->count;
+        if (!faces->same[i])
+            continue;
+        if (!ebpo_progress_stage(progress, "read faces", error))
+            return EBPO_E_CANCELLED;
+        status = ebpo_operand_mesh_read(&mesh, b, i, faces->workspace, error);
+        if (status != EBPO_OK)
+            return status;
+        status = list_faces(faces, i, &mesh, progress, error);
+        ebpo_mesh_free(&mesh);
+    }
+    faces->first[b->count] = faces->count;
+    faces->given_corners = faces->corners.count;
     return status;
 }
 
@@ -107,63 +180,20 @@ uint32_t ebpo_face_list_operand(const ebpo_face_list *faces, uint32_t face)
     return i;
 }
 
-void ebpo_face_list_free(ebpo_face_list *faces)
+/* --- partners --- */
+
+/* Returns the place in the list of face `number` of an operand. All faces in pairs are listed. */
+static uint32_t find_listed(const ebpo_face_list *faces, uint32_t operand, uint32_t number)
 {
-    ebpo_corner_ids_free(&faces->corners);
-    free(faces->face);
-    free(faces->begin);
-    free(faces->partner);
-}
-
-/* --- pairs --- */
-
-typedef struct pair_search {
-    ebpo_face_list *faces;
-    uint32_t first, second; /* first faces of the two operands */
-    uint32_t (*pair)[2];
-    uint64_t count, capacity;
-    bool full;
-} pair_search;
-
-static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
-{
-    pair_search *s = user;
-    s->full = !ebpo_grow(&s->pair, &s->capacity, s->count + count, sizeof *s->pair);
-    for (uint64_t i = 0; i < count && !s->full; i++) {
-        uint32_t a = s->first + (uint32_t)pairs[i].file_face_a,
-                 b = s->second + (uint32_t)pairs[i].file_face_b;
-        if (s->faces->face[a][0] == EBPO_NO_CORNER || s->faces->face[b][0] == EBPO_NO_CORNER)
-            continue;
-        s->pair[s->count][0] = a;
-        s->pair[s->count++][1] = b;
+    uint32_t low = faces->first[operand], high = faces->first[operand + 1];
+    while (high - low > 1) {
+        uint32_t middle = low + (high - low) / 2;
+        if (faces->number[middle] <= number)
+            low = middle;
+        else
+            high = middle;
     }
-    return !s->full;
-}
-
-static ebpo_status search_operands(pair_search *s, uint32_t i, uint32_t k,
-                                   const ebpo_progress *progress, ebpo_error *error)
-{
-    const ebpo_boolean *b = s->faces->boolean;
-    const double *x = b->solid[i].box, *y = b->solid[k].box;
-    ebpo_collider *collider;
-    ebpo_collider_options how = EBPO_COLLIDER_OPTIONS_INIT;
-    ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
-    if (ebpo_box_gap(x, x + 3, y, y + 3) > 0)
-        return EBPO_OK;
-    s->first = s->faces->first[i];
-    s->second = s->faces->first[k];
-    how.threads = b->threads;
-    options.pose_a = b->pose[i];
-    options.pose_b = b->pose[k];
-    options.progress = *progress;
-    ebpo_status status =
-        ebpo_collider_new(b->solid[i].model, b->solid[k].model, &how, &collider, error);
-    if (status != EBPO_OK)
-        return status;
-    status = i == k ? ebpo_collide_self_posed(collider, &options, take_pairs, s, error)
-                    : ebpo_collide_all(collider, &options, take_pairs, s, error);
-    ebpo_collider_free(collider);
-    return s->full ? ebpo_fail_memory(error, s->count * sizeof *s->pair) : status;
+    return low;
 }
 
 static int order_numbers(const void *a, const void *b)
@@ -172,39 +202,72 @@ static int order_numbers(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Lists each pair at both of its faces. */
-static ebpo_status list_partners(pair_search *s, ebpo_error *error)
+/* Replaces the faces of pairs by their places in the list. Drops pairs of faces without area. */
+static void find_places(ebpo_face_list *faces)
 {
-    ebpo_face_list *faces = s->faces;
+    uint64_t kept = 0;
+    for (uint64_t i = 0; i < faces->pairs; i++) {
+        ebpo_operand_pair *p = &faces->pair[i];
+        for (int k = 0; k < 2; k++)
+            p->face[k] = find_listed(faces, p->operand[k], p->face[k]);
+        if (faces->face[p->face[0]][0] != EBPO_NO_CORNER &&
+            faces->face[p->face[1]][0] != EBPO_NO_CORNER)
+            faces->pair[kept++] = *p;
+    }
+    faces->pairs = kept;
+}
+
+/* Lists each pair at both of its faces. */
+static ebpo_status list_partners(ebpo_face_list *faces, ebpo_error *error)
+{
+    find_places(faces);
     faces->begin = ebpo_alloc_zero((uint64_t)faces->count + 2, sizeof *faces->begin);
-    faces->partner = ebpo_alloc(2 * s->count, sizeof *faces->partner);
+    faces->partner = ebpo_alloc(2 * faces->pairs, sizeof *faces->partner);
     if (!faces->begin || !faces->partner)
-        return ebpo_fail_memory(error, 8 * (faces->count + s->count));
+        return ebpo_fail_memory(error, 8 * (faces->count + faces->pairs));
     uint64_t *end = faces->begin + 1; /* while filling: end[i + 1] is the end of face i's list */
-    for (uint64_t i = 0; i < 2 * s->count; i++)
-        end[s->pair[i / 2][i % 2] + 1]++;
+    for (uint64_t i = 0; i < 2 * faces->pairs; i++)
+        end[faces->pair[i / 2].face[i % 2] + 1]++;
     for (uint32_t f = 0; f < faces->count; f++)
         end[f + 1] += end[f];
-    for (uint64_t i = 0; i < 2 * s->count; i++)
-        faces->partner[end[s->pair[i / 2][i % 2]]++] = s->pair[i / 2][1 - i % 2];
+    for (uint64_t i = 0; i < 2 * faces->pairs; i++)
+        faces->partner[end[faces->pair[i / 2].face[i % 2]]++] = faces->pair[i / 2].face[1 - i % 2];
     for (uint32_t f = 0; f < faces->count; f++)
         if (faces->begin[f + 1] - faces->begin[f] > 1)
             qsort(faces->partner + faces->begin[f], faces->begin[f + 1] - faces->begin[f],
                   sizeof *faces->partner, order_numbers);
+    free(faces->pair);
+    faces->pair = NULL;
     return EBPO_OK;
 }
 
-ebpo_status ebpo_face_list_find_pairs(ebpo_face_list *faces, const ebpo_progress *progress,
-                                      ebpo_error *error)
+/* --- all of it --- */
+
+ebpo_status ebpo_face_list_make(ebpo_face_list *out, const ebpo_boolean *b,
+                                ebpo_workspace *workspace, const ebpo_progress *progress,
+                                ebpo_error *error)
 {
-    pair_search s = { .faces = faces };
-    ebpo_status status = EBPO_OK;
-    for (uint32_t i = 0; i < faces->boolean->count && status == EBPO_OK; i++)
-        for (uint32_t k = i; k < faces->boolean->count && status == EBPO_OK; k++)
-            if (faces->same[i] && faces->same[k])
-                status = search_operands(&s, i, k, progress, error);
+    *out = (ebpo_face_list){ .boolean = b, .workspace = workspace };
+    ebpo_boolean_find_equal(b, out->same);
+    for (uint32_t i = 0; i < b->count; i++)
+        if (b->solid[i].model->info->face_count > INT32_MAX)
+            return ebpo_fail(error, EBPO_E_LIMIT,
+                             "operand %u has more than 2^31 - 1 faces; cut smaller models", i + 1);
+    ebpo_status status = find_pairs(out, progress, error);
     if (status == EBPO_OK)
-        status = list_partners(&s, error);
-    free(s.pair);
-    return status;
+        status = read_operands(out, progress, error);
+    return status == EBPO_OK ? list_partners(out, error) : status;
+}
+
+void ebpo_face_list_free(ebpo_face_list *faces)
+{
+    ebpo_corner_ids_free(&faces->corners);
+    for (uint32_t i = 0; i < faces->boolean->count; i++)
+        ebpo_whole_faces_free(&faces->whole[i]);
+    free(faces->minus);
+    free(faces->face);
+    free(faces->number);
+    free(faces->pair);
+    free(faces->begin);
+    free(faces->partner);
 }

@@ -1,44 +1,63 @@
-/* The faces of all operands at their poses, with one number for equal corners. */
+/* The faces of the operands that are cut, and the faces beside them, with one number for equal
+ * corners. The other faces stay in the files: components of whole faces (operand_mesh.h) represent
+ * them. */
 #ifndef EBPO_BOOLEAN_FACE_LIST_H
 #define EBPO_BOOLEAN_FACE_LIST_H
 
-#include "extras/boolean/boolean.h"
+#include "extras/boolean/operand_mesh.h"
 #include "extras/collide/face_patches.h"
 
-/* Faces of the operands, one operand after the other, in the order of the files. Equal operands
- * (same content, same pose) are listed once. */
+/* Two intersecting faces, as operands and indices in their files. */
+typedef struct ebpo_operand_pair {
+    uint32_t face[2];
+    uint8_t operand[2];
+} ebpo_operand_pair;
+
+/* Listed faces, one operand after the other, in the order of the files. Equal operands (same
+ * content, same pose) are listed once. */
 typedef struct ebpo_face_list {
     const ebpo_boolean *boolean;
+    ebpo_workspace *workspace; /* NULL: malloc */
     ebpo_corner_ids corners;
     uint64_t given_corners; /* number of corners of faces; those after are added by cuts */
-    uint32_t (*face)[3];    /* corners of each face; EBPO_NO_CORNER first: the face has no area */
+    uint8_t *minus;         /* for each of them: a bit for each coordinate that is -0 */
+    uint64_t minus_capacity;
+    uint32_t (*face)[3]; /* corners of each face; EBPO_NO_CORNER first: the face has no area */
+    uint32_t *number;    /* the face's index in its operand's file */
     uint32_t count;
+    uint64_t face_capacity, number_capacity;
     uint32_t first[EBPO_BOOLEAN_OPERANDS_MAX + 1]; /* first face of each operand */
     /* see ebpo_boolean_find_equal; 0: the operand is not listed */
     uint64_t same[EBPO_BOOLEAN_OPERANDS_MAX];
-    bool floats; /* the coordinates of all files are floats */
-    /* Pairs of intersecting faces: the partners of face i are partner[begin[i]] to partner[begin[i
-     * + 1] - 1], in ascending order. */
+    ebpo_whole_faces whole[EBPO_BOOLEAN_OPERANDS_MAX];
+    /* All intersecting pairs; and then those of faces with an area: the partners of face i are
+     * partner[begin[i]] to partner[begin[i + 1] - 1], in ascending order. */
+    ebpo_operand_pair *pair;
+    uint64_t pairs, pair_capacity;
     uint64_t *begin;
     uint32_t *partner;
 } ebpo_face_list;
 
 #define EBPO_NO_CORNER UINT32_MAX
 
-/* Reads the faces. Must be freed, also after a failure. */
-EBPO_MUST_USE ebpo_status ebpo_face_list_read(ebpo_face_list *out, const ebpo_boolean *b,
+/* Makes the list: finds the pairs of intersecting faces of different operands, and those of one
+ * operand that are not just neighbours, then reads one operand after the other. Must be freed, also
+ * after a failure. */
+EBPO_MUST_USE ebpo_status ebpo_face_list_make(ebpo_face_list *out, const ebpo_boolean *b,
+                                              ebpo_workspace *workspace,
                                               const ebpo_progress *progress, ebpo_error *error);
-
-/* Finds the pairs of intersecting faces of different operands, and those of one operand that are
- * not just neighbours. */
-EBPO_MUST_USE ebpo_status ebpo_face_list_find_pairs(ebpo_face_list *faces,
-                                                    const ebpo_progress *progress,
-                                                    ebpo_error *error);
 
 void ebpo_face_list_free(ebpo_face_list *faces);
 
 /* Returns the operand of a face. */
 uint32_t ebpo_face_list_operand(const ebpo_face_list *faces, uint32_t face);
+
+/* Returns the component of a listed face; EBPO_NO_COMPONENT: the face is not whole. */
+static inline uint32_t ebpo_face_list_component(const ebpo_face_list *faces, uint32_t operand,
+                                                uint32_t face)
+{
+    return faces->whole[operand].component[faces->number[face]];
+}
 
 static inline const double *ebpo_face_list_corner(const ebpo_face_list *faces, uint32_t face, int i)
 {

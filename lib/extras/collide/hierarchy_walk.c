@@ -178,9 +178,8 @@ bool ebpo_pair_walk_decide(ebpo_pair_walk *w, uint32_t block_a, uint32_t block_b
             continue;
         if (w->neighbours || !(pairs->pair[i] & EBPO_CERTAINLY_CROSSING)) {
             const double(*a)[3] = posed_corners(&posed, w, 0, block_a, lane_a),
-                        (*b)[3] = posed_corners(&posed, w, 1, block_b, lane_b);
-            found.kind =
-                (int32_t)(w->neighbours ? neighbour_kind(a, b) : ebpo_triangle_pair(a, b));
+                  (*b)[3] = posed_corners(&posed, w, 1, block_b, lane_b);
+            found.kind = (int32_t)(w->neighbours ? neighbour_kind(a, b) : ebpo_triangle_pair(a, b));
             w->exact++;
         }
         if (found.kind == EBPO_PAIR_APART)

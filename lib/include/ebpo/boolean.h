@@ -285,11 +285,17 @@ typedef struct ebpo_boolean_mesh_options {
     bool origins;
 
     uint8_t reserved[6];
+
+    /*
+     * Holds the arrays of the mesh, and those that grow with the operands; free it after the mesh.
+     * NULL: no limit of memory.
+     */
+    ebpo_workspace *workspace;
 } ebpo_boolean_mesh_options;
 
-#define EBPO_BOOLEAN_MESH_OPTIONS_INIT                                         \
-    {                                                                          \
-        sizeof(ebpo_boolean_mesh_options), { NULL, NULL }, false, false, { 0 } \
+#define EBPO_BOOLEAN_MESH_OPTIONS_INIT                                               \
+    {                                                                                \
+        sizeof(ebpo_boolean_mesh_options), { NULL, NULL }, false, false, { 0 }, NULL \
     }
 
 typedef struct ebpo_boolean_mesh_report {

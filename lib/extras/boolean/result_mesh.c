@@ -1,0 +1,428 @@
+/* Writes the triangles that bound the result into a mesh.
+ *
+ * Each operand is read again. Its faces are visited in order: those in the list give their
+ * triangles of the cut mesh; each other face is whole, and bounds the result if the listed faces of
+ * its component do. Vertices are numbered by first use. A corner of a listed face has the number of
+ * its vertex in the cut mesh, so whole faces and triangles share vertices. Faces have the numbers of
+ * the operand's source if its file has maps, otherwise those of the file, as in all queries. */
+#include "core/strict_fp.h"
+
+#include "extras/boolean/result_mesh.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/parallel.h"
+#include "core/workspace.h"
+#include "mesh/attributes.h"
+#include "mesh/mesh_parts.h"
+
+#define NO_NUMBER UINT32_MAX
+
+typedef struct output {
+    const ebpo_cut_mesh *cut;
+    const int8_t *sign;
+    int8_t *of_component[EBPO_BOOLEAN_OPERANDS_MAX]; /* signs of whole faces */
+    bool doubles;
+    uint32_t *number;        /* for each vertex of the cut mesh: its number, or NO_NUMBER */
+    ebpo_corner_ids rounded; /* positions of those that have a number; equal ones share it */
+    uint32_t *of_rounded;    /* number of each of these positions */
+    uint64_t of_rounded_capacity;
+    ebpo_boolean_mesh_report *report;
+    ebpo_mesh *mesh;
+    uint8_t *operand; /* attributes of faces, or NULL */
+    uint8_t *operand_face;
+} output;
+
+/* The operand that is read. */
+typedef struct operand_output {
+    output *o;
+    uint32_t operand;
+    ebpo_mesh mesh; /* posed */
+    ebpo_maps maps;
+    bool repeats;
+    ebpo_positions first; /* if vertices have equal positions */
+    uint64_t *near;       /* a bit for each corner of a listed face */
+    uint32_t *number;     /* for each vertex: its number, or NO_NUMBER */
+} operand_output;
+
+/* --- vertices --- */
+
+/* Rounds coordinate k to the nearest float, ties to even. `p`: the exact point, or NULL if the
+ * double is exact. */
+static double round_to_float(double at, const ebpo_exact_point *p, int k, int unit)
+{
+    float nearest = (float)at, other = nextafterf(nearest, at > nearest ? INFINITY : -INFINITY);
+    bool tie = at != nearest && at - nearest == (double)other - at;
+    int side = tie && p ? ebpo_exact_side_of_double(p, k, unit) : 0;
+    if (side != 0)
+        nearest = (side > 0) == (other > nearest) ? other : nearest;
+    return nearest;
+}
+
+/* Adds a vertex, for which there is memory; returns its number. */
+static uint32_t add_vertex(output *o, const double at[3])
+{
+    uint64_t v = o->mesh->vertex_count++;
+    for (unsigned k = 0; k < 3; k++)
+        if (o->doubles)
+            o->mesh->xyz64[3 * v + k] = at[k];
+        else
+            o->mesh->xyz32[3 * v + k] = (float)at[k];
+    return (uint32_t)v;
+}
+
+/* Gets the double nearest to each coordinate of a vertex of the cut mesh, and the exact point, or
+ * NULL if they are exact. */
+static const ebpo_exact_point *get_cut_vertex(const output *o, uint32_t v, double at[3])
+{
+    const ebpo_face_list *faces = o->cut->faces;
+    uint64_t corners = faces->corners.count;
+    const ebpo_exact_point *p = v < corners ? NULL : &o->cut->set.point[v - corners];
+    memcpy(at, p ? p->at : faces->corners.at[v], 3 * sizeof *at);
+    for (int k = 0; k < 3 && v < faces->given_corners; k++)
+        at[k] = faces->minus[v] >> k & 1 ? -0.0 : at[k];
+    return p;
+}
+
+/* Numbers a vertex of the cut mesh. Returns false without memory. */
+static bool number_cut_vertex(output *o, uint32_t v)
+{
+    double at[3], out[3], moved;
+    uint32_t id;
+    if (o->number[v] != NO_NUMBER)
+        return true;
+    const ebpo_exact_point *p = get_cut_vertex(o, v, at);
+    for (int k = 0; k < 3; k++)
+        out[k] = o->doubles ? at[k] : round_to_float(at[k], p, k, o->cut->unit);
+    moved = p ? ebpo_exact_distance(p, out, o->cut->unit)
+              : hypot(hypot(out[0] - at[0], out[1] - at[1]), out[2] - at[2]);
+    o->report->displacement = fmax(o->report->displacement, moved);
+    o->report->new_vertices += p || v >= o->cut->faces->given_corners;
+    uint64_t known = o->rounded.count;
+    if (!ebpo_corner_id(&o->rounded, out, &id) ||
+        !ebpo_grow(&o->of_rounded, &o->of_rounded_capacity, o->rounded.count,
+                   sizeof *o->of_rounded))
+        return false;
+    if (id == known)
+        o->of_rounded[id] = add_vertex(o, out);
+    o->number[v] = o->of_rounded[id];
+    return true;
+}
+
+static void note_displacement(output *o, const double at[3])
+{
+    double moved[3], most = 0;
+    for (int k = 0; k < 3; k++) {
+        moved[k] = fabs((double)(float)at[k] - at[k]);
+        most = moved[k] > most ? moved[k] : most;
+    }
+    if (2 * most > o->report->displacement)
+        o->report->displacement =
+            fmax(o->report->displacement, hypot(hypot(moved[0], moved[1]), moved[2]));
+}
+
+/* Numbers a vertex of the operand. Returns false without memory. */
+static bool number_vertex(operand_output *r, uint32_t v)
+{
+    output *o = r->o;
+    double at[3];
+    uint32_t corner;
+    ebpo_mesh_position(&r->mesh, v, at);
+    if (ebpo_has_bit(r->near, v)) {
+        if (!ebpo_corner_id(&o->cut->faces->corners, at, &corner) || !number_cut_vertex(o, corner))
+            return false;
+        r->number[v] = o->number[corner];
+        return true;
+    }
+    if (!o->doubles && r->mesh.xyz64)
+        note_displacement(o, at);
+    r->number[v] = add_vertex(o, at);
+    return true;
+}
+
+/* --- faces --- */
+
+/* Adds a face of the operand, with the numbers of its corners. A face that lost a corner by
+ * rounding is omitted: its two other edges are then the same edge in both directions. */
+static void add_face(operand_output *r, uint64_t face, const uint32_t corner[3], int sign)
+{
+    output *o = r->o;
+    uint64_t at = o->mesh->face_count;
+    uint32_t *to = o->mesh->faces + 3 * at, number = (uint32_t)face;
+    if (corner[0] == corner[1] || corner[1] == corner[2] || corner[2] == corner[0])
+        return;
+    to[0] = corner[0];
+    to[1] = corner[sign > 0 ? 1 : 2];
+    to[2] = corner[sign > 0 ? 2 : 1];
+    o->mesh->face_count++;
+    if (!o->operand)
+        return;
+    if (r->maps.face_source)
+        number = r->maps.face_source[face];
+    o->operand[at] = (uint8_t)r->operand;
+    memcpy(o->operand_face + sizeof number * at, &number, sizeof number);
+}
+
+static void get_corners(const operand_output *r, uint64_t face, uint32_t out[3])
+{
+    for (int i = 0; i < 3; i++) {
+        out[i] = r->mesh.faces[3 * face + (unsigned)i];
+        if (r->repeats)
+            out[i] = ebpo_positions_first(&r->first, out[i]);
+    }
+}
+
+static bool add_whole_face(operand_output *r, uint64_t face, int sign)
+{
+    uint32_t corner[3];
+    get_corners(r, face, corner);
+    for (int i = 0; i < 3; i++) {
+        if (r->number[corner[i]] == NO_NUMBER && !number_vertex(r, corner[i]))
+            return false;
+        corner[i] = r->number[corner[i]];
+    }
+    add_face(r, face, corner, sign);
+    return true;
+}
+
+static bool add_triangle(operand_output *r, uint64_t face, uint64_t t)
+{
+    output *o = r->o;
+    uint32_t corner[3];
+    if (o->sign[t] == 0)
+        return true;
+    for (int i = 0; i < 3; i++) {
+        if (!number_cut_vertex(o, o->cut->triangle[t][i]))
+            return false;
+        corner[i] = o->number[o->cut->triangle[t][i]];
+    }
+    add_face(r, face, corner, o->sign[t]);
+    return true;
+}
+
+/* --- one operand --- */
+
+static void mark_near(operand_output *r)
+{
+    const ebpo_face_list *faces = r->o->cut->faces;
+    for (uint32_t i = faces->first[r->operand]; i < faces->first[r->operand + 1]; i++) {
+        uint32_t corner[3];
+        get_corners(r, faces->number[i], corner);
+        for (int k = 0; k < 3; k++)
+            ebpo_set_bit(r->near, corner[k]);
+    }
+}
+
+static bool add_faces(operand_output *r)
+{
+    const output *o = r->o;
+    const ebpo_face_list *faces = o->cut->faces;
+    const ebpo_whole_faces *whole = &faces->whole[r->operand];
+    uint32_t listed = faces->first[r->operand];
+    uint64_t t = 0, high = o->cut->count;
+    while (t < high) { /* finds the first triangle of the operand */
+        uint64_t middle = t + (high - t) / 2;
+        if (o->cut->face[middle] < listed)
+            t = middle + 1;
+        else
+            high = middle;
+    }
+    EBPO_FOR_ITEMS(r->mesh.workspace, f, 0, r->mesh.face_count)
+    {
+        if (ebpo_has_bit(whole->listed, f)) {
+            for (; t < o->cut->count && o->cut->face[t] == listed; t++)
+                if (!add_triangle(r, f, t))
+                    return false;
+            listed++;
+        } else {
+            int sign = o->of_component[r->operand][whole->component[f]];
+            if (sign && !add_whole_face(r, f, sign))
+                return false;
+        }
+    }
+    return true;
+}
+
+static ebpo_status read_maps(operand_output *r, ebpo_error *error)
+{
+    const ebpo_model *model = r->o->cut->faces->boolean->solid[r->operand].model;
+    ebpo_read_options how = EBPO_READ_OPTIONS_INIT;
+    ebpo_error cause = EBPO_ERROR_INIT;
+    how.workspace = r->mesh.workspace;
+    how.threads = r->o->cut->faces->boolean->threads;
+    ebpo_status status = ebpo_file_read_maps(model->file, &how, &r->maps, &cause);
+    return status == EBPO_OK || status == EBPO_E_ABSENT
+               ? EBPO_OK
+               : ebpo_fail_operand(model, r->operand, &cause, error);
+}
+
+static ebpo_status add_operand(output *o, uint32_t operand, ebpo_error *error)
+{
+    const ebpo_face_list *faces = o->cut->faces;
+    operand_output r = { .o = o, .operand = operand };
+    ebpo_status status = ebpo_operand_mesh_read(&r.mesh, faces->boolean, operand,
+                                                faces->workspace, error);
+    if (status != EBPO_OK)
+        return status;
+    uint64_t vertices = r.mesh.vertex_count;
+    r.repeats = faces->whole[operand].repeats;
+    r.number = ebpo_array_alloc(faces->workspace, vertices, sizeof *r.number);
+    r.near = ebpo_alloc_zero(vertices / 64 + 1, sizeof *r.near);
+    if (!r.number || !r.near)
+        status = ebpo_workspace_fail(faces->workspace, 4 * vertices, error);
+    if (status == EBPO_OK && r.repeats)
+        status = ebpo_positions_build(&r.first, &r.mesh, faces->boolean->threads, NULL, error);
+    if (status == EBPO_OK && o->operand)
+        status = read_maps(&r, error);
+    if (status == EBPO_OK) {
+        ebpo_array_fill(faces->workspace, r.number, 0xff, vertices * sizeof *r.number);
+        mark_near(&r);
+        if (!add_faces(&r))
+            status = ebpo_fail_memory(error, 40 * o->rounded.count);
+    }
+    ebpo_positions_free(&r.first);
+    ebpo_maps_free(&r.maps);
+    ebpo_array_free(faces->workspace, r.number);
+    free(r.near);
+    ebpo_mesh_free(&r.mesh);
+    return status;
+}
+
+/* --- sizes --- */
+
+/* Copies the signs of listed faces to their components. */
+static ebpo_status find_components(output *o, ebpo_error *error)
+{
+    const ebpo_face_list *faces = o->cut->faces;
+    for (uint32_t i = 0; i < faces->boolean->count; i++) {
+        o->of_component[i] = ebpo_alloc_zero(faces->whole[i].components, 1);
+        if (!o->of_component[i])
+            return ebpo_fail_memory(error, faces->whole[i].components);
+    }
+    for (uint64_t t = 0; t < o->cut->count; t++) {
+        uint32_t face = o->cut->face[t], operand = ebpo_face_list_operand(faces, face),
+                 component = ebpo_face_list_component(faces, operand, face);
+        if (component != EBPO_NO_COMPONENT)
+            o->of_component[operand][component] = o->sign[t];
+    }
+    return EBPO_OK;
+}
+
+/* Returns the number of faces of the result that are not listed. */
+static uint64_t count_whole(const output *o, uint32_t operand)
+{
+    const ebpo_face_list *faces = o->cut->faces;
+    const ebpo_whole_faces *whole = &faces->whole[operand];
+    uint64_t count = 0;
+    EBPO_FOR_ITEMS(faces->workspace, f, 0,
+                   faces->same[operand] ? faces->boolean->solid[operand].model->info->face_count
+                                        : 0)
+        count += !ebpo_has_bit(whole->listed, f) &&
+                 o->of_component[operand][whole->component[f]] != 0;
+    return count;
+}
+
+/* Returns true if an operand has coordinates beyond the range of floats. */
+static bool exceeds_floats(const ebpo_face_list *faces)
+{
+    for (uint32_t i = 0; i < faces->boolean->count; i++)
+        for (int k = 0; k < 6 && faces->same[i]; k++)
+            if (fabs(faces->boolean->solid[i].box[k]) > FLT_MAX)
+                return true;
+    return false;
+}
+
+static bool has_doubles(const ebpo_face_list *faces)
+{
+    for (uint32_t i = 0; i < faces->boolean->count; i++)
+        if (faces->same[i] && faces->boolean->solid[i].model->info->double_coordinates)
+            return true;
+    return false;
+}
+
+static uint8_t *add_array(ebpo_mesh *mesh, const char *name, ebpo_attribute_type type, uint64_t rows)
+{
+    ebpo_attribute like = { .element = "face", .type = type, .columns = 1 };
+    like.list = EBPO_ATTRIBUTE_NO_LIST;
+    memcpy(like.names, name, strlen(name) + 1);
+    ebpo_attribute *a = ebpo_attributes_add(mesh->attributes, &like);
+    return a && ebpo_attribute_reserve(mesh->workspace, a, rows + 1, 0) ? a->values : NULL;
+}
+
+/* Allocates the arrays of the mesh: an empty result has them, too, and so has their types. */
+static ebpo_status make_arrays(output *o, bool origins, ebpo_error *error)
+{
+    const ebpo_face_list *faces = o->cut->faces;
+    ebpo_mesh *mesh = o->mesh;
+    uint64_t vertices = ebpo_cut_mesh_vertices(o->cut), count = 0;
+    for (uint32_t i = 0; i < faces->boolean->count; i++) {
+        uint64_t whole = count_whole(o, i);
+        count += whole;
+        if (whole)
+            vertices += faces->boolean->solid[i].model->info->vertex_count;
+    }
+    for (uint64_t t = 0; t < o->cut->count; t++)
+        count += o->sign[t] != 0;
+    if (count > UINT32_MAX - 2 || vertices > UINT32_MAX - 2)
+        return ebpo_fail(error, EBPO_E_LIMIT, "the result has more than 2^32 - 2 faces or vertices");
+    mesh->faces = ebpo_array_alloc(mesh->workspace, count + 1, 3 * sizeof *mesh->faces);
+    if (o->doubles)
+        mesh->xyz64 = ebpo_array_alloc(mesh->workspace, vertices + 1, 3 * sizeof *mesh->xyz64);
+    else
+        mesh->xyz32 = ebpo_array_alloc(mesh->workspace, vertices + 1, 3 * sizeof *mesh->xyz32);
+    if (!mesh->faces || (!mesh->xyz32 && !mesh->xyz64))
+        return ebpo_workspace_fail(mesh->workspace, 12 * (count + vertices), error);
+    ebpo_status status = origins ? ebpo_mesh_need_attributes(mesh, error) : EBPO_OK;
+    if (status != EBPO_OK || !origins)
+        return status;
+    o->operand = add_array(mesh, "operand", EBPO_ATTRIBUTE_UINT8, count);
+    o->operand_face = add_array(mesh, "operand_face", EBPO_ATTRIBUTE_UINT32, count);
+    return o->operand && o->operand_face ? EBPO_OK
+                                         : ebpo_workspace_fail(mesh->workspace, 5 * count, error);
+}
+
+static ebpo_status add_operands(output *o, const ebpo_progress *progress, ebpo_error *error)
+{
+    const ebpo_face_list *faces = o->cut->faces;
+    ebpo_status status = EBPO_OK;
+    for (uint32_t i = 0; i < faces->boolean->count && status == EBPO_OK; i++) {
+        if (!ebpo_progress_step(progress, "join the result", i, faces->boolean->count, error))
+            return EBPO_E_CANCELLED;
+        if (faces->same[i])
+            status = add_operand(o, i, error);
+    }
+    return status;
+}
+
+ebpo_status ebpo_result_mesh_make(const ebpo_cut_mesh *cut, const int8_t *sign,
+                                  const ebpo_boolean_mesh_options *options, ebpo_mesh *mesh,
+                                  ebpo_boolean_mesh_report *report, ebpo_error *error)
+{
+    output o = { .cut = cut, .sign = sign, .report = report, .mesh = mesh };
+    uint64_t vertices = ebpo_cut_mesh_vertices(cut);
+    mesh->workspace = cut->faces->workspace;
+    o.doubles = options->doubles || has_doubles(cut->faces) || exceeds_floats(cut->faces);
+    o.number = ebpo_alloc(vertices, sizeof *o.number);
+    ebpo_status status = o.number ? EBPO_OK : ebpo_fail_memory(error, 4 * vertices);
+    for (uint64_t v = 0; v < vertices && o.number; v++)
+        o.number[v] = NO_NUMBER;
+    if (status == EBPO_OK)
+        status = find_components(&o, error);
+    if (status == EBPO_OK)
+        status = make_arrays(&o, options->origins, error);
+    if (status == EBPO_OK)
+        status = add_operands(&o, &options->progress, error);
+    for (uint64_t i = 0; i < (mesh->attributes ? mesh->attributes->count : 0); i++)
+        mesh->attributes->array[i].rows = mesh->face_count;
+    for (uint32_t i = 0; i < EBPO_BOOLEAN_OPERANDS_MAX; i++)
+        free(o.of_component[i]);
+    free(o.number);
+    free(o.of_rounded);
+    ebpo_corner_ids_free(&o.rounded);
+    return status;
+}
