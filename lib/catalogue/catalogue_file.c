@@ -1,4 +1,4 @@
-/* Catalogues: a list of entries, made of a JSON file or of an array.
+/* Makes a catalogue, a list of models with their boxes, from a JSON file or an array.
  *
  * A catalogue file is untrusted input. Every used member is checked for its kind and range before
  * the catalogue is made: paths are texts, digests are 64 hexadecimal digits, boxes have two corners
@@ -268,7 +268,7 @@ static ebpo_status read_path(const reader *r, const json_t *model, const char *k
     char what[64];
     if (!value || json_is_null(value) || (json_is_string(value) && !json_string_length(value)))
         return EBPO_OK;
-    snprintf(what, sizeof what, "%s is not a text", key);
+    snprintf(what, sizeof what, "%s is not a string", key);
     if (!json_is_string(value))
         return bad_model(r, what);
     *out = joined_path(r->folder, json_string_value(value));

@@ -1,4 +1,5 @@
-/* Shared parts of lib/catalogue: the list of entries, and models that are lent to threads. */
+/* Defines the shared parts of lib/catalogue: the list of entries, and open models that threads
+ * share. */
 #ifndef EBPO_CATALOGUE_CATALOGUE_IN_H
 #define EBPO_CATALOGUE_CATALOGUE_IN_H
 

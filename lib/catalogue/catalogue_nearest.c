@@ -42,9 +42,9 @@ static int nearest_first(const void *a, const void *b)
                                 : (x->box > y->box) - (x->box < y->box);
 }
 
-static ebpo_status take_nearest(const search *s, const ebpo_catalogue_run *run,
-                                const ebpo_catalogue_held *model, ebpo_distance_result *reported,
-                                ebpo_error *error)
+static ebpo_status merge_nearest(const search *s, const ebpo_catalogue_run *run,
+                                 const ebpo_catalogue_held *model, ebpo_distance_result *reported,
+                                 ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < run->count && status == EBPO_OK; i++) {
@@ -76,7 +76,7 @@ static ebpo_status query_distances(ebpo_context *context, const ebpo_catalogue_h
     o.unsigned_distance = true;
     ebpo_status status = ebpo_distance_many(context, run->rows, run->count, &o, reported, error);
     if (status == EBPO_OK)
-        status = take_nearest(s, run, model, reported, error);
+        status = merge_nearest(s, run, model, reported, error);
     free(reported);
     return status;
 }
@@ -251,9 +251,9 @@ static ebpo_status is_nearer(const shot *s, ebpo_context *context, const ebpo_ra
     return status;
 }
 
-static ebpo_status take_hits(const shot *s, const ebpo_catalogue_run *run, const ebpo_ray *rays,
-                             ebpo_context *context, const ebpo_catalogue_held *model,
-                             ebpo_ray_hit *reported, ebpo_error *error)
+static ebpo_status merge_hits(const shot *s, const ebpo_catalogue_run *run, const ebpo_ray *rays,
+                              ebpo_context *context, const ebpo_catalogue_held *model,
+                              ebpo_ray_hit *reported, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < run->count && status == EBPO_OK; i++) {
@@ -290,7 +290,7 @@ static ebpo_status query_hits(ebpo_context *context, const ebpo_catalogue_held *
     if (status == EBPO_OK)
         status = ebpo_ray_first_many(context, rays, run->count, &how, reported, error);
     if (status == EBPO_OK)
-        status = take_hits(s, run, rays, context, model, reported, error);
+        status = merge_hits(s, run, rays, context, model, reported, error);
     free(reported);
     free(rays);
     return status;

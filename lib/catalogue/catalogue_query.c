@@ -1,5 +1,5 @@
-/* Queries to a catalogue: they are cut into stretches. One thread processes a stretch, and queries
- * each model once for it.
+/* Evaluates queries to a catalogue. They are divided into stretches. One thread processes a
+ * stretch, and queries each model once for it.
  *
  * Points are taken in laps of some millions of points, and each lap in the order of the Morton
  * curve of the catalogue's box, so that a stretch visits few models and few of their subtrees; a

@@ -1,4 +1,4 @@
-/* Open models of any number of catalogues, all within one memory budget.
+/* Keeps open models of any number of catalogues, all within one memory budget.
  *
  * A model is identified by the path and digest of its file, the options of opening, its face
  * numbers, and its share of the budget. The share is the same for each model of a catalogue, but at
@@ -298,8 +298,8 @@ static uint64_t share_of(const ebpo_catalogue_models *h, const ebpo_catalogue *c
 
 /* Returns the model with this key, new or already open, as used by the calling thread. Returns NULL
  * without memory. */
-static ebpo_catalogue_held *take_model(ebpo_catalogue_models *h, const ebpo_catalogue *c,
-                                       wanted *key)
+static ebpo_catalogue_held *acquire_model(ebpo_catalogue_models *h, const ebpo_catalogue *c,
+                                          wanted *key)
 {
     ebpo_catalogue_held *m;
     pthread_mutex_lock(&h->lock);
@@ -385,7 +385,7 @@ ebpo_status ebpo_catalogue_lend(ebpo_catalogue_models *models, const ebpo_catalo
     ebpo_context *context = NULL;
     const ebpo_catalogue_entry *e = &c->entry[number];
     wanted key = key_of(c, e, surface && e->surface);
-    ebpo_catalogue_held *m = take_model(models, c, &key);
+    ebpo_catalogue_held *m = acquire_model(models, c, &key);
     if (!m)
         return ebpo_fail_memory(error, sizeof *m);
     pthread_rwlock_rdlock(&m->query_lock);

@@ -1,5 +1,5 @@
-/* For each face of a part, its number in the whole model. The file is a .npy of integers with one
- * dimension (NumPy's format, versions 1 to 3), from which any thread reads single numbers when
+/* Reads, for each face of a part, its index in the whole model. The file is a .npy of integers with
+ * one dimension (NumPy's format, versions 1 to 3), from which any thread reads single numbers when
  * needed.
  *
  * The file is untrusted input, as is the catalogue that refers to it. Its header is read once: the

@@ -175,8 +175,8 @@ static uint32_t cell_slot(const ebpo_box *box, int axis, int level, double x)
     return k;
 }
 
-/* Returns an octcode, shifted as if it were of level 20, so that its leading bits are always at the
- * same position. Vertices without faces come after all others. */
+/* Returns an octcode (locational code), shifted as if it were of level 20, so that its leading bits
+ * are always at the same position. Vertices without faces come after all others. */
 static uint64_t key_of(const arranging *a, uint64_t v)
 {
     const ebpo_box *box = &a->to->box;
@@ -232,7 +232,7 @@ static int compare_doubles(const void *x, const void *y)
     return compare_points(a->p, b->p, a->at, b->at);
 }
 
-static void take_vertices(void *context, uint64_t place, const void *records, uint64_t count)
+static void store_vertices(void *context, uint64_t place, const void *records, uint64_t count)
 {
     arranging *a = context;
     for (uint64_t i = 0; i < count; i++, place++) {
@@ -278,7 +278,7 @@ static ebpo_status sort_vertices(arranging *a, ebpo_error *error)
                        .context = a,
                        .make = make_vertices,
                        .compare = mesh->xyz32 ? compare_floats : compare_doubles,
-                       .take = take_vertices };
+                       .take = store_vertices };
     return ebpo_sort_run(&sort, error);
 }
 
@@ -376,7 +376,7 @@ static int compare_faces(const void *x, const void *y)
     return (a->key > b->key) - (a->key < b->key); /* keys differ */
 }
 
-static void take_faces(void *context, uint64_t place, const void *records, uint64_t count)
+static void store_faces(void *context, uint64_t place, const void *records, uint64_t count)
 {
     arranging *a = context;
     const face_record *r = records;
@@ -412,7 +412,7 @@ static ebpo_status sort_faces(arranging *a, ebpo_error *error)
                        .context = a,
                        .make = make_faces,
                        .compare = compare_faces,
-                       .take = take_faces };
+                       .take = store_faces };
     return ebpo_sort_run(&sort, error);
 }
 

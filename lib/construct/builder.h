@@ -1,5 +1,5 @@
-/* The builder's state, shared by its stages. Before the stages, vertices and faces are arranged
- * along the Morton curve. The stages are:
+/* Defines the builder's state, which its stages share. Before the stages, vertices and faces are
+ * arranged along the Morton curve. The stages are:
  *   1. The top of the tree:
  *      - partition assigns faces to the pieces into which the tree is cut;
  *      - corner_windings computes winding numbers;

@@ -149,8 +149,8 @@ static void fill_info(ebpo_info *info, const ebpo_builder *b, const ebpo_mesh *m
     info->selection = o->select;
     info->percent = traits->from_leaves && !(o->k_root > 0) ? o->percent : 0;
     info->k_root = traits->from_leaves ? o->k_root : 0;
-    info->normals = traits->takes_normals ? o->normals : 0;
-    info->seed = traits->takes_seed ? o->seed : 0;
+    info->normals = traits->uses_normal_distance ? o->normals : 0;
+    info->seed = traits->uses_seed ? o->seed : 0;
     if (repair_record)
         info->repair_record = *repair_record;
     info->report = *report;

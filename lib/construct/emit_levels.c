@@ -1,10 +1,10 @@
 /* Turns finished pieces into the arrays of the levels.
  *
- * A depth-first walk of a piece visits the nodes of each level in octcode order, so a piece's part
- * of each level array is one stretch. Stretches are joined in the depth-first order of the pieces,
- * which is octcode order too. The nodes of the top add separate stretches. Leaves refer to faces by
- * their numbers along the curve until all pieces are done, as the final numbers of another piece's
- * faces are not known before.
+ * A depth-first walk of a piece visits the nodes of each level in order of octcodes (locational
+ * codes), so a piece's part of each level array is one stretch. Stretches are joined in the
+ * depth-first order of the pieces, which is octcode order too. The nodes of the top add separate
+ * stretches. Leaves refer to faces by their numbers along the curve until all pieces are done, as
+ * the final numbers of another piece's faces are not known before.
  *
  * Arrays without information are omitted: those that the options exclude, and those with only
  * default values. Volumes are added in a fixed order, so the number of threads does not change the

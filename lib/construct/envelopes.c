@@ -66,8 +66,8 @@ static void sample_faces(const ebpo_builder *b, const ebpo_branch *s, const uint
     *skip = i - end;
 }
 
-static int take_sample(const ebpo_builder *b, const ebpo_branch *s, const ebpo_build_detail *d,
-                       uint32_t *sample)
+static int sample_candidates(const ebpo_builder *b, const ebpo_branch *s,
+                             const ebpo_build_detail *d, uint32_t *sample)
 {
     int count = 0;
     uint64_t skip = 0, total = 0;
@@ -116,7 +116,7 @@ static int build_candidates(const ebpo_builder *b, candidates_scratch *scratch,
                             ebpo_candidate *out)
 {
     normal_bin *table = scratch->table;
-    int used = 0, count = take_sample(b, s, detail, scratch->sample);
+    int used = 0, count = sample_candidates(b, s, detail, scratch->sample);
     uint32_t width = 1;
     while (!fill_bins(table, &used, scratch->slots, scratch->sample, count, width, most))
         width = width < 4 ? 4 : width + width / 2;
@@ -282,9 +282,9 @@ static void try_hull(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, do
 /* Points this near to the hull give nearly equal directions. */
 static const double hull_tolerance = 1e-3;
 
-/* Takes all points of the node. Returns false when there are too many, or when vertices were not
+/* Uses all points of the node. Returns false when there are too many, or when vertices were not
  * gathered as points. */
-static bool take_points(ebpo_envelope_scratch *s)
+static bool use_all_points(ebpo_envelope_scratch *s)
 {
     const ebpo_supports *from = &s->supports;
     if (from->begin < from->end || from->count > EBPO_HULL_POINTS)
@@ -376,7 +376,7 @@ static int choose_now(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebp
     s->count = s->tried_count = s->core_count = 0;
     if (!(volume > 0))
         return 0;
-    if (!take_points(s) ||
+    if (!use_all_points(s) ||
         (choice.core = hull_candidates(s, cell.level <= TOP_LEVELS ? 1e-9 : hull_tolerance)) < 0) {
         choose_directions(b, s, branch, detail, cell.level, envelope, volume, epsilon);
         choice.core = 0;

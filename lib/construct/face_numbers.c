@@ -1,4 +1,4 @@
-/* Gives faces and vertices their final numbers, and puts the mesh into that order.
+/* Assigns final indices to faces and vertices, and puts the mesh into that order.
  *
  * A face is numbered in the first leaf, depth first, that lists it; a vertex by the first face that
  * uses it. So a leaf's new faces are one range in the file, and only the leaf's other faces need

@@ -1,7 +1,7 @@
-/* Convex polytopes without a limit on faces: the method of geometry/polytope.c (BP 2008, section
- * 3.4.3) on arrays that grow. A cut builds a second shape, which replaces the first if the cut
- * succeeds. Vertices within a tolerance of the cutting plane are on it. A cut that rounding would
- * spoil is refused, so the polytope is never too small. */
+/* Cuts convex polytopes without a limit on faces, by the method of geometry/polytope.c (BP 2008,
+ * section 3.4.3) on arrays that grow. A cut builds a second shape, which replaces the first if the
+ * cut succeeds. Vertices within a tolerance of the cutting plane are on it. A cut that rounding
+ * would spoil is refused, so the polytope is never too small. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -150,7 +150,7 @@ static uint32_t edge_vertex(ebpo_large_polytope *p, uint32_t in, uint32_t out)
     return p->edge[at].vertex;
 }
 
-static void note_rim(ebpo_large_polytope *p, uint32_t from, uint32_t to)
+static void record_rim(ebpo_large_polytope *p, uint32_t from, uint32_t to)
 {
     if (from == to || !p->on[from] || !p->on[to])
         return;
@@ -181,7 +181,7 @@ static void clip_loop(ebpo_large_polytope *p, uint64_t f)
         return;
     shape_face(p, to, s->tag[f]);
     for (uint64_t i = start; i < to->corner_count; i++)
-        note_rim(p, to->corner[i], to->corner[i + 1 < to->corner_count ? i + 1 : start]);
+        record_rim(p, to->corner[i], to->corner[i + 1 < to->corner_count ? i + 1 : start]);
 }
 
 static bool is_paired(const ebpo_large_polytope *p, uint64_t i)

@@ -86,8 +86,8 @@ static ebpo_status no_memory_for_cells(ebpo_error *error)
 
 /* Lists the faces that cross the cell's faces (or touch an upper cell face): such a face has a
  * vertex outside the cell's run of vertices. */
-static bool note_crossing(const ebpo_builder *b, ebpo_branch *s, ebpo_cell cell,
-                          const uint32_t *list, uint64_t count, ebpo_build_detail *detail)
+static bool record_crossing(const ebpo_builder *b, ebpo_branch *s, ebpo_cell cell,
+                            const uint32_t *list, uint64_t count, ebpo_build_detail *detail)
 {
     uint64_t begin, end;
     ebpo_build_vertex_range(b, cell, &begin, &end);
@@ -257,7 +257,7 @@ static ebpo_status grow_node(grower *g, uint32_t index, ebpo_cell cell, uint64_t
         return no_memory_for_cells(g->error);
     s->nodes[index] = (ebpo_build_node){ EBPO_GRAY, child, detail };
     ebpo_build_detail d = { .entry_begin = s->entry_count };
-    if (!note_crossing(g->b, s, cell, g->stack + at, count, &d))
+    if (!record_crossing(g->b, s, cell, g->stack + at, count, &d))
         status = no_memory_for_cells(g->error);
     for (unsigned o = 0; o < 8 && status == EBPO_OK; o++)
         status = grow_node(g, child + o, ebpo_cell_child(cell, o), begin[o],

@@ -1,4 +1,5 @@
-/* Data of the pieces of the tree during the build (pieces.c). */
+/* Defines the data of the pieces of the tree during the build: subtrees that are built separately
+ */
 #ifndef EBPO_CONSTRUCT_PIECES_H
 #define EBPO_CONSTRUCT_PIECES_H
 

@@ -70,7 +70,7 @@ ebpo_select_fn ebpo_selection_function(ebpo_selection selection);
  * Candidates may have equal normals. Returns false when out of memory. */
 bool ebpo_choose_candidates(ebpo_selection selection, const ebpo_choice *choice, bool *chosen);
 
-/* Takes, again and again, the plane that removes the most volume, until the gain falls below
+/* Selects, again and again, the plane that removes the most volume, until the gain falls below
  * epsilon * cell volume. Gains are evaluated lazily. */
 int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes);
 

@@ -1,5 +1,5 @@
-/* The closed components of a mesh, and the effect of a rule on the winding numbers on both sides of
- * each. */
+/* Finds the closed components of a mesh (shells), and the effect of a rule on the winding numbers
+ * on both sides of each. */
 #ifndef EBPO_CONSTRUCT_SOLID_SHELLS_H
 #define EBPO_CONSTRUCT_SOLID_SHELLS_H
 

@@ -1,5 +1,5 @@
-/* The support of the solid in a gray node's cell, and bounds of runs of vertices along the curve
- * (supports.c). */
+/* Computes the support of the solid in a gray node's cell (the greatest n . x for a direction n),
+ * and bounds of runs of vertices along the curve (supports.c). */
 #ifndef EBPO_CONSTRUCT_SUPPORTS_H
 #define EBPO_CONSTRUCT_SUPPORTS_H
 

@@ -54,7 +54,7 @@ static int64_t cut_by_chosen(ebpo_large_polytope *own, const ebpo_choice *choice
     return planes;
 }
 
-/* Gives the corners of the faces that planes made. */
+/* Returns the corners of the envelope's faces that planes made. */
 static bool give_corners(const ebpo_large_polytope *own, ebpo_handover *out)
 {
     const ebpo_large_shape *s = &own->now;

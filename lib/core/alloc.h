@@ -1,5 +1,5 @@
-/* Allocation with checked sizes. Every array whose size comes from a file or a mesh is allocated
- * here, or by a workspace (core/workspace.h) if it may be larger than memory. */
+/* Allocates memory with checked sizes. Every array whose size comes from a file or a mesh is
+ * allocated here, or by a workspace (core/workspace.h) if it may be larger than memory. */
 #ifndef EBPO_CORE_ALLOC_H
 #define EBPO_CORE_ALLOC_H
 

@@ -1,8 +1,8 @@
-/* Caches of items under a budget. A pool has one lock, one table of slots by cache and key, and one
- * order of last use for all its caches; a cache with a separate budget has its own pool. Memory for
- * an item is reserved before it is loaded, and the lock is not held while a source loads or
- * releases. Meanwhile the slot is LOADING, and threads that want the same key wait. Waiting
- * reservations are served in order of arrival; otherwise a large one might wait for ever. A
+/* Keeps items in caches under a memory budget. A pool has one lock, one table of slots by cache and
+ * key, and one order of last use for all its caches; a cache with a separate budget has its own
+ * pool. Memory for an item is reserved before it is loaded, and the lock is not held while a source
+ * loads or releases. Meanwhile the slot is LOADING, and threads that want the same key wait.
+ * Waiting reservations are served in order of arrival; otherwise a large one might wait for ever. A
  * background thread loads prefetched keys; it evicts no item that is in use or in the same
  * prefetch. */
 #include <inttypes.h>
@@ -158,7 +158,7 @@ static cache_slot *add_slot(cache_slots *t, struct ebpo_cache *owner, uint64_t k
     return s;
 }
 
-static void take_slot_out(cache_slots *t, cache_slot *s)
+static void remove_slot(cache_slots *t, cache_slot *s)
 {
     cache_slot **at = bucket_of(t->bucket, t->bucket_count, s->owner, s->key);
     while (*at != s)
@@ -229,7 +229,7 @@ static void release_leaving(ebpo_cache_pool *p, cache_slot *leaving)
 static void drop_item(ebpo_cache_pool *p, cache_slot *s, cache_slot **leaving)
 {
     unlink_slot(&p->slots, s);
-    take_slot_out(&p->slots, s);
+    remove_slot(&p->slots, s);
     p->passing += s->bytes;
     s->owner->leaving++;
     s->chain = *leaving;
@@ -300,7 +300,7 @@ static bool wait_in_turn(ebpo_cache_pool *p, const cache_demand *d)
     return got == CAPACITY_MADE;
 }
 
-/* Gives back the reservation of a load. */
+/* Returns the reservation of a load to the budget. */
 static void give_back_reserved(ebpo_cache *c, uint64_t reserved)
 {
     c->stats.bytes -= reserved;
@@ -410,7 +410,7 @@ static void end_load(ebpo_cache *c, cache_slot *s, bool loaded, uint64_t reserve
         else
             link_slot(&c->pool->slots, s);
     } else {
-        take_slot_out(&c->pool->slots, s);
+        remove_slot(&c->pool->slots, s);
         s->state = FAILED;
         if (s->waiters == 0)
             free(s);
@@ -524,7 +524,7 @@ static ebpo_status wait_or_load(ebpo_cache *c, uint64_t key, void **item, ebpo_e
 }
 
 /* Pins an item that is in memory. */
-static bool take_ready(ebpo_cache *c, uint64_t key, void **item)
+static bool pin_ready(ebpo_cache *c, uint64_t key, void **item)
 {
     cache_slot *s = find_slot(&c->pool->slots, c, key);
     if (!s || s->state != READY)
@@ -540,7 +540,7 @@ ebpo_status ebpo_cache_get(ebpo_cache *c, uint64_t key, void **item, bool *hit, 
     ebpo_status status = EBPO_OK;
     *item = NULL;
     pthread_mutex_lock(&c->pool->lock);
-    bool present = take_ready(c, key, item);
+    bool present = pin_ready(c, key, item);
     if (!present) {
         double begin = ebpo_seconds();
         status = wait_or_load(c, key, item, error);
@@ -555,7 +555,7 @@ ebpo_status ebpo_cache_get(ebpo_cache *c, uint64_t key, void **item, bool *hit, 
 bool ebpo_cache_try(ebpo_cache *c, uint64_t key, void **item)
 {
     pthread_mutex_lock(&c->pool->lock);
-    bool present = take_ready(c, key, item);
+    bool present = pin_ready(c, key, item);
     pthread_mutex_unlock(&c->pool->lock);
     return present;
 }
@@ -682,9 +682,9 @@ static bool start_ahead(ebpo_cache *c)
     return started;
 }
 
-/* Takes the list, without repetitions. Items in memory become the newest, the first key last,
- * because it is used next. */
-static void take_list(ebpo_cache *c, const uint64_t *keys, unsigned count)
+/* Replaces the list of items to load ahead, without repetitions. Items in memory become the newest,
+ * the first key last, because it is used next. */
+static void replace_list(ebpo_cache *c, const uint64_t *keys, unsigned count)
 {
     c->ahead_count = c->ahead_next = 0;
     c->prefetch_count++;
@@ -703,7 +703,7 @@ static void take_list(ebpo_cache *c, const uint64_t *keys, unsigned count)
 void ebpo_cache_prefetch(ebpo_cache *c, const uint64_t *keys, unsigned count)
 {
     pthread_mutex_lock(&c->pool->lock);
-    take_list(c, keys, count);
+    replace_list(c, keys, count);
     if (!c->ahead_runs && c->ahead_count)
         c->ahead_runs = start_ahead(c);
     pthread_cond_signal(&c->work_added);

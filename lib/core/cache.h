@@ -43,7 +43,7 @@ EBPO_MUST_USE ebpo_status ebpo_cache_pool_make(ebpo_cache_pool **out, uint64_t b
                                                ebpo_error *error);
 /* Frees the pool; call it after freeing its caches. NULL is allowed. */
 void ebpo_cache_pool_free(ebpo_cache_pool *pool);
-/* Takes bytes from the budget for another purpose, until they are given back. Drops items to free
+/* Reserves bytes of the budget for another purpose, until they are returned. Drops items to free
  * the bytes. EBPO_E_LIMIT: items in use leave too little. */
 EBPO_MUST_USE ebpo_status ebpo_cache_pool_take(ebpo_cache_pool *pool, uint64_t bytes,
                                                ebpo_error *error);
@@ -84,10 +84,10 @@ void ebpo_cache_prefetch(ebpo_cache *cache, const uint64_t *keys, unsigned count
 /* Sets the number of bytes of the budget that are set aside for other data than the items. Loads
  * are refused as if all these bytes were taken. Call it before the cache is used. */
 void ebpo_cache_set_aside(ebpo_cache *cache, uint64_t most);
-/* Takes bytes of those set aside, and drops items to free them. Returns false if too few are left,
+/* Uses bytes of those set aside, and drops items to free them. Returns false if too few are left,
  * or if items in use and running loads leave too little memory now. */
 bool ebpo_cache_take_aside(ebpo_cache *cache, uint64_t bytes);
-/* Gives back bytes taken by ebpo_cache_take_aside. */
+/* Returns bytes that ebpo_cache_take_aside has used. */
 void ebpo_cache_give_back_aside(ebpo_cache *cache, uint64_t bytes);
 
 /* Drops all unpinned items. */

@@ -1,8 +1,8 @@
-/* Errors and versioned structs of public functions. An error has a status and a message that names
- * file, object and offset; the first cause is passed on, not replaced. Structs that begin with
- * their size (ebpo/base.h) work for callers that were compiled with an older or newer version of
- * the header: as many bytes as the caller's version has are read from options and written to
- * results. Fields unknown to this version must be zero. */
+/* Fills in errors and reads versioned structs, for all public functions. An error has a status and
+ * a message that names file, object and offset; the first cause is passed on, not replaced. Structs
+ * that begin with their size (ebpo/base.h) work for callers that were compiled with an older or
+ * newer version of the header: as many bytes as the caller's version has are read from options and
+ * written to results. Fields unknown to this version must be zero. */
 #include <ctype.h>
 #include <errno.h>
 #include <inttypes.h>

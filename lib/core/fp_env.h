@@ -1,5 +1,5 @@
-/* The floating-point environment of public functions: rounding to nearest, denormals kept, no
- * traps, whatever the caller has set.
+/* Sets and restores the floating-point environment in public functions: rounding to nearest,
+ * denormals kept, no traps, whatever the caller has set.
  *
  * EBPO_DEFAULT_FP; as the first line of a public function saves the caller's environment and
  * restores it on every return. Where the caller's environment is already the default, it writes

@@ -1,6 +1,6 @@
-/* Hash tables with open addressing, and random numbers. A table is an array whose number of slots
- * is a power of two; entries are never removed. The user of a table decides what a slot holds: a
- * key, an index, a count. */
+/* Provides hash tables with open addressing, and random numbers. A table is an array whose number
+ * of slots is a power of two; entries are never removed. The user of a table decides what a slot
+ * holds: a key, an index, a count. */
 #ifndef EBPO_CORE_HASH_H
 #define EBPO_CORE_HASH_H
 

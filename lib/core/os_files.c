@@ -1,6 +1,6 @@
-/* Unnamed temporary files. Where the system cannot make a file without a name, the file has one for
- * a moment. The name is stored before the file exists, so that a signal handler can remove the
- * file. Only one file at a time has a name. */
+/* Makes unnamed temporary files. Where the system cannot make a file without a name, the file has
+ * one for a moment. The name is stored before the file exists, so that a signal handler can remove
+ * the file. Only one file at a time has a name. */
 #include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>

@@ -1,4 +1,4 @@
-/* Threads: runs independent pieces of work on several threads, which take the pieces in ascending
+/* Runs independent pieces of work on several threads, which take the pieces in ascending
  * order. The calling thread is the first of them and alone reports progress. The thread of a piece
  * is not determined, so results must not depend on it; of several failures, the one of the lowest
  * piece is returned. All threads of the library are started here, with a fixed stack size and the

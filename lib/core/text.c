@@ -49,7 +49,7 @@ uint64_t ebpo_text_bom_length(const void *text, uint64_t size)
 
 /* Reads a number of exactly `count` digits and moves *text to the first character after it. Returns
  * false if a digit is missing or the number is not within `least` .. `most`. */
-static bool take_digits(const char **text, int count, int least, int most, int *out)
+static bool read_digits(const char **text, int count, int least, int most, int *out)
 {
     *out = 0;
     for (int i = 0; i < count; i++, (*text)++) {
@@ -73,11 +73,11 @@ static int days_in_month(int year, int month)
 static bool is_time(const char *t)
 {
     int n;
-    if (!take_digits(&t, 2, 0, 23, &n) || *t != ':' || (t++, !take_digits(&t, 2, 0, 59, &n)))
+    if (!read_digits(&t, 2, 0, 23, &n) || *t != ':' || (t++, !read_digits(&t, 2, 0, 59, &n)))
         return false;
     if (*t == ':') {
         t++;
-        if (!take_digits(&t, 2, 0, 60, &n)) /* 60: a leap second */
+        if (!read_digits(&t, 2, 0, 60, &n)) /* 60: a leap second */
             return false;
         if (*t == '.' || *t == ',') {
             size_t digits = strspn(t + 1, "0123456789");
@@ -90,7 +90,7 @@ static bool is_time(const char *t)
         return t[1] == 0;
     if (*t == '+' || *t == '-') {
         t++;
-        if (!take_digits(&t, 2, 0, 23, &n) || *t != ':' || (t++, !take_digits(&t, 2, 0, 59, &n)))
+        if (!read_digits(&t, 2, 0, 23, &n) || *t != ':' || (t++, !read_digits(&t, 2, 0, 59, &n)))
             return false;
     }
     return *t == 0;
@@ -99,15 +99,15 @@ static bool is_time(const char *t)
 bool ebpo_is_date(const char *text)
 {
     int year, month, day;
-    if (!take_digits(&text, 4, 0, 9999, &year))
+    if (!read_digits(&text, 4, 0, 9999, &year))
         return false;
     if (*text == 0)
         return true;
-    if (*text++ != '-' || !take_digits(&text, 2, 1, 12, &month))
+    if (*text++ != '-' || !read_digits(&text, 2, 1, 12, &month))
         return false;
     if (*text == 0)
         return true;
-    if (*text++ != '-' || !take_digits(&text, 2, 1, days_in_month(year, month), &day))
+    if (*text++ != '-' || !read_digits(&text, 2, 1, days_in_month(year, month), &day))
         return false;
     return *text == 0 || (*text == 'T' && is_time(text + 1));
 }

@@ -1,10 +1,10 @@
-/* Workspaces: the owners of large arrays. An array is an extent of whole pages, in memory up to
- * half of the budget and then in an unnamed temporary file. Arrays below LEAST_EXTENT are parts of
- * a pool, and those below a page come from malloc. Each extent is a holder of its workspace, so the
- * workspace and the extent may be freed in any order. Pages of a file count towards the budget only
- * while resident: loops release them between pieces of work (ebpo_release_pages), and written data
- * stays in the file. Any thread may allocate and free. docs/develop/building.md describes how a
- * build keeps to a budget. */
+/* Manages workspaces, the owners of large arrays. An array is an extent of whole pages, in memory
+ * up to half of the budget and then in an unnamed temporary file. Arrays below LEAST_EXTENT are
+ * parts of a pool, and those below a page come from malloc. Each extent is a holder of its
+ * workspace, so the workspace and the extent may be freed in any order. Pages of a file count
+ * towards the budget only while resident: loops release them between pieces of work
+ * (ebpo_release_pages), and written data stays in the file. Any thread may allocate and free.
+ * docs/develop/building.md describes how a build keeps to a budget. */
 #include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
@@ -195,7 +195,7 @@ static bool is_at(const extent *b, const void *at) { return b->at == at && b->ki
 /* Removes the extent that begins at `at` from the table and returns it, or NULL if the workspace
  * has none there. Never returns a pool, but the pool's first part, which begins at the same
  * address. */
-static extent *take_extent(ebpo_workspace *w, const void *at)
+static extent *remove_extent(ebpo_workspace *w, const void *at)
 {
     pthread_mutex_lock(&w->table_lock);
     extent **link = extent_bucket(w, at), *found = NULL;
@@ -237,7 +237,7 @@ static void subtract_bytes(ebpo_workspace *w, size_t bytes, bool filed)
 }
 
 /* Allocates blocks of a file; returns 0 or an errno value. */
-static int take_blocks(int fd, size_t bytes)
+static int allocate_blocks(int fd, size_t bytes)
 {
 #ifdef EBPO_HAVE_POSIX_FALLOCATE
     int fault;
@@ -261,7 +261,7 @@ static int take_blocks(int fd, size_t bytes)
  * a signal. */
 static void *map_file(ebpo_workspace *w, size_t bytes)
 {
-    int fd = ebpo_open_unnamed(w->folder), fault = fd < 0 ? errno : take_blocks(fd, bytes);
+    int fd = ebpo_open_unnamed(w->folder), fault = fd < 0 ? errno : allocate_blocks(fd, bytes);
     void *at = MAP_FAILED;
     if (fault == 0) {
         at = mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
@@ -359,7 +359,7 @@ static void leave_pool(ebpo_workspace *w, extent *pool)
     unmap_extent(w, pool);
 }
 
-/* Gives back a part's memory or blocks, if possible. */
+/* Frees a part's memory or blocks, if possible. */
 static void give_back(const extent *b)
 {
 #ifdef EBPO_HAVE_MADV_REMOVE
@@ -415,7 +415,7 @@ void ebpo_array_free(ebpo_workspace *workspace, void *array)
 {
     /* malloc returns whole pages only by chance: the table decides */
     extent *b = workspace && array && (uintptr_t)array % PAGE_BYTES == 0
-                    ? take_extent(workspace, array)
+                    ? remove_extent(workspace, array)
                     : NULL;
     if (b)
         free_extent(workspace, b);

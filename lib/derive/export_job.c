@@ -1,8 +1,8 @@
-/* Functions that all export formats share. They read a block from the file: a level with its nodes
- * and colours, or the mesh with its source indices and colours. They make the block's columns
- * (values of each polygon or face), float32 coordinates for formats that need them, and the entries
- * in the report. Where the counts are known, limits of formats are checked before anything is read.
- */
+/* Reads the data that all export formats share. Its functions read a block from the file: a level
+ * with its nodes and colours, or the mesh with its source indices and colours. They make the
+ * block's columns (values of each polygon or face), float32 coordinates for formats that need them,
+ * and the entries in the report. Where the counts are known, limits of formats are checked before
+ * anything is read. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -41,7 +41,7 @@ int ebpo_block_level(const ebpo_export_options *o, int i)
 }
 
 /* Replaces the colours of the mesh by the caller's colours. */
-static ebpo_status take_colours(ebpo_block *out, const uint8_t *rgba, ebpo_error *error)
+static ebpo_status replace_colours(ebpo_block *out, const uint8_t *rgba, ebpo_error *error)
 {
     uint64_t bytes = 4 * out->mesh.vertex_count;
     uint8_t *copy = ebpo_alloc(bytes, 1);
@@ -67,7 +67,7 @@ static ebpo_status read_mesh(ebpo_block *out, const ebpo_file *file, ebpo_block_
     if (status == EBPO_OK)
         status = ebpo_mesh_colours(&out->mesh, &out->colours, error);
     if (status == EBPO_OK && options->vertex_colours)
-        status = take_colours(out, options->vertex_colours, error);
+        status = replace_colours(out, options->vertex_colours, error);
     ebpo_attributes_free(out->mesh.attributes); /* other attributes are not exported */
     out->mesh.attributes = NULL;
     if (status == EBPO_OK && order == EBPO_FILE_ORDER &&

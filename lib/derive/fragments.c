@@ -1,4 +1,5 @@
-/* Fragments of an envelope, for bounds of its distance to the model: convex polytopes in the cell
+/* Cuts an envelope into fragments, for bounds of its distance to the model. Fragments are convex
+ * polytopes in the cell
  * coordinates of a node, which together cover the envelope. Lengths are in units of a power of two
  * near the cell's longest side, so that nothing overflows or underflows. Every cut keeps slightly
  * too much on both sides, so that the tolerances of ebpo_polytope_clip lose nothing. Fragments
@@ -252,8 +253,8 @@ static ebpo_status push_polytope(ebpo_bounder *b, ebpo_fragment_kind kind,
     return status;
 }
 
-/* Gives a fragment the faces that may intersect it. Copies these to the top of the stack of faces
- * from `count` faces that begin at `first` in the same stack. */
+/* Sets the faces of a fragment: those that may intersect it. Copies these to the top of the stack
+ * of faces from `count` faces that begin at `first` in the same stack. */
 static ebpo_status copy_faces(ebpo_bounder *b, ebpo_fragment *fragment, uint64_t first,
                               uint64_t count)
 {

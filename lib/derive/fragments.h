@@ -148,7 +148,7 @@ typedef struct ebpo_fragment_measure {
 EBPO_MUST_USE ebpo_status ebpo_fragment_push(ebpo_bounder *b, ebpo_fragment_kind kind,
                                              const ebpo_fragment *parent, ebpo_fragment **out);
 
-/* Gives a new fragment all faces of its leaf. */
+/* Sets the faces of a new fragment to all faces of its leaf. */
 EBPO_MUST_USE ebpo_status ebpo_fragment_leaf_faces(ebpo_bounder *b, ebpo_fragment *fragment,
                                                    const ebpo_node *leaf);
 

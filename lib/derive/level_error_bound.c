@@ -94,7 +94,8 @@ static uint64_t node_of_triangle(const sampling *s, uint64_t triangle)
     return low;
 }
 
-/* Returns the node with the octcode, or node_count. Nodes are sorted by octcode. */
+/* Returns the node with the octcode (locational code), or node_count. Nodes are sorted by octcode.
+ */
 static uint64_t find_node(const sampling *s, uint64_t octcode)
 {
     uint64_t low = 0, high = s->nodes.node_count;

@@ -1,8 +1,9 @@
-/* Computes the limit of convex envelopes: the volume of the convex hull of the solid in each cell
- * of a level. The extreme points of a hull are mesh vertices in the cell, corners where faces cut
- * the cell faces, and the corners of the cell that are inside. qhull computes the volumes; a build
- * without qhull reports EBPO_E_ABSENT. Volumes are stored for each node and added in the order of
- * the nodes, so that the number of threads does not change the sum. */
+/* Computes the least volume that convex envelopes can have, the "limit" of a level: the volume of
+ * the convex hull of the solid in each cell of the level. The extreme points of a hull are mesh
+ * vertices in the cell, corners where faces cut the cell faces, and the corners of the cell that
+ * are inside. qhull computes the volumes; a build without qhull reports EBPO_E_ABSENT. Volumes are
+ * stored for each node and added in the order of the nodes, so that the number of threads does not
+ * change the sum. */
 #include "core/strict_fp.h"
 
 #include <ebpo/limit.h>
@@ -135,7 +136,7 @@ typedef struct job {
     ebpo_level_nodes tree;
     ebpo_node *nodes; /* nodes to compute hulls for */
     uint64_t node_count, node_capacity;
-    double *volume; /* [node_count] in cells */
+    double *volume; /* [node_count] of the hull, as a fraction of the node's cell */
     double black;
     bool in_root_cells; /* unit of the volumes */
     scratch *scratch;   /* [threads] */
@@ -170,7 +171,7 @@ static bool list_nodes(job *j, const ebpo_node *node)
 
 /* --- a node's faces --- */
 
-static bool take_leaf(const job *j, scratch *s, int number, uint64_t leaf)
+static bool list_leaf_faces(const job *j, scratch *s, int number, uint64_t leaf)
 {
     const ebpo_level *level = &j->model.level[number];
     uint64_t refs = level->leaf_ref_count[leaf], fresh = level->leaf_new[leaf];
@@ -185,14 +186,14 @@ static bool take_leaf(const job *j, scratch *s, int number, uint64_t leaf)
     return true;
 }
 
-static bool take_node(const job *j, scratch *s, const ebpo_node *node)
+static bool list_node_faces(const job *j, scratch *s, const ebpo_node *node)
 {
     bool good = true;
     if (node->type == EBPO_LEAF)
-        return take_leaf(j, s, node->cell.level, node->rank);
+        return list_leaf_faces(j, s, node->cell.level, node->rank);
     for (unsigned octant = 0; octant < 8 && good && node->type == EBPO_GRAY; octant++) {
         ebpo_node child = ebpo_level_child(&j->tree, node, octant);
-        good = take_node(j, s, &child);
+        good = list_node_faces(j, s, &child);
     }
     return good;
 }
@@ -203,7 +204,7 @@ static int compare_faces(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-static bool take_faces(const job *j, scratch *s)
+static bool load_listed_faces(const job *j, scratch *s)
 {
     const ebpo_mesh *m = &j->mesh;
     uint64_t kept = 0;
@@ -274,7 +275,7 @@ static ebpo_status measure_hulls(void *context, uint64_t begin, uint64_t end, un
     for (uint64_t i = begin; i < end; i++) {
         const ebpo_node *w = &j->nodes[i];
         s->list_count = s->point_count = 0;
-        if (!take_node(j, s, w) || !take_faces(j, s) || !add_corners(j, s, w) ||
+        if (!list_node_faces(j, s, w) || !load_listed_faces(j, s) || !add_corners(j, s, w) ||
             !add_faces(j, s, w->cell))
             return ebpo_fail_memory(error, s->list_count * sizeof *s->faces);
         j->volume[i] = hull_volume(s->hull, s->points, s->point_count);

@@ -212,7 +212,7 @@ static ebpo_status resolve_options(ebpo_cutting *c)
     return resolve_box(c);
 }
 
-/* Gives prefetch hints for whole arrays, which are read if there is no box. A remote source then
+/* Sends prefetch hints for whole arrays, which are read if there is no box. A remote source then
  * fetches the arrays in few requests. */
 static void hint_cut(const ebpo_cutting *c)
 {

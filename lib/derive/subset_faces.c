@@ -145,7 +145,7 @@ static ebpo_status begin_attributes(ebpo_cutting *c)
                              : status;
 }
 
-static ebpo_status take_attributes(ebpo_cutting *c, const char *element, const uint32_t *rows,
+static ebpo_status copy_attributes(ebpo_cutting *c, const char *element, const uint32_t *rows,
                                    uint64_t count)
 {
     ebpo_attributes *to = c->out->mesh.attributes;
@@ -154,7 +154,7 @@ static ebpo_status take_attributes(ebpo_cutting *c, const char *element, const u
                                      : EBPO_OK;
 }
 
-static ebpo_status take_vertices(ebpo_cutting *c)
+static ebpo_status copy_vertices(ebpo_cutting *c)
 {
     ebpo_tree *out = c->out;
     vertices v = { NULL, NULL, 0, 0 };
@@ -179,12 +179,12 @@ static ebpo_status take_vertices(ebpo_cutting *c)
                      : ebpo_fail_memory(c->error, v.count * sizeof *out->vertex_source);
     }
     if (status == EBPO_OK)
-        status = take_attributes(c, "vertex", v.old, v.count);
+        status = copy_attributes(c, "vertex", v.old, v.count);
     free(v.old);
     return status;
 }
 
-static ebpo_status take_faces(ebpo_cutting *c, const numbering *n)
+static ebpo_status copy_faces(ebpo_cutting *c, const numbering *n)
 {
     ebpo_tree *out = c->out;
     out->info.face_count = out->mesh.face_count = n->count;
@@ -203,8 +203,8 @@ static ebpo_status take_faces(ebpo_cutting *c, const numbering *n)
     if (status == EBPO_OK && c->parts & EBPO_PART_ATTRIBUTES)
         status = begin_attributes(c);
     if (status == EBPO_OK)
-        status = take_attributes(c, "face", n->old, n->count);
-    return status == EBPO_OK ? take_vertices(c) : status;
+        status = copy_attributes(c, "face", n->old, n->count);
+    return status == EBPO_OK ? copy_vertices(c) : status;
 }
 
 /* Removes the mesh with its maps and attributes, when no leaf lists a face. */
@@ -234,7 +234,7 @@ ebpo_status ebpo_cut_faces(ebpo_cutting *c)
             l->new_count += l->leaf_new[k];
     }
     if (status == EBPO_OK && n.count)
-        status = take_faces(c, &n);
+        status = copy_faces(c, &n);
     else if (status == EBPO_OK)
         drop_lists(c);
     if (c->out->info.pruned)

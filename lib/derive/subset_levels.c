@@ -74,7 +74,7 @@ static uint64_t capacity_of(const ebpo_level *from, ebpo_per per, const uint64_t
     return ebpo_level_count(from, per) + leaf_planes + (type >= 0 ? more[type] : 0);
 }
 
-static void note_column(kept_nodes *kept, int id, int type)
+static void record_column(kept_nodes *kept, int id, int type)
 {
     kept->of_type[type].column[kept->of_type[type].columns++] =
         (kept_column){ .from = ebpo_level_array(kept->from, id),
@@ -84,7 +84,7 @@ static void note_column(kept_nodes *kept, int id, int type)
 }
 
 /* Returns the index of the counts of a list; adds them at first use. */
-static unsigned note_counts(kept_nodes *kept, ebpo_per per, const ebpo_list_spec *list)
+static unsigned record_counts(kept_nodes *kept, ebpo_per per, const ebpo_list_spec *list)
 {
     int type = ebpo_schema_node_type(list->of);
     unsigned i = 0, known = kept->of_type[type].counts;
@@ -98,11 +98,11 @@ static unsigned note_counts(kept_nodes *kept, ebpo_per per, const ebpo_list_spec
     return i;
 }
 
-static void note_list(kept_nodes *kept, int id, const ebpo_list_spec *list)
+static void record_list(kept_nodes *kept, int id, const ebpo_list_spec *list)
 {
     int type = ebpo_schema_node_type(list->of);
     kept->of_type[type].list[kept->of_type[type].lists++] =
-        (kept_list){ .counts = note_counts(kept, ebpo_schema[id].per, list),
+        (kept_list){ .counts = record_counts(kept, ebpo_schema[id].per, list),
                      .from = ebpo_level_array(kept->from, id),
                      .to = ebpo_level_array(kept->to, id),
                      .size = ebpo_schema[id].held_size };
@@ -126,9 +126,9 @@ static bool kept_begin(kept_nodes *kept, const ebpo_level *from, ebpo_level *to,
             return false;
         ebpo_level_set_array(to, id, array);
         if (list)
-            note_list(kept, id, list);
+            record_list(kept, id, list);
         else
-            note_column(kept, id, ebpo_schema_node_type(spec->per));
+            record_column(kept, id, ebpo_schema_node_type(spec->per));
     }
     return true;
 }
@@ -258,7 +258,7 @@ static bool may_go_on(const ebpo_cutting *c, int level)
 
 /* --- runs of needed groups --- */
 
-/* Gives prefetch hints in a file with subtrees, when the parents are the roots of subtrees. The
+/* Sends prefetch hints in a file with subtrees, when the parents are the roots of subtrees. The
  * hints cover all nodes below and the lists of faces, which are needed to find the faces. */
 static void hint_subtrees(const descent *d)
 {
@@ -345,7 +345,7 @@ static bool is_enough(descent *d)
     return d->tolerance_nodes && d->tolerance_nodes[d->next_tolerance_node++].enough;
 }
 
-static void take_gray(descent *d, ebpo_cell cell)
+static void copy_gray(descent *d, ebpo_cell cell)
 {
     uint64_t rank = d->kept.next[EBPO_GRAY], group = d->child[d->from.leaf_count + rank].group;
     bool enough = is_enough(d);
@@ -379,9 +379,9 @@ static void add_colour(descent *d)
             d->level ? t[-1].gray_colours[d->group] : EBPO_COLOUR_OF_NOTHING;
 }
 
-/* Takes a leaf. Outside the box, the leaf becomes a pruned node with the leaf's planes. If its
+/* Copies a leaf. Outside the box, the leaf becomes a pruned node with the leaf's planes. If its
  * parent's planes are close enough to the model, it becomes a pruned node without planes. */
-static ebpo_node_type take_leaf(descent *d, ebpo_cell cell)
+static ebpo_node_type copy_leaf(descent *d, ebpo_cell cell)
 {
     bool enough = is_enough(d);
     if (!enough && intersects_box(d->c, cell)) {
@@ -397,12 +397,12 @@ static ebpo_node_type take_leaf(descent *d, ebpo_cell cell)
     return EBPO_GRAY;
 }
 
-static ebpo_node_type take_node(descent *d, ebpo_node_type type, ebpo_cell cell)
+static ebpo_node_type copy_node(descent *d, ebpo_node_type type, ebpo_cell cell)
 {
     if (type == EBPO_LEAF)
-        return take_leaf(d, cell);
+        return copy_leaf(d, cell);
     if (type == EBPO_GRAY)
-        take_gray(d, cell);
+        copy_gray(d, cell);
     else
         kept_take(&d->kept, type);
     return type;
@@ -415,12 +415,12 @@ static ebpo_cell child_cell(const descent *d, uint64_t number, unsigned octant)
                     : (ebpo_cell){ 0, { 0, 0, 0 } };
 }
 
-static void take_group(descent *d, uint64_t number, uint16_t types)
+static void copy_group(descent *d, uint64_t number, uint16_t types)
 {
     d->group = number;
     for (unsigned octant = 0; octant < ebpo_group_octants(d->level); octant++) {
         ebpo_node_type type =
-            take_node(d, ebpo_group_type(types, octant), child_cell(d, number, octant));
+            copy_node(d, ebpo_group_type(types, octant), child_cell(d, number, octant));
         d->to->types[number] |= ebpo_group_of(type, octant);
     }
 }
@@ -470,7 +470,7 @@ static ebpo_status cut_level(descent *d)
             for (int k = 0; k < 8; k++) /* slots of absent children */
                 kept_add(&d->kept, EBPO_WHITE);
         else
-            take_group(d, i, d->from.types[next++]);
+            copy_group(d, i, d->from.types[next++]);
         d->filled += d->to->types[i] != 0;
     }
     ebpo_level_free(&d->from);

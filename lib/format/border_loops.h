@@ -1,4 +1,4 @@
-/* The part `border` of a file: closed loops. */
+/* Reads and checks the part `border` of a file: closed loops. */
 #ifndef EBPO_FORMAT_BORDER_LOOPS_H
 #define EBPO_FORMAT_BORDER_LOOPS_H
 

@@ -208,7 +208,7 @@ static int compare_descending(const void *a, const void *b)
     return (x < y) - (x > y);
 }
 
-static uint64_t take_blocks(uint32_t *blocks, uint64_t count, uint64_t from, uint32_t *out)
+static uint64_t sort_blocks(uint32_t *blocks, uint64_t count, uint64_t from, uint32_t *out)
 {
     uint64_t taken = 0;
     if (count)
@@ -225,8 +225,8 @@ static uint64_t take_blocks(uint32_t *blocks, uint64_t count, uint64_t from, uin
 static void shared_blocks_take(shared_blocks *b, const owned_range *own, uint32_t *out,
                                const uint64_t *before, uint64_t *after)
 {
-    uint64_t faces = take_blocks(b->face_block, b->face_blocks, own->face / EBPO_FACE_BLOCK, out);
-    uint64_t vertices = take_blocks(b->vertex_block, b->vertex_blocks,
+    uint64_t faces = sort_blocks(b->face_block, b->face_blocks, own->face / EBPO_FACE_BLOCK, out);
+    uint64_t vertices = sort_blocks(b->vertex_block, b->vertex_blocks,
                                     own->vertex / EBPO_VERTEX_BLOCK, out + faces);
     after[EBPO_S_SHARED_FACES] = before[EBPO_S_SHARED_FACES] + faces;
     after[EBPO_S_SHARED_VERTICES] = before[EBPO_S_SHARED_VERTICES] + vertices;

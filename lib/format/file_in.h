@@ -1,4 +1,4 @@
-/* An open file and the locations of its arrays. */
+/* Defines an open file and the locations of its arrays. */
 #ifndef EBPO_FORMAT_FILE_IN_H
 #define EBPO_FORMAT_FILE_IN_H
 

@@ -219,9 +219,10 @@ static ebpo_status read_types(ebpo_chunks *chunks, int level, uint64_t group, eb
 
 /* --- planes --- */
 
-static ebpo_status take_codes(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t first,
-                              uint64_t all, const uint8_t *counts, uint64_t nodes, ebpo_group *out,
-                              ebpo_node_type type, ebpo_error *error)
+static ebpo_status read_group_codes(ebpo_chunks *chunks, ebpo_array_id id, int level,
+                                    uint64_t first, uint64_t all, const uint8_t *counts,
+                                    uint64_t nodes, ebpo_group *out, ebpo_node_type type,
+                                    ebpo_error *error)
 {
     uint32_t codes[EBPO_GROUP_CODES];
     uint64_t sum = 0;
@@ -260,9 +261,9 @@ static ebpo_status read_gray_planes(ebpo_chunks *chunks, int level, uint64_t cou
                                       sizeof *counts, error);
     if (status != EBPO_OK)
         return status;
-    return take_codes(chunks, EBPO_A_PLANES, level, first,
-                      chunks->file->info.level[level].plane_count, counts, count, out, EBPO_GRAY,
-                      error);
+    return read_group_codes(chunks, EBPO_A_PLANES, level, first,
+                            chunks->file->info.level[level].plane_count, counts, count, out,
+                            EBPO_GRAY, error);
 }
 
 static ebpo_status read_leaf_planes(ebpo_chunks *chunks, int level, uint64_t count, ebpo_group *out,
@@ -278,9 +279,9 @@ static ebpo_status read_leaf_planes(ebpo_chunks *chunks, int level, uint64_t cou
                                       sizeof *counts, error);
     if (status != EBPO_OK)
         return status;
-    return take_codes(chunks, EBPO_A_LEAF_PLANES, level, first,
-                      chunks->file->info.level[level].leaf_plane_count, counts, count, out,
-                      EBPO_LEAF, error);
+    return read_group_codes(chunks, EBPO_A_LEAF_PLANES, level, first,
+                            chunks->file->info.level[level].leaf_plane_count, counts, count, out,
+                            EBPO_LEAF, error);
 }
 
 /* Sorts the plane codes into node order. In the input, codes of gray nodes precede those of leaves.

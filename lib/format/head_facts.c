@@ -195,10 +195,10 @@ static const ebpo_selection_traits selection_traits[] = {
     [EBPO_SELECT_INHERIT] = { .name = "inherit" },
     [EBPO_SELECT_KMEDOIDS] = { .name = "kmedoids",
                                .from_leaves = true,
-                               .takes_normals = true,
-                               .takes_seed = true },
+                               .uses_normal_distance = true,
+                               .uses_seed = true },
     [EBPO_SELECT_OFFSET] = { .name = "offset", .from_leaves = true },
-    [EBPO_SELECT_RANDOM] = { .name = "random", .from_leaves = true, .takes_seed = true },
+    [EBPO_SELECT_RANDOM] = { .name = "random", .from_leaves = true, .uses_seed = true },
 };
 _Static_assert(sizeof selection_traits / sizeof *selection_traits == EBPO_SELECTION_COUNT,
                "each selection of ebpo/build.h needs a line in this table");
@@ -676,7 +676,7 @@ static ebpo_status get_version(ebpo_head *in, ebpo_head_object root, ebpo_info *
 }
 
 /* Marks a known part as present in *found. A part may be in either of the two lists. */
-static ebpo_status take_part(ebpo_head *in, const char *word, bool required, unsigned *found,
+static ebpo_status mark_part(ebpo_head *in, const char *word, bool required, unsigned *found,
                              ebpo_error *error)
 {
     for (int i = 0; i < part_word_count; i++) {
@@ -714,7 +714,7 @@ static ebpo_status get_parts(ebpo_head *in, ebpo_head_object root, ebpo_info *in
             rest = space ? space + 1 : NULL;
             if (space)
                 *space = 0;
-            status = *word ? take_part(in, word, required, &found, error)
+            status = *word ? mark_part(in, word, required, &found, error)
                            : wrong_value(in, "/", name, error);
         }
         if (status != EBPO_OK)

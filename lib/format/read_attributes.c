@@ -328,9 +328,9 @@ typedef struct target {
     uint8_t *values;
 } target;
 
-static ebpo_status take_attribute_rows(void *context, const ebpo_array_in *array, uint64_t chunk,
-                                       uint64_t row, uint64_t rows, const uint8_t *bytes,
-                                       ebpo_error *error)
+static ebpo_status decode_attribute_rows(void *context, const ebpo_array_in *array, uint64_t chunk,
+                                         uint64_t row, uint64_t rows, const uint8_t *bytes,
+                                         ebpo_error *error)
 {
     const target *t = context;
     (void)chunk, (void)error;
@@ -352,7 +352,7 @@ static ebpo_status read_array(const ebpo_file *file, int number, const ebpo_read
     if (!*values)
         return ebpo_workspace_fail(read->workspace, bytes, error);
     target t = { file, *values };
-    return ebpo_reader_rows(file, array, read, take_attribute_rows, &t, error);
+    return ebpo_reader_rows(file, array, read, decode_attribute_rows, &t, error);
 }
 
 static ebpo_status check_ends(const ebpo_file *file, uint64_t n, const ebpo_attribute *a,
@@ -409,7 +409,7 @@ static ebpo_status read_header(const ebpo_file *file, ebpo_attributes *to, ebpo_
         return ebpo_fail_memory(error, to->header_bytes);
     target t = { file, (uint8_t *)to->header };
     ebpo_read_options read = ebpo_read_threads(1);
-    return ebpo_reader_rows(file, array, &read, take_attribute_rows, &t, error);
+    return ebpo_reader_rows(file, array, &read, decode_attribute_rows, &t, error);
 }
 
 ebpo_status ebpo_attributes_read_head(const ebpo_file *file, const ebpo_read_options *read,

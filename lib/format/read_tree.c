@@ -242,9 +242,9 @@ typedef struct mesh_job {
     uint64_t *faces_index; /* NULL: a single chunk */
 } mesh_job;
 
-static ebpo_status take_vertices(void *context, const ebpo_array_in *array, uint64_t chunk,
-                                 uint64_t row, uint64_t rows, const uint8_t *bytes,
-                                 ebpo_error *error)
+static ebpo_status decode_vertices(void *context, const ebpo_array_in *array, uint64_t chunk,
+                                   uint64_t row, uint64_t rows, const uint8_t *bytes,
+                                   ebpo_error *error)
 {
     (void)array;
     (void)chunk;
@@ -257,8 +257,9 @@ static ebpo_status take_vertices(void *context, const ebpo_array_in *array, uint
     return EBPO_OK;
 }
 
-static ebpo_status take_faces(void *context, const ebpo_array_in *array, uint64_t chunk,
-                              uint64_t row, uint64_t rows, const uint8_t *bytes, ebpo_error *error)
+static ebpo_status decode_faces(void *context, const ebpo_array_in *array, uint64_t chunk,
+                                uint64_t row, uint64_t rows, const uint8_t *bytes,
+                                ebpo_error *error)
 {
     mesh_job *j = context;
     ebpo_check check = ebpo_reader_check(j->file, j->mesh->workspace);
@@ -309,14 +310,14 @@ static ebpo_status read_mesh(const ebpo_file *file, ebpo_mesh *out, const ebpo_r
     ebpo_status status = make_mesh(file, out, read->workspace, error);
     if (status == EBPO_OK)
         status = ebpo_reader_rows(file, ebpo_reader_array(file, EBPO_A_VERTICES, 0), read,
-                                  take_vertices, &j, error);
+                                  decode_vertices, &j, error);
     if (status == EBPO_OK)
         status = ebpo_check_finite(&check, out, error);
     if (status == EBPO_OK)
         status = ebpo_reader_make(file, EBPO_A_FACES_INDEX, 0, &alone, 8, &j.faces_index, error);
     if (status == EBPO_OK)
-        status = ebpo_reader_rows(file, ebpo_reader_array(file, EBPO_A_FACES, 0), read, take_faces,
-                                  &j, error);
+        status = ebpo_reader_rows(file, ebpo_reader_array(file, EBPO_A_FACES, 0), read,
+                                  decode_faces, &j, error);
     ebpo_array_free(read->workspace, j.faces_index);
     if (status != EBPO_OK)
         ebpo_mesh_free(out);
@@ -324,7 +325,7 @@ static ebpo_status read_mesh(const ebpo_file *file, ebpo_mesh *out, const ebpo_r
 }
 
 /* Copies the caller's options to *read, and checks that the file has the part. */
-static ebpo_status take_options(const ebpo_file *file, const ebpo_read_options *options,
+static ebpo_status copy_options(const ebpo_file *file, const ebpo_read_options *options,
                                 uint32_t part, const char *name, ebpo_read_options *read,
                                 ebpo_error *error)
 {
@@ -350,7 +351,7 @@ ebpo_status ebpo_file_read_mesh(const ebpo_file *file, const ebpo_read_options *
     EBPO_DEFAULT_FP;
     memset(out, 0, sizeof *out);
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
-    ebpo_status status = take_options(file, options, EBPO_PART_MESH, "mesh", &read, error);
+    ebpo_status status = copy_options(file, options, EBPO_PART_MESH, "mesh", &read, error);
     if (status != EBPO_OK)
         return status;
     hint_root(file, EBPO_NEEDS_MESH, read.attributes);
@@ -362,9 +363,9 @@ ebpo_status ebpo_file_read_mesh(const ebpo_file *file, const ebpo_read_options *
     return status;
 }
 
-static ebpo_status take_numbers(void *context, const ebpo_array_in *array, uint64_t chunk,
-                                uint64_t row, uint64_t rows, const uint8_t *bytes,
-                                ebpo_error *error)
+static ebpo_status decode_numbers(void *context, const ebpo_array_in *array, uint64_t chunk,
+                                  uint64_t row, uint64_t rows, const uint8_t *bytes,
+                                  ebpo_error *error)
 {
     (void)array;
     (void)chunk;
@@ -381,7 +382,7 @@ static ebpo_status read_map(const ebpo_file *file, ebpo_array_id id, uint64_t li
     uint32_t *map = *out = ebpo_array_alloc(read->workspace, array->shape.rows, sizeof *map);
     if (!map)
         return ebpo_workspace_fail(read->workspace, array->shape.rows * sizeof *map, error);
-    ebpo_status status = ebpo_reader_rows(file, array, read, take_numbers, map, error);
+    ebpo_status status = ebpo_reader_rows(file, array, read, decode_numbers, map, error);
     return status == EBPO_OK
                ? ebpo_check_map(&check, array->path, map, array->shape.rows, limit, error)
                : status;
@@ -408,7 +409,7 @@ ebpo_status ebpo_file_read_maps(const ebpo_file *file, const ebpo_read_options *
     memset(out, 0, sizeof *out);
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
     ebpo_status status =
-        take_options(file, options, EBPO_PART_MAPS, "maps to source indices", &read, error);
+        copy_options(file, options, EBPO_PART_MAPS, "maps to source indices", &read, error);
     if (status != EBPO_OK)
         return status;
     hint_root(file, EBPO_NEEDS_MAPS, false);

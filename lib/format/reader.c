@@ -464,9 +464,9 @@ typedef struct target {
     size_t size;
 } target;
 
-static ebpo_status take_integers(void *context, const ebpo_array_in *array, uint64_t chunk,
-                                 uint64_t row, uint64_t rows, const uint8_t *bytes,
-                                 ebpo_error *error)
+static ebpo_status decode_integers(void *context, const ebpo_array_in *array, uint64_t chunk,
+                                   uint64_t row, uint64_t rows, const uint8_t *bytes,
+                                   ebpo_error *error)
 {
     (void)chunk;
     (void)error;
@@ -483,7 +483,7 @@ static ebpo_status reader_integers(const ebpo_file *file, const ebpo_array_in *a
                                    ebpo_error *error)
 {
     target t = { values, size };
-    return ebpo_reader_rows(file, array, options, take_integers, &t, error);
+    return ebpo_reader_rows(file, array, options, decode_integers, &t, error);
 }
 
 ebpo_status ebpo_reader_make(const ebpo_file *file, ebpo_array_id id, int level,

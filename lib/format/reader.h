@@ -91,7 +91,7 @@ bool ebpo_refs_decode(uint32_t *refs, uint64_t count, uint64_t first);
 void ebpo_idle_readers_make(ebpo_idle_readers *readers);
 /* Frees the idle readers. */
 void ebpo_idle_readers_free(ebpo_idle_readers *readers);
-/* Takes an idle reader from the list, or creates one. Returns NULL when out of memory. The caller
+/* Removes an idle reader from the list, or creates one. Returns NULL when out of memory. The caller
  * passes the reader to ebpo_idle_readers_give. */
 ebpo_idle_reader *ebpo_idle_readers_take(ebpo_idle_readers *readers);
 /* Puts a reader back into the list, or frees it when the list is full. NULL is allowed. */

@@ -206,7 +206,7 @@ static void localise_faces(ebpo_slice *slice, const ebpo_compact *shared)
     }
 }
 
-/* Gives the faces local indices, and moves the list of shared faces to the slice. */
+/* Assigns local indices to the faces, and moves the list of shared faces to the slice. */
 static ebpo_status number_faces(ebpo_slice *slice, ebpo_quota *space, ebpo_error *error)
 {
     ebpo_compact shared = { .slot = NULL };
@@ -271,8 +271,8 @@ static ebpo_status collect_older(const ebpo_mesh *mesh, uint64_t begin, ebpo_quo
     return status == EBPO_OK ? compact_sort(older, error) : status;
 }
 
-/* Gives the vertices local indices, in file order: first the older vertices, then those that owned
- * faces use first. */
+/* Assigns local indices to the vertices, in file order: first the older vertices, then those that
+ * owned faces use first. */
 static void renumber_vertices(ebpo_mesh *mesh, uint64_t begin, const ebpo_compact *older)
 {
     uint32_t less = (uint32_t)(begin - older->count);
@@ -281,7 +281,7 @@ static void renumber_vertices(ebpo_mesh *mesh, uint64_t begin, const ebpo_compac
             mesh->faces[i] < begin ? compact_find(older, mesh->faces[i]) : mesh->faces[i] - less;
 }
 
-static ebpo_status take_vertices(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_quota *space,
+static ebpo_status read_vertices(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_quota *space,
                                  ebpo_error *error)
 {
     ebpo_mesh *mesh = &slice->mesh;
@@ -311,7 +311,7 @@ static ebpo_status take_vertices(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_qu
     return status;
 }
 
-static ebpo_status take_source(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_error *error)
+static ebpo_status read_source_indices(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_error *error)
 {
     if (!(chunks->file->info.parts & EBPO_PART_MAPS))
         return EBPO_OK;
@@ -345,8 +345,8 @@ static ebpo_status slice_take_faces(ebpo_slice *slice, ebpo_chunks *chunks, bool
     status = gather_rows(chunks, EBPO_A_FACES, ROW, slice->shared, slice->shared_count,
                          slice->first_face, slice->face_count, slice->mesh.faces, error);
     if (status == EBPO_OK)
-        status = take_vertices(slice, chunks, space, error);
-    return status == EBPO_OK && maps ? take_source(slice, chunks, error) : status;
+        status = read_vertices(slice, chunks, space, error);
+    return status == EBPO_OK && maps ? read_source_indices(slice, chunks, error) : status;
 }
 
 /* --- subtrees --- */

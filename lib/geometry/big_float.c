@@ -1,4 +1,4 @@
-/* Arithmetic on numbers of 512 bits: aligned limbs, truncated results. */
+/* Computes with numbers of 512 bits: aligned limbs, truncated results. */
 #include "core/strict_fp.h"
 
 #include "geometry/big_float.h"

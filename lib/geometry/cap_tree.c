@@ -1,4 +1,4 @@
-/* A tree over the caps of a border, with bounds of their solid angles.
+/* Makes a tree over the caps of a border, with bounds of their solid angles.
  *
  * Bounds. Let the triangles of a node, of area a (with weights) and vector area V, be in a ball of
  * centre c and radius R. With r = |x - p|, the solid angle is the integral of f . dA,

@@ -1,4 +1,4 @@
-/* Winding numbers of the discs that close the border of a mesh.
+/* Computes winding numbers of the discs that close the border of a mesh.
  *
  * The mesh S with holes and the caps C of its border (mesh/border.h) together have an integer
  * winding number k. The caps turn against their loops, so the winding number of S is

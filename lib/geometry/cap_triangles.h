@@ -1,4 +1,4 @@
-/* Cap triangles of a closed loop of vertices, by halving.
+/* Makes the cap triangles of a closed loop of vertices, by halving.
  *
  * A stretch [i, j] of a loop is the path from position i to position j and the chord between them.
  * A stretch of more than one edge has the triangle (i, m, j), m = i + (j - i) / 2, and two parts,

@@ -1,4 +1,4 @@
-/* A position in an octree that moves from node to node, for any holder of nodes.
+/* Moves a position in an octree from node to node, for any holder of nodes.
  *
  * The cursor keeps the nodes from the root down to the current one, each with its children once
  * they have been read. Moving up therefore reads nothing, and a step to a cell nearby reads only

@@ -1,4 +1,4 @@
-/* Double-double arithmetic for distances and rays, compiled once for each instruction set.
+/* Provides double-double arithmetic for distances and rays, compiled once for each instruction set.
  *
  * On processors with FMA one instruction computes the rounding error of a product. On other
  * processors the factors are split (expansion.h). Both methods give the same value unless a number

@@ -1,4 +1,4 @@
-/* The nodes of an octree in memory: as levels, and as a table of children.
+/* Reads the nodes of an octree in memory: as levels, and as a table of children.
  *
  * Levels store node types in groups of eight siblings, 16 bits each. A node is found by its rank:
  * the number of nodes of its type before it in its level. Ranks are prefix sums of the counts in

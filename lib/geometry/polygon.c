@@ -408,7 +408,7 @@ static bool is_along(const double b[2], const double a[2], const double q[2])
     return a[k] > b[k] ? q[k] > b[k] : q[k] < b[k];
 }
 
-static void note_edges_along(const outline *o, tested_ear *e, uint32_t i)
+static void record_edges_along(const outline *o, tested_ear *e, uint32_t i)
 {
     const uint32_t *c = e->corner;
     const uint32_t neighbours[2] = { o->next[i], o->previous[i] };
@@ -447,7 +447,7 @@ static bool corner_blocks(const outline *o, tested_ear *e, uint32_t i)
     if (!o->touching || (side[0] > 0 && side[1] > 0))
         return true;
     if (side[0] == 0 && side[1] == 0)
-        note_edges_along(o, e, i);
+        record_edges_along(o, e, i);
     return edge_enters(o, e, side, o->next[i]) || edge_enters(o, e, side, o->previous[i]);
 }
 
@@ -606,7 +606,7 @@ static bool is_ear(outline *o, uint32_t b)
     return x == NONE && !is_outside(o, &e);
 }
 
-/* Goes around the outline and cuts every ear, skipping one corner after each cut so that fans of
+/* Walks around the outline and cuts every ear, skipping one corner after each cut so that fans of
  * slivers stay short. */
 static ears_result cut_all(outline *o, uint32_t (*triangle)[3], uint64_t limit)
 {
@@ -646,7 +646,7 @@ static uint64_t ears_scratch_bytes(uint64_t n)
     return ebpo_mul_ok(n + WORD, each, &bytes) ? bytes : 0;
 }
 
-static void *take_array(char **at, uint64_t bytes)
+static void *place_array(char **at, uint64_t bytes)
 {
     void *taken = *at;
     *at += bytes;
@@ -660,17 +660,17 @@ static void place_arrays(outline *o, void *scratch)
     if (o->n > SCANNED)
         for (o->leaves = 1; (uint64_t)o->leaves * BLOCK < o->n;)
             o->leaves *= 2;
-    o->boxes = take_array(&at, 2 * (uint64_t)o->leaves * sizeof *o->boxes);
+    o->boxes = place_array(&at, 2 * (uint64_t)o->leaves * sizeof *o->boxes);
     do {
         words = (words + WORD - 1) / WORD;
         o->words[o->levels] = words;
-        o->bits[o->levels++] = take_array(&at, words * sizeof **o->bits);
+        o->bits[o->levels++] = place_array(&at, words * sizeof **o->bits);
     } while (words > 1);
     uint32_t **arrays[] = { &o->next,          &o->previous,     &o->blocker,
                             &o->first_blocked, &o->next_blocked, &o->previous_blocked };
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
-        *arrays[i] = take_array(&at, o->n * sizeof **arrays[i]);
-    o->corners = take_array(&at, 2 * (uint64_t)o->leaves * sizeof *o->corners);
+        *arrays[i] = place_array(&at, o->n * sizeof **arrays[i]);
+    o->corners = place_array(&at, 2 * (uint64_t)o->leaves * sizeof *o->corners);
 }
 
 /* Writes n - 2 triangles of corner indices for the outline at[n], n >= 4, that runs

@@ -1,4 +1,4 @@
-/* Convex polytopes in the coordinates of a cell, cut from the unit cube by half-spaces.
+/* Cuts convex polytopes in the coordinates of a cell from the unit cube by half-spaces.
  *
  * Half-spaces are stored as plane codes of 32 bits, which decode to integers, so that no reader
  * rounds. Polytopes have rounded vertices: they serve volumes, drawing and the choice of planes.

@@ -1,4 +1,4 @@
-/* Poses: rotations as quaternions and matrices, and the coordinates of posed vertices.
+/* Evaluates poses: rotations as quaternions and matrices, and the coordinates of posed vertices.
  *
  * A pose is checked once. Its matrix may differ from a rotation by rounding only. Posed coordinates
  * are doubles, each operation rounded once, and all decisions about two models are exact on these

@@ -1,4 +1,4 @@
-/* Orientation predicates and signs of sums of products, exact for every finite double.
+/* Computes orientation predicates and signs of sums of products, exact for every finite double.
  *
  * Each predicate tries these stages, the cheapest first, until one gives a certain sign: signs of
  * factors, a floating-point filter, exact arithmetic on doubles (expansions) if exponents are in

@@ -1,4 +1,4 @@
-/* Intersection of a ray with a triangle.
+/* Intersects a ray with a triangle.
  *
  * A ray passes stages, cheapest first: the side of each edge on which the line passes, in floating
  * point with error bounds; then numerator and denominator of t in double-double arithmetic

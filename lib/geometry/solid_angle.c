@@ -1,4 +1,4 @@
-/* Half angles of triangles.
+/* Computes half solid angles of triangles.
  *
  * Error in doubles, with u = 2^-53 and M = |A||B||C|. Each component of A, B, C has a relative
  * error of at most u. The determinant is a sum of 6 products whose absolute values sum up to at

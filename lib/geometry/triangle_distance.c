@@ -1,4 +1,5 @@
-/* Distance of a point to a triangle: bounds, correctly rounded values, and exact comparisons.
+/* Computes the distance of a point to a triangle: bounds, correctly rounded values, and exact
+ * comparisons.
  *
  * The stages, cheapest first: bounds in doubles; signs of products with error bounds, for points
  * that are far from the triangle compared with its size; double-double arithmetic
@@ -506,8 +507,8 @@ static bool try_interior(nearest *n)
     return true;
 }
 
-/* Takes a corner or edge when it is nearer than the current feature; of equally bounded_number
- * ones, takes the corner. */
+/* Replaces the current feature by a corner or edge when it is nearer than the current feature; of
+ * equally near ones, keeps the corner. */
 static void offer_feature(nearest *n, bool first, const mpz_t square, const mpz_t denominator,
                           ebpo_feature feature, bool *taken)
 {

@@ -1,4 +1,4 @@
-/* The relation of two faces: apart, touching, crossing or coplanar. Exact. */
+/* Computes the relation of two faces: apart, touching, crossing or coplanar. Exact. */
 #ifndef EBPO_GEOMETRY_TRIANGLE_PAIR_H
 #define EBPO_GEOMETRY_TRIANGLE_PAIR_H
 

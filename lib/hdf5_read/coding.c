@@ -1,8 +1,8 @@
-/* Number codings of format-spec/README.md, section 9: differences to the previous value
- * (modulo the integer's size, in zigzag code), corners of faces relative to the number of vertices
- * seen, and integers of fewer bytes. Encoding and decoding are exact inverses for every bit
- * pattern; floats are coded as integers of the same order. Files are little-endian. Pure functions.
- */
+/* Implements the number codings of format-spec/README.md, section 9: differences to the previous
+ * value (modulo the integer's size, in zigzag code), corners of faces relative to the number of
+ * vertices seen, and integers of fewer bytes. Encoding and decoding are exact inverses for every
+ * bit pattern; floats are coded as integers of the same order. Files are little-endian. Pure
+ * functions. */
 #include "hdf5_read/coding.h"
 
 #include <string.h>

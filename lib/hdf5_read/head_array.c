@@ -99,8 +99,8 @@ static const char *read_layout(ebpo_head_cursor c, ebpo_head_layout *l, bool *fo
 }
 
 /* Stores the offset of the next chunk. */
-static const char *take_place(ebpo_head_chunks *t, uint64_t i, uint64_t address, uint64_t bytes,
-                              uint32_t mask)
+static const char *store_offset(ebpo_head_chunks *t, uint64_t i, uint64_t address, uint64_t bytes,
+                                uint32_t mask)
 {
     t->at = i;
     if (address == EBPO_NO_ADDRESS || bytes == 0)
@@ -128,7 +128,7 @@ static const char *read_single(ebpo_head_chunks *t)
     }
     if (t->filtered != l->single_filtered)
         return contradicts;
-    return take_place(t, 0, l->address, t->filtered ? l->single_bytes : t->whole, l->single_mask);
+    return store_offset(t, 0, l->address, t->filtered ? l->single_bytes : t->whole, l->single_mask);
 }
 
 static const char *read_implicit(ebpo_head_chunks *t)
@@ -140,7 +140,7 @@ static const char *read_implicit(ebpo_head_chunks *t)
         if (l->address != EBPO_NO_ADDRESS && (__builtin_mul_overflow(i, t->whole, &begin) ||
                                               __builtin_add_overflow(begin, l->address, &begin)))
             begin = EBPO_NO_ADDRESS;
-        wrong = take_place(t, i, begin, t->whole, 0);
+        wrong = store_offset(t, i, begin, t->whole, 0);
     }
     return wrong;
 }
@@ -196,7 +196,7 @@ static const char *read_entries(ebpo_head_state *s, ebpo_head_chunks *t, const f
         uint64_t address = ebpo_cursor_u64(&c);
         uint64_t bytes = t->filtered ? ebpo_cursor_uint(&c, f->size_bytes) : t->whole;
         uint32_t mask = t->filtered ? ebpo_cursor_u32(&c) : 0;
-        wrong = take_place(t, first + i, address, bytes, mask);
+        wrong = store_offset(t, first + i, address, bytes, mask);
     }
     return wrong;
 }

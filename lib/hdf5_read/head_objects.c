@@ -33,7 +33,7 @@ bool ebpo_head_sound(const uint8_t *block, uint64_t size)
                                                           ebpo_lookup3(block, (size_t)size - 4)));
 }
 
-static bool note_memory(ebpo_head_state *s, uint64_t bytes)
+static bool record_memory(ebpo_head_state *s, uint64_t bytes)
 {
     s->bytes.status = ebpo_fail_memory(&s->bytes.error, bytes);
     return false;
@@ -62,7 +62,7 @@ static bool add_message(ebpo_head_state *s, ebpo_head_header *h, const ebpo_head
     if (h->count == MESSAGES_MAX)
         return ebpo_refuse(s, "its header has too many messages");
     if (!ebpo_grow(&h->message, &h->capacity, h->count + 1, sizeof *h->message))
-        return note_memory(s, (h->count + 1) * sizeof *h->message);
+        return record_memory(s, (h->count + 1) * sizeof *h->message);
     h->message[h->count++] = *m;
     return true;
 }
@@ -88,7 +88,7 @@ static bool list_messages(ebpo_head_state *s, ebpo_head_header *h, uint64_t from
 
 /* Reads a block, which has `before` bytes in front of its messages and four bytes of checksum after
  * them. */
-static bool take_block(ebpo_head_state *s, ebpo_head_header *h, uint64_t at, uint64_t before,
+static bool read_block(ebpo_head_state *s, ebpo_head_header *h, uint64_t at, uint64_t before,
                        uint64_t size, unsigned gap)
 {
     if (size > BLOCK_BYTES_MAX || h->byte_count + size > HEADER_BYTES_MAX)
@@ -101,7 +101,7 @@ static bool take_block(ebpo_head_state *s, ebpo_head_header *h, uint64_t at, uin
     ebpo_head_note_range(s, at, before + size + 4);
     uint64_t from = h->byte_count;
     if (!ebpo_grow(&h->bytes, &h->byte_capacity, from + size + 1, 1))
-        return note_memory(s, size);
+        return record_memory(s, size);
     memcpy(h->bytes + from, block + before, (size_t)size);
     h->byte_count += size;
     return list_messages(s, h, from, gap);
@@ -129,7 +129,7 @@ static bool read_first_block(ebpo_head_state *s, ebpo_head_header *h, unsigned *
     if (c.cut)
         return ebpo_refuse(s, damaged_block);
     *gap = flags & 4 ? 2 : 0;
-    return take_block(s, h, at, (uint64_t)(c.at - prefix), bytes, *gap);
+    return read_block(s, h, at, (uint64_t)(c.at - prefix), bytes, *gap);
 }
 
 static bool read_continuation(ebpo_head_state *s, ebpo_head_header *h, uint64_t message,
@@ -144,7 +144,7 @@ static bool read_continuation(ebpo_head_state *s, ebpo_head_header *h, uint64_t 
         return ebpo_refuse(s, damaged_block);
     if (memcmp(block, "OCHK", 4) != 0)
         return ebpo_refuse(s, "its header continues at an invalid address");
-    return take_block(s, h, at, 4, size - 8, gap);
+    return read_block(s, h, at, 4, size - 8, gap);
 }
 
 static bool read_blocks(ebpo_head_state *s, ebpo_head_header *h)

@@ -1,7 +1,7 @@
-/* Chunks as zstd frames (RFC 8878), each with its content's size and a checksum. Parts of a frame
- * that neither zstd's decoder checks nor a checksum covers are checked here: a changed bit must not
- * go unnoticed. The blocks of a frame are the byte planes of shuffled elements or the streams of a
- * coding, because the statistics of these differ. */
+/* Encodes and decodes chunks as zstd frames (RFC 8878), each with its content's size and a
+ * checksum. Parts of a frame that neither zstd's decoder checks nor a checksum covers are checked
+ * here: a changed bit must not go unnoticed. The blocks of a frame are the byte planes of shuffled
+ * elements or the streams of a coding, because the statistics of these differ. */
 #include <string.h>
 #include <zstd.h>
 

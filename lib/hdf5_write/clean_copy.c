@@ -244,7 +244,7 @@ static bool all_is_there(const array_copy *a)
 }
 
 /* Reads a chunk as stored. Returns false if it must be decoded. */
-static bool take_stored(const array_copy *a, uint64_t first, void *data, size_t bound,
+static bool read_stored(const array_copy *a, uint64_t first, void *data, size_t bound,
                         size_t *bytes)
 {
     hsize_t at[2] = { first, 0 }, stored = 0;
@@ -307,7 +307,7 @@ static void copy_values(copying *c, const array_copy *a)
     for (uint64_t i = 0; i < ebpo_shape_chunks(shape) && c->status == EBPO_OK; i++) {
         size_t bytes = 0;
         uint64_t first = i * shape->chunk_rows;
-        if (take_stored(a, first, data, bound, &bytes) || make_chunk(c, a, first, data, &bytes))
+        if (read_stored(a, first, data, bound, &bytes) || make_chunk(c, a, first, data, &bytes))
             c->status = ebpo_h5_put_chunk(&c->to, a->path, to, shape, i, data, bytes, c->error);
     }
     if (c->status == EBPO_OK)

@@ -256,7 +256,7 @@ static ebpo_status read_apart(void *user, ebpo_error *error)
     return status == EBPO_OK ? copy_rows(d, error) : status;
 }
 
-static bool take_bytes(const dataset *d, uint64_t from, void *to, uint64_t bytes)
+static bool read_bytes(const dataset *d, uint64_t from, void *to, uint64_t bytes)
 {
     for (uint64_t at = 0; at < bytes;) {
         ssize_t done = pread(d->to, (char *)to + at, (size_t)(bytes - at), (off_t)(from + at));
@@ -270,17 +270,17 @@ static bool take_bytes(const dataset *d, uint64_t from, void *to, uint64_t bytes
 }
 
 /* Reads the other process's result: the total number of rows, and the requested rows. */
-static ebpo_status take_rows(const dataset *d, double **rows, uint64_t *count, uint64_t *total,
-                             ebpo_error *error)
+static ebpo_status read_result(const dataset *d, double **rows, uint64_t *count, uint64_t *total,
+                               ebpo_error *error)
 {
     struct stat facts;
-    if (fstat(d->to, &facts) != 0 || !take_bytes(d, 0, total, sizeof *total))
+    if (fstat(d->to, &facts) != 0 || !read_bytes(d, 0, total, sizeof *total))
         return ebpo_fail_errno(error, d->path, "its rows in TMPDIR cannot be read");
     uint64_t bytes = (uint64_t)facts.st_size - sizeof *total;
     *rows = ebpo_alloc(bytes, 1);
     if (!*rows)
         return ebpo_fail_memory(error, bytes);
-    if (!take_bytes(d, sizeof *total, *rows, bytes))
+    if (!read_bytes(d, sizeof *total, *rows, bytes))
         return ebpo_fail_errno(error, d->path, "its rows in TMPDIR cannot be read");
     *count = bytes / (d->most * sizeof **rows);
     return EBPO_OK;
@@ -332,7 +332,7 @@ ebpo_status ebpo_rows_read_part(const char *path, const char *name, unsigned lea
     if (status == EBPO_OK)
         status = ebpo_run_in_process(read_apart, &d, path, &limits, error);
     if (status == EBPO_OK)
-        status = take_rows(&d, rows, count, total, error);
+        status = read_result(&d, rows, count, total, error);
     if (d.to >= 0)
         close(d.to);
     if (status != EBPO_OK) {

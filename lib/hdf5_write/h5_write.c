@@ -10,7 +10,7 @@
 #include "hdf5_write/h5_parts.h"
 #include "hdf5_write/zstd_filter.h"
 
-/* Keeps everything in object headers where HDF5 would otherwise use B-trees and heaps. */
+/* Makes HDF5 store everything in object headers, where it would otherwise use B-trees and heaps. */
 enum { COMPACT = 65535 };
 
 void ebpo_h5_close_id(const ebpo_h5_out *out, ebpo_h5_id id)

@@ -1,4 +1,4 @@
-/* The scope of a use of libhdf5: a mutex, because Debian's serial build is not thread-safe, and
+/* Protects each use of libhdf5: by a mutex, because Debian's serial build is not thread-safe, and
  * HDF5's error printing, switched off and restored. Within it: messages that name file, object and
  * libhdf5's innermost reason, opening untrusted files to read, and registering the library's filter
  * once. */
@@ -34,7 +34,7 @@ void ebpo_h5_leave(ebpo_h5_scope *scope)
 /* libhdf5's messages have the path first, then the error number, so both must fit */
 enum { CAUSE_BYTES = 8192, CAUSE_SHOWN = 160 };
 
-static herr_t take_first(unsigned depth, const H5E_error2_t *entry, void *data)
+static herr_t copy_first_message(unsigned depth, const H5E_error2_t *entry, void *data)
 {
     (void)depth;
     if (entry->desc)
@@ -42,7 +42,7 @@ static herr_t take_first(unsigned depth, const H5E_error2_t *entry, void *data)
     return 1; /* stop: only the innermost message is needed */
 }
 
-static herr_t note_memory(unsigned depth, const H5E_error2_t *entry, void *data)
+static herr_t record_memory(unsigned depth, const H5E_error2_t *entry, void *data)
 {
     (void)depth;
     *(bool *)data |= entry->maj_num == H5E_RESOURCE && entry->min_num == H5E_NOSPACE;
@@ -52,7 +52,7 @@ static herr_t note_memory(unsigned depth, const H5E_error2_t *entry, void *data)
 bool ebpo_h5_short_of_memory(void)
 {
     bool found = false;
-    H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, note_memory, &found);
+    H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, record_memory, &found);
     return found;
 }
 
@@ -67,7 +67,7 @@ ebpo_status ebpo_h5_fail(ebpo_error *error, ebpo_status status, const char *show
                          const char *object, const char *what)
 {
     char cause[CAUSE_BYTES] = "";
-    H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, take_first, cause);
+    H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, copy_first_message, cause);
     H5Eclear2(H5E_DEFAULT);
     int number = system_error(cause);
     if (number > 0)
@@ -96,7 +96,7 @@ ebpo_status ebpo_h5_open_to_read(const char *path, const char *shown, bool lock,
     *file = open_with(path, lock);
     if (*file >= 0)
         return EBPO_OK;
-    H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, take_first, cause);
+    H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, copy_first_message, cause);
     int number = strstr(cause, "unable to lock file") ? system_error(cause) : 0;
     if (number == EAGAIN || number == EACCES)
         return ebpo_fail_file(error, EBPO_E_IO, shown,

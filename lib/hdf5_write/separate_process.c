@@ -41,7 +41,7 @@ static void limit_resource(int what, uint64_t most)
     }
 }
 
-static void take_limits(const ebpo_process_limits *limits, uint64_t has)
+static void set_limits(const ebpo_process_limits *limits, uint64_t has)
 {
     limit_resource(RLIMIT_CORE, 0);
     limit_resource(RLIMIT_FSIZE, limits->file_bytes);
@@ -93,7 +93,7 @@ static void run_work(ebpo_process_fn work, void *user, const ebpo_process_limits
         signal(handled[i], SIG_DFL);
     signal(SIGXFSZ, SIG_IGN);
     signal(SIGPIPE, SIG_IGN);
-    take_limits(limits, has);
+    set_limits(limits, has);
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
     H5PLset_loading_state(0);
     r.status = work(user, &r.error);

@@ -1,4 +1,4 @@
-/* The virtual file driver through which libhdf5 writes to a file or to memory.
+/* Provides the virtual file driver through which libhdf5 writes to a file or to memory.
  *
  * libhdf5 1.10 does not survive a failed write: it keeps unflushed data and an id whose file is
  * already released, and fails when it uses this id at exit. So the driver stores the first failure,

@@ -1,7 +1,7 @@
-/* HDF5 filter 32015, which stores a chunk as one zstd frame. It is registered with libhdf5 in this
- * process and, compiled a second time with EBPO_FILTER_IN_PLUGIN, is a plugin for h5dump, h5py and
- * all other programs. It uses only headers of HDF5 and does not link with HDF5's library, so one
- * plugin serves all builds. */
+/* Provides HDF5 filter 32015, which stores a chunk as one zstd frame. It is registered with libhdf5
+ * in this process and, compiled a second time with EBPO_FILTER_IN_PLUGIN, is a plugin for h5dump,
+ * h5py and all other programs. It uses only headers of HDF5 and does not link with HDF5's library,
+ * so one plugin serves all builds. */
 #include "hdf5_write/zstd_filter.h"
 
 #ifdef EBPO_FILTER_IN_PLUGIN

@@ -1,7 +1,7 @@
-/* Sources of files whose bytes arrive asynchronously (ebpo/async.h). Supplied bytes are extents, in
- * order and without overlaps. A read copies from extents, or notes the missing ranges as wanted and
- * returns EBPO_E_PENDING. Prefetch hints are noted in the same way, so the caller fetches all
- * ranges of a round trip together.
+/* Provides sources of files whose bytes arrive asynchronously (ebpo/async.h). Supplied bytes are
+ * extents, in order and without overlaps. A read copies from extents, or notes the missing ranges
+ * as wanted and returns EBPO_E_PENDING. Prefetch hints are noted in the same way, so the caller
+ * fetches all ranges of a round trip together.
  *
  * A clock counts reads, supplied ranges and operations. An extent that was used since the oldest
  * running operation began is never removed. So the available bytes only grow while an operation is
@@ -196,7 +196,7 @@ static void merge_wanted(ebpo_async *a, uint64_t gap)
     a->wanted_count = kept;
 }
 
-static bool note_wanted(ebpo_async *a, ebpo_range range)
+static bool record_wanted(ebpo_async *a, ebpo_range range)
 {
     if (a->wanted_count && a->wanted_count % COMPACT_COUNT == 0)
         merge_wanted(a, 0);
@@ -241,7 +241,7 @@ static ebpo_status async_read(void *user, uint64_t offset, uint64_t size, void *
         status = fail_changed(a, error);
     else if (is_available(a, offset, offset + size))
         copy_bytes(a, offset, offset + size, data);
-    else if (!note_wanted(a, (ebpo_range){ offset, size }))
+    else if (!record_wanted(a, (ebpo_range){ offset, size }))
         status = ebpo_fail_memory(error, sizeof *a->wanted);
     else
         status = ebpo_fail_at(error, EBPO_E_PENDING, a->name, "", (int64_t)offset,
@@ -258,7 +258,7 @@ static void async_prefetch(void *user, const ebpo_range *ranges, size_t count)
     pthread_mutex_lock(&a->lock);
     for (size_t i = 0; i < count; i++)
         if (!is_available(a, ranges[i].offset, ranges[i].offset + ranges[i].size) &&
-            !note_wanted(a, ranges[i]))
+            !record_wanted(a, ranges[i]))
             break; /* without memory, there is no hint */
     pthread_mutex_unlock(&a->lock);
 }

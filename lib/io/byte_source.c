@@ -1,7 +1,7 @@
-/* Sources of a file's bytes (ebpo_source): a regular file, which is read by pread, and memory of
- * the caller. http_source.c has the source for URLs. An input is a source with a name for messages
- * and a count of reads. Each read must be within the source's size. Files are not mapped, because
- * the process would end if another program shortened a mapped file.
+/* Provides sources of a file's bytes (ebpo_source): a regular file, which is read by pread, and
+ * memory of the caller. http_source.c has the source for URLs. An input is a source with a name for
+ * messages and a count of reads. Each read must be within the source's size. Files are not mapped,
+ * because the process would end if another program shortened a mapped file.
  *
  * This file also recognises URLs, and removes passwords and queries from URLs for messages. */
 #include <errno.h>

@@ -1,10 +1,10 @@
-/* Fetched parts of a file on a server. In memory there are cached ranges, in order and without
- * overlaps. One request fetches each range, which is kept while memory allows. Ranges with prefetch
- * hints that are not read yet are kept longest, then ranges that were read last. The cache folder,
- * if there is one, holds blocks as files, named by a digest of address and version, each with a
- * SHA-256. Blocks are written under temporary names, so any number of processes may share the
- * folder. When its limit is reached, the oldest blocks are removed. Nothing depends on the folder:
- * missing or damaged blocks are fetched. */
+/* Caches fetched parts of a file on a server, in memory and in a folder. In memory there are cached
+ * ranges, in order and without overlaps. One request fetches each range, which is kept while memory
+ * allows. Ranges with prefetch hints that are not read yet are kept longest, then ranges that were
+ * read last. The cache folder, if there is one, holds blocks as files, named by a digest of address
+ * and version, each with a SHA-256. Blocks are written under temporary names, so any number of
+ * processes may share the folder. When its limit is reached, the oldest blocks are removed. Nothing
+ * depends on the folder: missing or damaged blocks are fetched. */
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -611,7 +611,7 @@ static void add_wanted(ebpo_range_cache *p, const ebpo_range *hinted)
 }
 
 /* Makes cached ranges for hinted ranges (sorted), one for hinted ranges that are close together. */
-static void note_ranges(ebpo_range_cache *p, const ebpo_range *sorted, size_t count)
+static void record_ranges(ebpo_range_cache *p, const ebpo_range *sorted, size_t count)
 {
     uint64_t before = p->count, gap = count > MANY ? GAP_BYTES_OF_MANY : GAP_BYTES;
     p->hinting = true;
@@ -644,7 +644,7 @@ void ebpo_range_cache_hint(ebpo_range_cache *p, const ebpo_range *ranges, size_t
     memcpy(sorted, ranges, count * sizeof *sorted);
     qsort(sorted, count, sizeof *sorted, by_offset);
     pthread_mutex_lock(&p->lock);
-    note_ranges(p, sorted, count);
+    record_ranges(p, sorted, count);
     read_ahead(p, sorted[0].offset);
     pthread_mutex_unlock(&p->lock);
     free(sorted);

@@ -1,5 +1,5 @@
-/* Fetched parts of a file on a server: ranges in memory, and blocks in a folder. Blocks persist
- * between sessions. */
+/* Caches fetched parts of a file on a server: ranges in memory, and blocks in a folder. Blocks
+ * persist between sessions. */
 #ifndef EBPO_IO_HTTP_CACHE_H
 #define EBPO_IO_HTTP_CACHE_H
 
@@ -60,7 +60,7 @@ typedef struct ebpo_range_cache {
     double wait_seconds;
 } ebpo_range_cache;
 
-/* Notes prefetch hints within [0, size), in any order. Ranges that cannot be noted for lack of
+/* Records prefetch hints within [0, size), in any order. Ranges that cannot be recorded for lack of
  * memory are read without a hint. */
 void ebpo_range_cache_hint(ebpo_range_cache *cache, const ebpo_range *ranges, size_t count);
 /* Reads bytes [offset, offset + size) within [begin, size of the file). */

@@ -16,8 +16,8 @@
 
 /* Finds the text of the header field `name`, without surrounding blanks. Returns false when the
  * line is another field. */
-static bool take_field(const char *line, size_t size, const char *name, const char **text,
-                       size_t *length)
+static bool parse_field(const char *line, size_t size, const char *name, const char **text,
+                        size_t *length)
 {
     size_t at = strlen(name);
     if (size <= at || strncasecmp(line, name, at) != 0 || line[at] != ':')
@@ -33,7 +33,7 @@ static bool take_field(const char *line, size_t size, const char *name, const ch
 }
 
 /* Reads digits only; returns false beyond 2^63. */
-static bool take_number(const char **at, const char *end, uint64_t *out)
+static bool parse_number(const char **at, const char *end, uint64_t *out)
 {
     const char *begin = *at;
     *out = 0;
@@ -45,7 +45,7 @@ static bool take_number(const char **at, const char *end, uint64_t *out)
     return *at > begin;
 }
 
-static bool take_token(const char **at, const char *end, char c)
+static bool parse_token(const char **at, const char *end, char c)
 {
     if (*at >= end || **at != c)
         return false;
@@ -61,14 +61,14 @@ static bool content_range(ebpo_http_response *a, const char *at, const char *end
     if (end - at < 6 || strncasecmp(at, "bytes", 5) != 0 || at[5] != ' ')
         return false;
     at += 6;
-    range = !take_token(&at, end, '*');
-    if (range && (!take_number(&at, end, &begin) || !take_token(&at, end, '-') ||
-                  !take_number(&at, end, &last)))
+    range = !parse_token(&at, end, '*');
+    if (range && (!parse_number(&at, end, &begin) || !parse_token(&at, end, '-') ||
+                  !parse_number(&at, end, &last)))
         return false;
-    if (!take_token(&at, end, '/'))
+    if (!parse_token(&at, end, '/'))
         return false;
-    bool sized = !take_token(&at, end, '*');
-    if ((sized && !take_number(&at, end, &total)) || at != end || begin > last ||
+    bool sized = !parse_token(&at, end, '*');
+    if ((sized && !parse_number(&at, end, &total)) || at != end || begin > last ||
         (range && sized && last >= total))
         return false;
     if ((a->has_range || a->has_total) &&
@@ -82,7 +82,7 @@ static bool content_range(ebpo_http_response *a, const char *at, const char *end
     return true;
 }
 
-/* Keeps "text/html" of "Text/HTML; charset=utf-8". */
+/* Returns "text/html" of "Text/HTML; charset=utf-8". */
 static void keep_type(char out[EBPO_HTTP_TYPE_BYTES], const char *text, size_t length)
 {
     size_t i = 0;
@@ -100,7 +100,7 @@ bool ebpo_http_response_is_text(const char *type)
            (length >= 3 && strcmp(type + length - 3, "xml") == 0);
 }
 
-/* Keeps a text, or its digest if the text is too long, because it is only used in comparisons. */
+/* Stores a text, or its digest if the text is too long, because it is only used in comparisons. */
 static void keep_text(char out[EBPO_HTTP_TAG_BYTES], const char *text, size_t length)
 {
     if (length < EBPO_HTTP_TAG_BYTES) {
@@ -126,7 +126,7 @@ static void status_line(ebpo_http_response *a, const char *line, size_t size)
     uint64_t code = 0;
     while (at && at < end && *at == ' ')
         at++;
-    if (at && take_number(&at, end, &code) && code < 1000)
+    if (at && parse_number(&at, end, &code) && code < 1000)
         a->code = (int)code;
 }
 
@@ -137,22 +137,22 @@ void ebpo_http_response_line(ebpo_http_response *a, const char *line, size_t siz
     a->header_bytes += size;
     if (size > 5 && memcmp(line, "HTTP/", 5) == 0) {
         status_line(a, line, size);
-    } else if (take_field(line, size, "content-range", &text, &length)) {
+    } else if (parse_field(line, size, "content-range", &text, &length)) {
         if (!content_range(a, text, text + length))
             a->bad_range = true;
-    } else if (take_field(line, size, "content-length", &text, &length)) {
+    } else if (parse_field(line, size, "content-length", &text, &length)) {
         const char *at = text;
-        a->has_length = take_number(&at, text + length, &a->length) && at == text + length;
-    } else if (take_field(line, size, "content-encoding", &text, &length)) {
+        a->has_length = parse_number(&at, text + length, &a->length) && at == text + length;
+    } else if (parse_field(line, size, "content-encoding", &text, &length)) {
         a->encoded = length && !(length == 8 && strncasecmp(text, "identity", 8) == 0);
-    } else if (take_field(line, size, "transfer-encoding", &text, &length)) {
+    } else if (parse_field(line, size, "transfer-encoding", &text, &length)) {
         a->chunked = length >= 7 && strncasecmp(text + length - 7, "chunked", 7) == 0;
-    } else if (take_field(line, size, "etag", &text, &length)) {
+    } else if (parse_field(line, size, "etag", &text, &length)) {
         size_t weak = length > 2 && text[0] == 'W' && text[1] == '/' ? 2 : 0;
         keep_text(a->etag, text + weak, length - weak);
-    } else if (take_field(line, size, "content-type", &text, &length)) {
+    } else if (parse_field(line, size, "content-type", &text, &length)) {
         keep_type(a->type, text, length);
-    } else if (take_field(line, size, "last-modified", &text, &length)) {
+    } else if (parse_field(line, size, "last-modified", &text, &length)) {
         keep_text(a->modified, text, length);
     }
 }

@@ -1,6 +1,6 @@
-/* A source by URL: its options are checked and copied, the first request returns the file's size,
- * version and head, and reads use the cache of ranges (http_cache.c). A server that does not
- * support ranges sends the whole file, which is then kept in memory, up to a limit. */
+/* Provides the source for a URL: its options are checked and copied, the first request returns the
+ * file's size, version and head, and reads use the cache of ranges (http_cache.c). A server that
+ * does not support ranges sends the whole file, which is then kept in memory, up to a limit. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

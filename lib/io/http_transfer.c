@@ -1,9 +1,9 @@
-/* Requests for byte ranges through libcurl, which one thread drives. Requests wait in a queue,
- * urgent ones first; up to EBPO_SLOTS_MAX run at once, each in a slot with a reusable handle. A
- * response is judged by its head (http_response.c), before its body is accepted. If a body breaks
- * off, its bytes are kept, and the next attempt requests the rest, after growing pauses. At most
- * five redirects are followed, never from https to http, and the caller's credentials are not sent
- * to another server. The lock belongs to the caller (http_transfer.h). */
+/* Sends requests for byte ranges through libcurl, which one thread drives. Requests wait in a
+ * queue, urgent ones first; up to EBPO_SLOTS_MAX run at once, each in a slot with a reusable
+ * handle. A response is judged by its head (http_response.c), before its body is accepted. If a
+ * body breaks off, its bytes are kept, and the next attempt requests the rest, after growing
+ * pauses. At most five redirects are followed, never from https to http, and the caller's
+ * credentials are not sent to another server. The lock belongs to the caller (http_transfer.h). */
 #include <curl/curl.h>
 #include <errno.h>
 #include <inttypes.h>
@@ -181,7 +181,7 @@ static int check_stall(void *user, curl_off_t total, curl_off_t done, curl_off_t
     return s->stalled;
 }
 
-static size_t take_header(char *line, size_t size, size_t count, void *user)
+static size_t receive_header(char *line, size_t size, size_t count, void *user)
 {
     ebpo_slot *s = user;
     s->moved = ebpo_seconds();
@@ -219,7 +219,7 @@ static size_t refuse_body(ebpo_slot *s, ebpo_status status, const char *why)
     return 0;
 }
 
-static size_t take_part(ebpo_slot *s, const char *bytes, size_t size)
+static size_t receive_part(ebpo_slot *s, const char *bytes, size_t size)
 {
     uint64_t capacity = s->response.last + 1 - s->begin - s->taken;
     if (size > capacity)
@@ -232,7 +232,7 @@ static size_t take_part(ebpo_slot *s, const char *bytes, size_t size)
     return size;
 }
 
-static size_t take_whole(ebpo_slot *s, const char *bytes, size_t size)
+static size_t receive_whole(ebpo_slot *s, const char *bytes, size_t size)
 {
     ebpo_request *r = s->request;
     if (s->taken + size > s->owner->options->whole_limit)
@@ -247,7 +247,7 @@ static size_t take_whole(ebpo_slot *s, const char *bytes, size_t size)
     return size;
 }
 
-static size_t take_body(char *bytes, size_t size, size_t count, void *user)
+static size_t receive_body(char *bytes, size_t size, size_t count, void *user)
 {
     ebpo_slot *s = user;
     size *= count;
@@ -255,9 +255,9 @@ static size_t take_body(char *bytes, size_t size, size_t count, void *user)
     judge_slot(s);
     s->received += size;
     if (s->verdict == EBPO_HTTP_PART)
-        return take_part(s, bytes, size);
+        return receive_part(s, bytes, size);
     if (s->verdict == EBPO_HTTP_WHOLE)
-        return take_whole(s, bytes, size);
+        return receive_whole(s, bytes, size);
     s->unwanted += size;
     s->stopped = s->unwanted > DRAIN_BYTES || s->verdict == EBPO_HTTP_REFUSED;
     return s->stopped ? 0 : size;
@@ -309,9 +309,9 @@ static bool set_up_slot(ebpo_slot *s)
     curl_easy_setopt(e, CURLOPT_XFERINFOFUNCTION, check_stall);
     curl_easy_setopt(e, CURLOPT_XFERINFODATA, s);
     curl_easy_setopt(e, CURLOPT_ERRORBUFFER, s->trouble);
-    curl_easy_setopt(e, CURLOPT_HEADERFUNCTION, take_header);
+    curl_easy_setopt(e, CURLOPT_HEADERFUNCTION, receive_header);
     curl_easy_setopt(e, CURLOPT_HEADERDATA, s);
-    curl_easy_setopt(e, CURLOPT_WRITEFUNCTION, take_body);
+    curl_easy_setopt(e, CURLOPT_WRITEFUNCTION, receive_body);
     curl_easy_setopt(e, CURLOPT_WRITEDATA, s);
     curl_easy_setopt(e, CURLOPT_PRIVATE, s);
     return good;

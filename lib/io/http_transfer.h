@@ -1,4 +1,5 @@
-/* Requests for byte ranges, several at a time, with retries; a separate thread drives libcurl. */
+/* Sends requests for byte ranges, several at a time, with retries; a separate thread drives
+ * libcurl. */
 #ifndef EBPO_IO_HTTP_TRANSFER_H
 #define EBPO_IO_HTTP_TRANSFER_H
 

@@ -31,32 +31,32 @@
 /* No system allows more bytes of names or of a value. */
 enum { NAMES_MAX = 65536, VALUE_MAX = 65536 };
 
-static void take_attribute(int from, int to, const char *name, void *value)
+static void copy_attribute(int from, int to, const char *name, void *value)
 {
     ssize_t size = fgetxattr(from, name, value, VALUE_MAX);
     if (size >= 0)
         (void)!fsetxattr(to, name, value, (size_t)size, 0); /* where the system allows */
 }
 
-static void take_attributes(int from, int to)
+static void copy_attributes(int from, int to)
 {
     char *names = malloc(NAMES_MAX);
     void *value = malloc(VALUE_MAX);
     ssize_t size = names && value ? flistxattr(from, names, NAMES_MAX) : -1;
     for (ssize_t at = 0; at < size; at += (ssize_t)strlen(names + at) + 1)
-        take_attribute(from, to, names + at, value);
+        copy_attribute(from, to, names + at, value);
     free(names);
     free(value);
 }
 
 #else
-static void take_attributes(int from, int to) { (void)from, (void)to; }
+static void copy_attributes(int from, int to) { (void)from, (void)to; }
 #endif
 
 /* Sets the owner and group of `was`, and returns the mode that fits them. If the process may not
  * give the file away, the file stays the process's, without the bits that let it act for its owner
  * (set-user-ID). */
-static mode_t take_owner(int to, const struct stat *was)
+static mode_t copy_owner(int to, const struct stat *was)
 {
     struct stat is;
     mode_t mode = was->st_mode & 07777;
@@ -70,19 +70,20 @@ static mode_t take_owner(int to, const struct stat *was)
     return group ? mode & 0777 : mode & (0707 | (mode & 007) << 3);
 }
 
-/* Gives the open file the mode, owner and extended attributes (including access control lists) of
- * the regular file at `path`; owner and attributes only as far as the system allows. Without such a
- * file, sets `mode`, if it is not -1. Returns false with errno when the mode cannot be set. */
-static bool take_over_facts(int fd, const char *path, int mode)
+/* Sets for the open file the mode, owner and extended attributes (including access control lists)
+ * of the regular file at `path`; owner and attributes only as far as the system allows. Without
+ * such a file, sets `mode`, if it is not -1. Returns false with errno when the mode cannot be set.
+ */
+static bool copy_facts(int fd, const char *path, int mode)
 {
     struct stat was;
     int from = open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY);
     bool exists = from >= 0 ? fstat(from, &was) == 0 : lstat(path, &was) == 0;
     if (exists && S_ISREG(was.st_mode)) {
-        mode = (int)take_owner(fd, &was);
+        mode = (int)copy_owner(fd, &was);
         if (from >= 0)
             /* before the mode, because an access control list may change the mode */
-            take_attributes(from, fd);
+            copy_attributes(from, fd);
     }
     if (from >= 0)
         close(from);
@@ -271,7 +272,7 @@ static ebpo_status make_ready(ebpo_publish *publish, ebpo_error *error)
         return ebpo_fail_errno(error, publish->shown,
                                errno ? "could not be written" : "could not be written completely");
     int fd = open(publish->temporary, O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
-    if (fd >= 0 && !take_over_facts(fd, publish->target, publish->mode)) {
+    if (fd >= 0 && !copy_facts(fd, publish->target, publish->mode)) {
         int saved = errno;
         close(fd);
         errno = saved;
@@ -348,8 +349,8 @@ static bool exchange_files(const ebpo_publish *publish)
 }
 
 /* Restores the first file, because the second could not be renamed to its target. */
-static ebpo_status take_back(ebpo_publish *first, bool exchanged, bool fresh, ebpo_error *cause,
-                             ebpo_error *error)
+static ebpo_status restore_first(ebpo_publish *first, bool exchanged, bool fresh, ebpo_error *cause,
+                                 ebpo_error *error)
 {
     if (exchanged ? exchange_files(first) : fresh && unlink(first->target) == 0)
         return ebpo_fail_with(error, cause);
@@ -372,7 +373,7 @@ ebpo_status ebpo_publish_commit_pair(ebpo_publish *first, ebpo_publish *second, 
     if (status == EBPO_OK && !exchanged)
         status = put_in_place(first, error);
     if (status == EBPO_OK && put_in_place(second, &cause) != EBPO_OK)
-        status = take_back(first, exchanged, fresh, &cause, error);
+        status = restore_first(first, exchanged, fresh, &cause, error);
     ebpo_file_lock_release(&lock);
     if (status == EBPO_OK)
         status = sync_name(first, error);

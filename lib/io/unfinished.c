@@ -1,4 +1,4 @@
-/* Unfinished files. Outputs and locks are removed when a signal ends this process; their names are
+/* Removes unfinished files: outputs and locks, when a signal ends this process. Their names are
  * in fixed storage with lock-free states, because a signal handler reads them. Temporary files and
  * folders of killed processes are recognised by their names, which contain the process id; they are
  * removed when the process has ended and no process holds their lock. New folders are created

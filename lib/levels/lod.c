@@ -4,7 +4,7 @@
  * leaf's planes come from the file, or from its faces (construct/leaf_planes.c), or the leaf keeps
  * its parent's envelope. The top of the tree is walked first; threads then walk the independent
  * subtrees below it. The position of the split depends only on the tree, and pieces are joined in
- * octcode order, so the number of threads does not change the result.
+ * order of octcodes (locational codes), so the number of threads does not change the result.
  *
  * Sections: polyhedra as triangles; the model, which a walk reads; leaves; colours of nodes; the
  * walk. */
@@ -244,7 +244,7 @@ ebpo_status ebpo_lod_model_read(ebpo_lod_model *out, const ebpo_file *file, int 
 
 /* --- envelopes of leaves --- */
 
-static bool take_face(const ebpo_mesh *mesh, uint64_t face, ebpo_triangle *out)
+static bool copy_face(const ebpo_mesh *mesh, uint64_t face, ebpo_triangle *out)
 {
     if (face >= mesh->face_count)
         return false;
@@ -275,9 +275,9 @@ ebpo_status ebpo_lod_leaf_faces(const ebpo_lod_model *model, ebpo_cell cell, uin
         level->leaf_refs ? level->leaf_refs + model->ranks[cell.level].ref_first[leaf] : NULL;
     bool fine = true;
     for (uint64_t i = 0; i < refs && fine; i++)
-        fine = take_face(&model->mesh, ref[i], &scratch->faces[i]);
+        fine = copy_face(&model->mesh, ref[i], &scratch->faces[i]);
     for (uint64_t i = 0; i < fresh && fine; i++)
-        fine = take_face(&model->mesh, level->leaf_first[leaf] + i, &scratch->faces[refs + i]);
+        fine = copy_face(&model->mesh, level->leaf_first[leaf] + i, &scratch->faces[refs + i]);
     if (!fine)
         return ebpo_fail(error, EBPO_E_FORMAT,
                          "level %d: leaf %llu names a face or vertex that the mesh does not have; "
@@ -456,8 +456,8 @@ static ebpo_status emit_polytope(walker *w, const ebpo_polytope *p, ebpo_cell ce
 static ebpo_status visit_group(walker *w, uint64_t group, ebpo_cell parent_cell,
                                const ebpo_polytope *parent);
 
-/* Returns true for a pruned node, whose envelope represents it at all deeper levels. Only called
- * above the target. */
+/* Returns true for a pruned node (whose children are not in the file); its envelope represents it
+ * at all deeper levels. Only called above the target. */
 static bool is_pruned(const ebpo_lod_model *model, int level, uint64_t gray)
 {
     return model->info->pruned && level < model->target && model->level[level + 1].types[gray] == 0;

@@ -116,8 +116,8 @@ static uint64_t key_of(ebpo_cell cell, unsigned corner)
     return key;
 }
 
-/* Gives every corner position an index, and sets the corner indices of each node. Returns false
- * when out of memory. */
+/* Assigns an index to every corner position, and sets the corner indices of each node. Returns
+ * false when out of memory. */
 static bool number_corners(lighting *l)
 {
     uint64_t count = l->nodes->node_count, slots = ebpo_hash_slots(count * 8 / 3 * 4 + 1), at;

@@ -1,5 +1,5 @@
-/* Delivers a file level by level, node by node in octcode order, for programs that show or process
- * a model while it arrives.
+/* Delivers a file level by level, node by node in order of octcodes (locational codes), for
+ * programs that show or process a model while it arrives.
  *
  * Only the types of completed levels stay in memory, and their planes if polygons are requested.
  * This is enough to walk down to the nodes of the next level. Within a level, the depth-first walk

@@ -31,7 +31,7 @@ typedef struct ebpo_node_buffers {
     uint32_t polygon_first[EBPO_POLYTOPE_FACES + 1], corners[EBPO_POLYTOPE_CORNERS];
 } ebpo_node_buffers;
 
-/* Sets octcode, type, cell, and a black node's volume. */
+/* Sets octcode (locational code), type, cell, and a black node's volume. */
 void ebpo_node_begin(ebpo_stream_node *out, const ebpo_box *box, uint64_t octcode,
                      ebpo_node_type type);
 /* Adds at most EBPO_NODE_CODES codes. */

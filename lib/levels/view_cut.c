@@ -8,7 +8,7 @@
  *   parent after all nodes of the group have been delivered.
  * - The frontier holds the gray nodes of the cut in a binary heap, whose first node is refined
  *   next. Nodes are ordered by turn (visible, not visible, never refined), then by key, then by
- *   octcode. So no two nodes are equal, and the order is deterministic. */
+ *   octcode (locational code). So no two nodes are equal, and the order is deterministic. */
 #include "core/strict_fp.h"
 
 #include <math.h>

@@ -58,7 +58,7 @@ uint64_t ebpo_viewpoint_key(const ebpo_viewpoint *viewpoint, const ebpo_box *box
 /* A group of siblings. The group is linked to its parent (`child` of the parent's group) after all
  * nodes of the group have been delivered. */
 typedef struct ebpo_partial_group {
-    uint64_t parent;     /* octcode; 0: the root's group */
+    uint64_t parent;     /* octcode (locational code); 0: the root's group */
     uint64_t first_gray; /* rank in its level of the group's first gray node */
     uint64_t first_code; /* index into codes */
     uint32_t child[8];   /* index of the children's group; 0: not present */

@@ -38,7 +38,7 @@ typedef struct view_leaves {
     ebpo_view_faces now;
 } view_leaves;
 
-/* A group of siblings; `parent` is an octcode, 0 for the root's group. */
+/* A group of siblings; `parent` is an octcode (locational code), 0 for the root's group. */
 typedef struct view_group {
     ebpo_group_number number;
     uint64_t parent;
@@ -629,8 +629,9 @@ static ebpo_status read_group(ebpo_view_stream *s, const view_group *group, ebpo
     return status == EBPO_OK ? read_now(s, group, wanted, error) : status;
 }
 
-/* Begins to deliver the children of the frontier's top, or the root. A pruned node has no children:
- * it stays in the cut, and the caller calls this function again. */
+/* Begins to deliver the children of the frontier's top, or the root. A pruned node (whose children
+ * are not in the file) has no children: it stays in the cut, and the caller calls this function
+ * again. */
 static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_error *error)
 {
     bool root = s->partial.group_count == 0;

@@ -1,4 +1,4 @@
-/* Adjacency of faces at vertices and edges. */
+/* Finds the faces at vertices and edges. */
 #ifndef EBPO_MESH_ADJACENCY_H
 #define EBPO_MESH_ADJACENCY_H
 

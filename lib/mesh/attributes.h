@@ -97,12 +97,12 @@ void ebpo_attributes_drop_others(ebpo_attributes *from);
 bool ebpo_attribute_reserve(ebpo_workspace *workspace, ebpo_attribute *a, uint64_t rows,
                             uint64_t items);
 
-/* Notes data that cannot be kept, as a phrase such as "property x of vertex". */
+/* Records data that cannot be kept, as a phrase such as "property x of vertex". */
 void ebpo_attributes_lose(ebpo_attributes *attributes, const char *format, ...) EBPO_PRINTF(2, 3);
-/* Notes data that reading omitted, as a sentence without a full stop. */
+/* Records data that reading omitted, as a sentence without a full stop. */
 void ebpo_attributes_note_unread(ebpo_attributes *attributes, const char *format, ...)
     EBPO_PRINTF(2, 3);
-/* Notes "what: count", unless count is 0. */
+/* Records "what: count", unless count is 0. */
 void ebpo_attributes_count_unread(ebpo_attributes *attributes, const char *what, uint64_t count);
 
 /* Replaces the arrays of an element by `count` rows: row i is the old row rows[i], or zeros and

@@ -1,4 +1,4 @@
-/* The border of a mesh: its boundary as a chain, as closed directed loops with weights. */
+/* Finds the border of a mesh: its boundary as a chain, as closed directed loops with weights. */
 #ifndef EBPO_MESH_BORDER_H
 #define EBPO_MESH_BORDER_H
 

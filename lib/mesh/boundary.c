@@ -105,7 +105,7 @@ static int compare_edges(const void *a, const void *b)
     return (x->face > y->face) - (x->face < y->face);
 }
 
-static void take_edges(void *context, uint64_t place, const void *records, uint64_t count)
+static void store_edges(void *context, uint64_t place, const void *records, uint64_t count)
 {
     chaining *c = context;
     memcpy(c->edges + place, records, (size_t)count * sizeof *c->edges);
@@ -129,7 +129,7 @@ static int compare_arrivals(const void *a, const void *b)
     return (x->edge > y->edge) - (x->edge < y->edge);
 }
 
-static void take_arrivals(void *context, uint64_t place, const void *records, uint64_t count)
+static void store_arrivals(void *context, uint64_t place, const void *records, uint64_t count)
 {
     chaining *c = context;
     memcpy(c->arrivals + place, records, (size_t)count * sizeof *c->arrivals);
@@ -159,12 +159,12 @@ static ebpo_status sort_all(chaining *c, ebpo_error *error)
                        .context = c,
                        .make = make_edges,
                        .compare = compare_edges,
-                       .take = take_edges };
+                       .take = store_edges };
     ebpo_status status = ebpo_sort_run(&sort, error);
     sort.record = sizeof *c->arrivals;
     sort.make = make_arrivals;
     sort.compare = compare_arrivals;
-    sort.take = take_arrivals;
+    sort.take = store_arrivals;
     return status == EBPO_OK ? ebpo_sort_run(&sort, error) : status;
 }
 
@@ -444,7 +444,7 @@ static int compare_ranks(const void *a, const void *b)
     return (x->number > y->number) - (x->number < y->number);
 }
 
-static void take_ranks(void *context, uint64_t place, const void *records, uint64_t count)
+static void store_ranks(void *context, uint64_t place, const void *records, uint64_t count)
 {
     ranking *r = context;
     memcpy(r->sorted + place, records, (size_t)count * sizeof *r->sorted);
@@ -472,7 +472,7 @@ ebpo_status ebpo_loops_rank(uint64_t **triangles, const ebpo_loops *loops, const
                            .context = &r,
                            .make = make_ranks,
                            .compare = compare_ranks,
-                           .take = take_ranks };
+                           .take = store_ranks };
         status = ebpo_sort_run(&sort, error);
         EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, i, 0, status == EBPO_OK ? count : 0) {
             before[r.sorted[i].number] = sum;

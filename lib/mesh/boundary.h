@@ -1,4 +1,4 @@
-/* Boundary edges (used by one face) and the closed chains that they form: holes. */
+/* Finds boundary edges (used by one face) and the closed chains that they form: holes. */
 #ifndef EBPO_MESH_BOUNDARY_H
 #define EBPO_MESH_BOUNDARY_H
 

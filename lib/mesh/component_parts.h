@@ -1,4 +1,4 @@
-/* State of the search for the components of a mesh, and of their grouping. */
+/* Defines the state of the search for the components of a mesh, and of their grouping. */
 #ifndef EBPO_MESH_COMPONENT_PARTS_H
 #define EBPO_MESH_COMPONENT_PARTS_H
 

@@ -1,4 +1,4 @@
-/* Functions for a mesh as a whole: its name in messages, the check of its shape, copying, freeing,
+/* Handles a mesh as a whole: its name in messages, the check of its shape, copying, freeing,
  * and the frame in which coordinates can be multiplied without overflow. */
 #include "core/strict_fp.h"
 

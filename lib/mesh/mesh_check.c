@@ -120,8 +120,8 @@ static void measure_face(face_block *block, const ebpo_units *units, const doubl
                                       (a[2] - centre[2]) * cross[2]);
 }
 
-static void note_face(const ebpo_check *check, unsigned worker, ebpo_finding *finding,
-                      ebpo_finding_kind kind, uint64_t face)
+static void record_face(const ebpo_check *check, unsigned worker, ebpo_finding *finding,
+                        ebpo_finding_kind kind, uint64_t face)
 {
     ebpo_check_note(check, worker, finding, kind, ebpo_mesh_source_face(check->mesh, face),
                     (uint32_t)face, (uint32_t)face);
@@ -140,9 +140,9 @@ static ebpo_status check_faces(void *context, uint64_t begin, uint64_t end, unsi
         join_trees(parents, v[0], v[1]);
         join_trees(parents, v[1], v[2]);
         if (ebpo_face_repeats_index(v)) {
-            note_face(pass->check, worker, &block.index_repeated, EBPO_FOUND_INDEX_REPEATED_FACE,
-                      f);
-            note_face(pass->check, worker, &block.zero_area, EBPO_FOUND_ZERO_AREA_FACE, f);
+            record_face(pass->check, worker, &block.index_repeated, EBPO_FOUND_INDEX_REPEATED_FACE,
+                        f);
+            record_face(pass->check, worker, &block.zero_area, EBPO_FOUND_ZERO_AREA_FACE, f);
             continue;
         }
         double a[3], b[3], c[3], cross[3];
@@ -157,7 +157,7 @@ static ebpo_status check_faces(void *context, uint64_t begin, uint64_t end, unsi
             ebpo_mesh_position(mesh, v[2], c);
         }
         if (zero_area(a, b, c))
-            note_face(pass->check, worker, &block.zero_area, EBPO_FOUND_ZERO_AREA_FACE, f);
+            record_face(pass->check, worker, &block.zero_area, EBPO_FOUND_ZERO_AREA_FACE, f);
     }
     pass->blocks[begin / FACE_GRAIN] = block;
     return EBPO_OK;
@@ -294,7 +294,8 @@ static bool check_edges(const ebpo_check *check, star_block *block, scratch *s, 
     return true;
 }
 
-static bool note_repeated_faces(const ebpo_check *check, star_block *block, scratch *s, uint32_t v)
+static bool record_repeated_faces(const ebpo_check *check, star_block *block, scratch *s,
+                                  uint32_t v)
 {
     if (!ebpo_same_faces_gather(&s->same, &check->stars, check->mesh, v))
         return false;
@@ -323,7 +324,7 @@ static ebpo_status check_stars(void *context, uint64_t begin, uint64_t end, unsi
         block.components += check->parents[v] == v;
         if (!ebpo_star_gather(&s->star, &check->stars, check->mesh, vertex) ||
             !check_edges(check, &block, s, vertex) ||
-            !note_repeated_faces(check, &block, s, vertex))
+            !record_repeated_faces(check, &block, s, vertex))
             return ebpo_workspace_fail(check->mesh->workspace, degree * 2 * sizeof *s->star.links,
                                        error);
     }
@@ -522,7 +523,7 @@ static int compare_runs(const curve_run *a, const curve_run *b)
     return 0;
 }
 
-static void note_repeated(const ebpo_check *check, uint32_t v)
+static void record_repeated(const ebpo_check *check, uint32_t v)
 {
     ebpo_check_note(check, 0, &check->report->repeated_positions, EBPO_FOUND_REPEATED_POSITION,
                     ebpo_mesh_source_vertex(check->mesh, v), v, v);
@@ -530,7 +531,7 @@ static void note_repeated(const ebpo_check *check, uint32_t v)
 
 /* Skips the vertices at a run's next position. All but the first of them in the source are
  * repetitions. */
-static void take_position(const ebpo_check *check, curve_run *r, uint32_t *lowest)
+static void skip_position(const ebpo_check *check, curve_run *r, uint32_t *lowest)
 {
     double first[3], p[3];
     ebpo_mesh_position(r->mesh, r->at, first);
@@ -541,7 +542,7 @@ static void take_position(const ebpo_check *check, curve_run *r, uint32_t *lowes
         } else {
             if (ebpo_mesh_source_vertex(r->mesh, v) < ebpo_mesh_source_vertex(r->mesh, *lowest))
                 later = *lowest, *lowest = v;
-            note_repeated(check, later);
+            record_repeated(check, later);
         }
         if (r->at < r->end)
             ebpo_mesh_position(r->mesh, r->at, p);
@@ -560,9 +561,9 @@ static void compare_along_curve(const ebpo_check *check)
         uint32_t lowest = EBPO_NO_INDEX;
         int order = compare_runs(&a, &b);
         if (order <= 0)
-            take_position(check, &a, &lowest);
+            skip_position(check, &a, &lowest);
         if (order >= 0)
-            take_position(check, &b, &lowest);
+            skip_position(check, &b, &lowest);
         if (steps % EBPO_ITEMS_IN_ORDER == 0)
             ebpo_release_pages(mesh->workspace);
     }
@@ -592,7 +593,7 @@ static ebpo_status compare_all(const ebpo_check *check, ebpo_error *error)
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, v, 0, lowest ? count : 0) {
         uint64_t source = ebpo_mesh_source_vertex(mesh, v);
         if (lowest[ebpo_positions_first(&positions, (uint32_t)v)] != source)
-            note_repeated(check, (uint32_t)v);
+            record_repeated(check, (uint32_t)v);
     }
     ebpo_array_free(mesh->workspace, lowest);
     ebpo_positions_free(&positions);

@@ -35,9 +35,9 @@ typedef struct findings_picture {
 
 static ebpo_status begin_picture(findings_picture *picture, const ebpo_mesh *mesh, const char *path,
                                  ebpo_error *error);
-/* Notes a place in the picture. `faces`: indices in the current mesh. */
-static void note_in_picture(findings_picture *picture, const ebpo_found *found,
-                            const uint64_t *faces, uint64_t count);
+/* Records a location in the picture. `faces`: indices in the current mesh. */
+static void record_in_picture(findings_picture *picture, const ebpo_found *found,
+                              const uint64_t *faces, uint64_t count);
 /* Writes the picture. `report` is for the legend. */
 static ebpo_status write_picture(findings_picture *picture, const ebpo_mesh_report *report,
                                  ebpo_error *error);
@@ -125,7 +125,7 @@ static int compare_keyed(const void *x, const void *y)
     return a->ends < b->ends ? -1 : a->ends > b->ends;
 }
 
-static void take_keyed(void *context, uint64_t place, const void *records, uint64_t count)
+static void store_keyed(void *context, uint64_t place, const void *records, uint64_t count)
 {
     const sorting *s = context;
     const keyed *in = records;
@@ -178,7 +178,7 @@ static ebpo_status gather_findings(finding_search *p, const ebpo_found_list *lis
                              .context = &s,
                              .make = make_keyed,
                              .compare = compare_keyed,
-                             .take = take_keyed };
+                             .take = store_keyed };
     if (status == EBPO_OK && joined.count)
         status = ebpo_sort_run(&sort, error);
     ebpo_array_free(workspace, joined.item);
@@ -278,7 +278,7 @@ static ebpo_status report_all(finding_search *p, ebpo_error *error)
         if (!faces_of(p, f))
             return ebpo_workspace_fail(workspace, p->face_capacity * 2 * sizeof *p->faces, error);
         if (p->options.ply)
-            note_in_picture(&p->picture, f, p->faces, p->face_count);
+            record_in_picture(&p->picture, f, p->faces, p->face_count);
         if (i % BETWEEN_STEPS == 0 &&
             !ebpo_progress_step(&p->options.progress, "findings", i, p->all.count, error))
             return EBPO_E_CANCELLED;
@@ -294,7 +294,7 @@ static ebpo_status report_all(finding_search *p, ebpo_error *error)
 
 /* ---- entry point ---- */
 
-static ebpo_status note_all(finding_search *p, ebpo_mesh_report *report, ebpo_error *error)
+static ebpo_status record_all(finding_search *p, ebpo_mesh_report *report, ebpo_error *error)
 {
     unsigned threads = ebpo_thread_count(p->options.threads);
     ebpo_found_list *lists = ebpo_alloc_zero(threads, sizeof *lists);
@@ -316,7 +316,7 @@ static ebpo_status note_all(finding_search *p, ebpo_mesh_report *report, ebpo_er
 
 static ebpo_status find_all(finding_search *p, ebpo_mesh_report *report, ebpo_error *error)
 {
-    ebpo_status status = note_all(p, report, error);
+    ebpo_status status = record_all(p, report, error);
     if (status == EBPO_OK)
         status = ebpo_components_number(p->mesh, &p->component, error);
     if (status == EBPO_OK)
@@ -368,8 +368,8 @@ static ebpo_status begin_picture(findings_picture *picture, const ebpo_mesh *mes
     return ebpo_publish_begin(&picture->target, path, error);
 }
 
-static void note_in_picture(findings_picture *picture, const ebpo_found *found,
-                            const uint64_t *faces, uint64_t count)
+static void record_in_picture(findings_picture *picture, const ebpo_found *found,
+                              const uint64_t *faces, uint64_t count)
 {
     uint8_t kind = (uint8_t)found->kind;
     for (uint64_t i = 0; i < count; i++)

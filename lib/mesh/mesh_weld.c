@@ -278,8 +278,8 @@ static ebpo_status number_sources(welding *w, ebpo_error *error)
     return status;
 }
 
-/* Notes how many removed vertices have other attribute values than the remaining one. */
-static void note_differences(const welding *w)
+/* Records how many removed vertices have other attribute values than the remaining one. */
+static void record_differences(const welding *w)
 {
     const ebpo_mesh *mesh = w->mesh;
     uint64_t differ = 0;
@@ -336,7 +336,7 @@ static void move_attributes(const welding *w)
     ebpo_attributes *attributes = w->mesh->attributes;
     if (!attributes)
         return;
-    note_differences(w);
+    record_differences(w);
     ebpo_attributes_keep(attributes, "vertex", w->rows ? w->rows : w->from, w->kept);
 }
 

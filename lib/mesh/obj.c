@@ -444,7 +444,7 @@ static ebpo_status read_face(obj_reading *r, const uint64_t total[EBPO_IMPORT_SO
     return status;
 }
 
-/* Gives the current material to all faces so far that have none. */
+/* Sets the current material of all faces so far that have none. */
 static ebpo_status use_material(obj_reading *r)
 {
     ebpo_import_build *b = r->build;
@@ -487,7 +487,7 @@ static bool is_display(ebpo_obj_word word)
     return false;
 }
 
-static void note_other(obj_reading *r, ebpo_obj_word word)
+static void record_other(obj_reading *r, ebpo_obj_word word)
 {
     obj_losses *l = &r->losses;
     if (ebpo_obj_word_is(word, "mtllib")) {
@@ -520,7 +520,7 @@ static ebpo_status read_statement(obj_reading *r, const uint64_t total[EBPO_IMPO
         return begin_run(r);
     if (ebpo_obj_word_is(word, "usemtl"))
         return use_material(r);
-    note_other(r, word);
+    record_other(r, word);
     return EBPO_OK;
 }
 
@@ -677,8 +677,8 @@ static ebpo_status read_values(obj_reading *r)
 
 /* --- omitted data --- */
 
-/* Notes omitted data that also matter to callers that read only the mesh. */
-static void note_unread(const obj_reading *r, ebpo_attributes *to)
+/* Records omitted data that also matter to callers that read only the mesh. */
+static void record_unread(const obj_reading *r, ebpo_attributes *to)
 {
     const obj_losses *l = &r->losses;
     ebpo_attributes_count_unread(to, "texture coordinates that faces refer to but the file lacks",
@@ -696,7 +696,7 @@ static void note_unread(const obj_reading *r, ebpo_attributes *to)
                                     l->unknown, l->unknown_line);
 }
 
-static void note_losses(const obj_reading *r, ebpo_attributes *to)
+static void record_losses(const obj_reading *r, ebpo_attributes *to)
 {
     const obj_losses *l = &r->losses;
     if (l->third) /* only two components have names */
@@ -722,7 +722,7 @@ static bool any_unread(const obj_losses *l)
            l->surplus || l->curves || l->unknown;
 }
 
-static ebpo_status note_all(obj_reading *r)
+static ebpo_status record_all(obj_reading *r)
 {
     ebpo_mesh *mesh = r->build->mesh;
     ebpo_status status = any_unread(&r->losses)
@@ -731,9 +731,9 @@ static ebpo_status note_all(obj_reading *r)
     if (status != EBPO_OK)
         return status;
     if (mesh->attributes)
-        note_unread(r, mesh->attributes);
+        record_unread(r, mesh->attributes);
     if (r->build->attributes)
-        note_losses(r, mesh->attributes);
+        record_losses(r, mesh->attributes);
     return EBPO_OK;
 }
 
@@ -751,7 +751,7 @@ static ebpo_status read_all(obj_reading *r)
         status = ebpo_import_attributes(b);
     if (status == EBPO_OK && b->attributes)
         status = ebpo_obj_keep_materials(&r->names, b->mesh, b->error);
-    return status == EBPO_OK ? note_all(r) : status;
+    return status == EBPO_OK ? record_all(r) : status;
 }
 
 static ebpo_status build_obj(ebpo_import_build *b, const ebpo_import_job *job)

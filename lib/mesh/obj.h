@@ -58,7 +58,7 @@ typedef struct ebpo_obj_names {
 EBPO_MUST_USE ebpo_status ebpo_obj_use_material(ebpo_obj_names *names, ebpo_obj_word material,
                                                 ebpo_error *error);
 
-/* Gives the current material to all faces of the mesh that have none yet. EBPO_E_MEMORY, EBPO_E_IO.
+/* Sets the current material of all faces of the mesh that have none yet. EBPO_E_MEMORY, EBPO_E_IO.
  */
 EBPO_MUST_USE ebpo_status ebpo_obj_give_material(ebpo_obj_names *names, const ebpo_mesh *mesh,
                                                  ebpo_error *error);

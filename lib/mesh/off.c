@@ -272,7 +272,7 @@ static bool next_needed(off_reading *r, bool first, off_word *word)
 }
 
 /* Reads the rest of the line. With several rows per line, the rest belongs to the next rows. */
-static void take_rest(off_reading *r)
+static void read_rest(off_reading *r)
 {
     off_word word;
     r->rest_count = 0;
@@ -334,11 +334,11 @@ static ebpo_status fail_end(const off_reading *r, const char *what, uint64_t row
 }
 
 /* Reads the vertex values declared by the first word when rows and lines do not correspond. */
-static ebpo_status take_rest_anyhow(off_reading *r, uint64_t row)
+static ebpo_status read_rest_anyhow(off_reading *r, uint64_t row)
 {
     int wanted = (r->normals ? 3 : 0) + (r->colours ? 4 : 0) + (r->texture ? 2 : 0);
     if (r->rows != ROWS_ANYHOW) {
-        take_rest(r);
+        read_rest(r);
         return EBPO_OK;
     }
     for (r->rest_count = 0; r->rest_count < wanted; r->rest_count++)
@@ -375,7 +375,7 @@ static ebpo_status read_vertex(off_reading *r, uint64_t row)
     for (int k = 0; k < 3 && w != 1; k++)
         ebpo_import_quotient(r->build, &xyz[k], word[k].s, word[k].n, w);
     r->divided += w != 1;
-    ebpo_status status = take_rest_anyhow(r, row);
+    ebpo_status status = read_rest_anyhow(r, row);
     if (status == EBPO_OK)
         status = ebpo_import_position(r->build, xyz);
     return status == EBPO_OK ? keep_rest(r) : status;
@@ -449,7 +449,7 @@ static ebpo_status read_face(off_reading *r, uint64_t row)
         status = read_corner(r, row, corners);
     if (status != EBPO_OK)
         return status;
-    take_rest(r);
+    read_rest(r);
     status = keep_face(r, &colour);
     for (uint64_t i = 0; i < corners && colour != EBPO_IMPORT_NONE; i++)
         b->corner[i].row[EBPO_IMPORT_COLOURS] = colour;
@@ -458,7 +458,7 @@ static ebpo_status read_face(off_reading *r, uint64_t row)
 
 /* --- the file --- */
 
-static ebpo_status note_unread(off_reading *r)
+static ebpo_status record_unread(off_reading *r)
 {
     ebpo_mesh *mesh = r->build->mesh;
     bool any = r->divided || r->surplus_vertices || r->surplus_faces || r->more;
@@ -478,7 +478,7 @@ static ebpo_status note_unread(off_reading *r)
     return EBPO_OK;
 }
 
-static void note_losses(const off_reading *r, ebpo_attributes *to)
+static void record_losses(const off_reading *r, ebpo_attributes *to)
 {
     if (r->alpha)
         ebpo_attributes_lose(to, "opacity of colours");
@@ -519,8 +519,8 @@ static ebpo_status build_off(ebpo_import_build *b, const ebpo_import_job *job)
     if (status == EBPO_OK && b->attributes)
         status = ebpo_import_attributes(b);
     if (status == EBPO_OK && b->attributes)
-        note_losses(&r, b->mesh->attributes);
-    return status == EBPO_OK ? note_unread(&r) : status;
+        record_losses(&r, b->mesh->attributes);
+    return status == EBPO_OK ? record_unread(&r) : status;
 }
 
 const ebpo_import_format ebpo_import_off = { .called = "an OFF",

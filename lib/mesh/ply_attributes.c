@@ -25,7 +25,7 @@ static ebpo_status fail_rows(const ebpo_ply_parser *p, uint64_t bytes)
 /* --- which arrays --- */
 
 /* Copies a word of the header. Returns false when it is too long or not valid text. */
-static bool take_word(char *to, size_t capacity, ebpo_ply_word word)
+static bool parse_word(char *to, size_t capacity, ebpo_ply_word word)
 {
     if (word.n == 0 || word.n >= capacity)
         return false;
@@ -34,10 +34,10 @@ static bool take_word(char *to, size_t capacity, ebpo_ply_word word)
     return strlen(to) == word.n && ebpo_text_ok(to);
 }
 
-static bool take_names(char *to, size_t capacity, const ebpo_ply_property *property, unsigned count)
+static bool keep_names(char *to, size_t capacity, const ebpo_ply_property *property, unsigned count)
 {
     for (unsigned i = 0; i < count; i++) {
-        if (!take_word(to, capacity, property[i].name))
+        if (!parse_word(to, capacity, property[i].name))
             return false;
         to += property[i].name.n;
         capacity -= property[i].name.n;
@@ -89,8 +89,8 @@ static ebpo_status plan_array(ebpo_ply_parser *p, const ebpo_ply_element *elemen
                          .list =
                              property->list ? (int)property->count_type : EBPO_ATTRIBUTE_NO_LIST,
                          .columns = columns };
-    if (!take_word(a.element, sizeof a.element, element->name) ||
-        !take_names(a.names, sizeof a.names, property, columns) ||
+    if (!parse_word(a.element, sizeof a.element, element->name) ||
+        !keep_names(a.names, sizeof a.names, property, columns) ||
         to->count == EBPO_ATTRIBUTE_ARRAYS) {
         lose_property(p, element, property,
                       "the name is too long or not valid text, or there are too many "
@@ -329,7 +329,7 @@ static bool is_plain(const ebpo_ply_header *h)
 
 /* Copies the header lines unchanged, each ended by one line feed. The first line is exactly "ply".
  */
-static ebpo_status take_header(ebpo_ply_parser *p)
+static ebpo_status keep_header(ebpo_ply_parser *p)
 {
     ebpo_attributes *to = p->mesh->attributes;
     to->header = ebpo_alloc(p->header.body, 1);
@@ -354,7 +354,7 @@ ebpo_status ebpo_ply_attributes_end(ebpo_ply_parser *p)
     ebpo_attributes *to = p->mesh->attributes;
     if (!p->lost)
         return EBPO_OK;
-    ebpo_status status = is_plain(&p->header) ? EBPO_OK : take_header(p);
+    ebpo_status status = is_plain(&p->header) ? EBPO_OK : keep_header(p);
     if (p->header.encoding != EBPO_PLY_ASCII && p->at < p->size)
         ebpo_attributes_lose(to, "%" PRIu64 " bytes after the last element", p->size - p->at);
     if (p->rounded)

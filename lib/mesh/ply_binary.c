@@ -280,7 +280,7 @@ static ebpo_status read_vertices(void *context, uint64_t begin, uint64_t end, un
     return EBPO_OK;
 }
 
-static ebpo_status note_deviation(plain *t, uint64_t row)
+static ebpo_status record_deviation(plain *t, uint64_t row)
 {
     uint64_t known = __atomic_load_n(&t->deviates, __ATOMIC_RELAXED);
     while (row < known && !__atomic_compare_exchange_n(&t->deviates, &known, row, true,
@@ -319,7 +319,7 @@ static ebpo_status read_faces(void *context, uint64_t begin, uint64_t end, unsig
                 k ? load_integer(at + count_bytes + (k - 1) * bytes, t->corners->type, t->swap)
                   : load_integer(at, t->corners->count_type, t->swap);
             if (k ? (uint64_t)value >= count : value != 3)
-                return note_deviation(t, row);
+                return record_deviation(t, row);
             if (k)
                 *face++ = (uint32_t)value;
         }

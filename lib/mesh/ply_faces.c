@@ -254,7 +254,7 @@ static void move_attributes(const vertex_removal *l)
                                          "vertex indices that have changed");
 }
 
-static ebpo_status note_removed(const vertex_removal *l, uint64_t left)
+static ebpo_status record_removed(const vertex_removal *l, uint64_t left)
 {
     ebpo_status status = ebpo_mesh_need_attributes(l->p->mesh, l->p->error);
     if (status == EBPO_OK)
@@ -277,7 +277,7 @@ ebpo_status ebpo_ply_remove_unused(ebpo_ply_parser *p)
         move_vertices(&l);
         move_attributes(&l);
         mesh->vertex_count = l.kept;
-        status = note_removed(&l, count - l.kept);
+        status = record_removed(&l, count - l.kept);
     }
     ebpo_array_free(mesh->workspace, l.used);
     ebpo_array_free(mesh->workspace, l.from);

@@ -139,7 +139,7 @@ static ebpo_status format_statement(reader *r, const ebpo_ply_word *words, int n
     return EBPO_OK;
 }
 
-static ebpo_status note_kind(reader *r, ebpo_ply_element *element)
+static ebpo_status record_kind(reader *r, ebpo_ply_element *element)
 {
     ebpo_ply_header *h = r->header;
     int64_t *place;
@@ -171,7 +171,7 @@ static ebpo_status element_statement(reader *r, const ebpo_ply_word *words, int 
     if (!parse_count(words[2], &element.count))
         return fail_in_line(r, "not a count:", words[2]);
     element.name = words[1];
-    ebpo_status status = note_kind(r, &element);
+    ebpo_status status = record_kind(r, &element);
     if (status != EBPO_OK)
         return status;
     if (!ebpo_grow(&h->element, &h->element_capacity, h->elements + 1, sizeof *h->element))

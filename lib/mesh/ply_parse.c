@@ -187,7 +187,7 @@ static void describe_source(ebpo_ply_parser *p)
 }
 
 /* Records in mesh->attributes what was not read of the file. */
-static ebpo_status note_unread(ebpo_ply_parser *p)
+static ebpo_status record_unread(ebpo_ply_parser *p)
 {
     bool more = p->header.encoding == EBPO_PLY_ASCII && ebpo_ply_ascii_more(p);
     ebpo_status status = p->surplus_values || more || p->max_rounded > 0
@@ -249,7 +249,7 @@ ebpo_status ebpo_ply_parse_all(ebpo_mesh *out, const uint8_t *data, uint64_t siz
     if (status == EBPO_OK)
         status = ebpo_ply_attributes_end(&p);
     if (status == EBPO_OK)
-        status = note_unread(&p);
+        status = record_unread(&p);
     if (status == EBPO_OK)
         status = ebpo_ply_remove_unused(&p);
     if (status == EBPO_OK) {

@@ -177,8 +177,8 @@ void ebpo_ply_store_bits(uint8_t *at, unsigned bytes, uint64_t bits);
 /* Copies the values of face `row`, which came from a polygon, to all later faces. */
 EBPO_MUST_USE ebpo_status ebpo_ply_repeat_face(ebpo_ply_parser *p, uint64_t row);
 
-/* Gives faces from `first` on zeros and empty lists, because they have no row in the face element.
- * Space must have been reserved. */
+/* Sets zeros and empty lists for the faces from `first` on, because they have no row in the face
+ * element. Space must have been reserved. */
 void ebpo_ply_blank_faces(ebpo_ply_parser *p, uint64_t first);
 
 /* --- the body of an ascii file --- */

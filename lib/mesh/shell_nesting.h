@@ -1,4 +1,4 @@
-/* State of the search for the nesting of closed components. */
+/* Defines the state of the search for the nesting of closed components. */
 #ifndef EBPO_MESH_SHELL_NESTING_H
 #define EBPO_MESH_SHELL_NESTING_H
 

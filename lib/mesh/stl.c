@@ -149,7 +149,7 @@ static uint64_t count_words(const ebpo_import_build *b, const uint8_t *model)
     return words;
 }
 
-static ebpo_status note_bytes(ebpo_import_build *b, const stl_bytes *is, uint64_t words)
+static ebpo_status record_bytes(ebpo_import_build *b, const stl_bytes *is, uint64_t words)
 {
     ebpo_status status =
         is->payload || is->behind || words ? ebpo_mesh_need_attributes(b->mesh, b->error) : EBPO_OK;
@@ -215,7 +215,7 @@ static ebpo_status read_binary(ebpo_import_build *b, const uint8_t *data, uint64
         at += stated_size(data + at);
     }
     *plain = is.models == 1 && !is.payload ? stated_size(data) : 0;
-    return status == EBPO_OK ? note_bytes(b, &is, words) : status;
+    return status == EBPO_OK ? record_bytes(b, &is, words) : status;
 }
 
 enum { HEADER = 80, FIRST = 84, FACE = 50, STL_COLOURS_WORD = 48, OWN = 0x8000 };
@@ -412,7 +412,7 @@ static ebpo_status read_vertex(stl_text *t)
     return ebpo_import_position(t->build, xyz);
 }
 
-static void note_odd(stl_text *t) { t->odd_line = t->odd++ ? t->odd_line : t->line; }
+static void record_odd(stl_text *t) { t->odd_line = t->odd++ ? t->odd_line : t->line; }
 
 /* Skips and counts extra words. */
 static void pass_odd(stl_text *t)
@@ -426,7 +426,7 @@ static void pass_odd(stl_text *t)
         for (size_t i = 0; i < sizeof words / sizeof *words; i++)
             if (word_is(word, words[i]))
                 return;
-        note_odd(t);
+        record_odd(t);
         t->at = ahead.at;
     }
 }
@@ -442,7 +442,7 @@ static ebpo_status read_loop(stl_text *t)
         if (word_is(word, "outer") || word_is(word, "vertex") || word_is(word, "endfacet"))
             break;
         if (passed > 3)
-            note_odd(t);
+            record_odd(t);
     }
     if (word_is(word, "endfacet"))
         return fail_word(t, "outer loop", word);
@@ -519,7 +519,7 @@ static ebpo_status read_text(stl_text *t)
             between = t->begun = true;
             pass_name(t);
         } else if (between) {
-            note_odd(t);
+            record_odd(t);
         } else if (word_is(word, "end")) {
             continue;
         } else if (word_is(word, "endfacet") || word_is(word, "endloop") ||

@@ -366,7 +366,7 @@ static span trim_span(span t)
 }
 
 /* Removes and returns the first word. */
-static span take_word(span *rest)
+static span parse_word(span *rest)
 {
     span t = trim_span(*rest), word = { t.s, 0 };
     while (word.n < t.n && !is_blank(t.s[word.n]))
@@ -490,9 +490,9 @@ void ebpo_texture_names_of_ply(ebpo_texture_names *names, const char *header, ui
 {
     span text = { header, bytes }, line;
     while (next_line(&text, &line)) {
-        if (!span_is(take_word(&line), "comment"))
+        if (!span_is(parse_word(&line), "comment"))
             continue;
-        span word = take_word(&line);
+        span word = parse_word(&line);
         if (span_is(word, "TextureFile"))
             add_use(names, line, word, (span){ "", 0 });
     }
@@ -524,11 +524,11 @@ static bool is_number(span word)
 static span skip_options(span rest)
 {
     while (rest.n > 1 && rest.s[0] == '-') {
-        span option = take_word(&rest);
+        span option = parse_word(&rest);
         bool numbers = span_is(option, "-o") || span_is(option, "-s") || span_is(option, "-t");
         int most = numbers ? 3 : span_is(option, "-mm") ? 2 : 1;
         for (int i = 0; i < most; i++) {
-            span ahead = rest, value = take_word(&ahead);
+            span ahead = rest, value = parse_word(&ahead);
             if ((numbers && !is_number(value)) || !ahead.n)
                 break;
             rest = ahead;
@@ -541,7 +541,7 @@ void ebpo_texture_names_of_mtl(ebpo_texture_names *names, const uint8_t *text, u
 {
     span rest = whole_text(text, bytes), line, material = { "", 0 };
     while (next_line(&rest, &line)) {
-        span word = take_word(&line);
+        span word = parse_word(&line);
         if (span_is(word, "newmtl"))
             material = line;
         else if (is_map(word))
@@ -557,7 +557,7 @@ void ebpo_obj_libraries(const uint8_t *text, uint64_t bytes,
         for (; line.n && is_blank(*line.s); line.n--)
             line.s++;
         if (line.n > 6 && memcmp(line.s, "mtllib", 6) == 0 && is_blank(line.s[6])) {
-            take_word(&line);
+            parse_word(&line);
             take(context, line.s, line.n);
         }
     }
@@ -749,7 +749,7 @@ static void lose_files(ebpo_attributes *to, uint64_t count, const char *one, con
         ebpo_attributes_lose(to, several, count);
 }
 
-static void note_losses(const finding *f, ebpo_attributes *to)
+static void record_losses(const finding *f, ebpo_attributes *to)
 {
     uint64_t known = f->names.count - f->absent - f->outside - f->large;
     lose_files(to, f->names.omitted, "a name or a use of an image (too many)",
@@ -791,7 +791,7 @@ static ebpo_status add_images(finding *f, ebpo_mesh *mesh)
         return status;
     for (uint64_t i = 0; i < f->names.count && status == EBPO_OK; i++)
         status = add_image(f, mesh->attributes, &f->names.of[i]);
-    note_losses(f, mesh->attributes);
+    record_losses(f, mesh->attributes);
     return status;
 }
 

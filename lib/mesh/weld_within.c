@@ -68,7 +68,7 @@ static int compare_positions(const void *x, const void *y)
     return a->vertex < b->vertex ? -1 : a->vertex > b->vertex;
 }
 
-static void take_positions(void *context, uint64_t place, const void *records, uint64_t count)
+static void store_positions(void *context, uint64_t place, const void *records, uint64_t count)
 {
     grouping *g = context;
     const position *p = records;
@@ -87,7 +87,7 @@ static ebpo_status sort_positions(grouping *g, ebpo_error *error)
                              .context = g,
                              .make = make_positions,
                              .compare = compare_positions,
-                             .take = take_positions };
+                             .take = store_positions };
     return ebpo_sort_run(&sort, error);
 }
 

@@ -64,7 +64,8 @@ static inline pair greater_pair(pair a, pair b) { return pick_pair(a > b, a, b);
 static double least_of(pair x) { return x[0] < x[1] ? x[0] : x[1]; }
 static double max_of(pair x) { return x[0] > x[1] ? x[0] : x[1]; }
 
-/* Vertices of a block of doubles, in the frame. */
+/* Vertices of a block of doubles, in the frame (coordinates in which the subtree's cell has a size
+ * of 1 to 2). */
 enum { PAIRS = EBPO_MESHLET_VERTICES / 2 };
 typedef struct vertices {
     pair x[3][PAIRS];
@@ -398,7 +399,7 @@ static void set_cylinders(ebpo_bound_cylinder *b, int count, double size, const 
 
 /* --- all nodes --- */
 
-/* Returns the number by which the accel refers to a child. */
+/* Returns the number by which the accel (acceleration structure of a subtree) refers to a child. */
 static uint32_t child_number(const job *j, uint32_t child)
 {
     return child == EBPO_NO_CHILD || !(child & EBPO_IS_BLOCK)

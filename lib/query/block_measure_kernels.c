@@ -1,4 +1,4 @@
-/* Kernels that measure blocks of floats for block_bounds.c, eight vertices at a time: the extent of
+/* Measures blocks of floats for block_bounds.c, eight vertices at a time: the extent of
  * a block, and its extent along an axis and around it.
  *
  * Compiled for several instruction sets (core/cpu.h), with the same operations in the same order.

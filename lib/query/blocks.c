@@ -313,7 +313,7 @@ static void find_shared(const job *j, uint64_t block)
     j->layout->corners[block].count = (uint8_t)count;
 }
 
-static void take_shared(const job *j, uint64_t block, shared *out)
+static void copy_block(const job *j, uint64_t block, shared *out)
 {
     unsigned corners;
     const uint32_t *corner = corners_of(j, block, &corners);
@@ -403,7 +403,7 @@ static ebpo_status fill_blocks(void *context, uint64_t begin, uint64_t end, unsi
     job *j = context;
     shared v;
     for (uint64_t b = begin; b < end; b++) {
-        take_shared(j, b, &v);
+        copy_block(j, b, &v);
         char *at = j->s->meshlets + (uint64_t)j->layout->block_number[b] * EBPO_MESHLET_UNIT;
         memset(at, 0, (size_t)size_of(j->s, v.count) * EBPO_MESHLET_UNIT);
         ebpo_meshlet *m = (void *)at;

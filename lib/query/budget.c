@@ -1,9 +1,9 @@
-/* Budgets: the memory limit of a model and its division.
+/* Divides the memory budget of a model.
  *
  * A model is held in memory as a whole if the budget allows it. Otherwise the budget is shared by
- * the top of the tree (query_top.c), a cache of decoded chunks, skeletons (skeleton.c) and a cache
- * of subtrees. The cut level is chosen so that subtrees are small enough. The plan uses only the
- * counts in the file header; no chunks are read.
+ * the top of the tree (query_top.c), a cache of decoded chunks, skeletons (upper nodes of the
+ * hierarchies over faces) (skeleton.c) and a cache of subtrees. The cut level is chosen so that
+ * subtrees are small enough. The plan uses only the counts in the file header; no chunks are read.
  *
  * Several models may share a budget: the permanent parts of each are subtracted, and their caches
  * share the rest. A shared budget may be used by any thread. */

@@ -1,4 +1,4 @@
-/* Distance to the surface, nearest point and normal: EBP 2017, 4.4.
+/* Computes the distance to the surface, the nearest point and the normal (EBP 2017, 4.4).
  *
  * The exact minimum comes from nearest_subtrees.c. The modes of the thesis, whose result is not
  * always the minimum, search the leaf around the point, all leaves below the deepest gray node

@@ -26,7 +26,8 @@ EBPO_EIGHT unsigned ebpo_face_block_lanes(const ebpo_face_block *b)
     return (1u << b->m->faces) - 1;
 }
 
-/* Reads the three corners' coordinates on an axis, in the model's unit; for an accel of floats. */
+/* Reads the three corners' coordinates on an axis, in the model's unit; for an accel (acceleration
+ * structure of a subtree) of floats. */
 EBPO_EIGHT void ebpo_face_block_floats(const ebpo_face_block *b, int axis, f8 corner[3])
 {
     const float *x = ebpo_meshlet_floats(b->m) + (unsigned)axis * b->m->vertices;

@@ -1,10 +1,10 @@
 /* Finds the faces that intersect a box: their indices, or their triangles in batches.
  *
- * The walk visits the accels that intersect the box, depth first. In an accel it tests the boxes of
- * the hierarchy and skips those that are certainly outside. Then it tests triangles exactly. In
- * remote files the walk sends prefetch hints for the subtrees that it will enter. A face that
- * several subtrees list is returned once. In a subset the query fails if a pruned node intersects
- * the box. */
+ * The walk visits the accels (acceleration structures of subtrees) that intersect the box, depth
+ * first. In an accel it tests the boxes of the hierarchy and skips those that are certainly
+ * outside. Then it tests triangles exactly. In remote files the walk sends prefetch hints for the
+ * subtrees that it will enter. A face that several subtrees list is returned once. In a subset the
+ * query fails if a pruned node intersects the box. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -248,7 +248,7 @@ typedef struct gathering {
     uint64_t count, capacity;
 } gathering;
 
-static ebpo_status take_face_indices(box_walk *walk, const ebpo_accel *s, ebpo_error *error)
+static ebpo_status receive_face_indices(box_walk *walk, const ebpo_accel *s, ebpo_error *error)
 {
     gathering *g = (gathering *)walk;
     if (!ebpo_grow(&g->list, &g->capacity, g->count + walk->count, sizeof *g->list))
@@ -289,8 +289,9 @@ ebpo_status ebpo_faces_in_box(ebpo_context *context, const double min[3], const 
     EBPO_DEFAULT_FP;
     *faces = NULL;
     *count = 0;
-    gathering g = { .walk = {
-                        .context = context, .min = min, .max = max, .take = take_face_indices } };
+    gathering g = {
+        .walk = { .context = context, .min = min, .max = max, .take = receive_face_indices }
+    };
     ebpo_status status = check_box(min, max, error);
     if (status == EBPO_OK)
         status = ebpo_check_mesh(context->model, error);
@@ -332,7 +333,7 @@ static void pass_batch(delivery *d)
     d->count = 0;
 }
 
-static ebpo_status take_triangles(box_walk *walk, const ebpo_accel *s, ebpo_error *error)
+static ebpo_status receive_triangles(box_walk *walk, const ebpo_accel *s, ebpo_error *error)
 {
     delivery *d = (delivery *)walk;
     (void)error;
@@ -354,9 +355,11 @@ ebpo_status ebpo_triangles_in_box(ebpo_context *context, const double min[3], co
                                   ebpo_triangles_fn function, void *user, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    delivery d = { .walk = { .context = context, .min = min, .max = max, .take = take_triangles },
-                   .take = function,
-                   .user = user };
+    delivery d = {
+        .walk = { .context = context, .min = min, .max = max, .take = receive_triangles },
+        .take = function,
+        .user = user
+    };
     ebpo_status status = check_box(min, max, error);
     if (status == EBPO_OK)
         status = ebpo_check_mesh(context->model, error);

@@ -1,4 +1,4 @@
-/* Inside of a surface with its border.
+/* Decides points inside a surface with holes, by the caps of its border.
  *
  * The octree of a surface has the winding numbers k of the surface with its caps, which are
  * integers. The winding number of the surface is w = k + w_D with the discs D

@@ -1,4 +1,5 @@
-/* Inside of a surface with its border, by its generalized winding number. */
+/* Decides points inside a surface with holes, by its generalized winding number. Caps are faces
+ * that close the loops of the border. */
 #ifndef EBPO_QUERY_HOLES_H
 #define EBPO_QUERY_HOLES_H
 

@@ -1,4 +1,4 @@
-/* Point in solid, exact.
+/* Decides exactly whether points are inside a model.
  *
  * In a leaf the signs of its faces' planes decide where possible (leaf_kinds.c). Otherwise the
  * faces that axis-parallel segments cross are counted. A segment begins at a cell face that no face
@@ -8,8 +8,8 @@
  *
  * A query that may use envelopes, stops at a level or has a deadline goes from node to node and
  * loads subtrees on the way; with EBPO_LOAD_NODES it reads only the nodes on the way. Envelopes
- * decide pruned nodes, or the query fails with EBPO_E_ABSENT. Envelopes of a surface do not contain
- * its inside, so only its white nodes decide.
+ * decide pruned nodes (whose children are not in the file), or the query fails with EBPO_E_ABSENT.
+ * Envelopes of a surface do not contain its inside, so only its white nodes decide.
  *
  * Sources: EBP 2017, 4.2; format-spec, section 10. */
 #include "core/strict_fp.h"

@@ -1,8 +1,9 @@
-/* Kernels of point in solid: process the faces that a leaf lists, eight at a time.
+/* Counts, for point in solid, the crossings of a segment with the faces that a leaf lists, eight at
+ * a time.
  *
  * sum_crossings sums, for a segment parallel to an axis, its crossings with the faces. It uses
- * single precision, or double precision in accels of doubles. Faces that are not certain in this
- * precision are decided exactly by inside.c.
+ * single precision, or double precision in accels (acceleration structures of subtrees) of doubles.
+ * Faces that are not certain in this precision are decided exactly by inside.c.
  *
  * find_reached_cell_faces finds the cell faces that the leaf's faces reach: a face reaches a cell
  * face if its extent on the axis goes up to the cell face or beyond. It also computes the box of

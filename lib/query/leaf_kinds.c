@@ -1,4 +1,4 @@
-/* Kinds of leaves: finds and stores the kind of a leaf during queries.
+/* Finds and stores the kind of a leaf during queries.
  *
  * The first queries find a cell face that no face intersects and the boxes of the leaf's list.
  * After many queries the leaf is classified: one plane, two planes, convex or concave (then the
@@ -358,7 +358,7 @@ static bool add_page(ebpo_leaf_kinds *k, uint64_t least)
 }
 
 /* Returns the number of the first of `rows` rows, which are in one page, or EBPO_NO_ROWS. */
-static uint32_t take_rows(ebpo_leaf_kinds *k, uint64_t rows)
+static uint32_t reserve_rows(ebpo_leaf_kinds *k, uint64_t rows)
 {
     uint32_t number = EBPO_NO_ROWS;
     pthread_mutex_lock(&k->lock);
@@ -375,7 +375,7 @@ static ebpo_leaf_kind keep_planes(ebpo_leaf_kinds *kinds, ebpo_accel_leaf *leaf,
                                   const deciding_planes *planes)
 {
     int count = planes->count, flip = planes->flip, fours = (count + 3) / 4;
-    uint32_t first = take_rows(kinds, 1 + 4 * (uint64_t)fours);
+    uint32_t first = reserve_rows(kinds, 1 + 4 * (uint64_t)fours);
     if (first == EBPO_NO_ROWS)
         return EBPO_LEAF_GENERAL;
     ebpo_kind_row *row = EBPO_KIND_ROW(kinds, first);

@@ -1,4 +1,4 @@
-/* Loading ahead: loads subtrees before queries need them, or sends prefetch hints for a remote
+/* Loads subtrees before queries need them, or sends prefetch hints for a remote
  * file.
  *
  * A prefetch requests the subtrees that queries near the last query may need, in the order of their

@@ -66,7 +66,7 @@ uint64_t *ebpo_curve_order(const ebpo_box *box, const double *points, uint64_t c
 /* Returns the index of the i-th point to evaluate. Call it with i = 0, 1, 2, ... */
 uint64_t ebpo_batch_next(ebpo_batch *batch, uint64_t i);
 
-/* Notes the status of the i-th point, which has the index `point`. Returns EBPO_OK if the batch
+/* Records the status of the i-th point, which has the index `point`. Returns EBPO_OK if the batch
  * goes on with the next point: also after EBPO_E_PENDING, so that one round trip fetches the bytes
  * for all points whose subtrees have been hinted. */
 EBPO_MUST_USE ebpo_status ebpo_batch_note(ebpo_batch *batch, uint64_t i, uint64_t point,

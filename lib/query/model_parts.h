@@ -19,7 +19,8 @@ typedef struct ebpo_top_planes {
 typedef struct ebpo_top {
     int cut_level;
     /* Entries are UNIFORM, GRAY (gray nodes above the cut level), or SUBTREE_ROOT: gray nodes of
-     * the cut level, leaves down to this level, and pruned nodes. */
+     * the cut level, leaves down to this level, and pruned nodes (whose children are not in the
+     * file). */
     ebpo_node_table nodes;
     uint32_t *planes;      /* codes of all planes */
     ebpo_top_planes *gray; /* planes of the gray node whose children are group g */
@@ -110,7 +111,7 @@ ebpo_skeletons *ebpo_skeletons_make(uint64_t count, uint64_t space, ebpo_cache *
 void ebpo_skeletons_free(ebpo_skeletons *all);
 /* Returns the part of `space` that `count` skeletons can use. */
 uint64_t ebpo_skeletons_capacity(uint64_t count, uint64_t space);
-/* Takes bytes from the quota of skeletons for other data about subtrees; returns false if not
+/* Reserves bytes of the quota of skeletons for other data about subtrees; returns false if not
  * enough is left. The other function returns such bytes to the quota. Any thread. */
 bool ebpo_skeletons_take(ebpo_skeletons *all, uint64_t bytes);
 void ebpo_skeletons_give_back(ebpo_skeletons *all, uint64_t bytes);
@@ -167,14 +168,14 @@ ebpo_cache_pool *ebpo_budget_chunks(const ebpo_budget *budget);
 
 uint64_t ebpo_budget_bytes(const ebpo_budget *budget);
 
-/* Takes bytes for a model that is all in memory, for the lifetime of the model. Returns false if
+/* Reserves bytes for a model that is all in memory, for the lifetime of the model. Returns false if
  * they exceed the limit or the free part. The other function returns unused bytes, or all bytes, to
  * the budget. */
 bool ebpo_budget_take_whole(ebpo_budget *budget, uint64_t bytes);
 void ebpo_budget_give_back_whole(ebpo_budget *budget, uint64_t bytes);
 
-/* Takes at most `wanted` bytes of the quota for skeletons; the other function returns them to the
- * quota. */
+/* Reserves at most `wanted` bytes of the quota for skeletons; the other function returns them to
+ * the quota. */
 uint64_t ebpo_budget_take_skeletons(ebpo_budget *budget, uint64_t wanted);
 void ebpo_budget_give_back_skeletons(ebpo_budget *budget, uint64_t bytes);
 

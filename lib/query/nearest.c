@@ -1,4 +1,5 @@
-/* Finds the nearest face: the search in one accel, and the comparison of two faces.
+/* Finds the nearest face: the search in one accel (acceleration structure of a subtree), and the
+ * comparison of two faces.
  *
  * The search is depth first, the nearest child first. It drops nodes that are certainly farther
  * than the best face. Bounds and triangles are in single precision with bounded errors
@@ -78,9 +79,9 @@ void ebpo_nearest_begin(ebpo_nearest *n, const ebpo_model *model, const double p
     n->block = n->first_block = EBPO_NO_BLOCK;
 }
 
-static void take_face(ebpo_nearest *n, const double triangle[3][3],
-                      const ebpo_distance_bounds *bounds, const ebpo_far_keys *keys,
-                      uint64_t file_face, uint64_t source_face)
+static void set_nearest_face(ebpo_nearest *n, const double triangle[3][3],
+                             const ebpo_distance_bounds *bounds, const ebpo_far_keys *keys,
+                             uint64_t file_face, uint64_t source_face)
 {
     n->found = true;
     n->bounds = *bounds;
@@ -116,7 +117,7 @@ void ebpo_nearest_begin_with(ebpo_nearest *n, const double triangle[3][3], uint6
     ebpo_far_keys keys = keys_of(n, triangle);
     ebpo_triangle_distance_bounds(n->p, (const double(*)[3])triangle, &b);
     if (b.lo <= n->limit && keys.lo <= n->key_limit)
-        take_face(n, triangle, &b, &keys, file_face, source_face);
+        set_nearest_face(n, triangle, &b, &keys, file_face, source_face);
 }
 
 /* Tests a face. If the face is the nearest so far, keeps it and returns true. */
@@ -142,8 +143,8 @@ static bool try_face(ebpo_nearest *n, const ebpo_accel *s, uint32_t slot)
         if (sign > 0 || (sign == 0 && file_face > n->file_face))
             return false;
     }
-    take_face(n, (const double(*)[3])triangle, &b, &keys, file_face,
-              ebpo_accel_source_face(s, local));
+    set_nearest_face(n, (const double(*)[3])triangle, &b, &keys, file_face,
+                     ebpo_accel_source_face(s, local));
     return true;
 }
 
@@ -260,8 +261,8 @@ static void try_block(ebpo_nearest *n, const ebpo_accel *s, uint32_t child)
         try_face(n, s, (child & ~EBPO_IS_BLOCK) * EBPO_BLOCK + lane);
 }
 
-/* Takes the lane with the least lower bound from `left`, which is not empty. */
-static int take_nearest_lane(unsigned *left, const double lower[8])
+/* Removes the lane with the least lower bound from `left`, which is not empty, and returns it. */
+static int remove_nearest_lane(unsigned *left, const double lower[8])
 {
     int best = __builtin_ctz(*left);
     for (int lane = best + 1; lane < 8; lane++)
@@ -306,7 +307,7 @@ static void search_by_keys(const far_search *g, uint32_t child)
     double lower[8];
     unsigned left = far_children(g, child, lower);
     while (left) {
-        int best = take_nearest_lane(&left, lower);
+        int best = remove_nearest_lane(&left, lower);
         if (ebpo_nearest_is_late(n)) {
             ebpo_nearest_pass_over(n, lower[best]);
         } else if (lower[best] <= n->key_limit) {
@@ -351,7 +352,7 @@ static void search_far(ebpo_nearest *n, const ebpo_accel *s, uint32_t child)
         left |= 1u << lane;
     }
     while (left) {
-        int best = take_nearest_lane(&left, lower);
+        int best = remove_nearest_lane(&left, lower);
         if (ebpo_nearest_is_late(n)) {
             ebpo_nearest_pass_over(n, lower[best]);
         } else if (lower[best] <= n->limit) {

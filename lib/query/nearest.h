@@ -1,5 +1,5 @@
-/* Finds the nearest face: in one accel (nearest.c), and in a model under a budget
- * (nearest_subtrees.c). */
+/* Finds the nearest face: in one accel (acceleration structure of a subtree) (nearest.c), and in a
+ * model under a budget (nearest_subtrees.c). */
 #ifndef EBPO_QUERY_NEAREST_H
 #define EBPO_QUERY_NEAREST_H
 
@@ -89,10 +89,11 @@ ebpo_ranked ebpo_queue_pop(ebpo_context *context);
  *
  * Deep bounds are nodes of the levels right below the cut, with their envelopes but without faces:
  * a few bytes for each node. They bound subtrees that have never been loaded more closely than the
- * subtrees' envelopes do, as skeletons (query/model_parts.h) bound subtrees that have been loaded.
- * They are read at once, when queries have loaded about as much without need as reading them costs,
- * so that neither opening nor paths wait for them. They are for local files only: for remote files
- * one more request would cost as much as it saves. They count towards the quota of skeletons. */
+ * subtrees' envelopes do, as skeletons (upper nodes of the hierarchies over faces)
+ * (query/model_parts.h) bound subtrees that have been loaded. They are read at once, when queries
+ * have loaded about as much without need as reading them costs, so that neither opening nor paths
+ * wait for them. They are for local files only: for remote files one more request would cost as
+ * much as it saves. They count towards the quota of skeletons. */
 
 /* Reads the deep bounds once, unless the quota is too small or no levels exist below the cut. If
  * data cannot be read, queries that need them return the error later. */

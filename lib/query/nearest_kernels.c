@@ -1,5 +1,6 @@
-/* Kernel of the nearest face: the walk from node to node of one accel's hierarchy over faces, eight
- * children or eight faces at a time, in single precision.
+/* Finds the nearest face (kernel): walks from node to node of the hierarchy over faces of one accel
+ * (acceleration structure of a subtree), eight children or eight faces at a time, in single
+ * precision.
  *
  * The walk drops only nodes and faces that are certainly farther than the best upper bound. It
  * collects the other faces as candidates, which nearest.c compares.

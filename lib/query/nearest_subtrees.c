@@ -4,9 +4,9 @@
  * Nodes of the top and subtrees wait in a queue, ordered by guaranteed lower bounds of their
  * distance. The search ends when the next bound is beyond the best face. A subtree is loaded only
  * if its bound is at most the result, independent of the data in memory. Bounds come from a
- * subtree's skeleton, if it has ever been loaded (skeleton.c), else from the envelopes of the
- * levels right below the cut (deep bounds). Deep bounds are read once queries have loaded enough
- * subtrees without need. */
+ * subtree's skeleton (upper nodes of a subtree's hierarchy over faces), if it has ever been loaded
+ * (skeleton.c), else from the envelopes of the levels right below the cut (deep bounds). Deep
+ * bounds are read once queries have loaded enough subtrees without need. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -63,7 +63,7 @@ enum { NEW_AS_DEFAULT = 4, LOADS_TO_READ = 64 };
 
 /* --- deep bounds --- */
 
-static bool take_levels(ebpo_model *m, int level)
+static bool read_levels(ebpo_model *m, int level)
 {
     uint64_t most = ebpo_top_envelopes_estimate(m->info, level);
     ebpo_top *deep = NULL;
@@ -83,7 +83,7 @@ void ebpo_deep_bounds_make(ebpo_model *m)
         level = m->info->level_count - 1;
     if (!m->skeletons || atomic_exchange(&m->deep_begun, true))
         return;
-    while (level > cut && !take_levels(m, level))
+    while (level > cut && !read_levels(m, level))
         level--;
 }
 

@@ -1,5 +1,5 @@
-/* Guaranteed bounds of the distance of a point to a cell, to the half-spaces of an envelope, and to
- * the hierarchy over faces.
+/* Computes guaranteed bounds of the distance of a point to a cell, to the half-spaces of an
+ * envelope, and to the hierarchy over faces.
  *
  * From a distance of 16 sizes of the model's box on, doubles hardly separate distances. There the
  * bounds are those of keys, which grow with the distance (point_bounds.h). Upper bounds include

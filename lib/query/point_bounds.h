@@ -59,7 +59,8 @@ double ebpo_far_envelope(const ebpo_far *far, const ebpo_box *box, ebpo_cell cel
                          const uint32_t *codes, uint32_t count, double enough);
 double ebpo_far_cell_end(const ebpo_far *far, const ebpo_box *box, ebpo_cell cell);
 
-/* Transform from the coordinates of an accel to those of keys. */
+/* Transform from the coordinates of an accel (acceleration structure of a subtree) to those of
+ * keys. */
 typedef struct ebpo_far_frame {
     double offset[3], ratio, margin;
 } ebpo_far_frame;

@@ -71,7 +71,7 @@ static inline uint32_t ebpo_visit_push(ebpo_visit *stack, uint32_t top, const eb
     return top;
 }
 
-/* --- a search for the nearest face of one accel --- */
+/* --- a search for the nearest face of one accel (acceleration structure of a subtree) --- */
 
 /* A point, prepared for kernels. */
 typedef struct ebpo_probe {

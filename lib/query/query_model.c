@@ -1,5 +1,5 @@
-/* Models and contexts: opens a file for queries, loads subtrees, and checks the arguments of all
- * queries.
+/* Makes models and contexts: opens a file for queries, loads subtrees, and checks the arguments of
+ * all queries.
  *
  * A model holds everything if that fits into its budget, else the top of the tree and a cache of
  * subtrees (budget.c plans this). Models may be used by any thread. A context, with the buffers of

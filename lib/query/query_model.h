@@ -32,7 +32,8 @@ struct ebpo_model {
     ebpo_top *top;       /* levels 0 .. cut level */
     ebpo_chunks *chunks;
     ebpo_cache *cache;         /* subtrees by their index in top->below */
-    ebpo_skeletons *skeletons; /* skeletons of subtrees that have been loaded; or NULL */
+    ebpo_skeletons *skeletons; /* skeletons (upper nodes of the hierarchies over faces) of subtrees
+                                  that have been loaded; or NULL */
     _Atomic(ebpo_top *) deep;  /* levels below the cut: nearest_subtrees.c; or NULL */
     atomic_bool deep_begun;
     _Atomic uint64_t new_loads; /* number of loads that may have been without need, until `deep` is

@@ -1,5 +1,5 @@
-/* Nodes of a model: goes from a node to its children, in the top of the tree and in subtrees, with
- * bounds from envelopes.
+/* Walks through the nodes of a model: goes from a node to its children, in the top of the tree and
+ * in subtrees, with bounds from envelopes.
  *
  * Accels (nodes of one subtree) and contexts (nodes of the model; they load subtrees on demand) are
  * also sources for cursors. Nodes of a subtree are valid until the context enters another subtree.

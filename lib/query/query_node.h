@@ -1,5 +1,6 @@
-/* Nodes of a model: goes from a node to its children, in the top of the tree and in subtrees, with
- * bounds from envelopes. Nodes of a subtree are valid until the context enters another subtree. */
+/* Walks through the nodes of a model: goes from a node to its children, in the top of the tree and
+ * in subtrees, with bounds from envelopes. Nodes of a subtree are valid until the context enters
+ * another subtree. */
 #ifndef EBPO_QUERY_QUERY_NODE_H
 #define EBPO_QUERY_QUERY_NODE_H
 

@@ -1,4 +1,5 @@
-/* The top of a tree: levels 0 to the cut level without faces, and the nodes below.
+/* Holds the top of a tree: levels 0 to the cut level without faces, and the roots of the subtrees
+ * below.
  *
  * A model under a budget always has only the top in memory; queries go down through the top to the
  * subtrees. The same table, with envelopes alone, holds the levels right below the cut for deep
@@ -21,7 +22,8 @@ typedef struct reading {
     const ebpo_info *info;
     uint64_t group, plane, below; /* next free index of each array */
     ebpo_cell *gray;              /* cells of the previous level's gray nodes */
-    /* types of the nodes in the level below the current one, if pruned nodes depend on these */
+    /* types of the nodes in the level below the current one, if pruned nodes (whose children are
+     * not in the file) depend on these */
     uint16_t *next_types;
     uint64_t group_capacity, gray_capacity, plane_capacity, below_capacity, below_planes_capacity;
     bool envelopes; /* only envelopes are read */

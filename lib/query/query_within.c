@@ -230,7 +230,8 @@ static bool lists_ahead(const within *w)
 static ebpo_status put_children(within *w, const ebpo_box *box, const ebpo_ranked *r,
                                 ebpo_error *error);
 
-/* Returns a bound for a subtree's faces from its skeleton, if it has been loaded before. */
+/* Returns a bound for a subtree's faces from its skeleton (upper nodes of a subtree's hierarchy
+ * over faces), if it has been loaded before. */
 static double known_bound(const within *w, uint32_t below)
 {
     const ebpo_skeleton *k = ebpo_skeletons_find(w->context->model->skeletons, below);

@@ -1,5 +1,5 @@
-/* Kernel of rays: the walk of a ray through one accel's hierarchy over faces, and the filter for
- * eight faces, in single precision.
+/* Finds hits of a ray (kernel): walks through the hierarchy over faces of one accel (acceleration
+ * structure of a subtree), and the filter for eight faces, in single precision.
  *
  * The kernel drops only faces that the ray certainly misses, or hits beyond the limit. A certain
  * hit also holds in exact arithmetic. rays.c tests the other faces exactly.

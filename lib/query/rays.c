@@ -1,11 +1,11 @@
-/* Rays: the first face that a ray hits, a test for any hit, all hits; and many rays on all cores.
+/* Finds the first face that a ray hits, any hit, or all hits; and evaluates many rays on all cores.
  *
  * On the way down the tree, tests are conservative: a node is skipped only if the ray certainly
- * misses its cell, or its contents are beyond the limit. In an accel a filter in single precision
- * (ray_kernels.c) leaves a few faces, which are tested by exact predicates, the most promising
- * first. Hits are ordered by t, then by the number in the file. Results do not depend on threads:
- * each thread takes some rays at a time, with a separate context. Error bounds:
- * docs/develop/bounds.md. */
+ * misses its cell, or its contents are beyond the limit. In an accel (acceleration structure of a
+ * subtree) a filter in single precision (ray_kernels.c) leaves a few faces, which are tested by
+ * exact predicates, the most promising first. Hits are ordered by t, then by the number in the
+ * file. Results do not depend on threads: each thread takes some rays at a time, with a separate
+ * context. Error bounds: docs/develop/bounds.md. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -74,8 +74,8 @@ static const double near_enough = 4;
 
 /* --- limits --- */
 
-/* Returns t in the frame, relative to the moved origin; `sign` 1: at least the exact value, -1: at
- * most. */
+/* Returns t in the frame (coordinates in which the subtree's cell has a size of 1 to 2), relative
+ * to the moved origin; `sign` 1: at least the exact value, -1: at most. */
 static float frame_t(const ebpo_ray_search *r, double t, int sign)
 {
     double scaled = t * r->limit_scale;

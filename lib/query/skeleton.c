@@ -1,4 +1,4 @@
-/* Skeletons: bounds of the distance to the faces of subtrees that are not in memory.
+/* Makes skeletons, which bound the distance to the faces of subtrees that are not in memory.
  *
  * For each subtree that has been loaded, the upper nodes of its hierarchy over faces are kept,
  * eight at first; searches load the subtree again only if it may matter. When a search has loaded a
@@ -86,7 +86,7 @@ static bool is_shared(const ebpo_accel *s, uint32_t child)
     return ebpo_accel_slot_face(s, (child & ~EBPO_IS_BLOCK) * EBPO_BLOCK) < s->shared_count;
 }
 
-static void note_kinds(ebpo_skeleton *k, const ebpo_accel *s)
+static void record_kinds(ebpo_skeleton *k, const ebpo_accel *s)
 {
     const ebpo_bound *top = &s->bound[s->root_bound];
     for (int lane = 0; lane < top->count; lane++)
@@ -146,7 +146,7 @@ ebpo_skeleton *ebpo_skeleton_make(const ebpo_accel *s, unsigned nodes)
     k->first = most;
     uint32_t top = s->root_bound;
     keep_child(k, s, &top);
-    note_kinds(k, s);
+    record_kinds(k, s);
     keep_shared(k, s);
     for (uint32_t shared_end = k->count; k->count < most && keep_largest(k, s, shared_end);)
         ;
@@ -184,8 +184,9 @@ static double by_cylinder(const ebpo_child_cylinder *cylinder, const double to[3
     return aside * aside + over * over;
 }
 
-/* Computes squared lower bounds of the distances to the children from their boxes, in the frame;
- * the factor `certainly` is applied later. */
+/* Computes squared lower bounds of the distances to the children from their boxes, in the frame
+ * (coordinates in which the subtree's cell has a size of 1 to 2); the factor `certainly` is applied
+ * later. */
 static void by_boxes(const ebpo_bound *b, const double p[3], double lower2[8])
 {
     for (int lane = 0; lane < 8; lane++)
@@ -436,8 +437,8 @@ uint64_t ebpo_skeletons_capacity(uint64_t count, uint64_t space)
     return space < frame_bytes(count) + ebpo_skeleton_bytes(1) ? 0 : space < most ? space : most;
 }
 
-/* Takes bytes of the quota. `later`: bytes that must remain afterwards. */
-static bool take_capacity(ebpo_skeletons *all, uint64_t bytes, uint64_t later)
+/* Reserves bytes of the quota. `later`: bytes that must remain afterwards. */
+static bool reserve_capacity(ebpo_skeletons *all, uint64_t bytes, uint64_t later)
 {
     if (all->bytes + bytes > all->space || all->space - all->bytes - bytes < later ||
         (all->cache && !ebpo_cache_take_aside(all->cache, bytes)))
@@ -446,11 +447,11 @@ static bool take_capacity(ebpo_skeletons *all, uint64_t bytes, uint64_t later)
     return true;
 }
 
-/* Takes bytes for growing; leaves the bytes of the initial nodes of all other skeletons. */
-static bool take_more(void *user, uint64_t bytes)
+/* Reserves bytes for growing; leaves the bytes of the initial nodes of all other skeletons. */
+static bool reserve_more(void *user, uint64_t bytes)
 {
     ebpo_skeletons *all = user;
-    return take_capacity(all, bytes, all->left * ebpo_skeleton_bytes(all->nodes));
+    return reserve_capacity(all, bytes, all->left * ebpo_skeleton_bytes(all->nodes));
 }
 
 ebpo_skeletons *ebpo_skeletons_make(uint64_t count, uint64_t space, ebpo_cache *cache)
@@ -465,7 +466,7 @@ ebpo_skeletons *ebpo_skeletons_make(uint64_t count, uint64_t space, ebpo_cache *
     pthread_mutex_init(&all->lock, NULL);
     if (cache)
         ebpo_cache_set_aside(cache, space);
-    if (take_capacity(all, frame_bytes(count), 0))
+    if (reserve_capacity(all, frame_bytes(count), 0))
         return all;
     ebpo_skeletons_free(all);
     return NULL;
@@ -484,7 +485,7 @@ void ebpo_skeletons_free(ebpo_skeletons *all)
 bool ebpo_skeletons_take(ebpo_skeletons *all, uint64_t bytes)
 {
     pthread_mutex_lock(&all->lock);
-    bool taken = take_capacity(all, bytes, 0);
+    bool taken = reserve_capacity(all, bytes, 0);
     pthread_mutex_unlock(&all->lock);
     return taken;
 }
@@ -507,7 +508,7 @@ void ebpo_skeletons_keep(ebpo_skeletons *all, uint64_t number, const ebpo_accel 
     ebpo_skeleton *made = ebpo_skeleton_make(subtree, all->nodes);
     pthread_mutex_lock(&all->lock);
     /* another thread may have loaded the subtree, too: with planes */
-    if (made && !all->of[number] && take_capacity(all, ebpo_skeleton_bytes(made->first), 0)) {
+    if (made && !all->of[number] && reserve_capacity(all, ebpo_skeleton_bytes(made->first), 0)) {
         atomic_store_explicit(&all->of[number], made, memory_order_release);
         all->left--;
         made = NULL;
@@ -522,7 +523,7 @@ void ebpo_skeletons_grow(ebpo_skeletons *all, uint64_t number, const ebpo_accel 
     if (!all || !all->of[number])
         return;
     pthread_mutex_lock(&all->lock);
-    ebpo_skeleton_grow(all->of[number], subtree, p, limit, take_more, all);
+    ebpo_skeleton_grow(all->of[number], subtree, p, limit, reserve_more, all);
     pthread_mutex_unlock(&all->lock);
 }
 

@@ -1,10 +1,11 @@
-/* A subtree as plain arrays, for ebpo/subtree.h.
+/* Reads a subtree as plain arrays, for ebpo/subtree.h.
  *
- * A node is found by its octcode. The part below it is read as a slice, if an upper bound of its
- * memory, computed from counts, is within the caller's limit. The slice has an array for each type
- * of node. From these, this file makes arrays with a row for each node, faces with corners and
- * numbers, and lists of leaves. A single node can then be described in the model's coordinates: the
- * half-spaces that it inherits from all nodes above it, and the polygons of its envelope. */
+ * A node is found by its octcode (locational code). The part below it is read as a slice, if an
+ * upper bound of its memory, computed from counts, is within the caller's limit. The slice has an
+ * array for each type of node. From these, this file makes arrays with a row for each node, faces
+ * with corners and numbers, and lists of leaves. A single node can then be described in the model's
+ * coordinates: the half-spaces that it inherits from all nodes above it, and the polygons of its
+ * envelope. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -131,7 +132,7 @@ static int32_t winding_of(const ebpo_level *level, ebpo_node_type type, uint64_t
     }
 }
 
-static void take_planes(ebpo_subtree *s, const ebpo_level *level, ebpo_node_type type, place *at,
+static void copy_planes(ebpo_subtree *s, const ebpo_level *level, ebpo_node_type type, place *at,
                         uint64_t node)
 {
     uint32_t next = s->plane_first[node], count = 0;
@@ -151,8 +152,8 @@ static void take_planes(ebpo_subtree *s, const ebpo_level *level, ebpo_node_type
     s->plane_first[node + 1] = next + count;
 }
 
-static void take_node(ebpo_subtree *s, const ebpo_level *level, ebpo_node_type type,
-                      uint64_t octcode, place *at, uint64_t node)
+static void add_node(ebpo_subtree *s, const ebpo_level *level, ebpo_node_type type,
+                     uint64_t octcode, place *at, uint64_t node)
 {
     s->octcodes[node] = octcode;
     s->types[node] = (uint8_t)type;
@@ -160,13 +161,13 @@ static void take_node(ebpo_subtree *s, const ebpo_level *level, ebpo_node_type t
     if (s->windings)
         s->windings[node] = winding_of(level, type, at->rank[type]);
     if (s->has_planes)
-        take_planes(s, level, type, at, node);
+        copy_planes(s, level, type, at, node);
     at->rank[type]++;
 }
 
-/* Takes the nodes of a level below the root: the children of the previous level's gray nodes. Links
- * them to their parents. */
-static void take_level(ebpo_subtree *s, const ebpo_slice *slice, int i)
+/* Copies the nodes of a level below the root: the children of the previous level's gray nodes.
+ * Links them to their parents. */
+static void copy_level(ebpo_subtree *s, const ebpo_slice *slice, int i)
 {
     const ebpo_level *level = &slice->level[i];
     place at = { .plane = 0 };
@@ -180,13 +181,13 @@ static void take_level(ebpo_subtree *s, const ebpo_slice *slice, int i)
         }
         s->children[parent] = (uint32_t)node;
         for (unsigned octant = 0; octant < 8; octant++)
-            take_node(s, level, ebpo_group_type(level->types[group - 1], octant),
-                      ebpo_octcode_child(s->octcodes[parent], octant), &at, node++);
+            add_node(s, level, ebpo_group_type(level->types[group - 1], octant),
+                     ebpo_octcode_child(s->octcodes[parent], octant), &at, node++);
     }
 }
 
-/* Takes nodes, windings and planes from the slice; reuses its arrays where possible. */
-static ebpo_status subtree_take_nodes(ebpo_subtree *s, const ebpo_slice *slice, ebpo_error *error)
+/* Copies nodes, windings and planes from the slice; reuses its arrays where possible. */
+static ebpo_status copy_nodes(ebpo_subtree *s, const ebpo_slice *slice, ebpo_error *error)
 {
     uint64_t planes;
     place at = { .plane = 0 };
@@ -197,17 +198,16 @@ static ebpo_status subtree_take_nodes(ebpo_subtree *s, const ebpo_slice *slice, 
         return status;
     if (s->has_planes)
         s->plane_first[0] = 0;
-    take_node(s, &slice->level[0], slice->root.type, ebpo_octcode_of_cell(slice->root.cell), &at,
-              0);
+    add_node(s, &slice->level[0], slice->root.type, ebpo_octcode_of_cell(slice->root.cell), &at, 0);
     for (int i = 1; i < slice->level_count; i++)
-        take_level(s, slice, i);
+        copy_level(s, slice, i);
     return EBPO_OK;
 }
 
 /* --- faces --- */
 
-/* Takes a leaf's list: its references, then its new faces, which have higher numbers. */
-static void take_list(ebpo_subtree *s, const ebpo_level *level, uint64_t leaf, uint64_t *ref,
+/* Copies a leaf's list: its references, then its new faces, which have higher numbers. */
+static void copy_list(ebpo_subtree *s, const ebpo_level *level, uint64_t leaf, uint64_t *ref,
                       uint64_t *next)
 {
     for (uint32_t k = 0; k < level->leaf_ref_count[leaf]; k++)
@@ -216,7 +216,7 @@ static void take_list(ebpo_subtree *s, const ebpo_level *level, uint64_t leaf, u
         s->list[(*next)++] = (uint32_t)level->leaf_first[leaf] + k;
 }
 
-static ebpo_status take_lists(ebpo_subtree *s, const ebpo_slice *slice, ebpo_error *error)
+static ebpo_status copy_lists(ebpo_subtree *s, const ebpo_slice *slice, ebpo_error *error)
 {
     uint64_t listed = 0, next = 0;
     for (int i = 0; i < slice->level_count; i++)
@@ -234,14 +234,14 @@ static ebpo_status take_lists(ebpo_subtree *s, const ebpo_slice *slice, ebpo_err
         for (uint64_t node = s->level_first[i]; node < s->level_first[i + 1]; node++) {
             s->list_first[node] = (uint32_t)next;
             if (s->types[node] == EBPO_LEAF)
-                take_list(s, &slice->level[i], leaf++, &ref, &next);
+                copy_list(s, &slice->level[i], leaf++, &ref, &next);
         }
     }
     s->list_first[s->node_count] = (uint32_t)next;
     return EBPO_OK;
 }
 
-static ebpo_status take_numbers(ebpo_subtree *s, const ebpo_slice *slice, ebpo_error *error)
+static ebpo_status copy_indices(ebpo_subtree *s, const ebpo_slice *slice, ebpo_error *error)
 {
     uint64_t count = s->mesh.face_count;
     s->numbers = ebpo_alloc(count, sizeof *s->numbers);
@@ -253,7 +253,7 @@ static ebpo_status take_numbers(ebpo_subtree *s, const ebpo_slice *slice, ebpo_e
     return EBPO_OK;
 }
 
-static ebpo_status take_corners(ebpo_subtree *s, ebpo_error *error)
+static ebpo_status gather_corners(ebpo_subtree *s, ebpo_error *error)
 {
     const ebpo_mesh *mesh = &s->mesh;
     size_t row = 3 * (mesh->xyz32 ? sizeof(float) : sizeof(double));
@@ -269,9 +269,9 @@ static ebpo_status take_corners(ebpo_subtree *s, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Takes faces and lists. */
-static ebpo_status subtree_take_faces(ebpo_subtree *s, ebpo_slice *slice,
-                                      const ebpo_subtree_options *options, ebpo_error *error)
+/* Copies faces and lists. */
+static ebpo_status copy_faces(ebpo_subtree *s, ebpo_slice *slice,
+                              const ebpo_subtree_options *options, ebpo_error *error)
 {
     s->mesh = slice->mesh;
     memset(&slice->mesh, 0, sizeof slice->mesh);
@@ -280,10 +280,10 @@ static ebpo_status subtree_take_faces(ebpo_subtree *s, ebpo_slice *slice,
     slice->face_source = NULL;
     s->memory += s->mesh.face_count * 3 * sizeof(uint32_t) +
                  s->mesh.vertex_count * 3 * (s->mesh.xyz32 ? sizeof(float) : sizeof(double));
-    ebpo_status status = take_lists(s, slice, error);
+    ebpo_status status = copy_lists(s, slice, error);
     if (status == EBPO_OK)
-        status = take_numbers(s, slice, error);
-    return status == EBPO_OK && options->corners ? take_corners(s, error) : status;
+        status = copy_indices(s, slice, error);
+    return status == EBPO_OK && options->corners ? gather_corners(s, error) : status;
 }
 
 /* --- for callers --- */
@@ -560,8 +560,8 @@ static ebpo_status find_node(ebpo_chunks *chunks, uint64_t octcode, bool or_leaf
     return status == EBPO_OK ? check_found(chunks, octcode, or_leaf_above, c, error) : status;
 }
 
-/* Takes the planes of the nodes on the way to the subtree's root. */
-static ebpo_status take_above(ebpo_subtree *s, ebpo_cursor *c, ebpo_error *error)
+/* Reads the planes of the nodes on the way to the subtree's root. */
+static ebpo_status read_planes_above(ebpo_subtree *s, ebpo_cursor *c, ebpo_error *error)
 {
     uint32_t codes[EBPO_NODE_PLANES];
     uint64_t capacity = 0;
@@ -701,16 +701,16 @@ static ebpo_status fill_arrays(ebpo_subtree *s, ebpo_chunks *chunks, ebpo_cursor
     uint32_t needs = choose_needs(s, o, chunks->file->info.parts);
     ebpo_status status = check_memory(s, chunks, needs, o, error);
     if (status == EBPO_OK && needs & (EBPO_NEEDS_PLANES | EBPO_NEEDS_LEAF_PLANES))
-        status = take_above(s, c, error);
+        status = read_planes_above(s, c, error);
     if (status == EBPO_OK)
         status = s->no_faces
                      ? ebpo_slice_read_nodes(&slice, chunks, &s->root, needs, o->levels, error)
                      : ebpo_slice_read_parts(&slice, chunks, &s->root, needs, error);
     if (status != EBPO_OK)
         return status;
-    status = subtree_take_nodes(s, &slice, error);
+    status = copy_nodes(s, &slice, error);
     if (status == EBPO_OK && !s->no_faces)
-        status = subtree_take_faces(s, &slice, o, error);
+        status = copy_faces(s, &slice, o, error);
     ebpo_slice_free(&slice);
     return status;
 }

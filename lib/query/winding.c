@@ -1,5 +1,5 @@
-/* Winding numbers of points: integers for solids, bounds of real numbers for surfaces with holes.
- */
+/* Computes winding numbers of points: integers for solids, bounds of real numbers for surfaces with
+ * holes. */
 #include "core/strict_fp.h"
 
 #include <math.h>

@@ -1,8 +1,8 @@
 /* Counts checks and violations of the verifier, and keeps the first violation of each kind.
  *
  * Each thread counts in a separate tally; tallies are merged. The first violation is the first by
- * octcode, then by face, by plane and by text. So the report does not depend on which thread finds
- * a violation, or on the order of merging. */
+ * octcode (locational code), then by face, by plane and by text. So the report does not depend on
+ * which thread finds a violation, or on the order of merging. */
 #include "verify/tally.h"
 
 #include <inttypes.h>

@@ -19,8 +19,8 @@ typedef enum ebpo_verify_kind {
 #define EBPO_NO_FACE  UINT64_MAX
 #define EBPO_NO_PLANE UINT32_MAX
 
-/* Position of a violation. File order is the order of these members. The order of octcodes is
- * breadth-first. */
+/* Position of a violation. File order is the order of these members. The order of octcodes
+ * (locational codes) is breadth-first. */
 typedef struct ebpo_verify_place {
     uint64_t octcode; /* 0: no node, the whole file */
     uint64_t face;    /* EBPO_NO_FACE: none */

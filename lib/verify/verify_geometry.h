@@ -1,4 +1,4 @@
-/* Exact tests of faces against cells and planes, and winding numbers by rays (verify_geometry.c).
+/* Tests faces exactly against cells and planes, and winding numbers by rays (verify_geometry.c).
  * Any thread may call these functions. */
 #ifndef EBPO_VERIFY_VERIFY_GEOMETRY_H
 #define EBPO_VERIFY_VERIFY_GEOMETRY_H

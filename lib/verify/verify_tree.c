@@ -600,7 +600,8 @@ typedef struct descent {
     const ebpo_reference_tree *view;
     uint64_t next_face;               /* first face that no visited leaf has listed */
     uint64_t grays;                   /* number of visited gray nodes */
-    uint64_t pruned[EBPO_LEVELS_MAX]; /* number of pruned nodes, by level */
+    uint64_t pruned[EBPO_LEVELS_MAX]; /* number of pruned nodes (whose children are not in the
+                                         file), by level */
 } descent;
 
 static void record_check(descent *d, const ebpo_reference_node *node, bool holds, const char *text)

@@ -69,7 +69,7 @@ static void compare(const reported *got, const reference_found *intersected, uin
 static void inspect_distance(ebpo_collider *collider, const ebpo_collide_options *how,
                              const reference_faces f[2], bool intersect, counts *out)
 {
-    ebpo_clearance far;
+    ebpo_collide_distance_result far;
     ebpo_error error = EBPO_ERROR_INIT;
     model_must(ebpo_collide_distance(collider, how, NULL, &far, &error), "distance", &error);
     if ((far.distance.hi == 0) != intersect || far.distance.lo != far.distance.hi)

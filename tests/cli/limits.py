@@ -163,7 +163,7 @@ def captions_are_never_omitted():
 
 
 def models_are_held_in_parts():
-    """Results are the same with the model in parts. When the least memory is more than half of the free memory, this is reported."""
+    """Results are the same with the partly loaded model. When the least memory is more than half of the free memory, this is reported."""
     plan = json.loads(run("info", "--json", "--memory", "0", "b.ebpo.h5")[1])["memory"]
     whole, least = plan["whole"], plan["least"]
     requested = {"map": ["map", "--grid", "9,9,9", "-o", "OUT.nrrd", "b.ebpo.h5"],

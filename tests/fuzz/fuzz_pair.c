@@ -44,8 +44,8 @@ static void query_pair(ebpo_collider *collider, const ebpo_collide_options *opti
     uint64_t taken = 0;
     ebpo_face_pair pair;
     ebpo_relation_result relation;
-    ebpo_clearance clearance;
-    ebpo_certain a_in_b, b_in_a;
+    ebpo_collide_distance_result clearance;
+    ebpo_value_bounds a_in_b, b_in_a;
     ebpo_separation out;
     ebpo_level_result levels;
     int32_t found;

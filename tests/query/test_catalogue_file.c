@@ -148,7 +148,7 @@ static const struct {
     { "\"path\": \"", "\"path\": \"\\ud800", EBPO_E_FORMAT, "line 6" },
     { "\"path\": \"", "\"path\": \"\\u0000", EBPO_E_FORMAT, "line 6" },
     { "\"path\": \"", "\"path\": \"nowhere", EBPO_E_IO, "nowhere" },
-    { "\"path\": \"", "\"path\": 1, \"was\": \"", EBPO_E_FORMAT, "path is not a text" },
+    { "\"path\": \"", "\"path\": 1, \"was\": \"", EBPO_E_FORMAT, "path is not a string" },
     { "\"content_sha256\": \"", "\"content_sha256\": \"X", EBPO_E_FORMAT, "is not a digest" },
     { "\"solid\": true", "\"solid\": 1", EBPO_E_FORMAT, "solid is not true or false" },
     { "\"box_min\": [0,", "\"box_min\": [false,", EBPO_E_FORMAT, "two corners" },

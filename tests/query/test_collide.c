@@ -308,7 +308,7 @@ static void check_level(const ebpo_level_result *r, bool meet, double distance, 
                   "%s: %.17g is not in %.17g .. %.17g", what, distance, r->distance.lo,
                   r->distance.hi);
     ck_assert_msg(!meet || (r->contact == -1 && r->common != 0), "%s: faces intersect", what);
-    ck_assert_msg((r->open_pairs == 0) == (r->contact == 0), "%s: undecided pairs", what);
+    ck_assert_msg((r->undecided_pairs == 0) == (r->contact == 0), "%s: undecided pairs", what);
     ck_assert_msg(!(r->common == 1 && apart), "%s: boxes are apart", what);
 }
 
@@ -320,7 +320,7 @@ static void check_levels(bool meet, const query_model *a, const ebpo_pose *pa, c
     ebpo_model *part = in_parts(b, 1);
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     ebpo_collider *collider;
-    ebpo_clearance truth;
+    ebpo_collide_distance_result truth;
     options.pose_a = *pa;
     options.pose_b = *pb;
     ASSERT_OK(ebpo_collider_new(a->model, b->model, NULL, &collider, error));
@@ -336,9 +336,9 @@ static void check_levels(bool meet, const query_model *a, const ebpo_pose *pa, c
         check_level(&parts, meet, truth.distance.lo, apart, what);
         check_level(&late, meet, truth.distance.lo, apart, what);
         ck_assert_int_eq(parts.level_b, level < 1 ? level : whole.level_b < 1 ? whole.level_b : 1);
-        ck_assert(swapped.common == whole.common && swapped.open_pairs == whole.open_pairs &&
-                  swapped.distance.lo == whole.distance.lo &&
-                  swapped.distance.hi == whole.distance.hi);
+        ck_assert(
+            swapped.common == whole.common && swapped.undecided_pairs == whole.undecided_pairs &&
+            swapped.distance.lo == whole.distance.lo && swapped.distance.hi == whole.distance.hi);
     }
     ebpo_model_free(part);
 }

@@ -42,7 +42,7 @@ static void free_two(two_models *t)
 }
 
 static void run_query(ebpo_collider *c, const ebpo_pose *a, const ebpo_pose *b, double tolerance,
-                      uint64_t deadline, ebpo_certain out[2])
+                      uint64_t deadline, ebpo_value_bounds out[2])
 {
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     options.pose_a = *a;
@@ -113,8 +113,8 @@ static void depth_of_points(const reference_faces *a, const reference_faces *b, 
 
 /* --- tests --- */
 
-static void check_one(const ebpo_certain *got, double lo, double hi, double tolerance, double size,
-                      const char *what)
+static void check_one(const ebpo_value_bounds *got, double lo, double hi, double tolerance,
+                      double size, const char *what)
 {
     ck_assert_msg(got->lo <= hi + 1e-12 * size && lo <= got->hi + 1e-12 * size,
                   "%s: %.17g .. %.17g, by points %.17g .. %.17g", what, got->lo, got->hi, lo, hi);
@@ -127,7 +127,7 @@ static void check_case(two_models *t, int kind, uint64_t *state)
 {
     ebpo_pose a, b;
     reference_faces f[2];
-    ebpo_certain got[2], other[2], late[2];
+    ebpo_value_bounds got[2], other[2], late[2];
     char what[128];
     double lo, hi, size = t->model[0].size, tolerance = 0.003 * size;
     snprintf(what, sizeof what, "%s, %s, %s", t->model[0].name, t->model[1].name,
@@ -171,7 +171,7 @@ START_TEST(test_depth_of_boxes_matches_formula)
 {
     two_models t;
     ebpo_pose a = EBPO_POSE_INIT, b = EBPO_POSE_INIT;
-    ebpo_certain got[2];
+    ebpo_value_bounds got[2];
     double low[3], high[3], middle;
     make_two(&t, "cube", "cube");
     ebpo_test_point(&t.model[0].mesh, 0, low);
@@ -201,7 +201,7 @@ END_TEST
 START_TEST(test_depth_of_non_solid_is_refused)
 {
     two_models t;
-    ebpo_certain out;
+    ebpo_value_bounds out;
     ebpo_error refusal = EBPO_ERROR_INIT;
     make_two(&t, "cube", "sheet");
     ck_assert_int_eq(ebpo_collide_depth(t.collider, NULL, 0.1, &out, NULL, &refusal),

@@ -25,12 +25,13 @@ typedef struct two_models {
     ebpo_collider *collider, *swapped;
 } two_models;
 
-static ebpo_clearance run_query(ebpo_collider *c, const ebpo_pose *a, const ebpo_pose *b,
-                                double tolerance, double at_least, bool warm)
+static ebpo_collide_distance_result run_query(ebpo_collider *c, const ebpo_pose *a,
+                                              const ebpo_pose *b, double tolerance, double at_least,
+                                              bool warm)
 {
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
-    ebpo_clearance_options how = EBPO_CLEARANCE_OPTIONS_INIT;
-    ebpo_clearance out;
+    ebpo_collide_distance_options how = EBPO_COLLIDE_DISTANCE_OPTIONS_INIT;
+    ebpo_collide_distance_result out;
     options.pose_a = *a;
     options.pose_b = *b;
     how.tolerance = tolerance;
@@ -42,7 +43,8 @@ static ebpo_clearance run_query(ebpo_collider *c, const ebpo_pose *a, const ebpo
 
 /* --- results --- */
 
-static void check_pair(const reference_faces *f, const ebpo_clearance *got, const char *what)
+static void check_pair(const reference_faces *f, const ebpo_collide_distance_result *got,
+                       const char *what)
 {
     reference_found *intersected;
     uint64_t count = reference_pairs(&f[0], &f[1], &intersected), i = 0;
@@ -62,7 +64,7 @@ static void check_pair(const reference_faces *f, const ebpo_clearance *got, cons
     ck_assert_msg(!wrong, "%s: %.17g: %s", what, got->distance.hi, wrong);
 }
 
-static void check_points(const ebpo_clearance *got, double size, const char *what)
+static void check_points(const ebpo_collide_distance_result *got, double size, const char *what)
 {
     double square = 0, most = 0;
     for (int k = 0; k < 3; k++) {
@@ -73,9 +75,9 @@ static void check_points(const ebpo_clearance *got, double size, const char *wha
                   "%s: points are %.17g apart, not %.17g", what, sqrt(square), got->distance.hi);
 }
 
-static ebpo_clearance turned(ebpo_clearance c)
+static ebpo_collide_distance_result turned(ebpo_collide_distance_result c)
 {
-    ebpo_clearance out = c;
+    ebpo_collide_distance_result out = c;
     out.pair = (ebpo_face_pair){ c.pair.face_b,      c.pair.face_a, c.pair.file_face_b,
                                  c.pair.file_face_a, c.pair.kind,   0 };
     memcpy(out.point_a, c.point_b, sizeof out.point_a);
@@ -90,7 +92,8 @@ static void check_intervals(const two_models *t, const ebpo_pose *a, const ebpo_
 {
     const double tolerance[] = { 1e-12, 1e-3, 0.5 };
     for (int i = 0; i < 3; i++) {
-        ebpo_certain d = run_query(t->collider, a, b, tolerance[i] * size, -1, i == 1).distance;
+        ebpo_value_bounds d =
+            run_query(t->collider, a, b, tolerance[i] * size, -1, i == 1).distance;
         ck_assert_msg(d.lo <= distance && distance <= d.hi, "%s: %.17g is not in %.17g .. %.17g",
                       what, distance, d.lo, d.hi);
         ck_assert_msg(d.hi - d.lo <= (tolerance[i] + 1e-12) * size + 1e-9 * distance,
@@ -104,7 +107,7 @@ static void check_at_least(const two_models *t, const ebpo_pose *a, const ebpo_p
     const double thresholds[] = { 0, distance / 2, nextafter(distance, 0),
                                   nextafter(distance, INFINITY), 2 * distance + 1 };
     for (int i = 0; i < 5; i++) {
-        ebpo_clearance c = run_query(t->collider, a, b, 0, thresholds[i], false);
+        ebpo_collide_distance_result c = run_query(t->collider, a, b, 0, thresholds[i], false);
         int want = thresholds[i] <= distance;
         ck_assert_msg(c.at_least == want, "%s: at least %.17g: %d", what, thresholds[i],
                       c.at_least);
@@ -118,7 +121,7 @@ static void check_late(const two_models *t, const ebpo_pose *a, const ebpo_pose 
                        const char *what)
 {
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
-    ebpo_clearance out;
+    ebpo_collide_distance_result out;
     options.pose_a = *a;
     options.pose_b = *b;
     options.deadline_ns = 1;
@@ -139,9 +142,9 @@ static void check_case(two_models *t, int kind, uint64_t *state)
     reference_pose(kind, size, state, &a, &b);
     reference_faces_make(&f[0], &t->model[0], &a);
     reference_faces_make(&f[1], &t->model[1], &b);
-    ebpo_clearance got = run_query(t->collider, &a, &b, 0, -1, false),
-                   other = turned(run_query(t->swapped, &b, &a, 0, -1, false)),
-                   warm = run_query(t->collider, &a, &b, 0, -1, true);
+    ebpo_collide_distance_result got = run_query(t->collider, &a, &b, 0, -1, false),
+                                 other = turned(run_query(t->swapped, &b, &a, 0, -1, false)),
+                                 warm = run_query(t->collider, &a, &b, 0, -1, true);
     ck_assert_msg(memcmp(&got, &other, sizeof got) == 0, "%s: swapped", what);
     ck_assert_msg(memcmp(&got.distance, &warm.distance, sizeof got.distance) == 0, "%s: warm",
                   what);
@@ -223,7 +226,7 @@ static void distance_of_all(const reference_faces *a, const reference_faces *b, 
 static void approach(two_models *t, const ebpo_pose *a, ebpo_pose *b, double left)
 {
     for (int i = 0; i < 3; i++) {
-        ebpo_clearance c = run_query(t->collider, a, b, 0, -1, false);
+        ebpo_collide_distance_result c = run_query(t->collider, a, b, 0, -1, false);
         for (int k = 0; k < 3; k++)
             b->translation[k] += (1 - left) * (c.point_a[k] - c.point_b[k]);
     }
@@ -266,12 +269,12 @@ START_TEST(test_collide_distance_common_translation)
     make_two(&t, "cube", "cube", 0);
     double size = t.model[0].size;
     b.translation[0] = 1.25 * size;
-    ebpo_clearance here = run_query(t.collider, &a, &b, 0, -1, false);
+    ebpo_collide_distance_result here = run_query(t.collider, &a, &b, 0, -1, false);
     for (int k = 0; k < 3; k++) {
         a.translation[k] += 64 * size;
         b.translation[k] += 64 * size;
     }
-    ebpo_clearance there = run_query(t.collider, &a, &b, 0, -1, false);
+    ebpo_collide_distance_result there = run_query(t.collider, &a, &b, 0, -1, false);
     ck_assert_double_eq(here.distance.hi, 0.25 * size);
     ck_assert_double_eq(there.distance.hi, here.distance.hi);
     ck_assert(there.pair.file_face_a == here.pair.file_face_a &&
@@ -283,10 +286,10 @@ END_TEST
 START_TEST(test_collide_distance_bad_options_are_refused)
 {
     two_models t;
-    ebpo_clearance out;
+    ebpo_collide_distance_result out;
     ebpo_error refusal = EBPO_ERROR_INIT;
     make_two(&t, "cube", "torus", 0);
-    ebpo_clearance_options how = EBPO_CLEARANCE_OPTIONS_INIT;
+    ebpo_collide_distance_options how = EBPO_COLLIDE_DISTANCE_OPTIONS_INIT;
     how.tolerance = -1;
     ck_assert_int_eq(ebpo_collide_distance(t.collider, NULL, &how, &out, &refusal),
                      EBPO_E_ARGUMENT);

@@ -82,12 +82,12 @@ static void free_two(two_models *t)
 
 /* --- distances --- */
 
-static ebpo_clearance run_query(ebpo_collider *c, const ebpo_pose pose[2], double tolerance,
-                                double at_least, bool warm)
+static ebpo_collide_distance_result run_query(ebpo_collider *c, const ebpo_pose pose[2],
+                                              double tolerance, double at_least, bool warm)
 {
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
-    ebpo_clearance_options how = EBPO_CLEARANCE_OPTIONS_INIT;
-    ebpo_clearance out;
+    ebpo_collide_distance_options how = EBPO_COLLIDE_DISTANCE_OPTIONS_INIT;
+    ebpo_collide_distance_result out;
     options.pose_a = pose[0];
     options.pose_b = pose[1];
     how.tolerance = tolerance;
@@ -97,9 +97,9 @@ static ebpo_clearance run_query(ebpo_collider *c, const ebpo_pose pose[2], doubl
     return out;
 }
 
-static ebpo_clearance turned(ebpo_clearance c)
+static ebpo_collide_distance_result turned(ebpo_collide_distance_result c)
 {
-    ebpo_clearance out = c;
+    ebpo_collide_distance_result out = c;
     out.pair = (ebpo_face_pair){ c.pair.face_b,      c.pair.face_a, c.pair.file_face_b,
                                  c.pair.file_face_a, c.pair.kind,   0 };
     memcpy(out.point_a, c.point_b, sizeof out.point_a);
@@ -121,8 +121,9 @@ static bool find(void *user, const ebpo_face_pair *pairs, uint64_t count)
 }
 
 /* For intersecting faces, the reported pair depends on the parts. */
-static void check_distance(const two_models *t, const ebpo_pose pose[2], const ebpo_clearance *want,
-                           const ebpo_clearance *got, const char *what)
+static void check_distance(const two_models *t, const ebpo_pose pose[2],
+                           const ebpo_collide_distance_result *want,
+                           const ebpo_collide_distance_result *got, const char *what)
 {
     ck_assert_msg(memcmp(&want->distance, &got->distance, sizeof want->distance) == 0 &&
                       want->at_least == got->at_least,
@@ -142,10 +143,10 @@ static void check_distance(const two_models *t, const ebpo_pose pose[2], const e
 static void check_distances(const two_models *t, const ebpo_pose pose[2], const char *what)
 {
     const ebpo_pose back[2] = { pose[1], pose[0] };
-    ebpo_clearance want = run_query(t->whole, pose, 0, -1, false),
-                   both = run_query(t->parts, pose, 0, -1, true),
-                   one = run_query(t->one, pose, 0, -1, false),
-                   swapped = turned(run_query(t->swapped, back, 0, -1, false));
+    ebpo_collide_distance_result want = run_query(t->whole, pose, 0, -1, false),
+                                 both = run_query(t->parts, pose, 0, -1, true),
+                                 one = run_query(t->one, pose, 0, -1, false),
+                                 swapped = turned(run_query(t->swapped, back, 0, -1, false));
     check_distance(t, pose, &want, &both, what);
     check_distance(t, pose, &want, &one, what);
     check_distance(t, pose, &want, &swapped, what);
@@ -160,17 +161,18 @@ static void check_others(const two_models *t, const ebpo_pose pose[2], const cha
     double d = run_query(t->whole, pose, 0, -1, false).distance.hi, size = t->model[0].size;
     const double thresholds[] = { d / 2, nextafter(d, 0), nextafter(d, INFINITY), 2 * d + 1 };
     for (int i = 0; i < 4; i++) {
-        ebpo_clearance c = run_query(i % 2 ? t->one : t->parts, pose, 0, thresholds[i], i > 1);
+        ebpo_collide_distance_result c =
+            run_query(i % 2 ? t->one : t->parts, pose, 0, thresholds[i], i > 1);
         ck_assert_msg(c.at_least == (thresholds[i] <= d), "%s: at least %.17g", what,
                       thresholds[i]);
         ck_assert_msg(c.distance.lo <= d && d <= c.distance.hi, "%s: %.17g not in %.17g .. %.17g",
                       what, d, c.distance.lo, c.distance.hi);
     }
-    ebpo_certain about = run_query(t->parts, pose, 0.01 * size, -1, false).distance;
+    ebpo_value_bounds about = run_query(t->parts, pose, 0.01 * size, -1, false).distance;
     ck_assert_msg(about.lo <= d && d <= about.hi, "%s: tolerance", what);
     ck_assert_double_le(about.hi - about.lo, 0.011 * size + 1e-9 * d);
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
-    ebpo_clearance late;
+    ebpo_collide_distance_result late;
     options.pose_a = pose[0];
     options.pose_b = pose[1];
     options.deadline_ns = 1;
@@ -336,7 +338,7 @@ static void check_separation(const two_models *t, const ebpo_pose pose[2], uint6
 
 /* Computes the depths. Surfaces have no depth: then all bytes of the result are 0. */
 static void depths(ebpo_collider *c, const two_models *t, const ebpo_pose pose[2], bool back,
-                   uint64_t deadline, ebpo_certain out[2])
+                   uint64_t deadline, ebpo_value_bounds out[2])
 {
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     bool solid[2] = { t->model[back].info.solid, t->model[!back].info.solid };
@@ -351,7 +353,7 @@ static void depths(ebpo_collider *c, const two_models *t, const ebpo_pose pose[2
 
 static void check_depths(const two_models *t, const ebpo_pose pose[2], const char *what)
 {
-    ebpo_certain want[2], both[2], one[2], swapped[2], late[2];
+    ebpo_value_bounds want[2], both[2], one[2], swapped[2], late[2];
     depths(t->whole, t, pose, false, 0, want);
     depths(t->parts, t, pose, false, 0, both);
     depths(t->one, t, pose, false, 0, one);
@@ -425,7 +427,7 @@ static ebpo_collider_stats stats_of(const ebpo_collider *c)
     return out;
 }
 
-/* Checks relations of a model in parts, and counts the reads. */
+/* Checks relations of a partly loaded model, and counts the reads. */
 static void check_far_relation(ebpo_collider *whole, ebpo_collider *parts, const ebpo_pose pose[2],
                                int32_t expected)
 {
@@ -451,7 +453,7 @@ static void check_far_separation(ebpo_collider *whole, ebpo_collider *parts,
 static void check_far_depth(ebpo_collider *whole, ebpo_collider *parts, const ebpo_pose pose[2])
 {
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
-    ebpo_certain want[2], got[2];
+    ebpo_value_bounds want[2], got[2];
     options.pose_a = pose[0];
     options.pose_b = pose[1];
     ebpo_collider_stats before = stats_of(parts);
@@ -495,8 +497,8 @@ START_TEST(test_collision_shares_one_budget)
     ck_assert_uint_eq(want.count, got.count);
     ck_assert(memcmp(want.bytes, got.bytes, want.count) == 0);
     const ebpo_pose poses[2] = { EBPO_POSE_INIT, away };
-    ebpo_clearance far = run_query(whole, poses, 0, -1, false),
-                   same = run_query(parts, poses, 0, -1, false);
+    ebpo_collide_distance_result far = run_query(whole, poses, 0, -1, false),
+                                 same = run_query(parts, poses, 0, -1, false);
     ck_assert_double_gt(far.distance.hi, 0);
     ck_assert(memcmp(&far, &same, sizeof far) == 0);
     ck_assert_uint_gt(evicted(part[0]) + evicted(part[1]), 0);

@@ -13,12 +13,12 @@
 #include "solids.h"
 
 typedef struct found {
-    ebpo_crossing *at;
+    ebpo_self_intersection *at;
     uint64_t count;
-    ebpo_crossings_summary sum;
+    ebpo_self_intersections_summary sum;
 } found;
 
-static bool take(void *user, const ebpo_crossing *crossings, uint64_t count)
+static bool take(void *user, const ebpo_self_intersection *crossings, uint64_t count)
 {
     found *f = user;
     f->at = realloc(f->at, (f->count + count) * sizeof *f->at);
@@ -30,7 +30,7 @@ static bool take(void *user, const ebpo_crossing *crossings, uint64_t count)
 
 static int by_faces(const void *x, const void *y)
 {
-    const ebpo_crossing *p = x, *q = y;
+    const ebpo_self_intersection *p = x, *q = y;
     int first = (p->face[0] > q->face[0]) - (p->face[0] < q->face[0]);
     return first ? first : (p->face[1] > q->face[1]) - (p->face[1] < q->face[1]);
 }
@@ -49,17 +49,17 @@ static ebpo_mesh copy_of(const ebpo_mesh *mesh)
 /* Finds all pairs. memory: 0 for no workspace. */
 static found look(const ebpo_mesh *mesh, unsigned threads, uint64_t memory)
 {
-    found out = { .sum = EBPO_CROSSINGS_SUMMARY_INIT };
+    found out = { .sum = EBPO_SELF_INTERSECTIONS_SUMMARY_INIT };
     ebpo_mesh own = copy_of(mesh);
     ebpo_mesh_report report;
-    ebpo_crossings_options how = EBPO_CROSSINGS_OPTIONS_INIT;
+    ebpo_self_intersections_options how = EBPO_SELF_INTERSECTIONS_OPTIONS_INIT;
     ebpo_workspace *workspace = NULL;
     how.threads = threads;
     if (memory)
         ASSERT_OK(ebpo_workspace_make_any(&workspace, memory, NULL, error));
     own.workspace = workspace;
     ASSERT_OK(ebpo_mesh_check(&own, 1, (ebpo_progress){ NULL, NULL }, &report, error));
-    ASSERT_OK(ebpo_mesh_crossings(&own, &report, &how, take, &out, &out.sum, error));
+    ASSERT_OK(ebpo_mesh_self_intersections(&own, &report, &how, take, &out, &out.sum, error));
     ck_assert_ptr_null(own.faces);
     ebpo_workspace_free(workspace);
     if (out.count)
@@ -223,7 +223,7 @@ START_TEST(test_crossings_of_coincident_faces)
 }
 END_TEST
 
-static bool take_one(void *user, const ebpo_crossing *crossings, uint64_t count)
+static bool take_one(void *user, const ebpo_self_intersection *crossings, uint64_t count)
 {
     (void)crossings;
     *(uint64_t *)user += count;
@@ -236,7 +236,7 @@ START_TEST(test_crossings_stop_on_request)
     ebpo_mesh_report report;
     uint64_t count = 0;
     ASSERT_OK(ebpo_mesh_check(&mesh, 1, (ebpo_progress){ NULL, NULL }, &report, error));
-    ASSERT_OK(ebpo_mesh_crossings(&mesh, &report, NULL, take_one, &count, NULL, error));
+    ASSERT_OK(ebpo_mesh_self_intersections(&mesh, &report, NULL, take_one, &count, NULL, error));
     ck_assert_uint_gt(count, 0);
 }
 END_TEST

@@ -225,9 +225,9 @@ static bool add_line(void *user, const ebpo_polyline *line)
 
 static ebpo_status sum_pairs(ebpo_collider *c, const ebpo_collide_options *o, uint64_t *sum)
 {
-    ebpo_clearance clearance;
+    ebpo_collide_distance_result clearance;
     ebpo_relation_result relation;
-    ebpo_certain depth[2] = { { 0 } };
+    ebpo_value_bounds depth[2] = { { 0 } };
     ebpo_face_pair pair;
     int32_t found;
     memset(&clearance, 0, sizeof clearance);
@@ -320,7 +320,7 @@ static void make_points(subject *s)
     }
 }
 
-/* Makes a model in parts; repeats while bytes are pending. `memory` 0: the smallest budget. */
+/* Makes a partly loaded model; repeats while bytes are pending. `memory` 0: the smallest budget. */
 static void make_model(subject *s, pending_source *p, uint64_t memory)
 {
     enum { CUT_LEVEL = 3 };

@@ -570,7 +570,7 @@ START_TEST(test_relation_is_open_after_deadline)
     ASSERT_OK(ebpo_collider_new(a.model, b.model, NULL, &c, error));
     options.deadline_ns = 1;
     ASSERT_OK(ebpo_collide_relation(c, &options, &out, error));
-    ck_assert_int_eq(out.relation, EBPO_RELATION_OPEN);
+    ck_assert_int_eq(out.relation, EBPO_RELATION_UNDECIDED);
     options.deadline_ns = 0;
     ASSERT_OK(ebpo_collide_relation(c, &options, &out, error));
     ck_assert_int_eq(out.relation, EBPO_TOUCHING);

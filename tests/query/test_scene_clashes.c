@@ -195,7 +195,7 @@ static void check_depths(alone *p, const ebpo_scene_clash *m)
 {
     bool inner = m->relation >= EBPO_INTERSECTING && m->relation < EBPO_EQUAL;
     for (int i = 0; i < 2; i++) {
-        ebpo_certain reference = { 0, p->solid[!i] ? 0 : INFINITY, EBPO_VALUE_BOUND, 0 };
+        ebpo_value_bounds reference = { 0, p->solid[!i] ? 0 : INFINITY, EBPO_VALUE_BOUND, 0 };
         if (inner && p->solid[!i])
             ASSERT_OK(ebpo_collide_depth(p->collider, &p->options, within, i ? NULL : &reference,
                                          i ? &reference : NULL, error));
@@ -212,7 +212,7 @@ static void check_pair(ebpo_scene *scene, uint64_t a, uint64_t b, const ebpo_sce
     alone p;
     seen s;
     ebpo_relation_result relation;
-    ebpo_clearance far;
+    ebpo_collide_distance_result far;
     make_alone(scene, a, b, &p);
     look(&p, &s);
     ASSERT_OK(ebpo_collide_relation(p.collider, &p.options, &relation, error));
@@ -300,7 +300,8 @@ START_TEST(test_scene_reports_only_requested_values)
             };
             alone p;
             ck_assert_int_eq(m.list[i].kind, l.list[i].kind);
-            ck_assert(isnan(m.list[i].location[0]) && m.list[i].relation == EBPO_RELATION_OPEN);
+            ck_assert(isnan(m.list[i].location[0]) &&
+                      m.list[i].relation == EBPO_RELATION_UNDECIDED);
             ck_assert(m.list[i].depth[0].hi == INFINITY && l.list[i].contacts == 0);
             make_alone(scene, l.list[i].a, l.list[i].b, &p);
             check_place(&p, &l.list[i], &nothing);

@@ -208,7 +208,7 @@ static double distance_at(ebpo_scene *scene, uint64_t a, uint64_t b, double time
 {
     ebpo_scene_instance at = EBPO_SCENE_INSTANCE_INIT;
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
-    ebpo_clearance found;
+    ebpo_collide_distance_result found;
     ebpo_collider *collider;
     ebpo_model *model[2];
     for (int i = 0; i < 2; i++) {

@@ -52,8 +52,8 @@ static ebpo_status query_two(ebpo_collider *collider, const ebpo_collide_options
     ebpo_collider_stats stats = EBPO_COLLIDER_STATS_INIT;
     const double up[3] = { 0, 0, 1 };
     ebpo_separation separation;
-    ebpo_clearance clearance;
-    ebpo_certain depth[2];
+    ebpo_collide_distance_result clearance;
+    ebpo_value_bounds depth[2];
     ebpo_relation_result relation;
     ebpo_level_result levels;
     int32_t found;
@@ -94,7 +94,7 @@ static bool take_segments(void *user, const ebpo_contact_segment *segments, uint
 /* Runs queries for partly loaded models. */
 static ebpo_status query_parts(ebpo_collider *c, const ebpo_collide_options *o, ebpo_error *error)
 {
-    ebpo_clearance clearance;
+    ebpo_collide_distance_result clearance;
     uint64_t segments = 0;
     ebpo_status status = ebpo_collide_distance(c, o, NULL, &clearance, error);
     return status == EBPO_OK ? ebpo_collide_contacts(c, o, take_segments, &segments, error)
@@ -222,8 +222,8 @@ static ebpo_status map_mesh(ebpo_model *model, ebpo_error *error)
     ebpo_mesh mesh = { .vertex_count = 3, .face_count = 1 };
     ebpo_map_options options = EBPO_MAP_OPTIONS_INIT;
     ebpo_map_stats stats = EBPO_MAP_STATS_INIT;
-    ebpo_map_range reach = EBPO_MAP_RANGE_INIT;
-    ebpo_map_range_options reaching = EBPO_MAP_RANGE_OPTIONS_INIT;
+    ebpo_map_hausdorff reach = EBPO_MAP_HAUSDORFF_INIT;
+    ebpo_map_hausdorff_options reaching = EBPO_MAP_HAUSDORFF_OPTIONS_INIT;
     options.threads = reaching.threads = 1;
     ebpo_status status = ebpo_map_points(model, xyz, 3, &options, away, error);
     if (status == EBPO_OK)
@@ -231,7 +231,7 @@ static ebpo_status map_mesh(ebpo_model *model, ebpo_error *error)
     mesh.xyz64 = xyz;
     mesh.faces = face;
     if (status == EBPO_OK)
-        status = ebpo_map_find_range(model, &mesh, away, &reaching, &reach, error);
+        status = ebpo_map_bound_hausdorff(model, &mesh, away, &reaching, &reach, error);
     mesh.xyz64 = NULL; /* painting adds data to the mesh */
     mesh.faces = NULL;
     if (status == EBPO_OK)
@@ -425,7 +425,7 @@ static ebpo_status call_haptic(every_call_env *e)
     return status;
 }
 
-static bool count_crossings(void *user, const ebpo_crossing *crossings, uint64_t count)
+static bool count_crossings(void *user, const ebpo_self_intersection *crossings, uint64_t count)
 {
     (void)crossings;
     *(uint64_t *)user += count;
@@ -437,8 +437,8 @@ static ebpo_status call_crossings(every_call_env *e)
 {
     ebpo_mesh mesh;
     ebpo_prepared prepared = EBPO_PREPARED_INIT;
-    ebpo_crossings_options options = EBPO_CROSSINGS_OPTIONS_INIT;
-    ebpo_crossings_summary sum = EBPO_CROSSINGS_SUMMARY_INIT;
+    ebpo_self_intersections_options options = EBPO_SELF_INTERSECTIONS_OPTIONS_INIT;
+    ebpo_self_intersections_summary sum = EBPO_SELF_INTERSECTIONS_SUMMARY_INIT;
     uint64_t count = 0;
     options.threads = 1;
     options.ply = scratch("red.ply");
@@ -446,8 +446,8 @@ static ebpo_status call_crossings(every_call_env *e)
     if (status == EBPO_OK)
         status = every_call_prepare(&mesh, &prepared, e->error);
     if (status == EBPO_OK)
-        status = ebpo_mesh_crossings(&mesh, &prepared.report, &options, count_crossings, &count,
-                                     &sum, e->error);
+        status = ebpo_mesh_self_intersections(&mesh, &prepared.report, &options, count_crossings,
+                                              &count, &sum, e->error);
     ebpo_mesh_free(&mesh);
     return status;
 }

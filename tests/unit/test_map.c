@@ -305,8 +305,8 @@ START_TEST(test_map_error_bounds_hold_between_vertices)
 {
     for (int which = 0; which < 2; which++) {
         ebpo_error error = EBPO_ERROR_INIT;
-        ebpo_map_range one = EBPO_MAP_RANGE_INIT, many = EBPO_MAP_RANGE_INIT;
-        ebpo_map_range_options options = EBPO_MAP_RANGE_OPTIONS_INIT;
+        ebpo_map_hausdorff one = EBPO_MAP_HAUSDORFF_INIT, many = EBPO_MAP_HAUSDORFF_INIT;
+        ebpo_map_hausdorff_options options = EBPO_MAP_HAUSDORFF_OPTIONS_INIT;
         const double turned[3][3] = { { 0.8, -0.6, 0 }, { 0.6, 0.8, 0 }, { 0, 0, 1 } },
                      moved[3] = { 0.01, 0.02, 0.03 };
         double away[2000];
@@ -318,9 +318,10 @@ START_TEST(test_map_error_bounds_hold_between_vertices)
         options.tolerance = 0.02;
         options.queries = 2000000;
         options.threads = 1;
-        model_must(ebpo_map_find_range(o.model, &m, away, &options, &one, &error), "reach", &error);
+        model_must(ebpo_map_bound_hausdorff(o.model, &m, away, &options, &one, &error), "reach",
+                   &error);
         options.threads = 4;
-        model_must(ebpo_map_find_range(o.model, &m, away, &options, &many, &error), "reach",
+        model_must(ebpo_map_bound_hausdorff(o.model, &m, away, &options, &many, &error), "reach",
                    &error);
         ck_assert_mem_eq(&one, &many, sizeof one);
         double sampled = reach_of_samples(o.model, &m, which ? 24 : 300);
@@ -329,13 +330,13 @@ START_TEST(test_map_error_bounds_hold_between_vertices)
         ck_assert_msg(one.hi <= one.lo * 1.0201, "%.9g to %.9g", one.lo, one.hi);
         ck_assert_uint_gt(one.queries, 0);
         options.queries = 1; /* too few queries: the bounds are wider, and still certain */
-        model_must(ebpo_map_find_range(o.model, &m, away, &options, &many, &error), "reach",
+        model_must(ebpo_map_bound_hausdorff(o.model, &m, away, &options, &many, &error), "reach",
                    &error);
         ck_assert(sampled <= many.hi && many.hi >= one.hi && many.lo <= one.lo);
         double widest = many.hi;
         /* the queries are used where the bounds are widest, and not more than these are made */
         options.queries = 300;
-        model_must(ebpo_map_find_range(o.model, &m, away, &options, &many, &error), "reach",
+        model_must(ebpo_map_bound_hausdorff(o.model, &m, away, &options, &many, &error), "reach",
                    &error);
         ck_assert(sampled <= many.hi && many.hi < widest && many.queries <= 303);
         ebpo_mesh_free(&m);

@@ -323,13 +323,13 @@ START_TEST(test_paint_points_are_checked_against_model)
     s.points = &far;
     ck_assert(ebpo_paint_add_stroke(o.paint, &s, NULL) == EBPO_OK);
     ck_assert(ebpo_paint_check_points(o.paint, o.context, NULL, &error) == EBPO_E_FORMAT);
-    ck_assert(strstr(error.message, "stroke 12 of the paint is not on its face") != NULL);
+    ck_assert(strstr(error.message, "a point of stroke 12 is not on its face") != NULL);
     ck_assert(ebpo_paint_remove_stroke(o.paint, 12, NULL) == EBPO_OK);
     n.at = q;
     n.at.face = 1 << 20; /* a face that does not exist */
     ck_assert(ebpo_paint_add_note(o.paint, &n, NULL) == EBPO_OK);
     ck_assert(ebpo_paint_check_points(o.paint, o.context, NULL, &error) == EBPO_E_FORMAT);
-    ck_assert(strstr(error.message, "note 3 of the paint is not on its face 1048576") != NULL);
+    ck_assert(strstr(error.message, "a point of note 3 is not on its face 1048576") != NULL);
     close_model(&o);
 }
 END_TEST
@@ -681,7 +681,7 @@ START_TEST(test_paint_baked_colours_keep_type)
     ck_assert(rgba != NULL);
     model_must(ebpo_paint_bake(o.paint, o.context, &mesh, NULL, rgba, &baked, &error), "baking",
                &error);
-    ck_assert(baked.vertices == 5 && baked.points == 1 && baked.between == 0);
+    ck_assert(baked.vertices == 5 && baked.points == 1 && baked.points_without_vertex == 0);
     for (uint64_t i = 0; i < mesh.vertex_count; i++) {
         const double *x = mesh.xyz64 + 3 * i;
         bool near = hypot(x[0] - 4, x[1] - 4) <= 1.1;

@@ -426,7 +426,7 @@ START_TEST(test_equal_seeds_give_equal_files)
         digest_of((ebpo_selection)s, 5, 3, NULL, b);
         digest_of((ebpo_selection)s, 6, 2, NULL, c);
         ck_assert_mem_eq(a, b, 32);
-        ck_assert(!memcmp(a, c, 32) == !ebpo_selection_describe((ebpo_selection)s)->takes_seed);
+        ck_assert(!memcmp(a, c, 32) == !ebpo_selection_describe((ebpo_selection)s)->uses_seed);
     }
 }
 END_TEST

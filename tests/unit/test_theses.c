@@ -250,7 +250,7 @@ START_TEST(test_levels_do_not_depend_on_threads)
         options.seed = 2;
         three = levels_of(ebpo_test_torus(2, 0.7, 120, 60), &options, EBPO_COALESCE_SUM);
         ck_assert(!memcmp(&one, &three, sizeof one) ==
-                  !ebpo_selection_describe((ebpo_selection)s)->takes_seed);
+                  !ebpo_selection_describe((ebpo_selection)s)->uses_seed);
     }
 }
 END_TEST

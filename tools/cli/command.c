@@ -108,10 +108,10 @@ int command_is_hdf5(const char *name, const char *path)
     size_t size = 0;
     ssize_t got = 1;
     if (ebpo_is_url(path))
-        return 1; /* opening it reports the error */
+        return 1; /* the caller opens it, and then reports an error */
     int fd = open_regular(name, path);
     if (fd < 0)
-        return errno == ENOENT ? 1 : -1; /* likewise */
+        return errno == ENOENT ? 1 : -1; /* 1: as for a URL */
     while (size < sizeof head && got != 0) {
         got = read(fd, head + size, sizeof head - size);
         if (got < 0 && errno != EINTR)
@@ -124,15 +124,15 @@ int command_is_hdf5(const char *name, const char *path)
     return got < 0 ? -1 : size == sizeof head && memcmp(head, signature, sizeof head) == 0;
 }
 
-bool command_wants_hdf5(const char *name, const char *path)
+bool command_requires_hdf5(const char *name, const char *path)
 {
     int is_hdf5 = command_is_hdf5(name, path);
     ebpo_file *file;
     ebpo_error error = EBPO_ERROR_INIT;
     if (is_hdf5 != 0)
         return is_hdf5 > 0;
-    bool success = ebpo_open(path, &file, &error) == EBPO_OK; /* otherwise the library reports the
-                                                               * kind of file */
+    /* not HDF5: opening fails, and the message of the library names the kind of file */
+    bool success = ebpo_open(path, &file, &error) == EBPO_OK;
     if (!success)
         fprintf(stderr, "ebpo %s: %s\n", name, error.message);
     ebpo_close(file);

@@ -44,7 +44,7 @@ int command_is_hdf5(const char *name, const char *path);
 
 /* Returns false, with a report on stderr (exit with EXIT_FAILED), when the file cannot be read or
  * is not HDF5. */
-bool command_wants_hdf5(const char *name, const char *path);
+bool command_requires_hdf5(const char *name, const char *path);
 
 /* Returns false, with a report on stderr (exit with EXIT_USAGE), when the file has no such level.
  * Negative: none was given. */

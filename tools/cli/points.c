@@ -101,7 +101,7 @@ static const char *last_line_end(const char *text, size_t bytes)
 #endif
 }
 
-/* Takes all complete lines; the last line may lack its line end. */
+/* Parses all complete lines; the last line may lack its line end. */
 static void take_lines(points *p, points_block *b)
 {
     size_t whole = 0, scanned = 0;
@@ -140,7 +140,7 @@ static void check_rows(points *p, points_block *b, uint64_t more)
                      p->rows_taken > p->rows_total ? "something else" : "cut short");
 }
 
-/* Takes all complete rows. */
+/* Parses all complete rows. */
 static void take_numbers(points *p, points_block *b)
 {
     size_t each = (size_t)(p->layout.per_row * p->layout.bytes), most = p->rows_per_block * each;

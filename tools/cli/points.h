@@ -20,7 +20,7 @@ void points_close(points *p);
 /* Reads the first bytes, and may wait for them. Returns true while there is no error; errors are
  * reported on stderr. points_take calls this itself. */
 bool points_begin(points *p);
-/* Takes the next bytes: all that are available without waiting, but at least one row. Returns false
+/* Reads the next bytes: all that are available without waiting, but at least one row. Returns false
  * at the end and after a fatal error. Initialize blocks with zeros. Only one thread at a time may
  * call this. */
 bool points_take(points *p, points_block *block);
@@ -28,7 +28,7 @@ bool points_take(points *p, points_block *block);
  * any, on stderr. Call in the order in which blocks were taken. Returns false after an error. */
 bool points_finish_block(points *p, points_block *block);
 
-/* Takes, parses and finishes blocks on one thread: fills rows[POINTS_BATCH][points_width]. Returns
+/* Reads, parses and finishes blocks on one thread: fills rows[POINTS_BATCH][points_width]. Returns
  * the number of rows; 0 at the end or after an error. */
 uint64_t points_next(points *p, double *rows);
 

@@ -82,7 +82,7 @@ static uint64_t next_line(points *p, uint64_t begin, uint64_t at, uint64_t size)
     return size;
 }
 
-/* Takes the names of columns, which all parts need; the parts share the lines after the names.
+/* Reads the names of columns, which all parts need; the parts share the lines after the names.
  * `begin`: offset of the first line; *out: offset of the first line after the names. */
 static bool take_names(points *p, uint64_t begin, uint64_t *out)
 {

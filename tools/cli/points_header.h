@@ -4,7 +4,7 @@
 
 #include "cli/points_input.h"
 
-/* Takes the line of names if it is in the block; the block then begins after this line, and the
+/* Reads the line of names if it is in the block; the block then begins after this line, and the
  * names are in `p`. On false the block holds the error. */
 bool points_take_header(points *p, points_block *b);
 /* Splits a line that ends at `end` with a zero byte into fields, without surrounding blanks and

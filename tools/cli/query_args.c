@@ -131,7 +131,7 @@ int query_open_file(query_session *s, const char *name, const char *path,
                     const ebpo_model_options *options, int level, const remote_values *remote)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    if (!command_wants_hdf5(name, path))
+    if (!command_requires_hdf5(name, path))
         return EXIT_FAILED;
     if (remote_open(&s->file, path, remote, &error) != EBPO_OK)
         return command_failed(name, &error);

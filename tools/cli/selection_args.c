@@ -36,8 +36,8 @@ typedef bool (*trait_fn)(const ebpo_selection_traits *traits);
 
 static bool from_leaves(const ebpo_selection_traits *t) { return t->from_leaves; }
 static bool from_root(const ebpo_selection_traits *t) { return !t->from_leaves; }
-static bool takes_normals(const ebpo_selection_traits *t) { return t->takes_normals; }
-static bool takes_seed(const ebpo_selection_traits *t) { return t->takes_seed; }
+static bool uses_normal_distance(const ebpo_selection_traits *t) { return t->uses_normal_distance; }
+static bool uses_seed(const ebpo_selection_traits *t) { return t->uses_seed; }
 
 /* Returns the selections with a trait as bits, and writes their names, "kmedoids, offset or
  * random", to `names`. */
@@ -77,9 +77,9 @@ int selection_check(const char *name, const selection_options *o)
     if (code == EXIT_OK)
         code = check_effect(name, o, o->epsilon >= 0, "--epsilon is", from_root);
     if (code == EXIT_OK)
-        code = check_effect(name, o, o->normals >= 0, "--normals is", takes_normals);
+        code = check_effect(name, o, o->normals >= 0, "--normals is", uses_normal_distance);
     if (code == EXIT_OK)
-        code = check_effect(name, o, o->seed >= 0, "--seed is", takes_seed);
+        code = check_effect(name, o, o->seed >= 0, "--seed is", uses_seed);
     if (code != EXIT_OK)
         return code;
     if (o->percent >= 0 && o->k_root)

@@ -11,11 +11,11 @@
 #include "cli/command.h"
 #include "cli/signals.h"
 
-enum { PATH_MAX = 4096, PIECE = 1 << 16 };
+enum { PATH_MAX = 4096, BUFFER_BYTES = 1 << 16 };
 
 /* Names of temporary files, which a signal handler also reads; "": the file does not exist. */
 static char folder[PATH_MAX], input[PATH_MAX], output[PATH_MAX];
-static int printed_to = -1; /* copy of standard output while it is redirected */
+static int saved_stdout = -1; /* copy of standard output while it is redirected */
 
 /* Occupies closed descriptors 0 to 2. An opened file gets the lowest free descriptor, so it could
  * otherwise get one of these, and prints would go into the file. The files put there can neither be
@@ -44,23 +44,25 @@ static void clean_up(void)
         rmdir(folder);
 }
 
-static int fail_stream(const char *command, const char *what)
+/* Reports why something failed, from errno, and what to do (NULL: nothing). */
+static int fail_stream(const char *command, const char *what, const char *remedy)
 {
-    fprintf(stderr, "ebpo %s: %s: %s\n", command, what, strerror(errno));
+    fprintf(stderr, "ebpo %s: %s: %s%s%s\n", command, what, strerror(errno), remedy ? "; " : "",
+            remedy ? remedy : "");
     return EXIT_FAILED;
 }
 
 static bool copy_stream(int from, int to)
 {
-    static char piece[PIECE];
+    static char buffer[BUFFER_BYTES];
     for (;;) {
-        ssize_t got = read(from, piece, sizeof piece);
+        ssize_t got = read(from, buffer, sizeof buffer);
         if (got == 0)
             return true;
         if (got < 0 && errno == EINTR)
             continue;
         for (ssize_t at = 0, put; got < 0 || at < got; at += put) {
-            put = got < 0 ? -1 : write(to, piece + at, (size_t)(got - at));
+            put = got < 0 ? -1 : write(to, buffer + at, (size_t)(got - at));
             if (put < 0 && (got < 0 || errno != EINTR))
                 return false;
             put = put < 0 ? 0 : put;
@@ -77,13 +79,14 @@ static int make_folder(const char *command)
     int length =
         snprintf(made, sizeof made, "%s/ebpo-XXXXXX", where && *where ? where : "/var/tmp");
     if (length >= (int)sizeof made || !mkdtemp(made))
-        return fail_stream(command, "no temporary folder; set TMPDIR to a writable folder");
+        return fail_stream(command, "cannot create a temporary folder",
+                           "set TMPDIR to a writable folder");
     snprintf(folder, sizeof folder, "%s", made);
     signals_scratch(clean_up);
     return EXIT_OK;
 }
 
-static int take_input(const char *command, const char **operand)
+static int copy_input(const char *command, const char **operand)
 {
     if (*input)
         return command_usage(command, "standard input can be read only once");
@@ -92,14 +95,15 @@ static int take_input(const char *command, const char **operand)
         return code;
     snprintf(input, sizeof input, "%.*s/standard-input", PATH_MAX - 32, folder);
     int to = open(input, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
-    bool fine = to >= 0 && copy_stream(STDIN_FILENO, to);
+    bool success = to >= 0 && copy_stream(STDIN_FILENO, to);
     if (to >= 0 && close(to) != 0)
-        fine = false;
+        success = false;
     *operand = input;
-    return fine ? EXIT_OK : fail_stream(command, "standard input, copied to a temporary file");
+    return success ? EXIT_OK
+                   : fail_stream(command, "cannot copy standard input to a temporary file", NULL);
 }
 
-static int take_output(const char *command, const char **operand)
+static int redirect_output(const char *command, const char **operand)
 {
     if (isatty(STDOUT_FILENO))
         return command_usage(command, "standard output is a terminal; give a file name");
@@ -108,14 +112,15 @@ static int take_output(const char *command, const char **operand)
         return code;
     snprintf(output, sizeof output, "%.*s/standard-output", PATH_MAX - 32, folder);
     fflush(stdout);
-    printed_to = fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3);
-    if (printed_to < 0 || dup2(STDERR_FILENO, STDOUT_FILENO) < 0)
-        return fail_stream(command, "standard output");
+    saved_stdout = fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3);
+    if (saved_stdout < 0 || dup2(STDERR_FILENO, STDOUT_FILENO) < 0)
+        return fail_stream(command, "standard output", NULL);
     *operand = output;
     return EXIT_OK;
 }
 
-/* A pipe with a name, such as /dev/stdin or <(...) of a shell, can be read only once. */
+/* Returns true for a pipe with a name, such as /dev/stdin or <(...) of a shell: it can be read only
+ * once. */
 static bool is_pipe(const char *path)
 {
     struct stat st;
@@ -126,19 +131,20 @@ int standard_files_begin(const arg_spec *spec, const char *operand[ARGS_OPERANDS
 {
     int code = EXIT_OK;
     for (int i = 0; i < ARGS_OPERANDS_MAX && operand[i] && code == EXIT_OK; i++) {
-        char how = args_dash(spec, i);
+        char how = args_dash(spec, i); /* "-" means: 'i' standard input, 'o' standard output */
         if ((how == 'i' || how == 'o') && is_pipe(operand[i])) {
-            fprintf(stderr, "ebpo %s: %s: is a pipe or device; give '-' in its place, and %s\n",
+            fprintf(stderr, "ebpo %s: %s: is a pipe or device; give '-' instead, and %s\n",
                     spec->command, operand[i],
-                    how == 'i' ? "the mesh on standard input" : "take standard output");
+                    how == 'i' ? "redirect the mesh to standard input"
+                               : "redirect standard output");
             code = EXIT_FAILED;
         }
         if (strcmp(operand[i], "-") != 0)
             continue;
         if (how == 'i')
-            code = take_input(spec->command, &operand[i]);
+            code = copy_input(spec->command, &operand[i]);
         else if (how == 'o')
-            code = take_output(spec->command, &operand[i]);
+            code = redirect_output(spec->command, &operand[i]);
     }
     if (code != EXIT_OK)
         clean_up();
@@ -152,15 +158,15 @@ const char *standard_files_shown(const char *path)
 
 int standard_files_end(const arg_spec *spec, int code)
 {
-    if (printed_to >= 0) {
+    if (saved_stdout >= 0) {
         fflush(stdout);
         int from = code == EXIT_OK ? open(output, O_RDONLY | O_CLOEXEC) : -1;
-        if (code == EXIT_OK && (from < 0 || !copy_stream(from, printed_to)))
-            code = fail_stream(spec->command, "standard output");
+        if (code == EXIT_OK && (from < 0 || !copy_stream(from, saved_stdout)))
+            code = fail_stream(spec->command, "standard output", NULL);
         if (from >= 0)
             close(from);
-        dup2(printed_to, STDOUT_FILENO);
-        close(printed_to);
+        dup2(saved_stdout, STDOUT_FILENO);
+        close(saved_stdout);
     }
     clean_up();
     return code;

@@ -277,7 +277,7 @@ static int open_unnamed(int folder)
     return -1;
 }
 
-/* Gives the complete file its name, so that the name never refers to an incomplete image. */
+/* Renames the complete file, so that the name never refers to an incomplete image. */
 static bool link_file(int fd, int folder, const char *name)
 {
     char path[64];

@@ -1,4 +1,4 @@
-/* Boolean expressions over solids at poses: union, intersection, difference and symmetric
+/* Evaluates Boolean expressions over solids at poses: union, intersection, difference and symmetric
  * difference, evaluated at points of the world.
  *
  * An expression is a list of nodes, each of which refers to earlier nodes or to operands. The state

@@ -35,12 +35,15 @@ struct ebpo_boolean_cells {
     uint64_t stages[EBPO_CUBE_STAGES];
 };
 
-enum { PARENTS = 1 << 14, GRAIN = 64 };
+enum {
+    PARENTS = 1 << 14, /* parents whose children are classified together */
+    GRAIN = 64         /* candidates in one task */
+};
 
 /* A cell to classify. */
 typedef struct candidate {
     ebpo_world_cell cell;
-    unsigned may;
+    unsigned may; /* possible states of the result in the cell (world_cell.h) */
     uint8_t stages[EBPO_CUBE_STAGES];
 } candidate;
 
@@ -83,8 +86,7 @@ static ebpo_status keep_mixed(walk *w, const ebpo_world_cell *c, ebpo_error *err
     uint64_t most = w->options.most ? w->options.most : UINT64_C(1) << 25;
     if (w->next_count + cells->mixed_count >= most)
         return ebpo_fail(error, EBPO_E_LIMIT,
-                         "more than %" PRIu64
-                         " cells of level %d are mixed; give a lower level, or allow more",
+                         "more than %" PRIu64 " cells of level %d are mixed; give a lower level",
                          most, w->level);
     if (w->level == cells->world.level) {
         if (!ebpo_grow(&cells->mixed, &cells->mixed_capacity, cells->mixed_count + 1,
@@ -118,6 +120,7 @@ static ebpo_status query_and_keep(walk *w, uint64_t count, ebpo_error *error)
 static ebpo_status next_level(walk *w, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
+    /* progress in 65,536ths of a level */
     uint64_t total = (uint64_t)w->cells->world.level << 16;
     for (uint64_t at = 0; at < w->parent_count && status == EBPO_OK; at += PARENTS) {
         uint64_t count = w->parent_count - at < PARENTS ? w->parent_count - at : PARENTS;
@@ -179,8 +182,8 @@ ebpo_status ebpo_boolean_cells_new(ebpo_boolean *boolean, const ebpo_cells_optio
     if (status != EBPO_OK)
         return status;
     if (w.options.level < 0 || w.options.level > EBPO_BOOLEAN_LEVEL_MAX)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "level %d of cells; give 0 to %d", w.options.level,
-                         EBPO_BOOLEAN_LEVEL_MAX);
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "level %d of cells is out of range; give 0 to %d",
+                         w.options.level, EBPO_BOOLEAN_LEVEL_MAX);
     w.cells = ebpo_alloc_zero(1, sizeof *w.cells);
     if (!w.cells)
         return ebpo_fail_memory(error, sizeof *w.cells);
@@ -229,7 +232,7 @@ ebpo_status ebpo_boolean_cells_volume(const ebpo_boolean_cells *cells, ebpo_bool
                               .by_box = cells->stages[EBPO_CUBE_BY_BOX],
                               .by_nodes = cells->stages[EBPO_CUBE_BY_NODES],
                               .by_faces = cells->stages[EBPO_CUBE_BY_FACES] };
-    v.kind = ebpo_certain_of(v.lo, v.hi).kind;
+    v.kind = ebpo_value_bounds_of(v.lo, v.hi).kind;
     return EBPO_GIVE(ebpo_boolean_volume, out, &v);
 }
 
@@ -277,7 +280,8 @@ static corner corner_at(const uint32_t at[3])
     return (uint64_t)at[2] << 42 | (uint64_t)at[1] << 21 | at[0];
 }
 
-/* Adds a square, a side of a cell. from_outside: its front is outside the cell, else inside. */
+/* Adds a square, a side of a cell. from_outside: the square's normal points out of the cell; else
+ * into it. */
 static ebpo_status add_square(squares *s, ebpo_cell cell, int axis, bool upper, bool from_outside,
                               ebpo_error *error)
 {

@@ -1,5 +1,5 @@
-/* Points and planes in integers of any size. Every new point is where a line through two points
- * intersects a plane, so coordinates stay fractions of integers with one denominator.
+/* Computes points and planes in integers of any size. Every new point is where a line through two
+ * points intersects a plane, so coordinates stay fractions of integers with one denominator.
  *
  * Each point also has its coordinates rounded to the nearest double. Rounding keeps the order, so
  * different rounded coordinates decide comparisons, and equal points have equal rounded

@@ -182,7 +182,7 @@ static void bound_by_box(measuring *m)
         if (most == 0)
             break;
     }
-    m->out->volume = ebpo_certain_of(0, most);
+    m->out->volume = ebpo_value_bounds_of(0, most);
 }
 
 static void note_doubt(measuring *m, ebpo_volume_doubt why, uint32_t i, uint32_t k)
@@ -476,7 +476,7 @@ static ebpo_status add_operands(measuring *m, ebpo_error *error)
     int64_t exponent;
     volume = volume_sum_value(&m->sum[0], &scaled, &exponent);
     if (status == EBPO_OK && !m->out->doubt) {
-        m->out->volume = ebpo_certain_of(volume, volume);
+        m->out->volume = ebpo_value_bounds_of(volume, volume);
         m->out->scaled = scaled;
         m->out->exponent = exponent;
     }

@@ -1,8 +1,9 @@
 /* Divides segments of a plane where they intersect.
  *
  * Segments are sorted by their least coordinate; pairs with overlapping boxes are compared by exact
- * turns. Each segment notes the points inside it: ends of others, and points where it crosses
- * others. Sorted along the segment, they divide it. Rounding keeps the order of coordinates, so
+ * orientation tests of three points (turns). For each segment, the points in its interior are
+ * recorded: ends of other segments, and points where other segments cross it. Sorted along the
+ * segment, they divide it. Rounding keeps the order of coordinates, so
  * boxes of rounded coordinates overlap where the segments do. */
 #include "core/strict_fp.h"
 
@@ -73,7 +74,7 @@ static int turn_of(const ebpo_arrangement_2d *a, uint32_t p, uint32_t q, uint32_
     return ebpo_exact_turn(a->axis, &point[p], &point[q], &point[r]);
 }
 
-static bool note_point(ebpo_arrangement_2d *a, uint64_t segment, uint32_t point)
+static bool record_point(ebpo_arrangement_2d *a, uint64_t segment, uint32_t point)
 {
     if (!ebpo_grow(&a->on, &a->on_capacity, a->on_count + 1, sizeof *a->on))
         return false;
@@ -81,15 +82,15 @@ static bool note_point(ebpo_arrangement_2d *a, uint64_t segment, uint32_t point)
     return true;
 }
 
-/* Notes a point on the segment's line if the point is inside the segment. */
-static bool note_if_inside(ebpo_arrangement_2d *a, uint64_t segment, uint32_t p)
+/* Records a point on the segment's line if it is in the interior of the segment. */
+static bool record_if_inside(ebpo_arrangement_2d *a, uint64_t segment, uint32_t p)
 {
     const ebpo_plane_segment *s = &a->segment[segment];
     const ebpo_exact_point *point = a->set.point;
     if (p == s->from || p == s->to || s->from == s->to)
         return true;
     int first = ebpo_exact_order(&point[s->from], &point[p]);
-    return first != ebpo_exact_order(&point[p], &point[s->to]) || note_point(a, segment, p);
+    return first != ebpo_exact_order(&point[p], &point[s->to]) || record_point(a, segment, p);
 }
 
 static bool cross_segments(ebpo_arrangement_2d *a, uint64_t i, uint64_t j)
@@ -99,8 +100,8 @@ static bool cross_segments(ebpo_arrangement_2d *a, uint64_t i, uint64_t j)
     uint32_t number;
     ebpo_exact_plane_along(&a->line, a->axis, &point[t->from], &point[t->to]);
     ebpo_exact_meet(&a->meeting, &a->line, &point[s->from], &point[s->to], a->unit);
-    return ebpo_point_set_add(&a->set, &a->meeting, &number) && note_point(a, i, number) &&
-           note_point(a, j, number);
+    return ebpo_point_set_add(&a->set, &a->meeting, &number) && record_point(a, i, number) &&
+           record_point(a, j, number);
 }
 
 static bool compare_segments(ebpo_arrangement_2d *a, uint64_t i, uint64_t j)
@@ -116,10 +117,10 @@ static bool compare_segments(ebpo_arrangement_2d *a, uint64_t i, uint64_t j)
         return true;
     if (from_t * to_t < 0 && from_s * to_s < 0)
         return cross_segments(a, i, j);
-    return (from_t != 0 || note_if_inside(a, i, t.from)) &&
-           (to_t != 0 || note_if_inside(a, i, t.to)) &&
-           (from_s != 0 || note_if_inside(a, j, s.from)) &&
-           (to_s != 0 || note_if_inside(a, j, s.to));
+    return (from_t != 0 || record_if_inside(a, i, t.from)) &&
+           (to_t != 0 || record_if_inside(a, i, t.to)) &&
+           (from_s != 0 || record_if_inside(a, j, s.from)) &&
+           (to_s != 0 || record_if_inside(a, j, s.to));
 }
 
 static bool compare_all(ebpo_arrangement_2d *a)
@@ -160,7 +161,7 @@ bool ebpo_arrangement_2d_divide(ebpo_arrangement_2d *a)
     if (a->segments > UINT32_MAX || !compare_all(a))
         return false;
     for (uint64_t i = 0; i < a->segments; i++)
-        if (!note_point(a, i, a->segment[i].from) || !note_point(a, i, a->segment[i].to))
+        if (!record_point(a, i, a->segment[i].from) || !record_point(a, i, a->segment[i].to))
             return false;
     ebpo_sort_with(a->on, a->on_count, sizeof *a->on, order_noted, a);
     for (uint64_t i = 0; i + 1 < a->on_count; i++)

@@ -5,7 +5,8 @@
  *
  * All decisions are exact: points are fractions, and posed coordinates are the doubles that
  * geometry/pose.h defines. Only the faces near a point are looked up in the models' hierarchies, so
- * a model may be loaded in parts. Proofs: docs/develop/collision.md, "Relation of two models". */
+ * a model may be loaded subtree by subtree. Proofs: docs/develop/collision.md, "Relation of two
+ * models". */
 #include "core/strict_fp.h"
 
 #include "extras/collide/around_face.h"
@@ -212,7 +213,7 @@ typedef struct faces_at {
     bool no_memory;
 } faces_at;
 
-static bool note_faces(void *user, const ebpo_triangles *triangles)
+static bool record_faces(void *user, const ebpo_triangles *triangles)
 {
     faces_at *n = user;
     n->no_memory = !ebpo_grow(&n->face, &n->capacity, n->count + triangles->count, sizeof *n->face);
@@ -231,7 +232,7 @@ static ebpo_status find_faces(ebpo_two_models *two, int m, const mpq_t x[3], fac
         corner[1][k] = nextafter(mpq_get_d(x[k]), INFINITY);
     }
     ebpo_unpose_box(&two->model[m], corner[0], corner[1], low, high);
-    ebpo_status status = ebpo_triangles_in_box(two->context[m], low, high, note_faces, n, error);
+    ebpo_status status = ebpo_triangles_in_box(two->context[m], low, high, record_faces, n, error);
     if (status == EBPO_OK && n->no_memory)
         status = ebpo_fail_memory(error, n->count * sizeof *n->face);
     return status;
@@ -244,7 +245,7 @@ typedef struct face_query {
     bool on; /* a face with an area contains the point */
 } face_query;
 
-static bool note_side(void *user, const ebpo_around *around)
+static bool record_side(void *user, const ebpo_around *around)
 {
     face_query *a = user;
     a->in = around->in[a->m] != 0;
@@ -268,7 +269,7 @@ static ebpo_status query_face(face_query *a, uint64_t face, const mpq_t x[3], eb
     a->in = !two->solid[a->m];
     if (!a->in)
         status = cut_face(two, &two->others, a->m, face, (const double(*)[3])t, error);
-    piece_visit l = { two, &two->others, a->m, note_side, a, true };
+    piece_visit l = { two, &two->others, a->m, record_side, a, true };
     return status == EBPO_OK && !a->in ? visit_pieces(&l, &two->others, error) : status;
 }
 

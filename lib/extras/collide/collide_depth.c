@@ -252,7 +252,7 @@ static bool is_search_done(const depth_search *s)
     return s->count == 0 || !(s->part[0].most > s->lo + s->tolerance);
 }
 
-/* Takes the part that may be deepest from the heap, and divides it. */
+/* Removes the part that may be deepest from the heap, and divides it. */
 static ebpo_status divide_next(depth_search *s, ebpo_error *error)
 {
     depth_part part = heap_take(s->part, s->count--);
@@ -469,8 +469,8 @@ static ebpo_status run_depth_search(depth_search *s, ebpo_error *error)
 
 /* Computes how deep the surface of one model is in the other model, which is the caller's A (solid:
  * 0) or B (solid: 1). */
-static ebpo_status depth_in(const ebpo_collision *q, int solid, double tolerance, ebpo_certain *out,
-                            ebpo_error *error)
+static ebpo_status depth_in(const ebpo_collision *q, int solid, double tolerance,
+                            ebpo_value_bounds *out, ebpo_error *error)
 {
     ebpo_collider *c = q->collider;
     ebpo_posed_solid posed;
@@ -490,7 +490,7 @@ static ebpo_status depth_in(const ebpo_collision *q, int solid, double tolerance
                        .progress = &q->options.progress };
     status = run_depth_search(&s, error);
     if (status == EBPO_OK)
-        *out = ebpo_certain_of(s.lo, s.hi);
+        *out = ebpo_value_bounds_of(s.lo, s.hi);
     return status;
 }
 
@@ -512,8 +512,8 @@ static uint64_t subtree_loads(const ebpo_collider *c)
 }
 
 ebpo_status ebpo_collide_depth(ebpo_collider *c, const ebpo_collide_options *options,
-                               double tolerance, ebpo_certain *a_in_b, ebpo_certain *b_in_a,
-                               ebpo_error *error)
+                               double tolerance, ebpo_value_bounds *a_in_b,
+                               ebpo_value_bounds *b_in_a, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     ebpo_collision q;

@@ -6,10 +6,10 @@
  * several pairs at the same distance, the first in file order is returned, so the result is the
  * same with every processor and number of threads.
  *
- * Models in parts are searched in pairs of subtrees, in the order of the gaps of their envelopes. A
- * subtree
- * is loaded only if its envelope is nearer than the best pair so far. A collider keeps its last
- * pair, from which the next search begins. Bounds: docs/develop/collision.md. */
+ * Partly loaded models are searched in pairs of subtrees, in the order of the gaps of their
+ * envelopes. A subtree is loaded only if its envelope is nearer than the best pair so far. A
+ * collider keeps its last pair, from which the next search begins. Bounds:
+ * docs/develop/collision.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -128,7 +128,7 @@ static bool compare_with_at_least(nearest_pair *n, const ebpo_face_two *f)
 /* Considers a pair in a search with a tolerance: keeps only the least bounds. If the gap is tiny
  * compared with the faces, its direction is inaccurate in doubles and the bounds are wider than the
  * tolerance; then they are computed from the exact distance. */
-static void take_within_tolerance(nearest_pair *n, const ebpo_face_two *given)
+static void compare_within_tolerance(nearest_pair *n, const ebpo_face_two *given)
 {
     ebpo_face_two f = *given;
     double hi = n->found ? fmin(f.bounds.hi, n->best.bounds.hi) : f.bounds.hi;
@@ -155,7 +155,7 @@ static bool consider_faces(nearest_pair *n, const ebpo_face_two *f)
     if (!isnan(n->at_least))
         return compare_with_at_least(n, f);
     if (n->tolerance > 0)
-        take_within_tolerance(n, f);
+        compare_within_tolerance(n, f);
     else if (!n->found || is_nearer(f, &n->best)) {
         n->best = *f;
         n->found = true;
@@ -360,7 +360,7 @@ typedef struct node_search {
     double hi; /* upper bound of the distance, from the cells */
 } node_search;
 
-/* --- two accels --- */
+/* --- two accels (acceleration structures of subtrees) --- */
 
 /* Continues the search in two more hierarchies of the query's models. `may_intersect`: first search
  * for a contact, because lower bounds exclude few pairs where models intersect. */
@@ -474,7 +474,7 @@ static ebpo_status distance_of_parts(const ebpo_collision *q, nearest_pair *n, e
 
 /* --- the query --- */
 
-static ebpo_status check_options(const ebpo_clearance_options *o, ebpo_error *error)
+static ebpo_status check_options(const ebpo_collide_distance_options *o, ebpo_error *error)
 {
     if (!(o->tolerance >= 0 && o->tolerance < INFINITY) || isnan(o->at_least))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
@@ -494,7 +494,8 @@ static void set_common_point(const ebpo_face_two *f, ebpo_pair_kind kind, double
         point[0][k] = point[1][k] = end[0].point[k];
 }
 
-static void report_pair(const ebpo_collision *q, const nearest_pair *n, ebpo_clearance *out)
+static void report_pair(const ebpo_collision *q, const nearest_pair *n,
+                        ebpo_collide_distance_result *out)
 {
     const ebpo_face_two *f = &n->best;
     int a = q->turned, b = !q->turned;
@@ -576,16 +577,16 @@ static ebpo_status search_nearest(const ebpo_collision *q, bool warm, nearest_pa
 }
 
 ebpo_status ebpo_collide_distance(ebpo_collider *c, const ebpo_collide_options *options,
-                                  const ebpo_clearance_options *clearance, ebpo_clearance *out,
-                                  ebpo_error *error)
+                                  const ebpo_collide_distance_options *clearance,
+                                  ebpo_collide_distance_result *out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     ebpo_collision q;
-    ebpo_clearance_options wanted = EBPO_CLEARANCE_OPTIONS_INIT;
-    *out = (ebpo_clearance){ .at_least = -1,
-                             .pair = { EBPO_NO_FACE, EBPO_NO_FACE, EBPO_NO_FACE, EBPO_NO_FACE,
-                                       EBPO_PAIR_APART, 0 } };
-    ebpo_status status = EBPO_TAKE(ebpo_clearance_options, &wanted, clearance, error);
+    ebpo_collide_distance_options wanted = EBPO_COLLIDE_DISTANCE_OPTIONS_INIT;
+    *out = (ebpo_collide_distance_result){ .at_least = -1,
+                                           .pair = { EBPO_NO_FACE, EBPO_NO_FACE, EBPO_NO_FACE,
+                                                     EBPO_NO_FACE, EBPO_PAIR_APART, 0 } };
+    ebpo_status status = EBPO_TAKE(ebpo_collide_distance_options, &wanted, clearance, error);
     if (status == EBPO_OK)
         status = check_options(&wanted, error);
     if (status == EBPO_OK)
@@ -593,7 +594,7 @@ ebpo_status ebpo_collide_distance(ebpo_collider *c, const ebpo_collide_options *
     if (status != EBPO_OK)
         return status;
     if (!has_faces(q.model[0]) || !has_faces(q.model[1])) {
-        out->distance = ebpo_certain_of(INFINITY, INFINITY);
+        out->distance = ebpo_value_bounds_of(INFINITY, INFINITY);
         out->at_least = wanted.at_least < 0 ? -1 : 1;
         return EBPO_OK;
     }
@@ -606,7 +607,7 @@ ebpo_status ebpo_collide_distance(ebpo_collider *c, const ebpo_collide_options *
     if (status != EBPO_OK)
         return status;
     nearest_pair_end(&n);
-    out->distance = ebpo_certain_of(n.lo, n.hi);
+    out->distance = ebpo_value_bounds_of(n.lo, n.hi);
     out->at_least = n.is_at_least;
     if (!n.found)
         return EBPO_OK;

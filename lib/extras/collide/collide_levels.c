@@ -20,10 +20,10 @@ typedef struct level_search {
     const ebpo_collision *collision;
     ebpo_node_gaps nodes;
     /* Output: */
-    double lo, hi;       /* bounds of the distance of faces */
-    uint64_t open_pairs; /* pairs whose faces may intersect */
-    bool intersects;     /* the solids or faces certainly have a common point */
-    bool may_intersect;  /* an undecided pair may have a common point */
+    double lo, hi;            /* bounds of the distance of faces */
+    uint64_t undecided_pairs; /* pairs whose faces may intersect */
+    bool intersects;          /* the solids or faces certainly have a common point */
+    bool may_intersect;       /* an undecided pair may have a common point */
 } level_search;
 
 static const char stage[] = "pairs of nodes";
@@ -155,7 +155,7 @@ static void finish_pair(level_search *g, const ebpo_node_gap *pair)
     if (pair->gap > 0)
         return;
     g->may_intersect = true;
-    g->open_pairs += faces;
+    g->undecided_pairs += faces;
 }
 
 static ebpo_status divide_pair(level_search *g, const ebpo_node_gap *pair, ebpo_error *error)
@@ -244,10 +244,10 @@ static void fill_result(const ebpo_collision *q, const level_search *g, ebpo_lev
     int32_t value_kind = isinf(lo)                 ? EBPO_VALUE_EXACT
                          : lo == 0 || isinf(g->hi) ? EBPO_VALUE_BOUND
                                                    : EBPO_VALUE_INTERVAL;
-    out->distance = (ebpo_certain){ lo, g->hi, value_kind, 0 };
+    out->distance = (ebpo_value_bounds){ lo, g->hi, value_kind, 0 };
     out->common = g->intersects ? 1 : g->may_intersect ? -1 : 0;
-    out->contact = g->open_pairs ? -1 : 0;
-    out->open_pairs = g->open_pairs;
+    out->contact = g->undecided_pairs ? -1 : 0;
+    out->undecided_pairs = g->undecided_pairs;
     out->level_a = last_level(q->model[q->turned], q->options.level);
     out->level_b = last_level(q->model[!q->turned], q->options.level);
 }
@@ -257,7 +257,7 @@ ebpo_status ebpo_collide_levels(ebpo_collider *c, const ebpo_collide_options *op
 {
     EBPO_DEFAULT_FP;
     ebpo_collision q;
-    level_search g = { .open_pairs = 0 };
+    level_search g = { .undecided_pairs = 0 };
     *out = (ebpo_level_result){ .common = -1, .contact = -1 };
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status == EBPO_OK)

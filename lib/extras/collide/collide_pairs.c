@@ -5,7 +5,7 @@
  * pairs of nodes, which are distributed to threads. The results are sorted by the indices of the
  * first face, then of the second, so the order does not depend on the number of threads. If the
  * collider's memory is too small for all pairs, runs of consecutive faces of the first model are
- * searched one after the other. Models in parts are searched by subtree_walk.h. */
+ * searched one after the other. Partly loaded models are searched by subtree_walk.h. */
 #include "core/strict_fp.h"
 
 #include <stdatomic.h>
@@ -213,9 +213,9 @@ static ebpo_status run_parts(void *user, uint64_t begin, uint64_t end, unsigned 
     return EBPO_OK;
 }
 
-/* Takes the walks that the collider keeps, or makes new ones. The collider's are in use if the
- * callback that receives pairs makes another query. Returns false without memory. */
-static bool take_walks(pair_gathering *g)
+/* Uses the walks that the collider keeps, or makes new ones if another query is using them: the
+ * callback that receives pairs may make a query. Returns false without memory. */
+static bool acquire_walks(pair_gathering *g)
 {
     ebpo_collider *c = g->collision->collider;
     if (c->walks) {
@@ -232,7 +232,7 @@ static bool take_walks(pair_gathering *g)
 static ebpo_status prepare_walks(pair_gathering *g, const ebpo_accel_pair *pair, uint32_t begin,
                                  uint32_t end, ebpo_error *error)
 {
-    if (!g->walk && !take_walks(g))
+    if (!g->walk && !acquire_walks(g))
         return ebpo_fail_memory(error, g->threads * sizeof *g->walk);
     for (unsigned i = 0; i < g->threads; i++) {
         ebpo_pair_walk_begin(&g->walk[i], pair);

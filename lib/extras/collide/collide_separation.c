@@ -4,9 +4,9 @@
  * A heap holds pairs of nodes, the pair that may separate last first. The extents of the nodes
  * along the direction and along two axes perpendicular to it bound the time of their last contact.
  * The last contact of two faces is bounded in doubles (ebpo_sweep_max) and computed exactly
- * (ebpo_sweep_last). Models in parts are searched in pairs of subtrees: a subtree is loaded only if
- * its envelope may separate later than the last contact found. A search runs in one thread. Bounds:
- * docs/develop/collision.md, "Separation distance along a direction". */
+ * (ebpo_sweep_last). Partly loaded models are searched in pairs of subtrees: a subtree is loaded
+ * only if its envelope may separate later than the last contact found. A search runs in one thread.
+ * Bounds: docs/develop/collision.md, "Separation distance along a direction". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -434,7 +434,7 @@ static void fill_separation(const separation_search *s, int exponent, ebpo_separ
         t.unit -= exponent;
         lo = ebpo_sweep_time_round(&t);
     }
-    out->t = ebpo_certain_of(lo, s->hi < 0 ? lo : fmax(lo, hi));
+    out->t = ebpo_value_bounds_of(lo, s->hi < 0 ? lo : fmax(lo, hi));
 }
 
 ebpo_status ebpo_collide_separation(ebpo_collider *c, const ebpo_collide_options *options,

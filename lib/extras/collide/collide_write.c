@@ -3,7 +3,7 @@
  *
  * Rows are written in blocks as they are found, so memory does not grow with their number. The
  * writer of PLY files reads vertices and faces from a source in ascending order: a mesh in memory
- * or a model in parts. Output files appear only when they are complete (io/publish.h). */
+ * or a partly loaded model. Output files appear only when they are complete (io/publish.h). */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -185,7 +185,7 @@ static bool add_contact_row(pairs_file *w, const ebpo_face_pair *pair)
     return true;
 }
 
-static bool take_rows(void *user, const ebpo_face_pair *pairs, uint64_t count)
+static bool receive_rows(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
     pairs_file *w = user;
     for (uint64_t i = 0; i < count; i++) {
@@ -210,7 +210,7 @@ static ebpo_status write_tables(pairs_file *w, const char *path, ebpo_publish *t
     if (status == EBPO_OK)
         status = make_tables(w, w->error);
     if (status == EBPO_OK)
-        status = ebpo_collide_all(q->collider, &q->options, take_rows, w, w->error);
+        status = ebpo_collide_all(q->collider, &q->options, receive_rows, w, w->error);
     if (status == EBPO_OK)
         status = w->status;
     if (status == EBPO_OK && !flush_rows(w))
@@ -244,11 +244,11 @@ static ebpo_status write_hdf5(const ebpo_collision *q, const char *path, ebpo_pu
 
 /* --- PLY --- */
 
-/* A mesh that is written as PLY. A model in parts is read chunk by chunk; the mesh of a whole model
- * is read from the file again. */
+/* A mesh that is written as PLY. A partly loaded model is read chunk by chunk; the mesh of a whole
+ * model is read from the file again. */
 typedef struct shown_mesh {
     ebpo_mesh mesh;             /* of a whole model */
-    ebpo_faces_by_number parts; /* for a model in parts */
+    ebpo_faces_by_number parts; /* for a partly loaded model */
     ebpo_red_source source;
     uint64_t *intersecting; /* a bit for each intersecting face */
 } shown_mesh;

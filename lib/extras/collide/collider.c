@@ -1,4 +1,4 @@
-/* A collider: two models, options, and data that queries keep for the next ones.
+/* Makes a collider: two models, options, and data that queries keep for the next ones.
  *
  * All queries begin with ebpo_collision_begin. It checks the options and puts the models in an
  * order that does not change when the caller swaps them, so results do not depend on the caller's

@@ -23,8 +23,9 @@ struct ebpo_collider {
     ebpo_pair_walk *walks; /* [walk_count] walks of other threads, kept for the next query that
                             * finds all pairs; or NULL */
     unsigned walk_count;
-    uint64_t node_pairs, block_pairs, exact;             /* as in ebpo_collider_stats */
-    uint64_t subtree_pairs, subtrees, loads, bytes_read; /* members of it for models in parts */
+    uint64_t node_pairs, block_pairs, exact; /* as in ebpo_collider_stats */
+    uint64_t subtree_pairs, subtrees, loads,
+        bytes_read;                /* members of it for partly loaded models */
     struct ebpo_gap_search *gap;   /* state of distance queries, after the first one */
     struct ebpo_face_two *nearest; /* the last nearest pair, of the caller's A and B; or NULL */
     ebpo_context *context[2]; /* contexts of depth queries, after the first one of that model */
@@ -70,7 +71,8 @@ void ebpo_pair_walk_begin(ebpo_pair_walk *walk, const ebpo_accel_pair *pair);
 /* Adds a walk's counts to the collider's. */
 void ebpo_collider_count(ebpo_collider *collider, ebpo_pair_walk *walk);
 
-/* Converts a pair of local face indices of two accels to the pair that the caller receives. */
+/* Converts a pair of local face indices of two accels (acceleration structures of subtrees) to the
+ * pair that the caller receives. */
 ebpo_face_pair ebpo_collision_pair(const ebpo_collision *collision, const ebpo_accel *first,
                                    const ebpo_accel *second, const ebpo_found_pair *pair);
 
@@ -81,14 +83,14 @@ EBPO_MUST_USE ebpo_status ebpo_collide_self_posed(ebpo_collider *collider,
                                                   ebpo_error *error);
 
 /* Returns the interval lo .. hi as a result, with its kind. */
-static inline ebpo_certain ebpo_certain_of(double lo, double hi)
+static inline ebpo_value_bounds ebpo_value_bounds_of(double lo, double hi)
 {
     bool bound = lo != hi && (lo == 0 || isinf(hi));
-    return (ebpo_certain){ lo, hi,
-                           lo == hi ? EBPO_VALUE_EXACT
-                           : bound  ? EBPO_VALUE_BOUND
-                                    : EBPO_VALUE_INTERVAL,
-                           0 };
+    return (ebpo_value_bounds){ lo, hi,
+                                lo == hi ? EBPO_VALUE_EXACT
+                                : bound  ? EBPO_VALUE_BOUND
+                                         : EBPO_VALUE_INTERVAL,
+                                0 };
 }
 
 /* Number of pairs that a walk takes between checks of the clock. */

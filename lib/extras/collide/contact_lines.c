@@ -123,7 +123,7 @@ static bool add_segment(line_search *l, const ebpo_face_pair *pair)
     return true;
 }
 
-static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
+static bool receive_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
     line_search *l = user;
     for (uint64_t i = 0; i < count; i++) {
@@ -278,7 +278,7 @@ ebpo_status ebpo_collide_polylines(ebpo_collider *c, const ebpo_collide_options 
     if (status == EBPO_OK)
         status = ebpo_pair_faces_begin(&l.places, &q, error);
     if (status == EBPO_OK)
-        status = ebpo_collide_all(c, options, take_pairs, &l, error);
+        status = ebpo_collide_all(c, options, receive_pairs, &l, error);
     if (status == EBPO_OK)
         status = l.status;
     if (status == EBPO_OK && (l.full || l.no_memory))

@@ -146,6 +146,9 @@ static void set_end(ebpo_face_cuts *f, int end, const double x[3])
     mpq_set_d(f->cut[f->cuts].q[end], x[f->v]);
 }
 
+/* Cuts with lower indices are the edges of the face itself. */
+enum { FACE_EDGES = 3 };
+
 /* Adds the edges of t, a face in the same plane, as cuts. */
 static void cut_along_edges(ebpo_face_cuts *f, const double t[3][3])
 {
@@ -328,9 +331,9 @@ void ebpo_face_cuts_free(ebpo_face_cuts *f)
     for (uint64_t i = 0; i < f->values_made; i++)
         mpq_clear(f->value[i]);
     for (int i = 0; i < 2; i++) {
-        for (uint64_t k = 0; k < f->ends_made[i]; k++)
-            mpq_clears(f->end[i][k].low, f->end[i][k].high, NULL);
-        free(f->end[i]);
+        for (uint64_t k = 0; k < f->borders_made[i]; k++)
+            mpq_clears(f->border[i][k].low, f->border[i][k].high, NULL);
+        free(f->border[i]);
     }
     for (int i = 0; i < 8 && f->made; i++)
         mpq_clear(f->scratch[i]);
@@ -399,7 +402,7 @@ static int by_value(const void *x, const void *y) { return mpq_cmp((mpq_srcptr)x
 static void find_events(ebpo_face_cuts *f)
 {
     for (uint64_t i = 0; i < f->cuts && !f->no_memory; i++)
-        for (uint64_t k = i < 3 ? 3 : i + 1; k < f->cuts; k++) {
+        for (uint64_t k = i < FACE_EDGES ? FACE_EDGES : i + 1; k < f->cuts; k++) {
             const ebpo_face_cut *a = &f->cut[i], *b = &f->cut[k];
             if (mpq_cmp(a->p[1], b->p[0]) < 0 || mpq_cmp(b->p[1], a->p[0]) < 0)
                 continue;
@@ -449,10 +452,11 @@ static bool capacity_for_values(ebpo_face_cuts *f)
     for (; f->values_made < 3 * f->cuts; f->values_made++)
         mpq_init(f->value[f->values_made]);
     for (int i = 0; i < 2; i++) {
-        if (!ebpo_grow(&f->end[i], &f->end_capacity[i], f->cuts, sizeof *f->end[i]))
+        if (!ebpo_grow(&f->border[i], &f->border_capacity[i], f->cuts, sizeof *f->border[i]))
             return false;
-        for (; f->ends_made[i] < f->cuts; f->ends_made[i]++)
-            mpq_inits(f->end[i][f->ends_made[i]].low, f->end[i][f->ends_made[i]].high, NULL);
+        for (; f->borders_made[i] < f->cuts; f->borders_made[i]++)
+            mpq_inits(f->border[i][f->borders_made[i]].low, f->border[i][f->borders_made[i]].high,
+                      NULL);
     }
     return true;
 }
@@ -476,11 +480,12 @@ static uint64_t cuts_of_strip(ebpo_face_cuts *f, const mpq_t p[3])
         f->order[at] = i;
     }
     for (uint64_t i = 0; i < n; i++)
-        if (f->order[i] < 3) {
+        if (f->order[i] < FACE_EDGES) {
             low = low < 0 ? (int)i : low;
             high = (int)i;
         }
-    /* cuts before the first edge of the face, and after the last one, are outside or equal to it */
+    /* cuts below the lower edge of the face and above the upper one are outside the face, or
+     * coincide with the edge */
     for (uint64_t i = (uint64_t)(low < 0 ? 0 : low); low >= 0 && i <= (uint64_t)high; i++) {
         f->order[kept++] = f->order[i];
         value_of_cut(&f->cut[f->order[kept - 1]], p[LEFT], *value_at(f, f->order[kept - 1], LEFT));
@@ -490,12 +495,12 @@ static uint64_t cuts_of_strip(ebpo_face_cuts *f, const mpq_t p[3])
     return kept;
 }
 
-/* Returns true if a part of the previous strip, whose ends are end[before], and this part, from
- * `low` to `high`, share an open interval of the border between the strips. */
+/* Returns true if a part of the previous strip, whose intervals are border[before], and this part,
+ * from `low` to `high`, share an open interval of the border between the strips. */
 static bool continues_piece(const ebpo_face_cuts *f, int before, const mpq_t low, const mpq_t high)
 {
-    for (uint64_t i = 0; i < f->ends[before]; i++) {
-        const ebpo_piece_end *e = &f->end[before][i];
+    for (uint64_t i = 0; i < f->borders[before]; i++) {
+        const ebpo_piece_border *e = &f->border[before][i];
         if (mpq_cmp(e->low, high) < 0 && mpq_cmp(low, e->high) < 0)
             return true;
     }
@@ -563,7 +568,7 @@ static bool is_at_target(const ebpo_face_cuts *f, const mpq_t p[3], uint32_t low
     return false;
 }
 
-/* Visits a point of each part of a strip that begins a new piece. now: index of f->end for this
+/* Visits a point of each part of a strip that begins a new piece. now: index of f->border for this
  * strip. */
 static ebpo_status visit_strip(ebpo_face_cuts *f, strip_scratch *s, int now, ebpo_piece_fn visit,
                                void *user, ebpo_error *error)
@@ -571,12 +576,12 @@ static ebpo_status visit_strip(ebpo_face_cuts *f, strip_scratch *s, int now, ebp
     ebpo_status status = EBPO_OK;
     bool border_has_cut = upright_at(f, s->p[LEFT]);
     uint64_t n = cuts_of_strip(f, (const mpq_t *)s->p);
-    f->ends[now] = 0;
+    f->borders[now] = 0;
     for (uint64_t i = 0; i + 1 < n && status == EBPO_OK; i++) {
         uint32_t low = f->order[i], high = f->order[i + 1];
         if (mpq_equal(*value_at(f, low, MIDDLE), *value_at(f, high, MIDDLE)))
             continue;
-        ebpo_piece_end *e = &f->end[now][f->ends[now]++];
+        ebpo_piece_border *e = &f->border[now][f->borders[now]++];
         mpq_set(e->low, *value_at(f, low, RIGHT));
         mpq_set(e->high, *value_at(f, high, RIGHT));
         if (!border_has_cut && !f->all_cuts &&
@@ -599,7 +604,7 @@ ebpo_status ebpo_face_pieces_visit(ebpo_face_cuts *f, ebpo_piece_fn visit, void 
     if (f->no_memory || !capacity_for_values(f))
         return ebpo_fail_memory(error, f->cuts * sizeof *f->cut);
     mpq_inits(s.p[0], s.p[1], s.p[2], s.q, s.x[0], s.x[1], s.x[2], NULL);
-    f->ends[0] = f->ends[1] = 0;
+    f->borders[0] = f->borders[1] = 0;
     for (uint64_t i = 0; i + 1 < f->events && status == EBPO_OK; i++) {
         mpq_set(s.p[LEFT], f->event[i]);
         mpq_set(s.p[RIGHT], f->event[i + 1]);

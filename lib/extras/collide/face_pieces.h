@@ -22,11 +22,11 @@ typedef struct ebpo_flat_face {
     bool same_direction; /* its normal and the normal of the cut face have the same direction */
 } ebpo_flat_face;
 
-/* Bounds of q of a piece at the end of a strip. A strip is the part of the projection between two
- * neighbouring events. */
-typedef struct ebpo_piece_end {
+/* The interval of q of a piece on the border between two strips. A strip is the part of the
+ * projection between two neighbouring events. */
+typedef struct ebpo_piece_border {
     mpq_t low, high;
-} ebpo_piece_end;
+} ebpo_piece_border;
 
 /* The cuts of one face; its memory is reused for the next face. Zero before the first face. */
 typedef struct ebpo_face_cuts {
@@ -53,16 +53,17 @@ typedef struct ebpo_face_cuts {
     uint64_t values_made, value_capacity;
     uint32_t *order;
     uint64_t order_capacity;
-    ebpo_piece_end *end[2]; /* of the current strip and the previous one */
-    uint64_t ends[2], ends_made[2], end_capacity[2];
+    ebpo_piece_border *border[2]; /* of the current strip and the previous one */
+    uint64_t borders[2], borders_made[2], border_capacity[2];
 } ebpo_face_cuts;
 
 /* Begins a new face, which must have an area. all_cuts: see ebpo_face_cuts. */
 void ebpo_face_cuts_begin(ebpo_face_cuts *f, const double corner[3][3], bool all_cuts);
 /* Adds the cut of another face, which belongs to model 0 or 1. */
 void ebpo_face_cuts_add(ebpo_face_cuts *f, const double other[3][3], int model);
-/* Sets the target x, which needs all_cuts. Returns false if x is not on the face. Otherwise
- * ebpo_piece.at_target is set for each piece that is visited later. */
+/* Sets the target: a point x for which pieces are sought that contain it. Needs all_cuts. Returns
+ * false if x is not on the face. Otherwise ebpo_piece.at_target is set for each piece that is
+ * visited later. */
 bool ebpo_face_cuts_target(ebpo_face_cuts *f, const mpq_t x[3]);
 void ebpo_face_cuts_free(ebpo_face_cuts *f);
 

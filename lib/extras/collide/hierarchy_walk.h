@@ -1,5 +1,6 @@
-/* Walks through the hierarchies of two accels at poses: ebpo_pair_walk finds the faces that
- * intersect, ebpo_gap_search the nearest ones. Each walk is for one thread at a time. */
+/* Walks through the hierarchies of two accels (acceleration structures of subtrees) at poses:
+ * ebpo_pair_walk finds the faces that intersect, ebpo_gap_search the nearest ones. Each walk is for
+ * one thread at a time. */
 #ifndef EBPO_COLLIDE_HIERARCHY_WALK_H
 #define EBPO_COLLIDE_HIERARCHY_WALK_H
 

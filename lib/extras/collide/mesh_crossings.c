@@ -23,15 +23,15 @@
 #include "extras/collide/face_pairs.h"
 
 typedef struct crossings {
-    ebpo_crossings_options options;
-    ebpo_crossings_fn take;
+    ebpo_self_intersections_options options;
+    ebpo_self_intersections_fn take;
     void *user;
     ebpo_tree tree;
     ebpo_file *file;
     ebpo_model *model;
     ebpo_collider *collider;
     ebpo_publish target; /* the PLY file, if the caller wants one */
-    ebpo_crossings_summary sum;
+    ebpo_self_intersections_summary sum;
     uint64_t *intersecting; /* a bit for each face, by its index in the source */
     bool enough;            /* the caller needs no more crossings */
 } crossings;
@@ -125,18 +125,18 @@ static void common_point(const double a[3][3], const double b[3][3], int32_t kin
 }
 
 /* Marks a face as intersecting, and counts it once. */
-static void note_face(crossings *c, uint64_t face)
+static void record_face(crossings *c, uint64_t face)
 {
     uint64_t bit = UINT64_C(1) << face % 64;
     c->sum.faces += !(c->intersecting[face / 64] & bit);
     c->intersecting[face / 64] |= bit;
 }
 
-static void fill_crossing(crossings *c, const ebpo_face_pair *pair, ebpo_crossing *out)
+static void fill_crossing(crossings *c, const ebpo_face_pair *pair, ebpo_self_intersection *out)
 {
     double a[3][3], b[3][3];
     bool swap = pair->face_a > pair->face_b;
-    *out = (ebpo_crossing){ .kind = pair->kind };
+    *out = (ebpo_self_intersection){ .kind = pair->kind };
     out->face[swap] = pair->face_a;
     out->face[!swap] = pair->face_b;
     corners_of(c, pair->file_face_a, a);
@@ -144,15 +144,15 @@ static void fill_crossing(crossings *c, const ebpo_face_pair *pair, ebpo_crossin
     common_point((const double(*)[3])a, (const double(*)[3])b, pair->kind, out->point);
     c->sum.pairs[pair->kind]++;
     for (int i = 0; i < 2; i++)
-        note_face(c, out->face[i]);
+        record_face(c, out->face[i]);
 }
 
 enum { REPORTED_AT_ONCE = 256 };
 
-static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
+static bool receive_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
     crossings *c = user;
-    ebpo_crossing out[REPORTED_AT_ONCE];
+    ebpo_self_intersection out[REPORTED_AT_ONCE];
     for (uint64_t at = 0; at < count && !c->enough; at += REPORTED_AT_ONCE) {
         uint64_t n = count - at < REPORTED_AT_ONCE ? count - at : REPORTED_AT_ONCE;
         for (uint64_t i = 0; i < n; i++)
@@ -197,7 +197,7 @@ static ebpo_status search_crossings(crossings *c, ebpo_mesh *mesh, const ebpo_me
     if (status == EBPO_OK)
         status = make_collider(c, ebpo_workspace_memory(workspace), error);
     if (status == EBPO_OK)
-        status = ebpo_collide_self(c->collider, &how, take_pairs, c, error);
+        status = ebpo_collide_self(c->collider, &how, receive_pairs, c, error);
     return status == EBPO_OK && c->options.ply ? write_red_mesh(c, workspace, error) : status;
 }
 
@@ -211,18 +211,19 @@ static void close_all(crossings *c)
     ebpo_publish_abort(&c->target);
 }
 
-ebpo_status ebpo_mesh_crossings(ebpo_mesh *mesh, const ebpo_mesh_report *report,
-                                const ebpo_crossings_options *options, ebpo_crossings_fn take,
-                                void *user, ebpo_crossings_summary *out, ebpo_error *error)
+ebpo_status ebpo_mesh_self_intersections(ebpo_mesh *mesh, const ebpo_mesh_report *report,
+                                         const ebpo_self_intersections_options *options,
+                                         ebpo_self_intersections_fn take, void *user,
+                                         ebpo_self_intersections_summary *out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    crossings c = { .options = EBPO_CROSSINGS_OPTIONS_INIT,
+    crossings c = { .options = EBPO_SELF_INTERSECTIONS_OPTIONS_INIT,
                     .take = take,
                     .user = user,
                     .target = EBPO_PUBLISH_INIT,
-                    .sum = EBPO_CROSSINGS_SUMMARY_INIT };
+                    .sum = EBPO_SELF_INTERSECTIONS_SUMMARY_INIT };
     ebpo_workspace *workspace = mesh->workspace, *own = NULL;
-    ebpo_status status = EBPO_TAKE(ebpo_crossings_options, &c.options, options, error);
+    ebpo_status status = EBPO_TAKE(ebpo_self_intersections_options, &c.options, options, error);
     if (status == EBPO_OK && !workspace)
         status = ebpo_workspace_new(NULL, &own, error);
     if (status == EBPO_OK && c.options.ply)
@@ -232,5 +233,6 @@ ebpo_status ebpo_mesh_crossings(ebpo_mesh *mesh, const ebpo_mesh_report *report,
     ebpo_mesh_free(mesh);
     close_all(&c);
     ebpo_workspace_free(own);
-    return status == EBPO_OK && out ? EBPO_GIVE(ebpo_crossings_summary, out, &c.sum) : status;
+    return status == EBPO_OK && out ? EBPO_GIVE(ebpo_self_intersections_summary, out, &c.sum)
+                                    : status;
 }

@@ -2,7 +2,7 @@
  * crossing faces.
  *
  * The faces of a whole model are in memory: its slots give the position of each face in the blocks.
- * Faces of a model in parts are read through the cache of chunks. ebpo_posing_apply poses the
+ * Faces of a partly loaded model are read through the cache of chunks. ebpo_posing_apply poses the
  * corners, as in all exact tests. ebpo_collide_contacts returns the segments of all crossing pairs
  * in the order of pairs. */
 #include "core/strict_fp.h"

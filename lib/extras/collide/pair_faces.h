@@ -13,7 +13,7 @@
 uint32_t *ebpo_face_slots(const ebpo_accel *subtree);
 
 /* Reads corners of single faces by their indices in the file: faces of a whole model from its
- * blocks, faces of a model in parts through its cache of chunks. For one thread at a time. */
+ * blocks, faces of a partly loaded model through its cache of chunks. For one thread at a time. */
 
 typedef struct ebpo_faces_by_number {
     const ebpo_model *model;
@@ -26,7 +26,7 @@ void ebpo_faces_by_number_begin(ebpo_faces_by_number *f, const ebpo_model *model
 /* Computes the corners of a face, exactly as in the file. Fails with the errors of reading. */
 EBPO_MUST_USE ebpo_status ebpo_faces_by_number_get(ebpo_faces_by_number *f, uint64_t face,
                                                    double out[3][3], ebpo_error *error);
-/* For a model in parts: set `out` to the vertex indices of a face, and to the coordinates of a
+/* For a partly loaded model: set `out` to the vertex indices of a face, and to the coordinates of a
  * vertex, as in the file. */
 EBPO_MUST_USE ebpo_status ebpo_faces_by_number_corners(ebpo_faces_by_number *f, uint64_t face,
                                                        uint32_t out[3], ebpo_error *error);

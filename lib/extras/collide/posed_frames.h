@@ -84,8 +84,8 @@ static inline void ebpo_posed_faces_forget(ebpo_posed_faces faces[2][EBPO_POSED_
         faces[i / EBPO_POSED_FACES][i % EBPO_POSED_FACES].block = EBPO_NO_CHILD;
 }
 
-/* Two accels at their poses, each in its own frame, prepared for descending both hierarchies
- * together. It is not changed afterwards, so any thread may use it.
+/* Two accels (acceleration structures of subtrees) at their poses, each in its own frame, prepared
+ * for descending both hierarchies together. It is not changed afterwards, so any thread may use it.
  *
  * Both frames use one unit of length: that of the frame with the larger unit. Boxes of one model
  * are transformed to the other model's frame by linear maps, for all pose matrices; only cylinders

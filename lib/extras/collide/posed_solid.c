@@ -214,7 +214,7 @@ static void add_face_at_point(side_segment *l, const double t[3][3])
     l->jump += ebpo_axis_crossing(from, nextafter(l->w[axis], INFINITY), axis, t[0], t[1], t[2]);
 }
 
-static bool take_near_triangles(void *user, const ebpo_triangles *triangles)
+static bool receive_near_triangles(void *user, const ebpo_triangles *triangles)
 {
     side_segment *l = user;
     for (uint64_t i = 0; i < triangles->count; i++) {
@@ -288,7 +288,7 @@ static ebpo_status decide_by_faces(const ebpo_posed_solid *s, ebpo_context *cont
     memcpy(l.low, upward ? w : a.at, sizeof l.low);
     l.to = upward ? a.at[a.axis] : w[a.axis];
     ebpo_unpose_box(s, w, a.at, low, high);
-    status = ebpo_triangles_in_box(context, low, high, take_near_triangles, &l, error);
+    status = ebpo_triangles_in_box(context, low, high, receive_near_triangles, &l, error);
     if (status != EBPO_OK)
         return status;
     out->above = upward ? a.winding - l.crossed : a.winding + l.crossed;
@@ -434,7 +434,7 @@ static int count_crossing(path *p, int axis, const ebpo_vectorz *from, const ebp
     return -turn;
 }
 
-static bool take_path_triangles(void *user, const ebpo_triangles *triangles)
+static bool receive_path_triangles(void *user, const ebpo_triangles *triangles)
 {
     path *p = user;
     for (uint64_t i = 0; i < triangles->count; i++) {
@@ -478,7 +478,7 @@ ebpo_status ebpo_exact_winding(const ebpo_posed_solid *s, ebpo_context *context,
         return status;
     make_path(&p);
     ebpo_unpose_box(s, corner[0], corner[1], low, high);
-    status = ebpo_triangles_in_box(context, low, high, take_path_triangles, &p, error);
+    status = ebpo_triangles_in_box(context, low, high, receive_path_triangles, &p, error);
     *winding += p.crossed;
     clear_path(&p);
     return status;

@@ -1,11 +1,11 @@
-/* Subtrees of a posed model, convex envelopes of their faces, and bounds of the distance of
- * envelopes. A model in parts has the subtrees that are loaded on demand; a whole model is a single
- * subtree.
+/* Finds the subtrees of a posed model, convex envelopes of their faces, and bounds of the distance
+ * of envelopes. A partly loaded model has the subtrees that are loaded on demand; a whole model is
+ * a single subtree.
  *
  * An envelope begins as the cell. The planes of the node and of its nearest ancestors, which are in
- * memory, cut it; then it is posed. A hash table keeps envelopes by octcode. Gaps are lower bounds
- * of the distance of two convex sets, found by the iteration of Gilbert (1966): every direction
- * gives a bound, so the iteration may stop at any time. */
+ * memory, cut it; then it is posed. A hash table keeps envelopes by octcode (locational code). Gaps
+ * are lower bounds of the distance of two convex sets, found by the iteration of Gilbert (1966):
+ * every direction gives a bound, so the iteration may stop at any time. */
 #include "core/strict_fp.h"
 
 #include <math.h>

@@ -9,8 +9,8 @@
  * model are examined, then one face of each patch without contact, because such a patch is entirely
  * on one side of the other model. A patch is skipped if a face on its side would not change the
  * result; if the side is known, the patch's subtree is not loaded. If the deadline passes, the
- * relation is open. A search runs in one thread. See docs/develop/collision.md, "Relation of two
- * models". */
+ * relation is undecided. A search runs in one thread. See docs/develop/collision.md, "Relation of
+ * two models". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -86,7 +86,7 @@ static ebpo_status separate_patches_find(separate_patches *u, uint64_t number,
     return status;
 }
 
-static bool note_any(void *user, const ebpo_triangles *triangles)
+static bool record_any(void *user, const ebpo_triangles *triangles)
 {
     bool *any = user;
     *any |= triangles->count > 0;
@@ -109,7 +109,7 @@ static ebpo_status side_of_ball(const separate_patches *u, const double middle[3
         low[k] = nextafter(p[k] - space, -INFINITY);
         high[k] = nextafter(p[k] + space, INFINITY);
     }
-    ebpo_status status = ebpo_triangles_in_box(context, low, high, note_any, &near, error);
+    ebpo_status status = ebpo_triangles_in_box(context, low, high, record_any, &near, error);
     if (status != EBPO_OK || near)
         return status;
     status = ebpo_inside(context, p, NULL, &inside, error);
@@ -161,7 +161,7 @@ typedef struct relation_search {
     bool doubtful;      /* a piece of the face that was visited last is not part of its model */
     unsigned last[2];   /* `in` of the piece that was visited last */
     uint64_t inspected; /* number of examined faces */
-    bool open;          /* the deadline has passed */
+    bool late;          /* the deadline has passed */
     ebpo_error *error;  /* error of `status`, within callbacks */
     ebpo_status status;
 } relation_search;
@@ -197,7 +197,7 @@ typedef struct visited_face {
 } visited_face;
 
 /* Records the kinds of the parts of space on both sides of a piece, for two solids. */
-static void note_solids(relation_search *r, const ebpo_around *a)
+static void record_solids(relation_search *r, const ebpo_around *a)
 {
     r->both |= (a->in[0] & a->in[1]) != 0;
     r->only[0] |= (a->in[0] & ~a->in[1]) != 0;
@@ -205,7 +205,7 @@ static void note_solids(relation_search *r, const ebpo_around *a)
 }
 
 /* Records what is around a piece. Returns false if the relation is decided. */
-static bool note_piece(void *user, const ebpo_around *a)
+static bool record_piece(void *user, const ebpo_around *a)
 {
     const visited_face *f = user;
     relation_search *r = f->r;
@@ -213,7 +213,7 @@ static bool note_piece(void *user, const ebpo_around *a)
     r->examined = true;
     memcpy(r->last, a->in, sizeof r->last);
     if (r->two.solid[0] && r->two.solid[1])
-        note_solids(r, a);
+        record_solids(r, a);
     else {
         r->both |= is_mixed(r) && other == EBPO_SIDE_BOTH;
         r->only[f->m] |= other == 0;
@@ -229,12 +229,12 @@ static bool inspect_face(relation_search *r, int m, uint64_t face)
     if ((is_mixed(r) && r->two.solid[m]) || has_bit(r->seen[m], face))
         return true;
     set_bit(r->seen[m], face);
-    r->status = ebpo_visit_around_face(&r->two, m, face, note_piece, &f, r->error);
+    r->status = ebpo_visit_around_face(&r->two, m, face, record_piece, &f, r->error);
     if (r->status == EBPO_OK && ++r->inspected % 64 == 0 &&
         !ebpo_progress_step(&r->collision->options.progress, stage, 0, 0, r->error))
         r->status = EBPO_E_CANCELLED;
-    r->open |= ebpo_collision_is_late(r->collision);
-    return r->status == EBPO_OK && !r->open && !is_decided(r);
+    r->late |= ebpo_collision_is_late(r->collision);
+    return r->status == EBPO_OK && !r->late && !is_decided(r);
 }
 
 /* Examines both faces of a pair, as inspect_face does. */
@@ -262,7 +262,7 @@ static bool all_have_area(relation_search *r, const ebpo_face_pair *pair)
 
 /* Records an intersecting pair of faces of two surfaces. Returns false after a failure (r->status).
  */
-static bool note_pair(relation_search *r, const ebpo_face_pair *pair)
+static bool record_pair(relation_search *r, const ebpo_face_pair *pair)
 {
     r->both |= pair->kind != EBPO_PAIR_TOUCHING;
     r->touch = r->touch || r->both || all_have_area(r, pair);
@@ -270,7 +270,7 @@ static bool note_pair(relation_search *r, const ebpo_face_pair *pair)
 }
 
 /* Marks the faces of intersecting pairs, and examines those that cross. */
-static bool take_contacts(void *user, const ebpo_face_pair *pairs, uint64_t count)
+static bool receive_contacts(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
     relation_search *r = user;
     bool turned = r->collision->turned, more = true;
@@ -278,7 +278,7 @@ static bool take_contacts(void *user, const ebpo_face_pair *pairs, uint64_t coun
         set_bit(r->intersecting[turned], pairs[i].file_face_a);
         set_bit(r->intersecting[!turned], pairs[i].file_face_b);
         if (are_surfaces(r))
-            more = note_pair(r, &pairs[i]);
+            more = record_pair(r, &pairs[i]);
         else if (pairs[i].kind == EBPO_PAIR_CROSSING)
             more = inspect_pair(r, &pairs[i]);
     }
@@ -295,15 +295,15 @@ static ebpo_collide_options options_left(const relation_search *r)
     return options;
 }
 
-/* Passes all intersecting pairs to `take`. If the deadline passes, sets r->open. */
-static ebpo_status take_pairs(relation_search *r, ebpo_pairs_fn take, ebpo_error *error)
+/* Passes all intersecting pairs to `take`. If the deadline passes, sets r->late. */
+static ebpo_status receive_pairs(relation_search *r, ebpo_pairs_fn take, ebpo_error *error)
 {
     const ebpo_collision *q = r->collision;
     ebpo_collide_options options = options_left(r);
     ebpo_two_models_let_go(&r->two);
     ebpo_status status = ebpo_collide_all(q->collider, &options, take, r, error);
     if (status == EBPO_E_CANCELLED && ebpo_collision_is_late(q)) {
-        r->open = true;
+        r->late = true;
         status = EBPO_OK;
     }
     return status == EBPO_OK ? r->status : status;
@@ -312,7 +312,7 @@ static ebpo_status take_pairs(relation_search *r, ebpo_pairs_fn take, ebpo_error
 /* Returns true if the search must continue. */
 static bool must_continue(const relation_search *r)
 {
-    return r->status == EBPO_OK && !r->open && !is_decided(r);
+    return r->status == EBPO_OK && !r->late && !is_decided(r);
 }
 
 /* Examines all faces that intersect the other model. */
@@ -391,7 +391,7 @@ static void inspect_patches(relation_search *r, int m)
     for (uint64_t i = 0; i < u.subtrees && must_continue(r); i++) {
         if (!is_settled(r, &u, i) && r->status == EBPO_OK)
             inspect_subtree(r, &u, i);
-        r->open |= ebpo_collision_is_late(r->collision);
+        r->late |= ebpo_collision_is_late(r->collision);
     }
     separate_patches_end(&u);
 }
@@ -399,7 +399,7 @@ static void inspect_patches(relation_search *r, int m)
 /* --- common points of models without common inner points --- */
 
 /* Sets r->doubtful if a piece is not part of the face's model. */
-static bool note_doubtful_piece(void *user, const ebpo_around *a)
+static bool record_doubtful_piece(void *user, const ebpo_around *a)
 {
     const visited_face *f = user;
     f->r->examined = true;
@@ -414,7 +414,7 @@ static bool belongs_to_model(relation_search *r, int m, uint64_t face)
     visited_face f = { r, m };
     r->examined = r->doubtful = false;
     if (r->status == EBPO_OK)
-        r->status = ebpo_visit_around_face(&r->two, m, face, note_doubtful_piece, &f, r->error);
+        r->status = ebpo_visit_around_face(&r->two, m, face, record_doubtful_piece, &f, r->error);
     return r->status == EBPO_OK && r->examined && !r->doubtful;
 }
 
@@ -422,23 +422,23 @@ static bool find_touching_faces(void *user, const ebpo_face_pair *pairs, uint64_
 {
     relation_search *r = user;
     bool turned = r->collision->turned;
-    for (uint64_t i = 0; i < count && !r->touch && r->status == EBPO_OK && !r->open; i++) {
+    for (uint64_t i = 0; i < count && !r->touch && r->status == EBPO_OK && !r->late; i++) {
         const uint64_t face[2] = { pairs[i].file_face_a, pairs[i].file_face_b };
         r->touch = belongs_to_model(r, 0, face[turned]) && belongs_to_model(r, 1, face[!turned]);
-        r->open |= ebpo_collision_is_late(r->collision);
+        r->late |= ebpo_collision_is_late(r->collision);
     }
-    return !r->touch && r->status == EBPO_OK && !r->open;
+    return !r->touch && r->status == EBPO_OK && !r->late;
 }
 
 /* Sets r->touch if both models, with their boundaries, have a common point. */
 static ebpo_status find_common_point(relation_search *r, ebpo_error *error)
 {
-    ebpo_status status = take_pairs(r, find_touching_faces, error);
+    ebpo_status status = receive_pairs(r, find_touching_faces, error);
     uint64_t count = face_count(r, 0);
-    for (uint64_t f = 0; f < count && status == EBPO_OK && !r->touch && !r->open; f++) {
+    for (uint64_t f = 0; f < count && status == EBPO_OK && !r->touch && !r->late; f++) {
         if (has_bit(r->intersecting[0], f))
             status = ebpo_face_has_common_point(&r->two, 0, f, &r->touch, error);
-        r->open |= ebpo_collision_is_late(r->collision);
+        r->late |= ebpo_collision_is_late(r->collision);
     }
     return status;
 }
@@ -483,7 +483,7 @@ static ebpo_status inspect_first(relation_search *r, ebpo_error *error)
     ebpo_collide_options options = options_left(r);
     ebpo_face_pair pair;
     ebpo_status status = ebpo_collide_first(q->collider, &options, &pair, &r->out->contact, error);
-    r->open |= r->out->contact < 0;
+    r->late |= r->out->contact < 0;
     if (status != EBPO_OK || r->out->contact != 1 || are_surfaces(r))
         return status;
     (void)inspect_pair(r, &pair);
@@ -493,7 +493,7 @@ static ebpo_status inspect_first(relation_search *r, ebpo_error *error)
 /* Examines the faces that intersect the other model. */
 static ebpo_status inspect_contacts(relation_search *r, ebpo_error *error)
 {
-    ebpo_status status = take_pairs(r, take_contacts, error);
+    ebpo_status status = receive_pairs(r, receive_contacts, error);
     for (int m = 0; m < 2 && r->both && are_surfaces(r) && must_continue(r); m++)
         r->only[m] = has_separate_area(r, m);
     if (status == EBPO_OK && (r->both || !are_surfaces(r)))
@@ -511,7 +511,7 @@ static ebpo_status examine_models(relation_search *r, ebpo_error *error)
         inspect_patches(r, m);
         status = r->status;
     }
-    if (status == EBPO_OK && !r->open && !r->both && !are_surfaces(r) && r->out->contact == 1)
+    if (status == EBPO_OK && !r->late && !r->both && !are_surfaces(r) && r->out->contact == 1)
         status = find_common_point(r, error);
     return status;
 }
@@ -519,8 +519,8 @@ static ebpo_status examine_models(relation_search *r, ebpo_error *error)
 /* Returns the relation of the query's first model to its second. */
 static ebpo_relation relation_of(const relation_search *r)
 {
-    if (r->open)
-        return EBPO_RELATION_OPEN;
+    if (r->late)
+        return EBPO_RELATION_UNDECIDED;
     if (are_surfaces(r))
         return !r->touch                    ? EBPO_DISJOINT
                : !r->both                   ? EBPO_TOUCHING
@@ -594,7 +594,7 @@ ebpo_status ebpo_collide_relation(ebpo_collider *c, const ebpo_collide_options *
 {
     EBPO_DEFAULT_FP;
     ebpo_collision q;
-    *out = (ebpo_relation_result){ EBPO_RELATION_OPEN, -1 };
+    *out = (ebpo_relation_result){ EBPO_RELATION_UNDECIDED, -1 };
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     relation_search r = { .collision = &q, .out = out, .error = error };
     if (status == EBPO_OK)

@@ -2,8 +2,8 @@
  * on demand. The gap of two envelopes is a lower bound of the distance of the nodes' faces.
  *
  * Queries of levels, distances and separation distances use this search; each decides when to stop.
- * The larger of two nodes is divided first. Several pairs of nodes of a whole model and a model in
- * parts may need the same subtree: it is visited once. A search runs in one thread. */
+ * The larger of two nodes is divided first. Several pairs of nodes of a whole model and a partly
+ * loaded model may need the same subtree: it is visited once. A search runs in one thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -125,8 +125,8 @@ int ebpo_subtree_search_side(const ebpo_subtree_search *s, const ebpo_posed_node
     return is_gray(&node[!larger]) && !s->collision->model[!larger]->whole ? !larger : -1;
 }
 
-/* Returns true if a pair of subtrees has been visited. With a whole model and a model in parts,
- * several pairs of nodes need the same pair of subtrees. */
+/* Returns true if a pair of subtrees has been visited. With a whole model and a partly loaded
+ * model, several pairs of nodes need the same pair of subtrees. */
 static bool was_visited(const ebpo_subtree_search *s, const uint32_t number[2])
 {
     for (int i = 0; i < 2; i++)

@@ -50,7 +50,7 @@ int ebpo_node_larger(const ebpo_node_gaps *g, const ebpo_posed_node node[2]);
 typedef struct ebpo_subtree_search {
     const ebpo_collision *collision;
     ebpo_node_gaps nodes;
-    ebpo_context *context[2]; /* for models in parts */
+    ebpo_context *context[2]; /* for partly loaded models */
     bool *seen[2];            /* [subtree] it has been visited */
     uint64_t read_before;     /* bytes that had been read before the search */
 } ebpo_subtree_search;
@@ -66,9 +66,9 @@ void ebpo_subtree_search_end(ebpo_subtree_search *s);
  * of subtrees is loaded. */
 int ebpo_subtree_search_side(const ebpo_subtree_search *s, const ebpo_posed_node node[2]);
 
-/* Sets accel[2] to the hierarchies of two subtrees, loaded if necessary; they are valid until the
- * next call. *there is false, and nothing is set, if a subtree has no faces or the pair was visited
- * before. */
+/* Sets accel (acceleration structure of a subtree)[2] to the hierarchies of two subtrees, loaded if
+ * necessary; they are valid until the next call. *there is false, and nothing is set, if a subtree
+ * has no faces or the pair was visited before. */
 EBPO_MUST_USE ebpo_status ebpo_subtree_search_load(ebpo_subtree_search *s,
                                                    const ebpo_posed_node node[2],
                                                    const ebpo_accel *accel[2], bool *there,

@@ -1,4 +1,4 @@
-/* Finds all pairs of intersecting faces of models that are loaded in parts, with the same result as
+/* Finds all pairs of intersecting faces of partly loaded models, with the same result as
  * for whole models.
  *
  * Two faces with a common point are listed by the subtrees whose cells contain that point. So only
@@ -47,7 +47,7 @@ typedef struct stored_pair {
 typedef struct subtree_walk {
     const ebpo_collision *collision;
     bool self;                /* both models are one, at one pose */
-    ebpo_context *context[2]; /* for models in parts; they hold the last two subtrees */
+    ebpo_context *context[2]; /* for partly loaded models; they hold the last two subtrees */
     ebpo_pair_walk walk;
     stored_pair *stored; /* [count] pairs of faces of the last pair of subtrees, in no order */
     uint64_t count, capacity;

@@ -1,4 +1,4 @@
-/* Finds all pairs of intersecting faces of models that are loaded in parts. */
+/* Finds all pairs of intersecting faces of partly loaded models. */
 #ifndef EBPO_COLLIDE_SUBTREE_WALK_H
 #define EBPO_COLLIDE_SUBTREE_WALK_H
 

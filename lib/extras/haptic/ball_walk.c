@@ -188,7 +188,7 @@ void ebpo_ball_begin(ebpo_ball_walk *w)
     w->stage = EBPO_BALL_SEARCHES;
     w->part = 1;
     w->contacts.count = 0;
-    w->cut = false;
+    w->work_limited = false;
     w->queue.count = 0;
     if (w->box && w->box->count > 0)
         push_node(w, 1);
@@ -222,7 +222,7 @@ static bool end_before_waiting(ebpo_ball_walk *w)
         return false;
     w->part = w->queue.item[0].key;
     w->contacts.count = 0;
-    w->cut = true;
+    w->work_limited = true;
     return true;
 }
 

@@ -48,7 +48,7 @@ typedef struct ebpo_ball_walk {
     double reach, band, slack, least_slack;
     double part;               /* part of the path until the first contact */
     ebpo_held_planes contacts; /* normals of the contacts there */
-    bool cut;                  /* the path ends before the contact, because the limit
+    bool work_limited;         /* the path ends before the contact, because the limit
                                 * of work was reached */
     double to[3];              /* end of the piece, known after the search */
     ebpo_near_queue queue;     /* used at EBPO_BALL_SEARCHES */

@@ -1,5 +1,5 @@
-/* The faces in a box around the proxy, with a tree of boxes over them: the only geometry that a
- * haptic step reads.
+/* Loads the faces in a box around the proxy, with a tree of boxes over them: the only geometry that
+ * a haptic step reads.
  *
  * The loading thread makes a box; a box never changes while a step uses it. Faces keep the order of
  * the file, which follows a space-filling curve, so the tree needs no sorting. Functions that steps
@@ -70,7 +70,7 @@ typedef struct loading {
     bool fits;
 } loading;
 
-static bool take_triangles(void *user, const ebpo_triangles *triangles)
+static bool receive_triangles(void *user, const ebpo_triangles *triangles)
 {
     loading *l = user;
     ebpo_face_box *box = l->box;
@@ -124,7 +124,7 @@ ebpo_status ebpo_face_box_load(ebpo_face_box *box, ebpo_context *context,
     }
     ebpo_vec3_copy(min, box->loaded.min);
     ebpo_vec3_copy(max, box->loaded.max);
-    ebpo_status status = ebpo_triangles_in_box(context, min, max, take_triangles, &l, error);
+    ebpo_status status = ebpo_triangles_in_box(context, min, max, receive_triangles, &l, error);
     *fits = l.fits;
     if (status == EBPO_OK && l.fits)
         make_tree(box);

@@ -1,7 +1,6 @@
-/* The faces in a box, with a tree of boxes over them, for haptic steps; distances from these faces,
- * and the side of a point. The loading thread makes a box; a box never changes while a step uses
- * it.
- */
+/* Loads the faces in a box, with a tree of boxes over them, for haptic steps; distances from these
+ * faces, and the side of a point. The loading thread makes a box; a box never changes while a step
+ * uses it. */
 #ifndef EBPO_HAPTIC_FACE_BOX_H
 #define EBPO_HAPTIC_FACE_BOX_H
 

@@ -1,5 +1,4 @@
-/* The object of a haptic session: its options and memory, the step of a ball, and the placement of
- * the proxy.
+/* Makes the object of a haptic session, computes the step of a ball, and places the proxy.
  *
  * A step moves the proxy towards the device (haptic_step.c); the planes in contact with the proxy
  * hold it back. The step returns the force of a spring between proxy and device, with friction

@@ -1,4 +1,5 @@
-/* The thread that loads boxes of faces ahead of the haptic device, and exact results for probes.
+/* Loads boxes of faces ahead of the haptic device, and queries exact results for probes, in a
+ * separate thread. A box is a set of loaded faces (face_box.h).
  *
  * A haptic step never waits for this thread. Boxes and results are passed through buffers that are
  * exchanged atomically: the loader writes its buffer and swaps it with the middle one; the step
@@ -18,7 +19,7 @@
 #include "geometry/vec3.h"
 
 /* Queries distance and side at out->place, and sets the other members of *out. */
-static ebpo_status query_known_result(ebpo_haptic *t, ebpo_known_result *out, ebpo_error *error)
+static ebpo_status query_probe(ebpo_haptic *t, ebpo_probe_query *out, ebpo_error *error)
 {
     ebpo_distance_result near;
     ebpo_inside_result inside = { .where = EBPO_OUT };
@@ -40,14 +41,14 @@ static ebpo_status query_known_result(ebpo_haptic *t, ebpo_known_result *out, eb
  * false, and nothing happens, if the position is that of the last query. */
 static ebpo_status query_position(ebpo_haptic *t, bool *moved, ebpo_error *error)
 {
-    ebpo_known_result *known = &t->known[t->loader_result];
+    ebpo_probe_query *known = &t->known[t->loader_result];
     for (int i = 0; i < 3; i++)
         known->place[i] = atomic_load_explicit(&t->device_reported[i], memory_order_relaxed);
     *moved = known->place[0] != t->last_query[0] || known->place[1] != t->last_query[1] ||
              known->place[2] != t->last_query[2];
     if (!*moved)
         return EBPO_OK;
-    ebpo_status status = query_known_result(t, known, error);
+    ebpo_status status = query_probe(t, known, error);
     if (status != EBPO_OK)
         return status;
     ebpo_vec3_copy(known->place, t->last_query);
@@ -58,7 +59,7 @@ static ebpo_status query_position(ebpo_haptic *t, bool *moved, ebpo_error *error
     return EBPO_OK;
 }
 
-const ebpo_known_result *ebpo_haptic_known(ebpo_haptic *t)
+const ebpo_probe_query *ebpo_haptic_newest_probe_query(ebpo_haptic *t)
 {
     if (atomic_load_explicit(&t->waiting_result, memory_order_relaxed) & EBPO_HAPTIC_FRESH) {
         unsigned got =
@@ -101,8 +102,8 @@ static void predict_device(ebpo_haptic *t, double out[3])
         t->speed_time = now;
 }
 
-/* Computes the centres of a box around the proxy, shifted towards `goal`, the predicted position.
- */
+/* Computes the positions of the ball's centre for which a new box must have all faces: a cube
+ * around the proxy, shifted towards `goal`, the predicted position of the device. */
 static void place_box(const ebpo_haptic *t, const double goal[3], ebpo_extent *out)
 {
     for (int i = 0; i < 3; i++) {
@@ -125,7 +126,7 @@ static bool is_far_from_newest(const ebpo_haptic *t, const ebpo_extent *e)
     return false;
 }
 
-/* Passes the loaded box to the haptic steps, and receives another one. */
+/* Passes the loaded box to the haptic steps, and gets a free box in exchange. */
 static void pass_box(ebpo_haptic *t, uint64_t began)
 {
     uint64_t ns = ebpo_clock() - began;

@@ -1,4 +1,5 @@
-/* The object of a haptic session, in groups of members: who may use a group, and when. */
+/* Defines the object of a haptic session. Its members are in groups; comments state which thread
+ * may use a group. */
 #ifndef EBPO_HAPTIC_HAPTIC_PARTS_H
 #define EBPO_HAPTIC_HAPTIC_PARTS_H
 
@@ -25,14 +26,14 @@ enum {
     EBPO_HAPTIC_PIECES = EBPO_HAPTIC_PATH_MAX - 1
 };
 
-/* Exact results of the loading thread for a position of a probe. */
-typedef struct ebpo_known_result {
+/* Exact results of the loading thread for a position of the probe. */
+typedef struct ebpo_probe_query {
     double place[3];            /* the position */
     double distance;            /* without a sign; infinite if the model has no faces */
     double point[3], normal[3]; /* nearest point, and normal of its face */
     int32_t winding;
     bool valid, on_face; /* the results have been set; the position is on a face */
-} ebpo_known_result;
+} ebpo_probe_query;
 
 struct ebpo_haptic {
     /* --- constant members --- */
@@ -78,7 +79,7 @@ struct ebpo_haptic {
                                        * loader may read a mixture of two positions. Therefore the
                                        * step checks that a new box contains the proxy. */
     _Atomic double device_reported[3];
-    ebpo_known_result known[3];
+    ebpo_probe_query known[3];
     atomic_uint waiting_result; /* the same for known[] */
     _Atomic bool stop, stopped; /* stopped: by a failure; `failure` is set before */
     atomic_uint_fast64_t loads, too_many, load_ns, load_ns_max;
@@ -106,14 +107,14 @@ uint32_t ebpo_haptic_move_ball(ebpo_haptic *t, const double goal[3], ebpo_ball_w
 /* haptic_step.c: returns the part, 0 to 1, of the proxy's straight path `motion` for which all
  * faces within `reach` are loaded: it ends at the boundary of the current box, except where no face
  * of the model can be within `reach`. */
-double ebpo_haptic_known_part(const ebpo_haptic *t, const double motion[3], double reach);
+double ebpo_haptic_loaded_part(const ebpo_haptic *t, const double motion[3], double reach);
 
 /* haptic_step.c: finds the nearest face, its weights, the depth and the smooth normal, and sets
  * t->away. */
 void ebpo_haptic_find_nearest(ebpo_haptic *t, ebpo_haptic_ball_result *out);
 
-/* haptic_loader.c: returns the newest result for a probe. */
-const ebpo_known_result *ebpo_haptic_known(ebpo_haptic *t);
+/* haptic_loader.c: returns the newest exact results for the probe. */
+const ebpo_probe_query *ebpo_haptic_newest_probe_query(ebpo_haptic *t);
 
 /* haptic_loader.c: start and stop the loading thread. */
 EBPO_MUST_USE ebpo_status ebpo_haptic_loader_start(ebpo_haptic *t, ebpo_error *error);

@@ -1,4 +1,4 @@
-/* The haptic step of a probe: bounds of its distance to the surface, and its side.
+/* Computes the haptic step of a probe: bounds of its distance to the surface, and its side.
  *
  * Certain bounds come from three sources: the faces of the current box, the exact result for a
  * recent position of the probe, and the first levels of the octree. The step returns the
@@ -64,7 +64,7 @@ static bool bound_by_faces(ebpo_haptic *t, const double place[3], ebpo_haptic_pr
 static bool bound_by_known(ebpo_haptic *t, const double place[3], ebpo_haptic_probe_result *out,
                            bounds *b)
 {
-    const ebpo_known_result *known = ebpo_haptic_known(t);
+    const ebpo_probe_query *known = ebpo_haptic_newest_probe_query(t);
     double motion[3];
     if (!known->valid)
         return false;
@@ -82,7 +82,7 @@ static bool bound_by_known(ebpo_haptic *t, const double place[3], ebpo_haptic_pr
  */
 static bool find_side(ebpo_haptic *t, const double place[3], ebpo_haptic_probe_result *out)
 {
-    const ebpo_known_result *known = &t->known[t->step_result];
+    const ebpo_probe_query *known = &t->known[t->step_result];
     const ebpo_face_box *box = &t->box[t->current_box];
     for (int attempt = 0; attempt < 2; attempt++) {
         if (ebpo_side_move(&t->side, box, place, t->found, EBPO_HAPTIC_FACES, EBPO_HAPTIC_VISITS,

@@ -1,12 +1,14 @@
-/* The path of the proxy in a haptic step: straight until the ball is in contact, then along the
- * contacts, repeated a few times.
+/* Moves the proxy in a haptic step towards the position of the device. The proxy is the centre of a
+ * ball that stays outside of the model. Its path is straight until the ball is in contact, then
+ * along the contacts, repeated a few times.
  *
  * Each straight piece is decided in two passes: distances find where the ball stops, and exact
- * arithmetic checks that the centre has crossed no face. A piece takes several steps if very many
- * faces are around the ball.
+ * arithmetic checks that the centre has crossed no face. If very many faces are around the ball, a
+ * piece is completed in later haptic steps.
  *
- * This file also exchanges boxes with the loading thread, and finds the nearest face with a normal
- * that changes continuously. */
+ * This file also takes over the boxes (sets of loaded faces, face_box.h) of the loading thread. It
+ * finds the nearest face, and computes the smooth normal, which changes continuously with the
+ * position of the proxy. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -23,6 +25,8 @@ static void swap_boxes(ebpo_haptic *t)
     t->previous_box = before;
 }
 
+/* The newest box replaces the previous one. If it contains the proxy, it becomes the current one.
+ */
 bool ebpo_haptic_take_box(ebpo_haptic *t)
 {
     if (!(atomic_load_explicit(&t->waiting_box, memory_order_relaxed) & EBPO_HAPTIC_FRESH))
@@ -142,7 +146,8 @@ static bool has_no_face_close(const ebpo_haptic *t)
 }
 
 /* Computes the smooth normal: the normalised sum of the normals of the faces around the ball. If
- * the sum is 0, the normal of a ball is the direction away from the nearest face. */
+ * the sum is 0 and the tool is a ball (EBPO_HAPTIC_BALL), returns the direction away from the
+ * nearest face. */
 static void report_normal(const face_search *a, double out[3])
 {
     double sum[3] = { 0 };
@@ -184,9 +189,10 @@ void ebpo_haptic_find_nearest(ebpo_haptic *t, ebpo_haptic_ball_result *out)
 /* The path of the proxy in one haptic step. */
 typedef struct path_step {
     ebpo_haptic *t;
-    const double *goal;                   /* [3] */
-    double motion[3], slack, least_slack; /* of the current piece: as in ebpo_ball_motion */
-    uint32_t flags;                       /* bits of ebpo_haptic_flag, for the caller */
+    const double *goal; /* [3] */
+    double motion[3], slack,
+        least_slack; /* of the current piece: see ebpo_ball_motion (face_box.h) */
+    uint32_t flags;  /* bits of ebpo_haptic_flag, for the caller */
     ebpo_ball_work *work;
 } path_step;
 
@@ -212,8 +218,8 @@ static void shorten_motion(double motion[3], double part)
         motion[i] *= part;
 }
 
-/* Returns the part, 0 to 1, of the path from the point p in `e` that is in `e`; slightly less, so
- * that the rounded end is in `e`. */
+/* Returns the part, 0 to 1, of the path from p that is in `e`; p must be in `e`. The part is
+ * rounded down, so that the computed end is also in `e`. */
 static double part_inside(const double p[3], const double motion[3], const ebpo_extent *e)
 {
     double part = 1;
@@ -227,7 +233,7 @@ static double part_inside(const double p[3], const double motion[3], const ebpo_
     return part < 1 ? fmax(0, part * (1 - 0x1p-20)) : 1;
 }
 
-double ebpo_haptic_known_part(const ebpo_haptic *t, const double motion[3], double reach)
+double ebpo_haptic_loaded_part(const ebpo_haptic *t, const double motion[3], double reach)
 {
     const ebpo_extent *centres = &t->box[t->current_box].centres;
     ebpo_extent all;
@@ -239,10 +245,10 @@ double ebpo_haptic_known_part(const ebpo_haptic *t, const double motion[3], doub
 
 /* Shortens the piece to the part around which all faces are loaded. Returns false if no box
  * contains the proxy. */
-static bool cut_to_known_part(path_step *s)
+static bool cut_to_loaded_part(path_step *s)
 {
     ebpo_haptic *t = s->t;
-    double part = ebpo_haptic_known_part(t, s->motion, t->reach + t->band);
+    double part = ebpo_haptic_loaded_part(t, s->motion, t->reach + t->band);
     if (part < 1) {
         t->end_flags = EBPO_HAPTIC_WAITING;
         shorten_motion(s->motion, part);
@@ -277,7 +283,7 @@ static bool begin_piece(path_step *s)
     if (whole <= 0x1p-12 * t->options.skin)
         return false;
     t->end_flags = 0;
-    if (!cut_to_known_part(s))
+    if (!cut_to_loaded_part(s))
         return false;
     /* s->slack and s->least_slack belong to the whole path to the device: scale them to this piece
      */
@@ -285,8 +291,8 @@ static bool begin_piece(path_step *s)
     const ebpo_face_box *box = &t->box[t->current_box];
     ebpo_vec3_copy(t->proxy, w->from);
     ebpo_vec3_copy(s->motion, w->motion);
-    w->box = ebpo_extent_holds(&box->centres, t->proxy) ? box : NULL; /* NULL is possible: see
-                                                                       * cut_to_known_part */
+    w->box = ebpo_extent_holds(&box->centres, t->proxy) ? box : NULL; /* NULL: the whole piece
+                                                                       * is away from all faces */
     w->reach = t->reach;
     w->band = t->band;
     w->slack = s->slack * share;
@@ -295,8 +301,8 @@ static bool begin_piece(path_step *s)
     return true;
 }
 
-/* Makes space for more planes: keeps only the planes along which the last piece went, and at most
- * one less than the limit. Three planes are enough to hold the proxy. */
+/* Makes space for more planes: drops the planes that the last piece moved away from, and one more
+ * if the list is still full. Three planes are enough to hold the proxy. */
 static void reserve_space(ebpo_held_planes *along, const double motion[3])
 {
     double length = sqrt(ebpo_vec3_dot(motion, motion));
@@ -327,21 +333,23 @@ static bool end_piece(path_step *s)
 {
     ebpo_haptic *t = s->t;
     const ebpo_ball_walk *w = &t->walk;
-    bool touches = !w->cut && w->part < 1;
+    bool touches = !w->work_limited && w->part < 1;
     if (w->part > 0) {
         ebpo_vec3_copy(w->to, t->proxy);
         ebpo_vec3_copy(w->to, t->path[t->path_count++]);
     }
     if (touches)
         add_planes(t);
-    s->flags |= touches ? EBPO_HAPTIC_CONTACT : w->cut ? EBPO_HAPTIC_PATH_UNFINISHED : t->end_flags;
+    s->flags |= touches           ? EBPO_HAPTIC_CONTACT
+                : w->work_limited ? EBPO_HAPTIC_PATH_UNFINISHED
+                                  : t->end_flags;
     t->holding_planes = t->contact_planes;
     t->has_complete_piece = true;
     return touches;
 }
 
-/* Returns EBPO_HAPTIC_CONTACT if the contacts of the last complete piece hold the proxy back, while
- * no piece towards the current position of the device is complete; otherwise 0. */
+/* Returns 0 if a piece towards the current position of the device is complete. Otherwise returns
+ * EBPO_HAPTIC_CONTACT if the contacts of the last complete piece keep the proxy from the device. */
 static uint32_t held_flags(const path_step *s)
 {
     const ebpo_haptic *t = s->t;

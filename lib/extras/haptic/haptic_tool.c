@@ -1,6 +1,6 @@
-/* A haptic step of a tool. The motion follows Gauss' principle for a body without mass: of all
- * motions that its contacts allow, the tool makes the one nearest to the device's motion (Ortega,
- * Redon, Coquillart 2007).
+/* Computes a haptic step of a tool, a rigid set of points. The motion follows Gauss' principle for
+ * a body without mass: of all motions that its contacts allow, the tool makes the one nearest to
+ * the device's motion (Ortega, Redon, Coquillart 2007).
  *
  * A piece of the path is decided in two passes. First, each point that may hit a face is followed
  * along the path, up to where the first point comes too close to a face. Then all these points are
@@ -274,7 +274,7 @@ static bool begin_tool_motion(ebpo_haptic *t, const double wanted[EBPO_SCREW], u
         tool->motion[k] = wanted[k];
     tool->flags = 0;
     limit_angle(t, tool->motion, &tool->flags);
-    double part = ebpo_haptic_known_part(t, tool->motion, tool->radius + search * t->options.skin);
+    double part = ebpo_haptic_loaded_part(t, tool->motion, tool->radius + search * t->options.skin);
     if (part < 1) {
         tool->flags |= EBPO_HAPTIC_WAITING;
         if (part <= 0) {
@@ -294,7 +294,7 @@ static bool begin_tool_motion(ebpo_haptic *t, const double wanted[EBPO_SCREW], u
     return true;
 }
 
-/* Gives up the piece: too many faces are close, or its end is not allowed. The next piece is
+/* Abandons the piece: too many faces are close, or its end is not allowed. The next piece is
  * shorter. */
 static uint32_t give_up_piece(tool_piece *p)
 {

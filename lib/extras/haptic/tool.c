@@ -1,4 +1,4 @@
-/* A tool: a rigid set of points, the contacts that hold it, and its forces.
+/* Computes the motion of a tool, a rigid set of points: the contacts that hold it, and its forces.
  *
  * Points are split at the middle of their longest side into clusters of few points. A rotation is
  * measured as a length: its angle times the tool's arm.

@@ -21,8 +21,8 @@
 #include "query/query_model.h"
 
 /* Sets *out from the caller's options, or to the defaults for NULL, and checks it. */
-static ebpo_status take_map_options(ebpo_map_options *out, const ebpo_map_options *given,
-                                    ebpo_error *error)
+static ebpo_status check_map_options(ebpo_map_options *out, const ebpo_map_options *given,
+                                     ebpo_error *error)
 {
     *out = (ebpo_map_options)EBPO_MAP_OPTIONS_INIT;
     ebpo_status status = EBPO_TAKE(ebpo_map_options, out, given, error);
@@ -100,7 +100,7 @@ ebpo_status ebpo_map_points(ebpo_model *model, const double *points, uint64_t co
     EBPO_DEFAULT_FP;
     ebpo_map_options o;
     points_job job = { .points = points, .distances = distances };
-    ebpo_status status = take_map_options(&o, options, error);
+    ebpo_status status = check_map_options(&o, options, error);
     if (status == EBPO_OK)
         status = ebpo_check_points(points, count, error);
     if (status != EBPO_OK)
@@ -247,7 +247,7 @@ ebpo_status ebpo_map_lattice(ebpo_model *model, const ebpo_lattice *lattice,
     EBPO_DEFAULT_FP;
     ebpo_map_options o;
     slab_job job = { .lattice = lattice };
-    ebpo_status status = take_map_options(&o, options, error);
+    ebpo_status status = check_map_options(&o, options, error);
     if (status == EBPO_OK)
         status = check_lattice(lattice, error);
     if (status != EBPO_OK)

@@ -350,8 +350,8 @@ typedef struct writing {
     map_sums *sums;
 } writing;
 
-static ebpo_status take_layers(void *user, const double *values, uint64_t first, uint64_t layers,
-                               ebpo_error *error)
+static ebpo_status receive_layers(void *user, const double *values, uint64_t first, uint64_t layers,
+                                  ebpo_error *error)
 {
     writing *w = user;
     const ebpo_lattice *l = w->file.lattice;
@@ -389,7 +389,7 @@ ebpo_status ebpo_map_write(ebpo_model *model, const ebpo_lattice *lattice, const
     if (status == EBPO_OK)
         status = write_begin(&w, &publish, error);
     if (status == EBPO_OK)
-        status = ebpo_map_lattice(model, lattice, options, take_layers, &w, error);
+        status = ebpo_map_lattice(model, lattice, options, receive_layers, &w, error);
     if (status == EBPO_OK && format != EBPO_MAP_NRRD)
         status = map_vtkhdf_end(&w.file, error);
     ebpo_h5_close_id(&w.file.out, w.file.values);

@@ -1,6 +1,8 @@
 /* Computes colours of a mesh's vertices from paint, and finds the faces that a stroke covers.
  *
- * A stroke covers the faces and vertices in the reaches of its points (paint_reach.h). The strokes
+ * Each point of a stroke has a ball. The reach of the point are the faces that are connected with
+ * the point's face within this ball (paint_reach.h). A stroke covers the faces and vertices in the
+ * reaches of its points. The strokes
  * of a layer are applied in order. Then the layers are blended in order over the original colours
  * of the vertices. Colours are stored in the mesh's existing columns, in the columns' types; a mesh
  * without colours gets new columns.
@@ -30,19 +32,19 @@ static void put_byte(const ebpo_colour_column *c, uint64_t row, uint8_t value)
 {
     uint8_t *to = c->of->values + row * ebpo_attribute_row_bytes(c->of) +
                   (uint64_t)c->column * ebpo_attribute_bytes(c->of->type);
-    const uint16_t full = (uint16_t)(257 * value), two = value;
-    const uint32_t four = value;
-    const float share = (float)(value / 255.0);
-    const double exact = value / 255.0;
+    const uint16_t scaled16 = (uint16_t)(257 * value), value16 = value;
+    const uint32_t value32 = value;
+    const float as_float = (float)(value / 255.0);
+    const double as_double = value / 255.0;
     switch (c->of->type) {
     case EBPO_ATTRIBUTE_INT8: *to = value < 127 ? value : 127; break; /* maximum of the type */
     case EBPO_ATTRIBUTE_UINT8: *to = value; break;
-    case EBPO_ATTRIBUTE_INT16: memcpy(to, &two, sizeof two); break;
-    case EBPO_ATTRIBUTE_UINT16: memcpy(to, &full, sizeof full); break;
+    case EBPO_ATTRIBUTE_INT16: memcpy(to, &value16, sizeof value16); break;
+    case EBPO_ATTRIBUTE_UINT16: memcpy(to, &scaled16, sizeof scaled16); break;
     case EBPO_ATTRIBUTE_INT32:
-    case EBPO_ATTRIBUTE_UINT32: memcpy(to, &four, sizeof four); break;
-    case EBPO_ATTRIBUTE_FLOAT32: memcpy(to, &share, sizeof share); break;
-    case EBPO_ATTRIBUTE_FLOAT64: memcpy(to, &exact, sizeof exact); break;
+    case EBPO_ATTRIBUTE_UINT32: memcpy(to, &value32, sizeof value32); break;
+    case EBPO_ATTRIBUTE_FLOAT32: memcpy(to, &as_float, sizeof as_float); break;
+    case EBPO_ATTRIBUTE_FLOAT64: memcpy(to, &as_double, sizeof as_double); break;
     }
 }
 
@@ -92,7 +94,8 @@ static int by_file_face(const void *a, const void *b)
     return (x->file_face > y->file_face) - (x->file_face < y->file_face);
 }
 
-static ebpo_status add_point(ebpo_found_faces *found_faces, ebpo_reach *reach, ebpo_error *error)
+static ebpo_status add_point(ebpo_found_faces *found_faces, ebpo_reach_search *reach,
+                             ebpo_error *error)
 {
     for (uint64_t i = 0; i < reach->count; i++) {
         const ebpo_reach_face *f = &reach->face[i];
@@ -121,13 +124,13 @@ static void pass_faces(const ebpo_found_faces *found_faces, ebpo_paint_face_fn t
 }
 
 ebpo_status ebpo_paint_cover(const ebpo_paint *p, ebpo_context *context, uint64_t stroke,
-                             ebpo_paint_face_fn take, void *user, uint64_t *elsewhere,
+                             ebpo_paint_face_fn take, void *user, uint64_t *points_outside_subset,
                              ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     ebpo_found_faces found_faces = { 0 };
-    ebpo_reach reach;
-    uint64_t absent = 0;
+    ebpo_reach_search reach;
+    uint64_t outside = 0;
     ebpo_status status = ebpo_paint_check_context(p, context, error);
     if (status == EBPO_OK && stroke >= p->stroke_count)
         status = ebpo_fail(error, EBPO_E_ARGUMENT, "there is no stroke %llu",
@@ -140,11 +143,11 @@ ebpo_status ebpo_paint_cover(const ebpo_paint *p, ebpo_context *context, uint64_
         status = ebpo_paint_reach(&reach, p, stroke, i, &complete, error);
         if (status == EBPO_OK && complete)
             status = add_point(&found_faces, &reach, error);
-        absent += status == EBPO_OK && !complete;
+        outside += status == EBPO_OK && !complete;
     }
     ebpo_reach_end(&reach);
-    if (status == EBPO_OK && elsewhere)
-        *elsewhere = absent;
+    if (status == EBPO_OK && points_outside_subset)
+        *points_outside_subset = outside;
     if (status == EBPO_OK)
         pass_faces(&found_faces, take, user);
     ebpo_found_faces_free(&found_faces);
@@ -153,8 +156,8 @@ ebpo_status ebpo_paint_cover(const ebpo_paint *p, ebpo_context *context, uint64_
 
 /* --- all points --- */
 
-static ebpo_status check_point(ebpo_reach *reach, const ebpo_paint_point *q, const char *what,
-                               uint64_t number, ebpo_error *error)
+static ebpo_status check_point(ebpo_reach_search *reach, const ebpo_paint_point *q,
+                               const char *what, uint64_t number, ebpo_error *error)
 {
     bool fits;
     ebpo_status status = ebpo_reach_check(reach, q->place, q->face, &fits, error);
@@ -162,9 +165,8 @@ static ebpo_status check_point(ebpo_reach *reach, const ebpo_paint_point *q, con
                ? status
                : ebpo_fail_file(
                      error, EBPO_E_FORMAT, reach->context->model->file->in.shown,
-                     "%s %llu of the paint is not on its face %lu: the paint does not fit the "
-                     "model; give the model that it was made on, or remove that %s without "
-                     "naming a model",
+                     "a point of %s %llu is not on its face %lu: the paint was made on another "
+                     "model; give that model, or remove the %s with a command without a model",
                      what, (unsigned long long)number, (unsigned long)q->face, what);
 }
 
@@ -173,7 +175,7 @@ ebpo_status ebpo_paint_check_points(const ebpo_paint *p, ebpo_context *context,
 {
     EBPO_DEFAULT_FP;
     enum { STEP = 1024 };
-    ebpo_reach reach;
+    ebpo_reach_search reach;
     uint64_t done = 0;
     ebpo_status status = ebpo_paint_check_context(p, context, error);
     if (status != EBPO_OK)
@@ -210,8 +212,9 @@ typedef struct bake {
     const ebpo_progress *progress;
     uint8_t *rgba;
     ebpo_context *context;
-    ebpo_reacher *reacher;
-    uint32_t *numbers;         /* [row] source index of the mesh's face, ascending; NULL: the row */
+    ebpo_reach_pool *reach_pool;
+    uint32_t *numbers;         /* [face] source index of each face of the mesh, ascending; NULL: a
+                                * face's source index is its index in the mesh */
     uint32_t *slot;            /* [vertex_count] index in `vertices`, plus 1; 0: none */
     coloured_vertex *vertices; /* [count] */
     uint64_t count, capacity;  /* of `vertices` */
@@ -281,7 +284,7 @@ static ebpo_status find_vertex(bake *b, uint32_t vertex, coloured_vertex **out, 
 
 /* Applies a stroke to a vertex, unless this stroke was the last one that was applied to it. number:
  * index of the stroke. */
-static void colour_vertex(coloured_vertex *d, const ebpo_stroke_held *s, uint32_t number)
+static void colour_vertex(coloured_vertex *d, const ebpo_stroke_data *s, uint32_t number)
 {
     double share = s->rgba[3] / 255.0;
     if (d->layer != s->layer + 1) {
@@ -300,19 +303,23 @@ static void colour_vertex(coloured_vertex *d, const ebpo_stroke_held *s, uint32_
 
 /* Applies a stroke to the vertices of a face that are within a point's ball. *any: set to true if
  * there are any. */
-static ebpo_status colour_face(bake *b, const ebpo_reached_face *f, const ebpo_stroke_held *s,
+static ebpo_status colour_face(bake *b, const ebpo_reach_result_face *f, const ebpo_stroke_data *s,
                                uint32_t number, bool *any, ebpo_error *error)
 {
     uint64_t row = row_of(b, f->face);
     if (row >= b->mesh->face_count)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "the mesh is not the model's");
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "the mesh does not belong to the model; read it with "
+                         "ebpo_file_read_source_mesh");
     for (int k = 0; k < 3; k++) {
         coloured_vertex *d = NULL;
         if (!f->within[k])
             continue;
         uint32_t vertex = b->mesh->faces[3 * row + (unsigned)k];
         if (vertex >= b->mesh->vertex_count)
-            return ebpo_fail(error, EBPO_E_ARGUMENT, "the mesh is not the model's");
+            return ebpo_fail(error, EBPO_E_ARGUMENT,
+                             "the mesh does not belong to the model; read it with "
+                             "ebpo_file_read_source_mesh");
         ebpo_status status = find_vertex(b, vertex, &d, error);
         if (status != EBPO_OK)
             return status;
@@ -324,22 +331,22 @@ static ebpo_status colour_face(bake *b, const ebpo_reached_face *f, const ebpo_s
 
 static ebpo_status apply_stroke(bake *b, uint32_t number, ebpo_error *error)
 {
-    const ebpo_stroke_held *s = &b->p->stroke[number];
+    const ebpo_stroke_data *s = &b->p->stroke[number];
     ebpo_status status = EBPO_OK;
     for (uint32_t i = 0; i < s->count && status == EBPO_OK; i++, b->done++) {
-        ebpo_reached reached;
+        ebpo_reach_result reached;
         bool any = false;
         if (b->done % 256 == 0 &&
             !ebpo_progress_step(b->progress, "bake", b->done, b->p->point_count, error))
             return EBPO_E_CANCELLED;
-        status = ebpo_reacher_find(b->reacher, number, i, &reached, error);
+        status = ebpo_reach_pool_find(b->reach_pool, number, i, &reached, error);
         if (status != EBPO_OK)
             return status;
         for (uint64_t k = 0; status == EBPO_OK && k < reached.count; k++)
             status = colour_face(b, &reached.face[k], s, number, &any, error);
         b->baked.points++;
-        b->baked.elsewhere += !reached.complete;
-        b->baked.between += status == EBPO_OK && reached.complete && !any;
+        b->baked.points_outside_subset += !reached.complete;
+        b->baked.points_without_vertex += status == EBPO_OK && reached.complete && !any;
     }
     return status;
 }
@@ -386,7 +393,8 @@ static ebpo_status check_mesh(const ebpo_context *context, const ebpo_mesh *mesh
                    mesh->vertex_count == info->vertex_count
                ? EBPO_OK
                : ebpo_fail(error, EBPO_E_ARGUMENT,
-                           "the mesh is not that of the model, from ebpo_file_read_source_mesh");
+                           "the mesh does not belong to the model; read it with "
+                           "ebpo_file_read_source_mesh");
 }
 
 ebpo_status ebpo_paint_bake(const ebpo_paint *p, ebpo_context *context, const ebpo_mesh *mesh,
@@ -412,7 +420,7 @@ ebpo_status ebpo_paint_bake(const ebpo_paint *p, ebpo_context *context, const eb
     status = b.slot ? read_numbers(&b, error)
                     : ebpo_fail_memory(error, mesh->vertex_count * sizeof *b.slot);
     if (status == EBPO_OK)
-        status = ebpo_reacher_new(p, context, wanted.threads, &b.reacher, error);
+        status = ebpo_reach_pool_new(p, context, wanted.threads, &b.reach_pool, error);
     if (status == EBPO_OK)
         status = apply_layers(&b, error);
     if (status == EBPO_OK)
@@ -420,7 +428,7 @@ ebpo_status ebpo_paint_bake(const ebpo_paint *p, ebpo_context *context, const eb
     b.baked.vertices = b.count;
     if (status == EBPO_OK && baked)
         EBPO_GIVE(ebpo_paint_baked, baked, &b.baked);
-    ebpo_reacher_free(b.reacher);
+    ebpo_reach_pool_free(b.reach_pool);
     free(b.numbers);
     free(b.slot);
     free(b.vertices);

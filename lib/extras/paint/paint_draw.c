@@ -35,7 +35,7 @@ typedef struct stroke_range {
 typedef struct drawing {
     ebpo_context *context;
     ebpo_paint_pen pen;
-    ebpo_reach reach;
+    ebpo_reach_search reach;
     ebpo_paint_point *point;
     stroke_range *run;
     uint64_t point_count, point_capacity, run_count, run_capacity;
@@ -83,7 +83,7 @@ static ebpo_status check_input(const drawing *l, const ebpo_paint *p, const ebpo
         wrong = "a stroke needs at least one position of the pen";
     for (uint64_t i = 0; i < count && !wrong; i++)
         wrong = input_wrong(&input[i]);
-    ebpo_stroke_held stroke = { .radius = l->pen.radius,
+    ebpo_stroke_data stroke = { .radius = l->pen.radius,
                                 .time = l->pen.time,
                                 .layer =
                                     l->pen.layer < UINT32_MAX ? (uint32_t)l->pen.layer : UINT32_MAX,
@@ -136,8 +136,8 @@ static bool is_found(const ebpo_distance_result *at)
 
 /* Finds the reach of a ball around a point of the model. Fails with EBPO_E_ABSENT if a subset omits
  * some of the faces there. */
-static ebpo_status reach_around(ebpo_reach *reach, const ebpo_distance_result *at, double radius,
-                                ebpo_error *error)
+static ebpo_status reach_around(ebpo_reach_search *reach, const ebpo_distance_result *at,
+                                double radius, ebpo_error *error)
 {
     ebpo_reach_ball ball = { { at->point[0], at->point[1], at->point[2] }, radius, at->face };
     bool complete;
@@ -154,7 +154,7 @@ ebpo_status ebpo_paint_locate(const ebpo_paint *p, ebpo_context *context, const 
 {
     EBPO_DEFAULT_FP;
     ebpo_distance_result at;
-    ebpo_reach reach;
+    ebpo_reach_search reach;
     ebpo_status status = ebpo_paint_check_context(p, context, error);
     if (status == EBPO_OK)
         status = find_nearest(context, place, INFINITY, &at, error);
@@ -219,7 +219,7 @@ static void random_in_disc(uint64_t *state, double out[2])
 }
 
 /* Returns the face of the reach with this index, or NULL. */
-static const ebpo_reach_face *face_of(const ebpo_reach *reach, uint64_t face)
+static const ebpo_reach_face *face_of(const ebpo_reach_search *reach, uint64_t face)
 {
     for (uint64_t i = 0; i < reach->count; i++)
         if (reach->face[i].face == face)

@@ -1,4 +1,5 @@
-/* A paint as an object: its strokes, layers and notes, and the model that it belongs to.
+/* Adds and changes the content of a paint: its layers, strokes and notes. Checks the model that it
+ * belongs to.
  *
  * Strokes are kept in the order in which they were made; the points of a stroke are consecutive.
  * Removing a layer
@@ -37,7 +38,7 @@ const char *ebpo_paint_point_wrong(const ebpo_paint_point *q)
     return NULL;
 }
 
-const char *ebpo_paint_stroke_wrong(const ebpo_stroke_held *s, uint64_t layers)
+const char *ebpo_paint_stroke_wrong(const ebpo_stroke_data *s, uint64_t layers)
 {
     static const uint8_t none[4];
     if (s->layer >= layers)
@@ -59,7 +60,7 @@ ebpo_status ebpo_paint_get_stroke(const ebpo_paint *p, uint64_t number, ebpo_pai
     ebpo_status status = EBPO_CHECK_SIZED(ebpo_paint_stroke, out, NULL);
     if (status != EBPO_OK || number >= p->stroke_count)
         return EBPO_E_ARGUMENT;
-    const ebpo_stroke_held *s = &p->stroke[number];
+    const ebpo_stroke_data *s = &p->stroke[number];
     own.layer = s->layer;
     own.kind = (ebpo_paint_kind)s->kind;
     own.colour = ebpo_paint_pack(s->rgba);
@@ -72,9 +73,9 @@ ebpo_status ebpo_paint_get_stroke(const ebpo_paint *p, uint64_t number, ebpo_pai
 
 /* Checks a stroke, and sets *out to it. */
 static ebpo_status check_stroke(const ebpo_paint *p, const ebpo_paint_stroke *stroke,
-                                ebpo_stroke_held *out, ebpo_error *error)
+                                ebpo_stroke_data *out, ebpo_error *error)
 {
-    *out = (ebpo_stroke_held){ .radius = stroke->radius,
+    *out = (ebpo_stroke_data){ .radius = stroke->radius,
                                .time = stroke->time,
                                .first = p->point_count,
                                .layer = stroke->layer < UINT32_MAX ? (uint32_t)stroke->layer
@@ -96,7 +97,7 @@ static ebpo_status check_stroke(const ebpo_paint *p, const ebpo_paint_stroke *st
 
 ebpo_status ebpo_paint_add_stroke(ebpo_paint *p, const ebpo_paint_stroke *given, ebpo_error *error)
 {
-    ebpo_stroke_held held;
+    ebpo_stroke_data held;
     ebpo_paint_stroke stroke = EBPO_PAINT_STROKE_INIT;
     ebpo_status status = EBPO_TAKE(ebpo_paint_stroke, &stroke, given, error);
     if (status == EBPO_OK)
@@ -121,7 +122,7 @@ ebpo_status ebpo_paint_remove_stroke(ebpo_paint *p, uint64_t number, ebpo_error 
             error, EBPO_E_ARGUMENT,
             "there is no stroke %llu: strokes are numbered from 0, and the paint has %llu",
             (unsigned long long)number, (unsigned long long)p->stroke_count);
-    ebpo_stroke_held removed = p->stroke[number];
+    ebpo_stroke_data removed = p->stroke[number];
     uint64_t end = removed.first + removed.count;
     memmove(p->point + removed.first, p->point + end, (p->point_count - end) * sizeof *p->point);
     p->point_count -= removed.count;
@@ -170,9 +171,9 @@ bool ebpo_paint_texts_begin(char *text[EBPO_PAINT_TEXTS])
 
 /* Checks all texts, then copies them. A date equal to `known` is not checked, so that the date of
  * another program can be kept. of: for messages, such as "a layer". */
-static ebpo_status take_texts(const char *const from[EBPO_PAINT_TEXTS],
-                              const ebpo_paint_text_kind *kinds, const char *of, const char *known,
-                              char *to[EBPO_PAINT_TEXTS], ebpo_error *error)
+static ebpo_status check_texts(const char *const from[EBPO_PAINT_TEXTS],
+                               const ebpo_paint_text_kind *kinds, const char *of, const char *known,
+                               char *to[EBPO_PAINT_TEXTS], ebpo_error *error)
 {
     const char *date = from[EBPO_PAINT_DATE];
     size_t bytes = 0;
@@ -205,9 +206,9 @@ static ebpo_status no_layer(const ebpo_paint *p, uint64_t number, ebpo_error *er
                      (unsigned long long)number, (unsigned long long)p->layer_count);
 }
 
-/* Checks a layer and copies it. known: as in take_texts. */
-static ebpo_status take_layer(const ebpo_paint_layer *given, const char *known,
-                              ebpo_layer_held *out, ebpo_error *error)
+/* Checks a layer and copies it. known: as in check_texts. */
+static ebpo_status copy_layer(const ebpo_paint_layer *given, const char *known,
+                              ebpo_layer_data *out, ebpo_error *error)
 {
     ebpo_paint_layer layer = EBPO_PAINT_LAYER_INIT;
     ebpo_status status = EBPO_TAKE(ebpo_paint_layer, &layer, given, error);
@@ -218,10 +219,10 @@ static ebpo_status take_layer(const ebpo_paint_layer *given, const char *known,
                          "a layer's opacity is 0 to 255, and it is visible or not: 0 or 1");
     const char *texts[EBPO_PAINT_TEXTS] = { layer.title, layer.author, layer.date,
                                             layer.description };
-    *out = (ebpo_layer_held){ .colour = layer.colour,
+    *out = (ebpo_layer_data){ .colour = layer.colour,
                               .opacity = layer.opacity,
                               .visible = layer.visible };
-    return take_texts(texts, ebpo_paint_layer_texts, "a layer", known, out->text, error);
+    return check_texts(texts, ebpo_paint_layer_texts, "a layer", known, out->text, error);
 }
 
 ebpo_status ebpo_paint_get_layer(const ebpo_paint *p, uint64_t number, ebpo_paint_layer *out)
@@ -230,7 +231,7 @@ ebpo_status ebpo_paint_get_layer(const ebpo_paint *p, uint64_t number, ebpo_pain
     ebpo_status status = EBPO_CHECK_SIZED(ebpo_paint_layer, out, NULL);
     if (status != EBPO_OK || number >= p->layer_count)
         return EBPO_E_ARGUMENT;
-    const ebpo_layer_held *l = &p->layer[number];
+    const ebpo_layer_data *l = &p->layer[number];
     own.title = l->text[EBPO_PAINT_TITLE];
     own.author = l->text[EBPO_PAINT_AUTHOR];
     own.date = l->text[EBPO_PAINT_DATE];
@@ -248,7 +249,7 @@ ebpo_status ebpo_paint_add_layer(ebpo_paint *p, const ebpo_paint_layer *layer, u
         return ebpo_fail(error, EBPO_E_LIMIT, "a paint has at most %d layers", EBPO_PAINT_LAYERS);
     if (!ebpo_grow(&p->layer, &p->layer_capacity, p->layer_count + 1, sizeof *p->layer))
         return ebpo_fail_memory(error, sizeof *p->layer);
-    ebpo_status status = take_layer(layer, "", &p->layer[p->layer_count], error);
+    ebpo_status status = copy_layer(layer, "", &p->layer[p->layer_count], error);
     if (status != EBPO_OK)
         return status;
     if (number)
@@ -260,10 +261,10 @@ ebpo_status ebpo_paint_add_layer(ebpo_paint *p, const ebpo_paint_layer *layer, u
 ebpo_status ebpo_paint_set_layer(ebpo_paint *p, uint64_t number, const ebpo_paint_layer *layer,
                                  ebpo_error *error)
 {
-    ebpo_layer_held held;
+    ebpo_layer_data held;
     if (number >= p->layer_count)
         return no_layer(p, number, error);
-    ebpo_status status = take_layer(layer, p->layer[number].text[EBPO_PAINT_DATE], &held, error);
+    ebpo_status status = copy_layer(layer, p->layer[number].text[EBPO_PAINT_DATE], &held, error);
     if (status != EBPO_OK)
         return status;
     free_texts(p->layer[number].text);
@@ -276,7 +277,7 @@ static void drop_strokes(ebpo_paint *p, uint64_t layer)
 {
     uint64_t strokes = 0, points = 0;
     for (uint64_t i = 0; i < p->stroke_count; i++) {
-        ebpo_stroke_held s = p->stroke[i];
+        ebpo_stroke_data s = p->stroke[i];
         if (s.layer == layer)
             continue;
         memmove(p->point + points, p->point + s.first, s.count * sizeof *p->point);
@@ -325,7 +326,7 @@ ebpo_status ebpo_paint_get_note(const ebpo_paint *p, uint64_t number, ebpo_paint
     ebpo_status status = EBPO_CHECK_SIZED(ebpo_paint_note, out, NULL);
     if (status != EBPO_OK || number >= p->note_count)
         return EBPO_E_ARGUMENT;
-    const ebpo_note_held *n = &p->note[number];
+    const ebpo_note_data *n = &p->note[number];
     own.title = n->text[EBPO_PAINT_TITLE];
     own.author = n->text[EBPO_PAINT_AUTHOR];
     own.date = n->text[EBPO_PAINT_DATE];
@@ -354,9 +355,9 @@ ebpo_status ebpo_paint_add_note(ebpo_paint *p, const ebpo_paint_note *given, ebp
     if (!ebpo_grow(&p->note, &p->note_capacity, p->note_count + 1, sizeof *p->note))
         return ebpo_fail_memory(error, sizeof *p->note);
     const char *texts[EBPO_PAINT_TEXTS] = { note.title, note.author, note.date, note.body };
-    ebpo_note_held *held = &p->note[p->note_count];
-    *held = (ebpo_note_held){ .layer = note.layer, .at = note.at };
-    status = take_texts(texts, ebpo_paint_note_texts, "a note", "", held->text, error);
+    ebpo_note_data *held = &p->note[p->note_count];
+    *held = (ebpo_note_data){ .layer = note.layer, .at = note.at };
+    status = check_texts(texts, ebpo_paint_note_texts, "a note", "", held->text, error);
     if (status == EBPO_OK)
         p->note_count++;
     return status;

@@ -338,8 +338,9 @@ typedef struct measure {
     ebpo_found_faces found_faces;
     hit *hit;
     uint64_t hit_count, hit_capacity;
-    uint64_t elsewhere; /* number of points whose reach is not completely in this file */
-    uint64_t *first;    /* [found_faces.count + 1] first hit of each face */
+    uint64_t
+        points_outside_subset; /* number of points whose reach is not completely in this file */
+    uint64_t *first;           /* [found_faces.count + 1] first hit of each face */
     area_keys keys;
     ebpo_paint_colour_area *colour; /* [keys.colours] */
     uint64_t pieces;                /* number of pieces of work */
@@ -348,7 +349,7 @@ typedef struct measure {
 
 /* --- faces in the reaches --- */
 
-static ebpo_status add_point(measure *m, ebpo_reach *reach, uint32_t stroke, uint32_t point,
+static ebpo_status add_point(measure *m, ebpo_reach_search *reach, uint32_t stroke, uint32_t point,
                              ebpo_error *error)
 {
     if (!ebpo_grow(&m->hit, &m->hit_capacity, m->hit_count + reach->count, sizeof *m->hit))
@@ -370,7 +371,7 @@ static ebpo_status add_point(measure *m, ebpo_reach *reach, uint32_t stroke, uin
 static ebpo_status find_hits(measure *m, ebpo_context *context, ebpo_error *error)
 {
     const ebpo_paint *p = m->p;
-    ebpo_reach reach;
+    ebpo_reach_search reach;
     ebpo_status status = EBPO_OK;
     ebpo_reach_begin(&reach, context);
     for (uint32_t s = 0; s < p->stroke_count && status == EBPO_OK; s++)
@@ -384,7 +385,7 @@ static ebpo_status find_hits(measure *m, ebpo_context *context, ebpo_error *erro
                 status = ebpo_paint_reach(&reach, p, s, i, &complete, error);
             if (status == EBPO_OK && complete)
                 status = add_point(m, &reach, s, (uint32_t)point, error);
-            m->elsewhere += status == EBPO_OK && !complete;
+            m->points_outside_subset += status == EBPO_OK && !complete;
         }
     ebpo_reach_end(&reach);
     return status;
@@ -425,7 +426,7 @@ static int by_colour(const void *a, const void *b)
     return (x->colour > y->colour) - (x->colour < y->colour);
 }
 
-static ebpo_paint_colour_area colour_of(const ebpo_stroke_held *s)
+static ebpo_paint_colour_area colour_of(const ebpo_stroke_data *s)
 {
     return (ebpo_paint_colour_area){ .layer = s->layer, .colour = ebpo_paint_pack(s->rgba) };
 }
@@ -532,7 +533,7 @@ static ebpo_status pass_areas(measure *m, ebpo_paint_areas *out, ebpo_error *err
     own.strokes = copy_areas(strokes, m->p->stroke_count);
     own.layers = copy_areas(layers, m->p->layer_count);
     own.faces = m->found_faces.count;
-    own.elsewhere = m->elsewhere;
+    own.points_outside_subset = m->points_outside_subset;
     if (!own.strokes || !own.layers) {
         ebpo_paint_areas_free(&own);
         return ebpo_fail_memory(error, m->p->stroke_count * sizeof *own.strokes);

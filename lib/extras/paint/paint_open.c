@@ -33,7 +33,7 @@
 
 #define OF_STROKES(path, element, cols, member)                                    \
     {                                                                              \
-        "/strokes/" path, element, cols, false, offsetof(ebpo_stroke_held, member) \
+        "/strokes/" path, element, cols, false, offsetof(ebpo_stroke_data, member) \
     }
 #define OF_POINTS(path, element, cols, member)                                   \
     {                                                                            \
@@ -237,7 +237,7 @@ static ebpo_status read_layer(reader *r, uint64_t number, ebpo_error *error)
 {
     char path[32];
     ebpo_head_object group;
-    ebpo_layer_held *l = &r->p->layer[number];
+    ebpo_layer_data *l = &r->p->layer[number];
     snprintf(path, sizeof path, "/layers/%04" PRIu64, number);
     ebpo_status status = ebpo_head_open_group(&r->head, path, &group, error);
     if (status == EBPO_OK)
@@ -252,7 +252,7 @@ static ebpo_status read_layer(reader *r, uint64_t number, ebpo_error *error)
 }
 
 static ebpo_status read_note_place(reader *r, ebpo_head_object group, const char *path,
-                                   ebpo_note_held *n, ebpo_error *error)
+                                   ebpo_note_data *n, ebpo_error *error)
 {
     uint64_t face = 0;
     double weights[2] = { 0, 0 };
@@ -281,7 +281,7 @@ static ebpo_status read_note(reader *r, uint64_t number, ebpo_error *error)
 {
     char path[32];
     ebpo_head_object group;
-    ebpo_note_held *n = &r->p->note[number];
+    ebpo_note_data *n = &r->p->note[number];
     snprintf(path, sizeof path, "/notes/%04" PRIu64, number);
     ebpo_status status = ebpo_head_open_group(&r->head, path, &group, error);
     if (status == EBPO_OK)

@@ -1,4 +1,4 @@
-/* The arrays of a paint file, and the members of strokes and points that they hold:
+/* Lists the arrays of a paint file, and the members of strokes and points that they hold:
  * format-spec/paint.md, section 3. */
 #ifndef EBPO_PAINT_PAINT_OPEN_H
 #define EBPO_PAINT_PAINT_OPEN_H

@@ -1,4 +1,4 @@
-/* The content of a paint, and functions that the files of lib/extras/paint share. */
+/* Defines the content of a paint, and functions that the files of lib/extras/paint share. */
 #ifndef EBPO_PAINT_PAINT_PARTS_H
 #define EBPO_PAINT_PAINT_PARTS_H
 
@@ -33,23 +33,23 @@ extern const ebpo_paint_text_kind ebpo_paint_layer_texts[EBPO_PAINT_TEXTS];
 extern const ebpo_paint_text_kind ebpo_paint_note_texts[EBPO_PAINT_TEXTS];
 enum { EBPO_PAINT_TEXT_MAX = 32767 };
 
-typedef struct ebpo_layer_held {
+typedef struct ebpo_layer_data {
     char *text[EBPO_PAINT_TEXTS];
     uint64_t colour, opacity, visible;
-} ebpo_layer_held;
+} ebpo_layer_data;
 
-typedef struct ebpo_note_held {
+typedef struct ebpo_note_data {
     char *text[EBPO_PAINT_TEXTS];
     uint64_t layer;
     ebpo_paint_point at;
-} ebpo_note_held;
+} ebpo_note_data;
 
-typedef struct ebpo_stroke_held {
+typedef struct ebpo_stroke_data {
     double radius;
     uint64_t time, first; /* first: index of its first point */
     uint32_t layer, kind, count;
     uint8_t rgba[4];
-} ebpo_stroke_held;
+} ebpo_stroke_data;
 
 /* The file to which a paint belongs, and its version: the version from which the paint was read, or
  * as which it was saved. Saving changes this struct, but not the paint. */
@@ -66,9 +66,9 @@ struct ebpo_paint {
     ebpo_paint_file *file;
     char generator[64], model_sha256[65], model_name[256], unit[32];
     bool source_numbers; /* faces have their indices in the source; otherwise in the file */
-    ebpo_layer_held *layer;
-    ebpo_note_held *note;
-    ebpo_stroke_held *stroke;
+    ebpo_layer_data *layer;
+    ebpo_note_data *note;
+    ebpo_stroke_data *stroke;
     ebpo_paint_point *point;
     uint64_t layer_count, note_count, stroke_count, point_count;
     uint64_t layer_capacity, note_capacity, stroke_capacity, point_capacity;
@@ -80,7 +80,7 @@ static inline uint32_t ebpo_paint_pack(const uint8_t rgba[4])
 }
 
 /* Returns the radius of a point's ball. */
-static inline double ebpo_paint_radius(const ebpo_stroke_held *stroke,
+static inline double ebpo_paint_radius(const ebpo_stroke_data *stroke,
                                        const ebpo_paint_point *point)
 {
     return stroke->radius * point->size * 0x1p-15;
@@ -89,7 +89,7 @@ static inline double ebpo_paint_radius(const ebpo_stroke_held *stroke,
 /* Return a message about an invalid point or stroke; NULL: it is valid. layers: number of layers.
  */
 const char *ebpo_paint_point_wrong(const ebpo_paint_point *point);
-const char *ebpo_paint_stroke_wrong(const ebpo_stroke_held *stroke, uint64_t layers);
+const char *ebpo_paint_stroke_wrong(const ebpo_stroke_data *stroke, uint64_t layers);
 
 /* Makes empty texts for a layer or a note. Returns false if memory is short. */
 bool ebpo_paint_texts_begin(char *text[EBPO_PAINT_TEXTS]);

@@ -1,5 +1,5 @@
-/* The reach of a point: the faces that are connected with the point's own face within the point's
- * ball.
+/* Finds the reach of a point: the faces that are connected with the point's own face within the
+ * point's ball.
  *
  * Faces in the ball's box are joined into sets: at common corners (equal positions) within the
  * ball, and at common edges that cross the ball. The set that contains the point's face is the
@@ -26,28 +26,28 @@
 
 enum { FACES_MAX = 1 << 28 };
 
-void ebpo_reach_begin(ebpo_reach *r, ebpo_context *context)
+void ebpo_reach_begin(ebpo_reach_search *r, ebpo_context *context)
 {
     const double *size = context->model->info->box_size;
-    *r = (ebpo_reach){ .context = context };
+    *r = (ebpo_reach_search){ .context = context };
     r->tolerance = sqrt((size[0] * size[0] + size[1] * size[1]) + size[2] * size[2]) * 0x1p-20;
 }
 
-void ebpo_reach_end(ebpo_reach *r)
+void ebpo_reach_end(ebpo_reach_search *r)
 {
     free(r->face);
     free(r->position);
     free(r->edge);
     free(r->slot);
     free(r->root);
-    *r = (ebpo_reach){ .context = NULL };
+    *r = (ebpo_reach_search){ .context = NULL };
 }
 
 /* --- faces around the ball --- */
 
-static bool take_triangles(void *user, const ebpo_triangles *t)
+static bool receive_triangles(void *user, const ebpo_triangles *t)
 {
-    ebpo_reach *r = user;
+    ebpo_reach_search *r = user;
     r->too_many = r->count + t->count > FACES_MAX;
     r->short_of_memory =
         !r->too_many && !ebpo_grow(&r->face, &r->capacity, r->count + t->count, sizeof *r->face);
@@ -68,7 +68,8 @@ static int by_number(const void *a, const void *b)
 
 /* Gathers the faces around a slightly larger ball, because the bounds of the box are rounded, and
  * sorts them in the order of the file. */
-static ebpo_status gather_faces(ebpo_reach *r, const ebpo_reach_ball *ball, ebpo_error *error)
+static ebpo_status gather_faces(ebpo_reach_search *r, const ebpo_reach_ball *ball,
+                                ebpo_error *error)
 {
     double min[3], max[3], wide = fmax(ball->radius, r->tolerance) * (1 + 0x1p-40);
     for (int i = 0; i < 3; i++) {
@@ -77,7 +78,7 @@ static ebpo_status gather_faces(ebpo_reach *r, const ebpo_reach_ball *ball, ebpo
     }
     r->count = 0;
     r->too_many = r->short_of_memory = false;
-    ebpo_status status = ebpo_triangles_in_box(r->context, min, max, take_triangles, r, error);
+    ebpo_status status = ebpo_triangles_in_box(r->context, min, max, receive_triangles, r, error);
     if (status == EBPO_OK && r->too_many)
         status = ebpo_fail(error, EBPO_E_LIMIT,
                            "the ball of a point intersects more than %d faces; use a smaller "
@@ -108,7 +109,7 @@ static bool same_position(const double a[3], const double b[3])
 }
 
 /* Makes an empty hash table for `count` keys. Returns false without memory. */
-static bool clear_slots(ebpo_reach *r, uint64_t count)
+static bool clear_slots(ebpo_reach_search *r, uint64_t count)
 {
     r->slots = ebpo_hash_slots(2 * count);
     if (!ebpo_grow(&r->slot, &r->slot_capacity, r->slots, sizeof *r->slot))
@@ -118,7 +119,7 @@ static bool clear_slots(ebpo_reach *r, uint64_t count)
 }
 
 /* Finds the different positions of the faces' corners. */
-static void find_positions(ebpo_reach *r, const ebpo_reach_ball *ball)
+static void find_positions(ebpo_reach_search *r, const ebpo_reach_ball *ball)
 {
     double square = ball->radius * ball->radius;
     uint64_t at;
@@ -169,7 +170,7 @@ static bool segment_within(const ebpo_reach_ball *ball, const double p[3], const
 /* --- sets --- */
 
 /* Returns the representative of the set of member i, and shortens the path to it. */
-static uint32_t set_of(ebpo_reach *r, uint32_t i)
+static uint32_t set_of(ebpo_reach_search *r, uint32_t i)
 {
     while (r->root[i] != i) {
         r->root[i] = r->root[r->root[i]];
@@ -178,7 +179,7 @@ static uint32_t set_of(ebpo_reach *r, uint32_t i)
     return i;
 }
 
-static void join_sets(ebpo_reach *r, uint64_t a, uint64_t b)
+static void join_sets(ebpo_reach_search *r, uint64_t a, uint64_t b)
 {
     uint32_t x = set_of(r, (uint32_t)a), y = set_of(r, (uint32_t)b);
     if (x < y)
@@ -188,7 +189,7 @@ static void join_sets(ebpo_reach *r, uint64_t a, uint64_t b)
 }
 
 /* Joins the sets of faces that share a corner within the ball. */
-static void join_at_corners(ebpo_reach *r)
+static void join_at_corners(ebpo_reach_search *r)
 {
     for (uint64_t i = 0; i < 3 * r->count; i++)
         if (r->face[i / 3].within[i % 3])
@@ -197,7 +198,7 @@ static void join_at_corners(ebpo_reach *r)
 
 /* Joins the sets of faces that share an edge that intersects the ball. If an end of the edge is
  * within the ball, that corner has joined the faces already. */
-static void join_at_edges(ebpo_reach *r, const ebpo_reach_ball *ball)
+static void join_at_edges(ebpo_reach_search *r, const ebpo_reach_ball *ball)
 {
     uint64_t first = r->count + r->position_count, at;
     r->edge_count = 0;
@@ -220,7 +221,7 @@ static void join_at_edges(ebpo_reach *r, const ebpo_reach_ball *ball)
     }
 }
 
-static bool reserve_space(ebpo_reach *r)
+static bool reserve_space(ebpo_reach_search *r)
 {
     uint64_t corners = 3 * r->count, all = r->count + 2 * corners;
     if (!ebpo_grow(&r->position, &r->position_capacity, corners, sizeof *r->position) ||
@@ -233,7 +234,7 @@ static bool reserve_space(ebpo_reach *r)
 }
 
 /* Keeps only the faces in the set of the point's face. */
-static void keep_reach(ebpo_reach *r)
+static void keep_reach(ebpo_reach_search *r)
 {
     uint32_t set = set_of(r, (uint32_t)r->own);
     uint64_t kept = 0, own = 0;
@@ -250,7 +251,7 @@ static void keep_reach(ebpo_reach *r)
 
 /* --- the whole reach --- */
 
-static bool find_own(ebpo_reach *r, uint64_t face)
+static bool find_own(ebpo_reach_search *r, uint64_t face)
 {
     for (r->own = 0; r->own < r->count; r->own++)
         if (r->face[r->own].face == face)
@@ -258,18 +259,18 @@ static bool find_own(ebpo_reach *r, uint64_t face)
     return false;
 }
 
-static ebpo_status fail_place(const ebpo_reach *r, uint64_t face, ebpo_error *error)
+static ebpo_status fail_place(const ebpo_reach_search *r, uint64_t face, ebpo_error *error)
 {
     return ebpo_fail_file(error, EBPO_E_FORMAT, r->context->model->file->in.shown,
-                          "a point of the paint is not on its face %llu: the paint does not fit "
-                          "the model",
+                          "a point of the paint is not on its face %llu: the paint was made on "
+                          "another model; give that model",
                           (unsigned long long)face);
 }
 
 /* Gathers the faces around the ball, and finds the ball's face among them. *on: the centre is on
  * that face. *complete: as in ebpo_reach_find. */
-static ebpo_status find_face(ebpo_reach *r, const ebpo_reach_ball *ball, bool *complete, bool *on,
-                             ebpo_error *error)
+static ebpo_status find_face(ebpo_reach_search *r, const ebpo_reach_ball *ball, bool *complete,
+                             bool *on, ebpo_error *error)
 {
     const bool subset = r->context->model->info->pruned;
     ebpo_face_near near;
@@ -289,7 +290,7 @@ static ebpo_status find_face(ebpo_reach *r, const ebpo_reach_ball *ball, bool *c
     return EBPO_OK;
 }
 
-ebpo_status ebpo_reach_check(ebpo_reach *r, const double place[3], uint64_t face, bool *fits,
+ebpo_status ebpo_reach_check(ebpo_reach_search *r, const double place[3], uint64_t face, bool *fits,
                              ebpo_error *error)
 {
     const ebpo_reach_ball ball = { { place[0], place[1], place[2] }, 0, face };
@@ -299,7 +300,7 @@ ebpo_status ebpo_reach_check(ebpo_reach *r, const double place[3], uint64_t face
     return status;
 }
 
-ebpo_status ebpo_reach_find(ebpo_reach *r, const ebpo_reach_ball *ball, bool *complete,
+ebpo_status ebpo_reach_find(ebpo_reach_search *r, const ebpo_reach_ball *ball, bool *complete,
                             ebpo_error *error)
 {
     bool on;
@@ -382,23 +383,23 @@ enum { BATCH_POINTS = 1024, BATCH_FACES = 1 << 20, GRAIN = 8 };
  * another thread has just dropped. */
 enum { THREAD_BYTES = 1 << 20 };
 
-/* The reach of a point of the batch. done: it has been found; complete: as in ebpo_reached. */
+/* The reach of a point of the batch. done: it has been found; complete: as in ebpo_reach_result. */
 typedef struct found_reach {
-    ebpo_reached_face *face;
+    ebpo_reach_result_face *face;
     uint64_t count, capacity;
     bool done, complete;
 } found_reach;
 
-struct ebpo_reacher {
+struct ebpo_reach_pool {
     const ebpo_paint *p;
     unsigned threads;
-    ebpo_reach *reach; /* one reach for each worker */
+    ebpo_reach_search *reach; /* one reach for each worker */
     found_reach found[BATCH_POINTS];
     uint32_t stroke, first, count; /* the points of the current batch */
     atomic_uint_least64_t faces;   /* number of faces in the reaches of the batch */
 };
 
-static ebpo_status keep_reached(found_reach *f, const ebpo_reach *reach, ebpo_error *error)
+static ebpo_status keep_reached(found_reach *f, const ebpo_reach_search *reach, ebpo_error *error)
 {
     f->count = 0;
     if (!f->complete)
@@ -406,7 +407,7 @@ static ebpo_status keep_reached(found_reach *f, const ebpo_reach *reach, ebpo_er
     if (!ebpo_grow(&f->face, &f->capacity, reach->count, sizeof *f->face))
         return ebpo_fail_memory(error, reach->count * sizeof *f->face);
     for (uint64_t k = 0; k < reach->count; k++) {
-        ebpo_reached_face *one = &f->face[f->count++];
+        ebpo_reach_result_face *one = &f->face[f->count++];
         one->face = reach->face[k].face;
         memcpy(one->within, reach->face[k].within, sizeof one->within);
     }
@@ -418,8 +419,8 @@ static ebpo_status keep_reached(found_reach *f, const ebpo_reach *reach, ebpo_er
 static ebpo_status find_batch_reaches(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                       ebpo_error *error)
 {
-    ebpo_reacher *r = context;
-    ebpo_reach *reach = &r->reach[worker];
+    ebpo_reach_pool *r = context;
+    ebpo_reach_search *reach = &r->reach[worker];
     ebpo_status status = EBPO_OK;
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
         found_reach *f = &r->found[i];
@@ -439,7 +440,7 @@ static ebpo_status find_batch_reaches(void *context, uint64_t begin, uint64_t en
 
 /* Begins a batch at point i of a stroke. Frees large reaches first, so that the memory of all
  * reaches is bounded. */
-static void begin_batch(ebpo_reacher *r, uint32_t stroke, uint32_t i)
+static void begin_batch(ebpo_reach_pool *r, uint32_t stroke, uint32_t i)
 {
     uint32_t left = r->p->stroke[stroke].count - i;
     r->stroke = stroke;
@@ -458,8 +459,8 @@ static void begin_batch(ebpo_reacher *r, uint32_t stroke, uint32_t i)
     }
 }
 
-ebpo_status ebpo_reacher_find(ebpo_reacher *r, uint32_t stroke, uint32_t i, ebpo_reached *out,
-                              ebpo_error *error)
+ebpo_status ebpo_reach_pool_find(ebpo_reach_pool *r, uint32_t stroke, uint32_t i,
+                                 ebpo_reach_result *out, ebpo_error *error)
 {
     bool among = stroke == r->stroke && i >= r->first && i - r->first < r->count;
     if (!among || !r->found[i - r->first].done) {
@@ -470,14 +471,14 @@ ebpo_status ebpo_reacher_find(ebpo_reacher *r, uint32_t stroke, uint32_t i, ebpo
             return status;
     }
     const found_reach *f = &r->found[i - r->first];
-    *out = (ebpo_reached){ f->face, f->count, f->complete };
+    *out = (ebpo_reach_result){ f->face, f->count, f->complete };
     return EBPO_OK;
 }
 
-ebpo_status ebpo_reacher_new(const ebpo_paint *p, ebpo_context *context, unsigned threads,
-                             ebpo_reacher **out, ebpo_error *error)
+ebpo_status ebpo_reach_pool_new(const ebpo_paint *p, ebpo_context *context, unsigned threads,
+                                ebpo_reach_pool **out, ebpo_error *error)
 {
-    ebpo_reacher *r = *out = ebpo_alloc_zero(1, sizeof *r);
+    ebpo_reach_pool *r = *out = ebpo_alloc_zero(1, sizeof *r);
     if (!r)
         return ebpo_fail_memory(error, sizeof *r);
     r->p = p;
@@ -498,13 +499,13 @@ ebpo_status ebpo_reacher_new(const ebpo_paint *p, ebpo_context *context, unsigne
             ebpo_reach_begin(&r->reach[t], own);
     }
     if (status != EBPO_OK) {
-        ebpo_reacher_free(r);
+        ebpo_reach_pool_free(r);
         *out = NULL;
     }
     return status;
 }
 
-void ebpo_reacher_free(ebpo_reacher *r)
+void ebpo_reach_pool_free(ebpo_reach_pool *r)
 {
     if (!r)
         return;

@@ -1,4 +1,5 @@
-/* The reach of a point: the faces that are connected with the point's face within the point's ball.
+/* Finds the reach of a point: the faces that are connected with the point's face within the point's
+ * ball.
  * See format-spec/paint.md, section 4. */
 #ifndef EBPO_PAINT_PAINT_REACH_H
 #define EBPO_PAINT_PAINT_REACH_H
@@ -25,7 +26,7 @@ typedef struct ebpo_reach_edge {
 } ebpo_reach_edge;
 
 /* State for evaluating many points one after the other, in one thread. */
-typedef struct ebpo_reach {
+typedef struct ebpo_reach_search {
     ebpo_context *context;
     double tolerance;      /* maximum distance of a point from its face */
     ebpo_reach_face *face; /* [count] faces around the ball; after ebpo_reach_find only those of the
@@ -41,7 +42,7 @@ typedef struct ebpo_reach {
                      * the index of another member of the set, or of itself */
     uint64_t slots, slot_capacity, root_capacity;
     bool short_of_memory, too_many; /* why gathering faces failed */
-} ebpo_reach;
+} ebpo_reach_search;
 
 /* A ball around a point, with the point's face. */
 typedef struct ebpo_reach_ball {
@@ -49,19 +50,19 @@ typedef struct ebpo_reach_ball {
     uint64_t face;
 } ebpo_reach_ball;
 
-void ebpo_reach_begin(ebpo_reach *reach, ebpo_context *context);
-void ebpo_reach_end(ebpo_reach *reach);
+void ebpo_reach_begin(ebpo_reach_search *reach, ebpo_context *context);
+void ebpo_reach_end(ebpo_reach_search *reach);
 
 /* Finds the reach of a ball. *complete is false, without a result, if the model's file is a subset
  * that omits the ball's face or some of the faces around it. Fails with EBPO_E_FORMAT if the
  * position is not on the ball's face, EBPO_E_LIMIT, EBPO_E_MEMORY, and errors of reading. */
-EBPO_MUST_USE ebpo_status ebpo_reach_find(ebpo_reach *reach, const ebpo_reach_ball *ball,
+EBPO_MUST_USE ebpo_status ebpo_reach_find(ebpo_reach_search *reach, const ebpo_reach_ball *ball,
                                           bool *complete, ebpo_error *error);
 
 /* Sets *fits to true if a position is on the face, or if the model's file is a subset without this
  * face or its surroundings, so that the position may be on it. */
-EBPO_MUST_USE ebpo_status ebpo_reach_check(ebpo_reach *reach, const double place[3], uint64_t face,
-                                           bool *fits, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_reach_check(ebpo_reach_search *reach, const double place[3],
+                                           uint64_t face, bool *fits, ebpo_error *error);
 
 /* Returns true if q is within the ball with this centre and squared radius: format-spec/paint.md,
  * section 4. */
@@ -98,7 +99,7 @@ void ebpo_found_faces_free(ebpo_found_faces *found_faces);
 /* Returns point `i` of a stroke as a ball. */
 static inline ebpo_reach_ball ebpo_paint_ball(const ebpo_paint *p, uint64_t stroke, uint32_t i)
 {
-    const ebpo_stroke_held *s = &p->stroke[stroke];
+    const ebpo_stroke_data *s = &p->stroke[stroke];
     const ebpo_paint_point *q = &p->point[s->first + i];
     return (ebpo_reach_ball){ { q->place[0], q->place[1], q->place[2] },
                               ebpo_paint_radius(s, q),
@@ -106,9 +107,10 @@ static inline ebpo_reach_ball ebpo_paint_ball(const ebpo_paint *p, uint64_t stro
 }
 
 /* As ebpo_reach_find, for point `i` of a stroke. */
-EBPO_MUST_USE static inline ebpo_status ebpo_paint_reach(ebpo_reach *reach, const ebpo_paint *p,
-                                                         uint64_t stroke, uint32_t i,
-                                                         bool *complete, ebpo_error *error)
+EBPO_MUST_USE static inline ebpo_status ebpo_paint_reach(ebpo_reach_search *reach,
+                                                         const ebpo_paint *p, uint64_t stroke,
+                                                         uint32_t i, bool *complete,
+                                                         ebpo_error *error)
 {
     ebpo_reach_ball ball = ebpo_paint_ball(p, stroke, i);
     return ebpo_reach_find(reach, &ball, complete, error);
@@ -116,31 +118,32 @@ EBPO_MUST_USE static inline ebpo_status ebpo_paint_reach(ebpo_reach *reach, cons
 
 /* The reaches of many points, found on all cores and returned one by one. */
 
-typedef struct ebpo_reached_face {
+typedef struct ebpo_reach_result_face {
     uint64_t face; /* as in ebpo_paint_face */
     bool within[3];
-} ebpo_reached_face;
+} ebpo_reach_result_face;
 
 /* The reach of one point. */
-typedef struct ebpo_reached {
-    const ebpo_reached_face *face;
+typedef struct ebpo_reach_result {
+    const ebpo_reach_result_face *face;
     uint64_t count;
     bool complete; /* false: a subset omits a part of the reach */
-} ebpo_reached;
+} ebpo_reach_result;
 
-typedef struct ebpo_reacher ebpo_reacher;
+typedef struct ebpo_reach_pool ebpo_reach_pool;
 
 /* Makes an object that finds reaches on several threads. It uses the context, and makes further
  * contexts of the same model. `threads` 0: all cores, or fewer if the model's budget is small.
  * After a failure *out is NULL. */
-EBPO_MUST_USE ebpo_status ebpo_reacher_new(const ebpo_paint *p, ebpo_context *context,
-                                           unsigned threads, ebpo_reacher **out, ebpo_error *error);
-void ebpo_reacher_free(ebpo_reacher *r);
+EBPO_MUST_USE ebpo_status ebpo_reach_pool_new(const ebpo_paint *p, ebpo_context *context,
+                                              unsigned threads, ebpo_reach_pool **out,
+                                              ebpo_error *error);
+void ebpo_reach_pool_free(ebpo_reach_pool *r);
 
 /* Returns the reach of a stroke's point `i`, valid until the next call. The call also finds the
  * reaches of the next points of the stroke, so request points in order. Fails with the errors of
  * ebpo_reach_find. */
-EBPO_MUST_USE ebpo_status ebpo_reacher_find(ebpo_reacher *r, uint32_t stroke, uint32_t i,
-                                            ebpo_reached *out, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_reach_pool_find(ebpo_reach_pool *r, uint32_t stroke, uint32_t i,
+                                               ebpo_reach_result *out, ebpo_error *error);
 
 #endif

@@ -1,4 +1,5 @@
-/* Writes paint files by the table of paint_open.c.
+/* Writes paint files: annotations of a model (layers, strokes, notes). The table ebpo_paint_columns
+ * (paint_open.c) lists their arrays.
  *
  * A file is written under a temporary name and published when it is complete. The file of a paint
  * is replaced only if its version is still the one that was read or last saved. So a change by
@@ -69,7 +70,7 @@ static ebpo_status put_layer(ebpo_h5_out *out, const ebpo_paint *p, uint64_t num
 {
     char path[32];
     ebpo_h5_id group;
-    const ebpo_layer_held *l = &p->layer[number];
+    const ebpo_layer_data *l = &p->layer[number];
     snprintf(path, sizeof path, "/layers/%04" PRIu64, number);
     ebpo_status status = ebpo_h5_make_group(out, path, 0, &group, error);
     if (status == EBPO_OK)
@@ -89,7 +90,7 @@ static ebpo_status put_note(ebpo_h5_out *out, const ebpo_paint *p, uint64_t numb
 {
     char path[32];
     ebpo_h5_id group;
-    const ebpo_note_held *n = &p->note[number];
+    const ebpo_note_data *n = &p->note[number];
     const double weights[2] = { n->at.weight[0], n->at.weight[1] };
     snprintf(path, sizeof path, "/notes/%04" PRIu64, number);
     ebpo_status status = ebpo_h5_make_group(out, path, 0, &group, error);
@@ -156,7 +157,7 @@ static ebpo_status put_all(ebpo_h5_out *out, const ebpo_paint *p, ebpo_error *er
 }
 
 /* Returns an estimate of the bytes of all HDF5 headers of the file. */
-static uint64_t head_bytes(const ebpo_paint *p)
+static uint64_t header_bytes(const ebpo_paint *p)
 {
     enum { GROUP = 700, ROOT = 8192 };
     uint64_t sum = ROOT + GROUP * (p->layer_count + p->note_count);
@@ -167,9 +168,9 @@ static uint64_t head_bytes(const ebpo_paint *p)
     return sum;
 }
 
-/* Stores, after saving, that the open file `fd` at `path` has the paint's current version. Takes
- * ownership of both. */
-static void take_version(ebpo_paint_file *f, char *path, int fd)
+/* Remembers the file that was just saved: the next save compares the file at `path` with it. Takes
+ * ownership of `path` and of the open file `fd`. */
+static void remember_version(ebpo_paint_file *f, char *path, int fd)
 {
     if (f->fd >= 0)
         close(f->fd);
@@ -185,34 +186,36 @@ static ebpo_status save_locked(const ebpo_paint *p, const char *path, ebpo_error
     ebpo_paint_file *f = p->file;
     ebpo_publish publish = EBPO_PUBLISH_INIT;
     ebpo_h5_out out = EBPO_H5_OUT_INIT;
-    char *place;
+    char *target;
     int fd = -1;
-    ebpo_status status = ebpo_target_path(path, &place, error);
-    bool own = place && f->path && strcmp(f->path, place) == 0, first = !f->path;
+    ebpo_status status = ebpo_target_path(path, &target, error);
+    /* saving to the file that was read or last saved; the first save of a new paint */
+    bool to_own_file = target && f->path && strcmp(f->path, target) == 0, first = !f->path;
     if (status == EBPO_OK)
         status = ebpo_publish_begin(&publish, path, error);
-    if (status == EBPO_OK && (own || first) && (fd = fcntl(publish.fd, F_DUPFD_CLOEXEC, 3)) < 0)
+    if (status == EBPO_OK && (to_own_file || first) &&
+        (fd = fcntl(publish.fd, F_DUPFD_CLOEXEC, 3)) < 0)
         status = ebpo_fail_errno(error, path, "could not be written");
     if (status == EBPO_OK)
         status =
-            ebpo_h5_create(&out, ebpo_publish_path(&publish), path, head_bytes(p), LINKS, error);
+            ebpo_h5_create(&out, ebpo_publish_path(&publish), path, header_bytes(p), LINKS, error);
     if (status == EBPO_OK)
         status = put_all(&out, p, error);
     if (status == EBPO_OK)
         status = ebpo_h5_finish(&out, error);
     ebpo_h5_discard(&out);
-    if (own)
+    if (to_own_file)
         ebpo_publish_expect(&publish, &f->version, f->lock.fd >= 0);
     if (status == EBPO_OK)
         status = ebpo_publish_commit(&publish, error);
     ebpo_publish_abort(&publish);
-    if (own) /* also after a failure: other programs need not wait for a paint that is only in
-              * memory */
+    if (to_own_file) /* also after a failure: then nothing was saved, and other programs may change
+                      * the file */
         ebpo_file_lock_release(&f->lock);
     if (status == EBPO_OK && fd >= 0) {
-        take_version(f, place, fd);
+        remember_version(f, target, fd);
     } else {
-        free(place);
+        free(target);
         if (fd >= 0)
             close(fd);
     }

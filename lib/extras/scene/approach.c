@@ -83,8 +83,8 @@ static ebpo_status approach_evaluate(const approach_search *t, ebpo_scene_evalua
                                    false, error);
 }
 
-/* Goes from evaluation to evaluation, until the pair is reached, the time ends, or the search must
- * be given up. */
+/* Evaluates the distance at increasing times, until the pair is reached, the time ends, or the
+ * search must be given up. */
 static ebpo_status follow_pair(const approach_search *t, ebpo_scene_evaluations *evaluations,
                                ebpo_scene_approach_result *w, ebpo_error *error)
 {

@@ -1,5 +1,5 @@
-/* The narrow phase of a scene: decides exactly which pairs of instances intersect at a time, and
- * describes each contact.
+/* Computes the narrow phase of a scene: decides exactly which pairs of instances intersect at a
+ * time, and describes each contact.
  *
  * Pairs come from the broad phase (scene_pairs.c), and are evaluated on all cores. For each pair
  * whose faces intersect, the result has the faces, the location, the number and the depth of
@@ -35,9 +35,9 @@ typedef struct scene_two {
 /* Marks all results as unknown. */
 static void clear_results(ebpo_scene_clash *m)
 {
-    static const ebpo_certain unknown = { 0, INFINITY, EBPO_VALUE_BOUND, 0 };
+    static const ebpo_value_bounds unknown = { 0, INFINITY, EBPO_VALUE_BOUND, 0 };
     m->face_a = m->face_b = EBPO_NO_FACE;
-    m->relation = EBPO_RELATION_OPEN;
+    m->relation = EBPO_RELATION_UNDECIDED;
     for (int k = 0; k < 3; k++)
         m->location[k] = m->location_min[k] = m->location_max[k] = NAN;
     m->depth[0] = m->depth[1] = unknown;
@@ -75,7 +75,7 @@ static bool comes_first(const ebpo_face_pair *p, const ebpo_face_pair *q)
     return p->face_a < q->face_a || (p->face_a == q->face_a && p->face_b < q->face_b);
 }
 
-static bool note_segment(tally *t, const ebpo_face_pair *pair)
+static bool record_segment(tally *t, const ebpo_face_pair *pair)
 {
     ebpo_posed_pair faces;
     ebpo_contact_segment s;
@@ -99,7 +99,7 @@ static bool count_faces(void *user, const ebpo_face_pair *pairs, uint64_t count)
             return false;
         if (!t->kind_only && comes_first(&pairs[i], &t->first))
             t->first = pairs[i];
-        if (t->faces && pairs[i].kind == EBPO_PAIR_CROSSING && !note_segment(t, &pairs[i]))
+        if (t->faces && pairs[i].kind == EBPO_PAIR_CROSSING && !record_segment(t, &pairs[i]))
             return false;
     }
     return true;
@@ -152,7 +152,7 @@ static ebpo_status common_point(ebpo_pair_faces *of, const ebpo_face_pair *pair,
  * first contact that it finds. This needs no table of all faces. */
 static ebpo_status locate_first(const scene_two *two, ebpo_scene_clash *m, ebpo_error *error)
 {
-    ebpo_clearance found;
+    ebpo_collide_distance_result found;
     ebpo_status status = ebpo_collide_distance(two->collider, two->options, NULL, &found, error);
     if (status == EBPO_OK)
         set_location(m, found.point_a);
@@ -160,7 +160,7 @@ static ebpo_status locate_first(const scene_two *two, ebpo_scene_clash *m, ebpo_
 }
 
 /* Sets faces, distance and location of the nearest pair. */
-static void scene_report_nearest(const scene_two *two, const ebpo_clearance *nearest,
+static void scene_report_nearest(const scene_two *two, const ebpo_collide_distance_result *nearest,
                                  ebpo_scene_clash *m)
 {
     double middle[3];
@@ -244,7 +244,7 @@ static bool is_any_inner(int32_t relation)
 /* Sets the depth of each instance in the other. */
 static ebpo_status scene_report_depths(const scene_two *two, ebpo_scene_clash *m, ebpo_error *error)
 {
-    static const ebpo_certain none = { 0, 0, EBPO_VALUE_EXACT, 0 };
+    static const ebpo_value_bounds none = { 0, 0, EBPO_VALUE_EXACT, 0 };
     if (!(two->how->depth > 0))
         return EBPO_OK;
     if (is_any_inner(m->relation) && (two->solid[0] || two->solid[1]))
@@ -277,8 +277,8 @@ static ebpo_clash_kind kind_of(const ebpo_scene_clash *m)
  * only if the clearance is not kept. */
 static ebpo_status query_clearance(const scene_two *two, ebpo_scene_clash *m, ebpo_error *error)
 {
-    ebpo_clearance_options how = EBPO_CLEARANCE_OPTIONS_INIT;
-    ebpo_clearance found;
+    ebpo_collide_distance_options how = EBPO_COLLIDE_DISTANCE_OPTIONS_INIT;
+    ebpo_collide_distance_result found;
     how.at_least = m->clearance;
     ebpo_status status = ebpo_collide_distance(two->collider, two->options, &how, &found, error);
     if (status != EBPO_OK || found.at_least == 1)
@@ -309,7 +309,7 @@ static ebpo_status query_relation(const scene_two *two, ebpo_scene_clash *m, ebp
 static ebpo_status query_disjoint_faces(const scene_two *two, ebpo_scene_clash *m,
                                         ebpo_error *error)
 {
-    ebpo_clearance found;
+    ebpo_collide_distance_result found;
     ebpo_status status = two->how->relate ? query_relation(two, m, error) : EBPO_OK;
     if (status != EBPO_OK)
         return status;

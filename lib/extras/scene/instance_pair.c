@@ -1,5 +1,5 @@
-/* Two instances of a scene at a time: the box of one in the other's coordinates, bounds of their
- * relative motion and of their distance, and the faces that their files omit.
+/* Computes data of two instances of a scene at a time: the box of one in the other's coordinates,
+ * bounds of their relative motion and of their distance, and the faces that their files omit.
  *
  * Boxes and lengths are rounded outwards, so that every bound is certain in spite of rounding. A
  * file that is a subset has only the faces in its kept box; up to six boxes around the kept box
@@ -389,8 +389,8 @@ static ebpo_status query_distance(ebpo_scene_evaluations *l, double time, double
                                   ebpo_error *error)
 {
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
-    ebpo_clearance_options how = EBPO_CLEARANCE_OPTIONS_INIT;
-    ebpo_clearance found = { .distance = { .lo = INFINITY, .hi = INFINITY } };
+    ebpo_collide_distance_options how = EBPO_COLLIDE_DISTANCE_OPTIONS_INIT;
+    ebpo_collide_distance_result found = { .distance = { .lo = INFINITY, .hi = INFINITY } };
     how.tolerance = l->tolerance;
     how.warm =
         true; /* lo and hi may depend on the last pair, so each pair has a separate collider */

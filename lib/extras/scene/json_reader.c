@@ -228,7 +228,7 @@ ebpo_status ebpo_json_get_text(ebpo_json_reader *r, const json_t *object, const 
     if (!value)
         return json_reader_missing(r, key, needed);
     if (!json_is_string(value))
-        return ebpo_json_bad_at(r, key, "is not a text");
+        return ebpo_json_bad_at(r, key, "is not a string");
     *out = json_string_value(value);
     return EBPO_OK;
 }

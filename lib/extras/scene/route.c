@@ -1,4 +1,5 @@
-/* Routes: the pose at a time between keys, and bounds of the motion of points that follow a route.
+/* Evaluates routes: the pose at a time between keys, and bounds of the motion of points that follow
+ * a route.
  *
  * A rotation is interpolated along the arc between two unit quaternions by repeated halving. Only
  * sums, products, quotients and square roots are used, so that a pose has the same bits on every

@@ -120,7 +120,7 @@ static ebpo_status read_row(csv_lines *l, csv_text line, ebpo_scene_route *route
     csv_text field[FIELDS_MAX];
     double v[COLUMNS] = { [8] = 1 };
     if (csv_split(line, field) != l->fields)
-        return csv_bad(l, "the numbers are not as many as the columns", error);
+        return csv_bad(l, "the number of fields differs from the number of columns", error);
     for (int k = 0; k < COLUMNS; k++)
         if (l->field[k] >= 0 &&
             !ebpo_number_double(&v[k], field[l->field[k]].at, field[l->field[k]].size, l->c_locale))
@@ -362,7 +362,7 @@ static ebpo_status json_read_route(ebpo_json_reader *r, const char *name, const 
     if (keys + poses + csv != 1)
         return ebpo_json_bad(r, "must have exactly one of keys, poses and csv");
     if (!poses && (json_object_get(value, "begin") || json_object_get(value, "step")))
-        return ebpo_json_bad(r, "begin and step are for poses");
+        return ebpo_json_bad(r, "begin and step apply to poses only");
     status = keys    ? ebpo_json_each_item(r, value, "keys", read_key)
              : poses ? read_poses(r, value)
                      : read_csv(r, value);

@@ -1,5 +1,4 @@
-/* A scene as an object: its names, checks of the files that it names, adding its members, and
- * returning them.
+/* Makes a scene: adds its members and returns them, and checks names and the paths of files.
  *
  * Models, routes and cameras each have a separate name space. Layers, groups and instances share
  * one. In rules, a name is a selector: it stands for a set of instances. Every instance belongs to
@@ -313,7 +312,7 @@ static ebpo_status check_instance(const ebpo_scene *scene, const ebpo_scene_inst
     return ebpo_posing_make(&posing, &i->pose, origin, error); /* only checks the pose */
 }
 
-/* Puts the newest instance into the set of all instances, that of its layer, and `set`. */
+/* Adds the newest instance to the set of all instances, that of its layer, and `set`. */
 static ebpo_status join_own_sets(ebpo_scene *scene, uint64_t set, ebpo_error *error)
 {
     const ebpo_scene_instance_entry *i = &scene->instances[scene->instances_count - 1];

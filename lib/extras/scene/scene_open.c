@@ -1,9 +1,8 @@
 /* Opens scene files, and loads the models that they name.
  *
  * Models of the same path share one open file. If a scene file states a digest, the content_sha256
- * of the model's file must be equal to it. Loading sets the box of each model, which bounds of
- * motion use; until then the models of a scene have no boxes. A model for queries is made when it
- * is first needed. */
+ * of the model's file must be equal to it. Loading sets the box of each model; bounds of motions
+ * need these boxes. A model for queries is made when it is first needed. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -20,7 +19,7 @@
 #include "geometry/pose.h"
 #include "extras/scene/scene_parts.h"
 
-static ebpo_status take_options(ebpo_scene_options *own, const ebpo_scene_options *options,
+static ebpo_status copy_options(ebpo_scene_options *own, const ebpo_scene_options *options,
                                 ebpo_error *error)
 {
     *own = (ebpo_scene_options)EBPO_SCENE_OPTIONS_INIT;
@@ -66,7 +65,7 @@ static ebpo_status parse_scene(const char *text, size_t size, const char *name, 
         free(folder);
     }
     if (status == EBPO_OK) {
-        scene->outside = options->outside;
+        scene->allow_outside = options->outside;
         status = keep_text(scene, text, size, error);
     }
     if (status == EBPO_OK)
@@ -96,7 +95,7 @@ ebpo_status ebpo_scene_parse(const char *text, size_t size, const char *name, co
     EBPO_DEFAULT_FP;
     *out = NULL;
     ebpo_scene_options own;
-    ebpo_status status = take_options(&own, options, error);
+    ebpo_status status = copy_options(&own, options, error);
     if (status != EBPO_OK)
         return status;
     return parse_scene(text, size, name, folder_with_slash(folder), &own, out, error);
@@ -109,7 +108,7 @@ ebpo_status ebpo_scene_open(const char *path, const ebpo_scene_options *options,
     *out = NULL;
     ebpo_scene_options own;
     ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
-    ebpo_status status = take_options(&own, options, error);
+    ebpo_status status = copy_options(&own, options, error);
     if (status == EBPO_OK)
         status = ebpo_whole_file_open(&file, path, error);
     if (status == EBPO_OK && file.size > own.max_bytes)
@@ -156,8 +155,8 @@ static ebpo_status open_file(ebpo_scene *scene, const char *path, uint64_t max_e
     return EBPO_OK;
 }
 
-/* Sets the model's box, on each axis, to that of its faces, as the file states it, if that is
- * within the root cell; else to that of the root cell. */
+/* Sets the model's box: on each axis the range of the faces that the file states, if it is within
+ * the root cell; otherwise the range of the root cell. */
 static void set_model_box(ebpo_scene_model_entry *m, const ebpo_info *info)
 {
     for (int k = 0; k < 3; k++) {
@@ -190,7 +189,7 @@ static ebpo_status load_model(ebpo_scene *scene, ebpo_scene_model_entry *m, uint
     /* the model was read from the scene file, not added by the caller */
     bool of_text = (uint64_t)(m - scene->models) < scene->text_models;
     ebpo_status status = path ? EBPO_OK : ebpo_fail_memory(error, strlen(m->path));
-    if (status == EBPO_OK && of_text && !scene->outside)
+    if (status == EBPO_OK && of_text && !scene->allow_outside)
         status = ebpo_scene_stays_within(scene->folder, path, error);
     if (status == EBPO_OK)
         status = open_file(scene, path, max_expansion, &number, error);
@@ -207,16 +206,16 @@ static ebpo_status load_model(ebpo_scene *scene, ebpo_scene_model_entry *m, uint
 }
 
 /* Checks that the posed coordinates of the instance's model are in range. */
-static ebpo_status check_reach(const ebpo_scene *scene, const ebpo_scene_instance_entry *i,
+static ebpo_status check_range(const ebpo_scene *scene, const ebpo_scene_instance_entry *i,
                                ebpo_error *error)
 {
     const ebpo_scene_model_entry *m = &scene->models[i->as.model];
-    double reach[3];
+    double greatest[3]; /* absolute coordinate */
     ebpo_posing posing;
     ebpo_error why = EBPO_ERROR_INIT;
     for (int k = 0; k < 3; k++)
-        reach[k] = fmax(fabs(m->min[k]), fabs(m->max[k]));
-    ebpo_status status = ebpo_posing_make(&posing, &i->as.pose, reach, &why);
+        greatest[k] = fmax(fabs(m->min[k]), fabs(m->max[k]));
+    ebpo_status status = ebpo_posing_make(&posing, &i->as.pose, greatest, &why);
     return status == EBPO_OK
                ? EBPO_OK
                : ebpo_fail(error, status, "instance '%.80s': %.300s", i->as.name, why.message);
@@ -239,7 +238,7 @@ ebpo_status ebpo_scene_load(ebpo_scene *scene, const ebpo_load_options *options,
             status = EBPO_E_CANCELLED;
     }
     for (uint64_t i = 0; i < scene->instances_count && status == EBPO_OK; i++)
-        status = check_reach(scene, &scene->instances[i], error);
+        status = check_range(scene, &scene->instances[i], error);
     return status;
 }
 

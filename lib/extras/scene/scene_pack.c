@@ -152,7 +152,7 @@ static ebpo_status copy_poses(const ebpo_scene *scene, const char *csv, const ch
     ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
     char *path = ebpo_scene_join_path(scene->folder, csv);
     ebpo_status status = path ? EBPO_OK : ebpo_fail_memory(error, strlen(csv));
-    if (status == EBPO_OK && !scene->outside)
+    if (status == EBPO_OK && !scene->allow_outside)
         status = ebpo_scene_stays_within(scene->folder, path, error);
     if (status == EBPO_OK)
         status = ebpo_whole_file_open(&file, path, error);

@@ -1,5 +1,5 @@
-/* The broad phase of a scene: finds the pairs of instances that may come near each other in an
- * interval of time.
+/* Computes the broad phase of a scene: finds the pairs of instances that may come near each other
+ * in an interval of time.
  *
  * Rules select the pairs and their clearances. If several rules apply to a pair, the greatest
  * clearance counts; a rule that ignores the pair overrides all others.
@@ -81,7 +81,7 @@ static double rule_of(const ebpo_scene *scene, uint64_t a, uint64_t b)
 }
 
 /* Applies the clearance `rule` of a rule to a pair; returns false if the rule ignores the pair. */
-static bool take_rule(double rule, double *clearance)
+static bool apply_rule(double rule, double *clearance)
 {
     *clearance = fmax(*clearance, rule);
     return rule >= 0;
@@ -93,7 +93,7 @@ static bool by_sets(const ebpo_scene *scene, const ebpo_scene_instance_entry *x,
 {
     for (uint32_t i = 0; i < x->set_count; i++)
         for (uint32_t k = 0; k < y->set_count; k++)
-            if (!take_rule(rule_of(scene, x->sets[i], y->sets[k]), clearance))
+            if (!apply_rule(rule_of(scene, x->sets[i], y->sets[k]), clearance))
                 return false;
     return true;
 }
@@ -110,7 +110,7 @@ static bool by_rules(const ebpo_scene *scene, const ebpo_scene_instance_entry *x
     for (uint64_t i = 0; i < scene->rules_count; i++) {
         const ebpo_scene_rule_entry *r = &scene->rules[i];
         if (((is_in(x, r->a) && is_in(y, r->b)) || (is_in(x, r->b) && is_in(y, r->a))) &&
-            !take_rule(r->clearance, clearance))
+            !apply_rule(r->clearance, clearance))
             return false;
     }
     return true;
@@ -426,7 +426,7 @@ static bool near_each_other(const box *x, const box *y, double by)
 
 /* Adds a pair of boxes to the result if the rules do not ignore it and its boxes are within its
  * clearance. */
-static ebpo_status take_pair(sweep *s, const box *x, const box *y, ebpo_error *error)
+static ebpo_status add_pair_of_boxes(sweep *s, const box *x, const box *y, ebpo_error *error)
 {
     ebpo_scene_pair pair = { x->instance, y->instance, 0 };
     if (pair.a > pair.b)
@@ -457,7 +457,7 @@ static ebpo_status sweep_boxes(sweep *s, ebpo_error *error)
             if (gap > s->clearance + fabs(gap) * 0x1p-50)
                 break;
             if (near_each_other(x, y, s->clearance))
-                status = take_pair(s, x, y, error);
+                status = add_pair_of_boxes(s, x, y, error);
         }
     }
     return status;

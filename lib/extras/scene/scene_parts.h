@@ -1,4 +1,4 @@
-/* The members of a scene, and functions that the files of lib/extras/scene share. */
+/* Defines the members of a scene, and functions that the files of lib/extras/scene share. */
 #ifndef EBPO_SCENE_SCENE_PARTS_H
 #define EBPO_SCENE_SCENE_PARTS_H
 
@@ -70,7 +70,7 @@ struct ebpo_scene {
     char *text;                              /* text from which the scene was read; NULL: none */
     size_t text_size;
     uint64_t text_models, text_instances; /* numbers of models and instances in that text */
-    bool outside;                         /* files that the scene names may be outside the folder */
+    bool allow_outside;                   /* files that the scene names may be outside the folder */
     ebpo_model_options how;               /* options of ebpo_scene_model */
 };
 
@@ -99,7 +99,7 @@ EBPO_MUST_USE ebpo_status ebpo_scene_add_route(ebpo_scene *scene, const char *na
                                                uint64_t *number, ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_scene_add_camera(ebpo_scene *scene, const ebpo_scene_camera *camera,
                                                 ebpo_error *error);
-/* Puts the newest instance of the scene into a set. */
+/* Adds the newest instance of the scene to a set. */
 EBPO_MUST_USE ebpo_status ebpo_scene_join_set(ebpo_scene *scene, uint64_t set, ebpo_error *error);
 /* Adds a rule for pairs of an instance of set a and an instance of set b. A clearance below 0 means
  * that the pairs are ignored. */

@@ -69,7 +69,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_async_new(uint64_t size, const char *nam
 /*
  * Frees the object. First close the files that use its sources.
  *
- * Threads: one per object.
+ * Threads: one at a time per object.
  */
 EBPO_API void ebpo_async_free(ebpo_async *async);
 
@@ -104,10 +104,10 @@ EBPO_API void ebpo_async_end(ebpo_async *async, uint64_t operation);
  * last ebpo_async_needed. Ranges are in ascending order and at most 4 MiB each; ranges with small
  * gaps between them are merged.
  *
- * ranges   [count] lent until the next call of ebpo_async_needed with this object
+ * ranges   [count] valid until the next call of ebpo_async_needed with this object
  * count    0: all bytes have arrived in the meantime (several threads); repeat the call at once
  *
- * Threads: one per object.
+ * Threads: one at a time per object.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_async_needed(ebpo_async *async, const ebpo_range **ranges,
                                                      size_t *count, ebpo_error *error);

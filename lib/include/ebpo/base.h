@@ -35,7 +35,8 @@
  * "Threads:" in a comment says which threads may call a function at the same time:
  *   any           any number of threads, also with the same arguments, as long as no thread changes
  *                 the arguments
- *   one per X     one thread at a time for each object X; different objects are independent
+ *   one at a time per X   one thread at a time for each object X; different objects are
+ *                 independent
  * The last thread that uses an object frees it. A function may start other threads; they end before
  * it returns, unless its comment says otherwise.
  *
@@ -145,7 +146,7 @@ typedef enum ebpo_status {
     EBPO_E_FORMAT = -4,      /* a file has the wrong format or is damaged */
     EBPO_E_VERSION = -5,     /* a file needs a newer reader */
     EBPO_E_UNSUPPORTED = -6, /* valid, but not supported by this build or version */
-    EBPO_E_NOT_SOLID = -7,   /* a solid is required, and the mesh is not balanced */
+    EBPO_E_NOT_SOLID = -7,   /* a solid is required, and the mesh is not closed */
     EBPO_E_LIMIT = -8,       /* a count or size exceeds a stated limit */
     EBPO_E_CANCELLED = -9,   /* a callback requested to stop */
     EBPO_E_ABSENT = -10,     /* the file does not contain the required data */
@@ -254,14 +255,14 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_output_begin(const char *path, ebpo_outp
  * Syncs the file and renames it to its path. Always frees `out`. EBPO_E_IO: the file could not be
  * written; the file at the path is unchanged.
  *
- * Threads: one per output.
+ * Threads: one at a time per output.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_output_end(ebpo_output *out, ebpo_error *error);
 
 /*
  * Removes the temporary file and frees `out`. NULL is allowed.
  *
- * Threads: one per output.
+ * Threads: one at a time per output.
  */
 EBPO_API void ebpo_output_abandon(ebpo_output *out);
 

@@ -89,7 +89,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_new(const ebpo_boolean_operand *
 /*
  * Frees an expression. Free its models after this call.
  *
- * Threads: one per expression.
+ * Threads: one at a time per expression.
  */
 EBPO_API void ebpo_boolean_free(ebpo_boolean *boolean);
 
@@ -115,9 +115,10 @@ typedef struct ebpo_boolean_result {
  * Classifies a point of the world (three finite doubles).
  *
  * EBPO_E_ARGUMENT: the point is not finite. EBPO_E_ABSENT: a subset lacks the required data.
- * EBPO_E_LIMIT, and the errors of reading. On failure `out` is unspecified.
+ * EBPO_E_LIMIT: the budget is too small (ebpo_model_new). Also the errors of reading (base.h). On
+ * failure `out` is unspecified.
  *
- * Threads: one per expression.
+ * Threads: one at a time per expression.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_inside(ebpo_boolean *boolean, const double point[3],
                                                        ebpo_boolean_result *out, ebpo_error *error);
@@ -126,7 +127,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_inside(ebpo_boolean *boolean, co
  * Classifies points[count][3] into out[count]. The error is that of the first failed point, which
  * the message names.
  *
- * Threads: one per expression.
+ * Threads: one at a time per expression.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_inside_many(ebpo_boolean *boolean,
                                                             const double *points, uint64_t count,
@@ -142,7 +143,8 @@ typedef struct ebpo_boundary_options {
     double tolerance;
 
     /*
-     * The search stops after about this many cells of the world, with the bounds known so far. 0:
+     * The search stops after about this many cells of an octree around the result
+     * (ebpo_boolean_cells), with the bounds known so far. 0:
      * 100,000.
      */
     uint64_t cells;
@@ -170,13 +172,14 @@ typedef struct ebpo_boundary_distance {
 
 /*
  * Computes the distance from a point of the world (three finite doubles) to the boundary of the
- * result. If the nearest face of all operands is part of that boundary, two distances suffice, and
- * `lo` and `hi` differ only by rounding. Elsewhere cells of the world are searched, nearest first.
+ * result. If the face that is nearest among all operands is part of that boundary, no search is
+ * necessary, and `lo` and `hi` differ only by rounding. Otherwise cells of an octree around the
+ * result are searched, nearest first.
  *
  * EBPO_E_ARGUMENT: the point or the tolerance is not valid. EBPO_E_LIMIT: as for
  * ebpo_boolean_cells_new with level 0. Other errors are those of ebpo_boolean_inside.
  *
- * Threads: one per expression.
+ * Threads: one at a time per expression.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_distance(ebpo_boolean *boolean,
                                                          const double point[3],
@@ -197,10 +200,9 @@ typedef struct ebpo_volume_options {
 typedef enum ebpo_volume_doubt {
     EBPO_VOLUME_CERTAIN = 0,            /* the volume is exact */
     EBPO_VOLUME_OPERANDS_INTERSECT = 1, /* a face of operand[0] intersects one of operand[1] */
-    EBPO_VOLUME_FACES_INTERSECT =
-        2,                    /* two faces of operand[0] intersect other than as neighbours */
-    EBPO_VOLUME_IN_PARTS = 3, /* the model of operand[0] is not entirely in memory */
-    EBPO_VOLUME_SUBSET = 4    /* the file of operand[0] is a subset */
+    EBPO_VOLUME_FACES_INTERSECT = 2,    /* faces of operand[0] intersect each other */
+    EBPO_VOLUME_IN_PARTS = 3,           /* the model of operand[0] is not entirely in memory */
+    EBPO_VOLUME_SUBSET = 4              /* the file of operand[0] is a subset */
 } ebpo_volume_doubt;
 
 typedef struct ebpo_exact_volume {
@@ -213,7 +215,7 @@ typedef struct ebpo_exact_volume {
      * EBPO_VALUE_BOUND: from 0 to the volume of a box around the result; ebpo_boolean_cells_volume
      * gives better bounds.
      */
-    ebpo_certain volume;
+    ebpo_value_bounds volume;
 
     /* ebpo_volume_doubt: the first reason found, and its operands. */
     int32_t doubt;
@@ -256,9 +258,10 @@ typedef struct ebpo_exact_volume {
  *
  * Takes about 80 bytes for each face of one operand at a time.
  *
- * EBPO_E_LIMIT, and the errors of reading. On failure `out` is unspecified.
+ * EBPO_E_LIMIT: the budget is too small (ebpo_model_new). Also the errors of reading (base.h). On
+ * failure `out` is unspecified.
  *
- * Threads: one per expression.
+ * Threads: one at a time per expression.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_exact_volume(ebpo_boolean *boolean,
                                                              const ebpo_volume_options *options,
@@ -321,14 +324,14 @@ typedef struct ebpo_boolean_mesh_report {
 
 /*
  * Makes the mesh of the result. Faces of operands are cut exactly along their intersections with
- * all others, also in a common plane and within one operand. The parts that bound the result are
- * kept, where needed with the reverse orientation. Faces that are not cut keep their corners, at
- * their poses. Other vertices are the exact ones, rounded to the nearest coordinate. The mesh is
- * closed: each edge is used equally often in both directions. Rounding may create small
- * intersections of faces (ebpo_mesh_crossings). Vertices that become equal by rounding are merged,
- * and faces that lose a corner in this way are omitted. Winding numbers of the mesh are 1 in the
- * result and 0 elsewhere, except near rounded vertices. The mesh is the same for any number of
- * threads.
+ * all other faces, including coplanar faces and faces of the same operand. The parts that bound the
+ * result are kept, where needed with the reverse orientation. Faces that are not cut keep their
+ * corners, at their poses. Other vertices are the exact ones, rounded to the nearest coordinate.
+ * The mesh is closed: each edge is used equally often in both directions. Rounding may create small
+ * intersections of faces (ebpo_mesh_self_intersections). Vertices that become equal by rounding are
+ * merged, and faces that lose a corner in this way are omitted. Winding numbers of the mesh are 1
+ * in the result and 0 elsewhere, except near rounded vertices. The mesh is the same for any number
+ * of threads.
  *
  * Takes about 150 bytes for each face of the operands, and some 500 for each new vertex.
  *
@@ -339,7 +342,7 @@ typedef struct ebpo_boolean_mesh_report {
  * EBPO_E_LIMIT: more than 2^31 - 1 faces, or 2^31 vertices. EBPO_E_FORMAT: an operand is not
  * closed, although its file states so. Also the errors of reading. On failure `out` is cleared.
  *
- * Threads: one per expression.
+ * Threads: one at a time per expression.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_mesh(ebpo_boolean *boolean,
                                                      const ebpo_boolean_mesh_options *options,
@@ -393,7 +396,7 @@ typedef struct ebpo_boolean_cells ebpo_boolean_cells;
  * smaller than 2^-300, so that volumes are out of range. Other errors are those of
  * ebpo_boolean_inside.
  *
- * Threads: one per expression.
+ * Threads: one at a time per expression.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_cells_new(ebpo_boolean *boolean,
                                                           const ebpo_cells_options *options,
@@ -403,7 +406,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_cells_new(ebpo_boolean *boolean,
 /*
  * Frees the cells.
  *
- * Threads: one per cells.
+ * Threads: one at a time per object of cells.
  */
 EBPO_API void ebpo_boolean_cells_free(ebpo_boolean_cells *cells);
 
@@ -458,9 +461,9 @@ typedef enum ebpo_boolean_side {
 
 /*
  * Makes the surface of these cells: squares of the finest level, two triangles each, in doubles.
- * The mesh is balanced, with winding numbers 0 and 1. Where cells touch only along an edge or at a
- * corner, it is not a 2-manifold. The mesh may be written or converted: an .ebpo.h5 file of the
- * outer cells, and its envelopes, contain the result.
+ * The mesh is closed (ebpo_mesh_report.balanced), with winding numbers 0 and 1. Where cells touch
+ * only along an edge or at a corner, it is not a 2-manifold. The mesh may be written or converted:
+ * an .ebpo.h5 file of the outer cells, and its envelopes, contain the result.
  *
  * out   freed by ebpo_mesh_free; without faces if there are no such cells
  *

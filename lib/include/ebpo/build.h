@@ -37,11 +37,11 @@ typedef enum ebpo_selection {
 
     /*
      * The other three selections are from the theses. Candidates are the normals of the faces below
-     * the node. These selections go from the leaves up: the planes of a node are placed around the
-     * facets of its children's envelopes (EBP 2017, 3.3.4.3 and 3.4.1; BP 2008, 3.4).
+     * the node. These selections go from the leaves up: each plane of a node is moved outwards
+     * until it contains its children's envelopes (EBP 2017, 3.3.4.3 and 3.4.1; BP 2008, 3.4).
      */
     EBPO_SELECT_KMEDOIDS = 1, /* medoids of clusters of normals */
-    EBPO_SELECT_OFFSET = 2,   /* planes that had to move least from their faces */
+    EBPO_SELECT_OFFSET = 2,   /* planes that were moved outwards by the smallest distance */
     EBPO_SELECT_RANDOM = 3,   /* consecutive candidates, from a random one on */
 
     /* Number of selections. */
@@ -56,10 +56,10 @@ typedef struct ebpo_selection_traits {
     /* True: from the leaves up; uses percent or k_root, not epsilon. */
     bool from_leaves;
 
-    /* True: uses the distance of normals (ebpo_normal_distance). */
-    bool takes_normals;
+    /* True: uses a distance of normals (ebpo_normal_distance). */
+    bool uses_normal_distance;
 
-    bool takes_seed;
+    bool uses_seed;
 } ebpo_selection_traits;
 
 /*
@@ -100,7 +100,10 @@ typedef struct ebpo_build_times {
 typedef struct ebpo_build_options {
     size_t struct_size;
 
-    /* Deepest level, 0 to 20. -1: by EBP 2017, equation 3. */
+    /*
+     * Deepest level, 0 to 20. -1: the least level, at least 1, whose cells are shorter than the
+     * mean edge of the mesh (EBP 2017, equation 3).
+     */
     int max_level;
 
     /*
@@ -126,7 +129,7 @@ typedef struct ebpo_build_options {
     /* Rule that decides which points belong to the solid. */
     ebpo_rule rule;
 
-    /* True: return EBPO_E_NOT_SOLID for a mesh that is not balanced. */
+    /* True: return EBPO_E_NOT_SOLID for a mesh that is not closed (ebpo_mesh_report.balanced). */
     bool require_solid;
 
     unsigned threads;
@@ -185,7 +188,7 @@ typedef struct ebpo_build_options {
  * EBPO_E_LIMIT: as ebpo_mesh_check and ebpo_mesh_arrange. EBPO_E_IO: no disk space for the
  * workspace.
  *
- * Threads: one per mesh.
+ * Threads: one at a time per mesh.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_build(ebpo_mesh *mesh, const ebpo_mesh_report *report,
                                               const ebpo_repair_record *repair_record,
@@ -193,8 +196,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_build(ebpo_mesh *mesh, const ebpo_mesh_r
                                               ebpo_error *error);
 
 /*
- * Does what ebpo_file_repack does, and adds the part EBPO_PART_BORDER to a surface with a mesh that
- * does not have it, unless it is a subset.
+ * Repacks a file as ebpo_file_repack does. Adds EBPO_PART_BORDER (border loops, ebpo_part) to a
+ * surface that has a mesh but no border. Subsets are only repacked.
  *
  * EBPO_E_LIMIT: the border has 2^31 edges or more. Other errors are those of ebpo_file_repack.
  *
@@ -207,7 +210,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_add_border(const ebpo_file *file, c
 
 /* Criterion by which leaves with few faces become one leaf (BP 2008, 3.3.1). */
 typedef enum ebpo_coalescing {
-    /* A node with at most leaf_faces faces is a leaf. */
+    /* A node with at most leaf_faces different faces is a leaf. */
     EBPO_COALESCE_DISTINCT = 0,
 
     /*
@@ -248,7 +251,7 @@ typedef struct ebpo_thesis_levels {
  * EBPO_E_ARGUMENT: an option is out of range, or the selection is none of the theses. Other errors:
  * as ebpo_build.
  *
- * Threads: one per mesh.
+ * Threads: one at a time per mesh.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_build_as_theses(ebpo_mesh *mesh,
                                                         const ebpo_mesh_report *report,

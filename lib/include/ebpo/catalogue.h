@@ -156,7 +156,7 @@ EBPO_API void ebpo_catalogue_entry_of(const ebpo_file *file, const char *path,
  * Frees a catalogue. Call this function only after all queries of the catalogue have returned.
  * Models that queries opened stay open.
  *
- * Threads: one per catalogue.
+ * Threads: one at a time per catalogue.
  */
 EBPO_API void ebpo_catalogue_free(ebpo_catalogue *catalogue);
 
@@ -175,7 +175,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_catalogue_save(const ebpo_catalogue *cat
 typedef struct ebpo_catalogue_facts {
     size_t struct_size;
 
-    /* Path of the file that was read, lent. NULL: the catalogue was made of entries. */
+    /* Path of the file that was read; valid until the catalogue is freed. NULL: the catalogue was
+     * made of entries. */
     const char *path;
 
     /* Number of entries, at least 1. */
@@ -246,7 +247,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_catalogue_models_new(
 /*
  * Closes all models.
  *
- * Threads: one per object, after all queries.
+ * Threads: one at a time per object, after all queries.
  */
 EBPO_API void ebpo_catalogue_models_free(ebpo_catalogue_models *models);
 

@@ -11,13 +11,13 @@
  *   Depth                 ebpo_collide_depth
  *   Separation distance   ebpo_collide_separation
  *   By levels             ebpo_collide_levels
- *   One mesh              ebpo_mesh_crossings
+ *   One mesh              ebpo_mesh_self_intersections
  *
  * Decisions are exact on posed coordinates (pose.h). Results do not depend on the order of the
  * models or on the machine. Results do not depend on budgets either, with two exceptions: the pair
  * of intersecting faces that ebpo_collide_first and ebpo_collide_distance return, and distances
- * within a tolerance. Every query supports models that are loaded in parts, because of a budget or
- * a cut level (query.h). docs/develop/collision.md explains the kinds of pairs.
+ * within a tolerance. Every query supports partly loaded models: a budget or a cut level (query.h)
+ * keeps only some subtrees in memory. docs/develop/collision.md explains the kinds of pairs.
  */
 #ifndef EBPO_COLLIDE_H
 #define EBPO_COLLIDE_H
@@ -70,7 +70,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collider_new(ebpo_model *a, ebpo_model *
 /*
  * Frees a collider.
  *
- * Threads: one per collider.
+ * Threads: one at a time per collider.
  */
 EBPO_API void ebpo_collider_free(ebpo_collider *collider);
 
@@ -111,7 +111,10 @@ typedef struct ebpo_collide_options {
 
 /* ---- any contact ---- */
 
-/* Indices of faces as in ebpo_distance_result, and in the files. */
+/*
+ * face_a, face_b: indices in the source (in the file, if it has no maps). file_face_a, file_face_b:
+ * indices in the files.
+ */
 typedef struct ebpo_face_pair {
     uint64_t face_a, face_b, file_face_a, file_face_b;
 
@@ -126,12 +129,12 @@ typedef struct ebpo_face_pair {
  * undecided at the deadline. A solid inside another is not a contact.
  *
  * For the same files and poses, the pair is the same on every machine, but it is not the first pair
- * of ebpo_collide_all. For models in parts (a budget, a cut level) it also depends on the parts,
- * because few of them are loaded.
+ * of ebpo_collide_all. For partly loaded models it also depends on the subtrees in memory.
  *
- * EBPO_E_ARGUMENT: a pose is not valid (ebpo_pose_check). EBPO_E_LIMIT, and the errors of reading.
+ * EBPO_E_ARGUMENT: a pose is not valid (ebpo_pose_check). EBPO_E_LIMIT: the budget is too small
+ * (ebpo_model_new). Also the errors of reading (base.h).
  *
- * Threads: one per collider.
+ * Threads: one at a time per collider.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_first(ebpo_collider *collider,
                                                       const ebpo_collide_options *options,
@@ -153,7 +156,7 @@ typedef enum ebpo_relation {
     EBPO_A_INSIDE_B = 3,   /* B is a solid and contains all points of A; the sets are not equal */
     EBPO_B_INSIDE_A = 4,   /* the reverse */
     EBPO_EQUAL = 5,        /* the same points; the sets are not empty */
-    EBPO_RELATION_OPEN = 6 /* undecided at the deadline */
+    EBPO_RELATION_UNDECIDED = 6 /* undecided at the deadline */
 } ebpo_relation;
 
 typedef struct ebpo_relation_result {
@@ -172,14 +175,14 @@ typedef struct ebpo_relation_result {
  * contacts, one face of each shell decides. If models only touch, every face in contact is tested.
  *
  * Memory: a model entirely in memory takes 4 bytes per face in the collider, and about 60 during
- * the call. A model in parts takes half a byte per face, and about 60 per face of a subtree.
- * Subtrees of a model in parts are loaded if they have faces in contact, or faces that may be on a
- * side of the other model on which no face has been found yet.
+ * the call. A partly loaded model takes half a byte per face, and about 60 per face of a subtree.
+ * Subtrees of a partly loaded model are loaded if they have faces in contact, or if they may
+ * decide whether a model also has faces inside, or also outside, the other model.
  *
  * Errors are those of ebpo_collide_first; after the deadline the call succeeds. EBPO_E_ABSENT: as
  * for ebpo_inside.
  *
- * Threads: one per collider.
+ * Threads: one at a time per collider.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_relation(ebpo_collider *collider,
                                                          const ebpo_collide_options *options,
@@ -188,20 +191,24 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_relation(ebpo_collider *collider
 
 /* ---- all pairs of faces ---- */
 
-/* Receives pairs, lent until it returns. Return false to stop. Calls are sequential. */
+/*
+ * Callback that gets pairs, which are valid until it returns. It returns false to stop the call.
+ * Calls are sequential.
+ */
 typedef bool (*ebpo_pairs_fn)(void *user, const ebpo_face_pair *pairs, uint64_t count);
 
 /*
  * Finds every pair of intersecting faces once. Pairs are sorted by the index in the file of the
  * first model, then by that of the other model. The first model is the one with the lower
- * content_sha256; if these are equal, the one with the lower pose, compared bit by bit. Models in
- * parts give the same pairs in the same order. Subtrees whose envelopes may intersect are loaded;
- * each about once if `memory` holds all pairs and the budgets hold about a hundred subtrees.
+ * content_sha256; if these are equal, the one with the lower pose, compared bit by bit. Partly
+ * loaded models give the same pairs in the same order. Subtrees whose envelopes may intersect are
+ * loaded; each about once if `memory` holds all pairs and the budgets hold about a hundred
+ * subtrees.
  *
- * EBPO_E_CANCELLED: also at the deadline. The pairs passed so far are then the first ones. Other
- * errors are those of ebpo_collide_first.
+ * EBPO_E_CANCELLED: also if the deadline has passed. The pairs passed so far are then the first
+ * ones. Other errors are those of ebpo_collide_first.
  *
- * Threads: one per collider.
+ * Threads: one at a time per collider.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_all(ebpo_collider *collider,
                                                     const ebpo_collide_options *options,
@@ -209,14 +216,14 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_all(ebpo_collider *collider,
                                                     ebpo_error *error);
 
 /*
- * Finds the self-intersections of one model without a pose: pairs of faces that intersect other
- * than as neighbours; face_a is before face_b in the file. Common points of two faces at equal
- * corners, or along the edge between two equal corners, do not count. EBPO_PAIR_COPLANAR counts,
- * for example a fold or a repeated face. The collider must contain one model, twice.
+ * Finds the self-intersections of one model without a pose: pairs of faces that have common points
+ * besides a common corner or edge; face_a is before face_b in the file. Common points of two faces
+ * at equal corners, or along the edge between two equal corners, do not count. EBPO_PAIR_COPLANAR
+ * counts, for example a fold or a repeated face. The collider must contain one model, twice.
  *
  * EBPO_E_ARGUMENT: two different models. Other errors are those of ebpo_collide_all.
  *
- * Threads: one per collider.
+ * Threads: one at a time per collider.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_self(ebpo_collider *collider,
                                                      const ebpo_collide_options *options,
@@ -236,33 +243,33 @@ typedef struct ebpo_contact_segment {
     uint64_t face_a, face_b;
 
     /*
-     * Location of both ends on the faces: 0 to 2: this corner; 3 to 5: the edge from corner k - 3
-     * to the next; 6: interior.
+     * Location of both ends on the faces. A value k of 0 to 2: corner k; 3 to 5: the edge from
+     * corner k - 3 to the next corner; 6: interior.
      */
     uint8_t on_a[2], on_b[2];
 
     uint8_t reserved[4];
 } ebpo_contact_segment;
 
-/* Receives segments, lent until it returns. Return false to stop. */
+/* Callback that gets segments, valid until it returns. It returns false to stop the call. */
 typedef bool (*ebpo_segments_fn)(void *user, const ebpo_contact_segment *segments, uint64_t count);
 
 /*
  * Computes the segments of the EBPO_PAIR_CROSSING pairs of ebpo_collide_all, in that order. With
  * models A and B swapped, segments are the same with exchanged ends. For a model entirely in memory
- * the collider takes 4 more bytes per face. The faces of a model in parts are read once more, by
- * chunks.
+ * the collider takes 4 more bytes per face. The faces of a partly loaded model are read once more,
+ * by chunks.
  *
  * Errors are those of ebpo_collide_all.
  *
- * Threads: one per collider.
+ * Threads: one at a time per collider.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_contacts(ebpo_collider *collider,
                                                          const ebpo_collide_options *options,
                                                          ebpo_segments_fn take, void *user,
                                                          ebpo_error *error);
 
-/* A line along which two models cross; arrays are lent until the callback returns. */
+/* A line along which two models cross; arrays are valid until the callback returns. */
 typedef struct ebpo_polyline {
     uint64_t count;        /* number of points, at least 2 */
     const double *points;  /* [count][3]; closed: the last point is the first */
@@ -272,21 +279,21 @@ typedef struct ebpo_polyline {
     uint8_t reserved[7];
 } ebpo_polyline;
 
-/* Return false to stop. */
+/* Callback. It returns false to stop the call. */
 typedef bool (*ebpo_polylines_fn)(void *user, const ebpo_polyline *line);
 
 /*
- * Joins the segments of ebpo_collide_contacts to lines. Each segment is in one line. Two segments
- * are joined where one ends and the other begins at the same corner, edge or face of both models,
- * and no third segment does. Corners of a model with equal coordinates count as the same corner;
- * other points that are equal by chance are not joined. Lines are sorted by their first segments; a
- * closed line begins with its first segment in the order of ebpo_collide_contacts. With models A
- * and B swapped, lines have the reverse direction.
+ * Joins the segments of ebpo_collide_contacts to lines. Each segment is in one line. The end of one
+ * segment is joined to the beginning of another one if both are on the same corner, edge or face of
+ * both models, and no third segment begins or ends there. Corners of a model with equal coordinates
+ * count as the same corner; other points that are equal by chance are not joined. Lines are sorted
+ * by their first segments; a closed line begins with its first segment in the order of
+ * ebpo_collide_contacts. With models A and B swapped, lines have the reverse direction.
  *
  * EBPO_E_LIMIT: `memory` does not hold 256 bytes per segment. Other errors are those of
  * ebpo_collide_all.
  *
- * Threads: one per collider.
+ * Threads: one at a time per collider.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_polylines(ebpo_collider *collider,
                                                           const ebpo_collide_options *options,
@@ -319,10 +326,10 @@ typedef enum ebpo_pairs_format {
 /*
  * Writes all pairs to a file, which is replaced atomically.
  *
- * EBPO_E_IO: the file cannot be written. EBPO_E_LIMIT: also too many vertices for a PLY file. Other
- * errors are those of ebpo_collide_all.
+ * EBPO_E_IO: the file cannot be written. EBPO_E_LIMIT: also if a PLY file would have too many
+ * vertices. Other errors are those of ebpo_collide_all.
  *
- * Threads: one per collider.
+ * Threads: one at a time per collider.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_write(ebpo_collider *collider,
                                                       const ebpo_collide_options *options,
@@ -334,21 +341,21 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_write(ebpo_collider *collider,
 /* Accuracy of a value. */
 typedef enum ebpo_value_kind {
     EBPO_VALUE_EXACT = 0,    /* lo = hi: the double nearest to the true value */
-    EBPO_VALUE_INTERVAL = 1, /* the true value is certainly in lo .. hi, both approximated */
-    EBPO_VALUE_BOUND = 2     /* in lo .. hi, but lo is only 0 or hi only INFINITY */
+    EBPO_VALUE_INTERVAL = 1, /* lo and hi are guaranteed bounds, but not the closest doubles */
+    EBPO_VALUE_BOUND = 2     /* as EBPO_VALUE_INTERVAL; also, lo is 0 or hi is INFINITY */
 } ebpo_value_kind;
 
 /* A value with guaranteed bounds. */
-typedef struct ebpo_certain {
+typedef struct ebpo_value_bounds {
     double lo, hi;
 
     /* ebpo_value_kind */
     int32_t kind;
 
     int32_t reserved;
-} ebpo_certain;
+} ebpo_value_bounds;
 
-typedef struct ebpo_clearance_options {
+typedef struct ebpo_collide_distance_options {
     size_t struct_size;
 
     /* Allowed hi - lo of the result, in the world's unit; 0: exact. */
@@ -365,19 +372,19 @@ typedef struct ebpo_clearance_options {
     bool warm;
 
     uint8_t reserved[7];
-} ebpo_clearance_options;
+} ebpo_collide_distance_options;
 
-#define EBPO_CLEARANCE_OPTIONS_INIT                         \
-    {                                                       \
-        sizeof(ebpo_clearance_options), 0, -1, false, { 0 } \
+#define EBPO_COLLIDE_DISTANCE_OPTIONS_INIT                         \
+    {                                                              \
+        sizeof(ebpo_collide_distance_options), 0, -1, false, { 0 } \
     }
 
-typedef struct ebpo_clearance {
+typedef struct ebpo_collide_distance_result {
     /*
      * Distance of the faces, in the world's unit. 0 if any faces intersect; never negative, also
      * inside a solid.
      */
-    ebpo_certain distance;
+    ebpo_value_bounds distance;
 
     /*
      * 1: the distance is at least `at_least` of the options; 0: it is less; both are exact. -1: not
@@ -399,28 +406,28 @@ typedef struct ebpo_clearance {
      * intersect.
      */
     double point_a[3], point_b[3];
-} ebpo_clearance;
+} ebpo_collide_distance_result;
 
 /*
  * Computes the minimum distance between the faces of A and B; INFINITY if a model has no faces. For
  * a solid inside another, the result is the distance of their surfaces. With `at_least` the search
- * ends when this is decided. If the result is 1, `distance` is at_least .. INFINITY, without a
+ * ends when this is decided. If out->at_least is 1, `distance` is at_least .. INFINITY, without a
  * pair. If it is 0, the returned pair is nearer than at_least. After the deadline, `distance` has
  * the bounds known so far.
  *
- * For models in parts, subtrees whose envelopes are not farther apart than the best result are
- * loaded, nearest first. Exact distances and their pairs do not depend on the parts. Bounds of
- * intervals, and the reported pair of intersecting faces, do.
+ * For partly loaded models, subtrees whose envelopes are not farther apart than the best result are
+ * loaded, nearest first. Exact distances and their pairs do not depend on the subtrees in memory.
+ * Bounds of intervals, and the reported pair of intersecting faces, do.
  *
  * EBPO_E_ARGUMENT: also if the tolerance is below 0 or infinite, or at_least is NAN. Other errors
  * are those of ebpo_collide_first.
  *
- * Threads: one per collider.
+ * Threads: one at a time per collider.
  */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_distance(ebpo_collider *collider,
-                                                         const ebpo_collide_options *options,
-                                                         const ebpo_clearance_options *clearance,
-                                                         ebpo_clearance *out, ebpo_error *error);
+EBPO_API EBPO_MUST_USE ebpo_status
+ebpo_collide_distance(ebpo_collider *collider, const ebpo_collide_options *options,
+                      const ebpo_collide_distance_options *clearance,
+                      ebpo_collide_distance_result *out, ebpo_error *error);
 
 /*
  * Computes the depth of A's surface in the solid B: the maximum distance to B's nearest face over
@@ -433,15 +440,16 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_distance(ebpo_collider *collider
  * tolerance        greater than 0, in the world's unit; a smaller one takes longer
  * a_in_b, b_in_a   NULL: not requested
  *
- * EBPO_E_NOT_SOLID: the containing model is a surface. EBPO_E_ARGUMENT: also for the tolerance.
- * Other errors are those of ebpo_collide_first. The search uses memory outside the budgets.
+ * EBPO_E_NOT_SOLID: the containing model is a surface. EBPO_E_ARGUMENT: also if the tolerance is
+ * not valid. Other errors are those of ebpo_collide_first. The search uses memory outside the
+ * budgets.
  *
- * Threads: one per collider.
+ * Threads: one at a time per collider.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_depth(ebpo_collider *collider,
                                                       const ebpo_collide_options *options,
-                                                      double tolerance, ebpo_certain *a_in_b,
-                                                      ebpo_certain *b_in_a, ebpo_error *error);
+                                                      double tolerance, ebpo_value_bounds *a_in_b,
+                                                      ebpo_value_bounds *b_in_a, ebpo_error *error);
 
 /* ---- separation distance along a direction ---- */
 
@@ -450,7 +458,7 @@ typedef struct ebpo_separation {
      * The separation distance. EBPO_VALUE_EXACT: the nearest double; after the deadline an interval
      * or a bound.
      */
-    ebpo_certain t;
+    ebpo_value_bounds t;
 
     /*
      * Pair of faces that separate last; of several pairs, the first in the order of
@@ -461,20 +469,21 @@ typedef struct ebpo_separation {
 
 /*
  * Computes the separation distance of A from B along a direction: the least t >= 0 so that A, moved
- * by any t' * direction with t' > t, has no point in common with B (for solids, also no interior
- * point). With A moved by t, the models touch in the returned pair. Without a pair (t is 0), the
- * models intersect neither at their poses nor during the motion. Posed coordinates are moved
+ * by any t' * direction with t' > t, has no point in common with B. The points of a solid include
+ * its interior. With A moved by t, the models touch in the returned pair. Without a pair (t is 0),
+ * the models intersect neither at their poses nor during the motion. Posed coordinates are moved
  * without rounding. The models may also be apart for a smaller t, and have contacts again later; t
  * is the last contact.
  *
- * For models in parts, subtrees whose envelopes separate later than the best result are loaded.
+ * For partly loaded models, subtrees whose envelopes separate later than the best result are
+ * loaded.
  *
  * direction   of any length, which is the unit of t; its 1-norm must be within 2^-500 .. 2^500
  *
- * EBPO_E_ARGUMENT: also for the direction. Other errors are those of ebpo_collide_first; after the
- * deadline the call succeeds.
+ * EBPO_E_ARGUMENT: also if the direction is not valid. Other errors are those of
+ * ebpo_collide_first; after the deadline the call succeeds.
  *
- * Threads: one per collider.
+ * Threads: one at a time per collider.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_separation(ebpo_collider *collider,
                                                            const ebpo_collide_options *options,
@@ -491,12 +500,13 @@ typedef struct ebpo_level_result {
     int32_t contact;
 
     /* Distance of the faces, as in ebpo_collide_distance; INFINITY if a model has none. */
-    ebpo_certain distance;
+    ebpo_value_bounds distance;
 
     /* Number of pairs of nodes that may have intersecting faces. */
-    uint64_t open_pairs;
+    uint64_t undecided_pairs;
 
-    /* Deepest levels of A and of B that were used; for models in parts, at most the cut level. */
+    /* Deepest levels of A and of B that were used; for partly loaded models, at most the cut level.
+     */
     int32_t level_a, level_b;
 } ebpo_level_result;
 
@@ -509,7 +519,7 @@ typedef struct ebpo_level_result {
  *
  * EBPO_E_ARGUMENT: a pose is not valid (ebpo_pose_check).
  *
- * Threads: one per collider.
+ * Threads: one at a time per collider.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_levels(ebpo_collider *collider,
                                                        const ebpo_collide_options *options,
@@ -517,8 +527,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_levels(ebpo_collider *collider,
 
 /* ---- one mesh ---- */
 
-/* Two faces of one mesh that intersect other than as neighbours. */
-typedef struct ebpo_crossing {
+/* Two faces of one mesh with common points besides a common corner or edge. */
+typedef struct ebpo_self_intersection {
     /*
      * Source indices, the lower one first. Faces added by filling holes have indices after those of
      * the source.
@@ -532,12 +542,13 @@ typedef struct ebpo_crossing {
     int32_t kind;
 
     int32_t reserved;
-} ebpo_crossing;
+} ebpo_self_intersection;
 
-/* Receives intersections, lent until it returns. Return false to stop. */
-typedef bool (*ebpo_crossings_fn)(void *user, const ebpo_crossing *crossings, uint64_t count);
+/* Callback that gets intersections, valid until it returns. It returns false to stop the call. */
+typedef bool (*ebpo_self_intersections_fn)(void *user, const ebpo_self_intersection *crossings,
+                                           uint64_t count);
 
-typedef struct ebpo_crossings_options {
+typedef struct ebpo_self_intersections_options {
     size_t struct_size;
 
     unsigned threads;
@@ -549,15 +560,15 @@ typedef struct ebpo_crossings_options {
      * order; intersecting faces are red (255, 0, 0), others grey.
      */
     const char *ply;
-} ebpo_crossings_options;
+} ebpo_self_intersections_options;
 
-#define EBPO_CROSSINGS_OPTIONS_INIT                             \
-    {                                                           \
-        sizeof(ebpo_crossings_options), 0, { NULL, NULL }, NULL \
+#define EBPO_SELF_INTERSECTIONS_OPTIONS_INIT                             \
+    {                                                                    \
+        sizeof(ebpo_self_intersections_options), 0, { NULL, NULL }, NULL \
     }
 
 /* Summary of the results passed to the callback. */
-typedef struct ebpo_crossings_summary {
+typedef struct ebpo_self_intersections_summary {
     size_t struct_size;
 
     /* Number of pairs, indexed by ebpo_pair_kind. */
@@ -565,9 +576,9 @@ typedef struct ebpo_crossings_summary {
 
     /* Number of faces in at least one pair. */
     uint64_t faces;
-} ebpo_crossings_summary;
+} ebpo_self_intersections_summary;
 
-#define EBPO_CROSSINGS_SUMMARY_INIT EBPO_SIZED(ebpo_crossings_summary)
+#define EBPO_SELF_INTERSECTIONS_SUMMARY_INIT EBPO_SIZED(ebpo_self_intersections_summary)
 
 /*
  * Finds the self-intersections of a mesh as ebpo_collide_self does for a model, without an .ebpo.h5
@@ -584,11 +595,12 @@ typedef struct ebpo_crossings_summary {
  * EBPO_E_IO: no space in the workspace, or `ply` cannot be written. EBPO_E_FORMAT: as for
  * ebpo_build.
  *
- * Threads: one per mesh.
+ * Threads: one at a time per mesh.
  */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_crossings(
-    ebpo_mesh *mesh, const ebpo_mesh_report *report, const ebpo_crossings_options *options,
-    ebpo_crossings_fn take, void *user, ebpo_crossings_summary *out, ebpo_error *error);
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_self_intersections(
+    ebpo_mesh *mesh, const ebpo_mesh_report *report, const ebpo_self_intersections_options *options,
+    ebpo_self_intersections_fn take, void *user, ebpo_self_intersections_summary *out,
+    ebpo_error *error);
 
 /* Sums since the collider was made. */
 typedef struct ebpo_collider_stats {
@@ -601,9 +613,9 @@ typedef struct ebpo_collider_stats {
     uint64_t node_pairs, block_pairs, exact;
 
     /*
-     * For models in parts: number of pairs of subtrees with near envelopes, of subtrees in these
-     * pairs, of loads, and of bytes read from the files during the queries, including reads by
-     * others.
+     * For partly loaded models: number of pairs of subtrees with near envelopes, of subtrees in
+     * these pairs, of loads, and of bytes read from the files during the queries, including reads
+     * by others.
      */
     uint64_t subtree_pairs, subtrees, loads, bytes_read;
 } ebpo_collider_stats;
@@ -613,7 +625,7 @@ typedef struct ebpo_collider_stats {
 /*
  * Gets the statistics of a collider.
  *
- * Threads: one per collider.
+ * Threads: one at a time per collider.
  */
 EBPO_API ebpo_status ebpo_collider_get_stats(const ebpo_collider *collider,
                                              ebpo_collider_stats *out);

@@ -40,7 +40,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_colours(const ebpo_mesh *mesh, ebpo
 /*
  * Frees the arrays and clears the struct.
  *
- * Threads: one per struct.
+ * Threads: one at a time per struct.
  */
 EBPO_API void ebpo_colours_free(ebpo_colours *colours);
 

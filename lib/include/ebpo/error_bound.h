@@ -99,7 +99,8 @@ typedef struct ebpo_error_bound {
  *
  * EBPO_E_ABSENT: the model has no mesh, or is itself a subset. EBPO_E_ARGUMENT: the level is not
  * valid, the tolerance is 0, at_most is below 0, or `file` is neither the model's file nor a subset
- * of it. Digests are compared, or else sources and build options. The errors of reading.
+ * of it. Digests are compared, or else sources and build options. Also the errors of reading
+ * (base.h).
  *
  * Threads: any.
  */

@@ -138,7 +138,8 @@ EBPO_API bool ebpo_export_second_file(ebpo_export_format format, const char *pat
  * EBPO_E_ARGUMENT: invalid level, no data selected, or more than the format supports.
  * EBPO_E_UNSUPPORTED: the library was built without assimp. EBPO_E_ABSENT: the mesh is requested,
  * and the file has none. EBPO_E_LIMIT: more than 2^32 - 2 vertices or faces, a coordinate beyond
- * float32 in a format of float32, or a GLB of 2^32 bytes. EBPO_E_IO, and the errors of reading.
+ * float32 in a format of float32, or a GLB of 2^32 bytes. EBPO_E_IO. Also the errors of reading
+ * (base.h).
  *
  * Threads: any.
  */

@@ -192,7 +192,7 @@ typedef struct ebpo_level {
 /*
  * Frees the arrays and clears the struct.
  *
- * Threads: one per level.
+ * Threads: one at a time per level.
  */
 EBPO_API void ebpo_level_free(ebpo_level *level);
 
@@ -399,7 +399,7 @@ typedef struct ebpo_tree {
 /*
  * Frees the arrays and clears the struct.
  *
- * Threads: one per tree.
+ * Threads: one at a time per tree.
  */
 EBPO_API void ebpo_tree_free(ebpo_tree *tree);
 
@@ -662,7 +662,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_source(const ebpo_source *source, c
 /*
  * Closes a file. Free the models and streams of the file first.
  *
- * Threads: one per file.
+ * Threads: one at a time per file.
  */
 EBPO_API void ebpo_close(ebpo_file *file);
 
@@ -889,7 +889,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_maps(const ebpo_file *file,
 /*
  * Frees the arrays and clears the struct.
  *
- * Threads: one per struct.
+ * Threads: one at a time per struct.
  */
 EBPO_API void ebpo_maps_free(ebpo_maps *maps);
 
@@ -944,7 +944,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_attribute_ends(const ebpo_file *fil
 /*
  * Frees the arrays and clears the struct.
  *
- * Threads: one per struct.
+ * Threads: one at a time per struct.
  */
 EBPO_API void ebpo_attribute_values_free(ebpo_attribute_values *values);
 

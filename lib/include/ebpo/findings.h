@@ -70,7 +70,7 @@ typedef struct ebpo_mesh_finding {
 
     /*
      * For an edge or a vertex: all faces that use it. For a repeated face: this face, and the first
-     * face with the same vertices. For another face: this face. Ascending; lent until the callback
+     * face with the same vertices. For another face: this face. Ascending; valid until the callback
      * returns. NULL: none.
      */
     const uint64_t *faces;
@@ -80,7 +80,7 @@ typedef struct ebpo_mesh_finding {
     double point[3];
 } ebpo_mesh_finding;
 
-/* Return false to stop. */
+/* Callback. It returns false to stop the call. */
 typedef bool (*ebpo_findings_fn)(void *user, const ebpo_mesh_finding *finding);
 
 typedef struct ebpo_findings_options {

@@ -57,7 +57,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_read_groups(const char *path,
 /*
  * Frees the groups.
  *
- * Threads: one per object.
+ * Threads: one at a time per object.
  */
 EBPO_API void ebpo_mesh_groups_free(ebpo_mesh_groups *groups);
 

@@ -127,7 +127,8 @@ typedef struct ebpo_haptic_options {
  *
  * EBPO_E_ARGUMENT: an option or the position is not valid. EBPO_E_UNSUPPORTED: coordinates are
  * beyond 2^200. EBPO_E_ABSENT: the file has no mesh, or is a subset without the surroundings of the
- * position. EBPO_E_LIMIT, and the errors of reading.
+ * position. EBPO_E_LIMIT: the budget is too small (ebpo_model_new). Also the errors of reading
+ * (base.h).
  *
  * Threads: any; one more is started.
  */
@@ -139,7 +140,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_haptic_new(ebpo_model *model,
 /*
  * Frees the object and ends its thread, after the current load.
  *
- * Threads: one per object.
+ * Threads: one at a time per object.
  */
 EBPO_API void ebpo_haptic_free(ebpo_haptic *haptic);
 
@@ -230,7 +231,7 @@ typedef struct ebpo_haptic_ball_result {
  * motion the total energy given to the device is at most the energy taken from the device, plus
  * stiffness times the square of the longest step of the device.
  *
- * Threads: one per object.
+ * Threads: one at a time per object.
  */
 EBPO_API void ebpo_haptic_step_ball(ebpo_haptic *haptic, const double device[3],
                                     ebpo_haptic_ball_result *out);
@@ -242,7 +243,7 @@ enum { EBPO_HAPTIC_PATH_MAX = 17 };
  * Gets the path of the proxy in the last step: the segments from path[0] to path[n - 1], which
  * intersect no face. Returns n, which is 1 if the proxy did not move, and 0 before the first step.
  *
- * Threads: one per object.
+ * Threads: one at a time per object.
  */
 EBPO_API uint32_t ebpo_haptic_ball_path(const ebpo_haptic *haptic,
                                         double path[EBPO_HAPTIC_PATH_MAX][3]);
@@ -252,7 +253,7 @@ EBPO_API uint32_t ebpo_haptic_ball_path(const ebpo_haptic *haptic,
  * item is a position and a quaternion x, y, z, w. Between two items, each point of the tool moved
  * along a segment.
  *
- * Threads: one per object.
+ * Threads: one at a time per object.
  */
 EBPO_API uint32_t ebpo_haptic_tool_path(const ebpo_haptic *haptic,
                                         double path[EBPO_HAPTIC_PATH_MAX][7]);
@@ -304,7 +305,7 @@ typedef struct ebpo_haptic_probe_result {
  *
  * Time, locks, memory and reading are as in ebpo_haptic_step_ball.
  *
- * Threads: one per object.
+ * Threads: one at a time per object.
  */
 EBPO_API void ebpo_haptic_step_probe(ebpo_haptic *haptic, const double position[3],
                                      ebpo_haptic_probe_result *out);
@@ -365,7 +366,7 @@ typedef struct ebpo_haptic_tool_result {
  * McNeely, Puterbaugh and Troy 1999 (points for a tool); Barbic and James 2008 (clusters of points,
  * tested only if they can have come near a face).
  *
- * Threads: one per object.
+ * Threads: one at a time per object.
  */
 EBPO_API void ebpo_haptic_step_tool(ebpo_haptic *haptic, const double position[3],
                                     const double turn[4], ebpo_haptic_tool_result *out);
@@ -376,7 +377,7 @@ EBPO_API void ebpo_haptic_step_tool(ebpo_haptic *haptic, const double position[3
  *
  * Errors are those of ebpo_haptic_new. After a failure the position is unchanged.
  *
- * Threads: one per object.
+ * Threads: one at a time per object.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_haptic_reset(ebpo_haptic *haptic, const double position[3],
                                                      ebpo_error *error);
@@ -430,7 +431,7 @@ typedef struct ebpo_haptic_stats {
 /*
  * Gets the statistics of the object.
  *
- * Threads: one per object.
+ * Threads: one at a time per object.
  */
 EBPO_API ebpo_status ebpo_haptic_get_stats(const ebpo_haptic *haptic, ebpo_haptic_stats *out);
 

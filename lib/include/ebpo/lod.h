@@ -102,7 +102,7 @@ typedef struct ebpo_lod_nodes {
 /*
  * Frees the arrays and clears the struct.
  *
- * Threads: one per struct.
+ * Threads: one at a time per struct.
  */
 EBPO_API void ebpo_lod_nodes_free(ebpo_lod_nodes *nodes);
 

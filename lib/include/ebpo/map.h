@@ -5,7 +5,7 @@
  *   Distances     ebpo_map_points, ebpo_map_lattice
  *   Files         ebpo_map_write (HDF5 for VTK, NRRD)
  *   Two scans     ebpo_map_points (for the vertices of one scan), ebpo_map_describe,
- *                 ebpo_map_find_range, ebpo_map_paint
+ *                 ebpo_map_bound_hausdorff (bounds of the Hausdorff distance), ebpo_map_paint
  *   Colours       ebpo_map_colour
  *
  * Sources: BP 2008, figures 5.8 and 5.9; EBP 2017, section 4.4 and figures 90 to 92.
@@ -26,7 +26,8 @@ typedef struct ebpo_map_options {
     size_t struct_size;
 
     /*
-     * Points farther away than this get INFINITY, which is faster. In the model's unit; at least 0.
+     * Points farther away than this get INFINITY; a smaller value is faster. In the model's unit;
+     * at least 0.
      */
     double max_distance;
 
@@ -54,8 +55,8 @@ typedef struct ebpo_map_options {
  * per point.
  *
  * EBPO_E_ARGUMENT: an option or a point is not valid; the message has the index of the point.
- * EBPO_E_ABSENT: the file has no mesh. EBPO_E_LIMIT, and the errors of reading. On failure
- * `distances` is unspecified.
+ * EBPO_E_ABSENT: the file has no mesh. EBPO_E_LIMIT: the budget is too small (ebpo_model_new). Also
+ * the errors of reading (base.h). On failure `distances` is unspecified.
  *
  * Threads: any.
  */
@@ -86,9 +87,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_lattice_of_box(const double low[3], cons
                                                        ebpo_error *error);
 
 /*
- * Receives values[layers][count[1]][count[0]], lent until it returns, in the lattice's order, from
- * layer `first` on. Any return value except EBPO_OK ends the map with that status; the callback
- * then fills in `error`.
+ * Callback that gets values[layers][count[1]][count[0]], valid until it returns, in the lattice's
+ * order, from layer `first` on. Any return value except EBPO_OK ends the map with that status; the
+ * callback then fills in `error`.
  */
 typedef ebpo_status (*ebpo_map_fn)(void *user, const double *values, uint64_t first,
                                    uint64_t layers, ebpo_error *error);
@@ -97,8 +98,8 @@ typedef ebpo_status (*ebpo_map_fn)(void *user, const double *values, uint64_t fi
  * Computes the distances at a lattice's points and passes them to `take` by layers. Memory: a few
  * layers, 8 bytes per point; about 64 MiB in total, or one layer if that is more.
  *
- * EBPO_E_ARGUMENT: also a lattice with points that are not finite, or too many. Other errors are
- * those of ebpo_map_points.
+ * EBPO_E_ARGUMENT: also if a point of the lattice is not finite, or if there are too many points.
+ * Other errors are those of ebpo_map_points.
  *
  * Threads: any; calls of `take` are sequential and in order.
  */
@@ -131,8 +132,8 @@ typedef struct ebpo_map_stats {
     double mean, mean_unsigned, rms, standard_deviation;
 
     /*
-     * For each percentage (ebpo_map_percent): the least value that this percentage of the finite
-     * values does not exceed. For signed and for absolute values.
+     * For each percentage (ebpo_map_percent): the least value v such that at least this
+     * percentage of the finite values are <= v. For signed and for absolute values.
      */
     double percentile[EBPO_MAP_PERCENTILES], percentile_unsigned[EBPO_MAP_PERCENTILES];
 } ebpo_map_stats;
@@ -155,7 +156,7 @@ EBPO_API double ebpo_map_percent(int index);
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_map_describe(const double *values, uint64_t count,
                                                      ebpo_map_stats *out, ebpo_error *error);
 
-typedef struct ebpo_map_range_options {
+typedef struct ebpo_map_hausdorff_options {
     size_t struct_size;
 
     /* Bounds are refined until hi <= (1 + tolerance) lo. Above 0. */
@@ -172,14 +173,14 @@ typedef struct ebpo_map_range_options {
     uint32_t reserved;
 
     ebpo_progress progress;
-} ebpo_map_range_options;
+} ebpo_map_hausdorff_options;
 
-#define EBPO_MAP_RANGE_OPTIONS_INIT                                   \
-    {                                                                 \
-        sizeof(ebpo_map_range_options), 0.01, 0, 0, 0, { NULL, NULL } \
+#define EBPO_MAP_HAUSDORFF_OPTIONS_INIT                                   \
+    {                                                                     \
+        sizeof(ebpo_map_hausdorff_options), 0.01, 0, 0, 0, { NULL, NULL } \
     }
 
-typedef struct ebpo_map_range {
+typedef struct ebpo_map_hausdorff {
     size_t struct_size;
 
     /*
@@ -191,9 +192,9 @@ typedef struct ebpo_map_range {
     double location[3];
 
     uint64_t queries;
-} ebpo_map_range;
+} ebpo_map_hausdorff;
 
-#define EBPO_MAP_RANGE_INIT EBPO_SIZED(ebpo_map_range)
+#define EBPO_MAP_HAUSDORFF_INIT EBPO_SIZED(ebpo_map_hausdorff)
 
 /*
  * Computes the maximum distance of a mesh's faces from a model's faces. It includes the interior of
@@ -207,10 +208,9 @@ typedef struct ebpo_map_range {
  *
  * Threads: any.
  */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_map_find_range(ebpo_model *model, const ebpo_mesh *mesh,
-                                                       const double *distances,
-                                                       const ebpo_map_range_options *options,
-                                                       ebpo_map_range *out, ebpo_error *error);
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_map_bound_hausdorff(
+    ebpo_model *model, const ebpo_mesh *mesh, const double *distances,
+    const ebpo_map_hausdorff_options *options, ebpo_map_hausdorff *out, ebpo_error *error);
 
 /* ---- colours ---- */
 
@@ -254,7 +254,7 @@ EBPO_API void ebpo_map_colour(ebpo_map_palette palette, double distance, double 
  *
  * EBPO_E_ARGUMENT: palette or range is not valid, or the mesh has too many attributes.
  *
- * Threads: one per mesh.
+ * Threads: one at a time per mesh.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_map_paint(ebpo_mesh *mesh, const double *distances,
                                                   ebpo_map_palette palette, double range,
@@ -277,9 +277,9 @@ typedef enum ebpo_map_format {
  * Writes the map of a lattice to a file, which is replaced atomically. Values beyond max_distance
  * are INFINITY.
  *
- * stats   without percentiles (NAN); or NULL
+ * stats   receives the statistics, with percentiles NAN; may be NULL
  *
- * EBPO_E_ARGUMENT: also a lattice that the format does not support. EBPO_E_IO. Other errors are
+ * EBPO_E_ARGUMENT: also if the format does not support the lattice. EBPO_E_IO. Other errors are
  * those of ebpo_map_lattice.
  *
  * Threads: any.

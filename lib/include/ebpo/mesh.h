@@ -107,7 +107,7 @@ typedef struct ebpo_mesh {
 /*
  * Frees the arrays and clears the struct.
  *
- * Threads: one per mesh.
+ * Threads: one at a time per mesh.
  */
 EBPO_API void ebpo_mesh_free(ebpo_mesh *mesh);
 
@@ -355,7 +355,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_check(const ebpo_mesh *mesh, unsign
  * Errors are those of ebpo_mesh_check. EBPO_E_LIMIT: a coordinate is beyond 2^1000, so that the
  * cell faces of an octree would not be exact doubles. On failure the mesh is unchanged.
  *
- * Threads: one per mesh.
+ * Threads: one at a time per mesh.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_arrange(ebpo_mesh *mesh, unsigned threads,
                                                      ebpo_progress progress, ebpo_error *error);
@@ -415,7 +415,7 @@ typedef struct ebpo_repair_record {
  * Merges vertices of equal position (-0 equals 0), including unreferenced ones. The first vertex of
  * each group stays, and the order is kept. Faces that then use a vertex twice stay.
  *
- * Threads: one per mesh.
+ * Threads: one at a time per mesh.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_weld(ebpo_mesh *mesh, ebpo_repair_record *record,
                                                   ebpo_error *error);
@@ -437,7 +437,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_weld(ebpo_mesh *mesh, ebpo_repair_r
  * EBPO_E_ARGUMENT: the distance is out of range, or below 2^-49 of that side. On failure the mesh
  * is valid; vertices of equal position may have been merged.
  *
- * Threads: one per mesh.
+ * Threads: one at a time per mesh.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_weld_within(ebpo_mesh *mesh, double distance,
                                                          ebpo_repair_record *record,
@@ -457,7 +457,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_weld_within(ebpo_mesh *mesh, double
  *
  * EBPO_E_ARGUMENT: a component (ebpo_components_mesh) with repeated faces.
  *
- * Threads: one per mesh.
+ * Threads: one at a time per mesh.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_drop_duplicates(ebpo_mesh *mesh,
                                                              ebpo_repair_record *record,
@@ -504,7 +504,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_count_repeated(const ebpo_mesh *mes
  * whose faces cannot alternate around all edges is also counted there; its patches are then
  * oriented separately. Do not orient a mesh that has intended solids inside other solids.
  *
- * Threads: one per mesh.
+ * Threads: one at a time per mesh.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_orient(ebpo_mesh *mesh, ebpo_repair_record *record,
                                                     ebpo_error *error);
@@ -513,7 +513,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_orient(ebpo_mesh *mesh, ebpo_repair
  * Reverses every face. Adds to `flipped_faces` of the record. Sets none of its flags of requested
  * steps.
  *
- * Threads: one per mesh.
+ * Threads: one at a time per mesh.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_flip(ebpo_mesh *mesh, ebpo_repair_record *record,
                                                   ebpo_error *error);
@@ -527,7 +527,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_flip(ebpo_mesh *mesh, ebpo_repair_r
  * not close because orientations differ (see ebpo_mesh_orient) are unchanged, and are counted in
  * `unfilled_holes`.
  *
- * Threads: one per mesh.
+ * Threads: one at a time per mesh.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_fill_holes(ebpo_mesh *mesh, ebpo_repair_record *record,
                                                         ebpo_error *error);
@@ -591,7 +591,7 @@ typedef struct ebpo_prepared {
  * Errors are those of the single calls. On failure `out` is cleared; the mesh is valid and includes
  * the steps that were completed.
  *
- * Threads: one per mesh.
+ * Threads: one at a time per mesh.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_prepare(ebpo_mesh *mesh,
                                                      const ebpo_prepare_options *options,
@@ -644,7 +644,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_components_new(const ebpo_mesh *mesh, un
 /*
  * Frees the components.
  *
- * Threads: one per object.
+ * Threads: one at a time per object.
  */
 EBPO_API void ebpo_components_free(ebpo_components *components);
 

@@ -28,7 +28,7 @@
  *
  * An ebpo_paint is entirely in memory, 48 bytes per point, and keeps a descriptor of its file open.
  * Memory for queries of the model is that of the model's budget, plus the memory stated for each
- * function. Returned texts and arrays are lent until the paint is changed or freed.
+ * function. Returned texts and arrays are valid until the paint is changed or freed.
  *
  * Application: EBP 2017, section 4.5 (painting by a haptic device).
  */
@@ -140,7 +140,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_save(const ebpo_paint *paint, cons
 /*
  * Frees a paint.
  *
- * Threads: one per paint.
+ * Threads: one at a time per paint.
  */
 EBPO_API void ebpo_paint_free(ebpo_paint *paint);
 
@@ -190,9 +190,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_check_model(const ebpo_paint *pain
  * progress   stage "checking"; or NULL
  *
  * EBPO_E_FORMAT: a point is not on its face; the message has its index. EBPO_E_ARGUMENT,
- * EBPO_E_ABSENT: as ebpo_paint_check_model. EBPO_E_CANCELLED, and the errors of reading.
+ * EBPO_E_ABSENT: as ebpo_paint_check_model. EBPO_E_CANCELLED. Also the errors of reading (base.h).
  *
- * Threads: one per context.
+ * Threads: one at a time per context.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_check_points(const ebpo_paint *paint,
                                                            ebpo_context *context,
@@ -244,7 +244,7 @@ EBPO_API ebpo_status ebpo_paint_get_layer(const ebpo_paint *paint, uint64_t numb
  *
  * EBPO_E_ARGUMENT: a member is not valid. EBPO_E_LIMIT: EBPO_PAINT_LAYERS layers exist.
  *
- * Threads: one per paint.
+ * Threads: one at a time per paint.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_add_layer(ebpo_paint *paint,
                                                         const ebpo_paint_layer *layer,
@@ -255,7 +255,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_add_layer(ebpo_paint *paint,
  *
  * Errors are those of ebpo_paint_add_layer.
  *
- * Threads: one per paint.
+ * Threads: one at a time per paint.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_set_layer(ebpo_paint *paint, uint64_t number,
                                                         const ebpo_paint_layer *layer,
@@ -264,7 +264,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_set_layer(ebpo_paint *paint, uint6
 /*
  * Removes a layer with its strokes and notes. The indices of higher layers decrease by one.
  *
- * Threads: one per paint.
+ * Threads: one at a time per paint.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_remove_layer(ebpo_paint *paint, uint64_t number,
                                                            ebpo_error *error);
@@ -329,7 +329,7 @@ EBPO_API ebpo_status ebpo_paint_get_note(const ebpo_paint *paint, uint64_t numbe
  * Adds a note. EBPO_E_ARGUMENT: a text, position or layer is not valid. EBPO_E_LIMIT:
  * EBPO_PAINT_NOTES notes exist.
  *
- * Threads: one per paint.
+ * Threads: one at a time per paint.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_add_note(ebpo_paint *paint,
                                                        const ebpo_paint_note *note,
@@ -338,7 +338,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_add_note(ebpo_paint *paint,
 /*
  * Removes a note.
  *
- * Threads: one per paint.
+ * Threads: one at a time per paint.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_remove_note(ebpo_paint *paint, uint64_t number,
                                                           ebpo_error *error);
@@ -384,7 +384,7 @@ EBPO_API ebpo_status ebpo_paint_get_stroke(const ebpo_paint *paint, uint64_t num
  * Adds a stroke over the earlier ones. EBPO_E_ARGUMENT: a member is not valid. EBPO_E_LIMIT:
  * EBPO_PAINT_STROKES strokes or EBPO_PAINT_POINTS points exist.
  *
- * Threads: one per paint.
+ * Threads: one at a time per paint.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_add_stroke(ebpo_paint *paint,
                                                          const ebpo_paint_stroke *stroke,
@@ -394,7 +394,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_add_stroke(ebpo_paint *paint,
  * Removes a stroke. The indices of later strokes decrease by one. Removing the last stroke undoes
  * it.
  *
- * Threads: one per paint.
+ * Threads: one at a time per paint.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_remove_stroke(ebpo_paint *paint, uint64_t number,
                                                             ebpo_error *error);
@@ -498,9 +498,10 @@ typedef struct ebpo_paint_drawn {
  * drawn     statistics; or NULL
  *
  * On failure no stroke is added. EBPO_E_ARGUMENT: a value is not valid, or the model does not
- * match. EBPO_E_ABSENT, EBPO_E_LIMIT, and the errors of reading.
+ * match. EBPO_E_ABSENT, EBPO_E_LIMIT: the budget is too small (ebpo_model_new). Also the errors of
+ * reading (base.h).
  *
- * Threads: one per paint, one per context.
+ * Threads: one at a time per paint and per context.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_draw(ebpo_paint *paint, ebpo_context *context,
                                                    const ebpo_paint_input *input, uint64_t count,
@@ -513,7 +514,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_draw(ebpo_paint *paint, ebpo_conte
  *
  * Errors are those of ebpo_distance. EBPO_E_ARGUMENT: also if the model does not match.
  *
- * Threads: one per context.
+ * Threads: one at a time per context.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_locate(const ebpo_paint *paint, ebpo_context *context,
                                                      const double place[3], ebpo_paint_point *out,
@@ -543,7 +544,7 @@ typedef struct ebpo_paint_options {
         sizeof(ebpo_paint_options), 256, 0, { NULL, NULL } \
     }
 
-/* A face that intersects the ball of a point of a stroke; lent until the callback returns. */
+/* A face that intersects the ball of a point of a stroke; valid until the callback returns. */
 typedef struct ebpo_paint_face {
     /* As in ebpo_distance_result; index in the file. */
     uint64_t face, file_face;
@@ -557,7 +558,7 @@ typedef struct ebpo_paint_face {
     uint8_t reserved[5];
 } ebpo_paint_face;
 
-/* Return false to stop. */
+/* Callback. It returns false to stop the call. */
 typedef bool (*ebpo_paint_face_fn)(void *user, const ebpo_paint_face *face);
 
 /*
@@ -566,17 +567,17 @@ typedef bool (*ebpo_paint_face_fn)(void *user, const ebpo_paint_face *face);
  * face, and 300 for each face that intersects the box around one point.
  *
  * context     of a matching model
- * elsewhere   number of points whose faces a subset lacks; or NULL
+ * points_outside_subset   number of points whose faces a subset lacks; or NULL
  *
  * EBPO_E_ARGUMENT: the model does not match. EBPO_E_FORMAT: a point is not on its face.
  * EBPO_E_UNSUPPORTED: the model's coordinates are beyond 2^200. EBPO_E_LIMIT: a point's ball
- * intersects more than 2^28 faces. EBPO_E_ABSENT, and the errors of reading.
+ * intersects more than 2^28 faces. EBPO_E_ABSENT. Also the errors of reading (base.h).
  *
- * Threads: one per context.
+ * Threads: one at a time per context.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_cover(const ebpo_paint *paint, ebpo_context *context,
                                                     uint64_t stroke, ebpo_paint_face_fn take,
-                                                    void *user, uint64_t *elsewhere,
+                                                    void *user, uint64_t *points_outside_subset,
                                                     ebpo_error *error);
 
 typedef struct ebpo_paint_baked {
@@ -589,7 +590,7 @@ typedef struct ebpo_paint_baked {
      * Number of points of visible layers, of points whose faces a subset lacks, and of points that
      * cover no vertex because their balls are smaller than the faces.
      */
-    uint64_t points, elsewhere, between;
+    uint64_t points, points_outside_subset, points_without_vertex;
 } ebpo_paint_baked;
 
 #define EBPO_PAINT_BAKED_INIT EBPO_SIZED(ebpo_paint_baked)
@@ -609,7 +610,7 @@ typedef struct ebpo_paint_baked {
  * Errors are those of ebpo_paint_cover. EBPO_E_ARGUMENT: also if the mesh does not match.
  * EBPO_E_CANCELLED. On failure the colours are unchanged.
  *
- * Threads: one per context.
+ * Threads: one at a time per context.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_bake(const ebpo_paint *paint, ebpo_context *context,
                                                    const ebpo_mesh *mesh,
@@ -626,7 +627,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_bake(const ebpo_paint *paint, ebpo
  *
  * EBPO_E_ARGUMENT: the mesh has the maximum number of attributes.
  *
- * Threads: one per mesh.
+ * Threads: one at a time per mesh.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_colour_mesh(ebpo_mesh *mesh, const uint8_t *rgba,
                                                           ebpo_error *error);
@@ -661,7 +662,7 @@ typedef struct ebpo_paint_areas {
     ebpo_paint_colour_area *colours;
 
     /* Number of faces that intersect balls of points, and of points whose faces a subset lacks. */
-    uint64_t faces, elsewhere;
+    uint64_t faces, points_outside_subset;
 } ebpo_paint_areas;
 
 #define EBPO_PAINT_AREAS_INIT EBPO_SIZED(ebpo_paint_areas)
@@ -675,9 +676,10 @@ typedef struct ebpo_paint_areas {
  * Takes 24 bytes for each pair of a face and a point whose ball intersects the face, and 80 for
  * each such face.
  *
- * Errors are those of ebpo_paint_cover. EBPO_E_ARGUMENT: also for the fineness. EBPO_E_CANCELLED.
+ * Errors are those of ebpo_paint_cover. EBPO_E_ARGUMENT: also if the fineness is not valid.
+ * EBPO_E_CANCELLED.
  *
- * Threads: one per context.
+ * Threads: one at a time per context.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_measure(const ebpo_paint *paint,
                                                       ebpo_context *context,
@@ -687,7 +689,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_measure(const ebpo_paint *paint,
 /*
  * Frees the arrays and clears the struct, except its size.
  *
- * Threads: one per struct.
+ * Threads: one at a time per struct.
  */
 EBPO_API void ebpo_paint_areas_free(ebpo_paint_areas *areas);
 

@@ -62,7 +62,7 @@ typedef struct ebpo_model_options {
      * Memory limit of the model in bytes, including its caches and buffers for loading. 0: no
      * limit, except for a remote file (http.h) larger than 2 MiB with `cut_level` -1, where the
      * limit is 256 MiB. If such a file has a table of subtrees (ebpo_info.subtree_level), it is
-     * loaded in parts for any budget.
+     * loaded subtree by subtree for any budget.
      *
      * Not included are the chunk directory of the file (24 bytes per chunk), decoders (about 250 kB
      * per loading thread) and contexts. A context holds results; for distances also 4 bytes per
@@ -94,7 +94,7 @@ typedef struct ebpo_model_options {
     /*
      * Shared budget, used instead of `memory`; NULL: none. Requires EBPO_LOAD_CACHE. The model is
      * entirely in memory if it and the other models that are entirely in memory take at most half
-     * of the budget; else it is loaded in parts.
+     * of the budget; else it is loaded subtree by subtree.
      */
     ebpo_budget *budget;
 
@@ -191,7 +191,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_model_memory(const ebpo_file *file,
 /*
  * Frees a model. Free its contexts first.
  *
- * Threads: one per model.
+ * Threads: one at a time per model.
  */
 EBPO_API void ebpo_model_free(ebpo_model *model);
 
@@ -297,7 +297,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_budget_new(uint64_t bytes, ebpo_budget *
 /*
  * Frees a budget. Free its models first.
  *
- * Threads: one per budget.
+ * Threads: one at a time per budget.
  */
 EBPO_API void ebpo_budget_free(ebpo_budget *budget);
 
@@ -336,7 +336,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_context_new(ebpo_model *model, ebpo_cont
 /*
  * Frees a context.
  *
- * Threads: one per context.
+ * Threads: one at a time per context.
  */
 EBPO_API void ebpo_context_free(ebpo_context *context);
 
@@ -426,7 +426,7 @@ typedef struct ebpo_inside_result {
  * EBPO_E_NOT_SOLID: the model is a surface without EBPO_PART_BORDER. EBPO_E_ABSENT: the file has no
  * mesh and no level is given, or a subset lacks the required data.
  *
- * Threads: one per context.
+ * Threads: one at a time per context.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_inside(ebpo_context *context, const double point[3],
                                                const ebpo_inside_options *options,
@@ -435,7 +435,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_inside(ebpo_context *context, const doub
 /*
  * Classifies points[count][3] into out[count].
  *
- * Threads: one per context.
+ * Threads: one at a time per context.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_inside_many(ebpo_context *context, const double *points,
                                                     uint64_t count,
@@ -455,7 +455,7 @@ typedef struct ebpo_winding_bounds {
  *
  * EBPO_E_NOT_SOLID, EBPO_E_ABSENT as for ebpo_inside.
  *
- * Threads: one per context.
+ * Threads: one at a time per context.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_winding(ebpo_context *context, const double *points,
                                                 uint64_t count, double width,
@@ -558,7 +558,7 @@ typedef struct ebpo_distance_result {
  * EBPO_E_ABSENT: the file has no mesh, no level is given, and the mode is not
  * EBPO_DISTANCE_ENVELOPE; or a subset lacks the required data.
  *
- * Threads: one per context.
+ * Threads: one at a time per context.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_distance(ebpo_context *context, const double point[3],
                                                  const ebpo_distance_options *options,
@@ -567,7 +567,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_distance(ebpo_context *context, const do
 /*
  * Computes the distances of points[count][3] into out[count].
  *
- * Threads: one per context.
+ * Threads: one at a time per context.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_distance_many(ebpo_context *context, const double *points,
                                                       uint64_t count,
@@ -596,7 +596,7 @@ typedef struct ebpo_within_options {
         sizeof(ebpo_within_options), __builtin_inf(), 0, true, { 0 } \
     }
 
-/* A face and its distance; lent until the callback returns. */
+/* A face and its distance; valid until the callback returns. */
 typedef struct ebpo_near_face {
     /* Correctly rounded, unsigned. */
     double distance;
@@ -610,7 +610,7 @@ typedef struct ebpo_near_face {
     uint64_t reserved[3];
 } ebpo_near_face;
 
-/* Return false to stop. */
+/* Callback. It returns false to stop the call. */
 typedef bool (*ebpo_near_fn)(void *user, const ebpo_near_face *face);
 
 /*
@@ -630,7 +630,7 @@ typedef bool (*ebpo_near_fn)(void *user, const ebpo_near_face *face);
  * EBPO_E_ABSENT: as for ebpo_distance. In a subset, the call may pass some faces before it returns
  * this error; these faces are correct. EBPO_E_ARGUMENT: returned before the first face.
  *
- * Threads: one per context.
+ * Threads: one at a time per context.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_distance_within(ebpo_context *context,
                                                         const double point[3],
@@ -669,7 +669,7 @@ typedef struct ebpo_ray_hit {
  *
  * EBPO_E_ABSENT: the file has no mesh, or a subset lacks the required data.
  *
- * Threads: one per context.
+ * Threads: one at a time per context.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_first(ebpo_context *context, const double origin[3],
                                                   const double direction[3], double t_max,
@@ -677,9 +677,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_first(ebpo_context *context, const d
 
 /*
  * Finds all triangles that intersect the ray, sorted by t, then by the order of the file. `hits` is
- * lent until the next call with the context. Errors are those of ebpo_ray_first.
+ * valid until the next call with the context. Errors are those of ebpo_ray_first.
  *
- * Threads: one per context.
+ * Threads: one at a time per context.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_all(ebpo_context *context, const double origin[3],
                                                 const double direction[3], double t_max,
@@ -689,7 +689,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_all(ebpo_context *context, const dou
 /*
  * Tests if the ray intersects any triangle. Faster than ebpo_ray_first, with the same errors.
  *
- * Threads: one per context.
+ * Threads: one at a time per context.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_any(ebpo_context *context, const double origin[3],
                                                 const double direction[3], double t_max, bool *any,
@@ -743,7 +743,7 @@ typedef struct ebpo_ray {
  * errors are those of ebpo_ray_first, for the first failed ray in processing order. On failure
  * `out` is unspecified.
  *
- * Threads: one per context.
+ * Threads: one at a time per context.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_first_many(ebpo_context *context, const ebpo_ray *rays,
                                                        uint64_t count,
@@ -753,7 +753,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_first_many(ebpo_context *context, co
 /*
  * Tests rays[count] as ebpo_ray_any does, into any[count]; see ebpo_ray_first_many.
  *
- * Threads: one per context.
+ * Threads: one at a time per context.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_any_many(ebpo_context *context, const ebpo_ray *rays,
                                                      uint64_t count,
@@ -763,9 +763,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_any_many(ebpo_context *context, cons
 /*
  * Finds all hits of rays[count] as ebpo_ray_all does; see ebpo_ray_first_many. The hits
  * of ray i are hits[begin[i]] to hits[begin[i + 1] - 1]; `begin` has count + 1 items. `hits` and
- * `begin` are lent until the next call with the context.
+ * `begin` are valid until the next call with the context.
  *
- * Threads: one per context.
+ * Threads: one at a time per context.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_all_many(ebpo_context *context, const ebpo_ray *rays,
                                                      uint64_t count,
@@ -807,7 +807,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_sampler_new(const ebpo_file *file, const
 /*
  * Frees a sampler.
  *
- * Threads: one per sampler.
+ * Threads: one at a time per sampler.
  */
 EBPO_API void ebpo_sampler_free(ebpo_sampler *sampler);
 
@@ -858,9 +858,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_sample(const ebpo_sampler *sampler, cons
 /*
  * Finds the triangles that intersect the box min .. max (min <= max on each axis), in the order of
  * the file. Triangles and box include their boundaries. Indices are as in ebpo_distance_result.
- * `faces` is lent until the next call with the context. Errors are those of ebpo_ray_first.
+ * `faces` is valid until the next call with the context. Errors are those of ebpo_ray_first.
  *
- * Threads: one per context.
+ * Threads: one at a time per context.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_faces_in_box(ebpo_context *context, const double min[3],
                                                      const double max[3], const uint64_t **faces,
@@ -869,7 +869,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_faces_in_box(ebpo_context *context, cons
 /* Maximum number of triangles in a batch. */
 enum { EBPO_TRIANGLES_MAX = 1024 };
 
-/* A batch of triangles; lent until the callback returns. */
+/* A batch of triangles; valid until the callback returns. */
 typedef struct ebpo_triangles {
     /* 1 to EBPO_TRIANGLES_MAX */
     uint64_t count;
@@ -883,7 +883,7 @@ typedef struct ebpo_triangles {
     uint64_t reserved[4];
 } ebpo_triangles;
 
-/* Return false to stop. */
+/* Callback. It returns false to stop the call. */
 typedef bool (*ebpo_triangles_fn)(void *user, const ebpo_triangles *triangles);
 
 /*
@@ -899,7 +899,7 @@ typedef bool (*ebpo_triangles_fn)(void *user, const ebpo_triangles *triangles);
  * Errors are those of ebpo_ray_first. EBPO_E_ABSENT and EBPO_E_ARGUMENT are returned before the
  * first triangle.
  *
- * Threads: one per context.
+ * Threads: one at a time per context.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_triangles_in_box(ebpo_context *context, const double min[3],
                                                          const double max[3],

@@ -109,7 +109,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_new(ebpo_scene **out, ebpo_error *
 /*
  * Frees a scene, and closes its files and models.
  *
- * Threads: one per scene.
+ * Threads: one at a time per scene.
  */
 EBPO_API void ebpo_scene_free(ebpo_scene *scene);
 
@@ -123,7 +123,7 @@ EBPO_API void ebpo_scene_free(ebpo_scene *scene);
  *
  * EBPO_E_ARGUMENT: the name is not valid.
  *
- * Threads: one per scene.
+ * Threads: one at a time per scene.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_add_model(ebpo_scene *scene, const char *name,
                                                         const char *path, const uint8_t digest[32],
@@ -168,7 +168,7 @@ typedef struct ebpo_scene_instance {
  * EBPO_E_ARGUMENT: the name, model, route, layer or pose is not valid (for a loaded model
  * ebpo_pose_check tests more), or the instance is fixed and has a route.
  *
- * Threads: one per scene.
+ * Threads: one at a time per scene.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_add_instance(ebpo_scene *scene,
                                                            const ebpo_scene_instance *instance,
@@ -251,7 +251,7 @@ typedef struct ebpo_scene_stats {
 /*
  * Gets statistics of the models so far.
  *
- * Threads: one per scene.
+ * Threads: one at a time per scene.
  */
 EBPO_API ebpo_status ebpo_scene_get_stats(const ebpo_scene *scene, ebpo_scene_stats *out);
 
@@ -350,7 +350,7 @@ typedef struct ebpo_load_options {
  * link leads out of the scene's folder (ebpo_scene_options.outside). EBPO_E_ARGUMENT: an instance
  * has a pose that its model cannot have; the message names the instance. EBPO_E_IO.
  *
- * Threads: one per scene.
+ * Threads: one at a time per scene.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_load(ebpo_scene *scene,
                                                    const ebpo_load_options *options,
@@ -370,7 +370,7 @@ EBPO_API const ebpo_file *ebpo_scene_file(const ebpo_scene *scene, uint64_t mode
  *
  * EBPO_E_ARGUMENT: not loaded. The errors of ebpo_model_new.
  *
- * Threads: one per scene.
+ * Threads: one at a time per scene.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_model(ebpo_scene *scene, uint64_t model,
                                                     ebpo_model **out, ebpo_error *error);
@@ -430,7 +430,7 @@ typedef struct ebpo_scene_pair {
     double clearance;
 } ebpo_scene_pair;
 
-/* Receives pairs, lent until it returns. Return false to stop. */
+/* Callback that gets pairs, valid until it returns. It returns false to stop the call. */
 typedef bool (*ebpo_scene_pairs_fn)(void *user, const ebpo_scene_pair *pairs, uint64_t count);
 
 /*
@@ -486,7 +486,8 @@ typedef struct ebpo_scene_clash {
     /* ebpo_clash_kind. Without `relate`: the greatest kind of any pair of faces. */
     int32_t kind;
 
-    /* ebpo_relation of a to b with ebpo_scene_clash_options.relate, else EBPO_RELATION_OPEN. */
+    /* ebpo_relation of a to b with ebpo_scene_clash_options.relate, else EBPO_RELATION_UNDECIDED.
+     */
     int32_t relation;
 
     /*
@@ -510,10 +511,10 @@ typedef struct ebpo_scene_clash {
      * ebpo_scene_clash_options.depth. The bounds 0 and INFINITY: not requested, or the other
      * instance is a surface.
      */
-    ebpo_certain depth[2];
+    ebpo_value_bounds depth[2];
 } ebpo_scene_clash;
 
-/* Receives clashes, lent until it returns. Return false to stop. */
+/* Callback that gets clashes, valid until it returns. It returns false to stop the call. */
 typedef bool (*ebpo_scene_clashes_fn)(void *user, const ebpo_scene_clash *clashes, uint64_t count);
 
 typedef struct ebpo_scene_clash_options {
@@ -556,9 +557,9 @@ typedef struct ebpo_scene_clash_options {
  *
  * EBPO_E_ARGUMENT: not loaded, or invalid time, pose (ebpo_pose_check) or options.depth.
  * EBPO_E_ABSENT: a model has no mesh, or is a subset without required faces (`relate` requires all
- * faces). EBPO_E_LIMIT: too little memory (ebpo_load_options). The errors of reading.
+ * faces). EBPO_E_LIMIT: too little memory (ebpo_load_options). Also the errors of reading (base.h).
  *
- * Threads: one per scene.
+ * Threads: one at a time per scene.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_find_clashes(ebpo_scene *scene, double time,
                                                            const ebpo_scene_clash_options *options,
@@ -569,7 +570,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_find_clashes(ebpo_scene *scene, do
  * Finds all pairs of intersecting faces of two instances at a time, as ebpo_collide_all does for
  * their models. Errors are those of ebpo_scene_find_clashes.
  *
- * Threads: one per scene.
+ * Threads: one at a time per scene.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_collide(ebpo_scene *scene, uint64_t a, uint64_t b,
                                                       double time, unsigned threads,
@@ -618,7 +619,7 @@ typedef struct ebpo_scene_frame {
  *
  * EBPO_E_IO: the file cannot be written.
  *
- * Threads: one per scene. The scene must not change until the report is freed.
+ * Threads: one at a time per scene. The scene must not change until the report is freed.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_report_new(const ebpo_scene *scene, const char *path,
                                                          ebpo_scene_report **out,
@@ -627,7 +628,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_report_new(const ebpo_scene *scene
 /*
  * Adds a time with the results of ebpo_scene_find_clashes. EBPO_E_IO.
  *
- * Threads: one per report.
+ * Threads: one at a time per report.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_report_add(ebpo_scene_report *report,
                                                          const ebpo_scene_frame *frame,
@@ -637,7 +638,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_report_add(ebpo_scene_report *repo
 /*
  * Completes the file. EBPO_E_IO.
  *
- * Threads: one per report.
+ * Threads: one at a time per report.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_report_finish(ebpo_scene_report *report,
                                                             ebpo_error *error);
@@ -645,7 +646,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_report_finish(ebpo_scene_report *r
 /*
  * Frees a report. An unfinished file is removed.
  *
- * Threads: one per report.
+ * Threads: one at a time per report.
  */
 EBPO_API void ebpo_scene_report_free(ebpo_scene_report *report);
 
@@ -676,7 +677,7 @@ typedef struct ebpo_scene_approach_result {
     int32_t reserved;
 } ebpo_scene_approach_result;
 
-/* Receives results, lent until it returns. Return false to stop. */
+/* Callback that gets results, valid until it returns. It returns false to stop the call. */
 typedef bool (*ebpo_scene_approaches_fn)(void *user, const ebpo_scene_approach_result *results,
                                          uint64_t count);
 
@@ -711,7 +712,7 @@ typedef struct ebpo_scene_approach_options {
  * Errors are those of ebpo_scene_find_clashes. EBPO_E_ARGUMENT: also if the tolerance is not above
  * 0.
  *
- * Threads: one per scene.
+ * Threads: one at a time per scene.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_approach(ebpo_scene *scene, double from, double to,
                                                        const ebpo_scene_approach_options *options,
@@ -738,7 +739,7 @@ typedef struct ebpo_scene_least {
     uint64_t evaluations;
 } ebpo_scene_least;
 
-/* Receives minimum distances, lent until it returns. The return value is ignored. */
+/* Callback that gets minimum distances, valid until it returns. Its return value is ignored. */
 typedef bool (*ebpo_scene_least_fn)(void *user, const ebpo_scene_least *list, uint64_t count);
 
 /*
@@ -746,7 +747,7 @@ typedef bool (*ebpo_scene_least_fn)(void *user, const ebpo_scene_least *list, ui
  * .. to, and a time at which it occurs. Results are in ascending order of a, then b. Options and
  * errors are those of ebpo_scene_approach.
  *
- * Threads: one per scene.
+ * Threads: one at a time per scene.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_least_distances(
     ebpo_scene *scene, double from, double to, const ebpo_scene_approach_options *options,
@@ -834,7 +835,7 @@ typedef struct ebpo_scene_need {
 
 #define EBPO_SCENE_NEED_INIT EBPO_SIZED(ebpo_scene_need)
 
-/* Receives needs, lent until it returns. The return value is ignored. */
+/* Callback that gets needs, valid until it returns. Its return value is ignored. */
 typedef bool (*ebpo_scene_needs_fn)(void *user, const ebpo_scene_need *needs, uint64_t count);
 
 /*
@@ -845,7 +846,7 @@ typedef bool (*ebpo_scene_needs_fn)(void *user, const ebpo_scene_need *needs, ui
  * EBPO_E_ARGUMENT: not loaded, not from <= to, invalid purpose, or a margin below 0. The errors of
  * reading.
  *
- * Threads: one per scene.
+ * Threads: one at a time per scene.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_plan(ebpo_scene *scene, double from, double to,
                                                    const ebpo_plan_options *options,
@@ -906,7 +907,7 @@ typedef struct ebpo_scene_packed {
 
 #define EBPO_SCENE_PACKED_INIT EBPO_SIZED(ebpo_scene_packed)
 
-/* Receives packed models, lent until it returns. The return value is ignored. */
+/* Callback that gets packed models, valid until it returns. Its return value is ignored. */
 typedef bool (*ebpo_scene_packs_fn)(void *user, const ebpo_scene_packed *models, uint64_t count);
 
 /*
@@ -920,9 +921,9 @@ typedef bool (*ebpo_scene_packs_fn)(void *user, const ebpo_scene_packed *models,
  *
  * EBPO_E_ARGUMENT: as for ebpo_scene_plan; the scene was not read from a file, or was changed after
  * reading; or target_bytes is too small for a model. EBPO_E_ABSENT: with target_bytes, a file is a
- * subset or has no mesh. EBPO_E_IO: also if the folder exists. The errors of reading.
+ * subset or has no mesh. EBPO_E_IO: also if the folder exists. Also the errors of reading (base.h).
  *
- * Threads: one per scene.
+ * Threads: one at a time per scene.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_pack(ebpo_scene *scene, const char *folder,
                                                    double from, double to,

@@ -136,7 +136,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_stream_new(const ebpo_file *file,
 /*
  * Frees a stream.
  *
- * Threads: one per stream.
+ * Threads: one at a time per stream.
  */
 EBPO_API void ebpo_stream_free(ebpo_stream *stream);
 
@@ -144,7 +144,7 @@ EBPO_API void ebpo_stream_free(ebpo_stream *stream);
  * Prefetch hint: the stream will be read down to level `last`. A remote source then fetches these
  * levels with as few requests as possible. Errors are reported by later reads.
  *
- * Threads: one per stream.
+ * Threads: one at a time per stream.
  */
 EBPO_API void ebpo_stream_prefetch(const ebpo_stream *stream, int last);
 
@@ -152,7 +152,7 @@ EBPO_API void ebpo_stream_prefetch(const ebpo_stream *stream, int last);
  * Reads the next level, from level 0 on, and no data of deeper levels. After the last one, *more is
  * false and *out is unchanged. The caller may pause at any level, and may retry after a failure.
  *
- * Threads: one per stream.
+ * Threads: one at a time per stream.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_stream_next_level(ebpo_stream *stream,
                                                           ebpo_stream_level *out, bool *more,
@@ -164,7 +164,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_stream_next_level(ebpo_stream *stream,
  *
  * EBPO_E_ARGUMENT: no level has been read yet.
  *
- * Threads: one per stream.
+ * Threads: one at a time per stream.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_stream_next_node(ebpo_stream *stream, ebpo_stream_node *out,
                                                          bool *more, ebpo_error *error);

@@ -145,7 +145,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_subset(const ebpo_file *file, const char
  * Writes the subset of a tree. ebpo_tree_write first writes the tree to a temporary file beside
  * `path`; the result is that of ebpo_subset for this file. The tree is freed, also on failure.
  *
- * Threads: one per tree.
+ * Threads: one at a time per tree.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_subset_of_tree(ebpo_tree *tree, const char *path,
                                                        const ebpo_subset_options *options,

@@ -8,8 +8,9 @@
  *         draw(faces.vertex_count, faces.xyz32, faces.face_count, faces.faces);
  *     ebpo_subtree_close(subtree);
  *
- * Little more of the file is read than needed; remote files (http.h) take a few requests. Octcodes
- * are those of ebpo_stream_node and ebpo_view_node; ebpo_octcode_at returns the octcode of the cell
+ * Reads little more of the file than needed; remote files (http.h) take a few requests. The
+ * octcode (locational code) of a node is a leading 1 and three bits for each level (stream.h);
+ * ebpo_octcode_at returns the octcode of the cell
  * that contains a point.
  */
 #ifndef EBPO_SUBTREE_H
@@ -34,7 +35,7 @@ typedef struct ebpo_subtree_options {
 
     /*
      * Number of levels below the subtree's root. -1: all. With another value no faces are read,
-     * because faces are those of the whole subtree.
+     * because leaves of deeper levels list them.
      */
     int levels;
 
@@ -71,7 +72,7 @@ typedef struct ebpo_subtree ebpo_subtree;
  * EBPO_E_ARGUMENT: not an octcode; no such node; or a white or black node, which no face
  * intersects. EBPO_E_ABSENT: the file is a subset (ebpo_subset) without the data below this node.
  * EBPO_E_LIMIT: options.memory is too small, and the message names a sufficient value; or more than
- * 2^32 - 2 nodes, planes or listed faces. The errors of reading.
+ * 2^32 - 2 nodes, planes or listed faces. Also the errors of reading (base.h).
  *
  * Threads: any.
  */
@@ -82,14 +83,15 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_subtree_open(const ebpo_file *file, uint
 /*
  * Closes a subtree.
  *
- * Threads: one per subtree.
+ * Threads: one at a time per subtree.
  */
 EBPO_API void ebpo_subtree_close(ebpo_subtree *subtree);
 
 /*
- * Returns the octcode of the cell of a level that contains the point; a cell face belongs to the
- * cell above it. The node may be missing in the tree (ebpo_subtree_options.or_leaf_above). Returns
- * 0 if the point is not in the model's root cell, or the level is invalid.
+ * Returns the octcode of the cell of a level that contains the point. A point on a cell face
+ * belongs to the cell with the larger coordinates. The node may be missing in the tree
+ * (ebpo_subtree_options.or_leaf_above). Returns 0 if the point is not in the model's root cell, or
+ * the level is invalid.
  *
  * level   0 to EBPO_LEVELS_MAX - 1
  *
@@ -104,7 +106,7 @@ EBPO_API uint64_t ebpo_octcode_at(const ebpo_info *info, const double point[3], 
 
 /*
  * All nodes of a subtree, including white ones. Index 0 is the subtree's root; nodes are sorted by
- * level and then by octcode, so octcodes ascend. Arrays are lent until the subtree is closed.
+ * level and then by octcode, so octcodes ascend. Arrays are valid until the subtree is closed.
  */
 typedef struct ebpo_subtree_nodes {
     size_t struct_size;
@@ -137,8 +139,8 @@ typedef struct ebpo_subtree_nodes {
     const uint32_t *children;
 
     /*
-     * [node_count + 1] index in `planes` of each node's first own plane. Own planes are those that
-     * a gray node adds to its parent's envelope, and those stored for a leaf. NULL: not requested,
+     * [node_count + 1] index in `planes` of each node's first stored plane: those that a gray
+     * node adds to its parent's envelope, and those of a leaf. NULL: not requested,
      * or not in the file.
      */
     const uint32_t *plane_first;
@@ -153,7 +155,7 @@ typedef struct ebpo_subtree_nodes {
      */
     const uint32_t *above_first;
 
-    /* Codes, in coordinates of the cell of the node above. */
+    /* Codes; those of a node are in coordinates of the node's cell. */
     const uint32_t *above_planes;
 
     /* Total memory of the subtree in bytes. */
@@ -190,10 +192,10 @@ typedef struct ebpo_subtree_node {
 
 /*
  * Gets node `number` of ebpo_subtree_nodes: its cell, half-spaces and, with `polygons`, its
- * envelope; without planes if these were not read. Its pointers are lent until the next call for a
+ * envelope; without planes if these were not read. Its pointers are valid until the next call for a
  * node of this subtree.
  *
- * Threads: one per subtree.
+ * Threads: one at a time per subtree.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_subtree_get_node(ebpo_subtree *subtree, uint64_t number,
                                                          bool polygons, ebpo_subtree_node *out,
@@ -206,7 +208,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_subtree_get_node(ebpo_subtree *subtree, 
  * that are outside the cell by a rounding error. Shared faces come first: a leaf before this
  * subtree already lists them. The others are owned faces. So of all disjoint subtrees that list a
  * face, exactly one owns the face; the whole tree owns all faces. In a subset (ebpo_subset), faces
- * that are only below pruned nodes are missing. Arrays are lent until the subtree is closed.
+ * that are only below pruned nodes are missing. Arrays are valid until the subtree is closed.
  */
 typedef struct ebpo_subtree_faces {
     size_t struct_size;
@@ -230,7 +232,7 @@ typedef struct ebpo_subtree_faces {
     const float *corners32;
     const double *corners64;
 
-    /* [face_count] indices in the file, ascending */
+    /* [face_count] index of each face in the file, ascending */
     const uint32_t *numbers;
 
     /* [face_count] source indices; NULL: not requested, or the file has no maps */

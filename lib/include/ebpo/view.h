@@ -201,12 +201,12 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_view_stream_new(const ebpo_file *file,
 /*
  * Frees a stream.
  *
- * Threads: one per stream.
+ * Threads: one at a time per stream.
  */
 EBPO_API void ebpo_view_stream_free(ebpo_view_stream *stream);
 
 /*
- * Gets the next node; its pointers are lent until the next call with the stream. Unless *end is
+ * Gets the next node; its pointers are valid until the next call with the stream. Unless *end is
  * EBPO_VIEW_NODE, there is no node and *out is unchanged.
  *
  * Reads the chunks of the node and its siblings, unless they are in memory. For a remote file,
@@ -217,7 +217,7 @@ EBPO_API void ebpo_view_stream_free(ebpo_view_stream *stream);
  *
  * The sequence of nodes depends only on the file and the options. Limits only truncate it.
  *
- * Threads: one per stream.
+ * Threads: one at a time per stream.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_view_stream_next(ebpo_view_stream *stream,
                                                          ebpo_view_node *out, ebpo_view_end *end,
@@ -247,12 +247,12 @@ typedef struct ebpo_view_faces {
 
 /*
  * Gets the faces of the last node of ebpo_view_stream_next if it was a leaf, with options.faces;
- * otherwise none. Arrays are lent until the next call with the stream.
+ * otherwise none. Arrays are valid until the next call with the stream.
  *
  * Faces are read with the leaf and its siblings. If the faces would exceed options.bytes, the leaf
  * and its siblings are not delivered.
  *
- * Threads: one per stream.
+ * Threads: one at a time per stream.
  */
 EBPO_API ebpo_status ebpo_view_stream_get_faces(const ebpo_view_stream *stream,
                                                 ebpo_view_faces *out);
@@ -264,13 +264,13 @@ EBPO_API ebpo_status ebpo_view_stream_get_faces(const ebpo_view_stream *stream,
  *
  * EBPO_E_ARGUMENT: invalid options, or a fixed option differs.
  *
- * Threads: one per stream.
+ * Threads: one at a time per stream.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_view_stream_change(ebpo_view_stream *stream,
                                                            const ebpo_view_options *options,
                                                            ebpo_error *error);
 
-/* Receives a node, lent until it returns. Return false to stop. */
+/* Callback that gets a node, which is valid until it returns. It returns false to stop the call. */
 typedef bool (*ebpo_view_visit_fn)(void *user, const ebpo_view_node *node);
 
 /*
@@ -278,7 +278,7 @@ typedef bool (*ebpo_view_visit_fn)(void *user, const ebpo_view_node *node);
  * of the observer, or, without an observer, depth first by octcode. `complete` is always true.
  * There are no nodes before the root is delivered. Reads nothing. `visit` must not use the stream.
  *
- * Threads: one per stream.
+ * Threads: one at a time per stream.
  */
 EBPO_API void ebpo_view_stream_cut(ebpo_view_stream *stream, ebpo_view_visit_fn visit, void *user);
 
@@ -309,7 +309,7 @@ typedef struct ebpo_view_stats {
 /*
  * Gets statistics; visits all gray nodes of the cut.
  *
- * Threads: one per stream.
+ * Threads: one at a time per stream.
  */
 EBPO_API ebpo_status ebpo_view_stream_get_stats(const ebpo_view_stream *stream,
                                                 ebpo_view_stats *out);

@@ -61,7 +61,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_workspace_new(const ebpo_workspace_optio
 /*
  * Frees a workspace. Free all objects that use it first.
  *
- * Threads: one per workspace.
+ * Threads: one at a time per workspace.
  */
 EBPO_API void ebpo_workspace_free(ebpo_workspace *workspace);
 

@@ -60,8 +60,8 @@ struct two {
 
     double distance(double tolerance)
     {
-        ebpo_clearance_options how = EBPO_CLEARANCE_OPTIONS_INIT;
-        ebpo_clearance out;
+        ebpo_collide_distance_options how = EBPO_COLLIDE_DISTANCE_OPTIONS_INIT;
+        ebpo_collide_distance_result out;
         how.tolerance = tolerance;
         check(ebpo_collide_distance(collider, &options, &how, &out, &error));
         return out.distance.hi;

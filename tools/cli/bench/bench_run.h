@@ -57,8 +57,8 @@ EBPO_MUST_USE ebpo_status bench_each(const bench_job *job, ebpo_context *context
 EBPO_MUST_USE ebpo_status bench_batch(const bench_job *job, ebpo_context *context,
                                       void *result_values, bench_metrics *out, ebpo_error *error);
 
-/* Asks the system to drop a file from the page cache. Returns the share of pages still in memory;
- * -1 when not known. */
+/* Requests that the system drops a file from the page cache. Returns the share of pages still in
+ * memory; -1 when not known. */
 double bench_drop_file(const char *path);
 /* Returns the peak memory of this process (Linux), since the last bench_reset_peak if the system
  * allows a reset; 0 when not known. */

@@ -9,14 +9,14 @@ enum { PAIRS_SHOWN = 10 };
 typedef struct crossing_list {
     json *j; /* NULL: words */
     progress_line *line;
-    ebpo_crossing first[PAIRS_SHOWN];
+    ebpo_self_intersection first[PAIRS_SHOWN];
     int count;
 } crossing_list;
 
 static const char *const kinds[] = { "APART", "TOUCHING", "CROSSING", "COPLANAR" };
 static const char *const verbs[] = { "", "touch", "cross", "overlap" };
 
-static void crossing_json(json *j, const ebpo_crossing *c)
+static void crossing_json(json *j, const ebpo_self_intersection *c)
 {
     json_object(j, NULL);
     json_text(j, "kind", kinds[c->kind]);
@@ -28,7 +28,7 @@ static void crossing_json(json *j, const ebpo_crossing *c)
     json_end(j);
 }
 
-static bool take_crossing(void *user, const ebpo_crossing *crossings, uint64_t count)
+static bool take_crossing(void *user, const ebpo_self_intersection *crossings, uint64_t count)
 {
     crossing_list *p = user;
     progress_wipe(p->line);
@@ -40,13 +40,13 @@ static bool take_crossing(void *user, const ebpo_crossing *crossings, uint64_t c
     return true;
 }
 
-static uint64_t pairs_of(const ebpo_crossings_summary *s)
+static uint64_t pairs_of(const ebpo_self_intersections_summary *s)
 {
     return s->pairs[EBPO_PAIR_CROSSING] + s->pairs[EBPO_PAIR_TOUCHING] +
            s->pairs[EBPO_PAIR_COPLANAR];
 }
 
-static void print_words(const crossing_list *p, const ebpo_crossings_summary *s)
+static void print_words(const crossing_list *p, const ebpo_self_intersections_summary *s)
 {
     char pairs[64], faces[64];
     uint64_t all = pairs_of(s);
@@ -62,7 +62,7 @@ static void print_words(const crossing_list *p, const ebpo_crossings_summary *s)
            (unsigned long long)s->pairs[EBPO_PAIR_COPLANAR],
            words_plural(faces, sizeof faces, s->faces, "face", "faces"));
     for (int i = 0; i < p->count; i++) {
-        const ebpo_crossing *c = &p->first[i];
+        const ebpo_self_intersection *c = &p->first[i];
         printf("    faces %llu and %llu %s near %.9g %.9g %.9g\n", (unsigned long long)c->face[0],
                (unsigned long long)c->face[1], verbs[c->kind], c->point[0], c->point[1],
                c->point[2]);
@@ -73,7 +73,7 @@ static void print_words(const crossing_list *p, const ebpo_crossings_summary *s)
 
 /* Ends the list of pairs; the outermost object stays open. After a failure the object contains the
  * pairs found so far, and no count. */
-static void end_json(json *j, const ebpo_crossings_summary *s, bool found)
+static void end_json(json *j, const ebpo_self_intersections_summary *s, bool found)
 {
     json_end(j);
     if (found) {
@@ -88,16 +88,17 @@ static void end_json(json *j, const ebpo_crossings_summary *s, bool found)
 }
 
 ebpo_status check_crossings(ebpo_mesh *mesh, const ebpo_mesh_report *report,
-                            const ebpo_crossings_options *options, json *j, bool quiet,
+                            const ebpo_self_intersections_options *options, json *j, bool quiet,
                             progress_line *line, ebpo_error *error)
 {
     crossing_list p = { .j = j, .line = line };
-    ebpo_crossings_summary sum = EBPO_CROSSINGS_SUMMARY_INIT;
+    ebpo_self_intersections_summary sum = EBPO_SELF_INTERSECTIONS_SUMMARY_INIT;
     if (j) {
         json_object(j, "crossings");
         json_array(j, "pairs");
     }
-    ebpo_status status = ebpo_mesh_crossings(mesh, report, options, take_crossing, &p, &sum, error);
+    ebpo_status status =
+        ebpo_mesh_self_intersections(mesh, report, options, take_crossing, &p, &sum, error);
     progress_wipe(line);
     if (j)
         end_json(j, &sum, status == EBPO_OK);

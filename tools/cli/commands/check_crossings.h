@@ -10,7 +10,7 @@
 /* Prints the pairs found, in words (the first ones) or into `j` (all); `quiet`: nothing. The mesh
  * is empty afterwards. Wipes `line` before printing. */
 EBPO_MUST_USE ebpo_status check_crossings(ebpo_mesh *mesh, const ebpo_mesh_report *report,
-                                          const ebpo_crossings_options *options, json *j,
+                                          const ebpo_self_intersections_options *options, json *j,
                                           bool quiet, progress_line *line, ebpo_error *error);
 
 #endif

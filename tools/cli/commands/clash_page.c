@@ -299,7 +299,7 @@ static void put_instance(FILE *f, const ebpo_scene *scene, const char *letter, u
     fputs("</div>", f);
 }
 
-static void put_depth(FILE *f, const char *what, const ebpo_certain *depth)
+static void put_depth(FILE *f, const char *what, const ebpo_value_bounds *depth)
 {
     if (depth->hi < INFINITY && depth->hi > 0)
         fprintf(f, "%s %.4g to %.4g deep<br>", what, depth->lo, depth->hi);

@@ -408,7 +408,7 @@ static int prepare_points(const values *v, const char *path, bench_points *p)
 {
     points_kind kind = v->query >= BENCH_RAY ? POINTS_RAYS : POINTS;
     *p = (bench_points){ .rows = NULL };
-    if (!command_wants_hdf5("bench", path) || check_outputs(v) != EXIT_OK)
+    if (!command_requires_hdf5("bench", path) || check_outputs(v) != EXIT_OK)
         return EXIT_FAILED;
     return bench_points_make(p, kind, path, &v->q.remote, v->points, v->q.raw, (uint64_t)v->count,
                              (uint64_t)v->seed, v->q.tmax);

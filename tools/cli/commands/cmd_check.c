@@ -182,7 +182,7 @@ static void print_words(const values *v, const mesh_input *p, const char *path)
 static ebpo_status search_crossings(const values *v, mesh_input *p, ebpo_progress progress, json *j,
                                     progress_line *line, ebpo_error *error)
 {
-    ebpo_crossings_options how = EBPO_CROSSINGS_OPTIONS_INIT;
+    ebpo_self_intersections_options how = EBPO_SELF_INTERSECTIONS_OPTIONS_INIT;
     how.threads = (unsigned)v->threads;
     how.progress = progress;
     how.ply = v->out;

@@ -54,7 +54,7 @@ static ebpo_status find_relation(ebpo_collider *c, const ebpo_collide_options *h
     if (status != EBPO_E_ABSENT && status != EBPO_E_LIMIT)
         return status;
     *error = (ebpo_error)EBPO_ERROR_INIT; /* the required data is not in the subset */
-    *relation = collide_relations[EBPO_RELATION_OPEN];
+    *relation = collide_relations[EBPO_RELATION_UNDECIDED];
     return EBPO_OK;
 }
 
@@ -62,7 +62,7 @@ static ebpo_status find_relation(ebpo_collider *c, const ebpo_collide_options *h
  * nothing. */
 static void print_relation(bool as_json, const char *relation)
 {
-    bool open = relation == collide_relations[EBPO_RELATION_OPEN];
+    bool open = relation == collide_relations[EBPO_RELATION_UNDECIDED];
     if (relation && as_json)
         printf(open ? ", \"relation\": null" : ", \"relation\": \"%s\"", relation);
     else if (relation)
@@ -112,7 +112,7 @@ static bool measures_fit(measure_values *f, bool others)
 }
 
 /* Prints the two bounds. */
-static void print_bounds(bool as_json, const ebpo_certain *d)
+static void print_bounds(bool as_json, const ebpo_value_bounds *d)
 {
     char lo[32], hi[32];
     if (as_json)
@@ -123,7 +123,7 @@ static void print_bounds(bool as_json, const ebpo_certain *d)
 
 /* --- distance --- */
 
-static void pair_to_json(const ebpo_clearance *c)
+static void pair_to_json(const ebpo_collide_distance_result *c)
 {
     printf(", \"face_a\": %" PRIu64 ", \"face_b\": %" PRIu64 ", \"point_a\": [", c->pair.face_a,
            c->pair.face_b);
@@ -134,7 +134,7 @@ static void pair_to_json(const ebpo_clearance *c)
 }
 
 /* Prints the faces, if known. */
-static void print_clearance_pair(bool as_json, const ebpo_clearance *c)
+static void print_clearance_pair(bool as_json, const ebpo_collide_distance_result *c)
 {
     if (c->pair.face_a == EBPO_NO_FACE)
         return;
@@ -151,7 +151,8 @@ static void print_end(bool as_json, const char *relation)
     puts(as_json ? "}" : "");
 }
 
-static void print_distance(bool as_json, const ebpo_clearance *c, const char *relation)
+static void print_distance(bool as_json, const ebpo_collide_distance_result *c,
+                           const char *relation)
 {
     printf("%s", as_json ? "{" : "");
     print_bounds(as_json, &c->distance);
@@ -159,7 +160,8 @@ static void print_distance(bool as_json, const ebpo_clearance *c, const char *re
     print_end(as_json, relation);
 }
 
-static void print_at_least(bool as_json, const ebpo_clearance *c, const char *relation)
+static void print_at_least(bool as_json, const ebpo_collide_distance_result *c,
+                           const char *relation)
 {
     static const char *const words[2][3] = { { "not known", "no", "yes" },
                                              { "null", "false", "true" } };
@@ -171,8 +173,8 @@ static void print_at_least(bool as_json, const ebpo_clearance *c, const char *re
 static ebpo_status query_distance(const measure_values *f, bool as_json, ebpo_collider *c,
                                   const ebpo_collide_options *how, ebpo_error *error)
 {
-    ebpo_clearance_options wanted = EBPO_CLEARANCE_OPTIONS_INIT;
-    ebpo_clearance got;
+    ebpo_collide_distance_options wanted = EBPO_COLLIDE_DISTANCE_OPTIONS_INIT;
+    ebpo_collide_distance_result got;
     wanted.tolerance = f->tolerance;
     wanted.at_least = f->at_least;
     ebpo_status status = ebpo_collide_distance(c, how, &wanted, &got, error);
@@ -194,7 +196,7 @@ static ebpo_status query_distance(const measure_values *f, bool as_json, ebpo_co
 
 /* --- depth --- */
 
-static void print_depth(bool as_json, const char *name, bool solid, const ebpo_certain *d)
+static void print_depth(bool as_json, const char *name, bool solid, const ebpo_value_bounds *d)
 {
     printf(as_json ? "\"%s\": " : "%s ", name);
     if (!solid) {
@@ -209,7 +211,7 @@ static void print_depth(bool as_json, const char *name, bool solid, const ebpo_c
 static ebpo_status query_depth(const measure_values *f, bool as_json, ebpo_collider *c,
                                const ebpo_collide_options *how, ebpo_error *error)
 {
-    ebpo_certain depth[2] = { { 0, 0, 0, 0 }, { 0, 0, 0, 0 } };
+    ebpo_value_bounds depth[2] = { { 0, 0, 0, 0 }, { 0, 0, 0, 0 } };
     ebpo_status status[2];
     for (int i = 0; i < 2; i++) {
         status[i] = ebpo_collide_depth(c, how, f->tolerance, i == 0 ? &depth[0] : NULL,
@@ -348,7 +350,7 @@ static ebpo_status query_relation(const collide_values *v, ebpo_collider *c,
         return status;
     if (!v->query.json)
         puts(collide_relations[r.relation]);
-    else if (r.relation == EBPO_RELATION_OPEN)
+    else if (r.relation == EBPO_RELATION_UNDECIDED)
         printf("{\"relation\": null, \"contact\": %s}\n", truths[r.contact + 1]);
     else
         printf("{\"relation\": \"%s\", \"contact\": %s}\n", collide_relations[r.relation],
@@ -363,12 +365,13 @@ static void print_levels(bool as_json, const ebpo_level_result *r)
 {
     char lo[32], hi[32];
     if (as_json)
-        printf("{\"common\": %s, \"contact\": %s, \"open_pairs\": %llu, \"lo\": %s, \"hi\": "
+        printf("{\"common\": %s, \"contact\": %s, \"undecided_pairs\": %llu, \"lo\": %s, \"hi\": "
                "%s}\n",
-               truths[r->common + 1], truths[r->contact + 1], (unsigned long long)r->open_pairs,
-               json_number(r->distance.lo, lo), json_number(r->distance.hi, hi));
+               truths[r->common + 1], truths[r->contact + 1],
+               (unsigned long long)r->undecided_pairs, json_number(r->distance.lo, lo),
+               json_number(r->distance.hi, hi));
     else
-        printf("%s %llu %s %s\n", words[r->common + 1], (unsigned long long)r->open_pairs,
+        printf("%s %llu %s %s\n", words[r->common + 1], (unsigned long long)r->undecided_pairs,
                words_real(r->distance.lo, lo), words_real(r->distance.hi, hi));
 }
 

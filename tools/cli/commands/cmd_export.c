@@ -205,7 +205,7 @@ static int run_export(void *given, const char **operand)
     code = check_names(operand[0], operand[1], second);
     if (code != EXIT_OK)
         return code;
-    if (!command_wants_hdf5("export", operand[0]))
+    if (!command_requires_hdf5("export", operand[0]))
         return EXIT_FAILED;
     return write_out(v, operand[0], operand[1], second, &o);
 }

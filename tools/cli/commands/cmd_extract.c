@@ -200,7 +200,7 @@ static int run_extract(void *given, const char **operand)
         return code;
     if (!memory_check("extract", &v->memory))
         return EXIT_USAGE;
-    if (!command_wants_hdf5("extract", operand[0]))
+    if (!command_requires_hdf5("extract", operand[0]))
         return EXIT_FAILED;
     progress_line line;
     ebpo_progress progress = progress_start(&line, "extract", v->quiet);

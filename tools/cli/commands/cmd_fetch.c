@@ -194,7 +194,7 @@ static int run_fetch(void *given, const char **operand)
     int code = subset_options("fetch", v, operand[0], operand[1], &subset);
     if (code != EXIT_OK)
         return code;
-    if (!command_wants_hdf5("fetch", operand[0]))
+    if (!command_requires_hdf5("fetch", operand[0]))
         return EXIT_FAILED;
     char *part = NULL; /* with --http-cache, the cache folder keeps the data, and there is no folder
                           OUT.part */

@@ -626,7 +626,7 @@ static int run_haptic(void *given, const char **operand)
     int code = check_values(v, &memory);
     if (code != 0 || overwrites_input(v, operand[0]))
         return EXIT_USAGE;
-    bool fine = command_wants_hdf5("haptic", operand[0]) && read_tool(&j) &&
+    bool fine = command_requires_hdf5("haptic", operand[0]) && read_tool(&j) &&
                 (!v->path || haptic_path_open(&j.device, v->path)) &&
                 (!v->device || haptic_udp_open(&j.device, v->device));
     code = fine ? run_job(&j, memory) : EXIT_FAILED;

@@ -70,7 +70,7 @@ static int run_info(void *given, const char **operand)
     uint64_t bytes;
     if (v->memory && !words_read_size(v->memory, &bytes))
         return command_usage("info", "--memory: '%s' is not " WORDS_SIZE_EXPECTED, v->memory);
-    if (!command_wants_hdf5("info", operand[0]))
+    if (!command_requires_hdf5("info", operand[0]))
         return EXIT_FAILED;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;

@@ -220,7 +220,7 @@ static int run_levels(void *given, const char **operand)
     printer p = { .v = v, .begin = progress_now() };
     if (!process_memory_take("levels", v->memory, v->threads))
         return EXIT_USAGE;
-    if (!command_wants_hdf5("levels", operand[0]))
+    if (!command_requires_hdf5("levels", operand[0]))
         return EXIT_FAILED;
     if (remote_open(&file, operand[0], &v->remote, &error) != EBPO_OK)
         return command_failed("levels", &error);

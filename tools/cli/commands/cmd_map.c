@@ -449,10 +449,10 @@ static ebpo_status paint_map(map_job *j, ebpo_mesh *m, const double *distances, 
 static ebpo_status find_reach(map_job *j, const ebpo_mesh *m, const double *distances,
                               ebpo_error *error)
 {
-    ebpo_map_range_options o = EBPO_MAP_RANGE_OPTIONS_INIT;
+    ebpo_map_hausdorff_options o = EBPO_MAP_HAUSDORFF_OPTIONS_INIT;
     o.threads = j->options.threads;
     o.progress = j->options.progress;
-    return ebpo_map_find_range(j->model, m, distances, &o, &j->reach, error);
+    return ebpo_map_bound_hausdorff(j->model, m, distances, &o, &j->reach, error);
 }
 
 static ebpo_status map_vertices(map_job *j, ebpo_progress progress, ebpo_error *error)
@@ -698,7 +698,7 @@ static int run_map(void *given, const char **operand)
                   .path = operand[0],
                   .options = EBPO_MAP_OPTIONS_INIT,
                   .stats = EBPO_MAP_STATS_INIT,
-                  .reach = EBPO_MAP_RANGE_INIT,
+                  .reach = EBPO_MAP_HAUSDORFF_INIT,
                   .range = v->range };
     uint64_t memory = 0;
     int code = check_values(v);
@@ -708,7 +708,7 @@ static int run_map(void *given, const char **operand)
         code = EXIT_USAGE;
     if (code == EXIT_OK)
         code = check_outputs(operand[0], v);
-    if (code == EXIT_OK && !command_wants_hdf5("map", operand[0]))
+    if (code == EXIT_OK && !command_requires_hdf5("map", operand[0]))
         code = EXIT_FAILED;
     if (code != EXIT_OK)
         return code;

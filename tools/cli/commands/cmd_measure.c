@@ -350,7 +350,7 @@ static int run_measure(void *given, const char **operand)
     values *v = given;
     if (!process_memory_take("measure", v->memory, v->threads))
         return EXIT_USAGE;
-    return command_wants_hdf5("measure", operand[0]) ? measure_file(operand[0], v) : EXIT_FAILED;
+    return command_requires_hdf5("measure", operand[0]) ? measure_file(operand[0], v) : EXIT_FAILED;
 }
 
 const command command_measure = { &spec, sizeof standard, &standard, run_measure };

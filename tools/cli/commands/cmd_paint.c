@@ -629,7 +629,7 @@ static int run_paint(void *given, const char **operand)
         code = command_usage("paint", "the model is needed: ebpo paint PAINT FILE");
     if (code == EXIT_OK)
         code = check_outputs(&j);
-    if (code == EXIT_OK && j.model_path && !command_wants_hdf5("paint", j.model_path))
+    if (code == EXIT_OK && j.model_path && !command_requires_hdf5("paint", j.model_path))
         code = EXIT_FAILED;
     if (code == EXIT_OK && v->path && !paint_read_path(v, &input, &count))
         code = EXIT_FAILED;

@@ -501,7 +501,7 @@ static int run_recover(void *given, const char **operand)
         return command_usage("recover", "give the new file with --output");
     if (!memory_check("recover", &v->memory) || command_overwrites("recover", operand[0], v->out))
         return EXIT_USAGE;
-    if (!command_wants_hdf5("recover", operand[0]))
+    if (!command_requires_hdf5("recover", operand[0]))
         return EXIT_FAILED;
     p.progress = progress_start(&line, "recover", v->quiet);
     ebpo_status status = ebpo_check_output(v->out, &error);

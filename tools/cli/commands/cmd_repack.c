@@ -111,7 +111,7 @@ static int run_repack(void *given, const char **operand)
     int code = check_values(v, &write);
     if (code != EXIT_OK)
         return code;
-    if (!command_wants_hdf5("repack", operand[0]))
+    if (!command_requires_hdf5("repack", operand[0]))
         return EXIT_FAILED;
     progress_line line;
     double begun = progress_now();

@@ -50,8 +50,8 @@ static int add_setting(comparison *c, const report_values *v, const char *word)
     snprintf(s->word, sizeof s->word, v->percent ? "-%s%%" : "-K%s", word);
     for (const plane_setting *other = c->setting; other < s; other++)
         if (strcmp(other->word, s->word) == 0)
-            return refuse_value(v->percent ? "--percent" : "--k-root", word,
-                                "another number than one before it");
+            return command_usage("report", "%s: '%s' is given twice; give each number once",
+                                 v->percent ? "--percent" : "--k-root", word);
     selection_options chosen = { v->select,  v->percent ? s->percent : -1,
                                  v->epsilon, v->percent ? NULL : s->k_root,
                                  v->normals, -1 };
@@ -65,7 +65,7 @@ static int read_settings(comparison *c, const report_values *v)
     char word[sizeof c->setting->k_root];
     int code = EXIT_OK;
     selection_options all = { v->select, v->percent ? 1 : -1, v->epsilon, NULL, v->normals, -1 };
-    if (!list) { /* the seed also applies to points */
+    if (!list) { /* also checks --seed, which selects the points of queries */
         c->setting[c->settings++].percent = 40;
         return selection_check("report", &all);
     }
@@ -103,8 +103,8 @@ static int read_options(comparison *c, report_values *v, bool mesh)
     if (!mesh && building)
         return command_usage(
             "report", "--select, --percent, --k-root, --normals, --max-level, --leaf-faces, "
-                      "--epsilon, --unlimited and --keep only apply to a mesh, from which files "
-                      "are made");
+                      "--epsilon, --unlimited and --keep apply to a mesh only; give a mesh, or "
+                      "omit them");
     if (v->coalesce >= 0 && !v->unlimited)
         return command_usage("report", "--coalesce applies to --unlimited only");
     const ebpo_build_options standard = EBPO_BUILD_OPTIONS_INIT;
@@ -215,7 +215,8 @@ static int make_report(comparison *c, const char *const *operand, const char *pl
         return EXIT_FAILED;
     c->folder[0] = 0;
     if (report_page_missing())
-        fprintf(stderr, "ebpo report: warning: no page: %s\n", report_page_missing());
+        fprintf(stderr, "ebpo report: warning: report.html is not written: %s\n",
+                report_page_missing());
     if (c->v->json)
         report_to_json(stdout, c, false);
     else if (!c->v->quiet)
@@ -223,7 +224,7 @@ static int make_report(comparison *c, const char *const *operand, const char *pl
     return EXIT_OK;
 }
 
-/* Writes report-bunny for "dir/bunny.ply". */
+/* Sets `out` to the default name of the output folder: report-bunny for "dir/bunny.ply". */
 static void default_folder(const char *operand, char *out, size_t capacity)
 {
     char stem[201];

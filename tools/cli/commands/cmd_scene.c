@@ -15,7 +15,7 @@
 
 /* --- contents, boxes and pairs --- */
 
-/* Total bytes of model files, each counted once. */
+/* Totals: bytes and faces of files, each file once; and faces of all instances. */
 typedef struct scene_sums {
     uint64_t bytes, faces, posed_faces;
 } scene_sums;
@@ -84,12 +84,14 @@ static void info_words(const char *path, const ebpo_scene *scene, const ebpo_sce
     scene_sums s = sum_models(scene, c->models);
     printf("%s: %llu instances of %llu models\n", path, (unsigned long long)c->instances,
            (unsigned long long)c->models);
-    printf("fixed      %llu\nlayers     %llu\ngroups     %llu\nroutes     %llu, %llu poses\n",
+    printf("fixed      %llu instances\nlayers     %llu\ngroups     %llu\nroutes     %llu, %llu "
+           "poses\n",
            (unsigned long long)c->fixed, (unsigned long long)c->layers,
            (unsigned long long)c->groups, (unsigned long long)c->routes,
            (unsigned long long)c->poses);
-    printf("cameras    %llu\nignored    %llu\nclearances %llu\n", (unsigned long long)c->cameras,
-           (unsigned long long)c->ignored, (unsigned long long)c->clearances);
+    printf("cameras    %llu\nignored    %llu rules\nclearances %llu rules\n",
+           (unsigned long long)c->cameras, (unsigned long long)c->ignored,
+           (unsigned long long)c->clearances);
     printf("time       %g to %g\n", c->begin, c->end);
     printf("box        %.9g %.9g %.9g to %.9g %.9g %.9g\n", box[0][0], box[0][1], box[0][2],
            box[1][0], box[1][1], box[1][2]);
@@ -118,7 +120,8 @@ static ebpo_status scene_info(const scene_values *v, const char *path, ebpo_scen
     return status;
 }
 
-/* Reports that the scene is valid: everything was checked when it was opened. */
+/* Checks the checksums of all models, and reports that the scene is valid. Opening has checked the
+ * rest. */
 static ebpo_status scene_check(const scene_values *v, const char *path, ebpo_scene *scene,
                                ebpo_error *error)
 {
@@ -216,14 +219,13 @@ static ebpo_status scene_pairs(const scene_values *v, const char *path, ebpo_sce
     return status;
 }
 
-/* Lists the times when instances of a scene first come near each other, or their least distances.
- */
+/* --- approaches: times when instances first come near each other, or least distances --- */
 
 typedef struct listing {
     const scene_values *v;
     const ebpo_scene *scene;
     json j;
-    uint64_t reached, open, evaluations, approaches;
+    uint64_t reached, undecided, evaluations, approaches;
 } listing;
 
 static const char *name_of(const listing *l, uint64_t instance)
@@ -235,7 +237,7 @@ static const char *name_of(const listing *l, uint64_t instance)
 
 static const char *word_of(const ebpo_scene_approach_result *w)
 {
-    return w->reached > 0 ? "reached" : w->reached == 0 ? "apart" : "open";
+    return w->reached > 0 ? "reached" : w->reached == 0 ? "apart" : "undecided";
 }
 
 static void approach_json(listing *l, const ebpo_scene_approach_result *w)
@@ -253,7 +255,7 @@ static void approach_json(listing *l, const ebpo_scene_approach_result *w)
     json_end(j);
 }
 
-/* Prints all digits of bounds. */
+/* Prints an approach in one line, with all digits of the bounds. */
 static void print_approach(const listing *l, const ebpo_scene_approach_result *w)
 {
     char time[32], lo[32], hi[32];
@@ -272,7 +274,7 @@ static bool print_approaches(void *user, const ebpo_scene_approach_result *appro
     for (uint64_t i = 0; i < count; i++) {
         const ebpo_scene_approach_result *w = &approaches[i];
         l->reached += w->reached > 0;
-        l->open += w->reached < 0;
+        l->undecided += w->reached < 0;
         l->evaluations += w->evaluations;
         if (l->v->json)
             approach_json(l, w);
@@ -284,7 +286,7 @@ static bool print_approaches(void *user, const ebpo_scene_approach_result *appro
 
 /* Returns true when the limit of evaluations, or missing data of files, left a wider interval than
  * requested. */
-static bool is_open(const listing *l, const ebpo_scene_least *w)
+static bool is_undecided(const listing *l, const ebpo_scene_least *w)
 {
     return w->hi - w->lo > l->v->tolerance;
 }
@@ -298,7 +300,7 @@ static void least_json(listing *l, const ebpo_scene_least *w)
     json_real(j, "time", w->time);
     json_real(j, "distance_lo", w->lo);
     json_real(j, "distance_hi", w->hi);
-    json_bool(j, "open", is_open(l, w));
+    json_bool(j, "undecided", is_undecided(l, w));
     json_real(j, "clearance", w->clearance);
     json_uint(j, "evaluations", w->evaluations);
     json_end(j);
@@ -318,8 +320,8 @@ static bool print_leasts(void *user, const ebpo_scene_least *list, uint64_t coun
     for (uint64_t i = 0; i < count; i++) {
         const ebpo_scene_least *w = &list[i];
         l->reached += w->lo <= w->clearance;
-        bool open = is_open(l, w);
-        l->open += open;
+        bool open = is_undecided(l, w);
+        l->undecided += open;
         l->evaluations += w->evaluations;
         if (l->v->json)
             least_json(l, w);
@@ -354,9 +356,9 @@ static ebpo_status scene_approach(const scene_values *v, const char *path, ebpo_
     if (v->json)
         json_finish(&l.j);
     else if (!v->quiet)
-        fprintf(stderr, "%s: %llu come near, %llu open; %llu evaluations; %.3g s\n",
+        fprintf(stderr, "%s: %llu come near, %llu undecided; %llu evaluations; %.3g s\n",
                 words_plural((char[40]){ 0 }, 40, l.approaches, "pair", "pairs"),
-                (unsigned long long)l.reached, (unsigned long long)l.open,
+                (unsigned long long)l.reached, (unsigned long long)l.undecided,
                 (unsigned long long)l.evaluations, progress_now() - begun);
     return status;
 }
@@ -367,23 +369,24 @@ static const char *const purpose_words[] = { "collide", "view", "inside", "solid
 
 #include "cli/options/scene.inc"
 
-/* Sets v->from and v->to. Without --from, --to and --step, both are the value of --time, or the
- * first time of the scene; if `spans` and --time was not given, they are the first and last time of
- * the scene. Returns false for options that cannot be combined. */
-static bool set_times(scene_values *v, bool spans, const ebpo_scene *scene)
+/* Sets v->from and v->to. With --from, --to or --step: to these times; a missing one is the first
+ * or last time of the scene. With --time: both to this time. Without these options: to the first
+ * and the last time of the scene if `spans`, else both to the first time. Returns NULL, or an
+ * error. */
+static const char *set_times(scene_values *v, bool spans, const ebpo_scene *scene)
 {
     ebpo_scene_counts c = EBPO_SCENE_COUNTS_INIT;
     (void)ebpo_scene_get_counts(scene, &c);
     bool span = !isnan(v->from) || !isnan(v->to) || v->step > 0;
     if (span && !isnan(v->time))
-        return false;
+        return "--time cannot be used with --from, --to or --step";
     if (!span && !(spans && isnan(v->time))) {
         v->from = v->to = isnan(v->time) ? c.begin : v->time;
     } else {
         v->from = isnan(v->from) ? c.begin : v->from;
         v->to = isnan(v->to) ? c.end : v->to;
     }
-    return v->from <= v->to;
+    return v->from <= v->to ? NULL : "--from must not be after --to";
 }
 
 enum { FRAMES_MAX = 10000000 };
@@ -399,7 +402,7 @@ static const char *check_report(const scene_values *v)
     if (v->to > v->from && !(v->step > 0))
         return "a report from one time to another needs --step";
     if (v->to > v->from && !((v->to - v->from) / v->step < FRAMES_MAX))
-        return "--step is so small that there are more than ten million times";
+        return "--step is too small: the report would have more than ten million points in time";
     return NULL;
 }
 
@@ -420,13 +423,14 @@ static bool needs_span(int subcommand)
            subcommands[subcommand].run == scene_plan || subcommands[subcommand].run == scene_pack;
 }
 
-/* Returns NULL, or an error in the options of a plan: the options of a report give its purpose. */
+/* Sets the purpose of a plan: --solids and --depth, options of a report, mean --for solids. Returns
+ * NULL, or an error. */
 static const char *set_purpose(scene_values *v)
 {
     if (!v->solids && !(v->depth > 0))
         return NULL;
     if (v->purpose != EBPO_SCENE_FOR_COLLIDE && v->purpose != EBPO_SCENE_FOR_SOLIDS)
-        return "--solids and --depth are for collide and solids, not for view or inside";
+        return "--solids and --depth cannot be used with --for view or --for inside";
     v->purpose = EBPO_SCENE_FOR_SOLIDS;
     return NULL;
 }
@@ -467,9 +471,9 @@ static int run_scene(void *given, const char **operand)
     how.remote = v->remote;
     const char *wrong = NULL;
     ebpo_status status = ebpo_scene_open(operand[1], &how, &scene, &error);
-    if (status == EBPO_OK && !set_times(v, needs_span(subcommand), scene))
-        wrong = "--time cannot be used with --from or --to; --from must not be after --to";
-    else if (status == EBPO_OK)
+    if (status == EBPO_OK)
+        wrong = set_times(v, needs_span(subcommand), scene);
+    if (status == EBPO_OK && !wrong)
         wrong = check_options(subcommand, v, &load);
     if (wrong) {
         ebpo_scene_free(scene);

@@ -19,7 +19,7 @@ static int run_subset(void *given, const char **operand)
     int code = subset_options("subset", v, operand[0], operand[1], &subset);
     if (code != EXIT_OK)
         return code;
-    if (!command_wants_hdf5("subset", operand[0]))
+    if (!command_requires_hdf5("subset", operand[0]))
         return EXIT_FAILED;
     progress_line line;
     double begun = progress_now();

@@ -169,7 +169,7 @@ static int run_verify(void *given, const char **operand)
     values *v = given;
     if (!memory_check("verify", &v->memory))
         return EXIT_USAGE;
-    if (!command_wants_hdf5("verify", operand[0]))
+    if (!command_requires_hdf5("verify", operand[0]))
         return EXIT_FAILED;
     progress_line line;
     ebpo_progress progress = progress_start(&line, "verify", v->quiet);

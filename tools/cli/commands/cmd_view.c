@@ -287,7 +287,7 @@ static int run_view(void *given, const char **operand)
         return EXIT_USAGE;
     if (v->out && command_overwrites("view", operand[0], v->out))
         return EXIT_USAGE;
-    if (!command_wants_hdf5("view", operand[0]))
+    if (!command_requires_hdf5("view", operand[0]))
         return EXIT_FAILED;
     if (remote_open(&file, operand[0], &v->remote, &error) != EBPO_OK)
         return command_failed("view", &error);

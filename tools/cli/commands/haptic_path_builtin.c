@@ -1,6 +1,6 @@
-/* A built-in device: moves around the longest axis of the model in 8 seconds, slowly up and down
- * along the axis, and meanwhile into the surface and out of it. Rays find the surface in advance.
- */
+/* Simulates a haptic device: moves around the longest axis of the model in 8 seconds, slowly up and
+ * down along the axis, and meanwhile into the surface and out of it. Rays find the surface in
+ * advance. */
 #include <math.h>
 #include <stdlib.h>
 

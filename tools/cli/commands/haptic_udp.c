@@ -1,6 +1,6 @@
-/* A device that sends its positions in UDP packets, and receives the feedback: docs/guide/haptic.md
- * has their layout. The sender of the first valid packet is the device; other packets are ignored.
- */
+/* Drives a haptic device that sends its positions in UDP packets, and receives the feedback:
+ * docs/guide/haptic.md has their layout. The sender of the first valid packet is the device; other
+ * packets are ignored. */
 #include <arpa/inet.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -87,7 +87,7 @@ static bool read_pose(const uint8_t *p, haptic_pose *out)
     return square >= 0.25 && square <= 4;
 }
 
-/* Takes a packet. Returns false when it is not from the device, or is older than another one. */
+/* Receives a packet. Returns false when it is not from the device, or is older than another one. */
 static bool take_packet(udp *u, const uint8_t *p, ssize_t size, const struct sockaddr_in *from)
 {
     haptic_pose pose;

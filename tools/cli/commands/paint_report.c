@@ -148,11 +148,13 @@ static void print_changes(const paint_job *j)
                words_plural(vertices, sizeof vertices, b->vertices, "vertex", "vertices"),
                (unsigned long long)ebpo_file_info(j->file)->vertex_count,
                words_plural(points, sizeof points, b->points, "point", "points"),
-               (unsigned long long)b->between);
-    uint64_t elsewhere = j->v->bake ? b->elsewhere : j->v->area ? j->areas.elsewhere : 0;
-    if (elsewhere)
-        printf("  elsewhere  %s, on faces that this subset does not have\n",
-               words_plural(points, sizeof points, elsewhere, "point", "points"));
+               (unsigned long long)b->points_without_vertex);
+    uint64_t outside = j->v->bake   ? b->points_outside_subset
+                       : j->v->area ? j->areas.points_outside_subset
+                                    : 0;
+    if (outside)
+        printf("  omitted    %s, on faces that this subset does not have\n",
+               words_plural(points, sizeof points, outside, "point", "points"));
 }
 
 static void print_all(const paint_job *j, const ebpo_paint_info *info, const counts *c)
@@ -304,7 +306,7 @@ static void json_areas(const paint_job *j, const ebpo_paint_info *info, json *ou
     }
     json_end(out);
     json_uint(out, "faces", a->faces);
-    json_uint(out, "elsewhere", a->elsewhere);
+    json_uint(out, "points_outside_subset", a->points_outside_subset);
     json_end(out);
 }
 
@@ -324,8 +326,8 @@ static void json_changes(const paint_job *j, json *out)
         json_text(out, "output", j->v->bake);
         json_uint(out, "vertices", j->baked.vertices);
         json_uint(out, "points", j->baked.points);
-        json_uint(out, "elsewhere", j->baked.elsewhere);
-        json_uint(out, "between", j->baked.between);
+        json_uint(out, "points_outside_subset", j->baked.points_outside_subset);
+        json_uint(out, "points_without_vertex", j->baked.points_without_vertex);
         json_bool(out, "own_colours", j->colours_of_own);
         json_end(out);
     }

@@ -1,4 +1,4 @@
-/* Holds the model of a query command for all threads. Without --memory and similar options it
+/* Opens the model of a query command for all threads. Without --memory and similar options it
  * adapts: it begins with the upper levels and the subtrees that queries need, and loads the whole
  * model when loading parts has cost as much as loading the whole model would. */
 #ifndef EBPO_TOOLS_QUERY_HOLDING_H

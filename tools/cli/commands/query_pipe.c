@@ -266,7 +266,7 @@ static void end_taking(pipe_line *p, bool took)
     pthread_mutex_unlock(&p->lock);
 }
 
-/* Takes the next block of the input. Returns NULL at the end. */
+/* Reads the next block of the input. Returns NULL at the end. */
 static slot *take_block(pipe_line *p)
 {
     if (!begin_to_take(p))

@@ -176,7 +176,7 @@ static int inspect_inputs(const query_shard *s, const query_job *job, char **fac
 {
     struct stat st;
     const char *dataset;
-    if (!query_catalogue_named(s->model) && !command_wants_hdf5(s->command, s->model))
+    if (!query_catalogue_named(s->model) && !command_requires_hdf5(s->command, s->model))
         return EXIT_FAILED;
     if (!points_file(s->points, &st, &dataset)) {
         fprintf(stderr, "ebpo %s: %s: cannot be opened: %s\n", s->command, s->points,

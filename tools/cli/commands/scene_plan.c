@@ -20,7 +20,8 @@ static const char *name_of(const ebpo_scene *scene, uint64_t model)
     return m.name;
 }
 
-/* Returns true for the first model of a file, which counts for the file. */
+/* Returns true for the first of the models that use one file, so that its bytes are counted once.
+ */
 static bool is_first(const ebpo_scene *scene, uint64_t model)
 {
     for (uint64_t i = 0; i < model; i++)
@@ -69,7 +70,7 @@ static bool print_needs(void *user, const ebpo_scene_need *needs, uint64_t count
 {
     plan *p = user;
     if (!p->v->json)
-        printf("%10s %10s  %-13s %13s  model: parts\n", "bytes", "of", "levels", "subtrees");
+        printf("%10s %10s  %-13s %13s  model: parts\n", "bytes", "file", "levels", "subtrees");
     for (uint64_t i = 0; i < count; i++) {
         bool first = is_first(p->scene, needs[i].model);
         p->bytes += first ? needs[i].bytes : 0;
@@ -111,7 +112,7 @@ ebpo_status scene_plan(const scene_values *v, const char *path, ebpo_scene *scen
         json_finish(&p.j);
     } else if (status == EBPO_OK && !v->quiet) {
         char bytes[32], whole[32];
-        fprintf(stderr, "%s of %s are needed from %g to %g\n",
+        fprintf(stderr, "%s of %s are needed for times from %g to %g\n",
                 words_bytes(bytes, sizeof bytes, p.bytes),
                 words_bytes(whole, sizeof whole, p.file_bytes), v->from, v->to);
     }
@@ -124,7 +125,7 @@ typedef struct pack {
     const scene_values *v;
     const ebpo_scene *scene;
     json j;
-    uint64_t bytes, source_bytes, refused;
+    uint64_t bytes, source_bytes;
 } pack;
 
 static void packed_json(pack *p, const ebpo_scene_packed *m)
@@ -159,12 +160,11 @@ static bool print_packed(void *user, const ebpo_scene_packed *models, uint64_t c
 {
     pack *p = user;
     if (!p->v->json && !p->v->quiet)
-        printf("%10s %10s %10s  model\n", "bytes", "of", "read");
+        printf("%10s %10s %10s  model\n", "bytes", "file", "read");
     for (uint64_t i = 0; i < count; i++) {
         bool first = is_first(p->scene, models[i].model);
         p->bytes += first ? models[i].bytes : 0;
         p->source_bytes += first ? models[i].source_bytes : 0;
-        p->refused += !models[i].complete;
         if (p->v->json)
             packed_json(p, &models[i]);
         else if (!p->v->quiet)

@@ -27,12 +27,12 @@ static const char *relation_word(int32_t relation)
 {
     static const char *const words[] = { "disjoint",   "touching",   "intersecting",
                                          "a inside b", "b inside a", "equal" };
-    return relation < EBPO_RELATION_OPEN ? words[relation] : NULL;
+    return relation < EBPO_RELATION_UNDECIDED ? words[relation] : NULL;
 }
 
 /* --- JSON --- */
 
-static void depth_json(json *j, const char *key, const ebpo_certain *depth)
+static void depth_json(json *j, const char *key, const ebpo_value_bounds *depth)
 {
     json_object(j, key);
     json_real(j, "lo", depth->lo);
@@ -147,7 +147,7 @@ static void scene_row_csv(const scene_values *v, const ebpo_scene *scene, double
 
 /* --- words --- */
 
-static void depth_words(const char *which, const ebpo_certain *depth)
+static void depth_words(const char *which, const ebpo_value_bounds *depth)
 {
     if (depth->hi < INFINITY)
         printf("\t%s %.9g to %.9g deep", which, depth->lo, depth->hi);

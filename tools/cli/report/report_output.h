@@ -11,7 +11,7 @@
  * (NULL-terminated) is in the report that would be replaced. A report: a folder with only files of
  * a report, including report.json. */
 int output_begin(const char *place, const char *const *operand, char *folder, size_t capacity);
-/* Gives the folder the name `place` and replaces an existing report. Returns false after a failure,
+/* Renames the folder to `place` and replaces an existing report. Returns false after a failure,
  * reported on stderr. */
 bool output_commit(const char *place, const char *folder);
 /* Removes the folder and its contents, if it exists. */

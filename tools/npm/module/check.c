@@ -1,4 +1,4 @@
-/* Checks of a whole file for the WebAssembly module. */
+/* Checks a whole file, for the WebAssembly module. */
 #include <stdlib.h>
 
 #include <ebpo/subtree.h>

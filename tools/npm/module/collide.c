@@ -1,4 +1,5 @@
-/* Pairs of models for the WebAssembly module with collide. Both models are in one instance. */
+/* Queries pairs of models, for the WebAssembly module with collide. Both models are in one
+ * instance. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -134,8 +135,8 @@ int EBPO_JS(ebpo_js_pair_relation)(ebpo_js_pair *pair, const double *poses)
 int EBPO_JS(ebpo_js_pair_distance)(ebpo_js_pair *pair, const double *poses, double tolerance)
 {
     ebpo_collide_options options = read_options(poses);
-    ebpo_clearance_options clearance = EBPO_CLEARANCE_OPTIONS_INIT;
-    ebpo_clearance result;
+    ebpo_collide_distance_options clearance = EBPO_COLLIDE_DISTANCE_OPTIONS_INIT;
+    ebpo_collide_distance_result result;
     clearance.tolerance = tolerance;
     ebpo_js_clear(&pair->object);
     ebpo_status status =

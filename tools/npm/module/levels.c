@@ -1,4 +1,5 @@
-/* Levels for the WebAssembly module: streams of nodes, envelopes as polygons, and the mesh. */
+/* Reads levels, for the WebAssembly module: streams of nodes, envelopes as polygons, and the mesh.
+ */
 #include <stdlib.h>
 #include <string.h>
 

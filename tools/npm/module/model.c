@@ -1,4 +1,4 @@
-/* Models and query objects of the WebAssembly module, and measures of a whole file. */
+/* Makes models and query objects of the WebAssembly module, and measures whole files. */
 #include <stdlib.h>
 #include <string.h>
 

@@ -1,7 +1,7 @@
-/* Queries of many points, rays and boxes for the WebAssembly module. Inputs are arrays of doubles;
- * results are one array for each member of the library's result structs. Indices of faces have 32
- * bits; UINT32_MAX is EBPO_NO_FACE. A call after EBPO_E_PENDING has the same arguments and keeps
- * completed items. */
+/* Evaluates queries of many points, rays and boxes, for the WebAssembly module. Inputs are arrays
+ * of doubles; results are one array for each member of the library's result structs. Indices of
+ * faces have 32 bits; UINT32_MAX is EBPO_NO_FACE. A call after EBPO_E_PENDING has the same
+ * arguments and keeps completed items. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-/* Nodes for drawing, for the WebAssembly module of viewers. A part of a level is the nodes
+/* Reads nodes for drawing, for the WebAssembly module of viewers. A part of a level is the nodes
  * of one subtree; in levels without subtrees, up to EBPO_INDEX_ROWS groups of siblings. All chunks
  * that a call needs are requested together, as far as their positions are known. */
 #include <stdlib.h>

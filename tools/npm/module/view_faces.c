@@ -1,5 +1,5 @@
-/* Faces of leaves for drawing, for the WebAssembly module of viewers: corners, and colours from the
- * file's attributes. */
+/* Reads faces of leaves for drawing, for the WebAssembly module of viewers: corners, and colours
+ * from the file's attributes. */
 #include <stdlib.h>
 #include <string.h>
 

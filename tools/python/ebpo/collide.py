@@ -273,7 +273,7 @@ class Collider:
         tolerance: greatest allowed hi - lo.
         deadline: time limit in seconds; then the current bounds are returned.
         """
-        clearance, out = made(c.ebpo_clearance_options, tolerance=tolerance), c.ebpo_clearance()
+        clearance, out = made(c.ebpo_collide_distance_options, tolerance=tolerance), c.ebpo_collide_distance_result()
         with self._options((pose_a, pose_b), deadline) as options:
             call("ebpo_collide_distance", self._handle, options, ctypes.byref(clearance), ctypes.byref(out))
         return Clearance(out.distance.lo, out.distance.hi, number(out.pair.face_a), number(out.pair.face_b),
@@ -287,7 +287,7 @@ class Collider:
         >>> lo <= .25 <= hi
         True
         """
-        a_in_b, b_in_a = c.ebpo_certain(), c.ebpo_certain()
+        a_in_b, b_in_a = c.ebpo_value_bounds(), c.ebpo_value_bounds()
         with self._options((pose_a, pose_b)) as options:
             call("ebpo_collide_depth", self._handle, options, tolerance, ctypes.byref(a_in_b), ctypes.byref(b_in_a))
         return (a_in_b.lo, a_in_b.hi), (b_in_a.lo, b_in_a.hi)

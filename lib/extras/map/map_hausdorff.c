@@ -24,8 +24,8 @@
 enum { FACES_AT_A_TIME = 1 << 17, TRIANGLES_MAX = 1 << 20 };
 
 typedef struct triangle {
-    double corner[3][3], away[3]; /* `away`: unsigned distances of the corners from the model */
-    double upper;                 /* upper bound of the distance of the triangle's points */
+    double corner[3][3], distance[3]; /* `distance`: unsigned, of each corner from the model */
+    double upper;                     /* upper bound of the distance of the triangle's points */
 } triangle;
 
 typedef struct triangles {
@@ -37,16 +37,17 @@ typedef struct search {
     ebpo_map_queries queries;
     const ebpo_mesh *mesh;
     const double *distances;
-    ebpo_map_range_options o;
-    double slack;         /* more than the effect of rounding on positions and lengths */
-    ebpo_map_range range; /* bounds of the result so far */
-    uint64_t allowed;     /* maximum number of queries in total, until the current faces are done */
-    triangles current, next;                   /* triangles of this round and of the next one */
-    uint64_t divided;                          /* number of triangles that this round divides: the
-                                                * first ones of `current` */
-    double (*middle)[3][3], (*middle_away)[3]; /* [divided] middle of the edge from each corner to
-                                                * the next, and its distance from the model */
-    uint64_t middle_capacity, away_capacity;
+    ebpo_map_hausdorff_options o;
+    double slack;             /* more than the effect of rounding on positions and lengths */
+    ebpo_map_hausdorff range; /* bounds of the result so far */
+    uint64_t allowed;         /* limit of range.queries until the current batch of faces is done */
+    triangles current, next;  /* triangles of this round and of the next one */
+    uint64_t divided;         /* number of triangles that this round divides: the
+                               * first ones of `current` */
+    double (*middle)[3][3],
+        (*middle_distance)[3]; /* [divided] middle of the edge from each corner to
+                                * the next, and its distance from the model */
+    uint64_t middle_capacity, distance_capacity;
 } search;
 
 /* Returns an upper bound of the distance of two points. */
@@ -69,7 +70,7 @@ static void set_upper_bound(const search *s, triangle *t)
     for (int k = 0; k < 3; k++)
         edge[k] = distance_above(t->corner[k], t->corner[(k + 1) % 3]);
     for (int k = 0; k < 3; k++)
-        t->upper = fmin(t->upper, t->away[k] + fmax(edge[k], edge[(k + 2) % 3]));
+        t->upper = fmin(t->upper, t->distance[k] + fmax(edge[k], edge[(k + 2) % 3]));
     t->upper += s->slack;
 }
 
@@ -79,8 +80,8 @@ static bool needs_division(const search *s, double upper)
     return upper > s->range.lo * (1 + s->o.tolerance) && upper > s->range.hi;
 }
 
-/* Adds a triangle to a list of triangles that must be divided, if it must. If there are too many
- * triangles or queries, its bound becomes final. */
+/* Adds a triangle to a list of triangles to divide, if it can change the result. If there are too
+ * many triangles or queries, its bound becomes final. */
 static ebpo_status keep_triangle(search *s, triangles *list, const triangle *t, ebpo_error *error)
 {
     if (!needs_division(s, t->upper))
@@ -96,11 +97,11 @@ static ebpo_status keep_triangle(search *s, triangles *list, const triangle *t, 
 }
 
 /* Raises the lower bound of the result to a point's distance. */
-static void raise_lower_bound(search *s, double away, const double location[3])
+static void raise_lower_bound(search *s, double distance, const double location[3])
 {
-    if (away <= s->range.lo)
+    if (distance <= s->range.lo)
         return;
-    s->range.lo = away;
+    s->range.lo = distance;
     memcpy(s->range.location, location, sizeof s->range.location);
 }
 
@@ -120,11 +121,12 @@ static ebpo_status query_middles(void *context, uint64_t begin, uint64_t end, un
         ebpo_map_query(&s->queries, worker, s->middle[begin][0], 3 * (end - begin), results, error);
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++)
         for (int k = 0; k < 3; k++)
-            s->middle_away[i][k] = fabs(results[3 * (i - begin) + (uint64_t)k].distance);
+            s->middle_distance[i][k] = fabs(results[3 * (i - begin) + (uint64_t)k].distance);
     return status;
 }
 
-/* Makes a quarter of triangle i: at corner `which`, or, for 3, between the middles of its edges. */
+/* Makes quarter `which` of triangle i. 0 to 2: the quarter at this corner; 3: the middle one,
+ * between the middles of the edges. */
 static void child_of(const search *s, uint64_t i, int which, triangle *out)
 {
     const triangle *t = &s->current.item[i];
@@ -132,7 +134,7 @@ static void child_of(const search *s, uint64_t i, int which, triangle *out)
         bool corner = which < 3 && k == which; /* otherwise it is the middle of an adjacent edge */
         int edge = which == 3 ? k : k == (which + 1) % 3 ? which : (which + 2) % 3;
         memcpy(out->corner[k], corner ? t->corner[k] : s->middle[i][edge], sizeof out->corner[k]);
-        out->away[k] = corner ? t->away[k] : s->middle_away[i][edge];
+        out->distance[k] = corner ? t->distance[k] : s->middle_distance[i][edge];
     }
 }
 
@@ -160,7 +162,7 @@ static ebpo_status divide_triangles(search *s, ebpo_error *error)
     s->range.queries += 3 * s->divided;
     for (uint64_t i = 0; i < s->divided; i++)
         for (int k = 0; k < 3; k++)
-            raise_lower_bound(s, s->middle_away[i][k] - s->slack, s->middle[i][k]);
+            raise_lower_bound(s, s->middle_distance[i][k] - s->slack, s->middle[i][k]);
     s->next.count = 0;
     for (uint64_t i = 0; i < s->divided && status == EBPO_OK; i++)
         for (int which = 0; which < 4 && status == EBPO_OK; which++) {
@@ -184,7 +186,8 @@ static ebpo_status refine_triangles(search *s, ebpo_error *error)
     while (status == EBPO_OK && s->current.count) {
         choose_triangles(s);
         if (!ebpo_grow(&s->middle, &s->middle_capacity, s->divided, sizeof *s->middle) ||
-            !ebpo_grow(&s->middle_away, &s->away_capacity, s->divided, sizeof *s->middle_away))
+            !ebpo_grow(&s->middle_distance, &s->distance_capacity, s->divided,
+                       sizeof *s->middle_distance))
             return ebpo_fail_memory(error, s->divided * sizeof *s->middle);
         status = ebpo_parallel_for(s->queries.threads, NULL, s->divided, 256, query_middles, s,
                                    &none, "", error);
@@ -206,7 +209,7 @@ static void corner_of(const ebpo_mesh *m, uint32_t vertex, double out[3])
 static ebpo_status inspect_faces(search *s, uint64_t begin, uint64_t end, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    /* share of the faces that are searched after this piece */
+    /* share of the faces that have been searched when this batch is done */
     double share = (double)end / (double)s->mesh->face_count;
     s->allowed =
         end == s->mesh->face_count ? s->o.queries : (uint64_t)((double)s->o.queries * share);
@@ -216,7 +219,7 @@ static ebpo_status inspect_faces(search *s, uint64_t begin, uint64_t end, ebpo_e
         for (int k = 0; k < 3; k++) {
             uint32_t v = s->mesh->faces[3 * f + (uint64_t)k];
             corner_of(s->mesh, v, t.corner[k]);
-            t.away[k] = fabs(s->distances[v]);
+            t.distance[k] = fabs(s->distances[v]);
         }
         set_upper_bound(s, &t);
         status = keep_triangle(s, &s->current, &t, error);
@@ -230,8 +233,7 @@ static ebpo_status search_all(search *s, ebpo_error *error)
     const ebpo_mesh *m = s->mesh;
     for (uint64_t f = 0; f < m->face_count; f += FACES_AT_A_TIME) {
         uint64_t end = f + FACES_AT_A_TIME < m->face_count ? f + FACES_AT_A_TIME : m->face_count;
-        if (!ebpo_progress_step(&s->o.progress, "bounding between vertices", f, m->face_count,
-                                error))
+        if (!ebpo_progress_step(&s->o.progress, "searching faces", f, m->face_count, error))
             return EBPO_E_CANCELLED;
         status = inspect_faces(s, f, end, error);
         if (status != EBPO_OK)
@@ -264,11 +266,11 @@ static ebpo_status begin_search(search *s, ebpo_error *error)
     return EBPO_OK;
 }
 
-static ebpo_status take_range_options(search *s, const ebpo_map_range_options *given,
-                                      ebpo_error *error)
+static ebpo_status check_hausdorff_options(search *s, const ebpo_map_hausdorff_options *given,
+                                           ebpo_error *error)
 {
-    s->o = (ebpo_map_range_options)EBPO_MAP_RANGE_OPTIONS_INIT;
-    ebpo_status status = EBPO_TAKE(ebpo_map_range_options, &s->o, given, error);
+    s->o = (ebpo_map_hausdorff_options)EBPO_MAP_HAUSDORFF_OPTIONS_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_map_hausdorff_options, &s->o, given, error);
     if (status == EBPO_OK && !(s->o.tolerance > 0 && isfinite(s->o.tolerance)))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "the tolerance must be finite and above 0");
     if (s->o.queries == 0)
@@ -276,16 +278,17 @@ static ebpo_status take_range_options(search *s, const ebpo_map_range_options *g
     return status;
 }
 
-ebpo_status ebpo_map_find_range(ebpo_model *model, const ebpo_mesh *mesh, const double *distances,
-                                const ebpo_map_range_options *options, ebpo_map_range *out,
-                                ebpo_error *error)
+ebpo_status ebpo_map_bound_hausdorff(ebpo_model *model, const ebpo_mesh *mesh,
+                                     const double *distances,
+                                     const ebpo_map_hausdorff_options *options,
+                                     ebpo_map_hausdorff *out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     ebpo_map_options query_options = EBPO_MAP_OPTIONS_INIT;
     search s = { .mesh = mesh, .distances = distances };
-    ebpo_status status = EBPO_CHECK_SIZED(ebpo_map_range, out, error);
+    ebpo_status status = EBPO_CHECK_SIZED(ebpo_map_hausdorff, out, error);
     if (status == EBPO_OK)
-        status = take_range_options(&s, options, error);
+        status = check_hausdorff_options(&s, options, error);
     if (status == EBPO_OK)
         status = begin_search(&s, error);
     if (status != EBPO_OK)
@@ -299,6 +302,6 @@ ebpo_status ebpo_map_find_range(ebpo_model *model, const ebpo_mesh *mesh, const 
     free(s.current.item);
     free(s.next.item);
     free(s.middle);
-    free(s.middle_away);
-    return status == EBPO_OK ? EBPO_GIVE(ebpo_map_range, out, &s.range) : status;
+    free(s.middle_distance);
+    return status == EBPO_OK ? EBPO_GIVE(ebpo_map_hausdorff, out, &s.range) : status;
 }
