@@ -31,8 +31,7 @@ static ebpo_status pose_some(void *context, uint64_t begin, uint64_t end, unsign
 {
     const posing_job *job = context;
     (void)worker, (void)error;
-    EBPO_FOR_ITEMS(job->mesh->workspace, v, begin, end)
-    {
+    EBPO_FOR_ITEMS(job->mesh->workspace, v, begin, end) {
         double x[3];
         ebpo_mesh_position(job->mesh, v, x);
         ebpo_posing_apply(job->posing, x, job->out + 3 * v);

@@ -3,8 +3,8 @@
  * Each operand is read again. Its faces are visited in order: those in the list give their
  * triangles of the cut mesh; each other face is whole, and bounds the result if the listed faces of
  * its component do. Vertices are numbered by first use. A corner of a listed face has the number of
- * its vertex in the cut mesh, so whole faces and triangles share vertices. Faces have the numbers of
- * the operand's source if its file has maps, otherwise those of the file, as in all queries. */
+ * its vertex in the cut mesh, so whole faces and triangles share vertices. Faces have the numbers
+ * of the operand's source if its file has maps, otherwise those of the file, as in all queries. */
 #include "core/strict_fp.h"
 
 #include "extras/boolean/result_mesh.h"
@@ -232,8 +232,7 @@ static bool add_faces(operand_output *r)
         else
             high = middle;
     }
-    EBPO_FOR_ITEMS(r->mesh.workspace, f, 0, r->mesh.face_count)
-    {
+    EBPO_FOR_ITEMS(r->mesh.workspace, f, 0, r->mesh.face_count) {
         if (ebpo_has_bit(whole->listed, f)) {
             for (; t < o->cut->count && o->cut->face[t] == listed; t++)
                 if (!add_triangle(r, f, t))
@@ -265,8 +264,8 @@ static ebpo_status add_operand(output *o, uint32_t operand, ebpo_error *error)
 {
     const ebpo_face_list *faces = o->cut->faces;
     operand_output r = { .o = o, .operand = operand };
-    ebpo_status status = ebpo_operand_mesh_read(&r.mesh, faces->boolean, operand,
-                                                faces->workspace, error);
+    ebpo_status status =
+        ebpo_operand_mesh_read(&r.mesh, faces->boolean, operand, faces->workspace, error);
     if (status != EBPO_OK)
         return status;
     uint64_t vertices = r.mesh.vertex_count;
@@ -322,8 +321,8 @@ static uint64_t count_whole(const output *o, uint32_t operand)
     EBPO_FOR_ITEMS(faces->workspace, f, 0,
                    faces->same[operand] ? faces->boolean->solid[operand].model->info->face_count
                                         : 0)
-        count += !ebpo_has_bit(whole->listed, f) &&
-                 o->of_component[operand][whole->component[f]] != 0;
+        count +=
+            !ebpo_has_bit(whole->listed, f) && o->of_component[operand][whole->component[f]] != 0;
     return count;
 }
 
@@ -345,7 +344,8 @@ static bool has_doubles(const ebpo_face_list *faces)
     return false;
 }
 
-static uint8_t *add_array(ebpo_mesh *mesh, const char *name, ebpo_attribute_type type, uint64_t rows)
+static uint8_t *add_array(ebpo_mesh *mesh, const char *name, ebpo_attribute_type type,
+                          uint64_t rows)
 {
     ebpo_attribute like = { .element = "face", .type = type, .columns = 1 };
     like.list = EBPO_ATTRIBUTE_NO_LIST;
@@ -369,7 +369,8 @@ static ebpo_status make_arrays(output *o, bool origins, ebpo_error *error)
     for (uint64_t t = 0; t < o->cut->count; t++)
         count += o->sign[t] != 0;
     if (count > UINT32_MAX - 2 || vertices > UINT32_MAX - 2)
-        return ebpo_fail(error, EBPO_E_LIMIT, "the result has more than 2^32 - 2 faces or vertices");
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "the result has more than 2^32 - 2 faces or vertices");
     mesh->faces = ebpo_array_alloc(mesh->workspace, count + 1, 3 * sizeof *mesh->faces);
     if (o->doubles)
         mesh->xyz64 = ebpo_array_alloc(mesh->workspace, vertices + 1, 3 * sizeof *mesh->xyz64);

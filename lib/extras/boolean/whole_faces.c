@@ -26,16 +26,16 @@ typedef struct joining {
     const ebpo_mesh *mesh;
     const uint64_t *paired;
     ebpo_positions first; /* if vertices have equal positions */
-    uint64_t *flat;    /* a bit for each face without area */
-    uint64_t *touched; /* a bit for each corner of a face that is in a pair */
-    uint32_t *degree;  /* for each corner: number of edges that are listed at it */
-    uint64_t *begin;   /* for each corner of a run, and the next one: the start of its list */
+    uint64_t *flat;       /* a bit for each face without area */
+    uint64_t *touched;    /* a bit for each corner of a face that is in a pair */
+    uint32_t *degree;     /* for each corner: number of edges that are listed at it */
+    uint64_t *begin;      /* for each corner of a run, and the next one: the start of its list */
     uint64_t begin_capacity;
     /* other corner << 32 | face << 1 | 1 if the face has the edge from the greater corner */
     uint64_t *edge;
 } joining;
 
-static uint64_t words(uint64_t bits) { return bits / 64 + 1; }
+static uint64_t words_for(uint64_t bits) { return bits / 64 + 1; }
 
 /* Gets the corners of a face; vertices at one position are one corner. */
 static inline void get_corners(const joining *j, uint64_t face, uint32_t out[3])
@@ -54,8 +54,7 @@ static ebpo_status test_areas(void *context, uint64_t begin, uint64_t end, unsig
 {
     joining *j = context;
     (void)worker, (void)error;
-    EBPO_FOR_ITEMS(j->mesh->workspace, f, begin, end)
-    {
+    EBPO_FOR_ITEMS(j->mesh->workspace, f, begin, end) {
         double p[3][3];
         for (int i = 0; i < 3; i++)
             ebpo_mesh_position(j->mesh, j->mesh->faces[3 * f + (unsigned)i], p[i]);
@@ -76,8 +75,7 @@ static bool is_whole(const joining *j, uint64_t face)
 static void mark_corners(joining *j)
 {
     uint32_t corner[3];
-    EBPO_FOR_ITEMS(j->mesh->workspace, f, 0, j->mesh->face_count)
-    {
+    EBPO_FOR_ITEMS(j->mesh->workspace, f, 0, j->mesh->face_count) {
         if (ebpo_has_bit(j->flat, f))
             continue;
         get_corners(j, f, corner);
@@ -92,8 +90,7 @@ static void mark_corners(joining *j)
 
 static void list_touched(joining *j)
 {
-    EBPO_FOR_ITEMS(j->mesh->workspace, f, 0, j->mesh->face_count)
-    {
+    EBPO_FOR_ITEMS(j->mesh->workspace, f, 0, j->mesh->face_count) {
         uint32_t corner[3];
         bool listed = !is_whole(j, f);
         if (!listed) {
@@ -180,8 +177,7 @@ static bool join_list(joining *j, uint64_t *list, uint64_t count)
 static void list_edges(joining *j, uint64_t first, uint64_t end)
 {
     uint32_t corner[3];
-    EBPO_FOR_ITEMS(j->mesh->workspace, f, 0, j->mesh->face_count)
-    {
+    EBPO_FOR_ITEMS(j->mesh->workspace, f, 0, j->mesh->face_count) {
         if (ebpo_has_bit(j->flat, f))
             continue;
         get_corners(j, f, corner);
@@ -245,8 +241,7 @@ static void number_components(joining *j)
     uint32_t *parent = j->out->component, count = 0;
     EBPO_FOR_ITEMS(j->mesh->workspace, f, 0, j->mesh->face_count)
         parent[f] = parent[parent[f]]; /* the root: parents come first */
-    EBPO_FOR_ITEMS(j->mesh->workspace, g, 0, j->mesh->face_count)
-    {
+    EBPO_FOR_ITEMS(j->mesh->workspace, g, 0, j->mesh->face_count) {
         if (!is_whole(j, g))
             parent[g] = EBPO_NO_COMPONENT;
         else
@@ -259,12 +254,11 @@ static void number_components(joining *j)
 static ebpo_status list_components(joining *j, ebpo_error *error)
 {
     const uint32_t *component = j->out->component;
-    uint64_t *has = ebpo_alloc_zero(words(j->out->components), sizeof *has);
+    uint64_t *has = ebpo_alloc_zero(words_for(j->out->components), sizeof *has);
     if (!has)
-        return ebpo_fail_memory(error, words(j->out->components) * sizeof *has);
+        return ebpo_fail_memory(error, words_for(j->out->components) * sizeof *has);
     for (int pass = 0; pass < 2; pass++)
-        EBPO_FOR_ITEMS(j->mesh->workspace, f, 0, j->mesh->face_count)
-        {
+        EBPO_FOR_ITEMS(j->mesh->workspace, f, 0, j->mesh->face_count) {
             if (component[f] == EBPO_NO_COMPONENT || ebpo_has_bit(has, component[f]))
                 continue;
             if (pass)
@@ -283,13 +277,13 @@ static ebpo_status make_arrays(joining *j, ebpo_error *error)
     const ebpo_mesh *mesh = j->mesh;
     j->out->component =
         ebpo_array_alloc(mesh->workspace, mesh->face_count, sizeof *j->out->component);
-    j->out->listed = ebpo_alloc_zero(words(mesh->face_count), sizeof *j->out->listed);
-    j->flat = ebpo_alloc_zero(words(mesh->face_count), sizeof *j->flat);
-    j->touched = ebpo_alloc_zero(words(mesh->vertex_count), sizeof *j->touched);
+    j->out->listed = ebpo_alloc_zero(words_for(mesh->face_count), sizeof *j->out->listed);
+    j->flat = ebpo_alloc_zero(words_for(mesh->face_count), sizeof *j->flat);
+    j->touched = ebpo_alloc_zero(words_for(mesh->vertex_count), sizeof *j->touched);
     j->degree = ebpo_array_zero(mesh->workspace, mesh->vertex_count, sizeof *j->degree);
     if (!j->out->component || !j->out->listed || !j->flat || !j->touched || !j->degree)
-        return ebpo_workspace_fail(mesh->workspace,
-                                   4 * (mesh->face_count + mesh->vertex_count), error);
+        return ebpo_workspace_fail(mesh->workspace, 4 * (mesh->face_count + mesh->vertex_count),
+                                   error);
     EBPO_FOR_ITEMS(mesh->workspace, f, 0, mesh->face_count)
         j->out->component[f] = (uint32_t)f;
     return EBPO_OK;

@@ -18,7 +18,8 @@ typedef struct ebpo_js_array {
     size_t bytes, capacity;
 } ebpo_js_array;
 
-/* A model; or a query, stream, view or sampler, which borrows `async`, `file` and `model` of a model. */
+/* A model; or a query, stream, view or sampler, which borrows `async`, `file` and `model` of a
+ * model. */
 typedef struct ebpo_js_object {
     ebpo_async *async;
     ebpo_file *file;
