@@ -7,7 +7,7 @@ import { join } from 'node:path';
 import test from 'node:test';
 
 const { EBPO_PACKAGE: folder, EBPO_VECTORS: vectors, EBPO_FILES: files = '' } = process.env;
-const library = await import(join(folder, 'index.js'));
+const library = await import(join(folder, 'index.js')), { openView } = await import(join(folder, 'view.js'));
 const { open, EbpoAbsentError, EbpoArgumentError, EbpoError, EbpoFormatError, EbpoLimitError, EbpoPendingError, EbpoReadError } = library;
 const small = readFileSync(join(vectors, 'passed/06_four_levels_leaf_planes.ebpo.h5'));
 const large = files.split(' ').filter(Boolean).sort((a, b) => statSync(b).size - statSync(a).size)[0], largeBytes = large && readFileSync(large);
@@ -211,6 +211,13 @@ test('attributes are in the order of the mesh, and by name', async () => {
   const corners = await model.corners([2, 0]);
   assert.deepEqual([...corners], [2, 0].flatMap((f) => [...inFile.faces.subarray(3 * f, 3 * f + 3)].flatMap((v) => [...inFile.vertices.subarray(3 * v, 3 * v + 3)])));
   await assert.rejects(model.corners([info.faces]), EbpoArgumentError);
+  const bare = await vector('08_without_mesh');
+  await assert.rejects(bare.corners([0]), EbpoAbsentError);
+  await assert.rejects(bare.attribute('vertex:red'), EbpoAbsentError);
+  const view = await openView(readFileSync(join(vectors, 'passed/08_without_mesh.ebpo.h5')));
+  await assert.rejects(view.leafFaces([{ level: 0, group: 0, octant: 0, subtree: -1 }]), EbpoAbsentError);
+  view.dispose();
+  bare.dispose();
   await assert.rejects(model.attribute('taste'), (error) => error instanceof EbpoAbsentError && /vertex:/.test(error.message));
   await assert.rejects(model.mesh({ order: 'size' }), EbpoArgumentError);
   await assert.rejects(model.sample('taste', [0, 0, 0], [0]), EbpoAbsentError);

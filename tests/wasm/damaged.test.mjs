@@ -10,18 +10,25 @@ const { open, EbpoError } = await import(join(folder, 'index.js'));
 
 /** Reads all of a file and queries it; returns the first error, or null. */
 async function useAll(bytes, options = {}) {
-  let model, first = null;
-  const attempt = async (call) => {
+  let model, last = null;
+  const check = async (call) => {
     try {
       return await call();
     } catch (error) {
       assert.ok(error instanceof EbpoError, error.stack);
       assert.notEqual(error.status, 'EBPO_E_INTERNAL', error.stack);
       assert.ok(error.message.length > 10, error.message);
-      first ??= error;
+      last = error;
       return null;
     }
   };
+  const attempt = async (call) => { // the first error is returned
+    last = null;
+    const result = await check(call);
+    first ??= last;
+    return result;
+  };
+  let first = null;
   model = await attempt(() => open(bytes, { heap: 2 ** 30, ...options }));
   if (!model)
     return first;
@@ -39,8 +46,30 @@ async function useAll(bytes, options = {}) {
     for await (const level of model.levels({ polygons: true }))
       assert.ok(level.level >= 0);
   });
+  await useParts(model, check, middle, size);
   model.dispose();
   return first;
+}
+
+/** Reads the parts of a file that queries do not read. */
+async function useParts(model, check, middle, size) {
+  const { attributes } = model.info, [name] = attributes.map(({ element, names }) => `${element}:${names.split(' ')[0]}`);
+  await check(() => model.maps());
+  for (const { element, names } of attributes)
+    await check(() => model.attribute(`${element}:${names.split(' ')[0]}`));
+  await check(() => model.textures());
+  await check(() => model.sample(name ?? 'x', middle, [0]));
+  await check(() => model.corners([0, 1]));
+  await check(() => model.subtree());
+  await check(() => model.subtree(model.octcode(middle, 2)));
+  await check(() => model.windingBounds(middle));
+  await check(async () => {
+    const view = model.view({ priority: 'pixels', observer: { eye: middle, direction: size }, polygons: true, windings: true, faces: model.info.hasMesh });
+    for await (const nodes of view)
+      assert.ok(nodes.count > 0);
+    view.cut();
+    view.dispose();
+  });
 }
 
 const failed = join(vectors, 'failed');

@@ -85,6 +85,9 @@ int EBPO_JS(ebpo_js_corners)(ebpo_js_object *object, const double *faces, uint32
     enum { CORNERS, NUMBERS, ROWS, CACHE = 16 << 20 };
     const ebpo_info *info = ebpo_file_info(object->file);
     ebpo_js_clear(object);
+    ebpo_status status = ebpo_js_need_mesh(object);
+    if (status != EBPO_OK)
+        return status;
     uint32_t *numbers = ebpo_js_extend(object, NUMBERS, count, sizeof *numbers);
     uint32_t *rows = ebpo_js_extend(object, ROWS, count, 3 * sizeof *rows);
     void *corners =
@@ -100,7 +103,7 @@ int EBPO_JS(ebpo_js_corners)(ebpo_js_object *object, const double *faces, uint32
                              (unsigned long long)info->face_count, faces[i]);
     if (!object->chunks)
         object->chunk_memory = CACHE;
-    ebpo_status status = ebpo_js_need_chunks(object);
+    status = ebpo_js_need_chunks(object);
     if (status != EBPO_OK || !count)
         return status;
     ebpo_faces_hint(object->chunks, numbers, count, 0);

@@ -42,6 +42,9 @@ void ebpo_js_clear(ebpo_js_object *object);
 /* Makes `chunks`, unless it exists. */
 EBPO_MUST_USE ebpo_status ebpo_js_need_chunks(ebpo_js_object *object);
 
+/* Returns EBPO_E_ABSENT if the file has no mesh. */
+EBPO_MUST_USE ebpo_status ebpo_js_need_mesh(ebpo_js_object *object);
+
 void ebpo_js_free_arrays(ebpo_js_object *object);
 
 /* Appends bytes to result array n. Returns EBPO_E_MEMORY with an error if they do not fit. */

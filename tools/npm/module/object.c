@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/error.h"
 #include "format/chunks.h"
 #include "module.h"
 
@@ -147,6 +148,13 @@ ebpo_status ebpo_js_need_chunks(ebpo_js_object *object)
     return object->chunks ? EBPO_OK
                           : ebpo_chunks_make(&object->chunks, object->file, object->chunk_memory,
                                              &object->error);
+}
+
+ebpo_status ebpo_js_need_mesh(ebpo_js_object *object)
+{
+    return ebpo_file_info(object->file)->parts & EBPO_PART_MESH
+               ? EBPO_OK
+               : ebpo_fail(&object->error, EBPO_E_ABSENT, "the file has no mesh");
 }
 
 /* ---- opening ---- */

@@ -299,7 +299,9 @@ int EBPO_JS(ebpo_js_leaf_faces)(ebpo_js_object *object, const wanted_leaf *wante
     uint32_t rows = 0;
     ebpo_js_clear(object);
     ebpo_status status =
-        subtrees ? ebpo_js_need_chunks(object) : (object->error.status = EBPO_E_MEMORY);
+        subtrees ? ebpo_js_need_mesh(object) : (object->error.status = EBPO_E_MEMORY);
+    if (status == EBPO_OK)
+        status = ebpo_js_need_chunks(object);
     if (status != EBPO_OK) {
         free(subtrees);
         return status;
