@@ -4,12 +4,14 @@ import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { Tiles, lookOf, makeLook, setCut, setTheme } from './shade.js';
 
 /** Classes of three.js for code that is loaded later and must not load a second copy of three.js. */
-export const kit = { InstancedBufferAttribute: THREE.InstancedBufferAttribute, InstancedBufferGeometry: THREE.InstancedBufferGeometry, BufferAttribute: THREE.BufferAttribute,
-  BufferGeometry: THREE.BufferGeometry, Color: THREE.Color, DepthTexture: THREE.DepthTexture, DoubleSide: THREE.DoubleSide, Frustum: THREE.Frustum,
-    Group: THREE.Group, InstancedMesh: THREE.InstancedMesh,
-    LineBasicMaterial: THREE.LineBasicMaterial, LineSegments: THREE.LineSegments, Matrix4: THREE.Matrix4, Mesh: THREE.Mesh, MeshBasicMaterial: THREE.MeshBasicMaterial,
-    Scene: THREE.Scene, ShaderMaterial: THREE.ShaderMaterial, Sphere: THREE.Sphere,
-  Vector2: THREE.Vector2, Vector3: THREE.Vector3, WebGLRenderTarget: THREE.WebGLRenderTarget };
+export const kit = {
+  BufferAttribute: THREE.BufferAttribute, BufferGeometry: THREE.BufferGeometry, Color: THREE.Color, DepthTexture: THREE.DepthTexture,
+  DoubleSide: THREE.DoubleSide, Frustum: THREE.Frustum, Group: THREE.Group, InstancedBufferAttribute: THREE.InstancedBufferAttribute,
+  InstancedBufferGeometry: THREE.InstancedBufferGeometry, InstancedMesh: THREE.InstancedMesh, LineBasicMaterial: THREE.LineBasicMaterial,
+  LineSegments: THREE.LineSegments, Matrix4: THREE.Matrix4, Mesh: THREE.Mesh, MeshBasicMaterial: THREE.MeshBasicMaterial, Scene: THREE.Scene,
+  ShaderMaterial: THREE.ShaderMaterial, Sphere: THREE.Sphere, Vector2: THREE.Vector2, Vector3: THREE.Vector3,
+  WebGLRenderTarget: THREE.WebGLRenderTarget
+};
 
 const PICK_ROUNDING = 1e-6; // of a picked point: drawn triangles have coordinates in single precision
 const TURN = Math.PI / 24, MOVE = 0.06; // steps of the keys: radians, and shares of the distance

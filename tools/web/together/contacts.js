@@ -107,8 +107,10 @@ export class Contacts {
   // The faces are drawn over the models, which may hide them.
   #draw({ segments, corners }, instances) {
     const over = { depthTest: false, transparent: true };
-    corners.forEach((values, k) => this.group.add(new kit.Mesh(this.#points(values, instances[k].now),
-      new kit.MeshBasicMaterial({ ...over, color: COLOURS[k], opacity: 0.55, side: kit.DoubleSide }))));
+    corners.forEach((values, k) => {
+      const material = new kit.MeshBasicMaterial({ ...over, color: COLOURS[k], opacity: 0.55, side: kit.DoubleSide });
+      this.group.add(new kit.Mesh(this.#points(values, instances[k].now), material));
+    });
     this.group.add(new kit.LineSegments(this.#points(segments), new kit.LineBasicMaterial({ ...over, color: '#ffffff' })));
     this.group.children.forEach((object, i) => {
       object.renderOrder = 5 + i % 3;
