@@ -47,6 +47,23 @@ static void disturb_mesh(ebpo_mesh *mesh, uint64_t *state)
             mesh->xyz64[i] = nextafter(mesh->xyz64[i], random_below(state, 2) ? 9 : -9);
 }
 
+/* Joins two meshes to one, in which vertices repeat positions. Frees both. */
+static ebpo_mesh join_meshes(ebpo_mesh a, ebpo_mesh b)
+{
+    ebpo_mesh out = { .vertex_count = a.vertex_count + b.vertex_count,
+                      .face_count = a.face_count + b.face_count };
+    out.xyz64 = query_alloc(3 * out.vertex_count, sizeof *out.xyz64);
+    out.faces = query_alloc(3 * out.face_count, sizeof *out.faces);
+    memcpy(out.xyz64, a.xyz64, 24 * a.vertex_count);
+    memcpy(out.xyz64 + 3 * a.vertex_count, b.xyz64, 24 * b.vertex_count);
+    memcpy(out.faces, a.faces, 12 * a.face_count);
+    for (uint64_t i = 0; i < 3 * b.face_count; i++)
+        out.faces[3 * a.face_count + i] = b.faces[i] + (uint32_t)a.vertex_count;
+    ebpo_mesh_free(&a);
+    ebpo_mesh_free(&b);
+    return out;
+}
+
 static ebpo_pose turned_pose(uint64_t *state)
 {
     double c, s, d, t;
@@ -111,7 +128,7 @@ static void make_expression(scene *s, uint64_t *state)
     }
 }
 
-enum { KINDS = 10 };
+enum { KINDS = 11 };
 
 static void make_scene(scene *s, uint64_t seed)
 {
@@ -124,6 +141,8 @@ static void make_scene(scene *s, uint64_t seed)
                   .high = { -INFINITY, -INFINITY, -INFINITY } };
     ebpo_mesh a = query_random_solid(seed, on_grid);
     ebpo_mesh b = query_random_solid(kind == 2 ? seed : seed + 1000, on_grid);
+    if (kind == 10)
+        a = join_meshes(a, query_random_solid(seed + 3000, true));
     if (kind == 2 || kind == 3)
         disturb_mesh(&b, &state);
     if (kind == 4 || kind == 5) {

@@ -42,6 +42,7 @@ ebpo_status boolean_write_result(boolean_output *o, ebpo_boolean *b, ebpo_progre
     how.progress = progress;
     how.doubles = o->doubles;
     how.origins = true;
+    how.workspace = o->workspace;
     o->report = (ebpo_boolean_mesh_report)EBPO_BOOLEAN_MESH_REPORT_INIT;
     ebpo_status status = ebpo_boolean_mesh(b, &how, &mesh, &o->report, error);
     if (status != EBPO_OK)
@@ -56,6 +57,11 @@ ebpo_status boolean_write_result(boolean_output *o, ebpo_boolean *b, ebpo_progre
         status = boolean_write_mesh(o, &mesh, progress, error);
     }
     ebpo_mesh_free(&mesh);
+    if (o->workspace) {
+        ebpo_workspace_stats stats = EBPO_WORKSPACE_STATS_INIT;
+        (void)ebpo_workspace_get_stats(o->workspace, &stats);
+        o->temporary = stats.filed_peak;
+    }
     return status;
 }
 
@@ -65,8 +71,11 @@ void boolean_print_result(const boolean_output *o)
     words_plural(faces, sizeof faces, o->faces, "face", "faces");
     words_plural(cut, sizeof cut, o->report.faces_cut, "face", "faces");
     words_plural(fresh, sizeof fresh, o->report.new_vertices, "new vertex", "new vertices");
-    printf("%s: %s, closed; %s cut, %s, displaced at most %s\n", o->path, faces, cut, fresh,
+    printf("%s: %s, closed; %s cut, %s, displaced at most %s", o->path, faces, cut, fresh,
            words_real(o->report.displacement, real));
+    if (o->workspace)
+        printf("; temporary files: %s", words_bytes(real, sizeof real, o->temporary));
+    putchar('\n');
 }
 
 void boolean_result_to_json(const boolean_output *o, json *j)
@@ -78,4 +87,5 @@ void boolean_result_to_json(const boolean_output *o, json *j)
     json_uint(j, "new_vertices", o->report.new_vertices);
     json_uint(j, "patches", o->report.patches);
     json_real(j, "displacement", o->report.displacement);
+    json_uint(j, "temporary_bytes", o->temporary);
 }

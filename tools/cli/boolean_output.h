@@ -12,8 +12,10 @@ typedef struct boolean_output {
     const char *unit; /* recorded in an .ebpo.h5 file */
     unsigned threads;
     bool doubles;
-    uint64_t vertices, faces; /* of the exact result that was written */
+    ebpo_workspace *workspace; /* of the exact result; NULL: no limit of memory */
+    uint64_t vertices, faces;  /* of the exact result that was written */
     ebpo_boolean_mesh_report report;
+    uint64_t temporary; /* largest size of the temporary files */
 } boolean_output;
 
 /* Writes a mesh to OUT.ply or OUT.ebpo.h5. */

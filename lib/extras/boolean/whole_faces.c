@@ -18,7 +18,8 @@
 
 static const char stage[] = "join faces";
 
-enum { FACE_GRAIN = 1 << 16, EDGES_AT_ONCE = 1 << 23 };
+/* EDGES: listed at once without and with a limit of memory. */
+enum { FACE_GRAIN = 1 << 16, EDGES = 1 << 23, FEW_EDGES = 1 << 20 };
 
 /* Bits for faces and corners. */
 typedef struct joining {
@@ -200,13 +201,13 @@ static ebpo_status join_run(joining *j, uint64_t first, uint64_t *end, uint64_t 
     if (!ebpo_grow(&j->begin, &j->begin_capacity, last - first + 2, sizeof *j->begin))
         return ebpo_fail_memory(error, (last - first + 2) * sizeof *j->begin);
     uint64_t at = 0;
-    for (uint64_t v = first; v < last; v++) {
-        j->begin[v - first + 1] = at; /* moves to the end of the list while it is filled */
-        at += j->degree[v];
+    EBPO_FOR_ITEMS(j->mesh->workspace, n, first, last) {
+        j->begin[n - first + 1] = at; /* moves to the end of the list while it is filled */
+        at += j->degree[n];
     }
     j->begin[0] = 0;
     list_edges(j, first, last);
-    for (uint64_t v = first; v < last; v++)
+    EBPO_FOR_ITEMS(j->mesh->workspace, v, first, last)
         if (!join_list(j, j->edge + j->begin[v - first],
                        j->begin[v - first + 1] - j->begin[v - first]))
             return ebpo_fail(error, EBPO_E_FORMAT,
@@ -217,10 +218,10 @@ static ebpo_status join_run(joining *j, uint64_t first, uint64_t *end, uint64_t 
 
 static ebpo_status join_all(joining *j, const ebpo_progress *progress, ebpo_error *error)
 {
-    uint64_t capacity = EDGES_AT_ONCE, all = 3 * j->mesh->face_count;
+    uint64_t capacity = j->mesh->workspace ? FEW_EDGES : EDGES, all = 3 * j->mesh->face_count;
     ebpo_status status = EBPO_OK;
-    for (uint64_t v = 0; v < j->mesh->vertex_count; v++)
-        capacity = j->degree[v] > capacity ? j->degree[v] : capacity;
+    EBPO_FOR_ITEMS(j->mesh->workspace, n, 0, j->mesh->vertex_count)
+        capacity = j->degree[n] > capacity ? j->degree[n] : capacity;
     capacity = capacity < all ? capacity : all;
     j->edge = ebpo_alloc(capacity, sizeof *j->edge);
     if (!j->edge)

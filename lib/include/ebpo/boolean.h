@@ -328,12 +328,13 @@ typedef struct ebpo_boolean_mesh_report {
  * result are kept, where needed with the reverse orientation. Faces that are not cut keep their
  * corners, at their poses. Other vertices are the exact ones, rounded to the nearest coordinate.
  * The mesh is closed: each edge is used equally often in both directions. Rounding may create small
- * intersections of faces (ebpo_mesh_self_intersections). Vertices that become equal by rounding are
- * merged, and faces that lose a corner in this way are omitted. Winding numbers of the mesh are 1
+ * intersections of faces (ebpo_mesh_self_intersections). Vertices of cut faces that become equal by
+ * rounding are merged, and faces that lose a corner in this way are omitted. Winding numbers of the mesh are 1
  * in the result and 0 elsewhere, except near rounded vertices. The mesh is the same for any number
  * of threads.
  *
- * Takes about 150 bytes for each face of the operands, and some 500 for each new vertex.
+ * Takes about 40 bytes for each face of one operand at a time and 25 for each face of the mesh,
+ * which a workspace may hold, and 1,500 for each face that is cut.
  *
  * out     freed by ebpo_mesh_free; without faces if the result is empty
  * report  may be NULL

@@ -10,6 +10,7 @@
 #include "cli/boolean_output.h"
 #include "cli/command.h"
 #include "cli/json.h"
+#include "cli/memory_args.h"
 #include "cli/points.h"
 #include "cli/pose_args.h"
 #include "cli/progress.h"
@@ -23,7 +24,7 @@ enum { MODELS = ARGS_OPERANDS_MAX - 1 };
 
 typedef struct values {
     query_values query; /* first */
-    const char *inside, *distance, *out;
+    const char *inside, *distance, *out, *temp_dir;
     arg_list poses;
     int64_t level;
     double tolerance;
@@ -315,7 +316,8 @@ static ebpo_status compute_cells(cell_result *a, ebpo_boolean *b, ebpo_progress 
     return status;
 }
 
-static int make_cells(const values *v, const char **models, const char *unit, ebpo_boolean *b)
+static int make_cells(const values *v, const char **models, const char *unit,
+                      ebpo_workspace *workspace, ebpo_boolean *b)
 {
     progress_line line;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -324,7 +326,8 @@ static int make_cells(const values *v, const char **models, const char *unit, eb
                       .output = { .path = v->out,
                                   .unit = unit,
                                   .threads = (unsigned)v->query.threads,
-                                  .doubles = v->doubles },
+                                  .doubles = v->doubles,
+                                  .workspace = workspace },
                       .exact = EBPO_EXACT_VOLUME_INIT,
                       .cells = EBPO_BOOLEAN_VOLUME_INIT,
                       .volume = v->volume || !v->out };
@@ -356,8 +359,9 @@ static int check_values(const values *v, const char **models, uint32_t count)
         return command_usage("boolean", "--cells needs --output");
     if (v->inner && !v->cells)
         return command_usage("boolean", "--inner needs --output and --cells");
-    if (v->doubles && !writes_result(v))
-        return command_usage("boolean", "--double needs --output, and excludes --cells");
+    if ((v->doubles || v->temp_dir) && !writes_result(v))
+        return command_usage("boolean", "--%s needs --output, and excludes --cells",
+                             v->doubles ? "double" : "temp-dir");
     if (v->out && !words_end_with(v->out, ".ply") && !words_end_with(v->out, ".ebpo.h5"))
         return command_usage("boolean",
                              "--output '%s': expected a name that ends with .ply or "
@@ -382,7 +386,7 @@ static const char *unit_of(const query_session *sessions, uint32_t count)
 
 static int evaluate_expression(const values *v, const boolean_nodes *nodes,
                                const query_session *sessions, const ebpo_pose *poses,
-                               const char **models, uint32_t count)
+                               const char **models, uint32_t count, ebpo_workspace *workspace)
 {
     ebpo_boolean_operand operands[MODELS];
     ebpo_boolean *b;
@@ -393,10 +397,26 @@ static int evaluate_expression(const values *v, const boolean_nodes *nodes,
         operands[i] = (ebpo_boolean_operand){ sessions[i].model, poses[i] };
     if (ebpo_boolean_new(operands, count, nodes->node, nodes->count, &how, &b, &error) != EBPO_OK)
         return command_failed("boolean", &error);
-    int code = v->inside || v->distance ? query_points(v, b)
-                                        : make_cells(v, models, unit_of(sessions, count), b);
+    int code = v->inside || v->distance
+                   ? query_points(v, b)
+                   : make_cells(v, models, unit_of(sessions, count), workspace, b);
     ebpo_boolean_free(b);
     return code;
+}
+
+/* Makes the workspace of a result with a limit of memory, a quarter of which is for the models. */
+static int limit_memory(const values *v, uint32_t count, ebpo_model_options *holding,
+                        ebpo_workspace **out)
+{
+    const memory_values memory = { v->query.memory, v->temp_dir };
+    ebpo_error error = EBPO_ERROR_INIT;
+    if (!writes_result(v) || holding->memory == 0)
+        return EXIT_OK;
+    if (!memory_check("boolean", &memory))
+        return EXIT_USAGE;
+    holding->memory /= 4 * count;
+    return memory_new(out, &memory, &error) == EBPO_OK ? EXIT_OK
+                                                       : command_failed("boolean", &error);
 }
 
 static const values standard = { .query = QUERY_VALUES_INIT, .level = 6, .tolerance = 0.01 };
@@ -411,6 +431,7 @@ static int run_boolean(void *given, const char **operand)
     ebpo_inside_options inside;
     ebpo_distance_options distance;
     const char **models = operand + 1;
+    ebpo_workspace *workspace = NULL;
     uint32_t count = 0;
     for (; count < MODELS && models[count]; count++) {
         poses[count] = (ebpo_pose)EBPO_POSE_INIT;
@@ -421,12 +442,15 @@ static int run_boolean(void *given, const char **operand)
         !query_options_from("boolean", &v->query, &holding, &inside, &distance))
         return EXIT_USAGE;
     int code = check_values(v, models, count);
+    if (code == EXIT_OK)
+        code = limit_memory(v, count, &holding, &workspace);
     for (uint32_t i = 0; i < count && code == EXIT_OK; i++)
         code = query_open(&sessions[i], "boolean", models[i], &holding, -1, &v->query.remote);
     if (code == EXIT_OK)
-        code = evaluate_expression(v, &nodes, sessions, poses, models, count);
+        code = evaluate_expression(v, &nodes, sessions, poses, models, count, workspace);
     for (uint32_t i = 0; i < count; i++)
         query_close(&sessions[i]);
+    ebpo_workspace_free(workspace);
     return code;
 }
 
