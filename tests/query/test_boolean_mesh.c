@@ -188,8 +188,16 @@ static ebpo_boolean *make_boolean(const scene *s, unsigned threads)
 static ebpo_boolean_mesh_report make_mesh(const scene *s, unsigned threads, ebpo_mesh *mesh)
 {
     ebpo_boolean_mesh_report report = EBPO_BOOLEAN_MESH_REPORT_INIT;
+    ebpo_boolean_mesh_options options = EBPO_BOOLEAN_MESH_OPTIONS_INIT;
+    ebpo_exact_volume exact = EBPO_EXACT_VOLUME_INIT;
     ebpo_boolean *boolean = make_boolean(s, threads);
-    ASSERT_OK(ebpo_boolean_mesh(boolean, NULL, mesh, &report, error));
+    options.volume = true;
+    ASSERT_OK(ebpo_boolean_mesh(boolean, &options, mesh, &report, error));
+    ASSERT_OK(ebpo_boolean_exact_volume(boolean, NULL, &exact, error));
+    if (exact.doubt == EBPO_VOLUME_CERTAIN) {
+        ck_assert_double_eq(report.volume.lo, exact.volume.lo);
+        ck_assert_double_eq(report.volume.hi, exact.volume.hi);
+    }
     ebpo_boolean_free(boolean);
     return report;
 }
@@ -445,6 +453,36 @@ START_TEST(empty_result)
 }
 END_TEST
 
+/* The volumes of A | B and A & B add up to those of A and of B, apart from four roundings. */
+START_TEST(volumes)
+{
+    static const int32_t operations[] = { EBPO_BOOLEAN_UNION, EBPO_BOOLEAN_INTERSECTION };
+    uint64_t state = 1;
+    for (uint64_t seed = 0; seed < ebpo_test_scaled(40); seed++) {
+        scene s = { .nodes = 0 };
+        double sum = 0, size = 0;
+        add_operand(&s, query_random_solid(seed, true), moved_pose(0, 0, 0), 0);
+        add_operand(&s, query_random_solid(seed + 1000, true), turned_pose(&state), 0);
+        s.node[0] = (ebpo_boolean_node){ EBPO_BOOLEAN_OPERAND, 0, 0, 0 };
+        s.node[1] = (ebpo_boolean_node){ EBPO_BOOLEAN_OPERAND, 1, 0, 0 };
+        for (uint32_t i = 0; i < 4; i++) {
+            ebpo_mesh mesh;
+            s.nodes = i < 2 ? i + 1 : 3;
+            if (i >= 2)
+                s.node[2] = (ebpo_boolean_node){ operations[i - 2], 0, 1, 0 };
+            ebpo_boolean_mesh_report report = make_mesh(&s, 2, &mesh);
+            ck_assert_double_ge(report.volume.hi, report.volume.lo);
+            ck_assert_double_le(report.volume.hi - report.volume.lo, report.volume.hi * 0x1p-51);
+            sum += (i < 2 ? 1 : -1) * report.volume.lo;
+            size += report.volume.hi;
+            ebpo_mesh_free(&mesh);
+        }
+        ck_assert_double_le(fabs(sum), size * 0x1p-50);
+        free_scene(&s);
+    }
+}
+END_TEST
+
 START_TEST(equal_for_any_threads)
 {
     for (uint64_t seed = 1; seed < 1 + KINDS; seed++) {
@@ -475,6 +513,7 @@ TEST_SUITE(boolean_mesh)
     tcase_add_test(tests, origins);
     tcase_add_test(tests, signs_of_zero);
     tcase_add_test(tests, empty_result);
+    tcase_add_test(tests, volumes);
     tcase_add_test(tests, equal_for_any_threads);
     suite_add_tcase(suite, tests);
     return suite;

@@ -42,6 +42,7 @@ ebpo_status boolean_write_result(boolean_output *o, ebpo_boolean *b, ebpo_progre
     how.progress = progress;
     how.doubles = o->doubles;
     how.origins = true;
+    how.volume = o->volume;
     how.workspace = o->workspace;
     o->report = (ebpo_boolean_mesh_report)EBPO_BOOLEAN_MESH_REPORT_INIT;
     ebpo_status status = ebpo_boolean_mesh(b, &how, &mesh, &o->report, error);

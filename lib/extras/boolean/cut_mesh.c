@@ -189,6 +189,23 @@ ebpo_status ebpo_cut_mesh_make(ebpo_cut_mesh *out, ebpo_face_list *faces,
     return status == EBPO_OK ? number_vertices(out, error) : status;
 }
 
+void ebpo_cut_mesh_coordinate(const ebpo_cut_mesh *cut, uint32_t vertex, int k, mpq_t out)
+{
+    uint64_t corners = cut->faces->corners.count;
+    if (vertex < corners) {
+        mpq_set_d(out, cut->faces->corners.at[vertex][k]);
+        return;
+    }
+    const ebpo_exact_point *p = &cut->set.point[vertex - corners];
+    mpq_set_num(out, p->x[k]);
+    mpq_set_den(out, p->x[3]);
+    mpq_canonicalize(out);
+    if (cut->unit < 0)
+        mpq_div_2exp(out, out, (mp_bitcnt_t)-cut->unit);
+    else
+        mpq_mul_2exp(out, out, (mp_bitcnt_t)cut->unit);
+}
+
 void ebpo_cut_mesh_free(ebpo_cut_mesh *cut)
 {
     ebpo_point_set_free(&cut->set);

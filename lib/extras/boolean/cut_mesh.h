@@ -30,6 +30,9 @@ static inline uint64_t ebpo_cut_mesh_vertices(const ebpo_cut_mesh *cut)
     return cut->faces->corners.count + cut->set.count;
 }
 
+/* Sets `out` to coordinate k of a vertex. */
+void ebpo_cut_mesh_coordinate(const ebpo_cut_mesh *cut, uint32_t vertex, int k, mpq_t out);
+
 /* Finds the triangles that bound the result. sign[i] is 1: the triangle bounds the result; -1: its
  * reverse does; 0: it does not. *patches: number of parts of the surface that were classified. The
  * caller frees *sign. */

@@ -173,24 +173,6 @@ typedef struct classifying {
     int8_t *sign;             /* sign of this triangle */
 } classifying;
 
-static void add_vertex(const ebpo_cut_mesh *cut, uint32_t vertex, int k, mpq_t sum, mpq_t x)
-{
-    uint64_t corners = cut->faces->corners.count;
-    if (vertex < corners) {
-        mpq_set_d(x, cut->faces->corners.at[vertex][k]);
-    } else {
-        const ebpo_exact_point *p = &cut->set.point[vertex - corners];
-        mpq_set_num(x, p->x[k]);
-        mpq_set_den(x, p->x[3]);
-        mpq_canonicalize(x);
-        if (cut->unit < 0)
-            mpq_div_2exp(x, x, (mp_bitcnt_t)-cut->unit);
-        else
-            mpq_mul_2exp(x, x, (mp_bitcnt_t)cut->unit);
-    }
-    mpq_add(sum, sum, x);
-}
-
 /* Computes the mean of the triangle's corners. */
 static void find_middle(const ebpo_cut_mesh *cut, uint32_t triangle, mpq_t out[3])
 {
@@ -198,8 +180,10 @@ static void find_middle(const ebpo_cut_mesh *cut, uint32_t triangle, mpq_t out[3
     mpq_init(x);
     for (int k = 0; k < 3; k++) {
         mpq_init(out[k]);
-        for (int i = 0; i < 3; i++)
-            add_vertex(cut, cut->triangle[triangle][i], k, out[k], x);
+        for (int i = 0; i < 3; i++) {
+            ebpo_cut_mesh_coordinate(cut, cut->triangle[triangle][i], k, x);
+            mpq_add(out[k], out[k], x);
+        }
         mpq_set_ui(x, 3, 1);
         mpq_div(out[k], out[k], x);
     }

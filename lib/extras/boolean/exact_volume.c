@@ -9,7 +9,6 @@
  * no exact volume. Proof: docs/develop/booleans.md, "Exact volumes". */
 #include "core/strict_fp.h"
 
-#include <gmp.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -19,137 +18,13 @@
 #include "core/fp_env.h"
 #include "core/parallel.h"
 #include "extras/boolean/boolean.h"
+#include "extras/boolean/volume_sum.h"
 #include "extras/collide/collider.h"
 #include "extras/collide/face_patches.h"
 #include "extras/collide/posed_solid.h"
 #include "extras/collide/pair_faces.h"
-#include "geometry/expansion.h"
-#include "geometry/integer_vectors.h"
 #include "geometry/predicates.h"
 #include "geometry/level_nodes.h"
-#include "mesh/sum.h"
-
-/* --- sums of signed volumes --- */
-
-/* Sum of six times the signed volumes of the tetrahedra from the origin to faces. */
-typedef struct volume_sum {
-    ebpo_sum by_doubles; /* sum for faces whose products are exact in doubles */
-    mpz_t other;         /* sum for all other faces, in units of 2^EBPO_VOLUME_UNIT */
-} volume_sum;
-
-/* Exponent of the unit for products of three doubles: it represents all 53 bits of each double,
- * also of the least one, 2^-1074. */
-enum { EBPO_VOLUME_UNIT = -3 * (1074 + 52) };
-
-static void volume_sum_begin(volume_sum *s)
-{
-    s->by_doubles = (ebpo_sum){ 0 };
-    mpz_init(s->other);
-}
-
-static void volume_sum_end(volume_sum *s) { mpz_clear(s->other); }
-
-/* Returns true if products of three of these numbers and their rounding errors are doubles: the
- * lowest bit of a product is at least 2^(-3 (250 + 52)). */
-static bool has_exact_products(const double t[3][3])
-{
-    bool by_doubles = true;
-    for (int i = 0; i < 9; i++) {
-        double x = fabs(t[i / 3][i % 3]);
-        by_doubles &= x == 0 || (x >= 0x1p-250 && x <= 0x1p250);
-    }
-    return by_doubles;
-}
-
-/* Adds the product x y z, exactly. */
-static void add_product(ebpo_sum *s, double x, double y, double z)
-{
-    double product[2], all[4];
-    int n = ebpo_expansion_of_pair(product, ebpo_two_product(x, y));
-    n = ebpo_expansion_scale(all, product, n, z);
-    for (int i = 0; i < n; i++)
-        ebpo_sum_add(s, all[i]);
-}
-
-static void add_by_doubles(ebpo_sum *s, const double t[3][3], int times)
-{
-    for (int k = 0; k < 3; k++) {
-        int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
-        add_product(s, times * t[0][k], t[1][u], t[2][v]);
-        add_product(s, -times * t[0][k], t[1][v], t[2][u]);
-    }
-}
-
-static void add_other(mpz_t sum, const double t[3][3], int times)
-{
-    ebpo_vectorz corner[3], cross;
-    mpz_t volume;
-    mpz_init(volume);
-    ebpo_vectorz_init(&cross);
-    for (int i = 0; i < 3; i++) {
-        ebpo_vectorz_init(&corner[i]);
-        for (int k = 0; k < 3; k++)
-            ebpo_set_integer(corner[i].x[k], t[i][k], EBPO_VOLUME_UNIT / 3);
-    }
-    ebpo_vectorz_cross(&cross, &corner[1], &corner[2]);
-    ebpo_vectorz_dot(volume, &corner[0], &cross);
-    mpz_mul_si(volume, volume, times);
-    mpz_add(sum, sum, volume);
-    for (int i = 0; i < 3; i++)
-        ebpo_vectorz_clear(&corner[i]);
-    ebpo_vectorz_clear(&cross);
-    mpz_clear(volume);
-}
-
-/* Adds the volume below the face t, whose corners are counter-clockwise seen from outside and
- * finite; times: 1 or -1. */
-static void volume_sum_add(volume_sum *s, const double t[3][3], int times)
-{
-    if (has_exact_products(t))
-        add_by_doubles(&s->by_doubles, t, times);
-    else
-        add_other(s->other, t, times);
-}
-
-static void volume_sum_merge(volume_sum *s, const volume_sum *more)
-{
-    ebpo_sum_merge(&s->by_doubles, &more->by_doubles);
-    mpz_add(s->other, s->other, more->other);
-}
-
-/* Converts the accumulator to an integer in units of 2^-1074. */
-static void to_integer(mpz_t out, const ebpo_sum *sum)
-{
-    ebpo_sum s = *sum;
-    ebpo_sum_carry(&s);
-    mpz_set_si(out, 0);
-    for (int i = EBPO_SUM_LIMBS - 1; i >= 0; i--) {
-        mpz_mul_2exp(out, out, 32);
-        if (s.limb[i] < 0)
-            mpz_sub_ui(out, out, (unsigned long)-s.limb[i]);
-        else
-            mpz_add_ui(out, out, (unsigned long)s.limb[i]);
-    }
-}
-
-/* Returns the double nearest to the volume, ties to even; infinite beyond the range of doubles.
- * Sets *scaled, about 1, and *exponent, so that the volume is *scaled * 2^*exponent, rounded
- * likewise. */
-static double volume_sum_value(const volume_sum *s, double *scaled, int64_t *exponent)
-{
-    mpz_t all, six;
-    mpz_init(all);
-    mpz_init_set_ui(six, 6);
-    to_integer(all, &s->by_doubles);
-    mpz_mul_2exp(all, all, -1074 - EBPO_VOLUME_UNIT);
-    mpz_add(all, all, s->other);
-    double value = ebpo_round_quotient(all, six, EBPO_VOLUME_UNIT);
-    int bits = mpz_sgn(all) ? (int)mpz_sizeinbase(all, 2) : -EBPO_VOLUME_UNIT;
-    *scaled = ebpo_round_quotient(all, six, -bits);
-    *exponent = EBPO_VOLUME_UNIT + bits;
-    mpz_clears(all, six, NULL);
-    return value;
-}
 
 /* --- the measurement --- */
 
@@ -162,7 +37,7 @@ typedef struct measuring {
     ebpo_volume_options options;
     ebpo_exact_volume *out;
     uint64_t same[EBPO_BOOLEAN_OPERANDS_MAX]; /* see ebpo_boolean_find_equal */
-    volume_sum *sum;                          /* [threads] */
+    ebpo_volume_sum *sum;                     /* [threads] */
 } measuring;
 
 static bool is_first(const measuring *m, uint32_t i) { return m->same[i] != 0; }
@@ -398,7 +273,7 @@ static ebpo_status add_faces(void *user, uint64_t begin, uint64_t end, unsigned 
         if (times == 0)
             continue;
         pose_face(o, f, t);
-        volume_sum_add(&o->m->sum[worker], (const double(*)[3])t, times);
+        ebpo_volume_sum_add(&o->m->sum[worker], (const double(*)[3])t, times);
     }
     return EBPO_OK;
 }
@@ -464,24 +339,24 @@ static ebpo_status add_operands(measuring *m, ebpo_error *error)
     if (!m->sum)
         return ebpo_fail_memory(error, threads * sizeof *m->sum);
     for (unsigned i = 0; i < threads; i++)
-        volume_sum_begin(&m->sum[i]);
+        ebpo_volume_sum_begin(&m->sum[i]);
     for (uint32_t i = 0; i < m->b->count && status == EBPO_OK && !m->out->doubt; i++) {
         ebpo_error cause = EBPO_ERROR_INIT;
         if (is_first(m, i) && add_operand(m, i, &cause) != EBPO_OK)
             status = ebpo_fail_operand(m->b->solid[i].model, i, &cause, error);
     }
     for (unsigned i = 1; i < threads; i++)
-        volume_sum_merge(&m->sum[0], &m->sum[i]);
+        ebpo_volume_sum_merge(&m->sum[0], &m->sum[i]);
     double scaled, volume;
     int64_t exponent;
-    volume = volume_sum_value(&m->sum[0], &scaled, &exponent);
+    volume = ebpo_volume_sum_value(&m->sum[0], &scaled, &exponent);
     if (status == EBPO_OK && !m->out->doubt) {
         m->out->volume = ebpo_value_bounds_of(volume, volume);
         m->out->scaled = scaled;
         m->out->exponent = exponent;
     }
     for (unsigned i = 0; i < threads; i++)
-        volume_sum_end(&m->sum[i]);
+        ebpo_volume_sum_end(&m->sum[i]);
     free(m->sum);
     return status;
 }

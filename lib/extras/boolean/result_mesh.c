@@ -18,6 +18,7 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "core/workspace.h"
+#include "extras/boolean/volume_sum.h"
 #include "mesh/attributes.h"
 #include "mesh/mesh_parts.h"
 
@@ -36,6 +37,8 @@ typedef struct output {
     ebpo_mesh *mesh;
     uint8_t *operand; /* attributes of faces, or NULL */
     uint8_t *operand_face;
+    bool measures; /* `volume` is requested */
+    ebpo_volume_sum volume;
 } output;
 
 /* The operand that is read. */
@@ -181,6 +184,12 @@ static bool add_whole_face(operand_output *r, uint64_t face, int sign)
 {
     uint32_t corner[3];
     get_corners(r, face, corner);
+    if (r->o->measures) {
+        double t[3][3];
+        for (int i = 0; i < 3; i++)
+            ebpo_mesh_position(&r->mesh, corner[i], t[i]);
+        ebpo_volume_sum_add(&r->o->volume, (const double(*)[3])t, sign);
+    }
     for (int i = 0; i < 3; i++) {
         if (r->number[corner[i]] == NO_NUMBER && !number_vertex(r, corner[i]))
             return false;
@@ -190,12 +199,40 @@ static bool add_whole_face(operand_output *r, uint64_t face, int sign)
     return true;
 }
 
+/* Adds the volume below a triangle of the cut mesh, before rounding. */
+static void measure_triangle(output *o, uint64_t t)
+{
+    const uint32_t *corner = o->cut->triangle[t];
+    const ebpo_corner_ids *corners = &o->cut->faces->corners;
+    mpq_t exact[3][3];
+    double at[3][3];
+    bool doubles = true;
+    for (int i = 0; i < 3; i++) {
+        doubles = doubles && corner[i] < corners->count;
+        if (doubles)
+            memcpy(at[i], corners->at[corner[i]], sizeof at[i]);
+    }
+    if (doubles) {
+        ebpo_volume_sum_add(&o->volume, (const double(*)[3])at, o->sign[t]);
+        return;
+    }
+    for (int i = 0; i < 9; i++) {
+        mpq_init(exact[i / 3][i % 3]);
+        ebpo_cut_mesh_coordinate(o->cut, corner[i / 3], i % 3, exact[i / 3][i % 3]);
+    }
+    ebpo_volume_sum_add_rational(&o->volume, exact, o->sign[t]);
+    for (int i = 0; i < 9; i++)
+        mpq_clear(exact[i / 3][i % 3]);
+}
+
 static bool add_triangle(operand_output *r, uint64_t face, uint64_t t)
 {
     output *o = r->o;
     uint32_t corner[3];
     if (o->sign[t] == 0)
         return true;
+    if (o->measures)
+        measure_triangle(o, t);
     for (int i = 0; i < 3; i++) {
         if (!number_cut_vertex(o, o->cut->triangle[t][i]))
             return false;
@@ -405,6 +442,8 @@ ebpo_status ebpo_result_mesh_make(const ebpo_cut_mesh *cut, const int8_t *sign,
                                   ebpo_boolean_mesh_report *report, ebpo_error *error)
 {
     output o = { .cut = cut, .sign = sign, .report = report, .mesh = mesh };
+    o.measures = options->volume;
+    ebpo_volume_sum_begin(&o.volume);
     uint64_t vertices = ebpo_cut_mesh_vertices(cut);
     mesh->workspace = cut->faces->workspace;
     o.doubles = options->doubles || has_doubles(cut->faces) || exceeds_floats(cut->faces);
@@ -420,6 +459,9 @@ ebpo_status ebpo_result_mesh_make(const ebpo_cut_mesh *cut, const int8_t *sign,
         status = add_operands(&o, &options->progress, error);
     for (uint64_t i = 0; i < (mesh->attributes ? mesh->attributes->count : 0); i++)
         mesh->attributes->array[i].rows = mesh->face_count;
+    if (status == EBPO_OK && o.measures)
+        report->volume = ebpo_volume_sum_interval(&o.volume);
+    ebpo_volume_sum_end(&o.volume);
     for (uint32_t i = 0; i < EBPO_BOOLEAN_OPERANDS_MAX; i++)
         free(o.of_component[i]);
     free(o.number);

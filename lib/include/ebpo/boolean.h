@@ -287,7 +287,10 @@ typedef struct ebpo_boolean_mesh_options {
      */
     bool origins;
 
-    uint8_t reserved[6];
+    /* True: `volume` of the report is computed. */
+    bool volume;
+
+    uint8_t reserved[5];
 
     /*
      * Holds the arrays of the mesh, and those that grow with the operands; free it after the mesh.
@@ -296,9 +299,9 @@ typedef struct ebpo_boolean_mesh_options {
     ebpo_workspace *workspace;
 } ebpo_boolean_mesh_options;
 
-#define EBPO_BOOLEAN_MESH_OPTIONS_INIT                                               \
-    {                                                                                \
-        sizeof(ebpo_boolean_mesh_options), { NULL, NULL }, false, false, { 0 }, NULL \
+#define EBPO_BOOLEAN_MESH_OPTIONS_INIT                                                      \
+    {                                                                                       \
+        sizeof(ebpo_boolean_mesh_options), { NULL, NULL }, false, false, false, { 0 }, NULL \
     }
 
 typedef struct ebpo_boolean_mesh_report {
@@ -318,6 +321,13 @@ typedef struct ebpo_boolean_mesh_report {
      * world's unit, up to rounding.
      */
     double displacement;
+
+    /*
+     * If requested: volume of the exact result, before vertices are rounded, in the cube of the
+     * world's unit. EBPO_VALUE_EXACT: the nearest double, ties to even. EBPO_VALUE_INTERVAL: two or
+     * three neighbouring doubles, between which the volume is.
+     */
+    ebpo_value_bounds volume;
 } ebpo_boolean_mesh_report;
 
 #define EBPO_BOOLEAN_MESH_REPORT_INIT EBPO_SIZED(ebpo_boolean_mesh_report)
@@ -329,9 +339,9 @@ typedef struct ebpo_boolean_mesh_report {
  * corners, at their poses. Other vertices are the exact ones, rounded to the nearest coordinate.
  * The mesh is closed: each edge is used equally often in both directions. Rounding may create small
  * intersections of faces (ebpo_mesh_self_intersections). Vertices of cut faces that become equal by
- * rounding are merged, and faces that lose a corner in this way are omitted. Winding numbers of the mesh are 1
- * in the result and 0 elsewhere, except near rounded vertices. The mesh is the same for any number
- * of threads.
+ * rounding are merged, and faces that lose a corner in this way are omitted. Winding numbers of the
+ * mesh are 1 in the result and 0 elsewhere, except near rounded vertices. The mesh is the same for
+ * any number of threads.
  *
  * Takes about 40 bytes for each face of one operand at a time and 25 for each face of the mesh,
  * which a workspace may hold, and 1,500 for each face that is cut.

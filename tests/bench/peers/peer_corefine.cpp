@@ -1,6 +1,6 @@
-// CGAL's corefinement as a peer: peer_corefine A.ply B.ply OPERATOR POSE OUT.off computes A | B, A & B
-// or A - B of closed meshes. POSE: the twelve numbers of B's matrix [R t], by rows. Predicates are
-// exact, constructions are doubles (EPICK); one thread. Prints the number of faces.
+// CGAL's corefinement as a peer: peer_corefine A.ply B.ply OPERATOR POSE OUT.off computes A | B, A
+// & B or A - B of closed meshes. POSE: the twelve numbers of B's matrix [R t], by rows. Predicates
+// are exact, constructions are doubles (EPICK); one thread. Prints the number of faces.
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Polygon_mesh_processing/corefinement.h>
 #include <CGAL/Surface_mesh.h>
@@ -34,9 +34,7 @@ surface_mesh read(const char *path, const std::vector<double> &pose)
         out.add_vertex(kernel::Point_3(y[0], y[1], y[2]));
     }
     for (size_t f = 0; f < faces; f++) {
-        auto corner = [&](size_t i) {
-            return surface_mesh::Vertex_index(from.corners[3 * f + i]);
-        };
+        auto corner = [&](size_t i) { return surface_mesh::Vertex_index(from.corners[3 * f + i]); };
         if (out.add_face(corner(0), corner(1), corner(2)) == surface_mesh::null_face())
             throw std::runtime_error("CGAL's Surface_mesh needs a manifold mesh");
     }

@@ -146,6 +146,24 @@ static void print_volume(const cell_result *a)
            b->by_nodes, b->by_faces);
 }
 
+/* Prints the volume of the result that was written. */
+static void print_result_volume(const ebpo_value_bounds *volume)
+{
+    char lo[32], hi[32];
+    if (volume->kind == EBPO_VALUE_EXACT)
+        printf("volume    %s, exact but for one rounding\n", words_real(volume->lo, lo));
+    else
+        printf("volume    %s to %s, an interval\n", words_real(volume->lo, lo),
+               words_real(volume->hi, hi));
+}
+
+static void result_volume_to_json(json *j, const ebpo_value_bounds *volume)
+{
+    json_real(j, "volume_lo", volume->lo);
+    json_real(j, "volume_hi", volume->hi);
+    json_text(j, "volume_kind", volume_kinds[volume->kind]);
+}
+
 static void volume_to_json(json *j, const cell_result *a)
 {
     const ebpo_boolean_volume *b = &a->cells;
@@ -197,7 +215,9 @@ static void print_cells(const cell_result *a)
             boolean_print_result(&a->output);
         else if (a->v->out)
             print_written(a);
-        if (a->volume)
+        if (a->volume && writes_result(a->v))
+            print_result_volume(&a->output.report.volume);
+        else if (a->volume)
             print_volume(a);
         return;
     }
@@ -210,7 +230,9 @@ static void print_cells(const cell_result *a)
         json_text(&j, "side", a->v->inner ? "inner" : "outer");
         json_uint(&j, "faces", a->faces_written);
     }
-    if (a->volume)
+    if (a->volume && writes_result(a->v))
+        result_volume_to_json(&j, &a->output.report.volume);
+    else if (a->volume)
         volume_to_json(&j, a);
     json_finish(&j);
 }
@@ -296,7 +318,7 @@ static ebpo_status compute_cells(cell_result *a, ebpo_boolean *b, ebpo_progress 
     ebpo_status status = EBPO_OK;
     if (writes_result(a->v))
         status = boolean_write_result(&a->output, b, progress, error);
-    if (status != EBPO_OK || (writes_result(a->v) && !a->volume))
+    if (status != EBPO_OK || writes_result(a->v))
         return status;
     if (a->volume)
         status = ebpo_boolean_exact_volume(b, &measuring, &a->exact, error);
@@ -327,6 +349,7 @@ static int make_cells(const values *v, const char **models, const char *unit,
                                   .unit = unit,
                                   .threads = (unsigned)v->query.threads,
                                   .doubles = v->doubles,
+                                  .volume = v->volume,
                                   .workspace = workspace },
                       .exact = EBPO_EXACT_VOLUME_INIT,
                       .cells = EBPO_BOOLEAN_VOLUME_INIT,
