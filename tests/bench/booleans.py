@@ -3,11 +3,13 @@
 
     tests/bench/booleans.py BUILD_DIR MODEL.ply [--subdivide 1,2] [--python PYTHON] [--corefine-below 2] [--rounds 3]
         [-o docs/measured/booleans.md]
+    tests/bench/booleans.py BUILD_DIR MODEL.ply --picture docs/pictures/booleans.png
 
 The model is subdivided, and a copy of it, turned and moved, is subtracted from it and united with it. PYTHON has the
 packages manifold3d and numpy. CGAL's program is tests/bench/peers/peer_corefine of a build with -Dpeers=enabled; it
 takes part below the given subdivision. Rounds interleave the programs. Times are processor times, because they depend
-less on other load; peaks are of resident memory.
+less on other load; peaks are of resident memory. --picture measures nothing, and draws A - B with the faces of A and
+of B in two colours.
 """
 import argparse
 import math
@@ -22,8 +24,9 @@ import measured
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 TURN, SHIFT = (0.1, 0.2, 0.3, 0.9), (0.04, 0.03, -0.05)
-NAMES = {"ours": "`ebpo boolean`, PLY", "limited": "the same, `--memory 512M`", "model": "`ebpo boolean`, .ebpo.h5",
-         "manifold": "manifold3d", "corefine": "CGAL's corefinement"}
+DEEP, COLOURS = (0.2, 0.1, 0.35), (bytes((200, 190, 170)), bytes((215, 105, 60)))
+NAMES = {"ours": "`ebpo`, PLY", "limited": "with `--memory 512M`", "model": "`ebpo`, .ebpo.h5", "manifold": "manifold3d",
+         "corefine": "CGAL"}
 
 
 def matrix(shift):
@@ -67,22 +70,38 @@ def measure(arguments, work, level):
     return rows
 
 
+def draw(arguments, work):
+    """Draw the difference of the model and its turned copy; faces have the colours of their operands."""
+    build, model, out = arguments.build, work / "m.ebpo.h5", work / "o.ply"
+    measured.run(build / "tools/ebpo", "convert", "-q", arguments.model, model)
+    size = max(measured.run_json(build / "tools/ebpo", "info", "--json", model)["report"]["box_size"])
+    pose = matrix([t * size for t in DEEP])
+    measured.run(build / "tools/ebpo", "boolean", "A - B", model, model, "--pose", f"B {pose} 1", "-o", out)
+    data = out.read_bytes()
+    body = data.index(b"end_header\n") + 11
+    counts = [int(line.split()[2]) for line in data[:body].decode().split("\n") if line.startswith("element")]
+    middle_of_file, rows = body + 12 * counts[0], []
+    for at in range(middle_of_file, len(data), 18):
+        rows.append(data[at:at + 13] + COLOURS[data[at + 13]])
+    header = data[:body].replace(b"property uchar operand\nproperty uint operand_face\n",
+                                 b"property uchar red\nproperty uchar green\nproperty uchar blue\n")
+    coloured = work / "coloured.ply"
+    coloured.write_bytes(header + data[body:middle_of_file] + b"".join(rows))
+    measured.run(build / "tools/ebpo", "render", coloured, "-o", arguments.picture, "--mesh", "--view",
+                 arguments.view, "--size", "900x700")
+
+
 def middle(runs, key):
     return statistics.median(run[key] for run in runs)
 
 
-def table(results):
-    yield "| faces | operation | program | processor s | of manifold3d | peak MiB | of manifold3d |"
-    yield "|---|---|---|---|---|---|---|"
+def table(results, key, unit, digits):
+    """Return a table of medians: a row for each operation, a column for each program."""
+    yield "| " + " | ".join(["faces", "operation", *NAMES.values()]) + " |"
+    yield "|---" * (2 + len(NAMES)) + "|"
     for faces, operator, runs, _ in results:
-        for name, of in runs.items():
-            cpu, peak = middle(of, "cpu"), middle(of, "peak") / measured.MIB
-            share = ["", ""]
-            if "manifold" in runs and name != "manifold":
-                share = [f"{cpu / middle(runs['manifold'], 'cpu'):.2f}",
-                         f"{peak / (middle(runs['manifold'], 'peak') / measured.MIB):.2f}"]
-            operation = "A - B" if operator == "-" else "union"
-            yield f"| {faces:,} twice | {operation} | {NAMES[name]} | {cpu:.1f} | {share[0]} | {peak:,.0f} | {share[1]} |"
+        cells = [f"{middle(runs[name], key) / unit:,.{digits}f}" if name in runs else "" for name in NAMES]
+        yield "| " + " | ".join([f"{faces:,}", "difference" if operator == "-" else "union", *cells]) + " |"
 
 
 def goals(results):
@@ -119,11 +138,18 @@ def page(arguments, results):
     yield "## Measurement"
     yield ""
     yield f"Made by `tests/bench/booleans.py BUILD_DIR {arguments.model.name} --subdivide {arguments.subdivide} --rounds"
-    yield f"{arguments.rounds} --python PYTHON --corefine-below {arguments.corefine_below}` on {measured.machine()};"
-    yield f"load average {os.getloadavg()[2]:.0f}. B is A, turned and moved by a twentieth of its size."
-    yield "Times and peaks are of whole commands, reading and writing included, on all cores; medians of the rounds."
+    yield f"{arguments.rounds} --python PYTHON --corefine-below {arguments.corefine_below}` on {measured.machine()}."
+    yield f"The load average was {os.getloadavg()[2]:.0f}, which makes wall-clock times too long. B is A, turned and moved"
+    yield "by a twentieth of its size. Times and peaks are of whole commands, reading and writing included, on all cores;"
+    yield "medians of the rounds. `ebpo` reads .ebpo.h5 files, the others PLY files; CGAL writes OFF."
     yield ""
-    yield from table(results)
+    yield "Processor seconds:"
+    yield ""
+    yield from table(results, "cpu", 1, 1)
+    yield ""
+    yield "Peaks in MiB:"
+    yield ""
+    yield from table(results, "peak", measured.MIB, 0)
     yield ""
     if all(r[3] for r in results):
         yield "The PLY files with and without a limit of memory are equal byte for byte."
@@ -141,9 +167,14 @@ def main():
     parser.add_argument("--corefine-below", type=int, default=2)
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("-o", dest="output", type=pathlib.Path, default=ROOT / "docs/measured/booleans.md")
+    parser.add_argument("--picture", type=pathlib.Path)
+    parser.add_argument("--view", default="30,20")
     arguments = parser.parse_args()
     results = []
     with tempfile.TemporaryDirectory() as folder:
+        if arguments.picture:
+            draw(arguments, pathlib.Path(folder))
+            return
         for level in arguments.subdivide.split(","):
             results += measure(arguments, pathlib.Path(folder), int(level))
     arguments.output.write_text("\n".join(page(arguments, results)) + "\n")

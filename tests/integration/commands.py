@@ -135,9 +135,11 @@ COMMANDS = {
     "boolean": Command("boolean 'A - B' model.ebpo.h5 model.ebpo.h5 --pose 'B 0.5 0 0' --inside "
                        "points.txt"),
     "boolean cells": Command("boolean 'A - B' image.ebpo.h5 image.ebpo.h5 --pose 'B 0.5 0 0' "
-                             "--max-level 3 -o OUT.ebpo.h5", ("OUT.ebpo.h5",)),
+                             "--cells --max-level 3 -o OUT.ebpo.h5", ("OUT.ebpo.h5",)),
+    "boolean model": Command("boolean 'A - B' image.ebpo.h5 image.ebpo.h5 --pose 'B 0.5 0 0' "
+                             "-o OUT.ebpo.h5", ("OUT.ebpo.h5",)),
     "boolean ply": Command("boolean 'A - B' image.ebpo.h5 image.ebpo.h5 --pose 'B 0.5 0 0' "
-                           "--max-level 3 -o OUT.ply", ("OUT.ply",)),
+                           "--memory 128M --volume -o OUT.ply", ("OUT.ply",)),
     "scene check": Command("scene check --threads 1 a.scene.json"),
     "scene pairs": Command("scene pairs --threads 1 a.scene.json"),
     "scene plan": Command("scene plan --threads 1 a.scene.json"),
