@@ -7,15 +7,25 @@
 #include <stdint.h>
 #include <string.h>
 
-#if defined(__SSE2__)
+/* EBPO_PORTABLE_SIMD: tests compile the functions for machines without vectors. */
+#if defined(EBPO_PORTABLE_SIMD)
+#elif defined(__SSE2__)
 #include <immintrin.h>
+#define EBPO_SIMD_SSE2
+#if defined(__AVX2__)
+#define EBPO_SIMD_AVX2
+#endif
 #elif defined(__wasm_simd128__)
 #include <wasm_simd128.h>
+#define EBPO_SIMD_WASM
+#elif defined(__aarch64__)
+#include <arm_neon.h>
+#define EBPO_SIMD_NEON
 #endif
 
 #define EBPO_EIGHT static inline __attribute__((always_inline))
 
-#if defined(__AVX2__)
+#if defined(EBPO_SIMD_AVX2)
 
 typedef __m256 f8;
 
@@ -159,7 +169,7 @@ EBPO_EIGHT f8 f8_look_up(f8_table t, n8 at)
                      t.x[at.bits >> (16 * h + 8) & 15], t.x[at.bits >> (16 * h + 12) & 15] }));
 }
 
-#if defined(__SSE2__)
+#if defined(EBPO_SIMD_SSE2)
 EBPO_EIGHT f8 f8_min(f8 a, f8 b) { EBPO_BOTH(_mm_min_ps(a.half[h], b.half[h])); }
 EBPO_EIGHT f8 f8_max(f8 a, f8 b) { EBPO_BOTH(_mm_max_ps(a.half[h], b.half[h])); }
 EBPO_EIGHT f8 f8_sqrt(f8 a) { EBPO_BOTH(_mm_sqrt_ps(a.half[h])); }
@@ -185,7 +195,7 @@ EBPO_EIGHT f8 f8_from_shorts(const int16_t *x)
     return (f8){ { _mm_cvtepi32_ps(_mm_srai_epi32(_mm_unpacklo_epi16(words, words), 16)),
                    _mm_cvtepi32_ps(_mm_srai_epi32(_mm_unpackhi_epi16(words, words), 16)) } };
 }
-#elif defined(__wasm_simd128__)
+#elif defined(EBPO_SIMD_WASM)
 /* The pseudo-minimum of WebAssembly returns its first operand unless the second one is less. */
 EBPO_EIGHT f8 f8_min(f8 a, f8 b)
 {
@@ -218,6 +228,33 @@ EBPO_EIGHT f8 f8_from_bytes(const uint8_t *x)
 EBPO_EIGHT f8 f8_from_shorts(const int16_t *x)
 {
     EBPO_BOTH(wasm_f32x4_convert_i32x4(wasm_i32x4_load16x4(x + 4 * h)));
+}
+#elif defined(EBPO_SIMD_NEON)
+/* The minimum of NEON differs for NaN and for zeros of both signs, so a comparison selects. */
+EBPO_EIGHT f8 f8_min(f8 a, f8 b) { return f8_pick(f8_less(a, b), a, b); }
+EBPO_EIGHT f8 f8_max(f8 a, f8 b) { return f8_pick(f8_less(b, a), a, b); }
+EBPO_EIGHT f8 f8_sqrt(f8 a) { EBPO_BOTH(vsqrtq_f32((float32x4_t)a.half[h])); }
+EBPO_EIGHT f8 f8_about_inverse(f8 a) { return f8_div(f8_all(1), a); }
+EBPO_EIGHT unsigned f8_bits(f8 mask)
+{
+    const int32x4_t first = { 1, 2, 4, 8 };
+    int32x4_t low = vandq_s32(vshrq_n_s32((int32x4_t)mask.half[0], 31), first),
+              high = vandq_s32(vshrq_n_s32((int32x4_t)mask.half[1], 31), vshlq_n_s32(first, 4));
+    return (unsigned)vaddvq_s32(vorrq_s32(low, high));
+}
+EBPO_EIGHT f8 f8_spread0(f8 a) { EBPO_BOTH(vdupq_laneq_f32((float32x4_t)a.half[h], 0)); }
+EBPO_EIGHT f8 f8_spread1(f8 a) { EBPO_BOTH(vdupq_laneq_f32((float32x4_t)a.half[h], 1)); }
+EBPO_EIGHT f8 f8_spread2(f8 a) { EBPO_BOTH(vdupq_laneq_f32((float32x4_t)a.half[h], 2)); }
+EBPO_EIGHT f8 f8_spread3(f8 a) { EBPO_BOTH(vdupq_laneq_f32((float32x4_t)a.half[h], 3)); }
+EBPO_EIGHT f8 f8_from_bytes(const uint8_t *x)
+{
+    uint16x8_t words = vmovl_u8(vld1_u8(x));
+    return (f8){ { (f4)vcvtq_f32_u32(vmovl_u16(vget_low_u16(words))),
+                   (f4)vcvtq_f32_u32(vmovl_high_u16(words)) } };
+}
+EBPO_EIGHT f8 f8_from_shorts(const int16_t *x)
+{
+    EBPO_BOTH(vcvtq_f32_s32(vmovl_s16(vld1_s16(x + 4 * h))));
 }
 #else
 #include <math.h>
@@ -274,14 +311,16 @@ EBPO_EIGHT f8 f8_inverse(f8 a)
 /* Returns the least of the eight floats, none of which may be NaN. */
 EBPO_EIGHT float f8_least(f8 a)
 {
-#if defined(__AVX2__)
+#if defined(EBPO_SIMD_AVX2)
     __m128 x = _mm_min_ps(_mm256_castps256_ps128(a), _mm256_extractf128_ps(a, 1));
     x = _mm_min_ps(x, _mm_movehl_ps(x, x));
     return _mm_cvtss_f32(_mm_min_ss(x, _mm_movehdup_ps(x)));
-#elif defined(__SSE2__)
+#elif defined(EBPO_SIMD_SSE2)
     __m128 x = _mm_min_ps(a.half[0], a.half[1]);
     x = _mm_min_ps(x, _mm_movehl_ps(x, x));
     return _mm_cvtss_f32(_mm_min_ss(x, _mm_shuffle_ps(x, x, 1)));
+#elif defined(EBPO_SIMD_NEON)
+    return vminvq_f32(vminq_f32((float32x4_t)a.half[0], (float32x4_t)a.half[1]));
 #else
     float least = a.half[0][0];
     for (int i = 1; i < 8; i++)
@@ -303,9 +342,9 @@ typedef int64_t v4l __attribute__((vector_size(32)));
 
 static inline v4d v4d_all(double x) { return (v4d){ x, x, x, x }; }
 
-#if defined(__AVX__)
+#if defined(EBPO_SIMD_AVX2)
 static inline unsigned v4l_mask(v4l m) { return (unsigned)_mm256_movemask_pd((__m256d)m); }
-#elif defined(__SSE2__)
+#elif defined(EBPO_SIMD_SSE2)
 static inline unsigned v4l_mask(v4l m)
 {
     union {
@@ -314,7 +353,7 @@ static inline unsigned v4l_mask(v4l m)
     } x = { .l = m };
     return (unsigned)(_mm_movemask_pd(x.pd[0]) | _mm_movemask_pd(x.pd[1]) << 2);
 }
-#elif defined(__wasm_simd128__)
+#elif defined(EBPO_SIMD_WASM)
 static inline unsigned v4l_mask(v4l m)
 {
     union {
@@ -322,6 +361,17 @@ static inline unsigned v4l_mask(v4l m)
         v128_t half[2];
     } x = { .l = m };
     return (unsigned)(wasm_i64x2_bitmask(x.half[0]) | wasm_i64x2_bitmask(x.half[1]) << 2);
+}
+#elif defined(EBPO_SIMD_NEON)
+static inline unsigned v4l_mask(v4l m)
+{
+    union {
+        v4l l;
+        int32x4_t half[2];
+    } x = { .l = m };
+    const int32x4_t bit = { 1, 2, 4, 8 };
+    int32x4_t high_words = vuzp2q_s32(x.half[0], x.half[1]);
+    return (unsigned)vaddvq_s32(vandq_s32(vshrq_n_s32(high_words, 31), bit));
 }
 #else
 static inline unsigned v4l_mask(v4l m)
@@ -340,7 +390,7 @@ static inline unsigned v4l_mask(v4l m)
 /* Three doubles at a time, one for each axis: a register with AVX2, otherwise plain arithmetic,
  * with the same bits. */
 
-#if defined(__AVX2__)
+#if defined(EBPO_SIMD_AVX2)
 
 typedef __m256d d3; /* the fourth is unused */
 

@@ -67,7 +67,7 @@ units="dialects ply head container predicates face_gates chunk_sums source impor
     large_offsets"
 programs="tools/ebpo samples/ebpo-generate tests/vectors/make_vectors tests/vectors/test_vectors \
     tests/lint/flags/fp_hash_default tests/lint/flags/predicates_hash_small tests/unit/test_unit \
-    tests/query/test_query"
+    tests/query/test_query tests/lint/flags/simd_hash_base"
 # shellcheck disable=SC2086
 ninja -C /build -k 0 -j "${EBPO_JOBS:-$(nproc)}" $programs >/build.log 2>&1 || {
     grep -A3 -E ' (fatal )?error: |undefined reference' /build.log | head -60
@@ -82,6 +82,7 @@ cd /made
 check vectors bin/test_vectors $EBPO_VECTORS /made/bin/make_vectors
 mkdir -p vectors && check vectors-made bin/make_vectors /made/vectors # for same_chunks.py
 check vectors-verified sh /ebpo/tests/vectors/verify_vectors.sh bin/ebpo $EBPO_VECTORS/passed
+check simd bin/simd_hash_base
 check hashes python3 /ebpo/tests/lint/flags/fp_flags.py /ebpo/tests/lint/flags/fp_golden.txt \
     bin/fp_hash_default
 [ "$tests" = all ] || for unit in $units; do check "$unit" bin/test_unit "$unit"; done
