@@ -198,6 +198,9 @@ def arrays(file):
     names = ["/mesh/vertices", "/mesh/faces"] + ["/mesh/faces_index"] * several if mesh else []
     names += ["/maps/vertex_source", "/maps/face_source"] if "maps" in listed_parts else []
     names += ["/border/loops", "/border/points"] if border and one(attrs["border_loops"]) else []
+    if "surface" in listed_parts:
+        names += [f"/surface/{name}" for name in ("patches", "triangles", "points", "normals")]
+        names += ["/surface/colours"] if one(attrs["surface_colours"]) else []
     if "subtrees" in listed_parts:
         names += ["/subtrees/index", "/subtrees/counts", "/subtrees/chunk_directory"]
         names += ["/subtrees/shared_chunks"] * ("shared_chunks" in file["/subtrees"])
@@ -251,6 +254,8 @@ def as_without_subtrees(name, dataset):
 def checksum_of(file, path):
     """The attribute that counts an array."""
     border = path.startswith("/border/") or (text(file.attrs["kind"]) == "surface" and path.endswith("_winding"))
+    if path.startswith("/surface/"):
+        return "surface_sha256"
     return "border_sha256" if border else "colours_sha256" if path.endswith("/gray_colours") else "content_sha256"
 
 
@@ -338,6 +343,8 @@ LEVEL_NAMES = ["types", "plane_counts", "planes", "leaf_winding", "black_winding
                "leaf_index", "leaf_plane_counts", "leaf_planes", "gray_colours"]
 ROOT_PATHS = {4096: "/mesh/vertices", 4097: "/mesh/faces", 4098: "/mesh/faces_index",
               4099: "/maps/vertex_source", 4100: "/maps/face_source", 4101: "/border/loops", 4102: "/border/points",
+              4103: "/surface/patches", 4104: "/surface/triangles", 4105: "/surface/points", 4106: "/surface/normals",
+              4107: "/surface/colours",
               4112: "/subtrees/index",
               4113: "/subtrees/counts", 4114: "/subtrees/shared_chunks"}
 
@@ -637,6 +644,93 @@ def check_border(file):
     assert not any(chain.values()), "the loops are not the border"
 
 
+def patch_triangles(code, count, vertices):
+    """surface.md, section 3: the triangles, and (a, b, beyond) of each vertex that became new at an edge, else None."""
+    edges, recent, origin, out, at = [], [], [], [], 0
+
+    def number():
+        nonlocal at
+        value = 0
+        for k in range(4):
+            value |= (code[at] & 127) << 7 * k
+            at += 1
+            if code[at - 1] < 128:
+                return value
+        raise AssertionError("a number of a patch")
+
+    def new(of):
+        assert len(origin) < vertices, "vertices of a patch"
+        origin.append(of)
+        return len(origin) - 1
+
+    for _ in range(count):
+        e, v = divmod(code[at], 16)
+        at += 1
+        if e == 15:
+            assert v == 0, "a free triangle of a patch"
+            corners = []
+            for _ in range(3):
+                back = number()
+                assert back <= len(origin), "a vertex of a patch"
+                corners.append(len(origin) - back if back else new(None))
+                recent = [corners[-1]] + recent[:13]
+            a, b, c = corners
+            edges = ([(b, a, c)] + edges)[:15]
+        else:
+            a, b, beyond = edges.pop(e)
+            if v == 0:
+                c = new((a, b, beyond))
+            elif v == 15:
+                c = len(origin) - 1 - number()
+                assert c >= 0, "a vertex of a patch"
+            else:
+                c = recent[v - 1]
+            if v in (0, 15):
+                recent = [c] + recent[:13]
+        edges = ([(c, b, a), (a, c, b)] + edges)[:15]
+        out.append((a, b, c))
+    assert at == len(code), "bytes of a patch"
+    return out, origin + [None] * (vertices - len(origin))
+
+
+def check_surface(file):
+    """surface.md: the table, and the codes; returns triangles and points of all patches."""
+    count = {name: one(file.attrs[f"surface_{name}"]) for name in
+             ("patches", "triangles", "vertices", "code_bytes", "colours")}
+    assert 1 <= count["patches"] <= count["triangles"] <= count["code_bytes"] <= 1 << 40, "counts of the surface"
+    assert 3 <= count["vertices"] <= 1 << 40 and count["colours"] in (0, count["vertices"]), "counts of the surface"
+    rows = file["/surface/patches"][...].tolist()
+    names = ["patches", "triangles", "points", "normals"] + ["colours"] * (count["colours"] > 0)
+    lengths = [count[name] for name in ("patches", "code_bytes", "vertices", "vertices", "colours")]
+    assert [len(file[f"/surface/{name}"]) for name in names] == lengths[:len(names)], "arrays of the surface"
+    codes, steps = bytes(file["/surface/triangles"][...]), file["/surface/points"][...].astype("i8")
+    octcodes = [row[0] for row in rows]
+    assert all(a < b for a, b in zip(octcodes, octcodes[1:])), "octcodes of patches"
+    levels = [code.bit_length() // 3 for code in octcodes]
+    assert all(code and code.bit_length() % 3 == 1 for code in octcodes), "an octcode of a patch"
+    assert max(levels) < min(one(file.attrs["level_count"]), 15), "levels of patches"
+    most = 2 ** 32 - 1 if "pruned" in parts_of(file) else one(file.attrs["face_count"])
+    sums, out = [0, 0, 0], []
+    for _, first, faces_of, triangles, corners, size, error in rows:
+        assert 1 <= faces_of and first + faces_of <= most, "faces of a patch"
+        assert 1 <= triangles <= min(faces_of, size) and 3 <= corners <= 3 * faces_of, "counts of a patch"
+        assert error <= 1 << 34, "error of a patch"
+        code, rest = codes[sums[2]:sums[2] + size], steps[sums[1]:sums[1] + corners]
+        assert (len(code), len(rest)) == (size, corners), "counts of patches"
+        listed_triangles, origin = patch_triangles(code, triangles, corners)
+        points = np.zeros((corners, 3), "i8")
+        for v, (step, of) in enumerate(zip((rest >> 1) ^ -(rest & 1), origin)):
+            if of is None:
+                points[v] = points[v - 1] if v else 0
+            else:
+                points[v] = points[of[0]] + points[of[1]] - points[of[2]]
+            points[v] = (points[v] + step + 32768) % 65536 - 32768
+        out.append((listed_triangles, points))
+        sums = [sums[0] + triangles, sums[1] + corners, sums[2] + size]
+    assert sums == [count["triangles"], count["vertices"], count["code_bytes"]], "patches and counts"
+    return out
+
+
 def check_pruned(file, subset):
     """Subsets: an empty group for each pruned node, and on the last level all gray nodes pruned."""
     count = one(file.attrs["level_count"])
@@ -777,7 +871,7 @@ def read(path):
         check_weld(file)
         check_frames(file)
         assert content_sha256(file) == text(file.attrs["content_sha256"]), "content_sha256 differs"
-        for part in {"colours", "border"} & parts:
+        for part in {"colours", "border", "surface"} & parts:
             assert content_sha256(file, f"{part}_sha256") == text(file.attrs[f"{part}_sha256"]), f"{part}_sha256 differs"
         check_pruned(file, "pruned" in parts)
         check_codings(file)
@@ -785,6 +879,8 @@ def read(path):
         check_colours(file)
         if "border" in parts:
             check_border(file)
+        if "surface" in parts:
+            check_surface(file)
         if "subtrees" in parts:
             check_subtrees(file)
         out = {name: text(file.attrs[name]) for name in ("kind", "winding_rule", "coordinate_type")}

@@ -154,7 +154,8 @@ static void fill_info(ebpo_info *info, const ebpo_builder *b, const ebpo_mesh *m
     if (repair_record)
         info->repair_record = *repair_record;
     info->report = *report;
-    info->parts = o->parts & ~(uint32_t)EBPO_PART_BORDER; /* added by ebpo_build_border */
+    /* added by ebpo_build_border and ebpo_build_surface */
+    info->parts = o->parts & ~(uint32_t)(EBPO_PART_BORDER | EBPO_PART_SURFACE);
     if (!ebpo_attributes_hold(mesh->attributes) || !(o->parts & EBPO_PART_MESH))
         info->parts &= ~(uint32_t)EBPO_PART_ATTRIBUTES;
     if (!ebpo_attributes_coloured(mesh->attributes) || !(o->parts & EBPO_PART_MESH))
@@ -301,7 +302,11 @@ static ebpo_status run_stages(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, 
     bool border = !b->solid && b->options->parts & EBPO_PART_BORDER;
     if (status == EBPO_OK && border && !ebpo_progress_stage(&b->options->progress, "border", error))
         status = EBPO_E_CANCELLED;
-    return status == EBPO_OK && border ? ebpo_build_border(out, b->threads, error) : status;
+    if (status == EBPO_OK && border)
+        status = ebpo_build_border(out, b->threads, error);
+    return status == EBPO_OK && b->options->parts & EBPO_PART_SURFACE
+               ? ebpo_build_surface(out, b->threads, &b->options->progress, error)
+               : status;
 }
 
 static ebpo_status build_mesh(ebpo_mesh *mesh, const ebpo_mesh_report *report,
@@ -323,9 +328,9 @@ static ebpo_status build_mesh(ebpo_mesh *mesh, const ebpo_mesh_report *report,
     ebpo_status status = EBPO_TAKE(ebpo_build_options, &wanted, options, error);
     /* a build makes only these parts */
     wanted.parts &= EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES |
-                    EBPO_PART_ATTRIBUTES | EBPO_PART_COLOURS | EBPO_PART_BORDER;
+                    EBPO_PART_ATTRIBUTES | EBPO_PART_COLOURS | EBPO_PART_BORDER | EBPO_PART_SURFACE;
     if (!(wanted.parts & EBPO_PART_MESH))
-        wanted.parts &= ~(uint32_t)EBPO_PART_BORDER;
+        wanted.parts &= ~(uint32_t)(EBPO_PART_BORDER | EBPO_PART_SURFACE);
     if (status == EBPO_OK && wanted.times)
         status = EBPO_CHECK_SIZED(ebpo_build_times, wanted.times, error);
     if (status == EBPO_OK) {

@@ -65,6 +65,13 @@ EBPO_MUST_USE ebpo_status ebpo_build_gray_colours(const ebpo_builder *b, ebpo_tr
  * EBPO_E_IO, EBPO_E_LIMIT. */
 EBPO_MUST_USE ebpo_status ebpo_build_border(ebpo_tree *tree, unsigned threads, ebpo_error *error);
 
+/* --- surface.c (format-spec/surface.md) --- */
+
+/* Adds the part EBPO_PART_SURFACE to a tree with levels and mesh, unless it has too few faces.
+ * Returns EBPO_E_MEMORY, EBPO_E_IO, EBPO_E_CANCELLED. */
+EBPO_MUST_USE ebpo_status ebpo_build_surface(ebpo_tree *tree, unsigned threads,
+                                             const ebpo_progress *progress, ebpo_error *error);
+
 /* --- corner_windings.c --- */
 
 /* Computes the winding numbers of all pieces, before the pieces are partitioned. */

@@ -24,6 +24,7 @@
 #include "format/file_nodes.h"
 #include "format/reader.h"
 #include "format/subtree_index.h"
+#include "format/surface_patches.h"
 #include "format/write_file.h"
 #include "geometry/cells.h"
 #include "io/publish.h"
@@ -134,12 +135,13 @@ enum { CHUNK_BUDGET = 64 << 20 };
 uint32_t ebpo_profile_parts(ebpo_profile profile)
 {
     switch (profile) {
-    case EBPO_PROFILE_LOD: return EBPO_PART_PLANES | EBPO_PART_LEAF_PLANES | EBPO_PART_COLOURS;
+    case EBPO_PROFILE_LOD:
+        return EBPO_PART_PLANES | EBPO_PART_LEAF_PLANES | EBPO_PART_COLOURS | EBPO_PART_SURFACE;
     case EBPO_PROFILE_COLLISION: return EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_BORDER;
     case EBPO_PROFILE_FULL: break;
     }
     return EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES |
-           EBPO_PART_ATTRIBUTES | EBPO_PART_COLOURS | EBPO_PART_BORDER;
+           EBPO_PART_ATTRIBUTES | EBPO_PART_COLOURS | EBPO_PART_BORDER | EBPO_PART_SURFACE;
 }
 
 /* Checks that the box intersects the root cell and the box of an earlier subset, outside which the
@@ -239,6 +241,20 @@ static void name_mesh(ebpo_tree *out)
     out->mesh.source_size = out->info.source_size;
 }
 
+/* Keeps the patches of the levels that are kept. With a box or a maximum error, a node may lose
+ * faces, so the part is omitted. */
+static ebpo_status cut_surface(ebpo_cutting *c)
+{
+    ebpo_surface *surface = &c->out->surface;
+    ebpo_status status = EBPO_OK;
+    if (!c->options->boxed && !c->need)
+        status = ebpo_file_read_surface(c->file, 0, c->last_level, surface, c->error);
+    if (surface->patch_count == 0)
+        c->parts &= ~(uint32_t)EBPO_PART_SURFACE;
+    ebpo_surface_summarise(surface, &c->out->info);
+    return status;
+}
+
 /* Makes the tree of the subset. `need` decides which envelopes of the file, with the kept planes,
  * are close enough; it may be NULL. */
 static ebpo_status subset_tree_within(ebpo_tree *out, const ebpo_file *file,
@@ -263,6 +279,8 @@ static ebpo_status subset_tree_within(ebpo_tree *out, const ebpo_file *file,
         status = ebpo_cut_faces(&c);
     if (status == EBPO_OK && c.parts & EBPO_PART_BORDER)
         status = ebpo_border_read(file, &out->border, error);
+    if (status == EBPO_OK && c.parts & EBPO_PART_SURFACE)
+        status = cut_surface(&c);
     ebpo_chunks_free(c.chunks);
     if (status != EBPO_OK) {
         ebpo_tree_free(out);

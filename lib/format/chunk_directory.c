@@ -21,6 +21,7 @@ _Static_assert(EBPO_A_TYPES == 0 && EBPO_A_PLANES == 2 && EBPO_A_LEAF_REFS == 9 
                    EBPO_A_LEAF_INDEX == 12 && EBPO_A_LEAF_PLANES == 14 &&
                    EBPO_A_GRAY_COLOURS == 15 && EBPO_A_FACE_SOURCE - EBPO_A_VERTICES == 4 &&
                    EBPO_A_BORDER_POINTS - EBPO_A_VERTICES == 6 &&
+                   EBPO_A_SURFACE_COLOURS - EBPO_A_VERTICES == 11 &&
                    EBPO_A_SUBTREE_SHARED - EBPO_A_SUBTREE_INDEX == 2,
                "the format fixes these array numbers: append new rows of array_table.inc");
 

@@ -520,7 +520,7 @@ static int by_subtree(const void *a, const void *b)
 /* Selection of the arrays that come next in the file. */
 typedef struct choice {
     int first_level, last_level; /* for arrays of levels */
-    enum { WHOLE, TOP_INDEXES, NODES, LISTS, MESH, MAPS, TABLE, OF_MESH, REST } kind;
+    enum { WHOLE, TOP_INDEXES, SURFACE, NODES, LISTS, MESH, MAPS, TABLE, OF_MESH, REST } kind;
 } choice;
 
 /* Returns true for arrays of a level that describe face lists; the others describe nodes. */
@@ -541,6 +541,7 @@ static bool is_chosen(const choice *c, const ebpo_array_out *a)
         return (in_range && index) || a->id == EBPO_A_SUBTREE_INDEX ||
                a->id == EBPO_A_FACES_INDEX || a->id == EBPO_A_BORDER_LOOPS ||
                a->id == EBPO_A_BORDER_POINTS;
+    case SURFACE: return a->id >= EBPO_A_SURFACE_PATCHES && a->id <= EBPO_A_SURFACE_COLOURS;
     case NODES: return in_range && !index && !is_of_faces(a->id);
     case LISTS: return in_range && is_of_faces(a->id);
     /* query results contain source face indices, which are read together with the faces */
@@ -585,6 +586,7 @@ static void order_subtrees(ordering *o)
     add_chosen_chunks(o, &(choice){ 0, whole, WHOLE });
     add_chosen_chunks(o, &(choice){ whole + 1, last, TOP_INDEXES });
     o->out->top = o->out->count;
+    add_chosen_chunks(o, &(choice){ 0, 0, SURFACE });
     add_chosen_chunks(o, &(choice){ 0, 0, TABLE });
     for (int level = whole + 1; level < deep; level++)
         add_by_subtree(o, &(choice){ level, level, NODES });

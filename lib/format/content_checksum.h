@@ -21,13 +21,21 @@ typedef struct ebpo_content_entry {
  * checksum does not depend on the layout. */
 bool ebpo_content_has(const ebpo_info *info, ebpo_array_id id);
 
-/* The three checksums. Colours and the border of a surface, with its winding numbers, have separate
- * ones, so the content checksum is the same with and without these parts. */
-enum { EBPO_DIGEST_CONTENT, EBPO_DIGEST_COLOURS, EBPO_DIGEST_BORDER, EBPO_DIGESTS };
+/* The four checksums. Colours, the border of a surface with its winding numbers, and the simplified
+ * surface have separate ones, so the content checksum is the same with and without these parts. */
+enum {
+    EBPO_DIGEST_CONTENT,
+    EBPO_DIGEST_COLOURS,
+    EBPO_DIGEST_BORDER,
+    EBPO_DIGEST_SURFACE,
+    EBPO_DIGESTS
+};
 static inline int ebpo_content_of(ebpo_array_id id, bool solid)
 {
     bool border = id == EBPO_A_BORDER_LOOPS || id == EBPO_A_BORDER_POINTS ||
                   (!solid && (id == EBPO_A_LEAF_WINDING || id == EBPO_A_WHITE_WINDING));
+    if (id >= EBPO_A_SURFACE_PATCHES && id <= EBPO_A_SURFACE_COLOURS)
+        return EBPO_DIGEST_SURFACE;
     return border                      ? EBPO_DIGEST_BORDER
            : id == EBPO_A_GRAY_COLOURS ? EBPO_DIGEST_COLOURS
                                        : EBPO_DIGEST_CONTENT;

@@ -147,6 +147,7 @@ static const part_word part_words[] = {
     { "attributes", EBPO_PART_ATTRIBUTES, false },
     { "colours", EBPO_PART_COLOURS, false },
     { "border", EBPO_PART_BORDER, false },
+    { "surface", EBPO_PART_SURFACE, false },
     { "subtrees", WORD_SUBTREES, true },
     { "gates", WORD_GATES, true },
     { "pruned", WORD_PRUNED, true },
@@ -188,6 +189,17 @@ static const fact border_facts[] = {
     { "border_sha256", FACT_DIGEST, FACT_AT(border_sha256) },
 };
 static const int border_fact_count = sizeof border_facts / sizeof border_facts[0];
+
+/* Attributes of files with a simplified surface; the last one is the checksum. */
+static const fact surface_facts[] = {
+    { "surface_patches", FACT_COUNT, FACT_AT(surface_patches) },
+    { "surface_triangles", FACT_COUNT, FACT_AT(surface_triangles) },
+    { "surface_vertices", FACT_COUNT, FACT_AT(surface_vertices) },
+    { "surface_code_bytes", FACT_COUNT, FACT_AT(surface_code_bytes) },
+    { "surface_colours", FACT_COUNT, FACT_AT(surface_colours) },
+    { "surface_sha256", FACT_DIGEST, FACT_AT(surface_sha256) },
+};
+static const int surface_fact_count = sizeof surface_facts / sizeof surface_facts[0];
 
 /* --- names and settings of selections of planes; construct/selections.c has the functions --- */
 
@@ -247,6 +259,19 @@ static const char *check_border(const ebpo_info *info)
     if (!(info->border_area >= 0 && isfinite(info->border_area)))
         return "border_area is negative or not a number";
     return NULL;
+}
+
+static const char *check_surface(const ebpo_info *info)
+{
+    const uint64_t most = UINT64_C(1) << 40;
+    if (!(info->parts & EBPO_PART_SURFACE))
+        return NULL;
+    bool possible = info->surface_patches > 0 && info->surface_patches <= info->surface_triangles &&
+                    info->surface_triangles <= info->surface_code_bytes &&
+                    info->surface_code_bytes <= most && info->surface_vertices >= 3 &&
+                    info->surface_vertices <= most &&
+                    (info->surface_colours == 0 || info->surface_colours == info->surface_vertices);
+    return possible ? NULL : "the counts of the simplified surface are impossible";
 }
 
 static const char *check_weld(const ebpo_repair_record *m)
@@ -322,6 +347,8 @@ ebpo_status ebpo_facts_check(const ebpo_info *info, const char *shown, ebpo_stat
         wrong = check_box(info);
     if (!wrong)
         wrong = check_border(info);
+    if (!wrong)
+        wrong = check_surface(info);
     uint64_t faces = 0;
     int level = -1;
     while (!wrong && ++level < info->level_count) {
@@ -472,6 +499,9 @@ ebpo_status ebpo_facts_put(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *i
     for (int i = 0; i < border_fact_count && status == EBPO_OK && info->parts & EBPO_PART_BORDER;
          i++)
         status = put_fact(out, root, &border_facts[i], info, error);
+    for (int i = 0; i < surface_fact_count && status == EBPO_OK && info->parts & EBPO_PART_SURFACE;
+         i++)
+        status = put_fact(out, root, &surface_facts[i], info, error);
     if (status == EBPO_OK && info->subtree_level)
         status = put_subtrees(out, root, info, error);
     if (status == EBPO_OK && info->pruned)
@@ -495,6 +525,12 @@ ebpo_status ebpo_facts_put_border_digest(ebpo_h5_out *out, ebpo_h5_id root,
                                          const uint8_t digest[32], ebpo_error *error)
 {
     return put_digest(out, root, border_facts[border_fact_count - 1].name, digest, error);
+}
+
+ebpo_status ebpo_facts_put_surface_digest(ebpo_h5_out *out, ebpo_h5_id root,
+                                          const uint8_t digest[32], ebpo_error *error)
+{
+    return put_digest(out, root, surface_facts[surface_fact_count - 1].name, digest, error);
 }
 
 ebpo_status ebpo_facts_put_index(ebpo_h5_out *out, ebpo_h5_id root, uint64_t offset, uint64_t bytes,
@@ -851,6 +887,9 @@ ebpo_status ebpo_facts_get(ebpo_head *in, ebpo_head_object root, ebpo_info *info
     for (int i = 0; i < border_fact_count && status == EBPO_OK && info->parts & EBPO_PART_BORDER;
          i++)
         status = get_fact(in, root, "/", &border_facts[i], info, error);
+    for (int i = 0; i < surface_fact_count && status == EBPO_OK && info->parts & EBPO_PART_SURFACE;
+         i++)
+        status = get_fact(in, root, "/", &surface_facts[i], info, error);
     if (status == EBPO_OK && info->subtree_level)
         status = get_subtrees(in, root, info, error);
     return status == EBPO_OK && info->pruned ? get_subset(in, root, info, error) : status;

@@ -19,6 +19,9 @@ EBPO_MUST_USE ebpo_status ebpo_facts_put_digest(ebpo_h5_out *out, ebpo_h5_id roo
 EBPO_MUST_USE ebpo_status ebpo_facts_put_colours_digest(ebpo_h5_out *out, ebpo_h5_id root,
                                                         const uint8_t digest[32],
                                                         ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_facts_put_surface_digest(ebpo_h5_out *out, ebpo_h5_id root,
+                                                        const uint8_t digest[32],
+                                                        ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_facts_put_border_digest(ebpo_h5_out *out, ebpo_h5_id root,
                                                        const uint8_t digest[32], ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_facts_put_index(ebpo_h5_out *out, ebpo_h5_id root, uint64_t offset,

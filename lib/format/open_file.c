@@ -226,6 +226,8 @@ static ebpo_status open_arrays(ebpo_file *file, ebpo_head *head, ebpo_error *err
         status = open_group(head, "/maps", info->parts & EBPO_PART_MAPS, error);
     if (status == EBPO_OK)
         status = open_group(head, "/border", info->parts & EBPO_PART_BORDER, error);
+    if (status == EBPO_OK)
+        status = open_group(head, "/surface", info->parts & EBPO_PART_SURFACE, error);
     for (int level = 0; level < info->level_count; level++)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS && status == EBPO_OK; id++) {
             const ebpo_array_in *a = &file->level_array[level][id];

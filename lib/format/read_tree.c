@@ -226,6 +226,7 @@ void ebpo_tree_free(ebpo_tree *tree)
     ebpo_array_free(tree->workspace, tree->vertex_source);
     ebpo_array_free(tree->workspace, tree->face_source);
     ebpo_border_loops_free(&tree->border);
+    ebpo_surface_free(&tree->surface);
     memset(tree, 0, sizeof *tree);
 }
 
@@ -440,6 +441,8 @@ static ebpo_status read_parts(const ebpo_file *file, ebpo_tree *out, const ebpo_
         status = ebpo_file_read_maps(file, read, &maps, error);
     if (status == EBPO_OK && file->info.parts & EBPO_PART_BORDER)
         status = ebpo_border_read(file, &out->border, error);
+    if (status == EBPO_OK && file->info.parts & EBPO_PART_SURFACE)
+        status = ebpo_file_read_surface(file, 0, EBPO_LEVELS_MAX, &out->surface, error);
     out->vertex_source = maps.vertex_source;
     out->face_source = maps.face_source;
     return status;
@@ -700,5 +703,8 @@ ebpo_status ebpo_file_check_content(const ebpo_file *file, const ebpo_read_optio
     if (status == EBPO_OK && file->info.parts & EBPO_PART_BORDER)
         status = compare_digest(&j, EBPO_DIGEST_BORDER, file->info.border_sha256, "border_sha256",
                                 error);
+    if (status == EBPO_OK && file->info.parts & EBPO_PART_SURFACE)
+        status = compare_digest(&j, EBPO_DIGEST_SURFACE, file->info.surface_sha256,
+                                "surface_sha256", error);
     return status == EBPO_OK ? ebpo_attributes_check(file, &read, error) : status;
 }

@@ -171,6 +171,10 @@ void ebpo_schema_columns(const ebpo_info *info, ebpo_array_id id, char names[EBP
         [EBPO_A_FACES_INDEX] = "vertices",
         [EBPO_A_BORDER_LOOPS] = "points weight",
         [EBPO_A_BORDER_POINTS] = "x y z",
+        [EBPO_A_SURFACE_PATCHES] = "octcode first_face faces triangles vertices code_bytes error",
+        [EBPO_A_SURFACE_POINTS] = "x y z",
+        [EBPO_A_SURFACE_NORMALS] = "u v",
+        [EBPO_A_SURFACE_COLOURS] = "red green blue",
     };
     if (id == EBPO_A_SUBTREE_INDEX || id == EBPO_A_SUBTREE_COUNTS)
         subtree_columns(info, names);
@@ -256,6 +260,10 @@ uint64_t ebpo_schema_rows(const ebpo_info *info, ebpo_array_id id, int level)
     case EBPO_PER_FACE_CHUNK: return face_chunks(info);
     case EBPO_PER_BORDER_LOOP: return info->border_loops;
     case EBPO_PER_BORDER_POINT: return info->border_points;
+    case EBPO_PER_PATCH: return info->surface_patches;
+    case EBPO_PER_PATCH_BYTE: return info->surface_code_bytes;
+    case EBPO_PER_PATCH_VERTEX: return info->surface_vertices;
+    case EBPO_PER_PATCH_COLOUR: return info->surface_colours;
     case EBPO_PER_SUBTREE_CHUNK: return subtree_chunks(info);
     case EBPO_PER_SUBTREE: return subtree_rows(info);
     case EBPO_PER_SHARED_BLOCK:

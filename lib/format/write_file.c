@@ -194,7 +194,8 @@ static ebpo_status write_headers(file_headers *h, const char *path, const char *
         ebpo_h5_create(&h->out, path, shown, head_bytes,
                        3 + (h->list[CHUNK_CHECKSUMS].shape.rows != 0) +
                            (plan->info.subtree_level != 0) + (plan->attributes != NULL) +
-                           (plan->info.parts & EBPO_PART_BORDER ? 1 : 0),
+                           (plan->info.parts & EBPO_PART_BORDER ? 1 : 0) +
+                           (plan->info.parts & EBPO_PART_SURFACE ? 1 : 0),
                        error);
     if (status == EBPO_OK)
         status = ebpo_h5_root(&h->out, &h->root, error);
@@ -211,6 +212,9 @@ static ebpo_status write_headers(file_headers *h, const char *path, const char *
     if (status == EBPO_OK)
         status = make_root_group(h, "/border", EBPO_NEEDS_BORDER,
                                  "the border of a surface, as closed loops", error);
+    if (status == EBPO_OK)
+        status = make_root_group(h, "/surface", EBPO_NEEDS_SURFACE,
+                                 "simplified surfaces of nodes, for pictures", error);
     if (status == EBPO_OK)
         status = make_root_group(h, "/subtrees", EBPO_NEEDS_SUBTREES,
                                  "where the rows of each subtree begin in every array", error);
@@ -590,6 +594,11 @@ static ebpo_status put_digests(writer *w, ebpo_error *error)
         status = ebpo_content_end(&w->content[EBPO_DIGEST_BORDER], digest, error);
         if (status == EBPO_OK)
             status = ebpo_facts_put_border_digest(&w->head.out, w->head.root, digest, error);
+    }
+    if (status == EBPO_OK && w->plan.info.parts & EBPO_PART_SURFACE) {
+        status = ebpo_content_end(&w->content[EBPO_DIGEST_SURFACE], digest, error);
+        if (status == EBPO_OK)
+            status = ebpo_facts_put_surface_digest(&w->head.out, w->head.root, digest, error);
     }
     return status;
 }

@@ -20,6 +20,7 @@
 #include "format/chunk_layout.h"
 #include "format/head_facts.h"
 #include "format/schema.h"
+#include "format/surface_patches.h"
 #include "format/write_plan.h"
 #include "geometry/level_nodes.h"
 #include "hdf5_read/coding.h"
@@ -518,6 +519,8 @@ static ebpo_status check_tree(ebpo_plan *plan, const ebpo_check *check, ebpo_err
         status = ebpo_check_finite(check, &tree->mesh, error);
     if (status == EBPO_OK && info->parts & EBPO_PART_BORDER)
         status = ebpo_check_border(check, info, &tree->border, error);
+    if (status == EBPO_OK && info->parts & EBPO_PART_SURFACE)
+        status = ebpo_check_surface(check, info, &tree->surface, error);
     if (status == EBPO_OK && info->parts & EBPO_PART_MAPS)
         status = ebpo_check_map(check, "/maps/vertex_source", tree->vertex_source,
                                 info->vertex_count, info->source_vertex_count, error);
@@ -608,6 +611,16 @@ static void find_values(const ebpo_plan *plan, ebpo_array_out *a)
     const ebpo_array_spec *spec = &ebpo_schema[a->id];
     if (a->id == EBPO_A_BORDER_LOOPS)
         a->values = plan->tree->border.loop;
+    else if (a->id == EBPO_A_SURFACE_PATCHES)
+        a->values = plan->tree->surface.patch;
+    else if (a->id == EBPO_A_SURFACE_TRIANGLES)
+        a->values = plan->tree->surface.code;
+    else if (a->id == EBPO_A_SURFACE_POINTS)
+        a->values = plan->tree->surface.point;
+    else if (a->id == EBPO_A_SURFACE_NORMALS)
+        a->values = plan->tree->surface.normal;
+    else if (a->id == EBPO_A_SURFACE_COLOURS)
+        a->values = plan->tree->surface.colour;
     else if (a->id == EBPO_A_FACES_INDEX)
         a->values = plan->faces_index;
     else if (a->id == EBPO_A_SUBTREE_INDEX)

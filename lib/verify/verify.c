@@ -181,6 +181,8 @@ static ebpo_status verify_tree_of(ebpo_tally *tally, const ebpo_file *file, cons
     ebpo_check_nesting(tally, &view);
     status = check_colours(tally, &view, error);
     if (status == EBPO_OK)
+        status = ebpo_check_patches(tally, tree, options->workspace, error);
+    if (status == EBPO_OK)
         status = ebpo_verify_walk(tally, &view, options, error);
     if (status == EBPO_OK && file)
         status = ebpo_check_subtrees(tally, file, &view, options, error);

@@ -277,11 +277,14 @@ static ebpo_status index_all(offset_comparison *c, ebpo_error *error)
     static const struct {
         ebpo_array_id id;
         uint32_t number;
-    } roots[] = { { EBPO_A_VERTICES, 4096 },       { EBPO_A_FACES, 4097 },
-                  { EBPO_A_FACES_INDEX, 4098 },    { EBPO_A_VERTEX_SOURCE, 4099 },
-                  { EBPO_A_FACE_SOURCE, 4100 },    { EBPO_A_BORDER_LOOPS, 4101 },
-                  { EBPO_A_BORDER_POINTS, 4102 },  { EBPO_A_SUBTREE_INDEX, 4112 },
-                  { EBPO_A_SUBTREE_COUNTS, 4113 }, { EBPO_A_SUBTREE_SHARED, 4114 } };
+    } roots[] = { { EBPO_A_VERTICES, 4096 },          { EBPO_A_FACES, 4097 },
+                  { EBPO_A_FACES_INDEX, 4098 },       { EBPO_A_VERTEX_SOURCE, 4099 },
+                  { EBPO_A_FACE_SOURCE, 4100 },       { EBPO_A_BORDER_LOOPS, 4101 },
+                  { EBPO_A_BORDER_POINTS, 4102 },     { EBPO_A_SURFACE_PATCHES, 4103 },
+                  { EBPO_A_SURFACE_TRIANGLES, 4104 }, { EBPO_A_SURFACE_POINTS, 4105 },
+                  { EBPO_A_SURFACE_NORMALS, 4106 },   { EBPO_A_SURFACE_COLOURS, 4107 },
+                  { EBPO_A_SUBTREE_INDEX, 4112 },     { EBPO_A_SUBTREE_COUNTS, 4113 },
+                  { EBPO_A_SUBTREE_SHARED, 4114 } };
     ebpo_status status = EBPO_OK;
     for (int level = 0; level < c->file->info.level_count && status == EBPO_OK; level++)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS && status == EBPO_OK; id++)
@@ -540,6 +543,11 @@ static uint32_t number_of(const ebpo_array_in *a)
     case EBPO_A_FACE_SOURCE: return 4100;
     case EBPO_A_BORDER_LOOPS: return 4101;
     case EBPO_A_BORDER_POINTS: return 4102;
+    case EBPO_A_SURFACE_PATCHES: return 4103;
+    case EBPO_A_SURFACE_TRIANGLES: return 4104;
+    case EBPO_A_SURFACE_POINTS: return 4105;
+    case EBPO_A_SURFACE_NORMALS: return 4106;
+    case EBPO_A_SURFACE_COLOURS: return 4107;
     case EBPO_A_SUBTREE_INDEX: return 4112;
     case EBPO_A_SUBTREE_COUNTS: return 4113;
     case EBPO_A_SUBTREE_SHARED: return 4114;

@@ -79,6 +79,13 @@ EBPO_MUST_USE ebpo_status ebpo_check_border_rays(ebpo_tally *tally, ebpo_ray_poi
                                                  const ebpo_reference_tree *view, unsigned threads,
                                                  const ebpo_progress *progress, ebpo_error *error);
 
+/* --- verify_surface.c: the simplified surface (format-spec/surface.md) --- */
+
+/* Checks the nodes and the errors of all patches. Does nothing if the tree is a subset or has no
+ * mesh or no patches. */
+EBPO_MUST_USE ebpo_status ebpo_check_patches(ebpo_tally *tally, const ebpo_tree *tree,
+                                             ebpo_workspace *workspace, ebpo_error *error);
+
 /* --- verify_lists.c: face lists of leaves --- */
 
 /* Checks that a leaf lists all faces that touch its cell, and that no face touches a white or black

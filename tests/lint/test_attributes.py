@@ -15,7 +15,7 @@ SOME = ("selection_percent", "selection_k_root", "selection_seed", "subtree_leve
 
 root = pathlib.Path(sys.argv[1])
 section = re.search(r"^## 5\. .*?^## 6\. ", (root / "format-spec/README.md").read_text(),
-                    re.M | re.S).group(0) + (root / "format-spec/border.md").read_text()
+                    re.M | re.S).group(0) + (root / "format-spec/border.md").read_text() + (root / "format-spec/surface.md").read_text()
 said = {}
 for row in re.findall(r"^\| (`.*) \|$", section, re.M):
     cells = [cell.strip() for cell in row.split("|")]

@@ -446,6 +446,44 @@ static ebpo_status call_verify(every_call_env *e)
     return status == EBPO_OK && report.violations ? EBPO_E_FORMAT : status;
 }
 
+static ebpo_status call_add_surface(every_call_env *e)
+{
+    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
+    ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
+    ebpo_surface surface = { .patch_count = 0 };
+    read.threads = write.threads = 1;
+    read.workspace = e->workspace;
+    ebpo_status status =
+        ebpo_file_add_surface(e->file, scratch("part.ebpo.h5"), &read, &write, e->error);
+    if (status != EBPO_OK)
+        return status;
+    /* the model has too few faces */
+    status = ebpo_file_read_surface(e->file, 0, 20, &surface, e->error);
+    ebpo_surface_free(&surface);
+    return status == EBPO_E_ABSENT ? EBPO_OK : status;
+}
+
+/* A patch of one triangle. */
+static ebpo_status call_surface(every_call_env *e)
+{
+    uint64_t row[EBPO_PATCH_COLUMNS] = { 1, 0, 1, 1, 3, 4, 0 }, *patches = NULL, count = 0;
+    uint8_t code[4] = { 0xf0, 0, 0, 0 }, normal[6] = { 127, 127 }, colour[9] = { 255, 9 };
+    uint16_t point[9] = { 0, 0, 0, 200, 0, 0, 0, 200, 0 };
+    ebpo_surface surface = { 1, 1, 3, 4, 3, row, code, point, normal, colour };
+    ebpo_patch patch = EBPO_PATCH_INIT;
+    ebpo_surface_mesh mesh = { .error = 0 };
+    const ebpo_info *info = ebpo_file_info(e->file);
+    ebpo_status status = ebpo_surface_decode(&surface, info, 0, &patch, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_surface_select(&surface, 3, &patches, &count, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_surface_join(&surface, info, patches, count, &mesh, e->error);
+    free(patches);
+    ebpo_patch_free(&patch);
+    ebpo_surface_mesh_free(&mesh);
+    return status;
+}
+
 const every_call every_call_files[] = {
     { "facts", call_facts },
     { "workspace", call_workspace },
@@ -472,6 +510,8 @@ const every_call every_call_files[] = {
     { "subset_coarse", call_subset_coarse },
     { "repack", call_repack },
     { "add_border", call_add_border },
+    { "add_surface", call_add_surface },
+    { "surface", call_surface },
     { "export_xdmf", call_xdmf },
     { "export_vtkhdf", call_vtk },
     { "export_gltf", call_gltf },

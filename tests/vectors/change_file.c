@@ -281,6 +281,8 @@ static const char *checksum_of(const char *name)
     get_text("/", "kind", kind, sizeof kind);
     bool border = strncmp(name, "border/", 7) == 0 ||
                   (strcmp(kind, "surface") == 0 && ends_with(name, "_winding"));
+    if (strncmp(name, "surface/", 8) == 0)
+        return "surface_sha256";
     return border                            ? "border_sha256"
            : ends_with(name, "gray_colours") ? "colours_sha256"
                                              : "content_sha256";
@@ -362,6 +364,7 @@ void state_content(void)
     state_checksum("content_sha256");
     state_checksum("colours_sha256");
     state_checksum("border_sha256");
+    state_checksum("surface_sha256");
 }
 
 uint8_t *slurp(const char *path, size_t *size)

@@ -37,6 +37,7 @@ static const char *folder;
 #define SUMMED    "55_chunk_checksums_of_subtrees"
 #define SURFACE   "07_surface"
 #define BORDER    "65_border"
+#define PATCHES   "69_surface"
 #define CLOSE     "26_subset_error"
 #define MANY      "16_many_subtrees"
 
@@ -571,6 +572,14 @@ static void v_border_changed(void) { poke("/border/loops", 1, 3); }
 static void v_border_moved(void) { add_to("/border/points", 6, INT64_C(1) << 21); }
 static void v_border_winding(void) { add_to("/levels/01/leaf_winding", 0, 1); }
 static void v_border_area(void) { set_real("/", "border_area", 17); }
+static void v_surface_counts(void) { set_count("/", "surface_patches", 1 << 20); }
+static void v_surface_octcode(void) { poke("/surface/patches", 0, 3); }
+static void v_surface_faces(void) { poke("/surface/patches", 2, 2305); }
+static void v_surface_triangles(void) { add_to("/surface/patches", 3, 1); }
+static void v_surface_code(void) { poke("/surface/triangles", 0, 0); }
+static void v_surface_changed(void) { add_to("/surface/normals", 0, 1); }
+static void v_surface_node(void) { add_to("/surface/patches", 2, -1); }
+static void v_surface_error(void) { poke("/surface/patches", 6, 1); }
 static void v_volume(void) { set_real("/levels/00", "gray_volume", NAN); }
 
 typedef enum late_change {
@@ -740,6 +749,14 @@ static const failed_vector failed[] = {
     { "unverified_border_moved", BORDER, v_border_moved, NONE, "RK.6" },
     { "unverified_border_winding", BORDER, v_border_winding, NONE, "RK.7" },
     { "unverified_border_area", BORDER, v_border_area, NONE, "RK.8" },
+    { "surface_counts", PATCHES, v_surface_counts, NONE, "RL.1" },
+    { "surface_octcode", PATCHES, v_surface_octcode, NONE, "RL.2" },
+    { "surface_faces", PATCHES, v_surface_faces, NONE, "RL.3" },
+    { "surface_triangles", PATCHES, v_surface_triangles, NONE, "RL.4" },
+    { "surface_code", PATCHES, v_surface_code, NONE, "RL.5" },
+    { "surface_changed", PATCHES, v_surface_changed, NONE, "RL.6" },
+    { "unverified_surface_node", PATCHES, v_surface_node, NONE, "RL.7" },
+    { "unverified_surface_error", PATCHES, v_surface_error, NONE, "RL.8" },
     { "attributes_without_mesh", COLOURED, v_attributes_no_mesh, NONE, "R5.18" },
     { "chunk_in_place_of_another", SUMMED, NULL, MOVE_CHUNKS, "RF.4" },
     { "chunk_checksums_of_fewer_chunks", SUMMED, v_checksums_fewer, NONE, "RF.3" },
@@ -884,7 +901,8 @@ static void make_vector(const failed_vector *v)
     if (v->change)
         change_objects(path, v->change);
     if (v->change && v->change != v_content && v->change != v_digest_text &&
-        v->change != v_colours_changed && v->change != v_border_changed)
+        v->change != v_colours_changed && v->change != v_border_changed &&
+        v->change != v_surface_changed)
         change_objects(path, state_content);
     if (v->late != NONE)
         change_bytes(path, v->late);

@@ -841,6 +841,51 @@ static void make_borders(void)
     write_vector("68_border_of_a_subset", &tree, EBPO_CODEC_ZSTD, ~0u);
 }
 
+/* --- the simplified surface --- */
+
+/* A torus whose vertices have colours. */
+static ebpo_mesh coloured_torus(void)
+{
+    ebpo_mesh torus = ebpo_test_torus(1, 0.375, 96, 44);
+    size_t capacity = 512 + 96 * (size_t)torus.vertex_count + 32 * (size_t)torus.face_count, used;
+    char *text = malloc(capacity);
+    used = (size_t)snprintf(text, capacity,
+                            "ply\nformat ascii 1.0\nelement vertex %llu\nproperty float x\n"
+                            "property float y\nproperty float z\nproperty uchar red\n"
+                            "property uchar green\nproperty uchar blue\nelement face %llu\n"
+                            "property list uchar int vertex_indices\nend_header\n",
+                            (unsigned long long)torus.vertex_count,
+                            (unsigned long long)torus.face_count);
+    for (uint64_t i = 0; i < torus.vertex_count; i++) {
+        const double *p = torus.xyz64 + 3 * i;
+        used += (size_t)snprintf(text + used, capacity - used, "%.9g %.9g %.9g %d %d %d\n",
+                                 (double)(float)p[0], (double)(float)p[1], (double)(float)p[2],
+                                 (int)(128 + 80 * p[0]), (int)(128 + 80 * p[1]), (int)(i % 200));
+    }
+    for (uint64_t i = 0; i < torus.face_count; i++)
+        used += (size_t)snprintf(text + used, capacity - used, "3 %u %u %u\n", torus.faces[3 * i],
+                                 torus.faces[3 * i + 1], torus.faces[3 * i + 2]);
+    ebpo_mesh_free(&torus);
+    torus = read_text(text, "torus.ply");
+    free(text);
+    return torus;
+}
+
+static void make_surfaces(void)
+{
+    ebpo_tree tree;
+    ebpo_subset_options levels = EBPO_SUBSET_OPTIONS_INIT;
+    how with = { 5, 6, EBPO_PART_SURFACE, 0, 0, 0, 0 };
+    build_float(&tree, ebpo_test_torus(1, 0.375, 48, 24), with);
+    write_vector("69_surface", &tree, EBPO_CODEC_ZSTD, ~0u);
+    build_mesh(&tree, coloured_torus(), (how){ 4, 64, EBPO_PART_SURFACE, 0, 0, 0, 0 });
+    write_laid_out("70_surface_with_subtrees", &tree, EBPO_CODEC_ZSTD, ~0u, 10);
+    levels.last_level = 2;
+    levels.parts = EBPO_PART_SURFACE;
+    subset(&tree, "70_surface_with_subtrees", &levels);
+    write_vector("71_surface_without_mesh", &tree, EBPO_CODEC_DEFLATE, ~0u);
+}
+
 static void make_long(void)
 {
     ebpo_tree tree;
@@ -878,4 +923,5 @@ void make_passed(const char *to)
     make_welded();
     make_long();
     make_borders();
+    make_surfaces();
 }

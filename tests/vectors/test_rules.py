@@ -13,9 +13,9 @@ MOST_WORDS = 4500
 folder = pathlib.Path(sys.argv[1]) / "format-spec"
 vectors_page = folder / "vectors" / "README.md"
 pages = [folder / f"{name}.md" for name in (
-    "README", "gates", "subtrees", "attributes", "colours", "border", "checksums", "history",
+    "README", "gates", "subtrees", "attributes", "colours", "border", "surface", "checksums", "history",
     "hdf5-messages", "reasons", "building")] + [vectors_page]
-RULE = r"R(?:\d+|[A-K])\.\d+"
+RULE = r"R(?:\d+|[A-L])\.\d+"
 problems = []
 
 defined, mentioned = collections.Counter(), {}

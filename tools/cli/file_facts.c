@@ -63,6 +63,12 @@ static void print_border(FILE *out, const ebpo_info *info)
             100 * info->border_area / info->report.area);
 }
 
+static void print_surface(FILE *out, const ebpo_info *info)
+{
+    fprintf(out, "\n  surface   simplified: %llu triangles in %llu patches",
+            (unsigned long long)info->surface_triangles, (unsigned long long)info->surface_patches);
+}
+
 static void print_model(FILE *out, const ebpo_info *info)
 {
     fprintf(out, "  mesh      %llu vertices, %llu faces, %s coordinates",
@@ -82,6 +88,8 @@ static void print_model(FILE *out, const ebpo_info *info)
     }
     if (info->parts & EBPO_PART_BORDER)
         print_border(out, info);
+    if (info->parts & EBPO_PART_SURFACE)
+        print_surface(out, info);
     if (facts_inside_out(info))
         fprintf(out, "\n  warning   %s", facts_inside_out(info));
     fprintf(out, "\n  box       %.6g %.6g %.6g, size %.6g %.6g %.6g%s%s\n", info->box_origin[0],
@@ -151,7 +159,7 @@ static uint64_t other_bytes(const ebpo_info *info, const ebpo_stored_sizes *stor
     uint64_t sum = info->head_bytes + info->chunk_index_bytes + level_bytes(info, stored) +
                    stored->mesh_vertex_bytes + stored->mesh_face_bytes + stored->map_bytes +
                    stored->subtree_bytes + stored->attribute_bytes + stored->border_bytes +
-                   stored->checksum_bytes;
+                   stored->surface_bytes + stored->checksum_bytes;
     return info->file_bytes > sum ? info->file_bytes - sum : 0;
 }
 
@@ -195,6 +203,7 @@ void facts_print(FILE *out, const char *path, const ebpo_info *info,
     print_bytes(out, "subtrees", info, stored->subtree_bytes);
     print_bytes(out, "attributes", info, stored->attribute_bytes);
     print_bytes(out, "border", info, stored->border_bytes);
+    print_bytes(out, "surface", info, stored->surface_bytes);
     print_bytes(out, "checksums", info, stored->checksum_bytes);
     print_bytes(out, "other", info, other_bytes(info, stored));
     print_bytes(out, "file", info, info->file_bytes);
@@ -395,6 +404,17 @@ static void json_border(json *j, const ebpo_info *info)
     json_end(j);
 }
 
+static void json_surface(json *j, const ebpo_info *info)
+{
+    if (!(info->parts & EBPO_PART_SURFACE))
+        return;
+    json_object(j, "surface");
+    json_uint(j, "patches", info->surface_patches);
+    json_uint(j, "triangles", info->surface_triangles);
+    json_uint(j, "vertices", info->surface_vertices);
+    json_end(j);
+}
+
 static void json_storage(json *j, const ebpo_info *info, const ebpo_stored_sizes *stored)
 {
     char hex[65];
@@ -408,6 +428,7 @@ static void json_storage(json *j, const ebpo_info *info, const ebpo_stored_sizes
     if (info->parts & EBPO_PART_MESH)
         json_text(j, "face_coding", info->gates ? "gates" : "high-water");
     json_border(j, info);
+    json_surface(j, info);
     json_subset(j, info);
     json_text(j, "content_sha256", hex);
     json_object(j, "bytes");
@@ -421,6 +442,7 @@ static void json_storage(json *j, const ebpo_info *info, const ebpo_stored_sizes
     json_uint(j, "subtrees", stored->subtree_bytes);
     json_uint(j, "attributes", stored->attribute_bytes);
     json_uint(j, "border", stored->border_bytes);
+    json_uint(j, "surface", stored->surface_bytes);
     json_uint(j, "chunk_checksums", stored->checksum_bytes);
     json_uint(j, "other", other_bytes(info, stored));
     json_end(j);

@@ -14,8 +14,8 @@ const char *const rule_words[] = { "nonzero", "evenodd", "positive", NULL };
 const char *selection_words[EBPO_SELECTION_COUNT + 1];
 const char *const normals_words[] = { "spherical", "angle", NULL };
 const char *const codec_words[] = { "zstd", "deflate", "none", NULL };
-const char *const part_words[] = { "planes",     "mesh",    "maps",   "leaf-planes",
-                                   "attributes", "colours", "border", NULL };
+const char *const part_words[] = { "planes",  "mesh",   "maps",    "leaf-planes", "attributes",
+                                   "colours", "border", "surface", NULL };
 
 void words_init(void)
 {

@@ -208,6 +208,18 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_add_border(const ebpo_file *file, c
                                                         const ebpo_write_options *write,
                                                         ebpo_error *error);
 
+/*
+ * Does what ebpo_file_repack does, and adds the part EBPO_PART_SURFACE to a file with a mesh that
+ * does not have it, unless it is a subset or has too few faces (format-spec/surface.md). Errors are
+ * those of ebpo_file_repack.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_add_surface(const ebpo_file *file, const char *path,
+                                                         const ebpo_read_options *read,
+                                                         const ebpo_write_options *write,
+                                                         ebpo_error *error);
+
 /* Criterion by which leaves with few faces become one leaf (BP 2008, 3.3.1). */
 typedef enum ebpo_coalescing {
     /* A node with at most leaf_faces different faces is a leaf. */

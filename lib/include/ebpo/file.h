@@ -60,7 +60,8 @@ typedef enum ebpo_part {
     EBPO_PART_LEAF_PLANES = 8, /* stored envelope planes of leaves */
     EBPO_PART_ATTRIBUTES = 16, /* other data of the source for vertices and faces */
     EBPO_PART_COLOURS = 32,    /* mean colours of the faces of gray nodes */
-    EBPO_PART_BORDER = 64      /* of a surface: its border and winding numbers, for its inside */
+    EBPO_PART_BORDER = 64,     /* of a surface: its border and winding numbers, for its inside */
+    EBPO_PART_SURFACE = 128    /* simplified faces of nodes, with certified errors, for pictures */
 } ebpo_part;
 
 typedef enum ebpo_codec {
@@ -357,6 +358,14 @@ typedef struct ebpo_info {
     uint64_t border_loops, border_points, border_longest;
     double border_area;
     uint8_t border_sha256[32];
+
+    /*
+     * The simplified surface, with EBPO_PART_SURFACE: number of patches; of triangles and vertices
+     * of all patches; bytes of their triangle codes; vertices with colours, 0 or all; checksum.
+     */
+    uint64_t surface_patches, surface_triangles, surface_vertices, surface_code_bytes,
+        surface_colours;
+    uint8_t surface_sha256[32];
 } ebpo_info;
 
 /* Closed loops: the border of a surface (format-spec/border.md). */
@@ -369,6 +378,31 @@ typedef struct ebpo_border_loops {
     /* [point_count][3] coordinates, loop after loop */
     double *point;
 } ebpo_border_loops;
+
+/* Columns of a patch in ebpo_surface (format-spec/surface.md). */
+enum {
+    EBPO_PATCH_OCTCODE,
+    EBPO_PATCH_FIRST_FACE,
+    EBPO_PATCH_FACES,
+    EBPO_PATCH_TRIANGLES,
+    EBPO_PATCH_VERTICES,
+    EBPO_PATCH_CODE_BYTES,
+    EBPO_PATCH_ERROR,
+    EBPO_PATCH_COLUMNS
+};
+
+/*
+ * Simplified surfaces of nodes, as they are stored: patches of coarse levels first, those of a
+ * level in the order of octcodes. ebpo_surface_decode decodes a patch.
+ */
+typedef struct ebpo_surface {
+    uint64_t patch_count, triangle_count, vertex_count, code_bytes, colour_count;
+    uint64_t *patch;  /* [patch_count][EBPO_PATCH_COLUMNS] */
+    uint8_t *code;    /* [code_bytes] triangles, patch after patch */
+    uint16_t *point;  /* [vertex_count][3] */
+    uint8_t *normal;  /* [vertex_count][2] */
+    uint8_t *colour;  /* [colour_count][3], or NULL */
+} ebpo_surface;
 
 /*
  * A whole model in memory: ebpo_build makes it and ebpo_tree_write writes it. Faces are in the
@@ -394,6 +428,9 @@ typedef struct ebpo_tree {
 
     /* With EBPO_PART_BORDER; the arrays were allocated with malloc. */
     ebpo_border_loops border;
+
+    /* With EBPO_PART_SURFACE; the arrays were allocated with malloc. */
+    ebpo_surface surface;
 } ebpo_tree;
 
 /*
@@ -780,7 +817,7 @@ typedef struct ebpo_stored_sizes {
     /* List of chunk checksums. */
     uint64_t checksum_bytes;
 
-    uint64_t border_bytes;
+    uint64_t border_bytes, surface_bytes;
 } ebpo_stored_sizes;
 
 #define EBPO_STORED_SIZES_INIT EBPO_SIZED(ebpo_stored_sizes)
@@ -1012,6 +1049,62 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_repack(const ebpo_file *file, const
  * Threads: any.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_register_filters(ebpo_error *error);
+
+/* ---- patches of the simplified surface ---- */
+
+/* A patch: the simplified surface of the faces that are new in the leaves below a node. */
+typedef struct ebpo_patch {
+    int level;
+    uint32_t at[3]; /* position of the node's cell, 0 .. 2^level - 1 on each axis */
+
+    /* The model's faces [first_face, first_face + face_count), which the patch replaces. */
+    uint64_t first_face, face_count;
+
+    /*
+     * Each point of the patch is at most this far from these faces, and each point of these faces
+     * from the patch, in the model's unit.
+     */
+    double error;
+    uint64_t vertex_count, triangle_count;
+
+    /* [vertex_count][3] coordinates; unit normals; red, green and blue, or NULL */
+    double *xyz;
+    float *normals;
+    uint8_t *colours;
+
+    /* [triangle_count][3] vertices, counter-clockwise seen from outside */
+    uint32_t *triangles;
+} ebpo_patch;
+#define EBPO_PATCH_INIT { 0, { 0, 0, 0 }, 0, 0, 0, 0, 0, NULL, NULL, NULL, NULL }
+
+/* Frees the arrays and clears the struct. */
+EBPO_API void ebpo_patch_free(ebpo_patch *patch);
+
+/* Frees the arrays and clears the struct. */
+EBPO_API void ebpo_surface_free(ebpo_surface *surface);
+
+/*
+ * Reads the patches of levels [first_level, last_level] of a file with EBPO_PART_SURFACE, to be
+ * freed by ebpo_surface_free. No other part of the file is read.
+ *
+ * EBPO_E_ABSENT: the file does not have the part. EBPO_E_FORMAT: wrong values.
+ *
+ * Threads: any. Source: format-spec/surface.md.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_surface(const ebpo_file *file, int first_level,
+                                                          int last_level, ebpo_surface *out,
+                                                          ebpo_error *error);
+
+/*
+ * Decodes patch `index`, to be freed by ebpo_patch_free. `info`: of the file or tree.
+ *
+ * EBPO_E_ARGUMENT: there is no such patch. EBPO_E_FORMAT: its code is wrong. EBPO_E_MEMORY.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_surface_decode(const ebpo_surface *surface,
+                                                       const ebpo_info *info, uint64_t index,
+                                                       ebpo_patch *out, ebpo_error *error);
 
 #ifdef __cplusplus
 }

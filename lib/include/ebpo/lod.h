@@ -153,6 +153,59 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_normals(const ebpo_info *info, const
                                                     const ebpo_lod_nodes *nodes, float *out,
                                                     ebpo_error *error);
 
+/* ---- the simplified surface ---- */
+
+/* Patches as one mesh. */
+typedef struct ebpo_surface_mesh {
+    ebpo_mesh mesh; /* double precision */
+
+    /* [vertex_count][3] unit normals */
+    float *normals;
+
+    /* Colours of vertices, or none. */
+    ebpo_colours colours;
+
+    /*
+     * Greatest error of the patches, in the model's unit. Vertices that are replaced to close
+     * cracks are within the error of the coarser patch.
+     */
+    double error;
+} ebpo_surface_mesh;
+
+/* Frees the arrays and clears the struct. */
+EBPO_API void ebpo_surface_mesh_free(ebpo_surface_mesh *mesh);
+
+/*
+ * Lists the patches of a level, and the patches of coarser nodes that have no patches below. Together
+ * they replace all faces of the model.
+ *
+ * patches  [*count] ascending numbers of patches; freed by free()
+ *
+ * EBPO_E_MEMORY.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_surface_select(const ebpo_surface *surface, int level,
+                                                       uint64_t **patches, uint64_t *count,
+                                                       ebpo_error *error);
+
+/*
+ * Joins patches of any levels, none of a node above another, to one mesh without cracks: vertices
+ * on the borders of finer patches are replaced by those of coarser ones.
+ *
+ * info     of the file or tree
+ * patches  [count] ascending numbers of patches
+ * out      freed by ebpo_surface_mesh_free; cleared on failure
+ *
+ * EBPO_E_ARGUMENT, EBPO_E_FORMAT, EBPO_E_MEMORY, EBPO_E_LIMIT.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_surface_join(const ebpo_surface *surface,
+                                                     const ebpo_info *info, const uint64_t *patches,
+                                                     uint64_t count, ebpo_surface_mesh *out,
+                                                     ebpo_error *error);
+
 #ifdef __cplusplus
 }
 #endif

@@ -229,7 +229,7 @@ static uint32_t listed_parts(const char *text)
     uint32_t usable = parts;
     if (!(parts & EBPO_PART_MESH))
         usable &= ~(uint32_t)(EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES | EBPO_PART_COLOURS |
-                              EBPO_PART_BORDER);
+                              EBPO_PART_BORDER | EBPO_PART_SURFACE);
     if (!(parts & EBPO_PART_ATTRIBUTES))
         usable &= ~(uint32_t)EBPO_PART_COLOURS;
     return text[0] == '-' || usable == parts ? usable : 0;
@@ -245,8 +245,9 @@ static int check_parts(const values *v)
     if (!subset_read_parts(v->parts, DEFAULT_PARTS, &parts))
         return command_usage("convert", "--parts: '%s' " SUBSET_PARTS_EXPECTED, v->parts);
     if (v->parts[0] != '-' && parts != listed_parts(v->parts))
-        return command_usage("convert", "--parts: maps, attributes, colours and border need mesh, "
-                                        "and colours need attributes; add them");
+        return command_usage("convert",
+                             "--parts: maps, attributes, colours, border and surface need "
+                             "mesh, and colours need attributes; add them");
     if (v->embed_textures && !(parts & EBPO_PART_ATTRIBUTES && parts & EBPO_PART_MESH))
         return command_usage("convert", "--embed-textures needs the parts mesh and attributes: "
                                         "textures are among the attributes");

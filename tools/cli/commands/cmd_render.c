@@ -29,7 +29,7 @@ typedef struct values {
     int64_t level, threads;
     const char *levels, *view, *size, *memory;
     int up;
-    bool mesh, edges, no_colours, json, quiet;
+    bool mesh, surface, edges, no_colours, json, quiet;
     remote_values remote;
 } values;
 
@@ -46,6 +46,7 @@ typedef struct tile {
     ebpo_mesh mesh;
     ebpo_colours colours; /* colours of the model, if any */
     float *normals;       /* normals of a level for lighting, by triangle */
+    float *vertex_normals;
     bool closed;
     char caption[64];
 } tile;
@@ -132,6 +133,29 @@ static int parse_values(job *j)
 
 /* --- loading --- */
 
+/* Loads the simplified surface of a level. Reads no other part of the file. */
+static ebpo_status load_surface(tile *t, const ebpo_file *file, ebpo_error *error)
+{
+    const ebpo_info *info = ebpo_file_info(file);
+    ebpo_surface surface = { 0 };
+    ebpo_surface_mesh made = { 0 };
+    uint64_t *patches = NULL, count = 0;
+    ebpo_status status = ebpo_file_read_surface(file, 0, t->level, &surface, error);
+    if (status == EBPO_OK)
+        status = ebpo_surface_select(&surface, t->level, &patches, &count, error);
+    if (status == EBPO_OK)
+        status = ebpo_surface_join(&surface, info, patches, count, &made, error);
+    if (status == EBPO_OK)
+        snprintf(t->caption, sizeof t->caption, "level %d: %llu triangles, error %.2g", t->level,
+                 (unsigned long long)made.mesh.face_count, made.error);
+    t->mesh = made.mesh;
+    t->colours = made.colours;
+    t->vertex_normals = made.normals;
+    ebpo_surface_free(&surface);
+    free(patches);
+    return status;
+}
+
 static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress progress,
                              ebpo_error *error)
 {
@@ -146,6 +170,8 @@ static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress pro
         ebpo_status read_well = ebpo_file_read_mesh(file, &read, &t->mesh, error);
         return read_well == EBPO_OK ? ebpo_mesh_colours(&t->mesh, &t->colours, error) : read_well;
     }
+    if (j->v.surface)
+        return load_surface(t, file, error);
     ebpo_lod_options lod =
         /* with cell faces, which close the envelopes; those inside the model are invisible */
         EBPO_LOD_OPTIONS_INIT;
@@ -259,8 +285,9 @@ static ebpo_status draw_tile(const job *j, const tile *t, picture *p, const came
                            .edges = j->v.edges,
                            .face_colours = t->colours.by_face ? t->colours.face : NULL,
                            .vertex_colours = t->colours.by_face ? NULL : t->colours.vertex,
-                           .normals = t->normals };
-    if (t->level == MESH)
+                           .normals = t->normals,
+                           .vertex_normals = t->vertex_normals };
+    if (t->level == MESH || j->v.surface)
         memcpy(style.colour, (const double[3]){ 0.66, 0.54, 0.40 }, sizeof style.colour);
     int caption = caption_height(j, at[2]), drawn = at[3] - caption;
     ebpo_status status =
@@ -318,6 +345,7 @@ static ebpo_status render_picture(job *j, bool is_file, ebpo_progress progress, 
         ebpo_mesh_free(&j->tiles[i].mesh);
         ebpo_colours_free(&j->tiles[i].colours);
         free(j->tiles[i].normals);
+        free(j->tiles[i].vertex_normals);
     }
     return status;
 }

@@ -14,7 +14,7 @@
 #include "cli/commands/commands.h"
 
 typedef struct values {
-    const char *subtree_faces;
+    const char *subtree_faces, *parts;
     int codec; /* -1: none given */
     int face_coding;
     int64_t zstd_level, threads;
@@ -30,6 +30,8 @@ static int check_values(const values *v, ebpo_write_options *write)
     if (!memory_check("repack", &v->memory) ||
         !subtree_faces_read("repack", v->subtree_faces, &write->subtree_faces))
         return EXIT_USAGE;
+    if (v->parts && strcmp(v->parts, "+surface") != 0)
+        return command_usage("repack", "--parts: '%s' is not +surface", v->parts);
     if (v->zstd_level && v->codec > EBPO_CODEC_ZSTD)
         return command_usage("repack", "--zstd-level does not apply to --codec deflate or none");
     write->threads = (unsigned)v->threads;
@@ -60,6 +62,8 @@ static void print_words(const ebpo_info *info, const char *out, const ebpo_info 
            words_bytes(after, sizeof after, info->file_bytes));
     if (info->parts & ~from->parts & EBPO_PART_BORDER)
         fputs(", with the border of the surface", stdout);
+    if (info->parts & ~from->parts & EBPO_PART_SURFACE)
+        fputs(", with the simplified surface", stdout);
     if (info->subtree_level)
         printf(", %" PRIu64 " subtrees below level %d", info->level[info->subtree_level].gray_count,
                info->subtree_level);
@@ -125,7 +129,9 @@ static int run_repack(void *given, const char **operand)
     if (status == EBPO_OK)
         status = choose_codec(v, ebpo_file_info(file), &write, &error);
     if (status == EBPO_OK)
-        status = written = ebpo_file_add_border(file, operand[1], &read, &write, &error);
+        status = written =
+            (v->parts ? ebpo_file_add_surface : ebpo_file_add_border)(file, operand[1], &read,
+                                                                      &write, &error);
     progress_wipe(&line);
     if (status == EBPO_OK)
         status = report_sizes(v, operand[1], file, progress_now() - begun, &error);

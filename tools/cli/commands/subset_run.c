@@ -53,7 +53,8 @@ static uint32_t part_named(const char *word, size_t length)
                   { "leaf-planes", EBPO_PART_LEAF_PLANES },
                   { "attributes", EBPO_PART_ATTRIBUTES },
                   { "colours", EBPO_PART_COLOURS },
-                  { "border", EBPO_PART_BORDER } };
+                  { "border", EBPO_PART_BORDER },
+                  { "surface", EBPO_PART_SURFACE } };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         if (strlen(names[i].word) == length && memcmp(names[i].word, word, length) == 0)
             return names[i].part;
@@ -62,13 +63,13 @@ static uint32_t part_named(const char *word, size_t length)
 
 bool subset_read_parts(const char *text, uint32_t base, uint32_t *parts)
 {
-    bool without = text[0] == '-';
+    char sign = text[0] == '-' || text[0] == '+' ? text[0] : 0;
     uint32_t named = 0;
     for (const char *at = text;; at++) {
         size_t length = strcspn(at, ",");
-        if ((at[0] == '-') != without)
+        if (sign && at[0] != sign)
             return false;
-        uint32_t part = part_named(at + without, length - without);
+        uint32_t part = part_named(at + (sign != 0), length - (sign != 0));
         if (!part)
             return false;
         named |= part;
@@ -76,7 +77,7 @@ bool subset_read_parts(const char *text, uint32_t base, uint32_t *parts)
         if (!*at)
             break;
     }
-    *parts = without ? base & ~named : named;
+    *parts = sign == '-' ? base & ~named : sign == '+' ? base | named : named;
     return true;
 }
 

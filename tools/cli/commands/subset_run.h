@@ -25,13 +25,12 @@ typedef struct subset_values {
 
 extern const char *const profile_words[];
 
-/* Reads --parts: a list of part names separated by commas; with a minus sign before each name, the
- * parts are `base` without these. Returns false when the list is invalid. */
+/* Reads --parts: a list of part names separated by commas; with a minus or plus sign before each
+ * name, the parts are `base` without or with these. Returns false when the list is invalid. */
 bool subset_read_parts(const char *text, uint32_t base, uint32_t *parts);
-#define SUBSET_PARTS_EXPECTED                                                                  \
-    "is not a list of mesh, maps, attributes, envelopes, leaf-planes, colours, border, or of " \
-    "these "                                                                                   \
-    "with a minus sign before each"
+#define SUBSET_PARTS_EXPECTED                                                                     \
+    "is not a list of mesh, maps, attributes, envelopes, leaf-planes, colours, border, surface, " \
+    "or of these with a minus or a plus sign before each"
 
 /* Sets *out from --max-error and --target-size; returns the exit code. */
 int subset_read_target(const char *name, double max_error, const char *target_size,

@@ -284,6 +284,32 @@ static void colour_at(const raster *r, int x, int y, const sample *at, double ou
     }
 }
 
+/* Gets the normal for the light of a sample: that of the face, or the mean of those of its
+ * vertices. */
+static void normal_at(const raster *r, int x, int y, const sample *at, double out[3])
+{
+    uint32_t face = at->triangle & ~OUTLINE_BIT;
+    const float *given = r->style->vertex_normals, *flat = r->normal[face];
+    for (int k = 0; k < 3; k++)
+        out[k] = (double)flat[k];
+    if (!given)
+        return;
+    double p[3], shares[3], v[3] = { 0, 0, 0 }, n[3];
+    sample_position(r, x, y, (double)at->inverse, p);
+    corner_weights(r, face, p, shares);
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            v[k] += shares[i] *
+                    (double)given[3 * (uint64_t)r->mesh->faces[3 * (uint64_t)face + (uint64_t)i] +
+                                  (uint64_t)k];
+    n[0] = dot_product(v, r->view->right);
+    n[1] = dot_product(v, r->view->up);
+    n[2] = dot_product(v, r->view->back);
+    double length = sqrt(dot_product(n, n)), side = dot_product(n, out) < 0 ? -1 : 1;
+    for (int k = 0; k < 3 && length > 0; k++)
+        out[k] = side * n[k] / length;
+}
+
 /* Computes the linear light of a sample: a key light from the upper left, a weak fill light from
  * the right, the sky above, and a gloss. */
 static void light_sample(const raster *r, int x, int y, const sample *at, double hidden,
@@ -291,10 +317,10 @@ static void light_sample(const raster *r, int x, int y, const sample *at, double
 {
     double colour[3];
     colour_at(r, x, y, at, colour);
-    const float *n = r->normal[at->triangle & ~OUTLINE_BIT];
     static const double key[3] = { -0.46, 0.62, 0.635 }, fill[3] = { 0.86, 0.10, 0.50 },
                         half[3] = { -0.254, 0.343, 0.904 };
-    double m[3] = { (double)n[0], (double)n[1], (double)n[2] };
+    double m[3];
+    normal_at(r, x, y, at, m);
     double k = fmax(0, dot_product(m, key)), f = fmax(0, dot_product(m, fill)),
            sky = 0.5 + 0.5 * m[1];
     double gloss = fmax(0, dot_product(m, half));

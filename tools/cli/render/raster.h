@@ -32,6 +32,8 @@ typedef struct raster_style {
     const uint8_t *face_colours, *vertex_colours;
     /* [face_count][3] unit normals for lighting, or 0: geometric normal; NULL: all geometric */
     const float *normals;
+    /* [vertex_count][3] unit normals, interpolated on faces; NULL: none */
+    const float *vertex_normals;
 } raster_style;
 
 /* Draws the mesh over the rectangle (x, y, width, height) of the picture. `threads` 1 to 64; the

@@ -2,7 +2,7 @@
 // {call, read} for Model.
 import { EbpoAbsentError } from './errors.js';
 
-const PARTS = ['planes', 'mesh', 'maps', 'leaf-planes', 'attributes', 'colours', 'border'];
+const PARTS = ['planes', 'mesh', 'maps', 'leaf-planes', 'attributes', 'colours', 'border', 'surface'];
 const TYPES = { int8: Int8Array, uint8: Uint8Array, int16: Int16Array, uint16: Uint16Array, int32: Int32Array, uint32: Uint32Array,
   float32: Float32Array, float64: Float64Array };
 const TEXTURE = 'ebpo:texture';

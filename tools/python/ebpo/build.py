@@ -22,8 +22,8 @@ UNITS = {"m", "dm", "cm", "mm", "um", "\u00b5m", "nm", "km", "in", "inch", "ft",
          "US survey foot"}
 PARTS = {"mesh": c.EBPO_PART_MESH, "maps": c.EBPO_PART_MAPS, "attributes": c.EBPO_PART_ATTRIBUTES,
          "envelopes": c.EBPO_PART_PLANES, "leaf-planes": c.EBPO_PART_LEAF_PLANES, "colours": c.EBPO_PART_COLOURS,
-         "border": c.EBPO_PART_BORDER}
-DEFAULT_PARTS = sum(PARTS.values()) & ~c.EBPO_PART_LEAF_PLANES
+         "border": c.EBPO_PART_BORDER, "surface": c.EBPO_PART_SURFACE}
+DEFAULT_PARTS = sum(PARTS.values()) & ~(c.EBPO_PART_LEAF_PLANES | c.EBPO_PART_SURFACE)
 NEEDS = {"maps": "mesh", "attributes": "mesh", "border": "mesh", "colours": "attributes"}
 CODECS = {"zstd": c.EBPO_CODEC_ZSTD, "deflate": c.EBPO_CODEC_DEFLATE, "none": c.EBPO_CODEC_NONE}
 RULES = {rule.name.lower(): int(rule) for rule in c.Rule}

@@ -1,0 +1,368 @@
+/* Simplifies the triangles of a patch by collapsing edges in the order of their quadric error.
+ *
+ * The quadric of a vertex is the sum of the squared distances from the planes of its triangles,
+ * weighted by area. A collapse moves a vertex onto a neighbour; its cost is the quadric of both at
+ * the neighbour. Edges with one triangle also have a plane across the triangle, which keeps open
+ * borders in place. The corners of each vertex are a circular list, and a collapse joins two lists.
+ */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "construct/simplify.h"
+#include "core/alloc.h"
+#include "geometry/vec3.h"
+
+#define NONE UINT32_MAX
+/* Weight of the planes at open edges, weight of the squared length of an edge, and the least cosine
+ * between the normals of a triangle before and after a collapse. */
+static const double OPEN_WEIGHT = 10, LENGTH_WEIGHT = 1e-4, LEAST_COSINE = 0.25;
+
+/* Symmetric 4 x 4 matrix: squares and products of n, then n d, then d d. */
+typedef struct quadric {
+    double nn[6], nd[3], dd, area;
+} quadric;
+
+typedef struct candidate {
+    double cost;
+    uint32_t from, to, from_age, to_age;
+} candidate;
+
+typedef struct simplifier {
+    ebpo_patch_mesh *mesh;
+    quadric *sum;
+    uint32_t *next; /* [3 * triangles] next corner of the same vertex */
+    uint32_t *head; /* [vertices] a corner, or NONE */
+    uint32_t *age;  /* [vertices] number of changes */
+    uint32_t *mark; /* [vertices] last mark */
+    uint32_t marks;
+    bool *dead; /* [triangles] */
+    candidate *heap;
+    uint64_t heap_count, heap_capacity, alive;
+    bool short_of_memory;
+} simplifier;
+
+void ebpo_patch_mesh_free(ebpo_patch_mesh *mesh)
+{
+    free(mesh->vertex);
+    free(mesh->triangle);
+    memset(mesh, 0, sizeof *mesh);
+}
+
+static const double *position_of(const simplifier *s, uint32_t v) { return s->mesh->vertex[v].at; }
+
+static void add_plane(quadric *q, const double n[3], double d, double weight)
+{
+    static const int row[6] = { 0, 0, 0, 1, 1, 2 }, column[6] = { 0, 1, 2, 1, 2, 2 };
+    for (int i = 0; i < 6; i++)
+        q->nn[i] += weight * n[row[i]] * n[column[i]];
+    for (int k = 0; k < 3; k++)
+        q->nd[k] += weight * n[k] * d;
+    q->dd += weight * d * d;
+}
+
+static double quadric_value(const quadric *q, const double p[3])
+{
+    return q->nn[0] * p[0] * p[0] + q->nn[3] * p[1] * p[1] + q->nn[5] * p[2] * p[2] +
+           2 * (q->nn[1] * p[0] * p[1] + q->nn[2] * p[0] * p[2] + q->nn[4] * p[1] * p[2]) +
+           2 * ebpo_vec3_dot(q->nd, p) + q->dd;
+}
+
+static void cross_of(const double a[3], const double b[3], const double c[3], double out[3])
+{
+    double u[3], v[3];
+    ebpo_vec3_subtract(b, a, u);
+    ebpo_vec3_subtract(c, a, v);
+    ebpo_vec3_cross(u, v, out);
+}
+
+/* Returns the number of living triangles with both vertices. */
+static unsigned count_shared(const simplifier *s, uint32_t a, uint32_t b)
+{
+    unsigned count = 0;
+    uint32_t c = s->head[a];
+    if (c == NONE)
+        return 0;
+    do {
+        const uint32_t *t = s->mesh->triangle + c / 3 * 3;
+        if (!s->dead[c / 3] && (t[0] == b || t[1] == b || t[2] == b))
+            count++;
+        c = s->next[c];
+    } while (c != s->head[a]);
+    return count;
+}
+
+static void add_open_edge(simplifier *s, uint32_t a, uint32_t b, const double normal[3])
+{
+    double edge[3], n[3];
+    ebpo_vec3_subtract(position_of(s, b), position_of(s, a), edge);
+    ebpo_vec3_cross(edge, normal, n);
+    double length = ebpo_vec3_length(n), square = ebpo_vec3_dot(edge, edge);
+    if (!(length > 0))
+        return;
+    for (int k = 0; k < 3; k++)
+        n[k] /= length;
+    double d = -ebpo_vec3_dot(n, position_of(s, a));
+    add_plane(&s->sum[a], n, d, OPEN_WEIGHT * square);
+    add_plane(&s->sum[b], n, d, OPEN_WEIGHT * square);
+}
+
+static void add_triangle(simplifier *s, uint64_t i)
+{
+    const uint32_t *t = s->mesh->triangle + 3 * i;
+    double n[3];
+    cross_of(position_of(s, t[0]), position_of(s, t[1]), position_of(s, t[2]), n);
+    double twice = ebpo_vec3_length(n);
+    if (!(twice > 0))
+        return;
+    for (int k = 0; k < 3; k++)
+        n[k] /= twice;
+    double d = -ebpo_vec3_dot(n, position_of(s, t[0]));
+    for (int k = 0; k < 3; k++) {
+        add_plane(&s->sum[t[k]], n, d, twice / 2);
+        s->sum[t[k]].area += twice / 2;
+        uint32_t b = t[(k + 1) % 3];
+        if (!(s->mesh->vertex[t[k]].fixed && s->mesh->vertex[b].fixed) &&
+            count_shared(s, t[k], b) == 1)
+            add_open_edge(s, t[k], b, n);
+    }
+}
+
+/* --- the heap of candidates, the cheapest first --- */
+
+static bool is_before(const candidate *a, const candidate *b)
+{
+    if (a->cost != b->cost)
+        return a->cost < b->cost;
+    return a->from != b->from ? a->from < b->from : a->to < b->to;
+}
+
+static void push_candidate(simplifier *s, candidate c)
+{
+    if (!ebpo_grow(&s->heap, &s->heap_capacity, s->heap_count + 1, sizeof *s->heap)) {
+        s->short_of_memory = true;
+        return;
+    }
+    uint64_t i = s->heap_count++;
+    for (; i > 0 && is_before(&c, &s->heap[(i - 1) / 2]); i = (i - 1) / 2)
+        s->heap[i] = s->heap[(i - 1) / 2];
+    s->heap[i] = c;
+}
+
+static candidate pop_candidate(simplifier *s)
+{
+    candidate top = s->heap[0], last = s->heap[--s->heap_count];
+    uint64_t i = 0;
+    for (uint64_t child = 1; child < s->heap_count; child = 2 * i + 1) {
+        if (child + 1 < s->heap_count && is_before(&s->heap[child + 1], &s->heap[child]))
+            child++;
+        if (!is_before(&s->heap[child], &last))
+            break;
+        s->heap[i] = s->heap[child];
+        i = child;
+    }
+    s->heap[i] = last;
+    return top;
+}
+
+static void offer_collapse(simplifier *s, uint32_t from, uint32_t to)
+{
+    if (s->mesh->vertex[from].fixed)
+        return;
+    double edge[3];
+    ebpo_vec3_subtract(position_of(s, to), position_of(s, from), edge);
+    double cost = quadric_value(&s->sum[from], position_of(s, to)) +
+                  quadric_value(&s->sum[to], position_of(s, to)) +
+                  LENGTH_WEIGHT * s->sum[from].area * ebpo_vec3_dot(edge, edge);
+    push_candidate(s, (candidate){ cost, from, to, s->age[from], s->age[to] });
+}
+
+/* Calls offer_collapse for the edges of a vertex, in both directions; for only one of them if
+ * `lower`. */
+static void offer_edges(simplifier *s, uint32_t v, bool lower)
+{
+    uint32_t c = s->head[v];
+    if (c == NONE)
+        return;
+    s->marks++;
+    do {
+        for (int k = 0; k < 3 && !s->dead[c / 3]; k++) {
+            uint32_t w = s->mesh->triangle[c / 3 * 3 + (uint32_t)k];
+            if (w == v || s->mark[w] == s->marks || (lower && w < v))
+                continue;
+            s->mark[w] = s->marks;
+            offer_collapse(s, v, w);
+            offer_collapse(s, w, v);
+        }
+        c = s->next[c];
+    } while (c != s->head[v]);
+}
+
+/* --- collapses --- */
+
+static void mark_neighbours(simplifier *s, uint32_t v)
+{
+    uint32_t c = s->head[v];
+    s->marks++;
+    do {
+        for (int k = 0; k < 3 && !s->dead[c / 3]; k++)
+            s->mark[s->mesh->triangle[c / 3 * 3 + (uint32_t)k]] = s->marks;
+        c = s->next[c];
+    } while (c != s->head[v]);
+}
+
+/* Returns true if the triangle keeps its side when its vertex `from` moves to `to`. */
+static bool keeps_side(const simplifier *s, const uint32_t t[3], uint32_t from, uint32_t to)
+{
+    const double *p[3], *q[3];
+    double before[3], after[3];
+    for (int k = 0; k < 3; k++) {
+        p[k] = position_of(s, t[k]);
+        q[k] = t[k] == from ? position_of(s, to) : p[k];
+    }
+    cross_of(p[0], p[1], p[2], before);
+    cross_of(q[0], q[1], q[2], after);
+    double square = ebpo_vec3_dot(before, before) * ebpo_vec3_dot(after, after),
+           dot = ebpo_vec3_dot(before, after);
+    return !(ebpo_vec3_dot(before, before) > 0) || dot > LEAST_COSINE * sqrt(square);
+}
+
+/* Returns true if a collapse keeps the topology (the vertices next to both ends are those of their
+ * common triangles) and the sides of all triangles. */
+static bool is_possible(simplifier *s, uint32_t from, uint32_t to)
+{
+    unsigned shared = 0, common = 0;
+    bool open = false;
+    mark_neighbours(s, to);
+    uint32_t of_to = s->marks, seen = ++s->marks, c = s->head[from];
+    do {
+        const uint32_t *t = s->mesh->triangle + c / 3 * 3;
+        bool has_to = t[0] == to || t[1] == to || t[2] == to;
+        if (!s->dead[c / 3]) {
+            shared += has_to;
+            if (!has_to && !keeps_side(s, t, from, to))
+                return false;
+            for (int k = 0; k < 3; k++) {
+                uint32_t w = t[k];
+                if (w == from || w == to)
+                    continue;
+                common += s->mark[w] == of_to;
+                if (s->mark[w] != seen)
+                    open = open || count_shared(s, from, w) == 1;
+                s->mark[w] = s->mark[w] == of_to ? seen : s->mark[w];
+            }
+        }
+        c = s->next[c];
+    } while (c != s->head[from]);
+    return shared > 0 && common == shared && (!open || shared == 1);
+}
+
+static void collapse_edge(simplifier *s, uint32_t from, uint32_t to)
+{
+    ebpo_patch_vertex *u = &s->mesh->vertex[from], *v = &s->mesh->vertex[to];
+    uint32_t c = s->head[from];
+    do {
+        uint32_t *t = s->mesh->triangle + c / 3 * 3;
+        if (!s->dead[c / 3] && (t[0] == to || t[1] == to || t[2] == to)) {
+            s->dead[c / 3] = true;
+            s->alive--;
+        }
+        t[c % 3] = to;
+        c = s->next[c];
+    } while (c != s->head[from]);
+    uint32_t after = s->next[s->head[to]];
+    s->next[s->head[to]] = s->next[s->head[from]];
+    s->next[s->head[from]] = after;
+    s->head[from] = NONE;
+    for (int k = 0; k < 3; k++) {
+        v->normal[k] += u->normal[k];
+        v->colour[k] += u->colour[k];
+        s->sum[to].nd[k] += s->sum[from].nd[k];
+    }
+    v->weight += u->weight;
+    for (int i = 0; i < 6; i++)
+        s->sum[to].nn[i] += s->sum[from].nn[i];
+    s->sum[to].dd += s->sum[from].dd;
+    s->sum[to].area += s->sum[from].area;
+    s->age[from]++;
+    s->age[to]++;
+}
+
+/* Removes dead triangles, and unused vertices that are not fixed. `number`: [vertices]. */
+static void compact_mesh(simplifier *s, uint32_t *number)
+{
+    ebpo_patch_mesh *m = s->mesh;
+    uint64_t triangles = 0, vertices = 0;
+    for (uint64_t v = 0; v < m->vertex_count; v++)
+        number[v] = m->vertex[v].fixed ? 0 : NONE;
+    for (uint64_t t = 0; t < m->triangle_count; t++)
+        for (int k = 0; k < 3 && !s->dead[t]; k++)
+            number[m->triangle[3 * t + (uint64_t)k]] = 0;
+    for (uint64_t v = 0; v < m->vertex_count; v++)
+        if (number[v] != NONE) {
+            number[v] = (uint32_t)vertices;
+            m->vertex[vertices++] = m->vertex[v];
+        }
+    for (uint64_t t = 0; t < m->triangle_count; t++) {
+        if (s->dead[t])
+            continue;
+        for (uint64_t k = 0; k < 3; k++)
+            m->triangle[3 * triangles + k] = number[m->triangle[3 * t + k]];
+        triangles++;
+    }
+    m->triangle_count = triangles;
+    m->vertex_count = vertices;
+}
+
+static void collapse_edges(simplifier *s, uint64_t target)
+{
+    ebpo_patch_mesh *m = s->mesh;
+    for (uint64_t v = 0; v < m->vertex_count; v++)
+        s->head[v] = NONE;
+    for (uint32_t c = 0; c < 3 * m->triangle_count; c++) {
+        uint32_t *head = &s->head[m->triangle[c]];
+        s->next[c] = *head == NONE ? c : s->next[*head];
+        if (*head != NONE)
+            s->next[*head] = c;
+        *head = c;
+    }
+    for (uint64_t t = 0; t < m->triangle_count; t++)
+        add_triangle(s, t);
+    for (uint32_t v = 0; v < m->vertex_count; v++)
+        offer_edges(s, v, true);
+    while (s->alive > target && s->heap_count && !s->short_of_memory) {
+        candidate c = pop_candidate(s);
+        if (s->age[c.from] != c.from_age || s->age[c.to] != c.to_age || s->head[c.from] == NONE ||
+            s->head[c.to] == NONE || !is_possible(s, c.from, c.to))
+            continue;
+        collapse_edge(s, c.from, c.to);
+        offer_edges(s, c.to, false);
+    }
+}
+
+ebpo_status ebpo_simplify(ebpo_patch_mesh *mesh, uint64_t target, ebpo_error *error)
+{
+    uint64_t vertices = mesh->vertex_count, triangles = mesh->triangle_count;
+    simplifier s = { .mesh = mesh, .alive = triangles };
+    s.sum = ebpo_alloc_zero(vertices, sizeof *s.sum);
+    s.next = ebpo_alloc(triangles, 3 * sizeof *s.next);
+    s.head = ebpo_alloc(vertices, sizeof *s.head);
+    s.age = ebpo_alloc_zero(vertices, sizeof *s.age);
+    s.mark = ebpo_alloc_zero(vertices, sizeof *s.mark);
+    s.dead = ebpo_alloc_zero(triangles, sizeof *s.dead);
+    bool made = s.sum && s.next && s.head && s.age && s.mark && s.dead;
+    if (made) {
+        collapse_edges(&s, target);
+        compact_mesh(&s, s.head);
+    }
+    free(s.sum);
+    free(s.next);
+    free(s.head);
+    free(s.age);
+    free(s.mark);
+    free(s.dead);
+    free(s.heap);
+    return made && !s.short_of_memory ? EBPO_OK : ebpo_fail_memory(error, vertices * sizeof *s.sum);
+}

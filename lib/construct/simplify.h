@@ -1,0 +1,46 @@
+/* Triangles of a patch (format-spec/surface.md) while it is built: simplification, and the distance
+ * between two surfaces. */
+#ifndef EBPO_CONSTRUCT_SIMPLIFY_H
+#define EBPO_CONSTRUCT_SIMPLIFY_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include <ebpo/base.h>
+
+#include "core/error.h"
+
+typedef struct ebpo_patch_vertex {
+    double at[3];
+    double normal[3];         /* sum of the normals of faces, each as long as twice the area */
+    double colour[3], weight; /* sum of colours, and of their weights */
+    uint64_t lowest, highest; /* faces of the model that use the vertices it stands for */
+    uint64_t key;             /* of its cell, or the vertex of the model */
+    bool fixed;               /* it is on the border of the patch and does not move */
+} ebpo_patch_vertex;
+
+/* Triangles that are neighbours in the array should be neighbours in space. */
+typedef struct ebpo_patch_mesh {
+    uint64_t vertex_count, triangle_count, vertex_capacity, triangle_capacity;
+    ebpo_patch_vertex *vertex;
+    uint32_t *triangle; /* [triangle_count][3] */
+} ebpo_patch_mesh;
+
+void ebpo_patch_mesh_free(ebpo_patch_mesh *mesh);
+
+/* Collapses edges until at most `target` triangles remain, or no collapse is possible without
+ * flipping a triangle or changing the topology. Fixed vertices stay; others are moved onto a
+ * neighbour and removed, so no new positions arise. Removes unused vertices that are not fixed.
+ * Returns EBPO_E_MEMORY. Any thread. Source: Garland and Heckbert, Surface simplification using
+ * quadric error metrics, 1997. */
+EBPO_MUST_USE ebpo_status ebpo_simplify(ebpo_patch_mesh *mesh, uint64_t target, ebpo_error *error);
+
+/* Sets *out to an upper bound of the greatest distance of a point of `a` from `b`, which has
+ * triangles. The bound is at most 5 % above the distance, or `fine` above it, or at most `known`.
+ * The rounding error is the caller's: some 2^-45 of the greatest coordinate. Returns EBPO_E_MEMORY.
+ * Any thread. */
+EBPO_MUST_USE ebpo_status ebpo_bound_distance(const ebpo_patch_mesh *a, const ebpo_patch_mesh *b,
+                                              double fine, double known, double *out,
+                                              ebpo_error *error);
+
+#endif

@@ -1,0 +1,282 @@
+/* Bounds the greatest distance of the points of a surface from another surface.
+ *
+ * The distance to one triangle is convex, so over a triangle its maximum is at a corner. Over a
+ * triangle of the first surface, the distance is therefore at most the greatest distance of its
+ * corners from one triangle of the second surface, and at most the distance of its centre plus its
+ * radius. The triangle is halved until one of the bounds is close enough to the greatest distance
+ * of a point so far. The second surface is in a complete binary tree of boxes. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "construct/simplify.h"
+#include "core/alloc.h"
+#include "geometry/vec3.h"
+
+/* SAMPLED: of so many triangles, the distance of one vertex is computed first. */
+enum { LEAF_TRIANGLES = 4, DEEPEST = 64, SAMPLED = 8 };
+static const double CLOSE_ENOUGH = 1.05;
+
+typedef struct bounds {
+    double low[3], high[3];
+} bounds;
+
+typedef struct search {
+    const ebpo_patch_mesh *mesh;
+    bounds *node; /* node i has the children 2 i and 2 i + 1; the leaves are the last `leaves` */
+    uint64_t leaves;
+} search;
+
+typedef struct hit {
+    double square;
+    uint64_t triangle;
+} hit;
+
+static void get_corner(const ebpo_patch_mesh *mesh, uint64_t triangle, int k, double out[3])
+{
+    memcpy(out, mesh->vertex[mesh->triangle[3 * triangle + (uint64_t)k]].at, 3 * sizeof *out);
+}
+
+static double clamp_share(double t) { return t < 0 ? 0 : t > 1 ? 1 : t; }
+
+/* Returns the squared distance of p from the segment a + t d. */
+static double segment_square(const double p[3], const double a[3], const double d[3])
+{
+    double v[3], length = ebpo_vec3_dot(d, d);
+    ebpo_vec3_subtract(p, a, v);
+    double t = length > 0 ? clamp_share(ebpo_vec3_dot(v, d) / length) : 0;
+    for (int k = 0; k < 3; k++)
+        v[k] -= t * d[k];
+    return ebpo_vec3_dot(v, v);
+}
+
+/* Returns the squared distance of p from a point of the triangle, the nearest but for rounding. */
+static double triangle_square(const double p[3], const double t[3][3])
+{
+    double edge[3][3], n[3], v[3];
+    for (int k = 0; k < 3; k++)
+        ebpo_vec3_subtract(t[(k + 1) % 3], t[k], edge[k]);
+    ebpo_vec3_cross(edge[0], edge[1], n);
+    double area = ebpo_vec3_dot(n, n);
+    bool within = area > 0;
+    for (int k = 0; k < 3 && within; k++) {
+        double across[3];
+        ebpo_vec3_subtract(p, t[k], v);
+        ebpo_vec3_cross(edge[k], v, across);
+        within = ebpo_vec3_dot(across, n) >= 0;
+    }
+    if (within) {
+        ebpo_vec3_subtract(p, t[0], v);
+        double height = ebpo_vec3_dot(v, n);
+        return height * height / area;
+    }
+    double best = segment_square(p, t[0], edge[0]);
+    for (int k = 1; k < 3; k++)
+        best = fmin(best, segment_square(p, t[k], edge[k]));
+    return best;
+}
+
+static double square_to(const search *s, uint64_t triangle, const double p[3])
+{
+    double t[3][3];
+    for (int k = 0; k < 3; k++)
+        get_corner(s->mesh, triangle, k, t[k]);
+    return triangle_square(p, (const double(*)[3])t);
+}
+
+static bool make_search(search *s, const ebpo_patch_mesh *mesh)
+{
+    s->mesh = mesh;
+    s->leaves = 1;
+    while (s->leaves * LEAF_TRIANGLES < mesh->triangle_count)
+        s->leaves *= 2;
+    s->node = ebpo_alloc(2 * s->leaves, sizeof *s->node);
+    for (uint64_t i = 2 * s->leaves; s->node && --i > 0;) {
+        bounds *b = &s->node[i];
+        for (int k = 0; k < 3; k++)
+            b->low[k] = INFINITY, b->high[k] = -INFINITY;
+        if (i < s->leaves) {
+            for (int k = 0; k < 3; k++) {
+                b->low[k] = fmin(s->node[2 * i].low[k], s->node[2 * i + 1].low[k]);
+                b->high[k] = fmax(s->node[2 * i].high[k], s->node[2 * i + 1].high[k]);
+            }
+            continue;
+        }
+        uint64_t first = (i - s->leaves) * LEAF_TRIANGLES;
+        for (uint64_t t = first; t < first + LEAF_TRIANGLES && t < mesh->triangle_count; t++)
+            for (int c = 0; c < 3; c++) {
+                double p[3];
+                get_corner(mesh, t, c, p);
+                for (int k = 0; k < 3; k++) {
+                    b->low[k] = fmin(b->low[k], p[k]);
+                    b->high[k] = fmax(b->high[k], p[k]);
+                }
+            }
+    }
+    return s->node != NULL;
+}
+
+static double box_square(const bounds *b, const double p[3])
+{
+    double sum = 0;
+    for (int k = 0; k < 3; k++) {
+        double d = p[k] < b->low[k] ? b->low[k] - p[k] : p[k] > b->high[k] ? p[k] - b->high[k] : 0;
+        sum += d * d;
+    }
+    return sum;
+}
+
+/* Finds a nearest triangle, or one whose squared distance is at most `good`; `guess` is one that is
+ * probably near. */
+static hit find_nearest(const search *s, const double p[3], uint64_t guess, double good)
+{
+    hit best = { square_to(s, guess, p), guess };
+    struct {
+        uint64_t node;
+        double square;
+    } stack[DEEPEST];
+    int depth = 0;
+    stack[depth].node = 1;
+    stack[depth++].square = box_square(&s->node[1], p);
+    while (depth && best.square > good) {
+        uint64_t i = stack[--depth].node;
+        if (!(stack[depth].square < best.square))
+            continue;
+        if (i < s->leaves) {
+            double left = box_square(&s->node[2 * i], p),
+                   right = box_square(&s->node[2 * i + 1], p);
+            bool swap = left < right; /* the nearer one is pushed last */
+            stack[depth].node = 2 * i + swap;
+            stack[depth++].square = swap ? right : left;
+            stack[depth].node = 2 * i + !swap;
+            stack[depth++].square = swap ? left : right;
+            continue;
+        }
+        uint64_t first = (i - s->leaves) * LEAF_TRIANGLES;
+        for (uint64_t t = first; t < first + LEAF_TRIANGLES && t < s->mesh->triangle_count; t++) {
+            double square = square_to(s, t, p);
+            if (square < best.square)
+                best = (hit){ square, t };
+        }
+    }
+    return best;
+}
+
+/* Returns the greatest squared distance of three points from a triangle. */
+static double corners_square(const search *s, uint64_t triangle, double p[3][3])
+{
+    return ebpo_max3(square_to(s, triangle, p[0]), square_to(s, triangle, p[1]),
+                     square_to(s, triangle, p[2]));
+}
+
+typedef struct bounding {
+    search to;
+    double most, fine; /* greatest distance of a point so far */
+    double known;      /* a smaller bound is not needed */
+    double bound;
+    uint64_t guess; /* a triangle that was near the last triangle */
+} bounding;
+
+static double enough_of(const bounding *b)
+{
+    return fmax(b->known, fmax(b->most * CLOSE_ENOUGH, b->most + b->fine));
+}
+
+/* Bounds the distance over a triangle whose corners are farther than enough from the guess. */
+static void bound_triangle(bounding *b, double p[3][3], int depth)
+{
+    double centre[3], radius = 0;
+    for (int k = 0; k < 3; k++)
+        centre[k] = (p[0][k] + p[1][k] + p[2][k]) / 3;
+    for (int i = 0; i < 3; i++) {
+        double v[3];
+        ebpo_vec3_subtract(p[i], centre, v);
+        radius = fmax(radius, ebpo_vec3_length(v));
+    }
+    double good = enough_of(b) - radius;
+    good = good > 0 ? good * good : 0;
+    hit near = find_nearest(&b->to, centre, b->guess, good);
+    b->guess = near.triangle;
+    if (near.square > good)
+        b->most = fmax(b->most, sqrt(near.square));
+    double over = fmin(sqrt(corners_square(&b->to, near.triangle, p)), sqrt(near.square) + radius);
+    if (over <= enough_of(b) || depth == DEEPEST) {
+        b->bound = fmax(b->bound, over);
+        return;
+    }
+    int longest = 0;
+    double length = -1, half[3][3];
+    for (int i = 0; i < 3; i++) {
+        double v[3];
+        ebpo_vec3_subtract(p[(i + 1) % 3], p[i], v);
+        if (ebpo_vec3_dot(v, v) > length) {
+            length = ebpo_vec3_dot(v, v);
+            longest = i;
+        }
+    }
+    int next = (longest + 1) % 3;
+    for (int side = 0; side < 2; side++) {
+        memcpy(half, p, sizeof half);
+        for (int k = 0; k < 3; k++)
+            half[side ? longest : next][k] = (p[longest][k] + p[next][k]) / 2;
+        bound_triangle(b, half, depth + 1);
+    }
+}
+
+/* Bounds the distance over triangle t of `a`. First tries triangles that were near its neighbours;
+ * `near` has one for each vertex, or UINT64_MAX. */
+static void bound_from_neighbours(bounding *b, const ebpo_patch_mesh *a, uint64_t t, uint64_t *near)
+{
+    const uint32_t *corners = a->triangle + 3 * t;
+    uint64_t guess[4] = { b->guess, near[corners[0]], near[corners[1]], near[corners[2]] };
+    double p[3][3], enough = enough_of(b);
+    for (int k = 0; k < 3; k++)
+        get_corner(a, t, k, p[k]);
+    bool close = false;
+    for (int i = 0; i < 4 && !close; i++) {
+        bool repeated = guess[i] == UINT64_MAX;
+        for (int k = 0; k < i; k++)
+            repeated = repeated || guess[k] == guess[i];
+        if (repeated)
+            continue;
+        double over = sqrt(corners_square(&b->to, guess[i], p));
+        close = over <= enough;
+        if (close) {
+            b->guess = guess[i];
+            b->bound = fmax(b->bound, over);
+        }
+    }
+    if (!close)
+        bound_triangle(b, p, 0);
+    for (int k = 0; k < 3; k++)
+        near[corners[k]] = b->guess;
+}
+
+ebpo_status ebpo_bound_distance(const ebpo_patch_mesh *a, const ebpo_patch_mesh *b, double fine,
+                                double known, double *out, ebpo_error *error)
+{
+    bounding all = { .fine = fine, .known = known };
+    uint64_t *near = ebpo_alloc(a->vertex_count, sizeof *near);
+    *out = 0;
+    if (!near || !make_search(&all.to, b)) {
+        free(near);
+        return ebpo_fail_memory(error, b->triangle_count * sizeof *all.to.node);
+    }
+    for (uint64_t v = 0; v < a->vertex_count; v++)
+        near[v] = UINT64_MAX;
+    /* distances of some points, so that few triangles are halved in vain */
+    for (uint64_t t = 0; t < a->triangle_count; t += SAMPLED) {
+        uint32_t v = a->triangle[3 * t];
+        hit h = find_nearest(&all.to, a->vertex[v].at, all.guess, 0);
+        near[v] = all.guess = h.triangle;
+        all.most = fmax(all.most, sqrt(h.square));
+    }
+    for (uint64_t t = 0; t < a->triangle_count; t++)
+        bound_from_neighbours(&all, a, t, near);
+    *out = fmax(all.bound, all.most);
+    free(near);
+    free(all.to.node);
+    return EBPO_OK;
+}

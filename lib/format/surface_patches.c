@@ -1,0 +1,801 @@
+/* Encodes, decodes, reads and checks patches of the simplified surface.
+ *
+ * A patch is a list of triangles, most of which share an edge with a recent triangle. The coder and
+ * the decoder keep the last edges and the last vertices; a byte names an edge and the third vertex.
+ * New vertices are numbered in this order. A vertex is stored as the difference from the fourth
+ * corner of a parallelogram over the triangle beyond the edge. Source: format-spec/surface.md. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/endian.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/hash.h"
+#include "format/reader.h"
+#include "format/surface_patches.h"
+
+#define NONE UINT32_MAX
+
+/* Numbers of recent edges and vertices, and the values of the two halves of a byte. */
+enum { EDGES = 15, VERTICES = 14, FREE_TRIANGLE = 15, NEW_VERTEX = 0, FAR_VERTEX = 15 };
+
+/* --- state of coder and decoder --- */
+
+typedef struct recent_edge {
+    uint32_t from, to, beyond; /* beyond: third vertex of the triangle that has the edge */
+} recent_edge;
+
+typedef struct recent {
+    recent_edge edge[EDGES];
+    uint32_t vertex[VERTICES]; /* the last one first */
+    unsigned edges, vertices;
+} recent;
+
+static void add_edge(recent *r, uint32_t from, uint32_t to, uint32_t beyond)
+{
+    r->edges += r->edges < EDGES;
+    memmove(r->edge + 1, r->edge, (r->edges - 1) * sizeof *r->edge);
+    r->edge[0] = (recent_edge){ from, to, beyond };
+}
+
+static void remove_edge(recent *r, unsigned i)
+{
+    memmove(r->edge + i, r->edge + i + 1, (r->edges - i - 1) * sizeof *r->edge);
+    r->edges--;
+}
+
+static void add_vertex(recent *r, uint32_t v)
+{
+    r->vertices += r->vertices < VERTICES;
+    memmove(r->vertex + 1, r->vertex, (r->vertices - 1) * sizeof *r->vertex);
+    r->vertex[0] = v;
+}
+
+/* Adds the edges of a triangle, in the direction in which its neighbours have them. */
+static void add_edges(recent *r, const uint32_t t[3], bool first_too)
+{
+    if (first_too)
+        add_edge(r, t[1], t[0], t[2]);
+    add_edge(r, t[0], t[2], t[1]);
+    add_edge(r, t[2], t[1], t[0]);
+}
+
+/* Vertices from which a vertex is predicted: a + b - beyond; the one before if beyond is NONE. */
+typedef struct prediction {
+    uint32_t a, b, beyond;
+} prediction;
+
+static void predict_point(const int16_t *point, const prediction *p, uint32_t v, int32_t out[3])
+{
+    for (int k = 0; k < 3; k++)
+        out[k] = v == 0 ? 0
+                 : p->beyond == NONE
+                     ? point[3 * (v - 1) + (uint32_t)k]
+                     : point[3 * p->a + (uint32_t)k] + point[3 * p->b + (uint32_t)k] -
+                           point[3 * p->beyond + (uint32_t)k];
+}
+
+/* Returns the vertex with the normal and the colour from which those of v are differences. */
+static uint32_t vertex_before(const prediction *p, uint32_t v)
+{
+    return p->beyond == NONE ? v - 1 : p->a;
+}
+
+/* --- encoding --- */
+
+typedef struct coder {
+    const ebpo_patch_source *in;
+    ebpo_patch_rows *out;
+    recent recent;
+    uint32_t *corner; /* hash table of directed edges: corners where they begin */
+    uint64_t slots;
+    bool *done;       /* [triangles] */
+    uint32_t *number; /* [vertices] new numbers, or NONE */
+    uint32_t *vertex; /* [vertices] former numbers */
+    prediction *from; /* [vertices] by new number */
+    uint32_t next;
+    bool short_of_memory;
+} coder;
+
+static void put_byte(coder *c, uint32_t byte)
+{
+    if (ebpo_grow(&c->out->code, &c->out->code_capacity, c->out->code_bytes + 1, 1))
+        c->out->code[c->out->code_bytes++] = (uint8_t)byte;
+    else
+        c->short_of_memory = true;
+}
+
+/* Writes seven bits a byte, the low ones first; the highest bit of a byte: more follow. */
+static void put_number(coder *c, uint32_t value)
+{
+    for (; value > 127; value >>= 7)
+        put_byte(c, value | 128);
+    put_byte(c, value);
+}
+
+static uint64_t edge_hash(uint32_t from, uint32_t to)
+{
+    return ebpo_hash_number((uint64_t)from << 32 | to);
+}
+
+static void enter_edges(coder *c)
+{
+    for (uint32_t i = 0; i < 3 * c->in->triangle_count; i++) {
+        uint32_t from = c->in->triangle[i], to = c->in->triangle[i - i % 3 + (i + 1) % 3];
+        uint64_t slot = edge_hash(from, to) & (c->slots - 1);
+        while (c->corner[slot] != NONE)
+            slot = (slot + 1) & (c->slots - 1);
+        c->corner[slot] = i;
+    }
+}
+
+/* Returns the first corner of a triangle that is not done and has the edge, or NONE. */
+static uint32_t find_corner(const coder *c, uint32_t from, uint32_t to)
+{
+    const uint32_t *t = c->in->triangle;
+    for (uint64_t slot = edge_hash(from, to) & (c->slots - 1); c->corner[slot] != NONE;
+         slot = (slot + 1) & (c->slots - 1)) {
+        uint32_t i = c->corner[slot];
+        if (t[i] == from && t[i - i % 3 + (i + 1) % 3] == to && !c->done[i / 3])
+            return i;
+    }
+    return NONE;
+}
+
+static uint32_t new_number(coder *c, uint32_t former, prediction from)
+{
+    c->vertex[c->next] = former;
+    c->from[c->next] = from;
+    return c->number[former] = c->next++;
+}
+
+static void put_attached(coder *c, unsigned edge, uint32_t i)
+{
+    recent_edge e = c->recent.edge[edge];
+    uint32_t former = c->in->triangle[i - i % 3 + (i + 2) % 3], v = c->number[former];
+    if (v == NONE) {
+        v = new_number(c, former, (prediction){ e.from, e.to, e.beyond });
+        put_byte(c, edge << 4 | NEW_VERTEX);
+        add_vertex(&c->recent, v);
+    } else {
+        unsigned k = 0;
+        while (k < c->recent.vertices && c->recent.vertex[k] != v)
+            k++;
+        put_byte(c, edge << 4 | (k < c->recent.vertices ? k + 1 : FAR_VERTEX));
+        if (k == c->recent.vertices) {
+            put_number(c, c->next - 1 - v);
+            add_vertex(&c->recent, v);
+        }
+    }
+    remove_edge(&c->recent, edge);
+    add_edges(&c->recent, (uint32_t[3]){ e.from, e.to, v }, false);
+}
+
+static void put_free(coder *c, uint64_t triangle)
+{
+    uint32_t t[3];
+    put_byte(c, FREE_TRIANGLE << 4);
+    for (int k = 0; k < 3; k++) {
+        uint32_t former = c->in->triangle[3 * triangle + (uint64_t)k], v = c->number[former];
+        put_number(c, v == NONE ? 0 : c->next - v);
+        t[k] = v == NONE ? new_number(c, former, (prediction){ 0, 0, NONE }) : v;
+        add_vertex(&c->recent, t[k]);
+    }
+    add_edges(&c->recent, t, true);
+}
+
+static void put_triangles(coder *c)
+{
+    uint64_t first = 0;
+    for (uint64_t left = c->in->triangle_count; left; left--) {
+        uint32_t i = NONE;
+        unsigned edge = 0;
+        for (; edge < c->recent.edges && i == NONE; edge += i == NONE)
+            i = find_corner(c, c->vertex[c->recent.edge[edge].from],
+                            c->vertex[c->recent.edge[edge].to]);
+        if (i != NONE) {
+            put_attached(c, edge, i);
+            c->done[i / 3] = true;
+            continue;
+        }
+        while (c->done[first])
+            first++;
+        put_free(c, first);
+        c->done[first] = true;
+    }
+    for (uint32_t v = 0; v < c->in->vertex_count; v++)
+        if (c->number[v] == NONE)
+            new_number(c, v, (prediction){ 0, 0, NONE });
+}
+
+static double sign_of(double v) { return v < 0 ? -1 : 1; }
+
+/* Projects a direction on an octahedron: two numbers of 0 to 254, 127 in the middle. */
+static void encode_normal(const double n[3], uint8_t out[2])
+{
+    double sum = fabs(n[0]) + fabs(n[1]) + fabs(n[2]), x = 0, y = 0;
+    if (sum > 0) {
+        x = n[0] / sum;
+        y = n[1] / sum;
+        if (n[2] < 0) {
+            double folded = (1 - fabs(y)) * sign_of(x);
+            y = (1 - fabs(x)) * sign_of(y);
+            x = folded;
+        }
+    }
+    out[0] = (uint8_t)floor(x * 127 + 127.5);
+    out[1] = (uint8_t)floor(y * 127 + 127.5);
+}
+
+static void decode_normal(const uint8_t in[2], float out[3])
+{
+    double x = (in[0] - 127.0) / 127, y = (in[1] - 127.0) / 127, z = 1 - fabs(x) - fabs(y);
+    if (z < 0) {
+        double folded = (1 - fabs(y)) * sign_of(x);
+        y = (1 - fabs(x)) * sign_of(y);
+        x = folded;
+    }
+    double length = sqrt(x * x + y * y + z * z);
+    out[0] = (float)(x / length);
+    out[1] = (float)(y / length);
+    out[2] = (float)(z / length);
+}
+
+static uint16_t encode_zigzag(int32_t value)
+{
+    int16_t wrapped = (int16_t)(uint16_t)value;
+    return (uint16_t)((uint32_t)wrapped << 1 ^ (wrapped < 0 ? 0xffffu : 0));
+}
+
+static int32_t decode_zigzag(uint16_t code) { return code >> 1 ^ -(code & 1); }
+
+/* Writes the rows of vertices, as differences. `point`, `normal`: scratch, by new number. */
+static void put_vertices(const coder *c, int16_t *point, uint8_t *normal)
+{
+    for (uint32_t v = 0; v < c->in->vertex_count; v++) {
+        uint32_t former = c->vertex[v], before = v ? vertex_before(&c->from[v], v) : 0;
+        int32_t predicted[3];
+        memcpy(point + 3 * v, c->in->point + 3 * former, 3 * sizeof *point);
+        encode_normal(c->in->normal[former], normal + 2 * v);
+        predict_point(point, &c->from[v], v, predicted);
+        for (uint32_t k = 0; k < 3; k++)
+            c->out->point[3 * v + k] = encode_zigzag(point[3 * v + k] - predicted[k]);
+        for (uint32_t k = 0; k < 2; k++)
+            c->out->normal[2 * v + k] =
+                (uint8_t)(normal[2 * v + k] - (v ? normal[2 * before + k] : 0));
+        for (uint32_t k = 0; k < 3 && c->out->colour; k++)
+            c->out->colour[3 * v + k] =
+                (uint8_t)(c->in->colour[3 * former + k] -
+                          (v ? c->in->colour[3 * c->vertex[before] + k] : 0));
+    }
+}
+
+void ebpo_patch_rows_free(ebpo_patch_rows *rows)
+{
+    free(rows->code);
+    free(rows->point);
+    free(rows->normal);
+    free(rows->colour);
+    memset(rows, 0, sizeof *rows);
+}
+
+ebpo_status ebpo_patch_encode(const ebpo_patch_source *source, ebpo_patch_rows *out,
+                              ebpo_error *error)
+{
+    uint64_t vertices = source->vertex_count, triangles = source->triangle_count;
+    coder c = { .in = source, .out = out, .slots = ebpo_hash_slots(6 * triangles) };
+    memset(out, 0, sizeof *out);
+    c.corner = ebpo_alloc(c.slots, sizeof *c.corner);
+    c.done = ebpo_alloc_zero(triangles, sizeof *c.done);
+    c.number = ebpo_alloc(vertices, sizeof *c.number);
+    c.vertex = ebpo_alloc(vertices, sizeof *c.vertex);
+    c.from = ebpo_alloc(vertices, sizeof *c.from);
+    int16_t *point = ebpo_alloc(vertices, 3 * sizeof *point);
+    uint8_t *normal = ebpo_alloc(vertices, 2);
+    out->point = ebpo_alloc(vertices, 3 * sizeof *out->point);
+    out->normal = ebpo_alloc(vertices, 2);
+    out->colour = source->colour ? ebpo_alloc(vertices, 3) : NULL;
+    bool made = c.corner && c.done && c.number && c.vertex && c.from && point && normal &&
+                out->point && out->normal && (out->colour || !source->colour);
+    if (made) {
+        memset(c.corner, 0xff, c.slots * sizeof *c.corner);
+        memset(c.number, 0xff, vertices * sizeof *c.number);
+        enter_edges(&c);
+        put_triangles(&c);
+        put_vertices(&c, point, normal);
+    }
+    free(c.corner);
+    free(c.done);
+    free(c.number);
+    free(c.vertex);
+    free(c.from);
+    free(point);
+    free(normal);
+    return made && !c.short_of_memory ? EBPO_OK : ebpo_fail_memory(error, vertices * 32);
+}
+
+/* --- decoding --- */
+
+typedef struct decoder {
+    const uint8_t *code, *end;
+    recent recent;
+    uint32_t next, vertices;
+    prediction *from; /* [vertices] */
+} decoder;
+
+static bool get_number(decoder *d, uint32_t *out)
+{
+    *out = 0;
+    for (unsigned shift = 0; shift < 28 && d->code < d->end; shift += 7) {
+        uint8_t byte = *d->code++;
+        *out |= (uint32_t)(byte & 127) << shift;
+        if (!(byte & 128))
+            return true;
+    }
+    return false;
+}
+
+static bool take_new(decoder *d, prediction from, uint32_t *out)
+{
+    if (d->next >= d->vertices)
+        return false;
+    d->from[d->next] = from;
+    *out = d->next++;
+    return true;
+}
+
+static bool get_free(decoder *d, uint32_t t[3])
+{
+    for (int k = 0; k < 3; k++) {
+        uint32_t back;
+        if (!get_number(d, &back) || back > d->next)
+            return false;
+        t[k] = d->next - back;
+        if (back == 0 && !take_new(d, (prediction){ 0, 0, NONE }, &t[k]))
+            return false;
+        add_vertex(&d->recent, t[k]);
+    }
+    add_edges(&d->recent, t, true);
+    return true;
+}
+
+static bool get_triangle(decoder *d, uint32_t t[3])
+{
+    if (d->code == d->end)
+        return false;
+    unsigned byte = *d->code++, edge = byte >> 4, third = byte & 15;
+    if (edge == FREE_TRIANGLE)
+        return third == 0 && get_free(d, t);
+    if (edge >= d->recent.edges)
+        return false;
+    recent_edge e = d->recent.edge[edge];
+    if (third == NEW_VERTEX) {
+        if (!take_new(d, (prediction){ e.from, e.to, e.beyond }, &t[2]))
+            return false;
+    } else if (third == FAR_VERTEX) {
+        uint32_t back;
+        if (!get_number(d, &back) || back >= d->next)
+            return false;
+        t[2] = d->next - 1 - back;
+    } else if (third <= d->recent.vertices) {
+        t[2] = d->recent.vertex[third - 1];
+    } else {
+        return false;
+    }
+    if (third == NEW_VERTEX || third == FAR_VERTEX)
+        add_vertex(&d->recent, t[2]);
+    t[0] = e.from;
+    t[1] = e.to;
+    remove_edge(&d->recent, edge);
+    add_edges(&d->recent, t, false);
+    return true;
+}
+
+double ebpo_patch_error_step(const ebpo_info *info)
+{
+    const double *size = info->box_size;
+    return fmax(size[0], fmax(size[1], size[2])) * 0x1p-32;
+}
+
+void ebpo_patch_position(const ebpo_box *box, ebpo_cell cell, const int16_t point[3], double out[3])
+{
+    double step = ebpo_half_power(cell.level + EBPO_PATCH_GRID);
+    for (int k = 0; k < 3; k++)
+        out[k] = box->origin[k] +
+                 ((double)cell.at[k] * (1 << EBPO_PATCH_GRID) + point[k]) * (box->size[k] * step);
+}
+
+/* Rows of a patch within a surface. */
+typedef struct patch_rows {
+    const uint8_t *code, *normal, *colour;
+    const uint16_t *point;
+} patch_rows;
+
+static void decode_vertices(const ebpo_info *info, const patch_rows *rows, const decoder *d,
+                            int16_t *point, uint8_t *normal, ebpo_patch *out)
+{
+    ebpo_box box = ebpo_root_box(info);
+    ebpo_cell cell = { out->level, { out->at[0], out->at[1], out->at[2] } };
+    for (uint32_t v = 0; v < out->vertex_count; v++) {
+        uint32_t before = v ? vertex_before(&d->from[v], v) : 0;
+        int32_t predicted[3];
+        predict_point(point, &d->from[v], v, predicted);
+        for (uint32_t k = 0; k < 3; k++)
+            point[3 * v + k] =
+                (int16_t)(uint16_t)(uint32_t)(predicted[k] + decode_zigzag(rows->point[3 * v + k]));
+        for (uint32_t k = 0; k < 2; k++)
+            normal[2 * v + k] =
+                (uint8_t)(rows->normal[2 * v + k] + (v ? normal[2 * before + k] : 0));
+        for (uint32_t k = 0; k < 3 && out->colours; k++)
+            out->colours[3 * v + k] =
+                (uint8_t)(rows->colour[3 * v + k] + (v ? out->colours[3 * before + k] : 0));
+        ebpo_patch_position(&box, cell, point + 3 * v, out->xyz + 3 * v);
+        decode_normal(normal + 2 * v, out->normals + 3 * v);
+    }
+}
+
+void ebpo_patch_free(ebpo_patch *patch)
+{
+    if (!patch)
+        return;
+    free(patch->xyz);
+    free(patch->normals);
+    free(patch->colours);
+    free(patch->triangles);
+    memset(patch, 0, sizeof *patch);
+}
+
+/* Decodes triangles to `triangle`, which may be NULL. Returns false if the code is wrong. */
+static bool decode_triangles(decoder *d, uint64_t count, uint32_t *triangle)
+{
+    uint32_t t[3];
+    for (uint64_t i = 0; i < count; i++) {
+        if (!get_triangle(d, t))
+            return false;
+        if (triangle)
+            memcpy(triangle + 3 * i, t, sizeof t);
+    }
+    /* vertices that no triangle uses come last */
+    for (; d->next < d->vertices; d->next++)
+        d->from[d->next] = (prediction){ 0, 0, NONE };
+    return d->code == d->end;
+}
+
+static ebpo_status decode_patch(const ebpo_info *info, const patch_rows *rows, uint64_t code_bytes,
+                                ebpo_patch *out, ebpo_error *error)
+{
+    uint64_t vertices = out->vertex_count;
+    decoder d = { .code = rows->code,
+                  .end = rows->code + code_bytes,
+                  .vertices = (uint32_t)vertices };
+    d.from = ebpo_alloc(vertices, sizeof *d.from);
+    int16_t *point = ebpo_alloc(vertices, 3 * sizeof *point);
+    uint8_t *normal = ebpo_alloc(vertices, 2);
+    out->xyz = ebpo_alloc(vertices, 3 * sizeof *out->xyz);
+    out->normals = ebpo_alloc(vertices, 3 * sizeof *out->normals);
+    out->colours = rows->colour ? ebpo_alloc(vertices, 3) : NULL;
+    out->triangles = ebpo_alloc(out->triangle_count, 3 * sizeof *out->triangles);
+    ebpo_status status = EBPO_OK;
+    if (!d.from || !point || !normal || !out->xyz || !out->normals || !out->triangles ||
+        (rows->colour && !out->colours))
+        status = ebpo_fail_memory(error, vertices * 48);
+    if (status == EBPO_OK && !decode_triangles(&d, out->triangle_count, out->triangles))
+        status = ebpo_fail(error, EBPO_E_FORMAT, "/surface/triangles: wrong code of a patch");
+    if (status == EBPO_OK)
+        decode_vertices(info, rows, &d, point, normal, out);
+    free(d.from);
+    free(point);
+    free(normal);
+    return status;
+}
+
+ebpo_status ebpo_surface_decode(const ebpo_surface *surface, const ebpo_info *info, uint64_t index,
+                                ebpo_patch *out, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    uint64_t vertex = 0, code = 0;
+    *out = (ebpo_patch)EBPO_PATCH_INIT;
+    if (index >= surface->patch_count)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "patch %llu: there are only %llu patches",
+                         (unsigned long long)index, (unsigned long long)surface->patch_count);
+    const uint64_t *row = surface->patch;
+    for (uint64_t i = 0; i < index; i++, row += EBPO_PATCH_COLUMNS) {
+        vertex += row[EBPO_PATCH_VERTICES];
+        code += row[EBPO_PATCH_CODE_BYTES];
+    }
+    patch_rows rows = { surface->code + code, surface->normal + 2 * vertex,
+                        surface->colour ? surface->colour + 3 * vertex : NULL,
+                        surface->point + 3 * vertex };
+    ebpo_cell cell = ebpo_cell_of_octcode(row[EBPO_PATCH_OCTCODE]);
+    out->level = cell.level;
+    memcpy(out->at, cell.at, sizeof out->at);
+    out->first_face = row[EBPO_PATCH_FIRST_FACE];
+    out->face_count = row[EBPO_PATCH_FACES];
+    out->error = (double)row[EBPO_PATCH_ERROR] * ebpo_patch_error_step(info);
+    out->vertex_count = row[EBPO_PATCH_VERTICES];
+    out->triangle_count = row[EBPO_PATCH_TRIANGLES];
+    ebpo_status status = decode_patch(info, &rows, row[EBPO_PATCH_CODE_BYTES], out, error);
+    if (status != EBPO_OK)
+        ebpo_patch_free(out);
+    return status;
+}
+
+bool ebpo_patch_mark_border(const uint32_t *triangle, uint64_t triangles, uint64_t vertices,
+                            bool *border)
+{
+    uint64_t slots = ebpo_hash_slots(6 * triangles);
+    uint64_t *edge = ebpo_alloc(slots, sizeof *edge); /* lower vertex, higher vertex */
+    uint8_t *uses = ebpo_alloc_zero(slots, 1);
+    for (uint64_t v = 0; v < vertices; v++)
+        border[v] = true;
+    for (uint64_t i = 0; i < 3 * triangles; i++)
+        border[triangle[i]] = false;
+    for (uint64_t i = 0; i < 3 * triangles && edge && uses; i++) {
+        uint32_t a = triangle[i], b = triangle[i - i % 3 + (i + 1) % 3];
+        uint64_t key = a < b ? (uint64_t)a << 32 | b : (uint64_t)b << 32 | a,
+                 s = ebpo_hash_number(key) & (slots - 1);
+        while (uses[s] && edge[s] != key)
+            s = (s + 1) & (slots - 1);
+        edge[s] = key;
+        uses[s] = uses[s] < 2 ? uses[s] + 1 : 2;
+    }
+    for (uint64_t s = 0; s < slots && edge && uses; s++)
+        if (uses[s] == 1)
+            border[edge[s] >> 32] = border[(uint32_t)edge[s]] = true;
+    bool made = edge && uses;
+    free(edge);
+    free(uses);
+    return made;
+}
+
+/* --- checks --- */
+
+void ebpo_surface_free(ebpo_surface *surface)
+{
+    if (!surface)
+        return;
+    free(surface->patch);
+    free(surface->code);
+    free(surface->point);
+    free(surface->normal);
+    free(surface->colour);
+    memset(surface, 0, sizeof *surface);
+}
+
+void ebpo_surface_summarise(const ebpo_surface *surface, ebpo_info *info)
+{
+    info->surface_patches = surface->patch_count;
+    info->surface_triangles = surface->triangle_count;
+    info->surface_vertices = surface->vertex_count;
+    info->surface_code_bytes = surface->code_bytes;
+    info->surface_colours = surface->colour_count;
+}
+
+/* Returns what is wrong with a row of the table, or NULL. */
+static const char *find_row_fault(const ebpo_info *info, const uint64_t *row, uint64_t before)
+{
+    uint64_t code = row[EBPO_PATCH_OCTCODE], triangles = row[EBPO_PATCH_TRIANGLES];
+    /* a subset has the numbers of the original file */
+    uint64_t most_faces = info->pruned ? UINT32_MAX : info->face_count;
+    if (!ebpo_octcode_valid(code) || ebpo_octcode_level(code) > EBPO_PATCH_LEVEL ||
+        ebpo_octcode_level(code) >= info->level_count)
+        return "an octcode is that of no node that can have a patch";
+    if (code <= before)
+        return "the octcodes are not ascending";
+    if (row[EBPO_PATCH_FACES] == 0 || row[EBPO_PATCH_FIRST_FACE] > most_faces ||
+        row[EBPO_PATCH_FACES] > most_faces - row[EBPO_PATCH_FIRST_FACE])
+        return "the faces of a patch are not faces of the model";
+    if (triangles == 0 || triangles > row[EBPO_PATCH_FACES] ||
+        row[EBPO_PATCH_CODE_BYTES] < triangles || row[EBPO_PATCH_VERTICES] < 3 ||
+        row[EBPO_PATCH_VERTICES] > 3 * row[EBPO_PATCH_FACES] ||
+        row[EBPO_PATCH_VERTICES] > INT32_MAX / 4)
+        return "the counts of a patch are impossible";
+    if (row[EBPO_PATCH_ERROR] > UINT64_C(1) << 34)
+        return "the error of a patch is greater than the model";
+    return NULL;
+}
+
+static const char *find_fault(const ebpo_info *info, const ebpo_surface *surface)
+{
+    uint64_t triangles = 0, vertices = 0, bytes = 0, before = 0;
+    for (uint64_t i = 0; i < surface->patch_count; i++) {
+        const uint64_t *row = surface->patch + EBPO_PATCH_COLUMNS * i;
+        const char *fault = find_row_fault(info, row, before);
+        if (fault)
+            return fault;
+        if (row[EBPO_PATCH_VERTICES] > surface->vertex_count - vertices ||
+            row[EBPO_PATCH_CODE_BYTES] > surface->code_bytes - bytes ||
+            row[EBPO_PATCH_TRIANGLES] > surface->triangle_count - triangles)
+            return "the patches do not add up to the counts in the header";
+        before = row[EBPO_PATCH_OCTCODE];
+        triangles += row[EBPO_PATCH_TRIANGLES];
+        vertices += row[EBPO_PATCH_VERTICES];
+        bytes += row[EBPO_PATCH_CODE_BYTES];
+    }
+    return triangles == surface->triangle_count && vertices == surface->vertex_count &&
+                   bytes == surface->code_bytes
+               ? NULL
+               : "the patches do not add up to the counts in the header";
+}
+
+static ebpo_status check_codes(const ebpo_check *check, const ebpo_surface *surface,
+                               ebpo_error *error)
+{
+    const uint8_t *code = surface->code;
+    prediction *from = NULL;
+    uint64_t capacity = 0;
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = 0; i < surface->patch_count && status == EBPO_OK; i++) {
+        const uint64_t *row = surface->patch + EBPO_PATCH_COLUMNS * i;
+        decoder d = { .code = code,
+                      .end = code + row[EBPO_PATCH_CODE_BYTES],
+                      .vertices = (uint32_t)row[EBPO_PATCH_VERTICES] };
+        if (!ebpo_grow(&from, &capacity, row[EBPO_PATCH_VERTICES], sizeof *from)) {
+            status = ebpo_fail_memory(error, row[EBPO_PATCH_VERTICES] * sizeof *from);
+            break;
+        }
+        d.from = from;
+        if (!decode_triangles(&d, row[EBPO_PATCH_TRIANGLES], NULL))
+            status = ebpo_check_fail(check, -1, "/surface/triangles",
+                                     "the code of a patch is wrong", error);
+        code = d.end;
+    }
+    free(from);
+    return status;
+}
+
+ebpo_status ebpo_check_surface(const ebpo_check *check, const ebpo_info *info,
+                               const ebpo_surface *surface, ebpo_error *error)
+{
+    bool missing = !surface->patch || !surface->code || !surface->point || !surface->normal ||
+                   (surface->colour_count && !surface->colour);
+    const char *fault = missing || surface->patch_count != info->surface_patches ||
+                                surface->triangle_count != info->surface_triangles ||
+                                surface->vertex_count != info->surface_vertices ||
+                                surface->code_bytes != info->surface_code_bytes ||
+                                surface->colour_count != info->surface_colours
+                            ? "patches are missing"
+                            : find_fault(info, surface);
+    return fault ? ebpo_check_fail(check, -1, "/surface/patches", fault, error)
+                 : check_codes(check, surface, error);
+}
+
+/* --- files --- */
+
+typedef struct taking {
+    void *to;
+    unsigned size;       /* of an element in memory */
+    uint64_t first, end; /* rows to take */
+} taking;
+
+static void take_rows(const taking *t, const ebpo_array_in *array, uint64_t row, uint64_t rows,
+                      const uint8_t *bytes)
+{
+    uint64_t cols = array->shape.cols ? array->shape.cols : 1, row_bytes = cols * t->size;
+    uint64_t from = row > t->first ? row : t->first,
+             end = row + rows < t->end ? row + rows : t->end;
+    if (from >= end)
+        return;
+    const uint8_t *at = bytes + (from - row) * row_bytes;
+    uint8_t *to = (uint8_t *)t->to + (from - t->first) * row_bytes;
+    for (uint64_t i = 0; i < (end - from) * cols; i++, at += t->size, to += t->size) {
+        uint64_t wide = t->size == 8 ? ebpo_load64(at) : 0;
+        uint16_t narrow = (uint16_t)(t->size == 2 ? at[0] | at[1] << 8 : 0);
+        memcpy(to,
+               t->size == 8   ? (void *)&wide
+               : t->size == 2 ? (void *)&narrow
+                              : (void *)at,
+               t->size);
+    }
+}
+
+/* Reads rows [first, end) of an array to new memory. */
+static ebpo_status read_rows(const ebpo_file *file, ebpo_array_id id, uint64_t first, uint64_t end,
+                             void *out, ebpo_error *error)
+{
+    const ebpo_array_in *array = ebpo_reader_array(file, id, 0);
+    taking t = { .size = array->shape.element_size, .first = first, .end = end };
+    uint64_t cols = array->shape.cols ? array->shape.cols : 1, rows = array->shape.chunk_rows;
+    t.to = ebpo_alloc((end - first) * cols, t.size);
+    memcpy(out, &t.to, sizeof t.to);
+    ebpo_idle_reader *reader = ebpo_idle_readers_take(&ebpo_reader_own(file)->idle);
+    ebpo_status status =
+        t.to && reader ? EBPO_OK : ebpo_fail_memory(error, (end - first) * cols * t.size);
+    for (uint64_t k = first / rows; first < end && k * rows < end && status == EBPO_OK; k++) {
+        status = ebpo_reader_chunk(file, array, k, &reader->reader, reader->raw, error);
+        uint64_t left = array->shape.rows - k * rows;
+        if (status == EBPO_OK)
+            take_rows(&t, array, k * rows, left < rows ? left : rows, reader->raw);
+    }
+    ebpo_idle_readers_give(&ebpo_reader_own(file)->idle, reader);
+    return status;
+}
+
+/* Removes the patches of other levels from the table. Sets the first vertex and byte of code. */
+static void select_levels(ebpo_surface *s, int first_level, int last_level, uint64_t *vertex,
+                          uint64_t *code)
+{
+    uint64_t count = 0;
+    ebpo_surface out = { .patch = s->patch };
+    *vertex = *code = 0;
+    for (uint64_t i = 0; i < s->patch_count; i++) {
+        const uint64_t *row = s->patch + EBPO_PATCH_COLUMNS * i;
+        int level = ebpo_octcode_level(row[EBPO_PATCH_OCTCODE]);
+        if (level < first_level) {
+            *vertex += row[EBPO_PATCH_VERTICES];
+            *code += row[EBPO_PATCH_CODE_BYTES];
+        } else if (level <= last_level) {
+            out.triangle_count += row[EBPO_PATCH_TRIANGLES];
+            out.vertex_count += row[EBPO_PATCH_VERTICES];
+            out.code_bytes += row[EBPO_PATCH_CODE_BYTES];
+            memmove(s->patch + EBPO_PATCH_COLUMNS * count++, row, EBPO_PATCH_COLUMNS * sizeof *row);
+        }
+    }
+    out.patch_count = count;
+    out.colour_count = s->colour_count ? out.vertex_count : 0;
+    *s = out;
+}
+
+static void hint_rows(ebpo_hints *hints, const ebpo_file *file, ebpo_array_id id, uint64_t first,
+                      uint64_t end)
+{
+    const ebpo_array_in *array = ebpo_reader_array(file, id, 0);
+    uint64_t rows = array->shape.chunk_rows;
+    if (array->present && first < end)
+        ebpo_hint_chunks(hints, array, first / rows, (end - 1) / rows + 1);
+}
+
+static ebpo_status read_surface(const ebpo_file *file, int first_level, int last_level,
+                                ebpo_surface *out, ebpo_error *error)
+{
+    const ebpo_info *info = &file->info;
+    ebpo_check check = ebpo_reader_check(file, NULL);
+    ebpo_hints hints = EBPO_HINTS_INIT(file);
+    uint64_t vertex, code;
+    ebpo_status status =
+        read_rows(file, EBPO_A_SURFACE_PATCHES, 0, info->surface_patches, &out->patch, error);
+    if (status != EBPO_OK)
+        return status;
+    out->patch_count = info->surface_patches;
+    out->triangle_count = info->surface_triangles;
+    out->vertex_count = info->surface_vertices;
+    out->code_bytes = info->surface_code_bytes;
+    out->colour_count = info->surface_colours;
+    const char *fault = find_fault(info, out);
+    if (fault)
+        return ebpo_check_fail(&check, -1, "/surface/patches", fault, error);
+    select_levels(out, first_level, last_level, &vertex, &code);
+    uint64_t vertex_end = vertex + out->vertex_count;
+    hint_rows(&hints, file, EBPO_A_SURFACE_TRIANGLES, code, code + out->code_bytes);
+    hint_rows(&hints, file, EBPO_A_SURFACE_POINTS, vertex, vertex_end);
+    hint_rows(&hints, file, EBPO_A_SURFACE_NORMALS, vertex, vertex_end);
+    hint_rows(&hints, file, EBPO_A_SURFACE_COLOURS, vertex, vertex_end);
+    ebpo_hint_all(&hints);
+    status =
+        read_rows(file, EBPO_A_SURFACE_TRIANGLES, code, code + out->code_bytes, &out->code, error);
+    if (status == EBPO_OK)
+        status = read_rows(file, EBPO_A_SURFACE_POINTS, vertex, vertex_end, &out->point, error);
+    if (status == EBPO_OK)
+        status = read_rows(file, EBPO_A_SURFACE_NORMALS, vertex, vertex_end, &out->normal, error);
+    if (status == EBPO_OK && out->colour_count)
+        status = read_rows(file, EBPO_A_SURFACE_COLOURS, vertex, vertex_end, &out->colour, error);
+    return status == EBPO_OK ? check_codes(&check, out, error) : status;
+}
+
+ebpo_status ebpo_file_read_surface(const ebpo_file *file, int first_level, int last_level,
+                                   ebpo_surface *out, ebpo_error *error)
+{
+    memset(out, 0, sizeof *out);
+    if (!(file->info.parts & EBPO_PART_SURFACE))
+        return ebpo_fail_file(error, EBPO_E_ABSENT, file->in.shown,
+                              "the file was written without its simplified surface; add it with "
+                              "'ebpo repack --parts=+surface'");
+    ebpo_status status = read_surface(file, first_level, last_level, out, error);
+    if (status != EBPO_OK)
+        ebpo_surface_free(out);
+    return status;
+}

@@ -1,0 +1,54 @@
+/* The part `surface` of a file: patches, and their coding (format-spec/surface.md). */
+#ifndef EBPO_FORMAT_SURFACE_PATCHES_H
+#define EBPO_FORMAT_SURFACE_PATCHES_H
+
+#include "format/file_in.h"
+#include "geometry/cells.h"
+
+/* The grid of a patch has 2^EBPO_PATCH_GRID steps along a cell of the node. Vertices on the border
+ * of a patch are one for each cell of EBPO_PATCH_CELLS levels below the node. Nodes with patches
+ * are at most at level EBPO_PATCH_LEVEL. */
+enum { EBPO_PATCH_GRID = 10, EBPO_PATCH_CELLS = 5, EBPO_PATCH_LEVEL = 14 };
+
+/* A patch to encode. */
+typedef struct ebpo_patch_source {
+    uint64_t vertex_count, triangle_count;
+    const uint32_t *triangle;  /* [triangle_count][3] */
+    const int16_t *point;      /* [vertex_count][3] steps of the grid from the node's low corner */
+    const double (*normal)[3]; /* [vertex_count] of any length */
+    const uint8_t *colour;     /* [vertex_count][3], or NULL */
+} ebpo_patch_source;
+
+/* The rows of one patch; ebpo_patch_rows_free frees the arrays. */
+typedef struct ebpo_patch_rows {
+    uint64_t code_bytes, code_capacity;
+    uint8_t *code;
+    uint16_t *point;
+    uint8_t *normal, *colour;
+} ebpo_patch_rows;
+
+/* Encodes a patch, whose vertices are numbered anew. Returns EBPO_E_MEMORY. */
+EBPO_MUST_USE ebpo_status ebpo_patch_encode(const ebpo_patch_source *source, ebpo_patch_rows *out,
+                                            ebpo_error *error);
+void ebpo_patch_rows_free(ebpo_patch_rows *rows);
+
+/* Returns the size of a step of the error: 2^-32 of the longest side of the root cell. */
+double ebpo_patch_error_step(const ebpo_info *info);
+
+/* Returns the coordinates of a point of a patch of a node at `cell`. */
+void ebpo_patch_position(const ebpo_box *box, ebpo_cell cell, const int16_t point[3],
+                         double out[3]);
+
+/* Marks the vertices of triangles that are on the border of a patch: those at edges with one
+ * triangle, and those without triangles. Returns false if memory is short. */
+EBPO_MUST_USE bool ebpo_patch_mark_border(const uint32_t *triangle, uint64_t triangles,
+                                          uint64_t vertices, bool *border);
+
+/* Checks the table of patches against the header's counts, and the codes of all patches. */
+EBPO_MUST_USE ebpo_status ebpo_check_surface(const ebpo_check *check, const ebpo_info *info,
+                                             const ebpo_surface *surface, ebpo_error *error);
+
+/* Sets the counts of the header. */
+void ebpo_surface_summarise(const ebpo_surface *surface, ebpo_info *info);
+
+#endif
