@@ -599,14 +599,14 @@ static ebpo_status bound_error(const surface_builder *b, patch_node *node,
     return status;
 }
 
-/* Adds a vertex without triangles for each border vertex whose edges all have two triangles, so that
- * readers know the vertex of its cell. */
+/* Adds a vertex without triangles for each border vertex whose edges all have two triangles, so
+ * that readers know the vertex of its cell. */
 static bool add_hidden_vertices(ebpo_patch_mesh *mesh)
 {
     uint64_t count = mesh->vertex_count;
     bool *border = ebpo_alloc(count, sizeof *border);
-    bool made = border &&
-                ebpo_patch_mark_border(mesh->triangle, mesh->triangle_count, count, border);
+    bool made =
+        border && ebpo_patch_mark_border(mesh->triangle, mesh->triangle_count, count, border);
     for (uint64_t v = 0; v < count && made; v++) {
         if (border[v] || !mesh->vertex[v].fixed)
             continue;

@@ -397,11 +397,11 @@ enum {
  */
 typedef struct ebpo_surface {
     uint64_t patch_count, triangle_count, vertex_count, code_bytes, colour_count;
-    uint64_t *patch;  /* [patch_count][EBPO_PATCH_COLUMNS] */
-    uint8_t *code;    /* [code_bytes] triangles, patch after patch */
-    uint16_t *point;  /* [vertex_count][3] */
-    uint8_t *normal;  /* [vertex_count][2] */
-    uint8_t *colour;  /* [colour_count][3], or NULL */
+    uint64_t *patch; /* [patch_count][EBPO_PATCH_COLUMNS] */
+    uint8_t *code;   /* [code_bytes] triangles, patch after patch */
+    uint16_t *point; /* [vertex_count][3] */
+    uint8_t *normal; /* [vertex_count][2] */
+    uint8_t *colour; /* [colour_count][3], or NULL */
 } ebpo_surface;
 
 /*
@@ -1075,7 +1075,10 @@ typedef struct ebpo_patch {
     /* [triangle_count][3] vertices, counter-clockwise seen from outside */
     uint32_t *triangles;
 } ebpo_patch;
-#define EBPO_PATCH_INIT { 0, { 0, 0, 0 }, 0, 0, 0, 0, 0, NULL, NULL, NULL, NULL }
+#define EBPO_PATCH_INIT                                       \
+    {                                                         \
+        0, { 0, 0, 0 }, 0, 0, 0, 0, 0, NULL, NULL, NULL, NULL \
+    }
 
 /* Frees the arrays and clears the struct. */
 EBPO_API void ebpo_patch_free(ebpo_patch *patch);

@@ -176,8 +176,8 @@ typedef struct ebpo_surface_mesh {
 EBPO_API void ebpo_surface_mesh_free(ebpo_surface_mesh *mesh);
 
 /*
- * Lists the patches of a level, and the patches of coarser nodes that have no patches below. Together
- * they replace all faces of the model.
+ * Lists the patches of a level, and the patches of coarser nodes that have no patches below.
+ * Together they replace all faces of the model.
  *
  * patches  [*count] ascending numbers of patches; freed by free()
  *
