@@ -91,7 +91,7 @@ def check_parts(root):
                        (root / "lib/include/ebpo/file.h").read_text(), re.M)
     places = {"lib/format/schema.h": "EBPO_NEEDS_{0} = EBPO_PART_{0},",
               "lib/format/head_facts.c": ", EBPO_PART_{0}, ",
-              "tools/cli/words.c": '"{1}"', "tools/npm/ebpo/view.js": "'{1}'",
+              "tools/cli/words.c": '"{1}"', "tools/npm/ebpo/parts.js": "'{1}'",
               "format-spec/README.md": "| `{1}` |"}
     return [f"{place}: part {part} is not named" for part in parts for place, form in places.items()
             if form.format(part, part.lower().replace("_", "-")) not in (root / place).read_text()]
