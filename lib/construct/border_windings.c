@@ -8,6 +8,7 @@
  * sibling, so its number is known before the child is visited. Source: format-spec/border.md. */
 #include "core/strict_fp.h"
 
+#include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -226,6 +227,14 @@ ebpo_status ebpo_build_border(ebpo_tree *tree, unsigned threads, ebpo_error *err
 {
     ebpo_cap_tree caps = { .node = NULL };
     ebpo_status status = find_loops(&tree->border, &tree->mesh, threads, error);
+    uint64_t bytes = tree->border.point_count * EBPO_CAPS_BYTES,
+             memory = tree->workspace ? ebpo_workspace_memory(tree->workspace) : 0;
+    if (status == EBPO_OK && memory && bytes > memory / 2)
+        status = ebpo_fail(error, EBPO_E_LIMIT,
+                           "the border has %" PRIu64 " edges, whose caps take %" PRIu64
+                           " bytes; give at least %" PRIu64
+                           " bytes of memory, or build without the border",
+                           tree->border.point_count, bytes, 2 * bytes);
     if (status == EBPO_OK)
         status = ebpo_cap_tree_of_loops(&caps, &tree->border, error);
     if (status == EBPO_OK)

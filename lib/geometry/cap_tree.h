@@ -37,6 +37,9 @@ typedef struct ebpo_cap_tree {
     uint64_t triangle_count;
 } ebpo_cap_tree;
 
+/* Bytes of a tree for each point of its loops: a position and at most one node. */
+enum { EBPO_CAPS_BYTES = sizeof(double[3]) + sizeof(ebpo_cap_node) };
+
 /* Makes the tree of loops: loop i has the positions first[i] .. first[i + 1] - 1, at least three,
  * and weight[i] >= 1. `position`, an array of malloc, is taken over, also on failure. EBPO_E_LIMIT:
  * more than 2^31 positions. */

@@ -173,22 +173,31 @@ static ebpo_slice_size whole_size(const ebpo_info *info)
     return size;
 }
 
+/* Returns true if the budget holds the top: a quarter of it for levels, and half for the caps of a
+ * surface. */
+static bool top_fits(const ebpo_info *info, const ebpo_model_options *o, uint64_t budget,
+                     uint64_t top)
+{
+    uint64_t holes = ebpo_holes_estimate(info);
+    return top - holes <= budget / 4 && holes <= budget / 2 &&
+           top + ebpo_bytes_besides_subtrees(o, budget) + EBPO_SUBTREES_LEAST <= budget;
+}
+
 /* Chooses the cut level: half the budget for subtrees must hold this number of subtrees of average
- * size; the top may take a quarter. */
+ * size. */
 static int cut_for(const ebpo_info *info, const ebpo_model_options *o, uint64_t budget,
                    uint64_t subtrees)
 {
     ebpo_slice_size size = whole_size(info);
     for (int level = 1; level < info->level_count; level++) {
         uint64_t grays = info->level[level].gray_count;
-        uint64_t top = ebpo_top_estimate(info, level);
-        if (top > budget / 4 ||
-            top + ebpo_bytes_besides_subtrees(o, budget) + EBPO_SUBTREES_LEAST > budget)
+        if (!top_fits(info, o, budget, ebpo_top_estimate(info, level)))
             return -1;
         if (grays == 0 || ebpo_accel_mean_bytes(&size, info, grays) * subtrees <= budget / 2)
             return level;
     }
-    return budget < ebpo_bytes_besides_subtrees(o, budget) + 2 * EBPO_SUBTREES_LEAST
+    return budget < ebpo_bytes_besides_subtrees(o, budget) + 2 * EBPO_SUBTREES_LEAST ||
+                   ebpo_holes_estimate(info) > budget / 2
                ? -1
                : info->level_count - 1;
 }
@@ -233,11 +242,8 @@ bool ebpo_default_memory(const ebpo_file *file, ebpo_model_options *o)
 static int prefer_subtrees(const ebpo_info *info, const ebpo_model_options *o, int cut)
 {
     int level = info->subtree_level;
-    uint64_t top = ebpo_top_estimate(info, level), budget = o->memory;
-    return level > cut && top <= budget / 4 &&
-                   top + ebpo_bytes_besides_subtrees(o, budget) + EBPO_SUBTREES_LEAST <= budget
-               ? level
-               : cut;
+    return level > cut && top_fits(info, o, o->memory, ebpo_top_estimate(info, level)) ? level
+                                                                                       : cut;
 }
 
 /* --- applying the plan --- */

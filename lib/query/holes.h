@@ -23,10 +23,11 @@ EBPO_MUST_USE ebpo_status ebpo_holes_read(ebpo_holes **out, const ebpo_file *fil
                                           ebpo_error *error);
 void ebpo_holes_free(ebpo_holes *holes); /* accepts NULL */
 uint64_t ebpo_holes_bytes(const ebpo_holes *holes);
-/* Returns an upper bound of the bytes that a model uses for its border, also while it is read. */
+/* Returns an upper bound of the bytes of a border in memory. Twice of this also holds it while it
+ * is read. */
 static inline uint64_t ebpo_holes_estimate(const ebpo_info *info)
 {
-    return info->parts & EBPO_PART_BORDER ? 4096 + 224 * info->border_points : 0;
+    return info->parts & EBPO_PART_BORDER ? 4096 + EBPO_CAPS_BYTES * info->border_points : 0;
 }
 
 /* Decides what is constant in the cells of a table's nodes, and marks these nodes. Uniform entries

@@ -339,6 +339,17 @@ static ebpo_status open_top(ebpo_model *m, int cut_level, ebpo_error *error)
     return status;
 }
 
+/* Reads the border, if the budget holds the model. */
+static ebpo_status open_border(ebpo_model *m, ebpo_error *error)
+{
+    ebpo_model_plan plan;
+    if (!(m->info->parts & EBPO_PART_BORDER))
+        return EBPO_OK;
+    ebpo_status status = ebpo_plan_model(m->file, &m->options, m->default_memory, &plan, error);
+    return status == EBPO_OK ? ebpo_holes_read(&m->holes, m->file, m->options.threshold, error)
+                             : status;
+}
+
 /* Opens a model all in memory, under a shared budget. Returns EBPO_E_LIMIT if the budget is too
  * small. */
 static ebpo_status open_shared_whole(ebpo_model *m, uint64_t peak, ebpo_error *error)
@@ -348,7 +359,8 @@ static ebpo_status open_shared_whole(ebpo_model *m, uint64_t peak, ebpo_error *e
         return EBPO_E_LIMIT;
     m->options.memory = peak;
     ebpo_status status = open_whole(m, error);
-    uint64_t bytes = status == EBPO_OK ? ebpo_accel_bytes(m->whole) : 0;
+    uint64_t bytes =
+        status == EBPO_OK ? ebpo_accel_bytes(m->whole) + ebpo_holes_bytes(m->holes) : 0;
     ebpo_budget_give_back_whole(shared, peak - bytes);
     m->shared_taken = bytes;
     return status;
@@ -402,8 +414,7 @@ ebpo_status ebpo_model_new(const ebpo_file *file, const ebpo_model_options *opti
     m->options = wanted;
     m->kernels = ebpo_query_kernels_best();
     m->default_memory = ebpo_default_memory(file, &m->options);
-    if (m->info->parts & EBPO_PART_BORDER)
-        status = ebpo_holes_read(&m->holes, file, wanted.threshold, error);
+    status = open_border(m, error);
     if (status == EBPO_OK)
         status = open_parts(m, error);
     if (status != EBPO_OK) {
