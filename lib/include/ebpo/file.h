@@ -1080,10 +1080,10 @@ typedef struct ebpo_patch {
         0, { 0, 0, 0 }, 0, 0, 0, 0, 0, NULL, NULL, NULL, NULL \
     }
 
-/* Frees the arrays and clears the struct. */
+/* Frees the arrays and clears the struct. Threads: one at a time per struct. */
 EBPO_API void ebpo_patch_free(ebpo_patch *patch);
 
-/* Frees the arrays and clears the struct. */
+/* Frees the arrays and clears the struct. Threads: one at a time per struct. */
 EBPO_API void ebpo_surface_free(ebpo_surface *surface);
 
 /*

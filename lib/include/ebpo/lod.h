@@ -172,7 +172,7 @@ typedef struct ebpo_surface_mesh {
     double error;
 } ebpo_surface_mesh;
 
-/* Frees the arrays and clears the struct. */
+/* Frees the arrays and clears the struct. Threads: one at a time per struct. */
 EBPO_API void ebpo_surface_mesh_free(ebpo_surface_mesh *mesh);
 
 /*
