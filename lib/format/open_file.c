@@ -292,7 +292,7 @@ static ebpo_status check_bare(const ebpo_file *file, ebpo_error *error)
  * HDF5 or another known type. */
 static bool head_names_kind(const uint8_t *begin, uint64_t size)
 {
-    return (size && begin[0] == 0x89) || ebpo_foreign_bytes(begin, size);
+    return (size && begin[0] == 0x89) || ebpo_wrong_kind_of_file(begin, size);
 }
 
 /* Returns the format of the mesh that begins with these bytes, or NULL. */

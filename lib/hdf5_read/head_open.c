@@ -86,7 +86,7 @@ ebpo_status ebpo_head_open(ebpo_head *head, ebpo_input *input, ebpo_error *error
     static const char unknown[] =
         "not a whole HDF5 file; was it cut off in copying, or is it something else?";
     /* a message about a file that is not HDF5, such as a compressed one */
-    const char *other_kind = ebpo_foreign_bytes(s->bytes.first, s->bytes.first_bytes);
+    const char *other_kind = ebpo_wrong_kind_of_file(s->bytes.first, s->bytes.first_bytes);
     if (other_kind && !s->refusal.what && !has_signature(s))
         return ebpo_fail_at(error, EBPO_E_FORMAT, head->shown, "", 0, "%s", other_kind);
     return ebpo_head_fail(head, "", s->refusal.what ? "" : unknown, error);

@@ -237,10 +237,10 @@ static bool all_is_there(const array_copy *a)
     if (!a->stored_chunks)
         return H5Dget_storage_size(a->set) > 0;
     hid_t space = H5Dget_space(a->set);
-    bool there =
+    bool exists =
         space >= 0 && H5Dget_num_chunks(a->set, space, &chunks) >= 0 && chunks == a->stored_chunks;
     ebpo_h5_close_space(space);
-    return there;
+    return exists;
 }
 
 /* Reads a chunk as stored. Returns false if it must be decoded. */

@@ -334,7 +334,7 @@ static const char *find_markup(const char *text, uint64_t size)
                : NULL;
 }
 
-const char *ebpo_foreign_bytes(const uint8_t *data, uint64_t size)
+const char *ebpo_wrong_kind_of_file(const uint8_t *data, uint64_t size)
 {
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++)
         if (size >= kinds[i].count && memcmp(data, kinds[i].bytes, kinds[i].count) == 0)

@@ -78,7 +78,7 @@ int ebpo_open_below(const char *folder, const char *name);
 /* Recognises files of other kinds that are given as meshes or models by mistake. Returns a
  * description and a remedy, to follow the file's name in a message: "is compressed by gzip; ...".
  * NULL: not recognised. A binary STL file begins with any bytes: check for it first. */
-const char *ebpo_foreign_bytes(const uint8_t *data, uint64_t size);
+const char *ebpo_wrong_kind_of_file(const uint8_t *data, uint64_t size);
 
 /* Returns true for text: the first bytes contain no control characters but white space. */
 bool ebpo_bytes_are_text(const uint8_t *data, uint64_t size);

@@ -166,7 +166,7 @@ ebpo_status ebpo_import_memory(ebpo_mesh *out, const ebpo_import_format *format,
 
 ebpo_status ebpo_import_any(ebpo_mesh *out, const ebpo_import_job *job, ebpo_error *error)
 {
-    const char *foreign = ebpo_foreign_bytes(job->data, job->size),
+    const char *foreign = ebpo_wrong_kind_of_file(job->data, job->size),
                *name = ebpo_path_name(job->name);
     const ebpo_import_format *format = ebpo_import_recognise(job->data, job->size, job->name);
     char list[LIST_TEXT];

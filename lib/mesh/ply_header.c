@@ -276,7 +276,7 @@ static ebpo_status check_magic(reader *r, uint64_t size)
 {
     ebpo_ply_word line;
     const char *end = ebpo_ply_first_line((const uint8_t *)r->at, size, &r->header->line_end);
-    const char *foreign = end ? NULL : ebpo_foreign_bytes((const uint8_t *)r->at, size);
+    const char *foreign = end ? NULL : ebpo_wrong_kind_of_file((const uint8_t *)r->at, size);
     if (foreign)
         return ebpo_fail_at(r->error, EBPO_E_FORMAT, r->name, "", 0, "%s", foreign);
     r->at = end ? end : r->at;

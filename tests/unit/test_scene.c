@@ -36,8 +36,8 @@ static const struct {
     const char *text, *says;
 } bad[] = {
     { "", "line 1: is not JSON" },
-    { "[]", "line 1: a scene is an object" },
-    { "\xef\xbb\xbf[]", "line 1: a scene is an object" },
+    { "[]", "line 1: the top of a scene file must be a JSON object" },
+    { "\xef\xbb\xbf[]", "line 1: the top of a scene file must be a JSON object" },
     { "\xfe\xff\0[", "is text of two bytes a character (UTF-16); save it as UTF-8" },
     { "version https://git-lfs.github.com/spec/v1", "is a Git LFS pointer, not the file itself" },
     { "{}", "line 1: has no member ebpo_scene" },
@@ -50,7 +50,7 @@ static const struct {
     { HEAD "\"instances\": [" ONE ",\n" ONE "]}",
       "line 4: instances[1]: the name 'a' exists already" },
     { HEAD "\"instances\": [\n{\"name\": \"a\", \"model\": \"n\"}]}",
-      "line 4: instances[0].model: is not one of this scene" },
+      "line 4: instances[0].model: this name is not defined in the scene" },
     { HEAD "\"instances\": [{\"name\": \"a\", \"model\": \"m\",\n\"pose\": {\n\"scale\": \"1\"}}]}",
       "line 5: instances[0].pose.scale: is not a number" },
     { HEAD "\"instances\": [{\"name\": \"a\", \"model\": \"m\", \"pose\": {\"scale\": -1}}]}",
@@ -80,7 +80,7 @@ static const struct {
     { HEAD "\"clearance\": [{\"between\": [\"*\", \"*\"], \"distance\": -1}]}",
       "clearance[0].distance: is below 0" },
     { HEAD "\"cameras\": [{\"name\": \"c\", \"eye\": [0,0,1], \"target\": [0,0,2]}]}",
-      "up points to it" },
+      "up is parallel to the viewing direction" },
     { "{\"ebpo_scene\": \"1.0\",\n\"models\": {\"m\": {\"file\": \"/etc/m\"}}}",
       "line 2: models.m.file: is outside" },
     { "{\"ebpo_scene\": \"1.0\", \"models\": {\"m\": {\"file\": \"a/../../m\"}}}", "is outside" },

@@ -120,7 +120,7 @@ static bool read_pose(const char *name, const char *text, uint32_t operands, ebp
         return true;
     command_usage(name,
                   "--pose '%s': expected a model and a pose, 'B " POSE_FORM
-                  "', the quaternion not 0",
+                  "' with a quaternion that is not 0",
                   text);
     return false;
 }

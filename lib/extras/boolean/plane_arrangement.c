@@ -1,10 +1,10 @@
-/* Divides segments of a plane where they intersect.
+/* Divides segments in one plane at the points where they intersect.
  *
- * Segments are sorted by their least coordinate; pairs with overlapping boxes are compared by exact
- * orientation tests of three points (turns). For each segment, the points in its interior are
- * recorded: ends of other segments, and points where other segments cross it. Sorted along the
- * segment, they divide it. Rounding keeps the order of coordinates, so
- * boxes of rounded coordinates overlap where the segments do. */
+ * Segments are sorted by the lower end of their boxes on the first axis of the projection; pairs
+ * with overlapping boxes are compared by exact orientation tests of three points (turns). For each
+ * segment, the points in its interior are recorded: ends of other segments, and points where other
+ * segments cross it. Sorted along the segment, they divide it. Rounding keeps the order of
+ * coordinates, so boxes of rounded coordinates overlap where the segments do. */
 #include "core/strict_fp.h"
 
 #include "extras/boolean/plane_arrangement.h"
@@ -46,12 +46,12 @@ bool ebpo_arrangement_2d_add(ebpo_arrangement_2d *a, uint32_t from, uint32_t to)
         return false;
     ebpo_plane_segment *s = &a->segment[a->segments++];
     const double *p = a->set.point[from].at, *q = a->set.point[to].at;
-    const int seen[2] = { a->axis == 2 ? 0 : a->axis + 1, a->axis == 0 ? 2 : a->axis - 1 };
+    const int axes[2] = { a->axis == 2 ? 0 : a->axis + 1, a->axis == 0 ? 2 : a->axis - 1 };
     s->from = from;
     s->to = to;
     for (int k = 0; k < 2; k++) {
-        s->low[k] = fmin(p[seen[k]], q[seen[k]]);
-        s->high[k] = fmax(p[seen[k]], q[seen[k]]);
+        s->low[k] = fmin(p[axes[k]], q[axes[k]]);
+        s->high[k] = fmax(p[axes[k]], q[axes[k]]);
     }
     return true;
 }
@@ -135,7 +135,7 @@ static bool compare_all(ebpo_arrangement_2d *a)
     return true;
 }
 
-static int order_noted(const void *x, const void *y, void *context)
+static int order_recorded(const void *x, const void *y, void *context)
 {
     const ebpo_point_on_segment *p = x, *q = y;
     const ebpo_arrangement_2d *a = context;
@@ -163,7 +163,7 @@ bool ebpo_arrangement_2d_divide(ebpo_arrangement_2d *a)
     for (uint64_t i = 0; i < a->segments; i++)
         if (!record_point(a, i, a->segment[i].from) || !record_point(a, i, a->segment[i].to))
             return false;
-    ebpo_sort_with(a->on, a->on_count, sizeof *a->on, order_noted, a);
+    ebpo_sort_with(a->on, a->on_count, sizeof *a->on, order_recorded, a);
     for (uint64_t i = 0; i + 1 < a->on_count; i++)
         if (a->on[i].segment == a->on[i + 1].segment &&
             !add_edge(a, a->on[i].point, a->on[i + 1].point))

@@ -1,4 +1,4 @@
-/* Divides segments of a plane where they intersect. Exact; for one thread. */
+/* Divides segments in one plane at the points where they intersect. Exact; for one thread. */
 #ifndef EBPO_BOOLEAN_PLANE_ARRANGEMENT_H
 #define EBPO_BOOLEAN_PLANE_ARRANGEMENT_H
 
@@ -19,10 +19,10 @@ typedef struct ebpo_plane_edge {
     uint32_t from, to;
 } ebpo_plane_edge;
 
-/* Points and segments of one plane, seen against an axis to which the plane is not parallel. A zero
- * struct is empty. */
+/* Points and segments of one plane, projected along an axis that is not parallel to the plane. A
+ * zero struct is empty. */
 typedef struct ebpo_arrangement_2d {
-    int axis, unit;
+    int axis, unit; /* coordinates are multiples of 2^unit */
     ebpo_point_set set;
     ebpo_plane_segment *segment;
     uint64_t segments, segment_capacity;

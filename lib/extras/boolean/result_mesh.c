@@ -1,10 +1,12 @@
 /* Writes the triangles that bound the result into a mesh.
  *
- * Each operand is read again. Its faces are visited in order: those in the list give their
- * triangles of the cut mesh; each other face is whole, and bounds the result if the listed faces of
- * its component do. Vertices are numbered by first use. A corner of a listed face has the number of
- * its vertex in the cut mesh, so whole faces and triangles share vertices. Faces have the numbers
- * of the operand's source if its file has maps, otherwise those of the file, as in all queries. */
+ * Each operand is read again. Its faces are visited in order. Faces near other operands
+ * are in a list (face_list.h) and have been cut into triangles (the cut mesh); the triangles that
+ * bound the result are added. A face that is not listed is added whole if the listed faces of its
+ * connected component bound the result. Vertices are numbered by first use. A corner of a listed
+ * face has the number of its vertex in the cut mesh, so whole faces and triangles share vertices.
+ * Faces have the numbers of the operand's source if its file has source indices, otherwise those of
+ * the file, as in all queries. */
 #include "core/strict_fp.h"
 
 #include "extras/boolean/result_mesh.h"
@@ -26,12 +28,12 @@
 
 typedef struct output {
     const ebpo_cut_mesh *cut;
-    const int8_t *sign;
+    const int8_t *sign; /* of each triangle. 1: added; -1: added, reversed; 0: not in the result */
     int8_t *of_component[EBPO_BOOLEAN_OPERANDS_MAX]; /* signs of whole faces */
     bool doubles;
     uint32_t *number;        /* for each vertex of the cut mesh: its number, or NO_NUMBER */
-    ebpo_corner_ids rounded; /* positions of those that have a number; equal ones share it */
-    uint32_t *of_rounded;    /* number of each of these positions */
+    ebpo_corner_ids rounded; /* rounded positions of the vertices that have a number */
+    uint32_t *of_rounded;    /* for each rounded position: the number of its vertices */
     uint64_t of_rounded_capacity;
     ebpo_boolean_mesh_report *report;
     ebpo_mesh *mesh;
@@ -48,8 +50,8 @@ typedef struct operand_output {
     ebpo_mesh mesh; /* posed */
     ebpo_maps maps;
     bool repeats;
-    ebpo_positions first; /* if vertices have equal positions */
-    uint64_t *near;       /* a bit for each corner of a listed face */
+    ebpo_positions first; /* for each vertex: the first one at its position; only if `repeats` */
+    uint64_t *near;       /* for each vertex: a bit, 1 if it is a corner of a listed face */
     uint32_t *number;     /* for each vertex: its number, or NO_NUMBER */
 } operand_output;
 
@@ -88,7 +90,7 @@ static const ebpo_exact_point *get_cut_vertex(const output *o, uint32_t v, doubl
     const ebpo_exact_point *p = v < corners ? NULL : &o->cut->set.point[v - corners];
     memcpy(at, p ? p->at : faces->corners.at[v], 3 * sizeof *at);
     for (int k = 0; k < 3 && v < faces->given_corners; k++)
-        at[k] = faces->minus[v] >> k & 1 ? -0.0 : at[k];
+        at[k] = faces->minus[v] >> k & 1 ? -0.0 : at[k]; /* exact coordinates have no -0 */
     return p;
 }
 
@@ -349,7 +351,8 @@ static ebpo_status find_components(output *o, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Returns the number of faces of the result that are not listed. */
+/* Returns the number of faces of the result that are not listed. same[operand] is 0 if the operand
+ * is not listed (ebpo_boolean_find_equal). */
 static uint64_t count_whole(const output *o, uint32_t operand)
 {
     const ebpo_face_list *faces = o->cut->faces;
@@ -391,7 +394,7 @@ static uint8_t *add_array(ebpo_mesh *mesh, const char *name, ebpo_attribute_type
     return a && ebpo_attribute_reserve(mesh->workspace, a, rows + 1, 0) ? a->values : NULL;
 }
 
-/* Allocates the arrays of the mesh: an empty result has them, too, and so has their types. */
+/* Allocates the arrays of the mesh, also for an empty result, so that they have the right types. */
 static ebpo_status make_arrays(output *o, bool origins, ebpo_error *error)
 {
     const ebpo_face_list *faces = o->cut->faces;

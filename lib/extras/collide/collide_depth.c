@@ -351,7 +351,7 @@ static ebpo_status offer_cell(level_search *g, ebpo_cell cell, ebpo_error *error
     for (int k = 0; k < 3; k++)
         middle[k] = corner[0][k] / 2 + corner[7][k] / 2;
     if (!g->at.model->info->pruned) /* the cell contains a point of a face, or is near one */
-        ball.far = ball.radius + EBPO_NEAR_SHARE * diagonal;
+        ball.far = ball.radius + EBPO_FACE_MARGIN * diagonal;
     open_cell open = { .cell = cell };
     ebpo_status status = query_ball(s, middle, &ball, error);
     if (status != EBPO_OK || !ball.open)

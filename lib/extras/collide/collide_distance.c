@@ -393,9 +393,9 @@ static ebpo_status distance_of_accels(const ebpo_collision *q, const ebpo_accel 
 static ebpo_status inspect_pair(node_search *s, const ebpo_node_gap *pair, ebpo_error *error)
 {
     const ebpo_accel *accel[2];
-    bool there;
-    ebpo_status status = ebpo_subtree_search_load(&s->subtrees, pair->node, accel, &there, error);
-    return status == EBPO_OK && there
+    bool loaded;
+    ebpo_status status = ebpo_subtree_search_load(&s->subtrees, pair->node, accel, &loaded, error);
+    return status == EBPO_OK && loaded
                ? distance_of_accels(s->subtrees.collision, accel, pair->gap == 0, s->n, error)
                : status;
 }
@@ -577,7 +577,7 @@ static ebpo_status search_nearest(const ebpo_collision *q, bool warm, nearest_pa
 }
 
 ebpo_status ebpo_collide_distance(ebpo_collider *c, const ebpo_collide_options *options,
-                                  const ebpo_collide_distance_options *clearance,
+                                  const ebpo_collide_distance_options *distance_options,
                                   ebpo_collide_distance_result *out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
@@ -586,7 +586,7 @@ ebpo_status ebpo_collide_distance(ebpo_collider *c, const ebpo_collide_options *
     *out = (ebpo_collide_distance_result){ .at_least = -1,
                                            .pair = { EBPO_NO_FACE, EBPO_NO_FACE, EBPO_NO_FACE,
                                                      EBPO_NO_FACE, EBPO_PAIR_APART, 0 } };
-    ebpo_status status = EBPO_TAKE(ebpo_collide_distance_options, &wanted, clearance, error);
+    ebpo_status status = EBPO_TAKE(ebpo_collide_distance_options, &wanted, distance_options, error);
     if (status == EBPO_OK)
         status = check_options(&wanted, error);
     if (status == EBPO_OK)

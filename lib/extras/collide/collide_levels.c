@@ -95,7 +95,7 @@ static bool shares_point(const level_search *g, double solid[8][3], double other
     int within = 0;
     double middle[3], reach = g->collision->reach;
     if (!black)
-        widen_cell(other, 2 * EBPO_NEAR_SHARE);
+        widen_cell(other, 2 * EBPO_FACE_MARGIN);
     for (int c = 0; c < 8; c++)
         within += is_within((const double(*)[3])solid, other[c], reach);
     for (int i = 0; i < 3; i++)

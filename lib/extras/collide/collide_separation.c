@@ -369,12 +369,12 @@ static ebpo_status divide_node_pair(node_search *s, const ebpo_node_gap *pair, i
 static ebpo_status inspect_pair(node_search *s, const ebpo_node_gap *pair, ebpo_error *error)
 {
     const ebpo_accel *accel[2];
-    bool there;
+    bool loaded;
     int side = ebpo_subtree_search_side(&s->subtrees, pair->node);
     if (side >= 0)
         return divide_node_pair(s, pair, side, error);
-    ebpo_status status = ebpo_subtree_search_load(&s->subtrees, pair->node, accel, &there, error);
-    return status == EBPO_OK && there ? separation_search_run(s->search, accel, error) : status;
+    ebpo_status status = ebpo_subtree_search_load(&s->subtrees, pair->node, accel, &loaded, error);
+    return status == EBPO_OK && loaded ? separation_search_run(s->search, accel, error) : status;
 }
 
 static ebpo_status search_node_pairs(node_search *s, ebpo_error *error)

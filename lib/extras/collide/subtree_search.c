@@ -2,8 +2,9 @@
  * on demand. The gap of two envelopes is a lower bound of the distance of the nodes' faces.
  *
  * Queries of levels, distances and separation distances use this search; each decides when to stop.
- * The larger of two nodes is divided first. Several pairs of nodes of a whole model and a partly
- * loaded model may need the same subtree: it is visited once. A search runs in one thread. */
+ * The larger of two nodes is divided first. If one model is entirely in memory and the other
+ * one is partly loaded, several pairs of nodes may need the same subtree: it is visited once. A
+ * search runs in one thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -59,14 +60,14 @@ ebpo_node_gap ebpo_node_gaps_pop(ebpo_node_gaps *g) { return heap_take(g->heap, 
 
 double ebpo_node_far_bound(const ebpo_node_gaps *g, const ebpo_posed_node node[2])
 {
-    double corner[2][8][3], near = 0;
+    double corner[2][8][3], outside = 0; /* outside: margin for faces outside the cells */
     ebpo_convex convex[2];
     for (int i = 0; i < 2; i++) {
         ebpo_posed_cell(&g->side[i], node[i].cell, corner[i]);
         convex[i] = (ebpo_convex){ 8, (const double(*)[3])corner[i] };
-        near += EBPO_NEAR_SHARE * ebpo_posed_diagonal(&g->side[i], node[i].cell);
+        outside += EBPO_FACE_MARGIN * ebpo_posed_diagonal(&g->side[i], node[i].cell);
     }
-    return ebpo_convex_span(&convex[0], &convex[1]) + near + slack_of(g, node);
+    return ebpo_convex_span(&convex[0], &convex[1]) + outside + slack_of(g, node);
 }
 
 ebpo_status ebpo_node_gap_of(ebpo_node_gaps *g, const ebpo_posed_node node[2], double *out,
@@ -89,8 +90,8 @@ ebpo_status ebpo_subtree_search_begin(ebpo_subtree_search *s, const ebpo_collisi
     s->read_before = ebpo_collision_bytes_read(q);
     ebpo_status status = ebpo_node_gaps_begin(&s->nodes, q, error);
     for (int i = 0; i < 2 && status == EBPO_OK; i++) {
-        s->seen[i] = ebpo_alloc_zero(s->nodes.side[i].count + 1, sizeof *s->seen[i]);
-        if (!s->seen[i])
+        s->visited[i] = ebpo_alloc_zero(s->nodes.side[i].count + 1, sizeof *s->visited[i]);
+        if (!s->visited[i])
             return ebpo_fail_memory(error, s->nodes.side[i].count);
         if (!q->model[i]->whole)
             status = ebpo_context_new(q->model[i], &s->context[i], error);
@@ -105,7 +106,7 @@ void ebpo_subtree_search_end(ebpo_subtree_search *s)
     for (int i = 0; i < 2; i++) {
         c->loads += s->context[i] ? s->context[i]->loaded : 0;
         ebpo_context_free(s->context[i]);
-        free(s->seen[i]);
+        free(s->visited[i]);
     }
     ebpo_node_gaps_free(&s->nodes);
 }
@@ -115,8 +116,8 @@ static bool is_gray(const ebpo_posed_node *node)
     return ebpo_entry_kind_of(node->entry) == EBPO_ENTRY_GRAY;
 }
 
-/* Nodes of a whole model are divided only to get better bounds, and not below the size of the other
- * model's subtree. */
+/* Nodes of a model that is entirely in memory are divided only to get better bounds, and not below
+ * the size of the other model's subtree. */
 int ebpo_subtree_search_side(const ebpo_subtree_search *s, const ebpo_posed_node node[2])
 {
     int larger = ebpo_node_larger(&s->nodes, node);
@@ -125,22 +126,22 @@ int ebpo_subtree_search_side(const ebpo_subtree_search *s, const ebpo_posed_node
     return is_gray(&node[!larger]) && !s->collision->model[!larger]->whole ? !larger : -1;
 }
 
-/* Returns true if a pair of subtrees has been visited. With a whole model and a partly loaded
- * model, several pairs of nodes need the same pair of subtrees. */
+/* Returns true if a pair of subtrees has been visited. If one model is entirely in memory and the
+ * other one is partly loaded, several pairs of nodes need the same pair of subtrees. */
 static bool was_visited(const ebpo_subtree_search *s, const uint32_t number[2])
 {
     for (int i = 0; i < 2; i++)
-        if (s->collision->model[!i]->whole && s->seen[i][number[i]])
+        if (s->collision->model[!i]->whole && s->visited[i][number[i]])
             return true;
     return false;
 }
 
 ebpo_status ebpo_subtree_search_load(ebpo_subtree_search *s, const ebpo_posed_node node[2],
-                                     const ebpo_accel *accel[2], bool *there, ebpo_error *error)
+                                     const ebpo_accel *accel[2], bool *loaded, ebpo_error *error)
 {
     ebpo_collider *c = s->collision->collider;
     uint32_t number[2];
-    *there = false;
+    *loaded = false;
     for (int i = 0; i < 2; i++) {
         const ebpo_model *m = s->collision->model[i];
         number[i] = m->whole ? 0 : ebpo_entry_value(node[i].entry);
@@ -151,15 +152,15 @@ ebpo_status ebpo_subtree_search_load(ebpo_subtree_search *s, const ebpo_posed_no
         return EBPO_OK;
     c->subtree_pairs++;
     for (int i = 0; i < 2; i++) {
-        ebpo_accel *loaded = s->collision->model[i]->whole;
+        ebpo_accel *decoded = s->collision->model[i]->whole; /* NULL: partly loaded */
         ebpo_status status =
-            loaded ? EBPO_OK : ebpo_context_subtree(s->context[i], number[i], &loaded, error);
+            decoded ? EBPO_OK : ebpo_context_subtree(s->context[i], number[i], &decoded, error);
         if (status != EBPO_OK)
             return status;
-        c->subtrees += !s->seen[i][number[i]];
-        s->seen[i][number[i]] = true;
-        accel[i] = loaded;
+        c->subtrees += !s->visited[i][number[i]];
+        s->visited[i][number[i]] = true;
+        accel[i] = decoded;
     }
-    *there = true;
+    *loaded = true;
     return EBPO_OK;
 }

@@ -44,14 +44,14 @@ int ebpo_node_larger(const ebpo_node_gaps *g, const ebpo_posed_node node[2]);
 
 /* A node may list a face that is outside its cell but near it: within 1/256 of the cell's size on
  * each axis (format-spec, section 7). This value adds a margin for rounding. */
-#define EBPO_NEAR_SHARE 0x1.1p-8
+#define EBPO_FACE_MARGIN 0x1.1p-8
 
 /* A search through the subtrees of a query's models. Zero before ebpo_subtree_search_begin. */
 typedef struct ebpo_subtree_search {
     const ebpo_collision *collision;
     ebpo_node_gaps nodes;
     ebpo_context *context[2]; /* for partly loaded models */
-    bool *seen[2];            /* [subtree] it has been visited */
+    bool *visited[2];         /* [subtree] true after its first visit */
     uint64_t read_before;     /* bytes that had been read before the search */
 } ebpo_subtree_search;
 
@@ -67,11 +67,11 @@ void ebpo_subtree_search_end(ebpo_subtree_search *s);
 int ebpo_subtree_search_side(const ebpo_subtree_search *s, const ebpo_posed_node node[2]);
 
 /* Sets accel (acceleration structure of a subtree)[2] to the hierarchies of two subtrees, loaded if
- * necessary; they are valid until the next call. *there is false, and nothing is set, if a subtree
+ * necessary; they are valid until the next call. *loaded is false, and nothing is set, if a subtree
  * has no faces or the pair was visited before. */
 EBPO_MUST_USE ebpo_status ebpo_subtree_search_load(ebpo_subtree_search *s,
                                                    const ebpo_posed_node node[2],
-                                                   const ebpo_accel *accel[2], bool *there,
+                                                   const ebpo_accel *accel[2], bool *loaded,
                                                    ebpo_error *error);
 
 #endif

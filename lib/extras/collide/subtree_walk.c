@@ -188,14 +188,14 @@ static void sort_back_and_forth(subtree_pairs *p)
 /* Counts the different second subtrees, which have indices below `most`. */
 static ebpo_status count_second_subtrees(subtree_pairs *p, uint64_t most, ebpo_error *error)
 {
-    bool *seen = ebpo_alloc_zero(most, sizeof *seen);
-    if (!seen)
+    bool *visited = ebpo_alloc_zero(most, sizeof *seen);
+    if (!visited)
         return ebpo_fail_memory(error, most);
     for (uint64_t i = 0; i < p->count; i++) {
-        p->subtrees[1] += !seen[p->pair[i].b];
-        seen[p->pair[i].b] = true;
+        p->subtrees[1] += !visited[p->pair[i].b];
+        visited[p->pair[i].b] = true;
     }
-    free(seen);
+    free(visited);
     return EBPO_OK;
 }
 

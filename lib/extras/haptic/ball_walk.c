@@ -201,7 +201,7 @@ static void inspect_leaf(ebpo_ball_walk *w, uint64_t leaf, ebpo_ball_work *work)
     uint64_t f = leaf * EBPO_FACE_BOX_LEAF, end = f + EBPO_FACE_BOX_LEAF;
     for (; f < end && f < w->box->count; f++) {
         double away[3];
-        double part = ebpo_ball_intersects(&motion, (const double(*)[3])w->box->corner[f], away);
+        double part = ebpo_ball_first_contact(&motion, (const double(*)[3])w->box->corner[f], away);
         work->faces++;
         if (part > w->part)
             continue;

@@ -1,5 +1,5 @@
-/* Loads the faces in a box around the proxy, with a tree of boxes over them: the only geometry that
- * a haptic step reads.
+/* Loads the faces in a box around the proxy (the device's point, kept on the surface), with a tree
+ * of boxes over them. A haptic step (one cycle of the force computation) reads no other geometry.
  *
  * The loading thread makes a box; a box never changes while a step uses it. Faces keep the order of
  * the file, which follows a space-filling curve, so the tree needs no sorting. Functions that steps
@@ -327,7 +327,7 @@ enum { STEPS = 24 };
 /* Along a line the distance from a face, which is a convex set, is a convex function. So it is
  * above its tangents: a Newton step never passes the point at which the ball first touches the
  * face's interior, an edge or a corner. */
-double ebpo_ball_intersects(const ebpo_ball_motion *w, const double face[3][3], double away[3])
+double ebpo_ball_first_contact(const ebpo_ball_motion *w, const double face[3][3], double away[3])
 {
     double part = 0;
     for (int step = 0; step < STEPS; step++) {
@@ -336,7 +336,7 @@ double ebpo_ball_intersects(const ebpo_ball_motion *w, const double face[3][3], 
         for (int i = 0; i < 3; i++)
             x[i] = w->from[i] + part * w->motion[i];
         ebpo_face_nearest(x, face, &near);
-        double gap = near.distance - w->reach, slope = ebpo_vec3_dot(near.away, w->motion);
+        double gap = near.distance - w->radius, slope = ebpo_vec3_dot(near.away, w->motion);
         for (int i = 0; i < 3; i++)
             away[i] = near.away[i];
         if (slope >= -(gap > 0 ? w->slack : w->least_slack))
@@ -350,8 +350,8 @@ double ebpo_ball_intersects(const ebpo_ball_motion *w, const double face[3][3], 
     return part;
 }
 
-/* Returns the sign of the volume of the tetrahedron a, b, c, d, exactly; another number: that
- * cannot be decided without allocating memory. */
+/* Returns the sign of the volume of the tetrahedron a, b, c, d, exactly: -1, 0 or 1.
+ * Returns another number if the sign cannot be decided without allocating memory. */
 static int volume_sign(const double a[3], const double b[3], const double c[3], const double d[3])
 {
     double u[3], v[3], w[3], value = 0, sum = 0, last = 0;
@@ -485,7 +485,7 @@ ebpo_near_node ebpo_near_pop(ebpo_near_queue *queue)
 
 /* --- the side of a point --- */
 
-enum { SIDE_PIECES = 12 };
+enum { MOVES_MAX = 12 };
 
 static void extent_of_segment(const double p[3], const double q[3], ebpo_extent *out)
 {
@@ -501,7 +501,8 @@ typedef enum crossing {
     DEGENERATE /* the segment crosses an edge or a corner, or touches a face */
 } crossing;
 
-/* Moves the side along the segment to `to`; otherwise the side stays. */
+/* Counts the crossings along the segment from side->at to `to`. CROSSED: *side is now the point
+ * `to`, with its winding number. Otherwise *side is unchanged. */
 static crossing cross_faces(ebpo_side *side, const ebpo_face_box *box, const double to[3],
                             uint32_t *found, uint32_t most, uint32_t visits, uint64_t *work)
 {
@@ -548,7 +549,7 @@ bool ebpo_side_move(ebpo_side *side, const ebpo_face_box *box, const double plac
     side->known = side->known && ebpo_extent_holds(&box->centres, side->at);
     if (!side->known || !ebpo_extent_holds(&box->centres, place))
         return false;
-    for (int piece = 0; piece < SIDE_PIECES; piece++) {
+    for (int move = 0; move < MOVES_MAX; move++) {
         switch (cross_faces(side, box, to, found, most, visits, work)) {
         case CROSSED:
             if (to[0] == place[0] && to[1] == place[1] && to[2] == place[2])

@@ -76,7 +76,7 @@ void ebpo_face_nearest(const double p[3], const double face[3][3], ebpo_face_nea
 /* A ball that moves along a straight path. */
 typedef struct ebpo_ball_motion {
     const double *from, *motion; /* [3] first centre, and vector to the last one */
-    double reach, band; /* the ball's radius; contact begins at a distance of reach + band */
+    double radius, band;         /* contact begins at a distance of radius + band */
     /* If the ball comes nearer to a face by less than this over the whole path, the face is
      * ignored. `least_slack` applies if the distance is less than the radius, `slack` otherwise. */
     double slack, least_slack;
@@ -84,7 +84,7 @@ typedef struct ebpo_ball_motion {
 
 /* Returns the part of the path, 0 to 1 or slightly less, at which the ball touches the face; 2 if
  * it does not. `away` is as in ebpo_face_near, at that point. */
-double ebpo_ball_intersects(const ebpo_ball_motion *w, const double face[3][3], double away[3]);
+double ebpo_ball_first_contact(const ebpo_ball_motion *w, const double face[3][3], double away[3]);
 
 /* Returns false if the closed segment and the closed face certainly have no common point. Returns
  * true if they have one, or if coordinates are so large or small that only integers of any size

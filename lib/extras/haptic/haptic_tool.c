@@ -105,7 +105,7 @@ static bool add_close_point(const tool_piece *p, uint32_t point)
     const ebpo_ball_motion w = { from, motion, stop_at * p->skin, p->t->band, 0, 0 };
     for (uint32_t i = 0; i < count; i++) {
         double away[3];
-        double part = ebpo_ball_intersects(
+        double part = ebpo_ball_first_contact(
             &w, (const double(*)[3])p->box->corner[tool->pool[tool->pool_count + i]], away);
         tool->part = fmin(tool->part, part);
     }

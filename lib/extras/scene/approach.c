@@ -28,23 +28,23 @@ typedef struct approach_search {
     double from, to;
 } approach_search;
 
-/* Sets *next to the time of the next evaluation: from w->time until then, the motion is shorter
- * than `gap`. *next is w->time if no later time is possible. */
-static ebpo_status next_evaluation(const approach_search *t,
+/* Sets *next to the time of the next evaluation: from result->time until then, the motion is
+ * shorter than `gap`. *next is result->time if no later time is possible. */
+static ebpo_status next_evaluation(const approach_search *search,
                                    const ebpo_scene_evaluations *evaluations,
-                                   const ebpo_scene_approach_result *w, double gap, double *next,
-                                   ebpo_error *error)
+                                   const ebpo_scene_approach_result *result, double gap,
+                                   double *next, ebpo_error *error)
 {
-    double low = w->time, high = t->to, at = high, length = 0;
+    double low = result->time, high = search->to, at = high, length = 0;
     ebpo_status status = ebpo_scene_evaluations_motion(evaluations, low, at, &length, error);
     if (status != EBPO_OK || length < gap) {
         *next = at;
         return status;
     }
-    /* the interval is halved until it fits, then lengthened slightly */
-    for (int n = 0; n < 70 && status == EBPO_OK && (low == w->time || n < 8); n++) {
+    /* bisection: at least eight steps, and until a time after result->time fits */
+    for (int n = 0; n < 70 && status == EBPO_OK && (low == result->time || n < 8); n++) {
         at = low + (high - low) / 2;
-        status = ebpo_scene_evaluations_motion(evaluations, w->time, at, &length, error);
+        status = ebpo_scene_evaluations_motion(evaluations, result->time, at, &length, error);
         if (length < gap)
             low = at;
         else
@@ -54,74 +54,79 @@ static ebpo_status next_evaluation(const approach_search *t,
     return status;
 }
 
-/* Sets *next to the next representable time if the pair jumps there. Otherwise *next stays
- * unchanged: the bound of rounding exceeds the gap even for the shortest time. */
+/* Called if even the shortest step is too long. Sets *next to the next representable time if the
+ * pair jumps there: the motion is INFINITY. Otherwise rounding alone exceeds the gap, and *next
+ * stays unchanged. */
 static ebpo_status move_past_jump(const ebpo_scene_evaluations *evaluations,
-                                  const ebpo_scene_approach_result *w, double *next,
+                                  const ebpo_scene_approach_result *result, double *next,
                                   ebpo_error *error)
 {
-    double length, at = nextafter(w->time, INFINITY);
-    ebpo_status status = ebpo_scene_evaluations_motion(evaluations, w->time, at, &length, error);
+    double length, at = nextafter(result->time, INFINITY);
+    ebpo_status status =
+        ebpo_scene_evaluations_motion(evaluations, result->time, at, &length, error);
     if (status == EBPO_OK && length == INFINITY)
         *next = at;
     return status;
 }
 
-static bool is_reached(const approach_search *t, const ebpo_scene_approach_result *w)
+static bool is_reached(const approach_search *search, const ebpo_scene_approach_result *result)
 {
-    return ebpo_scene_is_within(w->hi, w->clearance, t->how.tolerance);
+    return ebpo_scene_is_within(result->hi, result->clearance, search->how.tolerance);
 }
 
-static ebpo_status approach_evaluate(const approach_search *t, ebpo_scene_evaluations *evaluations,
-                                     ebpo_scene_approach_result *w, ebpo_error *error)
+static ebpo_status approach_evaluate(const approach_search *search,
+                                     ebpo_scene_evaluations *evaluations,
+                                     ebpo_scene_approach_result *result, ebpo_error *error)
 {
-    ebpo_status status = ebpo_scene_evaluate(evaluations, w->time, &w->lo, &w->hi, error);
-    w->evaluations++;
-    if (status != EBPO_OK || is_reached(t, w) || evaluations->gap > w->clearance)
+    ebpo_status status =
+        ebpo_scene_evaluate(evaluations, result->time, &result->lo, &result->hi, error);
+    result->evaluations++;
+    if (status != EBPO_OK || is_reached(search, result) || evaluations->gap > result->clearance)
         return status;
-    return ebpo_scene_fail_omitted(t->scene, evaluations->pair, evaluations->lacking, w->time,
-                                   false, error);
+    return ebpo_scene_fail_omitted(search->scene, evaluations->pair, evaluations->lacking,
+                                   result->time, false, error);
 }
 
 /* Evaluates the distance at increasing times, until the pair is reached, the time ends, or the
  * search must be given up. */
-static ebpo_status follow_pair(const approach_search *t, ebpo_scene_evaluations *evaluations,
-                               ebpo_scene_approach_result *w, ebpo_error *error)
+static ebpo_status follow_pair(const approach_search *search, ebpo_scene_evaluations *evaluations,
+                               ebpo_scene_approach_result *result, ebpo_error *error)
 {
     for (;;) {
         double next;
-        ebpo_status status = approach_evaluate(t, evaluations, w, error);
+        ebpo_status status = approach_evaluate(search, evaluations, result, error);
         if (status != EBPO_OK)
             return status;
-        w->reached = is_reached(t, w);
-        if (w->reached || w->time >= t->to)
+        result->reached = is_reached(search, result);
+        if (result->reached || result->time >= search->to)
             return EBPO_OK;
-        status = next_evaluation(t, evaluations, w, w->lo - w->clearance, &next, error);
-        if (status == EBPO_OK && !(next > w->time))
-            status = move_past_jump(evaluations, w, &next, error);
+        status = next_evaluation(search, evaluations, result, result->lo - result->clearance, &next,
+                                 error);
+        if (status == EBPO_OK && !(next > result->time))
+            status = move_past_jump(evaluations, result, &next, error);
         if (status != EBPO_OK)
             return status;
-        if (w->evaluations >= t->how.max_evaluations || !(next > w->time)) {
-            w->reached = -1;
+        if (result->evaluations >= search->how.max_evaluations || !(next > result->time)) {
+            result->reached = -1;
             return EBPO_OK;
         }
-        w->time = next;
+        result->time = next;
     }
 }
 
 static ebpo_status find_approach(const void *how, const ebpo_scene_pair *pair, void *result,
                                  ebpo_error *error)
 {
-    const approach_search *t = how;
+    const approach_search *search = how;
     ebpo_scene_approach_result *approach = result;
     ebpo_scene_evaluations evaluations;
     *approach = (ebpo_scene_approach_result){
-        .a = pair->a, .b = pair->b, .time = t->from, .clearance = pair->clearance
+        .a = pair->a, .b = pair->b, .time = search->from, .clearance = pair->clearance
     };
-    ebpo_status status =
-        ebpo_scene_evaluations_begin(&evaluations, t->scene, pair, t->how.tolerance, error);
+    ebpo_status status = ebpo_scene_evaluations_begin(&evaluations, search->scene, pair,
+                                                      search->how.tolerance, error);
     if (status == EBPO_OK)
-        status = follow_pair(t, &evaluations, approach, error);
+        status = follow_pair(search, &evaluations, approach, error);
     ebpo_collider_free(evaluations.collider);
     return status;
 }
@@ -171,8 +176,9 @@ typedef struct time_part {
 typedef struct part_search {
     ebpo_scene_evaluations evaluations;
     ebpo_scene_least *out;
-    double limit; /* least lower bound that omitted faces gave so far: the lower bound of the
-                   * result cannot exceed it. INFINITY: none */
+    /* The least lower bound of the distance at times when faces that a subset file omits may be
+     * nearer than all others. The lower bound of the result cannot exceed it. INFINITY: none. */
+    double limit;
     EBPO_SCENE_LIST(time_part, parts); /* a heap: the part with the least `least` first */
 } part_search;
 
@@ -269,10 +275,10 @@ static bool is_done(const part_search *s, const time_part *p, double middle,
                     const least_search *how)
 {
     double hi = s->out->hi;
-    double open = hi - s->limit; /* the part of hi - lo that omitted faces leave; <= 0: none */
-    return ebpo_scene_is_within(hi, p->least, how->tolerance) || s->limit - p->least <= open / 8 ||
-           s->out->evaluations >= how->max_evaluations || p->motion <= how->tolerance / 8 ||
-           !(middle > p->from && middle < p->to);
+    double least_gap = hi - s->limit; /* hi - lo cannot be less, because of omitted faces */
+    return ebpo_scene_is_within(hi, p->least, how->tolerance) ||
+           s->limit - p->least <= least_gap / 8 || s->out->evaluations >= how->max_evaluations ||
+           p->motion <= how->tolerance / 8 || !(middle > p->from && middle < p->to);
 }
 
 /* Sets *out to true if at least half of the part's motion is a bound of rounding, which does not

@@ -191,7 +191,7 @@ ebpo_status ebpo_json_bad_at(ebpo_json_reader *r, const char *key, const char *w
     return status;
 }
 
-ebpo_status ebpo_json_judge(ebpo_json_reader *r, ebpo_status status, const ebpo_error *why)
+ebpo_status ebpo_json_locate_error(ebpo_json_reader *r, ebpo_status status, const ebpo_error *why)
 {
     if (status == EBPO_OK)
         return status;

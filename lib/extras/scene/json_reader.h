@@ -25,7 +25,7 @@ ebpo_status ebpo_json_bad(ebpo_json_reader *r, const char *format, ...) EBPO_PRI
 ebpo_status ebpo_json_bad_at(ebpo_json_reader *r, const char *key, const char *what);
 /* Converts EBPO_E_ARGUMENT with the message `why` into the error of ebpo_json_bad; returns other
  * errors unchanged. */
-ebpo_status ebpo_json_judge(ebpo_json_reader *r, ebpo_status status, const ebpo_error *why);
+ebpo_status ebpo_json_locate_error(ebpo_json_reader *r, ebpo_status status, const ebpo_error *why);
 
 /* Checks that the value is an object with only these members (NULL ends the list) and private ones,
  * "x-...". */

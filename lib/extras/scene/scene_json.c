@@ -160,7 +160,7 @@ static ebpo_status read_text(const ebpo_whole_file *file, ebpo_scene_route *rout
                     0,
                     newlocale(LC_ALL_MASK, "C", (locale_t)0) };
     ebpo_status status;
-    const char *foreign = ebpo_foreign_bytes(file->data, file->size);
+    const char *foreign = ebpo_wrong_kind_of_file(file->data, file->size);
     l.at += ebpo_scene_bom_length(l.at, file->size);
     if (foreign)
         status = ebpo_fail_file(error, EBPO_E_FORMAT, path, "%s", foreign);
@@ -181,8 +181,10 @@ static ebpo_status read_csv_file(ebpo_scene_route *route, const char *path, uint
     ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
     ebpo_status status = ebpo_whole_file_open(&file, path, error);
     if (status == EBPO_OK && file.size > *left)
-        status = ebpo_fail_file(error, EBPO_E_LIMIT, path,
-                                "files of poses have more bytes than the given limit");
+        status =
+            ebpo_fail_file(error, EBPO_E_LIMIT, path,
+                           "with this file, the CSV files of poses together have more bytes than "
+                           "max_pose_bytes");
     if (status == EBPO_OK)
         status = ebpo_whole_file_load(&file, NULL, 1, NULL, path, error);
     if (status == EBPO_OK)
@@ -237,10 +239,10 @@ static ebpo_status add_pose_key(ebpo_json_reader *r, const read_pose *p, double 
         /* `posing` is not used: this only checks the matrix */
         ebpo_status status = ebpo_posing_make(&posing, &p->pose, origin, &why);
         if (status != EBPO_OK)
-            return ebpo_json_judge(r, status, &why);
+            return ebpo_json_locate_error(r, status, &why);
         ebpo_scene_quaternion_of_matrix(p->pose.rotation, key.quaternion);
     }
-    return ebpo_json_judge(r, ebpo_scene_add_key(route, &key, &why), &why);
+    return ebpo_json_locate_error(r, ebpo_scene_add_key(route, &key, &why), &why);
 }
 
 /* Reads a pose; *out stays unchanged when the member is missing. */
@@ -334,6 +336,7 @@ static ebpo_status read_csv(ebpo_json_reader *r, const json_t *value)
 
 static ebpo_status read_between(ebpo_json_reader *r, const json_t *value)
 {
+    /* even: interpolated at even speed; jump: the pose of a key holds until the next key */
     const char *between = "even";
     ebpo_status status = ebpo_json_get_text(r, value, "between", false, &between);
     if (status != EBPO_OK)
@@ -352,7 +355,8 @@ static ebpo_status json_read_route(ebpo_json_reader *r, const char *name, const 
     ebpo_error why = EBPO_ERROR_INIT;
     ebpo_status status = ebpo_json_members(r, value, known);
     if (status == EBPO_OK)
-        status = ebpo_json_judge(r, ebpo_scene_add_route(r->scene, name, &number, &why), &why);
+        status =
+            ebpo_json_locate_error(r, ebpo_scene_add_route(r->scene, name, &number, &why), &why);
     if (status == EBPO_OK)
         status = read_between(r, value);
     if (status != EBPO_OK)
@@ -386,8 +390,9 @@ static ebpo_status read_layer(ebpo_json_reader *r, const char *key, const json_t
     ebpo_error why = EBPO_ERROR_INIT;
     const char *name = NULL;
     ebpo_status status = read_name(r, value, &name);
-    return status == EBPO_OK ? ebpo_json_judge(r, ebpo_scene_add_layer(r->scene, name, &why), &why)
-                             : status;
+    return status == EBPO_OK
+               ? ebpo_json_locate_error(r, ebpo_scene_add_layer(r->scene, name, &why), &why)
+               : status;
 }
 
 static ebpo_status read_group(ebpo_json_reader *r, const char *key, const json_t *value)
@@ -396,8 +401,9 @@ static ebpo_status read_group(ebpo_json_reader *r, const char *key, const json_t
     ebpo_error why = EBPO_ERROR_INIT;
     const char *name = NULL;
     ebpo_status status = read_name(r, value, &name);
-    return status == EBPO_OK ? ebpo_json_judge(r, ebpo_scene_add_group(r->scene, name, &why), &why)
-                             : status;
+    return status == EBPO_OK
+               ? ebpo_json_locate_error(r, ebpo_scene_add_group(r->scene, name, &why), &why)
+               : status;
 }
 
 /* --- models --- */
@@ -422,7 +428,7 @@ static bool read_digest(const char *hex, uint8_t out[32])
 static ebpo_status read_model(ebpo_json_reader *r, const char *name, const json_t *value)
 {
     static const char *const known[] = { "file", "content_sha256", "subset_of", NULL };
-    const char *path = NULL, *hex = NULL, *from = NULL;
+    const char *path = NULL, *hex = NULL, *subset_of = NULL;
     uint8_t digest[32];
     ebpo_error why = EBPO_ERROR_INIT;
     ebpo_status status = ebpo_json_members(r, value, known);
@@ -431,10 +437,11 @@ static ebpo_status read_model(ebpo_json_reader *r, const char *name, const json_
     if (status == EBPO_OK)
         status = ebpo_json_get_text(r, value, "content_sha256", false, &hex);
     if (status == EBPO_OK)
-        status = ebpo_json_get_text(r, value, "subset_of", false, &from);
+        status = ebpo_json_get_text(r, value, "subset_of", false, &subset_of);
     if (status != EBPO_OK)
         return status;
-    if (from && !read_digest(from, digest))
+    /* only checked here: programs that make subsets use it */
+    if (subset_of && !read_digest(subset_of, digest))
         return ebpo_json_bad_at(r, "subset_of", "is not 64 digits 0-9 a-f");
     if (hex && !read_digest(hex, digest))
         return ebpo_json_bad_at(r, "content_sha256", "is not 64 digits 0-9 a-f");
@@ -442,7 +449,7 @@ static ebpo_status read_model(ebpo_json_reader *r, const char *name, const json_
     if (refused)
         return ebpo_json_bad_at(r, "file", refused);
     status = ebpo_scene_add_model(r->scene, name, path, hex ? digest : NULL, NULL, &why);
-    return ebpo_json_judge(r, status, &why);
+    return ebpo_json_locate_error(r, status, &why);
 }
 
 /* --- instances --- */
@@ -457,8 +464,9 @@ static ebpo_status json_find(ebpo_json_reader *r, const json_t *object, const ch
     if (status != EBPO_OK || !name)
         return status;
     *number = ebpo_scene_find_name(r->scene, kind, name);
-    return *number != EBPO_SCENE_NONE ? EBPO_OK
-                                      : ebpo_json_bad_at(r, key, "is not one of this scene");
+    return *number != EBPO_SCENE_NONE
+               ? EBPO_OK
+               : ebpo_json_bad_at(r, key, "this name is not defined in the scene");
 }
 
 static ebpo_status join_group(ebpo_json_reader *r, const char *key, const json_t *value)
@@ -472,7 +480,7 @@ static ebpo_status join_group(ebpo_json_reader *r, const char *key, const json_t
     uint64_t set = ebpo_scene_find_name(r->scene, "group:", name);
     return set == EBPO_SCENE_NONE
                ? ebpo_json_bad(r, "is not a group of this scene")
-               : ebpo_json_judge(r, ebpo_scene_join_set(r->scene, set, &why), &why);
+               : ebpo_json_locate_error(r, ebpo_scene_join_set(r->scene, set, &why), &why);
 }
 
 static ebpo_status read_instance(ebpo_json_reader *r, const char *key, const json_t *value)
@@ -496,7 +504,7 @@ static ebpo_status read_instance(ebpo_json_reader *r, const char *key, const jso
     if (status == EBPO_OK)
         status = json_read_pose(r, value, "pose", &i.pose);
     if (status == EBPO_OK)
-        status = ebpo_json_judge(r, ebpo_scene_add_instance(r->scene, &i, NULL, &why), &why);
+        status = ebpo_json_locate_error(r, ebpo_scene_add_instance(r->scene, &i, NULL, &why), &why);
     return status == EBPO_OK ? ebpo_json_each_item(r, value, "groups", join_group) : status;
 }
 
@@ -505,15 +513,16 @@ static ebpo_status read_instance(ebpo_json_reader *r, const char *key, const jso
 static ebpo_status check_camera(ebpo_json_reader *r, const ebpo_scene_camera *c,
                                 const double pixels[2])
 {
-    double see[3], cross = 0;
+    double viewing[3], cross = 0;
     for (int k = 0; k < 3; k++)
-        see[k] = c->target[k] - c->eye[k];
+        viewing[k] = c->target[k] - c->eye[k];
     for (int k = 0; k < 3; k++) {
         int u = (k + 1) % 3, v = (k + 2) % 3;
-        cross = fmax(cross, fabs(see[u] * c->up[v] - see[v] * c->up[u]));
+        cross = fmax(cross, fabs(viewing[u] * c->up[v] - viewing[v] * c->up[u]));
     }
     if (!(cross > 0 && cross < INFINITY))
-        return ebpo_json_bad(r, "target is equal to eye, or up points to it");
+        return ebpo_json_bad(r,
+                             "target is equal to eye, or up is parallel to the viewing direction");
     if (!(c->fov > 0 && c->fov < 180))
         return ebpo_json_bad_at(r, "fov", "is not between 0 and 180 degrees");
     for (int k = 0; k < 2; k++)
@@ -554,7 +563,7 @@ static ebpo_status read_camera(ebpo_json_reader *r, const char *key, const json_
         return status;
     c.width = (uint32_t)pixels[0];
     c.height = (uint32_t)pixels[1];
-    return ebpo_json_judge(r, ebpo_scene_add_camera(r->scene, &c, &why), &why);
+    return ebpo_json_locate_error(r, ebpo_scene_add_camera(r->scene, &c, &why), &why);
 }
 
 /* --- rules --- */
@@ -583,7 +592,9 @@ static ebpo_status read_ignored(ebpo_json_reader *r, const char *key, const json
     (void)key;
     uint64_t set[2];
     ebpo_status status = read_selectors(r, value, set);
-    return status == EBPO_OK ? ebpo_scene_add_rule(r->scene, set[0], set[1], -1, r->error) : status;
+    const double ignore = -1; /* see ebpo_scene_add_rule */
+    return status == EBPO_OK ? ebpo_scene_add_rule(r->scene, set[0], set[1], ignore, r->error)
+                             : status;
 }
 
 static ebpo_status read_clearance(ebpo_json_reader *r, const char *key, const json_t *value)
@@ -617,7 +628,8 @@ static ebpo_status check_version(ebpo_json_reader *r, const json_t *root)
     if (strncmp(version, "1.", 2) != 0 || strspn(version + 2, "0123456789") == 0 ||
         version[2 + strspn(version + 2, "0123456789")] != 0)
         return ebpo_fail_file(r->error, EBPO_E_VERSION, r->name,
-                              "is a scene of version %.20s; this program reads 1.0", version);
+                              "is a scene of version %.20s; this program reads versions 1.x",
+                              version);
     return EBPO_OK;
 }
 
@@ -628,7 +640,7 @@ static ebpo_status read_root(ebpo_json_reader *r, const json_t *root)
                                          "cameras",    "ignore", "clearance", NULL };
     const char *text;
     if (!json_is_object(root))
-        return ebpo_json_bad(r, "a scene is an object");
+        return ebpo_json_bad(r, "the top of a scene file must be a JSON object");
     ebpo_status status = check_version(r, root);
     if (status == EBPO_OK)
         status = ebpo_json_members(r, root, known);
@@ -679,7 +691,7 @@ ebpo_status ebpo_scene_read_json(ebpo_scene *scene, const char *text, size_t siz
     ebpo_error why = EBPO_ERROR_INIT;
     if (size > options->max_bytes)
         return ebpo_scene_too_long(name, options, error);
-    const char *foreign = ebpo_foreign_bytes((const uint8_t *)text, size);
+    const char *foreign = ebpo_wrong_kind_of_file((const uint8_t *)text, size);
     if (foreign)
         return ebpo_fail_file(error, EBPO_E_FORMAT, name, "%s", foreign);
     if (ebpo_scene_text_fits(text, size, options->max_values, &why) != EBPO_OK)

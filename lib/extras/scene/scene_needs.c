@@ -22,7 +22,8 @@
 #include "extras/scene/instance_pair.h"
 #include "extras/scene/scene_needs.h"
 
-/* Greatest number of times that the interval between two keys is halved. */
+/* Greatest number of times that the interval between two keys (times at which a route gives a pose)
+ * is halved. */
 enum { HALVINGS = 12 };
 
 /* The search for the parts of the instance `of` that the instance `other` comes near. */
@@ -30,7 +31,8 @@ typedef struct near_search {
     ebpo_scene_needs *needs;
     const ebpo_scene *scene;
     uint64_t of, other;
-    double clearance, margin; /* lengths in the world */
+    /* Lengths in the world. margin: greatest motion over one step; boxes are widened by it. */
+    double clearance, margin;
     ebpo_scene_file_need *need;
 } near_search;
 
@@ -45,10 +47,10 @@ static const ebpo_scene_route *route_of(const ebpo_scene *scene, uint64_t instan
     return route == EBPO_SCENE_NONE ? NULL : &scene->routes[route];
 }
 
-/* Bounds how far the other instance is from the origin of this instance's route, in the unit of
- * that route. */
-static ebpo_status reach_of_other(const near_search *n, const ebpo_scene_route *route, double from,
-                                  double to, double *reach)
+/* Computes an upper bound of the distance of the other instance from the origin of this instance's
+ * route, in the coordinates before the route's scale. */
+static ebpo_status bound_distance(const near_search *n, const ebpo_scene_route *route, double from,
+                                  double to, double *distance)
 {
     double min[3], max[3], far[3];
     ebpo_pose at[2];
@@ -61,7 +63,7 @@ static ebpo_status reach_of_other(const near_search *n, const ebpo_scene_route *
                high = fmax(at[0].translation[k], at[1].translation[k]);
         far[k] = fmax(fabs(max[k] - low), fabs(high - min[k]));
     }
-    *reach = ebpo_scene_length_above(far) / fmin(at[0].scale, at[1].scale);
+    *distance = ebpo_scene_length_above(far) / fmin(at[0].scale, at[1].scale);
     return status;
 }
 
@@ -70,11 +72,12 @@ static ebpo_status reach_of_other(const near_search *n, const ebpo_scene_route *
 static ebpo_status relative_motion(const near_search *n, double from, double to, double *out)
 {
     const ebpo_scene_route *route = route_of(n->scene, n->of);
-    double reach = 0, own = 0;
+    double distance = 0, own = 0;
     ebpo_status status = ebpo_scene_motion(n->scene, n->other, from, to, out, n->needs->error);
     if (status == EBPO_OK && route && from < to) {
-        status = reach_of_other(n, route, from, to, &reach);
-        own = ebpo_scene_route_step(route, from, to, (ebpo_scene_reach){ reach, reach }).length;
+        status = bound_distance(n, route, from, to, &distance);
+        ebpo_scene_reach reach = { distance, distance };
+        own = ebpo_scene_route_step(route, from, to, reach).length;
     }
     *out = (*out + own) * (1 + 0x1p-40);
     return status;
@@ -385,8 +388,8 @@ static bool is_behind(const view_search *s, const ebpo_scene_bounds *box)
     return c->route == EBPO_SCENE_NONE && most < 0;
 }
 
-/* Returns the first level whose cells have a diagonal of at most `size`; -1: no level except
- * perhaps the last has such cells, so all levels are needed. */
+/* Returns the first level whose cells have a diagonal of at most `size`; -1: at most the
+ * last level has such cells, so all levels are needed. */
 static int level_for(const ebpo_info *info, double size)
 {
     double cell = ebpo_scene_length_above(info->box_size);

@@ -112,8 +112,8 @@ typedef struct ebpo_collide_options {
 /* ---- any contact ---- */
 
 /*
- * face_a, face_b: indices in the source (in the file, if it has no maps). file_face_a, file_face_b:
- * indices in the files.
+ * face_a, face_b: source indices (indices in the file if it has no source indices). file_face_a,
+ * file_face_b: indices in the files.
  */
 typedef struct ebpo_face_pair {
     uint64_t face_a, face_b, file_face_a, file_face_b;
@@ -145,14 +145,15 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_first(ebpo_collider *collider,
 
 /*
  * Relation of two point sets at their poses. The set of a solid is the closure of the points that
- * are inside by its rule. The set of a surface is its faces, also with EBPO_PART_BORDER: its inside
- * has no boundary faces in its holes. Faces without area are ignored. The first relation of this
- * list that is true applies.
+ * are inside by its rule. The set of a surface is only its faces, even if the file has the data
+ * that decides which points are inside (EBPO_PART_BORDER), because no faces close the holes. Faces
+ * without area are ignored. Exactly one relation applies: EBPO_A_INSIDE_B, EBPO_B_INSIDE_A and
+ * EBPO_EQUAL take precedence over EBPO_TOUCHING and EBPO_INTERSECTING.
  */
 typedef enum ebpo_relation {
     EBPO_DISJOINT = 0,     /* no common point */
     EBPO_TOUCHING = 1,     /* a common point, but none in the interior of both */
-    EBPO_INTERSECTING = 2, /* common interior points, and none of the following relations */
+    EBPO_INTERSECTING = 2, /* common interior points */
     EBPO_A_INSIDE_B = 3,   /* B is a solid and contains all points of A; the sets are not equal */
     EBPO_B_INSIDE_A = 4,   /* the reverse */
     EBPO_EQUAL = 5,        /* the same points; the sets are not empty */
@@ -176,8 +177,8 @@ typedef struct ebpo_relation_result {
  *
  * Memory: a model entirely in memory takes 4 bytes per face in the collider, and about 60 during
  * the call. A partly loaded model takes half a byte per face, and about 60 per face of a subtree.
- * Subtrees of a partly loaded model are loaded if they have faces in contact, or if they may
- * decide whether a model also has faces inside, or also outside, the other model.
+ * A subtree of a partly loaded model is loaded if it has faces in contact. It is also loaded if a
+ * face inside the other model is known and the subtree may have one outside, or the reverse.
  *
  * Errors are those of ebpo_collide_first; after the deadline the call succeeds. EBPO_E_ABSENT: as
  * for ebpo_inside.
@@ -235,8 +236,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_self(ebpo_collider *collider,
 /*
  * Intersection of two crossing faces, from point[0] to point[1] in the direction of the cross
  * product of A's normal and B's normal. The error of a coordinate is at most 0.51 units in the last
- * place plus 2^-60 of the greatest coordinate of the edge on which the point is. Indices of faces
- * as in ebpo_distance_result.
+ * place plus 2^-60 of the greatest coordinate of the edge on which the point is. face_a,
+ * face_b: as in ebpo_face_pair.
  */
 typedef struct ebpo_contact_segment {
     double point[2][3];
@@ -306,7 +307,7 @@ typedef enum ebpo_pairs_format {
     /*
      * All pairs and segments in the order of ebpo_collide_all, as HDF5 that version 1.8 and later
      * can read:
-     *   /pairs/faces       int64 [n][2]  of A and of B, as in ebpo_distance_result
+     *   /pairs/faces       int64 [n][2]  face_a and face_b of ebpo_face_pair
      *   /pairs/file_faces  int64 [n][2]  in the files
      *   /pairs/kind        uint8 [n]     ebpo_pair_kind
      *   /contacts/points   double [m][6] for crossing pairs: both ends of the segment
@@ -426,7 +427,7 @@ typedef struct ebpo_collide_distance_result {
  */
 EBPO_API EBPO_MUST_USE ebpo_status
 ebpo_collide_distance(ebpo_collider *collider, const ebpo_collide_options *options,
-                      const ebpo_collide_distance_options *clearance,
+                      const ebpo_collide_distance_options *distance_options,
                       ebpo_collide_distance_result *out, ebpo_error *error);
 
 /*
@@ -440,8 +441,9 @@ ebpo_collide_distance(ebpo_collider *collider, const ebpo_collide_options *optio
  * tolerance        greater than 0, in the world's unit; a smaller one takes longer
  * a_in_b, b_in_a   NULL: not requested
  *
- * EBPO_E_NOT_SOLID: the containing model is a surface. EBPO_E_ARGUMENT: also if the tolerance is
- * not valid. Other errors are those of ebpo_collide_first. The search uses memory outside the
+ * EBPO_E_NOT_SOLID: a_in_b is requested and B is a surface, or b_in_a is requested and A is a
+ * surface. EBPO_E_ARGUMENT: also if the tolerance is not valid. Other errors are those of
+ * ebpo_collide_first. After an error, neither result is valid. The search uses memory outside the
  * budgets.
  *
  * Threads: one at a time per collider.

@@ -34,8 +34,8 @@ typedef struct ebpo_subtree_options {
     uint32_t parts;
 
     /*
-     * Number of levels below the subtree's root. -1: all. With another value no faces are read,
-     * because leaves of deeper levels list them.
+     * Number of levels below the subtree's root. -1: all. With another value no faces are read:
+     * leaves below the last level may list some of the faces, and their lists are missing.
      */
     int levels;
 
@@ -126,8 +126,9 @@ typedef struct ebpo_subtree_nodes {
     const uint8_t *types;
 
     /*
-     * [node_count] winding number. White, black: in the cell. Leaf: at the lowest corner, shifted
-     * (see format-spec). Gray: 0. NULL: the model is a surface.
+     * [node_count] winding number. White, black: in the cell. Leaf: at the lowest corner, after
+     * a shift by infinitely small positive numbers (format-spec/README.md, section 10). Gray: 0.
+     * NULL: the model is a surface.
      */
     const int32_t *windings;
 
@@ -139,9 +140,9 @@ typedef struct ebpo_subtree_nodes {
     const uint32_t *children;
 
     /*
-     * [node_count + 1] index in `planes` of each node's first stored plane: those that a gray
-     * node adds to its parent's envelope, and those of a leaf. NULL: not requested,
-     * or not in the file.
+     * [node_count + 1] index in `planes` of each node's first stored plane. Stored planes are the
+     * planes that a gray node adds to its parent's envelope, and the planes of a leaf if the file
+     * has them. NULL: not requested, or not in the file.
      */
     const uint32_t *plane_first;
 
@@ -191,9 +192,9 @@ typedef struct ebpo_subtree_node {
 #define EBPO_SUBTREE_NODE_INIT EBPO_SIZED(ebpo_subtree_node)
 
 /*
- * Gets node `number` of ebpo_subtree_nodes: its cell, half-spaces and, with `polygons`, its
- * envelope; without planes if these were not read. Its pointers are valid until the next call for a
- * node of this subtree.
+ * Gets the node with index `number` in ebpo_subtree_nodes: its cell, half-spaces and, with
+ * `polygons`, its envelope; without planes if these were not read. Its pointers are valid until the
+ * next call for a node of this subtree.
  *
  * Threads: one at a time per subtree.
  */
@@ -206,9 +207,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_subtree_get_node(ebpo_subtree *subtree, 
 /*
  * All faces that intersect the subtree's cell, in the order of the file. Leaves may also list faces
  * that are outside the cell by a rounding error. Shared faces come first: a leaf before this
- * subtree already lists them. The others are owned faces. So of all disjoint subtrees that list a
- * face, exactly one owns the face; the whole tree owns all faces. In a subset (ebpo_subset), faces
- * that are only below pruned nodes are missing. Arrays are valid until the subtree is closed.
+ * subtree already lists them. The others are owned faces. So if the tree is divided into disjoint
+ * subtrees, exactly one of the subtrees that list a face owns it. The tree as a whole owns all
+ * faces. In a subset (ebpo_subset), faces that are only below pruned nodes are missing. Arrays are
+ * valid until the subtree is closed.
  */
 typedef struct ebpo_subtree_faces {
     size_t struct_size;
@@ -235,7 +237,7 @@ typedef struct ebpo_subtree_faces {
     /* [face_count] index of each face in the file, ascending */
     const uint32_t *numbers;
 
-    /* [face_count] source indices; NULL: not requested, or the file has no maps */
+    /* [face_count] source indices; NULL: not requested, or not in the file (EBPO_PART_MAPS) */
     const uint32_t *source;
 
     /* [node_count + 1] index in `list` of each node's first face; only leaves have faces */

@@ -119,7 +119,10 @@ typedef struct ebpo_view_options {
 
     /* ---- members that ebpo_view_stream_change may not change ---- */
 
-    /* As in ebpo_stream_options. If both are false, no planes are read. */
+    /*
+     * planes: half-spaces of each node. polygons: its envelope as polygons. Both are as in
+     * ebpo_stream_options. If both are false, no planes are read.
+     */
     bool planes, polygons;
 
     /* True: reads winding numbers. False: winding numbers of nodes are 0. */
@@ -233,7 +236,7 @@ typedef struct ebpo_view_faces {
     /* [face_count] corners, in the model's unit */
     const double (*corners)[3][3];
 
-    /* [face_count] indices in the file, ascending */
+    /* [face_count] index of each face in the file, ascending */
     const uint32_t *numbers;
 
     /*

@@ -128,8 +128,8 @@ ebpo_status bench_run_query(const bench_job *job, ebpo_context *context, uint64_
     return query_into(job, context, number, job->result_values, error);
 }
 
-/* Returns a quantile of ascending times: the least time that at most a share of 1 - thousandths /
- * 1000 of the times exceeds. */
+/* Returns a quantile of ascending times: the least time t such that at least thousandths / 1000 of
+ * all times are t or less. */
 static uint64_t time_quantile(const uint64_t *sorted, uint64_t count, unsigned thousandths)
 {
     uint64_t below = count / 1000 * thousandths + (count % 1000 * thousandths + 999) / 1000;
@@ -233,7 +233,7 @@ void bench_reset_peak(void)
 #endif
     FILE *f = fopen("/proc/self/clear_refs", "w");
     if (f) {
-        fputs("5\n", f);
+        fputs("5\n", f); /* 5 resets VmHWM, the peak */
         fclose(f);
     }
 }

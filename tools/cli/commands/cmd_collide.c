@@ -41,8 +41,9 @@ static const char *const collide_relations[] = { "DISJOINT",   "TOUCHING",   "IN
                                                  "A_INSIDE_B", "B_INSIDE_A", "EQUAL",
                                                  "not known" };
 
-/* Finds the relation of two models of which no intersecting faces are known. *relation is the name
- * of an ebpo_relation; NULL: the models are DISJOINT, or faces intersect. */
+/* Finds the relation of two models for which a query did not return intersecting faces. *relation:
+ * the name of an ebpo_relation to print; NULL if there is nothing to add, because the models are
+ * DISJOINT or their faces intersect. */
 static ebpo_status find_relation(ebpo_collider *c, const ebpo_collide_options *how,
                                  const char **relation, ebpo_error *error)
 {
@@ -97,9 +98,8 @@ static bool measures_fit(measure_values *f, bool others)
     const char *wrong = NULL;
     if ((measures_requested(f) && others) || f->distance + f->depth + (f->separation != NULL) > 1 ||
         (!f->distance && !f->depth && f->tolerance > 0))
-        wrong =
-            "--distance, --depth and --separation take neither --all nor --self nor each other, "
-            "and only the first two take --tolerance";
+        wrong = "--distance, --depth and --separation exclude each other, --all and --self; "
+                "--tolerance is for --distance and --depth only";
     else if (f->separation && !read_direction(f->separation, f->direction))
         wrong = "--separation expects a direction, three numbers 'X Y Z'";
     else if (f->at_least >= 0 && (!f->distance || f->tolerance > 0))
@@ -134,7 +134,7 @@ static void pair_to_json(const ebpo_collide_distance_result *c)
 }
 
 /* Prints the faces, if known. */
-static void print_clearance_pair(bool as_json, const ebpo_collide_distance_result *c)
+static void print_nearest_pair(bool as_json, const ebpo_collide_distance_result *c)
 {
     if (c->pair.face_a == EBPO_NO_FACE)
         return;
@@ -156,7 +156,7 @@ static void print_distance(bool as_json, const ebpo_collide_distance_result *c,
 {
     printf("%s", as_json ? "{" : "");
     print_bounds(as_json, &c->distance);
-    print_clearance_pair(as_json, c);
+    print_nearest_pair(as_json, c);
     print_end(as_json, relation);
 }
 
@@ -166,7 +166,7 @@ static void print_at_least(bool as_json, const ebpo_collide_distance_result *c,
     static const char *const words[2][3] = { { "not known", "no", "yes" },
                                              { "null", "false", "true" } };
     printf("%s%s", as_json ? "{\"at_least\": " : "", words[as_json][c->at_least + 1]);
-    print_clearance_pair(as_json, c);
+    print_nearest_pair(as_json, c);
     print_end(as_json, relation);
 }
 
@@ -180,7 +180,7 @@ static ebpo_status query_distance(const measure_values *f, bool as_json, ebpo_co
     ebpo_status status = ebpo_collide_distance(c, how, &wanted, &got, error);
     if (status != EBPO_OK)
         return status;
-    /* otherwise the line already reports that faces intersect, or that nothing is known */
+    /* if not apart, the line already reports an intersection, or that nothing is known */
     bool apart = got.distance.lo > 0 || (got.at_least >= 0 && got.distance.hi > 0);
     const char *relation = NULL;
     if (apart)
@@ -234,7 +234,7 @@ static ebpo_status query_depth(const measure_values *f, bool as_json, ebpo_colli
 static ebpo_status query_separation(const measure_values *f, bool as_json, ebpo_collider *c,
                                     const ebpo_collide_options *how, ebpo_error *error)
 {
-    static const char *const metrics[] = { "exact", "interval", "bound" };
+    static const char *const value_kinds[] = { "exact", "interval", "bound" };
     ebpo_separation w;
     ebpo_status status = ebpo_collide_separation(c, how, f->direction, &w, error);
     if (status != EBPO_OK)
@@ -243,7 +243,7 @@ static ebpo_status query_separation(const measure_values *f, bool as_json, ebpo_
     printf("%s", as_json ? "{" : "");
     print_bounds(as_json, &w.t);
     if (as_json)
-        printf(", \"value_kind\": \"%s\"", metrics[w.t.kind]);
+        printf(", \"value_kind\": \"%s\"", value_kinds[w.t.kind]);
     if (any)
         printf(as_json ? ", \"face_a\": %" PRIu64 ", \"face_b\": %" PRIu64
                        : " %" PRIu64 " %" PRIu64,
@@ -277,8 +277,9 @@ static bool read_pose(const char *name, const char *text, ebpo_pose *out)
     if (!text || pose_read(text, out))
         return true;
     (void)command_usage("collide",
-                        "--%s '%s': expected a pose, '" POSE_FORM "', the quaternion not 0", name,
-                        text);
+                        "--%s '%s': expected a pose '" POSE_FORM
+                        "' with a quaternion that is not 0",
+                        name, text);
     return false;
 }
 
@@ -308,8 +309,8 @@ static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
 /* Words for the values -1, 0 and 1. */
 static const char *const truths[] = { "null", "false", "true" };
 
-/* Prints the line for models whose faces do not intersect. For all pairs, JSON has an object for
- * each pair, and one object when there is no pair but other results. */
+/* Prints the line for models whose faces do not intersect. With --all, JSON has one object for
+ * each pair; without pairs, it has one object if a relation is printed, otherwise none. */
 static ebpo_status print_none(const collide_values *v, ebpo_collider *c,
                               const ebpo_collide_options *how, ebpo_error *error)
 {
@@ -416,7 +417,7 @@ static ebpo_status write_pairs(const collide_values *v, ebpo_collider *c,
         fprintf(stderr, "%s: %s%s%s\n", v->out,
                 ply ? "both models, with intersecting faces in red"
                     : "all pairs of intersecting faces, and where they cross",
-                relation ? "; none intersect: " : "", relation ? relation : "");
+                relation ? "; no faces intersect; relation: " : "", relation ? relation : "");
     return status;
 }
 
@@ -467,7 +468,7 @@ static void report_stats(const ebpo_collider *c, bool as_json)
             (unsigned long long)s.node_pairs, (unsigned long long)s.block_pairs,
             (unsigned long long)s.exact);
     if (s.subtree_pairs)
-        fprintf(stderr, "%llu pairs of subtrees, %llu of these, %llu loads, %llu bytes read\n",
+        fprintf(stderr, "%llu pairs of subtrees, from %llu subtrees; %llu loads, %llu bytes read\n",
                 (unsigned long long)s.subtree_pairs, (unsigned long long)s.subtrees,
                 (unsigned long long)s.loads, (unsigned long long)s.bytes_read);
 }

@@ -66,8 +66,8 @@ bool ebpo_js_put_node(ebpo_js_object *object, const ebpo_stream_node *n)
            put_polygons(object, n);
 }
 
-/* Reads the next level of the stream. Array LEVEL_FACTS is empty after the last one. The call after
- * EBPO_E_PENDING continues with the arrays. */
+/* Reads the next level of the stream. Array LEVEL_FACTS is empty after the last one. After
+ * EBPO_E_PENDING, the next call appends the remaining nodes of the level to the arrays. */
 int EBPO_JS(ebpo_js_next_level)(ebpo_js_object *object)
 {
     bool more = false;
@@ -98,37 +98,58 @@ int EBPO_JS(ebpo_js_next_level)(ebpo_js_object *object)
 
 /* ---- envelopes of a level ---- */
 
+/* Arrays of ebpo_js_level. */
+enum {
+    LOD_VERTICES,
+    LOD_TRIANGLES,
+    LOD_CORNER_COUNTS,
+    LOD_NORMALS,
+    LOD_OCTCODES,
+    LOD_TYPES,
+    LOD_WINDINGS,
+    LOD_VOLUMES,
+    LOD_VERTEX_COUNTS,
+    LOD_POLYGON_COUNTS,
+    LOD_COLOURS,
+    LOD_LEVEL_VOLUME
+};
+
 static ebpo_status put_lod(ebpo_js_object *object, const ebpo_mesh *mesh,
                            const ebpo_lod_nodes *nodes, double volume)
 {
     size_t polygons = (size_t)nodes->polygon_count;
-    float *normals = ebpo_js_extend(object, 3, polygons, 3 * sizeof *normals);
+    float *normals = ebpo_js_extend(object, LOD_NORMALS, polygons, 3 * sizeof *normals);
     ebpo_status status = normals ? ebpo_lod_normals(ebpo_file_info(object->file), mesh, nodes,
                                                     normals, &object->error)
                                  : EBPO_E_MEMORY;
-    bool ok = status == EBPO_OK &&
-              ebpo_js_put(object, 0, mesh->xyz64, (size_t)mesh->vertex_count * 24) == EBPO_OK &&
-              ebpo_js_put(object, 1, mesh->faces, (size_t)mesh->face_count * 12) == EBPO_OK &&
-              ebpo_js_put(object, 2, nodes->corners, polygons) == EBPO_OK &&
-              ebpo_js_put(object, 11, &volume, sizeof volume) == EBPO_OK;
+    bool ok =
+        status == EBPO_OK &&
+        ebpo_js_put(object, LOD_VERTICES, mesh->xyz64, (size_t)mesh->vertex_count * 24) ==
+            EBPO_OK &&
+        ebpo_js_put(object, LOD_TRIANGLES, mesh->faces, (size_t)mesh->face_count * 12) == EBPO_OK &&
+        ebpo_js_put(object, LOD_CORNER_COUNTS, nodes->corners, polygons) == EBPO_OK &&
+        ebpo_js_put(object, LOD_LEVEL_VOLUME, &volume, sizeof volume) == EBPO_OK;
     for (uint64_t i = 0; i < nodes->node_count && ok; i++) {
         const ebpo_lod_node *n = &nodes->nodes[i];
         uint8_t type = (uint8_t)n->type;
         uint32_t colour = n->coloured ? n->colour : UINT32_MAX;
-        ok = ebpo_js_put(object, 4, &n->octcode, sizeof n->octcode) == EBPO_OK &&
-             ebpo_js_put(object, 5, &type, sizeof type) == EBPO_OK &&
-             ebpo_js_put(object, 6, &n->winding, sizeof n->winding) == EBPO_OK &&
-             ebpo_js_put(object, 7, &n->volume, sizeof n->volume) == EBPO_OK &&
-             ebpo_js_put(object, 8, &n->vertex_count, sizeof n->vertex_count) == EBPO_OK &&
-             ebpo_js_put(object, 9, &n->polygon_count, sizeof n->polygon_count) == EBPO_OK &&
-             ebpo_js_put(object, 10, &colour, sizeof colour) == EBPO_OK;
+        ok = ebpo_js_put(object, LOD_OCTCODES, &n->octcode, sizeof n->octcode) == EBPO_OK &&
+             ebpo_js_put(object, LOD_TYPES, &type, sizeof type) == EBPO_OK &&
+             ebpo_js_put(object, LOD_WINDINGS, &n->winding, sizeof n->winding) == EBPO_OK &&
+             ebpo_js_put(object, LOD_VOLUMES, &n->volume, sizeof n->volume) == EBPO_OK &&
+             ebpo_js_put(object, LOD_VERTEX_COUNTS, &n->vertex_count, sizeof n->vertex_count) ==
+                 EBPO_OK &&
+             ebpo_js_put(object, LOD_POLYGON_COUNTS, &n->polygon_count, sizeof n->polygon_count) ==
+                 EBPO_OK &&
+             ebpo_js_put(object, LOD_COLOURS, &colour, sizeof colour) == EBPO_OK;
     }
     return status != EBPO_OK ? status : ok ? EBPO_OK : EBPO_E_MEMORY;
 }
 
-/* Arrays 0: vertices [3], 1: triangles [3], 2: corners of each polygon, uint8, 3: their normals,
- * float [3], 4 to 10: octcode, type, winding number, volume, vertices, polygons and colour of each
- * node, 11: volume. */
+/* Gets the envelopes of a level. Arrays 0: vertices [3], 1: triangles [3], 2: number of corners of
+ * each polygon, uint8, 3: normals of the polygons, float [3], 4 to 10: octcode, type, winding
+ * number, volume, number of vertices, number of polygons and colour of each node, 11: volume of the
+ * level. cell_faces: as in ebpo_lod_options. */
 int EBPO_JS(ebpo_js_level)(ebpo_js_object *object, int level, int cell_faces)
 {
     ebpo_lod_options options = EBPO_LOD_OPTIONS_INIT;
@@ -151,7 +172,7 @@ int EBPO_JS(ebpo_js_level)(ebpo_js_object *object, int level, int cell_faces)
 
 /* Array 0: vertices [3], floats; array 1: vertices [3], doubles; one of the two is empty. Array 2:
  * triangles [3], uint32. `in_source_order`: rows are in the order of the source, if the file has
- * maps; else in the order of the file. */
+ * source indices; else in the order of the file. */
 int EBPO_JS(ebpo_js_mesh)(ebpo_js_object *object, int in_source_order)
 {
     ebpo_read_options options = EBPO_READ_OPTIONS_INIT;
