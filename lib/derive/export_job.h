@@ -24,8 +24,9 @@ int ebpo_block_level(const ebpo_export_options *options, int i);
 
 /* Order of the mesh in its block (`level` -1). */
 typedef enum ebpo_block_order {
-    EBPO_FILE_ORDER,  /* order of the file; the block has the maps to the source, if present */
-    EBPO_SOURCE_ORDER /* order of the source, if the file has maps; the block has no maps */
+    EBPO_FILE_ORDER,  /* order of the file; the block has the source indices, if present */
+    EBPO_SOURCE_ORDER /* order of the source, if the file has source indices; the block has no
+                         source indices */
 } ebpo_block_order;
 
 /* Frees a block, also after a failure. */

@@ -1,4 +1,4 @@
-/* Reads whole parts of a file into memory: a level, the mesh, the maps to source indices, the mesh
+/* Reads whole parts of a file into memory: a level, the mesh, source indices, the mesh
  * in the source's order, and the whole tree. Levels and meshes are checked during reading, so that
  * every index in the result is valid. Threads decode chunks directly into the result, which may be
  * in a workspace on disk. The last functions of this file recompute a file's checksums and compare

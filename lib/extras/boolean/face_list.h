@@ -19,15 +19,16 @@ typedef struct ebpo_face_list {
     const ebpo_boolean *boolean;
     ebpo_workspace *workspace; /* NULL: malloc */
     ebpo_corner_ids corners;
-    uint64_t given_corners; /* number of corners of faces; those after are added by cuts */
-    uint8_t *minus;         /* for each of them: a bit for each coordinate that is -0 */
+    uint64_t given_corners; /* number of corners of faces; cuts add the corners after them */
+    uint8_t *minus;         /* for each given corner: a bit for each coordinate that is -0 */
     uint64_t minus_capacity;
     uint32_t (*face)[3]; /* corners of each face; EBPO_NO_CORNER first: the face has no area */
     uint32_t *number;    /* the face's index in its operand's file */
     uint32_t count;
     uint64_t face_capacity, number_capacity;
     uint32_t first[EBPO_BOOLEAN_OPERANDS_MAX + 1]; /* first face of each operand */
-    /* see ebpo_boolean_find_equal; 0: the operand is not listed */
+    /* [operand] a bit for each operand that is equal to this one, itself included; 0: the operand
+     * is not listed (ebpo_boolean_find_equal) */
     uint64_t same[EBPO_BOOLEAN_OPERANDS_MAX];
     ebpo_whole_faces whole[EBPO_BOOLEAN_OPERANDS_MAX];
     /* All intersecting pairs; and then those of faces with an area: the partners of face i are

@@ -188,7 +188,7 @@ static void sort_back_and_forth(subtree_pairs *p)
 /* Counts the different second subtrees, which have indices below `most`. */
 static ebpo_status count_second_subtrees(subtree_pairs *p, uint64_t most, ebpo_error *error)
 {
-    bool *visited = ebpo_alloc_zero(most, sizeof *seen);
+    bool *visited = ebpo_alloc_zero(most, sizeof *visited);
     if (!visited)
         return ebpo_fail_memory(error, most);
     for (uint64_t i = 0; i < p->count; i++) {

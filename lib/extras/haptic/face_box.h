@@ -108,8 +108,8 @@ void ebpo_near_push(ebpo_near_queue *queue, double key, uint64_t node);
 /* Removes and returns item[0], the node with the least key. */
 ebpo_near_node ebpo_near_pop(ebpo_near_queue *queue);
 
-/* The side of a probe: its winding number, which exact arithmetic changes at each face that the
- * probe crosses. */
+/* The point of a probe with its winding number, which exact arithmetic changes at each face that
+ * the probe crosses. */
 
 typedef struct ebpo_side {
     double at[3]; /* the point of this winding number; it is on no face */
@@ -118,10 +118,10 @@ typedef struct ebpo_side {
     uint32_t random; /* state of the pseudorandom numbers that choose detours */
 } ebpo_side;
 
-/* Moves the side to `place`, as far as bounded work allows: in at most twelve pieces of path, each
+/* Moves the point to `place`, as far as bounded work allows: in at most twelve attempts, each
  * with at most `most` faces and `visits` nodes. found[most] is workspace. Adds the number of faces
- * to *work. Returns true if `place` is reached. Otherwise the side stops at a point whose winding
- * number is known, or has left the box; `known` is then false. */
+ * to *work. Returns true if `place` is reached. Otherwise the point stops where its winding
+ * number is known, or it has left the box; `known` is then false. */
 bool ebpo_side_move(ebpo_side *side, const ebpo_face_box *box, const double place[3],
                     uint32_t *found, uint32_t most, uint32_t visits, uint64_t *work);
 

@@ -466,7 +466,7 @@ static ebpo_status json_find(ebpo_json_reader *r, const json_t *object, const ch
     *number = ebpo_scene_find_name(r->scene, kind, name);
     return *number != EBPO_SCENE_NONE
                ? EBPO_OK
-               : ebpo_json_bad_at(r, key, "this name is not defined in the scene");
+               : ebpo_json_bad_at(r, key, "the scene does not define this name");
 }
 
 static ebpo_status join_group(ebpo_json_reader *r, const char *key, const json_t *value)

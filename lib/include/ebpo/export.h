@@ -50,7 +50,7 @@ typedef struct ebpo_export_options {
 
     /*
      * True: exports the mesh. XDMF and VTKHDF contain it in the file's order, with source indices;
-     * other formats in the source's order if the file has maps.
+     * other formats in the source's order if the file has source indices.
      *
      * Colours (colours.h) are exported if present. XDMF and VTKHDF: arrays `rgba` of 4 bytes, for
      * vertices and faces. glTF: COLOR_0, linear, with alpha although the material is opaque. OBJ:

@@ -915,7 +915,7 @@ typedef struct ebpo_maps {
  * vertices are below source_vertex_count. Source indices of faces are below source_face_count plus
  * the number of faces that were added when holes were filled.
  *
- * EBPO_E_ABSENT: the file has no maps.
+ * EBPO_E_ABSENT: the file has no source indices.
  *
  * Threads: any.
  */
@@ -997,8 +997,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_tree(const ebpo_file *file,
                                                        ebpo_tree *out, ebpo_error *error);
 
 /*
- * Reads the mesh. If the file has maps, the mesh is in the order of the source and *source_order is
- * true; otherwise it is in the order of the file. Freed by ebpo_mesh_free.
+ * Reads the mesh. If the file has source indices, the mesh is in the order of the source and
+ * *source_order is true; otherwise it is in the order of the file. Freed by ebpo_mesh_free.
  *
  * EBPO_E_ABSENT: the file has no mesh.
  *

@@ -543,9 +543,9 @@ typedef struct ebpo_distance_result {
     double normal[3];
 
     /*
-     * Nearest face: its source index if the file has maps, else its index in the file. Of several
-     * faces at exactly the same distance, the first one in the file. EBPO_NO_FACE: none, for
-     * example with a level, a deadline or EBPO_DISTANCE_ENVELOPE.
+     * Nearest face: its source index if the file has source indices, else its index in the file. Of
+     * several faces at exactly the same distance, the first one in the file. EBPO_NO_FACE: none,
+     * for example with a level, a deadline or EBPO_DISTANCE_ENVELOPE.
      */
     uint64_t face;
 } ebpo_distance_result;

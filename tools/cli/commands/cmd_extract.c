@@ -136,7 +136,7 @@ static ebpo_status take_part(ebpo_file *file, const values *v, const char *path,
     ebpo_status status = ebpo_file_read_source_mesh(file, &read, &out->mesh, &source_order, error);
     if (status == EBPO_OK && !source_order)
         fprintf(stderr,
-                "ebpo extract: %s: note: has no source indices (maps), so vertices and faces are "
+                "ebpo extract: %s: note: has no source indices, so vertices and faces are "
                 "in the file's order\n",
                 remote_shown(path));
     if (status == EBPO_OK)

@@ -56,7 +56,7 @@ static not_compared list_not_compared(const ebpo_file *file, const ebpo_mesh *so
                  "its attributes, such as colours and normals: the file keeps none");
     else if (has && !(parts & EBPO_PART_MAPS))
         snprintf(u.words, sizeof u.words,
-                 "its attributes, such as colours and normals: the file has no maps");
+                 "its attributes, such as colours and normals: the file has no source indices");
     else if (lost || unread)
         snprintf(u.words, sizeof u.words, "what is not kept: %s%s%s", unread ? unread : "",
                  lost && unread ? "; " : "", lost ? lost : "");

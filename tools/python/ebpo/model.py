@@ -100,7 +100,7 @@ class Model(PointQueries):
     have no face (-1), the winding number 0, and NaN for all real numbers.
 
     Lengths are in the model's unit (`info.unit`). Face indices are those of the source, or those of the file
-    when the file has no maps (`info.parts`).
+    when the file has no source indices (`info.parts`).
 
     Results are exact for every double. They do not depend on threads, budgets or the way of loading.
     """
@@ -383,7 +383,7 @@ class Model(PointQueries):
         return read_mesh(self.file, order, self._threads)
 
     def maps(self) -> Maps:
-        """Return the source indices of the file's vertices and faces. Raises AbsentError when the file has no maps."""
+        """Return the source indices of the file's vertices and faces. Raises AbsentError when the file has none."""
         return read_maps(self.file, self.info, self._threads)
 
     @property
@@ -440,7 +440,7 @@ class Model(PointQueries):
         return TrimeshLike(self)
 
     def to_trimesh(self, *, process: bool = False) -> trimesh.Trimesh:
-        """Return the mesh as a trimesh.Trimesh, in the source's order if the file has maps.
+        """Return the mesh as a trimesh.Trimesh, in the source's order if the file has source indices.
 
         process: trimesh merges vertices and removes faces.
         """

@@ -168,7 +168,7 @@ def read_mesh(file: Handle, order: str, threads: int) -> Mesh:
         is_source = ctypes.c_bool()
         call("ebpo_file_read_source_mesh", file, ctypes.byref(options), mesh, ctypes.byref(is_source))
         if not is_source:
-            raise LookupError("the file has no maps, so the order of the source is unknown")
+            raise LookupError("the file has no source indices, so the order of the source is unknown")
     return mesh_of(mesh)
 
 
