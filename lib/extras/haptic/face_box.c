@@ -243,8 +243,8 @@ static double min_square_distance(const ebpo_face_box *box, const ebpo_extent *a
     return least;
 }
 
-double ebpo_face_box_clearance(const ebpo_face_box *box, const ebpo_extent *around,
-                               uint32_t max_visits, uint64_t *visits)
+double ebpo_face_box_gap(const ebpo_face_box *box, const ebpo_extent *around, uint32_t max_visits,
+                         uint64_t *visits)
 {
     return sqrt(min_square_distance(box, around, max_visits, visits)) * (1 - 0x1p-48);
 }

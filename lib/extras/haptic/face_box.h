@@ -58,8 +58,8 @@ bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uin
 /* Returns a lower bound of the distance of `around` from the faces of the box. The bound is smaller
  * than necessary if the search ends at `max_visits` nodes. Adds the number of visited nodes to
  * *visits. */
-double ebpo_face_box_clearance(const ebpo_face_box *box, const ebpo_extent *around,
-                               uint32_t max_visits, uint64_t *visits);
+double ebpo_face_box_gap(const ebpo_face_box *box, const ebpo_extent *around, uint32_t max_visits,
+                         uint64_t *visits);
 
 /* Distances of points and of moving balls from a face, in doubles. */
 

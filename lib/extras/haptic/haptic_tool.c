@@ -64,7 +64,7 @@ static double free_distance(const tool_piece *p, const ebpo_extent *e, uint32_t 
     for (int i = 0; i < 3; i++)
         inside = fmin(inside,
                       fmin(e->min[i] - p->box->loaded.min[i], p->box->loaded.max[i] - e->max[i]));
-    return fmax(out, fmin(inside, ebpo_face_box_clearance(p->box, e, visits, p->work)));
+    return fmax(out, fmin(inside, ebpo_face_box_gap(p->box, e, visits, p->work)));
 }
 
 /* Bounds the motion of a point, given its lever arm about the centre of rotation. */
