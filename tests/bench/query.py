@@ -129,10 +129,9 @@ def section_rays(page, results):
               "through the pixels of a picture. *segments*: as uniform, with a length of 1/20 of the "
               "box diagonal. "
               "*degenerate*: to a vertex, to the middle of an edge, from a vertex, along an axis "
-              "through a vertex. The table has the times and their ratio to Embree (robust "
-              "scene, high quality, single precision). *Embree differs, first*: number of first "
-              "hits that differ by more than 1e-6 of the box diagonal or that only one program "
-              "finds. *all*: number of rays for which the programs find different numbers of hits. A "
+              "through a vertex. Embree: robust scene, high quality, single precision. *Embree "
+              "differs, first*: first hits that differ by more than 1e-6 of the box diagonal or that "
+              "only one program finds. *all*: rays with different numbers of hits. A "
               "degenerate ray hits all faces around its vertex; single precision rarely finds all "
               "of them.")
     rows = []
@@ -173,7 +172,7 @@ def section_points(page, results, query, title, note):
 
 def section_tails(page, results):
     page.text("### Tails", "",
-              "The table has wall-clock times of single queries, minus the cost of reading the "
+              "Wall-clock times of single queries, minus the cost of reading the "
               "clock, for the smallest and the largest model.")
     models = list(results)
     page.table(["model", "query", "points", "p50", "p99", "p99.9", "max", "Embree p99.9"],
@@ -208,11 +207,10 @@ def measure_memory(bench, model):
 
 def section_memory(page, memory):
     page.text("## Memory and loading", "",
-              "The whole model is in memory. *Loading* ends when the first query can begin; the "
+              "*Loading* ends when the first query can begin; the "
               "file is in the page cache. For Embree, loading is the build of a robust scene from "
               "a mesh in memory. *CPU s*: processor seconds on one thread; *all cores*: wall-clock "
-              "seconds. Embree's memory includes its single-precision mesh, which point queries "
-              "need.")
+              "seconds. Embree's point queries need its mesh.")
     page.table(["model", "faces", "ours, B per face", "Embree tree, B per face",
                 "Embree tree and mesh, B per face", "ours / Embree with mesh",
                 "ours, CPU s", "Embree, CPU s", "ours / Embree", "ours, all cores, s",
@@ -247,8 +245,7 @@ def measure_budget(bench, model):
 def section_budget(page, model, rows):
     page.text("## Memory budget", "",
               f"{model.name}, {model.faces:,} faces, budget {BUDGET >> 20} MiB. Each row begins "
-              "with a model that has just been opened: only its upper levels are in memory, and "
-              "the file is in the page cache. *visited* and *loaded*: subtrees per query. *KiB read*: "
+              "with a newly opened model; the file is in the page cache. *visited* and *loaded*: subtrees per query. *KiB read*: "
               "per query. Times are wall-clock times in us; background threads may use all cores.")
     page.table(["query", "points", "queries", "visited", "loaded", "KiB read", "mean", "p50",
                 "p99", "p99.9", "max", "peak MiB"],
@@ -262,8 +259,7 @@ def section_budget(page, model, rows):
 
 def section_opening(bench, page, models):
     page.text("## Opening", "",
-              "The table has the seconds from a cold file to the first result. The page cache is "
-              "dropped before each run (`posix_fadvise`). Embree and CGAL load the PLY and build "
+              "Seconds from a cold file (`posix_fadvise` before each run) to the first result. Embree and CGAL load the PLY and build "
               "a tree. Ours decodes the whole file on one core (*all*), or only levels 0 to "
               f"{CUT} and the subtrees that the query needs (*cut*).")
     rows = []
@@ -394,8 +390,7 @@ POINTS = {
                  "Embree's point query is in single precision; *Embree, warm*: its search "
                  "radius comes from the previous result."),
     "inside": ("Point in solid",
-               "Ours is exact in double precision. Embree counts the hits of a ray "
-               "in single precision (robust scene). CGAL's `Side_of_triangle_mesh` is exact. "
+               "Embree counts the hits of a ray in single precision (robust scene). CGAL's `Side_of_triangle_mesh` is exact. "
                "*differs*: results that differ from ours, points on the surface excluded."),
 }
 
@@ -451,7 +446,7 @@ def write(options, bench, page, goals, short):
     head.text("# Query times", "", *short)
     made.text("## Measurement", "",
               f"Made by `{command_line(options)}` on {processor()}. Each query "
-              "runs on one thread of one core. Unless a section says otherwise, a time is the "
+              "runs on one core. Unless a section says otherwise, a time is the "
               f"processor time per query in us, the median of {options.rounds} rounds (half as many "
               "above two million faces). *batch*: one call for all points. Load average "
               f"{statistics.median(bench.load):.1f} (median), "

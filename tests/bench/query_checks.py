@@ -49,11 +49,10 @@ def write_results(page, model, rows):
               "(`tests/bench/exact_judge`). *hard*: queries on, at and through vertices, edges and "
               "planes. *wrong*: another classification, hit or number of hits, or a distance or "
               "position that differs by more than 1e-6 of the diagonal. *not rounded*: results of "
-              "ours that have another value than the correctly rounded one, another first face or "
-              "another sign. Embree rounds the query to single precision: its result is right for a nearby point or ray. A "
-              "program that does not report points on the surface is not judged for such points. The "
-              f"table omits {len(rows) - len(shown)} rows of uniform points, paths and cameras in "
-              "which no program is wrong.")
+              "ours with another value than the correctly rounded one, another first face or "
+              "another sign. Embree rounds the query to single precision: its result is right for a nearby point or ray. "
+              "Points on the surface count only for programs that report them. The "
+              f"table omits {len(rows) - len(shown)} rows without a wrong result.")
     page.table(["query", "points", "count", "ours, wrong", "ours, not rounded", "Embree, wrong",
                 "CGAL, wrong"],
                [[r["query"], r["which"], f"{r['count']:,}"]

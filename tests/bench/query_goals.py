@@ -32,10 +32,10 @@ def column(results, points, query, ours, theirs="embree"):
 def ray_goals(goals, results):
     for query, name, goal in RAYS:
         values = [max(v) for v in zip(*(column(results, p, query, "ebpo") for p in ORDINARY))]
-        goals.add(f"{name} / Embree, worst of {', '.join(ORDINARY)}", goal, values, [goal] * 4)
+        goals.add(f"rays, {name} / Embree", goal, values, [goal] * 4)
     for query, name, goal in RAYS:
         values = [max(v) for v in zip(*(column(results, p, query, "base") for p in ORDINARY))]
-        goals.add(f"{name}, ours with SSE2 only / Embree, worst of {', '.join(ORDINARY)}", 2 * goal, values, [2 * goal] * 4)
+        goals.add(f"rays, {name} with SSE2 / Embree", 2 * goal, values, [2 * goal] * 4)
     for query, name, _ in RAYS:
         goals.add(f"degenerate / uniform rays, {name}", 5,
                   [quotient(cells["degenerate", query]["ns"]["ebpo"],
@@ -75,12 +75,10 @@ def goals_table(results, memory, budget, found):
         goals.rows.append(["results that rational arithmetic contradicts", 0,
                            f"{bad} of {judged:,}", "missed" if bad else "met"])
     page.text("## Goals", "",
-              "The table begins with missed goals. A goal is an upper limit. Four values in a "
-              "cell are for the models of "
-              f"{', '.join(SIZES)} faces; *1 of 4*: one of them meets the goal. `a / b` is the value "
-              "of a divided by the value of b. The time of fcpw, a nearest-point library, is "
-              "estimated: the time of Embree's point query, multiplied by a factor for each model "
-              "from another machine: "
+              "The table begins with missed goals. A goal is an upper limit. Four values are for the models of "
+              f"{', '.join(SIZES)} faces; *1 of 4*: one of them meets the goal. *Rays*: the worst of uniform, "
+              "camera and segments. The time of fcpw, a nearest-point library, is estimated: Embree's time, "
+              "multiplied by a factor for each model from another machine: "
               f"{', '.join(map(str, FCPW['path']))} (path) and "
               f"{', '.join(map(str, FCPW['uniform']))} (uniform).")
     page.table(["what", "goal", "measured", ""],
