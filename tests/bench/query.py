@@ -160,7 +160,7 @@ def section_points(page, results, query, title, note):
     distance = query == "distance"
     ways = ["ebpo", "batch"] + (["cold"] if distance else []) + ["embree"]
     ways += (["embree warm"] if distance else []) + ["cgal"]
-    ratios = [("ebpo", "embree"), ("ebpo", "cgal")]
+    ratios = [("ebpo", "embree")]
     names = {"ebpo": "ours", "batch": "ours, batch", "cold": "ours, not warm",
              "embree": "Embree", "embree warm": "Embree, warm", "cgal": "CGAL"}
     rows = [[model.name, points] + times(cells[points, query], ways, ratios)

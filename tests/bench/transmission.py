@@ -142,10 +142,9 @@ results do not depend on the machine.
 - *Vertex distance*: maximum distance of an envelope vertex from the solid (`ebpo distance`), in percent of the box
   diagonal. The one-sided Hausdorff distance is at least this value.
 
-The values are for a reader without the mesh. For such a reader, the envelope of a leaf is the parent's envelope,
-cut to the leaf's cell. With `convert --profile full`, each leaf has stored planes. With the mesh, `ebpo measure
---derived` derives tighter leaf planes. The vertex distance can stay constant from level to level, because a leaf
-with a concave surface is not refined.
+The values are for a reader without the mesh, for which the envelope of a leaf is the parent's envelope, cut to the
+leaf's cell. *Leaf planes* are stored with `convert --profile full`; with the mesh, `ebpo measure --derived` derives
+tighter ones. The vertex distance can stay constant, because a leaf with a concave surface is not refined.
 
 ## First level within an excess
 
