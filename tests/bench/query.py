@@ -245,8 +245,8 @@ def measure_budget(bench, model):
 def section_budget(page, model, rows):
     page.text("## Memory budget", "",
               f"{model.name}, {model.faces:,} faces, budget {BUDGET >> 20} MiB. Each row begins "
-              "with a newly opened model; the file is in the page cache. *visited* and *loaded*: subtrees per query. *KiB read*: "
-              "per query. Times are wall-clock times in us; background threads may use all cores.")
+              "with a newly opened model; the file is in the page cache. *visited* and *loaded*: "
+              "subtrees per query. *KiB read*: per query. Times are wall-clock times in us; background threads may use all cores.")
     page.table(["query", "points", "queries", "visited", "loaded", "KiB read", "mean", "p50",
                 "p99", "p99.9", "max", "peak MiB"],
                [[query, points, f"{r['count']:,}", figure((r["hits"] + r["loads"]) / r["count"]),
@@ -259,8 +259,8 @@ def section_budget(page, model, rows):
 
 def section_opening(bench, page, models):
     page.text("## Opening", "",
-              "Seconds from a cold file (`posix_fadvise` before each run) to the first result. Embree and CGAL load the PLY and build "
-              "a tree. Ours decodes the whole file on one core (*all*), or only levels 0 to "
+              "Seconds from a cold file (`posix_fadvise` before each run) to the first result. "
+              "Embree and CGAL load the PLY and build a tree. Ours decodes the whole file on one core (*all*), or only levels 0 to "
               f"{CUT} and the subtrees that the query needs (*cut*).")
     rows = []
     for query in ["inside", "distance"]:
@@ -386,11 +386,12 @@ class Made:
 POINTS = {
     "distance": ("Nearest point",
                  "Ours is exact, signed and in double precision; each search begins "
-                 "with the previous result. *not warm*: without the previous result. "
+                 "with the previous result, except *not warm*. "
                  "Embree's point query is in single precision; *Embree, warm*: its search "
                  "radius comes from the previous result."),
     "inside": ("Point in solid",
-               "Embree counts the hits of a ray in single precision (robust scene). CGAL's `Side_of_triangle_mesh` is exact. "
+               "Embree counts the hits of a ray in single precision (robust scene). CGAL's "
+               "`Side_of_triangle_mesh` is exact. "
                "*differs*: results that differ from ours, points on the surface excluded."),
 }
 

@@ -210,7 +210,7 @@ def section_peers(page, results):
     page.text("### Trees in memory", "",
               "The trees are Embree 3's BVH (medium quality, robust, single precision, all cores) "
               "and CGAL's AABB tree (double, one core). The ratios include reading the "
-              "cold PLY. These trees stay in memory; ours is a file with levels of detail.")
+              "cold PLY.")
     rows = []
     for r in results:
         row = [f"{r['millions']:g} M"]

@@ -138,7 +138,7 @@ The page compares the bytes of the levels of a file with the binary PLY of the m
 results do not depend on the machine.
 
 - *Bytes*: all bytes of the file up to the end of the level, header included (`ebpo levels`).
-- *Excess*: volume of the envelopes minus volume of the solid, in percent of the solid. The envelopes contain the solid.
+- *Excess*: volume of the envelopes minus volume of the solid, in percent of the solid.
 - *Vertex distance*: maximum distance of an envelope vertex from the solid (`ebpo distance`), in percent of the box
   diagonal. The one-sided Hausdorff distance is at least this value.
 
