@@ -305,3 +305,23 @@ ebpo_status ebpo_sort_run(const ebpo_sort *sort, ebpo_error *error)
     free(t.in_bin);
     return status;
 }
+
+static int compare_numbers(const void *a, const void *b)
+{
+    uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
+    return (x > y) - (x < y);
+}
+
+void ebpo_sort_numbers(uint64_t *numbers, uint64_t count)
+{
+    if (count > 32) {
+        qsort(numbers, count, sizeof *numbers, compare_numbers);
+        return;
+    }
+    for (uint64_t i = 1; i < count; i++) {
+        uint64_t number = numbers[i], at = i;
+        for (; at > 0 && numbers[at - 1] > number; at--)
+            numbers[at] = numbers[at - 1];
+        numbers[at] = number;
+    }
+}

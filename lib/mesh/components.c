@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "core/alloc.h"
+#include "core/disjoint_sets.h"
 #include "core/workspace.h"
 #include "core/error.h"
 #include "core/fp_env.h"
@@ -17,20 +18,6 @@
 #include "mesh/textures.h"
 
 /* ---- faces connected by vertices ---- */
-
-static uint32_t root_of(uint32_t *above, uint32_t v)
-{
-    while (above[v] != v)
-        v = above[v] = above[above[v]];
-    return v;
-}
-
-static void join_trees(uint32_t *above, uint32_t a, uint32_t b)
-{
-    a = root_of(above, a);
-    b = root_of(above, b);
-    above[a < b ? b : a] = a < b ? a : b;
-}
 
 ebpo_status ebpo_components_check(const ebpo_mesh *mesh, ebpo_error *error)
 {
@@ -61,8 +48,8 @@ static void join_vertices(const ebpo_mesh *mesh, const uint32_t *closed, uint32_
         const uint32_t *corner = mesh->faces + 3 * f;
         if (closed && closed[f] != EBPO_NO_INDEX)
             continue;
-        join_trees(above, corner[0], corner[1]);
-        join_trees(above, corner[0], corner[2]);
+        ebpo_set_join(above, corner[0], corner[1]);
+        ebpo_set_join(above, corner[0], corner[2]);
     }
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, v, 0, mesh->vertex_count)
         above[v] = above[above[v]]; /* lower vertices have their final root */

@@ -17,6 +17,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/parallel.h"
+#include "core/sort.h"
 #include "extras/boolean/cut_mesh.h"
 #include "geometry/predicates.h"
 
@@ -34,27 +35,6 @@ typedef struct edge_lists {
 static uint32_t other_vertex(uint64_t edge) { return (uint32_t)(edge >> 32); }
 
 static uint32_t triangle_of(uint64_t edge) { return (uint32_t)edge >> 1; }
-
-static int order_edges(const void *a, const void *b)
-{
-    uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
-    return (x > y) - (x < y);
-}
-
-/* Lists are short: most have some three edges. */
-static void sort_list(uint64_t *list, uint64_t count)
-{
-    if (count > 32) {
-        qsort(list, count, sizeof *list, order_edges);
-        return;
-    }
-    for (uint64_t i = 1; i < count; i++) {
-        uint64_t edge = list[i], at = i;
-        for (; at > 0 && list[at - 1] > edge; at--)
-            list[at] = list[at - 1];
-        list[at] = edge;
-    }
-}
 
 static ebpo_status list_edges(edge_lists *e, const ebpo_cut_mesh *cut, ebpo_error *error)
 {
@@ -77,7 +57,7 @@ static ebpo_status list_edges(edge_lists *e, const ebpo_cut_mesh *cut, ebpo_erro
             e->edge[end[a < b ? a : b]++] = (uint64_t)(a < b ? b : a) << 32 | t << 1 | (a > b);
         }
     for (uint64_t v = 0; v < vertices; v++)
-        sort_list(e->edge + e->begin[v], e->begin[v + 1] - e->begin[v]);
+        ebpo_sort_numbers(e->edge + e->begin[v], e->begin[v + 1] - e->begin[v]);
     return EBPO_OK;
 }
 

@@ -9,8 +9,10 @@
 #include <stdlib.h>
 
 #include "core/alloc.h"
+#include "core/disjoint_sets.h"
 #include "core/error.h"
 #include "core/parallel.h"
+#include "core/sort.h"
 #include "core/workspace.h"
 #include "extras/boolean/operand_mesh.h"
 #include "geometry/predicates.h"
@@ -107,43 +109,7 @@ static void list_touched(joining *j)
 
 /* --- joining --- */
 
-static uint32_t find_root(uint32_t *parent, uint32_t face)
-{
-    while (parent[face] != face) {
-        parent[face] = parent[parent[face]];
-        face = parent[face];
-    }
-    return face;
-}
-
-static void join_two(uint32_t *parent, uint32_t a, uint32_t b)
-{
-    a = find_root(parent, a);
-    b = find_root(parent, b);
-    parent[a > b ? a : b] = a > b ? b : a;
-}
-
 static uint32_t face_of(uint64_t edge) { return (uint32_t)edge >> 1; }
-
-static int order_edges(const void *a, const void *b)
-{
-    uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
-    return (x > y) - (x < y);
-}
-
-static void sort_list(uint64_t *list, uint64_t count)
-{
-    if (count > 32) {
-        qsort(list, count, sizeof *list, order_edges);
-        return;
-    }
-    for (uint64_t i = 1; i < count; i++) {
-        uint64_t edge = list[i], at = i;
-        for (; at > 0 && list[at - 1] > edge; at--)
-            list[at] = list[at - 1];
-        list[at] = edge;
-    }
-}
 
 /* Joins the faces of one edge, if they are two and whole. Returns false if the edge is not closed.
  */
@@ -156,7 +122,7 @@ static bool join_edge(joining *j, const uint64_t *list, uint64_t count)
         balance += list[i] & 1 ? -1 : 1;
     }
     if (count == 2)
-        join_two(j->out->component, face_of(list[0]), face_of(list[1]));
+        ebpo_set_join(j->out->component, face_of(list[0]), face_of(list[1]));
     for (uint64_t i = 0; i < count && count > 2; i++)
         ebpo_set_bit(j->out->listed, face_of(list[i]));
     return balance == 0;
@@ -165,7 +131,7 @@ static bool join_edge(joining *j, const uint64_t *list, uint64_t count)
 static bool join_list(joining *j, uint64_t *list, uint64_t count)
 {
     bool closed = true;
-    sort_list(list, count);
+    ebpo_sort_numbers(list, count);
     for (uint64_t i = 0, next; i < count; i = next) {
         for (next = i + 1; next < count && list[next] >> 32 == list[i] >> 32;)
             next++;
