@@ -16,6 +16,8 @@
 #include "geometry/vec3.h"
 
 #define NONE UINT32_MAX
+/* Vertices with more corners in both lists do not collapse: each attempt walks along the lists. */
+enum { MOST_CORNERS = 512 };
 /* Weight of the planes at open edges, weight of the squared length of an edge, and the least cosine
  * between the normals of a triangle before and after a collapse. */
 static const double OPEN_WEIGHT = 10, LENGTH_WEIGHT = 1e-4, LEAST_COSINE = 0.25;
@@ -33,10 +35,11 @@ typedef struct candidate {
 typedef struct simplifier {
     ebpo_patch_mesh *mesh;
     quadric *sum;
-    uint32_t *next; /* [3 * triangles] next corner of the same vertex */
-    uint32_t *head; /* [vertices] a corner, or NONE */
-    uint32_t *age;  /* [vertices] number of changes */
-    uint32_t *mark; /* [vertices] last mark */
+    uint32_t *next;    /* [3 * triangles] next corner of the same vertex */
+    uint32_t *head;    /* [vertices] a corner, or NONE */
+    uint32_t *corners; /* [vertices] at least the number of living corners in the list */
+    uint32_t *age;     /* [vertices] number of changes */
+    uint32_t *mark;    /* [vertices] last mark */
     uint32_t marks;
     bool *dead; /* [triangles] */
     candidate *heap;
@@ -78,10 +81,15 @@ static void cross_of(const double a[3], const double b[3], const double c[3], do
     ebpo_vec3_cross(u, v, out);
 }
 
-/* Returns the number of living triangles with both vertices. */
+/* Returns the number of living triangles with both vertices, or 2 if there are more. */
 static unsigned count_shared(const simplifier *s, uint32_t a, uint32_t b)
 {
     unsigned count = 0;
+    if (s->corners[b] < s->corners[a]) { /* walk along the shorter list */
+        uint32_t other = a;
+        a = b;
+        b = other;
+    }
     uint32_t c = s->head[a];
     if (c == NONE)
         return 0;
@@ -90,7 +98,7 @@ static unsigned count_shared(const simplifier *s, uint32_t a, uint32_t b)
         if (!s->dead[c / 3] && (t[0] == b || t[1] == b || t[2] == b))
             count++;
         c = s->next[c];
-    } while (c != s->head[a]);
+    } while (c != s->head[a] && count < 2);
     return count;
 }
 
@@ -179,6 +187,29 @@ static void offer_collapse(simplifier *s, uint32_t from, uint32_t to)
     push_candidate(s, (candidate){ cost, from, to, s->age[from], s->age[to] });
 }
 
+/* Removes the corners of dead triangles from the list of a vertex; keeps one if all are dead. */
+static void remove_dead_corners(simplifier *s, uint32_t v)
+{
+    uint32_t begin = s->head[v], c = begin, first = NONE, last = NONE, count = 0;
+    do {
+        uint32_t after = s->next[c];
+        if (!s->dead[c / 3]) {
+            if (first == NONE)
+                first = c;
+            else
+                s->next[last] = c;
+            last = c;
+            count++;
+        }
+        c = after;
+    } while (c != begin);
+    if (first == NONE)
+        first = last = begin;
+    s->next[last] = first;
+    s->head[v] = first;
+    s->corners[v] = count;
+}
+
 /* Calls offer_collapse for the edges of a vertex, in both directions; for only one of them if
  * `lower`. */
 static void offer_edges(simplifier *s, uint32_t v, bool lower)
@@ -235,6 +266,8 @@ static bool is_possible(simplifier *s, uint32_t from, uint32_t to)
 {
     unsigned shared = 0, common = 0;
     bool open = false;
+    if ((uint64_t)s->corners[from] + s->corners[to] > MOST_CORNERS)
+        return false;
     mark_neighbours(s, to);
     uint32_t of_to = s->marks, seen = ++s->marks, c = s->head[from];
     do {
@@ -276,6 +309,7 @@ static void collapse_edge(simplifier *s, uint32_t from, uint32_t to)
     s->next[s->head[to]] = s->next[s->head[from]];
     s->next[s->head[from]] = after;
     s->head[from] = NONE;
+    remove_dead_corners(s, to);
     for (int k = 0; k < 3; k++) {
         v->normal[k] += u->normal[k];
         v->colour[k] += u->colour[k];
@@ -327,6 +361,7 @@ static void collapse_edges(simplifier *s, uint64_t target)
         if (*head != NONE)
             s->next[*head] = c;
         *head = c;
+        s->corners[m->triangle[c]]++;
     }
     for (uint64_t t = 0; t < m->triangle_count; t++)
         add_triangle(s, t);
@@ -349,10 +384,11 @@ ebpo_status ebpo_simplify(ebpo_patch_mesh *mesh, uint64_t target, ebpo_error *er
     s.sum = ebpo_alloc_zero(vertices, sizeof *s.sum);
     s.next = ebpo_alloc(triangles, 3 * sizeof *s.next);
     s.head = ebpo_alloc(vertices, sizeof *s.head);
+    s.corners = ebpo_alloc_zero(vertices, sizeof *s.corners);
     s.age = ebpo_alloc_zero(vertices, sizeof *s.age);
     s.mark = ebpo_alloc_zero(vertices, sizeof *s.mark);
     s.dead = ebpo_alloc_zero(triangles, sizeof *s.dead);
-    bool made = s.sum && s.next && s.head && s.age && s.mark && s.dead;
+    bool made = s.sum && s.next && s.head && s.corners && s.age && s.mark && s.dead;
     if (made) {
         collapse_edges(&s, target);
         compact_mesh(&s, s.head);
@@ -360,6 +396,7 @@ ebpo_status ebpo_simplify(ebpo_patch_mesh *mesh, uint64_t target, ebpo_error *er
     free(s.sum);
     free(s.next);
     free(s.head);
+    free(s.corners);
     free(s.age);
     free(s.mark);
     free(s.dead);

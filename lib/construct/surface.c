@@ -53,7 +53,7 @@ typedef struct patch_node {
     uint64_t after;      /* the next node that is not below this one */
     ebpo_patch_mesh mesh;
     ebpo_patch_rows rows;
-    double error; /* scaled like coordinates; INFINITY: unknown */
+    double error; /* scaled like coordinates; INFINITY: the node has no patch */
     uint64_t triangles, vertices;
     bool made, stored;
 } patch_node;
@@ -374,8 +374,6 @@ static ebpo_patch_vertex *enter_vertex(ebpo_patch_mesh *mesh, key_table *table, 
 
 static bool add_triangle(ebpo_patch_mesh *mesh, const uint32_t t[3])
 {
-    if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0])
-        return true;
     if (!ebpo_grow(&mesh->triangle, &mesh->triangle_capacity, mesh->triangle_count + 1,
                    3 * sizeof *mesh->triangle))
         return false;
@@ -409,6 +407,8 @@ static void widen_uses(ebpo_patch_vertex *v, uint64_t lowest, uint64_t highest)
     v->highest = highest > v->highest ? highest : v->highest;
 }
 
+/* Adds all faces, also those with repeated corners, because the error bounds their distances too.
+ */
 static bool add_faces(const surface_builder *b, ebpo_patch_mesh *mesh, uint64_t first, uint64_t end)
 {
     const uint32_t *corner = b->tree->mesh.faces + 3 * first;
@@ -465,6 +465,21 @@ static bool add_patch(ebpo_patch_mesh *mesh, key_table *table, const ebpo_patch_
     return made;
 }
 
+/* Returns false if all triangles of a node collapse into the vertices of cells on its border. */
+static bool has_patch(const patch_node *node) { return isfinite(node->error); }
+
+/* Adds the faces of the children that have no patch. They are no part of the node's patch; the
+ * error bounds their distance from it. */
+static bool add_collapsed_children(const surface_builder *b, const patch_node *node,
+                                   ebpo_patch_mesh *mesh)
+{
+    bool made = true;
+    for (uint64_t i = (uint64_t)(node - b->node) + 1; i < node->after && made; i = b->node[i].after)
+        if (!has_patch(&b->node[i]))
+            made = add_faces(b, mesh, b->node[i].first, b->node[i].end);
+    return made;
+}
+
 /* Makes the surface of a node's faces, or of the patches of its children. Frees these patches. */
 static bool gather_surface(surface_builder *b, const patch_node *node, ebpo_patch_mesh *mesh,
                            double *error)
@@ -478,7 +493,8 @@ static bool gather_surface(surface_builder *b, const patch_node *node, ebpo_patc
     for (; i < node->after && made; i = b->node[i].after) {
         patch_node *child = &b->node[i];
         made = add_patch(mesh, &table, &child->mesh);
-        *error = fmax(*error, child->error);
+        if (has_patch(child))
+            *error = fmax(*error, child->error);
         ebpo_patch_mesh_free(&child->mesh);
     }
     free(table.slot);
@@ -530,7 +546,9 @@ static bool snap_border(surface_builder *b, const patch_node *node, const ebpo_p
     }
     for (uint64_t i = 0; i < from->triangle_count && made; i++) {
         const uint32_t *t = from->triangle + 3 * i;
-        made = add_triangle(to, (uint32_t[3]){ number[t[0]], number[t[1]], number[t[2]] });
+        uint32_t a = number[t[0]], second = number[t[1]], c = number[t[2]];
+        if (a != second && second != c && c != a)
+            made = add_triangle(to, (uint32_t[3]){ a, second, c });
     }
     free(number);
     free(table.slot);
@@ -629,6 +647,8 @@ static ebpo_status make_patch(surface_builder *b, patch_node *node, ebpo_error *
         status = ebpo_fail_memory(error, from.vertex_count * sizeof *from.vertex);
     if (status == EBPO_OK)
         status = ebpo_simplify(&node->mesh, from.triangle_count / REDUCTION, error);
+    if (status == EBPO_OK && !add_collapsed_children(b, node, &from))
+        status = ebpo_fail_memory(error, from.triangle_count * 3 * sizeof *from.triangle);
     if (status == EBPO_OK && !add_hidden_vertices(&node->mesh))
         status = ebpo_fail_memory(error, node->mesh.vertex_count * sizeof *from.vertex);
     if (status == EBPO_OK) {
@@ -637,7 +657,7 @@ static ebpo_status make_patch(surface_builder *b, patch_node *node, ebpo_error *
     }
     node->made = true;
     node->error = INFINITY;
-    if (status == EBPO_OK && node->mesh.triangle_count && isfinite(before)) {
+    if (status == EBPO_OK && node->mesh.triangle_count) {
         node->stored = move_to_grid(b, node, &node->mesh, point);
         status = bound_error(b, node, &from, before, error);
         if (status == EBPO_OK && node->stored)
