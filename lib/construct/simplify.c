@@ -1,10 +1,10 @@
 /* Simplifies the triangles of a patch by collapsing edges in the order of their quadric error.
  *
  * The quadric of a vertex is the sum of the squared distances from the planes of its triangles,
- * weighted by area. A collapse moves a vertex onto a neighbour; its cost is the quadric of both at
- * the neighbour. Edges with one triangle also have a plane across the triangle, which keeps open
- * borders in place. The corners of each vertex are a circular list, and a collapse joins two lists.
- */
+ * weighted by area. A collapse moves a vertex onto a neighbour; its cost is the sum of the quadrics
+ * of both vertices at the neighbour's position. An edge with one triangle also has a plane across
+ * the triangle, which keeps open borders in place. The corners of each vertex are a circular list,
+ * and a collapse joins two lists. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -81,7 +81,7 @@ static void cross_of(const double a[3], const double b[3], const double c[3], do
     ebpo_vec3_cross(u, v, out);
 }
 
-/* Returns the number of living triangles with both vertices, or 2 if there are more. */
+/* Returns the number of living triangles that have both vertices, or 2 if there are more. */
 static unsigned count_shared(const simplifier *s, uint32_t a, uint32_t b)
 {
     unsigned count = 0;
@@ -210,8 +210,8 @@ static void remove_dead_corners(simplifier *s, uint32_t v)
     s->corners[v] = count;
 }
 
-/* Calls offer_collapse for the edges of a vertex, in both directions; for only one of them if
- * `lower`. */
+/* Calls offer_collapse in both directions for each edge of a vertex; if `lower`, only for edges
+ * whose other vertex has a higher number. */
 static void offer_edges(simplifier *s, uint32_t v, bool lower)
 {
     uint32_t c = s->head[v];
@@ -260,8 +260,8 @@ static bool keeps_side(const simplifier *s, const uint32_t t[3], uint32_t from, 
     return !(ebpo_vec3_dot(before, before) > 0) || dot > LEAST_COSINE * sqrt(square);
 }
 
-/* Returns true if a collapse keeps the topology (the vertices next to both ends are those of their
- * common triangles) and the sides of all triangles. */
+/* Returns true if a collapse keeps the topology (each vertex next to both ends is a vertex of a
+ * triangle that has both ends) and the sides of all triangles. */
 static bool is_possible(simplifier *s, uint32_t from, uint32_t to)
 {
     unsigned shared = 0, common = 0;

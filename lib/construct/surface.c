@@ -1,18 +1,20 @@
 /* Builds the part `surface`: a patch for the root, and for the children of each node with a patch
  * and many faces (format-spec/surface.md).
  *
- * The faces that are new below a node are a range of the model's faces. The patch of a node without
- * patches below it is made from these faces, and that of another node from the patches of its
- * children. Each patch has about a quarter of the triangles that it is made from.
+ * The faces that are new below a node are a range of the model's faces. If a node has no patches
+ * below it, its patch is made from these faces; otherwise the patch is made from the patches of the
+ * node's children. Each patch has about a quarter as many triangles as the faces or patches that it
+ * is made from.
  *
- * A vertex on the border of a patch, which other faces use too, is replaced by one vertex for its
- * cell, EBPO_PATCH_CELLS levels below the node. The vertex of a cell depends on the model only, so
- * neighbours agree: it is at the mean of the vertices in the cell that are on borders at that
- * level. Vertices on borders do not move when a patch is simplified.
+ * A vertex is on the border of a patch if faces outside the patch use it too. Each border vertex is
+ * replaced by the vertex of the cell that contains it, EBPO_PATCH_CELLS levels below the node. The
+ * vertex of a cell is at the mean of the model's vertices that are in the cell and on borders at
+ * the node's level. This mean depends on the model only, so neighbouring patches have the same
+ * vertex. Vertices on borders do not move when a patch is simplified.
  *
  * The error of a patch is the distance between the patch and the surface it is made from, in both
- * directions, plus the greatest error of that surface. Nodes with at most TASK_FACES faces are
- * built in parallel, with all nodes below; then the nodes above. */
+ * directions, plus the greatest error of that surface. Nodes with at most TASK_FACES faces, and all
+ * nodes below them, are built in parallel; then the nodes above them are built. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -58,7 +60,8 @@ typedef struct patch_node {
     bool made, stored;
 } patch_node;
 
-/* The vertex of a cell: sums over the corners of faces that are on the border of a patch. */
+/* The vertex that replaces the border vertices in a cell, as sums over the corners of faces at
+ * these vertices. */
 typedef struct cell_vertex {
     uint64_t key;
     double at[3]; /* in the root cell, 0 to 1 */
@@ -70,7 +73,8 @@ typedef struct cell_table {
     uint64_t slots, count;
 } cell_table;
 
-/* The faces of a level between which no border is: a node with a patch, or faces between two. */
+/* A range of faces that no border of a level divides: the faces of a node with a patch, or the
+ * faces between two nodes with patches. */
 typedef struct face_interval {
     uint64_t first, end;
 } face_interval;
@@ -89,7 +93,7 @@ typedef struct surface_builder {
     uint64_t interval_count[LEVELS];
     cell_table table[LEVELS];
     uint32_t *highest; /* [vertices] last face that uses the vertex */
-    uint32_t *lowest;  /* [vertices] first face */
+    uint32_t *lowest;  /* [vertices] first face that uses the vertex */
     ebpo_colour_column colour[EBPO_COLOUR_CHANNELS];
     bool coloured, by_face;
     uint64_t *task; /* nodes that are built in parallel */
@@ -113,8 +117,8 @@ static bool add_node(surface_builder *b, ebpo_cell cell, uint64_t first, uint64_
     return true;
 }
 
-/* Lists a gray node and the nodes below that have patches if it has one. Returns the end of its
- * faces. Recursive, one call for each level. */
+/* Lists a gray node with faces; and if it has more than MOST_FACES, the nodes with faces below it.
+ * Returns the end of the node's faces. Recursive, one call for each level. */
 static uint64_t list_nodes(surface_builder *b, ebpo_cell cell, uint64_t first)
 {
     int below = cell.level + 1;
@@ -170,8 +174,8 @@ static uint64_t cell_key(const uint32_t at[3])
     return (uint64_t)at[2] << 42 | (uint64_t)at[1] << 21 | at[0];
 }
 
-/* Returns the key of the cell of a point, which is in the root cell (0 to 1), for the borders of
- * patches of a level. */
+/* Returns the key of the cell that contains a point, for the borders of patches at a level. The
+ * coordinates of the point are 0 to 1 in the root cell. */
 static uint64_t key_of_point(const double unit[3], int node_level)
 {
     double cells = ldexp(1, node_level + EBPO_PATCH_CELLS);
@@ -219,8 +223,8 @@ static cell_vertex *enter_cell(cell_table *table, uint64_t key)
     return found;
 }
 
-/* A face: its corners, scaled and in the root cell (0 to 1); its normal, as long as twice the area;
- * a weight that is not zero without area. */
+/* A face: its corners, scaled and in the root cell (0 to 1); its normal, whose length is twice the
+ * area; `weight`, this length plus a small number, so that faces without area have a weight. */
 typedef struct scaled_face {
     double corner[3][3], unit[3][3], normal[3], weight;
 } scaled_face;
@@ -271,7 +275,7 @@ static bool add_corner(surface_builder *b, int level, uint64_t face, const scale
     return true;
 }
 
-/* Adds the corners of all faces that are on a border of a level to the vertices of their cells. */
+/* Adds each corner of a face that is on a border to the vertex of its cell, at each level. */
 static bool add_borders(surface_builder *b)
 {
     const ebpo_mesh *mesh = &b->tree->mesh;
@@ -324,7 +328,7 @@ typedef struct key_table {
     uint64_t slots;
 } key_table;
 
-/* Keys of vertices of the model have this bit, keys of cells have not. */
+/* This bit is 1 in keys of vertices of the model, and 0 in keys of cells. */
 static const uint64_t MODEL_VERTEX = UINT64_C(1) << 63;
 
 static bool grow_keys(key_table *table, const ebpo_patch_mesh *mesh)
@@ -347,8 +351,8 @@ static bool grow_keys(key_table *table, const ebpo_patch_mesh *mesh)
     return true;
 }
 
-/* Returns the vertex with a key, which is new if *is_new; NULL if memory is short. Key UINT64_MAX:
- * always new. */
+/* Returns the vertex with a key. If there is none, or the key is UINT64_MAX, adds a vertex and sets
+ * *is_new. Returns NULL if memory is short. */
 static ebpo_patch_vertex *enter_vertex(ebpo_patch_mesh *mesh, key_table *table, uint64_t key,
                                        bool *is_new)
 {
@@ -381,7 +385,7 @@ static bool add_triangle(ebpo_patch_mesh *mesh, const uint32_t t[3])
     return true;
 }
 
-/* Sets a vertex to that of its cell. */
+/* Moves a vertex to the vertex of its cell. */
 static void set_cell_vertex(const surface_builder *b, ebpo_patch_vertex *v, int node_level,
                             uint64_t key)
 {
@@ -480,7 +484,8 @@ static bool add_collapsed_children(const surface_builder *b, const patch_node *n
     return made;
 }
 
-/* Makes the surface of a node's faces, or of the patches of its children. Frees these patches. */
+/* Makes the surface that a node's patch simplifies: the node's faces, or the patches of its
+ * children. Frees the children's patches. */
 static bool gather_surface(surface_builder *b, const patch_node *node, ebpo_patch_mesh *mesh,
                            double *error)
 {
@@ -512,7 +517,7 @@ static uint64_t key_of_vertex(const surface_builder *b, uint32_t vertex, int nod
     return key_of_point(p, node_level);
 }
 
-/* Moves the vertices on the border of a node's patch to those of their cells. */
+/* Moves the vertices on the border of a node's patch to the vertices of their cells. */
 static bool snap_border(surface_builder *b, const patch_node *node, const ebpo_patch_mesh *from,
                         ebpo_patch_mesh *to)
 {
@@ -525,7 +530,7 @@ static bool snap_border(surface_builder *b, const patch_node *node, const ebpo_p
         uint64_t key = UINT64_MAX;
         if (border && old->key & MODEL_VERTEX) {
             key = key_of_vertex(b, (uint32_t)old->key, node->cell.level);
-        } else if (border) { /* the parent of a cell of the level below */
+        } else if (border) { /* the old key is of a cell one level finer: take its parent */
             uint32_t at[3] = { (old->key & 0x1fffff) >> 1, (old->key >> 21 & 0x1fffff) >> 1,
                                (uint32_t)(old->key >> 43) };
             key = cell_key(at);
@@ -555,8 +560,8 @@ static bool snap_border(surface_builder *b, const patch_node *node, const ebpo_p
     return made;
 }
 
-/* Moves the vertices to the grid of the patch, and gets their numbers of steps. Returns false if
- * one is too far from the node. */
+/* Moves the vertices to the grid of the patch, and gets their coordinates in steps of the grid.
+ * Returns false if a vertex is too far from the node. */
 static bool move_to_grid(const surface_builder *b, const patch_node *node, ebpo_patch_mesh *mesh,
                          int16_t *point)
 {
@@ -617,8 +622,8 @@ static ebpo_status bound_error(const surface_builder *b, patch_node *node,
     return status;
 }
 
-/* Adds a vertex without triangles for each border vertex whose edges all have two triangles, so
- * that readers know the vertex of its cell. */
+/* Adds a vertex without triangles at each border vertex whose edges all have two triangles. Readers
+ * take vertices without triangles as border vertices, so they find the vertex of the cell. */
 static bool add_hidden_vertices(ebpo_patch_mesh *mesh)
 {
     uint64_t count = mesh->vertex_count;
@@ -668,7 +673,7 @@ static ebpo_status make_patch(surface_builder *b, patch_node *node, ebpo_error *
     return status;
 }
 
-/* Makes the patches of a node and of the nodes below. Recursive, one call for each level. */
+/* Makes the patches of a node and of all nodes below it. Recursive, one call for each level. */
 static ebpo_status make_below(surface_builder *b, uint64_t i, ebpo_error *error)
 {
     patch_node *node = &b->node[i];
@@ -731,7 +736,7 @@ static void copy_patch(ebpo_surface *to, const patch_node *node, double step)
     to->vertex_count += node->vertices;
 }
 
-/* Omits the patches below a node unless all its children have one. */
+/* Omits the patches below a node unless all its children have patches. */
 static void select_patches(const surface_builder *b, uint64_t i, double step, bool wanted)
 {
     bool all = wanted;

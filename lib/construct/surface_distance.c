@@ -1,10 +1,11 @@
 /* Bounds the greatest distance of the points of a surface from another surface.
  *
  * The distance to one triangle is convex, so over a triangle its maximum is at a corner. Over a
- * triangle of the first surface, the distance is therefore at most the greatest distance of its
- * corners from one triangle of the second surface, and at most the distance of its centre plus its
- * radius. The triangle is halved until one of the bounds is close enough to the greatest distance
- * of a point so far. The second surface is in a complete binary tree of boxes. */
+ * triangle of the first surface, the distance is therefore at most the greatest distance of the
+ * triangle's corners from one triangle of the second surface, and at most the distance of the
+ * triangle's centre plus its radius. The triangle is halved until one of the bounds is close enough
+ * to the greatest distance of a point so far. The second surface is in a complete binary tree of
+ * boxes. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -15,7 +16,7 @@
 #include "core/alloc.h"
 #include "geometry/vec3.h"
 
-/* SAMPLED: of so many triangles, the distance of one vertex is computed first. */
+/* SAMPLED: the distance of a vertex of every SAMPLED-th triangle is computed first. */
 enum { LEAF_TRIANGLES = 4, DEEPEST = 64, SAMPLED = 8 };
 static const double CLOSE_ENOUGH = 1.05;
 
@@ -52,7 +53,8 @@ static double segment_square(const double p[3], const double a[3], const double 
     return ebpo_vec3_dot(v, v);
 }
 
-/* Returns the squared distance of p from a point of the triangle, the nearest but for rounding. */
+/* Returns the squared distance of p from a point of the triangle, which is nearest to p except for
+ * rounding errors. */
 static double triangle_square(const double p[3], const double t[3][3])
 {
     double edge[3][3], n[3], v[3];
@@ -128,8 +130,8 @@ static double box_square(const bounds *b, const double p[3])
     return sum;
 }
 
-/* Finds a nearest triangle, or one whose squared distance is at most `good`; `guess` is one that is
- * probably near. */
+/* Finds the triangle nearest to p, or a triangle whose squared distance is at most `good`. `guess`
+ * is a triangle that is probably near. */
 static hit find_nearest(const search *s, const double p[3], uint64_t guess, double good)
 {
     hit best = { square_to(s, guess, p), guess };
@@ -147,7 +149,7 @@ static hit find_nearest(const search *s, const double p[3], uint64_t guess, doub
         if (i < s->leaves) {
             double left = box_square(&s->node[2 * i], p),
                    right = box_square(&s->node[2 * i + 1], p);
-            bool swap = left < right; /* the nearer one is pushed last */
+            bool swap = left < right; /* the nearer child is pushed last */
             stack[depth].node = 2 * i + swap;
             stack[depth++].square = swap ? right : left;
             stack[depth].node = 2 * i + !swap;
@@ -184,7 +186,8 @@ static double enough_of(const bounding *b)
     return fmax(b->known, fmax(b->most * CLOSE_ENOUGH, b->most + b->fine));
 }
 
-/* Bounds the distance over a triangle whose corners are farther than enough from the guess. */
+/* Bounds the distance over a triangle. Halves the triangle until the bound is at most
+ * enough_of(b). */
 static void bound_triangle(bounding *b, double p[3][3], int depth)
 {
     double centre[3], radius = 0;
@@ -225,8 +228,8 @@ static void bound_triangle(bounding *b, double p[3][3], int depth)
     }
 }
 
-/* Bounds the distance over triangle t of `a`. First tries triangles that were near its neighbours;
- * `near` has one for each vertex, or UINT64_MAX. */
+/* Bounds the distance over triangle t of `a`. First tries the triangles of `b` that were near the
+ * neighbours of t: `near` has a triangle for each vertex of `a`, or UINT64_MAX. */
 static void bound_from_neighbours(bounding *b, const ebpo_patch_mesh *a, uint64_t t, uint64_t *near)
 {
     const uint32_t *corners = a->triangle + 3 * t;

@@ -2,8 +2,9 @@
  *
  * A patch is a list of triangles, most of which share an edge with a recent triangle. The coder and
  * the decoder keep the last edges and the last vertices; a byte names an edge and the third vertex.
- * New vertices are numbered in this order. A vertex is stored as the difference from the fourth
- * corner of a parallelogram over the triangle beyond the edge. Source: format-spec/surface.md. */
+ * New vertices are numbered in the order of the triangles. A vertex is stored as the difference
+ * from the fourth corner of a parallelogram over the triangle beyond the edge. Source:
+ * format-spec/surface.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -31,7 +32,7 @@ typedef struct recent_edge {
 
 typedef struct recent {
     recent_edge edge[EDGES];
-    uint32_t vertex[VERTICES]; /* the last one first */
+    uint32_t vertex[VERTICES]; /* the last vertex first */
     unsigned edges, vertices;
 } recent;
 
@@ -55,7 +56,7 @@ static void add_vertex(recent *r, uint32_t v)
     r->vertex[0] = v;
 }
 
-/* Adds the edges of a triangle, in the direction in which its neighbours have them. */
+/* Adds the edges of a triangle in the direction that they have in the neighbouring triangles. */
 static void add_edges(recent *r, const uint32_t t[3], bool first_too)
 {
     if (first_too)
@@ -64,7 +65,8 @@ static void add_edges(recent *r, const uint32_t t[3], bool first_too)
     add_edge(r, t[2], t[1], t[0]);
 }
 
-/* Vertices from which a vertex is predicted: a + b - beyond; the one before if beyond is NONE. */
+/* Vertices from which the position of a vertex is predicted: a + b - beyond. If beyond is NONE, the
+ * prediction is the position of the vertex with the number before. */
 typedef struct prediction {
     uint32_t a, b, beyond;
 } prediction;
@@ -79,7 +81,7 @@ static void predict_point(const int16_t *point, const prediction *p, uint32_t v,
                            point[3 * p->beyond + (uint32_t)k];
 }
 
-/* Returns the vertex with the normal and the colour from which those of v are differences. */
+/* Returns the vertex whose normal and colour are subtracted from the normal and colour of v. */
 static uint32_t vertex_before(const prediction *p, uint32_t v)
 {
     return p->beyond == NONE ? v - 1 : p->a;
@@ -91,11 +93,11 @@ typedef struct coder {
     const ebpo_patch_source *in;
     ebpo_patch_rows *out;
     recent recent;
-    uint32_t *corner; /* hash table of directed edges: corners where they begin */
+    uint32_t *corner; /* hash table of directed edges: corners where edges begin */
     uint64_t slots;
     bool *done;       /* [triangles] */
     uint32_t *number; /* [vertices] new numbers, or NONE */
-    uint32_t *vertex; /* [vertices] former numbers */
+    uint32_t *vertex; /* [vertices] by new number: number in `in` */
     prediction *from; /* [vertices] by new number */
     uint32_t next;
     bool short_of_memory;
@@ -109,7 +111,8 @@ static void put_byte(coder *c, uint32_t byte)
         c->short_of_memory = true;
 }
 
-/* Writes seven bits a byte, the low ones first; the highest bit of a byte: more follow. */
+/* Writes seven bits of the number in each byte, the lowest bits first. The highest bit of a byte is
+ * 1 if more bytes follow. */
 static void put_number(coder *c, uint32_t value)
 {
     for (; value > 127; value >>= 7)
@@ -133,7 +136,7 @@ static void enter_edges(coder *c)
     }
 }
 
-/* Returns the first corner of a triangle that is not done and has the edge, or NONE. */
+/* Returns the corner where a directed edge begins in a triangle that is not done, or NONE. */
 static uint32_t find_corner(const coder *c, uint32_t from, uint32_t to)
 {
     const uint32_t *t = c->in->triangle;
@@ -449,7 +452,8 @@ void ebpo_patch_free(ebpo_patch *patch)
     memset(patch, 0, sizeof *patch);
 }
 
-/* Decodes triangles to `triangle`, which may be NULL. Returns false if the code is wrong. */
+/* Decodes triangles to `triangle`, or only checks the code if `triangle` is NULL. Returns false if
+ * the code is wrong. */
 static bool decode_triangles(decoder *d, uint64_t count, uint32_t *triangle)
 {
     uint32_t t[3];
@@ -579,7 +583,7 @@ void ebpo_surface_summarise(const ebpo_surface *surface, ebpo_info *info)
 static const char *find_row_fault(const ebpo_info *info, const uint64_t *row, uint64_t before)
 {
     uint64_t code = row[EBPO_PATCH_OCTCODE], triangles = row[EBPO_PATCH_TRIANGLES];
-    /* a subset has the numbers of the original file */
+    /* a subset keeps the face numbers of the original file */
     uint64_t most_faces = info->pruned ? UINT32_MAX : info->face_count;
     if (!ebpo_octcode_valid(code) || ebpo_octcode_level(code) > EBPO_PATCH_LEVEL ||
         ebpo_octcode_level(code) >= info->level_count)
@@ -715,7 +719,8 @@ static ebpo_status read_rows(const ebpo_file *file, ebpo_array_id id, uint64_t f
     return status;
 }
 
-/* Removes the patches of other levels from the table. Sets the first vertex and byte of code. */
+/* Keeps only the patches from first_level to last_level in the table. Sets *vertex and *code to the
+ * first vertex and the first byte of code of these patches. */
 static void select_levels(ebpo_surface *s, int first_level, int last_level, uint64_t *vertex,
                           uint64_t *code)
 {

@@ -5,9 +5,9 @@
 #include "format/file_in.h"
 #include "geometry/cells.h"
 
-/* The grid of a patch has 2^EBPO_PATCH_GRID steps along a cell of the node. Vertices on the border
- * of a patch are one for each cell of EBPO_PATCH_CELLS levels below the node. Nodes with patches
- * are at most at level EBPO_PATCH_LEVEL. */
+/* The grid of a patch has 2^EBPO_PATCH_GRID steps along a cell of the node. Each cell
+ * EBPO_PATCH_CELLS levels below the node has at most one vertex on the border of the patch. Nodes
+ * with patches are at most at level EBPO_PATCH_LEVEL. */
 enum { EBPO_PATCH_GRID = 10, EBPO_PATCH_CELLS = 5, EBPO_PATCH_LEVEL = 14 };
 
 /* A patch to encode. */
@@ -27,20 +27,20 @@ typedef struct ebpo_patch_rows {
     uint8_t *normal, *colour;
 } ebpo_patch_rows;
 
-/* Encodes a patch, whose vertices are numbered anew. Returns EBPO_E_MEMORY. */
+/* Encodes a patch; gives its vertices new numbers. Returns EBPO_E_MEMORY. */
 EBPO_MUST_USE ebpo_status ebpo_patch_encode(const ebpo_patch_source *source, ebpo_patch_rows *out,
                                             ebpo_error *error);
 void ebpo_patch_rows_free(ebpo_patch_rows *rows);
 
-/* Returns the size of a step of the error: 2^-32 of the longest side of the root cell. */
+/* Returns the unit of the errors in the file: 2^-32 of the longest side of the root cell. */
 double ebpo_patch_error_step(const ebpo_info *info);
 
 /* Returns the coordinates of a point of a patch of a node at `cell`. */
 void ebpo_patch_position(const ebpo_box *box, ebpo_cell cell, const int16_t point[3],
                          double out[3]);
 
-/* Marks the vertices of triangles that are on the border of a patch: those at edges with one
- * triangle, and those without triangles. Returns false if memory is short. */
+/* Marks the vertices on the border of a patch: vertices of edges with one triangle, and vertices
+ * without triangles. Returns false if memory is short. */
 EBPO_MUST_USE bool ebpo_patch_mark_border(const uint32_t *triangle, uint64_t triangles,
                                           uint64_t vertices, bool *border);
 

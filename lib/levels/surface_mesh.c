@@ -1,10 +1,10 @@
 /* Joins patches of the simplified surface to one mesh without cracks.
  *
- * A vertex on the border of a patch is the only one in its cell on borders of that level. The cell
- * is EBPO_PATCH_CELLS levels below the node. Patches are joined from coarse to fine: a vertex on
- * the border of a finer patch is replaced by that of the coarsest cell that contains it and has a
+ * On the borders of the patches of a level there is one vertex for each cell, EBPO_PATCH_CELLS
+ * levels below the patches' nodes. Patches are joined from coarse to fine: a vertex on the border
+ * of a finer patch is replaced by the vertex of the coarsest cell that contains it and has a
  * vertex. Both sides of a border then have the same vertices, as each vertex of the model on the
- * border is in one of these cells. Source: format-spec/surface.md. */
+ * border is in a cell with a vertex. Source: format-spec/surface.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -39,7 +39,7 @@ static uint64_t make_key(int node_level, const uint32_t cell[3])
     return (uint64_t)node_level << 58 | (uint64_t)cell[2] << 38 | (uint64_t)cell[1] << 19 | cell[0];
 }
 
-/* Returns the slot of a key, or the empty one where it belongs. */
+/* Returns the slot of a key, or the empty slot where the key belongs. */
 static uint64_t find_slot(const joiner *j, uint64_t key)
 {
     uint64_t i = ebpo_hash_number(key) & (j->slots - 1);

@@ -1,11 +1,11 @@
 /* Verifies the simplified surface (format-spec/surface.md).
  *
- * - Each patch is of a gray node or a leaf, and has its faces. The children of a node with a patch
- *   that have faces either all have patches, or none. The patch of a node other than the root has
- *   one above.
- * - The error holds at points: vertices and centres of all triangles of a patch, and of some of the
- *   faces that the patch replaces, evenly spaced in the file. A point is compared with the
- * triangles in a uniform grid near it, by the exact bounds of the distance. */
+ * - Each patch belongs to a gray node or a leaf, and replaces the node's faces. If a child of a
+ *   node has a patch, the node has a patch, and so do all its children with faces.
+ * - The error is tested at points: at the vertices and centres of all triangles of a patch, and of
+ *   some of the faces that the patch replaces, evenly spaced in the file. A uniform grid finds the
+ *   triangles near a point. Exact bounds of the distance from these triangles are compared with the
+ *   error. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -51,7 +51,7 @@ static const uint64_t *find_patch(const ebpo_surface *s, ebpo_octcode code)
     return low < s->patch_count && row[EBPO_PATCH_OCTCODE] == code ? row : NULL;
 }
 
-/* Visits a node and the nodes below. Returns true if it has a patch. */
+/* Visits a node and the nodes below it. Returns true if the node has a patch. */
 static bool visit_node(node_walk *w, ebpo_octcode code, ebpo_node_type type)
 {
     ebpo_tally *tally = w->tally;
@@ -225,7 +225,8 @@ static bool is_near(const triangle_grid *g, const triangle_list *list, const dou
     return is_near_cells(g, list, p, limit, from, to);
 }
 
-/* Returns the number of points of triangles that are farther than `limit` from another list. */
+/* Returns the number of tested points of the list `of` that are farther than `limit` from the list
+ * `from`. */
 static uint64_t count_far(const triangle_list *of, uint64_t every, const triangle_grid *g,
                           const triangle_list *from, double limit)
 {
