@@ -1,13 +1,13 @@
 /* Decides points inside a surface with holes, by the caps of its border.
  *
  * The octree of a surface has the winding numbers k of the surface with its caps, which are
- * integers. The winding number of the surface is w = k + w_D with the discs D
- * (geometry/cap_tree.h). Bounds of w_D for all points of a cell often decide for the whole cell.
- * The error of a bound shows that no cap touches the cell, so k changes in the cell at faces only.
- * If |w_D| is below t and below 1 - t for the threshold t, the rule for w equals the rule for k;
- * this holds in all cells below too. Other white nodes have one result if the bounds of k + w_D are
- * on one side of the rule's boundary. Points of the remaining cells are decided one by one
- * (cap_winding.c). */
+ * integers. The winding number of the surface is w = k + w_D, where w_D is the winding number of
+ * the discs D (geometry/cap_tree.h). Bounds of w_D for all points of a cell often decide for the
+ * whole cell. The error of a bound shows that no cap touches the cell, so k changes in the cell at
+ * faces only. If |w_D| is below t and below 1 - t for the threshold t, the rule for w equals the
+ * rule for k; the rules are then equal in all cells below too. Other white nodes have one result if
+ * the bounds of k + w_D are on one side of the rule's boundary. Points of the remaining cells are
+ * decided one by one (cap_winding.c). */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -106,7 +106,8 @@ static bool caps_touch(const marking *w, ebpo_cell cell)
     return ebpo_caps_near(&w->holes->caps, low, high);
 }
 
-/* Returns the mark of a cell without faces. `winding`: at its lowest corner. */
+/* Returns the mark of a cell without faces. `winding`: winding number at the cell's lowest
+ * corner. */
 static ebpo_uniform_mark find_mark(const marking *w, ebpo_cell cell, int32_t winding)
 {
     ebpo_bounded b;

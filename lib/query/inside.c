@@ -1,10 +1,11 @@
 /* Decides exactly whether points are inside a model.
  *
- * In a leaf the signs of its faces' planes decide where possible (leaf_kinds.c). Otherwise the
- * faces that axis-parallel segments cross are counted. A segment begins at a cell face that no face
- * intersects, or segments begin at the lowest corner. A filter in single precision counts first
- * (inside_kernels.c), exact predicates count the rest. Many points in a model that is all in memory
- * go down the tree several at a time.
+ * In a leaf the signs of its faces' planes decide where possible (leaf_kinds.c). Where the signs do
+ * not decide, the faces that axis-parallel segments cross are counted: one segment begins at a cell
+ * face that no face intersects, or three segments lead from the cell's lowest corner to the point.
+ * A filter in single precision counts first (inside_kernels.c); exact predicates decide the faces
+ * that the filter leaves open. Many points in a model that is all in memory go down the tree
+ * several at a time.
  *
  * A query that may use envelopes, stops at a level or has a deadline goes from node to node and
  * loads subtrees on the way; with EBPO_LOAD_NODES it reads only the nodes on the way. Envelopes
@@ -37,8 +38,8 @@ static ebpo_status inside_pruned(ebpo_context *context, const double p[3], ebpo_
 
 /* --- one leaf --- */
 
-/* Adds the crossings that the filter left open; returns true when the point is on one of these
- * faces. */
+/* Decides the faces that the filter left open, and adds their crossings. Returns true when the
+ * point is on a face that was open. */
 static bool decide_open(const ebpo_accel *s, const uint32_t *open, uint32_t count,
                         const ebpo_axis_segment *g, const double *point, int32_t *sum)
 {
@@ -53,7 +54,7 @@ static bool decide_open(const ebpo_accel *s, const uint32_t *open, uint32_t coun
 }
 
 /* Counts crossings along a segment. Tests if `point` (the segment's end) is on a face; NULL: no
- * test. Returns false when it is on one. */
+ * test. Returns false when `point` is on a face. */
 static bool cross_leaf(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
                        const ebpo_accel_leaf *leaf, const ebpo_axis_segment *g, const double *point,
                        uint32_t *open, int32_t *sum)
@@ -87,7 +88,7 @@ static inline void find_in_leaf(int fine, int level, const ebpo_position *place,
 }
 
 /* Returns the `reach` of ebpo_axis_segment for the point alone; a segment from the point to a cell
- * face extends this. */
+ * face extends this reach. */
 static inline uint32_t reach_of(const in_leaf *i)
 {
     return i->sixteenth | (UINT32_C(0x0f0f0f) - i->sixteenth) << 4;
@@ -624,8 +625,8 @@ static ebpo_status uniform_from_file(inside_query *a, const ebpo_node *node,
     return status;
 }
 
-/* Handles a gray node on the way; sets *done when the node decides. Only after its children have
- * been requested, it is known if the node is pruned. */
+/* Handles a gray node on the way; sets *done when the node decides. A node is known to be pruned
+ * only after its children have been requested. */
 static ebpo_status pass_gray(inside_query *a, ebpo_cursor *c, bool *done, ebpo_inside_result *out,
                              ebpo_error *error)
 {
@@ -699,7 +700,7 @@ static ebpo_status walk_nodes(inside_query *a, ebpo_inside_result *out, ebpo_err
 }
 
 /* Returns the subtree that the context holds if its cell contains p, else NULL. *entry, *level: the
- * node of the levels above, when it decides. */
+ * node at which the way down the levels above the subtrees ends. */
 static const ebpo_accel *held_around(const inside_query *a, uint32_t *entry, int *level)
 {
     const ebpo_context *c = a->context;

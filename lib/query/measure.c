@@ -5,9 +5,9 @@
  *   first moments   det s / 24
  *   second moments  det (s s' + a a' + b b' + c c') / 120
  * All values are in double-double arithmetic, on coordinates scaled by a power of two to about 1.
- * They are summed in blocks of faces that do not depend on threads. A face counts with the
- * multiplicity of its component (construct/solid_shells.h) if this is known, else once. The caps of
- * a surface with its border are faces too (measure_caps.h). Source of
+ * The values are summed in blocks of faces, which do not depend on the number of threads. A face
+ * counts with the multiplicity of its component (construct/solid_shells.h) if the multiplicity is
+ * known, else once. The caps of a surface with its border are faces too (measure_caps.h). Source of
  * the moments: Tonon 2004, "Explicit exact formulas for the 3-D tetrahedron inertia tensor in terms
  * of its vertex coordinates". */
 #include "core/strict_fp.h"
@@ -39,7 +39,7 @@ static const double nothing = 0x1p-85;
 /* Scaled coordinates are p / 2^exponent; `middle` is scaled. */
 typedef struct frame {
     int exponent;
-    double factor[2]; /* 2^-exponent in two steps, as it may not fit into one */
+    double factor[2]; /* 2^-exponent as two factors, as it may not fit into one double */
     double middle[3];
 } frame;
 
@@ -47,7 +47,8 @@ typedef struct moments {
     ebpo_pair area2, volume6, first24[3], second120[6]; /* order of second moments: xx, yy, zz, yz,
                                                          * zx, xy */
     ebpo_pair integral6;                                /* with each face counted once */
-    /* the sum of absolute values of the terms of volume6; the same before cancellation */
+    /* absolute6: sum of the absolute values of the terms of volume6; terms6: sum of the absolute
+     * values of the products from which these terms are computed */
     double absolute6, terms6;
 } moments;
 
@@ -147,8 +148,8 @@ static ebpo_pair mixed_product(ebpo_pair r[3][3], const ebpo_pair s[3], int u, i
     return sum;
 }
 
-/* Adds the tetrahedron of a triangle with the doubled normal n. It counts `weight` times in the
- * integral, and `times` as often in the volume. */
+/* Adds the tetrahedron of a triangle with the doubled normal n. The tetrahedron counts `weight`
+ * times in the integral, and `weight` * `times` times in the volume. */
 static void add_tetrahedron(moments *m, const double corner[3][3], const double middle[3],
                             const ebpo_pair n[3], const double terms[3], double weight, int times)
 {
@@ -213,7 +214,8 @@ static ebpo_status measure_blocks(void *context, uint64_t begin, uint64_t end, u
 /* Sums over the caps of a border. */
 typedef struct cap_sums {
     double volume; /* sum of weights times bounds of the volumes of the loops' hulls */
-    double moment; /* the same, times the distance of the farthest point of the hull's box */
+    double moment; /* sum of these products, each times the distance of the farthest point of the
+                    * hull's box */
 } cap_sums;
 
 static void scale_point(const frame *f, const double p[3], double out[3])
@@ -277,9 +279,9 @@ static void inertia_of(ebpo_mass *out, const ebpo_pair central[6], int exponent)
 }
 
 /* Returns a bound of the rounding error of integral6. Each operation on pairs has an error of at
- * most 2^-103 times the absolute values of its operands, or of its product. A term of the sum comes
- * from at most 8 of them, and passes at most 4 additions for each triangle and block. All partial
- * sums are at most `terms6`, but for a factor below 2. */
+ * most 2^-103 times the absolute values of its operands, or of its product. A term of the sum is
+ * the result of at most 8 operations, and passes at most 4 additions for each triangle and block.
+ * All partial sums are at most `terms6`, but for a factor below 2. */
 static double integral_error(const moments *m, uint64_t triangles)
 {
     return (4 * (double)triangles + 64) * 0x1p-102 * m->terms6 + 0x1p-900;
@@ -288,17 +290,17 @@ static double integral_error(const moments *m, uint64_t triangles)
 /* Sets the members that depend on the border.
  *
  * Rounding: the corners of a triangle are at most 2 from the middle on each axis, so the absolute
- * value of a coordinate of their sum is at most 6, and the error of first24 at most 12 times that
- * of the integral. For V = integral6, M = first24 and c = M / (4 V), an error e of V and f of M
- * change c by at most (f + 4 |c| e) / (4 (|V| - e)).
+ * value of a coordinate of their sum is at most 6, and the error of first24 is at most 12 times the
+ * error of the integral. For V = integral6, M = first24 and c = M / (4 V), an error e of V and f of
+ * M change c by at most (f + 4 |c| e) / (4 (|V| - e)).
  *
  * Other caps: let k' be the winding numbers with other caps C', for which the closed surface of the
  * cap C'_i of each loop and of our cap, reversed, has winding numbers -1, 0 and 1 only, times the
  * loop's weight w_i, and for which C'_i is in the convex hull H_i of the loop, as our cap is. Then
  * |k' - k| is at most the sum of w_i over the hulls that contain the point, so the integral changes
  * by at most h = sum of w_i |H_i|. With the centroid c as the origin, the first moment of k is 0,
- * and that of k' is at most the sum of w_i |H_i| r_i, where r_i is the distance of the farthest
- * point of H_i. So the centroid moves by at most this sum over |V| - h. */
+ * and the first moment of k' is at most the sum of w_i |H_i| r_i, where r_i is the distance of the
+ * farthest point of H_i. So the centroid moves by at most this sum over |V| - h. */
 static void set_border(ebpo_mass *out, const moments *m, const frame *f,
                        const ebpo_border_loops *loops, uint64_t triangles)
 {
@@ -370,15 +372,16 @@ static ebpo_status count_components(pass *p, const ebpo_solid_shells *s, ebpo_ru
     return EBPO_OK;
 }
 
-/* Returns true if winding numbers of a surface with caps are 0 and 1, or 0 and -1, unless faces or
- * caps intersect: one component without edges of more than two faces or of opposed ones. */
+/* Returns true if the surface has one component, no edges of more than two faces, and no edges of
+ * faces with opposite orientations. Its winding numbers with caps are then 0 and 1, or 0 and -1,
+ * unless faces or caps intersect. */
 static bool is_one_sheet(const ebpo_info *info)
 {
     const ebpo_mesh_report *r = &info->report;
     return r->components == 1 && r->nonmanifold_edges.count == 0 && r->misoriented_edges.count == 0;
 }
 
-/* Finds if the volume is known; then sets the multiplicity of faces. */
+/* Determines if the volume is known; if so, sets the multiplicity of faces. */
 static ebpo_status decide_volume(pass *p, const ebpo_info *info, unsigned threads,
                                  ebpo_solid_shells *s, ebpo_solid_volume *volume, ebpo_error *error)
 {
@@ -396,7 +399,7 @@ static ebpo_status decide_volume(pass *p, const ebpo_info *info, unsigned thread
     return status;
 }
 
-/* Faces of a single component that face inwards count -1 times, or do not count. */
+/* Counts the faces of a single component that face inwards -1 times, or not at all. */
 static void count_inwards(moments *m, ebpo_rule rule)
 {
     int times = ebpo_rule_inside(rule, -1) ? -1 : 0;

@@ -1,11 +1,12 @@
 /* Lists the faces that are cut, and the faces beside them.
  *
  * Pairs of intersecting faces are found first, in the hierarchies of the models. Then each operand
- * is read once, which shows what to list of it. So the list grows with the cut, not with the
- * models.
+ * is read once to find which of its faces to list. So the size of the list depends on the cut, not
+ * on the size of the models.
  *
- * Faces without area have no partners: they bound nothing, and the points of their edges are
- * corners of faces with an area, which touch the faces beside them and are found as pairs. */
+ * The partners of a face are the faces that it is paired with. Faces without area have no partners:
+ * they bound nothing. The points of their edges are corners of faces with an area; the pairs of
+ * these faces with the faces that they touch are found. */
 #include "core/strict_fp.h"
 
 #include "extras/boolean/face_list.h"
@@ -119,7 +120,7 @@ static bool list_face(ebpo_face_list *faces, const ebpo_mesh *mesh, uint64_t f)
     return true;
 }
 
-/* Makes a bit for each face of the operand that is in a pair. */
+/* Makes a bit for each face of the operand: 1 if the face is in a pair. */
 static uint64_t *mark_paired(const ebpo_face_list *faces, uint32_t operand, uint64_t count)
 {
     uint64_t *paired = ebpo_alloc_zero(count / 64 + 1, sizeof *paired);
@@ -217,7 +218,7 @@ static void find_places(ebpo_face_list *faces)
     faces->pairs = kept;
 }
 
-/* Lists each pair at both of its faces. */
+/* Lists the partners of each face: both faces of a pair list each other. */
 static ebpo_status list_partners(ebpo_face_list *faces, ebpo_error *error)
 {
     find_places(faces);

@@ -31,8 +31,8 @@ typedef struct ebpo_face_list {
      * is not listed (ebpo_boolean_find_equal) */
     uint64_t same[EBPO_BOOLEAN_OPERANDS_MAX];
     ebpo_whole_faces whole[EBPO_BOOLEAN_OPERANDS_MAX];
-    /* All intersecting pairs; and then those of faces with an area: the partners of face i are
-     * partner[begin[i]] to partner[begin[i + 1] - 1], in ascending order. */
+    /* First all intersecting pairs, then only the pairs of faces with an area. The partners of face
+     * i are partner[begin[i]] to partner[begin[i + 1] - 1], in ascending order. */
     ebpo_operand_pair *pair;
     uint64_t pairs, pair_capacity;
     uint64_t *begin;
@@ -41,9 +41,9 @@ typedef struct ebpo_face_list {
 
 #define EBPO_NO_CORNER UINT32_MAX
 
-/* Makes the list: finds the pairs of intersecting faces of different operands, and those of one
- * operand that are not just neighbours, then reads one operand after the other. Must be freed, also
- * after a failure. */
+/* Makes the list: finds the pairs of intersecting faces of different operands, and the pairs of
+ * faces of one operand that intersect in more than a common corner or edge; then reads one operand
+ * after the other. Must be freed, also after a failure. */
 EBPO_MUST_USE ebpo_status ebpo_face_list_make(ebpo_face_list *out, const ebpo_boolean *b,
                                               ebpo_workspace *workspace,
                                               const ebpo_progress *progress, ebpo_error *error);

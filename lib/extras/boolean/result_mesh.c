@@ -1,12 +1,12 @@
 /* Writes the triangles that bound the result into a mesh.
  *
- * Each operand is read again. Its faces are visited in order. Faces near other operands
- * are in a list (face_list.h) and have been cut into triangles (the cut mesh); the triangles that
- * bound the result are added. A face that is not listed is added whole if the listed faces of its
- * connected component bound the result. Vertices are numbered by first use. A corner of a listed
- * face has the number of its vertex in the cut mesh, so whole faces and triangles share vertices.
- * Faces have the numbers of the operand's source if its file has source indices, otherwise those of
- * the file, as in all queries. */
+ * Each operand is read again. Its faces are visited in order. Faces near other operands are in a
+ * list (face_list.h) and have been cut into triangles (the cut mesh); the triangles that bound the
+ * result are added. A face that is not listed is added whole if the listed faces of its connected
+ * component bound the result. Vertices are numbered by first use. A corner of a listed face has the
+ * number of its vertex in the cut mesh, so whole faces and triangles share vertices. Faces have
+ * their source indices if the operand's file has them, and their indices in the file if not, as in
+ * all queries. */
 #include "core/strict_fp.h"
 
 #include "extras/boolean/result_mesh.h"
@@ -28,7 +28,7 @@
 
 typedef struct output {
     const ebpo_cut_mesh *cut;
-    const int8_t *sign; /* of each triangle. 1: added; -1: added, reversed; 0: not in the result */
+    const int8_t *sign; /* for each triangle: 1: added; -1: added, reversed; 0: not in the result */
     int8_t *of_component[EBPO_BOOLEAN_OPERANDS_MAX]; /* signs of whole faces */
     bool doubles;
     uint32_t *number;        /* for each vertex of the cut mesh: its number, or NO_NUMBER */
@@ -69,7 +69,7 @@ static double round_to_float(double at, const ebpo_exact_point *p, int k, int un
     return nearest;
 }
 
-/* Adds a vertex, for which there is memory; returns its number. */
+/* Adds a vertex and returns its number. The arrays have space for the vertex. */
 static uint32_t add_vertex(output *o, const double at[3])
 {
     uint64_t v = o->mesh->vertex_count++;
@@ -82,7 +82,7 @@ static uint32_t add_vertex(output *o, const double at[3])
 }
 
 /* Gets the double nearest to each coordinate of a vertex of the cut mesh, and the exact point, or
- * NULL if they are exact. */
+ * NULL if the doubles are exact. */
 static const ebpo_exact_point *get_cut_vertex(const output *o, uint32_t v, double at[3])
 {
     const ebpo_face_list *faces = o->cut->faces;
@@ -152,8 +152,8 @@ static bool number_vertex(operand_output *r, uint32_t v)
 
 /* --- faces --- */
 
-/* Adds a face of the operand, with the numbers of its corners. A face that lost a corner by
- * rounding is omitted: its two other edges are then the same edge in both directions. */
+/* Adds a face of the operand, with the numbers of its corners. If rounding made two corners equal,
+ * the face is omitted: its two other edges are then one edge in both directions. */
 static void add_face(operand_output *r, uint64_t face, const uint32_t corner[3], int sign)
 {
     output *o = r->o;

@@ -1,9 +1,9 @@
-/* Finds the components of an operand's whole faces: those with an area that intersect no face other
- * than as neighbours.
+/* Finds the connected components of an operand's whole faces. A whole face has an area, and
+ * intersects no other face except as a neighbour.
  *
  * Corners are compared by their positions. Each edge of a face is listed at its lesser corner. Runs
  * of consecutive corners are processed one after the other, so the lists need little memory. Faces
- * of one edge are joined in a disjoint-set forest whose roots are the first faces. */
+ * with a common edge are joined in a disjoint-set forest; the root of a set is its first face. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -20,7 +20,7 @@
 
 static const char stage[] = "join faces";
 
-/* EDGES: listed at once without and with a limit of memory. */
+/* Number of edges that are listed at once: EDGES, or FEW_EDGES with a limit of memory. */
 enum { FACE_GRAIN = 1 << 16, EDGES = 1 << 23, FEW_EDGES = 1 << 20 };
 
 /* Bits for faces and corners. */
@@ -111,14 +111,14 @@ static void list_touched(joining *j)
 
 static uint32_t face_of(uint64_t edge) { return (uint32_t)edge >> 1; }
 
-/* Joins the faces of one edge, if they are two and whole. Returns false if the edge is not closed.
- */
+/* Joins the faces of an edge if there are two faces and both are whole. Returns false if the edge
+ * is not closed. */
 static bool join_edge(joining *j, const uint64_t *list, uint64_t count)
 {
     int64_t balance = 0;
     for (uint64_t i = 0; i < count; i++) {
         if (ebpo_has_bit(j->paired, face_of(list[i])))
-            return true; /* is tested with the cut faces */
+            return true; /* the edge is tested with the cut faces */
         balance += list[i] & 1 ? -1 : 1;
     }
     if (count == 2)
@@ -157,7 +157,8 @@ static void list_edges(joining *j, uint64_t first, uint64_t end)
     }
 }
 
-/* Processes the corners from `first` on whose lists fit in memory. Sets *end to the next corner. */
+/* Processes as many corners from `first` on as have lists that fit in memory. Sets *end to the next
+ * corner. */
 static ebpo_status join_run(joining *j, uint64_t first, uint64_t *end, uint64_t capacity,
                             ebpo_error *error)
 {
@@ -168,7 +169,7 @@ static ebpo_status join_run(joining *j, uint64_t first, uint64_t *end, uint64_t 
         return ebpo_fail_memory(error, (last - first + 2) * sizeof *j->begin);
     uint64_t at = 0;
     EBPO_FOR_ITEMS(j->mesh->workspace, n, first, last) {
-        j->begin[n - first + 1] = at; /* moves to the end of the list while it is filled */
+        j->begin[n - first + 1] = at; /* moves to the end of the list while the list is filled */
         at += j->degree[n];
     }
     j->begin[0] = 0;
@@ -217,7 +218,7 @@ static void number_components(joining *j)
     j->out->components = count;
 }
 
-/* Lists a face of each component that has none in the list. */
+/* Adds a face of each component without a listed face to the list. */
 static ebpo_status list_components(joining *j, ebpo_error *error)
 {
     const uint32_t *component = j->out->component;

@@ -192,8 +192,8 @@ static int side_of_projection(const ebpo_face_cuts *f, int i, const double x[3])
                                    (double[]){ x[f->u], x[f->v] });
 }
 
-/* Returns true if there is an edge of the face on whose outer side, or line, all corners of t are.
- */
+/* Returns true if all corners of t are on the outer side, or on the line, of one edge of the
+ * face. */
 static bool beyond_an_edge(const ebpo_face_cuts *f, const double t[3][3])
 {
     for (int i = 0; i < 3; i++)
@@ -386,8 +386,7 @@ static void cross_two(ebpo_face_cuts *f, const ebpo_face_cut *a, const ebpo_face
     add_vertex(f, s[1], s[2]);
 }
 
-/* Adds the crossing of a cut with one that is parallel to the q axis, whose p is already an event.
- */
+/* Adds the crossing of a cut with a cut parallel to the q axis, whose p is already an event. */
 static void cross_upright(ebpo_face_cuts *f, const ebpo_face_cut *upright, const ebpo_face_cut *c)
 {
     if (!f->all_cuts || is_upright(c) || !cut_reaches(c, upright->p[0]))

@@ -105,8 +105,8 @@ EBPO_EIGHT void offer_edges8(nearest8 *n, const place8 *p, const edges8 *a, int 
     offer_nearest8(n, &direction, place_dot8(&direction, &direction));
 }
 
-/* Compares with the corners that are above the interior of a face, and their nearest points on it.
- * sign: 1 if the corners are A's, otherwise -1. */
+/* Compares the nearest points so far with each corner above the interior of a face and the corner's
+ * nearest point on the face. sign: 1 if the corners are A's, otherwise -1. */
 EBPO_EIGHT void offer_corners8(nearest8 *n, const triangle8 *face, const edges8 *of,
                                const triangle8 *corners, float sign)
 {
@@ -480,9 +480,9 @@ EBPO_EIGHT triangle8 load_faces8(const ebpo_posed_faces *f, const int32_t *lane,
     return out;
 }
 
-/* If one of eight pairs is nearer than the best pair so far, makes the nearest one the best pair,
- * and its direction that of the search. used: a bit for each valid pair. at: index of the first of
- * the eight pairs. */
+/* If one of eight pairs is nearer than the best pair so far, makes the nearest pair the best pair,
+ * and its direction the direction of the search. used: a bit for each valid pair. at: index of the
+ * first of the eight pairs. */
 EBPO_EIGHT void update_best(ebpo_gap_search *g, f8 high, const place8 *direction, unsigned used,
                             const uint32_t block[2], const near_lanes *near, unsigned at)
 {
@@ -505,8 +505,8 @@ EBPO_EIGHT void update_best(ebpo_gap_search *g, f8 high, const place8 *direction
                                                 directions[2][best] });
 }
 
-/* Adds those of eight pairs that may be within the limit to the waiting pairs. Returns true if one
- * of them may intersect. */
+/* Adds each of eight pairs that may be within the limit to the waiting pairs. Returns true if an
+ * added pair may intersect. */
 EBPO_EIGHT bool add_candidates(ebpo_gap_search *g, f8 low, unsigned used, const uint32_t block[2],
                                const near_lanes *near, unsigned at)
 {

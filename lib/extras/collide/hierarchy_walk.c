@@ -1,7 +1,7 @@
 /* Functions that the kernels of the two walks through hierarchies call: pair_walk_kernels.c
- * searches for faces that intersect, gap_walk_kernels.c for the nearest ones. A walk has a stack of
- * pairs of nodes, and keeps the last nodes and blocks that it has transformed. Each walk is for one
- * thread.
+ * searches for faces that intersect, gap_walk_kernels.c for the nearest faces. A walk has a stack
+ * of pairs of nodes, and keeps the last nodes and blocks that it has transformed. Each walk is for
+ * one thread.
  *
  * Pairs of faces that the float filter cannot decide are decided here exactly. If both models are
  * one mesh, the corner or edge that neighbouring faces share is no contact. */

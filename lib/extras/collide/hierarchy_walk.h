@@ -1,6 +1,6 @@
 /* Walks through the hierarchies of two accels (acceleration structures of subtrees) at poses:
- * ebpo_pair_walk finds the faces that intersect, ebpo_gap_search the nearest ones. Each walk is for
- * one thread at a time. */
+ * ebpo_pair_walk finds the faces that intersect, ebpo_gap_search finds the nearest faces. Each walk
+ * is for one thread at a time. */
 #ifndef EBPO_COLLIDE_HIERARCHY_WALK_H
 #define EBPO_COLLIDE_HIERARCHY_WALK_H
 
@@ -62,7 +62,7 @@ struct ebpo_pair_walk {
     const ebpo_pair_kernels *filter;
     bool first;      /* end with the first intersecting pair, and visit siblings by greatest overlap
                       */
-    bool self;       /* both accels are the same one at one pose: find each pair of faces once */
+    bool self;       /* both accels are one accel at one pose: find each pair of faces once */
     bool neighbours; /* the faces are of one mesh: a common corner or edge of neighbours is no
                       * contact */
     uint32_t begin, end; /* only these faces of the first accel: local indices */
@@ -176,7 +176,8 @@ void ebpo_gap_set_direction(ebpo_gap_search *g, const float direction[3]);
 
 /* Makes space for the pairs of children of two nodes. Returns false without memory. */
 bool ebpo_gap_capacity(ebpo_gap_search *g);
-/* Makes space for a block's pairs among the waiting ones. Returns false if judge returned false. */
+/* Makes space for a block's pairs among the waiting pairs. Returns false if judge returned
+ * false. */
 bool ebpo_gap_wait_capacity(ebpo_gap_search *g);
 
 /* Walks through all pairs, beginning with the top nodes. Afterwards, the nearest pair may be among

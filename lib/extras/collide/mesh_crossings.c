@@ -2,9 +2,9 @@
  *
  * The mesh is written to a temporary file, which is opened as a model with a memory budget, so the
  * mesh may be larger than memory. The search needs only the faces, so the model is built as a
- * surface without planes, which takes a fraction of the time. The crossings are those of the model
- * with itself (ebpo_collide_self_posed). The mesh in memory gives their positions. An optional PLY
- * file shows the faces in red. */
+ * surface without planes, which takes a fraction of the time. The crossings of the model with
+ * itself (ebpo_collide_self_posed) are the result. The mesh in memory gives their positions. An
+ * optional PLY file shows the faces in red. */
 #include "core/strict_fp.h"
 
 #include <stdio.h>

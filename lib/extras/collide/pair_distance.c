@@ -1,6 +1,6 @@
 /* Computes the distance of two triangles: bounds in doubles, and exact comparisons.
  *
- * Bounds follow from a pair of near points, which need not be the nearest ones. The distance of
+ * Bounds follow from a pair of near points, which need not be the nearest points. The distance of
  * these points is an upper bound. The gap of the faces along the line between them is a lower
  * bound. All coordinates are relative to A's first corner, so that rounding does not depend on the
  * position of the faces. Where bounds do not decide, the squared distance is computed as a fraction
@@ -202,8 +202,8 @@ static bool same_feature(const double a[3][3], int on_a, const double b[3][3], i
 }
 
 /* Returns true if both faces are perpendicular to the same axis and their projections along it
- * intersect. Their distance is then that of the two planes, whose coordinates are level[0] and
- * level[1]. */
+ * intersect. The distance of the faces is then the distance of their planes, whose coordinates are
+ * level[0] and level[1]. */
 static bool level_faces(const double a[3][3], const double b[3][3], double level[2])
 {
     for (int k = 0; k < 3; k++) {
@@ -289,7 +289,8 @@ static int fraction_compare(const fraction *f, const fraction *g)
     return order;
 }
 
-/* Sets *best to the lesser of both fractions. best->denominator is 0 if there is none so far. */
+/* Sets *best to the lesser of both fractions. best->denominator is 0 if there is no fraction so
+ * far. */
 static void keep_lesser(fraction *best, const fraction *other)
 {
     if (mpz_sgn(best->denominator) != 0 && fraction_compare(other, best) >= 0)

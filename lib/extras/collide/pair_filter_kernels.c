@@ -3,8 +3,8 @@
  *
  * Boxes are compared first, then the sides of the planes of both faces on which the corners are,
  * then the intervals on the common line of the planes, each with a proved error bound. All other
- * pairs are undecided; the caller decides them exactly. Letters are those of
- * docs/develop/collision.md. */
+ * pairs are undecided; the caller decides them exactly. Letters have the meaning that
+ * docs/develop/collision.md gives them. */
 #include "core/strict_fp.h"
 
 #include "core/simd.h"
@@ -108,7 +108,7 @@ EBPO_EIGHT sides8 sides_of8(vector8 e1, vector8 e2, const vector8 d[3], f8 bound
 
 /* Masks for a face: which of its corners is alone on its side of the other plane. */
 typedef struct alone8 {
-    f8 is0, is1; /* it is corner 0, corner 1; otherwise corner 2 */
+    f8 is0, is1; /* it is corner 0, corner 1; if neither, corner 2 */
     f8 above;    /* it is above the plane */
 } alone8;
 

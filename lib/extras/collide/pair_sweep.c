@@ -166,8 +166,8 @@ static void corners_and_face(sweep *s, int of)
     }
 }
 
-/* Considers the time at which edge i of the moving face intersects edge j of the other one, if
- * their projections cross: w = t d + x u - y v, by Cramer's rule. */
+/* Considers the time at which edge i of the moving face intersects edge j of the other face, if the
+ * projections of the edges cross: w = t d + x u - y v, by Cramer's rule. */
 static void two_edges(sweep *s, int i, int j)
 {
     const ebpo_vectorz *p = &s->corner[0][i], *q = &s->corner[1][j];

@@ -87,9 +87,9 @@ static inline void ebpo_posed_faces_forget(ebpo_posed_faces faces[2][EBPO_POSED_
 /* Two accels (acceleration structures of subtrees) at their poses, each in its own frame, prepared
  * for descending both hierarchies together. It is not changed afterwards, so any thread may use it.
  *
- * Both frames use one unit of length: that of the frame with the larger unit. Boxes of one model
- * are transformed to the other model's frame by linear maps, for all pose matrices; only cylinders
- * need a map that keeps lengths (docs/develop/collision.md, "Going down two hierarchies"). */
+ * Both frames use one unit of length: the larger of their units. Boxes of one model are transformed
+ * to the other model's frame by linear maps, for all pose matrices; only cylinders need a map that
+ * keeps lengths (docs/develop/collision.md, "Going down two hierarchies"). */
 
 typedef struct ebpo_accel_pair {
     const ebpo_accel *accel[2];

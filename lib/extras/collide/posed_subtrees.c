@@ -50,10 +50,10 @@ static const double *farthest_point(const ebpo_convex *c, const double n[3], dou
 /* Maximum number of iterations; sets that are nearly in contact would need more. */
 enum { DIRECTIONS = 32 };
 
-/* The distance is that of the origin from the convex set of all differences of a point of b and a
- * point of a. `v` is such a difference. Each step finds the difference w that is least along v,
- * which gives a lower bound of the distance. Then v becomes the point nearest to the origin on the
- * segment from v to w (Gilbert 1966). */
+/* The distance is equal to the distance of the origin from the convex set of all differences of a
+ * point of b and a point of a. `v` is such a difference. Each step finds the difference w that is
+ * least along v, which gives a lower bound of the distance. Then v becomes the point nearest to the
+ * origin on the segment from v to w (Gilbert 1966). */
 double ebpo_convex_gap(const ebpo_convex *a, const ebpo_convex *b, double enough)
 {
     double v[3], w[3], from[3], best = 0;
@@ -105,7 +105,7 @@ typedef struct posed_hull {
 /* Number of levels whose planes cut an envelope. It limits the rounding errors of corners, which
  * grow from level to level. */
 enum { LEVELS_OF_PLANES = 8 };
-/* Bound of the error of an envelope, as a share of the cell's side: that of 255 planes of each
+/* Bound of the error of an envelope, as a share of the cell's side: the error of 255 planes of each
  * level, each with an error of 1e-10 of its cell. */
 static const double cut_share = 0x1p-15;
 

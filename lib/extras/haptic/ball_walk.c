@@ -2,17 +2,18 @@
  * the ball's centre crosses no face.
  *
  * Nodes of the tree over the faces are visited in the order of their earliest possible contact. The
- * search ends when this is, for the next node, later than the first contact found. The distance
- * from a box or a face is convex along a line, so Newton's steps towards the ball's radius never go
- * too far. Of the nodes that are already in contact, the closest are visited first.
+ * search ends when the earliest possible contact of the next node is later than the first contact
+ * found. The distance from a box or a face is convex along a line, so Newton's steps towards the
+ * ball's radius never go too far. Among nodes that are already in contact, the closest node is
+ * visited first.
  *
  * The work of a haptic step is bounded. If the limit is reached, the piece ends where the next node
  * may be in contact; if that is near the beginning, the next haptic step continues the search. If
  * the contacts found so far hold the ball at its place, the search ends early.
  *
- * The planes of the contacts bound a cone of allowed motions. The motion of the cone that is
- * nearest to the wanted one is the wanted one itself, or on a plane, or on the line of two planes,
- * or 0. All of these are tried, since there are few planes. */
+ * The planes of the contacts bound a cone of allowed motions. The motion in the cone that is
+ * nearest to the wanted motion is the wanted motion itself, or on a plane, or on the line of two
+ * planes, or 0. All these motions are tried, since there are few planes. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -115,8 +116,8 @@ enum {
 /* Least part of a piece after which the piece may end before its contact is known. */
 static const double least_part = 1.0 / 32;
 
-/* Returns the greatest number of waiting nodes: their subtrees are disjoint, so there are at most
- * as many as leaves. */
+/* Returns the greatest number of waiting nodes: their subtrees are disjoint, so the number is at
+ * most the number of leaves. */
 static uint64_t capacity_for(uint64_t faces) { return ebpo_face_box_leaves(faces) + 1; }
 
 uint64_t ebpo_ball_walk_bytes(uint64_t faces)

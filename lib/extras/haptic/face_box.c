@@ -525,8 +525,8 @@ static crossing cross_faces(ebpo_side *side, const ebpo_face_box *box, const dou
     return CROSSED;
 }
 
-/* Chooses a pseudorandom point near the middle of the path for a detour, a different one each time.
- */
+/* Chooses a pseudorandom point near the middle of the path for a detour, a different point each
+ * time. */
 static void choose_detour(ebpo_side *side, const double to[3], const ebpo_extent *within,
                           double via[3])
 {

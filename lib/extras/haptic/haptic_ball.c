@@ -38,7 +38,7 @@ static bool has_no_piece(const ebpo_haptic *t) { return t->walk.stage == EBPO_BA
 
 /* Applies Coulomb friction. Without friction the proxy has slid from `from` to its position. With
  * friction it slides only by the part of this path by which the tangential force exceeds the
- * friction; it stays if the friction is larger. Both forces are those of a spring, so lengths are
+ * friction; it stays if the friction is larger. Both forces are forces of a spring, so lengths are
  * compared. */
 static uint32_t apply_friction(ebpo_haptic *t, const double from[3], const double device[3],
                                ebpo_ball_work *work)

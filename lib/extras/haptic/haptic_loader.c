@@ -2,9 +2,9 @@
  * separate thread. A box is a set of loaded faces (face_box.h).
  *
  * A haptic step never waits for this thread. Boxes and results are passed through buffers that are
- * exchanged atomically: the loader writes its buffer and swaps it with the middle one; the step
- * swaps the middle one with its own. The position of the device is predicted from its speed. When a
- * box has more faces than there is memory for, a smaller box is loaded. */
+ * exchanged atomically: the loader writes its buffer and swaps it with the middle buffer; the step
+ * swaps the middle buffer with its own buffer. The position of the device is predicted from its
+ * speed. When a box has more faces than there is memory for, a smaller box is loaded. */
 #include "core/strict_fp.h"
 
 #include <errno.h>

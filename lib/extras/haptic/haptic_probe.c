@@ -77,9 +77,9 @@ static bool bound_by_known(ebpo_haptic *t, const double place[3], ebpo_haptic_pr
     return far == 0;
 }
 
-/* Finds the side at `place` by moving there from the last position with a known side; if there is
- * none in the box, from the position of the newest exact result. Returns false if it is not found.
- */
+/* Finds the side at `place` by moving there from the last position with a known side; if the box
+ * contains no such position, from the position of the newest exact result. Returns false if the
+ * side is not found. */
 static bool find_side(ebpo_haptic *t, const double place[3], ebpo_haptic_probe_result *out)
 {
     const ebpo_probe_query *known = &t->known[t->step_result];

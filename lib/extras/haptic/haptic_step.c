@@ -378,7 +378,7 @@ static uint32_t follow_pieces(path_step *s)
         if (!end_piece(s)) {
             if (!resumed)
                 return s->flags;
-            s->flags = 0; /* these flags were of the path to the earlier position */
+            s->flags = 0; /* these flags describe the path to the earlier position */
             t->has_complete_piece = false;
         }
         resumed = false;

@@ -302,7 +302,7 @@ static void colour_vertex(coloured_vertex *d, const ebpo_stroke_data *s, uint32_
 }
 
 /* Applies a stroke to the vertices of a face that are within a point's ball. *any: set to true if
- * there are any. */
+ * there is such a vertex. */
 static ebpo_status colour_face(bake *b, const ebpo_reach_result_face *f, const ebpo_stroke_data *s,
                                uint32_t number, bool *any, ebpo_error *error)
 {

@@ -29,8 +29,8 @@ typedef struct ebpo_reach_edge {
 typedef struct ebpo_reach_search {
     ebpo_context *context;
     double tolerance;      /* maximum distance of a point from its face */
-    ebpo_reach_face *face; /* [count] faces around the ball; after ebpo_reach_find only those of the
-                            * reach, in the order of the file */
+    ebpo_reach_face *face; /* [count] faces around the ball; after ebpo_reach_find only the faces of
+                            * the reach, in the order of the file */
     uint64_t count, capacity;
     uint64_t own; /* index in `face` of the face that the point is on */
     ebpo_reach_position *position;

@@ -7,8 +7,8 @@
  * line.
  *
  * A reader stores the path of the current value: ebpo_json_enter and ebpo_json_leave must bracket
- * the evaluation of each value. Unknown members are errors, except private ones, whose names begin
- * with "x-".
+ * the evaluation of each value. Unknown members are errors, except private members, whose names
+ * begin with "x-".
  *
  * Source: format-spec/scene.md. */
 #include "core/strict_fp.h"

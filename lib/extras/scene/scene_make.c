@@ -3,7 +3,7 @@
  * Models, routes and cameras each have a separate name space. Layers, groups and instances share
  * one. In rules, a name is a selector: it stands for a set of instances. Every instance belongs to
  * the set of all instances, to a set that has only this instance, to the set of its layer and to
- * those of its groups.
+ * the sets of its groups.
  *
  * A scene that is untrusted input may name only files in its own folder or below, unless the
  * options allow others. Symbolic links that lead out of the folder are rejected. */

@@ -32,9 +32,9 @@ typedef struct ebpo_scene_route {
     bool jumps; /* the pose stays at a key until the time of the next key */
 } ebpo_scene_route;
 
-/* An instance and its sets. A name in a rule selects a set of instances: those of a layer or of a
- * group, one instance, or all. So an instance is in the set of all instances, in a set that has
- * only this instance, and in the sets of its layer and its groups. */
+/* An instance and its sets. A name in a rule selects a set of instances: the instances of a layer
+ * or of a group, one instance, or all instances. So an instance is in the set of all instances, in
+ * a set that has only this instance, and in the sets of its layer and its groups. */
 typedef struct ebpo_scene_instance_entry {
     ebpo_scene_instance as; /* the entry owns the name in this struct */
     uint64_t *sets;         /* in ascending order, once the rules are sorted */

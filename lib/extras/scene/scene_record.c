@@ -15,7 +15,7 @@
 #include "io/publish.h"
 #include "extras/scene/scene_parts.h"
 
-/* Datasets of the file: those of /frames come first, then those of /clashes. */
+/* Datasets of the file: first the datasets of /frames, then the datasets of /clashes. */
 enum {
     TIME,
     FIRST_CLASH,

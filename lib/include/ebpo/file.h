@@ -124,8 +124,8 @@ typedef struct ebpo_level {
     int32_t *black_winding;
 
     /*
-     * [white_count] winding number of the cell; for surfaces with EBPO_PART_BORDER, that at its
-     * lowest corner, shifted. NULL: all 0
+     * [white_count] winding number of the cell; for surfaces with EBPO_PART_BORDER, winding number
+     * at the cell's lowest corner, shifted. NULL: all 0
      */
     int32_t *white_winding;
 
@@ -392,7 +392,7 @@ enum {
 };
 
 /*
- * Simplified surfaces of nodes, as they are stored: patches of coarse levels first, those of a
+ * Simplified surfaces of nodes, as they are stored: patches of coarse levels first, and within a
  * level in the order of octcodes. ebpo_surface_decode decodes a patch.
  */
 typedef struct ebpo_surface {
@@ -407,7 +407,7 @@ typedef struct ebpo_surface {
 /*
  * A whole model in memory: ebpo_build makes it and ebpo_tree_write writes it. Faces are in the
  * order of the first leaf that they intersect, depth first by octcode. Vertices are in the order of
- * first use, unreferenced ones last.
+ * first use, unreferenced vertices last.
  */
 typedef struct ebpo_tree {
     ebpo_info info;

@@ -176,8 +176,8 @@ typedef struct ebpo_surface_mesh {
 EBPO_API void ebpo_surface_mesh_free(ebpo_surface_mesh *mesh);
 
 /*
- * Lists the patches of a level, and the patches of coarser nodes that have no patches below.
- * Together they replace all faces of the model.
+ * Lists the patches of a level, and the patches of coarser nodes without patches below. Together
+ * these patches replace all faces of the model.
  *
  * patches  [*count] ascending numbers of patches; freed by free()
  *
@@ -190,8 +190,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_surface_select(const ebpo_surface *surfa
                                                        ebpo_error *error);
 
 /*
- * Joins patches of any levels, none of a node above another, to one mesh without cracks: vertices
- * on the borders of finer patches are replaced by those of coarser ones.
+ * Joins patches of any levels to one mesh without cracks. No patch may belong to a node above the
+ * node of another patch. Vertices on the borders of finer patches are replaced by vertices of
+ * coarser patches.
  *
  * info     of the file or tree
  * patches  [count] ascending numbers of patches
