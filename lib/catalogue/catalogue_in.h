@@ -15,8 +15,8 @@ struct ebpo_catalogue {
     uint64_t count;                      /* at least 1, at most 2^32 - 2 */
     ebpo_catalogue_entry *entry;         /* the catalogue owns their texts */
     ebpo_catalogue_options how;          /* options; `folder` is not set */
-    ebpo_catalogue_boxes all, seen;      /* boxes of all models; of those that rays and distances
-                                          * use */
+    ebpo_catalogue_boxes all, seen;      /* boxes of all models; boxes of the models that rays and
+                                          * distances use */
     const ebpo_catalogue_entry *surface; /* the first model without an inside; NULL: all have one */
 };
 

@@ -4,14 +4,14 @@
  * face adds 0 to the sum.
  *
  * Parts of one model are closed by caps, which do not belong to the surface of the whole model. If
- * the point is on no face and no cap, the winding numbers of all parts add up to that of the whole
- * model. A point on a face or cap of a part is *doubtful*. The point is on the surface of the whole
- * model if a face that is not a cap contains it; a box query for the point decides this exactly.
- * Otherwise the point is on a cap. Then the point's winding number is counted along a ray through
- * the surfaces, which have no caps: the number of faces where the ray leaves the solid, minus the
- * number of faces where the ray enters the solid. If a ray hits an edge or runs along a face, its
- * crossings are not counted, and another ray is cast. The directions are always the same. Every ray
- * whose crossings are counted gives the same winding number.
+ * the point is on no face and no cap, the winding numbers of all parts add up to the winding number
+ * of the whole model. A point on a face or cap of a part is *doubtful*. The point is on the surface
+ * of the whole model if a face that is not a cap contains it; a box query for the point decides
+ * this exactly. Otherwise the point is on a cap. Then the point's winding number is counted along a
+ * ray through the surfaces, which have no caps: the number of faces where the ray leaves the solid,
+ * minus the number of faces where the ray enters the solid. If a ray hits an edge or runs along a
+ * face, its crossings are not counted, and another ray is cast. The directions are always the same.
+ * Every ray whose crossings are counted gives the same winding number.
  *
  * Source: docs/guide/clusters.md, "Beyond 2^32 faces". */
 #include "core/strict_fp.h"

@@ -1,11 +1,12 @@
 /* Finds the border of a surface, and the winding numbers of the surface with its caps.
  *
  * The caps (geometry/cap_triangles.h) close the border, so the winding number of surface and caps
- * is an integer. The number of a white node or a leaf is that of its lowest corner, shifted as in
- * corner_windings.c. The nodes are visited depth first. Each visit returns the differences of the
- * numbers at the cell's corners from that at the lowest one: the crossings of the leaf's faces and
- * of caps along the edges of the cell. The lowest corner of a child is a corner of an earlier
- * sibling, so its number is known before the child is visited. Source: format-spec/border.md. */
+ * is an integer. The number of a white node or a leaf is the winding number of its lowest corner,
+ * shifted as in corner_windings.c. The nodes are visited depth first. Each visit returns the
+ * differences of the numbers at the cell's corners from the number at the lowest corner: the
+ * crossings of the leaf's faces and of caps along the edges of the cell. The lowest corner of a
+ * child is a corner of an earlier sibling, so its number is known before the child is visited.
+ * Source: format-spec/border.md. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>

@@ -42,7 +42,7 @@ typedef struct ebpo_build_node {
 } ebpo_build_node;
 
 typedef struct ebpo_build_detail {
-    /* corner differences: winding numbers of the corners minus that of corner 0 */
+    /* corner differences: winding numbers of the corners minus the winding number of corner 0 */
     int32_t delta[8];
     /* range in `entries`: list of the leaf, or lists of all leaves below the gray node */
     uint64_t entry_begin, entry_end;

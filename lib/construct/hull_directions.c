@@ -207,10 +207,10 @@ static bool has_edge(const uint32_t *edges, int fours, uint32_t edge)
     return found;
 }
 
-/* Removes the visible facets that no new facet has replaced: those with the numbers index[from] ..
- * index[to - 1], in ascending order. `count`: number of facets before. For each removed facet, the
- * greatest index first, the last facet of the hull takes its index. So the facet that moves is
- * never one that must still be removed. */
+/* Removes the visible facets that no new facet has replaced: the facets with the numbers
+ * index[from] .. index[to - 1], in ascending order. `count`: number of facets before. For each
+ * removed facet, the greatest index first, the last facet of the hull takes its index. So the facet
+ * that moves is never one that must still be removed. */
 static void close_gaps(hull *h, const uint16_t *index, int from, int to, int count)
 {
     for (int i = to - 1; i >= from; i--)

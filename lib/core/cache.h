@@ -84,7 +84,7 @@ void ebpo_cache_prefetch(ebpo_cache *cache, const uint64_t *keys, unsigned count
 /* Sets the number of bytes of the budget that are set aside for other data than the items. Loads
  * are refused as if all these bytes were taken. Call it before the cache is used. */
 void ebpo_cache_set_aside(ebpo_cache *cache, uint64_t most);
-/* Uses bytes of those set aside, and drops items to free them. Returns false if too few are left,
+/* Uses bytes that are set aside, and drops items to free them. Returns false if too few are left,
  * or if items in use and running loads leave too little memory now. */
 bool ebpo_cache_take_aside(ebpo_cache *cache, uint64_t bytes);
 /* Returns bytes that ebpo_cache_take_aside has used. */

@@ -1,8 +1,8 @@
 /* Reads the machine's properties from the operating system: instruction sets, cores, the memory
- * that this process may use, and large pages. The memory is that of the machine, or the lowest
- * limit of the control groups of this process (as in containers; version 1 or 2, cgroups(7)). The
- * system may ignore advice on pages. On systems without the files in /proc and /sys, the values
- * come from sysconf. */
+ * that this process may use, and large pages. The memory is the memory of the machine, or the
+ * lowest limit of the control groups of this process (as in containers; version 1 or 2,
+ * cgroups(7)). The system may ignore advice on pages. On systems without the files in /proc and
+ * /sys, the values come from sysconf. */
 #include <sched.h>
 #include <stdint.h>
 #include <stdio.h>

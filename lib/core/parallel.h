@@ -23,7 +23,8 @@ unsigned ebpo_thread_count(unsigned requested);
  * `threads` threads (from ebpo_thread_count). The calling thread works too and reports progress
  * (`stage`, items done; 0 at the beginning). The thread of a piece is not determined: results must
  * not depend on it. After each piece, pages of `workspace` (may be NULL) are released if its budget
- * requires it, so tasks need not. Of several failures, that of the lowest piece is returned. */
+ * requires it, so tasks need not. Of several failures, the failure of the lowest piece is
+ * returned. */
 ebpo_status ebpo_parallel_for(unsigned threads, ebpo_workspace *workspace, uint64_t count,
                               uint64_t grain, ebpo_task_fn task, void *context,
                               const ebpo_progress *progress, const char *stage, ebpo_error *error);

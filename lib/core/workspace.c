@@ -382,8 +382,8 @@ static void free_extent(ebpo_workspace *w, extent *b)
     leave_pool(w, pool);
 }
 
-/* Allocates an array. Small arrays and those without a workspace are not in the table: malloc never
- * returns whole pages. */
+/* Allocates an array. Small arrays and arrays without a workspace are not in the table: malloc
+ * never returns whole pages. */
 static void *alloc_array(ebpo_workspace *w, uint64_t count, size_t size, bool zero)
 {
     uint64_t bytes;

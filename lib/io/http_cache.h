@@ -34,8 +34,8 @@ void ebpo_disk_held(const ebpo_disk *disk, uint64_t *held, uint64_t *others);
 void ebpo_disk_close(ebpo_disk *disk);
 
 /* Reading and reading ahead: a file's bytes in ranges, each fetched by one request and kept while
- * memory allows. Ranges with prefetch hints that are not read yet are kept longest, then those read
- * last. */
+ * memory allows. Ranges with prefetch hints that are not read yet are kept longest, then the ranges
+ * read last. */
 
 enum { EBPO_RANGE_BYTES = 4 << 20 }; /* limit of one request */
 

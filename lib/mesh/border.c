@@ -2,11 +2,11 @@
  * closed loops that they form.
  *
  * An edge that faces use n times from a to b and m times from b to a has weight n - m (n > m). The
- * border is the boundary of the faces as a chain, so the weights of the edges that arrive at a
- * vertex and of those that leave it have equal sums, whatever the mesh: non-manifold, twisted, or
- * with faces turned against each other. A walk along edges of positive weight therefore never
- * ends, until it returns to one of its vertices. There, a simple loop is cut off with the least
- * weight of its edges, which is subtracted from them. Each cut uses up at least one edge.
+ * border is the boundary of the faces as a chain, so at each vertex the weights of the edges that
+ * arrive and of the edges that leave have equal sums, whatever the mesh: non-manifold, twisted, or
+ * with faces turned against each other. A walk along edges of positive weight therefore never ends,
+ * until it returns to one of its vertices. There, a simple loop is cut off with the least weight of
+ * its edges, which is subtracted from them. Each cut uses up at least one edge.
  *
  * Walks begin at the least remaining edge and follow the least remaining edge at each vertex, in
  * the source's order, so the result depends neither on threads nor on the order of the mesh. */

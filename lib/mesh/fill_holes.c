@@ -1,6 +1,6 @@
 /* Fills holes: each boundary loop is triangulated (geometry/polygon.h). The triangles use each
- * boundary edge in the direction opposite to that of the adjacent face. The rest of the mesh does
- * not change. The repair record counts the additions. */
+ * boundary edge in the direction opposite to the direction in the adjacent face. The rest of the
+ * mesh does not change. The repair record counts the additions. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>

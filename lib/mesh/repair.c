@@ -33,7 +33,7 @@ typedef struct dropping {
 static bool is_removed(const dropping *d, uint64_t f) { return d->gone[f / WORD] >> f % WORD & 1; }
 
 /* Starts at the vertex with the face's lowest index. Returns true if the index of the next vertex
- * is lower than that of the last vertex. Repeated faces with different results have opposite
+ * is lower than the index of the last vertex. Repeated faces with different results have opposite
  * orientations. */
 static bool runs_up(const uint32_t face[3])
 {

@@ -1,7 +1,7 @@
 /* Finds the faces that intersect a box: their indices, or their triangles in batches.
  *
  * The walk visits the accels (acceleration structures of subtrees) that intersect the box, depth
- * first. In an accel it tests the boxes of the hierarchy and skips those that are certainly
+ * first. In an accel it tests the boxes of the hierarchy and skips boxes that are certainly
  * outside. Then it tests triangles exactly. In remote files the walk sends prefetch hints for the
  * subtrees that it will enter. A face that several subtrees list is returned once. In a subset the
  * query fails if a pruned node intersects the box. */

@@ -70,7 +70,7 @@ static inline int32_t ebpo_marked_value(int32_t marked) { return (marked - (mark
  * shifted: along x, then y, then z. */
 int32_t ebpo_holes_crossings(const ebpo_holes *holes, const double low[3], const double p[3]);
 
-/* Classifies a point that is on no face; `winding` is that of surface and caps. */
+/* Classifies a point that is on no face; `winding` is the winding number of surface and caps. */
 ebpo_where ebpo_holes_where(ebpo_holes *holes, const double p[3], int32_t winding);
 
 #endif

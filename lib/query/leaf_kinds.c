@@ -143,8 +143,8 @@ static bool face_plane(const ebpo_accel *s, const leaf_faces *f, int face, leaf_
     const double(*p)[3] = (const double(*)[3])f->p[face];
     double t[3][3], e[3], g[3], norm = 0, products = 0, reach = 0;
     ebpo_accel_triangle(s, f->slot[face], t);
-    for (int k = 0; k < 3; k++) { /* uses the exact corners: those in the cell's coordinates are
-                                   * rounded, which is too inexact for short edges */
+    for (int k = 0; k < 3; k++) { /* uses the exact corners: the corners in the cell's coordinates
+                                   * are rounded, which is too inexact for short edges */
         e[k] = (t[1][k] - t[0][k]) * f->inverse[k];
         g[k] = (t[2][k] - t[0][k]) * f->inverse[k];
     }

@@ -159,7 +159,7 @@ EBPO_MUST_USE ebpo_status ebpo_plan_parts(const ebpo_file *file, const ebpo_mode
 /* --- shared budgets ---
  *
  * A budget that several models share. It counts the bytes that each model takes permanently, and
- * those for the caches of all models. Any thread. */
+ * the bytes for the caches of all models. Any thread. */
 
 /* Return the pools of the caches of subtrees and of chunks. When one pool loads data, it needs
  * memory in the other. */

@@ -5,7 +5,7 @@
  * than the best face. Bounds and triangles are in single precision with bounded errors
  * (nearest_kernels.c). The remaining faces are compared by guaranteed bounds in double precision.
  * If the bounds of two faces overlap, the faces are compared with exact arithmetic. Of equally near
- * faces, the one with the lowest index in the file is returned. For points too far for single
+ * faces, the face with the lowest index in the file is returned. For points too far for single
  * precision, the search uses boxes in double precision. For points too far for doubles, it uses
  * keys: numbers in the order of the distances (point_bounds.h). An ebpo_nearest may search several
  * accels one after the other. */
@@ -192,7 +192,7 @@ static float frame_limit(const ebpo_near_search *g)
     return limit < 0x1p60 ? (float)limit * (1 + 0x1p-20f) + FLT_MIN : 0x1p60f;
 }
 
-/* Tests the candidates, the one with the least lower bound first. */
+/* Tests the candidates, the candidate with the least lower bound first. */
 static void judge_waiting(ebpo_near_search *g)
 {
     ebpo_nearest *n = g->user;

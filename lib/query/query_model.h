@@ -59,7 +59,7 @@ struct ebpo_context {
     ebpo_accel *pinned; /* the last used subtree, when it came from the cache */
     uint64_t pinned_key;
     bool planes; /* the query needs envelopes below the cut level */
-    /* results are not decided: their winding number is that of surface and caps */
+    /* results are not decided: their winding number is the winding number of surface and caps */
     bool undecided;
     uint32_t *open; /* slots that a filter left undecided */
     uint64_t open_capacity;

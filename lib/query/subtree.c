@@ -352,7 +352,7 @@ static void subtree_free_scratch(subtree_scratch *scratch)
 /* --- the path from the tree's root to a node --- */
 
 /* Returns the planes of the node at this level on the path to `octcode`. If the level is in the
- * subtree, `node` is the number of that node, and is set to the number of the next one. */
+ * subtree, `node` is the number of that node, and is set to the number of the next node. */
 static const uint32_t *planes_on_path(const ebpo_subtree *s, uint64_t octcode, int level,
                                       uint64_t *node, uint32_t *count)
 {

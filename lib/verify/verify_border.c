@@ -34,7 +34,7 @@ static uint64_t value_of_position(const double p[3])
     return value;
 }
 
-/* Returns the value of the edge from a to b; that of the opposite edge is its negative. */
+/* Returns the value of the edge from a to b. The value of the opposite edge is its negative. */
 static uint64_t value_of_edge(const double a[3], const double b[3])
 {
     uint64_t from = value_of_position(a), to = value_of_position(b);

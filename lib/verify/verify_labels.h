@@ -70,7 +70,7 @@ void ebpo_check_terminal_label(ebpo_tally *tally, const ebpo_reference_tree *vie
 EBPO_MUST_USE bool ebpo_label_note(ebpo_ray_points *points, const ebpo_reference_tree *view,
                                    const ebpo_reference_node *node, const ebpo_frame *frame,
                                    const ebpo_label_plan *plan);
-/* Compares the winding numbers by rays with those in the file. */
+/* Compares the winding numbers by rays with the winding numbers in the file. */
 void ebpo_check_rays(ebpo_tally *tally, const ebpo_ray_points *points);
 
 /* Compares the winding numbers at common corners of the children of a gray node. Stores those of

@@ -562,9 +562,9 @@ bool ebpo_check_shape(ebpo_tally *tally, const ebpo_tree *tree)
 
 /* --- structure: the tree --- */
 
-/* Returns true if a volume is at most that of `cells` cells, plus a tolerance for the rounding of
- * sums. Also returns true for coordinates beyond about 1e102 or below 1e-102. Their volumes exceed
- * the range of double, and the format does not specify them. */
+/* Returns true if a volume is at most the volume of `cells` cells, plus a tolerance for the
+ * rounding of sums. Also returns true for coordinates beyond about 1e102 or below 1e-102. Their
+ * volumes exceed the range of double, and the format does not specify them. */
 static bool volume_possible(double volume, uint64_t cells, int l, const ebpo_info *info)
 {
     double cell =

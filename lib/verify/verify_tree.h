@@ -54,7 +54,7 @@ bool ebpo_reference_is_pruned(const ebpo_reference_tree *view, const ebpo_refere
 ebpo_reference_node ebpo_reference_child(const ebpo_reference_tree *view,
                                          const ebpo_reference_node *node, unsigned octant);
 
-/* Returns the codes of the planes stored for a node: those that a gray node adds, or the leaf
+/* Returns the codes of the planes stored for a node: the planes that a gray node adds, or the leaf
  * planes of a leaf. Returns NULL, and *count is 0, when there are none. */
 const uint32_t *ebpo_reference_planes(const ebpo_reference_tree *view,
                                       const ebpo_reference_node *node, uint32_t *count);

@@ -70,7 +70,7 @@ static void free_edges(edge_lists *e)
 /* --- patches --- */
 
 /* A disjoint-set forest: the parent of each triangle << 1 | 1 if its orientation in the patch is
- * opposite to that of its parent. Roots are the first triangles of the patches. */
+ * opposite to the parent's orientation. Roots are the first triangles of the patches. */
 
 static uint32_t find_root(uint32_t *parent, uint32_t triangle)
 {
@@ -205,7 +205,7 @@ static ebpo_status classify_triangle(const ebpo_cut_mesh *cut, uint32_t triangle
     uint64_t in_front = 0, behind = 0;
     mpq_t middle[3];
     ebpo_status status = EBPO_OK;
-    /* winding numbers are those at the middle, shifted by an infinitesimal */
+    /* winding numbers at the middle, shifted by an infinitesimal */
     for (int k = 0; k < 3 && shifted == 0; k++)
         shifted = ebpo_normal_sign(k, ebpo_face_list_corner(faces, face, 0),
                                    ebpo_face_list_corner(faces, face, 1),

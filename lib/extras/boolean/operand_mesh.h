@@ -20,9 +20,9 @@ typedef struct ebpo_whole_faces {
     uint32_t *component; /* [faces] number of the component; EBPO_NO_COMPONENT: not whole */
     uint32_t components;
     bool repeats; /* several vertices have one position */
-    /* A bit for each face that must be listed: those that are not whole; whole faces of which two
-     * corners belong to faces in pairs; whole faces of edges of more than two faces; and the first
-     * face of each component that has no such face. */
+    /* A bit for each face that must be listed: the faces that are not whole; whole faces of which
+     * two corners belong to faces in pairs; whole faces of edges of more than two faces; and the
+     * first face of each component that has no such face. */
     uint64_t *listed;
 } ebpo_whole_faces;
 

@@ -1,9 +1,9 @@
 /* Triangulates points of a plane.
  *
- * Points are added in the order of their coordinates: each is outside the hull of those before, and
- * is joined to all edges of the hull that it sees. Then edges are flipped where that improves the
- * shape; these decisions are approximate, but an edge is only flipped in a strictly convex
- * quadrangle, by exact turns, so every triangle always has an area. Segments become edges by
+ * Points are added in the order of their coordinates: each point is outside the hull of the points
+ * before, and is joined to all edges of the hull that it sees. Then edges are flipped where that
+ * improves the shape; these decisions are approximate, but an edge is only flipped in a strictly
+ * convex quadrangle, by exact turns, so every triangle always has an area. Segments become edges by
  * flipping the edges that they cross (Sloan, "A fast algorithm for generating constrained Delaunay
  * triangulations", 1993). Invariant: triangles are counter-clockwise and cover the hull once. */
 #include "core/strict_fp.h"

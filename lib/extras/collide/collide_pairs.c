@@ -213,8 +213,9 @@ static ebpo_status run_parts(void *user, uint64_t begin, uint64_t end, unsigned 
     return EBPO_OK;
 }
 
-/* Uses the walks that the collider keeps, or makes new ones if another query is using them: the
- * callback that receives pairs may make a query. Returns false without memory. */
+/* Uses the walks that the collider keeps, or makes new walks if another query is using the
+ * collider's walks: the callback that receives pairs may make a query. Returns false without
+ * memory. */
 static bool acquire_walks(pair_gathering *g)
 {
     ebpo_collider *c = g->collision->collider;

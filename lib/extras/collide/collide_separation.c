@@ -238,8 +238,8 @@ static ebpo_status offer_children(separation_search *s, int which, uint32_t node
     return EBPO_OK;
 }
 
-/* Divides the larger node of a pair, or the one that can be divided; a pair of blocks is decided.
- */
+/* Divides the larger node of a pair, or the only node that can be divided; decides a pair of
+ * blocks. */
 static ebpo_status divide_pair(separation_search *s, const separation_pair *pair, ebpo_error *error)
 {
     uint32_t child[2] = { child_of(s, 0, pair->a), child_of(s, 1, pair->b) };

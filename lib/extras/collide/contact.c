@@ -3,8 +3,8 @@
  * Exact signs (geometry/predicates.h) decide which edges pierce the other face, so the ends are on
  * the right edges. The point where an edge pierces a plane is computed in double-double arithmetic.
  * If numbers are too large or too small for its error bounds, the point is computed exactly with
- * GMP and rounded once. Neither the order of the faces nor that of their corners changes a bit of
- * the points. Bounds: docs/develop/collision.md, "Contact of a crossing pair". The functions are
+ * GMP and rounded once. Neither the order of the faces nor the order of their corners changes a bit
+ * of the points. Bounds: docs/develop/collision.md, "Contact of a crossing pair". The functions are
  * pure and can be called from any thread. */
 #include "core/strict_fp.h"
 
@@ -198,8 +198,8 @@ static void end_of(const edge *e, double out[3])
     compute_piercing(&p, out);
 }
 
-/* Chooses one of two edges with the same piercing point: the one that ends there, otherwise the one
- * whose ends are less by coordinates. */
+/* Chooses one of two edges with the same piercing point: the edge that ends at this point, or else
+ * the edge whose ends are less by coordinates. */
 static const edge *choose_edge(const edge *a, const edge *b)
 {
     if (a->ends_in_plane || b->ends_in_plane)

@@ -138,7 +138,7 @@ static bool find_normal(sweep *s, int of)
     return mpz_sgn(s->share) != 0;
 }
 
-/* Returns true if the projection of the corner is in that of face `of`. */
+/* Returns true if the projection of the corner is in the projection of face `of`. */
 static bool is_over(sweep *s, const ebpo_vectorz *corner, int of)
 {
     int signs[3] = { 0, 0, 0 };

@@ -52,7 +52,8 @@ static inline double ebpo_box_gap(const double a_low[3], const double a_high[3],
 
 /* Computes the point p in the model's coordinates that the exact motion maps to w. *doubt bounds
  * the errors of p and of the rounding of posed coordinates: if no face of the model is within
- * *doubt of p, the winding number of the posed model at w is that of the model at p. */
+ * *doubt of p, the winding number of the posed model at w is the winding number of the model at
+ * p. */
 void ebpo_unpose(const ebpo_posed_solid *s, const double w[3], double p[3], double *doubt);
 
 /* Computes a box in the model's coordinates that intersects every face that, when posed, may have a

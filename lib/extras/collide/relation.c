@@ -269,7 +269,7 @@ static bool record_pair(relation_search *r, const ebpo_face_pair *pair)
     return r->status == EBPO_OK;
 }
 
-/* Marks the faces of intersecting pairs, and examines those that cross. */
+/* Marks the faces of intersecting pairs, and examines the faces that cross. */
 static bool receive_contacts(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
     relation_search *r = user;
@@ -337,8 +337,8 @@ static bool side_adds_nothing(const relation_search *r, int m, bool in)
     return in ? r->both && r->only[!m] : r->only[m];
 }
 
-/* Examines the owned faces of a subtree that intersect no face of the other model, except those of
- * patches that add no information. done: a bit for each such patch. */
+/* Examines the owned faces of a subtree that intersect no face of the other model, except the faces
+ * of patches that add no information. done: a bit for each such patch. */
 static void inspect_untouched_faces(relation_search *r, const separate_patches *u, uint64_t *done)
 {
     for (uint64_t i = 0; i < u->count && must_continue(r); i++) {
@@ -570,8 +570,8 @@ static ebpo_status find_relation(relation_search *r, ebpo_error *error)
     return r->status;
 }
 
-/* Adds the loads of this query to the collider's counts, and sets the bytes read: those of nested
- * queries are included in the difference. */
+/* Adds the loads of this query to the collider's counts, and sets the bytes read: the difference
+ * includes the bytes that nested queries read. */
 static void count_loads(const relation_search *r, uint64_t bytes_before, uint64_t read_before)
 {
     ebpo_collider *c = r->collision->collider;

@@ -1,5 +1,6 @@
-/* Visits pairs of nodes of two posed trees, the least gap first, down to subtrees that are loaded
- * on demand. The gap of two envelopes is a lower bound of the distance of the nodes' faces.
+/* Visits pairs of nodes of two posed trees, the pair with the least gap first, down to subtrees
+ * that are loaded on demand. The gap of two envelopes is a lower bound of the distance of the
+ * nodes' faces.
  *
  * Queries of levels, distances and separation distances use this search; each decides when to stop.
  * The larger of two nodes is divided first. If one model is entirely in memory and the other

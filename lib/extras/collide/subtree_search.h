@@ -1,4 +1,4 @@
-/* Visits pairs of nodes of two posed trees, those with the least gap of their envelopes first. For
+/* Visits pairs of nodes of two posed trees, the pair with the least gap of its envelopes first. For
  * one thread at a time. */
 #ifndef EBPO_COLLIDE_SUBTREE_SEARCH_H
 #define EBPO_COLLIDE_SUBTREE_SEARCH_H

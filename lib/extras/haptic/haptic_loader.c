@@ -38,7 +38,7 @@ static ebpo_status query_probe(ebpo_haptic *t, ebpo_probe_query *out, ebpo_error
 }
 
 /* Queries distance and side at the probe's position, and passes them to the haptic step. *moved is
- * false, and nothing happens, if the position is that of the last query. */
+ * false, and nothing happens, if the position is the position of the last query. */
 static ebpo_status query_position(ebpo_haptic *t, bool *moved, ebpo_error *error)
 {
     ebpo_probe_query *known = &t->known[t->loader_result];
@@ -115,8 +115,8 @@ static void place_box(const ebpo_haptic *t, const double goal[3], ebpo_extent *o
     }
 }
 
-/* Returns true if the middle of `e` is so far from that of the newest box that `e` must be loaded.
- */
+/* Returns true if the middle of `e` is so far from the middle of the newest box that `e` must be
+ * loaded. */
 static bool is_far_from_newest(const ebpo_haptic *t, const ebpo_extent *e)
 {
     for (int i = 0; i < 3; i++)

@@ -61,8 +61,8 @@ typedef struct face_search {
 } face_search;
 
 /* Adds the normal of a face to `sum`, weighted by the face's area and by a factor that falls to 0
- * at the search radius. The normal of a solid's face points outwards, that of a surface's face to
- * the proxy's side. */
+ * at the search radius. The normal of a solid's face points outwards; the normal of a surface's
+ * face points to the proxy's side. */
 static void add_normal(const face_search *a, const double face[3][3], double gap, double sum[3])
 {
     double e[3], f[3], n[3], d[3];

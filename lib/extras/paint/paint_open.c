@@ -66,7 +66,7 @@ static uint8_t *member_of(const ebpo_paint *p, const ebpo_paint_column *c, uint6
 }
 
 /* Copies a number of 1, 2, 4 or 8 bytes, and swaps its bytes on a big-endian machine. So it
- * converts from the file's order to that of memory and back. */
+ * converts from the file's order to the order in memory and back. */
 static void convert_value(const uint8_t *from, unsigned bytes, uint8_t *to)
 {
     const uint16_t two = bytes == 2 ? ebpo_load16(from) : 0;
@@ -295,7 +295,7 @@ static ebpo_status read_note(reader *r, uint64_t number, ebpo_error *error)
 }
 
 /* Reads layers and notes. p->layer_count and p->note_count grow with each one, so that after a
- * failure exactly those are freed whose texts have been allocated. */
+ * failure exactly the layers and notes are freed whose texts have been allocated. */
 static ebpo_status read_labels(reader *r, uint64_t layers, uint64_t notes, ebpo_error *error)
 {
     ebpo_paint *p = r->p;

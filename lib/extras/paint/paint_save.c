@@ -2,7 +2,7 @@
  * (paint_open.c) lists their arrays.
  *
  * A file is written under a temporary name and published when it is complete. The file of a paint
- * is replaced only if its version is still the one that was read or last saved. So a change by
+ * is replaced only if its version is still the version that was read or last saved. So a change by
  * another program is not lost.
  *
  * Source: format-spec/paint.md. */

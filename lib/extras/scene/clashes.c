@@ -290,7 +290,7 @@ static ebpo_status query_clearance(const scene_two *two, ebpo_scene_clash *m, eb
     return status;
 }
 
-/* Sets the relation. The relation of solids is more specific than that of faces. */
+/* Sets the relation. The relation of solids is more specific than the relation of faces. */
 static ebpo_status query_relation(const scene_two *two, ebpo_scene_clash *m, ebpo_error *error)
 {
     ebpo_relation_result found;

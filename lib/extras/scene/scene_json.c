@@ -174,7 +174,7 @@ static ebpo_status read_text(const ebpo_whole_file *file, ebpo_scene_route *rout
 }
 
 /* Adds the poses of a CSV file to a route. *left: number of bytes that may still be read from such
- * files; it decreases by the size of this one. */
+ * files; the number decreases by the size of this file. */
 static ebpo_status read_csv_file(ebpo_scene_route *route, const char *path, uint64_t *left,
                                  ebpo_error *error)
 {

@@ -312,7 +312,7 @@ static ebpo_status check_instance(const ebpo_scene *scene, const ebpo_scene_inst
     return ebpo_posing_make(&posing, &i->pose, origin, error); /* only checks the pose */
 }
 
-/* Adds the newest instance to the set of all instances, that of its layer, and `set`. */
+/* Adds the newest instance to the set of all instances, the set of its layer, and `set`. */
 static ebpo_status join_own_sets(ebpo_scene *scene, uint64_t set, ebpo_error *error)
 {
     const ebpo_scene_instance_entry *i = &scene->instances[scene->instances_count - 1];

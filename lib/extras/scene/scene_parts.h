@@ -131,8 +131,8 @@ EBPO_MUST_USE ebpo_status ebpo_scene_add_key(ebpo_scene_route *route, const ebpo
                                              ebpo_error *error);
 /* Returns the quaternion nearest to a matrix; its length is not 0, but need not be 1. */
 void ebpo_scene_quaternion_of_matrix(const double m[3][3], double quaternion[4]);
-/* Computes the pose of a route at a time. Before the first key it is that of the first key, after
- * the last key that of the last one. */
+/* Computes the pose of a route at a time. Before the first key the pose is the first key's, and
+ * after the last key it is the last key's. */
 void ebpo_scene_route_at(const ebpo_scene_route *route, double time, ebpo_pose *out);
 /* Computes the pose that applies `inner` first, then `outer`. */
 void ebpo_scene_compose(const ebpo_pose *outer, const ebpo_pose *inner, ebpo_pose *out);
