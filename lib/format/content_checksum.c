@@ -1,7 +1,7 @@
 /* Computes the content checksum from the path and the SHA-256 of each array, sorted by path. The
- * SHA-256 is that of the array's bytes before shuffle and compression, so the checksum does not
- * depend on the codec, the chunks or HDF5. Codes that restart at each chunk (vertices, maps) are
- * recoded as in a file without subtrees. The part `attributes` has a separate checksum of its
+ * SHA-256 is computed from the array's bytes before shuffle and compression, so the checksum does
+ * not depend on the codec, the chunks or HDF5. Codes that restart at each chunk (vertices, maps)
+ * are recoded as in a file without subtrees. The part `attributes` has a separate checksum of its
  * values, so the content checksum is the same with and without attributes. Source:
  * format-spec/checksums.md. */
 #include <stdio.h>

@@ -101,7 +101,7 @@ static const count_spec level_counts[EBPO_COUNTS] = {
 #include "format/array_table.inc"
 };
 
-/* Checks that the type in each row of array_table.inc is that of the member of ebpo_level. */
+/* Checks that the type in each row of array_table.inc is the type of the member of ebpo_level. */
 #define LEVEL_ARRAY(ID, name, field, type, ...)                                 \
     _Static_assert(_Generic(((ebpo_level *)0)->field, type * : 1, default : 0), \
                    "ebpo_level." #field ": another type than in its row of array_table.inc");

@@ -271,8 +271,8 @@ static ebpo_status collect_older(const ebpo_mesh *mesh, uint64_t begin, ebpo_quo
     return status == EBPO_OK ? compact_sort(older, error) : status;
 }
 
-/* Assigns local indices to the vertices, in file order: first the older vertices, then those that
- * owned faces use first. */
+/* Assigns local indices to the vertices, in file order: first the older vertices, then the vertices
+ * that owned faces use first. */
 static void renumber_vertices(ebpo_mesh *mesh, uint64_t begin, const ebpo_compact *older)
 {
     uint32_t less = (uint32_t)(begin - older->count);
@@ -533,7 +533,7 @@ static bool is_subtree(const ebpo_chunks *chunks, const extent *x, const ebpo_no
            root->type == EBPO_GRAY && x->end == info->level_count;
 }
 
-/* Checks that the owned faces are those that the table states for the subtree. */
+/* Checks that the owned faces are the faces that the table states for the subtree. */
 static ebpo_status check_owned_faces(const ebpo_slice *slice, ebpo_chunks *chunks, const extent *x,
                                      ebpo_error *error)
 {

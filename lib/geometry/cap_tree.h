@@ -84,7 +84,8 @@ typedef struct ebpo_cap_decision {
     ebpo_bounded winding; /* bounds of w_S as far as they were needed */
 } ebpo_cap_decision;
 
-/* Decides by w_S = winding + w_D at p; exact. `winding` is that of the shifted point. */
+/* Decides by w_S = winding + w_D at p; exact. `winding` is the winding number of the shifted
+ * point. */
 ebpo_cap_decision ebpo_cap_decide(const ebpo_cap_tree *tree, const double p[3], int32_t winding,
                                   const ebpo_cap_rule *rule);
 

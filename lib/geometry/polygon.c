@@ -241,7 +241,7 @@ typedef struct box {
 typedef struct outline {
     const double (*at)[2];
     bool touching;
-    uint32_t n, left; /* number of corners, and of those not yet cut off */
+    uint32_t n, left; /* number of corners, and of corners not yet cut off */
     uint64_t work;
 
     uint32_t *next, *previous; /* next: NONE once cut off */

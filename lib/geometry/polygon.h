@@ -49,10 +49,11 @@ bool ebpo_triangulate_chain(const ebpo_chain *chain, uint32_t (*triangles)[3]);
  * polygon with slits, with bridges to holes, or pinched at corners.
  *
  * Outlines whose projection crosses itself (including folded quads) have no such triangles. They
- * get triangles that are a guess, which callers count: up to EBPO_POLYGON_OPTIMAL corners those of
- * least area in space, otherwise those that result from cutting the smallest ears first. The result
- * depends only on the corners. Sources: Meisters, "Polygons have ears", 1975; Barequet and Sharir,
- * "Filling gaps in the boundary of a polyhedron", 1995, for the least area. */
+ * get triangles that are a guess, which callers count: up to EBPO_POLYGON_OPTIMAL corners the
+ * triangles of least area in space, with more corners the triangles that result from cutting the
+ * smallest ears first. The result depends only on the corners. Sources: Meisters, "Polygons have
+ * ears", 1975; Barequet and Sharir, "Filling gaps in the boundary of a polyhedron", 1995, for the
+ * least area. */
 
 typedef enum ebpo_polygon_kind {
     EBPO_POLYGON_CONVEX, /* a fan; also every triangle */

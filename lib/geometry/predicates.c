@@ -271,8 +271,8 @@ static double error_of_heads(ebpo_pair m[3][3])
 
 /* Returns a lower bound of the absolute value of the expansion e, for n <= 24: the heads alone give
  * at most 24 components. Components do not overlap, so the sum of their absolute values is below
- * twice that of the last one. The error of adding the components is less than n eps times this sum.
- */
+ * twice the absolute value of the last component. The error of adding the components is less than n
+ * eps times this sum. */
 static double expansion_size(const double *e, int n)
 {
     double sum = 0;

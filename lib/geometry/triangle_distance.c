@@ -207,7 +207,7 @@ static bool compare_far_corners(const double p[3], const double a[3], const doub
     return *sign || bounded_is_zero(d);
 }
 
-/* Replaces corners that do not belong to a feature by copies of those that do. */
+/* Replaces corners that do not belong to a feature by copies of corners that do. */
 static void keep_feature(double t[3][3], ebpo_feature feature)
 {
     double from[3], to[3];

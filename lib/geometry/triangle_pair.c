@@ -234,8 +234,8 @@ static int corner_alone(const int side[3])
     return 0;
 }
 
-/* Reorders the corners cyclically so that the one that is alone comes first. Returns true if this
- * corner is below another one: the other face's plane must then be flipped. */
+/* Reorders the corners cyclically so that the corner that is alone comes first. Returns true if
+ * this corner is below another one: the other face's plane must then be flipped. */
 static bool reorder_corners(const int side[3], int corner[3])
 {
     corner[0] = corner_alone(side);

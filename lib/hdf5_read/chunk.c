@@ -3,8 +3,9 @@
  * before compression, and if a fletcher32 checksum follows. A new array gets the filters of the
  * row. The pipeline of an array in a file is recognized by these filters. A new codec needs a
  * number in chunk.h, a row, and its functions in a separate file, such as zstd_codec.c. Deflate
- * needs only two calls of zlib, which are in this file. The output is bit for bit that of libhdf5's
- * own filters. Source: docs of HDF5 ("HDF5 filters"), format-spec/README.md, section 4. */
+ * needs only two calls of zlib, which are in this file. The output is bit for bit the output of
+ * libhdf5's own filters. Source: docs of HDF5 ("HDF5 filters"), format-spec/README.md, section
+ * 4. */
 #include <string.h>
 #include <zlib.h>
 

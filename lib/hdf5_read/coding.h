@@ -38,8 +38,8 @@ void ebpo_numbers_decode(const uint8_t *file, uint64_t rows, uint32_t *numbers);
 
 /* Encodes columns: [rows][cols] of unsigned integers of 1, 2, 4 or 8 bytes, in the machine's byte
  * order. `file` holds column after column; each value is coded as the difference to the previous
- * one (to 0 for the first), modulo the integer's size, in zigzag code. `floats`: the values are
- * bits of floats (4 or 8 bytes), converted to integers of the same order. */
+ * value (to 0 for the first value), modulo the integer's size, in zigzag code. `floats`: the values
+ * are bits of floats (4 or 8 bytes), converted to integers of the same order. */
 void ebpo_columns_encode(const void *values, size_t size, bool floats, uint64_t rows, uint32_t cols,
                          uint8_t *file);
 void ebpo_columns_decode(const uint8_t *file, size_t size, bool floats, uint64_t rows,

@@ -1,8 +1,8 @@
-/* Implements the coding "gates" of format-spec/gates.md. Faces follow each other across edges:
- * each face is written as its gate, which is one of the newest open edges, and its third vertex.
- * Open edges of earlier faces are kept in a short list, the newest last. Encoder and decoder keep
- * the same list, so the coding is invertible for all codes; the decoder accepts any bytes and
- * rejects those that represent no faces. Time is proportional to the number of faces. */
+/* Implements the coding "gates" of format-spec/gates.md. Faces follow each other across edges: each
+ * face is written as its gate, which is one of the newest open edges, and its third vertex. Open
+ * edges of earlier faces are kept in a short list, the newest last. Encoder and decoder keep the
+ * same list, so the coding is invertible for all codes; the decoder accepts any bytes and rejects
+ * bytes that represent no faces. Time is proportional to the number of faces. */
 #include "hdf5_read/face_gates.h"
 
 #include <string.h>

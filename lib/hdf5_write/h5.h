@@ -154,7 +154,7 @@ EBPO_MUST_USE ebpo_status ebpo_h5_put_layers(ebpo_h5_out *out, const char *path,
 /* Files in layouts of other programs, read through libhdf5 in a separate process. */
 
 typedef struct ebpo_process_limits {
-    uint64_t memory_bytes; /* address space beyond that of this process */
+    uint64_t memory_bytes; /* address space beyond the address space of this process */
     uint64_t file_bytes;   /* bytes that it writes */
     unsigned seconds;      /* processor time */
 } ebpo_process_limits;

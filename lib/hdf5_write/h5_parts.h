@@ -64,7 +64,7 @@ void ebpo_h5_sink_fail(ebpo_h5_sink *sink, const ebpo_error *error);
 /* Returns the stored failure, or EBPO_OK. */
 EBPO_MUST_USE ebpo_status ebpo_h5_sink_status(const ebpo_h5_sink *sink, ebpo_error *error);
 /* Closes the sink's file after libhdf5 has closed it, inside the scope. Returns the first failure,
- * including that of this close. */
+ * including the failure of this close. */
 EBPO_MUST_USE ebpo_status ebpo_h5_sink_close(ebpo_h5_sink *sink, ebpo_error *error);
 /* Releases the file but keeps the sink: libhdf5 could not close its file, for lack of memory, and
  * may call the driver again at any time. */

@@ -69,7 +69,7 @@ static ebpo_status open_set(dataset *d, ebpo_error *error)
     return d->space < 0 || d->type < 0 ? rows_fail(d, "the dataset is damaged", error) : EBPO_OK;
 }
 
-/* Returns true if the file's root names this format, or that of paint files. */
+/* Returns true if the file's root names this format, or the format of paint files. */
 static bool is_of_format(hid_t file)
 {
     enum { LIMIT = 64 };

@@ -1,6 +1,6 @@
 /* Runs libhdf5 on untrusted files in a separate process: forked, with limits of memory, time and
  * bytes written, without plugins, and with a pipe for its status and error. A crash ends that
- * process and not this one. */
+ * process and not this process. */
 #include "hdf5_write/h5_parts.h"
 
 #include <errno.h>

@@ -174,10 +174,12 @@ static inline ebpo_bound_sides ebpo_bound_side(const ebpo_bound *b, int lane, in
 }
 
 /* Bounding cylinder of a curved sheet. It separates the sheet's distance from the distance of
- * neighbouring sheets. With x a point of the child relative to the middle of its decoded box, and a
- * = axis / 2^15, along_step * from <= x . a <= along_step * to, x . x - (x . a)^2 <= (aside_step *
- * radius)^2. Values have 16 bits: with 8 bits, the error of the axis would be as large as the
- * thickness of curved sheets, and a fifth more blocks would be visited. */
+ * neighbouring sheets. With x a point of the child relative to the middle of its decoded box, and
+ * a = axis / 2^15,
+ *   along_step * from <= x . a <= along_step * to,
+ *   x . x - (x . a)^2 <= (aside_step * radius)^2.
+ * Values have 16 bits: with 8 bits, the error of the axis would be as large as the thickness of
+ * curved sheets, and a fifth more blocks would be visited. */
 typedef struct ebpo_bound_cylinder {
     _Alignas(64) int16_t axis[3][8];
     int16_t from[8], to[8], radius[8];

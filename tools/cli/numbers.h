@@ -18,8 +18,8 @@ double number_read(const char *text, const char *end, const char **after);
 /* Returns the beginning of the text of a file, after a byte order mark, if any. */
 const char *number_skip_mark(const char *text);
 
-/* Returns the end of the output. The layout is that of printf's %.17g; not finite: inf, -inf, nan,
- * -nan. */
+/* Returns the end of the output, which is the same as by printf's %.17g; not finite: inf, -inf,
+ * nan, -nan. */
 char *number_write(char *out, double v);
 char *number_write_uint(char *out, uint64_t v);
 char *number_write_int(char *out, int64_t v);

@@ -35,7 +35,7 @@ typedef struct points_block {
     uint64_t row_count;
     double *space; /* memory for rows that differ from the bytes */
     uint64_t capacity_rows;
-    uint64_t lines;    /* lines of text, including those before `begin` */
+    uint64_t lines;    /* lines of text, including lines before `begin` */
     bool first;        /* true for the first block of the input */
     bool failed;       /* an error follows the last row of the block */
     uint64_t fault_at; /* its line or row, from 1 in this block; 0: the input as a whole */

@@ -119,7 +119,7 @@ extern "C" {
 
 /*
  * Returns the version of the library in use, in the form of EBPO_VERSION_NUMBER. If its major
- * version differs from that of the headers, compile the program again.
+ * version differs from the major version of the headers, compile the program again.
  *
  * Threads: any.
  */

@@ -124,8 +124,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_inside(ebpo_boolean *boolean, co
                                                        ebpo_boolean_result *out, ebpo_error *error);
 
 /*
- * Classifies points[count][3] into out[count]. The error is that of the first failed point, which
- * the message names.
+ * Classifies points[count][3] into out[count]. The error is about the first failed point,
+ * which the message names.
  *
  * Threads: one at a time per expression.
  */
@@ -293,8 +293,8 @@ typedef struct ebpo_boolean_mesh_options {
     uint8_t reserved[5];
 
     /*
-     * Holds the arrays of the mesh, and those that grow with the operands; free it after the mesh.
-     * NULL: no limit of memory.
+     * Holds the arrays of the mesh, and the arrays that grow with the operands; free it after the
+     * mesh. NULL: no limit of memory.
      */
     ebpo_workspace *workspace;
 } ebpo_boolean_mesh_options;
@@ -425,9 +425,9 @@ typedef struct ebpo_boolean_volume {
     size_t struct_size;
 
     /*
-     * Bounds of the result's volume, in the cube of the world's unit: lo is that of all in-cells,
-     * hi that of all in-cells and mixed cells. Exact on posed coordinates. Both 0: the result is
-     * empty.
+     * Bounds of the result's volume, in the cube of the world's unit: lo is the volume of all
+     * in-cells, hi the volume of all in-cells and mixed cells. Exact on posed coordinates. Both 0:
+     * the result is empty.
      */
     double lo, hi;
 

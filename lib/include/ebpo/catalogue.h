@@ -144,8 +144,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_catalogue_new(const ebpo_catalogue_entry
                                                       ebpo_catalogue **out, ebpo_error *error);
 
 /*
- * Describes an open file as an entry with the given `path`, which is not copied. The box is that of
- * the mesh; for a file without faces it is not valid for ebpo_catalogue_new.
+ * Describes an open file as an entry with the given `path`, which is not copied. Its box is the box
+ * of the mesh; for a file without faces it is not valid for ebpo_catalogue_new.
  *
  * Threads: any.
  */
@@ -337,8 +337,8 @@ typedef struct ebpo_catalogue_query_options {
  * model with the point on a face adds 0. A point is inside if it is inside any model; else it is on
  * a face if it is on a face of any model.
  *
- * For parts, the rule is applied to the sum. The result is exactly that of the whole model, also
- * for points on caps. EBPO_E_LIMIT: each of 64 rays from a point on a cap hits an edge or runs
+ * For parts, the rule is applied to the sum. The result is exactly the result for the whole model,
+ * also for points on caps. EBPO_E_LIMIT: each of 64 rays from a point on a cap hits an edge or runs
  * along a face. EBPO_E_ABSENT: a point is on a cap, and the catalogue has no surface of any part.
  *
  * EBPO_E_NOT_SOLID: a model is a surface.

@@ -200,11 +200,11 @@ typedef bool (*ebpo_pairs_fn)(void *user, const ebpo_face_pair *pairs, uint64_t 
 
 /*
  * Finds every pair of intersecting faces once. Pairs are sorted by the index in the file of the
- * first model, then by that of the other model. The first model is the one with the lower
- * content_sha256; if these are equal, the one with the lower pose, compared bit by bit. Partly
- * loaded models give the same pairs in the same order. Subtrees whose envelopes may intersect are
- * loaded; each about once if `memory` holds all pairs and the budgets hold about a hundred
- * subtrees.
+ * first model, then by the index in the file of the other model. The first model is the model with
+ * the lower content_sha256; if these are equal, the model with the lower pose, compared bit by bit.
+ * Partly loaded models give the same pairs in the same order. Subtrees whose envelopes may
+ * intersect are loaded; each about once if `memory` holds all pairs and the budgets hold about a
+ * hundred subtrees.
  *
  * EBPO_E_CANCELLED: also if the deadline has passed. The pairs passed so far are then the first
  * ones. Other errors are those of ebpo_collide_first.

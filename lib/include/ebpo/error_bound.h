@@ -70,7 +70,7 @@ typedef struct ebpo_error_bound {
     /* Number of samples on the level's surface. */
     uint64_t samples;
 
-    /* Number of distances computed for the bounds, including those for coarser levels. */
+    /* Number of distances computed for the bounds, including distances for coarser levels. */
     uint64_t queries;
 } ebpo_error_bound;
 

@@ -165,7 +165,7 @@ typedef enum ebpo_haptic_flag {
      */
     EBPO_HAPTIC_FACES_OMITTED = 8,
 
-    /* The device position was not finite; the previous one was used. */
+    /* The device position was not finite; the previous position was used. */
     EBPO_HAPTIC_BAD_INPUT = 16,
 
     /* Wrong step function for this kind; nothing was done. */
@@ -353,8 +353,8 @@ typedef struct ebpo_haptic_tool_result {
  * features to feel.
  *
  * A rotation counts as its angle times the arm of the tool, the root mean square distance of the
- * points from the tool's position. Among all motions that the contacts allow, the proxy takes the
- * one that ends nearest to the device. Force and torque are those of a spring of `stiffness` for
+ * points from the tool's position. Among all motions that the contacts allow, the proxy makes the
+ * motion that ends nearest to the device. Force and torque are those of a spring of `stiffness` for
  * the prevented motion (for an angle, stiffness times arm^2). They are reduced as in
  * ebpo_haptic_step_ball to bound the energy, with rotations as lengths.
  *

@@ -13,8 +13,8 @@
  * for the first 128 KiB, which usually include levels 0 to 4. Later data is fetched in advance in
  * requests of up to 4 MiB, several at a time.
  *
- * Every response is checked: its range, its size, and the version of the file, which must be that
- * of the opened file. The version is the size and the ETag, weak or not; without ETag,
+ * Every response is checked: its range, its size, and the version of the file, which must be the
+ * version of the opened file. The version is the size and the ETag, weak or not; without ETag,
  * Last-Modified.
  *
  * Without libcurl the functions return EBPO_E_UNSUPPORTED.

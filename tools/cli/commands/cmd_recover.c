@@ -42,8 +42,8 @@ typedef struct recovery {
     ebpo_progress progress;
     part_state part_state[FILE_PARTS];
     char why[FILE_PARTS][sizeof((ebpo_error *)NULL)->message]; /* errors; "": none */
-    bool content_equal;                                        /* the new content equals that of the
-                                                                * file */
+    bool content_equal;                                        /* the new content equals the content
+                                                                * of the file */
 } recovery;
 
 /* Returns the options for reading parts. */

@@ -173,7 +173,7 @@ static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress pro
     if (j->v.surface)
         return load_surface(t, file, error);
     ebpo_lod_options lod =
-        /* with cell faces, which close the envelopes; those inside the model are invisible */
+        /* with cell faces, which close the envelopes; cell faces inside the model are invisible */
         EBPO_LOD_OPTIONS_INIT;
     lod.threads = threads;
     lod.progress = progress;

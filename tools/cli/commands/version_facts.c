@@ -57,7 +57,7 @@ static void print_installation(const installation *i)
            EBPO_HAVE_QHULL ? " qhull" : "");
 }
 
-/* Warns that the running library is not the one installed with the program; called also without
+/* Warns that the running library is not the library installed with the program; called also without
  * --verbose. */
 static int warn_of_other(const installation *i)
 {

@@ -4,8 +4,8 @@
 
 /* `argument`: the argument after --version, or NULL. --verbose also prints the paths of the
  * program, the running library and the HDF5 plugin, and the built-in parts. Returns the exit code:
- * EXIT_FAILED, with the reason on stderr, when the running library is not the one installed with
- * the program. */
+ * EXIT_FAILED, with the reason on stderr, when the running library is not the library installed
+ * with the program. */
 int version_report(const char *argument);
 
 #endif

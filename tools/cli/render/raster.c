@@ -284,8 +284,8 @@ static void colour_at(const raster *r, int x, int y, const sample *at, double ou
     }
 }
 
-/* Gets the normal for the light of a sample: that of the face, or the mean of those of its
- * vertices. */
+/* Gets the normal for the light of a sample: the normal of the face, or the mean of the normals of
+ * its vertices. */
 static void normal_at(const raster *r, int x, int y, const sample *at, double out[3])
 {
     uint32_t face = at->triangle & ~OUTLINE_BIT;
