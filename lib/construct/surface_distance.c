@@ -3,9 +3,11 @@
  * The distance to one triangle is convex, so over a triangle its maximum is at a corner. Over a
  * triangle of the first surface, the distance is therefore at most the greatest distance of the
  * triangle's corners from one triangle of the second surface, and at most the distance of the
- * triangle's centre plus its radius. The triangle is halved until one of the bounds is close enough
- * to the greatest distance of a point so far. The second surface is in a complete binary tree of
- * boxes. */
+ * triangle's centre plus its radius. The triangle is cut until one of the bounds is close enough to
+ * the greatest distance of a point so far. It is cut around the prism over a near triangle of the
+ * second surface, as halving a triangle until each half is near one triangle takes very many halves
+ * in planes that both surfaces divide into slivers. Otherwise it is halved. The second surface is
+ * in a complete binary tree of boxes. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -16,8 +18,10 @@
 #include "core/alloc.h"
 #include "geometry/vec3.h"
 
-/* SAMPLED: the distance of a vertex of every SAMPLED-th triangle is computed first. */
-enum { LEAF_TRIANGLES = 4, DEEPEST = 64, SAMPLED = 8 };
+/* DEEPEST: a triangle is cut at most so many times. PRISM_DEEPEST: triangles that were cut so many
+ * times are only halved; each cut at a prism moves points by a rounding error. SAMPLED: the
+ * distance of a vertex of every SAMPLED-th triangle is computed first. */
+enum { LEAF_TRIANGLES = 4, DEEPEST = 64, PRISM_DEEPEST = 20, SAMPLED = 8 };
 static const double CLOSE_ENOUGH = 1.05;
 
 typedef struct bounds {
@@ -186,7 +190,90 @@ static double enough_of(const bounding *b)
     return fmax(b->known, fmax(b->most * CLOSE_ENOUGH, b->most + b->fine));
 }
 
-/* Bounds the distance over a triangle. Halves the triangle until the bound is at most
+/* A convex polygon: a triangle that three planes cut has at most six corners. */
+typedef struct polygon {
+    int count;
+    double at[6][3];
+} polygon;
+
+/* Cuts a polygon by the plane of points x with n . (x - on) = 0. Appends the part in direction n to
+ * `front`, and the other part to `back`; both are empty before. */
+static void cut_polygon(const polygon *p, const double n[3], const double on[3], polygon *front,
+                        polygon *back)
+{
+    for (int i = 0; i < p->count; i++) {
+        const double *a = p->at[i], *b = p->at[(i + 1) % p->count];
+        double v[3], w[3], height, next;
+        ebpo_vec3_subtract(a, on, v);
+        ebpo_vec3_subtract(b, on, w);
+        height = ebpo_vec3_dot(v, n);
+        next = ebpo_vec3_dot(w, n);
+        if (height >= 0)
+            memcpy(front->at[front->count++], a, sizeof v);
+        if (height <= 0)
+            memcpy(back->at[back->count++], a, sizeof v);
+        if ((height > 0 && next < 0) || (height < 0 && next > 0)) {
+            for (int k = 0; k < 3; k++)
+                v[k] = a[k] + (b[k] - a[k]) * (height / (height - next));
+            memcpy(front->at[front->count++], v, sizeof v);
+            memcpy(back->at[back->count++], v, sizeof v);
+        }
+    }
+}
+
+static void bound_triangle(bounding *b, double p[3][3], int depth);
+
+static void bound_polygon(bounding *b, const polygon *p, int depth)
+{
+    for (int i = 2; i < p->count; i++) {
+        double t[3][3];
+        memcpy(t[0], p->at[0], sizeof t[0]);
+        memcpy(t[1], p->at[i - 1], sizeof t[1]);
+        memcpy(t[2], p->at[i], sizeof t[2]);
+        bound_triangle(b, t, depth + 1);
+    }
+}
+
+/* Cuts triangle p by the sides of the prism over triangle `near`: the three planes that contain its
+ * edges and are perpendicular to it. The part inside the prism is bounded by the distances of its
+ * corners from `near`, and the parts outside as further triangles. Returns false and changes
+ * nothing if the centre of p is outside the prism, as the part inside could be empty, or if a
+ * corner of the part inside is too far from `near`. */
+static bool bound_by_prism(bounding *b, double p[3][3], const double centre[3], uint64_t near,
+                           int depth)
+{
+    double t[3][3], edge[3][3], n[3], outward[3][3];
+    for (int k = 0; k < 3; k++)
+        get_corner(b->to.mesh, near, k, t[k]);
+    for (int k = 0; k < 3; k++)
+        ebpo_vec3_subtract(t[(k + 1) % 3], t[k], edge[k]);
+    ebpo_vec3_cross(edge[0], edge[1], n);
+    for (int k = 0; k < 3; k++) {
+        double v[3];
+        ebpo_vec3_cross(edge[k], n, outward[k]);
+        ebpo_vec3_subtract(centre, t[k], v);
+        if (!(ebpo_vec3_dot(v, outward[k]) < 0))
+            return false;
+    }
+    polygon within = { .count = 3 }, outside[3] = { 0 };
+    memcpy(within.at, p, 3 * sizeof *p);
+    for (int k = 0; k < 3; k++) {
+        polygon inside = { 0 };
+        cut_polygon(&within, outward[k], t[k], &outside[k], &inside);
+        within = inside;
+    }
+    double over = 0;
+    for (int i = 0; i < within.count; i++)
+        over = fmax(over, sqrt(square_to(&b->to, near, within.at[i])));
+    if (over > enough_of(b))
+        return false;
+    b->bound = fmax(b->bound, over);
+    for (int k = 0; k < 3; k++)
+        bound_polygon(b, &outside[k], depth);
+    return true;
+}
+
+/* Bounds the distance over a triangle. Cuts the triangle until the bound is at most
  * enough_of(b). */
 static void bound_triangle(bounding *b, double p[3][3], int depth)
 {
@@ -198,17 +285,25 @@ static void bound_triangle(bounding *b, double p[3][3], int depth)
         ebpo_vec3_subtract(p[i], centre, v);
         radius = fmax(radius, ebpo_vec3_length(v));
     }
-    double good = enough_of(b) - radius;
-    good = good > 0 ? good * good : 0;
-    hit near = find_nearest(&b->to, centre, b->guess, good);
+    double enough = enough_of(b), good = fmax(enough - radius, 0);
+    hit near = find_nearest(&b->to, centre, b->guess, enough * enough);
+    if (near.square <= enough * enough && depth < PRISM_DEEPEST &&
+        bound_by_prism(b, p, centre, near.triangle, depth)) {
+        b->guess = near.triangle;
+        return;
+    }
+    if (near.square > good * good)
+        near = find_nearest(&b->to, centre, near.triangle, good * good);
     b->guess = near.triangle;
-    if (near.square > good)
+    if (near.square > good * good)
         b->most = fmax(b->most, sqrt(near.square));
     double over = fmin(sqrt(corners_square(&b->to, near.triangle, p)), sqrt(near.square) + radius);
     if (over <= enough_of(b) || depth == DEEPEST) {
         b->bound = fmax(b->bound, over);
         return;
     }
+    if (depth < PRISM_DEEPEST && bound_by_prism(b, p, centre, near.triangle, depth))
+        return;
     int longest = 0;
     double length = -1, half[3][3];
     for (int i = 0; i < 3; i++) {
