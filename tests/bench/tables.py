@@ -23,16 +23,6 @@ EBPO, MODELS = sys.argv[1], pathlib.Path(sys.argv[2])
 LARGE = sys.argv[3:4]
 SOLIDS = ["bunny_closed", "armadillo", "dragon100k", "lucy100k", "igea", "skull", "thingi73416",
           "thingi99865"]
-CHECK = """
-## Check
-
-`ebpo check` was measured separately, on two busy cores:
-
-- `--crossings --memory 256MiB` of a torus of 1,000,832 faces: 6.6 s of CPU time and 117 MB on one thread, 6.4 s and
-  118 MB on two.
-- 100,000 closed components within another component (`tests/bench/many_shells.py`, 820,000 faces): 6.9 s and 135 MB.
-  The time grows linearly with the faces: 6.2 to 8.4 us per face.
-"""
 found = {"size": [], "ratio": [], "rate": [], "violations": 0}
 
 
@@ -123,7 +113,6 @@ def main():
           "`ebpo-generate --base armadillo.ply --subdivide 3 a5.ply`. Sizes do not depend on the "
           "machine.\n"))
     print(body.getvalue(), end="")
-    print(reflow(CHECK), end="")
 
 
 main()
