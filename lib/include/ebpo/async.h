@@ -28,8 +28,9 @@
  *   again and passes all results. Streams continue with the item that was not returned.
  * - Batches of points and rays keep their completed results if options.done is given (query.h).
  *   Also begin an operation before each repetition; two operations then run. After
- *   ebpo_async_needed, end the older one if the repetition has completed items, so that bytes that
- *   only earlier repetitions used may be removed. Otherwise end the newer one.
+ *   ebpo_async_needed, end the older operation if the repetition has completed items, so that bytes
+ *   that only earlier repetitions used may be removed. If the repetition has completed no items,
+ *   end the newer operation.
  * - ebpo_ray_all_many keeps no completed results: its hits are one array in the order of the rays,
  *   whose positions depend on all earlier rays. Each call evaluates all rays; pass few at a time.
  * - Catalogues open such files by ebpo_catalogue_options.open_file. Scenes open files by path.
@@ -101,8 +102,8 @@ EBPO_API void ebpo_async_end(ebpo_async *async, uint64_t operation);
 
 /*
  * Gets the ranges of missing bytes that calls have needed, or prefetch hints have named, since the
- * last ebpo_async_needed. Ranges are in ascending order and at most 4 MiB each; ranges with small
- * gaps between them are merged.
+ * last call of ebpo_async_needed. Ranges are in ascending order and at most 4 MiB each; ranges with
+ * small gaps between them are merged.
  *
  * ranges   [count] valid until the next call of ebpo_async_needed with this object
  * count    0: all bytes have arrived in the meantime (several threads); repeat the call at once
@@ -116,7 +117,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_async_needed(ebpo_async *async, const eb
  * Supplies bytes [offset, offset + size) of the file. They are copied. Any ranges may be supplied,
  * in any order, also before they are needed.
  *
- * version   of the file that the bytes are from; NULL: not known
+ * version   of the file from which the bytes come; NULL: not known
  *
  * EBPO_E_IO: the version differs from that of ebpo_async_new, or the bytes differ from those that
  * are available. The file has changed: all later calls and reads fail. EBPO_E_ARGUMENT: the range

@@ -21,13 +21,15 @@
  *
  * Failure: a function that fails makes no object. Its output for a new object is NULL.
  *
- * Callbacks that receive results return false to stop. They are then not called again, and the call
- * succeeds.
+ * A callback that receives results returns false to stop the call. The callback is then not called
+ * again, and the call succeeds.
  *
  * Errors: comments list the statuses that need an explanation. Any function that returns
  * ebpo_status can return EBPO_E_MEMORY, and EBPO_E_ARGUMENT for an argument that is NULL, out of
  * range or not initialized with its macro. A function with a progress callback can return
- * EBPO_E_CANCELLED. "The errors of reading" are those of ebpo_file_read_level (file.h).
+ * EBPO_E_CANCELLED. "The errors of reading" are EBPO_E_IO and EBPO_E_FORMAT, and EBPO_E_PENDING for
+ * files with a source of async.h. "EBPO_E_X: also if ..." adds a case to those of the functions
+ * that the comment names, or to the meaning that ebpo_status gives.
  *
  * Parameter or member `threads`: number of threads to use; 0: all cores. The result does not depend
  * on it.
@@ -118,8 +120,8 @@ extern "C" {
     EBPO_VERSION_OF(EBPO_VERSION_MAJOR, EBPO_VERSION_MINOR, EBPO_VERSION_PATCH)
 
 /*
- * Returns the version of the library in use, in the form of EBPO_VERSION_NUMBER. If its major
- * version differs from the major version of the headers, compile the program again.
+ * Returns the version of the library in use, in the form of EBPO_VERSION_NUMBER. If the major
+ * version of the library differs from that of the headers, compile the program again.
  *
  * Threads: any.
  */
@@ -210,9 +212,9 @@ EBPO_API bool ebpo_is_date(const char *text);
 /* ---- progress ---- */
 
 /*
- * Reports progress. The library calls it in the thread of the caller, when a stage begins and then
- * at most a few times a second. `stage` is a static string. `done` counts up to `total`, which is 0
- * if unknown.
+ * Callback that reports progress. The library calls the callback in the thread of the caller, when
+ * a stage begins and then at most a few times a second. `stage` is a static string. `done` counts
+ * up to `total`, which is 0 if unknown.
  *
  * Return false to stop: the running call returns EBPO_E_CANCELLED and leaves no file.
  */

@@ -144,8 +144,7 @@ typedef struct ebpo_boundary_options {
 
     /*
      * The search stops after about this many cells of an octree around the result
-     * (ebpo_boolean_cells), with the bounds known so far. 0:
-     * 100,000.
+     * (ebpo_boolean_cells), with the bounds known so far. 0: 100,000.
      */
     uint64_t cells;
 } ebpo_boundary_options;
@@ -249,12 +248,12 @@ typedef struct ebpo_exact_volume {
 #define EBPO_EXACT_VOLUME_INIT EBPO_SIZED(ebpo_exact_volume)
 
 /*
- * Computes the exact volume of the result if the operands' faces allow it. No face may intersect a
- * face of another operand, not even in a point. Faces of one operand, except those without area,
- * may intersect only as neighbours (ebpo_collide_self, at their poses). Shells may be apart, nested
- * or inverted, with any winding numbers. Equal operands (models of equal content at bitwise equal
- * poses) count as one, and unused operands are not tested. If the condition does not hold, the call
- * succeeds and `doubt` gives the reason.
+ * Computes the exact volume of the result if the operands' faces meet the following condition. No
+ * face may intersect a face of another operand, not even in a point. Faces of one operand, except
+ * those without area, may intersect only as neighbours (ebpo_collide_self, at their poses). Shells
+ * may be apart, nested or inverted, with any winding numbers. Equal operands (models of equal
+ * content at bitwise equal poses) count as one, and unused operands are not tested. If the
+ * condition is not met, the call succeeds and `doubt` gives the reason.
  *
  * Takes about 80 bytes for each face of one operand at a time.
  *

@@ -53,12 +53,16 @@ typedef struct ebpo_selection_traits {
     /* Name in files and commands, such as "inherit". */
     const char *name;
 
-    /* True: from the leaves up; uses percent or k_root, not epsilon. */
+    /*
+     * True: selects from the leaves up; uses `percent` or `k_root` of ebpo_build_options, not
+     * `epsilon`.
+     */
     bool from_leaves;
 
     /* True: uses a distance of normals (ebpo_normal_distance). */
     bool uses_normal_distance;
 
+    /* True: uses `seed` of ebpo_build_options. */
     bool uses_seed;
 } ebpo_selection_traits;
 
@@ -83,7 +87,7 @@ typedef enum ebpo_normal_distance {
 
 /*
  * Seconds of two steps, summed over all threads. `progress` does not separate the steps, because
- * each piece of the tree passes through both in turn.
+ * each piece (subtree) of the tree passes through both steps in turn.
  */
 typedef struct ebpo_build_times {
     size_t struct_size;
@@ -209,8 +213,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_add_border(const ebpo_file *file, c
                                                         ebpo_error *error);
 
 /*
- * Does what ebpo_file_repack does, and adds the part EBPO_PART_SURFACE to a file with a mesh that
- * does not have it, unless it is a subset or has too few faces (format-spec/surface.md). Errors are
+ * Repacks a file as ebpo_file_repack does. Adds the part EBPO_PART_SURFACE if the file has a mesh
+ * without this part, is not a subset, and has enough faces (format-spec/surface.md). Errors are
  * those of ebpo_file_repack.
  *
  * Threads: any.
@@ -231,7 +235,10 @@ typedef enum ebpo_coalescing {
      */
     EBPO_COALESCE_SUM = 1,
 
-    /* Siblings become one leaf while the mean of their lists is below leaf_faces (criterion 2). */
+    /*
+     * Siblings become one leaf while their lists have, on average, fewer than leaf_faces entries
+     * (criterion 2).
+     */
     EBPO_COALESCE_MEAN = 2
 } ebpo_coalescing;
 
@@ -252,9 +259,9 @@ typedef struct ebpo_thesis_levels {
 #define EBPO_THESIS_LEVELS_INIT EBPO_SIZED(ebpo_thesis_levels)
 
 /*
- * Computes the levels of a mesh as the theses do, for comparison; nothing can be stored. The limits
- * of files do not apply: a node may have more than 255 planes, and candidates with equal normals
- * all count. The selection must be one of the theses. The mesh is empty afterwards, also on
+ * Computes the levels of a mesh as the theses do, for comparison; the result cannot be stored. The
+ * limits of files do not apply: a node may have more than 255 planes, and candidates with equal
+ * normals all count. The selection must be one of the theses. The mesh is empty afterwards, also on
  * failure.
  *
  * report    as for ebpo_build

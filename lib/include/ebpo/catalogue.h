@@ -290,10 +290,10 @@ EBPO_API ebpo_status ebpo_catalogue_models_get_stats(ebpo_catalogue_models *mode
 
 /*
  * query.h gives the valid values of points and rays. For other values, queries return
- * EBPO_E_ARGUMENT, and the message gives the index. Points are processed along a curve, so that
- * models and subtrees are loaded few times. On failure the results are unspecified. Errors are
- * those of opening and querying models. EBPO_E_LIMIT: a model does not fit in its share of the
- * budget.
+ * EBPO_E_ARGUMENT, and the message gives the index of the point or ray. Points are processed along
+ * a curve, so that models and subtrees are loaded few times. On failure the results are
+ * unspecified. Errors are those of opening and querying models. EBPO_E_LIMIT: a model does not fit
+ * in its share of the budget.
  *
  * A query waits while other queries use the budget. Therefore a callback of a query, such as the
  * one that opens files, must not query the same ebpo_catalogue_models.
@@ -352,9 +352,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_catalogue_inside(
 
 /*
  * Finds the nearest face of any model within max_distance, for points[count][3]. If several models
- * have the same rounded distance, the first of these models is used. If all models are solids,
- * distances of points inside (ebpo_catalogue_inside) are negative. `lo` and `hi` are both the
- * unsigned distance, or 0 if no face is found.
+ * have the same rounded distance, the first of them in the catalogue is used. If all models are
+ * solids, distances of points inside (ebpo_catalogue_inside) are negative. `lo` and `hi` are both
+ * the unsigned distance, or 0 if no face is found.
  *
  * model   [count] index of the entry; EBPO_CATALOGUE_NO_MODEL: no face is found
  *
@@ -369,9 +369,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_catalogue_distance(
 
 /*
  * For each of rays[count], finds the first face of any model that the ray hits. If several models
- * have the same rounded t, the first of these models is used. Exception: several models have hits
- * whose t exceeds the range of double (INFINITY with a face). These hits are compared along a
- * direction that is longer by a power of two (see ebpo_ray_hit).
+ * have the same rounded t, the first of them in the catalogue is used. Exception: hits whose t
+ * exceeds the range of double (INFINITY with a face) are compared along a direction that is longer
+ * by a power of two (see ebpo_ray_hit).
  *
  * model   as for ebpo_catalogue_distance
  *

@@ -177,8 +177,9 @@ typedef struct ebpo_relation_result {
  *
  * Memory: a model entirely in memory takes 4 bytes per face in the collider, and about 60 during
  * the call. A partly loaded model takes half a byte per face, and about 60 per face of a subtree.
- * A subtree of a partly loaded model is loaded if it has faces in contact. It is also loaded if a
- * face inside the other model is known and the subtree may have one outside, or the reverse.
+ * A subtree of a partly loaded model is loaded if it has faces in contact. It is also loaded if one
+ * face inside the other model is known and the subtree may have a face outside the other model, or
+ * the reverse.
  *
  * Errors are those of ebpo_collide_first; after the deadline the call succeeds. EBPO_E_ABSENT: as
  * for ebpo_inside.
@@ -256,10 +257,10 @@ typedef struct ebpo_contact_segment {
 typedef bool (*ebpo_segments_fn)(void *user, const ebpo_contact_segment *segments, uint64_t count);
 
 /*
- * Computes the segments of the EBPO_PAIR_CROSSING pairs of ebpo_collide_all, in that order. With
- * models A and B swapped, segments are the same with exchanged ends. For a model entirely in memory
- * the collider takes 4 more bytes per face. The faces of a partly loaded model are read once more,
- * by chunks.
+ * Computes the segments of the pairs of kind EBPO_PAIR_CROSSING, in the order of ebpo_collide_all.
+ * With models A and B swapped, segments are the same with exchanged ends. For a model entirely in
+ * memory the collider takes 4 more bytes per face. The faces of a partly loaded model are read once
+ * more, by chunks.
  *
  * Errors are those of ebpo_collide_all.
  *
@@ -362,7 +363,10 @@ typedef struct ebpo_collide_distance_options {
     /* Allowed hi - lo of the result, in the world's unit; 0: exact. */
     double tolerance;
 
-    /* If 0 or more: only decide if the distance is at least this value. */
+    /*
+     * If 0 or more: only decides if the distance is at least this value. Below 0: computes the
+     * distance.
+     */
     double at_least;
 
     /*
@@ -411,10 +415,10 @@ typedef struct ebpo_collide_distance_result {
 
 /*
  * Computes the minimum distance between the faces of A and B; INFINITY if a model has no faces. For
- * a solid inside another, the result is the distance of their surfaces. With `at_least` the search
- * ends when this is decided. If out->at_least is 1, `distance` is at_least .. INFINITY, without a
- * pair. If it is 0, the returned pair is nearer than at_least. After the deadline, `distance` has
- * the bounds known so far.
+ * a solid inside another, the result is the distance of their surfaces. With `at_least` of the
+ * options, the search ends when this comparison is decided. If out->at_least is 1, `distance` is
+ * at_least .. INFINITY, without a pair. If out->at_least is 0, the returned pair is nearer than
+ * at_least. After the deadline, `distance` has the bounds known so far.
  *
  * For partly loaded models, subtrees whose envelopes are not farther apart than the best result are
  * loaded, nearest first. Exact distances and their pairs do not depend on the subtrees in memory.
@@ -431,12 +435,12 @@ ebpo_collide_distance(ebpo_collider *collider, const ebpo_collide_options *optio
                       ebpo_collide_distance_result *out, ebpo_error *error);
 
 /*
- * Computes the depth of A's surface in the solid B: the maximum distance to B's nearest face over
- * the points of A's faces that are in B. Also computes the depth of B's surface in A. 0: there is
- * no such point. The result is an interval, because the deepest point need not be a corner. hi - lo
- * is at most `tolerance` plus the rounding of posed points (2^-40 of the coordinates, more for
- * matrices that are not exact rotations), unless the deadline ends the search. The depth is not the
- * minimum motion that separates the models.
+ * Computes the depth of A's surface in the solid B: of all points of A's faces that are in B, the
+ * maximum distance to the nearest face of B. Also computes the depth of B's surface in A. The depth
+ * is 0 if no such point exists. The result is an interval, because the deepest point need not be a
+ * corner. hi - lo is at most `tolerance` plus the rounding of posed points (2^-40 of the
+ * coordinates, more for matrices that are not exact rotations), unless the deadline ends the
+ * search. The depth is not the minimum motion that separates the models.
  *
  * tolerance        greater than 0, in the world's unit; a smaller one takes longer
  * a_in_b, b_in_a   NULL: not requested
@@ -463,7 +467,7 @@ typedef struct ebpo_separation {
     ebpo_value_bounds t;
 
     /*
-     * Pair of faces that separate last; of several pairs, the first in the order of
+     * The pair of faces that separates last; of several pairs, the first in the order of
      * ebpo_collide_all. EBPO_NO_FACE: none was found.
      */
     ebpo_face_pair pair;
@@ -472,10 +476,10 @@ typedef struct ebpo_separation {
 /*
  * Computes the separation distance of A from B along a direction: the least t >= 0 so that A, moved
  * by any t' * direction with t' > t, has no point in common with B. The points of a solid include
- * its interior. With A moved by t, the models touch in the returned pair. Without a pair (t is 0),
+ * its interior. If A is moved by t, the models touch in the returned pair. Without a pair (t is 0),
  * the models intersect neither at their poses nor during the motion. Posed coordinates are moved
- * without rounding. The models may also be apart for a smaller t, and have contacts again later; t
- * is the last contact.
+ * without rounding. If the models separate and touch again during the motion, t is that of the last
+ * contact.
  *
  * For partly loaded models, subtrees whose envelopes separate later than the best result are
  * loaded.
@@ -515,9 +519,9 @@ typedef struct ebpo_level_result {
 /*
  * Computes certain results from levels alone, without faces. Envelopes bound the distance from
  * below; nodes with faces bound it from above. Solids intersect if a cell inside one contains a
- * point of the other. Reads no data; works for models with only a few levels in memory (a cut
- * level). The search stops at the deadline, or when pairs of nodes need more than the collider's
- * memory, with the results known so far.
+ * point of the other. Reads no data; also works for models with only a few levels in memory (a cut
+ * level). At the deadline, or when the pairs of nodes need more than the collider's memory, the
+ * search stops with the results known so far.
  *
  * EBPO_E_ARGUMENT: a pose is not valid (ebpo_pose_check).
  *
@@ -569,7 +573,7 @@ typedef struct ebpo_self_intersections_options {
         sizeof(ebpo_self_intersections_options), 0, { NULL, NULL }, NULL \
     }
 
-/* Summary of the results passed to the callback. */
+/* Summary of the intersections that were found. */
 typedef struct ebpo_self_intersections_summary {
     size_t struct_size;
 
@@ -617,7 +621,7 @@ typedef struct ebpo_collider_stats {
     /*
      * For partly loaded models: number of pairs of subtrees with near envelopes, of subtrees in
      * these pairs, of loads, and of bytes read from the files during the queries, including reads
-     * by others.
+     * by other users of the files.
      */
     uint64_t subtree_pairs, subtrees, loads, bytes_read;
 } ebpo_collider_stats;

@@ -31,7 +31,7 @@
  * Extras: headers of functions that are built on queries. They are installed unless the library was
  * configured with -Dextras=disabled.
  *
- *   boolean.h     unions and differences of solids at poses, by query
+ *   boolean.h     unions and differences of solids at poses: queries, volume, mesh
  *   collide.h     collision of two models
  *   scene.h       animated rigid instances of models
  *   map.h         maps of distance: planes, grids, two scans

@@ -91,8 +91,8 @@ typedef struct ebpo_export_block {
 /* Result of exporting colours. */
 typedef enum ebpo_export_colours {
     EBPO_EXPORT_NO_COLOURS, /* the exported data has none */
-    EBPO_EXPORT_WRITTEN,
-    EBPO_EXPORT_OMITTED /* the format does not support them */
+    EBPO_EXPORT_WRITTEN,    /* the file has the colours */
+    EBPO_EXPORT_OMITTED     /* the format does not support them */
 } ebpo_export_colours;
 
 typedef struct ebpo_export_report {
@@ -128,18 +128,18 @@ EBPO_API bool ebpo_export_second_file(ebpo_export_format format, const char *pat
 
 /*
  * Exports levels and the mesh to a file, which is replaced atomically. A second file is replaced
- * just before the first one; if replacing the first one then fails (EBPO_E_IO), the second file is
- * already new.
+ * just before the first one. If replacing the first file then fails (EBPO_E_IO), the second file is
+ * already the new one.
  *
  * For XDMF and VTKHDF one level is in memory at a time, for other formats all levels.
  *
  * report   may be NULL
  *
- * EBPO_E_ARGUMENT: invalid level, no data selected, or more than the format supports.
- * EBPO_E_UNSUPPORTED: the library was built without assimp. EBPO_E_ABSENT: the mesh is requested,
- * and the file has none. EBPO_E_LIMIT: more than 2^32 - 2 vertices or faces, a coordinate beyond
- * float32 in a format of float32, or a GLB of 2^32 bytes. EBPO_E_IO. Also the errors of reading
- * (base.h).
+ * EBPO_E_ARGUMENT: a level is not valid, no data is selected, or the format does not support the
+ * selected data. EBPO_E_UNSUPPORTED: the library was built without assimp. EBPO_E_ABSENT: the mesh
+ * is requested, and the file has none. EBPO_E_LIMIT: more than 2^32 - 2 vertices or faces, a
+ * coordinate beyond float32 in a format of float32, or a GLB of 2^32 bytes. EBPO_E_IO. Also the
+ * errors of reading (base.h).
  *
  * Threads: any.
  */

@@ -60,7 +60,7 @@ typedef enum ebpo_part {
     EBPO_PART_LEAF_PLANES = 8, /* stored envelope planes of leaves */
     EBPO_PART_ATTRIBUTES = 16, /* other data of the source for vertices and faces */
     EBPO_PART_COLOURS = 32,    /* mean colours of the faces of gray nodes */
-    EBPO_PART_BORDER = 64,     /* of a surface: its border and winding numbers, for its inside */
+    EBPO_PART_BORDER = 64,     /* border of a surface, and winding numbers that decide its inside */
     EBPO_PART_SURFACE = 128    /* simplified faces of nodes, with certified errors, for pictures */
 } ebpo_part;
 
@@ -125,7 +125,7 @@ typedef struct ebpo_level {
 
     /*
      * [white_count] winding number of the cell; for surfaces with EBPO_PART_BORDER, winding number
-     * at the cell's lowest corner, shifted. NULL: all 0
+     * at the cell's lowest corner, shifted as for leaf_winding. NULL: all 0
      */
     int32_t *white_winding;
 
@@ -788,7 +788,7 @@ typedef struct ebpo_attribute_facts {
 #define EBPO_ATTRIBUTE_FACTS_INIT EBPO_SIZED(ebpo_attribute_facts)
 
 /*
- * Describes the n-th array of attributes. Returns false if the file has fewer; `out` is then
+ * Describes the n-th array of attributes. Returns false if the file has fewer arrays; `out` is then
  * unchanged.
  *
  * Threads: any.
@@ -911,9 +911,10 @@ typedef struct ebpo_maps {
 } ebpo_maps;
 
 /*
- * Reads the maps. Checks that the indices of each map are distinct and in range: source indices of
- * vertices are below source_vertex_count. Source indices of faces are below source_face_count plus
- * the number of faces that were added when holes were filled.
+ * Reads the source indices (part EBPO_PART_MAPS). Checks that the indices of each array are
+ * distinct and in range: source indices of vertices are below source_vertex_count; source indices
+ * of faces are below source_face_count plus the number of faces that were added when holes were
+ * filled.
  *
  * EBPO_E_ABSENT: the file has no source indices.
  *
@@ -1030,8 +1031,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_check_content(const ebpo_file *file
  * EBPO_E_FORMAT: the content of `file` differs from its checksum. EBPO_E_UNSUPPORTED: the content
  * is correct, but this library would write the arrays in another way (for example, another program
  * chose wider types than needed); nothing is written. EBPO_E_IO: also if `path` is the path of
- * `file` and another program has replaced the file since opening. Other errors are those of reading
- * and writing.
+ * `file` and another program has replaced the file since opening. Other errors are those of
+ * reading, and of ebpo_tree_write.
  *
  * Threads: any.
  */

@@ -137,9 +137,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_colours(const ebpo_lod_nodes *nodes,
  * Computes normals for shading a level's polygons. A polygon on a plane of the envelope gets its
  * own normal. A polygon on a cell face is only a step between two envelopes. Such a polygon gets a
  * mean normal, weighted by area. The mean is taken over nearby polygons that are on planes and face
- * roughly the same way as the cell face. If there are none, the polygon gets its own normal. Cell
- * faces of the root cell count as planes. For images only: the normals are rounded and guarantee
- * nothing about the solid.
+ * roughly the same way as the cell face. If there are no such polygons, the polygon gets its own
+ * normal. Cell faces of the root cell count as planes. For images only: the normals are rounded and
+ * guarantee nothing about the solid.
  *
  * info  of the level's file
  * mesh  returned with the nodes

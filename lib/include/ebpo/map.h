@@ -77,8 +77,7 @@ typedef struct ebpo_lattice {
  * Makes a lattice that fills a box: the first points are on its lower faces, the last ones on its
  * upper faces. On an axis with one point, the point is in the middle.
  *
- * EBPO_E_ARGUMENT: a count is 0, or the box is not finite or its low corner is not below its high
- * one.
+ * EBPO_E_ARGUMENT: a count is 0, the box is not finite, or `low` is not below `high` on each axis.
  *
  * Threads: any.
  */
@@ -197,8 +196,8 @@ typedef struct ebpo_map_hausdorff {
 #define EBPO_MAP_HAUSDORFF_INIT EBPO_SIZED(ebpo_map_hausdorff)
 
 /*
- * Computes the maximum distance of a mesh's faces from a model's faces. It includes the interior of
- * faces, which may be farther away than their vertices.
+ * Bounds the maximum distance of a mesh's faces from a model's faces. The interiors of faces are
+ * included, because they may be farther away than the vertices.
  *
  * mesh        indices below vertex_count, finite coordinates
  * distances   [vertex_count] of its vertices, from ebpo_map_points, all finite

@@ -210,8 +210,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_read(const char *path,
  *
  * name    for messages
  * xyz     [*count][3] doubles, freed by free(). Binary floats and integers are converted exactly.
- * If no float represents a text value of a float property (see ebpo_mesh_read), the result is the
- * nearest double.
+ *         If no float represents a text value of a float property (see ebpo_mesh_read), the result
+ *         is the nearest double.
  *
  * EBPO_E_FORMAT, EBPO_E_LIMIT.
  *
@@ -500,9 +500,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_count_repeated(const ebpo_mesh *mes
  * their exact winding numbers with respect to the other shell are not zero.
  *
  * An open patch is oriented so that most of its faces are unchanged. A patch that cannot be
- * oriented is unchanged, and is counted in `unorientable_components`. A set of joined patches
- * whose faces cannot alternate around all edges is also counted there; its patches are then
- * oriented separately. Do not orient a mesh that has intended solids inside other solids.
+ * oriented is unchanged. A set of joined patches whose faces cannot alternate around all edges is
+ * separated again, and its patches are oriented separately. `unorientable_components` counts both
+ * cases. Do not orient a mesh that has intended solids inside other solids.
  *
  * Threads: one at a time per mesh.
  */
@@ -510,8 +510,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_orient(ebpo_mesh *mesh, ebpo_repair
                                                     ebpo_error *error);
 
 /*
- * Reverses every face. Adds to `flipped_faces` of the record. Sets none of its flags of requested
- * steps.
+ * Reverses every face. Adds the number of faces to `flipped_faces` of the record, and sets no flag
+ * of a requested step.
  *
  * Threads: one at a time per mesh.
  */
@@ -603,9 +603,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_prepare(ebpo_mesh *mesh,
  * Components of a mesh. Faces that share vertices are in one component. A component is closed if it
  * uses each edge equally often in both directions. A closed component of negative volume is a
  * cavity. A cavity is joined to the closed component of positive volume that surrounds it. A
- * component surrounds a cavity if its exact winding number is not zero at the first vertex of the
- * cavity's first face in the source. Of several such components, the one of least volume is used. A
- * cavity that is in no other component stays a separate component.
+ * component surrounds a cavity if the component's exact winding number is not zero at one vertex of
+ * the cavity: the first vertex of its first face in the source. Of several such components, the one
+ * of least volume is used. A cavity that is in no other component stays a separate component.
  */
 typedef struct ebpo_components ebpo_components;
 

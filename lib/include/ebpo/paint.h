@@ -124,10 +124,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_open_to_change(const char *path,
  * changed or replaced the file since this paint read or saved it. Then open the file again and
  * repeat the change, or save to another path. A save to any other path replaces the file there.
  *
- * The save compares the file with what this paint read or saved, and then replaces it. A lock
- * protects both steps against all users of this library, in any process and thread. Programs that
- * do not use this library may still replace the file between the two steps; without locks (see
- * ebpo_paint_open_to_change), so may users of this library.
+ * The save compares the file with the version that this paint read or saved, and then replaces the
+ * file. A lock protects both steps against all users of this library, in any process and thread.
+ * Programs that do not use this library may still replace the file between the two steps. Without
+ * locks (see ebpo_paint_open_to_change), users of this library may do this, too.
  *
  * EBPO_E_UNSUPPORTED: the library was built without libhdf5. EBPO_E_IO: also if another user has
  * had the file open to change for 10 seconds.
@@ -171,8 +171,8 @@ EBPO_API ebpo_status ebpo_paint_get_info(const ebpo_paint *paint, ebpo_paint_inf
 /*
  * Checks that the paint belongs to this model, or to the model of which this is a subset.
  *
- * EBPO_E_ARGUMENT: it does not; the message names the model of the paint. EBPO_E_ABSENT: the model
- * has no mesh, or lacks the required source indices.
+ * EBPO_E_ARGUMENT: the paint belongs to another model, which the message names. EBPO_E_ABSENT: the
+ * model has no mesh, or lacks the required source indices.
  *
  * Threads: any.
  */
@@ -209,8 +209,8 @@ typedef struct ebpo_paint_layer {
     size_t struct_size;
 
     /*
-     * At most 255, 255, 31 and 4,095 bytes. The date is "" or valid for ebpo_is_date. A date that
-     * was read from a file may be any text, and may be kept.
+     * At most 255, 255, 31 and 4,095 bytes, in this order. The date is "" or valid for
+     * ebpo_is_date. A date that was read from a file may be any text, and may be kept.
      */
     const char *title, *author, *date, *description;
 
@@ -230,7 +230,7 @@ typedef struct ebpo_paint_layer {
     }
 
 /*
- * Gets a layer.
+ * Gets layer `number`, 0 to layer_count - 1. EBPO_E_ARGUMENT: the number is out of range.
  *
  * Threads: any.
  */
@@ -240,7 +240,7 @@ EBPO_API ebpo_status ebpo_paint_get_layer(const ebpo_paint *paint, uint64_t numb
 /*
  * Adds a layer above all others.
  *
- * number   index of the new layer; or NULL
+ * number   receives the index of the new layer; may be NULL
  *
  * EBPO_E_ARGUMENT: a member is not valid. EBPO_E_LIMIT: EBPO_PAINT_LAYERS layers exist.
  *
@@ -305,7 +305,7 @@ typedef struct ebpo_paint_point {
 typedef struct ebpo_paint_note {
     size_t struct_size;
 
-    /* At most 255, 255, 31 and 32,767 bytes; rules as for layers. */
+    /* At most 255, 255, 31 and 32,767 bytes, in this order; rules as for layers. */
     const char *title, *author, *date, *body;
 
     /* Index of the layer of the note. */
@@ -318,7 +318,7 @@ typedef struct ebpo_paint_note {
 #define EBPO_PAINT_NOTE_INIT EBPO_SIZED(ebpo_paint_note)
 
 /*
- * Gets a note.
+ * Gets note `number`, 0 to note_count - 1. EBPO_E_ARGUMENT: the number is out of range.
  *
  * Threads: any.
  */
@@ -373,7 +373,8 @@ typedef struct ebpo_paint_stroke {
 #define EBPO_PAINT_STROKE_INIT EBPO_SIZED(ebpo_paint_stroke)
 
 /*
- * Gets a stroke; strokes are in the order in which they were made.
+ * Gets stroke `number`, 0 to stroke_count - 1, in the order in which strokes were added.
+ * EBPO_E_ARGUMENT: the number is out of range.
  *
  * Threads: any.
  */
@@ -495,7 +496,7 @@ typedef struct ebpo_paint_drawn {
  *
  * context   of a matching model
  * input     [count], at least 1
- * drawn     statistics; or NULL
+ * drawn     receives statistics; may be NULL
  *
  * On failure no stroke is added. EBPO_E_ARGUMENT: a value is not valid, or the model does not
  * match. EBPO_E_ABSENT, EBPO_E_LIMIT: the budget is too small (ebpo_model_new). Also the errors of
@@ -566,8 +567,8 @@ typedef bool (*ebpo_paint_face_fn)(void *user, const ebpo_paint_face *face);
  * `take`: each once, in the order of the file. This and the following functions take 110 bytes per
  * face, and 300 for each face that intersects the box around one point.
  *
- * context     of a matching model
- * points_outside_subset   number of points whose faces a subset lacks; or NULL
+ * context                 of a matching model
+ * points_outside_subset   receives the number of points whose faces a subset lacks; may be NULL
  *
  * EBPO_E_ARGUMENT: the model does not match. EBPO_E_FORMAT: a point is not on its face.
  * EBPO_E_UNSUPPORTED: the model's coordinates are beyond 2^200. EBPO_E_LIMIT: a point's ball
@@ -602,7 +603,7 @@ typedef struct ebpo_paint_baked {
  * mesh      mesh of that model, with faces, from ebpo_file_read_source_mesh
  * rgba      [vertex_count][4] in the order of the mesh. Input: the model's own colours. Output: the
  *           new colours; alpha and the colours of uncovered vertices are kept
- * baked     statistics; or NULL
+ * baked     receives statistics; may be NULL
  *
  * Takes, besides the mesh, 4 bytes per vertex, 72 per covered vertex, and 4 per face if source
  * indices of faces have gaps.

@@ -350,7 +350,7 @@ EBPO_API void ebpo_context_free(ebpo_context *context);
  *
  * Options member `done`, for files whose bytes arrive asynchronously (async.h): [count] flags of
  * the items of a batch, or NULL. Clear them before the first call. The call computes items whose
- * flag is false, and sets the flags of those that it completes, also if it returns EBPO_E_PENDING.
+ * flag is false, and sets the flag of each completed item, even if the call returns EBPO_E_PENDING.
  * Keep flags and results for the repeated call.
  */
 
@@ -370,9 +370,9 @@ typedef struct ebpo_inside_options {
     size_t struct_size;
 
     /*
-     * The query uses only levels 0 to `level`, and returns a certain result or EBPO_MAYBE. The
-     * latter is the result in all cells of gray nodes and leaves if the model is a surface, whose
-     * envelopes do not contain its inside. EBPO_LEVEL_ALL: exact results.
+     * The query uses only levels 0 to `level`, and returns a certain result or EBPO_MAYBE. For a
+     * surface, whose envelopes do not contain its inside, EBPO_MAYBE is the result in all cells of
+     * gray nodes and leaves. EBPO_LEVEL_ALL: exact results.
      */
     int level;
 
@@ -385,7 +385,7 @@ typedef struct ebpo_inside_options {
      */
     uint64_t deadline_ns;
 
-    /* Flags of completed points; see above. */
+    /* Flags of completed points; see "rules for all queries". */
     bool *done;
 } ebpo_inside_options;
 
@@ -449,9 +449,9 @@ typedef struct ebpo_winding_bounds {
 
 /*
  * Bounds the winding numbers of points[count][3], into out[count]. For a surface with
- * EBPO_PART_BORDER, hi - lo is at most `width`, at least 0, where double precision allows it: down
- * to about 1e-14 for small meshes, and far more near an edge of the border. For a solid, both
- * bounds are the integer winding number.
+ * EBPO_PART_BORDER, hi - lo is at most `width` (at least 0), where double precision allows it: down
+ * to about 1e-14 for small meshes, but only to much larger values near an edge of the border. For a
+ * solid, both bounds are the integer winding number.
  *
  * EBPO_E_NOT_SOLID, EBPO_E_ABSENT as for ebpo_inside.
  *
@@ -979,8 +979,8 @@ typedef struct ebpo_mass {
     int64_t exponent;
 
     /*
-     * Bounds of the volume; for a solid equal to `volume` if it is known, for a surface this value
-     * with the errors below on both sides; 0 and INFINITY if it is not known.
+     * Bounds of the volume. For a solid, both are `volume` if it is known; for a surface, `volume`
+     * minus and plus the errors below. 0 and INFINITY if the volume is not known.
      */
     double volume_lo, volume_hi;
 
@@ -998,9 +998,10 @@ typedef struct ebpo_mass {
     double integral_error, centroid_error;
 
     /*
-     * How far `integral` and the centroid of the winding number may be from those with other caps
-     * (INFINITY: no bound). The other caps are in the convex hulls of their loops. With our cap of
-     * the same loop they bound winding numbers -1, 0 and 1 only, times the loop's weight.
+     * Greatest difference that other caps could make to `integral` and to the centroid of the
+     * winding number (INFINITY: no bound). The other caps are in the convex hulls of their loops.
+     * With our cap of the same loop they bound winding numbers -1, 0 and 1 only, times the loop's
+     * weight.
      */
     double caps_integral, caps_centroid;
 } ebpo_mass;

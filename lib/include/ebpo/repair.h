@@ -83,9 +83,9 @@ typedef struct ebpo_repairs {
     ebpo_repair_try tries[EBPO_REPAIR_TRIES];
 
     /*
-     * Index of the try without doubts, which is the last try. -1: every try has doubts, or the
-     * unrepaired mesh has none and needs no repair (dropping repeated faces may be tried then,
-     * too).
+     * Index of the try without doubts, which is the last try. -1: every try has doubts, or there
+     * are no doubts about the unrepaired mesh, which then needs no repair (even if dropping
+     * repeated faces was tried).
      */
     int64_t chosen;
 } ebpo_repairs;
@@ -133,8 +133,8 @@ typedef struct ebpo_shells {
 
     /*
      * 1: every component is closed, and no faces of two components have a common point.
-     * Intersections within one component are not tested. 0: otherwise, or the search was stopped
-     * (ebpo_mesh_count_shells).
+     * Intersections within one component are not tested. 0: one of these conditions is not met, or
+     * the search was stopped (ebpo_mesh_count_shells).
      */
     int32_t apart;
 

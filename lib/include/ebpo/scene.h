@@ -25,8 +25,9 @@
  * in at most one layer and in any number of groups.
  *
  * Models, instances and cameras are numbered in the order in which they were added. Times are in
- * seconds. Before the first time of its route, an instance has the first pose of the route; after
- * the last time, it has the last pose. Poses, boxes and pairs are the same on every machine.
+ * seconds. Before the first time of its route, an instance has the first pose of the route. After
+ * the last time of the route, it has the last pose. Poses, boxes and pairs are the same on every
+ * machine.
  */
 #ifndef EBPO_SCENE_H
 #define EBPO_SCENE_H
@@ -59,9 +60,9 @@ typedef struct ebpo_scene_options {
     uint64_t max_values;
 
     /*
-     * True: files named by the scene may be anywhere. False: they must be in the scene's folder or
-     * below. Their paths must then be relative and without "..", and no link may lead out of the
-     * folder.
+     * True: files named by the scene may be anywhere. False: the files must be in the scene's
+     * folder or below. Their paths must be relative and without "..", and no link may lead out of
+     * the folder.
      */
     bool outside;
 
@@ -436,7 +437,8 @@ typedef bool (*ebpo_scene_pairs_fn)(void *user, const ebpo_scene_pair *pairs, ui
 /*
  * Broad phase: finds the pairs that ebpo_scene_pair_rule allows and whose boxes
  * (ebpo_scene_instance_box) are at most their clearance apart on each axis, in ascending order of
- * a, then b. The instances of any other allowed pair are farther apart at all times in from .. to.
+ * a, then b. The instances of every pair that ebpo_scene_pair_rule allows and that is not found are
+ * farther apart than their clearance at all times in from .. to.
  *
  * EBPO_E_ARGUMENT: not loaded, or not from <= to, both finite. EBPO_E_LIMIT: more than 2^23 pairs.
  *
@@ -466,8 +468,8 @@ typedef struct ebpo_scene_clash {
     uint64_t a, b;
 
     /*
-     * A pair of intersecting faces: the first by index if all are counted, else the pair of
-     * ebpo_collide_first. If no faces intersect: the nearest pair.
+     * A pair of intersecting faces: the pair with the lowest indices if all pairs are counted, else
+     * the pair of ebpo_collide_first. If no faces intersect: the nearest pair of faces.
      */
     uint64_t face_a, face_b;
 
@@ -551,7 +553,7 @@ typedef struct ebpo_scene_clash_options {
  * Narrow phase: finds the pairs of ebpo_scene_pairs whose faces intersect at a time, or are nearer
  * than the clearance. Decisions are exact on posed coordinates (collide.h). Clashes are in
  * ascending order of a, then b. If one instance is inside the other and no faces are near, the pair
- * is reported only with options.relate. Makes the models that it needs, as ebpo_scene_model does.
+ * is reported only with options.relate. The required models are made, as by ebpo_scene_model.
  *
  * tested   number of tested pairs; may be NULL
  *
@@ -704,10 +706,11 @@ typedef struct ebpo_scene_approach_options {
 
 /*
  * Finds when instances first come within their clearance of each other; no time is missed. For each
- * pair of ebpo_scene_pairs (from, to), the distance is evaluated at one time. From this distance
- * and ebpo_scene_motion follows the earliest later time at which the pair can be near, which is
- * evaluated next. There is one result per pair, in ascending order of a, then b. An instance that
- * is inside another from the beginning, without near faces, counts as apart.
+ * pair of ebpo_scene_pairs (from, to), the distance is evaluated at one time. This distance and
+ * ebpo_scene_motion give the earliest later time at which the pair can be near. The distance is
+ * evaluated at this time next, and so on. There is one result per pair, in ascending order of a,
+ * then b. An instance that is inside another from the beginning, without near faces, counts as
+ * apart.
  *
  * Errors are those of ebpo_scene_find_clashes. EBPO_E_ARGUMENT: also if the tolerance is not above
  * 0.
@@ -822,8 +825,8 @@ typedef struct ebpo_scene_need {
     int32_t last_level, level_count;
 
     /*
-     * ebpo_part bits: needed parts that the file has. For purposes other than VIEW: without
-     * EBPO_PART_MESH, no query needs the faces of this model.
+     * ebpo_part bits: needed parts that the file has. For purposes other than EBPO_SCENE_FOR_VIEW:
+     * if EBPO_PART_MESH is not set, no query needs the faces of this model.
      */
     uint32_t parts;
 

@@ -83,9 +83,9 @@ typedef struct ebpo_subset_options {
     double max_error;
 
     /*
-     * Maximum size of the new file in bytes. The least max_error (to 1 %) for which the file fits
-     * is found and used. If everything fits, no max_error is used. 0: no target. target_bytes and
-     * max_error cannot be set together.
+     * Maximum size of the new file in bytes. The least max_error (to 1 %) with which the file has
+     * at most this size is found and used. If the complete file fits, no max_error is used. 0: no
+     * target. target_bytes and max_error cannot be set together.
      */
     uint64_t target_bytes;
 

@@ -8,10 +8,9 @@
  *         draw(faces.vertex_count, faces.xyz32, faces.face_count, faces.faces);
  *     ebpo_subtree_close(subtree);
  *
- * Reads little more of the file than needed; remote files (http.h) take a few requests. The
+ * Little more of the file is read than these data; remote files (http.h) take a few requests. The
  * octcode (locational code) of a node is a leading 1 and three bits for each level (stream.h);
- * ebpo_octcode_at returns the octcode of the cell
- * that contains a point.
+ * ebpo_octcode_at returns the octcode of the cell that contains a point.
  */
 #ifndef EBPO_SUBTREE_H
 #define EBPO_SUBTREE_H
@@ -34,8 +33,9 @@ typedef struct ebpo_subtree_options {
     uint32_t parts;
 
     /*
-     * Number of levels below the subtree's root. -1: all. With another value no faces are read:
-     * leaves below the last level may list some of the faces, and their lists are missing.
+     * Number of levels below the subtree's root. -1: all. With another value no faces are read,
+     * because leaves below the last level list some of the faces, and the lists of these leaves are
+     * not read.
      */
     int levels;
 
@@ -156,7 +156,7 @@ typedef struct ebpo_subtree_nodes {
      */
     const uint32_t *above_first;
 
-    /* Codes; those of a node are in coordinates of the node's cell. */
+    /* Codes (ebpo_plane_decode); the codes of a node are in coordinates of the node's cell. */
     const uint32_t *above_planes;
 
     /* Total memory of the subtree in bytes. */
@@ -207,7 +207,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_subtree_get_node(ebpo_subtree *subtree, 
 /*
  * All faces that intersect the subtree's cell, in the order of the file. Leaves may also list faces
  * that are outside the cell by a rounding error. Shared faces come first: a leaf before this
- * subtree already lists them. The others are owned faces. So if the tree is divided into disjoint
+ * subtree already lists them. All other faces are owned. So if the tree is divided into disjoint
  * subtrees, exactly one of the subtrees that list a face owns it. The tree as a whole owns all
  * faces. In a subset (ebpo_subset), faces that are only below pruned nodes are missing. Arrays are
  * valid until the subtree is closed.

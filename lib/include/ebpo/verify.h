@@ -46,7 +46,7 @@ typedef struct ebpo_verify_report {
      */
     ebpo_verify_count labels;
 
-    /* No face intersects a cell that does not list it; no list contains a face twice. */
+    /* Each leaf lists all faces that intersect its cell; no list contains a face twice. */
     ebpo_verify_count lists;
 
     /* The mesh equals its source bitwise (options.source). */

@@ -14,8 +14,8 @@
  * parent when all eight are delivered (`complete`). The nodes that are not replaced are the cut.
  *
  * At any time the cut is a conservative level of detail. Every point of the root cell is in exactly
- * one of its cells (except on cell faces). The solid is contained in the envelopes of its gray
- * nodes and leaves, and its black cells.
+ * one cell of the cut (except on cell faces). The solid is contained in the envelopes of the gray
+ * nodes and leaves of the cut, together with its black cells.
  *
  * Sources: BP 2008, section 4.3, algorithm 9 (adaptive display); Meagher 1982 (octree enumeration
  * front to back).
@@ -162,7 +162,7 @@ typedef struct ebpo_view_node {
     bool complete;
 
     /*
-     * True if the cell is at least partly in the image. May also be true for other cells. True
+     * True if the cell is at least partly in the image, and for some cells outside the image. True
      * without an observer.
      */
     bool seen;
@@ -249,8 +249,8 @@ typedef struct ebpo_view_faces {
 #define EBPO_VIEW_FACES_INIT EBPO_SIZED(ebpo_view_faces)
 
 /*
- * Gets the faces of the last node of ebpo_view_stream_next if it was a leaf, with options.faces;
- * otherwise none. Arrays are valid until the next call with the stream.
+ * Gets the faces of the last node of ebpo_view_stream_next. Only a leaf has faces, and only with
+ * options.faces. Arrays are valid until the next call with the stream.
  *
  * Faces are read with the leaf and its siblings. If the faces would exceed options.bytes, the leaf
  * and its siblings are not delivered.
