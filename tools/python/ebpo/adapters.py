@@ -66,7 +66,7 @@ class TrimeshLike:
     vertices, faces.
 
     Points on faces are contained. Face indices are those of `faces`, which is in the source's order if the
-    file has maps.
+    file has source indices.
 
     >>> mesh = cube.as_trimesh()
     >>> mesh.contains([[.5, .5, .5], [2, 0, 0]])

@@ -70,7 +70,7 @@ class Automatic:
     def pays(self, model: Handle, total: int, parts_share: float) -> bool:
         """Return True when loading the whole model is cheaper.
 
-        That is so when subtrees have cost as much as the whole model, or certainly will.
+        This is so when loading subtrees has cost as much as loading the whole model, or certainly will.
 
         total: number of queries that are known to follow.
         parts_share: share of the queries' time that loading subtrees costs.

@@ -38,7 +38,7 @@ class Entry(NamedTuple):
 
     path: the file for winding numbers.
     content_sha256: the content digest of `path`.
-    solid: whether the model is a solid.
+    solid: True for a solid, False for a surface.
     low, high: corners of the model's box.
     surface: for a part, the file without caps, for distances and rays. "": the part has no caps, `path`
         serves both. None: the part consists only of caps.

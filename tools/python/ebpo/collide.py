@@ -151,7 +151,7 @@ class Collider:
     pose_a, pose_b: a result of `pose`, a (4, 4) matrix, or None for the pose in the file. Lengths are in the
     world's unit, which is the model's unit times the pose's scale.
 
-    memory: bytes for pairs that wait for their turn in the order of results.
+    memory: bytes for pairs of faces that are not sorted yet.
     threads: number of threads for `pairs`; None: all cores.
 
     One thread queries at a time; other threads wait.
@@ -202,7 +202,7 @@ class Collider:
     def first(self, pose_a: Pose | None = None, pose_b: Pose | None = None) -> tuple[int, int, c.PairKind] | None:
         """Return one pair of intersecting faces: face of a, face of b, kind.
 
-        Returns None when no faces intersect. A solid may nevertheless be inside the other.
+        Returns None when no faces intersect. Even then, one solid may be inside the other.
 
         >>> Collider(cube, cube).first(pose_b=pose(translation=[3, 0, 0])) is None
         True
@@ -213,7 +213,7 @@ class Collider:
         return (pair.face_a, pair.face_b, c.PairKind(pair.kind)) if found.value == 1 else None
 
     def relation(self, pose_a: Pose | None = None, pose_b: Pose | None = None, *, deadline: float | None = None) -> c.Relation:
-        """Return the exact Relation of the models. deadline: time limit in seconds; then the result may be OPEN."""
+        """Return the exact Relation of the models. deadline: time limit in seconds; then the result may be UNDECIDED."""
         result = c.ebpo_relation_result()
         with self._options((pose_a, pose_b), deadline) as options:
             call("ebpo_collide_relation", self._handle, options, ctypes.byref(result))
@@ -231,7 +231,7 @@ class Collider:
         return self._pairs("ebpo_collide_all", (pose_a, pose_b), progress)
 
     def self_pairs(self, *, progress: Progress | None = None) -> Pairs:
-        """Return the pairs of faces of one model that intersect and are not just neighbours.
+        """Return the pairs of faces of one model that have common points besides a common corner or edge.
 
         The collider must consist of the same model twice.
 
@@ -268,9 +268,9 @@ class Collider:
 
     def distance(self, pose_a: Pose | None = None, pose_b: Pose | None = None, *, tolerance: float = 0.0,
                  deadline: float | None = None) -> Clearance:
-        """Return the least distance between the faces. It is 0 if any intersect, and not negative inside a solid.
+        """Return the least distance between the faces: 0 if any faces intersect; not negative inside a solid.
 
-        tolerance: greatest allowed hi - lo.
+        tolerance: greatest allowed difference hi - lo of the bounds.
         deadline: time limit in seconds; then the current bounds are returned.
         """
         clearance, out = made(c.ebpo_collide_distance_options, tolerance=tolerance), c.ebpo_collide_distance_result()

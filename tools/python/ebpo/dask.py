@@ -139,7 +139,7 @@ def query(what: Query, model: Models, rows: PointSet, *, boundary: bool | None =
     what: "inside", "winding", "locate", "distance" or "ray".
     model: a path or URL that each worker can open, a list of them, a Catalogue, or the path of one (.json).
     rows: input of `points`; for rays (n, 6), origins and directions.
-    memory: budget in bytes for all models of a worker process, from then on; initially 1 GiB.
+    memory: budget in bytes for all models of a worker process, in this and later queries; initially 1 GiB.
     threads: number of threads for each chunk, in addition to the threads of Dask's workers.
     http: options for URLs, such as headers.
     boundary ... nan: arguments of the method of Catalogue. None: its default.

@@ -196,7 +196,7 @@ class Model(PointQueries):
             return self._current()
 
     def _bring_in_all(self) -> None:
-        """Replace the partially loaded model by the whole model when no query uses the former.
+        """Replace the partially loaded model by the whole model when no query uses the old one.
 
         Memory may be too small for both at the same time. While functions of the caller may run in a
         context, the method returns without a change: such a function may wait for this thread, or may have

@@ -64,16 +64,16 @@ class Mass(NamedTuple):
 
     area: float.
     volume: float, the volume of the points that are inside by the file's rule. nan: unknown, because
-        components intersect or coincide, or the mesh is not a 2-manifold. A surface without its border has 0,
-        and 0 in the following members; one with its border is measured with its caps.
+        components intersect or coincide, or the mesh is not a 2-manifold. 0 for a surface
+        without the part `border`, as are all following members. A surface with this part is measured with its caps.
     centroid: (3,). inertia: (3, 3), about the centroid. When the volume is nan, the winding number is the
         density.
     volume_bounds: (2,), guaranteed bounds of the volume.
     integral: float, the integral of the winding number. It equals the volume when winding numbers are only
         0 and 1.
     integral_error: float, centroid_error: float, of a surface with its border: bounds of rounding errors.
-    caps_integral: float, caps_centroid: float, how far the integral and the centroid may be from those with
-        other caps in the hulls of their loops. inf: no bound.
+    caps_integral: float, caps_centroid: float, greatest differences that other caps in the hulls of their loops
+        could make to the integral and the centroid. inf: no bound.
     """
 
     area: float

@@ -76,7 +76,7 @@ class PointQueries(RayQueries):
 
         A point with NaN is MAYBE, and its doubt is NaN.
 
-        Raises NotSolidError for a surface, and AbsentError when a subset lacks the data that decides.
+        Raises NotSolidError for a surface without the part `border`, and AbsentError when a subset lacks needed data.
 
         >>> cube.locate([[.5, .5, .5], [2, 0, 0], [1, .25, .5]]).where.tolist()
         [1, 0, 2]

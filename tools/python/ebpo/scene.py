@@ -110,7 +110,7 @@ class Scene:
     def pairs(self, begin: float | None = None, end: float | None = None) -> Rows:
         """Return the pairs whose boxes come closer than their clearance at any time from begin to end.
 
-        Returns a structured array of a, b and clearance, ascending. No other pair comes that close.
+        Returns a structured array of a, b and clearance, ascending. All other tested pairs stay farther apart.
         """
         found = Gathered(c.ebpo_scene_pairs_fn, CLOSE)
         with self._lock, found as taking:
