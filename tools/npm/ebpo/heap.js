@@ -32,7 +32,7 @@ export function loadModule(url) {
 export class Heap {
   #views = new Map();
   #scratch; // SCRATCH bytes for small arguments
-  #used = 0; // of them
+  #used = 0; // number of SCRATCH bytes in use
   #table; // offset of the table of result arrays in an object
 
   constructor(module, limit = 2 ** 32) {

@@ -1,8 +1,8 @@
 /** Reads and queries EBP-Octree files (.ebpo.h5) in browsers and Node.
  *
  * Faces have two indices. The *source index* is the face's index in the source; queries, `sample` and pairs use it. The *file
- * index* is its row in the file; it is called `number` in subtrees, views and View.leafFaces(). Both are equal in files without
- * maps. `maps()` gives the source index of each file index. `mesh()` and `attribute()` have rows in the order of source
+ * index* is the face's row in the file; it is called `number` in subtrees, views and View.leafFaces(). In files without source
+ * indices (part `maps`), both are equal. `maps()` gives the source index of each file index. `mesh()` and `attribute()` have rows in the order of source
  * indices, or, with order 'file', of file indices. Row i of the source order has source index i, unless faces of the source are
  * missing in the file (degenerate faces, subsets). */
 
@@ -85,11 +85,13 @@ export interface InsideOptions extends QueryOptions {
   /** Use levels 0 to `level` only; results are then certain or MAYBE. */
   level?: number;
 }
+/** `maxDistance`: faces farther away are ignored; `unsigned`: distances are not negative inside. */
 export interface DistanceOptions extends InsideOptions { maxDistance?: number; unsigned?: boolean }
+/** `radius`: maximum distance; `most`: maximum number of faces. */
 export interface NearestOptions extends QueryOptions { radius?: number; most?: number }
 export interface RayOptions extends QueryOptions {
   tMax?: number;
-  /** Triangles that count: front: hit from outside. */
+  /** Triangles that count. front: triangles that are hit from outside; back: from inside. */
   sides?: 'both' | 'front' | 'back';
 }
 
@@ -112,7 +114,7 @@ export interface Mesh { vertices: Float32Array | Float64Array; faces: Uint32Arra
 /** Source indices of the file's vertices and faces. */
 export interface Maps { vertex: Uint32Array; face: Uint32Array }
 export interface OrderOptions extends QueryOptions {
-  /** Order of rows. Default: source. Files without maps have only the order of the file. */
+  /** Order of rows. Default: source. Files without source indices have only the order of the file. */
   order?: 'source' | 'file';
 }
 
@@ -167,8 +169,8 @@ export interface ViewOptions {
 }
 
 /** As ebpo_view_node (ebpo/view.h). The `complete` node is the last of eight siblings, which now replace their parent.
- * Faces of leaves, with the option faces: `faceCount` of each node, and of each face 9 numbers, its file index, and 1 if an
- * earlier leaf had it. */
+ * Faces of leaves, with the option faces: `faceCount` of each node, and for each face 9 numbers, the file index, and 1 if an
+ * earlier leaf had the face. */
 export interface ViewNodes extends StreamNodes {
   count: number; level: Uint8Array; complete: Uint8Array; seen: Uint8Array; distance: Float64Array; pixels: Float64Array;
   faceCount?: Uint32Array; faceCorners?: Float64Array; faceNumber?: Uint32Array; faceRepeated?: Uint8Array;

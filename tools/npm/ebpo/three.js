@@ -13,8 +13,8 @@ function faceOf({ index, attributes: { position } }, face, vector) {
  * Returns a function for `raycast` of an Object3D in the model's coordinates, which three's Raycaster then calls:
  *   object.raycast = raycastOf(model);
  * As with three-mesh-bvh, `firstHitOnly` of the raycaster selects the first intersection. `face` is null unless the object's
- * geometry is indexed. A ray that needs bytes that are not in memory has no intersections; they are fetched, and then
- * `ready` is called.
+ * geometry is indexed. A ray that needs bytes that are not in memory has no intersections; the bytes are fetched, and
+ * then `ready` is called.
  */
 export const raycastOf = (model, { ready = () => {} } = {}) => function raycast(raycaster, intersects) {
   const { ray, near, far } = raycaster, inverse = this.matrixWorld.clone().invert();

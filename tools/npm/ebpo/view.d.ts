@@ -13,13 +13,13 @@ export interface LeafAddress { level: number; group: number; octant: number; sub
 /** Faces of a leaf: file indices (Model.maps() gives the source indices of queries), corners (9 numbers each), colours (red, green and blue of each corner). */
 export interface LeafFaces { numbers: Uint32Array; corners: Float32Array | Float64Array; colours?: Uint8Array }
 
-/** A file opened for drawing; of Model's methods it has only info and dispose(). */
+/** A file opened for drawing. It has `info` and dispose() as Model has, and none of Model's queries. */
 export class View {
   private constructor();
   readonly info: Info;
   /** True if faces or vertices have colours. */
   readonly coloured: boolean;
-  /** Rejects if the data returned before the list of chunk checksums arrived do not agree with it; undefined: no list. */
+  /** Rejects if data that was returned before the list of chunk checksums arrived does not agree with the list; undefined: no list. */
   readonly sums?: Promise<void>;
   nodes(wanted: { level: number; part: number }[], options?: QueryOptions & { bytes?: number }): Promise<NodePart[]>;
   leafFaces(leaves: LeafAddress[], options?: QueryOptions): Promise<LeafFaces[]>;

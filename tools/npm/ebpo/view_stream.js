@@ -54,7 +54,7 @@ export class ViewStream {
     this.#access.call(this.#object, name, ...args);
   }
 
-  /** Sets other options; those that are not given are kept. */
+  /** Sets other options; options that are not given are kept. */
   change(options = {}) {
     const all = { ...DEFAULTS, ...this.#options, ...options }, observer = { ...OBSERVER, ...all.observer };
     const numbers = Float64Array.of(indexOf(PRIORITIES, all.priority), indexOf(UNSEEN, all.unseen), all.pixels, all.distance, all.level, all.bytes, all.nodes,
