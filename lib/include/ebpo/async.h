@@ -22,8 +22,8 @@
  *     ebpo_async_end(async, operation);
  *
  * Every function that reads can return EBPO_E_PENDING if its file has such a source. Then:
- * - A function that makes an object makes none. ebpo_open_source closes its source: get another one
- *   from ebpo_async_source.
+ * - A function that makes an object makes no object. ebpo_open_source closes its source: get
+ *   another one from ebpo_async_source.
  * - Outputs are unspecified, and callbacks may have received some results. The repeated call starts
  *   again and passes all results. Streams continue with the item that was not returned.
  * - Batches of points and rays keep their completed results if options.done is given (query.h).
@@ -32,7 +32,8 @@
  *   that only earlier repetitions used may be removed. If the repetition has completed no items,
  *   end the newer operation.
  * - ebpo_ray_all_many keeps no completed results: its hits are one array in the order of the rays,
- *   whose positions depend on all earlier rays. Each call evaluates all rays; pass few at a time.
+ *   whose positions depend on all earlier rays. Each call evaluates all rays, so pass few rays at a
+ *   time.
  * - Catalogues open such files by ebpo_catalogue_options.open_file. Scenes open files by path.
  * - Haptic rendering does not support such files, as its thread loads data in the background.
  *

@@ -73,7 +73,7 @@ typedef struct ebpo_boolean ebpo_boolean;
  * outlive the expression.
  *
  * EBPO_E_ARGUMENT: an index is out of range or not of an earlier node, an operation is not valid,
- * or a pose is not valid (ebpo_pose_check). EBPO_E_LIMIT: no or too many operands or nodes.
+ * or a pose is not valid (ebpo_pose_check). EBPO_E_LIMIT: no operands or nodes, or too many.
  * EBPO_E_NOT_SOLID: an operand is a surface. EBPO_E_ABSENT: an operand's file has no mesh. Messages
  * give the index of the node, or the number of the operand (from 1 on) and its file.
  *
@@ -275,14 +275,15 @@ typedef struct ebpo_boolean_mesh_options {
     ebpo_progress progress;
 
     /*
-     * True: coordinates of the mesh are doubles. False: floats if those of all operands are and the
-     * result is in their range; else doubles.
+     * True: coordinates of the mesh are doubles. False: floats if the coordinates of all operands
+     * are floats and the result is in the range of floats; else doubles.
      */
     bool doubles;
 
     /*
      * True: faces of the mesh have the attributes `operand` (uint8, from 0) and `operand_face`
-     * (uint32): the face of the operand from which the face comes, by its index in the source.
+     * (uint32): the operand from which the face comes, and the source index of the face of this
+     * operand.
      */
     bool origins;
 
@@ -342,8 +343,8 @@ typedef struct ebpo_boolean_mesh_report {
  * mesh are 1 in the result and 0 elsewhere, except near rounded vertices. The mesh is the same for
  * any number of threads.
  *
- * Takes about 40 bytes for each face of one operand at a time and 25 for each face of the mesh,
- * which a workspace may hold, and 1,500 for each face that is cut.
+ * Takes about 40 bytes for each face of one operand at a time and 25 bytes for each face of the
+ * mesh, both of which a workspace may hold. Takes also 1,500 bytes for each face that is cut.
  *
  * out     freed by ebpo_mesh_free; without faces if the result is empty
  * report  may be NULL

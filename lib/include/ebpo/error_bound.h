@@ -53,8 +53,8 @@ typedef struct ebpo_error_bound {
     size_t struct_size;
 
     /*
-     * Bounds of the one-sided Hausdorff distance from the level's envelopes to the model. lo is 0:
-     * perhaps no envelope extends beyond the model.
+     * Bounds of the one-sided Hausdorff distance from the level's envelopes to the model. If lo is
+     * 0, perhaps no envelope extends beyond the model.
      */
     double lo, hi;
 

@@ -120,8 +120,8 @@ typedef struct ebpo_haptic_options {
 /*
  * Makes a haptic object at a position and starts loading around it.
  *
- * model   must outlive the object. Contexts may use the model at the same time. Its budget limits
- *         loading (ebpo_model_options.memory)
+ * model      must outlive the object. Contexts may use the model at the same time. The model's
+ *            budget limits loading (ebpo_model_options.memory)
  * position   three finite doubles, outside the solid. Ball: no face may be within the radius plus
  *            1.5 skins of the position. Tool: the same for each of its points. Probe: anywhere
  *
@@ -153,15 +153,16 @@ typedef enum ebpo_haptic_flag {
     EBPO_HAPTIC_WAITING = 2,
 
     /*
-     * The path of the proxy is incomplete: the work limit of the step was reached before its end.
-     * The next step continues; until then, a ball in contact stays in contact with the same faces.
+     * The path of the proxy is incomplete, because the step reached its work limit before the end
+     * of the path. The next step continues; until then, a ball in contact stays in contact with the
+     * same faces.
      */
     EBPO_HAPTIC_PATH_UNFINISHED = 4,
 
     /*
-     * The nearest face, its distance and the normal follow from only a part of the faces within
-     * `search_radius`: the farthest ones were not tested, or some were not loaded. The path of the
-     * proxy is not affected.
+     * The nearest face, its distance and the normal were computed from only a part of the faces
+     * within `search_radius`: the farthest faces were not tested, or some faces were not loaded.
+     * The path of the proxy is not affected.
      */
     EBPO_HAPTIC_FACES_OMITTED = 8,
 

@@ -45,7 +45,7 @@ typedef struct ebpo_limit {
     /* Number of computed hulls. */
     uint64_t hulls;
 
-    /* Number of hulls without volume: their points are in a plane, or nearly. */
+    /* Number of hulls without volume: their points are in a plane or nearly in a plane. */
     uint64_t flat;
 } ebpo_limit;
 

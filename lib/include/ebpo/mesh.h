@@ -551,13 +551,13 @@ typedef struct ebpo_prepare_options {
 
     ebpo_progress progress;
 
-    /* 1: also ebpo_mesh_flip. */
+    /* 1: calls ebpo_mesh_flip, too. */
     uint64_t flip;
 
-    /* 1: also ebpo_mesh_drop_duplicates. */
+    /* 1: calls ebpo_mesh_drop_duplicates, too. */
     uint64_t drop_duplicates;
 
-    /* Above 0: ebpo_mesh_weld_within with this distance, instead of ebpo_mesh_weld. */
+    /* Above 0: calls ebpo_mesh_weld_within with this distance, and not ebpo_mesh_weld. */
     double weld_distance;
 } ebpo_prepare_options;
 

@@ -430,8 +430,8 @@ typedef struct ebpo_paint_pen {
     double spread;
 
     /*
-     * Number of points per step at full pressure, 1 to 10,000. At pressure p the number is p times
-     * this, rounded, at least 1. If `spread` is 0, it is 1.
+     * Number of points per step at full pressure, 1 to 10,000. At pressure p, a step has p *
+     * density points, rounded, and at least one. If `spread` is 0, a step has one point.
      */
     uint32_t density;
 
@@ -449,8 +449,8 @@ typedef struct ebpo_paint_pen {
     double step;
 
     /*
-     * The pen is lifted where the device is farther from the surface than this; at least 0.
-     * INFINITY: never.
+     * The pen is lifted where the device is farther from the surface than this distance; at least
+     * 0. INFINITY: the pen is never lifted.
      */
     double within;
 

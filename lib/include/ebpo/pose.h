@@ -33,8 +33,8 @@ typedef struct ebpo_pose {
     }
 
 /*
- * Sets pose->rotation from a quaternion x, y, z, w (w is the real part) of any length; bitwise
- * equal to the result for scene files.
+ * Sets pose->rotation from a quaternion x, y, z, w (w is the real part) of any length. The result
+ * is bitwise equal to that for scene files.
  *
  * EBPO_E_ARGUMENT: its greatest component is not from 2^-500 to 2^500; the pose is unchanged.
  *

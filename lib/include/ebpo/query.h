@@ -36,8 +36,7 @@ extern "C" {
 
 /* ---- models and contexts ---- */
 
-/* How data that is not in memory is loaded (EBP 2017, section 4.2). All modes give equal results.
- */
+/* How data that is not in memory is loaded (EBP 2017, section 4.2). Results do not depend on it. */
 typedef enum ebpo_loading {
     /*
      * Whole subtrees, which are kept while the budget allows. The least recently used subtrees are
@@ -963,8 +962,7 @@ typedef struct ebpo_mass {
      */
     double volume;
 
-    /* Centroid of the solid. If the volume is unknown, points are weighted by their winding
-     * numbers. */
+    /* Centroid of the solid. If the volume is unknown, the winding number is the density. */
     double centroid[3];
 
     /* About the centroid, for density 1. */
@@ -991,7 +989,7 @@ typedef struct ebpo_mass {
     double integral, scaled_integral;
 
     /*
-     * The following members are of a surface with EBPO_PART_BORDER, in the model's unit; else 0.
+     * The following members are for surfaces with EBPO_PART_BORDER, in the model's unit; else 0.
      *
      * Bounds of the rounding errors of `integral`, and of `centroid` on each axis.
      */

@@ -14,7 +14,8 @@ extern "C" {
  * Reads a whole dataset of rows x columns as doubles. The dataset may contain integers or floats of
  * any size and byte order. Values are rounded to the nearest double.
  *
- * dataset        such as "/points". NULL or "": reads none; the error message lists the candidates
+ * dataset        such as "/points". NULL or "": reads nothing; the error message lists the suitable
+ *                datasets
  * least, most    allowed number of columns, 1 to 64
  * fill           value for missing columns, if the dataset has fewer than `most`
  * rows           [*count][most] doubles; freed by free()
@@ -22,9 +23,9 @@ extern "C" {
  * EBPO_E_IO: the file cannot be read, or another program has it open for writing. EBPO_E_FORMAT:
  * not an HDF5 file; no such dataset; another shape or type (for example complex numbers, or an
  * array of an .ebpo.h5 file, which holds codes); or the values are in another file. EBPO_E_ABSENT:
- * no dataset was named, and there is no candidate. EBPO_E_LIMIT: the rows would take more than 64
- * MiB, and more than 1,024 times the file size. EBPO_E_UNSUPPORTED: the library was built without
- * libhdf5.
+ * no dataset was named, and the file has no suitable one. EBPO_E_LIMIT: the rows would take more
+ * than 64 MiB, and more than 1,024 times the file size. EBPO_E_UNSUPPORTED: the library was built
+ * without libhdf5.
  *
  * libhdf5 reads the file in a separate process, with limits on memory and time and without plugins.
  * The rows are passed through an unnamed file in TMPDIR.

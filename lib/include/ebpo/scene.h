@@ -279,8 +279,8 @@ EBPO_API const char *ebpo_scene_get_layer(const ebpo_scene *scene, uint64_t laye
 EBPO_API const char *ebpo_scene_get_group(const ebpo_scene *scene, uint64_t group);
 
 /*
- * Returns the index of the nth group of an instance. EBPO_SCENE_NONE: it has fewer groups, or
- * `instance` is out of range.
+ * Returns the index of the nth group of an instance. EBPO_SCENE_NONE: the instance has fewer
+ * groups, or `instance` is out of range.
  *
  * Threads: any.
  */

@@ -41,8 +41,8 @@ typedef struct ebpo_verify_report {
     ebpo_verify_count nesting;
 
     /*
-     * White and black cells, and winding numbers of corners, agree with independently computed
-     * winding numbers.
+     * White and black cells, and winding numbers of corners, agree with winding numbers that
+     * another method computes.
      */
     ebpo_verify_count labels;
 

@@ -110,7 +110,7 @@ typedef struct ebpo_view_options {
 
     /*
      * Maximum number of bytes read from the file since opening (ebpo_file_get_stats). The stream
-     * stops before this is exceeded. 0: no limit.
+     * stops before it exceeds this number. 0: no limit.
      */
     uint64_t bytes;
 
