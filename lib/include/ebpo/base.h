@@ -32,7 +32,8 @@
  * that the comment names, or to the meaning that ebpo_status gives.
  *
  * Parameter or member `threads`: number of threads to use; 0: all cores. The result does not depend
- * on it.
+ * on this number. Member `progress`: callback that reports progress; by default none. Parameter
+ * `user`: passed to the callback unchanged. Members `reserved` are 0.
  *
  * "Threads:" in a comment says which threads may call a function at the same time:
  *   any           any number of threads, also with the same arguments, as long as no thread changes

@@ -203,8 +203,8 @@ EBPO_API ebpo_status ebpo_catalogue_get_facts(const ebpo_catalogue *catalogue,
                                               ebpo_catalogue_facts *out);
 
 /*
- * Returns entry `number`. Relative paths in the entry are already joined with their base folder.
- * Lent until the catalogue is freed. NULL: `number` is out of range.
+ * Returns entry `number`, from 0. Relative paths in the entry are already joined with their base
+ * folder. Lent until the catalogue is freed. NULL: `number` is out of range.
  *
  * Threads: any.
  */

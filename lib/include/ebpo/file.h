@@ -296,8 +296,8 @@ typedef struct ebpo_info {
 
     /*
      * Location of HDF5's chunk indexes, which are stored after the data of the first levels. Only
-     * arrays with several chunks have a chunk index. Used for prefetching. 0: none, or not
-     * recorded.
+     * arrays with several chunks have a chunk index. The location is used for prefetching. 0: no
+     * chunk indexes, or not recorded.
      */
     uint64_t chunk_index_offset, chunk_index_bytes;
 
@@ -603,8 +603,8 @@ typedef struct ebpo_open_options {
     uint64_t max_expansion;
 
     /*
-     * Opens this source instead of the path. The path is then only for messages. The source is
-     * closed at the same times as with ebpo_open_source.
+     * If not NULL, this source is opened instead of the path, which is then only for messages. The
+     * source is closed as by ebpo_open_source.
      */
     const ebpo_source *source;
 
@@ -688,8 +688,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_memory(const void *data, uint64_t s
                                                     ebpo_error *error);
 
 /*
- * Opens a file from any source. The source is closed with the file, and also if opening fails
- * (except if source->struct_size is not set).
+ * Opens a file from any source. The source is closed with the file, and also if opening fails,
+ * unless source->struct_size is not set.
  *
  * Threads: any.
  */

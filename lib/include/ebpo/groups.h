@@ -70,7 +70,7 @@ EBPO_API void ebpo_mesh_groups_free(ebpo_mesh_groups *groups);
 EBPO_API uint64_t ebpo_mesh_groups_count(const ebpo_mesh_groups *groups);
 
 /*
- * Gets group `number`.
+ * Gets group `number`, 0 to ebpo_mesh_groups_count - 1.
  *
  * Threads: any.
  */

@@ -41,7 +41,8 @@ typedef struct ebpo_http_options {
     double stall_timeout;
 
     /*
-     * Seconds for one request with all retries and pauses; above 0. No single read takes longer.
+     * Seconds for one request with all its retries and pauses; above 0. No single read takes longer
+     * than this.
      */
     double time_limit;
 
@@ -110,8 +111,8 @@ typedef struct ebpo_http_options {
     uint64_t cache_bytes;
 
     /*
-     * Called about ten times a second by another thread. Return true to make current and later
-     * operations fail with EBPO_E_CANCELLED. NULL: never.
+     * Called with `stop_user` about ten times a second by another thread. If it returns true,
+     * current and later operations fail with EBPO_E_CANCELLED. NULL: operations are never stopped.
      */
     bool (*stop)(void *user);
     void *stop_user;

@@ -656,7 +656,7 @@ EBPO_API void ebpo_components_free(ebpo_components *components);
 EBPO_API uint64_t ebpo_components_count(const ebpo_components *components);
 
 /*
- * Gets component `number`.
+ * Gets component `number`, 0 to ebpo_components_count - 1.
  *
  * Threads: any.
  */

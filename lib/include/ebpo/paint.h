@@ -251,7 +251,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_add_layer(ebpo_paint *paint,
                                                         uint64_t *number, ebpo_error *error);
 
 /*
- * Replaces the properties of a layer. Texts of ebpo_paint_get_layer for this layer may be passed.
+ * Replaces the properties of layer `number`. Texts of ebpo_paint_get_layer for this layer may be
+ * passed.
  *
  * Errors are those of ebpo_paint_add_layer.
  *
@@ -262,7 +263,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_set_layer(ebpo_paint *paint, uint6
                                                         ebpo_error *error);
 
 /*
- * Removes a layer with its strokes and notes. The indices of higher layers decrease by one.
+ * Removes layer `number` with its strokes and notes. The indices of higher layers decrease by one.
  *
  * Threads: one at a time per paint.
  */
@@ -336,7 +337,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_add_note(ebpo_paint *paint,
                                                        ebpo_error *error);
 
 /*
- * Removes a note.
+ * Removes note `number`. The indices of later notes decrease by one.
  *
  * Threads: one at a time per paint.
  */
@@ -392,8 +393,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_add_stroke(ebpo_paint *paint,
                                                          ebpo_error *error);
 
 /*
- * Removes a stroke. The indices of later strokes decrease by one. Removing the last stroke undoes
- * it.
+ * Removes stroke `number`. The indices of later strokes decrease by one. Removing the last stroke
+ * undoes it.
  *
  * Threads: one at a time per paint.
  */
