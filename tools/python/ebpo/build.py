@@ -43,8 +43,8 @@ def convert(mesh: AnyMesh, output: Path, *, overwrite: bool = False, parts: str 
         faces: (f, 3) integers.
     overwrite: replace an existing file. False: raise ExistingFileError, which is a FileExistsError.
     parts: as `ebpo convert --parts`: the parts to store, such as
-        "mesh,maps,attributes,envelopes,leaf-planes,colours", or parts to omit with minus signs, such as
-        "-maps,-colours"; or a list of such names. None: all except leaf-planes.
+        "mesh,maps,attributes,envelopes,leaf-planes,colours,border,surface", or parts to omit with minus signs,
+        such as "-maps,-colours"; or a list of such names. None: all except leaf-planes and surface.
     weld, weld_distance, orient, fill_holes, flip, drop_duplicates: repair the mesh, as the command
         `ebpo convert` does with these options.
     rule: "nonzero", "evenodd" or "positive": the winding numbers that are inside.
