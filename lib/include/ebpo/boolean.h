@@ -336,12 +336,12 @@ typedef struct ebpo_boolean_mesh_report {
  * Makes the mesh of the result. Faces of operands are cut exactly along their intersections with
  * all other faces, including coplanar faces and faces of the same operand. The parts that bound the
  * result are kept, where needed with the reverse orientation. Faces that are not cut keep their
- * corners, at their poses. Other vertices are the exact ones, rounded to the nearest coordinate.
- * The mesh is closed: each edge is used equally often in both directions. Rounding may create small
- * intersections of faces (ebpo_mesh_self_intersections). Vertices of cut faces that become equal by
- * rounding are merged, and faces that lose a corner in this way are omitted. Winding numbers of the
- * mesh are 1 in the result and 0 elsewhere, except near rounded vertices. The mesh is the same for
- * any number of threads.
+ * corners, at their poses. Other vertices are the exact vertices of the result, rounded to the
+ * nearest coordinates. The mesh is closed: each edge is used equally often in both directions.
+ * Rounding may create small intersections of faces (ebpo_mesh_self_intersections). Vertices of cut
+ * faces that become equal by rounding are merged, and faces that lose a corner in this way are
+ * omitted. Winding numbers of the mesh are 1 in the result and 0 elsewhere, except near rounded
+ * vertices. The mesh is the same for any number of threads.
  *
  * Takes about 40 bytes for each face of one operand at a time and 25 bytes for each face of the
  * mesh, both of which a workspace may hold. Takes also 1,500 bytes for each face that is cut.

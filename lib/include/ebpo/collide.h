@@ -208,7 +208,7 @@ typedef bool (*ebpo_pairs_fn)(void *user, const ebpo_face_pair *pairs, uint64_t 
  * hundred subtrees.
  *
  * EBPO_E_CANCELLED: also if the deadline has passed. The pairs passed so far are then the first
- * ones. Other errors are those of ebpo_collide_first.
+ * pairs in this order. Other errors are those of ebpo_collide_first.
  *
  * Threads: one at a time per collider.
  */
@@ -590,8 +590,8 @@ typedef struct ebpo_self_intersections_summary {
  * Finds the self-intersections of a mesh as ebpo_collide_self does for a model, without an .ebpo.h5
  * file. Each pair is reported once, in an order that depends only on the mesh. Coordinates are
  * compared exactly, so unwelded meshes give the same result. Memory is limited by the mesh's
- * workspace (if NULL, by one with default options), which also holds a temporary file of about 20
- * bytes per face. The mesh is empty afterwards, also on failure.
+ * workspace (if NULL, by a workspace with default options), which also holds a temporary file of
+ * about 20 bytes per face. The mesh is empty afterwards, also on failure.
  *
  * report   from ebpo_mesh_check or ebpo_mesh_prepare
  * take     NULL: only the summary
