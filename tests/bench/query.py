@@ -385,7 +385,7 @@ class Made:
 
 POINTS = {
     "distance": ("Nearest point",
-                 "Ours is exact, signed and in double precision; each search begins "
+                 "Our distance is exact, signed and in double precision; each search begins "
                  "with the previous result, except *not warm*. "
                  "Embree's point query is in single precision; *Embree, warm*: its search "
                  "radius comes from the previous result."),

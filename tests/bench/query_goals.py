@@ -75,10 +75,10 @@ def goals_table(results, memory, budget, found):
         goals.rows.append(["results that rational arithmetic contradicts", 0,
                            f"{bad} of {judged:,}", "missed" if bad else "met"])
     page.text("## Goals", "",
-              "The table begins with missed goals. A goal is an upper limit. Four values are for the models of "
-              f"{', '.join(SIZES)} faces; *1 of 4*: one of them meets the goal. *Rays*: the worst of uniform, "
+              "The table begins with missed goals. A goal is an upper limit. Four values in a row are for the models of "
+              f"{', '.join(SIZES)} faces; *1 of 4*: one of these values meets the goal. *Rays*: the worst of uniform, "
               "camera and segments. The time of fcpw, a nearest-point library, is estimated: Embree's time, "
-              "multiplied by a factor for each model from another machine: "
+              "multiplied by the ratio of the two times on another machine, for each model: "
               f"{', '.join(map(str, FCPW['path']))} (path) and "
               f"{', '.join(map(str, FCPW['uniform']))} (uniform).")
     page.table(["what", "goal", "measured", ""],
