@@ -221,6 +221,7 @@ EBPO_API bool ebpo_is_date(const char *text);
  */
 typedef bool (*ebpo_progress_fn)(void *user, const char *stage, uint64_t done, uint64_t total);
 
+/* A progress callback and its argument. */
 typedef struct ebpo_progress {
     ebpo_progress_fn report; /* NULL: no reports */
     void *user;              /* argument of `report` */

@@ -28,6 +28,7 @@ extern "C" {
 
 /* ---- expressions ---- */
 
+/* Operation of a node of an expression. */
 typedef enum ebpo_boolean_operation {
     EBPO_BOOLEAN_OPERAND = 0,             /* the operand with index `left` */
     EBPO_BOOLEAN_UNION = 1,               /* in `left`, in `right`, or in both */
@@ -53,6 +54,7 @@ typedef struct ebpo_boolean_operand {
 #define EBPO_BOOLEAN_OPERANDS_MAX 64
 #define EBPO_BOOLEAN_NODES_MAX    256
 
+/* Options of ebpo_boolean_new. */
 typedef struct ebpo_boolean_options {
     size_t struct_size;
 
@@ -95,6 +97,7 @@ EBPO_API void ebpo_boolean_free(ebpo_boolean *boolean);
 
 /* ---- point in solid ---- */
 
+/* Classification of a point (ebpo_boolean_inside). */
 typedef struct ebpo_boolean_result {
     /*
      * ebpo_where. EBPO_IN: certainly an interior point of the result. EBPO_OUT: certainly an
@@ -136,6 +139,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_inside_many(ebpo_boolean *boolea
 
 /* ---- distance ---- */
 
+/* Options of ebpo_boolean_distance. */
 typedef struct ebpo_boundary_options {
     size_t struct_size;
 
@@ -154,6 +158,7 @@ typedef struct ebpo_boundary_options {
         sizeof(ebpo_boundary_options), 0.01, 0 \
     }
 
+/* Result of ebpo_boolean_distance. */
 typedef struct ebpo_boundary_distance {
     /*
      * Bounds of the unsigned distance to the result's boundary, in the unit of the world. Both 0:
@@ -188,6 +193,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_distance(ebpo_boolean *boolean,
 
 /* ---- exact volume ---- */
 
+/* Options of ebpo_boolean_exact_volume. */
 typedef struct ebpo_volume_options {
     size_t struct_size;
     ebpo_progress progress;
@@ -204,6 +210,7 @@ typedef enum ebpo_volume_doubt {
     EBPO_VOLUME_SUBSET = 4              /* the file of operand[0] is a subset */
 } ebpo_volume_doubt;
 
+/* Result of ebpo_boolean_exact_volume. */
 typedef struct ebpo_exact_volume {
     size_t struct_size;
 
@@ -269,6 +276,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_exact_volume(ebpo_boolean *boole
 
 /* ---- mesh ---- */
 
+/* Options of ebpo_boolean_mesh. */
 typedef struct ebpo_boolean_mesh_options {
     size_t struct_size;
 
@@ -304,6 +312,7 @@ typedef struct ebpo_boolean_mesh_options {
         sizeof(ebpo_boolean_mesh_options), { NULL, NULL }, false, false, false, { 0 }, NULL \
     }
 
+/* Statistics of ebpo_boolean_mesh. */
 typedef struct ebpo_boolean_mesh_report {
     size_t struct_size;
 
@@ -363,6 +372,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_mesh(ebpo_boolean *boolean,
 
 /* ---- cells ---- */
 
+/* Options of ebpo_boolean_cells_new. */
 typedef struct ebpo_cells_options {
     size_t struct_size;
 
@@ -380,6 +390,7 @@ typedef struct ebpo_cells_options {
     ebpo_progress progress;
 } ebpo_cells_options;
 
+/* Deepest level of cells. */
 #define EBPO_BOOLEAN_LEVEL_MAX 20
 
 #define EBPO_CELLS_OPTIONS_INIT                             \
@@ -421,6 +432,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_cells_new(ebpo_boolean *boolean,
  */
 EBPO_API void ebpo_boolean_cells_free(ebpo_boolean_cells *cells);
 
+/* Result of ebpo_boolean_cells_volume. */
 typedef struct ebpo_boolean_volume {
     size_t struct_size;
 
@@ -465,6 +477,7 @@ typedef struct ebpo_boolean_volume {
 EBPO_API ebpo_status ebpo_boolean_cells_volume(const ebpo_boolean_cells *cells,
                                                ebpo_boolean_volume *out);
 
+/* Cells whose surface ebpo_boolean_cells_mesh makes. */
 typedef enum ebpo_boolean_side {
     EBPO_BOOLEAN_OUTER = 0, /* all in-cells and mixed cells: contains the result */
     EBPO_BOOLEAN_INNER = 1  /* all in-cells: contained in the result */

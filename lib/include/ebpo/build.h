@@ -101,6 +101,7 @@ typedef struct ebpo_build_times {
 
 #define EBPO_BUILD_TIMES_INIT EBPO_SIZED(ebpo_build_times)
 
+/* Options of ebpo_build. */
 typedef struct ebpo_build_options {
     size_t struct_size;
 
@@ -250,6 +251,7 @@ typedef struct ebpo_thesis_level {
     double gray_volume, leaf_volume, black_volume;
 } ebpo_thesis_level;
 
+/* Result of ebpo_build_as_theses: the levels from the root down. */
 typedef struct ebpo_thesis_levels {
     size_t struct_size;
     int level_count;

@@ -93,6 +93,7 @@ typedef ebpo_status (*ebpo_catalogue_open_fn)(void *user, const char *path, ebpo
  */
 typedef void (*ebpo_catalogue_close_fn)(void *user, ebpo_file *file);
 
+/* Options of ebpo_catalogue_open and ebpo_catalogue_new. */
 typedef struct ebpo_catalogue_options {
     size_t struct_size;
 
@@ -172,6 +173,7 @@ EBPO_API void ebpo_catalogue_free(ebpo_catalogue *catalogue);
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_catalogue_save(const ebpo_catalogue *catalogue,
                                                        const char *path, ebpo_error *error);
 
+/* Properties of a catalogue (ebpo_catalogue_get_facts). */
 typedef struct ebpo_catalogue_facts {
     size_t struct_size;
 
@@ -219,6 +221,7 @@ EBPO_API const ebpo_catalogue_entry *ebpo_catalogue_get_entry(const ebpo_catalog
  */
 typedef struct ebpo_catalogue_models ebpo_catalogue_models;
 
+/* Options of ebpo_catalogue_models_new. */
 typedef struct ebpo_catalogue_models_options {
     size_t struct_size;
 
@@ -265,6 +268,7 @@ EBPO_API void ebpo_catalogue_models_set_memory(ebpo_catalogue_models *models, ui
  */
 EBPO_API void ebpo_catalogue_models_close_idle(ebpo_catalogue_models *models);
 
+/* Statistics of open models (ebpo_catalogue_models_get_stats). */
 typedef struct ebpo_catalogue_models_stats {
     size_t struct_size;
 
@@ -299,6 +303,7 @@ EBPO_API ebpo_status ebpo_catalogue_models_get_stats(ebpo_catalogue_models *mode
  * one that opens files, must not query the same ebpo_catalogue_models.
  */
 
+/* Options of the queries of a catalogue. */
 typedef struct ebpo_catalogue_query_options {
     size_t struct_size;
 

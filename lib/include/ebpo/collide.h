@@ -32,6 +32,7 @@ extern "C" {
 
 /* ---- two models ---- */
 
+/* Options of ebpo_collider_new. */
 typedef struct ebpo_collider_options {
     size_t struct_size;
 
@@ -160,6 +161,7 @@ typedef enum ebpo_relation {
     EBPO_RELATION_UNDECIDED = 6 /* undecided at the deadline */
 } ebpo_relation;
 
+/* Result of ebpo_collide_relation. */
 typedef struct ebpo_relation_result {
     /* ebpo_relation */
     int32_t relation;
@@ -304,6 +306,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_polylines(ebpo_collider *collide
 
 /* ---- as a file ---- */
 
+/* Format of a file of pairs (ebpo_collide_write). */
 typedef enum ebpo_pairs_format {
     /*
      * All pairs and segments in the order of ebpo_collide_all, as HDF5 that version 1.8 and later
@@ -357,6 +360,7 @@ typedef struct ebpo_value_bounds {
     int32_t reserved;
 } ebpo_value_bounds;
 
+/* Options of ebpo_collide_distance, in addition to ebpo_collide_options. */
 typedef struct ebpo_collide_distance_options {
     size_t struct_size;
 
@@ -384,6 +388,7 @@ typedef struct ebpo_collide_distance_options {
         sizeof(ebpo_collide_distance_options), 0, -1, false, { 0 } \
     }
 
+/* Result of ebpo_collide_distance. */
 typedef struct ebpo_collide_distance_result {
     /*
      * Distance of the faces, in the world's unit. 0 if any faces intersect; never negative, also
@@ -459,6 +464,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_depth(ebpo_collider *collider,
 
 /* ---- separation distance along a direction ---- */
 
+/* Result of ebpo_collide_separation. */
 typedef struct ebpo_separation {
     /*
      * The separation distance. EBPO_VALUE_EXACT: the nearest double; after the deadline an interval
@@ -498,6 +504,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_separation(ebpo_collider *collid
 
 /* ---- by levels ---- */
 
+/* Result of ebpo_collide_levels. */
 typedef struct ebpo_level_result {
     /* Common point of both models (solids or faces): 1 certain, 0 certainly none, -1 undecided. */
     int32_t common;
@@ -554,6 +561,7 @@ typedef struct ebpo_self_intersection {
 typedef bool (*ebpo_self_intersections_fn)(void *user, const ebpo_self_intersection *crossings,
                                            uint64_t count);
 
+/* Options of ebpo_mesh_self_intersections. */
 typedef struct ebpo_self_intersections_options {
     size_t struct_size;
 

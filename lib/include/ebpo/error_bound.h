@@ -10,6 +10,7 @@
 extern "C" {
 #endif
 
+/* Options of ebpo_level_error_bound. */
 typedef struct ebpo_error_bound_options {
     size_t struct_size;
 

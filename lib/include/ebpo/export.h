@@ -11,6 +11,7 @@
 extern "C" {
 #endif
 
+/* Format of an exported file. */
 typedef enum ebpo_export_format {
     /*
      * XDMF 3, a spatial collection of grids: each level is a grid of polyhedra with their nodes'
@@ -42,6 +43,7 @@ typedef enum ebpo_export_format {
  */
 EBPO_API const char *ebpo_export_format_name(ebpo_export_format format);
 
+/* Options of ebpo_export. */
 typedef struct ebpo_export_options {
     size_t struct_size;
 
@@ -95,6 +97,7 @@ typedef enum ebpo_export_colours {
     EBPO_EXPORT_OMITTED     /* the format does not support them */
 } ebpo_export_colours;
 
+/* Description of the files that ebpo_export wrote. */
 typedef struct ebpo_export_report {
     size_t struct_size;
 

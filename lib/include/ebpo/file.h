@@ -22,7 +22,7 @@ extern "C" {
 #define EBPO_FORMAT_MAJOR 1
 #define EBPO_FORMAT_MINOR 1
 
-/* Levels 0 to 20. */
+/* Maximum number of levels of a file: levels 0 to 20. */
 #define EBPO_LEVELS_MAX 21
 
 /* ---- contents of a file ---- */
@@ -64,10 +64,11 @@ typedef enum ebpo_part {
     EBPO_PART_SURFACE = 128    /* simplified faces of nodes, with certified errors, for pictures */
 } ebpo_part;
 
+/* Compression of the chunks of a file. */
 typedef enum ebpo_codec {
     EBPO_CODEC_ZSTD = 0,    /* HDF5 filter 32015, frames with checksum */
     EBPO_CODEC_DEFLATE = 1, /* built-in filter of HDF5, needs no plugin; fletcher32 checksum */
-    EBPO_CODEC_NONE = 2
+    EBPO_CODEC_NONE = 2     /* no compression; fletcher32 checksum */
 } ebpo_codec;
 
 /* Coding of the vertex indices of faces (format-spec/README.md, section 9). */
@@ -452,6 +453,7 @@ typedef enum ebpo_chunk_checksums {
     EBPO_CHECKSUMS_NONE = 1     /* not written, as in format 1.0 */
 } ebpo_chunk_checksums;
 
+/* Options for writing a file (ebpo_tree_write, ebpo_file_repack). */
 typedef struct ebpo_write_options {
     size_t struct_size;
 
@@ -489,6 +491,7 @@ typedef struct ebpo_write_options {
     ebpo_chunk_checksums chunk_checksums;
 } ebpo_write_options;
 
+/* Value of subtree_faces for a file without subtrees. */
 #define EBPO_NO_SUBTREES UINT64_MAX
 
 #define EBPO_WRITE_OPTIONS_INIT                                                    \
@@ -844,6 +847,7 @@ EBPO_API void ebpo_file_prefetch_levels(const ebpo_file *file, int first, int la
 
 /* ---- reading ---- */
 
+/* Options for reading parts of a file. */
 typedef struct ebpo_read_options {
     size_t struct_size;
 

@@ -31,6 +31,7 @@ typedef enum ebpo_finding_kind {
     EBPO_FOUND_UNREFERENCED_VERTEX
 } ebpo_finding_kind;
 
+/* Number of kinds. */
 #define EBPO_FINDING_KINDS 10
 
 /*
@@ -49,6 +50,7 @@ EBPO_API const char *ebpo_finding_name(int32_t kind);
  */
 EBPO_API void ebpo_finding_colour(int32_t kind, uint8_t rgb[3]);
 
+/* Component of an unreferenced vertex. */
 #define EBPO_NO_COMPONENT UINT32_MAX
 
 /* One finding. Indices are those of the source. */
@@ -83,6 +85,7 @@ typedef struct ebpo_mesh_finding {
 /* Callback. It returns false to stop the call. */
 typedef bool (*ebpo_findings_fn)(void *user, const ebpo_mesh_finding *finding);
 
+/* Options of ebpo_mesh_findings. */
 typedef struct ebpo_findings_options {
     size_t struct_size;
 

@@ -22,6 +22,7 @@ extern "C" {
  */
 typedef struct ebpo_mesh_groups ebpo_mesh_groups;
 
+/* Description of a group. */
 typedef struct ebpo_mesh_group {
     size_t struct_size;
 

@@ -45,6 +45,7 @@
 extern "C" {
 #endif
 
+/* A proxy, its box of faces and the thread that loads faces. */
 typedef struct ebpo_haptic ebpo_haptic;
 
 /* Kind of the haptic object. Only the step function of this kind is allowed. */
@@ -54,6 +55,7 @@ typedef enum ebpo_haptic_kind {
     EBPO_HAPTIC_TOOL = 2   /* ebpo_haptic_step_tool */
 } ebpo_haptic_kind;
 
+/* Options of ebpo_haptic_new. */
 typedef struct ebpo_haptic_options {
     size_t struct_size;
 
@@ -182,6 +184,7 @@ typedef enum ebpo_haptic_flag {
     EBPO_HAPTIC_STOPPED = 128
 } ebpo_haptic_flag;
 
+/* Result of a haptic step of a ball. */
 typedef struct ebpo_haptic_ball_result {
     /* Centre of the proxy's ball. */
     double proxy[3];

@@ -28,6 +28,7 @@
 extern "C" {
 #endif
 
+/* Options for URLs (ebpo_open_url, ebpo_source_of_url). */
 typedef struct ebpo_http_options {
     size_t struct_size;
 

@@ -10,6 +10,7 @@
 extern "C" {
 #endif
 
+/* Options of ebpo_limit_level. */
 typedef struct ebpo_limit_options {
     size_t struct_size;
 

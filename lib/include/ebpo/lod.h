@@ -11,6 +11,7 @@
 extern "C" {
 #endif
 
+/* Options of ebpo_lod_level and ebpo_lod_level_nodes. */
 typedef struct ebpo_lod_options {
     size_t struct_size;
 

@@ -22,6 +22,7 @@ extern "C" {
 
 /* ---- distances ---- */
 
+/* Options for computing maps. */
 typedef struct ebpo_map_options {
     size_t struct_size;
 
@@ -155,6 +156,7 @@ EBPO_API double ebpo_map_percent(int index);
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_map_describe(const double *values, uint64_t count,
                                                      ebpo_map_stats *out, ebpo_error *error);
 
+/* Options of ebpo_map_bound_hausdorff. */
 typedef struct ebpo_map_hausdorff_options {
     size_t struct_size;
 
@@ -179,6 +181,7 @@ typedef struct ebpo_map_hausdorff_options {
         sizeof(ebpo_map_hausdorff_options), 0.01, 0, 0, 0, { NULL, NULL } \
     }
 
+/* Result of ebpo_map_bound_hausdorff. Lengths are in the model's unit. */
 typedef struct ebpo_map_hausdorff {
     size_t struct_size;
 
@@ -213,6 +216,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_map_bound_hausdorff(
 
 /* ---- colours ---- */
 
+/* Palette by which a distance gets a colour. */
 typedef enum ebpo_map_palette {
     /*
      * Signed: blue inside, orange outside, grey at 0; lightness decreases evenly with distance,
@@ -261,6 +265,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_map_paint(ebpo_mesh *mesh, const double 
 
 /* ---- files ---- */
 
+/* Format of the file of a map. */
 typedef enum ebpo_map_format {
     /*
      * HDF5, as an image of VTKHDF 1.0: /VTKHDF/PointData/distance[count[2]][count[1]][count[0]] of

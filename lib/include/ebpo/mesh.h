@@ -143,6 +143,7 @@ EBPO_API int ebpo_mesh_has_attributes(const ebpo_mesh *mesh);
 
 /* ---- reading and writing ---- */
 
+/* Options of ebpo_mesh_read. */
 typedef struct ebpo_mesh_read_options {
     size_t struct_size;
 
@@ -534,6 +535,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_fill_holes(ebpo_mesh *mesh, ebpo_re
 
 /* ---- all steps in one call ---- */
 
+/* Options of ebpo_mesh_prepare. */
 typedef struct ebpo_prepare_options {
     size_t struct_size;
 
@@ -566,6 +568,7 @@ typedef struct ebpo_prepare_options {
         sizeof(ebpo_prepare_options), false, false, false, 0, { NULL, NULL }, 0, 0, 0 \
     }
 
+/* Result of ebpo_mesh_prepare. */
 typedef struct ebpo_prepared {
     size_t struct_size;
 
@@ -609,6 +612,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_prepare(ebpo_mesh *mesh,
  */
 typedef struct ebpo_components ebpo_components;
 
+/* Description of a component. */
 typedef struct ebpo_component {
     size_t struct_size;
 

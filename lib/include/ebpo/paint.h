@@ -42,6 +42,7 @@
 extern "C" {
 #endif
 
+/* The layers, strokes and notes of one model. */
 typedef struct ebpo_paint ebpo_paint;
 
 /* Maximum numbers of layers, notes, strokes and points in a file. */
@@ -144,6 +145,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_save(const ebpo_paint *paint, cons
  */
 EBPO_API void ebpo_paint_free(ebpo_paint *paint);
 
+/* Properties of a paint (ebpo_paint_get_info). */
 typedef struct ebpo_paint_info {
     size_t struct_size;
 
@@ -303,6 +305,7 @@ typedef struct ebpo_paint_point {
 
 /* ---- notes ---- */
 
+/* A note. Arguments are copied; NULL texts mean "". */
 typedef struct ebpo_paint_note {
     size_t struct_size;
 
@@ -346,11 +349,13 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_remove_note(ebpo_paint *paint, uin
 
 /* ---- strokes ---- */
 
+/* Effect of a stroke. */
 typedef enum ebpo_paint_kind {
     EBPO_PAINT_PAINTS = 0,
     EBPO_PAINT_ERASES = 1 /* removes the paint of earlier strokes of its layer */
 } ebpo_paint_kind;
 
+/* A stroke. Arguments are copied. */
 typedef struct ebpo_paint_stroke {
     size_t struct_size; /* EBPO_PAINT_STROKE_INIT sets it */
 
@@ -414,6 +419,7 @@ typedef struct ebpo_paint_input {
     double time;
 } ebpo_paint_input;
 
+/* Properties of the strokes that ebpo_paint_draw makes. */
 typedef struct ebpo_paint_pen {
     size_t struct_size;
 
@@ -473,6 +479,7 @@ typedef struct ebpo_paint_pen {
         }                                                                              \
     }
 
+/* Statistics of ebpo_paint_draw. */
 typedef struct ebpo_paint_drawn {
     size_t struct_size;
 
@@ -582,6 +589,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_cover(const ebpo_paint *paint, ebp
                                                     void *user, uint64_t *points_outside_subset,
                                                     ebpo_error *error);
 
+/* Statistics of ebpo_paint_bake. */
 typedef struct ebpo_paint_baked {
     size_t struct_size;
 
@@ -650,6 +658,7 @@ typedef struct ebpo_paint_colour_area {
     ebpo_paint_area area;
 } ebpo_paint_colour_area;
 
+/* Result of ebpo_paint_measure. */
 typedef struct ebpo_paint_areas {
     size_t struct_size;
 

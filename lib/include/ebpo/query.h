@@ -54,6 +54,7 @@ typedef enum ebpo_loading {
 /* Memory budget that models share (ebpo_budget_new). */
 typedef struct ebpo_budget ebpo_budget;
 
+/* Options of ebpo_model_new and ebpo_model_memory. */
 typedef struct ebpo_model_options {
     size_t struct_size;
 
@@ -300,6 +301,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_budget_new(uint64_t bytes, ebpo_budget *
  */
 EBPO_API void ebpo_budget_free(ebpo_budget *budget);
 
+/* Statistics of a budget (ebpo_budget_get_stats). */
 typedef struct ebpo_budget_stats {
     size_t struct_size;
 
@@ -365,6 +367,7 @@ typedef enum ebpo_envelopes {
     EBPO_ENVELOPES_SKIP = 2  /* never */
 } ebpo_envelopes;
 
+/* Options of ebpo_inside and ebpo_inside_many. */
 typedef struct ebpo_inside_options {
     size_t struct_size;
 
@@ -393,6 +396,7 @@ typedef struct ebpo_inside_options {
         sizeof(ebpo_inside_options), EBPO_LEVEL_ALL, EBPO_ENVELOPES_AUTO, 0, NULL \
     }
 
+/* Location of a point relative to a model. */
 typedef enum ebpo_where {
     EBPO_OUT = 0,
     EBPO_IN = 1,
@@ -400,6 +404,7 @@ typedef enum ebpo_where {
     EBPO_MAYBE = 3 /* not decided by the level or deadline */
 } ebpo_where;
 
+/* Result of ebpo_inside. */
 typedef struct ebpo_inside_result {
     /* ebpo_where */
     int32_t where;
@@ -483,6 +488,7 @@ typedef enum ebpo_distance_mode {
     EBPO_DISTANCE_ENVELOPE = 3
 } ebpo_distance_mode;
 
+/* Options of ebpo_distance and ebpo_distance_many. */
 typedef struct ebpo_distance_options {
     size_t struct_size;
 
@@ -524,6 +530,7 @@ typedef struct ebpo_distance_options {
 /* Index of no face. */
 #define EBPO_NO_FACE UINT64_MAX
 
+/* Result of ebpo_distance. Lengths are in the model's unit. */
 typedef struct ebpo_distance_result {
     /*
      * Correctly rounded. Negative inside a solid (-0.0 if it underflows), unless unsigned_distance
@@ -573,6 +580,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_distance_many(ebpo_context *context, con
                                                       const ebpo_distance_options *options,
                                                       ebpo_distance_result *out, ebpo_error *error);
 
+/* Options of ebpo_distance_within. */
 typedef struct ebpo_within_options {
     size_t struct_size;
 
@@ -639,6 +647,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_distance_within(ebpo_context *context,
 
 /* ---- rays ---- */
 
+/* A face that a ray hits. */
 typedef struct ebpo_ray_hit {
     /*
      * Parameter of the hit, which is at origin + t direction; correctly rounded. INFINITY with a
@@ -706,6 +715,7 @@ typedef enum ebpo_ray_sides {
     EBPO_RAY_BACK = 2   /* triangles hit along their normal */
 } ebpo_ray_sides;
 
+/* Options of the queries of many rays. */
 typedef struct ebpo_ray_options {
     size_t struct_size;
 

@@ -53,6 +53,7 @@ typedef enum ebpo_doubt {
 EBPO_API uint32_t ebpo_mesh_doubts(double area, const ebpo_mesh_report *report,
                                    const ebpo_repair_record *record);
 
+/* Maximum number of tries. */
 #define EBPO_REPAIR_TRIES 12
 
 /* One sequence of steps that was tried. */
@@ -73,6 +74,7 @@ typedef struct ebpo_repair_try {
     uint32_t steps;
 } ebpo_repair_try;
 
+/* Result of ebpo_mesh_try_repairs. */
 typedef struct ebpo_repairs {
     size_t struct_size;
 

@@ -40,10 +40,12 @@
 extern "C" {
 #endif
 
+/* Models, instances, routes, cameras and rules. */
 typedef struct ebpo_scene ebpo_scene;
 
 /* ---- making ---- */
 
+/* Options of ebpo_scene_open and ebpo_scene_parse. */
 typedef struct ebpo_scene_options {
     size_t struct_size;
 
@@ -130,9 +132,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_add_model(ebpo_scene *scene, const
                                                         const char *path, const uint8_t digest[32],
                                                         uint64_t *number, ebpo_error *error);
 
-/* Index of a route or layer: none. */
+/* Index that stands for no route, no layer or no group. */
 #define EBPO_SCENE_NONE UINT64_MAX
 
+/* An instance of a model. */
 typedef struct ebpo_scene_instance {
     size_t struct_size;
 
@@ -177,6 +180,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_add_instance(ebpo_scene *scene,
 
 /* ---- contents ---- */
 
+/* Counts of a scene (ebpo_scene_get_counts). */
 typedef struct ebpo_scene_counts {
     size_t struct_size;
 
@@ -201,6 +205,7 @@ typedef struct ebpo_scene_counts {
  */
 EBPO_API ebpo_status ebpo_scene_get_counts(const ebpo_scene *scene, ebpo_scene_counts *out);
 
+/* Properties of a model in a scene (ebpo_scene_get_model_facts). */
 typedef struct ebpo_scene_model_facts {
     size_t struct_size;
 
@@ -231,6 +236,7 @@ typedef struct ebpo_scene_model_facts {
 EBPO_API ebpo_status ebpo_scene_get_model_facts(const ebpo_scene *scene, uint64_t model,
                                                 ebpo_scene_model_facts *out);
 
+/* Statistics of the models of a scene (ebpo_scene_get_stats). */
 typedef struct ebpo_scene_stats {
     size_t struct_size;
 
@@ -286,6 +292,7 @@ EBPO_API const char *ebpo_scene_get_group(const ebpo_scene *scene, uint64_t grou
  */
 EBPO_API uint64_t ebpo_scene_group_of(const ebpo_scene *scene, uint64_t instance, uint64_t nth);
 
+/* A perspective camera of a scene (ebpo_scene_get_camera). */
 typedef struct ebpo_scene_camera {
     size_t struct_size;
     const char *name;
@@ -325,6 +332,7 @@ EBPO_API bool ebpo_scene_pair_rule(const ebpo_scene *scene, uint64_t a, uint64_t
 
 /* ---- models ---- */
 
+/* Options of ebpo_scene_load. */
 typedef struct ebpo_load_options {
     size_t struct_size;
 
@@ -448,6 +456,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_pairs(const ebpo_scene *scene, dou
                                                     ebpo_scene_pairs_fn take, void *user,
                                                     ebpo_error *error);
 
+/* Kind of a clash. */
 typedef enum ebpo_clash_kind {
     EBPO_CLASH_NONE = 0,     /* no faces intersect; one instance may be inside the other */
     EBPO_CLASH_NEAR = 1,     /* no faces intersect, but some are nearer than the clearance */
@@ -519,6 +528,7 @@ typedef struct ebpo_scene_clash {
 /* Callback that gets clashes, valid until it returns. It returns false to stop the call. */
 typedef bool (*ebpo_scene_clashes_fn)(void *user, const ebpo_scene_clash *clashes, uint64_t count);
 
+/* Options of ebpo_scene_find_clashes. */
 typedef struct ebpo_scene_clash_options {
     size_t struct_size;
 
@@ -683,6 +693,7 @@ typedef struct ebpo_scene_approach_result {
 typedef bool (*ebpo_scene_approaches_fn)(void *user, const ebpo_scene_approach_result *results,
                                          uint64_t count);
 
+/* Options of ebpo_scene_approach and ebpo_scene_least_distances. */
 typedef struct ebpo_scene_approach_options {
     size_t struct_size;
 
@@ -758,6 +769,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_least_distances(
 
 /* ---- subsets ---- */
 
+/* Queries that a packed scene must support. */
 typedef enum ebpo_scene_purpose {
     /* ebpo_scene_find_clashes and ebpo_scene_approach; results have the face indices of the source.
      */
@@ -777,6 +789,7 @@ typedef enum ebpo_scene_purpose {
     EBPO_SCENE_FOR_SOLIDS = 3
 } ebpo_scene_purpose;
 
+/* Options of ebpo_scene_plan. */
 typedef struct ebpo_plan_options {
     size_t struct_size;
 
@@ -856,6 +869,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_plan(ebpo_scene *scene, double fro
                                                    ebpo_scene_needs_fn take, void *user,
                                                    ebpo_error *error);
 
+/* Options of ebpo_scene_pack. */
 typedef struct ebpo_pack_options {
     size_t struct_size;
 

@@ -16,6 +16,7 @@
 extern "C" {
 #endif
 
+/* Options of ebpo_stream_new. */
 typedef struct ebpo_stream_options {
     size_t struct_size;
 
@@ -96,6 +97,7 @@ typedef struct ebpo_stream_node {
     uint32_t coloured;
 } ebpo_stream_node;
 
+/* Properties of a level that a stream has read. */
 typedef struct ebpo_stream_level {
     int level;
 
@@ -121,6 +123,7 @@ typedef struct ebpo_stream_level {
     double volume;
 } ebpo_stream_level;
 
+/* Reads the levels of one file. */
 typedef struct ebpo_stream ebpo_stream;
 
 /*

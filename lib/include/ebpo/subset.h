@@ -44,6 +44,7 @@ typedef enum ebpo_profile {
  */
 EBPO_API uint32_t ebpo_profile_parts(ebpo_profile profile);
 
+/* Options of ebpo_subset. */
 typedef struct ebpo_subset_options {
     size_t struct_size;
 

@@ -23,6 +23,7 @@ extern "C" {
 
 /* ---- opening ---- */
 
+/* Options of ebpo_subtree_open. */
 typedef struct ebpo_subtree_options {
     size_t struct_size;
 

@@ -18,6 +18,7 @@ typedef struct ebpo_verify_count {
     char first[240];
 } ebpo_verify_count;
 
+/* Result of ebpo_verify, by kind of check. */
 typedef struct ebpo_verify_report {
     size_t struct_size;
 
@@ -66,6 +67,7 @@ typedef struct ebpo_verify_report {
 
 #define EBPO_VERIFY_REPORT_INIT EBPO_SIZED(ebpo_verify_report)
 
+/* Options of ebpo_verify. */
 typedef struct ebpo_verify_options {
     size_t struct_size;
 

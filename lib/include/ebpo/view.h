@@ -84,6 +84,7 @@ typedef enum ebpo_unseen {
     EBPO_UNSEEN_NEVER = 1 /* never refined */
 } ebpo_unseen;
 
+/* Options of ebpo_view_stream_new and ebpo_view_stream_change. */
 typedef struct ebpo_view_options {
     size_t struct_size;
 
@@ -153,6 +154,7 @@ typedef struct ebpo_view_options {
         }                                                                          \
     }
 
+/* A node that a view has delivered. */
 typedef struct ebpo_view_node {
     ebpo_stream_node node;
 
@@ -180,6 +182,7 @@ typedef struct ebpo_view_node {
     double pixels;
 } ebpo_view_node;
 
+/* Result of ebpo_view_stream_next: a node, or the reason why there is none. */
 typedef enum ebpo_view_end {
     EBPO_VIEW_NODE = 0,  /* a node was delivered */
     EBPO_VIEW_DONE = 1,  /* all nodes that the options select were delivered */
@@ -187,6 +190,7 @@ typedef enum ebpo_view_end {
     EBPO_VIEW_NODES = 3  /* the next nodes would exceed options.nodes */
 } ebpo_view_end;
 
+/* Streams the nodes of one file for an observer. */
 typedef struct ebpo_view_stream ebpo_view_stream;
 
 /*
@@ -285,6 +289,7 @@ typedef bool (*ebpo_view_visit_fn)(void *user, const ebpo_view_node *node);
  */
 EBPO_API void ebpo_view_stream_cut(ebpo_view_stream *stream, ebpo_view_visit_fn visit, void *user);
 
+/* Statistics of a view (ebpo_view_stream_get_stats). */
 typedef struct ebpo_view_stats {
     size_t struct_size;
 

@@ -28,6 +28,7 @@ typedef struct ebpo_workspace ebpo_workspace;
 /* Minimum budget, in bytes. */
 enum { EBPO_WORKSPACE_MIN = 128000000 };
 
+/* Options of ebpo_workspace_new. */
 typedef struct ebpo_workspace_options {
     size_t struct_size;
 
