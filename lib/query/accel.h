@@ -27,24 +27,28 @@ typedef enum ebpo_leaf_kind {
                             * (one that no face intersects) */
     EBPO_LEAF_CLAIMED = 6, /* a thread is finding its free cell face and the boxes of its list */
     EBPO_LEAF_BOUNDED = 7, /* cell face and boxes are known: treated as a general leaf */
-    EBPO_LEAF_SORTED = 8   /* as EBPO_LEAF_BOUNDED, and a thread is finding the kind */
+    EBPO_LEAF_SORTED = 8   /* as EBPO_LEAF_BOUNDED, while a thread is finding the kind */
 } ebpo_leaf_kind;
-/* Finding a free cell face takes as long as one query, finding the kind as long as dozens of
- * queries. Each is done after this number of queries. */
+/* Finding a free cell face takes as long as one query; finding the kind takes as long as dozens of
+ * queries. So each is done only after this number of queries in the leaf. */
 enum { EBPO_LEAF_CELL_FACE_QUERIES = 1, EBPO_LEAF_KIND_QUERIES = 128 };
-/* Values of `cell_face` without a free cell face. In a surface, points of leaves near the border
- * are decided one by one (holes.h). EBPO_NEAR_CAPS: also, a cap of the border touches the leaf. */
-enum { EBPO_NO_CELL_FACE = 6, EBPO_NEAR_BORDER = 7, EBPO_NEAR_CAPS = 8, EBPO_KIND_PLANES_MAX = 16 };
+/* Values of `cell_face` without a free cell face. EBPO_NEAR_BORDER: the leaf of a surface is near
+ * the border (the edges of holes), so points in it are decided one by one (holes.h).
+ * EBPO_NEAR_CAPS: in addition, a cap (faces that close a hole) touches the leaf. */
+enum { EBPO_NO_CELL_FACE = 6, EBPO_NEAR_BORDER = 7, EBPO_NEAR_CAPS = 8 };
+/* A leaf with more planes is of the general kind. */
+enum { EBPO_KIND_PLANES_MAX = 16 };
 
-/* A block in a leaf's list. Bits 0 to 28 are the block's number. Bit 29 is set in the last entry of
- * the leaf. Bits 32 to 39 are the lanes that the leaf lists, as other faces may share the block.
- * Bits 40 to 63 are a box around these faces in the cell, set in state EBPO_LEAF_BOUNDED: for each
- * axis four bits for the lower side and four bits for 15 minus the upper side, in sixteenths of the
- * cell, rounded outward. */
+/* An entry of a leaf's list: a block. Bits 0 to 28 are the block's number. Bit 29 is set in the
+ * last entry of the leaf. Bits 32 to 39 are the lanes that the leaf lists, as the block may have
+ * other faces too. Bits 40 to 63 are a box around the listed faces in the cell: for each axis four
+ * bits for the lower side and four bits for 15 minus the upper side, in sixteenths of the cell
+ * (EBPO_LISTED_CELLS), rounded outward. They are 0 until ebpo_leaf_is_bounded. */
 typedef _Atomic uint64_t ebpo_listed_block;
 enum { EBPO_LISTED_CELLS = 16, EBPO_LISTED_BOX = 40, EBPO_LISTED_LANES = 32 };
 #define EBPO_LISTED_LAST (UINT64_C(1) << 29)
 
+/* Load and store an entry. */
 static inline uint64_t ebpo_listed(const ebpo_listed_block *b)
 {
     return atomic_load_explicit(b, memory_order_relaxed);
@@ -56,13 +60,14 @@ static inline void ebpo_list(ebpo_listed_block *b, uint64_t listed)
 static inline uint32_t ebpo_listed_number(uint64_t b) { return b & (EBPO_LISTED_LAST - 1); }
 static inline unsigned ebpo_listed_lanes(uint64_t b) { return b >> EBPO_LISTED_LANES & 255; }
 
-/* A leaf. The results of ebpo_leaf_query are valid once `kind` has the corresponding value, and do
- * not change then. */
+/* A leaf. ebpo_leaf_query sets `rows`, `cell_face` and `cell_face_step` and then `kind`. They are
+ * valid once `kind` has the corresponding value, and do not change afterwards. */
 typedef struct ebpo_accel_leaf {
-    uint32_t list;           /* the leaf's blocks begin at list[list] of the subtree */
-    int32_t winding;         /* winding number at the lowest corner, shifted (format-spec, section
-                              * 10) */
-    uint32_t rows;           /* for kinds other than general: EBPO_KIND_ROW */
+    uint32_t list;   /* the leaf's blocks begin at list[list] of the subtree */
+    int32_t winding; /* winding number at the lowest corner, shifted (format-spec, section
+                      * 10) */
+    uint32_t
+        rows; /* if ebpo_leaf_has_planes: number of the first row of its planes (EBPO_KIND_ROW) */
     _Atomic uint8_t kind;    /* ebpo_leaf_kind; for surfaces always EBPO_LEAF_GENERAL */
     _Atomic uint8_t queries; /* approximate number of queries until the kind is known */
     /* 2 axis + side (1: upper) of a cell face that no face intersects, or EBPO_NO_CELL_FACE,
@@ -71,27 +76,27 @@ typedef struct ebpo_accel_leaf {
     int8_t cell_face_step; /* winding number on that cell face minus that at the lowest corner */
 } ebpo_accel_leaf;
 
-/* Returns true if the free cell face and the boxes of the list may be read. If false, the leaf is
- * treated as a general one. */
+/* Returns true if `cell_face` and the boxes of the list may be read. */
 static inline bool ebpo_leaf_is_bounded(ebpo_leaf_kind kind)
 {
     return kind != EBPO_LEAF_UNKNOWN && kind != EBPO_LEAF_CLAIMED;
 }
 
-/* A row of a leaf's planes. The first row has the winding numbers. Then come four rows for each
- * four planes n . xi - d, in the cell's coordinates (0 .. 1 on each axis): n0 of all four planes,
- * n1, n2, d.
- * |n0| + |n1| + |n2| = 1; for values beyond EBPO_PLANE_ERROR the sign is certain. */
+/* A row of a leaf's planes. The first row has the winding numbers. Then each group of four planes
+ * has four rows: n0 of all four planes, n1, n2, d. With xi in the cell's coordinates (0 .. 1 on
+ * each axis), a plane's value is n . xi - d, where |n0| + |n1| + |n2| = 1. The sign of a value is
+ * certain if its absolute value exceeds EBPO_PLANE_ERROR. */
 typedef union ebpo_kind_row {
     float of_four[4];
     struct {
-        int32_t inner, outer; /* winding number below all planes; elsewhere in the cell */
-        uint32_t fours;       /* number of groups of four planes; the last is padded */
-    } says;
+        int32_t inner,
+            outer;      /* winding numbers: where all values are negative; elsewhere in the cell */
+        uint32_t fours; /* number of groups of four planes; the last repeats the first plane */
+    } head;
 } ebpo_kind_row;
 #define EBPO_PLANE_ERROR 0x1p-19f
 
-/* Kinds found so far for a subtree's leaves. Rows are stored in pages. A row's number consists of
+/* Planes of a subtree's leaves, found so far. Rows are stored in pages. A row's number consists of
  * the page's number and the row's number within the page. */
 enum { EBPO_KIND_PAGES = 23, EBPO_KIND_PAGE_BITS = 27 };
 #define EBPO_NO_ROWS UINT32_MAX
@@ -100,10 +105,11 @@ typedef struct ebpo_leaf_kinds {
                            * lock */
     ebpo_kind_row *page[EBPO_KIND_PAGES];
     uint32_t pages;
-    uint64_t used, space;                       /* used rows and capacity of the last page */
-    _Atomic uint64_t rows;                      /* rows in all pages */
-    uint64_t rows_max;                          /* leaves beyond this limit stay general */
-    _Atomic uint64_t of_kind[5], one_cell_face; /* leaves whose kind is known */
+    uint64_t used, space;           /* used rows and capacity of the last page */
+    _Atomic uint64_t rows;          /* capacity of all pages, in rows */
+    uint64_t rows_max;              /* maximum of `rows`; leaves beyond this limit stay general */
+    _Atomic uint64_t of_kind[5];    /* numbers of leaves of each kind, if known */
+    _Atomic uint64_t one_cell_face; /* number of leaves of the general kind with a free cell face */
 } ebpo_leaf_kinds;
 #define EBPO_KIND_ROW(kinds, number)                  \
     ((kinds)->page[(number) >> EBPO_KIND_PAGE_BITS] + \
@@ -142,18 +148,17 @@ enum { EBPO_BLOCKS_MAX = 1 << 29 };
 
 /* --- bounding hierarchy over the blocks --- */
 
-/* Eight children and their boxes in steps of 8 bits: on axis k from origin + step * low to origin +
- * step * high, in the subtree's frame: (x - centre) * scale, about -1 .. 1 (farther where listed
- * faces extend beyond the cell). The boxes are enlarged by the rounding errors of single precision:
- * docs/develop/bounds.md. */
+/* A node: at most eight children and their boxes, with sides of 8 bits: on axis k from origin +
+ * step * low to origin + step * high, in the subtree's frame. The frame's coordinates are (x -
+ * centre) * scale, about -1 .. 1 (greater where listed faces extend beyond the cell). The boxes are
+ * enlarged by the rounding errors of single precision (docs/develop/bounds.md). */
 typedef struct ebpo_bound {
     _Alignas(64) float origin[3];
     float step[3];
     uint8_t low[3][8], high[3][8];
     uint32_t child[8]; /* number of a node, or of a block with EBPO_IS_BLOCK */
-    /* Bounding cylinders are tested only by searches whose squared limit is above this value. For
-     * others, the node is large compared with the search, and cylinders exclude hardly any child.
-     */
+    /* Searches test bounding cylinders only if their squared limit exceeds this value. If it does
+     * not, the node is large compared with the search, and cylinders exclude hardly any child. */
     float cylinder_limit2;
     uint32_t parent; /* number of a node; 0 for the top */
     uint8_t count;   /* number of children, which are in the first lanes */
@@ -162,7 +167,8 @@ typedef struct ebpo_bound {
 #define EBPO_IS_BLOCK UINT32_C(0x80000000)
 #define EBPO_NO_CHILD UINT32_MAX
 
-/* Two sides of a child's box, decoded: exact to 2^-52 of the greater of origin and side. */
+/* The sides of a child's box on one axis, decoded, with an error of 2^-52 of the greater of origin
+ * and side. */
 typedef struct ebpo_bound_sides {
     double low, high;
 } ebpo_bound_sides;
@@ -173,13 +179,11 @@ static inline ebpo_bound_sides ebpo_bound_side(const ebpo_bound *b, int lane, in
                                origin + step * b->high[axis][lane] };
 }
 
-/* Bounding cylinder of a curved sheet. It separates the sheet's distance from the distance of
- * neighbouring sheets. With x a point of the child relative to the middle of its decoded box, and
- * a = axis / 2^15,
- *   along_step * from <= x . a <= along_step * to,
- *   x . x - (x . a)^2 <= (aside_step * radius)^2.
- * Values have 16 bits: with 8 bits, the error of the axis would be as large as the thickness of
- * curved sheets, and a fifth more blocks would be visited. */
+/* Bounding cylinders of a node's children. Cylinders of neighbouring layers of a curved surface
+ * overlap less than boxes. With x a point of the child relative to the middle of the child's
+ * decoded box, and a = axis / 2^15, along_step * from <= x . a <= along_step * to, x . x - (x .
+ * a)^2 <= (aside_step * radius)^2. Values have 16 bits: with 8 bits, the error of the axis would be
+ * as large as the thickness of cylinders, and a fifth more blocks would be visited. */
 typedef struct ebpo_bound_cylinder {
     _Alignas(64) int16_t axis[3][8];
     int16_t from[8], to[8], radius[8];
@@ -202,7 +206,7 @@ static inline ebpo_child_cylinder ebpo_bound_cylinder_of(const ebpo_bound_cylind
 }
 
 typedef struct ebpo_accel {
-    ebpo_node root;
+    ebpo_node root;                /* root of the subtree */
     ebpo_box box;                  /* box of the whole model */
     int deepest;                   /* level of the tree's deepest nodes */
     bool has_windings, has_planes; /* has_windings: a solid, or a surface with its border */
@@ -229,7 +233,7 @@ typedef struct ebpo_accel {
     uint32_t shared_count;
     uint32_t *shared;      /* file indices of the shared faces, which are owned by other subtrees */
     uint64_t first_face;   /* file index of an owned face: first_face + local - shared_count */
-    uint32_t *face_source; /* [local] or NULL */
+    uint32_t *face_source; /* [local] index of each face in the source; NULL: as in the file */
     /* codes of gray nodes' planes, in the order of group numbers; only for subtrees loaded on
      * demand */
     uint32_t *gray_planes;
@@ -241,8 +245,8 @@ typedef struct ebpo_accel {
     uint64_t bytes;
 } ebpo_accel;
 
-/* Sets the boxes of a leaf's list. Returns the cell faces that the leaf's faces reach, a bit for
- * each: 2 axis + side (1: upper). A function of ebpo_inside_kernels. */
+/* Sets the boxes of a leaf's list. Returns a bit for each cell face that the leaf's faces intersect
+ * or may intersect: bit 2 * axis + side (1: upper). A function of ebpo_inside_kernels. */
 typedef unsigned ebpo_cell_faces_fn(const ebpo_accel *subtree, ebpo_listed_block *list,
                                     ebpo_cell cell);
 
@@ -284,7 +288,7 @@ void ebpo_accel_estimate_whole(const ebpo_info *info, uint64_t *keep, uint64_t *
 void ebpo_accel_estimate_subtree(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
                                  uint64_t *peak);
 /* Returns the average bytes of ordinary subtrees, from their number and the counts `all` of all
- * subtrees together. This estimate is closer still, and only slightly too high. */
+ * subtrees together. The result is only slightly too high, and lower than the estimates above. */
 uint64_t ebpo_accel_mean_bytes(const ebpo_slice_size *all, const ebpo_info *info,
                                uint64_t subtrees);
 
@@ -296,6 +300,7 @@ ebpo_node ebpo_accel_child(const ebpo_accel *subtree, const ebpo_node *gray, uns
 /* For cursors (geometry/cursor.h); the cursor's holder is an ebpo_accel. */
 extern const ebpo_node_source ebpo_accel_source;
 
+/* Returns the record of a block. */
 static inline const ebpo_meshlet *ebpo_accel_meshlet(const ebpo_accel *s, uint32_t block)
 {
     return (const void *)(s->meshlets + (uint64_t)block * EBPO_MESHLET_UNIT);
@@ -311,13 +316,14 @@ static inline const double *ebpo_meshlet_doubles(const ebpo_meshlet *m)
     return (const void *)((const char *)m + EBPO_MESHLET_WIDE);
 }
 
+/* Returns the index, in the block, of the vertex at a corner of a face. */
 static inline unsigned ebpo_meshlet_vertex(const ebpo_meshlet *m, unsigned lane, unsigned corner)
 {
     return m->vertices > EBPO_MESHLET_SHARED ? EBPO_BLOCK * corner + lane
                                              : m->corner[corner] >> 4 * lane & 15;
 }
 
-/* Returns the local number of a slot's face; EBPO_NO_SLOT: the slot is empty. */
+/* Returns the local index of a slot's face, or EBPO_NO_SLOT if the slot is empty. */
 static inline uint32_t ebpo_accel_slot_face(const ebpo_accel *s, uint32_t slot)
 {
     const ebpo_meshlet *m = ebpo_accel_meshlet(s, slot / EBPO_BLOCK);
@@ -335,6 +341,7 @@ static inline void ebpo_accel_triangle(const ebpo_accel *s, uint32_t slot, doubl
     }
 }
 
+/* Returns the face's index in the file. */
 static inline uint64_t ebpo_accel_file_face(const ebpo_accel *s, uint32_t local)
 {
     return local < s->shared_count ? s->shared[local] : s->first_face + (local - s->shared_count);
@@ -347,7 +354,7 @@ static inline void ebpo_accel_fetch_face(const ebpo_accel *s, uint32_t local)
         __builtin_prefetch(&s->face_source[local]);
 }
 
-/* Returns the face number that callers get. */
+/* Returns the face's index in the source, or in the file if it has no source indices. */
 static inline uint64_t ebpo_accel_source_face(const ebpo_accel *s, uint32_t local)
 {
     return s->face_source ? s->face_source[local] : ebpo_accel_file_face(s, local);

@@ -5,9 +5,10 @@
  * blocks (block_bounds.c), child tables and leaf records (here). Leaf kinds are found later
  * (leaf_kinds.c).
  *
- * Memory is estimated from counts, before anything is read. Three parts use bounds that hold for
- * ordinary models only: blocks, the hierarchy over them, and faces across a subtree's border.
- * ebpo_accel_make_within and ebpo_slice_read_within refuse models that exceed these bounds. */
+ * Memory is estimated from counts, before anything is read. Three estimates hold for ordinary
+ * models only: those of blocks, of the hierarchy over blocks, and of the faces that a subtree
+ * shares with other subtrees. ebpo_accel_make_within and ebpo_slice_read_within refuse models that
+ * exceed these estimates. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -26,8 +27,9 @@
 
 /* --- memory --- */
 
-/* Returns the maximum number of entries of leaves' lists. Each reference is one entry. A leaf with
- * more than eight new faces has them in at most 2 n / 9 blocks, a leaf with fewer in one block. */
+/* Returns the maximum number of entries of leaves' lists. Each reference (a face that an earlier
+ * leaf lists, too) takes at most one entry. The n new faces of a leaf are in one block if n is at
+ * most 8, else in at most 2 n / 9 blocks. */
 static inline uint64_t list_max(uint64_t refs, uint64_t leaves, uint64_t faces)
 {
     return refs + leaves + faces / 9 * 2 + 2;
@@ -37,12 +39,12 @@ static inline uint64_t list_max(uint64_t refs, uint64_t leaves, uint64_t faces)
  * squares and cubes stay far from overflow and underflow. */
 static bool accel_needs_doubles(const ebpo_info *info)
 {
-    double most = 0;
+    double greatest = 0;
     for (int k = 0; k < 3; k++)
-        most = fmax(most,
-                    fmax(fabs(info->box_origin[k]), fabs(info->box_origin[k] + info->box_size[k])));
-    double least = fmin(info->box_size[0], fmin(info->box_size[1], info->box_size[2]));
-    return info->double_coordinates || !(most < 0x1p40) || !(least > 0x1p-40);
+        greatest = fmax(greatest, fmax(fabs(info->box_origin[k]),
+                                       fabs(info->box_origin[k] + info->box_size[k])));
+    double shortest = fmin(info->box_size[0], fmin(info->box_size[1], info->box_size[2]));
+    return info->double_coordinates || !(greatest < 0x1p40) || !(shortest > 0x1p-40);
 }
 
 static uint64_t greater_of(uint64_t a, uint64_t b) { return a > b ? a : b; }
@@ -50,20 +52,24 @@ static uint64_t lesser_of(uint64_t a, uint64_t b) { return a < b ? a : b; }
 
 /* --- sizes from counts --- */
 
+/* Counts of what a subtree or the whole model has. */
 typedef struct counts {
     uint64_t groups, leaves, refs, uniform, planes, leaf_planes;
     uint64_t faces, shared, vertices; /* faces include the shared ones */
-    bool below;                       /* true for a subtree, false for the whole model */
+    bool is_subtree;                  /* false: the whole model */
     bool keeps_planes;
 } counts;
 
 /* Sizes in bytes, computed from counts. */
 typedef struct sizes {
     uint64_t levels, mesh, maps, shared; /* sizes of the parts of the slice */
-    uint64_t only_read; /* memory that is needed only while reading, not for a slice
-                         * in memory */
-    uint64_t nodes, list, planes, rows, slots;
-    uint64_t reserve;
+    uint64_t only_read;                  /* memory that is needed only while the slice is read */
+    uint64_t nodes;                      /* child tables and leaf records */
+    uint64_t list;                       /* lists of all leaves */
+    uint64_t planes;                     /* plane codes of gray nodes */
+    uint64_t rows;                       /* planes of leaves (ebpo_kind_row) */
+    uint64_t slots;                      /* slot of each face, while nodes are filled */
+    uint64_t reserve;                    /* for threads and small allocations */
 } sizes;
 
 static bool has_windings(const ebpo_info *info)
@@ -71,15 +77,16 @@ static bool has_windings(const ebpo_info *info)
     return info->solid || info->parts & EBPO_PART_BORDER;
 }
 
+/* Returns the bytes of the grid that skips the first levels of a whole model: 5 for each cell. */
 static uint64_t grid_bytes(uint64_t groups)
 {
     int bits = ebpo_node_grid_bits(groups);
     return bits ? (UINT64_C(1) << 3 * bits) * 5 : 0;
 }
 
-/* Returns the bytes of corner references to vertices of faces before the subtree: from shared faces
- * and their neighbours. */
-static uint64_t border_bytes(const counts *c) { return ebpo_compact_bytes(6 * c->shared); }
+/* Returns the bytes of the table of older vertices, which faces before the subtree use first
+ * (slice.c): at most six for each shared face, in ordinary models. */
+static uint64_t older_vertices_bytes(const counts *c) { return ebpo_compact_bytes(6 * c->shared); }
 
 static sizes sizes_of(const counts *c, const ebpo_info *info)
 {
@@ -90,15 +97,15 @@ static sizes sizes_of(const counts *c, const ebpo_info *info)
         .mesh = 12 * c->faces + 3 * coordinate * c->vertices,
         .maps = maps * c->faces,
         .shared = 4 * c->shared,
-        .only_read =
-            c->below ? border_bytes(c) : maps * c->vertices + c->leaves + 4 * c->leaf_planes,
-        .nodes = c->groups * 32 + (c->below ? 0 : grid_bytes(c->groups)) +
+        .only_read = c->is_subtree ? older_vertices_bytes(c)
+                                   : maps * c->vertices + c->leaves + 4 * c->leaf_planes,
+        .nodes = c->groups * 32 + (c->is_subtree ? 0 : grid_bytes(c->groups)) +
                  c->leaves * sizeof(ebpo_accel_leaf),
         .list = list_max(c->refs, c->leaves, c->faces) * sizeof(ebpo_listed_block),
         .planes = c->keeps_planes ? 4 * (c->groups + 1 + c->planes) : 0,
-        .rows = c->below && has_windings(info) ? c->leaves * sizeof(ebpo_kind_row) : 0,
+        .rows = c->is_subtree && has_windings(info) ? c->leaves * sizeof(ebpo_kind_row) : 0,
         .slots = 4 * c->faces,
-        .reserve = c->below ? 1 << 14 : 3 << 16,
+        .reserve = c->is_subtree ? 1 << 14 : 3 << 16,
     };
 }
 
@@ -124,7 +131,7 @@ static counts counts_of_slice(const ebpo_slice *slice, bool with_planes)
     counts c = { .faces = slice->mesh.face_count,
                  .shared = slice->shared_count,
                  .vertices = slice->mesh.vertex_count,
-                 .below = slice->root.cell.level > 0,
+                 .is_subtree = slice->root.cell.level > 0,
                  .keeps_planes = with_planes };
     for (int i = 0; i < slice->level_count; i++) {
         const ebpo_level *level = &slice->level[i];
@@ -137,9 +144,9 @@ static counts counts_of_slice(const ebpo_slice *slice, bool with_planes)
     return c;
 }
 
-/* Estimates counts. The number of faces across a subtree's border is about three times the square
- * root of its number of faces. Here it is `roots` times that root plus `more`, and at most the
- * number of listed faces. */
+/* Estimates the counts of a subtree. In ordinary models, the number of shared faces is about three
+ * times the square root of the number of owned faces. The estimate is `roots` times this root plus
+ * `more`, and at most the number of references. */
 static counts counts_of_size(const ebpo_slice_size *size, const ebpo_info *info, double roots,
                              uint64_t more)
 {
@@ -155,44 +162,46 @@ static counts counts_of_size(const ebpo_slice_size *size, const ebpo_info *info,
                      .faces = faces,
                      .shared = shared,
                      .vertices = greater_of(vertices, (uint64_t)(1.25 * of_face * (double)faces)),
-                     .below = true,
+                     .is_subtree = true,
                      .keeps_planes = size->planes > 0 };
 }
 
-/* --- sizes found while making --- */
+/* --- sizes that are known once blocks are made --- */
 
-typedef struct found {
-    uint64_t blocks, bounds, units;
-} found;
+typedef struct block_sizes {
+    uint64_t blocks, bounds, units; /* numbers of blocks, nodes of the hierarchy, and units */
+} block_sizes;
 
-static found default_model(const counts *c, const ebpo_info *info)
+/* Returns upper bounds for ordinary models. */
+static block_sizes ordinary_sizes(const counts *c, const ebpo_info *info)
 {
     uint64_t bytes = c->faces * (accel_needs_doubles(info) ? 56 : 32);
-    return (found){ .blocks = c->faces / 4 + 16,
-                    .bounds = c->faces / 16 + 16,
-                    .units = bytes / EBPO_MESHLET_UNIT + 64 };
+    return (block_sizes){ .blocks = c->faces / 4 + 16,
+                          .bounds = c->faces / 16 + 16,
+                          .units = bytes / EBPO_MESHLET_UNIT + 64 };
 }
 
-static uint64_t kept_bytes(const sizes *t, const found *f)
+static uint64_t kept_bytes(const sizes *t, const block_sizes *f)
 {
     return sizeof(ebpo_accel) + sizeof(ebpo_leaf_kinds) + t->maps + t->shared + t->nodes + t->list +
            t->planes + t->rows + (f->units + 1) * EBPO_MESHLET_UNIT +
            (f->bounds + 1) * (sizeof(ebpo_bound) + sizeof(ebpo_bound_cylinder));
 }
 
-/* Returns the maximum memory while an accel is made. Beside all memory that is kept later, there
- * are first the mesh and the data of blocks, then extents, then the nodes. Arrays of a layout may
- * be half empty, as they grow by half of their size. The memory for decoding a whole model with one
- * thread is added. The layout of a refused model fits into this maximum, too: it takes 12 bytes for
- * each block and 60 for each bound, has at most as many blocks as faces, and 7 bounds for 13
- * blocks. (join_parts wraps at least five members first, then four, three, two, two ..) With 8
- * bytes a face to number the faces, this is below the 56 bytes a face of ordinary records, bounds
- * and layout. */
-static uint64_t peak_bytes(const sizes *t, const found *f)
+/* Returns the maximum memory while an accel is made. Beside the memory that is kept, there are
+ * first the mesh and the corners of blocks, then extents, then the nodes; and the layout, whose
+ * arrays may be half empty, as they grow by half of their size.
+ *
+ * The layout of a refused model fits into this maximum, too. It takes 12 bytes for each block and
+ * 60 for each bound (node of the hierarchy). There are at most as many blocks as faces, and 7
+ * bounds for 13 blocks, because join_parts (blocks.c) wraps at least five members first, then four,
+ * three, two, two ... With the 8 bytes for each face in renumber_blocks, this is less than the
+ * 56 bytes a face that ordinary records, bounds and layouts take. */
+static uint64_t peak_bytes(const sizes *t, const block_sizes *f)
 {
-    enum { LAYOUT_BLOCK = 16, LAYOUT_BOUND = 60, FOUND = 25, EXTENT = 72 };
+    enum { LAYOUT_BLOCK = 16, LAYOUT_BOUND = 60, CORNERS = 25, EXTENT = 72 }; /* bytes of each */
     uint64_t layout = f->blocks * LAYOUT_BLOCK + f->bounds * LAYOUT_BOUND,
-             early = t->mesh + f->blocks * FOUND, extents = (f->blocks + f->bounds) * EXTENT,
+             early = t->mesh + f->blocks * CORNERS, extents = (f->blocks + f->bounds) * EXTENT,
              late = t->nodes + t->list, after = t->nodes + t->list + t->planes + t->rows,
              kept = kept_bytes(t, f) - after,
              read = t->levels + t->mesh + t->shared + t->maps + t->only_read;
@@ -207,7 +216,7 @@ void ebpo_accel_estimate_whole(const ebpo_info *info, uint64_t *keep, uint64_t *
 {
     counts c = counts_of_all(info);
     sizes t = sizes_of(&c, info);
-    found f = default_model(&c, info);
+    block_sizes f = ordinary_sizes(&c, info);
     *keep = kept_bytes(&t, &f);
     *peak = peak_bytes(&t, &f);
 }
@@ -217,13 +226,13 @@ void ebpo_accel_estimate_subtree(const ebpo_slice_size *size, const ebpo_info *i
 {
     counts c = counts_of_size(size, info, 8, 64);
     sizes t = sizes_of(&c, info);
-    found f = default_model(&c, info);
+    block_sizes f = ordinary_sizes(&c, info);
     *keep = kept_bytes(&t, &f);
     *peak = peak_bytes(&t, &f);
 }
 
-/* Uses averages: blocks and the hierarchy are fuller than the proven minimum, and a leaf's list has
- * one entry of a block for several faces. */
+/* Uses averages: blocks and nodes of the hierarchy are fuller than the proven minimum, and an entry
+ * of a leaf's list has several faces. */
 uint64_t ebpo_accel_mean_bytes(const ebpo_slice_size *all, const ebpo_info *info, uint64_t subtrees)
 {
     uint64_t n = subtrees ? subtrees : 1;
@@ -235,15 +244,15 @@ uint64_t ebpo_accel_mean_bytes(const ebpo_slice_size *all, const ebpo_info *info
     counts c = counts_of_size(&mean, info, 3.5, 2);
     sizes t = sizes_of(&c, info);
     uint64_t bytes = c.faces * (accel_needs_doubles(info) ? 48 : 27);
-    found f = { .units = bytes / EBPO_MESHLET_UNIT + 4, .bounds = c.faces / 24 + 1 };
+    block_sizes f = { .units = bytes / EBPO_MESHLET_UNIT + 4, .bounds = c.faces / 24 + 1 };
     t.list = ((c.refs + c.leaves) / 2 + c.faces / 16 + 4) * sizeof(ebpo_listed_block);
     return kept_bytes(&t, &f);
 }
 
-/* Blocks are at least half full, except the only block of a leaf with few faces whose neighbours
- * fill theirs. The 64 bytes for each leaf cover the excess of such blocks and the planes in a
- * subtree. Lists have at most one block for each listed face. A record has at most three vertices a
- * face, or four if it has space for more than 16. */
+/* Blocks are at least half full, except the only block of a leaf with few faces if the neighbouring
+ * leaves fill their own blocks. The 64 bytes for each leaf cover the excess of such blocks, and the
+ * planes of leaf kinds in a subtree. Lists have at most one entry for each listed face. A record
+ * has at most three vertices a face, or four if it has space for more than 16. */
 void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
                          uint64_t *peak)
 {
@@ -260,8 +269,9 @@ void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uin
 
 /* --- limits --- */
 
-/* Returns EBPO_E_LIMIT if making the accel with these blocks takes more memory, slice included,
- * than the quota (NULL: no limit). Without a layout, an ordinary number of blocks is assumed. */
+/* Returns EBPO_E_LIMIT if making the accel takes more memory, slice included, than the quota
+ * `space` (NULL: no limit). Without a layout, the numbers of blocks and units are those of an
+ * ordinary model. */
 static ebpo_status accel_fits(ebpo_quota *space, const ebpo_accel_plan *plan, uint64_t units,
                               ebpo_error *error)
 {
@@ -271,8 +281,8 @@ static ebpo_status accel_fits(ebpo_quota *space, const ebpo_accel_plan *plan, ui
     counts c = counts_of_slice(plan->slice, plan->with_planes);
     sizes t = sizes_of(&c, plan->info);
     t.only_read = 0; /* the slice has been read */
-    found f = layout ? (found){ layout->block_count, layout->bound_count, units }
-                     : default_model(&c, plan->info);
+    block_sizes f = layout ? (block_sizes){ layout->block_count, layout->bound_count, units }
+                           : ordinary_sizes(&c, plan->info);
     uint64_t peak = peak_bytes(&t, &f);
     ebpo_quota all = { .most = space->most };
     ebpo_status status = ebpo_quota_check(&all, peak, error);
@@ -285,9 +295,9 @@ static ebpo_status accel_fits(ebpo_quota *space, const ebpo_accel_plan *plan, ui
 typedef struct walk {
     ebpo_accel *s;
     const ebpo_slice *slice;
-    const uint32_t *slot_of;           /* [local face] */
-    uint64_t rank[EBPO_LEVELS_MAX][4]; /* nodes of each type of each level, visited so far */
-    uint64_t refs[EBPO_LEVELS_MAX];
+    const uint32_t *slot_of;               /* [local face] */
+    uint64_t rank[EBPO_LEVELS_MAX][4];     /* nodes of each level and type, visited so far */
+    uint64_t refs[EBPO_LEVELS_MAX];        /* references of each level's leaves, visited so far */
     uint64_t group_begin[EBPO_LEVELS_MAX]; /* number of the first group of each level */
     uint64_t leaf_begin[EBPO_LEVELS_MAX];
     uint64_t list_capacity;
@@ -295,8 +305,8 @@ typedef struct walk {
     ebpo_error *error;
 } walk;
 
-/* Reserves list entries for one leaf (upper bound). The minimum for all leaves was reserved before;
- * the excess is freed at the end. */
+/* Reserves `more` list entries, an upper bound for one leaf. (reserve_space has reserved the
+ * minimum for all leaves; trim_list frees the excess.) Returns false after an error. */
 static bool reserve_list(walk *w, uint64_t more)
 {
     ebpo_accel *s = w->s;
@@ -312,13 +322,13 @@ static bool reserve_list(walk *w, uint64_t more)
 /* A leaf's entries so far. */
 typedef struct listing {
     ebpo_listed_block *list;
-    uint32_t count, block; /* count: entries so far; block: block of the last entry (not a valid
-                            * number if there is no entry) */
-    uint64_t last;
+    uint32_t count; /* number of entries */
+    uint32_t block; /* block of the last entry; UINT32_MAX: there is no entry */
+    uint64_t last;  /* the last entry */
 } listing;
 
-/* Adds a face. Faces and blocks come in ascending order: faces of one block become one entry.
- * Branch-free, because a branch on a new entry is unpredictable. */
+/* Adds a face to the leaf's list. Faces come in ascending order, so consecutive faces of one block
+ * become one entry. Branch-free, because a branch on a new entry is unpredictable. */
 static inline void list_face(const walk *w, uint64_t face, listing *l)
 {
     uint32_t slot = w->slot_of[face], block = slot / EBPO_BLOCK;
@@ -330,8 +340,8 @@ static inline void list_face(const walk *w, uint64_t face, listing *l)
     ebpo_list(&l->list[l->count - 1], l->last);
 }
 
-/* Fills a leaf record: first the references, which come before the leaf's new faces, then the new
- * faces. */
+/* Fills a leaf record. The list has first the references, then the leaf's new faces, whose indices
+ * are greater. */
 static void fill_leaf(walk *w, const ebpo_level *level, int depth, uint64_t rank, uint32_t number)
 {
     ebpo_accel_leaf *leaf = &w->s->leaf[number];
@@ -356,6 +366,7 @@ static void fill_leaf(walk *w, const ebpo_level *level, int depth, uint64_t rank
     leaf->winding = level->leaf_winding ? level->leaf_winding[rank] : 0;
 }
 
+/* Returns the entry of a white or black node. */
 static uint32_t uniform_entry(walk *w, const int32_t *windings, uint64_t rank,
                               int32_t default_winding)
 {
@@ -367,6 +378,8 @@ static uint32_t uniform_entry(walk *w, const int32_t *windings, uint64_t rank,
     return entry;
 }
 
+/* Fills the tables below a node, which is the next one of its level and type, and returns the
+ * node's entry. */
 static uint32_t walk_node(walk *w, int depth, ebpo_node_type type)
 {
     const ebpo_level *level = &w->slice->level[depth];
@@ -386,7 +399,7 @@ static uint32_t walk_node(walk *w, int depth, ebpo_node_type type)
     if (w->slice->pruned &&
         (depth + 1 == w->slice->level_count || w->slice->level[depth + 1].types[rank] == 0)) {
         if (depth + 1 < w->slice->level_count) {
-            w->rank[depth + 1][EBPO_WHITE] += 8; /* position of its children */
+            w->rank[depth + 1][EBPO_WHITE] += 8; /* the group of a pruned node counts as white */
             memset(w->s->nodes.group[group], 0xff, sizeof w->s->nodes.group[group]);
         }
         return ebpo_entry(EBPO_ENTRY_SUBTREE_ROOT, (uint32_t)group);
@@ -397,6 +410,8 @@ static uint32_t walk_node(walk *w, int depth, ebpo_node_type type)
     return ebpo_entry(EBPO_ENTRY_GRAY, (uint32_t)group);
 }
 
+/* Allocates the tables, and makes *slot_of: the slot (8 * block number + lane) of each local face.
+ */
 static ebpo_status reserve_space(walk *w, const ebpo_layout *layout, uint32_t **slot_of)
 {
     const ebpo_slice *slice = w->slice;
@@ -410,7 +425,7 @@ static ebpo_status reserve_space(walk *w, const ebpo_layout *layout, uint32_t **
         refs += slice->level[depth].ref_count;
     }
     if (slice->level_count < EBPO_LEVELS_MAX)
-        /* the numbering of gray nodes continues where they have no groups */
+        /* gray nodes of the last level are pruned: they have group numbers, but no groups */
         w->group_begin[slice->level_count] = groups;
     if (groups >= EBPO_ENTRY_ZERO || leaves >= EBPO_ENTRY_ZERO)
         return ebpo_fail(w->error, EBPO_E_LIMIT,
@@ -438,8 +453,8 @@ static ebpo_status reserve_space(walk *w, const ebpo_layout *layout, uint32_t **
 /* Trims the list to its used entries. */
 static void trim_list(ebpo_accel *s)
 {
-    ebpo_listed_block *less = ebpo_realloc(s->list, s->list_count, sizeof *s->list);
-    s->list = less ? less : s->list;
+    ebpo_listed_block *trimmed = ebpo_realloc(s->list, s->list_count, sizeof *s->list);
+    s->list = trimmed ? trimmed : s->list;
 }
 
 /* Fills child tables and leaf records with their lists of blocks, in one walk through the tree. */
@@ -467,24 +482,27 @@ static ebpo_status accel_fill_nodes(ebpo_accel *s, const ebpo_slice *slice,
  * floats (see query/inside_kernels.c). */
 static double turn_error_constant(const ebpo_box *box)
 {
-    double reach = 0, size = 0;
+    double coordinate = 0, size = 0; /* the greatest of each */
     for (int k = 0; k < 3; k++) {
-        reach = fmax(reach, fmax(fabs(box->origin[k]), fabs(box->origin[k] + box->size[k])));
+        coordinate =
+            fmax(coordinate, fmax(fabs(box->origin[k]), fabs(box->origin[k] + box->size[k])));
         size = fmax(size, box->size[k]);
     }
-    return 0x1p-43 * reach * size;
+    return 0x1p-43 * coordinate * size;
 }
 
+/* Sets the frame: the cell's centre, and a power of two that scales the cell's longest side to 1
+ * .. 2. */
 static void make_frame(ebpo_accel *s)
 {
-    double most = 0, low[3], high[3];
+    double longest = 0, low[3], high[3];
     ebpo_cell_bounds(&s->box, s->root.cell, low, high);
     for (int k = 0; k < 3; k++) {
         s->centre[k] = low[k] / 2 + high[k] / 2;
-        most = fmax(most, high[k] - low[k]);
+        longest = fmax(longest, high[k] - low[k]);
     }
     int exponent;
-    frexp(most, &exponent);
+    frexp(longest, &exponent);
     s->turn_error_constant = (float)turn_error_constant(&s->box);
     s->scale = ldexp(1, exponent < -1000 ? 1000 : exponent > 1000 ? -1000 : 1 - exponent);
 }
@@ -521,13 +539,15 @@ static ebpo_status copy_planes(ebpo_accel *s, const ebpo_slice *slice, ebpo_erro
     return EBPO_OK;
 }
 
-/* Returns the maximum number of rows of leaf planes. Few leaves of one subtree are queried, so the
- * maximum is small and counts as used from the beginning. */
+/* Returns the maximum number of rows of leaf planes (ebpo_kind_row). In a subtree it is small,
+ * because few of its leaves are queried, and count_bytes counts these rows as used from the
+ * beginning. */
 static uint64_t rows_max(const ebpo_accel *s)
 {
     return s->root.cell.level ? s->leaf_count : 5 * (uint64_t)s->leaf_count;
 }
 
+/* Returns the value of ebpo_accel.bytes. */
 static uint64_t count_bytes(const ebpo_accel *s)
 {
     uint64_t cells = s->nodes.grid_bits ? UINT64_C(1) << 3 * s->nodes.grid_bits : 0;

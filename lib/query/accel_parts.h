@@ -1,27 +1,30 @@
-/* Stages of making an acceleration structure. */
+/* Declares the stages in which an accel (acceleration structure of a subtree, accel.h) is made, and
+ * the data that the stages exchange. */
 #ifndef EBPO_QUERY_ACCEL_PARTS_H
 #define EBPO_QUERY_ACCEL_PARTS_H
 
 #include "core/cpu.h"
 #include "query/accel.h"
 
-/* Layout: assigns faces to blocks and blocks to a hierarchy in one walk through the tree; it uses
- * no coordinates. */
+/* The layout assigns faces to blocks (at most eight faces) and blocks to a hierarchy. It is made in
+ * one walk through the tree, without coordinates. */
 typedef struct ebpo_layout {
-    /* [block_count] first local face of each block, and one past the last; blocks contain all
-     * faces, in order */
+    /* [block_count] first face of each block, and one past its last face, as local indices (in the
+     * slice); the blocks together contain all faces, in order */
     uint32_t *block_begin;
     uint32_t *block_end;
     uint64_t block_count, block_capacity;
-    /* [block_count] number of each block in the accel (ebpo_meshlet); set with the blocks */
+    /* [block_count] number of each block in the accel: the position of its record, in units
+     * (EBPO_MESHLET_UNIT); set by ebpo_accel_number_blocks */
     uint32_t *block_number;
     struct ebpo_block_corners *corners; /* [block_count] valid until the blocks are filled */
     uint32_t (*child)[8];               /* [bound_count] as in ebpo_bound */
-    /* [bound_count] blocks below a node are contiguous: first, and one past the last */
+    /* [bound_count] the blocks below a node are contiguous: the first one, and one past the last
+     * one */
     uint32_t *first_block;
     uint32_t *last_block;
     uint64_t bound_count, bound_capacity, bound_capacity2, bound_capacity3, block_capacity2;
-    uint32_t top;
+    uint32_t top; /* index in `child` of the hierarchy's root */
 } ebpo_layout;
 
 /* Returns EBPO_E_LIMIT for more than `most` blocks; `most` is EBPO_BLOCKS_MAX except in tests. */
@@ -29,31 +32,33 @@ EBPO_MUST_USE ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *s
                                            ebpo_error *error);
 void ebpo_layout_free(ebpo_layout *layout);
 
-/* Input of the making of an accel. */
+/* What an accel is made from. */
 typedef struct ebpo_accel_plan {
     const ebpo_info *info;
     const ebpo_slice *slice;
-    bool with_planes;
-    ebpo_layout *layout; /* NULL: not known yet */
+    bool with_planes;    /* keep the plane codes of gray nodes */
+    ebpo_layout *layout; /* NULL: not made yet */
 } ebpo_accel_plan;
 
-/* The first function computes the sizes of blocks, numbers them and sets s->units; the second fills
- * them. Both are parallel. */
+/* ebpo_accel_number_blocks computes the sizes of blocks, numbers the blocks and sets s->units.
+ * ebpo_accel_fill_blocks fills the blocks. Both functions use `threads` threads. */
 EBPO_MUST_USE ebpo_status ebpo_accel_number_blocks(ebpo_accel *s, const ebpo_accel_plan *plan,
                                                    unsigned threads, ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_accel_plan *plan,
                                                  unsigned threads, ebpo_error *error);
-/* Computes the bounds of the hierarchy from the blocks (parallel). */
+/* Computes the boxes and bounding cylinders of the hierarchy from the blocks, with `threads`
+ * threads. */
 EBPO_MUST_USE ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_layout *layout,
                                                  unsigned threads, ebpo_error *error);
-/* Allocates storage for at most `rows_max` rows. Returns NULL without memory. */
+/* Allocates storage for at most `rows_max` rows of leaf planes (ebpo_kind_row). Returns NULL
+ * without memory. */
 ebpo_leaf_kinds *ebpo_leaf_kinds_make(uint64_t rows_max);
 void ebpo_leaf_kinds_free(ebpo_leaf_kinds *kinds);
 
 /* --- kernels (block_measure_kernels.c) ---
  *
- * They measure blocks of floats, eight vertices at a time. They are compiled for any processor and
- * for those with AVX2, with the same operations in the same order. Error bounds:
+ * These kernels measure blocks of floats, eight vertices at a time. They are compiled for any
+ * processor and for processors with AVX2, with the same operations in the same order. Error bounds:
  * docs/develop/bounds.md, "How bounding cylinders are measured". */
 
 typedef struct ebpo_block_extent {
@@ -63,18 +68,20 @@ typedef struct ebpo_block_extent {
     float normal[3];
 } ebpo_block_extent;
 
-/* Frame of a bounding cylinder: an origin in two parts, in the model's unit; the scale of the
- * subtree's frame; the axis, and 1 less its squared length. */
+/* Coordinates in which a bounding cylinder is measured. */
 typedef struct ebpo_cylinder_view {
-    float high[3], low[3], scale, axis[3], rest;
+    float origin_high[3], origin_low[3]; /* their sum is the origin, in the model's unit */
+    float scale;                         /* scale of the subtree's frame (ebpo_bound) */
+    float axis[3], length2_defect;       /* axis, and 1 - (its squared length) */
 } ebpo_cylinder_view;
 
 typedef struct ebpo_cylinder_extent {
-    float from, to, aside2; /* extent along the axis, in the subtree's frame; square of the greatest
-                             * distance from the axis */
+    float from, to; /* extent along the axis, in the subtree's frame */
+    float aside2;   /* square of the greatest distance from the axis */
 } ebpo_cylinder_extent;
 
 typedef struct ebpo_block_measures {
+    /* Measures one block. */
     void (*extent)(const ebpo_accel *s, uint32_t block, ebpo_block_extent *out);
     /* Measures all vertices of `count` blocks, given by their numbers. */
     void (*cylinder)(const ebpo_accel *s, const uint32_t *block, uint32_t count,

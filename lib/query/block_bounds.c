@@ -20,20 +20,24 @@
 #include "core/parallel.h"
 #include "query/accel_parts.h"
 
-/* Maximum number of blocks with a bounding cylinder: larger patches are too curved. */
-enum { SLAB_BLOCKS_MAX = 1024 };
+/* Maximum number of blocks in a bounding cylinder: larger patches (all faces below a node) are too
+ * curved. */
+enum { CYLINDER_BLOCKS_MAX = 1024 };
 /* Enlargement of boxes, relative to the largest coordinate of their faces. */
 static const double box_slack = 0x1p-19;
-/* Enlargement of bounding cylinders, relative to the node's size: patches are thinner than their
- * distance from the origin. */
+/* Enlargement of bounding cylinders, relative to the node's size. (It is not relative to the
+ * largest coordinate, because patches may be much thinner than their distance from the origin.) */
 static const double cylinder_slack = 0x1p-19;
-/* Share of a node's size, squared. If a node is large compared with a search, its cylinders exclude
- * hardly any child. */
+/* Searches test the cylinders of a node only if their squared limit exceeds this share of the
+ * node's squared size (ebpo_bound.cylinder_limit2). */
 static const double cylinder_share = 0.01;
-/* Enlargement for a model without extent. */
+/* Enlargement of boxes whose coordinates are all 0. */
 static const double least_slack = 0x1p-60;
+/* AXIS_UNIT: stored value of an axis' coordinate 1. SHORT_MAX: greatest stored value of 16 bits;
+ * one less than possible, as values are rounded outward. */
 enum { AXIS_UNIT = 1 << 15, SHORT_MAX = 32766 };
 
+/* Extent of vertices in the subtree's frame, and the sum of the normals of their faces. */
 typedef struct extent {
     double low[3], high[3], normal[3];
 } extent;
@@ -42,7 +46,7 @@ typedef struct job {
     ebpo_accel *s;
     const ebpo_layout *layout;
     const ebpo_block_measures *measures;
-    extent *of_block, *of_node;
+    extent *of_block, *of_node; /* [block_count], [bound_count] */
 } job;
 
 /* Two lanes of doubles. */
@@ -117,6 +121,7 @@ static void add_normals(const ebpo_accel *s, uint32_t block, double normal[3])
     }
 }
 
+/* Computes the extent of a block of doubles. */
 static void extend_wide(const ebpo_accel *s, uint32_t block, extent *e)
 {
     vertices v;
@@ -126,6 +131,7 @@ static void extend_wide(const ebpo_accel *s, uint32_t block, extent *e)
     add_normals(s, block, e->normal);
 }
 
+/* Computes the extent of a block of floats. */
 static void extend_narrow(const job *j, uint32_t block, extent *e)
 {
     ebpo_block_extent b;
@@ -182,7 +188,8 @@ static void extend_nodes(job *j)
 /* Returns fmax of values that are not NaN, without a call. */
 static double larger_of(double a, double b) { return a > b ? a : b; }
 
-/* Chooses origin and step of one axis so that 255 steps cover the range. */
+/* Chooses origin and step of one axis so that 255 steps cover the range. Returns the slack by which
+ * boxes must be enlarged on both sides. */
 static double choose_grid(double low, double high, float *origin, float *step)
 {
     double slack = larger_of(fabs(low), fabs(high)) * box_slack + least_slack;
@@ -225,13 +232,14 @@ static void set_boxes(ebpo_bound *b, const extent *all, const extent child[8])
 }
 
 /* Returns the largest absolute coordinate of the node's boxes. */
-static double reach_of(const ebpo_bound *b)
+static double greatest_coordinate(const ebpo_bound *b)
 {
-    double reach = 0;
+    double greatest = 0;
     for (int k = 0; k < 3; k++)
-        reach = larger_of(reach, larger_of(fabs((double)b->origin[k]),
-                                           fabs((double)b->origin[k] + 255 * (double)b->step[k])));
-    return reach;
+        greatest =
+            larger_of(greatest, larger_of(fabs((double)b->origin[k]),
+                                          fabs((double)b->origin[k] + 255 * (double)b->step[k])));
+    return greatest;
 }
 
 /* --- bounding cylinders --- */
@@ -241,8 +249,8 @@ typedef struct cylinder {
     double from, to, radius2;
 } cylinder;
 
-/* Chooses the axis, rounded towards zero: the decoded axis is never longer than 1, which the bound
- * needs. */
+/* Chooses the axis, rounded towards zero, so that the decoded axis is never longer than 1: the
+ * formula of ebpo_bound_cylinder is valid only then. */
 static void choose_axis(const extent *e, ebpo_bound_cylinder *b, int lane, cylinder *out)
 {
     double length = sqrt(e->normal[0] * e->normal[0] + e->normal[1] * e->normal[1] +
@@ -255,7 +263,7 @@ static void choose_axis(const extent *e, ebpo_bound_cylinder *b, int lane, cylin
 }
 
 typedef struct cylinder_pairs {
-    pair middle[3], axis[3], from, to, most;
+    pair middle[3], axis[3], from, to, radius2;
 } cylinder_pairs;
 
 static inline void add_to_cylinder(const vertices *v, cylinder_pairs *p)
@@ -269,13 +277,14 @@ static inline void add_to_cylinder(const vertices *v, cylinder_pairs *p)
         }
         p->from = lesser_pair(along, p->from);
         p->to = greater_pair(along, p->to);
-        p->most = greater_pair(square - along * along, p->most);
+        p->radius2 = greater_pair(square - along * along, p->radius2);
     }
 }
 
-/* Extends a cylinder by all vertices of a run of blocks. The middle of the box need not be between
- * the vertices: for a tilted patch it is off the patch's plane. */
-static void add_run_wide(const job *j, uint32_t begin, uint32_t end, cylinder *out)
+/* Sets the extent of a cylinder around all vertices of the blocks begin .. end - 1 of the layout.
+ * The extent along the axis need not contain 0, because the middle of the box of a tilted patch may
+ * be off the patch. */
+static void enclose_wide(const job *j, uint32_t begin, uint32_t end, cylinder *out)
 {
     cylinder_pairs p = { .from = { INFINITY, INFINITY }, .to = { -INFINITY, -INFINITY } };
     for (int k = 0; k < 3; k++) {
@@ -289,12 +298,12 @@ static void add_run_wide(const job *j, uint32_t begin, uint32_t end, cylinder *o
     }
     out->from = least_of(p.from);
     out->to = max_of(p.to);
-    out->radius2 = max_of(p.most);
+    out->radius2 = max_of(p.radius2);
 }
 
-/* As add_run_wide, in single precision, relative to two floats near the middle; adds the distance
- * of these from the middle. */
-static void add_run_narrow(const job *j, uint32_t begin, uint32_t end, cylinder *out)
+/* As enclose_wide, in single precision. Coordinates are relative to the sum of two floats near the
+ * middle; the difference of this sum from the middle is added at the end. */
+static void enclose_narrow(const job *j, uint32_t begin, uint32_t end, cylinder *out)
 {
     const ebpo_accel *s = j->s;
     ebpo_cylinder_view view = { .scale = (float)s->scale };
@@ -302,16 +311,17 @@ static void add_run_narrow(const job *j, uint32_t begin, uint32_t end, cylinder 
     double square = 0, along = 0, off2 = 0;
     for (int k = 0; k < 3; k++) {
         double middle = s->centre[k] + out->middle[k] / s->scale;
-        view.high[k] = (float)middle;
-        view.low[k] = (float)(middle - (double)view.high[k]);
+        view.origin_high[k] = (float)middle;
+        view.origin_low[k] = (float)(middle - (double)view.origin_high[k]);
         view.axis[k] = (float)out->axis[k];
         square += out->axis[k] * out->axis[k];
-        double seen = ((double)view.high[k] - s->centre[k] + (double)view.low[k]) * s->scale,
-               off = seen - out->middle[k];
+        double origin = ((double)view.origin_high[k] - s->centre[k] + (double)view.origin_low[k]) *
+                        s->scale,
+               off = origin - out->middle[k];
         along += off * out->axis[k];
         off2 += off * off;
     }
-    view.rest = (float)(1 - square);
+    view.length2_defect = (float)(1 - square);
     j->measures->cylinder(s, j->layout->block_number + begin, end - begin, &view, &e);
     double aside = sqrt((double)e.aside2) + sqrt(off2);
     out->from = (double)e.from + along;
@@ -320,7 +330,7 @@ static void add_run_narrow(const job *j, uint32_t begin, uint32_t end, cylinder 
 }
 
 /* Sets a cylinder without axis, as wide as the box: it bounds no better than the box. */
-static void no_cylinder(ebpo_bound_cylinder *b, int lane, const double half[3], cylinder *out)
+static void set_no_cylinder(ebpo_bound_cylinder *b, int lane, const double half[3], cylinder *out)
 {
     for (int k = 0; k < 3; k++) {
         b->axis[k][lane] = 0;
@@ -343,15 +353,15 @@ static cylinder measure_cylinder(const job *j, uint64_t n, int lane, const exten
         first = j->layout->first_block[child];
         last = j->layout->last_block[child];
     }
-    if (last - first > SLAB_BLOCKS_MAX) {
-        no_cylinder(&j->s->cylinder[n], lane, half, &out);
+    if (last - first > CYLINDER_BLOCKS_MAX) {
+        set_no_cylinder(&j->s->cylinder[n], lane, half, &out);
         return out;
     }
     choose_axis(e, &j->s->cylinder[n], lane, &out);
     if (j->s->wide)
-        add_run_wide(j, first, last, &out);
+        enclose_wide(j, first, last, &out);
     else
-        add_run_narrow(j, first, last, &out);
+        enclose_narrow(j, first, last, &out);
     return out;
 }
 
@@ -361,10 +371,10 @@ static double size_of(const ebpo_bound *b)
     return 255 * (double)fmaxf(b->step[0], fmaxf(b->step[1], b->step[2]));
 }
 
-/* Returns false if some faces are so far from their leaf that squares overflow (possible in
- * untrusted files). A step of 16-bit values would then be infinite or NaN, so the node gets
- * cylinders that exclude nothing. */
-static bool is_known(int count, const cylinder child[8], const double radius[8])
+/* Returns false if some faces are so far from their leaf that squares overflow, which is possible
+ * in untrusted files. Steps of 16-bit values would then be infinite or NaN, so set_cylinders gives
+ * the node cylinders that exclude nothing. */
+static bool are_finite(int count, const cylinder child[8], const double radius[8])
 {
     for (int lane = 0; lane < count; lane++)
         if (!(fabs(child[lane].from) < FLT_MAX / 4 && fabs(child[lane].to) < FLT_MAX / 4 &&
@@ -382,11 +392,11 @@ static void set_cylinders(ebpo_bound_cylinder *b, int count, double size, const 
         radius[lane] = sqrt(larger_of(child[lane].radius2, 0) + size * size * 0x1p-46) + slack;
         aside = larger_of(aside, radius[lane]);
     }
-    bool known = is_known(count, child, radius);
-    b->along_step = (float)((known ? along : FLT_MAX / 4) / SHORT_MAX);
-    b->aside_step = (float)((known ? aside : FLT_MAX / 4) / SHORT_MAX);
+    bool finite = are_finite(count, child, radius);
+    b->along_step = (float)((finite ? along : FLT_MAX / 4) / SHORT_MAX);
+    b->aside_step = (float)((finite ? aside : FLT_MAX / 4) / SHORT_MAX);
     for (int lane = 0; lane < count; lane++) {
-        if (!known) {
+        if (!finite) {
             b->from[lane] = -SHORT_MAX;
             b->to[lane] = b->radius[lane] = SHORT_MAX;
             continue;
@@ -407,6 +417,7 @@ static uint32_t child_number(const job *j, uint32_t child)
                : j->layout->block_number[child & ~EBPO_IS_BLOCK] | EBPO_IS_BLOCK;
 }
 
+/* Computes the boxes and cylinders of nodes begin .. end - 1. */
 static ebpo_status bound_nodes(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                ebpo_error *error)
 {
@@ -487,7 +498,7 @@ ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_layout *layout, uns
     if (status == EBPO_OK)
         status = fill_levels(&j, threads, error);
     if (status == EBPO_OK && s->bound_count)
-        s->largest_coordinate = larger_of(1, reach_of(&s->bound[s->root_bound]));
+        s->largest_coordinate = larger_of(1, greatest_coordinate(&s->bound[s->root_bound]));
     free(j.of_block);
     free(j.of_node);
     return status;

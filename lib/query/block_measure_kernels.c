@@ -14,13 +14,14 @@ static const float lane_number[8] = { 0, 1, 2, 3, 4, 5, 6, 7 };
 
 EBPO_EIGHT float max_of(f8 x) { return -f8_least(f8_sub(f8_all(0), x)); }
 
-/* Loads vertices at .. at + 7 on an axis; repeats the first one if there are fewer. */
+/* Loads a coordinate of the vertices at .. at + 7. Lanes beyond the last vertex get vertex 0. */
 EBPO_EIGHT f8 load_vertices(const float *x, unsigned at, unsigned count)
 {
     f8 used = f8_less(f8_load(lane_number), f8_all((float)count - (float)at));
     return f8_pick(used, f8_load(x + at), f8_all(x[0]));
 }
 
+/* Sums the normals of the block's faces, each as long as twice the face's area. */
 static void measure_normals(const ebpo_face_block *b, float normal[3])
 {
     f8 x[3][3], used = f8_less(f8_load(lane_number), f8_all((float)b->m->faces));
@@ -60,18 +61,20 @@ typedef struct cylinder_sums {
     f8 from, to, aside2;
 } cylinder_sums;
 
+/* Extends the sums by eight vertices. */
 EBPO_EIGHT void measure_eight(const ebpo_cylinder_view *view, const f8 x[3], cylinder_sums *sum)
 {
     f8 d[3], along, aside2;
     for (int k = 0; k < 3; k++)
-        d[k] = f8_mul(f8_sub(f8_sub(x[k], f8_all(view->high[k])), f8_all(view->low[k])),
-                      f8_all(view->scale));
+        d[k] =
+            f8_mul(f8_sub(f8_sub(x[k], f8_all(view->origin_high[k])), f8_all(view->origin_low[k])),
+                   f8_all(view->scale));
     along = f8_add(f8_add(f8_mul(d[0], f8_all(view->axis[0])), f8_mul(d[1], f8_all(view->axis[1]))),
                    f8_mul(d[2], f8_all(view->axis[2])));
-    aside2 = f8_mul(f8_mul(along, along), f8_all(view->rest));
+    aside2 = f8_mul(f8_mul(along, along), f8_all(view->length2_defect));
     for (int k = 0; k < 3; k++) {
-        f8 off = f8_sub(d[k], f8_mul(along, f8_all(view->axis[k])));
-        aside2 = f8_add(aside2, f8_mul(off, off));
+        f8 aside = f8_sub(d[k], f8_mul(along, f8_all(view->axis[k])));
+        aside2 = f8_add(aside2, f8_mul(aside, aside));
     }
     sum->from = f8_min(along, sum->from);
     sum->to = f8_max(along, sum->to);

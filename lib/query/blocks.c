@@ -17,12 +17,12 @@
 #include "geometry/level_nodes.h"
 #include "query/accel_parts.h"
 
-/* Result of the walk below a node: either up to eight faces without a block, or up to eight members
- * of the hierarchy. */
+/* Result of the walk below a node: either at most eight faces that have no block yet, or at most
+ * eight members (blocks or nodes of the hierarchy). */
 typedef struct bundle {
     uint32_t begin, end; /* range of faces */
-    int members;         /* 0: no block yet */
-    uint32_t member[8];
+    int members;         /* number of members; 0: the faces have no block yet */
+    uint32_t member[8];  /* as in ebpo_bound.child */
 } bundle;
 
 typedef struct walk {
@@ -33,6 +33,7 @@ typedef struct walk {
     bool failed;
 } walk;
 
+/* Adds a block of the faces begin .. end - 1. Returns its number as a member. */
 static uint32_t add_block(walk *w, uint32_t begin, uint32_t end)
 {
     ebpo_layout *o = w->out;
@@ -48,7 +49,8 @@ static uint32_t add_block(walk *w, uint32_t begin, uint32_t end)
     return (uint32_t)o->block_count++ | EBPO_IS_BLOCK;
 }
 
-/* Adds a node. Its first_block and last_block are numbers of faces until all blocks are known. */
+/* Adds a node of the hierarchy. Its first_block and last_block are indices of faces until
+ * renumber_blocks. Returns its number as a member. */
 static uint32_t add_bound(walk *w, const bundle *b)
 {
     ebpo_layout *o = w->out;
@@ -66,6 +68,7 @@ static uint32_t add_bound(walk *w, const bundle *b)
     return (uint32_t)o->bound_count++;
 }
 
+/* Makes a block of the bundle's faces, if they have none. */
 static void close_bundle(walk *w, bundle *b)
 {
     if (b->members == 0 && b->end > b->begin) {
@@ -74,12 +77,13 @@ static void close_bundle(walk *w, bundle *b)
     }
 }
 
-/* Neighbours that together fill a node best, among those not wrapped yet. Without this choice the
- * hierarchy would become deep. */
+/* Consecutive bundles begin .. end - 1, and the number of their members. */
 typedef struct run {
     int begin, end, members;
 } run;
 
+/* Returns the consecutive bundles, none of them wrapped yet, that have the most members, at most
+ * eight. Without this choice the hierarchy would become deep. */
 static run choose_run(const bundle *part, int parts, const bool wrapped[8])
 {
     run best = { 0, 0, 0 };
@@ -95,6 +99,7 @@ static run choose_run(const bundle *part, int parts, const bool wrapped[8])
     return best;
 }
 
+/* Returns a bundle with the members of all parts. */
 static bundle gather_parts(const bundle *part, int parts)
 {
     bundle out = { part[0].begin, part[parts - 1].end, 0, { 0 } };
@@ -104,7 +109,8 @@ static bundle gather_parts(const bundle *part, int parts)
     return out;
 }
 
-/* Wraps neighbours in nodes, as full as possible, until at most eight members remain. */
+/* Wraps consecutive bundles in nodes, as full as possible, until at most eight members remain.
+ * Changes `part`. */
 static bundle join_parts(walk *w, bundle *part, int parts)
 {
     bool wrapped[8] = { false };
@@ -129,7 +135,7 @@ static bundle join_parts(walk *w, bundle *part, int parts)
                      : gather_parts(part, parts);
 }
 
-/* Splits a range of faces in its order: into blocks of equal size, eight under each node. */
+/* Splits a range of faces into consecutive blocks of about equal size, eight under each node. */
 static bundle split_range(walk *w, uint32_t begin, uint32_t end)
 {
     uint64_t count = end - begin;
@@ -138,12 +144,12 @@ static bundle split_range(walk *w, uint32_t begin, uint32_t end)
     uint64_t span = EBPO_BLOCK;
     while (count > span * 8)
         span *= 8;
-    uint64_t pieces = (count + span - 1) / span;
+    uint64_t parts = (count + span - 1) / span;
     bundle part[8];
-    for (uint64_t i = 0; i < pieces; i++)
-        part[i] = split_range(w, begin + (uint32_t)(count * i / pieces),
-                              begin + (uint32_t)(count * (i + 1) / pieces));
-    return join_parts(w, part, (int)pieces);
+    for (uint64_t i = 0; i < parts; i++)
+        part[i] = split_range(w, begin + (uint32_t)(count * i / parts),
+                              begin + (uint32_t)(count * (i + 1) / parts));
+    return join_parts(w, part, (int)parts);
 }
 
 static bundle walk_node(walk *w, int depth, ebpo_node_type type, uint32_t begin);
@@ -181,12 +187,13 @@ static bundle walk_node(walk *w, int depth, ebpo_node_type type, uint32_t begin)
     return (bundle){ begin, begin, 0, { 0 } };
 }
 
-/* Renumbers blocks by their faces, so that the blocks below a node are one range. Before, their
- * numbers are in the order in which the walk made them. */
+/* Renumbers blocks in the order of their faces, so that the blocks below a node are one range.
+ * Before, blocks are numbered in the order in which the walk made them. Returns false without
+ * memory. */
 static bool renumber_blocks(ebpo_layout *o, uint64_t faces)
 {
-    uint32_t *at_face = ebpo_alloc(faces + 1, sizeof *at_face),
-             *end = ebpo_alloc(o->block_count, sizeof *end);
+    uint32_t *at_face = ebpo_alloc(faces + 1, sizeof *at_face), /* block that begins at a face */
+        *end = ebpo_alloc(o->block_count, sizeof *end);
     if (!at_face || !end) {
         free(at_face);
         free(end);
@@ -198,7 +205,7 @@ static bool renumber_blocks(ebpo_layout *o, uint64_t faces)
     for (uint64_t face = 0; face < faces; number++) {
         uint32_t old = at_face[face];
         end[number] = o->block_end[old];
-        o->block_end[old] = number; /* from here on block_end has the new number of each old one */
+        o->block_end[old] = number; /* from here on, block_end[old] is the block's new number */
         at_face[face] = number;
         face = end[number];
     }
@@ -273,17 +280,19 @@ typedef struct job {
     ebpo_layout *layout;
 } job;
 
-/* A block's vertices. */
-typedef struct shared {
-    uint32_t vertex[EBPO_MESHLET_VERTICES];
-    const uint8_t *at; /* [face][corner]: index of the vertex */
+/* A block's vertices, each once. */
+typedef struct block_vertices {
+    uint32_t vertex[EBPO_MESHLET_VERTICES]; /* [count] indices in the slice's mesh */
+    const uint8_t *at;                      /* [face][corner]: index in `vertex` */
     unsigned faces, count;
-} shared;
+} block_vertices;
 
 /* Hash table with open addressing. An entry is the index of a vertex in the block plus one; 0:
  * free. */
 enum { TABLE_BITS = 6, TABLE = 1 << TABLE_BITS };
 
+/* Returns the vertices of the corners of the block's faces, in the slice's mesh, and their number.
+ */
 static const uint32_t *corners_of(const job *j, uint64_t block, unsigned *count)
 {
     uint32_t begin = j->layout->block_begin[block];
@@ -291,7 +300,8 @@ static const uint32_t *corners_of(const job *j, uint64_t block, unsigned *count)
     return j->mesh->faces + 3 * (uint64_t)begin;
 }
 
-static void find_shared(const job *j, uint64_t block)
+/* Finds the distinct vertices of a block: sets layout->corners[block]. */
+static void find_vertices(const job *j, uint64_t block)
 {
     unsigned corners, count = 0;
     const uint32_t *corner = corners_of(j, block, &corners);
@@ -313,7 +323,7 @@ static void find_shared(const job *j, uint64_t block)
     j->layout->corners[block].count = (uint8_t)count;
 }
 
-static void copy_block(const job *j, uint64_t block, shared *out)
+static void copy_block(const job *j, uint64_t block, block_vertices *out)
 {
     unsigned corners;
     const uint32_t *corner = corners_of(j, block, &corners);
@@ -341,13 +351,14 @@ static ebpo_status measure_blocks(void *context, uint64_t begin, uint64_t end, u
     (void)error;
     job *j = context;
     for (uint64_t b = begin; b < end; b++) {
-        find_shared(j, b);
+        find_vertices(j, b);
         j->layout->block_number[b] = size_of(j->s, j->layout->corners[b].count);
     }
     return EBPO_OK;
 }
 
-/* Turns sizes into numbers. Returns false when there are too many. */
+/* Replaces the size of each block by its number: the sum of the sizes of the blocks before it.
+ * Returns false if there are too many units. */
 static bool number_blocks(ebpo_accel *s, ebpo_layout *layout)
 {
     for (uint64_t b = 0; b < layout->block_count; b++) {
@@ -360,9 +371,9 @@ static bool number_blocks(ebpo_accel *s, ebpo_layout *layout)
 
 /* --- filling --- */
 
-/* Makes each corner of each lane a separate vertex, for blocks whose faces share too few vertices.
- */
-static void spread_corners(shared *v)
+/* Makes each corner of each lane a separate vertex, for a block with more than EBPO_MESHLET_SHARED
+ * vertices. */
+static void spread_corners(block_vertices *v)
 {
     uint32_t corner[EBPO_MESHLET_VERTICES];
     for (unsigned lane = 0; lane < EBPO_BLOCK; lane++)
@@ -372,14 +383,14 @@ static void spread_corners(shared *v)
     v->count = EBPO_MESHLET_VERTICES;
 }
 
-static void set_corners(const shared *v, ebpo_meshlet *m)
+static void set_corners(const block_vertices *v, ebpo_meshlet *m)
 {
     for (unsigned i = 0; i < 3; i++)
         for (unsigned lane = 0; lane < EBPO_BLOCK; lane++)
             m->corner[i] |= (uint32_t)v->at[3 * (lane < v->faces ? lane : 0) + i] << 4 * lane;
 }
 
-static void set_coordinates(const job *j, const shared *v, ebpo_meshlet *m)
+static void set_coordinates(const job *j, const block_vertices *v, ebpo_meshlet *m)
 {
     const ebpo_mesh *mesh = j->mesh;
     float *x32 = (void *)(m + 1);
@@ -401,7 +412,7 @@ static ebpo_status fill_blocks(void *context, uint64_t begin, uint64_t end, unsi
     (void)worker;
     (void)error;
     job *j = context;
-    shared v;
+    block_vertices v;
     for (uint64_t b = begin; b < end; b++) {
         copy_block(j, b, &v);
         char *at = j->s->meshlets + (uint64_t)j->layout->block_number[b] * EBPO_MESHLET_UNIT;
@@ -419,8 +430,8 @@ static ebpo_status fill_blocks(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-/* Allocates records. Kernels read tables of 16 entries, so memory after the last record is
- * allocated, too. */
+/* Allocates records. Kernels always read 16 vertices, so one more unit is allocated after the last
+ * record. */
 static ebpo_status reserve_space(ebpo_accel *s, ebpo_error *error)
 {
     uint64_t bytes = s->units * EBPO_MESHLET_UNIT;

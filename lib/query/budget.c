@@ -1,12 +1,13 @@
 /* Divides the memory budget of a model.
  *
- * A model is held in memory as a whole if the budget allows it. Otherwise the budget is shared by
- * the top of the tree (query_top.c), a cache of decoded chunks, skeletons (upper nodes of the
- * hierarchies over faces) (skeleton.c) and a cache of subtrees. The cut level is chosen so that
- * subtrees are small enough. The plan uses only the counts in the file header; no chunks are read.
+ * A model is completely in memory if the budget allows that. If not, the budget is divided between
+ * the top of the tree (levels 0 to the cut level, query_top.c), a cache of decoded chunks,
+ * skeletons (upper nodes of the hierarchies over faces, skeleton.c) and a cache of subtrees. The
+ * cut level is chosen so that subtrees are small enough. The plan uses only the counts in the file
+ * header; no chunks are read.
  *
- * Several models may share a budget: the permanent parts of each are subtracted, and their caches
- * share the rest. A shared budget may be used by any thread. */
+ * Several models may share a budget: the bytes that each model takes permanently are subtracted,
+ * and the caches of all models share the remaining bytes. Any thread may use a shared budget. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -21,7 +22,7 @@
 #include "query/accel.h"
 #include "query/model_parts.h"
 
-/* Cache of decoded chunks: an eighth of the budget, within these limits. */
+/* Maximum bytes of the cache of decoded chunks, which gets an eighth of the budget. */
 enum { CHUNKS_MAX = 128 << 20 };
 
 uint64_t ebpo_chunk_budget(uint64_t budget)
@@ -31,9 +32,9 @@ uint64_t ebpo_chunk_budget(uint64_t budget)
                                           : budget / 8;
 }
 
-/* Returns the maximum bytes of skeletons of subtrees: searches over the whole model gain more from
- * skeletons than from a few more subtrees. The bytes are taken from the part above the minimum, so
- * that the minimum budget does not grow. */
+/* Returns the maximum bytes of skeletons: a quarter of the bytes above the minimum budget, so that
+ * the minimum does not grow. Searches over the whole model gain more from skeletons than from a few
+ * more subtrees. */
 uint64_t ebpo_skeleton_budget(const ebpo_model_options *o, uint64_t budget)
 {
     const uint64_t least = EBPO_CHUNKS_LEAST + EBPO_SUBTREES_LEAST;
@@ -49,7 +50,7 @@ struct ebpo_budget {
     uint64_t bytes;
     ebpo_cache_pool *subtrees, *chunks;
     pthread_mutex_t lock;      /* protects the following fields */
-    uint64_t whole, skeletons; /* bytes still available */
+    uint64_t whole, skeletons; /* bytes still available for whole models and for skeletons */
 };
 
 ebpo_status ebpo_budget_new(uint64_t bytes, ebpo_budget **out, ebpo_error *error)
@@ -142,10 +143,10 @@ void ebpo_budget_give_back_whole(ebpo_budget *b, uint64_t bytes)
 uint64_t ebpo_budget_take_skeletons(ebpo_budget *b, uint64_t wanted)
 {
     (void)pthread_mutex_lock(&b->lock);
-    uint64_t got = wanted < b->skeletons ? wanted : b->skeletons;
-    b->skeletons -= got;
+    uint64_t taken = wanted < b->skeletons ? wanted : b->skeletons;
+    b->skeletons -= taken;
     (void)pthread_mutex_unlock(&b->lock);
-    return got;
+    return taken;
 }
 
 void ebpo_budget_give_back_skeletons(ebpo_budget *b, uint64_t bytes)
@@ -157,10 +158,12 @@ void ebpo_budget_give_back_skeletons(ebpo_budget *b, uint64_t bytes)
 
 /* --- the plan of a model --- */
 
-/* Minimum number of subtrees in a cache: a path needs the current subtree, its neighbours, and
- * memory to load the next one. More and smaller subtrees load faster. */
+/* Number of subtrees that a cache must have space for: a path needs the current subtree, its
+ * neighbours, and memory to load the next one. If the budget allows SUBTREES_WANTED, the subtrees
+ * are smaller and load faster. */
 enum { SUBTREES_NEEDED = 64, SUBTREES_WANTED = 320 };
 
+/* Returns the counts of the whole model. */
 static ebpo_slice_size whole_size(const ebpo_info *info)
 {
     ebpo_slice_size size = { .new_faces = info->face_count };
@@ -173,8 +176,8 @@ static ebpo_slice_size whole_size(const ebpo_info *info)
     return size;
 }
 
-/* Returns true if the budget holds the top: a quarter of it for levels, and half for the caps of a
- * surface. */
+/* Returns true if the budget holds the top of `top` bytes. The levels may take a quarter of the
+ * budget, and the caps of a surface (faces that close holes) half of it. */
 static bool top_fits(const ebpo_info *info, const ebpo_model_options *o, uint64_t budget,
                      uint64_t top)
 {
@@ -183,8 +186,9 @@ static bool top_fits(const ebpo_info *info, const ebpo_model_options *o, uint64_
            top + ebpo_bytes_besides_subtrees(o, budget) + EBPO_SUBTREES_LEAST <= budget;
 }
 
-/* Chooses the cut level: half the budget for subtrees must hold this number of subtrees of average
- * size. */
+/* Returns the lowest cut level for which half the budget holds `subtrees` subtrees of average size,
+ * or -1 if the budget is too small. At the deepest level, subtrees are single leaves, for which
+ * less is sufficient. */
 static int cut_for(const ebpo_info *info, const ebpo_model_options *o, uint64_t budget,
                    uint64_t subtrees)
 {
@@ -217,13 +221,16 @@ static uint64_t least_budget(const ebpo_info *info, const ebpo_model_options *o)
     return budget;
 }
 
-/* Remote files are read in parts, unless they are small, as queries rarely need a whole file. */
-enum { FAR_MEMORY = 256 << 20, FAR_WHOLE_BYTES = 2 << 20 };
+/* Remote files are read in parts, as queries rarely need a whole file. REMOTE_MEMORY: the default
+ * budget. REMOTE_WHOLE_BYTES: smaller files may be read completely. */
+enum { REMOTE_MEMORY = 256 << 20, REMOTE_WHOLE_BYTES = 2 << 20 };
 
+/* Returns true if the file is remote and must be read in parts, even if the budget holds the whole
+ * model. */
 static bool reads_parts(const ebpo_file *file, bool default_memory)
 {
     const ebpo_info *info = ebpo_file_info(file);
-    bool small = info->file_bytes <= FAR_WHOLE_BYTES;
+    bool small = info->file_bytes <= REMOTE_WHOLE_BYTES;
     return ebpo_input_is_remote(&file->in) && !small && (info->subtree_level || default_memory);
 }
 
@@ -233,12 +240,12 @@ bool ebpo_default_memory(const ebpo_file *file, ebpo_model_options *o)
         o->memory = budget_left(o->budget);
     bool is_default = !o->memory && ebpo_input_is_remote(&file->in);
     if (is_default && o->cut_level < 0)
-        o->memory = FAR_MEMORY;
+        o->memory = REMOTE_MEMORY;
     return is_default;
 }
 
-/* Returns the level of the roots of the file's subtrees, each of which is read at once, if the
- * budget allows that cut level. */
+/* Returns the level of the roots of the file's subtrees, if it is deeper than `cut` and the budget
+ * allows it, because each of these subtrees is read at once. If not, returns `cut`. */
 static int prefer_subtrees(const ebpo_info *info, const ebpo_model_options *o, int cut)
 {
     int level = info->subtree_level;
@@ -278,7 +285,7 @@ static ebpo_status choose_plan(const ebpo_file *file, const ebpo_model_options *
     return EBPO_OK;
 }
 
-/* Divides the budget, based on counts. */
+/* Sets the plan's number of subtrees and the bytes of each part of the budget. */
 static void share_budget(const ebpo_info *info, const ebpo_model_options *o, ebpo_model_plan *out)
 {
     ebpo_slice_size size = whole_size(info);

@@ -1,11 +1,11 @@
 /* Computes the distance to the surface, the nearest point and the normal (EBP 2017, 4.4).
  *
- * The exact minimum comes from nearest_subtrees.c. The modes of the thesis, whose result is not
+ * nearest_subtrees.c finds the exact minimum. The three modes of the thesis, whose result is not
  * always the minimum, search the leaf around the point, all leaves below the deepest gray node
- * around it, or the envelope of a node. With a level, a query returns an interval that the
- * envelopes of that level's nodes prove. When a deadline passes, the interval comes from the nodes
- * searched by then. In a subset a query fails with EBPO_E_ABSENT when an omitted face might be
- * nearer than the found one. */
+ * around the point, or the envelope of a node. With a level, a query returns an interval for the
+ * distance, from the envelopes of that level's nodes. If a deadline passes, the query returns an
+ * interval from the nodes searched by then. In a subset, a query fails with EBPO_E_ABSENT if an
+ * omitted face might be nearer than the found face. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -24,10 +24,13 @@
 
 /* --- distances that are not always the minimum --- */
 
-static const ebpo_distance_result nothing = { INFINITY,          0,           INFINITY,
-                                              { NAN, NAN, NAN }, { 0, 0, 0 }, EBPO_NO_FACE };
+/* The result if no face is within the limit. */
+static const ebpo_distance_result no_result = { INFINITY,          0,           INFINITY,
+                                                { NAN, NAN, NAN }, { 0, 0, 0 }, EBPO_NO_FACE };
 
-static ebpo_status all_leaves(ebpo_context *c, ebpo_nearest *n, ebpo_node node, ebpo_error *error)
+/* Searches all leaves below a node. */
+static ebpo_status search_leaves(ebpo_context *c, ebpo_nearest *n, ebpo_node node,
+                                 ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     if (ebpo_node_is_uniform(&node))
@@ -43,11 +46,11 @@ static ebpo_status all_leaves(ebpo_context *c, ebpo_nearest *n, ebpo_node node, 
         return EBPO_OK;
     }
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++)
-        status = all_leaves(c, n, ebpo_model_child(c->model, &node, octant), error);
+        status = search_leaves(c, n, ebpo_model_child(c->model, &node, octant), error);
     return status;
 }
 
-/* Searches the leaf around p. If there is none, finds nothing (LEAVES), or searches all leaves
+/* Searches the leaf around p. If no leaf contains p, finds nothing (LEAVES), or searches all leaves
  * below the deepest gray node around p (RECURSIVE). */
 static ebpo_status distance_around(ebpo_context *c, const double p[3],
                                    const ebpo_distance_options *o, ebpo_distance_result *out,
@@ -55,9 +58,9 @@ static ebpo_status distance_around(ebpo_context *c, const double p[3],
 {
     ebpo_box box = ebpo_model_box(c->model);
     uint32_t at[3];
-    int fine = c->model->info->level_count - 1;
-    *out = nothing;
-    if (!ebpo_locate(&box, fine, p, at))
+    int deepest = c->model->info->level_count - 1;
+    *out = no_result;
+    if (!ebpo_locate(&box, deepest, p, at))
         return EBPO_OK;
     ebpo_node node = ebpo_model_root(c->model), gray = node;
     ebpo_status status = EBPO_OK;
@@ -67,21 +70,22 @@ static ebpo_status distance_around(ebpo_context *c, const double p[3],
         if (status != EBPO_OK || ebpo_entry_kind_of(node.entry) == EBPO_ENTRY_LEAF)
             break;
         gray = node;
-        node = ebpo_model_child(c->model, &node, ebpo_octant_at(at, fine - node.cell.level - 1));
+        node = ebpo_model_child(c->model, &node, ebpo_octant_at(at, deepest - node.cell.level - 1));
     }
     ebpo_nearest n;
     ebpo_nearest_begin(&n, c->model, p, o->max_distance);
     if (status == EBPO_OK && !ebpo_node_is_uniform(&node))
         ebpo_nearest_leaf(&n, node.subtree, &node.subtree->leaf[ebpo_entry_value(node.entry)]);
     else if (status == EBPO_OK && o->mode == EBPO_DISTANCE_RECURSIVE)
-        status = all_leaves(c, &n, gray, error);
+        status = search_leaves(c, &n, gray, error);
     if (status == EBPO_OK)
         ebpo_nearest_end(&n, o->max_distance, out);
-    out->lo = 0; /* the result may not be the minimum: only an upper bound is certain */
+    out->lo = 0; /* the result may not be the minimum: it is only an upper bound */
     return status == EBPO_OK ? ebpo_give_sign(c, p, o, out, error) : status;
 }
 
-static void corner_of(const ebpo_box *box, ebpo_cell cell, const double xi[3], double out[3])
+/* Converts the coordinates xi (0 .. 1 in the cell) to a point. */
+static void point_at(const ebpo_box *box, ebpo_cell cell, const double xi[3], double out[3])
 {
     for (int k = 0; k < 3; k++) {
         double low = ebpo_cell_face(box, k, cell.level, cell.at[k]);
@@ -89,6 +93,7 @@ static void corner_of(const ebpo_box *box, ebpo_cell cell, const double xi[3], d
     }
 }
 
+/* Finds the nearest point of the polygons of the envelope `e`, each divided into triangles. */
 static void nearest_polygon(const ebpo_polytope *e, const ebpo_box *box, ebpo_cell cell,
                             const double p[3], ebpo_distance_result *out)
 {
@@ -97,9 +102,9 @@ static void nearest_polygon(const ebpo_polytope *e, const ebpo_box *box, ebpo_ce
         for (int i = e->first[f] + 1; i + 1 < e->first[f + 1]; i++) {
             double t[3][3];
             ebpo_distance_bounds b;
-            corner_of(box, cell, e->vertex[e->corner[e->first[f]]], t[0]);
-            corner_of(box, cell, e->vertex[e->corner[i]], t[1]);
-            corner_of(box, cell, e->vertex[e->corner[i + 1]], t[2]);
+            point_at(box, cell, e->vertex[e->corner[e->first[f]]], t[0]);
+            point_at(box, cell, e->vertex[e->corner[i]], t[1]);
+            point_at(box, cell, e->vertex[e->corner[i + 1]], t[2]);
             ebpo_triangle_distance_bounds(p, (const double(*)[3])t, &b);
             if (b.hi < out->distance) {
                 out->distance = b.hi;
@@ -120,14 +125,16 @@ static void nearest_polygon(const ebpo_polytope *e, const ebpo_box *box, ebpo_ce
 typedef struct node_chain {
     ebpo_node node[EBPO_LEVELS_MAX];
     int count;
-    const ebpo_node *pruned; /* the node after the last one, if it is pruned; or NULL */
-    ebpo_node child;
+    const ebpo_node *pruned; /* &child if it is a pruned node without envelope; else NULL */
+    ebpo_node child;         /* the node after the last one of `node` */
 } node_chain;
 
+/* Follows the nodes that contain the cell `at` of the deepest level, down to `level` (-1: no
+ * limit). */
 static ebpo_status follow_cells(ebpo_context *c, const uint32_t at[3], int level, node_chain *out,
                                 ebpo_error *error)
 {
-    int fine = c->model->info->level_count - 1;
+    int deepest = c->model->info->level_count - 1;
     ebpo_node node = ebpo_model_root(c->model);
     out->count = 0;
     out->pruned = NULL;
@@ -141,11 +148,11 @@ static ebpo_status follow_cells(ebpo_context *c, const uint32_t at[3], int level
                 return status;
         }
         out->child =
-            ebpo_model_child(c->model, &node, ebpo_octant_at(at, fine - node.cell.level - 1));
+            ebpo_model_child(c->model, &node, ebpo_octant_at(at, deepest - node.cell.level - 1));
         if (out->child.type != EBPO_GRAY)
             return EBPO_OK;
         if (c->model->info->boxed && out->child.pruned) {
-            /* leaves outside a subset's box are pruned in the same way */
+            /* the node may have been a leaf outside the subset's box: leaves have no envelope */
             out->pruned = &out->child;
             return EBPO_OK;
         }
@@ -159,9 +166,9 @@ static unsigned octant_of(ebpo_cell cell)
     return (cell.at[0] & 1) | (cell.at[1] & 1) << 1 | (cell.at[2] & 1) << 2;
 }
 
-/* Cuts the envelope of the last node that has one, into cutting[0]; returns the node's number in
- * the chain. A node's envelope is cut from its parent's, so one stored envelope replaces all above
- * it. */
+/* Cuts the envelope of the chain's last node that has one, into cutting[0]; returns the node's
+ * index in the chain. A node's envelope is cut from its parent's envelope, so the cut starts at the
+ * deepest node whose envelope is kept. */
 static int cut_envelope(ebpo_context *c, const node_chain *chain)
 {
     ebpo_polytope *out = &c->cutting[0], *above = &c->cutting[1];
@@ -195,7 +202,7 @@ static ebpo_status distance_to_envelope(ebpo_context *c, const double p[3],
 {
     ebpo_box box = ebpo_model_box(c->model);
     uint32_t at[3];
-    *out = nothing;
+    *out = no_result;
     if (!ebpo_locate(&box, c->model->info->level_count - 1, p, at))
         return EBPO_OK;
     node_chain chain;
@@ -215,6 +222,9 @@ static ebpo_status distance_to_envelope(ebpo_context *c, const double p[3],
 
 /* --- subsets: an omitted face may be nearer than the found one --- */
 
+/* Visits nodes with bounds within the search's limit. Before the deadline, fails with EBPO_E_ABSENT
+ * at the first pruned node. After the deadline, lowers *nearest to the bounds of pruned nodes and
+ * of subtrees, which are not entered. `lower`: bound of `node`. */
 static ebpo_status pruned_within(ebpo_context *c, const ebpo_nearest *n,
                                  const ebpo_ranking *ranking, ebpo_node node, double lower,
                                  double *nearest, ebpo_error *error)
@@ -239,8 +249,8 @@ static ebpo_status pruned_within(ebpo_context *c, const ebpo_nearest *n,
     return status;
 }
 
-/* Fails when an omitted part may change the result; after the deadline it only widens the interval.
- */
+/* Fails with EBPO_E_ABSENT if an omitted part may change the result. After the deadline it does not
+ * fail: the bound of the omitted part widens the interval. */
 static ebpo_status inspect_pruned(ebpo_context *c, ebpo_nearest *n, ebpo_error *error)
 {
     ebpo_ranking ranking = ebpo_ranking_of(c->model, n->p, &n->far);
@@ -279,8 +289,8 @@ static ebpo_status exact_distance(ebpo_context *c, const double p[3],
     if (status != EBPO_OK)
         return status;
     if (n.late && n.passed_over <= n.limit) {
-        /* With a very short deadline nothing may have been found. The root cell has a face, so its
-         * farthest point is an upper bound. */
+        /* With a very short deadline nothing may have been found. The root cell has a face, so
+         * its farthest point is an upper bound. */
         ebpo_box box = ebpo_model_box(c->model);
         double hi = fmin(n.upper, ebpo_cell_far(&box, (ebpo_cell){ 0, { 0, 0, 0 } }, p)),
                lo = fmin(fmin(n.passed_over, n.found ? n.bounds.lo : n.upper), hi);
@@ -309,9 +319,10 @@ typedef struct interval {
     ebpo_ranking ranking;
     ebpo_far far;
     uint64_t deadline;
-    double lo, hi; /* distances; for a far point keys (point_bounds.h) */
+    double lo, hi; /* bounds so far: distances, or keys if the point is far (point_bounds.h) */
 } interval;
 
+/* Improves the interval by the envelopes below a node. `lower`: bound of `node`. */
 static ebpo_status narrow_interval(interval *v, ebpo_node node, double lower, ebpo_error *error)
 {
     if (lower > v->hi || ebpo_node_is_uniform(&node))
@@ -379,7 +390,6 @@ static ebpo_status distance_of_point(ebpo_context *c, const double p[3],
                          : exact_distance(c, p, o, out, error);
 }
 
-/* Reports modes that support no level or deadline. */
 static ebpo_status check_values(const ebpo_distance_options *o, ebpo_error *error)
 {
     if (!(o->max_distance >= 0))
@@ -388,6 +398,7 @@ static ebpo_status check_values(const ebpo_distance_options *o, ebpo_error *erro
     return o->mode <= EBPO_DISTANCE_ENVELOPE ? EBPO_OK : ebpo_fail_value(error);
 }
 
+/* Returns EBPO_E_ARGUMENT if the mode does not support the given level or deadline. */
 static ebpo_status check_mode(const ebpo_distance_options *o, ebpo_error *error)
 {
     bool around = o->mode == EBPO_DISTANCE_RECURSIVE || o->mode == EBPO_DISTANCE_LEAVES;
@@ -402,6 +413,8 @@ static ebpo_status check_mode(const ebpo_distance_options *o, ebpo_error *error)
     return EBPO_OK;
 }
 
+/* Adds a batch to the model's counts. `searched`, `loaded`: counts of the context before the batch.
+ */
 static void count_work(ebpo_context *c, uint64_t queries, uint64_t searched, uint64_t loaded)
 {
     if (c->model->whole)
@@ -429,7 +442,7 @@ ebpo_status ebpo_distance_many(ebpo_context *context, const double *points, uint
         status = ebpo_check_points(points, count, error);
     if (status == EBPO_OK && o->level < 0 && o->mode != EBPO_DISTANCE_ENVELOPE)
         status = ebpo_check_mesh(context->model, error);
-    /* in a subset, bounds decide if omitted parts matter */
+    /* planes tighten the bounds of levels, deadlines and, in a subset, of omitted parts */
     context->planes = o->level >= 0 || o->deadline_ns || o->mode != EBPO_DISTANCE_EXACT ||
                       context->model->info->pruned;
     ebpo_batch batch = { .context = context,

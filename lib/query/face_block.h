@@ -1,6 +1,7 @@
-/* Reads a block's faces for kernels: eight lanes at a time, one axis after the other. Lanes from
- * `count` on repeat one of the block's faces, so computing bounds needs no mask, but counting does.
- * Included by files that are compiled for several processors. */
+/* Reads a block (at most eight faces, accel.h) for kernels: one face in each of eight lanes, one
+ * axis after the other. Lanes without a face repeat the block's first face. So a kernel that
+ * computes bounds needs no mask; a kernel that counts faces uses ebpo_face_block_lanes. This header
+ * is included by files that are compiled for several processors. */
 #ifndef EBPO_QUERY_FACE_BLOCK_H
 #define EBPO_QUERY_FACE_BLOCK_H
 
@@ -9,7 +10,7 @@
 
 typedef struct ebpo_face_block {
     const ebpo_meshlet *m;
-    n8 corner[3]; /* vertex indices, in blocks with shared vertices */
+    n8 corner[3]; /* [corner] each lane's vertex; not used in blocks without shared vertices */
 } ebpo_face_block;
 
 EBPO_EIGHT ebpo_face_block ebpo_face_block_open(const ebpo_accel *s, uint32_t block)
@@ -26,8 +27,8 @@ EBPO_EIGHT unsigned ebpo_face_block_lanes(const ebpo_face_block *b)
     return (1u << b->m->faces) - 1;
 }
 
-/* Reads the three corners' coordinates on an axis, in the model's unit; for an accel (acceleration
- * structure of a subtree) of floats. */
+/* Reads one coordinate (`axis`) of the three corners of all lanes, in the model's unit. The accel
+ * (acceleration structure of a subtree) must store floats (`wide` is false). */
 EBPO_EIGHT void ebpo_face_block_floats(const ebpo_face_block *b, int axis, f8 corner[3])
 {
     const float *x = ebpo_meshlet_floats(b->m) + (unsigned)axis * b->m->vertices;
@@ -36,13 +37,13 @@ EBPO_EIGHT void ebpo_face_block_floats(const ebpo_face_block *b, int axis, f8 co
             corner[i] = f8_load(x + i * EBPO_BLOCK);
         return;
     }
-    f8_table table = f8_table_load(x); /* memory after the block's vertices is loaded, but never
-                                        * picked */
+    f8_table table =
+        f8_table_load(x); /* loads 16 floats; those after the block's vertices are not used */
     for (int i = 0; i < 3; i++)
         corner[i] = f8_look_up(table, b->corner[i]);
 }
 
-/* As ebpo_face_block_floats, for an accel of doubles. */
+/* As ebpo_face_block_floats, for an accel that stores doubles (`wide`). */
 EBPO_EIGHT void ebpo_face_block_doubles(const ebpo_face_block *b, int axis,
                                         double corner[3][EBPO_BLOCK])
 {

@@ -66,10 +66,9 @@ static void try_block(box_walk *w, const ebpo_accel *s, uint32_t block)
     }
 }
 
-/* Adds the slots of the faces that intersect the box and are below a child of a node of the
- * hierarchy. low, high: the query's box
- * in the subtree's frame. The hierarchy's boxes were enlarged by more than the rounding error of
- * floats here. */
+/* Adds the slots of the faces that intersect the box and are below `child`, a node of the hierarchy
+ * or a block. low, high: the query's box in the subtree's frame. The hierarchy's boxes were
+ * enlarged by more than the rounding error of floats here. */
 static void gather_child(box_walk *w, const ebpo_accel *s, const float low[3], const float high[3],
                          uint32_t child)
 {
@@ -145,10 +144,10 @@ static void list_ahead(box_walk *w, const ebpo_box *box, ebpo_node node)
  * this subtree and the following ones, EBPO_HINTED_MAX in total. */
 static void send_hints(box_walk *w)
 {
-    uint64_t at = w->entered++, left = at < w->ahead_count ? w->ahead_count - at : 0;
-    if (at % EBPO_HINTED_MAX == 0 && left)
+    uint64_t at = w->entered++, remaining = at < w->ahead_count ? w->ahead_count - at : 0;
+    if (at % EBPO_HINTED_MAX == 0 && remaining)
         ebpo_context_hint(w->context, w->ahead + at,
-                          left < EBPO_HINTED_MAX ? left : EBPO_HINTED_MAX);
+                          remaining < EBPO_HINTED_MAX ? remaining : EBPO_HINTED_MAX);
 }
 
 /* Gathers the slots of all subtrees at or below the node. */
@@ -218,8 +217,8 @@ static bool find_first(const box_walk *w, const ebpo_box *box, ebpo_node node,
     return found;
 }
 
-/* Returns true if the triangle, which intersects the box, is taken in the current accel. This is
- * true in exactly one accel. `owned`: the current accel owns the face. */
+/* Returns true in exactly one of the accels that list a face which intersects the box: in the first
+ * one (find_first). `owned`: the current accel owns the face. */
 static bool box_walk_is_first(const box_walk *w, bool owned, const double triangle[3][3])
 {
     const ebpo_model *m = w->context->model;
@@ -237,7 +236,7 @@ static bool box_walk_is_first(const box_walk *w, bool owned, const double triang
 
 /* --- indices of faces --- */
 
-/* A face: its index in the file, and the index that callers get. */
+/* A face: its index in the file and in the source (the index that callers get). */
 typedef struct pair {
     uint64_t file_face, source_face;
 } pair;

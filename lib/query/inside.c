@@ -1,16 +1,18 @@
 /* Decides exactly whether points are inside a model.
  *
- * In a leaf the signs of its faces' planes decide where possible (leaf_kinds.c). Where the signs do
- * not decide, the faces that axis-parallel segments cross are counted: one segment begins at a cell
- * face that no face intersects, or three segments lead from the cell's lowest corner to the point.
- * A filter in single precision counts first (inside_kernels.c); exact predicates decide the faces
- * that the filter leaves open. Many points in a model that is all in memory go down the tree
- * several at a time.
+ * In a leaf, the signs of the planes of the leaf's faces decide where possible (leaf_kinds.c).
+ * Where they do not, crossings of faces with axis-parallel segments are counted: with one segment
+ * from a free cell face (one that no face intersects) to the point, or with three segments that
+ * lead from the cell's lowest corner to the point. A filter in single precision counts first
+ * (inside_kernels.c); exact predicates decide the faces that are *open*: the filter could not
+ * decide them. In a model that is completely in memory, a batch goes down the tree several points
+ * at a time.
  *
  * A query that may use envelopes, stops at a level or has a deadline goes from node to node and
- * loads subtrees on the way; with EBPO_LOAD_NODES it reads only the nodes on the way. Envelopes
- * decide pruned nodes (whose children are not in the file), or the query fails with EBPO_E_ABSENT.
- * Envelopes of a surface do not contain its inside, so only its white nodes decide.
+ * loads subtrees on the way; with EBPO_LOAD_NODES it reads only the nodes on the way. If the point
+ * is in a pruned node (whose children are not in the file), an envelope decides, or the query fails
+ * with EBPO_E_ABSENT. Envelopes of a surface do not contain its inside, so they decide nothing
+ * there.
  *
  * Sources: EBP 2017, 4.2; format-spec, section 10. */
 #include "core/strict_fp.h"
@@ -31,15 +33,15 @@
 #include "query/query_model.h"
 #include "query/query_node.h"
 
-/* Decides points in pruned nodes. Recursive: a subtree may end in a pruned node, above which
- * envelopes decide. */
+/* Decides a point in a pruned node by the envelopes of the nodes above it. It is declared here
+ * because it calls functions below that call it. */
 static ebpo_status inside_pruned(ebpo_context *context, const double p[3], ebpo_inside_result *out,
                                  ebpo_error *error);
 
 /* --- one leaf --- */
 
-/* Decides the faces that the filter left open, and adds their crossings. Returns true when the
- * point is on a face that was open. */
+/* Decides the open faces, and adds their crossings to *sum. Returns true if `point` (NULL: no test)
+ * is on one of them. */
 static bool decide_open(const ebpo_accel *s, const uint32_t *open, uint32_t count,
                         const ebpo_axis_segment *g, const double *point, int32_t *sum)
 {
@@ -53,8 +55,8 @@ static bool decide_open(const ebpo_accel *s, const uint32_t *open, uint32_t coun
     return false;
 }
 
-/* Counts crossings along a segment. Tests if `point` (the segment's end) is on a face; NULL: no
- * test. Returns false when `point` is on a face. */
+/* Sets *sum to the crossings along a segment. Returns false if `point`, an end of the segment, is
+ * on a face. NULL: no test. */
 static bool cross_leaf(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
                        const ebpo_accel_leaf *leaf, const ebpo_axis_segment *g, const double *point,
                        uint32_t *open, int32_t *sum)
@@ -65,38 +67,38 @@ static bool cross_leaf(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
 }
 
 /* A point in a leaf's cell. */
-typedef struct in_leaf {
+typedef struct leaf_point {
     ebpo_cell leaf;
-    double xi[3];       /* the point in the coordinates of the cell, 0 .. 1; the error is at most
-                         * 2^-30 */
-    uint32_t sixteenth; /* the point in sixteenths of the cell as in ebpo_listed_block, eight bits
-                         * for each axis */
-} in_leaf;
+    double xi[3];       /* coordinates in the cell, 0 .. 1; the error is at most 2^-30 */
+    uint32_t sixteenth; /* coordinates in sixteenths of the cell, eight bits for each axis, as the
+                         * lower sides in ebpo_listed_block */
+} leaf_point;
 
-static inline void find_in_leaf(int fine, int level, const ebpo_position *place, in_leaf *out)
+static inline void find_leaf_point(int deepest, int level, const ebpo_position *position,
+                                   leaf_point *out)
 {
-    int up = fine - level;
+    int up = deepest - level;
     double size = ebpo_half_power(up);
     out->leaf.level = level;
     out->sixteenth = 0;
     for (int k = 0; k < 3; k++) {
-        out->leaf.at[k] = place->at[k] >> up;
-        out->xi[k] = (place->cells[k] - (double)(out->leaf.at[k] << up)) * size;
+        out->leaf.at[k] = position->at[k] >> up;
+        out->xi[k] = (position->cells[k] - (double)(out->leaf.at[k] << up)) * size;
         int at = (int)(out->xi[k] * EBPO_LISTED_CELLS); /* rounding may give 16 */
         out->sixteenth |= (uint32_t)(at < 15 ? at : 15) << 8 * k;
     }
 }
 
-/* Returns the `reach` of ebpo_axis_segment for the point alone; a segment from the point to a cell
- * face extends this reach. */
-static inline uint32_t reach_of(const in_leaf *i)
+/* Returns ebpo_axis_segment.reach for the point alone. A segment from the point to a cell face has
+ * more bits. */
+static inline uint32_t reach_of(const leaf_point *at)
 {
-    return i->sixteenth | (UINT32_C(0x0f0f0f) - i->sixteenth) << 4;
+    return at->sixteenth | (UINT32_C(0x0f0f0f) - at->sixteenth) << 4;
 }
 
 /* Returns the segment from the leaf's free cell face to the point. */
-static ebpo_axis_segment cell_face_segment(const ebpo_box *box, uint8_t cell_face, const in_leaf *i,
-                                           const double p[3])
+static ebpo_axis_segment cell_face_segment(const ebpo_box *box, uint8_t cell_face,
+                                           const leaf_point *at, const double p[3])
 {
     int axis = cell_face / 2;
     ebpo_axis_segment g = {
@@ -104,9 +106,9 @@ static ebpo_axis_segment cell_face_segment(const ebpo_box *box, uint8_t cell_fac
         p[axis],
         axis,
         /* the cell face is at 15 (upper face), or at 0, stored as 15 (lower face) */
-        reach_of(i) | (cell_face % 2 ? 0x0fu : 0xf0u) << 8 * axis
+        reach_of(at) | (cell_face % 2 ? 0x0fu : 0xf0u) << 8 * axis
     };
-    double end = ebpo_cell_face(box, axis, i->leaf.level, i->leaf.at[axis] + cell_face % 2);
+    double end = ebpo_cell_face(box, axis, at->leaf.level, at->leaf.at[axis] + cell_face % 2);
     if (cell_face % 2)
         g.to = end;
     else
@@ -114,12 +116,13 @@ static ebpo_axis_segment cell_face_segment(const ebpo_box *box, uint8_t cell_fac
     return g;
 }
 
-/* Finds the winding number by one segment from a cell face that no face intersects. */
+/* Finds the winding number by one segment from the free cell face. Returns false if the point is on
+ * a face. */
 static bool from_cell_face(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
-                           const ebpo_accel_leaf *leaf, const in_leaf *i, const double p[3],
+                           const ebpo_accel_leaf *leaf, const leaf_point *at, const double p[3],
                            uint32_t *open, int32_t *winding)
 {
-    ebpo_axis_segment g = cell_face_segment(&s->box, leaf->cell_face, i, p);
+    ebpo_axis_segment g = cell_face_segment(&s->box, leaf->cell_face, at, p);
     int32_t sum;
     if (!cross_leaf(kernels, s, leaf, &g, p, open, &sum))
         return false;
@@ -127,15 +130,15 @@ static bool from_cell_face(const ebpo_inside_kernels *kernels, const ebpo_accel 
     return true;
 }
 
-/* Finds the winding number by three segments from the lowest corner: format-spec, section 10. The
- * last segment finds the faces that contain the point. `boxed`: the boxes of the leaf's list are
- * known. */
+/* Finds the winding number by three segments from the lowest corner (format-spec, section 10).
+ * Returns false if the point is on a face, which the last segment finds. `boxed`: the boxes of the
+ * leaf's list are known. */
 static bool from_corner(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
-                        const ebpo_accel_leaf *leaf, bool boxed, const in_leaf *i,
+                        const ebpo_accel_leaf *leaf, bool boxed, const leaf_point *at,
                         const double p[3], uint32_t *open, int32_t *winding)
 {
     double low[3], high[3];
-    ebpo_cell_bounds(&s->box, i->leaf, low, high);
+    ebpo_cell_bounds(&s->box, at->leaf, low, high);
     ebpo_axis_segment g = { { low[0], low[1], low[2] }, 0, 0, EBPO_REACH_ALL };
     uint32_t reach = 0xf0f0f0; /* the segment begins at the corner on all axes */
     *winding = leaf->winding;
@@ -144,14 +147,14 @@ static bool from_corner(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
         uint32_t byte = UINT32_C(0xff) << 8 * axis;
         g.axis = axis;
         g.to = p[axis];
-        reach |= i->sixteenth & byte;
+        reach |= at->sixteenth & byte;
         if (boxed)
             g.reach = reach;
         if (!cross_leaf(kernels, s, leaf, &g, axis == 2 ? p : NULL, open, &sum))
             return false;
         *winding += sum;
         g.from[axis] = p[axis];
-        reach = (reach & ~byte) | (reach_of(i) & byte);
+        reach = (reach & ~byte) | (reach_of(at) & byte);
     }
     return true;
 }
@@ -168,45 +171,48 @@ static inline bool any_sign(four_signs mask)
 
 /* Classifies the point by the signs of the leaf's planes. Returns false when a value is within the
  * rounding error. */
-static bool from_planes(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const in_leaf *in,
+static bool from_planes(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const leaf_point *in,
                         int32_t *winding)
 {
     float x = (float)in->xi[0], y = (float)in->xi[1], z = (float)in->xi[2];
     const ebpo_kind_row *row = EBPO_KIND_ROW(s->kinds, leaf->rows);
-    const ebpo_kind_row *says = row++;
-    four_signs above = { 0 }, near = { 0 };
-    for (uint32_t left = says->says.fours; left > 0; left--, row += 4) {
+    const ebpo_kind_row *head = row++;
+    four_signs above = { 0 }, not_below = { 0 };
+    for (uint32_t group = 0; group < head->head.fours; group++, row += 4) {
         four_floats q[4];
         memcpy(q, row, sizeof q);
         four_floats value = q[0] * x + q[1] * y + q[2] * z - q[3];
         above |= value > EBPO_PLANE_ERROR;
-        near |= value >= -EBPO_PLANE_ERROR;
+        not_below |= value >= -EBPO_PLANE_ERROR;
     }
     if (any_sign(above)) {
-        *winding = says->says.outer;
+        *winding = head->head.outer;
         return true;
     }
-    *winding = says->says.inner;
-    return !any_sign(near);
+    *winding = head->head.inner;
+    return !any_sign(not_below);
 }
 
-/* Finds the leaf's kind during queries. */
+/* Counts the query, which may find the leaf's kind, and returns the kind. */
 static __attribute__((noinline)) ebpo_leaf_kind query_kind(const ebpo_context *context,
                                                            const ebpo_accel *s,
-                                                           ebpo_accel_leaf *leaf, const in_leaf *i)
+                                                           ebpo_accel_leaf *leaf,
+                                                           const leaf_point *at)
 {
-    if (ebpo_leaf_query(s, leaf, i->leaf, context->model->kernels.inside->cell_faces))
+    if (ebpo_leaf_query(s, leaf, at->leaf, context->model->kernels.inside->cell_faces))
         ebpo_model_count_kind(context->model, leaf);
     return ebpo_leaf_kind_of(leaf);
 }
 
 static inline ebpo_leaf_kind kind_of(const ebpo_context *context, const ebpo_accel *s,
-                                     ebpo_accel_leaf *leaf, const in_leaf *i)
+                                     ebpo_accel_leaf *leaf, const leaf_point *at)
 {
     ebpo_leaf_kind kind = ebpo_leaf_kind_of(leaf);
-    return kind <= EBPO_LEAF_CONCAVE ? kind : query_kind(context, s, leaf, i);
+    return kind <= EBPO_LEAF_CONCAVE ? kind : query_kind(context, s, leaf, at);
 }
 
+/* Sets the result for a winding number. For a surface, the winding number is given as 0 or 1,
+ * unless the context wants undecided results (ebpo_context.undecided). */
 static inline void give_winding(const ebpo_context *context, int32_t winding,
                                 ebpo_inside_result *out)
 {
@@ -215,7 +221,8 @@ static inline void give_winding(const ebpo_context *context, int32_t winding,
     *out = (ebpo_inside_result){ in ? EBPO_IN : EBPO_OUT, rounded ? in : winding, 0 };
 }
 
-/* Decides a point of a surface by the winding number of surface and caps. */
+/* Decides a point of a surface by the winding number of the closed mesh of surface and caps (faces
+ * that close its holes). */
 static void decide_capped(const ebpo_context *context, const double p[3], int32_t winding,
                           ebpo_inside_result *out)
 {
@@ -231,8 +238,8 @@ static inline void give_out(ebpo_inside_result *out)
 }
 
 /* Classifies a point outside of the root cell. */
-static inline void inside_nowhere(const ebpo_context *context, const double p[3],
-                                  ebpo_inside_result *out)
+static inline void inside_beyond_root(const ebpo_context *context, const double p[3],
+                                      ebpo_inside_result *out)
 {
     if (context->model->holes)
         decide_capped(context, p, 0, out);
@@ -240,8 +247,8 @@ static inline void inside_nowhere(const ebpo_context *context, const double p[3]
         give_out(out);
 }
 
-/* Decides a point of a cell near the border by the winding number at the cell's lowest corner, plus
- * the crossings of faces on the way from there to the point. */
+/* Decides a point of a cell near the border (the edges of holes) by the winding number at the
+ * cell's lowest corner, plus the crossings of caps between this corner and the point. */
 static void decide_near(const ebpo_context *context, ebpo_cell cell, int32_t winding,
                         const double p[3], ebpo_inside_result *out)
 {
@@ -251,9 +258,9 @@ static void decide_near(const ebpo_context *context, ebpo_cell cell, int32_t win
     decide_capped(context, p, winding + ebpo_holes_crossings(context->model->holes, low, p), out);
 }
 
-/* Counts crossings of faces. */
+/* Decides a point in a leaf by counting crossings. */
 static ebpo_status result_by_faces(ebpo_context *context, const ebpo_accel *s,
-                                   const ebpo_accel_leaf *leaf, bool bounded, const in_leaf *i,
+                                   const ebpo_accel_leaf *leaf, bool bounded, const leaf_point *at,
                                    const double p[3], ebpo_inside_result *out, ebpo_error *error)
 {
     const ebpo_inside_kernels *kernels = context->model->kernels.inside;
@@ -264,13 +271,14 @@ static ebpo_status result_by_faces(ebpo_context *context, const ebpo_accel *s,
     if (most > context->open_capacity &&
         !ebpo_grow(&context->open, &context->open_capacity, most, sizeof *context->open))
         return ebpo_fail_memory(error, most * sizeof *context->open);
-    bool off = bounded && leaf->cell_face < EBPO_NO_CELL_FACE
-                   ? from_cell_face(kernels, s, leaf, i, p, context->open, &winding)
-                   : from_corner(kernels, s, leaf, bounded && !near, i, p, context->open, &winding);
-    if (!off)
+    bool on_no_face =
+        bounded && leaf->cell_face < EBPO_NO_CELL_FACE
+            ? from_cell_face(kernels, s, leaf, at, p, context->open, &winding)
+            : from_corner(kernels, s, leaf, bounded && !near, at, p, context->open, &winding);
+    if (!on_no_face)
         *out = (ebpo_inside_result){ EBPO_ON, 0, 0 };
     else if (near && leaf->cell_face == EBPO_NEAR_CAPS)
-        decide_near(context, i->leaf, winding, p, out);
+        decide_near(context, at->leaf, winding, p, out);
     else if (near)
         decide_capped(context, p, winding, out);
     else
@@ -279,47 +287,48 @@ static ebpo_status result_by_faces(ebpo_context *context, const ebpo_accel *s,
 }
 
 static ebpo_status result_in_leaf(ebpo_context *context, const ebpo_accel *s, ebpo_accel_leaf *leaf,
-                                  const in_leaf *i, const double p[3], ebpo_inside_result *out,
+                                  const leaf_point *at, const double p[3], ebpo_inside_result *out,
                                   ebpo_error *error)
 {
     int32_t winding;
-    ebpo_leaf_kind kind = kind_of(context, s, leaf, i);
-    if (!ebpo_leaf_has_planes(kind) || !from_planes(s, leaf, i, &winding))
-        return result_by_faces(context, s, leaf, ebpo_leaf_is_bounded(kind), i, p, out, error);
+    ebpo_leaf_kind kind = kind_of(context, s, leaf, at);
+    if (!ebpo_leaf_has_planes(kind) || !from_planes(s, leaf, at, &winding))
+        return result_by_faces(context, s, leaf, ebpo_leaf_is_bounded(kind), at, p, out, error);
     give_winding(context, winding, out);
     return EBPO_OK;
 }
 
-/* Classifies p in a leaf of a subtree at this level; p is in the leaf's cell, and `place` is its
+/* Classifies p in a leaf of a subtree at this level; p is in the leaf's cell, and `position` is its
  * shifted position. */
 static ebpo_status inside_leaf(ebpo_context *context, const ebpo_accel *s, uint32_t number,
-                               int level, const ebpo_position *place, const double p[3],
+                               int level, const ebpo_position *position, const double p[3],
                                ebpo_inside_result *out, ebpo_error *error)
 {
-    in_leaf i;
-    find_in_leaf(context->model->locator.level, level, place, &i);
-    return result_in_leaf(context, s, &s->leaf[number], &i, p, out, error);
+    leaf_point at;
+    find_leaf_point(context->model->locator.level, level, position, &at);
+    return result_in_leaf(context, s, &s->leaf[number], &at, p, out, error);
 }
 
 /* Classifies a point in a white node of a surface. */
 static __attribute__((noinline)) void inside_marked(const ebpo_context *context,
                                                     const ebpo_node_table *table, uint32_t entry,
-                                                    const ebpo_position *place, int level,
+                                                    const ebpo_position *position, int level,
                                                     const double p[3], ebpo_inside_result *out)
 {
-    int fine = context->model->locator.level;
+    int deepest = context->model->locator.level;
     int32_t marked = ebpo_entry_winding(entry);
     while (ebpo_entry_mark(marked) == EBPO_MARK_SPLIT)
-        marked = ebpo_entry_winding(
-            table->split[ebpo_marked_value(marked)][ebpo_octant_at(place->at, fine - ++level)]);
+        marked = ebpo_entry_winding(table->split[ebpo_marked_value(marked)]
+                                                [ebpo_octant_at(position->at, deepest - ++level)]);
     int32_t winding = ebpo_marked_value(marked);
     bool in = ebpo_entry_mark(marked) == EBPO_MARK_IN;
     switch (ebpo_entry_mark(marked)) {
     case EBPO_MARK_APART: decide_capped(context, p, winding, out); break;
     case EBPO_MARK_NEAR:
         decide_near(context,
-                    ebpo_cell_ancestor((ebpo_cell){ fine,
-                                                    { place->at[0], place->at[1], place->at[2] } },
+                    ebpo_cell_ancestor((ebpo_cell){ deepest,
+                                                    { position->at[0], position->at[1],
+                                                      position->at[2] } },
                                        level),
                     winding, p, out);
         break;
@@ -331,71 +340,72 @@ static __attribute__((noinline)) void inside_marked(const ebpo_context *context,
 
 /* Classifies a point in a white or black node of a table. */
 static inline void inside_uniform(const ebpo_context *context, const ebpo_node_table *table,
-                                  uint32_t entry, const ebpo_position *place, int level,
+                                  uint32_t entry, const ebpo_position *position, int level,
                                   const double p[3], ebpo_inside_result *out)
 {
     if (context->model->holes)
-        inside_marked(context, table, entry, place, level, p, out);
+        inside_marked(context, table, entry, position, level, p, out);
     else
         give_winding(context, ebpo_entry_winding(entry), out);
 }
 
-/* Classifies p in a subtree whose root's cell contains p; `place` is its shifted position. */
+/* Classifies p in a subtree whose root's cell contains p; `position` is its shifted position. */
 static ebpo_status inside_subtree(ebpo_context *context, const ebpo_accel *s,
-                                  const ebpo_position *place, const double p[3],
+                                  const ebpo_position *position, const double p[3],
                                   ebpo_inside_result *out, ebpo_error *error)
 {
-    ebpo_descent d = ebpo_descend(&s->nodes, context->model->locator.level, place->at);
+    ebpo_descent d = ebpo_descend(&s->nodes, context->model->locator.level, position->at);
     if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_UNIFORM) {
-        inside_uniform(context, &s->nodes, d.entry, place, d.level, p, out);
+        inside_uniform(context, &s->nodes, d.entry, position, d.level, p, out);
         return EBPO_OK;
     }
     if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_SUBTREE_ROOT)
         return inside_pruned(context, p, out, error);
-    return inside_leaf(context, s, ebpo_entry_value(d.entry), d.level, place, p, out, error);
+    return inside_leaf(context, s, ebpo_entry_value(d.entry), d.level, position, p, out, error);
 }
 
-/* Number of points that are processed together, stage by stage, so that memory for one stage is
- * fetched while other points are processed. */
-enum { TOGETHER = 16 };
+/* Number of points that are processed together, stage by stage: memory for the next stage of one
+ * point is fetched while other points are processed. */
+enum { POINTS_TOGETHER = 16 };
 
+/* One of these points on its way down the tree. */
 typedef struct lane {
-    ebpo_position place;
-    bool within;
+    ebpo_position position;
+    bool within; /* the point is in the root cell */
     ebpo_descent d;
 } lane;
 
 /* A point whose way down the tree ended in a leaf. */
 typedef struct waiting {
     ebpo_accel_leaf *leaf;
-    unsigned point;
-    in_leaf in;
+    unsigned point; /* index of the point */
+    leaf_point in;
 } waiting;
 
 static void start_lanes(const ebpo_accel *s, const ebpo_locator *locator, const double *points,
                         unsigned count, lane *l)
 {
-    int fine = locator->level;
+    int deepest = locator->level;
     for (unsigned i = 0; i < count; i++) {
-        l[i].within = ebpo_locator_find(locator, points + 3 * i, &l[i].place);
+        l[i].within = ebpo_locator_find(locator, points + 3 * i, &l[i].position);
         if (l[i].within && s->nodes.grid) {
-            uint64_t cell = ebpo_grid_cell(&s->nodes, fine, l[i].place.at);
+            uint64_t cell = ebpo_grid_cell(&s->nodes, deepest, l[i].position.at);
             __builtin_prefetch(&s->nodes.grid[cell]);
         }
     }
     for (unsigned i = 0; i < count; i++)
         if (l[i].within) {
-            l[i].d = ebpo_descent_begin(&s->nodes, fine, l[i].place.at);
+            l[i].d = ebpo_descent_begin(&s->nodes, deepest, l[i].position.at);
             ebpo_descent_prefetch(&l[i].d, &s->nodes);
         }
 }
 
-static void descend_together(const ebpo_accel *s, int fine, unsigned count, lane *l)
+static void descend_together(const ebpo_accel *s, int deepest, unsigned count, lane *l)
 {
     for (bool more = true; more;) {
         more = false;
         for (unsigned i = 0; i < count; i++)
-            if (l[i].within && ebpo_descent_step(&l[i].d, &s->nodes, fine, l[i].place.at))
+            if (l[i].within && ebpo_descent_step(&l[i].d, &s->nodes, deepest, l[i].position.at))
                 more |= ebpo_descent_prefetch(&l[i].d, &s->nodes);
     }
 }
@@ -443,17 +453,17 @@ static ebpo_status result_waiting(ebpo_context *context, const ebpo_accel *s, co
 static ebpo_status inside_together(ebpo_context *context, const ebpo_accel *s, const double *points,
                                    unsigned count, ebpo_inside_result *out, ebpo_error *error)
 {
-    lane l[TOGETHER];
-    waiting w[TOGETHER];
+    lane l[POINTS_TOGETHER];
+    waiting w[POINTS_TOGETHER];
     unsigned leaves = 0;
-    int fine = context->model->locator.level;
+    int deepest = context->model->locator.level;
     start_lanes(s, &context->model->locator, points, count, l);
-    descend_together(s, fine, count, l);
+    descend_together(s, deepest, count, l);
     for (unsigned i = 0; i < count; i++) {
         if (!l[i].within) {
-            inside_nowhere(context, points + 3 * i, &out[i]);
+            inside_beyond_root(context, points + 3 * i, &out[i]);
         } else if (ebpo_entry_kind_of(l[i].d.entry) == EBPO_ENTRY_UNIFORM) {
-            inside_uniform(context, &s->nodes, l[i].d.entry, &l[i].place, l[i].d.level,
+            inside_uniform(context, &s->nodes, l[i].d.entry, &l[i].position, l[i].d.level,
                            points + 3 * i, &out[i]);
         } else if (ebpo_entry_kind_of(l[i].d.entry) == EBPO_ENTRY_SUBTREE_ROOT) {
             ebpo_status status = inside_pruned(context, points + 3 * i, &out[i], error);
@@ -463,7 +473,7 @@ static ebpo_status inside_together(ebpo_context *context, const ebpo_accel *s, c
             w[leaves].leaf = &s->leaf[ebpo_entry_value(l[i].d.entry)];
             w[leaves].point = i;
             __builtin_prefetch(w[leaves].leaf);
-            find_in_leaf(fine, l[i].d.level, &l[i].place, &w[leaves].in);
+            find_leaf_point(deepest, l[i].d.level, &l[i].position, &w[leaves].in);
             leaves++;
         }
     }
@@ -477,16 +487,17 @@ static ebpo_status inside_whole(ebpo_context *context, const double *points, uin
     const ebpo_accel *s = context->model->whole;
     ebpo_status status = EBPO_OK;
     if (count == 1) {
-        ebpo_position place;
-        if (ebpo_locator_find(&context->model->locator, points, &place))
-            status = inside_subtree(context, s, &place, points, out, error);
+        ebpo_position position;
+        if (ebpo_locator_find(&context->model->locator, points, &position))
+            status = inside_subtree(context, s, &position, points, out, error);
         else
-            inside_nowhere(context, points, out);
+            inside_beyond_root(context, points, out);
     }
-    for (uint64_t i = 0; count > 1 && i < count && status == EBPO_OK; i += TOGETHER)
-        status = inside_together(context, s, points + 3 * i,
-                                 count - i < TOGETHER ? (unsigned)(count - i) : TOGETHER, out + i,
-                                 error);
+    for (uint64_t i = 0; count > 1 && i < count && status == EBPO_OK; i += POINTS_TOGETHER)
+        status =
+            inside_together(context, s, points + 3 * i,
+                            count - i < POINTS_TOGETHER ? (unsigned)(count - i) : POINTS_TOGETHER,
+                            out + i, error);
     if (status == EBPO_OK && done)
         memset(done, true, count);
     return status;
@@ -496,11 +507,12 @@ static ebpo_status inside_whole(ebpo_context *context, const double *points, uin
 
 static bool uses_envelopes(const ebpo_context *c, const ebpo_inside_options *o)
 {
-    /* An envelope proves that a point is outside, but not which winding number the point has: with
-     * rules other than nonzero the result would be incomplete. */
-    bool whole_result =
+    /* An envelope proves that a point is outside, but not its winding number. Under rules other
+     * than nonzero the result would be incomplete, so only queries with a level or deadline use
+     * envelopes. */
+    bool proves_result =
         c->model->info->rule == EBPO_RULE_NONZERO || o->level >= 0 || o->deadline_ns;
-    if (o->envelopes == EBPO_ENVELOPES_SKIP || !whole_result || c->model->holes)
+    if (o->envelopes == EBPO_ENVELOPES_SKIP || !proves_result || c->model->holes)
         return false;
     return o->envelopes == EBPO_ENVELOPES_USE || !c->model->whole || o->level >= 0 ||
            o->deadline_ns;
@@ -513,7 +525,7 @@ typedef struct inside_query {
     bool envelopes;
     uint64_t deadline; /* a time of ebpo_clock; 0: none */
     const double *p;
-    ebpo_position place;
+    ebpo_position position;
 } inside_query;
 
 static void give_maybe(const inside_query *a, ebpo_cell cell, ebpo_inside_result *out)
@@ -531,6 +543,7 @@ static bool outside_envelope(const inside_query *a, const ebpo_node *node)
 
 static bool is_late(const inside_query *a) { return a->deadline && ebpo_clock() > a->deadline; }
 
+/* Returns true if the query's level or deadline ends the way down at this node. */
 static bool stops_here(const inside_query *a, const ebpo_node *node)
 {
     if (a->options->level >= 0 &&
@@ -539,7 +552,7 @@ static bool stops_here(const inside_query *a, const ebpo_node *node)
     return is_late(a);
 }
 
-/* Returns the table of nodes that are in no subtree. */
+/* Returns the table of the nodes that are not in a subtree loaded on demand. */
 static const ebpo_node_table *top_nodes(const ebpo_model *m)
 {
     return m->whole ? &m->whole->nodes : &m->top->nodes;
@@ -552,7 +565,7 @@ static inline bool decide_at(const inside_query *a, const ebpo_node *node, ebpo_
     if (ebpo_node_is_uniform(node))
         inside_uniform(a->context,
                        node->subtree ? &node->subtree->nodes : top_nodes(a->context->model),
-                       node->entry, &a->place, node->cell.level, a->p, out);
+                       node->entry, &a->position, node->cell.level, a->p, out);
     else if (outside_envelope(a, node))
         give_out(out);
     else if (stops_here(a, node))
@@ -565,7 +578,7 @@ static inline bool decide_at(const inside_query *a, const ebpo_node *node, ebpo_
 static ebpo_status walk_down(inside_query *a, ebpo_inside_result *out, ebpo_error *error)
 {
     const ebpo_model *m = a->context->model;
-    int fine = m->info->level_count - 1;
+    int deepest = m->info->level_count - 1;
     ebpo_node node = ebpo_model_root(m);
     for (;;) {
         if (decide_at(a, &node, out))
@@ -575,17 +588,18 @@ static ebpo_status walk_down(inside_query *a, ebpo_inside_result *out, ebpo_erro
             if (status != EBPO_OK)
                 return status;
             if (!a->envelopes && a->options->level < 0 && !a->deadline)
-                return inside_subtree(a->context, node.subtree, &a->place, a->p, out, error);
+                return inside_subtree(a->context, node.subtree, &a->position, a->p, out, error);
         }
         if (ebpo_entry_kind_of(node.entry) == EBPO_ENTRY_LEAF)
             return inside_leaf(a->context, node.subtree, ebpo_entry_value(node.entry),
-                               node.cell.level, &a->place, a->p, out, error);
-        node = ebpo_model_child(m, &node, ebpo_octant_at(a->place.at, fine - node.cell.level - 1));
+                               node.cell.level, &a->position, a->p, out, error);
+        node = ebpo_model_child(m, &node,
+                                ebpo_octant_at(a->position.at, deepest - node.cell.level - 1));
     }
 }
 
-/* --- node by node from the file: only nodes on the way are read, and only decoded chunks are kept
- * --- */
+/* --- node by node from the file (EBPO_LOAD_NODES): only nodes on the way are read, and only
+ * decoded chunks are kept --- */
 
 static ebpo_status leaf_from_file(inside_query *a, const ebpo_node *leaf, ebpo_inside_result *out,
                                   ebpo_error *error)
@@ -606,7 +620,7 @@ static ebpo_status leaf_from_file(inside_query *a, const ebpo_node *leaf, ebpo_i
     if (status == EBPO_OK) {
         ebpo_model_count_leaves(m, subtree, 1);
         status = inside_leaf(a->context, subtree, ebpo_entry_value(subtree->nodes.root),
-                             leaf->cell.level, &a->place, a->p, out, error);
+                             leaf->cell.level, &a->position, a->p, out, error);
         ebpo_model_count_leaves(m, subtree, -1);
         ebpo_accel_free(subtree);
     }
@@ -625,8 +639,8 @@ static ebpo_status uniform_from_file(inside_query *a, const ebpo_node *node,
     return status;
 }
 
-/* Handles a gray node on the way; sets *done when the node decides. A node is known to be pruned
- * only after its children have been requested. */
+/* Handles a gray node on the way: sets the result and *done, or moves the cursor to a child. A node
+ * is known to be pruned only after its children have been requested. */
 static ebpo_status pass_gray(inside_query *a, ebpo_cursor *c, bool *done, ebpo_inside_result *out,
                              ebpo_error *error)
 {
@@ -654,8 +668,8 @@ static ebpo_status pass_gray(inside_query *a, ebpo_cursor *c, bool *done, ebpo_i
         return status;
     *done = !child;
     if (child)
-        ebpo_cursor_down(c,
-                         ebpo_octant_at(a->place.at, m->info->level_count - 2 - node->cell.level));
+        ebpo_cursor_down(c, ebpo_octant_at(a->position.at,
+                                           m->info->level_count - 2 - node->cell.level));
     else if (limited || is_late(a))
         give_maybe(a, node->cell, out);
     else
@@ -689,64 +703,65 @@ static ebpo_status walk_file(inside_query *a, const ebpo_node *below, ebpo_insid
 static ebpo_status walk_nodes(inside_query *a, ebpo_inside_result *out, ebpo_error *error)
 {
     const ebpo_model *m = a->context->model;
-    int fine = m->info->level_count - 1;
+    int deepest = m->info->level_count - 1;
     ebpo_node node = ebpo_model_root(m);
     while (!ebpo_node_is_subtree_root(&node)) {
         if (decide_at(a, &node, out))
             return EBPO_OK;
-        node = ebpo_model_child(m, &node, ebpo_octant_at(a->place.at, fine - node.cell.level - 1));
+        node = ebpo_model_child(m, &node,
+                                ebpo_octant_at(a->position.at, deepest - node.cell.level - 1));
     }
     return walk_file(a, &node, out, error);
 }
 
-/* Returns the subtree that the context holds if its cell contains p, else NULL. *entry, *level: the
- * node at which the way down the levels above the subtrees ends. */
-static const ebpo_accel *held_around(const inside_query *a, uint32_t *entry, int *level)
+/* Returns the subtree that the context holds in memory, if its cell contains p, else NULL. *entry,
+ * *level: the node at which the way down the top of the tree ends. */
+static const ebpo_accel *find_held(const inside_query *a, uint32_t *entry, int *level)
 {
     const ebpo_context *c = a->context;
-    int fine = c->model->info->level_count - 1;
+    int deepest = c->model->info->level_count - 1;
     *entry = ebpo_entry(EBPO_ENTRY_SUBTREE_ROOT, 0);
     if (c->model->whole)
         return c->model->whole;
-    ebpo_descent d = ebpo_descend(&c->model->top->nodes, fine, a->place.at);
+    ebpo_descent d = ebpo_descend(&c->model->top->nodes, deepest, a->position.at);
     *entry = d.entry;
     *level = d.level;
     bool below = ebpo_entry_kind_of(*entry) == EBPO_ENTRY_SUBTREE_ROOT;
     return below && ebpo_context_has_pinned(c, ebpo_entry_value(*entry)) ? c->pinned : NULL;
 }
 
-/* Returns true when the context holds all data that p needs: then envelopes save nothing, and only
- * the faces of a leaf take time. */
+/* Decides p if the context holds all data that p needs: then envelopes save nothing, because only
+ * the faces of a leaf take time. Returns false if it does not hold them. */
 static bool result_in_memory(inside_query *a, ebpo_inside_result *out, ebpo_status *status,
                              ebpo_error *error)
 {
     const ebpo_model *m = a->context->model;
     uint32_t entry;
     int level;
-    const ebpo_accel *held = held_around(a, &entry, &level);
+    const ebpo_accel *held = find_held(a, &entry, &level);
     *status = EBPO_OK;
     if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_UNIFORM) {
-        inside_uniform(a->context, top_nodes(m), entry, &a->place, level, a->p, out);
+        inside_uniform(a->context, top_nodes(m), entry, &a->position, level, a->p, out);
         return true;
     }
     if (!held)
         return false;
     if (!a->deadline) {
-        *status = inside_subtree(a->context, held, &a->place, a->p, out, error);
+        *status = inside_subtree(a->context, held, &a->position, a->p, out, error);
         return true;
     }
-    int fine = m->info->level_count - 1;
-    ebpo_descent d = ebpo_descend(&held->nodes, fine, a->place.at);
+    int deepest = m->info->level_count - 1;
+    ebpo_descent d = ebpo_descend(&held->nodes, deepest, a->position.at);
     if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_SUBTREE_ROOT)
         return false; /* pruned: an envelope may decide */
-    ebpo_cell cell = ebpo_descent_cell(&d, fine, a->place.at);
+    ebpo_cell cell = ebpo_descent_cell(&d, deepest, a->position.at);
     if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_UNIFORM)
-        inside_uniform(a->context, &held->nodes, d.entry, &a->place, d.level, a->p, out);
+        inside_uniform(a->context, &held->nodes, d.entry, &a->position, d.level, a->p, out);
     else if (is_late(a))
         give_maybe(a, cell, out);
     else
-        *status = inside_leaf(a->context, held, ebpo_entry_value(d.entry), d.level, &a->place, a->p,
-                              out, error);
+        *status = inside_leaf(a->context, held, ebpo_entry_value(d.entry), d.level, &a->position,
+                              a->p, out, error);
     return true;
 }
 
@@ -762,7 +777,7 @@ static ebpo_status inside_pruned(ebpo_context *context, const double p[3], ebpo_
     inside_query a = {
         .context = context, .options = &options, .box = ebpo_model_box(m), .envelopes = true, .p = p
     };
-    if (!ebpo_locator_find(&m->locator, p, &a.place))
+    if (!ebpo_locator_find(&m->locator, p, &a.position))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "a point outside the root cell has no node");
     ebpo_status status = walk_down(&a, out, error);
     if (status == EBPO_OK && out->where == EBPO_OUT &&
@@ -786,8 +801,8 @@ static ebpo_status inside_walk(ebpo_context *context, const double p[3],
                        .p = p };
     if (options->deadline_ns)
         a.deadline = ebpo_clock() + options->deadline_ns;
-    if (!ebpo_locator_find(&m->locator, p, &a.place)) {
-        inside_nowhere(context, p, out);
+    if (!ebpo_locator_find(&m->locator, p, &a.position)) {
+        inside_beyond_root(context, p, out);
         return EBPO_OK;
     }
     ebpo_status status;
@@ -846,8 +861,8 @@ ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64
     return ebpo_batch_end(&batch, status, error);
 }
 
-/* Returns true if the query has no special options and everything is in memory: only the point must
- * be checked. */
+/* Returns true if the query has no special options and the model is completely in memory: then no
+ * checks except that of the point are necessary. */
 static inline bool is_plain(const ebpo_context *context, const ebpo_inside_options *o)
 {
     return context->model->results_inside &&
@@ -859,12 +874,12 @@ static ebpo_status inside_plain(ebpo_context *context, const double point[3],
                                 ebpo_inside_result *out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_position place;
-    if (ebpo_locator_find(&context->model->locator, point, &place))
-        return inside_subtree(context, context->model->whole, &place, point, out, error);
+    ebpo_position position;
+    if (ebpo_locator_find(&context->model->locator, point, &position))
+        return inside_subtree(context, context->model->whole, &position, point, out, error);
     ebpo_status status = ebpo_check_points(point, 1, error);
     if (status == EBPO_OK)
-        inside_nowhere(context, point, out);
+        inside_beyond_root(context, point, out);
     return status;
 }
 

@@ -143,8 +143,9 @@ static int compare_plane(const double weight[3], const double size[3], const dou
     return height > error ? 1 : height < -error ? -1 : 0;
 }
 
-/* Tests if a face, which certainly intersects the segment's line, intersects the segment: 1 yes, 0
- * no, -1 not certain. t: the face's corners. `turn`: as for compare_plane. */
+/* Tests if a face that certainly intersects the segment's line intersects the segment. Returns 1 if
+ * it does, 0 if not, -1 if this is not certain. t: the face's corners. `turn`: as for
+ * compare_plane. */
 static int intersects_segment(const double t[3][3], int u, int v, const ebpo_axis_segment *g,
                               int turn)
 {
@@ -221,7 +222,7 @@ typedef struct faces_of_cell {
     double low[3], high[3];
     double inverse[3]; /* inverse of the cell's size */
     float low_down[3], low_up[3], high_down[3], high_up[3];
-    bool fine; /* false if the cell is too small for boxes: each box is then the whole cell */
+    bool has_boxes; /* false if the cell is too small for boxes: each box is then the whole cell */
 } faces_of_cell;
 
 /* Returns the float that is `steps` (-1, 0, 1) away, in the order of floats. -0 and +0 are two
@@ -255,11 +256,11 @@ static inline float float_above(double x)
 static void find_cell_faces(const ebpo_accel *s, ebpo_cell cell, faces_of_cell *out)
 {
     ebpo_cell_bounds(&s->box, cell, out->low, out->high);
-    out->fine = true;
+    out->has_boxes = true;
     for (int k = 0; k < 3; k++) {
         double size = out->high[k] - out->low[k];
         out->inverse[k] = 1 / size;
-        out->fine = out->fine && size > 0x1p-900;
+        out->has_boxes = out->has_boxes && size > 0x1p-900;
         out->low_down[k] = float_below(out->low[k]);
         out->low_up[k] = float_above(out->low[k]);
         out->high_down[k] = float_below(out->high[k]);
@@ -308,10 +309,10 @@ static spans span_doubles(const ebpo_face_block *b, const faces_of_cell *w, int 
     return out;
 }
 
-/* Converts a side of a box to sixteenths of the cell, 0 to 15. Direction -1, for the lower side:
- * returns the index of the sixteenth that contains the side. Direction 1, for the upper side:
- * returns 15 minus this index. The box is first enlarged by 2^-8 of a sixteenth, which is far more
- * than the rounding error here and in queries (2^-20 of a sixteenth). */
+/* Converts a side of a box to sixteenths of the cell, 0 to 15. With direction -1, for the lower
+ * side: returns the index of the sixteenth that contains the side. With direction 1, for the upper
+ * side: returns 15 minus this index. The box is first enlarged by 2^-8 of a sixteenth, which is far
+ * more than the rounding error here and in queries (2^-20 of a sixteenth). */
 static inline uint64_t find_sixteenth(float x, double low, double inverse, double direction)
 {
     double sixteenths = ((double)x - low) * inverse * EBPO_LISTED_CELLS + direction * 0x1p-8;
@@ -351,7 +352,7 @@ static unsigned bound_block(const ebpo_accel *s, ebpo_listed_block *at, const fa
     }
     for (int i = 0; i < 6; i++)
         reached |= (unsigned)((near & span[i / 2].reaches[i % 2]) != 0) << i;
-    uint64_t box = !near ? UINT64_MAX << EBPO_LISTED_BOX : w->fine ? box_of(span, near, w) : 0;
+    uint64_t box = !near ? UINT64_MAX << EBPO_LISTED_BOX : w->has_boxes ? box_of(span, near, w) : 0;
     ebpo_list(at, listed | box);
     return reached;
 }

@@ -5,14 +5,14 @@
  * signs of planes decide), or general (accel.h). One thread does that, while the others treat the
  * leaf as a general one. Kinds never change results.
  *
- * Proof that the planes of some leaves decide: let P be the set of points of the cell below all
- * planes of the leaf's faces. Suppose that every face is in P (all its corners are below all
- * planes). Then each face is on the boundary of P, so the winding number is constant within P's
- * interior; and it is constant in each component of the rest of the cell. Every such component
- * contains a corner of the cell: a point above plane i can move to the corner that is farthest
- * along that plane's normal and stays above. So when all corners of the cell outside P's closure
- * have the same winding number, and one point of P's interior is known, the planes decide. The same
- * holds with "above" for "below" (concave). */
+ * Proof that the planes of some leaves decide: a point is below a plane if n . xi < d (leaf_plane).
+ * Let P be the set of points of the cell below all planes of the leaf's faces. Suppose that every
+ * face is in P (all its corners are below all planes). Then each face is on the boundary of P, so
+ * the winding number is constant within P's interior; and it is constant in each component of the
+ * rest of the cell. Every such component contains a corner of the cell: a point above plane i can
+ * move to the corner that is farthest along that plane's normal and stays above. So when all
+ * corners of the cell outside P's closure have the same winding number, and one point of P's
+ * interior is known, the planes decide. The same holds with "above" for "below" (concave). */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -32,14 +32,16 @@ typedef struct leaf_plane {
     double n[3], d;
 } leaf_plane;
 
-/* Planes of a convex leaf (`flip` 1) or of a concave leaf (`flip` -1: planes are turned). The
- * winding numbers are those below all planes, and elsewhere in the cell. */
+/* Planes of a convex leaf (`flip` 1) or of a concave leaf (`flip` -1: all planes are reversed).
+ * `inner` is the winding number below all planes, `outer` the winding number elsewhere in the cell.
+ */
 typedef struct deciding_planes {
     int count, flip;
     int32_t inner, outer;
     leaf_plane plane[EBPO_KIND_PLANES_MAX];
 } deciding_planes;
 
+/* Leaves with more faces stay general. */
 enum { FACES_MAX = 64 };
 
 /* The faces of a leaf in the coordinates of its cell (0 .. 1), rounded: only faces whose boxes
@@ -48,10 +50,11 @@ typedef struct leaf_faces {
     int count;
     double p[FACES_MAX][3][3];
     uint32_t slot[FACES_MAX];
-    double low[3], size[3], inverse[3];
+    double low[3], size[3], inverse[3]; /* lowest corner and size of the cell; 1 / size */
 } leaf_faces;
 
-static bool intersects_cell(const double t[3][3], const double low[3], const double high[3])
+/* Returns true if the triangle's box intersects the cell. */
+static bool box_intersects_cell(const double t[3][3], const double low[3], const double high[3])
 {
     for (int k = 0; k < 3; k++)
         if (ebpo_min3(t[0][k], t[1][k], t[2][k]) > high[k] ||
@@ -67,8 +70,8 @@ static void add_face(uint32_t slot, const double t[3][3], leaf_faces *f)
     f->slot[f->count++] = slot;
 }
 
-/* Gathers the faces whose boxes intersect the cell. Returns false when there are too many faces, or
- * when the cell is too small for the next steps. */
+/* Gathers the faces whose boxes intersect the cell. Returns false if there are more than FACES_MAX,
+ * or if the cell is so small that later products would underflow. */
 static bool gather_faces(const ebpo_accel *s, const ebpo_accel_leaf *leaf, ebpo_cell cell,
                          leaf_faces *f)
 {
@@ -89,7 +92,7 @@ static bool gather_faces(const ebpo_accel *s, const ebpo_accel_leaf *leaf, ebpo_
                 ebpo_listed_number(listed) * EBPO_BLOCK + (unsigned)__builtin_ctz(lanes);
             double t[3][3];
             ebpo_accel_triangle(s, slot, t);
-            if (!intersects_cell((const double(*)[3])t, low, high))
+            if (!box_intersects_cell((const double(*)[3])t, low, high))
                 continue;
             if (f->count == FACES_MAX)
                 return false;
@@ -100,9 +103,9 @@ static bool gather_faces(const ebpo_accel *s, const ebpo_accel_leaf *leaf, ebpo_
     }
 }
 
-/* Counts crossings of the leaf's faces with a segment along an axis. Skips blocks whose box has any
- * bit of `excluded`: the lower side of such a box is above the lower side of the cell, where the
- * segment is. */
+/* Returns the signed crossings of the leaf's faces with a segment along an axis. Skips blocks whose
+ * list entry has any bit of `excluded`: bits of lower sides of boxes. If such a bit is set, the box
+ * begins above the lower side of the cell, and the segment is on that lower side. */
 static int32_t leaf_crossings(const ebpo_accel *s, const ebpo_accel_leaf *leaf,
                               const double from[3], double to, int axis, uint64_t excluded)
 {
@@ -121,8 +124,8 @@ static int32_t leaf_crossings(const ebpo_accel *s, const ebpo_accel_leaf *leaf,
     }
 }
 
-/* Returns the winding number at a shifted point of the cell: from the lowest corner, axis by axis.
- */
+/* Returns the winding number at a point of the cell, after the infinitesimal shift of format-spec,
+ * section 10: adds crossings on the way from the lowest corner, axis by axis. */
 static int32_t winding_at(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const double low[3],
                           const double p[3])
 {
@@ -137,11 +140,11 @@ static int32_t winding_at(const ebpo_accel *s, const ebpo_accel_leaf *leaf, cons
 }
 
 /* Computes the plane of a face in the cell's coordinates, with a normal of 1-norm 1. Returns false
- * when rounding may matter: for a sliver, or for corners far outside the cell. */
+ * if rounding may matter, as the face is very thin or has corners far outside the cell. */
 static bool face_plane(const ebpo_accel *s, const leaf_faces *f, int face, leaf_plane *out)
 {
     const double(*p)[3] = (const double(*)[3])f->p[face];
-    double t[3][3], e[3], g[3], norm = 0, products = 0, reach = 0;
+    double t[3][3], e[3], g[3], norm = 0, products = 0, greatest = 0;
     ebpo_accel_triangle(s, f->slot[face], t);
     for (int k = 0; k < 3; k++) { /* uses the exact corners: the corners in the cell's coordinates
                                    * are rounded, which is too inexact for short edges */
@@ -154,11 +157,11 @@ static bool face_plane(const ebpo_accel *s, const leaf_faces *f, int face, leaf_
         out->n[k] = a - b;
         norm += fabs(a - b);
         products += fabs(a) + fabs(b);
-        reach = ebpo_max3(reach, ebpo_max3(fabs(p[0][k]), fabs(p[1][k]), fabs(p[2][k])), 0);
+        greatest = ebpo_max3(greatest, ebpo_max3(fabs(p[0][k]), fabs(p[1][k]), fabs(p[2][k])), 0);
     }
     /* The error of n is 2^-50 of the products, so 2^-40 of its norm. The error of n . xi is 2^-33
      * for every corner: less than the margin of sides_of. */
-    if (!(norm > products * 0x1p-10) || !(products > 0x1p-900) || !(reach < 64))
+    if (!(norm > products * 0x1p-10) || !(products > 0x1p-900) || !(greatest < 64))
         return false;
     out->d = 0;
     for (int k = 0; k < 3; k++) {
@@ -181,8 +184,8 @@ static int exact_side(const ebpo_accel *s, uint32_t plane_slot, uint32_t point_s
     return ebpo_orient3d(a[0], a[1], a[2], b[corner]);
 }
 
-/* Returns the sides of plane i on which there are corners of other faces: bit 0: above, bit 1:
- * below. Stops when it has found all wanted sides. */
+/* Returns the sides of plane i on which other faces have corners: bit 0: above, bit 1: below. Stops
+ * when it has found all wanted sides. */
 static unsigned sides_of(const ebpo_accel *s, const leaf_faces *f, int i, const leaf_plane *q,
                          unsigned wanted)
 {
@@ -201,7 +204,8 @@ static unsigned sides_of(const ebpo_accel *s, const leaf_faces *f, int i, const 
     return sides;
 }
 
-static bool same_plane(const ebpo_accel *s, const leaf_faces *f, int i, int j)
+/* Returns true if face j is in the plane of face i. */
+static bool is_in_plane(const ebpo_accel *s, const leaf_faces *f, int i, int j)
 {
     for (int c = 0; c < 3; c++)
         if (exact_side(s, f->slot[i], f->slot[j], c) != 0)
@@ -209,15 +213,15 @@ static bool same_plane(const ebpo_accel *s, const leaf_faces *f, int i, int j)
     return true;
 }
 
-/* Returns true if both planes may be the same with the same orientation. */
+/* Returns false if the planes are certainly different, or have opposite orientations. */
 static bool turned_alike(const leaf_plane *a, const leaf_plane *b)
 {
     return fabs(a->d - b->d) < 0x1p-20 &&
            a->n[0] * b->n[0] + a->n[1] * b->n[1] + a->n[2] * b->n[2] > 0;
 }
 
-/* Collects all distinct planes of the leaf when it is convex (`flip` 1) or concave (-1, planes
- * turned). Returns false when it is neither, or when there are too many. */
+/* Collects all distinct planes of a convex or concave leaf. Returns false if the leaf is neither,
+ * or has more than EBPO_KIND_PLANES_MAX planes. */
 static bool collect_planes(const ebpo_accel *s, const leaf_faces *f, deciding_planes *out)
 {
     int of_face[EBPO_KIND_PLANES_MAX];
@@ -233,7 +237,7 @@ static bool collect_planes(const ebpo_accel *s, const leaf_faces *f, deciding_pl
             return false;
         bool known = false;
         for (int k = 0; k < out->count && !known; k++)
-            known = turned_alike(&out->plane[k], &q) && same_plane(s, f, of_face[k], i);
+            known = turned_alike(&out->plane[k], &q) && is_in_plane(s, f, of_face[k], i);
         if (known)
             continue;
         if (out->count == EBPO_KIND_PLANES_MAX)
@@ -245,9 +249,10 @@ static bool collect_planes(const ebpo_accel *s, const leaf_faces *f, deciding_pl
     return true;
 }
 
+/* Returns true if xi is below all planes. Sets *certain to false if rounding may change the result.
+ */
 static bool below_all(const deciding_planes *planes, const double xi[3], bool *certain)
 {
-    bool below = true;
     *certain = true;
     for (int i = 0; i < planes->count; i++) {
         const leaf_plane *q = &planes->plane[i];
@@ -256,14 +261,14 @@ static bool below_all(const deciding_planes *planes, const double xi[3], bool *c
             return *certain = true, false;
         *certain = *certain && value < -0x1p-18;
     }
-    return below;
+    return true;
 }
 
 static double within_cell(double x) { return x < 0 ? 0 : x > 1 ? 1 : x; }
 
-/* Finds the winding numbers in P and in the rest of the cell. Uses the cell's corners and, if none
- * of them is in P, a point near the middle of the faces. Returns false when these points do not
- * decide. */
+/* Finds the winding numbers below all planes (in P) and elsewhere in the cell. Uses the cell's
+ * corners and, if none of them is in P, the mean of the faces' corners. Returns false if these
+ * points do not decide. */
 static bool find_windings(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const leaf_faces *f,
                           deciding_planes *out)
 {
@@ -291,7 +296,7 @@ static bool find_windings(const ebpo_accel *s, const ebpo_accel_leaf *leaf, cons
                           within_cell(f->p[i][2][k])) /
                          (3 * f->count);
             p[k] = f->low[k] + xi[k] * f->size[k];
-            /* in a cell of a few ulps the point has moved */
+            /* repeat the conversion: if the cell's size is a few ulps, p is a different point */
             xi[k] = (p[k] - f->low[k]) / f->size[k];
         }
         if (!below_all(out, xi, &certain) || !certain)
@@ -301,8 +306,7 @@ static bool find_windings(const ebpo_accel *s, const ebpo_accel_leaf *leaf, cons
     return have_outer;
 }
 
-/* Finds the planes and winding numbers. Returns false when the planes of the leaf's faces do not
- * decide. */
+/* Finds the planes and winding numbers of a leaf. Returns false if the planes do not decide. */
 static bool leaf_find_planes(const ebpo_accel *s, const ebpo_accel_leaf *leaf, ebpo_cell cell,
                              deciding_planes *out)
 {
@@ -311,10 +315,11 @@ static bool leaf_find_planes(const ebpo_accel *s, const ebpo_accel_leaf *leaf, e
            find_windings(s, leaf, &f, out);
 }
 
-/* --- rows of all leaves: pages, each twice as large as the one before, so that stored rows do not
+/* --- rows of all leaves: pages, each twice as large as the page before, so that stored rows do not
  * move --- */
 
-/* The maximum number of rows for one leaf fits into a page: 1 + 4 * 4. */
+/* FIRST_PAGE: rows of the first page, which has space for the maximum of one leaf (1 + 4 * 4).
+ * PAGE_BYTES: the size of a page is a multiple of this number. */
 enum { FIRST_PAGE = 32, PAGE_BYTES = 64 };
 
 ebpo_leaf_kinds *ebpo_leaf_kinds_make(uint64_t rows_max)
@@ -337,12 +342,12 @@ void ebpo_leaf_kinds_free(ebpo_leaf_kinds *k)
     free(k);
 }
 
-/* Adds a page for at least `least` rows. Returns false without memory or when there are too many
- * pages. */
+/* Adds a page for at least `least` rows. Returns false without memory, or if the pages or their
+ * rows would be too many. */
 static bool add_page(ebpo_leaf_kinds *k, uint64_t least)
 {
-    uint64_t size = (uint64_t)FIRST_PAGE << k->pages, left = k->rows_max - k->rows;
-    size = size < left ? size : left;
+    uint64_t size = (uint64_t)FIRST_PAGE << k->pages, unused = k->rows_max - k->rows;
+    size = size < unused ? size : unused;
     if (size < least || k->pages == EBPO_KIND_PAGES ||
         size > (PTRDIFF_MAX - PAGE_BYTES) / sizeof **k->page)
         return false;
@@ -370,7 +375,8 @@ static uint32_t reserve_rows(ebpo_leaf_kinds *k, uint64_t rows)
     return number;
 }
 
-/* Stores the planes of a leaf and returns its kind; without memory the leaf stays general. */
+/* Stores the planes of a leaf and returns its kind. Without space for the planes, the leaf stays
+ * general. */
 static ebpo_leaf_kind keep_planes(ebpo_leaf_kinds *kinds, ebpo_accel_leaf *leaf,
                                   const deciding_planes *planes)
 {
@@ -379,7 +385,7 @@ static ebpo_leaf_kind keep_planes(ebpo_leaf_kinds *kinds, ebpo_accel_leaf *leaf,
     if (first == EBPO_NO_ROWS)
         return EBPO_LEAF_GENERAL;
     ebpo_kind_row *row = EBPO_KIND_ROW(kinds, first);
-    *row++ = (ebpo_kind_row){ .says = { planes->inner, planes->outer, (uint32_t)fours } };
+    *row++ = (ebpo_kind_row){ .head = { planes->inner, planes->outer, (uint32_t)fours } };
     for (int i = 0; i < 4 * fours; i++) {
         const leaf_plane *q = &planes->plane[i < count ? i : 0];
         for (int k = 0; k < 4; k++)
@@ -394,14 +400,15 @@ static ebpo_leaf_kind keep_planes(ebpo_leaf_kinds *kinds, ebpo_accel_leaf *leaf,
 
 /* --- a leaf --- */
 
-/* Returns a lower cell face if one is free, because its winding number is that of the lowest
- * corner. */
+/* Returns a free cell face (2 * axis + side), or EBPO_NO_CELL_FACE. `cell_faces` has a bit for each
+ * cell face that is not free. Prefers a lower cell face (bits 0, 2, 4), because the winding number
+ * on it is that of the lowest corner. */
 static uint8_t choose_cell_face(unsigned cell_faces)
 {
-    unsigned open = ~cell_faces & 63;
-    if (open & 21)
-        return (uint8_t)__builtin_ctz(open & 21);
-    return open ? (uint8_t)__builtin_ctz(open) : EBPO_NO_CELL_FACE;
+    unsigned is_free = ~cell_faces & 63;
+    if (is_free & 21)
+        return (uint8_t)__builtin_ctz(is_free & 21);
+    return is_free ? (uint8_t)__builtin_ctz(is_free) : EBPO_NO_CELL_FACE;
 }
 
 static ebpo_leaf_kind classify_leaf(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell)
@@ -429,6 +436,7 @@ static void bound_leaf(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cel
     leaf->cell_face_step = (int8_t)(small ? step : 0);
 }
 
+/* Changes the leaf's kind from `from` to `to`. Returns false if another thread has changed it. */
 static bool begin_kind(ebpo_accel_leaf *leaf, ebpo_leaf_kind from, ebpo_leaf_kind to)
 {
     uint8_t expected = (uint8_t)from;
@@ -443,7 +451,7 @@ static void end_kind(ebpo_accel_leaf *leaf, ebpo_leaf_kind kind)
 static void find_cell_face(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell,
                            ebpo_cell_faces_fn *cell_faces)
 {
-    /* this test comes first: later queries need only this read */
+    /* this test comes first, because in most queries it is false: it is one read */
     if (ebpo_leaf_kind_of(leaf) == EBPO_LEAF_UNKNOWN &&
         begin_kind(leaf, EBPO_LEAF_UNKNOWN, EBPO_LEAF_CLAIMED)) {
         bound_leaf(s, leaf, cell, cell_faces);
@@ -451,6 +459,7 @@ static void find_cell_face(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell
     }
 }
 
+/* Returns true if this call has found the kind, false if another thread finds or has found it. */
 static bool find_kind(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell)
 {
     if (!begin_kind(leaf, EBPO_LEAF_BOUNDED, EBPO_LEAF_SORTED))

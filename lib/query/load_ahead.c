@@ -25,29 +25,30 @@
 
 /* A subtree that a query may need. */
 typedef struct wanted {
-    uint64_t number; /* index of top->below */
-    double lower;    /* lower bound of the distance */
+    uint64_t below; /* index in top->below */
+    double lower;   /* lower bound of the distance */
 } wanted;
 
-/* Search for the nearest subtrees within a distance of a point. */
+/* A search for the nearest subtrees within a distance of a point. */
 typedef struct subtree_search {
     ebpo_ranking ranking;
-    double limit;
+    double limit; /* greatest bound that still matters */
     unsigned count;
     wanted list[EBPO_CACHE_AHEAD]; /* the nearest first */
 } subtree_search;
 
 /* Inserts a subtree by its lower bound. If the list is full, drops the farthest subtree. */
-static void add_subtree(subtree_search *l, uint64_t number, double lower)
+static void add_subtree(subtree_search *l, uint64_t below, double lower)
 {
     unsigned at = l->count < EBPO_CACHE_AHEAD ? l->count++ : EBPO_CACHE_AHEAD - 1;
     for (; at > 0 && l->list[at - 1].lower > lower; at--)
         l->list[at] = l->list[at - 1];
-    l->list[at] = (wanted){ number, lower };
+    l->list[at] = (wanted){ below, lower };
     if (l->count == EBPO_CACHE_AHEAD)
         l->limit = fmin(l->limit, l->list[EBPO_CACHE_AHEAD - 1].lower);
 }
 
+/* Adds the subtrees at or below a node. `lower`: bound of the node. */
 static void search_below(subtree_search *l, ebpo_node node, double lower)
 {
     if (lower > l->limit || ebpo_node_is_uniform(&node) || node.pruned)
@@ -63,12 +64,12 @@ static void search_below(subtree_search *l, ebpo_node node, double lower)
 }
 
 unsigned ebpo_subtrees_near(const ebpo_model *m, const double p[3], double limit,
-                            uint64_t numbers[EBPO_CACHE_AHEAD])
+                            uint64_t below[EBPO_CACHE_AHEAD])
 {
     subtree_search l = { .ranking = ebpo_ranking_of(m, p, NULL), .limit = limit };
     search_below(&l, ebpo_model_root(m), ebpo_rank_root(&l.ranking));
     for (unsigned i = 0; i < l.count; i++)
-        numbers[i] = l.list[i].number;
+        below[i] = l.list[i].below;
     return l.count;
 }
 
@@ -94,12 +95,12 @@ void ebpo_context_prefetch(ebpo_context *c, const double p[3], double search_dis
     c->has_prefetched = true;
     c->prefetched_distance = fabs(search_distance);
     memcpy(c->prefetched_from, p, sizeof c->prefetched_from);
-    /* Let w be a quarter side. Until the next prefetch, p moves by about w. Then envelopes come
-     * nearer by at most w, and the search distance grows by at most w. So queries need subtrees
-     * whose envelopes are within search_distance + 2 w: 0.5 sides are added.
-     * Under rules other than nonzero, envelopes do not decide: a query then needs the subtree whose
-     * cell contains the point. The envelope of this subtree may be a cell's diagonal away: 1.73
-     * sides are added. The sum, 2.23 sides, is rounded up to 2.25. */
+    /* Until the next prefetch, p moves by about side / 4. By this motion, envelopes come nearer by
+     * at greatest side / 4, and the search distance grows by at greatest side / 4. So queries need
+     * subtrees whose envelopes are within search_distance + side / 2. Under rules other than
+     * nonzero, envelopes do not decide: a query needs the subtree whose cell contains the point.
+     * The envelope of this subtree may be a cell's diagonal, 1.73 sides, away. The sum of 0.5
+     * and 1.73 is rounded up to 2.25. */
     uint64_t keys[EBPO_CACHE_AHEAD];
     unsigned count = ebpo_subtrees_near(m, p, fabs(search_distance) + 2.25 * side, keys);
     for (unsigned i = 0; i < count; i++)
@@ -107,10 +108,10 @@ void ebpo_context_prefetch(ebpo_context *c, const double p[3], double search_dis
     ebpo_cache_prefetch(m->cache, keys, count);
 }
 
-/* Returns the row of the file's table whose subtree contains the node top->below[below]. This node
- * can be deeper than the root of the table's subtree. UINT64_MAX: no hint is needed, or no row is
- * found. */
-static uint64_t table_number(const ebpo_context *c, uint32_t below)
+/* Returns the row of the file's table of subtrees whose subtree contains the node
+ * top->below[below]. (This node can be deeper than the root of that subtree.) Returns UINT64_MAX if
+ * no hint is needed, or no row is found. */
+static uint64_t table_row(const ebpo_context *c, uint32_t below)
 {
     const ebpo_model *m = c->model;
     const ebpo_node *root = &m->top->below[below];
@@ -154,7 +155,7 @@ void ebpo_context_hint(const ebpo_context *c, const uint32_t *below, uint64_t co
         return;
     uint64_t found = 0, *numbers = ebpo_alloc(count, sizeof *numbers);
     for (uint64_t i = 0; numbers && i < count; i++) {
-        uint64_t number = table_number(c, below[i]);
+        uint64_t number = table_row(c, below[i]);
         if (number != UINT64_MAX)
             numbers[found++] = number;
     }
@@ -171,13 +172,13 @@ void ebpo_context_hint(const ebpo_context *c, const uint32_t *below, uint64_t co
 
 #define EBPO_NO_SUBTREE UINT64_MAX
 
-/* Limits of a prefetch hint for homes (home_of). The data of two hints is being fetched at any
- * time. */
+/* Limits of a prefetch hint for homes (home_of: subtrees where queries begin). The data of two
+ * hints is being fetched at any time. */
 enum {
-    SUBTREES_A_TIME = 128, /* maximum number of subtrees: some megabytes of data */
-    POINTS_A_TIME = 4096,  /* maximum number of points whose homes are in the hint */
+    HINT_SUBTREES = 128, /* maximum number of subtrees: some megabytes of data */
+    HINT_POINTS = 4096,  /* maximum number of points whose homes are in the hint */
     /* maximum number of points after a pending one, in a batch without hints */
-    PENDING_A_TIME = 256
+    POINTS_AFTER_PENDING = 256
 };
 
 /* A point and its position on the curve. */
@@ -229,14 +230,15 @@ uint64_t *ebpo_curve_order(const ebpo_box *box, const double *points, uint64_t c
  * The points of a path already have such an order. */
 static bool are_scattered(const ebpo_box *box, const double *points, uint64_t count)
 {
-    const double mean_least = 0x1p-5; /* as a share of the box */
+    const double mean_least = 0x1p-5; /* mean distance, as a share of the box */
     double sum = 0;
     for (uint64_t i = 1; i < count; i++) {
-        double most = 0;
+        double greatest = 0;
         for (int k = 0; k < 3; k++)
-            most = fmax(most, fabs(points[3 * i + (unsigned)k] - points[3 * i + (unsigned)k - 3]) /
-                                  box->size[k]);
-        sum += most;
+            greatest =
+                fmax(greatest, fabs(points[3 * i + (unsigned)k] - points[3 * i + (unsigned)k - 3]) /
+                                   box->size[k]);
+        sum += greatest;
     }
     return count >= 32 && sum > mean_least * (double)count;
 }
@@ -306,6 +308,7 @@ static void collect_subtree(ebpo_batch *b, uint64_t below)
         b->below[b->below_count++] = (uint32_t)below;
 }
 
+/* Sends a hint for the collected subtrees. */
 static void hint_collected(ebpo_batch *b)
 {
     ebpo_context_hint(b->context, b->below, b->below_count);
@@ -321,8 +324,8 @@ static const double *ordered_point(const ebpo_batch *b, uint64_t i)
 static void hint_next(ebpo_batch *b)
 {
     uint64_t begin = b->hinted;
-    while (b->hinted < b->count && b->hinted - begin < POINTS_A_TIME &&
-           b->below_count < SUBTREES_A_TIME) {
+    while (b->hinted < b->count && b->hinted - begin < HINT_POINTS &&
+           b->below_count < HINT_SUBTREES) {
         uint64_t before = b->below_count, home = home_of(b, ordered_point(b, b->hinted++));
         if (before == 0 || b->below[before - 1] != home)
             collect_subtree(b, home);
@@ -330,11 +333,11 @@ static void hint_next(ebpo_batch *b)
     hint_collected(b);
 }
 
-/* Sends one hint for the other subtrees that the next points need, so that queries do not request
- * these subtrees one by one. Finds the nearest face in each point's home. The distance of this face
- * is an upper bound: subtrees beyond it are not needed. If a home cannot be loaded, the loop ends,
- * because the next home could again wait for a time-out. The query returns the error. Homes whose
- * bytes are pending do not end the loop. */
+/* Sends one hint for the subtrees, other than homes, that the points up to turn `end` need, so that
+ * queries do not request these subtrees one by one. Finds the nearest face in each point's home.
+ * The distance of this face is an upper bound: subtrees beyond it are not needed. If a home cannot
+ * be loaded, the loop ends, because the next home could again wait for a time-out; the query
+ * returns the error. Homes whose bytes are pending do not end the loop. */
 static void search_around(ebpo_batch *b, uint64_t end)
 {
     ebpo_context *c = b->context;
@@ -380,7 +383,7 @@ uint64_t ebpo_batch_next(ebpo_batch *b, uint64_t i)
 static uint64_t end_of_pass(const ebpo_batch *b)
 {
     if (!b->sends_hints)
-        return b->first_pending + PENDING_A_TIME;
+        return b->first_pending + POINTS_AFTER_PENDING;
     return b->searches_around ? b->searched : b->hinted == b->count ? b->count : b->hinted - 1;
 }
 

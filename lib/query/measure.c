@@ -5,11 +5,11 @@
  *   first moments   det s / 24
  *   second moments  det (s s' + a a' + b b' + c c') / 120
  * All values are in double-double arithmetic, on coordinates scaled by a power of two to about 1.
- * The values are summed in blocks of faces, which do not depend on the number of threads. A face
- * counts with the multiplicity of its component (construct/solid_shells.h) if the multiplicity is
- * known, else once. The caps of a surface with its border are faces too (measure_caps.h). Source of
- * the moments: Tonon 2004, "Explicit exact formulas for the 3-D tetrahedron inertia tensor in terms
- * of its vertex coordinates". */
+ * They are summed in blocks of BLOCK_FACES faces, so that sums do not depend on the number of
+ * threads. If the multiplicity of a face's component is known (construct/solid_shells.h), the face
+ * counts that number of times, else once. The caps of a surface with its border are faces too
+ * (measure_caps.h). Source of the moments: Tonon 2004, "Explicit exact formulas for the 3-D
+ * tetrahedron inertia tensor in terms of its vertex coordinates". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -33,36 +33,39 @@
 
 enum { BLOCK_FACES = 16384 };
 
-/* A volume whose share of the sum of absolute values is less than this is a rounding error: 0. */
-static const double nothing = 0x1p-85;
+/* A sum that is at most this share of the sum of the absolute values of its terms is a rounding
+ * error, and becomes 0. */
+static const double zero_share = 0x1p-85;
 
-/* Scaled coordinates are p / 2^exponent; `middle` is scaled. */
+/* Scaled coordinates are p / 2^exponent. `middle`: middle of the model's box, scaled. */
 typedef struct frame {
     int exponent;
     double factor[2]; /* 2^-exponent as two factors, as it may not fit into one double */
     double middle[3];
 } frame;
 
+/* Sums over faces. The number in a name is the factor by which the sum is too large. */
 typedef struct moments {
     ebpo_pair area2, volume6, first24[3], second120[6]; /* order of second moments: xx, yy, zz, yz,
                                                          * zx, xy */
-    ebpo_pair integral6;                                /* with each face counted once */
+    ebpo_pair integral6;                                /* as volume6, but each face counts once */
     /* absolute6: sum of the absolute values of the terms of volume6; terms6: sum of the absolute
      * values of the products from which these terms are computed */
     double absolute6, terms6;
 } moments;
 
-typedef struct pass {
+typedef struct measuring {
     const ebpo_mesh *mesh;
     const uint32_t *component; /* [faces]; NULL: all faces count once */
-    int8_t *times;             /* [components] multiplicity of each component's faces */
+    int8_t *times;             /* [component] multiplicity of its faces */
     frame frame;
     moments *blocks;
-} pass;
+} measuring;
 
 /* --- the frame --- */
 
-static void frame_of(frame *f, const ebpo_mesh *mesh)
+/* Chooses the frame: half the longest side of the box becomes 1/2 to 1. */
+static void make_frame(frame *f, const ebpo_mesh *mesh)
 {
     double low[3] = { INFINITY, INFINITY, INFINITY }, high[3] = { -INFINITY, -INFINITY, -INFINITY },
            half = 0, largest = 0, p[3];
@@ -77,10 +80,10 @@ static void frame_of(frame *f, const ebpo_mesh *mesh)
     for (int k = 0; k < 3; k++)
         half = fmax(half, mesh->face_count ? .5 * high[k] - .5 * low[k] : 0);
     frexp(half, &f->exponent);
-    /* A flat model that is far from the origin and has a tiny extent must not overflow. */
-    int top;
-    frexp(largest, &top);
-    f->exponent = f->exponent > top - 900 ? f->exponent : top - 900;
+    /* coordinates of a tiny model far from the origin must not overflow */
+    int largest_exponent;
+    frexp(largest, &largest_exponent);
+    f->exponent = f->exponent > largest_exponent - 900 ? f->exponent : largest_exponent - 900;
     f->factor[0] = ldexp(1, -f->exponent / 2);
     f->factor[1] = ldexp(1, -f->exponent - -f->exponent / 2);
     for (int k = 0; k < 3; k++)
@@ -89,7 +92,7 @@ static void frame_of(frame *f, const ebpo_mesh *mesh)
                                         : 0;
 }
 
-static void scaled_corners(const pass *p, uint64_t face, double out[3][3])
+static void scaled_corners(const measuring *p, uint64_t face, double out[3][3])
 {
     for (int i = 0; i < 3; i++) {
         ebpo_mesh_position(p->mesh, p->mesh->faces[3 * face + (uint64_t)i], out[i]);
@@ -124,7 +127,7 @@ static double pair_length(const ebpo_pair n[3])
     return largest * sqrt(x * x + y * y + z * z);
 }
 
-/* Computes n = (b - a) x (c - a); `terms`: sums of the absolute values of its products. */
+/* Computes n = (b - a) x (c - a). terms[k]: sum of the absolute values of the products in n[k]. */
 static void normal_of(const double corner[3][3], ebpo_pair n[3], double terms[3])
 {
     ebpo_pair f[3], g[3];
@@ -148,8 +151,8 @@ static ebpo_pair mixed_product(ebpo_pair r[3][3], const ebpo_pair s[3], int u, i
     return sum;
 }
 
-/* Adds the tetrahedron of a triangle with the doubled normal n. The tetrahedron counts `weight`
- * times in the integral, and `weight` * `times` times in the volume. */
+/* Adds the tetrahedron of a triangle. `n`, `terms`: results of normal_of. The tetrahedron counts
+ * `weight` times in the integral, and `weight` * `times` times in the volume. */
 static void add_tetrahedron(moments *m, const double corner[3][3], const double middle[3],
                             const ebpo_pair n[3], const double terms[3], double weight, int times)
 {
@@ -184,7 +187,8 @@ static void add_face(moments *m, const double corner[3][3], const double middle[
     add_tetrahedron(m, corner, middle, n, terms, 1, times);
 }
 
-static int times_of(const pass *p, uint64_t face)
+/* Returns the number of times that the face counts. */
+static int times_of(const measuring *p, uint64_t face)
 {
     return p->component ? p->times[p->component[face]] : 1;
 }
@@ -192,7 +196,7 @@ static int times_of(const pass *p, uint64_t face)
 static ebpo_status measure_blocks(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                   ebpo_error *error)
 {
-    pass *p = context;
+    measuring *p = context;
     (void)worker;
     (void)error;
     for (uint64_t b = begin; b < end; b++) {
@@ -329,16 +333,17 @@ static void set_border(ebpo_mass *out, const moments *m, const frame *f,
             : INFINITY;
 }
 
+/* Computes the result from the sums. Only a solid (or a surface with its border) has a volume. */
 static void mass_of(ebpo_mass *out, const moments *m, const frame *f, bool solid)
 {
     memset(out, 0, sizeof *out);
     out->exponent = f->exponent;
     out->scaled_area = .5 * m->area2.head;
     out->area = ldexp(out->scaled_area, 2 * f->exponent);
-    if (solid && fabs(m->integral6.head) > nothing * m->absolute6)
+    if (solid && fabs(m->integral6.head) > zero_share * m->absolute6)
         out->scaled_integral = ebpo_pair_divide(m->integral6, ebpo_pair_of(6)).head;
     out->integral = ldexp(out->scaled_integral, 3 * f->exponent);
-    if (!solid || fabs(m->volume6.head) <= nothing * m->absolute6)
+    if (!solid || fabs(m->volume6.head) <= zero_share * m->absolute6)
         return;
     ebpo_pair volume = ebpo_pair_divide(m->volume6, ebpo_pair_of(6)), centre[3], central[6];
     out->scaled_volume = volume.head;
@@ -359,7 +364,8 @@ static void mass_of(ebpo_mass *out, const moments *m, const frame *f, bool solid
 
 /* --- counted faces --- */
 
-static ebpo_status count_components(pass *p, const ebpo_solid_shells *s, ebpo_rule rule,
+/* Sets the multiplicity of each component's faces. */
+static ebpo_status count_components(measuring *p, const ebpo_solid_shells *s, ebpo_rule rule,
                                     ebpo_error *error)
 {
     const ebpo_components *c = s->nesting.components;
@@ -381,8 +387,9 @@ static bool is_one_sheet(const ebpo_info *info)
     return r->components == 1 && r->nonmanifold_edges.count == 0 && r->misoriented_edges.count == 0;
 }
 
-/* Determines if the volume is known; if so, sets the multiplicity of faces. */
-static ebpo_status decide_volume(pass *p, const ebpo_info *info, unsigned threads,
+/* Computes the interval of the volume from the file header and, for several components, from their
+ * nesting. If the volume is known, sets the multiplicity of faces. */
+static ebpo_status decide_volume(measuring *p, const ebpo_info *info, unsigned threads,
                                  ebpo_solid_shells *s, ebpo_solid_volume *volume, ebpo_error *error)
 {
     ebpo_shells shells;
@@ -399,7 +406,8 @@ static ebpo_status decide_volume(pass *p, const ebpo_info *info, unsigned thread
     return status;
 }
 
-/* Counts the faces of a single component that face inwards -1 times, or not at all. */
+/* Corrects the sums of a single component whose normals point inwards: its faces count -1 times if
+ * the rule includes winding number -1, else 0 times. */
 static void count_inwards(moments *m, ebpo_rule rule)
 {
     int times = ebpo_rule_inside(rule, -1) ? -1 : 0;
@@ -410,6 +418,7 @@ static void count_inwards(moments *m, ebpo_rule rule)
         *sum[i] = (ebpo_pair){ times * sum[i]->head, times * sum[i]->tail };
 }
 
+/* Sets the volume and its interval: the sum if the volume is known, else NAN and the interval. */
 static void set_volume(ebpo_mass *mass, const ebpo_solid_volume *known, bool bordered)
 {
     if (known->lo != known->hi) {
@@ -428,7 +437,7 @@ ebpo_status ebpo_measure(const ebpo_file *file, unsigned threads, ebpo_mass *out
 {
     EBPO_DEFAULT_FP;
     ebpo_mesh mesh = { 0 };
-    pass p = { .mesh = &mesh };
+    measuring p = { .mesh = &mesh };
     moments sum = { .absolute6 = 0 };
     uint64_t block_count = 0;
     ebpo_mass mass = EBPO_MASS_INIT;
@@ -461,7 +470,7 @@ ebpo_status ebpo_measure(const ebpo_file *file, unsigned threads, ebpo_mass *out
         status = ebpo_fail_memory(error, block_count * sizeof *p.blocks);
         goto done;
     }
-    frame_of(&p.frame, &mesh);
+    make_frame(&p.frame, &mesh);
     status = ebpo_parallel_for(threads, NULL, block_count, 1, measure_blocks, &p, NULL, "measuring",
                                error);
     if (status != EBPO_OK)
@@ -488,10 +497,12 @@ done:
 
 /* --- the volume of a solid, from the file header --- */
 
-/* Rounding errors of sums of envelopes: relative to the sum, and to the root cell's volume. */
+/* Bounds of the rounding errors of sums of envelopes' volumes: relative to the sum, and relative to
+ * the root cell's volume. */
 static const double OF_SUM = 1e-9, OF_ROOT = 1e-12;
 
-/* Sets out->lo and hi to the volumes of black cells and envelopes. */
+/* Sets out->lo to the volume of the black cells, and out->hi to the volume of black cells and
+ * leaves' envelopes. Does nothing for a subset. */
 static void bound_by_cells(const ebpo_info *info, ebpo_solid_volume *out)
 {
     double root = info->box_size[0] * info->box_size[1] * info->box_size[2], lo = 0, hi = 0;
@@ -506,8 +517,7 @@ static void bound_by_cells(const ebpo_info *info, ebpo_solid_volume *out)
     out->hi = hi * (1 + OF_SUM) + root * OF_ROOT;
 }
 
-/* Returns the volume of components that do not intersect; NAN: it is not known. Uncounted shells
- * may intersect. */
+/* Returns the volume, or NAN if it is not known because components intersect or may intersect. */
 static double known_volume(const ebpo_mesh_report *report, ebpo_rule rule,
                            const ebpo_shells *shells)
 {
@@ -525,17 +535,17 @@ ebpo_status ebpo_solid_volume_of(const ebpo_mesh_report *report, ebpo_rule rule,
 {
     EBPO_DEFAULT_FP;
     ebpo_solid_volume v = { .hi = INFINITY, .integral = report->volume };
-    ebpo_shells own = EBPO_SHELLS_INIT;
+    ebpo_shells known_shells = EBPO_SHELLS_INIT;
     ebpo_status status = EBPO_CHECK_SIZED(ebpo_solid_volume, out, error);
     if (status == EBPO_OK)
-        status = EBPO_TAKE(ebpo_shells, &own, shells, error);
+        status = EBPO_TAKE(ebpo_shells, &known_shells, shells, error);
     if (status != EBPO_OK)
         return status;
     if ((unsigned)rule > EBPO_RULE_POSITIVE)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "unknown winding rule %d", (int)rule);
     if (info)
         bound_by_cells(info, &v);
-    double volume = known_volume(report, rule, &own);
+    double volume = known_volume(report, rule, &known_shells);
     if (!report->balanced)
         v = (ebpo_solid_volume){ .integral = 0 };
     else if (volume >= v.lo && volume <= v.hi)

@@ -2,13 +2,13 @@
  * comparison of two faces.
  *
  * The search is depth first, the nearest child first. It drops nodes that are certainly farther
- * than the best face. Bounds and triangles are in single precision with bounded errors
+ * than the best face. Bounds of nodes and faces are in single precision with bounded errors
  * (nearest_kernels.c). The remaining faces are compared by guaranteed bounds in double precision.
- * If the bounds of two faces overlap, the faces are compared with exact arithmetic. Of equally near
- * faces, the face with the lowest index in the file is returned. For points too far for single
- * precision, the search uses boxes in double precision. For points too far for doubles, it uses
- * keys: numbers in the order of the distances (point_bounds.h). An ebpo_nearest may search several
- * accels one after the other. */
+ * If the bounds of two faces overlap, exact arithmetic compares the faces. Of equally near faces,
+ * the result is the face with the lowest index in the file. If a point is so far from the subtree
+ * that single precision does not suffice, the search uses boxes in double precision. If it is so
+ * far from the model that doubles do not suffice, the search uses keys: numbers in the order of the
+ * distances (point_bounds.h). An ebpo_nearest may search several accels one after the other. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -33,7 +33,7 @@ static bool is_edge(ebpo_feature feature)
 }
 
 /* Returns true if the nearest features of both faces are the same vertex or edge. Such faces are
- * the most frequent case of equal distances. */
+ * the greatest frequent case of equal distances. */
 static bool same_feature(const double a[3][3], ebpo_feature of_a, const double b[3][3],
                          ebpo_feature of_b)
 {
@@ -61,9 +61,9 @@ int ebpo_near_compare(const double p[3], const double a[3][3], const ebpo_distan
 
 /* --- the search --- */
 
-/* If a point is farther from a subtree than this multiple of half the subtree's size, single
- * precision cannot distinguish the distances of the subtree's faces. */
-#define FAR 32.0
+/* A coordinate in the subtree's frame, where the subtree is about -1 .. 1. From this coordinate on,
+ * single precision cannot distinguish the distances of the subtree's faces. */
+#define FAR_COORDINATE 32.0
 
 void ebpo_nearest_begin(ebpo_nearest *n, const ebpo_model *model, const double p[3],
                         double max_distance)
@@ -162,14 +162,15 @@ void ebpo_nearest_leaf(ebpo_nearest *n, const ebpo_accel *s, const ebpo_accel_le
 
 /* --- near: single precision --- */
 
+/* Converts the point for kernels. Returns false if it is too far for single precision. */
 static bool make_probe(const ebpo_accel *s, const double p[3], ebpo_probe *out)
 {
-    double most = 1;
+    double greatest = 1;
     for (int k = 0; k < 3; k++) {
         double local = (p[k] - s->centre[k]) * s->scale;
-        if (!(fabs(local) < FAR))
+        if (!(fabs(local) < FAR_COORDINATE))
             return false;
-        most = fmax(most, fabs(local));
+        greatest = fmax(greatest, fabs(local));
         out->p[k] = p[k];
         out->high[k] = (float)p[k];
         out->low[k] = (float)(p[k] - (double)out->high[k]);
@@ -177,10 +178,10 @@ static bool make_probe(const ebpo_accel *s, const double p[3], ebpo_probe *out)
     }
     out->scale = (float)s->scale;
     out->scale64 = s->scale;
-    /* On each axis, the rounding error of `local` is at most 2^-24 times `most`; over three axes
-     * it is at most 1.74 times as much. The factor is 2^-22 to include the rounding of limits:
-     * docs/develop/bounds.md, "Limits of points". */
-    out->error = (float)most * 0x1p-22f;
+    /* On each axis, the rounding error of `local` is at greatest 2^-24 times `greatest`; over three
+     * axes it is at greatest 1.74 times as much. The factor is 2^-22 to include the rounding of
+     * limits: docs/develop/bounds.md, "Limits of points". */
+    out->error = (float)greatest * 0x1p-22f;
     return true;
 }
 
@@ -218,8 +219,7 @@ static void judge_waiting(ebpo_near_search *g)
     }
 }
 
-/* Ends the search at the deadline. The nodes on the stack give a lower bound of the distance to
- * the faces that were not visited. */
+/* Ends the search at the deadline: the bounds of the nodes on the stack give n->passed_over. */
 static void give_up(const ebpo_near_search *g)
 {
     ebpo_nearest *n = g->user;
@@ -261,14 +261,14 @@ static void try_block(ebpo_nearest *n, const ebpo_accel *s, uint32_t child)
         try_face(n, s, (child & ~EBPO_IS_BLOCK) * EBPO_BLOCK + lane);
 }
 
-/* Removes the lane with the least lower bound from `left`, which is not empty, and returns it. */
-static int remove_nearest_lane(unsigned *left, const double lower[8])
+/* Removes the lane with the least lower bound from `lanes`, which is not empty, and returns it. */
+static int remove_nearest_lane(unsigned *lanes, const double lower[8])
 {
-    int best = __builtin_ctz(*left);
+    int best = __builtin_ctz(*lanes);
     for (int lane = best + 1; lane < 8; lane++)
-        if (*left >> lane & 1 && lower[lane] < lower[best])
+        if (*lanes >> lane & 1 && lower[lane] < lower[best])
             best = lane;
-    *left &= ~(1u << best);
+    *lanes &= ~(1u << best);
     return best;
 }
 
@@ -286,15 +286,15 @@ static unsigned far_children(const far_search *g, uint32_t node, double lower[8]
 {
     const ebpo_nearest *n = g->n;
     const ebpo_bound *b = &g->s->bound[node];
-    unsigned left = 0;
+    unsigned lanes = 0;
     ebpo_far_boxes(&n->far, &g->frame, b, lower);
     for (int lane = 0; lane < b->count; lane++) {
         if (lower[lane] <= n->key_limit)
             lower[lane] = fmax(lower[lane], ebpo_far_cylinder(&n->far, &g->frame, b,
                                                               &g->s->cylinder[node], lane));
-        left |= (unsigned)(lower[lane] <= n->key_limit) << lane;
+        lanes |= (unsigned)(lower[lane] <= n->key_limit) << lane;
     }
-    return left;
+    return lanes;
 }
 
 static void search_by_keys(const far_search *g, uint32_t child)
@@ -305,9 +305,9 @@ static void search_by_keys(const far_search *g, uint32_t child)
         return;
     }
     double lower[8];
-    unsigned left = far_children(g, child, lower);
-    while (left) {
-        int best = remove_nearest_lane(&left, lower);
+    unsigned lanes = far_children(g, child, lower);
+    while (lanes) {
+        int best = remove_nearest_lane(&lanes, lower);
         if (ebpo_nearest_is_late(n)) {
             ebpo_nearest_pass_over(n, lower[best]);
         } else if (lower[best] <= n->key_limit) {
@@ -321,21 +321,21 @@ static void search_by_keys(const far_search *g, uint32_t child)
 /* Returns a lower bound of the distance to a child's box, in the model's unit. */
 static double box_distance(const ebpo_accel *s, const ebpo_bound *b, int lane, const double p[3])
 {
-    double most = 0, sum = 0, d[3];
+    double greatest = 0, sum = 0, d[3];
     for (int k = 0; k < 3; k++) {
         ebpo_bound_sides sides = ebpo_bound_side(b, lane, k);
         double low = s->centre[k] + sides.low / s->scale,
                high = s->centre[k] + sides.high / s->scale;
         d[k] = fmax(fmax(low - p[k], p[k] - high), 0);
-        most = fmax(most, d[k]);
+        greatest = fmax(greatest, d[k]);
     }
-    if (!(most > 0) || isinf(most))
-        return most;
+    if (!(greatest > 0) || isinf(greatest))
+        return greatest;
     for (int k = 0; k < 3; k++)
-        sum += d[k] / most * (d[k] / most);
-    /* On at least one axis, p is FAR times half the subtree's size away. So the rounding error
-     * of the box sides is far below 2^-40 of the distance. */
-    return most * sqrt(sum) * (1 - 0x1p-40);
+        sum += d[k] / greatest * (d[k] / greatest);
+    /* On at least one axis, p is FAR_COORDINATE times half the subtree's size away. So the rounding
+     * error of the box sides is far below 2^-40 of the distance. */
+    return greatest * sqrt(sum) * (1 - 0x1p-40);
 }
 
 static void search_far(ebpo_nearest *n, const ebpo_accel *s, uint32_t child)
@@ -346,13 +346,13 @@ static void search_far(ebpo_nearest *n, const ebpo_accel *s, uint32_t child)
     }
     const ebpo_bound *b = &s->bound[child];
     double lower[8];
-    unsigned left = 0;
+    unsigned lanes = 0;
     for (int lane = 0; lane < b->count; lane++) {
         lower[lane] = box_distance(s, b, lane, n->p);
-        left |= 1u << lane;
+        lanes |= 1u << lane;
     }
-    while (left) {
-        int best = remove_nearest_lane(&left, lower);
+    while (lanes) {
+        int best = remove_nearest_lane(&lanes, lower);
         if (ebpo_nearest_is_late(n)) {
             ebpo_nearest_pass_over(n, lower[best]);
         } else if (lower[best] <= n->limit) {

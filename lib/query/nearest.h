@@ -1,5 +1,5 @@
-/* Finds the nearest face: in one accel (acceleration structure of a subtree) (nearest.c), and in a
- * model under a budget (nearest_subtrees.c). */
+/* Finds the nearest face: in one accel (acceleration structure of a subtree; nearest.c), and in a
+ * model that is loaded subtree by subtree (nearest_subtrees.c). */
 #ifndef EBPO_QUERY_NEAREST_H
 #define EBPO_QUERY_NEAREST_H
 
@@ -7,31 +7,32 @@
 #include "geometry/distance.h"
 #include "query/query_node.h"
 
-/* Returns the exact sign of distance(p, a) - distance(p, b). Rarely slow, because it uses the
- * bounds of both distances. */
+/* Returns the exact sign of distance(p, a) - distance(p, b). It is fast if the bounds of both
+ * distances do not overlap. */
 int ebpo_near_compare(const double p[3], const double a[3][3], const ebpo_distance_bounds *a_bounds,
                       const double b[3][3], const ebpo_distance_bounds *b_bounds);
 
 /* --- a search, which may go through several accels --- */
 
+/* A far point is a point so far from the model that keys replace distances (point_bounds.h). The
+ * *winner* is the nearest face so far. */
 typedef struct ebpo_nearest {
     double p[3];
     ebpo_far far;
     double key_limit; /* for a far point: faces with a greater key certainly do not matter */
     double limit;     /* faces that are farther away certainly do not matter */
     double upper;     /* upper bound of the distance to the model's nearest face, or INFINITY */
-    bool found;
-    ebpo_distance_bounds bounds; /* bounds of the distance of the nearest face so far, which is
-                                  * called the winner below */
-    ebpo_far_keys keys;          /* keys of the winner, for a far point */
-    double triangle[3][3];
-    uint64_t file_face, source_face;
-    uint32_t block, node; /* block of the winner, and the node above it; EBPO_NO_BLOCK: the winner
-                           * was known before */
+    bool found;       /* there is a winner; the next six fields are valid */
+    ebpo_distance_bounds bounds;     /* bounds of the winner's distance */
+    ebpo_far_keys keys;              /* for a far point: bounds of the winner's key */
+    double triangle[3][3];           /* corners of the winner */
+    uint64_t file_face, source_face; /* index of the winner in the file, and in the source */
+    uint32_t block, node; /* block of the winner, and the node above the block; EBPO_NO_BLOCK: the
+                           * winner was known before the search */
     uint32_t first_block, first_node; /* block and node where a search starts, or EBPO_NO_BLOCK */
     uint64_t deadline;                /* time of ebpo_clock, or 0 */
     bool late;                        /* true once the deadline has passed */
-    double passed_over;               /* lower bound of the part not visited before the deadline */
+    double passed_over; /* lower bound of the distance of all that the deadline left unvisited */
 } ebpo_nearest;
 
 /* Begins a search with nothing found. */
@@ -43,7 +44,8 @@ static inline double ebpo_nearest_limit(const ebpo_nearest *n)
 {
     return n->far.far ? n->key_limit : n->limit;
 }
-/* Records the bound of a part that is not visited because of the deadline. */
+/* Records the bound (a distance, or a key for a far point) of a part that is not visited because of
+ * the deadline. */
 static inline void ebpo_nearest_pass_over(ebpo_nearest *n, double lower)
 {
     double distance = n->far.far ? ebpo_far_lower(&n->far, lower) : lower;
@@ -56,11 +58,12 @@ static inline bool ebpo_nearest_is_late(ebpo_nearest *n)
     return n->late = n->late || (n->deadline && ebpo_clock() > n->deadline);
 }
 
-/* Begins with a known face of the model. */
+/* Takes a known face of the model as the winner, if it is within the limit. */
 void ebpo_nearest_begin_with(ebpo_nearest *n, const double triangle[3][3], uint64_t file_face,
                              uint64_t source_face);
 
-/* Begins with a block of the only accel that will be searched, and the node above the block. */
+/* Sets the block where the search starts, and the node above it. Only one accel may then be
+ * searched: the accel of this block. */
 static inline void ebpo_nearest_begin_at(ebpo_nearest *n, uint32_t block, uint32_t node)
 {
     n->first_block = block;
@@ -73,12 +76,13 @@ void ebpo_nearest_search(ebpo_nearest *n, const ebpo_context *context, const ebp
 /* Searches the faces that a leaf lists. */
 void ebpo_nearest_leaf(ebpo_nearest *n, const ebpo_accel *s, const ebpo_accel_leaf *leaf);
 
-/* Writes the result, without sign; if nothing is within the limit, the distance is INFINITY. */
+/* Writes the result, without sign. If no face is within max_distance, the distance is INFINITY. */
 void ebpo_nearest_end(const ebpo_nearest *n, double max_distance, ebpo_distance_result *out);
 
 /* --- a context's queue ---
  *
- * Nodes to visit: the nearest first; of equally near nodes the one with the least entry first. */
+ * The queue holds nodes to visit, ordered by their bound; nodes with equal bounds are ordered by
+ * their entry. */
 
 EBPO_MUST_USE ebpo_status ebpo_queue_push(ebpo_context *context, const ebpo_ranked *item,
                                           ebpo_error *error);
@@ -87,28 +91,29 @@ ebpo_ranked ebpo_queue_pop(ebpo_context *context);
 
 /* --- deep bounds ---
  *
- * Deep bounds are nodes of the levels right below the cut, with their envelopes but without faces:
- * a few bytes for each node. They bound subtrees that have never been loaded more closely than the
- * subtrees' envelopes do, as skeletons (upper nodes of the hierarchies over faces)
- * (query/model_parts.h) bound subtrees that have been loaded. They are read at once, when queries
- * have loaded about as much without need as reading them costs, so that neither opening nor paths
- * wait for them. They are for local files only: for remote files one more request would cost as
- * much as it saves. They count towards the quota of skeletons. */
+ * Deep bounds are nodes of the first levels below the cut level, with their envelopes but without
+ * faces: a few bytes for each node. For a subtree that has never been loaded, they give a better
+ * bound than the subtree's envelope. (For a subtree that has been loaded, its skeleton gives one:
+ * query/model_parts.h.) They are all read at once, when queries have loaded about as many subtrees
+ * without need as this reading costs; so neither opening a model nor a path waits for them. They
+ * are used for local files only: for remote files, one more request would cost as much as it saves.
+ * They count towards the quota of skeletons. */
 
-/* Reads the deep bounds once, unless the quota is too small or no levels exist below the cut. If
- * data cannot be read, queries that need them return the error later. */
+/* Reads the deep bounds, unless that was done before, the quota is too small, or there are no
+ * levels below the cut. Returns no error: if the file cannot be read, later queries fail. */
 void ebpo_deep_bounds_make(ebpo_model *model);
 
-/* Counts subtrees without bounds that a query has loaded. Makes the deep bounds when enough have
- * been loaded. Any thread. */
+/* Counts `loaded` subtrees that a query has loaded and that had no skeleton before. Makes the deep
+ * bounds when enough such subtrees have been loaded. Any thread. */
 void ebpo_deep_bounds_report(ebpo_model *model, unsigned loaded);
 
-/* --- a model: as a whole, or subtree by subtree, the nearest first --- */
+/* --- a model --- */
 
-/* Visits nodes of the top and subtrees in the order of guaranteed lower bounds of their distance,
- * until the next bound is beyond the found distance. A subtree is searched, and loaded if needed,
- * only if its bound is at most the result, independent of the data in memory. After a deadline, the
- * first unvisited bound limits the result. */
+/* Finds the nearest face of a model. If the model is not completely in memory, visits nodes of the
+ * top and subtrees in the order of guaranteed lower bounds of their distance, until the next bound
+ * is beyond the found distance. So a subtree is searched, and loaded if needed, only if its bound
+ * is at most the result, whatever is in memory. After a deadline, the first bound that was not
+ * visited limits the result. */
 EBPO_MUST_USE ebpo_status ebpo_nearest_first(ebpo_context *context, ebpo_nearest *search,
                                              ebpo_error *error);
 

@@ -1,6 +1,6 @@
-/* Finds the nearest face (kernel): walks from node to node of the hierarchy over faces of one accel
- * (acceleration structure of a subtree), eight children or eight faces at a time, in single
- * precision.
+/* The kernel that finds the nearest face: it walks from node to node of the hierarchy over faces of
+ * one accel (acceleration structure of a subtree), eight children or eight faces at a time, in
+ * single precision.
  *
  * The walk drops only nodes and faces that are certainly farther than the best upper bound. It
  * collects the other faces as candidates, which nearest.c compares.
@@ -55,10 +55,10 @@ EBPO_EIGHT f8 near_by_cylinders(const ebpo_bound_cylinder *cylinder, const near_
        to = f8_mul(f8_from_shorts(cylinder->to), step),
        radius = f8_mul(f8_from_shorts(cylinder->radius), f8_all(cylinder->aside_step));
     f8 over = f8_max3(f8_add(along, from), f8_sub(f8_sub(zero, along), to), zero);
-    /* Less than the true value by a margin, so that the root of a small difference of large squares
-     * is a lower bound. */
-    f8 away = f8_mul(near_square_sum(twice), f8_all(0.25f * (1 - 0x1p-19f))),
-       aside2 = f8_max(f8_sub(away, f8_mul(along, along)), zero),
+    /* square of the distance of the middle, less a margin: the root of a small difference of large
+     * squares must be a lower bound */
+    f8 away2 = f8_mul(near_square_sum(twice), f8_all(0.25f * (1 - 0x1p-19f))),
+       aside2 = f8_max(f8_sub(away2, f8_mul(along, along)), zero),
        aside = f8_max(f8_sub(f8_sqrt(aside2), radius), zero);
     return f8_add(f8_mul(aside, aside), f8_mul(over, over));
 }
@@ -77,6 +77,7 @@ EBPO_EIGHT unsigned near_children(const ebpo_near_search *g, uint32_t node, floa
 
 /* --- faces --- */
 
+/* Eight vectors. */
 typedef struct three {
     f8 x, y, z;
 } three;
@@ -91,7 +92,7 @@ EBPO_EIGHT three three_cross(three a, three b)
     return (three){ minor_of_four(a.y, a.z, b.y, b.z), minor_of_four(a.z, a.x, b.z, b.x),
                     minor_of_four(a.x, a.y, b.x, b.y) };
 }
-/* Returns an upper bound of the length. */
+/* Returns the sum of the absolute coordinates, an upper bound of the length. */
 EBPO_EIGHT f8 three_size(three a) { return f8_add(f8_add(f8_abs(a.x), f8_abs(a.y)), f8_abs(a.z)); }
 
 /* Returns the squared distance of the origin to the segment from a along e. */
@@ -104,12 +105,14 @@ EBPO_EIGHT f8 edge_distance2(three a, three e, f8 ee)
     return three_dot(q, q);
 }
 
-/* Corners of eight faces relative to the point, and their edges, in the subtree's frame. Edges are
- * computed from the corners themselves: a far point must not increase their error. */
+/* Corners of eight faces relative to the point, and edges of the faces, in the subtree's frame.
+ * Edges are computed from the stored corners, not from `corner`, because the error of `corner`
+ * grows with the point's distance. */
 typedef struct near_faces {
     three corner[3], edge[3];
 } near_faces;
 
+/* Reads one coordinate of corners and edges from a block of floats. */
 EBPO_EIGHT void near_axis32(const ebpo_near_search *g, const ebpo_face_block *b, int k,
                             f8 corner[3], f8 edge[3])
 {
@@ -124,6 +127,7 @@ EBPO_EIGHT void near_axis32(const ebpo_near_search *g, const ebpo_face_block *b,
     edge[1] = f8_mul(f8_sub(raw[2], raw[1]), scale);
 }
 
+/* Reads one coordinate of corners and edges from a block of doubles. */
 EBPO_EIGHT void near_axis64(const ebpo_near_search *g, const ebpo_face_block *b, int k,
                             f8 corner[3], f8 edge[3])
 {
@@ -161,11 +165,12 @@ EBPO_EIGHT near_faces near_load(const ebpo_near_search *g, const ebpo_face_block
     return out;
 }
 
-/* Computes bounds of the distances of eight faces: 2^-16 of r less and more than computed, where r
- * is the sum of all coordinates' sizes of a corner and two edges. Faces whose height is at least an
- * eighth of their longest edge use their planes. Other faces use their edges, from which no point
- * of the face is farther than its height. The last term covers underflow of squares. Proof:
- * docs/develop/bounds.md, "Points against eight faces". */
+/* Computes bounds of the distances of eight faces: the computed distance less and plus 2^-16 r,
+ * where r is the sum of the absolute coordinates of a corner and two edges; and EBPO_NEAR_UNDERFLOW
+ * for the underflow of squares. A face whose height is at least an eighth of its longest edge
+ * ("sturdy") uses its plane where the point projects into the face. Other faces use the distance of
+ * their edges; no point of a face is farther from its edges than its height, which is subtracted
+ * from the lower bound. Proof: docs/develop/bounds.md, "Points against eight faces". */
 EBPO_EIGHT void near_bounds(const near_faces *f, f8 *low, f8 *high)
 {
     f8 zero = f8_all(0), length[3], longest2;
@@ -173,18 +178,18 @@ EBPO_EIGHT void near_bounds(const near_faces *f, f8 *low, f8 *high)
         length[i] = three_dot(f->edge[i], f->edge[i]);
     longest2 = f8_max3(length[0], length[1], length[2]);
     three n = three_cross(f->edge[0], f->edge[1]);
-    f8 nn = three_dot(n, n), edges = f8_all(INFINITY), out = f8_less(zero, zero);
+    f8 nn = three_dot(n, n), edges = f8_all(INFINITY), outside = f8_less(zero, zero);
     for (int i = 0; i < 3; i++) {
         edges = f8_min(edge_distance2(f->corner[i], f->edge[i], length[i]), edges);
-        out = f8_or(out, f8_less(three_dot(three_cross(f->edge[i], n), f->corner[i]), zero));
+        outside =
+            f8_or(outside, f8_less(three_dot(three_cross(f->edge[i], n), f->corner[i]), zero));
     }
-    /* not squared before the division: the square would underflow for a small triangle close to the
-     * point */
+    /* an^2 / nn without an^2, which would underflow for a small triangle close to the point */
     f8 an = three_dot(f->corner[0], n);
     f8 sturdy = f8_and(f8_at_most(f8_mul(f8_mul(longest2, longest2), f8_all(0x1p-6f)), nn),
                        f8_less(f8_all(0x1p-54f), longest2));
     f8 plane = f8_mul(f8_mul(an, f8_inverse(nn)), an);
-    f8 distance = f8_sqrt(f8_pick(sturdy, f8_pick(out, edges, plane), edges));
+    f8 distance = f8_sqrt(f8_pick(sturdy, f8_pick(outside, edges, plane), edges));
     f8 sizes =
         f8_add(three_size(f->corner[0]), f8_add(three_size(f->edge[0]), three_size(f->edge[1])));
     f8 margin = f8_add(f8_mul(sizes, f8_all(0x1p-16f)), f8_all(EBPO_NEAR_UNDERFLOW));
@@ -200,8 +205,9 @@ EBPO_EIGHT void near_bounds(const near_faces *f, f8 *low, f8 *high)
 
 /* --- the walk --- */
 
-/* Visits a block. The face with the least upper bound comes first: then most of the eight faces are
- * known to be farther. */
+/* Visits a block, whose parent is `node`. First lowers the limit to the least upper bound of the
+ * eight faces: then most of them are known to be farther. Adds the remaining faces to the
+ * candidates. */
 EBPO_EIGHT void near_block(ebpo_near_search *g, uint32_t block, uint32_t node, bool wide)
 {
     ebpo_face_block faces = ebpo_face_block_open(g->s, block);
@@ -254,8 +260,8 @@ EBPO_EIGHT uint32_t near_push(ebpo_near_search *g, uint32_t top, uint32_t node, 
     return above;
 }
 
-/* Descends from a node to a block of `node`, always to the nearest child. Returns false if no child
- * matters. */
+/* Descends from *child to a block, always to the nearest child, and sets *child to the block and
+ * *node to the block's parent. Returns false if no child matters. */
 EBPO_EIGHT bool near_descend(ebpo_near_search *g, uint32_t *top, uint32_t *child, uint32_t *node)
 {
     while (!(*child & EBPO_IS_BLOCK)) {
@@ -277,9 +283,9 @@ EBPO_EIGHT bool near_descend(ebpo_near_search *g, uint32_t *top, uint32_t *child
     return true;
 }
 
-/* Visits the first block and chooses the next node: the lowest ancestor compared with which the
- * search is small. Above that node, the search hardly ever leaves through another child, and no
- * visit depends on the result of the previous one. */
+/* Visits the first block, and returns the node where the walk continues: the deepest ancestor
+ * compared with which the search is small. Above this node, the search hardly ever needs another
+ * child. */
 EBPO_EIGHT uint32_t near_begin(ebpo_near_search *g, bool wide)
 {
     const ebpo_bound *bound = g->s->bound;
@@ -287,21 +293,21 @@ EBPO_EIGHT uint32_t near_begin(ebpo_near_search *g, bool wide)
     if (g->first_block == EBPO_NO_BLOCK)
         return g->s->root_bound;
     near_block(g, g->first_block, node, wide);
-    if (g->late) /* at the deadline, the nodes not visited must be on the stack */
+    if (g->late) /* at the deadline, all unvisited nodes must be below nodes on the stack */
         return g->s->root_bound;
     while (node != g->s->root_bound && g->limit2 > bound[node].cylinder_limit2 * NEAR_SMALL)
         node = bound[node].parent;
     return node;
 }
 
-/* Pushes all children of a node but one. */
+/* Pushes all children of a node that matter, except `child`. Returns the new top. */
 EBPO_EIGHT uint32_t near_other_children(ebpo_near_search *g, uint32_t node, uint32_t child)
 {
     float lower2[8];
     unsigned lanes = near_children(g, node, lower2);
-    for (unsigned left = lanes; left; left &= left - 1)
-        if (g->s->bound[node].child[__builtin_ctz(left)] == child)
-            lanes &= ~(left & -left);
+    for (unsigned rest = lanes; rest; rest &= rest - 1)
+        if (g->s->bound[node].child[__builtin_ctz(rest)] == child)
+            lanes &= ~(rest & -rest);
     return lanes ? near_push(g, 0, node, lanes, lower2) : 0;
 }
 
@@ -325,6 +331,8 @@ EBPO_EIGHT bool near_walk_down(ebpo_near_search *g, uint32_t top, bool wide)
     return true;
 }
 
+/* Walks down from the node that near_begin returns, then, node by node up to the root, down through
+ * the other children. */
 EBPO_EIGHT void near_walk_in(ebpo_near_search *g, bool wide)
 {
     uint32_t node = near_begin(g, wide), top = 1;

@@ -1,12 +1,13 @@
-/* Finds the nearest face of a model. Under a budget, subtrees are searched, and loaded, in the
- * order in which they may matter.
+/* Finds the nearest face of a model. Under a budget, loads and searches subtrees in the order of
+ * their bounds.
  *
- * Nodes of the top and subtrees wait in a queue, ordered by guaranteed lower bounds of their
- * distance. The search ends when the next bound is beyond the best face. A subtree is loaded only
- * if its bound is at most the result, independent of the data in memory. Bounds come from a
- * subtree's skeleton (upper nodes of a subtree's hierarchy over faces), if it has ever been loaded
- * (skeleton.c), else from the envelopes of the levels right below the cut (deep bounds). Deep
- * bounds are read once queries have loaded enough subtrees without need. */
+ * Nodes of the top (levels 0 to the cut level) and subtrees wait in a queue, ordered by guaranteed
+ * lower bounds of their distance. The search ends when the next bound is beyond the best face. So a
+ * subtree is loaded only if its bound is at most the result, whatever is in memory. If a subtree
+ * has ever been loaded, its bound comes from its skeleton (upper nodes of its hierarchy over faces,
+ * skeleton.c). If not, its bound comes from the envelopes of the first levels below the cut level
+ * (*deep bounds*, nearest.h). Deep bounds are read when queries have loaded enough subtrees without
+ * need. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -53,25 +54,26 @@ ebpo_ranked ebpo_queue_pop(ebpo_context *c)
     return first;
 }
 
-/* Number of levels of deep bounds. Each level takes four times the memory of the one above it; a
- * third level would save a tenth of the loads that remain with two: docs/develop/design.md. */
+/* Number of levels of deep bounds. Each level takes four times the memory of the level above it; a
+ * third level would save only a tenth of the remaining loads (docs/develop/design.md). */
 enum { DEEP_LEVELS = 2 };
-/* Number of new subtrees without need after which deep bounds are read. On a path, a query visits
- * few new subtrees, so further ones were loaded without need. Reading two levels takes about as
- * long as this number of loads. */
-enum { NEW_AS_DEFAULT = 4, LOADS_TO_READ = 64 };
+/* A new subtree has no skeleton. On a path, a query loads at most a few new subtrees: if it loads
+ * more than NEW_NEEDED, the others count as loaded without need. Deep bounds are read after
+ * LOADS_TO_READ such loads, which take about as long as reading two levels. */
+enum { NEW_NEEDED = 4, LOADS_TO_READ = 64 };
 
 /* --- deep bounds --- */
 
+/* Reads the levels down to `level`. Returns false if the quota of skeletons is too small. */
 static bool read_levels(ebpo_model *m, int level)
 {
-    uint64_t most = ebpo_top_envelopes_estimate(m->info, level);
+    uint64_t estimate = ebpo_top_envelopes_estimate(m->info, level);
     ebpo_top *deep = NULL;
-    if (!ebpo_skeletons_take(m->skeletons, most))
+    if (!ebpo_skeletons_take(m->skeletons, estimate))
         return false;
     if (ebpo_top_read_envelopes(&deep, m->file, level, m->options.threads, NULL) != EBPO_OK)
         deep = NULL;
-    ebpo_skeletons_give_back(m->skeletons, most - (deep ? deep->bytes : 0));
+    ebpo_skeletons_give_back(m->skeletons, estimate - (deep ? deep->bytes : 0));
     atomic_store_explicit(&m->deep, deep, memory_order_release);
     return true;
 }
@@ -89,17 +91,18 @@ void ebpo_deep_bounds_make(ebpo_model *m)
 
 void ebpo_deep_bounds_report(ebpo_model *m, unsigned loaded)
 {
-    if (loaded <= NEW_AS_DEFAULT || m->deep_begun || ebpo_input_prefetches(&m->file->in))
+    if (loaded <= NEW_NEEDED || m->deep_begun || ebpo_input_prefetches(&m->file->in))
         return;
-    uint64_t more = loaded - NEW_AS_DEFAULT;
+    uint64_t more = loaded - NEW_NEEDED;
     if (atomic_fetch_add(&m->new_loads, more) + more >= LOADS_TO_READ)
         ebpo_deep_bounds_make(m);
 }
 
+/* A search for the least bound among the deepest nodes of the deep bounds. */
 typedef struct deep_search {
     const ebpo_top *top;
     const ebpo_ranking *ranking;
-    double best; /* best distance so far */
+    double best; /* least bound of a deepest node so far */
 } deep_search;
 
 typedef struct deep_child {
@@ -115,7 +118,7 @@ static ebpo_top_planes planes_of(const ebpo_top *t, uint32_t entry)
                                                                 : t->gray[value];
 }
 
-/* Ranks the children that may be nearer than the best distance, the nearest first. */
+/* Lists the children with bounds below g->best, the nearest first. */
 static int rank_deep_children(const deep_search *g, uint32_t gray, ebpo_cell cell, double parent,
                               deep_child out[8])
 {
@@ -149,8 +152,8 @@ static void search_deep(deep_search *g, uint32_t gray, ebpo_cell cell, double pa
             g->best = child[i].lower;
 }
 
-/* Returns a guaranteed lower bound, at least `lower`, for the solid's surface in the cell of a node
- * of the cut level; bounds beyond `limit` are not refined. Any thread. */
+/* Returns a guaranteed lower bound, at least `lower`, of the distance to the faces in the cell of a
+ * node of the cut level, from deep bounds. The search for it stops beyond `limit`. Any thread. */
 static double bound_below_cut(const ebpo_ranking *ranking, const ebpo_node *node, double lower,
                               double limit)
 {
@@ -171,26 +174,28 @@ static double bound_below_cut(const ebpo_ranking *ranking, const ebpo_node *node
 
 /* --- the search --- */
 
-/* Entries of the queue for a subtree: the node without further data; its owned faces; its shared
- * faces. */
+/* Values of ebpo_ranked.what. NODE: a node of the top, or a subtree that was not inspected yet.
+ * OWNED: the faces that the subtree owns; without a skeleton, all its faces. SHARED: faces that
+ * other subtrees own. */
 enum { NODE = 0, OWNED, SHARED };
 
 typedef struct searching {
     ebpo_context *c;
     ebpo_nearest *n;
     ebpo_ranking ranking;
-    unsigned new_loads; /* number of loaded subtrees that had no bounds */
-    double hinted;      /* prefetch hints have been sent for new subtrees up to this bound */
+    unsigned new_loads; /* number of loaded subtrees that had no skeleton */
+    double hinted;      /* prefetch hints have been sent for all new subtrees up to this bound */
 } searching;
 
+/* Adds a node to the queue if its bound is within the limit. */
 static ebpo_status add_node(searching *g, const ebpo_ranked *r, ebpo_error *error)
 {
     ebpo_nearest *n = g->n;
     if (r->lower > ebpo_nearest_limit(n) || ebpo_node_is_uniform(&r->node) ||
-        r->node.pruned) /* pruned: inspect_pruned handles the node */
+        r->node.pruned) /* pruned nodes: see inspect_pruned (distance.c) */
         return EBPO_OK;
     if (ebpo_node_is_subtree_root(&r->node)) {
-        /* the node contains a face */
+        /* the node lists a face, so its farthest point is an upper bound */
         double end = ebpo_rank_cell_end(&g->ranking, r->node.cell);
         n->upper = fmin(n->upper, n->far.far ? ebpo_far_upper(&n->far, end) : end);
         n->limit = fmin(n->limit, n->upper);
@@ -210,13 +215,15 @@ static ebpo_status add_children(searching *g, const ebpo_ranked *r, ebpo_error *
     return status;
 }
 
-/* --- subtrees are searched once: each is marked by twice the query's number, or one more --- */
+/* --- marks: a query of number q marks a subtree with 2 q if its owned faces are in the queue, and
+ * with 2 q + 1 if the subtree has been searched --- */
 
 static bool is_searched(const ebpo_context *c, uint32_t below)
 {
     return c->marks[below] == 2 * c->query_number + 1;
 }
 
+/* Empties the queue, and gives the query a number. */
 static ebpo_status begin_query(ebpo_context *c, ebpo_error *error)
 {
     uint64_t count = c->model->top->below_count;
@@ -229,24 +236,24 @@ static ebpo_status begin_query(ebpo_context *c, ebpo_error *error)
     return c->marks ? EBPO_OK : ebpo_fail_memory(error, count * sizeof *c->marks);
 }
 
-static bool is_there(const ebpo_context *c, uint32_t below)
+static bool is_in_memory(const ebpo_context *c, uint32_t below)
 {
     return ebpo_context_has_pinned(c, below) ||
            ebpo_cache_has(c->model->cache, ebpo_context_key(c, below));
 }
 
-/* Before a subtree of a remote file is entered, sends prefetch hints for it and for further
+/* Before a subtree of a remote file is entered, sends prefetch hints for it and for other new
  * subtrees that the search probably needs, so that one round trip fetches all of them. The result
- * is between the subtree's bound and the limit; the subtrees up to 3/16 of the way are requested.
- * 60 points anywhere in the box of 4.3 million faces: 11.5 round trips and 999 kB without these
- * hints, 6.9 and 1,040 kB with 3/16, 6.0 and 1,103 kB with 1/2. Far points, whose bounds are keys,
- * get no hints. */
+ * is between the subtree's bound and the limit; subtrees with bounds in the first 3/16 of this
+ * interval are requested. For 60 points anywhere in the box of a model of 4.3 million faces, a
+ * query takes 11.5 round trips and 999 kB without these hints, 6.9 and 1,040 kB with 3/16, 6.0 and
+ * 1,103 kB with 1/2. Far points, whose bounds are keys, get no hints. */
 static void hint_subtrees(searching *g, uint32_t below, double lower)
 {
     ebpo_context *c = g->c;
     double limit = g->n->found ? lower + (g->n->limit - lower) * 0.1875 : lower;
     if (g->ranking.far || limit <= g->hinted || !ebpo_input_prefetches(&c->model->file->in) ||
-        is_there(c, below))
+        is_in_memory(c, below))
         return;
     uint64_t near[EBPO_CACHE_AHEAD];
     uint32_t hinted[EBPO_CACHE_AHEAD + 1] = { below };
@@ -259,6 +266,7 @@ static void hint_subtrees(searching *g, uint32_t below, double lower)
     ebpo_context_hint(c, hinted, count);
 }
 
+/* Searches all faces of a subtree, unless this query has done that. */
 static ebpo_status search_below(searching *g, const ebpo_ranked *r, ebpo_error *error)
 {
     ebpo_node node = r->node;
@@ -277,10 +285,10 @@ static ebpo_status search_below(searching *g, const ebpo_ranked *r, ebpo_error *
         return status;
     ebpo_nearest_search(g->n, g->c, node.subtree);
     g->new_loads += g->c->loaded > loaded && is_new;
-    /* loaded without need, or one of many subtrees at about the same distance */
-    bool again =
+    /* true if the load was without need, or this is one of many subtrees at about this distance */
+    bool needs_bounds =
         g->n->limit == limit || g->n->limit > ebpo_cell_diagonal(&g->ranking.box, node.cell);
-    if (g->c->loaded > loaded && again)
+    if (g->c->loaded > loaded && needs_bounds)
         ebpo_skeletons_grow(g->c->model->skeletons, below, node.subtree, g->n->p, g->n->limit);
     return EBPO_OK;
 }
@@ -294,8 +302,8 @@ static ebpo_status search_below(searching *g, const ebpo_ranked *r, ebpo_error *
  * subtrees that may own them are searched instead, by bounds that hold wherever the owners' faces
  * are. If one of these owners has no skeleton, the subtree itself is searched. So the nearest face
  * is found: its nearest point is in a visited cell, and the subtree of that cell or the face's
- * owner is searched. All bounds that lead to this search are at most the face's distance. The queue
- * may return the subtree and the owner in any order. */
+ * owner is searched. All bounds that lead to this search are at most the face's distance. The
+ * queue may return the subtree and the owner in any order. */
 
 static ebpo_skeleton_bounds skeleton_bounds(const searching *g, const ebpo_skeleton *k)
 {
@@ -303,6 +311,7 @@ static ebpo_skeleton_bounds skeleton_bounds(const searching *g, const ebpo_skele
                           : ebpo_skeleton_lower_bounds(k, g->n->p, g->n->limit);
 }
 
+/* Returns the root node of a subtree. */
 static ebpo_node node_below(const ebpo_model *m, uint32_t below)
 {
     ebpo_node node = m->top->below[below];
@@ -310,9 +319,10 @@ static ebpo_node node_below(const ebpo_model *m, uint32_t below)
     return node;
 }
 
-/* Adds a subtree to the queue for its owned faces. `lower`: bound for which it is added. Bounds
- * only increase, so adding it once is enough. */
-static ebpo_status consider_own(searching *g, uint32_t below, double lower, ebpo_error *error)
+/* Adds the owned faces of a subtree to the queue, unless this query has done that. `lower`: bound
+ * of the queue's current entry. As bounds of the queue's entries only increase, a second entry
+ * would not have a lower bound. */
+static ebpo_status add_owned(searching *g, uint32_t below, double lower, ebpo_error *error)
 {
     ebpo_context *c = g->c;
     if (c->marks[below] >= 2 * c->query_number)
@@ -324,32 +334,34 @@ static ebpo_status consider_own(searching *g, uint32_t below, double lower, ebpo
     return r.lower <= ebpo_nearest_limit(g->n) ? ebpo_queue_push(c, &r, error) : EBPO_OK;
 }
 
-/* Walk to the subtrees that may own shared faces of another subtree: their cells intersect the box
- * of the faces and come before that subtree, depth first. */
+/* A walk to the subtrees that may own shared faces of a subtree S: the cells of these owners
+ * intersect the box of the faces, and precede S, depth first. */
 typedef struct owners {
     searching *g;
-    uint64_t code; /* octcode of the other subtree */
-    int level;
-    double lower;
-    const ebpo_shared_box *shared;
+    uint64_t code;                 /* octcode of S */
+    int level;                     /* level of S's root */
+    double lower;                  /* bound with which S left the queue */
+    const ebpo_shared_box *shared; /* box around some shared faces of S */
+    /* Called for each owner. The walk ends if it returns false. */
     bool (*visit)(struct owners *o, uint32_t below, ebpo_error *error);
     ebpo_status status;
 } owners;
 
-/* Returns true if the box reaches the cell. The cell is widened, as its node also lists faces near
- * the cell: point_bounds.c. */
+/* Returns true if the box intersects the cell enlarged by 1/128 of its size, because its node may
+ * also list faces that are near the cell (within 1/256: format-spec, section 7). */
 static bool cell_intersects(const owners *o, ebpo_cell cell)
 {
     double low[3], high[3];
     ebpo_cell_bounds(&o->g->ranking.box, cell, low, high);
     for (int k = 0; k < 3; k++) {
-        double near = (high[k] - low[k]) / 128 + (fabs(low[k]) + fabs(high[k])) * 0x1p-50;
-        if (o->shared->low[k] > high[k] + near || o->shared->high[k] < low[k] - near)
+        double margin = (high[k] - low[k]) / 128 + (fabs(low[k]) + fabs(high[k])) * 0x1p-50;
+        if (o->shared->low[k] > high[k] + margin || o->shared->high[k] < low[k] - margin)
             return false;
     }
     return true;
 }
 
+/* Returns true if the cell contains S or precedes S, depth first. */
 static bool comes_before(const owners *o, ebpo_cell cell)
 {
     uint64_t code = ebpo_octcode_of_cell(cell);
@@ -357,19 +369,20 @@ static bool comes_before(const owners *o, ebpo_cell cell)
     return deeper > 0 ? code >> 3 * deeper < o->code : code <= o->code >> 3 * -deeper;
 }
 
+/* Returns true if the owner has a skeleton. */
 static bool is_known(owners *o, uint32_t below, ebpo_error *error)
 {
     (void)error;
     return ebpo_skeletons_find(o->g->c->model->skeletons, below) != NULL;
 }
 
-static bool consider_owner(owners *o, uint32_t below, ebpo_error *error)
+static bool add_owner(owners *o, uint32_t below, ebpo_error *error)
 {
-    o->status = consider_own(o->g, below, o->lower, error);
+    o->status = add_owned(o->g, below, o->lower, error);
     return o->status == EBPO_OK;
 }
 
-/* Visits the owners. Returns false as soon as a visit does. */
+/* Visits the owners below a node. Returns false as soon as o->visit does. */
 static bool visit_owners(owners *o, uint32_t entry, ebpo_cell cell, ebpo_error *error)
 {
     const ebpo_node_table *nodes = &o->g->c->model->top->nodes;
@@ -385,6 +398,7 @@ static bool visit_owners(owners *o, uint32_t entry, ebpo_cell cell, ebpo_error *
     return true;
 }
 
+/* Visits the owners of the faces in all boxes. Returns false as soon as o->visit does. */
 static bool visit_all(owners *o, const ebpo_shared_box *boxes, unsigned count, ebpo_error *error)
 {
     for (unsigned i = 0; i < count; i++) {
@@ -395,10 +409,10 @@ static bool visit_all(owners *o, const ebpo_shared_box *boxes, unsigned count, e
     return true;
 }
 
-/* Adds the owners to the queue. Returns false if some owner has no skeleton; nothing has been added
- * then. */
-static bool consider_owners(searching *g, const ebpo_skeleton *k, const ebpo_ranked *r,
-                            ebpo_status *status, ebpo_error *error)
+/* Adds the owned faces of all owners to the queue. Returns false, and adds nothing, if some owner
+ * has no skeleton. */
+static bool add_owners(searching *g, const ebpo_skeleton *k, const ebpo_ranked *r,
+                       ebpo_status *status, ebpo_error *error)
 {
     ebpo_shared_box box[EBPO_SHARED_BOXES];
     unsigned count = ebpo_skeleton_shared_boxes(k, g->n->p, g->n->limit, box);
@@ -410,7 +424,7 @@ static bool consider_owners(searching *g, const ebpo_skeleton *k, const ebpo_ran
                  .status = EBPO_OK };
     if (!visit_all(&o, box, count, error))
         return false;
-    o.visit = consider_owner;
+    o.visit = add_owner;
     visit_all(&o, box, count, error);
     *status = o.status;
     return true;
@@ -421,8 +435,8 @@ static double deep_bound(const searching *g, const ebpo_ranked *r)
     return bound_below_cut(&g->ranking, &r->node, r->lower, ebpo_nearest_limit(g->n));
 }
 
-/* Handles a subtree without skeleton: it is searched after everything that is nearer than its
- * bound. */
+/* Handles a subtree without skeleton. If deep bounds increase its bound, it goes back to the queue;
+ * if not, it is searched. */
 static ebpo_status inspect_new(searching *g, const ebpo_ranked *r, ebpo_error *error)
 {
     ebpo_ranked all = { r->node, deep_bound(g, r), OWNED };
@@ -431,6 +445,7 @@ static ebpo_status inspect_new(searching *g, const ebpo_ranked *r, ebpo_error *e
     return all.lower > r->lower ? ebpo_queue_push(g->c, &all, error) : search_below(g, r, error);
 }
 
+/* Handles a subtree that leaves the queue for the first time. */
 static ebpo_status inspect_subtree(searching *g, const ebpo_ranked *r, ebpo_error *error)
 {
     uint32_t below = ebpo_entry_value(r->node.entry);
@@ -443,10 +458,10 @@ static ebpo_status inspect_subtree(searching *g, const ebpo_ranked *r, ebpo_erro
     double least = fmax(r->lower, fmin(bounds.owned, bounds.shared));
     if (least > ebpo_nearest_limit(g->n))
         return EBPO_OK;
-    bool there = is_there(g->c, below); /* then owned and shared faces are searched together */
-    double lower = there ? r->lower : deep_bound(g, r);
-    ebpo_ranked owned = { r->node, there ? least : fmax(lower, bounds.owned), OWNED },
-                shared = { r->node, there ? INFINITY : fmax(lower, bounds.shared), SHARED };
+    bool in_memory = is_in_memory(g->c, below); /* if so, all its faces are searched together */
+    double lower = in_memory ? r->lower : deep_bound(g, r);
+    ebpo_ranked owned = { r->node, in_memory ? least : fmax(lower, bounds.owned), OWNED },
+                shared = { r->node, in_memory ? INFINITY : fmax(lower, bounds.shared), SHARED };
     double limit = ebpo_nearest_limit(g->n);
     ebpo_status status = owned.lower <= limit ? ebpo_queue_push(g->c, &owned, error) : EBPO_OK;
     if (status == EBPO_OK && shared.lower <= limit)
@@ -454,13 +469,14 @@ static ebpo_status inspect_subtree(searching *g, const ebpo_ranked *r, ebpo_erro
     return status;
 }
 
+/* Handles the shared faces of a subtree: adds the owners to the queue, or searches the subtree. */
 static ebpo_status inspect_shared(searching *g, const ebpo_ranked *r, ebpo_error *error)
 {
     uint32_t below = ebpo_entry_value(r->node.entry);
     const ebpo_skeleton *k = ebpo_skeletons_find(g->c->model->skeletons, below);
     ebpo_status status = EBPO_OK;
     if (is_searched(g->c, below) ||
-        (!is_there(g->c, below) && consider_owners(g, k, r, &status, error)))
+        (!is_in_memory(g->c, below) && add_owners(g, k, r, &status, error)))
         return status;
     return search_below(g, r, error);
 }

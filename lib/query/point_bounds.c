@@ -1,10 +1,9 @@
 /* Computes guaranteed bounds of the distance of a point to a cell, to the half-spaces of an
  * envelope, and to the hierarchy over faces.
  *
- * From a distance of 16 sizes of the model's box on, doubles hardly separate distances. There the
- * bounds are those of keys, which grow with the distance (point_bounds.h). Upper bounds include
- * faces that a node may list without containing them: faces within 1/256 of the cell's size
- * (format-spec, section 7). Rounding: docs/develop/bounds.md, "Points far away". */
+ * If the distance is at least 16 sizes of the model's box, doubles hardly distinguish distances.
+ * Then the bounds are bounds of keys, which are in the same order as distances (point_bounds.h).
+ * Rounding: docs/develop/bounds.md, "Points far away". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -15,7 +14,7 @@
 
 /* A node may list a face that is outside its cell but near it: within 1/256 of the cell's size on
  * each axis (format-spec, section 7). This value adds a margin for rounding. */
-static const double near_share = 0x1.1p-8;
+static const double list_margin = 0x1.1p-8;
 
 static void cell_size(const ebpo_box *box, ebpo_cell cell, double low[3], double size[3])
 {
@@ -26,23 +25,24 @@ static void cell_size(const ebpo_box *box, ebpo_cell cell, double low[3], double
 }
 
 /* Returns sqrt(x0^2 + x1^2 + x2^2) without overflow; the error is a few ulp. */
-static double scaled_length(const double x[3])
+static double safe_length(const double x[3])
 {
-    double most = fmax(fabs(x[0]), fmax(fabs(x[1]), fabs(x[2])));
-    if (!(most > 0) || isinf(most))
-        return most;
-    double a = x[0] / most, b = x[1] / most, c = x[2] / most;
-    return most * sqrt(a * a + b * b + c * c);
+    double greatest = fmax(fabs(x[0]), fmax(fabs(x[1]), fabs(x[2])));
+    if (!(greatest > 0) || isinf(greatest))
+        return greatest;
+    double a = x[0] / greatest, b = x[1] / greatest, c = x[2] / greatest;
+    return greatest * sqrt(a * a + b * b + c * c);
 }
 
 double ebpo_cell_diagonal(const ebpo_box *box, ebpo_cell cell)
 {
     double low[3], size[3];
     cell_size(box, cell, low, size);
-    return scaled_length(size) * (1 + near_share);
+    return safe_length(size) * (1 + list_margin);
 }
 
-/* Returns the value of a half-space at p, 4096 n . xi - d, and a bound on its error. */
+/* Returns the value of a half-space at the point xi of the cell, 4096 n . xi - d (positive:
+ * outside), and a bound of its error. An invalid code has an infinite error. */
 static double plane_value(const double xi[3], uint32_t code, int32_t n[3], double *error)
 {
     int32_t d;
@@ -82,7 +82,7 @@ double ebpo_envelope_distance(const ebpo_box *box, ebpo_cell cell, const uint32_
         xi[k] = (p[k] - low[k]) / size[k];
         d[k] = fmax(fmax(low[k] - p[k], p[k] - (low[k] + size[k])), 0);
     }
-    double best = scaled_length(d) * (1 - 0x1p-48);
+    double best = safe_length(d) * (1 - 0x1p-48);
     for (uint32_t i = 0; i < count && !(best > enough); i++) {
         int32_t n[3];
         double error, value = plane_value(xi, codes[i], n, &error);
@@ -90,8 +90,7 @@ double ebpo_envelope_distance(const ebpo_box *box, ebpo_cell cell, const uint32_
             continue;
         double gradient[3] = { 4096.0 * n[0] / size[0], 4096.0 * n[1] / size[1],
                                4096.0 * n[2] / size[2] };
-        double length = scaled_length(gradient),
-               distance = (value - error) / length * (1 - 0x1p-48);
+        double length = safe_length(gradient), distance = (value - error) / length * (1 - 0x1p-48);
         if (length > 0 && isfinite(length) && distance > best)
             best = distance;
     }
@@ -104,35 +103,35 @@ double ebpo_cell_far(const ebpo_box *box, ebpo_cell cell, const double p[3])
     cell_size(box, cell, low, size);
     for (int k = 0; k < 3; k++)
         d[k] = fmax(fabs(p[k] - low[k]), fabs(p[k] - (low[k] + size[k])));
-    return scaled_length(d) * (1 + 0x1p-40) + scaled_length(size) * near_share;
+    return safe_length(d) * (1 + 0x1p-40) + safe_length(size) * list_margin;
 }
 
 /* Distance from which points are far, in sizes of the model's box. */
 static const double far_away = 16;
-/* Error of keys, relative to the largest coordinate: docs/develop/bounds.md. */
-static const double loss = 0x1p-46;
+/* Error of keys, relative to the largest coordinate (docs/develop/bounds.md). */
+static const double key_error = 0x1p-46;
 
 void ebpo_far_make(ebpo_far *f, const ebpo_box *box, const double p[3])
 {
-    double size = 0, most = 0, sum = 0, to[3];
+    double size = 0, greatest = 0, sum = 0, to[3];
     int unit, exponent;
     memset(f, 0, sizeof *f);
     for (int k = 0; k < 3; k++) {
         f->centre[k] = box->origin[k] + box->size[k] / 2;
         size = fmax(size, box->size[k]);
-        most = fmax(most, fmax(fabs(p[k]), fabs(f->centre[k])));
+        greatest = fmax(greatest, fmax(fabs(p[k]), fabs(f->centre[k])));
     }
-    if (!(size > 0) || !isfinite(size) || !isfinite(most))
+    if (!(size > 0) || !isfinite(size) || !isfinite(greatest))
         return;
     frexp(size, &unit);
-    frexp(most, &exponent);
+    frexp(greatest, &exponent);
     for (int k = 0; k < 3; k++) {
         to[k] = ldexp(p[k], -exponent) - ldexp(f->centre[k], -exponent);
         sum += to[k] * to[k];
     }
     double length = sqrt(sum);
-    f->reach = ldexp(length, exponent - unit);
-    if (!(f->reach >= far_away))
+    f->distance_in_units = ldexp(length, exponent - unit);
+    if (!(f->distance_in_units >= far_away))
         return;
     f->far = true;
     f->distance = ldexp(length, exponent);
@@ -147,35 +146,41 @@ void ebpo_far_make(ebpo_far *f, const ebpo_box *box, const double p[3])
 
 double ebpo_far_limit(const ebpo_far *f, double distance)
 {
-    if (!(distance < INFINITY) || !isfinite(f->reach) || !(f->distance < INFINITY) ||
+    if (!(distance < INFINITY) || !isfinite(f->distance_in_units) || !(f->distance < INFINITY) ||
         f->distance < 0x1p-1000)
         return INFINITY;
     double ratio = distance / f->distance; /* (d / D)^2 = 1 + 2 key / reach */
-    return ((ratio - 1) * (ratio + 1) / 2 + (ratio * ratio + 1) * 0x1p-47) * f->reach;
+    return ((ratio - 1) * (ratio + 1) / 2 + (ratio * ratio + 1) * 0x1p-47) * f->distance_in_units;
 }
 
+/* Returns the distance for a key, with a relative error of `share` added. */
 static double distance_of(const ebpo_far *f, double key, double share)
 {
     if (key == INFINITY)
         return INFINITY;
-    double square = 1 + (isfinite(f->reach) ? 2 * key / f->reach : 0) + share;
+    double square =
+        1 + (isfinite(f->distance_in_units) ? 2 * key / f->distance_in_units : 0) + share;
     return square > 0 ? f->distance * sqrt(square) * (1 + share) : 0;
 }
 
-/* Added to bounds: for numbers below the normal doubles the rounding error is larger. */
-static const double tiny = 0x1p-1070;
+/* Added to bounds, because the relative rounding error of denormal numbers is larger. */
+static const double denormal_error = 0x1p-1070;
 
 double ebpo_far_lower(const ebpo_far *f, double key)
 {
     /* the distance may be finite, although its computation in doubles overflows */
-    double distance = distance_of(f, key, -0x1p-40) - tiny;
+    double distance = distance_of(f, key, -0x1p-40) - denormal_error;
     return key == INFINITY ? INFINITY : fmin(fmax(distance, 0), 0x1p1023);
 }
-double ebpo_far_upper(const ebpo_far *f, double key) { return distance_of(f, key, 0x1p-40) + tiny; }
+double ebpo_far_upper(const ebpo_far *f, double key)
+{
+    return distance_of(f, key, 0x1p-40) + denormal_error;
+}
 
 /* --- positions --- */
 
-static double place_on_axis(const ebpo_far *f, double x, int axis)
+/* Returns a coordinate of y (point_bounds.h). */
+static double y_on_axis(const ebpo_far *f, double x, int axis)
 {
     return (x - f->centre[axis]) * f->unit[0] * f->unit[1];
 }
@@ -186,15 +191,15 @@ static double apex_of_square(double half, double toward)
     return half > 0 ? toward / (2 * half) : toward > 0 ? INFINITY : -INFINITY;
 }
 
-/* Returns the minimum of h y^2 - u y from `low` to `high`; `at`: the position of the minimum
- * without limits. */
+/* Returns the minimum of h y^2 - u y for y in low .. high. `at`: the result of apex_of_square. */
 static inline double least_between(double half, double toward, double at, double low, double high)
 {
     double y = at < low ? low : at > high ? high : at;
     return (half * y - toward) * y;
 }
 
-static double height_of(const ebpo_far *f, const double y[3])
+/* Returns the key of the point y. */
+static double key_of(const ebpo_far *f, const double y[3])
 {
     double sum = 0;
     for (int k = 0; k < 3; k++)
@@ -202,42 +207,45 @@ static double height_of(const ebpo_far *f, const double y[3])
     return sum;
 }
 
-static double margin_of(const ebpo_far *f, double most)
+/* Returns a bound of the error of the key of a point with coordinates y up to `greatest`. */
+static double margin_of(const ebpo_far *f, double greatest)
 {
-    return loss * most * (1 + f->half * most) + 0x1p-1000;
+    return key_error * greatest * (1 + f->half * greatest) + 0x1p-1000;
 }
 
 /* --- cells and envelopes --- */
 
+/* A cell in coordinates y; its greatest absolute coordinate. */
 typedef struct placed_cell {
-    double low[3], size[3], most;
+    double low[3], size[3], greatest;
 } placed_cell;
 
-static placed_cell cell_place(const ebpo_far *f, const ebpo_box *box, ebpo_cell cell)
+static placed_cell place_cell(const ebpo_far *f, const ebpo_box *box, ebpo_cell cell)
 {
-    placed_cell out = { .most = 0 };
+    placed_cell out = { .greatest = 0 };
     for (int k = 0; k < 3; k++) {
-        out.low[k] = place_on_axis(f, ebpo_cell_face(box, k, cell.level, cell.at[k]), k);
+        out.low[k] = y_on_axis(f, ebpo_cell_face(box, k, cell.level, cell.at[k]), k);
         out.size[k] = box->size[k] * f->unit[0] * f->unit[1] / (double)(1u << cell.level);
-        out.most = fmax(out.most, fabs(out.low[k]) + out.size[k]);
+        out.greatest = fmax(out.greatest, fabs(out.low[k]) + out.size[k]);
     }
     return out;
 }
 
 double ebpo_far_cell_end(const ebpo_far *f, const ebpo_box *box, ebpo_cell cell)
 {
-    placed_cell c = cell_place(f, box, cell);
+    placed_cell c = place_cell(f, box, cell);
     double sum = 0;
     for (int k = 0; k < 3; k++) {
-        double low = c.low[k] - near_share * c.size[k],
-               high = c.low[k] + (1 + near_share) * c.size[k];
+        double low = c.low[k] - list_margin * c.size[k],
+               high = c.low[k] + (1 + list_margin) * c.size[k];
         sum += fmax((f->half * low - f->toward[k]) * low, (f->half * high - f->toward[k]) * high);
     }
-    return sum + margin_of(f, 2 * c.most);
+    return sum + margin_of(f, 2 * c.greatest);
 }
 
-/* A bound by Lagrange: where n . xi <= d, adding share (n . xi - d) to a function makes it nowhere
- * greater. So its minimum over the whole cell is a lower bound, for every share of 0 or more. */
+/* Returns a lower bound of the key in the part of the cell where gradient . y <= beyond. There,
+ * adding share * (gradient . y - beyond) to the key does not increase it if share >= 0. So the
+ * minimum of this sum over the whole cell is a lower bound, for every such share. */
 static double cut_bound(const ebpo_far *f, const placed_cell *c, const double gradient[3],
                         double beyond, double share)
 {
@@ -249,7 +257,7 @@ static double cut_bound(const ebpo_far *f, const placed_cell *c, const double gr
         size += (fabs(f->toward[k]) + fabs(tilt)) * (fabs(low) + fabs(high)) +
                 share * fabs(gradient[k] * low);
     }
-    double bound = sum - size * loss - margin_of(f, c->most);
+    double bound = sum - size * key_error - margin_of(f, c->greatest);
     return isnan(bound) ? -INFINITY : bound;
 }
 
@@ -257,7 +265,7 @@ double ebpo_far_envelope(const ebpo_far *f, const ebpo_box *box, ebpo_cell cell,
                          const uint32_t *codes, uint32_t count, double enough)
 {
     static const double none[3];
-    placed_cell c = cell_place(f, box, cell);
+    placed_cell c = place_cell(f, box, cell);
     double best = cut_bound(f, &c, none, 0, 0);
     for (uint32_t i = 0; i < count && !(best > enough); i++) {
         int32_t n[3], d;
@@ -269,8 +277,7 @@ double ebpo_far_envelope(const ebpo_far *f, const ebpo_box *box, ebpo_cell cell,
             gradient[k] = c.size[k] > 0 ? n[k] / c.size[k] : 0;
             beyond += gradient[k] * c.low[k];
         }
-        /* as a function of the share, the bound is concave, and its slope changes only at these
-         * values */
+        /* the bound is a concave function of the share, whose slope changes only at these values */
         for (int k = 0; k < 3; k++) {
             double share = f->toward[k] / gradient[k];
             if (c.size[k] > 0 && share > 0 && isfinite(share))
@@ -283,15 +290,15 @@ double ebpo_far_envelope(const ebpo_far *f, const ebpo_box *box, ebpo_cell cell,
 /* --- the hierarchy over faces --- */
 
 ebpo_far_frame ebpo_far_frame_of(const ebpo_far *f, const double centre[3], double scale,
-                                 double reach)
+                                 double largest)
 {
     ebpo_far_frame g = { .ratio = f->unit[0] / scale * f->unit[1] };
-    double most = g.ratio * reach;
+    double greatest = g.ratio * largest;
     for (int k = 0; k < 3; k++) {
-        g.offset[k] = place_on_axis(f, centre[k], k);
-        most = fmax(most, fabs(g.offset[k]) + g.ratio * reach);
+        g.offset[k] = y_on_axis(f, centre[k], k);
+        greatest = fmax(greatest, fabs(g.offset[k]) + g.ratio * largest);
     }
-    g.margin = margin_of(f, 2 * most);
+    g.margin = margin_of(f, 2 * greatest);
     return g;
 }
 
@@ -310,8 +317,8 @@ void ebpo_far_boxes(const ebpo_far *f, const ebpo_far_frame *g, const ebpo_bound
 }
 
 /* |p - x|^2 >= |p - m|^2 - 2 (p - m) . (x - m) for the middle m of the box.
- * By Cauchy and Schwarz (p - m) . (x - m) <= ((p - m) . a) ((x - m) . a) + N(p - m) N(x - m).
- * N is that of bounds.md. */
+ * By Cauchy and Schwarz (p - m) . (x - m) <= ((p - m) . a) ((x - m) . a) + N(p - m) N(x - m),
+ * with a the axis and N(v) = sqrt(v . v - (v . a)^2), as in docs/develop/bounds.md. */
 double ebpo_far_cylinder(const ebpo_far *f, const ebpo_far_frame *g, const ebpo_bound *b,
                          const ebpo_bound_cylinder *cylinder, int lane)
 {
@@ -326,26 +333,26 @@ double ebpo_far_cylinder(const ebpo_far *f, const ebpo_far_frame *g, const ebpo_
     }
     double aside = sqrt(fmax(square - along * along, 0) + 0x1p-46 * (1 + square));
     double ahead = fmax(along * s.from, along * s.to);
-    return height_of(f, y) - (ahead + aside * s.radius) * g->ratio - g->margin;
+    return key_of(f, y) - (ahead + aside * s.radius) * g->ratio - g->margin;
 }
 
 /* --- faces --- */
 
-/* |y|^2 >= 2 z . y - |z|^2 for every z. With the best corner for z, the right side is linear in y,
- * so its minimum is at a corner. */
+/* |y|^2 >= 2 z . y - |z|^2 for every z. If z is the corner with the least key, the right side is
+ * linear in y, so its minimum is at a corner. */
 ebpo_far_keys ebpo_far_face(const ebpo_far *f, const double triangle[3][3])
 {
-    double y[3][3], key[3], most = 0;
+    double y[3][3], key[3], greatest = 0;
     int best = 0;
     for (int i = 0; i < 3; i++) {
         for (int k = 0; k < 3; k++) {
-            y[i][k] = place_on_axis(f, triangle[i][k], k);
-            most = fmax(most, fabs(y[i][k]));
+            y[i][k] = y_on_axis(f, triangle[i][k], k);
+            greatest = fmax(greatest, fabs(y[i][k]));
         }
-        key[i] = height_of(f, (const double *)y[i]);
+        key[i] = key_of(f, (const double *)y[i]);
         best = key[i] < key[best] ? i : best;
     }
-    double margin = margin_of(f, most), low = key[best];
+    double margin = margin_of(f, greatest), low = key[best];
     for (int i = 0; i < 3; i++) {
         double square = 0;
         for (int k = 0; k < 3; k++)

@@ -1,6 +1,6 @@
-/* The kernels of queries and their data: inner loops over blocks of faces and over bounds of eight
- * children. They are filters: "certain" means that the result holds in exact arithmetic. Compiled
- * for several instruction sets with the same results (core/cpu.h). */
+/* Declares the kernels of queries and their data. A kernel is an inner loop over blocks of faces
+ * and over the bounds of eight children, compiled for several instruction sets with the same
+ * results (core/cpu.h). Kernels are filters: what they call certain holds in exact arithmetic. */
 #ifndef EBPO_QUERY_QUERY_KERNELS_H
 #define EBPO_QUERY_QUERY_KERNELS_H
 
@@ -13,11 +13,12 @@
 
 /* --- stack of children still to visit, the nearest on top --- */
 
-/* The bits of a nonnegative key (which are ordered as integers), then the child's number. */
+/* A visit: in the upper 32 bits a nonnegative float as the key (bound of the child; such floats
+ * have the order of their bits), in the lower 32 bits the child, as in ebpo_bound. */
 typedef uint64_t ebpo_visit;
 
-/* Maximum number of visits. An octree level adds at most one level to the hierarchy, a long list of
- * one leaf adds eleven. */
+/* Maximum number of visits on a stack: eight for each level of the hierarchy. An octree level adds
+ * at most one level to the hierarchy, and a long list of one leaf adds at most eleven. */
 enum { EBPO_VISITS_MAX = 64 * 8 };
 
 static inline ebpo_visit ebpo_visit_make(float key, uint32_t child)
@@ -80,15 +81,15 @@ typedef struct ebpo_probe {
     float local[3];        /* position in the subtree's frame */
     float scale;           /* scale of the frame */
     double scale64;
-    /* bound of the error of distances that the rounding of `local` causes, in the frame */
+    /* bound, in the frame, of the error of distances caused by the rounding of `local` */
     float error;
 } ebpo_probe;
 
-/* A face that may be nearest. Candidates wait until the end: by then nearly all are known to be
- * farther. */
+/* A face that may be nearest, and a lower bound of its distance in the frame. Candidates wait until
+ * the end of the search, when nearly all of them are known to be farther. */
 typedef struct ebpo_near_candidate {
     float low;
-    uint32_t slot, node; /* the node is the parent of the face's block */
+    uint32_t slot, node; /* the face's slot; the parent of its block */
 } ebpo_near_candidate;
 enum { EBPO_NEAR_CANDIDATES = 64 };
 #define EBPO_NO_BLOCK UINT32_MAX
@@ -99,11 +100,10 @@ struct ebpo_near_search {
     ebpo_probe probe;
     void *user;
     void (*judge)(ebpo_near_search *search); /* compares all waiting candidates */
-    bool (*late)(ebpo_near_search *search);  /* NULL: no deadline */
+    bool (*late)(ebpo_near_search *search); /* returns true after the deadline; NULL: no deadline */
     /* block that is visited before all others, and the node above it; EBPO_NO_BLOCK: none */
     uint32_t first_block, first_node;
-    float best;   /* upper bound in the frame: some face is certainly not farther, or farther faces
-                   * do not matter */
+    float best;   /* greatest distance that matters, in the frame */
     float limit2; /* limit for squared lower bounds */
     int count;
     ebpo_near_candidate waiting[EBPO_NEAR_CANDIDATES];
@@ -123,6 +123,7 @@ static inline void ebpo_near_set_best(ebpo_near_search *g, float best)
     g->limit2 = limit * limit;
 }
 
+/* Drops candidates that are certainly farther than `best`. */
 static inline void ebpo_near_drop_far(ebpo_near_search *g)
 {
     int kept = 0;
@@ -138,8 +139,8 @@ typedef enum ebpo_ray_wants { EBPO_WANTS_FIRST, EBPO_WANTS_ANY, EBPO_WANTS_ALL }
 
 typedef struct ebpo_ray_search ebpo_ray_search;
 
-/* A face that the ray may hit, not before `low`, a value of t in the frame. `facing` is that of
- * ebpo_ray_intersection if the line certainly goes through the face's interior; else 0. */
+/* A face that the ray may hit, at a t of at least `low` (in the frame). `facing`: if the line
+ * certainly goes through the face's interior, as in ebpo_ray_intersection; else 0. */
 typedef struct ebpo_ray_candidate {
     float low;
     uint32_t slot;
@@ -160,19 +161,20 @@ struct ebpo_ray_search {
 
     /* ebpo_ray_search_accel sets the following fields. */
     bool done;    /* the search is complete */
-    bool any_hit; /* if any hit is wanted: some face is certainly hit (`decide` was not called)
-                   */
+    bool any_hit; /* EBPO_WANTS_ANY: some face is certainly hit, and `decide` was not called */
     void (*judge)(ebpo_ray_search *search); /* tests all waiting candidates */
     const ebpo_accel *s;
-    /* In the frame: the direction with a longest coordinate of 2^-12 to 2^12; the origin, moved
-     * along the ray to t = `moved`; the origin's error, for boxes. */
+    /* In the frame: the direction, whose longest coordinate is 2^-12 to 2^12; the origin, moved
+     * along the ray to t = `moved`; a bound of the origin's error. */
     double direction[3], origin[3], error;
-    /* Set by the kernels from direction and origin: start values of distances to the nearer and
-     * farther sides of boxes; four floats, of which three are used. */
+    /* Set by the kernels, with one float for each axis and an unused fourth one: the origin, moved
+     * by the error so that no box is missed, for the nearer and the farther sides of boxes; the
+     * inverse of the direction. */
     float near_from[4], far_from[4], inverse[4];
     float step_inverse[4];    /* unused value, then `inverse` */
     double inverse_double[4]; /* inverse of the direction, small coordinates replaced */
-    /* byte offsets in ebpo_bound of the sides of boxes: nearer ones, farther ones */
+    /* byte offsets in ebpo_bound: of the nearer sides of boxes on each axis, and of the farther
+     * ones */
     const uint8_t (*side_at)[3];
     int axis[3];    /* z: the axis with the longest coordinate of the direction */
     float shear[3]; /* motion in x and y for a step of 1 along z; change of t for such a step */
@@ -181,28 +183,28 @@ struct ebpo_ray_search {
     float from_high[4], from_low[4];
     float blur; /* distance at which other rounding errors equal the origin's error */
     double moved, limit_scale;
-    float bound, surely; /* limit, rounded up; t_max, rounded down */
+    float bound, surely; /* in the frame: limit, rounded up; t_max, rounded down */
     int count;
     ebpo_ray_candidate waiting[EBPO_RAY_CANDIDATES];
 };
 
 /* --- point in solid --- */
 
-/* A segment along an axis from `from` (on all three axes) up to coordinate `to`: predicates.h,
- * ebpo_axis_crossing. */
+/* A segment along an axis, from the point `from` up to the coordinate `to`, as in
+ * ebpo_axis_crossing (predicates.h). */
 typedef struct ebpo_axis_segment {
     double from[3];
     double to;
     int axis;
-    /* Extent of the segment in the cell, in the encoding of an ebpo_listed_block; but for each axis
-     * it has the upper side and 15 minus the lower side, rounded down. All ones: intersects
-     * everything. */
+    /* Extent of the segment in the cell, in sixteenths. As in an ebpo_listed_block, but for each
+     * axis it has the upper side and 15 minus the lower side. EBPO_REACH_ALL: intersects all boxes.
+     */
     uint32_t reach;
 } ebpo_axis_segment;
 #define EBPO_REACH_ALL UINT32_C(0xffffff)
 
-/* Returns false when the block's faces in the cell cannot intersect the segment. Then one side of
- * the block's box, four bits each, is greater than that of the segment. */
+/* Returns false if the listed faces of the block cannot intersect the segment. Then one of the six
+ * values of the block's box, four bits each, is greater than that of the segment. */
 static inline bool ebpo_axis_segment_intersects(const ebpo_axis_segment *g, uint64_t listed)
 {
     const uint32_t digits = 0x0f0f0f, carry = 0x101010;
@@ -214,19 +216,19 @@ static inline bool ebpo_axis_segment_intersects(const ebpo_axis_segment *g, uint
 
 /* --- tables --- */
 
-/* Pure functions. */
+/* Functions without side effects except on their outputs. */
 typedef struct ebpo_inside_kernels {
-    /* Returns the sum of the certain crossings of the segment with a leaf's listed faces, for the
-     * part of the faces within the leaf's cell (as ebpo_axis_crossing returns them). Appends lanes
-     * that are not certain to `open` as slots (capacity 8 for each block), and sets *open_count.
-     * These include every face that contains the segment's end at `to` or `from`. */
+    /* Returns the sum of the certain crossings (ebpo_axis_crossing) of the segment with a leaf's
+     * listed faces. The segment must be in the leaf's cell. Appends the slots of faces that are not
+     * certain to `open` (capacity: 8 for each block), and adds their number to *open_count. These
+     * include every face that contains the segment's end at `to` or `from`. */
     int32_t (*crossings)(const ebpo_accel *s, const ebpo_listed_block *list,
                          const ebpo_axis_segment *segment, uint32_t *open, uint32_t *open_count);
     ebpo_cell_faces_fn *cell_faces;
 } ebpo_inside_kernels;
 
-/* Walk through search->s. Not pure: they call search->judge when many faces wait. Afterwards the
- * waiting faces may be nearest, or hit; and best, or the limit, has decreased. */
+/* Walk through search->s, and call search->judge when many candidates wait. Afterwards, the faces
+ * that still wait may be the nearest, or hit. */
 typedef struct ebpo_nearest_kernels {
     void (*walk)(ebpo_near_search *search);
 } ebpo_nearest_kernels;

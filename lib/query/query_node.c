@@ -1,11 +1,12 @@
-/* Walks through the nodes of a model: goes from a node to its children, in the top of the tree and
- * in subtrees, with bounds from envelopes.
+/* Goes from a node of a model to its children, in the top of the tree and in subtrees, and computes
+ * bounds from envelopes.
  *
- * Accels (nodes of one subtree) and contexts (nodes of the model; they load subtrees on demand) are
- * also sources for cursors. Nodes of a subtree are valid until the context enters another subtree.
+ * Cursors (geometry/cursor.h) get nodes from an accel (nodes of one subtree) or from a context
+ * (nodes of the model; a context loads subtrees on demand). Nodes of a subtree are valid until the
+ * context enters another subtree.
  *
- * In a subset nodes may be pruned. A query that needs a part omitted below one fails with
- * EBPO_E_ABSENT, and the message gives the position and how the file was cut. */
+ * In a subset, nodes may be pruned: the file omits their children. A query that needs an omitted
+ * part fails with EBPO_E_ABSENT, and the message gives the position and how the file was cut. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -17,6 +18,7 @@
 #include "query/accel.h"
 #include "query/query_node.h"
 
+/* Returns the node of a subtree for an entry of its table. */
 static ebpo_node accel_node_of(const ebpo_accel *s, uint32_t entry, ebpo_cell cell)
 {
     ebpo_node node = ebpo_entry_node(entry, cell, (ebpo_rule)s->rule);
@@ -79,7 +81,7 @@ static ebpo_status uniform_winding(void *holder, const ebpo_node *uniform, int32
 
 const ebpo_node_source ebpo_accel_source = { accel_children, copy_accel_planes, uniform_winding };
 
-/* Returns a node of the top. */
+/* Returns the node of the top for an entry of its table. */
 static ebpo_node top_node_of(const ebpo_model *model, uint32_t entry, ebpo_cell cell)
 {
     ebpo_node node = ebpo_entry_node(entry, cell, model->info->rule);
@@ -116,7 +118,7 @@ ebpo_status ebpo_model_enter(ebpo_context *context, ebpo_node *node, ebpo_error 
         return status;
     node->subtree = subtree;
     node->entry = subtree->nodes.root;
-    /* a pruned node, in a file whose counts do not include the node */
+    /* the subtree's table may show that the node is pruned, although the file's counts do not */
     if (ebpo_node_is_subtree_root(node))
         return ebpo_fail_pruned(context->model, node->cell, error);
     return EBPO_OK;
@@ -148,6 +150,7 @@ double ebpo_rank_cell_end(const ebpo_ranking *r, ebpo_cell cell)
     return r->far ? ebpo_far_cell_end(r->far, &r->box, cell) : ebpo_cell_far(&r->box, cell, r->p);
 }
 
+/* As ebpo_rank_node; the computation may stop at any bound beyond `enough`. */
 static double bound_until(const ebpo_ranking *r, const ebpo_node *node, double parent,
                           double enough)
 {
@@ -220,7 +223,7 @@ static ebpo_status copy_model_planes(void *holder, const ebpo_node *node,
 
 const ebpo_node_source ebpo_context_source = { model_children, copy_model_planes, uniform_winding };
 
-/* Describes in words how the file was cut. */
+/* Describes in words how the subset was made. */
 static void describe_cut(const ebpo_info *info, char *out, size_t capacity)
 {
     const double *b = info->kept_box;
@@ -256,6 +259,7 @@ ebpo_status ebpo_fail_pruned(const ebpo_model *model, ebpo_cell cell, ebpo_error
         ebpo_cell_face(&box, 2, cell.level, cell.at[2]), cut);
 }
 
+/* The arguments of ebpo_check_pruned. */
 typedef struct checking {
     ebpo_context *context;
     ebpo_matters_fn matters;
@@ -269,7 +273,7 @@ static ebpo_status check_below(const checking *k, ebpo_node node, ebpo_error *er
     if (ebpo_node_is_uniform(&node) || node.type != EBPO_GRAY ||
         !k->matters(k->user, &k->box, &node))
         return EBPO_OK;
-    if (ebpo_node_is_subtree_root(&node)) /* entering fails for pruned nodes */
+    if (ebpo_node_is_subtree_root(&node)) /* ebpo_model_enter fails if the node is pruned */
         status = ebpo_model_enter(k->context, &node, error);
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++)
         status = check_below(k, ebpo_model_child(k->context->model, &node, octant), error);

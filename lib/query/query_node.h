@@ -1,6 +1,6 @@
-/* Walks through the nodes of a model: goes from a node to its children, in the top of the tree and
- * in subtrees, with bounds from envelopes. Nodes of a subtree are valid until the context enters
- * another subtree. */
+/* Goes from a node of a model to its children, in the top of the tree (levels 0 to the cut level)
+ * and in subtrees, and computes bounds from envelopes. Nodes of a subtree are valid until the
+ * context enters another subtree. */
 #ifndef EBPO_QUERY_QUERY_NODE_H
 #define EBPO_QUERY_QUERY_NODE_H
 
@@ -25,21 +25,22 @@ EBPO_MUST_USE ebpo_status ebpo_model_enter(ebpo_context *context, ebpo_node *nod
 /* Returns a child of a gray node that is not of the kind SUBTREE_ROOT. */
 ebpo_node ebpo_model_child(const ebpo_model *model, const ebpo_node *gray, unsigned octant);
 
-/* For cursors (geometry/cursor.h); the cursor's holder is an ebpo_context, which loads subtrees as
- * the cursor enters them. Only one cursor at a time may use a context, and no other query while its
- * nodes are used. */
+/* Source of nodes for cursors (geometry/cursor.h). The cursor's holder is an ebpo_context, which
+ * loads subtrees as the cursor enters them. Only one cursor at a time may use a context. While
+ * nodes of the cursor are used, the context may not be used for queries. */
 extern const ebpo_node_source ebpo_context_source;
 
 /* Returns the plane codes of the node itself, without those of its ancestors. */
 const uint32_t *ebpo_model_planes(const ebpo_model *model, const ebpo_node *node, uint32_t *count);
 
-/* A point by which nodes are ranked. */
+/* A point p. Nodes are ranked by lower bounds of the distance of p to their contents. */
 typedef struct ebpo_ranking {
     const ebpo_model *model;
     ebpo_box box; /* box of the model */
     const double *p;
-    const ebpo_far *far; /* if not NULL, bounds and limits are keys of this far point; NULL: they
-                          * are distances */
+    /* If not NULL, p is far, and bounds and limits are keys (point_bounds.h) instead of distances.
+     */
+    const ebpo_far *far;
 } ebpo_ranking;
 static inline ebpo_ranking ebpo_ranking_of(const ebpo_model *model, const double p[3],
                                            const ebpo_far *far)
@@ -47,38 +48,40 @@ static inline ebpo_ranking ebpo_ranking_of(const ebpo_model *model, const double
     return (ebpo_ranking){ model, ebpo_model_box(model), p, far && far->far ? far : NULL };
 }
 
-/* Returns a lower bound for the contents of the node, from its envelope and those of its ancestors:
- * `parent` is the bound of its parent. The other function returns the bound of the root. */
+/* Returns a lower bound for the contents of the node: the greater one of `parent`, the bound of its
+ * parent, and the bound from its own planes. */
 double ebpo_rank_node(const ebpo_ranking *ranking, const ebpo_node *node, double parent);
+/* Returns the lower bound of the root. */
 double ebpo_rank_root(const ebpo_ranking *ranking);
 /* Returns a lower bound for a cell, from the given planes only; the computation may stop at any
- * bound beyond `enough`. The other function returns an upper bound for the farthest point of a
- * cell. */
+ * bound beyond `enough`. */
 double ebpo_rank_cell(const ebpo_ranking *ranking, ebpo_cell cell, const uint32_t *codes,
                       uint32_t count, double enough);
+/* Returns an upper bound for the farthest point of a cell, as ebpo_cell_far. */
 double ebpo_rank_cell_end(const ebpo_ranking *ranking, ebpo_cell cell);
 
-/* Ranks children of a gray node that are neither white nor black nor beyond `limit`, nearest first;
- * returns their count. */
+/* A node and its lower bound. */
 struct ebpo_ranked {
     ebpo_node node;
     double lower;
-    uint8_t what; /* part of a subtree: nearest_subtrees.c */
+    uint8_t what; /* which faces of a subtree (nearest_subtrees.c); otherwise 0 */
 };
 
+/* Lists the children of a gray node that are neither white nor black and have a bound of at most
+ * `limit`, the nearest first. `parent`: bound of the gray node. Returns their number. */
 int ebpo_rank_children(const ebpo_ranking *ranking, const ebpo_node *gray, double parent,
                        double limit, ebpo_ranked out[8]);
 
 /* --- subsets: omitted parts must not change a result --- */
 
-/* Returns EBPO_E_ABSENT: the query needs a part omitted below this node. The message gives the
- * file, the position and how the file was cut. */
+/* Returns EBPO_E_ABSENT, because the query needs a part of the tree that the file omits below the
+ * node of this cell. The message gives the file, the position and how the file was cut. */
 ebpo_status ebpo_fail_pruned(const ebpo_model *model, ebpo_cell cell, ebpo_error *error);
 
 /* Returns true if something in the node's cell matters to the query. */
 typedef bool (*ebpo_matters_fn)(void *user, const ebpo_box *box, const ebpo_node *node);
 
-/* Returns EBPO_OK when no pruned node matters to the query. If `matters` is true for a node, it
+/* Returns EBPO_E_ABSENT if `matters` is true for a pruned node. If `matters` is true for a node, it
  * must be true for the node's parent. */
 EBPO_MUST_USE ebpo_status ebpo_check_pruned(ebpo_context *context, ebpo_matters_fn matters,
                                             void *user, ebpo_error *error);

@@ -217,9 +217,9 @@ START_TEST(test_block_bounds_same_on_any_cpu)
                      &query_variants[_i % query_variant_count]);
     const ebpo_accel *s = m.model->whole;
     ebpo_cylinder_view view = { .scale = (float)s->scale, .axis = { 0.5f, -0.75f, 0.25f } };
-    view.rest = 0.125f;
+    view.length2_defect = 0.125f;
     for (int k = 0; k < 3; k++)
-        view.high[k] = (float)s->centre[k];
+        view.origin_high[k] = (float)s->centre[k];
     for (uint32_t n = 0; n < s->bound_count && !s->wide; n++)
         for (int lane = 0; lane < s->bound[n].count; lane++)
             if (s->bound[n].child[lane] & EBPO_IS_BLOCK)
