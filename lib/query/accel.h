@@ -66,8 +66,8 @@ typedef struct ebpo_accel_leaf {
     uint32_t list;   /* the leaf's blocks begin at list[list] of the subtree */
     int32_t winding; /* winding number at the lowest corner, shifted (format-spec, section
                       * 10) */
-    uint32_t
-        rows; /* if ebpo_leaf_has_planes: number of the first row of its planes (EBPO_KIND_ROW) */
+    /* if ebpo_leaf_has_planes: number of the first row of the leaf's planes (EBPO_KIND_ROW) */
+    uint32_t rows;
     _Atomic uint8_t kind;    /* ebpo_leaf_kind; for surfaces always EBPO_LEAF_GENERAL */
     _Atomic uint8_t queries; /* approximate number of queries until the kind is known */
     /* 2 axis + side (1: upper) of a cell face that no face intersects, or EBPO_NO_CELL_FACE,

@@ -1,4 +1,5 @@
-/* Parts of a model beside subtrees: the top of its tree, skeletons, and its share of budgets. */
+/* Declares the parts of a model other than subtrees: the top of its tree, skeletons, and its share
+ * of budgets. */
 #ifndef EBPO_QUERY_MODEL_PARTS_H
 #define EBPO_QUERY_MODEL_PARTS_H
 
@@ -9,8 +10,9 @@
 #include "query/accel.h"
 #include "query/point_bounds.h"
 
-/* --- the top: levels 0 .. cut level, without faces. Immutable; any thread --- */
+/* --- the top: levels 0 .. cut level, without faces. Immutable; any thread may use it --- */
 
+/* A range of ebpo_top.planes. */
 typedef struct ebpo_top_planes {
     uint32_t first;
     uint32_t count;
@@ -18,52 +20,53 @@ typedef struct ebpo_top_planes {
 
 typedef struct ebpo_top {
     int cut_level;
-    /* Entries are UNIFORM, GRAY (gray nodes above the cut level), or SUBTREE_ROOT: gray nodes of
-     * the cut level, leaves down to this level, and pruned nodes (whose children are not in the
-     * file). */
+    /* The kinds of entries are UNIFORM, GRAY (gray nodes above the cut level) and SUBTREE_ROOT:
+     * gray nodes of the cut level, leaves down to the cut level, and pruned nodes (whose children
+     * are not in the file). The value of an entry SUBTREE_ROOT is an index in `below`. */
     ebpo_node_table nodes;
     uint32_t *planes;      /* codes of all planes */
-    ebpo_top_planes *gray; /* planes of the gray node whose children are group g */
+    ebpo_top_planes *gray; /* [group] planes of the gray node whose children are this group */
 
     uint64_t below_count;
-    /* [below_count] nodes of the kind SUBTREE_ROOT; NULL in a table of envelopes alone */
+    /* [below_count] nodes of the kind SUBTREE_ROOT; NULL after ebpo_top_read_envelopes */
     ebpo_node *below;
     ebpo_top_planes *below_planes; /* [below_count] planes of these nodes; leaves have none */
     uint64_t bytes;
 } ebpo_top;
 
+/* Reads the top. */
 EBPO_MUST_USE ebpo_status ebpo_top_read(ebpo_top **out, const ebpo_file *file, int cut_level,
                                         unsigned threads, ebpo_error *error);
-/* Reads only envelopes, and allocates memory for nothing else; `below` is NULL. */
+/* Reads only the table of nodes and the planes; `below` is NULL. */
 EBPO_MUST_USE ebpo_status ebpo_top_read_envelopes(ebpo_top **out, const ebpo_file *file,
                                                   int cut_level, unsigned threads,
                                                   ebpo_error *error);
 void ebpo_top_free(ebpo_top *top);
 
-/* Returns the bytes that the top will take, from the file header alone. */
+/* Return upper bounds, from the counts in the file header, of the bytes that ebpo_top_read and
+ * ebpo_top_read_envelopes will take. */
 uint64_t ebpo_top_estimate(const ebpo_info *info, int cut_level);
 uint64_t ebpo_top_envelopes_estimate(const ebpo_info *info, int cut_level);
 
 /* --- skeletons ---
  *
- * A skeleton has the upper nodes of a subtree's hierarchy over faces (query/accel.h). It is kept in
- * memory for each subtree that has been loaded: eight nodes at first, 2 KB where the subtree takes
- * hundreds. Skeletons bound the distance to a subtree's faces much better than its cell and its
- * envelope do, so searches load the subtree again only if it may matter. A skeleton is made when
- * the subtree is loaded and kept when the cache drops the subtree: this works for every file, and
- * needs no further reading. When a search loads a subtree without need, nodes are added near the
- * query point: memory is used where bounds are too loose.
+ * A skeleton has the upper nodes of a subtree's hierarchy over faces (query/accel.h): eight nodes
+ * at first, which take 2 KB, whereas the subtree takes hundreds. Skeletons bound the distance to a
+ * subtree's faces much better than the subtree's cell and envelope do, so searches load the subtree
+ * again only if it may matter. A skeleton is made when the subtree is loaded, without reading more
+ * of the file, and is kept when the cache drops the subtree. When a search loads a subtree without
+ * need, nodes near the query point are added to its skeleton: so memory is used where bounds are
+ * too loose.
  *
- * Skeletons give lower bounds only. Subtrees are searched in the order of guaranteed lower bounds
- * until the next bound is beyond the found distance (nearest_subtrees.c): the searched subtrees are
- * those whose bound is at most the result. No upper bound could avoid searching one of these. */
+ * Skeletons give lower bounds only. Upper bounds would not help: subtrees are searched in the order
+ * of lower bounds until the next bound is beyond the found distance (nearest_subtrees.c), and every
+ * subtree whose lower bound is at most the result must be searched. */
 
-/* Any thread may use const skeletons; one thread at a time may change one. */
+/* Any thread may read a skeleton, also while one other thread changes it. */
 typedef struct ebpo_skeleton ebpo_skeleton;
 
-/* Guaranteed lower bounds of the distance to a subtree's faces, in the model's unit: to its owned
- * faces, which no other subtree owns, and to its shared faces. INFINITY: there are no such faces.
- */
+/* Guaranteed lower bounds of the distance, in the model's unit, to the faces that the subtree owns,
+ * and to its shared faces, which other subtrees own. INFINITY: there are no such faces. */
 typedef struct ebpo_skeleton_bounds {
     double owned, shared;
 } ebpo_skeleton_bounds;
@@ -85,34 +88,35 @@ ebpo_skeleton_bounds ebpo_skeleton_far_bounds(const ebpo_skeleton *skeleton, con
 
 /* Maximum number of nodes after growing. */
 enum { EBPO_SKELETON_NODES = 64 };
-/* Adds up to eight nodes of the same subtree: those nearest to p, as far as is known, and within
- * `limit`. `take` returns true if the quota allows more. */
+/* Adds up to eight nodes of the same subtree: the nodes within `limit` of p that have the least
+ * lower bounds. `take` reserves bytes of a quota, and returns false if that is not possible. */
 void ebpo_skeleton_grow(ebpo_skeleton *skeleton, const ebpo_accel *subtree, const double p[3],
                         double limit, bool (*take)(void *user, uint64_t bytes), void *user);
 
-/* Writes boxes, in the model's unit, around the shared faces that may be within `limit` of p;
- * returns the number of boxes. Each shared face is owned by another subtree, whose cell it
- * intersects. */
+/* A box around some shared faces, in the model's unit. */
 typedef struct ebpo_shared_box {
     double low[3], high[3];
 } ebpo_shared_box;
+/* Maximum number of boxes of a skeleton. */
 enum { EBPO_SHARED_BOXES = 64 };
+/* Writes boxes around the shared faces that may be within `limit` of p, and returns their number.
+ */
 unsigned ebpo_skeleton_shared_boxes(const ebpo_skeleton *skeleton, const double p[3], double limit,
                                     ebpo_shared_box out[EBPO_SHARED_BOXES]);
 
-/* The skeletons of a model's subtrees, by the subtrees' numbers. Any thread. */
+/* The skeletons of a model's subtrees. `number`: index of a subtree in top->below. Any thread. */
 typedef struct ebpo_skeletons ebpo_skeletons;
 
-/* Makes the table. `space`: quota in bytes for all skeletons, see ebpo_skeletons_capacity. The
- * bytes are taken when needed from the budget of `cache`, unless it is NULL. Returns NULL without
- * memory. */
+/* Makes an empty table for `count` subtrees. `space`: quota in bytes for all skeletons
+ * (ebpo_skeletons_capacity). When bytes are needed, they are taken from the budget of `cache`,
+ * unless it is NULL. Returns NULL without memory. */
 ebpo_skeletons *ebpo_skeletons_make(uint64_t count, uint64_t space, ebpo_cache *cache);
 /* Frees the table after all other threads have finished; NULL is allowed. */
 void ebpo_skeletons_free(ebpo_skeletons *all);
 /* Returns the part of `space` that `count` skeletons can use. */
 uint64_t ebpo_skeletons_capacity(uint64_t count, uint64_t space);
-/* Reserves bytes of the quota of skeletons for other data about subtrees; returns false if not
- * enough is left. The other function returns such bytes to the quota. Any thread. */
+/* Reserve bytes of the quota for other data about subtrees (deep bounds, nearest.h), and give them
+ * back. The first function returns false if the quota is too small. Any thread. */
 bool ebpo_skeletons_take(ebpo_skeletons *all, uint64_t bytes);
 void ebpo_skeletons_give_back(ebpo_skeletons *all, uint64_t bytes);
 /* Returns the bytes of memory that are used now. */
@@ -134,19 +138,20 @@ enum { EBPO_SUBTREES_LEAST = 1 << 20 };
 /* Bytes for decoded chunks. */
 enum { EBPO_CHUNKS_LEAST = 2 << 20 };
 
-/* Return the bytes for decoded chunks, for skeletons, and for both together; the rest is for the
- * top and subtrees. */
+/* Return the bytes of a budget for decoded chunks, for skeletons, and for both together. The
+ * remaining bytes are for the top and subtrees. */
 uint64_t ebpo_chunk_budget(uint64_t budget);
 uint64_t ebpo_skeleton_budget(const ebpo_model_options *options, uint64_t budget);
 uint64_t ebpo_bytes_besides_subtrees(const ebpo_model_options *options, uint64_t budget);
 
 /* --- the plan for a model's budget, from the counts in the file header --- */
 
-/* Sets options->memory: the remainder of a shared budget, or a default for a remote file if no
- * budget was given. Returns true in the last case. */
+/* Sets options->memory: for a shared budget, the bytes that are not taken permanently; for a remote
+ * file without any budget, a default unless a cut level is given. Returns true for a remote file
+ * without any budget. */
 bool ebpo_default_memory(const ebpo_file *file, ebpo_model_options *options);
 
-/* Plans to load everything at once, or chooses the cut level. Fails with the errors of
+/* Decides if the whole model is loaded, or chooses the cut level. Returns the errors of
  * ebpo_model_memory. */
 EBPO_MUST_USE ebpo_status ebpo_plan_model(const ebpo_file *file, const ebpo_model_options *options,
                                           bool default_memory, ebpo_model_plan *out,
@@ -161,21 +166,21 @@ EBPO_MUST_USE ebpo_status ebpo_plan_parts(const ebpo_file *file, const ebpo_mode
  * A budget that several models share. It counts the bytes that each model takes permanently, and
  * the bytes for the caches of all models. Any thread. */
 
-/* Return the pools of the caches of subtrees and of chunks. When one pool loads data, it needs
- * memory in the other. */
+/* Return the pools of the caches of subtrees and of chunks. They are separate, because loading a
+ * subtree needs memory for chunks. */
 ebpo_cache_pool *ebpo_budget_subtrees(const ebpo_budget *budget);
 ebpo_cache_pool *ebpo_budget_chunks(const ebpo_budget *budget);
 
 uint64_t ebpo_budget_bytes(const ebpo_budget *budget);
 
-/* Reserves bytes for a model that is all in memory, for the lifetime of the model. Returns false if
- * they exceed the limit or the free part. The other function returns unused bytes, or all bytes, to
- * the budget. */
+/* Reserve bytes for a whole model, and give back unused bytes or, at the end of the model, all
+ * bytes. The first function returns false if the bytes exceed the quota of whole models or the free
+ * part of the budget. */
 bool ebpo_budget_take_whole(ebpo_budget *budget, uint64_t bytes);
 void ebpo_budget_give_back_whole(ebpo_budget *budget, uint64_t bytes);
 
-/* Reserves at most `wanted` bytes of the quota for skeletons; the other function returns them to
- * the quota. */
+/* Reserve at most `wanted` bytes of the quota of skeletons (returns their number), and give them
+ * back. */
 uint64_t ebpo_budget_take_skeletons(ebpo_budget *budget, uint64_t wanted);
 void ebpo_budget_give_back_skeletons(ebpo_budget *budget, uint64_t bytes);
 

@@ -33,7 +33,7 @@ static bool is_edge(ebpo_feature feature)
 }
 
 /* Returns true if the nearest features of both faces are the same vertex or edge. Such faces are
- * the greatest frequent case of equal distances. */
+ * the most frequent case of equal distances. */
 static bool same_feature(const double a[3][3], ebpo_feature of_a, const double b[3][3],
                          ebpo_feature of_b)
 {
@@ -178,8 +178,8 @@ static bool make_probe(const ebpo_accel *s, const double p[3], ebpo_probe *out)
     }
     out->scale = (float)s->scale;
     out->scale64 = s->scale;
-    /* On each axis, the rounding error of `local` is at greatest 2^-24 times `greatest`; over three
-     * axes it is at greatest 1.74 times as much. The factor is 2^-22 to include the rounding of
+    /* On each axis, the rounding error of `local` is at most 2^-24 times `greatest`; over three
+     * axes it is at most 1.74 times as much. The factor is 2^-22 to include the rounding of
      * limits: docs/develop/bounds.md, "Limits of points". */
     out->error = (float)greatest * 0x1p-22f;
     return true;

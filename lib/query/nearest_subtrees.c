@@ -295,15 +295,17 @@ static ebpo_status search_below(searching *g, const ebpo_ranked *r, ebpo_error *
 
 /* --- bounds from skeletons ---
  *
- * A face is listed by every subtree whose cell it intersects, and owned by one of them. Searching
- * it in its owner only avoids that a face across a cell face is searched on both sides. The queue
- * returns a subtree by a bound for its cell, which covers the parts of its faces within the cell.
- * The subtree is then searched for its owned faces. For its shared faces that may matter, the
- * subtrees that may own them are searched instead, by bounds that hold wherever the owners' faces
- * are. If one of these owners has no skeleton, the subtree itself is searched. So the nearest face
- * is found: its nearest point is in a visited cell, and the subtree of that cell or the face's
- * owner is searched. All bounds that lead to this search are at most the face's distance. The
- * queue may return the subtree and the owner in any order. */
+ * A face is listed by every subtree whose cell it intersects, and owned by one of them. A face that
+ * extends through a cell face would be searched in both subtrees; so it is searched in its owner
+ * only. In the queue, a subtree S first has a bound for its cell, which covers the parts of its
+ * faces within the cell. When the queue returns S, the owned faces of S get a second entry in the
+ * queue. For the shared faces of S that may matter, the subtrees that may own these faces get
+ * entries, with bounds that hold for all faces of the owner, also outside its cell. If one of these
+ * owners has no skeleton, S itself is searched.
+ *
+ * So the nearest face is found: its nearest point is in the cell of some S, and S or the face's
+ * owner is searched. All bounds that lead to this search are at most the face's distance. The queue
+ * may return S and the owner in any order. */
 
 static ebpo_skeleton_bounds skeleton_bounds(const searching *g, const ebpo_skeleton *k)
 {

@@ -1,9 +1,9 @@
 /* Makes models and contexts: opens a file for queries, loads subtrees, and checks the arguments of
  * all queries.
  *
- * A model holds everything if that fits into its budget, else the top of the tree and a cache of
- * subtrees (budget.c plans this). Models may be used by any thread. A context, with the buffers of
- * queries and its pinned subtree, is used by one thread. */
+ * A model is completely in memory if its budget allows that. If not, it has the top of the tree and
+ * a cache of subtrees (budget.c makes this plan). Any thread may use a model. A context, which has
+ * the buffers of queries and a pinned subtree, is used by one thread at a time. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -74,11 +74,11 @@ ebpo_status ebpo_check_solid(const ebpo_model *model, ebpo_error *error)
 
 /* --- envelopes that a context keeps --- */
 
-/* Number of envelopes; most take 1 to 3 KB. */
+/* Maximum number of kept envelopes; most take 1 to 3 KB. */
 enum { SLOTS = 256 };
 
-/* The head of a kept envelope. The used parts of the arrays follow, in the order of ebpo_polytope.
- */
+/* The head of a kept envelope. After it come the used parts of the arrays of ebpo_polytope, in its
+ * order. */
 typedef struct kept {
     ebpo_cell cell;
     int vertices, faces, corners;
@@ -160,6 +160,8 @@ static void kept_envelopes_free(ebpo_kept_envelopes *k)
 
 /* --- subtrees for the cache --- */
 
+/* Estimates the bytes of a subtree, for the cache: the maximum while it is loaded, and what is
+ * kept. */
 static ebpo_status estimate_subtree(void *user, uint64_t key, uint64_t *peak, uint64_t *keep,
                                     ebpo_error *error)
 {
@@ -190,8 +192,8 @@ void ebpo_model_count_kind(ebpo_model *m, const ebpo_accel_leaf *leaf)
         ebpo_leaf_kind_of(leaf) == EBPO_LEAF_GENERAL && leaf->cell_face != EBPO_NO_CELL_FACE;
 }
 
-/* Marks the nodes of a surface with its border. Only whole models have parts of nodes, as all of
- * their nodes are used for many queries. */
+/* Marks the nodes of a surface with its border (holes.h). Only in a whole model may marking split
+ * uniform nodes: they are used for many queries. */
 static ebpo_status mark_accel(const ebpo_model *m, ebpo_accel *s, ebpo_error *error)
 {
     if (!m->holes)
@@ -205,6 +207,7 @@ static ebpo_status mark_accel(const ebpo_model *m, ebpo_accel *s, ebpo_error *er
     return status;
 }
 
+/* Loads a subtree for the cache, within `most` bytes. */
 static ebpo_status load_subtree(void *user, uint64_t key, uint64_t most, void **item,
                                 uint64_t *bytes, ebpo_error *error)
 {
@@ -272,7 +275,8 @@ static ebpo_status open_whole(ebpo_model *m, ebpo_error *error)
 }
 
 /* Makes caches under the model's own budget; 0: no limit. */
-static ebpo_status make_own(ebpo_model *m, const ebpo_cache_source *source, ebpo_error *error)
+static ebpo_status make_own_caches(ebpo_model *m, const ebpo_cache_source *source,
+                                   ebpo_error *error)
 {
     uint64_t budget = m->options.memory, chunks = budget ? ebpo_chunk_budget(budget) : 0;
     uint64_t taken = m->top->bytes + ebpo_bytes_besides_subtrees(&m->options, budget);
@@ -289,7 +293,8 @@ static ebpo_status make_own(ebpo_model *m, const ebpo_cache_source *source, ebpo
 }
 
 /* Makes caches under a budget that several models share. */
-static ebpo_status make_shared(ebpo_model *m, const ebpo_cache_source *source, ebpo_error *error)
+static ebpo_status make_shared_caches(ebpo_model *m, const ebpo_cache_source *source,
+                                      ebpo_error *error)
 {
     ebpo_budget *shared = m->options.budget;
     ebpo_status status = ebpo_cache_pool_take(ebpo_budget_subtrees(shared), m->top->bytes, error);
@@ -302,6 +307,7 @@ static ebpo_status make_shared(ebpo_model *m, const ebpo_cache_source *source, e
     return ebpo_cache_make_in(&m->cache, source, "subtree", ebpo_budget_subtrees(shared), error);
 }
 
+/* Returns the quota in bytes for the model's skeletons. */
 static uint64_t skeleton_capacity(ebpo_model *m)
 {
     uint64_t budget = m->options.memory;
@@ -327,19 +333,21 @@ static ebpo_status open_top(ebpo_model *m, int cut_level, ebpo_error *error)
         status = ebpo_holes_mark(m->holes, &marked, error);
     }
     if (status == EBPO_OK)
-        status = m->options.budget ? make_shared(m, &source, error) : make_own(m, &source, error);
+        status = m->options.budget ? make_shared_caches(m, &source, error)
+                                   : make_own_caches(m, &source, error);
     uint64_t skeletons = status == EBPO_OK ? skeleton_capacity(m) : 0;
     if (status == EBPO_OK && m->options.loading == EBPO_LOAD_CACHE && skeletons) {
         m->skeletons = ebpo_skeletons_make(m->top->below_count, skeletons, m->cache);
         if (!m->skeletons && m->options.budget)
-            ebpo_cache_set_aside(m->cache, 0); /* other models use the whole budget now */
+            ebpo_cache_set_aside(m->cache, 0); /* other models have used up the budget: go on
+                                                * without skeletons */
         else if (!m->skeletons)
             return ebpo_fail_memory(error, m->top->below_count * sizeof(void *));
     }
     return status;
 }
 
-/* Reads the border, if the budget holds the model. */
+/* Reads the border of a surface, if the file has it and the budget is sufficient. */
 static ebpo_status open_border(ebpo_model *m, ebpo_error *error)
 {
     ebpo_model_plan plan;
@@ -350,8 +358,7 @@ static ebpo_status open_border(ebpo_model *m, ebpo_error *error)
                              : status;
 }
 
-/* Opens a model all in memory, under a shared budget. Returns EBPO_E_LIMIT if the budget is too
- * small. */
+/* Loads the whole model under a shared budget. Returns EBPO_E_LIMIT if the budget is too small. */
 static ebpo_status open_shared_whole(ebpo_model *m, uint64_t peak, ebpo_error *error)
 {
     ebpo_budget *shared = m->options.budget;
@@ -366,7 +373,8 @@ static ebpo_status open_shared_whole(ebpo_model *m, uint64_t peak, ebpo_error *e
     return status;
 }
 
-static ebpo_status open_parts(ebpo_model *m, ebpo_error *error)
+/* Loads the whole model or its top, according to the plan. */
+static ebpo_status open_planned(ebpo_model *m, ebpo_error *error)
 {
     ebpo_model_plan plan;
     ebpo_status status = ebpo_plan_model(m->file, &m->options, m->default_memory, &plan, error);
@@ -374,7 +382,7 @@ static ebpo_status open_parts(ebpo_model *m, ebpo_error *error)
         uint64_t memory = m->options.memory;
         status = m->options.budget ? open_shared_whole(m, plan.whole, error) : open_whole(m, error);
         m->options.memory = memory;
-        /* the model needs more memory than ordinary models with its counts */
+        /* EBPO_E_LIMIT: the model takes more memory than ordinary models with its counts */
         if (status != EBPO_E_LIMIT || !m->options.memory)
             return status;
         status = ebpo_plan_parts(m->file, &m->options, &plan, error);
@@ -416,7 +424,7 @@ ebpo_status ebpo_model_new(const ebpo_file *file, const ebpo_model_options *opti
     m->default_memory = ebpo_default_memory(file, &m->options);
     status = open_border(m, error);
     if (status == EBPO_OK)
-        status = open_parts(m, error);
+        status = open_planned(m, error);
     if (status != EBPO_OK) {
         ebpo_model_free(m);
         return status;
@@ -533,8 +541,8 @@ void ebpo_context_free(ebpo_context *c)
     free(c);
 }
 
-/* Fails; the message gives a value of --memory that would suffice. */
-static ebpo_status too_little(const ebpo_model *m, uint32_t below, ebpo_error *error)
+/* Returns EBPO_E_LIMIT, with a message that gives a sufficient budget. */
+static ebpo_status fail_budget(const ebpo_model *m, uint32_t below, ebpo_error *error)
 {
     uint64_t peak, keep, least;
     if (estimate_subtree((ebpo_model *)m, ebpo_subtree_key(below, true), &peak, &keep, NULL) !=
@@ -545,8 +553,8 @@ static ebpo_status too_little(const ebpo_model *m, uint32_t below, ebpo_error *e
         least += least / 8 + 1;
     return ebpo_fail(error, EBPO_E_LIMIT,
                      "the memory budget of %" PRIu64
-                     " bytes does not hold one subtree below level %d and the memory in use; a "
-                     "budget of %" PRIu64 " does, or a higher cut level",
+                     " bytes does not hold one subtree below level %d and the memory in use; give "
+                     "at least %" PRIu64 ", or a deeper cut level",
                      m->options.memory, m->top->cut_level, least);
 }
 
@@ -568,7 +576,7 @@ ebpo_status ebpo_context_subtree(ebpo_context *c, uint32_t below, ebpo_accel **o
     c->loaded += !hit;
     if (status != EBPO_OK)
         return status == EBPO_E_LIMIT && m->options.memory && !m->options.budget
-                   ? too_little(m, below, error)
+                   ? fail_budget(m, below, error)
                    : status;
     *out = c->pinned = item;
     c->pinned_key = key;

@@ -1,4 +1,4 @@
-/* Models and contexts: their members, and functions shared by all queries. */
+/* Declares the members of models and contexts, and functions that all queries share. */
 #ifndef EBPO_QUERY_QUERY_MODEL_H
 #define EBPO_QUERY_QUERY_MODEL_H
 
@@ -23,24 +23,26 @@ struct ebpo_model {
     const ebpo_info *info;
     ebpo_locator locator; /* finds cells of the deepest level */
     ebpo_model_options options;
-    uint64_t shared_taken, shared_skeletons; /* bytes taken permanently from a shared budget */
-    bool default_memory;                     /* no budget was given, but the file is remote */
+    uint64_t shared_taken, shared_skeletons; /* bytes taken from a shared budget: by the model, and
+                                              * by its skeletons */
+    bool default_memory;                     /* no budget was given, and the file is remote */
     ebpo_query_kernels kernels;
-    ebpo_accel *whole;   /* the whole model in memory, or NULL; then: */
-    bool results_inside; /* `whole` has its mesh and an inside */
-    ebpo_holes *holes;   /* for a surface with its border; or NULL */
-    ebpo_top *top;       /* levels 0 .. cut level */
-    ebpo_chunks *chunks;
-    ebpo_cache *cache;         /* subtrees by their index in top->below */
-    ebpo_skeletons *skeletons; /* skeletons (upper nodes of the hierarchies over faces) of subtrees
-                                  that have been loaded; or NULL */
-    _Atomic(ebpo_top *) deep;  /* levels below the cut: nearest_subtrees.c; or NULL */
-    atomic_bool deep_begun;
-    _Atomic uint64_t new_loads; /* number of loads that may have been without need, until `deep` is
-                                 * set */
+    ebpo_accel *whole;   /* the whole model in memory; NULL: the model is loaded in parts */
+    bool results_inside; /* true: `whole` has its mesh, and an inside */
+    ebpo_holes *holes;   /* for a surface with its border (the edges of its holes); or NULL */
+    /* If the model is loaded in parts: */
+    ebpo_top *top;              /* levels 0 .. cut level */
+    ebpo_chunks *chunks;        /* decoded chunks */
+    ebpo_cache *cache;          /* subtrees by ebpo_subtree_key */
+    ebpo_skeletons *skeletons;  /* skeletons (upper nodes of the hierarchies over faces) of subtrees
+                                   that have been loaded; or NULL */
+    _Atomic(ebpo_top *) deep;   /* deep bounds (nearest.h), or NULL */
+    atomic_bool deep_begun;     /* a thread has begun to read deep bounds */
+    _Atomic uint64_t new_loads; /* number of subtrees that may have been loaded without need, until
+                                 * `deep` is set */
     double open_seconds;
-    /* leaves of the subtrees in memory; leaves of each kind, of those that were queried often
-     * enough */
+    /* number of leaves in memory; of them, number of leaves of each kind, if the kind is known; and
+     * number of general leaves with a free cell face */
     _Atomic uint64_t leaves, leaves_of_kind[5], leaves_one_cell_face;
     _Atomic uint64_t distances, distance_subtrees, distance_loads; /* as in ebpo_model_stats */
 };
@@ -58,57 +60,57 @@ struct ebpo_context {
     ebpo_model *model;
     ebpo_accel *pinned; /* the last used subtree, when it came from the cache */
     uint64_t pinned_key;
-    bool planes; /* the query needs envelopes below the cut level */
-    /* results are not decided: their winding number is the winding number of surface and caps */
+    bool planes; /* the query needs the planes of nodes in subtrees */
+    /* for a surface with its border: results get the winding number of surface and caps, instead of
+     * the decision by the threshold */
     bool undecided;
     uint32_t *open; /* slots that a filter left undecided */
     uint64_t open_capacity;
     ebpo_ray_hit *hits;
     uint64_t hit_capacity;
-    uint64_t *hit_begin; /* hits of many rays */
+    uint64_t *hit_begin; /* [number of rays + 1] index in `hits` of each ray's first hit */
     uint64_t hit_begin_capacity;
     ebpo_ray_found *unsorted_hits; /* hits of one ray, before they are sorted */
     uint64_t found_capacity;
-    uint64_t *faces;
+    uint64_t *faces; /* result of ebpo_faces_in_box */
     uint64_t face_capacity;
-    ebpo_ranked *queue; /* nodes to be searched: nearest_subtrees.c */
+    ebpo_ranked *queue; /* nodes to be searched (nearest.h) */
     uint64_t queue_count, queue_capacity;
     uint32_t *marks; /* marks of subtrees, and the number of the query: nearest_subtrees.c */
     uint32_t query_number;
-    uint64_t searched, loaded;      /* subtrees visited by distance queries; subtrees loaded by all
-                                     * queries */
+    uint64_t searched, loaded;      /* numbers of subtrees visited by distance queries, and of
+                                     * subtrees loaded by all queries */
     ebpo_kept_envelopes *envelopes; /* envelopes for distances to them; or NULL */
-    ebpo_polytope *cutting;         /* [2] these are too large for a small stack; NULL before the
-                                     * first use */
+    ebpo_polytope *cutting;         /* [2] temporary envelopes, which are too large for a small
+                                     * stack; NULL before the first use */
     bool has_prefetched;            /* position and search distance of the last query that
                                      * prefetched are valid */
     double prefetched_from[3], prefetched_distance;
     /* The last nearest face: the next ebpo_distance starts there, if enabled. */
     bool warm;
     double warm_triangle[3][3];
-    uint64_t warm_face,
-        warm_source_face; /* its number in the file, and the number that callers get */
+    uint64_t warm_face, warm_source_face; /* its index in the file and in the source */
     /* its block in the whole model, and the node above the block; or EBPO_NO_BLOCK */
     uint32_t warm_block, warm_node;
 };
 
 static inline ebpo_box ebpo_model_box(const ebpo_model *m) { return ebpo_root_box(m->info); }
 
-/* Returns EBPO_E_ARGUMENT if a point is not finite; the message gives its number. */
+/* Returns EBPO_E_ARGUMENT if a point is not finite; the message gives the point's index. */
 EBPO_MUST_USE ebpo_status ebpo_check_points(const double *points, uint64_t count,
                                             ebpo_error *error);
 
-/* Returns EBPO_E_ARGUMENT for an invalid ray, with its number. */
+/* Returns EBPO_E_ARGUMENT if a ray is invalid; the message gives the ray's index. */
 EBPO_MUST_USE ebpo_status ebpo_check_ray_rows(const ebpo_ray *rays, uint64_t count,
                                               ebpo_error *error);
 
-/* Returns EBPO_E_LIMIT when the budget does not hold this leaf alone, for one context.
- * EBPO_LOAD_NODES loads the leaf without the cache. */
+/* Returns EBPO_E_LIMIT if the budget does not hold this leaf in addition to the top and the chunks.
+ * For EBPO_LOAD_NODES, which loads one leaf at a time, without the cache. */
 EBPO_MUST_USE ebpo_status ebpo_model_has_capacity(const ebpo_model *model, const ebpo_node *leaf,
                                                   ebpo_error *error);
 
-/* Returns a subtree's key in the cache. Subtrees are kept without the planes of their nodes, or
- * with them: few queries need planes, which take separate reads. */
+/* Returns the cache's key of the subtree top->below[below], with or without the planes of its
+ * nodes. (Few queries need planes, which take separate reads.) */
 static inline uint64_t ebpo_subtree_key(uint64_t below, bool planes) { return below << 1 | planes; }
 
 /* Returns the parts of the file that a subtree needs, with or without planes. */
@@ -118,13 +120,14 @@ static inline uint32_t ebpo_subtree_needs(bool planes)
            (planes ? (uint32_t)EBPO_NEEDS_PLANES : 0);
 }
 
+/* Returns true if the context's pinned subtree is this one, with planes if the query needs them. */
 static inline bool ebpo_context_has_pinned(const ebpo_context *c, uint64_t below)
 {
     return c->pinned && c->pinned_key >> 1 == below && (c->pinned_key & 1 || !c->planes);
 }
 
-/* Returns the key under which the query finds the subtree: a subtree with planes serves all
- * queries. */
+/* Returns the cache's key of the subtree for the current query. If the cache has the subtree with
+ * planes, it also serves queries that need no planes. */
 static inline uint64_t ebpo_context_key(const ebpo_context *c, uint64_t below)
 {
     uint64_t full = ebpo_subtree_key(below, true);
@@ -132,8 +135,8 @@ static inline uint64_t ebpo_context_key(const ebpo_context *c, uint64_t below)
                                                               : ebpo_subtree_key(below, false);
 }
 
-/* Returns the subtree with this number. It stays in memory until the context requests another one
- * or releases it. */
+/* Gets the subtree top->below[below], and pins it: it stays in memory until the context requests
+ * another one or releases it. */
 EBPO_MUST_USE ebpo_status ebpo_context_subtree(ebpo_context *context, uint32_t below,
                                                ebpo_accel **out, ebpo_error *error);
 /* Releases the pinned subtree, so that other contexts may use its memory; NULL is allowed. */
@@ -144,13 +147,14 @@ void ebpo_context_let_go(ebpo_context *context);
 
 /* Finds the envelope of the node with this cell. Returns false if it is not kept. */
 bool ebpo_kept_envelopes_get(const ebpo_kept_envelopes *kept, ebpo_cell cell, ebpo_polytope *out);
-/* Keeps an envelope, replacing another one. *kept is NULL initially; without memory nothing is
- * kept. */
+/* Keeps an envelope, which may replace another one. *kept is NULL initially. Without memory,
+ * nothing is kept. */
 void ebpo_kept_envelopes_put(ebpo_kept_envelopes **kept, ebpo_cell cell,
                              const ebpo_polytope *envelope);
 
 /* --- common checks of all queries --- */
 
+/* Returns EBPO_E_ARGUMENT if the level is not -1 or a possible level. */
 EBPO_MUST_USE ebpo_status ebpo_check_query_level(int level, ebpo_error *error);
 /* Returns EBPO_E_ARGUMENT with a message: an option has an invalid enum value. */
 ebpo_status ebpo_fail_value(ebpo_error *error);

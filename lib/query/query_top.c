@@ -1,9 +1,9 @@
-/* Holds the top of a tree: levels 0 to the cut level without faces, and the roots of the subtrees
+/* Reads the top of a tree: levels 0 to the cut level without faces, and the roots of the subtrees
  * below.
  *
- * A model under a budget always has only the top in memory; queries go down through the top to the
- * subtrees. The same table, with envelopes alone, holds the levels right below the cut for deep
- * bounds (nearest_subtrees.c). Immutable once it is read; any thread may use it. */
+ * A model that is loaded in parts always has the top in memory; queries go down through the top to
+ * the subtrees. The same struct, with envelopes only, holds some levels below the cut level for
+ * deep bounds (nearest.h). It is immutable after it has been read; any thread may use it. */
 #include "query/holes.h"
 #include "query/model_parts.h"
 
@@ -16,17 +16,17 @@
 #include "format/reader.h"
 #include "geometry/level_nodes.h"
 
-/* State of reading level by level. It has data about the previous level for the next one. */
+/* State of reading level by level. */
 typedef struct reading {
     ebpo_top *top;
     const ebpo_info *info;
     uint64_t group, plane, below; /* next free index of each array */
     ebpo_cell *gray;              /* cells of the previous level's gray nodes */
-    /* types of the nodes in the level below the current one, if pruned nodes (whose children are
-     * not in the file) depend on these */
+    /* types of the next level's nodes, which show what nodes are pruned (their children are not in
+     * the file); NULL: not needed */
     uint16_t *next_types;
     uint64_t group_capacity, gray_capacity, plane_capacity, below_capacity, below_planes_capacity;
-    bool envelopes; /* only envelopes are read */
+    bool envelopes; /* as in ebpo_top_read_envelopes */
     ebpo_error *error;
 } reading;
 
@@ -35,10 +35,9 @@ static ebpo_status no_memory(const reading *r)
     return ebpo_fail_memory(r->error, ebpo_top_estimate(r->info, r->top->cut_level));
 }
 
-/* Adds the planes of a node: the next `count` planes in the level's list, which begin at *in_level.
- */
+/* Adds the planes of a node: the next `count` planes of the level, which begin at *plane_at. */
 static ebpo_status add_planes(reading *r, const ebpo_level *level, uint32_t count,
-                              uint64_t *in_level, ebpo_top_planes *out)
+                              uint64_t *plane_at, ebpo_top_planes *out)
 {
     if (!ebpo_grow(&r->top->planes, &r->plane_capacity, r->plane + count + 1,
                    sizeof *r->top->planes))
@@ -48,17 +47,18 @@ static ebpo_status add_planes(reading *r, const ebpo_level *level, uint32_t coun
                          "too many planes down to cut level %d; give a lower one",
                          r->top->cut_level);
     if (count)
-        memcpy(r->top->planes + r->plane, level->planes + *in_level,
+        memcpy(r->top->planes + r->plane, level->planes + *plane_at,
                count * sizeof *r->top->planes);
     *out = (ebpo_top_planes){ (uint32_t)r->plane, count };
-    *in_level += count;
+    *plane_at += count;
     r->plane += count;
     return EBPO_OK;
 }
 
-typedef struct ranks {
+/* Numbers of a level's nodes of each type, and of planes, so far. */
+typedef struct level_counts {
     uint64_t of[4], planes;
-} ranks;
+} level_counts;
 
 static ebpo_status uniform_entry(const reading *r, const int32_t *windings, uint64_t rank,
                                  int32_t default_winding, uint32_t *entry)
@@ -70,8 +70,9 @@ static ebpo_status uniform_entry(const reading *r, const int32_t *windings, uint
                            "shells");
 }
 
+/* Adds a root of a subtree. */
 static ebpo_status add_below(reading *r, const ebpo_level *level, const ebpo_node *node,
-                             uint64_t *in_level, uint32_t *entry)
+                             uint64_t *plane_at, uint32_t *entry)
 {
     ebpo_top *t = r->top;
     if ((!r->envelopes &&
@@ -87,10 +88,11 @@ static ebpo_status add_below(reading *r, const ebpo_level *level, const ebpo_nod
     *entry = ebpo_entry(EBPO_ENTRY_SUBTREE_ROOT, (uint32_t)r->below);
     uint32_t count =
         node->type == EBPO_GRAY && level->plane_counts ? level->plane_counts[node->rank] : 0;
-    return add_planes(r, level, count, in_level, &t->below_planes[r->below++]);
+    return add_planes(r, level, count, plane_at, &t->below_planes[r->below++]);
 }
 
-static ebpo_status add_gray(reading *r, const ebpo_level *level, uint64_t rank, uint64_t *in_level,
+/* Adds a gray node above the cut level. */
+static ebpo_status add_gray(reading *r, const ebpo_level *level, uint64_t rank, uint64_t *plane_at,
                             uint32_t *entry)
 {
     ebpo_top *t = r->top;
@@ -102,19 +104,21 @@ static ebpo_status add_gray(reading *r, const ebpo_level *level, uint64_t rank, 
         return ebpo_fail(r->error, EBPO_E_LIMIT,
                          "too many nodes above cut level %d; give a lower one", t->cut_level);
     *entry = ebpo_entry(EBPO_ENTRY_GRAY, (uint32_t)group);
-    return add_planes(r, level, level->plane_counts ? level->plane_counts[rank] : 0, in_level,
+    return add_planes(r, level, level->plane_counts ? level->plane_counts[rank] : 0, plane_at,
                       &t->gray[group]);
 }
 
-static bool is_pruned_group(const reading *r, int number, uint64_t rank)
+/* Returns true if the gray node with this rank in the level `number` is pruned. */
+static bool is_pruned(const reading *r, int number, uint64_t rank)
 {
     return r->info->pruned &&
            (number + 1 == r->info->level_count || (r->next_types && r->next_types[rank] == 0));
 }
 
-/* Adds a pruned node. If it is above the cut, the next level has an empty group for it. */
+/* Adds a pruned node. If it is above the cut level, the next level has an empty group for it, which
+ * must be counted. */
 static ebpo_status add_pruned(reading *r, const ebpo_level *level, const ebpo_node *node,
-                              uint64_t *in_level, uint32_t *entry)
+                              uint64_t *plane_at, uint32_t *entry)
 {
     if (node->cell.level < r->top->cut_level && node->cell.level + 1 < r->info->level_count) {
         ebpo_level none = { .gray_count = 0 };
@@ -122,11 +126,12 @@ static ebpo_status add_pruned(reading *r, const ebpo_level *level, const ebpo_no
         if (status != EBPO_OK)
             return status;
     }
-    return add_below(r, level, node, in_level, entry);
+    return add_below(r, level, node, plane_at, entry);
 }
 
+/* Adds the next node of its type, and sets its entry. */
 static ebpo_status add_node(reading *r, const ebpo_level *level, ebpo_node_type type,
-                            ebpo_cell cell, ranks *next, uint32_t *entry)
+                            ebpo_cell cell, level_counts *next, uint32_t *entry)
 {
     uint64_t rank = next->of[type]++;
     if (type == EBPO_WHITE)
@@ -135,7 +140,7 @@ static ebpo_status add_node(reading *r, const ebpo_level *level, ebpo_node_type 
         return uniform_entry(r, level->black_winding, rank, 1, entry);
     ebpo_node node = { .cell = cell,
                        .type = type,
-                       .pruned = type == EBPO_GRAY && is_pruned_group(r, cell.level, rank),
+                       .pruned = type == EBPO_GRAY && is_pruned(r, cell.level, rank),
                        .rank = rank };
     if (node.pruned)
         return add_pruned(r, level, &node, &next->planes, entry);
@@ -144,13 +149,14 @@ static ebpo_status add_node(reading *r, const ebpo_level *level, ebpo_node_type 
     return add_below(r, level, &node, &next->planes, entry);
 }
 
+/* Adds the nodes of a level. `first_group`: number of the level's first group. */
 static ebpo_status add_level(reading *r, int number, const ebpo_level *level, uint64_t first_group)
 {
     uint64_t grays = 0;
     ebpo_cell *gray = ebpo_alloc(level->gray_count, sizeof *gray);
     if (!gray)
         return no_memory(r);
-    ranks next = { { 0 }, 0 };
+    level_counts next = { { 0 }, 0 };
     ebpo_status status = EBPO_OK;
     for (uint64_t g = 0; g < level->group_count && status == EBPO_OK; g++)
         for (unsigned octant = 0; octant < ebpo_group_octants(number) && status == EBPO_OK;
@@ -172,12 +178,12 @@ static ebpo_status add_level(reading *r, int number, const ebpo_level *level, ui
     return status;
 }
 
-/* Shrinks an array to its contents; afterwards it takes less memory, or the same. */
+/* Shrinks an array to `count` items. Without memory, the array stays as it is. */
 static void shrink_array(void *array, uint64_t *capacity, uint64_t count, size_t size)
 {
-    void **at = array, *less = *at ? realloc(*at, (count ? count : 1) * size) : NULL;
-    if (less) {
-        *at = less;
+    void **at = array, *shrunk = *at ? realloc(*at, (count ? count : 1) * size) : NULL;
+    if (shrunk) {
+        *at = shrunk;
         *capacity = count;
     }
 }
@@ -261,9 +267,10 @@ void ebpo_top_free(ebpo_top *top)
     free(top);
 }
 
-/* Growing arrays allocate memory for several items at first; arrays of bytes for five. */
+/* Bytes for the first allocations of growing arrays, which have space for several items. */
 enum { GROWN_LEAST = 4096 };
 
+/* Returns an upper bound of the bytes. `node`: bytes of each root in `below`. */
 static uint64_t estimate_levels(const ebpo_info *info, int cut_level, size_t node)
 {
     uint64_t bytes = sizeof(ebpo_top) + GROWN_LEAST, largest = 0;

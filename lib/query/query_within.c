@@ -1,13 +1,12 @@
 /* Returns the faces within a distance of a point, one after the other, the nearest first.
  *
- * Faces come in bands. A band has the faces that come after a given face, up to a number of them.
- * Bands follow each other, so that a stream of any length needs little memory; the first band is
- * small, for callers that need few faces. A band is searched depth first, the nearest child first.
- * Nodes and faces that are certainly beyond its limit, or certainly in an earlier band, are
- * skipped. The order is exact: by distance, then by number in the file. Subtrees that are not in
- * memory are loaded in the order of guaranteed lower bounds, until the next bound is beyond the
- * band.
- */
+ * Faces are found in bands: a band is a limited number of faces that follow, in the order of
+ * results, the last face of the previous band. So a stream of any length needs little memory; the
+ * first band is small, for callers that need few faces. The search for a band is depth first, the
+ * nearest child first. It skips nodes and faces that are certainly beyond the band's limit, or
+ * certainly in an earlier band. The order is exact: by distance, then by index in the file.
+ * Subtrees that are not in memory are loaded in the order of guaranteed lower bounds, until the
+ * next bound is beyond the band. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -25,8 +24,9 @@
 
 /* --- bands --- */
 
+/* A face, and bounds of its distance from p. */
 typedef struct near_face {
-    const double *p;
+    const double *p; /* the query point */
     ebpo_distance_bounds bounds;
     uint64_t file_face, source_face;
     double triangle[3][3];
@@ -34,12 +34,12 @@ typedef struct near_face {
 
 typedef struct near_band {
     double p[3];
-    double radius;  /* exact radius: farther faces are in no band */
-    double limit;   /* certain limit: farther faces are not in this band */
+    double radius;  /* farther faces are in no band; compared exactly */
+    double limit;   /* faces that are certainly farther are not in this band */
     uint64_t most;  /* maximum number of faces in the band, at least 1 */
     bool has_after; /* faces up to `after` were in earlier bands */
     near_face after;
-    near_face *near;
+    near_face *near; /* [count] candidates; after near_band_settle, the band's faces in order */
     uint64_t count, capacity;
     bool cut; /* there may be further faces after the band's last one */
     bool no_memory;
@@ -62,6 +62,7 @@ static void near_band_begin(near_band *band, uint64_t most)
 
 /* --- order --- */
 
+/* Compares by exact distance, then by index in the file. */
 static int compare_faces(const void *x, const void *y)
 {
     const near_face *a = x, *b = y;
@@ -72,8 +73,8 @@ static int compare_faces(const void *x, const void *y)
     return sign ? sign : a->file_face < b->file_face ? -1 : 1;
 }
 
-/* Sorts by exact distance, then by number in the file, removes duplicates, and keeps at most `most`
- * faces. Lowers the limit accordingly. */
+/* Sorts the candidates, removes duplicates, and keeps the first band->most. If there are as many,
+ * lowers the limit to the distance of the last one. */
 static void near_band_settle(near_band *band)
 {
     uint64_t kept = 0;
@@ -91,7 +92,8 @@ static void near_band_settle(near_band *band)
 
 /* --- faces --- */
 
-/* Adds a face. The faces are sorted when there are about twice as many as wanted. */
+/* Adds a face to the candidates. When there are about twice as many as the band can have, settles
+ * the band. */
 static void add_face(near_band *band, const near_face *face)
 {
     enum { SPARE_LEAST = 64 };
@@ -134,14 +136,14 @@ typedef struct searching {
     double error; /* bound of the rounding error of distances to the hierarchy's boxes */
 } searching;
 
-/* Returns a length that is finite if the exact length may be finite. */
+/* Returns the length of a vector with coordinates >= 0, without overflow of squares. */
 static double length_of_positive(const double x[3])
 {
-    double most = fmax(x[0], fmax(x[1], x[2]));
-    if (!(most > 0))
+    double greatest = fmax(x[0], fmax(x[1], x[2]));
+    if (!(greatest > 0))
         return 0;
-    double a = x[0] / most, b = x[1] / most, c = x[2] / most;
-    return most * sqrt(a * a + b * b + c * c);
+    double a = x[0] / greatest, b = x[1] / greatest, c = x[2] / greatest;
+    return greatest * sqrt(a * a + b * b + c * c);
 }
 
 /* Computes guaranteed bounds of the distances of all points of a child's box. */
@@ -186,12 +188,13 @@ static void search_child(const searching *g, uint32_t child)
         search_child(g, b->child[order[i]]);
 }
 
-/* Adds the subtree's faces in the band. Faces may be repeated in another subtree. */
+/* Adds those faces of the subtree that may be in the band. Another subtree may add the same faces
+ * again. */
 static void near_band_search(near_band *band, const ebpo_accel *s)
 {
     searching g = { band, s, 0 };
     double size = s->largest_coordinate / s->scale * 0x1p-46;
-    for (int k = 0; k < 3; k++) /* each side adds a few rounding errors of numbers of this size */
+    for (int k = 0; k < 3; k++) /* box_bounds has a few rounding errors of numbers of this size */
         size += fabs(band->p[k]) * 0x1p-46 + fabs(s->centre[k]) * 0x1p-46;
     g.error = size;
     if (s->bound_count)
@@ -200,22 +203,24 @@ static void near_band_search(near_band *band, const ebpo_accel *s)
 
 /* --- the stream --- */
 
-/* Sizes of bands. The first band is small, for callers that need few faces. Each next band is
- * several times larger, so that searching again from the start costs little. */
+/* Sizes of bands, in faces. The first band is small, for callers that need few faces. Each next
+ * band is BAND_GROWTH times larger up to BAND_MAX: every band is searched from the root, so few
+ * bands are faster. */
 enum { FIRST_BAND = 256, BAND_GROWTH = 8, BAND_MAX = 1 << 16 };
 
 typedef struct within {
     ebpo_context *context;
     const ebpo_within_options *options;
     near_band band;
-    uint64_t given;
+    uint64_t given;  /* number of faces passed to the caller */
     bool ahead;      /* result of lists_ahead */
     uint64_t hinted; /* number of subtrees with a prefetch hint that have not been entered */
     ebpo_near_fn take;
     void *user;
 } within;
 
-/* --- not everything in memory: the nearest remaining subtree, until it is beyond the limit --- */
+/* --- a model that is loaded in parts: searches the nearest remaining subtree, until its bound is
+ * beyond the limit --- */
 
 /* Returns true for a remote file with a radius: all subtrees within the radius will be entered, so
  * they are listed at once and requested together. For a number of nearest faces the subtrees are
@@ -230,8 +235,8 @@ static bool lists_ahead(const within *w)
 static ebpo_status put_children(within *w, const ebpo_box *box, const ebpo_ranked *r,
                                 ebpo_error *error);
 
-/* Returns a bound for a subtree's faces from its skeleton (upper nodes of a subtree's hierarchy
- * over faces), if it has been loaded before. */
+/* Returns a lower bound of the distance to a subtree's faces from its skeleton (upper nodes of its
+ * hierarchy over faces), or 0 if it has none. */
 static double known_bound(const within *w, uint32_t below)
 {
     const ebpo_skeleton *k = ebpo_skeletons_find(w->context->model->skeletons, below);
@@ -241,7 +246,8 @@ static double known_bound(const within *w, uint32_t below)
     return fmin(b.owned, b.shared);
 }
 
-/* Queues a node. Omitted parts of a subset are checked when the band is known. */
+/* Adds a node to the queue, or its children if w->ahead. Pruned nodes are checked when the band is
+ * known (node_matters). */
 static ebpo_status put_node(within *w, const ebpo_box *box, const ebpo_ranked *r, ebpo_error *error)
 {
     if (ebpo_node_is_uniform(&r->node) || r->node.pruned || r->lower > w->band.limit ||
@@ -254,8 +260,8 @@ static ebpo_status put_node(within *w, const ebpo_box *box, const ebpo_ranked *r
     return below.lower > w->band.limit ? EBPO_OK : ebpo_queue_push(w->context, &below, error);
 }
 
-/* Sends prefetch hints before a subtree is entered. The first subtree of each window sends them,
- * for some of the next subtrees. */
+/* Called before a subtree is entered. Sends prefetch hints for it and for some of the next
+ * subtrees, unless an earlier call has sent the hint for it. */
 static void hint_window(within *w, const ebpo_ranked *next)
 {
     const ebpo_context *c = w->context;
@@ -342,7 +348,7 @@ static ebpo_status search_band(within *w, uint64_t most, ebpo_error *error)
     return ebpo_check_pruned(w->context, node_matters, w, error);
 }
 
-/* Passes a face to the caller. Returns false when the caller wants no more. */
+/* Passes a face to the caller. Returns false if the caller wants no more faces. */
 static bool give_face(within *w, const near_face *n)
 {
     ebpo_triangle_nearest exact;
@@ -357,6 +363,8 @@ static bool give_face(within *w, const near_face *n)
     return w->take(w->user, &out);
 }
 
+/* Passes the band's faces to the caller. Returns true if there may be another band that the caller
+ * wants. */
 static bool give_band(within *w)
 {
     for (uint64_t i = 0; i < w->band.count; i++)
@@ -376,8 +384,8 @@ static ebpo_status stream_faces(within *w, ebpo_error *error)
     bool more = true;
     ebpo_status status = EBPO_OK;
     while (more && w->given < wanted && status == EBPO_OK) {
-        uint64_t left = wanted - w->given;
-        status = search_band(w, left < most ? left : most, error);
+        uint64_t missing = wanted - w->given;
+        status = search_band(w, missing < most ? missing : most, error);
         more = status == EBPO_OK && give_band(w);
         most = most < BAND_MAX / BAND_GROWTH ? most * BAND_GROWTH : BAND_MAX;
     }

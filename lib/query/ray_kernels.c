@@ -1,5 +1,5 @@
-/* Finds hits of a ray (kernel): walks through the hierarchy over faces of one accel (acceleration
- * structure of a subtree), and the filter for eight faces, in single precision.
+/* The kernel that finds the hits of a ray: it walks through the hierarchy over faces of one accel
+ * (acceleration structure of a subtree) and filters eight faces at a time, in single precision.
  *
  * The kernel drops only faces that the ray certainly misses, or hits beyond the limit. A certain
  * hit also holds in exact arithmetic. rays.c tests the other faces exactly.
@@ -17,8 +17,9 @@
 
 /* --- the ray --- */
 
-/* Offsets of the nearer and farther sides of boxes, for the signs of the direction: a bit for each
- * axis. Branch-free: half of the branches would be mispredicted. */
+/* [bits][0]: offsets in ebpo_bound of the nearer sides of boxes on each axis; [1]: of the farther
+ * sides. `bits` has a bit for each axis on which the direction is negative. The table avoids
+ * branches, half of which would be mispredicted. */
 #define LOW(k)  (offsetof(ebpo_bound, low) + 8 * (k))
 #define HIGH(k) (offsetof(ebpo_bound, high) + 8 * (k))
 static const uint8_t ray_side_at[8][2][3] = {
@@ -34,6 +35,7 @@ static const uint8_t ray_side_at[8][2][3] = {
 #undef LOW
 #undef HIGH
 
+/* Sets the fields for tests of boxes. */
 EBPO_EIGHT void ray_set_boxes(ebpo_ray_search *r)
 {
     d3 d = d3_load(r->direction), origin = d3_load(r->origin),
@@ -48,11 +50,12 @@ EBPO_EIGHT void ray_set_boxes(ebpo_ray_search *r)
     r->side_at = ray_side_at[d3_signs(d)];
 }
 
+/* Sets the fields for tests of faces. */
 EBPO_EIGHT void ray_set_faces(ebpo_ray_search *r)
 {
     const double *d = r->direction;
-    double x = fabs(d[0]), y = fabs(d[1]), most = y > x ? y : x;
-    int z = fabs(d[2]) > most ? 2 : y > x;
+    double x = fabs(d[0]), y = fabs(d[1]), longer = y > x ? y : x;
+    int z = fabs(d[2]) > longer ? 2 : y > x;
     r->axis[2] = z;
     r->axis[0] = z == 2 ? 0 : z + 1;
     r->axis[1] = z == 0 ? 2 : z - 1;
@@ -71,10 +74,10 @@ EBPO_EIGHT f8 side_at(const ebpo_bound *b, unsigned at, f8 step, f8 from)
     return f8_add(f8_mul(f8_from_bytes((const uint8_t *)b + at), step), from);
 }
 
-/* Returns the children whose boxes the ray may intersect between 0 and the limit; *enter: where it
- * enters each box. The three axes are prepared together: lanes 0 to 2 for the origin, lanes 1 to 3
- * for the step (origin and step are adjacent in memory, and each load of four floats reads only
- * numbers). */
+/* Returns a bit for each child whose box the ray may intersect between 0 and the limit; *enter: t
+ * where it enters each box. The three axes are prepared together: the origin's coordinates are in
+ * lanes 0 to 2, the step's in lanes 1 to 3. (Origin and step are adjacent in memory, so each load
+ * of four floats also reads one number of the other array.) */
 EBPO_EIGHT unsigned ray_children(const ebpo_ray_search *r, const ebpo_bound *b, f8 *enter)
 {
     f8 origin = f8_load_twice(b->origin), inverse = f8_load_twice(r->inverse),
@@ -137,7 +140,7 @@ EBPO_EIGHT projected ray_view(const ebpo_ray_search *r, const ebpo_face_block *b
 /* For each edge: twice the signed area of the triangle that the ray's line forms with the edge, and
  * a bound of its rounding error. */
 typedef struct edges {
-    f8 u, v, w, least, most, error;
+    f8 u, v, w, least, greatest, error;
 } edges;
 
 EBPO_EIGHT f8 signed_area(f8 ax, f8 ay, f8 bx, f8 by)
@@ -156,13 +159,14 @@ EBPO_EIGHT edges ray_edges(const projected *a, f8 size_z)
     e.v = signed_area(a->x[0], a->y[0], a->x[2], a->y[2]);
     e.w = signed_area(a->x[1], a->y[1], a->x[0], a->y[0]);
     e.least = f8_min3(e.u, e.v, e.w);
-    e.most = f8_max3(e.u, e.v, e.w);
+    e.greatest = f8_max3(e.u, e.v, e.w);
     e.error = f8_mul(f8_add(size, f8_mul(wide, f8_all(0x1p-21f))), f8_mul(wide, f8_all(0x1p-22f)));
     return e;
 }
 
-/* Masks of a block's lanes: possible hits from 0 to the limit (with bounds of their t), certain
- * hits, faces through whose interior the line certainly goes from the front, and from the back. */
+/* Results of a block's lanes. alive: possible hits from 0 to the limit; low, high: bounds of their
+ * t; sure: certain hits; front, back: the line certainly goes through the face's interior, from the
+ * front or from the back. */
 typedef struct ray_lanes {
     float low[8], high[8];
     unsigned alive, sure, front, back;
@@ -178,12 +182,13 @@ EBPO_EIGHT void ray_faces(const ebpo_ray_search *r, uint32_t block, ray_lanes *o
     f8 size_z = f8_add(f8_max(f8_abs(least_z), f8_abs(max_z)), f8_all(r->blur));
     edges e = ray_edges(&a, size_z);
     f8 below = f8_sub(zero, e.error);
-    unsigned alive = ~f8_bits(f8_and(f8_less(e.least, below), f8_less(e.error, e.most))) &
+    unsigned alive = ~f8_bits(f8_and(f8_less(e.least, below), f8_less(e.error, e.greatest))) &
                      ebpo_face_block_lanes(&faces);
     out->alive = alive;
     if (!alive)
         return;
-    f8 left = f8_less(e.error, e.least), right = f8_less(e.most, below), in = f8_or(left, right);
+    f8 left = f8_less(e.error, e.least), right = f8_less(e.greatest, below),
+       in = f8_or(left, right);
     out->front = f8_bits(r->shear[2] > 0 ? left : right);
     out->back = f8_bits(r->shear[2] > 0 ? right : left);
     if (r->facing)
@@ -194,9 +199,9 @@ EBPO_EIGHT void ray_faces(const ebpo_ray_search *r, uint32_t block, ray_lanes *o
     f8 t = f8_mul(f8_mul(sum, inverse), per_step);
     f8 share = f8_min(f8_abs(f8_mul(f8_mul(e.error, f8_all(6)), inverse)), f8_all(1));
     f8 error = f8_add(f8_mul(f8_mul(f8_sub(max_z, least_z), share), f8_abs(per_step)), size);
-    f8 one = f8_mul(least_z, per_step), other = f8_mul(max_z, per_step);
-    f8 from = f8_pick(in, f8_sub(t, error), f8_sub(f8_min(one, other), size)),
-       to = f8_pick(in, f8_add(t, error), f8_add(f8_max(one, other), size));
+    f8 t0 = f8_mul(least_z, per_step), t1 = f8_mul(max_z, per_step);
+    f8 from = f8_pick(in, f8_sub(t, error), f8_sub(f8_min(t0, t1), size)),
+       to = f8_pick(in, f8_add(t, error), f8_add(f8_max(t0, t1), size));
     alive &= ~f8_bits(f8_or(f8_less(f8_all(r->bound), from), f8_less(to, zero)));
     out->sure = alive & f8_bits(f8_and(f8_and(in, f8_at_most(zero, from)),
                                        f8_at_most(to, f8_all(r->surely))));
@@ -207,6 +212,7 @@ EBPO_EIGHT void ray_faces(const ebpo_ray_search *r, uint32_t block, ray_lanes *o
 
 /* --- the walk --- */
 
+/* Drops candidates beyond the limit. */
 static void drop_beyond(ebpo_ray_search *r)
 {
     int kept = 0;
@@ -216,6 +222,7 @@ static void drop_beyond(ebpo_ray_search *r)
     r->count = kept;
 }
 
+/* Visits a block: adds its possible hits to the candidates, and lowers the limit. */
 EBPO_EIGHT void ray_block(ebpo_ray_search *r, uint32_t block, bool wide)
 {
     ray_lanes found;
@@ -253,7 +260,8 @@ EBPO_EIGHT void ray_fetch(const ebpo_accel *s, uint32_t child, bool wide)
         __builtin_prefetch(at + 64 * i);
 }
 
-/* Pushes the children of two or more lanes except the nearest, which is returned. */
+/* Pushes the children of two or more lanes, farthest first, except the nearest child, which it
+ * returns. */
 EBPO_EIGHT uint32_t ray_nearest(const ebpo_accel *s, ebpo_visit *stack, uint32_t *top,
                                 const ebpo_bound *b, unsigned lanes, f8 enter, bool wide)
 {
@@ -275,7 +283,7 @@ EBPO_EIGHT uint32_t ray_nearest(const ebpo_accel *s, ebpo_visit *stack, uint32_t
     return (uint32_t)stack[*top];
 }
 
-/* Pushes the children of two or more lanes, in any order, except one, which is returned. */
+/* Pushes the children of two or more lanes, in any order, except one child, which it returns. */
 EBPO_EIGHT uint32_t ray_next(const ebpo_accel *s, ebpo_visit *stack, uint32_t *top,
                              const ebpo_bound *b, unsigned lanes, bool wide)
 {

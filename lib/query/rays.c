@@ -1,11 +1,11 @@
 /* Finds the first face that a ray hits, any hit, or all hits; and evaluates many rays on all cores.
  *
  * On the way down the tree, tests are conservative: a node is skipped only if the ray certainly
- * misses its cell, or its contents are beyond the limit. In an accel (acceleration structure of a
- * subtree) a filter in single precision (ray_kernels.c) leaves a few faces, which are tested by
- * exact predicates, the most promising first. Hits are ordered by t, then by the number in the
- * file. Results do not depend on threads: each thread takes some rays at a time, with a separate
- * context. Error bounds: docs/develop/bounds.md. */
+ * misses its cell, or if the cell is beyond the limit of t. In an accel (acceleration structure of
+ * a subtree), a filter in single precision (ray_kernels.c) excludes all but a few faces. Exact
+ * predicates test these candidates, the one with the least lower bound of t first. Hits are ordered
+ * by t, then by the face's index in the file. Results do not depend on the number of threads: each
+ * thread takes some rays at a time, with its own context. Error bounds: docs/develop/bounds.md. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -25,15 +25,16 @@
 #include "query/query_model.h"
 #include "query/query_node.h"
 
-/* A face that the ray hits, with the data for exact comparison. */
+/* A face that the ray hits, with the data for an exact comparison with other hits. */
 struct ebpo_ray_found {
     double triangle[3][3];
     uint64_t file_face, source_face;
     ebpo_ray_intersection intersection;
 };
 
+/* A query with one ray. */
 typedef struct casting {
-    ebpo_context *context; /* the context's list of faces holds all hits */
+    ebpo_context *context; /* if all hits are wanted, its unsorted_hits holds them */
     ebpo_segment ray;
     ebpo_ray_wants wants;
     ebpo_ray_sides sides; /* sides of faces that count as hits */
@@ -41,8 +42,8 @@ typedef struct casting {
                            * search */
     bool done;            /* the search is complete */
     bool no_memory;
-    uint64_t count;
-    ebpo_ray_found first; /* valid if count > 0, unless all hits are wanted */
+    uint64_t count;       /* number of hits that are kept */
+    ebpo_ray_found first; /* EBPO_WANTS_FIRST: the first hit so far, if count > 0 */
 } casting;
 
 static inline void casting_begin(casting *c, ebpo_context *context, const double origin[3],
@@ -66,16 +67,17 @@ static inline ebpo_ray_hit hit_of(const ebpo_ray_found *m)
 
 /* --- one ray through one accel --- */
 
-/* Origins whose distance from the box is greater than this multiple of half its size are moved
- * towards the box. */
+/* An origin with a coordinate in the frame beyond this multiple of the accel's largest coordinate
+ * is moved along the ray towards the faces. */
 static const double near_enough = 4;
-/* Replaces infinity by a finite value, so that products with 0 are not NaN. */
+/* Used in place of infinity, because products of infinity and 0 would be NaN. */
 #define BEYOND 0x1p100f
 
 /* --- limits --- */
 
 /* Returns t in the frame (coordinates in which the subtree's cell has a size of 1 to 2), relative
- * to the moved origin; `sign` 1: at least the exact value, -1: at most. */
+ * to the moved origin. With `sign` 1, the result is at least the exact value; with -1, it is at
+ * most the exact value. */
 static float frame_t(const ebpo_ray_search *r, double t, int sign)
 {
     double scaled = t * r->limit_scale;
@@ -96,8 +98,8 @@ static void lower_bound(ebpo_ray_search *r)
 /* Returns the maximum without a call of fmax. */
 static inline double greater_of(double a, double b) { return a > b ? a : b; }
 
-/* Scales a direction with an extreme longest coordinate by a power of two. Most directions are not
- * scaled, because that delays all later steps. */
+/* Scales a very long or very short direction by a power of two. This is done only if necessary,
+ * because it delays all later steps. */
 static void scale_direction(ebpo_ray_search *r, double longest)
 {
     int exponent;
@@ -111,32 +113,32 @@ static void scale_direction(ebpo_ray_search *r, double longest)
 static double to_frame(ebpo_ray_search *r)
 {
     const ebpo_accel *s = r->s;
-    double longest = 0, most = 0;
+    double longest = 0, greatest = 0;
     for (int k = 0; k < 3; k++) {
         r->direction[k] = r->ray->direction[k];
         longest = greater_of(longest, fabs(r->direction[k]));
         r->from[k] = r->ray->origin[k];
         r->origin[k] = (r->ray->origin[k] - s->centre[k]) * s->scale;
-        most = greater_of(most, fabs(r->origin[k]));
+        greatest = greater_of(greatest, fabs(r->origin[k]));
     }
     r->limit_scale = s->scale;
     if (!(longest >= 0x1p-12 && longest <= 0x1p12))
         scale_direction(r, longest);
     r->moved = 0;
-    return most;
+    return greatest;
 }
 
-/* Computes a point shortly before the ray enters the cube of size `reach` around all faces; returns
- * false if the ray misses the cube. The rounding error is far below the enlargement of the cube,
- * unless the origin is so far away that its error is as large as the cube; then the origin is not
- * moved. */
-static bool enters_cube(const ebpo_ray_search *r, double reach, double *t)
+/* Sets *t to a value shortly before the ray enters the faces: where it enters the cube from -2
+ * `largest` to 2 `largest`, if all coordinates of faces are at most `largest`. Returns false if the
+ * ray misses the cube. The rounding error of *t is far smaller than the margin between faces and
+ * cube. (An origin that is too far away for this is not moved: see ray_search_accel.) */
+static bool enters_cube(const ebpo_ray_search *r, double largest, double *t)
 {
     double from = 0, to = INFINITY;
     for (int k = 0; k < 3; k++) {
-        double cell_face = 2 * reach * (r->direction[k] < 0 ? -1 : 1);
+        double cell_face = 2 * largest * (r->direction[k] < 0 ? -1 : 1);
         if (r->direction[k] == 0) {
-            if (fabs(r->origin[k]) > 2 * reach)
+            if (fabs(r->origin[k]) > 2 * largest)
                 return false;
             continue;
         }
@@ -147,36 +149,37 @@ static bool enters_cube(const ebpo_ray_search *r, double reach, double *t)
     return from <= to;
 }
 
-/* Moves the origin in double-double arithmetic, so that its original distance hardly matters. */
-static bool move_origin(ebpo_ray_search *r, double *most)
+/* Moves the origin along the ray towards the faces, in double-double arithmetic, so that its
+ * original distance hardly adds to the error. Returns false if the ray misses all faces. */
+static bool move_origin(ebpo_ray_search *r, double *greatest)
 {
     const ebpo_accel *s = r->s;
     double t;
     if (!enters_cube(r, s->largest_coordinate, &t))
         return false;
     r->moved = t;
-    *most = 0;
+    *greatest = 0;
     for (int k = 0; k < 3; k++) {
         ebpo_pair from = ebpo_two_difference(r->ray->origin[k], s->centre[k]),
                   step = ebpo_two_product(t, r->direction[k]);
         from = (ebpo_pair){ from.head * s->scale, from.tail * s->scale };
         r->origin[k] = ebpo_pair_add(from, step).head;
-        *most = greater_of(*most, fabs(r->origin[k]));
+        *greatest = greater_of(*greatest, fabs(r->origin[k]));
         r->from[k] = s->centre[k] + r->origin[k] / s->scale;
     }
     return true;
 }
 
-/* Sets the error of the origin in the frame. Its causes: moving the origin, transforming it to the
- * frame and back to the model's unit, splitting it into floats, and replacing a small direction.
- * See docs/develop/bounds.md, "A ray against boxes". */
-static void set_error(ebpo_ray_search *r, double most)
+/* Sets a bound of the error of the origin in the frame. The origin is moved, transformed to the
+ * frame and back to the model's unit, and split into floats; small coordinates of the direction are
+ * replaced. Each step adds an error (docs/develop/bounds.md, "A ray against boxes"). */
+static void set_error(ebpo_ray_search *r, double greatest)
 {
     const double *c = r->s->centre;
     double unit = (fabs(c[0]) + fabs(c[1]) + fabs(c[2])) * r->s->scale;
-    r->error = 0x1p-45 * (most + unit) + 0x1p-55 * r->s->largest_coordinate + 0x1p-53;
-    r->blur = most < 0x1p30 ? (float)(r->error * 0x1p23 + 0x1p-30) : INFINITY;
-    if (most < 0x1p80)
+    r->error = 0x1p-45 * (greatest + unit) + 0x1p-55 * r->s->largest_coordinate + 0x1p-53;
+    r->blur = greatest < 0x1p30 ? (float)(r->error * 0x1p23 + 0x1p-30) : INFINITY;
+    if (greatest < 0x1p80)
         return;
     r->error = (double)BEYOND; /* the ray may intersect all boxes */
     memset(r->origin, 0, sizeof r->origin);
@@ -184,7 +187,8 @@ static void set_error(ebpo_ray_search *r, double most)
 
 /* --- candidates --- */
 
-/* Tests the nearest candidate first, if its hit may exclude others. */
+/* Tests all candidates. If the first hit is wanted, the candidate with the least lower bound comes
+ * first, because its hit may exclude others. */
 static void judge_waiting(ebpo_ray_search *r)
 {
     while (r->count && !r->done) {
@@ -213,11 +217,11 @@ static void ray_search_accel(ebpo_ray_search *r, const ebpo_ray_kernels *kernels
     r->done = r->any_hit = false;
     if (s->bound_count == 0)
         return;
-    double most = to_frame(r);
-    if (!(most <= near_enough * s->largest_coordinate) && most < 0x1p46 * s->largest_coordinate &&
-        !move_origin(r, &most))
+    double greatest = to_frame(r);
+    if (!(greatest <= near_enough * s->largest_coordinate) &&
+        greatest < 0x1p46 * s->largest_coordinate && !move_origin(r, &greatest))
         return;
-    set_error(r, most);
+    set_error(r, greatest);
     r->surely = frame_t(r, r->ray->t_max, -1);
     r->bound = BEYOND;
     lower_bound(r);
@@ -259,7 +263,7 @@ static void keep_first(casting *c, const ebpo_ray_found *m)
     c->limit = limit < c->limit ? limit : c->limit;
 }
 
-/* Keeps a hit face, with its numbers. */
+/* Keeps a hit, if it is wanted. */
 static void casting_keep(casting *c, const ebpo_ray_found *m)
 {
     ebpo_context *k = c->context;
@@ -276,8 +280,8 @@ static void casting_keep(casting *c, const ebpo_ray_found *m)
     }
 }
 
-/* Sorts hits. There are few in most cases, and nearly in order, because boxes are visited from the
- * nearest on. */
+/* Sorts hits. In most cases they are few and nearly in order, because the nearest boxes are visited
+ * first. */
 static void sort_found(ebpo_ray_found *found, uint64_t count, ebpo_segment *ray)
 {
     if (count > 16) {
@@ -309,14 +313,15 @@ static ebpo_status casting_sort(casting *c, uint64_t begin, uint64_t *end, ebpo_
     return EBPO_OK;
 }
 
+/* As ray_fault, but slower. */
 static const char *ray_fault_of(const ebpo_segment *ray)
 {
-    double nothing = 0, longest = 0;
+    double not_finite = 0, longest = 0; /* not_finite: 0, or NaN if a coordinate is not finite */
     for (int k = 0; k < 3; k++) {
-        nothing += ray->origin[k] * 0 + ray->direction[k] * 0;
+        not_finite += ray->origin[k] * 0 + ray->direction[k] * 0;
         longest = fabs(ray->direction[k]) > longest ? fabs(ray->direction[k]) : longest;
     }
-    if (nothing != 0) /* NaN: a coordinate is not finite */
+    if (not_finite != 0)
         return "has a coordinate that is not a finite number";
     if (longest == 0)
         return "needs a direction other than (0, 0, 0)";
@@ -333,10 +338,10 @@ static inline const char *ray_fault(const ebpo_segment *ray)
     return ray_fault_of(ray);
 }
 
-/* Computes the interval of t in which the ray is within [low, high] enlarged by `slack`, cut to 0
- * .. limit; false when it is empty. */
-static bool intersects_slabs(const double origin[3], const double direction[3], double limit,
-                             const double low[3], const double high[3], double slack, double *enter)
+/* Returns false if the ray misses the box [low, high], enlarged by `slack`, for all t in 0 ..
+ * limit. *enter: t where the ray enters the box. */
+static bool intersects_box(const double origin[3], const double direction[3], double limit,
+                           const double low[3], const double high[3], double slack, double *enter)
 {
     double from = 0, to = limit;
     for (int k = 0; k < 3; k++) {
@@ -354,6 +359,7 @@ static bool intersects_slabs(const double origin[3], const double direction[3], 
     return from <= to;
 }
 
+/* Tests a candidate exactly (ebpo_ray_search.decide). */
 static void decide_face(ebpo_ray_search *r, uint32_t slot, int facing)
 {
     casting *c = r->user;
@@ -380,7 +386,7 @@ static void cast_subtree(casting *c, const ebpo_accel *s)
     r.decide = decide_face;
     r.user = c;
     ray_search_accel(&r, c->context->model->kernels.ray, s);
-    if (r.any_hit) { /* only if any hit is wanted */
+    if (r.any_hit) {
         c->count = 1;
         c->done = true;
     }
@@ -393,7 +399,7 @@ static bool intersects_cell(const casting *c, const ebpo_box *box, const ebpo_no
     ebpo_cell_bounds(box, node->cell, low, high);
     for (int k = 0; k < 3; k++)
         slack = fmax(slack, (fabs(low[k]) + fabs(high[k]) + fabs(c->ray.origin[k])) * 0x1p-48);
-    return intersects_slabs(c->ray.origin, c->ray.direction, c->limit, low, high, slack, &enter);
+    return intersects_box(c->ray.origin, c->ray.direction, c->limit, low, high, slack, &enter);
 }
 
 static bool ray_matters(void *user, const ebpo_box *box, const ebpo_node *node)
@@ -405,7 +411,7 @@ static ebpo_status cast_node(casting *c, const ebpo_box *box, ebpo_node node, eb
 {
     const ebpo_model *m = c->context->model;
     if (c->done || ebpo_node_is_uniform(&node) || !intersects_cell(c, box, &node) ||
-        node.pruned) /* pruned: ray_walk handles the node */
+        node.pruned) /* ray_walk checks pruned nodes at the end */
         return EBPO_OK;
     if (ebpo_node_is_subtree_root(&node)) {
         ebpo_status status = ebpo_model_enter(c->context, &node, error);
@@ -497,11 +503,11 @@ ebpo_status ebpo_ray_all(ebpo_context *context, const double origin[3], const do
 
 /* --- many rays --- */
 
-/* Number of rays that a thread takes at a time. It is larger for a model that is not all in memory,
+/* Number of rays that a thread takes at a time. For a model that is loaded in parts, it is larger,
  * because neighbours on the curve need the same subtrees. */
-enum { PIECE = 128, PIECE_ALONG_CURVE = 1024 };
+enum { RAYS_AT_A_TIME = 128, RAYS_ALONG_CURVE = 1024 };
 
-/* Where the hits of a ray are, before they are gathered: in which context, and from where on. */
+/* The hits of a ray, before they are gathered: a range of `hits` in the context of a worker. */
 typedef struct found {
     unsigned worker;
     uint64_t begin, end;
@@ -513,13 +519,13 @@ typedef struct batch {
     ebpo_ray_options options;
     ebpo_ray_wants wants;
     unsigned threads;
-    ebpo_context **context; /* [threads] the first one is the caller's */
+    ebpo_context **context; /* [threads] the first one is the caller's context */
     uint64_t *held;         /* [threads] number of hits in each context, if all hits are wanted */
-    double *entry;          /* [count][3] entry points, in the order of work; NULL: the order of
-                             * work is that of the rays */
+    double *entry;          /* [count][3] points where rays enter the model's box, in the order of
+                             * work */
     uint64_t work;          /* number of rays to compute */
-    uint64_t *order;        /* [work] order of work */
-    /* results, [count] each; one of the following three is used */
+    uint64_t *order;        /* [work] indices of rays in the order of work; NULL: the given order */
+    /* results, [count] each; `wants` decides which of the three is used */
     ebpo_ray_hit *first;
     bool *any;
     found *all;
@@ -527,7 +533,7 @@ typedef struct batch {
 
 /* --- a ray of many --- */
 
-static ebpo_status result_ray(batch *b, uint64_t i, unsigned worker, ebpo_error *error)
+static ebpo_status cast_one(batch *b, uint64_t i, unsigned worker, ebpo_error *error)
 {
     casting c;
     const ebpo_ray *r = &b->rays[i];
@@ -549,8 +555,8 @@ static ebpo_status result_ray(batch *b, uint64_t i, unsigned worker, ebpo_error 
     return status;
 }
 
-static ebpo_status result_piece(void *user, uint64_t begin, uint64_t end, unsigned worker,
-                                ebpo_error *error)
+static ebpo_status cast_range(void *user, uint64_t begin, uint64_t end, unsigned worker,
+                              ebpo_error *error)
 {
     batch *b = user;
     ebpo_status status = EBPO_OK;
@@ -563,7 +569,7 @@ static ebpo_status result_piece(void *user, uint64_t begin, uint64_t end, unsign
         uint64_t k = begin + ebpo_batch_next(&along, i), ray = b->order ? b->order[k] : k;
         if (b->options.done && b->options.done[ray])
             continue;
-        status = result_ray(b, ray, worker, error);
+        status = cast_one(b, ray, worker, error);
         if (status == EBPO_OK && b->options.done)
             b->options.done[ray] = true;
         status = ebpo_batch_note(&along, i, k, status, error);
@@ -657,8 +663,8 @@ static void clear_batch(batch *b)
     free(b->all);
 }
 
-static ebpo_status result_all(batch *b, ebpo_context *context, const ebpo_ray_options *options,
-                              ebpo_error *error)
+static ebpo_status cast_all(batch *b, ebpo_context *context, const ebpo_ray_options *options,
+                            ebpo_error *error)
 {
     const ebpo_model *m = context->model;
     b->options = (ebpo_ray_options)EBPO_RAY_OPTIONS_INIT;
@@ -674,17 +680,19 @@ static ebpo_status result_all(batch *b, ebpo_context *context, const ebpo_ray_op
     if (status != EBPO_OK || b->count == 0)
         return status;
     b->work = b->count;
+    /* true if contexts of several threads can use the model at the same time */
     bool shared = m->whole || m->options.loading == EBPO_LOAD_CACHE;
     if (!m->whole && shared && b->count > 1)
         put_in_order(b, m);
-    uint64_t piece = b->order ? PIECE_ALONG_CURVE : PIECE, pieces = (b->work + piece - 1) / piece;
+    uint64_t grain = b->order ? RAYS_ALONG_CURVE : RAYS_AT_A_TIME,
+             tasks = (b->work + grain - 1) / grain;
     b->threads = shared ? ebpo_thread_count(b->options.threads) : 1;
-    if (b->threads > pieces)
-        b->threads = (unsigned)pieces;
-    status = pieces ? make_contexts(b, context, error) : EBPO_OK;
+    if (b->threads > tasks)
+        b->threads = (unsigned)tasks;
+    status = tasks ? make_contexts(b, context, error) : EBPO_OK;
     if (status == EBPO_OK)
         status =
-            ebpo_parallel_for(b->threads, NULL, b->work, piece, result_piece, b, NULL, NULL, error);
+            ebpo_parallel_for(b->threads, NULL, b->work, grain, cast_range, b, NULL, NULL, error);
     return status;
 }
 
@@ -694,7 +702,7 @@ ebpo_status ebpo_ray_first_many(ebpo_context *context, const ebpo_ray *rays, uin
 {
     EBPO_DEFAULT_FP;
     batch b = { .rays = rays, .count = count, .wants = EBPO_WANTS_FIRST, .first = out };
-    ebpo_status status = result_all(&b, context, options, error);
+    ebpo_status status = cast_all(&b, context, options, error);
     clear_batch(&b);
     return status;
 }
@@ -704,7 +712,7 @@ ebpo_status ebpo_ray_any_many(ebpo_context *context, const ebpo_ray *rays, uint6
 {
     EBPO_DEFAULT_FP;
     batch b = { .rays = rays, .count = count, .wants = EBPO_WANTS_ANY, .any = any };
-    ebpo_status status = result_all(&b, context, options, error);
+    ebpo_status status = cast_all(&b, context, options, error);
     clear_batch(&b);
     return status;
 }
@@ -745,7 +753,7 @@ ebpo_status ebpo_ray_all_many(ebpo_context *context, const ebpo_ray *rays, uint6
     *hits = NULL;
     *begin = NULL;
     b.all = ebpo_alloc(count, sizeof *b.all);
-    ebpo_status status = b.all ? result_all(&b, context, options, error)
+    ebpo_status status = b.all ? cast_all(&b, context, options, error)
                                : ebpo_fail_memory(error, count * sizeof *b.all);
     if (status == EBPO_OK)
         status = gather_hits(&b, context, error);

@@ -18,32 +18,34 @@
 #include "geometry/vec3.h"
 #include "mesh/attributes.h"
 
-/* A column of an array. */
+/* A requested column of an attribute. */
 typedef struct sampled {
     const ebpo_attribute *head; /* attribute of the file */
-    unsigned array, column;
-    bool of_vertices, owner; /* owner: this is the first column that uses these values */
+    unsigned array, column;     /* index of the attribute in the file; column of it */
+    bool of_vertices;           /* the attribute belongs to vertices; false: to faces */
+    bool owner;                 /* this item frees `values`, which later items may use, too */
     ebpo_attribute_values values;
 } sampled;
 
 struct ebpo_sampler {
     const ebpo_file *file;
     ebpo_mesh mesh;      /* read if any attribute belongs to vertices; else empty */
-    uint32_t *file_face; /* [numbers] file index of each source face, UINT32_MAX: none; NULL: both
-                          * numbers are the same */
-    uint64_t numbers;
+    uint32_t *file_face; /* [source_indices] file index of each source face; UINT32_MAX: the file
+                          * does not have the face; NULL: both indices are the same */
+    uint64_t source_indices; /* greatest source index of a face, plus 1 */
     unsigned count;
     sampled item[EBPO_SAMPLER_MAX];
 };
 
 /* --- choice of attributes --- */
 
+/* A requested column: `text` is NAME or ELEMENT:NAME, in a longer string. */
 typedef struct wanted {
     const char *text, *element, *name;
-    size_t bytes, element_bytes, name_bytes;
+    size_t bytes, element_bytes, name_bytes; /* element_bytes 0: any element */
 } wanted;
 
-/* Returns the text up to the next comma: a name, or `element:name`. */
+/* Splits the text up to the next comma, or to the end. */
 static wanted next_wanted(const char *text)
 {
     wanted w = { .text = text, .bytes = strcspn(text, ",") };
@@ -67,6 +69,7 @@ static int column_named(const char *names, const wanted *w)
     return -1;
 }
 
+/* Returns true if the attribute belongs to this element, and the caller requested this element. */
 static bool of_element(const ebpo_attribute *head, const wanted *w, const char *element)
 {
     return ebpo_attribute_is_of(head, element) &&
@@ -74,6 +77,7 @@ static bool of_element(const ebpo_attribute *head, const wanted *w, const char *
                                   memcmp(element, w->element, w->element_bytes) == 0));
 }
 
+/* Finds the column among the attributes of an element. Returns false if it is absent or a list. */
 static bool find_column(const ebpo_file *file, const wanted *w, const char *element, sampled *out)
 {
     for (unsigned n = 0; n < file->attributes.count; n++) {
@@ -112,6 +116,7 @@ static ebpo_status choose_columns(ebpo_sampler *s, const char *names, ebpo_error
 
 /* --- reading --- */
 
+/* Reads each requested attribute once. */
 static ebpo_status read_values(ebpo_sampler *s, const ebpo_read_options *read, ebpo_error *error)
 {
     for (unsigned i = 0; i < s->count; i++) {
@@ -139,27 +144,27 @@ static ebpo_status read_mesh(ebpo_sampler *s, const ebpo_read_options *read, ebp
     return needed ? ebpo_file_read_mesh(s->file, read, &s->mesh, error) : EBPO_OK;
 }
 
-/* Inverts the map from file faces to source faces: callers use face numbers of the source. */
+/* Makes `file_face`, because callers give source indices of faces. */
 static ebpo_status invert_map(ebpo_sampler *s, const ebpo_read_options *read, ebpo_error *error)
 {
     uint64_t faces = s->file->info.face_count;
     ebpo_maps maps;
-    s->numbers = faces;
+    s->source_indices = faces;
     if (!(s->file->info.parts & EBPO_PART_MAPS))
         return EBPO_OK;
     ebpo_status status = ebpo_file_read_maps(s->file, read, &maps, error);
     if (status != EBPO_OK)
         return status;
     for (uint64_t f = 0; f < faces; f++)
-        if (maps.face_source[f] >= s->numbers)
-            s->numbers = maps.face_source[f] + UINT64_C(1);
-    s->file_face = ebpo_alloc(s->numbers, sizeof *s->file_face);
+        if (maps.face_source[f] >= s->source_indices)
+            s->source_indices = maps.face_source[f] + UINT64_C(1);
+    s->file_face = ebpo_alloc(s->source_indices, sizeof *s->file_face);
     if (s->file_face) {
-        memset(s->file_face, 0xff, s->numbers * sizeof *s->file_face);
+        memset(s->file_face, 0xff, s->source_indices * sizeof *s->file_face);
         for (uint64_t f = 0; f < faces; f++)
             s->file_face[maps.face_source[f]] = (uint32_t)f;
     } else {
-        status = ebpo_fail_memory(error, s->numbers * sizeof *s->file_face);
+        status = ebpo_fail_memory(error, s->source_indices * sizeof *s->file_face);
     }
     ebpo_maps_free(&maps);
     return status;
@@ -213,10 +218,10 @@ static double clamp_to(double v, double least, double most)
 /* Returns the exponent of the largest absolute value of `count` numbers; 0 if all are 0. */
 static int greatest_exponent(const double *v, int count)
 {
-    double most = 0;
+    double greatest = 0;
     for (int i = 0; i < count; i++)
-        most = fabs(v[i]) > most ? fabs(v[i]) : most;
-    return most > 0 ? ilogb(most) : 0;
+        greatest = fabs(v[i]) > greatest ? fabs(v[i]) : greatest;
+    return greatest > 0 ? ilogb(greatest) : 0;
 }
 
 static void scale_by_power(double *v, int count, int by)
@@ -225,8 +230,8 @@ static void scale_by_power(double *v, int count, int by)
         v[i] = scalbn(v[i], by);
 }
 
-/* Computes e[0]: b - a, e[1]: c - a, e[2]: p - a, scaled so that the larger of the first two is 1
- * to 2. */
+/* Computes e[0] = b - a, e[1] = c - a and e[2] = p - a for the corners a, b, c. They are scaled by
+ * a power of two so that the largest coordinate of e[0] and e[1] is 1 to 2. */
 static void edges_of(const double corner[3][3], const double p[3], double e[3][3])
 {
     double at[4][3];
@@ -261,6 +266,7 @@ static void weigh_edge(const double e[3][3], double weight[3])
     weight[to[longest]] = t;
 }
 
+/* Computes the weights of the three corners at the point p: >= 0, with the sum 1. */
 static void weigh_corners(const double corner[3][3], const double p[3], double weight[3])
 {
     double e[3][3];
@@ -280,7 +286,8 @@ static void weigh_corners(const double corner[3][3], const double p[3], double w
     weight[2] = c / sum;
 }
 
-/* Blends values; the result is between them, also after rounding. */
+/* Returns the weighted mean of three values. The result is between the values, also after rounding.
+ */
 static double blend_values(const double weight[3], const double value[3])
 {
     double sum = 0, least = INFINITY, most = -INFINITY;
@@ -330,10 +337,11 @@ static void sample_face(const ebpo_sampler *s, uint64_t f, const double point[3]
     }
 }
 
-/* Returns the file's index of a face; UINT64_MAX: the file has no such face. */
+/* Converts a source index of a face to its index in the file. Returns UINT64_MAX if the file does
+ * not have the face. */
 static uint64_t face_in_file(const ebpo_sampler *s, uint64_t number)
 {
-    if (number >= s->numbers)
+    if (number >= s->source_indices)
         return UINT64_MAX;
     return !s->file_face                        ? number
            : s->file_face[number] == UINT32_MAX ? UINT64_MAX

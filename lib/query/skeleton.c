@@ -1,10 +1,10 @@
 /* Makes skeletons, which bound the distance to the faces of subtrees that are not in memory.
  *
- * For each subtree that has been loaded, the upper nodes of its hierarchy over faces are kept,
- * eight at first; searches load the subtree again only if it may matter. When a search has loaded a
- * subtree without need, nodes are added near the query point. All skeletons together stay within
- * their share of the budget. They give lower bounds only (reason: model_parts.h). Any thread may
- * use a skeleton, also while it grows. */
+ * The skeleton of a subtree has the upper nodes of the subtree's hierarchy over faces, eight at
+ * first. It is made when the subtree is loaded; later searches load the subtree again only if it
+ * may matter. When a search has loaded a subtree without need, nodes near the query point are
+ * added. All skeletons together stay within their share of the budget. They give lower bounds only
+ * (model_parts.h has the reason). Any thread may use a skeleton, also while it grows. */
 #include "core/strict_fp.h"
 
 #include "query/model_parts.h"
@@ -19,19 +19,20 @@
 #include "core/alloc.h"
 
 typedef struct kept_node {
-    /* `child` is one of: EBPO_IS_BLOCK; the number of a node of the skeleton; a number in the
-     * subtree's hierarchy, which is replaced when the skeleton grows. */
+    /* A child is a block (EBPO_IS_BLOCK), a node of the skeleton (IS_KEPT and its number), or a
+     * node of the subtree's hierarchy (its number there) that the skeleton does not have. */
     ebpo_bound bound;
     ebpo_bound_cylinder cylinder;
 } kept_node;
 
-/* Maximum numbers of nodes in a part, and of parts: powers of two. */
+/* Nodes are allocated in parts of PART_NODES nodes. GROWN_AT_ONCE: maximum number of nodes that are
+ * added at a time. */
 enum { PART_NODES = 8, PARTS = EBPO_SKELETON_NODES / PART_NODES, GROWN_AT_ONCE = 8 };
 #define IS_KEPT UINT32_C(0x40000000)
 
 struct ebpo_skeleton {
     double centre[3], scale; /* frame of the subtree */
-    unsigned count, first;   /* number of nodes; maximum number in the first part */
+    unsigned count, first;   /* number of nodes; capacity of the first part */
     uint8_t owned, shared;   /* a bit for each child of node 0 that has owned faces, shared faces;
                               * no child has both */
     kept_node *_Atomic part[PARTS];
@@ -43,21 +44,21 @@ static kept_node *node_at(const ebpo_skeleton *k, uint32_t number)
            number % PART_NODES;
 }
 
-/* Returns a child; another thread may add the node below it at the same time. */
+/* Returns a child. Another thread may add the child's node to the skeleton at the same time. */
 static uint32_t child_of(const kept_node *n, int lane)
 {
     return __atomic_load_n(&n->bound.child[lane], __ATOMIC_ACQUIRE);
 }
 static bool is_kept(uint32_t child) { return (child & (IS_KEPT | EBPO_IS_BLOCK)) == IS_KEPT; }
 
-/* Within these limits, squares of numbers in the frames, and the results, are far from overflow and
- * underflow of doubles. */
-static const double scale_max = 0x1p500, place_max = 0x1p200;
+/* Limits of the frame's scale and of coordinates in the frame: within them, squares and results are
+ * far from overflow and underflow of doubles. */
+static const double scale_max = 0x1p500, coordinate_max = 0x1p200;
 
 static uint64_t part_bytes(unsigned nodes) { return nodes * (uint64_t)sizeof(kept_node); }
 uint64_t ebpo_skeleton_bytes(unsigned nodes) { return sizeof(ebpo_skeleton) + part_bytes(nodes); }
 
-/* Adds the node below this child, `place`, of a node of the skeleton. */
+/* Adds the node of a child. `place`: the entry of the child in its parent. */
 static void keep_child(ebpo_skeleton *k, const ebpo_accel *s, uint32_t *place)
 {
     uint32_t number = k->count++;
@@ -77,8 +78,8 @@ static double squared_diagonal(const ebpo_bound *b, int lane)
     return sum;
 }
 
-/* Returns true if the faces below the child are shared. Blocks, and so children of the topmost
- * node, hold either shared faces or owned ones: see blocks.c. */
+/* Returns true if the faces below a child of the topmost node are shared. (Below such a child,
+ * either all faces are shared or all are owned: blocks.c.) */
 static bool is_shared(const ebpo_accel *s, uint32_t child)
 {
     while (!(child & EBPO_IS_BLOCK))
@@ -96,8 +97,8 @@ static void record_kinds(ebpo_skeleton *k, const ebpo_accel *s)
             k->owned |= (uint8_t)(1u << lane);
 }
 
-/* Adds the one or two nodes below the topmost one that hold all shared faces: these faces are
- * searched in the subtrees that own them, and small boxes identify the owners. */
+/* Adds the nodes of children of the topmost node with shared faces. Small boxes around shared faces
+ * are needed to find the subtrees that own them. */
 static void keep_shared(ebpo_skeleton *k, const ebpo_accel *s)
 {
     kept_node *top = node_at(k, 0);
@@ -106,20 +107,21 @@ static void keep_shared(ebpo_skeleton *k, const ebpo_accel *s)
             keep_child(k, s, &top->bound.child[lane]);
 }
 
-/* Adds, for owned faces, the node below the largest child without a node in the skeleton: the box
- * of this child is the loosest. */
+/* Adds the node of the largest child with owned faces whose node is not in the skeleton, because
+ * its box is the loosest. Returns false if there is none. `shared_end`: number of the first node
+ * after the nodes of shared faces. */
 static bool keep_largest(ebpo_skeleton *k, const ebpo_accel *s, uint32_t shared_end)
 {
-    double most = -1;
+    double largest = -1;
     uint32_t *place = NULL;
     for (uint32_t number = 0; number < k->count; number += number ? 1 : shared_end) {
         ebpo_bound *b = &node_at(k, number)->bound;
         for (int lane = 0; lane < b->count; lane++) {
-            bool leads_on =
+            bool can_be_added =
                 !(b->child[lane] & (IS_KEPT | EBPO_IS_BLOCK)) && (number || k->owned >> lane & 1);
-            double size = leads_on ? squared_diagonal(b, lane) : -1;
-            if (size > most) {
-                most = size;
+            double size = can_be_added ? squared_diagonal(b, lane) : -1;
+            if (size > largest) {
+                largest = size;
                 place = &b->child[lane];
             }
         }
@@ -167,8 +169,8 @@ void ebpo_skeleton_free(ebpo_skeleton *k)
  * covers (docs/develop/bounds.md, "Points against skeletons"). */
 static const double certainly = 1 - 0x1p-40;
 
-/* Returns a squared lower bound by |p - x|^2 >= (N(p) - radius)^2 + (along - [from, to])^2, as in
- * the kernels. `to` is the position of p relative to the middle of the box. */
+/* Returns a squared lower bound of the distance to a cylinder, as in nearest_kernels.c. `to` is the
+ * position of p relative to the middle of the box. */
 static double by_cylinder(const ebpo_child_cylinder *cylinder, const double to[3])
 {
     double along = 0, square = 0;
@@ -177,8 +179,7 @@ static double by_cylinder(const ebpo_child_cylinder *cylinder, const double to[3
         square += to[k] * to[k];
     }
     double over = fmax(fmax(cylinder->from - along, along - cylinder->to), 0);
-    /* less than the true value, so that the root of a small difference of large squares is a lower
-     * bound */
+    /* the factor makes the root of a small difference of large squares a lower bound */
     double aside2 = fmax(square * (1 - 0x1p-48) - along * along, 0);
     double aside = fmax(sqrt(aside2) - cylinder->radius, 0);
     return aside * aside + over * over;
@@ -218,14 +219,15 @@ typedef struct nearest_place {
     uint32_t *place;
 } nearest_place;
 
-/* Searches below these children of a node for a child nearer than `best`. Bounding cylinders are
- * tested only where boxes do not decide. */
+/* Searches, below the children of a node in `lanes`, for the nearest child whose node is not in the
+ * skeleton, nearer than `best`. Visits the nearest child first; tests its bounding cylinder only if
+ * its box is near enough. `parent`: squared bound of the node. */
 static void search_below(const ebpo_skeleton *k, uint32_t number, unsigned lanes, const double p[3],
                          double parent, nearest_place *best)
 {
     kept_node *n = node_at(k, number);
     double lower2[8];
-    unsigned reported = 0;
+    unsigned tested = 0; /* lanes whose bound includes the cylinder */
     by_boxes(&n->bound, p, lower2);
     lanes &= (1u << n->bound.count) - 1;
     while (lanes) {
@@ -235,8 +237,8 @@ static void search_below(const ebpo_skeleton *k, uint32_t number, unsigned lanes
                 lane = other;
         if (lower2[lane] >= best->lower2)
             break;
-        if (!(reported >> lane & 1)) {
-            reported |= 1u << lane;
+        if (!(tested >> lane & 1)) {
+            tested |= 1u << lane;
             lower2[lane] = fmax(fmax(lower2[lane], parent), by_child_cylinder(n, lane, p));
             continue;
         }
@@ -249,13 +251,13 @@ static void search_below(const ebpo_skeleton *k, uint32_t number, unsigned lanes
     }
 }
 
-/* Transforms a point to the frame. Returns false if it is too far; p is then not valid. */
+/* Transforms a point to the frame. If it is too far, sets p to 0 and returns false. */
 static bool to_frame(const ebpo_skeleton *k, const double point[3], double p[3])
 {
     bool near = true;
     for (int i = 0; i < 3; i++) {
         p[i] = (point[i] - k->centre[i]) * k->scale;
-        near = near && fabs(p[i]) < place_max;
+        near = near && fabs(p[i]) < coordinate_max;
     }
     for (int i = 0; i < 3 && !near; i++)
         p[i] = 0;
@@ -265,10 +267,12 @@ static bool to_frame(const ebpo_skeleton *k, const double point[3], double p[3])
 /* Returns the square of the limit in the frame, rounded up. */
 static double frame_limit2(const ebpo_skeleton *k, double limit)
 {
-    double most = limit * k->scale * (1 + 0x1p-38);
-    return most < place_max ? most * most * (1 + 0x1p-38) + DBL_MIN : INFINITY;
+    double local = limit * k->scale * (1 + 0x1p-38);
+    return local < coordinate_max ? local * local * (1 + 0x1p-38) + DBL_MIN : INFINITY;
 }
 
+/* Returns a lower bound of the distance to the faces below the children of the topmost node in
+ * `lanes`; INFINITY: there are none within the limit. */
 static double lower_bound(const ebpo_skeleton *k, unsigned lanes, const double p[3], double limit2)
 {
     nearest_place best = { limit2, NULL };
@@ -319,10 +323,10 @@ ebpo_skeleton_bounds ebpo_skeleton_far_bounds(const ebpo_skeleton *k, const ebpo
                                               double limit)
 {
     const ebpo_bound *top = &node_at(k, 0)->bound;
-    double reach = 1, beyond = nextafter(limit, INFINITY);
+    double largest = 1, beyond = nextafter(limit, INFINITY);
     for (int i = 0; i < 3; i++)
-        reach = fmax(reach, fabs((double)top->origin[i]) + 255 * (double)top->step[i]);
-    far_search owned = { k, far, ebpo_far_frame_of(far, k->centre, k->scale, reach), beyond },
+        largest = fmax(largest, fabs((double)top->origin[i]) + 255 * (double)top->step[i]);
+    far_search owned = { k, far, ebpo_far_frame_of(far, k->centre, k->scale, largest), beyond },
                shared = owned;
     search_below_far(&owned, 0, k->owned);
     search_below_far(&shared, 0, k->shared);
@@ -330,9 +334,9 @@ ebpo_skeleton_bounds ebpo_skeleton_far_bounds(const ebpo_skeleton *k, const ebpo
                                    k->shared ? shared.best : INFINITY };
 }
 
-/* Allocates the next part of nodes if needed. Returns false if the skeleton has its maximum size,
- * or without memory. */
-static bool has_place(ebpo_skeleton *k, bool (*take)(void *user, uint64_t bytes), void *user)
+/* Makes space for another node: allocates the next part of nodes if needed. Returns false if the
+ * skeleton has its maximum size, or without memory. */
+static bool reserve_node(ebpo_skeleton *k, bool (*take)(void *user, uint64_t bytes), void *user)
 {
     unsigned part = k->count / PART_NODES;
     if (k->first < PART_NODES || part >= PARTS)
@@ -355,7 +359,7 @@ void ebpo_skeleton_grow(ebpo_skeleton *k, const ebpo_accel *s, const double poin
     for (int added = 0; added < GROWN_AT_ONCE; added++) {
         nearest_place best = { limit2, NULL };
         search_below(k, 0, k->owned, p, 0, &best);
-        if (!best.place || *best.place & EBPO_IS_BLOCK || !has_place(k, take, user))
+        if (!best.place || *best.place & EBPO_IS_BLOCK || !reserve_node(k, take, user))
             return;
         keep_child(k, s, best.place);
     }
@@ -374,7 +378,8 @@ static ebpo_shared_box box_of(const ebpo_skeleton *k, const ebpo_bound *b, int l
     return out;
 }
 
-/* Writes the boxes of a node's children, and of the nodes right below it. */
+/* Writes the boxes of those children of a node, and of nodes of the skeleton below it, that may be
+ * within the limit and whose own nodes are not in the skeleton. Returns their number. */
 static unsigned boxes_of(const ebpo_skeleton *k, uint32_t number, unsigned lanes, const double p[3],
                          double limit2, ebpo_shared_box out[])
 {
@@ -412,9 +417,9 @@ struct ebpo_skeletons {
     ebpo_cache *cache;    /* the cache whose budget is used, or NULL */
     unsigned nodes;       /* initial number of nodes of each skeleton */
     pthread_mutex_t lock; /* protects the changing fields; searches do not wait for it */
-    uint64_t left;        /* number of subtrees without a skeleton */
+    uint64_t missing;     /* number of subtrees without a skeleton */
     _Atomic uint64_t bytes;
-    _Atomic(ebpo_skeleton *) of[];
+    _Atomic(ebpo_skeleton *) of[]; /* [count] NULL: none */
 };
 
 static uint64_t frame_bytes(uint64_t count)
@@ -451,7 +456,7 @@ static bool reserve_capacity(ebpo_skeletons *all, uint64_t bytes, uint64_t later
 static bool reserve_more(void *user, uint64_t bytes)
 {
     ebpo_skeletons *all = user;
-    return reserve_capacity(all, bytes, all->left * ebpo_skeleton_bytes(all->nodes));
+    return reserve_capacity(all, bytes, all->missing * ebpo_skeleton_bytes(all->nodes));
 }
 
 ebpo_skeletons *ebpo_skeletons_make(uint64_t count, uint64_t space, ebpo_cache *cache)
@@ -459,7 +464,7 @@ ebpo_skeletons *ebpo_skeletons_make(uint64_t count, uint64_t space, ebpo_cache *
     ebpo_skeletons *all = ebpo_alloc_zero(1, frame_bytes(count));
     if (!all)
         return NULL;
-    all->count = all->left = count;
+    all->count = all->missing = count;
     all->space = space;
     all->cache = cache;
     all->nodes = nodes_each(count, space);
@@ -507,10 +512,10 @@ void ebpo_skeletons_keep(ebpo_skeletons *all, uint64_t number, const ebpo_accel 
         return;
     ebpo_skeleton *made = ebpo_skeleton_make(subtree, all->nodes);
     pthread_mutex_lock(&all->lock);
-    /* another thread may have loaded the subtree, too: with planes */
+    /* another thread may have loaded the same subtree at the same time, with planes */
     if (made && !all->of[number] && reserve_capacity(all, ebpo_skeleton_bytes(made->first), 0)) {
         atomic_store_explicit(&all->of[number], made, memory_order_release);
-        all->left--;
+        all->missing--;
         made = NULL;
     }
     pthread_mutex_unlock(&all->lock);

@@ -1,11 +1,11 @@
 /* Reads a subtree as plain arrays, for ebpo/subtree.h.
  *
- * A node is found by its octcode (locational code). The part below it is read as a slice, if an
- * upper bound of its memory, computed from counts, is within the caller's limit. The slice has an
- * array for each type of node. From these, this file makes arrays with a row for each node, faces
- * with corners and numbers, and lists of leaves. A single node can then be described in the model's
- * coordinates: the half-spaces that it inherits from all nodes above it, and the polygons of its
- * envelope. */
+ * A node is found by its octcode (locational code). The subtree below it is read as a slice
+ * (format/slice.h), if an upper bound of the memory, computed from counts, is within the caller's
+ * limit. A slice has separate arrays for each type of node. From them, this file makes arrays with
+ * a row for each node, arrays of faces, and the leaves' lists of faces. A single node can then be
+ * described in the model's coordinates: the half-spaces that it inherits from all nodes above it,
+ * and the polygons of its envelope. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -44,10 +44,9 @@ struct ebpo_subtree {
     bool has_leaf_planes;  /* leaves have stored planes */
     uint32_t *plane_first; /* [node_count + 1] */
     uint32_t *planes;
-    uint32_t above_first[EBPO_LEVELS_MAX + 1];
+    uint32_t above_first[EBPO_LEVELS_MAX + 1]; /* as in ebpo_subtree_nodes */
     uint32_t *above_planes;
-    /* Faces; no_faces: the reason if there are none. */
-    const char *no_faces;
+    const char *no_faces; /* reason why no faces were read; NULL: faces were read */
     uint32_t shared_count;
     ebpo_mesh mesh;
     float *corners32;
@@ -59,7 +58,8 @@ struct ebpo_subtree {
 
 /* --- capacity --- */
 
-/* Returns true for the group of a pruned node; in subsets it replaces eight missing nodes. */
+/* Returns true if the group belongs to a pruned node. In subsets, such a group replaces eight nodes
+ * that are not in the file. */
 static bool is_pruned_group(const ebpo_slice *slice, int level, uint64_t group)
 {
     return level && slice->pruned && slice->level[level].types[group] == 0;
@@ -110,17 +110,18 @@ static ebpo_status reserve_space(ebpo_subtree *s, uint64_t planes, ebpo_error *e
     bytes += (s->solid ? nodes * sizeof *s->windings : 0) +
              (s->has_planes ? (nodes + 1 + planes) * sizeof *s->planes : 0);
     s->memory += sizeof *s + bytes + s->above_first[s->root.cell.level] * sizeof *s->planes;
-    bool fine = s->octcodes && s->types && s->children && (s->windings || !s->solid) &&
-                ((s->plane_first && s->planes) || !s->has_planes);
-    return fine ? EBPO_OK : ebpo_fail_memory(error, bytes);
+    bool allocated = s->octcodes && s->types && s->children && (s->windings || !s->solid) &&
+                     ((s->plane_first && s->planes) || !s->has_planes);
+    return allocated ? EBPO_OK : ebpo_fail_memory(error, bytes);
 }
 
 /* --- one level --- */
 
-/* Running counts through a level's arrays. */
-typedef struct place {
+/* Position in a level's arrays: the numbers of nodes of each type, planes and leaf planes so far.
+ */
+typedef struct level_position {
     uint64_t rank[4], plane, leaf_plane;
-} place;
+} level_position;
 
 static int32_t winding_of(const ebpo_level *level, ebpo_node_type type, uint64_t rank)
 {
@@ -132,8 +133,9 @@ static int32_t winding_of(const ebpo_level *level, ebpo_node_type type, uint64_t
     }
 }
 
-static void copy_planes(ebpo_subtree *s, const ebpo_level *level, ebpo_node_type type, place *at,
-                        uint64_t node)
+/* Copies the planes of the next gray node or leaf of its type. */
+static void copy_planes(ebpo_subtree *s, const ebpo_level *level, ebpo_node_type type,
+                        level_position *at, uint64_t node)
 {
     uint32_t next = s->plane_first[node], count = 0;
     uint64_t rank = at->rank[type];
@@ -153,7 +155,7 @@ static void copy_planes(ebpo_subtree *s, const ebpo_level *level, ebpo_node_type
 }
 
 static void add_node(ebpo_subtree *s, const ebpo_level *level, ebpo_node_type type,
-                     uint64_t octcode, place *at, uint64_t node)
+                     uint64_t octcode, level_position *at, uint64_t node)
 {
     s->octcodes[node] = octcode;
     s->types[node] = (uint8_t)type;
@@ -170,7 +172,7 @@ static void add_node(ebpo_subtree *s, const ebpo_level *level, ebpo_node_type ty
 static void copy_level(ebpo_subtree *s, const ebpo_slice *slice, int i)
 {
     const ebpo_level *level = &slice->level[i];
-    place at = { .plane = 0 };
+    level_position at = { .plane = 0 };
     uint64_t node = s->level_first[i], group = 0;
     for (uint64_t parent = s->level_first[i - 1]; parent < s->level_first[i]; parent++) {
         if (s->types[parent] != EBPO_GRAY)
@@ -186,11 +188,11 @@ static void copy_level(ebpo_subtree *s, const ebpo_slice *slice, int i)
     }
 }
 
-/* Copies nodes, windings and planes from the slice; reuses its arrays where possible. */
+/* Copies nodes, winding numbers and planes from the slice. */
 static ebpo_status copy_nodes(ebpo_subtree *s, const ebpo_slice *slice, ebpo_error *error)
 {
     uint64_t planes;
-    place at = { .plane = 0 };
+    level_position at = { .plane = 0 };
     ebpo_status status = count_nodes(s, slice, &planes, error);
     if (status == EBPO_OK)
         status = reserve_space(s, planes, error);
@@ -206,7 +208,8 @@ static ebpo_status copy_nodes(ebpo_subtree *s, const ebpo_slice *slice, ebpo_err
 
 /* --- faces --- */
 
-/* Copies a leaf's list: its references, then its new faces, which have higher numbers. */
+/* Copies a leaf's list: its references, then its new faces, which have greater indices. *ref:
+ * position in the level's references; *next: position in s->list. */
 static void copy_list(ebpo_subtree *s, const ebpo_level *level, uint64_t leaf, uint64_t *ref,
                       uint64_t *next)
 {
@@ -241,6 +244,7 @@ static ebpo_status copy_lists(ebpo_subtree *s, const ebpo_slice *slice, ebpo_err
     return EBPO_OK;
 }
 
+/* Makes the file indices of the faces. */
 static ebpo_status copy_indices(ebpo_subtree *s, const ebpo_slice *slice, ebpo_error *error)
 {
     uint64_t count = s->mesh.face_count;
@@ -253,6 +257,7 @@ static ebpo_status copy_indices(ebpo_subtree *s, const ebpo_slice *slice, ebpo_e
     return EBPO_OK;
 }
 
+/* Makes the array of corners: the coordinates of each face. */
 static ebpo_status gather_corners(ebpo_subtree *s, ebpo_error *error)
 {
     const ebpo_mesh *mesh = &s->mesh;
@@ -269,7 +274,7 @@ static ebpo_status gather_corners(ebpo_subtree *s, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Copies faces and lists. */
+/* Takes the faces from the slice, and copies the lists of leaves. */
 static ebpo_status copy_faces(ebpo_subtree *s, ebpo_slice *slice,
                               const ebpo_subtree_options *options, ebpo_error *error)
 {
@@ -335,7 +340,7 @@ ebpo_status ebpo_subtree_get_faces(const ebpo_subtree *s, ebpo_subtree_faces *ou
 
 struct subtree_scratch {
     ebpo_envelope_stack envelopes;
-    ebpo_polytope leaf;
+    ebpo_polytope leaf; /* envelope of a leaf, cut by derived planes */
     ebpo_node_buffers lent;
     double inherited[EBPO_HALF_SPACES_MAX][4];
     ebpo_triangle *faces; /* faces of the leaf that is described */
@@ -351,8 +356,9 @@ static void subtree_free_scratch(subtree_scratch *scratch)
 
 /* --- the path from the tree's root to a node --- */
 
-/* Returns the planes of the node at this level on the path to `octcode`. If the level is in the
- * subtree, `node` is the number of that node, and is set to the number of the next node. */
+/* Returns the planes of the node at this level on the path from the tree's root to `octcode`. If
+ * the node is in the subtree, *node must be its number, and is set to the number of the path's next
+ * node. */
 static const uint32_t *planes_on_path(const ebpo_subtree *s, uint64_t octcode, int level,
                                       uint64_t *node, uint32_t *count)
 {
@@ -373,6 +379,7 @@ static const uint32_t *planes_on_path(const ebpo_subtree *s, uint64_t octcode, i
     return s->planes + s->plane_first[at];
 }
 
+/* Sets the half-spaces of all nodes above the node, in the model's coordinates. */
 static void add_inherited(ebpo_subtree *s, uint64_t octcode, ebpo_subtree_node *out)
 {
     ebpo_cell cell = ebpo_cell_of_octcode(octcode);
@@ -390,8 +397,8 @@ static void add_inherited(ebpo_subtree *s, uint64_t octcode, ebpo_subtree_node *
     out->inherited = (const double(*)[4])s->scratch->inherited;
 }
 
-/* Returns the node's envelope by stored planes, without the planes that are derived from a leaf's
- * faces. */
+/* Returns the node's envelope, cut by the planes in the file only. (Planes that are derived from a
+ * leaf's faces: derive_planes.) */
 static const ebpo_polytope *stored_envelope(ebpo_subtree *s, uint64_t octcode, ebpo_node_type type)
 {
     ebpo_envelope_stack *stack = &s->scratch->envelopes;
@@ -401,18 +408,19 @@ static const ebpo_polytope *stored_envelope(ebpo_subtree *s, uint64_t octcode, e
     if (type == EBPO_BLACK)
         return ebpo_envelope_put_cube(stack, octcode);
     for (int level = 0; level <= last; level++) {
-        ebpo_octcode own = octcode >> 3 * (last - level);
+        ebpo_octcode ancestor = octcode >> 3 * (last - level);
         uint32_t count;
         const uint32_t *codes = planes_on_path(s, octcode, level, &node, &count);
-        envelope = ebpo_envelope_held(stack, own);
+        envelope = ebpo_envelope_held(stack, ancestor);
         if (!envelope)
-            envelope = ebpo_envelope_put(stack, own, codes, count);
+            envelope = ebpo_envelope_put(stack, ancestor, codes, count);
     }
     return envelope;
 }
 
 /* --- leaves --- */
 
+/* Gathers the faces of a leaf in the scratch memory. */
 static ebpo_status gather_faces(ebpo_subtree *s, uint64_t leaf, uint64_t *count, ebpo_error *error)
 {
     subtree_scratch *scratch = s->scratch;
@@ -518,7 +526,7 @@ static ebpo_status fail_uniform(const ebpo_chunks *chunks, uint64_t octcode, ebp
                           octcode, found, type);
 }
 
-/* Checks that the cursor's node can be opened. */
+/* Returns an error if the cursor's node cannot be opened. */
 static ebpo_status check_found(const ebpo_chunks *chunks, uint64_t octcode, bool or_leaf_above,
                                ebpo_cursor *c, ebpo_error *error)
 {
@@ -582,7 +590,8 @@ static ebpo_status read_planes_above(ebpo_subtree *s, ebpo_cursor *c, ebpo_error
 
 /* --- memory --- */
 
-/* Bytes of decoded chunks while reading: a quarter of the limit, within these values. */
+/* Limits of the bytes for decoded chunks while reading, which are a quarter of the caller's limit.
+ */
 enum { CHUNKS_LEAST = 2 << 20, CHUNKS_MAX = 32 << 20 };
 
 static uint64_t chunk_budget(uint64_t memory)
@@ -606,7 +615,8 @@ static uint64_t bound_bytes(const ebpo_slice_size *size, const ebpo_info *info, 
                             bool corners)
 {
     enum {
-        NODE = 32,      /* bytes of a node: octcode, type, winding, children, planes, list; winding
+        /* bytes of each item */
+        NODE = 32,      /* of a node: octcode, type, winding, children, planes, list; winding
                          * in the slice */
         GROUP = 4,      /* of a group: types, plane counts */
         LEAF = 24,      /* of a leaf: data of a level */
@@ -625,8 +635,9 @@ static uint64_t bound_bytes(const ebpo_slice_size *size, const ebpo_info *info, 
            (whole ? 0 : 3 * faces * OLDER) + vertices * 3 * number;
 }
 
-/* Counts references to faces that are new before the subtree: an upper bound of the number of
- * shared faces. Reads the lists, of which most are references within the subtree. */
+/* Counts the references to faces that precede the subtree's faces in the file: an upper bound of
+ * the number of shared faces. (Most references are to faces that the subtree owns, so the number of
+ * all references would be a much greater bound.) Reads the lists. */
 static ebpo_status count_shared(const ebpo_subtree *s, ebpo_chunks *chunks, uint64_t *shared,
                                 ebpo_error *error)
 {
@@ -638,7 +649,7 @@ static ebpo_status count_shared(const ebpo_subtree *s, ebpo_chunks *chunks, uint
                               EBPO_SLICE_ALL, error);
     if (status != EBPO_OK)
         return status;
-    for (int i = 0; i < lists.level_count; i++) /* numbers are ascending within a level */
+    for (int i = 0; i < lists.level_count; i++) /* leaf_first is ascending within a level */
         if (lists.level[i].leaf_count && lists.level[i].leaf_first[0] < first)
             first = lists.level[i].leaf_first[0];
     for (int i = 0; i < lists.level_count; i++)
@@ -677,7 +688,7 @@ static ebpo_status check_memory(const ebpo_subtree *s, ebpo_chunks *chunks, uint
 
 /* --- reading --- */
 
-/* Returns the parts of the file that are wanted; sets `no_faces`. */
+/* Returns the parts of the file that must be read; sets s->no_faces. */
 static uint32_t choose_needs(ebpo_subtree *s, const ebpo_subtree_options *o, uint32_t parts)
 {
     uint32_t most = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES,
