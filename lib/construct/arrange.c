@@ -1,5 +1,5 @@
-/* Sorts a mesh's vertices and faces along a Morton curve. Afterwards the vertices of every cell are
- * one run, and neighbours in space are neighbours in memory.
+/* Sorts a mesh's vertices and faces along a Morton curve. Afterwards, the vertices of every cell
+ * are one contiguous range, and neighbours in space are neighbours in memory.
  *
  * The curve's box is chosen first: every cell face has to be exact in doubles, at every level in
  * use. Vertices are sorted by the octcode of their cell and, within a cell, by position, so that
@@ -29,15 +29,17 @@ enum { GRAIN = 1 << 15 };
 typedef struct arranging {
     ebpo_mesh *mesh;
     unsigned threads;
-    bool together; /* true: vertices are sorted by position, referenced or not */
+    bool all_by_position; /* false: unreferenced vertices come after all others */
     const ebpo_progress *progress;
-    uint8_t *referenced;    /* bit v: a face uses vertex v */
-    double (*bounds)[2][3]; /* bounds of each GRAIN of vertices */
-    struct ebpo_arrangement *to;
-    float *xyz32;
+    uint8_t *referenced;         /* bit v: a face uses vertex v */
+    double (*bounds)[2][3];      /* box around the referenced vertices of each GRAIN of vertices */
+    struct ebpo_arrangement *to; /* result */
+    float *xyz32; /* sorted coordinates: floats or doubles; the other array is NULL */
     double *xyz64;
-    uint32_t *rank, *corners, *faces;
-    /* the window of `rank`: vertices with these old numbers */
+    uint32_t *corners; /* faces in their old order, with the vertices' new indices */
+    uint32_t *faces;   /* sorted faces */
+    /* [rank_count] new indices of the vertices with the old indices rank_first, ... */
+    uint32_t *rank;
     uint64_t rank_first, rank_count;
 } arranging;
 
@@ -97,19 +99,20 @@ static ebpo_status find_bounds(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-/* Chooses the deepest level at which the condition of exact cell faces hardly enlarges the box.
- * Around a small model far from the origin, this condition can enlarge the box much. */
+/* Makes the root box. Cell faces must be exact in doubles down to `level`; around a small model far
+ * from the origin, this condition can enlarge the box much. With level -1, takes the deepest level
+ * at which it hardly enlarges the box. */
 static bool choose_box(ebpo_box *out, const double min[3], const double max[3], int level)
 {
-    static const double larger = 1 + 0x1p-16;
+    static const double allowed = 1 + 0x1p-16; /* ratio of sizes */
     ebpo_box least;
     if (level >= 0)
         return ebpo_box_make(out, min, max, level);
     if (!ebpo_box_make(&least, min, max, 0))
         return false;
     for (int deep = EBPO_MAX_LEVEL; deep > 0; deep--)
-        if (ebpo_box_make(out, min, max, deep) && out->size[0] <= least.size[0] * larger &&
-            out->size[1] <= least.size[1] * larger && out->size[2] <= least.size[2] * larger)
+        if (ebpo_box_make(out, min, max, deep) && out->size[0] <= least.size[0] * allowed &&
+            out->size[1] <= least.size[1] * allowed && out->size[2] <= least.size[2] * allowed)
             return true;
     *out = least;
     return true;
@@ -137,25 +140,26 @@ static ebpo_status measure_all(arranging *a, int level, ebpo_error *error)
             min[k] = fmin(min[k], a->bounds[i][0][k]);
             max[k] = fmax(max[k], a->bounds[i][1][k]);
         }
-    double most = 0;
+    double greatest = 0;
     for (int k = 0; k < 3; k++)
-        most = fmax(most, fmax(fabs(min[k]), fabs(max[k])));
+        greatest = fmax(greatest, fmax(fabs(min[k]), fabs(max[k])));
     if (!choose_box(&a->to->box, min, max, level))
         return ebpo_fail_file(
             error, EBPO_E_LIMIT, ebpo_mesh_label(mesh),
-            "coordinates up to %g are too large for an exact grid; scale the model", most);
+            "coordinates up to %g are too large for an exact grid; scale the model", greatest);
     return EBPO_OK;
 }
 
 /* --- vertices --- */
 
+/* What is sorted for each vertex. */
 typedef struct vertex_record {
-    uint64_t key;
-    uint32_t at, unused; /* index in the mesh before sorting */
+    uint64_t key;        /* key_of */
+    uint32_t at, unused; /* at: index in the mesh before sorting */
     double p[3];
 } vertex_record;
 
-/* Vertex record with the bits of floats, in 24 bytes. */
+/* As vertex_record, for float coordinates, in 24 bytes. */
 typedef struct float_record {
     uint64_t key;
     uint32_t at;
@@ -164,7 +168,7 @@ typedef struct float_record {
 
 /* Returns the index of the cell that contains a coordinate. The division may round to the wrong
  * side of a cell face; the comparison with the exact cell face corrects this. */
-static uint32_t cell_slot(const ebpo_box *box, int axis, int level, double x)
+static uint32_t cell_index(const ebpo_box *box, int axis, int level, double x)
 {
     double cells = (double)(1u << level), at = (x - box->origin[axis]) / (box->size[axis] / cells);
     uint32_t k = at <= 0 ? 0 : at >= cells ? (1u << level) - 1 : (uint32_t)at;
@@ -175,8 +179,8 @@ static uint32_t cell_slot(const ebpo_box *box, int axis, int level, double x)
     return k;
 }
 
-/* Returns an octcode (locational code), shifted as if it were of level 20, so that its leading bits
- * are always at the same position. Vertices without faces come after all others. */
+/* Returns the octcode of the vertex's cell, shifted so that its leading bit is always at the same
+ * position; with the bit UNREFERENCED for a vertex that must come after all others. */
 static uint64_t key_of(const arranging *a, uint64_t v)
 {
     const ebpo_box *box = &a->to->box;
@@ -184,9 +188,9 @@ static uint64_t key_of(const arranging *a, uint64_t v)
     ebpo_mesh_position(a->mesh, v, p);
     ebpo_cell cell = { box->grid_level, { 0, 0, 0 } };
     for (int k = 0; k < 3; k++)
-        cell.at[k] = cell_slot(box, k, cell.level, p[k]);
+        cell.at[k] = cell_index(box, k, cell.level, p[k]);
     return ebpo_octcode_of_cell(cell) << 3 * (EBPO_MAX_LEVEL - box->grid_level) |
-           (a->together || is_referenced(a, v) ? 0 : UNREFERENCED);
+           (a->all_by_position || is_referenced(a, v) ? 0 : UNREFERENCED);
 }
 
 static ebpo_status make_vertices(void *context, uint64_t begin, uint64_t end, void *records,
@@ -209,8 +213,8 @@ static ebpo_status make_vertices(void *context, uint64_t begin, uint64_t end, vo
     return EBPO_OK;
 }
 
-/* Orders vertices of one cell by position, so that equal ones are neighbours; then by their old
- * order. */
+/* Orders vertices of one cell by position, so that vertices with equal positions are neighbours;
+ * then by their old indices `a` and `b`. */
 static int compare_points(const double p[3], const double q[3], uint32_t a, uint32_t b)
 {
     for (int k = 0; k < 3; k++)
@@ -260,8 +264,8 @@ static ebpo_status sort_vertices(arranging *a, ebpo_error *error)
     uint64_t n = mesh->vertex_count;
     for (uint64_t v = 0; v < n; v++)
         a->to->referenced += is_referenced(a, v);
-    a->to->grouped = a->together || a->to->referenced == n;
-    bool ordered = !a->together || a->to->referenced == n;
+    a->to->grouped = a->all_by_position || a->to->referenced == n;
+    bool ordered = !a->all_by_position || a->to->referenced == n;
     a->to->key = ordered ? ebpo_array_alloc(mesh->workspace, n, sizeof *a->to->key) : NULL;
     a->to->vertex_source = ebpo_array_alloc(mesh->workspace, n, sizeof *a->to->vertex_source);
     a->xyz32 = mesh->xyz32 ? ebpo_array_alloc(mesh->workspace, n, 3 * sizeof *a->xyz32) : NULL;
@@ -282,7 +286,7 @@ static ebpo_status sort_vertices(arranging *a, ebpo_error *error)
     return ebpo_sort_run(&sort, error);
 }
 
-/* --- faces: translated to the vertices' new numbers, then sorted by the least of these --- */
+/* --- faces: get the vertices' new indices, and are then sorted by the least of them --- */
 
 static ebpo_status fill_ranks(void *context, uint64_t begin, uint64_t end, unsigned worker,
                               ebpo_error *error)
@@ -349,7 +353,8 @@ static ebpo_status translate_faces(arranging *a, uint64_t *passes, ebpo_error *e
 }
 
 typedef struct face_record {
-    /* least vertex << 32 | number in the source: the result does not depend on the old order */
+    /* least vertex << 32 | index in the source, so that the result does not depend on the old order
+     */
     uint64_t key;
     uint32_t corner[3], unused;
 } face_record;
@@ -418,8 +423,8 @@ static ebpo_status sort_faces(arranging *a, ebpo_error *error)
 
 /* --- the whole mesh --- */
 
-/* Composes the maps of a mesh that was arranged already: the source indices of vertices come from
- * its map. The source indices of faces were part of the sort keys. */
+/* Converts old indices of vertices in `map` to source indices, if the mesh was arranged before.
+ * (For faces, the sort keys contain source indices.) */
 static void compose_maps(const struct ebpo_arrangement *before, ebpo_workspace *workspace,
                          uint32_t *map, uint64_t count)
 {
@@ -427,6 +432,7 @@ static void compose_maps(const struct ebpo_arrangement *before, ebpo_workspace *
         map[i] = before->vertex_source[map[i]];
 }
 
+/* Replaces the mesh's arrays by the sorted arrays. */
 static void put_in_place(arranging *a)
 {
     ebpo_mesh *mesh = a->mesh;
@@ -498,7 +504,7 @@ ebpo_status ebpo_arrange_to_repair(ebpo_mesh *mesh, unsigned threads, const ebpo
     return arrange_by_curve((arranging){ .mesh = mesh,
                                          .threads = ebpo_thread_count(threads),
                                          .progress = progress,
-                                         .together = true },
+                                         .all_by_position = true },
                             -1, error);
 }
 

@@ -1,5 +1,6 @@
 /* Defines the builder's state, which its stages share. Before the stages, vertices and faces are
- * arranged along the Morton curve. The stages are:
+ * arranged along the Morton curve. A piece is a subtree that one thread builds; the top is the
+ * nodes above all pieces. The stages are:
  *   1. The top of the tree:
  *      - partition assigns faces to the pieces into which the tree is cut;
  *      - corner_windings computes winding numbers;
@@ -9,13 +10,13 @@
  *      - partition assigns faces to cells;
  *      - face_numbers numbers the faces;
  *      - emit_levels computes envelopes and the piece's part of each level;
- *      - pieces moves the results to the store.
+ *      - pieces moves these results to the store.
  *   3. The entire tree:
  *      - emit_levels joins the levels' arrays;
  *      - face_numbers computes the final numbers of the vertices.
  *
- * A piece is a subtree. The top is its only source of data about other pieces. Its only results are
- * its part of the levels and the numbers of its faces. */
+ * A piece gets data about other pieces only from the top. Its only results are its part of the
+ * levels and the final indices of its faces. */
 #ifndef EBPO_CONSTRUCT_BUILDER_H
 #define EBPO_CONSTRUCT_BUILDER_H
 
@@ -37,28 +38,31 @@
 typedef struct ebpo_build_node {
     uint8_t type;   /* ebpo_node_type; empty nodes are EBPO_WHITE */
     uint32_t child; /* gray: index of the first of eight children */
-    /* gray and leaf: index into details; a subtree below the top: its number */
+    /* gray node or leaf: index in `details`; leaf of the top: index of a piece in ebpo_builder.sub
+     */
     uint32_t detail;
 } ebpo_build_node;
 
 typedef struct ebpo_build_detail {
     /* corner differences: winding numbers of the corners minus the winding number of corner 0 */
     int32_t delta[8];
-    /* range in `entries`: list of the leaf, or lists of all leaves below the gray node */
+    /* range in `entries`: list of the leaf, or lists of all leaves below the gray node; in the top:
+     * range of the pieces below the gray node */
     uint64_t entry_begin, entry_end;
-    /* gray: faces that are not entirely inside the cell, in `crossing` */
+    /* gray: range in `crossing`: faces that are not entirely inside the cell */
     uint64_t cross_begin, cross_end;
-    uint32_t first, new_count; /* leaf: final number of its first new face */
+    uint32_t first, new_count; /* leaf: final index of its first new face; number of new faces */
 } ebpo_build_detail;
 
 /* A piece, or the top of the tree. Its nodes are stored depth first; nodes[0] is the root. */
 typedef struct ebpo_branch {
     ebpo_cell cell;
-    /* faces that touch the cell, ascending; NULL for the top, whose entries are face numbers */
+    /* [list_count] indices of the faces that touch the cell, ascending; NULL for the top, whose
+     * `crossing` has indices of faces */
     uint32_t *list;
     uint64_t list_count;
     uint8_t *fresh;              /* bit i: no piece before this one lists face list[i] */
-    uint64_t fresh_count, first; /* number of fresh faces; final number of the first of them */
+    uint64_t fresh_count, first; /* number of these fresh faces; final index of the first one */
     ebpo_build_node *nodes;
     uint64_t node_count, node_capacity;
     ebpo_build_detail *details;
@@ -77,8 +81,8 @@ typedef struct ebpo_branch {
     ebpo_workspace *workspace;        /* the builder's workspace, for all arrays */
 } ebpo_branch;
 
-/* Boxes around runs of vertices, in a hierarchy: a block has 16 vertices, or 16 blocks of the level
- * below. */
+/* Boxes around ranges of vertices, in a hierarchy: a block has 16 vertices, or 16 blocks of the
+ * level below. */
 enum { EBPO_BOUNDS_FAN = 16, EBPO_BOUNDS_LEVELS = 8 };
 typedef struct ebpo_bounds {
     double (*box[EBPO_BOUNDS_LEVELS])[2][3]; /* box[k][i]: box of vertices [i * 16^(k+1), ...) */
@@ -100,7 +104,7 @@ typedef struct ebpo_builder {
     const uint64_t *key; /* octcode of the vertex's cell at box.grid_level, ascending */
     const uint32_t (*face)[3];
     ebpo_bounds bounds;
-    uint32_t *number; /* final number of each face; a piece sets the numbers of its fresh faces */
+    uint32_t *number; /* [face] final index; a piece sets the indices of its fresh faces */
     /* the nodes above the pieces; `detail` of a leaf of the top is the index of a piece in `sub` */
     ebpo_branch top;
     ebpo_branch *sub; /* [sub_count] the pieces */
@@ -117,7 +121,7 @@ static inline void ebpo_build_triangle(const ebpo_builder *b, uint32_t face, ebp
         ebpo_mesh_position(b->mesh, b->face[face][i], out->corner[i]);
 }
 
-/* Returns the face of an entry of a piece or of the top. */
+/* Returns the index of a face from an entry of a piece, or from `crossing` of the top. */
 static inline uint32_t ebpo_branch_face(const ebpo_branch *s, uint32_t entry)
 {
     return s->list ? s->list[entry] : entry;

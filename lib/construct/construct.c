@@ -41,6 +41,7 @@ static int level_limit(const ebpo_mesh_report *report)
     return level;
 }
 
+/* Returns an error if a text option is too long for ebpo_info or has control characters. */
 static ebpo_status check_text(const char *name, const char *text, size_t capacity,
                               ebpo_error *error)
 {
@@ -102,8 +103,8 @@ static void copy_name(char *to, const char *from)
         bool valid = length > 0 && c[0] >= 32 && c[0] != 127;
         for (int i = 1; i < length && valid; i++)
             valid = (c[i] & 0xc0) == 0x80;
-        /* Not valid: control characters of Latin 1, overlong sequences, surrogates, code points
-         * beyond Unicode. */
+        /* invalid: control characters of Latin 1, overlong sequences, surrogates, code points
+         * beyond Unicode */
         if ((c[0] == 0xc2 && c[1] < 0xa0) || (c[0] == 0xe0 && c[1] < 0xa0) ||
             (c[0] == 0xed && c[1] >= 0xa0) || (c[0] == 0xf0 && c[1] < 0x90) ||
             (c[0] == 0xf4 && c[1] >= 0x90))
@@ -154,7 +155,7 @@ static void fill_info(ebpo_info *info, const ebpo_builder *b, const ebpo_mesh *m
     if (repair_record)
         info->repair_record = *repair_record;
     info->report = *report;
-    /* added by ebpo_build_border and ebpo_build_surface */
+    /* ebpo_build_border and ebpo_build_surface add these two parts if they can make them */
     info->parts = o->parts & ~(uint32_t)(EBPO_PART_BORDER | EBPO_PART_SURFACE);
     if (!ebpo_attributes_hold(mesh->attributes) || !(o->parts & EBPO_PART_MESH))
         info->parts &= ~(uint32_t)EBPO_PART_ATTRIBUTES;
@@ -162,7 +163,8 @@ static void fill_info(ebpo_info *info, const ebpo_builder *b, const ebpo_mesh *m
         info->parts &= ~(uint32_t)EBPO_PART_COLOURS;
 }
 
-/* Arranges the mesh again if the tree is deeper than the mesh's order supports. */
+/* Arranges the mesh if it is not arranged yet, or if the tree is deeper than the levels for which
+ * it was arranged. Then makes the boxes of vertices. */
 static ebpo_status arrange_for_levels(ebpo_builder *b, ebpo_mesh *mesh, ebpo_error *error)
 {
     const ebpo_progress *progress = &b->options->progress;
@@ -214,6 +216,7 @@ static void builder_free(ebpo_builder *b)
     ebpo_store_free(b->store);
 }
 
+/* The parallel task of all pieces. */
 typedef struct piece_job {
     ebpo_builder *b;
     ebpo_emit_scratch **scratch;             /* [threads] */
@@ -326,7 +329,7 @@ static ebpo_status build_mesh(ebpo_mesh *mesh, const ebpo_mesh_report *report,
     for (int i = 0; i < EBPO_LEVELS_MAX; i++)
         out->level[i].workspace = mesh->workspace;
     ebpo_status status = EBPO_TAKE(ebpo_build_options, &wanted, options, error);
-    /* a build makes only these parts */
+    /* other parts are not made by a build */
     wanted.parts &= EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES |
                     EBPO_PART_ATTRIBUTES | EBPO_PART_COLOURS | EBPO_PART_BORDER | EBPO_PART_SURFACE;
     if (!(wanted.parts & EBPO_PART_MESH))

@@ -1,6 +1,6 @@
-/* The stages of building, run by construct.c; builder.h lists them in order. Each function
- * processes one piece (ebpo_branch) or all of the builder. Stages that allocate report
- * EBPO_E_MEMORY or EBPO_E_IO, long ones EBPO_E_CANCELLED. */
+/* Declares the stages of building, which construct.c runs; builder.h lists them in order. A
+ * function processes one piece (ebpo_branch, a subtree) or the whole builder. Functions that
+ * allocate return EBPO_E_MEMORY or EBPO_E_IO; functions that take long return EBPO_E_CANCELLED. */
 #ifndef EBPO_CONSTRUCT_CONSTRUCT_STAGES_H
 #define EBPO_CONSTRUCT_CONSTRUCT_STAGES_H
 
@@ -9,9 +9,10 @@
 
 /* --- partition.c: the nodes of a piece and the face lists of its leaves --- */
 
+/* Makes the piece's nodes, and assigns its faces to leaves. */
 ebpo_status ebpo_build_partition(ebpo_builder *b, ebpo_branch *s, ebpo_error *error);
-/* Returns EBPO_E_LIMIT when there are more leaves, or more faces listed in them, than the limits
- * for a mesh with that many faces. */
+/* Returns EBPO_E_LIMIT if a mesh with this number of faces may not have so many leaves, or so many
+ * entries of leaves' face lists. */
 ebpo_status ebpo_build_check_lists(uint64_t face_count, uint64_t leaves, uint64_t entries,
                                    ebpo_error *error);
 
@@ -31,8 +32,8 @@ ebpo_status ebpo_emit_scratch_make(ebpo_emit_scratch **out, ebpo_workspace *work
                                    ebpo_error *error);
 void ebpo_emit_scratch_free(ebpo_emit_scratch *scratch);
 
-/* Writes a piece's part of the levels' arrays; leaf_refs still has the faces' numbers along the
- * curve, not the final ones. */
+/* Computes the envelopes of a piece, and writes its part of the levels' arrays. Their leaf_refs
+ * have the faces' indices along the curve, not the final indices. */
 ebpo_status ebpo_emit_piece(const ebpo_builder *b, ebpo_emit_scratch *scratch, ebpo_branch *s,
                             ebpo_error *error);
 
@@ -41,13 +42,14 @@ ebpo_status ebpo_build_levels(ebpo_builder *b, ebpo_tree *out, ebpo_error *error
 
 /* --- triangle_cell.c --- */
 
-/* Returns a mask for a face that touches the cell: bit i is set when the face may touch the closed
- * octant i of the cell. The mask never lacks an octant that the face touches. */
+/* Returns a mask for a face that touches the cell: bit i is set if the face may touch octant i of
+ * the cell. The bit of each octant that the face touches is set. */
 unsigned ebpo_octants_visited(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face);
 
-/* --- face_numbers.c: final numbers, in the order in which leaves list them first --- */
+/* --- face_numbers.c: final indices of faces, in the order of the leaves that list them first ---
+ */
 
-/* Numbers a piece's fresh faces. */
+/* Numbers a piece's fresh faces (faces that no earlier piece lists). */
 ebpo_status ebpo_build_number(ebpo_builder *b, ebpo_branch *s, ebpo_error *error);
 /* Puts the mesh into its final order. */
 ebpo_status ebpo_build_mesh(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, ebpo_error *error);
@@ -92,7 +94,8 @@ void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell 
  * crossings along two paths between corners disagree; then the mesh does not balance. */
 bool ebpo_gather_delta(const ebpo_builder *b, const ebpo_branch *s, uint32_t child,
                        int32_t delta[8]);
-/* Returns a mask; bit i is set when corner i is inside by the builder's rule. */
+/* Returns a mask: bit i is set if corner i of a cell is inside by the builder's rule. `winding`:
+ * winding number at corner 0; `delta`: corner differences (ebpo_build_detail). */
 unsigned ebpo_inside_corners(const ebpo_builder *b, int32_t winding, const int32_t delta[8]);
 
 /* --- envelopes.c --- */
@@ -101,9 +104,10 @@ typedef struct ebpo_envelope_scratch ebpo_envelope_scratch;
 ebpo_status ebpo_scratch_make(ebpo_envelope_scratch **out, ebpo_error *error);
 void ebpo_scratch_free(ebpo_envelope_scratch *scratch);
 
-/* Sets the planes that a gray node adds: planes proposed from the leaves up, or else planes chosen
- * now. On entry `envelope` is the parent's envelope cut to the node's cell, on return the node's
- * envelope. Returns the number of planes, or -1 when out of memory. */
+/* Sets the planes that a gray node adds: the planes that were chosen from the leaves up, or if
+ * there are none, planes that are chosen now. On entry, `envelope` is the parent's envelope cut to
+ * the node's cell; on return, it is the node's envelope. Returns the number of planes, or -1 when
+ * out of memory. */
 int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *scratch, const ebpo_branch *s,
                      uint32_t detail, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope,
                      uint32_t codes[EBPO_PLANES_STORED]);
@@ -115,7 +119,7 @@ typedef struct ebpo_top_envelope {
     double volume;
 } ebpo_top_envelope;
 
-/* Computes the envelopes of the nodes above the subtrees. */
+/* Computes the envelopes of the nodes above the pieces. */
 ebpo_status ebpo_build_top(ebpo_builder *b, ebpo_error *error);
 
 #endif

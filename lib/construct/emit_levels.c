@@ -1,14 +1,13 @@
 /* Turns finished pieces into the arrays of the levels.
  *
- * A depth-first walk of a piece visits the nodes of each level in order of octcodes (locational
- * codes), so a piece's part of each level array is one stretch. Stretches are joined in the
- * depth-first order of the pieces, which is octcode order too. The nodes of the top add separate
- * stretches. Leaves refer to faces by their numbers along the curve until all pieces are done, as
- * the final numbers of another piece's faces are not known before.
+ * A depth-first walk of a piece visits the nodes of each level in the order of octcodes (locational
+ * codes), so the piece's part of each array is one contiguous stretch. Stretches are joined in the
+ * depth-first order of the pieces, which is also the order of octcodes. The nodes of the top have
+ * separate stretches. Until all pieces are done, leaves refer to faces by their indices along the
+ * curve, because the final indices of faces of other pieces are not known before.
  *
- * Arrays without information are omitted: those that the options exclude, and those with only
- * default values. Volumes are added in a fixed order, so the number of threads does not change the
- * result. */
+ * Arrays that the options exclude, and arrays with only default values, are omitted. Volumes are
+ * added in a fixed order, so the number of threads does not change the result. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -30,8 +29,9 @@ struct ebpo_emit_scratch {
     ebpo_triangle *faces; /* faces of one leaf */
     uint64_t faces_capacity;
     ebpo_workspace *workspace;
-    /* [level][3] halves of the envelopes on the path to a node, cut along z, y, x. They are too
-     * large for the stack, and are allocated when the first node of the level has children. */
+    /* [level][3] for the gray node of this level on the path: half of its envelope (cut along z), a
+     * quarter (cut along z and y), and the envelope cut to a child's cell. They are too large for
+     * the stack; NULL until needed. */
     ebpo_polytope (*half[EBPO_LEVELS_MAX])[3];
 };
 
@@ -80,6 +80,7 @@ static bool grow_leaf_arrays(ebpo_piece_level *out, uint64_t refs)
 #undef GROW
 }
 
+/* Adds a leaf's list: winding number, range of new faces, and references. */
 static bool emit_list(const emitter *e, const ebpo_build_detail *d, ebpo_piece_level *out,
                       int32_t winding)
 {
@@ -113,8 +114,8 @@ static bool gather_faces(emitter *e, const ebpo_build_detail *d)
     return true;
 }
 
-/* Writes the codes of the planes to be stored, which the selection chooses. (Readers derive planes
- * that are not stored.) Returns the number of planes, or -1 when out of memory. */
+/* Chooses the planes of a leaf that will be stored, and cuts the envelope. (If leaf planes are not
+ * stored, readers derive planes.) Returns the number of planes, or -1 when out of memory. */
 static int leaf_planes(emitter *e, uint32_t detail, ebpo_cell cell, int32_t winding,
                        ebpo_polytope *envelope, uint32_t *codes)
 {
@@ -133,6 +134,9 @@ static int leaf_planes(emitter *e, uint32_t detail, ebpo_cell cell, int32_t wind
     return count;
 }
 
+/* The emit functions add a node and all nodes below to the piece's stretches. `winding`: winding
+ * number at the lowest corner. `envelope`: the parent's envelope cut to the cell, which they
+ * change. They return false when out of memory. */
 static bool emit_leaf(emitter *e, uint32_t detail, ebpo_cell cell, int32_t winding,
                       ebpo_polytope *envelope)
 {
@@ -169,6 +173,7 @@ static bool emit_empty(emitter *e, ebpo_cell cell, int32_t winding)
 static bool emit_node(emitter *e, uint32_t index, ebpo_cell cell, int32_t winding,
                       ebpo_polytope *envelope);
 
+/* Returns a bit for each child that is not empty. */
 static unsigned filled_children(const ebpo_branch *s, uint32_t child)
 {
     unsigned mask = 0;
@@ -177,9 +182,9 @@ static unsigned filled_children(const ebpo_branch *s, uint32_t child)
     return mask;
 }
 
-/* Emits children in octant order; neighbours share the halves that their envelopes are cut from. A
- * half that becomes empty by rounding is replaced by the whole cube, and so are its parts: an
- * envelope may be too large, never too small. */
+/* Emits the children in the order of octants; neighbours share the halves and quarters from which
+ * their envelopes are cut. If a half becomes empty by rounding errors, ebpo_polytope_half replaces
+ * it by the whole cube: an envelope may be too large, never too small. */
 static bool emit_children(emitter *e, uint32_t child, ebpo_cell cell, int32_t winding,
                           const int32_t offset[8], const ebpo_polytope *envelope)
 {
@@ -258,11 +263,10 @@ ebpo_status ebpo_emit_piece(const ebpo_builder *b, ebpo_emit_scratch *scratch, e
 
 typedef struct joiner {
     ebpo_builder *b;
-    /* in depth-first order: alternately stretches of the top and whole subtrees */
-    ebpo_piece_level **stretch;
+    ebpo_piece_level **stretch; /* [count] stretches of pieces and of the top, depth first */
     uint64_t count, capacity;
-    ebpo_piece_level *current;
-    ebpo_level *level; /* result */
+    ebpo_piece_level *current; /* the top's last stretch; NULL: a piece comes after it */
+    ebpo_level *level;         /* result */
 } joiner;
 
 static const char stage[] = "joining levels";
@@ -280,6 +284,7 @@ static bool push_stretch(joiner *j, ebpo_piece_level *out)
     return true;
 }
 
+/* Returns the stretch for the next node of the top, or NULL when out of memory. */
 static ebpo_piece_level *current_stretch(joiner *j)
 {
     if (j->current)
@@ -294,6 +299,7 @@ static ebpo_piece_level *current_stretch(joiner *j)
     return j->current = out;
 }
 
+/* Returns the type, in the file, of a node of the top. */
 static ebpo_node_type type_of(const ebpo_builder *b, const ebpo_build_node *n, int32_t winding)
 {
     ebpo_node_type type = n->type == EBPO_LEAF ? b->sub[n->detail].root_type : n->type;
@@ -302,6 +308,7 @@ static ebpo_node_type type_of(const ebpo_builder *b, const ebpo_build_node *n, i
     return type;
 }
 
+/* Collects the stretches of the pieces below a node, and adds the nodes of the top. */
 static bool collect_stretches(joiner *j, uint32_t index, ebpo_cell cell, int32_t winding)
 {
     ebpo_builder *b = j->b;
@@ -338,12 +345,12 @@ static bool collect_stretches(joiner *j, uint32_t index, ebpo_cell cell, int32_t
     return true;
 }
 
-static void add_counts(const joiner *j, int level, int per)
+static void add_counts(const joiner *j, int level, int unit)
 {
     uint64_t total = 0;
     for (uint64_t i = 0; i < j->count; i++)
-        total += ebpo_level_count(&j->stretch[i][level].level, (ebpo_per)per);
-    ebpo_level_set_count(&j->level[level], (ebpo_per)per, total);
+        total += ebpo_level_count(&j->stretch[i][level].level, (ebpo_per)unit);
+    ebpo_level_set_count(&j->level[level], (ebpo_per)unit, total);
 }
 
 static bool any_has(const joiner *j, int level, int id)
@@ -356,7 +363,7 @@ static bool any_has(const joiner *j, int level, int id)
 
 static void fill_default(const joiner *j, char *to, uint64_t bytes, int id)
 {
-    /* the machine is little-endian, like the files */
+    /* copies the low bytes of `value`: the machine is little-endian, like the files */
     int64_t value = ebpo_schema[id].default_value;
     EBPO_FOR_ITEMS(j->b->workspace, i, 0, bytes / ebpo_schema[id].held_size)
         memcpy(to + i * ebpo_schema[id].held_size, &value, ebpo_schema[id].held_size);
@@ -414,11 +421,10 @@ enum { LEAF_GRAIN = 1 << 13 };
 typedef struct numbering {
     const ebpo_builder *b;
     ebpo_level *level;
-    uint64_t *first; /* start of each block of leaves in leaf_refs */
+    uint64_t *first; /* [block of LEAF_GRAIN leaves] index of its first reference in leaf_refs */
 } numbering;
 
-/* Replaces the leaves' face numbers along the curve by final numbers, now that the final numbers of
- * all pieces are known. */
+/* Replaces the faces' indices along the curve in leaf_refs by final indices. */
 static ebpo_status number_block(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                 ebpo_error *error)
 {
@@ -435,8 +441,8 @@ static ebpo_status number_block(void *context, uint64_t begin, uint64_t end, uns
     return EBPO_OK;
 }
 
-/* Numbers the references of a level. For progress: `all` is the number of references of all levels,
- * of which `before` are numbered. */
+/* Replaces the indices in a level's leaf_refs by final indices. For progress: `all` is the number
+ * of references of all levels, of which `before` are done. */
 static ebpo_status number_refs(const ebpo_builder *b, ebpo_level *l, uint64_t before, uint64_t all,
                                ebpo_error *error)
 {
@@ -486,7 +492,8 @@ static ebpo_status join_arrays(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-/* Adds volumes in a fixed order, independent of the number of threads. */
+/* Sums volumes, in a fixed order that does not depend on the number of threads, and finishes the
+ * arrays. */
 static ebpo_status finish_level(const joiner *j, int level, uint64_t before, uint64_t all,
                                 ebpo_error *error)
 {
@@ -503,6 +510,7 @@ static ebpo_status finish_level(const joiner *j, int level, uint64_t before, uin
     return status;
 }
 
+/* Adds the group of level 0, which has the type of the root. */
 static bool root_group(joiner *j)
 {
     ebpo_builder *b = j->b;
@@ -519,8 +527,8 @@ ebpo_status ebpo_build_levels(ebpo_builder *b, ebpo_tree *out, ebpo_error *error
         root_group(&j) && collect_stretches(&j, 0, b->top.cell, 0) ? EBPO_OK : no_memory(b, error);
     uint64_t refs = 0, all = 0;
     for (int level = 0; level < EBPO_LEVELS_MAX && status == EBPO_OK; level++) {
-        for (int per = 0; per <= EBPO_PER_GROUP; per++)
-            add_counts(&j, level, per);
+        for (int unit = 0; unit <= EBPO_PER_GROUP; unit++)
+            add_counts(&j, level, unit);
         all += out->level[level].ref_count;
     }
     ebpo_pass pass = { &b->options->progress, 0, all, 2 * all };
@@ -529,9 +537,9 @@ ebpo_status ebpo_build_levels(ebpo_builder *b, ebpo_tree *out, ebpo_error *error
         status = ebpo_parallel_for(b->threads, NULL, EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS, 1,
                                    join_arrays, &j, &progress, stage, error);
     for (int level = 0; level < EBPO_LEVELS_MAX && status == EBPO_OK; level++) {
-        uint64_t own = out->level[level].ref_count;
+        uint64_t refs_of_level = out->level[level].ref_count;
         status = finish_level(&j, level, refs, all, error);
-        refs += own;
+        refs += refs_of_level;
         if (out->level[level].group_count)
             out->info.level_count = level + 1;
         out->info.level[level] = ebpo_level_summarise(&out->level[level], ~0u);

@@ -1,16 +1,18 @@
-/* Chooses the planes of gray nodes, from the root down. The candidates are directions of the convex
- * hull of the solid within the cell.
+/* Chooses the planes of gray nodes, from the root down. The directions of candidates are normals of
+ * the convex hull of the solid within the cell.
  *
- * - Few points: the directions are the facets of the points' hull.
- * - Many points, or points that span no volume: the directions are the facets of the hull of
- *   extreme points. Each round finds the supports of the solid along the facets' normals
- *   (supports.h), and adds the points of these supports to the hull.
- * - In the second case, normals of the faces below the node are tried too. Many normals are grouped
- *   in bins of the octahedral map, no finer than needed, and the mean of each bin is tried.
+ * - If the node has few points (supports.h), the directions are the normals of the facets of their
+ * hull.
+ * - If it has many points, or if they span no volume, the directions are the normals of the facets
+ * of a hull of extreme points, in rounds: each round finds the supports of the solid along the
+ * normals of the facets (supports.h), and adds the points of these supports to the hull. Normals of
+ * the faces below the node are tried, too: they are grouped in bins of the octahedral map (of
+ * normals to 10 + 10 bits), no finer than needed, and the mean of each bin is tried.
  *
  * The selection (selections.c) takes planes from the candidates. A support is an upper bound, so a
- * plane never cuts off a part of the solid, however bad a candidate is. The nodes above the pieces
- * are computed here too, level by level, so that every piece knows its parent's envelope. */
+ * plane never cuts off a part of the solid, however bad its direction is. This file also computes
+ * the envelopes of the nodes above the pieces, level by level, so that every piece gets its
+ * parent's envelope. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -31,23 +33,26 @@
 
 /* --- candidates: normals of faces --- */
 
+/* Maximum number of sampled normals; size of the table of bins. */
 enum { CANDIDATES_SAMPLE = 4096, CANDIDATES_BINS = 16384 };
 
-/* A bin of the octahedral map, and the normals in it. */
+/* A bin of the octahedral map. */
 typedef struct normal_bin {
-    uint32_t key; /* 0: free */
-    uint32_t count;
-    uint64_t sum_u, sum_v;
+    uint32_t key;          /* position of the bin; 0: the entry of the table is free */
+    uint32_t count;        /* number of normals in the bin */
+    uint64_t sum_u, sum_v; /* sums of their two coordinates */
 } normal_bin;
 
 /* Memory of one thread, which is too large for its stack; initialised with zeros. */
 typedef struct candidates_scratch {
     normal_bin table[CANDIDATES_BINS]; /* hash table; all bins are free between calls */
     uint32_t sample[CANDIDATES_SAMPLE];
-    int slots[EBPO_PLANES_CANDIDATES]; /* the bins that are not free */
+    int slots[EBPO_PLANES_CANDIDATES]; /* indices in `table` of the bins that are not free */
 } candidates_scratch;
 
-/* Samples every `step`-th of the entries, or of the branch's whole list. */
+/* Adds the normals of every `step`-th face to the sample, from begin + *skip on. The faces are
+ * entries[begin .. end - 1], or if `entries` is NULL, the branch's list. Sets *skip for the next
+ * list. */
 static void sample_faces(const ebpo_builder *b, const ebpo_branch *s, const uint32_t *entries,
                          uint64_t begin, uint64_t end, uint64_t *skip, uint64_t step,
                          uint32_t *sample, int *count)
@@ -66,6 +71,7 @@ static void sample_faces(const ebpo_builder *b, const ebpo_branch *s, const uint
     *skip = i - end;
 }
 
+/* Samples the normals of the faces below a node. Returns their number. */
 static int sample_candidates(const ebpo_builder *b, const ebpo_branch *s,
                              const ebpo_build_detail *d, uint32_t *sample)
 {
@@ -84,7 +90,8 @@ static int sample_candidates(const ebpo_builder *b, const ebpo_branch *s,
     return count;
 }
 
-/* Fills the table with bins of `width` codes; returns false when more than `most` are occupied. */
+/* Fills the table with bins of `width` * `width` normals. Returns false if more than `most` bins
+ * are occupied. *used: number of occupied bins, before and after. */
 static bool fill_bins(normal_bin *table, int *used, int *slots, const uint32_t *sample, int count,
                       uint32_t width, int most)
 {
@@ -110,7 +117,7 @@ static bool fill_bins(normal_bin *table, int *used, int *slots, const uint32_t *
     return true;
 }
 
-/* Makes at most `most` candidates; returns their number. */
+/* Makes at most `most` candidates of the means of bins. Returns their number. */
 static int build_candidates(const ebpo_builder *b, candidates_scratch *scratch,
                             const ebpo_branch *s, const ebpo_build_detail *detail, int most,
                             ebpo_candidate *out)
@@ -133,12 +140,13 @@ static int build_candidates(const ebpo_builder *b, candidates_scratch *scratch,
 /* --- scratch memory and supports --- */
 
 enum {
-    TOP_LEVELS = 4,   /* levels whose planes take hardly any bytes */
-    MANY_LEVELS = 2,  /* round solids need more planes there: 73 nodes at most */
-    FACES_BELOW = 16, /* maximum number of face normals that are tried */
-    HULL_BELOW = 24,  /* directions of the hull, per round below the top */
-    HULL_ROUNDS = 3,
-    HULL_DIRECTIONS = 160, /* maximum per round */
+    TOP_LEVELS = 4,        /* down to this level, planes take hardly any bytes of the file */
+    MANY_LEVELS = 2,       /* down to this level (at most 73 nodes), a node may have twice as many
+                            * planes, which round solids need */
+    FACES_BELOW = 16,      /* maximum number of means of face normals that are tried */
+    HULL_BELOW = 24,       /* maximum number of directions of a round below TOP_LEVELS */
+    HULL_ROUNDS = 3,       /* maximum number of rounds */
+    HULL_DIRECTIONS = 160, /* maximum number of directions of a round down to TOP_LEVELS */
     TABLE = 1024           /* entries of the table of normals */
 };
 
@@ -149,8 +157,8 @@ struct ebpo_envelope_scratch {
     /* normals of candidates and of dropped directions */
     uint32_t tried[2 * EBPO_PLANES_CANDIDATES];
     int tried_count;
-    uint32_t normals[TABLE];          /* 1 + normal, by hash */
-    double core[EBPO_HULL_POINTS][3]; /* extreme points of the solid in the cell */
+    uint32_t normals[TABLE];          /* hash table: 1 + normal; 0: free */
+    double core[EBPO_HULL_POINTS][3]; /* known points of the solid in the cell, for the hull */
     int core_count;
     ebpo_hull_facet facet[EBPO_HULL_FACETS];
     candidates_scratch of_faces;
@@ -170,24 +178,24 @@ void ebpo_scratch_free(ebpo_envelope_scratch *scratch)
 }
 
 /* Returns the largest useful support of a plane: with this support or more, the plane can remove
- * neither epsilon nor a needle. The reason: a cap of height h of a body of width H and volume V has
- * at most V (1 - (1 - h/H)^3) <= 3 V h / H. */
+ * neither the volume epsilon nor a needle. Reason: the part of height h that a plane cuts off from
+ * a convex body of width H and volume V has at most the volume V (1 - (1 - h/H)^3) <= 3 V h / H. */
 static double largest_useful_support(const ebpo_polytope *envelope, double volume,
                                      const int32_t n[3], double epsilon)
 {
-    double most = -1e300, least = 1e300;
+    double greatest = -1e300, least = 1e300;
     for (int i = 0; i < envelope->vertex_count; i++) {
         const double *v = envelope->vertex[i];
         double e = n[0] * v[0] + n[1] * v[1] + n[2] * v[2];
-        most = e > most ? e : most;
+        greatest = e > greatest ? e : greatest;
         least = e < least ? e : least;
     }
     double length = sqrt((double)n[0] * n[0] + (double)n[1] * n[1] + (double)n[2] * n[2]);
-    return most - fmin((most - least) * epsilon / (3 * volume), ebpo_needle * length);
+    return greatest - fmin((greatest - least) * epsilon / (3 * volume), ebpo_needle * length);
 }
 
-/* Tries a direction. Drops it as soon as it cannot gain epsilon. Returns the extreme point in
- * `where`. */
+/* Tries a direction: makes it a candidate if its plane may be useful. Sets `where` to the point of
+ * the greatest value found; the search stops as soon as the plane is useless. */
 static void try_normal(ebpo_envelope_scratch *s, uint32_t normal, const ebpo_polytope *envelope,
                        double volume, double epsilon, double where[3])
 {
@@ -204,6 +212,7 @@ static void try_normal(ebpo_envelope_scratch *s, uint32_t normal, const ebpo_pol
 
 /* --- directions of the hull --- */
 
+/* Adds a point to the hull's points, unless a known point is very close. */
 static void add_core(ebpo_envelope_scratch *s, const double where[3])
 {
     static const double near = 1e-12;
@@ -221,9 +230,9 @@ static void add_core(ebpo_envelope_scratch *s, const double where[3])
     s->core_count++;
 }
 
-/* Tries the directions to the faces, edges and corners of a cell. Then the hull has points on all
- * sides, whatever the normals of the faces are. */
-static void try_all_around(ebpo_envelope_scratch *s)
+/* Adds the extreme points along the directions from the cell's centre to its faces, edges and
+ * corners. So the hull has points on all sides, whatever the normals of the faces are. */
+static void add_points_around(ebpo_envelope_scratch *s)
 {
     for (int i = 0; i < 27; i++) {
         double direction[3] = { i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1 }, where[3];
@@ -245,12 +254,13 @@ static bool was_tried(const ebpo_envelope_scratch *s, uint32_t normal)
     return false;
 }
 
-/* Runs one round: tries the facets of the hull of the known points, and adds the extreme points
- * beyond facets. Returns false when no point was added. */
+/* Runs one round: tries the normals of the facets of the hull of the known points, at most `most`
+ * directions, the largest facets first. Adds the extreme points that are beyond a facet. Returns
+ * false if no point was added. */
 static bool hull_round(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, double volume,
                        double epsilon, int most)
 {
-    static const double worth = 1e-3; /* share of the cell */
+    static const double least_distance = 1e-3; /* of an added point from the facet, in cells */
     int facets = ebpo_hull_facets((const double(*)[3])s->core, s->core_count, 1e-9, s->facet,
                                   EBPO_HULL_FACETS),
         before = s->core_count;
@@ -263,7 +273,7 @@ static bool hull_round(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, 
             continue;
         try_normal(s, normal, envelope, volume, epsilon, where);
         most--;
-        if (ebpo_vec3_dot(f->n, where) > f->d + worth)
+        if (ebpo_vec3_dot(f->n, where) > f->d + least_distance)
             add_core(s, where);
     }
     return s->core_count > before;
@@ -279,11 +289,12 @@ static void try_hull(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, do
 
 /* --- few points --- */
 
-/* Points this near to the hull give nearly equal directions. */
+/* Points that are outside the hull by less than this add nearly equal directions, so they are
+ * omitted below TOP_LEVELS. */
 static const double hull_tolerance = 1e-3;
 
-/* Uses all points of the node. Returns false when there are too many, or when vertices were not
- * gathered as points. */
+/* Takes all points of the node for the hull. Returns false if they are too many, or if vertices are
+ * not among them. */
 static bool use_all_points(ebpo_envelope_scratch *s)
 {
     const ebpo_supports *from = &s->supports;
@@ -309,8 +320,8 @@ static bool new_normal(ebpo_envelope_scratch *s, uint32_t normal)
     return true;
 }
 
-/* Adds the hull's facets as candidates; returns the volume of the hull, or -1 when there is none.
- */
+/* Makes candidates of the hull's facets. Returns the volume of the hull, or -1 if the points span
+ * no volume. */
 static double hull_candidates(ebpo_envelope_scratch *s, double tolerance)
 {
     int facets = ebpo_hull_facets((const double(*)[3])s->core, s->core_count, tolerance, s->facet,
@@ -339,10 +350,11 @@ static double hull_candidates(ebpo_envelope_scratch *s, double tolerance)
 
 /* --- the node --- */
 
-/* Returns the factor of epsilon for top levels: their planes take hardly any bytes, and a needle
- * that fills a thousandth of its cell still needs planes. */
+/* Returns the factor of epsilon for levels down to TOP_LEVELS. It is small, because their planes
+ * take hardly any bytes, and even a solid that fills a thousandth of its cell needs planes. */
 static double top_share(double volume) { return 0.1 * sqrt(fmax(0, volume)); }
 
+/* Makes the candidates of a node with many points. */
 static void choose_directions(const ebpo_builder *b, ebpo_envelope_scratch *s,
                               const ebpo_branch *branch, const ebpo_build_detail *detail, int level,
                               const ebpo_polytope *envelope, double volume, double epsilon)
@@ -351,7 +363,7 @@ static void choose_directions(const ebpo_builder *b, ebpo_envelope_scratch *s,
     ebpo_candidate faces[FACES_BELOW];
     int count = build_candidates(b, &s->of_faces, branch, detail, FACES_BELOW, faces);
     s->core_count = 0;
-    try_all_around(s);
+    add_points_around(s);
     for (int i = 0; i < count; i++) {
         double where[3];
         try_normal(s, faces[i].normal, envelope, volume, epsilon, where);
@@ -360,6 +372,7 @@ static void choose_directions(const ebpo_builder *b, ebpo_envelope_scratch *s,
     try_hull(s, envelope, volume, epsilon, top ? HULL_DIRECTIONS : HULL_BELOW);
 }
 
+/* Chooses the planes of a gray node from the root down. Returns their number, or -1. */
 static int choose_now(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebpo_branch *branch,
                       const ebpo_build_detail *detail, ebpo_cell cell, int32_t winding,
                       ebpo_polytope *envelope, uint32_t *codes)
@@ -400,14 +413,15 @@ int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebpo
 
 /* --- the nodes above the pieces, level by level --- */
 
+/* A gray node of the top, whose envelope is to be computed. */
 typedef struct pending {
     uint32_t node; /* gray node in the top */
     ebpo_cell cell;
     int32_t winding;
-    ebpo_polytope *envelope; /* the parent's envelope cut to the cell, then its envelope */
+    ebpo_polytope *envelope; /* first the parent's envelope cut to the cell, then the node's own */
 } pending;
 
-/* The gray nodes of the top that are processed together: those of one level. */
+/* The gray nodes of one level of the top, which are processed together. */
 typedef struct front {
     ebpo_builder *b;
     pending *nodes;
@@ -442,8 +456,8 @@ static ebpo_status front_envelopes(void *context, uint64_t begin, uint64_t end, 
     return status;
 }
 
-/* Passes a finished node's envelope to its children: gray children join the next front, subtrees
- * get their input. */
+/* Cuts a node's envelope to its children. Gray children join the next front; pieces get the
+ * envelope and their winding number. */
 static bool pass_down(ebpo_builder *b, const pending *p, front *next)
 {
     const ebpo_build_node *node = &b->top.nodes[p->node];
@@ -486,7 +500,7 @@ static ebpo_status front_begin(ebpo_builder *b, front *w, ebpo_error *error)
     if (!cube)
         return no_memory(b, error);
     ebpo_polytope_cube(cube);
-    if (b->top.nodes[0].type == EBPO_LEAF) { /* a small model is one subtree */
+    if (b->top.nodes[0].type == EBPO_LEAF) { /* a small model is one piece */
         b->sub[0].above = cube;
         return EBPO_OK;
     }

@@ -1,10 +1,11 @@
-/* Assigns final indices to faces and vertices, and puts the mesh into that order.
+/* Assigns final indices to faces and vertices, and puts the mesh into their order.
  *
- * A face is numbered in the first leaf, depth first, that lists it; a vertex by the first face that
- * uses it. So a leaf's new faces are one range in the file, and only the leaf's other faces need
- * references. A piece numbers its fresh faces, which no earlier piece lists, so pieces are
- * independent of each other. Attributes move with their vertices and faces. The format describes
- * the order in format-spec/README.md. */
+ * Leaves are visited depth first. A face gets the next index in the first leaf that lists it, and a
+ * vertex gets the next index in the first face that uses it. So the new faces of a leaf (no earlier
+ * leaf lists them) are one range in the file, and only the leaf's other faces need references. A
+ * piece numbers its *fresh* faces, which no earlier piece lists, so pieces do not depend on each
+ * other. Attributes move with their vertices and faces. format-spec/README.md describes the order.
+ */
 #include "core/strict_fp.h"
 
 #include "construct/construct_stages.h"
@@ -17,6 +18,7 @@
 #include "core/error.h"
 #include "core/parallel.h"
 
+/* Numbers the new faces of a leaf. `next`: next index. */
 static void number_leaf(ebpo_builder *b, const ebpo_branch *s, ebpo_build_detail *d, uint32_t *next)
 {
     d->first = *next;
@@ -44,15 +46,16 @@ ebpo_status ebpo_build_number(ebpo_builder *b, ebpo_branch *s, ebpo_error *error
 {
     uint32_t next = (uint32_t)s->first;
     number_node(b, s, 0, &next);
-    uint64_t given = next - s->first;
-    if (given != s->fresh_count)
+    uint64_t numbered = next - s->first;
+    if (numbered != s->fresh_count)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "internal: %llu faces of a piece are in none of its leaves",
-                         (unsigned long long)(s->fresh_count - given));
+                         (unsigned long long)(s->fresh_count - numbered));
     return EBPO_OK;
 }
 
-/* Sets order[i] to the mesh vertex that gets the final number i, and final[] to the inverse. */
+/* Sets order[i] to the mesh's vertex that gets the final index i, and final[v] to the final index
+ * of vertex v. */
 static void order_vertices(const ebpo_builder *b, const ebpo_mesh *mesh, const uint32_t *face_at,
                            uint32_t *order, uint32_t *final)
 {
@@ -74,12 +77,12 @@ static void order_vertices(const ebpo_builder *b, const ebpo_mesh *mesh, const u
     }
 }
 
-/* Task of all cores after the order is known: moves the data. */
+/* Input and output of the parallel tasks that move the data into the final order. */
 typedef struct moving {
     const ebpo_builder *b;
     const ebpo_mesh *mesh;
-    const uint32_t *final;
-    uint32_t *face_at;
+    const uint32_t *final; /* [vertex] final index */
+    uint32_t *face_at;     /* [final index] face of `mesh` */
     ebpo_tree *out;
 } moving;
 

@@ -1,12 +1,12 @@
-/* Computes the colours of gray nodes: the mean, by area, of the colours of the faces below
+/* Computes the colours of gray nodes: the mean of the colours of the faces below, weighted by area
  * (format-spec/colours.md).
  *
- * The levels are processed from the deepest upwards: the sums of a gray node are those of its
+ * The levels are processed from the deepest upwards: the sums of a gray node are the sums over its
  * group of eight children. No data is kept for each face: the weight of a face is computed again
  * for each leaf that lists the face, as most faces are in one leaf only. Weights and sums are
- * integers, so the result is exact and does not depend on the number of threads. Vertex colours are
- * used. If vertices have no colours, or all have the same colour, face colours are used instead, if
- * there are any. lib/verify computes the same colours with separate code. */
+ * integers, so the result is exact and does not depend on the number of threads. The colours are
+ * those of vertices. If vertices have no colours or all have the same colour, face colours are
+ * used, if there are any. lib/verify computes the same colours with separate code. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -21,6 +21,8 @@
 #include "geometry/vec3.h"
 #include "mesh/attributes.h"
 
+/* GROUP_GRAIN: groups of a task. GROUPS_A_TIME: groups after which pages of the workspace are
+ * released. */
 enum { GROUP_GRAIN = 1 << 12, GROUPS_A_TIME = 16 };
 
 /* Sums over the faces below a node. A face counts once for each leaf that lists the face. */
@@ -29,25 +31,25 @@ typedef struct colour_sums {
     ebpo_wide weight;    /* sum of 3 * weight */
 } colour_sums;
 
-/* Numbers of leaves, gray nodes and entries of leaf_refs of a level before a run of GROUP_GRAIN
- * groups. For each leaf, leaf_refs has the *references*: the faces that an earlier leaf also lists.
- */
-typedef struct run_start {
+/* Numbers of leaves, gray nodes and references of a level before the groups of a task. (A reference
+ * is an entry of leaf_refs: a face that an earlier leaf also lists.) */
+typedef struct task_start {
     uint64_t leaf, gray, ref;
-} run_start;
+} task_start;
 
 typedef struct colouring {
     ebpo_tree *tree;
-    double size;  /* largest side of the box */
+    double size;  /* longest side of the root box */
     bool by_face; /* the columns are colours of faces, not of vertices */
     ebpo_colour_column column[EBPO_COLOUR_CHANNELS];
     const ebpo_level *level;  /* level whose groups are added up */
-    const run_start *start;   /* one for each run of groups */
+    const task_start *start;  /* [task] */
     const colour_sums *below; /* sums of the level's gray nodes */
     colour_sums *above;       /* sums of the level's groups */
     uint32_t *colours;        /* colours of the level's groups */
 } colouring;
 
+/* Returns the weight of a face: 1 + 2^32 times its doubled area, relative to the squared size. */
 static uint64_t weight_of(const colouring *c, uint64_t face)
 {
     const uint32_t *corner = c->tree->mesh.faces + 3 * face;
@@ -67,10 +69,10 @@ static void add_face(const colouring *c, uint64_t face, colour_sums *sums)
     uint64_t weight = weight_of(c, face);
     const uint32_t *corner = c->tree->mesh.faces + 3 * face;
     for (int k = 0; k < 3; k++) {
-        unsigned thrice = c->by_face ? 3u * ebpo_colour_byte(&c->column[k], face) : 0;
+        unsigned triple = c->by_face ? 3u * ebpo_colour_byte(&c->column[k], face) : 0;
         for (int i = 0; i < 3 && !c->by_face; i++)
-            thrice += ebpo_colour_byte(&c->column[k], corner[i]);
-        sums->colour[k] = ebpo_wide_plus(sums->colour[k], ebpo_wide_product(weight, thrice));
+            triple += ebpo_colour_byte(&c->column[k], corner[i]);
+        sums->colour[k] = ebpo_wide_plus(sums->colour[k], ebpo_wide_product(weight, triple));
     }
     sums->weight = ebpo_wide_plus(sums->weight, ebpo_wide_product(weight, 3));
 }
@@ -91,14 +93,14 @@ static void add_leaf(const colouring *c, uint64_t leaf, uint64_t ref, colour_sum
         add_face(c, l->leaf_refs[ref + i], sums);
 }
 
-/* Returns the integer nearest to colour / weight, halves rounded up. The result is a byte, which is
- * found bit by bit. */
+/* Returns the byte nearest to colour / weight; halves are rounded up. It is the greatest byte with
+ * 2 * byte * weight <= 2 * colour + weight, found bit by bit. */
 static uint32_t mean_of_channel(ebpo_wide colour, ebpo_wide weight)
 {
-    ebpo_wide most = ebpo_wide_plus(ebpo_wide_left(colour, 1), weight);
+    ebpo_wide limit = ebpo_wide_plus(ebpo_wide_left(colour, 1), weight);
     uint32_t byte = 0;
     for (uint32_t bit = 128; bit; bit >>= 1)
-        if (!ebpo_wide_less(most, ebpo_wide_times(weight, 2 * (byte | bit))))
+        if (!ebpo_wide_less(limit, ebpo_wide_times(weight, 2 * (byte | bit))))
             byte |= bit;
     return byte;
 }
@@ -115,7 +117,7 @@ static ebpo_status add_groups(void *context, uint64_t begin, uint64_t end, unsig
                               ebpo_error *error)
 {
     const colouring *c = context;
-    run_start at = c->start[begin / GROUP_GRAIN];
+    task_start at = c->start[begin / GROUP_GRAIN];
     (void)worker, (void)error;
     EBPO_FOR_ITEMS_EVERY(c->tree->workspace, GROUPS_A_TIME, group, begin, end) {
         colour_sums sums = { .weight = 0 };
@@ -134,11 +136,11 @@ static ebpo_status add_groups(void *context, uint64_t begin, uint64_t end, unsig
     return EBPO_OK;
 }
 
-static run_start *find_starts(const colouring *c)
+static task_start *find_starts(const colouring *c)
 {
     const ebpo_level *l = c->level;
-    run_start at = { 0, 0, 0 },
-              *start = ebpo_alloc(l->group_count / GROUP_GRAIN + 1, sizeof *start);
+    task_start at = { 0, 0, 0 },
+               *start = ebpo_alloc(l->group_count / GROUP_GRAIN + 1, sizeof *start);
     EBPO_FOR_ITEMS(c->tree->workspace, group, 0, start ? l->group_count : 0) {
         if (group % GROUP_GRAIN == 0)
             start[group / GROUP_GRAIN] = at;
@@ -157,7 +159,7 @@ static ebpo_status colour_level(const ebpo_builder *b, colouring *c, int level,
     ebpo_workspace *workspace = c->tree->workspace;
     uint64_t groups = c->tree->level[level].group_count;
     c->level = &c->tree->level[level];
-    run_start *start = find_starts(c);
+    task_start *start = find_starts(c);
     c->start = start;
     c->above = ebpo_array_alloc(workspace, groups, sizeof *c->above);
     c->colours = ebpo_array_alloc(workspace, groups, sizeof *c->colours);
@@ -172,6 +174,7 @@ static ebpo_status colour_level(const ebpo_builder *b, colouring *c, int level,
     return status;
 }
 
+/* Returns true if all vertices have the same colour. */
 static bool have_equal_colours(const colouring *c)
 {
     uint8_t first[3];

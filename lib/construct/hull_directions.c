@@ -38,7 +38,7 @@ typedef struct hull {
     /* planes n . x = d of the facets, padded to a multiple of four with planes that no point is
      * above */
     double nx[FACETS_MAX + 4], ny[FACETS_MAX + 4], nz[FACETS_MAX + 4], d[FACETS_MAX + 4];
-    double length[FACETS_MAX]; /* twice the area of each facet */
+    double length[FACETS_MAX]; /* length of the facet's cross product: twice its area */
     double tolerance;          /* points at most this far outside the hull are omitted */
     uint16_t corner[FACETS_MAX][3];
     int count, capacity; /* number of facets, and its limit */

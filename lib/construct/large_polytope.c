@@ -1,7 +1,8 @@
-/* Cuts convex polytopes without a limit on faces, by the method of geometry/polytope.c (BP 2008,
- * section 3.4.3) on arrays that grow. A cut builds a second shape, which replaces the first if the
- * cut succeeds. Vertices within a tolerance of the cutting plane are on it. A cut that rounding
- * would spoil is refused, so the polytope is never too small. */
+/* Cuts convex polytopes with any number of faces, by the method of geometry/polytope.c (BP 2008,
+ * section 3.4.3) on arrays that grow. A cut builds a second shape, which replaces the first shape
+ * if the cut succeeds. Vertices within a tolerance of the cutting plane count as on the plane. If
+ * rounding errors would make the new shape inconsistent, the cut is refused; so the polytope is
+ * never too small. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -12,12 +13,12 @@
 #include "core/hash.h"
 #include "geometry/vec3.h"
 
-static const double tolerance = 1e-10;
+static const double tolerance = 1e-10; /* in cells */
 
 static const uint32_t no_vertex = UINT32_MAX;
 
 struct ebpo_large_edge {
-    uint64_t key; /* the ends' numbers, inner end first; 0: empty slot */
+    uint64_t key; /* 1 + (inner end << 32 | outer end); 0: empty slot */
     uint32_t vertex;
 };
 
@@ -42,6 +43,7 @@ static uint32_t shape_vertex(ebpo_large_polytope *p, ebpo_large_shape *s, const 
     return (uint32_t)s->vertex_count++;
 }
 
+/* Adds a corner to the loop of the current face, unless it is equal to the previous corner. */
 static void shape_corner(ebpo_large_polytope *p, ebpo_large_shape *s, uint32_t vertex)
 {
     uint64_t start = s->first[s->face_count];
@@ -54,7 +56,7 @@ static void shape_corner(ebpo_large_polytope *p, ebpo_large_shape *s, uint32_t v
     s->corner[s->corner_count++] = vertex;
 }
 
-/* Ends the loop of a face; drops a face with less than three corners. */
+/* Ends the loop of a face; drops a face with fewer than three corners. */
 static void shape_face(ebpo_large_polytope *p, ebpo_large_shape *s, int32_t tag)
 {
     uint64_t start = s->first[s->face_count];
@@ -133,7 +135,7 @@ double ebpo_large_volume(const ebpo_large_polytope *p)
 
 static bool is_out(const ebpo_large_polytope *p, uint32_t v) { return p->distance[v] > tolerance; }
 
-/* Returns the vertex of the cut on an edge; the same for both faces at the edge. */
+/* Returns the vertex where the plane cuts an edge; it is the same for both faces at the edge. */
 static uint32_t edge_vertex(ebpo_large_polytope *p, uint32_t in, uint32_t out)
 {
     uint64_t key = ((uint64_t)in << 32 | out) + 1, at, mask = p->edge_slots - 1;
@@ -150,6 +152,7 @@ static uint32_t edge_vertex(ebpo_large_polytope *p, uint32_t in, uint32_t out)
     return p->edge[at].vertex;
 }
 
+/* Records an edge of a kept face, if both ends are on the plane. */
 static void record_rim(ebpo_large_polytope *p, uint32_t from, uint32_t to)
 {
     if (from == to || !p->on[from] || !p->on[to])
@@ -160,7 +163,7 @@ static void record_rim(ebpo_large_polytope *p, uint32_t from, uint32_t to)
         p->rim[p->rims++] = (struct ebpo_large_rim){ from, to };
 }
 
-/* Copies the part of a face within the half-space, and notes its edges on the plane. */
+/* Copies the part of a face within the half-space, and records its edges on the plane. */
 static void clip_loop(ebpo_large_polytope *p, uint64_t f)
 {
     const ebpo_large_shape *s = &p->now;
@@ -184,6 +187,7 @@ static void clip_loop(ebpo_large_polytope *p, uint64_t f)
         record_rim(p, to->corner[i], to->corner[i + 1 < to->corner_count ? i + 1 : start]);
 }
 
+/* Returns true if edge i of the rim also occurs reversed: it is between two kept faces. */
 static bool is_paired(const ebpo_large_polytope *p, uint64_t i)
 {
     for (uint64_t j = 0; p->touched && j < p->rims; j++)
@@ -192,9 +196,9 @@ static bool is_paired(const ebpo_large_polytope *p, uint64_t i)
     return false;
 }
 
-/* Closes the cap, whose loop is the rim reversed. A rim edge in both directions is between two kept
- * faces. */
-static bool close_loop(ebpo_large_polytope *p, int32_t tag)
+/* Adds the cap: its loop consists of the reversed edges of the rim, except paired edges. Returns
+ * false if they do not form one loop. */
+static bool add_cap(ebpo_large_polytope *p, int32_t tag)
 {
     uint64_t open = 0, steps = 0;
     uint32_t begin = no_vertex;
@@ -250,7 +254,7 @@ static bool begin_cut(ebpo_large_polytope *p)
 
 ebpo_clip ebpo_large_clip(ebpo_large_polytope *p, const double n[3], double d, int32_t tag)
 {
-    double most = -1e300, least = 1e300;
+    double greatest = -1e300, least = 1e300;
     if (!ebpo_grow(&p->distance, &p->distance_capacity, p->now.vertex_count, sizeof *p->distance)) {
         p->no_memory = true;
         return EBPO_CLIP_REFUSED;
@@ -258,16 +262,16 @@ ebpo_clip ebpo_large_clip(ebpo_large_polytope *p, const double n[3], double d, i
     for (uint64_t i = 0; i < p->now.vertex_count; i++) {
         double e = ebpo_vec3_dot(n, p->now.vertex[i]) - d;
         p->distance[i] = e;
-        most = e > most ? e : most;
+        greatest = e > greatest ? e : greatest;
         least = e < least ? e : least;
     }
-    if (most <= tolerance)
+    if (greatest <= tolerance)
         return EBPO_CLIP_NONE;
     if (least >= -1e-7 || !begin_cut(p))
         return EBPO_CLIP_REFUSED;
     for (uint64_t f = 0; f < p->now.face_count && !p->no_memory; f++)
         clip_loop(p, f);
-    if (p->no_memory || !close_loop(p, tag) || p->no_memory || p->next.face_count < 4)
+    if (p->no_memory || !add_cap(p, tag) || p->no_memory || p->next.face_count < 4)
         return EBPO_CLIP_REFUSED;
     ebpo_large_shape old = p->now;
     p->now = p->next;

@@ -1,5 +1,5 @@
-/* A convex polytope with any number of faces (large_polytope.c), for envelopes of the theses, which
- * may have thousands of planes. ebpo_polytope holds the 255 planes that a file stores. */
+/* A convex polytope with any number of faces, for envelopes of the theses, which may have thousands
+ * of planes. (ebpo_polytope has at most the 255 planes that a file stores for a node.) */
 #ifndef EBPO_CONSTRUCT_LARGE_POLYTOPE_H
 #define EBPO_CONSTRUCT_LARGE_POLYTOPE_H
 
@@ -20,17 +20,19 @@ typedef struct ebpo_large_shape {
 
 typedef struct ebpo_large_polytope {
     ebpo_large_shape now, next;   /* next: work space */
-    double *distance;             /* [vertices of now] from the cutting plane */
-    uint32_t *number;             /* [vertices of now] index in next */
-    uint32_t *cap;                /* [vertices of next] successor in the loop of the cap */
-    bool *on;                     /* [vertices of next] the vertex is on the cutting plane */
+    double *distance;             /* [vertex of now] signed distance from the cutting plane */
+    uint32_t *number;             /* [vertex of now] index in `next` */
+    uint32_t *cap;                /* [vertex of next] next vertex of the cap, the new face in the
+                                   * cutting plane */
+    bool *on;                     /* [vertex of next] the vertex is on the cutting plane */
     struct ebpo_large_edge *edge; /* hash table of the cut edges */
     struct ebpo_large_rim {
         uint32_t from, to;
     } * rim; /* edges of kept faces on the cutting plane */
     uint64_t rims, distance_capacity, number_capacity, cap_capacity, on_capacity, edge_capacity,
         edge_slots, rim_capacity;
-    bool touched; /* old vertices are on the plane: a rim edge may be between two kept faces */
+    bool touched; /* old vertices are on the plane, so an edge of `rim` may be between two kept
+                     faces */
     bool no_memory;
 } ebpo_large_polytope;
 
@@ -38,7 +40,8 @@ typedef struct ebpo_large_polytope {
  */
 bool ebpo_large_cube(ebpo_large_polytope *p);
 
-/* Keeps n . x <= d, as ebpo_polytope_clip. EBPO_CLIP_REFUSED with no_memory set: out of memory. */
+/* Cuts off all points with n . x > d, as ebpo_polytope_clip. Without memory, sets p->no_memory and
+ * returns EBPO_CLIP_REFUSED. */
 ebpo_clip ebpo_large_clip(ebpo_large_polytope *p, const double n[3], double d, int32_t tag);
 
 double ebpo_large_volume(const ebpo_large_polytope *p);

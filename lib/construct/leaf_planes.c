@@ -1,11 +1,11 @@
 /* Computes the envelope of a leaf from its faces (EBP 2017, 3.3.4). Readers derive the same planes
  * from the same faces, bit for bit, so most files do not store them.
  *
- * The candidates' directions are those of the convex hull of the extreme points: the corners of the
- * faces' parts in the cell, and the cell's corners that are inside the solid. When there are too
- * many points, or all are in one plane, the directions are the normals of the faces. A plane's
- * offset is the support of all points, plus a bound of the rounding error, so no part of a face in
- * the cell is cut off. */
+ * The directions of candidates are the normals of the convex hull of the leaf's points: the corners
+ * of the faces' parts in the cell, and the cell's corners that are inside the solid. If there are
+ * too many points, or if all are in one plane, the directions are the normals of the faces. The
+ * offset of a plane is the support (the greatest n . x) of all points, plus a bound of the rounding
+ * error, so no part of a face in the cell is cut off. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -17,9 +17,11 @@
 #include "geometry/polytope.h"
 #include "geometry/vec3.h"
 
+/* Maximum numbers of candidates and of points; size of the hash table of points. */
 enum { LEAF_CANDIDATES = 64, LEAF_POINTS = 192, LEAF_TABLE = 512 };
 
-/* Extreme points of the solid in the cell, and a bound of the rounding error of a coordinate. */
+/* The points whose hull contains the solid in the cell, and bounds of the rounding errors of their
+ * coordinates. */
 typedef struct leaf_points {
     double at[LEAF_POINTS][3], slack[LEAF_POINTS];
     int count;
@@ -39,7 +41,7 @@ static bool add_candidate(uint32_t normal, ebpo_candidate *out, int *count)
 
 /* --- few points: their hull --- */
 
-static bool same_point(const double a[3], const double b[3])
+static bool equal_points(const double a[3], const double b[3])
 {
     return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
 }
@@ -49,7 +51,8 @@ static bool add_point(leaf_points *points, const double p[3], double slack)
     uint64_t bits[3], place;
     memcpy(bits, p, sizeof bits);
     EBPO_HASH_FIND(place, ebpo_hash_three(bits), LEAF_TABLE - 1,
-                   !points->number[place] || same_point(points->at[points->number[place] - 1], p));
+                   !points->number[place] ||
+                       equal_points(points->at[points->number[place] - 1], p));
     if (points->number[place]) {
         int i = points->number[place] - 1;
         points->slack[i] = fmax(points->slack[i], slack);
@@ -64,7 +67,7 @@ static bool add_point(leaf_points *points, const double p[3], double slack)
     return true;
 }
 
-/* Collects the extreme points. Returns false when there are more than LEAF_POINTS. */
+/* Collects the points. Returns false if there are more than LEAF_POINTS. */
 static bool gather_points(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces,
                           uint64_t count, unsigned inside, leaf_points *points)
 {
@@ -83,6 +86,7 @@ static bool gather_points(const ebpo_box *box, ebpo_cell cell, const ebpo_triang
     return true;
 }
 
+/* Makes candidates of the facets of the points' hull, without supports. Returns their number. */
 static int hull_normals(const leaf_points *points, ebpo_candidate *out)
 {
     ebpo_hull_facet facets[2 * LEAF_POINTS];
@@ -101,8 +105,8 @@ static int hull_normals(const leaf_points *points, ebpo_candidate *out)
 
 /* --- many points, or all of them in a plane: the faces' directions --- */
 
-/* Collects distinct normals of the faces (an even sample of many), and the opposite ones, for
- * solids and surfaces without thickness. */
+/* Makes candidates of the faces' normals (of every step-th face if there are many) and of the
+ * opposite normals, which solids and surfaces without thickness need. Returns their number. */
 static int face_normals(const ebpo_box *box, const ebpo_triangle *faces, uint64_t count,
                         ebpo_candidate *out)
 {
@@ -125,6 +129,7 @@ static int face_normals(const ebpo_box *box, const ebpo_triangle *faces, uint64_
 
 /* --- offsets --- */
 
+/* Raises the supports of all candidates to the value of a point. `n`: decoded normals. */
 static void raise_supports(ebpo_candidate *c, double (*n)[3], int count, const double p[3],
                            double slack)
 {
@@ -166,14 +171,14 @@ static int leaf_candidates(const ebpo_box *box, ebpo_cell cell, const ebpo_trian
 {
     leaf_points points;
     double n[LEAF_CANDIDATES][3];
-    bool few = gather_points(box, cell, faces, count, inside_corners, &points);
-    int kept = few ? hull_normals(&points, out) : 0;
+    bool has_all = gather_points(box, cell, faces, count, inside_corners, &points);
+    int kept = has_all ? hull_normals(&points, out) : 0;
     if (kept == 0)
         kept = face_normals(box, faces, count, out);
     decode_normals(out, kept, n);
-    if (!few)
+    if (!has_all)
         supports_of_faces(box, cell, faces, count, inside_corners, out, n, kept);
-    for (int i = 0; few && i < points.count; i++)
+    for (int i = 0; has_all && i < points.count; i++)
         raise_supports(out, n, kept, points.at[i], points.slack[i]);
     return kept;
 }

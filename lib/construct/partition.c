@@ -1,12 +1,13 @@
-/* Assigns faces to cells. First the top of the tree is cut until the pieces below it are small
- * enough to be processed in parallel; then each piece becomes a subtree, depth first.
+/* Assigns faces to cells. First the root is divided into nodes until these are small enough to be
+ * processed in parallel: they are the roots of the pieces, and the nodes above them are the top.
+ * Then the nodes of each piece are made, depth first.
  *
- * A node depends on its cell and its faces alone, and the depth of the top depends on the model
- * alone, so the result is independent of pieces, threads and machine. Sources: EBP 2017, 3.3
+ * A node depends on its cell and its faces alone, and the pieces depend on the model alone, so the
+ * result does not depend on the number of threads or the machine. Sources: EBP 2017, 3.3
  * (assignment of faces to leaves); BP 2008, 3.3.1 (coalescing nodes with few faces).
  *
- * While the top is cut, two inputs of each piece are computed that depend on other pieces: which of
- * its faces no earlier piece lists ("fresh" faces), and the winding numbers at its corners. */
+ * While the top is divided, two inputs of each piece are computed that depend on other pieces: its
+ * *fresh* faces, which no earlier piece lists, and the winding numbers at its corners. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -25,14 +26,15 @@
 
 /* --- a piece: limits and lists --- */
 
+/* Number of faces after which pages of the workspace are released. */
 enum { RELEASE_FACES = 1 << 13 };
 
-/* Limits of leaves and listed faces: a mesh with huge faces and a deep maximum level would list
- * every face in millions of cells. */
+/* Limits of the numbers of leaves and of entries in their lists: with huge faces and a deep maximum
+ * level, every face would be listed in millions of cells. */
 static const uint64_t leaves_per_face = 64, leaves_always = 1 << 22, entries_per_face = 512,
                       entries_always = 1 << 26;
 
-/* Set of faces found below a node. A slot is used if its round is the current round, so a new round
+/* A set of faces (hash table). A slot is occupied if its round is the current round, so a new round
  * empties the set without clearing the slots. */
 typedef struct face_set {
     struct {
@@ -42,20 +44,22 @@ typedef struct face_set {
     uint32_t round;
 } face_set;
 
+/* State of making the nodes of a piece. */
 typedef struct grower {
     ebpo_builder *b;
     ebpo_branch *s;
-    uint32_t *stack; /* lists of the nodes on the way down, one after the other */
+    uint32_t *stack; /* face lists of the nodes on the way down and of their children */
     uint64_t stack_used, stack_capacity;
-    uint8_t *mask;
+    uint8_t *mask; /* octants of each face of the node that is divided */
     uint64_t mask_capacity;
-    ebpo_triangle *faces; /* capacity for one leaf */
+    ebpo_triangle *faces; /* faces of a leaf */
     uint64_t faces_capacity;
     face_set set;
     ebpo_error *error;
 } grower;
 
-/* Returns true when leaves are made by a criterion of the theses, after all levels. */
+/* Returns true if gray nodes become leaves by a criterion of the theses, after their children have
+ * been made. */
 static bool coalesces_late(const ebpo_builder *b)
 {
     return b->thesis && b->thesis->coalesce != EBPO_COALESCE_DISTINCT;
@@ -84,8 +88,8 @@ static ebpo_status no_memory_for_cells(ebpo_error *error)
     return ebpo_fail(error, EBPO_E_MEMORY, "out of memory while assigning faces to cells");
 }
 
-/* Lists the faces that cross the cell's faces (or touch an upper cell face): such a face has a
- * vertex outside the cell's run of vertices. */
+/* Adds to s->crossing the faces that cross a cell face or touch an upper cell face: such a face has
+ * a vertex that is not in the cell's range of vertices. */
 static bool record_crossing(const ebpo_builder *b, ebpo_branch *s, ebpo_cell cell,
                             const uint32_t *list, uint64_t count, ebpo_build_detail *detail)
 {
@@ -105,6 +109,7 @@ static bool record_crossing(const ebpo_builder *b, ebpo_branch *s, ebpo_cell cel
     return true;
 }
 
+/* Makes a leaf of the list at stack[at]. */
 static ebpo_status grow_leaf(grower *g, ebpo_build_node *node, ebpo_cell cell, uint64_t at,
                              uint64_t count)
 {
@@ -133,7 +138,8 @@ static ebpo_status grow_leaf(grower *g, ebpo_build_node *node, ebpo_cell cell, u
     return EBPO_OK;
 }
 
-/* Splits the list at stack[at] into eight lists at stack[top]. */
+/* Splits the list at stack[at] into eight lists from stack[top] on. List o is stack[begin[o]] to
+ * stack[begin[o + 1] - 1]. */
 static ebpo_status split_list(grower *g, ebpo_cell cell, uint64_t at, uint64_t count, uint64_t top,
                               uint64_t begin[9])
 {
@@ -178,7 +184,7 @@ static bool set_has(const face_set *set, uint32_t face)
     return set->slots[set_slot(set, face)].round == set->round;
 }
 
-/* Empties the set, which has space for one face more than a leaf may list. */
+/* Empties the set, and makes space for most + 1 faces. Returns false when out of memory. */
 static bool set_start(face_set *set, uint64_t most)
 {
     if (!set->slots || set->mask < 2 * (most + 2) - 1) {
@@ -192,9 +198,9 @@ static bool set_start(face_set *set, uint64_t most)
     return set->slots != NULL;
 }
 
-/* Collapses a gray node with few faces. A face that misses the cell by a rounding error may be
- * listed here but not in smaller cells. When the leaves below a gray node list no more faces than
- * one leaf may, the node becomes a leaf of these faces; when they list none, it is empty. */
+/* Makes a gray node a leaf, or an empty node, if the leaves below it list at most as many different
+ * faces as a leaf may list. (A node's list may have faces that miss the cell by a rounding error;
+ * smaller cells may not list them. So there may be fewer faces below a node than in its list.) */
 static ebpo_status collapse_if_few(grower *g, uint32_t index, ebpo_cell cell, uint64_t at,
                                    uint64_t count)
 {
@@ -300,7 +306,8 @@ ebpo_status ebpo_build_partition(ebpo_builder *b, ebpo_branch *s, ebpo_error *er
 
 /* --- the top of the tree --- */
 
-/* Pieces have at most this many faces, but there are no more than about PIECES_MAX pieces. */
+/* A piece has at most PIECE_FACES faces, unless that would make more than about PIECES_MAX pieces.
+ */
 enum { PIECE_FACES = 4096, PIECES_MAX = 2048, SPLIT_GRAIN = 1 << 13 };
 
 static ebpo_status no_memory_for_pieces(const ebpo_builder *b, ebpo_error *error)
@@ -308,8 +315,8 @@ static ebpo_status no_memory_for_pieces(const ebpo_builder *b, ebpo_error *error
     return ebpo_workspace_fail_while(b->workspace, "while cutting the tree into pieces", error);
 }
 
-/* The task of splitting a node of the top: its faces are classified in blocks, and the blocks are
- * then distributed to the children's lists in parallel. */
+/* The tasks of dividing a node of the top: blocks of SPLIT_GRAIN faces are classified, and then
+ * distributed to the children's lists, both in parallel. */
 typedef struct top_split {
     const ebpo_builder *b;
     ebpo_cell cell;
@@ -322,8 +329,8 @@ typedef struct top_split {
     uint32_t *to[9]; /* for each bit: the list that gets the faces */
 } top_split;
 
-/* Returns a mask of the octants that the face touches. An exact test decides where several octants
- * are possible, as each face that a piece lists must be in one of its leaves. */
+/* Returns a mask of the octants that the face touches. If several octants are possible, an exact
+ * test decides, because each face that a piece lists must be in one of its leaves. */
 static unsigned octants_exactly(const ebpo_builder *b, ebpo_cell cell, const ebpo_triangle *face)
 {
     unsigned mask = ebpo_octants_visited(&b->box, cell, face);
@@ -380,22 +387,23 @@ static ebpo_status distribute_faces(void *context, uint64_t begin, uint64_t end,
     return EBPO_OK;
 }
 
-/* Returns the number of faces that a piece lists already. */
+/* Returns the number of different faces that the pieces list so far. */
 static uint64_t faces_done(const ebpo_builder *b)
 {
     const ebpo_branch *last = b->sub_count ? &b->sub[b->sub_count - 1] : NULL;
     return last ? last->first + last->fresh_count : 0;
 }
 
-/* Replaces the numbers of faces of blocks by positions of blocks, and sets `sizes` to the sums. */
+/* Replaces the number of each block's faces by the block's position in the list, and sets `sizes`
+ * to the lengths of the lists. */
 static void add_up(top_split *t, uint64_t sizes[9])
 {
     memset(sizes, 0, 9 * sizeof *sizes);
     for (uint64_t block = 0; block * SPLIT_GRAIN < t->count; block++)
         for (int bit = 0; bit < 9; bit++) {
-            uint64_t own = t->begin[block][bit];
+            uint64_t faces = t->begin[block][bit];
             t->begin[block][bit] = sizes[bit];
-            sizes[bit] += own;
+            sizes[bit] += faces;
         }
 }
 
@@ -416,6 +424,8 @@ static ebpo_status reserve_space(ebpo_builder *b, top_split *t, uint32_t *lists[
     return EBPO_OK;
 }
 
+/* Splits the list of a node of the top into the lists of its eight children, and adds crossing
+ * faces to the top's list. `sizes`: lengths of the lists, and number of crossing faces. */
 static ebpo_status split_top(ebpo_builder *b, ebpo_cell cell, const uint32_t *list, uint64_t count,
                              uint32_t *lists[8], uint64_t sizes[9], ebpo_error *error)
 {
@@ -446,7 +456,7 @@ static ebpo_status split_top(ebpo_builder *b, ebpo_cell cell, const uint32_t *li
     return status;
 }
 
-/* Marks the faces of the piece that no piece before it lists. */
+/* Marks the fresh faces of a piece: the faces that no earlier piece lists. */
 static bool mark_fresh(ebpo_builder *b, ebpo_branch *s, uint8_t *listed)
 {
     s->fresh = ebpo_alloc_zero(s->list_count / 8 + 1, 1);
@@ -464,9 +474,10 @@ static bool mark_fresh(ebpo_builder *b, ebpo_branch *s, uint8_t *listed)
     return true;
 }
 
+/* State of dividing the tree into pieces. */
 typedef struct cutting {
     ebpo_builder *b;
-    uint64_t piece;   /* a node with at most this many faces becomes a piece */
+    uint64_t piece;   /* a node with at most this number of faces becomes a piece */
     uint8_t *listed;  /* bit f: a piece lists face f */
     uint64_t entries; /* number of entries in the lists of all pieces so far */
     ebpo_error *error;
@@ -495,7 +506,7 @@ static ebpo_status add_piece(cutting *c, ebpo_build_node *node, ebpo_cell cell, 
     return EBPO_OK;
 }
 
-/* Grows a node of the top; takes over `list`. */
+/* Makes a node of the top a piece, or divides it; takes over `list`. */
 static ebpo_status grow_top(cutting *c, uint32_t index, ebpo_cell cell, uint32_t *list,
                             uint64_t count)
 {
@@ -579,29 +590,29 @@ static ebpo_status corners_of_pieces(void *context, uint64_t begin, uint64_t end
     return EBPO_OK;
 }
 
-/* Limits the number of threads so that half of the memory budget is enough for the largest piece in
- * each thread. A piece is processed in memory, and a cell of the deepest level is not cut, however
- * many faces it lists. */
+/* Limits the number of threads so that half of the memory budget is sufficient if each thread
+ * processes a piece of the greatest size. (A piece is processed in memory, and a cell of the
+ * deepest level is not divided, however many faces it lists.) */
 static ebpo_status fit_largest_piece(ebpo_builder *b, ebpo_error *error)
 {
     /* memory for the points of a hull, measured with a million faces at one vertex */
     enum { BYTES_A_FACE = 160 };
     ebpo_workspace_stats stats = EBPO_WORKSPACE_STATS_INIT;
     stats.memory = 0;
-    uint64_t most = 1;
+    uint64_t largest = 1;
     if (b->workspace)
         ebpo_workspace_get_stats(b->workspace, &stats);
     if (stats.memory < EBPO_WORKSPACE_MIN)
         return EBPO_OK; /* no budget, or a small budget of a test */
     for (uint64_t i = 0; i < b->sub_count; i++)
-        most = b->sub[i].list_count > most ? b->sub[i].list_count : most;
-    uint64_t fit = stats.memory / 2 / BYTES_A_FACE / most;
+        largest = b->sub[i].list_count > largest ? b->sub[i].list_count : largest;
+    uint64_t fit = stats.memory / 2 / BYTES_A_FACE / largest;
     if (fit < 1)
         return ebpo_fail(
             error, EBPO_E_LIMIT,
             "a cell of level %d, the deepest allowed level, lists %llu faces, for which half of "
             "the memory budget of %llu bytes is too small; allow more levels or more memory",
-            b->max_level, (unsigned long long)most, (unsigned long long)stats.memory);
+            b->max_level, (unsigned long long)largest, (unsigned long long)stats.memory);
     b->threads = b->threads < fit ? b->threads : (unsigned)fit;
     return EBPO_OK;
 }

@@ -1,5 +1,5 @@
-/* Manages the data of the pieces of the tree during the build: nodes, details, lists, stretches of
- * the levels' arrays, proposed planes, and the store.
+/* Manages the data of the pieces of the tree during the build: nodes, details, lists, proposed
+ * planes, the piece's part (stretch) of each level's arrays, and the store.
  *
  * A piece is a subtree that one thread builds. Its arrays grow in memory or in the builder's
  * workspace. When a piece is done, its results move to the store. The store consists of blocks of
@@ -142,7 +142,7 @@ bool ebpo_proposals_make(ebpo_branch *s)
 
 /* --- the store --- */
 
-enum { STORE_BYTES = 16 << 20, ALIGNMENT = 8 };
+enum { STORE_BYTES = 16 << 20 /* of a block */, ALIGNMENT = 8 };
 
 /* Blocks of the workspace, filled one after the other. */
 struct ebpo_store {
@@ -150,8 +150,8 @@ struct ebpo_store {
     pthread_mutex_t lock;
     char **blocks;
     uint64_t block_count, block_capacity;
-    size_t left; /* free bytes at the end of the last block */
-    size_t last_bytes;
+    size_t left;       /* free bytes at the end of the last block */
+    size_t last_bytes; /* bytes of the last block */
 };
 
 static size_t aligned_bytes(uint64_t count, size_t size)
@@ -159,6 +159,7 @@ static size_t aligned_bytes(uint64_t count, size_t size)
     return (count * size + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
 }
 
+/* Reserves bytes in the last block, or in a new block. */
 static char *store_take(ebpo_builder *b, struct ebpo_store *s, size_t bytes)
 {
     if (!s->block_count || bytes > s->left) {

@@ -1,13 +1,14 @@
 /* Prepares a mesh for building, and finds repairs that make it a solid.
  *
- * ebpo_mesh_prepare sorts the mesh along the curve first, so that each later step accesses memory
- * in order; then it checks, repairs as the options request, sorts again and checks again. A mesh
- * with coordinates beyond 2^1000 (ebpo_mesh_arrange) is still checked; ebpo_build rejects it.
+ * ebpo_mesh_prepare first sorts the mesh along the Morton curve (arrange.h), so that each later
+ * step accesses memory in order. Then it checks the mesh, repairs it as the options request, sorts
+ * again and checks again. A mesh with coordinates beyond 2^1000, which ebpo_mesh_arrange rejects,
+ * is checked all the same; ebpo_build rejects it.
  *
  * ebpo_mesh_try_repairs applies sequences of repairs to copies of the mesh, shorter sequences
  * first, until one leaves a solid without doubts. Doubts are reasons why a solid may differ from
- * the author's intention: holes that were filled over much of the surface, a volume that is
- * negative, or one that is small for the area (a sheet). */
+ * the author's intention: much of the surface was made by filling holes, or the volume is negative,
+ * or the volume is very small for the area (a sheet). */
 #include "core/strict_fp.h"
 
 #include <ebpo/repair.h>
@@ -29,8 +30,9 @@ typedef struct preparation {
     ebpo_prepared *out;
 } preparation;
 
-/* Ignores the error for coordinates beyond 2^1000, as checking is still possible. ebpo_build
- * reports the error again. */
+/* Replaces EBPO_E_LIMIT, the error for coordinates beyond 2^1000, by EBPO_OK, because the mesh can
+ * still be checked. (ebpo_build returns the error again.) Copies any other error from *local to
+ * *error. */
 static ebpo_status accept_too_large(ebpo_status status, const ebpo_error *local, ebpo_error *error)
 {
     if (status == EBPO_OK || status == EBPO_E_LIMIT)
@@ -51,8 +53,8 @@ static ebpo_status repair_as_requested(const preparation *p, bool weld, ebpo_err
     return ebpo_mesh_repair(p->mesh, steps, o->weld_distance, &p->out->record, error);
 }
 
-/* Sorts along the curve first, so that each step accesses memory in order. This matters when memory
- * is small. */
+/* Sorts along the curve, checks and repairs. Sorting comes first, because the next steps are slow
+ * in a workspace with little memory if they do not access memory in order. */
 static ebpo_status arrange_and_repair(const preparation *p, bool weld, ebpo_error *error)
 {
     const ebpo_prepare_options *o = p->options;
@@ -67,7 +69,7 @@ static ebpo_status arrange_and_repair(const preparation *p, bool weld, ebpo_erro
 static ebpo_status prepare_in_order(const preparation *p, ebpo_error *error)
 {
     const ebpo_prepare_options *o = p->options;
-    /* STL has no shared vertices */
+    /* faces of an STL file share no vertices, so these are always welded */
     bool weld = o->weld || o->weld_distance > 0 || strncmp(p->mesh->source_format, "stl", 3) == 0;
     ebpo_status status = EBPO_OK;
     if (!(o->weld_distance >= 0))
@@ -93,7 +95,7 @@ ebpo_status ebpo_mesh_prepare(ebpo_mesh *mesh, const ebpo_prepare_options *optio
                               ebpo_prepared *out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    static const ebpo_prepared nothing = EBPO_PREPARED_INIT;
+    static const ebpo_prepared none = EBPO_PREPARED_INIT;
     ebpo_prepare_options wanted = EBPO_PREPARE_OPTIONS_INIT;
     ebpo_prepared made = EBPO_PREPARED_INIT;
     preparation p = { mesh, &wanted, &made };
@@ -102,7 +104,7 @@ ebpo_status ebpo_mesh_prepare(ebpo_mesh *mesh, const ebpo_prepare_options *optio
         status = EBPO_TAKE(ebpo_prepare_options, &wanted, options, error);
     if (status == EBPO_OK)
         status = prepare_in_order(&p, error);
-    EBPO_GIVE(ebpo_prepared, out, status == EBPO_OK ? &made : &nothing);
+    EBPO_GIVE(ebpo_prepared, out, status == EBPO_OK ? &made : &none);
     return status;
 }
 
@@ -115,12 +117,13 @@ enum {
     DROP = EBPO_REPAIR_DROP
 };
 
-/* A sheet: the cube root of the volume is at most this share of the square root of the area. */
+/* A mesh is a sheet if the cube root of its volume is at most this share of the square root of its
+ * area. */
 static const double THIN = 0.01;
 
 typedef struct trying {
     const ebpo_mesh *mesh;
-    const ebpo_mesh_report *given;
+    const ebpo_mesh_report *given; /* report on `mesh` */
     unsigned threads;
     const ebpo_progress *progress;
     ebpo_repairs *out;
@@ -128,8 +131,8 @@ typedef struct trying {
 
 /* --- doubts about a result --- */
 
-/* Returns true if much of the surface was filled. When a loop of n edges is filled, n - 2 faces and
- * n - 3 edges are added. */
+/* Returns true if more than half of the edges were boundary edges before holes were filled.
+ * (Filling a loop of n edges adds n - 2 faces and n - 3 edges.) */
 static bool mostly_open(const ebpo_mesh_report *report, const ebpo_repair_record *record)
 {
     uint64_t boundary = record->added_faces + 2 * record->filled_holes;
@@ -152,12 +155,12 @@ static uint32_t doubts_of_filling(double area, const ebpo_mesh_report *report,
     return doubts;
 }
 
-/* Finds sheets and solids turned inside out. For coordinates far from 1, volume and area overflow
- * or vanish, though the volume keeps its sign. Then only a mesh without extent along an axis counts
- * as a sheet. */
+/* Finds sheets, and solids that are inside out. If coordinates are extremely large or small, volume
+ * and area overflow or underflow, but the volume keeps its sign. Then only a mesh without extent
+ * along an axis counts as a sheet. */
 static uint32_t doubts_of_volume(const ebpo_mesh_report *report)
 {
-    enum { FAR = 1000 };
+    enum { EXTREME = 1000 }; /* sum of the three exponents of the extent */
     int exponent[3], sum = 0;
     bool flat = false;
     for (int k = 0; k < 3; k++) {
@@ -166,8 +169,8 @@ static uint32_t doubts_of_volume(const ebpo_mesh_report *report)
         frexp(isfinite(extent) ? extent : DBL_MAX, &exponent[k]);
         sum += exponent[k];
     }
-    bool far = sum > FAR || sum < -FAR;
-    if (flat || (!far && cbrt(fabs(report->volume)) <= THIN * sqrt(report->area)))
+    bool extreme = sum > EXTREME || sum < -EXTREME;
+    if (flat || (!extreme && cbrt(fabs(report->volume)) <= THIN * sqrt(report->area)))
         return EBPO_DOUBT_NO_VOLUME;
     return signbit(report->volume) ? EBPO_DOUBT_INSIDE_OUT : 0;
 }
@@ -184,6 +187,7 @@ uint32_t ebpo_mesh_doubts(double area, const ebpo_mesh_report *report,
 
 /* --- sequences of repairs --- */
 
+/* Applies `steps` to a copy of the mesh, and adds the result to the list of tries. */
 static ebpo_status try_steps(trying *t, unsigned steps, ebpo_error *error)
 {
     static const ebpo_progress silent;
@@ -208,7 +212,7 @@ static ebpo_status try_steps(trying *t, unsigned steps, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Returns true if `steps`, applied to the mesh that `base` describes, may leave a solid. */
+/* Returns true if `steps` may make a solid of a mesh with the report `base`. */
 static bool may_help(const ebpo_mesh_report *base, unsigned steps)
 {
     bool open = base->boundary_edges.count > 0;
@@ -219,12 +223,13 @@ static bool may_help(const ebpo_mesh_report *base, unsigned steps)
     return !(steps & ORIENT) || turned || open;
 }
 
-/* Start of a sequence: the steps done before, and the report on their result. */
+/* The beginning of a sequence: the steps so far, and the report on their result. */
 typedef struct start {
     unsigned steps;
-    const ebpo_mesh_report *report; /* NULL: not done */
+    const ebpo_mesh_report *report; /* NULL: the steps were not tried */
 } start;
 
+/* Tries from.steps and `more`, unless a repair is already chosen or this cannot make a solid. */
 static ebpo_status try_more(trying *t, start from, unsigned more, ebpo_error *error)
 {
     if (t->out->chosen >= 0 || !from.report || !may_help(from.report, more))
@@ -232,7 +237,7 @@ static ebpo_status try_more(trying *t, start from, unsigned more, ebpo_error *er
     return try_steps(t, from.steps | more, error);
 }
 
-/* Tries the step alone, and sets *then to the start for further steps. */
+/* Tries from.steps and `step`, and sets *then to the start for further steps. */
 static ebpo_status begin_with(trying *t, start from, unsigned step, start *then, ebpo_error *error)
 {
     if (t->out->chosen >= 0)
@@ -241,13 +246,14 @@ static ebpo_status begin_with(trying *t, start from, unsigned step, start *then,
     return try_steps(t, then->steps, error);
 }
 
+/* Tries to drop repeated faces, if there are any. */
 static ebpo_status drop_repeated(trying *t, start from, start *then, ebpo_error *error)
 {
     return from.report->repeated_faces.count ? begin_with(t, from, DROP, then, error) : EBPO_OK;
 }
 
-/* If there are vertices to merge, makes the welded mesh the start of the other sequences. Shorter
- * sequences without welding are tried too. */
+/* If vertices have equal positions, first tries short sequences without welding; then makes the
+ * welded mesh the start of all further sequences. */
 static ebpo_status weld_first(trying *t, start *from, ebpo_error *error)
 {
     start bare = *from, dropped = { 0, NULL };
@@ -281,7 +287,7 @@ static ebpo_status try_all(trying *t, ebpo_error *error)
     return status == EBPO_OK ? try_more(t, dropped, ORIENT | FILL, error) : status;
 }
 
-/* Tries to drop the repeated faces of a plausible solid, for information only: no repair is chosen.
+/* Tries to drop the repeated faces of a solid without doubts, for information: no repair is chosen.
  */
 static ebpo_status try_dropping(trying *t, ebpo_error *error)
 {
@@ -295,8 +301,8 @@ ebpo_status ebpo_mesh_try_repairs(const ebpo_mesh *mesh, const ebpo_mesh_report 
                                   ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    static const ebpo_repairs nothing = { .struct_size = sizeof nothing, .chosen = -1 };
-    ebpo_repairs made = nothing;
+    static const ebpo_repairs none = { .struct_size = sizeof none, .chosen = -1 };
+    ebpo_repairs made = none;
     trying t = { mesh, report, threads, &progress, &made };
     ebpo_status status = EBPO_CHECK_SIZED(ebpo_repairs, out, error);
     if (status == EBPO_OK)
@@ -305,6 +311,6 @@ ebpo_status ebpo_mesh_try_repairs(const ebpo_mesh *mesh, const ebpo_mesh_report 
         status = try_all(&t, error);
     else if (status == EBPO_OK && report->repeated_faces.count)
         status = try_dropping(&t, error);
-    EBPO_GIVE(ebpo_repairs, out, status == EBPO_OK ? &made : &nothing);
+    EBPO_GIVE(ebpo_repairs, out, status == EBPO_OK ? &made : &none);
     return status;
 }

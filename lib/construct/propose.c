@@ -1,12 +1,14 @@
 /* Chooses planes from the leaves up, for the selections of the theses (EBP 2017, 3.4.1). The walk
  * from the root down writes the chosen planes later.
  *
- * A leaf's candidates are the planes of its faces; a gray node's are the planes that its children
- * have chosen. Each node clips the whole cell, and the supports are computed from the corners of
- * the children's envelopes and from the solid itself, so containment never depends on rounded
- * corners. Each piece is partitioned, its planes are chosen, and its nodes are freed again. Then
- * planes are chosen for the nodes of the top, the deepest level first, and the nodes of a level in
- * parallel. */
+ * The candidates of a leaf are the planes of its faces; the candidates of a gray node are the
+ * planes that its children have chosen. The chosen planes clip the node's cell. The offset of a
+ * plane is its support (greatest n . xi), computed from the corners of the children's envelopes and
+ * from the solid itself. So the envelope contains the solid even if the corners are rounded.
+ *
+ * For each piece, the nodes are made, planes are chosen, and the nodes are freed again. Then planes
+ * are chosen for the nodes of the top (the nodes above all pieces), the deepest level first; nodes
+ * of the same level are processed in parallel. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -24,9 +26,8 @@
 #include "geometry/cells.h"
 #include "geometry/polytope.h"
 
-/* Bound, with a large margin, of the rounding error that the corners of a child's envelope have in
- * a support, in cells. */
-static const double rounded = 1e-9;
+/* Upper bound, in cells, of the rounding error of a corner of a child's envelope. */
+static const double corner_error = 1e-9;
 
 typedef struct proposer {
     const ebpo_builder *b;
@@ -34,9 +35,9 @@ typedef struct proposer {
     ebpo_select_fn select;
     ebpo_supports supports;
     ebpo_candidate *candidates;
-    int *order; /* of the candidates in the node */
+    int *order; /* as in ebpo_choice */
     uint64_t candidate_capacity, order_capacity;
-    ebpo_large_polytope own; /* for envelopes without limits */
+    ebpo_large_polytope own; /* work space of ebpo_thesis_choose */
 } proposer;
 
 /* --- choosing, for leaves and gray nodes alike --- */
@@ -46,7 +47,7 @@ static int by_normal(const void *a, const void *b)
     const ebpo_offer *x = a, *y = b;
     if (x->normal != y->normal)
         return x->normal < y->normal ? -1 : 1;
-    /* among equal normals, the plane that moves least comes first */
+    /* of equal normals, the plane that moves least comes first */
     return x->origin > y->origin ? -1 : x->origin < y->origin;
 }
 
@@ -56,8 +57,8 @@ static int by_normal_alone(const void *a, const void *b)
     return (x->normal > y->normal) - (x->normal < y->normal);
 }
 
-/* More candidates than this are thinned out evenly, as k-medoids compares all pairs. Only leaves
- * without a limit on faces have more. */
+/* If a node has more candidates, only every n-th is kept, as k-medoids compares all pairs. Only
+ * leaves of the deepest level have so many. */
 enum { CANDIDATES_MAX = 4096 };
 
 static int by_place(const void *a, const void *b)
@@ -66,7 +67,7 @@ static int by_place(const void *a, const void *b)
     return (*x > *y) - (*x < *y);
 }
 
-/* Sorts the candidates' numbers as the node has them. */
+/* Sets p->order: the candidates' indices in the order of the node's faces or children. */
 static bool sort_order(proposer *p, const ebpo_handover *given)
 {
     uint64_t *pair = ebpo_alloc(given->offer_count, sizeof *pair);
@@ -80,7 +81,8 @@ static bool sort_order(proposer *p, const ebpo_handover *given)
     return pair != NULL;
 }
 
-/* Keeps one of equal normals, and thins out. */
+/* Sorts the offers by normal, keeps one of equal normals, and at most about CANDIDATES_MAX in all.
+ */
 static void thin_offers(ebpo_handover *given)
 {
     uint64_t kept = 0;
@@ -114,6 +116,7 @@ static bool make_candidates(proposer *p, ebpo_handover *given)
     return p->b->thesis || sort_order(p, given);
 }
 
+/* Raises the candidate's support to the value of a point with the error `slack`. */
 static void raise_support(ebpo_candidate *c, const double point[3], double slack)
 {
     int32_t n[3], d;
@@ -122,6 +125,7 @@ static void raise_support(ebpo_candidate *c, const double point[3], double slack
     c->support = s > c->support ? s : c->support;
 }
 
+/* Returns ebpo_candidate.moved. `size`: size of the cell. */
 static double moved_by(const ebpo_offer *offer, double support, const double size[3])
 {
     int32_t n[3], d;
@@ -132,7 +136,8 @@ static double moved_by(const ebpo_offer *offer, double support, const double siz
     return (support - offer->origin) * least / sqrt(square);
 }
 
-/* Chooses planes from p->candidates, stores them and makes the data for the parent. */
+/* Chooses planes from p->candidates, which were made from the offers `given`; stores them, and
+ * writes the data for the parent to `out`. Returns false when out of memory. */
 static bool choose_planes(proposer *p, uint32_t detail, ebpo_cell cell, uint64_t leaf_faces,
                           const ebpo_handover *given, ebpo_handover *out)
 {
@@ -187,6 +192,7 @@ static bool choose_planes(proposer *p, uint32_t detail, ebpo_cell cell, uint64_t
 
 /* --- leaves: planes of faces, around the solid --- */
 
+/* Adds the plane of each face of a leaf to the offers. */
 static bool offer_faces(proposer *p, const ebpo_build_detail *d, ebpo_cell cell,
                         ebpo_handover *given)
 {
@@ -212,6 +218,8 @@ static bool offer_faces(proposer *p, const ebpo_build_detail *d, ebpo_cell cell,
     return true;
 }
 
+/* Computes the supports of a leaf's candidates: the maximum over its faces in the cell and over the
+ * corners inside the solid. */
 static void leaf_supports(proposer *p, const ebpo_build_detail *d, ebpo_cell cell, int32_t winding,
                           uint64_t count)
 {
@@ -247,8 +255,8 @@ static bool propose_leaf(proposer *p, uint32_t detail, ebpo_cell cell, int32_t w
 
 /* --- gray nodes: the children's planes, around the children's envelopes --- */
 
-/* Uses the solid itself besides the children's envelopes, so that the guarantee never depends on
- * rounded corners. */
+/* Computes the supports of a gray node's candidates: the maximum over the solid in the cell and
+ * over the corners of the children's envelopes. */
 static bool gray_supports(proposer *p, const ebpo_build_detail *d, ebpo_cell cell, int32_t winding,
                           const ebpo_handover *given)
 {
@@ -261,7 +269,7 @@ static bool gray_supports(proposer *p, const ebpo_build_detail *d, ebpo_cell cel
         ebpo_plane_code_decode(c->normal, n, &e);
         c->support = ebpo_supports_find(&p->supports, n, 1e300, where);
         for (uint64_t j = 0; j < given->corner_count; j++)
-            raise_support(c, given->corner[j], rounded);
+            raise_support(c, given->corner[j], corner_error);
     }
     return true;
 }
@@ -274,6 +282,8 @@ static bool propose_gray(proposer *p, uint32_t detail, ebpo_cell cell, int32_t w
            choose_planes(p, detail, cell, 0, given, out);
 }
 
+/* Chooses planes for a node and all nodes below, and writes the data for its parent to `out`.
+ * Returns false when out of memory. */
 static bool propose_node(proposer *p, uint32_t index, ebpo_cell cell, int32_t winding,
                          ebpo_handover *out)
 {
@@ -308,8 +318,8 @@ static void proposer_free(proposer *p)
     ebpo_large_free(&p->own);
 }
 
-/* Chooses the planes of one gray node from its children's data. Returns false when out of memory.
- */
+/* Chooses the planes of one gray node of the top from the data of its children. Returns false when
+ * out of memory. */
 static bool propose_one_gray(const ebpo_builder *b, ebpo_branch *s, uint32_t detail, ebpo_cell cell,
                              int32_t winding, ebpo_handover *given, ebpo_handover *out)
 {
@@ -360,8 +370,7 @@ static ebpo_status pack_proposals(ebpo_builder *b, ebpo_branch *s, ebpo_error *e
     return EBPO_OK;
 }
 
-/* Runs a task over the builder's pieces: partitions each, chooses for its nodes and frees the
- * nodes. */
+/* Makes the nodes of pieces first .. last - 1, chooses their planes, and frees the nodes. */
 static ebpo_status propose_pieces(void *context, uint64_t first, uint64_t last, unsigned worker,
                                   ebpo_error *error)
 {
@@ -386,24 +395,23 @@ static ebpo_status propose_pieces(void *context, uint64_t first, uint64_t last, 
 
 /* --- the top --- */
 
-/* A gray node of the top. The deepest nodes are processed first, the nodes of one level in
- * parallel. */
+/* A gray node of the top. */
 typedef struct top_node {
-    uint32_t node;
+    uint32_t node; /* index in the top's nodes */
     ebpo_cell cell;
     int32_t winding;
-    ebpo_handover given, out;
-    uint64_t parent; /* index in the list */
-    unsigned octant;
+    ebpo_handover given, out; /* data from the children; data for the parent */
+    uint64_t parent;          /* index in the list; UINT64_MAX: root */
+    unsigned octant;          /* of this node in its parent */
     uint32_t codes[EBPO_PLANES_STORED];
     int count;
-    ebpo_thesis_level *thesis; /* as that of ebpo_proposals */
+    ebpo_thesis_level *thesis; /* as in ebpo_proposals */
 } top_node;
 
 typedef struct top_list {
     ebpo_builder *b;
     top_node *nodes;
-    uint64_t count, capacity, base;
+    uint64_t count, capacity, base; /* base: first node of the current level */
 } top_list;
 
 /* Lists the gray nodes breadth first, so that the nodes of a level are consecutive. Also computes
@@ -449,7 +457,8 @@ static ebpo_status propose_top_nodes(void *context, uint64_t first, uint64_t las
     for (uint64_t i = first; i < last && status == EBPO_OK; i++) {
         top_node *n = &t->nodes[t->base + i];
         const ebpo_build_node *node = &b->top.nodes[n->node];
-        ebpo_branch alone = b->top; /* with separate proposals: other threads are running */
+        ebpo_branch alone =
+            b->top; /* a copy with its own proposals, as other threads make theirs */
         uint32_t detail = node->detail;
         int32_t offset[8];
         ebpo_child_windings(b, &b->top, node->child, offset);
@@ -480,6 +489,7 @@ static ebpo_status propose_top_nodes(void *context, uint64_t first, uint64_t las
     return status;
 }
 
+/* Stores the chosen planes as the top's proposals. Returns false when out of memory. */
 static bool store_top(top_list *t)
 {
     ebpo_branch *s = &t->b->top;
@@ -527,7 +537,8 @@ static ebpo_status propose_top(top_list *t, ebpo_pass *pass, ebpo_error *error)
     return status;
 }
 
-/* Adds up in a fixed order: the sums do not depend on threads. */
+/* Adds the sums of all pieces and nodes in a fixed order, so that they do not depend on the number
+ * of threads. */
 static void add_up_levels(const top_list *t)
 {
     ebpo_builder *b = t->b;
@@ -549,7 +560,7 @@ ebpo_status ebpo_build_propose(ebpo_builder *b, ebpo_error *error)
     if (status == EBPO_OK)
         status = ebpo_parallel_for(b->threads, b->workspace, b->sub_count, 1, propose_pieces, b,
                                    &progress, "choosing planes", error);
-    atomic_store(&b->leaf_count, 0); /* the pieces are made again */
+    atomic_store(&b->leaf_count, 0); /* the leaves will be made and counted again */
     atomic_store(&b->entry_count, 0);
     if (status == EBPO_OK)
         status = propose_top(&t, &pass, error);

@@ -1,13 +1,14 @@
-/* Selects the planes of an envelope from candidates: one function for each ebpo_selection, and the
- * table of them at the end. Names and settings of selections are in format/head_facts.c;
- * CONTRIBUTING.md describes how to add one.
+/* Selects the planes of an envelope from candidates. There is one function for each ebpo_selection;
+ * the table at the end lists them. Names and settings of selections are in format/head_facts.c;
+ * CONTRIBUTING.md describes how to add a selection.
  *
- * - greedy (inherit): the plane that removes most volume comes first. Gains only shrink while the
- *   envelope does. So an earlier gain bounds the present gain, and most candidates are never
- *   evaluated again (lazy evaluation). A choice by volume alone leaves needles: long, thin portions
- *   of the envelope with little volume. So planes that cut off needles come last.
- * - random, offset, k-medoids: from the theses (EBP 2017, 3.3.4.3; BP 2008, 3.4.2). They choose a
- *   fixed number of candidates, without regard to the volume that these cut off.
+ * - greedy (EBPO_SELECT_INHERIT): the plane that removes most volume (its gain) comes first. When
+ * planes make the envelope smaller, the gains of the other candidates become smaller, too. So an
+ * earlier gain is an upper bound, and most candidates are evaluated only once (lazy evaluation). A
+ * choice by volume alone would leave needles: long, thin portions of the envelope with little
+ * volume. So planes that cut off needles are added at the end.
+ * - random, offset, k-medoids: the selections of the theses (EBP 2017, 3.3.4.3; BP 2008, 3.4.2).
+ * They choose a fixed number of candidates, whatever volume these cut off.
  *
  * A selection clips the given envelope and returns the codes of its planes. Results depend on the
  * arguments alone; random choices use the seed of the node. */
@@ -25,22 +26,24 @@
 
 /* --- greedy --- */
 
+/* A candidate's plane n . xi <= d. */
 typedef struct ranked {
-    double gain; /* upper bound; exact for the envelope of `round` */
+    /* upper bound of the volume that the plane removes; exact when `round` planes were taken */
+    double gain;
     double n[3], d;
     uint32_t code;
-    int round; /* -1: never evaluated */
+    int round; /* -1: the gain was never evaluated */
 } ranked;
 
-/* Candidates that may still be chosen: a heap by removed volume, and a list by the extent of the
- * envelope beyond the plane. */
+/* Candidates that may still be chosen. */
 typedef struct ranking {
-    ranked by_gain[EBPO_PLANES_CANDIDATES], by_reach[EBPO_PLANES_CANDIDATES];
-    int gains, reaches;
+    ranked by_gain[EBPO_PLANES_CANDIDATES]; /* heap, the greatest gain first */
+    ranked needle[EBPO_PLANES_CANDIDATES];  /* the envelope extends far beyond these planes */
+    int gains, needles;                     /* lengths of both lists */
 } ranking;
 
-/* Makes the plane of a candidate, for ebpo_polytope_clip. Returns false when no plane code has an
- * offset that keeps the candidate's support. */
+/* Makes the plane of a candidate, for ebpo_polytope_clip. Returns false if no plane code has an
+ * offset that is at least the candidate's support. */
 static bool candidate_plane(const ebpo_candidate *candidate, uint32_t *code, double n[3],
                             double *offset)
 {
@@ -69,11 +72,12 @@ static void envelope_extent(const ebpo_polytope *p, const double n[3], double *l
     *most = high;
 }
 
+/* Makes both lists of `c`. `volume`: volume of the envelope. */
 static void rank_candidates(const ebpo_polytope *envelope, double volume,
                             const ebpo_candidate *candidates, int count, double epsilon,
                             double reach, ranking *c)
 {
-    c->gains = c->reaches = 0;
+    c->gains = c->needles = 0;
     for (int i = 0; i < count && i < EBPO_PLANES_CANDIDATES; i++) {
         ranked r = { .round = -1 };
         double least, most;
@@ -83,9 +87,9 @@ static void rank_candidates(const ebpo_polytope *envelope, double volume,
         r.gain = ebpo_polytope_cap_bound(volume, most - least, most - r.d);
         if (r.gain >= epsilon && r.gain > 0)
             c->by_gain[c->gains++] = r;
-        /* further cuts only reduce this extent */
+        /* other cuts only reduce this extent, so no further candidate can be added later */
         if (reach > 0 && most - r.d > reach * ebpo_vec3_length(r.n))
-            c->by_reach[c->reaches++] = r;
+            c->needle[c->needles++] = r;
     }
 }
 
@@ -122,30 +126,30 @@ static void drop_first(ranked *heap, int *count)
         sift_down(heap, *count, 0);
 }
 
-/* Cuts off needles, the longest first. Skips a plane if clipping by it fails. */
+/* Cuts off needles, the longest first. `taken`: number of codes so far; returns the new number. */
 static int cut_needles(ebpo_polytope *envelope, ranking *c, double reach, int most, int taken,
                        uint32_t *codes)
 {
-    while (taken < most && c->reaches > 0) {
+    while (taken < most && c->needles > 0) {
         double deepest = reach;
-        int which = -1, left = 0;
-        for (int i = 0; i < c->reaches; i++) {
+        int which = -1, kept = 0;
+        for (int i = 0; i < c->needles; i++) {
             double low, high;
-            envelope_extent(envelope, c->by_reach[i].n, &low, &high);
-            double depth = (high - c->by_reach[i].d) / ebpo_vec3_length(c->by_reach[i].n);
+            envelope_extent(envelope, c->needle[i].n, &low, &high);
+            double depth = (high - c->needle[i].d) / ebpo_vec3_length(c->needle[i].n);
             if (!(depth > reach))
                 continue;
-            c->by_reach[left] = c->by_reach[i];
+            c->needle[kept] = c->needle[i];
             if (depth > deepest)
-                deepest = depth, which = left;
-            left++;
+                deepest = depth, which = kept;
+            kept++;
         }
-        c->reaches = left;
+        c->needles = kept;
         if (which < 0)
             break;
-        ranked r = c->by_reach[which];
-        memmove(&c->by_reach[which], &c->by_reach[which + 1],
-                (size_t)(--c->reaches - which) * sizeof r);
+        ranked r = c->needle[which];
+        memmove(&c->needle[which], &c->needle[which + 1],
+                (size_t)(--c->needles - which) * sizeof r);
         if (ebpo_polytope_clip(envelope, r.n, r.d, taken) == EBPO_CLIP_CUT)
             codes[taken++] = r.code;
     }
@@ -199,10 +203,10 @@ int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, i
 
 /* --- the selections of the theses --- */
 
-/* Clips by the chosen candidates in ascending order of their indices. Drops candidates that cut
- * nothing by then. At most `most` candidates are chosen (ebpo_selection_wanted), so this loop omits
- * none for lack of space: as candidates are sorted by direction, those would all face in similar
- * directions. */
+/* Clips by the chosen candidates in ascending order of their indices; omits candidates that then
+ * cut off nothing. ebpo_selection_wanted ensures that at most choice->most are chosen. So this loop
+ * never omits the last ones for lack of space; as candidates are sorted by direction, these would
+ * all have similar directions. */
 static int clip_by_chosen(ebpo_polytope *envelope, const ebpo_choice *choice, const bool *chosen,
                           uint32_t *codes)
 {
@@ -220,8 +224,9 @@ static int clip_by_chosen(ebpo_polytope *envelope, const ebpo_choice *choice, co
 
 /* --- random --- */
 
-/* Chooses consecutive candidates in the node's order, from a random one on (EBP 2017, 3.3.4.3).
- * Candidates sorted by direction would give planes that face to one side. */
+/* Chooses consecutive candidates in the order of the node's faces or children, from a random one on
+ * (EBP 2017, 3.3.4.3). (In the order of candidates, which is by direction, they would all face to
+ * one side.) */
 static bool choose_random(const ebpo_choice *choice, bool *chosen)
 {
     uint64_t state = choice->seed, first = ebpo_random_next(&state) % (uint64_t)choice->count;
@@ -261,26 +266,28 @@ static bool choose_offset(const ebpo_choice *choice, bool *chosen)
     return true;
 }
 
-/* --- k-medoids: PAM, as the theses cite it after Ng and Han 1994. The swap of least cost is found
- * for all medoids in one pass over the points (Schubert and Rousseeuw 2019), which gives PAM's
- * result in a k-th of the time. --- */
+/* --- k-medoids: the algorithm PAM, which the theses cite from Ng and Han 1994. One pass over the
+ * points finds the best swap for all k medoids (Schubert and Rousseeuw 2019); the result is the
+ * same, in a k-th of the time. --- */
 
 typedef struct clustering {
     int count, wanted;
-    double (*at)[3];       /* [count] normals, as place_normal */
-    float *distance;       /* [count][count]; NULL: `row` is computed when needed */
-    float *row;            /* [count] */
-    int *medoid;           /* [wanted] */
-    bool *chosen;          /* [count] the caller's */
+    double (*at)[3];       /* [count] normals as points (place_normal) */
+    float *distance;       /* [count][count] squared distances; NULL: `row` is used */
+    float *row;            /* [count] squared distances of one candidate */
+    int *medoid;           /* [wanted] index of the candidate */
+    bool *chosen;          /* [count] the candidate is a medoid; the caller's array */
     int *nearest;          /* [count] index in `medoid` */
-    float *first, *second; /* [count] distance of the nearest medoid and of the next */
-    double *lost;          /* [wanted] change of the cost when the medoid is removed */
-    /* [wanted] part of the change that depends on the medoid, when a candidate replaces it */
+    float *first, *second; /* [count] distances from the nearest and the second nearest medoid */
+    double *lost;          /* [wanted] change of the cost if the medoid is removed */
+    /* [wanted] change of the cost if a certain candidate replaces the medoid, without the part that
+     * is the same for all medoids */
     double *gain;
 } clustering;
 
-/* Returns the angle of (x, y) from the x axis, -pi .. pi, to about 1e-15, by operations that round
- * identically everywhere: implementations of libm differ, but the choices must be the same. */
+/* Returns the angle of (x, y) from the x axis, -pi .. pi, with an error of about 1e-15. Does not
+ * use libm, because its implementations round differently, and the choices must be the same
+ * everywhere. */
 static double angle_of(double y, double x)
 {
     double least = fmin(fabs(x), fabs(y)), most = fmax(fabs(x), fabs(y));
@@ -300,8 +307,8 @@ static double angle_of(double y, double x)
     return y < 0 ? -angle : angle;
 }
 
-/* Computes the normal in the model's coordinates, as a unit vector or as the two angles of the
- * theses. */
+/* Computes the normal in the model's coordinates, as a unit vector (EBPO_NORMALS_ANGLE) or as the
+ * two angles of the theses. */
 static void place_normal(const ebpo_choice *choice, uint32_t normal, double out[3])
 {
     int32_t n[3], d;
@@ -324,7 +331,7 @@ static void place_normal(const ebpo_choice *choice, uint32_t normal, double out[
     out[0] = around, out[1] = down, out[2] = 0;
 }
 
-/* Distances of at most this many candidates are kept. */
+/* For at most this number of candidates, all distances are kept. */
 enum { DISTANCES_KEPT = 4096 };
 
 static void compute_row(const clustering *c, int i, float *row)
@@ -394,6 +401,7 @@ static void choose_at_random(clustering *c, uint64_t seed)
     }
 }
 
+/* Finds the two nearest medoids of each candidate. */
 static void assign_medoids(clustering *c)
 {
     for (int i = 0; i < c->count; i++) {
@@ -412,8 +420,8 @@ static void assign_medoids(clustering *c)
     }
 }
 
-/* Computes the change of the total cost when candidate `h` replaces each medoid; returns the best.
- */
+/* Returns the least change of the total cost if candidate `h` replaces a medoid; *which: this
+ * medoid. */
 static double best_swap_for(clustering *c, int h, int *which)
 {
     const float *row = distances_of(c, h);
@@ -434,6 +442,7 @@ static double best_swap_for(clustering *c, int h, int *which)
     return c->gain[*which] + shared;
 }
 
+/* Makes the best swap. Returns false if no swap lowers the cost. */
 static bool swap_once(clustering *c)
 {
     int leave = -1, enter = -1;
@@ -457,7 +466,7 @@ static bool swap_once(clustering *c)
     return true;
 }
 
-/* Finds the best medoid when only one is wanted: then no point has a second nearest medoid. */
+/* Finds the best medoid if only one is wanted. (swap_once needs a second nearest medoid.) */
 static void single_medoid(clustering *c)
 {
     double best = INFINITY;
@@ -476,7 +485,7 @@ static void single_medoid(clustering *c)
 
 static bool choose_kmedoids(const ebpo_choice *choice, bool *chosen)
 {
-    /* each swap lowers the cost; this only prevents endless loops by rounding */
+    /* each swap lowers the cost; the limit prevents an endless loop caused by rounding errors */
     enum { SWAPS_MAX = 100000 };
     ebpo_choice all = *choice;
     if (choice->wanted < 1)

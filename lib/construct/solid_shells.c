@@ -1,12 +1,12 @@
 /* Finds the closed components of a mesh that are apart, and computes which of them bound the solid.
  *
- * Where no faces of two components have a common point, each component as a whole is inside or
- * outside every other one, and the winding numbers on its sides follow from the nesting. Faces are
- * compared only where the boxes of components do not decide: a first pass finds the faces that
- * intersect the box of another component, unless that box contains the box of their own component.
- * A second pass compares these faces. Both passes stop after a number of steps that is proportional
- * to the number of faces; the components then count as not apart. `ebpo check` uses the counts; the
- * computation of the solid's volume uses the components that are apart. */
+ * Two components are apart if their faces have no common point. Then each is completely inside or
+ * outside the other one, and the winding numbers on both sides of its faces follow from the nesting
+ * of components. Faces are compared only where the boxes of components do not decide: a first pass
+ * finds the faces that intersect the box of another component, unless that box contains the box of
+ * the face's own component. A second pass compares these faces. Both passes stop after a number of
+ * steps that is proportional to the number of faces; then the components count as not apart. `ebpo
+ * check` prints the counts; ebpo_measure uses the multiplicity of components. */
 #include "core/strict_fp.h"
 
 #include "construct/solid_shells.h"
@@ -30,10 +30,10 @@ typedef struct comparing {
     /* [faces] 1: the face's box intersects the box of another shell, which does not contain the box
      * of the face's own shell */
     uint8_t *exposed;
-    uint8_t *reached;     /* [shells] 1: a face of another shell intersects this shell's box */
-    ebpo_box_tree faces;  /* faces of reached shells; value: the shell */
-    uint64_t steps, most; /* steps of all walks so far; their limit */
-    bool apart;           /* result so far */
+    uint8_t *reached;          /* [shells] 1: a face of another shell intersects this shell's box */
+    ebpo_box_tree faces;       /* faces of reached shells; value: the shell */
+    uint64_t steps, steps_max; /* steps of all walks so far; their limit */
+    bool apart;                /* no contact was found so far, and the limit was not reached */
 } comparing;
 
 /* The walk for one face, which is compared with shells or with other faces. */
@@ -63,6 +63,8 @@ static bool is_near(void *user, const ebpo_box_node *node)
     return boxes_intersect(&((const visitor *)user)->box, node->filled->min, node->filled->max);
 }
 
+/* Marks the face and the shells whose boxes the face intersects. Returns false at the limit of
+ * steps. */
 static bool visit_shells(void *user, ebpo_tree_point *points, uint64_t count)
 {
     visitor *v = user;
@@ -76,9 +78,10 @@ static bool visit_shells(void *user, ebpo_tree_point *points, uint64_t count)
         v->c->exposed[v->face] = 1;
         __atomic_store_n(&v->c->reached[points[i].number], 1, __ATOMIC_RELAXED);
     }
-    return v->steps < v->c->most;
+    return v->steps < v->c->steps_max;
 }
 
+/* Compares the face with faces of other shells. Returns false after a contact, or at the limit. */
 static bool visit_faces(void *user, ebpo_tree_point *points, uint64_t count)
 {
     visitor *v = user;
@@ -99,10 +102,11 @@ static bool visit_faces(void *user, ebpo_tree_point *points, uint64_t count)
             return false;
         }
     }
-    return v->steps < v->c->most;
+    return v->steps < v->c->steps_max;
 }
 
-/* Compares each face with the tree of shells, or each exposed face with the tree of faces. */
+/* Compares each face with the tree of shells (visit_shells), or each exposed face with the tree of
+ * faces (visit_faces). */
 static ebpo_status compare_faces(comparing *c, uint64_t begin, uint64_t end,
                                  const ebpo_box_tree *tree, ebpo_tree_points_fn visit)
 {
@@ -115,7 +119,7 @@ static ebpo_status compare_faces(comparing *c, uint64_t begin, uint64_t end,
             break;
         ebpo_face_box(c->s->mesh, &p, &v.box);
         (void)ebpo_box_tree_walk(tree, is_near, visit, &v);
-        if (__atomic_add_fetch(&c->steps, v.steps, __ATOMIC_RELAXED) >= c->most)
+        if (__atomic_add_fetch(&c->steps, v.steps, __ATOMIC_RELAXED) >= c->steps_max)
             __atomic_store_n(&c->apart, false, __ATOMIC_RELAXED);
     }
     return EBPO_OK;
@@ -177,7 +181,7 @@ static ebpo_status compare_shells(comparing *c, ebpo_error *error)
 static ebpo_status find_apart(ebpo_solid_shells *s, ebpo_error *error)
 {
     comparing c = { .s = s, .apart = true };
-    c.most = STEPS_PER_FACE * s->mesh->face_count + STEPS_AT_LEAST;
+    c.steps_max = STEPS_PER_FACE * s->mesh->face_count + STEPS_AT_LEAST;
     ebpo_status status = s->nesting.count > 1 ? compare_shells(&c, error) : EBPO_OK;
     s->apart = c.apart;
     ebpo_box_tree_free(&c.faces);
@@ -186,9 +190,9 @@ static ebpo_status find_apart(ebpo_solid_shells *s, ebpo_error *error)
     return status;
 }
 
-/* Returns false for an open component. Also returns false for a component that has no volume but is
- * not flat: it bounds parts whose volumes cancel. A closed component of two faces is flat: a face
- * and its reverse. */
+/* Returns true if a component is closed, and has a volume or is flat. (A component with the volume
+ * 0 that is not flat bounds parts whose volumes cancel. A closed component of two faces is flat: a
+ * face and its reverse.) */
 static bool is_simple(const ebpo_components *c, uint64_t i)
 {
     const ebpo_found_component *one = &c->list[i];
@@ -243,6 +247,7 @@ int ebpo_component_times(const ebpo_solid_shells *shells, uint32_t component, eb
 
 /* --- counting --- */
 
+/* Counts a shell. A shell is a cavity, or turned inwards, relative to the shells around it. */
 static void count_one(const ebpo_nesting *n, const ebpo_shell *one, ebpo_shells *made)
 {
     bool inwards = ebpo_shell_faces_inwards(n, one), cavity = ebpo_shell_is_cavity(one);
@@ -282,7 +287,7 @@ ebpo_status ebpo_mesh_count_shells(const ebpo_mesh *mesh, unsigned threads, ebpo
                                    ebpo_shells *out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    static const ebpo_shells nothing = EBPO_SHELLS_INIT;
+    static const ebpo_shells none = EBPO_SHELLS_INIT;
     ebpo_shells made = EBPO_SHELLS_INIT;
     ebpo_solid_shells s = { .mesh = mesh };
     ebpo_status status = EBPO_CHECK_SIZED(ebpo_shells, out, error);
@@ -291,6 +296,6 @@ ebpo_status ebpo_mesh_count_shells(const ebpo_mesh *mesh, unsigned threads, ebpo
     if (status == EBPO_OK)
         ebpo_solid_shells_count(&s, &made);
     ebpo_solid_shells_free(&s);
-    EBPO_GIVE(ebpo_shells, out, status == EBPO_OK ? &made : &nothing);
+    EBPO_GIVE(ebpo_shells, out, status == EBPO_OK ? &made : &none);
     return status;
 }

@@ -1,5 +1,5 @@
-/* Finds the closed components of a mesh (shells), and the effect of a rule on the winding numbers
- * on both sides of each. */
+/* Finds the shells of a mesh (its closed components), and which of them bound the solid of a rule
+ * (the winding numbers that count as inside). */
 #ifndef EBPO_CONSTRUCT_SOLID_SHELLS_H
 #define EBPO_CONSTRUCT_SOLID_SHELLS_H
 
@@ -13,8 +13,9 @@ typedef struct ebpo_solid_shells {
     /* result of ebpo_mesh_find_shells; the nesting uses it as `of_face` of its components */
     uint32_t *closed;
     ebpo_nesting nesting;
-    uint32_t *shell_of; /* [components] index among the shells; EBPO_NO_INDEX: without a volume */
-    bool apart;         /* every component is closed, and no faces of two have a common point */
+    uint32_t *shell_of; /* [component] index of its shell; EBPO_NO_INDEX: it has no volume */
+    bool apart;         /* every component is closed, and faces of two different components have no
+                         * common point */
 } ebpo_solid_shells;
 
 /* Finds the components and their nesting, and sets `apart`. Takes as long as
@@ -26,9 +27,9 @@ EBPO_MUST_USE ebpo_status ebpo_solid_shells_find(ebpo_solid_shells *out, const e
 void ebpo_solid_shells_count(const ebpo_solid_shells *shells, ebpo_shells *out);
 void ebpo_solid_shells_free(ebpo_solid_shells *shells);
 
-/* Returns how often the faces of a component bound the solid: 1, 0 (not at all) or -1 (with the
- * opposite orientation). Only for components that are apart. An integral over all faces with these
- * factors is the integral over the solid. */
+/* Returns 1 if the faces of a component bound the solid, -1 if they do so with the opposite
+ * orientation, 0 if they do not bound it. `apart` must be true. The integral over the solid is the
+ * integral over all faces with these factors. */
 int ebpo_component_times(const ebpo_solid_shells *shells, uint32_t component, ebpo_rule rule);
 
 #endif

@@ -1,13 +1,13 @@
 /* Computes the support of the solid in a cell: the greatest n . xi over the mesh vertices in the
- * cell, the points where faces cross the cell's faces, and the corners of the cell that are inside
+ * cell, the points where the mesh crosses cell faces, and the corners of the cell that are inside
  * the solid. The support is the offset of a plane with normal n.
  *
- * With few vertices, all points are gathered, each once, and searched in stretches that share a
- * box. With many vertices, only crossings and corners are gathered; vertices are searched by a
- * hierarchy of boxes over their runs along the curve. Rounding is monotone: a box's bound, computed
- * by the same operations in the same order, is never below that of a point in it, so skipping a box
- * never loses the greatest point. A search stops early when the support is so large that the plane
- * would not be worth storing. */
+ * If the vertices are few, all points are gathered, each once, and searched in stretches (sweep.h)
+ * that share a box. If they are many, only crossings and corners are gathered, and the vertices are
+ * searched by a hierarchy of boxes over ranges of vertices along the curve. Rounding is monotone:
+ * the bound of a box is computed by the same operations in the same order as the values of points,
+ * so it is never less than the value of a point in the box, and no search skips the greatest point.
+ * A search stops early when the support is so large that the plane would not be worth storing. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -21,7 +21,7 @@
 #include "geometry/cells.h"
 #include "geometry/polytope.h"
 
-/* --- runs of vertices, by boxes of boxes --- */
+/* --- boxes around ranges of vertices, and boxes around boxes --- */
 
 static void join_box(double (*box)[3], const double low[3], const double high[3])
 {
@@ -66,14 +66,16 @@ void ebpo_bounds_free(ebpo_bounds *bounds)
     bounds->levels = 0;
 }
 
-typedef struct query {
+/* A search for the vertex of begin .. end - 1 with the greatest n . xi. */
+typedef struct vertex_search {
     const ebpo_builder *b;
-    double corner[3], size[3], n[3];
-    uint64_t begin, end, at;
+    double corner[3], size[3], n[3]; /* the cell; the direction */
+    uint64_t begin, end, at;         /* at: the best vertex */
     double best;
-} query;
+} vertex_search;
 
-static double bound_value(const query *q, const double low[3], const double high[3])
+/* Returns the greatest n . xi in a box. */
+static double bound_value(const vertex_search *q, const double low[3], const double high[3])
 {
     double x = (q->n[0] < 0 ? low[0] : high[0]), y = (q->n[1] < 0 ? low[1] : high[1]),
            z = (q->n[2] < 0 ? low[2] : high[2]);
@@ -82,9 +84,9 @@ static double bound_value(const query *q, const double low[3], const double high
            q->n[2] * ((z - q->corner[2]) / q->size[2]);
 }
 
-static void visit_block(query *q, int level, uint64_t block)
+/* Searches a block of 16^level vertices (level 0: a vertex). */
+static void visit_block(vertex_search *q, int level, uint64_t block)
 {
-    /* `level` 0: the vertices themselves. */
     uint64_t width = 1;
     for (int i = 0; i < level; i++)
         width *= EBPO_BOUNDS_FAN;
@@ -108,19 +110,18 @@ static void visit_block(query *q, int level, uint64_t block)
         visit_block(q, level - 1, i);
 }
 
-/* Returns the greatest n . xi over vertices [begin, end), in coordinates of the cell that contains
- * them, but at least `least`. `*at` is the vertex, or EBPO_NO_VERTEX when no value exceeds `least`.
- */
+/* Returns the greatest n . xi over the vertices begin .. end - 1, in coordinates of the cell, but
+ * at least `least`. Sets *at to the vertex, or to EBPO_NO_VERTEX if no value exceeds `least`. */
 static double bounds_support(const ebpo_builder *b, ebpo_cell cell, const double n[3],
                              uint64_t begin, uint64_t end, double least, uint64_t *at)
 {
-    query q = { .b = b, .begin = begin, .end = end, .at = EBPO_NO_VERTEX, .best = least };
+    vertex_search q = { .b = b, .begin = begin, .end = end, .at = EBPO_NO_VERTEX, .best = least };
     for (int k = 0; k < 3; k++) {
         q.corner[k] = ebpo_cell_face(&b->box, k, cell.level, cell.at[k]);
         q.size[k] = b->box.size[k] / (double)(1u << cell.level);
         q.n[k] = n[k];
     }
-    /* Start at the level where the run covers some blocks, not at the top. */
+    /* start at the level where the range has a few blocks, not at the top */
     int level = 0;
     uint64_t width = 1;
     while (level < b->bounds.levels && width * EBPO_BOUNDS_FAN <= end - begin) {
@@ -134,6 +135,7 @@ static double bounds_support(const ebpo_builder *b, ebpo_cell cell, const double
     return q.best;
 }
 
+/* Returns the number of keys below `wanted`. */
 static uint64_t lower_bound(const uint64_t *key, uint64_t count, uint64_t wanted)
 {
     uint64_t low = 0;
@@ -158,6 +160,8 @@ void ebpo_build_vertex_range(const ebpo_builder *b, ebpo_cell cell, uint64_t *be
 
 /* --- the points of a node --- */
 
+/* FEW_VERTICES: a node with more vertices searches them by boxes. TABLE_MAX: maximum size of the
+ * hash table. MANY_POINTS: a search among more points releases pages of the workspace first. */
 enum { FEW_VERTICES = 4096, TABLE_MAX = 1 << 16, MANY_POINTS = 1 << 15 };
 
 static bool is_point(const ebpo_supports *s, unsigned i, const double x[3])
@@ -166,7 +170,8 @@ static bool is_point(const ebpo_supports *s, unsigned i, const double x[3])
     return p[0][i % 4] == x[0] && p[1][i % 4] == x[1] && p[2][i % 4] == x[2];
 }
 
-/* Returns true when the point exists already; its slack becomes the greater of the two. */
+/* Returns true if the point exists already, and raises its error bound to `slack`. If not, enters
+ * the next point in the table. */
 static bool known_point(ebpo_supports *s, const double x[3], double slack)
 {
     uint64_t bits[3], at;
@@ -196,10 +201,10 @@ static bool add_point(ebpo_supports *s, const double x[3], double slack)
         return true;
     double(*p)[4] = s->point[s->count / 4],
     values[4] = { x[0], x[1], x[2], EBPO_NORMAL_NORM * slack };
-    unsigned own = s->count % 4;
+    unsigned lane_of_point = s->count % 4;
     /* the other lanes of a four are copies of the first lane until they are set */
     for (int k = 0; k < 4; k++)
-        for (unsigned lane = own; lane < (own ? own + 1 : 4); lane++)
+        for (unsigned lane = lane_of_point; lane < (lane_of_point ? lane_of_point + 1 : 4); lane++)
             p[k][lane] = values[k];
     s->count++;
     return true;
@@ -216,8 +221,8 @@ static bool add_vertices(ebpo_supports *s, uint64_t begin, uint64_t end)
     for (uint64_t i = begin; i < end; i++) {
         double p[3];
         ebpo_mesh_position(b->mesh, i, p);
-        /* Two rounding errors of values up to 1, far below the slack that ebpo_plane_code_offset
-         * adds. */
+        /* error bound 0: these two rounding errors of values up to 1 are far below the margin of
+         * ebpo_plane_code_offset */
         if (!add_point(s,
                        (const double[3]){ (p[0] - corner[0]) / size[0],
                                           (p[1] - corner[1]) / size[1],
@@ -271,8 +276,8 @@ static bool gather_points(ebpo_supports *s, const ebpo_builder *b, const ebpo_br
         return false;
     s->begin = few ? 0 : begin;
     s->end = few ? 0 : end;
-    /* Corners come first: they are far out, so searches along directions without gain stop early.
-     */
+    /* Corners come first: they have great values, so searches along directions of useless planes
+     * stop early. */
     unsigned corners = ebpo_inside_corners(b, winding, detail->delta);
     for (int i = 0; i < 8; i++)
         if (corners >> i & 1 &&
@@ -281,7 +286,7 @@ static bool gather_points(ebpo_supports *s, const ebpo_builder *b, const ebpo_br
     return (!few || add_vertices(s, begin, end)) && add_crossings(s, branch, detail);
 }
 
-/* Finds the point of a stretch with the value `best`. */
+/* Sets `where` to the point with the value `best` in the stretch that begins with point `first`. */
 static void locate_point(const ebpo_supports *s, uint64_t first, const double n[3], double best,
                          double where[3])
 {
@@ -296,7 +301,7 @@ static void locate_point(const ebpo_supports *s, uint64_t first, const double n[
     }
 }
 
-/* Raises `support` to the maximum of the points. */
+/* Raises *support to the maximum over the points, and sets `where` if it has been raised. */
 static void among_points(const ebpo_supports *s, const double n[3], double enough, double *support,
                          double where[3])
 {
@@ -309,6 +314,7 @@ static void among_points(const ebpo_supports *s, const double n[3], double enoug
         locate_point(s, stretch, n, *support, where);
 }
 
+/* Makes the boxes of the stretches. */
 static bool box_points(ebpo_supports *s)
 {
     uint64_t fours = (s->count + 3) / 4;

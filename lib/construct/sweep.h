@@ -1,6 +1,6 @@
-/* The two inner loops of hulls and supports, four doubles at a time (sweep_kernels.c). They are
- * compiled once for each instruction set. Each variant does the same operations in the same order,
- * so the results are the same. */
+/* Declares the two inner loops (kernels) of convex hulls and supports (supports.h), four doubles at
+ * a time. sweep_kernels.c is compiled once for each instruction set. Each variant does the same
+ * operations in the same order, so the results are the same. */
 #ifndef EBPO_CONSTRUCT_SWEEP_H
 #define EBPO_CONSTRUCT_SWEEP_H
 
@@ -8,19 +8,19 @@
 #include <stdint.h>
 
 enum {
-    EBPO_STRETCH = 8,        /* fours of points that share a box */
-    EBPO_SWEEP_PLANES = 2048 /* maximum */
+    EBPO_STRETCH = 8,        /* a stretch is 8 consecutive fours of points, which share a box */
+    EBPO_SWEEP_PLANES = 2048 /* maximum number of planes */
 };
 
-/* Planes n . x = d as a structure of arrays. The padding of the last four is a plane that no point
- * is above. */
+/* Planes n . x = d as a structure of arrays. The last four is padded with planes that no point is
+ * above. */
 typedef struct ebpo_sweep_planes {
     const double *nx, *ny, *nz, *d;
     int fours;
 } ebpo_sweep_planes;
 
-/* Points in fours: four x, four y, four z, and four values that are added to n . x. The padding of
- * the last four is a copy of a point. */
+/* Points in fours: four x, four y, four z, and four values that are added to n . x. The last four
+ * is padded with copies of a point. */
 typedef struct ebpo_sweep_points {
     const double (*point)[4][4]; /* [fours] */
     /* for each stretch: least and greatest coordinates, greatest added value */
@@ -29,14 +29,14 @@ typedef struct ebpo_sweep_points {
 } ebpo_sweep_points;
 
 typedef struct ebpo_sweep {
-    /* Finds all planes that p is above by more than `above`, but none if p is above no plane by
-     * more than `beyond`. Writes the indices of the first `capacity` planes and returns the number
-     * of all planes found. */
+    /* If p is above some plane by more than `beyond`, finds all planes that p is above by more than
+     * `above`; if not, finds none. Writes the indices of the first `capacity` planes found, and
+     * returns the number of all. */
     int (*find_visible)(const ebpo_sweep_planes *planes, const double p[3], double beyond,
                         double above, uint16_t *list, int capacity);
-    /* Raises *best to the greatest value among the points; ends when *best has reached `enough`.
-     * Returns the index of the first point of the stretch with this value; UINT64_MAX when no value
-     * is greater. */
+    /* Raises *best to the greatest value of the points; ends when *best has reached `enough`.
+     * Returns the index of the first point of the stretch where this value is, or UINT64_MAX if no
+     * value is greater than *best was. */
     uint64_t (*highest)(const ebpo_sweep_points *points, const double n[3], double enough,
                         double *best);
 } ebpo_sweep;

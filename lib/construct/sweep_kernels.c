@@ -1,7 +1,7 @@
-/* The two inner loops of hulls and supports, four doubles at a time. One finds the planes that a
- * point is above, the other the greatest value among points. meson.build compiles this file once
- * for each instruction set; the operations and their order are the same in each, so the results are
- * the same. The interface is sweep.h; core/cpu.h chooses the variant. */
+/* The two kernels of sweep.h, four doubles at a time: the first finds the planes that a point is
+ * above, the second finds the greatest value among points. meson.build compiles this file once for
+ * each instruction set. The operations and their order are the same in each variant, so the results
+ * are the same; core/cpu.h chooses the variant. */
 #include "core/strict_fp.h"
 
 #include "construct/sweep.h"
@@ -14,6 +14,7 @@ typedef v4d v4d_stored __attribute__((aligned(8), may_alias));
 
 static v4d load_four(const double *at) { return *(const v4d_stored *)at; }
 
+/* Adds first + i to the list for each bit i. Returns the new count. */
 static int list_bits(unsigned bits, int first, uint16_t *list, int capacity, int count)
 {
     for (; bits; bits &= bits - 1, count++)
@@ -42,9 +43,9 @@ static int find_visible_planes(const ebpo_sweep_planes *planes, const double p[3
     return count;
 }
 
-/* Returns an upper bound for the values of a stretch's points. The bound is computed like the
- * values, so rounding does not make it less than a value. */
-static double reach_of(const double box[7], const double n[3])
+/* Returns an upper bound for the values of a stretch's points. It is computed by the same
+ * operations as the values, so rounding does not make it less than a value. */
+static double bound_of_stretch(const double box[7], const double n[3])
 {
     return n[0] * box[n[0] < 0 ? 0 : 3] + n[1] * box[n[1] < 0 ? 1 : 4] +
            n[2] * box[n[2] < 0 ? 2 : 5] + box[6];
@@ -67,15 +68,15 @@ static uint64_t highest_value(const ebpo_sweep_points *points, const double n[3]
     v4d nx = v4d_all(n[0]), ny = v4d_all(n[1]), nz = v4d_all(n[2]);
     uint64_t stretch = UINT64_MAX;
     for (uint64_t first = 0; first < points->fours && *best < enough; first += EBPO_STRETCH) {
-        if (reach_of(points->box[first / EBPO_STRETCH], n) <= *best)
+        if (bound_of_stretch(points->box[first / EBPO_STRETCH], n) <= *best)
             continue;
         uint64_t end = points->fours - first < EBPO_STRETCH ? points->fours : first + EBPO_STRETCH;
-        v4d most = v4d_all(*best);
+        v4d greatest = v4d_all(*best);
         for (uint64_t i = first; i < end; i++)
-            most = greater_of(values_of(points->point[i], nx, ny, nz), most);
+            greatest = greater_of(values_of(points->point[i], nx, ny, nz), greatest);
         for (int lane = 0; lane < 4; lane++)
-            if (most[lane] > *best)
-                *best = most[lane], stretch = 4 * first;
+            if (greatest[lane] > *best)
+                *best = greatest[lane], stretch = 4 * first;
     }
     return stretch;
 }

@@ -1,10 +1,11 @@
-/* Envelopes chosen as in the theses, for comparison: volumes and planes of levels, without a file.
+/* Computes envelopes as in the theses, for comparison: volumes and numbers of planes of levels,
+ * without a file.
  *
- * Files limit the planes of a node to 255 and drop candidates with equal normals before a
- * percentage is taken. Neither thesis does this (BP 2008, 3.5.1: 2,955 planes at a root). Here all
- * candidates of a node count, in the order of its faces or children, and polytopes have any number
- * of faces. The offsets of planes are not rounded to the steps of files; normals are. Leaves follow
- * one of three criteria (BP 2008, 3.3.1, algorithm 4). */
+ * For a file, a node has at most 255 planes, and candidates with equal normals are dropped before a
+ * percentage of them is chosen. Neither thesis does this (BP 2008, 3.5.1: 2,955 planes at a root).
+ * Here, all candidates of a node count, in the order of its faces or children, and polytopes have
+ * any number of faces. Normals are rounded as in files, offsets are not. Leaves are made by one of
+ * three criteria (BP 2008, 3.3.1, algorithm 4). */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -18,7 +19,7 @@
 bool ebpo_thesis_coalesces(const ebpo_builder *b, const ebpo_branch *s, uint32_t node,
                            uint64_t *most)
 {
-    uint64_t sum = 0, leaves = 0, number = b->options->leaf_faces;
+    uint64_t sum = 0, leaves = 0, limit = b->options->leaf_faces;
     for (uint32_t o = 0; o < 8; o++) {
         const ebpo_build_node *child = &s->nodes[s->nodes[node].child + o];
         if (child->type == EBPO_GRAY)
@@ -30,10 +31,11 @@ bool ebpo_thesis_coalesces(const ebpo_builder *b, const ebpo_branch *s, uint32_t
         leaves++;
     }
     *most = sum;
-    return b->thesis->coalesce == EBPO_COALESCE_MEAN ? sum < number * leaves : sum < number;
+    return b->thesis->coalesce == EBPO_COALESCE_MEAN ? sum < limit * leaves : sum < limit;
 }
 
-/* Returns the number of planes that cut, or -1 when out of memory; clears `chosen` for others. */
+/* Cuts `own` by the chosen candidates. Clears `chosen` for candidates that cut nothing off. Returns
+ * the number of the others, or -1 when out of memory. */
 static int64_t cut_by_chosen(ebpo_large_polytope *own, const ebpo_choice *choice, bool *chosen)
 {
     int64_t planes = 0;
@@ -54,7 +56,8 @@ static int64_t cut_by_chosen(ebpo_large_polytope *own, const ebpo_choice *choice
     return planes;
 }
 
-/* Returns the corners of the envelope's faces that planes made. */
+/* Adds to `out` the corners of those faces of the envelope that planes made (tag >= 0), not the
+ * cell. */
 static bool give_corners(const ebpo_large_polytope *own, ebpo_handover *out)
 {
     const ebpo_large_shape *s = &own->now;
@@ -117,8 +120,8 @@ bool ebpo_thesis_choose(const ebpo_builder *b, ebpo_large_polytope *own, ebpo_th
 void ebpo_thesis_add_empty(const ebpo_builder *b, ebpo_thesis_level *levels, int level,
                            int32_t winding)
 {
-    static const int32_t same[8] = { 0 };
-    if (!b->solid || !(ebpo_inside_corners(b, winding, same) & 1))
+    static const int32_t no_delta[8] = { 0 };
+    if (!b->solid || !(ebpo_inside_corners(b, winding, no_delta) & 1))
         return;
     levels[level].black_count++;
     levels[level].black_volume += ebpo_cell_volume(&b->box, level);

@@ -1,5 +1,5 @@
-/* Envelopes chosen as in the theses, without the limits of files, for comparison (thesis_levels.c):
- * ebpo_build_as_theses. */
+/* Computes envelopes as in the theses (EBP 2017, BP 2008), without the limits of files, for the
+ * comparison of ebpo_build_as_theses. */
 #ifndef EBPO_CONSTRUCT_THESIS_LEVELS_H
 #define EBPO_CONSTRUCT_THESIS_LEVELS_H
 
@@ -7,24 +7,26 @@
 #include "construct/large_polytope.h"
 #include "construct/pieces.h"
 
-/* A run of ebpo_build_as_theses: its criterion of leaves, and its results. */
+/* A call of ebpo_build_as_theses: its criterion of leaves, and its results. */
 typedef struct ebpo_thesis_run {
     ebpo_coalescing coalesce;
     ebpo_thesis_levels *out;
 } ebpo_thesis_run;
 
-/* Returns true when a gray node becomes a leaf by a criterion of the theses. `most` is the greatest
- * number of faces that such a leaf may have. */
+/* Returns true if a gray node becomes a leaf by the criterion of the theses. Sets *most to the
+ * greatest number of faces that this leaf may have. */
 bool ebpo_thesis_coalesces(const ebpo_builder *b, const ebpo_branch *s, uint32_t node,
                            uint64_t *most);
 
-/* Chooses planes among all candidates of a node, cuts `own` by them, adds the result to `levels`
- * and makes the data for the parent. Returns false when out of memory. */
+/* Chooses planes among all candidates of a node (`given`: the offers that they were made from),
+ * cuts the cell by these planes, adds the counts and the volume to `levels`, and writes the data
+ * for the parent to `out`. `own`: work space. `leaf_faces`: number of faces of a leaf; 0 for a gray
+ * node. Returns false when out of memory. */
 bool ebpo_thesis_choose(const ebpo_builder *b, ebpo_large_polytope *own, ebpo_thesis_level *levels,
                         ebpo_cell cell, uint64_t leaf_faces, ebpo_choice *choice,
                         const ebpo_handover *given, ebpo_handover *out);
 
-/* Adds a node without faces. */
+/* Adds a node without faces to the sums of its level. */
 void ebpo_thesis_add_empty(const ebpo_builder *b, ebpo_thesis_level *levels, int level,
                            int32_t winding);
 

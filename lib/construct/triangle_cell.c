@@ -1,11 +1,11 @@
 /* Tests a face against a cell: finds the octants of the cell that the face may touch, tests if the
  * face misses the cell, and clips the face to the cell.
  *
- * All tests are conservative by a bound of the rounding error, so no exact arithmetic is needed: a
- * face that a cell lists without touching it costs little, but a missing face is an error of the
- * file. The tests use the face's bounding box, its plane and the cross products of its edges with
- * the axes (separating axes). Clipping enlarges the cell by the bound, so that a face that touches
- * the closed cell always leaves points. */
+ * All tests use a bound of the rounding error and are conservative, so no exact arithmetic is
+ * needed: a listed face that does not touch the cell costs little time, but a missing face would
+ * make the file wrong. The tests use the face's bounding box, its plane, and the cross products of
+ * its edges with the axes (separating axes). Clipping enlarges the cell by the bound, so that a
+ * face that touches the closed cell always leaves points. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -15,30 +15,32 @@
 #include "geometry/polytope.h"
 #include "geometry/vec3.h"
 
-/* Converts to cell coordinates: one rounding in the subtraction, one in the division; corners and
- * sizes of cells are exact. */
+/* Converts a face to cell coordinates, and returns the greatest absolute coordinate, at least 1.
+ * Corners and sizes of cells are exact, so a coordinate has one rounding in the subtraction and one
+ * in the division. */
 static double to_cell(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face,
                       double x[3][3])
 {
-    double most = 1;
+    double greatest = 1;
     for (int k = 0; k < 3; k++) {
         double corner = ebpo_cell_face(box, k, cell.level, cell.at[k]);
         double size = box->size[k] / (double)(1u << cell.level);
         for (int i = 0; i < 3; i++) {
             x[i][k] = (face->corner[i][k] - corner) / size;
             double a = fabs(x[i][k]);
-            most = a > most ? a : most;
+            greatest = a > greatest ? a : greatest;
         }
     }
-    return most;
+    return greatest;
 }
 
-/* Returns the slack. With coordinates up to M and u = 2^-53, the errors are 2.01 u M from to_cell
- * and at most 8 u M for each of six clips; 128 u M covers their sum. All faces with small
- * coordinates have the same slack, so that shared points of two faces are computed identically from
- * both. */
-static double slack_for(double most) { return most <= 2 ? 0x1p-45 : most * 0x1p-46; }
+/* Returns the slack: the bound of the rounding error of a coordinate. With coordinates up to M and
+ * u = 2^-53, the errors are 2.01 u M from to_cell and at most 8 u M for each of six clips; 128 u M
+ * covers their sum. The slack is the same for all faces with coordinates up to 2, so that a common
+ * point of two faces is computed identically from both. */
+static double slack_for(double greatest) { return greatest <= 2 ? 0x1p-45 : greatest * 0x1p-46; }
 
+/* Clips a polygon to sign * x[axis] <= limit. Returns the number of remaining corners. */
 static int clip_cell_face(double in[9][3], int count, int axis, double sign, double limit,
                           double out[9][3])
 {
@@ -52,7 +54,7 @@ static int clip_cell_face(double in[9][3], int count, int axis, double sign, dou
             kept++;
         }
         if ((da < 0 && db > 0) || (da > 0 && db < 0)) {
-            bool back = da > 0; /* from the inner end, independent of the direction of the edge */
+            bool back = da > 0; /* interpolate from the inner end, whatever the edge's direction */
             const double *from = back ? b : a, *to = back ? a : b;
             double t = back ? db / (db - da) : da / (da - db);
             for (int k = 0; k < 3; k++)
@@ -67,7 +69,7 @@ static int clip_cell_face(double in[9][3], int count, int axis, double sign, dou
 int ebpo_clip_triangle(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face,
                        double points[9][3], double *slack)
 {
-    double x[3][3], other[9][3], e = slack_for(to_cell(box, cell, face, x));
+    double x[3][3], buffer[9][3], e = slack_for(to_cell(box, cell, face, x));
     *slack = e;
     int count = 3;
     for (int i = 0; i < 3; i++)
@@ -80,15 +82,16 @@ int ebpo_clip_triangle(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle 
             return 0;
         if (high <= 1 + e && low >= -e)
             continue;
-        int n = clip_cell_face(points, count, k, 1, 1 + e, other);
-        count = clip_cell_face(other, n, k, -1, e, points);
+        int n = clip_cell_face(points, count, k, 1, 1 + e, buffer);
+        count = clip_cell_face(buffer, n, k, -1, e, points);
     }
     return count;
 }
 
+/* A face in cell coordinates, for tests of separating axes. */
 typedef struct separation {
     double x[3][3], edge[3][3], normal[3];
-    double most;
+    double greatest; /* greatest absolute coordinate, at least 1 */
 } separation;
 
 static void separation_prepare(separation *s)
@@ -98,12 +101,13 @@ static void separation_prepare(separation *s)
     ebpo_vec3_cross(s->edge[0], s->edge[1], s->normal);
 }
 
-/* Returns true when the plane of the face or a cross product of one of its edges with an axis
- * separates it from the cube around `centre`. Rounding errors, with coordinates up to M and u =
- * 2^-53: 4 u M of edges, below 64 u M^2 of cross terms, below 512 u M^3 of the plane. */
+/* Returns true if the plane of the face, or a cross product of one of its edges with an axis,
+ * separates the face from the cube around `centre` with the sides 2 * half. Rounding errors, with
+ * coordinates up to M and u = 2^-53: 4 u M for edges, below 64 u M^2 for cross products, below 512
+ * u M^3 for the plane. */
 static bool is_separated(const separation *s, const double centre[3], double half)
 {
-    double m = s->most, tolerance = 0x1p-44 * m * m * m;
+    double m = s->greatest, tolerance = 0x1p-44 * m * m * m;
     double distance = 0, radius = 0;
     for (int k = 0; k < 3; k++) {
         distance += s->normal[k] * (s->x[0][k] - centre[k]);
@@ -149,7 +153,7 @@ unsigned ebpo_octants_visited(const ebpo_box *box, ebpo_cell cell, const ebpo_tr
     if ((mask & (mask - 1)) == 0)
         return mask;
     separation s;
-    s.most = to_cell(box, cell, face, s.x);
+    s.greatest = to_cell(box, cell, face, s.x);
     separation_prepare(&s);
     for (unsigned octant = 0; octant < 8; octant++) {
         if (!(mask >> octant & 1))
@@ -166,8 +170,8 @@ unsigned ebpo_octants_visited(const ebpo_box *box, ebpo_cell cell, const ebpo_tr
 bool ebpo_triangle_misses_cell(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face)
 {
     separation s;
-    s.most = to_cell(box, cell, face, s.x);
-    double e = slack_for(s.most);
+    s.greatest = to_cell(box, cell, face, s.x);
+    double e = slack_for(s.greatest);
     for (int k = 0; k < 3; k++)
         if (fmin(s.x[0][k], fmin(s.x[1][k], s.x[2][k])) > 1 + e ||
             fmax(s.x[0][k], fmax(s.x[1][k], s.x[2][k])) < -e)
@@ -178,10 +182,10 @@ bool ebpo_triangle_misses_cell(const ebpo_box *box, ebpo_cell cell, const ebpo_t
 
 bool ebpo_face_normal_code(const ebpo_box *box, const ebpo_triangle *face, uint32_t *normal)
 {
-    /* In coordinates scaled by the root box, which has the same shape as every cell, the normal
-     * needs no further scaling. */
+    /* every cell has the shape of the root box, so the normal in the root's coordinates is the
+     * normal in any cell's coordinates */
     separation s;
-    s.most = to_cell(box, (ebpo_cell){ 0, { 0, 0, 0 } }, face, s.x);
+    s.greatest = to_cell(box, (ebpo_cell){ 0, { 0, 0, 0 } }, face, s.x);
     separation_prepare(&s);
     return ebpo_plane_code_normal(s.normal, normal);
 }
