@@ -46,8 +46,8 @@ static int print_place(char *out, size_t size, const ebpo_verify_place *place)
     return length;
 }
 
-/* Counts a violation, and keeps its text if it is the first. Violations at one place are ordered by
- * their text, so that the result does not depend on the order of merging. */
+/* Counts a violation, and keeps its text if it is the first. Violations at the same place are
+ * ordered by their text, so that the result does not depend on the order of merging. */
 static void record_violation(ebpo_tally *tally, ebpo_verify_kind kind,
                              const ebpo_verify_place *place, const char *text)
 {

@@ -1,10 +1,11 @@
-/* Counts checks and violations, and keeps the first violation of each kind in file order (tally.c).
- * The result does not depend on the number of threads. */
+/* Counts the verifier's checks and violations, and keeps the first violation of each kind, in file
+ * order. The result does not depend on the number of threads. */
 #ifndef EBPO_VERIFY_TALLY_H
 #define EBPO_VERIFY_TALLY_H
 
 #include <ebpo/verify.h>
 
+/* Kinds of checks, as in ebpo_verify_report. */
 typedef enum ebpo_verify_kind {
     EBPO_VERIFY_STRUCTURE,
     EBPO_VERIFY_CONTENT,
@@ -19,8 +20,8 @@ typedef enum ebpo_verify_kind {
 #define EBPO_NO_FACE  UINT64_MAX
 #define EBPO_NO_PLANE UINT32_MAX
 
-/* Position of a violation. File order is the order of these members. The order of octcodes
- * (locational codes) is breadth-first. */
+/* Position of a violation. File order compares these members one after the other. The order of
+ * octcodes (locational codes) is breadth-first. */
 typedef struct ebpo_verify_place {
     uint64_t octcode; /* 0: no node, the whole file */
     uint64_t face;    /* EBPO_NO_FACE: none */
@@ -32,13 +33,14 @@ typedef struct ebpo_tally {
     uint64_t checks[EBPO_VERIFY_KINDS], violations[EBPO_VERIFY_KINDS];
     ebpo_verify_place place[EBPO_VERIFY_KINDS]; /* positions of the violations in `first` */
     char first[EBPO_VERIFY_KINDS][240];         /* texts of the first violations */
-    /* number of listed faces that do not touch their leaf, which the format allows */
+    /* number of listed faces that do not touch their leaf; the format allows them if they are near
+     */
     uint64_t spare_entries;
-    uint64_t exact_touches, exact_half_spaces; /* numbers of tests in rationals */
+    uint64_t exact_touches, exact_half_spaces; /* numbers of tests in rational arithmetic */
 } ebpo_tally;
 
-/* Counts one violation. Keeps its text "place: text" if it precedes the first violation so far, in
- * file order. */
+/* Counts one violation. If it precedes, in file order, the first violation so far, keeps its text
+ * "place: text". */
 void ebpo_tally_violation(ebpo_tally *tally, ebpo_verify_kind kind, const ebpo_verify_place *place,
                           const char *format, ...) EBPO_PRINTF(4, 5);
 

@@ -1,8 +1,7 @@
 /* Verifies a file: runs all checks in order, and makes the report. The folder `verify` checks the
- * results of other folders. It therefore uses no code of construct, of the writer or of query, and
- * has separate vector functions. It computes cells, half-spaces and clipping with other methods
- * than the builder; only the exact predicates are shared (tests/lint/test_layers.py checks the
- * folders).
+ * results of other folders, so it uses no code of `construct`, of the writer or of `query`, and has
+ * its own vector functions. It computes cells, half-spaces and clipping with other methods than the
+ * builder; both share only the exact predicates (tests/lint/test_layers.py checks the folders).
  *
  * The order of the checks:
  * 1. chunk directory and chunk checksums (verify_chunks.c)
@@ -13,8 +12,8 @@
  * 6. unused bytes
  * Damage that is found while reading is a violation, not an error of the call.
  *
- * Colours of gray nodes are checked in this file, from the root down. The mean colour is not
- * rounded to a byte. Instead, two products decide if the stored byte is the nearest to the mean. */
+ * This file also checks the colours of gray nodes, from the root down. It does not round the mean
+ * colour to a byte: two products decide if the stored byte is nearest to the mean. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -34,30 +33,33 @@
 
 /* --- colours of gray nodes --- */
 
+/* Number of leaves after which pages of the workspace are released. */
 enum { NODES_A_TIME = 128 };
 
 /* Sums over the corners of faces. */
-typedef struct totals {
+typedef struct colour_sums {
     ebpo_wide of[4]; /* weight times red, green and blue; weight */
-} totals;
+} colour_sums;
 
 typedef struct node_check {
     ebpo_tally *tally;
     const ebpo_reference_tree *view;
     ebpo_colours colours;
-    bool by_face;    /* use colours of faces, otherwise of vertices */
+    bool by_face;    /* use colours of faces; false: of vertices */
     double longest;  /* longest side of the root cell */
     uint64_t leaves; /* number of visited leaves */
 } node_check;
 
-static void add_corner(uint64_t weight, const uint8_t *rgba, totals *sum)
+static void add_corner(uint64_t weight, const uint8_t *rgba, colour_sums *sum)
 {
     for (int k = 0; k < 3; k++)
         sum->of[k] = ebpo_wide_plus(sum->of[k], ebpo_wide_product(weight, rgba[k]));
     sum->of[3] = ebpo_wide_plus(sum->of[3], (ebpo_wide){ 0, weight });
 }
 
-static void add_face(const node_check *j, uint64_t face, totals *sum)
+/* Adds a face with the weight 1 + 2^32 times its doubled area, relative to the squared longest
+ * side. */
+static void add_face(const node_check *j, uint64_t face, colour_sums *sum)
 {
     const ebpo_mesh *mesh = &j->view->tree->mesh;
     double at[3][3], edge[2][3], across[3];
@@ -74,7 +76,7 @@ static void add_face(const node_check *j, uint64_t face, totals *sum)
     }
     double squares = across[0] * across[0] + across[1] * across[1];
     double area = ldexp(sqrt(squares + across[2] * across[2]), 32);
-    /* a larger face is beyond the root cell, which check_vertices reports */
+    /* a larger face extends beyond the root cell, which check_vertices (verify_tree.c) reports */
     uint64_t weight = area < 0x1p40 ? (uint64_t)area + 1 : 1;
     for (uint64_t i = 0; i < 3; i++)
         add_corner(weight,
@@ -83,7 +85,7 @@ static void add_face(const node_check *j, uint64_t face, totals *sum)
                    sum);
 }
 
-static void add_leaf(node_check *j, const ebpo_reference_node *leaf, totals *sum)
+static void add_leaf(node_check *j, const ebpo_reference_node *leaf, colour_sums *sum)
 {
     const ebpo_level *level = &j->view->tree->level[leaf->cell.level];
     uint32_t count;
@@ -97,29 +99,33 @@ static void add_leaf(node_check *j, const ebpo_reference_node *leaf, totals *sum
 }
 
 /* Returns true if byte - 1/2 <= mean < byte + 1/2. */
-static bool is_nearest(const totals *sum, int channel, uint32_t byte)
+static bool is_nearest(const colour_sums *sum, int channel, uint32_t byte)
 {
-    ebpo_wide one = sum->of[3], above = ebpo_wide_plus(ebpo_wide_left(sum->of[channel], 1), one);
-    return !ebpo_wide_less(above, ebpo_wide_times(one, 2 * (uint64_t)byte)) &&
-           ebpo_wide_less(above, ebpo_wide_times(one, 2 * (uint64_t)byte + 2));
+    /* twice the sum plus the weight, compared with 2 * byte * weight and 2 * (byte + 1) * weight */
+    ebpo_wide weight = sum->of[3],
+              doubled = ebpo_wide_plus(ebpo_wide_left(sum->of[channel], 1), weight);
+    return !ebpo_wide_less(doubled, ebpo_wide_times(weight, 2 * (uint64_t)byte)) &&
+           ebpo_wide_less(doubled, ebpo_wide_times(weight, 2 * (uint64_t)byte + 2));
 }
 
-static void check_node(const node_check *j, const ebpo_reference_node *node, const totals *sum)
+static void check_node(const node_check *j, const ebpo_reference_node *node, const colour_sums *sum)
 {
     uint32_t colour = j->view->tree->level[node->cell.level].gray_colours[node->rank];
-    bool right = true;
+    bool correct = true;
     for (int k = 0; k < 3 && (sum->of[3].high || sum->of[3].low); k++)
-        right = right && is_nearest(sum, k, colour >> 8 * k & 255);
+        correct = correct && is_nearest(sum, k, colour >> 8 * k & 255);
     j->tally->checks[EBPO_VERIFY_STRUCTURE]++;
-    if (!right)
+    if (!correct)
         ebpo_tally_violation(j->tally, EBPO_VERIFY_STRUCTURE,
                              &(ebpo_verify_place){ node->code, EBPO_NO_FACE, EBPO_NO_PLANE },
                              "its colour %06" PRIx32 " is not the mean of the faces below", colour);
 }
 
-static void check_subtree_colours(node_check *j, const ebpo_reference_node *node, totals *above)
+/* Checks the colours of a node and of all nodes below, and adds its sums to *above. */
+static void check_subtree_colours(node_check *j, const ebpo_reference_node *node,
+                                  colour_sums *above)
 {
-    totals sum = { { { 0, 0 } } };
+    colour_sums sum = { { { 0, 0 } } };
     if (node->type == EBPO_LEAF)
         add_leaf(j, node, &sum);
     for (unsigned octant = 0; octant < 8 && node->type == EBPO_GRAY; octant++) {
@@ -156,7 +162,7 @@ static ebpo_status check_colours(ebpo_tally *tally, const ebpo_reference_tree *v
     j.by_face = j.colours.face && !vertices_differ(&j);
     for (int k = 0; k < 3; k++)
         j.longest = fmax(j.longest, view->box.size[k]);
-    totals all = { { { 0, 0 } } };
+    colour_sums all = { { { 0, 0 } } };
     ebpo_reference_node root = ebpo_reference_root(view);
     check_subtree_colours(&j, &root, &all);
     ebpo_colours_free(&j.colours);
@@ -198,7 +204,7 @@ ebpo_status ebpo_verify_tree(ebpo_tally *tally, const ebpo_tree *tree,
     return verify_tree_of(tally, NULL, tree, options, error);
 }
 
-/* Returns true for a failure that the file causes, not this machine or the call. */
+/* Returns true if the file is the cause of the failure, not this machine or the call. */
 static bool is_finding(ebpo_status status)
 {
     return status == EBPO_E_FORMAT || status == EBPO_E_VERSION || status == EBPO_E_LIMIT;
@@ -215,50 +221,50 @@ static ebpo_read_options read_options_of(const ebpo_verify_options *options)
 static ebpo_status check_content(const ebpo_file *file, const ebpo_verify_options *options,
                                  ebpo_tally *tally, ebpo_error *error)
 {
-    ebpo_error own = EBPO_ERROR_INIT;
+    ebpo_error failure = EBPO_ERROR_INIT;
     ebpo_read_options read = read_options_of(options);
-    ebpo_status status = ebpo_file_check_content(file, &read, &own);
+    ebpo_status status = ebpo_file_check_content(file, &read, &failure);
     if (status == EBPO_OK || is_finding(status)) {
-        ebpo_tally_check(tally, EBPO_VERIFY_CONTENT, status == EBPO_OK, "%s", own.message);
+        ebpo_tally_check(tally, EBPO_VERIFY_CONTENT, status == EBPO_OK, "%s", failure.message);
         return EBPO_OK;
     }
-    return ebpo_fail_with(error, &own);
+    return ebpo_fail_with(error, &failure);
 }
 
 static ebpo_status check_tree(const ebpo_file *file, const ebpo_verify_options *options,
                               ebpo_tally *tally, ebpo_error *error)
 {
-    ebpo_error own = EBPO_ERROR_INIT;
+    ebpo_error failure = EBPO_ERROR_INIT;
     ebpo_read_options read = read_options_of(options);
     ebpo_tree tree = { 0 };
-    ebpo_status status = ebpo_file_read_tree(file, &read, &tree, &own);
+    ebpo_status status = ebpo_file_read_tree(file, &read, &tree, &failure);
     if (status == EBPO_OK || is_finding(status))
-        ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, status == EBPO_OK, "%s", own.message);
+        ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, status == EBPO_OK, "%s", failure.message);
     if (status == EBPO_OK) {
         status = verify_tree_of(tally, file, &tree, options, error);
         ebpo_tree_free(&tree);
         return status;
     }
-    return is_finding(status) ? EBPO_OK : ebpo_fail_with(error, &own);
+    return is_finding(status) ? EBPO_OK : ebpo_fail_with(error, &failure);
 }
 
 static ebpo_status check_source(const ebpo_file *file, const ebpo_verify_options *options,
                                 ebpo_tally *tally, ebpo_error *error)
 {
-    ebpo_error own = EBPO_ERROR_INIT;
+    ebpo_error failure = EBPO_ERROR_INIT;
     ebpo_read_options read = read_options_of(options);
     read.attributes = options->source->attributes != NULL;
     ebpo_mesh stored;
     bool ordered = false;
     if (ebpo_file_info(file)->pruned)
         return ebpo_check_source(tally, file, NULL, false, options->source, &read, error);
-    ebpo_status status = ebpo_file_read_source_mesh(file, &read, &stored, &ordered, &own);
+    ebpo_status status = ebpo_file_read_source_mesh(file, &read, &stored, &ordered, &failure);
     if (is_finding(status)) {
-        ebpo_tally_check(tally, EBPO_VERIFY_SOURCE, false, "%s", own.message);
+        ebpo_tally_check(tally, EBPO_VERIFY_SOURCE, false, "%s", failure.message);
         return EBPO_OK;
     }
     if (status != EBPO_OK)
-        return ebpo_fail_with(error, &own);
+        return ebpo_fail_with(error, &failure);
     status = ebpo_check_source(tally, file, &stored, ordered, options->source, &read, error);
     ebpo_mesh_free(&stored);
     return status;

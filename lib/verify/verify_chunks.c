@@ -1,9 +1,9 @@
 /* Verifies how the file stores its chunks (format-spec/gates.md, checksums.md).
  *
- * - Chunks of faces with the coding `gates` are decoded by a reference implementation, which
- * follows the specification line by line and is not optimised. The corners are compared with the
- * library's result.
- * - The list of chunk offsets is compared with HDF5's indexes.
+ * - A reference implementation, which follows the specification line by line and is not optimised,
+ * decodes the chunks of faces with the coding `gates`. The corners are compared with the library's
+ * result.
+ * - The list of chunk offsets (/subtrees/chunk_directory) is compared with HDF5's indexes.
  * - Unused bytes of the file are counted. They do not affect results, but a change of these bytes
  *   must be detectable.
  * - Chunk checksums are compared with the last bytes of the chunks, which are read without the
@@ -24,22 +24,25 @@
 
 /* --- reference implementation of a reader of the coding `gates` --- */
 
-enum { OPEN_MAX = 64, NEAR = 32 };
+/* As in the specification: maximum number of open edges, and number of newest open edges among
+ * which a new edge is searched. */
+enum { OPEN_MAX = 64, NEWEST_EDGES = 32 };
 
-typedef struct pair {
+/* An open edge, from vertex a to vertex b. */
+typedef struct open_edge_ends {
     uint64_t a, b;
-} pair;
+} open_edge_ends;
 
 typedef struct gates_reader {
-    const uint8_t *low, *more, *end;
-    pair open[OPEN_MAX + 1]; /* newest last */
-    size_t count;
-    uint64_t used;
+    const uint8_t *low, *more, *end;   /* next vertex byte; next further byte; end of these */
+    open_edge_ends open[OPEN_MAX + 1]; /* newest last */
+    size_t count;                      /* number of open edges */
+    uint64_t used;                     /* number of vertices used so far */
 } gates_reader;
 
 static void open_edge(gates_reader *t, uint64_t a, uint64_t b)
 {
-    t->open[t->count++] = (pair){ a, b };
+    t->open[t->count++] = (open_edge_ends){ a, b };
     if (t->count > OPEN_MAX)
         memmove(t->open, t->open + 1, --t->count * sizeof *t->open);
 }
@@ -49,9 +52,11 @@ static void remove_edge(gates_reader *t, size_t at)
     memmove(t->open + at, t->open + at + 1, (--t->count - at) * sizeof *t->open);
 }
 
+/* If the edge from a to b is among the newest open edges, removes it; if not, opens the reverse
+ * edge. */
 static void pass_edge(gates_reader *t, uint64_t a, uint64_t b)
 {
-    for (size_t back = 1; back <= NEAR && back <= t->count; back++)
+    for (size_t back = 1; back <= NEWEST_EDGES && back <= t->count; back++)
         if (t->open[t->count - back].a == a && t->open[t->count - back].b == b) {
             remove_edge(t, t->count - back);
             return;
@@ -59,6 +64,7 @@ static void pass_edge(gates_reader *t, uint64_t a, uint64_t b)
     open_edge(t, b, a);
 }
 
+/* Reads a vertex. Returns false if the chunk is invalid. */
 static bool read_vertex(gates_reader *t, uint64_t *vertex)
 {
     uint64_t number = *t->low++;
@@ -91,13 +97,15 @@ static size_t newest_edge(const gates_reader *t, bool first, uint64_t vertex)
     return t->count;
 }
 
+/* Reads a face across the open edge `gate` (1: the newest). `third`: code of its third vertex and
+ * of its first corner. Returns false if the chunk is invalid. */
 static bool read_across(gates_reader *t, unsigned gate, unsigned third, uint64_t *face)
 {
     uint64_t c = 0;
     unsigned kind = third / 3, k = third % 3;
     if (gate > t->count)
         return false;
-    pair e = t->open[t->count - gate];
+    open_edge_ends e = t->open[t->count - gate];
     remove_edge(t, t->count - gate);
     size_t at = kind == 1   ? newest_edge(t, true, e.b)
                 : kind == 2 ? newest_edge(t, false, e.a)
@@ -127,7 +135,8 @@ static bool read_across(gates_reader *t, unsigned gate, unsigned third, uint64_t
     return true;
 }
 
-static bool read_gates(const uint8_t *in, uint32_t rows, uint64_t *used, uint32_t *faces)
+/* Reads a chunk whose faces are stored corner by corner (first byte 1). */
+static bool read_corner_codes(const uint8_t *in, uint32_t rows, uint64_t *used, uint32_t *faces)
 {
     for (size_t i = 0; i < 3 * (size_t)rows; i++) {
         uint64_t code = 0;
@@ -149,7 +158,7 @@ bool ebpo_plain_gates_read(const uint8_t *in, uint32_t rows, uint64_t *used, uin
     gates_reader t;
     size_t thirds = 0, numbers = 0;
     if (in[0] == 1)
-        return read_gates(in, rows, used, faces);
+        return read_corner_codes(in, rows, used, faces);
     for (uint32_t i = 0; i < rows; i++)
         thirds += in[i] != 0;
     for (size_t i = 0; i < thirds; i++)
@@ -207,10 +216,11 @@ static ebpo_status compare_gates(ebpo_tally *tally, const ebpo_file *file, const
     ebpo_status status = EBPO_OK;
     uint64_t used = 0, rows = array->shape.chunk_rows;
     for (uint64_t row = 0; row < array->shape.rows && status == EBPO_OK; row += rows) {
-        uint64_t left = array->shape.rows - row;
+        uint64_t remaining = array->shape.rows - row;
         status = ebpo_reader_gates(file, row / rows, &r->reader, r->raw, error);
         if (status == EBPO_OK)
-            compare_gates_chunk(tally, r->raw, faces, tree, row, left < rows ? left : rows, &used);
+            compare_gates_chunk(tally, r->raw, faces, tree, row,
+                                remaining < rows ? remaining : rows, &used);
     }
     return status;
 }
@@ -242,20 +252,19 @@ typedef struct indexed {
     uint64_t listed; /* number of chunks in the list so far */
 } indexed;
 
-enum { LIMIT = EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS };
+enum { INDEXED_MAX = EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS };
 
 typedef struct offset_comparison {
     ebpo_tally *tally;
     const ebpo_file *file;
     ebpo_head head;
-    indexed array[LIMIT];
+    indexed array[INDEXED_MAX];
     unsigned arrays;
-    uint64_t *list, rows;
+    uint64_t *list, rows; /* [rows] the array's number in the upper 32 bits, bytes in the lower */
 } offset_comparison;
 
-/* Reads HDF5's index of an array that is present. `number`: the array's number in the
- * specification, which has 64 numbers for each level, then those of the mesh, the maps and the
- * table. */
+/* Reads HDF5's index of an array, if the file has it. `number`: the array's number in the
+ * specification, which has 64 numbers for each level, then numbers for all other arrays. */
 static ebpo_status index_array(offset_comparison *c, const ebpo_array_in *array, uint32_t number,
                                ebpo_error *error)
 {
@@ -323,6 +332,7 @@ static indexed *find_indexed(offset_comparison *c, uint32_t number)
     return NULL;
 }
 
+/* Compares a row of the list with HDF5's index. `at`, `bytes`: the chunk by the list. */
 static void compare_row(offset_comparison *c, uint64_t row, uint64_t at, uint32_t bytes)
 {
     ebpo_tally *tally = c->tally;
@@ -389,6 +399,7 @@ ebpo_status ebpo_check_chunk_offsets(ebpo_tally *tally, const ebpo_file *file,
 
 /* --- unused bytes --- */
 
+/* Search for the bytes of the file that nothing uses. */
 typedef struct survey {
     const ebpo_file *file;
     const ebpo_progress *progress;
@@ -458,21 +469,22 @@ static int by_offset(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Counts the bytes of a gap that are not zero. The gap may be large, so it is read in pieces. */
+/* Counts the bytes of a gap that are not zero. The gap may be large, so it is read in several
+ * steps. */
 static ebpo_status inspect_gap(const survey *s, ebpo_range gap, uint64_t *filled, ebpo_error *error)
 {
-    enum { PIECE = 1 << 14 };
-    uint8_t piece[PIECE];
+    enum { STEP_BYTES = 1 << 14 };
+    uint8_t bytes[STEP_BYTES];
     ebpo_input *in = &ebpo_reader_own(s->file)->in;
     ebpo_status status = EBPO_OK;
     while (gap.size && status == EBPO_OK) {
-        uint64_t size = gap.size < PIECE ? gap.size : PIECE;
+        uint64_t size = gap.size < STEP_BYTES ? gap.size : STEP_BYTES;
         if (!ebpo_progress_step(s->progress, "checking unused bytes", gap.offset, in->source.size,
                                 error))
             return EBPO_E_CANCELLED;
-        status = ebpo_input_read(in, gap.offset, size, piece, error);
+        status = ebpo_input_read(in, gap.offset, size, bytes, error);
         for (uint64_t i = 0; i < size && status == EBPO_OK; i++)
-            *filled += piece[i] != 0;
+            *filled += bytes[i] != 0;
         gap = (ebpo_range){ gap.offset + size, gap.size - size };
     }
     return status;
@@ -517,13 +529,13 @@ ebpo_status ebpo_count_spare(const ebpo_file *file, const ebpo_progress *progres
     if (status == EBPO_OK)
         status = inspect_gaps(&s, spare, filled, &own);
     free(s.range);
-    /* the checks that read the data report damage */
+    /* damage is not reported here: the checks that read the damaged data report it */
     return status == EBPO_OK || status == EBPO_E_FORMAT ? EBPO_OK : ebpo_fail_with(error, &own);
 }
 
 /* --- chunk checksums --- */
 
-enum { SUM_BYTES = 4, UNKNOWN = 20000 };
+enum { SUM_BYTES = 4, UNKNOWN = 20000 }; /* UNKNOWN: greater than all numbers of arrays */
 
 typedef struct checksum_comparison {
     ebpo_tally *tally;
@@ -610,7 +622,7 @@ ebpo_status ebpo_check_checksums(ebpo_tally *tally, const ebpo_file *file, ebpo_
     const ebpo_array_in *a = &file->root_array[EBPO_A_CHUNK_CHECKSUMS];
     ebpo_error own = EBPO_ERROR_INIT;
     uint64_t *list = NULL;
-    /* In a remote file each chunk would take a request. There, only the library's check is made. */
+    /* in a remote file, each chunk would take a request, so only the library's own check is made */
     if (!file->has_checksums || ebpo_input_prefetches(&ebpo_reader_own(file)->in))
         return EBPO_OK;
     ebpo_status status = ebpo_file_locate(file, NULL, &own);

@@ -1,6 +1,6 @@
-/* Determines exactly if a face touches a cell, if the part of a face in a cell
- * satisfies the node's planes, and how a ray crosses a face. Floating point with error bounds
- * decides most cases; the others use rationals (GMP). Only the exact predicates are shared with the
+/* Determines exactly if a face touches a cell, if the part of a face in a cell satisfies the node's
+ * planes, and how a ray crosses a face. Floating point with error bounds decides most cases;
+ * rational arithmetic (GMP) decides the other cases. Only the exact predicates are shared with the
  * builder.
  *
  * The methods, in the order of this file:
@@ -158,7 +158,7 @@ bool ebpo_exact_half_space(const double low[3], const double high[3], const ebpo
  * axes are sufficient for a box and a triangle, which may have no area. */
 
 static const double eps = 0x1p-53;
-static const double slack = 0x1p-900; /* error bound of underflow */
+static const double slack = 0x1p-900; /* bound of errors by underflow */
 
 /* Corners of a face in cell coordinates. The error of each coordinate is at most 4 * 2^-53 of its
  * absolute value (plus 2^-1000). */
@@ -301,8 +301,8 @@ static int orient_in(int u, int v, const double a[3], const double b[3], const d
                          (double[2]){ c[u], c[v] });
 }
 
-/* Returns how often the face, projected to the plane (u, v), winds around p: 1 counter-clockwise,
- * -1 clockwise, 0 not at all. */
+/* Returns 1 if the face, projected to the plane (u, v), winds around p counter-clockwise, -1 if
+ * clockwise, 0 if it does not wind around p. */
 static int turns_around(const double p[3], int u, int v, const ebpo_corners *face)
 {
     int sum = 0;
@@ -333,6 +333,7 @@ static int shifted_side(const double p[3], const ebpo_corners *face)
     return side != 0 ? side : orient_in(0, 1, a, b, c);
 }
 
+/* Returns true if the shifted p is outside the face's extent on axis k. */
 static bool is_outside(const double p[3], int k, const ebpo_corners *face)
 {
     double a = face->at[0][k], b = face->at[1][k], c = face->at[2][k];
@@ -398,13 +399,13 @@ static double highest_corner(const local_face *face, const double n[3])
 /* Returns true if the upper bound for m, including rounding errors, is at most `bound`. */
 static bool is_certified(const local_face *face, const double n[3], const double m[3], double bound)
 {
-    double rest[3], cube = 0, size = 0;
+    double difference[3], cube = 0, size = 0;
     for (int k = 0; k < 3; k++) {
-        rest[k] = n[k] - m[k];
+        difference[k] = n[k] - m[k];
         cube += m[k] > 0 ? m[k] : 0;
         size += (fabs(n[k]) + fabs(m[k])) * face->largest[k];
     }
-    return highest_corner(face, rest) + cube + 16 * eps * size <= bound;
+    return highest_corner(face, difference) + cube + 16 * eps * size <= bound;
 }
 
 /* Tries m along one axis such that n - m is perpendicular to an edge of the face. */

@@ -1,5 +1,5 @@
-/* Tests faces exactly against cells and planes, and winding numbers by rays (verify_geometry.c).
- * Any thread may call these functions. */
+/* Tests faces exactly against cells and planes, and computes winding numbers by rays. Any thread
+ * may call these functions. */
 #ifndef EBPO_VERIFY_VERIFY_GEOMETRY_H
 #define EBPO_VERIFY_VERIFY_GEOMETRY_H
 
@@ -12,7 +12,7 @@
 #include "verify/tally.h"
 #include "verify/verify_tree.h"
 
-/* --- tests in rationals: exact and slow --- */
+/* --- tests in rational arithmetic: exact and slow --- */
 
 /* A face: its corners in the model's coordinates, exact. */
 typedef struct ebpo_corners {
@@ -27,7 +27,7 @@ bool ebpo_exact_touches(const double low[3], const double high[3], const ebpo_co
 bool ebpo_exact_half_space(const double low[3], const double high[3], const ebpo_corners *face,
                            const int32_t n[3], int32_t d);
 
-/* --- tests in floating point with error bounds; undecided cases use rationals --- */
+/* --- tests in floating point with error bounds; undecided cases use rational arithmetic --- */
 
 /* A cell: the coordinates of its cell faces (exact), and the reciprocals of its sizes (rounded). */
 typedef struct ebpo_frame {
@@ -36,6 +36,7 @@ typedef struct ebpo_frame {
 
 ebpo_frame ebpo_frame_make(const ebpo_box *box, ebpo_cell cell);
 
+/* Returns true if the point is in the closed cell. */
 static inline bool ebpo_corner_in_cell(const ebpo_frame *frame, const double p[3])
 {
     return p[0] >= frame->low[0] && p[0] <= frame->high[0] && p[1] >= frame->low[1] &&
@@ -43,16 +44,16 @@ static inline bool ebpo_corner_in_cell(const ebpo_frame *frame, const double p[3
 }
 
 /* Returns true if the closed triangle and the closed cell have a common point. The result is exact.
- * Counts tests in rationals in the tally. */
+ * Counts tests in rational arithmetic in the tally. */
 bool ebpo_face_touches(const ebpo_frame *frame, const ebpo_corners *face, ebpo_tally *tally);
 
 /* --- winding numbers by rays --- */
 
-/* A point is shifted by (d0, d1, d2), infinitely small and positive, d0 >> d1 >> d2, as the format
- * defines for the corners of cells. The ray has direction +axis. Far from the model the winding
- * number is 0. So a point's winding number is a sum over the faces that its ray crosses: +1 if the
- * ray crosses the face along its normal, -1 if it crosses against the normal. Only orientation
- * signs are used. */
+/* A point is shifted by (d0, d1, d2), infinitely small and positive, with d0 >> d1 >> d2, as the
+ * format defines for the corners of cells. The ray leads from the point in the positive direction
+ * of an axis. Its far end is outside, where the winding number is 0. So the point's winding number
+ * is a sum over the faces that the ray crosses: +1 if the ray crosses the face along its normal, -1
+ * if it crosses against the normal. The computation uses only signs of orientation predicates. */
 
 /* Returns the face's exact contribution to the winding number of p: -1, 0 or 1. */
 int ebpo_ray_hit(const double p[3], int axis, const ebpo_corners *face);
@@ -67,13 +68,12 @@ void ebpo_face_corners(const ebpo_mesh *mesh, uint64_t face, ebpo_corners *out);
 
 enum { EBPO_NODE_PLANES_MAX = 255 }; /* counts are bytes */
 
-/* The planes stored for a node, decoded. Invalid codes are omitted; ebpo_check_nesting reports
- * them.
- */
+/* The planes stored for a node, decoded. Invalid codes are omitted, because ebpo_check_nesting
+ * reports them. */
 typedef struct ebpo_node_planes {
     int count;
-    double n[EBPO_NODE_PLANES_MAX][3], bound[EBPO_NODE_PLANES_MAX]; /* n . xi <= bound; exact */
-    int32_t normal[EBPO_NODE_PLANES_MAX][3], d[EBPO_NODE_PLANES_MAX];
+    double n[EBPO_NODE_PLANES_MAX][3], bound[EBPO_NODE_PLANES_MAX];   /* n . xi <= bound; exact */
+    int32_t normal[EBPO_NODE_PLANES_MAX][3], d[EBPO_NODE_PLANES_MAX]; /* 4096 normal . xi <= d */
     uint32_t number[EBPO_NODE_PLANES_MAX]; /* index among the node's codes */
 } ebpo_node_planes;
 
@@ -85,8 +85,8 @@ void ebpo_check_face_contained(ebpo_tally *tally, const ebpo_node_planes *planes
                                const ebpo_reference_node *node, const ebpo_frame *frame,
                                const ebpo_corners *face, uint64_t number);
 
-/* Checks corners of the cell against all planes. `corners`: bit i is set for corner i. Bits 0, 1
- * and 2 of a corner's number are set for the upper end in x, y and z. */
+/* Checks the corners of the cell that are in the solid against all planes. `corners`: bit i is set
+ * for corner i; bits 0, 1 and 2 of i are set for the upper end in x, y and z. */
 void ebpo_check_corners_contained(ebpo_tally *tally, const ebpo_node_planes *planes,
                                   const ebpo_reference_node *node, unsigned corners);
 

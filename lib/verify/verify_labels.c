@@ -1,14 +1,14 @@
 /* Verifies labels, which are the winding numbers of cells, in two independent ways:
  *
  * - By links, for all cells. A point must have the same winding number in all cells of which it is
- * a corner. A cell without faces has one winding number for all its corners. A leaf stores the
- *   winding number of its lowest corner; those of the other corners follow from signed crossings
- *   along the cell's edges. The 64 corners of a gray node's children are 27 points. The corners of
- *   the root have the winding number 0. These links connect every cell to the root. All winding
- *   numbers are right if no link is violated and the lists are complete (verify_lists.c).
+ * a corner. All corners of a cell without faces have the cell's winding number. A leaf stores the
+ * winding number of its lowest corner; the winding numbers of its other corners follow from signed
+ * crossings along the cell's edges. The 64 corners of a gray node's children are 27 points. The
+ * corners of the root have the winding number 0. These links connect every cell to the root. So all
+ * winding numbers are correct if no link is violated and the lists are complete (verify_lists.c).
  * - By rays through the whole mesh, for all cells or an even sample. The points are sorted into
- *   columns along x. Each face is tested against the points in its columns. Faces are therefore
- * read once, in their order, and only the points are in memory. */
+ * columns along x, and each face is tested against the points in its columns. So faces are read
+ * once, in their order, and only the points are in memory. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -57,8 +57,9 @@ static columns grid_for(const ebpo_mesh *mesh, const ebpo_box *box, uint64_t cou
     return c;
 }
 
-/* Returns the column of a coordinate, y if i is 0 or z if i is 1. The function is monotone, so a
- * point within a face's range of coordinates is also within its range of columns. */
+/* Returns the position, in the grid of columns, of a coordinate y (i = 0) or z (i = 1). The
+ * function is monotone, so a point within a face's range of coordinates is also within the face's
+ * range of columns. */
 static uint64_t column_of(const columns *c, int i, double x)
 {
     double at = (x - c->low[i]) * c->scale[i] * (double)c->side;
@@ -103,9 +104,9 @@ static ebpo_status sort_points(columns *c, ebpo_ray_points *points, ebpo_error *
     EBPO_FOR_ITEMS(points->workspace, i, 0, points->count)
         c->first[column_of_point(c, &points->point[i])]++;
     for (uint64_t i = 0, sum = 0; i <= cells; i++) {
-        uint64_t own = c->first[i];
+        uint64_t in_column = c->first[i];
         c->first[i] = sum;
-        sum += own;
+        sum += in_column;
     }
     EBPO_FOR_ITEMS_SCATTERED(points->workspace, i, 0, points->count)
         sorted[c->first[column_of_point(c, &points->point[i])]++] = points->point[i];
@@ -135,7 +136,7 @@ static ebpo_status follow_faces(void *context, uint64_t begin, uint64_t end, uns
     const columns *c = context;
     (void)worker;
     (void)error;
-    uint64_t rows = 0; /* number of visited rows of columns, each elsewhere in memory */
+    uint64_t rows = 0; /* number of visited rows of columns, which are far apart in memory */
     for (uint64_t f = begin; f < end; f++) {
         ebpo_corners face;
         ebpo_face_corners(c->mesh, f, &face);
@@ -182,8 +183,10 @@ static double rays_work(const ebpo_mesh *mesh, const ebpo_box *box, uint64_t cou
 
 /* --- selection of the cells to check by rays --- */
 
+/* By default, all cells are checked if there are at most CELLS_ALL, else SAMPLES_MANY;
+ * SAMPLES_LEAST if these would take too long. */
 enum { SAMPLES_LEAST = 4096, SAMPLES_MANY = 1 << 20, CELLS_ALL = 1 << 22 };
-/* Maximum number of tests of a face against a point by default, which take some seconds. */
+/* Number of tests of a face against a point that takes too long: some seconds. */
 static const double ray_work_affordable = 4e8;
 
 static uint64_t default_samples(const ebpo_reference_tree *view, uint64_t cells)

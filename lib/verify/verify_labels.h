@@ -1,5 +1,5 @@
-/* Verifies labels, the winding numbers of cells and their corners, by links and by rays
- * (verify_labels.c). */
+/* Verifies labels, which are the winding numbers of cells and of their corners, by links (common
+ * corners of cells must agree) and by rays (crossings with the whole mesh). */
 #ifndef EBPO_VERIFY_VERIFY_LABELS_H
 #define EBPO_VERIFY_VERIFY_LABELS_H
 
@@ -17,7 +17,7 @@ typedef struct ebpo_ray_point {
     double at[3];
     uint64_t octcode; /* code of the cell */
     int64_t stored;   /* winding number in the file */
-    int64_t found;    /* winding number by a ray, set by ebpo_rays_follow */
+    int64_t found;    /* winding number by crossings, set by ebpo_rays_follow */
 } ebpo_ray_point;
 
 /* List of points. A list of zeros is empty. Free `point` with ebpo_array_free. */
@@ -39,14 +39,14 @@ EBPO_MUST_USE ebpo_status ebpo_rays_follow(ebpo_ray_points *points, const ebpo_m
 
 /* --- labels --- */
 
-/* Winding numbers of a cell's corners. Bits 0, 1 and 2 of a corner's number are set for the upper
+/* Winding numbers of a cell's corners. Bits 0, 1 and 2 of a corner's index are set for the upper
  * end in x, y and z. */
 typedef struct ebpo_node_windings {
     int64_t at[8];
-    unsigned known; /* bit i: at[i] is set. Files without mesh do not have all of them */
+    unsigned known; /* bit i: at[i] is set. Without a mesh, only corner 0 of a leaf is known */
 } ebpo_node_windings;
 
-/* The cells to check by rays: about every n-th cell of each level and type. */
+/* The cells to check by rays: an even sample of the cells of each level and type. */
 typedef struct ebpo_label_plan {
     uint64_t cells[EBPO_LEVELS_MAX][4]; /* number of all cells, by level and type */
     uint64_t take[EBPO_LEVELS_MAX][4];  /* number of cells to check */
@@ -65,16 +65,16 @@ void ebpo_terminal_windings(ebpo_node_windings *out, const ebpo_reference_tree *
 void ebpo_check_terminal_label(ebpo_tally *tally, const ebpo_reference_tree *view,
                                const ebpo_reference_node *node);
 
-/* Adds the cell's lowest corner to the points to check by rays, if the plan contains the cell.
- * Returns false when out of memory. */
+/* If the plan contains the cell, adds its lowest corner to the points to check by rays. Returns
+ * false when out of memory. */
 EBPO_MUST_USE bool ebpo_label_note(ebpo_ray_points *points, const ebpo_reference_tree *view,
                                    const ebpo_reference_node *node, const ebpo_frame *frame,
                                    const ebpo_label_plan *plan);
 /* Compares the winding numbers by rays with the winding numbers in the file. */
 void ebpo_check_rays(ebpo_tally *tally, const ebpo_ray_points *points);
 
-/* Compares the winding numbers at common corners of the children of a gray node. Stores those of
- * the node's corners in *out. */
+/* Compares the winding numbers at common corners of the children of a gray node. Stores the winding
+ * numbers of the node's corners in *out. */
 void ebpo_check_links(ebpo_tally *tally, const ebpo_reference_node *node,
                       const ebpo_node_windings children[8], ebpo_node_windings *out);
 

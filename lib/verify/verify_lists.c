@@ -1,8 +1,8 @@
 /* Verifies the face lists of leaves against the faces that touch the leaves.
  *
  * A leaf must list every face that touches its closed cell. No face may touch a white or black
- * cell. The builder also lists faces for which its test is not certain. A listed face that does not
- * touch the leaf is therefore no violation if it touches the cell widened by 1/256; such faces are
+ * cell. The builder also lists faces for which its test is not certain. So a listed face that does
+ * not touch the leaf's cell is no violation if it touches the cell widened by 1/256; such faces are
  * only counted.
  *
  * A gray node is only allowed if a leaf in its place would list more faces than the limit of the
@@ -73,7 +73,7 @@ static void check_near(ebpo_tally *tally, const ebpo_reference_tree *view,
         report_face(tally, leaf, face, "the leaf lists a face that is not near it");
 }
 
-/* Checks the listed faces that do not touch the leaf. `faces` are all faces that touch it. */
+/* Checks the listed faces that do not touch the leaf. `faces`: all faces that touch the leaf. */
 static void check_extra(ebpo_tally *tally, const ebpo_reference_tree *view,
                         const ebpo_reference_node *leaf, const face_list *list,
                         const uint32_t *faces, uint64_t count)
@@ -153,6 +153,7 @@ static int compare_numbers(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
+/* Sorts the list of faces and removes repetitions. */
 static void keep_different(gathering *g)
 {
     uint64_t kept = g->count > 0;

@@ -1,4 +1,4 @@
-/* The parts of the verifier, which verify.c calls. */
+/* Declares the parts of the verifier, which verify.c calls. */
 #ifndef EBPO_VERIFY_VERIFY_PARTS_H
 #define EBPO_VERIFY_VERIFY_PARTS_H
 
@@ -28,9 +28,10 @@ bool ebpo_plain_gates_read(const uint8_t *in, uint32_t rows, uint64_t *used, uin
 /* --- verify_source.c: comparison of the file's mesh with its source --- */
 
 /* Repeats the recorded repairs on a copy of `source`, and compares the result bit for bit with
- * `stored`, the file's mesh. `ordered`: `stored` is in the order of the source; otherwise vertices
- * and faces are compared as multisets. If `stored` is NULL, the file is a subset. Faces and
- * vertices of a subset, and of the file of one component, are compared by their source indices. */
+ * `stored`, the file's mesh. If `stored` is in the order of the source (`ordered`), vertices and
+ * faces are compared one by one; if not, as multisets. `stored` is NULL if the file is a subset.
+ * Faces and vertices of a subset, and of the file of one component, are compared by their source
+ * indices. */
 EBPO_MUST_USE ebpo_status ebpo_check_source(ebpo_tally *tally, const ebpo_file *file,
                                             const ebpo_mesh *stored, bool ordered,
                                             const ebpo_mesh *source, const ebpo_read_options *read,
@@ -51,9 +52,9 @@ EBPO_MUST_USE ebpo_status ebpo_check_chunk_offsets(ebpo_tally *tally, const ebpo
                                                    const ebpo_verify_options *options,
                                                    ebpo_error *error);
 
-/* Checks each row of the list of chunk checksums (section 20), and that each chunk has a row. Does
- * nothing for remote files and files without the list, or if another program has rewritten the
- * file. */
+/* Checks each row of the list of chunk checksums (format-spec, section 20), and that each chunk has
+ * a row. Does nothing for remote files, for files without the list, and for files that another
+ * program has rewritten. */
 EBPO_MUST_USE ebpo_status ebpo_check_checksums(ebpo_tally *tally, const ebpo_file *file,
                                                ebpo_error *error);
 

@@ -1,11 +1,11 @@
 /* Compares the mesh in a file with its source mesh.
  *
- * The recorded repairs are repeated on a copy of the source. The copy must then be equal to the
- * file's mesh bit for bit. If the file's mesh is in the source's order, vertices and faces are
- * compared one by one, otherwise as multisets. For a subset, or the file of one component, faces
- * and vertices are compared by their source indices. Attributes must be those of the source, in the
- * same order, except for omitted elements. If an earlier version rounded the coordinates, only this
- * is reported. */
+ * The recorded repairs are repeated on a copy of the source. Afterwards, the copy must be equal to
+ * the file's mesh bit for bit. If the file's mesh is in the source's order, vertices and faces are
+ * compared one by one; if not, as multisets. For a subset, or the file of one component, faces and
+ * vertices are compared by their source indices. The file must have the attributes of the source,
+ * in the same order, except for omitted elements. If an earlier version of the program has rounded
+ * the coordinates, only this is reported. */
 #include "verify/verify_parts.h"
 
 #include <inttypes.h>
@@ -64,8 +64,8 @@ static ebpo_status copy_mesh(ebpo_mesh *out, const ebpo_mesh *mesh, ebpo_workspa
     return status;
 }
 
-/* Returns the repair steps of the record. If faces were flipped without the step orient, all faces
- * were flipped. */
+/* Returns the repair steps of the record. (If faces were flipped without the step `orient`, the
+ * step was `flip`, which flips all faces.) */
 static unsigned steps_of(const ebpo_repair_record *to_repeat)
 {
     return (to_repeat->weld ? EBPO_REPAIR_WELD : 0) | (to_repeat->orient ? EBPO_REPAIR_ORIENT : 0) |
@@ -74,8 +74,9 @@ static unsigned steps_of(const ebpo_repair_record *to_repeat)
            (to_repeat->fill_holes ? EBPO_REPAIR_FILL : 0);
 }
 
-/* Repeats the recorded repairs on a copy of the source. If the number of flipped faces is not the
- * recorded one, repeats the repairs as earlier versions did, which flipped fewer faces. */
+/* Repeats the recorded repairs on a copy of the source. If the number of flipped faces differs from
+ * the recorded number, repeats the repairs as earlier versions of the program did, which flipped
+ * fewer faces. */
 static ebpo_status repair_again(ebpo_mesh *mesh, const ebpo_mesh *source,
                                 const ebpo_repair_record *to_repeat, ebpo_repair_record *did,
                                 ebpo_workspace *workspace, ebpo_error *error)
@@ -149,8 +150,9 @@ static bool image_unknown(const ebpo_attribute *source, uint64_t at, const ebpo_
     return !ebpo_texture_list(source, at).count || !ebpo_texture_list(stored, i).count;
 }
 
-/* Compares row i of the file's array with row number[i] of the source, or with row i if `number` is
- * NULL. Skips faces that repairs have added, which have numbers from source->rows on. */
+/* Compares row i of the file's array with row number[i] of the source's array, or with row i if
+ * `number` is NULL. Skips faces that repairs have added: their source indices are source->rows and
+ * more. */
 static void compare_rows(ebpo_tally *tally, const ebpo_attribute *source,
                          const ebpo_attribute *stored, const uint32_t *number,
                          ebpo_workspace *workspace)
@@ -176,8 +178,9 @@ static const uint32_t *source_numbers(const ebpo_attribute *array, const ebpo_ma
     return maps && ebpo_attribute_is_of(array, "face") ? maps->face_source : NULL;
 }
 
-/* Checks that the file's attribute arrays are those of the source, in the same order, except for
- * arrays of omitted elements. `maps`: source indices, or NULL for the source's order. */
+/* Checks that the file has the attribute arrays of the source, in the same order, except for arrays
+ * of omitted elements. `maps`: source indices of the file's rows; NULL: the rows are in the
+ * source's order. */
 static void compare_attributes(ebpo_tally *tally, const ebpo_mesh *source, const ebpo_mesh *stored,
                                const ebpo_maps *maps)
 {
@@ -200,6 +203,7 @@ static int compare_vertices(const void *a, const void *b, void *mesh)
                   vertex_bytes(mesh, *(const uint32_t *)b), vertex_size(mesh));
 }
 
+/* Compares the positions of the corners of face i of m and face j of n. */
 static int face_order(const ebpo_mesh *m, uint64_t i, const ebpo_mesh *n, uint64_t j)
 {
     int order = 0;
@@ -227,6 +231,8 @@ static uint32_t *sorted_order(const ebpo_mesh *mesh, uint64_t count,
     return order;
 }
 
+/* Compares the faces or the vertices of two meshes as multisets: sorts both, and compares one by
+ * one. */
 static ebpo_status compare_as_sets(ebpo_tally *tally, const ebpo_mesh *a, const ebpo_mesh *b,
                                    bool faces, ebpo_error *error)
 {
@@ -248,8 +254,9 @@ static ebpo_status compare_as_sets(ebpo_tally *tally, const ebpo_mesh *a, const 
     return EBPO_OK;
 }
 
-/* Computes for each face index of the source the current index of the face, or EBPO_NO_INDEX. *out
- * is NULL if the indices are the same. *numbers: number of face indices of the source. */
+/* Computes (*out)[i]: the index in `whole` of the face with the source index i, or EBPO_NO_INDEX if
+ * it was dropped. Leaves *out NULL if both indices are the same. *numbers: number of source
+ * indices. */
 static ebpo_status list_positions(const ebpo_mesh *whole, uint32_t **out, uint64_t *numbers,
                                   ebpo_error *error)
 {
@@ -266,6 +273,8 @@ static ebpo_status list_positions(const ebpo_mesh *whole, uint32_t **out, uint64
     return EBPO_OK;
 }
 
+/* Returns true if face i of the part has the same corners as the face of `whole` with its source
+ * index. */
 static bool same_corners(const ebpo_mesh *whole, const uint32_t *positions, uint64_t numbers,
                          const ebpo_mesh *part, const ebpo_maps *maps, uint64_t i)
 {
@@ -279,8 +288,8 @@ static bool same_corners(const ebpo_mesh *whole, const uint32_t *positions, uint
     return true;
 }
 
-/* Compares the mesh of a subset, of one component, or with dropped faces: each face and vertex by
- * its source index. */
+/* Compares each face and vertex of the file by its source index: for a subset, the file of one
+ * component, or a mesh of which repairs have dropped faces. */
 static ebpo_status compare_some(ebpo_tally *tally, const ebpo_file *file, const ebpo_mesh *whole,
                                 const ebpo_read_options *read, ebpo_error *error)
 {
@@ -328,8 +337,8 @@ static bool check_digest(ebpo_tally *tally, const ebpo_info *info, const ebpo_me
                  "the source file's digest or size is not the recorded one");
 }
 
-/* Returns true if an earlier version has written the file with rounded coordinates. It rounded the
- * coordinates of OBJ, OFF and text STL to floats, although the text has more digits. */
+/* Returns true if an earlier version of the program has written the file: it rounded the
+ * coordinates of OBJ, OFF and text STL to floats, even if the text had more digits. */
 static bool was_rounded(const ebpo_info *info, const ebpo_mesh *source)
 {
     return source->xyz64 && !info->double_coordinates && source->source_format[0] &&
@@ -394,7 +403,7 @@ ebpo_status ebpo_check_source(ebpo_tally *tally, const ebpo_file *file, const eb
     ebpo_status status =
         unchanged ? EBPO_OK
                   : repair_again(&repaired, source, to_repeat, &did, read->workspace, error);
-    if (status == EBPO_E_ARGUMENT) { /* the cause is the record, not the caller */
+    if (status == EBPO_E_ARGUMENT) { /* the file's record is invalid */
         CHECK(false, "welding within %g is recorded, but the source cannot be welded within it",
               to_repeat->weld_distance);
         ebpo_mesh_free(&repaired);

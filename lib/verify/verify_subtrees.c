@@ -1,12 +1,12 @@
-/* Verifies the table of subtrees (format-spec/subtrees.md). Visits the whole tree once, leaf by
- * leaf in the order of the faces, and counts all items again.
+/* Verifies the table of subtrees (format-spec/subtrees.md). Visits the whole tree once, depth
+ * first, which is the order of the faces, and counts all items again.
  *
- * Every column of every row is recomputed except the numbers of shared chunks:
- * /subtrees/shared_chunks is a hint. Only the sum of these numbers must equal the number of its
- * rows.
+ * Every column of every row is recomputed, except the two numbers of shared chunks, because
+ * /subtrees/shared_chunks is only a hint. The sum of these numbers must be the number of rows of
+ * /subtrees/shared_chunks.
  *
- * This check is independent of the writer and the reader of the library, which proceed level by
- * level. It shares with them only the code that reads arrays. */
+ * This check is independent of the library's writer and reader, which proceed level by level. It
+ * shares with them only the code that reads arrays. */
 #include "verify/verify_parts.h"
 
 #include <inttypes.h>
@@ -20,8 +20,8 @@
 
 #define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
 
-/* Columns of the table, numbered as in the specification. The columns of the levels begin at
- * FIRST_LEVEL. GRAY to END_GROWTH are relative to the first column of a level. */
+/* Columns of the table, numbered as in the specification. From FIRST_LEVEL on, each level has
+ * OF_A_LEVEL columns; GRAY to END_GROWTH are positions among them. */
 enum {
     FACES_BEFORE, /* faces between the previous subtree and this one */
     FACES,
@@ -38,8 +38,9 @@ enum {
     REFERENCES,
     END_GROWTH,
     OF_A_LEVEL,
-    MAX_COLS = FIRST_LEVEL + OF_A_LEVEL * EBPO_LEVELS_MAX
+    COLUMNS_MAX = FIRST_LEVEL + OF_A_LEVEL * EBPO_LEVELS_MAX
 };
+/* Number of subtrees after which pages of the workspace are released. */
 enum { SUBTREES_A_TIME = 128 };
 static const char *const names[] = { "faces before the subtree",    "faces",
                                      "vertices before the subtree", "vertices",
@@ -57,16 +58,17 @@ typedef struct recount {
     const ebpo_reference_tree *view;
     int level; /* level of the subtrees' roots */
     /* the arrays of /subtrees, as stored */
-    unsigned cols, rows_of_chunk; /* of `counts` */
+    unsigned columns, rows_of_chunk; /* of `counts`: columns, and rows of a chunk */
     const uint32_t *counts;
     const uint64_t *index;
     uint64_t subtrees, shared_rows; /* shared_rows: number of rows of /subtrees/shared_chunks */
     /* numbers of subtrees, faces and vertices so far */
     uint64_t subtree, faces, vertices;
-    uint64_t shared_done, end[EBPO_LEVELS_MAX]; /* end of the new faces, by level */
-    uint64_t sum[MAX_COLS]; /* of each column, over all subtrees before the current one */
-    uint64_t row[MAX_COLS]; /* counts of the current subtree */
-    bool within;            /* the visit is within a subtree */
+    uint64_t shared_done;          /* sum of the numbers of shared chunks so far */
+    uint64_t end[EBPO_LEVELS_MAX]; /* [level] end of the last leaf's new faces */
+    uint64_t sum[COLUMNS_MAX];     /* of each column, over all subtrees before the current one */
+    uint64_t row[COLUMNS_MAX];     /* counts of the current subtree */
+    bool within;                   /* the visit is within a subtree */
 } recount;
 
 /* Returns the name of a column. *level: the level to which it belongs, or -1. */
@@ -84,19 +86,19 @@ static const char *column_name(const recount *c, unsigned column, int *level)
 static void check_row(recount *c)
 {
     ebpo_tally *tally = c->tally;
-    const uint32_t *stated = c->counts + c->subtree * c->cols;
+    const uint32_t *stated = c->counts + c->subtree * c->columns;
     int level;
     c->row[SHARED_FACES] =
         stated[SHARED_FACES]; /* not checked: a hint, like the chunks that the list names */
     c->row[SHARED_VERTICES] = stated[SHARED_VERTICES];
     c->shared_done += c->row[SHARED_FACES] + c->row[SHARED_VERTICES];
-    for (unsigned k = 0; k < c->cols; k++) {
+    for (unsigned k = 0; k < c->columns; k++) {
         const char *name = column_name(c, k, &level);
         if (c->subtree % c->rows_of_chunk == 0)
-            CHECK(c->index[c->subtree / c->rows_of_chunk * c->cols + k] == c->sum[k],
+            CHECK(c->index[c->subtree / c->rows_of_chunk * c->columns + k] == c->sum[k],
                   "/subtrees/index, before subtree %" PRIu64 ", column %u (%s): states %" PRIu64
                   ", but the rows of /subtrees/counts before add up to %" PRIu64,
-                  c->subtree, k, name, c->index[c->subtree / c->rows_of_chunk * c->cols + k],
+                  c->subtree, k, name, c->index[c->subtree / c->rows_of_chunk * c->columns + k],
                   c->sum[k]);
         CHECK(stated[k] == c->row[k],
               "/subtrees/counts, subtree %" PRIu64 ", column %u (%s%s): states %" PRIu32
@@ -109,8 +111,8 @@ static void check_row(recount *c)
 
 /* --- visiting the tree --- */
 
-/* Counts the next `count` faces, which are new in a leaf, and the vertices that no earlier face
- * uses. */
+/* Counts the next `count` faces, which are the new faces of a leaf, and the vertices that these
+ * faces are the first to use. */
 static void count_faces(recount *c, uint64_t count)
 {
     const ebpo_mesh *mesh = &c->view->tree->mesh;
@@ -200,26 +202,26 @@ ebpo_status ebpo_check_subtrees(ebpo_tally *tally, const ebpo_file *file,
     const ebpo_array_in *counts = ebpo_reader_array(file, EBPO_A_SUBTREE_COUNTS, 0),
                         *shared = ebpo_reader_array(file, EBPO_A_SUBTREE_SHARED, 0);
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
-    ebpo_error own = EBPO_ERROR_INIT;
+    ebpo_error failure = EBPO_ERROR_INIT;
     recount c = { .tally = tally, .view = view, .level = file->info.subtree_level };
     read.threads = options->threads;
     read.workspace = options->workspace;
     if (!c.level)
         return EBPO_OK;
-    c.cols = counts->shape.cols;
+    c.columns = counts->shape.cols;
     c.rows_of_chunk = counts->shape.chunk_rows;
     c.shared_rows = shared->present ? shared->shape.rows : 0;
     ebpo_status status = ebpo_reader_make(file, EBPO_A_SUBTREE_COUNTS, 0, &read, sizeof *c.counts,
-                                          (void *)&c.counts, &own);
+                                          (void *)&c.counts, &failure);
     if (status == EBPO_OK)
         status = ebpo_reader_make(file, EBPO_A_SUBTREE_INDEX, 0, &read, sizeof *c.index,
-                                  (void *)&c.index, &own);
+                                  (void *)&c.index, &failure);
     if (status == EBPO_OK)
         recount_table(&c);
     ebpo_array_free(read.workspace, (void *)(uintptr_t)c.counts);
     ebpo_array_free(read.workspace, (void *)(uintptr_t)c.index);
     if (status != EBPO_E_FORMAT)
-        return status == EBPO_OK ? EBPO_OK : ebpo_fail_with(error, &own);
-    CHECK(false, "%s", own.message);
+        return status == EBPO_OK ? EBPO_OK : ebpo_fail_with(error, &failure);
+    CHECK(false, "%s", failure.message);
     return EBPO_OK;
 }

@@ -1,16 +1,17 @@
 /* Finds the nodes of a tree in memory, and runs the checks that need no single face: nesting and
  * structure.
  *
- * - Nodes are found by rank. The numbers of items before each group of siblings give the positions
- *   of a node's children, planes, lists and winding number.
+ * - Nodes are found by rank (number among the nodes of the level and type). The numbers of items
+ * before each group of siblings give the positions of a node's children, planes, lists and winding
+ * number.
  * - Structure: the arrays are consistent (ebpo_check_shape, which runs before all other checks),
  * and the format allows the tree: summaries, leaf sizes, the order of faces, the root box, balanced
  *   edges of a solid.
- * - Nesting: the planes of a node and of all its ancestors bound the node's envelope. The envelope
- *   is therefore within the envelope of the parent if a plane is the same in the coordinates of
- *   every cell. This condition is checked in integers, for points of sampled cells. Each point is
- *   compared with each plane twice: the plane is transformed down to the cell of the point, and the
- *   point is transformed up to the cell of the plane. */
+ * - Nesting: the planes of a node and of all its ancestors bound the node's envelope. So the
+ * envelope is within the parent's envelope if a plane is the same in the coordinates of every cell.
+ * This condition is checked in integers, for points of sampled cells. Each point is compared with
+ * each plane twice: once the plane is transformed down to the cell of the point, once the point is
+ * transformed up to the cell of the plane. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -199,6 +200,7 @@ int64_t ebpo_reference_winding(const ebpo_reference_tree *view, const ebpo_refer
 
 enum { NODES_PER_LEVEL = 256, POINTS_PER_NODE = 8, POINT_BITS = 16 };
 
+/* Checks that the plane codes of the level's nodes of a type are valid. */
 static void check_codes(ebpo_tally *tally, const ebpo_reference_tree *view, int l,
                         ebpo_node_type type, const uint8_t *counts)
 {
@@ -246,8 +248,8 @@ static void chain_to(chain *out, const ebpo_reference_tree *view, const ebpo_ref
 
 /* Returns true if a point is on the inner side of a plane of the cell `above`. The point is in
  * units of 2^-16 of the cell `at`, and is transformed to the coordinates of `above`. */
-static bool keeps_above(const ebpo_cell *above, const ebpo_cell *at, const int64_t point[3],
-                        const int32_t n[3], int64_t d)
+static bool point_kept_above(const ebpo_cell *above, const ebpo_cell *at, const int64_t point[3],
+                             const int32_t n[3], int64_t d)
 {
     int down = at->level - above->level;
     ebpo_wide sum = { 0, 0 };
@@ -260,10 +262,10 @@ static bool keeps_above(const ebpo_cell *above, const ebpo_cell *at, const int64
                                     ebpo_wide_signed_product(d, INT64_C(1) << (POINT_BITS + down)));
 }
 
-/* Does the same in the coordinates of the lower cell. The plane is transformed down level by level,
- * as readers do. */
-static bool keeps_below(const chain *c, int from, int to, const int64_t point[3],
-                        const int32_t n[3], int64_t d)
+/* Returns the same as point_kept_above, but transforms the plane of the cell at level `from` of the
+ * chain, level by level as readers do, to the coordinates of the point's cell at level `to`. */
+static bool point_kept_below(const chain *c, int from, int to, const int64_t point[3],
+                             const int32_t n[3], int64_t d)
 {
     for (int l = from + 1; l <= to; l++)
         d = ebpo_plane_to_child(n, d, c->node[l].octant);
@@ -286,8 +288,8 @@ static void check_point(ebpo_tally *tally, const ebpo_reference_tree *view, cons
             if (!ebpo_plane_decode(codes[i], n, &d))
                 continue;
             tally->checks[EBPO_VERIFY_NESTING]++;
-            if (keeps_above(&c->node[l].cell, at, point, n, d) !=
-                keeps_below(c, l, c->depth, point, n, d))
+            if (point_kept_above(&c->node[l].cell, at, point, n, d) !=
+                point_kept_below(c, l, c->depth, point, n, d))
                 ebpo_tally_violation(tally, EBPO_VERIFY_NESTING,
                                      &(ebpo_verify_place){ c->node[c->depth].code, EBPO_NO_FACE,
                                                            i },
@@ -595,6 +597,7 @@ static void check_summary(ebpo_tally *tally, const ebpo_tree *tree, int l)
           level->leaf_volume);
 }
 
+/* State of visiting all nodes, depth first. */
 typedef struct descent {
     ebpo_tally *tally;
     const ebpo_reference_tree *view;
@@ -644,7 +647,7 @@ static void check_node(descent *d, const ebpo_reference_node *node)
 
 static void check_gray(descent *d, const ebpo_reference_node *node)
 {
-    if (ebpo_reference_is_pruned(d->view, node)) { /* a leaf may have become pruned */
+    if (ebpo_reference_is_pruned(d->view, node)) { /* in a subset, also in place of a leaf */
         d->pruned[node->cell.level]++;
         return;
     }
@@ -681,9 +684,9 @@ static void check_vertices(ebpo_tally *tally, const ebpo_reference_tree *view)
           outside, first / 3);
 }
 
-/* Returns true if every edge is used equally often in both directions. Adds a random value for each
- * use of an undirected edge, with a sign for its direction. The sum is 0 if all directions cancel,
- * and otherwise with a probability of only 2^-64. */
+/* Returns true if every edge is used equally often in both directions. Each edge has a
+ * pseudo-random value, which is added for each use in one direction and subtracted for each use in
+ * the other direction. If the uses do not cancel, the sum is 0 with a probability of only 2^-64. */
 static bool edges_balance(const ebpo_mesh *mesh)
 {
     uint64_t sum = 0;

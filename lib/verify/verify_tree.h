@@ -1,5 +1,5 @@
-/* Finds the nodes of a tree in memory by a separate implementation for the verifier, and checks
- * nesting and structure (verify_tree.c). */
+/* Finds the nodes of a tree in memory, and checks nesting and structure. This implementation is
+ * separate from the library's own, because the verifier checks the latter's results. */
 #ifndef EBPO_VERIFY_VERIFY_TREE_H
 #define EBPO_VERIFY_VERIFY_TREE_H
 
@@ -10,13 +10,14 @@
 
 /* --- finding nodes --- */
 
-/* Numbers of items before a group of siblings in its level. */
+/* Numbers of items that precede a group of siblings in its level. */
 typedef struct ebpo_reference_group {
     uint64_t of_type[4]; /* nodes of each ebpo_node_type */
     uint64_t planes, refs, leaf_planes;
 } ebpo_reference_group;
 
-/* View of a tree, in which nodes are found by rank. */
+/* A tree, with what is needed to find nodes by rank (the number of a node among the nodes of its
+ * level and type). */
 typedef struct ebpo_reference_tree {
     const ebpo_tree *tree; /* the caller's */
     ebpo_box box;
@@ -29,8 +30,8 @@ typedef struct ebpo_reference_tree {
 typedef struct ebpo_reference_node {
     ebpo_octcode code;
     ebpo_cell cell;
-    uint64_t group;
-    unsigned octant;
+    uint64_t group;  /* number of its group of siblings in the level */
+    unsigned octant; /* position in this group */
     ebpo_node_type type;
     uint64_t rank;
 } ebpo_reference_node;
@@ -54,8 +55,9 @@ bool ebpo_reference_is_pruned(const ebpo_reference_tree *view, const ebpo_refere
 ebpo_reference_node ebpo_reference_child(const ebpo_reference_tree *view,
                                          const ebpo_reference_node *node, unsigned octant);
 
-/* Returns the codes of the planes stored for a node: the planes that a gray node adds, or the leaf
- * planes of a leaf. Returns NULL, and *count is 0, when there are none. */
+/* Returns the codes of the planes stored for a node: the planes that a gray node adds to its
+ * parent's envelope, or the leaf planes of a leaf. If there are none, returns NULL and sets *count
+ * to 0. */
 const uint32_t *ebpo_reference_planes(const ebpo_reference_tree *view,
                                       const ebpo_reference_node *node, uint32_t *count);
 /* Returns the references of a leaf to faces that earlier leaves already list. */
@@ -77,13 +79,13 @@ static inline bool ebpo_reference_inside(const ebpo_reference_tree *view, int64_
 /* --- nesting --- */
 
 /* Checks that plane codes are valid, and that a plane is the same in the coordinates of its cell
- * and of every cell below (verify_tree.c). */
+ * and of every cell below. */
 void ebpo_check_nesting(ebpo_tally *tally, const ebpo_reference_tree *view);
 
 /* --- structure: the arrays are consistent, and the format allows the tree --- */
 
-/* Checks that the arrays are consistent, so that other checks stay within them. Returns false after
- * a violation; the caller must then run no other checks. */
+/* Checks that the arrays are consistent, so that other checks do not read beyond their ends.
+ * Returns false after a violation; the caller must then run no other checks. */
 bool ebpo_check_shape(ebpo_tally *tally, const ebpo_tree *tree);
 
 /* Checks the level summaries, the sizes of leaves, the order of faces, that the root box contains

@@ -20,6 +20,8 @@
 #include "verify/verify_geometry.h"
 #include "verify/verify_labels.h"
 
+/* FACE_GRAIN: faces of a task. A subtree that one thread visits has at most a SUBTREES_WANTED-th of
+ * all faces; this limit is between SUBTREE_FACES and SUBTREE_FACES_MAX. */
 enum { FACE_GRAIN = 4096, SUBTREE_FACES = 1024, SUBTREE_FACES_MAX = 1 << 18, SUBTREES_WANTED = 64 };
 
 /* A stack of face indices: the faces of a node, then those of its child, and so on down. */
@@ -29,6 +31,7 @@ typedef struct face_stack {
     uint64_t capacity;
 } face_stack;
 
+/* What one thread uses alone. */
 typedef struct worker {
     ebpo_tally tally;
     face_stack stack;
@@ -37,10 +40,11 @@ typedef struct worker {
     uint64_t visited; /* number of faces since the last release of pages */
 } worker;
 
-/* A node of the upper part of the tree. */
+/* A node of the upper part of the tree, which is visited by all threads, or the root of a subtree.
+ */
 typedef struct upper_node {
     ebpo_reference_node node;
-    uint32_t *faces;
+    uint32_t *faces; /* faces that touch the node; NULL after the node has been visited */
     uint64_t face_count;
     uint64_t children; /* index in `upper` of the first of eight; 0: root of a subtree */
     ebpo_node_windings corners;
@@ -83,8 +87,8 @@ static void family_make(family *out, const ebpo_box *box, const ebpo_reference_n
         }
 }
 
-/* Returns the octants that the face's bounding box intersects. An octant is here the intersection
- * of three half-spaces at the middle planes. */
+/* Returns the octants that the face's bounding box intersects, as bits. Here, an octant is the
+ * intersection of three half-spaces at the middle planes. */
 static unsigned near_octants(const family *f, const ebpo_corners *face)
 {
     static const uint8_t upper[3] = { 0xaa, 0xcc, 0xf0 };
@@ -128,8 +132,8 @@ static void visit_faces(const walk *w, worker *self, const ebpo_reference_node *
     }
 }
 
-/* Checks that a gray node has too many faces for a leaf. `touching`: number of faces that touch it.
- */
+/* Checks that a gray node has too many faces for a leaf. `touching`: number of faces that touch the
+ * node. */
 static void check_worth(const walk *w, ebpo_tally *tally, const ebpo_reference_node *node,
                         uint64_t touching)
 {
@@ -158,6 +162,7 @@ static void finish_gray(const walk *w, worker *self, const ebpo_reference_node *
     ebpo_check_corners_contained(&self->tally, &self->planes, node, inside);
 }
 
+/* Returns true if the node has no children in the file. */
 static bool is_terminal(const walk *w, const ebpo_reference_node *node)
 {
     return node->type != EBPO_GRAY || ebpo_reference_is_pruned(w->view, node);
@@ -229,13 +234,13 @@ static ebpo_status walk_down(const walk *w, worker *self, const ebpo_reference_n
     check_worth(w, &self->tally, node, count);
     ebpo_node_windings children[8];
     for (unsigned octant = 0; octant < 8; octant++) {
-        uint64_t own = 0;
+        uint64_t in_child = 0;
         for (uint64_t i = 0; i < count; i++)
             if (s->octants[first + i] >> octant & 1)
-                s->faces[first + count + own++] = s->faces[first + i];
+                s->faces[first + count + in_child++] = s->faces[first + i];
         ebpo_reference_node child = ebpo_reference_child(w->view, node, octant);
         ebpo_status status =
-            walk_down(w, self, &child, first + count, own, &children[octant], error);
+            walk_down(w, self, &child, first + count, in_child, &children[octant], error);
         if (status != EBPO_OK)
             return status;
     }
@@ -338,7 +343,8 @@ static ebpo_status walk_upper(walk *w, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Visits a subtree. The faces of a leaf are not copied to the stack, as they may be too many. */
+/* Visits a subtree. If it is a leaf, its faces, which may be very many, are not copied to the
+ * stack. */
 static ebpo_status walk_subtree(const walk *w, worker *self, upper_node *n, ebpo_error *error)
 {
     if (is_terminal(w, &n->node))
@@ -389,8 +395,8 @@ static ebpo_status walk_prepare(walk *w, ebpo_error *error)
     if (!w->workers)
         return ebpo_fail_memory(error, w->threads * sizeof *w->workers);
     uint64_t faces = w->view->has_mesh ? w->view->tree->mesh.face_count : 0;
-    /* each thread stores the faces on its path, about 15 bytes for each face of the subtree's root
-     */
+    /* each thread stores the faces of all nodes on its path: about 15 bytes for each face of the
+     * subtree's root */
     uint64_t share = faces / SUBTREES_WANTED;
     w->subtree_limit = share < SUBTREE_FACES       ? SUBTREE_FACES
                        : share > SUBTREE_FACES_MAX ? SUBTREE_FACES_MAX
