@@ -1,10 +1,11 @@
 /* Computes the polygons of a level: the envelopes of its nodes, as triangles.
  *
- * The walk goes from the root down; each envelope is cut from its parent's by the node's planes. A
- * leaf's planes come from the file, or from its faces (construct/leaf_planes.c), or the leaf keeps
- * its parent's envelope. The top of the tree is walked first; threads then walk the independent
- * subtrees below it. The position of the split depends only on the tree, and pieces are joined in
- * order of octcodes (locational codes), so the number of threads does not change the result.
+ * The walk goes from the root down; each node's envelope is cut from the parent's envelope by the
+ * node's planes. A leaf's planes come from the file, or from its faces (construct/leaf_planes.c),
+ * or the leaf keeps its parent's envelope. One thread first walks the top of the tree, down to the
+ * split level; all threads then walk the independent subtrees below this level. The split level
+ * depends only on the tree, and the results of the walks are joined in order of octcodes
+ * (locational codes), so the number of threads does not change the result.
  *
  * Sections: polyhedra as triangles; the model, which a walk reads; leaves; colours of nodes; the
  * walk. */
@@ -25,6 +26,7 @@
 #include "geometry/polytope.h"
 #include "levels/lod.h"
 
+/* greatest number of vertices or faces of a mesh */
 static const uint64_t count_limit = UINT32_MAX - 1;
 
 /* --- polyhedra as triangles --- */
@@ -43,14 +45,16 @@ static void polyhedra_free(ebpo_polyhedra *piece)
     piece->node_count = piece->node_capacity = piece->polygon_count = piece->polygon_capacity = 0;
 }
 
-static void add_fan(ebpo_polyhedra *piece, const uint32_t *number, const uint16_t *loop,
+/* Appends a polygon as a fan of triangles. `loop` has the polygon's vertices as indices in the
+ * polytope, `new_index` the indices of these vertices in the piece. */
+static void add_fan(ebpo_polyhedra *piece, const uint32_t *new_index, const uint16_t *loop,
                     int corners)
 {
     for (int i = 1; i + 1 < corners; i++) {
         uint32_t *face = piece->faces + 3 * piece->face_count++;
-        face[0] = number[loop[0]];
-        face[1] = number[loop[i]];
-        face[2] = number[loop[i + 1]];
+        face[0] = new_index[loop[0]];
+        face[1] = new_index[loop[i]];
+        face[2] = new_index[loop[i + 1]];
     }
 }
 
@@ -70,6 +74,7 @@ static bool begin_node(ebpo_polyhedra *piece, const ebpo_polytope *p, const ebpo
     return true;
 }
 
+/* Records a polygon of the last node. */
 static void end_polygon(ebpo_polyhedra *piece, unsigned corners)
 {
     piece->corners[piece->polygon_count++] = (uint8_t)corners;
@@ -90,24 +95,24 @@ ebpo_status ebpo_polyhedra_add(ebpo_polyhedra *piece, const ebpo_polytope *p, co
         (piece->wants_nodes && !begin_node(piece, p, box, cell, type)))
         return ebpo_fail_memory(error,
                                 (piece->vertex_count + piece->face_count) * 3 * sizeof(double));
-    uint32_t number[EBPO_POLYTOPE_VERTICES];
+    uint32_t new_index[EBPO_POLYTOPE_VERTICES];
     uint8_t sides[EBPO_POLYTOPE_VERTICES];
     ebpo_polytope_sides(p, sides);
-    memset(number, 0xff, sizeof number);
+    memset(new_index, 0xff, sizeof new_index);
     uint64_t first_vertex = piece->vertex_count;
     for (int f = 0; f < p->face_count; f++) {
         if (p->tag[f] < 0 && !cell_faces)
             continue;
         for (int i = p->first[f]; i < p->first[f + 1]; i++) {
             uint16_t v = p->corner[i];
-            if (number[v] != UINT32_MAX)
+            if (new_index[v] != UINT32_MAX)
                 continue;
             for (int k = 0; k < 3; k++)
                 piece->xyz[3 * piece->vertex_count + (uint64_t)k] =
                     ebpo_cell_face_point(box, cell, k, p->vertex[v][k], sides[v]);
-            number[v] = (uint32_t)piece->vertex_count++;
+            new_index[v] = (uint32_t)piece->vertex_count++;
         }
-        add_fan(piece, number, p->corner + p->first[f], p->first[f + 1] - p->first[f]);
+        add_fan(piece, new_index, p->corner + p->first[f], p->first[f + 1] - p->first[f]);
         if (piece->wants_nodes)
             end_polygon(piece, p->first[f + 1] - p->first[f]);
     }
@@ -244,6 +249,7 @@ ebpo_status ebpo_lod_model_read(ebpo_lod_model *out, const ebpo_file *file, int 
 
 /* --- envelopes of leaves --- */
 
+/* Returns false if the mesh has no such face or not all of its vertices. */
 static bool copy_face(const ebpo_mesh *mesh, uint64_t face, ebpo_triangle *out)
 {
     if (face >= mesh->face_count)
@@ -259,8 +265,8 @@ static bool copy_face(const ebpo_mesh *mesh, uint64_t face, ebpo_triangle *out)
     return true;
 }
 
-/* Collects the leaf's faces in the order of the builder: ascending indices, so referenced faces
- * precede new ones. */
+/* Collects the leaf's faces in the same order as the construction did, which is the order of
+ * ascending indices. So referenced faces precede new faces. */
 ebpo_status ebpo_lod_leaf_faces(const ebpo_lod_model *model, ebpo_cell cell, uint64_t leaf,
                                 ebpo_leaf_scratch *scratch, uint64_t *count, ebpo_error *error)
 {
@@ -273,12 +279,12 @@ ebpo_status ebpo_lod_leaf_faces(const ebpo_lod_model *model, ebpo_cell cell, uin
         return ebpo_fail_memory(error, (refs + fresh) * sizeof *scratch->faces);
     const uint32_t *ref =
         level->leaf_refs ? level->leaf_refs + model->ranks[cell.level].ref_first[leaf] : NULL;
-    bool fine = true;
-    for (uint64_t i = 0; i < refs && fine; i++)
-        fine = copy_face(&model->mesh, ref[i], &scratch->faces[i]);
-    for (uint64_t i = 0; i < fresh && fine; i++)
-        fine = copy_face(&model->mesh, level->leaf_first[leaf] + i, &scratch->faces[refs + i]);
-    if (!fine)
+    bool valid = true;
+    for (uint64_t i = 0; i < refs && valid; i++)
+        valid = copy_face(&model->mesh, ref[i], &scratch->faces[i]);
+    for (uint64_t i = 0; i < fresh && valid; i++)
+        valid = copy_face(&model->mesh, level->leaf_first[leaf] + i, &scratch->faces[refs + i]);
+    if (!valid)
         return ebpo_fail(error, EBPO_E_FORMAT,
                          "level %d: leaf %llu names a face or vertex that the mesh does not have; "
                          "run ebpo verify",
@@ -340,8 +346,8 @@ static ebpo_status cut_to_leaf(const ebpo_lod_model *model, ebpo_cell cell, uint
 
 /* --- colours of nodes --- */
 
-/* Finds the colour of the last gray node on the path from the root: the node itself or its parent.
- */
+/* Finds the colour of the last gray node on the path from the root to a node. This is the node
+ * itself or its parent. Returns false without a colour. */
 static bool find_colour(const ebpo_lod_model *model, uint64_t octcode, uint32_t *colour)
 {
     int depth = ebpo_cell_of_octcode(octcode).level;
@@ -408,9 +414,11 @@ ebpo_status ebpo_lod_colours(const ebpo_lod_nodes *nodes, uint64_t vertex_count,
 
 /* --- the walk --- */
 
+/* Gray nodes that are enough to keep all threads busy. */
 enum { SEEDS_WANTED = 128 };
 
-/* Halves of the envelopes on the path to a node, along z, y, x; too large for the stack. */
+/* Halves of the envelopes on the path to a node: the envelope's half along z, this half's half
+ * along y, and that half's half along x. They are too large for the stack. */
 typedef ebpo_polytope path_halves[EBPO_LEVELS_MAX][3];
 
 /* A gray node at the split level, where the walk of a subtree begins. */
@@ -421,13 +429,13 @@ typedef struct seed {
 
 typedef struct job {
     const ebpo_lod_model *model;
-    bool cell_faces; /* keep polygons on cell faces */
-    bool polygons;   /* compute polygons; false: only the volume */
-    bool nodes;      /* record the node of each polygon */
+    bool cell_faces; /* true: keep polygons on cell faces */
+    bool polygons;   /* true: compute polygons; false: only the volume */
+    bool nodes;      /* true: record the node of each polygon */
     int split;       /* level at which the first walk creates seeds */
     seed *seeds;
     uint64_t seed_count;
-    /* [1 + seed_count]: for the top, then for each seed */
+    /* [1 + seed_count] the pieces of the walk from the root, then of the walk from each seed */
     ebpo_polyhedra (*pieces)[EBPO_LEVELS_MAX];
     ebpo_leaf_scratch *scratch; /* [threads] */
     path_halves *halves;        /* [threads] */
@@ -438,12 +446,13 @@ typedef struct walker {
     ebpo_polyhedra *out; /* [EBPO_LEVELS_MAX] */
     ebpo_leaf_scratch *scratch;
     ebpo_polytope (*half)[3]; /* [EBPO_LEVELS_MAX] */
-    int stop;                 /* gray nodes of this level are not entered */
+    int last_level; /* gray nodes of this level become seeds; -1: the walk has no such level */
     ebpo_error *error;
 } walker;
 
-static ebpo_status emit_polytope(walker *w, const ebpo_polytope *p, ebpo_cell cell,
-                                 ebpo_node_type type)
+/* Adds a node's polytope to the piece of the node's level. */
+static ebpo_status add_polytope(walker *w, const ebpo_polytope *p, ebpo_cell cell,
+                                ebpo_node_type type)
 {
     ebpo_polyhedra *piece = &w->out[cell.level];
     piece->volume += ebpo_polytope_volume(p) * ebpo_cell_volume(&w->j->model->box, cell.level);
@@ -456,8 +465,8 @@ static ebpo_status emit_polytope(walker *w, const ebpo_polytope *p, ebpo_cell ce
 static ebpo_status visit_group(walker *w, uint64_t group, ebpo_cell parent_cell,
                                const ebpo_polytope *parent);
 
-/* Returns true for a pruned node (whose children are not in the file); its envelope represents it
- * at all deeper levels. Only called above the target. */
+/* Returns true for a pruned node (whose children are not in the file). The node's envelope
+ * represents the node at all deeper levels. Only called above the target level. */
 static bool is_pruned(const ebpo_lod_model *model, int level, uint64_t gray)
 {
     return model->info->pruned && level < model->target && model->level[level + 1].types[gray] == 0;
@@ -470,15 +479,15 @@ static ebpo_status visit_gray(walker *w, uint64_t gray, ebpo_cell cell, ebpo_pol
         ebpo_planes_cut(envelope, level->planes + w->j->model->ranks[cell.level].plane_first[gray],
                         level->plane_counts[gray]);
     if (cell.level == w->j->model->target)
-        return emit_polytope(w, envelope, cell, EBPO_GRAY);
-    if (cell.level == w->stop) {
+        return add_polytope(w, envelope, cell, EBPO_GRAY);
+    if (cell.level == w->last_level) {
         seed *s = &w->j->seeds[w->j->seed_count++];
         s->cell = cell;
         ebpo_polytope_copy(&s->envelope, envelope);
         return EBPO_OK;
     }
     if (is_pruned(w->j->model, cell.level, gray))
-        return emit_polytope(w, envelope, cell, EBPO_GRAY);
+        return add_polytope(w, envelope, cell, EBPO_GRAY);
     return visit_group(w, gray, cell, envelope);
 }
 
@@ -494,7 +503,7 @@ static ebpo_status visit_node(walker *w, uint64_t group, unsigned octant, ebpo_c
     if (type == EBPO_GRAY)
         return visit_gray(w, rank, cell, envelope);
     ebpo_status status = cut_to_leaf(model, cell, rank, w->scratch, envelope, w->error);
-    return status == EBPO_OK ? emit_polytope(w, envelope, cell, EBPO_LEAF) : status;
+    return status == EBPO_OK ? add_polytope(w, envelope, cell, EBPO_LEAF) : status;
 }
 
 /* Adds a black node, which fills its cell. */
@@ -502,7 +511,7 @@ static ebpo_status visit_black(walker *w, ebpo_cell cell)
 {
     ebpo_polytope cube;
     ebpo_polytope_cube(&cube);
-    return emit_polytope(w, &cube, cell, EBPO_BLACK);
+    return add_polytope(w, &cube, cell, EBPO_BLACK);
 }
 
 static ebpo_status visit_root(walker *w)
@@ -517,8 +526,8 @@ static ebpo_status visit_root(walker *w)
     }
 }
 
-/* Visits siblings in octant order; they share the halves that their envelopes are cut from, as in
- * the builder. */
+/* Visits siblings in octant order. Their envelopes are cut from shared halves of the parent's
+ * envelope, as in the construction. */
 static ebpo_status visit_group(walker *w, uint64_t group, ebpo_cell parent_cell,
                                const ebpo_polytope *parent)
 {
@@ -542,6 +551,7 @@ static ebpo_status visit_group(walker *w, uint64_t group, ebpo_cell parent_cell,
     return status;
 }
 
+/* Walks the subtrees of the seeds from `begin` to `end` - 1. */
 static ebpo_status walk_seeds(void *context, uint64_t begin, uint64_t end, unsigned worker,
                               ebpo_error *error)
 {
@@ -552,7 +562,7 @@ static ebpo_status walk_seeds(void *context, uint64_t begin, uint64_t end, unsig
         /* The seeds are all gray nodes of their level in octcode order, so the children of seed i
          * are group i of the next level. */
         ebpo_status status = is_pruned(j->model, s->cell.level, i)
-                                 ? emit_polytope(&w, &s->envelope, s->cell, EBPO_GRAY)
+                                 ? add_polytope(&w, &s->envelope, s->cell, EBPO_GRAY)
                                  : visit_group(&w, i, s->cell, &s->envelope);
         if (status != EBPO_OK)
             return status;
@@ -594,8 +604,8 @@ static ebpo_status job_walk(job *j, unsigned threads, const ebpo_progress *progr
                              "clipping envelopes", error);
 }
 
-/* Joins the pieces level by level; within a level, the top comes first and then the seeds in order.
- */
+/* Joins the pieces level by level. Within a level, the piece of the walk from the root comes first,
+ * then the pieces of the seeds in order. */
 static ebpo_status job_join(job *j, ebpo_mesh *out, ebpo_lod_nodes *nodes, double *volume,
                             ebpo_error *error)
 {
@@ -639,17 +649,18 @@ void ebpo_lod_nodes_free(ebpo_lod_nodes *nodes)
 }
 
 /* Adds winding numbers. Joined nodes are sorted by level, then by octcode, and include every leaf
- * and black node of a level, so running counts are their ranks. */
+ * and black node of a level. So the number of leaves, or black nodes, before a node is the node's
+ * rank. */
 static void add_windings(ebpo_lod_nodes *nodes, const ebpo_lod_model *model)
 {
     uint64_t leaf = 0, black = 0;
-    int before = 0;
+    int previous_level = 0;
     for (uint64_t i = 0; i < nodes->node_count; i++) {
         ebpo_lod_node *n = &nodes->nodes[i];
         int level = ebpo_cell_of_octcode(n->octcode).level;
-        if (level != before)
+        if (level != previous_level)
             leaf = black = 0;
-        before = level;
+        previous_level = level;
         const ebpo_level *l = &model->level[level];
         if (n->type == EBPO_LEAF)
             n->winding = l->leaf_winding ? l->leaf_winding[leaf++] : 0;

@@ -1,5 +1,5 @@
-/* Parts of the computation of a level's polygons (lod.c): polyhedra as triangles, the model that a
- * walk reads, and the planes of leaves. */
+/* Declares what the computation of a level's polygons (lod.c) shares with other files: polyhedra as
+ * triangles, the model that a walk reads, and the planes of leaves. */
 #ifndef EBPO_LEVELS_LOD_H
 #define EBPO_LEVELS_LOD_H
 
@@ -13,7 +13,7 @@
 
 /* --- polyhedra as triangles, collected piece by piece and joined in a fixed order --- */
 
-/* Results of one walk at one level. */
+/* A piece: the polyhedra of the nodes that one walk visits at one level. */
 typedef struct ebpo_polyhedra {
     double *xyz;     /* [vertex_count][3] */
     uint32_t *faces; /* [face_count][3], indices within the piece */
@@ -43,9 +43,11 @@ EBPO_MUST_USE ebpo_status ebpo_polyhedra_join(ebpo_mesh *out, ebpo_lod_nodes *no
  * a walk --- */
 
 typedef enum ebpo_leaf_source {
-    EBPO_LEAF_STORED,   /* planes from the file */
-    EBPO_LEAF_DERIVED,  /* planes from the leaf's faces */
-    EBPO_LEAF_INHERITED /* neither is in the file: the parent's envelope in the leaf's cell */
+    EBPO_LEAF_STORED,  /* planes from the file */
+    EBPO_LEAF_DERIVED, /* planes from the leaf's faces */
+    /* The file has neither planes of leaves nor faces. A leaf gets the parent's envelope, cut to
+       the leaf's cell. */
+    EBPO_LEAF_INHERITED
 } ebpo_leaf_source;
 
 typedef struct ebpo_lod_model {
@@ -55,7 +57,7 @@ typedef struct ebpo_lod_model {
     ebpo_leaf_source leaf_source;
     ebpo_level level[EBPO_LEVELS_MAX];
     ebpo_level_ranks ranks[EBPO_LEVELS_MAX];
-    ebpo_mesh mesh; /* for EBPO_LEAF_DERIVED */
+    ebpo_mesh mesh; /* empty except for EBPO_LEAF_DERIVED */
 } ebpo_lod_model;
 
 /* Reads levels 0 .. target. After a failure there is nothing to free. */
@@ -82,8 +84,8 @@ EBPO_MUST_USE ebpo_status ebpo_lod_leaf_faces(const ebpo_lod_model *model, ebpo_
                                               uint64_t leaf, ebpo_leaf_scratch *scratch,
                                               uint64_t *count, ebpo_error *error);
 
-/* Returns the corners of a solid's leaf that are inside, for ebpo_leaf_planes; `winding` is the
- * winding number at the lowest corner of the leaf. */
+/* Returns which corners of a leaf are inside the solid (bit i: corner i), for ebpo_leaf_planes.
+ * `winding` is the winding number at the lowest corner of the leaf. */
 unsigned ebpo_lod_inside_corners(const ebpo_box *box, ebpo_cell cell, ebpo_rule rule,
                                  int32_t winding, const ebpo_triangle *faces, uint64_t count);
 

@@ -8,7 +8,7 @@
  * In each pass, every corner of every drawn cell gets a normal: the mean of the normals, weighted
  * by area, of the plane polygons of the nodes around the corner. Only polygons that face this side
  * count, so that polygons on the other side of a thin part are ignored. A polygon on this side of a
- * cell gets the normal that is interpolated linearly between the corners of the cell. */
+ * cell gets a normal that is interpolated linearly from the normals at the cell's corners. */
 #include "core/strict_fp.h"
 
 #include <ebpo/lod.h>
@@ -42,13 +42,13 @@ typedef struct lighting {
     polygon *polygons; /* [polygon_count] */
     uint32_t (*at)[8]; /* corner indices of each node */
     double (*sum)[4];  /* [corner_count] sums of normals and of their lengths */
-    uint64_t *keys;    /* [corner_count] positions, as key_of makes them */
+    uint64_t *keys;    /* [corner_count] positions (position_key) */
     uint64_t corner_count, key_capacity;
 } lighting;
 
 /* --- polygons --- */
 
-/* Adds the area vector of a triangle. */
+/* Adds the area vector of a triangle: its normal, with twice the triangle's area as length. */
 static void add_triangle(const ebpo_mesh *mesh, const uint32_t *face, double area[3])
 {
     const double *a = mesh->xyz64 + 3 * (uint64_t)face[0], *b = mesh->xyz64 + 3 * (uint64_t)face[1],
@@ -59,7 +59,7 @@ static void add_triangle(const ebpo_mesh *mesh, const uint32_t *face, double are
     }
 }
 
-/* Returns corner i of a polygon, whose triangles are a fan. */
+/* Returns corner i of a polygon. `face` is the first triangle of the polygon's fan. */
 static const double *corner_of(const ebpo_mesh *mesh, const uint32_t *face, unsigned i)
 {
     uint32_t v = i < 2 ? face[i] : face[3 * (i - 2) + 2];
@@ -108,7 +108,9 @@ static void describe_polygons(lighting *l, const ebpo_mesh *mesh)
 
 /* --- corners of cells --- */
 
-static uint64_t key_of(ebpo_cell cell, unsigned corner)
+/* Returns a number for the position of a cell's corner. The cells that share a corner get the same
+ * number. */
+static uint64_t position_key(ebpo_cell cell, unsigned corner)
 {
     uint64_t key = 0;
     for (int k = 0; k < 3; k++)
@@ -122,29 +124,30 @@ static bool number_corners(lighting *l)
 {
     uint64_t count = l->nodes->node_count, slots = ebpo_hash_slots(count * 8 / 3 * 4 + 1), at;
     uint32_t *table = ebpo_alloc(slots, sizeof *table);
-    bool good = table != NULL;
-    if (good)
+    bool complete = table != NULL;
+    if (complete)
         memset(table, 0xff, slots * sizeof *table);
-    for (uint64_t i = 0; i < count && good; i++) {
+    for (uint64_t i = 0; i < count && complete; i++) {
         ebpo_cell cell = ebpo_cell_of_octcode(l->nodes->nodes[i].octcode);
-        for (unsigned c = 0; c < 8 && good; c++) {
-            uint64_t key = key_of(cell, c);
+        for (unsigned c = 0; c < 8 && complete; c++) {
+            uint64_t key = position_key(cell, c);
             EBPO_HASH_FIND(at, ebpo_hash_number(key), slots - 1,
                            table[at] == none || l->keys[table[at]] == key);
             if (table[at] == none) {
-                good = l->corner_count < none &&
-                       ebpo_grow(&l->keys, &l->key_capacity, l->corner_count + 1, sizeof *l->keys);
-                if (good)
+                complete =
+                    l->corner_count < none &&
+                    ebpo_grow(&l->keys, &l->key_capacity, l->corner_count + 1, sizeof *l->keys);
+                if (complete)
                     l->keys[table[at] = (uint32_t)l->corner_count++] = key;
             }
             l->at[i][c] = table[at];
         }
     }
     free(table);
-    return good;
+    return complete;
 }
 
-/* --- sides --- */
+/* --- normals at the corners, side by side --- */
 
 /* Sums the area vectors, and their lengths, of a node's plane polygons that face a side. */
 static void sum_node(const polygon *p, uint32_t count, int side, double out[4])
@@ -196,7 +199,8 @@ static void direction_at(const lighting *l, ebpo_cell cell, const uint32_t at[8]
     }
 }
 
-/* Sets `out` to the direction with a length of 1. A direction of length 0 does not change `out`. */
+/* Sets `out` to the direction, scaled to a length of 1. A direction of length 0 does not change
+ * `out`. */
 static void put_normal(const double direction[3], float out[3])
 {
     double length = sqrt(ebpo_vec3_dot(direction, direction));

@@ -3,8 +3,8 @@
  *
  * Only the types of completed levels stay in memory, and their planes if polygons are requested.
  * This is enough to walk down to the nodes of the next level. Within a level, the depth-first walk
- * from the root visits groups, nodes of each type and planes in stored order; running counts give
- * their positions, without tables of sums.
+ * from the root visits groups, nodes of each type and planes in stored order. So counts of the
+ * visited items give the items' positions, and no tables of sums are needed.
  *
  * Half-spaces and polygons are converted from cell coordinates to model coordinates with bounded
  * rounding: a point of the cell that satisfies a plane's code also satisfies the delivered plane.
@@ -31,7 +31,7 @@
 
 /* --- from cell to model coordinates --- */
 
-/* With t the cell's shortest side and N = t n / size, the half-space is
+/* Let t be the cell's shortest side, and N = t n / size. Then the half-space is
  *     N . (p - corner) <= t d / 4096.
  * For any normal a, any factor f > 0, and p in the cell:
  *     a . p = a . corner + f N . (p - corner) + (a - f N) . (p - corner)
@@ -43,7 +43,7 @@
 void ebpo_plane_to_world(const ebpo_box *box, ebpo_cell cell, const int32_t n[3], int32_t d,
                          double out[4])
 {
-    double corner[3], size[3], reach = 0, bulk = 0, at = 0, square = 0;
+    double corner[3], size[3], magnitude = 0, extent = 0, at = 0, square = 0;
     for (int k = 0; k < 3; k++) {
         corner[k] = ebpo_cell_face(box, k, cell.level, cell.at[k]);
         size[k] = box->size[k] / (double)(1u << cell.level);
@@ -57,11 +57,11 @@ void ebpo_plane_to_world(const ebpo_box *box, ebpo_cell cell, const int32_t n[3]
     for (int k = 0; k < 3; k++) {
         out[k] *= factor;
         at += out[k] * corner[k];
-        reach += fabs(out[k]) * (fabs(corner[k]) + size[k]);
-        bulk += fabs(corner[k]) + size[k];
+        magnitude += fabs(out[k]) * (fabs(corner[k]) + size[k]);
+        extent += fabs(corner[k]) + size[k];
     }
     out[3] = at + factor * shortest * ((double)d / 4096) +
-             (16 * DBL_EPSILON * reach + 4 * DBL_MIN * bulk + 64 * DBL_TRUE_MIN);
+             (16 * DBL_EPSILON * magnitude + 4 * DBL_MIN * extent + 64 * DBL_TRUE_MIN);
 }
 
 /* Converts the vertices of a polytope. Coordinates are rounded, but vertices on cell faces get the
@@ -128,12 +128,13 @@ typedef struct level_walk_node {
 } level_walk_node;
 
 typedef struct level_walk {
-    /* [target + 1] borrowed; levels above the target provide only types, plane counts and planes */
+    /* [target + 1], owned by the caller; levels above the target provide only types, plane counts
+     * and planes */
     const ebpo_level *level;
     int target, depth;
     bool pruned; /* the file is a subset: empty groups have no nodes */
     struct {
-        /* numbers of items visited so far in this level */
+        /* numbers of groups, nodes of each type, and planes visited so far in this level */
         uint64_t group, rank[4], plane, leaf_plane;
         unsigned octant; /* next octant of the group */
         /* last visited node; in levels above `depth`, it is the ancestor of the next node */
@@ -200,7 +201,8 @@ static bool level_walk_next(level_walk *w, level_walk_node *out)
     }
 }
 
-/* Returns the envelope of the ancestor at `depth`, and computes the envelopes above the ancestor.
+/* Returns the envelope of the last visited node at `depth`, and computes the envelopes of this
+ * node's ancestors.
  */
 static const ebpo_polytope *ancestor_envelope(const level_walk *w, int depth,
                                               ebpo_envelope_stack *e)
@@ -233,9 +235,9 @@ struct ebpo_stream {
     const ebpo_info *info;
     ebpo_stream_options options;
     ebpo_box box;
-    int level; /* last level read; -1: none */
-    ebpo_level kept[EBPO_LEVELS_MAX];
-    uint64_t bytes;
+    int level;                        /* last level read; -1: none */
+    ebpo_level kept[EBPO_LEVELS_MAX]; /* arrays of the levels 0 to `level` that are still needed */
+    uint64_t bytes;                   /* size of the header and of the levels read so far */
     /* volume of the leaves and black nodes in all levels up to `level` */
     double terminal_volume;
     level_walk walk;
@@ -294,7 +296,8 @@ static uint64_t sum_counts(const uint8_t *counts, uint64_t count)
     return sum;
 }
 
-/* Checks the values that the walk relies on. */
+/* Checks the values that the walk needs: the number of groups, and the counts of nodes and planes.
+ */
 static ebpo_status check_level(const ebpo_level *level, int number, uint64_t parents,
                                ebpo_error *error)
 {
@@ -326,6 +329,7 @@ typedef struct volumes {
     double gray, terminal_volume;
 } volumes;
 
+/* Computation of the volume of a level, in ranges of RANGE_NODES nodes. */
 typedef struct job {
     const ebpo_stream *stream;
     int target;
@@ -359,14 +363,15 @@ static void find_starts(job *j)
     level_walk walk;
     level_walk_node node;
     level_walk_begin(&walk, j->stream->kept, j->target, j->stream->info->pruned);
-    uint64_t seen = 0;
+    uint64_t visited = 0;
     do {
-        if (seen % RANGE_NODES == 0)
-            j->starts[seen / RANGE_NODES] = walk;
-        seen++;
+        if (visited % RANGE_NODES == 0)
+            j->starts[visited / RANGE_NODES] = walk;
+        visited++;
     } while (level_walk_next(&walk, &node));
 }
 
+/* Computes the volumes of the nodes of level `target` from their envelopes. */
 static ebpo_status cut_volumes(const ebpo_stream *s, int target, uint64_t nodes, volumes *out,
                                ebpo_error *error)
 {
@@ -395,6 +400,7 @@ done:
     return status;
 }
 
+/* Returns the volumes that the file's header states for a level. */
 static volumes stated_volumes(const ebpo_stream *s, int level)
 {
     const ebpo_level_summary *summary = &s->info->level[level];
@@ -429,7 +435,7 @@ ebpo_status ebpo_stream_next_level(ebpo_stream *s, ebpo_stream_level *out, bool 
     if (status != EBPO_OK)
         return status;
     volumes v = stated_volumes(s, next);
-    /* the header was checked: at most all parents are pruned */
+    /* The header was checked, so the number of pruned nodes is at most the number of parents. */
     uint64_t nodes = next ? 8 * (parents - s->info->level[next - 1].pruned_count) : 1;
     status = check_level(level, next, parents, error);
     if (status == EBPO_OK && s->options.polygons) {
@@ -455,6 +461,8 @@ ebpo_status ebpo_stream_next_level(ebpo_stream *s, ebpo_stream_level *out, bool 
 
 /* --- returning nodes --- */
 
+/* Returns the stored winding number of a node. Without stored numbers, black nodes have 1 and other
+ * nodes 0. */
 static int32_t winding_of(const ebpo_level *level, const level_walk_node *node)
 {
     switch (node->type) {
@@ -466,7 +474,8 @@ static int32_t winding_of(const ebpo_level *level, const level_walk_node *node)
     }
 }
 
-/* Sets the colour of a node that is not gray: its parent's, which was visited before. */
+/* Sets the colour of a node. A node that is not gray gets the colour of its parent, which was
+ * visited before. */
 static void add_colour(const ebpo_stream *s, const level_walk_node *node, ebpo_stream_node *out)
 {
     bool gray = node->type == EBPO_GRAY;

@@ -1,5 +1,5 @@
-/* Nodes as delivered by a stream (stream.c): half-spaces and polygons in model coordinates.
- * lib/query's subtrees return nodes in the same form. */
+/* Declares the functions that fill in the nodes of a stream (stream.c): half-spaces and polygons in
+ * model coordinates. The subtrees of lib/query return nodes in the same form. */
 #ifndef EBPO_LEVELS_STREAM_H
 #define EBPO_LEVELS_STREAM_H
 
@@ -24,7 +24,7 @@ void ebpo_plane_to_world(const ebpo_box *box, ebpo_cell cell, const int32_t n[3]
 
 enum { EBPO_NODE_CODES = 255 };
 
-/* Buffers that a node refers to. */
+/* Buffers that a node's pointers refer to. */
 typedef struct ebpo_node_buffers {
     double planes[EBPO_NODE_CODES][4];
     double vertices[EBPO_POLYTOPE_VERTICES][3];
@@ -34,9 +34,10 @@ typedef struct ebpo_node_buffers {
 /* Sets octcode (locational code), type, cell, and a black node's volume. */
 void ebpo_node_begin(ebpo_stream_node *out, const ebpo_box *box, uint64_t octcode,
                      ebpo_node_type type);
-/* Adds at most EBPO_NODE_CODES codes. */
+/* Decodes `count` plane codes, at most EBPO_NODE_CODES, and adds their planes to the node. */
 void ebpo_node_add_planes(ebpo_stream_node *out, const ebpo_box *box, const uint32_t *codes,
                           unsigned count, ebpo_node_buffers *buffers);
+/* Adds the polygons and the volume of the node's envelope, which is given in cell coordinates. */
 void ebpo_node_add_polygons(ebpo_stream_node *out, const ebpo_box *box,
                             const ebpo_polytope *envelope, ebpo_node_buffers *buffers);
 

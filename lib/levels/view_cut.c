@@ -8,7 +8,8 @@
  *   parent after all nodes of the group have been delivered.
  * - The frontier holds the gray nodes of the cut in a binary heap, whose first node is refined
  *   next. Nodes are ordered by turn (visible, not visible, never refined), then by key, then by
- *   octcode (locational code). So no two nodes are equal, and the order is deterministic. */
+ *   octcode (locational code). No two nodes have the same octcode, so the order is deterministic.
+ */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -24,7 +25,7 @@
 
 /* --- the observer --- */
 
-/* Bound of the relative rounding error of a sum of three products. A large margin is included, so
+/* Bound of the relative rounding error of a sum of three products. The bound has a large margin, so
  * that barely visible cells count as visible. */
 static const double SLACK = 1e-12;
 
@@ -61,15 +62,16 @@ static ebpo_status check_observer(const ebpo_observer *o, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Computes the side planes and the plane through the eye. The inward normals of the side planes
- * are t * forward +- side, where side is the direction to the right or up, and t is the tangent
- * of half the angle of view in this direction. */
+/* Computes the frustum's side planes, and the plane through the eye that is parallel to the
+ * picture. The inward normals of the side planes are t * forward +- side, where side is the
+ * direction to the right or up, and t is the tangent of half the angle of view in this direction.
+ */
 static ebpo_status make_frustum(ebpo_viewpoint *s, const ebpo_observer *o, double tangent,
                                 ebpo_error *error)
 {
     double forward[3], side[2][3], up[3];
-    s->everywhere = !normalise_vector(o->direction, forward);
-    if (s->everywhere)
+    s->no_frustum = !normalise_vector(o->direction, forward);
+    if (s->no_frustum)
         return EBPO_OK;
     if (!normalise_vector(o->up, up))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "the observer's upward direction is (0, 0, 0)");
@@ -100,7 +102,7 @@ ebpo_status ebpo_viewpoint_make(ebpo_viewpoint *out, const ebpo_box *box,
         return status;
     int exponent;
     (void)frexp(fmax(box->size[0], fmax(box->size[1], box->size[2])), &exponent);
-    out->given = true;
+    out->has_observer = true;
     out->unit = ldexp(1, exponent);
     double root_diagonal2 = 0, tangent = tan(observer->fov * (3.14159265358979323846 / 360));
     for (int k = 0; k < 3; k++) {
@@ -118,7 +120,7 @@ ebpo_seen ebpo_viewpoint_see(const ebpo_viewpoint *s, const ebpo_box *box, ebpo_
 {
     ebpo_seen out = { 0, true };
     double low[3], high[3]; /* relative to the eye */
-    if (!s->given)
+    if (!s->has_observer)
         return out;
     for (int k = 0; k < 3; k++) {
         low[k] = (ebpo_cell_face(box, k, cell.level, cell.at[k]) - s->eye[k]) / s->unit;
@@ -126,40 +128,41 @@ ebpo_seen ebpo_viewpoint_see(const ebpo_viewpoint *s, const ebpo_box *box, ebpo_
         double away = low[k] > 0 ? low[k] : high[k] < 0 ? -high[k] : 0;
         out.distance2 += away * away;
     }
-    for (int i = 0; i < 5 && !s->everywhere && out.seen; i++) {
-        double most = 0, magnitude = 0;
+    for (int i = 0; i < 5 && !s->no_frustum && out.seen; i++) {
+        double greatest = 0, magnitude = 0;
         for (int k = 0; k < 3; k++) {
             double a = s->inward[i][k] * low[k], b = s->inward[i][k] * high[k];
-            most += a > b ? a : b;
+            greatest += a > b ? a : b;
             magnitude += fabs(a) + fabs(b);
         }
-        out.seen = !(most < -SLACK * magnitude);
+        out.seen = !(greatest < -SLACK * magnitude);
     }
     return out;
 }
 
 double ebpo_viewpoint_distance(const ebpo_viewpoint *s, double distance2)
 {
-    return s->given ? sqrt(distance2) * s->unit : NAN;
+    return s->has_observer ? sqrt(distance2) * s->unit : NAN;
 }
 
 double ebpo_viewpoint_pixels(const ebpo_viewpoint *s, int level, double distance2)
 {
-    return s->given ? s->focal * sqrt(s->diagonal2[level] / distance2) : NAN;
+    return s->has_observer ? s->focal * sqrt(s->diagonal2[level] / distance2) : NAN;
 }
 
 unsigned ebpo_viewpoint_octant(const ebpo_viewpoint *s, const ebpo_box *box, ebpo_cell cell)
 {
     unsigned octant = 0;
-    for (int k = 0; k < 3 && s->given; k++)
+    for (int k = 0; k < 3 && s->has_observer; k++)
         octant |=
             (unsigned)(s->eye[k] >= ebpo_cell_face(box, k, cell.level + 1, 2 * cell.at[k] + 1))
             << k;
     return octant;
 }
 
-/* Returns a key of the octants on the path from the root, each relative to the octant of the eye
- * (ebpo_viewpoint_octant). Ascending keys are the order from front to back. */
+/* Returns a key that consists of the octants on the path from the root. Each octant is relative to
+ * the octant of the eye (ebpo_viewpoint_octant), so ascending keys give the order from front to
+ * back. */
 static uint64_t octants_key(const ebpo_viewpoint *s, const ebpo_box *box, ebpo_octcode octcode)
 {
     int level = ebpo_octcode_level(octcode);
@@ -175,7 +178,8 @@ static uint64_t octants_key(const ebpo_viewpoint *s, const ebpo_box *box, ebpo_o
     return key;
 }
 
-/* Returns the bits of a nonnegative double, which have the same order. */
+/* Returns the bits of a nonnegative double. As integers, the bits have the same order as the
+ * doubles. */
 static uint64_t double_bits(double v)
 {
     uint64_t out;
@@ -309,6 +313,7 @@ ebpo_status ebpo_frontier_reserve(ebpo_frontier *f, uint64_t more, ebpo_error *e
                : ebpo_fail_memory(error, (f->count + more) * sizeof *f->at);
 }
 
+/* Moves the node at index i down the heap, until no node below it comes before it. */
 static void sink_down(ebpo_frontier *f, uint64_t i)
 {
     ebpo_waiting node = f->at[i];
@@ -364,7 +369,8 @@ unsigned ebpo_frontier_blocks(const ebpo_frontier *f, uint64_t span,
         if (w->turn == EBPO_TURN_NEVER)
             continue;
         /* The block's number includes the level, so the number is not 0. */
-        uint64_t block = (w->below / span) << 6 | (uint64_t)(64 - __builtin_clzll(w->octcode));
+        uint64_t block =
+            (w->child_group / span) << 6 | (uint64_t)(64 - __builtin_clzll(w->octcode));
         uint64_t at;
         EBPO_HASH_FIND(at, ebpo_hash_number(block), SLOTS - 1,
                        !slot[at].block || slot[at].block == block);

@@ -1,6 +1,6 @@
-/* State of a view (view_cut.c): the observer, the delivered part of the tree, and the frontier. The
- * cut consists of the delivered nodes whose children are not delivered; the frontier has the gray
- * nodes among them. */
+/* Declares the state of a view (view_cut.c): the observer, the delivered part of the tree, and the
+ * frontier. The cut consists of the delivered nodes whose children are not delivered; the frontier
+ * consists of the gray nodes of the cut. */
 #ifndef EBPO_LEVELS_VIEW_CUT_H
 #define EBPO_LEVELS_VIEW_CUT_H
 
@@ -14,14 +14,14 @@
 
 /* --- the observer: distance, size, visibility and order of cells --- */
 
-/* A prepared observer. The unit of length is about the root cell's longest side (a power of two of
- * the model's unit), so that squares neither overflow nor underflow. */
+/* A prepared observer. Lengths are measured in a unit that is about the root cell's longest side (a
+ * power of two of the model's unit), so that their squares neither overflow nor underflow. */
 typedef struct ebpo_viewpoint {
-    bool given;      /* false: there is no observer */
-    bool everywhere; /* the observer has no frustum, so every cell is visible */
-    double eye[3];   /* in the model's unit */
-    double unit;     /* size of the unit of length, in the model's unit */
-    double focal;    /* pixels of length 1 at distance 1 */
+    bool has_observer; /* false: there is no observer */
+    bool no_frustum;   /* the observer has no frustum, so every cell is visible */
+    double eye[3];     /* in the model's unit */
+    double unit;       /* size of the unit of length, in the model's unit */
+    double focal;      /* size in pixels of a length of 1 at a distance of 1 */
     /* normals of the four side planes of the frustum, and of the plane parallel to the picture; all
      * five planes pass through the eye */
     double inward[5][3];
@@ -34,13 +34,15 @@ EBPO_MUST_USE ebpo_status ebpo_viewpoint_make(ebpo_viewpoint *out, const ebpo_bo
 
 typedef struct ebpo_seen {
     double distance2; /* squared distance from the eye to the cell's nearest point */
-    bool seen;        /* the cell may intersect the frustum */
+    bool seen;        /* false: the cell does not intersect the frustum */
 } ebpo_seen;
 ebpo_seen ebpo_viewpoint_see(const ebpo_viewpoint *viewpoint, const ebpo_box *box, ebpo_cell cell);
 
-/* ebpo_viewpoint_distance returns the distance in the model's unit, ebpo_viewpoint_pixels the size
- * of a cell in pixels. */
+/* Converts a squared distance of ebpo_viewpoint_see to a distance in the model's unit. Returns NAN
+ * without an observer. */
 double ebpo_viewpoint_distance(const ebpo_viewpoint *viewpoint, double distance2);
+/* Returns the size in pixels of a cell's diagonal at the cell's distance. Returns NAN without an
+ * observer. */
 double ebpo_viewpoint_pixels(const ebpo_viewpoint *viewpoint, int level, double distance2);
 
 /* Returns the octant e of the cell that contains the eye or is nearest to it. No ray from the eye
@@ -48,8 +50,8 @@ double ebpo_viewpoint_pixels(const ebpo_viewpoint *viewpoint, int level, double 
 unsigned ebpo_viewpoint_octant(const ebpo_viewpoint *viewpoint, const ebpo_box *box,
                                ebpo_cell cell);
 
-/* Returns the priority key: the node with the least key comes first. Keys are comparable for cells
- * that do not contain each other. */
+/* Returns the priority key of a node: the node with the least key comes first. Only the keys of
+ * cells that do not contain each other may be compared. */
 uint64_t ebpo_viewpoint_key(const ebpo_viewpoint *viewpoint, const ebpo_box *box,
                             ebpo_priority priority, ebpo_octcode octcode, double distance2);
 
@@ -61,7 +63,7 @@ typedef struct ebpo_partial_group {
     uint64_t parent;     /* octcode (locational code); 0: the root's group */
     uint64_t first_gray; /* rank in its level of the group's first gray node */
     uint64_t first_code; /* index into codes */
-    uint32_t child[8];   /* index of the children's group; 0: not present */
+    uint32_t child[8];   /* index of the group of each octant's children; 0: not delivered */
     uint16_t types;
     uint8_t plane_count[8];
 } ebpo_partial_group;
@@ -69,10 +71,10 @@ typedef struct ebpo_partial_group {
 typedef struct ebpo_partial {
     ebpo_partial_group *group; /* group 0 is the root's */
     uint32_t *codes;
-    int32_t (*winding)[8]; /* NULL: not requested */
+    int32_t (*winding)[8]; /* winding numbers of each group; NULL: not requested */
     uint64_t group_count, group_capacity, winding_capacity, code_count, code_capacity;
     bool windings;
-    /* number of delivered gray nodes of each level; in a damaged file, it would exceed the number
+    /* number of delivered gray nodes of each level; in a damaged file, it could exceed the number
      * in the header */
     uint64_t grays[EBPO_LEVELS_MAX];
 } ebpo_partial;
@@ -124,7 +126,7 @@ typedef enum ebpo_turn { EBPO_TURN_SEEN, EBPO_TURN_UNSEEN, EBPO_TURN_NEVER } ebp
 
 typedef struct ebpo_waiting {
     uint64_t key, octcode; /* nodes are ordered by turn, then by key, then by octcode */
-    uint64_t below;        /* index of the children's group in the children's level */
+    uint64_t child_group;  /* index of the children's group in the children's level */
     uint32_t group;
     uint8_t octant, turn; /* turn: ebpo_turn */
 } ebpo_waiting;
@@ -135,11 +137,11 @@ typedef struct ebpo_frontier {
 } ebpo_frontier;
 
 void ebpo_frontier_free(ebpo_frontier *frontier);
-/* Reserves space, so that the next `more` pushes cannot fail. */
+/* Reserves space for `more` nodes. Until this space is used up, ebpo_frontier_push cannot fail. */
 EBPO_MUST_USE ebpo_status ebpo_frontier_reserve(ebpo_frontier *frontier, uint64_t more,
                                                 ebpo_error *error);
 void ebpo_frontier_push(ebpo_frontier *frontier, ebpo_waiting node);
-/* Removes and returns the top. */
+/* Removes and returns the top, which is the node to refine next. */
 ebpo_waiting ebpo_frontier_pop(ebpo_frontier *frontier);
 /* Restores the heap after keys or turns have changed. */
 void ebpo_frontier_restore(ebpo_frontier *frontier);

@@ -1,4 +1,4 @@
-/* Delivers a view: one group of siblings after the other, in the order of the observer's priority,
+/* Delivers a view: one group of siblings after the other, in the order of the view's priority,
  * until the view's limits are reached.
  *
  * Each step takes the top of the frontier (view_cut.h), reads the group of its children, with the
@@ -6,8 +6,8 @@
  * siblings replace their parent in the cut. When the observer changes, the frontier is sorted
  * again; delivered nodes stay.
  *
- * For remote files, the chunks that a group needs are requested together, with the chunks of the
- * groups that follow, as far as the reader's memory allows. */
+ * For remote files, the chunks that a group needs are requested in one batch. The batch also has
+ * the chunks of the groups that follow, as far as the reader's memory allows. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -28,14 +28,14 @@
 /* Leaves among the current siblings, and flags of delivered faces. */
 typedef struct view_leaves {
     const ebpo_info *info;
-    ebpo_slice slice[8]; /* of the leaves among the siblings */
-    uint8_t *given;      /* bit f: face f was delivered */
+    ebpo_slice slice[8]; /* faces of the leaves among the siblings, by octant */
+    uint8_t *delivered;  /* bit f: face f was delivered */
     /* Faces of the last returned leaf, valid until the next node is returned. */
     double (*corners)[3][3];
-    uint32_t *numbers;
-    uint8_t *repeated;
+    uint32_t *numbers; /* indices of the faces in the file */
+    uint8_t *repeated; /* 1: the face was delivered before */
     uint64_t capacity[3];
-    ebpo_view_faces now;
+    ebpo_view_faces current; /* refers to the arrays above */
 } view_leaves;
 
 /* A group of siblings; `parent` is an octcode (locational code), 0 for the root's group. */
@@ -44,7 +44,7 @@ typedef struct view_group {
     uint64_t parent;
 } view_group;
 
-/* Limit for the levels that the view visits below a node. */
+/* Function that returns the first level below a node that the view will not visit soon. */
 typedef struct view_depth {
     int (*level)(const void *user, uint64_t octcode);
     const void *user;
@@ -59,17 +59,16 @@ struct ebpo_view_stream {
     ebpo_viewpoint viewpoint;
     ebpo_chunks *chunks;
     ebpo_partial partial;
-    ebpo_frontier frontier; /* gray nodes of the cut, except `parent` */
-    /* True while the last group of `partial` is being delivered. */
-    bool delivering;
-    ebpo_waiting parent; /* unused for the root's group */
-    unsigned step, flip; /* the next octant is step ^ flip */
-    uint64_t delivered, cut[4];
+    ebpo_frontier frontier;     /* gray nodes of the cut, except `parent` */
+    bool delivering;            /* true while the last group of `partial` is being delivered */
+    ebpo_waiting parent;        /* of the group being delivered; unused for the root's group */
+    unsigned step, octant_mask; /* the next octant is step ^ octant_mask */
+    uint64_t delivered, cut[4]; /* number of delivered nodes; nodes of each type in the cut */
     ebpo_group read;
     ebpo_envelope_stack *envelopes; /* if polygons are requested */
     ebpo_node_buffers buffers;
     view_leaves *leaves; /* if faces are requested */
-    /* nodes that are deeper, or smaller in pixels, are not prefetched yet */
+    /* nodes that are deeper than this level, or smaller in pixels, are not prefetched yet */
     int soon_level;
     double soon_pixels;
 };
@@ -84,8 +83,8 @@ static ebpo_status view_leaves_new(view_leaves **out, const ebpo_file *file, ebp
                          "its mesh; build it again with the mesh");
     view_leaves *l = ebpo_alloc_zero(1, sizeof *l);
     if (l)
-        l->given = ebpo_alloc_zero(info->face_count / 8 + 1, 1);
-    if (!l || !l->given) {
+        l->delivered = ebpo_alloc_zero(info->face_count / 8 + 1, 1);
+    if (!l || !l->delivered) {
         free(l);
         return ebpo_fail_memory(error, sizeof *l + info->face_count / 8 + 1);
     }
@@ -105,7 +104,7 @@ static void view_leaves_free(view_leaves *l)
     if (!l)
         return;
     drop_slices(l);
-    free(l->given);
+    free(l->delivered);
     free(l->corners);
     free(l->numbers);
     free(l->repeated);
@@ -131,11 +130,11 @@ static bool leaf_of_group(const view_group *group, const ebpo_group *read, unsig
 
 static ebpo_status reserve_space(view_leaves *l, uint64_t faces, ebpo_error *error)
 {
-    bool fine = ebpo_grow(&l->corners, &l->capacity[0], faces, sizeof *l->corners) &&
-                ebpo_grow(&l->numbers, &l->capacity[1], faces, sizeof *l->numbers) &&
-                ebpo_grow(&l->repeated, &l->capacity[2], faces, sizeof *l->repeated);
-    return fine ? EBPO_OK
-                : ebpo_fail_memory(error, faces * (sizeof *l->corners + sizeof *l->numbers + 1));
+    bool grown = ebpo_grow(&l->corners, &l->capacity[0], faces, sizeof *l->corners) &&
+                 ebpo_grow(&l->numbers, &l->capacity[1], faces, sizeof *l->numbers) &&
+                 ebpo_grow(&l->repeated, &l->capacity[2], faces, sizeof *l->repeated);
+    return grown ? EBPO_OK
+                 : ebpo_fail_memory(error, faces * (sizeof *l->corners + sizeof *l->numbers + 1));
 }
 
 /* Reads the faces of all leaves of a group. After a failure there are none. */
@@ -158,9 +157,10 @@ static ebpo_status view_leaves_read(view_leaves *l, ebpo_chunks *chunks, const v
 
 /* --- faces of leaves: returning them --- */
 
-/* Clears `now`, for a node without faces. */
-static void clear_faces(view_leaves *l) { l->now = (ebpo_view_faces)EBPO_VIEW_FACES_INIT; }
+/* Clears `current`, for a node without faces. */
+static void clear_faces(view_leaves *l) { l->current = (ebpo_view_faces)EBPO_VIEW_FACES_INIT; }
 
+/* Copies a face of the slice to the arrays of the returned leaf, and marks it as delivered. */
 static void take_face(view_leaves *l, const ebpo_slice *slice, uint32_t face)
 {
     const ebpo_mesh *mesh = &slice->mesh;
@@ -170,55 +170,57 @@ static void take_face(view_leaves *l, const ebpo_slice *slice, uint32_t face)
         l->corners[face][i / 3][i % 3] = mesh->xyz32 ? (double)mesh->xyz32[at] : mesh->xyz64[at];
     }
     l->numbers[face] = (uint32_t)number;
-    l->repeated[face] = l->given[number / 8] >> number % 8 & 1;
-    l->given[number / 8] |= (uint8_t)(1u << number % 8);
-    l->now.new_count += !l->repeated[face];
+    l->repeated[face] = l->delivered[number / 8] >> number % 8 & 1;
+    l->delivered[number / 8] |= (uint8_t)(1u << number % 8);
+    l->current.new_count += !l->repeated[face];
 }
 
-/* Sets `now` to the faces of the node at this octant, none if the node is not a leaf. */
+/* Sets `current` to the faces of the node at this octant. A node that is not a leaf has no faces.
+ */
 static void set_faces(view_leaves *l, unsigned octant)
 {
     const ebpo_slice *slice = &l->slice[octant];
     clear_faces(l);
-    l->now.face_count = slice->mesh.face_count;
-    l->now.corners = (const double(*)[3][3])l->corners;
-    l->now.numbers = l->numbers;
-    l->now.repeated = l->repeated;
+    l->current.face_count = slice->mesh.face_count;
+    l->current.corners = (const double(*)[3][3])l->corners;
+    l->current.numbers = l->numbers;
+    l->current.repeated = l->repeated;
     for (uint32_t face = 0; face < slice->mesh.face_count; face++)
         take_face(l, slice, face);
 }
 
 /* --- fetching: requests --- */
 
+/* Data that the functions of these sections need. */
 typedef struct fetching {
     ebpo_chunks *chunks;
     const ebpo_partial *partial;
     const ebpo_frontier *frontier;
-    unsigned wanted;
-    bool faces;
+    unsigned wanted; /* data of each group: EBPO_GROUP_... */
+    bool faces;      /* true: the faces of leaves are also needed */
     const view_depth *depth;
 } fetching;
 
 /* Returns the group of children of a node of the frontier. */
 static view_group children_of(const ebpo_waiting *w)
 {
-    return (view_group){ { ebpo_octcode_level(w->octcode) + 1, w->below }, w->octcode };
+    return (view_group){ { ebpo_octcode_level(w->octcode) + 1, w->child_group }, w->octcode };
 }
 
-/* Lists the next group and groups that follow soon, one for each block of `block` groups. Returns
- * their number. */
+/* Lists the next group (`first`) and groups that follow soon. Lists one group for each block of
+ * `block` neighbouring groups. Returns the number of listed groups. */
 static unsigned coming_groups(const fetching *f, const view_group *first, unsigned block,
                               view_group groups[EBPO_FRONTIER_BLOCKS])
 {
     uint64_t best[EBPO_FRONTIER_BLOCKS];
     unsigned count = ebpo_frontier_blocks(f->frontier, block, best);
     groups[0] = *first;
-    for (unsigned i = 0; i < count; i++) /* the first is the current group */
+    for (unsigned i = 0; i < count; i++) /* the first of them is again `first` */
         groups[i] = children_of(&f->frontier->at[best[i]]);
     return count ? count : 1;
 }
 
-/* Reads all data of a group, only to record which chunks are missing. */
+/* Reads all data of a group from memory, only to record which chunks are missing. */
 static void try_group(const fetching *f, const view_group *group)
 {
     ebpo_group read;
@@ -235,7 +237,8 @@ static void try_group(const fetching *f, const view_group *group)
 
 /* --- fetching: subtrees --- */
 
-static bool below_subtrees(const fetching *f, const view_group *group)
+/* Returns true if the group is in a subtree that the file's table of subtrees lists. */
+static bool is_in_subtree(const fetching *f, const view_group *group)
 {
     return group->parent && ebpo_subtree_table_has(f->chunks->file, group->number.level);
 }
@@ -251,38 +254,41 @@ static uint64_t subtree_of(const fetching *f, const view_group *group)
     return ebpo_partial_children(f->partial, node);
 }
 
-enum { SUBTREES_MAX = 4096, WITH_FACES = 64 };
+/* SUBTREES_MAX limits a list of subtrees. If the view enters more subtrees than
+ * SUBTREES_WITH_FACES, their faces are not collected. */
+enum { SUBTREES_MAX = 4096, SUBTREES_WITH_FACES = 64 };
 
 /* A subtree that the view enters, by its index and root. */
-typedef struct entered {
-    uint64_t number, octcode;
-} entered;
+typedef struct view_subtree {
+    uint64_t index, octcode;
+} view_subtree;
 
-typedef struct entering {
+typedef struct subtree_list {
     unsigned count;
-    entered list[SUBTREES_MAX];
-} entering;
+    view_subtree list[SUBTREES_MAX];
+} subtree_list;
 
-/* Lists the subtrees of these groups, each once. Without faces, skips the groups directly below a
- * subtree's root, because enter_frontier lists their subtrees. */
-static void enter_groups(const fetching *f, const view_group *groups, unsigned count, entering *e)
+/* Lists the subtrees of these groups, each subtree once. Without faces, skips the groups directly
+ * below a subtree's root, because list_frontier_subtrees lists their subtrees. */
+static void list_group_subtrees(const fetching *f, const view_group *groups, unsigned count,
+                                subtree_list *e)
 {
     int level = f->chunks->file->info.subtree_level;
     for (unsigned i = 0; i < count; i++) {
-        if (!below_subtrees(f, &groups[i]) || (!f->faces && groups[i].number.level == level + 1))
+        if (!is_in_subtree(f, &groups[i]) || (!f->faces && groups[i].number.level == level + 1))
             continue;
         uint64_t root = groups[i].parent >> 3 * (ebpo_octcode_level(groups[i].parent) - level);
         unsigned k = 0;
         while (k < e->count && e->list[k].octcode != root)
             k++;
         if (k == e->count)
-            e->list[e->count++] = (entered){ subtree_of(f, &groups[i]), root };
+            e->list[e->count++] = (view_subtree){ subtree_of(f, &groups[i]), root };
     }
 }
 
 /* Lists the subtrees that the view will enter from a node above them. Where types of intermediate
  * levels are not in memory, their chunks are recorded as missing. */
-static void enter_below(const fetching *f, const view_group *children, entering *e)
+static void list_descendant_subtrees(const fetching *f, const view_group *children, subtree_list *e)
 {
     int level = children->number.level;
     ebpo_group read;
@@ -295,47 +301,48 @@ static void enter_below(const fetching *f, const view_group *children, entering 
             f->depth->level(f->depth->user, octcode) <= level)
             continue;
         if (level == f->chunks->file->info.subtree_level)
-            e->list[e->count++] = (entered){ rank, octcode };
+            e->list[e->count++] = (view_subtree){ rank, octcode };
         else
-            enter_below(f, &(view_group){ { level + 1, rank }, octcode }, e);
+            list_descendant_subtrees(f, &(view_group){ { level + 1, rank }, octcode }, e);
     }
 }
 
 /* Lists the subtrees that the view will enter from visible nodes of the frontier. These nodes are
  * at the subtrees' roots or above. */
-static void enter_frontier(const fetching *f, entering *e)
+static void list_frontier_subtrees(const fetching *f, subtree_list *e)
 {
     int level = f->chunks->file->info.subtree_level;
     for (uint64_t i = 0; i < f->frontier->count && e->count < SUBTREES_MAX; i++) {
         const ebpo_waiting *w = &f->frontier->at[i];
         view_group children = children_of(w);
         if (w->turn == EBPO_TURN_SEEN && children.number.level <= level)
-            enter_below(f, &children, e);
+            list_descendant_subtrees(f, &children, e);
         else if (w->turn == EBPO_TURN_SEEN && children.number.level == level + 1)
-            e->list[e->count++] = (entered){ w->below, w->octcode };
+            e->list[e->count++] = (view_subtree){ w->child_group, w->octcode };
     }
 }
 
-/* Collects all chunks that the view needs from the subtrees of these groups, up to `most` bytes.
- * With faces, returns false if the view enters so many subtrees that none will be completed soon.
- * Then the caller collects only the chunks of the next groups. */
+/* Collects all chunks that the view needs from the subtrees of these groups, up to `byte_limit`
+ * bytes. Returns false if it collected none. Then the caller collects only the chunks of the next
+ * groups. This happens if the groups are in no subtree and, with faces, if the view enters so many
+ * subtrees that none will be completed soon. */
 static bool try_subtrees(const fetching *f, const view_group *groups, unsigned count,
-                         const ebpo_chunk_keys *keys, uint64_t most)
+                         const ebpo_chunk_keys *keys, uint64_t byte_limit)
 {
-    entering e;
+    subtree_list e;
     bool planes = f->wanted & EBPO_GROUP_PLANES, windings = f->wanted & EBPO_GROUP_WINDINGS;
     uint32_t needs = EBPO_NEEDS_ALWAYS | (f->faces ? EBPO_NEEDS_MESH : 0) |
                      (windings ? EBPO_NEEDS_SOLID : 0) |
                      (planes ? EBPO_NEEDS_PLANES | EBPO_NEEDS_LEAF_PLANES : 0);
     e.count = 0;
-    enter_groups(f, groups, count, &e);
+    list_group_subtrees(f, groups, count, &e);
     if (!f->faces)
-        enter_frontier(f, &e);
-    if (f->faces && e.count > WITH_FACES)
+        list_frontier_subtrees(f, &e);
+    if (f->faces && e.count > SUBTREES_WITH_FACES)
         return false;
-    for (unsigned i = 0; i < e.count && keys->bytes < most; i++) {
+    for (unsigned i = 0; i < e.count && keys->bytes < byte_limit; i++) {
         ebpo_hints none = EBPO_HINTS_INIT(f->chunks->file);
-        ebpo_subtrees_hint(f->chunks, &none, e.list[i].number, 1, needs,
+        ebpo_subtrees_hint(f->chunks, &none, e.list[i].index, 1, needs,
                            f->depth->level(f->depth->user, e.list[i].octcode), f->faces);
     }
     return e.count > 0;
@@ -343,41 +350,43 @@ static bool try_subtrees(const fetching *f, const view_group *groups, unsigned c
 
 /* --- fetching --- */
 
-/* Collects the missing chunks of the group. Unless these were prefetched before, also collects the
- * missing chunks of the next groups; so one batch is used up before the next one is requested.
- * Returns the number of the group's missing chunks. */
+/* Collects the missing chunks of the group. Unless all of these were prefetched, also collects the
+ * missing chunks of the next groups. So the view uses the chunks of one batch before it requests
+ * the next batch. Returns the number of the group's missing chunks. */
 static unsigned collect_chunks(const fetching *f, const view_group *group, ebpo_chunk_keys *keys)
 {
-    /* at most this many groups are tried, as trying takes time */
+    /* With faces, one group of each block of FACES_BLOCK groups is listed. At most TRIED groups are
+     * tried, because each try takes time. */
     enum { FACES_BLOCK = 64, TRIED = 64 };
     view_group groups[EBPO_FRONTIER_BLOCKS];
     ebpo_chunk_keys_begin(keys);
     ebpo_chunks_collect(f->chunks, keys);
     try_group(f, group);
-    unsigned own = keys->count;
-    uint64_t most = keys->bytes + ebpo_chunks_capacity(f->chunks);
-    if (own && !ebpo_chunks_hinted(f->chunks, keys)) {
+    unsigned missing = keys->count;
+    uint64_t byte_limit = keys->bytes + ebpo_chunks_capacity(f->chunks);
+    if (missing && !ebpo_chunks_hinted(f->chunks, keys)) {
         unsigned count = coming_groups(f, group, f->faces ? FACES_BLOCK : 1, groups);
-        bool collected = try_subtrees(f, groups, count, keys, most);
-        for (unsigned i = 1; i < count && i < TRIED && !collected && keys->bytes < most; i++)
+        bool collected = try_subtrees(f, groups, count, keys, byte_limit);
+        for (unsigned i = 1; i < count && i < TRIED && !collected && keys->bytes < byte_limit; i++)
             try_group(f, &groups[i]);
     }
     ebpo_chunks_collect(f->chunks, NULL);
-    return own;
+    return missing;
 }
 
-/* Fetches in passes, as lists, references, faces and vertices (and ranks in between) show in turn
- * which chunks are needed next. Chunks that are missing after the last pass are read one by one. */
+/* Fetches the chunks in passes, because the chunks of one pass show which chunks the next pass
+ * needs: face lists, references, faces, vertices, and the ranks between them. Chunks that are
+ * missing after the last pass are read one by one. */
 static ebpo_status fetch_tried(const fetching *f, const view_group *group, ebpo_error *error)
 {
     enum { PASSES = 12 };
     ebpo_chunk_keys keys;
     ebpo_status status = EBPO_OK;
-    unsigned own = 1;
-    for (int pass = 0; pass < PASSES && own && status == EBPO_OK; pass++) {
-        own = collect_chunks(f, group, &keys);
-        if (own)
-            status = ebpo_chunks_fetch(f->chunks, &keys, own, error);
+    unsigned missing = 1;
+    for (int pass = 0; pass < PASSES && missing && status == EBPO_OK; pass++) {
+        missing = collect_chunks(f, group, &keys);
+        if (missing)
+            status = ebpo_chunks_fetch(f->chunks, &keys, missing, error);
     }
     return status;
 }
@@ -397,10 +406,10 @@ static ebpo_status fetch_nodes(const fetching *f, const view_group *group, ebpo_
     return ebpo_group_fetch(f->chunks, numbers, count, f->wanted, error);
 }
 
-/* Fetches the missing chunks of the group (EBPO_GROUP_...) of a remote file and, with `faces`, of
- * its leaves. Also prefetches the chunks of the next groups of the frontier; if the file has a
- * table of subtrees, all chunks of the groups' subtrees. When the limit of bytes is exceeded,
- * returns EBPO_E_LIMIT as ebpo_group_read does. */
+/* Fetches the missing chunks of a remote file that have the wanted data (EBPO_GROUP_...) of the
+ * group and, with `faces`, of its leaves. Also prefetches the chunks of the next groups of the
+ * frontier. If the file has a table of subtrees, prefetches all chunks of the groups' subtrees.
+ * When the limit of bytes is exceeded, returns EBPO_E_LIMIT as ebpo_group_read does. */
 static ebpo_status fetch_group(ebpo_chunks *chunks, const ebpo_partial *partial,
                                const ebpo_frontier *frontier, const view_group *group,
                                unsigned wanted, bool faces, const view_depth *depth,
@@ -408,12 +417,14 @@ static ebpo_status fetch_group(ebpo_chunks *chunks, const ebpo_partial *partial,
 {
     fetching f = { chunks, partial, frontier, wanted, faces, depth };
     ebpo_status status = EBPO_OK;
-    if (!below_subtrees(&f, group))
+    if (!is_in_subtree(&f, group))
         status = fetch_nodes(&f, group, error);
-    return status == EBPO_OK && (faces || below_subtrees(&f, group)) ? fetch_tried(&f, group, error)
-                                                                     : status;
+    return status == EBPO_OK && (faces || is_in_subtree(&f, group)) ? fetch_tried(&f, group, error)
+                                                                    : status;
 }
 
+/* Least memory of a view, in bytes. With less memory than for one group's chunks and their
+ * neighbours, every group would read all of these chunks again. */
 enum { MEMORY_LEAST = 1 << 20 };
 
 /* --- options --- */
@@ -430,8 +441,7 @@ static ebpo_status check_options(const ebpo_view_options *o, ebpo_error *error)
         return ebpo_fail(
             error, EBPO_E_ARGUMENT,
             "view options: pixels must be a finite number and distance a number, both at least 0");
-    if (o->memory && o->memory < MEMORY_LEAST) /* less than one group's chunks and the adjacent
-                                                * ones: every group would read all of them again */
+    if (o->memory && o->memory < MEMORY_LEAST)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "view options: memory must be at least %d bytes, or 0", MEMORY_LEAST);
     if (!o->observer &&
@@ -507,6 +517,7 @@ void ebpo_view_stream_free(ebpo_view_stream *s)
 
 /* --- the next group --- */
 
+/* Returns a node's class in the order of refinement, from its level and its sight. */
 static ebpo_turn turn_of(const ebpo_view_stream *s, int level, ebpo_seen sight)
 {
     const ebpo_view_options *o = &s->options;
@@ -521,6 +532,7 @@ static ebpo_turn turn_of(const ebpo_view_stream *s, int level, ebpo_seen sight)
     return o->unseen == EBPO_UNSEEN_NEVER ? EBPO_TURN_NEVER : EBPO_TURN_UNSEEN;
 }
 
+/* Sets the key and the turn of a node of the frontier. */
 static void rank_waiting(const ebpo_view_stream *s, ebpo_waiting *w)
 {
     ebpo_seen sight = ebpo_viewpoint_see(&s->viewpoint, &s->box, ebpo_cell_of_octcode(w->octcode));
@@ -574,10 +586,12 @@ static bool read_at_once(ebpo_view_stream *s, const view_group *group, unsigned 
     return status == EBPO_OK && missing.count == 0;
 }
 
-/* If a view ends at a number of bytes or nodes, its depth is unknown. Then a node that is this many
- * levels deeper than the next node, or smaller by this power of two, is not prefetched yet. */
+/* If a view ends at a number of bytes or nodes, the depth at which it will end is unknown. Then a
+ * node is not prefetched yet if it is more than SOON_LEVELS levels deeper than the next node, or
+ * smaller in pixels by more than this power of two. */
 enum { SOON_LEVELS = 2 };
 
+/* Sets the limits of what is prefetched; `next` is the octcode of the next node to refine. */
 static void set_soon(ebpo_view_stream *s, uint64_t next)
 {
     int level = ebpo_octcode_level(next);
@@ -591,7 +605,8 @@ static void set_soon(ebpo_view_stream *s, uint64_t next)
             : 0;
 }
 
-static bool is_late(const ebpo_view_stream *s, int level, ebpo_seen sight)
+/* Returns true if a node is beyond the limits of set_soon. */
+static bool is_distant(const ebpo_view_stream *s, int level, ebpo_seen sight)
 {
     return level > s->soon_level ||
            (s->soon_pixels > 0 &&
@@ -600,13 +615,13 @@ static bool is_late(const ebpo_view_stream *s, int level, ebpo_seen sight)
 
 /* Returns the first level at which no descendant of the node will be refined soon, even at the
  * node's own distance from the eye. */
-static int depth_below(const void *user, uint64_t octcode)
+static int depth_of_view(const void *user, uint64_t octcode)
 {
     const ebpo_view_stream *s = user;
     ebpo_seen sight = ebpo_viewpoint_see(&s->viewpoint, &s->box, ebpo_cell_of_octcode(octcode));
     int level = ebpo_octcode_level(octcode);
     while (level < s->info->level_count && turn_of(s, level, sight) != EBPO_TURN_NEVER &&
-           !is_late(s, level, sight))
+           !is_distant(s, level, sight))
         level++;
     return level;
 }
@@ -618,7 +633,7 @@ static ebpo_status read_group(ebpo_view_stream *s, const view_group *group, ebpo
                       (s->options.windings ? EBPO_GROUP_WINDINGS : 0u);
     ebpo_status status = EBPO_OK;
     ebpo_chunks_limit(s->chunks, s->options.bytes ? s->options.bytes : UINT64_MAX);
-    view_depth depth = { depth_below, s };
+    view_depth depth = { depth_of_view, s };
     if (ebpo_input_prefetches(&s->chunks->file->in)) {
         if (read_at_once(s, group, wanted))
             return EBPO_OK;
@@ -629,9 +644,9 @@ static ebpo_status read_group(ebpo_view_stream *s, const view_group *group, ebpo
     return status == EBPO_OK ? read_now(s, group, wanted, error) : status;
 }
 
-/* Begins to deliver the children of the frontier's top, or the root. A pruned node (whose children
- * are not in the file) has no children: it stays in the cut, and the caller calls this function
- * again. */
+/* Begins to deliver the root, or the children of the frontier's top. Sets `end` if the view ends
+ * here. If the top is a pruned node (whose children are not in the file), only takes it from the
+ * frontier: the node stays in the cut, and the caller calls this function again. */
 static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_error *error)
 {
     bool root = s->partial.group_count == 0;
@@ -668,19 +683,19 @@ static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_err
             *error = why;
         return status;
     }
-    s->flip = 0;
+    s->octant_mask = 0;
     if (!root) {
         s->parent = ebpo_frontier_pop(&s->frontier);
         if (s->options.priority == EBPO_PRIORITY_FRONT_TO_BACK)
-            s->flip = ebpo_viewpoint_octant(&s->viewpoint, &s->box,
-                                            ebpo_cell_of_octcode(s->parent.octcode));
+            s->octant_mask = ebpo_viewpoint_octant(&s->viewpoint, &s->box,
+                                                   ebpo_cell_of_octcode(s->parent.octcode));
     }
     s->step = 0;
     s->delivering = true;
     return EBPO_OK;
 }
 
-/* Replaces the parent in the cut by its children, which are complete now. */
+/* Replaces the parent in the cut by its children, which have all been delivered. */
 static void end_group(ebpo_view_stream *s)
 {
     uint32_t group = (uint32_t)(s->partial.group_count - 1);
@@ -696,7 +711,7 @@ static void end_group(ebpo_view_stream *s)
                                      /* a gray node of the last level is pruned */
                                      s->info->level_count) {
             ebpo_waiting w = { .octcode = ebpo_partial_octcode(&s->partial, node),
-                               .below = ebpo_partial_children(&s->partial, node),
+                               .child_group = ebpo_partial_children(&s->partial, node),
                                .group = group,
                                .octant = (uint8_t)octant };
             rank_waiting(s, &w);
@@ -745,7 +760,7 @@ ebpo_status ebpo_view_stream_next(ebpo_view_stream *s, ebpo_view_node *out, ebpo
             return status;
     }
     uint32_t group = (uint32_t)(s->partial.group_count - 1);
-    unsigned octant = s->step++ ^ s->flip;
+    unsigned octant = s->step++ ^ s->octant_mask;
     fill_node(s, (ebpo_partial_node){ group, (uint8_t)octant }, out);
     if (s->leaves)
         set_faces(s->leaves, octant);
@@ -765,21 +780,22 @@ typedef struct visitor {
     ebpo_view_node node;
 } visitor;
 
-/* Returns false to stop. */
+/* Visits the nodes of the cut below a node, or the node itself, from front to back. Returns false
+ * to stop. */
 static bool visit_node(visitor *v, ebpo_partial_node node)
 {
     const ebpo_partial *partial = &v->stream->partial;
-    uint32_t below = partial->group[node.group].child[node.octant];
-    if (below == 0) {
+    uint32_t children = partial->group[node.group].child[node.octant];
+    if (children == 0) {
         fill_node(v->stream, node, &v->node);
         v->node.complete = true;
         return v->visit(v->user, &v->node);
     }
-    unsigned flip =
+    unsigned octant_mask =
         ebpo_viewpoint_octant(&v->stream->viewpoint, &v->stream->box,
                               ebpo_cell_of_octcode(ebpo_partial_octcode(partial, node)));
     for (unsigned step = 0; step < 8; step++)
-        if (!visit_node(v, (ebpo_partial_node){ below, (uint8_t)(step ^ flip) }))
+        if (!visit_node(v, (ebpo_partial_node){ children, (uint8_t)(step ^ octant_mask) }))
             return false;
     return true;
 }
@@ -792,6 +808,7 @@ void ebpo_view_stream_cut(ebpo_view_stream *s, ebpo_view_visit_fn visit, void *u
         (void)visit_node(&v, (ebpo_partial_node){ 0, 0 });
 }
 
+/* Adds a gray node of the cut to the statistics. */
 static void count_node(const ebpo_view_stream *s, const ebpo_waiting *w, ebpo_view_stats *out)
 {
     ebpo_cell cell = ebpo_cell_of_octcode(w->octcode);
@@ -807,7 +824,7 @@ ebpo_status ebpo_view_stream_get_stats(const ebpo_view_stream *s, ebpo_view_stat
     ebpo_file_stats file = EBPO_FILE_STATS_INIT;
     ebpo_view_stats stats = EBPO_VIEW_STATS_INIT;
     stats.nodes = s->delivered;
-    stats.pixels = s->viewpoint.given ? 0 : NAN;
+    stats.pixels = s->viewpoint.has_observer ? 0 : NAN;
     ebpo_file_get_stats(s->file, &file);
     stats.bytes_read = file.bytes_read;
     for (int i = 0; i < 4; i++)
@@ -822,5 +839,5 @@ ebpo_status ebpo_view_stream_get_stats(const ebpo_view_stream *s, ebpo_view_stat
 ebpo_status ebpo_view_stream_get_faces(const ebpo_view_stream *stream, ebpo_view_faces *out)
 {
     static const ebpo_view_faces none = EBPO_VIEW_FACES_INIT;
-    return EBPO_GIVE(ebpo_view_faces, out, stream->leaves ? &stream->leaves->now : &none);
+    return EBPO_GIVE(ebpo_view_faces, out, stream->leaves ? &stream->leaves->current : &none);
 }

@@ -403,7 +403,7 @@ START_TEST(test_view_groups_beyond_32_bits)
     for (uint64_t i = 0; i < NODES; i++) /* in 32 bits the number of blocks would be the same */
         ebpo_frontier_push(&frontier, (ebpo_waiting){ .key = i,
                                                       .octcode = UINT64_C(1) << 48,
-                                                      .below = i << 38,
+                                                      .child_group = i << 38,
                                                       .turn = EBPO_TURN_SEEN });
     ck_assert_uint_eq(ebpo_frontier_blocks(&frontier, EBPO_GROUP_BLOCK, places), NODES);
     ebpo_frontier_free(&frontier);
