@@ -1,8 +1,9 @@
 /* Bounds the distance by which an envelope extends beyond the model. ebpo_bound_envelope is a
  * branch and bound over the fragments of fragments.c: the upper bound of each fragment is computed
- * from the distance of its centre and from its nearest face, and the largest distance found is the
- * lower bound. The second part decides for the nodes of a level if their envelopes are within
- * max_error, on several threads, and keeps its results for other limits. */
+ * from the distance of the fragment's centre and from the face nearest to the centre, and the
+ * largest distance found is the lower bound. The second part of the file decides for the nodes of a
+ * level if their envelopes are within max_error. It uses several threads and keeps its results for
+ * other limits. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -37,22 +38,26 @@ void ebpo_bounder_free(ebpo_bounder *b)
 
 /* --- measures of a fragment --- */
 
-static void find_centre(const ebpo_bounder *b, const ebpo_polytope *p, ebpo_fragment_measure *l)
+/* Sets the centre of a fragment, and the radius around the centre that contains the fragment. */
+static void find_centre(const ebpo_bounder *b, const ebpo_polytope *p,
+                        ebpo_fragment_measure *measure)
 {
     ebpo_extent e;
     ebpo_extent_of(p, &e);
-    l->reach = 0;
+    measure->radius = 0;
     for (int k = 0; k < 3; k++) {
-        l->centre[k] = 0;
+        measure->centre[k] = 0;
         for (int i = 0; i < p->vertex_count; i++)
-            l->centre[k] += p->vertex[i][k];
-        l->centre[k] =
-            fmin(fmax(l->centre[k] / p->vertex_count, fmax(e.min[k], 0)), fmin(e.max[k], 1));
+            measure->centre[k] += p->vertex[i][k];
+        measure->centre[k] =
+            fmin(fmax(measure->centre[k] / p->vertex_count, fmax(e.min[k], 0)), fmin(e.max[k], 1));
     }
     for (int i = 0; i < p->vertex_count; i++)
-        l->reach = fmax(l->reach, ebpo_cell_frame_apart(&b->frame, p->vertex[i], l->centre));
+        measure->radius =
+            fmax(measure->radius, ebpo_cell_frame_apart(&b->frame, p->vertex[i], measure->centre));
 }
 
+/* Queries the signed distance of a point (in cell coordinates), in the frame's unit. */
 static ebpo_status query_distance(ebpo_bounder *b, const double xi[3], double *distance)
 {
     ebpo_distance_result result;
@@ -75,10 +80,11 @@ static bool is_in_envelope(const ebpo_bounder *b, const double xi[3])
     return true;
 }
 
-/* Moves a point outside the envelope towards the envelope's middle until it is inside. Fragments
- * extend a little beyond the envelope, and where the envelope is sharp, all of a fragment may be
- * outside. The move changes the point's distance by at most the length of the move. */
-static void pull_in(const ebpo_bounder *b, const double xi[3], double out[3])
+/* Moves a point that is outside the envelope towards the envelope's middle until the point is
+ * inside. Fragments extend a little beyond the envelope, and at a sharp corner of the envelope, all
+ * of a fragment may be outside. The move changes the point's distance by at most the length of the
+ * move. */
+static void move_into_envelope(const ebpo_bounder *b, const double xi[3], double out[3])
 {
     double share = 0;
     for (int i = 0; i < b->halves.count; i++) {
@@ -95,57 +101,62 @@ static void pull_in(const ebpo_bounder *b, const double xi[3], double out[3])
         out[k] = xi[k] + share * (b->inner[k] - xi[k]);
 }
 
-static void learn_distance(ebpo_bounder *b, const double xi[3], double distance)
+/* Raises the lower bound if the distance of a queried point shows a greater one. */
+static void raise_lower_bound(ebpo_bounder *b, const double xi[3], double distance)
 {
-    double at[3], certain = distance - 4 * b->frame.grain;
-    if (certain <= b->lo)
+    double at[3], lower_bound = distance - 4 * b->frame.grain;
+    if (lower_bound <= b->lo)
         return;
-    pull_in(b, xi, at);
-    certain -= ebpo_cell_frame_apart(&b->frame, xi, at);
-    if (certain <= b->lo || !is_in_envelope(b, at))
+    move_into_envelope(b, xi, at);
+    lower_bound -= ebpo_cell_frame_apart(&b->frame, xi, at);
+    if (lower_bound <= b->lo || !is_in_envelope(b, at))
         return;
-    b->lo = certain;
+    b->lo = lower_bound;
     ebpo_cell_frame_point(&b->frame, at, b->location);
     b->target = fmax(b->target, b->ratio * b->lo);
 }
 
+/* Bounds the distance of a fragment with one or two queries. */
 static ebpo_status measure_fragment(ebpo_bounder *b, const ebpo_fragment *fragment,
-                                    ebpo_fragment_measure *l)
+                                    ebpo_fragment_measure *measure)
 {
     double corner = 0;
     int farthest = 0;
-    find_centre(b, &fragment->p, l);
-    ebpo_status status = query_distance(b, l->centre, &l->distance);
+    find_centre(b, &fragment->p, measure);
+    ebpo_status status = query_distance(b, measure->centre, &measure->distance);
     if (status != EBPO_OK)
         return status;
-    memcpy(l->face, b->context->warm_triangle, sizeof l->face);
-    learn_distance(b, l->centre, l->distance);
+    memcpy(measure->face, b->context->warm_triangle, sizeof measure->face);
+    raise_lower_bound(b, measure->centre, measure->distance);
     for (int i = 0; i < fragment->p.vertex_count; i++) {
-        double d =
-            ebpo_cell_frame_distance(&b->frame, fragment->p.vertex[i], (const double(*)[3])l->face);
+        double d = ebpo_cell_frame_distance(&b->frame, fragment->p.vertex[i],
+                                            (const double(*)[3])measure->face);
         farthest = d > corner ? i : farthest;
         corner = fmax(corner, d);
     }
-    l->upper =
-        fmin(fmin(fragment->upper, corner), fmax(0, l->distance + l->reach)) + 4 * b->frame.grain;
-    if (l->upper <= b->target || (l->distance < 0 && corner <= -l->distance))
+    measure->upper =
+        fmin(fmin(fragment->upper, corner), fmax(0, measure->distance + measure->radius)) +
+        4 * b->frame.grain;
+    if (measure->upper <= b->target || (measure->distance < 0 && corner <= -measure->distance))
         return EBPO_OK;
     /* Also query the corner most likely to have the largest distance, moved off the rounded
      * surface. */
     double xi[3], d;
     for (int k = 0; k < 3; k++)
         xi[k] = fmin(fmax(fragment->p.vertex[farthest][k] +
-                              1e-5 * (l->centre[k] - fragment->p.vertex[farthest][k]),
+                              1e-5 * (measure->centre[k] - fragment->p.vertex[farthest][k]),
                           0),
                      1);
     status = query_distance(b, xi, &d);
     if (status == EBPO_OK)
-        learn_distance(b, xi, d);
+        raise_lower_bound(b, xi, d);
     return status;
 }
 
 /* --- the search --- */
 
+/* Sets the stack to one fragment, which is the whole envelope. The stack is empty for a black node.
+ */
 static ebpo_status begin_search(ebpo_bounder *b)
 {
     ebpo_node node;
@@ -175,10 +186,11 @@ static ebpo_status begin_search(ebpo_bounder *b)
     return node.type == EBPO_LEAF ? ebpo_fragment_leaf_faces(b, first, &node) : EBPO_OK;
 }
 
+/* Takes a fragment from the stack; measures and cuts it if its upper bound is above the target. */
 static ebpo_status search_step(ebpo_bounder *b)
 {
     ebpo_fragment fragment;
-    ebpo_fragment_measure l;
+    ebpo_fragment_measure measure;
     const ebpo_fragment *top = &b->fragments[--b->fragment_count];
     memcpy(&fragment, top, offsetof(ebpo_fragment, p));
     ebpo_polytope_copy(&fragment.p, &top->p);
@@ -190,19 +202,19 @@ static ebpo_status search_step(ebpo_bounder *b)
         ebpo_bound_raise(b, fragment.upper);
         return EBPO_OK;
     }
-    ebpo_status status = measure_fragment(b, &fragment, &l);
+    ebpo_status status = measure_fragment(b, &fragment, &measure);
     if (status != EBPO_OK)
         return status;
-    fragment.upper = l.upper;
-    if (l.upper <= b->target || l.reach < EBPO_FRAGMENT_LEAST) {
-        ebpo_bound_raise(b, l.upper);
+    fragment.upper = measure.upper;
+    if (measure.upper <= b->target || measure.radius < EBPO_FRAGMENT_LEAST) {
+        ebpo_bound_raise(b, measure.upper);
         return EBPO_OK;
     }
-    return ebpo_fragment_cut(b, &fragment, &l);
+    return ebpo_fragment_cut(b, &fragment, &measure);
 }
 
 ebpo_status ebpo_bound_envelope(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound_goal *goal,
-                                ebpo_reach_bound *out, ebpo_error *error)
+                                ebpo_envelope_bound *out, ebpo_error *error)
 {
     ebpo_box box = b->whole->box;
     ebpo_cell_frame_make(&b->frame, &box, cell);
@@ -217,14 +229,14 @@ ebpo_status ebpo_bound_envelope(ebpo_bounder *b, ebpo_cell cell, const ebpo_boun
         status = search_step(b);
     for (uint64_t i = 0; i < b->fragment_count; i++)
         ebpo_bound_raise(b, b->fragments[i].upper);
-    *out = (ebpo_reach_bound){ b->lo > 0 ? ldexp(b->lo, b->frame.exponent) : 0,
-                               ebpo_cell_frame_model_length(&b->frame, b->hi),
-                               { b->location[0], b->location[1], b->location[2] },
-                               b->queries };
+    *out = (ebpo_envelope_bound){ b->lo > 0 ? ldexp(b->lo, b->frame.exponent) : 0,
+                                  ebpo_cell_frame_model_length(&b->frame, b->hi),
+                                  { b->location[0], b->location[1], b->location[2] },
+                                  b->queries };
     return status;
 }
 
-static void merge_bounds(ebpo_reach_bound *known, const ebpo_reach_bound *found)
+static void merge_bounds(ebpo_envelope_bound *known, const ebpo_envelope_bound *found)
 {
     known->hi = fmin(known->hi, found->hi);
     known->queries += found->queries;
@@ -235,44 +247,46 @@ static void merge_bounds(ebpo_reach_bound *known, const ebpo_reach_bound *found)
 }
 
 ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound_goal *goal,
-                               ebpo_reach_bound *out, ebpo_error *error)
+                               ebpo_envelope_bound *out, ebpo_error *error)
 {
-    ebpo_reach_bound found;
-    ebpo_bound_goal now = *goal;
+    ebpo_envelope_bound found;
+    ebpo_bound_goal step_goal = *goal;
     uint64_t queries_done = 0;
     ebpo_status status = EBPO_OK;
     if (isinf(out->hi)) {
         ebpo_cell_frame frame;
         ebpo_box box = b->whole->box;
         ebpo_cell_frame_make(&frame, &box, cell);
-        /* a gray node or leaf touches a face, so no point is farther than the diagonal */
+        /* The cell of a gray node or leaf touches a face, so no point of the cell is farther from
+         * the face than the cell's diagonal. */
         out->hi = ebpo_cell_frame_model_length(&frame, ebpo_cell_frame_diagonal(&frame, 0));
     }
     for (;;) {
-        double good = fmax(goal->enough, goal->ratio * out->lo);
-        if (status != EBPO_OK || out->hi <= good || queries_done >= goal->queries ||
+        double sufficient = fmax(goal->enough, goal->ratio * out->lo);
+        if (status != EBPO_OK || out->hi <= sufficient || queries_done >= goal->queries ||
             out->lo > goal->too_much)
             return status;
-        now.enough = fmax(out->hi / 2, good);
-        now.queries = goal->queries - queries_done;
-        status = ebpo_bound_envelope(b, cell, &now, &found, error);
+        step_goal.enough = fmax(out->hi / 2, sufficient);
+        step_goal.queries = goal->queries - queries_done;
+        status = ebpo_bound_envelope(b, cell, &step_goal, &found, error);
         if (status != EBPO_OK)
             return status;
-        bool stuck = found.hi >= out->hi && found.lo <= out->lo;
+        bool unchanged = found.hi >= out->hi && found.lo <= out->lo;
         queries_done += found.queries;
         merge_bounds(out, &found);
-        if (stuck)
-            return EBPO_OK; /* only rounding remains */
+        if (unchanged)
+            return EBPO_OK; /* the bounds differ only by rounding errors */
     }
 }
 
-/* maximum number of queries for a node; a node that needs more is refined, as its children's
- * envelopes are smaller and closer */
-enum { QUERIES = 4096 };
+/* Maximum number of queries for a node. A node that needs more queries is refined, because its
+ * children's envelopes are smaller and closer to the model. */
+enum { NODE_QUERIES = 4096 };
 
-/* Results of earlier searches for a node, which predict results for other limits: a search for a
- * larger max_error never needs more queries (error_bound.h). The upper bound of an earlier search
- * predicts nothing, as a search for that limit might use up its queries before it gets there. */
+/* Results of earlier searches for a node. They determine the results for some other limits, because
+ * a search for a larger max_error never needs more queries (error_bound.h). The upper bound of an
+ * earlier search determines nothing, because a search with that upper bound as limit might use up
+ * its queries before it finds the bound. */
 typedef struct earlier_results {
     double enough; /* least max_error that was enough */
     double failed; /* largest max_error that was not enough */
@@ -349,27 +363,28 @@ void ebpo_tolerance_close(ebpo_tolerance *n)
     free(n);
 }
 
+/* Decides for one node, from earlier results if possible, else by a search. */
 static ebpo_status judge_node(ebpo_tolerance *n, ebpo_bounder *b, ebpo_tolerance_node *node,
                               ebpo_error *error)
 {
-    ebpo_node own;
-    ebpo_reach_bound found;
-    ebpo_bound_goal goal = { n->max_error, n->max_error, 0, QUERIES };
+    ebpo_node stored;
+    ebpo_envelope_bound found;
+    ebpo_bound_goal goal = { n->max_error, n->max_error, 0, NODE_QUERIES };
     node->enough = false;
     if (!node->required)
         return EBPO_OK;
-    if (!ebpo_tree_find(&n->tree, node->cell, &own) ||
-        (own.type != EBPO_GRAY && own.type != EBPO_LEAF))
+    if (!ebpo_tree_find(&n->tree, node->cell, &stored) ||
+        (stored.type != EBPO_GRAY && stored.type != EBPO_LEAF))
         return ebpo_fail(error, EBPO_E_FORMAT,
                          "level %d: a node is missing in the tree; run ebpo verify",
                          node->cell.level);
-    earlier_results *m = own.type == EBPO_GRAY ? &n->gray[node->cell.level][own.rank]
-                                               : &n->leaf[node->cell.level][own.rank];
+    earlier_results *m = stored.type == EBPO_GRAY ? &n->gray[node->cell.level][stored.rank]
+                                                  : &n->leaf[node->cell.level][stored.rank];
     node->enough = n->max_error >= m->enough;
     if (node->enough || n->max_error <= m->failed || n->max_error < m->lo)
         return EBPO_OK;
     if (n->planes)
-        (void)ebpo_tree_bounds(&n->tree, node->cell, own.type == EBPO_GRAY, &own, &b->halves);
+        (void)ebpo_tree_bounds(&n->tree, node->cell, stored.type == EBPO_GRAY, &stored, &b->halves);
     else
         b->halves.count = 0;
     ebpo_status status = ebpo_bound_envelope(b, node->cell, &goal, &found, error);
@@ -405,24 +420,24 @@ ebpo_status ebpo_tolerance_judge(ebpo_tolerance *n, ebpo_tolerance_node *nodes, 
 
 ebpo_status ebpo_tolerance_max(ebpo_tolerance *n, double *out, ebpo_error *error)
 {
-    ebpo_node own;
-    ebpo_reach_bound found = { 0, INFINITY, { 0, 0, 0 }, 0 };
+    ebpo_node stored;
+    ebpo_envelope_bound found = { 0, INFINITY, { 0, 0, 0 }, 0 };
     ebpo_cell root = { 0, { 0, 0, 0 } };
-    ebpo_bound_goal goal = { 0, INFINITY, 1.02, QUERIES };
-    (void)ebpo_tree_bounds(&n->tree, root, true, &own, &n->bounders[0].halves);
-    if (own.type == EBPO_LEAF || !n->planes)
+    ebpo_bound_goal goal = { 0, INFINITY, 1.02, NODE_QUERIES };
+    (void)ebpo_tree_bounds(&n->tree, root, true, &stored, &n->bounders[0].halves);
+    if (stored.type == EBPO_LEAF || !n->planes)
         n->bounders[0].halves.count = 0;
     ebpo_status status = ebpo_bound_closely(&n->bounders[0], root, &goal, &found, error);
-    /* The search of judge_node may need a slightly larger limit. With the root cell's diagonal as
-     * the limit, it succeeds without queries. */
+    /* The search of judge_node may need a slightly larger limit than this upper bound. With the
+     * root cell's diagonal as limit, the search succeeds without queries, so the loop ends. */
     ebpo_tolerance_node node = { root, true, false };
-    double most = found.hi > 0 ? found.hi : DBL_MIN;
-    *out = most;
-    for (double more = 0x1p-30; status == EBPO_OK && !node.enough; more *= 2) {
+    double upper = found.hi > 0 ? found.hi : DBL_MIN;
+    *out = upper;
+    for (double excess = 0x1p-30; status == EBPO_OK && !node.enough; excess *= 2) {
         n->max_error = *out;
         status = judge_node(n, &n->bounders[0], &node, error);
         if (!node.enough)
-            *out = most * (1 + more);
+            *out = upper * (1 + excess);
     }
     return status;
 }

@@ -1,7 +1,7 @@
 /* Exports levels and the mesh in other programs' formats. The table below has one row for each
  * format: its name, its second file, its contents, and the function that writes it. A new format is
  * a value of ebpo_export_format, a row here, and a file export_NAME.c with the function, which is
- * declared in export_job.h. Functions that all writers share are in export_job.c. */
+ * declared in export_job.h. The functions that the writers share are in export_job.c. */
 #include <ebpo/export.h>
 
 #include <stdio.h>

@@ -1,8 +1,8 @@
 /* Writes OBJ and STL through assimp's exporters, which write float32 coordinates. The blocks of a
- * job become one assimp scene, which borrows their arrays for the call. assimp writes only one
- * file, under a temporary name until it is complete; every other name that it opens is an error. A
- * build without assimp does not compile this file, and the table in export.c has no function for
- * these formats. */
+ * job become one assimp scene, which borrows their arrays for the call. assimp may write only one
+ * file, which has a temporary name until it is complete. If assimp opens another file for writing,
+ * the export fails. A build without assimp does not compile this file, and the table in export.c
+ * then has no function for these formats. */
 #include "core/strict_fp.h"
 
 #include <assimp/cexport.h>
@@ -24,6 +24,7 @@
 
 /* --- the file that assimp writes --- */
 
+/* The only file that assimp may write. */
 typedef struct scene_file {
     const char *path; /* borrowed */
     ebpo_publish publish;
@@ -33,14 +34,15 @@ typedef struct scene_file {
     char unknown[128]; /* another name that assimp opened for writing, or "" */
 } scene_file;
 
-typedef struct cursor {
+/* A file that assimp has opened. */
+typedef struct open_stream {
     scene_file *target;
     FILE *stream;
-} cursor;
+} open_stream;
 
-static cursor *cursor_of(struct aiFile *file) { return (cursor *)(void *)file->UserData; }
+static open_stream *stream_of(struct aiFile *file) { return (open_stream *)(void *)file->UserData; }
 
-/* Records a failure, as assimp ignores the results of these callbacks. */
+/* Records the first failure, because assimp ignores the results of these callbacks. */
 static void keep_failure(scene_file *target)
 {
     target->why = target->failed ? target->why : errno;
@@ -49,7 +51,7 @@ static void keep_failure(scene_file *target)
 
 static size_t write_bytes(struct aiFile *file, const char *from, size_t size, size_t count)
 {
-    cursor *c = cursor_of(file);
+    open_stream *c = stream_of(file);
     size_t done = fwrite(from, size, count, c->stream);
     if (done != count && size)
         keep_failure(c->target);
@@ -64,14 +66,14 @@ static size_t read_bytes(struct aiFile *file, char *to, size_t size, size_t coun
 
 static size_t stream_position(struct aiFile *file)
 {
-    off_t at = ftello(cursor_of(file)->stream);
+    off_t at = ftello(stream_of(file)->stream);
     return at > 0 ? (size_t)at : 0;
 }
 
 static enum aiReturn seek_stream(struct aiFile *file, size_t offset, enum aiOrigin origin)
 {
     int whence = origin == aiOrigin_SET ? SEEK_SET : origin == aiOrigin_CUR ? SEEK_CUR : SEEK_END;
-    return fseeko(cursor_of(file)->stream, (off_t)offset, whence) == 0 ? aiReturn_SUCCESS
+    return fseeko(stream_of(file)->stream, (off_t)offset, whence) == 0 ? aiReturn_SUCCESS
                                                                        : aiReturn_FAILURE;
 }
 
@@ -86,8 +88,8 @@ static size_t file_size(struct aiFile *file)
 
 static void flush_stream(struct aiFile *file)
 {
-    if (fflush(cursor_of(file)->stream) != 0)
-        keep_failure(cursor_of(file)->target);
+    if (fflush(stream_of(file)->stream) != 0)
+        keep_failure(stream_of(file)->target);
 }
 
 static struct aiFile *open_file(struct aiFileIO *io, const char *name, const char *mode)
@@ -95,12 +97,12 @@ static struct aiFile *open_file(struct aiFileIO *io, const char *name, const cha
     scene_file *target = (scene_file *)(void *)io->UserData;
     if (mode[0] != 'w')
         return NULL;
-    bool known = strcmp(ebpo_path_name(target->path), ebpo_path_name(name)) == 0;
-    FILE *stream = known ? ebpo_publish_stream(&target->publish) : NULL;
-    if (!known)
+    bool is_target = strcmp(ebpo_path_name(target->path), ebpo_path_name(name)) == 0;
+    FILE *stream = is_target ? ebpo_publish_stream(&target->publish) : NULL;
+    if (!is_target)
         snprintf(target->unknown, sizeof target->unknown, "%s", name);
     struct aiFile *file = calloc(1, sizeof *file);
-    cursor *c = calloc(1, sizeof *c);
+    open_stream *c = calloc(1, sizeof *c);
     if (!stream || !file || !c) {
         free(file);
         free(c);
@@ -109,7 +111,7 @@ static struct aiFile *open_file(struct aiFileIO *io, const char *name, const cha
         return NULL;
     }
     target->stream = stream;
-    *c = (cursor){ target, stream };
+    *c = (open_stream){ target, stream };
     *file = (struct aiFile){ read_bytes,  write_bytes,  stream_position,      file_size,
                              seek_stream, flush_stream, (aiUserData)(void *)c };
     return file;
@@ -157,18 +159,19 @@ static void scene_file_abort(scene_file *file) { ebpo_publish_abort(&file->publi
 
 /* --- the scene for assimp --- */
 
-enum { PARTS_MAX = EBPO_LEVELS_MAX + 1 };
+enum { BLOCKS_MAX = EBPO_LEVELS_MAX + 1 };
 
-/* assimp has one error text for the whole process. */
+/* assimp has one error text for the whole process, so only one thread at a time may call it. */
 static pthread_mutex_t assimp_mutex = PTHREAD_MUTEX_INITIALIZER;
 
-/* All data that assimp borrows. assimp copies data before changing them. */
+/* All data that assimp borrows. assimp does not change the data; where it needs changes, it copies
+ * the data first. */
 typedef struct scene {
     struct aiScene root;
-    struct aiNode top, node[PARTS_MAX], *children[PARTS_MAX];
-    struct aiMesh mesh[PARTS_MAX], *meshes[PARTS_MAX];
+    struct aiNode top, node[BLOCKS_MAX], *children[BLOCKS_MAX];
+    struct aiMesh mesh[BLOCKS_MAX], *meshes[BLOCKS_MAX];
     struct aiMaterial material, *materials;
-    unsigned number[PARTS_MAX], count;
+    unsigned number[BLOCKS_MAX], count;
     double largest_change;
 } scene;
 
@@ -197,7 +200,7 @@ static ebpo_status add_vertices(scene *s, struct aiMesh *to, const ebpo_mesh *fr
     return status;
 }
 
-/* assimp writes colours after the positions. */
+/* Adds colours of vertices. In an OBJ file, assimp writes them after the positions. */
 static ebpo_status add_colours(struct aiMesh *to, const ebpo_block *block, ebpo_error *error)
 {
     const uint8_t *rgba = block->colours.vertex;
@@ -274,7 +277,7 @@ static void scene_free(scene *s)
 static ebpo_status gather_scene(scene *s, const ebpo_export_job *job, ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(job->file);
-    /* The mesh can be checked before anything is read. */
+    /* The mesh can be checked before it is read. */
     ebpo_status status =
         job->options->mesh
             ? ebpo_export_check_assimp(job->path, info->vertex_count, info->face_count, error)

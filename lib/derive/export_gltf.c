@@ -1,8 +1,8 @@
-/* Writes glTF 2.0, as one file (GLB) or as a text with a .bin file beside it. Coordinates are
- * float32. If the model is far from zero, they are relative to the middle of the root cell, which
- * is the translation of the nodes. assimp is not used here: its exporter joins vertices that are
- * less than 1e-5 apart, at any size of the model. Source: Khronos, "glTF 2.0 Specification",
- * sections 3 and 4. */
+/* Writes glTF 2.0, as one file (GLB) or as a text file with a .bin file beside it. Coordinates are
+ * float32. If the model is far from zero, its coordinates are relative to the middle of the root
+ * cell, which becomes the translation of the nodes. assimp is not used here, because its exporter
+ * joins vertices that are less than 1e-5 apart, at any size of the model. Source: Khronos,
+ * "glTF 2.0 Specification", sections 3 and 4. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -20,48 +20,50 @@
 #include "io/file_source.h"
 #include "io/publish.h"
 
+/* Numbers of the glTF format: FLOAT32, UINT32 and UINT16 are component types; VERTICES and INDICES
+ * are targets of buffer views. */
 enum {
-    PARTS_MAX = EBPO_LEVELS_MAX + 1,
+    BLOCKS_MAX = EBPO_LEVELS_MAX + 1,
     FLOAT32 = 5126,
     UINT32 = 5125,
     UINT16 = 5123,
     VERTICES = 34962,
     INDICES = 34963,
-    BUFFER = 1 << 14
+    WORDS_AT_ONCE = 1 << 14
 };
 
-typedef struct part {
+typedef struct gltf_block {
     ebpo_block block; /* block.mesh has no positions, which are in xyz */
     float *xyz, low[3], high[3];
-} part;
+} gltf_block;
 
 typedef struct model {
-    part parts[PARTS_MAX];
+    gltf_block blocks[BLOCKS_MAX];
     int count;
     double origin[3], largest_change;
-    const char *bin_name; /* NULL: in the same file */
+    const char *bin_name; /* name of the file with the numbers; NULL: they are in the same file */
 } model;
 
 /* --- content --- */
 
-/* Far from zero, a float32 has few digits left. There, vertices are stored relative to the middle
- * of the box, which becomes the nodes' translation. */
+/* Sets the origin of the stored coordinates. Far from zero, a float32 coordinate has too few
+ * digits. Then the origin is the middle of the root cell, which becomes the nodes' translation. */
 static void choose_origin(model *m, const ebpo_info *info)
 {
-    double size = 0, far = 0;
+    double size = 0, largest = 0;
     for (int k = 0; k < 3; k++) {
         size = fmax(size, info->box_size[k]);
-        far = fmax(far,
-                   fmax(fabs(info->box_origin[k]), fabs(info->box_origin[k] + info->box_size[k])));
+        largest = fmax(largest, fmax(fabs(info->box_origin[k]),
+                                     fabs(info->box_origin[k] + info->box_size[k])));
     }
-    for (int k = 0; k < 3 && far > 16 * size; k++) {
+    for (int k = 0; k < 3 && largest > 16 * size; k++) {
         /* readers keep a translation as float32 */
         float middle = (float)(info->box_origin[k] + info->box_size[k] / 2);
         m->origin[k] = isfinite(middle) ? (double)middle : 0;
     }
 }
 
-static void find_bounds(part *p)
+static void find_bounds(gltf_block *p)
 {
     for (int k = 0; k < 3; k++)
         p->low[k] = p->high[k] = p->xyz[k];
@@ -71,10 +73,11 @@ static void find_bounds(part *p)
     }
 }
 
-/* Views of a part, in this order; each has an accessor. */
+/* Buffer views of a block, in this order; each view has one accessor. A block without colours lacks
+ * the last view. */
 enum { VIEW_POSITIONS, VIEW_CORNERS, VIEW_COLOURS, VIEWS };
 
-static uint64_t view_bytes(const part *p, int view)
+static uint64_t view_bytes(const gltf_block *p, int view)
 {
     const ebpo_block *block = &p->block;
     return view == VIEW_POSITIONS  ? 12 * block->mesh.vertex_count
@@ -83,12 +86,12 @@ static uint64_t view_bytes(const part *p, int view)
                                    : 0;
 }
 
-/* Returns the index of a part's first accessor, which is also the index of its first view. */
+/* Returns the index of a block's first accessor, which is also the index of its first view. */
 static int first_view(const model *m, int number)
 {
     int n = 0;
     for (int i = 0; i < number; i++)
-        n += m->parts[i].block.colours.vertex ? VIEWS : VIEW_COLOURS;
+        n += m->blocks[i].block.colours.vertex ? VIEWS : VIEW_COLOURS;
     return n;
 }
 
@@ -97,7 +100,7 @@ static uint64_t bin_bytes(const model *m)
     uint64_t sum = 0;
     for (int i = 0; i < m->count; i++)
         for (int v = 0; v < VIEWS; v++)
-            sum += view_bytes(&m->parts[i], v);
+            sum += view_bytes(&m->blocks[i], v);
     return sum;
 }
 
@@ -106,18 +109,18 @@ static ebpo_status gather_model(model *m, const ebpo_export_job *job, ebpo_error
     ebpo_status status = EBPO_OK;
     const ebpo_info *info = ebpo_file_info(job->file);
     choose_origin(m, info);
-    if (!m->bin_name && job->options->mesh) /* known before anything is read */
+    if (!m->bin_name && job->options->mesh) /* the mesh can be checked before it is read */
         status = ebpo_export_check_glb(job->path, 0, 12 * (info->vertex_count + info->face_count),
                                        error);
     for (int i = 0; i < ebpo_block_count(job->options) && status == EBPO_OK; i++) {
-        part *p = &m->parts[m->count];
+        gltf_block *p = &m->blocks[m->count];
         status = ebpo_export_read_block(job, i, EBPO_SOURCE_ORDER, &p->block, error);
         if (status != EBPO_OK || p->block.mesh.face_count == 0) {
             ebpo_block_free(&p->block);
             continue;
         }
         m->count++;
-        /* before more is read */
+        /* check before the next block is read */
         status = m->bin_name ? EBPO_OK : ebpo_export_check_glb(job->path, 0, bin_bytes(m), error);
         if (status != EBPO_OK)
             return status;
@@ -141,8 +144,8 @@ static ebpo_status gather_model(model *m, const ebpo_export_job *job, ebpo_error
 
 static void print_name(FILE *f, const char *name)
 {
-    static const char hex[] = "0123456789ABCDEF"; /* a URI: other characters are written as %XX */
-    for (; *name; name++) {
+    static const char hex[] = "0123456789ABCDEF";
+    for (; *name; name++) { /* a URI has other characters as %XX */
         unsigned char c = (unsigned char)*name;
         if ((c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||
             strchr("-._~", c))
@@ -169,7 +172,7 @@ static void print_three(FILE *f, const char *before, const double x[3])
 
 static void print_mesh(FILE *f, const model *m, int i)
 {
-    const ebpo_block *block = &m->parts[i].block;
+    const ebpo_block *block = &m->blocks[i].block;
     int first = first_view(m, i);
     bool coloured = block->colours.vertex != NULL;
     fprintf(f, "%s{\"name\":\"%s\",\"primitives\":[{\"attributes\":{\"POSITION\":%d",
@@ -187,7 +190,7 @@ static void print_nodes(FILE *f, const model *m)
         fprintf(f, "%s%d", i ? "," : "", i);
     fprintf(f, "]}],\n\"nodes\":[");
     for (int i = 0; i < m->count; i++) {
-        fprintf(f, "%s{\"name\":\"%s\",\"mesh\":%d", i ? ",\n" : "", m->parts[i].block.name, i);
+        fprintf(f, "%s{\"name\":\"%s\",\"mesh\":%d", i ? ",\n" : "", m->blocks[i].block.name, i);
         if (o[0] != 0 || o[1] != 0 || o[2] != 0)
             print_three(f, ",\"translation\":", o);
         fputc('}', f);
@@ -198,7 +201,8 @@ static void print_nodes(FILE *f, const model *m)
     fprintf(f,
             "],\n\"materials\":[{\"name\":\"plain\",\"pbrMetallicRoughness\":{\"baseColorFactor\":["
             "0.6,0.7,0.8,1],\"metallicFactor\":0,\"roughnessFactor\":0.8}}");
-    if (first_view(m, m->count) > VIEW_COLOURS * m->count) /* factors multiply colours */
+    /* Blocks with colours get a material without a base colour, which would change the colours. */
+    if (first_view(m, m->count) > VIEW_COLOURS * m->count)
         fprintf(f, ",\n{\"name\":\"coloured\",\"pbrMetallicRoughness\":{\"metallicFactor\":0,"
                    "\"roughnessFactor\":0.8}}");
     fprintf(f, "],\n");
@@ -206,7 +210,7 @@ static void print_nodes(FILE *f, const model *m)
 
 static void print_accessors(FILE *f, const model *m, int i)
 {
-    const part *p = &m->parts[i];
+    const gltf_block *p = &m->blocks[i];
     int first = first_view(m, i);
     const double low[3] = { (double)p->low[0], (double)p->low[1], (double)p->low[2] },
                  high[3] = { (double)p->high[0], (double)p->high[1], (double)p->high[2] };
@@ -234,7 +238,7 @@ static void print_data(FILE *f, const model *m)
     fprintf(f, "],\n\"bufferViews\":[");
     for (int i = 0; i < m->count; i++) {
         for (int k = 0; k < VIEWS; k++) {
-            uint64_t size = view_bytes(&m->parts[i], k);
+            uint64_t size = view_bytes(&m->blocks[i], k);
             if (size)
                 fprintf(f,
                         "%s{\"buffer\":0,\"byteOffset\":%" PRIu64 ",\"byteLength\":%" PRIu64
@@ -264,16 +268,16 @@ static void print_text(FILE *f, const model *m)
 
 static void write_words(FILE *f, const void *words, uint64_t count)
 {
-    uint8_t buffer[4 * BUFFER];
+    uint8_t buffer[4 * WORDS_AT_ONCE];
     const uint8_t *from = words;
     for (uint64_t done = 0; done < count;) {
-        size_t n = count - done < BUFFER ? (size_t)(count - done) : BUFFER;
+        size_t n = count - done < WORDS_AT_ONCE ? (size_t)(count - done) : WORDS_AT_ONCE;
         for (size_t i = 0; i < n; i++) {
             uint32_t word;
             memcpy(&word, from + 4 * (done + i), 4);
             ebpo_store32(buffer + 4 * i, word);
         }
-        fwrite(buffer, 4, n, f); /* failures show in ferror */
+        fwrite(buffer, 4, n, f); /* write_files checks ferror */
         done += n;
     }
 }
@@ -298,10 +302,11 @@ static void write_colours(FILE *f, const uint8_t *rgba, uint64_t count)
 static void write_bin(FILE *f, const model *m)
 {
     for (int i = 0; i < m->count; i++) {
-        write_words(f, m->parts[i].xyz, 3 * m->parts[i].block.mesh.vertex_count);
-        write_words(f, m->parts[i].block.mesh.faces, 3 * m->parts[i].block.mesh.face_count);
-        if (m->parts[i].block.colours.vertex)
-            write_colours(f, m->parts[i].block.colours.vertex, m->parts[i].block.mesh.vertex_count);
+        write_words(f, m->blocks[i].xyz, 3 * m->blocks[i].block.mesh.vertex_count);
+        write_words(f, m->blocks[i].block.mesh.faces, 3 * m->blocks[i].block.mesh.face_count);
+        if (m->blocks[i].block.colours.vertex)
+            write_colours(f, m->blocks[i].block.colours.vertex,
+                          m->blocks[i].block.mesh.vertex_count);
     }
 }
 
@@ -336,10 +341,11 @@ static ebpo_status write_glb(FILE *f, const model *m, const char *path, ebpo_err
     return EBPO_OK;
 }
 
-static ebpo_status write_files(const model *m, const ebpo_export_job *job, ebpo_publish *light,
-                               ebpo_publish *heavy, ebpo_error *error)
+static ebpo_status write_files(const model *m, const ebpo_export_job *job, ebpo_publish *main_file,
+                               ebpo_publish *bin_file, ebpo_error *error)
 {
-    FILE *f = ebpo_publish_stream(light), *b = m->bin_name ? ebpo_publish_stream(heavy) : NULL;
+    FILE *f = ebpo_publish_stream(main_file),
+         *b = m->bin_name ? ebpo_publish_stream(bin_file) : NULL;
     ebpo_status status = EBPO_OK;
     if (!f || (m->bin_name && !b))
         return ebpo_fail_memory(error, BUFSIZ);
@@ -355,29 +361,30 @@ static ebpo_status write_files(const model *m, const ebpo_export_job *job, ebpo_
         status = ebpo_fail_errno(error, job->path, "could not be written");
     if (status != EBPO_OK)
         return status;
-    return b ? ebpo_publish_commit_pair(heavy, light, error) : ebpo_publish_commit(light, error);
+    return b ? ebpo_publish_commit_pair(bin_file, main_file, error)
+             : ebpo_publish_commit(main_file, error);
 }
 
 ebpo_status ebpo_export_gltf(const ebpo_export_job *job, ebpo_error *error)
 {
-    ebpo_publish light = EBPO_PUBLISH_INIT, heavy = EBPO_PUBLISH_INIT;
+    ebpo_publish main_file = EBPO_PUBLISH_INIT, bin_file = EBPO_PUBLISH_INIT;
     model *m = ebpo_alloc_zero(1, sizeof *m);
     if (!m)
         return ebpo_fail_memory(error, sizeof *m);
     m->bin_name = *job->second ? ebpo_path_name(job->second) : NULL;
     /* Begins before the work, so that a folder without write permission is reported at once. */
-    ebpo_status status = ebpo_publish_begin(&light, job->path, error);
+    ebpo_status status = ebpo_publish_begin(&main_file, job->path, error);
     if (status == EBPO_OK && m->bin_name)
-        status = ebpo_publish_begin(&heavy, job->second, error);
+        status = ebpo_publish_begin(&bin_file, job->second, error);
     if (status == EBPO_OK)
         status = gather_model(m, job, error);
     if (status == EBPO_OK)
-        status = write_files(m, job, &light, &heavy, error);
-    ebpo_publish_abort(&heavy);
-    ebpo_publish_abort(&light);
+        status = write_files(m, job, &main_file, &bin_file, error);
+    ebpo_publish_abort(&bin_file);
+    ebpo_publish_abort(&main_file);
     for (int i = 0; i < m->count; i++) {
-        ebpo_block_free(&m->parts[i].block);
-        free(m->parts[i].xyz);
+        ebpo_block_free(&m->blocks[i].block);
+        free(m->blocks[i].xyz);
     }
     free(m);
     return status;

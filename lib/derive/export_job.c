@@ -1,8 +1,7 @@
-/* Reads the data that all export formats share. Its functions read a block from the file: a level
- * with its nodes and colours, or the mesh with its source indices and colours. They make the
- * block's columns (values of each polygon or face), float32 coordinates for formats that need them,
- * and the entries in the report. Where the counts are known, limits of formats are checked before
- * anything is read. */
+/* Reads the data that all export formats share. The functions read a block from the file: a level
+ * with its nodes and colours, or the mesh with its source indices and colours. They also make the
+ * block's columns (values of each node, polygon or face), float32 coordinates for formats that need
+ * them, and the entries in the report, and check the limits of formats. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -19,11 +18,12 @@
 #include "mesh/attributes.h"
 
 const ebpo_column ebpo_columns[EBPO_COLUMNS] = {
-    { "octcode", EBPO_H5_I64 },     /* of the node; 0 for the mesh */
-    { "level", EBPO_H5_I32 },       /* of the node in the octree; -1 for the mesh */
-    { "type", EBPO_H5_I32 },        /* of the node, as in ebpo_node_type; -1 for the mesh */
-    { "winding", EBPO_H5_I32 },     /* black: in the cell; leaf: at its lowest corner; else 0 */
-    { "volume", EBPO_H5_F64 },      /* of the envelope; 0 for the mesh */
+    { "octcode", EBPO_H5_I64 },     /* locational code of the node; 0 for the mesh */
+    { "level", EBPO_H5_I32 },       /* level of the node in the octree; -1 for the mesh */
+    { "type", EBPO_H5_I32 },        /* type of the node (ebpo_node_type); -1 for the mesh */
+    { "winding", EBPO_H5_I32 },     /* winding number in a black node's cell, or at a leaf's lowest
+                                       corner; else 0 */
+    { "volume", EBPO_H5_F64 },      /* volume of the envelope; 0 for the mesh */
     { "source_face", EBPO_H5_I64 }, /* source index; -1 for envelopes, and without maps */
     { "lod", EBPO_H5_I32 },         /* level of the block; -1 for the mesh */
 };
@@ -128,6 +128,7 @@ static void set_integer(void *values, ebpo_h5_number number, uint64_t i, int64_t
         ((int32_t *)values)[i] = (int32_t)v;
 }
 
+/* Returns the value of an integer column for a node. */
 static int64_t value_of(const ebpo_block *block, const ebpo_lod_node *node, int column)
 {
     switch (column) {
@@ -140,6 +141,7 @@ static int64_t value_of(const ebpo_block *block, const ebpo_lod_node *node, int 
     }
 }
 
+/* Returns the value of a column for a face of the mesh. */
 static int64_t value_of_face(const ebpo_block *block, uint64_t face, int column)
 {
     switch (column) {
@@ -160,7 +162,7 @@ void *ebpo_column_make(const ebpo_block *block, int column, bool polygons)
     uint64_t count = mesh       ? block->mesh.face_count
                      : polygons ? nodes->polygon_count
                                 : nodes->node_count,
-             at = 0;
+             value_index = 0;
     void *values = ebpo_alloc(count, ebpo_h5_number_bytes(number));
     if (!values)
         return NULL;
@@ -168,11 +170,11 @@ void *ebpo_column_make(const ebpo_block *block, int column, bool polygons)
         set_integer(values, number, i, value_of_face(block, i, column));
     for (uint64_t i = 0; i < nodes->node_count; i++) {
         const ebpo_lod_node *node = &nodes->nodes[i];
-        for (uint32_t k = 0; k < (polygons ? node->polygon_count : 1); k++, at++) {
+        for (uint32_t k = 0; k < (polygons ? node->polygon_count : 1); k++, value_index++) {
             if (column == EBPO_COLUMN_VOLUME)
-                ((double *)values)[at] = node->volume;
+                ((double *)values)[value_index] = node->volume;
             else
-                set_integer(values, number, at, value_of(block, node, column));
+                set_integer(values, number, value_index, value_of(block, node, column));
         }
     }
     return values;
@@ -194,16 +196,16 @@ ebpo_status ebpo_mesh_floats(float **out, const ebpo_mesh *mesh, const double or
     if (!xyz)
         return ebpo_fail_memory(error, mesh->vertex_count * 3 * sizeof *xyz);
     for (uint64_t i = 0; i < 3 * mesh->vertex_count; i++) {
-        double at = mesh->xyz32 ? (double)mesh->xyz32[i] : mesh->xyz64[i];
-        xyz[i] = (float)(at - origin[i % 3]);
-        *largest_change = fmax(*largest_change, fabs((double)xyz[i] + origin[i % 3] - at));
+        double coordinate = mesh->xyz32 ? (double)mesh->xyz32[i] : mesh->xyz64[i];
+        xyz[i] = (float)(coordinate - origin[i % 3]);
+        *largest_change = fmax(*largest_change, fabs((double)xyz[i] + origin[i % 3] - coordinate));
         if (!isfinite(xyz[i])) {
             free(xyz);
             *out = NULL;
             return ebpo_fail(error, EBPO_E_LIMIT,
                              "a coordinate of %g exceeds the range of float32; export XDMF or "
                              "VTKHDF, or scale the model",
-                             at);
+                             coordinate);
         }
     }
     return EBPO_OK;

@@ -1,5 +1,5 @@
-/* Declarations shared by all export formats: blocks (the envelopes of a level, or the mesh, with
- * colours), the job of a writer, and the writers. */
+/* Declares what the writers of all export formats share: blocks (the envelopes of a level, or the
+ * mesh, with colours), the job of a writer, and the writers. */
 #ifndef EBPO_DERIVE_EXPORT_JOB_H
 #define EBPO_DERIVE_EXPORT_JOB_H
 
@@ -12,10 +12,10 @@ typedef struct ebpo_block {
     int level; /* -1: the mesh */
     char name[24];
     ebpo_mesh mesh;
-    ebpo_lod_nodes nodes; /* for levels */
-    ebpo_maps maps;       /* for the mesh of a file with maps */
-    ebpo_colours colours; /* if present; levels: of vertices */
-    double volume;
+    ebpo_lod_nodes nodes; /* set for a level */
+    ebpo_maps maps;       /* set for the mesh of a file with maps */
+    ebpo_colours colours; /* set if there are colours; a level has colours of vertices */
+    double volume;        /* of the level's envelopes */
 } ebpo_block;
 
 /* Returns the number of blocks; ebpo_block_level returns the level of block i. */
@@ -32,8 +32,8 @@ typedef enum ebpo_block_order {
 /* Frees a block, also after a failure. */
 void ebpo_block_free(ebpo_block *block);
 
-/* A column of values: one for each node of a level, or one for each polygon (the value of its
- * node). In the mesh, one for each triangle. */
+/* A column of values: one value for each node of a level, or for each polygon of a level (the value
+ * of the polygon's node), or for each triangle of the mesh. */
 typedef struct ebpo_column {
     const char *name;
     ebpo_h5_number number;
@@ -51,7 +51,8 @@ enum {
 };
 extern const ebpo_column ebpo_columns[EBPO_COLUMNS];
 
-/* Returns the vertex numbers of a polygon whose fan begins with this triangle. */
+/* Returns the vertex number of corner i of a polygon; the polygon's fan begins with this triangle.
+ */
 static inline uint32_t ebpo_polygon_corner(const uint32_t *triangle, unsigned i)
 {
     return i < 2 ? triangle[i] : triangle[3 * (i - 2) + 2];
@@ -59,8 +60,8 @@ static inline uint32_t ebpo_polygon_corner(const uint32_t *triangle, unsigned i)
 
 /* Returns the values of a column, to be freed by the caller; NULL when out of memory. */
 void *ebpo_column_make(const ebpo_block *block, int column, bool polygons);
-/* Returns the source's number of each vertex of the mesh as int64_t; -1 each for a level or without
- * maps. To be freed by the caller; NULL when out of memory. */
+/* Returns the source's number of each vertex of the mesh as int64_t; all numbers are -1 for a
+ * level, and without maps. To be freed by the caller; NULL when out of memory. */
 void *ebpo_column_of_vertices(const ebpo_block *block);
 
 /* --- jobs and formats --- */
@@ -80,10 +81,9 @@ typedef struct ebpo_export_row {
     ebpo_status (*write)(const ebpo_export_job *job, ebpo_error *error);
 } ebpo_export_row;
 
-/* `path` and `second` are the names that the files get. */
 struct ebpo_export_job {
     const ebpo_file *file;
-    const char *path, *second;
+    const char *path, *second; /* names of the files to write; second is "" if there is one file */
     ebpo_export_format format;
     const ebpo_export_row *row; /* row of the format */
     const ebpo_export_options *options;
@@ -96,9 +96,9 @@ EBPO_MUST_USE ebpo_status ebpo_export_read_block(const ebpo_export_job *job, int
                                                  ebpo_block_order order, ebpo_block *out,
                                                  ebpo_error *error);
 
-/* These functions fail with EBPO_E_LIMIT for counts that a format cannot represent. GLB has sizes
- * of 32 bits; `text` and `bin` are the sizes in bytes of the JSON text and of the binary data. OBJ
- * and STL are written by assimp, which has 32-bit indices of corners. */
+/* These functions fail with EBPO_E_LIMIT for sizes that a format cannot represent. GLB files have
+ * 32-bit sizes; `text` and `bin` are the sizes in bytes of the JSON text and of the binary data.
+ * OBJ and STL files are written by assimp, which has 32-bit indices of corners. */
 enum { EBPO_GLB_HEADS = 28 };
 EBPO_MUST_USE ebpo_status ebpo_export_check_glb(const char *path, uint64_t text, uint64_t bin,
                                                 ebpo_error *error);

@@ -1,6 +1,7 @@
-/* Writes VTKHDF 1.0: a file with one unstructured grid of polygons. This version has neither blocks
- * (2.1 has) nor polyhedra (2.5 has), so the cell array `lod` distinguishes levels, and each level
- * and the mesh is a partition. Source: VTK's documentation, "VTKHDF file format". */
+/* Writes VTKHDF 1.0: a file with one unstructured grid of polygons. Version 1.0 has no blocks (2.1
+ * has them) and no polyhedra (2.5 has them). So each level, and the mesh, is a partition of the
+ * grid, and the cell array `lod` gives the level of each polygon. Source: VTK's documentation,
+ * "VTKHDF file format". */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -22,7 +23,8 @@ enum {
     CELL_COUNT,
     CORNER_COUNT,
     SOURCE_VERTEX,
-    VERTEX_COLOURS, /* the two tables of colours are made when the first block has colours */
+    VERTEX_COLOURS, /* each of the two tables of colours is made for the first block that has
+                       colours */
     FACE_COLOURS,
     FIRST_COLUMN,
     TABLES = FIRST_COLUMN + EBPO_COLUMNS
@@ -48,7 +50,7 @@ static const struct {
 typedef struct writer {
     ebpo_h5_out out;
     ebpo_h5_table table[TABLES];
-    bool begun[2]; /* tables of colours */
+    bool has_colours[2]; /* true: the table VERTEX_COLOURS, or FACE_COLOURS, exists */
 } writer;
 
 static ebpo_status make_group(writer *w, const char *path, ebpo_error *error)
@@ -85,7 +87,8 @@ static ebpo_status make_tables(writer *w, bool floats, ebpo_error *error)
     return status;
 }
 
-/* Appends and frees the values; NULL means that memory was short. */
+/* Appends the values to a table and frees them. If `values` is NULL, the caller's allocation
+ * failed, and so does this function. */
 static ebpo_status append_table(writer *w, int table, void *values, uint64_t count,
                                 ebpo_error *error)
 {
@@ -138,32 +141,33 @@ static ebpo_status append_cells(writer *w, const ebpo_block *block, uint64_t cel
     return status;
 }
 
-/* Appends white rows, for blocks without colours, until the table has `rows` rows. */
+/* Appends white rows, for the blocks without colours, until the table has `rows` rows. */
 static ebpo_status pad_colours(writer *w, int table, uint64_t rows, ebpo_error *error)
 {
     uint8_t white[4 * 1024];
     memset(white, 255, sizeof white);
     ebpo_status status = EBPO_OK;
     while (status == EBPO_OK && w->table[table].rows < rows) {
-        uint64_t left = rows - w->table[table].rows;
-        status = ebpo_h5_append(&w->out, &w->table[table], white, left < 1024 ? left : 1024, error);
+        uint64_t missing = rows - w->table[table].rows;
+        status = ebpo_h5_append(&w->out, &w->table[table], white, missing < 1024 ? missing : 1024,
+                                error);
     }
     return status;
 }
 
-/* Appends a block's colours. `all`: number of rows including this block. The table is made for the
- * first block that has colours. */
+/* Appends a block's colours, which are `rows` rows. `all` is the number of rows with this block
+ * included. Makes the table for the first block that has colours. */
 static ebpo_status append_rgba(writer *w, int table, const uint8_t *rgba, uint64_t rows,
                                uint64_t all, ebpo_error *error)
 {
-    bool *begun = &w->begun[table - VERTEX_COLOURS];
+    bool *has_colours = &w->has_colours[table - VERTEX_COLOURS];
     ebpo_status status = EBPO_OK;
-    if (!rgba && !*begun)
+    if (!rgba && !*has_colours)
         return EBPO_OK;
-    if (!*begun)
+    if (!*has_colours)
         status = ebpo_h5_make_table(&w->out, layout[table].path, layout[table].number,
                                     layout[table].cols, &w->table[table], error);
-    *begun = true;
+    *has_colours = true;
     if (status == EBPO_OK)
         status = pad_colours(w, table, rgba ? all - rows : all, error);
     return status == EBPO_OK && rgba ? ebpo_h5_append(&w->out, &w->table[table], rgba, rows, error)

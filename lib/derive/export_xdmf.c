@@ -1,6 +1,6 @@
-/* Writes XDMF 3: a text that refers to arrays in an HDF5 file beside it. Each level is a grid of
- * polyhedra, one for each node, and the mesh a grid of triangles. VTK reads polyhedra with its
- * Xdmf3 readers, not with the older XDMF reader. Both files are published together. */
+/* Writes XDMF 3: a text file that refers to arrays in an HDF5 file beside it. Each level is a grid
+ * of polyhedra, one for each node, and the mesh is a grid of triangles. VTK reads polyhedra with
+ * its Xdmf3 readers, but not with the older XDMF reader. Both files are published together. */
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,7 +16,7 @@ enum { XDMF_POLYHEDRON = 16 };
 typedef struct writer {
     ebpo_h5_out out;
     FILE *text;
-    const char *heavy; /* the HDF5 file's name in the text */
+    const char *data_file; /* the HDF5 file's name in the text */
 } writer;
 
 static void print_escaped(FILE *f, const char *s)
@@ -29,8 +29,8 @@ static void print_escaped(FILE *f, const char *s)
     }
 }
 
-/* Writes the array to the HDF5 file and refers to it in the text; NULL means that memory was short.
- */
+/* Writes an array to the HDF5 file and a reference to the array to the text file. If `values` is
+ * NULL, the caller's allocation failed, and so does this function. */
 static ebpo_status put_array(writer *w, const ebpo_block *block, const char *name,
                              ebpo_h5_number number, uint32_t cols, const void *values,
                              uint64_t rows, ebpo_error *error)
@@ -49,7 +49,7 @@ static ebpo_status put_array(writer *w, const ebpo_block *block, const char *nam
     if (cols)
         fprintf(w->text, " %" PRIu32, cols);
     fprintf(w->text, "\">");
-    print_escaped(w->text, w->heavy);
+    print_escaped(w->text, w->data_file);
     fprintf(w->text, ":%s</DataItem>\n", path);
     return status;
 }
@@ -67,8 +67,8 @@ static ebpo_status put_attribute(writer *w, const ebpo_block *block, const char 
     return status;
 }
 
-/* Writes for each polyhedron its kind, the number of its polygons, and for each polygon the number
- * of its corners and the corners. */
+/* Writes for each polyhedron its kind and the number of its polygons; then for each polygon the
+ * number of its corners, and the corners. */
 static ebpo_status put_polyhedra(writer *w, const ebpo_block *block, ebpo_error *error)
 {
     const ebpo_lod_nodes *nodes = &block->nodes;
@@ -203,14 +203,14 @@ static ebpo_status write_blocks(writer *w, const ebpo_export_job *job, ebpo_erro
 ebpo_status ebpo_export_xdmf(const ebpo_export_job *job, ebpo_error *error)
 {
     writer w = { EBPO_H5_OUT_INIT, NULL, ebpo_path_name(job->second) };
-    ebpo_publish light = EBPO_PUBLISH_INIT, heavy = EBPO_PUBLISH_INIT;
-    ebpo_status status = ebpo_publish_begin(&light, job->path, error);
+    ebpo_publish text_file = EBPO_PUBLISH_INIT, data_file = EBPO_PUBLISH_INIT;
+    ebpo_status status = ebpo_publish_begin(&text_file, job->path, error);
     if (status == EBPO_OK)
-        status = ebpo_publish_begin(&heavy, job->second, error);
-    if (status == EBPO_OK && !(w.text = ebpo_publish_stream(&light)))
+        status = ebpo_publish_begin(&data_file, job->second, error);
+    if (status == EBPO_OK && !(w.text = ebpo_publish_stream(&text_file)))
         status = ebpo_fail_memory(error, BUFSIZ);
     if (status == EBPO_OK)
-        status = ebpo_h5_create_plain(&w.out, ebpo_publish_path(&heavy), job->second, error);
+        status = ebpo_h5_create_plain(&w.out, ebpo_publish_path(&data_file), job->second, error);
     if (status == EBPO_OK)
         status = write_blocks(&w, job, error);
     if (status == EBPO_OK && ferror(w.text))
@@ -219,8 +219,8 @@ ebpo_status ebpo_export_xdmf(const ebpo_export_job *job, ebpo_error *error)
         status = ebpo_h5_finish(&w.out, error);
     ebpo_h5_discard(&w.out);
     if (status == EBPO_OK)
-        status = ebpo_publish_commit_pair(&heavy, &light, error);
-    ebpo_publish_abort(&heavy);
-    ebpo_publish_abort(&light);
+        status = ebpo_publish_commit_pair(&data_file, &text_file, error);
+    ebpo_publish_abort(&data_file);
+    ebpo_publish_abort(&text_file);
     return status;
 }

@@ -1,11 +1,11 @@
-/* Cuts an envelope into fragments, for bounds of its distance to the model. Fragments are convex
- * polytopes in the cell
- * coordinates of a node, which together cover the envelope. Lengths are in units of a power of two
- * near the cell's longest side, so that nothing overflows or underflows. Every cut keeps slightly
- * too much on both sides, so that the tolerances of ebpo_polytope_clip lose nothing. Fragments
- * follow the model's tree down to leaves and are then cut along the planes of faces, or halved,
- * until each is inside, outside, or small. This file also reads the trees: the tree whose envelopes
- * are measured, and the tree of the whole model, which determines the solid. */
+/* Cuts an envelope into fragments, for bounds of the distance by which the envelope extends beyond
+ * the model. Fragments are convex polytopes in the cell coordinates of a node; together they cover
+ * the envelope. The unit of length is a power of two near the cell's longest side, so that no
+ * length overflows or underflows. Every cut keeps slightly too much on both sides, so that the
+ * tolerances of ebpo_polytope_clip lose nothing. Fragments follow the model's tree down to leaves.
+ * Within leaves, they are cut along the planes of faces, or halved, until each fragment is inside,
+ * outside, or small. This file also reads the trees: the tree whose envelopes are measured, and the
+ * tree of the whole model, which determines the solid. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -17,8 +17,8 @@
 #include "format/reader.h"
 #include "geometry/distance.h"
 
-/* exceeds the few roundings of a sum of squares and its root */
-static const double up = 1 + 0x1p-40;
+/* factor that exceeds the rounding errors of a sum of three squares and of its root */
+static const double rounding_factor = 1 + 0x1p-40;
 
 void ebpo_cell_frame_make(ebpo_cell_frame *out, const ebpo_box *box, ebpo_cell cell)
 {
@@ -69,7 +69,7 @@ double ebpo_cell_frame_apart(const ebpo_cell_frame *f, const double a[3], const 
         double d = (a[k] - b[k]) * f->side[k];
         sum += d * d;
     }
-    return sqrt(sum) * up + f->grain;
+    return sqrt(sum) * rounding_factor + f->grain;
 }
 
 double ebpo_cell_frame_diagonal(const ebpo_cell_frame *f, int levels)
@@ -77,7 +77,7 @@ double ebpo_cell_frame_diagonal(const ebpo_cell_frame *f, int levels)
     double sum = 0;
     for (int k = 0; k < 3; k++)
         sum += f->side[k] * f->side[k];
-    return sqrt(sum) * up * (1 + 1 / 128.0) * ebpo_half_power(levels) + f->grain;
+    return sqrt(sum) * rounding_factor * (1 + 1 / 128.0) * ebpo_half_power(levels) + f->grain;
 }
 
 double ebpo_cell_frame_distance(const ebpo_cell_frame *f, const double xi[3],
@@ -111,7 +111,7 @@ static double cell_frame_triangle(const ebpo_cell_frame *f, const double triangl
     return 0x1p-50 * largest + f->grain / least;
 }
 
-enum { CUT_TAG = 1 << 20 };
+enum { CUT_TAG = 1 << 20 }; /* tag of the polygons that cuts add to a polytope */
 
 void ebpo_extent_of(const ebpo_polytope *p, ebpo_extent *out)
 {
@@ -125,15 +125,15 @@ void ebpo_extent_of(const ebpo_polytope *p, ebpo_extent *out)
     }
 }
 
-/* Computes the part with x[axis] <= at (side 0) or >= at (side 1), plus a thin part of the other
- * side. Returns false if this part is empty or thin. */
+/* Computes the part with x[axis] <= at (side 0) or >= at (side 1). If the part on the other side is
+ * thin, adds it to this part. Returns false if this part is empty or thin. */
 static bool cut_axis(const ebpo_polytope *p, int axis, int side, double at, ebpo_polytope *out)
 {
     double n[3] = { 0, 0, 0 };
     ebpo_extent e;
     ebpo_extent_of(p, &e);
-    /* Clipping fails where almost nothing would remain, and a box around a thin part extends far
-     * beyond it. So a thin part stays with the thick part. */
+    /* Clipping fails where almost nothing would remain. A thin part's box, used instead, would
+     * extend far beyond the part. So a thin part stays with the thick part. */
     bool high_is_thin = e.max[axis] - at <= EBPO_CUT_THIN,
          low_is_thin = !high_is_thin && at - e.min[axis] <= EBPO_CUT_THIN;
     if (side ? high_is_thin : low_is_thin)
@@ -141,7 +141,7 @@ static bool cut_axis(const ebpo_polytope *p, int axis, int side, double at, ebpo
     ebpo_polytope_copy(out, p);
     n[axis] = side ? -1 : 1;
     if (!high_is_thin && !low_is_thin)
-        /* where clipping still fails, the part stays too large */
+        /* if clipping still fails, the part stays larger than necessary */
         (void)ebpo_polytope_clip(out, n, (side ? -at : at) + EBPO_CUT_SLACK, CUT_TAG);
     return true;
 }
@@ -175,12 +175,13 @@ ebpo_status ebpo_tree_read_whole(ebpo_lod_model *out, const ebpo_file *file, uns
     return status;
 }
 
+/* Moves a cursor to the node of a cell; returns false if the tree has no such node. */
 static bool go_to(ebpo_cursor *c, ebpo_level_nodes *nodes, ebpo_cell cell, ebpo_node *out)
 {
     ebpo_cursor_begin(c, &ebpo_level_source, nodes, ebpo_level_root(nodes));
-    bool good = ebpo_cursor_to_cell(c, cell, NULL) == EBPO_OK;
+    bool found = ebpo_cursor_to_cell(c, cell, NULL) == EBPO_OK;
     *out = *ebpo_cursor_node(c);
-    return good && out->cell.level == cell.level;
+    return found && out->cell.level == cell.level;
 }
 
 bool ebpo_tree_find(const ebpo_lod_model *tree, ebpo_cell cell, ebpo_node *out)
@@ -190,13 +191,13 @@ bool ebpo_tree_find(const ebpo_lod_model *tree, ebpo_cell cell, ebpo_node *out)
     return go_to(&c, &nodes, cell, out);
 }
 
-bool ebpo_tree_bounds(const ebpo_lod_model *tree, ebpo_cell cell, bool own, ebpo_node *out,
+bool ebpo_tree_bounds(const ebpo_lod_model *tree, ebpo_cell cell, bool include_node, ebpo_node *out,
                       ebpo_half_spaces *halves)
 {
     ebpo_level_nodes nodes = ebpo_lod_model_nodes(tree);
     ebpo_cursor c;
     return go_to(&c, &nodes, cell, out) &&
-           ebpo_cursor_half_spaces(&c, own, halves, NULL) == EBPO_OK;
+           ebpo_cursor_half_spaces(&c, include_node, halves, NULL) == EBPO_OK;
 }
 
 ebpo_status ebpo_tree_derive(const ebpo_lod_model *tree, const ebpo_node *leaf,
@@ -216,8 +217,9 @@ ebpo_status ebpo_tree_derive(const ebpo_lod_model *tree, const ebpo_node *leaf,
 
 /* maximum number of faces to cut along; a fragment with more faces is halved */
 enum { CUT_FACES = 64 };
-/* a plane cuts only a fragment that extends this far, in cells, to both sides of the plane; this is
- * more than the width that ebpo_polytope_clip refuses */
+/* A plane cuts a fragment only if the fragment extends to at least this distance (in cell
+ * coordinates) on both sides of the plane. The distance is more than the width that
+ * ebpo_polytope_clip refuses. */
 static const double side_least = 2e-7;
 
 /* --- the stack --- */
@@ -253,8 +255,8 @@ static ebpo_status push_polytope(ebpo_bounder *b, ebpo_fragment_kind kind,
     return status;
 }
 
-/* Sets the faces of a fragment: those that may intersect it. Copies these to the top of the stack
- * of faces from `count` faces that begin at `first` in the same stack. */
+/* Lists the faces that may intersect a fragment, among the `count` faces that begin at `first` in
+ * the stack of faces. Copies the listed faces to the top of this stack. */
 static ebpo_status copy_faces(ebpo_bounder *b, ebpo_fragment *fragment, uint64_t first,
                               uint64_t count)
 {
@@ -308,10 +310,11 @@ static void find_cell_faces(const ebpo_bounder *b, ebpo_cell cell, int levels, d
     }
 }
 
-/* Returns how far a fragment extends beyond its cell: up to EBPO_CUT_THIN where a neighbour's thin
- * part stayed with it, or the slack of a cut. Both are lengths in the cell coordinates of the
- * envelope's node, so far below this node they are not small compared with the fragment's cell. A
- * bound for the cell plus this distance is a bound for the fragment. */
+/* Returns the distance by which a fragment extends beyond its cell: up to EBPO_CUT_THIN where a
+ * neighbour's thin part stayed with the fragment, or EBPO_CUT_SLACK after a cut. Both are lengths
+ * in the cell coordinates of the envelope's node. Many levels below this node, they are not small
+ * compared with the fragment's cell. A bound for the cell plus this distance is a bound for the
+ * fragment. */
 static double find_beyond(const ebpo_bounder *b, const ebpo_polytope *p, ebpo_cell cell, int levels)
 {
     double low[3], high[3], origin[3] = { 0, 0, 0 }, apart[3];
@@ -324,21 +327,23 @@ static double find_beyond(const ebpo_bounder *b, const ebpo_polytope *p, ebpo_ce
 }
 
 /* Bounds a fragment in a black cell. The fragment is inside the solid, except for thin parts of
- * neighbouring cells that stayed with it. Parts within the slack are ignored, as the fragments of
- * neighbours overlap by it. */
+ * neighbouring cells that stayed with it. Parts within EBPO_CUT_SLACK of the cell are ignored,
+ * because the fragments of the neighbours cover these parts, too. */
 static void bound_black(ebpo_bounder *b, const ebpo_polytope *p, ebpo_cell cell, int levels)
 {
     double low[3], high[3];
-    bool thin = false;
+    bool has_thin_parts = false;
     ebpo_extent e;
     ebpo_extent_of(p, &e);
     find_cell_faces(b, cell, levels, low, high);
     for (int k = 0; k < 3; k++)
-        thin = thin || e.min[k] < low[k] - EBPO_CUT_SLACK || e.max[k] > high[k] + EBPO_CUT_SLACK;
-    if (thin)
+        has_thin_parts = has_thin_parts || e.min[k] < low[k] - EBPO_CUT_SLACK ||
+                         e.max[k] > high[k] + EBPO_CUT_SLACK;
+    if (has_thin_parts)
         ebpo_bound_raise(b, find_beyond(b, p, cell, levels));
 }
 
+/* Cuts a fragment in a gray node's cell along the cells of the node's children. */
 static ebpo_status cut_gray(ebpo_bounder *b, const ebpo_fragment *fragment)
 {
     ebpo_polytope z, y, x;
@@ -375,6 +380,7 @@ static ebpo_status cut_gray(ebpo_bounder *b, const ebpo_fragment *fragment)
     return status;
 }
 
+/* Halves a fragment across its longest extent. */
 static ebpo_status cut_longest(ebpo_bounder *b, const ebpo_fragment *fragment,
                                ebpo_fragment_kind kind)
 {
@@ -398,8 +404,8 @@ static ebpo_status cut_longest(ebpo_bounder *b, const ebpo_fragment *fragment,
     return status;
 }
 
-/* Computes the plane of a face in cell coordinates, n of length 1; returns false when rounding
- * leaves it too uncertain. */
+/* Computes the plane of a face in cell coordinates, with a normal of length 1. Returns false if the
+ * rounding error of the plane may be too large. */
 static bool find_plane(const ebpo_bounder *b, uint64_t face, double n[3], double *d)
 {
     double t[3][3], u[3], v[3],
@@ -413,8 +419,9 @@ static bool find_plane(const ebpo_bounder *b, uint64_t face, double n[3], double
     double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]), edge = 0;
     for (int k = 0; k < 3; k++)
         edge += fabs(u[k]) + fabs(v[k]);
-    /* An error of a corner tilts the plane by about error * edge / length. The tilt acts over the
-     * length of a cell or of an edge. */
+    /* An error of a corner tilts the plane by about error * edge / length. The tilt moves points of
+     * the plane in proportion to their distance, which is at most about the side of the cell or the
+     * length of an edge. */
     if (!(length > 0) || !(error * edge / length * (1 + edge) < 1e-9))
         return false;
     for (int k = 0; k < 3; k++)
@@ -423,8 +430,8 @@ static bool find_plane(const ebpo_bounder *b, uint64_t face, double n[3], double
     return true;
 }
 
-/* Cuts a fragment along a plane, |n| = 1, and pushes both parts. Sets *done to false when clipping
- * fails. */
+/* Cuts a fragment along a plane, with |n| = 1, and pushes both parts. Sets *done to false if
+ * clipping fails; then no part is pushed. */
 static ebpo_status cut_along(ebpo_bounder *b, const ebpo_fragment *fragment,
                              ebpo_fragment_kind kind, const double n[3], double d, bool *done)
 {
@@ -441,16 +448,17 @@ static ebpo_status cut_along(ebpo_bounder *b, const ebpo_fragment *fragment,
     return status;
 }
 
-/* Cuts a fragment of about the size of its nearest face along the sides of the prism above that
- * face. Over the face, the distance to the face's plane is the distance to the face, so flat places
- * need no small fragments. */
+/* Cuts a fragment along a side of the prism that stands on its nearest face, perpendicular to the
+ * face. Within this prism, the distance to the face's plane is the distance to the face, so no
+ * small fragments are needed where the surface is flat. A fragment that is much larger than the
+ * face, or that no side of the prism cuts, is halved. */
 static ebpo_status cut_prism(ebpo_bounder *b, const ebpo_fragment *fragment,
-                             const ebpo_fragment_measure *l)
+                             const ebpo_fragment_measure *measure)
 {
     double t[3][3], edge[3][3], normal[3], longest = 0;
     bool done = false;
     ebpo_status status = EBPO_OK;
-    (void)cell_frame_triangle(&b->frame, l->face, t);
+    (void)cell_frame_triangle(&b->frame, measure->face, t);
     for (int i = 0; i < 3; i++) {
         double sum = 0;
         for (int k = 0; k < 3; k++) {
@@ -462,8 +470,8 @@ static ebpo_status cut_prism(ebpo_bounder *b, const ebpo_fragment *fragment,
     for (int k = 0; k < 3; k++)
         normal[k] = edge[0][(k + 1) % 3] * edge[1][(k + 2) % 3] -
                     edge[0][(k + 2) % 3] * edge[1][(k + 1) % 3];
-    for (int i = 0; i < 3 && l->reach <= 2 * longest && !done && status == EBPO_OK; i++) {
-        double n[3], d = 0, length = 0, most = -INFINITY, least = INFINITY;
+    for (int i = 0; i < 3 && measure->radius <= 2 * longest && !done && status == EBPO_OK; i++) {
+        double n[3], d = 0, length = 0, greatest = -INFINITY, least = INFINITY;
         for (int k = 0; k < 3; k++) {
             n[k] = (edge[i][(k + 1) % 3] * normal[(k + 2) % 3] -
                     edge[i][(k + 2) % 3] * normal[(k + 1) % 3]) *
@@ -478,22 +486,24 @@ static ebpo_status cut_prism(ebpo_bounder *b, const ebpo_fragment *fragment,
         for (int v = 0; v < fragment->p.vertex_count; v++) {
             double e = n[0] * fragment->p.vertex[v][0] + n[1] * fragment->p.vertex[v][1] +
                        n[2] * fragment->p.vertex[v][2] - d;
-            most = fmax(most, e);
+            greatest = fmax(greatest, e);
             least = fmin(least, e);
         }
-        if (most > side_least && least < -side_least) /* never for NAN, from a face without area */
+        /* A face without area gives NAN, for which both comparisons are false. */
+        if (greatest > side_least && least < -side_least)
             status = cut_along(b, fragment, EBPO_FRAGMENT_OUTSIDE, n, d, &done);
     }
     return status != EBPO_OK || done ? status : cut_longest(b, fragment, EBPO_FRAGMENT_OUTSIDE);
 }
 
-/* Returns a bound of the distance for a fragment whose centre is inside the solid. Faces may cut
- * only the outermost part of the fragment. A segment from the centre to a point behind such a face
- * ends at most this far behind the face. The same is true for the cell faces of the leaf, where the
- * fragment extends beyond them by more than the overlap of cuts: faces there are in the list of the
- * neighbour, not of this leaf. */
+/* Returns a bound of the distance for a fragment whose centre is inside the solid. The planes of
+ * the fragment's faces may cut off only thin outermost parts of it. A segment from the centre to a
+ * point of the fragment may leave the solid only behind such a plane, and the part of the segment
+ * behind the plane is at most as long as the returned bound. Where the fragment extends beyond the
+ * leaf's cell by more than EBPO_CUT_SLACK, the cell face counts as such a plane, because the faces
+ * beyond it are listed by the neighbour and not by this leaf. */
 static double behind_faces(const ebpo_bounder *b, const ebpo_fragment *fragment,
-                           const ebpo_fragment_measure *l)
+                           const ebpo_fragment_measure *measure)
 {
     double share = 0, low[3], high[3];
     ebpo_extent all;
@@ -501,79 +511,85 @@ static double behind_faces(const ebpo_bounder *b, const ebpo_fragment *fragment,
     find_cell_faces(b, fragment->node.cell, fragment->levels, low, high);
     for (int k = 0; k < 3; k++)
         for (int side = 0; side < 2; side++) {
-            double other = side ? all.max[k] - high[k] : low[k] - all.min[k],
-                   own = side ? high[k] - l->centre[k] : l->centre[k] - low[k];
-            if (other > EBPO_CUT_SLACK && !(own > 0))
-                /* the centre is beyond the cell face: only the distance of the centre is known */
+            double beyond = side ? all.max[k] - high[k] : low[k] - all.min[k],
+                   centre_to_side =
+                       side ? high[k] - measure->centre[k] : measure->centre[k] - low[k];
+            if (beyond > EBPO_CUT_SLACK && !(centre_to_side > 0))
+                /* The centre is beyond the cell face, so this function gives no bound. */
                 return INFINITY;
-            if (other > EBPO_CUT_SLACK)
-                share = fmax(share, (other + 2e-9) / (other + 2e-9 + own));
+            if (beyond > EBPO_CUT_SLACK)
+                share = fmax(share, (beyond + 2e-9) / (beyond + 2e-9 + centre_to_side));
         }
     for (uint64_t i = 0; i < fragment->face_count; i++) {
-        double n[3], d, reach[2] = { 0, 0 };
+        double n[3], d, farthest_from_plane[2] = { 0, 0 };
         if (!find_plane(b, fragment->face_first + i, n, &d))
             return INFINITY;
-        double own = n[0] * l->centre[0] + n[1] * l->centre[1] + n[2] * l->centre[2] - d;
+        double centre_to_plane =
+            n[0] * measure->centre[0] + n[1] * measure->centre[1] + n[2] * measure->centre[2] - d;
         for (int v = 0; v < fragment->p.vertex_count; v++) {
             double e = n[0] * fragment->p.vertex[v][0] + n[1] * fragment->p.vertex[v][1] +
                        n[2] * fragment->p.vertex[v][2] - d;
-            reach[e > 0] = fmax(reach[e > 0], fabs(e));
+            farthest_from_plane[e > 0] = fmax(farthest_from_plane[e > 0], fabs(e));
         }
-        double other = reach[own < 0] + 2e-9;
-        share = fmax(share, other / (other + fabs(own)));
+        double behind = farthest_from_plane[centre_to_plane < 0] + 2e-9;
+        share = fmax(share, behind / (behind + fabs(centre_to_plane)));
     }
-    return share * l->reach + b->frame.grain;
+    return share * measure->radius + b->frame.grain;
 }
 
-/* Returns true if the cell is thinner on some axis than the precision of coordinates. */
+/* Returns true if the cell is so thin on some axis that the planes of faces are too uncertain. */
 static bool is_flat(const ebpo_bounder *b)
 {
     return fmin(fmin(b->frame.side[0], b->frame.side[1]), b->frame.side[2]) < 1e10 * b->frame.grain;
 }
 
-/* Cuts a fragment within a leaf of a solid, whose points are inside or outside. */
+/* Cuts a fragment within a leaf of a solid. Every point of the fragment is inside or outside the
+ * solid. */
 static ebpo_status cut_leaf(ebpo_bounder *b, const ebpo_fragment *fragment,
-                            const ebpo_fragment_measure *l)
+                            const ebpo_fragment_measure *measure)
 {
-    bool done = false, known = fragment->face_count <= CUT_FACES;
+    bool done = false, usable = fragment->face_count <= CUT_FACES;
     ebpo_status status = EBPO_OK;
-    for (uint64_t i = 0; i < fragment->face_count && known && !done && status == EBPO_OK; i++) {
-        double n[3], d, most = -INFINITY, least = INFINITY;
-        known = find_plane(b, fragment->face_first + i, n, &d);
-        for (int v = 0; v < fragment->p.vertex_count && known; v++) {
+    for (uint64_t i = 0; i < fragment->face_count && usable && !done && status == EBPO_OK; i++) {
+        double n[3], d, greatest = -INFINITY, least = INFINITY;
+        usable = find_plane(b, fragment->face_first + i, n, &d);
+        for (int v = 0; v < fragment->p.vertex_count && usable; v++) {
             double e = n[0] * fragment->p.vertex[v][0] + n[1] * fragment->p.vertex[v][1] +
                        n[2] * fragment->p.vertex[v][2] - d;
-            most = fmax(most, e);
+            greatest = fmax(greatest, e);
             least = fmin(least, e);
         }
-        if (known && most > side_least && least < -side_least) {
+        if (usable && greatest > side_least && least < -side_least) {
             status = cut_along(b, fragment, EBPO_FRAGMENT_LEAF, n, d, &done);
-            known = done;
+            usable = done;
         }
     }
     if (status != EBPO_OK || done)
         return status;
-    if (!known && is_flat(b)) /* sides cannot be distinguished: the model is treated as a surface */
-        return cut_prism(b, fragment, l);
-    if (!known)
+    /* In a flat cell, inside and outside cannot be distinguished, so the model counts as a surface.
+     */
+    if (!usable && is_flat(b))
+        return cut_prism(b, fragment, measure);
+    if (!usable)
         return cut_longest(b, fragment, EBPO_FRAGMENT_LEAF);
-    if (l->distance >= 0)
-        return cut_prism(b, fragment, l);
-    double behind = behind_faces(b, fragment, l);
+    if (measure->distance >= 0)
+        return cut_prism(b, fragment, measure);
+    double behind = behind_faces(b, fragment, measure);
     if (behind > EBPO_FRAGMENT_LEAST && behind > b->target)
         return cut_longest(b, fragment, EBPO_FRAGMENT_LEAF);
-    ebpo_bound_raise(b, fmin(behind, l->upper));
+    ebpo_bound_raise(b, fmin(behind, measure->upper));
     return EBPO_OK;
 }
 
 ebpo_status ebpo_fragment_cut(ebpo_bounder *b, const ebpo_fragment *fragment,
-                              const ebpo_fragment_measure *l)
+                              const ebpo_fragment_measure *measure)
 {
     switch (fragment->kind) {
     case EBPO_FRAGMENT_GRAY: return cut_gray(b, fragment);
     case EBPO_FRAGMENT_LEAF:
-        return b->whole->info->solid ? cut_leaf(b, fragment, l) : cut_prism(b, fragment, l);
+        return b->whole->info->solid ? cut_leaf(b, fragment, measure)
+                                     : cut_prism(b, fragment, measure);
     case EBPO_FRAGMENT_OUTSIDE: break;
     }
-    return cut_prism(b, fragment, l);
+    return cut_prism(b, fragment, measure);
 }

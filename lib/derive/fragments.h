@@ -1,5 +1,5 @@
-/* Declarations of fragments.c: a node's cell with its unit of length, fragments of an envelope, the
- * trees of a file, and the state of a search for an error bound. */
+/* Declares the functions of fragments.c: a node's cell with its unit of length, fragments of an
+ * envelope, the trees of a file, and the state of a search for an error bound. */
 #ifndef EBPO_DERIVE_FRAGMENTS_H
 #define EBPO_DERIVE_FRAGMENTS_H
 
@@ -15,7 +15,7 @@
 typedef struct ebpo_cell_frame {
     ebpo_cell cell;
     int exponent;                    /* the unit is 2^exponent in the model's unit */
-    double factor[2];                /* 2^-exponent in two factors, as one may overflow */
+    double factor[2];                /* two factors of 2^-exponent, which itself may overflow */
     double low[3], high[3], size[3]; /* box of the cell, in the model's unit */
     double side[3];                  /* sides of the cell, in the frame's unit */
     /* bound of the rounding error of points and distances, in the frame's unit */
@@ -24,7 +24,7 @@ typedef struct ebpo_cell_frame {
 
 void ebpo_cell_frame_make(ebpo_cell_frame *out, const ebpo_box *box, ebpo_cell cell);
 
-/* Converts cell coordinates to the model's coordinates, with a rounding error below the grain. */
+/* Converts cell coordinates to the model's coordinates, with a rounding error below f->grain. */
 void ebpo_cell_frame_point(const ebpo_cell_frame *f, const double xi[3], double out[3]);
 
 /* Convert a length of the model to the frame's unit, and back (rounded up). INFINITY is not
@@ -36,8 +36,9 @@ double ebpo_cell_frame_model_length(const ebpo_cell_frame *f, double length);
  * distance is in the frame's unit. */
 double ebpo_cell_frame_apart(const ebpo_cell_frame *f, const double a[3], const double b[3]);
 
-/* A face that touches a cell, perhaps up to a rounding error (format-spec, section 7), is at most
- * this far from every point of the cell. The cell is `levels` below the frame's cell. */
+/* Returns an upper bound of the distance between any point of a cell and a face that touches the
+ * cell, perhaps up to a rounding error (format-spec, section 7). The cell is `levels` levels below
+ * the frame's cell. */
 double ebpo_cell_frame_diagonal(const ebpo_cell_frame *f, int levels);
 
 /* Returns an upper bound of the distance of a point (in cell coordinates) to a triangle of the
@@ -48,8 +49,8 @@ double ebpo_cell_frame_distance(const ebpo_cell_frame *f, const double xi[3],
 /* Fragments of an envelope are convex polytopes in the cell coordinates of the node. Together they
  * cover the envelope. Every cut keeps a little too much on both sides. */
 
-/* The amount that is kept too much: more than the tolerance of clipping, for normals of Euclidean
- * length 1/sqrt(3) and up. */
+/* Width, in cell coordinates, of what each cut keeps too much. The width is more than the tolerance
+ * of clipping, for normals of Euclidean length 1/sqrt(3) and up. */
 #define EBPO_CUT_SLACK 4e-10
 
 typedef struct ebpo_extent {
@@ -58,8 +59,8 @@ typedef struct ebpo_extent {
 
 void ebpo_extent_of(const ebpo_polytope *p, ebpo_extent *out);
 
-/* A part of at most this width stays with the part on the other side. The width is less than a
- * quarter of the smallest fragment that is cut. */
+/* If one of the two parts that a cut makes is at most this wide, no cut is made, and the other part
+ * keeps it. The width is less than a quarter of the smallest fragment that is cut. */
 #define EBPO_CUT_THIN 1.2e-7 /* ebpo_polytope_clip refuses 1e-7 */
 
 /* Two trees determine a bound: the tree whose envelopes are bounded, and the tree of the whole
@@ -74,9 +75,9 @@ EBPO_MUST_USE ebpo_status ebpo_tree_read_whole(ebpo_lod_model *out, const ebpo_f
 bool ebpo_tree_find(const ebpo_lod_model *tree, ebpo_cell cell, ebpo_node *out);
 
 /* Finds the node like ebpo_tree_find, and returns the half-spaces of the node's ancestors in the
- * coordinates of `cell`. With `own`, also returns the half-spaces that the file stores for the
- * node. */
-bool ebpo_tree_bounds(const ebpo_lod_model *tree, ebpo_cell cell, bool own, ebpo_node *out,
+ * coordinates of `cell`. With `include_node`, also returns the half-spaces that the file stores for
+ * the node itself. */
+bool ebpo_tree_bounds(const ebpo_lod_model *tree, ebpo_cell cell, bool include_node, ebpo_node *out,
                       ebpo_half_spaces *halves);
 
 /* Adds the half-spaces that ebpo_lod_level derives for a leaf of a file without stored leaf planes.
@@ -96,7 +97,7 @@ typedef struct ebpo_bounder {
     ebpo_half_spaces halves;  /* half-spaces of the envelope */
     ebpo_fragment *fragments; /* a stack */
     uint64_t fragment_capacity, fragment_count;
-    /* faces of fragments within leaves, in the model's unit: also a stack */
+    /* a stack: the faces of the fragments within leaves, in the model's unit */
     double (*faces)[3][3];
     uint64_t face_capacity, face_count;
     /* The search for the current node, with lengths in the frame's unit: */
@@ -105,7 +106,8 @@ typedef struct ebpo_bounder {
     double quit;        /* the search stops once `lo` is larger */
     double ratio;       /* `target` is at least `ratio` times `lo` */
     double lo, hi;      /* bounds found so far */
-    double location[3]; /* point of the envelope at `lo`, in the model's coordinates */
+    double location[3]; /* point of the envelope whose distance gave `lo`, in the model's
+                           coordinates */
     double inner[3];    /* a point near the envelope's middle, in cell coordinates */
     uint64_t queries;
     ebpo_error *error;
@@ -113,11 +115,12 @@ typedef struct ebpo_bounder {
 
 /* --- the fragments that error_bound.c searches: a stack, and how a fragment is cut --- */
 
-#define EBPO_FRAGMENT_LEAST 1e-6 /* fragments are not cut below this, in sides of the cell */
+/* Fragments below this size, in the frame's unit, are not cut. */
+#define EBPO_FRAGMENT_LEAST 1e-6
 
 typedef enum ebpo_fragment_kind {
-    EBPO_FRAGMENT_GRAY, /* the part in a gray node's cell */
-    /* within a leaf's cell: its faces that may intersect the fragment are known */
+    EBPO_FRAGMENT_GRAY, /* the part of the envelope in a gray node's cell */
+    /* within a leaf's cell; the fragment lists the leaf's faces that may intersect it */
     EBPO_FRAGMENT_LEAF,
     /* in a white cell, or cut off from all faces, or in a surface's envelope, which has no inside
      */
@@ -126,25 +129,25 @@ typedef enum ebpo_fragment_kind {
 
 struct ebpo_fragment {
     ebpo_fragment_kind kind;
-    double upper;
+    double upper;   /* upper bound of the distance of the fragment's points */
     ebpo_node node; /* GRAY, LEAF: the node of the model's tree whose cell has the fragment */
     int levels;     /* GRAY, LEAF: the number of levels of `node` below the node of the envelope */
     /* GRAY, LEAF: bound of the distance of the fragment's points from the cell of `node` */
     double beyond;
-    uint64_t face_first, face_count; /* LEAF */
+    uint64_t face_first, face_count; /* LEAF: the listed faces, in the stack of faces */
     ebpo_polytope p;
 };
 
 /* Measures of a fragment. */
 typedef struct ebpo_fragment_measure {
-    double centre[3], reach; /* all of the fragment is within `reach` of the centre */
-    double distance;         /* distance of the centre; negative inside */
-    double upper;
-    double face[3][3]; /* the face nearest to the centre, in the model's unit */
+    double centre[3], radius; /* every point of the fragment is within `radius` of the centre */
+    double distance;          /* distance of the centre; negative inside */
+    double upper;             /* upper bound of the distance of the fragment's points */
+    double face[3][3];        /* the face nearest to the centre, in the model's unit */
 } ebpo_fragment_measure;
 
-/* Pushes a fragment with the bounds of its parent. *out is valid until the next call; its polytope
- * is not set. */
+/* Pushes a fragment with the bounds of `parent`, the fragment that it was cut from (NULL: no
+ * bounds). *out is valid until the next call; its polytope is not set. */
 EBPO_MUST_USE ebpo_status ebpo_fragment_push(ebpo_bounder *b, ebpo_fragment_kind kind,
                                              const ebpo_fragment *parent, ebpo_fragment **out);
 
@@ -152,12 +155,13 @@ EBPO_MUST_USE ebpo_status ebpo_fragment_push(ebpo_bounder *b, ebpo_fragment_kind
 EBPO_MUST_USE ebpo_status ebpo_fragment_leaf_faces(ebpo_bounder *b, ebpo_fragment *fragment,
                                                    const ebpo_node *leaf);
 
-/* Cuts a fragment, which the caller has popped from the stack. Pushes its parts, or raises the
- * bound by them if no further cut is needed. */
+/* Cuts a fragment, which the caller has popped from the stack, and pushes the parts. If no cut is
+ * needed, raises the upper bound of the search to the fragment's bound. */
 EBPO_MUST_USE ebpo_status ebpo_fragment_cut(ebpo_bounder *b, const ebpo_fragment *fragment,
-                                            const ebpo_fragment_measure *l);
+                                            const ebpo_fragment_measure *measure);
 
-/* Raises the bound to `upper`, the bound of some fragment. */
+/* Raises the upper bound of the search to `upper`, the upper bound of a fragment that is not
+ * examined further. */
 static inline void ebpo_bound_raise(ebpo_bounder *b, double upper)
 {
     b->hi = b->hi < upper ? upper : b->hi;

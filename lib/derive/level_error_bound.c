@@ -1,9 +1,9 @@
 /* Measures the error of a level: bounds of the largest distance by which its envelopes extend
  * beyond the model, and the mean distance, from samples. A level's bounds are the largest bounds of
- * its nodes. A short search for each node gives bounds that dismiss most nodes; the other nodes are
- * searched in the order of their upper bounds. Samples are points on the level's polygons. The area
- * is divided into equal parts, with one sample in each. A sample counts if a point slightly outside
- * its polygon is in no other envelope. */
+ * its nodes. A short search for each node shows for most nodes that they do not have the largest
+ * distance; the other nodes are searched in the order of their upper bounds. Samples are points on
+ * the level's polygons. The area of the polygons is divided into equal parts, with one sample in
+ * each part. A sample counts if the point slightly outside its polygon is in no other envelope. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -33,15 +33,15 @@ typedef struct sampling {
     ebpo_lod_nodes nodes;
     uint64_t *first_triangle; /* [node_count + 1] */
     uint32_t *triangle;       /* [samples] */
-    double *distance;         /* [samples]; NAN: not on the surface */
+    double *distance;         /* [samples]; NAN: the sample does not count */
     ebpo_context **contexts;  /* [threads] */
     unsigned threads;
 } sampling;
 
-/* Returns the random number at index `place` of the stream for `seed`, from 0 to 1. */
-static double random_unit(uint64_t seed, uint64_t place)
+/* Returns the random number at index `index` of the stream for `seed`, from 0 to 1. */
+static double random_unit(uint64_t seed, uint64_t index)
 {
-    uint64_t number = seed * UINT64_C(0xd1342543de82ef95) + place + 1;
+    uint64_t number = seed * UINT64_C(0xd1342543de82ef95) + index + 1;
     return ebpo_random_unit(ebpo_random_mix(number * EBPO_RANDOM_STEP));
 }
 
@@ -67,16 +67,16 @@ static double triangle_area(const sampling *s, uint64_t triangle)
 /* Distributes one sample to each of `samples` equal parts of the area. */
 static void distribute_samples(sampling *s)
 {
-    double total = 0, below = 0;
+    double total = 0, area_before = 0;
     uint64_t t = 0;
     for (uint64_t i = 0; i < s->mesh.face_count; i++)
         total += triangle_area(s, i);
-    double next = s->mesh.face_count ? triangle_area(s, 0) : 0;
+    double area = s->mesh.face_count ? triangle_area(s, 0) : 0;
     for (uint64_t i = 0; i < s->o->samples; i++) {
         double at = ((double)i + random_unit(s->o->seed, 3 * i)) / (double)s->o->samples * total;
-        while (below + next <= at && t + 1 < s->mesh.face_count) {
-            below += next;
-            next = triangle_area(s, ++t);
+        while (area_before + area <= at && t + 1 < s->mesh.face_count) {
+            area_before += area;
+            area = triangle_area(s, ++t);
         }
         s->triangle[i] = (uint32_t)t;
     }
@@ -84,6 +84,7 @@ static void distribute_samples(sampling *s)
 
 /* --- the envelope that contains a point --- */
 
+/* Returns the index of the node that has a triangle. */
 static uint64_t node_of_triangle(const sampling *s, uint64_t triangle)
 {
     uint64_t low = 0, high = s->nodes.node_count;
@@ -128,7 +129,8 @@ static bool unit_normal(const sampling *s, uint64_t triangle, double n[3])
     return length > 0;
 }
 
-static bool node_holds(const sampling *s, uint64_t node, const double p[3])
+/* Returns true if a point is behind the planes of all triangles of a node's envelope. */
+static bool is_in_node_envelope(const sampling *s, uint64_t node, const double p[3])
 {
     double slack = 1e-9 * ebpo_half_power(s->level);
     for (uint64_t t = s->first_triangle[node]; t < s->first_triangle[node + 1]; t++) {
@@ -143,7 +145,8 @@ static bool node_holds(const sampling *s, uint64_t node, const double p[3])
     return true;
 }
 
-static bool in_another(const sampling *s, uint64_t own, const double p[3])
+/* Returns true if a point is in the envelope of a node other than `own`. */
+static bool is_in_other_envelope(const sampling *s, uint64_t own, const double p[3])
 {
     double xi[3];
     for (int k = 0; k < 3; k++) {
@@ -157,13 +160,15 @@ static bool in_another(const sampling *s, uint64_t own, const double p[3])
             cell.at[k] = (uint32_t)(xi[k] * (double)(1u << level));
         uint64_t node = find_node(s, ebpo_octcode_of_cell(cell));
         if (node < s->nodes.node_count)
-            return node != own && node_holds(s, node, p);
+            return node != own && is_in_node_envelope(s, node, p);
     }
     return false;
 }
 
 /* --- samples --- */
 
+/* Chooses the point of sample i in the sample's triangle, and measures its distance if the sample
+ * counts. */
 static ebpo_status measure_sample(sampling *s, uint64_t i, ebpo_context *context, ebpo_error *error)
 {
     double a = sqrt(random_unit(s->o->seed, 3 * i + 1)), b = random_unit(s->o->seed, 3 * i + 2),
@@ -181,7 +186,7 @@ static ebpo_status measure_sample(sampling *s, uint64_t i, ebpo_context *context
                a * ((1 - b) * triangle_corner(s, t, 1)[k] + b * triangle_corner(s, t, 2)[k]);
         q[k] = p[k] + n[k] * step;
     }
-    if (in_another(s, node_of_triangle(s, t), q))
+    if (is_in_other_envelope(s, node_of_triangle(s, t), q))
         return EBPO_OK;
     ebpo_distance_result result;
     ebpo_status status = ebpo_distance(context, p, NULL, &result, error);
@@ -199,6 +204,7 @@ static ebpo_status sample_some(void *context, uint64_t begin, uint64_t end, unsi
     return status;
 }
 
+/* Computes the mean and the root mean square of the samples that count. */
 static void sum_up(const sampling *s, ebpo_error_bound *out)
 {
     double sum = 0, squares = 0;
@@ -270,31 +276,33 @@ static ebpo_status error_bound_sample(ebpo_model *model, const ebpo_file *file, 
 
 /* --- bounds --- */
 
-/* QUERIES_MAX limits the queries for each node; only flat places close to the model are undecided
- * then */
+/* BLOCK_MAX is the maximum number of nodes that are searched with the same goal. QUERIES_MAX limits
+ * the queries for each node. Only nodes whose envelopes are flat and close to the model need more
+ * queries. */
 enum { BLOCK_MAX = 512, QUERIES_MAX = 1 << 16 };
 
 typedef struct level_node {
     ebpo_cell cell;
-    ebpo_reach_bound bound;
+    ebpo_envelope_bound bound;
 } level_node;
 
+/* The search for the bounds of a level. */
 typedef struct survey {
-    const ebpo_lod_model *tree, *whole; /* trees of the file and of the model's file; may be the
-                                         * same */
+    const ebpo_lod_model *tree;  /* of the file */
+    const ebpo_lod_model *whole; /* of the model's file; may be the same tree */
     int level;
     level_node *nodes;
     uint64_t count, capacity, *order;
     ebpo_bounder *bounders; /* [threads] */
     unsigned threads;
     ebpo_bound_goal goal;
-    uint64_t first; /* start of the current block in `order` */
-    bool spent;     /* the queries were used up before the tolerance was reached */
+    uint64_t first;       /* start of the current block in `order` */
+    bool queries_used_up; /* the queries were used up before the tolerance was reached */
     const ebpo_progress *progress;
     ebpo_error *error;
 } survey;
 
-/* --- the level's nodes --- */
+/* --- the nodes of the level --- */
 
 static ebpo_status add_node(survey *s, const ebpo_node *node)
 {
@@ -304,6 +312,7 @@ static ebpo_status add_node(survey *s, const ebpo_node *node)
     return EBPO_OK;
 }
 
+/* Lists the gray nodes of the level, and the leaves and pruned nodes above it, below `node`. */
 static ebpo_status list_nodes(survey *s, const ebpo_level_nodes *tree, const ebpo_node *node)
 {
     if (node->type == EBPO_LEAF)
@@ -345,12 +354,13 @@ static ebpo_status bound_some(void *context, uint64_t begin, uint64_t end, unsig
     return status;
 }
 
+/* A node of the list, by its index, with its upper bound. */
 typedef struct ranked {
     double hi;
     uint64_t node;
 } ranked;
 
-static int farthest_first(const void *a, const void *b)
+static int compare_upper_bounds(const void *a, const void *b)
 {
     const ranked *x = a, *y = b;
     if (x->hi != y->hi)
@@ -366,18 +376,19 @@ static ebpo_status sort_nodes(survey *s)
     for (uint64_t i = 0; i < s->count; i++)
         list[i] = (ranked){ s->nodes[i].bound.hi, i };
     if (s->count)
-        qsort(list, s->count, sizeof *list, farthest_first);
+        qsort(list, s->count, sizeof *list, compare_upper_bounds);
     for (uint64_t i = 0; i < s->count; i++)
         s->order[i] = list[i].node;
     free(list);
     return EBPO_OK;
 }
 
-/* Updates *out by the results of the nodes with indices first .. last - 1 in s->order. */
+/* Raises the lower bound in *out to the bounds of the nodes with indices first .. last - 1 in
+ * s->order. */
 static void gather_survey(const survey *s, uint64_t first, uint64_t last, ebpo_error_bound *out)
 {
     for (uint64_t i = first; i < last; i++) {
-        const ebpo_reach_bound *b = &s->nodes[s->order[i]].bound;
+        const ebpo_envelope_bound *b = &s->nodes[s->order[i]].bound;
         if (b->lo > out->lo) {
             out->lo = b->lo;
             memcpy(out->location, b->location, sizeof out->location);
@@ -431,20 +442,21 @@ static ebpo_status search_nodes(survey *s, const ebpo_error_bound_options *o, eb
 static void bound_by_coarser(survey *s, double at_most)
 {
     for (uint64_t i = 0; i < s->count && at_most > 0; i++) {
-        ebpo_reach_bound *b = &s->nodes[i].bound;
+        ebpo_envelope_bound *b = &s->nodes[i].bound;
         b->hi = fmax(b->lo, fmin(b->hi, at_most));
     }
 }
 
-static bool has_spent(const survey *s, const ebpo_error_bound_options *o,
-                      const ebpo_error_bound *out)
+/* Returns true if the queries were used up before the tolerance was reached. */
+static bool has_used_up_queries(const survey *s, const ebpo_error_bound_options *o,
+                                const ebpo_error_bound *out)
 {
     if (out->hi <= (1 + o->tolerance) * out->lo)
         return false;
-    bool spent = o->queries && out->queries >= o->queries;
-    for (uint64_t i = 0; i < s->count && !spent; i++)
-        spent = s->nodes[i].bound.queries >= QUERIES_MAX;
-    return spent;
+    bool queries_used_up = o->queries && out->queries >= o->queries;
+    for (uint64_t i = 0; i < s->count && !queries_used_up; i++)
+        queries_used_up = s->nodes[i].bound.queries >= QUERIES_MAX;
+    return queries_used_up;
 }
 
 static ebpo_status bound_level(survey *s, const ebpo_error_bound_options *o, ebpo_error_bound *out)
@@ -454,7 +466,7 @@ static ebpo_status bound_level(survey *s, const ebpo_error_bound_options *o, ebp
     free(s->order);
     s->order = NULL;
     s->count = 0;
-    s->first = 0; /* may still be set by the search in a finer level */
+    s->first = 0; /* the search in a finer level may have set it */
     ebpo_status status = list_nodes(s, &tree, &root);
     if (status == EBPO_OK && !(s->order = ebpo_alloc(s->count, sizeof *s->order)))
         status = ebpo_fail_memory(s->error, s->count * sizeof *s->order);
@@ -474,18 +486,18 @@ static ebpo_status bound_level(survey *s, const ebpo_error_bound_options *o, ebp
     for (uint64_t i = 0; i < s->count; i++)
         out->hi = fmax(out->hi, s->nodes[i].bound.hi);
     out->queries = count_queries(s);
-    s->spent = has_spent(s, o, out);
+    s->queries_used_up = has_used_up_queries(s, o, out);
     return status;
 }
 
-/* Improves the upper bound by the bounds of coarser levels. Envelopes nest, so no level has a
- * larger error than the coarser level before it. The search in the coarser level cuts other
- * fragments and may be more precise. */
+/* Improves the upper bound by the bounds of coarser levels. Each envelope is within its parent's
+ * envelope, so no level has a larger error than a coarser level. The search in a coarser level cuts
+ * other fragments and may give a lower upper bound. */
 static ebpo_status use_coarser_levels(survey *s, const ebpo_error_bound_options *o,
                                       ebpo_error_bound *out)
 {
     ebpo_status status = EBPO_OK;
-    while (s->spent && s->level > 0 && !(o->at_most > 0) && status == EBPO_OK) {
+    while (s->queries_used_up && s->level > 0 && !(o->at_most > 0) && status == EBPO_OK) {
         ebpo_error_bound coarser = EBPO_ERROR_BOUND_INIT;
         s->level--;
         status = bound_level(s, o, &coarser);

@@ -1,9 +1,9 @@
-/* Computes the least volume that convex envelopes can have, the "limit" of a level: the volume of
- * the convex hull of the solid in each cell of the level. The extreme points of a hull are mesh
- * vertices in the cell, corners where faces cut the cell faces, and the corners of the cell that
- * are inside. qhull computes the volumes; a build without qhull reports EBPO_E_ABSENT. Volumes are
- * stored for each node and added in the order of the nodes, so that the number of threads does not
- * change the sum. */
+/* Computes the "limit" of a level: the least volume that its convex envelopes can have, which is
+ * the sum of the volumes of the convex hulls of the solid in each cell of the level. The extreme
+ * points of a hull are among the corners of the mesh faces that are clipped to the cell, and the
+ * corners of the cell that are inside the solid. qhull computes the volumes; a build without qhull
+ * reports EBPO_E_ABSENT. Volumes are stored for each node and added in the order of the nodes, so
+ * that the number of threads does not change the sum. */
 #include "core/strict_fp.h"
 
 #include <ebpo/limit.h>
@@ -35,7 +35,7 @@
 
 #if EBPO_HAVE_QHULL
 
-/* One for each thread. */
+/* State of qhull, one for each thread. */
 typedef struct hull {
     FILE *null_file; /* receives qhull's long explanations of flat sets */
     qhT qhull;
@@ -61,25 +61,27 @@ static void hull_free(hull *h)
     free(h);
 }
 
+/* Returns the volume that qhull computes with the options of `command`; sets *failed if qhull
+ * fails. */
 static double volume_by(hull *h, double *points, int count, char *command, bool *failed)
 {
     qhT *qh = &h->qhull;
     volatile double volume = 0; /* set between setjmp and a jump */
-    volatile bool wrong = true;
+    volatile bool has_failed = true;
     qh_zero(qh, h->null_file);
     if (qh_new_qhull(qh, 3, count, points, False, command, NULL, h->null_file) == 0) {
         if (setjmp(qh->errexit) == 0) { /* qhull's errors jump here */
             qh->NOerrexit = False;
             qh_getarea(qh, qh->facet_list);
             volume = qh->totvol;
-            wrong = false;
+            has_failed = false;
         }
         qh->NOerrexit = True;
     }
-    int left, size;
+    int unfreed_blocks, unfreed_bytes;
     qh_freeqhull(qh, !qh_ALL);
-    qh_memfreeshort(qh, &left, &size);
-    *failed = wrong;
+    qh_memfreeshort(qh, &unfreed_blocks, &unfreed_bytes);
+    *failed = has_failed;
     return volume > 0 ? volume : 0;
 }
 
@@ -92,8 +94,8 @@ static double hull_volume(hull *h, double *points, uint64_t count)
     if (count < 4 || count > INT_MAX / 3)
         return 0;
     double volume = volume_by(h, points, (int)count, merged, &failed);
-    /* qhull fails for thin hulls when all of their facets merge. When the points are moved by about
-     * 1e-11, thin hulls have a volume, and flat ones almost none. */
+    /* qhull fails for a thin hull if it merges all facets of the hull. With option QJ, qhull moves
+     * the points by about 1e-11. Then a thin hull has a volume, and a flat hull has almost none. */
     return failed ? volume_by(h, points, (int)count, joggled, &failed) : volume;
 }
 
@@ -119,10 +121,10 @@ static double hull_volume(hull *h, double *points, uint64_t count)
 
 #endif
 
-/* One for each thread. */
+/* Memory for the computation of one node's hull, one for each thread. */
 typedef struct scratch {
     hull *hull;
-    uint32_t *list;
+    uint32_t *list; /* indices of the node's faces */
     ebpo_triangle *faces;
     double *points;
     uint64_t list_count, list_capacity, faces_capacity, point_count, points_capacity;
@@ -136,9 +138,10 @@ typedef struct job {
     ebpo_level_nodes tree;
     ebpo_node *nodes; /* nodes to compute hulls for */
     uint64_t node_count, node_capacity;
-    double *volume; /* [node_count] of the hull, as a fraction of the node's cell */
-    double black;
-    bool in_root_cells; /* unit of the volumes */
+    double *volume; /* [node_count] volume of the hull, as a fraction of the volume of the node's
+                       cell */
+    double black;   /* sum of the volumes of black nodes */
+    bool in_root_cells; /* true: volumes are fractions of the root cell's volume */
     scratch *scratch;   /* [threads] */
 } job;
 
@@ -149,6 +152,8 @@ static double cell_volume(const job *j, int level)
 
 /* --- the nodes --- */
 
+/* Lists the gray nodes of the level and the leaves above it, and adds the volumes of black nodes.
+ */
 static bool list_nodes(job *j, const ebpo_node *node)
 {
     if (node->type == EBPO_BLACK)
@@ -156,12 +161,12 @@ static bool list_nodes(job *j, const ebpo_node *node)
     if (ebpo_node_is_uniform(node))
         return true;
     if (node->type == EBPO_GRAY && node->cell.level < j->level) {
-        bool good = true;
-        for (unsigned octant = 0; octant < 8 && good; octant++) {
+        bool complete = true;
+        for (unsigned octant = 0; octant < 8 && complete; octant++) {
             ebpo_node child = ebpo_level_child(&j->tree, node, octant);
-            good = list_nodes(j, &child);
+            complete = list_nodes(j, &child);
         }
-        return good;
+        return complete;
     }
     if (!ebpo_grow(&j->nodes, &j->node_capacity, j->node_count + 1, sizeof *j->nodes))
         return false;
@@ -188,14 +193,14 @@ static bool list_leaf_faces(const job *j, scratch *s, int number, uint64_t leaf)
 
 static bool list_node_faces(const job *j, scratch *s, const ebpo_node *node)
 {
-    bool good = true;
+    bool complete = true;
     if (node->type == EBPO_LEAF)
         return list_leaf_faces(j, s, node->cell.level, node->rank);
-    for (unsigned octant = 0; octant < 8 && good && node->type == EBPO_GRAY; octant++) {
+    for (unsigned octant = 0; octant < 8 && complete && node->type == EBPO_GRAY; octant++) {
         ebpo_node child = ebpo_level_child(&j->tree, node, octant);
-        good = list_node_faces(j, s, &child);
+        complete = list_node_faces(j, s, &child);
     }
-    return good;
+    return complete;
 }
 
 static int compare_faces(const void *a, const void *b)
@@ -204,6 +209,7 @@ static int compare_faces(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
+/* Sorts the listed faces, removes repeated ones, and copies their coordinates. */
 static bool load_listed_faces(const job *j, scratch *s)
 {
     const ebpo_mesh *m = &j->mesh;
@@ -236,13 +242,14 @@ static int32_t lowest_winding(const job *j, ebpo_node node)
     return ebpo_level_winding(&j->tree, &node);
 }
 
-static bool add_corners(const job *j, scratch *s, const ebpo_node *w)
+/* Adds the corners of the cell that are inside the solid. */
+static bool add_corners(const job *j, scratch *s, const ebpo_node *node)
 {
     const ebpo_lod_model *m = &j->model;
     if (!m->info->solid)
         return true;
-    int32_t delta[8], lowest = lowest_winding(j, *w);
-    ebpo_corner_windings(&m->box, w->cell, s->faces, s->list_count, delta);
+    int32_t delta[8], lowest = lowest_winding(j, *node);
+    ebpo_corner_windings(&m->box, node->cell, s->faces, s->list_count, delta);
     if (!ebpo_grow(&s->points, &s->points_capacity, s->point_count + 8, 3 * sizeof *s->points))
         return false;
     for (int i = 0; i < 8; i++)
@@ -253,6 +260,7 @@ static bool add_corners(const job *j, scratch *s, const ebpo_node *w)
     return true;
 }
 
+/* Adds the corners of the listed faces after each face is clipped to the cell. */
 static bool add_faces(const job *j, scratch *s, ebpo_cell cell)
 {
     if (!ebpo_grow(&s->points, &s->points_capacity, s->point_count + 9 * s->list_count,
@@ -273,10 +281,10 @@ static ebpo_status measure_hulls(void *context, uint64_t begin, uint64_t end, un
     job *j = context;
     scratch *s = &j->scratch[worker];
     for (uint64_t i = begin; i < end; i++) {
-        const ebpo_node *w = &j->nodes[i];
+        const ebpo_node *node = &j->nodes[i];
         s->list_count = s->point_count = 0;
-        if (!list_node_faces(j, s, w) || !load_listed_faces(j, s) || !add_corners(j, s, w) ||
-            !add_faces(j, s, w->cell))
+        if (!list_node_faces(j, s, node) || !load_listed_faces(j, s) || !add_corners(j, s, node) ||
+            !add_faces(j, s, node->cell))
             return ebpo_fail_memory(error, s->list_count * sizeof *s->faces);
         j->volume[i] = hull_volume(s->hull, s->points, s->point_count);
     }

@@ -1,13 +1,14 @@
 /* Makes subsets: a smaller file that contains selected levels, parts, a box, or the envelopes that
  * are close enough to the model. This file
- * - counts the bytes that a subset needs of its file, from headers and tables alone;
+ * - counts the bytes of its file that a subset needs, from headers and tables alone;
  * - resolves the options and makes the subset's tree, with subset_levels.c and subset_faces.c;
  * - searches for the smallest max_error whose file fits a target size;
  * - publishes the result.
  *
- * The size falls as max_error grows. Coarse files are tried first, as they are small and quick to
- * make, and all trials share the bounds of envelopes. Trials are written beside the output. The
- * best trial that fits is published, so that the published file is the one that was measured. */
+ * The size of the file falls as max_error grows. Coarse files are tried first, because they are
+ * small and quick to make. All trials share the results of the searches for bounds of envelopes.
+ * Trials are written beside the output. The finest trial that fits is published itself, so its size
+ * is the size that was measured. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -29,7 +30,7 @@
 #include "geometry/cells.h"
 #include "io/publish.h"
 
-enum { COUNTING_BUDGET = 16 << 20 };
+enum { COUNTING_BUDGET = 16 << 20 }; /* memory of each cache of chunks, in bytes */
 
 typedef struct counting {
     const ebpo_file *file;
@@ -37,22 +38,22 @@ typedef struct counting {
     ebpo_box box;
     ebpo_chunks *top; /* chunks that are read to find subtrees */
     /* a cache without chunks of the subtrees, so that all of their chunks are counted */
-    ebpo_chunks *below;
-    ebpo_hints expected;
+    ebpo_chunks *subtree_chunks;
+    ebpo_hints hints; /* collects the chunks that are needed, and counts their bytes */
     uint32_t needs;
     int last_level;
     ebpo_subset_reads *out;
     ebpo_error *error;
 } counting;
 
-static void count_subtree(counting *c, uint64_t number)
+static void count_subtree(counting *c, uint64_t index)
 {
     c->out->subtrees++;
-    ebpo_subtrees_hint(c->below, &c->expected, number, 1, c->needs, c->last_level,
+    ebpo_subtrees_hint(c->subtree_chunks, &c->hints, index, 1, c->needs, c->last_level,
                        c->needs & EBPO_NEEDS_MESH);
 }
 
-/* Counts the subtrees below a gray node whose roots' cells intersect the box. */
+/* Counts the subtrees at or below a gray node whose root's cell intersects the box. */
 static ebpo_status descend_to_subtrees(counting *c, const ebpo_node *gray)
 {
     const ebpo_subset_options *o = c->options;
@@ -78,13 +79,13 @@ static ebpo_status count_subtrees(counting *c)
     ebpo_node root;
     ebpo_status status = ebpo_chunks_make(&c->top, c->file, COUNTING_BUDGET, c->error);
     if (status == EBPO_OK)
-        status = ebpo_chunks_make(&c->below, c->file, COUNTING_BUDGET, c->error);
+        status = ebpo_chunks_make(&c->subtree_chunks, c->file, COUNTING_BUDGET, c->error);
     if (status == EBPO_OK)
         status = ebpo_chunks_root(c->top, &root, c->error);
     if (status == EBPO_OK && root.type == EBPO_GRAY)
         status = descend_to_subtrees(c, &root);
     ebpo_chunks_free(c->top);
-    ebpo_chunks_free(c->below);
+    ebpo_chunks_free(c->subtree_chunks);
     return status;
 }
 
@@ -93,7 +94,7 @@ static void count_levels(counting *c, int last)
     for (int level = 0; level <= last; level++)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
             if (ebpo_schema[id].needs & c->needs)
-                ebpo_hint_array(&c->expected, &c->file->level_array[level][id]);
+                ebpo_hint_array(&c->hints, &c->file->level_array[level][id]);
 }
 
 ebpo_status ebpo_subset_count_reads(const ebpo_file *file, const ebpo_subset_options *options,
@@ -104,7 +105,7 @@ ebpo_status ebpo_subset_count_reads(const ebpo_file *file, const ebpo_subset_opt
     counting c = { .file = file,
                    .options = options,
                    .box = ebpo_root_box(info),
-                   .expected = EBPO_HINTS_INIT(file),
+                   .hints = EBPO_HINTS_INIT(file),
                    .needs = (info->parts & options->parts) | EBPO_NEEDS_ALWAYS |
                             (info->solid ? (uint32_t)EBPO_NEEDS_SOLID : 0),
                    .last_level = options->last_level,
@@ -116,7 +117,7 @@ ebpo_status ebpo_subset_count_reads(const ebpo_file *file, const ebpo_subset_opt
         return status;
     if (c.last_level < 0 || c.last_level > deepest || c.needs & EBPO_NEEDS_MESH)
         c.last_level = deepest;
-    c.expected.counts_bytes = true;
+    c.hints.counts_bytes = true;
     bool divided = options->boxed && info->subtree_level && c.last_level > info->subtree_level;
     out->of_subtrees = info->subtree_level ? info->level[info->subtree_level].gray_count : 0;
     if (!divided && c.last_level > info->subtree_level)
@@ -125,12 +126,12 @@ ebpo_status ebpo_subset_count_reads(const ebpo_file *file, const ebpo_subset_opt
     if (divided)
         status = count_subtrees(&c);
     else
-        ebpo_hint_root(&c.expected, c.needs);
-    out->bytes = ebpo_hints_bytes(&c.expected);
+        ebpo_hint_root(&c.hints, c.needs);
+    out->bytes = ebpo_hints_bytes(&c.hints);
     return status;
 }
 
-enum { CHUNK_BUDGET = 64 << 20 };
+enum { CHUNK_BUDGET = 64 << 20 }; /* memory of the cache of chunks, in bytes */
 
 uint32_t ebpo_profile_parts(ebpo_profile profile)
 {
@@ -144,8 +145,9 @@ uint32_t ebpo_profile_parts(ebpo_profile profile)
            EBPO_PART_ATTRIBUTES | EBPO_PART_COLOURS | EBPO_PART_BORDER | EBPO_PART_SURFACE;
 }
 
-/* Checks that the box intersects the root cell and the box of an earlier subset, outside which the
- * file has nothing. Sets the kept box. */
+/* Checks that the box intersects the root cell. If the file is itself a subset for a box, also
+ * checks that the two boxes intersect, because the file has nothing outside its box. Sets the kept
+ * box. */
 static ebpo_status resolve_box(ebpo_cutting *c)
 {
     const ebpo_subset_options *o = c->options;
@@ -221,7 +223,7 @@ static void hint_cut(const ebpo_cutting *c)
     ebpo_hints e = EBPO_HINTS_INIT(c->file);
     if (c->last_level > c->from->subtree_level)
         ebpo_hint_top(c->file);
-    if (c->options->boxed || c->need || !ebpo_input_prefetches(&c->file->in))
+    if (c->options->boxed || c->tolerance || !ebpo_input_prefetches(&c->file->in))
         return;
     for (int level = 0; level <= c->last_level; level++)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
@@ -242,12 +244,12 @@ static void name_mesh(ebpo_tree *out)
 }
 
 /* Keeps the patches of the levels that are kept. With a box or a maximum error, a node may lose
- * faces, so the part is omitted. */
+ * faces, so the patches are omitted. */
 static ebpo_status cut_surface(ebpo_cutting *c)
 {
     ebpo_surface *surface = &c->out->surface;
     ebpo_status status = EBPO_OK;
-    if (!c->options->boxed && !c->need)
+    if (!c->options->boxed && !c->tolerance)
         status = ebpo_file_read_surface(c->file, 0, c->last_level, surface, c->error);
     if (surface->patch_count == 0)
         c->parts &= ~(uint32_t)EBPO_PART_SURFACE;
@@ -255,10 +257,10 @@ static ebpo_status cut_surface(ebpo_cutting *c)
     return status;
 }
 
-/* Makes the tree of the subset. `need` decides which envelopes of the file, with the kept planes,
- * are close enough; it may be NULL. */
+/* Makes the tree of the subset. `tolerance` decides which envelopes of the file, with the kept
+ * planes, are close enough; it may be NULL. */
 static ebpo_status subset_tree_within(ebpo_tree *out, const ebpo_file *file,
-                                      const ebpo_subset_options *options, ebpo_tolerance *need,
+                                      const ebpo_subset_options *options, ebpo_tolerance *tolerance,
                                       ebpo_error *error)
 {
     ebpo_cutting c = { .file = file,
@@ -266,7 +268,7 @@ static ebpo_status subset_tree_within(ebpo_tree *out, const ebpo_file *file,
                        .options = options,
                        .out = out,
                        .error = error,
-                       .need = options->max_error > 0 ? need : NULL };
+                       .tolerance = options->max_error > 0 ? tolerance : NULL };
     memset(out, 0, sizeof *out);
     ebpo_status status = resolve_options(&c);
     if (status == EBPO_OK)
@@ -288,7 +290,7 @@ static ebpo_status subset_tree_within(ebpo_tree *out, const ebpo_file *file,
     }
     bool lost_planes = c.from->parts & ~c.parts & EBPO_PART_PLANES;
     out->info.parts = c.parts;
-    if (((options->boxed || c.need) && out->info.pruned) || lost_planes)
+    if (((options->boxed || c.tolerance) && out->info.pruned) || lost_planes)
         ebpo_cut_volumes(&c);
     if (!out->info.pruned) {
         out->info.cut_levels = 0;
@@ -302,14 +304,14 @@ static ebpo_status subset_tree_within(ebpo_tree *out, const ebpo_file *file,
 ebpo_status ebpo_subset_tree(ebpo_tree *out, const ebpo_file *file,
                              const ebpo_subset_options *options, ebpo_error *error)
 {
-    ebpo_tolerance *need = NULL;
+    ebpo_tolerance *tolerance = NULL;
     ebpo_status status = EBPO_OK;
     if (options->max_error > 0)
-        status = ebpo_tolerance_open(&need, file, options->parts & EBPO_PART_PLANES,
+        status = ebpo_tolerance_open(&tolerance, file, options->parts & EBPO_PART_PLANES,
                                      options->threads, options->progress, error);
     if (status == EBPO_OK)
-        status = subset_tree_within(out, file, options, need, error);
-    ebpo_tolerance_close(need);
+        status = subset_tree_within(out, file, options, tolerance, error);
+    ebpo_tolerance_close(tolerance);
     return status;
 }
 
@@ -328,16 +330,17 @@ static ebpo_write_options subset_write_options(const ebpo_subset_options *option
 
 /* --- subsets for a target size --- */
 
-/* the search ends when the two limits of max_error differ by this factor */
-static const double precision = 1.01;
-/* below this share of the coarsest max_error, only the whole file is tried */
-static const double finest = 0x1p-40;
+/* The search ends when fitting.fits is at most this multiple of fitting.too_large. */
+static const double size_precision = 1.01;
+/* No max_error below this share of the coarsest max_error is tried. */
+static const double least_share = 0x1p-40;
 
+/* The search for the smallest max_error whose file fits the target size. */
 typedef struct fitting {
     const ebpo_file *file;
     ebpo_subset_options *options;
     ebpo_publish trial, best; /* best: the finest trial that fits so far */
-    ebpo_tolerance *need;
+    ebpo_tolerance *tolerance;
     double fits;                     /* least max_error with a file that fits */
     double too_large;                /* largest max_error with a file that is too large; 0: none */
     uint64_t fit_bytes, large_bytes; /* sizes of these two files */
@@ -345,15 +348,15 @@ typedef struct fitting {
 } fitting;
 
 /* Writes a trial file for a max_error and returns its size in *bytes. A trial that fits becomes the
- * best, as it is finer than the trials that fitted before. *pruned is set if max_error made a
- * difference. */
+ * best trial, because it is finer than the trials that fitted before. Sets *pruned to true if the
+ * file has pruned nodes. */
 static ebpo_status try_error(fitting *f, double max_error, uint64_t *bytes, bool *pruned)
 {
     ebpo_tree tree;
     struct stat st;
     ebpo_subset_options o = *f->options;
     o.max_error = max_error;
-    ebpo_status status = subset_tree_within(&tree, f->file, &o, f->need, f->error);
+    ebpo_status status = subset_tree_within(&tree, f->file, &o, f->tolerance, f->error);
     if (status != EBPO_OK)
         return status;
     *pruned = tree.info.pruned;
@@ -367,20 +370,21 @@ static ebpo_status try_error(fitting *f, double max_error, uint64_t *bytes, bool
         return status;
     *bytes = (uint64_t)st.st_size;
     if (*bytes <= f->options->target_bytes) {
-        ebpo_publish other = f->best;
+        ebpo_publish swapped = f->best;
         f->best = f->trial;
-        f->trial = other;
+        f->trial = swapped;
     }
     return EBPO_OK;
 }
 
-/* Tries files from the coarsest on, until a file is too large or nothing is pruned any more
- * (*pruned is false). `too_large` stays 0 when no file is too large. */
+/* Tries files from the coarsest on, with half the max_error each time. Ends when a file is too
+ * large, or has no pruned nodes (*pruned is false). f->too_large stays 0 if no file is too large.
+ */
 static ebpo_status bracket_size(fitting *f, bool *pruned)
 {
     uint64_t bytes = 0;
     double coarsest = 0;
-    ebpo_status status = ebpo_tolerance_max(f->need, &coarsest, f->error);
+    ebpo_status status = ebpo_tolerance_max(f->tolerance, &coarsest, f->error);
     *pruned = true;
     if (status == EBPO_OK)
         status = try_error(f, coarsest, &bytes, pruned);
@@ -393,7 +397,7 @@ static ebpo_status bracket_size(fitting *f, bool *pruned)
     f->fit_bytes = bytes;
     f->too_large = 0;
     for (double e = coarsest / 2;
-         status == EBPO_OK && *pruned && f->too_large == 0 && e > coarsest * finest; e /= 2) {
+         status == EBPO_OK && *pruned && f->too_large == 0 && e > coarsest * least_share; e /= 2) {
         status = try_error(f, e, &bytes, pruned);
         bool fits = bytes <= f->options->target_bytes;
         *(fits ? &f->fits : &f->too_large) = e;
@@ -402,9 +406,11 @@ static ebpo_status bracket_size(fitting *f, bool *pruned)
     return status;
 }
 
-/* Sizes change almost linearly between the two ends, which are at most a factor of 2 apart. The
- * guess is halfway between the linear guess and the middle, so that neither end stays for long.
- * Functions of libm are not used, as their results differ and max_error is stored in the file. */
+/* Returns the max_error to try next, between too_large and fits. These two differ by at most a
+ * factor of 2, and the size changes almost linearly between them. The result is halfway between the
+ * linear interpolation and the middle, so that both ends move within a few trials. Functions of
+ * libm are not used, because their results differ between systems and max_error is stored in the
+ * file. */
 static double next_guess(const fitting *f)
 {
     double share = .5;
@@ -415,11 +421,13 @@ static double next_guess(const fitting *f)
     return f->too_large + share * (f->fits - f->too_large);
 }
 
+/* Searches for the smallest max_error whose file fits. The best trial is in f->best. */
 static ebpo_status find_error(fitting *f)
 {
     uint64_t bytes = 0;
     bool pruned = false;
-    /* With a target of less than a quarter of the source, writing everything is hardly useful. */
+    /* The whole file is tried first only if the target is at least a quarter of the source's size,
+     * because otherwise it hardly fits. */
     bool may_fit =
              !f->options->choose_parts && f->options->target_bytes >= f->file->info.file_bytes / 4,
          tried = f->options->choose_parts || may_fit;
@@ -430,7 +438,7 @@ static ebpo_status find_error(fitting *f)
     /* Envelopes that coincide with the solid are pruned for any max_error. */
     if (status == EBPO_OK && f->too_large == 0 && pruned && !tried)
         return try_error(f, 0, &bytes, &pruned);
-    while (status == EBPO_OK && f->too_large > 0 && f->fits > precision * f->too_large) {
+    while (status == EBPO_OK && f->too_large > 0 && f->fits > size_precision * f->too_large) {
         double e = next_guess(f);
         if (!(e > f->too_large) || !(e < f->fits))
             break;
@@ -442,7 +450,8 @@ static ebpo_status find_error(fitting *f)
     return status;
 }
 
-/* Tries the profiles without pruning (max_error 0), from the largest on. */
+/* Tries the profiles without pruning (max_error 0), from the largest profile on. Sets *found if a
+ * profile fits. */
 static ebpo_status choose_parts(fitting *f, bool *found)
 {
     static const ebpo_profile order[] = { EBPO_PROFILE_FULL, EBPO_PROFILE_COLLISION,
@@ -479,11 +488,11 @@ static ebpo_status subset_fit(const ebpo_file *file, const char *path, ebpo_subs
     if (status == EBPO_OK && options->choose_parts)
         status = choose_parts(&f, &done);
     if (status == EBPO_OK && !done)
-        status = ebpo_tolerance_open(&f.need, file, options->parts & EBPO_PART_PLANES,
+        status = ebpo_tolerance_open(&f.tolerance, file, options->parts & EBPO_PART_PLANES,
                                      options->threads, options->progress, error);
     if (status == EBPO_OK && !done)
         status = find_error(&f);
-    ebpo_tolerance_close(f.need);
+    ebpo_tolerance_close(f.tolerance);
     if (status == EBPO_OK) {
         ebpo_publish_expect_input(&f.best, &file->in);
         status = ebpo_publish_commit(&f.best, error);
@@ -497,13 +506,14 @@ static ebpo_status subset_fit(const ebpo_file *file, const char *path, ebpo_subs
 
 uint64_t ebpo_subset_memory(uint64_t face_count, uint32_t leaf_faces)
 {
-    /* measured bytes per face of the mesh and its bounds, and of leaves, which take more when they
-     * are smaller */
-    enum { OF_MESH = 130, OF_LEAVES = 1800, OF_LEAVES_MAX = 430, ANYHOW = 16 << 20 };
+    /* Measured memory in bytes: per face for the mesh and its bounds (OF_MESH); per face for
+     * leaves, which take more when they are smaller (OF_LEAVES / leaf_faces, at most
+     * OF_LEAVES_MAX); and for everything else (ALWAYS). */
+    enum { OF_MESH = 130, OF_LEAVES = 1800, OF_LEAVES_MAX = 430, ALWAYS = 16 << 20 };
     double leaves = OF_LEAVES / (double)leaf_faces;
     return (uint64_t)((double)face_count *
                           (OF_MESH + (leaves < OF_LEAVES_MAX ? leaves : OF_LEAVES_MAX)) +
-                      ANYHOW);
+                      ALWAYS);
 }
 
 ebpo_status ebpo_subset(const ebpo_file *file, const char *path, const ebpo_subset_options *options,

@@ -1,8 +1,8 @@
 /* Copies the faces, vertices, maps and attributes of a subset, with new numbers. Faces and vertices
  * are numbered in the order of the specification: by a depth-first walk through the remaining
- * leaves. The arrays that map old numbers to new ones have an entry for each face or vertex of the
- * original file. For a small subset these arrays take little memory: pages that are never written
- * take no memory, and faces that are close in space have close numbers. Source:
+ * leaves. The arrays that map old numbers to new numbers have an entry for each face or vertex of
+ * the original file. For a small subset, these arrays still take little memory: pages that are
+ * never written take no memory, and faces that are close in space have close numbers. Source:
  * format-spec/README.md, section 7. */
 #include "core/strict_fp.h"
 
@@ -28,6 +28,7 @@ typedef struct numbering {
     bool no_memory;
 } numbering;
 
+/* Gives a face the next new number; returns false when out of memory. */
 static bool add_new(numbering *n, uint32_t face)
 {
     n->no_memory = !ebpo_grow(&n->old, &n->capacity, n->count + 1, sizeof *n->old);
@@ -55,26 +56,27 @@ static ebpo_status number_leaf(numbering *n, int level)
     ebpo_level *l = &n->c->out->level[level];
     uint64_t i = n->leaf[level]++, begin = n->count, kept = 0;
     uint32_t *refs = l->leaf_refs + n->read[level], *to = l->leaf_refs + n->written[level];
-    bool sorted = true, good = true;
-    for (uint64_t k = 0; k < l->leaf_ref_count[i] && good; k++) {
+    bool is_sorted = true, valid = true;
+    for (uint64_t k = 0; k < l->leaf_ref_count[i] && valid; k++) {
         uint32_t face = refs[k];
         if (n->number[face] && n->number[face] <= begin) {
             to[kept++] = n->number[face] - 1;
-            sorted = sorted && (kept == 1 || to[kept - 2] < to[kept - 1]);
+            is_sorted = is_sorted && (kept == 1 || to[kept - 2] < to[kept - 1]);
         } else {
-            good = n->number[face] == 0 && add_new(n, face);
+            valid = n->number[face] == 0 && add_new(n, face);
         }
     }
-    for (uint64_t k = 0; k < l->leaf_new[i] && good; k++)
-        good = n->number[l->leaf_first[i] + k] == 0 && add_new(n, (uint32_t)(l->leaf_first[i] + k));
+    for (uint64_t k = 0; k < l->leaf_new[i] && valid; k++)
+        valid =
+            n->number[l->leaf_first[i] + k] == 0 && add_new(n, (uint32_t)(l->leaf_first[i] + k));
     if (n->no_memory)
         return ebpo_fail_memory(n->c->error, n->count * sizeof *n->old);
-    if (!good)
+    if (!valid)
         return ebpo_fail(n->c->error, EBPO_E_FORMAT,
                          "level %d: a leaf lists a face twice, or as new although an earlier "
                          "leaf lists it; run ebpo verify",
                          level);
-    if (!sorted)
+    if (!is_sorted)
         qsort(to, kept, sizeof *to, compare_numbers);
     n->read[level] += l->leaf_ref_count[i];
     n->written[level] += kept;
@@ -102,7 +104,7 @@ static ebpo_status number_group(numbering *n, int level)
 /* --- vertices --- */
 
 typedef struct vertices {
-    uint32_t *number, *old; /* as for faces */
+    uint32_t *number, *old; /* as in `numbering`, for vertices */
     uint64_t count, capacity;
 } vertices;
 
@@ -110,30 +112,30 @@ static ebpo_status number_vertices(ebpo_cutting *c, vertices *v)
 {
     ebpo_mesh *mesh = &c->out->mesh;
     v->number = ebpo_alloc_zero(c->from->vertex_count, sizeof *v->number);
-    bool good = v->number;
-    for (uint64_t i = 0; i < 3 * mesh->face_count && good; i++) {
+    bool valid = v->number;
+    for (uint64_t i = 0; i < 3 * mesh->face_count && valid; i++) {
         uint32_t vertex = mesh->faces[i];
         if (v->number[vertex] == 0) {
-            good = ebpo_grow(&v->old, &v->capacity, v->count + 1, sizeof *v->old);
-            if (good)
+            valid = ebpo_grow(&v->old, &v->capacity, v->count + 1, sizeof *v->old);
+            if (valid)
                 v->old[v->count++] = vertex;
             v->number[vertex] = (uint32_t)v->count;
         }
         mesh->faces[i] = v->number[vertex] - 1;
     }
-    for (uint64_t i = 0; i < c->from->vertex_count && good && !c->out->info.pruned;
+    for (uint64_t i = 0; i < c->from->vertex_count && valid && !c->out->info.pruned;
          i++) /* if nothing was pruned, vertices that no face uses are kept */
         if (v->number[i] == 0) {
-            good = ebpo_grow(&v->old, &v->capacity, v->count + 1, sizeof *v->old);
-            if (good)
+            valid = ebpo_grow(&v->old, &v->capacity, v->count + 1, sizeof *v->old);
+            if (valid)
                 v->old[v->count++] = (uint32_t)i;
         }
-    return good ? EBPO_OK : ebpo_fail_memory(c->error, c->from->vertex_count * sizeof *v->number);
+    return valid ? EBPO_OK : ebpo_fail_memory(c->error, c->from->vertex_count * sizeof *v->number);
 }
 
-/* In a subset, attributes of elements other than vertices and faces are omitted, because their
- * values may refer to removed elements. Textures stay. If nothing was pruned, everything is
- * unchanged. */
+/* Reads the attributes that are not copied row by row. In a subset, attributes of elements other
+ * than vertices and faces are omitted, because their values may refer to removed elements; textures
+ * are kept. If nothing was pruned, all attributes are kept. */
 static ebpo_status begin_attributes(ebpo_cutting *c)
 {
     ebpo_read_options read = ebpo_read_threads(c->options->threads);
@@ -207,7 +209,7 @@ static ebpo_status copy_faces(ebpo_cutting *c, const numbering *n)
     return status == EBPO_OK ? copy_vertices(c) : status;
 }
 
-/* Removes the mesh with its maps and attributes, when no leaf lists a face. */
+/* Removes the mesh with its maps and attributes. Used if no leaf lists a face. */
 static void drop_lists(ebpo_cutting *c)
 {
     c->parts &= ~(uint32_t)(EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES);

@@ -1,9 +1,10 @@
-/* Cuts the levels of a subset: the nodes that remain, and their volumes. Levels are cut from the
- * root downwards; the level above determines the needed groups, so only these are read. Nodes with
- * omitted descendants become pruned nodes. All arrays of ebpo_schema are copied node by node for
- * the remaining nodes; face numbers remain those of the source until subset_faces.c renumbers them.
- * With max_error, the envelopes of a level are evaluated together. Volumes are those of envelopes
- * that are cut as in ebpo_lod_level; leaves are cut by stored planes only. */
+/* Makes the levels of a subset: the nodes that remain, and their volumes. Levels are made from the
+ * root downwards. Each level determines the groups of the next level that are needed, so only these
+ * groups are read. Nodes with omitted descendants become pruned nodes. All arrays of ebpo_schema
+ * are copied node by node for the remaining nodes. Faces keep the numbers of the source until
+ * subset_faces.c renumbers them. With max_error, the envelopes of a level are evaluated together.
+ * Volumes are those of envelopes that are cut as in ebpo_lod_level; leaves are cut by stored planes
+ * only. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -22,29 +23,30 @@
 
 /* --- copying the arrays of remaining nodes --- */
 
-/* A row for each node. */
+/* An array with one value for each node of a type. */
 typedef struct kept_column {
     const uint8_t *from;
     uint8_t *to;
     uint8_t size;
-    int8_t default_value; /* for new nodes */
+    int8_t default_value; /* value for nodes that are not in the source */
 } kept_column;
 
-/* Counts of items for each node, as u8 or u32. */
+/* The number of items of each node of a type, as u8 or u32. */
 typedef struct kept_counts {
     ebpo_per per;
     const uint8_t *counts;
     uint8_t size;
 } kept_counts;
 
-/* An array of counted items; several arrays may share their counts. */
+/* An array with the items of each node; several arrays may share the numbers of items. */
 typedef struct kept_list {
-    unsigned counts; /* index of the counts of the type */
+    unsigned counts; /* index in `count` of the node type */
     const uint8_t *from;
     uint8_t *to;
     uint8_t size;
 } kept_list;
 
+/* The copying of nodes from one level to another. */
 typedef struct kept_nodes {
     const ebpo_level *from;
     ebpo_level *to;
@@ -55,7 +57,7 @@ typedef struct kept_nodes {
         unsigned columns, counts, lists;
     } of_type[4];
     uint64_t next[4];           /* for each type: the next node of `from` */
-    uint64_t read[EBPO_COUNTS]; /* for each list: its next item */
+    uint64_t read[EBPO_COUNTS]; /* for each kind of counts: the first item of the next node */
 } kept_nodes;
 
 static ebpo_per per_of(ebpo_node_type type)
@@ -83,7 +85,7 @@ static void record_column(kept_nodes *kept, int id, int type)
                        .default_value = ebpo_schema[id].default_value };
 }
 
-/* Returns the index of the counts of a list; adds them at first use. */
+/* Returns the index of a list's counts in `count`, and adds the counts at their first use. */
 static unsigned record_counts(kept_nodes *kept, ebpo_per per, const ebpo_list_spec *list)
 {
     int type = ebpo_schema_node_type(list->of);
@@ -165,9 +167,9 @@ static uint64_t kept_items(const kept_counts *c, uint64_t rank)
 /* Adds a node to the level's count; returns the index of the node among those of its type. */
 static uint64_t grow_level(ebpo_level *level, ebpo_node_type type)
 {
-    uint64_t place = ebpo_level_count(level, per_of(type));
-    ebpo_level_set_count(level, per_of(type), place + 1);
-    return place;
+    uint64_t index = ebpo_level_count(level, per_of(type));
+    ebpo_level_set_count(level, per_of(type), index + 1);
+    return index;
 }
 
 /* Appends the items of a remaining node. */
@@ -192,9 +194,9 @@ static void kept_skip(kept_nodes *kept, ebpo_node_type type)
 /* Keeps the next node of a type. */
 static void kept_take(kept_nodes *kept, ebpo_node_type type)
 {
-    uint64_t place = grow_level(kept->to, type), rank = kept->next[type];
+    uint64_t index = grow_level(kept->to, type), rank = kept->next[type];
     for (unsigned i = 0; i < kept->of_type[type].columns; i++)
-        copy_row(&kept->of_type[type].column[i], rank, place);
+        copy_row(&kept->of_type[type].column[i], rank, index);
     for (unsigned i = 0; i < kept->of_type[type].lists; i++) {
         const kept_list *list = &kept->of_type[type].list[i];
         const kept_counts *c = &kept->of_type[type].count[list->counts];
@@ -210,38 +212,38 @@ static void kept_take(kept_nodes *kept, ebpo_node_type type)
     kept_skip(kept, type);
 }
 
-/* Adds a node that is not in `from`: default values, empty lists. */
+/* Adds a node that is not in `from`, with default values and empty lists. */
 static void kept_add(kept_nodes *kept, ebpo_node_type type)
 {
-    uint64_t place = grow_level(kept->to, type);
+    uint64_t index = grow_level(kept->to, type);
     for (unsigned i = 0; i < kept->of_type[type].columns; i++)
-        put_default(&kept->of_type[type].column[i], place);
+        put_default(&kept->of_type[type].column[i], index);
 }
 
 /* --- cutting levels --- */
 
-static const uint64_t NOTHING = UINT64_MAX;
+static const uint64_t NO_GROUP = UINT64_MAX;
 
 /* A gray node of the result. */
 typedef struct gray {
-    /* group of the node's children in the source; NOTHING: the children are omitted */
+    /* group of the node's children in the source; NO_GROUP: the children are omitted */
     uint64_t group;
     ebpo_cell cell;
 } gray;
 
+/* The work on all levels from the root downwards; `level` is the current level. */
 typedef struct descent {
     ebpo_cutting *c;
     int level;
     ebpo_level from, *to;
-    kept_nodes kept; /* copies nodes from one to the other */
-    gray *parent, *child;
-    ebpo_tolerance_node
-        *tolerance_nodes; /* gray nodes and leaves in order, with max_error; else NULL */
+    kept_nodes kept;      /* copies nodes from `from` to `to` */
+    gray *parent, *child; /* gray nodes of the result: of the level above, and of this level */
+    ebpo_tolerance_node *tolerance_nodes; /* gray nodes and leaves in order; NULL: no max_error */
     uint64_t next_tolerance_node;
     uint64_t parent_count, child_count;
-    uint64_t group;  /* current group of the result: the number of its parent among gray nodes */
-    uint64_t filled; /* groups of the result that are not empty */
-    bool goes_on;    /* some child has children */
+    uint64_t group; /* current group of the result, which is the index of its parent in `parent` */
+    uint64_t nonempty_groups; /* number of groups of this level of the result that have nodes */
+    bool has_next_level;      /* some gray node of this level has children in the result */
 } descent;
 
 static bool intersects_box(const ebpo_cutting *c, ebpo_cell cell)
@@ -251,15 +253,16 @@ static bool intersects_box(const ebpo_cutting *c, ebpo_cell cell)
 }
 
 /* Returns true if gray nodes of this level may have children in the result. */
-static bool may_go_on(const ebpo_cutting *c, int level)
+static bool may_have_children(const ebpo_cutting *c, int level)
 {
     return level < c->last_level && level + 1 < c->from->level_count;
 }
 
 /* --- runs of needed groups --- */
 
-/* Sends prefetch hints in a file with subtrees, when the parents are the roots of subtrees. The
- * hints cover all nodes below and the lists of faces, which are needed to find the faces. */
+/* Sends prefetch hints for a file with subtrees; the parents are the roots of subtrees. The hints
+ * cover all nodes below the parents, and the leaves' lists of faces, from which the faces are
+ * found. */
 static void hint_subtrees(const descent *d)
 {
     const ebpo_cutting *c = d->c;
@@ -267,7 +270,7 @@ static void hint_subtrees(const descent *d)
     uint64_t count = 0, *roots = ebpo_alloc(d->parent_count, sizeof *roots);
     uint32_t needs = c->parts | EBPO_NEEDS_ALWAYS | EBPO_NEEDS_SOLID;
     for (uint64_t i = 0; roots && i < d->parent_count; i++)
-        if (d->parent[i].group != NOTHING)
+        if (d->parent[i].group != NO_GROUP)
             roots[count++] = d->parent[i].group;
     if (count)
         ebpo_subtree_table_hint(c->chunks, roots, count);
@@ -277,6 +280,8 @@ static void hint_subtrees(const descent *d)
     free(roots);
 }
 
+/* Reads the groups of the level that are needed to d->from, and sets the groups of their gray
+ * nodes' children. */
 static ebpo_status pick_level(descent *d)
 {
     uint64_t count = 0;
@@ -288,7 +293,7 @@ static ebpo_status pick_level(descent *d)
         return ebpo_fail_memory(d->c->error, d->parent_count * sizeof *runs);
     for (uint64_t i = 0; i < d->parent_count; i++) {
         uint64_t group = d->parent[i].group;
-        if (group == NOTHING)
+        if (group == NO_GROUP)
             continue;
         if (count && runs[count - 1].group + runs[count - 1].groups == group)
             runs[count - 1].groups++;
@@ -298,8 +303,8 @@ static ebpo_status pick_level(descent *d)
     ebpo_status status =
         ebpo_pick_level(d->c->chunks, d->level, runs, count,
                         d->c->parts | EBPO_NEEDS_SOLID | EBPO_NEEDS_ALWAYS, &d->from, d->c->error);
-    /* A gray node's group of children has the node's rank in the source, which follows from the
-     * runs. */
+    /* The index of the group of a gray node's children is the gray node's rank in the source. The
+     * runs give these ranks. */
     uint64_t next = 0;
     if (status == EBPO_OK) {
         d->child = ebpo_alloc(d->from.gray_count + d->from.leaf_count, sizeof *d->child);
@@ -307,9 +312,9 @@ static ebpo_status pick_level(descent *d)
             status = ebpo_fail_memory(d->c->error,
                                       (d->from.gray_count + d->from.leaf_count) * sizeof *d->child);
     }
-    /* The groups are stored at the end of d->child, while the array is filled from the front by
-     * gray nodes and by leaves that become pruned nodes. The two never collide, as each node takes
-     * at most one entry. */
+    /* These indices are stored at the end of d->child. The front of the array is filled later, with
+     * gray nodes and with leaves that become pruned nodes. An index is never overwritten before it
+     * is read, because each node takes at most one entry. */
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
         for (uint64_t k = 0; k < runs[i].count[EBPO_GRAY]; k++)
             d->child[d->from.leaf_count + next++].group = runs[i].rank[EBPO_GRAY] + k;
@@ -332,15 +337,17 @@ static ebpo_status reserve_space(descent *d)
 
 /* --- nodes --- */
 
+/* Adds a gray node of the result; `group` is the group of its children in the source, or NO_GROUP.
+ */
 static void add_child(descent *d, ebpo_cell cell, uint64_t group)
 {
     d->child[d->child_count++] = (gray){ group, cell };
-    d->goes_on = d->goes_on || group != NOTHING;
+    d->has_next_level = d->has_next_level || group != NO_GROUP;
 }
 
-/* Returns true if the envelope is close enough to the model. To be called once for each gray node
- * and leaf, in their order. */
-static bool is_enough(descent *d)
+/* Returns true if the envelope of the next gray node or leaf is close enough to the model. Must be
+ * called once for each of these nodes, in their order. */
+static bool is_close_enough(descent *d)
 {
     return d->tolerance_nodes && d->tolerance_nodes[d->next_tolerance_node++].enough;
 }
@@ -348,9 +355,9 @@ static bool is_enough(descent *d)
 static void copy_gray(descent *d, ebpo_cell cell)
 {
     uint64_t rank = d->kept.next[EBPO_GRAY], group = d->child[d->from.leaf_count + rank].group;
-    bool enough = is_enough(d);
-    if (enough || !may_go_on(d->c, d->level) || !intersects_box(d->c, cell))
-        group = NOTHING;
+    bool close_enough = is_close_enough(d);
+    if (close_enough || !may_have_children(d->c, d->level) || !intersects_box(d->c, cell))
+        group = NO_GROUP;
     kept_take(&d->kept, EBPO_GRAY);
     add_child(d, cell, group);
 }
@@ -370,7 +377,8 @@ static void add_leaf_planes(descent *d)
     t->plane_count += count;
 }
 
-/* Sets the colour of the last gray node of the result, which was a leaf, to its parent's. */
+/* Sets the colour of the last gray node of the result, which is a leaf in the source, to the colour
+ * of its parent. */
 static void add_colour(descent *d)
 {
     ebpo_level *t = d->to;
@@ -379,21 +387,22 @@ static void add_colour(descent *d)
             d->level ? t[-1].gray_colours[d->group] : EBPO_COLOUR_OF_NOTHING;
 }
 
-/* Copies a leaf. Outside the box, the leaf becomes a pruned node with the leaf's planes. If its
- * parent's planes are close enough to the model, it becomes a pruned node without planes. */
+/* Copies a leaf. If the leaf is outside the box, it becomes a pruned node with the leaf's planes.
+ * If the parent's envelope, cut to the leaf's cell, is close enough to the model, the leaf becomes
+ * a pruned node without planes. Returns the type of the copy. */
 static ebpo_node_type copy_leaf(descent *d, ebpo_cell cell)
 {
-    bool enough = is_enough(d);
-    if (!enough && intersects_box(d->c, cell)) {
+    bool close_enough = is_close_enough(d);
+    if (!close_enough && intersects_box(d->c, cell)) {
         kept_take(&d->kept, EBPO_LEAF);
         return EBPO_LEAF;
     }
     kept_add(&d->kept, EBPO_GRAY);
-    if (!enough)
+    if (!close_enough)
         add_leaf_planes(d);
     add_colour(d);
     kept_skip(&d->kept, EBPO_LEAF);
-    add_child(d, cell, NOTHING);
+    add_child(d, cell, NO_GROUP);
     return EBPO_GRAY;
 }
 
@@ -425,20 +434,20 @@ static void copy_group(descent *d, uint64_t number, uint16_t types)
     }
 }
 
-/* --- errors of all envelopes of a level --- */
+/* --- the decision which envelopes of a level are close enough --- */
 
 static ebpo_status judge_level(descent *d)
 {
     uint64_t next = 0, count = 0;
     d->next_tolerance_node = 0;
-    if (!d->c->need)
+    if (!d->c->tolerance)
         return EBPO_OK;
     if (!(d->tolerance_nodes =
               ebpo_alloc_zero(d->from.gray_count + d->from.leaf_count, sizeof *d->tolerance_nodes)))
         return ebpo_fail_memory(d->c->error, (d->from.gray_count + d->from.leaf_count) *
                                                  sizeof *d->tolerance_nodes);
     for (uint64_t i = 0; i < d->parent_count; i++) {
-        if (d->parent[i].group == NOTHING)
+        if (d->parent[i].group == NO_GROUP)
             continue;
         uint16_t types = d->from.types[next++];
         for (unsigned octant = 0; octant < ebpo_group_octants(d->level); octant++) {
@@ -448,11 +457,11 @@ static ebpo_status judge_level(descent *d)
             ebpo_tolerance_node *node = &d->tolerance_nodes[count++];
             node->cell = child_cell(d, i, octant);
             node->required = intersects_box(d->c, node->cell) &&
-                             (type == EBPO_LEAF || may_go_on(d->c, d->level));
+                             (type == EBPO_LEAF || may_have_children(d->c, d->level));
         }
     }
-    return ebpo_tolerance_judge(d->c->need, d->tolerance_nodes, count, d->c->options->max_error,
-                                d->c->error);
+    return ebpo_tolerance_judge(d->c->tolerance, d->tolerance_nodes, count,
+                                d->c->options->max_error, d->c->error);
 }
 
 /* Cuts a level; its gray nodes are the parents of the next level. */
@@ -466,12 +475,12 @@ static ebpo_status cut_level(descent *d)
     uint64_t next = 0;
     d->to->group_count = d->parent_count;
     for (uint64_t i = 0; i < d->parent_count && status == EBPO_OK; i++) {
-        if (d->parent[i].group == NOTHING)
-            for (int k = 0; k < 8; k++) /* slots of absent children */
+        if (d->parent[i].group == NO_GROUP)
+            for (int k = 0; k < 8; k++) /* a group without nodes has eight white entries */
                 kept_add(&d->kept, EBPO_WHITE);
         else
             copy_group(d, i, d->from.types[next++]);
-        d->filled += d->to->types[i] != 0;
+        d->nonempty_groups += d->to->types[i] != 0;
     }
     ebpo_level_free(&d->from);
     free(d->tolerance_nodes);
@@ -487,28 +496,29 @@ static ebpo_status cut_level(descent *d)
 ebpo_status ebpo_cut_levels(ebpo_cutting *c)
 {
     ebpo_info *info = &c->out->info;
-    descent d = {
-        .c = c, .goes_on = true, .parent_count = 1, .parent = ebpo_alloc_zero(1, sizeof *d.parent)
-    };
+    descent d = { .c = c,
+                  .has_next_level = true,
+                  .parent_count = 1,
+                  .parent = ebpo_alloc_zero(1, sizeof *d.parent) };
     ebpo_status status = d.parent ? EBPO_OK : ebpo_fail_memory(c->error, sizeof *d.parent);
     info->level_count = 0;
-    for (; d.goes_on && status == EBPO_OK; d.level++) {
+    for (; d.has_next_level && status == EBPO_OK; d.level++) {
         if (!ebpo_progress_step(&c->options->progress, "reading levels", (uint64_t)d.level,
                                 (uint64_t)c->last_level + 1, c->error)) {
             status = EBPO_E_CANCELLED;
             break;
         }
         d.to = &c->out->level[d.level];
-        d.filled = 0;
-        d.goes_on = false;
+        d.nonempty_groups = 0;
+        d.has_next_level = false;
         status = cut_level(&d);
-        if (status == EBPO_OK && d.level && d.filled == 0) {
-            /* for a subset of a subset: no node of this level is in both subsets */
+        if (status == EBPO_OK && d.level && d.nonempty_groups == 0) {
+            /* This happens in a subset of a subset, if no node of this level is in both subsets. */
             ebpo_level_free(d.to);
             break;
         }
         if (d.level)
-            d.to[-1].pruned_count = d.to->group_count - d.filled;
+            d.to[-1].pruned_count = d.to->group_count - d.nonempty_groups;
         d.to->pruned_count = d.to->gray_count;
         d.to->gray_volume = c->from->level[d.level].gray_volume;
         d.to->leaf_volume = c->from->level[d.level].leaf_volume;
@@ -532,13 +542,14 @@ ebpo_status ebpo_cut_levels(ebpo_cutting *c)
 
 /* --- volumes of envelopes --- */
 
+/* The computation of volumes, with the index of the next group, node and plane of each level. */
 typedef struct measuring {
     ebpo_cutting *c;
     uint64_t group[EBPO_LEVELS_MAX], gray[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX],
         plane[EBPO_LEVELS_MAX], leaf_plane[EBPO_LEVELS_MAX];
 } measuring;
 
-/* Cuts the envelope by the node's own planes. */
+/* Cuts the envelope by the planes of the next node, and moves on to the node after it. */
 static void cut_envelope(ebpo_polytope *envelope, const uint8_t *counts, const uint32_t *planes,
                          uint64_t *node, uint64_t *plane)
 {
@@ -556,22 +567,22 @@ static void measure_group(measuring *m, int level, const ebpo_polytope *parent)
     uint16_t types = l->types[m->group[level]++];
     for (unsigned octant = 0; octant < ebpo_group_octants(level); octant++) {
         ebpo_node_type type = ebpo_group_type(types, octant);
-        ebpo_polytope own;
+        ebpo_polytope envelope;
         if (type != EBPO_GRAY && type != EBPO_LEAF)
             continue;
         if (parent)
-            (void)ebpo_polytope_child(parent, octant, &own);
+            (void)ebpo_polytope_child(parent, octant, &envelope);
         else
-            ebpo_polytope_cube(&own);
+            ebpo_polytope_cube(&envelope);
         if (type == EBPO_GRAY)
-            cut_envelope(&own, l->plane_counts, l->planes, &m->gray[level], &m->plane[level]);
+            cut_envelope(&envelope, l->plane_counts, l->planes, &m->gray[level], &m->plane[level]);
         else
-            cut_envelope(&own, l->leaf_plane_counts, l->leaf_planes, &m->leaf[level],
+            cut_envelope(&envelope, l->leaf_plane_counts, l->leaf_planes, &m->leaf[level],
                          &m->leaf_plane[level]);
         *(type == EBPO_GRAY ? &l->gray_volume : &l->leaf_volume) +=
-            ebpo_polytope_volume(&own) * ebpo_cell_volume(&m->c->box, level);
+            ebpo_polytope_volume(&envelope) * ebpo_cell_volume(&m->c->box, level);
         if (type == EBPO_GRAY && level + 1 < tree->info.level_count)
-            measure_group(m, level + 1, &own);
+            measure_group(m, level + 1, &envelope);
     }
 }
 

@@ -1,4 +1,4 @@
-/* Declarations shared by the files that cut subsets. */
+/* Declares what the files that make subsets share. */
 #ifndef EBPO_DERIVE_SUBSET_PARTS_H
 #define EBPO_DERIVE_SUBSET_PARTS_H
 
@@ -8,30 +8,32 @@
 #include "format/pick_rows.h"
 #include "geometry/cells.h"
 
+/* The work of making the tree of a subset. */
 typedef struct ebpo_cutting {
     const ebpo_file *file;
-    const ebpo_info *from;
+    const ebpo_info *from; /* the header of `file` */
     const ebpo_subset_options *options;
     ebpo_chunks *chunks;
-    ebpo_tolerance *need; /* decides which envelopes are close enough; NULL without max_error */
-    ebpo_box box;         /* the root cell */
-    int last_level;       /* deepest level that may be kept */
-    uint32_t parts;       /* parts that are kept and are in the file */
+    ebpo_tolerance
+        *tolerance; /* decides which envelopes are close enough; NULL without max_error */
+    ebpo_box box;   /* the root cell */
+    int last_level; /* deepest level that may be kept */
+    uint32_t parts; /* parts that are kept and are in the file */
     ebpo_tree *out;
     ebpo_error *error;
 } ebpo_cutting;
 
-/* Cuts the levels of the subset (subset_levels.c). Face numbers are those of the original file. */
+/* Makes the levels of the subset (subset_levels.c). Faces keep the numbers of the original file. */
 EBPO_MUST_USE ebpo_status ebpo_cut_levels(ebpo_cutting *c);
 
-/* Renumbers the faces that the remaining leaves list, with their vertices and maps
- * (subset_faces.c). If no faces remain, these parts are removed. */
+/* Copies the faces that the remaining leaves list, with their vertices, maps and attributes, and
+ * gives them new numbers (subset_faces.c). If no faces remain, removes these parts. */
 EBPO_MUST_USE ebpo_status ebpo_cut_faces(ebpo_cutting *c);
 
 /* Computes the volumes of the envelopes of the nodes that remain. */
 void ebpo_cut_volumes(ebpo_cutting *c);
 
-/* Makes the tree that would be written; for tests too. */
+/* Makes the tree of the subset that ebpo_subset would write. Tests call this function, too. */
 EBPO_MUST_USE ebpo_status ebpo_subset_tree(ebpo_tree *out, const ebpo_file *file,
                                            const ebpo_subset_options *options, ebpo_error *error);
 
@@ -39,7 +41,7 @@ EBPO_MUST_USE ebpo_status ebpo_subset_tree(ebpo_tree *out, const ebpo_file *file
 
 typedef struct ebpo_subset_reads {
     uint64_t subtrees;    /* subtrees that intersect the box; 0 if the file has none */
-    uint64_t of_subtrees; /* all subtrees; 0 if the file has none */
+    uint64_t of_subtrees; /* all subtrees of the file; 0 if the file has none */
     uint64_t bytes;       /* bytes of the chunks that contain the subset, each counted once */
 } ebpo_subset_reads;
 
