@@ -50,8 +50,8 @@ bool ebpo_supports_gather(ebpo_supports *s, const ebpo_builder *b, const ebpo_br
 double ebpo_supports_find(const ebpo_supports *s, const int32_t n[3], double enough,
                           double where[3]);
 
-/* As ebpo_supports_find, but the search begins with the greatest value of some known points of the
- * solid, so it is faster. */
+/* Returns the same value as ebpo_supports_find. The search is faster, because it begins with the
+ * greatest value of some known points of the solid. */
 double ebpo_supports_find_from(const ebpo_supports *s, const int32_t n[3], double enough,
                                const double (*known)[3], int known_count, double where[3]);
 

@@ -262,8 +262,9 @@ bool ebpo_leaf_query(const ebpo_accel *subtree, ebpo_accel_leaf *leaf, ebpo_cell
 EBPO_MUST_USE ebpo_status ebpo_accel_make(ebpo_accel **out, ebpo_slice *slice,
                                           const ebpo_info *info, bool with_planes, unsigned threads,
                                           ebpo_error *error);
-/* As ebpo_accel_make, within a quota. Returns EBPO_E_LIMIT if the memory, slice included, exceeded
- * the quota (NULL: no limit). Ordinary subtrees and models are refused before they exceed it. */
+/* Does the same as ebpo_accel_make, within a quota. Returns EBPO_E_LIMIT if the memory, slice
+ * included, exceeds the quota (NULL: no limit). Ordinary subtrees and models are refused before
+ * they exceed the quota. */
 EBPO_MUST_USE ebpo_status ebpo_accel_make_within(ebpo_accel **out, ebpo_slice *slice,
                                                  const ebpo_info *info, ebpo_quota *space,
                                                  bool with_planes, unsigned threads,
@@ -280,10 +281,10 @@ static inline uint64_t ebpo_accel_bytes(const ebpo_accel *whole)
  * it is made (slice included). */
 void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
                          uint64_t *peak);
-/* As ebpo_accel_estimate, but with closer bounds, which hold for ordinary models only
- * (accel_make.c). ebpo_slice_read_within and ebpo_accel_make_within refuse models that exceed them.
- * The first function is for a whole model. The second is for a subtree, which may be counted with
- * or without planes. */
+/* Set closer bounds than ebpo_accel_estimate. These bounds are valid for ordinary models only
+ * (accel_make.c); ebpo_slice_read_within and ebpo_accel_make_within refuse models that exceed them.
+ * The first function is for a whole model. The second function is for a subtree, which may be
+ * counted with or without planes. */
 void ebpo_accel_estimate_whole(const ebpo_info *info, uint64_t *keep, uint64_t *peak);
 void ebpo_accel_estimate_subtree(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
                                  uint64_t *peak);

@@ -188,9 +188,10 @@ static uint64_t kept_bytes(const sizes *t, const block_sizes *f)
            (f->bounds + 1) * (sizeof(ebpo_bound) + sizeof(ebpo_bound_cylinder));
 }
 
-/* Returns the maximum memory while an accel is made. Beside the memory that is kept, there are
- * first the mesh and the corners of blocks, then extents, then the nodes; and the layout, whose
- * arrays may be half empty, as they grow by half of their size.
+/* Returns the maximum memory while an accel is made. In addition to the memory that is kept, memory
+ * is needed first for the mesh and the corners of blocks, then for extents, then for the nodes.
+ * During all of this, memory is needed for the layout, whose arrays may have more space than they
+ * use, because they grow by half of their size.
  *
  * The layout of a refused model fits into this maximum, too. It takes 12 bytes for each block and
  * 60 for each bound (node of the hierarchy). There are at most as many blocks as faces, and 7

@@ -301,8 +301,8 @@ static void enclose_wide(const job *j, uint32_t begin, uint32_t end, cylinder *o
     out->radius2 = max_of(p.radius2);
 }
 
-/* As enclose_wide, in single precision. Coordinates are relative to the sum of two floats near the
- * middle; the difference of this sum from the middle is added at the end. */
+/* Does the same as enclose_wide, in single precision. Coordinates are relative to the sum of two
+ * floats near the middle; the difference of this sum from the middle is added at the end. */
 static void enclose_narrow(const job *j, uint32_t begin, uint32_t end, cylinder *out)
 {
     const ebpo_accel *s = j->s;

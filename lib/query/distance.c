@@ -121,12 +121,12 @@ static void nearest_polygon(const ebpo_polytope *e, const ebpo_box *box, ebpo_ce
         out->point[k] = exact.point[k];
 }
 
-/* The nodes around a point, from the root to the last one that has an envelope. */
+/* The nodes that contain a point, from the root to the last node that has an envelope. */
 typedef struct node_chain {
     ebpo_node node[EBPO_LEVELS_MAX];
     int count;
-    const ebpo_node *pruned; /* &child if it is a pruned node without envelope; else NULL */
-    ebpo_node child;         /* the node after the last one of `node` */
+    const ebpo_node *pruned; /* &child, if `child` is a pruned node without envelope; else NULL */
+    ebpo_node child;         /* the node below the last node of `node` */
 } node_chain;
 
 /* Follows the nodes that contain the cell `at` of the deepest level, down to `level` (-1: no

@@ -140,8 +140,8 @@ static void list_ahead(box_walk *w, const ebpo_box *box, ebpo_node node)
         list_ahead(w, box, ebpo_model_child(w->context->model, &node, octant));
 }
 
-/* Called before a subtree is entered. At every EBPO_HINTED_MAX-th subtree, sends prefetch hints for
- * this subtree and the following ones, EBPO_HINTED_MAX in total. */
+/* Must be called before a subtree is entered. At every EBPO_HINTED_MAX-th subtree, sends prefetch
+ * hints for EBPO_HINTED_MAX subtrees: this subtree and the following subtrees. */
 static void send_hints(box_walk *w)
 {
     uint64_t at = w->entered++, remaining = at < w->ahead_count ? w->ahead_count - at : 0;

@@ -72,8 +72,9 @@ uint64_t *ebpo_curve_order(const ebpo_box *box, const double *points, uint64_t c
 uint64_t ebpo_batch_next(ebpo_batch *batch, uint64_t i);
 
 /* Records the status of the point with turn i and index `point`. Returns EBPO_OK if the caller must
- * go on with the next point. That is also so after EBPO_E_PENDING, until all points are done for
- * whose subtrees hints were sent: one round trip then fetches their bytes. */
+ * go on with the next point. After EBPO_E_PENDING, the caller also goes on, until all points are
+ * done for whose subtrees hints were sent; so one round trip fetches the bytes of all these
+ * subtrees. */
 EBPO_MUST_USE ebpo_status ebpo_batch_note(ebpo_batch *batch, uint64_t i, uint64_t point,
                                           ebpo_status status, const ebpo_error *error);
 

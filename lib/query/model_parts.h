@@ -81,8 +81,7 @@ uint64_t ebpo_skeleton_bytes(unsigned nodes);
 /* Returns lower bounds; those beyond `limit` may be INFINITY. */
 ebpo_skeleton_bounds ebpo_skeleton_lower_bounds(const ebpo_skeleton *skeleton, const double p[3],
                                                 double limit);
-/* As ebpo_skeleton_lower_bounds, with keys instead of distances, for a far point (point_bounds.h).
- */
+/* Returns lower bounds of keys instead of distances, for a far point (point_bounds.h). */
 ebpo_skeleton_bounds ebpo_skeleton_far_bounds(const ebpo_skeleton *skeleton, const ebpo_far *far,
                                               double limit);
 

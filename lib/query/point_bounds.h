@@ -54,7 +54,8 @@ double ebpo_far_limit(const ebpo_far *far, double distance);
 double ebpo_far_lower(const ebpo_far *far, double key);
 double ebpo_far_upper(const ebpo_far *far, double key);
 
-/* As ebpo_envelope_distance and ebpo_cell_far, with keys instead of distances. */
+/* Return the same bounds as ebpo_envelope_distance and ebpo_cell_far, as keys instead of distances.
+ */
 double ebpo_far_envelope(const ebpo_far *far, const ebpo_box *box, ebpo_cell cell,
                          const uint32_t *codes, uint32_t count, double enough);
 double ebpo_far_cell_end(const ebpo_far *far, const ebpo_box *box, ebpo_cell cell);

@@ -150,7 +150,7 @@ double ebpo_rank_cell_end(const ebpo_ranking *r, ebpo_cell cell)
     return r->far ? ebpo_far_cell_end(r->far, &r->box, cell) : ebpo_cell_far(&r->box, cell, r->p);
 }
 
-/* As ebpo_rank_node; the computation may stop at any bound beyond `enough`. */
+/* Does the same as ebpo_rank_node, but may stop at any bound beyond `enough`. */
 static double bound_until(const ebpo_ranking *r, const ebpo_node *node, double parent,
                           double enough)
 {

@@ -260,8 +260,8 @@ static ebpo_status put_node(within *w, const ebpo_box *box, const ebpo_ranked *r
     return below.lower > w->band.limit ? EBPO_OK : ebpo_queue_push(w->context, &below, error);
 }
 
-/* Called before a subtree is entered. Sends prefetch hints for it and for some of the next
- * subtrees, unless an earlier call has sent the hint for it. */
+/* Sends prefetch hints for the subtree that is entered next and for some of the subtrees after it,
+ * unless an earlier call has sent the hint for this subtree. */
 static void hint_window(within *w, const ebpo_ranked *next)
 {
     const ebpo_context *c = w->context;

@@ -313,7 +313,7 @@ static ebpo_status casting_sort(casting *c, uint64_t begin, uint64_t *end, ebpo_
     return EBPO_OK;
 }
 
-/* As ray_fault, but slower. */
+/* Finds the fault of a ray that ray_fault does not accept at once. */
 static const char *ray_fault_of(const ebpo_segment *ray)
 {
     double not_finite = 0, longest = 0; /* not_finite: 0, or NaN if a coordinate is not finite */
