@@ -457,8 +457,7 @@ static ebpo_status propose_top_nodes(void *context, uint64_t first, uint64_t las
     for (uint64_t i = first; i < last && status == EBPO_OK; i++) {
         top_node *n = &t->nodes[t->base + i];
         const ebpo_build_node *node = &b->top.nodes[n->node];
-        ebpo_branch alone =
-            b->top; /* a copy with its own proposals, as other threads make theirs */
+        ebpo_branch alone = b->top; /* a copy, because other threads also make proposals */
         uint32_t detail = node->detail;
         int32_t offset[8];
         ebpo_child_windings(b, &b->top, node->child, offset);

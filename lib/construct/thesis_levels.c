@@ -34,8 +34,8 @@ bool ebpo_thesis_coalesces(const ebpo_builder *b, const ebpo_branch *s, uint32_t
     return b->thesis->coalesce == EBPO_COALESCE_MEAN ? sum < limit * leaves : sum < limit;
 }
 
-/* Cuts `own` by the chosen candidates. Clears `chosen` for candidates that cut nothing off. Returns
- * the number of the others, or -1 when out of memory. */
+/* Cuts `own` by the chosen candidates. Clears `chosen` for the candidates that cut nothing off.
+ * Returns the number of candidates that are still chosen, or -1 when out of memory. */
 static int64_t cut_by_chosen(ebpo_large_polytope *own, const ebpo_choice *choice, bool *chosen)
 {
     int64_t planes = 0;

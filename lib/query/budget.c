@@ -176,8 +176,9 @@ static ebpo_slice_size whole_size(const ebpo_info *info)
     return size;
 }
 
-/* Returns true if the budget holds the top of `top` bytes. The levels may take a quarter of the
- * budget, and the caps of a surface (faces that close holes) half of it. */
+/* Returns true if the budget is sufficient for the top of the tree, which takes `top` bytes. The
+ * levels may take a quarter of the budget, and the caps of a surface (faces that close holes) half
+ * of the budget. */
 static bool top_fits(const ebpo_info *info, const ebpo_model_options *o, uint64_t budget,
                      uint64_t top)
 {

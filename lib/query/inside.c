@@ -730,8 +730,8 @@ static const ebpo_accel *find_held(const inside_query *a, uint32_t *entry, int *
     return below && ebpo_context_has_pinned(c, ebpo_entry_value(*entry)) ? c->pinned : NULL;
 }
 
-/* Decides p if the context holds all data that p needs: then envelopes save nothing, because only
- * the faces of a leaf take time. Returns false if it does not hold them. */
+/* Decides p if the context has all data that p needs in memory. Then envelopes would save nothing,
+ * because only the faces of a leaf take time. Returns false if some data is missing. */
 static bool result_in_memory(inside_query *a, ebpo_inside_result *out, ebpo_status *status,
                              ebpo_error *error)
 {

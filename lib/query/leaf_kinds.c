@@ -2,8 +2,8 @@
  *
  * The first queries find a cell face that no face intersects and the boxes of the leaf's list.
  * After many queries the leaf is classified: one plane, two planes, convex or concave (then the
- * signs of planes decide), or general (accel.h). One thread does that, while the others treat the
- * leaf as a general one. Kinds never change results.
+ * signs of planes decide), or general (accel.h). While one thread classifies the leaf, the other
+ * threads treat it as general. Kinds never change results.
  *
  * Proof that the planes of some leaves decide: a point is below a plane if n . xi < d (leaf_plane).
  * Let P be the set of points of the cell below all planes of the leaf's faces. Suppose that every

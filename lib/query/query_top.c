@@ -178,7 +178,7 @@ static ebpo_status add_level(reading *r, int number, const ebpo_level *level, ui
     return status;
 }
 
-/* Shrinks an array to `count` items. Without memory, the array stays as it is. */
+/* Shrinks an array to `count` items. When out of memory, does not change the array. */
 static void shrink_array(void *array, uint64_t *capacity, uint64_t count, size_t size)
 {
     void **at = array, *shrunk = *at ? realloc(*at, (count ? count : 1) * size) : NULL;

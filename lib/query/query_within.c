@@ -73,8 +73,8 @@ static int compare_faces(const void *x, const void *y)
     return sign ? sign : a->file_face < b->file_face ? -1 : 1;
 }
 
-/* Sorts the candidates, removes duplicates, and keeps the first band->most. If there are as many,
- * lowers the limit to the distance of the last one. */
+/* Sorts the candidates, removes duplicates, and keeps at most band->most candidates, the nearest.
+ * If band->most candidates are kept, lowers the limit to the distance of the last of them. */
 static void near_band_settle(near_band *band)
 {
     uint64_t kept = 0;
@@ -92,8 +92,8 @@ static void near_band_settle(near_band *band)
 
 /* --- faces --- */
 
-/* Adds a face to the candidates. When there are about twice as many as the band can have, settles
- * the band. */
+/* Adds a face to the candidates. When there are about twice as many candidates as the band can
+ * have, calls near_band_settle. */
 static void add_face(near_band *band, const near_face *face)
 {
     enum { SPARE_LEAST = 64 };

@@ -1,8 +1,9 @@
 /* The kernel that finds the hits of a ray: it walks through the hierarchy over faces of one accel
  * (acceleration structure of a subtree) and filters eight faces at a time, in single precision.
  *
- * The kernel drops only faces that the ray certainly misses, or hits beyond the limit. A certain
- * hit also holds in exact arithmetic. rays.c tests the other faces exactly.
+ * The kernel drops only faces that the ray certainly misses, or hits beyond the limit. If the
+ * kernel reports a certain hit, the face is also hit in exact arithmetic. rays.c tests the other
+ * faces exactly.
  *
  * Compiled for several instruction sets with the same results (core/cpu.h). Error bounds:
  * docs/develop/bounds.md. */

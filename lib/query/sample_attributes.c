@@ -21,7 +21,7 @@
 /* A requested column of an attribute. */
 typedef struct sampled {
     const ebpo_attribute *head; /* attribute of the file */
-    unsigned array, column;     /* index of the attribute in the file; column of it */
+    unsigned array, column;     /* index of the attribute in the file; index of its column */
     bool of_vertices;           /* the attribute belongs to vertices; false: to faces */
     bool owner;                 /* this item frees `values`, which later items may use, too */
     ebpo_attribute_values values;
