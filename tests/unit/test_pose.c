@@ -222,7 +222,7 @@ static void check_vertex(const ebpo_block_posing *p, const ebpo_posed_block *pos
         double off = fabs((double)posed->x[k][i] - (world[k] - posed->base[k]) * p->unit);
         ck_assert_msg(off <= (double)posed->error, "off by %g, stated %g", off,
                       (double)posed->error);
-        ck_assert(fabsf(posed->x[k][i]) <= posed->reach);
+        ck_assert(fabsf(posed->x[k][i]) <= posed->extent);
     }
 }
 
@@ -271,7 +271,8 @@ START_TEST(test_posed_blocks_are_within_error_bound)
             origin[k] = posed.base[k] + away * reference_uniform(&state);
         check_block(&p, &posed, block, origin, vertices);
         check_block(&p, &wide, block, origin, vertices);
-        ck_assert((double)posed.error <= 0x1p-18 * pose.scale * p.unit * size + (double)p.doubt);
+        ck_assert((double)posed.error <=
+                  0x1p-18 * pose.scale * p.unit * size + (double)p.uncertainty);
     }
 }
 END_TEST

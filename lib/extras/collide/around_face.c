@@ -1,12 +1,12 @@
-/* Finds on which sides of a posed face each of two models is. The face, which belongs to one of
- * them, is cut into pieces along the faces of both models that intersect it (face_pieces.h). At a
- * point of each piece, the winding numbers of both models show which sides of the piece are in each
- * model.
+/* Finds which sides of a posed face are in the interior of each of two models. The face belongs to
+ * one of these models, and is cut into pieces along the faces of both models that intersect it
+ * (face_pieces.h). At a point of each piece, the winding numbers of both models show which sides of
+ * the piece are in each model.
  *
- * All decisions are exact: points are fractions, and posed coordinates are the doubles that
- * geometry/pose.h defines. Only the faces near a point are looked up in the models' hierarchies, so
- * a model may be loaded subtree by subtree. Proofs: docs/develop/collision.md, "Relation of two
- * models". */
+ * All decisions are exact: coordinates of points are fractions, and posed coordinates are the
+ * doubles that geometry/pose.h defines. Only the faces near a point are read from the models'
+ * hierarchies, so a model may be loaded subtree by subtree. Proofs: docs/develop/collision.md,
+ * "Relation of two models". */
 #include "core/strict_fp.h"
 
 #include "extras/collide/around_face.h"
@@ -22,15 +22,15 @@
 #include "geometry/predicates.h"
 #include "geometry/level_nodes.h"
 
-ebpo_status ebpo_two_models_begin(ebpo_two_models *two, ebpo_pair_faces *places, ebpo_error *error)
+ebpo_status ebpo_two_models_begin(ebpo_two_models *two, ebpo_pair_faces *lookup, ebpo_error *error)
 {
-    const ebpo_collision *q = places->collision;
+    const ebpo_collision *q = lookup->collision;
     ebpo_status status = EBPO_OK;
     *two = (ebpo_two_models){ 0 };
     for (int i = 0; i < 2 && status == EBPO_OK; i++) {
-        int caller = (int)q->turned ^ i;
+        int caller = (int)q->swapped ^ i;
         const ebpo_pose *pose = caller ? &q->options.pose_b : &q->options.pose_a;
-        two->faces[i] = &places->side[caller];
+        two->faces[i] = &lookup->side[caller];
         two->solid[i] = q->model[i]->info->solid;
         two->rule[i] = q->model[i]->info->rule;
         status = ebpo_posed_solid_make(&two->model[i], q->model[i], pose, error);
@@ -65,25 +65,27 @@ uint64_t ebpo_two_models_loads(const ebpo_two_models *two)
 ebpo_status ebpo_two_models_face(const ebpo_two_models *two, int m, uint64_t face, double out[3][3],
                                  bool *has_area, ebpo_error *error)
 {
-    double own[3][3];
-    ebpo_status status = ebpo_faces_by_number_get(two->faces[m], face, own, error);
+    double unposed[3][3];
+    ebpo_status status = ebpo_faces_by_number_get(two->faces[m], face, unposed, error);
     for (int k = 0; k < 3 && status == EBPO_OK; k++)
-        ebpo_posing_apply(&two->model[m].posing, own[k], out[k]);
+        ebpo_posing_apply(&two->model[m].posing, unposed[k], out[k]);
     *has_area = status == EBPO_OK && !ebpo_zero_area(out[0], out[1], out[2]);
     return status;
 }
 
 /* --- faces that intersect a face --- */
 
+/* The cutting of a face by other faces. */
 typedef struct cut_search {
     const ebpo_two_models *two;
     ebpo_face_cuts *pieces;
-    double low[3], high[3]; /* box of the face */
+    double low[3], high[3]; /* box of the cut face */
     int model;              /* model whose faces are visited */
-    uint64_t own;           /* index of the cut face, which does not cut itself; EBPO_NO_FACE: the
-                             * face is of the other model */
+    uint64_t cut_index;     /* index of the cut face, which does not cut itself; EBPO_NO_FACE: the
+                             * cut face belongs to the other model */
 } cut_search;
 
+/* Returns true if the box of the face t intersects the box of the cut face. */
 static bool near_box(const cut_search *c, const double t[3][3])
 {
     for (int k = 0; k < 3; k++)
@@ -93,13 +95,13 @@ static bool near_box(const cut_search *c, const double t[3][3])
     return true;
 }
 
-/* Adds the cuts of faces that intersect the box of the face. */
+/* Adds the cuts of those triangles whose boxes intersect the box of the cut face. */
 static bool add_cuts(void *user, const ebpo_triangles *triangles)
 {
     const cut_search *c = user;
     for (uint64_t i = 0; i < triangles->count; i++) {
         double t[3][3];
-        if (triangles->file_faces[i] == c->own)
+        if (triangles->file_faces[i] == c->cut_index)
             continue;
         for (int k = 0; k < 3; k++)
             ebpo_posing_apply(&c->two->model[c->model].posing, triangles->corners[i][k], t[k]);
@@ -123,7 +125,7 @@ static ebpo_status cut_face(ebpo_two_models *two, ebpo_face_cuts *pieces, int m,
         double low[3], high[3];
         ebpo_unpose_box(&two->model[i], c.low, c.high, low, high);
         c.model = i;
-        c.own = i == m ? face : EBPO_NO_FACE;
+        c.cut_index = i == m ? face : EBPO_NO_FACE;
         status = ebpo_triangles_in_box(two->context[i], low, high, add_cuts, &c, error);
     }
     return status;
@@ -131,17 +133,18 @@ static ebpo_status cut_face(ebpo_two_models *two, ebpo_face_cuts *pieces, int m,
 
 /* --- winding numbers --- */
 
+/* A visit of all pieces of a face. */
 typedef struct piece_visit {
     ebpo_two_models *two;
     const ebpo_face_cuts *pieces;
-    int m;
+    int m; /* model of the face */
     ebpo_around_fn visit;
     void *user;
-    bool only_at_target;
+    bool only_at_target; /* visit only pieces that contain the target of `pieces` */
 } piece_visit;
 
-/* Returns true if the normal points towards x + (d0, d1, d2), the shifted point of
- * ebpo_exact_winding. */
+/* Returns true if a point of the face, shifted as in ebpo_exact_winding, is in front of the face.
+ */
 static bool shift_is_front(const ebpo_face_cuts *f)
 {
     int sign = 0;
@@ -182,8 +185,8 @@ static ebpo_status visit_around_piece(void *user, const ebpo_piece *piece, ebpo_
     return status;
 }
 
-/* Visits the pieces. When the visitor needs no more, visit_around_piece returns EBPO_E_CANCELLED,
- * which is not a failure. */
+/* Visits the pieces. visit_around_piece returns EBPO_E_CANCELLED if the visitor needs no more
+ * pieces, which is not a failure. */
 static ebpo_status visit_pieces(piece_visit *l, ebpo_face_cuts *pieces, ebpo_error *error)
 {
     ebpo_status status = ebpo_face_pieces_visit(pieces, visit_around_piece, l, error);
@@ -206,7 +209,7 @@ ebpo_status ebpo_visit_around_face(ebpo_two_models *two, int m, uint64_t face, e
 
 /* --- points of the models with their boundaries --- */
 
-/* Faces of a model near a point. */
+/* Faces of a model near a point, by their indices in the file. */
 typedef struct faces_at {
     uint64_t *face;
     uint64_t count, capacity;
@@ -238,10 +241,11 @@ static ebpo_status find_faces(ebpo_two_models *two, int m, const mpq_t x[3], fac
     return status;
 }
 
+/* The query if model m contains a point, by the faces at this point. */
 typedef struct face_query {
     ebpo_two_models *two;
     int m;
-    bool in; /* near the point, the model is on at least one side of a piece */
+    bool in; /* the model contains the point: at it, a side of a piece is in the model */
     bool on; /* a face with an area contains the point */
 } face_query;
 
@@ -252,8 +256,8 @@ static bool record_side(void *user, const ebpo_around *around)
     return !a->in;
 }
 
-/* Examines one face that may contain the point x: sets a->on if it does, and a->in if the model is
- * also on a side of it there. */
+/* Examines a face that may contain the point x. Sets a->on if the face contains the point, and
+ * a->in if, in addition, a side of the face at this point is in the model. */
 static ebpo_status query_face(face_query *a, uint64_t face, const mpq_t x[3], ebpo_error *error)
 {
     double t[3][3];
@@ -294,7 +298,7 @@ static ebpo_status has_point(ebpo_two_models *two, int m, const mpq_t x[3], bool
 
 typedef struct common_point_search {
     ebpo_two_models *two;
-    bool *has;
+    bool *has; /* output: both models contain a visited vertex */
 } common_point_search;
 
 /* Tests a vertex of the pieces; ends the visits with EBPO_E_CANCELLED if both models contain it. */

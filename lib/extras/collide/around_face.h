@@ -1,5 +1,6 @@
-/* Finds, exactly, on which sides of a posed face each of two models is. For one thread at a time.
- */
+/* Finds, exactly, which sides of a posed face are in the interior of each of two models. Other
+ * faces cut the face into pieces (face_pieces.h), and each piece has separate results. For one
+ * thread at a time. */
 #ifndef EBPO_COLLIDE_AROUND_FACE_H
 #define EBPO_COLLIDE_AROUND_FACE_H
 
@@ -12,15 +13,15 @@ typedef struct ebpo_two_models {
     ebpo_posed_solid model[2];
     ebpo_context *context[2];
     ebpo_faces_by_number *faces[2];
-    bool solid[2];
-    ebpo_rule rule[2];
+    bool solid[2];         /* false: the model is a surface, which has no interior */
+    ebpo_rule rule[2];     /* which winding numbers are inside the solid */
     ebpo_face_cuts pieces; /* cuts of the examined face */
-    ebpo_face_cuts others; /* cuts of faces around one of its vertices */
+    ebpo_face_cuts others; /* cuts of other faces, around a vertex of the examined face */
 } ebpo_two_models;
 
-/* Prepares both models of the query places->collision. Faces are looked up in `places`, which must
- * live longer than `two`. Fails with the errors of posing and of contexts. */
-EBPO_MUST_USE ebpo_status ebpo_two_models_begin(ebpo_two_models *two, ebpo_pair_faces *places,
+/* Prepares both models of the query lookup->collision. `lookup` must live longer than `two`, which
+ * reads faces through it. Fails with the errors of ebpo_posed_solid_make and ebpo_context_new. */
+EBPO_MUST_USE ebpo_status ebpo_two_models_begin(ebpo_two_models *two, ebpo_pair_faces *lookup,
                                                 ebpo_error *error);
 /* Releases the memory of subtrees until the next query. */
 void ebpo_two_models_let_go(ebpo_two_models *two);
@@ -31,17 +32,18 @@ void ebpo_two_models_end(ebpo_two_models *two);
 /* Sides of a face: its normal points to the front. */
 enum { EBPO_SIDE_FRONT = 1, EBPO_SIDE_BACK = 2, EBPO_SIDE_BOTH = 3 };
 
-/* What is around a piece of a face. */
+/* The sides of a piece of a face. */
 typedef struct ebpo_around {
     /* [model] bits of the sides of the piece that are in the interior of the solid. For a surface:
      * EBPO_SIDE_BOTH if the surface contains the piece, otherwise 0. */
     unsigned in[2];
 } ebpo_around;
 
-/* Called for each piece; returns false to stop. The function that calls it then succeeds. */
+/* Called for each piece. Returns false to stop; ebpo_visit_around_face then returns EBPO_OK. */
 typedef bool (*ebpo_around_fn)(void *user, const ebpo_around *around);
 
-/* Computes the posed corners of a face of model m. *has_area is false if they are on one line. */
+/* Sets `out` to the posed corners of a face of model m. *has_area is false if the corners are on
+ * one line. */
 EBPO_MUST_USE ebpo_status ebpo_two_models_face(const ebpo_two_models *two, int m, uint64_t face,
                                                double out[3][3], bool *has_area, ebpo_error *error);
 
@@ -51,8 +53,8 @@ EBPO_MUST_USE ebpo_status ebpo_visit_around_face(ebpo_two_models *two, int m, ui
                                                  ebpo_around_fn visit, void *user,
                                                  ebpo_error *error);
 
-/* Sets *has to true if a face of model m has a point that belongs to both models, each with its
- * boundary. */
+/* Sets *has to true if the face of model m has a point that belongs to both models. A solid
+ * includes its boundary. */
 EBPO_MUST_USE ebpo_status ebpo_face_has_common_point(ebpo_two_models *two, int m, uint64_t face,
                                                      bool *has, ebpo_error *error);
 

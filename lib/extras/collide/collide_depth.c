@@ -2,11 +2,12 @@
  * a point of the surface inside the solid to the boundary of the solid.
  *
  * A branch-and-bound search visits the cells of the surface's octree, then faces and parts of
- * faces. Each of them is enclosed in a ball; the distance of the ball's centre from the solid's
- * boundary bounds the depth of its points. A heap returns the part that may be deepest. The search
- * ends when no part can be deeper than the best point plus the tolerance, or at the deadline; lo
- * and hi then bound the depth. The steps do not depend on what is in memory. A search runs in one
- * thread. Bounds: docs/develop/collision.md, "Depth". */
+ * faces. A ball encloses each cell, face or part; the distance of the ball's centre from the
+ * solid's boundary bounds the depth of all points in the ball. A heap returns the part that may be
+ * deepest. The search ends when no part can be deeper than the best point plus the tolerance, or at
+ * the deadline; lo and hi then bound the depth. The order of the search does not depend on which
+ * subtrees are in memory. A search runs in one thread. Bounds: docs/develop/collision.md, "Depth".
+ */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -30,9 +31,9 @@
 
 /* --- the search: balls, faces and parts of faces --- */
 
-/* A part of a face. */
+/* A triangle that is a part of a face. */
 typedef struct depth_part {
-    double most;         /* no point of the part is deeper */
+    double most;         /* upper bound of the depth of its points */
     double corner[3][3]; /* in world coordinates */
 } depth_part;
 
@@ -40,46 +41,48 @@ typedef struct depth_search {
     /* Input: */
     ebpo_context *from; /* context of the surface's model */
     const ebpo_posing *posing;
-    double reach; /* greatest size of the surface's posed coordinates */
+    double
+        max_coordinate; /* upper bound of the absolute values of the surface's posed coordinates */
     const ebpo_posed_solid *solid;
     ebpo_context *context; /* separate context of the solid's model */
     double tolerance;
-    uint64_t late; /* deadline, a time of ebpo_clock; UINT64_MAX: none */
+    uint64_t deadline; /* deadline, a time of ebpo_clock; UINT64_MAX: none */
     const ebpo_progress *progress;
     /* Output: lo <= depth <= hi. */
     double lo, hi;
     /* Initially 0: */
     double dropped_max;    /* greatest `most` of the dropped parts */
-    double position_error; /* bound of how far rounding moves points */
-    depth_part *part;      /* a heap, the greatest `most` first */
+    double position_error; /* greatest distance by which rounding moves points */
+    depth_part *part;      /* [count] a heap; part[0] has the greatest `most` */
     uint64_t count, capacity, evaluations;
 } depth_search;
 
 /* A ball that contains a part of the surface. */
 typedef struct depth_ball {
     double radius; /* all points of the part are within this distance of the centre */
-    double far;    /* at least one point is certainly within this distance; INFINITY: unknown */
+    double far;    /* at least one point of the part is within this distance of the centre;
+                    * INFINITY: unknown */
     /* Output: */
     bool open;   /* the part may have the deepest point */
-    double most; /* bound of its depth */
+    double most; /* if `open`: upper bound of the depth of the part's points */
 } depth_ball;
 
 /* --- one point --- */
 
-/* Bounds the depth of the point w in the solid by *lo .. *hi; the depth is negative outside.
- * *rounding: how far w may be from its exact position. */
+/* Bounds the depth of the point w in the solid by *lo .. *hi; the depth is negative outside the
+ * solid. *rounding: bound of the distance of w from its exact position. */
 static ebpo_status depth_at(depth_search *s, const double w[3], double *lo, double *hi,
                             double *rounding, ebpo_error *error)
 {
-    double p[3], doubt, scale = s->solid->posing.scale;
+    double p[3], uncertainty, scale = s->solid->posing.scale;
     ebpo_distance_result r;
-    ebpo_unpose(s->solid, w, p, &doubt);
-    *rounding = doubt * scale;
+    ebpo_unpose(s->solid, w, p, &uncertainty);
+    *rounding = uncertainty * scale;
     s->evaluations++;
     ebpo_status status = ebpo_distance(s->context, p, NULL, &r, error);
     if (status != EBPO_OK)
         return status;
-    double size = fabs(r.distance), off = 2 * doubt + 0x1p-50 * size;
+    double size = fabs(r.distance), off = 2 * uncertainty + 0x1p-50 * size;
     *hi = (size + off) * scale;
     *lo = -*hi;
     if (!(size > off)) /* the rounded point may be on either side of a face */
@@ -91,17 +94,17 @@ static ebpo_status depth_at(depth_search *s, const double w[3], double *lo, doub
     return EBPO_OK;
 }
 
-/* Bounds the depth of a triangle by its distance from one face: the face that was nearest to the
- * last query point. No point of the triangle inside the solid is deeper than its distance from that
- * face. The distance is convex, so its greatest value at the corners is a bound. */
+/* Returns an upper bound of the depth of a triangle's points: their greatest distance from the face
+ * that was nearest to the last query point. No point inside the solid is deeper than its distance
+ * from any face of the solid. The distance is convex, so it is greatest at a corner. */
 static double max_at_corners(const depth_search *s, const double corner[3][3])
 {
-    double most = 0, p[3], doubt;
+    double most = 0, p[3], uncertainty;
     for (int i = 0; i < 3; i++) {
         ebpo_distance_bounds d;
-        ebpo_unpose(s->solid, corner[i], p, &doubt);
+        ebpo_unpose(s->solid, corner[i], p, &uncertainty);
         ebpo_triangle_distance_bounds(p, (const double(*)[3])s->context->warm_triangle, &d);
-        most = fmax(most, (d.hi + 2 * doubt) * s->solid->posing.scale + s->position_error);
+        most = fmax(most, (d.hi + 2 * uncertainty) * s->solid->posing.scale + s->position_error);
     }
     return most * (1 + 0x1p-50);
 }
@@ -124,12 +127,12 @@ static bool push_part(depth_search *s, const depth_part *part)
 
 static bool is_search_late(const depth_search *s)
 {
-    return s->late != UINT64_MAX && ebpo_clock() >= s->late;
+    return s->deadline != UINT64_MAX && ebpo_clock() >= s->deadline;
 }
 
-/* Returns true if a part with the bound `most` need not be divided, and records its bound. If only
- * rounding makes its depth uncertain, the part is not divided: parts of faces that are on other
- * faces would be divided without end. */
+/* Returns true if a part with the bound `most` need not be divided, and records the bound. A part
+ * whose depth is uncertain only because of rounding is not divided, because the search would divide
+ * faces that are on other faces without end. */
 static bool is_settled(depth_search *s, double most, double rounding)
 {
     if (most > s->lo + s->tolerance + 4 * (rounding + s->position_error))
@@ -138,7 +141,7 @@ static bool is_settled(depth_search *s, double most, double rounding)
     return true;
 }
 
-/* Returns a bound of the depth in a ball from the bound `hi` of the depth at its centre. */
+/* Returns an upper bound of the depth in a ball. hi: upper bound of the depth at its centre. */
 static double max_within(double hi, double radius)
 {
     return (hi + radius) * (hi + radius > 0 ? 1 + 0x1p-50 : 1);
@@ -161,8 +164,8 @@ static ebpo_status query_ball(depth_search *s, const double middle[3], depth_bal
     return EBPO_OK;
 }
 
-/* Adds a part to the heap if it may have the deepest point. All its points are within `radius` of
- * the centre, which is one of them. */
+/* Adds a part to the heap if it may have the deepest point. `centre` is a point of the part, and
+ * all points of the part are within `radius` of it. */
 static ebpo_status offer_part(depth_search *s, depth_part *part, const double centre[3],
                               double radius, ebpo_error *error)
 {
@@ -207,7 +210,7 @@ static ebpo_status offer_face(depth_search *s, const double corner[3][3], ebpo_e
     return offer_triangle(s, corner[0], corner[1], corner[2], error);
 }
 
-/* Computes the middle between corner k and the next one. */
+/* Computes the middle of edge k, from corner k to the next corner. */
 static void middle_of(const depth_part *p, int k, double out[3])
 {
     for (int i = 0; i < 3; i++)
@@ -225,8 +228,9 @@ static ebpo_status halve_triangle(depth_search *s, const depth_part *p, int k, e
                              : status;
 }
 
-/* Divides the triangle into four at the middles of its edges, or a long triangle into two: its
- * quarters would be long, too, and their number would grow without limit near another face. */
+/* Divides the triangle into four at the middles of its edges. Divides a long triangle into two,
+ * because its quarters would be long, too, and their number would grow without limit near another
+ * face. */
 static ebpo_status divide_triangle(depth_search *s, const depth_part *p, ebpo_error *error)
 {
     double middle[3][3], length[3];
@@ -246,7 +250,7 @@ static ebpo_status divide_triangle(depth_search *s, const depth_part *p, ebpo_er
     return status;
 }
 
-/* Returns true if no waiting part is deeper than the known depth plus the tolerance. */
+/* Returns true if no part in the heap is deeper than the best known depth plus the tolerance. */
 static bool is_search_done(const depth_search *s)
 {
     return s->count == 0 || !(s->part[0].most > s->lo + s->tolerance);
@@ -262,8 +266,8 @@ static ebpo_status divide_next(depth_search *s, ebpo_error *error)
 /* --- cells of the octree --- */
 
 /* Cells are visited level by level, and in each level in file order. So a subtree is loaded about
- * once for each level that matters. Neither the cells nor the final interval depend on what is in
- * memory. */
+ * once for each of its levels that has open cells. Neither the visited cells nor the final interval
+ * depend on which subtrees are in memory. */
 
 /* A cell that may contain the deepest point. */
 typedef struct open_cell {
@@ -350,7 +354,7 @@ static ebpo_status offer_cell(level_search *g, ebpo_cell cell, ebpo_error *error
     ebpo_posed_cell(&g->at, cell, corner);
     for (int k = 0; k < 3; k++)
         middle[k] = corner[0][k] / 2 + corner[7][k] / 2;
-    if (!g->at.model->info->pruned) /* the cell contains a point of a face, or is near one */
+    if (!g->at.model->info->pruned) /* a point of a face is in the cell or near it */
         ball.far = ball.radius + EBPO_FACE_MARGIN * diagonal;
     open_cell open = { .cell = cell };
     ebpo_status status = query_ball(s, middle, &ball, error);
@@ -424,8 +428,8 @@ static void swap_levels(level_search *g)
     g->next_capacity = capacity;
 }
 
-/* Visits the cells, and adds all faces that may have the deepest point to the heap. Fails with the
- * errors of run_depth_search. */
+/* Visits the cells level by level, and adds to the heap all faces that may have the deepest
+ * point. */
 static ebpo_status offer_cells(depth_search *s, ebpo_error *error)
 {
     level_search g = { .s = s, .at = { .model = s->from->model, .posing = *s->posing } };
@@ -454,7 +458,7 @@ static ebpo_status search_parts(depth_search *s, ebpo_error *error)
  * of ebpo_distance. */
 static ebpo_status run_depth_search(depth_search *s, ebpo_error *error)
 {
-    s->position_error = 0x1p-46 * s->reach;
+    s->position_error = 0x1p-46 * s->max_coordinate;
     s->lo = 0;
     ebpo_status status = search_parts(s, error);
     s->hi = fmax(s->lo, s->dropped_max);
@@ -467,8 +471,8 @@ static ebpo_status run_depth_search(depth_search *s, ebpo_error *error)
 
 /* --- the query --- */
 
-/* Computes how deep the surface of one model is in the other model, which is the caller's A (solid:
- * 0) or B (solid: 1). */
+/* Computes how deep the surface of one model is in the other model. solid: 0: the other model is
+ * the caller's A, 1: it is B. */
 static ebpo_status depth_in(const ebpo_collision *q, int solid, double tolerance,
                             ebpo_value_bounds *out, ebpo_error *error)
 {
@@ -481,12 +485,12 @@ static ebpo_status depth_in(const ebpo_collision *q, int solid, double tolerance
     if (status != EBPO_OK)
         return status;
     depth_search s = { .from = c->context[!solid],
-                       .posing = &q->posing[solid == q->turned].posing,
-                       .reach = q->reach,
+                       .posing = &q->posing[solid == q->swapped].posing,
+                       .max_coordinate = q->max_coordinate,
                        .solid = &posed,
                        .context = c->context[solid],
                        .tolerance = tolerance,
-                       .late = q->late,
+                       .deadline = q->deadline,
                        .progress = &q->options.progress };
     status = run_depth_search(&s, error);
     if (status == EBPO_OK)
@@ -519,7 +523,7 @@ ebpo_status ebpo_collide_depth(ebpo_collider *c, const ebpo_collide_options *opt
     ebpo_collision q;
     if (!(tolerance > 0 && tolerance < INFINITY))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "the depth's tolerance must be greater than 0 and finite");
+                         "expected a tolerance of the depth that is greater than 0 and finite");
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status != EBPO_OK)
         return status;

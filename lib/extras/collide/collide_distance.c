@@ -1,10 +1,10 @@
 /* Computes the distance of two posed models, and a pair of faces at that distance.
  *
  * The kernels of gap_walk_kernels.c walk through pairs of nodes in floats and drop pairs that are
- * certainly farther apart than the limit. The remaining pairs wait and are decided here: in doubles
- * with error bounds (ebpo_triangles_distance_bounds), and exactly where the bounds overlap. Of
- * several pairs at the same distance, the first in file order is returned, so the result is the
- * same with every processor and number of threads.
+ * certainly farther apart than the limit. They store the remaining pairs of faces as waiting pairs,
+ * which are decided here: in doubles with error bounds (ebpo_triangles_distance_bounds), and
+ * exactly where the bounds overlap. Of several pairs at the same distance, the first in file order
+ * is returned, so the result is the same with every processor and number of threads.
  *
  * Partly loaded models are searched in pairs of subtrees, in the order of the gaps of their
  * envelopes. A subtree is loaded only if its envelope is nearer than the best pair so far. A
@@ -28,10 +28,10 @@
 #include "extras/collide/subtree_search.h"
 #include "geometry/triangle_pair.h"
 
-/* Two faces, with coordinates as in their files (`own`) and at their poses (`corner`). */
+/* Two faces, with coordinates as in their files (`unposed`) and at their poses (`corner`). */
 typedef struct ebpo_face_two {
     uint64_t file[2], source[2]; /* face indices in the file and in the source */
-    double own[2][3][3], corner[2][3][3];
+    double unposed[2][3][3], corner[2][3][3];
     ebpo_pair_distance_bounds bounds;
 } ebpo_face_two;
 
@@ -39,9 +39,9 @@ typedef struct ebpo_face_two {
  * after the other. */
 typedef struct nearest_pair {
     /* Input: */
-    double tolerance; /* 0: exact */
-    double at_least;  /* only compare the distance with this value; NAN: compute the distance */
-    uint64_t late;    /* deadline, a time of ebpo_clock; UINT64_MAX: none */
+    double tolerance;  /* 0: exact */
+    double at_least;   /* only compare the distance with this value; NAN: compute the distance */
+    uint64_t deadline; /* deadline, a time of ebpo_clock; UINT64_MAX: none */
     const ebpo_progress *progress;
     /* Output: lo <= distance <= hi, equal if the result is exact. */
     double lo, hi;
@@ -50,9 +50,9 @@ typedef struct nearest_pair {
                       * file order */
     int is_at_least; /* the distance is at least `at_least`: 1: yes, 0: no, -1: not compared, or
                       * undecided */
-    ebpo_face_two best;
-    bool ended;        /* the search ended before all pairs were visited */
-    double unvisited;  /* then: the other pairs are at least this far apart */
+    ebpo_face_two best; /* if `found`: the nearest pair so far */
+    bool ended;         /* the search ended before all pairs were visited */
+    double unvisited;  /* if `ended`: the pairs that were not visited are at least this far apart */
     ebpo_error *error; /* error of `status` during the search */
     ebpo_status status;
 } nearest_pair;
@@ -66,7 +66,7 @@ typedef const double (*corners)[3];
 static void pose_faces(const ebpo_posing *const posing[2], ebpo_face_two *out)
 {
     for (int i = 0; i < 6; i++)
-        ebpo_posing_apply(posing[i / 3], out->own[i / 3][i % 3], out->corner[i / 3][i % 3]);
+        ebpo_posing_apply(posing[i / 3], out->unposed[i / 3][i % 3], out->corner[i / 3][i % 3]);
     ebpo_triangles_distance_bounds(CORNERS(out, 0), CORNERS(out, 1), &out->bounds);
 }
 
@@ -78,17 +78,18 @@ static void inspect_slots(const ebpo_gap_search *g, const uint32_t slot[2], ebpo
         uint32_t local = ebpo_accel_slot_face(g->accel[s], slot[s]);
         out->file[s] = ebpo_accel_file_face(g->accel[s], local);
         out->source[s] = ebpo_accel_source_face(g->accel[s], local);
-        ebpo_accel_triangle(g->accel[s], slot[s], out->own[s]);
+        ebpo_accel_triangle(g->accel[s], slot[s], out->unposed[s]);
     }
     pose_faces(posing, out);
 }
 
-/* Returns true if a pair precedes another one in the order of the files. */
+/* Returns true if the pair f precedes the pair `than` in the order of the files. */
 static bool is_earlier(const ebpo_face_two *f, const ebpo_face_two *than)
 {
     return f->file[0] != than->file[0] ? f->file[0] < than->file[0] : f->file[1] < than->file[1];
 }
 
+/* Returns true if the pair f is nearer than the pair `than`, or equally near and earlier. */
 static bool is_nearer(const ebpo_face_two *f, const ebpo_face_two *than)
 {
     if (f->bounds.hi < than->bounds.lo)
@@ -111,8 +112,8 @@ static float to_unit(const ebpo_gap_search *g, double distance)
     return (float)(distance * g->posing[0].unit * (1 + 0x1p-22)) + 0x1p-100f;
 }
 
-/* Compares the distance of two disjoint faces with n->at_least. Returns false if it is less, which
- * decides the comparison. */
+/* Compares the distance of two disjoint faces with n->at_least. Returns false if the distance is
+ * less, which ends the search. */
 static bool compare_with_at_least(nearest_pair *n, const ebpo_face_two *f)
 {
     if (!(f->bounds.lo < n->at_least) ||
@@ -125,9 +126,9 @@ static bool compare_with_at_least(nearest_pair *n, const ebpo_face_two *f)
     return false;
 }
 
-/* Considers a pair in a search with a tolerance: keeps only the least bounds. If the gap is tiny
- * compared with the faces, its direction is inaccurate in doubles and the bounds are wider than the
- * tolerance; then they are computed from the exact distance. */
+/* Updates the result of a search with a tolerance by a pair. If the distance is tiny compared with
+ * the faces, its direction is inaccurate in doubles and the bounds are wider than the tolerance;
+ * the bounds are then computed from the exact distance. */
 static void compare_within_tolerance(nearest_pair *n, const ebpo_face_two *given)
 {
     ebpo_face_two f = *given;
@@ -178,7 +179,7 @@ static bool continue_search(ebpo_gap_search *g)
     nearest_pair *n = g->user;
     if (!ebpo_progress_step(n->progress, "distance", 0, 0, n->error))
         n->status = EBPO_E_CANCELLED;
-    g->ended = n->status != EBPO_OK || (n->late != UINT64_MAX && ebpo_clock() >= n->late);
+    g->ended = n->status != EBPO_OK || (n->deadline != UINT64_MAX && ebpo_clock() >= n->deadline);
     return !g->ended;
 }
 
@@ -187,26 +188,26 @@ static bool continue_search(ebpo_gap_search *g)
 static double least_waiting(const ebpo_gap_search *g, unsigned first)
 {
     double least = INFINITY;
-    for (unsigned i = first; i < g->waits; i++)
+    for (unsigned i = first; i < g->waiting_count; i++)
         if ((double)g->waiting[i].low < least)
             least = (double)g->waiting[i].low;
     return fmax(least / g->posing[0].unit * (1 - 0x1p-20), 0);
 }
 
-/* Decides the waiting pairs, and calls continue_search now and then, because many pairs may wait
- * where models have flat parts. Returns false if the search can end. */
+/* Decides the waiting pairs. Calls continue_search after every 16 pairs, because many pairs may
+ * wait if models have flat parts. Returns false if the search can end. */
 static bool decide_waiting(ebpo_gap_search *g)
 {
     nearest_pair *n = g->user;
     bool more = true;
     unsigned evaluated = 0, i = 0;
-    for (; i < g->waits && more; i++)
+    for (; i < g->waiting_count && more; i++)
         if (!(g->waiting[i].low > g->limit))
             more =
                 decide_faces(g, n, g->waiting[i].slot) && (++evaluated % 16 || continue_search(g));
     if (!more)
         n->lo = fmin(n->lo, least_waiting(g, i));
-    g->waits = 0;
+    g->waiting_count = 0;
     return more;
 }
 
@@ -240,6 +241,7 @@ static void set_distance_bounds(nearest_pair *n)
     n->lo = fmax(n->lo, 0);
 }
 
+/* Sets the output from what the search has found. */
 static void nearest_pair_end(nearest_pair *n)
 {
     bool has_threshold = !isnan(n->at_least);
@@ -260,11 +262,11 @@ static void nearest_pair_end(nearest_pair *n)
         set_distance_bounds(n);
 }
 
-/* Records that unvisited pairs are at least this far apart. */
-static void record_unvisited(nearest_pair *n, double left)
+/* Records that the pairs that were not visited are at least this far apart. */
+static void record_unvisited(nearest_pair *n, double distance)
 {
     n->ended = true;
-    n->unvisited = fmin(n->unvisited, left);
+    n->unvisited = fmin(n->unvisited, distance);
 }
 
 /* --- the search --- */
@@ -278,8 +280,8 @@ static void nearest_pair_begin(nearest_pair *n)
     n->is_at_least = -1;
 }
 
-/* Considers a pair of faces from an earlier query first; its members own, file and source are set.
- */
+/* Considers a pair of faces from an earlier query. Of `pair`, only unposed, file and source are
+ * used. */
 static void nearest_pair_start(nearest_pair *n, const ebpo_posing posing[2],
                                const ebpo_face_two *pair)
 {
@@ -289,7 +291,7 @@ static void nearest_pair_start(nearest_pair *n, const ebpo_posing posing[2],
     (void)consider_faces(n, &f);
 }
 
-/* Records two faces of `g`, by their slots, that are known to intersect. */
+/* Records that two faces of `g`, given by their slots, intersect. */
 static void nearest_pair_found(nearest_pair *n, const ebpo_gap_search *g, const uint32_t slot[2])
 {
     inspect_slots(g, slot, &n->best);
@@ -310,7 +312,7 @@ static bool nearest_pair_is_done(const nearest_pair *n)
     return n->intersects || n->is_at_least >= 0 || n->ended || n->status != EBPO_OK;
 }
 
-/* Limits the search by what is already known. */
+/* Limits the search by the results of earlier searches of this query. */
 static void begin_search(const nearest_pair *n, ebpo_gap_search *g)
 {
     g->tolerance = (float)(n->tolerance * g->posing[0].unit * (1 - 0x1p-20));
@@ -322,9 +324,9 @@ static void begin_search(const nearest_pair *n, ebpo_gap_search *g)
     }
 }
 
-/* Decides the pairs that still wait. With a tolerance, also decides the pair of g->best if its
- * bound is less than `before`, the bound at the beginning of the walk. */
-static void decide_rest(ebpo_gap_search *g, nearest_pair *n, float before)
+/* Decides the pairs that still wait after the walk. With a tolerance, also decides the pair
+ * g->best_slot if g->best is less than `before`, its value at the beginning of the walk. */
+static void decide_last(ebpo_gap_search *g, nearest_pair *n, float before)
 {
     if (nearest_pair_is_done(n) || !decide_waiting(g) || n->intersects || !isnan(n->at_least))
         return;
@@ -337,15 +339,15 @@ static void decide_rest(ebpo_gap_search *g, nearest_pair *n, float before)
 static ebpo_status nearest_pair_search(nearest_pair *n, ebpo_gap_search *g, ebpo_error *error)
 {
     g->user = n;
-    g->judge = decide_waiting;
-    g->go_on = continue_search;
+    g->decide_waiting = decide_waiting;
+    g->keep_going = continue_search;
     n->error = error;
     begin_search(n, g);
     float before = g->best;
     ebpo_gap_kernels_best()->walk(g);
     if (g->no_memory)
         return ebpo_fail_memory(error, g->capacity * sizeof *g->stack);
-    decide_rest(g, n, before);
+    decide_last(g, n, before);
     if (g->ended)
         record_unvisited(n, least_unvisited(g));
     return n->status;
@@ -372,7 +374,7 @@ static ebpo_status distance_of_accels(const ebpo_collision *q, const ebpo_accel 
     int32_t intersects = 0;
     if (accel[0]->bound_count == 0 || accel[1]->bound_count == 0)
         return EBPO_OK;
-    ebpo_gap_begin(c->gap, accel, posing, q->reach);
+    ebpo_gap_begin(c->gap, accel, posing, q->max_coordinate);
     ebpo_status status =
         may_intersect ? ebpo_collision_first(q, accel, stage, &intersects, error) : EBPO_OK;
     if (status != EBPO_OK)
@@ -412,7 +414,7 @@ static ebpo_status add_node_pair(node_search *s, const ebpo_posed_node node[2], 
         if (ebpo_entry_kind_of(node[i].entry) == EBPO_ENTRY_UNIFORM)
             return EBPO_OK;
     ebpo_status status = ebpo_node_gap_of(nodes, node, &pair.gap, error);
-    pair.gap = fmax(pair.gap, gap); /* the gap of their parents is a bound, too */
+    pair.gap = fmax(pair.gap, gap); /* the gap of the parents is a bound, too */
     if (status != EBPO_OK || pair.gap > fmin(s->hi, nearest_pair_limit(s->n)))
         return status;
     if (!model[0]->info->pruned && !model[1]->info->pruned)
@@ -455,8 +457,8 @@ static ebpo_status search_subtrees(node_search *s, ebpo_error *error)
     return status;
 }
 
-/* Searches all pairs of subtrees whose envelopes are not farther apart than the best distance, in
- * the order of their gaps. The result is the same as for whole models. */
+/* Searches pairs of subtrees in the order of the gaps of their envelopes, until the gap is greater
+ * than the best distance. The result is the same as for models that are entirely in memory. */
 static ebpo_status distance_of_parts(const ebpo_collision *q, nearest_pair *n, ebpo_error *error)
 {
     node_search s = { .n = n, .hi = INFINITY };
@@ -478,8 +480,8 @@ static ebpo_status check_options(const ebpo_collide_distance_options *o, ebpo_er
 {
     if (!(o->tolerance >= 0 && o->tolerance < INFINITY) || isnan(o->at_least))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "the tolerance of the distance must be 0 or more and finite, and the "
-                         "distance to compare with must be a number");
+                         "expected a tolerance of the distance that is 0 or more and finite, and a "
+                         "distance to compare with that is a number");
     return EBPO_OK;
 }
 
@@ -498,7 +500,7 @@ static void report_pair(const ebpo_collision *q, const nearest_pair *n,
                         ebpo_collide_distance_result *out)
 {
     const ebpo_face_two *f = &n->best;
-    int a = q->turned, b = !q->turned;
+    int a = q->swapped, b = !q->swapped;
     ebpo_pair_kind kind = EBPO_PAIR_APART;
     double point[2][3];
     for (int i = 0; i < 6; i++)
@@ -522,10 +524,10 @@ static void report_pair(const ebpo_collision *q, const nearest_pair *n,
 static ebpo_face_two in_query_order(const ebpo_collision *q, const ebpo_face_two *f)
 {
     ebpo_face_two out = *f;
-    for (int i = 0; i < 2 && q->turned; i++) {
+    for (int i = 0; i < 2 && q->swapped; i++) {
         out.file[i] = f->file[!i];
         out.source[i] = f->source[!i];
-        memcpy(out.own[i], f->own[!i], sizeof out.own[i]);
+        memcpy(out.unposed[i], f->unposed[!i], sizeof out.unposed[i]);
     }
     return out;
 }
@@ -600,7 +602,7 @@ ebpo_status ebpo_collide_distance(ebpo_collider *c, const ebpo_collide_options *
     }
     nearest_pair n = { .tolerance = wanted.tolerance,
                        .at_least = wanted.at_least < 0 ? NAN : wanted.at_least,
-                       .late = q.late,
+                       .deadline = q.deadline,
                        .progress = &q.options.progress };
     nearest_pair_begin(&n);
     status = search_nearest(&q, wanted.warm, &n, error);

@@ -1,11 +1,11 @@
-/* Bounds the distance of two posed models by the levels of their octrees, without their faces, and
+/* Bounds the distance of two posed models by the nodes of their octrees, without reading faces, and
  * reports if both solids certainly have a common point.
  *
  * Pairs of nodes are visited in the order of the gaps of their envelopes, the least first
  * (subtree_search.h). A gap is a lower bound of the distance; two nodes with faces give an upper
  * bound. A black cell belongs entirely to its solid. So both solids have a common point in two
- * cases: a black cell contains a whole cell with faces of the other model, or it contains a point
- * of a black cell of the other model. A search runs in one thread. */
+ * cases: a black cell contains all of a cell with faces of the other model, or a point of a black
+ * cell of the other model. A search runs in one thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -28,9 +28,9 @@ typedef struct level_search {
 
 static const char stage[] = "pairs of nodes";
 
-/* Width of the margin inside a black cell whose points are not counted as inside, as a share of the
- * cell's side. */
-static const double cell_face_share = 0x1p-14;
+/* Width of the margin along the faces of a black cell, as a share of the cell's side. Points in the
+ * margin are not counted as inside the cell. */
+static const double margin_share = 0x1p-14;
 
 /* --- nodes --- */
 
@@ -55,9 +55,9 @@ static bool has_children(const level_search *g, const ebpo_posed_node *node)
 
 /* --- a common point of both solids --- */
 
-/* Returns true if the posed point p is certainly within a posed cell. reach: bound of posed
- * coordinates. */
-static bool is_within(const double corner[8][3], const double p[3], double reach)
+/* Returns true if the posed point p is certainly within a posed cell. max_coordinate: bound of
+ * posed coordinates. */
+static bool is_within(const double corner[8][3], const double p[3], double max_coordinate)
 {
     for (int k = 0; k < 3; k++) {
         const double *from = corner[0], *to = corner[1 << k];
@@ -69,7 +69,7 @@ static bool is_within(const double corner[8][3], const double p[3], double reach
         if (!(length2 > 0x1p-900 && length2 < 0x1p900)) /* the squares overflow, underflow or are
                                                          * not numbers */
             return false;
-        double space = cell_face_share * length2 + 0x1p-44 * reach * sqrt(length2);
+        double space = margin_share * length2 + 0x1p-44 * max_coordinate * sqrt(length2);
         if (!(along > space && along < length2 - space))
             return false;
     }
@@ -87,22 +87,25 @@ static void widen_cell(double corner[8][3], double share)
             corner[c][i] = middle[i] + (corner[c][i] - middle[i]) * (1 + share);
 }
 
-/* Returns true if `solid`, the cell of a black node, certainly has a common point with the other
- * node's model: if it contains the whole region in which the other node has a face, or, if the
- * other node is also `black`, a corner or the middle of the other cell. */
+/* Returns true if `solid`, the cell of a black node, certainly has a common point with the model of
+ * the other cell. black: the other node is black, too; then `solid` must contain a corner or the
+ * middle of the other cell. Otherwise `solid` must contain the region in which the other node has
+ * its faces. `other` may be changed. */
 static bool shares_point(const level_search *g, double solid[8][3], double other[8][3], bool black)
 {
     int within = 0;
-    double middle[3], reach = g->collision->reach;
+    double middle[3], max_coordinate = g->collision->max_coordinate;
     if (!black)
         widen_cell(other, 2 * EBPO_FACE_MARGIN);
     for (int c = 0; c < 8; c++)
-        within += is_within((const double(*)[3])solid, other[c], reach);
+        within += is_within((const double(*)[3])solid, other[c], max_coordinate);
     for (int i = 0; i < 3; i++)
         middle[i] = other[0][i] / 2 + other[7][i] / 2;
-    return black ? within > 0 || is_within((const double(*)[3])solid, middle, reach) : within == 8;
+    return black ? within > 0 || is_within((const double(*)[3])solid, middle, max_coordinate)
+                 : within == 8;
 }
 
+/* Returns true if the models of two nodes certainly have a common point because of a black node. */
 static bool certainly_intersect(const level_search *g, const ebpo_posed_node node[2],
                                 const content has[2])
 {
@@ -131,7 +134,7 @@ static ebpo_status add_node_pair(level_search *g, const ebpo_posed_node node[2],
     if (has[0] == NOTHING || has[1] == NOTHING || (!faces && g->intersects))
         return EBPO_OK;
     ebpo_status status = ebpo_node_gap_of(&g->nodes, node, &pair.gap, error);
-    pair.gap = fmax(pair.gap, gap); /* the gap of their parents is a bound, too */
+    pair.gap = fmax(pair.gap, gap); /* the gap of the parents is a bound, too */
     if (status != EBPO_OK || pair.gap > g->hi || (!faces && pair.gap > 0))
         return status;
     if (faces)
@@ -173,7 +176,7 @@ static ebpo_status divide_pair(level_search *g, const ebpo_node_gap *pair, ebpo_
 
 /* --- the search --- */
 
-/* Adds all waiting pairs, undecided, to the result. */
+/* Adds all pairs of the heap to the result, without dividing them. */
 static void finish_all_pairs(level_search *g)
 {
     for (uint64_t i = 0; i < g->nodes.count; i++)
@@ -248,8 +251,8 @@ static void fill_result(const ebpo_collision *q, const level_search *g, ebpo_lev
     out->common = g->intersects ? 1 : g->may_intersect ? -1 : 0;
     out->contact = g->undecided_pairs ? -1 : 0;
     out->undecided_pairs = g->undecided_pairs;
-    out->level_a = last_level(q->model[q->turned], q->options.level);
-    out->level_b = last_level(q->model[!q->turned], q->options.level);
+    out->level_a = last_level(q->model[q->swapped], q->options.level);
+    out->level_b = last_level(q->model[!q->swapped], q->options.level);
 }
 
 ebpo_status ebpo_collide_levels(ebpo_collider *c, const ebpo_collide_options *options,

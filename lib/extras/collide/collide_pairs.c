@@ -24,15 +24,15 @@
  * Zero at the beginning. */
 typedef struct pair_gathering {
     const ebpo_collision *collision;
-    bool self;            /* both are the same hierarchy, at one pose */
-    ebpo_node_pair *part; /* pairs of nodes from which threads continue */
+    bool self;            /* both hierarchies are the same one, at one pose */
+    ebpo_node_pair *part; /* [parts] pairs of nodes at which the searches of threads begin */
     uint64_t parts, part_capacity;
     ebpo_pair_walk *walk; /* [threads] */
     unsigned threads;
     uint64_t most;                /* maximum number of pairs */
     _Atomic uint64_t found;       /* number of pairs found by all threads */
     _Atomic bool full;            /* there are more than `most` pairs */
-    ebpo_found_pair *found_pairs; /* [found_count] the sorted result */
+    ebpo_found_pair *found_pairs; /* [found_count] the sorted pairs of this run */
     uint64_t found_count, found_capacity;
 } pair_gathering;
 
@@ -68,8 +68,8 @@ static unsigned bits_for(uint64_t count)
     return bits;
 }
 
-/* Sorts pairs by a, then by b, which are below max_a and max_b. `spare` is workspace for as many
- * pairs; the result is in `pairs`. */
+/* Sorts pairs by a, then by b; a < max_a and b < max_b. `spare` is workspace for `count` pairs. The
+ * result is in `pairs`. */
 static void sort_found_pairs(ebpo_found_pair *pairs, ebpo_found_pair *spare, uint64_t count,
                              uint32_t max_a, uint32_t max_b)
 {
@@ -120,7 +120,7 @@ ebpo_status ebpo_collision_first(const ebpo_collision *q, const ebpo_accel *cons
     *found = 0;
     if (accel[0]->bound_count == 0 || accel[1]->bound_count == 0)
         return EBPO_OK;
-    ebpo_accel_pair_make(&pair, accel, posing, q->reach);
+    ebpo_accel_pair_make(&pair, accel, posing, q->max_coordinate);
     if (pair.apart)
         return EBPO_OK;
     ebpo_pair_walk_begin(w, &pair);
@@ -153,9 +153,9 @@ ebpo_status ebpo_collide_first(ebpo_collider *c, const ebpo_collide_options *opt
 
 static const char stage[] = "pairs of faces";
 
-/* Least number of parts, and number of pieces of work. They affect only how evenly the threads are
- * used, not the result. */
-enum { PARTS = 512, PARTS_EACH = 64 };
+/* PARTS: number of parts at which dividing ends; TASKS: number of groups of parts that are
+ * distributed to threads. They affect only how evenly the threads are used, not the result. */
+enum { PARTS = 512, TASKS = 64 };
 
 static ebpo_status no_memory(const ebpo_pair_walk *w, ebpo_error *error)
 {
@@ -173,8 +173,8 @@ static bool store_parts(pair_gathering *g, const ebpo_node_pair *pairs, uint64_t
     return true;
 }
 
-/* Divides all pairs of nodes repeatedly, until there are enough parts or only pairs of blocks.
- * Returns false without memory. */
+/* Divides all pairs of nodes repeatedly, until there are enough parts or all parts are pairs of
+ * blocks. Returns false without memory. */
 static bool make_parts(pair_gathering *g, ebpo_pair_walk *w)
 {
     bool ok = w->kernels->start(w) && store_parts(g, w->stack, w->top);
@@ -213,8 +213,8 @@ static ebpo_status run_parts(void *user, uint64_t begin, uint64_t end, unsigned 
     return EBPO_OK;
 }
 
-/* Uses the walks that the collider keeps, or makes new walks if another query is using the
- * collider's walks: the callback that receives pairs may make a query. Returns false without
+/* Takes the walks that the collider keeps. Makes new walks if an outer query of the same collider
+ * has taken them (the callback that receives pairs may make a query). Returns false without
  * memory. */
 static bool acquire_walks(pair_gathering *g)
 {
@@ -247,7 +247,7 @@ static ebpo_status prepare_walks(pair_gathering *g, const ebpo_accel_pair *pair,
     return EBPO_OK;
 }
 
-/* Joins the results of all threads, and sorts them. */
+/* Joins and sorts the results of all threads. */
 static ebpo_status join_results(pair_gathering *g, const ebpo_accel_pair *pair, ebpo_error *error)
 {
     uint64_t count = 0;
@@ -269,8 +269,8 @@ static ebpo_status join_results(pair_gathering *g, const ebpo_accel_pair *pair, 
     return EBPO_OK;
 }
 
-/* Finds the pairs of the faces [begin, end) of the first hierarchy. Sets g->found_pairs; or g->full
- * if there are too many pairs. */
+/* Finds the pairs of the faces [begin, end) of the first hierarchy. Sets g->found_pairs, or, if
+ * there are too many pairs, g->full. */
 static ebpo_status gather_pairs(pair_gathering *g, const ebpo_accel_pair *pair, uint32_t begin,
                                 uint32_t end, ebpo_error *error)
 {
@@ -279,7 +279,7 @@ static ebpo_status gather_pairs(pair_gathering *g, const ebpo_accel_pair *pair, 
         return status;
     if (!make_parts(g, &g->walk[0]))
         return no_memory(&g->walk[0], error);
-    uint64_t grain = g->parts / PARTS_EACH + 1;
+    uint64_t grain = g->parts / TASKS + 1;
     status = ebpo_parallel_for(g->threads, NULL, g->parts, grain, run_parts, g,
                                &g->collision->options.progress, stage, error);
     for (unsigned i = 0; i < g->threads; i++)
@@ -337,8 +337,8 @@ static void pass_pairs(pair_receiver *v, const ebpo_found_pair *found_pairs, uin
 }
 
 /* Searches runs of consecutive faces of the first model. A run is halved until its pairs fit in
- * memory; after a run that fits, the next one is twice as long. The pairs of a single face may need
- * more memory. */
+ * memory; after a run that fits, the next one is twice as long. The pairs of a single face are
+ * stored even if they do not fit. */
 static ebpo_status search_in_runs(pair_receiver *v, pair_gathering *g, ebpo_error *error)
 {
     uint32_t faces = v->pair->accel[0]->face_count, run = faces;
@@ -371,7 +371,7 @@ static ebpo_status all_pairs(const ebpo_collision *q, bool self, ebpo_pairs_fn t
     ebpo_accel_pair pair;
     if (accel[0]->bound_count == 0 || accel[1]->bound_count == 0)
         return EBPO_OK;
-    ebpo_accel_pair_make(&pair, accel, posing, q->reach);
+    ebpo_accel_pair_make(&pair, accel, posing, q->max_coordinate);
     if (pair.apart)
         return EBPO_OK;
     pair_receiver v = { q, &pair, take, user, false };
@@ -398,8 +398,8 @@ ebpo_status ebpo_collide_self(ebpo_collider *c, const ebpo_collide_options *opti
     ebpo_collide_options unposed = EBPO_COLLIDE_OPTIONS_INIT;
     if (c->model[0] != c->model[1])
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "one model with itself: expected a collider of "
-                         "two models");
+                         "one model with itself: expected a collider whose two models are the same "
+                         "one");
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status != EBPO_OK)
         return status;

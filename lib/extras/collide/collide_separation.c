@@ -1,12 +1,12 @@
-/* Computes how far one model has to move along a direction until both models have no common point:
- * the last time of contact.
+/* Computes how far one model has to move along a direction until both models have no common point.
+ * The distance is a time t, the last time of contact: the model has moved by t * direction.
  *
- * A heap holds pairs of nodes, the pair that may separate last first. The extents of the nodes
- * along the direction and along two axes perpendicular to it bound the time of their last contact.
- * The last contact of two faces is bounded in doubles (ebpo_sweep_max) and computed exactly
- * (ebpo_sweep_last). Partly loaded models are searched in pairs of subtrees: a subtree is loaded
- * only if its envelope may separate later than the last contact found. A search runs in one thread.
- * Bounds: docs/develop/collision.md, "Separation distance along a direction". */
+ * A heap holds pairs of nodes; its first pair is the one that may separate last. The extents of the
+ * nodes along the direction and along two axes perpendicular to it bound the time of their last
+ * contact. The last contact of two faces is bounded in doubles (ebpo_sweep_max) and computed
+ * exactly (ebpo_sweep_last). Partly loaded models are searched in pairs of subtrees: a subtree is
+ * loaded only if its envelope may separate later than the last contact found so far. A search runs
+ * in one thread. Bounds: docs/develop/collision.md, "Separation distance along a direction". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -24,11 +24,12 @@
 
 /* A pair of children of nodes, each given as 8 * the node's index + the child's lane. */
 typedef struct separation_pair {
-    double most; /* upper bound of the last time at which they have a common point */
+    double most; /* upper bound of the last time at which the two children have a common point */
     uint32_t a, b;
 } separation_pair;
 
-/* The map from a hierarchy's frame to components along the three axes of separation_search. */
+/* A hierarchy, and the map from its frame to components along the three axes of
+ * separation_search. */
 typedef struct separation_side {
     const ebpo_accel *accel;
     const ebpo_posing *posing;
@@ -49,9 +50,9 @@ typedef struct separation_search {
     separation_side side[2];
     double axis[3][3];      /* three perpendicular axes; the first is the direction */
     double step;            /* length of `direction` */
-    double extent_error;    /* bound of how far rounding moves extents */
-    double earliest;        /* `last` is certainly not earlier than this */
-    separation_pair *pairs; /* a heap, the greatest `most` first */
+    double extent_error;    /* greatest distance by which rounding moves ends of extents */
+    double earliest;        /* lower bound of `last`, 0 or more */
+    separation_pair *pairs; /* [count] a heap; pairs[0] has the greatest `most` */
     uint64_t count, capacity, evaluations;
 } separation_search;
 
@@ -94,15 +95,15 @@ static separation_extent extent_of(const separation_search *s, int which, uint32
     for (int i = 0; i < 3; i++) {
         const double *row = side->row[i];
         double at = row[0] * middle[0] + row[1] * middle[1] + row[2] * middle[2] + side->base[i],
-               reach = fabs(row[0]) * half[0] + fabs(row[1]) * half[1] + fabs(row[2]) * half[2];
-        out.low[i] = at - reach;
-        out.high[i] = at + reach;
+               width = fabs(row[0]) * half[0] + fabs(row[1]) * half[1] + fabs(row[2]) * half[2];
+        out.low[i] = at - width;
+        out.high[i] = at + width;
     }
     return out;
 }
 
-/* Returns the greatest t at which sets with these extents may have a common point; negative: there
- * is none. */
+/* Returns an upper bound of the times at which sets with these extents have a common point;
+ * negative if there is no such time. */
 static double separation_max(const separation_search *s, const separation_extent *a,
                              const separation_extent *b)
 {
@@ -113,8 +114,8 @@ static double separation_max(const separation_search *s, const separation_extent
     return along < 0 ? -1 : along / s->step * (1 + 0x1p-40);
 }
 
-/* Sets axis[0] to the direction d with length 1, and two unit vectors perpendicular to it and to
- * each other. */
+/* Sets axis[0] to the direction d with length 1, and axis[1] and axis[2] to unit vectors that are
+ * perpendicular to axis[0] and to each other. */
 static void make_axes(const double d[3], double axis[3][3])
 {
     double length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
@@ -134,6 +135,7 @@ static void make_axes(const double d[3], double axis[3][3])
     }
 }
 
+/* Prepares the map from the frame of a hierarchy of model `which`. */
 static void make_side(separation_search *s, int which, const ebpo_accel *accel)
 {
     separation_side *side = &s->side[which];
@@ -159,11 +161,12 @@ static bool comes_first(const separation_search *s, const ebpo_found_pair *x)
     uint64_t a = ebpo_accel_file_face(s->side[0].accel, x->a),
              b = ebpo_accel_file_face(s->side[1].accel, x->b);
     const uint64_t has[2] = { s->pair.file_face_a, s->pair.file_face_b };
-    bool turned = s->collision->turned;
-    return a != has[turned] ? a < has[turned] : b < has[!turned];
+    bool swapped = s->collision->swapped;
+    return a != has[swapped] ? a < has[swapped] : b < has[!swapped];
 }
 
-/* Computes the last contact of two faces, and keeps it if it is later than s->last. */
+/* Computes the last contact of two faces. Keeps it if it is later than s->last, or at the same time
+ * and of an earlier pair. */
 static void inspect_faces(separation_search *s, const double a[3][3], const double b[3][3],
                           const ebpo_found_pair *pair)
 {
@@ -191,11 +194,11 @@ static void inspect_blocks(separation_search *s, uint32_t block_a, uint32_t bloc
     const uint32_t block[2] = { block_a, block_b };
     const ebpo_meshlet *m[2];
     double corner[2][EBPO_BLOCK][3][3];
-    for (int w = 0; w < 2; w++) {
-        m[w] = ebpo_accel_meshlet(s->side[w].accel, block[w]);
-        for (uint32_t lane = 0; lane < m[w]->faces; lane++)
-            ebpo_posed_triangle(s->side[w].accel, s->side[w].posing, block[w] * EBPO_BLOCK + lane,
-                                corner[w][lane]);
+    for (int i = 0; i < 2; i++) {
+        m[i] = ebpo_accel_meshlet(s->side[i].accel, block[i]);
+        for (uint32_t lane = 0; lane < m[i]->faces; lane++)
+            ebpo_posed_triangle(s->side[i].accel, s->side[i].posing, block[i] * EBPO_BLOCK + lane,
+                                corner[i][lane]);
     }
     for (uint32_t i = 0; i < m[0]->faces; i++)
         for (uint32_t j = 0; j < m[1]->faces; j++) {
@@ -217,8 +220,8 @@ static double size_of(const separation_extent *e)
     return e->high[0] - e->low[0] + (e->high[1] - e->low[1]) + (e->high[2] - e->low[2]);
 }
 
-/* Adds the pairs of each child of a node of model `which` with `other`, a child of a node of the
- * other model, to the heap. */
+/* Adds to the heap the pairs of each child of `node`, a node of model `which`, with `other`, a
+ * child of a node of the other model (as in separation_pair). */
 static ebpo_status offer_children(separation_search *s, int which, uint32_t node, uint32_t other,
                                   ebpo_error *error)
 {
@@ -238,8 +241,8 @@ static ebpo_status offer_children(separation_search *s, int which, uint32_t node
     return EBPO_OK;
 }
 
-/* Divides the larger node of a pair, or the only node that can be divided; decides a pair of
- * blocks. */
+/* Divides the larger node of a pair, or, if one of them is a block, the other one. Compares the
+ * faces of a pair of blocks. */
 static ebpo_status divide_pair(separation_search *s, const separation_pair *pair, ebpo_error *error)
 {
     uint32_t child[2] = { child_of(s, 0, pair->a), child_of(s, 1, pair->b) };
@@ -259,7 +262,7 @@ static void separation_search_begin(separation_search *s)
     ebpo_sweep_time_init(&s->last);
     make_axes(s->direction, s->axis);
     s->step = ebpo_vec3_dot(s->axis[0], s->direction);
-    s->extent_error = 0x1p-40 * s->collision->reach;
+    s->extent_error = 0x1p-40 * s->collision->max_coordinate;
     s->hi = -1;
     s->pair = (ebpo_face_pair){ EBPO_NO_FACE, EBPO_NO_FACE,    EBPO_NO_FACE,
                                 EBPO_NO_FACE, EBPO_PAIR_APART, 0 };
@@ -282,8 +285,8 @@ static ebpo_status separation_search_run(separation_search *s, const ebpo_accel 
     const ebpo_progress *progress = &s->collision->options.progress;
     if (accel[0]->bound_count == 0 || accel[1]->bound_count == 0)
         return EBPO_OK;
-    for (int w = 0; w < 2; w++)
-        make_side(s, w, accel[w]);
+    for (int i = 0; i < 2; i++)
+        make_side(s, i, accel[i]);
     ebpo_status status = offer_tops(s, error);
     while (status == EBPO_OK && s->count > 0 && s->pairs[0].most >= s->earliest) {
         if (ebpo_collision_is_late(s->collision))
@@ -306,13 +309,13 @@ static ebpo_status separation_search_run(separation_search *s, const ebpo_accel 
 
 /* --- pairs of subtrees --- */
 
-/* The search in pairs of subtrees. A subtree lists the faces that have a point in its cell. The
- * last common point of two moving faces is therefore in a cell of each model whose subtree lists
- * the face. The envelopes of both subtrees contain the point, and do not separate earlier. */
-
+/* The search in pairs of subtrees. A subtree lists the faces that have a point in its cell.
+ * Therefore the last common point of two moving faces is, in each model, in the cell of a subtree
+ * that lists the model's face. The envelopes of both subtrees contain the point, so they do not
+ * separate before the faces. */
 typedef struct node_search {
-    ebpo_subtree_search subtrees; /* here ebpo_node_gap.gap is minus the time until which the
-                                   * envelopes may intersect */
+    ebpo_subtree_search subtrees; /* ebpo_node_gap.gap is used for minus the last time at which
+                                   * the envelopes may intersect */
     separation_search *search;
 } node_search;
 
@@ -322,7 +325,7 @@ static ebpo_status cell_extent(node_search *s, int which, ebpo_cell cell, separa
 {
     ebpo_posed_subtrees *side = &s->subtrees.nodes.side[which];
     ebpo_convex hull;
-    double slack = ebpo_posed_slack(side, cell, s->subtrees.collision->reach);
+    double slack = ebpo_posed_slack(side, cell, s->subtrees.collision->max_coordinate);
     ebpo_status status = ebpo_posed_envelope(side, cell, &hull, error);
     for (int i = 0; i < 3 && status == EBPO_OK; i++) {
         const double *axis = s->search->axis[i];
@@ -399,8 +402,9 @@ static ebpo_status search_node_pairs(node_search *s, ebpo_error *error)
     return status;
 }
 
-/* Searches all pairs of subtrees whose envelopes may separate later than the last contact found,
- * the latest first. The result is the same as for whole models. */
+/* Searches pairs of subtrees in the order of the time at which their envelopes may separate, the
+ * latest first, until that time is before the last contact found. The result is the same as for
+ * models that are entirely in memory. */
 static ebpo_status separation_of_parts(separation_search *search, ebpo_error *error)
 {
     node_search s = { .search = search };
@@ -421,7 +425,7 @@ static int set_direction(separation_search *s, const double direction[3])
     (void)frexp(fmax(fabs(direction[0]), fmax(fabs(direction[1]), fabs(direction[2]))), &exponent);
     for (int k = 0; k < 3; k++)
         s->direction[k] =
-            ldexp(s->collision->turned ? -direction[k] : direction[k], -exponent) + 0.0;
+            ldexp(s->collision->swapped ? -direction[k] : direction[k], -exponent) + 0.0;
     return exponent;
 }
 

@@ -1,9 +1,10 @@
 /* Writes results for other programs: pairs of intersecting faces to an HDF5 file, and meshes to a
  * PLY file that shows the intersecting faces in red.
  *
- * Rows are written in blocks as they are found, so memory does not grow with their number. The
- * writer of PLY files reads vertices and faces from a source in ascending order: a mesh in memory
- * or a partly loaded model. Output files appear only when they are complete (io/publish.h). */
+ * Rows are written in groups as pairs are found, so memory does not grow with the number of pairs.
+ * The writer of PLY files reads vertices and faces in ascending order from a source: a mesh in
+ * memory or a partly loaded model. Output files appear only when they are complete (io/publish.h).
+ */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -122,12 +123,13 @@ static const struct {
     [CONTACT_ON] = { "/contacts/on", EBPO_H5_U8, 4 },
 };
 
+/* Number of rows that are written at once. */
 enum { ROWS = 512 };
 
 /* An HDF5 file while it is written. */
 typedef struct pairs_file {
     const ebpo_collision *collision;
-    ebpo_pair_faces places; /* for looking up faces */
+    ebpo_pair_faces lookup; /* for looking up faces */
     ebpo_h5_out out;
     ebpo_h5_table table[TABLES];
     int64_t faces[ROWS][2], file_faces[ROWS][2], contact_faces[ROWS][2];
@@ -153,7 +155,7 @@ static ebpo_status make_tables(pairs_file *w, ebpo_error *error)
     return status;
 }
 
-/* Writes the waiting rows. Returns false after a failure (w->status). */
+/* Writes the waiting rows. Returns false after a failure, and sets w->status. */
 static bool flush_rows(pairs_file *w)
 {
     const void *const data[TABLES] = { w->faces,  w->file_faces,    w->kind,
@@ -165,13 +167,14 @@ static bool flush_rows(pairs_file *w)
     return w->status == EBPO_OK;
 }
 
-/* Adds a row for the contact of a crossing pair. Returns false after a failure (w->status). */
+/* Adds a row for the contact of a crossing pair. Returns false after a failure, and sets
+ * w->status. */
 static bool add_contact_row(pairs_file *w, const ebpo_face_pair *pair)
 {
     ebpo_posed_pair faces;
     ebpo_contact_segment s;
     uint64_t n = w->contacts++;
-    w->status = ebpo_pose_pair(&w->places, pair, &faces, w->error);
+    w->status = ebpo_pose_pair(&w->lookup, pair, &faces, w->error);
     if (w->status != EBPO_OK)
         return false;
     ebpo_contact_of(&faces, pair, &s);
@@ -234,23 +237,23 @@ static ebpo_status write_hdf5(const ebpo_collision *q, const char *path, ebpo_pu
     w->error = error;
     for (int i = 0; i < TABLES; i++)
         w->table[i] = (ebpo_h5_table)EBPO_H5_TABLE_INIT;
-    ebpo_status status = ebpo_pair_faces_begin(&w->places, q, error);
+    ebpo_status status = ebpo_pair_faces_begin(&w->lookup, q, error);
     if (status == EBPO_OK)
         status = write_tables(w, path, target);
-    ebpo_pair_faces_end(&w->places);
+    ebpo_pair_faces_end(&w->lookup);
     free(w);
     return status;
 }
 
 /* --- PLY --- */
 
-/* A mesh that is written as PLY. A partly loaded model is read chunk by chunk; the mesh of a whole
- * model is read from the file again. */
+/* A mesh that is written as PLY. A partly loaded model is read chunk by chunk. The mesh of a model
+ * that is entirely in memory (a whole model) is read from the file again. */
 typedef struct shown_mesh {
-    ebpo_mesh mesh;             /* of a whole model */
+    ebpo_mesh mesh;             /* for a whole model */
     ebpo_faces_by_number parts; /* for a partly loaded model */
     ebpo_red_source source;
-    uint64_t *intersecting; /* a bit for each intersecting face */
+    uint64_t *intersecting; /* a bit for each face, 1: the face intersects the other mesh */
 } shown_mesh;
 
 typedef struct shown_meshes {
@@ -315,7 +318,7 @@ static ebpo_status write_ply(const ebpo_collision *q, ebpo_publish *target, ebpo
         status = ebpo_collide_all(q->collider, &q->options, mark_faces, &p, error);
     uint64_t before = ebpo_collision_bytes_read(q);
     for (int m = 0; m < 2; m++)
-        red[m] = (ebpo_red_mesh){ p.side[m].source, &q->posing[(int)q->turned ^ m].posing,
+        red[m] = (ebpo_red_mesh){ p.side[m].source, &q->posing[(int)q->swapped ^ m].posing,
                                   p.side[m].intersecting, colour[m] };
     if (status == EBPO_OK)
         status = ebpo_red_meshes_print(red, 2, target, error);
@@ -334,7 +337,8 @@ ebpo_status ebpo_collide_write(ebpo_collider *c, const ebpo_collide_options *opt
     ebpo_collision q;
     ebpo_publish target = EBPO_PUBLISH_INIT;
     if (format != EBPO_PAIRS_HDF5 && format != EBPO_PAIRS_PLY)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: unknown format of pairs", path);
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: unknown format of pairs: %d", path,
+                         (int)format);
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status == EBPO_OK)
         status = ebpo_publish_begin(&target, path, error);

@@ -1,4 +1,4 @@
-/* Makes a collider: two models, options, and data that queries keep for the next ones.
+/* Makes a collider: two models, options, and data that a query keeps for the following queries.
  *
  * All queries begin with ebpo_collision_begin. It checks the options and puts the models in an
  * order that does not change when the caller swaps them, so results do not depend on the caller's
@@ -28,7 +28,7 @@ static ebpo_status check_complete(const ebpo_model *model, ebpo_error *error)
         return EBPO_OK;
     return ebpo_fail_file(error, EBPO_E_ABSENT, model->file->in.shown,
                           "is a part of another file, and omitted faces might also intersect; "
-                          "query the whole file, or put both into a scene, which knows the "
+                          "query the whole file, or put both models into a scene, which knows the "
                           "relevant faces (`ebpo scene`)");
 }
 
@@ -119,18 +119,18 @@ static bool comes_second(const ebpo_collider *c, const ebpo_collide_options *o)
 static ebpo_status make_posings(ebpo_collision *q, ebpo_error *error)
 {
     ebpo_posing posing[2];
-    q->reach = 0;
+    q->max_coordinate = 0;
     for (int i = 0; i < 2; i++) {
-        double reach[3];
-        ebpo_model_extent(q->model[i], reach);
-        const ebpo_pose *pose = (i == 1) != q->turned ? &q->options.pose_b : &q->options.pose_a;
-        ebpo_status status = ebpo_posing_make(&posing[i], pose, reach, error);
+        double max_coordinate[3];
+        ebpo_model_extent(q->model[i], max_coordinate);
+        const ebpo_pose *pose = (i == 1) != q->swapped ? &q->options.pose_b : &q->options.pose_a;
+        ebpo_status status = ebpo_posing_make(&posing[i], pose, max_coordinate, error);
         if (status != EBPO_OK)
             return status;
-        q->reach = fmax(q->reach, ebpo_posed_extent(&posing[i], reach));
+        q->max_coordinate = fmax(q->max_coordinate, ebpo_posed_extent(&posing[i], max_coordinate));
     }
     for (int i = 0; i < 2; i++)
-        ebpo_block_posing_make(&q->posing[i], &posing[i], q->reach);
+        ebpo_block_posing_make(&q->posing[i], &posing[i], q->max_coordinate);
     return EBPO_OK;
 }
 
@@ -142,10 +142,10 @@ ebpo_status ebpo_collision_begin(ebpo_collision *out, ebpo_collider *c,
     if (status != EBPO_OK)
         return status;
     out->collider = c;
-    out->turned = comes_second(c, &out->options);
-    out->model[0] = c->model[out->turned];
-    out->model[1] = c->model[!out->turned];
-    out->late = out->options.deadline_ns ? ebpo_clock() + out->options.deadline_ns : UINT64_MAX;
+    out->swapped = comes_second(c, &out->options);
+    out->model[0] = c->model[out->swapped];
+    out->model[1] = c->model[!out->swapped];
+    out->deadline = out->options.deadline_ns ? ebpo_clock() + out->options.deadline_ns : UINT64_MAX;
     return make_posings(out, error);
 }
 
@@ -156,10 +156,10 @@ bool ebpo_collision_is_in_parts(const ebpo_collision *q)
 
 bool ebpo_collision_is_late(const ebpo_collision *q)
 {
-    return q->late != UINT64_MAX && ebpo_clock() >= q->late;
+    return q->deadline != UINT64_MAX && ebpo_clock() >= q->deadline;
 }
 
-/* A file that both models use is counted once. */
+/* Counts a file that both models use only once. */
 uint64_t ebpo_collision_bytes_read(const ebpo_collision *q)
 {
     uint64_t bytes = 0;
@@ -179,7 +179,7 @@ ebpo_face_pair ebpo_collision_pair(const ebpo_collision *q, const ebpo_accel *fi
                          ebpo_accel_file_face(second, pair->b) },
              source[2] = { ebpo_accel_source_face(first, pair->a),
                            ebpo_accel_source_face(second, pair->b) };
-    int a = q->turned, b = !q->turned;
+    int a = q->swapped, b = !q->swapped;
     return (ebpo_face_pair){ source[a], source[b], file[a], file[b], pair->kind, 0 };
 }
 

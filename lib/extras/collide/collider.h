@@ -1,4 +1,4 @@
-/* A collider, and the common beginning of all queries on two models. */
+/* Declares a collider (two models and their options), and the first step of all queries on it. */
 #ifndef EBPO_COLLIDE_COLLIDER_H
 #define EBPO_COLLIDE_COLLIDER_H
 
@@ -9,9 +9,8 @@
 #include "extras/collide/hierarchy_walk.h"
 #include "query/query_model.h"
 
-/* As ebpo_collider_new, but the models may be subsets: results consider only the faces in the
- * files.
- */
+/* Makes a collider as ebpo_collider_new does, but accepts subsets of models; results then consider
+ * only the faces in the files. */
 EBPO_MUST_USE ebpo_status ebpo_collider_of_parts(ebpo_model *a, ebpo_model *b,
                                                  const ebpo_collider_options *options,
                                                  ebpo_collider **out, ebpo_error *error);
@@ -25,12 +24,13 @@ struct ebpo_collider {
     unsigned walk_count;
     uint64_t node_pairs, block_pairs, exact; /* as in ebpo_collider_stats */
     uint64_t subtree_pairs, subtrees, loads,
-        bytes_read;                /* members of it for partly loaded models */
-    struct ebpo_gap_search *gap;   /* state of distance queries, after the first one */
-    struct ebpo_face_two *nearest; /* the last nearest pair, of the caller's A and B; or NULL */
-    ebpo_context *context[2]; /* contexts of depth queries, after the first one of that model */
-    uint32_t *slots[2];       /* ebpo_face_slots of whole models, after the first query that needs
-                               * them */
+        bytes_read;                /* as in ebpo_collider_stats; only for partly loaded models */
+    struct ebpo_gap_search *gap;   /* state of distance queries; NULL before the first one */
+    struct ebpo_face_two *nearest; /* nearest pair of the last distance query, in the caller's
+                                    * order; or NULL */
+    ebpo_context *context[2]; /* contexts of depth queries; NULL before the first one of a model */
+    uint32_t *slots[2];       /* ebpo_face_slots of models that are entirely in memory; NULL before
+                               * the first query that needs the array */
 };
 
 /* A query with checked options. Its models are in an order that stays the same when the caller
@@ -38,13 +38,14 @@ struct ebpo_collider {
 typedef struct ebpo_collision {
     ebpo_collider *collider;
     ebpo_collide_options options;
-    bool turned; /* the caller's B comes first */
+    bool swapped; /* model[0] is the caller's B */
     ebpo_model *model[2];
     ebpo_block_posing posing[2];
-    double reach;  /* bound of the sizes of posed coordinates */
-    uint64_t late; /* deadline, a time of ebpo_clock; UINT64_MAX: none */
+    double max_coordinate; /* upper bound of the absolute values of all posed coordinates */
+    uint64_t deadline;     /* deadline, a time of ebpo_clock; UINT64_MAX: none */
 } ebpo_collision;
 
+/* Checks the options and prepares a query. Fails with EBPO_E_ARGUMENT (options, poses). */
 EBPO_MUST_USE ebpo_status ebpo_collision_begin(ebpo_collision *out, ebpo_collider *collider,
                                                const ebpo_collide_options *options,
                                                ebpo_error *error);
@@ -52,8 +53,9 @@ EBPO_MUST_USE ebpo_status ebpo_collision_begin(ebpo_collision *out, ebpo_collide
 /* Returns true if the deadline has passed. */
 bool ebpo_collision_is_late(const ebpo_collision *collision);
 
-/* Finds a contact of two hierarchies of the query's models: in found_pairs[0] and found_slot of the
- * collider's walk. *found is set as by ebpo_collide_first. stage: for the progress function. */
+/* Finds a contact of two hierarchies of the query's models. Sets *found as ebpo_collide_first does.
+ * If *found is 1, the contact is in found_pairs[0] and found_slot of the collider's walk. stage:
+ * for the progress function. */
 EBPO_MUST_USE ebpo_status ebpo_collision_first(const ebpo_collision *collision,
                                                const ebpo_accel *const accel[2], const char *stage,
                                                int32_t *found, ebpo_error *error);
@@ -64,11 +66,11 @@ uint64_t ebpo_collision_bytes_read(const ebpo_collision *collision);
 /* Returns true if a model is not entirely in memory. */
 bool ebpo_collision_is_in_parts(const ebpo_collision *collision);
 
-/* Begins a walk. A walk that was used before reuses its memory; a new one must be zero. The pair
+/* Begins a walk. A walk that was used before reuses its memory; a new walk must be zero. `pair`
  * must live as long as the walk is used. */
 void ebpo_pair_walk_begin(ebpo_pair_walk *walk, const ebpo_accel_pair *pair);
 
-/* Adds a walk's counts to the collider's. */
+/* Adds a walk's counts to the collider's counts, and resets them. */
 void ebpo_collider_count(ebpo_collider *collider, ebpo_pair_walk *walk);
 
 /* Converts a pair of local face indices of two accels (acceleration structures of subtrees) to the
@@ -76,7 +78,8 @@ void ebpo_collider_count(ebpo_collider *collider, ebpo_pair_walk *walk);
 ebpo_face_pair ebpo_collision_pair(const ebpo_collision *collision, const ebpo_accel *first,
                                    const ebpo_accel *second, const ebpo_found_pair *pair);
 
-/* Finds the pairs of ebpo_collide_self at a pose, which both poses of the options have. */
+/* Finds the pairs of ebpo_collide_self at a pose. pose_a and pose_b of the options must be equal.
+ */
 EBPO_MUST_USE ebpo_status ebpo_collide_self_posed(ebpo_collider *collider,
                                                   const ebpo_collide_options *options,
                                                   ebpo_pairs_fn take, void *user,
@@ -93,7 +96,7 @@ static inline ebpo_value_bounds ebpo_value_bounds_of(double lo, double hi)
                                 0 };
 }
 
-/* Number of pairs that a walk takes between checks of the clock. */
+/* Number of pairs of nodes that a walk visits between checks of the clock. */
 enum { EBPO_WALK_PAIRS = 1024 };
 
 #endif

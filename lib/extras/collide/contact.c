@@ -1,11 +1,12 @@
-/* Computes the segment that two crossing faces have in common, by its ends.
+/* Computes the ends of the segment that two crossing faces have in common.
  *
  * Exact signs (geometry/predicates.h) decide which edges pierce the other face, so the ends are on
- * the right edges. The point where an edge pierces a plane is computed in double-double arithmetic.
- * If numbers are too large or too small for its error bounds, the point is computed exactly with
- * GMP and rounded once. Neither the order of the faces nor the order of their corners changes a bit
- * of the points. Bounds: docs/develop/collision.md, "Contact of a crossing pair". The functions are
- * pure and can be called from any thread. */
+ * the right edges. The point where an edge pierces a plane is computed in double-double arithmetic
+ * (an ebpo_pair is a number: the sum of two doubles). If coordinates are too large or too small for
+ * the error bounds of that arithmetic, the point is computed exactly with GMP and rounded once.
+ * Neither the order of the faces nor the order of their corners changes a bit of the points.
+ * Bounds: docs/develop/collision.md, "Contact of a crossing pair". The functions are pure and can
+ * be called from any thread. */
 #include "core/strict_fp.h"
 
 #include "extras/collide/face_pairs.h"
@@ -17,8 +18,8 @@
 #include "geometry/integer_vectors.h"
 #include "geometry/triangle_pair.h"
 
-/* An edge with its ends on different sides of a plane, and three points of the plane. The ends and
- * the points are each sorted by coordinates. */
+/* An edge with its ends on different sides of a plane, and three points of the plane. The two ends
+ * are sorted by coordinates, and so are the three points. */
 typedef struct piercing {
     const double *end[2], *plane[3];
 } piercing;
@@ -43,8 +44,9 @@ static piercing piercing_of(const double edge_of[3][3], int from, int to, const 
 
 /* --- the point, in double-double arithmetic --- */
 
-/* Computes the signed distance of `point` from the plane through `from`, times the normal's length.
- * Returns the sum of the absolute values of its products, for the error bound. */
+/* Sets *height to the signed distance of `point` from the plane through `from`, times the normal's
+ * length. products: [k] sum of the absolute values of the two products in normal[k]. Returns the
+ * sum of the absolute values of the products in *height, for the error bound. */
 static double height_over(const ebpo_pair normal[3], const double products[3], const double *from,
                           const double *point, ebpo_pair *height)
 {
@@ -57,8 +59,8 @@ static double height_over(const ebpo_pair normal[3], const double products[3], c
     return sum;
 }
 
-/* Computes the position of the point as a fraction of the edge: height[0] / (height[0] -
- * height[1]). Returns false if its error may be too large. */
+/* Sets *share to the position of the piercing point as a fraction of the edge: height[0] /
+ * (height[0] - height[1]). Returns false if the error of *share may be too large. */
 static bool share_of_edge(const piercing *p, ebpo_pair *share)
 {
     ebpo_pair e[3], f[3], normal[3], height[2];
@@ -72,12 +74,12 @@ static bool share_of_edge(const piercing *p, ebpo_pair *share)
     }
     for (int i = 0; i < 2; i++)
         most = fmax(most, height_over(normal, products, p->plane[0], p->end[i], &height[i]));
-    ebpo_pair both = ebpo_pair_subtract(height[0], height[1]);
-    *share = ebpo_pair_divide(height[0], both);
-    return most <= 0x1p30 * fabs(both.head) && fabs(both.head) >= 0x1p-600;
+    ebpo_pair difference = ebpo_pair_subtract(height[0], height[1]);
+    *share = ebpo_pair_divide(height[0], difference);
+    return most <= 0x1p30 * fabs(difference.head) && fabs(difference.head) >= 0x1p-600;
 }
 
-/* Returns false if numbers are so large or small that the error bounds do not hold. */
+/* Returns false if coordinates are so large or small that the error bounds do not hold. */
 static bool is_ordinary(const piercing *p)
 {
     const double *const all[] = { p->end[0], p->end[1], p->plane[0], p->plane[1], p->plane[2] };
@@ -92,7 +94,8 @@ static bool is_ordinary(const piercing *p)
     return true;
 }
 
-/* Computes the point in double-double arithmetic; returns false if its error may be too large. */
+/* Computes the piercing point in double-double arithmetic. Returns false if its error may be too
+ * large. */
 static bool point_by_pairs(const piercing *p, double out[3])
 {
     ebpo_pair share, d[3];
@@ -172,7 +175,8 @@ static void compute_piercing(const piercing *p, double out[3])
 
 /* --- which edge pierces --- */
 
-/* An edge of a face, from the corner that is the only one on its side of the other face's plane. */
+/* An edge of a face. It begins at the corner that is alone on one side of the other face's plane.
+ */
 typedef struct edge {
     const double (*face)[3], (*plane)[3];
     int from, to;
@@ -198,8 +202,8 @@ static void end_of(const edge *e, double out[3])
     compute_piercing(&p, out);
 }
 
-/* Chooses one of two edges with the same piercing point: the edge that ends at this point, or else
- * the edge whose ends are less by coordinates. */
+/* Returns one of two edges with the same piercing point: the edge that ends at this point, or, if
+ * neither does, the edge whose ends precede in the order of coordinates. */
 static const edge *choose_edge(const edge *a, const edge *b)
 {
     if (a->ends_in_plane || b->ends_in_plane)
@@ -210,8 +214,8 @@ static const edge *choose_edge(const edge *a, const edge *b)
     return (order != 0 ? order : ebpo_corner_order(p.end[1], q.end[1])) <= 0 ? a : b;
 }
 
-/* Sets an end of the segment: where A's edge pierces B (order < 0), where B's edge pierces A (order
- * > 0), or where both happens (0). */
+/* Sets an end of the segment. order < 0: it is the point where A's edge pierces B; order > 0: the
+ * point where B's edge pierces A; 0: both are the same point. */
 static void set_end(const edge *a, const edge *b, int order, ebpo_contact_end *out)
 {
     end_of(order < 0 ? a : order > 0 ? b : choose_edge(a, b), out->point);
@@ -226,13 +230,13 @@ void ebpo_triangle_contact(const double a[3][3], const double b[3][3], ebpo_cont
     if (!ebpo_prepare_pair(a, b, &t, &kind))
         return;
     bool reversed = t.flipped_a != t.flipped_b;
-    edge of_a[2], of_b[2]; /* edges to corners 1 and 2 */
+    edge of_a[2], of_b[2]; /* the edges from t.a[0] and t.b[0] to corners 1 and 2 */
     for (int i = 0; i < 2; i++) {
         of_a[i] = (edge){ a, b, t.a[0], t.a[i + 1], t.side_a[t.a[i + 1]] == 0 };
         of_b[i] = (edge){ b, a, t.b[0], t.b[i + 1], t.side_b[t.b[i + 1]] == 0 };
     }
-    /* A's interval goes from its edge to corner 2 to its edge to corner 1; B's interval goes the
-     * opposite way. */
+    /* On the common line, the interval of A begins at of_a[1] and ends at of_a[0]; the interval of
+     * B begins at of_b[0] and ends at of_b[1]. */
     set_end(&of_a[1], &of_b[0], ebpo_compare_ends(a, b, &t, 2, 1), &out[reversed]);
     set_end(&of_a[0], &of_b[1], -ebpo_compare_ends(a, b, &t, 1, 2), &out[!reversed]);
 }

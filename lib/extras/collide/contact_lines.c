@@ -34,7 +34,7 @@ typedef struct segment {
 } segment;
 
 typedef struct line_search {
-    ebpo_pair_faces places; /* for looking up faces */
+    ebpo_pair_faces lookup; /* for looking up faces */
     uint64_t most;          /* maximum number of segments */
     segment *segment;       /* [count] */
     end_key *key;           /* two for each segment */
@@ -44,9 +44,10 @@ typedef struct line_search {
     double *points, *normals;
     uint64_t *faces;
     uint64_t points_capacity, normals_capacity, faces_capacity;
-    bool full, no_memory; /* there are more than `most` segments; memory is short */
-    ebpo_error *error;    /* error of `status` */
-    ebpo_status status;
+    bool full;          /* there are more than `most` segments */
+    bool no_memory;     /* an allocation has failed */
+    ebpo_error *error;  /* error of `status` */
+    ebpo_status status; /* other failures */
 } line_search;
 
 /* --- gathering --- */
@@ -72,8 +73,9 @@ static void unit_normal(const double t[3][3], double out[3])
         out[k] /= length;
 }
 
-/* Sets `out` to the key of the feature `on` (an ebpo_feature) of a face of the caller's model m.
- * `t` has the face's corners as in the file. Returns false without memory. */
+/* Sets `out` to the key of a feature of a face of the caller's model m. on: ebpo_feature; 0 to 2: a
+ * corner, 3 to 5: an edge, more: the interior. t: the face's corners as in the file. Returns false
+ * without memory. */
 static bool set_feature(line_search *l, int m, uint64_t face, const double t[3][3], unsigned on,
                         uint32_t out[2])
 {
@@ -104,7 +106,7 @@ static bool add_segment(line_search *l, const ebpo_face_pair *pair)
         return false;
     segment *s = &l->segment[l->count];
     *s = (segment){ .after = NONE, .before = NONE };
-    l->status = ebpo_pose_pair(&l->places, pair, &faces, l->error);
+    l->status = ebpo_pose_pair(&l->lookup, pair, &faces, l->error);
     if (l->status != EBPO_OK)
         return true;
     ebpo_contact_of(&faces, pair, &s->contact);
@@ -113,10 +115,10 @@ static bool add_segment(line_search *l, const ebpo_face_pair *pair)
     for (unsigned e = 0; e < 2; e++) {
         end_key *k = &l->key[2 * l->count + e];
         k->end = (uint32_t)(2 * l->count + e);
-        const double(*own[2])[3] = { (const double(*)[3])faces.own[0],
-                                     (const double(*)[3])faces.own[1] };
-        if (!set_feature(l, 0, pair->file_face_a, own[0], s->contact.on_a[e], k->on[0]) ||
-            !set_feature(l, 1, pair->file_face_b, own[1], s->contact.on_b[e], k->on[1]))
+        const double(*unposed[2])[3] = { (const double(*)[3])faces.unposed[0],
+                                         (const double(*)[3])faces.unposed[1] };
+        if (!set_feature(l, 0, pair->file_face_a, unposed[0], s->contact.on_a[e], k->on[0]) ||
+            !set_feature(l, 1, pair->file_face_b, unposed[1], s->contact.on_b[e], k->on[1]))
             return false;
     }
     l->count++;
@@ -156,7 +158,7 @@ static int by_features(const void *x, const void *y)
     return order ? order : (p->end > q->end) - (p->end < q->end);
 }
 
-/* Joins segments where exactly one ends and exactly one begins. */
+/* Joins segments at each point where exactly one segment ends and exactly one begins. */
 static void join_segments(line_search *l)
 {
     uint64_t n = 2 * l->count;
@@ -186,8 +188,8 @@ static bool add_point(line_search *l, const double at[3])
     return true;
 }
 
-/* Adds the first point of a segment, its faces and normals. The segment's second point is the first
- * one of the next segment. */
+/* Adds to the line the first point of a segment, its faces and normals. The segment's second point
+ * is the first point of the next segment. Returns false without memory. */
 static bool add_to_line(line_search *l, segment *s)
 {
     uint64_t n = l->line.count;
@@ -202,7 +204,8 @@ static bool add_to_line(line_search *l, segment *s)
     return true;
 }
 
-/* Makes the line that contains segment i, the first segment that is not yet reported. */
+/* Makes the line that contains segment i, the first segment that has not been reported. Returns
+ * false without memory. */
 static bool make_line(line_search *l, uint32_t i)
 {
     uint32_t first = i, last = NONE;
@@ -250,7 +253,7 @@ static ebpo_status fail_lines(const line_search *l, ebpo_error *error)
 
 static void free_lines(line_search *l)
 {
-    ebpo_pair_faces_end(&l->places);
+    ebpo_pair_faces_end(&l->lookup);
     for (int i = 0; i < 2; i++)
         ebpo_corner_ids_free(&l->corners[i]);
     free(l->segment);
@@ -260,6 +263,8 @@ static void free_lines(line_search *l)
     free(l->faces);
 }
 
+/* Memory of a segment with its share of all arrays, and the greatest number of segments, whose ends
+ * have indices of 32 bits. */
 enum { SEGMENT_BYTES = 256, SEGMENTS_MAX = 1 << 30 };
 
 uint64_t ebpo_contact_lines_max(const ebpo_collider *c)
@@ -276,7 +281,7 @@ ebpo_status ebpo_collide_polylines(ebpo_collider *c, const ebpo_collide_options 
     line_search l = { .error = error, .most = ebpo_contact_lines_max(c) };
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status == EBPO_OK)
-        status = ebpo_pair_faces_begin(&l.places, &q, error);
+        status = ebpo_pair_faces_begin(&l.lookup, &q, error);
     if (status == EBPO_OK)
         status = ebpo_collide_all(c, options, receive_pairs, &l, error);
     if (status == EBPO_OK)

@@ -1,11 +1,12 @@
 /* Finds patches of faces: the connected components of a mesh.
  *
- * Faces are connected by corners with equal coordinates, or by edges that two faces share. They are
- * joined in a disjoint-set forest whose roots are the first faces of the patches. A hash table
- * gives corners with equal coordinates the same index (0 and -0 are equal).
+ * One function connects faces by corners with equal coordinates, the other one by edges that
+ * exactly two faces share. Connected faces are joined in a disjoint-set forest, in which the root
+ * of a tree is the first face of the patch. A hash table gives corners with equal coordinates the
+ * same index (0 and -0 are equal).
  *
- * A patch whose faces intersect no face of the other model lies entirely on one side of that model.
- * The relation of two models and the exact volumes of results rely on this. */
+ * If no face of a patch intersects another model, the patch is entirely on one side of that model.
+ * The relation of two models and the exact volumes of Boolean operations rely on this. */
 #include "core/strict_fp.h"
 
 #include <stdint.h>
@@ -21,8 +22,8 @@
 
 /* --- joined faces --- */
 
-/* Returns the first face that is joined with `face` so far, and shortens paths in the forest
- * `first`. Initially first[face] = face. */
+/* Returns the root of the tree of `face` in the forest: the first face of all faces joined with
+ * `face` so far. first[face]: parent of the face; initially the face itself. Shortens paths. */
 static inline uint32_t first_joined(uint32_t *first, uint32_t face)
 {
     while (first[face] != face) {
@@ -55,7 +56,7 @@ static bool same_corner(const double p[3], const double q[3])
     return p[0] == q[0] && p[1] == q[1] && p[2] == q[2];
 }
 
-/* Returns the corner's entry of the table, or the free entry where it can be added. */
+/* Returns the corner's entry of the table, or the free entry for it. */
 static uint32_t *find_corner(const ebpo_corner_ids *ids, const double x[3])
 {
     uint64_t i = hash_of(x) & (ids->table_size - 1);
@@ -110,7 +111,7 @@ void ebpo_corner_ids_free(ebpo_corner_ids *ids)
 
 typedef struct corner_joining {
     ebpo_corner_ids corners;
-    uint32_t *user; /* [corner] a face that has it */
+    uint32_t *user; /* [corner] a face that has this corner */
     uint64_t users; /* capacity of `user` */
 } corner_joining;
 
@@ -162,9 +163,9 @@ ebpo_status ebpo_face_patches(const ebpo_accel *subtree, const uint32_t *slots,
 
 /* --- patches over edges --- */
 
-/* Each edge of a face is in the list of its corner with the lesser index. An entry has the other
- * corner and the face. If exactly two entries of a list have the same other corner, their faces are
- * joined. */
+/* Each corner has a list of the edges at whose other end is a corner with a greater index. An entry
+ * has the other corner and a face with this edge. If exactly two entries of a list have the same
+ * other corner, their faces are joined. */
 
 #define NO_CORNER UINT32_MAX
 
@@ -204,7 +205,7 @@ static bool edge_of(const edge_lists *e, uint32_t f, int i, uint32_t *lesser, ui
     return e->corner[f][0] != NO_CORNER;
 }
 
-/* Counts the entries, then fills the lists from their ends. */
+/* Counts the entries of all lists, then fills the lists. */
 static void list_edges(edge_lists *e, uint64_t corners)
 {
     uint32_t at, other;
@@ -271,6 +272,7 @@ ebpo_status ebpo_edge_patches(const ebpo_accel *whole, const uint32_t *slots,
     free(e.edge);
     if (!ok) {
         free(e.patch);
+        /* 60 bytes for each face: corner, end, edge and patch, approximately */
         return ebpo_fail_memory(error, whole->face_count * (uint64_t)60);
     }
     *out = e.patch;

@@ -1,4 +1,4 @@
-/* Finds patches of connected faces. */
+/* Finds patches: sets of connected faces. */
 #ifndef EBPO_COLLIDE_FACE_PATCHES_H
 #define EBPO_COLLIDE_FACE_PATCHES_H
 
@@ -25,19 +25,19 @@ bool ebpo_corner_id(ebpo_corner_ids *ids, const double x[3], uint32_t *id);
 bool ebpo_corner_ids_reserve(ebpo_corner_ids *ids, uint64_t count);
 void ebpo_corner_ids_free(ebpo_corner_ids *ids);
 
-/* Finds the patches of a subtree's owned faces, which are connected by corners with equal
- * coordinates. (*out)[i] is the first face of the patch of the owned face i, whose index in the
- * file is subtree->first_face + i. Omitted faces (`omitted` has a bit for each face of the file)
- * connect no other faces; each of them is a separate patch. slots: ebpo_face_slots. The caller
- * frees the result. */
+/* Finds the patches of the faces that a subtree owns (those that no earlier subtree lists). Faces
+ * of a patch are connected by corners with equal coordinates. (*out)[i] is the least i of a face in
+ * the patch of the owned face i, whose index in the file is subtree->first_face + i. `omitted` has
+ * a bit for each face of the file; a face whose bit is set is a separate patch and connects no
+ * other faces. slots: ebpo_face_slots. The caller frees the result. */
 EBPO_MUST_USE ebpo_status ebpo_face_patches(const ebpo_accel *subtree, const uint32_t *slots,
                                             const uint64_t *omitted, uint32_t **out,
                                             ebpo_error *error);
 
-/* Finds the patches of a whole model at a pose. They are connected by edges (pairs of equal posed
- * corners) that exactly two faces with an area share. (*out)[i] is the first face of the patch of
- * the face whose index in the file is i. A face without area is a separate patch. slots:
- * ebpo_face_slots. The caller frees the result. */
+/* Finds the patches of a whole model at a pose. Faces of a patch are connected by edges (pairs of
+ * equal posed corners) that exactly two faces with an area share. (*out)[i] is the least index of a
+ * face in the patch of face i; indices are those in the file. A face without area is a separate
+ * patch. slots: ebpo_face_slots. The caller frees the result. */
 EBPO_MUST_USE ebpo_status ebpo_edge_patches(const ebpo_accel *whole, const uint32_t *slots,
                                             const ebpo_posing *posing, uint32_t **out,
                                             ebpo_error *error);

@@ -4,9 +4,9 @@
  * the two other coordinates, which are GMP fractions. Other faces cut it along segments, the cuts.
  * Values of p at which a cut begins, ends or crosses another cut are events. Between neighbouring
  * events (in a strip) the cuts have one order in q, so they divide the strip into parts. Two parts
- * of neighbouring strips belong to one piece if their borders share an open interval that is no
- * cut. For each point, the faces in the same plane that contain it are counted by their
- * orientation. See docs/develop/collision.md, "Relation of two models". */
+ * of neighbouring strips belong to one piece if their borders have an open interval in common that
+ * no cut covers. For each point, the other faces in the same plane that contain it are counted by
+ * their orientation. See docs/develop/collision.md, "Relation of two models". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -32,7 +32,7 @@ static bool capacity_for_cut(ebpo_face_cuts *f)
     return true;
 }
 
-/* Adds a value of p to the events. Sets f->no_memory if memory is short. */
+/* Adds a value of p to the events. Sets f->no_memory if there is not enough memory. */
 static void add_event(ebpo_face_cuts *f, const mpq_t p)
 {
     if (!ebpo_grow(&f->event, &f->event_capacity, f->events + 1, sizeof *f->event)) {
@@ -44,8 +44,8 @@ static void add_event(ebpo_face_cuts *f, const mpq_t p)
     mpq_set(f->event[f->events++], p);
 }
 
-/* Adds the point (p, q) to the vertices, if all cuts are wanted. Sets f->no_memory if memory is
- * short. */
+/* Adds the point (p, q) to the vertices if f->all_cuts. Sets f->no_memory if there is not enough
+ * memory. */
 static void add_vertex(ebpo_face_cuts *f, const mpq_t p, const mpq_t q)
 {
     if (!f->all_cuts)
@@ -62,7 +62,8 @@ static void add_vertex(ebpo_face_cuts *f, const mpq_t p, const mpq_t q)
 
 /* --- the face --- */
 
-/* Chooses the axis of the projection: one on which the normal is not 0 and, in doubles, longest. */
+/* Chooses the axis of the projection: the axis on which the normal's component is not 0 and,
+ * computed in doubles, greatest. */
 static void choose_projection(ebpo_face_cuts *f)
 {
     double most = -1;
@@ -113,8 +114,8 @@ static void set_plane(ebpo_face_cuts *f)
     }
 }
 
-/* Orients the cut whose ends are in f->cut[f->cuts], and adds it; a cut of length 0 adds only an
- * event and a vertex. */
+/* Orients the cut whose ends are in f->cut[f->cuts], and adds it. Adds only an event and a vertex
+ * for a cut of length 0. */
 static void finish_cut(ebpo_face_cuts *f)
 {
     ebpo_face_cut *c = &f->cut[f->cuts];
@@ -146,10 +147,10 @@ static void set_end(ebpo_face_cuts *f, int end, const double x[3])
     mpq_set_d(f->cut[f->cuts].q[end], x[f->v]);
 }
 
-/* Cuts with lower indices are the edges of the face itself. */
+/* The first FACE_EDGES cuts are the edges of the face itself. */
 enum { FACE_EDGES = 3 };
 
-/* Adds the edges of t, a face in the same plane, as cuts. */
+/* Adds the edges of t as cuts. t is the face itself or another face in the same plane. */
 static void cut_along_edges(ebpo_face_cuts *f, const double t[3][3])
 {
     for (int i = 0; i < 3; i++) {
@@ -183,7 +184,7 @@ void ebpo_face_cuts_begin(ebpo_face_cuts *f, const double corner[3][3], bool all
 
 /* --- other faces --- */
 
-/* Returns the side of edge i on which the projection of x is: 1: inside, -1: outside, 0: on its
+/* Returns the side of edge i of the projection of x: 1: inside, -1: outside, 0: on the edge's
  * line. */
 static int side_of_projection(const ebpo_face_cuts *f, int i, const double x[3])
 {
@@ -192,8 +193,8 @@ static int side_of_projection(const ebpo_face_cuts *f, int i, const double x[3])
                                    (double[]){ x[f->u], x[f->v] });
 }
 
-/* Returns true if all corners of t are on the outer side, or on the line, of one edge of the
- * face. */
+/* Returns true if, for an edge of the face, all corners of t are on the outer side or on the edge's
+ * line. */
 static bool beyond_an_edge(const ebpo_face_cuts *f, const double t[3][3])
 {
     for (int i = 0; i < 3; i++)
@@ -203,8 +204,8 @@ static bool beyond_an_edge(const ebpo_face_cuts *f, const double t[3][3])
     return false;
 }
 
-/* Sets an end of the new cut to the point where the edge from a to b pierces the plane; a and b are
- * on different sides of the plane. */
+/* Sets an end (0 or 1) of the new cut to the point where the edge from a to b pierces the face's
+ * plane; a and b are on different sides of the plane. */
 static void set_piercing(ebpo_face_cuts *f, int end, const double a[3], const double b[3])
 {
     mpq_t *s = f->scratch;
@@ -228,7 +229,8 @@ static void set_piercing(ebpo_face_cuts *f, int end, const double a[3], const do
     }
 }
 
-/* Adds the cut of a face t that intersects the plane. side: sides of its corners. */
+/* Adds the cut of a face t that intersects the plane of this face. side: sides of the plane on
+ * which the corners of t are. */
 static void cut_across(ebpo_face_cuts *f, const double t[3][3], const int side[3])
 {
     int ends = 0;
@@ -239,14 +241,14 @@ static void cut_across(ebpo_face_cuts *f, const double t[3][3], const int side[3
         else if (side[i] == -side[next])
             set_piercing(f, ends++, t[i], t[next]);
     }
-    if (ends == 1) {
+    if (ends == 1) { /* only a corner is in the plane: a cut of length 0 */
         mpq_set(f->cut[f->cuts].p[1], f->cut[f->cuts].p[0]);
         mpq_set(f->cut[f->cuts].q[1], f->cut[f->cuts].q[0]);
     }
     finish_cut(f);
 }
 
-/* Adds a face in the same plane. */
+/* Adds a face t in the same plane, and its edges as cuts. */
 static void add_flat(ebpo_face_cuts *f, const double t[3][3], int model)
 {
     if (!ebpo_grow(&f->flat, &f->flat_capacity, f->flats + 1, sizeof *f->flat)) {
@@ -282,7 +284,7 @@ void ebpo_face_cuts_add(ebpo_face_cuts *f, const double t[3][3], int model)
         f->no_memory = true;
 }
 
-/* Returns the side of the projected line from a to b on which (p, q) is: positive: left, negative:
+/* Returns the side of (p, q) relative to the projected line from a to b: positive: left, negative:
  * right, 0: on the line. */
 static int side_of_edge(ebpo_face_cuts *f, const double a[3], const double b[3], const mpq_t p,
                         const mpq_t q)
@@ -359,6 +361,7 @@ static void value_of_cut(const ebpo_face_cut *c, const mpq_t p, mpq_t out)
     mpq_add(out, out, c->q[0]);
 }
 
+/* Returns true if the cut is parallel to the q axis. */
 static bool is_upright(const ebpo_face_cut *c) { return mpq_equal(c->p[0], c->p[1]) != 0; }
 
 static bool cut_reaches(const ebpo_face_cut *c, const mpq_t p)
@@ -366,7 +369,7 @@ static bool cut_reaches(const ebpo_face_cut *c, const mpq_t p)
     return mpq_cmp(c->p[0], p) <= 0 && mpq_cmp(c->p[1], p) >= 0;
 }
 
-/* Adds the crossing of two cuts that are not parallel to the q axis. */
+/* Adds the crossing of two cuts, neither of which is parallel to the q axis. */
 static void cross_two(ebpo_face_cuts *f, const ebpo_face_cut *a, const ebpo_face_cut *b)
 {
     mpq_t *s = f->scratch;
@@ -435,7 +438,7 @@ static void fraction_between(const mpq_t low, const mpq_t high, mpq_t out)
     mpq_div_2exp(out, out, 1);
 }
 
-/* Positions in a strip. */
+/* Positions in a strip: its left border, a value of p in its interior, its right border. */
 enum { LEFT, MIDDLE, RIGHT };
 
 static mpq_t *value_at(const ebpo_face_cuts *f, uint32_t cut, int where)
@@ -494,8 +497,9 @@ static uint64_t cuts_of_strip(ebpo_face_cuts *f, const mpq_t p[3])
     return kept;
 }
 
-/* Returns true if a part of the previous strip, whose intervals are border[before], and this part,
- * from `low` to `high`, share an open interval of the border between the strips. */
+/* Returns true if a part of the previous strip (its intervals are border[before]) and this part,
+ * which is between `low` and `high`, have an open interval of the border between the strips in
+ * common. */
 static bool continues_piece(const ebpo_face_cuts *f, int before, const mpq_t low, const mpq_t high)
 {
     for (uint64_t i = 0; i < f->borders[before]; i++) {
@@ -552,7 +556,8 @@ static ebpo_status visit_at(ebpo_face_cuts *f, const mpq_t p, const mpq_t q, mpq
 }
 
 typedef struct strip_scratch {
-    mpq_t p[3], q, x[3];
+    mpq_t p[3];    /* values of p at LEFT, MIDDLE and RIGHT of the current strip */
+    mpq_t q, x[3]; /* temporary values */
 } strip_scratch;
 
 /* Returns true if the target is on the left or right border of the part between the cuts low and

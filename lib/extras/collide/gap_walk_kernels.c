@@ -1,11 +1,13 @@
-/* Walks through pairs of nodes of two hierarchies for the distance of two models, eight children at
- * a time, in floats. This file is compiled for several instruction sets with the same results.
+/* Walks through pairs of nodes of two hierarchies to find the nearest faces of two models, eight
+ * children at a time, in floats. This file is compiled for several instruction sets with the same
+ * results. Names that end in 8 handle eight values at once.
  *
  * The distance of two nodes has three lower bounds: the gap of their boxes, the gap of their
  * bounding cylinders, and the gap along the direction of the best pair of faces. The walk is
  * depth-first until a limit is known; then a heap returns the least bound first. In a pair of
- * blocks the distance of each pair of faces is bounded by near points of both. A pair is dropped
- * only if it is certainly not nearer than the limit; collide_distance.c decides the others. Bounds:
+ * blocks the distance of each pair of faces is bounded by a point of each face, which are near each
+ * other. A pair is dropped only if it is certainly not nearer than the limit; collide_distance.c
+ * decides the remaining pairs. Bounds:
  * docs/develop/collision.md, "Bounds of pairs of nodes" and "Distance of two faces". */
 #include "core/strict_fp.h"
 
@@ -18,52 +20,55 @@
 /* --- pairs of faces --- */
 
 /* Eight points or vectors. */
-typedef struct place8 {
+typedef struct point8 {
     f8 x[3];
-} place8;
+} point8;
 
 typedef struct triangle8 {
-    place8 corner[3];
+    point8 corner[3];
 } triangle8;
 
-EBPO_EIGHT f8 place_dot8(const place8 *a, const place8 *b)
+EBPO_EIGHT f8 point_dot8(const point8 *a, const point8 *b)
 {
     return f8_add(f8_add(f8_mul(a->x[0], b->x[0]), f8_mul(a->x[1], b->x[1])),
                   f8_mul(a->x[2], b->x[2]));
 }
-EBPO_EIGHT place8 place_minus8(const place8 *a, const place8 *b)
+EBPO_EIGHT point8 point_minus8(const point8 *a, const point8 *b)
 {
-    place8 out;
+    point8 out;
     for (int k = 0; k < 3; k++)
         out.x[k] = f8_sub(a->x[k], b->x[k]);
     return out;
 }
 /* Returns a + t b. */
-EBPO_EIGHT place8 place_along8(const place8 *a, f8 t, const place8 *b)
+EBPO_EIGHT point8 point_along8(const point8 *a, f8 t, const point8 *b)
 {
-    place8 out;
+    point8 out;
     for (int k = 0; k < 3; k++)
         out.x[k] = f8_add(a->x[k], f8_mul(t, b->x[k]));
     return out;
 }
 /* Returns a d - b c. */
 EBPO_EIGHT f8 minor_of8(f8 a, f8 b, f8 c, f8 d) { return f8_sub(f8_mul(a, d), f8_mul(b, c)); }
-EBPO_EIGHT place8 place_cross8(const place8 *a, const place8 *b)
+EBPO_EIGHT point8 point_cross8(const point8 *a, const point8 *b)
 {
-    return (place8){ { minor_of8(a->x[1], a->x[2], b->x[1], b->x[2]),
+    return (point8){ { minor_of8(a->x[1], a->x[2], b->x[1], b->x[2]),
                        minor_of8(a->x[2], a->x[0], b->x[2], b->x[0]),
                        minor_of8(a->x[0], a->x[1], b->x[0], b->x[1]) } };
 }
 /* Limits t to 0 .. 1; NaN becomes 0. */
 EBPO_EIGHT f8 within_unit8(f8 t) { return f8_min(f8_max(t, f8_all(0)), f8_all(1)); }
 
-/* The nearest pair of points so far: the vector from A's point to B's, and its squared length. */
+/* The nearest pair of points so far: the vector from A's point to B's point, and its squared
+ * length. */
 typedef struct nearest8 {
     f8 square;
-    place8 direction;
+    point8 direction;
 } nearest8;
 
-EBPO_EIGHT void offer_nearest8(nearest8 *n, const place8 *direction, f8 square)
+/* Keeps the vector `direction`, whose squared length is `square`, in each lane in which it is
+ * shorter. */
+EBPO_EIGHT void offer_nearest8(nearest8 *n, const point8 *direction, f8 square)
 {
     f8 better = f8_less(square, n->square);
     n->square = f8_pick(better, square, n->square);
@@ -71,10 +76,10 @@ EBPO_EIGHT void offer_nearest8(nearest8 *n, const place8 *direction, f8 square)
         n->direction.x[k] = f8_pick(better, direction->x[k], n->direction.x[k]);
 }
 
-/* Edges with their squared lengths and the reciprocals. */
+/* The edges of faces. */
 typedef struct edges8 {
-    place8 edge[3];
-    f8 square[3], inverse[3];
+    point8 edge[3];           /* vectors along the edges */
+    f8 square[3], inverse[3]; /* squared lengths, and their reciprocals */
 } edges8;
 
 EBPO_EIGHT edges8 edges_of8(const triangle8 *t)
@@ -82,57 +87,58 @@ EBPO_EIGHT edges8 edges_of8(const triangle8 *t)
     edges8 out;
 #pragma GCC unroll 3
     for (int i = 0; i < 3; i++) {
-        out.edge[i] = place_minus8(&t->corner[i == 2 ? 0 : i + 1], &t->corner[i]);
-        out.square[i] = place_dot8(&out.edge[i], &out.edge[i]);
+        out.edge[i] = point_minus8(&t->corner[i == 2 ? 0 : i + 1], &t->corner[i]);
+        out.square[i] = point_dot8(&out.edge[i], &out.edge[i]);
         out.inverse[i] = f8_div(f8_all(1), out.square[i]);
     }
     return out;
 }
 
-/* Compares with the nearest points of edge i of a, from p, and edge j of b, from q. */
-EBPO_EIGHT void offer_edges8(nearest8 *n, const place8 *p, const edges8 *a, int i, const place8 *q,
+/* Offers the nearest points of two edges: edge i of a, which begins at p, and edge j of b, which
+ * begins at q. */
+EBPO_EIGHT void offer_edges8(nearest8 *n, const point8 *p, const edges8 *a, int i, const point8 *q,
                              const edges8 *b, int j)
 {
-    const place8 *e = &a->edge[i], *f = &b->edge[j];
-    place8 w = place_minus8(q, p);
-    f8 ef = place_dot8(e, f), ew = place_dot8(e, &w), fw = place_dot8(f, &w);
+    const point8 *e = &a->edge[i], *f = &b->edge[j];
+    point8 w = point_minus8(q, p);
+    f8 ef = point_dot8(e, f), ew = point_dot8(e, &w), fw = point_dot8(f, &w);
     f8 area = minor_of8(a->square[i], ef, ef, b->square[j]);
     f8 s = within_unit8(f8_div(minor_of8(ew, fw, ef, b->square[j]), area));
     f8 t = within_unit8(f8_mul(f8_sub(f8_mul(s, ef), fw), b->inverse[j]));
     s = within_unit8(f8_mul(f8_add(f8_mul(t, ef), ew), a->inverse[i]));
-    place8 direction = place_along8(&w, t, f);
-    direction = place_along8(&direction, f8_sub(f8_all(0), s), e);
-    offer_nearest8(n, &direction, place_dot8(&direction, &direction));
+    point8 direction = point_along8(&w, t, f);
+    direction = point_along8(&direction, f8_sub(f8_all(0), s), e);
+    offer_nearest8(n, &direction, point_dot8(&direction, &direction));
 }
 
-/* Compares the nearest points so far with each corner above the interior of a face and the corner's
- * nearest point on the face. sign: 1 if the corners are A's, otherwise -1. */
+/* Offers each corner that is above the interior of a face, with its nearest point on the face.
+ * sign: 1 if the corners belong to A, -1 if they belong to B. */
 EBPO_EIGHT void offer_corners8(nearest8 *n, const triangle8 *face, const edges8 *of,
                                const triangle8 *corners, float sign)
 {
-    const place8 *e = &of->edge[0];
-    place8 f = place_minus8(&face->corner[2], &face->corner[0]), normal = place_cross8(e, &f),
-           to_e = place_cross8(&f, &normal), to_f = place_cross8(&normal, e);
-    f8 inverse = f8_div(f8_all(1), place_dot8(&normal, &normal)), zero = f8_all(0);
+    const point8 *e = &of->edge[0];
+    point8 f = point_minus8(&face->corner[2], &face->corner[0]), normal = point_cross8(e, &f),
+           to_e = point_cross8(&f, &normal), to_f = point_cross8(&normal, e);
+    f8 inverse = f8_div(f8_all(1), point_dot8(&normal, &normal)), zero = f8_all(0);
 #pragma GCC unroll 3
     for (int i = 0; i < 3; i++) {
-        place8 d = place_minus8(&corners->corner[i], &face->corner[0]);
-        f8 s = f8_mul(place_dot8(&d, &to_e), inverse), t = f8_mul(place_dot8(&d, &to_f), inverse);
+        point8 d = point_minus8(&corners->corner[i], &face->corner[0]);
+        f8 s = f8_mul(point_dot8(&d, &to_e), inverse), t = f8_mul(point_dot8(&d, &to_f), inverse);
         f8 over = f8_and(f8_and(f8_at_most(zero, s), f8_at_most(zero, t)),
                          f8_at_most(f8_add(s, t), f8_all(1)));
-        place8 up = place_along8(&d, f8_sub(zero, s), e);
-        up = place_along8(&up, f8_sub(zero, t), &f);
-        f8 square = f8_pick(over, place_dot8(&up, &up), f8_all(INFINITY));
+        point8 up = point_along8(&d, f8_sub(zero, s), e);
+        up = point_along8(&up, f8_sub(zero, t), &f);
+        f8 square = f8_pick(over, point_dot8(&up, &up), f8_all(INFINITY));
         for (int k = 0; k < 3; k++)
             up.x[k] = f8_mul(up.x[k], f8_all(-sign));
         offer_nearest8(n, &up, square);
     }
 }
 
-/* Bounds eight distances, and computes the vectors between near points. No coordinate is greater
- * than `size`, or differs by more than `error` from its exact value. */
+/* Bounds eight distances by *low and *high, and computes the vectors between the near points. No
+ * coordinate is greater than `size` or differs from its exact value by more than `error`. */
 EBPO_EIGHT void bounds_of_pairs8(const triangle8 *a, const triangle8 *b, float size, float error,
-                                 f8 *low, f8 *high, place8 *direction)
+                                 f8 *low, f8 *high, point8 *direction)
 {
     edges8 of_a = edges_of8(a), of_b = edges_of8(b);
     nearest8 n = { f8_all(INFINITY), { { f8_all(0), f8_all(0), f8_all(0) } } };
@@ -144,11 +150,11 @@ EBPO_EIGHT void bounds_of_pairs8(const triangle8 *a, const triangle8 *b, float s
     offer_corners8(&n, a, &of_a, b, -1);
     offer_corners8(&n, b, &of_b, a, 1);
     f8 most =
-           f8_max3(place_dot8(&n.direction, &a->corner[0]), place_dot8(&n.direction, &a->corner[1]),
-                   place_dot8(&n.direction, &a->corner[2])),
+           f8_max3(point_dot8(&n.direction, &a->corner[0]), point_dot8(&n.direction, &a->corner[1]),
+                   point_dot8(&n.direction, &a->corner[2])),
        least =
-           f8_min3(place_dot8(&n.direction, &b->corner[0]), place_dot8(&n.direction, &b->corner[1]),
-                   place_dot8(&n.direction, &b->corner[2]));
+           f8_min3(point_dot8(&n.direction, &b->corner[0]), point_dot8(&n.direction, &b->corner[1]),
+                   point_dot8(&n.direction, &b->corner[2]));
     f8 length = f8_sqrt(n.square), lost = f8_all(40 * 0x1p-24f * size + 4 * error + 0x1p-60f);
     f8 gap = f8_div(f8_mul(f8_sub(least, most), f8_all(1 - 0x1p-20f)), length);
     *low = f8_pick(f8_less(f8_all(0x1p-110f), n.square), f8_sub(gap, lost), f8_all(-1));
@@ -176,8 +182,8 @@ EBPO_EIGHT void node_boxes(ebpo_gap_node *out, const ebpo_bound *b, const ebpo_t
     }
 }
 
-/* Decodes bounding cylinders. A cylinder without an axis gets an extreme length, so that it gives
- * no bound. */
+/* Decodes bounding cylinders. A child without a cylinder gets an extreme length, so that the
+ * cylinder excludes no pair. */
 EBPO_EIGHT void node_cylinders(ebpo_gap_node *out, const ebpo_bound_cylinder *b,
                                const ebpo_turned_frame *f, float slack)
 {
@@ -210,7 +216,7 @@ EBPO_EIGHT f8 sine_of8(f8 cosine)
 }
 
 /* Computes how far the children extend along the search's direction. */
-EBPO_EIGHT void node_reach(ebpo_gap_node *out, const float along[3])
+EBPO_EIGHT void node_extent(ebpo_gap_node *out, const float along[3])
 {
     f8 boxes = f8_all(0), cylinders = f8_all(0), cosine = f8_all(0);
 #pragma GCC unroll 3
@@ -223,7 +229,7 @@ EBPO_EIGHT void node_reach(ebpo_gap_node *out, const float along[3])
     }
     cylinders = f8_add(cylinders, f8_add(f8_mul(f8_abs(cosine), f8_load(out->thick)),
                                          f8_mul(sine_of8(cosine), f8_load(out->radius))));
-    f8_store(out->reach, f8_min(boxes, cylinders));
+    f8_store(out->extent, f8_min(boxes, cylinders));
 }
 
 /* Returns the decoded children of a node; decodes them unless they are kept. */
@@ -238,7 +244,7 @@ static const ebpo_gap_node *decoded_node(ebpo_gap_search *g, int side, uint32_t 
         out->direction = 0;
     }
     if (out->direction != g->direction_number) {
-        node_reach(out, g->along[side]);
+        node_extent(out, g->along[side]);
         out->direction = g->direction_number;
     }
     return out;
@@ -246,8 +252,8 @@ static const ebpo_gap_node *decoded_node(ebpo_gap_search *g, int side, uint32_t 
 
 /* --- pairs of nodes --- */
 
-/* Returns the sums of the squared gaps of eight boxes of p and the box in lane j of q, along the
- * axes of frame f (0: that of p). *most: raised to the greatest gap. */
+/* Returns the sums of the squared gaps of the eight boxes of p and the box in lane j of q, along
+ * the axes of frame f (0: the frame of p). Raises *most to the greatest gap. */
 EBPO_EIGHT f8 box_gaps8(const ebpo_gap_node *p, const ebpo_gap_node *q, int j, int f, f8 slack,
                         f8 *most)
 {
@@ -264,7 +270,8 @@ EBPO_EIGHT f8 box_gaps8(const ebpo_gap_node *p, const ebpo_gap_node *q, int j, i
     return sum;
 }
 
-/* Returns the greater of the gaps of two cylinders along their axes, 0 or more. */
+/* Returns the greatest gap of the eight cylinders of p and cylinder j of q along their two axes, 0
+ * or more. */
 EBPO_EIGHT f8 cylinder_gaps8(const ebpo_gap_node *p, const ebpo_gap_node *q, int j)
 {
     f8 dot = f8_all(0), by_p = dot, by_q = dot, box_p = dot, box_q = dot, size_p = dot,
@@ -272,8 +279,8 @@ EBPO_EIGHT f8 cylinder_gaps8(const ebpo_gap_node *p, const ebpo_gap_node *q, int
 #pragma GCC unroll 3
     for (int k = 0; k < 3; k++) {
         f8 ap = f8_load(p->axis[0][k]), aq = f8_all(q->axis[0][k][j]),
-           aq_there = f8_all(q->axis[1][k][j]);
-        dot = f8_add(dot, f8_mul(ap, aq_there));
+           aq_in_p = f8_all(q->axis[1][k][j]);
+        dot = f8_add(dot, f8_mul(ap, aq_in_p));
         by_p =
             f8_add(by_p, f8_mul(ap, f8_sub(f8_load(p->middle[0][k]), f8_all(q->middle[1][k][j]))));
         by_q =
@@ -283,7 +290,7 @@ EBPO_EIGHT f8 cylinder_gaps8(const ebpo_gap_node *p, const ebpo_gap_node *q, int
         box_q =
             f8_add(box_q, f8_mul(aq, f8_sub(f8_load(p->centre[1][k]), f8_all(q->middle[0][k][j]))));
         size_p = f8_add(size_p, f8_mul(f8_abs(f8_load(p->axis[1][k])), f8_all(q->half[0][k][j])));
-        size_q = f8_add(size_q, f8_mul(f8_abs(aq_there), f8_load(p->half[0][k])));
+        size_q = f8_add(size_q, f8_mul(f8_abs(aq_in_p), f8_load(p->half[0][k])));
     }
     f8 cosine = f8_abs(dot), sine = sine_of8(dot), thick_p = f8_load(p->thick),
        thick_q = f8_all(q->thick[j]), none = f8_all(0);
@@ -296,14 +303,15 @@ EBPO_EIGHT f8 cylinder_gaps8(const ebpo_gap_node *p, const ebpo_gap_node *q, int
     return f8_max3(far_p, far_q, none);
 }
 
-/* Returns the keys of eight children of p with child j of q: squared lower bounds of their
- * distances; 0 or negative if boxes intersect. */
+/* Returns the keys (ebpo_gap_visit.key) of eight children of p with child j of q: squared lower
+ * bounds of their distances; 0 or negative if boxes intersect. */
 EBPO_EIGHT f8 gap_keys8(const ebpo_gap_search *g, const ebpo_gap_node *p, const ebpo_gap_node *q,
                         int j)
 {
     f8 slack = f8_all(g->frames.slack), most = f8_all(-INFINITY), zero = f8_all(0);
     f8 square = f8_max(box_gaps8(p, q, j, 0, slack, &most), box_gaps8(p, q, j, 1, slack, &most));
-    f8 gap = f8_sub(f8_all(g->along_shift - q->reach[j] - 8 * g->frames.slack), f8_load(p->reach));
+    f8 gap =
+        f8_sub(f8_all(g->along_shift - q->extent[j] - 8 * g->frames.slack), f8_load(p->extent));
     gap = f8_max(gap, zero);
     square = f8_max(square, f8_mul(gap, gap));
     if (f8_bits(f8_at_most(square, f8_all(g->square)))) {
@@ -315,7 +323,7 @@ EBPO_EIGHT f8 gap_keys8(const ebpo_gap_search *g, const ebpo_gap_node *p, const 
 
 /* --- pairs to be visited --- */
 
-/* Prefetches the memory of the pair that is visited next, unless a nearer one is found. */
+/* Prefetches the memory of the pair that is visited next unless a nearer pair is found. */
 EBPO_EIGHT void fetch_next(const ebpo_gap_search *g)
 {
     if (g->count == 0)
@@ -325,7 +333,7 @@ EBPO_EIGHT void fetch_next(const ebpo_gap_search *g)
         fetch_below(g->accel[i], below_child(g->accel[i], v->child[i]), true);
 }
 
-/* Adds a pair. While there is no heap, the pairs from index `base` on stay sorted, the least key on
+/* Adds a pair. In a stack, keeps the pairs from index `base` on sorted, with the least key on
  * top. */
 EBPO_EIGHT void push_visit(ebpo_gap_search *g, uint64_t base, ebpo_gap_visit v)
 {
@@ -351,8 +359,8 @@ static void sift_down(ebpo_gap_search *g, uint64_t at, ebpo_gap_visit v)
     g->stack[at] = v;
 }
 
-/* Makes a heap of the stack: from now on the least key comes first, so that no pair is visited
- * whose bound is above the final distance. */
+/* Makes a heap of the stack. From now on the pair with the least key is visited first, so that no
+ * pair is visited whose bound is above the final distance. */
 static void make_heap(ebpo_gap_search *g)
 {
     uint64_t kept = 0;
@@ -375,8 +383,8 @@ EBPO_EIGHT ebpo_gap_visit pop_visit(ebpo_gap_search *g)
     return out;
 }
 
-/* Pushes the pairs of each child of p, a node of model `side`, with child j of q. base: as for
- * push_visit. */
+/* Pushes the pairs of each child of p, a node of model `side`, with child j of q, unless they are
+ * too far apart. base: as for push_visit. */
 EBPO_EIGHT void push_eight(ebpo_gap_search *g, uint64_t base, int side, const ebpo_gap_node *p,
                            const ebpo_gap_node *q, int j)
 {
@@ -413,13 +421,15 @@ static void push_side(ebpo_gap_search *g, int side, uint32_t node, uint32_t othe
 
 /* --- pairs of blocks --- */
 
-/* Pairs of faces of two blocks, by their lanes; eight more valid entries follow the last pair. */
+/* Pairs of faces of two blocks, by their lanes. */
 typedef struct near_lanes {
-    int32_t lane[2][72];
+    int32_t lane[2][72]; /* [count + 8]: the entries after the last pair are 0, so that pairs can be
+                          * loaded eight at a time */
     unsigned count;
 } near_lanes;
 
-/* Finds the pairs of faces that may be within the limit, by their boxes and along the direction. */
+/* Finds the pairs of faces that may be within the limit, by their boxes and by their gap along the
+ * direction. shift: origin of b minus origin of a. */
 EBPO_EIGHT void near_by_boxes(const ebpo_gap_search *g, const ebpo_posed_faces *a,
                               const ebpo_posed_faces *b, const float shift[3], float error,
                               near_lanes *out)
@@ -483,7 +493,7 @@ EBPO_EIGHT triangle8 load_faces8(const ebpo_posed_faces *f, const int32_t *lane,
 /* If one of eight pairs is nearer than the best pair so far, makes the nearest pair the best pair,
  * and its direction the direction of the search. used: a bit for each valid pair. at: index of the
  * first of the eight pairs. */
-EBPO_EIGHT void update_best(ebpo_gap_search *g, f8 high, const place8 *direction, unsigned used,
+EBPO_EIGHT void update_best(ebpo_gap_search *g, f8 high, const point8 *direction, unsigned used,
                             const uint32_t block[2], const near_lanes *near, unsigned at)
 {
     unsigned nearer = used & f8_bits(f8_less(high, f8_all(g->best)));
@@ -518,7 +528,7 @@ EBPO_EIGHT bool add_candidates(ebpo_gap_search *g, f8 low, unsigned used, const 
     f8_store(lows, low);
     for (; used; used &= used - 1) {
         unsigned i = (unsigned)__builtin_ctz(used);
-        ebpo_gap_candidate *c = &g->waiting[g->waits++];
+        ebpo_gap_candidate *c = &g->waiting[g->waiting_count++];
         c->low = lows[i];
         for (int s = 0; s < 2; s++)
             c->slot[s] = block[s] * 8 + (uint32_t)near->lane[s][at + i];
@@ -537,8 +547,9 @@ static bool visit_blocks(ebpo_gap_search *g, const uint32_t block[2])
         shift[k] = (float)((b->base[k] - a->base[k]) * g->posing[0].unit);
         most = fabsf(shift[k]) > most ? fabsf(shift[k]) : most;
     }
-    float size = a->reach + b->reach + most;
-    float error = a->error + b->error + 0x1.2p-24f * (a->reach + b->reach) + 2.5f * 0x1p-24f * most;
+    float size = a->extent + b->extent + most;
+    float error =
+        a->error + b->error + 0x1.2p-24f * (a->extent + b->extent) + 2.5f * 0x1p-24f * most;
     near_lanes near;
     near_by_boxes(g, a, b, shift, error + 0x1p-22f * size, &near);
     g->block_pairs++;
@@ -550,30 +561,30 @@ static bool visit_blocks(ebpo_gap_search *g, const uint32_t block[2])
                   q = load_faces8(b, near.lane[1] + at, shift);
         unsigned used = near.count - at < 8 ? (1u << (near.count - at)) - 1 : 255;
         f8 low, high;
-        place8 direction;
+        point8 direction;
         bounds_of_pairs8(&p, &q, size, error, &low, &high, &direction);
         update_best(g, high, &direction, used, block, &near, at);
         intersects |= add_candidates(g, low, used, block, &near, at);
     }
-    return !intersects || g->judge(g);
+    return !intersects || g->decide_waiting(g);
 }
 
 /* --- the walk --- */
 
-/* Tests a pair again whose key was computed for an earlier direction. Returns true if it is too far
- * apart along the current one. */
+/* Returns true if a pair whose key was computed for an earlier direction is too far apart along the
+ * current direction. */
 static bool is_far_along(ebpo_gap_search *g, const ebpo_gap_visit *v)
 {
     if (v->direction == g->direction_number)
         return false;
     float gap = g->along_shift - 8 * g->frames.slack;
     for (int s = 0; s < 2; s++)
-        gap -= decoded_node(g, s, v->child[s] / 8)->reach[v->child[s] % 8];
+        gap -= decoded_node(g, s, v->child[s] / 8)->extent[v->child[s] % 8];
     return gap > 0 && gap * gap > g->square;
 }
 
-/* Returns the sum of the half sides of a child's box. Of two children, the one with the larger sum
- * is divided. */
+/* Returns the sum of the half sides of a child's box: of two children, the child with the greater
+ * sum is divided. */
 static float child_size(ebpo_gap_search *g, int side, uint32_t child)
 {
     const ebpo_gap_node *n = decoded_node(g, side, child / 8);
@@ -581,8 +592,7 @@ static float child_size(ebpo_gap_search *g, int side, uint32_t child)
 }
 
 /* Divides a pair and pushes the new pairs, or visits a pair of blocks. Returns false to end the
- * walk.
- */
+ * walk. */
 static bool visit_pair(ebpo_gap_search *g, const ebpo_gap_visit *v)
 {
     uint32_t child[2];
@@ -595,15 +605,15 @@ static bool visit_pair(ebpo_gap_search *g, const ebpo_gap_visit *v)
         return visit_blocks(g, (const uint32_t[2]){ child[0] & ~EBPO_IS_BLOCK,
                                                     child[1] & ~EBPO_IS_BLOCK });
     g->node_pairs++;
-    if (!ebpo_gap_capacity(g) || (g->node_pairs % 256 == 0 && !g->go_on(g)))
+    if (!ebpo_gap_capacity(g) || (g->node_pairs % 256 == 0 && !g->keep_going(g)))
         return false;
     if (block[0])
         push_side(g, 1, child[1], v->child[0]);
     else if (block[1])
         push_side(g, 0, child[0], v->child[1]);
     else {
-        int down = child_size(g, 0, v->child[0]) < child_size(g, 1, v->child[1]);
-        push_side(g, down, child[down], v->child[1 - down]);
+        int larger = child_size(g, 0, v->child[0]) < child_size(g, 1, v->child[1]);
+        push_side(g, larger, child[larger], v->child[1 - larger]);
     }
     return true;
 }

@@ -1,10 +1,10 @@
-/* Functions that the kernels of the two walks through hierarchies call: pair_walk_kernels.c
+/* Provides functions for the kernels of the two walks through hierarchies: pair_walk_kernels.c
  * searches for faces that intersect, gap_walk_kernels.c for the nearest faces. A walk has a stack
  * of pairs of nodes, and keeps the last nodes and blocks that it has transformed. Each walk is for
  * one thread.
  *
- * Pairs of faces that the float filter cannot decide are decided here exactly. If both models are
- * one mesh, the corner or edge that neighbouring faces share is no contact. */
+ * Pairs of faces that the float filter leaves undecided are decided here exactly. If both models
+ * are one mesh, a corner or edge that neighbouring faces share is no contact. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -61,8 +61,9 @@ static bool edge_intersects(const double a[3][3], int i, const double b[3][3])
     return ebpo_triangle_pair((const double(*)[3])edge, b) != EBPO_PAIR_APART;
 }
 
-/* Returns true if n . (p - corner) certainly has the sign of `side`. A difference has a relative
- * error of at most 2^-53, so the sum has one of 2^-50 of its terms, apart from underflow. */
+/* Returns true if n . (p - corner) certainly has the sign of `side`. Each difference has a relative
+ * error of at most 2^-53, so the error of the sum is at most 2^-50 times the sum of the terms'
+ * absolute values, except for underflow. */
 static bool is_on_side(const double n[3], const double corner[3], const double p[3], double side)
 {
     double sum = 0, size = 0;
@@ -74,9 +75,9 @@ static bool is_on_side(const double n[3], const double corner[3], const double p
     return sum > 0x1p-50 * size + 0x1p-1000;
 }
 
-/* Returns true if the faces certainly have only the corner i of a, which is corner k of b, in
- * common: a plane through it separates them. The plane is between the two edges that form the least
- * angle; its normal may be rounded. */
+/* Returns true if a plane through the common corner (corner i of a, corner k of b) certainly
+ * separates the faces, so that they have only this corner in common. The plane is between the two
+ * edges that form the least angle; its normal may be rounded. */
 static bool separate_at_corner(const double a[3][3], int i, const double b[3][3], int k)
 {
     const double *p[4] = { a[(i + 1) % 3], a[(i + 2) % 3], b[(k + 1) % 3], b[(k + 2) % 3] };
@@ -101,9 +102,9 @@ static bool separate_at_corner(const double a[3][3], int i, const double b[3][3]
            is_on_side(n, a[i], p[2], -1) && is_on_side(n, a[i], p[3], -1);
 }
 
-/* Decides two faces with one common corner, i of a and k of b. Two convex sets have another common
- * point only if a ray from the common corner reaches the opposite edge of one face while it is
- * still in the other face. */
+/* Returns the kind of two faces with one common corner, i of a and k of b. If the faces have
+ * another common point, the ray from the corner through this point leaves one face through its
+ * opposite edge, at a point that the other face contains. */
 static ebpo_pair_kind one_corner(const double a[3][3], int i, const double b[3][3], int k)
 {
     if (separate_at_corner(a, i, b, k))
@@ -114,8 +115,9 @@ static ebpo_pair_kind one_corner(const double a[3][3], int i, const double b[3][
     return kind;
 }
 
-/* Decides two faces with a common edge. Faces in different planes have no other common point.
- * opposite: the corner of b that is not on the edge; -1: a face has corners at one point. */
+/* Returns the kind of two faces with a common edge. Faces in different planes have no other common
+ * point. opposite: the corner of b that is not on the edge; -1: a face has two corners at one
+ * point. */
 static ebpo_pair_kind one_edge(const double a[3][3], const double b[3][3], int opposite)
 {
     if (opposite >= 0 && ebpo_orient3d(a[0], a[1], a[2], b[opposite]) != 0)
@@ -123,12 +125,13 @@ static ebpo_pair_kind one_edge(const double a[3][3], const double b[3][3], int o
     return ebpo_triangle_pair(a, b) == EBPO_PAIR_COPLANAR ? EBPO_PAIR_COPLANAR : EBPO_PAIR_APART;
 }
 
-/* As ebpo_triangle_pair, but returns EBPO_PAIR_APART if the only common points are a corner or an
- * edge that both faces have, with equal coordinates. The result does not change when the faces are
- * swapped. */
+/* Returns the kind of a pair as ebpo_triangle_pair does, but EBPO_PAIR_APART if the only common
+ * points are a corner or an edge that both faces have, with equal coordinates. The result does not
+ * change when the faces are swapped. */
 static ebpo_pair_kind neighbour_kind(const double a[3][3], const double b[3][3])
 {
-    static const int others[8] = { -1, -1, -1, 2, -1, 1, 0, -1 }; /* of two corners */
+    /* the third corner, if exactly two bits of corners are set; otherwise -1 */
+    static const int third[8] = { -1, -1, -1, 2, -1, 1, 0, -1 };
     int shared = 0, in_a = 0, in_b = 0, of_b = 0;
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++)
@@ -140,15 +143,16 @@ static ebpo_pair_kind neighbour_kind(const double a[3][3], const double b[3][3])
             }
     if (shared == 0)
         return ebpo_triangle_pair(a, b);
-    return shared == 1 ? one_corner(a, in_a, b, in_b) : one_edge(a, b, others[of_b]);
+    return shared == 1 ? one_corner(a, in_a, b, in_b) : one_edge(a, b, third[of_b]);
 }
 
 /* Faces of two blocks at their poses, computed when they are needed. */
 typedef struct posed_blocks {
     double corner[2][EBPO_BLOCK][3][3];
-    unsigned known[2]; /* bits of the lanes */
+    unsigned known[2]; /* a bit for each lane, 1: its face has been posed */
 } posed_blocks;
 
+/* Returns the posed corners of a face; poses the face at its first use. */
 static const double (*posed_corners(posed_blocks *posed, const ebpo_pair_walk *w, int side,
                                     uint32_t block, uint32_t lane))[3]
 {
@@ -194,23 +198,23 @@ bool ebpo_pair_walk_decide(ebpo_pair_walk *w, uint32_t block_a, uint32_t block_b
 }
 
 void ebpo_gap_begin(ebpo_gap_search *g, const ebpo_accel *const accel[2],
-                    const ebpo_posing posing[2], double reach)
+                    const ebpo_posing posing[2], double max_coordinate)
 {
     for (int s = 0; s < 2; s++) {
         g->accel[s] = accel[s];
-        ebpo_block_posing_make(&g->posing[s], &posing[s], reach);
+        ebpo_block_posing_make(&g->posing[s], &posing[s], max_coordinate);
         for (int i = 0; i < EBPO_GAP_NODES; i++)
             g->node[s][i].node = EBPO_NO_CHILD;
     }
     ebpo_posed_faces_forget(g->faces);
     ebpo_two_frames_make(&g->frames, accel, g->posing);
-    g->count = g->waits = 0;
+    g->count = g->waiting_count = 0;
     g->node_pairs = g->block_pairs = 0;
     g->ended = g->no_memory = g->is_heap = false;
     g->limit = g->square = g->best = INFINITY;
     g->tolerance = 0;
     g->direction_number = 0;
-    for (int k = 0; k < 3; k++) /* used if the direction between the centres below has no length */
+    for (int k = 0; k < 3; k++) /* the direction for models whose centres are equal */
         g->direction[k] = k == 0;
     ebpo_gap_set_direction(g, g->direction);
     double centre[2][3];
@@ -254,8 +258,8 @@ static float float_dot(const float a[3], const float b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Makes the direction slightly shorter than 1, so that gaps that are computed along it are not too
- * great. */
+/* Scales the direction to slightly less than length 1, so that gaps along the direction are not
+ * computed too great. */
 void ebpo_gap_set_direction(ebpo_gap_search *g, const float direction[3])
 {
     float length = sqrtf(float_dot(direction, direction));
@@ -285,11 +289,11 @@ bool ebpo_gap_capacity(ebpo_gap_search *g)
 bool ebpo_gap_wait_capacity(ebpo_gap_search *g)
 {
     unsigned kept = 0;
-    if (g->waits + 64 <= EBPO_GAP_CANDIDATES)
+    if (g->waiting_count + 64 <= EBPO_GAP_CANDIDATES)
         return true;
-    for (unsigned i = 0; i < g->waits; i++)
+    for (unsigned i = 0; i < g->waiting_count; i++)
         if (!(g->waiting[i].low > g->limit))
             g->waiting[kept++] = g->waiting[i];
-    g->waits = kept;
-    return g->waits + 64 <= EBPO_GAP_CANDIDATES || g->judge(g);
+    g->waiting_count = kept;
+    return g->waiting_count + 64 <= EBPO_GAP_CANDIDATES || g->decide_waiting(g);
 }

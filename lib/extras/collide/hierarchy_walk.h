@@ -1,6 +1,7 @@
 /* Walks through the hierarchies of two accels (acceleration structures of subtrees) at poses:
- * ebpo_pair_walk finds the faces that intersect, ebpo_gap_search finds the nearest faces. Each walk
- * is for one thread at a time. */
+ * ebpo_pair_walk finds the faces that intersect, ebpo_gap_search finds the nearest faces. A node of
+ * a hierarchy has up to eight children in lanes 0 to 7; a child is a node or a block of up to eight
+ * faces (query/accel.h). Each walk is for one thread at a time. */
 #ifndef EBPO_COLLIDE_HIERARCHY_WALK_H
 #define EBPO_COLLIDE_HIERARCHY_WALK_H
 
@@ -13,17 +14,18 @@
 /* A pair of children of nodes, each given as 8 * the node's index + the child's lane. */
 typedef struct ebpo_node_pair {
     uint32_t a, b;
-    float key; /* the search for the first contact visits greater keys first */
+    float key; /* overlap of both nodes; the search for the first contact visits greater keys
+                * first */
 } ebpo_node_pair;
 
-/* A pair of intersecting faces, by their local indices. */
+/* A pair of intersecting faces, by their local indices in the two accels. */
 typedef struct ebpo_found_pair {
     uint32_t a, b;
     int32_t kind; /* ebpo_pair_kind, not EBPO_PAIR_APART */
 } ebpo_found_pair;
 
-/* A node's children in its model's frame, and (with a 2 in the name) in the other model's frame:
- * rotated, but not translated. Coordinates are relative to the node's origin. */
+/* A node's children in its model's frame, and (members with a 2 in the name) in the other model's
+ * frame: rotated, but not translated. Coordinates are relative to the node's origin. */
 typedef struct ebpo_turned_node {
     _Alignas(32) float c[3][8], e[3][8]; /* middles and half sides of boxes */
     float c2[3][8], e2[3][8];            /* boxes around these boxes, along the axes of the other
@@ -35,11 +37,12 @@ typedef struct ebpo_turned_node {
     double origin[3];                    /* the node's origin in the first model's frame, for nodes
                                           * of both models */
     float size;                          /* length of the longest side of all boxes */
-    uint32_t node;                       /* EBPO_NO_CHILD: the entry is empty */
-    uint8_t lanes;
-    bool cylinders; /* at least one child has a cylinder */
+    uint32_t node;                       /* the node's index; EBPO_NO_CHILD: the entry is empty */
+    uint8_t lanes;                       /* a bit for each lane that has a child */
+    bool cylinders;                      /* at least one child has a cylinder */
 } ebpo_turned_node;
 
+/* Number of turned nodes of each model that a walk keeps (a cache). */
 enum { EBPO_TURNED_BITS = 4, EBPO_TURNED_NODES = 1 << EBPO_TURNED_BITS };
 
 typedef struct ebpo_pair_walk ebpo_pair_walk;
@@ -47,7 +50,7 @@ typedef struct ebpo_pair_walk ebpo_pair_walk;
 /* The functions of a walk, compiled for several processors, with the same results. All return false
  * without memory. */
 typedef struct ebpo_walk_kernels {
-    /* Processes at most this many pairs of the stack. */
+    /* Visits at most `pairs` pairs of the stack. */
     bool (*run)(ebpo_pair_walk *walk, uint64_t pairs);
     /* Push the pairs of children of both top nodes, or of one pair of nodes. */
     bool (*start)(ebpo_pair_walk *walk);
@@ -65,10 +68,11 @@ struct ebpo_pair_walk {
     bool self;       /* both accels are one accel at one pose: find each pair of faces once */
     bool neighbours; /* the faces are of one mesh: a common corner or edge of neighbours is no
                       * contact */
-    uint32_t begin, end; /* only these faces of the first accel: local indices */
+    uint32_t begin, end; /* the walk considers only the faces [begin, end) of the first accel: local
+                          * indices */
     ebpo_node_pair *stack;
     uint64_t top, capacity;
-    uint64_t group; /* if `first`: start of the last group of siblings on the stack */
+    uint64_t group; /* if `first`: index at which the last group of siblings begins on the stack */
     ebpo_found_pair *found_pairs;
     uint64_t found_count, found_capacity;
     uint32_t found_slot[2];                  /* slots of the last pair found */
@@ -93,14 +97,14 @@ void ebpo_posed_triangle(const ebpo_accel *accel, const ebpo_posing *posing, uin
 
 /* --- the nearest pair of faces ---
  *
- * All lengths are world lengths times the posings' unit. A pair is dropped only if it is certainly
- * not nearer than `limit`.
- * Bounds: docs/develop/collision.md, "Bounds of pairs of nodes". */
+ * All lengths are world lengths times the unit of the posings (ebpo_block_unit). A pair is dropped
+ * only if it is certainly not nearer than `limit`. Bounds: docs/develop/collision.md, "Bounds of
+ * pairs of nodes". */
 
 /* A pair of children of nodes, each given as 8 * the node's index + the child's lane. */
 typedef struct ebpo_gap_visit {
-    float key; /* squared lower bound; negative where nodes intersect: the nearer to 0, the less
-                * they overlap */
+    float key; /* square of a lower bound of the distance; negative if the nodes intersect: nearer
+                * to 0 if they overlap less */
     uint32_t child[2];
     uint32_t direction; /* direction_number of the direction for which the key was computed */
 } ebpo_gap_visit;
@@ -116,8 +120,10 @@ typedef struct ebpo_gap_node {
     _Alignas(32) float centre[2][3][8], half[2][3][8]; /* boxes */
     float axis[2][3][8], middle[2][3][8];              /* unit axes and middles of cylinders */
     float thick[8], radius[8];                         /* half lengths and radii of cylinders */
-    float reach[8]; /* extents along the direction of the search, in the node's frame */
-    uint32_t node, direction;
+    float extent[8];    /* how far each child extends along the direction of the search, from the
+                         * origin of the node's frame */
+    uint32_t node;      /* the node's index; EBPO_NO_CHILD: the entry is empty */
+    uint32_t direction; /* direction_number of the direction of `extent` */
 } ebpo_gap_node;
 
 enum { EBPO_GAP_CANDIDATES = 256, EBPO_GAP_NODES = 16 };
@@ -127,23 +133,25 @@ struct ebpo_gap_search {
     const ebpo_accel *accel[2];
     ebpo_block_posing posing[2];
     ebpo_two_frames frames;
-    float limit;  /* pairs that are certainly farther apart do not matter */
+    float limit;  /* pairs whose distance is certainly greater do not matter */
     float square; /* square of the limit, rounded up: squared lower bounds are compared with it */
-    float tolerance; /* an improvement smaller than this does not matter */
+    float tolerance; /* a pair that is nearer than `best` by less than this does not matter */
     float best; /* upper bound of the distance of the faces best_slot; INFINITY: no pair is known */
     uint32_t best_slot[2];
     float direction[3]; /* a direction in the world, from A to B, along which the gap of the models
                          * may be large */
     float along[2][3], along_shift; /* along: the same direction in both frames, towards the other
-                                     * model */
-    uint32_t direction_number;
+                                     * model; along_shift: distance of both frames' origins along
+                                     * it */
+    uint32_t direction_number;      /* counts the directions of this search */
 
     void *user;
-    bool (*judge)(ebpo_gap_search *search); /* decides all waiting pairs of faces; returns false to
-                                             * end the walk, because enough is known */
-    bool (*go_on)(ebpo_gap_search *search); /* called from time to time; returns false to end the
-                                             * walk */
-    bool ended;                             /* the walk ended before all pairs were visited */
+    /* Decides all waiting pairs of faces. Returns false to end the walk, if further pairs cannot
+     * change the result. */
+    bool (*decide_waiting)(ebpo_gap_search *search);
+    /* Called from time to time; returns false to end the walk. */
+    bool (*keep_going)(ebpo_gap_search *search);
+    bool ended; /* the walk ended before all pairs were visited */
     bool no_memory;
 
     /* Pairs to be visited. Until a limit is known this is a stack; then a heap with the least key
@@ -151,9 +159,10 @@ struct ebpo_gap_search {
     ebpo_gap_visit *stack;
     uint64_t count, capacity;
     bool is_heap;
-    ebpo_gap_candidate waiting[EBPO_GAP_CANDIDATES]; /* [waits] pairs of faces to be decided */
-    unsigned waits;
-    uint64_t node_pairs, block_pairs;
+    ebpo_gap_candidate
+        waiting[EBPO_GAP_CANDIDATES]; /* [waiting_count] pairs of faces to be decided */
+    unsigned waiting_count;
+    uint64_t node_pairs, block_pairs; /* numbers of visited pairs of nodes and of blocks */
 
     ebpo_gap_node node[2][EBPO_GAP_NODES];
     ebpo_posed_faces faces[2][EBPO_POSED_FACES];
@@ -162,10 +171,10 @@ struct ebpo_gap_search {
 /* Allocates a search. Returns NULL without memory. */
 ebpo_gap_search *ebpo_gap_new(void);
 void ebpo_gap_free(ebpo_gap_search *g);
-/* Begins a search with no limit and the tolerance 0; sets all members except user, judge and go_on.
- * `reach`: as for ebpo_block_unit. */
+/* Begins a search without limit and with tolerance 0; sets all members except user, decide_waiting
+ * and keep_going. max_coordinate: as for ebpo_block_unit. */
 void ebpo_gap_begin(ebpo_gap_search *g, const ebpo_accel *const accel[2],
-                    const ebpo_posing posing[2], double reach);
+                    const ebpo_posing posing[2], double max_coordinate);
 /* Lowers the limit; a greater limit than the current one changes nothing. */
 void ebpo_gap_set_limit(ebpo_gap_search *g, float limit);
 /* Records a pair of faces and an upper bound of its distance. */
@@ -176,13 +185,13 @@ void ebpo_gap_set_direction(ebpo_gap_search *g, const float direction[3]);
 
 /* Makes space for the pairs of children of two nodes. Returns false without memory. */
 bool ebpo_gap_capacity(ebpo_gap_search *g);
-/* Makes space for a block's pairs among the waiting pairs. Returns false if judge returned
- * false. */
+/* Makes space for the pairs of two blocks among the waiting pairs, if necessary by deciding those.
+ * Returns false if decide_waiting returned false. */
 bool ebpo_gap_wait_capacity(ebpo_gap_search *g);
 
-/* Walks through all pairs, beginning with the top nodes. Afterwards, the nearest pair may be among
- * the waiting pairs, which have not been decided. After an early end, the stack has the pairs of
- * nodes that were not visited. Compiled twice, with the same results. */
+/* The walk through all pairs, which begins with the top nodes. Afterwards the nearest pair may be
+ * among the waiting pairs, which have not been decided. If the walk ended early, the stack has the
+ * pairs of nodes that were not visited. Compiled for several processors, with the same results. */
 typedef struct ebpo_gap_kernels {
     void (*walk)(ebpo_gap_search *g);
 } ebpo_gap_kernels;

@@ -2,9 +2,9 @@
  *
  * The mesh is written to a temporary file, which is opened as a model with a memory budget, so the
  * mesh may be larger than memory. The search needs only the faces, so the model is built as a
- * surface without planes, which takes a fraction of the time. The crossings of the model with
- * itself (ebpo_collide_self_posed) are the result. The mesh in memory gives their positions. An
- * optional PLY file shows the faces in red. */
+ * surface without planes, which is much faster. ebpo_collide_self finds the pairs of the model's
+ * faces that intersect. The mesh in the workspace gives the coordinates for their common points. An
+ * optional PLY file shows these faces in red. */
 #include "core/strict_fp.h"
 
 #include <stdio.h>
@@ -50,16 +50,16 @@ static ebpo_status build_model(crossings *c, ebpo_mesh *mesh, const ebpo_mesh_re
     return ebpo_build(mesh, &surface, NULL, &how, &c->tree, error);
 }
 
-/* Frees the levels. After the file is written, the search needs only the file, and the mesh for
- * positions. */
+/* Frees the levels. After the file is written, the search needs only the file, and the mesh for the
+ * common points. */
 static void drop_levels(ebpo_tree *tree)
 {
     for (int i = 0; i < tree->info.level_count; i++)
         ebpo_level_free(&tree->level[i]);
 }
 
-/* Writes the temporary file and opens it. The file has a name until it is open, because libhdf5
- * needs a name. */
+/* Writes the temporary file, opens it, and then removes its name, which libhdf5 needs for
+ * opening. */
 static ebpo_status store_model(crossings *c, const char *folder, ebpo_error *error)
 {
     ebpo_write_options how = EBPO_WRITE_OPTIONS_INIT;
@@ -81,8 +81,8 @@ static ebpo_status store_model(crossings *c, const char *folder, ebpo_error *err
 /* Least memory budget of the model; only tests have workspaces so small that it applies. */
 enum { LEAST_MODEL = 1 << 20 };
 
-/* Makes the model and its collider. memory: all allowed memory. The workspace uses half of it, the
- * model a quarter, waiting pairs 1/16. */
+/* Makes the model and its collider. memory: number of bytes that all parts may use together. The
+ * workspace uses half of it, the model a quarter, and waiting pairs 1/16. */
 static ebpo_status make_collider(crossings *c, uint64_t memory, ebpo_error *error)
 {
     ebpo_model_options model_options = EBPO_MODEL_OPTIONS_INIT;
@@ -222,17 +222,17 @@ ebpo_status ebpo_mesh_self_intersections(ebpo_mesh *mesh, const ebpo_mesh_report
                     .user = user,
                     .target = EBPO_PUBLISH_INIT,
                     .sum = EBPO_SELF_INTERSECTIONS_SUMMARY_INIT };
-    ebpo_workspace *workspace = mesh->workspace, *own = NULL;
+    ebpo_workspace *workspace = mesh->workspace, *temporary = NULL;
     ebpo_status status = EBPO_TAKE(ebpo_self_intersections_options, &c.options, options, error);
     if (status == EBPO_OK && !workspace)
-        status = ebpo_workspace_new(NULL, &own, error);
+        status = ebpo_workspace_new(NULL, &temporary, error);
     if (status == EBPO_OK && c.options.ply)
         status = ebpo_publish_begin(&c.target, c.options.ply, error);
     if (status == EBPO_OK)
-        status = search_crossings(&c, mesh, report, workspace ? workspace : own, error);
+        status = search_crossings(&c, mesh, report, workspace ? workspace : temporary, error);
     ebpo_mesh_free(mesh);
     close_all(&c);
-    ebpo_workspace_free(own);
+    ebpo_workspace_free(temporary);
     return status == EBPO_OK && out ? EBPO_GIVE(ebpo_self_intersections_summary, out, &c.sum)
                                     : status;
 }

@@ -1,13 +1,13 @@
 /* Computes the distance of two triangles: bounds in doubles, and exact comparisons.
  *
  * Bounds follow from a pair of near points, which need not be the nearest points. The distance of
- * these points is an upper bound. The gap of the faces along the line between them is a lower
- * bound. All coordinates are relative to A's first corner, so that rounding does not depend on the
- * position of the faces. Where bounds do not decide, the squared distance is computed as a fraction
- * of integers: the least of the squared distances of a corner from the other face, and of two edges
- * whose inner points are nearest. See docs/develop/collision.md, "Distance of two faces". All
- * functions are pure and can be called from any thread; results do not depend on compilers and
- * their flags. */
+ * these points is an upper bound. The gap of the faces along the line through both points is a
+ * lower bound. All coordinates are relative to A's first corner, so that rounding does not depend
+ * on the position of the faces. If bounds do not decide a comparison, the squared distance is
+ * computed as a fraction of integers. It is the least one of the squared distances of a corner from
+ * the other face, and of two edges whose nearest points are not ends. See
+ * docs/develop/collision.md, "Distance of two faces". All functions are pure and can be called from
+ * any thread; results do not depend on compilers and their flags. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -20,21 +20,22 @@
 #include "geometry/triangle_pair.h"
 #include "geometry/vec3.h"
 
-static const double max_reach = 0x1p200, least_reach = 0x1p-200;
+/* The range of 1-norms for which squares neither overflow nor underflow. */
+static const double max_norm = 0x1p200, least_norm = 0x1p-200;
 
 static double within_unit(double t) { return t > 0 ? (t < 1 ? t : 1) : 0; }
 
 /* The nearest pair of points so far. Coordinates are relative to A's first corner. */
 typedef struct search {
     double face[2][3][3];       /* corners of A and B */
-    double reach;               /* bound of the corners' 1-norms */
-    double square, point[2][3]; /* squared distance, and points of A and B */
-    int feature[2];             /* features that contain them, as in ebpo_pair_distance_bounds */
-    double space; /* distance of the points from the ends of their features, as a fraction of
-                     `reach` */
+    double norm;                /* upper bound of the corners' 1-norms */
+    double square, point[2][3]; /* the points of A and B, and their squared distance */
+    int feature[2];             /* features of the points, as in ebpo_pair_distance_bounds */
+    double space; /* distance of the points from the ends of their features; INFINITY at corners */
 } search;
 
-/* Keeps the points p and q if they are nearer. first: p is of A (0) or B (1). */
+/* Keeps the points p and q if they are nearer than the pair so far. first: p is a point of A (0) or
+ * B (1), and q of the other face. on_p, on_q, space: as in `search`. */
 static void offer_points(search *s, int first, const double p[3], const double q[3], int on_p,
                          int on_q, double space)
 {
@@ -59,17 +60,17 @@ static void point_along(const double from[3], const double edge[3], double t, do
         out[k] = from[k] + t * edge[k];
 }
 
-/* Returns the feature of the point at the part t of edge i. */
+/* Returns the feature of the point at the fraction t of edge i. */
 static int on_edge(int i, double t) { return t == 0 ? i : t == 1 ? (i + 1) % 3 : 3 + i; }
 
-/* Returns the distance from the point at the part t of an edge, whose squared length is `square`,
- * to the nearer end; INFINITY at an end, because ends are exact. */
-static double capacity_on_edge(double t, double square)
+/* Returns the distance from the point at the fraction t of an edge to the nearer end of the edge;
+ * INFINITY at an end, because ends are exact. square: the edge's squared length. */
+static double space_on_edge(double t, double square)
 {
     return t == 0 || t == 1 ? INFINITY : fmin(t, 1 - t) * sqrt(square);
 }
 
-/* Compares with the nearest points of edge i of A and edge j of B. */
+/* Offers the nearest points of edge i of A and edge j of B. */
 static void offer_edges(search *s, int i, int j)
 {
     const double *p = s->face[0][i], *q = s->face[1][j];
@@ -86,15 +87,15 @@ static void offer_edges(search *s, int i, int j)
     point_along(p, e, on_e, x);
     point_along(q, f, on_f, y);
     bool edges = on_e > 0 && on_e < 1 && on_f > 0 && on_f < 1;
-    double space = fmin(capacity_on_edge(on_e, ee), capacity_on_edge(on_f, ff));
+    double space = fmin(space_on_edge(on_e, ee), space_on_edge(on_f, ff));
     offer_points(s, 0, x, y, on_edge(i, on_e), on_edge(j, on_f),
                  edges && !(area > 0x1p-20 * ee * ff) ? 0 : space);
 }
 
 /* --- corners with planes --- */
 
-/* Compares with corner i of face `of` and its nearest point on the other face, if that is in the
- * other face's interior; otherwise the pairs of edges include this pair. */
+/* Offers corner i of face `of` and its nearest point on the other face, if that point is in the
+ * other face's interior. If it is on an edge, the pairs of edges include this pair of points. */
 static void offer_corner(search *s, int of, int i)
 {
     double(*plane)[3] = s->face[!of];
@@ -121,11 +122,11 @@ static void offer_corner(search *s, int of, int i)
 
 /* --- bounds --- */
 
-/* Begins a search: makes coordinates relative to A's first corner. Returns false if they are too
- * large or too small. */
+/* Begins a search: computes coordinates relative to A's first corner. Returns false if these are
+ * too large or too small. */
 static bool make_relative(const double a[3][3], const double b[3][3], search *s)
 {
-    s->reach = 0;
+    s->norm = 0;
     s->square = INFINITY;
     s->space = 0;
     memset(s->point, 0, sizeof s->point);
@@ -135,10 +136,10 @@ static bool make_relative(const double a[3][3], const double b[3][3], search *s)
         ebpo_vec3_subtract(b[i], a[0], s->face[1][i]);
         for (int of = 0; of < 2; of++) {
             const double *x = s->face[of][i];
-            s->reach = fmax(s->reach, fabs(x[0]) + fabs(x[1]) + fabs(x[2]));
+            s->norm = fmax(s->norm, fabs(x[0]) + fabs(x[1]) + fabs(x[2]));
         }
     }
-    return s->reach < max_reach && s->reach > least_reach;
+    return s->norm < max_norm && s->norm > least_norm;
 }
 
 /* Returns a lower bound of the gap of the faces along n, which is not 0. */
@@ -152,7 +153,7 @@ static double gap_along(const search *s, const double n[3])
         most = fmax(most, ebpo_vec3_dot(n, d));
     }
     double size = fabs(n[0]) + fabs(n[1]) + fabs(n[2]);
-    return (least - most - 0x1p-48 * size * s->reach) / sqrt(ebpo_vec3_dot(n, n));
+    return (least - most - 0x1p-48 * size * s->norm) / sqrt(ebpo_vec3_dot(n, n));
 }
 
 /* --- features --- */
@@ -164,21 +165,21 @@ static bool is_on(int corner, int feature)
            (feature >= 3 && (corner == feature - 3 || corner == (feature - 2) % 3));
 }
 
-/* Returns true if the features of the points are certainly nearest. This holds if, along n, A's
- * other corners are strictly behind A's point and B's other corners are ahead of B's point, by more
- * than the error of n and of the points: docs/develop/collision.md, "Which features are nearest".
- */
+/* Returns true if the features of the points certainly contain the nearest points. This is true if,
+ * along n, the corners of A that are not on A's feature are behind A's point, and the corners of B
+ * that are not on B's feature are ahead of B's point, by more than the errors of n and of the
+ * points: docs/develop/collision.md, "Which features are nearest". */
 static bool features_certain(const search *s, const double n[3])
 {
     const double enough = 0x1p-24;
-    if (!(s->space > enough * s->reach))
+    if (!(s->space > enough * s->norm))
         return false;
     for (int of = 0; of < 2; of++)
         for (int i = 0; i < 3; i++) {
             double d[3];
             ebpo_vec3_subtract(s->face[of][i], s->point[of], d);
             double ahead = of ? ebpo_vec3_dot(n, d) : -ebpo_vec3_dot(n, d);
-            if (!is_on(i, s->feature[of]) && !(ahead > enough * s->reach * s->reach))
+            if (!is_on(i, s->feature[of]) && !(ahead > enough * s->norm * s->norm))
                 return false;
         }
     return true;
@@ -252,7 +253,7 @@ void ebpo_triangles_distance_bounds(const double a[3][3], const double b[3][3],
         offer_edges(&s, i / 3, i % 3);
     for (int i = 0; i < 6; i++)
         offer_corner(&s, i / 3, i % 3);
-    double n[3], margin = 0x1p-47 * s.reach;
+    double n[3], margin = 0x1p-47 * s.norm;
     ebpo_vec3_subtract(s.point[1], s.point[0], n);
     double distance = sqrt(s.square);
     out->hi = distance + margin;
@@ -289,8 +290,7 @@ static int fraction_compare(const fraction *f, const fraction *g)
     return order;
 }
 
-/* Sets *best to the lesser of both fractions. best->denominator is 0 if there is no fraction so
- * far. */
+/* Sets *best to `other` if that is less, or if best->denominator is 0 (no fraction so far). */
 static void keep_lesser(fraction *best, const fraction *other)
 {
     if (mpz_sgn(best->denominator) != 0 && fraction_compare(other, best) >= 0)

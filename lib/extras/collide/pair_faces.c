@@ -1,10 +1,10 @@
 /* Looks up the posed faces of pairs by their indices in the file, and computes the intersections of
  * crossing faces.
  *
- * The faces of a whole model are in memory: its slots give the position of each face in the blocks.
- * Faces of a partly loaded model are read through the cache of chunks. ebpo_posing_apply poses the
- * corners, as in all exact tests. ebpo_collide_contacts returns the segments of all crossing pairs
- * in the order of pairs. */
+ * If a model is entirely in memory (a whole model), an array gives the slot of each face, its
+ * position in the blocks of the accel. Faces of a partly loaded model are read through the cache of
+ * chunks. ebpo_posing_apply poses the corners, as in all exact tests. ebpo_collide_contacts returns
+ * the segments of all crossing pairs in the order of the pairs. */
 #include "core/strict_fp.h"
 
 #include <string.h>
@@ -94,8 +94,7 @@ ebpo_status ebpo_faces_by_number_get(ebpo_faces_by_number *f, uint64_t face, dou
 
 /* --- contact segments --- */
 
-/* Makes the slots of the models that are in memory, once for each collider. Fails with
- * EBPO_E_MEMORY. */
+/* Makes the arrays of slots for whole models, once for each collider. Fails with EBPO_E_MEMORY. */
 static ebpo_status make_slots(ebpo_collider *c, ebpo_error *error)
 {
     for (int i = 0; i < 2; i++) {
@@ -130,12 +129,12 @@ ebpo_status ebpo_pose_pair(ebpo_pair_faces *f, const ebpo_face_pair *pair, ebpo_
 {
     const uint64_t face[2] = { pair->file_face_a, pair->file_face_b };
     for (int i = 0; i < 2; i++) {
-        const ebpo_posing *posing = &f->collision->posing[f->collision->turned ^ i].posing;
-        ebpo_status status = ebpo_faces_by_number_get(&f->side[i], face[i], out->own[i], error);
+        const ebpo_posing *posing = &f->collision->posing[f->collision->swapped ^ i].posing;
+        ebpo_status status = ebpo_faces_by_number_get(&f->side[i], face[i], out->unposed[i], error);
         if (status != EBPO_OK)
             return status;
         for (int k = 0; k < 3; k++)
-            ebpo_posing_apply(posing, out->own[i][k], out->corner[i][k]);
+            ebpo_posing_apply(posing, out->unposed[i][k], out->corner[i][k]);
     }
     return EBPO_OK;
 }

@@ -7,14 +7,15 @@
 #include "query/accel.h"
 #include "query/query_model.h"
 
-/* Returns an array of the slots of faces in the blocks of a subtree or a whole model. It is indexed
- * by a face's local index, which in a whole model is its index in the file. Returns NULL without
- * memory. The caller frees the array. */
+/* Returns an array that gives, for the local index of each face of a subtree, the face's slot (its
+ * position in the blocks). In a model that is entirely in memory (a whole model, a single subtree)
+ * the local index is the index in the file. Returns NULL without memory. The caller frees the
+ * array. */
 uint32_t *ebpo_face_slots(const ebpo_accel *subtree);
 
-/* Reads corners of single faces by their indices in the file: faces of a whole model from its
- * blocks, faces of a partly loaded model through its cache of chunks. For one thread at a time. */
-
+/* Reads corners of single faces by their indices in the file. Faces of a whole model are read from
+ * its blocks, faces of a partly loaded model through its cache of chunks. For one thread at a
+ * time. */
 typedef struct ebpo_faces_by_number {
     const ebpo_model *model;
     const uint32_t *slots;           /* for a whole model: ebpo_face_slots; else NULL */
@@ -26,8 +27,8 @@ void ebpo_faces_by_number_begin(ebpo_faces_by_number *f, const ebpo_model *model
 /* Computes the corners of a face, exactly as in the file. Fails with the errors of reading. */
 EBPO_MUST_USE ebpo_status ebpo_faces_by_number_get(ebpo_faces_by_number *f, uint64_t face,
                                                    double out[3][3], ebpo_error *error);
-/* For a partly loaded model: set `out` to the vertex indices of a face, and to the coordinates of a
- * vertex, as in the file. */
+/* For a partly loaded model only: the first function sets `out` to the vertex indices of a face,
+ * the second one to the coordinates of a vertex, both as in the file. */
 EBPO_MUST_USE ebpo_status ebpo_faces_by_number_corners(ebpo_faces_by_number *f, uint64_t face,
                                                        uint32_t out[3], ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_faces_by_number_vertex(ebpo_faces_by_number *f, uint64_t vertex,
@@ -35,9 +36,10 @@ EBPO_MUST_USE ebpo_status ebpo_faces_by_number_vertex(ebpo_faces_by_number *f, u
 /* Releases the chunks that `f` holds; a zero struct is allowed. */
 void ebpo_faces_by_number_end(ebpo_faces_by_number *f);
 
-/* The corners of a pair's faces, of the caller's A and B: as in the files, and posed. */
+/* The corners of a pair's faces. [0] is of the caller's A, [1] of B. */
 typedef struct ebpo_posed_pair {
-    double own[2][3][3], corner[2][3][3];
+    double unposed[2][3][3]; /* as in the files */
+    double corner[2][3][3];  /* at the poses */
 } ebpo_posed_pair;
 
 /* Looks up the faces of a query's pairs. */
@@ -46,8 +48,8 @@ typedef struct ebpo_pair_faces {
     ebpo_faces_by_number side[2]; /* the caller's A and B */
 } ebpo_pair_faces;
 
-/* Prepares the look-up of faces. Must be ended by ebpo_pair_faces_end, also after a failure, which
- * also accepts a zero struct. */
+/* Prepares the look-up of faces. The caller must call ebpo_pair_faces_end, even after a failure;
+ * that function also accepts a zero struct. */
 EBPO_MUST_USE ebpo_status ebpo_pair_faces_begin(ebpo_pair_faces *f, const ebpo_collision *collision,
                                                 ebpo_error *error);
 void ebpo_pair_faces_end(ebpo_pair_faces *f);
@@ -56,8 +58,7 @@ void ebpo_pair_faces_end(ebpo_pair_faces *f);
 EBPO_MUST_USE ebpo_status ebpo_pose_pair(ebpo_pair_faces *f, const ebpo_face_pair *pair,
                                          ebpo_posed_pair *out, ebpo_error *error);
 
-/* Returns the number of segments for which ebpo_collide_polylines has memory: one for each crossing
- * pair. */
+/* Returns the greatest number of crossing pairs for which ebpo_collide_polylines has memory. */
 uint64_t ebpo_contact_lines_max(const ebpo_collider *collider);
 
 /* Computes the common segment of a pair of kind EBPO_PAIR_CROSSING, whose faces are `faces`. */

@@ -1,10 +1,11 @@
 /* Filters pairs of faces, eight at a time in floats: finds pairs that are certainly apart and pairs
  * that certainly cross. This file is compiled for several instruction sets with the same results.
  *
- * Boxes are compared first, then the sides of the planes of both faces on which the corners are,
- * then the intervals on the common line of the planes, each with a proved error bound. All other
- * pairs are undecided; the caller decides them exactly. Letters have the meaning that
- * docs/develop/collision.md gives them. */
+ * Three tests follow each other, each with a proved error bound. They compare the boxes, then the
+ * corners of each face with the plane of the other face, then the intervals of both faces on the
+ * common line of the planes. All other pairs are undecided; the caller decides them exactly.
+ * docs/develop/collision.md ("The filter of eight pairs") explains the letters. Names that end in 8
+ * handle eight values at once. */
 #include "core/strict_fp.h"
 
 #include "core/simd.h"
@@ -67,7 +68,7 @@ EBPO_EIGHT box8 box_of8(const face8 *f)
     return b;
 }
 
-/* Returns a bit for each pair of boxes that are certainly apart. e: error of coordinates. */
+/* Returns a bit for each pair of boxes, 1: certainly apart. e: error of coordinates. */
 EBPO_EIGHT unsigned boxes_apart8(const box8 *a, const box8 *b, f8 e)
 {
     f8 far = f8_all(-1);
@@ -79,14 +80,15 @@ EBPO_EIGHT unsigned boxes_apart8(const box8 *a, const box8 *b, f8 e)
 
 /* --- sides of planes --- */
 
-/* Sides of a plane on which the three corners of the other face are. */
+/* On which sides of a face's plane the three corners of the other face are. */
 typedef struct sides8 {
-    f8 above[3];            /* masks: the corner is above; valid only where `certain` is set */
-    unsigned same, certain; /* bits: all corners are certainly on one side; all sides are certain */
+    f8 above[3];      /* masks: the corner is above; valid only where `certain` is set */
+    unsigned same;    /* bits: all corners are certainly on one side */
+    unsigned certain; /* bits: the sides of all three corners are certain */
 } sides8;
 
 /* Finds the sides. e1, e2: edges of the plane's face from its first corner; d: corners of the other
- * face minus that corner; bound: error of determinants. */
+ * face minus this first corner; bound: greatest error of the determinants. */
 EBPO_EIGHT sides8 sides_of8(vector8 e1, vector8 e2, const vector8 d[3], f8 bound)
 {
     vector8 n = vector8_cross(e1, e2);
@@ -106,10 +108,10 @@ EBPO_EIGHT sides8 sides_of8(vector8 e1, vector8 e2, const vector8 d[3], f8 bound
 
 /* --- the common line --- */
 
-/* Masks for a face: which of its corners is alone on its side of the other plane. */
+/* Masks for a face: which of its corners is alone on one side of the other face's plane. */
 typedef struct alone8 {
-    f8 is0, is1; /* it is corner 0, corner 1; if neither, corner 2 */
-    f8 above;    /* it is above the plane */
+    f8 is0, is1; /* corner 0 is alone; corner 1 is alone; if neither, corner 2 is */
+    f8 above;    /* the corner that is alone is above the plane */
 } alone8;
 
 EBPO_EIGHT alone8 alone_of8(const f8 above[3])
@@ -131,8 +133,8 @@ EBPO_EIGHT vector8 turned_corner8(const face8 *f, const alone8 *alone, int first
                         vector8_pick(alone->is1, c[(first + 1) % 3], c[(first + 2) % 3]));
 }
 
-/* Decides pairs, for which all sides must be certain, by their intervals on the common line: apart
- * or crossing. bound: error of determinants. */
+/* Decides pairs by their intervals on the common line: apart or crossing. All sides must be
+ * certain. bound: greatest error of the determinants. */
 EBPO_EIGHT ebpo_pair_masks decide_on_line8(const face8 *a, const face8 *b, const sides8 *side_a,
                                            const sides8 *side_b, f8 bound)
 {
@@ -154,15 +156,15 @@ EBPO_EIGHT ebpo_pair_masks decide_on_line8(const face8 *a, const face8 *b, const
 
 /* --- bounds --- */
 
-/* Returns m * (4 e (n1) + 12 v n2). */
+/* Returns m * (4 e n1 + 12 v n2), a bound of the error of determinants; v is 2^-24. */
 EBPO_EIGHT f8 error_bound8(f8 e, f8 m, f8 n1, f8 n2)
 {
     f8 inputs = f8_mul(f8_mul(e, f8_all(4)), n1), rounding = f8_mul(n2, f8_all(12 * 0x1p-24f));
     return f8_mul(m, f8_add(inputs, rounding));
 }
 
-/* Bounds the error of determinants for a plane whose face has edges of length l, and corners at a
- * distance of d from it. */
+/* Bounds the error of determinants for a plane whose face has edges of length l, and for corners of
+ * the other face at a distance of d from the face's first corner. */
 EBPO_EIGHT f8 plane_bound8(f8 e, f8 l, f8 d)
 {
     return error_bound8(e, l, f8_add(f8_add(d, d), l), f8_mul(l, d));
@@ -212,6 +214,7 @@ EBPO_EIGHT face8 load_eight(const float *block)
     return f;
 }
 
+/* Returns the error, but at least 2^-40, which covers underflow. */
 EBPO_EIGHT f8 usable_error8(float error) { return f8_all(error > 0x1p-40f ? error : 0x1p-40f); }
 
 EBPO_EIGHT ebpo_pair_masks filter_faces8(const face8 *a, const face8 *b, float error)

@@ -1,9 +1,10 @@
-/* Computes the last time at which two triangles have a common point, when one of them moves along a
+/* Computes the last time at which two triangles have a common point, if one of them moves along a
  * direction.
  *
- * Projected along the direction, both faces are convex polygons; each of their points has a height,
- * its coordinate along the direction. The difference of heights is concave where the polygons
- * overlap, so it is greatest at a corner of one polygon or where edges cross. The exact time is a
+ * Projected along the direction, both faces are convex polygons, and each of their points has a
+ * height: its coordinate along the direction. Where the polygons overlap, the difference of the
+ * heights of both faces is concave, so it is greatest at a corner of one polygon or where edges
+ * cross. The exact time is a
  * fraction of integers (GMP). A bound in doubles follows from separating axes: normals, and cross
  * products of edges with each other and with the direction. See docs/develop/collision.md,
  * "Separation distance along a direction". All functions are pure and can be called from any
@@ -94,8 +95,8 @@ static void triple_product(sweep *s, mpz_t out, const ebpo_vectorz *x, const ebp
     ebpo_vectorz_dot(out, x, &s->m);
 }
 
-/* Keeps top / bottom if it is later than the last time so far. `other`: the time was computed as if
- * the other face moved, so its sign is reversed. */
+/* Keeps the time top / bottom if it is later than the last time so far. `other`: the time was
+ * computed for a motion of the other face, so its sign is reversed. */
 static void keep_later_time(sweep *s, bool other)
 {
     if (mpz_sgn(s->bottom) < 0) {
@@ -115,7 +116,7 @@ static void keep_later_time(sweep *s, bool other)
     s->best->ever = true;
 }
 
-/* Returns true if 0 <= share / bottom <= 1; bottom is not 0. */
+/* Returns true if share / bottom is in 0 .. 1; bottom must not be 0. */
 static bool is_share(const sweep *s)
 {
     int sign = mpz_sgn(s->bottom);
@@ -138,7 +139,7 @@ static bool find_normal(sweep *s, int of)
     return mpz_sgn(s->share) != 0;
 }
 
-/* Returns true if the projection of the corner is in the projection of face `of`. */
+/* Returns true if the projection of face `of` contains the projection of the corner. */
 static bool is_over(sweep *s, const ebpo_vectorz *corner, int of)
 {
     int signs[3] = { 0, 0, 0 };
@@ -151,8 +152,8 @@ static bool is_over(sweep *s, const ebpo_vectorz *corner, int of)
     return signs[0] == 0 || signs[2] == 0;
 }
 
-/* Considers the times at which corners of face `of` are in the other face, which is not parallel to
- * the direction. */
+/* Considers the times at which the other face contains a corner of face `of`. The other face must
+ * not be parallel to the direction. */
 static void corners_and_face(sweep *s, int of)
 {
     (void)find_normal(s, !of);
@@ -260,13 +261,14 @@ void ebpo_sweep_last(const double a[3][3], const double b[3][3], const double di
 
 /* --- bounds --- */
 
-/* The interval 0 .. most of times of contact. Each separating direction n restricts it in turn: n .
- * d t is between the differences of the extents of both faces along n. */
+/* The interval 0 .. most that contains all times of contact from 0 on. Directions n restrict it one
+ * after the other: at a time t of contact, t (n . d) is between the differences of the extents of
+ * both faces along n. */
 typedef struct time_bounds {
     double x[3][3], y[3][3]; /* corners of both faces, relative to the first corner */
-    double reach;            /* bound of their 1-norms */
+    double norm;             /* upper bound of the 1-norms of x and y */
     const double *d;         /* [3] direction of the motion */
-    double most;             /* negative: there is no time */
+    double most;             /* negative: there is no time of contact */
 } time_bounds;
 
 /* Restricts the interval by the direction n. */
@@ -275,7 +277,7 @@ static void bound_by(time_bounds *b, const double n[3])
     double size = fabs(n[0]) + fabs(n[1]) + fabs(n[2]);
     if (!(size > 0x1p-600 && size < 0x1p600) || b->most < 0)
         return;
-    double c = ebpo_vec3_dot(n, b->d), sign = c < 0 ? -1 : 1, slack = 0x1p-48 * size * b->reach;
+    double c = ebpo_vec3_dot(n, b->d), sign = c < 0 ? -1 : 1, slack = 0x1p-48 * size * b->norm;
     double x_lo = INFINITY, x_hi = -INFINITY, y_lo = INFINITY, y_hi = -INFINITY;
     for (int i = 0; i < 3; i++) {
         double x = sign * ebpo_vec3_dot(n, b->x[i]), y = sign * ebpo_vec3_dot(n, b->y[i]);
@@ -313,9 +315,9 @@ double ebpo_sweep_max(const double a[3][3], const double b[3][3], const double d
             x += fabs(w.x[i][k]);
             y += fabs(w.y[i][k]);
         }
-        w.reach = fmax(w.reach, fmax(x, y));
+        w.norm = fmax(w.norm, fmax(x, y));
     }
-    if (!(w.reach > 0x1p-250 && w.reach < 0x1p250))
+    if (!(w.norm > 0x1p-250 && w.norm < 0x1p250))
         return limit;
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++) {

@@ -25,7 +25,7 @@ EBPO_EIGHT void store_vector8(float out[3][8], const f8 x[3])
         f8_store(out[k], x[k]);
 }
 
-/* Decodes boxes, and computes boxes around them in the other frame. c: their middles. */
+/* Decodes boxes, and computes boxes around them in the other frame. c: set to their middles. */
 EBPO_EIGHT void transform_boxes(const ebpo_accel_pair *p, int side, const ebpo_bound *b,
                                 ebpo_turned_node *out, f8 c[3])
 {
@@ -47,7 +47,8 @@ EBPO_EIGHT void transform_boxes(const ebpo_accel_pair *p, int side, const ebpo_b
     store_vector8(out->e2, e2);
 }
 
-/* Decodes and rotates bounding cylinders. A cylinder without an axis gives no bound. */
+/* Decodes and rotates bounding cylinders. A child without a cylinder gets an extreme length, so
+ * that the cylinder excludes no pair. c: middles of the boxes. */
 EBPO_EIGHT void transform_cylinders(const ebpo_accel_pair *p, int side,
                                     const ebpo_bound_cylinder *s, ebpo_turned_node *out,
                                     const f8 c[3])
@@ -104,15 +105,16 @@ EBPO_EIGHT const ebpo_turned_node *turned_node(ebpo_pair_walk *w, int side, uint
 /* Two nodes P and Q, whose children are compared. */
 typedef struct two_nodes {
     const ebpo_turned_node *p, *q;
-    float in_p[3], in_q[3]; /* Q's origin minus P's, in P's frame; P's minus Q's, in Q's frame */
-    float slack,
-        cylinder_slack; /* computed gaps of boxes, of cylinders, may be too large by this */
-    float sine;         /* 1 plus the margin of the squared sine */
-    bool cylinders;     /* a child has a cylinder */
+    float in_p[3];               /* Q's origin minus P's origin, in P's frame */
+    float in_q[3];               /* P's origin minus Q's origin, in Q's frame */
+    float slack, cylinder_slack; /* greatest errors by which computed gaps of boxes and of cylinders
+                                  * may be too large */
+    float sine;                  /* 1 plus ebpo_accel_pair.sine_capacity */
+    bool cylinders;              /* a child has a cylinder */
 } two_nodes;
 
-/* Prepares the comparison of a node of the first model and one of the second; P is of model p_side.
- */
+/* Prepares the comparison of a, a node of the first model, and b, a node of the second one. p_side:
+ * 0: P is a, 1: P is b. */
 EBPO_EIGHT two_nodes two_nodes_of(const ebpo_accel_pair *pair, const ebpo_turned_node *a,
                                   const ebpo_turned_node *b, int p_side)
 {
@@ -130,15 +132,15 @@ EBPO_EIGHT two_nodes two_nodes_of(const ebpo_accel_pair *pair, const ebpo_turned
     memcpy(t.in_p, p_side == 0 ? in_a : in_b, sizeof t.in_p);
     memcpy(t.in_q, p_side == 0 ? in_b : in_a, sizeof t.in_q);
     float size = a->size + b->size + far;
-    t.slack = 0x1p-18f * size + pair->doubt;
-    t.cylinder_slack = pair->cylinder_share * size + pair->doubt;
+    t.slack = 0x1p-18f * size + pair->uncertainty;
+    t.cylinder_slack = pair->cylinder_share * size + pair->uncertainty;
     t.sine = 1 + pair->sine_capacity;
     t.cylinders = a->cylinders | b->cylinders;
     return t;
 }
 
-/* Returns the greatest gaps of the boxes of P and box j of Q along their six axes; negative where
- * they overlap. */
+/* Returns, for each box of P, the greatest gap to box j of Q along the six axes of both boxes;
+ * negative if they overlap. */
 EBPO_EIGHT f8 box_gaps(const two_nodes *t, int j)
 {
     const ebpo_turned_node *p = t->p, *q = t->q;
@@ -156,8 +158,8 @@ EBPO_EIGHT f8 box_gaps(const two_nodes *t, int j)
     return gap;
 }
 
-/* Returns the greatest gaps of the cylinders of P and cylinder j of Q along their axes, computed in
- * P's frame. */
+/* Returns, for each cylinder of P, the greatest gap to cylinder j of Q along the axes of both
+ * cylinders, computed in P's frame. */
 EBPO_EIGHT f8 cylinder_gaps(const two_nodes *t, int j)
 {
     const ebpo_turned_node *p = t->p, *q = t->q;
@@ -192,7 +194,7 @@ EBPO_EIGHT f8 cylinder_gaps(const two_nodes *t, int j)
     return f8_max(gap, f8_sub(f8_max(by_cylinder, by_box), q_half));
 }
 
-/* Returns a bit for each child of P that may intersect child j of Q, also if its gap is NaN. If
+/* Returns a bit for each child of P, 1 if it may intersect child j of Q (or if the gap is NaN). If
  * `first`, sets the keys of the pairs. */
 EBPO_EIGHT unsigned near_children_of(const two_nodes *t, int j, bool first, float key[8])
 {
@@ -212,18 +214,18 @@ EBPO_EIGHT unsigned near_children_of(const two_nodes *t, int j, bool first, floa
 
 /* --- pairs of nodes --- */
 
-/* Begins a group. In a search for the first contact, the pairs into which one pair of nodes is
- * divided are a group on the stack. The pair of a group with the deepest overlap is searched only
- * when it is needed, because most groups are left early. Below each group is an entry with the
- * start of the previous group. */
+/* Begins a group: in a search for the first contact, the pairs into which one pair of nodes is
+ * divided are a group on the stack. A group is not sorted; pop_deepest finds its deepest pair when
+ * this is needed, because the search leaves most groups early. Below each group on the stack is an
+ * entry with the start of the previous group. */
 EBPO_EIGHT void open_group(ebpo_pair_walk *w)
 {
     w->stack[w->top++] = (ebpo_node_pair){ 0, (uint32_t)w->group, 0 };
     w->group = w->top;
 }
 
-/* Pops the pair with the deepest overlap of the last group; of several, the last one. Returns false
- * if the stack is empty. */
+/* Pops the pair with the deepest overlap of the last group; of several such pairs, the one with the
+ * greatest indices. Returns false if the stack is empty. */
 EBPO_EIGHT bool pop_deepest(ebpo_pair_walk *w, ebpo_node_pair *out)
 {
     ebpo_node_pair *s = w->stack;
@@ -248,9 +250,9 @@ EBPO_EIGHT void push_pair(ebpo_pair_walk *w, uint32_t a, uint32_t b, float key)
     w->stack[w->top++] = (ebpo_node_pair){ a, b, key };
 }
 
-/* Pushes the pairs of the children of p, of the first model, with the children of q that are in
- * `of_b`, a bit for each. First collects a bit for each pair: the processor predicts one loop over
- * these bits better than a loop for each child. */
+/* Pushes the pairs of the children of p, a node of the first model, with the children of q whose
+ * bits are set in `of_b`. First collects a bit for each pair, because the processor predicts one
+ * loop over these bits better than a loop for each child. */
 EBPO_EIGHT void push_both(ebpo_pair_walk *w, const ebpo_turned_node *p, const ebpo_turned_node *q,
                           unsigned of_b, bool first)
 {
@@ -276,7 +278,8 @@ EBPO_EIGHT void push_both(ebpo_pair_walk *w, const ebpo_turned_node *p, const eb
     }
 }
 
-/* Returns the children of p, a node of model `side`, that may intersect `one`, a child of q. */
+/* Returns a bit for each child of p, a node of model `side`, 1 if it may intersect `one`, a child
+ * of q (as in ebpo_node_pair). */
 EBPO_EIGHT unsigned near_children_of_side(const ebpo_pair_walk *w, int side,
                                           const ebpo_turned_node *p, const ebpo_turned_node *q,
                                           uint32_t one, bool first, float key[8])
@@ -285,8 +288,8 @@ EBPO_EIGHT unsigned near_children_of_side(const ebpo_pair_walk *w, int side,
     return near_children_of(&t, (int)(one & 7), first, key);
 }
 
-/* Pushes the pairs of the children of `node`, of model `down`, with the child in r of the other
- * model, which is a child of q. */
+/* Pushes the pairs of the children of `node`, a node of model `down`, with the child of the other
+ * model in r. q: the node whose child that is. */
 EBPO_EIGHT void push_one_side(ebpo_pair_walk *w, ebpo_node_pair r, int down, uint32_t node,
                               const ebpo_turned_node *q, bool first)
 {
@@ -302,11 +305,12 @@ EBPO_EIGHT void push_one_side(ebpo_pair_walk *w, ebpo_node_pair r, int down, uin
     }
 }
 
-/* If a child is this many times longer than the other one, only the longer one is divided. */
+/* If the box of a child is this many times larger than the box of the other child, only the larger
+ * child is divided. */
 #define LONGER 4.0f
 
-/* Returns which of two children is divided: 0, 1, or 2 for both. a, b: the nodes or blocks below
- * them. */
+/* Returns which of two children is divided: 0 or 1, or 2 for both. a, b: the node or block that
+ * each child is; at least one is a node. */
 EBPO_EIGHT int side_to_divide(uint32_t a, uint32_t b, float size_a, float size_b)
 {
     if (a & EBPO_IS_BLOCK)
@@ -316,7 +320,8 @@ EBPO_EIGHT int side_to_divide(uint32_t a, uint32_t b, float size_a, float size_b
     return size_a > LONGER * size_b ? 0 : size_b > LONGER * size_a ? 1 : 2;
 }
 
-/* Divides a pair of children, below which are a and b. Returns false without memory. */
+/* Divides a pair of children, which are the nodes or blocks a and b. Returns false without
+ * memory. */
 EBPO_EIGHT bool divide_pair(ebpo_pair_walk *w, ebpo_node_pair r, uint32_t a, uint32_t b, bool first)
 {
     w->node_pairs++;
@@ -345,7 +350,7 @@ static const ebpo_posed_faces *posed_faces(ebpo_pair_walk *w, int side, uint32_t
     return posed_faces_of(w->posed[side], w->pair->accel[side], w->pair->posing[side], block);
 }
 
-/* Makes the faces of a block relative to `origin`, as ebpo_posed_block_place does; returns the
+/* Computes the faces of a block relative to `origin`, as ebpo_posed_block_place does. Returns the
  * bound of their error. */
 EBPO_EIGHT float place_faces(const ebpo_posed_faces *b, double unit, const double origin[3],
                              float out[9][8])
@@ -357,7 +362,7 @@ EBPO_EIGHT float place_faces(const ebpo_posed_faces *b, double unit, const doubl
         for (int i = 0; i < 3; i++)
             f8_store(out[3 * i + k], f8_add(f8_load(b->x[3 * i + k]), f8_all(shift)));
     }
-    return b->error + 0x1.2p-24f * b->reach + 2.5f * 0x1p-24f * most;
+    return b->error + 0x1.2p-24f * b->extent + 2.5f * 0x1p-24f * most;
 }
 
 /* Finds the pairs of intersecting faces of two blocks. Returns false without memory. */
@@ -375,7 +380,7 @@ static bool blocks_intersect(ebpo_pair_walk *w, uint32_t block_a, uint32_t block
 
 /* --- the stack --- */
 
-/* Processes pairs of the stack: see ebpo_walk_kernels.run. */
+/* Visits at most `pairs` pairs of the stack. Returns false without memory. */
 EBPO_EIGHT bool run_any(ebpo_pair_walk *w, uint64_t pairs, bool first)
 {
     const ebpo_accel *sa = w->pair->accel[0], *sb = w->pair->accel[1];

@@ -2,11 +2,11 @@
  * of pairs, and the relative position of the frames of two models.
  *
  * Coordinates are multiplied by a unit, a power of two, which brings them into the range of floats.
- * Blocks are rotated in floats relative to their first vertex, whose posed coordinates are doubles.
- * With each matrix between frames, the absolute values of its entries are stored, from which the
- * kernels compute sizes of boxes. If two frames are too different for floats, no pair is dropped.
- * See docs/develop/collision.md, "From blocks to the filter". All functions are pure and can be
- * called from any thread. */
+ * Blocks (of up to eight faces) are rotated in floats relative to their first vertex, whose posed
+ * coordinates are doubles. The absolute values of the entries of each matrix between frames are
+ * stored, too; kernels compute sizes of boxes from these values. If two frames are too different
+ * for floats, no pair of nodes is dropped. See docs/develop/collision.md, "From blocks to the
+ * filter". All functions are pure and can be called from any thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -20,20 +20,21 @@ enum { LIMIT = EBPO_POSED_VERTICES };
 
 static float greater_of(float a, float b) { return a > b ? a : b; }
 
-double ebpo_block_unit(double reach)
+double ebpo_block_unit(double max_coordinate)
 {
     int exponent;
-    frexp(reach > 0x1p-900 ? reach : 0x1p-900, &exponent);
+    frexp(max_coordinate > 0x1p-900 ? max_coordinate : 0x1p-900, &exponent);
     return ldexp(1, 30 - exponent);
 }
 
-void ebpo_block_posing_make(ebpo_block_posing *out, const ebpo_posing *posing, double reach)
+void ebpo_block_posing_make(ebpo_block_posing *out, const ebpo_posing *posing,
+                            double max_coordinate)
 {
     out->posing = *posing;
-    out->unit = ebpo_block_unit(reach);
+    out->unit = ebpo_block_unit(max_coordinate);
     double size = posing->scale * out->unit * (1 + 0x1p-18);
     out->size = (float)(size * (1 + 0x1p-20));
-    out->doubt = (float)(0x1p-49 * reach * out->unit);
+    out->uncertainty = (float)(0x1p-49 * max_coordinate * out->unit);
     out->fits = size > 0x1p-60 && size < 0x1p60;
     for (int i = 0; i < 9; i++)
         out->matrix[i / 3][i % 3] = (float)(posing->matrix[i / 3][i % 3] * out->unit);
@@ -56,8 +57,8 @@ void ebpo_posed_block_make(ebpo_posed_block *out, const ebpo_block_posing *p, co
             out->x[k][i] = (m[0] * d[0][i] + m[1] * d[1][i]) + m[2] * d[2][i];
     }
     out->vertices = vertices;
-    out->reach = ebpo_posed_block_extent(p, most);
-    out->error = ebpo_posed_block_error(p, out->reach);
+    out->extent = ebpo_posed_block_extent(p, most);
+    out->error = ebpo_posed_block_error(p, out->extent);
 }
 
 void ebpo_posed_block_make_wide(ebpo_posed_block *out, const ebpo_block_posing *p,
@@ -66,17 +67,17 @@ void ebpo_posed_block_make_wide(ebpo_posed_block *out, const ebpo_block_posing *
     const double base[3] = { vertex[0], vertex[vertices], vertex[2 * vertices] };
     ebpo_posing_apply(&p->posing, base, out->base);
     memset(out->x, 0, sizeof out->x);
-    out->reach = 0;
+    out->extent = 0;
     for (unsigned i = 0; i < vertices; i++) {
         double v[3] = { vertex[i], vertex[vertices + i], vertex[2 * vertices + i] }, posed[3];
         ebpo_posing_apply(&p->posing, v, posed);
         for (int k = 0; k < 3; k++) {
             out->x[k][i] = (float)((posed[k] - out->base[k]) * p->unit);
-            out->reach = greater_of(out->reach, fabsf(out->x[k][i]));
+            out->extent = greater_of(out->extent, fabsf(out->x[k][i]));
         }
     }
     out->vertices = vertices;
-    out->error = 2 * 0x1p-24f * out->reach + p->doubt;
+    out->error = 2 * 0x1p-24f * out->extent + p->uncertainty;
 }
 
 float ebpo_posed_block_place(const ebpo_posed_block *b, double unit, const double origin[3],
@@ -89,7 +90,7 @@ float ebpo_posed_block_place(const ebpo_posed_block *b, double unit, const doubl
         for (int i = 0; i < LIMIT; i++)
             out[k][i] = b->x[k][i] + shift;
     }
-    return b->error + 0x1.2p-24f * b->reach + 2.5f * 0x1p-24f * most;
+    return b->error + 0x1.2p-24f * b->extent + 2.5f * 0x1p-24f * most;
 }
 
 /* Inverts a 3x3 matrix near a rotation, in doubles. */
@@ -121,8 +122,8 @@ static void to_floats(const double m[3][3], float out[3][3], float size[3][3])
     }
 }
 
-/* Prepares a pair whose frames are too different or too extreme for floats: the walk visits every
- * pair of nodes. */
+/* Prepares a pair whose frames are too different for floats, or have coordinates out of their
+ * range. The walk then visits every pair of nodes. */
 static void visit_all_pairs(ebpo_accel_pair *out)
 {
     out->unit[0] = out->unit[1] = 1;
@@ -131,7 +132,7 @@ static void visit_all_pairs(ebpo_accel_pair *out)
     out->place[0] = out->place[1] = out->place[2] = 0;
     to_floats((const double(*)[3])out->turn, out->into[0], out->size[0]);
     to_floats((const double(*)[3])out->turn, out->into[1], out->size[1]);
-    out->doubt = INFINITY;
+    out->uncertainty = INFINITY;
     out->cylinders = out->apart = false;
 }
 
@@ -142,7 +143,7 @@ static bool turned_boxes_apart(const ebpo_accel_pair *p)
     double first = p->accel[0]->largest_coordinate * (double)p->unit[0],
            second = p->accel[1]->largest_coordinate * (double)p->unit[1];
     for (int i = 0; i < 3; i++) {
-        double size = first + (double)p->doubt;
+        double size = first + (double)p->uncertainty;
         for (int k = 0; k < 3; k++)
             size += fabs(p->turn[i][k]) * second;
         if (fabs(p->place[i]) > size * (1 + 0x1p-40))
@@ -162,7 +163,7 @@ static void choose_units(ebpo_accel_pair *out, const double per_world[2])
 }
 
 void ebpo_accel_pair_make(ebpo_accel_pair *out, const ebpo_accel *const accel[2],
-                          const ebpo_block_posing *const posing[2], double reach)
+                          const ebpo_block_posing *const posing[2], double max_coordinate)
 {
     double per_world[2], rotation[2][3][3], back[3][3], middle[3], rotated[3];
     for (int i = 0; i < 2; i++) {
@@ -175,7 +176,7 @@ void ebpo_accel_pair_make(ebpo_accel_pair *out, const ebpo_accel *const accel[2]
     double unit = (double)out->unit[0] * per_world[0],
            ratio = unit / ((double)out->unit[1] * per_world[1]);
     if (!(unit > 0x1p-900 && unit < 0x1p900 && ratio > 0x1p-900 && ratio < 0x1p900 &&
-          reach * unit < 0x1p100)) {
+          max_coordinate * unit < 0x1p100)) {
         visit_all_pairs(out);
         return;
     }
@@ -196,7 +197,7 @@ void ebpo_accel_pair_make(ebpo_accel_pair *out, const ebpo_accel *const accel[2]
     invert_matrix((const double(*)[3])out->turn, back);
     to_floats((const double(*)[3])back, out->into[1], out->size[1]);
     double error_bound = posing[0]->posing.error_bound + posing[1]->posing.error_bound;
-    out->doubt = (float)(0x1p-44 * reach * unit) + 0x1p-100f;
+    out->uncertainty = (float)(0x1p-44 * max_coordinate * unit) + 0x1p-100f;
     out->cylinder_share = (float)(0x1p-17 + 8 * error_bound);
     out->sine_capacity = (float)(0x1p-17 + 16 * error_bound);
     out->apart = turned_boxes_apart(out);
@@ -207,8 +208,8 @@ static double greatest_coordinate(const double x[3])
     return fmax(fabs(x[0]), fmax(fabs(x[1]), fabs(x[2])));
 }
 
-/* Computes the position of one frame in another one. from, to: their rotations; offset: centre of
- * `from` minus centre of `to`, in the world, times the unit. */
+/* Computes the map from the frame `from` to the frame `to`. from, to: rotations of the frames;
+ * offset: centre of `from` minus centre of `to`, in the world, times the unit. */
 static void set_turned_frame(ebpo_turned_frame *out, double from[3][3], double to[3][3],
                              const double offset[3])
 {

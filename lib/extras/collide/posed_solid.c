@@ -1,14 +1,14 @@
 /* Computes the winding number of a posed solid at a point of the world, exactly for posed
  * coordinates.
  *
- * The point is transformed into the model's coordinates with an error bound. If no face is near,
- * the result is the winding number there. Otherwise the faces near the point are posed, and they
- * decide: a segment parallel to an axis leads from a point farther away, whose winding number is
- * known, to the query point, and its crossings with faces are counted exactly. A point whose
- * coordinates are fractions is reached from the point with the nearest doubles in three such
- * segments.
+ * The point is transformed into the model's coordinates with an error bound. If no face is within
+ * the bound, the result is the model's winding number at that point. Otherwise the faces near the
+ * point are posed. A segment parallel to an axis leads from an anchor (a point farther away, whose
+ * winding number is known) to the query point, and its crossings with posed faces are counted
+ * exactly. If the coordinates of the query point are fractions, three such segments lead to it from
+ * the point with the nearest doubles as coordinates.
  *
- * Functions do not change a posed solid: any thread may use it, each with a separate context.
+ * Functions do not change a posed solid: several threads may use one, each with a separate context.
  * Proofs: docs/develop/booleans.md and docs/develop/collision.md, "Relation of two models". */
 #include "core/strict_fp.h"
 
@@ -25,21 +25,21 @@
 #include "geometry/predicates.h"
 #include "query/query_model.h"
 
-void ebpo_model_extent(const ebpo_model *m, double reach[3])
+void ebpo_model_extent(const ebpo_model *m, double max_coordinate[3])
 {
     for (int k = 0; k < 3; k++) {
         double low = m->info->box_origin[k], high = low + m->info->box_size[k];
-        reach[k] = fmax(fabs(low), fabs(high)) * (1 + 0x1p-50);
+        max_coordinate[k] = fmax(fabs(low), fabs(high)) * (1 + 0x1p-50);
     }
 }
 
-double ebpo_posed_extent(const ebpo_posing *p, const double reach[3])
+double ebpo_posed_extent(const ebpo_posing *p, const double max_coordinate[3])
 {
     double most = 0;
     for (int i = 0; i < 3; i++) {
         double size = fabs(p->translation[i]);
         for (int k = 0; k < 3; k++)
-            size += fabs(p->matrix[i][k]) * reach[k];
+            size += fabs(p->matrix[i][k]) * max_coordinate[k];
         most = fmax(most, size);
     }
     return most * (1 + 0x1p-50);
@@ -49,9 +49,9 @@ ebpo_status ebpo_pose_check(const ebpo_model *model, const ebpo_pose *pose, ebpo
 {
     EBPO_DEFAULT_FP;
     ebpo_posing posing;
-    double reach[3];
-    ebpo_model_extent(model, reach);
-    return ebpo_posing_make(&posing, pose, reach, error);
+    double max_coordinate[3];
+    ebpo_model_extent(model, max_coordinate);
+    return ebpo_posing_make(&posing, pose, max_coordinate, error);
 }
 
 bool ebpo_same_model(const ebpo_model *a, const ebpo_model *b)
@@ -63,7 +63,7 @@ bool ebpo_same_model(const ebpo_model *a, const ebpo_model *b)
 
 /* --- points in the coordinates of the model --- */
 
-/* Factor for bounds: more than the rounding of their computation. */
+/* Factor by which bounds are widened; it exceeds the rounding errors of their computation. */
 static const double margin_factor = 1 + 0x1p-40;
 
 /* Sets the box of all posed vertices. */
@@ -87,18 +87,21 @@ static void bound_box(ebpo_posed_solid *s)
 ebpo_status ebpo_posed_solid_make(ebpo_posed_solid *out, ebpo_model *model, const ebpo_pose *pose,
                                   ebpo_error *error)
 {
-    double reach[3];
+    double max_coordinate[3];
     *out = (ebpo_posed_solid){ .model = model };
     memcpy(out->rotation, pose->rotation, sizeof out->rotation);
-    ebpo_model_extent(model, reach);
+    ebpo_model_extent(model, max_coordinate);
     ebpo_status status = ebpo_check_mesh(model, error);
     if (status == EBPO_OK)
-        status = ebpo_posing_make(&out->posing, pose, reach, error);
+        status = ebpo_posing_make(&out->posing, pose, max_coordinate, error);
     if (status != EBPO_OK)
         return status;
-    /* reach is at most 2^1000: no sum overflows; 1.7321 is more than the root of 3 */
-    out->moved =
-        1.7321 * ebpo_posing_error(&out->posing, (reach[0] + reach[1] + reach[2]) * margin_factor);
+    /* No sum overflows, because max_coordinate is at most 2^1000. 1.7321 is more than the root
+     * of 3.
+     */
+    out->moved = 1.7321 * ebpo_posing_error(&out->posing, (max_coordinate[0] + max_coordinate[1] +
+                                                           max_coordinate[2]) *
+                                                              margin_factor);
     bound_box(out);
     if (!(out->moved / out->posing.scale <= 0x1p990))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
@@ -117,7 +120,7 @@ bool ebpo_posed_solid_near(const ebpo_posed_solid *s, const double w[3], double 
     return true;
 }
 
-void ebpo_unpose(const ebpo_posed_solid *s, const double w[3], double p[3], double *doubt)
+void ebpo_unpose(const ebpo_posed_solid *s, const double w[3], double p[3], double *uncertainty)
 {
     double y[3], length = 0, scale = s->posing.scale;
     for (int i = 0; i < 3; i++) {
@@ -128,39 +131,39 @@ void ebpo_unpose(const ebpo_posed_solid *s, const double w[3], double p[3], doub
         p[k] = ((s->rotation[0][k] * y[0] + s->rotation[1][k] * y[1]) + s->rotation[2][k] * y[2]) /
                scale;
     double far = s->moved + length * (2 * s->posing.error_bound + 8 * 0x1p-53) + 0x1p-1060;
-    *doubt = far / scale * margin_factor + 0x1p-1060;
+    *uncertainty = far / scale * margin_factor + 0x1p-1060;
 }
 
 void ebpo_unpose_box(const ebpo_posed_solid *s, const double a[3], const double b[3], double low[3],
                      double high[3])
 {
-    double middle[3], half[3], all = 0, p[3], doubt;
+    double middle[3], half[3], all = 0, p[3], uncertainty;
     for (int k = 0; k < 3; k++) {
         middle[k] = a[k] / 2 + b[k] / 2;
         half[k] = fmax(fabs(a[k] - middle[k]), fabs(b[k] - middle[k])) * (1 + 0x1p-50);
         all += half[k];
     }
-    ebpo_unpose(s, middle, p, &doubt);
+    ebpo_unpose(s, middle, p, &uncertainty);
     for (int k = 0; k < 3; k++) {
-        double reach = 2 * s->posing.error_bound * all;
+        double width = 2 * s->posing.error_bound * all; /* half the width of the result */
         for (int i = 0; i < 3; i++)
-            reach += fabs(s->rotation[i][k]) * half[i];
-        reach = reach / s->posing.scale * (1 + 0x1p-40) + doubt;
-        low[k] = nextafter(p[k] - reach, -INFINITY);
-        high[k] = nextafter(p[k] + reach, INFINITY);
+            width += fabs(s->rotation[i][k]) * half[i];
+        width = width / s->posing.scale * (1 + 0x1p-40) + uncertainty;
+        low[k] = nextafter(p[k] - width, -INFINITY);
+        high[k] = nextafter(p[k] + width, INFINITY);
     }
 }
 
-/* Sets *clear to true if certainly no face of the model is within `doubt` of p. */
-static ebpo_status is_clear_of_faces(ebpo_context *context, const double p[3], double doubt,
+/* Sets *clear to true if certainly no face of the model is within `uncertainty` of p. */
+static ebpo_status is_clear_of_faces(ebpo_context *context, const double p[3], double uncertainty,
                                      bool *clear, ebpo_error *error)
 {
     double low[3], high[3];
     const uint64_t *faces;
     uint64_t count;
     for (int k = 0; k < 3; k++) {
-        low[k] = nextafter(p[k] - doubt, -INFINITY);
-        high[k] = nextafter(p[k] + doubt, INFINITY);
+        low[k] = nextafter(p[k] - uncertainty, -INFINITY);
+        high[k] = nextafter(p[k] + uncertainty, INFINITY);
     }
     ebpo_status status = ebpo_faces_in_box(context, low, high, &faces, &count, error);
     *clear = status == EBPO_OK && count == 0;
@@ -169,12 +172,12 @@ static ebpo_status is_clear_of_faces(ebpo_context *context, const double p[3], d
 
 /* --- sides of a point --- */
 
-/* The segment that leads to the point w, or begins there. */
+/* The segment between the query point w and the anchor. */
 typedef struct side_segment {
     const ebpo_posed_solid *solid;
     const double *w;   /* [3] the query point */
     int axis;          /* the segment is parallel to this axis */
-    double low[3], to; /* its lower end, and the coordinate of its upper end on the axis */
+    double low[3], to; /* the segment's lower end; the coordinate of its upper end on the axis */
     int32_t crossed;   /* winding number at the upper end minus that at the lower end */
     int32_t jump;      /* winding number above w minus that below it */
     ebpo_posed_sides *out;
@@ -190,7 +193,7 @@ static int side_axis(const double t[3][3])
     return -1;
 }
 
-/* Returns true if both faces are in one plane. */
+/* Returns true if the face t is in the plane of the face `plane`. */
 static bool in_plane(const double plane[3][3], const double t[3][3])
 {
     return ebpo_orient3d(plane[0], plane[1], plane[2], t[0]) == 0 &&
@@ -228,27 +231,27 @@ static bool receive_near_triangles(void *user, const ebpo_triangles *triangles)
     return true;
 }
 
-/* --- a point that is certainly far enough from faces --- */
+/* --- the anchor: a point that is certainly far enough from faces --- */
 
 /* A point with a known winding number. */
 typedef struct anchor {
     double at[3];
-    int axis;        /* axis along which it is displaced from w */
+    int axis;        /* axis along which the anchor is displaced from w */
     int32_t winding; /* winding number at the anchor */
 } anchor;
 
-/* Sets *found, and the winding number, if a->at is certainly far enough from faces. */
+/* Sets *found to true, and the winding number, if a->at is certainly far enough from faces. */
 static ebpo_status try_anchor(const ebpo_posed_solid *s, ebpo_context *context, anchor *a,
                               bool *found, ebpo_error *error)
 {
-    double p[3], doubt;
+    double p[3], uncertainty;
     ebpo_inside_result inside = { 0 };
     *found = !ebpo_posed_solid_near(s, a->at, 0);
     a->winding = 0;
     if (*found)
         return EBPO_OK;
-    ebpo_unpose(s, a->at, p, &doubt);
-    ebpo_status status = is_clear_of_faces(context, p, doubt, found, error);
+    ebpo_unpose(s, a->at, p, &uncertainty);
+    ebpo_status status = is_clear_of_faces(context, p, uncertainty, found, error);
     if (status == EBPO_OK && *found)
         status = ebpo_inside(context, p, NULL, &inside, error);
     a->winding = inside.winding;
@@ -272,15 +275,16 @@ static ebpo_status find_anchor(const ebpo_posed_solid *s, ebpo_context *context,
         }
 }
 
-/* Computes the sides of w by a segment from an anchor. doubt: of ebpo_unpose. */
+/* Computes the winding numbers around w by a segment from an anchor. uncertainty: result of
+ * ebpo_unpose for w. */
 static ebpo_status decide_by_faces(const ebpo_posed_solid *s, ebpo_context *context,
-                                   const double w[3], double doubt, ebpo_posed_sides *out,
+                                   const double w[3], double uncertainty, ebpo_posed_sides *out,
                                    ebpo_error *error)
 {
     anchor a;
     double low[3], high[3];
     side_segment l = { .solid = s, .w = w, .out = out };
-    ebpo_status status = find_anchor(s, context, w, 8 * doubt * s->posing.scale, &a, error);
+    ebpo_status status = find_anchor(s, context, w, 8 * uncertainty * s->posing.scale, &a, error);
     if (status != EBPO_OK)
         return status;
     bool upward = a.at[a.axis] > w[a.axis]; /* the segment begins at w */
@@ -299,16 +303,16 @@ static ebpo_status decide_by_faces(const ebpo_posed_solid *s, ebpo_context *cont
 ebpo_status ebpo_posed_solid_sides(const ebpo_posed_solid *s, ebpo_context *context,
                                    const double w[3], ebpo_posed_sides *out, ebpo_error *error)
 {
-    double p[3], doubt;
+    double p[3], uncertainty;
     bool clear = false;
     ebpo_inside_result inside;
     *out = (ebpo_posed_sides){ .flat = true };
     if (!ebpo_posed_solid_near(s, w, 0))
         return EBPO_OK;
-    ebpo_unpose(s, w, p, &doubt);
-    ebpo_status status = is_clear_of_faces(context, p, doubt, &clear, error);
+    ebpo_unpose(s, w, p, &uncertainty);
+    ebpo_status status = is_clear_of_faces(context, p, uncertainty, &clear, error);
     if (status == EBPO_OK && !clear)
-        return decide_by_faces(s, context, w, doubt, out, error);
+        return decide_by_faces(s, context, w, uncertainty, out, error);
     if (status == EBPO_OK)
         status = ebpo_inside(context, p, NULL, &inside, error);
     if (status == EBPO_OK)
@@ -318,8 +322,8 @@ ebpo_status ebpo_posed_solid_sides(const ebpo_posed_solid *s, ebpo_context *cont
 
 /* --- winding numbers at points with fractions --- */
 
-/* A path from w, a point of doubles, to x. Integers are coordinates in units of 2^unit /
- * denominator. */
+/* A path from w, the point of doubles nearest to x, to x. Its integers are coordinates in units of
+ * 2^unit / denominator. */
 typedef struct path {
     const ebpo_posed_solid *solid;
     const mpq_t *x; /* [3] */
@@ -328,7 +332,7 @@ typedef struct path {
     mpz_t number[4];        /* temporary values */
     ebpo_vectorz at[4];     /* at[0] is w; at[1] to at[3] replace one coordinate after the
                              * other by that of x */
-    ebpo_vectorz corner[3]; /* of the current face */
+    ebpo_vectorz corner[3]; /* corners of the current face */
     int32_t crossed;        /* winding number at x minus that at w */
 } path;
 
@@ -389,8 +393,9 @@ static int orientation_of(path *p, int axis, const ebpo_vectorz *a, const ebpo_v
     return mpz_sgn(p->number[0]);
 }
 
-/* Returns the side of the line of edge i, in the projection along the axis, on which the point `at`
- * is after the infinitesimal shift of geometry/triangle_predicates.c. */
+/* Returns the side of the line of edge i, in the projection along the axis, of the point `at`,
+ * which is shifted by the infinitesimal vector of geometry/triangle_predicates.c; 0: the edge has
+ * no length in the projection. */
 static int side_of_line(path *p, int axis, int i, const ebpo_vectorz *at)
 {
     const ebpo_vectorz *a = &p->corner[i], *b = &p->corner[i == 2 ? 0 : i + 1];
@@ -404,7 +409,7 @@ static int side_of_line(path *p, int axis, int i, const ebpo_vectorz *at)
     return (sign > 0) - (sign < 0);
 }
 
-/* Returns the side of the face's plane on which the shifted point `at` is. */
+/* Returns the side (1 or -1) of the face's plane on which the shifted point `at` is. */
 static int side_of_plane(path *p, const ebpo_vectorz *at)
 {
     const ebpo_vectorz *a = &p->corner[0];
@@ -422,8 +427,8 @@ static int side_of_plane(path *p, const ebpo_vectorz *at)
     return sign;
 }
 
-/* Returns the change of the winding number by the face along a segment parallel to the axis, from
- * one point to another one above it. */
+/* Returns the change of the winding number that the face causes along a segment parallel to the
+ * axis. `to` is above `from` on the axis. */
 static int count_crossing(path *p, int axis, const ebpo_vectorz *from, const ebpo_vectorz *to)
 {
     int turn = side_of_line(p, axis, 0, from);

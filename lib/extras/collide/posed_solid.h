@@ -1,7 +1,7 @@
-/* Models at poses: their extent, and the winding number of a posed solid at a point of the world.
- * It is exact for the posed coordinates, which are rounded to doubles. Proofs:
- * docs/develop/booleans.md. Functions do not change a posed solid: any thread may use it, each with
- * a separate context. */
+/* Computes the extent of posed models, and the winding number of a posed solid at a point of the
+ * world. The winding number is exact for the posed coordinates, which are rounded to doubles.
+ * Proofs: docs/develop/booleans.md. Functions do not change a posed solid: several threads may use
+ * one, each with a separate context. */
 #ifndef EBPO_COLLIDE_POSED_SOLID_H
 #define EBPO_COLLIDE_POSED_SOLID_H
 
@@ -11,27 +11,29 @@
 #include "geometry/pose.h"
 #include "query/query_model.h"
 
-/* Sets `reach` to upper bounds of the absolute values of the vertices' coordinates on each axis. */
-void ebpo_model_extent(const ebpo_model *model, double reach[3]);
+/* Sets max_coordinate[axis] to an upper bound of the absolute values of the vertices' coordinates
+ * on the axis. */
+void ebpo_model_extent(const ebpo_model *model, double max_coordinate[3]);
 
-/* Returns an upper bound of the absolute values of the posed vertices' coordinates. reach: of
- * ebpo_model_extent. */
-double ebpo_posed_extent(const ebpo_posing *posing, const double reach[3]);
+/* Returns an upper bound of the absolute values of the posed vertices' coordinates. max_coordinate:
+ * result of ebpo_model_extent. */
+double ebpo_posed_extent(const ebpo_posing *posing, const double max_coordinate[3]);
 
-/* Returns true if both models are of one file, or of two files with the same content: they have the
- * same faces, in the same order. */
+/* Returns true if both models come from files with the same content and have the same kind (solid
+ * or surface) and rule. They then have the same faces in the same order. */
 bool ebpo_same_model(const ebpo_model *a, const ebpo_model *b);
 
 typedef struct ebpo_posed_solid {
     ebpo_model *model;
     ebpo_posing posing;
-    double rotation[3][3];
-    double box[6]; /* low and high: all posed vertices are in this box */
-    double moved;  /* bound of the distance between a posed vertex and its exact motion */
+    double rotation[3][3]; /* rotation of the pose, without its scale */
+    double box[6]; /* the low corner, then the high corner of a box around all posed vertices */
+    double moved;  /* bound of the distance of a posed vertex from its exact motion, which is not
+                    * rounded */
 } ebpo_posed_solid;
 
-/* Makes a posed solid, or a posed surface, whose winding numbers must not be queried. Fails with
- * EBPO_E_ARGUMENT (the pose) and EBPO_E_ABSENT (a model without its mesh). */
+/* Makes a posed solid. The model may be a surface; then its winding numbers must not be queried.
+ * Fails with EBPO_E_ARGUMENT (the pose) and EBPO_E_ABSENT (a model without its mesh). */
 EBPO_MUST_USE ebpo_status ebpo_posed_solid_make(ebpo_posed_solid *out, ebpo_model *model,
                                                 const ebpo_pose *pose, ebpo_error *error);
 
@@ -50,14 +52,15 @@ static inline double ebpo_box_gap(const double a_low[3], const double a_high[3],
     return most;
 }
 
-/* Computes the point p in the model's coordinates that the exact motion maps to w. *doubt bounds
- * the errors of p and of the rounding of posed coordinates: if no face of the model is within
- * *doubt of p, the winding number of the posed model at w is the winding number of the model at
- * p. */
-void ebpo_unpose(const ebpo_posed_solid *s, const double w[3], double p[3], double *doubt);
+/* Computes the point p, in the model's coordinates, that the exact motion maps to w. *uncertainty
+ * bounds the errors of p and of the rounding of posed coordinates. If no face of the model is
+ * within *uncertainty of p, the winding number of the posed model at w is equal to the winding
+ * number of the model at p. */
+void ebpo_unpose(const ebpo_posed_solid *s, const double w[3], double p[3], double *uncertainty);
 
-/* Computes a box in the model's coordinates that intersects every face that, when posed, may have a
- * point in a box of the world. a and b are opposite corners of the world box, in any order. */
+/* Computes a box in the model's coordinates from a box of the world: every face whose posed face
+ * may have a point in the world box intersects the result. a and b are opposite corners of the
+ * world box, in any order. */
 void ebpo_unpose_box(const ebpo_posed_solid *s, const double a[3], const double b[3], double low[3],
                      double high[3]);
 
@@ -65,11 +68,11 @@ void ebpo_unpose_box(const ebpo_posed_solid *s, const double a[3], const double 
 typedef struct ebpo_posed_sides {
     bool on;            /* a posed face with an area contains the point */
     bool flat;          /* all such faces are in one plane */
-    double plane[3][3]; /* if on: corners of one of them */
+    double plane[3][3]; /* if `on`: corners of one of these faces */
     /* Winding numbers next to the point, on both sides of the plane: `above` on the side of greater
      * x (of greater y if the plane is parallel to the x axis, of greater z if it is also parallel
-     * to the y axis), `below` on the other side. They are equal unless `on`. If `on` and not
-     * `flat`, only `above` is valid: the winding number at some point next to this one. */
+     * to the y axis), `below` on the other side. They are equal if not `on`. If `on` and not
+     * `flat`, only `above` is valid: the winding number at some point next to the query point. */
     int32_t above, below;
 } ebpo_posed_sides;
 
@@ -78,9 +81,9 @@ EBPO_MUST_USE ebpo_status ebpo_posed_solid_sides(const ebpo_posed_solid *s, ebpo
                                                  const double w[3], ebpo_posed_sides *out,
                                                  ebpo_error *error);
 
-/* Computes the winding number at x shifted by (d0, d1, d2), the infinitesimal shift of
- * ebpo_axis_crossing; the shifted point is on no face. The coordinates of x are canonical fractions
- * within the range of doubles. */
+/* Computes the winding number at the point x, which is shifted by the infinitesimal vector (d0, d1,
+ * d2) of ebpo_axis_crossing (geometry/predicates.h), so that it is on no face. The coordinates of x
+ * are canonical fractions within the range of doubles. */
 EBPO_MUST_USE ebpo_status ebpo_exact_winding(const ebpo_posed_solid *s, ebpo_context *context,
                                              const mpq_t x[3], int32_t *winding, ebpo_error *error);
 

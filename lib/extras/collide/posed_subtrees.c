@@ -1,11 +1,12 @@
-/* Finds the subtrees of a posed model, convex envelopes of their faces, and bounds of the distance
- * of envelopes. A partly loaded model has the subtrees that are loaded on demand; a whole model is
- * a single subtree.
+/* Finds the subtrees of a posed model and convex envelopes of their faces, and bounds the distance
+ * of envelopes. A partly loaded model has subtrees that are loaded on demand; a model that is
+ * entirely in memory (a whole model) is a single subtree.
  *
- * An envelope begins as the cell. The planes of the node and of its nearest ancestors, which are in
- * memory, cut it; then it is posed. A hash table keeps envelopes by octcode (locational code). Gaps
- * are lower bounds of the distance of two convex sets, found by the iteration of Gilbert (1966):
- * every direction gives a bound, so the iteration may stop at any time. */
+ * An envelope is computed from the cell: the planes of the node and of its nearest ancestors, which
+ * are in memory, cut the cell, and the result is posed. A hash table keeps envelopes by octcode
+ * (locational code). A gap is a lower bound of the distance of two convex sets, found by the
+ * iteration of Gilbert (1966): every direction gives a bound, so the iteration may stop at any
+ * time. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -47,7 +48,7 @@ static const double *farthest_point(const ebpo_convex *c, const double n[3], dou
     return c->point[best];
 }
 
-/* Maximum number of iterations; sets that are nearly in contact would need more. */
+/* Maximum number of iterations. Sets that are nearly in contact need more for an accurate gap. */
 enum { DIRECTIONS = 32 };
 
 /* The distance is equal to the distance of the origin from the convex set of all differences of a
@@ -111,10 +112,10 @@ static const double cut_share = 0x1p-15;
 
 /* --- order of subtrees --- */
 
-/* A subtree, and its position in the order of the file. */
+/* A subtree, with the key that orders subtrees as the file does. */
 typedef struct subtree_position {
-    uint64_t code; /* octcode of its first cell at the deepest level */
-    uint32_t number;
+    uint64_t code;   /* octcode of the subtree's first cell at the deepest level */
+    uint32_t number; /* index of the subtree */
 } subtree_position;
 
 static int by_code(const void *x, const void *y)
@@ -204,13 +205,13 @@ void ebpo_posed_cell(const ebpo_posed_subtrees *s, ebpo_cell cell, double out[8]
     }
 }
 
-double ebpo_posed_slack(const ebpo_posed_subtrees *s, ebpo_cell cell, double reach)
+double ebpo_posed_slack(const ebpo_posed_subtrees *s, ebpo_cell cell, double max_coordinate)
 {
     double side = 0;
     for (int k = 0; k < 3; k++)
         side = fmax(side, s->model->info->box_size[k]);
     side *= s->posing.scale / (double)(1u << cell.level);
-    return 1.75 * cut_share * side + 0x1p-45 * reach;
+    return 1.75 * cut_share * side + 0x1p-45 * max_coordinate;
 }
 
 double ebpo_posed_diagonal(const ebpo_posed_subtrees *s, ebpo_cell cell)
@@ -273,7 +274,7 @@ static posed_hull *make_hull(const ebpo_posed_subtrees *s, ebpo_cell cell)
     return out;
 }
 
-/* Returns the entry of an octcode in the table, or the free entry where it can be added. */
+/* Returns the entry of an octcode in the table, or the free entry for it. */
 static posed_hull **find_hull(posed_hull **hull, uint64_t slots, ebpo_octcode code)
 {
     uint64_t at;
@@ -281,7 +282,7 @@ static posed_hull **find_hull(posed_hull **hull, uint64_t slots, ebpo_octcode co
     return &hull[at];
 }
 
-/* Makes space for one more entry. Returns false without memory. */
+/* Makes space for one more entry of the table. Returns false without memory. */
 static bool widen_table(ebpo_posed_subtrees *s)
 {
     if (4 * (s->hulls + 1) <= 3 * s->slots)

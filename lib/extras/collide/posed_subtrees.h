@@ -1,5 +1,5 @@
-/* The subtrees of a posed model, convex envelopes of their faces, and bounds of the distance of
- * envelopes. */
+/* Finds the subtrees of a posed model and convex envelopes of their faces, and bounds the distance
+ * of envelopes. */
 #ifndef EBPO_COLLIDE_POSED_SUBTREES_H
 #define EBPO_COLLIDE_POSED_SUBTREES_H
 
@@ -12,29 +12,30 @@ typedef struct ebpo_convex {
     const double (*point)[3];
 } ebpo_convex;
 
-/* Returns a lower bound of the distance of two hulls, except for an error of 2^-48 of the greatest
- * coordinate; 0 if no bound was found. Mostly the bound is close to the distance. The search ends
- * when it finds a bound above `enough`. The result is the same on every processor. */
+/* Returns a lower bound of the distance of two hulls, which may be too great by 2^-48 times the
+ * greatest coordinate; 0 if no bound was found. In most cases the bound is close to the distance.
+ * The search ends when it finds a bound above `enough`. The result is the same on every
+ * processor. */
 double ebpo_convex_gap(const ebpo_convex *a, const ebpo_convex *b, double enough);
 
 /* Returns an upper bound of the distance of a point of a from a point of b, rounded up. */
 double ebpo_convex_span(const ebpo_convex *a, const ebpo_convex *b);
 
-/* The subtrees of a model that are loaded on demand; a whole model is a single one. */
-
+/* The subtrees of a posed model. They are loaded on demand; a model that is entirely in memory (a
+ * whole model) is a single subtree. */
 typedef struct ebpo_posed_subtrees {
     const ebpo_model *model;
     ebpo_posing posing;
     uint64_t count;           /* number of subtrees */
     uint32_t *rank;           /* [count] rank of each subtree in the order of the file's faces */
     struct posed_hull **hull; /* [slots] hash table by octcodes of envelopes that were requested */
-    uint64_t hulls, slots;    /* number of envelopes, size of the table */
-    uint64_t bytes;           /* memory of the envelopes */
+    uint64_t hulls, slots;    /* number of envelopes; size of the table */
+    uint64_t bytes;           /* memory of the envelopes and their table */
 } ebpo_posed_subtrees;
 
 /* A node of the part of the tree that is in memory. */
 typedef struct ebpo_posed_node {
-    uint32_t entry; /* its entry in the model */
+    uint32_t entry; /* the node's entry in the model (ebpo_entry_kind_of) */
     ebpo_cell cell;
 } ebpo_posed_node;
 
@@ -45,24 +46,26 @@ EBPO_MUST_USE ebpo_status ebpo_posed_subtrees_make(ebpo_posed_subtrees *out,
                                                    const ebpo_posing *posing, ebpo_error *error);
 void ebpo_posed_subtrees_free(ebpo_posed_subtrees *s);
 
-/* Sets *out to the posed envelope of a node in memory, or of a subtree as far as it is known
- * without loading the subtree. Except for errors up to ebpo_posed_slack, the envelope contains the
- * part of every face that is in the cell. It lives as long as `s`. */
+/* Sets *out to the posed envelope of a cell, which belongs to a node in memory or to the root of a
+ * subtree; the subtree is not loaded. Except for errors up to ebpo_posed_slack, the envelope
+ * contains the part of every face that is in the cell. It lives as long as `s`. */
 EBPO_MUST_USE ebpo_status ebpo_posed_envelope(ebpo_posed_subtrees *s, ebpo_cell cell,
                                               ebpo_convex *out, ebpo_error *error);
 
-/* The first function returns the root of the tree. The second returns the root of a subtree that is
- * loaded on demand; a whole model is its only subtree. */
+/* Returns the root of the tree. */
 ebpo_posed_node ebpo_posed_root(const ebpo_posed_subtrees *s);
+/* Returns the node at which a search for subtrees begins: the root of the tree, or, for a whole
+ * model, the root of its only subtree. */
 ebpo_posed_node ebpo_posed_subtree_root(const ebpo_posed_subtrees *s);
 /* Returns a child of a gray node. */
 ebpo_posed_node ebpo_posed_child(const ebpo_posed_subtrees *s, const ebpo_posed_node *gray,
                                  unsigned octant);
-/* Computes the posed corners of a cell. */
+/* Computes the posed corners of a cell. Bit k of a corner's index: the upper coordinate on axis k.
+ */
 void ebpo_posed_cell(const ebpo_posed_subtrees *s, ebpo_cell cell, double out[8][3]);
 /* Bounds the errors that posing and cutting cause in the corners of the envelope of a cell.
- * `reach`: bound of posed coordinates. */
-double ebpo_posed_slack(const ebpo_posed_subtrees *s, ebpo_cell cell, double reach);
+ * `max_coordinate`: bound of posed coordinates. */
+double ebpo_posed_slack(const ebpo_posed_subtrees *s, ebpo_cell cell, double max_coordinate);
 /* Returns the length of the cell's diagonal in the world. */
 double ebpo_posed_diagonal(const ebpo_posed_subtrees *s, ebpo_cell cell);
 

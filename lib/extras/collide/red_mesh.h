@@ -1,4 +1,4 @@
-/* Writes meshes to a PLY file for viewing, with marked faces in red. */
+/* Writes meshes to a PLY file for viewers, with marked faces in red. */
 #ifndef EBPO_COLLIDE_RED_MESH_H
 #define EBPO_COLLIDE_RED_MESH_H
 
@@ -7,8 +7,9 @@
 #include "io/publish.h"
 #include "geometry/pose.h"
 
-/* A mesh to be printed: functions that return a vertex, and the vertex indices of a face. They are
- * called for each vertex, then for each face, in ascending order. */
+/* A mesh to be printed. `vertex` sets `out` to the coordinates of a vertex, `face` to the vertex
+ * indices of a face. They are called for each vertex, then for each face, in ascending order of
+ * `number`. */
 typedef struct ebpo_red_source {
     uint64_t vertices, faces;
     void *user;
@@ -22,7 +23,7 @@ ebpo_red_source ebpo_red_source_of(const ebpo_mesh *mesh);
 typedef struct ebpo_red_mesh {
     ebpo_red_source source;
     const ebpo_posing *posing; /* NULL: coordinates are not changed */
-    const uint64_t *red;       /* a bit for each face: it is red */
+    const uint64_t *red;       /* a bit for each face, 1: the face is red */
     const char *colour;        /* colour of the other faces: "r g b" */
 } ebpo_red_mesh;
 

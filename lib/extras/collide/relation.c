@@ -2,14 +2,16 @@
  * or equal.
  *
  * The boundaries of two models divide space into parts. The relation depends on which kinds of
- * parts exist: parts inside both models, only inside the first, only inside the second. Each part
- * is bounded by pieces of faces, so the parts are found around these pieces (around_face.h).
+ * parts exist: parts inside both models, parts inside only the first one, parts inside only the
+ * second one. Each part is bounded by pieces of faces, so the parts are found around these pieces
+ * (around_face.h).
  *
- * A crossing pair of faces nearly always decides. Otherwise all faces that intersect the other
- * model are examined, then one face of each patch without contact, because such a patch is entirely
- * on one side of the other model. A patch is skipped if a face on its side would not change the
- * result; if the side is known, the patch's subtree is not loaded. If the deadline passes, the
- * relation is undecided. A search runs in one thread. See docs/develop/collision.md, "Relation of
+ * In nearly all cases a crossing pair of faces decides the relation. If it does not, all faces that
+ * intersect the other model are examined, then one face of each patch without contact. Such a patch
+ * (a set of connected faces, none of which intersects the other model) is entirely on one side of
+ * the other model. A patch is skipped if its side is known and adds no information; its subtree is
+ * then not loaded. If the deadline passes, the relation is undecided. A search runs in one
+ * thread. See docs/develop/collision.md, "Relation of
  * two models". */
 #include "core/strict_fp.h"
 
@@ -32,8 +34,8 @@
 
 /* --- patches without contact --- */
 
-/* The patches without contact of the query's model m, subtree by subtree; a whole model is its only
- * subtree. */
+/* The patches without contact of the query's model m, subtree by subtree. A model that is entirely
+ * in memory (a whole model) is a single subtree. */
 typedef struct separate_patches {
     const ebpo_collision *collision;
     ebpo_two_models *two;
@@ -41,7 +43,7 @@ typedef struct separate_patches {
     uint64_t subtrees;     /* number of subtrees */
     uint64_t first, count; /* owned faces of the current subtree: index of the first one in the
                             * file, and their number */
-    uint32_t *patch;       /* [count] first owned face of the patch of each (face_patches.h) */
+    uint32_t *patch;       /* [count] the patch of each owned face, as in ebpo_face_patches */
 } separate_patches;
 
 static void separate_patches_begin(separate_patches *u, const ebpo_collision *collision,
@@ -63,8 +65,8 @@ static ebpo_status find_patches(separate_patches *u, const ebpo_accel *subtree,
     return ebpo_face_patches(subtree, slots, intersecting, &u->patch, error);
 }
 
-/* Loads a subtree, finds its patches, and releases it. intersecting: a bit for each face of the
- * model: it intersects the other model. */
+/* Loads a subtree, finds its patches, and releases the subtree. intersecting: a bit for each face
+ * of the model, 1: the face intersects the other model. */
 static ebpo_status separate_patches_find(separate_patches *u, uint64_t number,
                                          const uint64_t *intersecting, ebpo_error *error)
 {
@@ -93,18 +95,18 @@ static bool record_any(void *user, const ebpo_triangles *triangles)
     return !*any;
 }
 
-/* Sets *in to 1 if a ball around a point of the world is entirely inside the other model, to 0 if
- * it is entirely outside; otherwise *in stays unchanged. */
+/* Sets *in to 1 if a ball around a point of the world is entirely inside the other model, and to 0
+ * if the ball is entirely outside. Does not change *in if faces of the other model may be near. */
 static ebpo_status side_of_ball(const separate_patches *u, const double middle[3], double radius,
                                 int *in, ebpo_error *error)
 {
     const ebpo_posed_solid *other = &u->two->model[!u->m];
     ebpo_context *context = u->two->context[!u->m];
-    double low[3], high[3], p[3], doubt;
+    double low[3], high[3], p[3], uncertainty;
     bool near = false;
     ebpo_inside_result inside;
-    ebpo_unpose(other, middle, p, &doubt);
-    double space = (radius / other->posing.scale + 2 * doubt) * (1 + 0x1p-20);
+    ebpo_unpose(other, middle, p, &uncertainty);
+    double space = (radius / other->posing.scale + 2 * uncertainty) * (1 + 0x1p-20);
     for (int k = 0; k < 3; k++) {
         low[k] = nextafter(p[k] - space, -INFINITY);
         high[k] = nextafter(p[k] + space, INFINITY);
@@ -117,10 +119,10 @@ static ebpo_status side_of_ball(const separate_patches *u, const double middle[3
     return status;
 }
 
-/* Finds on which side of the other model the faces of a subtree are that intersect no face of the
- * other model: *in is 1 (inside), 0 (outside) or -1 (unknown). The ball around the subtree's cell
- * contains a point of each owned face. If no face of the other model is near the ball, the ball is
- * on one side, and so is each of these faces. */
+/* Finds on which side of the other model those faces of a subtree are that do not intersect the
+ * other model: sets *in to 1 (inside), 0 (outside) or -1 (unknown). The ball around the subtree's
+ * cell contains a point of each owned face. If no face of the other model is near the ball, the
+ * whole ball is on one side of the other model, and so is each of these faces. */
 static ebpo_status separate_patches_side(const separate_patches *u, uint64_t number, int *in,
                                          ebpo_error *error)
 {
@@ -131,8 +133,8 @@ static ebpo_status separate_patches_side(const separate_patches *u, uint64_t num
     if (model->whole)
         return EBPO_OK;
     ebpo_cell cell = model->top->below[number].cell;
-    double radius =
-        ebpo_posed_diagonal(&as, cell) / 2 + ebpo_posed_slack(&as, cell, u->collision->reach);
+    double radius = ebpo_posed_diagonal(&as, cell) / 2 +
+                    ebpo_posed_slack(&as, cell, u->collision->max_coordinate);
     ebpo_posed_cell(&as, cell, corner);
     for (int k = 0; k < 3; k++)
         middle[k] = corner[0][k] / 2 + corner[7][k] / 2;
@@ -149,24 +151,24 @@ static const char stage[] = "relation";
 /* State of the search. Models are in the query's order. */
 typedef struct relation_search {
     const ebpo_collision *collision;
-    ebpo_pair_faces places;
+    ebpo_pair_faces lookup;
     ebpo_two_models two;
     ebpo_relation_result *out;
-    uint64_t *intersecting[2]; /* [model] a bit for each face: it intersects the other model */
-    uint64_t *seen[2];         /* [model] a bit for each face: it has been examined */
+    uint64_t *intersecting[2]; /* [model] a bit for each face, 1: it intersects the other model */
+    uint64_t *seen[2];         /* [model] a bit for each face, 1: it has been examined */
     bool both;                 /* a point is inside both models */
     bool only[2];              /* [model] a point is inside this model but not in the other */
     bool examined;             /* the face that was visited last has an area */
     bool touch;                /* a common point exists */
     bool doubtful;      /* a piece of the face that was visited last is not part of its model */
-    unsigned last[2];   /* `in` of the piece that was visited last */
+    unsigned last[2];   /* ebpo_around.in of the piece that was visited last */
     uint64_t inspected; /* number of examined faces */
     bool late;          /* the deadline has passed */
     ebpo_error *error;  /* error of `status`, within callbacks */
     ebpo_status status;
 } relation_search;
 
-/* Returns true for a solid and a surface. */
+/* Returns true if one model is a solid and the other one a surface. */
 static bool is_mixed(const relation_search *r) { return r->two.solid[0] != r->two.solid[1]; }
 
 static bool are_surfaces(const relation_search *r) { return !r->two.solid[0] && !r->two.solid[1]; }
@@ -204,7 +206,7 @@ static void record_solids(relation_search *r, const ebpo_around *a)
     r->only[1] |= (a->in[1] & ~a->in[0]) != 0;
 }
 
-/* Records what is around a piece. Returns false if the relation is decided. */
+/* Records the sides of a piece of a face. Returns false if the relation is decided. */
 static bool record_piece(void *user, const ebpo_around *a)
 {
     const visited_face *f = user;
@@ -222,7 +224,8 @@ static bool record_piece(void *user, const ebpo_around *a)
 }
 
 /* Examines a face, unless it has been examined. Returns false if the search can end, or after a
- * failure (r->status). For a solid and a surface, only faces of the surface are examined. */
+ * failure (see r->status). If one model is a solid and the other one a surface, examines only faces
+ * of the surface. */
 static bool inspect_face(relation_search *r, int m, uint64_t face)
 {
     visited_face f = { r, m };
@@ -241,17 +244,18 @@ static bool inspect_face(relation_search *r, int m, uint64_t face)
 static bool inspect_pair(relation_search *r, const ebpo_face_pair *pair)
 {
     const uint64_t face[2] = { pair->file_face_a, pair->file_face_b };
-    bool turned = r->collision->turned;
-    return inspect_face(r, 0, face[turned]) && inspect_face(r, 1, face[!turned]);
+    bool swapped = r->collision->swapped;
+    return inspect_face(r, 0, face[swapped]) && inspect_face(r, 1, face[!swapped]);
 }
 
 /* --- contacts --- */
 
-/* Returns true if both faces of a pair have an area; false also after a failure (r->status). */
+/* Returns true if both faces of a pair have an area. Returns false after a failure, too, and sets
+ * r->status. */
 static bool all_have_area(relation_search *r, const ebpo_face_pair *pair)
 {
     ebpo_posed_pair faces;
-    r->status = ebpo_pose_pair(&r->places, pair, &faces, r->error);
+    r->status = ebpo_pose_pair(&r->lookup, pair, &faces, r->error);
     for (int i = 0; i < 2 && r->status == EBPO_OK; i++) {
         const double(*t)[3] = (const double(*)[3])faces.corner[i];
         if (ebpo_zero_area(t[0], t[1], t[2]))
@@ -260,8 +264,8 @@ static bool all_have_area(relation_search *r, const ebpo_face_pair *pair)
     return r->status == EBPO_OK;
 }
 
-/* Records an intersecting pair of faces of two surfaces. Returns false after a failure (r->status).
- */
+/* Records an intersecting pair of faces of two surfaces. Returns false after a failure, and sets
+ * r->status. */
 static bool record_pair(relation_search *r, const ebpo_face_pair *pair)
 {
     r->both |= pair->kind != EBPO_PAIR_TOUCHING;
@@ -273,10 +277,10 @@ static bool record_pair(relation_search *r, const ebpo_face_pair *pair)
 static bool receive_contacts(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
     relation_search *r = user;
-    bool turned = r->collision->turned, more = true;
+    bool swapped = r->collision->swapped, more = true;
     for (uint64_t i = 0; i < count && more; i++) {
-        set_bit(r->intersecting[turned], pairs[i].file_face_a);
-        set_bit(r->intersecting[!turned], pairs[i].file_face_b);
+        set_bit(r->intersecting[swapped], pairs[i].file_face_a);
+        set_bit(r->intersecting[!swapped], pairs[i].file_face_b);
         if (are_surfaces(r))
             more = record_pair(r, &pairs[i]);
         else if (pairs[i].kind == EBPO_PAIR_CROSSING)
@@ -286,12 +290,12 @@ static bool receive_contacts(void *user, const ebpo_face_pair *pairs, uint64_t c
 }
 
 /* Returns the query's options with the time that remains until the deadline. */
-static ebpo_collide_options options_left(const relation_search *r)
+static ebpo_collide_options remaining_options(const relation_search *r)
 {
     ebpo_collide_options options = r->collision->options;
     uint64_t now = ebpo_clock();
-    if (r->collision->late != UINT64_MAX)
-        options.deadline_ns = r->collision->late > now ? r->collision->late - now : 1;
+    if (r->collision->deadline != UINT64_MAX)
+        options.deadline_ns = r->collision->deadline > now ? r->collision->deadline - now : 1;
     return options;
 }
 
@@ -299,7 +303,7 @@ static ebpo_collide_options options_left(const relation_search *r)
 static ebpo_status receive_pairs(relation_search *r, ebpo_pairs_fn take, ebpo_error *error)
 {
     const ebpo_collision *q = r->collision;
-    ebpo_collide_options options = options_left(r);
+    ebpo_collide_options options = remaining_options(r);
     ebpo_two_models_let_go(&r->two);
     ebpo_status status = ebpo_collide_all(q->collider, &options, take, r, error);
     if (status == EBPO_E_CANCELLED && ebpo_collision_is_late(q)) {
@@ -328,8 +332,8 @@ static void inspect_intersecting(relation_search *r)
 
 /* --- faces without contact --- */
 
-/* Returns true if a patch without contact of model m, inside (`in`) or outside the other model,
- * adds no information. */
+/* Returns true if a patch without contact of model m adds no information. in: the patch is inside
+ * the other model (otherwise outside). */
 static bool side_adds_nothing(const relation_search *r, int m, bool in)
 {
     if (is_mixed(r))
@@ -337,8 +341,9 @@ static bool side_adds_nothing(const relation_search *r, int m, bool in)
     return in ? r->both && r->only[!m] : r->only[m];
 }
 
-/* Examines the owned faces of a subtree that intersect no face of the other model, except the faces
- * of patches that add no information. done: a bit for each such patch. */
+/* Examines the owned faces of a subtree that do not intersect the other model, except the faces of
+ * patches that add no information. done: a bit for each patch (by its first face), 1: it adds no
+ * information; initially 0. */
 static void inspect_untouched_faces(relation_search *r, const separate_patches *u, uint64_t *done)
 {
     for (uint64_t i = 0; i < u->count && must_continue(r); i++) {
@@ -371,7 +376,7 @@ static void inspect_subtree(relation_search *r, separate_patches *u, uint64_t nu
     free(done);
 }
 
-/* Returns true if all faces without contact of a subtree are on a known side and add no
+/* Returns true if the faces without contact of a subtree are on a known side and add no
  * information, so that the subtree need not be loaded. */
 static bool is_settled(relation_search *r, const separate_patches *u, uint64_t number)
 {
@@ -396,7 +401,7 @@ static void inspect_patches(relation_search *r, int m)
     separate_patches_end(&u);
 }
 
-/* --- common points of models without common inner points --- */
+/* --- common points of models whose interiors have no common point --- */
 
 /* Sets r->doubtful if a piece is not part of the face's model. */
 static bool record_doubtful_piece(void *user, const ebpo_around *a)
@@ -421,10 +426,10 @@ static bool belongs_to_model(relation_search *r, int m, uint64_t face)
 static bool find_touching_faces(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
     relation_search *r = user;
-    bool turned = r->collision->turned;
+    bool swapped = r->collision->swapped;
     for (uint64_t i = 0; i < count && !r->touch && r->status == EBPO_OK && !r->late; i++) {
         const uint64_t face[2] = { pairs[i].file_face_a, pairs[i].file_face_b };
-        r->touch = belongs_to_model(r, 0, face[turned]) && belongs_to_model(r, 1, face[!turned]);
+        r->touch = belongs_to_model(r, 0, face[swapped]) && belongs_to_model(r, 1, face[!swapped]);
         r->late |= ebpo_collision_is_late(r->collision);
     }
     return !r->touch && r->status == EBPO_OK && !r->late;
@@ -464,7 +469,7 @@ static bool is_same(const ebpo_collision *q)
            memcmp(&q->options.pose_a, &q->options.pose_b, sizeof q->options.pose_a) == 0;
 }
 
-/* Sets the result for two identical models: r->both if the model has a point. */
+/* Sets the result for two identical models: r->both is true if the model has at least one point. */
 static void find_any(relation_search *r)
 {
     uint64_t count = face_count(r, 0);
@@ -475,12 +480,12 @@ static void find_any(relation_search *r)
         (void)inspect_face(r, 0, f);
 }
 
-/* Finds an intersecting pair, and examines its faces: if they cross, this pair nearly always
- * decides. */
+/* Finds an intersecting pair, and examines its faces. If the faces cross, they decide the relation
+ * in nearly all cases. */
 static ebpo_status inspect_first(relation_search *r, ebpo_error *error)
 {
     const ebpo_collision *q = r->collision;
-    ebpo_collide_options options = options_left(r);
+    ebpo_collide_options options = remaining_options(r);
     ebpo_face_pair pair;
     ebpo_status status = ebpo_collide_first(q->collider, &options, &pair, &r->out->contact, error);
     r->late |= r->out->contact < 0;
@@ -551,7 +556,7 @@ static bool are_boxes_apart(const ebpo_two_models *two)
 static ebpo_status find_relation(relation_search *r, ebpo_error *error)
 {
     const ebpo_collision *q = r->collision;
-    ebpo_status status = ebpo_two_models_begin(&r->two, &r->places, error);
+    ebpo_status status = ebpo_two_models_begin(&r->two, &r->lookup, error);
     if (status != EBPO_OK)
         return status;
     r->out->contact = are_boxes_apart(&r->two) ? 0 : -1;
@@ -570,8 +575,8 @@ static ebpo_status find_relation(relation_search *r, ebpo_error *error)
     return r->status;
 }
 
-/* Adds the loads of this query to the collider's counts, and sets the bytes read: the difference
- * includes the bytes that nested queries read. */
+/* Adds the loads of this query to the collider's counts, and sets the bytes read. Nested queries
+ * have added their bytes to the collider's count, so the count is replaced, not increased. */
 static void count_loads(const relation_search *r, uint64_t bytes_before, uint64_t read_before)
 {
     ebpo_collider *c = r->collision->collider;
@@ -582,7 +587,7 @@ static void count_loads(const relation_search *r, uint64_t bytes_before, uint64_
 static void end_search(relation_search *r)
 {
     ebpo_two_models_end(&r->two);
-    ebpo_pair_faces_end(&r->places);
+    ebpo_pair_faces_end(&r->lookup);
     for (int m = 0; m < 2; m++) {
         free(r->intersecting[m]);
         free(r->seen[m]);
@@ -598,13 +603,13 @@ ebpo_status ebpo_collide_relation(ebpo_collider *c, const ebpo_collide_options *
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     relation_search r = { .collision = &q, .out = out, .error = error };
     if (status == EBPO_OK)
-        status = ebpo_pair_faces_begin(&r.places, &q, error);
+        status = ebpo_pair_faces_begin(&r.lookup, &q, error);
     if (status != EBPO_OK)
         return status;
     uint64_t bytes_before = c->bytes_read, before = ebpo_collision_bytes_read(&q);
     status = find_relation(&r, error);
     ebpo_relation relation = relation_of(&r);
-    out->relation = (int32_t)(q.turned ? swap_relation(relation) : relation);
+    out->relation = (int32_t)(q.swapped ? swap_relation(relation) : relation);
     count_loads(&r, bytes_before, before);
     end_search(&r);
     return status;

@@ -2,9 +2,9 @@
  * that are loaded on demand. The gap of two envelopes is a lower bound of the distance of the
  * nodes' faces.
  *
- * Queries of levels, distances and separation distances use this search; each decides when to stop.
- * The larger of two nodes is divided first. If one model is entirely in memory and the other
- * one is partly loaded, several pairs of nodes may need the same subtree: it is visited once. A
+ * Queries of levels, distances and separation distances use this search, and decide when it ends.
+ * The larger one of two nodes is divided first. If one model is entirely in memory and the other
+ * one is partly loaded, several pairs of nodes may need the same subtree, which is visited once. A
  * search runs in one thread. */
 #include "core/strict_fp.h"
 
@@ -19,7 +19,7 @@
 ebpo_status ebpo_node_gaps_begin(ebpo_node_gaps *g, const ebpo_collision *q, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    g->reach = q->reach;
+    g->max_coordinate = q->max_coordinate;
     for (int i = 0; i < 2 && status == EBPO_OK; i++)
         status = ebpo_posed_subtrees_make(&g->side[i], q->model[i], &q->posing[i].posing, error);
     return status;
@@ -41,8 +41,8 @@ int ebpo_node_larger(const ebpo_node_gaps *g, const ebpo_posed_node node[2])
 /* Returns a bound of the errors of both envelopes. */
 static double slack_of(const ebpo_node_gaps *g, const ebpo_posed_node node[2])
 {
-    return ebpo_posed_slack(&g->side[0], node[0].cell, g->reach) +
-           ebpo_posed_slack(&g->side[1], node[1].cell, g->reach);
+    return ebpo_posed_slack(&g->side[0], node[0].cell, g->max_coordinate) +
+           ebpo_posed_slack(&g->side[1], node[1].cell, g->max_coordinate);
 }
 
 static bool is_nearer(const ebpo_node_gap *a, const ebpo_node_gap *b) { return a->gap < b->gap; }

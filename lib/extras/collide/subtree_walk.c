@@ -1,14 +1,16 @@
-/* Finds all pairs of intersecting faces of partly loaded models, with the same result as
- * for whole models.
+/* Finds pairs of intersecting faces of partly loaded models, with the same result as for models
+ * that are entirely in memory (whole models).
  *
- * Two faces with a common point are listed by the subtrees whose cells contain that point. So only
- * pairs of subtrees whose envelopes may touch need to be searched. These pairs are found before a
- * subtree is loaded, and sorted so that a loaded subtree is soon reused. Several threads search
- * pairs of subtrees. A pair of faces is found more than once if several subtrees list a face. So
- * the pairs found are stored, sorted and made unique before they are returned.
+ * Two faces with a common point are listed by subtrees whose cells contain that point. So only
+ * pairs of subtrees whose envelopes may touch need to be searched. These pairs of subtrees are
+ * found before any subtree is loaded, and are sorted so that a loaded subtree is soon reused.
+ * Several threads search pairs of subtrees. A pair of faces is found more than once if several
+ * subtrees list one of the faces. So the pairs of faces are stored, sorted and made unique before
+ * they are returned.
  *
- * If the collider's memory is too small for all pairs, the pairs of the later faces of the first
- * model are dropped; another round finds them again. */
+ * If the collider's memory is too small for all pairs of faces, the search has several rounds. A
+ * round drops the pairs of the last faces of the first model, and the next round finds these pairs
+ * again. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -28,7 +30,8 @@
 typedef struct subtree_pair {
     uint32_t a, b;           /* indices of the subtrees */
     uint32_t rank_a, rank_b; /* ranks of the subtrees in the order of the files' faces */
-    double apart;            /* distance of their middles divided by the sum of their diagonals */
+    double apart;            /* distance of the middles of both cells, divided by the sum of their
+                              * diagonals */
 } subtree_pair;
 
 typedef struct subtree_pairs {
@@ -46,13 +49,13 @@ typedef struct stored_pair {
 /* Search of one thread. Zero at the beginning. */
 typedef struct subtree_walk {
     const ebpo_collision *collision;
-    bool self;                /* both models are one, at one pose */
-    ebpo_context *context[2]; /* for partly loaded models; they hold the last two subtrees */
+    bool self;                /* both models are the same one, at one pose */
+    ebpo_context *context[2]; /* for partly loaded models; each holds the last subtree */
     ebpo_pair_walk walk;
     stored_pair *stored; /* [count] pairs of faces of the last pair of subtrees, in no order */
     uint64_t count, capacity;
-    uint64_t first_end; /* all faces that the first of these subtrees lists have indices below this
-                         */
+    uint64_t first_end; /* greater than the indices of all faces that the first one of the last two
+                         * subtrees lists */
     bool late;          /* the deadline passed before all pairs were found */
 } subtree_walk;
 
@@ -60,7 +63,7 @@ typedef struct subtree_walk {
 typedef struct subtree_pair_search {
     subtree_pairs *out;
     ebpo_posed_subtrees *side[2];
-    double reach;
+    double max_coordinate;
     bool self;
     ebpo_error *error;
 } subtree_pair_search;
@@ -69,8 +72,8 @@ typedef struct subtree_pair_search {
 
 static double slack_of(const subtree_pair_search *f, const ebpo_posed_node node[2])
 {
-    return ebpo_posed_slack(f->side[0], node[0].cell, f->reach) +
-           ebpo_posed_slack(f->side[1], node[1].cell, f->reach);
+    return ebpo_posed_slack(f->side[0], node[0].cell, f->max_coordinate) +
+           ebpo_posed_slack(f->side[1], node[1].cell, f->max_coordinate);
 }
 
 /* Returns true if the cells of two nodes are certainly apart. */
@@ -127,7 +130,7 @@ static ebpo_status add_subtree_pair(const subtree_pair_search *f, const ebpo_pos
 
 /* --- the descent --- */
 
-/* Finds the pairs of subtrees below two nodes. */
+/* Finds the pairs of subtrees below two nodes whose envelopes may touch. */
 static ebpo_status descend_pair(const subtree_pair_search *f, const ebpo_posed_node node[2])
 {
     bool below[2];
@@ -171,8 +174,8 @@ static void reverse_pairs(subtree_pair *pair, uint64_t count)
     }
 }
 
-/* Sorts by the first subtree; for each first subtree by the second, alternately forwards and
- * backwards. Counts the first subtrees. */
+/* Sorts by the rank of the first subtree, then by the rank of the second one, which alternately
+ * ascends and descends. Sets subtrees[0] to the number of different first subtrees. */
 static void sort_back_and_forth(subtree_pairs *p)
 {
     if (p->count)
@@ -199,17 +202,16 @@ static ebpo_status count_second_subtrees(subtree_pairs *p, uint64_t most, ebpo_e
     return EBPO_OK;
 }
 
-/* Finds the pairs of subtrees that may have intersecting faces. Two intersecting faces have a
- * common point, which is in a cell of each model whose subtree lists the face. So one of the pairs
- * lists both faces. The pairs are sorted by the rank of the first subtree, and for each first
- * subtree by the rank of the second, alternately forwards and backwards, so that loaded subtrees
- * are reused soon. `self`: both are one model at one pose; each pair is found once, with rank_a <=
- * rank_b. The caller frees out->pair, also after a failure. */
+/* Finds the pairs of subtrees that may have intersecting faces, sorted by sort_back_and_forth, so
+ * that loaded subtrees are reused soon. Two intersecting faces have a common point, and each model
+ * has a subtree that lists its face and whose cell contains the point; these two subtrees are a
+ * pair of the result. `self`: both models are the same one at one pose; each pair is found once,
+ * with rank_a <= rank_b. The caller frees out->pair, even after a failure. */
 static ebpo_status find_subtree_pairs(subtree_pairs *out, ebpo_posed_subtrees *a,
-                                      ebpo_posed_subtrees *b, double reach, bool self,
+                                      ebpo_posed_subtrees *b, double max_coordinate, bool self,
                                       ebpo_error *error)
 {
-    subtree_pair_search f = { out, { a, b }, reach, self, error };
+    subtree_pair_search f = { out, { a, b }, max_coordinate, self, error };
     ebpo_posed_node root[2] = { ebpo_posed_subtree_root(a), ebpo_posed_subtree_root(b) };
     *out = (subtree_pairs){ .count = 0 };
     ebpo_status status = descend_pair(&f, root);
@@ -227,7 +229,7 @@ static int by_nearness(const void *x, const void *y)
     return by_rank(x, y);
 }
 
-/* Sorts by `apart`, the least first. */
+/* Sorts pairs by `apart`, the least first. */
 static void sort_nearest_first(subtree_pairs *p)
 {
     if (p->count)
@@ -282,7 +284,7 @@ static int compare_stored_pairs(const void *x, const void *y)
 
 static ebpo_face_pair face_pair_of(const ebpo_collision *q, const stored_pair *t)
 {
-    int a = q->turned, b = !q->turned;
+    int a = q->swapped, b = !q->swapped;
     return (ebpo_face_pair){ t->source[a], t->source[b], t->file[a], t->file[b], t->kind, 0 };
 }
 
@@ -298,8 +300,8 @@ static ebpo_status load_subtree(subtree_walk *w, int side, uint32_t number, cons
     return status;
 }
 
-/* Stores the pairs of faces that the walk has found; with `self`, the lesser index first, and no
- * face with itself. */
+/* Stores the pairs of faces that the walk has found. If w->self, orders each pair by its indices
+ * and omits pairs of a face with itself. */
 static ebpo_status store_pairs(subtree_walk *w, const ebpo_accel *const accel[2], ebpo_error *error)
 {
     const ebpo_pair_walk *found = &w->walk;
@@ -333,19 +335,19 @@ static ebpo_status walk_hierarchies(subtree_walk *w, const ebpo_accel *const acc
     const ebpo_collision *q = w->collision;
     const ebpo_block_posing *posing[2] = { &q->posing[0], &q->posing[1] };
     ebpo_accel_pair pair;
-    ebpo_pair_walk *down = &w->walk;
-    ebpo_accel_pair_make(&pair, accel, posing, q->reach);
+    ebpo_pair_walk *walk = &w->walk;
+    ebpo_accel_pair_make(&pair, accel, posing, q->max_coordinate);
     if (pair.apart)
         return EBPO_OK;
-    ebpo_pair_walk_begin(down, &pair);
-    down->first = false;
-    down->neighbours = w->self;
-    down->self = w->self && accel[0] == accel[1];
-    if (!down->kernels->start(down))
-        return no_memory(down, error);
-    while (down->top > 0) {
-        if (!down->kernels->run(down, EBPO_WALK_PAIRS))
-            return no_memory(down, error);
+    ebpo_pair_walk_begin(walk, &pair);
+    walk->first = false;
+    walk->neighbours = w->self;
+    walk->self = w->self && accel[0] == accel[1];
+    if (!walk->kernels->start(walk))
+        return no_memory(walk, error);
+    while (walk->top > 0) {
+        if (!walk->kernels->run(walk, EBPO_WALK_PAIRS))
+            return no_memory(walk, error);
         if ((w->late = ebpo_collision_is_late(q)))
             return EBPO_OK;
     }
@@ -374,7 +376,8 @@ static ebpo_status subtree_walk_pair(subtree_walk *w, const subtree_pair *pair, 
 
 static const char stage[] = "pairs of subtrees";
 
-/* Number of consecutive pairs that one thread takes; mostly they have the same first subtree. */
+/* Number of consecutive pairs of subtrees that one thread takes. In most cases they have the same
+ * first subtree, which is then loaded once. */
 enum { PAIRS_IN_A_ROW = 4 };
 
 typedef struct gathering_parts {
@@ -382,8 +385,8 @@ typedef struct gathering_parts {
     bool self;
     ebpo_posed_subtrees subtrees[2];
     subtree_pairs pairs;
-    uint64_t *end;      /* [subtree of the first model] its faces have indices below this; 0:
-                         * unknown */
+    uint64_t *end;      /* [subtree of the first model] first_end (subtree_walk) of this subtree; 0:
+                         * not known yet */
     subtree_walk *walk; /* [threads] */
     unsigned threads;
     uint64_t read_before; /* bytes that had been read before the search */
@@ -414,8 +417,8 @@ static void sort_unique(gathering_parts *g)
     g->count = kept;
 }
 
-/* Drops the last pairs, so that at most half of the maximum number waits, but never all pairs of
- * the first face. Ends this round's range of faces before the dropped pairs. */
+/* Drops the last waiting pairs, so that at most half of the maximum number remains, but keeps all
+ * pairs of the first face. Ends this round's range of faces before the faces of dropped pairs. */
 static void drop_last_pairs(gathering_parts *g)
 {
     sort_unique(g);
@@ -451,7 +454,7 @@ static ebpo_status add_waiting_pairs(gathering_parts *g, const subtree_walk *w, 
 
 /* --- searching --- */
 
-/* Returns true if earlier rounds have found all pairs of the faces of the pair's first subtree. */
+/* Returns true if earlier rounds have returned all pairs of faces of the pair's first subtree. */
 static bool is_done(gathering_parts *g, const subtree_pair *pair)
 {
     (void)pthread_mutex_lock(&g->lock);
@@ -490,8 +493,8 @@ static ebpo_status run_pairs(void *user, uint64_t begin, uint64_t end, unsigned 
     return EBPO_OK;
 }
 
-/* Runs all threads. Each thread holds two subtrees; if the memory budget is too small for all
- * threads, one thread searches from the beginning. */
+/* Runs all threads. Each thread holds two subtrees. If the memory budget is too small for that, one
+ * thread searches again from the beginning. */
 static ebpo_status run_all(gathering_parts *g, ebpo_error *error)
 {
     const ebpo_progress *progress = &g->collision->options.progress;
@@ -522,8 +525,7 @@ enum { PASSED_AT_ONCE = 1024 };
 static bool pass_waiting(const gathering_parts *g, ebpo_pairs_fn take, void *user)
 {
     ebpo_face_pair out[PASSED_AT_ONCE];
-    for (unsigned i = 0; i < g->threads; i++) /* the callback that receives the pairs may need the
-                                               * memory */
+    for (unsigned i = 0; i < g->threads; i++) /* `take` may need the memory of subtrees */
         subtree_walk_let_go(&g->walk[i]);
     for (uint64_t at = 0; at < g->count; at += PASSED_AT_ONCE) {
         uint64_t n = g->count - at < PASSED_AT_ONCE ? g->count - at : PASSED_AT_ONCE;
@@ -571,8 +573,8 @@ static ebpo_status begin_gathering(gathering_parts *g, unsigned threads, ebpo_er
     for (unsigned i = 0; i < threads && status == EBPO_OK; i++)
         status = subtree_walk_begin(&g->walk[i], q, g->self, error);
     if (status == EBPO_OK)
-        status = find_subtree_pairs(&g->pairs, &g->subtrees[0], &g->subtrees[1], q->reach, g->self,
-                                    error);
+        status = find_subtree_pairs(&g->pairs, &g->subtrees[0], &g->subtrees[1], q->max_coordinate,
+                                    g->self, error);
     if (status != EBPO_OK)
         return status;
     q->collider->subtree_pairs += g->pairs.count;
@@ -610,8 +612,8 @@ ebpo_status ebpo_gather_parts(const ebpo_collision *q, bool self, ebpo_pairs_fn 
     return status;
 }
 
-/* Finds the first pair of intersecting faces, in the order of the files, of the first pair of
- * subtrees that has one. */
+/* Finds the first pair of subtrees that has intersecting faces, and of its intersecting pairs of
+ * faces the first one in the order of the files. *found: as of ebpo_collide_first. */
 static ebpo_status search_first_parts(gathering_parts *g, ebpo_face_pair *out, int32_t *found,
                                       ebpo_error *error)
 {

@@ -1,4 +1,4 @@
-/* Finds all pairs of intersecting faces of partly loaded models. */
+/* Finds pairs of intersecting faces if at least one of two models is partly loaded. */
 #ifndef EBPO_COLLIDE_SUBTREE_WALK_H
 #define EBPO_COLLIDE_SUBTREE_WALK_H
 
