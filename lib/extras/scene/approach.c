@@ -2,8 +2,9 @@
  * clearance, and the least distance of a pair over an interval of time.
  *
  * Both searches evaluate the distance at some times, and use one bound: the distance of two
- * instances changes by at most their motion. The first search goes from one evaluation to the next.
- * The motion in between is shorter than the distance minus the clearance, so no contact is missed.
+ * instances changes by at most their motion. The first search goes forward in time from one
+ * evaluation to the next. Between two evaluations the motion is shorter than the distance minus the
+ * clearance, so no contact is missed.
  * The second search divides the interval into parts, and keeps them in a heap, ordered by a lower
  * bound of the distance in each part. It halves the first part until the result is within the
  * tolerance. Routes jump only at ends of parts. A result is a pair of guaranteed bounds. A search
@@ -28,8 +29,8 @@ typedef struct approach_search {
     double from, to;
 } approach_search;
 
-/* Sets *next to the time of the next evaluation: from result->time until then, the motion is
- * shorter than `gap`. *next is result->time if no later time is possible. */
+/* Sets *next to the time of the next evaluation, so that the motion from result->time to *next is
+ * shorter than `gap`. Sets *next to result->time if no later time is possible. */
 static ebpo_status next_evaluation(const approach_search *search,
                                    const ebpo_scene_evaluations *evaluations,
                                    const ebpo_scene_approach_result *result, double gap,
@@ -69,6 +70,7 @@ static ebpo_status move_past_jump(const ebpo_scene_evaluations *evaluations,
     return status;
 }
 
+/* Returns true if the pair is within its clearance, plus the tolerance. */
 static bool is_reached(const approach_search *search, const ebpo_scene_approach_result *result)
 {
     return ebpo_scene_is_within(result->hi, result->clearance, search->how.tolerance);
@@ -87,8 +89,8 @@ static ebpo_status approach_evaluate(const approach_search *search,
                                    result->time, false, error);
 }
 
-/* Evaluates the distance at increasing times, until the pair is reached, the time ends, or the
- * search must be given up. */
+/* Evaluates the distance at increasing times, until the pair is within its clearance, the interval
+ * of time ends, or the search must be given up (result->reached is -1). */
 static ebpo_status follow_pair(const approach_search *search, ebpo_scene_evaluations *evaluations,
                                ebpo_scene_approach_result *result, ebpo_error *error)
 {
@@ -179,7 +181,7 @@ typedef struct part_search {
     /* The least lower bound of the distance at times when faces that a subset file omits may be
      * nearer than all others. The lower bound of the result cannot exceed it. INFINITY: none. */
     double limit;
-    EBPO_SCENE_LIST(time_part, parts); /* a heap: the part with the least `least` first */
+    EBPO_SCENE_LIST(time_part, parts); /* a heap; parts[0] has the least `least` */
 } part_search;
 
 /* --- parts --- */
@@ -215,8 +217,8 @@ static ebpo_status least_distance_evaluate(part_search *s, double time, double *
     return status;
 }
 
-/* Adds a part. Going from one end to the other, the distance changes by at most p.motion in total,
- * so between the ends it is at least (at_from + at_to - motion) / 2. */
+/* Adds a part. From one end of the part to the other, the distance changes by at most p.motion in
+ * total, so between the ends it is at least (at_from + at_to - motion) / 2. */
 static ebpo_status add_part(part_search *s, time_part p, ebpo_error *error)
 {
     ebpo_status status =
@@ -240,8 +242,8 @@ static ebpo_status least_distance_halve(part_search *s, const time_part *p, doub
                : status;
 }
 
-/* Returns the time of the next key, where routes may jump. If both instances follow one route,
- * their pair does not jump. */
+/* Returns the time of the next key, at which routes may jump. If both instances follow one route,
+ * their distance does not jump, and `to` is returned. */
 static double next_jump(const part_search *s, double from, double to)
 {
     return s->evaluations.shares_route
@@ -269,8 +271,8 @@ static ebpo_status begin_parts(part_search *s, double from, double to, ebpo_erro
     return status;
 }
 
-/* Returns true if the lower bound of the first part is within the tolerance or cannot be improved:
- * omitted faces limit it, evaluations are used up, or the part is too short. */
+/* Returns true if the lower bound of the first part p is within the tolerance or cannot be
+ * improved, because omitted faces limit it, evaluations are used up, or the part is too short. */
 static bool is_done(const part_search *s, const time_part *p, double middle,
                     const least_search *how)
 {
@@ -282,7 +284,7 @@ static bool is_done(const part_search *s, const time_part *p, double middle,
 }
 
 /* Sets *out to true if at least half of the part's motion is a bound of rounding, which does not
- * shrink when the part is halved. */
+ * become smaller if the part is halved. */
 static ebpo_status is_rounding(const part_search *s, const time_part *p, bool *out,
                                ebpo_error *error)
 {

@@ -1,11 +1,11 @@
 /* Computes the narrow phase of a scene: decides exactly which pairs of instances intersect at a
  * time, and describes each contact.
  *
- * Pairs come from the broad phase (scene_pairs.c), and are evaluated on all cores. For each pair
- * whose faces intersect, the result has the faces, the location, the number and the depth of
- * contacts. For other pairs the result has, as far as the options request it, the relation of the
- * solids and whether the clearance is kept. If parts that are omitted from a subset may matter, the
- * query fails with EBPO_E_ABSENT.
+ * The broad phase (scene_pairs.c) provides the pairs, which are evaluated on all cores. For a pair
+ * whose faces intersect, the result has two of these faces, and the location, number and depth of
+ * contacts. For other pairs the result has, if the options request it, the relation of the solids
+ * and the distance if it is less than the clearance. If faces that are omitted from a subset may
+ * change a result, the query fails with EBPO_E_ABSENT.
  *
  * Source: docs/guide/scenes.md. */
 #include "core/strict_fp.h"
@@ -24,48 +24,49 @@
 #include "extras/collide/pair_faces.h"
 #include "extras/scene/instance_pair.h"
 
-/* Two instances at their poses. */
+/* A query of two instances at their poses. */
 typedef struct scene_two {
     const ebpo_scene_clash_options *how; /* requested results */
     ebpo_collider *collider;
-    const ebpo_collide_options *options; /* poses */
-    bool solid[2];                       /* the model is a solid, not a surface */
+    const ebpo_collide_options *options; /* the poses of both instances */
+    bool solid[2];                       /* true: the model is a solid, false: a surface */
 } scene_two;
 
 /* Marks all results as unknown. */
-static void clear_results(ebpo_scene_clash *m)
+static void clear_results(ebpo_scene_clash *clash)
 {
     static const ebpo_value_bounds unknown = { 0, INFINITY, EBPO_VALUE_BOUND, 0 };
-    m->face_a = m->face_b = EBPO_NO_FACE;
-    m->relation = EBPO_RELATION_UNDECIDED;
+    clash->face_a = clash->face_b = EBPO_NO_FACE;
+    clash->relation = EBPO_RELATION_UNDECIDED;
     for (int k = 0; k < 3; k++)
-        m->location[k] = m->location_min[k] = m->location_max[k] = NAN;
-    m->depth[0] = m->depth[1] = unknown;
+        clash->location[k] = clash->location_min[k] = clash->location_max[k] = NAN;
+    clash->depth[0] = clash->depth[1] = unknown;
 }
 
-/* Widens the box of locations by a point. A box that is still NAN becomes the point. */
-static void widen_location_box(ebpo_scene_clash *m, const double p[3])
+/* Extends the box of locations so that it contains a point. A box that is NAN becomes the point. */
+static void widen_location_box(ebpo_scene_clash *clash, const double p[3])
 {
     for (int k = 0; k < 3; k++) {
-        m->location_min[k] = fmin(m->location_min[k], p[k]);
-        m->location_max[k] = fmax(m->location_max[k], p[k]);
+        clash->location_min[k] = fmin(clash->location_min[k], p[k]);
+        clash->location_max[k] = fmax(clash->location_max[k], p[k]);
     }
 }
 
-static void set_location(ebpo_scene_clash *m, const double location[3])
+static void set_location(ebpo_scene_clash *clash, const double location[3])
 {
-    memcpy(m->location, location, sizeof m->location);
-    widen_location_box(m, location);
+    memcpy(clash->location, location, sizeof clash->location);
+    widen_location_box(clash, location);
 }
 
 /* --- all pairs --- */
 
 /* Counts pairs of faces by kind, and keeps the pair with the least indices. */
 typedef struct tally {
-    ebpo_scene_clash *m;
+    ebpo_scene_clash *clash;
     ebpo_pair_faces *faces; /* for finding locations; NULL: not requested */
     ebpo_face_pair first;
-    bool kind_only;    /* the first crossing pair is enough: stop there, and keep `first` */
+    bool kind_only;    /* stop at the first crossing pair, which decides the kind, and do not
+                        * change `first` */
     ebpo_error *error; /* error of `status` */
     ebpo_status status;
 } tally;
@@ -83,8 +84,8 @@ static bool record_segment(tally *t, const ebpo_face_pair *pair)
     if (t->status != EBPO_OK)
         return false;
     ebpo_contact_of(&faces, pair, &s);
-    widen_location_box(t->m, s.point[0]);
-    widen_location_box(t->m, s.point[1]);
+    widen_location_box(t->clash, s.point[0]);
+    widen_location_box(t->clash, s.point[1]);
     return true;
 }
 
@@ -92,10 +93,10 @@ static bool count_faces(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
     tally *t = user;
     for (uint64_t i = 0; i < count; i++) {
-        t->m->touching += pairs[i].kind == EBPO_PAIR_TOUCHING;
-        t->m->crossing += pairs[i].kind == EBPO_PAIR_CROSSING;
-        t->m->coplanar += pairs[i].kind == EBPO_PAIR_COPLANAR;
-        if (t->kind_only && t->m->crossing)
+        t->clash->touching += pairs[i].kind == EBPO_PAIR_TOUCHING;
+        t->clash->crossing += pairs[i].kind == EBPO_PAIR_CROSSING;
+        t->clash->coplanar += pairs[i].kind == EBPO_PAIR_COPLANAR;
+        if (t->kind_only && t->clash->crossing)
             return false;
         if (!t->kind_only && comes_first(&pairs[i], &t->first))
             t->first = pairs[i];
@@ -112,20 +113,21 @@ static bool count_lines(void *user, const ebpo_polyline *line)
     return true;
 }
 
-/* Sets the number of lines of contact; UINT64_MAX: the collider's memory for segments does not
- * suffice to count them. */
-static ebpo_status report_lines(const scene_two *two, ebpo_scene_clash *m, ebpo_error *error)
+/* Sets the number of lines of contact; UINT64_MAX if the collider has too little memory to count
+ * them. */
+static ebpo_status report_lines(const scene_two *two, ebpo_scene_clash *clash, ebpo_error *error)
 {
-    if (m->crossing > ebpo_contact_lines_max(two->collider)) {
-        m->contacts = UINT64_MAX;
+    if (clash->crossing > ebpo_contact_lines_max(two->collider)) {
+        clash->contacts = UINT64_MAX;
         return EBPO_OK;
     }
-    return ebpo_collide_polylines(two->collider, two->options, count_lines, &m->contacts, error);
+    return ebpo_collide_polylines(two->collider, two->options, count_lines, &clash->contacts,
+                                  error);
 }
 
 /* --- locations --- */
 
-/* Computes a common point of two faces: an end of their common segment if they cross, otherwise a
+/* Computes a common point of two faces: if they cross, an end of their common segment, otherwise a
  * nearest point. */
 static ebpo_status common_point(ebpo_pair_faces *of, const ebpo_face_pair *pair, double out[3],
                                 ebpo_error *error)
@@ -148,56 +150,57 @@ static ebpo_status common_point(ebpo_pair_faces *of, const ebpo_face_pair *pair,
     return EBPO_OK;
 }
 
-/* Finds a location of contact by a distance query: if models intersect, it returns a point of the
- * first contact that it finds. This needs no table of all faces. */
-static ebpo_status locate_first(const scene_two *two, ebpo_scene_clash *m, ebpo_error *error)
+/* Finds a location of contact by a distance query, which returns a point of the first contact that
+ * it finds. Unlike ebpo_pair_faces it needs no array of slots of all faces. */
+static ebpo_status locate_first(const scene_two *two, ebpo_scene_clash *clash, ebpo_error *error)
 {
     ebpo_collide_distance_result found;
     ebpo_status status = ebpo_collide_distance(two->collider, two->options, NULL, &found, error);
     if (status == EBPO_OK)
-        set_location(m, found.point_a);
+        set_location(clash, found.point_a);
     return status;
 }
 
 /* Sets faces, distance and location of the nearest pair. */
 static void scene_report_nearest(const scene_two *two, const ebpo_collide_distance_result *nearest,
-                                 ebpo_scene_clash *m)
+                                 ebpo_scene_clash *clash)
 {
     double middle[3];
-    m->distance = nearest->distance.hi;
-    m->face_a = nearest->pair.face_a;
-    m->face_b = nearest->pair.face_b;
+    clash->distance = nearest->distance.hi;
+    clash->face_a = nearest->pair.face_a;
+    clash->face_b = nearest->pair.face_b;
     for (int k = 0; k < 3; k++)
         middle[k] = nearest->point_a[k] / 2 + nearest->point_b[k] / 2;
     if (two->how->locations)
-        set_location(m, middle);
+        set_location(clash, middle);
 }
 
 /* --- intersecting faces --- */
 
-/* Counts all pairs of intersecting faces and the lines of contact. `faces`: for finding locations;
- * NULL: not requested. `first`: a pair that intersects. */
+/* Counts all pairs of intersecting faces and the lines of contact. faces: for finding locations;
+ * NULL: locations are not requested. first: an intersecting pair. */
 static ebpo_status count_all(const scene_two *two, ebpo_pair_faces *faces,
-                             const ebpo_face_pair *first, ebpo_scene_clash *m, ebpo_error *error)
+                             const ebpo_face_pair *first, ebpo_scene_clash *clash,
+                             ebpo_error *error)
 {
-    tally t = { m, faces, *first, false, error, EBPO_OK };
+    tally t = { clash, faces, *first, false, error, EBPO_OK };
     double location[3];
     ebpo_status status = ebpo_collide_all(two->collider, two->options, count_faces, &t, error);
     if (status == EBPO_OK)
         status = t.status;
     if (status != EBPO_OK)
         return status;
-    m->face_a = t.first.face_a;
-    m->face_b = t.first.face_b;
+    clash->face_a = t.first.face_a;
+    clash->face_b = t.first.face_b;
     if (faces)
         status = common_point(faces, &t.first, location, error);
     if (faces && status == EBPO_OK)
-        set_location(m, location);
-    return status == EBPO_OK && m->crossing ? report_lines(two, m, error) : status;
+        set_location(clash, location);
+    return status == EBPO_OK && clash->crossing ? report_lines(two, clash, error) : status;
 }
 
 static ebpo_status count_with_location(const scene_two *two, const ebpo_face_pair *first,
-                                       ebpo_scene_clash *m, ebpo_error *error)
+                                       ebpo_scene_clash *clash, ebpo_error *error)
 {
     ebpo_collision collision;
     ebpo_pair_faces faces = { .collision = &collision };
@@ -205,55 +208,57 @@ static ebpo_status count_with_location(const scene_two *two, const ebpo_face_pai
     if (status == EBPO_OK)
         status = ebpo_pair_faces_begin(&faces, &collision, error);
     if (status == EBPO_OK)
-        status = count_all(two, &faces, first, m, error);
+        status = count_all(two, &faces, first, clash, error);
     ebpo_pair_faces_end(&faces);
     return status;
 }
 
-/* Searches for a crossing pair of faces only, which decides the kind. */
-static ebpo_status find_kind(const scene_two *two, const ebpo_face_pair *first, ebpo_scene_clash *m,
-                             ebpo_error *error)
+/* Finds the kind of the clash. Ends the search at the first crossing pair of faces, which decides
+ * it. */
+static ebpo_status find_kind(const scene_two *two, const ebpo_face_pair *first,
+                             ebpo_scene_clash *clash, ebpo_error *error)
 {
-    tally t = { m, NULL, *first, true, error, EBPO_OK };
-    m->crossing = first->kind == EBPO_PAIR_CROSSING;
-    return m->crossing ? EBPO_OK
-                       : ebpo_collide_all(two->collider, two->options, count_faces, &t, error);
+    tally t = { clash, NULL, *first, true, error, EBPO_OK };
+    clash->crossing = first->kind == EBPO_PAIR_CROSSING;
+    return clash->crossing ? EBPO_OK
+                           : ebpo_collide_all(two->collider, two->options, count_faces, &t, error);
 }
 
 /* Sets faces, numbers of pairs, contacts and location. `first`: result of ebpo_collide_first. */
 static ebpo_status scene_report_contacts(const scene_two *two, const ebpo_face_pair *first,
-                                         ebpo_scene_clash *m, ebpo_error *error)
+                                         ebpo_scene_clash *clash, ebpo_error *error)
 {
-    m->face_a = first->face_a;
-    m->face_b = first->face_b;
+    clash->face_a = first->face_a;
+    clash->face_b = first->face_b;
     if (two->how->count)
-        return two->how->locations ? count_with_location(two, first, m, error)
-                                   : count_all(two, NULL, first, m, error);
-    ebpo_status status = find_kind(two, first, m, error);
-    return status == EBPO_OK && two->how->locations ? locate_first(two, m, error) : status;
+        return two->how->locations ? count_with_location(two, first, clash, error)
+                                   : count_all(two, NULL, first, clash, error);
+    ebpo_status status = find_kind(two, first, clash, error);
+    return status == EBPO_OK && two->how->locations ? locate_first(two, clash, error) : status;
 }
 
-/* Returns true if a point of one model is inside the other. Otherwise the depth is 0, and no search
- * is necessary, which would take long for faces that overlap in one plane. */
+/* Returns true if a point of one model is inside the other model. If not, the depth is 0 and needs
+ * no search, which would take long for faces that overlap in one plane. */
 static bool is_any_inner(int32_t relation)
 {
     return relation == EBPO_INTERSECTING || relation == EBPO_A_INSIDE_B ||
            relation == EBPO_B_INSIDE_A;
 }
 
-/* Sets the depth of each instance in the other. */
-static ebpo_status scene_report_depths(const scene_two *two, ebpo_scene_clash *m, ebpo_error *error)
+/* Sets the depth of each instance in the other instance. */
+static ebpo_status scene_report_depths(const scene_two *two, ebpo_scene_clash *clash,
+                                       ebpo_error *error)
 {
     static const ebpo_value_bounds none = { 0, 0, EBPO_VALUE_EXACT, 0 };
     if (!(two->how->depth > 0))
         return EBPO_OK;
-    if (is_any_inner(m->relation) && (two->solid[0] || two->solid[1]))
+    if (is_any_inner(clash->relation) && (two->solid[0] || two->solid[1]))
         return ebpo_collide_depth(two->collider, two->options, two->how->depth,
-                                  two->solid[1] ? &m->depth[0] : NULL,
-                                  two->solid[0] ? &m->depth[1] : NULL, error);
+                                  two->solid[1] ? &clash->depth[0] : NULL,
+                                  two->solid[0] ? &clash->depth[1] : NULL, error);
     for (int i = 0; i < 2; i++)
         if (two->solid[!i])
-            m->depth[i] = none;
+            clash->depth[i] = none;
     return EBPO_OK;
 }
 
@@ -265,65 +270,66 @@ typedef struct clash_query {
     double time;
 } clash_query;
 
-static ebpo_clash_kind kind_of(const ebpo_scene_clash *m)
+static ebpo_clash_kind kind_of(const ebpo_scene_clash *clash)
 {
-    return m->crossing   ? EBPO_CLASH_CROSSING
-           : m->coplanar ? EBPO_CLASH_COPLANAR
-           : m->touching ? EBPO_CLASH_TOUCHING
-                         : EBPO_CLASH_NONE;
+    return clash->crossing   ? EBPO_CLASH_CROSSING
+           : clash->coplanar ? EBPO_CLASH_COPLANAR
+           : clash->touching ? EBPO_CLASH_TOUCHING
+                             : EBPO_CLASH_NONE;
 }
 
-/* Checks the clearance, which takes less time than computing the distance. Computes the distance
- * only if the clearance is not kept. */
-static ebpo_status query_clearance(const scene_two *two, ebpo_scene_clash *m, ebpo_error *error)
+/* Compares the distance with the clearance, which takes less time than computing the distance.
+ * Computes the distance only if it is less than the clearance. */
+static ebpo_status query_clearance(const scene_two *two, ebpo_scene_clash *clash, ebpo_error *error)
 {
     ebpo_collide_distance_options how = EBPO_COLLIDE_DISTANCE_OPTIONS_INIT;
     ebpo_collide_distance_result found;
-    how.at_least = m->clearance;
+    how.at_least = clash->clearance;
     ebpo_status status = ebpo_collide_distance(two->collider, two->options, &how, &found, error);
     if (status != EBPO_OK || found.at_least == 1)
         return status;
     status = ebpo_collide_distance(two->collider, two->options, NULL, &found, error);
-    m->kind = EBPO_CLASH_NEAR;
+    clash->kind = EBPO_CLASH_NEAR;
     if (status == EBPO_OK)
-        scene_report_nearest(two, &found, m);
+        scene_report_nearest(two, &found, clash);
     return status;
 }
 
-/* Sets the relation. The relation of solids is more specific than the relation of faces. */
-static ebpo_status query_relation(const scene_two *two, ebpo_scene_clash *m, ebpo_error *error)
+/* Sets the relation. Replaces the kind of the clash by a kind that follows from the relation, if
+ * there is one. */
+static ebpo_status query_relation(const scene_two *two, ebpo_scene_clash *clash, ebpo_error *error)
 {
     ebpo_relation_result found;
     ebpo_status status = ebpo_collide_relation(two->collider, two->options, &found, error);
-    m->relation = found.relation;
+    clash->relation = found.relation;
     if (found.relation == EBPO_INTERSECTING && (two->solid[0] || two->solid[1]))
-        m->kind = EBPO_CLASH_PROTRUDING;
+        clash->kind = EBPO_CLASH_PROTRUDING;
     if (found.relation == EBPO_A_INSIDE_B || found.relation == EBPO_B_INSIDE_A)
-        m->kind = EBPO_CLASH_ENCLOSED;
+        clash->kind = EBPO_CLASH_ENCLOSED;
     if (found.relation == EBPO_EQUAL)
-        m->kind = EBPO_CLASH_DUPLICATE;
+        clash->kind = EBPO_CLASH_DUPLICATE;
     return status;
 }
 
 /* Sets the results of a pair whose faces do not intersect. */
-static ebpo_status query_disjoint_faces(const scene_two *two, ebpo_scene_clash *m,
+static ebpo_status query_disjoint_faces(const scene_two *two, ebpo_scene_clash *clash,
                                         ebpo_error *error)
 {
     ebpo_collide_distance_result found;
-    ebpo_status status = two->how->relate ? query_relation(two, m, error) : EBPO_OK;
+    ebpo_status status = two->how->relate ? query_relation(two, clash, error) : EBPO_OK;
     if (status != EBPO_OK)
         return status;
-    if (m->kind == EBPO_CLASH_NONE) {
-        status = m->clearance > 0 ? query_clearance(two, m, error) : EBPO_OK;
+    if (clash->kind == EBPO_CLASH_NONE) {
+        status = clash->clearance > 0 ? query_clearance(two, clash, error) : EBPO_OK;
     } else {
         status = ebpo_collide_distance(two->collider, two->options, NULL, &found, error);
         if (status == EBPO_OK)
-            scene_report_nearest(two, &found, m);
+            scene_report_nearest(two, &found, clash);
     }
-    return status == EBPO_OK ? scene_report_depths(two, m, error) : status;
+    return status == EBPO_OK ? scene_report_depths(two, clash, error) : status;
 }
 
-static ebpo_status query_faces(const scene_two *two, ebpo_scene_clash *m, ebpo_error *error)
+static ebpo_status query_faces(const scene_two *two, ebpo_scene_clash *clash, ebpo_error *error)
 {
     int32_t found = 0;
     ebpo_face_pair first;
@@ -331,16 +337,16 @@ static ebpo_status query_faces(const scene_two *two, ebpo_scene_clash *m, ebpo_e
     if (status != EBPO_OK)
         return status;
     if (found <= 0)
-        return query_disjoint_faces(two, m, error);
-    status = scene_report_contacts(two, &first, m, error);
-    m->kind = kind_of(m);
+        return query_disjoint_faces(two, clash, error);
+    status = scene_report_contacts(two, &first, clash, error);
+    clash->kind = kind_of(clash);
     if (status == EBPO_OK && two->how->relate)
-        status = query_relation(two, m, error);
-    return status == EBPO_OK ? scene_report_depths(two, m, error) : status;
+        status = query_relation(two, clash, error);
+    return status == EBPO_OK ? scene_report_depths(two, clash, error) : status;
 }
 
-/* Checks that parts omitted from a file do not matter. If one instance is inside a solid, any face
- * may matter. */
+/* Checks that faces omitted from a file cannot change the result. If the relation is requested, any
+ * omitted face may change it, because one instance may be inside the other one. */
 static ebpo_status check_omitted_faces(const clash_query *a, const ebpo_scene_pair *pair,
                                        ebpo_error *error)
 {
@@ -361,11 +367,11 @@ static ebpo_status query_pair(const void *how, const ebpo_scene_pair *pair, void
                               ebpo_error *error)
 {
     const clash_query *a = how;
-    ebpo_scene_clash *m = result;
+    ebpo_scene_clash *clash = result;
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     ebpo_collider *collider = NULL;
-    *m = (ebpo_scene_clash){ .a = pair->a, .b = pair->b, .clearance = pair->clearance };
-    clear_results(m);
+    *clash = (ebpo_scene_clash){ .a = pair->a, .b = pair->b, .clearance = pair->clearance };
+    clear_results(clash);
     ebpo_status status = ebpo_scene_pose_pair(a->scene, pair, a->time, &options, error);
     if (status == EBPO_OK)
         status = check_omitted_faces(a, pair, error);
@@ -375,7 +381,7 @@ static ebpo_status query_pair(const void *how, const ebpo_scene_pair *pair, void
         &a->how, collider, &options, { is_solid(a->scene, pair->a), is_solid(a->scene, pair->b) }
     };
     if (status == EBPO_OK && collider)
-        status = query_faces(&two, m, error);
+        status = query_faces(&two, clash, error);
     ebpo_collider_free(collider);
     return status;
 }
@@ -404,8 +410,7 @@ ebpo_status ebpo_scene_find_clashes(ebpo_scene *scene, double time,
     ebpo_status status = EBPO_TAKE(ebpo_scene_clash_options, &a.how, options, error);
     if (status == EBPO_OK && !(a.how.depth >= 0 && a.how.depth < INFINITY))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "depths within %g: the tolerance is not a valid "
-                         "length",
+                         "expected a tolerance of depths that is a length of 0 or more, got %g",
                          a.how.depth);
     a.how.relate |= a.how.depth > 0;
     ebpo_scene_search search = {

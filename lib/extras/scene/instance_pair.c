@@ -1,10 +1,11 @@
-/* Computes data of two instances of a scene at a time: the box of one in the other's coordinates,
- * bounds of their relative motion and of their distance, and the faces that their files omit.
+/* Computes data of two instances of a scene at a time: the box of one instance in the coordinates
+ * of the other one, bounds of their relative motion and of their distance, and bounds of the faces
+ * that their files omit.
  *
  * Boxes and lengths are rounded outwards, so that every bound is certain in spite of rounding. A
- * file that is a subset has only the faces in its kept box; up to six boxes around the kept box
- * contain the omitted faces. Two instances that follow one route have no relative motion except by
- * rounding and scale.
+ * file that is a subset has all faces of a box (the kept box); up to six boxes around the kept box
+ * contain the omitted faces. If two instances follow one route, their relative position changes
+ * only by rounding and by changes of the route's scale.
  *
  * ebpo_scene_find_in_pairs evaluates a list of pairs on all cores. Each pair has a separate
  * collider, so that results do not depend on the number of threads. */
@@ -21,7 +22,7 @@
 #include "extras/scene/instance_pair.h"
 #include "geometry/pose.h"
 
-/* Relative margin for sums of a few products: far above their rounding. */
+/* Relative margin for sums of a few products, far greater than their rounding errors. */
 static const double slack = 0x1p-44;
 
 static const ebpo_scene_model_entry *model_of_instance(const ebpo_scene *scene, uint64_t instance)
@@ -33,19 +34,19 @@ static ebpo_status posing_of(const ebpo_scene *scene, uint64_t instance, double 
                              ebpo_posing *out, ebpo_error *error)
 {
     const ebpo_scene_model_entry *m = model_of_instance(scene, instance);
-    double reach[3];
+    double max_coordinate[3];
     ebpo_pose pose;
     for (int k = 0; k < 3; k++)
-        reach[k] = fmax(fabs(m->min[k]), fabs(m->max[k]));
+        max_coordinate[k] = fmax(fabs(m->min[k]), fabs(m->max[k]));
     ebpo_status status = ebpo_scene_pose(scene, instance, time, &pose, error);
-    return status == EBPO_OK ? ebpo_posing_make(out, &pose, reach, error) : status;
+    return status == EBPO_OK ? ebpo_posing_make(out, &pose, max_coordinate, error) : status;
 }
 
-/* The box of a model in the world. */
+/* The posed box of a model. */
 typedef struct posed_box {
-    double middle[3];  /* its centre */
+    double middle[3];  /* centre of the box, in the world */
     double half[3][3]; /* [axis of the box] vector from the centre to the middle of a side */
-    double size;       /* sum of the terms of the coordinates, for bounds of rounding */
+    double size;       /* sum of the absolute values of all terms, for bounds of rounding */
 } posed_box;
 
 static void pose_box(const ebpo_posing *p, const ebpo_scene_model_entry *m, posed_box *out)
@@ -58,9 +59,9 @@ static void pose_box(const ebpo_posing *p, const ebpo_scene_model_entry *m, pose
     for (int i = 0; i < 3; i++) {
         out->size += fabs(p->translation[i]);
         for (int k = 0; k < 3; k++) {
-            double reach = fmax(fabs(m->min[k]), fabs(m->max[k]));
+            double max_coordinate = fmax(fabs(m->min[k]), fabs(m->max[k]));
             out->half[k][i] = p->matrix[i][k] * (m->max[k] / 2 - m->min[k] / 2);
-            out->size += fabs(p->matrix[i][k]) * reach;
+            out->size += fabs(p->matrix[i][k]) * max_coordinate;
         }
     }
 }
@@ -78,14 +79,15 @@ ebpo_status ebpo_scene_make_relative_box(const ebpo_scene *scene, uint64_t of, u
     if (status != EBPO_OK)
         return status;
     pose_box(&at, model_of_instance(scene, other), &b);
-    double scale = from.scale, sizes = b.size, reach = 0;
+    double scale = from.scale, sizes = b.size, max_coordinate = 0;
     for (int i = 0; i < 3; i++) {
         sizes += fabs(from.translation[i]);
-        reach += fmax(fabs(m->min[i]), fabs(m->max[i]));
+        max_coordinate += fmax(fabs(m->min[i]), fabs(m->max[i]));
     }
-    /* the transposed matrix is the inverse except for an error, which is bounded for points of the
-     * model's box */
-    double off = (sizes + reach * scale) * slack / scale + 3 * from.error_bound * reach;
+    /* The transposed matrix is used as the inverse. `off` bounds the error of this for points of
+     * the model's box, and rounding. */
+    double off =
+        (sizes + max_coordinate * scale) * slack / scale + 3 * from.error_bound * max_coordinate;
     out->rounding = off;
     for (int k = 0; k < 3; k++) {
         double middle = 0, half = off;
@@ -112,8 +114,8 @@ double ebpo_scene_bounds_gap(const ebpo_scene_bounds *a, const ebpo_scene_bounds
     return ebpo_scene_length_above(apart) * (1 - 8 * slack);
 }
 
-/* Computes the box of the faces that are in a model's file; empty: no faces are certain to be
- * there. Returns false if the file has all faces. */
+/* Computes a box all of whose faces are in the model's file; empty if there is no such box. Returns
+ * false if the file has all faces. */
 static bool held_box(const ebpo_scene *scene, uint64_t instance, ebpo_scene_bounds *out)
 {
     const ebpo_info *info =
@@ -148,7 +150,8 @@ static double gap_around(const ebpo_scene_bounds *all, const ebpo_scene_bounds *
     return gap;
 }
 
-/* Sets *gap to a lower bound of the distance of omitted faces of `of` from `other`. */
+/* Sets *gap to a lower bound of the distance between the omitted faces of the instance `of` and the
+ * instance `other`; INFINITY if no faces are omitted. */
 static ebpo_status omitted_of(const ebpo_scene *scene, uint64_t of, uint64_t other, double time,
                               double *gap, ebpo_error *error)
 {
@@ -187,7 +190,8 @@ ebpo_status ebpo_scene_fail_omitted(const ebpo_scene *scene, const ebpo_scene_pa
     return ebpo_fail(
         error, EBPO_E_ABSENT,
         "instances '%.80s' and '%.80s' at time %.9g: the file of model '%.80s' is a subset or "
-        "has no mesh, and the omitted part may matter; query a scene with more of the model%s",
+        "has no mesh, and the omitted part may change the result; query a scene with more of the "
+        "model%s",
         scene->instances[pair->a].as.name, scene->instances[pair->b].as.name, time, m->name,
         solids ? ", such as a scene from ebpo scene pack --solids" : "");
 }
@@ -198,8 +202,8 @@ static const ebpo_scene_route *route_of(const ebpo_scene *scene, uint64_t instan
     return route == EBPO_SCENE_NONE ? NULL : &scene->routes[route];
 }
 
-/* Returns true if both instances follow one route, or two routes with the same keys. Then their
- * relative position changes only by rounding, and in size where the route's scale changes. */
+/* Returns true if both instances follow one route, or two routes with the same keys. Their relative
+ * position then changes only by rounding, and in size if the route's scale changes. */
 static bool follows_one_route(const ebpo_scene *scene, const ebpo_scene_pair *pair)
 {
     const ebpo_scene_route *a = route_of(scene, pair->a), *b = route_of(scene, pair->b);
@@ -209,8 +213,8 @@ static bool follows_one_route(const ebpo_scene *scene, const ebpo_scene_pair *pa
                       memcmp(a->keys, b->keys, a->count * sizeof *a->keys) == 0);
 }
 
-/* Returns a bound of the change of the pair's distance that rounding of its routes causes; 0:
- * neither instance has a route. */
+/* Returns an upper bound of the change of the pair's distance that rounding causes in the poses of
+ * the routes; 0 if neither instance has a route. */
 static double pair_rounding(const ebpo_scene *scene, const ebpo_scene_pair *pair)
 {
     double sum = 0;
@@ -220,21 +224,23 @@ static double pair_rounding(const ebpo_scene *scene, const ebpo_scene_pair *pair
         if (route)
             sum +=
                 ebpo_scene_route_rounding(route,
-                                          ebpo_scene_reach_of(scene, &scene->instances[instance]));
+                                          ebpo_scene_extent_of(scene, &scene->instances[instance]));
     }
     return sum;
 }
 
 /* Bounds the motion of a pair on one route. The pose of the route is the same for both instances,
- * to the last bit. So if two of their points are at most `reach` apart in the coordinates of the
- * route, their distance at a time is at most the scale times `reach`. */
+ * to the last bit. So the distance of two points, one of each instance, is the route's scale times
+ * their distance in the coordinates of the route, and changes only with the scale and by
+ * rounding. */
 static double motion_on_one_route(const ebpo_scene *scene, const ebpo_scene_pair *pair, double from,
                                   double to)
 {
-    ebpo_scene_reach a = ebpo_scene_reach_of(scene, &scene->instances[pair->a]);
-    ebpo_scene_reach b = ebpo_scene_reach_of(scene, &scene->instances[pair->b]);
+    ebpo_scene_extent a = ebpo_scene_extent_of(scene, &scene->instances[pair->a]);
+    ebpo_scene_extent b = ebpo_scene_extent_of(scene, &scene->instances[pair->b]);
     return ebpo_scene_route_growth(route_of(scene, pair->a), from, to,
-                                   (ebpo_scene_reach){ a.length + b.length, a.size + b.size });
+                                   (ebpo_scene_extent){ a.max_distance + b.max_distance,
+                                                        a.size + b.size });
 }
 
 /* Sets *out to a bound of the change of the pair's distance between two times; INFINITY over a
@@ -301,8 +307,8 @@ ebpo_status ebpo_scene_keep_pairs(const ebpo_scene *scene, double from, double t
     return status;
 }
 
-/* As ebpo_scene_keep_pairs, and makes the models of the pairs. On failure there is nothing to free.
- */
+/* Lists the pairs as ebpo_scene_keep_pairs does, and makes their models. On failure there is
+ * nothing to free. */
 static ebpo_status list_pairs(ebpo_scene *scene, double from, double to, ebpo_scene_pairs_list *out,
                               ebpo_error *error)
 {
@@ -383,8 +389,8 @@ ebpo_status ebpo_scene_pose_pair(const ebpo_scene *scene, const ebpo_scene_pair 
     return status == EBPO_OK ? ebpo_scene_pose(scene, pair->b, time, &out->pose_b, error) : status;
 }
 
-/* Bounds the distance of the faces in both files at a time. Without a collider, one of the files
- * has no faces: both bounds are INFINITY. */
+/* Bounds the distance of the faces that are in both files, at a time. If there is no collider, one
+ * of the files has no faces, and both bounds are INFINITY. */
 static ebpo_status query_distance(ebpo_scene_evaluations *l, double time, double *lo, double *hi,
                                   ebpo_error *error)
 {
@@ -392,8 +398,8 @@ static ebpo_status query_distance(ebpo_scene_evaluations *l, double time, double
     ebpo_collide_distance_options how = EBPO_COLLIDE_DISTANCE_OPTIONS_INIT;
     ebpo_collide_distance_result found = { .distance = { .lo = INFINITY, .hi = INFINITY } };
     how.tolerance = l->tolerance;
-    how.warm =
-        true; /* lo and hi may depend on the last pair, so each pair has a separate collider */
+    /* lo and hi may depend on the last query, so each pair of instances has a separate collider */
+    how.warm = true;
     ebpo_status status = ebpo_scene_pose_pair(l->scene, l->pair, time, &options, error);
     if (status == EBPO_OK && l->collider)
         status = ebpo_collide_distance(l->collider, &options, &how, &found, error);
@@ -418,7 +424,8 @@ ebpo_status ebpo_scene_evaluations_begin(ebpo_scene_evaluations *l, const ebpo_s
                                          ebpo_error *error)
 {
     *l = (ebpo_scene_evaluations){ .scene = scene, .pair = pair, .tolerance = tolerance / 4 };
-    /* a smaller tolerance would take long, and the additional digits change with every pose */
+    /* a smaller tolerance takes long, and its additional digits are only rounding errors of poses
+     */
     l->tolerance = fmax(l->tolerance, pair_rounding(scene, pair) / 16);
     l->shares_route = follows_one_route(scene, pair);
     return ebpo_scene_collider(scene, pair, 1, &l->collider, error);
@@ -435,14 +442,15 @@ bool ebpo_scene_is_within(double hi, double lo, double tolerance)
     return hi <= lo || (hi - lo) * (1 + 0x1p-52) <= tolerance;
 }
 
-ebpo_status ebpo_scene_take_approach_options(ebpo_scene_approach_options *own,
+ebpo_status ebpo_scene_take_approach_options(ebpo_scene_approach_options *checked,
                                              const ebpo_scene_approach_options *options,
                                              ebpo_error *error)
 {
-    ebpo_status status = EBPO_TAKE(ebpo_scene_approach_options, own, options, error);
-    if (status == EBPO_OK && !(own->tolerance > 0 && own->tolerance < INFINITY))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "the tolerance %g is not above 0", own->tolerance);
-    if (!own->max_evaluations)
-        own->max_evaluations = 10000;
+    ebpo_status status = EBPO_TAKE(ebpo_scene_approach_options, checked, options, error);
+    if (status == EBPO_OK && !(checked->tolerance > 0 && checked->tolerance < INFINITY))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "expected a tolerance above 0, got %g",
+                         checked->tolerance);
+    if (!checked->max_evaluations)
+        checked->max_evaluations = 10000;
     return status;
 }

@@ -1,5 +1,6 @@
-/* Two instances of a scene at a time: boxes in each other's coordinates, relative motion, distance,
- * and the parts that their files omit. Bounds hold for posed coordinates. */
+/* Computes data of two instances of a scene at a time: the box of one instance in the coordinates
+ * of the other one, their relative motion and distance, and the distance of the faces that their
+ * files omit. Bounds are valid for posed coordinates, which are rounded. */
 #ifndef EBPO_SCENE_INSTANCE_PAIR_H
 #define EBPO_SCENE_INSTANCE_PAIR_H
 
@@ -11,11 +12,11 @@ typedef struct ebpo_scene_bounds {
     double min[3], max[3];
 } ebpo_scene_bounds;
 
-/* The box of one instance in the coordinates of another one's model. */
+/* The box of one instance in the coordinates of another instance's model. */
 typedef struct ebpo_scene_relative_box {
     ebpo_scene_bounds box;
-    double rounding; /* by how much `box` has been widened on each side for rounding */
-    double unit;     /* a length of 1 in these coordinates is at least this long in the world */
+    double rounding; /* length by which `box` has been widened on each side because of rounding */
+    double unit;     /* least length in the world of a length of 1 in these coordinates */
 } ebpo_scene_relative_box;
 
 /* Computes a box in the coordinates of the instance `of` that contains the box of `other` at a
@@ -28,25 +29,25 @@ EBPO_MUST_USE ebpo_status ebpo_scene_make_relative_box(const ebpo_scene *scene, 
 /* Returns the distance of two boxes, rounded down. */
 double ebpo_scene_bounds_gap(const ebpo_scene_bounds *a, const ebpo_scene_bounds *b);
 
-/* Sets *gap to a lower bound of the distance, at a time, between a face of a and a face of b of
- * which at least one is omitted from its file; INFINITY: no face is omitted. *lacking: an instance
- * whose file omits faces. */
+/* Sets *gap to a lower bound of the distance, at a time, of all pairs of a face of pair->a and a
+ * face of pair->b in which at least one face is omitted from its file; INFINITY if no face is
+ * omitted. Sets *lacking to an instance whose file omits faces. */
 EBPO_MUST_USE ebpo_status ebpo_scene_omitted(const ebpo_scene *scene, const ebpo_scene_pair *pair,
                                              double time, double *gap, uint64_t *lacking,
                                              ebpo_error *error);
 
-/* Reports that faces that the file of the instance `lacking` omits may change the result. Always
- * returns EBPO_E_ABSENT. `solids`: the omitted faces may enclose the other instance. */
+/* Reports that faces which the file of the instance `lacking` omits may change the result. Always
+ * returns EBPO_E_ABSENT. solids: the reason is that the omitted faces may enclose the other
+ * instance. */
 ebpo_status ebpo_scene_fail_omitted(const ebpo_scene *scene, const ebpo_scene_pair *pair,
                                     uint64_t lacking, double time, bool solids, ebpo_error *error);
 
-/* Relative motion of two instances. */
-
-/* Returns the next time at which a route of the pair has a key; `to` if that comes first. */
+/* Returns the next time after `from` at which a route of the pair has a key (a time at which a
+ * route gives a pose), or `to` if that is earlier. */
 double ebpo_scene_pair_next(const ebpo_scene *scene, const ebpo_scene_pair *pair, double from,
                             double to);
 
-/* Evaluation of many pairs on several threads, each pair by one of them. */
+/* --- evaluation of many pairs on several threads; one thread evaluates a pair --- */
 
 typedef struct ebpo_scene_pairs_list {
     ebpo_scene_pair *pairs; /* from malloc */
@@ -65,53 +66,54 @@ typedef struct ebpo_scene_search {
     ebpo_scene_find_fn find;
     const void *how;
     size_t result_size;
-    uint64_t grain; /* number of pairs in a piece of work */
-    unsigned threads;
+    uint64_t grain;   /* number of consecutive pairs that a thread takes */
+    unsigned threads; /* 0: one for each core */
     const ebpo_progress *progress;
-    const char *stage;
+    const char *stage; /* for the progress function */
 } ebpo_scene_search;
 
-/* Lists the pairs, makes their models, and computes the result of each pair. *results has the order
- * of the pairs; free it, also on failure. *count is 0 if the pairs could not be listed. */
+/* Lists the pairs, makes their models, and computes the result of each pair. *results is in the
+ * order of the pairs; the caller frees it, even on failure. *count is 0 if the pairs could not be
+ * listed. */
 EBPO_MUST_USE ebpo_status ebpo_scene_find_in_pairs(ebpo_scene *scene, double from, double to,
                                                    const ebpo_scene_search *search, void **results,
                                                    uint64_t *count, ebpo_error *error);
 
-/* Makes the models of all pairs, one after the other; queries on several threads then share them.
- */
+/* Makes the models of all pairs in the calling thread. Queries on several threads may then share
+ * the models. */
 EBPO_MUST_USE ebpo_status ebpo_scene_make_models(ebpo_scene *scene, const ebpo_scene_pair *pairs,
                                                  uint64_t count, ebpo_error *error);
 /* Makes a collider for a pair whose models have been made. *out is NULL if one of the files has no
- * mesh; then ebpo_scene_omitted counts all its faces as omitted. */
+ * mesh; ebpo_scene_omitted treats all faces of such a file as omitted. */
 EBPO_MUST_USE ebpo_status ebpo_scene_collider(const ebpo_scene *scene, const ebpo_scene_pair *pair,
                                               unsigned threads, ebpo_collider **out,
                                               ebpo_error *error);
-/* Sets the poses of both instances at a time. */
+/* Sets pose_a and pose_b of `out` to the poses of both instances at a time. */
 EBPO_MUST_USE ebpo_status ebpo_scene_pose_pair(const ebpo_scene *scene, const ebpo_scene_pair *pair,
                                                double time, ebpo_collide_options *out,
                                                ebpo_error *error);
 
-/* A pair of instances at a sequence of times: distance and motion. */
-
+/* Evaluates the distance and the motion of a pair of instances at a sequence of times. */
 typedef struct ebpo_scene_evaluations {
     const ebpo_scene *scene;
     const ebpo_scene_pair *pair;
     ebpo_collider *collider; /* from ebpo_scene_collider; must be freed */
     double tolerance;        /* tolerance of one evaluation */
-    bool shares_route;       /* both follow one route */
+    bool shares_route;       /* both instances follow one route */
     double gap;              /* result of ebpo_scene_omitted at the last evaluation */
     uint64_t lacking;        /* instance whose file omits faces, from the same call */
 } ebpo_scene_evaluations;
 
-/* Begins evaluations. `tolerance`: tolerance of the result. An evaluation uses a quarter of it, but
- * not less than the limit of rounding. Free the collider, also on failure. */
+/* Begins evaluations. tolerance: tolerance of the caller's result; each evaluation uses a quarter
+ * of it, but not less than the rounding of poses allows. The caller frees the collider, even on
+ * failure. */
 EBPO_MUST_USE ebpo_status ebpo_scene_evaluations_begin(ebpo_scene_evaluations *evaluations,
                                                        const ebpo_scene *scene,
                                                        const ebpo_scene_pair *pair,
                                                        double tolerance, ebpo_error *error);
 
-/* Sets *out to a bound of the change of the pair's distance between two times; INFINITY over a
- * jump. */
+/* Sets *out to an upper bound of the change of the pair's distance between two times; INFINITY if a
+ * route jumps between them. */
 EBPO_MUST_USE ebpo_status ebpo_scene_evaluations_motion(const ebpo_scene_evaluations *evaluations,
                                                         double from, double to, double *out,
                                                         ebpo_error *error);
@@ -123,10 +125,10 @@ EBPO_MUST_USE ebpo_status ebpo_scene_evaluate(ebpo_scene_evaluations *evaluation
 /* Returns true if hi - lo is certainly at most the tolerance, in spite of rounding. */
 bool ebpo_scene_is_within(double hi, double lo, double tolerance);
 
-/* Reads the options, with the default number of evaluations. Fails with EBPO_E_ARGUMENT if the
- * tolerance is not above 0. */
+/* Copies the options to `checked`, with the default number of evaluations. Fails with
+ * EBPO_E_ARGUMENT if the tolerance is not above 0. */
 EBPO_MUST_USE ebpo_status
-ebpo_scene_take_approach_options(ebpo_scene_approach_options *own,
+ebpo_scene_take_approach_options(ebpo_scene_approach_options *checked,
                                  const ebpo_scene_approach_options *options, ebpo_error *error);
 
 #endif

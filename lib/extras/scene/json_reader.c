@@ -3,12 +3,12 @@
  *
  * A scene file is untrusted input. Before jansson parses the text, one pass compares the number and
  * the depth of its values with the limits, so that parsing takes bounded memory. jansson stores no
- * positions: after an error, a second pass over the text follows the path of the member to find its
- * line.
+ * positions. So, after an error, another pass over the text follows the path of the value to find
+ * its line.
  *
- * A reader stores the path of the current value: ebpo_json_enter and ebpo_json_leave must bracket
- * the evaluation of each value. Unknown members are errors, except private members, whose names
- * begin with "x-".
+ * A reader stores the path of the current value: ebpo_json_enter must be called before a value is
+ * evaluated, and ebpo_json_leave afterwards. Unknown members are errors, except private members,
+ * whose names begin with "x-".
  *
  * Source: format-spec/scene.md. */
 #include "core/strict_fp.h"
@@ -50,7 +50,7 @@ ebpo_status ebpo_scene_text_fits(const char *text, size_t size, uint64_t max_val
         depth -= (c == '}' || c == ']') && depth > 0;
         if (values > max_values)
             return ebpo_fail(error, EBPO_E_LIMIT,
-                             "byte %zu: more than %llu values, the given limit", i,
+                             "byte %zu: more than %llu values (the limit is an option)", i,
                              (unsigned long long)max_values);
     }
     return EBPO_OK;
@@ -105,8 +105,8 @@ static bool key_is(const cursor *c, const char *key)
     return *c->at == '"' && strncmp(c->at + 1, key, size) == 0 && c->at[1 + size] == '"';
 }
 
-/* Moves from the opening bracket at `c` to the value with the key or index `at` in these brackets.
- * Returns false if there is none. */
+/* Moves from an opening bracket at `c` to the value with the key or index `at` in these brackets.
+ * Returns false if there is no such value. */
 static bool json_text_enter(cursor *c, const ebpo_scene_at *at)
 {
     bool object = *c->at == '{';
@@ -128,8 +128,8 @@ static bool json_text_enter(cursor *c, const ebpo_scene_at *at)
     return false;
 }
 
-/* Returns the line, from 1, on which a value begins in valid JSON. The value has a path of `count`
- * steps. If it does not exist, returns the line of the deepest existing value on its path. */
+/* Returns the line, from 1, on which the value with a path of `count` steps begins in valid JSON.
+ * If the value does not exist, returns the line of the last existing value on its path. */
 static uint64_t find_line(const char *text, const ebpo_scene_at *path, int count)
 {
     cursor c = { text, 1 };
@@ -153,7 +153,7 @@ void ebpo_json_enter(ebpo_json_reader *r, const char *key, uint64_t item)
 
 void ebpo_json_leave(ebpo_json_reader *r) { r->depth--; }
 
-/* Writes the path of the current value, such as "instances[3].pose", cut to fit. */
+/* Writes the path of the current value, such as "instances[3].pose", truncated to `space` bytes. */
 static void show_path(const ebpo_json_reader *r, char *out, size_t space)
 {
     size_t used = 0;
@@ -211,7 +211,7 @@ ebpo_status ebpo_json_members(ebpo_json_reader *r, const json_t *value, const ch
         while (*k && strcmp(*k, key) != 0)
             k++;
         if (!*k && strncmp(key, "x-", 2) != 0)
-            return ebpo_json_bad_at(r, key, "is not a known member; private ones begin with x-");
+            return ebpo_json_bad_at(r, key, "is not a known member; private members begin with x-");
     }
     return EBPO_OK;
 }

@@ -14,26 +14,27 @@ typedef struct ebpo_json_reader {
     ebpo_error *error;
 } ebpo_json_reader;
 
-/* The first function adds a member, or an item if `key` is NULL, to the path of the current value;
- * the second removes it from the path. */
+/* ebpo_json_enter appends a step to the path of the current value: the member `key`, or, if `key`
+ * is NULL, the item with the index `item`. ebpo_json_leave removes the last step. */
 void ebpo_json_enter(ebpo_json_reader *r, const char *key, uint64_t item);
 void ebpo_json_leave(ebpo_json_reader *r);
 
-/* Returns EBPO_E_FORMAT with a message about the entered value. */
+/* Sets r->error to a message about the current value. Always returns EBPO_E_FORMAT. */
 ebpo_status ebpo_json_bad(ebpo_json_reader *r, const char *format, ...) EBPO_PRINTF(2, 3);
-/* Returns EBPO_E_FORMAT with a message about the member `key` of the entered value. */
+/* Sets r->error to a message about the member `key` of the current value. Always returns
+ * EBPO_E_FORMAT. */
 ebpo_status ebpo_json_bad_at(ebpo_json_reader *r, const char *key, const char *what);
-/* Converts EBPO_E_ARGUMENT with the message `why` into the error of ebpo_json_bad; returns other
- * errors unchanged. */
+/* Converts the status EBPO_E_ARGUMENT with the message `why` into the error of ebpo_json_bad, which
+ * names the line and the path. Returns other statuses unchanged. */
 ebpo_status ebpo_json_locate_error(ebpo_json_reader *r, ebpo_status status, const ebpo_error *why);
 
-/* Checks that the value is an object with only these members (NULL ends the list) and private ones,
- * "x-...". */
+/* Checks that the value is an object that has only members in the list `known` (NULL ends it) and
+ * private members, whose names begin with "x-". */
 EBPO_MUST_USE ebpo_status ebpo_json_members(ebpo_json_reader *r, const json_t *value,
                                             const char *const *known);
 
-/* Read a member. If the member is missing, *out stays unchanged; if it is also `needed`, the
- * function fails with EBPO_E_FORMAT. */
+/* Read a member. If the member is missing, do not change *out, and fail with EBPO_E_FORMAT if it is
+ * `needed`. */
 EBPO_MUST_USE ebpo_status ebpo_json_get_text(ebpo_json_reader *r, const json_t *object,
                                              const char *key, bool needed, const char **out);
 EBPO_MUST_USE ebpo_status ebpo_json_get_flag(ebpo_json_reader *r, const json_t *object,
@@ -44,8 +45,9 @@ EBPO_MUST_USE ebpo_status ebpo_json_get_reals(ebpo_json_reader *r, const json_t 
                                               const char *key, bool needed, double *out,
                                               size_t count);
 
-/* Called for each member (or item) of the member `key`, if `key` exists. The member (or item) has
- * been entered. `name` is NULL in arrays. */
+/* The function that is called for each member of the object `key`, or for each item of the array
+ * `key`, if there is a member `key`. The path of the reader includes this member or item. `name` is
+ * NULL for items. */
 typedef ebpo_status (*ebpo_json_each_fn)(ebpo_json_reader *r, const char *name,
                                          const json_t *value);
 EBPO_MUST_USE ebpo_status ebpo_json_each_member(ebpo_json_reader *r, const json_t *object,

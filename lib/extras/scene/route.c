@@ -5,9 +5,9 @@
  * sums, products, quotients and square roots are used, so that a pose has the same bits on every
  * machine.
  *
- * Three bounds hold between two times with no key between them: of the length of the motion, of its
- * distance from the straight line, and of the motion that rounding alone causes. They are rounded
- * upwards. */
+ * Between two times with no key between them, three quantities have upper bounds: the length of the
+ * motion, its distance from the straight line, and the motion that rounding alone causes. The
+ * bounds are rounded upwards. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -20,7 +20,7 @@
 
 /* Relative rounding error of lengths after a few dozen operations, each with an error of 2^-53. */
 static const double slack = 0x1p-44;
-/* Greatest time: differences of such times are finite. */
+/* Greatest absolute time. Differences of times in this range are finite. */
 static const double max_time = 0x1p1000;
 
 void ebpo_scene_quaternion_of_matrix(const double m[3][3], double quaternion[4])
@@ -65,7 +65,7 @@ ebpo_status ebpo_scene_add_key(ebpo_scene_route *route, const ebpo_route_key *ke
     if (!ebpo_quaternion_normalise(k.quaternion))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "the quaternion is 0 or too long");
     if (route->count && !(k.time > route->keys[route->count - 1].time))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "time %g is not above the previous one, %g",
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "time %g is not later than the previous time, %g",
                          k.time, route->keys[route->count - 1].time);
     if (!ebpo_grow(&route->keys, &route->capacity, route->count + 1, sizeof *route->keys))
         return ebpo_fail_memory(error, (route->count + 1) * sizeof *route->keys);
@@ -87,8 +87,8 @@ static uint64_t key_at(const ebpo_scene_route *route, double time)
     return low;
 }
 
-/* Interpolates at constant speed along the shorter arc. The arc is halved until chord and arc are
- * equal. */
+/* Interpolates at constant speed along the shorter arc. u: fraction of the arc, 0 to 1. Halves the
+ * arc 28 times; the length of the rest is equal to its chord, so this is interpolated linearly. */
 static void interpolate_rotation(const double from[4], const double to[4], double u, double out[4])
 {
     double a[4], b[4];
@@ -101,8 +101,8 @@ static void interpolate_rotation(const double from[4], const double to[4], doubl
         double middle[4];
         for (int k = 0; k < 4; k++)
             middle[k] = a[k] + b[k];
-        ebpo_quaternion_normalise(middle); /* both are at most a right angle apart, so their sum is
-                                            * not near 0 */
+        ebpo_quaternion_normalise(middle); /* never near 0: the angle of a and b is at most 90
+                                            * degrees */
         bool later = u >= 0.5;
         memcpy(later ? a : b, middle, sizeof middle);
         u = later ? 2 * u - 1 : 2 * u;
@@ -154,8 +154,8 @@ double ebpo_scene_route_next(const ebpo_scene_route *route, double from, double 
     return n + 1 < route->count ? fmin(to, route->keys[n + 1].time) : to;
 }
 
-/* Returns an upper bound of the angle, in radians, of the rotation from a to b. It is twice the
- * angle between the quaternions, which is 2 asin(chord / 2) by the series of asin. */
+/* Returns an upper bound of the angle, in radians, of the rotation from a to b. This angle is twice
+ * the angle between the quaternions, 2 asin(chord / 2). asin is computed by its series. */
 static double angle_between(const double a[4], const double b[4])
 {
     double less[4], more[4];
@@ -172,8 +172,8 @@ static double angle_between(const double a[4], const double b[4])
         term *= square * (2 * n - 1) / (2 * n);
         sum += term / (2 * n + 1);
     }
-    return 4 * (sum + term) * (1 + slack); /* the remaining terms are in total below the first of
-                                            * them / (1 - 1/2) */
+    /* y^2 is about 1/2 at most, so the sum of the omitted terms is less than `term` */
+    return 4 * (sum + term) * (1 + slack);
 }
 
 double ebpo_scene_length_above(const double vector[3])
@@ -187,7 +187,7 @@ double ebpo_scene_length_above(const double vector[3])
 }
 
 ebpo_scene_step ebpo_scene_route_step(const ebpo_scene_route *route, double from, double to,
-                                      ebpo_scene_reach reach)
+                                      ebpo_scene_extent extent)
 {
     uint64_t n = key_at(route, from);
     const ebpo_route_key *a = &route->keys[n], *b = n + 1 < route->count ? a + 1 : a;
@@ -202,21 +202,21 @@ ebpo_scene_step ebpo_scene_route_step(const ebpo_scene_route *route, double from
     }
     double angle = angle_between(a->quaternion, b->quaternion), scale = fmax(a->scale, b->scale);
     double step_angle = angle * part, scale_change = fabs(b->scale - a->scale) * part;
-    double rounding = slack * (size + (reach.length + reach.size) * scale);
+    double rounding = slack * (size + (extent.max_distance + extent.size) * scale);
     return (ebpo_scene_step){
         (ebpo_scene_length_above(vector) * part +
-         reach.length * (scale * step_angle + scale_change)) *
+         extent.max_distance * (scale * step_angle + scale_change)) *
                 (1 + slack) +
             rounding,
-        reach.length / 8 * (scale * step_angle * step_angle + 2 * scale_change * step_angle) *
-                (1 + slack) +
+        extent.max_distance / 8 *
+                (scale * step_angle * step_angle + 2 * scale_change * step_angle) * (1 + slack) +
             rounding,
     };
 }
 
 /* Statistics of the scales and translations of a sequence of poses. */
 typedef struct pose_statistics {
-    double scale;        /* of the last pose */
+    double scale;        /* scale of the last pose */
     double scale_change; /* sum of the absolute changes of the scale */
     double most;         /* greatest scale */
     double size;         /* greatest 1-norm of a translation */
@@ -235,7 +235,7 @@ static void add_pose_statistics(pose_statistics *g, double scale, const double t
 }
 
 double ebpo_scene_route_growth(const ebpo_scene_route *route, double from, double to,
-                               ebpo_scene_reach reach)
+                               ebpo_scene_extent extent)
 {
     ebpo_pose at;
     ebpo_scene_route_at(route, from, &at);
@@ -248,14 +248,14 @@ double ebpo_scene_route_growth(const ebpo_scene_route *route, double from, doubl
     }
     ebpo_scene_route_at(route, to, &at);
     add_pose_statistics(&g, at.scale, at.translation);
-    return reach.length * g.scale_change * (1 + slack) +
-           slack * (2 * g.size + (reach.length + reach.size) * g.most);
+    return extent.max_distance * g.scale_change * (1 + slack) +
+           slack * (2 * g.size + (extent.max_distance + extent.size) * g.most);
 }
 
-double ebpo_scene_route_rounding(const ebpo_scene_route *route, ebpo_scene_reach reach)
+double ebpo_scene_route_rounding(const ebpo_scene_route *route, ebpo_scene_extent extent)
 {
     pose_statistics g = { .scale = 0 };
     for (uint64_t n = 0; n < route->count; n++)
         add_pose_statistics(&g, route->keys[n].scale, route->keys[n].translation);
-    return slack * (g.size + (reach.length + reach.size) * g.most);
+    return slack * (g.size + (extent.max_distance + extent.size) * g.most);
 }

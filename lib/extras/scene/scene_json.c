@@ -21,6 +21,7 @@
 #include "geometry/pose.h"
 #include "io/file_source.h"
 
+/* The first NEEDED columns must exist. */
 enum { COLUMNS = 9, NEEDED = 8, FIELDS_MAX = 64 };
 static const char *const columns[COLUMNS] = {
     "time", "x", "y", "z", "qx", "qy", "qz", "qw", "scale"
@@ -29,9 +30,9 @@ static const char *const columns[COLUMNS] = {
 /* The text of a CSV file while it is read. */
 typedef struct csv_lines {
     const char *at, *end; /* the text that has not been read */
-    const char *name;     /* for messages */
+    const char *name;     /* name of the file, for messages */
     uint64_t line;        /* number of lines read */
-    int field[COLUMNS];   /* [column] index of its field in each line; -1: missing */
+    int field[COLUMNS];   /* [column] index of the column's field in a line; -1: missing */
     int fields;           /* number of fields of each line */
     locale_t c_locale;
 } csv_lines;
@@ -51,7 +52,7 @@ static csv_text csv_trimmed(const char *from, const char *to)
     return (csv_text){ from, (size_t)(to - from) };
 }
 
-/* Reads the next line that is not empty. */
+/* Reads the next line that is not empty. Returns false at the end of the text. */
 static bool next_line(csv_lines *l, csv_text *out)
 {
     while (l->at < l->end) {
@@ -66,7 +67,8 @@ static bool next_line(csv_lines *l, csv_text *out)
     return false;
 }
 
-/* Splits fields at commas or semicolons; returns -1 if there are too many. */
+/* Splits a line at commas and semicolons. Returns the number of fields; -1: more than FIELDS_MAX.
+ */
 static int csv_split(csv_text line, csv_text field[FIELDS_MAX])
 {
     int count = 0;
@@ -160,10 +162,10 @@ static ebpo_status read_text(const ebpo_whole_file *file, ebpo_scene_route *rout
                     0,
                     newlocale(LC_ALL_MASK, "C", (locale_t)0) };
     ebpo_status status;
-    const char *foreign = ebpo_wrong_kind_of_file(file->data, file->size);
+    const char *wrong_kind = ebpo_wrong_kind_of_file(file->data, file->size);
     l.at += ebpo_scene_bom_length(l.at, file->size);
-    if (foreign)
-        status = ebpo_fail_file(error, EBPO_E_FORMAT, path, "%s", foreign);
+    if (wrong_kind)
+        status = ebpo_fail_file(error, EBPO_E_FORMAT, path, "%s", wrong_kind);
     else if (!l.c_locale)
         status = ebpo_fail_memory(error, 1);
     else
@@ -173,14 +175,14 @@ static ebpo_status read_text(const ebpo_whole_file *file, ebpo_scene_route *rout
     return status;
 }
 
-/* Adds the poses of a CSV file to a route. *left: number of bytes that may still be read from such
- * files; the number decreases by the size of this file. */
-static ebpo_status read_csv_file(ebpo_scene_route *route, const char *path, uint64_t *left,
+/* Adds the poses of a CSV file to a route. Decreases *bytes_left, the number of bytes that may
+ * still be read from CSV files, by the size of this file. */
+static ebpo_status read_csv_file(ebpo_scene_route *route, const char *path, uint64_t *bytes_left,
                                  ebpo_error *error)
 {
     ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
     ebpo_status status = ebpo_whole_file_open(&file, path, error);
-    if (status == EBPO_OK && file.size > *left)
+    if (status == EBPO_OK && file.size > *bytes_left)
         status =
             ebpo_fail_file(error, EBPO_E_LIMIT, path,
                            "with this file, the CSV files of poses together have more bytes than "
@@ -192,14 +194,15 @@ static ebpo_status read_csv_file(ebpo_scene_route *route, const char *path, uint
     if (status == EBPO_OK)
         status = ebpo_whole_file_unchanged(&file, path, error);
     if (status == EBPO_OK)
-        *left -= file.size;
+        *bytes_left -= file.size;
     ebpo_whole_file_close(&file);
     return status;
 }
 
 /* --- poses and routes --- */
 
-/* A pose whose rotation may be given as a matrix, or as a quaternion x, y, z, w of any length. */
+/* A pose as a scene file gives it: the rotation is a matrix, or a quaternion x, y, z, w of any
+ * length. */
 typedef struct read_pose {
     ebpo_pose pose;
     double quaternion[4];
@@ -236,7 +239,7 @@ static ebpo_status add_pose_key(ebpo_json_reader *r, const read_pose *p, double 
     memcpy(key.translation, p->pose.translation, sizeof key.translation);
     memcpy(key.quaternion, p->quaternion, sizeof key.quaternion);
     if (!p->has_quaternion) {
-        /* `posing` is not used: this only checks the matrix */
+        /* only checks the matrix; `posing` is not used */
         ebpo_status status = ebpo_posing_make(&posing, &p->pose, origin, &why);
         if (status != EBPO_OK)
             return ebpo_json_locate_error(r, status, &why);
@@ -245,7 +248,7 @@ static ebpo_status add_pose_key(ebpo_json_reader *r, const read_pose *p, double 
     return ebpo_json_locate_error(r, ebpo_scene_add_key(route, &key, &why), &why);
 }
 
-/* Reads a pose; *out stays unchanged when the member is missing. */
+/* Reads a pose. Does not change *out if the member is missing. */
 static ebpo_status json_read_pose(ebpo_json_reader *r, const json_t *object, const char *key,
                                   ebpo_pose *out)
 {
@@ -263,7 +266,7 @@ static ebpo_status json_read_pose(ebpo_json_reader *r, const json_t *object, con
         free(single.keys);
     }
     ebpo_json_leave(r);
-    *out = p.pose; /* a rotation given as a matrix is checked with the instance */
+    *out = p.pose; /* ebpo_scene_add_instance checks a rotation that is a matrix */
     return status;
 }
 
@@ -347,7 +350,7 @@ static ebpo_status read_between(ebpo_json_reader *r, const json_t *value)
                : ebpo_json_bad_at(r, "between", "is neither even nor jump");
 }
 
-/* Reads a route, for ebpo_json_each_member. */
+/* Reads a member of "routes". */
 static ebpo_status json_read_route(ebpo_json_reader *r, const char *name, const json_t *value)
 {
     static const char *const known[] = { "keys", "poses", "begin", "step", "csv", "between", NULL };
@@ -440,7 +443,7 @@ static ebpo_status read_model(ebpo_json_reader *r, const char *name, const json_
         status = ebpo_json_get_text(r, value, "subset_of", false, &subset_of);
     if (status != EBPO_OK)
         return status;
-    /* only checked here: programs that make subsets use it */
+    /* subset_of is only checked here; programs that make subsets use it */
     if (subset_of && !read_digest(subset_of, digest))
         return ebpo_json_bad_at(r, "subset_of", "is not 64 digits 0-9 a-f");
     if (hex && !read_digest(hex, digest))
@@ -454,8 +457,8 @@ static ebpo_status read_model(ebpo_json_reader *r, const char *name, const json_
 
 /* --- instances --- */
 
-/* Finds the object whose name is the value of the member `key`, and sets *number; *number stays
- * unchanged when the member is missing. */
+/* Sets *number to the index of the object whose name is the value of the member `key`. Does not
+ * change *number if the member is missing. */
 static ebpo_status json_find(ebpo_json_reader *r, const json_t *object, const char *key,
                              const char *kind, bool needed, uint64_t *number)
 {
@@ -466,7 +469,7 @@ static ebpo_status json_find(ebpo_json_reader *r, const json_t *object, const ch
     *number = ebpo_scene_find_name(r->scene, kind, name);
     return *number != EBPO_SCENE_NONE
                ? EBPO_OK
-               : ebpo_json_bad_at(r, key, "the scene does not define this name");
+               : ebpo_json_bad_at(r, key, "is not a name that the scene defines");
 }
 
 static ebpo_status join_group(ebpo_json_reader *r, const char *key, const json_t *value)
@@ -592,7 +595,7 @@ static ebpo_status read_ignored(ebpo_json_reader *r, const char *key, const json
     (void)key;
     uint64_t set[2];
     ebpo_status status = read_selectors(r, value, set);
-    const double ignore = -1; /* see ebpo_scene_add_rule */
+    const double ignore = -1; /* a clearance below 0: ebpo_scene_add_rule */
     return status == EBPO_OK ? ebpo_scene_add_rule(r->scene, set[0], set[1], ignore, r->error)
                              : status;
 }
@@ -691,9 +694,9 @@ ebpo_status ebpo_scene_read_json(ebpo_scene *scene, const char *text, size_t siz
     ebpo_error why = EBPO_ERROR_INIT;
     if (size > options->max_bytes)
         return ebpo_scene_too_long(name, options, error);
-    const char *foreign = ebpo_wrong_kind_of_file((const uint8_t *)text, size);
-    if (foreign)
-        return ebpo_fail_file(error, EBPO_E_FORMAT, name, "%s", foreign);
+    const char *wrong_kind = ebpo_wrong_kind_of_file((const uint8_t *)text, size);
+    if (wrong_kind)
+        return ebpo_fail_file(error, EBPO_E_FORMAT, name, "%s", wrong_kind);
     if (ebpo_scene_text_fits(text, size, options->max_values, &why) != EBPO_OK)
         return ebpo_fail_file(error, EBPO_E_LIMIT, name, "%s", why.message);
     json_t *root =

@@ -1,12 +1,12 @@
-/* Makes a scene: adds its members and returns them, and checks names and the paths of files.
+/* Makes a scene: adds and returns its members, and checks names and the paths of files.
  *
- * Models, routes and cameras each have a separate name space. Layers, groups and instances share
- * one. In rules, a name is a selector: it stands for a set of instances. Every instance belongs to
- * the set of all instances, to a set that has only this instance, to the set of its layer and to
- * the sets of its groups.
+ * Models, routes and cameras each have a separate name space. In rules, a selector stands for a set
+ * of instances: "*", the name of an instance, or the name of a layer or a group with the prefix
+ * "layer:" or "group:". Every instance belongs to the set of all instances, to a set that has only
+ * this instance, to the set of its layer and to the sets of its groups.
  *
- * A scene that is untrusted input may name only files in its own folder or below, unless the
- * options allow others. Symbolic links that lead out of the folder are rejected. */
+ * A scene file is untrusted input. It may name only files in its folder or below that, unless the
+ * options allow other files. Symbolic links that lead out of the folder are rejected. */
 #include "core/strict_fp.h"
 
 #include <errno.h>
@@ -24,6 +24,7 @@
 
 enum { NAME_MAX = 255, KIND_MAX = 8 };
 
+/* Returns true if the name is valid UTF-8 without control characters. */
 static bool is_plain(const char *name)
 {
     for (const unsigned char *c = (const unsigned char *)name; *c; c++)
@@ -41,8 +42,8 @@ static ebpo_status check_name(const char *name, const char *what, ebpo_error *er
     size_t size = name ? strnlen(name, NAME_MAX + 1) : 0;
     if (size == 0 || size > NAME_MAX || !is_plain(name))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "a name of %s is 1 to %d bytes of UTF-8 without control characters", what,
-                         NAME_MAX);
+                         "expected a name of %s, 1 to %d bytes of UTF-8 without control characters",
+                         what, NAME_MAX);
     if (strcmp(name, "*") == 0 || strncmp(name, "layer:", 6) == 0 ||
         strncmp(name, "group:", 6) == 0)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
@@ -69,7 +70,7 @@ uint64_t ebpo_scene_find_name(const ebpo_scene *scene, const char *kind, const c
     return number ? (uint64_t)json_integer_value(number) : EBPO_SCENE_NONE;
 }
 
-/* Stores the number of the object with this kind and name. Fails with EBPO_E_ARGUMENT if the name
+/* Stores the index of the object with this kind and name. Fails with EBPO_E_ARGUMENT if the name
  * exists already. */
 static ebpo_status put_name(ebpo_scene *scene, const char *kind, const char *name, uint64_t number,
                             ebpo_error *error)
@@ -104,6 +105,7 @@ static ebpo_status add_set(ebpo_scene *scene, const char *kind, const char *name
 
 /* --- files that a scene names --- */
 
+/* Returns true if a part of the path is "..". */
 static bool goes_up(const char *path)
 {
     for (const char *part = path; part; part = strchr(part, '/')) {
@@ -122,7 +124,7 @@ const char *ebpo_scene_path_refused(const char *path, const ebpo_scene_options *
     if (ebpo_is_url(path) && !options->remote)
         return "is on a server, which must be allowed (ebpo scene --remote)";
     if (ebpo_is_url(path) && !has_digest)
-        return "is on a server, and needs its content_sha256 here";
+        return "is on a server; the scene must have its content_sha256 beside the path";
     if (!ebpo_is_url(path) && !options->outside && (*path == '/' || goes_up(path)))
         return "is outside the scene's folder, which must be allowed (ebpo scene "
                "--allow-outside)";
@@ -144,11 +146,11 @@ char *ebpo_scene_join_path(const char *folder, const char *path)
 static bool is_below(const char *folder, const char *path)
 {
     size_t size = strlen(folder);
-    size -= size && folder[size - 1] == '/'; /* only the root keeps its final slash */
+    size -= size && folder[size - 1] == '/'; /* realpath returns a final slash only for "/" */
     return strncmp(folder, path, size) == 0 && path[size] == '/';
 }
 
-/* Checks that the real path of a file, without links, is in the folder. */
+/* Checks that the real path of a file, which has no links, is in the folder. */
 static ebpo_status check_real(const char *folder, const char *real, const char *path,
                               ebpo_error *error)
 {
@@ -312,7 +314,8 @@ static ebpo_status check_instance(const ebpo_scene *scene, const ebpo_scene_inst
     return ebpo_posing_make(&posing, &i->pose, origin, error); /* only checks the pose */
 }
 
-/* Adds the newest instance to the set of all instances, the set of its layer, and `set`. */
+/* Adds the instance that was added last to the set of all instances, to the set of its layer, and
+ * to `set`, which has only this instance. */
 static ebpo_status join_own_sets(ebpo_scene *scene, uint64_t set, ebpo_error *error)
 {
     const ebpo_scene_instance_entry *i = &scene->instances[scene->instances_count - 1];
@@ -506,7 +509,7 @@ const char *ebpo_scene_get_group(const ebpo_scene *scene, uint64_t group)
     return group < scene->groups_count ? scene->sets[scene->groups[group]] : NULL;
 }
 
-/* Returns the group of a set; EBPO_SCENE_NONE: the set belongs to no group. */
+/* Returns the group to which a set belongs; EBPO_SCENE_NONE if it is not the set of a group. */
 static uint64_t group_with(const ebpo_scene *scene, uint64_t set)
 {
     uint64_t low = 0, high = scene->groups_count;

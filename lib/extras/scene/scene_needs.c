@@ -1,10 +1,9 @@
 /* Finds the part of each model's file that a scene needs in an interval of time: a box for
  * collisions and for inside tests, and the last level for views.
  *
- * Boxes are in the model's own coordinates, and contain all parts that another instance comes near.
+ * Boxes are in the coordinates of the model, and contain all parts that come near another instance.
  * They are computed over steps of time so short that no instance moves far. They are rounded
- * outwards, so that a subset file that was cut with this box returns the same results as the whole
- * file.
+ * outwards, so that the subset of a file with this box returns the same results as the whole file.
  *
  * A view needs the levels up to the first one whose cells have a diagonal of at most one pixel. A
  * node's envelope and its content are both in its cell, so finer levels make no visible difference.
@@ -26,14 +25,15 @@
  * is halved. */
 enum { HALVINGS = 12 };
 
-/* The search for the parts of the instance `of` that the instance `other` comes near. */
+/* The search for the parts of the instance `of` that come near the instance `other`. */
 typedef struct near_search {
     ebpo_scene_needs *needs;
     const ebpo_scene *scene;
     uint64_t of, other;
-    /* Lengths in the world. margin: greatest motion over one step; boxes are widened by it. */
-    double clearance, margin;
-    ebpo_scene_file_need *need;
+    double clearance; /* parts within this distance are near; a length in the world */
+    double margin;    /* greatest motion in one step, by which boxes are widened; a length in the
+                       * world */
+    ebpo_scene_file_need *need; /* need of the file of `of` */
 } near_search;
 
 static ebpo_scene_file_need *need_of(const ebpo_scene_needs *n, uint64_t instance)
@@ -67,23 +67,23 @@ static ebpo_status bound_distance(const near_search *n, const ebpo_scene_route *
     return status;
 }
 
-/* Bounds the motion of the other instance relative to this one, in the world's unit. There must be
- * no key between the times. */
+/* Bounds the motion of the other instance relative to this instance, in the world's unit. No key
+ * may be between the two times. */
 static ebpo_status relative_motion(const near_search *n, double from, double to, double *out)
 {
     const ebpo_scene_route *route = route_of(n->scene, n->of);
-    double distance = 0, own = 0;
+    double distance = 0, own_motion = 0;
     ebpo_status status = ebpo_scene_motion(n->scene, n->other, from, to, out, n->needs->error);
     if (status == EBPO_OK && route && from < to) {
         status = bound_distance(n, route, from, to, &distance);
-        ebpo_scene_reach reach = { distance, distance };
-        own = ebpo_scene_route_step(route, from, to, reach).length;
+        ebpo_scene_extent extent = { distance, distance };
+        own_motion = ebpo_scene_route_step(route, from, to, extent).length;
     }
-    *out = (*out + own) * (1 + 0x1p-40);
+    *out = (*out + own_motion) * (1 + 0x1p-40);
     return status;
 }
 
-/* Computes the part of the model's box that the other instance may come near between two times.
+/* Computes the part of the model's box that may come near the other instance between two times.
  * *any is false if there is no such part. */
 static ebpo_status near_box(const near_search *n, double from, double to, double motion,
                             ebpo_scene_bounds *out, bool *any)
@@ -96,14 +96,13 @@ static ebpo_status near_box(const near_search *n, double from, double to, double
             ebpo_scene_make_relative_box(n->scene, n->of, n->other, to, &later, n->needs->error);
     if (status != EBPO_OK)
         return status;
-    /* the last term bounds the rounding of the boxes between these times, even if all others are 0
-     */
+    /* The last term bounds the rounding errors of the boxes at all times between these two. */
     double grow = (n->clearance + n->margin + motion) / fmin(at.unit, later.unit) * (1 + 0x1p-40) +
                   2 * fmax(at.rounding, later.rounding);
     *any = true;
     for (int k = 0; k < 3; k++) {
         double low = at.box.min[k] - grow, high = at.box.max[k] + grow;
-        /* after an overflow the box is unknown: use the model's whole box */
+        /* NaN after an overflow: the comparison is false, and the whole box is used */
         out->min[k] = low > n->need->whole.min[k] ? low : n->need->whole.min[k];
         out->max[k] = high < n->need->whole.max[k] ? high : n->need->whole.max[k];
         *any = *any && out->min[k] <= out->max[k];
@@ -111,6 +110,7 @@ static ebpo_status near_box(const near_search *n, double from, double to, double
     return EBPO_OK;
 }
 
+/* Returns true if the needed box contains the box a. */
 static bool is_within(const ebpo_scene_bounds *a, const ebpo_scene_file_need *need)
 {
     bool within = need->any;
@@ -130,8 +130,8 @@ static void join_need_box(ebpo_scene_file_need *need, const ebpo_scene_bounds *b
     }
 }
 
-/* Adds the part of the model that the other instance comes near between two times. Halves the
- * interval while the instances move by more than the margin, at most `halvings` times. */
+/* Adds the part of the model that comes near the other instance between two times. Halves the
+ * interval while the instances move by more than the margin, but at most `halvings` times. */
 static ebpo_status add_near_between(const near_search *n, double from, double to, int halvings)
 {
     double motion, middle = from + (to - from) / 2;
@@ -151,7 +151,7 @@ static ebpo_status add_near_between(const near_search *n, double from, double to
 }
 
 /* Adds the near parts over the whole interval, from key to key of both routes. Each key begins a
- * new interval, because routes may jump there. */
+ * new part of the interval, because routes may jump at keys. */
 static ebpo_status add_near_parts(const near_search *n)
 {
     const ebpo_scene_pair pair = { n->of, n->other, 0 };
@@ -178,8 +178,8 @@ static double size_of(const ebpo_scene *scene, uint64_t instance, double time)
     return size * pose.scale;
 }
 
-/* Returns the default margin of a pair: 1/32 of the size of the smaller instance; of the larger one
- * if the smaller is a point. */
+/* Returns the default margin of a pair: 1/32 of the size of the smaller instance, or, if that is a
+ * point, of the larger one. */
 static double default_margin(const ebpo_scene_needs *needs, const ebpo_scene_pair *pair)
 {
     double a = size_of(needs->scene, pair->a, needs->from);
@@ -187,8 +187,7 @@ static double default_margin(const ebpo_scene_needs *needs, const ebpo_scene_pai
     return (fmin(a, b) > 0 ? fmin(a, b) : fmax(a, b)) / 32;
 }
 
-/* Marks both models of the pair as needed completely, because either solid may contain the other
- * instance. */
+/* Adds both models of the pair completely, because either solid may contain the other instance. */
 static void add_complete_models(ebpo_scene_needs *needs, const ebpo_scene_pair *pair)
 {
     for (int i = 0; i < 2; i++) {
@@ -319,7 +318,8 @@ ebpo_status ebpo_scene_report_need(const ebpo_scene_needs *needs, uint64_t model
 
 /* --- views --- */
 
-enum { VIEW_STEPS = 16 }; /* number of parts of a camera's path between two keys */
+/* Number of parts into which a camera's path between two keys is divided. */
+enum { VIEW_STEPS = 16 };
 
 /* The search for the levels that a camera can resolve. */
 typedef struct view_search {
@@ -328,8 +328,8 @@ typedef struct view_search {
     double pixel; /* width of a pixel at a distance of 1 */
 } view_search;
 
-/* Computes a box that contains the camera's eye between two times, without a key of the camera's
- * route between them. */
+/* Computes a box that contains the camera's eye at all times between two times. No key of the
+ * camera's route may be between them. */
 static void eye_box(const view_search *s, double from, double to, ebpo_scene_bounds *out)
 {
     const ebpo_scene_camera *c = s->camera;
@@ -338,10 +338,10 @@ static void eye_box(const view_search *s, double from, double to, ebpo_scene_bou
     memcpy(out->min, c->eye, sizeof out->min);
     if (c->route != EBPO_SCENE_NONE) {
         const ebpo_scene_route *route = &s->needs->scene->routes[c->route];
-        ebpo_scene_reach reach = { ebpo_scene_length_above(c->eye),
-                                   ebpo_scene_length_above(c->eye) };
+        ebpo_scene_extent extent = { ebpo_scene_length_above(c->eye),
+                                     ebpo_scene_length_above(c->eye) };
         ebpo_scene_route_at(route, from, &at);
-        length = ebpo_scene_route_step(route, from, to, reach).length;
+        length = ebpo_scene_route_step(route, from, to, extent).length;
         for (int i = 0; i < 3; i++)
             out->min[i] =
                 at.scale * ((at.rotation[i][0] * c->eye[0] + at.rotation[i][1] * c->eye[1]) +
@@ -354,8 +354,8 @@ static void eye_box(const view_search *s, double from, double to, ebpo_scene_bou
     }
 }
 
-/* Computes the least distance of an instance from the eye between two times, and the instance's
- * greatest scale. */
+/* Computes a lower bound of the distance of an instance from the eye between two times, and the
+ * instance's greatest scale. */
 static ebpo_status distance_between(const view_search *s, uint64_t instance, double from, double to,
                                     double *distance, double *scale)
 {
@@ -373,7 +373,7 @@ static ebpo_status distance_between(const view_search *s, uint64_t instance, dou
     return EBPO_OK;
 }
 
-/* Returns true if a box is behind a static camera, which then cannot see it. */
+/* Returns true if a box is behind a camera that does not move. */
 static bool is_behind(const view_search *s, const ebpo_scene_bounds *box)
 {
     const ebpo_scene_camera *c = s->camera;
@@ -399,7 +399,7 @@ static int level_for(const ebpo_info *info, double size)
     return -1;
 }
 
-/* Adds the levels that the camera can resolve of one instance between two times. */
+/* Adds the levels of an instance that the camera can resolve between two times. */
 static ebpo_status add_instance_view(const view_search *s, uint64_t instance, double from,
                                      double to)
 {
@@ -430,7 +430,7 @@ static ebpo_status add_views_between(const view_search *s, double from, double t
     return status;
 }
 
-/* Adds the views over the whole interval: in steps from key to key of the camera's route. */
+/* Adds the views over the whole interval, in steps from key to key of the camera's route. */
 static ebpo_status add_views_along_route(const view_search *s)
 {
     const ebpo_scene_needs *n = s->needs;

@@ -1,8 +1,9 @@
 /* Opens scene files, and loads the models that they name.
  *
- * Models of the same path share one open file. If a scene file states a digest, the content_sha256
- * of the model's file must be equal to it. Loading sets the box of each model; bounds of motions
- * need these boxes. A model for queries is made when it is first needed. */
+ * Models of the same path share one open file. If a scene file has a digest for a model, the
+ * content_sha256 of the model's file must be equal to that digest. Loading sets the box of each
+ * model, from which motions are bounded. An ebpo_model for queries is made when it is first
+ * needed. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -19,17 +20,17 @@
 #include "geometry/pose.h"
 #include "extras/scene/scene_parts.h"
 
-static ebpo_status copy_options(ebpo_scene_options *own, const ebpo_scene_options *options,
+static ebpo_status copy_options(ebpo_scene_options *checked, const ebpo_scene_options *options,
                                 ebpo_error *error)
 {
-    *own = (ebpo_scene_options)EBPO_SCENE_OPTIONS_INIT;
-    ebpo_status status = EBPO_TAKE(ebpo_scene_options, own, options, error);
-    if (!own->max_bytes)
-        own->max_bytes = UINT64_C(64) << 20;
-    if (!own->max_pose_bytes)
-        own->max_pose_bytes = UINT64_C(256) << 20;
-    if (!own->max_values)
-        own->max_values = 4000000;
+    *checked = (ebpo_scene_options)EBPO_SCENE_OPTIONS_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_scene_options, checked, options, error);
+    if (!checked->max_bytes)
+        checked->max_bytes = UINT64_C(64) << 20;
+    if (!checked->max_pose_bytes)
+        checked->max_pose_bytes = UINT64_C(256) << 20;
+    if (!checked->max_values)
+        checked->max_values = 4000000;
     return status;
 }
 
@@ -94,11 +95,11 @@ ebpo_status ebpo_scene_parse(const char *text, size_t size, const char *name, co
 {
     EBPO_DEFAULT_FP;
     *out = NULL;
-    ebpo_scene_options own;
-    ebpo_status status = copy_options(&own, options, error);
+    ebpo_scene_options checked;
+    ebpo_status status = copy_options(&checked, options, error);
     if (status != EBPO_OK)
         return status;
-    return parse_scene(text, size, name, folder_with_slash(folder), &own, out, error);
+    return parse_scene(text, size, name, folder_with_slash(folder), &checked, out, error);
 }
 
 ebpo_status ebpo_scene_open(const char *path, const ebpo_scene_options *options, ebpo_scene **out,
@@ -106,18 +107,18 @@ ebpo_status ebpo_scene_open(const char *path, const ebpo_scene_options *options,
 {
     EBPO_DEFAULT_FP;
     *out = NULL;
-    ebpo_scene_options own;
+    ebpo_scene_options checked;
     ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
-    ebpo_status status = copy_options(&own, options, error);
+    ebpo_status status = copy_options(&checked, options, error);
     if (status == EBPO_OK)
         status = ebpo_whole_file_open(&file, path, error);
-    if (status == EBPO_OK && file.size > own.max_bytes)
-        status = ebpo_scene_too_long(path, &own, error);
+    if (status == EBPO_OK && file.size > checked.max_bytes)
+        status = ebpo_scene_too_long(path, &checked, error);
     if (status == EBPO_OK)
         status = ebpo_whole_file_load(&file, NULL, 1, NULL, path, error);
     if (status == EBPO_OK)
         status = parse_scene((const char *)file.data, file.size, path, ebpo_scene_folder_of(path),
-                             &own, out, error);
+                             &checked, out, error);
     if (status == EBPO_OK)
         status = ebpo_whole_file_unchanged(&file, path, error);
     if (status != EBPO_OK) {
@@ -155,8 +156,8 @@ static ebpo_status open_file(ebpo_scene *scene, const char *path, uint64_t max_e
     return EBPO_OK;
 }
 
-/* Sets the model's box: on each axis the range of the faces that the file states, if it is within
- * the root cell; otherwise the range of the root cell. */
+/* Sets the model's box. On each axis this is the range of the faces that the file reports, or, if
+ * that range is not within the root cell, the range of the root cell. */
 static void set_model_box(ebpo_scene_model_entry *m, const ebpo_info *info)
 {
     for (int k = 0; k < 3; k++) {
@@ -176,8 +177,8 @@ static ebpo_status check_digest(const ebpo_scene_model_entry *m, const ebpo_info
         return EBPO_OK;
     char shown[256];
     return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_url_redact(m->path, shown, sizeof shown),
-                          "is not the file of model '%.80s': its content_sha256 differs from "
-                          "that in the scene",
+                          "is not the file of model '%.80s': its content_sha256 differs from the "
+                          "content_sha256 in the scene",
                           m->name);
 }
 
@@ -186,7 +187,7 @@ static ebpo_status load_model(ebpo_scene *scene, ebpo_scene_model_entry *m, uint
 {
     char *path = ebpo_scene_join_path(scene->folder, m->path);
     uint64_t number = 0;
-    /* the model was read from the scene file, not added by the caller */
+    /* true: the model was read from the scene file; false: the caller added it */
     bool of_text = (uint64_t)(m - scene->models) < scene->text_models;
     ebpo_status status = path ? EBPO_OK : ebpo_fail_memory(error, strlen(m->path));
     if (status == EBPO_OK && of_text && !scene->allow_outside)
@@ -210,7 +211,7 @@ static ebpo_status check_range(const ebpo_scene *scene, const ebpo_scene_instanc
                                ebpo_error *error)
 {
     const ebpo_scene_model_entry *m = &scene->models[i->as.model];
-    double greatest[3]; /* absolute coordinate */
+    double greatest[3]; /* greatest absolute coordinates */
     ebpo_posing posing;
     ebpo_error why = EBPO_ERROR_INIT;
     for (int k = 0; k < 3; k++)
@@ -224,17 +225,17 @@ static ebpo_status check_range(const ebpo_scene *scene, const ebpo_scene_instanc
 ebpo_status ebpo_scene_load(ebpo_scene *scene, const ebpo_load_options *options, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_load_options own = EBPO_LOAD_OPTIONS_INIT;
-    ebpo_status status = EBPO_TAKE(ebpo_load_options, &own, options, error);
-    if (status == EBPO_OK && own.memory && !scene->how.budget)
-        status = ebpo_budget_new(own.memory, &scene->how.budget, error);
-    if (status == EBPO_OK && !ebpo_progress_stage(&own.progress, "opening models", error))
+    ebpo_load_options checked = EBPO_LOAD_OPTIONS_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_load_options, &checked, options, error);
+    if (status == EBPO_OK && checked.memory && !scene->how.budget)
+        status = ebpo_budget_new(checked.memory, &scene->how.budget, error);
+    if (status == EBPO_OK && !ebpo_progress_stage(&checked.progress, "opening models", error))
         status = EBPO_E_CANCELLED;
     for (uint64_t i = 0; i < scene->models_count && status == EBPO_OK; i++) {
         if (scene->models[i].file == EBPO_SCENE_NONE)
-            status = load_model(scene, &scene->models[i], own.max_expansion, error);
-        if (status == EBPO_OK &&
-            !ebpo_progress_step(&own.progress, "opening models", i + 1, scene->models_count, error))
+            status = load_model(scene, &scene->models[i], checked.max_expansion, error);
+        if (status == EBPO_OK && !ebpo_progress_step(&checked.progress, "opening models", i + 1,
+                                                     scene->models_count, error))
             status = EBPO_E_CANCELLED;
     }
     for (uint64_t i = 0; i < scene->instances_count && status == EBPO_OK; i++)

@@ -2,9 +2,9 @@
  * folder that has only these parts.
  *
  * Packing writes a subset of each file (scene_needs.c), copies the files of poses, and writes a
- * scene file like the original with other paths and digests. The folder is written beside its
- * target and renamed when it is complete, so that it is created atomically; on failure it is
- * removed.
+ * scene file that differs from the original in its paths and digests. The folder is written under a
+ * temporary name and renamed when it is complete, so that it is created atomically. It is removed
+ * after a failure.
  *
  * A plan finds the same needs without writing anything. */
 #include "core/strict_fp.h"
@@ -42,7 +42,8 @@ static ebpo_status check_plan_options(ebpo_scene_needs *needs, const ebpo_plan_o
     if (needs->how.purpose < EBPO_SCENE_FOR_COLLIDE || needs->how.purpose > EBPO_SCENE_FOR_SOLIDS)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "unknown purpose %d", (int)needs->how.purpose);
     if (!(needs->how.margin >= 0 && needs->how.margin < INFINITY))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "the margin %g is below 0 or not a valid length",
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "expected a margin that is a length of 0 or more, got %g",
                          needs->how.margin);
     if (!(isfinite(needs->from) && isfinite(needs->to) && needs->from <= needs->to))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "%g to %g is not an interval of time", needs->from,
@@ -97,13 +98,13 @@ ebpo_status ebpo_scene_plan(ebpo_scene *scene, double from, double to,
     return status;
 }
 
-/* Writes the name of a model's file in the folder. file: index in scene->files. */
+/* Sets `name` to the name of a model's file in the folder. file: index in scene->files. */
 static void scene_packed_name(uint64_t file, char name[40])
 {
     snprintf(name, 40, "model-%" PRIu64 ".ebpo.h5", file);
 }
 
-/* Writes the name of the file of a route's poses in the folder. */
+/* Sets `name` to the name, in the folder, of the file of a route's poses. */
 static void scene_packed_route(uint64_t route, char name[40])
 {
     snprintf(name, 40, "route-%" PRIu64 ".csv", route);
@@ -114,7 +115,7 @@ static bool set_text(json_t *object, const char *key, const char *text)
     return json_object_set_new(object, key, json_string(text)) == 0;
 }
 
-/* Sets the paths and digests of models' files in the scene. */
+/* Sets the paths and digests of models' files in the packed scene. */
 static ebpo_status name_files(json_t *root, const ebpo_scene *scene, const ebpo_scene_packed *files,
                               ebpo_error *error)
 {
@@ -145,7 +146,7 @@ static ebpo_status write_in_folder(const char *folder, const char *name, const v
     return status;
 }
 
-/* Copies a CSV file of poses byte for byte, so that the numbers stay the same. */
+/* Copies a CSV file of poses byte by byte, so that its numbers do not change. */
 static ebpo_status copy_poses(const ebpo_scene *scene, const char *csv, const char *folder,
                               const char *name, ebpo_error *error)
 {
@@ -189,7 +190,7 @@ static ebpo_status copy_routes(json_t *root, const ebpo_scene *scene, const char
 static ebpo_status scene_write_packed(const ebpo_scene *scene, const ebpo_scene_packed *files,
                                       const char *folder, ebpo_error *error)
 {
-    /* the text is valid: it has been parsed before */
+    /* NULL means too little memory, because the text has been parsed before */
     json_t *root = json_loadb(scene->text, scene->text_size,
                               JSON_REJECT_DUPLICATES | JSON_DECODE_INT_AS_REAL, NULL);
     if (!root)
@@ -234,8 +235,8 @@ static void remove_in(const char *folder, const char *name)
         unlink(path);
 }
 
-/* Removes the folder with all files that may have been written, without allocating memory or
- * opening anything. */
+/* Removes the folder with all files that may have been written. Does not allocate memory or open
+ * files, so that it works after any failure. */
 static void remove_folder(const ebpo_scene *scene, const char *folder)
 {
     char name[40];
@@ -285,7 +286,7 @@ static uint64_t bytes_read(const ebpo_file *file)
     return s.bytes_read;
 }
 
-/* Writes the needed part of a file of models. target: greatest size in bytes; 0: no limit. */
+/* Writes the needed part of a model's file. target: greatest size in bytes; 0: no limit. */
 static ebpo_status write_file(packing *p, uint64_t number, uint64_t target)
 {
     ebpo_scene_packed *out = &p->files[number];
@@ -318,8 +319,8 @@ static uint64_t sum_of_files(const packing *p)
     return sum;
 }
 
-/* Writes files again if their sum is above the target size. Each is reduced by the same factor,
- * except the files of which only the root is needed. */
+/* If the sum of the files' sizes is above the target size, writes files again, each reduced by the
+ * same factor. Files of which only the root is needed are not reduced. */
 static ebpo_status shrink_to_target(packing *p)
 {
     uint64_t fixed = 0, sum = sum_of_files(p), target = p->how.target_bytes;
@@ -364,13 +365,13 @@ static ebpo_status check_pack_options(packing *p, const ebpo_pack_options *optio
     if (!scene->text || scene->text_models != scene->models_count ||
         scene->text_instances != scene->instances_count)
         return ebpo_fail(p->error, EBPO_E_ARGUMENT,
-                         "only a scene that was read from a file, without additions, can be "
-                         "packed");
+                         "only a scene that was read from a file, without later additions, can "
+                         "be packed");
     return check_plan_options(&p->needs, &plan);
 }
 
-/* Lists the packed files of models. This is done before publishing, because nothing may fail
- * afterwards. */
+/* Makes the list of packed files for the caller, a file for each model. It is made before the
+ * folder is published, because nothing may fail afterwards. */
 static ebpo_status list_packed(const packing *p, ebpo_scene_packed **out)
 {
     const ebpo_scene *scene = p->needs.scene;

@@ -9,7 +9,7 @@
  * the greatest distance of the motion from a straight line.
  *
  * Sweep and prune sorts boxes along the axis with the least expected overlap. Pairs are returned in
- * the order of their instances. If a test is in doubt, the pair is returned. */
+ * the order of their instances. If rounding makes a test uncertain, the pair is returned. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -48,8 +48,8 @@ static void sort_sets(ebpo_scene_instance_entry *i)
     i->set_count = kept;
 }
 
-/* Keeps one rule for each pair of sets. It ignores pairs if one of the rules does; otherwise it has
- * the greatest clearance. */
+/* Merges the rules for each pair of sets into one rule. This rule ignores pairs if one of the rules
+ * does; otherwise it has the greatest clearance. */
 void ebpo_scene_sort_rules(ebpo_scene *scene)
 {
     uint64_t kept = 0;
@@ -70,8 +70,8 @@ void ebpo_scene_sort_rules(ebpo_scene *scene)
         sort_sets(&scene->instances[i]);
 }
 
-/* Returns the clearance of the rule for two sets; below 0: pairs are ignored. Returns 0 if there is
- * no such rule. */
+/* Returns the clearance of the rule for two sets: below 0 if it ignores pairs, 0 if there is no
+ * rule. */
 static double rule_of(const ebpo_scene *scene, uint64_t a, uint64_t b)
 {
     ebpo_scene_rule_entry wanted = { a < b ? a : b, a < b ? b : a, 0 };
@@ -87,7 +87,8 @@ static bool apply_rule(double rule, double *clearance)
     return rule >= 0;
 }
 
-/* Applies all rules for a set of x and a set of y: looks up the rule of each pair of sets. */
+/* Applies all rules for a set of x and a set of y, by looking up the rule of each pair of sets.
+ * Returns false if a rule ignores the pair. */
 static bool by_sets(const ebpo_scene *scene, const ebpo_scene_instance_entry *x,
                     const ebpo_scene_instance_entry *y, double *clearance)
 {
@@ -103,7 +104,7 @@ static bool is_in(const ebpo_scene_instance_entry *i, uint64_t set)
     return bsearch(&set, i->sets, i->set_count, sizeof set, compare_sets) != NULL;
 }
 
-/* Does the same as by_sets, but tests each rule of the scene. */
+/* Does the same as by_sets, by testing each rule of the scene. */
 static bool by_rules(const ebpo_scene *scene, const ebpo_scene_instance_entry *x,
                      const ebpo_scene_instance_entry *y, double *clearance)
 {
@@ -124,15 +125,15 @@ bool ebpo_scene_pair_rule(const ebpo_scene *scene, uint64_t a, uint64_t b, doubl
     const ebpo_scene_instance_entry *x = &scene->instances[a], *y = &scene->instances[b];
     if (x->as.fixed && y->as.fixed)
         return false;
-    /* test every rule if there are fewer rules than pairs of sets: if both instances have 100,000
-     * groups, looking up all pairs of groups would take hours */
+    /* If there are fewer rules than pairs of sets, test every rule: if both instances have 100,000
+     * groups, looking up the rules of all pairs of groups takes hours. */
     bool by_rule = scene->rules_count < (uint64_t)x->set_count * y->set_count;
     return (by_rule ? by_rules : by_sets)(scene, x, y, clearance);
 }
 
 /* --- poses, boxes and motion --- */
 
-/* Relative margin for sums of a few products: far above their rounding. */
+/* Relative margin for sums of a few products, far greater than their rounding errors. */
 static const double slack = 0x1p-44;
 /* Rotation in one step of a box, in radians. */
 static const double step_angle = 0.125;
@@ -205,10 +206,10 @@ static void posed_box(const ebpo_pose *pose, const ebpo_scene_model_entry *m, do
     }
 }
 
-/* Returns x, or `all` if x is NaN: after an overflow the bound is unknown. */
+/* Returns x, or `all` if x is NaN, because after an overflow the bound is unknown. */
 static double or_else(double x, double all) { return isnan(x) ? all : x; }
 
-/* Widens a box by the box low .. high, which is first enlarged on each side. */
+/* Extends a box so that it contains the box low .. high, enlarged by `by` on each side. */
 static void join_box(double min[3], double max[3], const double low[3], const double high[3],
                      double by)
 {
@@ -226,22 +227,23 @@ static void empty_box(double min[3], double max[3])
     }
 }
 
-ebpo_scene_reach ebpo_scene_reach_of(const ebpo_scene *scene, const ebpo_scene_instance_entry *i)
+ebpo_scene_extent ebpo_scene_extent_of(const ebpo_scene *scene, const ebpo_scene_instance_entry *i)
 {
     const ebpo_scene_model_entry *m = &scene->models[i->as.model];
     double min[3], max[3], far[3];
-    ebpo_scene_reach reach = { 0, 0 };
+    ebpo_scene_extent extent = { 0, 0 };
     posed_box(&i->as.pose, m, min, max);
     for (int k = 0; k < 3; k++) {
         far[k] = fmax(fabs(min[k]), fabs(max[k]));
-        reach.size += fabs(i->as.pose.translation[k]) +
-                      i->as.pose.scale * fmax(fabs(m->min[k]), fabs(m->max[k]));
+        extent.size += fabs(i->as.pose.translation[k]) +
+                       i->as.pose.scale * fmax(fabs(m->min[k]), fabs(m->max[k]));
     }
-    reach.length = ebpo_scene_length_above(far);
-    return reach;
+    extent.max_distance = ebpo_scene_length_above(far);
+    return extent;
 }
 
-/* Widens min .. max by the box of the instance at a time, enlarged by `by` on each side. */
+/* Extends min .. max so that it contains the box of the instance at a time, enlarged by `by` on
+ * each side. */
 static void box_at(const ebpo_scene *scene, const ebpo_scene_instance_entry *i, double time,
                    double by, double min[3], double max[3])
 {
@@ -252,39 +254,39 @@ static void box_at(const ebpo_scene *scene, const ebpo_scene_instance_entry *i, 
     join_box(min, max, low, high, by);
 }
 
-/* Widens min .. max so that it contains the instance between two times, with no key between them.
+/* Extends min .. max so that it contains the instance between two times with no key between them.
  * The number of steps follows from the angle of rotation, which is estimated from the sag of the
- * whole arc: sag = reach * angle^2 / 8. */
+ * whole arc: sag = max_distance * angle^2 / 8. */
 static void box_between(const ebpo_scene *scene, const ebpo_scene_instance_entry *i,
-                        ebpo_scene_reach reach, double from, double to, double min[3],
+                        ebpo_scene_extent extent, double from, double to, double min[3],
                         double max[3])
 {
     const ebpo_scene_route *route = route_of(scene, i);
-    ebpo_scene_step all = ebpo_scene_route_step(route, from, to, reach);
-    double angle = reach.length > 0 ? sqrt(8 * all.sag / reach.length) : 0;
+    ebpo_scene_step all = ebpo_scene_route_step(route, from, to, extent);
+    double angle = extent.max_distance > 0 ? sqrt(8 * all.sag / extent.max_distance) : 0;
     int steps = angle < 32 * step_angle ? 1 + (int)(angle / step_angle) : 32;
     for (int n = 0; n < steps; n++) {
         double begin = n == 0 ? from : from + (to - from) * n / steps;
         double end = n + 1 == steps ? to : from + (to - from) * (n + 1) / steps;
-        double sag = ebpo_scene_route_step(route, begin, end, reach).sag;
+        double sag = ebpo_scene_route_step(route, begin, end, extent).sag;
         box_at(scene, i, begin, sag, min, max);
         box_at(scene, i, end, sag, min, max);
     }
 }
 
-/* Widens min .. max so that it contains the instance at all times from .. to. */
+/* Extends min .. max so that it contains the instance at all times from .. to. */
 static void swept_box(const ebpo_scene *scene, const ebpo_scene_instance_entry *i, double from,
                       double to, double min[3], double max[3])
 {
     const ebpo_scene_route *route = route_of(scene, i);
-    ebpo_scene_reach reach = ebpo_scene_reach_of(scene, i);
+    ebpo_scene_extent extent = ebpo_scene_extent_of(scene, i);
     if (!route || from == to) {
         box_at(scene, i, from, 0, min, max);
         return;
     }
     for (double at = from; at < to;) {
         double next = ebpo_scene_route_next(route, at, to);
-        box_between(scene, i, reach, at, next, min, max);
+        box_between(scene, i, extent, at, next, min, max);
         at = next;
     }
 }
@@ -298,12 +300,13 @@ ebpo_status ebpo_scene_motion(const ebpo_scene *scene, uint64_t instance, double
         return status;
     const ebpo_scene_instance_entry *i = &scene->instances[instance];
     const ebpo_scene_route *route = route_of(scene, i);
-    ebpo_scene_reach reach = ebpo_scene_reach_of(scene, i);
+    ebpo_scene_extent extent = ebpo_scene_extent_of(scene, i);
     double sum = 0;
     for (double at = from; route && at < to;) {
         double next = ebpo_scene_route_next(route, at, to);
-        sum += ebpo_scene_route_step(route, at, next, reach).length;
-        /* `next` is a key other than the first: after it, another key follows */
+        sum += ebpo_scene_route_step(route, at, next, extent).length;
+        /* true if `next` is the time of a key after the first one: different keys follow `at` and
+         * `next` */
         bool ends_at_key =
             next > route->keys[0].time && ebpo_scene_route_next(route, next, INFINITY) >
                                               ebpo_scene_route_next(route, at, INFINITY);
@@ -342,7 +345,7 @@ ebpo_status ebpo_scene_box(const ebpo_scene *scene, double from, double to, doub
 
 /* --- sweep and prune --- */
 
-/* Maximum number of pairs; they take 400 MB while they are sorted. */
+/* Maximum number of pairs; this number of pairs takes 400 MB while it is sorted. */
 static const uint64_t max_pairs = UINT64_C(1) << 23;
 
 typedef struct box {
@@ -391,7 +394,8 @@ static int best_axis(const sweep *s)
     return best;
 }
 
-/* Exchanges the first axis of each box with the chosen one, by which boxes are sorted and swept. */
+/* Exchanges the first axis of each box with the chosen axis. Boxes are sorted and swept along the
+ * first axis. */
 static void swap_axes(sweep *s, int axis)
 {
     for (uint64_t i = 0; i < s->count; i++) {
@@ -412,8 +416,8 @@ static int compare_boxes(const void *a, const void *b)
     return (x->instance > y->instance) - (x->instance < y->instance);
 }
 
-/* Returns true if two boxes are at most `by` apart on each axis. The rounding of differences is
- * added, so the result is true in doubt. */
+/* Returns true if two boxes are at most `by` apart on each axis, or if rounding makes this
+ * uncertain. */
 static bool near_each_other(const box *x, const box *y, double by)
 {
     for (int k = 0; k < 3; k++) {

@@ -9,18 +9,19 @@
 typedef struct ebpo_scene_file_entry {
     char *path; /* path by which the file is opened */
     ebpo_file *file;
-    ebpo_model *model; /* made when first needed */
+    ebpo_model *model; /* NULL until it is needed */
 } ebpo_scene_file_entry;
 
 typedef struct ebpo_scene_model_entry {
     char *name, *path;
-    uint8_t digest[32];    /* required content_sha256 of the file; all 0: not stated */
+    uint8_t digest[32];    /* required content_sha256 of the file; all 0: any content */
     uint64_t instances;    /* number of instances of the model */
     uint64_t file;         /* index in scene.files; EBPO_SCENE_NONE: not loaded */
     double min[3], max[3]; /* box of the model, set when it is loaded */
 } ebpo_scene_model_entry;
 
-/* A key of a route. The rotation is a unit quaternion: x, y, z, w. */
+/* A key of a route: a time, and the pose at that time. The rotation is a unit quaternion: x, y, z,
+ * w. */
 typedef struct ebpo_route_key {
     double time, quaternion[4], translation[3], scale;
 } ebpo_route_key;
@@ -29,7 +30,8 @@ typedef struct ebpo_scene_route {
     char *name;
     ebpo_route_key *keys; /* in ascending order of time */
     uint64_t count, capacity;
-    bool jumps; /* the pose stays at a key until the time of the next key */
+    bool jumps; /* the pose of a key is kept until the time of the next key, without
+                 * interpolation */
 } ebpo_scene_route;
 
 /* An instance and its sets. A name in a rule selects a set of instances: the instances of a layer
@@ -47,7 +49,7 @@ typedef struct ebpo_scene_rule_entry {
     double clearance; /* below 0: the pairs are ignored */
 } ebpo_scene_rule_entry;
 
-/* A growing list: items, count, capacity. */
+/* Declares the members of a growing list: the items, their number and the capacity. */
 #define EBPO_SCENE_LIST(type, name) \
     type *name;                     \
     uint64_t name##_count, name##_capacity
@@ -57,13 +59,13 @@ struct ebpo_scene {
     EBPO_SCENE_LIST(ebpo_scene_instance_entry, instances);
     EBPO_SCENE_LIST(ebpo_scene_route, routes);
     EBPO_SCENE_LIST(ebpo_scene_camera, cameras);
-    EBPO_SCENE_LIST(ebpo_scene_rule_entry, rules); /* sorted, once a scene file has been read */
+    EBPO_SCENE_LIST(ebpo_scene_rule_entry, rules); /* sorted by ebpo_scene_sort_rules */
     EBPO_SCENE_LIST(char *, sets);     /* names of sets: "*", then those of layers, groups and
                                         * instances */
     EBPO_SCENE_LIST(uint64_t, layers); /* [layer] index in `sets` of the layer's set */
     EBPO_SCENE_LIST(uint64_t, groups); /* [group] index in `sets` of the group's set; ascending */
     EBPO_SCENE_LIST(ebpo_scene_file_entry, files);
-    json_t *names; /* maps a name, prefixed by its kind, to the index of the object */
+    json_t *names; /* maps a name, prefixed by its kind, to the index in the list of that kind */
     uint64_t ignored_count, clearance_count; /* numbers of rules that ignore pairs, and of rules
                                               * that require a clearance, before sorting */
     char *folder;                            /* base of relative paths, "" or ending with "/" */
@@ -85,12 +87,13 @@ struct ebpo_scene {
 #define EBPO_SCENE_CAMERA "\001c"
 #define EBPO_SCENE_LAYER  "\001l"
 
-/* Returns the number of the object with this name; EBPO_SCENE_NONE: the name does not exist. */
+/* Returns the index of the object of this kind and name; EBPO_SCENE_NONE if there is none. */
 uint64_t ebpo_scene_find_name(const ebpo_scene *scene, const char *kind, const char *name);
 
 /* --- adding members --- */
 
-/* Add members that only scene files can have. Texts are copied; numbers must be valid. */
+/* Add members that only scene files can have. Names are copied; indices in `camera` must be valid.
+ */
 EBPO_MUST_USE ebpo_status ebpo_scene_add_layer(ebpo_scene *scene, const char *name,
                                                ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_scene_add_group(ebpo_scene *scene, const char *name,
@@ -99,7 +102,7 @@ EBPO_MUST_USE ebpo_status ebpo_scene_add_route(ebpo_scene *scene, const char *na
                                                uint64_t *number, ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_scene_add_camera(ebpo_scene *scene, const ebpo_scene_camera *camera,
                                                 ebpo_error *error);
-/* Adds the newest instance of the scene to a set. */
+/* Adds the instance that was added last to a set. */
 EBPO_MUST_USE ebpo_status ebpo_scene_join_set(ebpo_scene *scene, uint64_t set, ebpo_error *error);
 /* Adds a rule for pairs of an instance of set a and an instance of set b. A clearance below 0 means
  * that the pairs are ignored. */
@@ -125,16 +128,16 @@ EBPO_MUST_USE ebpo_status ebpo_scene_read_json(ebpo_scene *scene, const char *te
 /* --- routes --- */
 
 /* Appends a key and normalises its quaternion. Fails with EBPO_E_ARGUMENT if a number is not
- * finite, the time is not later than that of the last key or is beyond 2^1000, the quaternion is 0,
- * or the scale is out of range. */
+ * finite, the time is not later than the time of the last key or is beyond 2^1000, the quaternion
+ * is 0, or the scale is out of range. */
 EBPO_MUST_USE ebpo_status ebpo_scene_add_key(ebpo_scene_route *route, const ebpo_route_key *key,
                                              ebpo_error *error);
 /* Returns the quaternion nearest to a matrix; its length is not 0, but need not be 1. */
 void ebpo_scene_quaternion_of_matrix(const double m[3][3], double quaternion[4]);
-/* Computes the pose of a route at a time. Before the first key the pose is the first key's, and
- * after the last key it is the last key's. */
+/* Computes the pose of a route at a time: before the first key, the pose of the first key; after
+ * the last key, the pose of the last key. */
 void ebpo_scene_route_at(const ebpo_scene_route *route, double time, ebpo_pose *out);
-/* Computes the pose that applies `inner` first, then `outer`. */
+/* Computes the pose that applies `inner` first, and then `outer`. */
 void ebpo_scene_compose(const ebpo_pose *outer, const ebpo_pose *inner, ebpo_pose *out);
 /* Returns the time of the first key after `from`, or `to` if that is earlier. Between `from` and
  * this time the motion is smooth. */
@@ -143,36 +146,37 @@ double ebpo_scene_route_next(const ebpo_scene_route *route, double from, double 
 /* Returns an upper bound of the length of a vector. Squares do not overflow or underflow. */
 double ebpo_scene_length_above(const double vector[3]);
 
-/* Reach of points that follow a route. */
-typedef struct ebpo_scene_reach {
-    double length; /* bound of their distance from the route's origin */
-    double size;   /* size of the coordinates from which `length` is computed: sets the rounding */
-} ebpo_scene_reach;
+/* Bounds of a set of points that follow a route, in the coordinates of the route. */
+typedef struct ebpo_scene_extent {
+    double max_distance; /* upper bound of their distance from the route's origin */
+    double size; /* 1-norm of the coordinates from which max_distance is computed; it determines
+                  * the rounding error */
+} ebpo_scene_extent;
 
-/* Bounds of the motion of points within `reach` of the route's origin. No key may be between the
- * two times. length: of their distance from their first position. sag: of their distance from a
- * point that moves at constant speed on the straight line from their first to their last position.
- */
+/* Bounds of the motion of points between two times. */
 typedef struct ebpo_scene_step {
-    double length, sag;
+    double length; /* upper bound of the distance of a point from its first position */
+    double sag;    /* upper bound of the distance of a point from another point that moves at
+                    * constant speed on the straight line from the first to the last position */
 } ebpo_scene_step;
+/* Returns the bounds for points of this extent. No key may be between the two times. */
 ebpo_scene_step ebpo_scene_route_step(const ebpo_scene_route *route, double from, double to,
-                                      ebpo_scene_reach reach);
+                                      ebpo_scene_extent extent);
 
-/* Bounds the motion that rounding alone causes. It does not become smaller when the interval of
- * time becomes shorter. */
-double ebpo_scene_route_rounding(const ebpo_scene_route *route, ebpo_scene_reach reach);
+/* Returns an upper bound of the motion that rounding alone causes. It does not become smaller in
+ * shorter intervals of time. */
+double ebpo_scene_route_rounding(const ebpo_scene_route *route, ebpo_scene_extent extent);
 
-/* Bounds the change of the distance of two instances on one route between `from` and `to`,
- * including rounding. reach: the sum of both instances' reaches. from < to. */
+/* Returns an upper bound of the change of the distance of two instances on one route between `from`
+ * and `to`, including rounding. extent: the sums of both instances' extents. from < to. */
 double ebpo_scene_route_growth(const ebpo_scene_route *route, double from, double to,
-                               ebpo_scene_reach reach);
+                               ebpo_scene_extent extent);
 
 /* --- boxes --- */
 
-/* Returns the reach of the instance's points from the origin of its route. */
-ebpo_scene_reach ebpo_scene_reach_of(const ebpo_scene *scene,
-                                     const ebpo_scene_instance_entry *instance);
+/* Returns the extent of the instance's points in the coordinates of its route. */
+ebpo_scene_extent ebpo_scene_extent_of(const ebpo_scene *scene,
+                                       const ebpo_scene_instance_entry *instance);
 
 /* --- files that a scene names --- */
 
@@ -182,7 +186,7 @@ const char *ebpo_scene_path_refused(const char *path, const ebpo_scene_options *
 /* Returns the path by which a file is opened, from malloc; NULL without memory. */
 char *ebpo_scene_join_path(const char *folder, const char *path);
 /* Checks, before a file is opened, that its path does not lead out of the folder by symbolic links.
- * Then fails with EBPO_E_FORMAT; or with EBPO_E_IO, EBPO_E_MEMORY. */
+ * Fails with EBPO_E_FORMAT if it does, and with EBPO_E_IO, EBPO_E_MEMORY. */
 EBPO_MUST_USE ebpo_status ebpo_scene_stays_within(const char *folder, const char *path,
                                                   ebpo_error *error);
 /* Returns the part of a path up to its last "/", or "", from malloc. */
@@ -193,8 +197,8 @@ char *ebpo_scene_folder_of(const char *path);
 /* Returns the length of a UTF-8 byte order mark at the beginning of a text: 0 or 3. */
 size_t ebpo_scene_bom_length(const char *text, size_t size);
 
-/* Returns EBPO_E_LIMIT if the JSON text has more than `max_values` values or 32 levels of brackets.
- * Does not parse the text. */
+/* Fails with EBPO_E_LIMIT if the JSON text has more than `max_values` values or more than
+ * EBPO_SCENE_DEPTH levels of brackets. Does not parse the text. */
 EBPO_MUST_USE ebpo_status ebpo_scene_text_fits(const char *text, size_t size, uint64_t max_values,
                                                ebpo_error *error);
 

@@ -256,30 +256,30 @@ typedef struct rows {
         depth[ROWS][4];
 } rows;
 
-/* Returns an index or a count as a signed number; -1: there is none. */
+/* Returns an index or a count as a signed number; -1 for values that mean "none" or "not known". */
 static int64_t record_number(uint64_t n) { return n > INT64_MAX ? -1 : (int64_t)n; }
 
-static void fill_row(rows *out, uint64_t i, const ebpo_scene_clash *m, int64_t frame)
+static void fill_row(rows *out, uint64_t i, const ebpo_scene_clash *clash, int64_t frame)
 {
     out->frame[i] = frame;
-    out->instances[i][0] = record_number(m->a);
-    out->instances[i][1] = record_number(m->b);
-    out->kind[i] = (uint8_t)m->kind;
-    out->relation[i] = (uint8_t)m->relation;
-    out->faces[i][0] = record_number(m->face_a);
-    out->faces[i][1] = record_number(m->face_b);
-    out->pairs[i][0] = record_number(m->touching);
-    out->pairs[i][1] = record_number(m->coplanar);
-    out->pairs[i][2] = record_number(m->crossing);
-    out->contacts[i] = record_number(m->contacts);
-    out->clearance[i] = m->clearance;
-    out->distance[i] = m->distance;
-    memcpy(out->location[i], m->location, sizeof m->location);
-    memcpy(out->location_box[i], m->location_min, sizeof m->location_min);
-    memcpy(out->location_box[i] + 3, m->location_max, sizeof m->location_max);
+    out->instances[i][0] = record_number(clash->a);
+    out->instances[i][1] = record_number(clash->b);
+    out->kind[i] = (uint8_t)clash->kind;
+    out->relation[i] = (uint8_t)clash->relation;
+    out->faces[i][0] = record_number(clash->face_a);
+    out->faces[i][1] = record_number(clash->face_b);
+    out->pairs[i][0] = record_number(clash->touching);
+    out->pairs[i][1] = record_number(clash->coplanar);
+    out->pairs[i][2] = record_number(clash->crossing);
+    out->contacts[i] = record_number(clash->contacts);
+    out->clearance[i] = clash->clearance;
+    out->distance[i] = clash->distance;
+    memcpy(out->location[i], clash->location, sizeof clash->location);
+    memcpy(out->location_box[i], clash->location_min, sizeof clash->location_min);
+    memcpy(out->location_box[i] + 3, clash->location_max, sizeof clash->location_max);
     for (int k = 0; k < 2; k++) {
-        out->depth[i][2 * k] = m->depth[k].lo;
-        out->depth[i][2 * k + 1] = m->depth[k].hi;
+        out->depth[i][2 * k] = clash->depth[k].lo;
+        out->depth[i][2 * k + 1] = clash->depth[k].hi;
     }
 }
 
