@@ -50,7 +50,7 @@ static const struct {
     { HEAD "\"instances\": [" ONE ",\n" ONE "]}",
       "line 4: instances[1]: the name 'a' exists already" },
     { HEAD "\"instances\": [\n{\"name\": \"a\", \"model\": \"n\"}]}",
-      "line 4: instances[0].model: the scene does not define this name" },
+      "line 4: instances[0].model: is not a name that the scene defines" },
     { HEAD "\"instances\": [{\"name\": \"a\", \"model\": \"m\",\n\"pose\": {\n\"scale\": \"1\"}}]}",
       "line 5: instances[0].pose.scale: is not a number" },
     { HEAD "\"instances\": [{\"name\": \"a\", \"model\": \"m\", \"pose\": {\"scale\": -1}}]}",

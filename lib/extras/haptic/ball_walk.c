@@ -3,17 +3,17 @@
  *
  * Nodes of the tree over the faces are visited in the order of their earliest possible contact. The
  * search ends when the earliest possible contact of the next node is later than the first contact
- * found. The distance from a box or a face is convex along a line, so Newton's steps towards the
- * ball's radius never go too far. Among nodes that are already in contact, the closest node is
- * visited first.
+ * found. The distance from a box or a face is convex along a line, so Newton's method never passes
+ * the point at which the distance is equal to the ball's radius. Among nodes that are already in
+ * contact, the closest node is visited first.
  *
  * The work of a haptic step is bounded. If the limit is reached, the piece ends where the next node
- * may be in contact; if that is near the beginning, the next haptic step continues the search. If
- * the contacts found so far hold the ball at its place, the search ends early.
+ * may be in contact; or, if that is near the beginning, the next haptic step continues the search.
+ * The search also ends if the contacts found so far hold the ball in its position.
  *
  * The planes of the contacts bound a cone of allowed motions. The motion in the cone that is
  * nearest to the wanted motion is the wanted motion itself, or on a plane, or on the line of two
- * planes, or 0. All these motions are tried, since there are few planes. */
+ * planes, or 0. All these motions are tried, because there are few planes. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -37,7 +37,8 @@ typedef struct motion_search {
     double *out;        /* [3] */
 } motion_search;
 
-/* Keeps the motion if all planes allow it, within `slack`, and it is nearer to `want`. */
+/* Keeps the motion if all planes allow it with the tolerance `slack`, and it is nearer to `want`
+ * than the best motion so far. */
 static void try_motion(motion_search *t, const double motion[3], double slack)
 {
     double lost[3];
@@ -105,19 +106,19 @@ void ebpo_held_planes_add(ebpo_held_planes *planes, const double normal[3])
 /* --- the walk --- */
 
 enum {
-    STEPS = 6,
-    /* Work of a haptic step that is reserved for the check of crossings. */
+    STEPS = 6, /* greatest number of steps of Newton's method */
+    /* Numbers of faces and nodes of a haptic step that are reserved for the check of crossings. */
     KEPT_FACES = 64,
     KEPT_NODES = 256,
-    /* Number of further faces that are visited when a face holds the ball in place. */
+    /* Number of further faces that are visited after a face holds the ball in its position. */
     HELD_FACES = 48
 };
 
-/* Least part of a piece after which the piece may end before its contact is known. */
+/* Least fraction of a piece at which the piece may end before its contact is known. */
 static const double least_part = 1.0 / 32;
 
-/* Returns the greatest number of waiting nodes: their subtrees are disjoint, so the number is at
- * most the number of leaves. */
+/* Returns the capacity of the queue. The subtrees of waiting nodes are disjoint, so their number is
+ * at most the number of leaves. */
 static uint64_t capacity_for(uint64_t faces) { return ebpo_face_box_leaves(faces) + 1; }
 
 uint64_t ebpo_ball_walk_bytes(uint64_t faces)
@@ -141,8 +142,8 @@ void ebpo_ball_walk_free(ebpo_ball_walk *w)
     w->queue.item = NULL;
 }
 
-/* Returns true if the ball does not come nearer to any point of `e`. The slacks of ebpo_ball_motion
- * cover the rounding. */
+/* Returns true if the ball comes nearer to no point of `e`, except by rounding, which is less than
+ * the slacks of ebpo_ball_motion. */
 static bool moves_away(const ebpo_ball_walk *w, const ebpo_extent *e)
 {
     double least = 0;
@@ -151,9 +152,9 @@ static bool moves_away(const ebpo_ball_walk *w, const ebpo_extent *e)
     return least >= 0;
 }
 
-/* Returns a lower bound of the part of the path at which the ball touches faces in `e`; a negative
- * number, minus the overlap, if it may touch them at the beginning; INFINITY if it touches none
- * before w->part. */
+/* Returns a lower bound of the fraction of the path after which the ball touches faces in `e`.
+ * Returns minus the overlap if the ball may touch faces at the beginning, and INFINITY if it
+ * touches none before the fraction w->part. */
 static double earliest_contact(const ebpo_ball_walk *w, const ebpo_extent *e)
 {
     double part = 0;
@@ -163,7 +164,8 @@ static double earliest_contact(const ebpo_ball_walk *w, const ebpo_extent *e)
             double x = w->from[i] + part * w->motion[i];
             off[i] = x > e->max[i] ? x - e->max[i] : x < e->min[i] ? x - e->min[i] : 0;
         }
-        double distance = sqrt(ebpo_vec3_dot(off, off)), gap = distance - (w->reach + 2 * w->band);
+        double distance = sqrt(ebpo_vec3_dot(off, off)),
+               gap = distance - (w->contact_distance + 2 * w->band);
         if (gap <= 0)
             return part > 0 ? part : moves_away(w, e) ? INFINITY : gap;
         double slope = ebpo_vec3_dot(off, w->motion) / distance;
@@ -197,7 +199,7 @@ void ebpo_ball_begin(ebpo_ball_walk *w)
 
 static void inspect_leaf(ebpo_ball_walk *w, uint64_t leaf, ebpo_ball_work *work)
 {
-    const ebpo_ball_motion motion = { w->from, w->motion, w->reach,
+    const ebpo_ball_motion motion = { w->from, w->motion, w->contact_distance,
                                       w->band, w->slack,  w->least_slack };
     uint64_t f = leaf * EBPO_FACE_BOX_LEAF, end = f + EBPO_FACE_BOX_LEAF;
     for (; f < end && f < w->box->count; f++) {
@@ -213,8 +215,9 @@ static void inspect_leaf(ebpo_ball_walk *w, uint64_t leaf, ebpo_ball_work *work)
     }
 }
 
-/* Ends the piece where the first waiting node may be in contact; all other waiting nodes may be in
- * contact only later. Returns false, and changes nothing, if the piece would be too short. */
+/* Ends the piece where the first node of the queue may be in contact; the other nodes of the queue
+ * may be in contact only later. Returns false, and changes nothing, if the piece would be too
+ * short. */
 static bool end_before_waiting(ebpo_ball_walk *w)
 {
     if (w->part <= 0)
@@ -230,7 +233,7 @@ static bool end_before_waiting(ebpo_ball_walk *w)
 /* Searches for the first contact. Returns false if the next haptic step must continue. */
 static bool find_contact(ebpo_ball_walk *w, ebpo_ball_work *work)
 {
-    uint32_t held = work->faces; /* number of faces visited before the contact */
+    uint32_t held = work->faces; /* work->faces when a face first held the ball in its position */
     while (w->queue.count > 0 && w->queue.item[0].key < w->part) {
         if (w->part <= 0 &&
             (w->contacts.count == EBPO_PLANES_LIMIT || work->faces >= held + HELD_FACES))
@@ -264,9 +267,8 @@ static void begin_check(ebpo_ball_walk *w)
         w->stack[w->depth++] = 1;
 }
 
-/* Returns true if the segment of the centre may intersect `e`. The margin around `e` is greater
- * than the rounding of the segment's entry and exit, and less than the ball's distance from faces.
- */
+/* Returns true if the segment of the centre may intersect `e`. `e` is widened by more than the
+ * rounding errors, but less than the ball's distance from faces. */
 static bool may_cross(const ebpo_ball_walk *w, const ebpo_extent *e)
 {
     double enters = 0, leaves = 1, wider = 16 * w->band;

@@ -1,14 +1,15 @@
 /* Loads the faces in a box around the proxy (the device's point, kept on the surface), with a tree
- * of boxes over them. A haptic step (one cycle of the force computation) reads no other geometry.
+ * of boxes over the faces. A haptic step (one cycle of the force computation) reads no other
+ * geometry.
  *
  * The loading thread makes a box; a box never changes while a step uses it. Faces keep the order of
  * the file, which follows a space-filling curve, so the tree needs no sorting. Functions that steps
  * call allocate no memory; their callers limit their work.
  *
- * Distances are in doubles, correct to a few ulps. The side of a point is exact: along a straight
- * path from a point whose side is known, the winding number changes at each face whose interior the
- * path crosses. If the path crosses an edge, or begins in a face's plane, it is replaced by a
- * detour through another point; almost every point works. */
+ * Distances are computed in doubles, with errors of a few ulps. Winding numbers are exact: along a
+ * straight path from a point whose winding number is known, the winding number changes at each face
+ * whose interior the path crosses. If the path crosses an edge, or begins in a face's plane, it is
+ * replaced by a detour through another point; almost every other point is suitable. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -35,7 +36,7 @@ uint64_t ebpo_face_box_bytes(uint64_t capacity)
            2 * ebpo_face_box_leaves(capacity) * sizeof(ebpo_extent);
 }
 
-/* Writes to all pages, so that no haptic step waits for the operating system to provide a page. */
+/* Writes to all pages of the memory, so that no haptic step waits for the operating system. */
 ebpo_status ebpo_face_box_new(ebpo_face_box *out, uint64_t capacity, ebpo_error *error)
 {
     *out = (ebpo_face_box){ .capacity = capacity, .leaves = 1 };
@@ -49,11 +50,10 @@ ebpo_status ebpo_face_box_new(ebpo_face_box *out, uint64_t capacity, ebpo_error 
     }
     memset(out->corner, 0xff, capacity * sizeof *out->corner);
     memset(out->face, 0xff, capacity * sizeof *out->face);
-    memset(out->node, 0xff, nodes * sizeof *out->node); /* NAN: an empty node, which intersects
-                                                         * nothing */
+    /* NAN, so that nodes intersect nothing and the box contains nothing */
+    memset(out->node, 0xff, nodes * sizeof *out->node);
     for (int i = 0; i < 3; i++)
-        out->centres.min[i] = out->centres.max[i] = NAN; /* NAN: an empty box, which contains
-                                                          * nothing */
+        out->centres.min[i] = out->centres.max[i] = NAN;
     return EBPO_OK;
 }
 
@@ -258,7 +258,7 @@ typedef struct nearest_edge_point {
     double part;              /* position on the edge */
 } nearest_edge_point;
 
-/* Replaces *best by the nearest point of edge k if that is nearer. */
+/* Replaces *best by the nearest point of edge k if that point is nearer. */
 static void try_edge(const double p[3], const double face[3][3], int k, nearest_edge_point *best)
 {
     const double *a = face[k], *b = face[(k + 1) % 3];
@@ -278,8 +278,8 @@ static void try_edge(const double p[3], const double face[3][3], int k, nearest_
     }
 }
 
-/* Computes the result if the nearest point is in the interior of the face; otherwise returns false.
- */
+/* Computes the result if the nearest point is in the interior of the face. Returns false if it is
+ * not. */
 static bool nearest_in_interior(const double p[3], const double face[3][3], ebpo_face_near *out)
 {
     double e[3], f[3], n[3], d[3], c[3];
@@ -322,11 +322,12 @@ void ebpo_face_nearest(const double p[3], const double face[3][3], ebpo_face_nea
     out->weight[(best.edge + 1) % 3] = best.part;
 }
 
+/* Greatest number of steps of Newton's method. */
 enum { STEPS = 24 };
 
-/* Along a line the distance from a face, which is a convex set, is a convex function. So it is
- * above its tangents: a Newton step never passes the point at which the ball first touches the
- * face's interior, an edge or a corner. */
+/* Along a line the distance from a face, which is a convex set, is a convex function. Its graph is
+ * above its tangents, so a step of Newton's method never passes the point at which the ball first
+ * touches the face. */
 double ebpo_ball_first_contact(const ebpo_ball_motion *w, const double face[3][3], double away[3])
 {
     double part = 0;
@@ -350,8 +351,8 @@ double ebpo_ball_first_contact(const ebpo_ball_motion *w, const double face[3][3
     return part;
 }
 
-/* Returns the sign of the volume of the tetrahedron a, b, c, d, exactly: -1, 0 or 1.
- * Returns another number if the sign cannot be decided without allocating memory. */
+/* Returns the exact sign of the volume of the tetrahedron a, b, c, d: -1, 0 or 1. Returns any other
+ * value if the sign cannot be decided without allocating memory. */
 static int volume_sign(const double a[3], const double b[3], const double c[3], const double d[3])
 {
     double u[3], v[3], w[3], value = 0, sum = 0, last = 0;
@@ -365,13 +366,14 @@ static int volume_sign(const double a[3], const double b[3], const double c[3], 
         sum += (fabs(l) + fabs(r)) * fabs(w[i]);
         last += fabs(w[i]);
     }
-    /* this is the filter of ebpo_orient3d, which is not called, because it may allocate memory */
+    /* the filter of ebpo_orient3d; that function is not called, because it may allocate memory */
     double bound = 0x1p-50 * sum + 0x1p-960 * (1 + last);
     return value > bound ? 1 : value < -bound ? -1 : ebpo_orient3d_expansion(a, b, c, d);
 }
 
-/* Tests a segment in the face's plane, in the projection along an axis. Returns false if the line
- * of an edge or of pq separates the segment and the face. */
+/* Returns false if the segment and the face, which are in one plane, have no common point. Tests in
+ * the projection along an axis if the line of an edge or of pq separates them. Returns true if this
+ * cannot be decided without allocating memory. */
 static bool intersects_in_plane(const double p[3], const double q[3], const double face[3][3],
                                 int axis)
 {
@@ -392,7 +394,7 @@ static bool intersects_in_plane(const double p[3], const double q[3], const doub
         if (ebpo_orient2d_expansion(corner[k], corner[(k + 1) % 3], a) == -orientation &&
             ebpo_orient2d_expansion(corner[k], corner[(k + 1) % 3], b) == -orientation)
             return false;
-    /* no such line separates them if pq is on the line of an edge: compare their intervals */
+    /* if pq is on the line of an edge, no such line separates them, so compare intervals */
     for (int i = 0; i < 2; i++)
         if (fmax(a[i], b[i]) < fmin(corner[0][i], fmin(corner[1][i], corner[2][i])) ||
             fmin(a[i], b[i]) > fmax(corner[0][i], fmax(corner[1][i], corner[2][i])))
@@ -400,8 +402,8 @@ static bool intersects_in_plane(const double p[3], const double q[3], const doub
     return true;
 }
 
-/* Tests a segment in the face's plane: in the projection along the first axis in which the face has
- * area. Returns false if the face has no area. */
+/* Does the same as intersects_in_plane, with the first axis along which the projection of the face
+ * has an area. Returns false if the face has no area. */
 static bool intersects_coplanar(const double p[3], const double q[3], const double face[3][3])
 {
     for (int axis = 0; axis < 3; axis++) {
@@ -438,10 +440,10 @@ bool ebpo_segment_may_intersect(const double p[3], const double q[3], const doub
 
 enum { CROSSES_DEGENERATE = 2 };
 
-/* Returns the change of the winding number from p to q by this face: 1 from outside to inside, -1
- * from inside to outside, 0 without a common point. CROSSES_DEGENERATE: the segment crosses an edge
- * or a corner, begins or ends in the face's plane, or perhaps does not cross at all. Allocates no
- * memory. */
+/* Returns the change of the winding number from p to q at this face: 1 from outside to inside, -1
+ * from inside to outside, 0 if there is no common point. Returns CROSSES_DEGENERATE if the segment
+ * crosses an edge or a corner, or begins or ends in the face's plane, or if the crossing cannot be
+ * decided without allocating memory. */
 static int segment_crosses(const double p[3], const double q[3], const double face[3][3])
 {
     if (!ebpo_segment_may_intersect(p, q, face))
@@ -455,7 +457,7 @@ static int segment_crosses(const double p[3], const double q[3], const double fa
         if (sign != 1 && sign != -1)
             return CROSSES_DEGENERATE;
     }
-    return at_p; /* 1: p is on the outer side, so the path enters; -1: it leaves */
+    return at_p; /* 1: p is on the outer side */
 }
 
 void ebpo_near_push(ebpo_near_queue *queue, double key, uint64_t node)
@@ -483,8 +485,9 @@ ebpo_near_node ebpo_near_pop(ebpo_near_queue *queue)
     return first;
 }
 
-/* --- the side of a point --- */
+/* --- the winding number of a point --- */
 
+/* Greatest number of attempts of ebpo_known_winding_move. */
 enum { MOVES_MAX = 12 };
 
 static void extent_of_segment(const double p[3], const double q[3], ebpo_extent *out)
@@ -501,9 +504,9 @@ typedef enum crossing {
     DEGENERATE /* the segment crosses an edge or a corner, or touches a face */
 } crossing;
 
-/* Counts the crossings along the segment from side->at to `to`. CROSSED: *side is now the point
- * `to`, with its winding number. Otherwise *side is unchanged. */
-static crossing cross_faces(ebpo_side *side, const ebpo_face_box *box, const double to[3],
+/* Counts the crossings along the segment from side->at to `to`. If the result is CROSSED, *side is
+ * now the point `to` with its winding number. With other results *side is unchanged. */
+static crossing cross_faces(ebpo_known_winding *side, const ebpo_face_box *box, const double to[3],
                             uint32_t *found, uint32_t most, uint32_t visits, uint64_t *work)
 {
     ebpo_extent around;
@@ -525,9 +528,9 @@ static crossing cross_faces(ebpo_side *side, const ebpo_face_box *box, const dou
     return CROSSED;
 }
 
-/* Chooses a pseudorandom point near the middle of the path for a detour, a different point each
- * time. */
-static void choose_detour(ebpo_side *side, const double to[3], const ebpo_extent *within,
+/* Sets `via` to a pseudorandom point near the middle of the path, for a detour. Each call returns a
+ * different point. */
+static void choose_detour(ebpo_known_winding *side, const double to[3], const ebpo_extent *within,
                           double via[3])
 {
     double length = 0;
@@ -541,8 +544,9 @@ static void choose_detour(ebpo_side *side, const double to[3], const ebpo_extent
     }
 }
 
-bool ebpo_side_move(ebpo_side *side, const ebpo_face_box *box, const double place[3],
-                    uint32_t *found, uint32_t most, uint32_t visits, uint64_t *work)
+bool ebpo_known_winding_move(ebpo_known_winding *side, const ebpo_face_box *box,
+                             const double place[3], uint32_t *found, uint32_t most, uint32_t visits,
+                             uint64_t *work)
 {
     double to[3];
     ebpo_vec3_copy(place, to);

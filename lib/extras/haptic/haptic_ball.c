@@ -1,9 +1,9 @@
 /* Makes the object of a haptic session, computes the step of a ball, and places the proxy.
  *
- * A step moves the proxy towards the device (haptic_step.c); the planes in contact with the proxy
- * hold it back. The step returns the force of a spring between proxy and device, with friction
- * along the surface. A step allocates no memory, takes no lock and reads no file: its data are made
- * before or come from the loading thread. A device position at infinity or NaN is ignored.
+ * A step moves the proxy towards the device (haptic_step.c); faces in contact with the proxy hold
+ * it back. The step returns the force of a spring between proxy and device, with friction along the
+ * surface. A step allocates no memory, takes no lock and reads no file: its data are made before
+ * the step or come from the loading thread. A device position that is infinite or NaN is ignored.
  *
  * Documentation: docs/guide/haptic.md. */
 #include "core/strict_fp.h"
@@ -38,8 +38,8 @@ static bool has_no_piece(const ebpo_haptic *t) { return t->walk.stage == EBPO_BA
 
 /* Applies Coulomb friction. Without friction the proxy has slid from `from` to its position. With
  * friction it slides only by the part of this path by which the tangential force exceeds the
- * friction; it stays if the friction is larger. Both forces are forces of a spring, so lengths are
- * compared. */
+ * friction; it stays at `from` if the friction is greater. Both forces are proportional to lengths,
+ * so lengths are compared. Returns bits of ebpo_haptic_flag. */
 static uint32_t apply_friction(ebpo_haptic *t, const double from[3], const double device[3],
                                ebpo_ball_work *work)
 {
@@ -61,7 +61,7 @@ static uint32_t apply_friction(ebpo_haptic *t, const double from[3], const doubl
 }
 
 /* Computes the vector from the device to the proxy. If the proxy waits for the loading thread or
- * its path is incomplete, this is only the part of the vector that contacts cause. */
+ * its path is incomplete, computes only the part of this vector that contacts cause. */
 static void find_depth(const ebpo_haptic *t, const double device[3], uint32_t flags, double out[3])
 {
     double want[3], motion[3];
@@ -74,18 +74,18 @@ static void find_depth(const ebpo_haptic *t, const double device[3], uint32_t fl
 }
 
 /* Removes the part of the force that pulls towards faces, without increasing the force. The vector
- * `depth` from device to proxy is not exactly along the faces' normals: the proxy's remaining path,
- * rounding far from 0, and friction tilt it. So damping across this vector may pull towards faces,
- * and very high damping pulls with full force. `near`: t->away is set. */
+ * `depth` from device to proxy is not exactly along the faces' normals, because of the proxy's
+ * remaining path, rounding of great coordinates, and friction. So damping perpendicular to this
+ * vector may pull towards faces, and very high damping pulls with full force. near: t->away is
+ * set. */
 static void keep_from_faces(const ebpo_haptic *t, bool near, const double depth[3], double force[3])
 {
     ebpo_held_planes planes = { .count = 0 };
     double wanted[3];
-    /* the first contact may be the edge of a face that is a tiny distance beside the ball, so the
-     * nearest face counts, too */
+    /* the first contact may be an edge beside the ball, so the nearest face counts, too */
     if (near && ebpo_vec3_dot(t->away, depth) >= 0)
         ebpo_held_planes_add(&planes, t->away);
-    /* if the spring itself pulls towards a face, this is the other face of a narrow corner: it does
+    /* a face towards which the spring itself pulls is the other face of a narrow corner, and does
      * not count */
     for (int i = 0; i < t->holding_planes.count; i++)
         if (ebpo_vec3_dot(t->holding_planes.normal[i], depth) >= 0)
@@ -240,7 +240,7 @@ static ebpo_status measure_model(ebpo_haptic *t, ebpo_error *error)
     if (t->options.search_radius == 0)
         t->options.search_radius = 3 * t->diagonal / sqrt(fmax(1, (double)info->face_count));
     t->options.search_radius = fmax(t->options.search_radius, 4 * t->options.skin);
-    t->reach = wide + t->options.skin;
+    t->contact_distance = wide + t->options.skin;
     t->band = fmax(0x1p-24 * t->options.skin, 0x1p-48 * most);
     t->margin = wide + (t->tool ? 4 * t->options.skin : t->options.search_radius);
     t->max_piece = t->diagonal;
@@ -268,20 +268,21 @@ static ebpo_status make_parts(ebpo_haptic *t, ebpo_error *error)
     return status;
 }
 
-/* Checks that a ball or a tool may begin with a point at `place`: no face is within `reach` and
- * half a skin, and the point is not inside the solid. */
-static ebpo_status check_point(ebpo_haptic *t, const double place[3], double reach,
+/* Checks that a ball or a tool may begin with a point at `place`: no face is within
+ * contact_distance plus half a skin, and the point is not inside the solid. */
+static ebpo_status check_point(ebpo_haptic *t, const double place[3], double contact_distance,
                                ebpo_error *error)
 {
     ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
     ebpo_distance_result near;
-    options.max_distance = reach + t->options.skin / 2;
+    options.max_distance = contact_distance + t->options.skin / 2;
     ebpo_status status = ebpo_distance(t->proxy_context, place, &options, &near, error);
     if (status == EBPO_OK && near.distance <= options.max_distance && near.distance >= 0)
-        return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "the distance of the device from a face is %g there; it must be greater "
-                         "than %g",
-                         near.distance, options.max_distance);
+        return ebpo_fail(
+            error, EBPO_E_ARGUMENT,
+            "at the initial position, the distance of the device from a face is %g; it "
+            "must be greater than %g",
+            near.distance, options.max_distance);
     if (status != EBPO_OK || !t->solid)
         return status;
     ebpo_inside_result inside;
@@ -291,8 +292,7 @@ static ebpo_status check_point(ebpo_haptic *t, const double place[3], double rea
                : ebpo_fail(error, EBPO_E_ARGUMENT, "the position is in the solid; begin outside");
 }
 
-/* Checks the initial position. A probe may be anywhere; a tool begins with its axes along the
- * model's. */
+/* Checks the initial position. A probe may be anywhere; a tool begins without rotation. */
 static ebpo_status check_place(ebpo_haptic *t, const double place[3], ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
@@ -300,7 +300,7 @@ static ebpo_status check_place(ebpo_haptic *t, const double place[3], ebpo_error
         if (!(fabs(place[i]) <= 0x1p200))
             return ebpo_fail(error, EBPO_E_ARGUMENT, "the position must be three finite numbers");
     if (t->options.kind == EBPO_HAPTIC_BALL)
-        return check_point(t, place, t->reach, error);
+        return check_point(t, place, t->contact_distance, error);
     for (uint64_t i = 0; t->tool && i < t->tool->count && status == EBPO_OK; i++) {
         double at[3];
         for (int k = 0; k < 3; k++)
@@ -310,9 +310,9 @@ static ebpo_status check_place(ebpo_haptic *t, const double place[3], ebpo_error
     return status;
 }
 
-/* Returns true if a box contains the proxy, and makes it the current one. If take_box rejected the
- * newest box because it did not contain the proxy then, that box is now the previous one. It may
- * contain the new position, and then the loader makes no further box. */
+/* Returns true if a box contains the proxy, and makes this box the current one. The previous box is
+ * tested, too: it may be a box that ebpo_haptic_take_box rejected because of an earlier position of
+ * the proxy, and the loader makes no further box if that box contains the new position. */
 static bool has_box(ebpo_haptic *t)
 {
     if (ebpo_extent_holds(&t->box[t->current_box].centres, t->proxy) || ebpo_haptic_take_box(t))
@@ -343,8 +343,8 @@ ebpo_status ebpo_haptic_reset(ebpo_haptic *t, const double place[3], ebpo_error 
     ebpo_status status = check_place(t, place, error);
     if (status != EBPO_OK)
         return status;
-    t->walk.stage = EBPO_BALL_IDLE; /* also after a failure: the session continues from its
-                                     * position */
+    t->walk.stage = EBPO_BALL_IDLE; /* after a failure, too, the session continues without an
+                                     * unfinished piece */
     ebpo_vec3_copy(place, t->proxy);
     ebpo_vec3_copy(place, t->device);
     ebpo_haptic_report(t, place);
@@ -382,24 +382,24 @@ ebpo_status ebpo_haptic_new(ebpo_model *model, const ebpo_haptic_options *option
                             const double place[3], ebpo_haptic **out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_haptic_options own = EBPO_HAPTIC_OPTIONS_INIT;
+    ebpo_haptic_options checked = EBPO_HAPTIC_OPTIONS_INIT;
     *out = NULL;
-    ebpo_status status = EBPO_TAKE(ebpo_haptic_options, &own, options, error);
+    ebpo_status status = EBPO_TAKE(ebpo_haptic_options, &checked, options, error);
     if (status == EBPO_OK)
-        status = check_options(&own, error);
+        status = check_options(&checked, error);
     if (status != EBPO_OK)
         return status;
     ebpo_haptic *t = ebpo_alloc_zero(1, sizeof *t);
     if (!t)
         return ebpo_fail_memory(error, sizeof *t);
     t->model = model;
-    t->options = own;
+    t->options = checked;
     t->failure = (ebpo_error)EBPO_ERROR_INIT;
     pthread_mutex_init(&t->mutex, NULL);
-    t->passive.stiffness = own.stiffness;
-    if (own.kind == EBPO_HAPTIC_TOOL)
-        status = ebpo_tool_new(own.points, own.point_count, &t->tool, error);
-    t->options.points = NULL; /* the caller's memory */
+    t->passive.stiffness = checked.stiffness;
+    if (checked.kind == EBPO_HAPTIC_TOOL)
+        status = ebpo_tool_new(checked.points, checked.point_count, &t->tool, error);
+    t->options.points = NULL; /* the caller may free the points */
     if (status == EBPO_OK)
         status = measure_model(t, error);
     if (status == EBPO_OK)

@@ -1,10 +1,11 @@
 /* Loads boxes of faces ahead of the haptic device, and queries exact results for probes, in a
  * separate thread. A box is a set of loaded faces (face_box.h).
  *
- * A haptic step never waits for this thread. Boxes and results are passed through buffers that are
- * exchanged atomically: the loader writes its buffer and swaps it with the middle buffer; the step
- * swaps the middle buffer with its own buffer. The position of the device is predicted from its
- * speed. When a box has more faces than there is memory for, a smaller box is loaded. */
+ * A haptic step never waits for this thread. Boxes and results are passed through three or more
+ * buffers whose indices are exchanged atomically: the loader writes its buffer and swaps it with
+ * the waiting buffer; the step swaps the waiting buffer with its own buffer. The position of the
+ * device is predicted from its speed. If the faces of a box do not fit in its memory, a smaller box
+ * is loaded. */
 #include "core/strict_fp.h"
 
 #include <errno.h>
@@ -18,7 +19,7 @@
 #include "extras/haptic/haptic_parts.h"
 #include "geometry/vec3.h"
 
-/* Queries distance and side at out->place, and sets the other members of *out. */
+/* Queries distance and winding number at out->place, and sets the other members of *out. */
 static ebpo_status query_probe(ebpo_haptic *t, ebpo_probe_query *out, ebpo_error *error)
 {
     ebpo_distance_result near;
@@ -37,8 +38,8 @@ static ebpo_status query_probe(ebpo_haptic *t, ebpo_probe_query *out, ebpo_error
     return EBPO_OK;
 }
 
-/* Queries distance and side at the probe's position, and passes them to the haptic step. *moved is
- * false, and nothing happens, if the position is the position of the last query. */
+/* Queries distance and winding number at the probe's position, and passes them to the haptic step.
+ * Does nothing, and sets *moved to false, if the position is the position of the last query. */
 static ebpo_status query_position(ebpo_haptic *t, bool *moved, ebpo_error *error)
 {
     ebpo_probe_query *known = &t->known[t->loader_result];
@@ -52,26 +53,27 @@ static ebpo_status query_position(ebpo_haptic *t, bool *moved, ebpo_error *error
     if (status != EBPO_OK)
         return status;
     ebpo_vec3_copy(known->place, t->last_query);
-    unsigned got =
+    unsigned received =
         atomic_exchange_explicit(&t->waiting_result, t->loader_result | EBPO_HAPTIC_FRESH,
                                  memory_order_acq_rel);
-    t->loader_result = got & ~(unsigned)EBPO_HAPTIC_FRESH;
+    t->loader_result = received & ~(unsigned)EBPO_HAPTIC_FRESH;
     return EBPO_OK;
 }
 
 const ebpo_probe_query *ebpo_haptic_newest_probe_query(ebpo_haptic *t)
 {
     if (atomic_load_explicit(&t->waiting_result, memory_order_relaxed) & EBPO_HAPTIC_FRESH) {
-        unsigned got =
+        unsigned received =
             atomic_exchange_explicit(&t->waiting_result, t->step_result, memory_order_acq_rel);
-        t->step_result = got & ~(unsigned)EBPO_HAPTIC_FRESH;
+        t->step_result = received & ~(unsigned)EBPO_HAPTIC_FRESH;
     }
     return &t->known[t->step_result];
 }
 
 /* --- boxes --- */
 
-static const double prediction_seconds = 0.05; /* a box is made for the position after this time */
+static const double prediction_seconds = 0.05; /* a box is made for the device's position after this
+                                                * time */
 static const double speed_seconds = 0.02;      /* time over which the speed is measured */
 /* Lengths in units of half a box's side: the greatest distance of the proxy from the middle of a
  * new box, and the motion of the middle after which another box is loaded. */
@@ -84,7 +86,7 @@ static void sleep_briefly(void)
 }
 
 /* Predicts the position of the device. Its speed is averaged over several haptic steps, because
- * between two checks the device has often made one step or none. */
+ * between two calls of this function there is often one step or none. */
 static void predict_device(ebpo_haptic *t, double out[3])
 {
     uint64_t now = ebpo_clock();
@@ -115,8 +117,8 @@ static void place_box(const ebpo_haptic *t, const double goal[3], ebpo_extent *o
     }
 }
 
-/* Returns true if the middle of `e` is so far from the middle of the newest box that `e` must be
- * loaded. */
+/* Returns true if the middle of `e` is so far from the middle of the newest box that a box for `e`
+ * must be loaded. */
 static bool is_far_from_newest(const ebpo_haptic *t, const ebpo_extent *e)
 {
     for (int i = 0; i < 3; i++)
@@ -130,9 +132,9 @@ static bool is_far_from_newest(const ebpo_haptic *t, const ebpo_extent *e)
 static void pass_box(ebpo_haptic *t, uint64_t began)
 {
     uint64_t ns = ebpo_clock() - began;
-    unsigned got = atomic_exchange_explicit(&t->waiting_box, t->loader_box | EBPO_HAPTIC_FRESH,
-                                            memory_order_acq_rel);
-    t->loader_box = got & ~(unsigned)EBPO_HAPTIC_FRESH;
+    unsigned received = atomic_exchange_explicit(&t->waiting_box, t->loader_box | EBPO_HAPTIC_FRESH,
+                                                 memory_order_acq_rel);
+    t->loader_box = received & ~(unsigned)EBPO_HAPTIC_FRESH;
     atomic_fetch_add(&t->loads, 1);
     atomic_fetch_add(&t->load_ns, ns);
     if (ns > atomic_load(&t->load_ns_max))
@@ -154,7 +156,7 @@ static ebpo_status load_boxes(ebpo_haptic *t, const double goal[3], ebpo_error *
             break;
         atomic_fetch_add(&t->too_many, 1);
         t->half_side /= 2;
-        if (!(t->half_side > t->reach * 0x1p-10 + t->band))
+        if (!(t->half_side > t->contact_distance * 0x1p-10 + t->band))
             return ebpo_fail(
                 error, EBPO_E_LIMIT,
                 "more than %llu faces around one point; allow more "
@@ -162,8 +164,8 @@ static ebpo_status load_boxes(ebpo_haptic *t, const double goal[3], ebpo_error *
                 (unsigned long long)t->options.faces);
     }
     t->newest_centres = centres;
-    bool can_grow = box->count < box->capacity / 4; /* read here: after the exchange, the haptic
-                                                     * step owns the box */
+    /* computed before pass_box, after which the haptic step owns the box */
+    bool can_grow = box->count < box->capacity / 4;
     pass_box(t, began);
     if (can_grow)
         t->half_side = fmin(1.5 * t->half_side, t->diagonal);

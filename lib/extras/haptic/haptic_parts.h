@@ -1,5 +1,5 @@
-/* Defines the object of a haptic session. Its members are in groups; comments state which thread
- * may use a group. */
+/* Defines the object of a haptic session. Its members are in groups; a comment at the head of each
+ * group states which thread may use its members. */
 #ifndef EBPO_HAPTIC_HAPTIC_PARTS_H
 #define EBPO_HAPTIC_HAPTIC_PARTS_H
 
@@ -16,77 +16,81 @@ enum {
     /* Number of boxes: the current and the previous one of haptic steps, one that waits to be taken
      * by a step, and one that is being loaded. */
     EBPO_HAPTIC_BOXES = 4,
-    EBPO_HAPTIC_FRESH = 8, /* flag, added to a box's index: no haptic step has taken the box */
+    EBPO_HAPTIC_FRESH = 8, /* flag that is added to the index of a box: no haptic step has taken the
+                            * box */
 
     /* Maximum number of faces and nodes that are examined for the normal, and for the side of a
      * probe. */
     EBPO_HAPTIC_FACES = 384,
     EBPO_HAPTIC_VISITS = 1024,
 
+    /* Maximum number of straight pieces of the path in a haptic step. */
     EBPO_HAPTIC_PIECES = EBPO_HAPTIC_PATH_MAX - 1
 };
 
 /* Exact results of the loading thread for a position of the probe. */
 typedef struct ebpo_probe_query {
     double place[3];            /* the position */
-    double distance;            /* without a sign; infinite if the model has no faces */
+    double distance;            /* distance from the nearest face, 0 or more; infinite if the model
+                                 * has no faces */
     double point[3], normal[3]; /* nearest point, and normal of its face */
     int32_t winding;
-    bool valid, on_face; /* the results have been set; the position is on a face */
+    bool valid;   /* the results have been set */
+    bool on_face; /* the position is on a face */
 } ebpo_probe_query;
 
 struct ebpo_haptic {
     /* --- constant members --- */
     ebpo_model *model;
     ebpo_haptic_options options;
-    ebpo_extent root;   /* contains all faces */
-    double diagonal;    /* diagonal of the root cell */
-    double reach, band; /* as in ebpo_ball_motion: radius plus skin, and tolerance of contact */
-    double margin;      /* faces within this distance of the proxy are loaded */
+    ebpo_extent root;              /* contains all faces */
+    double diagonal;               /* diagonal of the root cell */
+    double contact_distance, band; /* `radius` (here radius plus skin) and `band` (tolerance of
+                                    * contact) of ebpo_ball_motion */
+    double margin;                 /* faces within this distance of the proxy are loaded */
     bool solid;
     ebpo_held_levels levels; /* for probes */
 
     /* --- used by the thread of haptic steps --- */
-    unsigned current_box, previous_box; /* indices of the current and the previous box */
-    double proxy[3], device[3], force[3];
-    bool touching;
-    ebpo_ball_walk walk; /* the current piece of the path */
-    ebpo_held_planes
-        contact_planes;         /* contacts of the ball when its centre is at contact_position */
-    double contact_position[3]; /* position of the centre for these contacts */
+    unsigned current_box, previous_box;   /* indices of the current and the previous box */
+    double proxy[3], device[3], force[3]; /* positions, and the force of the last step */
+    bool touching;                        /* the last step had a contact */
+    ebpo_ball_walk walk;                  /* the current piece of the path */
+    ebpo_held_planes contact_planes; /* contacts of the ball if its centre is at contact_position */
+    double contact_position[3];
     ebpo_held_planes holding_planes; /* planes that hold the proxy after the last complete piece */
     uint32_t end_flags;              /* flags that are returned at the end of the piece */
     bool has_complete_piece; /* a piece towards the current position of the device is complete */
-    double path[EBPO_HAPTIC_PATH_MAX][3];
+    double path[EBPO_HAPTIC_PATH_MAX][3]; /* [path_count] positions of the proxy in the last step */
     uint32_t path_count;
     double max_piece; /* maximum length of a piece of a tool's path */
     ebpo_passive passive;
-    struct ebpo_tool *tool; /* or NULL */
+    struct ebpo_tool *tool; /* NULL for a ball or a probe */
     ebpo_haptic_stats stats;
-    uint32_t found[EBPO_HAPTIC_FACES]; /* workspace: faces around the proxy */
-    ebpo_near_node nearest_queue[EBPO_HAPTIC_VISITS + 2];
-    double gap[EBPO_HAPTIC_FACES]; /* their distances from the ball */
+    uint32_t found[EBPO_HAPTIC_FACES];                    /* workspace: faces around the proxy */
+    ebpo_near_node nearest_queue[EBPO_HAPTIC_VISITS + 2]; /* workspace of the search for faces */
+    double gap[EBPO_HAPTIC_FACES]; /* distances of the faces in `found` from the ball */
     double away[3];                /* direction away from the nearest face, if one was found */
     ebpo_context *proxy_context;   /* for placing the proxy */
-    ebpo_side side;                /* of a probe */
+    ebpo_known_winding side;       /* winding number of a probe's position */
     unsigned step_result;          /* index in known[] of the result that steps use */
 
     /* --- exchanged between the threads --- */
     ebpo_face_box box[EBPO_HAPTIC_BOXES];
     atomic_uint
         waiting_box; /* index of the waiting box, plus EBPO_HAPTIC_FRESH until it is taken */
-    _Atomic double proxy_reported[3]; /* The position of the proxy. Each component is atomic, so the
-                                       * loader may read a mixture of two positions. Therefore the
-                                       * step checks that a new box contains the proxy. */
-    _Atomic double device_reported[3];
+    /* The positions of proxy and device. Only the components are atomic, so the loader may read a
+     * mixture of two positions. Therefore the step checks that a new box contains the proxy. */
+    _Atomic double proxy_reported[3], device_reported[3];
     ebpo_probe_query known[3];
-    atomic_uint waiting_result; /* the same for known[] */
-    _Atomic bool stop, stopped; /* stopped: by a failure; `failure` is set before */
+    atomic_uint waiting_result; /* index in known[] of the waiting result, as for waiting_box */
+    _Atomic bool stop;          /* the loading thread must end */
+    _Atomic bool stopped;       /* the loading thread has failed, and `failure` has been set */
     atomic_uint_fast64_t loads, too_many, load_ns, load_ns_max;
 
     /* --- used by the loading thread --- */
     ebpo_context *loading;
-    unsigned loader_box;                /* index of the box that it may write */
+    unsigned loader_box;                /* index of the box that the loading thread may write */
     unsigned loader_result;             /* index in known[] of the result that it may write */
     double last_query[3];               /* position of the last query for a probe */
     ebpo_extent newest_centres;         /* `centres` of the newest box */
@@ -104,10 +108,10 @@ struct ebpo_haptic {
  * limits of `work` allow. Returns bits of ebpo_haptic_flag. */
 uint32_t ebpo_haptic_move_ball(ebpo_haptic *t, const double goal[3], ebpo_ball_work *work);
 
-/* haptic_step.c: returns the part, 0 to 1, of the proxy's straight path `motion` for which all
- * faces within `reach` are loaded: it ends at the boundary of the current box, except where no face
- * of the model can be within `reach`. */
-double ebpo_haptic_loaded_part(const ebpo_haptic *t, const double motion[3], double reach);
+/* haptic_step.c: returns the fraction, 0 to 1, of the proxy's straight path `motion` for which all
+ * faces within `distance` are loaded. The result is 1 if no face of the model can be within
+ * `distance` of the path. */
+double ebpo_haptic_loaded_part(const ebpo_haptic *t, const double motion[3], double distance);
 
 /* haptic_step.c: finds the nearest face, its weights, the depth and the smooth normal, and sets
  * t->away. */
@@ -120,11 +124,11 @@ const ebpo_probe_query *ebpo_haptic_newest_probe_query(ebpo_haptic *t);
 EBPO_MUST_USE ebpo_status ebpo_haptic_loader_start(ebpo_haptic *t, ebpo_error *error);
 void ebpo_haptic_loader_stop(ebpo_haptic *t);
 
-/* haptic_step.c: takes the waiting box, if it is fresh, as the previous box; if it contains the
- * proxy, makes it the current one and returns true. */
+/* haptic_step.c: if the waiting box is fresh, takes it as the previous box. If this box contains
+ * the proxy, makes it the current box and returns true. */
 bool ebpo_haptic_take_box(ebpo_haptic *t);
-/* haptic_step.c: exchanges the current and the previous box if the previous one contains the proxy:
- * it may reach further in the direction of the device. */
+/* haptic_step.c: exchanges the current and the previous box if the previous box contains the proxy,
+ * because the previous box may extend further in the direction of the device. */
 void ebpo_haptic_try_previous_box(ebpo_haptic *t);
 
 /* haptic_ball.c: returns EBPO_HAPTIC_STOPPED if the loading thread has failed, or 0. */

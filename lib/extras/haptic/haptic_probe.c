@@ -1,10 +1,11 @@
-/* Computes the haptic step of a probe: bounds of its distance to the surface, and its side.
+/* Computes the haptic step of a probe (a point): bounds of its distance to the surface, and if it
+ * is inside or outside.
  *
  * Certain bounds come from three sources: the faces of the current box, the exact result for a
  * recent position of the probe, and the first levels of the octree. The step returns the
- * intersection of these intervals. The side follows from the winding number, which changes at each
- * face that the probe crosses, by exact arithmetic. It is EBPO_MAYBE if the work limit of the step
- * is too small to find it. */
+ * intersection of these intervals. The side (EBPO_IN, EBPO_OUT) follows from the winding number,
+ * which changes at each face that the probe crosses, by exact arithmetic. The side is EBPO_MAYBE if
+ * the work limit of the step is too small to find it. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -14,9 +15,10 @@
 #include "extras/haptic/haptic_parts.h"
 #include "geometry/vec3.h"
 
+/* Greatest number of visited nodes of the first levels. */
 enum { VISITS = 512 };
 
-/* Bounds of the distance without a sign. */
+/* Bounds of the unsigned distance. */
 typedef struct bounds {
     double lo, hi;
 } bounds;
@@ -33,8 +35,7 @@ static double rounding_of(const ebpo_haptic *t, double length)
     return t->levels.slack + EBPO_LENGTH_SLACK * length;
 }
 
-/* Bounds the distance by the faces of the current box. Returns true if the nearest face is known.
- */
+/* Narrows the bounds by the faces of the current box. Returns true if the nearest face is known. */
 static bool bound_by_faces(ebpo_haptic *t, const double place[3], ebpo_haptic_probe_result *out,
                            bounds *b)
 {
@@ -59,8 +60,8 @@ static bool bound_by_faces(ebpo_haptic *t, const double place[3], ebpo_haptic_pr
     return all && near.face != EBPO_NO_FACE;
 }
 
-/* Bounds the distance by the newest exact result and the distance of its position from `place`.
- * Returns true if it is the result for `place`. */
+/* Narrows the bounds by the newest exact result and the distance of its position from `place`.
+ * Returns true if these positions are equal. */
 static bool bound_by_known(ebpo_haptic *t, const double place[3], ebpo_haptic_probe_result *out,
                            bounds *b)
 {
@@ -77,16 +78,16 @@ static bool bound_by_known(ebpo_haptic *t, const double place[3], ebpo_haptic_pr
     return far == 0;
 }
 
-/* Finds the side at `place` by moving there from the last position with a known side; if the box
- * contains no such position, from the position of the newest exact result. Returns false if the
- * side is not found. */
+/* Finds the winding number at `place` by moving to it from the last position with a known winding
+ * number, or, if the box does not contain that position, from the position of the newest exact
+ * result. Returns false if the winding number is not found. */
 static bool find_side(ebpo_haptic *t, const double place[3], ebpo_haptic_probe_result *out)
 {
     const ebpo_probe_query *known = &t->known[t->step_result];
     const ebpo_face_box *box = &t->box[t->current_box];
     for (int attempt = 0; attempt < 2; attempt++) {
-        if (ebpo_side_move(&t->side, box, place, t->found, EBPO_HAPTIC_FACES, EBPO_HAPTIC_VISITS,
-                           &out->work))
+        if (ebpo_known_winding_move(&t->side, box, place, t->found, EBPO_HAPTIC_FACES,
+                                    EBPO_HAPTIC_VISITS, &out->work))
             return true;
         if (t->side.known || !known->valid || known->on_face)
             return false;
@@ -97,6 +98,7 @@ static bool find_side(ebpo_haptic *t, const double place[3], ebpo_haptic_probe_r
     return false;
 }
 
+/* Returns EBPO_IN, EBPO_OUT, EBPO_ON or EBPO_MAYBE for a position. */
 static int32_t classify_position(ebpo_haptic *t, const double place[3],
                                  ebpo_haptic_probe_result *out)
 {
@@ -118,7 +120,7 @@ static int32_t classify_position(ebpo_haptic *t, const double place[3],
 }
 
 /* Sets the interval of the signed distance. close: the nearest face or the exact distance is known,
- * so the middle of the interval is accurate. */
+ * so that the middle of the interval is accurate; if false, `distance` is NAN. */
 static void fill_bounds(ebpo_haptic_probe_result *out, const bounds *b, bool close)
 {
     double lo = fmax(0, fmin(b->lo, b->hi)), hi = b->hi;

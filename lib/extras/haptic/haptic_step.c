@@ -1,12 +1,12 @@
 /* Moves the proxy in a haptic step towards the position of the device. The proxy is the centre of a
- * ball that stays outside of the model. Its path is straight until the ball is in contact, then
- * along the contacts, repeated a few times.
+ * ball that stays outside of the model. Its path consists of straight pieces: a piece ends where
+ * the ball comes into contact, and the next piece follows the contacts.
  *
- * Each straight piece is decided in two passes: distances find where the ball stops, and exact
- * arithmetic checks that the centre has crossed no face. If very many faces are around the ball, a
- * piece is completed in later haptic steps.
+ * Each piece is decided in two passes: distances find where the ball stops, and exact arithmetic
+ * checks that the centre has crossed no face. If very many faces are around the ball, a piece is
+ * completed in later haptic steps.
  *
- * This file also takes over the boxes (sets of loaded faces, face_box.h) of the loading thread. It
+ * This file also takes over the boxes (sets of loaded faces, face_box.h) of the loading thread,
  * finds the nearest face, and computes the smooth normal, which changes continuously with the
  * position of the proxy. */
 #include "core/strict_fp.h"
@@ -25,14 +25,13 @@ static void swap_boxes(ebpo_haptic *t)
     t->previous_box = before;
 }
 
-/* The newest box replaces the previous one. If it contains the proxy, it becomes the current one.
- */
 bool ebpo_haptic_take_box(ebpo_haptic *t)
 {
     if (!(atomic_load_explicit(&t->waiting_box, memory_order_relaxed) & EBPO_HAPTIC_FRESH))
         return false;
-    unsigned got = atomic_exchange_explicit(&t->waiting_box, t->previous_box, memory_order_acq_rel);
-    t->previous_box = got & ~(unsigned)EBPO_HAPTIC_FRESH;
+    unsigned received =
+        atomic_exchange_explicit(&t->waiting_box, t->previous_box, memory_order_acq_rel);
+    t->previous_box = received & ~(unsigned)EBPO_HAPTIC_FRESH;
     if (!ebpo_extent_holds(&t->box[t->previous_box].centres, t->proxy))
         return false; /* the box was made for another position */
     swap_boxes(t);
@@ -53,16 +52,16 @@ typedef struct face_search {
     ebpo_haptic *t;
     const ebpo_face_box *box;
     ebpo_near_queue queue;
-    double search_radius; /* all faces that are closer to the ball than this have been found */
+    double search_radius; /* all faces closer to the ball than this distance have been found */
     double nearest;       /* distance from the centre to the nearest face */
     uint32_t visited_faces;
     uint32_t count; /* number of entries of t->found */
     ebpo_haptic_ball_result *out;
 } face_search;
 
-/* Adds the normal of a face to `sum`, weighted by the face's area and by a factor that falls to 0
- * at the search radius. The normal of a solid's face points outwards; the normal of a surface's
- * face points to the proxy's side. */
+/* Adds the normal of a face to `sum`, weighted by the face's area and by a factor that decreases to
+ * 0 at the search radius. The normal of a solid's face points outwards; the normal of a surface's
+ * face is turned to the proxy's side. gap: distance of the face from the ball. */
 static void add_normal(const face_search *a, const double face[3][3], double gap, double sum[3])
 {
     double e[3], f[3], n[3], d[3];
@@ -77,7 +76,7 @@ static void add_normal(const face_search *a, const double face[3][3], double gap
         sum[i] += weight * n[i];
 }
 
-/* Adds a face within the search radius to t->found, and updates the nearest one. */
+/* Adds a face to t->found if it is within the search radius, and updates the nearest face. */
 static void add_face(face_search *a, uint64_t f)
 {
     const double(*face)[3] = (const double(*)[3])a->box->corner[f];
@@ -112,8 +111,9 @@ static void push_node(face_search *a, uint64_t node)
         ebpo_near_push(&a->queue, least, node);
 }
 
-/* Finds the faces around the ball, the nearest first. When there are too many, the farthest are
- * omitted, and the normal uses only faces that are closer than every omitted face. */
+/* Finds the faces around the ball, the nearest first. If there are too many, omits the farthest,
+ * and reduces a->search_radius so that the normal uses only faces that are closer than every
+ * omitted face. */
 static void find_faces(face_search *a)
 {
     for (uint32_t visits = 0; a->queue.count > 0; visits++) {
@@ -135,7 +135,7 @@ static void find_faces(face_search *a)
     }
 }
 
-/* Returns true if all faces of the model are certainly outside the search radius. */
+/* Returns true if the box of the model is outside the search radius. */
 static bool has_no_face_close(const ebpo_haptic *t)
 {
     double wide = t->options.radius + t->options.search_radius;
@@ -146,8 +146,8 @@ static bool has_no_face_close(const ebpo_haptic *t)
 }
 
 /* Computes the smooth normal: the normalised sum of the normals of the faces around the ball. If
- * the sum is 0 and the tool is a ball (EBPO_HAPTIC_BALL), returns the direction away from the
- * nearest face. */
+ * the sum is 0 and the object is a ball (EBPO_HAPTIC_BALL), the result is the direction away from
+ * the nearest face. */
 static void report_normal(const face_search *a, double out[3])
 {
     double sum[3] = { 0 };
@@ -189,10 +189,9 @@ void ebpo_haptic_find_nearest(ebpo_haptic *t, ebpo_haptic_ball_result *out)
 /* The path of the proxy in one haptic step. */
 typedef struct path_step {
     ebpo_haptic *t;
-    const double *goal; /* [3] */
-    double motion[3], slack,
-        least_slack; /* of the current piece: see ebpo_ball_motion (face_box.h) */
-    uint32_t flags;  /* bits of ebpo_haptic_flag, for the caller */
+    const double *goal;                   /* [3] */
+    double motion[3], slack, least_slack; /* of the current piece, as in ebpo_ball_motion */
+    uint32_t flags;                       /* bits of ebpo_haptic_flag, for the caller */
     ebpo_ball_work *work;
 } path_step;
 
@@ -218,8 +217,8 @@ static void shorten_motion(double motion[3], double part)
         motion[i] *= part;
 }
 
-/* Returns the part, 0 to 1, of the path from p that is in `e`; p must be in `e`. The part is
- * rounded down, so that the computed end is also in `e`. */
+/* Returns the fraction, 0 to 1, of the path from p that is in `e`; p must be in `e`. The fraction
+ * is rounded down, so that the computed end is in `e`, too. */
 static double part_inside(const double p[3], const double motion[3], const ebpo_extent *e)
 {
     double part = 1;
@@ -233,11 +232,11 @@ static double part_inside(const double p[3], const double motion[3], const ebpo_
     return part < 1 ? fmax(0, part * (1 - 0x1p-20)) : 1;
 }
 
-double ebpo_haptic_loaded_part(const ebpo_haptic *t, const double motion[3], double reach)
+double ebpo_haptic_loaded_part(const ebpo_haptic *t, const double motion[3], double distance)
 {
     const ebpo_extent *centres = &t->box[t->current_box].centres;
     ebpo_extent all;
-    box_of_path(t->proxy, motion, reach, &all);
+    box_of_path(t->proxy, motion, distance, &all);
     if (are_apart(&all, &t->root))
         return 1;
     return ebpo_extent_holds(centres, t->proxy) ? part_inside(t->proxy, motion, centres) : 0;
@@ -248,7 +247,7 @@ double ebpo_haptic_loaded_part(const ebpo_haptic *t, const double motion[3], dou
 static bool cut_to_loaded_part(path_step *s)
 {
     ebpo_haptic *t = s->t;
-    double part = ebpo_haptic_loaded_part(t, s->motion, t->reach + t->band);
+    double part = ebpo_haptic_loaded_part(t, s->motion, t->contact_distance + t->band);
     if (part < 1) {
         t->end_flags = EBPO_HAPTIC_WAITING;
         shorten_motion(s->motion, part);
@@ -265,7 +264,7 @@ static bool vectors_differ(const double a[3], const double b[3])
     return a[0] != b[0] || a[1] != b[1] || a[2] != b[2];
 }
 
-/* Begins the next piece. Returns false if the proxy stays. */
+/* Begins the next piece. Returns false if the proxy must stay at its position. */
 static bool begin_piece(path_step *s)
 {
     ebpo_haptic *t = s->t;
@@ -279,21 +278,21 @@ static bool begin_piece(path_step *s)
     if (vectors_differ(s->motion, want))
         s->flags |= EBPO_HAPTIC_CONTACT;
     s->least_slack = 0x1p-44 * sqrt(ebpo_vec3_dot(want, want));
-    double whole = sqrt(ebpo_vec3_dot(s->motion, s->motion));
-    if (whole <= 0x1p-12 * t->options.skin)
+    double full_length = sqrt(ebpo_vec3_dot(s->motion, s->motion));
+    if (full_length <= 0x1p-12 * t->options.skin)
         return false;
     t->end_flags = 0;
     if (!cut_to_loaded_part(s))
         return false;
-    /* s->slack and s->least_slack belong to the whole path to the device: scale them to this piece
+    /* s->slack and s->least_slack belong to the whole path to the device; scale them to this piece
      */
-    double share = sqrt(ebpo_vec3_dot(s->motion, s->motion)) / whole;
+    double share = sqrt(ebpo_vec3_dot(s->motion, s->motion)) / full_length;
     const ebpo_face_box *box = &t->box[t->current_box];
     ebpo_vec3_copy(t->proxy, w->from);
     ebpo_vec3_copy(s->motion, w->motion);
-    w->box = ebpo_extent_holds(&box->centres, t->proxy) ? box : NULL; /* NULL: the whole piece
-                                                                       * is away from all faces */
-    w->reach = t->reach;
+    /* NULL: the whole piece is away from all faces (cut_to_loaded_part) */
+    w->box = ebpo_extent_holds(&box->centres, t->proxy) ? box : NULL;
+    w->contact_distance = t->contact_distance;
     w->band = t->band;
     w->slack = s->slack * share;
     w->least_slack = s->least_slack * share;
@@ -301,8 +300,8 @@ static bool begin_piece(path_step *s)
     return true;
 }
 
-/* Makes space for more planes: drops the planes that the last piece moved away from, and one more
- * if the list is still full. Three planes are enough to hold the proxy. */
+/* Makes space for more planes: drops the planes from which the last piece moved away, and, if the
+ * list is still full, the last plane. Three planes are enough to hold the proxy. */
 static void reserve_space(ebpo_held_planes *along, const double motion[3])
 {
     double length = sqrt(ebpo_vec3_dot(motion, motion));
@@ -313,8 +312,8 @@ static void reserve_space(ebpo_held_planes *along, const double motion[3])
     along->count = kept < EBPO_PLANES_LIMIT ? kept : kept - 1;
 }
 
-/* Adds the contacts at the end of the piece to t->contact_planes; earlier contacts are dropped if
- * the ball has moved. */
+/* Adds the contacts at the end of the piece to t->contact_planes. Drops earlier contacts if the
+ * ball has moved. */
 static void add_planes(ebpo_haptic *t)
 {
     const ebpo_ball_walk *w = &t->walk;
@@ -327,8 +326,8 @@ static void add_planes(ebpo_haptic *t)
     ebpo_vec3_copy(t->proxy, t->contact_position);
 }
 
-/* Ends the piece: moves the proxy, and updates contacts and flags. Returns false if the ball has no
- * contact at the end, so that no further piece along contacts follows. */
+/* Ends the piece: moves the proxy, and updates contacts and flags. Returns true if the ball is in
+ * contact at the end, so that another piece along the contacts follows. */
 static bool end_piece(path_step *s)
 {
     ebpo_haptic *t = s->t;
@@ -348,8 +347,9 @@ static bool end_piece(path_step *s)
     return touches;
 }
 
-/* Returns 0 if a piece towards the current position of the device is complete. Otherwise returns
- * EBPO_HAPTIC_CONTACT if the contacts of the last complete piece keep the proxy from the device. */
+/* Returns EBPO_HAPTIC_CONTACT if no piece towards the current position of the device is complete
+ * yet and the contacts of the last complete piece keep the proxy from the device. Returns 0 in
+ * other cases. */
 static uint32_t held_flags(const path_step *s)
 {
     const ebpo_haptic *t = s->t;
@@ -361,8 +361,8 @@ static uint32_t held_flags(const path_step *s)
     return vectors_differ(motion, want) ? EBPO_HAPTIC_CONTACT : 0;
 }
 
-/* Follows pieces towards the goal. A piece that an earlier haptic step began leads to the device's
- * position at that time, and is completed first. */
+/* Follows pieces towards the goal. First completes a piece that an earlier haptic step began, which
+ * leads to an earlier position of the device. Returns bits of ebpo_haptic_flag. */
 static uint32_t follow_pieces(path_step *s)
 {
     ebpo_haptic *t = s->t;
@@ -389,12 +389,12 @@ static uint32_t follow_pieces(path_step *s)
 uint32_t ebpo_haptic_move_ball(ebpo_haptic *t, const double goal[3], ebpo_ball_work *work)
 {
     path_step s = { .t = t, .goal = goal, .work = work };
-    double left[3];
+    double remaining[3];
     t->has_complete_piece = false;
     t->path_count = 0;
     ebpo_vec3_copy(t->proxy, t->path[t->path_count++]);
     uint32_t flags = follow_pieces(&s);
-    ebpo_vec3_subtract(goal, t->proxy, left);
-    bool arrived = sqrt(ebpo_vec3_dot(left, left)) <= 0x1p-12 * t->options.skin;
+    ebpo_vec3_subtract(goal, t->proxy, remaining);
+    bool arrived = sqrt(ebpo_vec3_dot(remaining, remaining)) <= 0x1p-12 * t->options.skin;
     return arrived ? flags & ~(uint32_t)EBPO_HAPTIC_CONTACT : flags;
 }

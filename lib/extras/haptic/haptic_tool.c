@@ -1,12 +1,13 @@
 /* Computes a haptic step of a tool, a rigid set of points. The motion follows Gauss' principle for
- * a body without mass: of all motions that its contacts allow, the tool makes the one nearest to
- * the device's motion (Ortega, Redon, Coquillart 2007).
+ * a body without mass: of all motions that its contacts allow, the tool makes the motion nearest to
+ * the motion of the device (Ortega, Redon, Coquillart 2007).
  *
- * A piece of the path is decided in two passes. First, each point that may hit a face is followed
- * along the path, up to where the first point comes too close to a face. Then all these points are
- * examined at their new positions: exact arithmetic checks that they have crossed no face, and
- * distances check that they are not too close. Only then does the tool move there. Both passes may
- * take several steps, if many points are close. */
+ * The path of a step consists of pieces. A piece is decided in two passes. The first pass follows
+ * each point that may hit a face, and ends the piece where the first point comes too close to a
+ * face. The second pass examines these points at their new positions: exact arithmetic checks that
+ * no point has crossed a face, and distances check that no point is too close. After that, the tool
+ * moves to the end of the piece. If many points are close to faces, a pass may take several haptic
+ * steps. */
 #include "core/strict_fp.h"
 
 #include "core/fp_env.h"
@@ -14,21 +15,27 @@
 #include "extras/haptic/tool.h"
 #include "extras/haptic/haptic_parts.h"
 
+/* Limits of visited nodes in a search around a cluster, around a point, and for the faces around a
+ * point's path; and the work of examining a face, in visited nodes. */
 enum { CLUSTER_VISITS = 64, POINT_VISITS = 48, FACE_VISITS = 256, FACE_COST = 6 };
 
 /* Distances in units of the skin. */
-static const double search = 2.5;   /* faces within this distance of a point's path are examined */
-static const double stop_at = 0.75; /* a piece ends where a point is this close to a face */
-static const double allowed = 0.5;  /* at the end of a piece, no point may be closer to a face */
-static const double bend = 0.125;   /* a rotating point may be this far from its straight path; see
-                                     * limit_angle */
+static const double search_distance =
+    2.5; /* faces within this distance of a point's path are examined */
+static const double stop_distance = 0.75; /* a piece ends where a point is this close to a face */
+static const double least_distance =
+    0.5;                              /* at the end of a piece, no point may be closer to a face */
+static const double max_bend = 0.125; /* a rotating point may be this far from its straight path;
+                                       * see limit_angle */
 
 typedef struct tool_piece {
     ebpo_haptic *t;
     ebpo_tool *tool;
-    const ebpo_face_box *box; /* NULL: no box contains the proxy; then no face is near the path */
-    double skin, angle;       /* skin, and angle of rotation of the whole piece */
-    uint64_t *work;
+    const ebpo_face_box *box; /* NULL: the current box does not contain the proxy, because no face
+                               * is near the path */
+    double skin;              /* distance that the tool keeps from faces (ebpo_haptic_options) */
+    double angle;             /* angle of rotation of the piece, in radians */
+    uint64_t *work;           /* work of the haptic step so far */
 } tool_piece;
 
 static tool_piece make_piece(ebpo_haptic *t, uint64_t *work)
@@ -52,8 +59,8 @@ static void box_of_segment(const double p[3], const double q[3], double wide, eb
     }
 }
 
-/* Returns a distance within which no face is around `e`. It follows from the faces of the box and
- * the boundary of the loaded region, or from the model's box. */
+/* Returns a distance within which no face is around `e`. It is computed from the faces of the box
+ * and the boundary of the loaded region, or from the box of the model. */
 static double free_distance(const tool_piece *p, const ebpo_extent *e, uint32_t visits)
 {
     double out = 0, inside = INFINITY;
@@ -80,8 +87,8 @@ static double max_motion(const tool_piece *p, const ebpo_tool_cluster *c)
     return max_point_motion(p, lever_of(c->middle) + c->radius) * (1 + 0x1p-40);
 }
 
-/* Adds a point to tool->close_points with the faces around its path, and shortens the path to where
- * the point comes too close to one of them. Returns false if the pool is full or too many faces are
+/* Adds a point to tool->close_points with the faces around its path. Ends the piece where the point
+ * comes too close to one of these faces. Returns false if the pool is full or too many faces are
  * around the path. */
 static bool add_close_point(const tool_piece *p, uint32_t point)
 {
@@ -94,7 +101,7 @@ static bool add_close_point(const tool_piece *p, uint32_t point)
     for (int i = 0; i < 3; i++)
         to[i] = tool->proxy.place[i] + tool->motion[i] + lever[i];
     ebpo_vec3_subtract(to, from, motion);
-    box_of_segment(from, to, search * p->skin, &e);
+    box_of_segment(from, to, search_distance * p->skin, &e);
     if (tool->pool_count + EBPO_TOOL_NEAR > EBPO_TOOL_POOL)
         return false;
     bool all = ebpo_face_box_find(p->box, &e, tool->pool + tool->pool_count, EBPO_TOOL_NEAR,
@@ -102,7 +109,7 @@ static bool add_close_point(const tool_piece *p, uint32_t point)
     *p->work += FACE_VISITS - visits + FACE_COST * (uint64_t)count;
     if (!all)
         return false;
-    const ebpo_ball_motion w = { from, motion, stop_at * p->skin, p->t->band, 0, 0 };
+    const ebpo_ball_motion w = { from, motion, stop_distance * p->skin, p->t->band, 0, 0 };
     for (uint32_t i = 0; i < count; i++) {
         double away[3];
         double part = ebpo_ball_first_contact(
@@ -121,9 +128,9 @@ static bool inspect_points(const tool_piece *p, uint32_t number)
 {
     ebpo_tool *tool = p->tool;
     ebpo_tool_cluster *c = &tool->cluster[number];
-    double need = search * p->skin;
+    double need = search_distance * p->skin;
     double all = INFINITY;
-    c->safe_until = 0; /* remains 0 if the piece is given up */
+    c->safe_until = 0; /* not known, until all points have been examined */
     for (uint32_t i = c->first; i < c->first + c->count; i++) {
         double motion = max_point_motion(p, lever_of(tool->point[i])) * (1 + 0x1p-40);
         if (tool->safe_until[i] - c->travelled - motion <= 0) {
@@ -154,7 +161,7 @@ static bool inspect_cluster(const tool_piece *p, uint32_t number)
     ebpo_extent e;
     ebpo_tool_at(&tool->proxy, (const double(*)[3])tool->from_matrix, c->middle, at);
     box_of_segment(at, at, c->radius, &e);
-    from_all = free_distance(p, &e, CLUSTER_VISITS) - search * p->skin;
+    from_all = free_distance(p, &e, CLUSTER_VISITS) - search_distance * p->skin;
     if (from_all - motion <= 0)
         return inspect_points(p, number);
     c->safe_until = c->travelled + from_all;
@@ -181,11 +188,10 @@ static void add_contact(const tool_piece *p, const ebpo_close_point *close, uint
     ebpo_tool_contact_add(&tool->next, &c);
 }
 
-/* Adds the contacts of a point. A face directly below the point pushes along its normal; its
- * neighbours would push at an angle, from the shared edge. So a face counts only if the point of
- * the face that is nearest to the tool's point is in the face's interior, or if no other face is
- * nearer.
- */
+/* Adds the contacts of a point. A face directly below the point pushes along its normal, but its
+ * neighbours would push at an angle, from the shared edge. So a face counts only if its nearest
+ * point is in its interior, or if no other face is nearer. near: nearest points of close->count
+ * faces. */
 static void add_contacts(const tool_piece *p, const ebpo_close_point *close,
                          const ebpo_face_near *near)
 {
@@ -195,14 +201,14 @@ static void add_contacts(const tool_piece *p, const ebpo_close_point *close,
     for (uint32_t i = 0; i < close->count; i++) {
         const double *w = near[i].weight;
         bool straight = w[0] > 0 && w[1] > 0 && w[2] > 0;
-        if (near[i].distance < search * p->skin &&
+        if (near[i].distance < search_distance * p->skin &&
             (straight || near[i].distance <= nearest + 0x1p-10 * p->skin))
             add_contact(p, close, p->tool->pool[close->first + i], &near[i]);
     }
 }
 
-/* Checks the new position of a point, and adds the contacts there. Returns false if the point has
- * crossed a face or is too close to one. */
+/* Checks the new position of a point, and adds the contacts at this position. Returns false if the
+ * point has crossed a face or is too close to a face. */
 static bool check_close_point(const tool_piece *p, const ebpo_close_point *close)
 {
     ebpo_tool *tool = p->tool;
@@ -215,7 +221,7 @@ static bool check_close_point(const tool_piece *p, const ebpo_close_point *close
     for (uint32_t i = 0; i < close->count; i++) {
         const double(*face)[3] = (const double(*)[3])p->box->corner[tool->pool[close->first + i]];
         ebpo_face_nearest(to, face, &near[i]);
-        if (tool->part > 0 && (near[i].distance < allowed * p->skin + p->t->band ||
+        if (tool->part > 0 && (near[i].distance < least_distance * p->skin + p->t->band ||
                                ebpo_segment_may_intersect(from, to, face)))
             return false;
     }
@@ -234,7 +240,7 @@ static void begin_check(ebpo_tool *tool)
     ebpo_rigid_matrix(&tool->end, tool->end_matrix);
 }
 
-/* Moves the tool to the end of the piece, and adds the motion to that of each cluster. */
+/* Moves the tool to the end of the piece, and adds the motion to `travelled` of each cluster. */
 static void end_piece(const tool_piece *p)
 {
     ebpo_tool *tool = p->tool;
@@ -246,12 +252,12 @@ static void end_piece(const tool_piece *p)
     tool->stage = EBPO_TOOL_IDLE;
 }
 
-/* Shortens a motion whose angle or length is too great, and then sets a flag. The path of a point
- * differs from a straight one by at most lever * angle^2 / 8. */
+/* Shortens a motion whose angle or length is too great, and then sets a bit of *flags. The path of
+ * a point differs from a straight path by at most lever * angle^2 / 8. */
 static void limit_angle(ebpo_haptic *t, double motion[EBPO_SCREW], uint32_t *flags)
 {
     ebpo_tool *tool = t->tool;
-    double most = fmin(0.25, sqrt(8 * bend * t->options.skin / tool->radius));
+    double most = fmin(0.25, sqrt(8 * max_bend * t->options.skin / tool->radius));
     double angle = sqrt(ebpo_vec3_dot(motion + 3, motion + 3)) / tool->arm, part = 1;
     if (angle > most)
         part = most / angle;
@@ -265,8 +271,8 @@ static void limit_angle(ebpo_haptic *t, double motion[EBPO_SCREW], uint32_t *fla
         motion[k] *= part;
 }
 
-/* Begins a piece along `wanted`, shortened as necessary. Returns false, and sets a bit of *flags,
- * if the piece cannot begin. */
+/* Begins a piece along `wanted`, which is shortened if necessary. Returns false, and sets a bit of
+ * *flags, if the piece cannot begin. */
 static bool begin_tool_motion(ebpo_haptic *t, const double wanted[EBPO_SCREW], uint32_t *flags)
 {
     ebpo_tool *tool = t->tool;
@@ -274,7 +280,8 @@ static bool begin_tool_motion(ebpo_haptic *t, const double wanted[EBPO_SCREW], u
         tool->motion[k] = wanted[k];
     tool->flags = 0;
     limit_angle(t, tool->motion, &tool->flags);
-    double part = ebpo_haptic_loaded_part(t, tool->motion, tool->radius + search * t->options.skin);
+    double part =
+        ebpo_haptic_loaded_part(t, tool->motion, tool->radius + search_distance * t->options.skin);
     if (part < 1) {
         tool->flags |= EBPO_HAPTIC_WAITING;
         if (part <= 0) {
@@ -294,8 +301,8 @@ static bool begin_tool_motion(ebpo_haptic *t, const double wanted[EBPO_SCREW], u
     return true;
 }
 
-/* Abandons the piece: too many faces are close, or its end is not allowed. The next piece is
- * shorter. */
+/* Abandons the piece, because too many faces are close or its end is not allowed. Makes the next
+ * piece shorter. */
 static uint32_t give_up_piece(tool_piece *p)
 {
     p->t->max_piece = fmax(0.25 * ebpo_screw_length(p->tool->motion), 0x1p-8 * p->skin);
@@ -393,8 +400,8 @@ static uint32_t move_proxy(ebpo_haptic *t, const ebpo_rigid *device, uint64_t *w
     return flags | EBPO_HAPTIC_PATH_UNFINISHED;
 }
 
-/* Computes the vector from device to proxy, or only the part of it that contacts cause. Returns the
- * number of contacts that hold the tool. */
+/* Computes the vector from device to proxy, or only the part of this vector that contacts cause.
+ * Returns the number of contacts that hold the tool. */
 static int find_depth(const ebpo_haptic *t, const ebpo_rigid *device, uint32_t flags,
                       double out[EBPO_SCREW])
 {
@@ -402,8 +409,8 @@ static int find_depth(const ebpo_haptic *t, const ebpo_rigid *device, uint32_t f
     double want[EBPO_SCREW], motion[EBPO_SCREW];
     ebpo_rigid_between(&tool->proxy, device, tool->arm, want);
     int holding = ebpo_tool_hold(&tool->contacts, want, contact_tolerance(t), false, motion);
-    /* with friction, a tool that has completed its path is held in all directions: the whole
-     * vector counts. Otherwise motions that the contacts allow do not count. */
+    /* Friction holds a tool that has completed its path in all directions, so the whole vector
+     * counts. In other cases motions that the contacts allow do not count. */
     bool held_only =
         flags & (EBPO_HAPTIC_WAITING | EBPO_HAPTIC_PATH_UNFINISHED) || t->options.friction == 0;
     for (int k = 0; k < EBPO_SCREW; k++)

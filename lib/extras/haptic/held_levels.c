@@ -1,10 +1,10 @@
-/* Keeps the first levels of an octree in memory for probes: bounds of the distance to the surface,
- * and the winding numbers of cells without faces.
+/* Keeps the first levels of an octree in memory for probes. They give bounds of the distance to the
+ * surface, and the winding numbers of cells without faces.
  *
- * There are at most 2^17 nodes, of at most 6 levels below the root. A node has its box, its
- * children, a flag for faces in or near its cell, and its winding number if there are no faces.
- * Bounds are certain: they include the rounding of the model's coordinates. A query visits at most
- * as many nodes as its caller allows; with fewer nodes its bounds are wider. */
+ * At most 2^17 nodes of at most 6 levels below the root are kept. A node has its box, its children,
+ * a flag for faces in or near its cell, and, if there are none, its winding number. Bounds are
+ * certain: they include the rounding of the model's coordinates. The caller limits the number of
+ * visited nodes; with a smaller limit the bounds are wider. */
 #include "core/strict_fp.h"
 
 #include "extras/haptic/held_levels.h"
@@ -91,10 +91,11 @@ static double distance_to_far_corner(const ebpo_held_node *n, const double p[3])
 
 typedef struct waiting_node {
     uint32_t node;
-    double lower;
+    double lower; /* distance of the query point from the node's cell */
 } waiting_node;
 
-/* Pushes the children whose distance is below `limit` onto the stack, the nearest on top. */
+/* Pushes the children with faces whose distance is below `limit` onto the stack, the nearest child
+ * last. */
 static void add_children(const ebpo_held_levels *levels, const double p[3], uint32_t first,
                          double limit, waiting_node *stack, int *depth)
 {
@@ -131,7 +132,7 @@ void ebpo_held_levels_bound(const ebpo_held_levels *levels, const double p[3], i
         else
             add_children(levels, p, n->children, lower, stack, &depth);
     }
-    /* without faces both bounds are infinite */
+    /* both bounds are infinite if the model has no faces */
     *lo = isfinite(lower) ? fmax(0, lower - levels->slack - EBPO_LENGTH_SLACK * lower) : lower;
     *hi = upper + levels->slack + EBPO_LENGTH_SLACK * upper;
 }

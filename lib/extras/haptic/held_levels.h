@@ -1,11 +1,12 @@
-/* The first levels of a model's octree, kept for haptic steps: guaranteed bounds without reading a
- * file. */
+/* Keeps the first levels of a model's octree in memory, so that haptic steps get guaranteed bounds
+ * without reading a file. */
 #ifndef EBPO_HAPTIC_HELD_LEVELS_H
 #define EBPO_HAPTIC_HELD_LEVELS_H
 
 #include <ebpo/query.h>
 
-/* Relative rounding error of a length between two points: a few units in the last place. */
+/* Greatest relative rounding error of a length between two points (some units in the last place).
+ */
 #define EBPO_LENGTH_SLACK 0x1p-48
 
 typedef struct ebpo_held_node {
@@ -21,14 +22,13 @@ typedef struct ebpo_held_levels {
     double slack; /* bound of the rounding of the model's coordinates */
 } ebpo_held_levels;
 
-/* Reads the root and as many levels below it as have at most 2^17 nodes in total, but not more than
- * 6. */
+/* Reads the root and up to 6 levels below it, as many as have at most 2^17 nodes in total. */
 EBPO_MUST_USE ebpo_status ebpo_held_levels_read(const ebpo_file *file, ebpo_held_levels *out,
                                                 ebpo_error *error);
 void ebpo_held_levels_free(ebpo_held_levels *levels);
 
 /* Bounds the distance of p from the nearest face by *lo and *hi. Visits the children of at most
- * `visits` nodes; with fewer visits the bounds are wider. */
+ * `visits` nodes; the bounds are wider if `visits` is smaller. */
 void ebpo_held_levels_bound(const ebpo_held_levels *levels, const double p[3], int visits,
                             double *lo, double *hi);
 

@@ -4,10 +4,11 @@
  * measured as a length: its angle times the tool's arm.
  *
  * Contacts constrain the motion of a tool: of the motions that bring no point closer to a face than
- * allowed, the tool makes the one nearest to the wanted motion. Hildreth's method finds this motion
- * for a few active contacts, which are added one at a time, the most violated contact first.
+ * allowed, the tool makes the motion nearest to the wanted motion. Hildreth's method finds this
+ * motion for a few active contacts, which are added one at a time, the most violated contact first.
  *
- * Forces are passive: they are reduced where the device would receive more energy than it gave. */
+ * Forces are passive: a force is reduced if with it the device could receive more energy than it
+ * gave. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -134,7 +135,7 @@ void ebpo_rigid_matrix(const ebpo_rigid *r, double out[3][3])
 
 /* --- contacts --- */
 
-/* Greatest numbers of active contacts, and of iterations after each new one. */
+/* Greatest number of active contacts, and of iterations after each new active contact. */
 enum { ACTIVE_MAX = 12, SWEEPS = 20 };
 
 static void swap_contacts(ebpo_tool_contacts *all, int i, int j)
@@ -144,6 +145,7 @@ static void swap_contacts(ebpo_tool_contacts *all, int i, int j)
     all->at[j] = c;
 }
 
+/* Moves at[0] down in the heap, to its position. */
 static void sink_contact(ebpo_tool_contacts *all)
 {
     for (int i = 0, child; (child = 2 * i + 1) < all->count; i = child) {
@@ -179,7 +181,7 @@ typedef struct hold_state {
     bool release;
 } hold_state;
 
-/* Returns by how much the motion violates a contact. */
+/* Returns the length by which the motion violates a contact; negative if it does not. */
 static double violation_of(const hold_state *h, const ebpo_tool_contact *c,
                            const double motion[EBPO_SCREW])
 {
@@ -205,8 +207,8 @@ static void hold_sweep(hold_state *h, double tolerance, double motion[EBPO_SCREW
     }
 }
 
-/* Returns the contact that the motion violates most, by more than `tolerance`; -1: there is none,
- * or it is active already. */
+/* Returns the contact that the motion violates most. Returns -1 if no violation is greater than
+ * `tolerance`, or if the contact is active already. */
 static int most_violated(const hold_state *h, double tolerance, const double motion[EBPO_SCREW])
 {
     int found = -1;
@@ -220,8 +222,8 @@ static int most_violated(const hold_state *h, double tolerance, const double mot
     }
     for (int i = 0; i < h->count; i++)
         if (h->active[i] == found)
-            return -1; /* more iterations could reduce the violation; the check of the points will
-                        * find it */
+            return -1; /* only more iterations could reduce the violation; if it is too great, the
+                        * check of the points finds it */
     return found;
 }
 
@@ -336,10 +338,10 @@ static void fill_tool(ebpo_tool *t, const double (*points)[3], numbered_point *p
         t->close_points[i] = (ebpo_close_point){ 0 };
     }
     for (uint64_t i = 0; i < EBPO_TOOL_POOL; i++)
-        t->pool[i] = 0;                     /* so that no haptic step waits for the operating system
-                                             * to provide a page */
-    t->arm = square > 0 ? sqrt(square) : 1; /* 1: all points are at the centre, and rotation has no
-                                             * effect */
+        t->pool[i] = 0; /* writes to all pages, so that no haptic step waits for the operating
+                         * system */
+    /* 1: all points are at the centre, so rotation has no effect */
+    t->arm = square > 0 ? sqrt(square) : 1;
 }
 
 uint64_t ebpo_tool_bytes(const ebpo_tool *t)

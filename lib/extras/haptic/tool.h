@@ -1,6 +1,6 @@
-/* A tool: points that move together, its contacts, rigid motions, and passive forces. For each
- * point a distance is known within which there is no face; a point is examined only after it may
- * have moved by this distance. */
+/* Declares a tool (points that move together), its contacts, rigid motions and passive forces. For
+ * each point a distance is stored within which there is no face; the point is examined again only
+ * after it may have moved by this distance. */
 #ifndef EBPO_HAPTIC_TOOL_H
 #define EBPO_HAPTIC_TOOL_H
 
@@ -12,28 +12,32 @@
 #include "geometry/vec3.h"
 
 /* A spring whose forces are passive: in total, the device receives no more energy than it gave,
- * except for that of one step (see max_force in tool.c). */
+ * except for the energy of one step (see max_force in tool.c). */
 typedef struct ebpo_passive {
     double stiffness;
-    double energy;       /* energy that the device has received in total */
+    double energy;       /* energy that the device has received in total; negative: it gave more */
     double longest_step; /* longest motion of the device in one haptic step */
 } ebpo_passive;
 
-/* Records that the device has moved by moved[n] under the force[n] of the last haptic step. */
+/* Records that the device moved by moved[n] while the force[n] of the last haptic step acted. */
 void ebpo_passive_moved(ebpo_passive *p, const double *force, const double *moved, int n);
 
-/* Computes the force of the spring along `depth`, the vector from device to proxy, minus `damping`
- * times `moved`, and limits it. The force never opposes `depth`. All vectors have n components. */
+/* Computes the force: stiffness times `depth` (the vector from device to proxy), minus `damping`
+ * times `moved`, limited so that it is passive. The force never opposes `depth`. All vectors have n
+ * components. */
 void ebpo_passive_push(const ebpo_passive *p, double damping, const double *depth,
                        const double *moved, int n, double *force);
 
-/* Rigid motions. A tool's rotation is measured in lengths: angles times the tool's arm. */
+/* --- rigid motions; a rotation is measured as a length: its angle times the tool's arm --- */
 
+/* The position of a tool. */
 typedef struct ebpo_rigid {
-    double place[3], turn[4]; /* a unit quaternion x, y, z, w */
+    double place[3]; /* position of the tool's centre */
+    double turn[4];  /* rotation, a unit quaternion x, y, z, w */
 } ebpo_rigid;
 
-enum { EBPO_SCREW = 6 }; /* translation, then rotation vector times the arm */
+/* Number of components of a rigid motion: translation, then rotation vector times the arm. */
+enum { EBPO_SCREW = 6 };
 
 /* Returns false if values are not finite or the quaternion is invalid. */
 bool ebpo_rigid_read(const double place[3], const double turn[4], ebpo_rigid *out);
@@ -42,7 +46,7 @@ bool ebpo_rigid_read(const double place[3], const double turn[4], ebpo_rigid *ou
 void ebpo_rigid_between(const ebpo_rigid *a, const ebpo_rigid *b, double arm,
                         double out[EBPO_SCREW]);
 
-/* Moves `from` by a part, 0 to 1, of the motion. */
+/* Moves `from` by the fraction `part`, 0 to 1, of the motion. */
 void ebpo_rigid_move(const ebpo_rigid *from, const double motion[EBPO_SCREW], double part,
                      double arm, ebpo_rigid *out);
 
@@ -65,69 +69,71 @@ static inline double ebpo_screw_length(const double a[EBPO_SCREW])
     return sqrt(ebpo_screw_dot(a, a));
 }
 
-/* Contacts of a tool, and the motion that they allow: of the motions that bring no point closer to
- * a face than allowed, the one nearest to the wanted motion. */
+/* --- contacts of a tool --- */
 
 enum { EBPO_CONTACTS_MAX = 256 };
 
 typedef struct ebpo_tool_contact {
-    double grip[EBPO_SCREW]; /* grip . motion is how far the point moves away from the face */
-    double space;            /* how far the point may come closer to the face; negative: it must
-                              * move away */
-    double gap;              /* distance of the point from the face */
-    uint64_t point, face;    /* indices that callers get */
-    double normal[3];        /* unit vector from the face to the point */
+    double grip[EBPO_SCREW]; /* grip . motion is the distance by which the point moves away from the
+                              * face */
+    double space;         /* distance by which the point may come closer to the face; negative: it
+                           * must move away by -space */
+    double gap;           /* distance of the point from the face */
+    uint64_t point, face; /* indices for the caller */
+    double normal[3];     /* unit vector from the face to the point */
 } ebpo_tool_contact;
 
 typedef struct ebpo_tool_contacts {
-    ebpo_tool_contact at[EBPO_CONTACTS_MAX]; /* a heap: the contact with the largest gap first */
+    ebpo_tool_contact at[EBPO_CONTACTS_MAX]; /* a heap; at[0] has the largest gap */
     int count;
 } ebpo_tool_contacts;
 
-/* Adds a contact; when the heap is full, it replaces the contact with the largest gap. */
+/* Adds a contact. If the heap is full, replaces the contact with the largest gap, if that is
+ * larger. */
 void ebpo_tool_contact_add(ebpo_tool_contacts *all, const ebpo_tool_contact *contact);
 
-/* Computes the motion `out` nearest to `want` with grip . out >= -space for all contacts, with an
- * error of at most `tolerance`, as far as bounded work allows. Without `release`, a negative space
- * counts as 0, so that no contact requires a motion away from its face. Returns the number of
- * contacts that hold the tool. */
+/* Computes the motion `out` nearest to `want` with grip . out >= -space for all contacts. The error
+ * is at most `tolerance`, unless the limit of work is reached. release: contacts with a negative
+ * space require a motion away from their faces; if false, a negative space counts as 0. Returns the
+ * number of contacts that hold the tool. */
 int ebpo_tool_hold(const ebpo_tool_contacts *all, const double want[EBPO_SCREW], double tolerance,
                    bool release, double out[EBPO_SCREW]);
 
-/* Limits of a tool. */
-
+/* Greatest values of a tool. */
 enum {
-    EBPO_TOOL_POINTS = 10000, /* points of a tool */
-    EBPO_TOOL_CLUSTER = 8,    /* points of a cluster */
-    EBPO_TOOL_PIECES = 6,     /* pieces of path in each haptic step */
-    EBPO_TOOL_POOL = 1 << 16, /* faces around all points in total */
-    EBPO_TOOL_NEAR = 64,      /* faces around one point */
-    EBPO_TOOL_WORK = 4000     /* for each haptic step: visited nodes, plus six for each face */
+    EBPO_TOOL_POINTS = 10000, /* number of points of a tool */
+    EBPO_TOOL_CLUSTER = 8,    /* number of points of a cluster */
+    EBPO_TOOL_PIECES = 6,     /* number of pieces of the path in a haptic step */
+    EBPO_TOOL_POOL = 1 << 16, /* number of faces around all points in total */
+    EBPO_TOOL_NEAR = 64,      /* number of faces around a point */
+    EBPO_TOOL_WORK = 4000     /* work of a haptic step: visited nodes, plus six for each face */
 };
 
+/* A set of points that are near each other. */
 typedef struct ebpo_tool_cluster {
-    uint32_t first, count; /* points of the cluster */
-    double middle[3], radius;
-    double travelled;  /* bound of the motion of each of its points, summed over all pieces */
-    double safe_until; /* no point can hit a face before `travelled` exceeds this */
+    uint32_t first, count;    /* indices of its points: first .. first + count - 1 */
+    double middle[3], radius; /* a ball around the points, in the tool's coordinates */
+    double travelled;         /* upper bound of the length of each point's path, over all pieces */
+    double safe_until;        /* no point can hit a face until `travelled` is greater than this */
 } ebpo_tool_cluster;
 
-/* A point that may hit faces in a piece of path; its faces begin at pool[first]. */
+/* A point that may hit faces in the current piece: the faces pool[first] to pool[first + count -
+ * 1]. */
 typedef struct ebpo_close_point {
     uint32_t point, first, count;
 } ebpo_close_point;
 
 typedef enum ebpo_tool_stage {
-    EBPO_TOOL_IDLE,
-    EBPO_TOOL_SEARCHES,
-    EBPO_TOOL_CHECKS
+    EBPO_TOOL_IDLE,     /* there is no unfinished piece */
+    EBPO_TOOL_SEARCHES, /* first pass: find where a point comes too close to a face */
+    EBPO_TOOL_CHECKS    /* second pass: check the points at the end of the piece */
 } ebpo_tool_stage;
 
 typedef struct ebpo_tool {
     uint64_t count, cluster_count;
     double (*point)[3]; /* in the tool's coordinates, cluster after cluster */
-    uint32_t *number;   /* [count] indices that the caller gets */
-    double *safe_until; /* [count] as `safe_until` of clusters, for one point */
+    uint32_t *number;   /* [count] index of each point in the caller's array */
+    double *safe_until; /* [count] as ebpo_tool_cluster.safe_until, for one point */
     double radius, arm; /* greatest distance of the points from the centre; root of the mean square
                          * of these distances */
     ebpo_tool_cluster *cluster;
@@ -135,19 +141,23 @@ typedef struct ebpo_tool {
     ebpo_rigid proxy, device;
     ebpo_rigid path[EBPO_TOOL_PIECES + 1]; /* positions of the proxy in the last haptic step */
     uint32_t path_count;
-    double force[EBPO_SCREW];
-    ebpo_tool_contacts contacts, next; /* contacts at the proxy, and at the end of the piece */
+    double force[EBPO_SCREW];    /* force of the last haptic step */
+    ebpo_tool_contacts contacts; /* contacts at the proxy's position */
+    ebpo_tool_contacts next;     /* contacts at the end of the piece */
 
     /* The current piece of path; the next haptic step continues it. */
     ebpo_tool_stage stage;
-    double motion[EBPO_SCREW], part; /* the piece is free up to this part */
-    ebpo_rigid end;
-    double from_matrix[3][3], to_matrix[3][3], end_matrix[3][3];
-    uint32_t flags;
+    double motion[EBPO_SCREW]; /* motion of the whole piece */
+    double part;               /* fraction of the piece that is free */
+    ebpo_rigid end;            /* position of the tool at this fraction */
+    double from_matrix[3][3];  /* rotation at the beginning of the piece */
+    double to_matrix[3][3];    /* rotation at the end of the whole piece */
+    double end_matrix[3][3];   /* rotation of `end` */
+    uint32_t flags;            /* bits of ebpo_haptic_flag, if the piece is completed */
     uint64_t next_index; /* index of the cluster or of the close point that is examined next */
     ebpo_close_point *close_points; /* [close_count] */
     uint64_t close_count;
-    uint32_t *pool; /* [pool_count] faces around close points: positions in the box */
+    uint32_t *pool; /* [pool_count] faces around close points: indices in ebpo_face_box.corner */
     uint64_t pool_count;
 } ebpo_tool;
 
@@ -156,7 +166,8 @@ EBPO_MUST_USE ebpo_status ebpo_tool_new(const double (*points)[3], uint64_t coun
 void ebpo_tool_free(ebpo_tool *tool);
 uint64_t ebpo_tool_bytes(const ebpo_tool *tool);
 
-/* Places the tool at another position without a path, and discards all known distances. */
+/* Places the tool at another position without following a path, and discards all known distances.
+ */
 void ebpo_tool_put(ebpo_tool *tool, const ebpo_rigid *at);
 
 /* Computes the position in the world of the tool's point p. matrix: the rotation of r. */
