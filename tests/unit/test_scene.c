@@ -70,7 +70,7 @@ static const struct {
     { HEAD "\"routes\": {\"r\": {}}}", "routes.r: must have exactly one of keys" },
     { HEAD "\"routes\": {\"r\": {\"keys\": [{\"time\": 1, \"pose\": {}},\n{\"time\": 1, \"pose\": "
            "{}}]}}}",
-      "line 4: routes.r.keys[1]: time 1 is not above" },
+      "line 4: routes.r.keys[1]: time 1 is not later than" },
     { HEAD "\"routes\": {\"r\": {\"keys\": [{\"time\": -1.7e308, \"pose\": {}}]}}}",
       "the time is beyond 2^1000" },
     { HEAD "\"routes\": {\"r\": {\"keys\": [{\"time\": 1}]}}}", "keys[0].pose: is not an object" },

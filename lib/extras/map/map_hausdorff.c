@@ -1,11 +1,11 @@
 /* Computes guaranteed bounds of the greatest distance from a mesh's faces, including their
  * interior, to a model (a one-sided Hausdorff distance).
  *
- * The method is branch and bound over triangles, which are divided into four. When a point moves,
- * its distance changes by at most the length of the motion. So the distance of each point of a
- * triangle is at most the distance of a corner plus the length of the longer edge at this corner.
- * The triangles with the greatest bounds are divided together in a round, so the result does not
- * depend on the number of threads. */
+ * The method is branch and bound over triangles, which are divided into four. If a point moves, its
+ * distance changes by at most the length of the motion. So the distance of each point of a triangle
+ * is at most the distance of a corner plus the length of the longer edge at this corner. A round
+ * divides the triangles with the greatest bounds together, so the result does not depend on the
+ * number of threads. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -19,13 +19,14 @@
 #include "core/parallel.h"
 #include "extras/map/map_lattice.h"
 
-/* Number of faces that are searched together, and maximum number of triangles of a round; further
- * triangles are not divided, and their bounds are final. */
+/* Number of faces that are searched together (a batch), and maximum number of triangles of a round.
+ * Further triangles are not divided, and their bounds are final. */
 enum { FACES_AT_A_TIME = 1 << 17, TRIANGLES_MAX = 1 << 20 };
 
 typedef struct triangle {
-    double corner[3][3], distance[3]; /* `distance`: unsigned, of each corner from the model */
-    double upper;                     /* upper bound of the distance of the triangle's points */
+    double corner[3][3],
+        distance[3]; /* distance: unsigned distance of each corner from the model */
+    double upper;    /* upper bound of the distance of the triangle's points */
 } triangle;
 
 typedef struct triangles {
@@ -38,15 +39,14 @@ typedef struct search {
     const ebpo_mesh *mesh;
     const double *distances;
     ebpo_map_hausdorff_options o;
-    double slack;             /* more than the effect of rounding on positions and lengths */
+    double slack;             /* upper bound of the rounding errors of positions and lengths */
     ebpo_map_hausdorff range; /* bounds of the result so far */
-    uint64_t allowed;         /* limit of range.queries until the current batch of faces is done */
-    triangles current, next;  /* triangles of this round and of the next one */
+    uint64_t allowed;         /* greatest value of range.queries at the end of the current batch */
+    triangles current, next;  /* triangles of this round and of the next round */
     uint64_t divided;         /* number of triangles that this round divides: the
                                * first ones of `current` */
-    double (*middle)[3][3],
-        (*middle_distance)[3]; /* [divided] middle of the edge from each corner to
-                                * the next, and its distance from the model */
+    double (*middle)[3][3];   /* [divided] middles of the edges from each corner to the next one */
+    double (*middle_distance)[3]; /* [divided] distances of these middles from the model */
     uint64_t middle_capacity, distance_capacity;
 } search;
 
@@ -74,14 +74,15 @@ static void set_upper_bound(const search *s, triangle *t)
     t->upper += s->slack;
 }
 
-/* Returns true if a triangle with this upper bound can change the result beyond the tolerance. */
+/* Returns true if a triangle with this upper bound can change the result by more than the
+ * tolerance. */
 static bool needs_division(const search *s, double upper)
 {
     return upper > s->range.lo * (1 + s->o.tolerance) && upper > s->range.hi;
 }
 
-/* Adds a triangle to a list of triangles to divide, if it can change the result. If there are too
- * many triangles or queries, its bound becomes final. */
+/* Adds a triangle that can change the result to a list of triangles to divide. If there are too
+ * many triangles or queries, makes its bound final instead. */
 static ebpo_status keep_triangle(search *s, triangles *list, const triangle *t, ebpo_error *error)
 {
     if (!needs_division(s, t->upper))
@@ -96,7 +97,7 @@ static ebpo_status keep_triangle(search *s, triangles *list, const triangle *t, 
     return EBPO_OK;
 }
 
-/* Raises the lower bound of the result to a point's distance. */
+/* Raises the lower bound of the result to the distance of a point, if that is greater. */
 static void raise_lower_bound(search *s, double distance, const double location[3])
 {
     if (distance <= s->range.lo)
@@ -125,29 +126,30 @@ static ebpo_status query_middles(void *context, uint64_t begin, uint64_t end, un
     return status;
 }
 
-/* Makes quarter `which` of triangle i. 0 to 2: the quarter at this corner; 3: the middle one,
- * between the middles of the edges. */
+/* Makes quarter `which` of triangle i. 0 to 2: the quarter at this corner; 3: the quarter in the
+ * middle. */
 static void child_of(const search *s, uint64_t i, int which, triangle *out)
 {
     const triangle *t = &s->current.item[i];
     for (int k = 0; k < 3; k++) {
-        bool corner = which < 3 && k == which; /* otherwise it is the middle of an adjacent edge */
+        bool corner = which < 3 && k == which; /* false: corner k is the middle of an edge */
         int edge = which == 3 ? k : k == (which + 1) % 3 ? which : (which + 2) % 3;
         memcpy(out->corner[k], corner ? t->corner[k] : s->middle[i][edge], sizeof out->corner[k]);
         out->distance[k] = corner ? t->distance[k] : s->middle_distance[i][edge];
     }
 }
 
-/* Moves the triangles whose bounds are at least half of the greatest one to the front, and counts
- * them in s->divided: dividing others does not help yet. */
+/* Chooses the triangles that this round divides: those with bounds of at least half of the greatest
+ * bound, because dividing the others does not improve the result yet. Moves them to the front, and
+ * sets s->divided to their number. */
 static void choose_triangles(search *s)
 {
     double most = 0;
-    uint64_t left = s->allowed > s->range.queries ? s->allowed - s->range.queries : 0;
+    uint64_t remaining = s->allowed > s->range.queries ? s->allowed - s->range.queries : 0;
     s->divided = 0;
     for (uint64_t i = 0; i < s->current.count; i++)
         most = fmax(most, s->current.item[i].upper);
-    for (uint64_t i = 0; i < s->current.count && 3 * s->divided < left; i++)
+    for (uint64_t i = 0; i < s->current.count && 3 * s->divided < remaining; i++)
         if (s->current.item[i].upper >= most / 2) {
             triangle t = s->current.item[i];
             s->current.item[i] = s->current.item[s->divided];
@@ -209,7 +211,7 @@ static void corner_of(const ebpo_mesh *m, uint32_t vertex, double out[3])
 static ebpo_status inspect_faces(search *s, uint64_t begin, uint64_t end, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    /* share of the faces that have been searched when this batch is done */
+    /* share of the faces that have been searched at the end of this batch */
     double share = (double)end / (double)s->mesh->face_count;
     s->allowed =
         end == s->mesh->face_count ? s->o.queries : (uint64_t)((double)s->o.queries * share);
@@ -255,8 +257,8 @@ static ebpo_status begin_search(search *s, ebpo_error *error)
             if (v >= m->vertex_count || !isfinite(s->distances[v]))
                 return ebpo_fail(error, EBPO_E_ARGUMENT,
                                  "face %" PRIu64
-                                 " has a corner that is not a vertex index, or a vertex with a "
-                                 "non-finite distance",
+                                 " has a vertex index that is out of range, or a vertex with a "
+                                 "distance that is not finite",
                                  f);
             corner_of(m, v, p);
             most = fmax(most, fmax(fabs(p[0]), fmax(fabs(p[1]), fabs(p[2]))));
@@ -272,7 +274,7 @@ static ebpo_status check_hausdorff_options(search *s, const ebpo_map_hausdorff_o
     s->o = (ebpo_map_hausdorff_options)EBPO_MAP_HAUSDORFF_OPTIONS_INIT;
     ebpo_status status = EBPO_TAKE(ebpo_map_hausdorff_options, &s->o, given, error);
     if (status == EBPO_OK && !(s->o.tolerance > 0 && isfinite(s->o.tolerance)))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "the tolerance must be finite and above 0");
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "expected a tolerance that is finite and above 0");
     if (s->o.queries == 0)
         s->o.queries = 16 * s->mesh->face_count;
     return status;

@@ -1,9 +1,9 @@
-/* Computes distances of given points and of the points of a lattice.
+/* Computes distances of given points and of the points of a lattice (a regular grid).
  *
- * A lattice is evaluated in slabs, which are groups of layers. Each slab is divided into bricks:
- * the points of a brick are close to each other, so that subtrees are loaded few times and the
- * processor's caches keep the data. Each thread has a separate query context, which is made when it
- * is first used. Results do not depend on the number of threads.
+ * A lattice is evaluated in slabs. A slab is a group of consecutive layers, and is divided into
+ * bricks. The points of a brick are close to each other, so that each subtree is loaded few times
+ * and the processor's caches keep the data. Each thread has a separate query context, which is made
+ * at its first query. Results do not depend on the number of threads.
  *
  * Source: docs/guide/maps.md. */
 #include "core/strict_fp.h"
@@ -20,7 +20,7 @@
 #include "query/load_ahead.h"
 #include "query/query_model.h"
 
-/* Sets *out from the caller's options, or to the defaults for NULL, and checks it. */
+/* Sets *out to the caller's options, or to the defaults if `given` is NULL, and checks them. */
 static ebpo_status check_map_options(ebpo_map_options *out, const ebpo_map_options *given,
                                      ebpo_error *error)
 {
@@ -40,7 +40,7 @@ ebpo_status ebpo_map_queries_make(ebpo_map_queries *out, ebpo_model *model,
     distance.unsigned_distance = options->unsigned_distance;
     *out = (ebpo_map_queries){ .model = model, .distance = distance };
     out->threads = ebpo_thread_count(options->threads);
-    /* a model that has no distances fails here, before other memory is allocated */
+    /* fails for a model without distances before other memory is allocated */
     ebpo_status status = ebpo_context_new(model, &out->context[0], error);
     return status == EBPO_OK ? ebpo_distance_many(out->context[0], NULL, 0, &distance, NULL, error)
                              : status;
@@ -55,10 +55,10 @@ void ebpo_map_queries_free(ebpo_map_queries *queries)
 ebpo_status ebpo_map_query(ebpo_map_queries *queries, unsigned worker, const double *points,
                            uint64_t count, ebpo_distance_result *results, ebpo_error *error)
 {
-    ebpo_context **own = &queries->context[worker];
-    ebpo_status status = *own ? EBPO_OK : ebpo_context_new(queries->model, own, error);
+    ebpo_context **context = &queries->context[worker];
+    ebpo_status status = *context ? EBPO_OK : ebpo_context_new(queries->model, context, error);
     return status == EBPO_OK
-               ? ebpo_distance_many(*own, points, count, &queries->distance, results, error)
+               ? ebpo_distance_many(*context, points, count, &queries->distance, results, error)
                : status;
 }
 
@@ -71,7 +71,7 @@ typedef struct points_job {
     double *distances;
 } points_job;
 
-/* Returns the index in the input of the point that is evaluated as number i. */
+/* Returns the index, in the input, of the point that is evaluated at position i of the order. */
 static uint64_t place_of(const points_job *j, uint64_t i) { return j->order ? j->order[i] : i; }
 
 static ebpo_status query_piece(void *context, uint64_t begin, uint64_t end, unsigned worker,
@@ -107,7 +107,7 @@ ebpo_status ebpo_map_points(ebpo_model *model, const double *points, uint64_t co
         return status;
     ebpo_box box = ebpo_model_box(model);
     uint64_t *order = model->whole ? NULL : ebpo_curve_order(&box, points, count);
-    job.order = order; /* NULL without memory: evaluation in input order is slower, with the same
+    job.order = order; /* NULL if memory is short: the input order is slower, but gives the same
                         * results */
     status = ebpo_map_queries_make(&job.queries, model, &o, error);
     if (status == EBPO_OK)
@@ -120,7 +120,8 @@ ebpo_status ebpo_map_points(ebpo_model *model, const double *points, uint64_t co
 
 /* --- lattices --- */
 
-/* Points along a side of a brick; greatest number of values of a slab that has several layers. */
+/* BRICK: number of points along a side of a brick. SLAB_VALUES: greatest number of values of a slab
+ * that has more than one layer. */
 enum { BRICK = 16, SLAB_VALUES = 8 << 20 };
 #define POINTS_MAX (UINT64_C(1) << 40)
 
@@ -140,7 +141,7 @@ static void point_of(const ebpo_lattice *l, uint64_t i, uint64_t j, uint64_t k, 
 }
 
 typedef struct brick {
-    uint64_t low[3], high[3]; /* range of indices of points in the slab, `high` excluded */
+    uint64_t low[3], high[3]; /* on each axis, indices low .. high - 1 of points in the slab */
 } brick;
 
 static brick brick_of(const slab_job *j, uint64_t number)
@@ -194,8 +195,8 @@ static ebpo_status query_bricks(void *context, uint64_t begin, uint64_t end, uns
     return status;
 }
 
-/* Checks the number of points, and that the lattice's corners are finite. Then all points are
- * finite, because each coordinate is monotonous in i, j and k. */
+/* Checks the number of points, and that the lattice's corners are finite. Finite corners mean that
+ * all points are finite, because each coordinate is monotonic in the three indices. */
 static ebpo_status check_lattice(const ebpo_lattice *l, ebpo_error *error)
 {
     uint64_t points = 0;
@@ -257,8 +258,8 @@ ebpo_status ebpo_map_lattice(ebpo_model *model, const ebpo_lattice *lattice,
     status = job.values ? ebpo_map_queries_make(&job.queries, model, &o, error)
                         : ebpo_fail_memory(error, most * plane * sizeof *job.values);
     while (status == EBPO_OK && job.first < lattice->count[2]) {
-        uint64_t left = lattice->count[2] - job.first;
-        job.layers = left < most ? left : most;
+        uint64_t remaining = lattice->count[2] - job.first;
+        job.layers = remaining < most ? remaining : most;
         status = map_slab(&job, &o, error);
         if (status == EBPO_OK)
             status = take(user, job.values, job.first, job.layers, error);

@@ -4,9 +4,10 @@
 
 #include <ebpo/map.h>
 
+/* Greatest number of threads, and of points in a call of ebpo_map_query. */
 enum { EBPO_MAP_THREADS = 256, EBPO_MAP_PIECE = 4096 };
 
-/* Query contexts: each worker has one, made at its first query. */
+/* Query contexts. Each thread has one, which is made at its first query. */
 typedef struct ebpo_map_queries {
     ebpo_model *model;
     ebpo_distance_options distance;
@@ -14,8 +15,8 @@ typedef struct ebpo_map_queries {
     ebpo_context *context[EBPO_MAP_THREADS];
 } ebpo_map_queries;
 
-/* Makes query contexts from checked options. The result must be freed by ebpo_map_queries_free,
- * also after a failure. */
+/* Prepares query contexts for checked options. The caller frees them by ebpo_map_queries_free, even
+ * after a failure. */
 EBPO_MUST_USE ebpo_status ebpo_map_queries_make(ebpo_map_queries *out, ebpo_model *model,
                                                 const ebpo_map_options *options, ebpo_error *error);
 void ebpo_map_queries_free(ebpo_map_queries *queries);

@@ -1,8 +1,9 @@
 /* Maps distances to colours, and adds distances with their colours as attributes of a mesh's
  * vertices.
  *
- * The diverging palette is computed in OKLab (B. Ottosson, 2020: the matrices below are its
- * definition), whose lightness agrees with perception. The other palette is that of the thesis.
+ * The diverging palette is computed in the colour space OKLab (B. Ottosson, 2020), whose lightness
+ * agrees with perception. The matrices below define OKLab. The other palette is the palette of the
+ * thesis EBP 2017.
  *
  * Existing vertex attributes named distance, red, green or blue are replaced. */
 #include "core/strict_fp.h"
@@ -54,7 +55,8 @@ static void rgb_of_oklab(double light, double a, double b, uint8_t rgb[3])
             srgb_of(to_rgb[i][0] * cone[0] + to_rgb[i][1] * cone[1] + to_rgb[i][2] * cone[2]));
 }
 
-/* The hues are 255 and 50 degrees, which colour-blind readers can distinguish. */
+/* Computes a colour of the diverging palette. share: distance / range, -1 to 1. The hues are 255
+ * and 50 degrees, which colour-blind readers can distinguish. */
 static void palette_diverging(double share, uint8_t rgb[3])
 {
     static const double cosine[2] = { -0.2588190451, 0.6427876097 },
@@ -64,7 +66,8 @@ static void palette_diverging(double share, uint8_t rgb[3])
     rgb_of_oklab(light, chroma * cosine[outside], chroma * sine[outside], rgb);
 }
 
-/* Computes a hue from red (near 0) over yellow, green and cyan to blue (at the range). */
+/* Computes a colour of the thesis' palette: from red at distance 0 over yellow, green and cyan to
+ * blue at the range. */
 static void palette_thesis(double share, uint8_t rgb[3])
 {
     double far = fabs(share), hue = 4 * far; /* 0 red, 1 yellow, 2 green, 3 cyan, 4 blue */
@@ -106,7 +109,7 @@ static bool has_name(const char *names, const char *name)
     return false;
 }
 
-/* Returns true for an attribute of vertices that the new ones replace. */
+/* Returns true if a is an attribute of vertices that the new attributes replace. */
 static bool is_replaced(const ebpo_attribute *a)
 {
     static const char *const names[] = { "distance", "red", "green", "blue" };
@@ -139,7 +142,7 @@ ebpo_status ebpo_map_paint(ebpo_mesh *mesh, const double *distances, ebpo_map_pa
     EBPO_DEFAULT_FP;
     if ((unsigned)palette >= EBPO_MAP_PALETTES || !(range > 0) || !isfinite(range))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "painting needs one of the palettes, and a finite range above 0");
+                         "expected an ebpo_map_palette, and a range that is finite and above 0");
     if (!mesh->attributes)
         mesh->attributes = ebpo_attributes_make(mesh->workspace);
     for (uint64_t i = mesh->attributes ? mesh->attributes->count : 0; i-- > 0;)

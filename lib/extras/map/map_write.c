@@ -1,8 +1,8 @@
 /* Computes statistics of distances, and writes files of the distances at a lattice's points.
  *
  * Sums are exact (mesh/sum.h), so statistics depend neither on the order of values nor on the
- * number of threads. Small, ordinary and large values have separate sums, so that neither values
- * nor squares overflow.
+ * number of threads. Small, ordinary and large values have separate sums, so that no square
+ * overflows or underflows.
  *
  * A lattice is written layer by layer, as NRRD (teem, "Definition of NRRD File Format") or as a
  * VTKHDF 1.0 image (VTK's documentation, "VTKHDF file format"). Each format has a function that
@@ -26,26 +26,24 @@
 #include "io/publish.h"
 #include "mesh/sum.h"
 
-/* State of statistics while values are added; percentiles are computed separately. */
-
 enum { MAP_BINS = 3, MAP_BIN_UNIT = 600 };
 
+/* The state of statistics while values are added. Percentiles are computed separately. */
 typedef struct map_sums {
-    ebpo_map_stats stats; /* counts, min and max */
+    ebpo_map_stats stats; /* only counts, min and max are set */
     /* Sums of small, ordinary and large values: the unit of bin i is 2^(MAP_BIN_UNIT (i - 1)). The
      * unit of sums of squares is the square of that. */
     ebpo_sum sum[MAP_BINS], sum_unsigned[MAP_BINS], squares[MAP_BINS];
 } map_sums;
 
 /* A file that is written layer by layer. */
-
 typedef struct map_file {
     const ebpo_lattice *lattice;
     const char *shown; /* name of the file for messages */
-    const char *path;  /* name of the temporary file, for VTKHDF only */
-    FILE *stream;      /* for NRRD only */
-    ebpo_h5_out out;
-    ebpo_h5_id values;
+    const char *path;  /* for VTKHDF: name of the temporary file */
+    FILE *stream;      /* for NRRD */
+    ebpo_h5_out out;   /* for VTKHDF */
+    ebpo_h5_id values; /* for VTKHDF: the dataset of distances */
 } map_file;
 
 static const double percents[EBPO_MAP_PERCENTILES] = { 1, 5, 25, 50, 75, 95, 99 };
@@ -66,7 +64,7 @@ static map_sums *map_sums_new(void)
     return s;
 }
 
-/* Adds a value, or its square, to the bin for its size, in the unit of this bin. */
+/* Adds a value, or its square, to the bin for its absolute value, in the unit of this bin. */
 static void add_to(ebpo_sum bins[MAP_BINS], double value, bool square)
 {
     double size = fabs(value);
@@ -105,7 +103,7 @@ static void map_sums_add(map_sums *s, const double *values, uint64_t count)
     }
 }
 
-/* Returns the statistics of no finite values. */
+/* Returns the statistics if no value is finite: counts, and NAN for all other members. */
 static ebpo_map_stats stats_of_nothing(const ebpo_map_stats *s)
 {
     ebpo_map_stats out = *s;
@@ -249,7 +247,7 @@ static double length_of(const double v[3])
 }
 
 /* Computes the direction matrix of an image, whose columns are perpendicular unit vectors, and the
- * spacing of points along them. */
+ * spacing of points along these vectors. */
 static ebpo_status find_axes(const ebpo_lattice *l, double spacing[3], double direction[9],
                              ebpo_error *error)
 {

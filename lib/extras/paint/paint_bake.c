@@ -1,11 +1,10 @@
 /* Computes colours of a mesh's vertices from paint, and finds the faces that a stroke covers.
  *
- * Each point of a stroke has a ball. The reach of the point are the faces that are connected with
- * the point's face within this ball (paint_reach.h). A stroke covers the faces and vertices in the
- * reaches of its points. The strokes
- * of a layer are applied in order. Then the layers are blended in order over the original colours
- * of the vertices. Colours are stored in the mesh's existing columns, in the columns' types; a mesh
- * without colours gets new columns.
+ * Each point of a stroke has a ball. The reach of the point is the set of faces that are connected
+ * with the point's face within this ball (paint_reach.h). A stroke covers the faces and vertices in
+ * the reaches of its points. The strokes of a layer are applied in order. The layers are then
+ * blended in order over the original colours of the vertices. Colours are stored in the mesh's
+ * existing columns of colours, in their types; a mesh without colours gets new columns.
  *
  * Source: format-spec/paint.md, section 5. */
 #include "core/strict_fp.h"
@@ -37,7 +36,7 @@ static void put_byte(const ebpo_colour_column *c, uint64_t row, uint8_t value)
     const float as_float = (float)(value / 255.0);
     const double as_double = value / 255.0;
     switch (c->of->type) {
-    case EBPO_ATTRIBUTE_INT8: *to = value < 127 ? value : 127; break; /* maximum of the type */
+    case EBPO_ATTRIBUTE_INT8: *to = value < 127 ? value : 127; break; /* 127: the type's maximum */
     case EBPO_ATTRIBUTE_UINT8: *to = value; break;
     case EBPO_ATTRIBUTE_INT16: memcpy(to, &value16, sizeof value16); break;
     case EBPO_ATTRIBUTE_UINT16: memcpy(to, &scaled16, sizeof scaled16); break;
@@ -202,8 +201,8 @@ typedef struct coloured_vertex {
     double colour[3];   /* colour with the previous layers */
     double paint[3], a; /* colour and opacity of the current layer */
     uint32_t vertex;
-    uint32_t layer, stroke; /* indices of the last layer and stroke that covered it, plus 1; 0: none
-                             */
+    uint32_t layer, stroke; /* indices, plus 1, of the last layer and the last stroke that covered
+                             * the vertex; 0: none */
 } coloured_vertex;
 
 typedef struct bake {
@@ -215,7 +214,7 @@ typedef struct bake {
     ebpo_reach_pool *reach_pool;
     uint32_t *numbers;         /* [face] source index of each face of the mesh, ascending; NULL: a
                                 * face's source index is its index in the mesh */
-    uint32_t *slot;            /* [vertex_count] index in `vertices`, plus 1; 0: none */
+    uint32_t *slot;            /* [vertex_count] index in `vertices`, plus 1; 0: not covered */
     coloured_vertex *vertices; /* [count] */
     uint64_t count, capacity;  /* of `vertices` */
     uint64_t done;             /* number of points that have been evaluated */
@@ -230,8 +229,8 @@ static int by_value(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Sets b->numbers, if the paint uses indices of the source and the model has not all faces of the
- * source. The faces of the mesh are in the order of the source. */
+/* Sets b->numbers if the paint uses indices in the source and the model does not have all faces of
+ * the source. The faces of the mesh are in the order of the source. */
 static ebpo_status read_numbers(bake *b, ebpo_error *error)
 {
     const ebpo_file *file = b->context->model->file;
@@ -254,7 +253,7 @@ static ebpo_status read_numbers(bake *b, ebpo_error *error)
     return status;
 }
 
-/* Returns the row of a face in the mesh. */
+/* Returns the index, in the mesh, of a face of the paint. */
 static uint64_t row_of(const bake *b, uint64_t face)
 {
     uint32_t number = (uint32_t)face;
@@ -282,8 +281,7 @@ static ebpo_status find_vertex(bake *b, uint32_t vertex, coloured_vertex **out, 
     return EBPO_OK;
 }
 
-/* Applies a stroke to a vertex, unless this stroke was the last one that was applied to it. number:
- * index of the stroke. */
+/* Applies a stroke to a vertex, but only once. number: index of the stroke. */
 static void colour_vertex(coloured_vertex *d, const ebpo_stroke_data *s, uint32_t number)
 {
     double share = s->rgba[3] / 255.0;
@@ -301,7 +299,7 @@ static void colour_vertex(coloured_vertex *d, const ebpo_stroke_data *s, uint32_
     d->a = erases ? 0 : d->a * (1 - share) + share;
 }
 
-/* Applies a stroke to the vertices of a face that are within a point's ball. *any: set to true if
+/* Applies a stroke to the vertices of a face that are within a point's ball. Sets *any to true if
  * there is such a vertex. */
 static ebpo_status colour_face(bake *b, const ebpo_reach_result_face *f, const ebpo_stroke_data *s,
                                uint32_t number, bool *any, ebpo_error *error)
@@ -351,7 +349,7 @@ static ebpo_status apply_stroke(bake *b, uint32_t number, ebpo_error *error)
     return status;
 }
 
-/* Blends the current layer over the previous ones. */
+/* Blends a layer over the previous layers. */
 static void blend_layer(bake *b, uint32_t layer)
 {
     double opacity = (double)b->p->layer[layer].opacity / 255.0;

@@ -1,9 +1,9 @@
-/* Makes strokes from the path of a pen: points at even steps along the path. With more pressure
+/* Makes strokes from the path of a pen: points at equal steps along the path. With more pressure
  * there are more points at each step.
  *
- * Every point is on a face of the model. It is stored as the face and two integer weights of the
- * face's corners. The scatter of points is pseudorandom with a seed, so a path makes the same
- * stroke on every machine. */
+ * Every point is on a face of the model, and is stored as the face and two integer weights of the
+ * face's corners. Points are scattered by pseudorandom numbers with a seed, so a path makes the
+ * same stroke on every machine. */
 #include "core/strict_fp.h"
 
 #include <ebpo/paint.h>
@@ -26,8 +26,8 @@
 
 enum { DENSITY_MAX = 10000 };
 
-/* A stroke that is not yet part of the paint: its first point in drawing.point, and their number.
- */
+/* A stroke that is not yet part of the paint: the index of its first point in drawing.point, and
+ * the number of its points. */
 typedef struct stroke_range {
     uint64_t first, count;
 } stroke_range;
@@ -36,11 +36,11 @@ typedef struct drawing {
     ebpo_context *context;
     ebpo_paint_pen pen;
     ebpo_reach_search reach;
-    ebpo_paint_point *point;
-    stroke_range *run;
+    ebpo_paint_point *point; /* [point_count] points of all new strokes */
+    stroke_range *run;       /* [run_count] the new strokes */
     uint64_t point_count, point_capacity, run_count, run_capacity;
     uint64_t random;    /* state of the pseudorandom numbers */
-    uint64_t space;     /* number of points that the paint has space for */
+    uint64_t space;     /* number of points that can be added to the paint */
     bool pen_down;      /* the pen was painting at the previous step */
     double stroke_time; /* time at which the current stroke began */
     ebpo_paint_drawn drawn;
@@ -75,22 +75,22 @@ static const char *input_wrong(const ebpo_paint_input *h)
     return is_in_range(h->time, 0, UINT32_MAX) ? NULL : "the pen's time must be 0 to 2^32 - 1";
 }
 
-static ebpo_status check_input(const drawing *l, const ebpo_paint *p, const ebpo_paint_input *input,
+static ebpo_status check_input(const drawing *d, const ebpo_paint *p, const ebpo_paint_input *input,
                                uint64_t count, ebpo_error *error)
 {
-    const char *wrong = pen_wrong(&l->pen);
+    const char *wrong = pen_wrong(&d->pen);
     if (count == 0)
         wrong = "a stroke needs at least one position of the pen";
     for (uint64_t i = 0; i < count && !wrong; i++)
         wrong = input_wrong(&input[i]);
-    ebpo_stroke_data stroke = { .radius = l->pen.radius,
-                                .time = l->pen.time,
+    ebpo_stroke_data stroke = { .radius = d->pen.radius,
+                                .time = d->pen.time,
                                 .layer =
-                                    l->pen.layer < UINT32_MAX ? (uint32_t)l->pen.layer : UINT32_MAX,
-                                .kind = (uint32_t)l->pen.kind,
+                                    d->pen.layer < UINT32_MAX ? (uint32_t)d->pen.layer : UINT32_MAX,
+                                .kind = (uint32_t)d->pen.kind,
                                 .count = 1 };
     for (int i = 0; i < 4; i++)
-        stroke.rgba[i] = (uint8_t)(l->pen.colour >> (24 - 8 * i));
+        stroke.rgba[i] = (uint8_t)(d->pen.colour >> (24 - 8 * i));
     if (!wrong)
         wrong = ebpo_paint_stroke_wrong(&stroke, p->layer_count);
     return wrong ? ebpo_fail(error, EBPO_E_ARGUMENT, "%s", wrong) : EBPO_OK;
@@ -119,7 +119,8 @@ static void set_point(ebpo_paint_point *q, const ebpo_distance_result *at,
     round_weights(near.weight, q->weight);
 }
 
-/* Finds the nearest point of the model within a distance. */
+/* Finds the nearest point of the model within the distance `within`. is_found reports if there is
+ * one. */
 static ebpo_status find_nearest(ebpo_context *context, const double place[3], double within,
                                 ebpo_distance_result *out, ebpo_error *error)
 {
@@ -129,13 +130,14 @@ static ebpo_status find_nearest(ebpo_context *context, const double place[3], do
     return ebpo_distance(context, place, &options, out, error);
 }
 
+/* Returns true if find_nearest found a point. */
 static bool is_found(const ebpo_distance_result *at)
 {
     return at->face != EBPO_NO_FACE && isfinite(at->distance);
 }
 
-/* Finds the reach of a ball around a point of the model. Fails with EBPO_E_ABSENT if a subset omits
- * some of the faces there. */
+/* Finds the reach of a ball around a point of the model. Fails with EBPO_E_ABSENT if the model is a
+ * subset that omits some of the faces around the point. */
 static ebpo_status reach_around(ebpo_reach_search *reach, const ebpo_distance_result *at,
                                 double radius, ebpo_error *error)
 {
@@ -145,8 +147,8 @@ static ebpo_status reach_around(ebpo_reach_search *reach, const ebpo_distance_re
     return status != EBPO_OK || complete
                ? status
                : ebpo_fail(error, EBPO_E_ABSENT,
-                           "the subset lacks some faces around the pen; paint on the whole "
-                           "model, or within the subset");
+                           "the subset omits some faces around the pen; paint on the whole "
+                           "model, or farther from the omitted faces");
 }
 
 ebpo_status ebpo_paint_locate(const ebpo_paint *p, ebpo_context *context, const double place[3],
@@ -170,28 +172,28 @@ ebpo_status ebpo_paint_locate(const ebpo_paint *p, ebpo_context *context, const 
 
 /* --- a step --- */
 
-static ebpo_status add_point(drawing *l, const ebpo_distance_result *at, const double corner[3][3],
+static ebpo_status add_point(drawing *d, const ebpo_distance_result *at, const double corner[3][3],
                              const ebpo_paint_input *input, ebpo_error *error)
 {
-    double share = l->pen.size_least + input->pressure * (l->pen.size_full - l->pen.size_least);
-    if (l->point_count == l->space)
+    double share = d->pen.size_least + input->pressure * (d->pen.size_full - d->pen.size_least);
+    if (d->point_count == d->space)
         return ebpo_fail(error, EBPO_E_LIMIT,
                          "the stroke would exceed the %d points that a paint may have; use "
                          "longer steps or fewer points",
                          EBPO_PAINT_POINTS);
-    if (!ebpo_grow(&l->point, &l->point_capacity, l->point_count + 1, sizeof *l->point))
-        return ebpo_fail_memory(error, l->point_count * sizeof *l->point);
-    ebpo_paint_point *q = &l->point[l->point_count++];
+    if (!ebpo_grow(&d->point, &d->point_capacity, d->point_count + 1, sizeof *d->point))
+        return ebpo_fail_memory(error, d->point_count * sizeof *d->point);
+    ebpo_paint_point *q = &d->point[d->point_count++];
     set_point(q, at, corner);
     q->size = (uint16_t)fmax(1, floor(share * EBPO_PAINT_FULL + 0.5));
     q->pressure = (uint16_t)floor(input->pressure * UINT16_MAX + 0.5);
-    q->time = (uint32_t)(input->time - l->stroke_time);
-    l->run[l->run_count - 1].count++;
+    q->time = (uint32_t)(input->time - d->stroke_time);
+    d->run[d->run_count - 1].count++;
     return EBPO_OK;
 }
 
-/* Makes two unit vectors that are perpendicular to each other and to the normal; a face without
- * area has the normal 0, 0, 0, and any two are made. */
+/* Makes two unit vectors that are perpendicular to each other and to the normal. If the normal is
+ * 0, 0, 0 (a face without area), they are perpendicular to the z axis. */
 static void make_frame(const double normal[3], double u[3], double v[3])
 {
     double n[3] = { 0, 0, 1 }, axis[3] = { 0, 0, 0 };
@@ -227,73 +229,74 @@ static const ebpo_reach_face *face_of(const ebpo_reach_search *reach, uint64_t f
     return NULL;
 }
 
-/* Adds points of the reach that are scattered around `middle`; more points with more pressure. */
-static ebpo_status scatter_points(drawing *l, const ebpo_distance_result *middle,
+/* Adds points that are scattered around `middle` within its reach; more points with more pressure.
+ */
+static ebpo_status scatter_points(drawing *d, const ebpo_distance_result *middle,
                                   const ebpo_paint_input *input, ebpo_error *error)
 {
-    double u[3], v[3], place[3], disc[2], spread = l->pen.spread;
-    unsigned wanted = (unsigned)fmax(1, floor(input->pressure * l->pen.density + 0.5));
+    double u[3], v[3], place[3], disc[2], spread = d->pen.spread;
+    unsigned wanted = (unsigned)fmax(1, floor(input->pressure * d->pen.density + 0.5));
     ebpo_status status = EBPO_OK;
     make_frame(middle->normal, u, v);
     for (unsigned i = 0; i < wanted && status == EBPO_OK; i++) {
         ebpo_distance_result at;
-        random_in_disc(&l->random, disc);
+        random_in_disc(&d->random, disc);
         for (int k = 0; k < 3; k++)
             place[k] = middle->point[k] + spread * (disc[0] * u[k] + disc[1] * v[k]);
-        status = find_nearest(l->context, place, spread, &at, error);
+        status = find_nearest(d->context, place, spread, &at, error);
         if (status != EBPO_OK)
             return status;
-        const ebpo_reach_face *f = is_found(&at) ? face_of(&l->reach, at.face) : NULL;
+        const ebpo_reach_face *f = is_found(&at) ? face_of(&d->reach, at.face) : NULL;
         if (f && ebpo_ball_holds(middle->point, spread * spread, at.point))
-            status = add_point(l, &at, f->corner, input, error);
+            status = add_point(d, &at, f->corner, input, error);
         else
-            l->drawn.strayed++;
+            d->drawn.strayed++;
     }
     return status;
 }
 
-/* Begins a stroke unless the pen is down. */
-static ebpo_status begin_stroke(drawing *l, const ebpo_paint_input *input, ebpo_error *error)
+/* Begins a stroke unless the pen is already painting. */
+static ebpo_status begin_stroke(drawing *d, const ebpo_paint_input *input, ebpo_error *error)
 {
-    if (l->pen_down)
+    if (d->pen_down)
         return EBPO_OK;
-    if (!ebpo_grow(&l->run, &l->run_capacity, l->run_count + 1, sizeof *l->run))
-        return ebpo_fail_memory(error, l->run_count * sizeof *l->run);
-    l->run[l->run_count++] = (stroke_range){ l->point_count, 0 };
-    l->stroke_time = input->time;
-    l->pen_down = true;
+    if (!ebpo_grow(&d->run, &d->run_capacity, d->run_count + 1, sizeof *d->run))
+        return ebpo_fail_memory(error, d->run_count * sizeof *d->run);
+    d->run[d->run_count++] = (stroke_range){ d->point_count, 0 };
+    d->stroke_time = input->time;
+    d->pen_down = true;
     return EBPO_OK;
 }
 
 /* Makes the points of one step, or lifts the pen if it presses on no surface. */
-static ebpo_status make_step(drawing *l, const ebpo_paint_input *input, ebpo_error *error)
+static ebpo_status make_step(drawing *d, const ebpo_paint_input *input, ebpo_error *error)
 {
     ebpo_distance_result at = { .face = EBPO_NO_FACE };
     ebpo_status status = EBPO_OK;
     if (input->pressure > 0)
-        status = find_nearest(l->context, input->place, l->pen.within, &at, error);
+        status = find_nearest(d->context, input->place, d->pen.within, &at, error);
     if (status != EBPO_OK)
         return status;
     if (!is_found(&at)) {
-        l->pen_down = false;
-        l->drawn.lifted++;
+        d->pen_down = false;
+        d->drawn.lifted++;
         return EBPO_OK;
     }
-    l->drawn.steps++;
-    status = begin_stroke(l, input, error);
+    d->drawn.steps++;
+    status = begin_stroke(d, input, error);
     if (status == EBPO_OK)
-        status = reach_around(&l->reach, &at, l->pen.spread, error);
+        status = reach_around(&d->reach, &at, d->pen.spread, error);
     if (status != EBPO_OK)
         return status;
-    return l->pen.spread > 0
-               ? scatter_points(l, &at, input, error)
-               : add_point(l, &at, (const double(*)[3])l->reach.face[l->reach.own].corner, input,
+    return d->pen.spread > 0
+               ? scatter_points(d, &at, input, error)
+               : add_point(d, &at, (const double(*)[3])d->reach.face[d->reach.own].corner, input,
                            error);
 }
 
 /* --- the path --- */
 
-/* Interpolates between two positions of the pen, at the part t of the way. */
+/* Interpolates between two positions of the pen, at the fraction t of the way. */
 static void interpolate_input(const ebpo_paint_input *a, const ebpo_paint_input *b, double t,
                               ebpo_paint_input *out)
 {
@@ -310,16 +313,16 @@ static double length_between(const ebpo_paint_input *a, const ebpo_paint_input *
     return sqrt(ebpo_vec3_dot(d, d));
 }
 
-/* Follows the path, and makes a step at each multiple of the step's length from its beginning. */
-static ebpo_status follow_path(drawing *l, const ebpo_paint_input *input, uint64_t count,
+/* Follows the path, and makes a step at each multiple of the step's length along it. */
+static ebpo_status follow_path(drawing *d, const ebpo_paint_input *input, uint64_t count,
                                ebpo_error *error)
 {
-    double step = l->pen.step != 0 ? l->pen.step : fmax(l->pen.radius, l->pen.spread) / 2,
+    double step = d->pen.step != 0 ? d->pen.step : fmax(d->pen.radius, d->pen.spread) / 2,
            ahead = step; /* distance from the current position to the next step */
-    ebpo_status status = make_step(l, &input[0], error);
+    ebpo_status status = make_step(d, &input[0], error);
     for (uint64_t i = 1; i < count && status == EBPO_OK; i++) {
         double length = length_between(&input[i - 1], &input[i]), at = ahead;
-        if (i % 64 == 1 && !ebpo_progress_step(&l->pen.progress, "drawing", i, count, error))
+        if (i % 64 == 1 && !ebpo_progress_step(&d->pen.progress, "drawing", i, count, error))
             return EBPO_E_CANCELLED;
         if (!(length / step <= EBPO_PAINT_POINTS))
             return ebpo_fail(
@@ -329,8 +332,8 @@ static ebpo_status follow_path(drawing *l, const ebpo_paint_input *input, uint64
         for (uint64_t k = 1; at <= length && status == EBPO_OK; k++) {
             ebpo_paint_input pen;
             interpolate_input(&input[i - 1], &input[i], at / length, &pen);
-            pen.time = fmax(pen.time, l->stroke_time);
-            status = make_step(l, &pen, error);
+            pen.time = fmax(pen.time, d->stroke_time);
+            status = make_step(d, &pen, error);
             at = ahead + (double)k * step;
         }
         ahead = at - length;
@@ -338,25 +341,25 @@ static ebpo_status follow_path(drawing *l, const ebpo_paint_input *input, uint64
     return status;
 }
 
-/* Adds all strokes to the paint; after a failure, none. */
-static ebpo_status keep_strokes(drawing *l, ebpo_paint *p, ebpo_error *error)
+/* Adds all strokes to the paint. After a failure, removes those that were added. */
+static ebpo_status keep_strokes(drawing *d, ebpo_paint *p, ebpo_error *error)
 {
     uint64_t before = p->stroke_count;
     ebpo_status status = EBPO_OK;
-    for (uint64_t i = 0; i < l->run_count && status == EBPO_OK; i++) {
+    for (uint64_t i = 0; i < d->run_count && status == EBPO_OK; i++) {
         ebpo_paint_stroke s = EBPO_PAINT_STROKE_INIT;
-        s.layer = l->pen.layer;
-        s.kind = l->pen.kind;
-        s.colour = l->pen.colour;
-        s.radius = l->pen.radius;
-        s.time = l->pen.time;
-        s.points = l->point + l->run[i].first;
-        s.point_count = l->run[i].count;
+        s.layer = d->pen.layer;
+        s.kind = d->pen.kind;
+        s.colour = d->pen.colour;
+        s.radius = d->pen.radius;
+        s.time = d->pen.time;
+        s.points = d->point + d->run[i].first;
+        s.point_count = d->run[i].count;
         if (s.point_count)
             status = ebpo_paint_add_stroke(p, &s, error);
     }
-    l->drawn.strokes = p->stroke_count - before;
-    l->drawn.points = l->point_count;
+    d->drawn.strokes = p->stroke_count - before;
+    d->drawn.points = d->point_count;
     while (status != EBPO_OK && p->stroke_count > before) {
         p->stroke_count--;
         p->point_count -= p->stroke[p->stroke_count].count;
@@ -369,27 +372,27 @@ ebpo_status ebpo_paint_draw(ebpo_paint *p, ebpo_context *context, const ebpo_pai
                             ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    drawing l = { .context = context, .pen = EBPO_PAINT_PEN_INIT };
-    l.drawn.struct_size = sizeof l.drawn;
-    ebpo_status status = EBPO_TAKE(ebpo_paint_pen, &l.pen, pen, error);
+    drawing d = { .context = context, .pen = EBPO_PAINT_PEN_INIT };
+    d.drawn.struct_size = sizeof d.drawn;
+    ebpo_status status = EBPO_TAKE(ebpo_paint_pen, &d.pen, pen, error);
     if (status == EBPO_OK && drawn)
         status = EBPO_CHECK_SIZED(ebpo_paint_drawn, drawn, error);
     if (status == EBPO_OK)
-        status = check_input(&l, p, input, count, error);
+        status = check_input(&d, p, input, count, error);
     if (status == EBPO_OK)
         status = ebpo_paint_check_context(p, context, error);
     if (status != EBPO_OK)
         return status;
-    l.random = l.pen.seed;
-    l.space = EBPO_PAINT_POINTS - p->point_count;
-    ebpo_reach_begin(&l.reach, context);
-    status = follow_path(&l, input, count, error);
+    d.random = d.pen.seed;
+    d.space = EBPO_PAINT_POINTS - p->point_count;
+    ebpo_reach_begin(&d.reach, context);
+    status = follow_path(&d, input, count, error);
     if (status == EBPO_OK)
-        status = keep_strokes(&l, p, error);
+        status = keep_strokes(&d, p, error);
     if (status == EBPO_OK && drawn)
-        EBPO_GIVE(ebpo_paint_drawn, drawn, &l.drawn);
-    ebpo_reach_end(&l.reach);
-    free(l.point);
-    free(l.run);
+        EBPO_GIVE(ebpo_paint_drawn, drawn, &d.drawn);
+    ebpo_reach_end(&d.reach);
+    free(d.point);
+    free(d.run);
     return status;
 }

@@ -1,10 +1,10 @@
-/* Adds and changes the content of a paint: its layers, strokes and notes. Checks the model that it
- * belongs to.
+/* Adds and changes the content of a paint: its layers, strokes and notes. Checks that a model is
+ * the model to which the paint belongs.
  *
  * Strokes are kept in the order in which they were made; the points of a stroke are consecutive.
- * Removing a layer
- * removes its strokes and its notes. Texts are UTF-8 of limited size without control characters. A
- * paint belongs to the model with a given SHA-256 digest: for another model, queries fail.
+ * Removing a layer removes its strokes and its notes. Texts are UTF-8 of limited size without
+ * control characters. A paint belongs to the model with a given SHA-256 digest; queries with
+ * another model fail.
  *
  * Source: format-spec/paint.md. */
 #include "core/strict_fp.h"
@@ -56,22 +56,22 @@ const char *ebpo_paint_stroke_wrong(const ebpo_stroke_data *s, uint64_t layers)
 
 ebpo_status ebpo_paint_get_stroke(const ebpo_paint *p, uint64_t number, ebpo_paint_stroke *out)
 {
-    ebpo_paint_stroke own = EBPO_PAINT_STROKE_INIT;
+    ebpo_paint_stroke result = EBPO_PAINT_STROKE_INIT;
     ebpo_status status = EBPO_CHECK_SIZED(ebpo_paint_stroke, out, NULL);
     if (status != EBPO_OK || number >= p->stroke_count)
         return EBPO_E_ARGUMENT;
     const ebpo_stroke_data *s = &p->stroke[number];
-    own.layer = s->layer;
-    own.kind = (ebpo_paint_kind)s->kind;
-    own.colour = ebpo_paint_pack(s->rgba);
-    own.radius = s->radius;
-    own.time = s->time;
-    own.point_count = s->count;
-    own.points = p->point + s->first;
-    return EBPO_GIVE(ebpo_paint_stroke, out, &own);
+    result.layer = s->layer;
+    result.kind = (ebpo_paint_kind)s->kind;
+    result.colour = ebpo_paint_pack(s->rgba);
+    result.radius = s->radius;
+    result.time = s->time;
+    result.point_count = s->count;
+    result.points = p->point + s->first;
+    return EBPO_GIVE(ebpo_paint_stroke, out, &result);
 }
 
-/* Checks a stroke, and sets *out to it. */
+/* Converts a stroke to *out, and checks it. */
 static ebpo_status check_stroke(const ebpo_paint *p, const ebpo_paint_stroke *stroke,
                                 ebpo_stroke_data *out, ebpo_error *error)
 {
@@ -97,21 +97,21 @@ static ebpo_status check_stroke(const ebpo_paint *p, const ebpo_paint_stroke *st
 
 ebpo_status ebpo_paint_add_stroke(ebpo_paint *p, const ebpo_paint_stroke *given, ebpo_error *error)
 {
-    ebpo_stroke_data held;
+    ebpo_stroke_data copy;
     ebpo_paint_stroke stroke = EBPO_PAINT_STROKE_INIT;
     ebpo_status status = EBPO_TAKE(ebpo_paint_stroke, &stroke, given, error);
     if (status == EBPO_OK)
-        status = check_stroke(p, &stroke, &held, error);
+        status = check_stroke(p, &stroke, &copy, error);
     if (status != EBPO_OK)
         return status;
     if (!ebpo_grow(&p->stroke, &p->stroke_capacity, p->stroke_count + 1, sizeof *p->stroke) ||
-        !ebpo_grow(&p->point, &p->point_capacity, p->point_count + held.count, sizeof *p->point))
-        return ebpo_fail_memory(error, held.count * sizeof *p->point);
-    memcpy(p->point + p->point_count, stroke.points, held.count * sizeof *p->point);
-    for (uint32_t i = 0; i < held.count; i++)
+        !ebpo_grow(&p->point, &p->point_capacity, p->point_count + copy.count, sizeof *p->point))
+        return ebpo_fail_memory(error, copy.count * sizeof *p->point);
+    memcpy(p->point + p->point_count, stroke.points, copy.count * sizeof *p->point);
+    for (uint32_t i = 0; i < copy.count; i++)
         p->point[p->point_count + i].reserved = 0;
-    p->stroke[p->stroke_count++] = held;
-    p->point_count += held.count;
+    p->stroke[p->stroke_count++] = copy;
+    p->point_count += copy.count;
     return EBPO_OK;
 }
 
@@ -169,8 +169,8 @@ bool ebpo_paint_texts_begin(char *text[EBPO_PAINT_TEXTS])
     return copy_texts(none, text);
 }
 
-/* Checks all texts, then copies them. A date equal to `known` is not checked, so that the date of
- * another program can be kept. of: for messages, such as "a layer". */
+/* Checks all texts, then copies them. known: the present date, which is not checked, so that a date
+ * that another program wrote can be kept. of: the object for messages, such as "a layer". */
 static ebpo_status check_texts(const char *const from[EBPO_PAINT_TEXTS],
                                const ebpo_paint_text_kind *kinds, const char *of, const char *known,
                                char *to[EBPO_PAINT_TEXTS], ebpo_error *error)
@@ -216,7 +216,7 @@ static ebpo_status copy_layer(const ebpo_paint_layer *given, const char *known,
         return status;
     if (layer.opacity > 255 || layer.visible > 1)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "a layer's opacity is 0 to 255, and it is visible or not: 0 or 1");
+                         "a layer's opacity must be 0 to 255, and `visible` must be 0 or 1");
     const char *texts[EBPO_PAINT_TEXTS] = { layer.title, layer.author, layer.date,
                                             layer.description };
     *out = (ebpo_layer_data){ .colour = layer.colour,
@@ -227,19 +227,19 @@ static ebpo_status copy_layer(const ebpo_paint_layer *given, const char *known,
 
 ebpo_status ebpo_paint_get_layer(const ebpo_paint *p, uint64_t number, ebpo_paint_layer *out)
 {
-    ebpo_paint_layer own = EBPO_PAINT_LAYER_INIT;
+    ebpo_paint_layer result = EBPO_PAINT_LAYER_INIT;
     ebpo_status status = EBPO_CHECK_SIZED(ebpo_paint_layer, out, NULL);
     if (status != EBPO_OK || number >= p->layer_count)
         return EBPO_E_ARGUMENT;
     const ebpo_layer_data *l = &p->layer[number];
-    own.title = l->text[EBPO_PAINT_TITLE];
-    own.author = l->text[EBPO_PAINT_AUTHOR];
-    own.date = l->text[EBPO_PAINT_DATE];
-    own.description = l->text[EBPO_PAINT_BODY];
-    own.colour = (uint32_t)l->colour;
-    own.opacity = (uint32_t)l->opacity;
-    own.visible = l->visible;
-    return EBPO_GIVE(ebpo_paint_layer, out, &own);
+    result.title = l->text[EBPO_PAINT_TITLE];
+    result.author = l->text[EBPO_PAINT_AUTHOR];
+    result.date = l->text[EBPO_PAINT_DATE];
+    result.description = l->text[EBPO_PAINT_BODY];
+    result.colour = (uint32_t)l->colour;
+    result.opacity = (uint32_t)l->opacity;
+    result.visible = l->visible;
+    return EBPO_GIVE(ebpo_paint_layer, out, &result);
 }
 
 ebpo_status ebpo_paint_add_layer(ebpo_paint *p, const ebpo_paint_layer *layer, uint64_t *number,
@@ -261,14 +261,14 @@ ebpo_status ebpo_paint_add_layer(ebpo_paint *p, const ebpo_paint_layer *layer, u
 ebpo_status ebpo_paint_set_layer(ebpo_paint *p, uint64_t number, const ebpo_paint_layer *layer,
                                  ebpo_error *error)
 {
-    ebpo_layer_data held;
+    ebpo_layer_data copy;
     if (number >= p->layer_count)
         return no_layer(p, number, error);
-    ebpo_status status = copy_layer(layer, p->layer[number].text[EBPO_PAINT_DATE], &held, error);
+    ebpo_status status = copy_layer(layer, p->layer[number].text[EBPO_PAINT_DATE], &copy, error);
     if (status != EBPO_OK)
         return status;
     free_texts(p->layer[number].text);
-    p->layer[number] = held;
+    p->layer[number] = copy;
     return EBPO_OK;
 }
 
@@ -322,18 +322,18 @@ ebpo_status ebpo_paint_remove_layer(ebpo_paint *p, uint64_t number, ebpo_error *
 
 ebpo_status ebpo_paint_get_note(const ebpo_paint *p, uint64_t number, ebpo_paint_note *out)
 {
-    ebpo_paint_note own = EBPO_PAINT_NOTE_INIT;
+    ebpo_paint_note result = EBPO_PAINT_NOTE_INIT;
     ebpo_status status = EBPO_CHECK_SIZED(ebpo_paint_note, out, NULL);
     if (status != EBPO_OK || number >= p->note_count)
         return EBPO_E_ARGUMENT;
     const ebpo_note_data *n = &p->note[number];
-    own.title = n->text[EBPO_PAINT_TITLE];
-    own.author = n->text[EBPO_PAINT_AUTHOR];
-    own.date = n->text[EBPO_PAINT_DATE];
-    own.body = n->text[EBPO_PAINT_BODY];
-    own.layer = n->layer;
-    own.at = n->at;
-    return EBPO_GIVE(ebpo_paint_note, out, &own);
+    result.title = n->text[EBPO_PAINT_TITLE];
+    result.author = n->text[EBPO_PAINT_AUTHOR];
+    result.date = n->text[EBPO_PAINT_DATE];
+    result.body = n->text[EBPO_PAINT_BODY];
+    result.layer = n->layer;
+    result.at = n->at;
+    return EBPO_GIVE(ebpo_paint_note, out, &result);
 }
 
 ebpo_status ebpo_paint_add_note(ebpo_paint *p, const ebpo_paint_note *given, ebpo_error *error)
@@ -342,7 +342,7 @@ ebpo_status ebpo_paint_add_note(ebpo_paint *p, const ebpo_paint_note *given, ebp
     ebpo_status status = EBPO_TAKE(ebpo_paint_note, &note, given, error);
     if (status != EBPO_OK)
         return status;
-    note.at.size = EBPO_PAINT_FULL; /* not used in notes */
+    note.at.size = EBPO_PAINT_FULL; /* notes do not use size, pressure and time */
     note.at.pressure = 0;
     note.at.time = note.at.reserved = 0;
     const char *wrong = ebpo_paint_point_wrong(&note.at);
@@ -355,9 +355,9 @@ ebpo_status ebpo_paint_add_note(ebpo_paint *p, const ebpo_paint_note *given, ebp
     if (!ebpo_grow(&p->note, &p->note_capacity, p->note_count + 1, sizeof *p->note))
         return ebpo_fail_memory(error, sizeof *p->note);
     const char *texts[EBPO_PAINT_TEXTS] = { note.title, note.author, note.date, note.body };
-    ebpo_note_data *held = &p->note[p->note_count];
-    *held = (ebpo_note_data){ .layer = note.layer, .at = note.at };
-    status = check_texts(texts, ebpo_paint_note_texts, "a note", "", held->text, error);
+    ebpo_note_data *copy = &p->note[p->note_count];
+    *copy = (ebpo_note_data){ .layer = note.layer, .at = note.at };
+    status = check_texts(texts, ebpo_paint_note_texts, "a note", "", copy->text, error);
     if (status == EBPO_OK)
         p->note_count++;
     return status;
@@ -384,8 +384,8 @@ static void write_hex(const uint8_t digest[32], char out[65])
         snprintf(out + 2 * i, 3, "%02x", digest[i]);
 }
 
-/* Writes the digest that identifies the model of a paint made on this file: format-spec/paint.md,
- * section 2. */
+/* Sets `out` to the digest by which a paint made on this file identifies its model
+ * (format-spec/paint.md, section 2). */
 static void name_model(const ebpo_info *info, char out[65])
 {
     bool whole = info->pruned && info->parts & EBPO_PART_MAPS;
@@ -465,46 +465,46 @@ void ebpo_paint_free(ebpo_paint *p)
 
 ebpo_status ebpo_paint_get_info(const ebpo_paint *p, ebpo_paint_info *out)
 {
-    ebpo_paint_info own = EBPO_PAINT_INFO_INIT;
-    own.generator = p->generator;
-    own.model_sha256 = p->model_sha256;
-    own.model_name = p->model_name;
-    own.unit = p->unit;
-    own.source_numbers = p->source_numbers;
-    own.layer_count = p->layer_count;
-    own.note_count = p->note_count;
-    own.stroke_count = p->stroke_count;
-    own.point_count = p->point_count;
+    ebpo_paint_info result = EBPO_PAINT_INFO_INIT;
+    result.generator = p->generator;
+    result.model_sha256 = p->model_sha256;
+    result.model_name = p->model_name;
+    result.unit = p->unit;
+    result.source_numbers = p->source_numbers;
+    result.layer_count = p->layer_count;
+    result.note_count = p->note_count;
+    result.stroke_count = p->stroke_count;
+    result.point_count = p->point_count;
     ebpo_status status = EBPO_CHECK_SIZED(ebpo_paint_info, out, NULL);
-    return status == EBPO_OK ? EBPO_GIVE(ebpo_paint_info, out, &own) : status;
+    return status == EBPO_OK ? EBPO_GIVE(ebpo_paint_info, out, &result) : status;
 }
 
 ebpo_status ebpo_paint_check_model(const ebpo_paint *p, const ebpo_file *model, ebpo_error *error)
 {
-    char own[65], whole[65];
+    char digest[65], whole[65]; /* of this file; of the file of which it is a subset */
     bool maps = model->info.parts & EBPO_PART_MAPS;
     ebpo_status status = check_mesh(model, error);
     if (status != EBPO_OK)
         return status;
-    write_hex(model->info.content_sha256, own);
+    write_hex(model->info.content_sha256, digest);
     name_model(&model->info, whole);
-    bool named = strcmp(p->model_sha256, own) == 0 || strcmp(p->model_sha256, whole) == 0;
+    bool named = strcmp(p->model_sha256, digest) == 0 || strcmp(p->model_sha256, whole) == 0;
     if (named && p->source_numbers && !maps)
         return ebpo_fail_file(error, EBPO_E_ABSENT, model->in.shown,
-                              "the paint names faces by their numbers in the source, which this "
-                              "file was written without; build it again with maps");
-    if (strcmp(p->model_sha256, p->source_numbers ? own : whole) == 0 ||
+                              "the paint names faces by their indices in the source, which this "
+                              "file does not contain; build it again with maps");
+    if (strcmp(p->model_sha256, p->source_numbers ? digest : whole) == 0 ||
         (p->source_numbers && named))
         return p->source_numbers == maps
                    ? EBPO_OK
                    : ebpo_fail_file(error, EBPO_E_ARGUMENT, model->in.shown,
-                                    "the paint names faces by their rows in the file, but this "
-                                    "model has numbers of the source: the paint was not made for "
-                                    "it");
+                                    "the paint names faces by their indices in the file, but this "
+                                    "model has indices in the source, so the paint was made on "
+                                    "another model; give that model");
     return ebpo_fail_file(error, EBPO_E_ARGUMENT, model->in.shown,
                           "the paint belongs to another model%s%s, with content_sha256 %s; this "
-                          "one has %s: give the model that it was made on",
-                          p->model_name[0] ? ", " : "", p->model_name, p->model_sha256, own);
+                          "model has %s: give the model on which the paint was made",
+                          p->model_name[0] ? ", " : "", p->model_name, p->model_sha256, digest);
 }
 
 ebpo_status ebpo_paint_check_context(const ebpo_paint *p, const ebpo_context *context,

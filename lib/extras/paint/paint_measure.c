@@ -1,12 +1,12 @@
 /* Measures the painted area, by stroke, by colour, by layer and in total.
  *
- * Faces are halved at their longest edge into parts, until it is certain which stroke a part
- * belongs to, or the part is small. In each layer the newest stroke decides: if one of its balls
- * contains the part, the part belongs to this stroke. If a ball only intersects the part, the
- * uncovered rest may belong to older strokes. So lower and upper bounds are summed.
+ * Faces are halved repeatedly at their longest edge, until it is certain to which stroke a part
+ * belongs, or the part is small. In each layer the newest stroke decides: if one of its balls
+ * contains the part, the part belongs to this stroke. If a ball only intersects the part, the area
+ * outside the ball may belong to older strokes. So lower and upper bounds are summed.
  *
- * Faces are distributed to a fixed number of pieces of work. The sums of the pieces are added in
- * order, so results do not depend on the number of threads.
+ * Faces are distributed to a fixed number of work items. The sums of the items are added in order,
+ * so results do not depend on the number of threads.
  *
  * Source: format-spec/paint.md, section 6. */
 #include "core/strict_fp.h"
@@ -31,8 +31,8 @@ typedef struct area_ball {
     uint32_t layer, stroke;
 } area_ball;
 
-/* Order of the sums in area_cut.area: one for each stroke, one for each colour, one for each layer,
- * and the total. area_key_count is their number. */
+/* The keys of the sums in area_cut.area. There is a sum for each stroke, then for each colour, then
+ * for each layer, then the total. */
 typedef struct area_keys {
     const ebpo_paint *p;
     uint32_t *colour; /* [strokes] index of a stroke's colour */
@@ -51,13 +51,14 @@ typedef struct area_cut {
     ebpo_paint_area *area; /* [keys] sums of areas */
     area_ball *ball;       /* a stack: for each part the balls that may intersect it */
     uint64_t ball_capacity;
-    uint64_t *last_visit; /* [colours] value of `visit` when the colour was last added */
-    uint64_t visit;       /* number of layers of parts that have been added */
+    uint64_t *last_visit; /* [colours] value of `visit` when an area was last added to the colour */
+    uint64_t visit;       /* counts the calls of add_layer, so that a call adds to a colour once */
 } area_cut;
 
 /* Greatest number of halvings of a face. */
 enum { DEEPEST = 900 };
 
+/* A face or a part of a face. */
 typedef struct triangle {
     double p[3][3], area;
 } triangle;
@@ -111,11 +112,11 @@ static bool area_cut_intersects(const area_ball *ball, const triangle *t)
 
 /* --- balls that intersect a part --- */
 
-/* Balls of a layer are ordered from the newest stroke to the oldest. Copies to position `to` those
- * balls in [from, end) that intersect the triangle, up to the newest stroke with a ball that
- * contains the triangle; of this stroke only that ball is copied. Returns the number of copied
- * balls. *sure: no ball intersects the triangle, or the newest stroke that intersects it also
- * contains it. */
+/* Copies the balls of a layer that matter for a triangle. The balls [from, end) are ordered from
+ * the newest stroke to the oldest. Copies to position `to` the balls that intersect the triangle,
+ * up to the newest stroke with a ball that contains the triangle; of this stroke copies only that
+ * ball. Returns the number of copied balls. *sure is true if no ball intersects the triangle, or if
+ * the newest stroke that intersects it has a ball that contains it. */
 static uint64_t sift_layer(area_cut *c, const triangle *t, uint64_t from, uint64_t end, uint64_t to,
                            bool *sure)
 {
@@ -137,8 +138,8 @@ static uint64_t sift_layer(area_cut *c, const triangle *t, uint64_t from, uint64
     return kept;
 }
 
-/* Calls sift_layer for the balls [from, from + count) of each layer. The copied balls are on the
- * stack after these balls. *sure: all layers are sure. */
+/* Calls sift_layer for each layer of the balls [from, from + count). The copied balls are on the
+ * stack after these balls. Returns their number. *sure is true if it is true for all layers. */
 static uint64_t sift_layers(area_cut *c, const triangle *t, uint64_t from, uint64_t count,
                             bool *sure)
 {
@@ -164,8 +165,8 @@ static double least_radius(const area_cut *c, uint64_t from, uint64_t count)
 
 /* --- sums --- */
 
-/* Adds the area of a part that may be painted. certain: all of it is painted; at_centre: its centre
- * is painted. */
+/* Adds the area of a part that may be painted. certain: the whole part is painted; at_centre: the
+ * centre of the part is painted. */
 static void area_cut_add(ebpo_paint_area *to, double area, bool certain, bool at_centre)
 {
     to->lo += certain ? area : 0;
@@ -173,24 +174,26 @@ static void area_cut_add(ebpo_paint_area *to, double area, bool certain, bool at
     to->hi += area;
 }
 
-/* The result of a layer for a small or decided triangle. */
-typedef struct verdict {
-    bool painted, unpainted; /* a point of the triangle may be painted, may be unpainted */
-    uint32_t at_centre;      /* stroke at the centre; UINT32_MAX: none */
-    uint32_t colour;         /* the first possible colour */
-    bool one_colour;         /* this colour is the only possible one */
-} verdict;
+/* The result of a layer for a triangle that is not divided further. */
+typedef struct layer_result {
+    bool painted;       /* a point of the triangle may be painted */
+    bool unpainted;     /* a point of the triangle may be unpainted */
+    uint32_t at_centre; /* stroke at the centre; UINT32_MAX: none */
+    uint32_t colour;    /* if `painted`: the colour of the newest stroke that may paint */
+    bool one_colour;    /* no other colour is possible */
+} layer_result;
 
+/* Returns true if the stroke paints, false if it erases. */
 static bool area_cut_paints(const area_cut *c, uint32_t stroke)
 {
     return c->keys->p->stroke[stroke].kind == EBPO_PAINT_PAINTS;
 }
 
 /* Evaluates a layer's balls [from, end), from the newest stroke to the oldest. */
-static verdict judge_layer(const area_cut *c, const triangle *t, const double centre[3],
-                           uint64_t from, uint64_t end)
+static layer_result evaluate_layer(const area_cut *c, const triangle *t, const double centre[3],
+                                   uint64_t from, uint64_t end)
 {
-    verdict v = { .at_centre = UINT32_MAX, .one_colour = true, .unpainted = true };
+    layer_result v = { .at_centre = UINT32_MAX, .one_colour = true, .unpainted = true };
     bool first = true;
     for (uint64_t i = from; i < end; i++) {
         const area_ball *b = &c->ball[i];
@@ -204,8 +207,9 @@ static verdict judge_layer(const area_cut *c, const triangle *t, const double ce
             first = false;
         }
     }
-    if (end > from && area_cut_holds(&c->ball[end - 1], t)) { /* the oldest of these strokes covers
-                                                               * the whole triangle */
+    /* if the oldest one of these strokes covers the whole triangle, only erasing leaves points
+     * unpainted */
+    if (end > from && area_cut_holds(&c->ball[end - 1], t)) {
         v.unpainted = false;
         for (uint64_t i = from; i < end; i++)
             v.unpainted = v.unpainted || !area_cut_paints(c, c->ball[i].stroke);
@@ -214,7 +218,8 @@ static verdict judge_layer(const area_cut *c, const triangle *t, const double ce
 }
 
 /* Adds the result of a layer for a part to the sums of strokes, colours and layers. */
-static void add_layer(area_cut *c, const triangle *t, const verdict *v, uint64_t from, uint64_t end)
+static void add_layer(area_cut *c, const triangle *t, const layer_result *v, uint64_t from,
+                      uint64_t end)
 {
     ebpo_paint_area *strokes = c->area, *colours = strokes + c->keys->p->stroke_count,
                     *layers = colours + c->keys->colours;
@@ -240,7 +245,7 @@ static void add_layer(area_cut *c, const triangle *t, const verdict *v, uint64_t
     }
 }
 
-/* Adds a part to the sums. Its balls are at [from, from + count). */
+/* Adds a part to the sums. The balls of the part are at [from, from + count). */
 static void area_cut_account(area_cut *c, const triangle *t, uint64_t from, uint64_t count)
 {
     double centre[3];
@@ -250,7 +255,7 @@ static void area_cut_account(area_cut *c, const triangle *t, uint64_t from, uint
     for (uint64_t i = from, end; i < from + count; i = end) {
         for (end = i; end < from + count && c->ball[end].layer == c->ball[i].layer; end++)
             continue;
-        verdict v = judge_layer(c, t, (const double *)centre, i, end);
+        layer_result v = evaluate_layer(c, t, (const double *)centre, i, end);
         may = may || v.painted;
         certain = certain || (v.painted && !v.unpainted);
         at_centre = at_centre || (v.at_centre != UINT32_MAX && area_cut_paints(c, v.at_centre));
@@ -275,7 +280,7 @@ static double longest_edge(const triangle *t, int *which)
     return sqrt(longest);
 }
 
-/* Finds the middle of an edge; returns false if it equals one of the ends in doubles. */
+/* Computes the middle of an edge. Returns false if it is equal to an end, because of rounding. */
 static bool find_middle(const double a[3], const double b[3], double middle[3])
 {
     for (int i = 0; i < 3; i++)
@@ -283,8 +288,9 @@ static bool find_middle(const double a[3], const double b[3], double middle[3])
     return memcmp(middle, a, 3 * sizeof *a) != 0 && memcmp(middle, b, 3 * sizeof *b) != 0;
 }
 
-/* Divides a triangle, whose balls are at [from, from + count), and adds its parts to the sums. The
- * stack after these balls is used for the balls of the parts. Returns false without memory. */
+/* Divides a triangle and adds its parts to the sums. The balls of the triangle are at [from, from +
+ * count); the stack after these balls is used for the balls of the parts. Returns false without
+ * memory. */
 static bool divide_triangle(area_cut *c, const triangle *t, uint64_t from, uint64_t count,
                             int depth)
 {
@@ -312,7 +318,7 @@ static bool divide_triangle(area_cut *c, const triangle *t, uint64_t from, uint6
     return divide_triangle(c, &half, at, kept, depth + 1);
 }
 
-/* Adds a face. Its `count` balls are the first ones of c->ball, ordered by layer, in each layer
+/* Adds a face. Its balls are c->ball[0] to c->ball[count - 1], ordered by layer, and in each layer
  * from the newest stroke to the oldest. Returns false without memory. */
 static bool area_cut_face(area_cut *c, const double corner[3][3], uint64_t count)
 {
@@ -324,12 +330,14 @@ static bool area_cut_face(area_cut *c, const double corner[3][3], uint64_t count
 
 /* --- the model --- */
 
+/* Greatest numbers of work items, and of sums of all items; greatest fineness. */
 enum { PIECES_MAX = 64, SUMS_MAX = 1 << 22, FINENESS_MAX = 1 << 16 };
 
-/* A face in a point's reach. */
+/* A pair of a point and a face in its reach. */
 typedef struct hit {
-    uint32_t face, layer, stroke, point; /* face: index among the faces in all reaches; point: index
-                                          * among all points */
+    uint32_t face; /* index in measure.found_faces */
+    uint32_t layer, stroke;
+    uint32_t point; /* index in ebpo_paint.point */
 } hit;
 
 typedef struct measure {
@@ -343,7 +351,7 @@ typedef struct measure {
     uint64_t *first;           /* [found_faces.count + 1] first hit of each face */
     area_keys keys;
     ebpo_paint_colour_area *colour; /* [keys.colours] */
-    uint64_t pieces;                /* number of pieces of work */
+    uint64_t pieces;                /* number of work items */
     ebpo_paint_area *sum;           /* [pieces][keys] */
 } measure;
 
@@ -391,7 +399,7 @@ static ebpo_status find_hits(measure *m, ebpo_context *context, ebpo_error *erro
     return status;
 }
 
-/* Orders by face, then layer, then from the newest stroke to the oldest. */
+/* Orders hits by face, then by layer, then from the newest stroke to the oldest. */
 static int by_face(const void *a, const void *b)
 {
     const hit *x = a, *y = b;
@@ -431,8 +439,8 @@ static ebpo_paint_colour_area colour_of(const ebpo_stroke_data *s)
     return (ebpo_paint_colour_area){ .layer = s->layer, .colour = ebpo_paint_pack(s->rgba) };
 }
 
-/* Finds the colours of strokes that paint (not of those that erase), each colour once for each
- * layer. */
+/* Finds the colours of all strokes that paint (not of strokes that erase). A colour in two layers
+ * counts as two colours. */
 static ebpo_status find_colours(measure *m, ebpo_error *error)
 {
     const ebpo_paint *p = m->p;
@@ -528,22 +536,22 @@ static ebpo_status pass_areas(measure *m, ebpo_paint_areas *out, ebpo_error *err
 {
     const ebpo_paint_area *strokes = m->sum, *colours = strokes + m->p->stroke_count,
                           *layers = colours + m->keys.colours;
-    ebpo_paint_areas own = EBPO_PAINT_AREAS_INIT;
-    own.all = layers[m->p->layer_count];
-    own.strokes = copy_areas(strokes, m->p->stroke_count);
-    own.layers = copy_areas(layers, m->p->layer_count);
-    own.faces = m->found_faces.count;
-    own.points_outside_subset = m->points_outside_subset;
-    if (!own.strokes || !own.layers) {
-        ebpo_paint_areas_free(&own);
-        return ebpo_fail_memory(error, m->p->stroke_count * sizeof *own.strokes);
+    ebpo_paint_areas areas = EBPO_PAINT_AREAS_INIT;
+    areas.all = layers[m->p->layer_count];
+    areas.strokes = copy_areas(strokes, m->p->stroke_count);
+    areas.layers = copy_areas(layers, m->p->layer_count);
+    areas.faces = m->found_faces.count;
+    areas.points_outside_subset = m->points_outside_subset;
+    if (!areas.strokes || !areas.layers) {
+        ebpo_paint_areas_free(&areas);
+        return ebpo_fail_memory(error, m->p->stroke_count * sizeof *areas.strokes);
     }
     for (uint64_t i = 0; i < m->keys.colours; i++)
         m->colour[i].area = colours[i];
-    own.colour_count = m->keys.colours;
-    own.colours = m->colour;
+    areas.colour_count = m->keys.colours;
+    areas.colours = m->colour;
     m->colour = NULL;
-    EBPO_GIVE(ebpo_paint_areas, out, &own);
+    EBPO_GIVE(ebpo_paint_areas, out, &areas);
     return EBPO_OK;
 }
 
@@ -570,8 +578,8 @@ ebpo_status ebpo_paint_measure(const ebpo_paint *p, ebpo_context *context,
     if (status == EBPO_OK)
         status = EBPO_CHECK_SIZED(ebpo_paint_areas, out, error);
     if (status == EBPO_OK && (wanted.fineness < 1 || wanted.fineness > FINENESS_MAX))
-        status =
-            ebpo_fail(error, EBPO_E_ARGUMENT, "the fineness of areas is 1 to %d", FINENESS_MAX);
+        status = ebpo_fail(error, EBPO_E_ARGUMENT, "expected a fineness of areas from 1 to %d",
+                           FINENESS_MAX);
     if (status == EBPO_OK)
         status = ebpo_paint_check_context(p, context, error);
     if (status == EBPO_OK)

@@ -1,4 +1,4 @@
-/* Reads paint files, and has the table of their arrays.
+/* Reads paint files, and defines the table of their arrays (ebpo_paint_columns).
  *
  * A paint file is untrusted input. The strict reader of HDF5 headers (lib/hdf5_read) reads it
  * without libhdf5. Every count is compared with its limit and with the file's size before memory is
@@ -66,7 +66,7 @@ static uint8_t *member_of(const ebpo_paint *p, const ebpo_paint_column *c, uint6
 }
 
 /* Copies a number of 1, 2, 4 or 8 bytes, and swaps its bytes on a big-endian machine. So it
- * converts from the file's order to the order in memory and back. */
+ * converts a number from the file's byte order to the order in memory, or back. */
 static void convert_value(const uint8_t *from, unsigned bytes, uint8_t *to)
 {
     const uint16_t two = bytes == 2 ? ebpo_load16(from) : 0;
@@ -82,7 +82,7 @@ static void convert_value(const uint8_t *from, unsigned bytes, uint8_t *to)
 
 static unsigned values_of(const ebpo_paint_column *c) { return c->cols ? c->cols : 1; }
 
-/* Copies consecutive rows from the bytes of a file to members. */
+/* Copies all rows of a column from the bytes of the file to the members of strokes or points. */
 static void convert_column(ebpo_paint *p, const ebpo_paint_column *c, const uint8_t *bytes)
 {
     for (uint64_t row = 0; row < ebpo_paint_column_rows(p, c); row++)
@@ -103,8 +103,8 @@ typedef struct reader {
     ebpo_head head;
     ebpo_input input;
     ebpo_paint *p;
-    uint64_t text_bytes; /* number of bytes of all texts */
-    char text[EBPO_PAINT_TEXT_MAX + 1];
+    uint64_t text_bytes;                /* number of bytes of all texts so far */
+    char text[EBPO_PAINT_TEXT_MAX + 1]; /* workspace */
 } reader;
 
 static ebpo_status fail_wrong(const reader *r, const char *path, const char *what,
@@ -294,8 +294,8 @@ static ebpo_status read_note(reader *r, uint64_t number, ebpo_error *error)
     return status == EBPO_OK ? read_note_place(r, group, path, n, error) : status;
 }
 
-/* Reads layers and notes. p->layer_count and p->note_count grow with each one, so that after a
- * failure exactly the layers and notes are freed whose texts have been allocated. */
+/* Reads layers and notes. Increments p->layer_count and p->note_count when the texts of a layer or
+ * a note have been allocated, so that after a failure exactly these texts are freed. */
 static ebpo_status read_labels(reader *r, uint64_t layers, uint64_t notes, ebpo_error *error)
 {
     ebpo_paint *p = r->p;
@@ -324,7 +324,8 @@ static ebpo_status read_labels(reader *r, uint64_t layers, uint64_t notes, ebpo_
 /* --- strokes and points --- */
 
 /* Finds the offset and the number of bytes of a column's only chunk, and checks the array's shape.
- * The chunk is within the file, so the file's size bounds the memory that is allocated for it. */
+ * The chunk is within the file, so the file's size bounds the memory that is allocated for the
+ * chunk. */
 static ebpo_status find_column(reader *r, const ebpo_paint_column *c, uint64_t rows,
                                ebpo_chunk_location *place, ebpo_error *error)
 {
@@ -443,7 +444,7 @@ static ebpo_status read_all(reader *r, ebpo_error *error)
     return status == EBPO_OK ? read_strokes(r, strokes, points, error) : status;
 }
 
-/* Stores which file, and which version of it, is read. */
+/* Stores the path and the version of the file that is read. */
 static ebpo_status keep_version(const reader *r, ebpo_error *error)
 {
     ebpo_paint_file *f = r->p->file;
@@ -505,7 +506,7 @@ ebpo_status ebpo_paint_open(const char *path, ebpo_paint **out, ebpo_error *erro
 }
 
 /* Makes a paint for a file that does not exist. Stores the path, so that saving fails if another
- * program makes a file there in the meantime. */
+ * program makes a file with this path in the meantime. */
 static ebpo_status make_new_paint(const char *path, const ebpo_file *model, ebpo_paint **out,
                                   ebpo_error *error)
 {

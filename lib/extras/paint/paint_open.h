@@ -1,5 +1,5 @@
-/* Lists the arrays of a paint file, and the members of strokes and points that they hold:
- * format-spec/paint.md, section 3. */
+/* Lists the arrays of a paint file. Each array is a column: it has a member of all strokes or of
+ * all points (format-spec/paint.md, section 3). */
 #ifndef EBPO_PAINT_PAINT_OPEN_H
 #define EBPO_PAINT_PAINT_OPEN_H
 
@@ -22,10 +22,10 @@ static inline uint64_t ebpo_paint_column_rows(const ebpo_paint *p, const ebpo_pa
     return c->of_points ? p->point_count : p->stroke_count;
 }
 
-/* Returns the shape of the array of a column with `rows` rows, above 0, in one chunk. */
+/* Returns the shape of a column's array with `rows` rows (above 0), which is one chunk. */
 ebpo_shape ebpo_paint_column_shape(const ebpo_paint_column *column, uint64_t rows);
 
-/* Writes all rows of a column to bytes[rows][cols or 1] as they are stored in the file. */
+/* Writes all rows of a column to `bytes` in the form in which the file stores them. */
 void ebpo_paint_column_write(const ebpo_paint *paint, const ebpo_paint_column *column,
                              uint8_t *bytes);
 

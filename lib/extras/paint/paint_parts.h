@@ -1,4 +1,5 @@
-/* Defines the content of a paint, and functions that the files of lib/extras/paint share. */
+/* Defines the content of a paint (annotations of a model: layers, strokes, notes), and declares
+ * functions that the files of lib/extras/paint share. */
 #ifndef EBPO_PAINT_PAINT_PARTS_H
 #define EBPO_PAINT_PAINT_PARTS_H
 
@@ -17,11 +18,11 @@ enum {
     EBPO_PAINT_FORMAT_MINOR = 0,
     EBPO_PAINT_MINOR_MAX = 1 << 20,
     EBPO_PAINT_WEIGHTS = 1 << 30, /* sum of all three weights of a point */
-    EBPO_PAINT_FULL = 1 << 15     /* size of a point whose radius is that of its stroke */
+    EBPO_PAINT_FULL = 1 << 15     /* size of a point whose radius is equal to its stroke's radius */
 };
 #define EBPO_PAINT_TIME_MAX (UINT64_C(1) << 53)
 
-/* Texts of a layer or of a note, in this order: from malloc, never NULL. */
+/* Order of the texts of a layer or of a note. A text is from malloc, and never NULL. */
 enum { EBPO_PAINT_TITLE, EBPO_PAINT_AUTHOR, EBPO_PAINT_DATE, EBPO_PAINT_BODY, EBPO_PAINT_TEXTS };
 
 /* A kind of text: the attribute's name, and its maximum number of bytes. */
@@ -46,13 +47,13 @@ typedef struct ebpo_note_data {
 
 typedef struct ebpo_stroke_data {
     double radius;
-    uint64_t time, first; /* first: index of its first point */
+    uint64_t time, first; /* first: index of the stroke's first point */
     uint32_t layer, kind, count;
     uint8_t rgba[4];
 } ebpo_stroke_data;
 
-/* The file to which a paint belongs, and its version: the version from which the paint was read, or
- * as which it was saved. Saving changes this struct, but not the paint. */
+/* The file to which a paint belongs, with the version of the file that was read or last saved.
+ * Saving changes this struct, but not the paint. */
 typedef struct ebpo_paint_file {
     pthread_mutex_t mutex; /* protects the other members during saving */
     char *path;            /* absolute path; NULL: no file yet */
@@ -65,7 +66,7 @@ typedef struct ebpo_paint_file {
 struct ebpo_paint {
     ebpo_paint_file *file;
     char generator[64], model_sha256[65], model_name[256], unit[32];
-    bool source_numbers; /* faces have their indices in the source; otherwise in the file */
+    bool source_numbers; /* face indices are those in the source (true) or in the file (false) */
     ebpo_layer_data *layer;
     ebpo_note_data *note;
     ebpo_stroke_data *stroke;
@@ -86,19 +87,19 @@ static inline double ebpo_paint_radius(const ebpo_stroke_data *stroke,
     return stroke->radius * point->size * 0x1p-15;
 }
 
-/* Return a message about an invalid point or stroke; NULL: it is valid. layers: number of layers.
- */
+/* Return a message about what is wrong with a point or a stroke; NULL if it is valid. layers:
+ * number of layers. */
 const char *ebpo_paint_point_wrong(const ebpo_paint_point *point);
 const char *ebpo_paint_stroke_wrong(const ebpo_stroke_data *stroke, uint64_t layers);
 
-/* Makes empty texts for a layer or a note. Returns false if memory is short. */
+/* Allocates empty texts for a layer or a note. Returns false without memory. */
 bool ebpo_paint_texts_begin(char *text[EBPO_PAINT_TEXTS]);
 
-/* Returns an empty paint, without a file; NULL if memory is short. */
+/* Returns an empty paint without a file; NULL without memory. */
 ebpo_paint *ebpo_paint_begin(void);
 
-/* Checks that the context is of the paint's model (otherwise EBPO_E_ARGUMENT or EBPO_E_ABSENT), and
- * that the model's coordinates are not too large (otherwise EBPO_E_UNSUPPORTED). */
+/* Fails with EBPO_E_ARGUMENT or EBPO_E_ABSENT if the context is not of the paint's model, and with
+ * EBPO_E_UNSUPPORTED if the model's coordinates are too large. */
 EBPO_MUST_USE ebpo_status ebpo_paint_check_context(const ebpo_paint *paint,
                                                    const ebpo_context *context, ebpo_error *error);
 

@@ -2,11 +2,11 @@
  * point's ball.
  *
  * Faces in the ball's box are joined into sets: at common corners (equal positions) within the
- * ball, and at common edges that cross the ball. The set that contains the point's face is the
+ * ball, and at common edges that intersect the ball. The set that contains the point's face is the
  * reach. So paint does not pass through a part of a model that is thinner than the ball.
  *
- * Points of a stroke are evaluated in batches on all cores. A reach is kept until it is requested.
- * Results do not depend on the number of threads.
+ * Points of a stroke are evaluated in batches on all cores. Their reaches are kept until they are
+ * requested. Results do not depend on the number of threads.
  *
  * Source: format-spec/paint.md, section 4. */
 #include "core/strict_fp.h"
@@ -66,8 +66,8 @@ static int by_number(const void *a, const void *b)
     return (x->file_face > y->file_face) - (x->file_face < y->file_face);
 }
 
-/* Gathers the faces around a slightly larger ball, because the bounds of the box are rounded, and
- * sorts them in the order of the file. */
+/* Gathers the faces around the ball, and sorts them in the order of the file. Uses a slightly
+ * larger box than the ball's box, because its bounds are rounded. */
 static ebpo_status gather_faces(ebpo_reach_search *r, const ebpo_reach_ball *ball,
                                 ebpo_error *error)
 {
@@ -86,7 +86,7 @@ static ebpo_status gather_faces(ebpo_reach_search *r, const ebpo_reach_ball *bal
                            FACES_MAX);
     if (status == EBPO_OK && r->short_of_memory)
         status = ebpo_fail_memory(error, (r->count + EBPO_TRIANGLES_MAX) * sizeof *r->face);
-    if (status == EBPO_OK && r->count) /* 0: the position is far from all faces */
+    if (status == EBPO_OK && r->count)
         qsort(r->face, r->count, sizeof *r->face, by_number);
     return status;
 }
@@ -148,7 +148,8 @@ static bool comes_first(const double a[3], const double b[3])
     return true;
 }
 
-/* Returns true if the segment pq intersects the ball; the same for pq and qp. */
+/* Returns true if the segment pq intersects the ball. The result does not depend on the order of p
+ * and q. */
 static bool segment_within(const ebpo_reach_ball *ball, const double p[3], const double q[3])
 {
     const double *a = comes_first(p, q) ? p : q, *b = a == p ? q : p;
@@ -169,7 +170,7 @@ static bool segment_within(const ebpo_reach_ball *ball, const double p[3], const
 
 /* --- sets --- */
 
-/* Returns the representative of the set of member i, and shortens the path to it. */
+/* Returns the representative of the set that contains i, and shortens the path from i to it. */
 static uint32_t set_of(ebpo_reach_search *r, uint32_t i)
 {
     while (r->root[i] != i) {
@@ -197,7 +198,7 @@ static void join_at_corners(ebpo_reach_search *r)
 }
 
 /* Joins the sets of faces that share an edge that intersects the ball. If an end of the edge is
- * within the ball, that corner has joined the faces already. */
+ * within the ball, join_at_corners has joined the faces already. */
 static void join_at_edges(ebpo_reach_search *r, const ebpo_reach_ball *ball)
 {
     uint64_t first = r->count + r->position_count, at;
@@ -267,8 +268,8 @@ static ebpo_status fail_place(const ebpo_reach_search *r, uint64_t face, ebpo_er
                           (unsigned long long)face);
 }
 
-/* Gathers the faces around the ball, and finds the ball's face among them. *on: the centre is on
- * that face. *complete: as in ebpo_reach_find. */
+/* Gathers the faces around the ball, and finds the ball's face among them. Sets *on to true if the
+ * ball's centre is on that face. *complete: as in ebpo_reach_find. */
 static ebpo_status find_face(ebpo_reach_search *r, const ebpo_reach_ball *ball, bool *complete,
                              bool *on, ebpo_error *error)
 {
@@ -277,7 +278,7 @@ static ebpo_status find_face(ebpo_reach_search *r, const ebpo_reach_ball *ball, 
     ebpo_error cause = EBPO_ERROR_INIT;
     *complete = *on = false;
     ebpo_status status = gather_faces(r, ball, &cause);
-    if (status == EBPO_E_ABSENT && subset) /* the connectivity of omitted faces is unknown */
+    if (status == EBPO_E_ABSENT && subset) /* the connections over omitted faces are unknown */
         return EBPO_OK;
     if (status != EBPO_OK)
         return ebpo_fail_with(error, &cause);
@@ -312,7 +313,7 @@ ebpo_status ebpo_reach_find(ebpo_reach_search *r, const ebpo_reach_ball *ball, b
         return fail_place(r, ball->face, error);
     }
     if (!reserve_space(r))
-        return ebpo_fail_memory(error, r->count * 150);
+        return ebpo_fail_memory(error, r->count * 150); /* approximate bytes for each face */
     find_positions(r, ball);
     join_at_corners(r);
     memset(r->slot, 0, r->slots * sizeof *r->slot);
@@ -375,15 +376,16 @@ void ebpo_found_faces_free(ebpo_found_faces *found_faces)
 
 /* --- many points --- */
 
-/* A batch has up to BATCH_POINTS points; it ends early when these reach more than BATCH_FACES
+/* A batch has up to BATCH_POINTS points; it ends early if their reaches have more than BATCH_FACES
  * faces. A thread takes GRAIN points at a time. */
 enum { BATCH_POINTS = 1024, BATCH_FACES = 1 << 20, GRAIN = 8 };
 
-/* Bytes of the memory budget that each thread needs. With less, a thread would load data that
- * another thread has just dropped. */
+/* Bytes of the memory budget that each thread needs. With less memory, threads would repeatedly
+ * load data that another thread has just dropped. */
 enum { THREAD_BYTES = 1 << 20 };
 
-/* The reach of a point of the batch. done: it has been found; complete: as in ebpo_reach_result. */
+/* The reach of a point of the batch. done: the reach has been found; complete: as in
+ * ebpo_reach_result. */
 typedef struct found_reach {
     ebpo_reach_result_face *face;
     uint64_t count, capacity;
@@ -393,7 +395,7 @@ typedef struct found_reach {
 struct ebpo_reach_pool {
     const ebpo_paint *p;
     unsigned threads;
-    ebpo_reach_search *reach; /* one reach for each worker */
+    ebpo_reach_search *reach; /* [threads] a search for each thread */
     found_reach found[BATCH_POINTS];
     uint32_t stroke, first, count; /* the points of the current batch */
     atomic_uint_least64_t faces;   /* number of faces in the reaches of the batch */
@@ -414,8 +416,8 @@ static ebpo_status keep_reached(found_reach *f, const ebpo_reach_search *reach, 
     return EBPO_OK;
 }
 
-/* Finds the reaches of the points [begin, end) of the batch. If there are too many faces, further
- * points are skipped, and a later batch evaluates them. The first point is never skipped. */
+/* Finds the reaches of the points [begin, end) of the batch. If the reaches have too many faces,
+ * skips the remaining points, which a later batch evaluates. Never skips the first point. */
 static ebpo_status find_batch_reaches(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                       ebpo_error *error)
 {
@@ -433,7 +435,7 @@ static ebpo_status find_batch_reaches(void *context, uint64_t begin, uint64_t en
         atomic_fetch_add(&r->faces, f->count);
         f->done = status == EBPO_OK;
     }
-    /* a thread that waits for work must not hold memory that others need */
+    /* a thread that waits for work must not hold memory that other threads need */
     ebpo_context_let_go(reach->context);
     return status;
 }
@@ -442,10 +444,10 @@ static ebpo_status find_batch_reaches(void *context, uint64_t begin, uint64_t en
  * reaches is bounded. */
 static void begin_batch(ebpo_reach_pool *r, uint32_t stroke, uint32_t i)
 {
-    uint32_t left = r->p->stroke[stroke].count - i;
+    uint32_t remaining = r->p->stroke[stroke].count - i;
     r->stroke = stroke;
     r->first = i;
-    r->count = left < BATCH_POINTS ? left : BATCH_POINTS;
+    r->count = remaining < BATCH_POINTS ? remaining : BATCH_POINTS;
     atomic_store(&r->faces, 0);
     for (uint32_t k = 0; k < BATCH_POINTS; k++) {
         found_reach *f = &r->found[k];

@@ -2,8 +2,8 @@
  * (paint_open.c) lists their arrays.
  *
  * A file is written under a temporary name and published when it is complete. The file of a paint
- * is replaced only if its version is still the version that was read or last saved. So a change by
- * another program is not lost.
+ * is replaced only if it has not changed since it was read or last saved. So a change by another
+ * program is not lost.
  *
  * Source: format-spec/paint.md. */
 #include "core/strict_fp.h"
@@ -168,8 +168,8 @@ static uint64_t header_bytes(const ebpo_paint *p)
     return sum;
 }
 
-/* Remembers the file that was just saved: the next save compares the file at `path` with it. Takes
- * ownership of `path` and of the open file `fd`. */
+/* Stores the version of the file that was just saved, with which the next save compares the file at
+ * `path`. Takes ownership of `path` and of the open file `fd`. */
 static void remember_version(ebpo_paint_file *f, char *path, int fd)
 {
     if (f->fd >= 0)
@@ -189,7 +189,8 @@ static ebpo_status save_locked(const ebpo_paint *p, const char *path, ebpo_error
     char *target;
     int fd = -1;
     ebpo_status status = ebpo_target_path(path, &target, error);
-    /* saving to the file that was read or last saved; the first save of a new paint */
+    /* to_own_file: `path` is the file that was read or last saved; first: the paint has no file yet
+     */
     bool to_own_file = target && f->path && strcmp(f->path, target) == 0, first = !f->path;
     if (status == EBPO_OK)
         status = ebpo_publish_begin(&publish, path, error);
@@ -209,8 +210,7 @@ static ebpo_status save_locked(const ebpo_paint *p, const char *path, ebpo_error
     if (status == EBPO_OK)
         status = ebpo_publish_commit(&publish, error);
     ebpo_publish_abort(&publish);
-    if (to_own_file) /* also after a failure: then nothing was saved, and other programs may change
-                      * the file */
+    if (to_own_file) /* released after a failure, too: other programs may then change the file */
         ebpo_file_lock_release(&f->lock);
     if (status == EBPO_OK && fd >= 0) {
         remember_version(f, target, fd);
