@@ -17,7 +17,7 @@ typedef enum arg_kind {
     ARG_LIST,   /* arg_list; may be repeated */
     ARG_WORD,   /* int: index into `words` */
     ARG_SET,    /* uint32_t: bits by index into `words`; comma list, may be repeated */
-    ARG_OPERAND /* the operand OUT, given as an option instead; `offset` is its index */
+    ARG_OPERAND /* the operand OUT, given as the option --output; `offset` is the operand's index */
 } arg_kind;
 
 typedef struct arg_option {
@@ -29,7 +29,8 @@ typedef struct arg_option {
     const char *help;
     double low, high;
     const char *const *words; /* NULL-terminated */
-    const char *page; /* `ebpo help PAGE` describes the option, not --help; NULL: --help does */
+    const char *page; /* name of the page of `ebpo help` that describes the option; NULL: --help
+                       * describes it */
 } arg_option;
 
 /* Texts in the order of the command line, NULL at the end. */
@@ -42,17 +43,18 @@ typedef struct arg_list {
 typedef struct arg_spec {
     const char *command;  /* "convert" */
     const char *operands; /* "IN.ply OUT.ebpo.h5" */
-    int least, most;      /* number of operands */
+    int least, most;      /* least and greatest number of operands */
     const char *summary;  /* one line */
     const char *text;     /* further text for --help, or NULL */
     const arg_option *options;
     /* Meaning of "-", one letter for each operand:
      *   i  standard input, by way of a file (standard_files.h)
-     *   o  standard output, likewise
+     *   o  standard output, by way of a file
      *   p  the command interprets "-"
      * A blank, the end of the text or NULL: "-" is refused. */
     const char *dash;
-    /* Endings allowed for the second operand, "h5 hdf5"; endings of other formats are refused. */
+    /* File name endings of the second operand's formats, such as "h5 hdf5"; known endings of other
+     * formats are refused. */
     const char *writes;
 } arg_spec;
 

@@ -21,7 +21,7 @@ typedef struct boolean_nodes {
 bool boolean_read(const char *name, const char *text, uint32_t operands, boolean_nodes *out);
 
 /* Reads each text as a model and a pose (see pose_read) into pose[operands], which the caller has
- * initialized. Returns false as above. */
+ * initialized. Returns false after an error, as boolean_read does. */
 bool boolean_read_poses(const char *name, const arg_list *texts, uint32_t operands,
                         ebpo_pose *pose);
 

@@ -53,7 +53,8 @@ ebpo_status boolean_write_result(boolean_output *o, ebpo_boolean *b, ebpo_progre
     if (mesh.face_count == 0 && !words_end_with(o->path, ".ply")) {
         error->status = status = EBPO_E_ABSENT;
         snprintf(error->message, sizeof error->message,
-                 "%s: the result is empty, and only a .ply file can be", o->path);
+                 "%s: the result is empty, and an .ebpo.h5 file cannot be; write a .ply file",
+                 o->path);
     } else {
         status = boolean_write_mesh(o, &mesh, progress, error);
     }

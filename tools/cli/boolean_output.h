@@ -11,7 +11,8 @@ typedef struct boolean_output {
     const char *path;
     const char *unit; /* recorded in an .ebpo.h5 file */
     unsigned threads;
-    bool doubles, volume;      /* compute the volume of the exact result */
+    bool doubles;              /* write double coordinates */
+    bool volume;               /* compute the volume of the exact result */
     ebpo_workspace *workspace; /* of the exact result; NULL: no limit of memory */
     uint64_t vertices, faces;  /* of the exact result that was written */
     ebpo_boolean_mesh_report report;

@@ -20,7 +20,7 @@ int command_failed(const char *name, const ebpo_error *error);
 /* Prints an error of the command line and a hint to --help on stderr. Returns EXIT_USAGE. */
 int command_usage(const char *name, const char *format, ...) EBPO_PRINTF(2, 3);
 
-/* Reports that memory is short. Returns EXIT_FAILED. */
+/* Reports that there is not enough memory. Returns EXIT_FAILED. */
 int command_no_memory(const char *name);
 
 /* Returns the number of cores that this process may use; at least 1. */
@@ -38,8 +38,9 @@ bool command_same_file(const char *a, const char *b);
  * EXIT_USAGE). */
 bool command_overwrites(const char *name, const char *in, const char *out);
 
-/* Returns 1 when the file begins as an HDF5 file, or when opening it will report an error (a URL,
- * or no such file); 0 when it begins otherwise; -1 when it cannot be read (reported on stderr). */
+/* Returns 1 if the file begins with the signature of HDF5, 0 if it begins with other bytes, -1 if
+ * it cannot be read (reported on stderr). Returns 1, too, for a URL and for a file that does not
+ * exist, because opening these reports an error. */
 int command_is_hdf5(const char *name, const char *path);
 
 /* Returns false, with a report on stderr (exit with EXIT_FAILED), when the file cannot be read or
@@ -47,7 +48,7 @@ int command_is_hdf5(const char *name, const char *path);
 bool command_requires_hdf5(const char *name, const char *path);
 
 /* Returns false, with a report on stderr (exit with EXIT_USAGE), when the file has no such level.
- * Negative: none was given. */
+ * level: negative if no level was given. */
 bool command_has_level(const char *name, const ebpo_info *info, int64_t level);
 
 /* Flushes standard output, which detects a full disk. Returns false after an error, reported on
@@ -57,7 +58,8 @@ bool command_flush(const char *name);
 /* Reports once why standard output could not be written. Returns false. */
 bool command_not_written(const char *name);
 
-/* Writes bytes to standard output, bypassing the buffer of stdio. Returns false as above. */
+/* Writes bytes to standard output, bypassing the buffer of stdio. Returns false after an error, as
+ * command_flush does. */
 bool command_write(const char *name, const char *bytes, size_t count);
 
 #endif

@@ -10,7 +10,7 @@
 #include "cli/tables.h"
 #include "cli/words.h"
 
-/* A volume too small for a double keeps its sign. */
+/* Returns true if the volume is negative but too small for a double: it is then stored as -0. */
 static bool has_negative_volume(const ebpo_mesh_report *r)
 {
     double box = (r->max[0] - r->min[0]) * (r->max[1] - r->min[1]) * (r->max[2] - r->min[2]);
@@ -65,8 +65,11 @@ static void print_border(FILE *out, const ebpo_info *info)
 
 static void print_surface(FILE *out, const ebpo_info *info)
 {
-    fprintf(out, "\n  surface   simplified: %llu triangles in %llu patches",
-            (unsigned long long)info->surface_triangles, (unsigned long long)info->surface_patches);
+    char triangles[40], patches[40];
+    fprintf(out, "\n  surface   simplified: %s in %s",
+            words_plural(triangles, sizeof triangles, info->surface_triangles, "triangle",
+                         "triangles"),
+            words_plural(patches, sizeof patches, info->surface_patches, "patch", "patches"));
 }
 
 static void print_model(FILE *out, const ebpo_info *info)

@@ -15,7 +15,7 @@ uint64_t facts_white(const ebpo_info *info, int level);
 /* Returns the bytes of the header and of levels 0 .. level. */
 uint64_t facts_cumulative(const ebpo_info *info, const ebpo_stored_sizes *stored, int level);
 
-/* `stored`: from ebpo_file_locate. */
+/* Prints the facts of the file and of its levels. stored: result of ebpo_file_locate. */
 void facts_print(FILE *out, const char *path, const ebpo_info *info,
                  const ebpo_stored_sizes *stored);
 void facts_table(FILE *out, const ebpo_info *info, const ebpo_stored_sizes *stored);

@@ -100,8 +100,8 @@ static void warn_of_inside_out(FILE *out, const char *command, const char *path,
 {
     fprintf(out,
             "ebpo %s: %s: warning: %llu of %llu closed components %s turned inside out: normals "
-            "point inwards, and winding numbers there are less by 1 and not greater, which the "
-            "rule positive takes for outside; --orient turns them\n",
+            "point inwards, so winding numbers inside are smaller by 1 instead of greater, and the "
+            "rule positive treats the inside as outside; --orient corrects this\n",
             command, path, (unsigned long long)s->inside_out, (unsigned long long)s->closed,
             s->inside_out == 1 ? "is" : "are");
 }
@@ -111,8 +111,8 @@ static void warn_of_nested(FILE *out, const char *command, const char *path, con
     fprintf(out,
             "ebpo %s: %s: warning: %llu of %llu closed components %s within another and oriented "
             "outwards "
-            "like it: winding numbers there are greater by 1, so the rules nonzero and positive "
-            "leave no cavity, and evenodd does; --orient turns them into cavities\n",
+            "like it: winding numbers inside are greater by 1, so there is no cavity by the rules "
+            "nonzero and positive, but by evenodd there is; --orient makes cavities\n",
             command, path, (unsigned long long)s->nested, (unsigned long long)s->closed,
             s->nested == 1 ? "is" : "are");
 }

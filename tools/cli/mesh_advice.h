@@ -7,7 +7,7 @@
 #include "cli/json.h"
 #include "cli/mesh_input.h"
 
-/* Prints a warning for a surface and for a doubtful solid; otherwise nothing. */
+/* Prints a warning if the mesh is a surface or a doubtful solid. */
 void advice_warn(FILE *out, const char *command, const char *path, const mesh_input *p);
 
 /* Prints the result of each sequence of repairs; nothing when none was tried. */

@@ -17,14 +17,15 @@ typedef struct repair_request {
 } repair_request;
 
 typedef struct mesh_input {
-    ebpo_mesh mesh;         /* after repairs */
-    ebpo_mesh as_read;      /* facts only; its array pointers only show which arrays existed */
-    char unread[512];       /* result of ebpo_mesh_ignored; empty: everything was read */
+    ebpo_mesh mesh;    /* after repairs */
+    ebpo_mesh as_read; /* the mesh before repairs: only its facts are valid; array pointers show
+                        * which arrays existed, and must not be used */
+    char unread[512];  /* result of ebpo_mesh_ignored; empty: everything was read */
     ebpo_prepared prepared; /* findings and repairs made */
     bool repairs_tried;     /* repairs were tried; their results are in `repairs` */
     ebpo_repairs repairs;
-    /* faces at the positions of an earlier face, in the repaired mesh; when vertices coincide, also
-     * the counts with the opposite and with the same orientation */
+    /* faces at the positions of an earlier face, in the repaired mesh; if vertices coincide, also
+     * how many of these faces have the opposite and the same orientation as the earlier face */
     ebpo_finding repeated;
     uint64_t repeated_opposite, repeated_same;
     bool shells_counted; /* closed components were counted in `shells` */

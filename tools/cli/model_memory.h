@@ -4,9 +4,10 @@
 
 #include <ebpo/query.h>
 
-/* Sets `options->memory`: to the size of the whole model when that is at most half of the free
- * memory, else to half of the free memory. When even the minimum is more, sets the minimum, with a
- * note on standard error. Remote files keep the default budget of the library. */
+/* Sets options->memory to no limit if the whole model needs at most half of the free memory, and
+ * otherwise to half of the free memory. If that is less than the minimum of the model, sets the
+ * minimum and prints a note on standard error. Remote files keep the default budget of the
+ * library. */
 void model_memory_default(const char *command, const ebpo_file *file, const char *path,
                           ebpo_model_options *options);
 

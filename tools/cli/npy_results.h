@@ -16,7 +16,8 @@ typedef struct npy_results {
  * sets the number; otherwise the input must state it. Returns false when the number cannot be known
  * or writing failed (reported on stderr). */
 bool npy_begin(npy_results *npy, points *in);
-/* Returns false as above. */
+/* Sets the number of results in the header, if standard output is a file. Returns false if writing
+ * failed (reported on stderr). */
 bool npy_end(npy_results *npy);
 
 #endif

@@ -113,8 +113,8 @@ static void take_lines(points *p, points_block *b)
             (whole && (b->count >= POINTS_TEXT || !points_more_is_there(p))))
             break;
         size_t target = b->count < POINTS_TEXT ? POINTS_TEXT : POINTS_LINE;
-        ssize_t got = points_read_some(p, b, b->bytes + b->count, target - b->count);
-        b->count += got > 0 ? (size_t)got : 0;
+        ssize_t read_count = points_read_some(p, b, b->bytes + b->count, target - b->count);
+        b->count += read_count > 0 ? (size_t)read_count : 0;
     }
     if (b->failed || (!p->is_ended && !whole)) {
         size_t all = b->count;
@@ -135,9 +135,9 @@ static void check_rows(points *p, points_block *b, uint64_t more)
     p->rows_taken += more;
     if (!b->failed &&
         (p->rows_taken > p->rows_total || (p->is_ended && p->rows_taken < p->rows_total)))
-        points_fault(b, 0, "holds %s rows than the %" PRIu64 " of its shape; the input is %s",
+        points_fault(b, 0, "has %s rows than its shape states, %" PRIu64 "; the input is %s",
                      p->rows_taken > p->rows_total ? "more" : "fewer", p->rows_total,
-                     p->rows_taken > p->rows_total ? "something else" : "cut short");
+                     p->rows_taken > p->rows_total ? "in another format" : "cut short");
 }
 
 /* Parses all complete rows. */
@@ -145,8 +145,8 @@ static void take_numbers(points *p, points_block *b)
 {
     size_t each = (size_t)(p->layout.per_row * p->layout.bytes), most = p->rows_per_block * each;
     while (!p->is_ended && b->count < most && (b->count < each || points_more_is_there(p))) {
-        ssize_t got = points_read_some(p, b, b->bytes + b->count, most - b->count);
-        b->count += got > 0 ? (size_t)got : 0;
+        ssize_t read_count = points_read_some(p, b, b->bytes + b->count, most - b->count);
+        b->count += read_count > 0 ? (size_t)read_count : 0;
     }
     size_t left = b->count % each;
     if (!p->is_ended)
@@ -225,7 +225,7 @@ static void report_fault(const points *p, const points_block *b)
         fprintf(stderr, "%s %" PRIu64 ": ", p->from_zero ? "vertex" : names[p->kind],
                 p->row + b->fault_at - p->from_zero);
     else if (b->fault_at && p->line_from)
-        fprintf(stderr, "line %" PRIu64 " behind byte %" PRIu64 ": ", p->line + b->fault_at,
+        fprintf(stderr, "line %" PRIu64 " after byte %" PRIu64 ": ", p->line + b->fault_at,
                 p->line_from);
     else if (b->fault_at)
         fprintf(stderr, "line %" PRIu64 ": ", p->line + b->fault_at);

@@ -11,8 +11,8 @@
  * cannot be opened (reported on stderr). Call points_close in any case. */
 bool points_open(points *p, const char *by, const char *path, points_kind kind, bool raw,
                  double tmax);
-/* As points_open; but of an HDF5 dataset it reads only part `number` of `of`. Call points_cut(p,
- * number, of) next. */
+/* Opens the input as points_open does, but reads only part `number` of `of` if it is an HDF5
+ * dataset. Call points_cut(p, number, of) next. */
 bool points_open_shard(points *p, const char *by, const char *path, points_kind kind, bool raw,
                        double tmax, uint64_t number, uint64_t of);
 void points_close(points *p);

@@ -134,6 +134,7 @@ bool points_take_header(points *p, points_block *b)
     }
     b->count = b->begin;
     return points_fault(b, b->lines--,
-                        "this header names no columns %s, and there are not as many as needed",
+                        "this line does not name the columns %s, and does not have as many fields; "
+                        "correct the line of names",
                         wanted[p->kind]);
 }

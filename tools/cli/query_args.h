@@ -57,7 +57,7 @@ bool query_distance_fits(const char *name, const query_values *v);
 bool query_options_from(const char *name, const query_values *v, ebpo_model_options *model,
                         ebpo_inside_options *inside, ebpo_distance_options *distance);
 
-/* Reads the value of --deadline in ns. Returns false as above. */
+/* Reads the value of --deadline in ns. Returns false for an invalid value, reported on stderr. */
 bool query_read_time(const char *name, const char *text, uint64_t *out);
 
 /* A file, the model of the file in memory, and a context. */

@@ -21,7 +21,7 @@ struct result_text {
     size_t skipped_bytes; /* first bytes of the text that were already written and are skipped */
     bool failed;          /* out of memory; the buffered text is lost */
     bool write_failed;    /* writing failed, which has been reported */
-    bool full;            /* text after the last complete row is lost until result_text_retry */
+    bool full;            /* text after the last complete row is dropped until result_text_retry */
     /* Called when the text is too long to be kept: writes it, discards it, or sets `full`. */
     void (*spill)(result_text *t, void *user);
     void *user;
@@ -34,7 +34,7 @@ enum { RESULT_MAX = 768 };
 bool result_text_init(result_text *t);
 void result_text_free(result_text *t);
 
-/* Makes space for result_text_capacity: grows the buffer or spills it. */
+/* Grows or spills the buffer, so that there is space for RESULT_MAX bytes; returns where. */
 char *result_text_grow(result_text *t);
 /* A pipe takes RESULT_PIECE bytes atomically; RESULT_SPILL is the default size before spilling. */
 enum { RESULT_PIECE = 4096, RESULT_SPILL = 1 << 20 };

@@ -5,11 +5,12 @@
 
 void signals_install(void);
 
-/* Registers a function called once when such a signal comes; it must be safe in a signal handler.
- */
+/* Registers a function that is called once when one of these signals arrives. It must be safe in a
+ * signal handler. */
 void signals_also(void (*clean_up)(void));
 
-/* Does the same for temporary files that exist during a whole command. */
+/* Registers a second such function, which removes temporary files that exist during a whole
+ * command. */
 void signals_scratch(void (*clean_up)(void));
 
 #endif

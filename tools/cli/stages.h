@@ -21,14 +21,16 @@ typedef struct stage_facts {
 } stage_facts;
 
 enum { STAGE_PLAN_MAX = STAGE_ROWS + 3 };
-/* Writes the rows to come, in their order, for progress; returns how many. */
+/* Sets `plan` to the rows of all stages to come, in their order, for progress. Returns their
+ * number. */
 int stages_plan(const stage_facts *f, int plan[STAGE_PLAN_MAX]);
 
 /* Splits the stage of the library for cells and envelopes of the pieces into two, by the times of
  * their threads. Call before the two functions below. */
 void stages_split(progress_line *line, const ebpo_build_times *times);
 
-/* Call both after progress_end_stage. `seconds`: total. */
+/* Print the times of the stages, as a table and as JSON. Call after progress_end_stage. seconds:
+ * total time. */
 void stages_print(FILE *out, const progress_line *line, const stage_facts *f, double seconds);
 void stages_json(json *j, const progress_line *line, const stage_facts *f);
 

@@ -322,7 +322,7 @@ static ebpo_status check_names(const textures *t, ebpo_error *error)
         ebpo_status status =
             name ? EBPO_OK
                  : fail_file(error, EBPO_E_FORMAT, shown ? shown : "?",
-                             "an image's name that leads out of the folder; nothing was written");
+                             "the name of this image leads out of the folder; nothing was written");
         free(name);
         free(shown);
         if (status != EBPO_OK)
