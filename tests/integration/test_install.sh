@@ -82,7 +82,7 @@ mkdir "$work/old" && cp "$library" "$work/old/$(basename "$(ls -d "${library%.so
 LD_LIBRARY_PATH="$work/old" "$ebpo" --version --verbose >"$work/out" 2>&1 &&
     fail "an older copy is not detected"
 grep -q "^library: $work/old/libebpo" "$work/out" || fail "the copy is not named"
-grep -q "^ebpo: the library that runs is not the one .*$library; $work/old/.* loader's way" "$work/out" ||
+grep -q "^ebpo: the running library is not the library .*$library; the loader found $work/old/.* first" "$work/out" ||
     fail "the message about the copy"
 
 # Other programs find the installed library with pkg-config.

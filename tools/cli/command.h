@@ -31,10 +31,10 @@ unsigned command_cores(void);
 enum { COMMAND_STACK = 4 << 20 };
 int command_thread(pthread_t *thread, void *(*body)(void *), void *argument);
 
-/* Returns true when both paths lead to one existing file. */
+/* Returns true if both paths lead to one existing file. */
 bool command_same_file(const char *a, const char *b);
 
-/* Returns true when writing `out` would overwrite `in`, and reports it on stderr (exit with
+/* Returns true if writing `out` would overwrite `in`, and reports it on stderr (exit with
  * EXIT_USAGE). */
 bool command_overwrites(const char *name, const char *in, const char *out);
 

@@ -25,7 +25,7 @@ static void write_header(char head[HEADER_SIZE], const char *dtype, uint64_t cou
     head[HEADER_SIZE - 1] = '\n';
 }
 
-/* Returns true when standard output is a file whose header can be rewritten. */
+/* Returns true if standard output is a file whose header can be rewritten. */
 static bool can_rewrite_header(void)
 {
     struct stat st;

@@ -13,7 +13,7 @@ typedef struct npy_results {
 } npy_results;
 
 /* Writes the header, which states the number of results. When standard output is a file, npy_end
- * sets the number; otherwise the input must state it. Returns false when the number cannot be known
+ * sets the number; otherwise the input must state it. Returns false if the number cannot be known
  * or writing failed (reported on stderr). */
 bool npy_begin(npy_results *npy, points *in);
 /* Sets the number of results in the header, if standard output is a file. Returns false if writing

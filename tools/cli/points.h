@@ -7,7 +7,7 @@
 #include "cli/points_input.h"
 
 /* Opens the input. `by`: name of the command, for messages. `path` NULL or "-": standard input.
- * `raw`: the input is doubles. `tmax`: default for rays without tmax. Returns false when the input
+ * `raw`: the input is doubles. `tmax`: default for rays without tmax. Returns false if the input
  * cannot be opened (reported on stderr). Call points_close in any case. */
 bool points_open(points *p, const char *by, const char *path, points_kind kind, bool raw,
                  double tmax);

@@ -9,7 +9,7 @@
  * each row once; a part may be empty. Binary numbers are cut so that the numbers of rows of two
  * parts differ by at most one. Text is cut into parts of equal byte counts, at the next line. Only
  * the bytes of the part and the beginning of the file are read. A PLY file has been read
- * completely; of a dataset, points_open_shard has read only this part. Returns false when the input
+ * completely; of a dataset, points_open_shard has read only this part. Returns false if the input
  * is not a file, or is invalid; this has been reported on stderr. */
 bool points_cut(points *p, uint64_t number, uint64_t of);
 

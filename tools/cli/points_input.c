@@ -35,7 +35,7 @@ void points_block_free(points_block *b)
     *b = (points_block){ .bytes = NULL };
 }
 
-/* Waits for more input. Returns false when the wait was interrupted. */
+/* Waits for more input. Returns false if the wait was interrupted. */
 static bool wait_for_more(const points *p)
 {
     struct pollfd both[] = { { .fd = p->wake_fd, .events = POLLIN },

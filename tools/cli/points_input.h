@@ -101,7 +101,7 @@ void points_drop(points *p, size_t bytes);
 /* Reads once, at most `most` bytes. Returns the number of bytes; -1 after an error, which is then
  * in the block. */
 ssize_t points_read_some(points *p, points_block *b, char *to, size_t most);
-/* Returns true when more can be read without waiting; always for files. */
+/* Returns true if more can be read without waiting; always for files. */
 bool points_more_is_there(const points *p);
 void points_block_free(points_block *block);
 

@@ -56,7 +56,7 @@ static double load_number(points_layout layout, const char *at)
     return layout.bytes == 4 ? (double)f : v;
 }
 
-/* Returns true when the input numbers have the layout of query rows, so that no conversion is
+/* Returns true if the input numbers have the layout of query rows, so that no conversion is
  * needed. */
 static bool is_query_layout(const points *p)
 {

@@ -37,7 +37,7 @@ enum {
     QUERY_PREFETCH = 32
 };
 
-/* Returns true when distance returns lists: --nearest or --within. */
+/* Returns true if distance returns lists: --nearest or --within. */
 static inline bool query_lists(const query_values *v)
 {
     return v->nearest > 0 || isfinite(v->within);

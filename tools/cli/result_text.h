@@ -30,7 +30,7 @@ struct result_text {
 /* Longest result in bytes, except lists of hits and faces, whose items are shorter. */
 enum { RESULT_MAX = 768 };
 
-/* Returns false when memory is short. Call result_text_free in any case. */
+/* Returns false if memory is short. Call result_text_free in any case. */
 bool result_text_init(result_text *t);
 void result_text_free(result_text *t);
 
@@ -70,7 +70,7 @@ static inline void result_text_end_row(result_text *t)
     t->row = t->count;
     t->row_written = 0;
 }
-/* Returns true when further results would be lost. */
+/* Returns true if further results would be lost. */
 static inline bool result_text_is_over(const result_text *t)
 {
     return t->failed || t->write_failed || t->full;

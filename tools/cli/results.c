@@ -157,7 +157,7 @@ void results_inside(result_text *t, result_form form, const ebpo_inside_result *
 
 /* --- distance --- */
 
-/* Returns true when there is a nearest point, also when the distance exceeds doubles (inf). */
+/* Returns true if there is a nearest point, also when the distance exceeds doubles (inf). */
 static bool has_point(const ebpo_distance_result *r)
 {
     return isfinite(r->distance) || r->face != EBPO_NO_FACE;

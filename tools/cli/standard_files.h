@@ -6,7 +6,7 @@
 
 #include "cli/args.h"
 
-/* Replaces closed standard streams by unusable files, before any file is opened. Returns false when
+/* Replaces closed standard streams by unusable files, before any file is opened. Returns false if
  * that is impossible; then nothing may be opened. */
 bool standard_files_occupy(void);
 

@@ -30,7 +30,7 @@ const char *table_scaled(char out[TABLE_CELL], int digits, double x, int64_t exp
 /* Writes x * 2^exponent as a number; beyond the range of a double as the same text. */
 void table_json(json *j, const char *key, double x, int64_t exponent);
 
-/* Returns true when a double holds x * 2^exponent, neither infinite nor rounded to 0 or near it. */
+/* Returns true if a double holds x * 2^exponent, neither infinite nor rounded to 0 or near it. */
 bool table_in_range(double x, int64_t exponent);
 
 /* Returns "mm^3" with a blank before it; "" without a unit. */

@@ -184,7 +184,7 @@ static ebpo_status fail_system(ebpo_error *error, const char *path)
     return fail_file(error, EBPO_E_IO, path, strerror(errno));
 }
 
-/* Returns true when no word between the slashes of the name is "..". */
+/* Returns true if no word between the slashes of the name is "..". */
 static bool stays_below(const char *name)
 {
     size_t n = 0;
@@ -339,7 +339,7 @@ static bool spans_equal(span a, span b)
     return a.n == b.n && (!a.n || memcmp(a.s, b.s, a.n) == 0);
 }
 
-/* Returns true when an earlier row is the same image under the same name, spelled differently. */
+/* Returns true if an earlier row is the same image under the same name, spelled differently. */
 static bool is_repeated(const textures *t, uint64_t row)
 {
     char *name = safe_name(list_of(t, NAMES, row));

@@ -21,10 +21,10 @@ typedef struct textures {
 EBPO_MUST_USE ebpo_status textures_read(textures *out, const ebpo_file *file, bool bytes,
                                         ebpo_error *error);
 void textures_free(textures *t);
-/* Returns true when the file has bytes of images; reads none of them. */
+/* Returns true if the file has bytes of images; reads none of them. */
 bool textures_embedded(const ebpo_file *file);
 
-/* Returns true when both files name the same images, with the same bytes according to their
+/* Returns true if both files name the same images, with the same bytes according to their
  * digests. Also true when one file cannot be read. */
 bool textures_same(const ebpo_file *a, const ebpo_file *b);
 

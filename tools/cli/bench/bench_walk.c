@@ -55,7 +55,7 @@ static void add_scaled(double v[3], double s, const double w[3])
         v[k] += s * w[k];
 }
 
-/* Returns false when there is no direction. */
+/* Returns false if there is no direction. */
 static bool normalise_vector(double v[3])
 {
     double most = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));

@@ -12,7 +12,7 @@ double bench_random_unit(uint64_t *state);
  * and swings within 1 % of `diagonal` to both sides of the surface; a step is a tenth of
  * `mean_edge`. At an edge without neighbour it turns back; at faces without area it continues on a
  * random face. The points are the same on all machines, as only + - * / and square roots are used.
- * Returns false when memory is short. */
+ * Returns false if memory is short. */
 bool bench_walk(const ebpo_mesh *mesh, double mean_edge, double diagonal, uint64_t seed,
                 uint64_t count, double *out);
 

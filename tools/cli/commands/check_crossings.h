@@ -7,8 +7,8 @@
 #include "cli/json.h"
 #include "cli/progress.h"
 
-/* Prints the pairs found, in words (the first ones) or into `j` (all); `quiet`: nothing. The mesh
- * is empty afterwards. Wipes `line` before printing. */
+/* Finds the pairs. Prints the first pairs in words or, if `j` is not NULL, all pairs as JSON; if
+ * `quiet`, prints no words. The mesh is empty afterwards. Wipes `line` before printing. */
 EBPO_MUST_USE ebpo_status check_crossings(ebpo_mesh *mesh, const ebpo_mesh_report *report,
                                           const ebpo_self_intersections_options *options, json *j,
                                           bool quiet, progress_line *line, ebpo_error *error);

@@ -9,7 +9,7 @@
 
 /* --- names as HTML text --- */
 
-/* Rows of a page of clashes can be filtered by the groups of their instances, without scripts. */
+/* Buttons filter the rows of the table by the groups of their instances, without scripts. */
 
 /* Writes text between tags. */
 static void html_put_text(FILE *f, const char *text)
@@ -46,7 +46,8 @@ static double clash_depth(const ebpo_scene_clash *m)
     return fmax(a, b);
 }
 
-/* Returns less than 0 when the first is worse. */
+/* Returns a negative number if the first clash is worse than the second, a positive number if the
+ * second is worse, or 0. */
 static int order_clashes(const ebpo_scene_clash *m, const ebpo_scene_clash *n)
 {
     if (rank_of(m) != rank_of(n))
@@ -182,8 +183,8 @@ static void put_buttons(FILE *f, const uint64_t *sums, uint64_t groups, const cl
             put_button(f, i, sums[i], ebpo_scene_get_group(scene, i));
 }
 
-/* Writes a button for each group with clashes, if there is any; a table of class `c` must follow
- * directly. Returns false when memory is short. */
+/* Writes a button for each group with clashes, if there are any; a table of class `c` must follow
+ * directly. Returns false if there is not enough memory. */
 static bool put_filter(FILE *f, const clash_list *list, const ebpo_scene *scene)
 {
     ebpo_scene_counts c = EBPO_SCENE_COUNTS_INIT;
@@ -228,11 +229,11 @@ static const char style[] =
 static const char *const meanings[] = {
     "",
     "closer than the clearance",
-    "faces touch, nothing enters",
+    "faces touch, without penetration",
     "faces overlap in one plane",
-    "surfaces cut each other",
-    "one runs into the other",
-    "one is completely within the other",
+    "surfaces intersect",
+    "one part penetrates the other",
+    "one part is completely within the other",
     "the same part twice in one place",
 };
 enum { KINDS = sizeof meanings / sizeof *meanings };
@@ -259,7 +260,8 @@ static void put_head(FILE *f, const clash_list *list, const char *title, double 
     html_put_text(f, title);
     fprintf(f, "</title>\n<style>%s</style>\n<h1>Clashes in ", style);
     html_put_text(f, title);
-    fprintf(f, "</h1>\n<p>%llu pairs of parts", (unsigned long long)list->count);
+    fprintf(f, "</h1>\n<p>%llu %s of parts", (unsigned long long)list->count,
+            list->count == 1 ? "pair" : "pairs");
     if (frames > 1)
         fprintf(f,
                 ", evaluated at %llu times from %.9g to %.9g; times in between are not "
@@ -341,7 +343,7 @@ static void put_row(FILE *f, const ebpo_scene *scene, const clash *c, uint64_t n
     fputc('\n', f);
 }
 
-/* Returns false when memory is short. */
+/* Returns false if there is not enough memory. */
 static bool put_page(FILE *f, const clash_list *list, const ebpo_scene *scene, const char *title,
                      double from, double to, uint64_t frames)
 {

@@ -63,46 +63,47 @@ static double longest_side(const double min[3], const double max[3])
 /* Chooses the region to draw: the smaller instance and the contact. If the contact is small
  * compared with this instance, the region is the contact and its surroundings. */
 static ebpo_status find_region(const ebpo_scene *scene, const clash *c, double middle[3],
-                               double *reach, ebpo_error *error)
+                               double *half_side, ebpo_error *error)
 {
-    const ebpo_scene_clash *m = &c->worst;
+    const ebpo_scene_clash *clash_facts = &c->worst;
     double min[2][3], max[2][3];
-    bool placed = isfinite(m->location[0]);
+    bool placed = isfinite(clash_facts->location[0]);
     for (int i = 0; i < 2; i++) {
-        ebpo_status status = ebpo_scene_instance_box(scene, i ? m->b : m->a, c->time, c->time,
-                                                     min[i], max[i], error);
+        ebpo_status status = ebpo_scene_instance_box(scene, i ? clash_facts->b : clash_facts->a,
+                                                     c->time, c->time, min[i], max[i], error);
         if (status != EBPO_OK)
             return status;
     }
     int small = longest_side(min[1], max[1]) < longest_side(min[0], max[0]);
     double size = longest_side(min[small], max[small]),
-           contact = longest_side(m->location_min, m->location_max);
-    bool zoom = placed && m->crossing && contact > 0 && 8 * contact < size;
-    const double *low = zoom ? m->location_min : min[small],
-                 *high = zoom ? m->location_max : max[small];
+           contact = longest_side(clash_facts->location_min, clash_facts->location_max);
+    bool zoom = placed && clash_facts->crossing && contact > 0 && 8 * contact < size;
+    const double *low = zoom ? clash_facts->location_min : min[small],
+                 *high = zoom ? clash_facts->location_max : max[small];
     if (placed) {
-        widen_box(min[small], max[small], m->location_min);
-        widen_box(min[small], max[small], m->location_max);
+        widen_box(min[small], max[small], clash_facts->location_min);
+        widen_box(min[small], max[small], clash_facts->location_max);
     }
     for (int k = 0; k < 3; k++)
         middle[k] = low[k] / 2 + high[k] / 2;
-    *reach = (zoom ? 4 : 0.6) * longest_side(low, high);
+    *half_side = (zoom ? 4 : 0.6) * longest_side(low, high);
     return EBPO_OK;
 }
 
 static ebpo_status paint_pair(ebpo_scene *scene, const clash *c, unsigned threads,
                               painted_mesh *out, ebpo_error *error)
 {
-    const ebpo_scene_clash *m = &c->worst;
-    bool intersects = m->touching + m->coplanar + m->crossing > 0;
+    const ebpo_scene_clash *clash_facts = &c->worst;
+    bool intersects = clash_facts->touching + clash_facts->coplanar + clash_facts->crossing > 0;
     uint8_t *red[2] = { NULL, NULL };
-    ebpo_status status =
-        intersects ? painted_find_red(scene, m->a, m->b, c->time, threads, red, error) : EBPO_OK;
+    ebpo_status status = intersects ? painted_find_red(scene, clash_facts->a, clash_facts->b,
+                                                       c->time, threads, red, error)
+                                    : EBPO_OK;
     for (int i = 0; i < 2 && status == EBPO_OK; i++) {
-        bool outer = m->kind == EBPO_CLASH_ENCLOSED &&
-                     m->relation == (i ? EBPO_A_INSIDE_B : EBPO_B_INSIDE_A);
+        bool outer = clash_facts->kind == EBPO_CLASH_ENCLOSED &&
+                     clash_facts->relation == (i ? EBPO_A_INSIDE_B : EBPO_B_INSIDE_A);
         status =
-            painted_add(out, scene, i ? m->b : m->a, c->time, red[i],
+            painted_add(out, scene, i ? clash_facts->b : clash_facts->a, c->time, red[i],
                         (uint8_t)((i ? RASTER_OTHER : RASTER_PLAIN) | (outer ? RASTER_HOLLOW : 0)),
                         error);
     }
@@ -134,15 +135,16 @@ ebpo_status clash_draw(ebpo_scene *scene, clash *c, unsigned threads, ebpo_error
 {
     painted_mesh p = { 0 };
     camera view;
-    double middle[3], min[3], max[3], reach;
-    ebpo_status status = find_region(scene, c, middle, &reach, error);
+    double middle[3], min[3], max[3], half_side;
+    ebpo_status status = find_region(scene, c, middle, &half_side, error);
     if (status == EBPO_OK)
         status = paint_pair(scene, c, threads, &p, error);
     if (status == EBPO_OK) {
-        painted_crop(&p, middle, 1.5 * reach); /* removes faces between the eye and the region */
+        painted_crop(&p, middle,
+                     1.5 * half_side); /* removes faces between the eye and the region */
         for (int k = 0; k < 3; k++) {
-            min[k] = middle[k] - reach;
-            max[k] = middle[k] + reach;
+            min[k] = middle[k] - half_side;
+            max[k] = middle[k] + half_side;
         }
         aim_camera(&view, min, max, HEIGHT);
         status = draw_clash(&p, &view, c, threads, error);
@@ -158,8 +160,8 @@ struct clash_strip {
     unsigned threads;
     int tiles, done, columns;
     uint64_t instances;
-    bool boxes; /* the scene has so many faces that only intersecting instances are drawn with them
-                 */
+    bool boxes; /* draw boxes instead of faces, except for intersecting instances: the scene has too
+                 * many faces */
     double min[3], max[3];
     picture picture;
 };
@@ -170,9 +172,9 @@ static uint64_t faces_of(const ebpo_scene *scene, uint64_t models)
 {
     uint64_t sum = 0;
     for (uint64_t i = 0; i < models; i++) {
-        ebpo_scene_model_facts m = EBPO_SCENE_MODEL_FACTS_INIT;
-        (void)ebpo_scene_get_model_facts(scene, i, &m);
-        sum += m.instances * ebpo_file_info(ebpo_scene_file(scene, i))->face_count;
+        ebpo_scene_model_facts clash_facts = EBPO_SCENE_MODEL_FACTS_INIT;
+        (void)ebpo_scene_get_model_facts(scene, i, &clash_facts);
+        sum += clash_facts.instances * ebpo_file_info(ebpo_scene_file(scene, i))->face_count;
     }
     return sum;
 }
@@ -209,21 +211,22 @@ void clash_strip_free(clash_strip *s)
     free(s);
 }
 
-/* Sets red[i] to the bytes that mark the red faces of instance i. red[i] stays NULL if no face of
- * the instance intersects another one. */
+/* Sets red[i] to the bytes that mark the red faces of instance i. red[i] remains NULL if no face of
+ * the instance intersects another instance. */
 static ebpo_status find_red_faces(clash_strip *s, double time,
                                   const ebpo_scene_clash *found_clashes, uint64_t count,
                                   uint8_t **red, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
-        const ebpo_scene_clash *m = &found_clashes[i];
-        uint8_t *two[2] = { red[m->a], red[m->b] };
-        if (m->touching + m->coplanar + m->crossing == 0)
+        const ebpo_scene_clash *clash_facts = &found_clashes[i];
+        uint8_t *two[2] = { red[clash_facts->a], red[clash_facts->b] };
+        if (clash_facts->touching + clash_facts->coplanar + clash_facts->crossing == 0)
             continue;
-        status = painted_find_red(s->scene, m->a, m->b, time, s->threads, two, error);
-        red[m->a] = two[0];
-        red[m->b] = two[1];
+        status = painted_find_red(s->scene, clash_facts->a, clash_facts->b, time, s->threads, two,
+                                  error);
+        red[clash_facts->a] = two[0];
+        red[clash_facts->b] = two[1];
     }
     return status;
 }
@@ -254,7 +257,8 @@ static ebpo_status draw_tile(clash_strip *s, const painted_mesh *p, double time,
     s->done++;
     ebpo_status status =
         draw_model(&s->picture, x, y, HEIGHT - caption, &view, p, s->threads, error);
-    snprintf(text, sizeof text, "time %.4g: %llu clash", time, (unsigned long long)count);
+    snprintf(text, sizeof text, "time %.4g: %llu %s", time, (unsigned long long)count,
+             count == 1 ? "clash" : "clashes");
     if (status == EBPO_OK && caption)
         status =
             picture_caption(&s->picture, x, y + HEIGHT - caption, WIDTH, caption, ink, text, error);

@@ -8,8 +8,8 @@
 /* Returns NULL, or why there are no pictures. */
 const char *clash_pictures_missing(void);
 
-/* Draws two instances at the time and position of their worst clash: sets `picture`. When one is
- * within the other, draws only the far side of the outer one. */
+/* Draws two instances at the time and position of their worst clash: sets `picture`. If one
+ * instance is within the other, draws only the far side of the outer instance. */
 EBPO_MUST_USE ebpo_status clash_draw(ebpo_scene *scene, clash *c, unsigned threads,
                                      ebpo_error *error);
 
@@ -18,7 +18,8 @@ typedef struct clash_strip clash_strip;
 
 enum { CLASH_TILES = 24 };
 
-/* Makes a strip of `tiles` times from .. to. NULL: no memory. */
+/* Makes a strip of pictures at `tiles` times, from `from` to `to`. Returns NULL if there is not
+ * enough memory. */
 clash_strip *clash_strip_new(ebpo_scene *scene, double from, double to, int tiles,
                              unsigned threads);
 EBPO_MUST_USE ebpo_status clash_strip_add(clash_strip *strip, double time,

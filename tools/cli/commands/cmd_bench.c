@@ -18,7 +18,7 @@
 #include "cli/commands/commands.h"
 
 typedef struct values {
-    query_values q; /* first: its rows of options are shared */
+    query_values q; /* the first member: the options of other query commands set it */
     int query;
     const char *points, *mode, *save_points, *save_results;
     int64_t count, seed, repeat;
@@ -29,7 +29,8 @@ static const char *const query_words[] = {
     "inside", "distance", "ray", "ray-any", "ray-all", NULL
 };
 enum { REPEAT_MAX = 99 };
-/* Outcomes of a distance or ray query. INTERVAL: the level or the deadline did not suffice. */
+/* Kinds of results of a distance or ray query. RESULT_INTERVAL: an interval, as the maximum level
+ * or the deadline did not allow the exact distance. */
 enum { RESULT_NONE, RESULT_FOUND, RESULT_INTERVAL };
 
 #include "cli/options/bench.inc"
@@ -42,7 +43,8 @@ typedef struct results {
     bench_metrics metrics;
     ebpo_model_stats model, model_end; /* after the first pass, and at the end */
     traffic traffic;                   /* traffic of the warm session */
-    uint64_t counts[4];                /* inside: by ebpo_where; else NOTHING, FOUND or INTERVAL */
+    uint64_t
+        counts[4]; /* inside: by ebpo_where; other queries: by RESULT_NONE to RESULT_INTERVAL */
 } results;
 
 /* The words of --mode depend on the query. */
@@ -58,22 +60,23 @@ static bool set_mode(values *v)
         }
     fprintf(stderr, "ebpo bench: --mode: '%s' is not a mode of %s; 'ebpo %s --help' %s\n", v->mode,
             query_words[v->query], query_words[v->query],
-            v->query >= BENCH_RAY ? "says that it has none" : "lists them");
+            v->query >= BENCH_RAY ? "has no modes" : "lists the modes");
     return false;
 }
 
 /* --- measuring --- */
 
 /* Measures the time from opening a file outside the page cache to the first result. */
-static int cold_start(const bench_job *job, const char *path, const ebpo_model_options *holding,
-                      const remote_values *remote, results *r)
+static int cold_start(const bench_job *job, const char *path,
+                      const ebpo_model_options *model_options, const remote_values *remote,
+                      results *r)
 {
     query_session s = QUERY_SESSION_INIT;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
     r->cold_pages = bench_drop_file(path);
     uint64_t begin = tool_clock();
-    int code = query_open(&s, "bench", path, holding, job->inside.level, remote);
+    int code = query_open(&s, "bench", path, model_options, job->inside.level, remote);
     r->cold_open_seconds = (double)(tool_clock() - begin) * 1e-9;
     if (code == EXIT_OK && bench_run_query(job, s.context, 0, &error) != EBPO_OK)
         code = command_failed("bench", &error);
@@ -110,13 +113,13 @@ static double median_batch(const bench_metrics *f, int count)
 /* Refuses options without effect, which would make the results misleading. */
 static bool options_fit(const values *v)
 {
-    char with[40];
-    unsigned idle = QUERY_UNSIGNED | QUERY_MAX_DISTANCE | QUERY_NO_WARM;
+    char query_option[40];
+    unsigned unused = QUERY_UNSIGNED | QUERY_MAX_DISTANCE | QUERY_NO_WARM;
     if (v->query >= BENCH_RAY)
-        idle |= QUERY_LEVEL | QUERY_DEADLINE | QUERY_PREFETCH;
-    snprintf(with, sizeof with, "--query %s", query_words[v->query]);
+        unused |= QUERY_LEVEL | QUERY_DEADLINE | QUERY_PREFETCH;
+    snprintf(query_option, sizeof query_option, "--query %s", query_words[v->query]);
     if (isfinite(v->q.tmax) && v->query < BENCH_RAY) {
-        command_usage("bench", "--tmax has no effect with %s; omit one of them", with);
+        command_usage("bench", "--tmax has no effect with %s; omit one of them", query_option);
         return false;
     }
     if (v->q.raw && bench_points_generated(v->points)) {
@@ -135,10 +138,11 @@ static bool options_fit(const values *v)
     }
     if (v->query == BENCH_DISTANCE)
         return query_distance_fits("bench", &v->q);
-    return query_check_effect("bench", &v->q, idle, with) && query_inside_fits("bench", &v->q);
+    return query_check_effect("bench", &v->q, unused, query_option) &&
+           query_inside_fits("bench", &v->q);
 }
 
-/* Compares bits: NAN means not found. */
+/* Compares the bits of numbers, as NAN stands for a result that was not found. */
 static bool same_reals(const double *a, const double *b, int count)
 {
     return memcmp(a, b, (size_t)count * sizeof *a) == 0;
@@ -163,7 +167,8 @@ static bool same_result(bench_query query, const void *one, const void *other, u
     return same_reals(&a->t, &b->t, 1) && a->face == b->face && a->side == b->side;
 }
 
-/* The batch must return the results of single queries, unless they depend on time. */
+/* Checks that the batch has the results of single queries, unless they depend on time. Returns an
+ * exit code. */
 static int compare_results(const bench_job *job, const void *batch)
 {
     if (job->inside.deadline_ns)
@@ -277,21 +282,22 @@ static void print_opening(const results *r)
     printf("%-12s %11.6f %11s %11s %11" PRIu64 "\n", "again", r->open_seconds, "",
            words_bytes(bytes, sizeof bytes, r->model.bytes_read), r->model.reads);
     if (r->cold_pages >= 0)
-        printf("cold: the system still held %.0f %% of the file; ", 100 * r->cold_pages);
-    puts("to result: seconds to the first one");
+        printf("cold: %.0f %% of the file was still in the page cache; ", 100 * r->cold_pages);
+    puts("to result: seconds to the first result");
 }
 
 static void print_results(const values *v, const char *path, uint64_t count, const results *r)
 {
     const bench_metrics *f = &r->metrics;
     char bytes[40];
-    printf("%s: %s, %s, %" PRIu64 " queries\n\n", path, query_words[v->query], v->points, count);
+    printf("%s: %s, %s, %s\n\n", path, query_words[v->query], v->points,
+           words_plural(bytes, sizeof bytes, count, "query", "queries"));
     printf("%-12s %11s %11s %11s %11s %11s\n", "ns/query", "mean", "p50", "p99", "p99.9", "max");
     printf("%-12s %11.1f %11" PRIu64 " %11" PRIu64 " %11" PRIu64 " %11" PRIu64 "\n", "single",
            f->mean, f->p50, f->p99, f->p999, f->max);
     printf("%-12s %11.1f\n", "batch", f->batch);
-    printf("single: each by itself, less the clock's %" PRIu64 " ns; batch: all at once; "
-           "one thread\n",
+    printf("single: one query per call, without the %" PRIu64 " ns of the clock; batch: all in one "
+           "call; one thread\n",
            r->clock_ns);
     print_opening(r);
     print_counts(v, r);
@@ -376,17 +382,17 @@ static void print_json(const values *v, const char *path, uint64_t count, const 
 /* --- the command --- */
 
 static int bench_model(bench_job *job, const values *v, const bench_points *p, const char *path,
-                       const ebpo_model_options *holding, void *batch)
+                       const ebpo_model_options *model_options, void *batch)
 {
     results r = { .clock_ns = bench_clock_cost(),
                   .model = EBPO_MODEL_STATS_INIT,
                   .model_end = EBPO_MODEL_STATS_INIT };
     query_session s = QUERY_SESSION_INIT;
     bench_reset_peak();
-    int code = cold_start(job, path, holding, &v->q.remote, &r);
+    int code = cold_start(job, path, model_options, &v->q.remote, &r);
     uint64_t begin = tool_clock();
     if (code == EXIT_OK)
-        code = query_open(&s, "bench", path, holding, job->inside.level, &v->q.remote);
+        code = query_open(&s, "bench", path, model_options, job->inside.level, &v->q.remote);
     r.open_seconds = (double)(tool_clock() - begin) * 1e-9;
     if (code == EXIT_OK)
         code = measure_rounds(job, &s, (int)v->repeat, batch, &r);
@@ -421,11 +427,11 @@ static const values standard = {
 static int run_bench(void *given, const char **operand)
 {
     values *v = given;
-    ebpo_model_options holding;
+    ebpo_model_options model_options;
     bench_job job = { .result_values = NULL };
     bench_points p;
     if (!set_mode(v) || !options_fit(v) ||
-        !query_options_from("bench", &v->q, &holding, &job.inside, &job.distance))
+        !query_options_from("bench", &v->q, &model_options, &job.inside, &job.distance))
         return EXIT_USAGE;
     if (v->seed < 0)
         v->seed = 1;
@@ -443,7 +449,7 @@ static int run_bench(void *given, const char **operand)
         code = command_no_memory("bench");
     }
     if (code == EXIT_OK)
-        code = bench_model(&job, v, &p, operand[0], &holding, batch);
+        code = bench_model(&job, v, &p, operand[0], &model_options, batch);
     free(batch);
     free(job.result_values);
     free(job.ns);

@@ -23,7 +23,7 @@
 enum { MODELS = ARGS_OPERANDS_MAX - 1 };
 
 typedef struct values {
-    query_values query; /* first */
+    query_values query; /* the first member: the options of other query commands set it */
     const char *inside, *distance, *out, *temp_dir;
     arg_list poses;
     int64_t level;
@@ -77,8 +77,8 @@ typedef struct cell_result {
     /* the volume is exact, but no cells can be made; `why_no_cells` is the reason */
     bool no_cells;
     char why_no_cells[1024];
-    bool volume;            /* requested */
-    uint64_t faces_written; /* of cells */
+    bool volume;            /* the volume is requested */
+    uint64_t faces_written; /* number of written faces of cells */
 } cell_result;
 
 /* Returns true if the exact result is requested. */
@@ -109,7 +109,7 @@ static void explain_bound(const cell_result *a, char *out, size_t capacity)
                  e->face[0], e->face[1], 'A' + (int)i, first);
         break;
     case EBPO_VOLUME_IN_PARTS:
-        snprintf(out, capacity, "%c (%s) is not all in memory", 'A' + (int)i, first);
+        snprintf(out, capacity, "%c (%s) is only partly in memory", 'A' + (int)i, first);
         break;
     case EBPO_VOLUME_SUBSET:
         snprintf(out, capacity, "%c (%s) is a part of another file", 'A' + (int)i, first);
@@ -202,9 +202,9 @@ static void print_written(const cell_result *a)
     words_plural(in, sizeof in, a->cells.in_cells, "cell", "cells");
     words_plural(mixed, sizeof mixed, a->cells.mixed_cells, "mixed cell", "mixed cells");
     if (a->v->inner)
-        printf("%s: %s around %s that the result holds\n", a->v->out, faces, in);
+        printf("%s: %s around %s within the result\n", a->v->out, faces, in);
     else
-        printf("%s: %s around %s and %s that hold the result\n", a->v->out, faces, in, mixed);
+        printf("%s: %s around %s and %s that contain the result\n", a->v->out, faces, in, mixed);
 }
 
 static void print_cells(const cell_result *a)
@@ -298,8 +298,8 @@ static ebpo_status write_cells(const ebpo_boolean_cells *cells, cell_result *a,
     if (mesh.face_count == 0) {
         error->status = status = EBPO_E_ABSENT;
         snprintf(error->message, sizeof error->message,
-                 "%s: there are no %s cells at level %" PRId64 "; give a higher level", v->out,
-                 v->inner ? "inner" : "such", v->level);
+                 "%s: there are no %s at level %" PRId64 "; give a higher level", v->out,
+                 v->inner ? "inner cells" : "cells", v->level);
     } else {
         status = boolean_write_mesh(&a->output, &mesh, progress, error);
     }
@@ -375,8 +375,8 @@ static int check_values(const values *v, const char **models, uint32_t count)
         return command_usage("boolean", "--inside and --distance cannot be used together");
     if (has_point_queries && (v->volume || v->out || v->inner))
         return command_usage("boolean",
-                             "%s queries points; --volume and --output do not; run them "
-                             "separately",
+                             "%s cannot be used with --volume, --output or --inner; run the "
+                             "command for each",
                              v->inside ? "--inside" : "--distance");
     if (v->cells && !v->out)
         return command_usage("boolean", "--cells needs --output");
@@ -427,17 +427,18 @@ static int evaluate_expression(const values *v, const boolean_nodes *nodes,
     return code;
 }
 
-/* Makes the workspace of a result with a limit of memory, a quarter of which is for the models. */
-static int limit_memory(const values *v, uint32_t count, ebpo_model_options *holding,
+/* If the exact result is written under a limit of memory, makes its workspace, and sets the limit
+ * of each model: a quarter of the memory is for the models. */
+static int limit_memory(const values *v, uint32_t count, ebpo_model_options *model_options,
                         ebpo_workspace **out)
 {
     const memory_values memory = { v->query.memory, v->temp_dir };
     ebpo_error error = EBPO_ERROR_INIT;
-    if (!writes_result(v) || holding->memory == 0)
+    if (!writes_result(v) || model_options->memory == 0)
         return EXIT_OK;
     if (!memory_check("boolean", &memory))
         return EXIT_USAGE;
-    holding->memory /= 4 * count;
+    model_options->memory /= 4 * count;
     return memory_new(out, &memory, &error) == EBPO_OK ? EXIT_OK
                                                        : command_failed("boolean", &error);
 }
@@ -450,7 +451,7 @@ static int run_boolean(void *given, const char **operand)
     boolean_nodes nodes;
     ebpo_pose poses[MODELS];
     query_session sessions[MODELS];
-    ebpo_model_options holding;
+    ebpo_model_options model_options;
     ebpo_inside_options inside;
     ebpo_distance_options distance;
     const char **models = operand + 1;
@@ -462,13 +463,13 @@ static int run_boolean(void *given, const char **operand)
     }
     if (!boolean_read("boolean", operand[0], count, &nodes) ||
         !boolean_read_poses("boolean", &v->poses, count, poses) ||
-        !query_options_from("boolean", &v->query, &holding, &inside, &distance))
+        !query_options_from("boolean", &v->query, &model_options, &inside, &distance))
         return EXIT_USAGE;
     int code = check_values(v, models, count);
     if (code == EXIT_OK)
-        code = limit_memory(v, count, &holding, &workspace);
+        code = limit_memory(v, count, &model_options, &workspace);
     for (uint32_t i = 0; i < count && code == EXIT_OK; i++)
-        code = query_open(&sessions[i], "boolean", models[i], &holding, -1, &v->query.remote);
+        code = query_open(&sessions[i], "boolean", models[i], &model_options, -1, &v->query.remote);
     if (code == EXIT_OK)
         code = evaluate_expression(v, &nodes, sessions, poses, models, count, workspace);
     for (uint32_t i = 0; i < count; i++)

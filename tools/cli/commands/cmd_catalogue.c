@@ -98,7 +98,7 @@ static void read_entry(catalogue *c, size_t number)
     if (!name || !e->path || !e->shown_path) {
         c->no_memory = true;
     } else if (!is_utf8(e->path)) {
-        omit_entry(c, e, "its name is not UTF-8; give it another one");
+        omit_entry(c, e, "its name is not UTF-8; rename the file");
     } else if (remote_open(&file, name, &how, &error) == EBPO_OK) {
         ebpo_catalogue_entry_of(file, e->path, &e->reported);
         e->known = true;
@@ -120,7 +120,7 @@ static void *read_entries(void *user)
         pthread_mutex_unlock(&c->lock);
         read_entry(c, number);
         pthread_mutex_lock(&c->lock);
-        progress_report(c->progress, "heads", ++c->done, c->files.count);
+        progress_report(c->progress, "headers", ++c->done, c->files.count);
     }
     pthread_mutex_unlock(&c->lock);
     return NULL;
@@ -210,15 +210,15 @@ static char *relative_path(const char *a, const char *b)
     return path;
 }
 
-/* Finds the prefix of paths in the catalogue. Returns the exit code. */
+/* Sets the prefix of paths in the catalogue. Returns the exit code. */
 static int find_relative_path(catalogue *c)
 {
     char *a = real_folder(c->out), *b = a ? realpath(c->folder, NULL) : NULL;
-    bool reached = b || errno == ENOMEM;
-    if (!reached)
+    bool resolved = b || errno == ENOMEM;
+    if (!resolved)
         fprintf(stderr, "ebpo catalogue: %s: %s\n", a ? c->folder : c->out, strerror(errno));
     c->path_prefix = b ? relative_path(a, b) : NULL;
-    int code = c->path_prefix ? EXIT_OK : reached ? command_no_memory("catalogue") : EXIT_FAILED;
+    int code = c->path_prefix ? EXIT_OK : resolved ? command_no_memory("catalogue") : EXIT_FAILED;
     free(a);
     free(b);
     return code;
@@ -300,20 +300,21 @@ static void print_json(const catalogue *c)
 
 static void print_words(const catalogue *c)
 {
-    char models[40], faces[24], bytes[32], left[40];
+    char models[40], faces[24], bytes[32], omitted[40];
     words_plural(models, sizeof models, c->models, "model", "models");
     words_count(faces, sizeof faces, (double)c->faces);
+    const char *word = c->faces == 1 ? "face" : "faces";
     words_bytes(bytes, sizeof bytes, c->bytes);
-    words_plural(left, sizeof left, count_omitted(c), "was omitted", "were omitted");
-    printf("%s: %s, %" PRIu64 " of them solid, %s faces, %s", c->out, models, c->solids, faces,
+    words_plural(omitted, sizeof omitted, count_omitted(c), "was omitted", "were omitted");
+    printf("%s: %s, %" PRIu64 " of them solid, %s %s, %s", c->out, models, c->solids, faces, word,
            bytes);
-    printf(count_omitted(c) ? "; %s\n" : "\n", left);
+    printf(count_omitted(c) ? "; %s\n" : "\n", omitted);
 }
 
 /* --- command --- */
 
-/* Returns true when the catalogue would overwrite a file that it lists; reports it on stderr and
- * sets `code`. */
+/* Returns true if the catalogue would overwrite a file that it lists, or after an error: then
+ * reports it on stderr and sets `code`. */
 static bool overwrites_model(const catalogue *c, int *code)
 {
     for (size_t i = 0; i < c->files.count; i++) {
@@ -348,8 +349,8 @@ static int make_catalogue(catalogue *c)
     report_omitted(c);
     if (!c->models) {
         fprintf(stderr,
-                "ebpo catalogue: %s: holds no model; nothing was written (ebpo convert makes "
-                "them)\n",
+                "ebpo catalogue: %s: has no models; nothing was written (ebpo convert makes "
+                "models)\n",
                 c->folder);
         return EXIT_FAILED;
     }

@@ -30,7 +30,7 @@ typedef struct finding_printer {
     uint64_t count[EBPO_FINDING_KINDS];
 } finding_printer;
 
-/* Returns false when `to` is neither "all" nor the name of a PLY file. */
+/* Returns true if `to` is "all" or the name of a PLY file. */
 static bool is_findings_target(const char *to)
 {
     size_t length = strlen(to);
@@ -110,8 +110,8 @@ static void print_legend(const char *path, const uint64_t count[EBPO_FINDING_KIN
     }
 }
 
-/* Prints all positions, or writes the coloured PLY file and prints its legend. `j`: writes JSON
- * into the open object instead; NULL: words, unless `quiet`. */
+/* Prints all positions or, if `to` names a PLY file, writes the coloured file and prints its
+ * legend. j: prints JSON into the open object instead; NULL: prints words, unless `quiet`. */
 static ebpo_status check_findings(const ebpo_mesh *mesh, const char *to, unsigned threads,
                                   ebpo_progress progress, json *j, bool quiet, progress_line *line,
                                   ebpo_error *error)

@@ -21,7 +21,7 @@
 
 /* --- distance, depth and relation --- */
 
-/* Options as given. If not given, `tolerance` is 0, and `at_least` is below 0. */
+/* Values of the options. If not given, `tolerance` is 0, and `at_least` is below 0. */
 typedef struct measure_values {
     bool distance, depth;
     double tolerance, at_least;
@@ -63,9 +63,9 @@ static ebpo_status find_relation(ebpo_collider *c, const ebpo_collide_options *h
  * nothing. */
 static void print_relation(bool as_json, const char *relation)
 {
-    bool open = relation == collide_relations[EBPO_RELATION_UNDECIDED];
+    bool undecided = relation == collide_relations[EBPO_RELATION_UNDECIDED];
     if (relation && as_json)
-        printf(open ? ", \"relation\": null" : ", \"relation\": \"%s\"", relation);
+        printf(undecided ? ", \"relation\": null" : ", \"relation\": \"%s\"", relation);
     else if (relation)
         printf(" %s", relation);
 }
@@ -91,8 +91,8 @@ static bool measures_requested(const measure_values *f)
     return f->distance || f->depth || f->separation;
 }
 
-/* Returns false, with a message on standard error, for options that cannot be combined. `others`:
- * --all or --self was given. */
+/* Returns false, with a message on standard error, for options that cannot be combined. others:
+ * true if --all or --self was given. */
 static bool measures_fit(measure_values *f, bool others)
 {
     const char *wrong = NULL;
@@ -173,24 +173,24 @@ static void print_at_least(bool as_json, const ebpo_collide_distance_result *c,
 static ebpo_status query_distance(const measure_values *f, bool as_json, ebpo_collider *c,
                                   const ebpo_collide_options *how, ebpo_error *error)
 {
-    ebpo_collide_distance_options wanted = EBPO_COLLIDE_DISTANCE_OPTIONS_INIT;
-    ebpo_collide_distance_result got;
-    wanted.tolerance = f->tolerance;
-    wanted.at_least = f->at_least;
-    ebpo_status status = ebpo_collide_distance(c, how, &wanted, &got, error);
+    ebpo_collide_distance_options distance_options = EBPO_COLLIDE_DISTANCE_OPTIONS_INIT;
+    ebpo_collide_distance_result result;
+    distance_options.tolerance = f->tolerance;
+    distance_options.at_least = f->at_least;
+    ebpo_status status = ebpo_collide_distance(c, how, &distance_options, &result, error);
     if (status != EBPO_OK)
         return status;
     /* if not apart, the line already reports an intersection, or that nothing is known */
-    bool apart = got.distance.lo > 0 || (got.at_least >= 0 && got.distance.hi > 0);
+    bool apart = result.distance.lo > 0 || (result.at_least >= 0 && result.distance.hi > 0);
     const char *relation = NULL;
     if (apart)
         status = find_relation(c, how, &relation, error);
     if (status != EBPO_OK)
         return status;
     if (f->at_least >= 0)
-        print_at_least(as_json, &got, relation);
+        print_at_least(as_json, &result, relation);
     else
-        print_distance(as_json, &got, relation);
+        print_distance(as_json, &result, relation);
     return EBPO_OK;
 }
 
@@ -235,19 +235,19 @@ static ebpo_status query_separation(const measure_values *f, bool as_json, ebpo_
                                     const ebpo_collide_options *how, ebpo_error *error)
 {
     static const char *const value_kinds[] = { "exact", "interval", "bound" };
-    ebpo_separation w;
-    ebpo_status status = ebpo_collide_separation(c, how, f->direction, &w, error);
+    ebpo_separation separation;
+    ebpo_status status = ebpo_collide_separation(c, how, f->direction, &separation, error);
     if (status != EBPO_OK)
         return status;
-    bool any = w.pair.face_a != EBPO_NO_FACE;
+    bool any = separation.pair.face_a != EBPO_NO_FACE;
     printf("%s", as_json ? "{" : "");
-    print_bounds(as_json, &w.t);
+    print_bounds(as_json, &separation.t);
     if (as_json)
-        printf(", \"value_kind\": \"%s\"", value_kinds[w.t.kind]);
+        printf(", \"value_kind\": \"%s\"", value_kinds[separation.t.kind]);
     if (any)
         printf(as_json ? ", \"face_a\": %" PRIu64 ", \"face_b\": %" PRIu64
                        : " %" PRIu64 " %" PRIu64,
-               w.pair.face_a, w.pair.face_b);
+               separation.pair.face_a, separation.pair.face_b);
     puts(as_json ? "}" : "");
     return EBPO_OK;
 }
@@ -476,12 +476,12 @@ static void report_stats(const ebpo_collider *c, bool as_json)
 static int query_collider(collide_values *v, ebpo_model *a, ebpo_model *b,
                           ebpo_collide_options *how)
 {
-    ebpo_collider_options with = EBPO_COLLIDER_OPTIONS_INIT;
+    ebpo_collider_options collider_options = EBPO_COLLIDER_OPTIONS_INIT;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_collider *c = NULL;
     progress_line line;
-    with.threads = (unsigned)v->query.threads;
-    ebpo_status status = ebpo_collider_new(a, b, &with, &c, &error);
+    collider_options.threads = (unsigned)v->query.threads;
+    ebpo_status status = ebpo_collider_new(a, b, &collider_options, &c, &error);
     how->progress = progress_start(&line, "collide", v->quiet);
     if (status == EBPO_OK)
         status = query_all(v, c, how, &error);
@@ -494,62 +494,64 @@ static int query_collider(collide_values *v, ebpo_model *a, ebpo_model *b,
     return command_flush("collide") ? EXIT_OK : EXIT_FAILED;
 }
 
-/* --memory applies to both models together: both are loaded completely if they fit, else both in
- * parts that share it. */
+/* Makes the budget of both models for --memory, which applies to both together, unless both fit
+ * completely. */
 static ebpo_status share_memory(const query_session *a, const query_session *b,
-                                ebpo_model_options *holding, ebpo_error *error)
+                                ebpo_model_options *model_options, ebpo_error *error)
 {
-    ebpo_model_options without = *holding;
+    ebpo_model_options unlimited = *model_options;
     ebpo_model_plan plan[2] = { EBPO_MODEL_PLAN_INIT, EBPO_MODEL_PLAN_INIT };
-    without.memory = 0;
-    ebpo_status status = ebpo_model_memory(a->file, &without, &plan[0], error);
+    unlimited.memory = 0;
+    ebpo_status status = ebpo_model_memory(a->file, &unlimited, &plan[0], error);
     if (status == EBPO_OK)
-        status = ebpo_model_memory(b->file, &without, &plan[1], error);
-    bool all = holding->cut_level < 0 && plan[0].whole + plan[1].whole <= holding->memory;
+        status = ebpo_model_memory(b->file, &unlimited, &plan[1], error);
+    bool all =
+        model_options->cut_level < 0 && plan[0].whole + plan[1].whole <= model_options->memory;
     if (status != EBPO_OK || all)
         return status;
-    return ebpo_budget_new(holding->memory, &holding->budget, error);
+    return ebpo_budget_new(model_options->memory, &model_options->budget, error);
 }
 
-/* Without --memory: half of the free memory if both models would need more, or the minimum. Remote
- * files keep the default budget of the library. */
+/* Sets the memory of both models if --memory is not given: no limit if both need at most half of
+ * the free memory, otherwise half of the free memory, or the minimum if that is more. Remote files
+ * keep the default budget of the library. */
 static void default_memory(const query_session *a, const query_session *b,
-                           const char *const path[2], ebpo_model_options *holding)
+                           const char *const path[2], ebpo_model_options *model_options)
 {
     if (ebpo_is_url(path[0]) || (b && ebpo_is_url(path[1])))
         return;
     ebpo_model_plan plan[2] = { EBPO_MODEL_PLAN_INIT, EBPO_MODEL_PLAN_INIT };
-    if (ebpo_model_memory(a->file, holding, &plan[0], NULL) != EBPO_OK ||
-        (b && ebpo_model_memory(b->file, holding, &plan[1], NULL) != EBPO_OK))
+    if (ebpo_model_memory(a->file, model_options, &plan[0], NULL) != EBPO_OK ||
+        (b && ebpo_model_memory(b->file, model_options, &plan[1], NULL) != EBPO_OK))
         return; /* errors are reported when the models are made */
     uint64_t half = ebpo_free_memory() / 2;
     uint64_t least = plan[0].least + plan[1].least;
     if (plan[0].whole + plan[1].whole <= half)
         return;
-    holding->memory = half > least ? half : least;
+    model_options->memory = half > least ? half : least;
     if (least > half)
         model_memory_report_least("collide", "both models", least, half);
 }
 
 static int open_models(query_session *a, query_session *b, const collide_values *v,
-                       const char **operand, ebpo_model_options *holding)
+                       const char **operand, ebpo_model_options *model_options)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     const char *path[2] = { operand[0], operand[1] };
-    bool one = v->self || strcmp(path[0], path[1]) == 0; /* then it is loaded once */
+    bool same_model = v->self || strcmp(path[0], path[1]) == 0; /* then it is loaded once */
     int level = (int)v->query.level;
-    int code = query_open_file(a, "collide", path[0], holding, level, &v->query.remote);
-    if (code == EXIT_OK && !one)
-        code = query_open_file(b, "collide", path[1], holding, level, &v->query.remote);
-    if (code == EXIT_OK && !v->query.memory && holding->cut_level < 0)
-        default_memory(a, one ? NULL : b, path, holding);
-    if (code == EXIT_OK && !one && holding->memory &&
-        share_memory(a, b, holding, &error) != EBPO_OK)
+    int code = query_open_file(a, "collide", path[0], model_options, level, &v->query.remote);
+    if (code == EXIT_OK && !same_model)
+        code = query_open_file(b, "collide", path[1], model_options, level, &v->query.remote);
+    if (code == EXIT_OK && !v->query.memory && model_options->cut_level < 0)
+        default_memory(a, same_model ? NULL : b, path, model_options);
+    if (code == EXIT_OK && !same_model && model_options->memory &&
+        share_memory(a, b, model_options, &error) != EBPO_OK)
         return command_failed("collide", &error);
     if (code == EXIT_OK)
-        code = query_open_model(a, "collide", holding);
-    if (code == EXIT_OK && !one)
-        code = query_open_model(b, "collide", holding);
+        code = query_open_model(a, "collide", model_options);
+    if (code == EXIT_OK && !same_model)
+        code = query_open_model(b, "collide", model_options);
     return code;
 }
 
@@ -557,7 +559,7 @@ static int run_collide(void *given, const char **operand)
 {
     collide_values *v = given;
     ebpo_collide_options how = EBPO_COLLIDE_OPTIONS_INIT;
-    ebpo_model_options holding = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model_options model_options = EBPO_MODEL_OPTIONS_INIT;
     ebpo_inside_options inside = EBPO_INSIDE_OPTIONS_INIT;
     ebpo_distance_options distance = EBPO_DISTANCE_OPTIONS_INIT;
     query_session a = QUERY_SESSION_INIT, b = QUERY_SESSION_INIT;
@@ -579,17 +581,17 @@ static int run_collide(void *given, const char **operand)
         return command_usage("collide", "--max-level allows no other query");
     if (!read_pose("pose-a", v->pose_a, &how.pose_a) ||
         !read_pose("pose-b", v->pose_b, &how.pose_b) ||
-        !query_options_from("collide", &v->query, &holding, &inside, &distance))
+        !query_options_from("collide", &v->query, &model_options, &inside, &distance))
         return EXIT_USAGE;
     how.deadline_ns = distance.deadline_ns;
     how.level = distance.level;
     setvbuf(stdout, NULL, _IOFBF, 1 << 18);
-    int code = open_models(&a, &b, v, operand, &holding);
+    int code = open_models(&a, &b, v, operand, &model_options);
     if (code == EXIT_OK)
         code = query_collider(v, a.model, b.model ? b.model : a.model, &how);
     query_close(&b);
     query_close(&a);
-    ebpo_budget_free(holding.budget);
+    ebpo_budget_free(model_options.budget);
     return code;
 }
 

@@ -28,9 +28,9 @@
 
 /* --- the mesh and the file, described --- */
 
-/* Facts to report, and their form. */
+/* Properties of a conversion that its reports use, and the form of the reports. */
 typedef struct convert_reported {
-    const char *in, *out; /* `in` as in messages */
+    const char *in, *out; /* `in`: name for messages */
     bool piped;           /* the mesh came from standard input */
     bool json, quiet, timings;
     bool repair_requested; /* --repair was given */
@@ -38,7 +38,7 @@ typedef struct convert_reported {
     bool by_groups;        /* warnings are reported for each group, not here */
 } convert_reported;
 
-/* Before building: reports the mesh, and warnings. */
+/* Reports the mesh, and warnings. Call before building. */
 static void convert_report_mesh(const convert_reported *t, const mesh_input *p)
 {
     ebpo_solid_volume before = mesh_input_solid(p, false), after = mesh_input_solid(p, true);
@@ -168,7 +168,7 @@ static void print_json(const convert_reported *t, const mesh_input *p, const ebp
     json_finish(&j);
 }
 
-/* Afterwards: reports the file on the disk, as a reader sees it. */
+/* Opens the written file, and reports its properties. */
 static ebpo_status convert_report_file(const convert_reported *t, const mesh_input *p,
                                        const progress_line *line, const stage_facts *stages,
                                        double seconds, ebpo_error *error)
@@ -212,7 +212,7 @@ typedef struct values {
     const char *unit, *crs, *date;
 } values;
 
-/* Stored unless --parts or --profile is given. */
+/* Parts that are stored if neither --parts nor --profile is given. */
 #define DEFAULT_PARTS                                                            \
     (EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES | \
      EBPO_PART_COLOURS | EBPO_PART_BORDER)
@@ -220,7 +220,7 @@ typedef struct values {
 #include "cli/options/convert.inc"
 
 /* Returns the parts of --parts. A list with minus signs also omits the parts that need an omitted
- * one; any other list that lacks a needed part is not valid: 0. */
+ * part. Returns 0 for another list that lacks a needed part, which is not valid. */
 static uint32_t listed_parts(const char *text)
 {
     uint32_t parts = 0;
@@ -269,7 +269,8 @@ static int check_values(const values *v, const char *in, const char *out)
     if (check_parts(v) != EXIT_OK)
         return EXIT_USAGE;
     if (v->split_components && v->split_groups)
-        return command_usage("convert", "--split-components and --split-groups: choose one");
+        return command_usage("convert",
+                             "--split-components and --split-groups cannot be used together");
     if (v->split_groups && (v->repairs_wanted.fill_holes || v->repairs_wanted.repair))
         return command_usage("convert",
                              "--fill-holes and --repair cannot be used with --split-groups: "
@@ -328,16 +329,16 @@ static convert_reported reported_of(const values *v, const char *in, const char 
 
 /* --- work --- */
 
-/* Fails before a long build if there is too little memory to measure the error bound of the
- * envelopes after it. */
+/* Fails if there is not enough memory to measure the error bound of the envelopes after the build.
+ * Call before the build, which may take long. */
 static ebpo_status check_selection_memory(const values *v, uint64_t faces, const char *in,
                                           const ebpo_workspace *workspace, ebpo_error *error)
 {
-    ebpo_workspace_stats metrics = EBPO_WORKSPACE_STATS_INIT;
+    ebpo_workspace_stats stats = EBPO_WORKSPACE_STATS_INIT;
     uint64_t needed = ebpo_subset_memory(faces, (uint32_t)v->leaf_faces);
     char bytes[32], budget[32];
-    ebpo_workspace_get_stats(workspace, &metrics);
-    if (needed <= metrics.memory)
+    ebpo_workspace_get_stats(workspace, &stats);
+    if (needed <= stats.memory)
         return EBPO_OK;
     error->status = EBPO_E_LIMIT;
     snprintf(error->message, sizeof error->message,
@@ -345,7 +346,7 @@ static ebpo_status check_selection_memory(const values *v, uint64_t faces, const
              "%s, but the budget is %s; allow more with --memory, or omit them here and use "
              "'ebpo subset' on a machine with more memory",
              in, words_bytes(bytes, sizeof bytes, needed),
-             words_bytes(budget, sizeof budget, metrics.memory));
+             words_bytes(budget, sizeof budget, stats.memory));
     return EBPO_E_LIMIT;
 }
 
@@ -451,8 +452,8 @@ static ebpo_status build_pieces(piece_build *build, mesh_input *p, const char *f
     return pieces_write(&run, p, begun, error);
 }
 
-/* Returns the facts that the options decide, to plan the stages; `faces` and `times` are set after
- * the build. */
+/* Returns the facts that follow from the options, to plan the stages; `faces` and `times` are set
+ * after the build. */
 static stage_facts plan_stages(const values *v, const char *in)
 {
     const char *dot = strrchr(in, '.');
@@ -495,11 +496,10 @@ static ebpo_status refuse_mesh(const values *v, const mesh_input *p, const char 
 static ebpo_status no_groups(const char *in, ebpo_error *error)
 {
     error->status = EBPO_E_FORMAT;
-    snprintf(
-        error->message, sizeof error->message,
-        "%s: names no groups, which are lines g or o of an OBJ file; use --split-components to "
-        "split it into components that share no vertices",
-        in);
+    snprintf(error->message, sizeof error->message,
+             "%s: has no groups, which are lines g or o of an OBJ file; use --split-components to "
+             "split it into components that share no vertices",
+             in);
     return error->status;
 }
 

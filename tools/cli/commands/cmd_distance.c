@@ -9,7 +9,7 @@
 
 #include "cli/options/distance.inc"
 
-/* Returns true when the options allow an interval as the result. */
+/* Returns true if the options allow an interval as the result. */
 static bool gives_interval(const ebpo_distance_options *o)
 {
     return o->mode == EBPO_DISTANCE_EXACT && (o->level >= 0 || o->deadline_ns);

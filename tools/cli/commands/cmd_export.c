@@ -33,14 +33,14 @@ static int choose_format(values *v, const char *out)
 {
     const char *dot = strrchr(out, '.');
     if (dot && strcasecmp(dot, ".ply") == 0 && v->format < 0)
-        return command_usage("export", "PLY is written by 'ebpo extract'");
+        return command_usage("export", "PLY files are written by 'ebpo extract'");
     for (int i = 0; dot && v->format < 0 && format_words[i]; i++)
         if (strcasecmp(dot + 1, format_words[i]) == 0)
             v->format = i;
     return v->format >= 0
                ? EXIT_OK
                : command_usage("export",
-                               "the output's extension does not say which format; give --format");
+                               "the output's extension is not that of a format; give --format");
 }
 
 static int choose_levels(values *v, ebpo_export_options *o)
@@ -91,7 +91,7 @@ static void print_colours(const ebpo_export_report *r)
 
 static void print_report(const char *out, const char *second, const ebpo_export_report *r)
 {
-    char count[2][40], volume[TABLE_CELL];
+    char count[3][40], volume[TABLE_CELL];
     printf("%s%s%s\n", out, *second ? ", " : "", second);
     for (int i = 0; i < r->block_count; i++) {
         const ebpo_export_block *b = &r->block[i];
@@ -100,7 +100,8 @@ static void print_report(const char *out, const char *second, const ebpo_export_
         if (b->level < 0)
             printf("mesh: %s, %s\n", count[0], count[1]);
         else
-            printf("level %d: %" PRIu64 " envelopes, %s, %s, volume %s\n", b->level, b->nodes,
+            printf("level %d: %s, %s, %s, volume %s\n", b->level,
+                   words_plural(count[2], sizeof count[2], b->nodes, "envelope", "envelopes"),
                    count[0], count[1], table_volume(volume, "%.9g", b->volume));
     }
     if (r->origin[0] != 0 || r->origin[1] != 0 || r->origin[2] != 0)

@@ -51,14 +51,14 @@ static int check_values(const values *v, const char *in, const char *out)
     if (requested > 1)
         return command_usage("extract", "--level, --mesh and --subtree cannot be used together");
     if (v->level < 0 && v->no_cell_faces)
-        return command_usage("extract",
-                             "--no-cell-faces belongs to --level; the model has no cell faces");
+        return command_usage(
+            "extract", "--no-cell-faces applies to --level only; the model has no cell faces");
     if (command_overwrites("extract", in, out))
         return EXIT_USAGE;
     return EXIT_OK;
 }
 
-/* Warns of pruned nodes: gray nodes without children in a complete subtree. */
+/* Warns of pruned nodes, which are gray nodes without children. The subtree must be complete. */
 static void warn_of_pruned(const ebpo_subtree *subtree, const char *path)
 {
     ebpo_subtree_nodes nodes = EBPO_SUBTREE_NODES_INIT;
@@ -67,13 +67,13 @@ static void warn_of_pruned(const ebpo_subtree *subtree, const char *path)
         return;
     for (uint64_t i = 0; i < nodes.node_count; i++)
         pruned += nodes.types[i] == EBPO_GRAY && nodes.children[i] == EBPO_NO_CHILDREN;
-    char lacking[40];
-    words_plural(lacking, sizeof lacking, pruned, "node", "nodes");
+    char nodes_text[40];
+    words_plural(nodes_text, sizeof nodes_text, pruned, "node", "nodes");
     if (pruned)
         fprintf(stderr,
                 "ebpo extract: %s: note: is a subset without the nodes below %s of this subtree, "
                 "so faces are missing\n",
-                remote_shown(path), lacking);
+                remote_shown(path), nodes_text);
 }
 
 /* Returns the faces as a mesh, borrowed from the subtree. */

@@ -23,21 +23,21 @@
 
 static const char BLOCK[] = ".ebpo-block", TEMPORARY[] = ".ebpo-part-";
 
-static bool is_ours(const char *name)
+static bool is_fetched_data(const char *name)
 {
     size_t length = strlen(name), end = sizeof BLOCK - 1;
     return (length > end && strcmp(name + length - end, BLOCK) == 0) ||
            strncmp(name, TEMPORARY, sizeof TEMPORARY - 1) == 0;
 }
 
-/* Removes the blocks, and the folder when it is then empty. */
+/* Removes the blocks, and then the folder if it is empty. */
 static void remove_part(const char *folder)
 {
     DIR *d = opendir(folder);
     if (!d)
         return;
     for (struct dirent *f; (f = readdir(d)) != NULL;)
-        if (is_ours(f->d_name))
+        if (is_fetched_data(f->d_name))
             unlinkat(dirfd(d), f->d_name, 0);
     closedir(d);
     rmdir(folder);
@@ -87,7 +87,7 @@ static void wipe_ticker(ticker *t)
 
 /* --- work --- */
 
-/* Reports the data that was in the folder when the file was opened. Returns true when this data is
+/* Reports the data that was in the folder when the file was opened. Returns true if this data is
  * usable. */
 static bool report_resuming(const subset_values *v, ebpo_file *file, const char *url,
                             const char *part)
@@ -129,7 +129,7 @@ static int fetch_subset(subset_values *v, const char *url, const char *out, cons
     ebpo_status status = remote_open(&file, url, &v->remote, &error);
     if (t.shown)
         fputs("\r\033[K", stderr);
-    bool held = status == EBPO_OK && part && report_resuming(v, file, url, part);
+    bool has_fetched_data = status == EBPO_OK && part && report_resuming(v, file, url, part);
     atomic_store(&t.file, file);
     if (status == EBPO_OK)
         status = subset_set_parts(v, ebpo_file_info(file), remote_shown(url), subset, &error);
@@ -152,8 +152,8 @@ static int fetch_subset(subset_values *v, const char *url, const char *out, cons
                         "in transit; run the same command to start again\n");
         return code;
     }
-    /* After an error in an option, only the data that this run fetched is removed. */
-    if (part && (status == EBPO_OK || (usage && !held)))
+    /* After an error in an option, data is removed only if this run has fetched all of it. */
+    if (part && (status == EBPO_OK || (usage && !has_fetched_data)))
         remove_part(part);
     /* rmdir removes an empty folder, and fails if there is data. */
     if (part && status != EBPO_OK && !usage && access(part, F_OK) == 0 && rmdir(part) != 0) {

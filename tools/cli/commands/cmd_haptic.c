@@ -31,7 +31,8 @@
 enum { HAPTIC_BINS = 16 };
 
 typedef struct haptic_times {
-    uint64_t step_count, late;                /* not finished a period after their due times */
+    uint64_t step_count; /* number of steps */
+    uint64_t late;       /* steps not finished a period after their due times */
     double p50, p99, p99_9, p99_99, max_time; /* seconds from the start to the end of a step */
     double wake_p99_9, wake_max;              /* seconds from the due time of a step to its start */
     double cpu_p99_9, cpu_max; /* processor time from the start to the end of a step */
@@ -54,17 +55,17 @@ typedef struct haptic_play {
  * on what was granted. Threads created afterwards inherit the scheduling. */
 static const char *request_real_time(void)
 {
-    bool kept = mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
+    bool locked = mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
 #ifdef EBPO_HAVE_SCHED_SETSCHEDULER
     struct sched_param first = { .sched_priority = sched_get_priority_max(SCHED_FIFO) / 2 };
     /* for this thread; the loading thread was created before and keeps its scheduling */
-    bool ahead = sched_setscheduler(0, SCHED_FIFO, &first) == 0;
+    bool is_real_time = sched_setscheduler(0, SCHED_FIFO, &first) == 0;
 #else
-    bool ahead = false;
+    bool is_real_time = false;
 #endif
-    return ahead  ? kept ? "SCHED_FIFO, memory locked" : "SCHED_FIFO, memory not locked"
-           : kept ? "as other threads, memory locked"
-                  : "as other threads, memory not locked";
+    return is_real_time ? locked ? "SCHED_FIFO, memory locked" : "SCHED_FIFO, memory not locked"
+           : locked     ? "as other threads, memory locked"
+                        : "as other threads, memory not locked";
 }
 
 /* Returns to normal scheduling. */
@@ -180,7 +181,7 @@ static void step_probe(const haptic_play *p, const haptic_pose *pose, haptic_res
     ebpo_map_colour(EBPO_MAP_THESIS, r.distance, p->range, a->rgb);
 }
 
-/* Returns false when the device has ended. */
+/* Returns false if the device has ended. */
 static bool play_step(const haptic_play *p, uint64_t i, haptic_times *out)
 {
     haptic_result result = { .depth = 0 };
@@ -212,14 +213,14 @@ static uint64_t play_all(const haptic_play *p, uint64_t count, const step_times 
     for (; i < count; i++) {
         uint64_t due = begin + (uint64_t)((double)i * period);
         tool_wait_until(due);
-        uint64_t worked = thread_clock(), began = tool_clock();
+        uint64_t cpu_begin = thread_clock(), begin_time = tool_clock();
         if (!play_step(p, i, out))
             break;
-        uint64_t ended = tool_clock();
-        s->cpu[i] = 1e-9F * (float)(thread_clock() - worked);
-        s->took[i] = 1e-9F * (float)(ended - began);
-        s->wake[i] = 1e-9F * (float)(began - due);
-        out->late += (double)(ended - due) > period;
+        uint64_t end_time = tool_clock();
+        s->cpu[i] = 1e-9F * (float)(thread_clock() - cpu_begin);
+        s->took[i] = 1e-9F * (float)(end_time - begin_time);
+        s->wake[i] = 1e-9F * (float)(begin_time - due);
+        out->late += (double)(end_time - due) > period;
     }
     out->page_faults = page_faults() - faults;
     return i;
@@ -228,11 +229,12 @@ static uint64_t play_all(const haptic_play *p, uint64_t count, const step_times 
 /* Returns the maximum number of steps. */
 static uint64_t haptic_play_steps(const haptic_play *p)
 {
-    uint64_t max_time = p->haptic ? p->device->step_count(p->device->self) : 0;
-    return max_time ? max_time : (uint64_t)ceil(p->rate * p->seconds);
+    uint64_t count = p->haptic ? p->device->step_count(p->device->self) : 0;
+    return count ? count : (uint64_t)ceil(p->rate * p->seconds);
 }
 
-/* Returns false when there is no memory for the times. */
+/* Plays all steps and sets *out to their times. Returns false if there is not enough memory for the
+ * times. */
 static bool haptic_play_run(const haptic_play *p, haptic_times *out)
 {
     uint64_t count = haptic_play_steps(p);
@@ -393,7 +395,7 @@ static void json_report(const job *j)
 
 /* --- running --- */
 
-/* Reads tools: vertices of a mesh file, or points as `ebpo inside` reads them. */
+/* Reads the points of the tool: vertices of a mesh file. */
 static bool read_mesh_tool(job *j)
 {
     ebpo_mesh_read_options read = EBPO_MESH_READ_OPTIONS_INIT;
@@ -411,20 +413,21 @@ static bool read_mesh_tool(job *j)
     return j->points != NULL;
 }
 
+/* Reads the points of the tool from a file of points, as `ebpo inside` reads it. */
 static bool read_point_tool(job *j)
 {
     points p;
     double rows[3 * POINTS_BATCH];
-    uint64_t got;
+    uint64_t point_count;
     bool fine = points_open(&p, "haptic", j->v->tool, POINTS, false, INFINITY);
-    while (fine && (got = points_next(&p, rows)) > 0) {
-        double *more = realloc(j->points, (j->point_count + got) * 3 * sizeof *more);
+    while (fine && (point_count = points_next(&p, rows)) > 0) {
+        double *more = realloc(j->points, (j->point_count + point_count) * 3 * sizeof *more);
         fine = more != NULL;
         if (!fine)
             break;
-        memcpy(more + 3 * j->point_count, rows, got * 3 * sizeof *more);
+        memcpy(more + 3 * j->point_count, rows, point_count * 3 * sizeof *more);
         j->points = more;
-        j->point_count += got;
+        j->point_count += point_count;
     }
     fine = fine && !p.failed;
     points_close(&p);
@@ -449,11 +452,11 @@ static bool read_tool(job *j)
 
 static double tool_radius(const job *j)
 {
-    double max_time = j->v->radius;
+    double radius = j->v->radius;
     for (uint64_t i = 0; i < j->point_count; i++)
-        max_time = fmax(max_time,
-                        hypot(hypot(j->points[3 * i], j->points[3 * i + 1]), j->points[3 * i + 2]));
-    return max_time;
+        radius = fmax(radius,
+                      hypot(hypot(j->points[3 * i], j->points[3 * i + 1]), j->points[3 * i + 2]));
+    return radius;
 }
 
 static ebpo_status open_model(job *j, uint64_t memory, ebpo_error *error)
@@ -474,19 +477,19 @@ static ebpo_status open_model(job *j, uint64_t memory, ebpo_error *error)
 static ebpo_status open_device(job *j, const double start[3], ebpo_error *error)
 {
     const values *v = j->v;
-    ebpo_haptic_options wanted = EBPO_HAPTIC_OPTIONS_INIT;
-    wanted.radius = v->radius;
-    wanted.friction = v->friction;
-    wanted.stiffness = v->stiffness;
-    wanted.damping = v->damping;
-    wanted.skin = v->skin;
-    wanted.search_radius = v->search_radius;
-    wanted.step_seconds = 1 / v->rate;
-    wanted.faces = (uint64_t)v->faces;
-    wanted.kind = j->kind;
-    wanted.points = (const double(*)[3])j->points;
-    wanted.point_count = j->point_count;
-    return ebpo_haptic_new(j->model, &wanted, start, &j->haptic, error);
+    ebpo_haptic_options options = EBPO_HAPTIC_OPTIONS_INIT;
+    options.radius = v->radius;
+    options.friction = v->friction;
+    options.stiffness = v->stiffness;
+    options.damping = v->damping;
+    options.skin = v->skin;
+    options.search_radius = v->search_radius;
+    options.step_seconds = 1 / v->rate;
+    options.faces = (uint64_t)v->faces;
+    options.kind = j->kind;
+    options.points = (const double(*)[3])j->points;
+    options.point_count = j->point_count;
+    return ebpo_haptic_new(j->model, &options, start, &j->haptic, error);
 }
 
 static double model_diagonal(const ebpo_info *info)
@@ -543,7 +546,7 @@ static ebpo_status write_record(const job *j, ebpo_error *error)
     enum { LINE = 7 * (NUMBER_CAPACITY + 1) };
     char *text = malloc(j->times.step_count * LINE + 1), *at = text;
     if (!text)
-        return no_memory(error, "what is recorded");
+        return no_memory(error, "the text of the record");
     for (uint64_t i = 0; i < j->times.step_count; i++) {
         const haptic_pose *p = &j->record[i];
         for (int k = 0; k < 7; k++) {
@@ -582,7 +585,7 @@ static int run_job(job *j, uint64_t memory)
     return j->stopped.status == EBPO_OK ? EXIT_OK : command_failed("haptic", &j->stopped);
 }
 
-/* Returns EXIT_OK when the values are valid. */
+/* Checks the values of the options, and sets *memory. Returns an exit code. */
 static int check_values(const values *v, uint64_t *memory)
 {
     if (v->memory && !words_read_size(v->memory, memory))
@@ -591,18 +594,20 @@ static int check_values(const values *v, uint64_t *memory)
         return command_usage("haptic", "--seconds cannot be combined with --path, which ends at "
                                        "its last position");
     if (v->path && v->device)
-        return command_usage("haptic", "--path and --device both move the tool; choose one");
+        return command_usage("haptic", "--path and --device cannot be used together: both move the "
+                                       "tool");
     if (v->device && !haptic_udp_named(v->device))
         return command_usage("haptic", "--device '%s': expected udp:PORT or udp:ADDRESS:PORT",
                              v->device);
     if (v->tool && v->probe)
-        return command_usage("haptic", "--tool and --probe: a probe is a point");
+        return command_usage("haptic", "--tool and --probe cannot be used together: a probe is a "
+                                       "point");
     if ((v->tool || v->probe) && v->radius > 0)
         return command_usage("haptic", "--radius is for a ball, without --tool and --probe");
     return 0;
 }
 
-/* Returns true when the record would overwrite an input. */
+/* Returns true if the record would overwrite an input. */
 static bool overwrites_input(const values *v, const char *model)
 {
     const char *in[] = { model, v->path, v->tool };

@@ -128,8 +128,8 @@ static ebpo_status report_nodes(printer *p, ebpo_stream *stream, ebpo_error *err
 
 /* --- all levels --- */
 
-/* Prints all levels, and flushes the output after each. Stops when the output was closed: *arrived
- * is then false. */
+/* Prints all levels, and flushes the output after each level. If the output has been closed, stops
+ * and sets *arrived to false. */
 static ebpo_status report_levels(printer *p, ebpo_stream *stream, int last, bool *arrived,
                                  ebpo_error *error)
 {
@@ -166,10 +166,9 @@ static void print_head(const char *path, const ebpo_info *info)
 static void print_legend(const ebpo_info *info)
 {
     table_legend(stdout);
-    printf(
-        "volume: of the envelopes, in the model's unit%s%s cubed; %% last: of the last level's;\n"
-        "bytes: read up to and with the level; ms: since opening\n",
-        info->unit[0] ? " " : "", info->unit);
+    printf("volume: of the envelopes, in the model's unit%s%s cubed; %% last: percent of the last "
+           "level's volume;\nbytes: read for the level and those above; ms: since opening\n",
+           info->unit[0] ? " " : "", info->unit);
     if (!isfinite(facts_volume(info, 0)))
         table_beyond(stdout);
 }
@@ -225,10 +224,11 @@ static int run_levels(void *given, const char **operand)
     if (remote_open(&file, operand[0], &v->remote, &error) != EBPO_OK)
         return command_failed("levels", &error);
     p.info = ebpo_file_info(file);
-    bool there = command_has_level("levels", p.info, v->max_level), arrived = true;
-    ebpo_status status = there ? stream_levels(&p, file, operand[0], &arrived, &error) : EBPO_OK;
+    bool has_level = command_has_level("levels", p.info, v->max_level), arrived = true;
+    ebpo_status status =
+        has_level ? stream_levels(&p, file, operand[0], &arrived, &error) : EBPO_OK;
     ebpo_close(file);
-    if (!there)
+    if (!has_level)
         return EXIT_USAGE;
     if (!arrived)
         return EXIT_FAILED;

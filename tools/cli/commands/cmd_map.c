@@ -58,8 +58,7 @@ static int find_box(const map_job *j, double low[3], double high[3])
     if (j->v->box) {
         if (!read_reals(j->v->box, 6, all) || !(all[0] < all[3]) || !(all[1] < all[4]) ||
             !(all[2] < all[5]))
-            return refuse_value("--box", j->v->box,
-                                "six numbers, the low corner below the high one");
+            return refuse_value("--box", j->v->box, "six numbers, the lower corner first");
         memcpy(low, all, 3 * sizeof *low);
         memcpy(high, all + 3, 3 * sizeof *high);
     }
@@ -84,7 +83,7 @@ typedef struct rectangle {
     double corner[3], edge[2][3];
 } rectangle;
 
-/* Reads "z=0.5" or "z=50%": the coordinate, in the bounding box of the model. */
+/* Reads "z=0.5", a coordinate, or "z=50%", a share of the bounding box of the model. */
 static bool read_plane(const map_job *j, const char *text, int *axis, double *at)
 {
     const ebpo_info *info = ebpo_file_info(j->file);
@@ -102,8 +101,8 @@ static bool read_plane(const map_job *j, const char *text, int *axis, double *at
     return isfinite(*at);
 }
 
-/* Finds the edges of the rectangle: right and up for the viewer are x and y, x and z, or y and z.
- */
+/* Finds the rectangle of --plane. For planes across an axis, the edges to the right and up are x
+ * and y, x and z, or y and z. */
 static int find_rectangle(const map_job *j, rectangle *r)
 {
     double all[9], low[3], high[3], at;
@@ -249,15 +248,17 @@ static ebpo_status draw_legend(const map_job *j, picture *p, int x, bool has_sig
     return status;
 }
 
-/* Returns true when the sign changes between neighbours, or the value is 0: the surface. */
+/* Returns true if the surface is at this pixel: the value is 0, or the sign changes between
+ * neighbours.
+ */
 static bool on_surface(const double *values, int width, int height, int x, int y)
 {
-    double own = values[(size_t)y * (size_t)width + (size_t)x];
-    if (own == 0)
+    double value = values[(size_t)y * (size_t)width + (size_t)x];
+    if (value == 0)
         return true;
-    if (x + 1 < width && own * values[(size_t)y * (size_t)width + (size_t)x + 1] < 0)
+    if (x + 1 < width && value * values[(size_t)y * (size_t)width + (size_t)x + 1] < 0)
         return true;
-    return y + 1 < height && own * values[(size_t)(y + 1) * (size_t)width + (size_t)x] < 0;
+    return y + 1 < height && value * values[(size_t)(y + 1) * (size_t)width + (size_t)x] < 0;
 }
 
 static bool has_signs(const map_job *j)
@@ -265,7 +266,7 @@ static bool has_signs(const map_job *j)
     return j->v->palette == EBPO_MAP_DIVERGING && j->stats.min < 0;
 }
 
-/* Draws values[height][width], row 0 at the bottom, or a painted mesh, with a legend. */
+/* Draws values[height][width], row 0 at the bottom, with a legend. */
 static ebpo_status map_draw_plane(const map_job *j, const double *values, const char *path,
                                   ebpo_error *error)
 {
@@ -287,6 +288,7 @@ static ebpo_status map_draw_plane(const map_job *j, const double *values, const 
     return status;
 }
 
+/* Draws a painted mesh, with a legend. */
 static ebpo_status map_draw_mesh(const map_job *j, const ebpo_mesh *mesh, const char *path,
                                  ebpo_error *error)
 {
@@ -354,11 +356,11 @@ static ebpo_status no_memory(ebpo_error *error)
 static ebpo_status keep_layer(void *user, const double *values, uint64_t first, uint64_t layers,
                               ebpo_error *error)
 {
-    map_job *const *with = ((void **)user)[0];
+    map_job *const *job = ((void **)user)[0];
     (void)first;
     (void)layers;
     (void)error;
-    const ebpo_lattice *l = &(*with)->lattice;
+    const ebpo_lattice *l = &(*job)->lattice;
     memcpy(((void **)user)[1], values, l->count[0] * l->count[1] * sizeof *values);
     return EBPO_OK;
 }
@@ -446,13 +448,13 @@ static ebpo_status paint_map(map_job *j, ebpo_mesh *m, const double *distances, 
     return status;
 }
 
-static ebpo_status find_reach(map_job *j, const ebpo_mesh *m, const double *distances,
-                              ebpo_error *error)
+static ebpo_status bound_hausdorff(map_job *j, const ebpo_mesh *m, const double *distances,
+                                   ebpo_error *error)
 {
     ebpo_map_hausdorff_options o = EBPO_MAP_HAUSDORFF_OPTIONS_INIT;
     o.threads = j->options.threads;
     o.progress = j->options.progress;
-    return ebpo_map_bound_hausdorff(j->model, m, distances, &o, &j->reach, error);
+    return ebpo_map_bound_hausdorff(j->model, m, distances, &o, &j->hausdorff, error);
 }
 
 static ebpo_status map_vertices(map_job *j, ebpo_progress progress, ebpo_error *error)
@@ -472,7 +474,7 @@ static ebpo_status map_vertices(map_job *j, ebpo_progress progress, ebpo_error *
     if (status == EBPO_OK)
         status = ebpo_map_describe(distances, m.vertex_count, &j->stats, error);
     if (status == EBPO_OK && j->v->bounds)
-        status = find_reach(j, &m, distances, error);
+        status = bound_hausdorff(j, &m, distances, error);
     if (status == EBPO_OK && (j->v->out || j->v->picture))
         status = paint_map(j, &m, distances, error);
     free(points);
@@ -534,7 +536,8 @@ static int check_values(const map_values *v)
 {
     int kinds = (v->plane != NULL) + (v->grid != NULL) + (v->from != NULL);
     if (kinds != 1)
-        return command_usage("map", "expected one of --plane, --grid and --from: which points?");
+        return command_usage("map",
+                             "expected one of --plane, --grid and --from, which define the points");
     if (v->from && (v->box || v->margin != standard.margin))
         return command_usage("map", "--box and --margin belong to --plane and --grid");
     if ((v->grid || v->from) && v->size && !v->picture)
@@ -555,7 +558,7 @@ static int check_outputs(const char *path, const map_values *v)
         if (outs[i / 2] && ins[i % 2] && command_overwrites("map", ins[i % 2], outs[i / 2]))
             return EXIT_USAGE;
     if (v->out && v->picture && command_same_file(v->out, v->picture))
-        return command_usage("map", "--output and --picture name one file");
+        return command_usage("map", "--output and --picture are the same file; choose two names");
     return EXIT_OK;
 }
 
@@ -579,9 +582,10 @@ static void print_stats(const map_job *j)
 {
     const ebpo_map_stats *s = &j->stats;
     const char *unit = ebpo_file_info(j->file)->unit;
-    printf("%s: distances of %llu points%s%s%s\n", remote_shown(j->path),
-           (unsigned long long)(s->count + s->beyond), unit[0] ? ", unit " : "", unit,
-           j->v->from ? ", vertices of the other model" : "");
+    char points[40], queries[40];
+    printf("%s: distances of %s%s%s%s\n", remote_shown(j->path),
+           words_plural(points, sizeof points, s->count + s->beyond, "point", "points"),
+           unit[0] ? ", unit " : "", unit, j->v->from ? ", vertices of the other model" : "");
     printf("  inside     %llu, on the model %llu", (unsigned long long)s->inside,
            (unsigned long long)s->on);
     if (s->beyond)
@@ -593,8 +597,10 @@ static void print_stats(const map_job *j)
     if (isfinite(s->percentile[0]))
         print_percentiles(s);
     if (j->v->bounds)
-        printf("  hausdorff  %.9g to %.9g, from all of its faces; %llu distances\n", j->reach.lo,
-               j->reach.hi, (unsigned long long)j->reach.queries);
+        printf("  hausdorff  %.9g to %.9g, from all of its faces; %s\n", j->hausdorff.lo,
+               j->hausdorff.hi,
+               words_plural(queries, sizeof queries, j->hausdorff.queries, "distance",
+                            "distances"));
 }
 
 static void json_stats(const map_job *j, json *out)
@@ -624,10 +630,10 @@ static void json_stats(const map_job *j, json *out)
     }
     if (j->v->bounds) {
         json_object(out, "hausdorff");
-        json_real(out, "lo", j->reach.lo);
-        json_real(out, "hi", j->reach.hi);
-        json_reals(out, "location", j->reach.location, 3);
-        json_uint(out, "queries", j->reach.queries);
+        json_real(out, "lo", j->hausdorff.lo);
+        json_real(out, "hi", j->hausdorff.hi);
+        json_reals(out, "location", j->hausdorff.location, 3);
+        json_uint(out, "queries", j->hausdorff.queries);
         json_end(out);
     }
     if (j->range > 0)
@@ -698,7 +704,7 @@ static int run_map(void *given, const char **operand)
                   .path = operand[0],
                   .options = EBPO_MAP_OPTIONS_INIT,
                   .stats = EBPO_MAP_STATS_INIT,
-                  .reach = EBPO_MAP_HAUSDORFF_INIT,
+                  .hausdorff = EBPO_MAP_HAUSDORFF_INIT,
                   .range = v->range };
     uint64_t memory = 0;
     int code = check_values(v);

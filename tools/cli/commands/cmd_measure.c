@@ -79,11 +79,11 @@ static void print_legend(const ebpo_info *info, const measures *m)
     printf("volumes in the model's unit%s%s cubed; ", info->unit[0] ? " " : "", info->unit);
     facts_print_whole(stdout, info, &m->solid);
     if (m->error_bound)
-        puts("reaches, at most: bounds of how far the farthest point is beyond the model;\n"
+        puts("reaches, at most: bounds of the largest distance of the envelopes beyond the model;\n"
              "mean, rms: over the envelopes' surface");
     if (m->limit && info->solid)
-        puts("excess to limit: beyond the solid's volume, in that of the hulls; - where these are\n"
-             "the solid");
+        puts("excess to limit: the envelopes' volume beyond the solid's, divided by that of the\n"
+             "hulls; - if the hulls have the solid's volume");
     if (!isfinite(facts_volume(info, 0)))
         table_beyond(stdout);
 }
@@ -129,16 +129,16 @@ static bool has_inside(const ebpo_info *info)
     return info->solid || info->parts & EBPO_PART_BORDER;
 }
 
-/* Prints how much depends on the caps of a surface. */
+/* Prints how much the integral and the centroid depend on the caps of a surface. */
 static void print_caps(const ebpo_info *info, const ebpo_mass *mass)
 {
     char unit[TABLE_CELL], share[TABLE_CELL];
     double percent = 100 * mass->caps_integral / fabs(mass->integral);
-    printf(
-        "  caps      the integral is exact to %.2g; by the choice of caps in the hulls of their\n"
-        "            loops it changes by at most %.6g%s (%s %%), the centroid by %.6g%s\n",
-        mass->integral_error, mass->caps_integral, table_unit(unit, info->unit, 3),
-        table_cell(share, "%.3g", percent), mass->caps_centroid, info->unit[0] ? " " : "");
+    printf("  caps      the error of the integral is at most %.2g; the choice of caps in the hulls "
+           "of\n"
+           "            their loops changes it by at most %.6g%s (%s %%), the centroid by %.6g%s\n",
+           mass->integral_error, mass->caps_integral, table_unit(unit, info->unit, 3),
+           table_cell(share, "%.3g", percent), mass->caps_centroid, info->unit[0] ? " " : "");
 }
 
 static void print_mass(const char *path, const ebpo_info *info, const ebpo_mass *mass,

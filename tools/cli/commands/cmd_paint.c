@@ -16,7 +16,7 @@
 #include "cli/progress.h"
 #include "cli/words.h"
 
-/* --- reading colours, positions and paths --- */
+/* --- reading colours and positions --- */
 
 /* Reads "RRGGBB" or "RRGGBBAA" as 0xRRGGBBAA. Returns false for other text. */
 static bool paint_read_colour(const char *text, uint32_t *out)
@@ -31,7 +31,8 @@ static bool paint_read_colour(const char *text, uint32_t *out)
 
 /* --- paths --- */
 
-/* Reads numbers separated by blanks or commas; -1: other text, or more than `most`. */
+/* Reads numbers separated by blanks or commas. Returns their count; -1: other text, or more than
+ * `most` numbers. */
 static int read_numbers(const char *text, double *out, int most)
 {
     int count = 0;
@@ -61,7 +62,8 @@ static bool fail_line(const paint_values *v, uint64_t line, const char *what)
     return false;
 }
 
-/* Reads the numbers of a line as a position of the pen; `number`: index of the position. */
+/* Sets *out to the position of the pen in a line. Returns NULL, or an error. number: index of the
+ * position. */
 static const char *set_input(const paint_values *v, const double *row, int count, uint64_t number,
                              ebpo_paint_input *out)
 {
@@ -71,10 +73,10 @@ static const char *set_input(const paint_values *v, const double *row, int count
     out->pressure = count > 3 ? row[3] : v->pressure;
     out->time = count > 4 ? row[4] : (double)number * 1000 / v->rate;
     if (!(out->pressure >= 0 && out->pressure <= 1))
-        return "the pressure is not 0 to 1";
+        return "the pressure is not from 0 to 1";
     return out->time >= 0 && out->time <= UINT32_MAX
                ? NULL
-               : "the time is not 0 to 2^32 - 1 milliseconds, which are 49 days";
+               : "the time is not from 0 to 2^32 - 1 milliseconds, which are 49 days";
 }
 
 static bool read_lines(const paint_values *v, FILE *in, ebpo_paint_input **input, uint64_t *count)
@@ -144,7 +146,8 @@ static ebpo_paint_info info_of(const paint_job *j)
     return info;
 }
 
-/* Finds the index of --layer, or of the topmost layer. EBPO_E_ARGUMENT: there is none. */
+/* Sets *layer to the layer of --layer, or to the topmost layer. EBPO_E_ARGUMENT: there is no such
+ * layer. */
 static ebpo_status paint_layer(const paint_job *j, uint64_t *layer, ebpo_error *error)
 {
     ebpo_paint_info info = info_of(j);
@@ -275,8 +278,9 @@ static ebpo_status undo_strokes(paint_job *j, ebpo_error *error)
     uint64_t strokes = info_of(j).stroke_count;
     if ((uint64_t)j->v->undo > strokes) {
         char what[80];
-        snprintf(what, sizeof what, "--undo %lld: the paint has only %llu strokes",
-                 (long long)j->v->undo, (unsigned long long)strokes);
+        char count[40];
+        snprintf(what, sizeof what, "--undo %lld: the paint has only %s", (long long)j->v->undo,
+                 words_plural(count, sizeof count, strokes, "stroke", "strokes"));
         return fail_paint(error, EBPO_E_ARGUMENT, what);
     }
     for (int64_t i = 0; i < j->v->undo && status == EBPO_OK; i++)
@@ -284,8 +288,7 @@ static ebpo_status undo_strokes(paint_job *j, ebpo_error *error)
     return status;
 }
 
-/* Applies the requested change, after creating the paint if it does not exist. Returns an exit
- * code; errors have been reported. */
+/* Applies the requested change, and saves the paint. */
 static ebpo_status paint_change(paint_job *j, const ebpo_paint_input *input, uint64_t count,
                                 ebpo_error *error)
 {
@@ -315,7 +318,8 @@ static ebpo_status paint_change(paint_job *j, const ebpo_paint_input *input, uin
 
 /* --- baking --- */
 
-/* Returns [vertex_count][4], the colours of the model, or the base. NULL: no memory. */
+/* Returns [vertex_count][4]: the colours of the model or, if it has none, the colour of --base.
+ * Returns NULL if there is not enough memory. */
 static uint8_t *base_colours(paint_job *j, const ebpo_mesh *mesh, ebpo_error *error)
 {
     ebpo_colours colours;
@@ -407,7 +411,7 @@ static bool gives_layer_facts(const paint_values *v)
     return v->description || v->opacity >= 0 || v->show || v->hide;
 }
 
-/* Returns true when options set only facts of an existing layer. */
+/* Returns true if options set only facts of an existing layer. */
 static bool sets_layer(const paint_values *v)
 {
     return !v->new_layer && !v->path && !v->note &&
@@ -436,7 +440,7 @@ static int check_pen(const paint_values *v)
     if (v->density != 1 && v->spread == 0)
         return command_usage("paint", "--density belongs to --spread");
     if (v->erase && v->colour)
-        return command_usage("paint", "--erase has no colour");
+        return command_usage("paint", "--erase and --colour cannot be used together");
     return EXIT_OK;
 }
 
@@ -454,7 +458,7 @@ static int check_texts(const paint_values *v)
     if (v->date && !ebpo_is_date(v->date))
         return command_usage("paint", "--date '%s': expected " WORDS_DATE_EXPECTED, v->date);
     if ((v->at != NULL) != (v->note != NULL))
-        return command_usage("paint", "--note and --at belong together");
+        return command_usage("paint", "--note and --at need each other; give both");
     if (v->bake && !words_end_with(v->bake, ".ply") && !words_end_with(v->bake, ".glb") &&
         !words_end_with(v->bake, ".gltf") && !words_end_with(v->bake, ".obj"))
         return command_usage(
@@ -518,8 +522,8 @@ static int check_outputs(const paint_job *j)
 /* Seconds to wait for other commands that change the same paint. */
 static const double LOCK_SECONDS = 600;
 
-/* Opens the paint; waits for other commands before changing it. Creates it when a layer is added.
- */
+/* Opens the paint; creates it if it does not exist and --new-layer is given. If the paint will be
+ * changed, waits until other commands have changed it. */
 static ebpo_status open_paint(paint_job *j, ebpo_error *error)
 {
     const paint_values *v = j->v;
@@ -575,7 +579,7 @@ static ebpo_status run_steps(paint_job *j, const ebpo_paint_input *input, uint64
         j->file && (info.point_count || info.note_count) && (j->changed || needs_model(j->v));
     if (needs_model(j->v) || check)
         status = open_model(j, memory, error);
-    if (status == EBPO_OK && check) /* checks all of it, whatever is requested */
+    if (status == EBPO_OK && check) /* checks all points, whatever is requested */
         status = ebpo_paint_check_points(j->paint, j->context, &j->progress, error);
     if (status == EBPO_OK && j->changed)
         status = paint_change(j, input, count, error);

@@ -94,7 +94,8 @@ static ebpo_status inspect_mesh(recovery *p, ebpo_error *error)
     return record_result(p, MAPS, status, &reported, error);
 }
 
-/* The shared header is read with all attributes. */
+/* Checks that all attributes can be read with the mesh, which also reads the header that they
+ * share. */
 static ebpo_status inspect_header(recovery *p, ebpo_error *error)
 {
     ebpo_error reported = EBPO_ERROR_INIT;
@@ -118,9 +119,9 @@ static ebpo_status inspect_attributes(recovery *p, ebpo_error *error)
     p->part_state[ATTRIBUTES] = KEPT;
     status = inspect_header(p, error);
     for (unsigned n = 0; status == EBPO_OK && p->part_state[ATTRIBUTES] == KEPT; n++) {
-        ebpo_attribute_values got;
-        status = ebpo_file_read_attribute(p->file, n, &read, &got, &reported);
-        ebpo_attribute_values_free(&got);
+        ebpo_attribute_values values_read;
+        status = ebpo_file_read_attribute(p->file, n, &read, &values_read, &reported);
+        ebpo_attribute_values_free(&values_read);
         if (status == EBPO_E_ABSENT) /* there are no more attributes */
             return EBPO_OK;
         status = record_result(p, ATTRIBUTES, status, &reported, error);
@@ -160,7 +161,8 @@ static ebpo_status inspect_all(recovery *p, ebpo_error *error)
     return status == EBPO_OK ? inspect_levels(p, error) : status;
 }
 
-/* Opens the file without its list of chunk ends, if its content then matches the header. */
+/* Opens the file without its list of chunk ends. Fails if its content does not match the checksum
+ * in the header. */
 static ebpo_status open_unlisted(const recovery *p, ebpo_file **out, ebpo_error *error)
 {
     ebpo_read_options read = part_options(p);
@@ -243,7 +245,8 @@ static uint32_t *sorted_numbers(const uint32_t *map, uint64_t count)
     return out;
 }
 
-/* Welding and dropping leave gaps in the source indices, which the mesh alone does not show. */
+/* Sets the source indices if vertices were welded or faces dropped: then there are gaps in the
+ * source indices, which the mesh does not show. */
 static ebpo_status set_source_indices(const recovery *p, rebuilt_mesh *r, ebpo_error *error)
 {
     const ebpo_repair_record *m = &p->info->repair_record;
@@ -380,7 +383,7 @@ static ebpo_status compare_content(recovery *p, ebpo_error *error)
         return status;
     p->content_equal = memcmp(ebpo_file_info(made)->content_sha256, p->info->content_sha256,
                               sizeof p->info->content_sha256) == 0;
-    /* a part that was read without fault is kept only if the new one equals it */
+    /* levels that were read without an error are kept only if the new content equals the old one */
     if (p->part_state[LEVELS] == LOST || !p->content_equal)
         p->part_state[LEVELS] = REBUILT;
     if (p->v->source && !textures_same(p->file, made)) {
@@ -476,9 +479,8 @@ static void print_json(const recovery *p, const char *in)
     json_finish(&j);
 }
 
-/* Returns the exit code. Without the maps of the file the content always differs, which is no
- * error.
- */
+/* Returns the exit code. If the maps of the file are lost, the content always differs, which is no
+ * error. */
 static int exit_code_of(const recovery *p)
 {
     return p->content_equal || p->part_state[MAPS] == LOST ? EXIT_OK : EXIT_DIFFERS;
@@ -498,7 +500,7 @@ static int run_recover(void *given, const char **operand)
     how.max_expansion = (uint64_t)v->max_expansion;
     ebpo_error error = EBPO_ERROR_INIT;
     if (!v->out)
-        return command_usage("recover", "give the new file with --output");
+        return command_usage("recover", "name the new file with --output");
     if (!memory_check("recover", &v->memory) || command_overwrites("recover", operand[0], v->out))
         return EXIT_USAGE;
     if (!command_requires_hdf5("recover", operand[0]))

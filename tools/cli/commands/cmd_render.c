@@ -1,4 +1,5 @@
-/* ebpo render: draws a shaded picture of a level, of the model, or of several side by side. */
+/* ebpo render: draws a shaded picture of a level or of the model, or of several of these side by
+ * side. */
 #include "ebpo_config.h"
 
 #include <stddef.h>
@@ -133,7 +134,7 @@ static int parse_values(job *j)
 
 /* --- loading --- */
 
-/* Loads the simplified surface of a level. Reads no other part of the file. */
+/* Loads the simplified surface of a level. Reads no other parts of the file. */
 static ebpo_status load_surface(tile *t, const ebpo_file *file, ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(file);
@@ -146,8 +147,9 @@ static ebpo_status load_surface(tile *t, const ebpo_file *file, ebpo_error *erro
     if (status == EBPO_OK)
         status = ebpo_surface_join(&surface, info, patches, count, &made, error);
     if (status == EBPO_OK)
-        snprintf(t->caption, sizeof t->caption, "level %d: %llu triangles, error %.2g", t->level,
-                 (unsigned long long)made.mesh.face_count, made.error);
+        snprintf(t->caption, sizeof t->caption, "level %d: %llu %s, error %.2g", t->level,
+                 (unsigned long long)made.mesh.face_count,
+                 made.mesh.face_count == 1 ? "triangle" : "triangles", made.error);
     t->mesh = made.mesh;
     t->colours = made.colours;
     t->vertex_normals = made.normals;
@@ -163,12 +165,13 @@ static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress pro
     unsigned threads = (unsigned)j->v.threads;
     ebpo_read_options read = reading_options(j->v.threads, NULL);
     if (t->level == MESH) {
-        snprintf(t->caption, sizeof t->caption, "mesh, %llu faces",
-                 (unsigned long long)info->face_count);
+        snprintf(t->caption, sizeof t->caption, "mesh, %llu %s",
+                 (unsigned long long)info->face_count, info->face_count == 1 ? "face" : "faces");
         t->closed = info->solid && info->report.manifold;
         read.attributes = !j->v.no_colours;
-        ebpo_status read_well = ebpo_file_read_mesh(file, &read, &t->mesh, error);
-        return read_well == EBPO_OK ? ebpo_mesh_colours(&t->mesh, &t->colours, error) : read_well;
+        ebpo_status read_status = ebpo_file_read_mesh(file, &read, &t->mesh, error);
+        return read_status == EBPO_OK ? ebpo_mesh_colours(&t->mesh, &t->colours, error)
+                                      : read_status;
     }
     if (j->v.surface)
         return load_surface(t, file, error);
@@ -256,7 +259,8 @@ static void paint_background(picture *p)
     }
 }
 
-/* All tiles share one viewpoint, at which the coarsest one fits. */
+/* Returns the tile with the coarsest level. All tiles have one viewpoint, from which this tile fits
+ * into the picture. */
 static const tile *coarsest_tile(const job *j)
 {
     const tile *best = &j->tiles[0];
@@ -310,7 +314,7 @@ static ebpo_status draw_tiles(const job *j, picture *p, ebpo_error *error)
     const tile *first = coarsest_tile(j);
     if (height <= caption) {
         snprintf(error->message, sizeof error->message,
-                 "--size %s is too small for %d tiles; choose a larger one", j->v.size,
+                 "--size %s is too small for %d tiles; choose a larger size", j->v.size,
                  j->tile_count);
         return error->status = EBPO_E_ARGUMENT;
     }

@@ -55,7 +55,7 @@ static ebpo_status choose_codec(const values *v, const ebpo_info *info, ebpo_wri
 static void print_words(const ebpo_info *info, const char *out, const ebpo_info *from,
                         double seconds)
 {
-    char before[32], after[32], hex[65];
+    char before[32], after[32], hex[65], subtrees[40];
     words_hex(info->content_sha256, hex);
     printf("%s: the same content, SHA-256 %s; %s before, %s now", out, hex,
            words_bytes(before, sizeof before, from->file_bytes),
@@ -65,7 +65,9 @@ static void print_words(const ebpo_info *info, const char *out, const ebpo_info 
     if (info->parts & ~from->parts & EBPO_PART_SURFACE)
         fputs(", with the simplified surface", stdout);
     if (info->subtree_level)
-        printf(", %" PRIu64 " subtrees below level %d", info->level[info->subtree_level].gray_count,
+        printf(", %s below level %d",
+               words_plural(subtrees, sizeof subtrees, info->level[info->subtree_level].gray_count,
+                            "subtree", "subtrees"),
                info->subtree_level);
     printf(", in %.1f s\n", seconds);
 }
@@ -138,7 +140,7 @@ static int run_repack(void *given, const char **operand)
     ebpo_close(file);
     ebpo_workspace_free(read.workspace);
     code = status == EBPO_OK ? EXIT_OK : command_failed("repack", &error);
-    /* an error about the output means that this build cannot write it at all */
+    /* an error that names the output file: this build cannot write the file at all */
     bool differs = written == EBPO_E_UNSUPPORTED && strcmp(error.file, operand[1]) != 0;
     return differs ? EXIT_DIFFERS : code;
 }

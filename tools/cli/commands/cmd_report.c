@@ -74,7 +74,7 @@ static int read_settings(comparison *c, const report_values *v)
     for (const char *at = list; *at && code == EXIT_OK;) {
         if (c->settings == SETTINGS_MAX || !next_word(&at, word, sizeof word))
             return refuse_value(v->percent ? "--percent" : "--k-root", list,
-                                "at most 12 numbers with commas between them");
+                                "a list of at most 12 numbers, separated by commas");
         code = add_setting(c, v, word);
     }
     if (c->settings == 0)
@@ -111,7 +111,8 @@ static int read_options(comparison *c, report_values *v, bool mesh)
     v->select = v->select ? v->select : 1u << EBPO_SELECT_INHERIT;
     if (v->unlimited && v->select == 1u << EBPO_SELECT_INHERIT)
         return command_usage("report",
-                             "--unlimited is for --select kmedoids, offset or random; add one");
+                             "--unlimited applies to --select kmedoids, offset or random; add one "
+                             "of them");
     int code = read_settings(c, v);
     if (code != EXIT_OK)
         return code;

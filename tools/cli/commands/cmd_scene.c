@@ -78,20 +78,25 @@ static void info_json(const char *path, const ebpo_scene *scene, const ebpo_scen
     json_finish(&j);
 }
 
+static const char *plural(char out[40], uint64_t count, const char *one, const char *many)
+{
+    return words_plural(out, 40, count, one, many);
+}
+
 static void info_words(const char *path, const ebpo_scene *scene, const ebpo_scene_counts *c,
                        double box[2][3])
 {
     scene_sums s = sum_models(scene, c->models);
-    printf("%s: %llu instances of %llu models\n", path, (unsigned long long)c->instances,
-           (unsigned long long)c->models);
-    printf("fixed      %llu instances\nlayers     %llu\ngroups     %llu\nroutes     %llu, %llu "
-           "poses\n",
-           (unsigned long long)c->fixed, (unsigned long long)c->layers,
+    char text[2][40];
+    printf("%s: %s of %s\n", path, plural(text[0], c->instances, "instance", "instances"),
+           plural(text[1], c->models, "model", "models"));
+    printf("fixed      %s\nlayers     %llu\ngroups     %llu\nroutes     %llu, %s\n",
+           plural(text[0], c->fixed, "instance", "instances"), (unsigned long long)c->layers,
            (unsigned long long)c->groups, (unsigned long long)c->routes,
-           (unsigned long long)c->poses);
-    printf("cameras    %llu\nignored    %llu rules\nclearances %llu rules\n",
-           (unsigned long long)c->cameras, (unsigned long long)c->ignored,
-           (unsigned long long)c->clearances);
+           plural(text[1], c->poses, "pose", "poses"));
+    printf("cameras    %llu\nignored    %s\nclearances %s\n", (unsigned long long)c->cameras,
+           plural(text[0], c->ignored, "rule", "rules"),
+           plural(text[1], c->clearances, "rule", "rules"));
     printf("time       %g to %g\n", c->begin, c->end);
     printf("box        %.9g %.9g %.9g to %.9g %.9g %.9g\n", box[0][0], box[0][1], box[0][2],
            box[1][0], box[1][1], box[1][2]);
@@ -120,8 +125,8 @@ static ebpo_status scene_info(const scene_values *v, const char *path, ebpo_scen
     return status;
 }
 
-/* Checks the checksums of all models, and reports that the scene is valid. Opening has checked the
- * rest. */
+/* Checks the checksums of all models, and reports that the scene is valid. Its other properties
+ * were checked when it was opened. */
 static ebpo_status scene_check(const scene_values *v, const char *path, ebpo_scene *scene,
                                ebpo_error *error)
 {
@@ -138,8 +143,8 @@ static ebpo_status scene_check(const scene_values *v, const char *path, ebpo_sce
         json_uint(&j, "models", c.models);
         json_finish(&j);
     } else if (status == EBPO_OK && !v->quiet)
-        printf("%s: OK: %llu models, all contents match their checksums\n", path,
-               (unsigned long long)c.models);
+        printf("%s: OK: %s, all contents match their checksums\n", path,
+               words_plural((char[40]){ 0 }, 40, c.models, "model", "models"));
     return status;
 }
 
@@ -235,35 +240,35 @@ static const char *name_of(const listing *l, uint64_t instance)
     return i.name;
 }
 
-static const char *word_of(const ebpo_scene_approach_result *w)
+static const char *word_of(const ebpo_scene_approach_result *result)
 {
-    return w->reached > 0 ? "reached" : w->reached == 0 ? "apart" : "undecided";
+    return result->reached > 0 ? "reached" : result->reached == 0 ? "apart" : "undecided";
 }
 
-static void approach_json(listing *l, const ebpo_scene_approach_result *w)
+static void approach_json(listing *l, const ebpo_scene_approach_result *result)
 {
     json *j = &l->j;
     json_object(j, NULL);
-    json_text(j, "a", name_of(l, w->a));
-    json_text(j, "b", name_of(l, w->b));
-    json_text(j, "result", word_of(w));
-    json_real(j, "time", w->time);
-    json_real(j, "distance_lo", w->lo);
-    json_real(j, "distance_hi", w->hi);
-    json_real(j, "clearance", w->clearance);
-    json_uint(j, "evaluations", w->evaluations);
+    json_text(j, "a", name_of(l, result->a));
+    json_text(j, "b", name_of(l, result->b));
+    json_text(j, "result", word_of(result));
+    json_real(j, "time", result->time);
+    json_real(j, "distance_lo", result->lo);
+    json_real(j, "distance_hi", result->hi);
+    json_real(j, "clearance", result->clearance);
+    json_uint(j, "evaluations", result->evaluations);
     json_end(j);
 }
 
 /* Prints an approach in one line, with all digits of the bounds. */
-static void print_approach(const listing *l, const ebpo_scene_approach_result *w)
+static void print_approach(const listing *l, const ebpo_scene_approach_result *result)
 {
     char time[32], lo[32], hi[32];
-    printf("%s\t%s\t%s\t%s\t", words_real(w->time, time), word_of(w), name_of(l, w->a),
-           name_of(l, w->b));
-    if (w->reached < 0)
-        printf("%s to ", words_real(w->lo, lo));
-    printf("%s\n", words_real(w->hi, hi));
+    printf("%s\t%s\t%s\t%s\t", words_real(result->time, time), word_of(result),
+           name_of(l, result->a), name_of(l, result->b));
+    if (result->reached < 0)
+        printf("%s to ", words_real(result->lo, lo));
+    printf("%s\n", words_real(result->hi, hi));
 }
 
 static bool print_approaches(void *user, const ebpo_scene_approach_result *approaches,
@@ -272,45 +277,46 @@ static bool print_approaches(void *user, const ebpo_scene_approach_result *appro
     listing *l = user;
     l->approaches += count;
     for (uint64_t i = 0; i < count; i++) {
-        const ebpo_scene_approach_result *w = &approaches[i];
-        l->reached += w->reached > 0;
-        l->undecided += w->reached < 0;
-        l->evaluations += w->evaluations;
+        const ebpo_scene_approach_result *result = &approaches[i];
+        l->reached += result->reached > 0;
+        l->undecided += result->reached < 0;
+        l->evaluations += result->evaluations;
         if (l->v->json)
-            approach_json(l, w);
+            approach_json(l, result);
         else
-            print_approach(l, w);
+            print_approach(l, result);
     }
     return true;
 }
 
-/* Returns true when the limit of evaluations, or missing data of files, left a wider interval than
- * requested. */
-static bool is_undecided(const listing *l, const ebpo_scene_least *w)
+/* Returns true if the interval is wider than requested, because of the limit of evaluations or of
+ * missing data of files. */
+static bool is_undecided(const listing *l, const ebpo_scene_least *result)
 {
-    return w->hi - w->lo > l->v->tolerance;
+    return result->hi - result->lo > l->v->tolerance;
 }
 
-static void least_json(listing *l, const ebpo_scene_least *w)
+static void least_json(listing *l, const ebpo_scene_least *result)
 {
     json *j = &l->j;
     json_object(j, NULL);
-    json_text(j, "a", name_of(l, w->a));
-    json_text(j, "b", name_of(l, w->b));
-    json_real(j, "time", w->time);
-    json_real(j, "distance_lo", w->lo);
-    json_real(j, "distance_hi", w->hi);
-    json_bool(j, "undecided", is_undecided(l, w));
-    json_real(j, "clearance", w->clearance);
-    json_uint(j, "evaluations", w->evaluations);
+    json_text(j, "a", name_of(l, result->a));
+    json_text(j, "b", name_of(l, result->b));
+    json_real(j, "time", result->time);
+    json_real(j, "distance_lo", result->lo);
+    json_real(j, "distance_hi", result->hi);
+    json_bool(j, "undecided", is_undecided(l, result));
+    json_real(j, "clearance", result->clearance);
+    json_uint(j, "evaluations", result->evaluations);
     json_end(j);
 }
 
-static void print_least(const listing *l, const ebpo_scene_least *w, bool open)
+static void print_least(const listing *l, const ebpo_scene_least *result, bool open)
 {
     char time[32], lo[32], hi[32];
-    printf("%s\tleast\t%s\t%s\t%s to %s%s\n", words_real(w->time, time), name_of(l, w->a),
-           name_of(l, w->b), words_real(w->lo, lo), words_real(w->hi, hi), open ? "\topen" : "");
+    printf("%s\tleast\t%s\t%s\t%s to %s%s\n", words_real(result->time, time), name_of(l, result->a),
+           name_of(l, result->b), words_real(result->lo, lo), words_real(result->hi, hi),
+           open ? "\topen" : "");
 }
 
 static bool print_leasts(void *user, const ebpo_scene_least *list, uint64_t count)
@@ -318,15 +324,15 @@ static bool print_leasts(void *user, const ebpo_scene_least *list, uint64_t coun
     listing *l = user;
     l->approaches += count;
     for (uint64_t i = 0; i < count; i++) {
-        const ebpo_scene_least *w = &list[i];
-        l->reached += w->lo <= w->clearance;
-        bool open = is_undecided(l, w);
+        const ebpo_scene_least *result = &list[i];
+        l->reached += result->lo <= result->clearance;
+        bool open = is_undecided(l, result);
         l->undecided += open;
-        l->evaluations += w->evaluations;
+        l->evaluations += result->evaluations;
         if (l->v->json)
-            least_json(l, w);
+            least_json(l, result);
         else
-            print_least(l, w, open);
+            print_least(l, result, open);
     }
     return true;
 }
@@ -369,10 +375,10 @@ static const char *const purpose_words[] = { "collide", "view", "inside", "solid
 
 #include "cli/options/scene.inc"
 
-/* Sets v->from and v->to. With --from, --to or --step: to these times; a missing one is the first
- * or last time of the scene. With --time: both to this time. Without these options: to the first
- * and the last time of the scene if `spans`, else both to the first time. Returns NULL, or an
- * error. */
+/* Sets v->from and v->to. With --from, --to or --step: to these times; a missing --from is the
+ * first time of the scene, and a missing --to the last time. With --time: both to this time.
+ * Without these options: to the first and the last time of the scene if `spans`, else both to the
+ * first time. Returns NULL, or an error. */
 static const char *set_times(scene_values *v, bool spans, const ebpo_scene *scene)
 {
     ebpo_scene_counts c = EBPO_SCENE_COUNTS_INIT;
@@ -398,11 +404,11 @@ static const char *check_report(const scene_values *v)
         return "--json and --csv cannot be used together";
     if (v->out && !words_end_with(v->out, ".h5") && !words_end_with(v->out, ".html") &&
         !words_end_with(v->out, ".png"))
-        return "--output of a report ends in .h5, .html or .png";
+        return "--output of a report must end in .h5, .html or .png";
     if (v->to > v->from && !(v->step > 0))
         return "a report from one time to another needs --step";
     if (v->to > v->from && !((v->to - v->from) / v->step < FRAMES_MAX))
-        return "--step is too small: the report would have more than ten million points in time";
+        return "--step is too small: a report has at most ten million times";
     return NULL;
 }
 

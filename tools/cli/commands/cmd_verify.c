@@ -31,7 +31,7 @@ static const struct kind {
     { offsetof(ebpo_verify_report, nesting), "nesting", "envelopes lie in their parents'" },
     { offsetof(ebpo_verify_report, labels), "labels", "white, black, winding numbers" },
     { offsetof(ebpo_verify_report, lists), "lists", "faces are listed where they touch" },
-    { offsetof(ebpo_verify_report, source), "source", "what the file keeps equals the source's" },
+    { offsetof(ebpo_verify_report, source), "source", "data of the file equals the source's" },
 };
 enum { KINDS = sizeof kinds / sizeof *kinds };
 
@@ -53,13 +53,13 @@ static not_compared list_not_compared(const ebpo_file *file, const ebpo_mesh *so
     bool has = ebpo_mesh_has_attributes(source);
     if (has && !(parts & EBPO_PART_ATTRIBUTES))
         snprintf(u.words, sizeof u.words,
-                 "its attributes, such as colours and normals: the file keeps none");
+                 "its attributes, such as colours and normals: the file has none");
     else if (has && !(parts & EBPO_PART_MAPS))
         snprintf(u.words, sizeof u.words,
                  "its attributes, such as colours and normals: the file has no source indices");
     else if (lost || unread)
-        snprintf(u.words, sizeof u.words, "what is not kept: %s%s%s", unread ? unread : "",
-                 lost && unread ? "; " : "", lost ? lost : "");
+        snprintf(u.words, sizeof u.words, "data that is not converted: %s%s%s",
+                 unread ? unread : "", lost && unread ? "; " : "", lost ? lost : "");
     return u;
 }
 

@@ -1,4 +1,4 @@
-/* ebpo view: prints nodes by their importance for an observer, under a budget. */
+/* ebpo view: prints nodes in the order of their importance for an observer, within a budget. */
 #include <inttypes.h>
 #include <math.h>
 #include <stddef.h>
@@ -184,9 +184,9 @@ static void print_node(printer *p, const ebpo_view_node *v)
 static void print_legend(void)
 {
     table_legend(stdout);
-    puts("waiting: gray, to be divided next; pixels: size of the largest of these, - without "
+    puts("waiting: gray nodes to divide next; pixels: size of the largest of these, - without "
          "--eye;\n"
-         "bytes: read of the file; ms: since opening");
+         "bytes: read from the file; ms: since opening");
 }
 
 /* --- streaming --- */
@@ -254,8 +254,8 @@ static ebpo_status stream_nodes(printer *p, ebpo_file *file, const char *path,
     ebpo_view_stream_get_stats(stream, &stats);
     if (status == EBPO_OK && *arrived && p->v->out && stats.nodes == 0) {
         fprintf(stderr,
-                "ebpo view: %s: not written: the budget is too small even for the root; give more "
-                "--bytes\n",
+                "ebpo view: %s: not written: the budget is too small even for the root; give "
+                "larger --bytes\n",
                 p->v->out);
         *arrived = false;
     } else if (status == EBPO_OK && *arrived && p->v->out)
@@ -291,11 +291,11 @@ static int run_view(void *given, const char **operand)
         return EXIT_FAILED;
     if (remote_open(&file, operand[0], &v->remote, &error) != EBPO_OK)
         return command_failed("view", &error);
-    bool there = command_has_level("view", ebpo_file_info(file), v->max_level), arrived = true;
+    bool has_level = command_has_level("view", ebpo_file_info(file), v->max_level), arrived = true;
     ebpo_status status =
-        there ? stream_nodes(&p, file, operand[0], &wanted, &arrived, &error) : EBPO_OK;
+        has_level ? stream_nodes(&p, file, operand[0], &wanted, &arrived, &error) : EBPO_OK;
     ebpo_close(file);
-    if (!there)
+    if (!has_level)
         return EXIT_USAGE;
     if (!arrived)
         return EXIT_FAILED;

@@ -33,7 +33,7 @@ static bool is_safe(char c)
 }
 
 /* Writes "KIND-NUMBER-NAME", with letters, digits, '-' and '_' only. The number has `digits` digits
- * and makes the name unique. `own`: the NAME; NULL: none. */
+ * and makes the name unique. own_name: the NAME; NULL: none. */
 static void piece_file_name(char out[NAME_SIZE], const char *kind, int digits, uint64_t number,
                             const char *own_name)
 {
@@ -54,14 +54,14 @@ static bool is_selector(const char *own_name)
            strncmp(own_name, "group:", 6) == 0;
 }
 
-/* Returns the number of bytes of the character at `s`; 0: not allowed in a scene. */
+/* Returns the number of bytes of the character at `s`; 0: a scene does not allow the character. */
 static int plain_length(const char *s)
 {
     unsigned char c = (unsigned char)*s;
     return c < 0x20 || c == 0x7f ? 0 : json_utf8_length(s);
 }
 
-/* Returns true when a scene can have this name: 1 to 255 bytes of UTF-8 without control characters
+/* Returns true if a scene can have this name: 1 to 255 bytes of UTF-8 without control characters
  * and no selector. */
 static bool is_scene_name(const char *own_name)
 {
@@ -83,8 +83,8 @@ static int compare_names(const void *a, const void *b)
     return strcmp(*(const char *const *)a, *(const char *const *)b);
 }
 
-/* Writes the name, with each byte that is not allowed as \xNN; truncated if it is too long. Returns
- * the length. */
+/* Writes the name, with \xNN for each byte that is not allowed; truncates the name if it is too
+ * long. Returns the length. */
 static size_t spell_name(char *out, const char *own_name)
 {
     size_t size = 0;
@@ -121,7 +121,7 @@ static void write_shown_name(char out[SHOWN_SIZE], const char *own_name, uint64_
 
 /* Words for a kind of pieces. */
 typedef struct piece_kind {
-    const char *singular, *plural, *scene, *building, *too_many;
+    const char *singular, *plural, *scene, *building, *hint;
 } piece_kind;
 
 static const piece_kind components = { "component", "components", "components.scene.json",
@@ -220,17 +220,18 @@ static char *path_of(const char *name)
 
 /* ---- pieces ---- */
 
-static ebpo_status too_many(const piece_writer *w, ebpo_error *error)
+static ebpo_status hint(const piece_writer *w, ebpo_error *error)
 {
     error->status = EBPO_E_LIMIT;
     snprintf(error->message, sizeof error->message, "%s: has %llu %s, and at most %d are written%s",
              w->whole->as_read.source_name,
              (unsigned long long)ebpo_components_count(w->components), w->kind->plural, PIECES_MAX,
-             w->kind->too_many);
+             w->kind->hint);
     return EBPO_E_LIMIT;
 }
 
-/* Numbers have as many digits as the last one, so that names sort. */
+/* Sets the names and the facts of a piece. All numbers in names have as many digits as the greatest
+ * number, so that the order of names is the order of numbers. */
 static ebpo_status name_piece(const piece_writer *w, uint64_t i, int digits, ebpo_error *error)
 {
     piece *p = &w->pieces[i];
@@ -273,9 +274,9 @@ static ebpo_status show_names(const piece_writer *w, ebpo_error *error)
 
 static ebpo_status name_pieces(piece_writer *w, ebpo_error *error)
 {
-    uint64_t count = ebpo_components_count(w->components), most = 0;
+    uint64_t count = ebpo_components_count(w->components), max_faces = 0;
     if (count > PIECES_MAX)
-        return too_many(w, error);
+        return hint(w, error);
     w->pieces = calloc(count, sizeof *w->pieces);
     if (!w->pieces)
         return no_memory(error);
@@ -283,14 +284,15 @@ static ebpo_status name_pieces(piece_writer *w, ebpo_error *error)
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
         status = name_piece(w, i, digits, error);
-        most = w->pieces[i].facts.face_count > most ? w->pieces[i].facts.face_count : most;
+        max_faces =
+            w->pieces[i].facts.face_count > max_faces ? w->pieces[i].facts.face_count : max_faces;
     }
     w->count = count;
     made_pieces = w->pieces;
     made_count = count;
     if (status == EBPO_OK && w->run->groups)
         status = show_names(w, error);
-    return status == EBPO_OK ? w->run->fits(w->run->user, most, error) : status;
+    return status == EBPO_OK ? w->run->fits(w->run->user, max_faces, error) : status;
 }
 
 static const char *shown_name(const piece *p) { return p->shown ? p->shown : p->name; }
@@ -411,7 +413,7 @@ static ebpo_status write_scene(const piece_writer *w, ebpo_error *error)
 
 static void print_words(const piece_writer *w, double seconds)
 {
-    char bytes[32];
+    char bytes[32], faces[40];
     uint64_t sum = 0;
     for (uint64_t i = 0; i < w->count; i++) {
         const piece *p = &w->pieces[i];
@@ -419,8 +421,8 @@ static void print_words(const piece_writer *w, double seconds)
         printf("%s: ", p->name);
         if (p->shown)
             printf("'%s', ", p->shown);
-        printf("%s, %llu faces", p->solid ? "a solid" : "a surface",
-               (unsigned long long)p->facts.face_count);
+        printf("%s, %s", p->solid ? "a solid" : "a surface",
+               words_plural(faces, sizeof faces, p->facts.face_count, "face", "faces"));
         if (p->facts.cavities)
             printf(" with %llu %s", (unsigned long long)p->facts.cavities,
                    p->facts.cavities == 1 ? "cavity" : "cavities");
@@ -428,7 +430,8 @@ static void print_words(const piece_writer *w, double seconds)
                p->levels - 1, words_bytes(bytes, sizeof bytes, p->bytes));
     }
     printf("%s: %llu %s, %s, in %.1f s\n", w->run->folder, (unsigned long long)w->count,
-           w->kind->plural, words_bytes(bytes, sizeof bytes, sum), seconds);
+           w->count == 1 ? w->kind->singular : w->kind->plural,
+           words_bytes(bytes, sizeof bytes, sum), seconds);
 }
 
 static void print_json(const piece_writer *w, double seconds)

@@ -14,7 +14,8 @@ typedef struct pieces_run {
     ebpo_status (*fits)(void *user, uint64_t faces, ebpo_error *error);
     void *user;
     const ebpo_mesh_groups *groups; /* NULL: components are the pieces */
-    const char *folder, *unit;      /* `unit` may be NULL: none */
+    const char *folder;             /* the folder to write */
+    const char *unit;               /* unit of the coordinates; NULL: none */
     bool json, quiet;
     unsigned threads;
     progress_line *line; /* wiped before a warning */

@@ -78,11 +78,11 @@ static bool inspect_entry(folder_files *f, DIR *dir, const char *folder, const c
                           const char *name)
 {
     struct stat st;
-    bool known = fstatat(dirfd(dir), name, &st, AT_SYMLINK_NOFOLLOW) == 0;
-    if (!known && errno == ENOENT)
+    bool has_stat = fstatat(dirfd(dir), name, &st, AT_SYMLINK_NOFOLLOW) == 0;
+    if (!has_stat && errno == ENOENT)
         return true; /* it was removed meanwhile */
-    bool enter = known && S_ISDIR(st.st_mode);
-    if (!known && !is_model_name(name)) /* it may be a folder */
+    bool enter = has_stat && S_ISDIR(st.st_mode);
+    if (!has_stat && !is_model_name(name)) /* it may be a folder */
         return report_unread(f, folder, below, name);
     if (!enter && !is_model_name(name))
         return true;
@@ -92,9 +92,9 @@ static bool inspect_entry(folder_files *f, DIR *dir, const char *folder, const c
     char *path = join_path(below, name);
     if (!path || !enter)
         return add_path(f, path);
-    bool fine = search_folder(f, folder, path);
+    bool ok = search_folder(f, folder, path);
     free(path);
-    return fine;
+    return ok;
 }
 
 static DIR *open_folder(folder_files *f, const char *folder, const char *below)
@@ -113,14 +113,14 @@ static bool search_folder(folder_files *f, const char *folder, const char *below
     DIR *dir = open_folder(f, folder, below);
     if (!dir)
         return !f->no_memory && *below;
-    bool fine = true;
-    for (const struct dirent *entry; fine && (errno = 0, entry = readdir(dir));)
+    bool ok = true;
+    for (const struct dirent *entry; ok && (errno = 0, entry = readdir(dir));)
         if (entry->d_name[0] != '.')
-            fine = inspect_entry(f, dir, folder, below, entry->d_name);
-    if (fine && errno != 0)
-        fine = report_unread(f, folder, below, "");
+            ok = inspect_entry(f, dir, folder, below, entry->d_name);
+    if (ok && errno != 0)
+        ok = report_unread(f, folder, below, "");
     closedir(dir);
-    return fine;
+    return ok;
 }
 
 static int compare_bytes(const void *a, const void *b)
@@ -131,10 +131,10 @@ static int compare_bytes(const void *a, const void *b)
 bool folder_files_find(folder_files *files, const char *command, const char *folder)
 {
     *files = (folder_files){ .command = command };
-    bool fine = search_folder(files, folder, "");
+    bool ok = search_folder(files, folder, "");
     if (files->count)
         qsort(files->path, files->count, sizeof *files->path, compare_bytes);
-    return fine;
+    return ok;
 }
 
 void folder_files_free(folder_files *files)

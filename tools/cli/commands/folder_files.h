@@ -13,12 +13,13 @@ typedef struct folder_files {
     bool no_memory;
 } folder_files;
 
-/* Finds names that end in .h5 or .hdf5, except names that begin with a dot, and paint. Follows
- * links to files, not links to folders. Returns false when the folder itself cannot be read
- * (reported on stderr), or on `no_memory`. Call folder_files_free in any case. */
+/* Finds files whose names end in .h5 or .hdf5, except paint files and names that begin with a dot.
+ * Follows links to files, not links to folders. Returns false if the folder itself cannot be read
+ * (reported on stderr), or if there is not enough memory (`no_memory`). Call folder_files_free in
+ * any case. */
 bool folder_files_find(folder_files *files, const char *command, const char *folder);
-/* Returns a copy without control characters, as in errors of the library: names are untrusted
- * input. NULL: no memory. */
+/* Returns a copy of the path without control characters, as in errors of the library: names are
+ * untrusted input. Returns NULL if there is not enough memory. */
 char *folder_files_shown(const char *path);
 void folder_files_free(folder_files *files);
 

@@ -64,30 +64,30 @@ static bool read_lines(path *p, FILE *in, const char *name)
 {
     char *line = NULL;
     size_t space = 0;
-    bool fine = true;
+    bool ok = true;
     ssize_t length;
-    for (uint64_t n = 1; fine && (length = getline(&line, &space, in)) >= 0; n++) {
+    for (uint64_t n = 1; ok && (length = getline(&line, &space, in)) >= 0; n++) {
         double v[7];
         const char *text = n == 1 ? number_skip_mark(line) : line;
         int count = strlen(line) == (size_t)length
                         ? read_numbers(text, (size_t)(line + length - text), v)
                         : -1;
-        fine = count == 0 || ((count == 3 || count == 7) && add_pose(p, v, count));
-        if (!fine)
+        ok = count == 0 || ((count == 3 || count == 7) && add_pose(p, v, count));
+        if (!ok)
             fprintf(
                 stderr,
-                "ebpo haptic: %s, line %llu: expected three numbers, or seven of which the last "
-                "four are a quaternion\n",
+                "ebpo haptic: %s, line %llu: expected three numbers, or seven numbers, of which "
+                "the last four are a quaternion\n",
                 name, (unsigned long long)n);
     }
     free(line);
-    if (fine && ferror(in)) {
+    if (ok && ferror(in)) {
         perror(name);
         return false;
     }
-    if (fine && p->count == 0)
+    if (ok && p->count == 0)
         fprintf(stderr, "ebpo haptic: the path '%s' has no position\n", name);
-    return fine && p->count > 0;
+    return ok && p->count > 0;
 }
 
 static bool begin_path(void *self, double seconds, haptic_pose *first)
@@ -126,12 +126,12 @@ bool haptic_path_open(haptic_device *out, const char *name)
     bool standard = strcmp(name, "-") == 0;
     FILE *in = standard ? stdin : fopen(name, "r");
     *out = (haptic_device){ begin_path, read_pose, write_result, count_steps, end_path, p };
-    bool fine = p && in;
+    bool ok = p && in;
     if (!in)
         fprintf(stderr, "ebpo haptic: %s: cannot be opened: %s\n", name, strerror(errno));
-    if (fine)
-        fine = read_lines(p, in, standard ? "standard input" : name);
+    if (ok)
+        ok = read_lines(p, in, standard ? "standard input" : name);
     if (in && !standard)
         fclose(in);
-    return fine;
+    return ok;
 }

@@ -14,22 +14,22 @@ typedef struct builtin_path {
     double rate, clearance; /* radius of the tool, as a share of the model */
     double origin[3], size[3];
     int up;
-    double hit[HEIGHTS]
-              [ANGLES]; /* distances from the axis, in sizes of the box; 0.1 without a hit */
+    double hit[HEIGHTS][ANGLES]; /* distances of the surface from the axis, in sizes of the box; 0.1
+                                    without a hit */
 } builtin_path;
 
 /* Computes a point in box coordinates from an angle, a height from -0.5 and a distance from the
  * axis. */
-static void box_point(const builtin_path *o, double angle, double height, double radius,
+static void box_point(const builtin_path *p, double angle, double height, double radius,
                       double out[3])
 {
-    int u = (o->up + 1) % 3, v = (o->up + 2) % 3;
-    out[u] = o->origin[u] + o->size[u] * (0.5 + radius * cos(angle));
-    out[v] = o->origin[v] + o->size[v] * (0.5 + radius * sin(angle));
-    out[o->up] = o->origin[o->up] + o->size[o->up] * (0.5 + height);
+    int u = (p->up + 1) % 3, v = (p->up + 2) % 3;
+    out[u] = p->origin[u] + p->size[u] * (0.5 + radius * cos(angle));
+    out[v] = p->origin[v] + p->size[v] * (0.5 + radius * sin(angle));
+    out[p->up] = p->origin[p->up] + p->size[p->up] * (0.5 + height);
 }
 
-static ebpo_status measure_radii(builtin_path *o, ebpo_context *context, ebpo_error *error)
+static ebpo_status measure_radii(builtin_path *p, ebpo_context *context, ebpo_error *error)
 {
     for (int h = 0; h < HEIGHTS; h++)
         for (int a = 0; a < ANGLES; a++) {
@@ -37,39 +37,39 @@ static ebpo_status measure_radii(builtin_path *o, ebpo_context *context, ebpo_er
             double from[3], direction[3];
             ebpo_ray_hit hit;
             bool is_hit;
-            box_point(o, angle, height, 0.8, from);
-            box_point(o, angle, height, 0, direction);
+            box_point(p, angle, height, 0.8, from);
+            box_point(p, angle, height, 0, direction);
             for (int k = 0; k < 3; k++)
                 direction[k] -= from[k];
             ebpo_status status = ebpo_ray_first(context, from, direction, 1, &hit, &is_hit, error);
             if (status != EBPO_OK)
                 return status;
-            o->hit[h][a] = is_hit ? 0.8 * (1 - hit.t) : 0.1;
+            p->hit[h][a] = is_hit ? 0.8 * (1 - hit.t) : 0.1;
         }
     return EBPO_OK;
 }
 
-static double surface_distance(const builtin_path *o, double angle, double height)
+static double surface_distance(const builtin_path *p, double angle, double height)
 {
     double a = angle / (2 * pi) * ANGLES, h = (height / 0.9 + 0.5) * (HEIGHTS - 1);
     int i = (int)floor(a), j = (int)fmin(fmax(floor(h), 0), HEIGHTS - 2);
     double s = a - i, t = h - j;
     int i0 = ((i % ANGLES) + ANGLES) % ANGLES, i1 = (i0 + 1) % ANGLES;
-    return (1 - t) * ((1 - s) * o->hit[j][i0] + s * o->hit[j][i1]) +
-           t * ((1 - s) * o->hit[j + 1][i0] + s * o->hit[j + 1][i1]);
+    return (1 - t) * ((1 - s) * p->hit[j][i0] + s * p->hit[j][i1]) +
+           t * ((1 - s) * p->hit[j + 1][i0] + s * p->hit[j + 1][i1]);
 }
 
 static bool pose_at(void *self, uint64_t step_seconds, haptic_pose *out)
 {
-    const builtin_path *o = self;
-    double seconds = (double)step_seconds / o->rate, angle = 2 * pi * seconds / 8;
+    const builtin_path *p = self;
+    double seconds = (double)step_seconds / p->rate, angle = 2 * pi * seconds / 8;
     double height = 0.4 * sin(0.31 * angle), nod = 0.06 * cos(3.7 * angle);
     double approach = fmax(0, 1 - seconds); /* from outside the model */
-    double radius = surface_distance(o, angle, height) + o->clearance + nod - 0.01;
-    box_point(o, angle, height, radius + approach * (0.9 + o->clearance - radius), out->position);
+    double radius = surface_distance(p, angle, height) + p->clearance + nod - 0.01;
+    box_point(p, angle, height, radius + approach * (0.9 + p->clearance - radius), out->position);
     for (int k = 0; k < 4; k++)
         out->rotation[k] = 0;
-    out->rotation[o->up] = sin(0.3 * sin(angle)); /* back and forth */
+    out->rotation[p->up] = sin(0.3 * sin(angle)); /* back and forth */
     out->rotation[3] = cos(0.3 * sin(angle));
     return true;
 }
@@ -95,22 +95,22 @@ static uint64_t count_steps(void *self)
 ebpo_status haptic_builtin_open(haptic_device *out, ebpo_model *model, const ebpo_info *info,
                                 double rate, double clearance, ebpo_error *error)
 {
-    builtin_path *o = calloc(1, sizeof *o);
+    builtin_path *p = calloc(1, sizeof *p);
     ebpo_context *context = NULL;
-    *out = (haptic_device){ begin_builtin, pose_at, write_result, count_steps, free, o };
+    *out = (haptic_device){ begin_builtin, pose_at, write_result, count_steps, free, p };
     ebpo_status status = ebpo_context_new(model, &context, error);
-    if (status != EBPO_OK || !o)
+    if (status != EBPO_OK || !p)
         return status != EBPO_OK ? status : EBPO_E_MEMORY;
     double shortest = fmin(info->box_size[0], fmin(info->box_size[1], info->box_size[2]));
-    o->rate = rate;
-    o->clearance = clearance / shortest;
+    p->rate = rate;
+    p->clearance = clearance / shortest;
     for (int k = 0; k < 3; k++) {
-        o->origin[k] = info->box_origin[k];
-        o->size[k] = info->box_size[k];
-        if (o->size[k] > o->size[o->up])
-            o->up = k;
+        p->origin[k] = info->box_origin[k];
+        p->size[k] = info->box_size[k];
+        if (p->size[k] > p->size[p->up])
+            p->up = k;
     }
-    status = measure_radii(o, context, error);
+    status = measure_radii(p, context, error);
     ebpo_context_free(context);
     return status;
 }

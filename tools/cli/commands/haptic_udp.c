@@ -87,7 +87,7 @@ static bool read_pose(const uint8_t *p, haptic_pose *out)
     return square >= 0.25 && square <= 4;
 }
 
-/* Receives a packet. Returns false when it is not from the device, or is older than another one. */
+/* Receives a packet. Returns false if it is not from the device, or is older than another one. */
 static bool take_packet(udp *u, const uint8_t *p, ssize_t size, const struct sockaddr_in *from)
 {
     haptic_pose pose;
@@ -118,7 +118,7 @@ static void take_all(udp *u)
         socklen_t length = sizeof from;
         ssize_t size = recvfrom(u->socket, bytes, sizeof bytes, MSG_DONTWAIT | MSG_TRUNC,
                                 (struct sockaddr *)&from, &length);
-        if (size < 0 && errno != ECONNREFUSED) /* the device is not reachable now, and may return */
+        if (size < 0 && errno != ECONNREFUSED) /* refused: the device is away, and may return */
             return;
         if (size >= 0 && !(length == sizeof from && take_packet(u, bytes, size, &from)))
             u->ignored++;
@@ -202,7 +202,8 @@ static void end_udp(void *self)
     free(u);
 }
 
-/* 'udp:PORT' accepts only this machine. */
+/* Reads a name 'udp:PORT', which stands for an address of this machine only, or 'udp:ADDRESS:PORT'.
+ */
 static bool read_name(const char *name, struct sockaddr_in *out)
 {
     char address[64] = "127.0.0.1", *after;

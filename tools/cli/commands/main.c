@@ -67,7 +67,7 @@ static void print_usage(FILE *out)
           out);
 }
 
-/* Returns true when `name` is one of the words of `names`. */
+/* Returns true if `name` is one of the words of `names`. */
 static bool is_among(const char *names, const char *name)
 {
     size_t length = strlen(name);

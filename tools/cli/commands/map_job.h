@@ -31,7 +31,7 @@ typedef struct map_job {
     /* results */
     double range; /* range of the colours */
     ebpo_map_stats stats;
-    ebpo_map_hausdorff reach;
+    ebpo_map_hausdorff hausdorff;
 } map_job;
 
 /* Reads "800x600" into two numbers of 2 to 8192 each. Returns false after an error, which was

@@ -24,7 +24,7 @@ typedef struct paint_job {
     ebpo_model *model;
     ebpo_context *context;
     ebpo_progress progress;
-    bool changed;            /* in memory */
+    bool changed;            /* the paint in memory differs from the file */
     ebpo_paint_drawn drawn;  /* by --path */
     ebpo_paint_baked baked;  /* by --bake */
     ebpo_paint_areas areas;  /* by --area */

@@ -19,7 +19,7 @@ typedef struct counts {
     uint64_t strokes, points, notes;
 } counts;
 
-/* Returns the counts of all layers; NULL: no memory. */
+/* Returns the counts of all layers; NULL: not enough memory. */
 static counts *count_layers(const ebpo_paint *p, const ebpo_paint_info *info)
 {
     counts *c = calloc(info->layer_count + 1, sizeof *c);
@@ -134,17 +134,17 @@ static void print_areas(const paint_job *j, const ebpo_paint_info *info)
 
 static void print_changes(const paint_job *j)
 {
-    const ebpo_paint_drawn *l = &j->drawn;
+    const ebpo_paint_drawn *drawn = &j->drawn;
     const ebpo_paint_baked *b = &j->baked;
     char points[40], strokes[40], steps[40], vertices[40];
     if (j->v->path)
         printf("  drawn      %s in %s, at %s; lifted at %llu, strayed %llu\n",
-               words_plural(points, sizeof points, l->points, "point", "points"),
-               words_plural(strokes, sizeof strokes, l->strokes, "stroke", "strokes"),
-               words_plural(steps, sizeof steps, l->steps, "step", "steps"),
-               (unsigned long long)l->lifted, (unsigned long long)l->strayed);
+               words_plural(points, sizeof points, drawn->points, "point", "points"),
+               words_plural(strokes, sizeof strokes, drawn->strokes, "stroke", "strokes"),
+               words_plural(steps, sizeof steps, drawn->steps, "step", "steps"),
+               (unsigned long long)drawn->lifted, (unsigned long long)drawn->strayed);
     if (j->v->bake)
-        printf("  baked      %s of %llu; of %s %llu cover no vertex\n",
+        printf("  baked      %s of %llu; of %s, %llu cover no vertex\n",
                words_plural(vertices, sizeof vertices, b->vertices, "vertex", "vertices"),
                (unsigned long long)ebpo_file_info(j->file)->vertex_count,
                words_plural(points, sizeof points, b->points, "point", "points"),

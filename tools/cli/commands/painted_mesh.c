@@ -141,7 +141,7 @@ ebpo_status painted_add_box(painted_mesh *p, const ebpo_scene *scene, uint64_t i
     return EBPO_OK;
 }
 
-static bool is_near(const ebpo_mesh *m, uint64_t face, const double middle[3], double reach)
+static bool is_near(const ebpo_mesh *m, uint64_t face, const double middle[3], double half_side)
 {
     for (uint64_t k = 0; k < 3; k++) {
         double low = INFINITY, high = -INFINITY;
@@ -150,18 +150,18 @@ static bool is_near(const ebpo_mesh *m, uint64_t face, const double middle[3], d
             low = fmin(low, x);
             high = fmax(high, x);
         }
-        if (low > middle[k] + reach || high < middle[k] - reach)
+        if (low > middle[k] + half_side || high < middle[k] - half_side)
             return false;
     }
     return true;
 }
 
-void painted_crop(painted_mesh *p, const double middle[3], double reach)
+void painted_crop(painted_mesh *p, const double middle[3], double half_side)
 {
     ebpo_mesh *m = &p->mesh;
     uint64_t kept = 0;
     for (uint64_t f = 0; f < m->face_count; f++) {
-        if (!is_near(m, f, middle, reach))
+        if (!is_near(m, f, middle, half_side))
             continue;
         memmove(m->faces + 3 * kept, m->faces + 3 * f, 3 * sizeof *m->faces);
         p->paint[kept++] = p->paint[f];

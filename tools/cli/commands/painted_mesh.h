@@ -12,12 +12,12 @@ typedef struct painted_mesh {
 
 void painted_free(painted_mesh *p);
 
-/* Finds intersecting faces of two instances at a time: bytes by face index in the files, which the
- * caller frees. */
+/* Finds intersecting faces of two instances at a time: sets byte i of red[k] to 1 for each such
+ * face i in the file of instance k. The caller frees the arrays. */
 EBPO_MUST_USE ebpo_status painted_find_red(ebpo_scene *scene, uint64_t a, uint64_t b, double time,
                                            unsigned threads, uint8_t *red[2], ebpo_error *error);
 
-/* `red`: bytes of red faces, or NULL. */
+/* Adds the faces of the instance's model. red: the bytes of painted_find_red, or NULL. */
 EBPO_MUST_USE ebpo_status painted_add(painted_mesh *p, const ebpo_scene *scene, uint64_t instance,
                                       double time, const uint8_t *red, uint8_t paint,
                                       ebpo_error *error);
@@ -27,7 +27,7 @@ EBPO_MUST_USE ebpo_status painted_add_box(painted_mesh *p, const ebpo_scene *sce
                                           uint64_t instance, double time, uint8_t paint,
                                           ebpo_error *error);
 
-/* Removes faces that are farther than `reach` from `middle` on some axis. */
-void painted_crop(painted_mesh *p, const double middle[3], double reach);
+/* Removes faces outside the cube with centre `middle` and side 2 * half_side. */
+void painted_crop(painted_mesh *p, const double middle[3], double half_side);
 
 #endif

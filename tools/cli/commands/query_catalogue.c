@@ -39,7 +39,8 @@ bool query_catalogue_fits(const query_job *job)
 {
     const char *what = refused_option(job);
     if (what)
-        command_usage(job->command, "%s needs a model, not a catalogue", what);
+        command_usage(job->command, "%s needs a model, not a catalogue; give an .ebpo.h5 file",
+                      what);
     return !what;
 }
 
@@ -92,8 +93,10 @@ void query_catalogue_report(const query_job *job)
     ebpo_catalogue_models_get_stats(job->models, &n, &sums);
     if (!job->values->json) {
         stats_print(stderr, &sums);
-        fprintf(stderr, "catalogue: %" PRIu64 " models, opened %" PRIu64 ", closed %" PRIu64 "\n",
-                facts.count, n.opened, n.closed);
+        char models[40];
+        words_plural(models, sizeof models, facts.count, "model", "models");
+        fprintf(stderr, "catalogue: %s, opened %" PRIu64 ", closed %" PRIu64 "\n", models, n.opened,
+                n.closed);
         return;
     }
     json j;

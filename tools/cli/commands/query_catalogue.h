@@ -4,10 +4,10 @@
 
 #include "cli/commands/query_job.h"
 
-/* Returns true when MODEL is a catalogue: the name of a file that ends in .json. */
+/* Returns true if MODEL is a catalogue: the name of a file that ends in .json. */
 bool query_catalogue_named(const char *name);
 
-/* Returns true when a catalogue supports the query; otherwise reports it on stderr (exit with
+/* Returns true if a catalogue supports the query; otherwise reports it on stderr (exit with
  * EXIT_USAGE). */
 bool query_catalogue_fits(const query_job *job);
 /* Opens the catalogue without opening models, as job->catalogue. The memory in `options`, if given,

@@ -16,20 +16,20 @@ enum { LOADS_MIN = 8, SAFETY_FACTOR = 4 };
 
 /* --- opening --- */
 
-/* Cuts a model with subtrees at their roots, as if the whole model did not fit. Each subtree is one
- * read. */
+/* Sets the options for loading in parts: cuts a file with subtrees at their roots, so that each
+ * part is one read, and another file as if the whole model did not fit. */
 static void cut_at_subtrees(query_holding *h)
 {
     ebpo_model_options *o = &h->options;
     ebpo_model_plan parts = EBPO_MODEL_PLAN_INIT;
-    uint64_t most = o->memory;
+    uint64_t memory = o->memory;
     o->cut_level = ebpo_file_info(h->session.file)->subtree_level;
     if (o->cut_level == 0) {
         o->cut_level = -1;
-        o->memory = h->plan.resident ? h->plan.whole - 1 : most;
+        o->memory = h->plan.resident ? h->plan.whole - 1 : memory;
         o->cut_level =
             ebpo_model_memory(h->session.file, o, &parts, NULL) == EBPO_OK ? parts.cut_level : -1;
-        o->memory = most;
+        o->memory = memory;
     }
     if (ebpo_model_memory(h->session.file, o, &parts, NULL) == EBPO_OK)
         h->subtrees = parts.subtrees;
@@ -57,13 +57,13 @@ static bool is_unlimited(const query_values *v, const ebpo_model_options *o)
 
 static void init_lock(query_holding *h)
 {
-    pthread_rwlockattr_t fair;
-    pthread_rwlockattr_init(&fair);
+    pthread_rwlockattr_t attributes;
+    pthread_rwlockattr_init(&attributes);
 #ifdef __GLIBC__
-    pthread_rwlockattr_setkind_np(&fair, PTHREAD_RWLOCK_PREFER_WRITER_NONRECURSIVE_NP);
+    pthread_rwlockattr_setkind_np(&attributes, PTHREAD_RWLOCK_PREFER_WRITER_NONRECURSIVE_NP);
 #endif
-    pthread_rwlock_init(&h->lock, &fair);
-    pthread_rwlockattr_destroy(&fair);
+    pthread_rwlock_init(&h->lock, &attributes);
+    pthread_rwlockattr_destroy(&attributes);
     pthread_mutex_init(&h->counts_lock, NULL);
 }
 
@@ -137,11 +137,11 @@ void query_holding_drop_context(query_holding *h, ebpo_context **context)
 
 /* --- all of the model --- */
 
-/* Loading everything costs as much as loading each subtree once, and while all are kept, parts cost
- * no more. Parts cost more when subtrees are loaded again, and because queries that change between
- * subtrees are slower. Loading everything pays when this extra cost equals its own cost, so the
- * total is at most twice the optimum; or at the beginning, when the remaining queries will clearly
- * need everything. */
+/* Returns true if the whole model should be loaded now. Loading it costs as much as loading each
+ * subtree once. Parts cost more if subtrees are loaded again, and because queries that change
+ * between subtrees are slower. The whole model is loaded when this extra cost equals the cost of
+ * loading, so that the total is at most twice the optimum; or at the beginning, if the remaining
+ * queries will clearly need all subtrees. */
 static bool loading_pays(query_holding *h, double total)
 {
     ebpo_model_stats s = EBPO_MODEL_STATS_INIT;
@@ -151,16 +151,16 @@ static bool loading_pays(query_holding *h, double total)
     double each = s.load_seconds / (double)s.loads, queries = (double)h->queries,
            again = (double)(s.evicted < s.loads ? s.evicted : s.loads) * each,
            query_time = h->query_seconds > s.load_seconds ? h->query_seconds - s.load_seconds : 0,
-           foretold = queries > 0 ? (double)s.loads / queries * (total - queries) : 0;
+           expected_loads = queries > 0 ? (double)s.loads / queries * (total - queries) : 0;
     h->whole_seconds = each * (double)h->subtrees;
     h->extra_seconds = again + h->subtree_overhead * query_time;
     h->queries_before = h->queries;
     h->loads_before = s.loads;
-    bool does =
-        h->extra_seconds >= h->whole_seconds ||
-        (s.loads < h->subtrees / SAFETY_FACTOR && foretold >= SAFETY_FACTOR * (double)h->subtrees);
+    bool pays = h->extra_seconds >= h->whole_seconds ||
+                (s.loads < h->subtrees / SAFETY_FACTOR &&
+                 expected_loads >= SAFETY_FACTOR * (double)h->subtrees);
     pthread_mutex_unlock(&h->counts_lock);
-    return does;
+    return pays;
 }
 
 /* Loads the whole model. Needs exclusive access. Frees the loaded parts first, so that the budget
@@ -247,17 +247,17 @@ void query_holding_report(const query_holding *h)
                 ? "the minimum, which is more than half of the free memory"
                 : "half of the free memory");
     if (!h->subtrees)
-        fprintf(stderr, "all of the model at once, as it is small\n");
+        fprintf(stderr, "the whole model at once, as it is small\n");
     else if (h->loaded_all)
         fprintf(stderr,
-                "all of the model after %" PRIu64 " queries and %" PRIu64 " of %" PRIu64
-                " subtrees; parts had cost %.3f s more than all of it at once, "
+                "the whole model after %" PRIu64 " queries and %" PRIu64 " of %" PRIu64
+                " subtrees; parts had cost %.3f s more than the whole model at once, "
                 "which was estimated at %.3f s\n",
                 h->queries_before, h->loads_before, h->subtrees, h->extra_seconds,
                 h->whole_seconds);
     else
         fprintf(stderr, "in parts%s\n",
-                h->plan.resident ? "" : ", as all of the model would not fit");
+                h->plan.resident ? "" : ", as the whole model would not fit");
 }
 
 void query_holding_json(const query_holding *h, json *j)

@@ -18,10 +18,10 @@ typedef struct query_holding {
     ebpo_model_options options;
     pthread_rwlock_t lock;                     /* held during queries; exclusive: to change the
                                                 * model */
-    ebpo_context **context[QUERY_THREADS_MAX]; /* existing contexts; protected by `books` */
+    ebpo_context **context[QUERY_THREADS_MAX]; /* existing contexts; protected by counts_lock */
     unsigned contexts;
     pthread_mutex_t counts_lock;
-    bool external; /* the job holds its own data, such as a catalogue; these functions do nothing */
+    bool external; /* the job has other data, such as a catalogue; these functions do nothing */
     /* policy */
     bool automatic;           /* no memory limit was given */
     atomic_bool may_load_all; /* the whole model may still be loaded */
@@ -35,32 +35,32 @@ typedef struct query_holding {
     uint64_t free_memory;    /* bytes, before the model was made */
     uint64_t subtrees;       /* number of subtrees at first; 0: in one piece */
     uint64_t queries;        /* number of queries and their time, including loads; protected by
-                              * `books` */
+                              * counts_lock */
     double query_seconds;    /* sum of all threads */
 } query_holding;
 
-/* Opens the model; `subtree_overhead`: as the member. Returns an exit code; errors were reported.
- * Call query_holding_close in any case. */
+/* Opens the model. Returns an exit code; errors have been reported. Call query_holding_close in any
+ * case. subtree_overhead: as the member. */
 int query_holding_open(query_holding *h, const char *command, const char *path,
                        const query_values *values, const ebpo_model_options *options,
                        double subtree_overhead);
-/* Initializes `h` for a job that holds its own data. */
+/* Initializes `h` for a job that has other data than a model. */
 void query_holding_external(query_holding *h, const char *command);
 void query_holding_close(query_holding *h);
 
-/* Call before a thread queries: *context (NULL at first) then belongs to the model as it is
- * currently held. `total`: number of queries; 0: not known. After success, call query_holding_leave
- * with the number of queries done and their time. */
+/* Call before a thread queries: sets *context, which is NULL at first, to a context of the current
+ * model. total: number of queries; 0: not known. After success, call query_holding_leave with the
+ * number of queries done and their time. */
 EBPO_MUST_USE ebpo_status query_holding_enter(query_holding *h, ebpo_context **context,
                                               double total, ebpo_error *error);
-/* As query_holding_enter, but with exclusive access to the model, and without its decisions.
- * Returns false after a failure. */
+/* Enters as query_holding_enter does, but with exclusive access to the model, and never loads the
+ * whole model. Returns false after a failure. */
 bool query_holding_enter_alone(query_holding *h, ebpo_context **context);
 void query_holding_leave(query_holding *h, uint64_t queries, double seconds);
 void query_holding_drop_context(query_holding *h, ebpo_context **context);
 
-/* Print, for --stats, how the model was held: a line of words on stderr, or a member of JSON. They
- * print nothing when a limit was given. */
+/* Print, for --stats, which parts of the model were in memory: a line of words on stderr, or a
+ * member of JSON. They print nothing if a memory limit was given. */
 void query_holding_report(const query_holding *h);
 void query_holding_json(const query_holding *h, json *j);
 

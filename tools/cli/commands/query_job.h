@@ -23,12 +23,12 @@ struct query_job {
     points_kind kind;
     size_t result_bytes;     /* size of the result of one row */
     double subtree_overhead; /* see query_holding_open */
-    /* Evaluates rows[count][points_width(kind)], while the model is held: results of one size go to
-     * `results`; lists are printed until the text is over. Called with no rows first, so that an
-     * unsupported query is reported before the command waits for input. */
+    /* Evaluates rows[count][points_width(kind)], after query_holding_enter: writes results of a
+     * fixed size to `results`, or prints lists until result_text_is_over. Called with no rows
+     * first, so that an unsupported query is reported before the command waits for input. */
     ebpo_status (*result)(const query_job *job, query_worker *worker, const double *rows,
                           uint64_t count, ebpo_error *error);
-    /* Prints the results of these rows, without the model; NULL: all results are lists. */
+    /* Prints the results of these rows; does not use the model. NULL: all results are lists. */
     void (*print)(const query_job *job, query_worker *worker, const double *rows, uint64_t count);
     /* Returns the names of the columns of a result line. */
     const char *(*columns)(const query_job *job);

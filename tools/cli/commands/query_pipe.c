@@ -10,7 +10,7 @@
 #include "cli/points_parse.h"
 
 /* Number of blocks in progress for each thread, and this number for large blocks: while the oldest
- * block is pending, others are evaluated. FIRST_ROWS: rows of the first piece of a block. */
+ * block is pending, other blocks are evaluated. FIRST_ROWS: rows of the first piece of a block. */
 enum { BLOCKS_EACH = 4, LARGE_EACH = 2, FIRST_ROWS = 16 };
 /* Bytes of results that a block keeps, for each of its rows. */
 enum { KEPT_BYTES = 128 };
@@ -21,7 +21,7 @@ typedef struct slot {
     points_block block;
     result_text text;
     uint64_t number;
-    bool holds_model; /* its thread holds the model */
+    bool holds_model; /* its thread holds the lock of the model */
     bool done;
     ebpo_status status;
     ebpo_error error;
@@ -33,10 +33,10 @@ typedef struct pipe_thread {
     pthread_t thread;
 } pipe_thread;
 
-/* Two locks: the lock of the model (query_holding.h), which is held while rows are evaluated, and
- * `lock`. No thread waits for `moved` while it holds the model, and none takes another lock while
- * it holds `lock`. So each thread that holds the model releases it, and the oldest block waits for
- * nothing else. */
+/* There are two locks: the lock of the model (query_holding.h), which is held while rows are
+ * evaluated, and `lock`. No thread waits for `changed` while it holds the lock of the model, and no
+ * thread takes another lock while it holds `lock`. So each thread that holds the lock of the model
+ * releases it, and the oldest block waits for nothing else. */
 typedef struct pipe_line {
     const query_job *job;
     query_holding *holding;
@@ -46,14 +46,14 @@ typedef struct pipe_line {
     unsigned threads; /* maximum */
     uint64_t slots;
     slot *slot;               /* [slots] block i is in slot i % slots */
-    pipe_thread *pipe_thread; /* [threads] the first `working` threads have started */
-    atomic_uint started;      /* changed by the thread that takes blocks */
+    pipe_thread *pipe_thread; /* [threads] the first `started` threads have started */
+    atomic_uint started;      /* changed by the thread that is taking a block */
     pthread_mutex_t lock;     /* protects all members below */
     pthread_cond_t changed;   /* signals that any of these has changed */
     bool taking;              /* a thread is taking a block; only one at a time */
     uint64_t taken;           /* number of blocks that were taken */
     uint64_t written;         /* number of blocks whose results have been written */
-    bool writing;             /* a thread is writing block `left`; only one at a time */
+    bool writing;             /* a thread is writing block `written`; only one at a time */
     bool stopped;
     /* used only by the thread that writes blocks */
     uint64_t rows_written, bytes_written;
@@ -70,8 +70,8 @@ static void stop_pipe(pipe_line *p)
     pthread_cond_broadcast(&p->changed);
 }
 
-/* Returns true when all earlier blocks have been written; waits for that unless the thread holds
- * the model. */
+/* Returns true if all earlier blocks have been written; waits for that unless the thread holds the
+ * lock of the model. */
 static bool has_turn(slot *s)
 {
     pipe_line *p = s->pipe;
@@ -85,8 +85,8 @@ static bool has_turn(slot *s)
     return turn;
 }
 
-/* Writes long results if it is the turn of the block. Otherwise evaluation stops at a row, and
- * continues after the model was released. */
+/* Writes long results if all earlier blocks have been written. Otherwise evaluation stops at a row,
+ * and continues after the lock of the model has been released. */
 static void spill_results(result_text *t, void *user)
 {
     slot *s = user;
@@ -108,7 +108,7 @@ static void report_progress(pipe_line *p, const slot *s)
     progress_report(p->progress, "queries", p->rows_written, total);
 }
 
-/* Writes the results of a block, then reports the error after them, if any. Returns false when no
+/* Writes the results of a block, then reports the error after them, if any. Returns false if no
  * further results may be written. */
 static bool write_block(pipe_line *p, slot *s)
 {
@@ -137,11 +137,11 @@ static void finish_block(pipe_line *p, slot *s)
             break;
         p->writing = true;
         pthread_mutex_unlock(&p->lock);
-        bool go_on = write_block(p, oldest);
+        bool keep_going = write_block(p, oldest);
         pthread_mutex_lock(&p->lock);
         p->writing = oldest->done = false;
         p->written++;
-        if (!go_on)
+        if (!keep_going)
             stop_pipe(p);
         pthread_cond_broadcast(&p->changed);
     }
@@ -179,9 +179,9 @@ static void compute_rest(pipe_line *p, query_worker *w, slot *s, const double *r
     query_holding_leave(p->holding, count - done, progress_now() - begin);
 }
 
-/* Evaluates rows of a block, or only the first text->rows of them. If other threads hold memory
- * that these rows need, they are evaluated while no other thread holds the model. Returns false
- * when no further rows may be evaluated. */
+/* Evaluates rows of a block, or only the first text->rows of them. If other threads use memory that
+ * these rows need, evaluates them while no other thread uses the model. Returns false if no further
+ * rows may be evaluated. */
 static bool compute_rows(pipe_line *p, query_worker *w, slot *s, const double *rows, uint64_t count,
                          double total)
 {
@@ -206,8 +206,9 @@ static bool compute_rows(pipe_line *p, query_worker *w, slot *s, const double *r
     return !result_text_is_over(&s->text);
 }
 
-/* The first queries come in small pieces, each as large as all before it: after each piece the
- * whole model may be loaded. Queries that fail together are evaluated one by one. */
+/* Evaluates all rows of a block, in pieces. The first block has small pieces, each as large as all
+ * pieces before it: after each piece the whole model may be loaded. Queries that fail together are
+ * evaluated one by one. */
 static void compute_block(pipe_line *p, query_worker *w, slot *s)
 {
     const points_block *b = &s->block;
@@ -244,24 +245,24 @@ static void start_thread(pipe_line *p)
         p->started++;
 }
 
-/* Waits until this thread may take a block and a slot is free. Returns false when nothing more is
+/* Waits until this thread may take a block and a slot is free. Returns false if no more blocks are
  * taken. */
 static bool begin_to_take(pipe_line *p)
 {
     pthread_mutex_lock(&p->lock);
     while (!p->stopped && (p->taking || p->taken - p->written >= p->slots))
         pthread_cond_wait(&p->changed, &p->lock);
-    bool may = !p->stopped;
-    p->taking |= may;
+    bool may_take = !p->stopped;
+    p->taking |= may_take;
     pthread_mutex_unlock(&p->lock);
-    return may;
+    return may_take;
 }
 
-static void end_taking(pipe_line *p, bool took)
+static void end_taking(pipe_line *p, bool has_block)
 {
     pthread_mutex_lock(&p->lock);
     p->taking = false;
-    p->taken += took;
+    p->taken += has_block;
     pthread_cond_broadcast(&p->changed);
     pthread_mutex_unlock(&p->lock);
 }
@@ -272,14 +273,14 @@ static slot *take_block(pipe_line *p)
     if (!begin_to_take(p))
         return NULL;
     slot *s = &p->slot[p->taken % p->slots];
-    bool took = points_take(p->in, &s->block);
-    if (took) {
+    bool has_block = points_take(p->in, &s->block);
+    if (has_block) {
         s->number = p->taken;
         if (s->number > 0 || s->block.count > POINTS_BATCH * 8)
             start_thread(p);
     }
-    end_taking(p, took);
-    return took ? s : NULL;
+    end_taking(p, has_block);
+    return has_block ? s : NULL;
 }
 
 static void *work_on_blocks(void *user)

@@ -7,8 +7,8 @@
 #include "cli/commands/query_holding.h"
 #include "cli/commands/query_job.h"
 
-/* Evaluates all of `in`; returns an exit code. `threads`: maximum, at least 1; few queries use
- * fewer threads. */
+/* Evaluates all queries of `in`. Returns an exit code. threads: maximum number of threads, at least
+ * 1; few queries use fewer threads. */
 int query_pipe_run(const query_job *job, query_holding *holding, points *in, unsigned threads,
                    progress_line *progress);
 

@@ -34,8 +34,9 @@ static void report_stats(const query_job *job, const query_holding *holding)
     json_finish(&j);
 }
 
-/* Returns the number of cores that this process may use, unless a number was given. Loading modes
- * that keep nothing use one thread: each would drop the data of the others. */
+/* Returns the given number of threads or, if none was given, the number of cores that this process
+ * may use. Loading modes that keep no data use one thread: each thread would drop the data of the
+ * others. */
 static unsigned threads_for(const query_values *v, const ebpo_model_options *holding)
 {
     unsigned wanted = v->threads ? (unsigned)v->threads : command_cores();
@@ -60,7 +61,7 @@ static int query_all(query_job *job, query_holding *holding, points *in,
                      const ebpo_model_options *options)
 {
     progress_line line;
-    /* shows the line between results when both go to one terminal */
+    /* no line if the results go to the terminal */
     (void)progress_start(&line, job->command, isatty(STDOUT_FILENO));
     npy_results npy = { .command = job->command };
     bool as_npy = job->values->npy;
@@ -88,7 +89,9 @@ static bool form_fits(const query_job *job)
     else if (v->npy && v->attribute)
         (void)command_usage(job->command, "--attribute has no effect with --npy; omit one of them");
     else if (v->attribute && strlen(v->attribute) > RESULT_NAMES)
-        (void)command_usage(job->command, "--attribute: names of at most %d bytes in all",
+        (void)command_usage(job->command,
+                            "--attribute: the names have more than %d bytes in total; name fewer "
+                            "attributes",
                             RESULT_NAMES);
     else
         return true;
@@ -104,8 +107,8 @@ static result_form form_of(const query_values *v)
                     : RESULTS_TEXT;
 }
 
-/* For output to a file: when the model is held in parts, so many points are evaluated together, in
- * the order of subtrees, that few are loaded again. */
+/* Number of points evaluated together, in the order of subtrees, if output goes to a file and only
+ * parts of the model are in memory: so many that few subtrees are loaded again. */
 enum { TOGETHER_IN_PARTS = 1 << 20 };
 /* Maximum number of values kept in one array. */
 enum { TOGETHER_BYTES = 1024 };
@@ -168,12 +171,12 @@ static int open_and_run(query_job *job, const char *model, const char *path,
     points in;
     if (query_shard_done(shard, job, &code))
         return code;
-    bool fine = points_open_shard(&in, job->command, path, job->kind, v->raw, v->tmax,
-                                  shard->number, shard->of ? shard->of : 1);
+    bool ok = points_open_shard(&in, job->command, path, job->kind, v->raw, v->tmax, shard->number,
+                                shard->of ? shard->of : 1);
     in.header = v->header;
-    if (fine && shard->of)
-        fine = points_cut(&in, shard->number, shard->of);
-    code = fine ? run_query(job, model, &in, options, shard) : EXIT_FAILED;
+    if (ok && shard->of)
+        ok = points_cut(&in, shard->number, shard->of);
+    code = ok ? run_query(job, model, &in, options, shard) : EXIT_FAILED;
     points_close(&in);
     return code;
 }

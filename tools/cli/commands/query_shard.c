@@ -73,7 +73,7 @@ bool query_shard_fits(query_shard *s, const query_job *job, const char *model,
     else if (v->force && !v->shard)
         command_usage(s->command, "--force has no effect without --shard; omit it");
     else if (v->shard && (!points_path || strcmp(points_path, "-") == 0))
-        command_usage(s->command, "--shard takes its part of a file, not of standard input");
+        command_usage(s->command, "--shard needs a file of points, not standard input");
     else if (v->shard && v->npy)
         command_usage(s->command, "--npy has no effect with --shard; outputs of --raw can be "
                                   "joined by cat");
@@ -81,7 +81,7 @@ bool query_shard_fits(query_shard *s, const query_job *job, const char *model,
         command_usage(s->command, "--deadline has no effect with --shard, whose results do not "
                                   "depend on time; omit one of them");
     else if (v->out && strcmp(v->out, "-") == 0)
-        command_usage(s->command, "results go to standard output without -o; omit it");
+        command_usage(s->command, "without -o, results go to standard output; omit -o");
     else
         return !v->out || !overwrites_input(s, v->out);
     return false;
@@ -137,7 +137,8 @@ static int report_model(json *j, const query_shard *s)
     return EXIT_OK;
 }
 
-/* Memory and threads do not change results, and are not included. Returns an exit code. */
+/* Sets *facts to the facts of the inputs, as JSON. Memory and threads do not change results, and
+ * are not included. Returns an exit code. */
 static int report_facts(const query_shard *s, const query_job *job, const struct stat *st,
                         const char *dataset, char **facts)
 {
@@ -188,8 +189,8 @@ static int inspect_inputs(const query_shard *s, const query_job *job, char **fac
 
 /* --- the note --- */
 
-/* Returns the facts, with the length and the time of the results, so that the note of one of two
- * commands is not taken for the results of the other. */
+/* Returns the text of the note: the facts, and the length and the time of the results. So the note
+ * of one of two commands does not match the results of the other. */
 static char *note_text(const char *facts, const struct stat *results)
 {
     char *text = NULL;
@@ -203,38 +204,38 @@ static char *note_text(const char *facts, const struct stat *results)
 static bool file_equals(const char *path, const char *text)
 {
     size_t size = strlen(text);
-    char *there = malloc(size + 1);
-    FILE *in = there ? fopen(path, "re") : NULL;
-    bool same = in && fread(there, 1, size + 1, in) == size && memcmp(there, text, size) == 0;
+    char *contents = malloc(size + 1);
+    FILE *in = contents ? fopen(path, "re") : NULL;
+    bool same = in && fread(contents, 1, size + 1, in) == size && memcmp(contents, text, size) == 0;
     if (in)
         fclose(in);
-    free(there);
+    free(contents);
     return same;
 }
 
-/* Returns false when a file that is not a note, such as an input, has the name of the note. The
- * file is kept, and is reported before the work begins. */
+/* Returns false if a file that is not a note, such as an input, has the name of the note. The file
+ * is not changed, and is reported before the work begins. */
 static bool check_note(const query_shard *s)
 {
     static const char begins[] = "{\n  \"format\": \"ebpo-shard\",\n";
     struct stat st;
-    char there[sizeof begins - 1];
+    char contents[sizeof begins - 1];
     if (lstat(s->note, &st) != 0)
         return true; /* other errors are reported for the results, which are in the same folder */
     FILE *in = S_ISREG(st.st_mode) ? fopen(s->note, "re") : NULL;
-    bool is_note = in && fread(there, 1, sizeof there, in) == sizeof there &&
-                   memcmp(there, begins, sizeof there) == 0;
+    bool is_note = in && fread(contents, 1, sizeof contents, in) == sizeof contents &&
+                   memcmp(contents, begins, sizeof contents) == 0;
     if (in)
         fclose(in);
     if (!is_note)
         fprintf(stderr,
-                "ebpo %s: %s: exists, is not a note of a shard, and would be replaced; choose "
-                "another output\n",
+                "ebpo %s: %s: exists, and is not the file of facts that --shard writes beside its "
+                "output; choose another output\n",
                 s->command, s->note);
     return is_note;
 }
 
-/* Returns true when the results of these inputs exist. */
+/* Returns true if the results of these inputs exist. */
 static bool results_exist(const query_shard *s)
 {
     struct stat st, note;
@@ -277,14 +278,14 @@ bool query_shard_done(query_shard *s, const query_job *job, int *code)
 int query_shard_begin(query_shard *s)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    int to;
+    int file;
     if (!s->v->out)
         return EXIT_OK;
-    if (ebpo_output_begin(s->v->out, &s->out, &to, &error) != EBPO_OK)
+    if (ebpo_output_begin(s->v->out, &s->out, &file, &error) != EBPO_OK)
         return command_failed(s->command, &error);
     fflush(stdout);
     s->saved_stdout = fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3);
-    if (s->saved_stdout >= 0 && dup2(to, STDOUT_FILENO) >= 0)
+    if (s->saved_stdout >= 0 && dup2(file, STDOUT_FILENO) >= 0)
         return EXIT_OK;
     fprintf(stderr, "ebpo %s: standard output: %s\n", s->command, strerror(errno));
     return EXIT_FAILED;

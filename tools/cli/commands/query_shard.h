@@ -1,5 +1,6 @@
 /* Writes results to a file atomically, for all queries or a shard of them. Beside the results of a
- * shard it leaves a note of their inputs: a later run that finds the note has nothing to do. */
+ * shard it writes a file with facts of their inputs, the note: a later run that finds the note of
+ * the same inputs has nothing to do. */
 #ifndef EBPO_TOOLS_QUERY_SHARD_H
 #define EBPO_TOOLS_QUERY_SHARD_H
 
@@ -20,7 +21,7 @@ typedef struct query_shard {
  * (exit with EXIT_USAGE). Call query_shard_free in any case. */
 bool query_shard_fits(query_shard *s, const query_job *job, const char *model,
                       const char *points_path);
-/* Examines the inputs. Returns true when the command has nothing more to do: the results exist,
+/* Examines the inputs. Returns true if the command has nothing more to do: the results exist,
  * which was reported, or *code is an error. */
 bool query_shard_done(query_shard *s, const query_job *job, int *code);
 /* Redirects standard output to the file of results, if one is requested. */

@@ -1,5 +1,5 @@
-/* `ebpo scene plan`: lists the parts of models that a scene can need; `ebpo scene pack`: writes
- * them to a folder. */
+/* Implements `ebpo scene plan`, which lists the parts of models that a scene can need, and `ebpo
+ * scene pack`, which writes these parts to a folder. */
 #ifndef EBPO_TOOLS_SCENE_PLAN_H
 #define EBPO_TOOLS_SCENE_PLAN_H
 

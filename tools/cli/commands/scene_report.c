@@ -15,7 +15,7 @@
 
 /* --- a contact --- */
 
-/* Valid until the scene is freed. */
+/* Returns the name of the instance, which is valid until the scene is freed. */
 static const char *scene_instance_name(const ebpo_scene *scene, uint64_t instance)
 {
     ebpo_scene_instance i = EBPO_SCENE_INSTANCE_INIT;
@@ -89,9 +89,9 @@ static void scene_head_csv(const scene_values *v)
            v->depth > 0 ? ",a_in_b_lo,a_in_b_hi,b_in_a_lo,b_in_a_hi" : "");
 }
 
-/* Writes the text with doubled quotes. Spreadsheets take some beginnings for a formula: then a '
- * precedes the text. A ' also precedes a text that begins with ', so that removing the first '
- * restores the text. */
+/* Writes the text with doubled quotes. Spreadsheets read a text that begins with some characters as
+ * a formula: writes a ' before such a text. Also writes a ' before a text that begins with ', so
+ * that removing the first ' restores the text. */
 static void csv_text(const char *text)
 {
     putchar('"');
@@ -165,7 +165,7 @@ static void scene_row_words(const scene_values *v, const ebpo_scene *scene, doub
     if (m->kind == EBPO_CLASH_NEAR)
         printf("\t%.9g of %.9g", m->distance, m->clearance);
     else if (v->count && pairs)
-        printf("\t%llu pairs of faces", (unsigned long long)pairs);
+        printf("\t%llu %s of faces", (unsigned long long)pairs, pairs == 1 ? "pair" : "pairs");
     if (v->depth > 0) {
         depth_words("a", &m->depth[0]);
         depth_words("b", &m->depth[1]);
@@ -176,7 +176,6 @@ static void scene_row_words(const scene_values *v, const ebpo_scene *scene, doub
 }
 
 /* State of a report: contacts in a scene at each of several times. */
-
 typedef struct report {
     const scene_values *v;
     ebpo_scene *scene;
@@ -188,7 +187,7 @@ typedef struct report {
     json j;
     const char *path;
     uint64_t frames, reported;
-    /* Output format, by the ending of v->out; else NULL and false. */
+    /* One of these is set, by the ending of v->out; the others are NULL or false. */
     ebpo_scene_report *record;
     clash_strip *strip;
     bool page;
@@ -266,8 +265,8 @@ static void print_frame(report *r)
                                                       &f->found_clashes[i]);
 }
 
-/* Returns true when the strip shows this frame: all frames if there are as many as pictures, else
- * frames spread evenly. */
+/* Returns true if the strip shows this frame. It shows all frames or, if there are more than
+ * CLASH_TILES, frames at regular intervals. */
 static bool is_pictured(const report *r)
 {
     uint64_t n = r->reported, most = r->frames < CLASH_TILES ? r->frames : CLASH_TILES;
@@ -318,7 +317,7 @@ static ebpo_status begin_report(report *r, ebpo_error *error)
     return out && !r->page ? ebpo_scene_report_new(r->scene, out, &r->record, error) : EBPO_OK;
 }
 
-/* Maximum number of clashes with pictures, the worst first. */
+/* Maximum number of clashes with pictures, which are the worst clashes. */
 enum { PICTURES_MAX = 60 };
 
 static ebpo_status write_page(report *r, ebpo_error *error)
@@ -362,7 +361,7 @@ static void finish_report(report *r, double seconds)
 
 /* --- all frames --- */
 
-/* Returns the time of frame `n`: the last one is at the last time. */
+/* Returns the time of frame `n`; the last frame is at time v->to. */
 static double time_of(const scene_values *v, uint64_t n, uint64_t frames)
 {
     return n + 1 == frames ? v->to : v->from + v->step * (double)n;

@@ -1,4 +1,4 @@
-/* `ebpo scene report`: finds contacts at each of several times. */
+/* Implements `ebpo scene report`: finds contacts at each of several times. */
 #ifndef EBPO_TOOLS_SCENE_REPORT_H
 #define EBPO_TOOLS_SCENE_REPORT_H
 

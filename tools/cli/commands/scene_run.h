@@ -1,4 +1,4 @@
-/* Subcommands of `ebpo scene` for a scene with loaded models. */
+/* Defines the options of those subcommands of `ebpo scene` that load the models. */
 #ifndef EBPO_TOOLS_SCENE_RUN_H
 #define EBPO_TOOLS_SCENE_RUN_H
 

@@ -110,7 +110,7 @@ int subset_options(const char *name, const subset_values *v, const char *in, con
         return command_usage(
             name,
             "--levels: '%s' is not 0-N with N up to 20; all levels from 0 to N are "
-            "needed, as each level builds on those above",
+            "needed, as each level depends on the levels above",
             v->levels);
     if (v->box && !read_box(v->box, out))
         return command_usage(
@@ -159,7 +159,8 @@ ebpo_status subset_set_parts(const subset_values *v, const ebpo_info *info, cons
     }
     if (named && out->parts & EBPO_PART_MAPS && !(out->parts & EBPO_PART_MESH))
         return refuse_values(error, shown,
-                             "--parts requests maps without the mesh that they number; add mesh");
+                             "--parts requests maps without the mesh, whose faces and vertices "
+                             "they number; add mesh");
     if (!v->parts && v->profile < 0 && out->last_level >= 0 &&
         out->last_level < info->level_count - 1)
         out->parts &= ~(uint32_t)(EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES);

@@ -26,7 +26,7 @@ typedef struct subset_values {
 extern const char *const profile_words[];
 
 /* Reads --parts: a list of part names separated by commas; with a minus or plus sign before each
- * name, the parts are `base` without or with these. Returns false when the list is invalid. */
+ * name, the parts are `base` without or with these. Returns false if the list is invalid. */
 bool subset_read_parts(const char *text, uint32_t base, uint32_t *parts);
 #define SUBSET_PARTS_EXPECTED                                                                     \
     "is not a list of mesh, maps, attributes, envelopes, leaf-planes, colours, border, surface, " \
@@ -36,8 +36,8 @@ bool subset_read_parts(const char *text, uint32_t base, uint32_t *parts);
 int subset_read_target(const char *name, double max_error, const char *target_size,
                        ebpo_subset_options *out);
 
-/* Prints ", ..." for summaries: the maximum error and, if it was `chosen`, the profile; or nothing.
- */
+/* Prints the end of a summary, ", ...": the profile, if it was `chosen`, and the maximum error, if
+ * the file is pruned. */
 void subset_print_target(const ebpo_info *info, bool chosen);
 
 /* Checks options before the file is open; returns the exit code, EXIT_OK to continue. `out` gets
@@ -51,7 +51,7 @@ EBPO_MUST_USE ebpo_status subset_set_parts(const subset_values *v, const ebpo_in
                                            const char *shown, ebpo_subset_options *out,
                                            ebpo_error *error);
 
-/* Reports the file on the disk, as a reader sees it. `t`: traffic of the input. */
+/* Opens the written file, and reports its properties. t: traffic of the input. */
 EBPO_MUST_USE ebpo_status subset_report(const subset_values *v, const char *out_path,
                                         const ebpo_info *from, const traffic *t, double seconds,
                                         ebpo_error *error);

@@ -28,15 +28,15 @@ static ebpo_status read_longer(void *user, uint64_t offset, uint64_t size, void 
     uint8_t *to = data;
     memset(to, 0, size);
     while (offset < end) {
-        ssize_t got = pread(l->fd, to, end - offset, (off_t)offset);
-        if (got < 0 && errno == EINTR)
+        ssize_t read_bytes = pread(l->fd, to, end - offset, (off_t)offset);
+        if (read_bytes < 0 && errno == EINTR)
             continue;
-        if (got == 0)
+        if (read_bytes == 0)
             errno = EIO; /* it has been truncated */
-        if (got <= 0)
+        if (read_bytes <= 0)
             return fail_path(l->path, error);
-        to += got;
-        offset += (uint64_t)got;
+        to += read_bytes;
+        offset += (uint64_t)read_bytes;
     }
     return EBPO_OK;
 }
@@ -51,7 +51,7 @@ static void close_longer(void *user)
 ebpo_status unlisted_open(const char *path, uint64_t max_expansion, ebpo_file **out,
                           ebpo_error *error)
 {
-    ebpo_open_options how = EBPO_OPEN_OPTIONS_INIT;
+    ebpo_open_options options = EBPO_OPEN_OPTIONS_INIT;
     ebpo_source source = EBPO_SOURCE_INIT;
     struct stat st;
     *out = NULL;
@@ -69,7 +69,7 @@ ebpo_status unlisted_open(const char *path, uint64_t max_expansion, ebpo_file **
     source.size = l->size + 1;
     source.read = read_longer;
     source.close = close_longer;
-    how.max_expansion = max_expansion;
-    how.source = &source;
-    return ebpo_open_with(path, &how, out, error);
+    options.max_expansion = max_expansion;
+    options.source = &source;
+    return ebpo_open_with(path, &options, out, error);
 }

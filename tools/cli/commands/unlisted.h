@@ -8,8 +8,8 @@
  * /subtrees/chunk_directory state the length of their file, and are not used in a file of another
  * length. Then the library finds chunks by the index of HDF5, and checks them by their own
  * checksums. Nothing proves that a chunk belongs to its position: compare the content before using
- * it. `path`: a local file, which must stay while it is open. Fails with EBPO_E_IO, and the errors
- * of ebpo_open_with. */
+ * it. Fails with EBPO_E_IO, and the errors of ebpo_open_with. path: a local file; the string must
+ * exist while the file is open. */
 ebpo_status unlisted_open(const char *path, uint64_t max_expansion, ebpo_file **out,
                           ebpo_error *error);
 

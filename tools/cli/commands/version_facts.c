@@ -13,13 +13,14 @@
 
 typedef struct installation {
     char program[PATH_MAX];
-    char library[PATH_MAX]; /* the running one */
-    char own[PATH_MAX];     /* the one installed with the program; "": none exists */
-    char plugin[PATH_MAX];  /* the folder; "": does not exist */
+    char library[PATH_MAX];           /* the library that runs; "": not known */
+    char installed_library[PATH_MAX]; /* the library installed with the program; "": does not exist
+                                       */
+    char plugin[PATH_MAX];            /* folder of the HDF5 plugin; "": does not exist */
 } installation;
 
-/* Writes the path of an installed file, relative to the program's folder unless absolute; "": there
- * is no such file. */
+/* Sets `out` to the path of an installed file, or to "" if there is no such file. path: relative to
+ * the program's folder, or absolute. */
 static void locate_file(const char *program, const char *path, const char *name, char out[PATH_MAX])
 {
     char joined[3 * PATH_MAX];
@@ -38,7 +39,7 @@ static void inspect_installation(installation *i)
     bool known = function && dladdr(function, &library) && library.dli_fname;
     if (!known || !realpath(library.dli_fname, i->library))
         i->library[0] = 0;
-    locate_file(i->program, EBPO_LIBRARY_FROM_BIN, "", i->own);
+    locate_file(i->program, EBPO_LIBRARY_FROM_BIN, "", i->installed_library);
     i->plugin[0] = 0;
     if (*EBPO_PLUGIN_FROM_BIN)
         locate_file(i->program, EBPO_PLUGIN_FROM_BIN, "/libebpo_h5zstd.so", i->plugin);
@@ -61,13 +62,13 @@ static void print_installation(const installation *i)
  * --verbose. */
 static int warn_of_other(const installation *i)
 {
-    bool other = i->own[0] && i->library[0] && !command_same_file(i->own, i->library);
+    bool other = i->installed_library[0] && i->library[0] &&
+                 !command_same_file(i->installed_library, i->library);
     if (other)
-        fprintf(
-            stderr,
-            "ebpo: the library that runs is not the one that was installed with this program, %s; "
-            "%s is in the loader's way: remove it, or take its folder out of LD_LIBRARY_PATH\n",
-            i->own, i->library);
+        fprintf(stderr,
+                "ebpo: the running library is not the library installed with this program, %s; the "
+                "loader found %s first: remove it, or remove its folder from LD_LIBRARY_PATH\n",
+                i->installed_library, i->library);
     bool differs = ebpo_version_number() != EBPO_VERSION_NUMBER;
     if (differs)
         fprintf(stderr, "ebpo: this program was made for version %d.%d.%d of the library, not %s\n",
@@ -80,7 +81,7 @@ int version_report(const char *argument)
     char format[32];
     bool verbose = argument && strcmp(argument, "--verbose") == 0;
     if (argument && !verbose) {
-        fprintf(stderr, "ebpo: --version takes nothing but --verbose, not '%s'\n", argument);
+        fprintf(stderr, "ebpo: after --version, only --verbose is allowed, not '%s'\n", argument);
         return EXIT_USAGE;
     }
     installation i;

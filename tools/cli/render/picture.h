@@ -9,11 +9,11 @@ typedef struct picture {
     uint8_t *rgb; /* [height][width][3] */
 } picture;
 
-/* Makes a picture of one colour. Returns false when memory is short. */
+/* Makes a picture of one colour. Returns false if memory is short. */
 bool picture_make(picture *out, int width, int height, const uint8_t colour[3]);
 void picture_free(picture *p);
 
-/* Returns true when this build can draw text (cairo); otherwise captions are omitted. */
+/* Returns true if this build can draw text (cairo); otherwise captions are omitted. */
 bool picture_has_captions(void);
 /* Draws text in the middle of a rectangle in the picture. EBPO_E_MEMORY, also when the library for
  * text is installed and could not be loaded. */

@@ -30,7 +30,7 @@ static void set_header_values(const comparison *c, method *m)
 
 /* --- levels --- */
 
-/* Returns true when the volume of the root cell, or of a cell far below it, is no normal double. */
+/* Returns true if the volume of the root cell, or of a cell far below it, is no normal double. */
 static bool is_out_of_range(const ebpo_info *info)
 {
     double volume = info->box_size[0] * info->box_size[1] * info->box_size[2];
