@@ -97,22 +97,22 @@ static int generate_rows(bench_points *out, const char *model, const remote_valu
 
 static int read_all(bench_points *out, points *in, uint64_t most)
 {
-    uint64_t capacity = 0, got = 1;
-    while (got && out->count < most) {
+    uint64_t capacity = 0, row_count = 1;
+    while (row_count && out->count < most) {
         if (capacity < out->count + POINTS_BATCH) {
             capacity = 2 * capacity + POINTS_BATCH;
             if (reserve_space(out, capacity) != EXIT_OK)
                 return EXIT_FAILED;
         }
-        got = points_next(in, out->rows + out->count * (uint64_t)points_width(out->kind));
-        out->count += got;
+        row_count = points_next(in, out->rows + out->count * (uint64_t)points_width(out->kind));
+        out->count += row_count;
     }
     if (in->failed)
         return EXIT_FAILED;
     if (out->count > most)
         out->count = most;
     if (out->count == 0)
-        fprintf(stderr, "ebpo bench: %s: holds no points\n", in->name);
+        fprintf(stderr, "ebpo bench: %s: has no points\n", in->name);
     return out->count ? EXIT_OK : EXIT_FAILED;
 }
 
@@ -133,8 +133,8 @@ int bench_points_make(bench_points *out, points_kind kind, const char *model,
     generator by = generator_of(what);
     *out = (bench_points){ .kind = kind, .count = count ? count : DEFAULT_COUNT };
     if (by == PATH && kind == POINTS_RAYS)
-        return command_usage("bench",
-                             "a path has points; for rays give --points uniform or a file");
+        return command_usage(
+            "bench", "--points path makes points; for rays, give --points uniform or a file");
     if (by > PATH && by < NO_GENERATOR && kind != POINTS_RAYS)
         return command_usage("bench", "--points %s makes rays; add --query ray", what);
     if (by != NO_GENERATOR)
@@ -175,9 +175,9 @@ int bench_points_save(const bench_points *p, const char *path)
     char *data = NULL;
     size_t size = 0;
     FILE *f = open_memstream(&data, &size);
-    int width = points_width(p->kind), kept = points_raw_width(p->kind);
+    int width = points_width(p->kind), written_width = points_raw_width(p->kind);
     for (uint64_t i = 0; f && i < p->count; i++)
-        for (int k = 0; k < kept; k++)
+        for (int k = 0; k < written_width; k++)
             raw_double(f, p->rows[i * (uint64_t)width + (unsigned)k]);
     return bench_save(f, &data, &size, path);
 }

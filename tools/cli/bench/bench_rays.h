@@ -4,7 +4,7 @@
 
 #include <ebpo/file.h>
 
-/* The bounding box. */
+/* The bounding box of the model. */
 typedef struct bench_scene {
     double low[3], high[3];
 } bench_scene;

@@ -76,13 +76,14 @@ static ebpo_status query_ray(bench_query query, const double *row, ebpo_context 
 }
 
 static ebpo_status query_any_many(const bench_job *job, ebpo_context *context,
-                                  const ebpo_ray_options *how, ebpo_ray_hit *out, ebpo_error *error)
+                                  const ebpo_ray_options *options, ebpo_ray_hit *out,
+                                  ebpo_error *error)
 {
     bool *any = malloc(job->count ? job->count : 1);
     if (!any)
         return EBPO_E_MEMORY;
     ebpo_status status =
-        ebpo_ray_any_many(context, (const void *)job->rows, job->count, how, any, error);
+        ebpo_ray_any_many(context, (const void *)job->rows, job->count, options, any, error);
     for (uint64_t i = 0; i < job->count && status == EBPO_OK; i++)
         out[i] = any_result(any[i]);
     free(any);
@@ -92,16 +93,17 @@ static ebpo_status query_any_many(const bench_job *job, ebpo_context *context,
 static ebpo_status query_many_rays(const bench_job *job, ebpo_context *context, ebpo_ray_hit *out,
                                    ebpo_error *error)
 {
-    ebpo_ray_options how = EBPO_RAY_OPTIONS_INIT;
+    ebpo_ray_options options = EBPO_RAY_OPTIONS_INIT;
     const void *rays = job->rows;
     const ebpo_ray_hit *hits;
     const uint64_t *begin;
-    how.threads = 1;
+    options.threads = 1;
     if (job->query == BENCH_RAY)
-        return ebpo_ray_first_many(context, rays, job->count, &how, out, error);
+        return ebpo_ray_first_many(context, rays, job->count, &options, out, error);
     if (job->query == BENCH_RAY_ANY)
-        return query_any_many(job, context, &how, out, error);
-    ebpo_status status = ebpo_ray_all_many(context, rays, job->count, &how, &hits, &begin, error);
+        return query_any_many(job, context, &options, out, error);
+    ebpo_status status =
+        ebpo_ray_all_many(context, rays, job->count, &options, &hits, &begin, error);
     for (uint64_t i = 0; i < job->count && status == EBPO_OK; i++)
         out[i] = all_result(hits + begin[i], begin[i + 1] - begin[i]);
     return status;
@@ -184,14 +186,14 @@ ebpo_status bench_batch(const bench_job *job, ebpo_context *context, void *resul
 
 static double share_in_memory(int fd, size_t bytes)
 {
-    size_t page = (size_t)sysconf(_SC_PAGESIZE), pages = (bytes + page - 1) / page, held = 0;
+    size_t page = (size_t)sysconf(_SC_PAGESIZE), pages = (bytes + page - 1) / page, in_memory = 0;
     unsigned char *flags = pages ? malloc(pages) : NULL;
     void *mapped = flags ? mmap(NULL, bytes, PROT_READ, MAP_SHARED, fd, 0) : MAP_FAILED;
     double share = -1;
     if (mapped != MAP_FAILED && mincore(mapped, bytes, flags) == 0) {
         for (size_t i = 0; i < pages; i++)
-            held += flags[i] & 1;
-        share = (double)held / (double)pages;
+            in_memory += flags[i] & 1;
+        share = (double)in_memory / (double)pages;
     }
     if (mapped != MAP_FAILED)
         munmap(mapped, bytes);

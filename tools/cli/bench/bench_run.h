@@ -15,8 +15,8 @@ typedef enum bench_query {
     BENCH_RAY_ALL
 } bench_query;
 
-/* Result of a ray query: no hit has face EBPO_NO_FACE. For any hit, t and face are 0; for all, t is
- * the number of hits and face is the first face. */
+/* Result of a query. A ray without a hit has the face EBPO_NO_FACE. For BENCH_RAY_ANY, t and face
+ * are 0; for BENCH_RAY_ALL, t is the number of hits, and face is the first face. */
 typedef union bench_result {
     ebpo_inside_result inside;
     ebpo_distance_result distance;
@@ -29,7 +29,7 @@ typedef struct bench_job {
     ebpo_inside_options inside;
     ebpo_distance_options distance;
     const double *rows; /* rows of rays: as ebpo_ray */
-    int width;          /* doubles a row */
+    int width;          /* number of doubles in a row */
     uint64_t count;
     double rate;         /* single queries per second; 0: no limit */
     uint64_t *ns;        /* [count] */
@@ -44,24 +44,24 @@ typedef struct bench_metrics {
     double batch;                 /* nanoseconds per query in a batch */
 } bench_metrics;
 
-/* Returns the time that reading the clock adds to a measurement: the median of 10,001. */
+/* Returns the time that reading the clock adds to a measurement: the median of 10,001 readings. */
 uint64_t bench_clock_cost(void);
 
 EBPO_MUST_USE ebpo_status bench_run_query(const bench_job *job, ebpo_context *context,
                                           uint64_t number, ebpo_error *error);
-/* Runs and times each query separately: all results except `batch`. Sorts job->ns. */
+/* Runs and times each query separately. Sets all members of *out except `batch`. Sorts job->ns. */
 EBPO_MUST_USE ebpo_status bench_each(const bench_job *job, ebpo_context *context,
                                      uint64_t clock_cost, bench_metrics *out, ebpo_error *error);
-/* Runs all queries in a batch by the functions for many points or rays, on one thread, into
- * `result_values`, which has the size of job->result_values. */
+/* Runs all queries in a batch, by the functions for many points or rays, on one thread. Writes the
+ * results to `result_values`, which has the size of job->result_values. */
 EBPO_MUST_USE ebpo_status bench_batch(const bench_job *job, ebpo_context *context,
                                       void *result_values, bench_metrics *out, ebpo_error *error);
 
-/* Requests that the system drops a file from the page cache. Returns the share of pages still in
- * memory; -1 when not known. */
+/* Requests that the system drops a file from the page cache. Returns the share of pages that are
+ * still in memory; -1: not known. */
 double bench_drop_file(const char *path);
 /* Returns the peak memory of this process (Linux), since the last bench_reset_peak if the system
- * allows a reset; 0 when not known. */
+ * allows a reset; 0: not known. */
 uint64_t bench_peak_memory(void);
 void bench_reset_peak(void);
 

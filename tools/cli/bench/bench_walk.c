@@ -8,7 +8,7 @@ enum { HOPS_MAX = 100, SWING_STEPS = 1000 };
 
 typedef struct walker {
     const ebpo_mesh *mesh;
-    uint64_t *face_begin;   /* [vertex_count + 1] offsets into `around` */
+    uint64_t *face_begin;   /* [vertex_count + 1] offsets into `vertex_faces` */
     uint32_t *vertex_faces; /* faces around each vertex */
     uint64_t random;
     uint64_t face;
@@ -55,7 +55,7 @@ static void add_scaled(double v[3], double s, const double w[3])
         v[k] += s * w[k];
 }
 
-/* Returns false if there is no direction. */
+/* Makes the vector a unit vector. Returns false if it is 0 or not finite. */
 static bool normalise_vector(double v[3])
 {
     double most = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
@@ -95,8 +95,8 @@ static void read_vertex(const ebpo_mesh *m, uint32_t number, double out[3])
                           : m->xyz64[3 * (uint64_t)number + (unsigned)k];
 }
 
-/* Returns the corner of `face` from which its edge from a to b (or, with `any`, from b to a)
- * starts; -1: it has none. */
+/* Returns the corner of `face` at which its edge from a to b (or, with `any`, from b to a) starts;
+ * -1: the face has no such edge. */
 static int edge_corner(const ebpo_mesh *m, uint64_t face, uint32_t a, uint32_t b, bool any)
 {
     const uint32_t *f = m->faces + 3 * face;
@@ -106,8 +106,8 @@ static int edge_corner(const ebpo_mesh *m, uint64_t face, uint32_t a, uint32_t b
     return -1;
 }
 
-/* Returns the face beyond the edge from a to b, preferring the opposite edge; UINT64_MAX: there is
- * none. `third`: its other corner. */
+/* Returns the face beyond the edge from a to b, if possible a face with the edge from b to a;
+ * UINT64_MAX: there is none. *third: the other corner of the face. */
 static uint64_t find_neighbour(const walker *w, uint32_t a, uint32_t b, uint32_t *third)
 {
     for (int any = 0; any < 2; any++)
@@ -124,7 +124,7 @@ static uint64_t find_neighbour(const walker *w, uint32_t a, uint32_t b, uint32_t
 
 /* --- the walk --- */
 
-/* Returns false for a face without area. */
+/* Sets the face of the walk. Returns false if the face has no area. */
 static bool enter_face(walker *w, uint64_t face)
 {
     double e0[3], e1[3];
@@ -146,7 +146,7 @@ static void place_on_face(walker *w)
     normalise_vector(w->d);
 }
 
-/* Moves to a random face with an area; returns false when a thousand have none. */
+/* Moves to a random face with an area. Returns false if a thousand faces have no area. */
 static bool place_randomly(walker *w)
 {
     for (int i = 0; i < 1000; i++)
@@ -157,8 +157,8 @@ static bool place_randomly(walker *w)
     return false;
 }
 
-/* Returns the distance to the edge i of the face in the direction of the walk; infinity when the
- * walk leads away from the edge. *inward: unit normal of the edge in the plane. */
+/* Returns the distance to the edge i of the face in the direction of the walk; infinity: the walk
+ * leads away from the edge. *inward: unit normal of the edge in the plane of the face. */
 static double edge_distance(const walker *w, int i, double inward[3])
 {
     double edge[3], from[3];
@@ -199,7 +199,7 @@ static bool cross_edge(walker *w, int i)
     return normalise_vector(w->d) || place_randomly(w);
 }
 
-static bool advance_walker(walker *w, double left)
+static bool advance_walker(walker *w, double remaining)
 {
     for (int hop = 0; hop < HOPS_MAX; hop++) {
         int nearest = 0;
@@ -211,10 +211,10 @@ static bool advance_walker(walker *w, double left)
                 nearest = i;
             }
         }
-        double now = fmin(distance, left);
-        add_scaled(w->p, now, w->d);
-        left -= now;
-        if (!(left > 0) || isinf(distance))
+        double length = fmin(distance, remaining);
+        add_scaled(w->p, length, w->d);
+        remaining -= length;
+        if (!(remaining > 0) || isinf(distance))
             return true;
         if (!cross_edge(w, nearest))
             return false;

@@ -16,7 +16,8 @@ static void read_vertex(const ebpo_mesh *mesh, uint64_t i, double out[3])
         out[k] = mesh->xyz32 ? (double)mesh->xyz32[3 * i + k] : mesh->xyz64[3 * i + k];
 }
 
-/* At azimuth 0 the eye looks along -z when y is up, along y when z is up, along -z when x is up. */
+/* Sets the axes of the camera. At azimuth 0 the eye looks along -z if y is up, along y if z is up,
+ * along -z if x is up. */
 static void aim_camera(camera *c, double azimuth, double elevation, int up_axis)
 {
     static const double rights[3][3] = { { 0, -1, 0 }, { 1, 0, 0 }, { 1, 0, 0 } };

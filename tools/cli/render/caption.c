@@ -69,7 +69,8 @@ bool picture_has_captions(void)
     return loaded != MISSING;
 }
 
-/* *good: false when memory was short. */
+/* Returns a surface with the coverage of the text. *success: false if there is not enough memory.
+ */
 static cairo_surface_t *text_coverage(int width, int height, const char *text, bool *success)
 {
     cairo_surface_t *surface = lib.image_surface_create(CAIRO_FORMAT_A8, width, height);
@@ -106,8 +107,8 @@ ebpo_status picture_caption(picture *p, int x, int y, int width, int height,
     if (loaded == MISSING)
         return EBPO_OK;
     if (loaded == FAILED)
-        return no_memory("libcairo, which draws captions, cannot be loaded: memory is short, or "
-                         "the library damaged",
+        return no_memory("libcairo, which draws captions, cannot be loaded: there is not enough "
+                         "memory, or the library is damaged",
                          error);
     cairo_surface_t *surface = text_coverage(width, height, text, &success);
     const unsigned char *row = success ? lib.image_surface_get_data(surface) : NULL;

@@ -9,25 +9,26 @@ typedef struct picture {
     uint8_t *rgb; /* [height][width][3] */
 } picture;
 
-/* Makes a picture of one colour. Returns false if memory is short. */
+/* Makes a picture of one colour. Returns false if there is not enough memory. */
 bool picture_make(picture *out, int width, int height, const uint8_t colour[3]);
 void picture_free(picture *p);
 
 /* Returns true if this build can draw text (cairo); otherwise captions are omitted. */
 bool picture_has_captions(void);
-/* Draws text in the middle of a rectangle in the picture. EBPO_E_MEMORY, also when the library for
- * text is installed and could not be loaded. */
+/* Draws text in the middle of a rectangle in the picture. EBPO_E_MEMORY: there is not enough
+ * memory, or the library that draws text is installed but cannot be loaded. */
 EBPO_MUST_USE ebpo_status picture_caption(picture *p, int x, int y, int width, int height,
                                           const uint8_t colour[3], const char *text,
                                           ebpo_error *error);
 
-/* Encodes a PNG in memory, to be freed: `channels` 3 (RGB) or 4 (RGB and opacity), 8 bits each,
- * rows from the top. `what` is for messages. */
+/* Encodes pixels as a PNG in memory, which the caller frees. channels: 3 (RGB) or 4 (RGB and
+ * opacity), of 8 bits; rows from the top. what: name for messages. */
 EBPO_MUST_USE ebpo_status picture_encode_png(const uint8_t *pixels, int width, int height,
                                              int channels, const char *what, void **bytes,
                                              size_t *size, ebpo_error *error);
 
-/* Returns a PNG in memory as "data:image/png;base64,...", to be freed; NULL: no memory. */
+/* Returns a PNG in memory as "data:image/png;base64,...", which the caller frees. Returns NULL if
+ * there is not enough memory. */
 char *picture_data_uri(const uint8_t *bytes, size_t size);
 
 /* Writes a PNG file; replaces it atomically. */

@@ -48,7 +48,7 @@ static void cross_product(const double a[3], const double b[3], double out[3])
     out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-/* Converts to camera axes: x right, y up, z towards the eye, from the target. */
+/* Converts vertex i to camera axes: x right, y up, z towards the eye, from the target. */
 static void to_camera(const raster *r, uint64_t i, double out[3])
 {
     double v[3];
@@ -207,15 +207,17 @@ static void sample_position(const raster *r, int x, int y, double inverse, doubl
 }
 
 /* Returns the hidden share of the sky near a sample, 0 .. 1. It is estimated from points on a
- * spiral around the sample that are above the plane of the sample. */
+ * spiral around the sample that are above the plane of the sample. max_distance: radius of the
+ * spiral, in the unit of the model. */
 static double sky_hidden(const raster *r, int x, int y, const sample *at, const float n[3],
-                         double reach)
+                         double max_distance)
 {
     double p[3], sum = 0;
     sample_position(r, x, y, at->inverse, p);
     uint32_t hash = ((uint32_t)x * 73856093u ^ (uint32_t)y * 19349663u) * 2654435761u;
     const double *turn = r->turn[hash >> 24];
-    double radius = reach * r->focal * at->inverse, tx = radius * turn[0], ty = radius * turn[1];
+    double radius = max_distance * r->focal * at->inverse, tx = radius * turn[0],
+           ty = radius * turn[1];
     for (int i = 0; i < OCCLUSION_STEPS; i++) {
         const double *s = r->spiral[i];
         int qx = x + (int)(tx * s[0] - ty * s[1]), qy = y + (int)(tx * s[1] + ty * s[0]);
@@ -232,7 +234,7 @@ static double sky_hidden(const raster *r, int x, int y, const sample *at, const 
             continue;
         double square = dot_product(v, v), above = height / sqrt(square) - 0.08;
         if (above > 0)
-            sum += above / (1 + square / (reach * reach));
+            sum += above / (1 + square / (max_distance * max_distance));
     }
     double hidden = 2.4 * sum / OCCLUSION_STEPS;
     return hidden > 1 ? 1 : hidden;
@@ -284,8 +286,8 @@ static void colour_at(const raster *r, int x, int y, const sample *at, double ou
     }
 }
 
-/* Gets the normal for the light of a sample: the normal of the face, or the mean of the normals of
- * its vertices. */
+/* Computes the normal for the light of a sample: the normal of the face, or the mean of the normals
+ * of its vertices. */
 static void normal_at(const raster *r, int x, int y, const sample *at, double out[3])
 {
     uint32_t face = at->triangle & ~OUTLINE_BIT;
@@ -324,7 +326,7 @@ static void light_sample(const raster *r, int x, int y, const sample *at, double
     double k = fmax(0, dot_product(m, key)), f = fmax(0, dot_product(m, fill)),
            sky = 0.5 + 0.5 * m[1];
     double gloss = fmax(0, dot_product(m, half));
-    for (int i = 0; i < 5; i++) /* to the 32nd */
+    for (int i = 0; i < 5; i++) /* the 32nd power */
         gloss *= gloss;
     gloss *= 0.12;
     double open = 1 - 0.85 * hidden, direct = 1 - 0.45 * hidden;
@@ -345,10 +347,10 @@ static double to_linear(int v)
 static void make_tables(raster *r)
 {
     for (int i = 0; i < OCCLUSION_STEPS; i++) {
-        double thread_rows = (i + 0.5) / OCCLUSION_STEPS,
-               angle = i * 2.399963; /* the golden angle */
-        r->spiral[i][0] = thread_rows * cos(angle);
-        r->spiral[i][1] = thread_rows * sin(angle);
+        double radius = (i + 0.5) / OCCLUSION_STEPS;
+        double angle = i * 2.399963; /* the golden angle */
+        r->spiral[i][0] = radius * cos(angle);
+        r->spiral[i][1] = radius * sin(angle);
     }
     for (int i = 0; i < 256; i++) {
         r->turn[i][0] = cos(i * M_PI / 128);
@@ -363,7 +365,7 @@ static uint8_t to_srgb(double v)
     return (uint8_t)(s <= 0 ? 0 : s >= 1 ? 255 : s * 255 + 0.5);
 }
 
-static void resolve_pixel(const raster *r, int x, int y, double reach, uint8_t *rgb)
+static void resolve_pixel(const raster *r, int x, int y, double max_distance, uint8_t *rgb)
 {
     static const double ink[3] = { 0.03, 0.04, 0.06 };
     double sum[3] = { 0, 0, 0 };
@@ -373,7 +375,8 @@ static void resolve_pixel(const raster *r, int x, int y, double reach, uint8_t *
             double c[3] = { r->linear[rgb[0]], r->linear[rgb[1]], r->linear[rgb[2]] };
             if (at->inverse > 0) {
                 uint32_t face = at->triangle & ~OUTLINE_BIT;
-                light_sample(r, i, j, at, sky_hidden(r, i, j, at, r->normal[face], reach), c);
+                light_sample(r, i, j, at, sky_hidden(r, i, j, at, r->normal[face], max_distance),
+                             c);
                 for (int k = 0; k < 3 && at->triangle & OUTLINE_BIT; k++)
                     c[k] = 0.45 * c[k] + 0.55 * ink[k];
             }
@@ -396,10 +399,10 @@ typedef struct thread_rows {
 static void *resolve_rows(void *argument)
 {
     const thread_rows *s = argument;
-    double reach = 0.10 * s->r->view->distance * s->r->view->tangent;
+    double max_distance = 0.10 * s->r->view->distance * s->r->view->tangent;
     for (int j = (int)s->number; j < s->height; j += (int)s->threads)
         for (int i = 0; i < s->width; i++)
-            resolve_pixel(s->r, i, j, reach,
+            resolve_pixel(s->r, i, j, max_distance,
                           s->out->rgb + 3 * ((size_t)(s->y + j) * (size_t)s->out->width +
                                              (size_t)(s->x + i)));
     return NULL;

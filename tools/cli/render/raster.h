@@ -13,13 +13,14 @@ typedef struct camera {
     double tangent;                  /* tangent of half the vertical angle of view */
 } camera;
 
-/* Looks from azimuth and elevation (degrees) with `up_axis` (0 x, 1 y, 2 z) upwards, at the
- * distance at which the vertices of the mesh just fit a picture of that size. The mesh has at least
- * one face. */
+/* Sets the camera so that it looks from azimuth and elevation (degrees) with `up_axis` (0 x, 1 y, 2
+ * z) upwards, from the least distance at which all vertices of the mesh are in a picture of that
+ * size. The mesh must have at least one face. */
 void camera_fit(camera *out, const ebpo_mesh *mesh, double azimuth, double elevation, int up_axis,
                 int width, int height);
 
-/* Painting of a face; with RASTER_HOLLOW it is drawn only where its back is visible. */
+/* Values of raster_style.paint. A face with the bit RASTER_HOLLOW is drawn only where its back is
+ * visible. */
 enum { RASTER_PLAIN = 0, RASTER_OTHER = 1, RASTER_RED = 2, RASTER_HOLLOW = 4 };
 
 typedef struct raster_style {
@@ -36,8 +37,8 @@ typedef struct raster_style {
     const float *vertex_normals;
 } raster_style;
 
-/* Draws the mesh over the rectangle (x, y, width, height) of the picture. `threads` 1 to 64; the
- * picture does not depend on their number. */
+/* Draws the mesh over the rectangle (x, y, width, height) of the picture. threads: 1 to 64; the
+ * picture does not depend on this number. */
 EBPO_MUST_USE ebpo_status raster_draw(picture *out, int x, int y, int width, int height,
                                       const camera *view, const ebpo_mesh *mesh,
                                       const raster_style *style, unsigned threads,

@@ -9,6 +9,6 @@ typedef struct page_part {
     size_t size;
 } page_part;
 
-extern const page_part page_parts[]; /* the last one has no name */
+extern const page_part page_parts[]; /* the name of the last element is NULL */
 
 #endif

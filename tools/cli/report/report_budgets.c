@@ -1,12 +1,12 @@
-/* Measures distances under a memory budget. The part of the model in memory gives an interval at
- * once; the exact result loads subtrees. */
+/* Measures distance queries under a memory budget. The part of the model in memory gives an
+ * interval without loading; an exact query loads subtrees. */
 #include <stdio.h>
 #include <stdlib.h>
 
 #include "cli/bench/bench_run.h"
 #include "cli/report/report_data.h"
 
-/* Maximum number of points; loading subtrees takes time. */
+/* Maximum number of points; it is small, as loading subtrees takes time. */
 enum { BUDGET_POINTS = 500 };
 
 static ebpo_status query_within_budget(const comparison *c, ebpo_model *model, int cut, double *f,

@@ -110,7 +110,7 @@ typedef struct metric_name {
     const char *name, *unit;
     bool timed; /* the value differs from run to run */
     const char *meaning;
-    /* why it may be absent, when no note of the method gives a reason */
+    /* why the value may be absent; used if no note of the method gives a reason */
     const char *absent;
 } metric_name;
 extern const metric_name level_metrics[LEVEL_METRICS], whole_metrics[WHOLE_METRICS],
@@ -182,7 +182,7 @@ typedef struct comparison {
     const report_values *v;
     plane_setting setting[SETTINGS_MAX];
     int settings;
-    int first, last; /* levels that are measured; last is at most the last level of a method */
+    int first, last; /* levels to measure; a method that has fewer levels ends earlier */
     double azimuth, elevation;
     method *methods; /* [count] */
     int count;
@@ -212,8 +212,8 @@ void comparison_free(comparison *c);
  */
 void report_stem(const char *path, char *out, size_t capacity);
 
-/* Adds a note, once, why a build or a file has no results of a kind, and returns EBPO_OK. For
- * failures that are no such reason, returns `status`. */
+/* If `status` is a reason why a build or a file has no results of a kind, adds a note with this
+ * reason, unless the note exists, and returns EBPO_OK. Otherwise returns `status`. */
 ebpo_status method_note_missing(method *m, const char *what, ebpo_status status, ebpo_error *error);
 
 /* Sorts the values, and returns the quantile `share` (0 .. 1): the least value that at most 1 -
@@ -245,16 +245,18 @@ EBPO_MUST_USE ebpo_status report_pictures(comparison *c, ebpo_error *error);
  * code; errors have been reported on stderr. */
 int report_find_methods(comparison *c, const char *const *operand);
 
-/* Output. */
+/* Write the report as CSV, JSON and HTML. */
 void report_csv(FILE *out, const comparison *c);
 void report_to_json(FILE *out, const comparison *c, bool in_page); /* in_page: see json.h */
 void report_page(FILE *out, const comparison *c);
-/* Returns why this build writes no page and how to get one, or NULL when it does. */
+/* Returns why this build writes no page, and how to get a build that does. Returns NULL if this
+ * build writes the page. */
 const char *report_page_missing(void);
 
-/* "Intel(R) Xeon(R) Processor @ 2.50GHz", "" when not known; borrowed. */
+/* Returns the name of the processor, such as "Intel(R) Xeon(R) Processor @ 2.50GHz", or "" if it is
+ * not known. The string is static. */
 const char *machine_processor(void);
-/* Number of cores that this process may use. */
+/* Returns the number of cores that this process may use. */
 unsigned machine_cores(void);
 
 #endif

@@ -1,5 +1,5 @@
-/* Measures the best distance before a deadline: the width of the certain interval, and the time
- * taken. */
+/* Measures distance queries with a deadline: the width of the certain interval, and the time taken.
+ */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -43,7 +43,7 @@ static void note_timing(const comparison *c, timing *t, double *f)
     f[METRIC_DEADLINE_WIDTH_P99] = quantile_of(t->width, c->points, 0.99);
     f[METRIC_DEADLINE_TOOK_MEDIAN] = quantile_of(t->took, c->points, 0.5);
     f[METRIC_DEADLINE_TOOK_P99] = quantile_of(t->took, c->points, 0.99);
-    f[METRIC_DEADLINE_TOOK_MAX] = t->took[c->points - 1]; /* they are sorted here */
+    f[METRIC_DEADLINE_TOOK_MAX] = t->took[c->points - 1]; /* quantile_of has sorted them */
 }
 
 ebpo_status report_deadlines(comparison *c, method *m, ebpo_model *model, int round,
@@ -56,7 +56,7 @@ ebpo_status report_deadlines(comparison *c, method *m, ebpo_model *model, int ro
     ebpo_status status = ebpo_context_new(model, &context, error);
     if (status == EBPO_OK && (!t.width || !t.took)) {
         snprintf(error->message, sizeof error->message,
-                 "not enough memory for the points; give fewer with --points");
+                 "not enough memory for the points; use fewer --points");
         status = error->status = EBPO_E_MEMORY;
     }
     for (int i = 0; i < DEADLINES && status == EBPO_OK; i++) {

@@ -12,7 +12,7 @@
 static ebpo_status no_memory(ebpo_error *error)
 {
     snprintf(error->message, sizeof error->message,
-             "not enough memory for the points; give fewer with --points");
+             "not enough memory for the points; use fewer --points");
     return error->status = EBPO_E_MEMORY;
 }
 
@@ -53,7 +53,7 @@ static uint64_t pick_by_sum(const double *sums, uint64_t count, double value)
 }
 
 /* Generates a point in a ball around a point that is uniform on the surface. */
-static void near_point(const ebpo_mesh *mesh, const double *sums, double reach, uint64_t *random,
+static void near_point(const ebpo_mesh *mesh, const double *sums, double radius, uint64_t *random,
                        double out[3])
 {
     uint64_t face =
@@ -70,7 +70,7 @@ static void near_point(const ebpo_mesh *mesh, const double *sums, double reach, 
             d[k] = 2 * bench_random_unit(random) - 1;
     while (d[0] * d[0] + d[1] * d[1] + d[2] * d[2] > 1);
     for (int k = 0; k < 3; k++)
-        out[k] = p[0][k] + s * (p[1][k] - p[0][k]) + t * (p[2][k] - p[0][k]) + reach * d[k];
+        out[k] = p[0][k] + s * (p[1][k] - p[0][k]) + t * (p[2][k] - p[0][k]) + radius * d[k];
 }
 
 static ebpo_status make_near(comparison *c, const method *m, ebpo_error *error)
@@ -125,7 +125,7 @@ typedef struct level_queries {
     ebpo_distance_result *distance;
     double *width;
     round_times *round;
-    bool first; /* round: later ones only measure times */
+    bool first; /* first round; later rounds only measure times */
 } level_queries;
 
 /* Measures nanoseconds per point; results are in a->distance or a->inside. */

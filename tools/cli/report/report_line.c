@@ -12,11 +12,11 @@
 /* as in the library for URLs: bytes fetched when opening, and the size of later blocks */
 enum { HEAD_BYTES = 128 << 10, BLOCK_BYTES = 4096 };
 
-/* One thread reads, so there is no lock. */
+/* A simulated network connection. Only one thread reads, so there is no lock. */
 typedef struct simulated_line {
     int file;
     uint64_t size, bytes;
-    uint64_t trips;         /* completed */
+    uint64_t trips;         /* number of completed round trips */
     uint32_t *arrival_trip; /* for each block: the round trip that brings it; 0: not requested */
 } simulated_line;
 
@@ -42,12 +42,13 @@ static ebpo_status read_range(void *user, uint64_t offset, uint64_t size, void *
     uint64_t arrival = request_blocks(l, offset, size), done = 0;
     l->trips = arrival > l->trips ? arrival : l->trips;
     while (done < size) {
-        ssize_t got = pread(l->file, (char *)data + done, size - done, (off_t)(offset + done));
-        if (got <= 0) {
+        ssize_t read_bytes =
+            pread(l->file, (char *)data + done, size - done, (off_t)(offset + done));
+        if (read_bytes <= 0) {
             snprintf(error->message, sizeof error->message, "the file cannot be read");
             return error->status = EBPO_E_IO;
         }
-        done += (uint64_t)got;
+        done += (uint64_t)read_bytes;
     }
     return EBPO_OK;
 }
@@ -93,7 +94,7 @@ ebpo_status report_lines(comparison *c, method *m, ebpo_error *error)
     simulated_line l = { .file = -1 };
     ebpo_status status = EBPO_OK;
     if (ebpo_is_url(m->path)) {
-        method_note(m, "lines", "the file came over one; compare files on disk");
+        method_note(m, "network connections", "the file is remote; compare files on the disk");
         return EBPO_OK;
     }
     l.file = open(m->path, O_RDONLY | O_CLOEXEC);
@@ -105,7 +106,7 @@ ebpo_status report_lines(comparison *c, method *m, ebpo_error *error)
         l.arrival_trip = malloc((l.size / BLOCK_BYTES + 1) * sizeof *l.arrival_trip);
         if (!l.arrival_trip) {
             snprintf(error->message, sizeof error->message,
-                     "not enough memory for simulated lines");
+                     "not enough memory for simulated connections");
             status = error->status = EBPO_E_MEMORY;
         }
     }

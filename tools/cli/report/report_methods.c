@@ -47,7 +47,7 @@ static int read_facts(comparison *c, method *m)
     if (m == c->methods || same_model(&c->methods->info, &m->info))
         return EXIT_OK;
     fprintf(stderr,
-            "ebpo report: %s and %s are made of different meshes; a report compares files of one "
+            "ebpo report: %s and %s are made from different meshes; a report compares files of one "
             "model\n",
             remote_shown(c->methods->path), remote_shown(m->path));
     return EXIT_FAILED;
@@ -73,7 +73,8 @@ static int add_file(comparison *c, const char *path)
         return refuse_method("the name is too long", path);
     if (strpbrk(name, "/,\"\n"))
         return refuse_method(
-            "a method's name has no '/', comma, quotation mark or new line; give another --name",
+            "a method's name must not have a '/', comma, quotation mark or new line; give another "
+            "--name",
             name);
     for (int i = 0; i < c->count; i++)
         if (strcmp(c->methods[i].name, name) == 0)
@@ -130,7 +131,8 @@ static ebpo_status compute_unlimited(const comparison *c, mesh_input *p,
     return status;
 }
 
-/* The builder consumes the mesh, so it is read for each method. */
+/* Builds one file, or computes the levels without the limits of files. Reads the mesh for each
+ * method, because the builder consumes it. */
 static ebpo_status build_one(comparison *c, const char *mesh, int selection,
                              const plane_setting *setting, const char *path, bool unlimited,
                              build_result *out, ebpo_error *error)

@@ -35,7 +35,8 @@ static bool is_dot(const char *name) { return strcmp(name, ".") == 0 || strcmp(n
 static const char *const fixed_names[] = { "report.csv", "report.json", "report.html", NULL };
 #define MODEL_ENDING ".ebpo.h5"
 
-/* "inherit.ebpo.h5", "kmedoids-10%.ebpo.h5", "kmedoids-K0.5%.ebpo.h5" */
+/* Returns true for names such as "inherit.ebpo.h5", "kmedoids-10%.ebpo.h5" and
+ * "kmedoids-K0.5%.ebpo.h5". */
 static bool is_selection_file(const char *name)
 {
     size_t length = strlen(name), ending = strlen(MODEL_ENDING);
@@ -71,8 +72,8 @@ static bool is_operand(const char *folder, const char *name, const char *const *
     return false;
 }
 
-/* Checks the existing folder, which would be deleted: it must be a report and must not hold an
- * operand. */
+/* Checks the existing folder, which would be deleted: it must be a report, and no operand may be in
+ * it. */
 static int check_folder(const char *place, DIR *folder, const char *const *operand)
 {
     char text[600];
@@ -86,14 +87,14 @@ static int check_folder(const char *place, DIR *folder, const char *const *opera
         if (is_operand(place, name, operand)) {
             snprintf(text, sizeof text,
                      "is a folder with an input in it, '%.255s', and would be replaced; give "
-                     "another one with -o",
+                     "another folder with -o",
                      name);
             return fail_output(EXIT_USAGE, place, text);
         }
         if (!is_report_file(place, name)) {
             snprintf(text, sizeof text,
-                     "is a folder with other files than a report, '%.255s'; give another one "
-                     "with -o",
+                     "is a folder with a file that is not of a report, '%.255s'; give another "
+                     "folder with -o",
                      name);
             return fail_output(EXIT_FAILED, place, text);
         }
@@ -101,7 +102,8 @@ static int check_folder(const char *place, DIR *folder, const char *const *opera
     if (!empty && !report)
         return fail_output(
             EXIT_FAILED, place,
-            "is a folder without report.json, so it may be no report; give another one with -o");
+            "is a folder without report.json, so it may not be a report; give another folder with "
+            "-o");
     return EXIT_OK;
 }
 
@@ -113,21 +115,22 @@ static int check_place(const char *place, const char *const *operand)
     DIR *folder = S_ISDIR(st.st_mode) ? opendir(place) : NULL;
     if (!folder)
         return fail_output(EXIT_FAILED, place,
-                           "exists and is not a folder; give another one with -o");
+                           "exists and is not a folder; give another name with -o");
     int code = check_folder(place, folder, operand);
     closedir(folder);
     return code;
 }
 
 /* Removes the files, and the folder if it is then empty. */
-static bool remove_folder(const char *folder, bool ours_only)
+static bool remove_folder(const char *folder, bool report_files_only)
 {
     char path[8192];
     DIR *d = opendir(folder);
     if (!d)
         return false;
     for (struct dirent *entry; (entry = readdir(d));)
-        if (!is_dot(entry->d_name) && (!ours_only || is_report_file(folder, entry->d_name))) {
+        if (!is_dot(entry->d_name) &&
+            (!report_files_only || is_report_file(folder, entry->d_name))) {
             snprintf(path, sizeof path, "%s/%s", folder, entry->d_name);
             unlink(path);
         }
@@ -135,7 +138,8 @@ static bool remove_folder(const char *folder, bool ours_only)
     return rmdir(folder) == 0;
 }
 
-/* Called in a signal handler: only async-signal-safe calls. Names are known in advance. */
+/* Removes a file of the temporary folder. Called in a signal handler, so it uses only
+ * async-signal-safe calls, and does not list the folder. */
 static void abandon_file(const char *stem, const char *ending)
 {
     size_t length = strlen(temporary_folder);
@@ -158,7 +162,8 @@ static void abandon_files(void)
     rmdir(temporary_folder);
 }
 
-/* When memory for listing the folder is short, removes the files of a report by name. */
+/* If there is not enough memory to list the folder, removes the files of a report by their names.
+ */
 void output_remove(const char *folder)
 {
     if (folder[0] && !remove_folder(folder, false))
@@ -166,7 +171,7 @@ void output_remove(const char *folder)
     temporary_folder[0] = 0;
 }
 
-/* Uses a hidden name, as an existing report may be in the way, which the library would refuse. */
+/* Makes a folder with a hidden name: the library refuses the name of an existing report. */
 static bool make_folder(const char *place, size_t length, char *folder, size_t capacity)
 {
     char *making, hidden[4200];
@@ -211,7 +216,8 @@ int output_begin(const char *place, const char *const *operand, char *folder, si
     return EXIT_OK;
 }
 
-/* Reports files of the user that were added to the replaced report meanwhile. */
+/* Removes the replaced report, and reports files that the user has added to it since it was
+ * checked. */
 static bool report_other_files(const char *older)
 {
     if (!remove_folder(older, true))

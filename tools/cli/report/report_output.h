@@ -1,15 +1,15 @@
-/* Makes a temporary folder beside the folder `place` of a report, and gives it the name `place`
- * when it is complete. */
+/* Makes a temporary folder beside the folder `place` of a report, and renames it to `place` when it
+ * is complete. */
 #ifndef EBPO_TOOLS_REPORT_OUTPUT_H
 #define EBPO_TOOLS_REPORT_OUTPUT_H
 
 #include <stdbool.h>
 #include <stddef.h>
 
-/* Makes the folder. Returns an exit code; errors have been reported on stderr. EXIT_FAILED: `place`
- * exists and is not a report, or the folder cannot be made; EXIT_USAGE: one of the operands
- * (NULL-terminated) is in the report that would be replaced. A report: a folder with only files of
- * a report, including report.json. */
+/* Makes the temporary folder. Returns an exit code; errors have been reported on stderr.
+ * EXIT_FAILED: `place` exists and is not a report, or the folder cannot be made; EXIT_USAGE: one of
+ * the operands (NULL-terminated) is in the report that would be replaced. A folder is a report if
+ * all of its files have names of a report and it has report.json. */
 int output_begin(const char *place, const char *const *operand, char *folder, size_t capacity);
 /* Renames the folder to `place` and replaces an existing report. Returns false after a failure,
  * reported on stderr. */

@@ -20,7 +20,7 @@ static const page_part *find_part(const char *name, size_t length)
     return p;
 }
 
-/* Pictures by level: data URIs. */
+/* Writes the pictures, as data URIs, by their levels. */
 static void pictures_to_json(FILE *out, const comparison *c)
 {
     json j;

@@ -29,7 +29,7 @@ static ebpo_status no_memory(ebpo_error *error)
     return error->status = EBPO_E_MEMORY;
 }
 
-/* Computes a picture with opacity from the same picture on black and on white. */
+/* Computes the colours and the opacity of a picture that was drawn on black and on white. */
 static void make_transparent(const picture *black, const picture *white, uint8_t *rgba)
 {
     for (size_t i = 0; i < (size_t)black->width * (size_t)black->height; i++) {
@@ -84,29 +84,30 @@ static ebpo_status level_mesh(const comparison *c, ebpo_file *file, int level, e
     return ebpo_lod_level(file, level, &options, out, NULL, error);
 }
 
-/* All levels of all methods share one viewpoint, from which the coarsest level of each fits. */
+/* Sets the camera of all levels of all methods, so that the coarsest level of each method fits into
+ * the picture. */
 static ebpo_status fit_camera(const comparison *c, ebpo_file *const *file, camera *view,
                               ebpo_error *error)
 {
     ebpo_mesh all = { 0 };
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < c->count && status == EBPO_OK; i++) {
-        ebpo_mesh one = { 0 };
+        ebpo_mesh level = { 0 };
         if (c->first > method_last(c, &c->methods[i]))
             continue;
-        status = level_mesh(c, file[i], c->first, &one, error);
+        status = level_mesh(c, file[i], c->first, &level, error);
         double *both =
             status == EBPO_OK
-                ? realloc(all.xyz64, 3 * (all.vertex_count + one.vertex_count + 1) * sizeof *both)
+                ? realloc(all.xyz64, 3 * (all.vertex_count + level.vertex_count + 1) * sizeof *both)
                 : NULL;
         if (both) {
-            memcpy(both + 3 * all.vertex_count, one.xyz64, 3 * one.vertex_count * sizeof *both);
+            memcpy(both + 3 * all.vertex_count, level.xyz64, 3 * level.vertex_count * sizeof *both);
             all.xyz64 = both;
-            all.vertex_count += one.vertex_count;
+            all.vertex_count += level.vertex_count;
         } else if (status == EBPO_OK) {
             status = no_memory(error);
         }
-        ebpo_mesh_free(&one);
+        ebpo_mesh_free(&level);
     }
     if (status == EBPO_OK)
         camera_fit(view, &all, c->azimuth, c->elevation, c->v->up, TILE_WIDTH, TILE_HEIGHT);

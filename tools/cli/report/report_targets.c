@@ -11,7 +11,7 @@
 static const double errors[] = { 10, 3, 1, 0.3 }; /* percent of the diagonal */
 static const double sizes[] = { 3, 5, 10, 50 };   /* percent of the first file */
 
-/* Cuts the part for a viewer: envelopes without mesh. */
+/* Makes the subset for a viewer: envelopes without the mesh. */
 static ebpo_status cut_subset(const comparison *c, ebpo_file *file, const target_result *n,
                               const char *path, ebpo_error *error)
 {

@@ -15,13 +15,13 @@ enum { NORMAL_SPAN = 1023 }; /* -511 .. 511 */
 
 typedef struct cost_state {
     ebpo_mesh mesh;
-    uint8_t *normals, *faces, *vertices; /* bits: occurred before */
+    uint8_t *normals, *faces, *vertices; /* bit arrays; bit i: item i has occurred */
     /* [vertex_count] number of the last leaf with the vertex, from 1 */
     uint64_t *leaf_of;
     uint64_t leaves;
 } cost_state;
 
-/* Sets bit i; returns true when it was not set before. */
+/* Sets bit i. Returns true if it was not set before. */
 static bool mark_first(uint8_t *bits, uint64_t i)
 {
     bool before = bits[i >> 3] >> (i & 7) & 1;
@@ -107,14 +107,14 @@ ebpo_status report_thesis(comparison *c, method *m, ebpo_file *file, ebpo_error 
 {
     cost_state s = { .leaves = 0 };
     if (m->info.pruned) {
-        method_note(m, "theses' cost model", "is that of a whole tree; this file is a subset");
+        method_note(m, "theses' cost model", "applies to a whole tree; this file is a subset");
         return EBPO_OK;
     }
     ebpo_read_options read = reading_options(c->v->threads, NULL);
     ebpo_status status = ebpo_file_read_mesh(file, &read, &s.mesh, error);
     if (status == EBPO_OK && !begin_counting(&s)) {
         snprintf(error->message, sizeof error->message,
-                 "not enough memory for a mark on each face and vertex");
+                 "not enough memory for bits of all faces and vertices");
         status = error->status = EBPO_E_MEMORY;
     }
     if (status == EBPO_OK)

@@ -21,7 +21,7 @@ function leastOf(some, of) {
   return values.length ? Math.min(...values) : null;
 }
 
-// The middle one of the measured levels.
+// The middle level of the measured levels.
 const MIDDLE = levels[Math.floor(levels.length / 2)];
 
 // Returns the sum of the volumes of all levels, in percent of the solid (EBP 2017, chart 18).

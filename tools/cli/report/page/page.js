@@ -61,14 +61,14 @@ function tile(method, pictures, level) {
 
 // Makes a grid of pictures of some levels, with a row for each method.
 function strip(some, columns) {
-  const made = element('div', { className: 'strip' }, element('div', { className: 'level' }), ...some.map(levelName));
-  made.style.setProperty('--columns', columns);
+  const grid = element('div', { className: 'strip' }, element('div', { className: 'level' }), ...some.map(levelName));
+  grid.style.setProperty('--columns', columns);
   methods.forEach((m, i) => {
-    const who = element('div', { className: 'who' }, m.name);
-    who.style.color = `var(--m${i % METHOD_COLOURS})`;
-    made.append(who, ...some.map((level) => tile(m, drawn.levels[i], level)));
+    const methodName = element('div', { className: 'methodName' }, m.name);
+    methodName.style.color = `var(--m${i % METHOD_COLOURS})`;
+    grid.append(methodName, ...some.map((level) => tile(m, drawn.levels[i], level)));
   });
-  return made;
+  return grid;
 }
 
 function showPictures() {
@@ -90,8 +90,8 @@ function showNotes() {
   byId('missing').querySelector('ul').append(...notes.map((note) => element('li', {}, note)));
   for (const q of report.quantities)
     byId('quantities').append(element('dt', {}, `${q.name}, ${q.unit}`), element('dd', {}, q.meaning));
-  const made = `, version ${report.version}, in ${report.seconds.toFixed(0)} s.`;
-  document.querySelector('footer').append('Made by ', element('code', {}, 'ebpo report'), made);
+  const grid = `, version ${report.version}, in ${report.seconds.toFixed(0)} s.`;
+  document.querySelector('footer').append('Made by ', element('code', {}, 'ebpo report'), grid);
 }
 
 // Hides sections without a plot, and the table of the limit if no method has a solid.

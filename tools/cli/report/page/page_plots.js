@@ -43,7 +43,7 @@ const SENT_SO_FAR = {
 };
 const SENT = { name: 'bytes of the level', as: BYTE, of: (l) => l.bytes, dotted: (l) => l.thesis_bytes };
 
-// Axes of each plot; keys are the data-plot attributes of the page's figures.
+// Axes of each plot; the keys are the data-plot attributes of the <figure> elements of the page.
 const axesOf = {
   'volume-by-level': [LEVEL, ALL_KNOWN],
   'ratio-by-level': [LEVEL, RATIO],

@@ -43,7 +43,7 @@ function bytesUntil(method, goal) {
 function showGlance() {
   const columns = [
     bytes('file', 'file_bytes'), count('levels', 'levels_in_file'), count('planes', 'all_planes'),
-    ...[10, 3, 1].map((goal) => bytes(`≤ ${goal} %`, (m) => bytesUntil(m, goal), null, 'no measured level has so small an excess')),
+    ...[10, 3, 1].map((goal) => bytes(`≤ ${goal} %`, (m) => bytesUntil(m, goal), null, 'no measured level has an excess that small')),
     seconds('build', 'build_seconds'), seconds('load', 'open_seconds'),
     bytes('memory', 'memory_bytes'), nanoseconds('point in solid, exact', 'exact_inside_ns'),
     nanoseconds('distance, exact', 'exact_distance_ns'),
@@ -84,7 +84,7 @@ function targetTitle(target) {
     `error ≤ ${format.percent(ofDiagonal(target.max_error))}` : `size ≤ ${format.bytes(target.target_bytes)}`;
 }
 
-// Rows are the targets of the method that has most targets.
+// Shows the targets. The rows are the targets of the method with the greatest number of targets.
 function showTargets() {
   const most = methods.reduce((a, b) => (b.targets.length > a.targets.length ? b : a)).targets;
   const same = (n) => (o) => n.max_error === o.max_error && n.target_bytes === o.target_bytes;

@@ -99,7 +99,7 @@ function tooltip(x, y) {
   return { displayColors: false, callbacks: { title, label: ({ raw }) => [...say(y, raw.y), ...say(x, raw.x)] } };
 }
 
-// A method's dotted line goes with its other one.
+// Shows or hides both lines of a method, the continuous and the dotted line.
 function toggle(event, item, legend) {
   const { chart } = legend, shown = chart.isDatasetVisible(item.datasetIndex);
   chart.data.datasets.forEach((d, i) => d.label === item.text && chart.setDatasetVisibility(i, !shown));
@@ -146,7 +146,7 @@ function plot(figure, x, y, series) {
   return true;
 }
 
-// Must be called before the first plot. Redraws all plots when the system's colour scheme changes, and for printing.
+// Sets the font, and redraws all plots when the system's colour scheme changes, and for printing. Call before the first plot.
 function preparePlots() {
   Chart.defaults.font.family = getComputedStyle(document.body).fontFamily;
   for (const query of ['(prefers-color-scheme: dark)', 'print'])
