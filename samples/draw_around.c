@@ -11,7 +11,7 @@
 
 static bool write_faces(const ebpo_subtree_faces *faces, const char *path, ebpo_error *error)
 {
-    /* The arrays are lent, so this mesh is not freed. Its members are not const, but
+    /* The arrays belong to the subtree, so this mesh is not freed. Its members are not const, but
      * ebpo_mesh_write_ply does not change the arrays. */
     ebpo_mesh mesh = { .vertex_count = faces->vertex_count,
                        .face_count = faces->face_count,

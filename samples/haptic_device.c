@@ -26,7 +26,7 @@ typedef struct position_packet {
 typedef struct force_packet {
     char magic[4];
     uint16_t version, kind; /* 2 */
-    uint64_t sequence, tag; /* of the position to which this replies */
+    uint64_t sequence, tag; /* of the position packet to which this packet is the reply */
     double force[3], torque[3], proxy[3], turn[4], depth, lo, hi, normal[3];
     uint64_t face;
     uint32_t flags;
@@ -50,19 +50,19 @@ int main(int argc, char **argv)
     position_packet out = {
         "EBPT", 1, 1, 0, 0, { atof(argv[2]), atof(argv[3]), 0 }, { 0, 0, 0, 1 }
     };
-    force_packet in = { .depth = 0 }, most = in;
+    force_packet in = { .depth = 0 }, strongest = in;
     int replies = 0;
     for (int i = 0; i < STEPS; i++) {
-        int down = i < STEPS / 2 ? i : STEPS - i;
+        int depth_step = i < STEPS / 2 ? i : STEPS - i;
         out.sequence++;
-        out.place[2] =
-            atof(argv[4]) - atof(argv[5]) * down / (STEPS / 2); /* driver: read the position */
+        out.place[2] = atof(argv[4]) -
+                       atof(argv[5]) * depth_step / (STEPS / 2); /* driver: read the position */
         (void)send(s, &out, sizeof out, 0);
         struct pollfd waiting = { .fd = s, .events = POLLIN };
         while (poll(&waiting, 1, 0) > 0 && recv(s, &in, sizeof in, 0) == (ssize_t)sizeof in) {
             replies++;
-            if (in.force[2] > most.force[2]) /* driver: apply in.force */
-                most = in;
+            if (in.force[2] > strongest.force[2]) /* driver: apply in.force */
+                strongest = in;
         }
         nanosleep(&(struct timespec){ 0, 1000000 }, NULL);
     }
@@ -71,6 +71,7 @@ int main(int argc, char **argv)
     (void)send(s, &out, sizeof out, 0);
     close(s);
     printf("%s replies, %s force up, proxy at %.2f %.2f %.2f\n", replies > 0 ? "some" : "no",
-           most.force[2] > 0 ? "a" : "no", most.proxy[0], most.proxy[1], most.proxy[2]);
+           strongest.force[2] > 0 ? "a" : "no", strongest.proxy[0], strongest.proxy[1],
+           strongest.proxy[2]);
     return replies > 0 ? 0 : 1;
 }

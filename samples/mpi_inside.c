@@ -2,11 +2,11 @@
  *
  *     mpirun -n 4 mpi_inside MODEL.ebpo.h5 POINTS.raw RESULTS.raw [MEGABYTES]
  *
- * POINTS.raw holds three doubles for each point. RESULTS.raw gets two int32 for each, as `ebpo
+ * POINTS.raw has three doubles for each point. RESULTS.raw gets two int32 for each point, as `ebpo
  * inside --raw` prints them: location (0 outside, 1 inside, 2 on the surface) and winding number.
- * The bytes do not depend on the number of processes. Each process opens the model, within
- * MEGABYTES (default 256). An error of one process ends all processes, and the results are removed.
- */
+ * The results do not depend on the number of processes. Each process opens the model with at most
+ * MEGABYTES of memory (default 256). An error of one process ends all processes, and the results
+ * are removed. */
 #include <ebpo/ebpo.h>
 #include <mpi.h>
 #include <stdio.h>
@@ -17,14 +17,14 @@ enum { TOGETHER = 1 << 18 }; /* number of points of a process in each collective
 
 static int rank, ranks;
 
-/* Returns true if all processes are OK; a process that is not prints its error. Every process must
- * call this function. */
-static int all_ok(int fine, const char *what)
+/* Returns true if `ok` is true in all processes; a process in which it is false prints its error.
+ * Every process must call this function. */
+static int all_ok(int ok, const char *what)
 {
     int every;
-    if (!fine)
+    if (!ok)
         fprintf(stderr, "mpi_inside: process %d of %d: %s\n", rank, ranks, what);
-    MPI_Allreduce(&fine, &every, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
+    MPI_Allreduce(&ok, &every, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
     return every;
 }
 
@@ -48,19 +48,19 @@ static int query_ok(ebpo_status status, MPI_Offset first, const char *message)
     return all_ok(status == EBPO_OK, what);
 }
 
-/* Reads, queries and writes `count` points from `first` on, together with those of the other
- * processes. */
+/* Reads `count` points from index `first` on, queries them, and writes the results, together with
+ * the other processes. */
 static int query_range(ebpo_context *context, MPI_File in, MPI_File out, const char *const *paths,
                        MPI_Offset first, int count, double *points, ebpo_inside_result *results,
                        int *pairs)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    MPI_Status got;
+    MPI_Status read_status;
     int doubles = 0;
-    int code = MPI_File_read_at_all(in, first * 24, points, 3 * count, MPI_DOUBLE, &got);
+    int code = MPI_File_read_at_all(in, first * 24, points, 3 * count, MPI_DOUBLE, &read_status);
     if (!mpi_ok(code, paths[0]))
         return 0;
-    MPI_Get_count(&got, MPI_DOUBLE, &doubles);
+    MPI_Get_count(&read_status, MPI_DOUBLE, &doubles);
     if (!all_ok(doubles == 3 * count, "the points file became shorter during reading"))
         return 0;
     ebpo_inside_options options = EBPO_INSIDE_OPTIONS_INIT;
@@ -72,7 +72,7 @@ static int query_range(ebpo_context *context, MPI_File in, MPI_File out, const c
         pairs[2 * i] = (int)results[i].where;
         pairs[2 * i + 1] = results[i].winding;
     }
-    code = MPI_File_write_at_all(out, first * 8, pairs, 2 * count, MPI_INT, &got);
+    code = MPI_File_write_at_all(out, first * 8, pairs, 2 * count, MPI_INT, &read_status);
     return mpi_ok(code, paths[1]);
 }
 
@@ -84,16 +84,17 @@ static int query_all(ebpo_context *context, MPI_File in, MPI_File out, const cha
     double *points = malloc(sizeof *points * 3 * TOGETHER);
     ebpo_inside_result *results = malloc(sizeof *results * TOGETHER);
     int *pairs = malloc(sizeof *pairs * 2 * TOGETHER);
-    int fine = all_ok(points && results && pairs, "not enough memory");
-    for (MPI_Offset at = 0; fine && at < rows; at += (MPI_Offset)TOGETHER * ranks) {
-        MPI_Offset first = at + (MPI_Offset)TOGETHER * rank, left = first < rows ? rows - first : 0;
-        fine = query_range(context, in, out, paths, first, left < TOGETHER ? (int)left : TOGETHER,
-                           points, results, pairs);
+    int ok = all_ok(points && results && pairs, "not enough memory");
+    for (MPI_Offset at = 0; ok && at < rows; at += (MPI_Offset)TOGETHER * ranks) {
+        MPI_Offset first = at + (MPI_Offset)TOGETHER * rank,
+                   remaining = first < rows ? rows - first : 0;
+        ok = query_range(context, in, out, paths, first,
+                         remaining < TOGETHER ? (int)remaining : TOGETHER, points, results, pairs);
     }
     free(points);
     free(results);
     free(pairs);
-    return fine;
+    return ok;
 }
 
 /* Returns true if the output file is an input file, which writing would destroy. */
@@ -111,21 +112,21 @@ static int query_files(ebpo_context *context, const char *points, const char *ou
     MPI_Offset bytes = 0;
     if (!mpi_ok(MPI_File_open(MPI_COMM_WORLD, points, MPI_MODE_RDONLY, MPI_INFO_NULL, &in), points))
         return 0;
-    int fine = mpi_ok(MPI_File_get_size(in, &bytes), points) &&
-               all_ok(bytes % 24 == 0, "the points file does not contain rows of three doubles");
-    if (fine && mpi_ok(MPI_File_open(MPI_COMM_WORLD, output, MPI_MODE_WRONLY | MPI_MODE_CREATE,
-                                     MPI_INFO_NULL, &out),
-                       output)) {
-        fine = mpi_ok(MPI_File_set_size(out, bytes / 3), output) &&
-               query_all(context, in, out, paths, bytes / 24);
-        fine = mpi_ok(MPI_File_close(&out), output) && fine;
-        if (!fine && rank == 0)
+    int ok = mpi_ok(MPI_File_get_size(in, &bytes), points) &&
+             all_ok(bytes % 24 == 0, "the points file does not contain rows of three doubles");
+    if (ok && mpi_ok(MPI_File_open(MPI_COMM_WORLD, output, MPI_MODE_WRONLY | MPI_MODE_CREATE,
+                                   MPI_INFO_NULL, &out),
+                     output)) {
+        ok = mpi_ok(MPI_File_set_size(out, bytes / 3), output) &&
+             query_all(context, in, out, paths, bytes / 24);
+        ok = mpi_ok(MPI_File_close(&out), output) && ok;
+        if (!ok && rank == 0)
             MPI_File_delete(output, MPI_INFO_NULL);
     } else {
-        fine = 0;
+        ok = 0;
     }
     MPI_File_close(&in);
-    return fine;
+    return ok;
 }
 
 static int query_model(const char *const *path, double megabytes)
@@ -145,11 +146,11 @@ static int query_model(const char *const *path, double megabytes)
         status = ebpo_model_new(file, &options, &model, &error);
     if (status == EBPO_OK)
         status = ebpo_context_new(model, &context, &error);
-    int fine = all_ok(status == EBPO_OK, error.message) && query_files(context, path[1], path[2]);
+    int ok = all_ok(status == EBPO_OK, error.message) && query_files(context, path[1], path[2]);
     ebpo_context_free(context);
     ebpo_model_free(model);
     ebpo_close(file);
-    return fine;
+    return ok;
 }
 
 int main(int argc, char **argv)
@@ -159,13 +160,13 @@ int main(int argc, char **argv)
     MPI_Comm_size(MPI_COMM_WORLD, &ranks);
     char none[] = "", *end = none;
     double megabytes = argc == 5 ? strtod(argv[4], &end) : 256;
-    int fine = 0;
+    int ok = 0;
     if ((argc == 4 || argc == 5) && !*end && megabytes > 0 && megabytes < 1e9) {
         const char *const path[] = { argv[1], argv[2], argv[3] };
-        fine = query_model(path, megabytes);
+        ok = query_model(path, megabytes);
     } else if (rank == 0) {
         fprintf(stderr, "usage: mpi_inside MODEL.ebpo.h5 POINTS.raw RESULTS.raw [MEGABYTES]\n");
     }
     MPI_Finalize();
-    return fine ? 0 : 1;
+    return ok ? 0 : 1;
 }

@@ -34,27 +34,27 @@ int main(int argc, char **argv)
     double p[3];
     if (argc != 2)
         return fputs("usage: query MODEL.ebpo.h5 <points.txt\n", stderr), 2;
-    bool good = ebpo_open(argv[1], &file, &error) == EBPO_OK &&
-                ebpo_model_new(file, NULL, &model, &error) == EBPO_OK &&
-                ebpo_context_new(model, &context, &error) == EBPO_OK;
-    for (long number = 1; good && fgets(line, sizeof line, stdin); number++) {
+    bool ok = ebpo_open(argv[1], &file, &error) == EBPO_OK &&
+              ebpo_model_new(file, NULL, &model, &error) == EBPO_OK &&
+              ebpo_context_new(model, &context, &error) == EBPO_OK;
+    for (long number = 1; ok && fgets(line, sizeof line, stdin); number++) {
         int end = 0, count = sscanf(line, "%lf %lf %lf %n", &p[0], &p[1], &p[2], &end);
         if (count == EOF) /* an empty line */
             continue;
-        good = count == 3 && line[end] == 0;
-        if (good)
-            good = print_results(context, p, &error);
+        ok = count == 3 && line[end] == 0;
+        if (ok)
+            ok = print_results(context, p, &error);
         else
             snprintf(error.message, sizeof error.message, "line %ld: expected three numbers",
                      number);
     }
-    if (!good)
+    if (!ok)
         fprintf(stderr, "query: %s\n", error.message);
-    good = fflush(stdout) == 0 && !ferror(stdout) && good; /* detects a full disk */
+    ok = fflush(stdout) == 0 && !ferror(stdout) && ok; /* detects a full disk */
     if (ferror(stdout))
         perror("query: standard output");
     ebpo_context_free(context);
     ebpo_model_free(model);
     ebpo_close(file);
-    return !good;
+    return !ok;
 }

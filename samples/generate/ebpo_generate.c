@@ -32,8 +32,9 @@ static const char usage[] =
     "0.4), 0 to 0.2 (default 0.08)\n"
     "The output is a closed manifold if the base is one. Sphere and torus never intersect "
     "themselves: this is proved for each file\n"
-    "before it is written. The shape of a file may, if the base does or if parts of it are closer "
-    "than the roughness; tests/integration/crossing_faces checks it.\n";
+    "before it is written. A mesh made from a FILE may intersect itself, if the base does or if "
+    "parts of it are closer than the roughness;\n"
+    "tests/integration/crossing_faces checks it.\n";
 
 static bool parse_count(const char *name, const char *text, uint64_t most, uint64_t *out)
 {
@@ -61,7 +62,7 @@ static bool parse_height(const char *name, const char *text, double most, double
     return true;
 }
 
-/* Returns 0 to continue, 1 to stop with success, 2 for wrong usage. */
+/* Parses the command line. Returns 0 to continue, 1 to end with success, 2 for wrong usage. */
 static int parse(int argc, char **argv, settings *s)
 {
     static const struct option options[] = { { "base", required_argument, NULL, 'b' },
@@ -99,7 +100,7 @@ static int parse(int argc, char **argv, settings *s)
     return ok ? 0 : 2;
 }
 
-static bool out_of_reach(void)
+static bool fail_too_large(void)
 {
     fprintf(stderr,
             "ebpo-generate: not enough memory, or more than 2^32 - 2 faces; request fewer faces\n");
@@ -110,7 +111,7 @@ static bool refine(ebpo_mesh *mesh, const settings *s, bool round)
 {
     for (uint64_t i = 0; s->faces ? mesh->face_count < s->faces : i < s->subdivide; i++) {
         if (!ebpo_subdivide(mesh))
-            return out_of_reach();
+            return fail_too_large();
         if (round)
             ebpo_to_unit_sphere(mesh);
     }
@@ -124,9 +125,9 @@ static bool make_torus(ebpo_mesh *mesh, const settings *s)
         m = ceil(sqrt((double)s->faces / 5));
         m = m < 3 ? 3 : m;
         n = ceil((double)s->faces / 2 / m);
-        n = n < 8 ? 8 : n; /* with fewer the hole is too narrow for the proof */
+        n = n < 8 ? 8 : n; /* with fewer squares the hole is too narrow for the proof */
     }
-    return ebpo_make_torus(mesh, (uint32_t)n, (uint32_t)m) || out_of_reach();
+    return ebpo_make_torus(mesh, (uint32_t)n, (uint32_t)m) || fail_too_large();
 }
 
 static bool to_float(ebpo_mesh *mesh)
@@ -135,7 +136,7 @@ static bool to_float(ebpo_mesh *mesh)
         return true;
     mesh->xyz32 = malloc((mesh->vertex_count * 3 + 1) * sizeof *mesh->xyz32);
     if (!mesh->xyz32)
-        return out_of_reach();
+        return fail_too_large();
     for (uint64_t i = 0; i < 3 * mesh->vertex_count; i++)
         mesh->xyz32[i] = (float)mesh->xyz64[i];
     free(mesh->xyz64);
@@ -165,11 +166,11 @@ static bool read_base(ebpo_mesh *mesh, const settings *s)
     return to_float(mesh);
 }
 
-static bool keeps_clear(bool proved)
+static bool report_proof(bool proved)
 {
     if (!proved)
-        fprintf(stderr, "ebpo-generate: the faces may intersect with so few faces and so high a "
-                        "relief; request more faces, or less --relief or --roughness\n");
+        fprintf(stderr, "ebpo-generate: the faces may intersect, as there are too few faces for "
+                        "this relief; request more faces, or less --relief or --roughness\n");
     return proved;
 }
 
@@ -184,7 +185,7 @@ static bool generate(ebpo_mesh *mesh, const settings *s)
     } else if (strcmp(s->base, "sphere") == 0) {
         embedded = ebpo_embedded_sphere;
         if (!ebpo_make_icosahedron(mesh))
-            return out_of_reach();
+            return fail_too_large();
         if (!refine(mesh, s, true))
             return false;
     } else {
@@ -193,8 +194,8 @@ static bool generate(ebpo_mesh *mesh, const settings *s)
             return false;
     }
     if (!ebpo_displace(mesh, relief, s->roughness, s->seed))
-        return out_of_reach();
-    return !embedded || keeps_clear(embedded(mesh));
+        return fail_too_large();
+    return !embedded || report_proof(embedded(mesh));
 }
 
 int main(int argc, char **argv)

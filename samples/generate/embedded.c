@@ -2,8 +2,9 @@
 
 #include <math.h>
 
-/* Much larger than the sum of a dozen rounding errors of products of these coordinates, and much
- * smaller than the value for a face of a mesh of a billion faces. */
+/* Bound of rounding errors. It is much larger than the sum of a dozen rounding errors of products
+ * of these coordinates, and much smaller than the volume for a face of a mesh of a billion faces.
+ */
 static const double slack = 1e-14;
 
 typedef struct corners {
@@ -38,8 +39,9 @@ static double volume(const double *a, const double *b, const double *c)
     return dot(n, c);
 }
 
-/* Tests a face against a ray from `origin`. Returns 1: crossed, 0: not crossed, -1: too close to an
- * edge to decide. Faces that the line crosses behind the origin are not crossed. */
+/* Tests whether a ray from `origin` crosses a face. Returns 1 if it does, 0 if it does not, and -1
+ * if it is too close to an edge to decide. The part of the line behind the origin is not on the
+ * ray. */
 static int crossed(const corners *c, const double origin[3], const double direction[3])
 {
     double q[3][3], sides[3];
@@ -62,7 +64,8 @@ static int crossed(const corners *c, const double origin[3], const double direct
 }
 
 /* Returns true if the ray intersects exactly one face. */
-static bool leaves_once(const ebpo_mesh *mesh, const double origin[3], const double direction[3])
+static bool intersects_once(const ebpo_mesh *mesh, const double origin[3],
+                            const double direction[3])
 {
     uint64_t times = 0;
     for (uint64_t f = 0; f < mesh->face_count; f++) {
@@ -83,12 +86,13 @@ bool ebpo_embedded_sphere(const ebpo_mesh *mesh)
         if (!(volume(c.p[0], c.p[1], c.p[2]) > slack))
             return false;
     }
-    return leaves_once(mesh, centre, oblique);
+    return intersects_once(mesh, centre, oblique);
 }
 
-/* The points of the circle nearest to the face's points are on an arc between those nearest to two
- * of its corners. c^2 / 7 bounds the height of an arc of chord c <= 1 above the chord. This gives
- * the support of the arc in the direction of the normal, and the plane must be beyond it. */
+/* Returns true if the central circle is below the plane of the face where it is nearest to the
+ * face. The points of the circle nearest to the face's points are on an arc between those nearest
+ * to two of its corners. c^2 / 7 bounds the height of an arc of chord c <= 1 above the chord. This
+ * gives the support of the arc in the direction of the normal, and the plane must be beyond it. */
 static bool faces_outwards(const corners *c)
 {
     double centre[3][3], e[2][3], n[3], support = -INFINITY, longest = 0;
@@ -114,8 +118,8 @@ static bool faces_outwards(const corners *c)
 
 bool ebpo_embedded_torus(const ebpo_mesh *mesh)
 {
-    /* Outwards and up from the circle, in the half plane through the axis, so that the ray stays in
-     * it. */
+    /* The ray goes outwards and up from the circle, in a half plane that begins at the axis, and
+     * stays in this half plane. */
     const double x = 0.7431, y = sqrt(1 - x * x), origin[3] = { x, y, 0 },
                  oblique[3] = { 0.8 * x, 0.8 * y, 0.6 };
     for (uint64_t f = 0; f < mesh->face_count; f++) {
@@ -123,5 +127,5 @@ bool ebpo_embedded_torus(const ebpo_mesh *mesh)
         if (!faces_outwards(&c))
             return false;
     }
-    return leaves_once(mesh, origin, oblique);
+    return intersects_once(mesh, origin, oblique);
 }

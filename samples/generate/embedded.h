@@ -5,7 +5,7 @@
 #include <ebpo/mesh.h>
 
 /* Returns true for a closed mesh that certainly does not intersect itself. Returns false if it
- * does, or is too steep for this proof. Floats up to 4.
+ * does, or is too steep for this proof. Coordinates must be floats of at most 4.
  *
  * Proof: let a projection map all points of space except a few onto a smooth surface S, each along
  * its ray: onto the sphere from its centre, or onto the torus from the nearest point of its central

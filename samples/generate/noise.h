@@ -1,4 +1,5 @@
-/* Smooth noise by additions and multiplications only, so that it is the same on every machine. */
+/* Computes smooth noise by additions and multiplications only, so that it is the same on every
+ * machine. */
 #ifndef EBPO_SAMPLES_NOISE_H
 #define EBPO_SAMPLES_NOISE_H
 

@@ -73,7 +73,7 @@ bool ebpo_make_torus(ebpo_mesh *out, uint32_t n, uint32_t m)
     return true;
 }
 
-/* Midpoints by edge: open addressing, at most 3/4 full. */
+/* Hash table of the midpoints of edges: open addressing, at most 3/4 full. */
 typedef struct midpoints {
     uint64_t *keys;
     uint32_t *vertices;
@@ -146,13 +146,13 @@ void ebpo_to_unit_sphere(ebpo_mesh *mesh)
 }
 
 /* Sums over the faces around a vertex. */
-typedef struct around {
+typedef struct vertex_sums {
     float normal[3]; /* sum of unit normals */
     float length;    /* sum over the faces of two edges each */
     uint32_t edges;
-} around;
+} vertex_sums;
 
-static void look_around(const ebpo_mesh *mesh, around *all)
+static void sum_faces(const ebpo_mesh *mesh, vertex_sums *all)
 {
     for (uint64_t f = 0; f < mesh->face_count; f++) {
         const uint32_t *v = mesh->faces + 3 * f;
@@ -169,7 +169,7 @@ static void look_around(const ebpo_mesh *mesh, around *all)
         n[2] = e[0][0] * e[1][1] - e[0][1] * e[1][0];
         double size = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
         for (int k = 0; k < 3; k++) {
-            around *a = &all[v[k]];
+            vertex_sums *a = &all[v[k]];
             for (int i = 0; i < 3 && size > 0; i++)
                 a->normal[i] += (float)(n[i] / size);
             a->length += (float)(length[k] + length[(k + 2) % 3]);
@@ -194,7 +194,7 @@ static double extent(const ebpo_mesh *mesh)
 }
 
 /* Returns the shortest wavelength that a model of this mean edge length can represent smoothly. */
-static double fine_wave(const around *all, uint64_t count)
+static double fine_wave(const vertex_sums *all, uint64_t count)
 {
     double sum = 0;
     uint64_t edges = 0;
@@ -207,25 +207,25 @@ static double fine_wave(const around *all, uint64_t count)
 
 bool ebpo_displace(ebpo_mesh *mesh, double relief, double roughness, uint64_t seed)
 {
-    around *all = calloc(mesh->vertex_count ? mesh->vertex_count : 1, sizeof *all);
+    vertex_sums *all = calloc(mesh->vertex_count ? mesh->vertex_count : 1, sizeof *all);
     if (!all)
         return false;
-    look_around(mesh, all);
+    sum_faces(mesh, all);
     double size = extent(mesh), fine = fine_wave(all, mesh->vertex_count);
     for (uint64_t v = 0; v < mesh->vertex_count; v++) {
-        const around *a = &all[v];
+        const vertex_sums *a = &all[v];
         float *p = mesh->xyz32 + 3 * v;
         double at[3] = { p[0], p[1], p[2] }, n[3] = { a->normal[0], a->normal[1], a->normal[2] };
-        double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]), move = 0;
+        double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]), displacement = 0;
         if (!(length > 0) || a->edges == 0)
             continue;
         if (relief > 0)
-            move += relief * ebpo_noise_octaves(at, size / 4, size / 32, seed);
+            displacement += relief * ebpo_noise_octaves(at, size / 4, size / 32, seed);
         if (roughness > 0)
-            move += roughness * a->length / a->edges *
-                    ebpo_noise_octaves(at, 4 * fine, fine, seed + 100);
-        set3(p, at[0] + move * n[0] / length, at[1] + move * n[1] / length,
-             at[2] + move * n[2] / length);
+            displacement += roughness * a->length / a->edges *
+                            ebpo_noise_octaves(at, 4 * fine, fine, seed + 100);
+        set3(p, at[0] + displacement * n[0] / length, at[1] + displacement * n[1] / length,
+             at[2] + displacement * n[2] / length);
     }
     free(all);
     return true;

@@ -1,5 +1,5 @@
-/* Base meshes and their refinement. Functions return false if memory is short or 2^32 - 2 faces are
- * exceeded. Coordinates are floats. */
+/* Makes base meshes and refines them. Functions return false if there is not enough memory, or if
+ * there would be more than 2^32 - 2 faces. Coordinates are floats. */
 #ifndef EBPO_SAMPLES_SHAPES_H
 #define EBPO_SAMPLES_SHAPES_H
 
