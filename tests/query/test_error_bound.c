@@ -40,8 +40,8 @@ static ebpo_error_bound error_bound(query_model *m, int level, double tolerance,
 static void check_level(query_model *m, int level)
 {
     ebpo_error_bound d = error_bound(m, level, 0.05, 500, 1);
-    double reference =
-               reference_reach(m->file, level, &m->mesh, m->info.solid, 400, (uint64_t)level),
+    double reference = reference_max_distance(m->file, level, &m->mesh, m->info.solid, 400,
+                                              (uint64_t)level),
            slack = 1e-9 * (m->size + m->largest);
     ck_assert_msg(reference <= d.hi + slack,
                   "%s, %s, level %d: %.17g found, at most %.17g certified", m->name, m->variant,
@@ -196,7 +196,7 @@ START_TEST(test_error_bound_shrinks_with_level)
         reported = with.hi;
         alone = without.hi;
         ck_assert(reported >=
-                  reference_reach(m.file, level, &m.mesh, true, 100, 1) - 1e-9 * m.size);
+                  reference_max_distance(m.file, level, &m.mesh, true, 100, 1) - 1e-9 * m.size);
     }
     query_model_free(&m);
 }
@@ -235,7 +235,7 @@ START_TEST(test_error_bound_scales_with_model)
     for (int level = 0; level < m.info.level_count; level++) {
         ebpo_error_bound d = error_bound(&m, level, 0.05, 0, 1);
         ck_assert_msg(d.hi <= 1.05 * d.lo + 1e-4, "level %d: %g to %g", level, d.lo, d.hi);
-        ck_assert(d.hi + 1e-6 >= reference_reach(m.file, level, &m.mesh, true, 200, 1));
+        ck_assert(d.hi + 1e-6 >= reference_max_distance(m.file, level, &m.mesh, true, 200, 1));
     }
     query_model_free(&m);
     query_model_free(&unit);

@@ -141,8 +141,8 @@ static void check_requested_errors(query_model *m, uint32_t parts)
         result_make(&r, m, first ? "a" : e < coarsest / 4 ? "c" : "b", &o);
         verify(&r);
         double hi = reach(m, r.file, r.info->level_count - 1),
-               reference = reference_reach(r.file, r.info->level_count - 1, &m->mesh, m->info.solid,
-                                           300, 1);
+               reference = reference_max_distance(r.file, r.info->level_count - 1, &m->mesh,
+                                                  m->info.solid, 300, 1);
         ck_assert_msg(hi <= e * 1.06 + 1e-5 * m->size, "%s: requested error %g, upper bound %g",
                       m->name, e, hi);
         ck_assert_msg(reference <= e + 1e-9 * m->size, "%s: requested error %g, reference %g",

@@ -59,22 +59,22 @@ uint64_t changeable_get(const changeable *c, ebpo_array_id id, uint64_t item)
     return value;
 }
 
-/* Updates the checksum after the bytes of a chunk; returns it. */
-static uint32_t seal(changeable *c, ebpo_chunk_location chunk)
+/* Updates the checksum at the end of a chunk. Returns the checksum. */
+static uint32_t update_checksum(changeable *c, ebpo_chunk_location chunk)
 {
     uint8_t *end = c->data + chunk.address + chunk.bytes - 4;
     ebpo_store32(end, ebpo_fletcher32(c->data + chunk.address, chunk.bytes - 4));
     return ebpo_load32(end);
 }
 
-/* Updates the list of chunk checksums, too. */
-static void seal_sum(changeable *c, const ebpo_array_in *a, uint64_t chunk, uint32_t sum)
+/* Sets the checksum of a chunk in the list of chunk checksums, if the file has the list. */
+static void update_list(changeable *c, const ebpo_array_in *a, uint64_t chunk, uint32_t sum)
 {
     const ebpo_array_in *list = array_of(c, EBPO_A_CHUNK_CHECKSUMS);
     if (!c->file->has_checksums || ebpo_schema_is_list(a->id))
         return;
     ebpo_store32(c->data + list->chunks[0].address + 8 * (a->first_checksum + chunk), sum);
-    (void)seal(c, list->chunks[0]);
+    (void)update_checksum(c, list->chunks[0]);
 }
 
 uint64_t changeable_put(changeable *c, ebpo_array_id id, uint64_t item, uint64_t value)
@@ -84,6 +84,6 @@ uint64_t changeable_put(changeable *c, ebpo_array_id id, uint64_t item, uint64_t
     uint8_t *at = item_at(c, a, item, &chunk);
     uint64_t before = changeable_get(c, id, item);
     memcpy(at, &value, a->shape.element_size);
-    seal_sum(c, a, (uint64_t)(chunk - a->chunks), seal(c, *chunk));
+    update_list(c, a, (uint64_t)(chunk - a->chunks), update_checksum(c, *chunk));
     return before;
 }

@@ -1,5 +1,5 @@
-/* Uncompressed files in memory with one changed value. The chunk checksum and the stored chunk
- * checksums are adjusted, so that only the value reveals the change. */
+/* Changes a value of an uncompressed file in memory, and updates the checksum of the chunk and the
+ * list of chunk checksums, so that only the value reveals the change. */
 #ifndef EBPO_TESTS_CHANGED_ARRAY_H
 #define EBPO_TESTS_CHANGED_ARRAY_H
 
@@ -17,7 +17,7 @@ typedef struct changeable {
 void changeable_load(changeable *c, const char *path);
 void changeable_free(changeable *c);
 
-/* Returns the number of values of an array of the root; 0: not present. */
+/* Returns the number of values of an array in the root group; 0: the array is not in the file. */
 uint64_t changeable_count(const changeable *c, ebpo_array_id id);
 /* Returns a value, or sets a value and returns the original one; values are counted row by row. */
 uint64_t changeable_get(const changeable *c, ebpo_array_id id, uint64_t item);

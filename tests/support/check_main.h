@@ -1,4 +1,4 @@
-/* The main function of Check programs: check_main.c. */
+/* Interface of check_main.c, which has the main function of Check programs. */
 #ifndef EBPO_TESTS_CHECK_MAIN_H
 #define EBPO_TESTS_CHECK_MAIN_H
 

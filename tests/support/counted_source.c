@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static bool touch(counted_source *c, uint64_t offset, uint64_t size)
+static bool mark_requested(counted_source *c, uint64_t offset, uint64_t size)
 {
     uint64_t before = c->requested;
     for (uint64_t i = offset; i < offset + size; i++) {
@@ -24,7 +24,7 @@ static ebpo_status read_counted(void *user, uint64_t offset, uint64_t size, void
         strcpy(error->message, "the line is down");
         return EBPO_E_IO;
     }
-    c->alone += touch(c, offset, size);
+    c->alone += mark_requested(c, offset, size);
     memcpy(data, c->data + offset, size);
     return EBPO_OK;
 }
@@ -34,7 +34,7 @@ static void expect_counted(void *user, const ebpo_range *ranges, size_t count)
     counted_source *c = user;
     bool any = false;
     for (size_t i = 0; i < count; i++)
-        any |= touch(c, ranges[i].offset, ranges[i].size);
+        any |= mark_requested(c, ranges[i].offset, ranges[i].size);
     c->batches += any;
 }
 

@@ -1,4 +1,4 @@
-/* A file whose source counts each byte that is read or prefetched once, and can fail. */
+/* Opens a file with a source that counts the requested bytes, each byte once, and that can fail. */
 #ifndef EBPO_TESTS_COUNTED_SOURCE_H
 #define EBPO_TESTS_COUNTED_SOURCE_H
 
@@ -6,15 +6,15 @@
 
 typedef struct counted_source {
     uint8_t *data, *touched;
-    uint64_t size, requested; /* bytes of the file; bytes requested */
-    uint64_t batches;         /* prefetch hints */
-    uint64_t alone;           /* reads of bytes that were not requested before */
-    uint64_t failed;          /* reads during the failure */
-    bool failing;
+    uint64_t size, requested; /* number of bytes of the file, and of requested bytes */
+    uint64_t batches;         /* number of prefetch hints with bytes not requested before */
+    uint64_t alone;           /* number of reads of bytes that were not requested before */
+    uint64_t failed;          /* number of reads that failed */
+    bool failing;             /* all reads fail */
 } counted_source;
 
-/* Opens a file; `far`: the source takes prefetch hints. For one thread. Aborts if the file cannot
- * be opened. */
+/* Opens a file, for use by one thread. Aborts if the file cannot be opened. far: the source accepts
+ * prefetch hints. */
 ebpo_file *counted_open(counted_source *c, const char *path, bool far);
 void counted_close(counted_source *c, ebpo_file *file);
 

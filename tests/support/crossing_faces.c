@@ -23,7 +23,7 @@ static void *make(uint64_t count, size_t size)
 
 static int sign_of(double x) { return (x > 0) - (x < 0); }
 
-/* Floats are integer multiples of 2^-149. */
+/* Sets z to x * 2^149, which is an integer. */
 static void set_whole(mpz_t z, float x)
 {
     int exponent;
@@ -150,7 +150,7 @@ static bool segment_intersects(const float *p, const float *q, const triangle t)
     return true;
 }
 
-/* Returns true when faces f and g have a common point besides shared corners and edges. */
+/* Returns true if faces f and g have a common point besides shared corners and edges. */
 static bool have_common_point(const face_model *m, uint64_t f, uint64_t g)
 {
     triangle a, b;
@@ -273,7 +273,8 @@ static int by_cell(const void *x, const void *y)
     return (a->face > b->face) - (a->face < b->face);
 }
 
-/* Tests whether boxes intersect; each pair counts only in one of its common cells. */
+/* Returns true if the boxes of two faces intersect, and `cell` is the cell in which the pair
+ * counts: one of its common cells. */
 static bool near(const face_model *m, const grid *g, uint64_t cell, uint64_t f, uint64_t h)
 {
     float a[2][3], b[2][3];

@@ -27,12 +27,12 @@ struct degenerate_case {
     ebpo_status status;  /* not EBPO_OK: converting fails with this status ... */
     const char *message; /* ... and the message contains this text */
     bool surface;        /* the mesh is not balanced, so a surface; else a solid */
-    int reached;         /* number of levels of the tree; 0: any */
+    int reached;         /* required number of levels of the tree; 0: any number */
     double volume;       /* integral of the winding number by a formula; 0: none */
     /* allowed relative error of `volume` for the rounding of coordinates; 0: DEGENERATE_MEASURE */
     double within;
     double measure; /* allowed relative error of ebpo_measure; 0: DEGENERATE_MEASURE */
-    double set;     /* volume of the set of points; 0: equal to the integral; NAN: unknown */
+    double set;     /* volume of the solid as a set of points; 0: equal to `volume`; NAN: unknown */
 };
 extern const degenerate_case degenerate_cases[];
 extern const int degenerate_case_count;
@@ -63,11 +63,11 @@ typedef struct degenerate_result {
 /* Builds, writes and verifies a case, and queries `queries` points and a quarter as many rays;
  * out->fault describes a failure. */
 void degenerate_run(const degenerate_case *c, uint64_t queries, degenerate_result *out);
-/* Only checks and builds; the mesh is consumed. */
+/* Checks the mesh and builds the tree, and consumes the mesh. */
 ebpo_status degenerate_build(const degenerate_case *c, ebpo_mesh *mesh, ebpo_tree *tree,
                              ebpo_error *error);
 
-/* Generators, each with its arguments a[0], a[1], ... */
+/* Generators. The comments list the arguments a[0], a[1], ... of each generator. */
 ebpo_mesh degenerate_named(const degenerate_case *c); /* .solid */
 /* factor, floats, shift: boxes that touch at vertices, edges, faces; volume 3.375 factor^3 */
 ebpo_mesh degenerate_shells(const degenerate_case *c);

@@ -1,4 +1,4 @@
-/* Preloaded library; see faults.h. */
+/* Lets system calls fail, as a preloaded library; see faults.h. */
 #undef _FILE_OFFSET_BITS /* defines both names of each call */
 #ifndef _GNU_SOURCE
 #define _GNU_SOURCE
@@ -51,7 +51,8 @@ static struct {
     FILE *(*fdopen)(int, const char *);
 } real;
 
-/* Standard C converts a pointer to an object into one to a function only by its bytes. */
+/* Finds the original function. Copies the bytes of the pointer, as standard C does not convert a
+ * pointer to an object into a pointer to a function. */
 static void find(const char *name, void *call)
 {
     void *found = dlsym(RTLD_NEXT, name);
@@ -464,11 +465,11 @@ int unlink(const char *path)
  * cookie. Interrupted calls do not occur on disks. */
 static ssize_t cookie_read(void *cookie, char *data, size_t size)
 {
-    ssize_t got;
+    ssize_t bytes;
     do
-        got = read_as((int)(intptr_t)cookie, data, size, NULL);
-    while (got < 0 && errno == EINTR);
-    return got;
+        bytes = read_as((int)(intptr_t)cookie, data, size, NULL);
+    while (bytes < 0 && errno == EINTR);
+    return bytes;
 }
 
 static ssize_t cookie_write(void *cookie, const char *data, size_t size)

@@ -240,7 +240,7 @@ static void hash_ray(hashing *h, const degenerate_case *c, ebpo_context *context
 }
 
 /* Hashes error bounds of levels, and a subset selected by an error bound. */
-static void hash_reach(hashing *h, const degenerate_case *c, query_model *m)
+static void hash_error_bounds(hashing *h, const degenerate_case *c, query_model *m)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_status status = EBPO_OK;
@@ -296,16 +296,16 @@ static void hash_queries(hashing *h, const degenerate_case *c, query_model *m, u
     uint64_t state = 9;
     for (uint64_t i = 0; i < queries / 4; i++) {
         query_ray r;
-        bool fine = true;
+        bool finite = true;
         query_make_ray(m, &state, r.origin, r.direction, &r.t_max);
         for (int k = 0; k < 3; k++)
-            fine &= isfinite(r.origin[k]) && isfinite(r.direction[k]) &&
-                    isfinite(r.origin[k] + r.direction[k]);
-        if (fine)
+            finite &= isfinite(r.origin[k]) && isfinite(r.direction[k]) &&
+                      isfinite(r.origin[k] + r.direction[k]);
+        if (finite)
             hash_ray(h, c, m->context, &r);
     }
     free(points);
-    hash_reach(h, c, m);
+    hash_error_bounds(h, c, m);
     ebpo_context_free(m->context);
     ebpo_model_free(m->model);
 }

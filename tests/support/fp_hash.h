@@ -21,7 +21,7 @@ typedef struct fp_hashes {
 void fp_hash_case(const degenerate_case *c, const fp_setting *setting, uint64_t queries,
                   fp_hashes *out);
 
-/* Returns true if the case is small enough to be hashed by all builds. */
+/* Returns true if the case is small enough for tests of all builds. */
 bool fp_hash_takes(const degenerate_case *c);
 
 #endif

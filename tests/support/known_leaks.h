@@ -1,7 +1,7 @@
-/* Suppresses leaks of libhdf5 1.10 after a damaged object header, and what the dynamic linker
- * allocates for dlopen and holds until the end: LeakSanitizer omits it by itself, but not when the
- * preloaded malloc of faults.c is between. One file of each program that is built with
- * LeakSanitizer includes this header. */
+/* Suppresses reports of LeakSanitizer on two kinds of memory: leaks of libhdf5 1.10 after a damaged
+ * object header, and memory that the dynamic linker allocates for dlopen and never frees.
+ * LeakSanitizer does not report the second kind, except if the malloc of faults.c is preloaded. One
+ * file of each program that is built with LeakSanitizer includes this header. */
 #ifndef EBPO_TESTS_KNOWN_LEAKS_H
 #define EBPO_TESTS_KNOWN_LEAKS_H
 

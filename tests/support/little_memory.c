@@ -1,5 +1,6 @@
-/* Preloaded library that simulates a machine. Environment variables: EBPO_TEST_FREE, bytes of free
- * memory; EBPO_TEST_LOCK, the error number with which locking a file fails. */
+/* Simulates a machine with little memory, or without locks of files, as a preloaded library.
+ * Environment variables: EBPO_TEST_FREE, number of bytes of free memory; EBPO_TEST_LOCK, error
+ * number with which locking a file fails. */
 #include <errno.h>
 #include <stdint.h>
 #include <stdlib.h>

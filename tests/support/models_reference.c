@@ -176,7 +176,7 @@ uint64_t reference_pairs(const reference_faces *a, const reference_faces *b, ref
     return count;
 }
 
-/* Returns true when the gap along one of some directions is certainly greater. */
+/* Returns true if the distance of the faces along one of these directions is certainly greater. */
 static bool farther(const double a[3][3], const double b[3][3], double direction[][3],
                     int directions, double distance)
 {

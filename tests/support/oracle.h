@@ -11,7 +11,7 @@
 #include <ebpo/mesh.h>
 
 /* A mesh to query. An oracle has scratch memory, so only one thread at a time may use it. Functions
- * abort if memory is short. */
+ * abort if there is not enough memory. */
 typedef struct oracle oracle;
 oracle *oracle_make(const ebpo_mesh *mesh); /* copies; coordinates are finite */
 void oracle_free(oracle *o);
@@ -20,7 +20,7 @@ void oracle_free(oracle *o);
 typedef struct oracle_nearest {
     double distance; /* correctly rounded, ties to even; INFINITY when it overflows */
     bool on;         /* the exact distance is 0: the point is on a closed triangle */
-    /* all faces at exactly this distance, ascending; lent until the next call */
+    /* all faces at exactly this distance, ascending; valid until the next call */
     const uint32_t *faces;
     uint32_t count;
 } oracle_nearest;
@@ -60,11 +60,12 @@ typedef struct oracle_hit {
     double t;   /* correctly rounded */
 } oracle_hit;
 /* Finds the closed triangles that intersect origin + t direction, 0 <= t <= t_max, by the exact t
- * of the first common point, then by index. The hits are lent until the next call. */
+ * of the first common point, then by index. The hits are valid until the next call. */
 void oracle_ray(oracle *o, const double origin[3], const double direction[3], double t_max,
                 const oracle_hit **hits, uint32_t *count);
 
-/* Finds the closed triangles that intersect the closed box, ascending. Lent until the next call. */
+/* Finds the closed triangles that intersect the closed box, ascending. They are valid until the
+ * next call. */
 void oracle_box(oracle *o, const double min[3], const double max[3], const uint32_t **faces,
                 uint32_t *count);
 

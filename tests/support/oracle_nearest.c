@@ -28,7 +28,7 @@ static void segment_distance(oracle *o, int i, oracle_fraction *out)
     }
 }
 
-/* Returns true when the projection of the origin on the plane of the face is in the face. */
+/* Returns true if the projection of the origin on the plane of the face is in the face. */
 static bool above_face(oracle *o)
 {
     for (int i = 0; i < 3; i++) {
@@ -178,14 +178,14 @@ static void near_weights(double a[3][3], double w[3])
  * point of the triangle, low the distance of a plane before the triangle. */
 static void face_bounds(const double corner[9], const double p[3], double *low, double *high)
 {
-    double a[3][3], w[3], q[3], reach = 0;
+    double a[3][3], w[3], q[3], size = 0;
     for (int i = 0; i < 3; i++) {
         for (int k = 0; k < 3; k++)
             a[i][k] = corner[3 * i + k] - p[k];
-        reach = fmax(reach, fabs(a[i][0]) + fabs(a[i][1]) + fabs(a[i][2]));
+        size = fmax(size, fabs(a[i][0]) + fabs(a[i][1]) + fabs(a[i][2]));
     }
     *low = 0, *high = INFINITY;
-    if (!(reach > 0x1p-400 && reach < 0x1p400))
+    if (!(size > 0x1p-400 && size < 0x1p400))
         return;
     near_weights(a, w);
     if (!(w[0] >= -1e-13 && w[1] >= -1e-13 && w[2] >= -1e-13 &&
@@ -193,7 +193,7 @@ static void face_bounds(const double corner[9], const double p[3], double *low, 
         w[0] = 1, w[1] = w[2] = 0;
     for (int k = 0; k < 3; k++)
         q[k] = w[0] * a[0][k] + w[1] * a[1][k] + w[2] * a[2][k];
-    double length = sqrt(dot(q, q)), margin = 1e-12 * reach;
+    double length = sqrt(dot(q, q)), margin = 1e-12 * size;
     *high = length + margin;
     if (length > 0x1p-450)
         *low = fmin(dot(q, a[0]), fmin(dot(q, a[1]), dot(q, a[2]))) / length - margin;
@@ -287,8 +287,8 @@ static void exact_signs(oracle *o, int sign[3])
     }
 }
 
-/* Returns 1: leaves through the face, -1: enters, 0: neither, 2: the ray intersects an edge or a
- * vertex, or is in the plane. */
+/* Returns 1 if the ray leaves through the face, -1 if it enters, 0 if it does not intersect the
+ * face, and 2 if it intersects an edge or a vertex, or is in the plane. */
 static int crossing(oracle *o, uint32_t face, const double p[3], const double d[3])
 {
     double a[3][3];

@@ -57,7 +57,7 @@ static void intersect_edge(oracle *o, int i, bool *any, oracle_fraction *best)
         keep_least(o, any, best, &o->one);
 }
 
-/* Returns true when the origin is in the face, whose plane contains it. */
+/* Returns true if the origin is in the face, whose plane contains it. */
 static bool origin_in_face(oracle *o)
 {
     for (int i = 0; i < 3; i++) {
@@ -193,7 +193,7 @@ void oracle_ray(oracle *o, const double origin[3], const double direction[3], do
 
 /* --- boxes; corners are relative to o->p = min, o->direction = max - min --- */
 
-/* Returns true when the projections on the axis have a gap. */
+/* Returns true if the projections on the axis have a gap. */
 static bool separates(oracle *o, mpz_t *axis)
 {
     mpz_t *low = &o->s[2], *high = &o->s[3];

@@ -59,7 +59,7 @@ static void add_directions(problem *p, int of, int feature)
         }
 }
 
-/* Solves the equations of the Gram matrix and the right side. Returns false when the directions are
+/* Solves the equations of the Gram matrix and the right side. Returns false if the directions are
  * not independent, so that a lower feature also has the minimum. */
 static bool solve(problem *p)
 {
@@ -89,7 +89,7 @@ static bool solve(problem *p)
     return true;
 }
 
-/* Returns true when parameters from .. to - 1 belong to a point within its feature. */
+/* Returns true if parameters from .. to - 1 belong to a point within its feature. */
 static bool within(problem *p, int from, int to)
 {
     mpq_set_ui(p->sum, 0, 1);

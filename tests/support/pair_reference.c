@@ -43,7 +43,7 @@ enum { CORNERS_MAX = 64 };
 typedef struct work {
     zector corner[2][3], edge[2][3], normal[2], n, w, x, y;
     mpz_t nn, s, t, den;
-    /* the found points: points[i] / weight[i] */
+    /* the corners of the intersection that were found: points[i] / weight[i] */
     zector points[CORNERS_MAX];
     mpz_t weight[CORNERS_MAX];
     int count, unit;
@@ -232,7 +232,7 @@ static void find_common(work *k)
     }
 }
 
-/* Returns true when the mean of the found points, an inner point of the intersection, is in the
+/* Returns true if the mean of the found points, an inner point of the intersection, is in the
  * interior of face `of`. */
 static bool mean_within(work *k, int of, zector sum, mpz_t weight)
 {
@@ -287,7 +287,7 @@ static int feature_at(work *k, int of, int i)
     return 6;
 }
 
-/* Returns true when |x - point i| <= 0.51 ulp(x) + 2^-60 most on each axis. */
+/* Returns true if |x - point i| <= 0.51 ulp(x) + 2^-60 most on each axis. */
 static bool close_to(work *k, int i, const double *x, const double most[3])
 {
     bool close = true;

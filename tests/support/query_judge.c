@@ -195,8 +195,8 @@ uint64_t query_wrong_inside(const query_model *m, const double *points, const qu
     return wrong;
 }
 
-/* Returns true when the nearest point is at about the distance from the point: within some ulps of
- * the largest coordinate. */
+/* Returns true if the nearest point has the distance from the point, within some ulps of the
+ * largest coordinate. */
 static bool point_fits(const query_model *m, const double *p, const query_truth *t,
                        const ebpo_distance_result *got)
 {

@@ -9,7 +9,8 @@
 #include "scratch.h"
 #include "solids.h"
 
-/* For Check tests. The macro declares `ebpo_error *error`, which `call` can pass on. */
+/* Fails a Check test if the call fails. The macro declares `ebpo_error *error`, which `call` can
+ * pass on. */
 #define ASSERT_OK(call)                                                     \
     do {                                                                    \
         ebpo_error error_ = EBPO_ERROR_INIT, *error = &error_;              \
@@ -69,11 +70,11 @@ typedef struct query_model {
 void query_model_make(query_model *m, const char *name, ebpo_mesh mesh,
                       const query_variant *variant);
 void query_model_free(query_model *m);
-/* As query_model_make, but returns the library's status instead of failing the test. On failure no
- * files or memory remain. */
+/* Does the same as query_model_make, but returns the library's status instead of failing the test.
+ * After a failure no files or memory remain. */
 ebpo_status query_model_try(query_model *m, const char *name, ebpo_mesh mesh,
                             const query_variant *variant, ebpo_error *error);
-/* Only checks and builds, with one thread; the mesh is consumed. */
+/* Checks the mesh and builds the tree, with one thread; consumes the mesh. */
 ebpo_status query_build(ebpo_tree *tree, ebpo_mesh *mesh, const query_variant *variant,
                         ebpo_error *error);
 
@@ -87,13 +88,13 @@ typedef struct query_truth {
 } query_truth;
 void query_find_truths(query_model *m, const double *points, uint64_t count, query_truth *out);
 
-/* Returns the number of wrong results among `count` exact ones, and prints the first.
- * `is_unsigned`: no signs were requested. */
+/* Return the number of wrong results among `count` exact results, and print the first wrong ones.
+ * is_unsigned: no signs were requested. */
 uint64_t query_wrong_inside(const query_model *m, const double *points, const query_truth *truth,
                             uint64_t count, const ebpo_inside_result *got);
 uint64_t query_wrong_distance(const query_model *m, const double *points, const query_truth *truth,
                               uint64_t count, bool is_unsigned, const ebpo_distance_result *got);
-/* As the two functions above, for results limited by a level or a deadline. */
+/* Do the same for results that are limited by a level or a deadline. */
 uint64_t query_wrong_limited_inside(const query_model *m, const double *points,
                                     const query_truth *truth, uint64_t count,
                                     const ebpo_inside_result *got);

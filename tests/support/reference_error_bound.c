@@ -83,13 +83,13 @@ double reference_distance(const ebpo_mesh *mesh, bool solid, const double p[3])
     return fabs(angle) > 6.28 ? 0 : best;
 }
 
-double reference_reach(ebpo_file *file, int level, const ebpo_mesh *mesh, bool solid,
-                       uint64_t points, uint64_t seed)
+double reference_max_distance(ebpo_file *file, int level, const ebpo_mesh *mesh, bool solid,
+                              uint64_t points, uint64_t seed)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_mesh lod;
     ebpo_lod_nodes nodes;
-    double most = 0;
+    double greatest = 0;
     ck_assert_msg(ebpo_lod_level_nodes(file, level, NULL, &lod, &nodes, NULL, &error) == EBPO_OK,
                   "%s", error.message);
     for (uint64_t i = 0; i < points && lod.face_count; i++) {
@@ -110,9 +110,9 @@ double reference_reach(ebpo_file *file, int level, const ebpo_mesh *mesh, bool s
             for (uint64_t k = 0; k < 3; k++)
                 p[k] += t * (lod.xyz64[3 * other + k] - p[k]);
         }
-        most = fmax(most, reference_distance(mesh, solid, p));
+        greatest = fmax(greatest, reference_distance(mesh, solid, p));
     }
     ebpo_mesh_free(&lod);
     ebpo_lod_nodes_free(&nodes);
-    return most;
+    return greatest;
 }

@@ -1,5 +1,4 @@
-/* Folders for files of tests: below $TMPDIR or /tmp, empty when made, removed with their contents.
- */
+/* Makes folders for files of tests, below $TMPDIR or /tmp, and removes them with their contents. */
 #ifndef EBPO_TESTS_SCRATCH_H
 #define EBPO_TESTS_SCRATCH_H
 

@@ -110,7 +110,7 @@ void ebpo_test_point(const ebpo_mesh *m, uint64_t v, double out[3])
         out[k] = m->xyz32 ? (double)m->xyz32[3 * v + (unsigned)k] : m->xyz64[3 * v + (unsigned)k];
 }
 
-/* Allocates exactly the used size, because the arrays grow by their counts alone. */
+/* Allocates the powers of two for the counts: vertex and face allocate only at powers of two. */
 static void regrow(ebpo_mesh *m, uint64_t vertices, uint64_t faces)
 {
     uint64_t v = 1, f = 1;
@@ -348,8 +348,7 @@ ebpo_mesh ebpo_test_voxels(const uint8_t *filled, uint32_t n, double cell)
     return m;
 }
 
-/* Splits each face into four. Midpoints are found by linear search among the edges of the lower
- * end, so this is for small meshes only. */
+/* Splits each face into four. Midpoints of edges are found by a hash table. */
 static ebpo_mesh subdivide(const ebpo_mesh *m)
 {
     ebpo_mesh out = empty();

@@ -5,8 +5,8 @@
 
 #include <ebpo/file.h>
 
-/* All functions return a mesh that the caller frees with ebpo_mesh_free; they abort if memory is
- * short. Coordinates are doubles, unless stated. */
+/* All functions return a mesh that the caller frees with ebpo_mesh_free; they abort if there is not
+ * enough memory. Coordinates are doubles, unless a comment states otherwise. */
 
 ebpo_mesh ebpo_test_tetrahedron(double size);
 /* Makes an axis-parallel box of 12 n^2 faces, each side n by n squares. Counter-clockwise seen from
@@ -34,19 +34,19 @@ ebpo_mesh ebpo_test_band(uint32_t n, bool twisted);
 /* Makes a square of size x size in z = 0, n by n cells, normal +z: an open surface. */
 ebpo_mesh ebpo_test_sheet(double size, uint32_t n);
 
-/* Tools. */
+/* Change and read meshes. */
 void ebpo_test_append(ebpo_mesh *mesh, const ebpo_mesh *other); /* vertices are not shared */
-/* doubles only; returns its index */
+/* appends a vertex to a mesh with double coordinates; returns its index */
 uint32_t ebpo_test_append_vertex(ebpo_mesh *mesh, double x, double y, double z);
 void ebpo_test_turn_face(ebpo_mesh *mesh, uint64_t face); /* reverses its orientation */
 void ebpo_test_append_face(ebpo_mesh *mesh, uint32_t a, uint32_t b, uint32_t c);
 void ebpo_test_reverse(ebpo_mesh *mesh);  /* reverses every face */
 void ebpo_test_to_float(ebpo_mesh *mesh); /* rounds the coordinates */
-/* doubles only */
+/* transforms a mesh with double coordinates */
 void ebpo_test_transform(ebpo_mesh *mesh, const double matrix[3][3], const double offset[3]);
 /* renumbers vertices and faces, rotates corners */
 void ebpo_test_shuffle(ebpo_mesh *mesh, uint64_t seed);
-/* three separate vertices for every face */
+/* gives every face three separate vertices */
 void ebpo_test_split_vertices(ebpo_mesh *mesh);
 void ebpo_test_point(const ebpo_mesh *mesh, uint64_t vertex, double out[3]);
 

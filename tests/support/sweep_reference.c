@@ -58,7 +58,7 @@ static void take(hull *h)
     h->found = true;
 }
 
-/* 0 <= share / bottom */
+/* Returns true if share / bottom >= 0. */
 static bool not_negative(const hull *h, const mpz_t share)
 {
     return mpz_sgn(share) * mpz_sgn(h->bottom) >= 0;
@@ -130,7 +130,7 @@ static void try_all(hull *h)
     }
 }
 
-/* Returns true when some points may be beyond the known maximum along the direction. */
+/* Returns true if some points may be beyond the known maximum along the direction. */
 static bool may_be_later(hull *h)
 {
     for (int i = 0; i < 9; i++) {

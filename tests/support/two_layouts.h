@@ -1,4 +1,4 @@
-/* The same model in two files: with contiguous subtrees, and level by level. */
+/* Writes the same model to two files: with contiguous subtrees, and level by level. */
 #ifndef EBPO_TESTS_TWO_LAYOUTS_H
 #define EBPO_TESTS_TWO_LAYOUTS_H
 
@@ -6,7 +6,7 @@
 
 typedef struct two_layouts {
     const char *packed, *plain; /* paths in the program's scratch folder */
-    ebpo_file *with, *without;  /* both open files */
+    ebpo_file *with, *without;  /* the open files, with and without contiguous subtrees */
 } two_layouts;
 
 /* Write both files of a tree, or of the tree that is built of a mesh; consume the tree or mesh.

@@ -56,7 +56,7 @@ static inline ebpo_status vector_read(const char *path, ebpo_tree *tree, ebpo_er
     return status;
 }
 
-/* Gives the first violation that verifying finds, as two lines; false if there is none. */
+/* Writes the first violation that verifying finds, as two lines. Returns false if there is none. */
 static inline bool vector_violation(const char *path, char *text, size_t size)
 {
     ebpo_file *file;
