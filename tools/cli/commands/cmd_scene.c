@@ -78,7 +78,7 @@ static void info_json(const char *path, const ebpo_scene *scene, const ebpo_scen
     json_finish(&j);
 }
 
-static const char *plural(char out[40], uint64_t count, const char *one, const char *many)
+static const char *count_words(char out[40], uint64_t count, const char *one, const char *many)
 {
     return words_plural(out, 40, count, one, many);
 }
@@ -88,15 +88,15 @@ static void info_words(const char *path, const ebpo_scene *scene, const ebpo_sce
 {
     scene_sums s = sum_models(scene, c->models);
     char text[2][40];
-    printf("%s: %s of %s\n", path, plural(text[0], c->instances, "instance", "instances"),
-           plural(text[1], c->models, "model", "models"));
+    printf("%s: %s of %s\n", path, count_words(text[0], c->instances, "instance", "instances"),
+           count_words(text[1], c->models, "model", "models"));
     printf("fixed      %s\nlayers     %llu\ngroups     %llu\nroutes     %llu, %s\n",
-           plural(text[0], c->fixed, "instance", "instances"), (unsigned long long)c->layers,
+           count_words(text[0], c->fixed, "instance", "instances"), (unsigned long long)c->layers,
            (unsigned long long)c->groups, (unsigned long long)c->routes,
-           plural(text[1], c->poses, "pose", "poses"));
+           count_words(text[1], c->poses, "pose", "poses"));
     printf("cameras    %llu\nignored    %s\nclearances %s\n", (unsigned long long)c->cameras,
-           plural(text[0], c->ignored, "rule", "rules"),
-           plural(text[1], c->clearances, "rule", "rules"));
+           count_words(text[0], c->ignored, "rule", "rules"),
+           count_words(text[1], c->clearances, "rule", "rules"));
     printf("time       %g to %g\n", c->begin, c->end);
     printf("box        %.9g %.9g %.9g to %.9g %.9g %.9g\n", box[0][0], box[0][1], box[0][2],
            box[1][0], box[1][1], box[1][2]);

@@ -220,7 +220,7 @@ static char *path_of(const char *name)
 
 /* ---- pieces ---- */
 
-static ebpo_status hint(const piece_writer *w, ebpo_error *error)
+static ebpo_status fail_too_many(const piece_writer *w, ebpo_error *error)
 {
     error->status = EBPO_E_LIMIT;
     snprintf(error->message, sizeof error->message, "%s: has %llu %s, and at most %d are written%s",
@@ -276,7 +276,7 @@ static ebpo_status name_pieces(piece_writer *w, ebpo_error *error)
 {
     uint64_t count = ebpo_components_count(w->components), max_faces = 0;
     if (count > PIECES_MAX)
-        return hint(w, error);
+        return fail_too_many(w, error);
     w->pieces = calloc(count, sizeof *w->pieces);
     if (!w->pieces)
         return no_memory(error);
