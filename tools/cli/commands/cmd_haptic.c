@@ -477,19 +477,19 @@ static ebpo_status open_model(job *j, uint64_t memory, ebpo_error *error)
 static ebpo_status open_device(job *j, const double start[3], ebpo_error *error)
 {
     const values *v = j->v;
-    ebpo_haptic_options options = EBPO_HAPTIC_OPTIONS_INIT;
-    options.radius = v->radius;
-    options.friction = v->friction;
-    options.stiffness = v->stiffness;
-    options.damping = v->damping;
-    options.skin = v->skin;
-    options.search_radius = v->search_radius;
-    options.step_seconds = 1 / v->rate;
-    options.faces = (uint64_t)v->faces;
-    options.kind = j->kind;
-    options.points = (const double(*)[3])j->points;
-    options.point_count = j->point_count;
-    return ebpo_haptic_new(j->model, &options, start, &j->haptic, error);
+    ebpo_haptic_options haptic_options = EBPO_HAPTIC_OPTIONS_INIT;
+    haptic_options.radius = v->radius;
+    haptic_options.friction = v->friction;
+    haptic_options.stiffness = v->stiffness;
+    haptic_options.damping = v->damping;
+    haptic_options.skin = v->skin;
+    haptic_options.search_radius = v->search_radius;
+    haptic_options.step_seconds = 1 / v->rate;
+    haptic_options.faces = (uint64_t)v->faces;
+    haptic_options.kind = j->kind;
+    haptic_options.points = (const double(*)[3])j->points;
+    haptic_options.point_count = j->point_count;
+    return ebpo_haptic_new(j->model, &haptic_options, start, &j->haptic, error);
 }
 
 static double model_diagonal(const ebpo_info *info)

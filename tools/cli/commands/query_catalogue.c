@@ -8,6 +8,7 @@
 
 #include "cli/command.h"
 #include "cli/model_stats.h"
+#include "cli/words.h"
 
 /* Options that a catalogue does not support, in the order of reports. */
 static const char *refused_option(const query_job *job)
