@@ -37,7 +37,7 @@ static bool cut_numbers(points *p, uint64_t begin, uint64_t size, uint64_t numbe
     if (p->rows_stated && (size - begin) / each != p->rows_total)
         return fail_cut(p, rows > p->rows_total
                                ? "holds more rows than its shape states; it is in another format"
-                               : "holds fewer rows than its shape states; it is truncated");
+                               : "has fewer rows than its shape states; it is truncated");
     uint64_t first = points_share(rows, number, of), end = points_share(rows, number + 1, of);
     p->row = first;
     p->rows_stated = false; /* checked above; take_numbers need not check it */
