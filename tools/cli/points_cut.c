@@ -36,7 +36,7 @@ static bool cut_numbers(points *p, uint64_t begin, uint64_t size, uint64_t numbe
     uint64_t each = (uint64_t)(p->layout.per_row * p->layout.bytes), rows = (size - begin) / each;
     if (p->rows_stated && (size - begin) / each != p->rows_total)
         return fail_cut(p, rows > p->rows_total
-                               ? "holds more rows than its shape states; it is in another format"
+                               ? "has more rows than its shape states; it is in another format"
                                : "has fewer rows than its shape states; it is truncated");
     uint64_t first = points_share(rows, number, of), end = points_share(rows, number + 1, of);
     p->row = first;
